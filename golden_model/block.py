@@ -1,0 +1,111 @@
+"""What a block declares, once: ports with formats, registers, latency, model, reference, bounds.
+
+The contract every block keeps, in the model and in the RTL:
+
+* A sample enters on the clock edge at which ``in_valid`` is high.  Its inputs stay as they are for
+  ``interval`` clocks from that edge, which is also the least distance of two samples.
+* Registers change only while no sample is in flight.
+* ``out_valid`` is high ``latency`` clocks later, for one clock, and the outputs stay until the next
+  sample's may change them.
+* ``rst`` is synchronous and active high.  It empties the pipeline and brings the state to
+  ``state``; it promises nothing about the outputs, which nobody may read without ``out_valid``.
+* A clocked block (``clocked=True``) has no strobes: each clock is a sample, latency is one.
+
+``reference`` and ``bound`` see the values as real numbers, the state as the integers it holds before
+the sample, so that what they promise is one sample's error, derived from the formats alone.
+
+``step(*inputs, *registers, *generics)`` returns a tuple in the order of ``outputs``; a block with
+state has ``step(state, ...)`` and returns ``(state, outputs)``, state being a NamedTuple of integers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from golden_model.fixed import Format
+from golden_model.formats import BIT
+
+
+@dataclass(frozen=True)
+class Port:
+    """A named signal with its format and, where the block needs it, a narrower legal range."""
+
+    name: str
+    fmt: Format
+    lo: int | None = None
+    hi: int | None = None
+    doc: str = ""
+
+    @property
+    def low(self) -> int:
+        return self.fmt.lo if self.lo is None else self.lo
+
+    @property
+    def high(self) -> int:
+        return self.fmt.hi if self.hi is None else self.hi
+
+    @property
+    def is_bit(self) -> bool:
+        return self.fmt == BIT
+
+
+@dataclass(frozen=True)
+class Const:
+    """A real number rounded into a format: what the VHDL package will hold."""
+
+    real: float
+    fmt: Format
+
+    @property
+    def value(self) -> int:
+        exact = self.fmt.to_int(self.real)
+        if abs(exact * self.fmt.lsb - self.real) > self.fmt.lsb / 2:
+            raise ValueError(f"{self.real} does not fit {self.fmt}")
+        return exact
+
+
+@dataclass(frozen=True)
+class Block:
+    """One block of the core; see the module's docstring for the contract."""
+
+    name: str
+    folder: str
+    paper: str  # where the equation comes from
+    step: Callable
+    inputs: tuple[Port, ...]
+    outputs: tuple[Port, ...]
+    latency: int
+    reference: Callable | None  # float: (values, state) -> {output: value}
+    bound: Callable | None  # (values, state) -> {output: largest |golden - reference|}
+    registers: tuple[Port, ...] = ()
+    state: Any = None
+    interval: int = 1
+    clocked: bool = False
+    constants: Mapping[str, int | Const] = field(default_factory=dict)
+    roms: Mapping[str, tuple[Format, list[int]]] = field(default_factory=dict)
+    configs: tuple[Mapping[str, int], ...] = ({},)  # generics to verify with
+    stimuli: Callable | None = None  # (rng, config) -> list of {port: value}: the block's own hard cases
+    width_from: Mapping[str, Callable] = field(default_factory=dict)  # port -> config -> Format
+
+    def ports(self, config: Mapping[str, int]) -> tuple[Port, ...]:
+        """Inputs and registers with the formats that the generics give them."""
+        return tuple(self._sized(p, config) for p in self.inputs + self.registers)
+
+    def out_ports(self, config: Mapping[str, int]) -> tuple[Port, ...]:
+        """Outputs with the formats that the generics give them."""
+        return tuple(self._sized(p, config) for p in self.outputs)
+
+    def _sized(self, port: Port, config: Mapping[str, int]) -> Port:
+        size = self.width_from.get(port.name)
+        return port if size is None else Port(port.name, size(config), port.lo, port.hi, port.doc)
+
+    def run(self, state, values: Mapping[str, int], config: Mapping[str, int]):
+        """One sample by name: returns (next state, {output: integer})."""
+        args = [values[p.name] for p in self.inputs + self.registers] + list(config.values())
+        if self.state is None:
+            result = self.step(*args)
+        else:
+            state, result = self.step(state, *args)
+        return state, {p.name: int(v) for p, v in zip(self.outputs, result, strict=True)}

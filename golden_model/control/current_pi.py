@@ -1,0 +1,123 @@
+"""Current regulators of both axes, d first, through one pair of multipliers.
+
+    err   = i_ref - i
+    int  += ki*err      unless the voltage was at its limit and err pushes further
+    u_pi  = kp*err + int
+
+``sat_d``, ``sat_q`` (-1, 0, +1) say at which limit voltage_limit held the axis in the sample before;
+waiting one sample keeps this block independent of the limiter and lets the integral run on for at most
+that sample.  ``run`` = 0: outputs and integrals are zero.
+
+Formats: err saturated to PU; proportional part rounded half up to S(3,28), whose limit of 8 lies so far
+beyond the output's that saturating it changes nothing; increment rounded half up to S(1,28), where
+2**-16 * ki still counts; integral saturated to S(1,28), twice the largest voltage the limiter grants;
+sum exact, rounded half up to PU and saturated, again twice the limiter's.
+"""
+
+from typing import NamedTuple
+
+from golden_model.block import Block, Port
+from golden_model.fixed import Format, round_sat, saturate
+from golden_model.formats import BIT, INTEGRAL, INTEGRAL_W, KI, KP, PU, PU_TO_INTEGRAL, PU_W
+from golden_model.kernel import kernel
+
+PROPORTIONAL = Format(1, 3, 28)
+PROPORTIONAL_W = PROPORTIONAL.width
+DROP_P = PU.frac_bits + KP.frac_bits - PROPORTIONAL.frac_bits
+DROP_I = PU.frac_bits + KI.frac_bits - INTEGRAL.frac_bits
+SAT = Format(1, 1, 0)
+
+
+class State(NamedTuple):
+    integral_d: int = 0  # INTEGRAL
+    integral_q: int = 0
+
+
+@kernel
+def axis(integral, i, i_ref, sat, run, kp, ki):
+    """One axis: (next integral, u_pi)."""
+    err = saturate(i_ref - i, PU_W)
+    prod_p = err * kp
+    prod_i = err * ki
+    proportional = round_sat(prod_p, DROP_P, PROPORTIONAL_W)
+    increment = round_sat(prod_i, DROP_I, INTEGRAL_W)
+    if (sat > 0 and err > 0) or (sat < 0 and err < 0):
+        increment = 0
+    integral = saturate(integral + increment, INTEGRAL_W)
+    if not run:
+        integral, proportional = 0, 0
+    return integral, round_sat(proportional + integral, PU_TO_INTEGRAL, PU_W)
+
+
+@kernel
+def step(state, i_d, i_q, i_d_ref, i_q_ref, sat_d, sat_q, run, kp_d, ki_d, kp_q, ki_q):
+    int_d, u_pi_d = axis(state.integral_d, i_d, i_d_ref, sat_d, run, kp_d, ki_d)
+    int_q, u_pi_q = axis(state.integral_q, i_q, i_q_ref, sat_q, run, kp_q, ki_q)
+    return State(int_d, int_q), (u_pi_d, u_pi_q, int_d, int_q)
+
+
+def reference(v, state):
+    out = {}
+    for x, old in (("d", state.integral_d), ("q", state.integral_q)):
+        err = min(max(v[f"i_{x}_ref"] - v[f"i_{x}"], -2.0), PU.hi * PU.lsb)
+        held = v[f"sat_{x}"] * err > 0
+        integral = old * INTEGRAL.lsb + (0.0 if held else v[f"ki_{x}"] * err)
+        integral = min(max(integral, -2.0), INTEGRAL.hi * INTEGRAL.lsb)
+        total = v[f"kp_{x}"] * err + integral
+        out[f"u_int_{x}"] = integral if v["run"] else 0.0
+        out[f"u_pi_{x}"] = min(max(total, -2.0), PU.hi * PU.lsb) if v["run"] else 0.0
+    return out
+
+
+def bound(_v, _state):
+    inner = INTEGRAL.lsb / 2
+    total = PROPORTIONAL.lsb / 2 + inner + PU.lsb / 2
+    return {"u_pi_d": total, "u_pi_q": total, "u_int_d": inner, "u_int_q": inner}
+
+
+def stimuli(rng, _config):
+    """Integrals driven into both rails and back, with and without the limiter's word; stop and restart."""
+    base = {"kp_d": 40000, "ki_d": 1 << 23, "kp_q": 50000, "ki_q": 1 << 22, "run": 1}
+    rows = []
+    for ref, sat in ((131071, 0), (131071, 1), (-131072, 1), (-131072, 0), (-131072, -1), (3, 0), (-3, 0)):
+        values = {"i_d_ref": ref, "i_q_ref": -1 - ref, "i_d": 0, "i_q": 0, "sat_d": sat, "sat_q": -sat}
+        rows += [{**base, **values} for _ in range(8)]
+    rows.append({**rows[-1], "run": 0})
+    rows += [{**rows[0], "i_d": int(rng.integers(-99, 99))} for _ in range(4)]
+    return rows
+
+
+BLOCK = Block(
+    name="current_pi",
+    folder="control",
+    paper="001, Fig. 8 and section 5.2: PI_idq",
+    step=step,
+    inputs=(
+        Port("i_d", PU, doc="current, d axis"),
+        Port("i_q", PU, doc="current, q axis"),
+        Port("i_d_ref", PU, doc="current reference, d axis"),
+        Port("i_q_ref", PU, doc="current reference, q axis"),
+        Port("sat_d", SAT, lo=-1, hi=1, doc="limit that held the d axis"),
+        Port("sat_q", SAT, lo=-1, hi=1, doc="limit that held the q axis"),
+        Port("run", BIT, doc="0: outputs and integrals zero"),
+    ),
+    registers=(
+        Port("kp_d", KP, doc="proportional gain, d axis"),
+        Port("ki_d", KI, doc="integral gain times sample time, d axis"),
+        Port("kp_q", KP, doc="proportional gain, q axis"),
+        Port("ki_q", KI, doc="integral gain times sample time, q axis"),
+    ),
+    outputs=(
+        Port("u_pi_d", PU, doc="regulator output, d axis"),
+        Port("u_pi_q", PU, doc="regulator output, q axis"),
+        Port("u_int_d", INTEGRAL, doc="its integral part, d axis"),
+        Port("u_int_q", INTEGRAL, doc="its integral part, q axis"),
+    ),
+    state=State(),
+    latency=6,
+    interval=2,
+    constants={"DROP_P": DROP_P, "DROP_I": DROP_I, "PROPORTIONAL_W": PROPORTIONAL_W},
+    reference=reference,
+    bound=bound,
+    stimuli=stimuli,
+)

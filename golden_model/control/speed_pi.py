@@ -1,0 +1,104 @@
+"""Speed regulator: from speed error to i_q reference, limited, with conditional integration.
+
+    err     = omega_ref - omega_me
+    u       = speed_kp*err + integral
+    i_q_ref = limit(u, +-i_max)
+    integral += speed_ki*err      unless u is beyond the limit and err pushes further
+
+Torque mode (``speed_mode`` = 0): i_q_ref is ``i_q_ext``, limited, and the integral follows it, so that
+a change to speed mode starts from the torque at hand.  ``run`` = 0: output and integral are zero.
+
+Formats: err saturated to PU; proportional part rounded half up to S(3,28): its limit of 8 lies so far
+beyond that of the output that saturating it changes nothing; increment rounded half up to S(1,28), where
+2**-16 * ki still counts; the integral is kept within +-i_max; sum exact, rounded half up to PU.
+"""
+
+from typing import NamedTuple
+
+from golden_model.block import Block, Port
+from golden_model.fixed import Format, clamp, round_half_up, round_sat, saturate
+from golden_model.formats import BIT, INTEGRAL, KI, KP, PU, PU_TO_INTEGRAL, PU_W
+from golden_model.kernel import kernel
+
+PROPORTIONAL = Format(1, 3, 28)
+PROPORTIONAL_W = PROPORTIONAL.width
+INCREMENT_W = INTEGRAL.width
+DROP_P = PU.frac_bits + KP.frac_bits - PROPORTIONAL.frac_bits
+DROP_I = PU.frac_bits + KI.frac_bits - INTEGRAL.frac_bits
+
+
+class State(NamedTuple):
+    integral: int = 0  # INTEGRAL
+
+
+@kernel
+def step(state, omega_ref, omega_me, i_q_ext, speed_mode, run, speed_kp, speed_ki, i_max):
+    err = saturate(omega_ref - omega_me, PU_W)
+    prod_p = err * speed_kp
+    prod_i = err * speed_ki
+    proportional = round_sat(prod_p, DROP_P, PROPORTIONAL_W)
+    increment = round_sat(prod_i, DROP_I, INCREMENT_W)
+    total = round_half_up(proportional + state.integral, PU_TO_INTEGRAL)
+    asked = total if speed_mode else i_q_ext
+    limit = i_max << PU_TO_INTEGRAL
+    hold = (total > i_max and err > 0) or (total < -i_max and err < 0)
+    if speed_mode:
+        integral = state.integral if hold else clamp(state.integral + increment, -limit, limit)
+    else:
+        integral = clamp(i_q_ext, -i_max, i_max) << PU_TO_INTEGRAL
+    i_q_ref = clamp(asked, -i_max, i_max)
+    limited = 1 if asked != i_q_ref else 0
+    if not run:
+        integral, i_q_ref, limited = 0, 0, 0
+    return State(integral), (i_q_ref, limited)
+
+
+def reference(v, state):
+    if not v["run"]:
+        return {"i_q_ref": 0.0}
+    err = min(max(v["omega_ref"] - v["omega_me"], -2.0), PU.hi * PU.lsb)
+    asked = v["speed_kp"] * err + state.integral * INTEGRAL.lsb if v["speed_mode"] else v["i_q_ext"]
+    return {"i_q_ref": min(max(asked, -v["i_max"]), v["i_max"])}
+
+
+def bound(_v, _state):
+    return {"i_q_ref": PROPORTIONAL.lsb / 2 + PU.lsb / 2}
+
+
+def stimuli(_rng, _config):
+    """A minute of saturation in both directions with recovery, torque mode, stop and restart."""
+    regs = {"speed_kp": 5 << 16, "speed_ki": 1 << 20, "i_max": 30000, "speed_mode": 1, "run": 1, "i_q_ext": 12345}
+    rows = []
+    for target in (131071, 100, -131072, 0):
+        rows += [{"omega_ref": target, "omega_me": w, **regs} for w in (0, 1000, target, target - 1, target + 1)]
+    rows = [r for r in rows if -131072 <= r["omega_me"] <= 131071] * 2
+    rows += [{**rows[0], "speed_mode": 0}, rows[0], {**rows[0], "run": 0}, rows[0]]
+    return rows
+
+
+BLOCK = Block(
+    name="speed_pi",
+    folder="control",
+    paper="001, section 5.3: speed regulator with limited current reference",
+    step=step,
+    inputs=(
+        Port("omega_ref", PU, doc="speed reference"),
+        Port("omega_me", PU, doc="electrical speed"),
+        Port("i_q_ext", PU, doc="current reference of torque mode"),
+        Port("speed_mode", BIT, doc="1: speed control, 0: torque control"),
+        Port("run", BIT, doc="0: output and integral zero"),
+    ),
+    registers=(
+        Port("speed_kp", KP, doc="proportional gain"),
+        Port("speed_ki", KI, doc="integral gain times sample time"),
+        Port("i_max", PU, lo=0, doc="limit of the current reference"),
+    ),
+    outputs=(Port("i_q_ref", PU, doc="current reference, q axis"), Port("speed_limited", BIT, doc="output at its limit")),
+    state=State(),
+    latency=5,
+    interval=5,
+    constants={"DROP_P": DROP_P, "DROP_I": DROP_I, "PROPORTIONAL_W": PROPORTIONAL_W},
+    reference=reference,
+    bound=bound,
+    stimuli=stimuli,
+)

@@ -1,0 +1,103 @@
+"""Fixed-point formats and the two narrowing operations, twin of rtl/common/fixed_pkg.vhd.
+
+A value is an integer; its format says what the integer means.  Python integers are unbounded
+and the compiled kernels use 64 bits, so every product that a block forms must fit 63 bits:
+the widest is 25 x 18 bits with an exponent shift of 5.
+
+Rounding is half up (add half an output LSB, then floor) and overflow saturates.  A block that
+does anything else, a floor or a modulo, says so where it does it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from golden_model.kernel import kernel
+
+
+@dataclass(frozen=True)
+class Format:
+    """A fixed-point format: sign bit, integer bits, fraction bits; width = sum of the three.
+
+    ``int_bits`` may be negative (leading zeros are not stored), ``frac_bits`` larger than the width.
+    """
+
+    signed: int
+    int_bits: int
+    frac_bits: int
+
+    @property
+    def width(self) -> int:
+        return self.signed + self.int_bits + self.frac_bits
+
+    @property
+    def lo(self) -> int:
+        return -(1 << (self.width - 1)) if self.signed else 0
+
+    @property
+    def hi(self) -> int:
+        return (1 << (self.width - self.signed)) - 1
+
+    @property
+    def lsb(self) -> float:
+        return 2.0**-self.frac_bits
+
+    def to_float(self, value: int) -> float:
+        """The number that an integer of this format stands for."""
+        return value * self.lsb
+
+    def to_int(self, value: float) -> int:
+        """Nearest integer (half up), saturated.  Raises ValueError for NaN or infinity."""
+        if value != value or value in (float("inf"), float("-inf")):
+            raise ValueError(f"{value} is not a number that {self} can hold")
+        scaled = int((value / self.lsb + 0.5) // 1)
+        return max(self.lo, min(self.hi, scaled))
+
+    def __str__(self) -> str:
+        return f"{'S' if self.signed else 'U'}({self.int_bits},{self.frac_bits})"
+
+
+@kernel
+def round_half_up(x, drop):
+    """x / 2**drop, rounded to the nearest integer, halves towards plus infinity."""
+    if drop == 0:
+        return x
+    return (x + (1 << (drop - 1))) >> drop
+
+
+@kernel
+def saturate(x, width):
+    """x limited to the range of a signed number of ``width`` bits."""
+    hi = (1 << (width - 1)) - 1
+    return max(-hi - 1, min(hi, x))
+
+
+@kernel
+def saturate_u(x, width):
+    """x limited to the range of an unsigned number of ``width`` bits."""
+    return max(0, min((1 << width) - 1, x))
+
+
+@kernel
+def round_sat(x, drop, width):
+    """The default narrowing: half up, then saturated to ``width`` signed bits."""
+    return saturate(round_half_up(x, drop), width)
+
+
+@kernel
+def clamp(x, lo, hi):
+    """x limited to [lo, hi]."""
+    return max(lo, min(hi, x))
+
+
+@kernel
+def wrap(x, width):
+    """x modulo 2**width as an unsigned number: the meaning of an angle, never of a quantity."""
+    return x & ((1 << width) - 1)
+
+
+@kernel
+def wrap_s(x, width):
+    """x modulo 2**width as a signed number: the shorter way round between two angles."""
+    half = 1 << (width - 1)
+    return ((x + half) & ((1 << width) - 1)) - half

@@ -1,0 +1,27 @@
+"""Formats and constants that several blocks share.  Everything is per unit of the bases in drive.py.
+
+``PU`` has 18 bits, the narrow port of every FPGA multiplier of the last twenty years, and a range
+of two: the base is what the sensor can measure, and sums of two such quantities still fit.
+"""
+
+from golden_model.fixed import Format
+
+BIT = Format(0, 1, 0)
+PU = Format(1, 1, 16)  # currents, voltages, speeds, flux linkages
+TRIG = Format(1, 1, 16)  # sine and cosine, -1 to +1 both included
+TURN = Format(0, 0, 18)  # angles in turns; wraps
+CODE = Format(0, 1, 15)  # an ADC code moved to the left edge of 16 bits; half scale is 1.0
+DUTY = Format(0, 1, 16)  # 0 to 65536, both included
+U_DC = Format(0, 1, 16)  # bus voltage
+U_MAX = Format(0, 0, 16)  # radius of the voltage circle
+GAIN = Format(1, 1, 16)  # sensor gain, negative for a reversed sensor
+KP = Format(0, 8, 16)  # proportional gain, per unit
+KI = Format(0, 0, 24)  # integral gain times the sample time, per unit
+INDUCTANCE = Format(0, 4, 20)  # inductance, per unit
+INTEGRAL = Format(1, 1, 28)  # integrators: 12 bits below PU, so that small errors still count
+RECIPROCAL = Format(0, 0, 17)  # m of U_dc = 2**n / m
+
+PU_W, TURN_W, INTEGRAL_W = PU.width, TURN.width, INTEGRAL.width
+DUTY_ONE = 1 << DUTY.frac_bits
+TRIG_ONE = 1 << TRIG.frac_bits
+PU_TO_INTEGRAL = INTEGRAL.frac_bits - PU.frac_bits

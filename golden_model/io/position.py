@@ -1,0 +1,67 @@
+"""Resolver or encoder code to electrical angle: theta_me = pole_pairs * code + theta_offset, modulo one turn.
+
+Formats: a code of 8 to 18 bits is moved to the left edge of 18 bits.  Nothing is rounded; every
+operation is modulo one turn by meaning.  ``reverse`` = 1 turns the sense of rotation (code -> -code).
+"""
+
+from golden_model.block import Block, Port
+from golden_model.fixed import Format, wrap
+from golden_model.formats import BIT, TURN, TURN_W
+from golden_model.kernel import kernel
+
+POLE_PAIRS = Format(0, 6, 0)
+
+
+@kernel
+def step(code_theta, reverse, pole_pairs, theta_offset, position_bits):
+    aligned = code_theta << (TURN_W - position_bits)
+    mech = -aligned if reverse else aligned
+    prod = mech * pole_pairs
+    theta_me = wrap(prod + theta_offset, TURN_W)
+    return (theta_me,)
+
+
+def reference(v, _state):
+    mech = -v["code_theta"] if v["reverse"] else v["code_theta"]
+    return {"theta_me": (mech * v["pole_pairs"] + v["theta_offset"]) % 1.0}
+
+
+def bound(_v, _state):
+    return {"theta_me": 0.0}
+
+
+def stimuli(_rng, config):
+    """Both ends of the code around the wrap, both directions, one to 63 pole pairs."""
+    top = (1 << config["POSITION_BITS"]) - 1
+    return [
+        {"code_theta": code, "reverse": rev, "pole_pairs": p, "theta_offset": off}
+        for code in (0, 1, top, top - 1, top // 2, top // 2 + 1)
+        for rev in (0, 1)
+        for p in (1, 4, 63)
+        for off in (0, 1, TURN.hi)
+    ]
+
+
+def code_format(config):
+    return Format(0, 0, config["POSITION_BITS"])
+
+
+BLOCK = Block(
+    name="position",
+    folder="io",
+    paper="001, section 5.2, position",
+    step=step,
+    inputs=(Port("code_theta", Format(0, 0, 16), doc="position code, one mechanical turn"),),
+    registers=(
+        Port("reverse", BIT, doc="1: code counts against the phase order"),
+        Port("pole_pairs", POLE_PAIRS, lo=1, doc="pole pairs"),
+        Port("theta_offset", TURN, doc="electrical angle at code zero"),
+    ),
+    outputs=(Port("theta_me", TURN, doc="electrical angle"),),
+    latency=2,
+    configs=({"POSITION_BITS": 16}, {"POSITION_BITS": 12}, {"POSITION_BITS": 18}),
+    width_from={"code_theta": code_format},
+    reference=reference,
+    bound=bound,
+    stimuli=stimuli,
+)

@@ -1,0 +1,70 @@
+"""Holds one raw sample, the references and the run state, so that nothing moves while it is worked on.
+
+Everything that may change at any clock (converter codes, position, references, the gates' running
+state) enters the core here; the blocks behind see constant inputs until the next sample.
+Formats: all as they come; nothing is computed.
+"""
+
+from golden_model.block import Block, Port
+from golden_model.formats import BIT, PU
+from golden_model.io import current_conditioning, position, u_dc_conditioning
+from golden_model.kernel import kernel
+
+
+@kernel
+def step(
+    adc_a, adc_b, adc_c, adc_u_dc, position_code, omega_ref_in, i_d_ref_in, i_q_ext_in, speed_mode_in, run_in, *_widths
+):
+    return adc_a, adc_b, adc_c, adc_u_dc, position_code, omega_ref_in, i_d_ref_in, i_q_ext_in, speed_mode_in, run_in
+
+
+NAMES = {
+    "adc_a": "code_a",
+    "adc_b": "code_b",
+    "adc_c": "code_c",
+    "adc_u_dc": "code_u_dc",
+    "position_code": "code_theta",
+    "omega_ref_in": "omega_ref",
+    "i_d_ref_in": "i_d_ref",
+    "i_q_ext_in": "i_q_ext",
+    "speed_mode_in": "speed_mode",
+    "run_in": "run",
+}
+_CODES = {p.name: p for b in (current_conditioning, position, u_dc_conditioning) for p in b.BLOCK.inputs}
+_REFERENCES = {
+    "omega_ref": Port("omega_ref", PU, doc="speed reference"),
+    "i_d_ref": Port("i_d_ref", PU, doc="current reference, d axis"),
+    "i_q_ext": Port("i_q_ext", PU, doc="current reference of torque mode, q axis"),
+    "speed_mode": Port("speed_mode", BIT, doc="1: speed control, 0: torque control"),
+    "run": Port("run", BIT, doc="1: the gates are switching"),
+}
+_PORTS = _CODES | _REFERENCES
+
+
+def sized(name):
+    """The format function of a code port, which a generic decides, or None."""
+    width = {**current_conditioning.BLOCK.width_from, **u_dc_conditioning.BLOCK.width_from, **position.BLOCK.width_from}
+    return width.get(name)
+
+
+def reference(v, _state):
+    return {out: v[name] for name, out in NAMES.items()}
+
+
+def bound(_v, _state):
+    return dict.fromkeys(NAMES.values(), 0.0)
+
+
+BLOCK = Block(
+    name="sample_latch",
+    folder="io",
+    paper="001, Fig. 5: acquisition",
+    step=step,
+    inputs=tuple(Port(name, _PORTS[out].fmt, doc=_PORTS[out].doc) for name, out in NAMES.items()),
+    outputs=tuple(_PORTS[out] for out in NAMES.values()),
+    latency=1,
+    configs=({"ADC_BITS": 16, "POSITION_BITS": 16}, {"ADC_BITS": 12, "POSITION_BITS": 18}),
+    width_from={k: sized(out) for name, out in NAMES.items() for k in (name, out) if sized(out)},
+    reference=reference,
+    bound=bound,
+)

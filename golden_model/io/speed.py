@@ -1,0 +1,94 @@
+"""Speed from two consecutive position codes, then a first-order filter.
+
+    raw(k)      = k_speed * wrap(code(k) - code(k-1))
+    omega_me(k) = omega_me(k-1) + k_filter * (raw(k) - omega_me(k-1))
+
+Formats: the difference is the shorter way round, S(-1,18) of a mechanical turn, so speeds up to half
+a turn a sample are told apart.  raw is rounded half up to PU; the filter's state has 12 bits more, so
+that it comes to rest within one PU LSB of its input.  k_filter = 1 is no filter.
+The first sample after reset has no predecessor: its difference is zero.
+Saturation: raw saturates at 2 per unit; the state moves between values in range and cannot leave it.
+"""
+
+from typing import NamedTuple
+
+from golden_model.block import Block, Port
+from golden_model.fixed import Format, round_sat, wrap_s
+from golden_model.formats import BIT, INTEGRAL, INTEGRAL_W, PU, PU_TO_INTEGRAL, PU_W, TURN_W
+from golden_model.io.position import code_format
+from golden_model.kernel import kernel
+
+K_SPEED = Format(0, 12, 12)
+K_FILTER = Format(0, 1, 16)
+DROP_RAW = TURN_W + K_SPEED.frac_bits - PU.frac_bits
+DROP_STATE = PU.frac_bits + K_FILTER.frac_bits - INTEGRAL.frac_bits
+
+
+class State(NamedTuple):
+    code: int = 0
+    seen: int = 0
+    omega: int = 0  # INTEGRAL
+
+
+@kernel
+def step(state, code_theta, reverse, k_speed, k_filter, position_bits):
+    aligned = code_theta << (TURN_W - position_bits)
+    mech = -aligned if reverse else aligned
+    delta = wrap_s(mech - state.code, TURN_W) if state.seen else 0
+    prod_raw = delta * k_speed
+    raw = round_sat(prod_raw, DROP_RAW, PU_W)
+    err = raw - round_sat(state.omega, PU_TO_INTEGRAL, PU_W)
+    prod_err = err * k_filter
+    move = (prod_err + (1 << (DROP_STATE - 1))) >> DROP_STATE
+    omega = round_sat(state.omega + move, 0, INTEGRAL_W)
+    omega_me = round_sat(omega, PU_TO_INTEGRAL, PU_W)
+    return State(mech, 1, omega), (omega_me,)
+
+
+def reference(v, state):
+    mech = -v["code_theta"] if v["reverse"] else v["code_theta"]
+    delta = (mech - state.code / 2**TURN_W + 0.5) % 1.0 - 0.5 if state.seen else 0.0
+    raw = min(max(v["k_speed"] * delta, -2.0), PU.hi * PU.lsb)
+    old = state.omega * INTEGRAL.lsb
+    return {"omega_me": old + v["k_filter"] * (raw - old)}
+
+
+def bound(v, _state):
+    """Rounding of raw and of the fed-back output (each weighted by k_filter), of the move, of the output."""
+    return {"omega_me": v["k_filter"] * PU.lsb + INTEGRAL.lsb / 2 + PU.lsb}
+
+
+def stimuli(rng, config):
+    """Standstill, steady turning both ways through the wrap, a reversal, jumps of half a turn."""
+    size = 1 << config["POSITION_BITS"]
+    rows, code = [], 0
+    for speed in (0, 1, -1, size // 200, -size // 200, size // 2 - 1, size // 2, size // 2 + 1, 0):
+        regs = {"k_speed": int(200 * 4096), "k_filter": int(rng.integers(1, 65537)), "reverse": 0}
+        for _ in range(12):
+            code = (code + speed) % size
+            rows.append({"code_theta": code, **regs})
+    return rows
+
+
+BLOCK = Block(
+    name="speed",
+    folder="io",
+    paper="001, section 5.1, speed by differentiating two consecutive samples",
+    step=step,
+    inputs=(Port("code_theta", Format(0, 0, 16), doc="position code, one mechanical turn"),),
+    registers=(
+        Port("reverse", BIT, doc="1: code counts against the phase order"),
+        Port("k_speed", K_SPEED, doc="speed per turn and sample"),
+        Port("k_filter", K_FILTER, hi=1 << 16, doc="filter weight of the new sample, 1 = no filter"),
+    ),
+    outputs=(Port("omega_me", PU, doc="electrical speed"),),
+    state=State(),
+    latency=7,
+    interval=3,
+    constants={"DROP_RAW": DROP_RAW, "DROP_STATE": DROP_STATE},
+    configs=({"POSITION_BITS": 16}, {"POSITION_BITS": 12}, {"POSITION_BITS": 18}),
+    width_from={"code_theta": code_format},
+    reference=reference,
+    bound=bound,
+    stimuli=stimuli,
+)

@@ -1,0 +1,169 @@
+"""Up-down carrier, six gate signals with dead time, enable and latched trip; one step is one clock.
+
+The carrier counts 0 .. CARRIER_HALF-1 and back, each value once a direction: 2*CARRIER_HALF clocks.
+A leg wants to be high while carrier >= CARRIER_HALF - compare, for 2*compare clocks around the peak.
+Compare values, dead time and minimum pulse are taken over at the valley only, when carrier is 0 again.
+
+* Dead time: when a leg changes its mind both gates go off, the other one on ``dead_time`` clocks later.
+* ``dead_time`` = 0 or >= ``min_pulse``, or ``min_pulse`` above half a period, contradict each other: the
+  setting is refused (``setting_refused``), the last good one stays, and before the first good one the
+  gates stay off.
+* ``enable`` switches on at the valley, off at once.  ``trip`` switches off at once and is remembered
+  until ``clear_trip`` is given while ``trip`` is gone; ``enable`` is then still needed.
+* ``sample`` marks the first clock of a period, the middle of the zero vector: when to sample.
+"""
+
+from typing import NamedTuple
+
+from golden_model.block import Block, Port
+from golden_model.fixed import Format
+from golden_model.formats import BIT
+from golden_model.kernel import kernel
+from golden_model.modulation.pwm_compare import CLOCKS, COUNT
+
+LEGS = Format(0, 3, 0)
+
+
+class State(NamedTuple):
+    carrier: int = 0
+    down: int = 0
+    compare_a: int = 0
+    compare_b: int = 0
+    compare_c: int = 0
+    dead_time: int = 0
+    min_pulse: int = 0
+    configured: int = 0
+    running: int = 0
+    tripped: int = 0
+    level_a: int = 0
+    level_b: int = 0
+    level_c: int = 0
+    timer_a: int = 0
+    timer_b: int = 0
+    timer_c: int = 0
+
+
+@kernel
+def leg(wanted, level, timer, dead_time, on):
+    """One leg: (level, timer, high gate, low gate) of the next clock."""
+    if not on:
+        return 0, dead_time, 0, 0
+    if wanted != level:
+        return wanted, dead_time - 1, 0, 0
+    if timer > 0:
+        return level, timer - 1, 0, 0
+    return level, 0, level, 1 - level
+
+
+@kernel
+def step(state, compare_a, compare_b, compare_c, enable, trip, clear_trip, dead_time, min_pulse, carrier_half):
+    s = state
+    valley = s.carrier == 0 and s.down == 1
+    if s.down == 0:
+        carrier, down = (s.carrier, 1) if s.carrier == carrier_half - 1 else (s.carrier + 1, 0)
+    else:
+        carrier, down = (0, 0) if valley else (s.carrier - 1, 1)
+
+    good = 0 < dead_time < min_pulse <= carrier_half
+    tripped = 1 if trip or (s.tripped and not clear_trip) else 0
+    on = 1 if s.running and enable and not trip else 0
+
+    wanted_a = 1 if s.carrier >= carrier_half - s.compare_a else 0
+    wanted_b = 1 if s.carrier >= carrier_half - s.compare_b else 0
+    wanted_c = 1 if s.carrier >= carrier_half - s.compare_c else 0
+    level_a, timer_a, high_a, low_a = leg(wanted_a, s.level_a, s.timer_a, s.dead_time, on)
+    level_b, timer_b, high_b, low_b = leg(wanted_b, s.level_b, s.timer_b, s.dead_time, on)
+    level_c, timer_c, high_c, low_c = leg(wanted_c, s.level_c, s.timer_c, s.dead_time, on)
+
+    running, configured = on, s.configured
+    if valley:
+        if good:
+            configured = 1
+        running = 1 if enable and configured and not tripped else 0
+    following = State(
+        carrier,
+        down,
+        compare_a if valley else s.compare_a,
+        compare_b if valley else s.compare_b,
+        compare_c if valley else s.compare_c,
+        dead_time if valley and good else s.dead_time,
+        min_pulse if valley and good else s.min_pulse,
+        configured,
+        running,
+        tripped,
+        level_a,
+        level_b,
+        level_c,
+        timer_a,
+        timer_b,
+        timer_c,
+    )
+    gate_high = high_a + 2 * high_b + 4 * high_c
+    gate_low = low_a + 2 * low_b + 4 * low_c
+    outputs = (
+        gate_high,
+        gate_low,
+        1 if valley else 0,
+        running,
+        tripped,
+        0 if good else 1,
+        following.min_pulse,
+        carrier,
+    )
+    return following, outputs
+
+
+def stimuli(rng, config):
+    """Every duty from 0 to 100 %, dead times and pulses that fit and that do not, trips at every phase."""
+    half = config["CARRIER_HALF"]
+    rows = []
+    good = {"dead_time": 3, "min_pulse": 8}
+    for period in range(36):
+        settings = {18: {"dead_time": 8, "min_pulse": 8}, 20: {"dead_time": 5, "min_pulse": 7}}.get(period, good)
+        settings = {24: {"dead_time": 3, "min_pulse": half + 1}, 26: {"dead_time": 0, "min_pulse": 4}}.get(period, settings)
+        compare = [int(rng.integers(0, half + 1)) for _ in range(3)]
+        compare = {2: [0, half, half // 2], 3: [half, 0, half], 4: [1, half - 1, 0]}.get(period, compare)
+        for clock in range(2 * half):
+            row = dict(zip(("compare_a", "compare_b", "compare_c"), compare, strict=True), **settings)
+            row |= {"enable": int(period != 12 or clock < half // 3), "trip": 0, "clear_trip": 0}
+            if period in (6, 9):
+                row["trip"] = int(half // 2 + period <= clock < half // 2 + period + 1)
+            if period in (8, 9, 11):
+                row["clear_trip"] = int(clock == half // 2 + period)
+            rows.append(row)
+    return rows
+
+
+BLOCK = Block(
+    name="gate_generation",
+    folder="modulation",
+    paper="001, section 5.2, IGBT pulse generation",
+    step=step,
+    inputs=tuple(Port(f"compare_{k}", COUNT, doc=f"compare value, leg {k}") for k in "abc")
+    + (
+        Port("enable", BIT, doc="1: gates may switch"),
+        Port("trip", BIT, doc="1: gates off, remembered"),
+        Port("clear_trip", BIT, doc="1: forget the trip"),
+    ),
+    registers=(
+        Port("dead_time", CLOCKS, doc="both gates of a leg off, clocks"),
+        Port("min_pulse", CLOCKS, doc="shortest pulse of a leg, clocks"),
+    ),
+    outputs=(
+        Port("gate_high", LEGS, doc="upper gates, bit 0 is leg a"),
+        Port("gate_low", LEGS, doc="lower gates, bit 0 is leg a"),
+        Port("sample", BIT, doc="first clock of a period"),
+        Port("running", BIT, doc="gates are switching"),
+        Port("tripped", BIT, doc="a trip is remembered"),
+        Port("setting_refused", BIT, doc="dead_time and min_pulse contradict each other"),
+        Port("min_pulse_used", CLOCKS, doc="minimum pulse in force"),
+        Port("carrier", COUNT, doc="carrier, for observation"),
+    ),
+    state=State(),
+    latency=1,
+    clocked=True,
+    configs=({"CARRIER_HALF": 40}, {"CARRIER_HALF": 100}),
+    reference=None,
+    bound=None,
+    stimuli=stimuli,
+)

@@ -1,0 +1,99 @@
+"""Symmetrical space-vector modulation: stator voltage to three duties, without a divider.
+
+    x = u_alpha/u_dc,  y = sqrt(3)/2*u_beta/u_dc          by m, m_beta and n of u_dc_processing
+    legs a = x,  b = -x/2 + y,  c = -x/2 - y
+    duty = 1/2 + leg + mid(a,b,c)/2                       half the middle leg centres the three pulses
+
+a + b + c = 0, so the zero-sequence voltage -(max + min)/2 of the symmetrical pattern is half the middle
+leg.  Formats: products 33 fraction bits, shifted by n, rounded half up to S(1,17) and saturated at two
+bus voltages, which the clamp of the duty swallows; legs and sum exact; duty rounded half up, then
+clamped to 0..1 (over-modulation).
+"""
+
+import math
+
+from golden_model.block import Block, Port
+from golden_model.fixed import Format, clamp, round_half_up, round_sat
+from golden_model.formats import DUTY, DUTY_ONE, PU, RECIPROCAL
+from golden_model.io.u_dc_processing import N_MAX
+from golden_model.kernel import kernel
+
+SCALED = Format(1, 1, 17)
+SCALED_W = SCALED.width
+DROP_SCALED = PU.frac_bits + RECIPROCAL.frac_bits - SCALED.frac_bits
+SUM_FRAC = SCALED.frac_bits + 2
+HALF = 1 << (SUM_FRAC - 1)
+DROP_DUTY = SUM_FRAC - DUTY.frac_bits
+
+
+@kernel
+def step(u_alpha, u_beta, m, m_beta, n):
+    prod_x = u_alpha * m
+    prod_y = u_beta * m_beta
+    x = round_sat(prod_x << n, DROP_SCALED, SCALED_W)
+    y = round_sat(prod_y << n, DROP_SCALED, SCALED_W)
+    leg_a = 2 * x
+    leg_b = 2 * y - x
+    leg_c = -2 * y - x
+    a_ge_b = 3 * x >= 2 * y
+    a_ge_c = 3 * x >= -2 * y
+    b_ge_c = y >= 0
+    if a_ge_b != a_ge_c:
+        mid = leg_a
+    elif a_ge_b == b_ge_c:
+        mid = leg_b
+    else:
+        mid = leg_c
+    duty_a = clamp(round_half_up(HALF + 2 * leg_a + mid, DROP_DUTY), 0, DUTY_ONE)
+    duty_b = clamp(round_half_up(HALF + 2 * leg_b + mid, DROP_DUTY), 0, DUTY_ONE)
+    duty_c = clamp(round_half_up(HALF + 2 * leg_c + mid, DROP_DUTY), 0, DUTY_ONE)
+    return duty_a, duty_b, duty_c
+
+
+def reference(v, _state):
+    x = v["u_alpha"] * v["m"] * 2.0 ** v["n"]
+    y = v["u_beta"] * v["m_beta"] * 2.0 ** v["n"]
+    x, y = (min(max(z, -2.0), SCALED.hi * SCALED.lsb) for z in (x, y))
+    legs = (x, y - x / 2, -y - x / 2)
+    zero = -(max(legs) + min(legs)) / 2
+    return {f"duty_{k}": min(max(0.5 + leg + zero, 0.0), 1.0) for k, leg in zip("abc", legs, strict=True)}
+
+
+def bound(_v, _state):
+    """x and y within half an LSB each move a duty by at most 1.5 of it; then the duty's own rounding."""
+    return {f"duty_{k}": 1.5 * SCALED.lsb + DUTY.lsb / 2 for k in "abc"}
+
+
+def stimuli(_rng, _config):
+    """Zero vector at every bus voltage; every sector border and corner, inside and beyond the hexagon."""
+    rows = [{"u_alpha": 0, "u_beta": 0, "m": m, "m_beta": m * 7 // 8, "n": n} for m in (65536, 131071) for n in range(6)]
+    for radius in (1, 1000, 20000, 37837, 43690, 65536, 131071):
+        for k in range(24):
+            a, b = radius * math.cos(k * math.pi / 12), radius * math.sin(k * math.pi / 12)
+            rows += [
+                {"u_alpha": round(a) + da, "u_beta": round(b), "m": 131071, "m_beta": 113511, "n": 0}
+                for da in (-1, 0, 1)
+                if abs(round(a) + da) <= PU.hi
+            ]
+    return rows
+
+
+BLOCK = Block(
+    name="svm",
+    folder="modulation",
+    paper="001, section 5.2, SVM with U_dc = 2**n/m",
+    step=step,
+    inputs=(
+        Port("u_alpha", PU, doc="voltage, alpha"),
+        Port("u_beta", PU, doc="voltage, beta"),
+        Port("m", RECIPROCAL, doc="mantissa of 1/u_dc"),
+        Port("m_beta", RECIPROCAL, doc="m * sqrt(3)/2"),
+        Port("n", Format(0, 3, 0), hi=N_MAX, doc="exponent of 1/u_dc"),
+    ),
+    outputs=tuple(Port(f"duty_{k}", DUTY, hi=DUTY_ONE, doc=f"duty, leg {k}") for k in "abc"),
+    latency=5,
+    constants={"DROP_SCALED": DROP_SCALED, "SCALED_W": SCALED_W, "HALF": HALF, "DROP_DUTY": DROP_DUTY},
+    reference=reference,
+    bound=bound,
+    stimuli=stimuli,
+)

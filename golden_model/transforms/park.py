@@ -1,0 +1,44 @@
+"""Stator frame to rotor frame: the rotation by -theta_me.
+
+    i_d =  i_alpha*cos_theta + i_beta*sin_theta
+    i_q = -i_alpha*sin_theta + i_beta*cos_theta
+
+Formats, rounding and saturation: those of rotate.  Negating the sine cannot overflow, it is within +-1.
+"""
+
+from golden_model.block import Block, Port
+from golden_model.formats import PU
+from golden_model.kernel import kernel
+from golden_model.transforms import rotate
+
+
+@kernel
+def step(i_alpha, i_beta, cos_theta, sin_theta):
+    return rotate.step(i_alpha, i_beta, cos_theta, -sin_theta)
+
+
+def reference(v, _state):
+    c, s = v["cos_theta"], v["sin_theta"]
+    return {
+        "i_d": rotate.limited(v["i_alpha"] * c + v["i_beta"] * s),
+        "i_q": rotate.limited(v["i_beta"] * c - v["i_alpha"] * s),
+    }
+
+
+def bound(_v, _state):
+    return {"i_d": PU.lsb / 2, "i_q": PU.lsb / 2}
+
+
+BLOCK = Block(
+    name="park",
+    folder="transforms",
+    paper="001, eq. (9): T_alphabeta/dq",
+    step=step,
+    inputs=(Port("i_alpha", PU, doc="current, alpha"), Port("i_beta", PU, doc="current, beta"), *rotate.TRIG_PORTS),
+    outputs=(Port("i_d", PU, doc="current, d axis"), Port("i_q", PU, doc="current, q axis")),
+    latency=rotate.BLOCK.latency,
+    interval=rotate.BLOCK.interval,
+    reference=reference,
+    bound=bound,
+    stimuli=rotate.unit_vectors("i_alpha", "i_beta"),
+)

@@ -1,0 +1,61 @@
+"""Float physics of the drive: machine, shaft, inverter and sensors, in SI units.
+
+Amplitude-invariant Clarke, d axis at the electrical angle theta, motor
+convention, phase order a, b, c.  This package knows nothing of the rest of the
+project: it stands for the hardware.
+"""
+
+from plant import layout
+from plant.averaged import advance_averaged, skewed_currents
+from plant.drive_plant import AveragedPlant, SwitchingPlant, initial_state, plant_params
+from plant.flux_map import FluxMap
+from plant.inverter import Inverter, averaged_leg_voltage
+from plant.kernel import PlantParams, refresh
+from plant.layout import STATE_SIZE, empty_state, state_names
+from plant.mechanics import FREE, IMPOSED_SPEED, Profile, profile, profile_at
+from plant.modulation import centred_gates
+from plant.pmsm import Harmonic, Machine, flux_from_currents, machine_params
+from plant.sensors import (
+    Sensors,
+    current_code,
+    hash_normal,
+    position_code,
+    sensor_params,
+    u_dc_code,
+)
+from plant.switching import advance_switching
+
+__all__ = [
+    "FREE",
+    "IMPOSED_SPEED",
+    "STATE_SIZE",
+    "AveragedPlant",
+    "FluxMap",
+    "Harmonic",
+    "Inverter",
+    "Machine",
+    "PlantParams",
+    "Profile",
+    "Sensors",
+    "SwitchingPlant",
+    "advance_averaged",
+    "advance_switching",
+    "averaged_leg_voltage",
+    "centred_gates",
+    "current_code",
+    "empty_state",
+    "flux_from_currents",
+    "hash_normal",
+    "initial_state",
+    "layout",
+    "machine_params",
+    "plant_params",
+    "position_code",
+    "profile",
+    "profile_at",
+    "refresh",
+    "sensor_params",
+    "skewed_currents",
+    "state_names",
+    "u_dc_code",
+]

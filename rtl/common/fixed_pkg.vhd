@@ -1,0 +1,90 @@
+-- Purpose: the two narrowing operations of the core, twin of golden_model/fixed.py.
+-- Rounding: half up (add half an output LSB, then floor).  Overflow: saturation.
+-- A floor is written as a plain shift_right, a modulo as a slice, and both are named where they stand.
+
+library ieee;
+use ieee.std_logic_1164.all;
+use ieee.numeric_std.all;
+
+package fixed_pkg is
+
+  -- x / 2**drop, halves towards plus infinity; one bit wider than x cut by drop, so it cannot overflow.
+  function round_half_up (x : signed; drop : natural) return signed;
+
+  -- x limited to the range of a signed number of width bits.
+  function saturate (x : signed; width : positive) return signed;
+
+  -- x limited to the range of an unsigned number of width bits.
+  function saturate_u (x : signed; width : positive) return unsigned;
+
+  -- The default narrowing: half up, then saturated to width signed bits.
+  function round_sat (x : signed; drop : natural; width : positive) return signed;
+
+  -- x limited to [lo, hi]; lo and hi must fit the width of x.
+  function clamp (x : signed; lo : signed; hi : signed) return signed;
+
+end package fixed_pkg;
+
+package body fixed_pkg is
+
+  function round_half_up (x : signed; drop : natural) return signed is
+    variable wide : signed(x'length downto 0) := resize(x, x'length + 1);
+  begin
+    if drop > 0 then
+      wide := wide + shift_left(to_signed(1, x'length + 1), drop - 1);
+    end if;
+    return wide(x'length downto drop);
+  end function;
+
+  function saturate (x : signed; width : positive) return signed is
+    constant IN_RANGE : signed(x'length - 1 downto 0) := (others => '0');
+    alias v           : signed(x'length - 1 downto 0) is x;
+    variable result   : signed(width - 1 downto 0);
+  begin
+    if width >= x'length then
+      return resize(x, width);
+    end if;
+    -- In range when every bit above the result's sign repeats it.
+    if v(x'length - 1 downto width - 1) = IN_RANGE(x'length - 1 downto width - 1)
+       or not v(x'length - 1 downto width - 1) = IN_RANGE(x'length - 1 downto width - 1) then
+      return v(width - 1 downto 0);
+    end if;
+    result            := (others => not v(v'high));
+    result(width - 1) := v(v'high);
+    return result;
+  end function;
+
+  function saturate_u (x : signed; width : positive) return unsigned is
+    alias v         : signed(x'length - 1 downto 0) is x;
+    constant ZERO   : signed(x'length - 1 downto 0) := (others => '0');
+    variable result : unsigned(width - 1 downto 0)  := (others => '0');
+  begin
+    if v(v'high) = '1' then
+      return result;
+    end if;
+    if width >= x'length then
+      return resize(unsigned(v), width);
+    end if;
+    if v(v'high downto width) = ZERO(v'high downto width) then
+      return unsigned(v(width - 1 downto 0));
+    end if;
+    result := (others => '1');
+    return result;
+  end function;
+
+  function round_sat (x : signed; drop : natural; width : positive) return signed is
+  begin
+    return saturate(round_half_up(x, drop), width);
+  end function;
+
+  function clamp (x : signed; lo : signed; hi : signed) return signed is
+  begin
+    if x < lo then
+      return resize(lo, x'length);
+    elsif x > hi then
+      return resize(hi, x'length);
+    end if;
+    return x;
+  end function;
+
+end package body fixed_pkg;

@@ -1,0 +1,68 @@
+-- Purpose: rotational voltages, the last term of paper 001 eq. (2).
+--   u_dec_d = -omega_me*lambda_q;  u_dec_q = omega_me*lambda_d
+-- Formats: PU in and out; products exact.
+-- Latency: 3.  Rounding: half up, saturated at 2 per unit, twice the largest voltage that the limiter grants.
+
+library ieee;
+use ieee.std_logic_1164.all;
+use ieee.numeric_std.all;
+use work.fixed_pkg.all;
+use work.fluxproof_pkg.all;
+
+entity decoupling is
+  port (
+    clk       : in  std_logic;
+    rst       : in  std_logic;
+    in_valid  : in  std_logic;
+    omega_me  : in  signed(PU_W - 1 downto 0);
+    lambda_d  : in  signed(PU_W - 1 downto 0);
+    lambda_q  : in  signed(PU_W - 1 downto 0);
+    out_valid : out std_logic;
+    u_dec_d   : out signed(PU_W - 1 downto 0);
+    u_dec_q   : out signed(PU_W - 1 downto 0)
+  );
+end entity decoupling;
+
+architecture rtl of decoupling is
+  constant LATENCY : positive := DECOUPLING_LATENCY;
+
+  signal valid    : std_logic_vector(0 to LATENCY);
+  signal prod_d_1 : signed(2 * PU_W - 1 downto 0);
+  signal prod_q_1 : signed(2 * PU_W - 1 downto 0);
+  signal prod_d_2 : signed(2 * PU_W downto 0);
+  signal prod_q_2 : signed(2 * PU_W downto 0);
+begin
+  valid(0) <= in_valid;
+
+  process (clk)
+  begin
+    if rising_edge(clk) then
+      valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
+
+      -- Stage 1: prod_d = omega_me*lambda_q,  prod_q = omega_me*lambda_d
+      if valid(0) = '1' then
+        prod_d_1 <= omega_me * lambda_q;
+        prod_q_1 <= omega_me * lambda_d;
+      end if;
+
+      -- Stage 2: the d axis' term is negative
+      if valid(1) = '1' then
+        prod_d_2 <= -resize(prod_d_1, 2 * PU_W + 1);
+        prod_q_2 <= resize(prod_q_1, 2 * PU_W + 1);
+      end if;
+
+      -- Stage 3: u_dec = prod, narrowed
+      if valid(2) = '1' then
+        u_dec_d <= round_sat(prod_d_2, DECOUPLING_DROP, PU_W);
+        u_dec_q <= round_sat(prod_q_2, DECOUPLING_DROP, PU_W);
+      end if;
+
+      if rst = '1' then
+        valid(1 to LATENCY) <= (others => '0');
+      end if;
+    end if;
+  end process;
+
+  out_valid <= valid(LATENCY);
+
+end architecture rtl;

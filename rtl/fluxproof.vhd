@@ -1,0 +1,496 @@
+-- Purpose: the whole drive: raw samples in, gate signals out.  This top only instantiates.
+--
+--   raw sample -> conditioning -> transforms -> control -> modulation -> gates
+--
+-- Each block starts when its last input is there and runs in parallel with what does not depend on it; which of
+-- its inputs is the last is known, because latencies are constants (a test holds the measured against them).
+-- Formats: per unit, see golden_model/formats.py; registers as `fluxproof registers drive.toml` prints them.
+-- Latency: sample_valid to duty_valid FLUXPROOF_SAMPLE_TO_DUTY clocks; samples at least FLUXPROOF_INTERVAL apart.
+-- Registers change only between samples; dead_time and min_pulse at any time, they are taken over at the valley.
+
+library ieee;
+use ieee.std_logic_1164.all;
+use ieee.numeric_std.all;
+use work.fluxproof_pkg.all;
+
+entity fluxproof is
+  generic (
+    ADC_BITS      : positive range 12 to 16   := 16;
+    POSITION_BITS : positive range 8 to 18    := 16;
+    CARRIER_HALF  : positive range 8 to 32767 := 10000  -- half a PWM period in clocks
+  );
+  port (
+    clk             : in  std_logic;
+    rst             : in  std_logic;  -- synchronous, active high
+    sample_valid    : in  std_logic;  -- the raw sample below is there
+    adc_a           : in  unsigned(ADC_BITS - 1 downto 0);  -- ADC code, phase a
+    adc_b           : in  unsigned(ADC_BITS - 1 downto 0);  -- ADC code, phase b
+    adc_c           : in  unsigned(ADC_BITS - 1 downto 0);  -- ADC code, phase c
+    adc_u_dc        : in  unsigned(ADC_BITS - 1 downto 0);  -- ADC code, bus voltage
+    position_code   : in  unsigned(POSITION_BITS - 1 downto 0);  -- position code, one mechanical turn
+    omega_ref_in    : in  signed(PU_W - 1 downto 0);  -- speed reference
+    i_d_ref_in      : in  signed(PU_W - 1 downto 0);  -- current reference, d axis
+    i_q_ext_in      : in  signed(PU_W - 1 downto 0);  -- current reference of torque mode, q axis
+    speed_mode_in   : in  std_logic;  -- 1: speed control, 0: torque control
+    enable          : in  std_logic;  -- 1: gates may switch
+    trip            : in  std_logic;  -- 1: gates off, remembered
+    clear_trip      : in  std_logic;  -- 1: forget the trip
+    offset_a        : in  unsigned(CODE_W - 1 downto 0);  -- code at zero current, phase a, left-aligned
+    offset_b        : in  unsigned(CODE_W - 1 downto 0);  -- code at zero current, phase b, left-aligned
+    offset_c        : in  unsigned(CODE_W - 1 downto 0);  -- code at zero current, phase c, left-aligned
+    gain_a          : in  signed(PU_W - 1 downto 0);  -- current per code, phase a
+    gain_b          : in  signed(PU_W - 1 downto 0);  -- current per code, phase b
+    gain_c          : in  signed(PU_W - 1 downto 0);  -- current per code, phase c
+    reverse         : in  std_logic;  -- 1: code counts against the phase order
+    pole_pairs      : in  unsigned(5 downto 0);  -- pole pairs
+    theta_offset    : in  unsigned(TURN_W - 1 downto 0);  -- electrical angle at code zero
+    k_speed         : in  unsigned(23 downto 0);  -- speed per turn and sample
+    k_filter        : in  unsigned(16 downto 0);  -- filter weight of the new sample, 1 = no filter
+    u_dc_offset     : in  unsigned(CODE_W - 1 downto 0);  -- code at zero bus voltage, left-aligned
+    u_dc_gain       : in  signed(PU_W - 1 downto 0);  -- bus voltage per code
+    k_u_max         : in  unsigned(16 downto 0);  -- voltage circle over bus voltage
+    speed_kp        : in  unsigned(KP_W - 1 downto 0);  -- proportional gain
+    speed_ki        : in  unsigned(KI_W - 1 downto 0);  -- integral gain times sample time
+    i_max           : in  signed(PU_W - 1 downto 0);  -- limit of the current reference
+    kp_d            : in  unsigned(KP_W - 1 downto 0);  -- proportional gain, d axis
+    ki_d            : in  unsigned(KI_W - 1 downto 0);  -- integral gain times sample time, d axis
+    kp_q            : in  unsigned(KP_W - 1 downto 0);  -- proportional gain, q axis
+    ki_q            : in  unsigned(KI_W - 1 downto 0);  -- integral gain times sample time, q axis
+    l_d             : in  unsigned(INDUCTANCE_W - 1 downto 0);  -- inductance, d axis
+    l_q             : in  unsigned(INDUCTANCE_W - 1 downto 0);  -- inductance, q axis
+    lambda_mg       : in  signed(PU_W - 1 downto 0);  -- magnet flux linkage
+    k_delay         : in  unsigned(16 downto 0);  -- turns per unit of speed
+    min_pulse       : in  unsigned(11 downto 0);  -- shortest pulse of a leg, clocks
+    dead_time       : in  unsigned(11 downto 0);  -- both gates of a leg off, clocks
+    gate_high       : out unsigned(2 downto 0);  -- upper gates, bit 0 is leg a
+    gate_low        : out unsigned(2 downto 0);  -- lower gates, bit 0 is leg a
+    sample_trigger  : out std_logic;  -- first clock of a period: take a sample
+    running         : out std_logic;  -- gates are switching
+    tripped         : out std_logic;  -- a trip is remembered
+    setting_refused : out std_logic;  -- dead_time and min_pulse contradict each other
+    min_pulse_used  : out unsigned(11 downto 0);  -- minimum pulse in force
+    carrier         : out unsigned(15 downto 0);  -- carrier, for observation
+    duty_valid      : out std_logic;  -- the duties of the sample are there
+    compare_valid   : out std_logic;  -- the compare values are there, and all of the sample's values below
+    i_a             : out signed(PU_W - 1 downto 0);  -- current, phase a
+    i_b             : out signed(PU_W - 1 downto 0);  -- current, phase b
+    i_c             : out signed(PU_W - 1 downto 0);  -- current, phase c
+    current_at_rail : out unsigned(2 downto 0);  -- bit x: code of phase x at its end
+    u_dc            : out unsigned(DUTY_W - 1 downto 0);  -- bus voltage
+    u_max           : out unsigned(U_MAX_W - 1 downto 0);  -- radius of the voltage circle
+    u_dc_at_rail    : out std_logic;  -- code at either end
+    u_dc_low        : out std_logic;  -- bus below 1/32 per unit
+    theta_me        : out unsigned(TURN_W - 1 downto 0);  -- electrical angle
+    omega_me        : out signed(PU_W - 1 downto 0);  -- electrical speed
+    i_d             : out signed(PU_W - 1 downto 0);  -- current, d axis
+    i_q             : out signed(PU_W - 1 downto 0);  -- current, q axis
+    i_q_ref         : out signed(PU_W - 1 downto 0);  -- current reference, q axis
+    speed_limited   : out std_logic;  -- output at its limit
+    lambda_d        : out signed(PU_W - 1 downto 0);  -- flux linkage, d axis
+    lambda_q        : out signed(PU_W - 1 downto 0);  -- flux linkage, q axis
+    u_dec_d         : out signed(PU_W - 1 downto 0);  -- rotational voltage, d axis
+    u_dec_q         : out signed(PU_W - 1 downto 0);  -- rotational voltage, q axis
+    u_int_d         : out signed(INTEGRAL_W - 1 downto 0);  -- its integral part, d axis
+    u_int_q         : out signed(INTEGRAL_W - 1 downto 0);  -- its integral part, q axis
+    u_d             : out signed(PU_W - 1 downto 0);  -- voltage, d axis
+    u_q             : out signed(PU_W - 1 downto 0);  -- voltage, q axis
+    sat_d           : out signed(1 downto 0);  -- limit that holds the d axis
+    sat_q           : out signed(1 downto 0);  -- limit that holds the q axis
+    u_alpha         : out signed(PU_W - 1 downto 0);  -- voltage, alpha
+    u_beta          : out signed(PU_W - 1 downto 0);  -- voltage, beta
+    duty_a          : out unsigned(DUTY_W - 1 downto 0);  -- duty, leg a
+    duty_b          : out unsigned(DUTY_W - 1 downto 0);  -- duty, leg b
+    duty_c          : out unsigned(DUTY_W - 1 downto 0);  -- duty, leg c
+    compare_a       : out unsigned(15 downto 0);  -- compare value, leg a
+    compare_b       : out unsigned(15 downto 0);  -- compare value, leg b
+    compare_c       : out unsigned(15 downto 0)  -- compare value, leg c
+  );
+end entity fluxproof;
+
+architecture rtl of fluxproof is
+  signal latch_valid      : std_logic;
+  signal code_a           : unsigned(ADC_BITS - 1 downto 0);
+  signal code_b           : unsigned(ADC_BITS - 1 downto 0);
+  signal code_c           : unsigned(ADC_BITS - 1 downto 0);
+  signal code_u_dc        : unsigned(ADC_BITS - 1 downto 0);
+  signal code_theta       : unsigned(POSITION_BITS - 1 downto 0);
+  signal omega_ref        : signed(PU_W - 1 downto 0);
+  signal i_d_ref          : signed(PU_W - 1 downto 0);
+  signal i_q_ext          : signed(PU_W - 1 downto 0);
+  signal speed_mode       : std_logic;
+  signal run              : std_logic;
+  signal current_valid    : std_logic;
+  signal theta_valid      : std_logic;
+  signal omega_valid      : std_logic;
+  signal u_dc_valid       : std_logic;
+  signal reciprocal_valid : std_logic;
+  signal m                : unsigned(RECIPROCAL_W - 1 downto 0);
+  signal m_beta           : unsigned(RECIPROCAL_W - 1 downto 0);
+  signal n                : unsigned(2 downto 0);
+  signal alpha_beta_valid : std_logic;
+  signal i_alpha          : signed(PU_W - 1 downto 0);
+  signal i_beta           : signed(PU_W - 1 downto 0);
+  signal trig_valid       : std_logic;
+  signal cos_theta        : signed(PU_W - 1 downto 0);
+  signal sin_theta        : signed(PU_W - 1 downto 0);
+  signal dq_valid         : std_logic;
+  signal i_q_ref_valid    : std_logic;
+  signal pi_valid         : std_logic;
+  signal u_pi_d           : signed(PU_W - 1 downto 0);
+  signal u_pi_q           : signed(PU_W - 1 downto 0);
+  signal lambda_valid     : std_logic;
+  signal decoupling_valid : std_logic;
+  signal dq_voltage_valid : std_logic;
+  signal theta_out_valid  : std_logic;
+  signal theta_out        : unsigned(TURN_W - 1 downto 0);
+  signal trig_out_valid   : std_logic;
+  signal cos_out          : signed(PU_W - 1 downto 0);
+  signal sin_out          : signed(PU_W - 1 downto 0);
+  signal ab_voltage_valid : std_logic;
+  signal duty_ready       : std_logic;
+  signal compare_ready    : std_logic;
+begin
+
+  latch : entity work.sample_latch
+    generic map (
+      ADC_BITS      => ADC_BITS,
+      POSITION_BITS => POSITION_BITS
+    )
+    port map (
+      clk           => clk,
+      rst           => rst,
+      in_valid      => sample_valid,
+      adc_a         => adc_a,
+      adc_b         => adc_b,
+      adc_c         => adc_c,
+      adc_u_dc      => adc_u_dc,
+      position_code => position_code,
+      omega_ref_in  => omega_ref_in,
+      i_d_ref_in    => i_d_ref_in,
+      i_q_ext_in    => i_q_ext_in,
+      speed_mode_in => speed_mode_in,
+      run_in        => running,
+      out_valid     => latch_valid,
+      code_a        => code_a,
+      code_b        => code_b,
+      code_c        => code_c,
+      code_u_dc     => code_u_dc,
+      code_theta    => code_theta,
+      omega_ref     => omega_ref,
+      i_d_ref       => i_d_ref,
+      i_q_ext       => i_q_ext,
+      speed_mode    => speed_mode,
+      run           => run
+    );
+
+  conditioning : entity work.current_conditioning
+    generic map (
+      ADC_BITS => ADC_BITS
+    )
+    port map (
+      clk             => clk,
+      rst             => rst,
+      in_valid        => latch_valid,
+      code_a          => code_a,
+      code_b          => code_b,
+      code_c          => code_c,
+      offset_a        => offset_a,
+      offset_b        => offset_b,
+      offset_c        => offset_c,
+      gain_a          => gain_a,
+      gain_b          => gain_b,
+      gain_c          => gain_c,
+      out_valid       => current_valid,
+      i_a             => i_a,
+      i_b             => i_b,
+      i_c             => i_c,
+      current_at_rail => current_at_rail
+    );
+
+  angle : entity work.position
+    generic map (
+      POSITION_BITS => POSITION_BITS
+    )
+    port map (
+      clk          => clk,
+      rst          => rst,
+      in_valid     => latch_valid,
+      code_theta   => code_theta,
+      reverse      => reverse,
+      pole_pairs   => pole_pairs,
+      theta_offset => theta_offset,
+      out_valid    => theta_valid,
+      theta_me     => theta_me
+    );
+
+  speed_measurement : entity work.speed
+    generic map (
+      POSITION_BITS => POSITION_BITS
+    )
+    port map (
+      clk        => clk,
+      rst        => rst,
+      in_valid   => latch_valid,
+      code_theta => code_theta,
+      reverse    => reverse,
+      k_speed    => k_speed,
+      k_filter   => k_filter,
+      out_valid  => omega_valid,
+      omega_me   => omega_me
+    );
+
+  bus_voltage : entity work.u_dc_conditioning
+    generic map (
+      ADC_BITS => ADC_BITS
+    )
+    port map (
+      clk          => clk,
+      rst          => rst,
+      in_valid     => latch_valid,
+      code_u_dc    => code_u_dc,
+      u_dc_offset  => u_dc_offset,
+      u_dc_gain    => u_dc_gain,
+      k_u_max      => k_u_max,
+      out_valid    => u_dc_valid,
+      u_dc         => u_dc,
+      u_max        => u_max,
+      u_dc_at_rail => u_dc_at_rail
+    );
+
+  bus_reciprocal : entity work.u_dc_processing
+    port map (
+      clk       => clk,
+      rst       => rst,
+      in_valid  => u_dc_valid,
+      u_dc      => u_dc,
+      out_valid => reciprocal_valid,
+      m         => m,
+      m_beta    => m_beta,
+      n         => n,
+      u_dc_low  => u_dc_low
+    );
+
+  stator_frame : entity work.clarke
+    port map (
+      clk       => clk,
+      rst       => rst,
+      in_valid  => current_valid,
+      i_a       => i_a,
+      i_b       => i_b,
+      i_c       => i_c,
+      out_valid => alpha_beta_valid,
+      i_alpha   => i_alpha,
+      i_beta    => i_beta
+    );
+
+  trig : entity work.sincos
+    port map (
+      clk       => clk,
+      rst       => rst,
+      in_valid  => theta_valid,
+      theta     => theta_me,
+      out_valid => trig_valid,
+      cos_theta => cos_theta,
+      sin_theta => sin_theta
+    );
+
+  rotor_frame : entity work.park
+    port map (
+      clk       => clk,
+      rst       => rst,
+      in_valid  => alpha_beta_valid,
+      i_alpha   => i_alpha,
+      i_beta    => i_beta,
+      cos_theta => cos_theta,
+      sin_theta => sin_theta,
+      out_valid => dq_valid,
+      i_d       => i_d,
+      i_q       => i_q
+    );
+
+  speed_regulator : entity work.speed_pi
+    port map (
+      clk           => clk,
+      rst           => rst,
+      in_valid      => omega_valid,
+      omega_ref     => omega_ref,
+      omega_me      => omega_me,
+      i_q_ext       => i_q_ext,
+      speed_mode    => speed_mode,
+      run           => run,
+      speed_kp      => speed_kp,
+      speed_ki      => speed_ki,
+      i_max         => i_max,
+      out_valid     => i_q_ref_valid,
+      i_q_ref       => i_q_ref,
+      speed_limited => speed_limited
+    );
+
+  current_regulators : entity work.current_pi
+    port map (
+      clk       => clk,
+      rst       => rst,
+      in_valid  => i_q_ref_valid,
+      i_d       => i_d,
+      i_q       => i_q,
+      i_d_ref   => i_d_ref,
+      i_q_ref   => i_q_ref,
+      sat_d     => sat_d,
+      sat_q     => sat_q,
+      run       => run,
+      kp_d      => kp_d,
+      ki_d      => ki_d,
+      kp_q      => kp_q,
+      ki_q      => ki_q,
+      out_valid => pi_valid,
+      u_pi_d    => u_pi_d,
+      u_pi_q    => u_pi_q,
+      u_int_d   => u_int_d,
+      u_int_q   => u_int_q
+    );
+
+  flux_model : entity work.current_model
+    port map (
+      clk       => clk,
+      rst       => rst,
+      in_valid  => dq_valid,
+      i_d       => i_d,
+      i_q       => i_q,
+      l_d       => l_d,
+      l_q       => l_q,
+      lambda_mg => lambda_mg,
+      out_valid => lambda_valid,
+      lambda_d  => lambda_d,
+      lambda_q  => lambda_q
+    );
+
+  cross_coupling : entity work.decoupling
+    port map (
+      clk       => clk,
+      rst       => rst,
+      in_valid  => lambda_valid,
+      omega_me  => omega_me,
+      lambda_d  => lambda_d,
+      lambda_q  => lambda_q,
+      out_valid => decoupling_valid,
+      u_dec_d   => u_dec_d,
+      u_dec_q   => u_dec_q
+    );
+
+  circle : entity work.voltage_limit
+    port map (
+      clk       => clk,
+      rst       => rst,
+      in_valid  => pi_valid,
+      u_pi_d    => u_pi_d,
+      u_pi_q    => u_pi_q,
+      u_dec_d   => u_dec_d,
+      u_dec_q   => u_dec_q,
+      u_max     => u_max,
+      out_valid => dq_voltage_valid,
+      u_d       => u_d,
+      u_q       => u_q,
+      sat_d     => sat_d,
+      sat_q     => sat_q
+    );
+
+  delay : entity work.svm_delay_compensation
+    port map (
+      clk       => clk,
+      rst       => rst,
+      in_valid  => omega_valid,
+      theta_me  => theta_me,
+      omega_me  => omega_me,
+      k_delay   => k_delay,
+      out_valid => theta_out_valid,
+      theta_out => theta_out
+    );
+
+  trig_out : entity work.sincos
+    port map (
+      clk       => clk,
+      rst       => rst,
+      in_valid  => theta_out_valid,
+      theta     => theta_out,
+      out_valid => trig_out_valid,
+      cos_theta => cos_out,
+      sin_theta => sin_out
+    );
+
+  stator_voltage : entity work.inverse_park
+    port map (
+      clk       => clk,
+      rst       => rst,
+      in_valid  => dq_voltage_valid,
+      u_d       => u_d,
+      u_q       => u_q,
+      cos_theta => cos_out,
+      sin_theta => sin_out,
+      out_valid => ab_voltage_valid,
+      u_alpha   => u_alpha,
+      u_beta    => u_beta
+    );
+
+  modulator : entity work.svm
+    port map (
+      clk       => clk,
+      rst       => rst,
+      in_valid  => ab_voltage_valid,
+      u_alpha   => u_alpha,
+      u_beta    => u_beta,
+      m         => m,
+      m_beta    => m_beta,
+      n         => n,
+      out_valid => duty_ready,
+      duty_a    => duty_a,
+      duty_b    => duty_b,
+      duty_c    => duty_c
+    );
+
+  compare : entity work.pwm_compare
+    generic map (
+      CARRIER_HALF => CARRIER_HALF
+    )
+    port map (
+      clk       => clk,
+      rst       => rst,
+      in_valid  => duty_ready,
+      duty_a    => duty_a,
+      duty_b    => duty_b,
+      duty_c    => duty_c,
+      min_pulse => min_pulse_used,
+      out_valid => compare_ready,
+      compare_a => compare_a,
+      compare_b => compare_b,
+      compare_c => compare_c
+    );
+
+  gates : entity work.gate_generation
+    generic map (
+      CARRIER_HALF => CARRIER_HALF
+    )
+    port map (
+      clk             => clk,
+      rst             => rst,
+      compare_a       => compare_a,
+      compare_b       => compare_b,
+      compare_c       => compare_c,
+      enable          => enable,
+      trip            => trip,
+      clear_trip      => clear_trip,
+      dead_time       => dead_time,
+      min_pulse       => min_pulse,
+      gate_high       => gate_high,
+      gate_low        => gate_low,
+      sample          => sample_trigger,
+      running         => running,
+      tripped         => tripped,
+      setting_refused => setting_refused,
+      min_pulse_used  => min_pulse_used,
+      carrier         => carrier
+    );
+
+  duty_valid    <= duty_ready;
+  compare_valid <= compare_ready;
+
+end architecture rtl;

@@ -1,0 +1,95 @@
+-- Purpose: duties to compare values of the carrier, compare = duty * CARRIER_HALF, short pulses dropped.
+--   2*compare < min_pulse: 0;  CARRIER_HALF - compare < min_pulse: CARRIER_HALF
+-- A low end of a period counts alone, because the period before or after may be high throughout.
+-- Formats: duty U(1,16), 0 to 1; compare 0 to CARRIER_HALF; min_pulse in clocks.
+-- Latency: 5 (legs a, b, c follow each other).  Interval: 3.  The three values change together.
+-- Rounding: half up to whole clocks; no overflow, duty <= 1.
+
+library ieee;
+use ieee.std_logic_1164.all;
+use ieee.numeric_std.all;
+use work.fixed_pkg.all;
+use work.fluxproof_pkg.all;
+
+entity pwm_compare is
+  generic (
+    CARRIER_HALF : positive range 8 to 32767 := 10000
+  );
+  port (
+    clk       : in  std_logic;
+    rst       : in  std_logic;
+    in_valid  : in  std_logic;
+    duty_a    : in  unsigned(DUTY_W - 1 downto 0);
+    duty_b    : in  unsigned(DUTY_W - 1 downto 0);
+    duty_c    : in  unsigned(DUTY_W - 1 downto 0);
+    min_pulse : in  unsigned(11 downto 0);
+    out_valid : out std_logic;
+    compare_a : out unsigned(15 downto 0);
+    compare_b : out unsigned(15 downto 0);
+    compare_c : out unsigned(15 downto 0)
+  );
+end entity pwm_compare;
+
+architecture rtl of pwm_compare is
+  constant LATENCY : positive              := PWM_COMPARE_LATENCY;
+  constant HALF    : unsigned(15 downto 0) := to_unsigned(CARRIER_HALF, 16);
+
+  signal valid       : std_logic_vector(0 to LATENCY);
+  signal duty_0      : unsigned(DUTY_W - 1 downto 0);
+  signal prod_1      : signed(DUTY_W + 17 downto 0);
+  signal min_pulse_1 : unsigned(11 downto 0);
+  signal compare_2   : unsigned(15 downto 0);
+  signal min_pulse_2 : unsigned(11 downto 0);
+  signal dropped_2   : unsigned(15 downto 0);
+  signal kept_a_3    : unsigned(15 downto 0);
+  signal kept_b_4    : unsigned(15 downto 0);
+begin
+  valid(0) <= in_valid;
+
+  duty_0    <= duty_b when valid(1) = '1' else duty_c when valid(2) = '1' else duty_a;
+  dropped_2 <= to_unsigned(0, 16) when (compare_2 & '0') < min_pulse_2 else
+               HALF when HALF - compare_2 < min_pulse_2 else
+               compare_2;
+
+  process (clk)
+  begin
+    if rising_edge(clk) then
+      valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
+
+      -- Stage 1: prod = duty * CARRIER_HALF, leg by leg
+      if valid(0) = '1' or valid(1) = '1' or valid(2) = '1' then
+        prod_1      <= signed('0' & duty_0) * signed('0' & HALF);
+        min_pulse_1 <= min_pulse;
+      end if;
+
+      -- Stage 2: compare = prod in clocks
+      if valid(1) = '1' or valid(2) = '1' or valid(3) = '1' then
+        compare_2   <= resize(unsigned(round_half_up(prod_1, PWM_COMPARE_DROP)), 16);
+        min_pulse_2 <= min_pulse_1;
+      end if;
+
+      -- Stage 3: short pulses dropped; a and b wait for c
+      if valid(2) = '1' then
+        kept_a_3 <= dropped_2;
+      end if;
+      if valid(3) = '1' then
+        kept_b_4 <= dropped_2;
+      end if;
+      if valid(4) = '1' then
+        compare_a <= kept_a_3;
+        compare_b <= kept_b_4;
+        compare_c <= dropped_2;
+      end if;
+
+      if rst = '1' then
+        valid(1 to LATENCY) <= (others => '0');
+        compare_a           <= (others => '0');
+        compare_b           <= (others => '0');
+        compare_c           <= (others => '0');
+      end if;
+    end if;
+  end process;
+
+  out_valid <= valid(LATENCY);
+
+end architecture rtl;

@@ -1,0 +1,58 @@
+-- Purpose: angle at which the voltage will act, theta_out = theta_me + k_delay*omega_me, modulo one turn.
+-- k_delay = 1.5*T_s*omega_base/(2*pi): a duty acts on average 1.5 sample times after the sampling instant.
+-- Formats: theta TURN U(0,18), omega_me PU, k_delay U(0,17).
+-- Latency: 2.  Rounding: product half up to TURN; the sum wraps, it is an angle.
+
+library ieee;
+use ieee.std_logic_1164.all;
+use ieee.numeric_std.all;
+use work.fixed_pkg.all;
+use work.fluxproof_pkg.all;
+
+entity svm_delay_compensation is
+  port (
+    clk       : in  std_logic;
+    rst       : in  std_logic;
+    in_valid  : in  std_logic;
+    theta_me  : in  unsigned(TURN_W - 1 downto 0);
+    omega_me  : in  signed(PU_W - 1 downto 0);
+    k_delay   : in  unsigned(16 downto 0);
+    out_valid : out std_logic;
+    theta_out : out unsigned(TURN_W - 1 downto 0)
+  );
+end entity svm_delay_compensation;
+
+architecture rtl of svm_delay_compensation is
+  constant LATENCY : positive := SVM_DELAY_COMPENSATION_LATENCY;
+
+  signal valid   : std_logic_vector(0 to LATENCY);
+  signal prod_1  : signed(PU_W + 17 downto 0);
+  signal theta_1 : unsigned(TURN_W - 1 downto 0);
+begin
+  valid(0) <= in_valid;
+
+  process (clk)
+  begin
+    if rising_edge(clk) then
+      valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
+
+      -- Stage 1: prod = omega_me * k_delay
+      if valid(0) = '1' then
+        prod_1  <= omega_me * signed('0' & k_delay);
+        theta_1 <= theta_me;
+      end if;
+
+      -- Stage 2: theta_out = theta_me + prod, modulo one turn
+      if valid(1) = '1' then
+        theta_out <= theta_1 + resize(unsigned(round_half_up(prod_1, SVM_DELAY_COMPENSATION_DROP)), TURN_W);
+      end if;
+
+      if rst = '1' then
+        valid(1 to LATENCY) <= (others => '0');
+      end if;
+    end if;
+  end process;
+
+  out_valid <= valid(LATENCY);
+
+end architecture rtl;
