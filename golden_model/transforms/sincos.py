@@ -29,8 +29,8 @@ DROP_OUT = FRAC - TRIG.frac_bits
 
 _N = 1 << ADDRESS_BITS
 SINE_ROM = tuple(TABLE.to_int(math.sin((k + 0.5) * math.pi / 2 / _N)) for k in range(_N))
-_FIRST = -(1 << DELTA_BITS) + 1
-DELTA_ROM = tuple(DELTA.to_int((_FIRST + 2 * k) * math.pi * TURN.lsb) for k in range(1 << DELTA_BITS))
+_HALF = 1 << (DELTA_BITS - 1)
+DELTA_ROM = tuple(DELTA.to_int((k - _HALF) * 2 * math.pi * TURN.lsb) for k in range(1 << DELTA_BITS))
 
 SINE, DELTAS = np.array(SINE_ROM), np.array(DELTA_ROM)
 

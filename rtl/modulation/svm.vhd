@@ -63,7 +63,7 @@ architecture rtl of svm is
   function to_duty (sum : signed) return unsigned is
     constant ROUNDED : signed := round_half_up(sum, SVM_DROP_DUTY);
   begin
-    return unsigned(resize(clamp(ROUNDED, to_signed(0, ROUNDED'length), to_signed(DUTY_ONE, ROUNDED'length)), DUTY_W));
+    return resize(unsigned(clamp(ROUNDED, to_signed(0, ROUNDED'length), to_signed(DUTY_ONE, ROUNDED'length))), DUTY_W);
   end function;
 begin
   valid(0) <= in_valid;

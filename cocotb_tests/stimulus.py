@@ -1,0 +1,170 @@
+"""What the one bench feeds a block: a schedule of clocks, made from the block's declaration and a seed.
+
+Every registered block gets the same treatment: all corner combinations of its ports (sampled where there
+are too many), its own hard cases, seeded random values; samples back to back and with gaps; inputs that
+turn to noise as soon as the contract lets them; resets in mid-stream, with samples in flight.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from golden_model.block import Block, Port
+
+CORNERS_AT_MOST = 1500
+RANDOM_SAMPLES = 1200
+BURST = 40  # samples between two changes of the registers
+
+
+@dataclass
+class Clock:
+    """One clock: what is driven before its rising edge, and what must be seen before the next one."""
+
+    writes: dict[str, int]
+    in_valid: int = 0
+    rst: int = 0
+    sample: int = -1  # index of the sample that enters here
+    out_valid: int = 0
+    of_sample: int = -1  # index of the sample whose outputs are due here
+    expected: dict[str, int] = field(default_factory=dict)
+
+
+def corner_values(port: Port) -> list[int]:
+    """Both ends of the legal range, and around zero where it is signed."""
+    return sorted({v for v in (port.low, -1, 0, 1, port.high) if port.low <= v <= port.high})
+
+
+def random_value(rng: np.random.Generator, port: Port) -> int:
+    """Half the time uniform, else a corner or a number of random magnitude: small ones matter too."""
+    kind = rng.integers(4)
+    if kind == 0:
+        return int(rng.choice(corner_values(port)))
+    value = int(rng.integers(port.low, port.high, endpoint=True))
+    if kind == 1:
+        value >>= int(rng.integers(0, port.fmt.width))
+    return min(max(value, port.low), port.high)
+
+
+def corners(ports: tuple[Port, ...], rng: np.random.Generator) -> Iterator[dict[str, int]]:
+    """Every combination of corner values; of both ends only, or a sample, where there are too many."""
+    for choose in (corner_values, lambda p: sorted({p.low, p.high})):
+        choices = [choose(p) for p in ports]
+        if np.prod([float(len(c)) for c in choices]) <= CORNERS_AT_MOST:
+            break
+    else:
+        for _ in range(CORNERS_AT_MOST):
+            yield {p.name: int(rng.choice(corner_values(p))) for p in ports}
+        return
+    for values in itertools.product(*choices):
+        yield dict(zip((p.name for p in ports), values, strict=True))
+
+
+def samples(block: Block, config: dict[str, int], seed: int) -> list[dict[str, int]]:
+    """All samples, in order: corners, the block's own hard cases, random ones."""
+    rng = np.random.default_rng(seed)
+    ports = block.ports(config)
+    rows = list(corners(ports, rng))
+    if block.stimuli is not None:
+        rows += [{**{p.name: 0 for p in ports}, **row} for row in block.stimuli(rng, config)]
+    registers = {p.name: 0 for p in block.registers}
+    for k in range(RANDOM_SAMPLES):
+        row = {p.name: random_value(rng, p) for p in ports}
+        if k % BURST == 0:
+            registers = {p.name: row[p.name] for p in block.registers}
+        rows.append(row | registers)
+    for row in rows:
+        for p in ports:
+            if not p.low <= row[p.name] <= p.high:
+                raise ValueError(f"stimulus of {block.name}: {p.name}={row[p.name]} is outside its range")
+    return rows
+
+
+def schedule(block: Block, config: dict[str, int], seed: int) -> list[Clock]:
+    """Clock by clock, with what the model says must come out and when."""
+    if block.clocked:
+        return _clocked_schedule(block, config, seed)
+    rng = np.random.default_rng(seed + 1)
+    noise_ports = tuple(p for p in block.ports(config) if p.name in {q.name for q in block.inputs})
+    clocks: list[Clock] = [Clock({}, rst=1), Clock({}, rst=1)]
+    state, registers, last = block.state, None, -(10**9)
+
+    def pad_to(index: int) -> None:
+        """Idle clocks; the inputs become noise once the last sample no longer needs them."""
+        while len(clocks) < index:
+            writes = {}
+            if len(clocks) == last + block.interval:
+                writes = {p.name: random_value(rng, p) for p in noise_ports}
+            clocks.append(Clock(writes))
+
+    due: list[tuple[int, int, dict[str, int]]] = []
+    for index, row in enumerate(samples(block, config, seed)):
+        wanted_registers = {p.name: row[p.name] for p in block.registers}
+        start = max(len(clocks), last + block.interval)
+        if wanted_registers != registers:
+            start = max(start, last + block.latency + 1)
+        elif rng.integers(4) == 0:
+            start += int(rng.integers(1, 2 * block.latency))
+        pad_to(start)
+        if index and rng.integers(60) == 0:
+            # A reset somewhere behind the last sample: what is in flight must never come out.
+            pad_to(max(len(clocks), last + int(rng.integers(1, block.latency + 2))))
+            clocks.append(Clock({}, rst=1))
+            due = [d for d in due if d[0] < len(clocks)]
+            state = block.state
+        pad_to(max(len(clocks), last + block.interval))
+        last = len(clocks)
+        clocks.append(Clock(dict(row), in_valid=1, sample=index))
+        registers = wanted_registers
+        state, outputs = block.run(state, row, config)
+        due.append((last + block.latency, index, outputs))
+    pad_to(len(clocks) + 2 * block.latency + 2)
+    for when, index, outputs in due:
+        clocks[when].out_valid, clocks[when].of_sample, clocks[when].expected = 1, index, outputs
+    return clocks
+
+
+def _clocked_schedule(block: Block, config: dict[str, int], seed: int) -> list[Clock]:
+    """For a block whose sample is the clock: its own hard cases, then random ones, with resets."""
+    rng = np.random.default_rng(seed)
+    rows = block.stimuli(rng, config)
+    rows += _held_random(block, config, rng, 30 * len(block.inputs) * 40)
+    clocks = [Clock({}, rst=1), Clock({}, rst=1)]
+    state = block.state
+    for index, row in enumerate(rows):
+        reset = int(rng.integers(700) == 0)
+        clock = Clock(dict(row), rst=reset, sample=index)
+        if reset:
+            state, outputs = block.state, {p.name: 0 for p in block.outputs}
+        else:
+            state, outputs = block.run(state, row, config)
+        clocks.append(clock)
+        # Expected before the next edge, that is, in the next entry.
+        clocks[-1].expected, clocks[-1].of_sample = outputs, index
+    following = [Clock({}, rst=1)] + clocks
+    for k, clock in enumerate(clocks):
+        following[k + 1] = Clock(clock.writes, rst=clock.rst, sample=clock.sample)
+    for k, clock in enumerate(clocks):
+        if clock.expected:
+            target = k + 2
+            if target < len(following):
+                following[target].expected, following[target].of_sample = clock.expected, clock.of_sample
+    return following
+
+
+def _held_random(block: Block, config: dict[str, int], rng, count: int) -> list[dict[str, int]]:
+    """Random values, each held for a random while, flags mostly at rest, so that something can happen."""
+    ports = block.ports(config)
+    rows: list[dict[str, int]] = []
+    row = {p.name: random_value(rng, p) for p in ports} | {"enable": 1, "trip": 0}
+    for _ in range(count):
+        if rng.integers(30) == 0:
+            port = ports[int(rng.integers(len(ports)))]
+            row = {**row, port.name: random_value(rng, port)}
+        if rng.integers(40) == 0:
+            row = {**row, "enable": 1, "trip": 0, "dead_time": int(rng.integers(1, 9)), "min_pulse": 10}
+        rows.append(row)
+    return rows
