@@ -17,6 +17,7 @@ from golden_model.block import Block, Port
 
 CORNERS_AT_MOST = 1500
 RANDOM_SAMPLES = 1200
+CLOCKED_RANDOM = 6000  # clocks
 BURST = 40  # samples between two changes of the registers
 
 
@@ -128,31 +129,24 @@ def schedule(block: Block, config: dict[str, int], seed: int) -> list[Clock]:
 
 
 def _clocked_schedule(block: Block, config: dict[str, int], seed: int) -> list[Clock]:
-    """For a block whose sample is the clock: its own hard cases, then random ones, with resets."""
+    """For a block whose sample is the clock: its own hard cases, then random ones, with resets.
+
+    Outputs are due before the edge that follows the sample's; in reset all of them are zero.
+    """
     rng = np.random.default_rng(seed)
-    rows = block.stimuli(rng, config)
-    rows += _held_random(block, config, rng, 30 * len(block.inputs) * 40)
-    clocks = [Clock({}, rst=1), Clock({}, rst=1)]
-    state = block.state
+    rows = block.stimuli(rng, config) + _held_random(block, config, rng, CLOCKED_RANDOM)
+    clocks, state = [Clock({}, rst=1), Clock({}, rst=1)], block.state
+    outputs, of_sample = {p.name: 0 for p in block.outputs}, -1
     for index, row in enumerate(rows):
         reset = int(rng.integers(700) == 0)
-        clock = Clock(dict(row), rst=reset, sample=index)
+        clocks.append(Clock(dict(row), rst=reset, sample=index, of_sample=of_sample, expected=outputs))
         if reset:
             state, outputs = block.state, {p.name: 0 for p in block.outputs}
         else:
             state, outputs = block.run(state, row, config)
-        clocks.append(clock)
-        # Expected before the next edge, that is, in the next entry.
-        clocks[-1].expected, clocks[-1].of_sample = outputs, index
-    following = [Clock({}, rst=1)] + clocks
-    for k, clock in enumerate(clocks):
-        following[k + 1] = Clock(clock.writes, rst=clock.rst, sample=clock.sample)
-    for k, clock in enumerate(clocks):
-        if clock.expected:
-            target = k + 2
-            if target < len(following):
-                following[target].expected, following[target].of_sample = clock.expected, clock.of_sample
-    return following
+        of_sample = index
+    clocks.append(Clock({}, of_sample=of_sample, expected=outputs))
+    return clocks
 
 
 def _held_random(block: Block, config: dict[str, int], rng, count: int) -> list[dict[str, int]]:

@@ -33,11 +33,15 @@ def _cache_dir() -> Path:
 CACHE_DIR = _cache_dir()
 
 
-def kernel(function):
-    """Compile ``function`` with numba on first call; ``function.py_func`` stays plain Python."""
+def kernel(function, cache_dir: Path = CACHE_DIR):
+    """Compile ``function`` with numba on first call; ``function.py_func`` stays plain Python.
+
+    A kernel outside this package that calls more than this package gives a ``cache_dir`` of its own,
+    named after everything it calls.
+    """
     previous = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = str(CACHE_DIR)
+    numba.config.CACHE_DIR = str(cache_dir)
     try:
-        return numba.njit(cache=True, inline="never")(function)
+        return numba.njit(cache=True)(function)
     finally:
         numba.config.CACHE_DIR = previous

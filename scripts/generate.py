@@ -6,7 +6,6 @@ Formats, constants, tables and latencies stand in the Python blocks and nowhere 
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 from pathlib import Path
 
@@ -14,6 +13,7 @@ from golden_model import formats
 from golden_model.block import Const
 from golden_model.fixed import Format
 from golden_model.registry import BLOCKS
+from scripts.files import write_text
 
 PACKAGE = Path(__file__).resolve().parent.parent / "rtl" / "common" / "fluxproof_pkg.vhd"
 
@@ -86,9 +86,7 @@ def main() -> int:
             print(f"{PACKAGE.name} is stale: run `make generate` and commit it", file=sys.stderr)
             return 1
         return 0
-    temporary = PACKAGE.with_suffix(".tmp")
-    temporary.write_text(text)
-    os.replace(temporary, PACKAGE)
+    write_text(PACKAGE, text)
     print(f"wrote {PACKAGE.relative_to(PACKAGE.parents[2])}, {len(text.splitlines())} lines")
     return 0
 

@@ -1,0 +1,91 @@
+"""The VHDL in GHDL as a device of the closed loop (scripts/cosim.py): one period at a time."""
+
+from __future__ import annotations
+
+import cocotb
+import numpy as np
+from cocotb.clock import Clock
+from cocotb.triggers import FallingEdge, First, RisingEdge, ValueChange
+from cocotb.utils import get_sim_time
+
+from cocotb_tests.dut_bench import read
+from golden_model.fluxproof import OBSERVED, Observed
+from scripts.cosim import SAMPLE_DELAY, Period
+
+CLOCK_NS = 10
+
+
+def now() -> int:
+    """Rising edges since the start of the clock; exact, the clock's period is a whole number of nanoseconds."""
+    return int(get_sim_time("ns")) // CLOCK_NS
+
+
+class GhdlDevice:
+    """Drives the top entity; gate edges are recorded by a task of their own."""
+
+    def __init__(self, dut):
+        self.dut = dut
+        self.edges: list[tuple[int, int]] = []
+        self.word = 0
+        self.start_clock = 0
+        self.observed = [(n, getattr(dut, n), bool(OBSERVED[n].fmt.signed)) for n in Observed._fields]
+
+    async def _watch_gates(self):
+        high, low = self.dut.gate_high, self.dut.gate_low
+        while True:
+            await First(ValueChange(high), ValueChange(low))
+            # Both vectors change at a rising edge; half a clock later both have settled.
+            clock = now()
+            await FallingEdge(self.dut.clk)
+            word = read(high, False) + 8 * read(low, False)
+            if word != self.word:
+                self.word = word
+                self.edges.append((clock, word))
+
+    async def start(self, registers, enable: int) -> Period:
+        dut = self.dut
+        for name, value in registers._asdict().items():
+            getattr(dut, name).value = int(value)
+        for name in ("sample_valid", "trip", "clear_trip", "adc_a", "adc_b", "adc_c", "adc_u_dc", "position_code"):
+            getattr(dut, name).value = 0
+        for name in ("omega_ref_in", "i_d_ref_in", "i_q_ext_in", "speed_mode_in"):
+            getattr(dut, name).value = 0
+        dut.enable.value = enable
+        dut.rst.value = 1
+        Clock(dut.clk, CLOCK_NS, unit="ns").start()
+        for _ in range(4):
+            await FallingEdge(dut.clk)
+        dut.rst.value = 0
+        cocotb.start_soon(self._watch_gates())
+        self.start_clock = now()
+        return await self._finish(None, 0, 0)
+
+    async def period(self, inputs: dict[str, int], enable: int) -> Period:
+        dut = self.dut
+        dut.enable.value = enable
+        for name, value in inputs.items():
+            getattr(dut, name).value = value
+        for _ in range(SAMPLE_DELAY):
+            await FallingEdge(dut.clk)
+        running = read(dut.running, False)
+        dut.sample_valid.value = 1
+        await FallingEdge(dut.clk)
+        dut.sample_valid.value = 0
+        began = now()
+        await RisingEdge(dut.duty_valid)
+        duty_clocks = now() + 1 - began  # the edge at which a follower would see duty_valid
+        await RisingEdge(dut.compare_valid)
+        await FallingEdge(dut.clk)
+        observed = {name: read(handle, signed) for name, handle, signed in self.observed}
+        return await self._finish(observed, duty_clocks, running)
+
+    async def _finish(self, observed, duty_clocks: int, running: int) -> Period:
+        await RisingEdge(self.dut.sample_trigger)
+        end = now()
+        await FallingEdge(self.dut.clk)
+        mine = [(c, w) for c, w in self.edges if c < end]
+        self.edges = [(c, w) for c, w in self.edges if c >= end]
+        clocks = np.array([c - self.start_clock for c, _ in mine], np.int64)
+        words = np.array([w for _, w in mine], np.int64)
+        length, self.start_clock = end - self.start_clock, end
+        return Period(observed, clocks, words, length, duty_clocks, running)

@@ -1,0 +1,192 @@
+"""A drive in SI units, as drive.toml describes it once, and the bases of the per-unit numbers.
+
+Peak values throughout, amplitude-invariant dq frames, angles and speeds electrical unless a name says
+otherwise.  ``load(path)`` reads a file; ``registers.registers(drive)`` makes the core's integers of it.
+
+Bases, where [bases] does not say otherwise (a per-unit number reaches +-2):
+
+    I_base      current at the upper end of the ADC code
+    U_base      half the voltage at full bus code, so that the code's scale ends at 2
+    omega_base  pole_pairs * rated mechanical speed: twice the rated speed can be represented
+    lambda_base U_base / omega_base
+"""
+
+import dataclasses
+from dataclasses import dataclass
+
+from golden_model.drive_checks import check
+from golden_model.drive_file import read_sections
+from golden_model.drive_keys import DriveError, flag, not_negative, positive, real, whole
+
+
+@dataclass(frozen=True)
+class Machine:
+    """[machine]; names as in plant.Machine, so that ``plant.Machine.from_mapping(asdict(...))`` works."""
+
+    pole_pairs: int = whole(1, 63, "pole pairs")
+    resistance_ohm: float = positive("ohm", "per phase at temperature_ref_c")
+    inductance_d_h: float = positive("H", "d axis")
+    inductance_q_h: float = positive("H", "q axis")
+    magnet_flux_wb: float = not_negative("Wb", "flux linkage of the magnets, peak")
+    rated_current_a: float = positive("A", "phase current, peak")
+    rated_speed_rad_s: float = positive("rad/s", "mechanical")
+    inertia_kgm2: float = not_negative("kg m2", "rotor and load", 0.0)
+    viscous_friction_nms: float = not_negative("Nm s", "per mechanical rad/s", 0.0)
+    coulomb_friction_nm: float = not_negative("Nm", "", 0.0)
+    temperature_ref_c: float = real("degC", "of resistance and magnet flux", 20.0)
+    temperature_winding_c: float = real("degC", "at the start of a simulation", 20.0)
+    temperature_magnet_c: float = real("degC", "at the start of a simulation", 20.0)
+    resistance_temp_coeff_per_k: float = real("1/K", "copper: 0.0039", 0.0)
+    magnet_temp_coeff_per_k: float = real("1/K", "NdFeB: about -0.001", 0.0)
+    saturation_d_per_a2: float = not_negative("1/A2", "see plant/pmsm.py", 0.0)
+    saturation_q_per_a2: float = not_negative("1/A2", "see plant/pmsm.py", 0.0)
+    cross_saturation_wb_per_a2: float = real("Wb/A2", "see plant/pmsm.py", 0.0)
+    iron_conductance_s: float = not_negative("S", "1 / R_fe", 0.0)
+
+
+@dataclass(frozen=True)
+class Inverter:
+    """[inverter]; the drops and slopes serve simulation alone, named as in plant.Inverter."""
+
+    dc_bus_v: float = positive("V", "nominal bus voltage")
+    pwm_frequency_hz: float = positive("Hz", "one carrier up and down")
+    dead_time_s: float = positive("s", "both gates of a leg off")
+    min_pulse_s: float = positive("s", "shortest pulse, longer than the dead time")
+    v_switch_v: float = not_negative("V", "threshold of the switch", 0.0)
+    v_diode_v: float = not_negative("V", "threshold of the diode", 0.0)
+    r_switch_ohm: float = not_negative("ohm", "slope of the switch", 0.0)
+    r_diode_ohm: float = not_negative("ohm", "slope of the diode", 0.0)
+    zero_current_a: float = not_negative("A", "width of the zone around zero current", 0.0)
+
+
+@dataclass(frozen=True)
+class Control:
+    """[control]; a gain given here overrides what the bandwidths would make."""
+
+    current_bandwidth_hz: float = positive("Hz", "current loop")
+    sample_time_s: float | None = positive("s", "1 / pwm_frequency_hz", None)
+    duty_applied_after_samples: int = whole(0, 10, "whole samples between a duty and its period", 1)
+    delay_samples: float = not_negative("samples", "from sampling to the mean of the voltage", 1.5, most=10.0)
+    speed_bandwidth_hz: float | None = positive("Hz", "speed loop; none: no speed control", None)
+    speed_filter_hz: float | None = positive("Hz", "filter of the measured speed; none: no filter", None)
+    current_limit_a: float | None = positive("A", "limit of the q reference, rated current if none", None)
+    voltage_reserve: float = not_negative("1", "part of the voltage circle left unused", 0.0, most=0.99)
+    current_kp_d_v_per_a: float | None = not_negative("V/A", "override", None)
+    current_kp_q_v_per_a: float | None = not_negative("V/A", "override", None)
+    current_ki_d_v_per_as: float | None = not_negative("V/(A s)", "override", None)
+    current_ki_q_v_per_as: float | None = not_negative("V/(A s)", "override", None)
+    speed_kp_as_per_rad: float | None = not_negative("A s/rad", "override, per electrical rad/s", None)
+    speed_ki_a_per_rad: float | None = not_negative("A/rad", "override, per electrical rad", None)
+
+
+@dataclass(frozen=True)
+class Sensors:
+    """[sensors]; offsets in codes of the converter, gains as trims around one."""
+
+    adc_bits: int = whole(12, 16, "of the current and bus converters")
+    current_range_a: float = positive("A", "current at the upper end of the code, mid code is zero")
+    u_dc_range_v: float = positive("V", "bus voltage at full code")
+    position_bits: int = whole(8, 18, "codes per mechanical turn")
+    current_offset_code: tuple | None = real("codes", "at zero current, mid code if none", None, count=3)
+    current_gain: tuple = real("1", "trim, negative for a reversed sensor", (1.0, 1.0, 1.0), count=3)
+    u_dc_offset_code: float = not_negative("codes", "at zero volts", 0.0)
+    u_dc_gain: float = real("1", "trim", 1.0)
+    position_reverse: bool = flag("true: the code counts against the phase order", False)
+    theta_offset_rad: float = real("rad", "electrical angle at code zero", 0.0)
+
+
+@dataclass(frozen=True)
+class Core:
+    """[core]"""
+
+    clock_hz: float = positive("Hz", "of the core; a whole multiple of twice the PWM frequency")
+
+
+@dataclass(frozen=True)
+class BaseChoice:
+    """[bases], all optional; see the module's docstring for the defaults."""
+
+    current_a: float | None = positive("A", "per-unit base", None)
+    voltage_v: float | None = positive("V", "per-unit base", None)
+    omega_me_rad_s: float | None = positive("rad/s", "per-unit base, electrical", None)
+
+
+@dataclass(frozen=True)
+class Bases:
+    """What 1.0 per unit stands for, SI, peak, electrical."""
+
+    current_a: float
+    voltage_v: float
+    omega_me_rad_s: float
+
+    @property
+    def flux_wb(self):
+        return self.voltage_v / self.omega_me_rad_s
+
+
+@dataclass(frozen=True)
+class Drive:
+    """One drive; refuses sections that contradict each other (``dataclasses.replace`` checks again)."""
+
+    machine: Machine
+    inverter: Inverter
+    control: Control
+    sensors: Sensors
+    core: Core
+    base_choice: BaseChoice = BaseChoice()
+
+    def __post_init__(self):
+        check(self)
+
+    @property
+    def bases(self):
+        choice, sensors, machine = self.base_choice, self.sensors, self.machine
+        return Bases(
+            choice.current_a or sensors.current_range_a,
+            choice.voltage_v or sensors.u_dc_range_v / 2,
+            choice.omega_me_rad_s or machine.pole_pairs * machine.rated_speed_rad_s,
+        )
+
+    @property
+    def sample_time_s(self):
+        """One sample a PWM period, at the valley of the carrier."""
+        return 1.0 / self.inverter.pwm_frequency_hz
+
+    @property
+    def current_limit_a(self):
+        limit = self.control.current_limit_a
+        return self.machine.rated_current_a if limit is None else limit
+
+    @property
+    def carrier_half(self):
+        """Half a PWM period in clocks; ``check`` has made sure that it is whole."""
+        return round(self.core.clock_hz / (2.0 * self.inverter.pwm_frequency_hz))
+
+
+SECTIONS = {
+    "machine": Machine,
+    "inverter": Inverter,
+    "control": Control,
+    "sensors": Sensors,
+    "core": Core,
+    "bases": BaseChoice,
+}
+
+
+def load(path):
+    """The drive that a TOML file describes; DriveError says what is wrong with it."""
+    sections = read_sections(path, SECTIONS)
+    try:
+        return Drive(*sections.values())
+    except DriveError as error:
+        raise DriveError(f"{path}: {error}") from None
+
+
+def with_carrier(drive, carrier_half):
+    """The same drive with ``carrier_half`` clocks in half a PWM period, for simulations at the clock.
+
+    Only the clock changes, to ``2*carrier_half*pwm_frequency``; sampling and every gain stay.  Dead
+    time and minimum pulse keep their seconds and become other, fewer clocks.
+    """
+    core = dataclasses.replace(drive.core, clock_hz=2.0 * carrier_half * drive.inverter.pwm_frequency_hz)
+    return dataclasses.replace(drive, core=core)

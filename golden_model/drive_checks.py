@@ -1,0 +1,94 @@
+"""Checks between the sections of a drive: settings that are fine alone and contradict each other."""
+
+import math
+
+from golden_model.drive_keys import DriveError
+
+CARRIER_HALF_RANGE = (8, 32767)  # generic CARRIER_HALF of rtl/fluxproof.vhd
+WHOLE = 1e-6  # relative; a decimal fraction typed with seven digits still counts as exact
+
+
+def check(drive):
+    """Raise DriveError for the first contradiction."""
+    for rule in (_sample_time, _carrier, _pulses, _voltage, _current, _codes, _speed_loop, _current_loop):
+        rule(drive)
+
+
+def _refuse(key, value, allowed):
+    raise DriveError(f"{key} = {value:g} is out of range: allowed is {allowed}")
+
+
+def _sample_time(drive):
+    """The duties are updated once a period, at the valley."""
+    given, period = drive.control.sample_time_s, drive.sample_time_s
+    if given is not None and abs(given / period - 1.0) > WHOLE:
+        frequency = f"[inverter] pwm_frequency_hz = {drive.inverter.pwm_frequency_hz:g}"
+        _refuse("[control] sample_time_s", given, f"{period:g} s, one PWM period, since {frequency}")
+
+
+def _carrier(drive):
+    clock, pwm = drive.core.clock_hz, drive.inverter.pwm_frequency_hz
+    exact = clock / (2.0 * pwm)
+    keys = f"[core] clock_hz = {clock:g} and [inverter] pwm_frequency_hz = {pwm:g}"
+    if abs(exact - round(exact)) > WHOLE:
+        raise DriveError(f"{keys} make {exact:g} clocks in half a PWM period: allowed is a whole number")
+    lo, hi = CARRIER_HALF_RANGE
+    if not lo <= exact <= hi:
+        raise DriveError(f"{keys} make {exact:g} clocks in half a PWM period: allowed is {lo} to {hi}")
+
+
+def _pulses(drive):
+    """gate_generation refuses anything but 0 < dead_time < min_pulse <= half a period."""
+    inverter = drive.inverter
+    dead, pulse, half = inverter.dead_time_s, inverter.min_pulse_s, drive.sample_time_s / 2.0
+    if not dead < pulse:
+        _refuse("[inverter] dead_time_s", dead, f"above 0 and below min_pulse_s = {pulse:g} s")
+    if not pulse <= half:
+        _refuse("[inverter] min_pulse_s", pulse, f"up to half a PWM period, {half:g} s")
+
+
+def _voltage(drive):
+    """u_max is below one per unit, u_dc / sqrt(3) must fit it."""
+    bus, limit = drive.inverter.dc_bus_v, math.sqrt(3.0) * drive.bases.voltage_v
+    if bus > drive.sensors.u_dc_range_v:
+        _refuse("[inverter] dc_bus_v", bus, f"up to [sensors] u_dc_range_v = {drive.sensors.u_dc_range_v:g} V")
+    if bus > limit:
+        base = "[bases] voltage_v" if drive.base_choice.voltage_v else "[sensors] u_dc_range_v / 2"
+        _refuse("[inverter] dc_bus_v", bus, f"up to sqrt(3) * {base} = {limit:g} V")
+
+
+def _current(drive):
+    limit, reach = drive.current_limit_a, drive.sensors.current_range_a
+    if limit > reach:
+        key = "[machine] rated_current_a" if drive.control.current_limit_a is None else "[control] current_limit_a"
+        _refuse(key, limit, f"up to [sensors] current_range_a = {reach:g} A")
+
+
+def _codes(drive):
+    top = 2**drive.sensors.adc_bits - 1
+    for code in drive.sensors.current_offset_code or ():
+        if not 0 <= code <= top:
+            _refuse("[sensors] current_offset_code", code, f"0 to {top}")
+    if drive.sensors.u_dc_offset_code > top:
+        _refuse("[sensors] u_dc_offset_code", drive.sensors.u_dc_offset_code, f"0 to {top}")
+
+
+def _speed_loop(drive):
+    """The speed gains divide by the torque constant and are proportional to the inertia."""
+    control, machine = drive.control, drive.machine
+    if control.speed_bandwidth_hz is None:
+        return
+    for key in ("inertia_kgm2", "magnet_flux_wb"):
+        if getattr(machine, key) <= 0.0:
+            _refuse(f"[machine] {key}", 0.0, "above 0, since [control] speed_bandwidth_hz is given")
+
+
+def _current_loop(drive):
+    """A delay of d samples turns the loop's phase by 90 degrees at 1/(4*d*T_s): unstable from there."""
+    control = drive.control
+    if control.delay_samples == 0.0:
+        return
+    limit = 1.0 / (4.0 * control.delay_samples * drive.sample_time_s)
+    if control.current_bandwidth_hz >= limit:
+        reason = f"{control.delay_samples:g} samples of delay make the loop unstable from there"
+        _refuse("[control] current_bandwidth_hz", control.current_bandwidth_hz, f"below {limit:g} Hz; {reason}")

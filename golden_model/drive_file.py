@@ -1,0 +1,128 @@
+"""Reads a TOML file into the dataclasses that declare its sections; every fault is one clear line.
+
+Messages name the file, the section and the key, and what would have been right: the allowed range, the
+type, or for an unknown name the nearest known one.
+"""
+
+import dataclasses
+import difflib
+import re
+from pathlib import Path
+
+try:
+    import tomllib
+except ModuleNotFoundError:  # Python 3.10
+    import tomli as tomllib
+
+from golden_model.drive_keys import DriveError, key_of
+
+IGNORED = ("columns",)  # how recordings name their signals; read elsewhere
+
+
+def read_sections(path, schema):
+    """{section: dataclass instance} from the file; ``schema`` is {section: dataclass}."""
+    try:
+        tables = _tables(Path(path))
+        _refuse_unknown(tables, [*schema, *IGNORED], "section")
+        return {name: _section(name, kind, tables.get(name)) for name, kind in schema.items()}
+    except DriveError as error:
+        raise DriveError(f"{path}{error}") from None
+
+
+def _tables(path):
+    """The file as nested dictionaries; the message then starts right behind the file's name."""
+    try:
+        text = path.read_bytes().decode("utf-8")
+    except UnicodeDecodeError as error:
+        line = error.object[: error.start].count(b"\n") + 1
+        raise DriveError(f":{line}: not UTF-8 text") from None
+    except (OSError, ValueError) as error:
+        raise DriveError(f": cannot be read: {getattr(error, 'strerror', None) or error}") from None
+    try:
+        return tomllib.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise DriveError(_syntax_message(str(error), text)) from None
+
+
+def _syntax_message(message, text):
+    """':line: what TOML says'; the parser puts the line at the end, in words."""
+    at = re.search(r" \(at line (\d+), column (\d+)\)$", message)
+    if at:
+        return f":{at[1]}: not TOML: {message[: at.start()]} (column {at[2]})"
+    return f":{max(1, len(text.splitlines()))}: not TOML: {message}"
+
+
+def _nearest(name, known):
+    close = difflib.get_close_matches(name, known, n=1, cutoff=0.0)
+    return f"the nearest known one is {close[0]}" if close else "none is known here"
+
+
+def _refuse_unknown(table, known, what, where=""):
+    for name in table:
+        if name not in known:
+            raise DriveError(f": {where}unknown {what} {name}; {_nearest(name, known)}")
+
+
+def _section(name, kind, table):
+    """One section as an instance of its dataclass."""
+    fields = {f.name: f for f in dataclasses.fields(kind)}
+    required = [f for f, x in fields.items() if x.default is dataclasses.MISSING]
+    if table is None:
+        if required:
+            raise DriveError(f": section [{name}] is missing; it needs {', '.join(required)}")
+        table = {}
+    if not isinstance(table, dict):
+        raise DriveError(f": {name} must be a section [{name}] with keys, not a {_type_name(table)}")
+    _refuse_unknown(table, list(fields), "key", f"[{name}] ")
+    for key in required:
+        if key not in table:
+            raise DriveError(f": [{name}] {key} is missing: {_expected(key_of(fields[key]))}")
+    return kind(**{key: _value(f"[{name}] {key}", key_of(fields[key]), value) for key, value in table.items()})
+
+
+def _value(where, key, value):
+    """The value in its declared type, a list as a tuple."""
+    if not key.count:
+        return _single(where, key, value)
+    if not isinstance(value, list) or len(value) != key.count:
+        raise DriveError(f": {where} = {_shown(value)}: must be {_expected(key)}")
+    return tuple(_single(where, key, item) for item in value)
+
+
+def _single(where, key, value):
+    if not _type_fits(key.kind, value):
+        raise DriveError(f": {where} = {_shown(value)} is a {_type_name(value)}: must be {_expected(key)}")
+    if key.kind == "bool":
+        return value
+    if not key.accepts(value):
+        raise DriveError(f": {where} = {_shown(value)} is out of range: allowed is {key.allowed}")
+    return float(value) if key.kind == "float" else value
+
+
+def _type_fits(kind, value):
+    """TOML's true is not a number, and a whole number is a real one."""
+    if kind == "bool" or isinstance(value, bool):
+        return kind == "bool" and isinstance(value, bool)
+    if kind == "int":
+        return isinstance(value, int)
+    return isinstance(value, float) or (isinstance(value, int) and abs(value) < 10**300)
+
+
+def _expected(key):
+    """What the key takes, in words."""
+    if key.kind == "bool":
+        return "true or false"
+    one = f"{'whole number' if key.kind == 'int' else 'number'}, {key.allowed}"
+    doc = f" ({key.doc})" if key.doc else ""
+    return f"a list of {key.count}, each a {one}{doc}" if key.count else f"a {one}{doc}"
+
+
+def _type_name(value):
+    names = {bool: "boolean", str: "string", list: "list", dict: "table", float: "real number", int: "whole number"}
+    return names.get(type(value), type(value).__name__)
+
+
+def _shown(value):
+    """The value as text that fits a line."""
+    text = repr(value) if not isinstance(value, bool) else str(value).lower()
+    return text if len(text) <= 40 else f"{text[:37]}..."

@@ -1,0 +1,61 @@
+"""Integers of the core's signals to SI units and back; the unit of each signal stands in ``UNITS``.
+
+The scale of a signal is what its LSB means: format LSB times base.  Compare values count clocks.
+"""
+
+import math
+
+from golden_model.fluxproof import OBSERVED
+from golden_model.io import sample_latch
+from golden_model.registers import TURN_RAD
+
+SIGNALS = {p.name: p for p in sample_latch.BLOCK.outputs} | OBSERVED  # raw sample, references, observed values
+
+_OF_UNIT = {
+    "A": "i_a i_b i_c i_d i_q i_q_ref i_d_ref i_q_ext",
+    "V": "u_dc u_max u_dec_d u_dec_q u_int_d u_int_q u_d u_q u_alpha u_beta",
+    "rad/s": "omega_me omega_ref",
+    "Wb": "lambda_d lambda_q",
+    "rad": "theta_me theta_out",
+}
+UNITS = {name: unit for unit, names in _OF_UNIT.items() for name in names.split()}  # the rest: "1"
+
+
+def unit(name):
+    """SI unit of a signal; electrical angles and speeds, peak values; "1" for duties, flags and counts."""
+    return UNITS.get(name, "1")
+
+
+def si_per_lsb(name, drive):
+    """What one LSB of the signal means; multiply whole arrays of integers by it."""
+    if name not in SIGNALS:
+        raise KeyError(f"{name} is not a signal; known are {', '.join(SIGNALS)}")
+    bases = drive.bases
+    scale = {
+        "A": bases.current_a,
+        "V": bases.voltage_v,
+        "rad/s": bases.omega_me_rad_s,
+        "Wb": bases.flux_wb,
+        "rad": TURN_RAD,
+        "1": 1.0,
+    }[unit(name)]
+    return SIGNALS[name].fmt.lsb * scale
+
+
+def to_si(name, value, drive):
+    """The signal's integer (or an array of them) in SI units."""
+    return value * si_per_lsb(name, drive)
+
+
+def from_si(name, value, drive):
+    """Nearest integer for a value in SI units; angles wrap, anything else out of range is a ValueError."""
+    port, lsb = SIGNALS.get(name), si_per_lsb(name, drive)
+    if not math.isfinite(value):
+        raise ValueError(f"{name} = {value} is not a number the core can take")
+    integer = math.floor(value / lsb + 0.5)
+    if unit(name) == "rad":
+        return integer % (port.fmt.hi + 1)
+    if not port.low <= integer <= port.high:
+        lo, hi = port.low * lsb, port.high * lsb
+        raise ValueError(f"{name} = {value:g} {unit(name)} is out of range: allowed is {lo:.6g} to {hi:.6g}")
+    return integer

@@ -1,0 +1,232 @@
+"""Closed loop: gate edges switch the plant, the plant's sensors feed the core, the golden model runs beside it.
+
+The device under test is anything that can run one PWM period (see Device): the VHDL in GHDL, its Verilog
+conversion in Verilator, or the golden model itself.  All see the same codes; every observed value and every gate
+edge is compared with ``==``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+
+from golden_model import fluxproof
+from golden_model.kernel import kernel
+from golden_model.modulation import gate_generation
+from plant import Inverter, Machine, Sensors, SwitchingPlant, sensor_params
+from plant.sensors import current_code, position_code, u_dc_code
+
+SAMPLE_DELAY = 4  # clocks from sample_trigger to sample_valid: what a converter would take, shortened
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """What happens, period by period: arrays of one length."""
+
+    omega_ref: np.ndarray  # integers, per unit format
+    load: np.ndarray  # [Nm]
+    u_dc: np.ndarray  # [V]
+    i_d_ref: np.ndarray  # integers
+    i_q_ext: np.ndarray  # integers
+    speed_mode: np.ndarray  # 0 or 1
+    enable: np.ndarray  # 0 or 1
+
+    def __len__(self) -> int:
+        return len(self.load)
+
+
+@dataclass
+class Period:
+    """What a device did in one period, from one sample_trigger to the next."""
+
+    observed: dict[str, int] | None  # None where no sample came out
+    edge_clocks: np.ndarray
+    gate_words: np.ndarray
+    clocks: int
+    sample_to_duty: int
+    running: int  # when the sample was taken
+
+
+class Device(Protocol):
+    """Runs one period: takes the sample SAMPLE_DELAY clocks after sample_trigger."""
+
+    async def start(self, registers, enable: int) -> Period:
+        """Reset, set the registers, run to the first sample_trigger."""
+
+    async def period(self, inputs: dict[str, int], enable: int) -> Period:
+        """From this sample_trigger to the next; ``inputs`` are the raw sample's ports."""
+
+
+@kernel
+def gate_period(state, compare_a, compare_b, compare_c, enable, dead_time, min_pulse, carrier_half, word, clocks, words):
+    """Golden gates from one sample_trigger to the next: (state, running, last word, edges written, clocks).
+
+    ``clocks``, ``words`` receive the edges; ``word`` is the gate word in force, six bits, upper gates first.
+    """
+    edges = 0
+    for clock in range(1, 4 * carrier_half):
+        state, out = gate_generation.step(
+            state, compare_a, compare_b, compare_c, enable, 0, 0, dead_time, min_pulse, carrier_half
+        )
+        now = out[0] + 8 * out[1]
+        if now != word:
+            word = now
+            clocks[edges], words[edges] = clock, now
+            edges += 1
+        if out[2]:
+            return state, out[3], word, edges, clock
+    return state, -1, word, edges, -1
+
+
+class GoldenGates:
+    """The golden gate generator as a period machine; an edge on the last clock belongs to the next period."""
+
+    def __init__(self, registers, carrier_half: int):
+        self.state, self.word, self.carried = gate_generation.BLOCK.state, 0, None
+        self.registers, self.carrier_half = registers, carrier_half
+        self.clocks, self.words = np.zeros(64, np.int64), np.zeros(64, np.int64)
+
+    def run(self, compare: tuple[int, int, int], enable: int) -> tuple[np.ndarray, np.ndarray, int, int]:
+        """One period: (edge clocks, gate words, clocks, running at its end)."""
+        start = self.word
+        self.state, running, self.word, count, length = gate_period(
+            self.state,
+            *compare,
+            enable,
+            self.registers.dead_time,
+            self.registers.min_pulse,
+            self.carrier_half,
+            start,
+            self.clocks,
+            self.words,
+        )
+        edges = [(int(c), int(w)) for c, w in zip(self.clocks[:count], self.words[:count], strict=True)]
+        if self.carried is not None:
+            edges.insert(0, (0, self.carried))
+        self.carried = edges.pop()[1] if edges and edges[-1][0] == length else None
+        clocks = np.array([c for c, _ in edges], np.int64)
+        return clocks, np.array([w for _, w in edges], np.int64), int(length), int(running)
+
+
+@dataclass
+class Result:
+    """Everything recorded: one row per period, integers as the core shows them, plant in SI units."""
+
+    observed: dict[str, np.ndarray] = field(default_factory=dict)
+    plant: dict[str, np.ndarray] = field(default_factory=dict)
+    periods_compared: int = 0
+    differences: int = 0
+    first_difference: str | None = None
+    sample_to_duty_clocks: int = 0
+    gate_edges: int = 0
+
+
+PLANT_SIGNALS = {
+    "i_a": lambda p: p.i_abc[0],
+    "i_d": lambda p: p.i_dq[0],
+    "i_q": lambda p: p.i_dq[1],
+    "lambda_d": lambda p: p.lambda_dq[0],
+    "lambda_q": lambda p: p.lambda_dq[1],
+    "omega_m": lambda p: p.omega_m,
+    "torque": lambda p: p.torque,
+}
+
+
+def build_plant(drive, sensors: Sensors | None = None) -> tuple[SwitchingPlant, Sensors]:
+    """Plant and sensors as drive.toml describes them; the device's own dead time comes out of its gates."""
+    machine = Machine.from_mapping(vars(drive.machine))
+    s = drive.sensors
+    sensors = sensors or Sensors(
+        current_bits=s.adc_bits,
+        current_full_scale_a=s.current_range_a,
+        u_dc_bits=s.adc_bits,
+        u_dc_full_scale_v=s.u_dc_range_v,
+        position_bits=s.position_bits,
+    )
+    return SwitchingPlant(machine, Inverter()), sensors
+
+
+async def cosimulate(
+    device: Device,
+    drive,
+    register_set,
+    scenario: Scenario,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+    sensors: Sensors | None = None,
+) -> Result:
+    """Run ``scenario`` on ``device`` in closed loop and compare with the golden model at every period."""
+    registers, config = register_set.values, register_set.config
+    period_s = 1.0 / drive.inverter.pwm_frequency_hz
+    plant, described = build_plant(drive, sensors)
+    codes = sensor_params(described)
+    gates = GoldenGates(registers, config.carrier_half)
+    state, result, observed_rows, plant_rows = fluxproof.State(), Result(), [], []
+
+    def differ(k: int, what: str) -> None:
+        result.differences += 1
+        result.first_difference = result.first_difference or f"period {k}: {what}"
+
+    first = await device.start(registers, int(scenario.enable[0]))
+    golden_clocks, golden_words, _length, running = gates.run((0, 0, 0), int(scenario.enable[0]))
+    if not np.array_equal(first.gate_words, golden_words):
+        differ(-1, "gates before the first sample")
+    for k in range(len(scenario)):
+        inputs = {
+            **{f"adc_{x}": current_code(codes, n, plant.i_abc[n], k) for n, x in enumerate("abc")},
+            "adc_u_dc": u_dc_code(codes, float(scenario.u_dc[k]), k),
+            "position_code": position_code(codes, plant.theta_m, k),
+            "omega_ref_in": int(scenario.omega_ref[k]),
+            "i_d_ref_in": int(scenario.i_d_ref[k]),
+            "i_q_ext_in": int(scenario.i_q_ext[k]),
+            "speed_mode_in": int(scenario.speed_mode[k]),
+        }
+        enable = int(scenario.enable[k])
+        run = running if enable else 0
+        sample = fluxproof.Sample(*inputs.values(), run)
+        state, golden = fluxproof.step(state, sample, registers, config)
+        golden_clocks, golden_words, length, running = gates.run(golden[-3:], enable)
+
+        got = await device.period(inputs, enable)
+        compare_period(k, got, golden, (golden_clocks, golden_words, length, run), differ)
+        result.sample_to_duty_clocks = max(result.sample_to_duty_clocks, got.sample_to_duty)
+        result.gate_edges += len(got.edge_clocks)
+        result.periods_compared += 1
+        observed_rows.append(golden)
+        plant_rows.append([read(plant) for read in PLANT_SIGNALS.values()])
+        times = got.edge_clocks * (period_s / got.clocks)
+        plant.advance(times, got.gate_words, float(scenario.u_dc[k]), float(scenario.load[k]), period_s)
+        progress(k + 1, len(scenario))
+    result.observed = dict(zip(fluxproof.Observed._fields, np.array(observed_rows).T, strict=True))
+    result.plant = dict(zip(PLANT_SIGNALS, np.array(plant_rows).T, strict=True))
+    return result
+
+
+def compare_period(k: int, got: Period, golden, gates, differ: Callable[[int, str], None]) -> None:
+    """``==`` on every observed value, every gate edge, the period's length and the run state."""
+    edge_clocks, words, length, run = gates
+    if got.observed is None:
+        differ(k, "no sample came out")
+        return
+    for name, wanted in zip(fluxproof.Observed._fields, golden, strict=True):
+        if got.observed[name] != wanted:
+            differ(k, f"{name}: got {got.observed[name]}, wanted {wanted}")
+    if not np.array_equal(got.edge_clocks, edge_clocks) or not np.array_equal(got.gate_words, words):
+        differ(k, f"gate edges: got {_edges(got.edge_clocks, got.gate_words)}, wanted {_edges(edge_clocks, words)}")
+    if (got.clocks, got.running) != (length, run):
+        differ(k, f"clocks, running: got {(got.clocks, got.running)}, wanted {(length, run)}")
+
+
+def _edges(clocks, words) -> str:
+    return " ".join(f"{c}:{w:06b}" for c, w in zip(clocks, words, strict=False))
+
+
+def run_now(coroutine):
+    """Drive a coroutine that never waits: the devices that are plain function calls."""
+    try:
+        coroutine.send(None)
+    except StopIteration as stop:
+        return stop.value
+    raise RuntimeError("the coroutine waited for something; run it inside its simulator")

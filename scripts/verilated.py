@@ -1,0 +1,298 @@
+"""The converted core, compiled by Verilator into a library: the RTL itself, bit by bit, at millions of clocks/s.
+
+    core = VerilatedCore({"CARRIER_HALF": 10000})
+    core.set_many({"enable": 1, "dead_time": 100, "min_pulse": 300, ...})
+    core.reset()
+    clocks, edge_clocks, gate_words = core.run_period(30000, sample={"adc_a": 32768, ...}, sample_at=50)
+
+Values are the integers on the ports, signed where the VHDL says so.  Time is counted in ticks, that is rising
+edges of ``clk``: what is set before a tick is seen by it, what is read after a tick holds from that edge on.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import ctypes
+import fcntl
+import hashlib
+import os
+import shutil
+import subprocess
+import tempfile
+import time
+from collections.abc import Iterable, Iterator, Mapping
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from scripts.sources import ROOT, RTL
+from scripts.verilog import TOP, VerilogPort, conversion_key, convert, top_ports
+
+CACHE = ROOT / "build" / "verilated"
+WRAPPER = Path(__file__).with_suffix(".cpp")
+LIBRARY = "libcore.so"
+
+# Registers without a reset start as 0; what the VHDL calls 'U' there is the business of the comparing test.
+VERILATOR_FLAGS = ["--cc", "-O3", "--x-assign", "fast", "--x-initial", "fast", "--no-assert", "-Wno-lint", "-Wno-fatal"]
+DEFINES = ["VERILATOR=1", "VL_IGNORE_UNKNOWN_ARCH"]
+DEFINES += [f"VM_{x}=0" for x in "COVERAGE SC TIMING TRACE TRACE_FST TRACE_VCD TRACE_SAIF".split()]
+COMPILE = ["-std=gnu++17", "-fPIC", "-w", *(f"-D{define}" for define in DEFINES)]
+HOT, COLD = "-O3", "-O0"  # what runs every clock; what runs once (tables being filled, the run-time library)
+
+
+class BuildError(RuntimeError):
+    """Verilator or the C++ compiler is missing or refused; the message ends with its words."""
+
+
+@lru_cache(maxsize=1)
+def find_verilator() -> tuple[str, str, Path]:
+    """(executable, version, its root folder): the virtual environment's, else the machine's."""
+    own = ROOT / ".venv" / "bin" / "verilator"
+    verilator = str(own) if own.exists() else shutil.which("verilator")
+    if verilator is None:
+        raise BuildError("there is no verilator: `make setup` installs it")
+    return verilator, _run([verilator, "--version"]).strip(), Path(_run([verilator, "--getenv", "VERILATOR_ROOT"]).strip())
+
+
+def _run(command: list[str], cwd: Path | None = None) -> str:
+    """What the command prints; BuildError with its complaints where it fails."""
+    try:
+        done = subprocess.run(command, cwd=cwd, capture_output=True, text=True)
+    except OSError as error:
+        raise BuildError(f"cannot start {command[0]}: {error}") from error
+    if done.returncode:
+        raise BuildError(f"{Path(command[0]).name} failed:\n{done.stdout[-2000:]}{done.stderr[-4000:]}")
+    return done.stdout
+
+
+@contextlib.contextmanager
+def _locked(path: Path) -> Iterator[None]:
+    """Holds the file's lock; the system frees it when the process ends, however it ends."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.open("w") as handle:
+        fcntl.flock(handle, fcntl.LOCK_EX)
+        yield
+
+
+def _compile(folder: Path, ports: Iterable[VerilogPort]) -> None:
+    """Turns ``folder``/fluxproof.v into ``folder``/libcore.so."""
+    verilator, _, root = find_verilator()
+    compiler = os.environ.get("CXX", "g++")
+    (folder / "ports.inc").write_text("".join(f"PORT({p.name}, {p.width}, {int(p.signed)})\n" for p in ports))
+    _run([verilator, *VERILATOR_FLAGS, "--Mdir", "obj", "--top-module", TOP, f"{TOP}.v"], folder)
+    hot = [str(WRAPPER), *sorted(str(p) for p in (folder / "obj").glob("*.cpp") if "Slow" not in p.name)]
+    cold = sorted(str(p) for p in (folder / "obj").glob("*Slow.cpp"))
+    cold += [str(root / "include" / name) for name in ("verilated.cpp", "verilated_threads.cpp")]
+    includes = [f"-I{path}" for path in (folder, folder / "obj", root / "include", root / "include" / "vltstd")]
+    for level, sources in ((HOT, hot), (COLD, cold)):
+        # One folder a level: the compiler names an object after its source, and two are called verilated.cpp.
+        (folder / level).mkdir()
+        _run([compiler, *COMPILE, level, *includes, "-c", *sources], folder / level)
+    objects = sorted(str(p) for p in folder.glob("-O*/*.o"))
+    _run([compiler, "-shared", "-pthread", "-o", LIBRARY, *objects], folder)
+
+
+def build(generics: Mapping[str, int], rtl: Path = RTL) -> Path:
+    """The folder with libcore.so and fluxproof.v for these generics, made if it is not there yet.
+
+    Processes that want the same one wait for the first; a folder appears under its name only when complete.
+    """
+    tools = (find_verilator()[1], os.environ.get("CXX", "g++"), VERILATOR_FLAGS, COMPILE, HOT, COLD)
+    digest = hashlib.sha256(f"{conversion_key(generics, rtl)} {tools}".encode() + WRAPPER.read_bytes())
+    folder = CACHE / digest.hexdigest()[:16]
+    if folder.exists():
+        return folder
+    with _locked(folder.with_suffix(".lock")):
+        if not folder.exists():
+            with tempfile.TemporaryDirectory(prefix=f"{folder.name}.", dir=CACHE) as scratch:
+                work = Path(scratch)
+                _compile(work, top_ports(convert(generics, work, rtl), rtl))
+                finished = work / "finished"
+                finished.mkdir()
+                for name in (LIBRARY, f"{TOP}.v"):
+                    os.replace(work / name, finished / name)
+                os.replace(finished, folder)
+    return folder
+
+
+_INT, _LONG, _CORE = ctypes.c_int, ctypes.c_int64, ctypes.c_void_p
+_LONGS = np.ctypeslib.ndpointer(np.int64, flags="C_CONTIGUOUS")
+_INTS = np.ctypeslib.ndpointer(np.int32, flags="C_CONTIGUOUS")
+_BYTES = np.ctypeslib.ndpointer(np.uint8, flags="C_CONTIGUOUS")
+_FUNCTIONS = {  # name: (result, arguments), as in verilated.cpp
+    "core_new": (_CORE, []),
+    "core_delete": (None, [_CORE]),
+    "core_clock": (_LONG, [_CORE]),
+    "core_set": (None, [_CORE, _INT, _LONG]),
+    "core_get": (_LONG, [_CORE, _INT]),
+    "core_eval": (None, [_CORE]),
+    "core_tick": (None, [_CORE, _LONG]),
+    "core_until": (_LONG, [_CORE, _INT, _LONG]),
+    "core_trace": (None, [_CORE, _LONG, _INTS, _LONG, _LONGS]),
+    "core_read": (None, [_CORE, _INTS, _LONG, _LONGS]),
+    "core_run_period": (_LONG, [_CORE, _LONG, _LONG, _INTS, _BYTES, ctypes.POINTER(_LONG)]),
+}
+
+
+def _load(path: Path) -> ctypes.CDLL:
+    library = ctypes.CDLL(str(path))
+    for name, (result, arguments) in _FUNCTIONS.items():
+        function = getattr(library, name)
+        function.restype, function.argtypes = result, arguments
+    return library
+
+
+class VerilatedCore:
+    """One core with all inputs 0, before its first clock; as many as wanted may live side by side."""
+
+    def __init__(self, generics: Mapping[str, int] | None = None, rtl: Path = RTL):
+        self._handle = None
+        folder = build(dict(generics or {}), rtl)
+        self.ports = {p.name: p for p in top_ports(folder / f"{TOP}.v", rtl)}
+        self.inputs = tuple(name for name, p in self.ports.items() if p.is_input)
+        self.outputs = tuple(name for name, p in self.ports.items() if not p.is_input)
+        self._index = {name: k for k, name in enumerate(self.ports)}
+        self._lists: dict[tuple[str, ...], np.ndarray] = {}
+        self._edges = (np.empty(0, np.int32), np.empty(0, np.uint8))
+        self._library = _load(folder / LIBRARY)
+        self._handle = self._library.core_new()
+
+    def __del__(self):
+        if self._handle is not None:
+            self._library.core_delete(self._handle)
+            self._handle = None
+
+    @property
+    def clock(self) -> int:
+        """Ticks since the core was made."""
+        return self._library.core_clock(self._handle)
+
+    @property
+    def gate_word(self) -> int:
+        """The gates now: bits 0..2 upper gates of legs a, b, c, bits 3..5 lower gates."""
+        return self.get("gate_high") | self.get("gate_low") << 3
+
+    def set(self, name: str, value: int) -> None:
+        """Drives an input from the next tick on; ValueError where the value does not fit the port."""
+        port, value = self.ports[name], int(value)
+        if not port.is_input or name == "clk":
+            raise ValueError(f"{name} is not an input to set")
+        if not port.low <= value <= port.high:
+            raise ValueError(f"{name}={value} does not fit {port.low} .. {port.high}")
+        self._library.core_set(self._handle, self._index[name], value)
+
+    def set_many(self, values: Mapping[str, int]) -> None:
+        """``set`` for each item."""
+        for name, value in values.items():
+            self.set(name, value)
+
+    def get(self, name: str) -> int:
+        """A port's value as the last tick left it; inputs read back as set."""
+        return self._library.core_get(self._handle, self._index[name])
+
+    def get_many(self, names: Iterable[str] | None = None) -> dict[str, int]:
+        """Several ports, all outputs by default, in one call."""
+        names = self.outputs if names is None else tuple(names)
+        values = np.empty(len(names), np.int64)
+        self._library.core_read(self._handle, self._indices(names), len(names), values)
+        return dict(zip(names, values.tolist(), strict=True))
+
+    def _indices(self, names: tuple[str, ...]) -> np.ndarray:
+        if names not in self._lists:
+            self._lists[names] = np.array([self._index[name] for name in names], np.int32)
+        return self._lists[names]
+
+    def settle(self) -> None:
+        """Lets outputs that depend on inputs directly follow what was set, without a clock."""
+        self._library.core_eval(self._handle)
+
+    def tick(self, n: int = 1) -> None:
+        """``n`` rising edges of the clock."""
+        self._library.core_tick(self._handle, n)
+
+    def reset(self, n: int = 4) -> None:
+        """``n`` clocks with rst high; rst is low afterwards, the other inputs stay."""
+        self.set("rst", 1)
+        self.tick(n)
+        self.set("rst", 0)
+
+    def clocks_until(self, name: str, most: int) -> int:
+        """Ticks, at least once, until port ``name`` is not 0; returns how many, TimeoutError beyond ``most``."""
+        clocks = self._library.core_until(self._handle, self._index[name], most)
+        if clocks < 0:
+            raise TimeoutError(f"{name} stayed 0 for {most} clocks, to clock {self.clock}")
+        return clocks
+
+    def trace(self, n: int, names: Iterable[str]) -> np.ndarray:
+        """Ticks ``n`` times: int64, shape (n, len(names)), row k as tick k left the ports."""
+        names = tuple(names)
+        values = np.empty((n, len(names)), np.int64)
+        self._library.core_trace(self._handle, n, self._indices(names), len(names), values)
+        return values
+
+    def apply_sample(self, **inputs: int) -> None:
+        """One tick with these inputs and sample_valid high; sample_valid is low again afterwards."""
+        self.set_many(inputs)
+        self.set("sample_valid", 1)
+        self.tick()
+        self.set("sample_valid", 0)
+
+    def run_sample(self, wait: int | None = None, most: int = 1000, **inputs: int) -> dict[str, int]:
+        """``apply_sample``, then ``wait`` ticks or until compare_valid: all outputs of the sample."""
+        self.apply_sample(**inputs)
+        if wait is None:
+            self.clocks_until("compare_valid", most)
+        else:
+            self.tick(wait)
+        return self.get_many()
+
+    def run_period(
+        self, max_clocks: int, sample: Mapping[str, int] | None = None, sample_at: int = 1
+    ) -> tuple[int, np.ndarray, np.ndarray]:
+        """Ticks until sample_trigger is high again, at most ``max_clocks`` times, and records the gates.
+
+        Returns (clocks, edge_clocks, gate_words): the ticks made; int32 and uint8 arrays, one entry for each
+        change of the gate word: the number of the tick that made it (1 .. clocks, so the change is that many
+        clocks after the call's start) and the new word (see ``gate_word``).  An entry with number 0 comes
+        first where the word changed between the last call and this one, by ``tick`` and the like.
+
+        ``sample``: inputs to set now, entering the core with sample_valid at tick ``sample_at``.
+        """
+        if sample is not None:
+            if sample_at < 1:
+                raise ValueError("sample_at counts ticks from 1")
+            self.set_many(sample)
+        if len(self._edges[0]) <= max_clocks:
+            self._edges = (np.empty(max_clocks + 1, np.int32), np.empty(max_clocks + 1, np.uint8))
+        found = _LONG()
+        at = 0 if sample is None else sample_at
+        clocks = self._library.core_run_period(self._handle, max_clocks, at, *self._edges, found)
+        return clocks, self._edges[0][: found.value].copy(), self._edges[1][: found.value].copy()
+
+
+def measure(carrier_half: int, periods: int) -> float:
+    """Clocks per second over whole control periods, one sample each, gates switching."""
+    core = VerilatedCore({"CARRIER_HALF": carrier_half})
+    core.set_many({"enable": 1, "dead_time": 3, "min_pulse": 8})
+    core.reset()
+    start, begin = time.perf_counter(), core.clock
+    for k in range(periods):
+        core.run_period(4 * carrier_half, {"position_code": k % 128, "adc_u_dc": 4000})
+    return (core.clock - begin) / (time.perf_counter() - start)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description="Builds the verilated core and measures its speed.")
+    parser.add_argument("--carrier-half", type=int, default=10000, help="half a PWM period in clocks")
+    parser.add_argument("--periods", type=int, default=500, help="control periods to run")
+    arguments = parser.parse_args()
+    start = time.perf_counter()
+    build({"CARRIER_HALF": arguments.carrier_half})
+    print(f"library ready after {time.perf_counter() - start:.1f} s")
+    print(f"{measure(arguments.carrier_half, arguments.periods) / 1e6:.2f} million clocks per second")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,159 @@
+"""Converts the core to one Verilog file, by GHDL 5 or newer only: ``make verilog``.
+
+GHDL 2 converts without a complaint and wrongly (a signed ``shift_right`` loses its sign), so the version is
+checked before anything else, and a test holds the converted design against the VHDL clock by clock.
+
+The file's first line carries a key: a hash of the sources, the generics and GHDL's version.  A file with the
+right key is not written again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import os
+import re
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+from scripts.sources import ROOT, RTL, rtl_sources
+
+TOP = "fluxproof"
+OLDEST_GHDL = 5
+
+_ENTITY = re.compile(r"entity\s+(\w+)\s+is(.*?)end\s+entity", re.IGNORECASE | re.DOTALL)
+_VHDL_PORT = re.compile(r"(\w+)\s*:\s*(?:in|out)\s+(\w+)", re.IGNORECASE)
+_VERILOG_PORT = re.compile(r"\b(input|output)\s+(?:\[(\d+):0\]\s*)?(\w+)")
+
+
+class NoUsableGhdl(RuntimeError):
+    """There is no GHDL here whose Verilog can be trusted."""
+
+
+@dataclass(frozen=True)
+class VerilogPort:
+    """A port of the converted top: ``width`` in bits; ``signed`` as the VHDL has it, for Verilog forgets."""
+
+    name: str
+    width: int
+    signed: bool
+    is_input: bool
+
+    @property
+    def low(self) -> int:
+        return -(1 << (self.width - 1)) if self.signed else 0
+
+    @property
+    def high(self) -> int:
+        return (1 << (self.width - self.signed)) - 1
+
+
+def ghdl_version(ghdl: Path | str) -> str:
+    """The version as GHDL prints it, for instance "5.0.1"; empty where it does not run."""
+    try:
+        said = subprocess.run([str(ghdl), "--version"], capture_output=True, text=True, check=True).stdout
+    except (OSError, subprocess.CalledProcessError):
+        return ""
+    found = re.match(r"GHDL (\d+[\w.]*)", said)
+    return found.group(1) if found else ""
+
+
+@lru_cache(maxsize=1)
+def find_ghdl() -> tuple[Path, str]:
+    """(executable, version) of a GHDL that converts rightly: ours from ``make setup``, else the machine's."""
+    seen = []
+    for candidate in (ROOT / ".cache" / "ghdl5" / "bin" / "ghdl", shutil.which("ghdl"), shutil.which("ghdl-mcode")):
+        version = ghdl_version(candidate) if candidate else ""
+        if version and int(version.split(".")[0]) >= OLDEST_GHDL:
+            return Path(candidate), version
+        seen += [version] if version else []
+    raise NoUsableGhdl(
+        f"found {'GHDL ' + ', '.join(seen) if seen else 'no GHDL'}, but the conversion to Verilog needs "
+        f"GHDL {OLDEST_GHDL} or newer: GHDL 2 miscompiles silently (a signed shift_right becomes a logical "
+        "shift). `make setup` fetches GHDL 5."
+    )
+
+
+def synthesize(sources: Sequence[Path], top: str, generics: Mapping[str, int]) -> str:
+    """The Verilog of entity ``top``; raises RuntimeError with GHDL's words where it refuses."""
+    ghdl, _ = find_ghdl()
+    options = ["--std=08", "--out=verilog", *(f"-g{name}={value}" for name, value in generics.items())]
+    command = [str(ghdl), "--synth", *options, *(str(path) for path in sources), "-e", top]
+    # GHDL leaves its library file where it runs: a folder that goes away.
+    with tempfile.TemporaryDirectory() as scratch:
+        done = subprocess.run(command, capture_output=True, text=True, cwd=scratch)
+    if done.returncode or f"module {top}" not in done.stdout:
+        raise RuntimeError(f"GHDL cannot convert {top} {dict(generics)} to Verilog:\n{done.stderr}")
+    return done.stdout
+
+
+def conversion_key(generics: Mapping[str, int], rtl: Path = RTL) -> str:
+    """16 hex digits that change with the sources, the generics and the version of GHDL."""
+    digest = hashlib.sha256(repr((find_ghdl()[1], TOP, sorted(generics.items()))).encode())
+    for path in rtl_sources(rtl):
+        digest.update(str(path.relative_to(rtl)).encode() + b"\0" + path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def convert(generics: Mapping[str, int], out_dir: Path | str, rtl: Path = RTL) -> Path:
+    """Writes ``out_dir``/fluxproof.v with these generics (the VHDL's defaults for the others), if it is stale.
+
+    Safe beside another process that writes the same file: it appears complete or not at all.
+    """
+    key = conversion_key(generics, rtl)
+    heading = f"// fluxproof {key}: converted from VHDL by GHDL {find_ghdl()[1]}, generics {dict(generics) or 'default'}\n"
+    path = Path(out_dir) / f"{TOP}.v"
+    if path.exists():
+        with path.open() as present:
+            if present.readline() == heading:
+                return path
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_suffix(f".{os.getpid()}.tmp")
+    temporary.write_text(heading + synthesize(rtl_sources(rtl), TOP, generics))
+    os.replace(temporary, path)
+    return path
+
+
+def top_ports(verilog: Path, rtl: Path = RTL) -> tuple[VerilogPort, ...]:
+    """The ports of the converted top in order: widths from the Verilog, signs from the VHDL entity."""
+    header = re.search(rf"^module {TOP}\s*\((.*?)\);", verilog.read_text(), re.MULTILINE | re.DOTALL)
+    entities = {name.lower(): body for name, body in _ENTITY.findall((rtl / f"{TOP}.vhd").read_text())}
+    if header is None or TOP not in entities:
+        raise ValueError(f"no {TOP} in {verilog.name}, or none in {TOP}.vhd")
+    kinds = {name.lower(): kind.lower() for name, kind in _VHDL_PORT.findall(entities[TOP])}
+    ports = tuple(
+        VerilogPort(name, int(msb or 0) + 1, kinds[name] == "signed", direction == "input")
+        for direction, msb, name in _VERILOG_PORT.findall(header.group(1))
+    )
+    if {p.name for p in ports} != set(kinds):
+        raise ValueError(f"Verilog and VHDL disagree on ports: {sorted({p.name for p in ports} ^ set(kinds))}")
+    return ports
+
+
+def generic(text: str) -> tuple[str, int]:
+    """``NAME=VALUE`` of the command line."""
+    name, value = text.split("=")
+    return name.upper(), int(value)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("generics", nargs="*", type=generic, metavar="NAME=VALUE", help="generics of the top")
+    parser.add_argument("--out", type=Path, default=ROOT / "build" / "verilog", help="folder to write to")
+    arguments = parser.parse_args()
+    try:
+        path = convert(dict(arguments.generics), arguments.out)
+    except NoUsableGhdl as reason:
+        parser.exit(1, f"{reason}\n")
+    ports = top_ports(path)
+    lines = len(path.read_text().splitlines())
+    print(f"{os.path.relpath(path)}: {lines} lines, {len(ports)} ports, by GHDL {find_ghdl()[1]}")
+
+
+if __name__ == "__main__":
+    main()
