@@ -17,8 +17,8 @@ from typing import NamedTuple
 from golden_model.drive import Drive
 from golden_model.drive_keys import DriveError
 from golden_model.fluxproof import REGISTERS, Config, Registers
+from golden_model.units import TURN_RAD
 
-TURN_RAD = 2.0 * math.pi
 INTEGRAL_CORNER = 5.0  # speed crossover over the corner of the speed regulator's integral
 ROUND_UP = ("dead_time", "min_pulse")  # times that must not come out shorter than asked
 

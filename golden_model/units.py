@@ -7,8 +7,8 @@ import math
 
 from golden_model.fluxproof import OBSERVED
 from golden_model.io import sample_latch
-from golden_model.registers import TURN_RAD
 
+TURN_RAD = 2.0 * math.pi
 SIGNALS = {p.name: p for p in sample_latch.BLOCK.outputs} | OBSERVED  # raw sample, references, observed values
 
 _OF_UNIT = {
@@ -16,7 +16,7 @@ _OF_UNIT = {
     "V": "u_dc u_max u_dec_d u_dec_q u_int_d u_int_q u_d u_q u_alpha u_beta",
     "rad/s": "omega_me omega_ref",
     "Wb": "lambda_d lambda_q",
-    "rad": "theta_me theta_out",
+    "rad": "theta_me",
 }
 UNITS = {name: unit for unit, names in _OF_UNIT.items() for name in names.split()}  # the rest: "1"
 

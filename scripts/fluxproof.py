@@ -1,0 +1,63 @@
+"""The command ``fluxproof``: ``fluxproof registers drive.toml`` and what stands beside it in COMMANDS.
+
+Exit status: 0 done, 2 bad input (one line on stderr says which and why), 1 where a command found a fault.
+A command is a module with two functions: ``arguments(parser)`` declares its options, ``run(args)`` returns
+the exit status; a line in COMMANDS makes it known.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Callable
+from typing import NamedTuple
+
+from golden_model.drive_keys import DriveError
+from scripts import print_registers
+
+
+class Command(NamedTuple):
+    """One subcommand: a line of help, the options it takes, what it does."""
+
+    help: str
+    arguments: Callable[[argparse.ArgumentParser], None]
+    run: Callable[[argparse.Namespace], int]
+
+
+COMMANDS = {
+    "registers": Command("the core's registers for a drive", print_registers.arguments, print_registers.run),
+}
+
+
+def parser() -> argparse.ArgumentParser:
+    """The command line with every subcommand."""
+    top = argparse.ArgumentParser(prog="fluxproof", description="Tools around the Fluxproof motor-drive core.")
+    commands = top.add_subparsers(metavar="command", required=True)
+    for name, command in COMMANDS.items():
+        sub = commands.add_parser(name, help=command.help, description=command.help)
+        command.arguments(sub)
+        sub.set_defaults(run=command.run)
+    return top
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run a subcommand; bad input and unusable files end in one line and status 2, never in a traceback."""
+    args = parser().parse_args(argv)
+    try:
+        status = args.run(args)
+        sys.stdout.flush()
+        return status
+    except DriveError as error:
+        print(f"fluxproof: {error}", file=sys.stderr)
+    except BrokenPipeError:  # the reader, a pager or head, has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except OSError as error:
+        name = f"{error.filename}: " if error.filename else ""
+        print(f"fluxproof: {name}{error.strerror or error}", file=sys.stderr)
+    return 2
+
+
+if __name__ == "__main__":
+    sys.exit(main())
