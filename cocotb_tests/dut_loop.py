@@ -35,13 +35,14 @@ async def closed_loop(dut):
         "result.npz",
         **{f"observed_{k}": v for k, v in result.observed.items()},
         **{f"plant_{k}": v for k, v in result.plant.items()},
+        gate_edges=result.gate_edges,
     )
     summary = {
         "periods_compared": result.periods_compared,
         "differences": result.differences,
         "first_difference": result.first_difference,
         "sample_to_duty_clocks": result.sample_to_duty_clocks,
-        "gate_edges": result.gate_edges,
+        "gate_edges": len(result.gate_edges),
         "seconds": round(time.monotonic() - began, 2),
     }
     with open("summary.json", "w") as stream:

@@ -50,8 +50,9 @@ def _pulses(drive):
 def _voltage(drive):
     """u_max is below one per unit, u_dc / sqrt(3) must fit it."""
     bus, limit = drive.inverter.dc_bus_v, math.sqrt(3.0) * drive.bases.voltage_v
-    if bus > drive.sensors.u_dc_range_v:
-        _refuse("[inverter] dc_bus_v", bus, f"up to [sensors] u_dc_range_v = {drive.sensors.u_dc_range_v:g} V")
+    reach = drive.sensors.u_dc_range_v
+    if bus > reach:
+        _refuse("[inverter] dc_bus_v", bus, f"up to [sensors] u_dc_range_v = {reach:g} V")
     if bus > limit:
         base = "[bases] voltage_v" if drive.base_choice.voltage_v else "[sensors] u_dc_range_v / 2"
         _refuse("[inverter] dc_bus_v", bus, f"up to sqrt(3) * {base} = {limit:g} V")
@@ -60,7 +61,8 @@ def _voltage(drive):
 def _current(drive):
     limit, reach = drive.current_limit_a, drive.sensors.current_range_a
     if limit > reach:
-        key = "[machine] rated_current_a" if drive.control.current_limit_a is None else "[control] current_limit_a"
+        given = drive.control.current_limit_a is not None
+        key = "[control] current_limit_a" if given else "[machine] rated_current_a"
         _refuse(key, limit, f"up to [sensors] current_range_a = {reach:g} A")
 
 
@@ -88,7 +90,7 @@ def _current_loop(drive):
     control = drive.control
     if control.delay_samples == 0.0:
         return
-    limit = 1.0 / (4.0 * control.delay_samples * drive.sample_time_s)
-    if control.current_bandwidth_hz >= limit:
+    limit, asked = 1.0 / (4.0 * control.delay_samples * drive.sample_time_s), control.current_bandwidth_hz
+    if asked >= limit:
         reason = f"{control.delay_samples:g} samples of delay make the loop unstable from there"
-        _refuse("[control] current_bandwidth_hz", control.current_bandwidth_hz, f"below {limit:g} Hz; {reason}")
+        _refuse("[control] current_bandwidth_hz", asked, f"below {limit:g} Hz; {reason}")

@@ -77,7 +77,8 @@ def _section(name, kind, table):
     for key in required:
         if key not in table:
             raise DriveError(f": [{name}] {key} is missing: {_expected(key_of(fields[key]))}")
-    return kind(**{key: _value(f"[{name}] {key}", key_of(fields[key]), value) for key, value in table.items()})
+    values = {key: _value(f"[{name}] {key}", key_of(fields[key]), value) for key, value in table.items()}
+    return kind(**values)
 
 
 def _value(where, key, value):
@@ -118,7 +119,8 @@ def _expected(key):
 
 
 def _type_name(value):
-    names = {bool: "boolean", str: "string", list: "list", dict: "table", float: "real number", int: "whole number"}
+    names = {bool: "boolean", str: "string", list: "list", dict: "table", float: "real number"}
+    names[int] = "whole number"
     return names.get(type(value), type(value).__name__)
 
 

@@ -140,9 +140,9 @@ def current_loop(drive):
 
 def gates(drive):
     """Times of the gate signals in clocks."""
-    period = 1.0 / drive.core.clock_hz
     for name in ROUND_UP:
-        yield Entry(name, getattr(drive.inverter, f"{name}_s"), "s", period, f"[inverter] {name}_s; [core] clock_hz")
+        keys = f"[inverter] {name}_s; [core] clock_hz"
+        yield Entry(name, getattr(drive.inverter, f"{name}_s"), "s", 1.0 / drive.core.clock_hz, keys)
 
 
 PARTS = (sensing, speed_loop, current_loop, gates)
@@ -165,8 +165,10 @@ def _row(entry, port):
         )
     if integer == 0 and entry.si != 0.0 and entry.unit not in ("rad", "code"):
         least = lsb * entry.scale / 2.0
-        raise DriveError(f"register {entry.name} from {entry.keys}: {entry.si:.6g} {entry.unit} rounds to zero: "
-                         f"allowed is 0 or at least {least:.6g} {entry.unit}")  # fmt: skip
+        raise DriveError(
+            f"register {entry.name} from {entry.keys}: {entry.si:.6g} {entry.unit} rounds to zero: "
+            f"allowed is 0 or at least {least:.6g} {entry.unit}"
+        )
     return _printed(entry, port, integer)
 
 
@@ -188,6 +190,6 @@ def _keep_pulse_above_dead_time(rows, drive):
         rows["min_pulse"] = _printed(entry, REGISTERS["min_pulse"], pulse)
     if not pulse <= drive.carrier_half:
         raise DriveError(
-            f"register min_pulse from [inverter] dead_time_s, min_pulse_s; [core] clock_hz: {pulse} clocks is out of "
-            f"range: allowed is {dead + 1} to {drive.carrier_half}, half a PWM period"
+            f"register min_pulse from [inverter] dead_time_s, min_pulse_s; [core] clock_hz: {pulse} clocks is "
+            f"out of range: allowed is {dead + 1} to {drive.carrier_half}, half a PWM period"
         )

@@ -9,7 +9,7 @@ from golden_model.fluxproof import OBSERVED
 from golden_model.io import sample_latch
 
 TURN_RAD = 2.0 * math.pi
-SIGNALS = {p.name: p for p in sample_latch.BLOCK.outputs} | OBSERVED  # raw sample, references, observed values
+SIGNALS = {p.name: p for p in sample_latch.BLOCK.outputs} | OBSERVED  # raw sample and references first
 
 _OF_UNIT = {
     "A": "i_a i_b i_c i_d i_q i_q_ref i_d_ref i_q_ext",

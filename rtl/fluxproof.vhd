@@ -64,7 +64,7 @@ entity fluxproof is
     dead_time       : in  unsigned(11 downto 0);  -- both gates of a leg off, clocks
     gate_high       : out unsigned(2 downto 0);  -- upper gates, bit 0 is leg a
     gate_low        : out unsigned(2 downto 0);  -- lower gates, bit 0 is leg a
-    sample_trigger  : out std_logic;  -- first clock of a period: take a sample
+    sample_trigger  : out std_logic;  -- middle of the zero vector: take a sample
     running         : out std_logic;  -- gates are switching
     tripped         : out std_logic;  -- a trip is remembered
     setting_refused : out std_logic;  -- dead_time and min_pulse contradict each other

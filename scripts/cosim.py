@@ -121,7 +121,7 @@ class Result:
     differences: int = 0
     first_difference: str | None = None
     sample_to_duty_clocks: int = 0
-    gate_edges: int = 0
+    gate_edges: np.ndarray | None = None  # rows of (period, clock, gate word) as the device gave them
 
 
 PLANT_SIGNALS = {
@@ -163,7 +163,7 @@ async def cosimulate(
     plant, described = build_plant(drive, sensors)
     codes = sensor_params(described)
     gates = GoldenGates(registers, config.carrier_half)
-    state, result, observed_rows, plant_rows = fluxproof.State(), Result(), [], []
+    state, result, observed_rows, plant_rows, edge_rows = fluxproof.State(), Result(), [], [], []
 
     def differ(k: int, what: str) -> None:
         result.differences += 1
@@ -192,7 +192,7 @@ async def cosimulate(
         got = await device.period(inputs, enable)
         compare_period(k, got, golden, (golden_clocks, golden_words, length, run), differ)
         result.sample_to_duty_clocks = max(result.sample_to_duty_clocks, got.sample_to_duty)
-        result.gate_edges += len(got.edge_clocks)
+        edge_rows += [(k, int(c), int(w)) for c, w in zip(got.edge_clocks, got.gate_words, strict=True)]
         result.periods_compared += 1
         observed_rows.append(golden)
         plant_rows.append([read(plant) for read in PLANT_SIGNALS.values()])
@@ -201,6 +201,7 @@ async def cosimulate(
         progress(k + 1, len(scenario))
     result.observed = dict(zip(fluxproof.Observed._fields, np.array(observed_rows).T, strict=True))
     result.plant = dict(zip(PLANT_SIGNALS, np.array(plant_rows).T, strict=True))
+    result.gate_edges = np.array(edge_rows, np.int64).reshape(-1, 3)
     return result
 
 

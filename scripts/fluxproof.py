@@ -26,7 +26,7 @@ class Command(NamedTuple):
 
 
 COMMANDS = {
-    "registers": Command("the core's registers for a drive", print_registers.arguments, print_registers.run),
+    "registers": Command("the registers for a drive", print_registers.arguments, print_registers.run),
 }
 
 

@@ -76,7 +76,7 @@ MUTANTS = (
     ("duty not clamped", "modulation/svm.vhd",
      "clamp(ROUNDED, to_signed(0, ROUNDED'length), to_signed(DUTY_ONE, ROUNDED'length))", "ROUNDED"),
     ("floor of the bus", "io/u_dc_processing.vhd", "if u_dc < U_DC_PROCESSING_U_DC_MIN then", "if u_dc <= U_DC_PROCESSING_U_DC_MIN then"),
-    ("restoring step", "io/u_dc_processing.vhd", "if trial >= mantissa then", "if trial > mantissa then"),
+    ("restoring step", "io/u_dc_processing.vhd", "resize(trial - mantissa, U_DC_W)", "resize(trial - mantissa + 1, U_DC_W)"),
     # latency, pipeline, handshake
     ("one clock late", "transforms/clarke.vhd", "out_valid <= valid(LATENCY);", "out_valid <= valid(LATENCY) when rising_edge(clk);"),
     ("one clock early", "control/decoupling.vhd", "out_valid <= valid(LATENCY);", "out_valid <= valid(LATENCY - 1);"),
@@ -111,8 +111,9 @@ MUTANTS = (
     ("minimum pulse one short", "modulation/pwm_compare.vhd", "HALF - compare_2 < min_pulse_2", "HALF - compare_2 < min_pulse_2 - 1"),
     ("gates survive reset", "modulation/gate_generation.vhd", "        gate_low        <= (others => '0');\n", ""),
     # wiring of the top
-    ("voltage without delay compensation", "fluxproof.vhd", "      cos_theta => cos_theta,\n      sin_theta => sin_theta,\n      out_valid => dq_valid,",
-     "      cos_theta => cos_out,\n      sin_theta => sin_out,\n      out_valid => dq_valid,"),
+    ("voltage without delay compensation", "fluxproof.vhd",
+     "      cos_theta => cos_out,\n      sin_theta => sin_out,\n      out_valid => ab_voltage_valid,",
+     "      cos_theta => cos_theta,\n      sin_theta => sin_theta,\n      out_valid => ab_voltage_valid,"),
     ("always running", "fluxproof.vhd", "run_in        => running,", "run_in        => '1',"),
     ("limiter flags swapped", "fluxproof.vhd", "      sat_d     => sat_d,\n      sat_q     => sat_q,\n      run       => run,",
      "      sat_d     => sat_q,\n      sat_q     => sat_d,\n      run       => run,"),

@@ -37,8 +37,8 @@ def bases_lines(drive: Drive, result: RegisterSet) -> list[str]:
     """What 1.0 per unit stands for, and the generics."""
     bases, config = drive.bases, result.config._asdict()
     return [
-        f"bases     {bases.current_a:g} A, {bases.voltage_v:g} V, {bases.omega_me_rad_s:g} rad/s (electrical), "
-        f"{bases.flux_wb:.6g} Wb; all peak; T_s = {drive.sample_time_s:g} s",
+        f"bases     {bases.current_a:g} A, {bases.voltage_v:g} V, {bases.omega_me_rad_s:g} rad/s electrical,"
+        f" {bases.flux_wb:.6g} Wb; all peak; T_s = {drive.sample_time_s:g} s",
         "generics  " + ", ".join(f"{name.upper()} = {value}" for name, value in config.items()),
     ]
 

@@ -72,4 +72,9 @@ def full_speed(drive: Drive) -> Scenario:
     return scenario(drive, 0.6, rpm={0.0: 2900, 0.25: 3400, 0.35: -2900, 0.55: 0})
 
 
-SCENARIOS = {"fig9": fig9, "everything": everything, "full_speed": full_speed}
+def short(drive: Drive) -> Scenario:
+    """30 ms: start, load, reversal; for configurations that only need to be shown to work."""
+    return scenario(drive, 0.03, rpm={0.0: 400, 0.02: -400}, load={0.01: 2.0})
+
+
+SCENARIOS = {"fig9": fig9, "short": short, "everything": everything, "full_speed": full_speed}

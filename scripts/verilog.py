@@ -67,7 +67,8 @@ def ghdl_version(ghdl: Path | str) -> str:
 def find_ghdl() -> tuple[Path, str]:
     """(executable, version) of a GHDL that converts rightly: ours from ``make setup``, else the machine's."""
     seen = []
-    for candidate in (ROOT / ".cache" / "ghdl5" / "bin" / "ghdl", shutil.which("ghdl"), shutil.which("ghdl-mcode")):
+    own = ROOT / ".cache" / "ghdl5" / "bin" / "ghdl"
+    for candidate in (own, shutil.which("ghdl"), shutil.which("ghdl-mcode")):
         version = ghdl_version(candidate) if candidate else ""
         if version and int(version.split(".")[0]) >= OLDEST_GHDL:
             return Path(candidate), version
@@ -101,22 +102,35 @@ def conversion_key(generics: Mapping[str, int], rtl: Path = RTL) -> str:
 
 
 def convert(generics: Mapping[str, int], out_dir: Path | str, rtl: Path = RTL) -> Path:
-    """Writes ``out_dir``/fluxproof.v with these generics (the VHDL's defaults for the others), if it is stale.
+    """Writes ``out_dir``/fluxproof.v with these generics (the VHDL's defaults for the others) if it is stale.
 
     Safe beside another process that writes the same file: it appears complete or not at all.
     """
-    key = conversion_key(generics, rtl)
-    heading = f"// fluxproof {key}: converted from VHDL by GHDL {find_ghdl()[1]}, generics {dict(generics) or 'default'}\n"
     path = Path(out_dir) / f"{TOP}.v"
-    if path.exists():
-        with path.open() as present:
-            if present.readline() == heading:
-                return path
+    key = conversion_key(generics, rtl)
+    if _key_of(path) == key:
+        return path
+    text, converted = "", None
+    while converted != key:  # once, unless someone saves a source meanwhile
+        converted = key
+        text = synthesize(rtl_sources(rtl), TOP, generics)
+        key = conversion_key(generics, rtl)
+    setting = ", ".join(f"{name}={value}" for name, value in generics.items()) or "as in the VHDL"
+    heading = f"// {TOP} {key}: converted from VHDL by GHDL {find_ghdl()[1]}; generics: {setting}\n"
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_suffix(f".{os.getpid()}.tmp")
-    temporary.write_text(heading + synthesize(rtl_sources(rtl), TOP, generics))
+    temporary.write_text(heading + text)
     os.replace(temporary, path)
     return path
+
+
+def _key_of(path: Path) -> str | None:
+    """The key in the first line of a converted file, or None."""
+    if not path.exists():
+        return None
+    with path.open() as file:
+        found = re.match(rf"// {TOP} (\w+):", file.readline())
+    return found.group(1) if found else None
 
 
 def top_ports(verilog: Path, rtl: Path = RTL) -> tuple[VerilogPort, ...]:
@@ -130,8 +144,9 @@ def top_ports(verilog: Path, rtl: Path = RTL) -> tuple[VerilogPort, ...]:
         VerilogPort(name, int(msb or 0) + 1, kinds[name] == "signed", direction == "input")
         for direction, msb, name in _VERILOG_PORT.findall(header.group(1))
     )
-    if {p.name for p in ports} != set(kinds):
-        raise ValueError(f"Verilog and VHDL disagree on ports: {sorted({p.name for p in ports} ^ set(kinds))}")
+    missing = set(kinds) - {p.name for p in ports}
+    if missing:
+        raise ValueError(f"the Verilog lacks ports of the VHDL: {sorted(missing)}")
     return ports
 
 

@@ -10,7 +10,7 @@ Compare values, dead time and minimum pulse are taken over at the valley only, w
   gates stay off.
 * ``enable`` switches on at the valley, off at once.  ``trip`` switches off at once and is remembered
   until ``clear_trip`` is given while ``trip`` is gone; ``enable`` is then still needed.
-* ``sample`` marks the first clock of a period, the middle of the zero vector: when to sample.
+* ``sample`` marks the middle of the zero vector as the gates show it, one register behind the carrier.
 """
 
 from typing import NamedTuple
@@ -103,7 +103,7 @@ def step(state, compare_a, compare_b, compare_c, enable, trip, clear_trip, dead_
     outputs = (
         gate_high,
         gate_low,
-        1 if valley else 0,
+        1 if s.carrier == 0 and s.down == 0 else 0,
         running,
         tripped,
         0 if good else 1,
@@ -152,7 +152,7 @@ BLOCK = Block(
     outputs=(
         Port("gate_high", LEGS, doc="upper gates, bit 0 is leg a"),
         Port("gate_low", LEGS, doc="lower gates, bit 0 is leg a"),
-        Port("sample", BIT, doc="first clock of a period"),
+        Port("sample", BIT, doc="middle of the zero vector: take a sample"),
         Port("running", BIT, doc="gates are switching"),
         Port("tripped", BIT, doc="a trip is remembered"),
         Port("setting_refused", BIT, doc="dead_time and min_pulse contradict each other"),

@@ -1,7 +1,7 @@
 -- Purpose: up-down carrier, six gate signals with dead time, enable and latched trip.
 -- The carrier counts 0 .. CARRIER_HALF-1 and back, each value once a direction.  A leg wants to be high while
 -- carrier >= CARRIER_HALF - compare.  Compare values, dead time and minimum pulse are taken over at the valley
--- only, when carrier is 0 again; sample marks the first clock of a period.
+-- only, when carrier is 0 again; sample marks the middle of the zero vector as the gates show it.
 -- Dead time: a leg that changes its mind turns both gates off, the other one on dead_time clocks later.
 -- A dead time that is zero or not below min_pulse, or a min_pulse above half a period, is refused: the last good
 -- setting stays, and before the first good one the gates stay off.
@@ -87,8 +87,13 @@ begin
         count <= count - 1;
       end if;
 
+      -- The gates leave one register behind the carrier, and so does the mark of the zero vector's middle
+      sample <= '0';
+      if count = 0 and down = '0' then
+        sample <= '1';
+      end if;
+
       -- At the valley: what the next period works with
-      sample      <= valley;
       running_now <= on_now;
       tripped_now <= tripping;
       if valley = '1' then

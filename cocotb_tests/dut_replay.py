@@ -1,0 +1,145 @@
+"""A recording of a real drive through the core inside GHDL: open loop, every sample equal to the golden model.
+
+The log's dq currents, speed and bus voltage become the codes that the converters and the resolver of ``drive.toml``
+would have given.  One row of the log is one sample of the core: the angle moves by speed times the core's sample time
+from row to row, not by speed times the log's 29 ms, in which the rotor turns several times.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+import cocotb
+import numpy as np
+
+from cocotb_tests.dut_loop import progress
+from cocotb_tests.ghdl_device import GhdlDevice
+from golden_model import drive as drives
+from golden_model import fluxproof
+from golden_model.drive import Drive
+from golden_model.registers import registers
+from golden_model.units import from_si
+from plant import sensor_params
+from plant.sensors import current_code, position_code, u_dc_code
+from scripts.cosim import GoldenGates, Result, build_plant, compare_period
+from scripts.scenarios import RPM
+
+PHASE_SHIFT = 2.0 * np.pi / 3.0
+COLUMNS = {
+    "t": "t_s",
+    "i_d": "id_A",
+    "i_q": "iq_A",
+    "u_d": "vd_V",
+    "u_q": "vq_V",
+    "rpm": "n_rpm",
+    "u_dc": "u_dc_V",
+    "command": "current_cmd",
+}
+
+
+class Recording(NamedTuple):
+    """Rows of the log: time [s], peak currents [A] and asked voltages [V] in dq, speed, bus, command [0..1]."""
+
+    t: np.ndarray
+    i_d: np.ndarray
+    i_q: np.ndarray
+    u_d: np.ndarray
+    u_q: np.ndarray
+    rpm: np.ndarray  # mechanical, negative is forward
+    u_dc: np.ndarray
+    command: np.ndarray
+
+    def omega_me(self, pole_pairs: int) -> np.ndarray:
+        """Electrical speed [rad/s], negative is forward as in the log."""
+        return self.rpm * RPM * pole_pairs
+
+
+def load_recording(path: Path | str) -> Recording:
+    """Read the log; OSError where it is absent."""
+    table = np.genfromtxt(path, delimiter=",", names=True)
+    return Recording(*(table[column] for column in COLUMNS.values()))
+
+
+def angles(recording: Recording, drive: Drive) -> np.ndarray:
+    """Electrical angle [rad] at every row: the speed of each row held for one sample time."""
+    turned = np.cumsum(recording.omega_me(drive.machine.pole_pairs)) * drive.sample_time_s
+    return np.concatenate(([0.0], turned[:-1]))
+
+
+def sample_inputs(recording: Recording, drive: Drive) -> np.ndarray:
+    """The core's input ports, one row per row of the log, columns as in fluxproof.Sample without ``run``.
+
+    Torque mode: the q reference is the rider's command times the current limit, with the sign of forward; d is zero.
+    """
+    codes = sensor_params(build_plant(drive)[1])
+    theta = angles(recording, drive)
+    rows = np.zeros((len(theta), len(fluxproof.Sample._fields) - 1), np.int64)
+    for k, angle in enumerate(theta):
+        for x in range(3):
+            along = angle - x * PHASE_SHIFT
+            current = recording.i_d[k] * np.cos(along) - recording.i_q[k] * np.sin(along)
+            rows[k, x] = current_code(codes, x, current, k)
+        rows[k, 3] = u_dc_code(codes, recording.u_dc[k], k)
+        rows[k, 4] = position_code(codes, angle / drive.machine.pole_pairs, k)
+        rows[k, 7] = from_si("i_q_ext", -recording.command[k] * drive.current_limit_a, drive)
+    return rows
+
+
+INPUT_PORTS = (
+    *("adc_a", "adc_b", "adc_c", "adc_u_dc", "position_code"),
+    *("omega_ref_in", "i_d_ref_in", "i_q_ext_in", "speed_mode_in"),
+)
+
+
+async def replay(device, register_set, rows: np.ndarray, tell: Callable[[int, int], None]) -> Result:
+    """Feed the rows to the device, one per PWM period, and compare as the closed loop does."""
+    values, config = register_set.values, register_set.config
+    gates, state, result, observed = GoldenGates(values, config.carrier_half), fluxproof.State(), Result(), []
+
+    def differ(k: int, what: str) -> None:
+        result.differences += 1
+        result.first_difference = result.first_difference or f"row {k}: {what}"
+
+    first = await device.start(values, 1)
+    _clocks, words, _length, running = gates.run((0, 0, 0), 1)
+    if not np.array_equal(first.gate_words, words):
+        differ(-1, "gates before the first sample")
+    for k, row in enumerate(rows.tolist()):
+        run = running
+        state, golden = fluxproof.step(state, fluxproof.Sample(*row, run), values, config)
+        clocks, words, length, running = gates.run(golden[-3:], 1)
+        got = await device.period(dict(zip(INPUT_PORTS, row, strict=True)), 1)
+        compare_period(k, got, golden, (clocks, words, length, run), differ)
+        result.sample_to_duty_clocks = max(result.sample_to_duty_clocks, got.sample_to_duty)
+        result.gate_edges += len(got.edge_clocks)
+        result.periods_compared += 1
+        observed.append(golden)
+        tell(k + 1, len(rows))
+    result.observed = dict(zip(fluxproof.Observed._fields, np.array(observed).T, strict=True))
+    return result
+
+
+@cocotb.test()
+async def recording_replay(dut):
+    drive = drives.load(os.environ["FLUXPROOF_DRIVE"])
+    drive = drives.with_carrier(drive, int(os.environ["FLUXPROOF_CARRIER_HALF"]))
+    rows = sample_inputs(load_recording(os.environ["FLUXPROOF_RECORDING"]), drive)
+    began = time.monotonic()
+    result = await replay(GhdlDevice(dut), registers(drive), rows, progress)
+    np.savez("result.npz", **{f"observed_{name}": values for name, values in result.observed.items()})
+    summary = {
+        "periods_compared": result.periods_compared,
+        "differences": result.differences,
+        "first_difference": result.first_difference,
+        "sample_to_duty_clocks": result.sample_to_duty_clocks,
+        "gate_edges": result.gate_edges,
+        "seconds": round(time.monotonic() - began, 2),
+    }
+    with open("summary.json", "w") as stream:
+        json.dump(summary, stream)
+    assert result.differences == 0, result.first_difference

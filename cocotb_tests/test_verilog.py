@@ -1,0 +1,218 @@
+"""The converted Verilog is the VHDL: both run on the same stimulus, every output is compared at every clock.
+
+The VHDL runs in the machine's GHDL, which had no part in the conversion; the Verilog runs in Verilator.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cocotb_tests import simulate
+from cocotb_tests.stimulus import random_value
+from golden_model.fluxproof import REGISTERS
+from golden_model.io import sample_latch
+from scripts import verilog
+from scripts.sources import rtl_sources
+from scripts.verilated import VerilatedCore
+
+GENERICS = {"ADC_BITS": 16, "POSITION_BITS": 16, "CARRIER_HALF": 100}
+OTHER = {"ADC_BITS": 12, "POSITION_BITS": 18, "CARRIER_HALF": 75}
+CLOCKS = 10000
+GAP = (60, 80)  # clocks from sample to sample
+LATCHED = "run_in"  # the latch's input that the core makes itself
+
+
+@pytest.fixture(scope="module")
+def ghdl5():
+    """Skips where nothing here can convert rightly."""
+    try:
+        return verilog.find_ghdl()
+    except verilog.NoUsableGhdl as reason:
+        pytest.skip(str(reason))
+
+
+def settings(rng: np.random.Generator) -> dict[str, int]:
+    """dead_time and min_pulse in clocks: small ones that let the gates switch, one in five contradictory."""
+    dead_time = int(rng.integers(1, 12))
+    min_pulse = int(rng.integers(dead_time + 1, 30))
+    if rng.integers(5) == 0:
+        return {"dead_time": min_pulse, "min_pulse": dead_time}
+    return {"dead_time": dead_time, "min_pulse": min_pulse}
+
+
+def registers(rng: np.random.Generator) -> dict[str, int]:
+    """Every register anywhere in its legal range, but for those that ``settings`` makes."""
+    ports = [p for p in REGISTERS.values() if p.name not in ("dead_time", "min_pulse")]
+    return {p.name: random_value(rng, p) for p in ports}
+
+
+def raw_sample(rng: np.random.Generator, generics: dict[str, int]) -> dict[str, int]:
+    """What the converters and the references may say."""
+    ports = [p for p in sample_latch.BLOCK.ports(generics) if p.name != LATCHED]
+    return {p.name: random_value(rng, p) for p in ports}
+
+
+def stimulus(seed: int, generics: dict[str, int], clocks: int = CLOCKS) -> list[dict[str, int]]:
+    """For each clock the inputs that change before its rising edge: what the core may meet, in any order.
+
+    A raw sample every 60 to 80 clocks, sometimes none for longer; its inputs turn to noise one clock later.
+    Registers change with every fourth sample; resets, trips and switching off come at any time.
+    """
+    rng = np.random.default_rng(seed)
+    writes: list[dict[str, int]] = [{} for _ in range(clocks)]
+
+    def pulse(name: str, at: int, width: int = 1) -> None:
+        writes[at][name] = 1
+        writes[min(at + width, clocks - 1)][name] = 0
+
+    for at in range(37, clocks, 450):
+        writes[at] |= settings(rng)
+    for at in sorted(rng.integers(1500, clocks, 4).tolist()):
+        pulse("rst", at, int(rng.integers(1, 5)))
+    for at in range(900, clocks - 800, 1100):
+        pulse("trip", at + int(rng.integers(100)), 3)
+        pulse("clear_trip", at + int(rng.integers(250, 350)))
+        off = at + int(rng.integers(400, 700))
+        writes[off]["enable"], writes[off + 30]["enable"] = 0, 1
+    at, number = 20, 0
+    while at < clocks - 1:
+        writes[at] |= raw_sample(rng, generics)
+        if number % 4 == 0:
+            writes[at] |= registers(rng)
+        writes[at + 1] |= raw_sample(rng, generics)
+        pulse("sample_valid", at)
+        at += int(rng.integers(*GAP, endpoint=True)) + (500 if number % 17 == 16 else 0)
+        number += 1
+    writes[0] |= {"rst": 1, "enable": 1, "dead_time": 3, "min_pulse": 8}
+    writes[4]["rst"] = 0
+    return writes
+
+
+def trace_of_vhdl(writes, core: VerilatedCore, generics: dict, folder: Path) -> list[list[int | None]]:
+    """The outputs of the VHDL after every clock; None where GHDL shows a metavalue."""
+    given, made = folder / "stimulus.json", folder / "trace.json"
+    outputs = {name: core.ports[name].signed for name in core.outputs}
+    inputs = [name for name in core.inputs if name != "clk"]
+    given.write_text(json.dumps({"inputs": inputs, "outputs": outputs, "writes": writes}))
+    environment = {"FLUXPROOF_STIMULUS": str(given), "FLUXPROOF_TRACE": str(made)}
+    run = simulate.run(verilog.TOP, "cocotb_tests.trace_dut", generics, environment, key="trace")
+    reason = simulate.failure(run)
+    assert reason is None, reason
+    return json.loads(made.read_text())
+
+
+def trace_of_verilog(writes: list[dict], core: VerilatedCore) -> list[list[int]]:
+    """The outputs of the converted core after every clock."""
+    rows = []
+    for changes in writes:
+        core.set_many(changes)
+        rows += core.trace(1, core.outputs).tolist()
+    return rows
+
+
+def differences(names, wanted, got) -> list[str]:
+    """Every output that differs at any clock, in words; what the VHDL leaves undefined is no difference."""
+    return [
+        f"clock {k}: {name} is {b} in Verilog, {a} in VHDL"
+        for k, rows in enumerate(zip(wanted, got, strict=True))
+        for name, a, b in zip(names, *rows, strict=True)
+        if a is not None and a != b
+    ]
+
+
+@pytest.mark.parametrize("generics", [GENERICS, OTHER], ids=["sixteen_bits", "other_widths"])
+def test_equals_vhdl_clock_by_clock(ghdl5, generics, tmp_path, capsys):
+    seed = int(os.environ.get("FLUXPROOF_SEED", "1"))
+    core = VerilatedCore(generics)
+    names = core.outputs
+    writes = stimulus(seed, generics)
+    got = trace_of_verilog(writes, core)
+    wanted = trace_of_vhdl(writes, core, generics, tmp_path)
+    assert len(got) == len(wanted) == CLOCKS
+
+    # Registers without a reset are undefined in VHDL and 0 in Verilog until the first sample has passed.
+    first = next(k for k, row in enumerate(wanted) if row[names.index("compare_valid")] == 1)
+    undefined = [k for k, row in enumerate(wanted) for value in row if value is None]
+    assert max(undefined, default=0) < first, f"undefined at clock {max(undefined)}, first valid at {first}"
+
+    wrong = differences(names, wanted, got)
+    again = f"rerun: FLUXPROOF_SEED={seed} make test ARGS='-k equals_vhdl'"
+    assert not wrong, "\n".join([f"{len(wrong)} differences", *wrong[:12], again])
+
+    # The comparison is worth something only if everything moved.
+    still = [name for j, name in enumerate(names) if len({row[j] for row in wanted} - {None}) < 2]
+    assert not still, f"the stimulus never moves {still}"
+    with capsys.disabled():
+        equal = f"{CLOCKS} clocks x {len(names)} outputs are equal"
+        print(f"\nseed {seed}: {equal}; {len(undefined)} values undefined before clock {first}")
+
+
+def test_run_period_records_what_a_trace_shows(ghdl5):
+    settings = {"enable": 1, "dead_time": 3, "min_pulse": 8, "lambda_mg": 9000, "u_dc_gain": 60000}
+    sample, sample_at = {"adc_a": 40000, "adc_u_dc": 50000, "position_code": 777}, 5
+    names = ("gate_high", "gate_low", "sample_trigger")
+    fast, slow = VerilatedCore(GENERICS), VerilatedCore(GENERICS)
+    for core in (fast, slow):
+        core.set_many(settings)
+        core.reset()
+        assert core.clocks_until("sample_trigger", 10) == 1
+    edges = 0
+    for _ in range(10):
+        words = [slow.gate_word]
+        clocks, edge_clocks, gate_words = fast.run_period(1000, sample, sample_at)
+        slow.set_many(sample)
+        rows = slow.trace(sample_at - 1, names).tolist()
+        slow.apply_sample()
+        rows.append([slow.get(name) for name in names])
+        rows += slow.trace(clocks - sample_at, names).tolist()
+        words += [high | low << 3 for high, low, _ in rows]
+        changes = [(k, words[k]) for k in range(1, clocks + 1) if words[k] != words[k - 1]]
+        assert [row[2] for row in rows] == [0] * (clocks - 1) + [1]
+        assert changes == list(zip(edge_clocks.tolist(), gate_words.tolist(), strict=True))
+        edges += len(changes)
+    assert clocks == 2 * GENERICS["CARRIER_HALF"]
+    assert edges > 20 and fast.clock == slow.clock
+
+
+def test_set_refuses_what_does_not_fit(ghdl5):
+    core = VerilatedCore(GENERICS)
+    core.set("omega_ref_in", -(1 << 17))
+    assert core.get("omega_ref_in") == -(1 << 17)
+    for name, value in (("omega_ref_in", 1 << 17), ("adc_a", -1), ("adc_a", 1 << 16), ("i_a", 0), ("clk", 1)):
+        with pytest.raises(ValueError):
+            core.set(name, value)
+    with pytest.raises(TimeoutError):
+        core.clocks_until("compare_valid", 50)
+
+
+SHIFT = """\
+library ieee; use ieee.std_logic_1164.all; use ieee.numeric_std.all;
+entity shifted is port (a : in signed(7 downto 0); y : out signed(7 downto 0)); end entity;
+architecture rtl of shifted is begin y <= shift_right(a, 3); end architecture;
+"""
+
+
+def test_signed_shift_stays_arithmetic(ghdl5, tmp_path):
+    source = tmp_path / "shifted.vhd"
+    source.write_text(SHIFT)
+    assert ">>>" in verilog.synthesize([source], "shifted", {})
+
+
+def test_old_ghdl_is_refused(monkeypatch):
+    monkeypatch.setattr(verilog, "ghdl_version", lambda path: "2.0.0")
+    with pytest.raises(verilog.NoUsableGhdl, match="miscompiles silently.*make setup"):
+        verilog.find_ghdl.__wrapped__()
+
+
+def test_sources_come_in_compile_order(tmp_path):
+    (tmp_path / "sub").mkdir()
+    (tmp_path / "a.vhd").write_text("use work.p.all; entity a is end; -- entity work.z\n x : entity work.b\n")
+    (tmp_path / "sub" / "b.vhd").write_text("entity b is end entity;")
+    (tmp_path / "z_pkg.vhd").write_text("package p is end package;")
+    assert [path.stem for path in rtl_sources(tmp_path)] == ["z_pkg", "b", "a"]
+    assert [path.stem for path in rtl_sources()][-1] == verilog.TOP
