@@ -53,16 +53,24 @@ async def equals_model(dut):
     await FallingEdge(dut.clk)
     await FallingEdge(dut.clk)
 
-    compared, in_valid, rst = 0, 0, 1
+    compared, in_valid, rst, held = 0, 0, 1, None
     for number, clock in enumerate(clocks):
         if not block.clocked and number > 2:
             valid = read(dut.out_valid, False)
             if valid != clock.out_valid:
                 wrong = [("out_valid", valid, clock.out_valid)]
                 raise AssertionError(report(block, config, seed, number, clock.of_sample, rows, wrong))
+        if block.atomic:
+            seen = [read(handle, signed) for _, handle, signed in outputs]
+            if held is not None and not clock.out_valid and seen != held:
+                wrong = [("outputs without out_valid", seen, held)]
+                raise AssertionError(report(block, config, seed, number, clock.of_sample, rows, wrong))
+            held = None if clock.rst else seen
         if clock.expected:
             got = [(name, read(handle, signed)) for name, handle, signed in outputs]
-            wrong = [(name, value, clock.expected[name]) for name, value in got if value != clock.expected[name]]
+            wrong = [
+                (name, value, clock.expected[name]) for name, value in got if value != clock.expected[name]
+            ]
             if wrong:
                 raise AssertionError(report(block, config, seed, number, clock.of_sample, rows, wrong))
             compared += 1

@@ -22,7 +22,9 @@ from cocotb_tests.ghdl_device import GhdlDevice
 from golden_model import drive as drives
 from golden_model import fluxproof
 from golden_model.drive import Drive
+from golden_model.formats import PU
 from golden_model.registers import registers
+from golden_model.transforms import clarke, sincos
 from golden_model.units import from_si
 from plant import sensor_params
 from plant.sensors import current_code, position_code, u_dc_code
@@ -90,6 +92,23 @@ def sample_inputs(recording: Recording, drive: Drive) -> np.ndarray:
     return rows
 
 
+def current_bound(recording: Recording, drive: Drive) -> np.ndarray:
+    """How far [A] the core's current vector may lie from the logged one, row by row, from the formats alone.
+
+    Half a code of each converter and of the resolver, then the roundings on the way to i_d and i_q.
+    """
+    base, machine, s = drive.bases.current_a, drive.machine, drive.sensors
+    phase = s.current_range_a / 2.0**s.adc_bits + base * PU.lsb / 2.0
+    vector = 4.0 / 3.0 * phase  # three phase errors of one size: (2/3) * |1 - a - a**2| = 4/3
+    length = np.hypot(recording.i_d, recording.i_q) + vector
+    angle = np.pi * machine.pole_pairs / 2.0**s.position_bits
+    # Along alpha three times, along beta sqrt(3) times the vector meets its coefficient's rounding.
+    coefficients = np.hypot(3.0 * clarke.THIRD.fmt.lsb / 2.0, np.sqrt(3.0) * clarke.INV_SQRT3.fmt.lsb / 2.0)
+    trig = np.sqrt(2.0) * sincos.bound(None, None)["cos_theta"]
+    rounded = 2.0 * np.sqrt(2.0) * base * PU.lsb / 2.0  # Clarke and Park, two components each
+    return vector + rounded + length * (angle + coefficients + trig)
+
+
 INPUT_PORTS = (
     *("adc_a", "adc_b", "adc_c", "adc_u_dc", "position_code"),
     *("omega_ref_in", "i_d_ref_in", "i_q_ext_in", "speed_mode_in"),
@@ -99,7 +118,8 @@ INPUT_PORTS = (
 async def replay(device, register_set, rows: np.ndarray, tell: Callable[[int, int], None]) -> Result:
     """Feed the rows to the device, one per PWM period, and compare as the closed loop does."""
     values, config = register_set.values, register_set.config
-    gates, state, result, observed = GoldenGates(values, config.carrier_half), fluxproof.State(), Result(), []
+    gates, state, result = GoldenGates(values, config.carrier_half), fluxproof.State(), Result()
+    observed, edges = [], []
 
     def differ(k: int, what: str) -> None:
         result.differences += 1
@@ -116,11 +136,12 @@ async def replay(device, register_set, rows: np.ndarray, tell: Callable[[int, in
         got = await device.period(dict(zip(INPUT_PORTS, row, strict=True)), 1)
         compare_period(k, got, golden, (clocks, words, length, run), differ)
         result.sample_to_duty_clocks = max(result.sample_to_duty_clocks, got.sample_to_duty)
-        result.gate_edges += len(got.edge_clocks)
+        edges += [(k, int(c), int(w)) for c, w in zip(got.edge_clocks, got.gate_words, strict=True)]
         result.periods_compared += 1
         observed.append(golden)
         tell(k + 1, len(rows))
     result.observed = dict(zip(fluxproof.Observed._fields, np.array(observed).T, strict=True))
+    result.gate_edges = np.array(edges, np.int64).reshape(-1, 3)
     return result
 
 
@@ -137,7 +158,7 @@ async def recording_replay(dut):
         "differences": result.differences,
         "first_difference": result.first_difference,
         "sample_to_duty_clocks": result.sample_to_duty_clocks,
-        "gate_edges": result.gate_edges,
+        "gate_edges": len(result.gate_edges),
         "seconds": round(time.monotonic() - began, 2),
     }
     with open("summary.json", "w") as stream:

@@ -30,7 +30,17 @@ async def timeline(dut):
     drive = drives.with_carrier(drives.load(os.environ["FLUXPROOF_DRIVE"]), 128)
     for name, value in registers(drive).values._asdict().items():
         getattr(dut, name).value = int(value)
-    for name in ("sample_valid", "enable", "trip", "clear_trip", "adc_a", "adc_b", "adc_c", "adc_u_dc", "position_code"):
+    for name in (
+        "sample_valid",
+        "enable",
+        "trip",
+        "clear_trip",
+        "adc_a",
+        "adc_b",
+        "adc_c",
+        "adc_u_dc",
+        "position_code",
+    ):
         getattr(dut, name).value = 0
     for name in ("omega_ref_in", "i_d_ref_in", "i_q_ext_in", "speed_mode_in"):
         getattr(dut, name).value = 0
@@ -42,7 +52,9 @@ async def timeline(dut):
     await FallingEdge(dut.clk)
     strobes = {label: getattr(dut, label) for label in labels}
     strobes = {label: (h.in_valid, h.out_valid) for label, h in strobes.items() if hasattr(h, "in_valid")}
-    rows = {label: {"block": labels[label], "instance": label, "first": None, "last": None} for label in strobes}
+    rows = {
+        label: {"block": labels[label], "instance": label, "first": None, "last": None} for label in strobes
+    }
     duty = None
     dut.sample_valid.value = 1
     for clock in range(CLOCKS):
@@ -58,4 +70,6 @@ async def timeline(dut):
         await FallingEdge(dut.clk)
         dut.sample_valid.value = 0
     with open("timeline.json", "w") as stream:
-        json.dump({"sample_to_duty_clocks": duty, "blocks": sorted(rows.values(), key=lambda r: r["first"])}, stream)
+        json.dump(
+            {"sample_to_duty_clocks": duty, "blocks": sorted(rows.values(), key=lambda r: r["first"])}, stream
+        )

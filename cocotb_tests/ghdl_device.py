@@ -46,7 +46,16 @@ class GhdlDevice:
         dut = self.dut
         for name, value in registers._asdict().items():
             getattr(dut, name).value = int(value)
-        for name in ("sample_valid", "trip", "clear_trip", "adc_a", "adc_b", "adc_c", "adc_u_dc", "position_code"):
+        for name in (
+            "sample_valid",
+            "trip",
+            "clear_trip",
+            "adc_a",
+            "adc_b",
+            "adc_c",
+            "adc_u_dc",
+            "position_code",
+        ):
             getattr(dut, name).value = 0
         for name in ("omega_ref_in", "i_d_ref_in", "i_q_ext_in", "speed_mode_in"):
             getattr(dut, name).value = 0

@@ -14,7 +14,9 @@ ROOT = Path(__file__).resolve().parent.parent
 RTL = ROOT / "rtl"
 
 
-def run(toplevel: str, module: str, generics: dict, environment: dict, rtl: Path = RTL, extra=(), key="") -> Path:
+def run(
+    toplevel: str, module: str, generics: dict, environment: dict, rtl: Path = RTL, extra=(), key=""
+) -> Path:
     """Simulate ``toplevel`` under cocotb module ``module``; returns the folder of the run, see failure().
 
     ``rtl`` may be another tree (a mutant's), ``extra`` more VHDL files.  Raises SystemExit or

@@ -113,7 +113,9 @@ def schedule(block: Block, config: dict[str, int], seed: int) -> list[Clock]:
         if index and rng.integers(60) == 0:
             # A reset somewhere behind the last sample: what is in flight must never come out.
             pad_to(max(len(clocks), last + int(rng.integers(1, block.latency + 2))))
-            clocks.append(Clock({}, rst=1))
+            # Half the time with a sample on the same edge, which must be lost.
+            clocks.append(Clock(dict(row), in_valid=int(rng.integers(2)), rst=1))
+            registers = wanted_registers
             due = [d for d in due if d[0] < len(clocks)]
             state = block.state
         pad_to(max(len(clocks), last + block.interval))

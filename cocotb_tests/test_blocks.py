@@ -20,14 +20,20 @@ WITHOUT_MODEL = {"fluxproof"}  # the top only instantiates; the closed loop comp
 
 @pytest.mark.parametrize(("block", "config"), CASES, ids=IDS)
 def test_rtl_equals_model(block, config):
-    environment = {"FLUXPROOF_BLOCK": block.name, "FLUXPROOF_CONFIG": str(config), "FLUXPROOF_SEED": str(SEED)}
+    environment = {
+        "FLUXPROOF_BLOCK": block.name,
+        "FLUXPROOF_CONFIG": str(config),
+        "FLUXPROOF_SEED": str(SEED),
+    }
     folder = simulate.run(block.name, "cocotb_tests.dut_bench", dict(block.configs[config]), environment)
     problem = simulate.failure(folder)
     assert problem is None, problem
 
 
 @pytest.mark.parametrize(
-    ("block", "config"), [c for c in CASES if c[0].reference], ids=[i for i, c in zip(IDS, CASES) if c[0].reference]
+    ("block", "config"),
+    [c for c in CASES if c[0].reference],
+    ids=[i for i, c in zip(IDS, CASES) if c[0].reference],
 )
 def test_model_within_bound(block, config):
     generics = block.configs[config]

@@ -46,7 +46,9 @@ def check_equal_at_every_period(summary, arrays):
     assert summary["periods_compared"] >= 2000 and summary["differences"] == 0
     # The scenario must have been as hard as it claims.
     assert np.count_nonzero(arrays["observed_sat_q"]) > 100, "the voltage was never at its limit"
-    assert np.count_nonzero(arrays["observed_speed_limited"]) > 100, "the speed regulator was never at its limit"
+    assert np.count_nonzero(arrays["observed_speed_limited"]) > 100, (
+        "the speed regulator was never at its limit"
+    )
     assert arrays["plant_omega_m"].max() > 70 and arrays["plant_omega_m"].min() < -30
     assert np.abs(arrays["plant_torque"]).max() > 4
 
@@ -103,7 +105,11 @@ def check_pwm_timing(arrays, register_set, leg: int):
 
 def test_smallest_converters(tmp_path):
     """12-bit currents and a 12-bit resolver: the other end of the generics."""
-    text = PAPER.read_text().replace("adc_bits = 16", "adc_bits = 12").replace("position_bits = 16", "position_bits = 12")
+    text = (
+        PAPER.read_text()
+        .replace("adc_bits = 16", "adc_bits = 12")
+        .replace("position_bits = 16", "position_bits = 12")
+    )
     path = tmp_path / "coarse.toml"
     path.write_text(text)
     summary, _, register_set = close_loop(path, "short", 100, key="coarse")
@@ -120,4 +126,6 @@ def test_timeline():
     ends = {row["last"] for row in measured["blocks"]} | {0}
     for row in measured["blocks"]:
         assert row["last"] - row["first"] == BLOCKS[row["block"]].latency, row
-        assert row["first"] in ends, f"{row['block']} starts at {row['first']}, when nothing has just finished"
+        assert row["first"] in ends, (
+            f"{row['block']} starts at {row['first']}, when nothing has just finished"
+        )

@@ -49,7 +49,9 @@ def simulate_drive(seconds, rpm, u_dc=None, load=None, omega_m=0.0, i_q=None, de
     machine = Machine.from_mapping(vars(DRIVE.machine))
     params = plant_params(machine)
     sensors = sensor_params(
-        Sensors(current_bits=16, current_full_scale_a=12.5, u_dc_bits=16, u_dc_full_scale_v=1000, position_bits=16)
+        Sensors(
+            current_bits=16, current_full_scale_a=12.5, u_dc_bits=16, u_dc_full_scale_v=1000, position_bits=16
+        )
     )
     out = np.zeros((n, 8))
     registers_used = values.values if delay else values.values._replace(k_delay=0)
@@ -64,16 +66,16 @@ def simulate_drive(seconds, rpm, u_dc=None, load=None, omega_m=0.0, i_q=None, de
 def test_speed_recovers_from_seconds_of_saturation(sign):
     """Three seconds at a bus too low for the speed asked; after its return no more overshoot than a plain step."""
     target = 1500.0
-    time, out = simulate_drive(
-        5.0, lambda t: np.full_like(t, sign * target), u_dc=sag(0.5, 3.5, 90.0)
-    )
+    time, out = simulate_drive(5.0, lambda t: np.full_like(t, sign * target), u_dc=sag(0.5, 3.5, 90.0))
     speed = sign * out[:, 4] / RPM
     stuck = speed[(time > 3.0) & (time < 3.45)].mean()
     assert stuck < 0.9 * target, "the bus was not low enough to saturate"
     after = speed[time > 3.5].max() - target
     _, plain = simulate_drive(1.5, lambda t: np.full_like(t, sign * target), omega_m=sign * stuck * RPM)
     unsaturated = (sign * plain[:, 4] / RPM).max() - target
-    assert after <= unsaturated + 0.02 * target, f"overshoot {after:.1f} rpm, without saturation {unsaturated:.1f} rpm"
+    assert after <= unsaturated + 0.02 * target, (
+        f"overshoot {after:.1f} rpm, without saturation {unsaturated:.1f} rpm"
+    )
 
 
 @pytest.mark.parametrize("sign", [1, -1])
@@ -90,7 +92,9 @@ def test_current_recovers_from_seconds_of_saturation(sign):
     i_q = sign * out[:, 1]
     assert i_q[(time > 2.0) & (time < 2.29)].max() < 2.7, "the bus was not low enough to saturate"
     overshoot = i_q[time > 2.3].max() - 3.0
-    _, plain = simulate_drive(0.3, hold, i_q=lambda t: np.full_like(t, sign * 3.0), load=lambda t: np.full_like(t, sign * 2.0))
+    _, plain = simulate_drive(
+        0.3, hold, i_q=lambda t: np.full_like(t, sign * 3.0), load=lambda t: np.full_like(t, sign * 2.0)
+    )
     unsaturated = (sign * plain[:, 1]).max() - 3.0
     assert overshoot <= max(unsaturated, 0.0) + 0.03 * 3.0, (overshoot, unsaturated)
 
@@ -98,8 +102,11 @@ def test_current_recovers_from_seconds_of_saturation(sign):
 @pytest.mark.parametrize("sign", [1, -1])
 def test_delay_compensation_in_both_directions(sign):
     """At speed the applied voltage points where it should: without the advance the d current error is far larger."""
+
     def settle(delay):
-        _, out = simulate_drive(0.6, lambda t: np.full_like(t, sign * 2500.0), omega_m=sign * 2500 * RPM, delay=delay)
+        _, out = simulate_drive(
+            0.6, lambda t: np.full_like(t, sign * 2500.0), omega_m=sign * 2500 * RPM, delay=delay
+        )
         return np.abs(out[50:400, 0]).max()
 
     assert settle(True) < 0.35 * settle(False)

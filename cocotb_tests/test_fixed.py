@@ -56,7 +56,9 @@ def test_vhdl_equals_python(tmp_path):
     assert len(lines) == len(rows) > 10_000
     for (drop, width, bits, x), line in zip(rows, lines, strict=True):
         fields = line.split()
-        got = [number(text, signed) for text, signed in zip(fields, (True, True, False, True, True), strict=True)]
+        got = [
+            number(text, signed) for text, signed in zip(fields, (True, True, False, True, True), strict=True)
+        ]
         limit = 1 << (min(width, bits) - 1)
         wanted = [
             fixed.round_half_up(x, drop),
@@ -99,7 +101,9 @@ def test_generated_package_is_fresh(monkeypatch, tmp_path, capsys):
     """The committed VHDL package equals what the blocks declare now; a stale one is noticed."""
     assert generate.PACKAGE.read_text() == generate.render(), "run `make generate` and commit the result"
     stale = tmp_path / "fluxproof_pkg.vhd"
-    stale.write_text(generate.render().replace("CLARKE_LATENCY : positive := 3", "CLARKE_LATENCY : positive := 4"))
+    stale.write_text(
+        generate.render().replace("CLARKE_LATENCY : positive := 3", "CLARKE_LATENCY : positive := 4")
+    )
     monkeypatch.setattr(generate, "PACKAGE", stale)
     monkeypatch.setattr("sys.argv", ["generate", "--check"])
     assert generate.main() == 1

@@ -25,6 +25,13 @@ OTHER = {"ADC_BITS": 12, "POSITION_BITS": 18, "CARRIER_HALF": 75}
 CLOCKS = 10000
 GAP = (60, 80)  # clocks from sample to sample
 LATCHED = "run_in"  # the latch's input that the core makes itself
+MODERATE = {  # registers of the size a drive has, with which little saturates
+    **dict.fromkeys(("offset_a", "offset_b", "offset_c"), 32768),
+    **dict.fromkeys(("gain_a", "gain_b", "gain_c", "u_dc_gain", "i_max"), 65536),
+    **dict.fromkeys(("kp_d", "kp_q", "k_filter", "k_delay", "lambda_mg"), 20000),
+    **dict.fromkeys(("ki_d", "ki_q", "speed_ki", "l_d", "l_q"), 300000),
+    **{"pole_pairs": 3, "k_speed": 4096, "u_dc_offset": 200, "k_u_max": 75000, "speed_kp": 30000},
+}
 
 
 @pytest.fixture(scope="module")
@@ -45,10 +52,13 @@ def settings(rng: np.random.Generator) -> dict[str, int]:
     return {"dead_time": dead_time, "min_pulse": min_pulse}
 
 
-def registers(rng: np.random.Generator) -> dict[str, int]:
-    """Every register anywhere in its legal range, but for those that ``settings`` makes."""
+def registers(rng: np.random.Generator, moderate: bool) -> dict[str, int]:
+    """Every register but those of ``settings``: anywhere in its legal range, or within a half of MODERATE."""
     ports = [p for p in REGISTERS.values() if p.name not in ("dead_time", "min_pulse")]
-    return {p.name: random_value(rng, p) for p in ports}
+    values = {p.name: random_value(rng, p) for p in ports}
+    if moderate:
+        values |= {name: int(value * rng.uniform(0.5, 1.5)) for name, value in MODERATE.items()}
+    return values
 
 
 def raw_sample(rng: np.random.Generator, generics: dict[str, int]) -> dict[str, int]:
@@ -83,7 +93,7 @@ def stimulus(seed: int, generics: dict[str, int], clocks: int = CLOCKS) -> list[
     while at < clocks - 1:
         writes[at] |= raw_sample(rng, generics)
         if number % 4 == 0:
-            writes[at] |= registers(rng)
+            writes[at] |= registers(rng, moderate=number % 8 == 0)
         writes[at + 1] |= raw_sample(rng, generics)
         pulse("sample_valid", at)
         at += int(rng.integers(*GAP, endpoint=True)) + (500 if number % 17 == 16 else 0)
@@ -172,6 +182,7 @@ def test_run_period_records_what_a_trace_shows(ghdl5):
         rows += slow.trace(clocks - sample_at, names).tolist()
         words += [high | low << 3 for high, low, _ in rows]
         changes = [(k, words[k]) for k in range(1, clocks + 1) if words[k] != words[k - 1]]
+        assert fast.duty_at - sample_at > 0 and fast.compare_at > fast.duty_at
         assert [row[2] for row in rows] == [0] * (clocks - 1) + [1]
         assert changes == list(zip(edge_clocks.tolist(), gate_words.tolist(), strict=True))
         edges += len(changes)

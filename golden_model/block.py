@@ -6,7 +6,7 @@ The contract every block keeps, in the model and in the RTL:
   ``interval`` clocks from that edge, which is also the least distance of two samples.
 * Registers change only while no sample is in flight.
 * ``out_valid`` is high ``latency`` clocks later, for one clock, and the outputs stay until the next
-  sample's may change them.
+  sample's may change them; those of an ``atomic`` block change together, with ``out_valid`` only.
 * ``rst`` is synchronous and active high.  It empties the pipeline and brings the state to
   ``state``; it promises nothing about the outputs, which nobody may read without ``out_valid``.
 * A clocked block (``clocked=True``) has no strobes: each clock is a sample, latency is one.
@@ -83,6 +83,7 @@ class Block:
     state: Any = None
     interval: int = 1
     clocked: bool = False
+    atomic: bool = False  # outputs change with out_valid only
     constants: Mapping[str, int | Const] = field(default_factory=dict)
     roms: Mapping[str, tuple[Format, list[int]]] = field(default_factory=dict)
     configs: tuple[Mapping[str, int], ...] = ({},)  # generics to verify with

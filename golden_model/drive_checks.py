@@ -10,7 +10,7 @@ WHOLE = 1e-6  # relative; a decimal fraction typed with seven digits still count
 
 def check(drive):
     """Raise DriveError for the first contradiction."""
-    for rule in (_sample_time, _carrier, _pulses, _voltage, _current, _codes, _speed_loop, _current_loop):
+    for rule in RULES:
         rule(drive)
 
 
@@ -30,11 +30,10 @@ def _carrier(drive):
     clock, pwm = drive.core.clock_hz, drive.inverter.pwm_frequency_hz
     exact = clock / (2.0 * pwm)
     keys = f"[core] clock_hz = {clock:g} and [inverter] pwm_frequency_hz = {pwm:g}"
-    if abs(exact - round(exact)) > WHOLE:
-        raise DriveError(f"{keys} make {exact:g} clocks in half a PWM period: allowed is a whole number")
     lo, hi = CARRIER_HALF_RANGE
-    if not lo <= exact <= hi:
-        raise DriveError(f"{keys} make {exact:g} clocks in half a PWM period: allowed is {lo} to {hi}")
+    if not lo <= exact <= hi or abs(exact / round(exact) - 1.0) > WHOLE:
+        allowed = f"a whole number from {lo} to {hi}"
+        raise DriveError(f"{keys} make {exact:.9g} clocks in half a PWM period: allowed is {allowed}")
 
 
 def _pulses(drive):
@@ -66,6 +65,16 @@ def _current(drive):
         _refuse(key, limit, f"up to [sensors] current_range_a = {reach:g} A")
 
 
+def _flux(drive):
+    """The decoupling clips flux linkages beyond two per unit: L*i at the limit of the current must fit."""
+    for axis in "dq":
+        key = f"inductance_{axis}_h"
+        flux, most = getattr(drive.machine, key) * drive.current_limit_a, 2.0 * drive.bases.flux_wb
+        if flux > most:
+            why = "twice the flux base, voltage over electrical speed base; see [bases]"
+            _refuse(f"[machine] {key} times the current limit", flux, f"up to {most:g} Wb, {why}")
+
+
 def _codes(drive):
     top = 2**drive.sensors.adc_bits - 1
     for code in drive.sensors.current_offset_code or ():
@@ -88,9 +97,11 @@ def _speed_loop(drive):
 def _current_loop(drive):
     """A delay of d samples turns the loop's phase by 90 degrees at 1/(4*d*T_s): unstable from there."""
     control = drive.control
-    if control.delay_samples == 0.0:
-        return
-    limit, asked = 1.0 / (4.0 * control.delay_samples * drive.sample_time_s), control.current_bandwidth_hz
-    if asked >= limit:
+    asked, four_delays = control.current_bandwidth_hz, 4.0 * control.delay_samples * drive.sample_time_s
+    if asked * four_delays >= 1.0:
         reason = f"{control.delay_samples:g} samples of delay make the loop unstable from there"
+        limit = 1.0 / four_delays
         _refuse("[control] current_bandwidth_hz", asked, f"below {limit:g} Hz; {reason}")
+
+
+RULES = (_sample_time, _carrier, _pulses, _voltage, _current, _flux, _codes, _speed_loop, _current_loop)

@@ -53,14 +53,14 @@ def _syntax_message(message, text):
 
 
 def _nearest(name, known):
-    close = difflib.get_close_matches(name, known, n=1, cutoff=0.0)
-    return f"the nearest known one is {close[0]}" if close else "none is known here"
+    return f"the nearest known one is {difflib.get_close_matches(name, known, n=1, cutoff=0.0)[0]}"
 
 
 def _refuse_unknown(table, known, what, where=""):
     for name in table:
         if name not in known:
-            raise DriveError(f": {where}unknown {what} {name}; {_nearest(name, known)}")
+            shown = name if name.isprintable() else repr(name)
+            raise DriveError(f": {where}unknown {what} {shown}; {_nearest(name, known)}")
 
 
 def _section(name, kind, table):

@@ -28,7 +28,7 @@ class Key:
     def accepts(self, value):
         """Whether one number is finite and within the range."""
         above = value > self.lo if self.open_lo else value >= self.lo
-        return math.isfinite(value) and above and value <= self.hi
+        return above and value <= self.hi and math.isfinite(value)
 
     @property
     def allowed(self):

@@ -8,7 +8,14 @@ from collections import namedtuple
 from typing import NamedTuple
 
 from golden_model.control import current_model, current_pi, decoupling, speed_pi, voltage_limit
-from golden_model.io import current_conditioning, position, sample_latch, speed, u_dc_conditioning, u_dc_processing
+from golden_model.io import (
+    current_conditioning,
+    position,
+    sample_latch,
+    speed,
+    u_dc_conditioning,
+    u_dc_processing,
+)
 from golden_model.kernel import kernel
 from golden_model.modulation import gate_generation, pwm_compare, svm, svm_delay_compensation
 from golden_model.transforms import clarke, inverse_park, park, sincos
@@ -111,13 +118,24 @@ def step(state, sample, regs, config):
     """One control period: (next state, Observed)."""
     x, r, c = sample, regs, config
     i_a, i_b, i_c, current_at_rail = current_conditioning.step(
-        x.adc_a, x.adc_b, x.adc_c, r.offset_a, r.offset_b, r.offset_c, r.gain_a, r.gain_b, r.gain_c, c.adc_bits
+        x.adc_a,
+        x.adc_b,
+        x.adc_c,
+        r.offset_a,
+        r.offset_b,
+        r.offset_c,
+        r.gain_a,
+        r.gain_b,
+        r.gain_c,
+        c.adc_bits,
     )
     (theta_me,) = position.step(x.position_code, r.reverse, r.pole_pairs, r.theta_offset, c.position_bits)
     speed_state, (omega_me,) = speed.step(
         state.of_speed, x.position_code, r.reverse, r.k_speed, r.k_filter, c.position_bits
     )
-    u_dc, u_max, u_dc_at_rail = u_dc_conditioning.step(x.adc_u_dc, r.u_dc_offset, r.u_dc_gain, r.k_u_max, c.adc_bits)
+    u_dc, u_max, u_dc_at_rail = u_dc_conditioning.step(
+        x.adc_u_dc, r.u_dc_offset, r.u_dc_gain, r.k_u_max, c.adc_bits
+    )
     m, m_beta, n, u_dc_low = u_dc_processing.step(u_dc)
 
     i_alpha, i_beta = clarke.step(i_a, i_b, i_c)
@@ -125,10 +143,29 @@ def step(state, sample, regs, config):
     i_d, i_q = park.step(i_alpha, i_beta, cos_theta, sin_theta)
 
     speed_pi_state, (i_q_ref, speed_limited) = speed_pi.step(
-        state.of_speed_pi, x.omega_ref, omega_me, x.i_q_ext, x.speed_mode, x.run, r.speed_kp, r.speed_ki, r.i_max
+        state.of_speed_pi,
+        x.omega_ref,
+        omega_me,
+        x.i_q_ext,
+        x.speed_mode,
+        x.run,
+        r.speed_kp,
+        r.speed_ki,
+        r.i_max,
     )
     current_pi_state, (u_pi_d, u_pi_q, u_int_d, u_int_q) = current_pi.step(
-        state.of_current_pi, i_d, i_q, x.i_d_ref, i_q_ref, state.sat_d, state.sat_q, x.run, r.kp_d, r.ki_d, r.kp_q, r.ki_q
+        state.of_current_pi,
+        i_d,
+        i_q,
+        x.i_d_ref,
+        i_q_ref,
+        state.sat_d,
+        state.sat_q,
+        x.run,
+        r.kp_d,
+        r.ki_d,
+        r.kp_q,
+        r.ki_q,
     )
     lambda_d, lambda_q = current_model.step(i_d, i_q, r.l_d, r.l_q, r.lambda_mg)
     u_dec_d, u_dec_q = decoupling.step(omega_me, lambda_d, lambda_q)
@@ -148,4 +185,9 @@ def step(state, sample, regs, config):
     )  # fmt: skip
 
 
-OBSERVED = {p.name: p for module in (sample_latch, *MODULES) for p in module.BLOCK.outputs if p.name in Observed._fields}
+OBSERVED = {
+    p.name: p
+    for module in (sample_latch, *MODULES)
+    for p in module.BLOCK.outputs
+    if p.name in Observed._fields
+}

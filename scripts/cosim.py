@@ -61,7 +61,9 @@ class Device(Protocol):
 
 
 @kernel
-def gate_period(state, compare_a, compare_b, compare_c, enable, dead_time, min_pulse, carrier_half, word, clocks, words):
+def gate_period(
+    state, compare_a, compare_b, compare_c, enable, dead_time, min_pulse, carrier_half, word, clocks, words
+):
     """Golden gates from one sample_trigger to the next: (state, running, last word, edges written, clocks).
 
     ``clocks``, ``words`` receive the edges; ``word`` is the gate word in force, six bits, upper gates first.
@@ -215,7 +217,10 @@ def compare_period(k: int, got: Period, golden, gates, differ: Callable[[int, st
         if got.observed[name] != wanted:
             differ(k, f"{name}: got {got.observed[name]}, wanted {wanted}")
     if not np.array_equal(got.edge_clocks, edge_clocks) or not np.array_equal(got.gate_words, words):
-        differ(k, f"gate edges: got {_edges(got.edge_clocks, got.gate_words)}, wanted {_edges(edge_clocks, words)}")
+        differ(
+            k,
+            f"gate edges: got {_edges(got.edge_clocks, got.gate_words)}, wanted {_edges(edge_clocks, words)}",
+        )
     if (got.clocks, got.running) != (length, run):
         differ(k, f"clocks, running: got {(got.clocks, got.running)}, wanted {(length, run)}")
 

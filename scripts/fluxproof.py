@@ -32,7 +32,7 @@ COMMANDS = {
 
 def parser() -> argparse.ArgumentParser:
     """The command line with every subcommand."""
-    top = argparse.ArgumentParser(prog="fluxproof", description="Tools around the Fluxproof motor-drive core.")
+    top = argparse.ArgumentParser(prog="fluxproof", description="Tools around the Fluxproof drive core.")
     commands = top.add_subparsers(metavar="command", required=True)
     for name, command in COMMANDS.items():
         sub = commands.add_parser(name, help=command.help, description=command.help)

@@ -32,7 +32,9 @@ def run_controller(state, samples, registers, config, observed):
 
 
 @mixed_kernel
-def run_averaged(state, references, u_dc, load, registers, config, plant_state, plant_params, sensors, period_s, out):
+def run_averaged(
+    state, references, u_dc, load, registers, config, plant_state, plant_params, sensors, period_s, out
+):
     """Closed loop over the averaged plant; the duties of a sample act in the next period.
 
     ``references`` (n, 4) int64: omega_ref, i_d_ref, i_q_ext, speed_mode; ``u_dc`` [V], ``load`` [Nm] (n,).

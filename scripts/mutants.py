@@ -3,6 +3,8 @@
 The text must stand exactly once in the file, so a change of the RTL that outdates a mutant is noticed.
 """
 
+# fmt: off
+# ruff: noqa: E501
 MUTANTS = (
     # rounding
     ("conditioning floors", "io/current_conditioning.vhd",

@@ -32,7 +32,9 @@ def plant(number: int) -> Path:
     shutil.copytree(ROOT / "rtl", tree)
     text = (tree / file).read_text()
     if text.count(old) != 1:
-        raise ValueError(f"mutant '{name}': its text stands {text.count(old)} times in rtl/{file}, expected once")
+        raise ValueError(
+            f"mutant '{name}': its text stands {text.count(old)} times in rtl/{file}, expected once"
+        )
     (tree / file).write_text(text.replace(old, new))
     return tree
 

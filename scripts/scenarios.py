@@ -21,7 +21,9 @@ def steps(n: int, changes: dict[float, float], per_period: float) -> np.ndarray:
     return values
 
 
-def scenario(drive: Drive, seconds: float, rpm, load=None, u_dc=None, i_d=None, i_q=None, torque_mode=(), off=()) -> Scenario:
+def scenario(
+    drive: Drive, seconds: float, rpm, load=None, u_dc=None, i_d=None, i_q=None, torque_mode=(), off=()
+) -> Scenario:
     """Staircases in SI units to a scenario; ``torque_mode`` and ``off`` are (from, to) intervals [s]."""
     t_s = drive.sample_time_s
     n = round(seconds / t_s)
@@ -68,8 +70,8 @@ def everything(drive: Drive) -> Scenario:
 
 
 def full_speed(drive: Drive) -> Scenario:
-    """Beyond the rated speed and back through zero: the voltage circle holds for a long while."""
-    return scenario(drive, 0.6, rpm={0.0: 2900, 0.25: 3400, 0.35: -2900, 0.55: 0})
+    """On a bus of 300 V towards the rated speed and back through zero: the voltage circle holds for long."""
+    return scenario(drive, 0.4, rpm={0.0: 2900, 0.2: -2900}, u_dc={0.0: 300.0})
 
 
 def short(drive: Drive) -> Scenario:

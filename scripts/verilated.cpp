@@ -126,9 +126,10 @@ void core_read(const Core* core, const int32_t* ports, int64_t count, int64_t* v
 // Ticks until sample_trigger is high again, at most `most` times; returns the ticks made.  The tick with number
 // `sample_at` sees sample_valid high (none does if that is never reached).  clocks[] and words[] take at
 // most `most` + 1 entries: the number of the tick after which the gate word was new, and that word; number 0
-// means that it had changed before, since the last call.
+// means that it had changed before, since the last call.  facts: entries written; the tick after which
+// duty_valid was high, and compare_valid (0: none).
 int64_t core_run_period(Core* core, int64_t most, int64_t sample_at, int32_t* clocks, uint8_t* words,
-                        int64_t* changes) {
+                        int64_t* facts) {
     Vfluxproof& top = core->top;
     int64_t found = 0;
     const auto look = [&](int64_t k) {
@@ -140,15 +141,18 @@ int64_t core_run_period(Core* core, int64_t most, int64_t sample_at, int32_t* cl
     };
     look(0);
     int64_t k = 0;
+    facts[1] = facts[2] = 0;
     while (k < most) {
         ++k;
         top.sample_valid = k == sample_at;
         core->tick();
         look(k);
+        if (top.duty_valid) facts[1] = k;
+        if (top.compare_valid) facts[2] = k;
         if (top.sample_trigger) break;
     }
     top.sample_valid = 0;
-    *changes = found;
+    facts[0] = found;
     return k;
 }
 

@@ -148,7 +148,7 @@ _FUNCTIONS = {  # name: (result, arguments), as in verilated.cpp
     "core_until": (_LONG, [_CORE, _INT, _LONG]),
     "core_trace": (None, [_CORE, _LONG, _INTS, _LONG, _LONGS]),
     "core_read": (None, [_CORE, _INTS, _LONG, _LONGS]),
-    "core_run_period": (_LONG, [_CORE, _LONG, _LONG, _INTS, _BYTES, ctypes.POINTER(_LONG)]),
+    "core_run_period": (_LONG, [_CORE, _LONG, _LONG, _INTS, _BYTES, _LONGS]),
 }
 
 
@@ -172,6 +172,7 @@ class VerilatedCore:
         self._index = {name: k for k, name in enumerate(self.ports)}
         self._lists: dict[tuple[str, ...], np.ndarray] = {}
         self._edges = (np.empty(0, np.int32), np.empty(0, np.uint8))
+        self.duty_at = self.compare_at = 0  # ticks of the last run_period that raised the two valids, 0: none
         self._library = _load(folder / LIBRARY)
         self._handle = self._library.core_new()
 
@@ -275,7 +276,8 @@ class VerilatedCore:
         first where the word changed between the last call and this one, by ``tick`` and the like.
 
         ``sample``: inputs to set now, entering the core with sample_valid at tick ``sample_at``; RuntimeError
-        where the call ended before that tick.
+        where the call ended before that tick.  ``duty_at`` and ``compare_at`` then say at which tick the
+        duties and all values of the sample were there; they stay readable until the next sample's.
         """
         if sample is not None:
             if sample_at < 1:
@@ -283,12 +285,13 @@ class VerilatedCore:
             self.set_many(sample)
         if len(self._edges[0]) <= max_clocks:
             self._edges = (np.empty(max_clocks + 1, np.int32), np.empty(max_clocks + 1, np.uint8))
-        found = _LONG()
+        facts = np.empty(3, np.int64)
         at = 0 if sample is None else sample_at
-        clocks = self._library.core_run_period(self._handle, max_clocks, at, *self._edges, found)
+        clocks = self._library.core_run_period(self._handle, max_clocks, at, *self._edges, facts)
+        found, self.duty_at, self.compare_at = facts.tolist()
         if clocks < at:
             raise RuntimeError(f"the sample of tick {at} never entered: the call ended after {clocks}")
-        return clocks, self._edges[0][: found.value].copy(), self._edges[1][: found.value].copy()
+        return clocks, self._edges[0][: found].copy(), self._edges[1][: found].copy()
 
 
 def measure(carrier_half: int, periods: int) -> float:

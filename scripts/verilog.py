@@ -84,10 +84,12 @@ def synthesize(sources: Sequence[Path], top: str, generics: Mapping[str, int]) -
     """The Verilog of entity ``top``; raises RuntimeError with GHDL's words where it refuses."""
     ghdl, _ = find_ghdl()
     options = ["--std=08", "--out=verilog", *(f"-g{name}={value}" for name, value in generics.items())]
-    command = [str(ghdl), "--synth", *options, *(str(path) for path in sources), "-e", top]
-    # GHDL leaves its library file where it runs: a folder that goes away.
+    # The Verilog names its sources line by line: relative names keep it the same in every checkout.
+    base = Path(os.path.commonpath([path.parent for path in sources]))
+    files = [str(path.relative_to(base)) for path in sources]
     with tempfile.TemporaryDirectory() as scratch:
-        done = subprocess.run(command, capture_output=True, text=True, cwd=scratch)
+        command = [str(ghdl), "--synth", *options, f"--workdir={scratch}", *files, "-e", top]
+        done = subprocess.run(command, capture_output=True, text=True, cwd=base)
     if done.returncode or f"module {top}" not in done.stdout:
         raise RuntimeError(f"GHDL cannot convert {top} {dict(generics)} to Verilog:\n{done.stderr}")
     return done.stdout

@@ -42,7 +42,10 @@ BLOCK = Block(
         Port("l_q", INDUCTANCE, doc="inductance, q axis"),
         Port("lambda_mg", PU, doc="magnet flux linkage"),
     ),
-    outputs=(Port("lambda_d", PU, doc="flux linkage, d axis"), Port("lambda_q", PU, doc="flux linkage, q axis")),
+    outputs=(
+        Port("lambda_d", PU, doc="flux linkage, d axis"),
+        Port("lambda_q", PU, doc="flux linkage, q axis"),
+    ),
     latency=3,
     constants={"DROP": DROP},
     reference=reference,

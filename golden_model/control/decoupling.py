@@ -41,7 +41,10 @@ BLOCK = Block(
         Port("lambda_d", PU, doc="flux linkage, d axis"),
         Port("lambda_q", PU, doc="flux linkage, q axis"),
     ),
-    outputs=(Port("u_dec_d", PU, doc="rotational voltage, d axis"), Port("u_dec_q", PU, doc="rotational voltage, q axis")),
+    outputs=(
+        Port("u_dec_d", PU, doc="rotational voltage, d axis"),
+        Port("u_dec_q", PU, doc="rotational voltage, q axis"),
+    ),
     latency=3,
     constants={"DROP": DROP},
     reference=reference,

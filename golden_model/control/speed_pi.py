@@ -67,10 +67,19 @@ def bound(_v, _state):
 
 def stimuli(_rng, _config):
     """A minute of saturation in both directions with recovery, torque mode, stop and restart."""
-    regs = {"speed_kp": 5 << 16, "speed_ki": 1 << 20, "i_max": 30000, "speed_mode": 1, "run": 1, "i_q_ext": 12345}
+    regs = {
+        "speed_kp": 5 << 16,
+        "speed_ki": 1 << 20,
+        "i_max": 30000,
+        "speed_mode": 1,
+        "run": 1,
+        "i_q_ext": 12345,
+    }
     rows = []
     for target in (131071, 100, -131072, 0):
-        rows += [{"omega_ref": target, "omega_me": w, **regs} for w in (0, 1000, target, target - 1, target + 1)]
+        rows += [
+            {"omega_ref": target, "omega_me": w, **regs} for w in (0, 1000, target, target - 1, target + 1)
+        ]
     rows = [r for r in rows if -131072 <= r["omega_me"] <= 131071] * 2
     rows += [{**rows[0], "speed_mode": 0}, rows[0], {**rows[0], "run": 0}, rows[0]]
     return rows
@@ -93,7 +102,10 @@ BLOCK = Block(
         Port("speed_ki", KI, doc="integral gain times sample time"),
         Port("i_max", PU, lo=0, doc="limit of the current reference"),
     ),
-    outputs=(Port("i_q_ref", PU, doc="current reference, q axis"), Port("speed_limited", BIT, doc="output at its limit")),
+    outputs=(
+        Port("i_q_ref", PU, doc="current reference, q axis"),
+        Port("speed_limited", BIT, doc="output at its limit"),
+    ),
     state=State(),
     latency=5,
     interval=5,

@@ -58,7 +58,9 @@ def stimuli(_rng, _config):
         for d in (0, u_max - 1, u_max, u_max + 1, u_max * 3 // 5):
             for q in (0, u_max * 4 // 5 - 1, u_max * 4 // 5 + 1, 131071):
                 for s in (1, -1):
-                    rows.append({"u_pi_d": s * d, "u_pi_q": -s * q, "u_dec_d": 0, "u_dec_q": 0, "u_max": u_max})
+                    rows.append(
+                        {"u_pi_d": s * d, "u_pi_q": -s * q, "u_dec_d": 0, "u_dec_q": 0, "u_max": u_max}
+                    )
     return rows
 
 

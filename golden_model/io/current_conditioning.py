@@ -39,7 +39,10 @@ def step(code_a, code_b, code_c, offset_a, offset_b, offset_c, gain_a, gain_b, g
 
 
 def reference(v, _state):
-    return {f"i_{x}": min(max((v[f"code_{x}"] - v[f"offset_{x}"]) * v[f"gain_{x}"], -2.0), PU.hi * PU.lsb) for x in "abc"}
+    return {
+        f"i_{x}": min(max((v[f"code_{x}"] - v[f"offset_{x}"]) * v[f"gain_{x}"], -2.0), PU.hi * PU.lsb)
+        for x in "abc"
+    }
 
 
 def bound(_v, _state):
@@ -54,7 +57,9 @@ def stimuli(_rng, config):
     for gain in (65536, -65536, 131071, -131072, 1):
         for code in (0, 1, top // 2, top // 2 + 1, top - 1, top):
             row = {f"code_{x}": code for x in "abc"}
-            row |= {f"offset_{x}": 32768 + k for k, x in enumerate("abc")} | {f"gain_{x}": gain for x in "abc"}
+            row |= {f"offset_{x}": 32768 + k for k, x in enumerate("abc")} | {
+                f"gain_{x}": gain for x in "abc"
+            }
             rows.append(row)
     return rows
 
@@ -69,7 +74,9 @@ BLOCK = Block(
     paper="001, section 5.2, I/O conditioning",
     step=step,
     inputs=tuple(Port(f"code_{x}", CODE, doc=f"ADC code, phase {x}") for x in "abc"),
-    registers=tuple(Port(f"offset_{x}", CODE, doc=f"code at zero current, phase {x}, left-aligned") for x in "abc")
+    registers=tuple(
+        Port(f"offset_{x}", CODE, doc=f"code at zero current, phase {x}, left-aligned") for x in "abc"
+    )
     + tuple(Port(f"gain_{x}", GAIN, doc=f"current per code, phase {x}") for x in "abc"),
     outputs=tuple(Port(f"i_{x}", PU, doc=f"current, phase {x}") for x in "abc")
     + (Port("current_at_rail", Format(0, 3, 0), doc="bit x: code of phase x at its end"),),

@@ -13,9 +13,30 @@ from golden_model.kernel import kernel
 
 @kernel
 def step(
-    adc_a, adc_b, adc_c, adc_u_dc, position_code, omega_ref_in, i_d_ref_in, i_q_ext_in, speed_mode_in, run_in, *_widths
+    adc_a,
+    adc_b,
+    adc_c,
+    adc_u_dc,
+    position_code,
+    omega_ref_in,
+    i_d_ref_in,
+    i_q_ext_in,
+    speed_mode_in,
+    run_in,
+    *_widths,
 ):
-    return adc_a, adc_b, adc_c, adc_u_dc, position_code, omega_ref_in, i_d_ref_in, i_q_ext_in, speed_mode_in, run_in
+    return (
+        adc_a,
+        adc_b,
+        adc_c,
+        adc_u_dc,
+        position_code,
+        omega_ref_in,
+        i_d_ref_in,
+        i_q_ext_in,
+        speed_mode_in,
+        run_in,
+    )
 
 
 NAMES = {
@@ -43,7 +64,11 @@ _PORTS = _CODES | _REFERENCES
 
 def sized(name):
     """The format function of a code port, which a generic decides, or None."""
-    width = {**current_conditioning.BLOCK.width_from, **u_dc_conditioning.BLOCK.width_from, **position.BLOCK.width_from}
+    width = {
+        **current_conditioning.BLOCK.width_from,
+        **u_dc_conditioning.BLOCK.width_from,
+        **position.BLOCK.width_from,
+    }
     return width.get(name)
 
 

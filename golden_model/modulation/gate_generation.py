@@ -56,7 +56,9 @@ def leg(wanted, level, timer, dead_time, on):
 
 
 @kernel
-def step(state, compare_a, compare_b, compare_c, enable, trip, clear_trip, dead_time, min_pulse, carrier_half):
+def step(
+    state, compare_a, compare_b, compare_c, enable, trip, clear_trip, dead_time, min_pulse, carrier_half
+):
     s = state
     valley = s.carrier == 0 and s.down == 1
     if s.down == 0:
@@ -119,8 +121,12 @@ def stimuli(rng, config):
     rows = []
     good = {"dead_time": 3, "min_pulse": 8}
     for period in range(36):
-        settings = {18: {"dead_time": 8, "min_pulse": 8}, 20: {"dead_time": 5, "min_pulse": 7}}.get(period, good)
-        settings = {24: {"dead_time": 3, "min_pulse": half + 1}, 26: {"dead_time": 0, "min_pulse": 4}}.get(period, settings)
+        settings = {18: {"dead_time": 8, "min_pulse": 8}, 20: {"dead_time": 5, "min_pulse": 7}}.get(
+            period, good
+        )
+        settings = {24: {"dead_time": 3, "min_pulse": half + 1}, 26: {"dead_time": 0, "min_pulse": 4}}.get(
+            period, settings
+        )
         compare = [int(rng.integers(0, half + 1)) for _ in range(3)]
         compare = {2: [0, half, half // 2], 3: [half, 0, half], 4: [1, half - 1, 0]}.get(period, compare)
         for clock in range(2 * half):

@@ -53,7 +53,18 @@ def stimuli(_rng, config):
     half = config["CARRIER_HALF"]
     rows = []
     for pulse in (0, 1, 2, 20, 21):
-        for clocks in (0, 1, pulse // 2 - 1, pulse // 2, pulse // 2 + 1, half // 2, half - pulse - 1, half - pulse, half - 1, half):
+        for clocks in (
+            0,
+            1,
+            pulse // 2 - 1,
+            pulse // 2,
+            pulse // 2 + 1,
+            half // 2,
+            half - pulse - 1,
+            half - pulse,
+            half - 1,
+            half,
+        ):
             duty = min(max(clocks * DUTY_ONE // half, 0), DUTY_ONE)
             rows.append({"duty_a": duty, "duty_b": DUTY_ONE - duty, "duty_c": duty, "min_pulse": pulse})
     return rows
@@ -69,6 +80,7 @@ BLOCK = Block(
     outputs=tuple(Port(f"compare_{k}", COUNT, doc=f"compare value, leg {k}") for k in "abc"),
     latency=5,
     interval=3,
+    atomic=True,
     constants={"DROP": DROP},
     configs=({"CARRIER_HALF": 10000}, {"CARRIER_HALF": 100}),
     reference=reference,

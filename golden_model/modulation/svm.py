@@ -66,7 +66,11 @@ def bound(_v, _state):
 
 def stimuli(_rng, _config):
     """Zero vector at every bus voltage; every sector border and corner, inside and beyond the hexagon."""
-    rows = [{"u_alpha": 0, "u_beta": 0, "m": m, "m_beta": m * 7 // 8, "n": n} for m in (65536, 131071) for n in range(6)]
+    rows = [
+        {"u_alpha": 0, "u_beta": 0, "m": m, "m_beta": m * 7 // 8, "n": n}
+        for m in (65536, 131071)
+        for n in range(6)
+    ]
     for radius in (1, 1000, 20000, 37837, 43690, 65536, 131071):
         for k in range(24):
             a, b = radius * math.cos(k * math.pi / 12), radius * math.sin(k * math.pi / 12)

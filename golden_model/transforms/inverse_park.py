@@ -34,7 +34,11 @@ BLOCK = Block(
     folder="transforms",
     paper="001, eq. (9): T_dq/alphabeta",
     step=step,
-    inputs=(Port("u_d", PU, doc="voltage, d axis"), Port("u_q", PU, doc="voltage, q axis"), *rotate.TRIG_PORTS),
+    inputs=(
+        Port("u_d", PU, doc="voltage, d axis"),
+        Port("u_q", PU, doc="voltage, q axis"),
+        *rotate.TRIG_PORTS,
+    ),
     outputs=(Port("u_alpha", PU, doc="voltage, alpha"), Port("u_beta", PU, doc="voltage, beta")),
     latency=rotate.BLOCK.latency,
     interval=rotate.BLOCK.interval,

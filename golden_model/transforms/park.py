@@ -34,7 +34,11 @@ BLOCK = Block(
     folder="transforms",
     paper="001, eq. (9): T_alphabeta/dq",
     step=step,
-    inputs=(Port("i_alpha", PU, doc="current, alpha"), Port("i_beta", PU, doc="current, beta"), *rotate.TRIG_PORTS),
+    inputs=(
+        Port("i_alpha", PU, doc="current, alpha"),
+        Port("i_beta", PU, doc="current, beta"),
+        *rotate.TRIG_PORTS,
+    ),
     outputs=(Port("i_d", PU, doc="current, d axis"), Port("i_q", PU, doc="current, q axis")),
     latency=rotate.BLOCK.latency,
     interval=rotate.BLOCK.interval,

@@ -63,7 +63,10 @@ BLOCK = Block(
     paper="001, eq. (9): T_dq/alphabeta",
     step=step,
     inputs=(Port("x", PU, doc="first component"), Port("y", PU, doc="second component"), *TRIG_PORTS),
-    outputs=(Port("out_x", PU, doc="first component, turned"), Port("out_y", PU, doc="second component, turned")),
+    outputs=(
+        Port("out_x", PU, doc="first component, turned"),
+        Port("out_y", PU, doc="second component, turned"),
+    ),
     latency=4,
     interval=2,
     constants={"DROP": DROP},

@@ -83,7 +83,12 @@ BLOCK = Block(
     outputs=(Port("cos_theta", TRIG, doc="cosine", **OUT), Port("sin_theta", TRIG, doc="sine", **OUT)),
     latency=6,
     interval=2,
-    constants={"ADDRESS_BITS": ADDRESS_BITS, "DROP_PROD": DROP_PROD, "TABLE_SHIFT": TABLE_SHIFT, "DROP_OUT": DROP_OUT},
+    constants={
+        "ADDRESS_BITS": ADDRESS_BITS,
+        "DROP_PROD": DROP_PROD,
+        "TABLE_SHIFT": TABLE_SHIFT,
+        "DROP_OUT": DROP_OUT,
+    },
     roms={"SINE": (TABLE, list(SINE_ROM)), "DELTA": (DELTA, list(DELTA_ROM))},
     reference=reference,
     bound=bound,

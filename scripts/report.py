@@ -1,0 +1,198 @@
+"""What the demo measured: figures from the simulation's integers, and one self-contained HTML page that shows them."""
+
+from __future__ import annotations
+
+import base64
+import dataclasses
+from pathlib import Path
+from types import SimpleNamespace
+
+import jinja2
+import numpy as np
+
+from golden_model.drive import Drive
+from golden_model.drive_keys import key_of
+from golden_model.units import to_si
+from scripts import plots
+from scripts.cosim import Scenario
+from scripts.files import write_text
+from scripts.scenarios import RPM
+
+TEMPLATES = Path(__file__).resolve().parent / "templates"
+SETTLED = 100  # samples before the next event (10 ms) that count as settled
+
+
+def run_view(arrays, drive: Drive, scenario: Scenario, register_set) -> SimpleNamespace:
+    """A closed-loop run in SI units, one element per sample; currents and speed are the plant's, not the sensors'."""
+
+    def observed(name: str) -> np.ndarray:
+        return to_si(name, arrays[f"observed_{name}"], drive)
+
+    omega_ref = to_si("omega_ref", scenario.omega_ref, drive)
+    edges = arrays["gate_edges"]
+    return SimpleNamespace(
+        ms=np.arange(len(scenario)) * drive.sample_time_s * 1e3,
+        rpm_ref=omega_ref / (RPM * drive.machine.pole_pairs),
+        rpm=arrays["plant_omega_m"] / RPM,
+        i_d=arrays["plant_i_d"],
+        i_q=arrays["plant_i_q"],
+        i_d_ref=to_si("i_d_ref", scenario.i_d_ref, drive),
+        i_q_ref=observed("i_q_ref"),
+        i_max=drive.current_limit_a,
+        limited=arrays["observed_speed_limited"] != 0,
+        u_max=observed("u_max"),
+        **{name: observed(name) for name in ("u_alpha", "u_beta", "duty_a", "duty_b", "duty_c")},
+        speed_step=int(np.flatnonzero(np.diff(scenario.omega_ref))[-1]) + 1,
+        load_step=int(np.flatnonzero(np.diff(scenario.load))[0]) + 1,
+        edges=edges,
+        carrier_half=register_set.config.carrier_half,
+        period_us=drive.sample_time_s * 1e6,
+    )
+
+
+def metrics(run: SimpleNamespace) -> dict:
+    """The numbers of summary.json that describe the control; keys carry the units."""
+    error = run.rpm_ref - run.rpm
+    ends = {"before_speed_step": run.speed_step, "before_load_step": run.load_step, "loaded_at_end": len(error)}
+    settled = {name: _worst(error[end - SETTLED : end]) for name, end in ends.items()}
+    after = run.rpm[run.load_step :]
+    both_on, dead_clocks = dead_times(run.edges, run.carrier_half)
+    return {
+        "speed_error_rpm": {"worst": max(settled.values()), **settled},
+        "speed_overshoot_rpm": _rounded(np.max(-error[run.speed_step : run.load_step])),
+        "speed_dip_rpm": _rounded(run.rpm_ref[-1] - after.min()),
+        "speed_dip_after_ms": _rounded(run.ms[int(after.argmin())]),
+        "i_d_tracking_a": _tracking(run.i_d_ref - run.i_d, ends),
+        "i_q_tracking_a": _tracking(run.i_q_ref - run.i_q, ends),
+        "peak_current_a": _rounded(np.hypot(run.i_d, run.i_q).max()),
+        "current_limited_ms": _rounded(run.limited.sum() * run.period_us * 1e-3),
+        "voltage_of_circle_percent": _rounded(100 * (np.hypot(run.u_alpha, run.u_beta) / run.u_max).max()),
+        "both_gates_on": both_on,
+        "shortest_dead_time_us": _rounded(dead_clocks * run.period_us / (2 * run.carrier_half)),
+    }
+
+
+def _rounded(value) -> float:
+    return round(float(value), 4)
+
+
+def _worst(error: np.ndarray) -> float:
+    return _rounded(np.abs(error).max())
+
+
+def _tracking(error: np.ndarray, ends: dict[str, int]) -> dict[str, float]:
+    """Reference minus current [A]: over the whole run, and where it should have settled."""
+    calm = np.concatenate([error[end - SETTLED : end] for end in ends.values()])
+    rms, rms_calm = (_rounded(np.sqrt(np.mean(e**2))) for e in (error, calm))
+    return {"rms": rms, "worst": _worst(error), "settled_rms": rms_calm, "settled_worst": _worst(calm)}
+
+
+def dead_times(edges: np.ndarray, carrier_half: int) -> tuple[int, int]:
+    """(times that both gates of a leg were on, shortest time [clocks] with both off) from rows period, clock, word."""
+    clock = edges[:, 0] * 2 * carrier_half + edges[:, 1]
+    both_on, shortest = 0, np.iinfo(np.int64).max
+    for leg in range(3):
+        state = (edges[:, 2] >> leg & 1) + 2 * (edges[:, 2] >> (leg + 3) & 1)
+        starts = np.flatnonzero(np.diff(state, prepend=-1))
+        both_on += int((state[starts] == 3).sum())
+        off = np.diff(clock[starts])[state[starts][:-1] == 0]
+        shortest = min(shortest, int(off.min()))
+    return both_on, shortest
+
+
+def gate_view(run: SimpleNamespace, period: int) -> SimpleNamespace:
+    """The gates of one PWM period, times in us from its start; ``dead_us``: leg a's first dead time, (off, on)."""
+    inside = run.edges[:, 0] == period
+    before = run.edges[np.flatnonzero(inside)[0] - 1, 2]
+    us = run.edges[inside, 1] * run.period_us / (2 * run.carrier_half)
+    words = run.edges[inside, 2]
+    off = int(np.flatnonzero(words & 0b001001 == 0)[0])
+    on = off + int(np.flatnonzero(words[off:] & 0b001001)[0])
+    return SimpleNamespace(
+        us=np.append(0.0, us), words=np.append(before, words), period_us=run.period_us, dead_us=(us[off], us[on])
+    )
+
+
+def recording_view(recording, bound, observed, drive: Drive) -> SimpleNamespace:
+    """Logged beside what the core made of the codes; u_q of the core is its decoupling voltage plus R i_q.
+
+    ``bound`` [A]: how far the formats let the core's current vector lie from the logged one.
+    """
+    core = {name: to_si(name, observed[f"observed_{name}"], drive) for name in ("omega_me", "i_d", "i_q", "u_dec_q")}
+    return SimpleNamespace(
+        row=np.arange(len(recording.t)),
+        current_error=np.hypot(core["i_d"] - recording.i_d, core["i_q"] - recording.i_q),
+        current_bound=bound,
+        top_speed=np.abs(recording.rpm).max() * RPM * drive.machine.pole_pairs,
+        top_current=np.hypot(recording.i_d, recording.i_q).max(),
+        omega=recording.omega_me(drive.machine.pole_pairs),
+        omega_core=core["omega_me"],
+        i_q=recording.i_q,
+        i_q_core=core["i_q"],
+        u_q=recording.u_q,
+        u_q_core=core["u_dec_q"] + drive.machine.resistance_ohm * core["i_q"],
+    )
+
+
+def replay_figures(result: dict, view: SimpleNamespace) -> dict:
+    """The part of summary.json about the recording, from the replay's own summary; currents in A."""
+    return {
+        "samples_compared": result["periods_compared"],
+        **{k: result[k] for k in ("differences", "first_difference", "gate_edges", "sample_to_duty_clocks")},
+        "current_error_a": _rounded(view.current_error.max()),
+        "current_bound_a": _rounded(view.current_bound.max()),
+        "ghdl_seconds": result["seconds"],
+    }
+
+
+def verdict(summary: dict) -> str:
+    """The whole result in one sentence."""
+    text = f"{summary['periods_compared']:,} periods, {_count(summary['differences'])}"
+    text += f", duties {summary['sample_to_duty_clocks']} clocks after the sample"
+    rec = summary["recording"]
+    if "skipped" in rec:
+        return f"{text}; recording skipped."
+    return f"{text}; a real recording: {rec['samples_compared']:,} samples, {_count(rec['differences'])}."
+
+
+def _count(differences: int) -> str:
+    return f"{differences} difference{'' if differences == 1 else 's'}"
+
+
+def text(summary: dict, drive: Drive) -> str:
+    """The result for the terminal: verdict and the figures that matter most."""
+    s, rec = summary, summary["recording"]
+    speed, i_d, i_q = s["speed_error_rpm"], s["i_d_tracking_a"], s["i_q_tracking_a"]
+    ns = s["sample_to_duty_clocks"] / drive.core.clock_hz * 1e9
+    skipped = f"skipped: {rec['skipped']}" if "skipped" in rec else None
+    lines = {
+        "sample to duties": f"{s['sample_to_duty_clocks']} clocks, {ns:.0f} ns at {drive.core.clock_hz / 1e6:g} MHz",
+        "speed": f"error {speed['before_load_step']:.1f} rpm at 732 rpm, {speed['loaded_at_end']:.1f} rpm 120 ms after "
+        f"the load step; dip {s['speed_dip_rpm']:.0f} rpm",
+        "currents": f"i_d within {i_d['worst']:.2f} A of 0, rms {i_d['rms']:.3f} A; i_q follows with "
+        f"{i_q['settled_rms']:.3f} A rms settled; peak {s['peak_current_a']:.2f} A",
+        "gates": f"{s['gate_edges']:,} edges, shortest dead time {s['shortest_dead_time_us']:g} µs",
+        "recording": skipped or f"currents within {rec['current_error_a']:.2f} A of the log, "
+        f"formats allow {rec['current_bound_a']:.2f} A",
+        "time": f"{s['wall_time_s']:.0f} s, GHDL {s['ghdl_seconds']:.0f} s for Fig. 9",
+    }
+    return "\n".join([verdict(s)] + [f"  {name:17s} {line}" for name, line in lines.items()])
+
+
+def described(drive: Drive) -> list[SimpleNamespace]:
+    """The sections of drive.toml: rows of (key, value, unit), without what is left at its default."""
+    sections = []
+    for name in ("machine", "inverter", "control", "sensors"):
+        section = getattr(drive, name)
+        given = [(f, getattr(section, f.name)) for f in dataclasses.fields(section)]
+        rows = [(f.name, f"{value:g}", key_of(f).unit) for f, value in given if value not in (f.default, None)]
+        sections.append(SimpleNamespace(name=name, rows=rows))
+    return sections
+
+
+def write(path: Path, figures: list, **context) -> Path:
+    """Render the page; every matplotlib figure becomes an image inside the page itself."""
+    environment = jinja2.Environment(loader=jinja2.FileSystemLoader(TEMPLATES), autoescape=True, trim_blocks=True)
+    images = {f.fluxproof_name: base64.b64encode(plots.svg(f)).decode() for f in figures}
+    page = environment.get_template("report.html").render(images=images, **context)
+    return write_text(path, page)
