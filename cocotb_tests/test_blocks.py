@@ -102,3 +102,10 @@ def test_u_dc_reciprocal_over_the_whole_range():
     below = u_dc_processing.step(u_dc_processing.U_DC_MIN)[:3]
     for u_dc in (0, 1, u_dc_processing.U_DC_MIN - 1):
         assert u_dc_processing.step(u_dc) == (*below, 1)
+
+
+def test_readme_tells_the_declared_latencies():
+    """The README's block table has one row per block, with the declared latency and interval."""
+    readme = (simulate.ROOT / "README.md").read_text()
+    rows = {m[0]: m[1:] for m in re.findall(r"^\| `(\w+)` \| (\w+) \| (\d+) \| (\d+) \|", readme, re.MULTILINE)}
+    assert rows == {b.name: (b.folder, str(b.latency), str(b.interval)) for b in BLOCKS.values()}
