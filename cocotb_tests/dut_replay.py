@@ -1,8 +1,8 @@
-"""A recording of a real drive through the core inside GHDL: open loop, every sample equal to the golden model.
+"""A recording of a real drive through the core inside GHDL: open loop, every sample equal to its model.
 
-The log's dq currents, speed and bus voltage become the codes that the converters and the resolver of ``drive.toml``
-would have given.  One row of the log is one sample of the core: the angle moves by speed times the core's sample time
-from row to row, not by speed times the log's 29 ms, in which the rotor turns several times.
+The log's dq currents, speed and bus voltage become the codes that the converters and the resolver of
+``drive.toml`` would have given.  One row of the log is one sample of the core: from row to row the angle
+moves by speed times the core's sample time, not times the log's 29 ms, in which the rotor turns far.
 """
 
 from __future__ import annotations
@@ -45,16 +45,16 @@ COLUMNS = {
 
 
 class Recording(NamedTuple):
-    """Rows of the log: time [s], peak currents [A] and asked voltages [V] in dq, speed, bus, command [0..1]."""
+    """Columns of the log, one element a row."""
 
-    t: np.ndarray
-    i_d: np.ndarray
+    t: np.ndarray  # [s]
+    i_d: np.ndarray  # [A], peak
     i_q: np.ndarray
-    u_d: np.ndarray
+    u_d: np.ndarray  # [V], peak, what the recorded controller asked for
     u_q: np.ndarray
     rpm: np.ndarray  # mechanical, negative is forward
-    u_dc: np.ndarray
-    command: np.ndarray
+    u_dc: np.ndarray  # [V]
+    command: np.ndarray  # torque the rider asked for, 0 to 1
 
     def omega_me(self, pole_pairs: int) -> np.ndarray:
         """Electrical speed [rad/s], negative is forward as in the log."""
@@ -76,7 +76,7 @@ def angles(recording: Recording, drive: Drive) -> np.ndarray:
 def sample_inputs(recording: Recording, drive: Drive) -> np.ndarray:
     """The core's input ports, one row per row of the log, columns as in fluxproof.Sample without ``run``.
 
-    Torque mode: the q reference is the rider's command times the current limit, with the sign of forward; d is zero.
+    Torque mode: the q reference is the command times the current limit, with the sign of forward; d is zero.
     """
     codes = sensor_params(build_plant(drive)[1])
     theta = angles(recording, drive)

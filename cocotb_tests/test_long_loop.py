@@ -9,6 +9,8 @@ import pytest
 
 from cocotb_tests.simulate import ROOT
 from golden_model import drive as drives
+from golden_model import fluxproof
+from golden_model.io import sample_latch
 from golden_model.registers import registers
 from scripts import verilog
 from scripts.cosim import cosimulate, run_now
@@ -41,10 +43,36 @@ def test_full_ratio(name):
     )
     assert result.differences == 0, result.first_difference
     assert result.periods_compared >= 3000
-    assert result.sample_to_duty_clocks == 38
+    assert result.sample_to_duty_clocks == fluxproof.SAMPLE_TO_DUTY
     rpm = result.plant["omega_m"] * 30 / np.pi
     if name == "fig9":
         assert abs(rpm[-1] - 732) < 15 and rpm[1750] == pytest.approx(732, abs=15)
     else:
         assert rpm.max() > 2000 and rpm.min() < -1000
         assert np.count_nonzero(result.observed["sat_q"]) > 200, "the voltage circle was never reached"
+
+
+def test_samples_as_close_as_allowed():
+    """Random raw samples FLUXPROOF_SAMPLE_INTERVAL clocks apart: each equals the golden model."""
+    reason = ghdl5_missing()
+    if reason:
+        pytest.skip(reason)
+    from scripts.verilated import VerilatedCore
+
+    register_set = registers(drives.with_carrier(DRIVE, 100))
+    config = register_set.config
+    core = VerilatedCore({name.upper(): value for name, value in config._asdict().items()})
+    core.reset()
+    core.set_many({**register_set.values._asdict(), "enable": 1})
+    core.tick(3 * 2 * config.carrier_half)
+    assert core.get("running") == 1
+    rng, state = np.random.default_rng(1), fluxproof.State()
+    for _ in range(2000):
+        sample = fluxproof.Sample(*rng.integers(0, 1 << 16, 5), *rng.integers(-90000, 90000, 3), rng.integers(2), 1)
+        inputs = dict(zip([p.name for p in sample_latch.BLOCK.inputs], map(int, sample), strict=True))
+        inputs.pop("run_in")
+        core.apply_sample(**inputs)
+        core.tick(fluxproof.SAMPLE_INTERVAL - 1)
+        state, wanted = fluxproof.step(state, fluxproof.Sample(*map(int, sample)), register_set.values, config)
+        got = core.get_many(fluxproof.Observed._fields)
+        assert tuple(got.values()) == tuple(wanted)

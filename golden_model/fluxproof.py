@@ -41,6 +41,42 @@ MODULES = (
     gate_generation,
 )
 
+# Instance of the top -> (its block, the instances it waits for).  Blocks start when the last of these is done.
+WIRING = {
+    "latch": (sample_latch, ()),
+    "conditioning": (current_conditioning, ("latch",)),
+    "angle": (position, ("latch",)),
+    "speed_measurement": (speed, ("latch",)),
+    "bus_voltage": (u_dc_conditioning, ("latch",)),
+    "bus_reciprocal": (u_dc_processing, ("bus_voltage",)),
+    "stator_frame": (clarke, ("conditioning",)),
+    "trig": (sincos, ("angle",)),
+    "rotor_frame": (park, ("stator_frame", "trig")),
+    "speed_regulator": (speed_pi, ("speed_measurement",)),
+    "current_regulators": (current_pi, ("rotor_frame", "speed_regulator")),
+    "flux_model": (current_model, ("rotor_frame",)),
+    "cross_coupling": (decoupling, ("flux_model", "speed_measurement")),
+    "circle": (voltage_limit, ("current_regulators", "cross_coupling", "bus_voltage")),
+    "delay": (svm_delay_compensation, ("angle", "speed_measurement")),
+    "trig_out": (sincos, ("delay",)),
+    "stator_voltage": (inverse_park, ("circle", "trig_out")),
+    "modulator": (svm, ("stator_voltage", "bus_reciprocal")),
+    "compare": (pwm_compare, ("modulator",)),
+}
+
+
+def schedule() -> dict[str, tuple[int, int]]:
+    """{instance: (first clock, last clock)} since the raw sample, from the declared latencies alone."""
+    times: dict[str, tuple[int, int]] = {}
+    for instance, (module, awaited) in WIRING.items():
+        first = max((times[name][1] for name in awaited), default=0)
+        times[instance] = (first, first + module.BLOCK.latency)
+    return times
+
+
+SAMPLE_TO_DUTY = schedule()["modulator"][1]
+SAMPLE_INTERVAL = max(last for _, last in schedule().values()) + 1  # no sample enters while one is in flight
+
 REGISTERS = {p.name: p for module in MODULES for p in module.BLOCK.registers}
 Registers = namedtuple("Registers", list(REGISTERS))
 

@@ -5,7 +5,8 @@
 -- Each block starts when its last input is there and runs in parallel with what does not depend on it; which of
 -- its inputs is the last is known, because latencies are constants (a test holds the measured against them).
 -- Formats: per unit, see golden_model/formats.py; registers as `fluxproof registers drive.toml` prints them.
--- Latency: sample_valid to duty_valid FLUXPROOF_SAMPLE_TO_DUTY clocks; samples at least FLUXPROOF_INTERVAL apart.
+-- Latency: sample_valid to duty_valid FLUXPROOF_SAMPLE_TO_DUTY clocks; samples at least
+-- FLUXPROOF_SAMPLE_INTERVAL apart.
 -- Registers change only between samples; dead_time and min_pulse at any time, they are taken over at the valley.
 
 library ieee;

@@ -1,7 +1,7 @@
 """`make demo`: Fig. 9 of paper 001 with the VHDL in the loop, and a real recording through the same core.
 
-Two simulations run side by side in GHDL, the golden model beside each.  Writes build/demo/summary.json, the figures
-and report.html.  Exit status: 0 equal in every bit, 1 where anything differs or a simulation fails.
+Two simulations run side by side in GHDL, the golden model beside each.  Writes build/demo/summary.json,
+the figures and report.html.  Exit status: 0 equal in every bit, 1 where anything differs or fails.
 """
 
 from __future__ import annotations
@@ -30,12 +30,13 @@ DRIVES = ROOT / "docs" / "drives"
 RECORDING = "emrax228/coastdown_run.csv"
 LOOP_CARRIER, REPLAY_CARRIER = 1000, 100  # clocks in half a PWM period: GHDL pays by the clock
 LEAST_PERIODS = 2000
+INTERRUPTED = 130  # exit status, as the shell has it
 
 
 class Simulation(threading.Thread):
-    """One run of the core in GHDL: ``total`` periods of ``drive_file`` under a cocotb module."""
+    """One run of the core in GHDL: ``total`` periods of a drive under a cocotb module."""
 
-    def __init__(self, name: str, drive_file: str, carrier_half: int, module: str, total: int, **environment: str):
+    def __init__(self, name, drive_file: str, carrier_half: int, module: str, total: int, **environment: str):
         super().__init__(name=name, daemon=True)
         self.drive_file, self.module, self.total = drive_file, module, total
         self.drive = drives.with_carrier(drives.load(DRIVES / drive_file), carrier_half)
@@ -52,9 +53,10 @@ class Simulation(threading.Thread):
     def run(self) -> None:
         for name in ("progress", "result.npz", "summary.json"):  # nothing old may pass for new
             (self.folder / name).unlink(missing_ok=True)
+        module = f"cocotb_tests.{self.module}"
         try:
-            simulate.run("fluxproof", f"cocotb_tests.{self.module}", self.generics, self.environment, key="demo")
-            self.problem = simulate.failure(self.folder)
+            simulate.run("fluxproof", module, self.generics, self.environment, key="demo")
+            self.problem = simulate.failure(self.folder) or (None if self.summary() else "no result")
         except (SystemExit, subprocess.CalledProcessError) as error:  # no GHDL, or VHDL that does not build
             self.problem = f"{error}; see {self.folder.relative_to(ROOT)}/build.log"
 
@@ -71,131 +73,134 @@ class Simulation(threading.Thread):
 
 
 def run_folder(generics: dict) -> Path:
-    """The folder that simulate.run will use (a test holds the two together); needed to watch it from outside."""
+    """The folder that simulate.run will use (a test holds the two together); to watch it from outside."""
     tag = hashlib.sha256(repr((str(simulate.RTL), sorted(generics.items()), "demo")).encode()).hexdigest()[:8]
     return BUILD / "sim" / f"fluxproof-{tag}"
 
 
+class Progress:
+    """How far the simulations are: a live line on a terminal, else a line from each at every 10 %."""
+
+    def __init__(self, simulations: list[Simulation], out):
+        self.simulations, self.out = simulations, out
+        self.began: dict[Simulation, tuple[float, int]] = {}
+        self.told = dict.fromkeys(simulations, 0)
+
+    def show(self, done: dict[Simulation, int], now: float) -> None:
+        for s in self.simulations:
+            if done[s]:
+                self.began.setdefault(s, (now, done[s]))
+        if self.out.isatty():
+            columns = os.get_terminal_size(self.out.fileno()).columns
+            line = self.line(done, now, min(20, max(4, (columns - 68) // 2)))
+            print(f"\r{line[: columns - 1]}\x1b[K", end="", file=self.out, flush=True)
+            return
+        for s in self.simulations:
+            tenth = 10 * done[s] // s.total
+            if tenth > self.told[s]:
+                self.told[s] = tenth
+                rate, left = self.speed(s, done[s], now)
+                state = f"{s.name}: {10 * tenth} %, {done[s]} of {s.total} periods"
+                print(f"{state}, {rate:.0f}/s, {left:.0f} s left", file=self.out, flush=True)
+
+    def speed(self, s: Simulation, done: int, now: float) -> tuple[float, float]:
+        """(periods per second, seconds left) since the first sign of life."""
+        since, first = self.began.get(s, (now, done))
+        rate = (done - first) / (now - since) if now > since else 0.0
+        return rate, (s.total - done) / rate if rate else 0.0
+
+    def line(self, done: dict[Simulation, int], now: float, width: int) -> str:
+        parts, longest = [], 0.0
+        for s in self.simulations:
+            rate, left = self.speed(s, done[s], now)
+            longest = max(longest, left)
+            bar = "#" * (width * done[s] // s.total)
+            text = f"[{bar:.<{width}}] {done[s]}/{s.total} {rate:.0f}/s" if done[s] else "building"
+            parts.append(f"{s.name} {text}")
+        return "  ".join([*parts, f"{longest:.0f} s left" if longest else ""])
+
+
 def watch(simulations: list[Simulation], out=sys.stdout, pause: float = 0.5) -> None:
-    """Start all and show how far they are: a live line on a terminal, else a line every 10 %."""
-    began, told = {}, dict.fromkeys(simulations, 0)
-    for simulation in simulations:
-        simulation.start()
-    while any(s.is_alive() for s in simulations):
+    """Run all at once and show how far they are."""
+    progress = Progress(simulations, out)
+    for s in simulations:
+        s.start()
+    while any([s.is_alive() for s in simulations]):
         time.sleep(pause)
-        for s in simulations:
-            if s.done():
-                began.setdefault(s, (time.monotonic(), s.done()))
-        if out.isatty():
-            line = "   ".join(_state(s, began.get(s)) for s in simulations)
-            print(f"\r{line[: os.get_terminal_size().columns - 1]}\x1b[K", end="", file=out, flush=True)
-            continue
-        for s in simulations:
-            tenth = 10 * s.done() // s.total
-            if tenth > told[s]:
-                told[s] = tenth
-                print(_state(s, began.get(s)), file=out, flush=True)
+        progress.show({s: s.done() for s in simulations}, time.monotonic())
     if out.isatty():
         print(file=out)
-
-
-def _state(simulation: Simulation, began: tuple[float, int] | None) -> str:
-    """Name, bar, periods done, speed, time left."""
-    done, total = simulation.done(), simulation.total
-    if began is None:
-        return f"{simulation.name}: analysing the VHDL, compiling the golden model ..."
-    bar = "#" * (12 * done // total)
-    text = f"{simulation.name} [{bar:.<12}] {done}/{total} periods"
-    seconds, since = time.monotonic() - began[0], done - began[1]
-    if done == total or not since:
-        return text
-    return f"{text}, {since / seconds:.0f}/s, {(total - done) * seconds / since:.0f} s left"
 
 
 def recording_path() -> tuple[Path, str | None]:
     """Where the recording should be, and why it is skipped, if it is."""
     folder = Path(os.environ.get("FLUXPROOF_RECORDINGS", "../shared/recordings"))
-    path = ROOT / folder / RECORDING
-    return path, None if path.exists() else f"no {folder / RECORDING} (FLUXPROOF_RECORDINGS names the folder)"
+    path = (ROOT / folder / RECORDING).resolve()
+    return path, None if path.exists() else f"{RECORDING} is not there; FLUXPROOF_RECORDINGS names its folder"
 
 
 def collect(loop: Simulation, replay: Simulation | None, recording, skipped: str | None):
-    """(summary, figures, view of the recording or None) from what the finished simulations left behind."""
+    """(summary, figures by name, view of the recording or None) from what the simulations left behind."""
     scenario = fig9(loop.drive)
     run = report.run_view(np.load(loop.folder / "result.npz"), loop.drive, scenario, loop.registers)
-    result = loop.summary()
-    seconds = result.pop("seconds")
-    summary = {**result, **report.metrics(run), "carrier_half_clocks": run.carrier_half, "ghdl_seconds": seconds}
-    figures = [draw(run) for draw in plots.OF_A_RUN]
-    figures.append(plots.gate_signals(report.gate_view(run, len(scenario) - 50)))
+    summary = {**report.counts(loop.summary()), **report.metrics(run)}
+    figures = {name: draw(run) for name, draw in plots.OF_A_RUN.items()}
+    figures["gate_signals"] = plots.gate_signals(report.gate_view(run, len(scenario) - 50))
     if replay is None:
         return {**summary, "recording": {"skipped": skipped}}, figures, None
     bound = dut_replay.current_bound(recording, replay.drive)
     view = report.recording_view(recording, bound, np.load(replay.folder / "result.npz"), replay.drive)
-    found = {"rows": replay.total, **report.replay_figures(replay.summary(), view), "carrier_half_clocks": REPLAY_CARRIER}
-    return {**summary, "recording": found}, [*figures, plots.recording(view)], view
+    figures["recording"] = plots.recording(view)
+    found = {"rows": replay.total, **report.counts(replay.summary()), **report.recording_metrics(view)}
+    return {**summary, "recording": found}, figures, view
 
 
-def passed(summary: dict, simulations: list[Simulation]) -> bool:
+def passed(summary: dict, problems: list[str]) -> bool:
     """Equal in every bit, and enough of it compared."""
     differences = summary["differences"] + summary["recording"].get("differences", 0)
-    enough = summary["periods_compared"] >= LEAST_PERIODS
-    return enough and differences == 0 and all(s.problem is None for s in simulations)
+    return not problems and differences == 0 and summary["periods_compared"] >= LEAST_PERIODS
 
 
 def main(argv: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="make demo", description=__doc__.splitlines()[0])
     parser.add_argument("--carrier-half", type=int, default=LOOP_CARRIER, help="clocks in half a PWM period")
-    parser.add_argument("--redraw", action="store_true", help="report from the last run, without simulating")
     parser.add_argument("--picture", type=Path, metavar="FILE.png", help="write the README's picture too")
-    options = parser.parse_args(argv)
-    began = time.monotonic()
+    options, began = parser.parse_args(argv), time.monotonic()
 
     real = drives.load(DRIVES / "paper001.toml")
-    total = len(fig9(real))
-    loop = Simulation("Fig. 9", "paper001.toml", options.carrier_half, "dut_loop", total, FLUXPROOF_SCENARIO="fig9")
-    simulations, replay, recording = [loop], None, None
-    path, skipped = recording_path()
+    what, carrier = {"FLUXPROOF_SCENARIO": "fig9"}, options.carrier_half
+    loop = Simulation("Fig. 9", "paper001.toml", carrier, "dut_loop", len(fig9(real)), **what)
+    replay, recording, (path, skipped) = None, None, recording_path()
     if skipped:
         print(f"recording skipped: {skipped}")
     else:
-        recording = dut_replay.load_recording(path)
-        where = {"FLUXPROOF_RECORDING": str(path.resolve())}
-        replay = Simulation("recording", "emrax228.toml", REPLAY_CARRIER, "dut_replay", len(recording.t), **where)
-        simulations.append(replay)
-    if not options.redraw:
-        print(f"VHDL in GHDL, golden model beside it: {total} periods of Fig. 9 in closed loop", flush=True)
-        watch(simulations)
-    broken = [s for s in simulations if s.summary() is None]
-    for s in broken:
-        print(f"{s.name}: no result: {s.problem or 'run it first'}", file=sys.stderr)
-    if broken:
+        recording, what = dut_replay.load_recording(path), {"FLUXPROOF_RECORDING": str(path)}
+        rows = len(recording.t)
+        replay = Simulation("recording", "emrax228.toml", REPLAY_CARRIER, "dut_replay", rows, **what)
+    simulations = [loop] if skipped else [loop, replay]
+    print("VHDL in GHDL, golden model beside it, compared in every bit of every control period", flush=True)
+    watch(simulations)
+    problems = [f"{s.name}: {s.problem}" for s in simulations if s.problem]
+    print("\n".join(problems), file=sys.stderr, end="\n" if problems else "")
+    if any(s.summary() is None for s in simulations):
         return 1
 
     summary, figures, view = collect(loop, replay, recording, skipped)
-    for figure in figures:
-        plots.write_png(figure, DEMO / f"{figure.fluxproof_name}.png")
-        if options.picture and figure.fluxproof_name == "overview":
-            plots.write_png(figure, options.picture)
+    for name, figure in figures.items():
+        plots.write_png(figure, DEMO / f"{name}.png")
+    if options.picture:
+        plots.write_png(figures["overview"], options.picture)
     summary["wall_time_s"] = round(time.monotonic() - began, 1)
-    good = passed(summary, simulations)
-    page = report.write(
-        DEMO / "report.html",
-        figures,
-        good=good,
-        verdict=report.verdict(summary),
-        problems=[f"{s.name}: {s.problem}" for s in simulations if s.problem],
-        summary=summary,
-        loop=loop,
-        replay=replay,
-        view=view,
-        sections=report.described(loop.drive),
-        real=real,
-    )
+    good = passed(summary, problems)
+    context = dict(good=good, problems=problems, loop=loop, replay=replay, view=view, real=real)
+    page = report.write(DEMO / "report.html", figures, summary, **context)
     write_json(DEMO / "summary.json", summary)
     print(f"\n{report.text(summary, real)}\n  report            {page.relative_to(ROOT)}")
     return 0 if good else 1
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    try:
+        sys.exit(main())
+    except KeyboardInterrupt:
+        sys.exit(INTERRUPTED)

@@ -9,7 +9,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from golden_model import formats
+from golden_model import fluxproof, formats
 from golden_model.block import Const
 from golden_model.fixed import Format
 from golden_model.registry import BLOCKS
@@ -68,6 +68,9 @@ def table(name: str, fmt: Format, values: list[int]) -> list[str]:
 def render() -> str:
     """The whole package as text."""
     lines = shared_formats()
+    lines += ["", "  -- fluxproof: clocks from the raw sample to the duties, least distance of two samples"]
+    lines.append(f"  constant FLUXPROOF_SAMPLE_TO_DUTY : positive := {fluxproof.SAMPLE_TO_DUTY};")
+    lines.append(f"  constant FLUXPROOF_SAMPLE_INTERVAL : positive := {fluxproof.SAMPLE_INTERVAL};")
     for block in BLOCKS.values():
         prefix = block.name.upper()
         lines += ["", f"  -- {block.name}: {block.paper}"]

@@ -17,19 +17,15 @@ from matplotlib.figure import Figure
 
 REFERENCE, SPEED, Q_AXIS, D_AXIS, QUIET = "#8a8f98", "#1f5fa8", "#c2461c", "#1c7f5f", "#b9bec6"
 PHASES = {"a": SPEED, "b": Q_AXIS, "c": D_AXIS}
-DEAD = "#f0c419"
 WIDTH, HEIGHT = 5.6, 3.1  # inches; narrow, so that the text stays readable on a phone
 STYLE = {k: v for k, v in mpl.rcParamsDefault.items() if not k.startswith("backend")} | {
     "font.size": 10.0,
     "axes.titlesize": 10.5,
     "axes.titleweight": "bold",
     "axes.titlelocation": "left",
-    "axes.spines.top": False,
-    "axes.spines.right": False,
+    **dict.fromkeys(("axes.spines.top", "axes.spines.right"), False),
+    **dict.fromkeys(("axes.labelcolor", "xtick.color", "ytick.color"), "#3b4048"),
     "axes.edgecolor": "#9aa0a8",
-    "axes.labelcolor": "#3b4048",
-    "xtick.color": "#3b4048",
-    "ytick.color": "#3b4048",
     "axes.grid": True,
     "grid.color": "#e8eaed",
     "lines.linewidth": 1.4,
@@ -50,19 +46,18 @@ def styled(function):
 
 
 @styled
-def svg(figure: Figure) -> bytes:
-    """The figure as SVG with its letters as outlines: no font is needed to show it."""
+def image(figure: Figure, kind: str, **options) -> bytes:
+    """The figure as "png" or "svg"; SVG holds its letters as outlines, no font is needed to show it."""
     with io.BytesIO() as stream:
-        figure.savefig(stream, format="svg", metadata={"Date": None})
+        figure.savefig(stream, format=kind, **options)
         return stream.getvalue()
 
 
-@styled
 def write_png(figure: Figure, path: Path) -> None:
     """Write the figure to ``path`` in one step."""
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(f".{path.name}.{os.getpid()}")
-    figure.savefig(temporary, format="png", dpi=160)
+    temporary.write_bytes(image(figure, "png", dpi=160))
     os.replace(temporary, path)
 
 
@@ -106,6 +101,7 @@ def _current_panel(axis, run, part=slice(None)) -> None:
         _name(axis, ms[-1], i_q_ref[-1], "$i_q$ ref.", REFERENCE, dy=8)
     _name(axis, ms[-1], i_q[-1], "$i_q$", Q_AXIS, dy=-4)
     _name(axis, ms[-1], i_d[-1], "$i_d$", D_AXIS)
+    _events(axis, run)
     axis.set(ylabel="A", xlim=(ms[0], ms[-1]))
 
 
@@ -113,7 +109,7 @@ def _current_panel(axis, run, part=slice(None)) -> None:
 def speed(run) -> Figure:
     figure, axis = _axes()
     _speed_panel(axis, run)
-    axis.set_xlabel("time [ms]")
+    axis.set(xlabel="time [ms]")
     return figure
 
 
@@ -122,17 +118,8 @@ def currents(run, title="Currents, peak", start: int = 0, end: int | None = None
     """Samples ``start`` to ``end`` of the dq currents."""
     figure, axis = _axes()
     _current_panel(axis, run, slice(start, end))
-    _events(axis, run)
-    axis.set(title=title, xlabel="time [ms]", xlim=(run.ms[start], run.ms[-1 if end is None else end - 1]))
+    axis.set(title=title, xlabel="time [ms]")
     return figure
-
-
-def zoom_speed_step(run) -> Figure:
-    return currents(run, "Currents at the speed step", run.speed_step - 15, run.speed_step + 65)
-
-
-def zoom_load_step(run) -> Figure:
-    return currents(run, "Currents at the load step", run.load_step - 50, run.load_step + 350)
 
 
 @styled
@@ -152,7 +139,7 @@ def voltages(run) -> Figure:
 
 
 @styled
-def _three(run, signal: str, scale: float, title: str, unit: str) -> Figure:
+def phases(run, signal: str, scale: float, title: str, unit: str) -> Figure:
     """A signal of the three phases over the last 32 ms, one and a half electrical turns."""
     figure, axis = _axes()
     part = slice(len(run.ms) - 320, None)
@@ -162,14 +149,6 @@ def _three(run, signal: str, scale: float, title: str, unit: str) -> Figure:
         _name(axis, run.ms[-1], values[-1], phase, color)
     axis.set(title=title, xlabel="time [ms]", ylabel=unit, xlim=(run.ms[part][0], run.ms[-1]))
     return figure
-
-
-def duties(run) -> Figure:
-    return _three(run, "duty", 100.0, "Duties of the three legs, loaded", "%")
-
-
-def phase_currents(run) -> Figure:
-    return _three(run, "i", 1.0, "Phase currents as the core sees them, loaded", "A")
 
 
 def _gate_lines(axis, gates, start: float, end: float) -> None:
@@ -182,7 +161,7 @@ def _gate_lines(axis, gates, start: float, end: float) -> None:
             axis.fill_between(us, base, level, step="post", color=color, alpha=0.13, linewidth=0)
             at = dict(xycoords=("axes fraction", "data"), textcoords="offset points", ha="right", va="center")
             axis.annotate(f"{phase} {side}", (0, base + 0.45), (-4, 0), color=color, fontsize=9, **at)
-    axis.axvspan(*gates.dead_us, color=DEAD, alpha=0.35, linewidth=0)
+    axis.axvspan(*gates.dead_us, color="#f0c419", alpha=0.35, linewidth=0)
     axis.set(xlim=(start, end), yticks=[], xlabel="µs")
     axis.grid(visible=False)
     axis.spines["left"].set_visible(False)
@@ -224,9 +203,17 @@ def overview(run) -> Figure:
     figure, (above, below) = _axes(2, 1, (7.6, 4.6), sharex=True)
     _speed_panel(above, run)
     _current_panel(below, run)
-    _events(below, run)
     below.set(title="Currents, peak", xlabel="time [ms]")
     return figure
 
 
-OF_A_RUN = (speed, currents, zoom_speed_step, zoom_load_step, voltages, phase_currents, duties, overview)
+OF_A_RUN = {
+    "speed": speed,
+    "currents": currents,
+    "at_speed_step": lambda run: currents(run, "Currents at the speed step", run.speed_step - 15, run.speed_step + 65),
+    "at_load_step": lambda run: currents(run, "Currents at the load step", run.load_step - 50, run.load_step + 350),
+    "voltages": voltages,
+    "phase_currents": lambda run: phases(run, "i", 1.0, "Phase currents as the core sees them, loaded", "A"),
+    "duties": lambda run: phases(run, "duty", 100.0, "Duties of the three legs, loaded", "%"),
+    "overview": overview,
+}

@@ -1,4 +1,4 @@
-"""What the demo measured: figures from the simulation's integers, and one self-contained HTML page that shows them."""
+"""What the demo measured: numbers from the simulation's integers, and one HTML page that shows them."""
 
 from __future__ import annotations
 
@@ -19,11 +19,13 @@ from scripts.files import write_text
 from scripts.scenarios import RPM
 
 TEMPLATES = Path(__file__).resolve().parent / "templates"
+SHOWN = (*("u_max", "u_alpha", "u_beta"), *("i_a", "i_b", "i_c"), *("duty_a", "duty_b", "duty_c"))
+LEG_A = 0b001001  # its two gates in a gate word
 SETTLED = 100  # samples before the next event (10 ms) that count as settled
 
 
 def run_view(arrays, drive: Drive, scenario: Scenario, register_set) -> SimpleNamespace:
-    """A closed-loop run in SI units, one element per sample; currents and speed are the plant's, not the sensors'."""
+    """A closed-loop run in SI units, one element per sample; i_d, i_q and speed are the plant's own."""
 
     def observed(name: str) -> np.ndarray:
         return to_si(name, arrays[f"observed_{name}"], drive)
@@ -40,8 +42,7 @@ def run_view(arrays, drive: Drive, scenario: Scenario, register_set) -> SimpleNa
         i_q_ref=observed("i_q_ref"),
         i_max=drive.current_limit_a,
         limited=arrays["observed_speed_limited"] != 0,
-        u_max=observed("u_max"),
-        **{name: observed(name) for name in ("u_alpha", "u_beta", "duty_a", "duty_b", "duty_c")},
+        **{name: observed(name) for name in SHOWN},
         speed_step=int(np.flatnonzero(np.diff(scenario.omega_ref))[-1]) + 1,
         load_step=int(np.flatnonzero(np.diff(scenario.load))[0]) + 1,
         edges=edges,
@@ -53,7 +54,7 @@ def run_view(arrays, drive: Drive, scenario: Scenario, register_set) -> SimpleNa
 def metrics(run: SimpleNamespace) -> dict:
     """The numbers of summary.json that describe the control; keys carry the units."""
     error = run.rpm_ref - run.rpm
-    ends = {"before_speed_step": run.speed_step, "before_load_step": run.load_step, "loaded_at_end": len(error)}
+    ends = {"before_speed_step": run.speed_step, "before_load_step": run.load_step, "at_end": len(error)}
     settled = {name: _worst(error[end - SETTLED : end]) for name, end in ends.items()}
     after = run.rpm[run.load_step :]
     both_on, dead_clocks = dead_times(run.edges, run.carrier_half)
@@ -67,9 +68,18 @@ def metrics(run: SimpleNamespace) -> dict:
         "peak_current_a": _rounded(np.hypot(run.i_d, run.i_q).max()),
         "current_limited_ms": _rounded(run.limited.sum() * run.period_us * 1e-3),
         "voltage_of_circle_percent": _rounded(100 * (np.hypot(run.u_alpha, run.u_beta) / run.u_max).max()),
+        "i_q_rise_ms": rise_time(run),
+        "carrier_half_clocks": run.carrier_half,
         "both_gates_on": both_on,
         "shortest_dead_time_us": _rounded(dead_clocks * run.period_us / (2 * run.carrier_half)),
     }
+
+
+def rise_time(run: SimpleNamespace) -> float:
+    """From the speed step until i_q has made 90 % of its reference's jump [ms]."""
+    start, target = run.i_q[run.speed_step], run.i_q_ref[run.speed_step]
+    made = (run.i_q[run.speed_step :] - start) / (target - start)
+    return _rounded(run.ms[int(np.argmax(made >= 0.9))])
 
 
 def _rounded(value) -> float:
@@ -88,7 +98,7 @@ def _tracking(error: np.ndarray, ends: dict[str, int]) -> dict[str, float]:
 
 
 def dead_times(edges: np.ndarray, carrier_half: int) -> tuple[int, int]:
-    """(times that both gates of a leg were on, shortest time [clocks] with both off) from rows period, clock, word."""
+    """(times that both gates of a leg were on, shortest time [clocks] with both off); rows: period, clock, word."""
     clock = edges[:, 0] * 2 * carrier_half + edges[:, 1]
     both_on, shortest = 0, np.iinfo(np.int64).max
     for leg in range(3):
@@ -101,16 +111,13 @@ def dead_times(edges: np.ndarray, carrier_half: int) -> tuple[int, int]:
 
 
 def gate_view(run: SimpleNamespace, period: int) -> SimpleNamespace:
-    """The gates of one PWM period, times in us from its start; ``dead_us``: leg a's first dead time, (off, on)."""
-    inside = run.edges[:, 0] == period
-    before = run.edges[np.flatnonzero(inside)[0] - 1, 2]
-    us = run.edges[inside, 1] * run.period_us / (2 * run.carrier_half)
-    words = run.edges[inside, 2]
-    off = int(np.flatnonzero(words & 0b001001 == 0)[0])
-    on = off + int(np.flatnonzero(words[off:] & 0b001001)[0])
-    return SimpleNamespace(
-        us=np.append(0.0, us), words=np.append(before, words), period_us=run.period_us, dead_us=(us[off], us[on])
-    )
+    """The gates of one PWM period, times in us from its start; ``dead_us``: (off, on) of leg a's first dead time."""
+    inside = np.flatnonzero(run.edges[:, 0] == period)
+    us = np.append(0.0, run.edges[inside, 1] * run.period_us / (2 * run.carrier_half))
+    words = run.edges[np.append(inside[0] - 1, inside), 2]  # the word in force before the first edge leads
+    off = int(np.flatnonzero(words & LEG_A == 0)[0])
+    on = off + int(np.flatnonzero(words[off:] & LEG_A)[0])
+    return SimpleNamespace(us=us, words=words, period_us=run.period_us, dead_us=(us[off], us[on]))
 
 
 def recording_view(recording, bound, observed, drive: Drive) -> SimpleNamespace:
@@ -118,7 +125,8 @@ def recording_view(recording, bound, observed, drive: Drive) -> SimpleNamespace:
 
     ``bound`` [A]: how far the formats let the core's current vector lie from the logged one.
     """
-    core = {name: to_si(name, observed[f"observed_{name}"], drive) for name in ("omega_me", "i_d", "i_q", "u_dec_q")}
+    names = ("omega_me", "i_d", "i_q", "u_dec_q")
+    core = {name: to_si(name, observed[f"observed_{name}"], drive) for name in names}
     return SimpleNamespace(
         row=np.arange(len(recording.t)),
         current_error=np.hypot(core["i_d"] - recording.i_d, core["i_q"] - recording.i_q),
@@ -134,15 +142,17 @@ def recording_view(recording, bound, observed, drive: Drive) -> SimpleNamespace:
     )
 
 
-def replay_figures(result: dict, view: SimpleNamespace) -> dict:
-    """The part of summary.json about the recording, from the replay's own summary; currents in A."""
+def recording_metrics(view: SimpleNamespace) -> dict:
+    """The core's current vector against the log [A], worst over all rows, and the bound from the formats."""
     return {
-        "samples_compared": result["periods_compared"],
-        **{k: result[k] for k in ("differences", "first_difference", "gate_edges", "sample_to_duty_clocks")},
         "current_error_a": _rounded(view.current_error.max()),
         "current_bound_a": _rounded(view.current_bound.max()),
-        "ghdl_seconds": result["seconds"],
     }
+
+
+def counts(summary: dict) -> dict:
+    """A simulation's own summary under the demo's names."""
+    return {**{k: v for k, v in summary.items() if k != "seconds"}, "ghdl_seconds": summary["seconds"]}
 
 
 def verdict(summary: dict) -> str:
@@ -160,23 +170,21 @@ def _count(differences: int) -> str:
 
 
 def text(summary: dict, drive: Drive) -> str:
-    """The result for the terminal: verdict and the figures that matter most."""
-    s, rec = summary, summary["recording"]
+    """The result for the terminal: verdict and the numbers that matter most."""
+    s, rec, ns = summary, summary["recording"], summary["sample_to_duty_clocks"] / drive.core.clock_hz * 1e9
     speed, i_d, i_q = s["speed_error_rpm"], s["i_d_tracking_a"], s["i_q_tracking_a"]
-    ns = s["sample_to_duty_clocks"] / drive.core.clock_hz * 1e9
-    skipped = f"skipped: {rec['skipped']}" if "skipped" in rec else None
-    lines = {
-        "sample to duties": f"{s['sample_to_duty_clocks']} clocks, {ns:.0f} ns at {drive.core.clock_hz / 1e6:g} MHz",
-        "speed": f"error {speed['before_load_step']:.1f} rpm at 732 rpm, {speed['loaded_at_end']:.1f} rpm 120 ms after "
-        f"the load step; dip {s['speed_dip_rpm']:.0f} rpm",
-        "currents": f"i_d within {i_d['worst']:.2f} A of 0, rms {i_d['rms']:.3f} A; i_q follows with "
-        f"{i_q['settled_rms']:.3f} A rms settled; peak {s['peak_current_a']:.2f} A",
-        "gates": f"{s['gate_edges']:,} edges, shortest dead time {s['shortest_dead_time_us']:g} µs",
-        "recording": skipped or f"currents within {rec['current_error_a']:.2f} A of the log, "
-        f"formats allow {rec['current_bound_a']:.2f} A",
-        "time": f"{s['wall_time_s']:.0f} s, GHDL {s['ghdl_seconds']:.0f} s for Fig. 9",
-    }
-    return "\n".join([verdict(s)] + [f"  {name:17s} {line}" for name, line in lines.items()])
+    logged = f"skipped: {rec['skipped']}" if "skipped" in rec else (
+        f"currents within {rec['current_error_a']:.2f} A of the log, formats allow {rec['current_bound_a']:.2f} A"
+    )
+    return f"""{verdict(s)}
+  sample to duties  {s["sample_to_duty_clocks"]} clocks, {ns:.0f} ns at {drive.core.clock_hz / 1e6:g} MHz
+  speed             error {speed["before_load_step"]:.1f} rpm at 732 rpm, {speed["at_end"]:.1f} rpm under load
+  load step         dip {s["speed_dip_rpm"]:.0f} rpm, lowest after {s["speed_dip_after_ms"]:.0f} ms
+  currents          i_d {i_d["rms"]:.3f} A rms from 0, i_q {i_q["settled_rms"]:.3f} A rms from its settled reference
+  peak current      {s["peak_current_a"]:.2f} A of {drive.current_limit_a:g} A
+  gates             {s["gate_edges"]:,} edges, shortest dead time {s["shortest_dead_time_us"]:g} µs
+  recording         {logged}
+  time              {s["wall_time_s"]:.0f} s, GHDL {s["ghdl_seconds"]:.0f} s for Fig. 9"""
 
 
 def described(drive: Drive) -> list[SimpleNamespace]:
@@ -185,14 +193,17 @@ def described(drive: Drive) -> list[SimpleNamespace]:
     for name in ("machine", "inverter", "control", "sensors"):
         section = getattr(drive, name)
         given = [(f, getattr(section, f.name)) for f in dataclasses.fields(section)]
-        rows = [(f.name, f"{value:g}", key_of(f).unit) for f, value in given if value not in (f.default, None)]
+        given = [(f.name, value, key_of(f).unit) for f, value in given if value not in (f.default, None)]
+        rows = [(name, f"{value:g}", "" if unit == "1" else unit) for name, value, unit in given]
         sections.append(SimpleNamespace(name=name, rows=rows))
     return sections
 
 
-def write(path: Path, figures: list, **context) -> Path:
+def write(path: Path, figures: dict, summary: dict, **context) -> Path:
     """Render the page; every matplotlib figure becomes an image inside the page itself."""
-    environment = jinja2.Environment(loader=jinja2.FileSystemLoader(TEMPLATES), autoescape=True, trim_blocks=True)
-    images = {f.fluxproof_name: base64.b64encode(plots.svg(f)).decode() for f in figures}
-    page = environment.get_template("report.html").render(images=images, **context)
-    return write_text(path, page)
+    loader = jinja2.FileSystemLoader(TEMPLATES)
+    environment = jinja2.Environment(loader=loader, autoescape=True, trim_blocks=True)
+    svg = {name: plots.image(figure, "svg", metadata={"Date": None}) for name, figure in figures.items()}
+    images = {name: base64.b64encode(data).decode() for name, data in svg.items()}
+    context |= dict(summary=summary, verdict=verdict(summary), sections=described(context["real"]))
+    return write_text(path, environment.get_template("report.html").render(images=images, **context))

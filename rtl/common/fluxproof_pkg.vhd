@@ -26,6 +26,10 @@ package fluxproof_pkg is
   constant DUTY_ONE : natural := 65536;
   constant TRIG_ONE : natural := 65536;
 
+  -- fluxproof: clocks from the raw sample to the duties, least distance of two samples
+  constant FLUXPROOF_SAMPLE_TO_DUTY : positive := 38;
+  constant FLUXPROOF_SAMPLE_INTERVAL : positive := 44;
+
   -- sqrt: 001, section 5.2: voltage limit of the current regulation
   constant SQRT_LATENCY : positive := 6;
   constant SQRT_DROP_X : natural := 12;
