@@ -67,9 +67,11 @@ class Simulation(threading.Thread):
         except (OSError, ValueError, IndexError):  # not there yet, or just being written
             return 0
 
-    def summary(self) -> dict | None:
+    def summary(self) -> dict:
+        """What the simulation counted; empty where it came to no end."""
         path = self.folder / "summary.json"
-        return json.loads(path.read_text()) if path.exists() else None
+        counted = json.loads(path.read_text()) if path.exists() else {}
+        return {"ghdl_seconds" if k == "seconds" else k: value for k, value in counted.items()}
 
 
 def run_folder(generics: dict) -> Path:
@@ -92,8 +94,7 @@ class Progress:
                 self.began.setdefault(s, (now, done[s]))
         if self.out.isatty():
             columns = os.get_terminal_size(self.out.fileno()).columns
-            line = self.line(done, now, min(20, max(4, (columns - 68) // 2)))
-            print(f"\r{line[: columns - 1]}\x1b[K", end="", file=self.out, flush=True)
+            print(f"\r{self.line(done, now, columns - 1)}\x1b[K", end="", file=self.out, flush=True)
             return
         for s in self.simulations:
             tenth = 10 * done[s] // s.total
@@ -109,15 +110,15 @@ class Progress:
         rate = (done - first) / (now - since) if now > since else 0.0
         return rate, (s.total - done) / rate if rate else 0.0
 
-    def line(self, done: dict[Simulation, int], now: float, width: int) -> str:
-        parts, longest = [], 0.0
+    def line(self, done: dict[Simulation, int], now: float, columns: int) -> str:
+        """All simulations in one line of at most ``columns`` characters."""
+        parts, width = [], min(20, max(4, (columns - 67) // 2))
         for s in self.simulations:
-            rate, left = self.speed(s, done[s], now)
-            longest = max(longest, left)
             bar = "#" * (width * done[s] // s.total)
-            text = f"[{bar:.<{width}}] {done[s]}/{s.total} {rate:.0f}/s" if done[s] else "building"
-            parts.append(f"{s.name} {text}")
-        return "  ".join([*parts, f"{longest:.0f} s left" if longest else ""])
+            text = f"[{bar:.<{width}}] {done[s]}/{s.total} {self.speed(s, done[s], now)[0]:.0f}/s"
+            parts.append(f"{s.name} {text if done[s] else 'building'}")
+        left = max(self.speed(s, done[s], now)[1] for s in self.simulations)
+        return "  ".join([*parts, f"{left:.0f} s left" if left else ""])[:columns]
 
 
 def watch(simulations: list[Simulation], out=sys.stdout, pause: float = 0.5) -> None:
@@ -143,16 +144,14 @@ def collect(loop: Simulation, replay: Simulation | None, recording, skipped: str
     """(summary, figures by name, view of the recording or None) from what the simulations left behind."""
     scenario = fig9(loop.drive)
     run = report.run_view(np.load(loop.folder / "result.npz"), loop.drive, scenario, loop.registers)
-    summary = {**report.counts(loop.summary()), **report.metrics(run)}
-    figures = {name: draw(run) for name, draw in plots.OF_A_RUN.items()}
-    figures["gate_signals"] = plots.gate_signals(report.gate_view(run, len(scenario) - 50))
+    summary = {**loop.summary(), **report.metrics(run)}
+    gates = report.gate_view(run, len(scenario) - 50)
     if replay is None:
-        return {**summary, "recording": {"skipped": skipped}}, figures, None
+        return {**summary, "recording": {"skipped": skipped}}, plots.draw(run, gates), None
     bound = dut_replay.current_bound(recording, replay.drive)
     view = report.recording_view(recording, bound, np.load(replay.folder / "result.npz"), replay.drive)
-    figures["recording"] = plots.recording(view)
-    found = {"rows": replay.total, **report.counts(replay.summary()), **report.recording_metrics(view)}
-    return {**summary, "recording": found}, figures, view
+    found = {"rows": replay.total, **report.recording_metrics(view, replay.summary())}
+    return {**summary, "recording": found}, plots.draw(run, gates, view), view
 
 
 def passed(summary: dict, problems: list[str]) -> bool:
@@ -164,7 +163,7 @@ def passed(summary: dict, problems: list[str]) -> bool:
 def main(argv: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="make demo", description=__doc__.splitlines()[0])
     parser.add_argument("--carrier-half", type=int, default=LOOP_CARRIER, help="clocks in half a PWM period")
-    parser.add_argument("--picture", type=Path, metavar="FILE.png", help="write the README's picture too")
+    parser.add_argument("--picture", type=Path, metavar="FILE.png", help="write the README's picture here")
     options, began = parser.parse_args(argv), time.monotonic()
 
     real = drives.load(DRIVES / "paper001.toml")
@@ -182,7 +181,7 @@ def main(argv: list[str] | None = None) -> int:
     watch(simulations)
     problems = [f"{s.name}: {s.problem}" for s in simulations if s.problem]
     print("\n".join(problems), file=sys.stderr, end="\n" if problems else "")
-    if any(s.summary() is None for s in simulations):
+    if not all(s.summary() for s in simulations):
         return 1
 
     summary, figures, view = collect(loop, replay, recording, skipped)

@@ -98,8 +98,9 @@ MUTANTS = (
     ("integral survives reset", "control/current_pi.vhd", "        integral_q          <= (others => '0');\n", ""),
     ("pipeline survives reset", "modulation/svm.vhd", "        valid(1 to LATENCY) <= (others => '0');\n", "        null;\n"),
     # gates
-    ("dead time one short", "modulation/gate_generation.vhd", "timer(k) <= dead_used - 1;", "timer(k) <= dead_used - 2;"),
-    ("no dead time after enable", "modulation/gate_generation.vhd", "          timer(k) <= dead_used;", "          timer(k) <= (others => '0');"),
+    ("dead time one short", "modulation/gate_generation.vhd", "elsif elapsed(k) < dead_used then", "elsif elapsed(k) + 1 < dead_used then"),
+    ("no dead time after enable", "modulation/gate_generation.vhd", "          elapsed(k) <= (others => '0');", "          elapsed(k) <= (others => '1');"),
+    ("gate off when the dead time grows", "modulation/gate_generation.vhd", "          elapsed(k)   <= (others => '1');\n", ""),
     ("trip not remembered", "modulation/gate_generation.vhd", "tripping <= trip or (tripped_now and not clear_trip);", "tripping <= trip;"),
     ("trip waits for the valley", "modulation/gate_generation.vhd", "on_now   <= running_now and enable and not trip;", "on_now   <= running_now and enable;"),
     ("enable drops at the valley", "modulation/gate_generation.vhd", "on_now   <= running_now and enable and not trip;", "on_now   <= running_now and not trip;"),

@@ -1,12 +1,11 @@
 """The demo's figures: Fig. 9 of paper 001 from the simulation, what lies behind it, and the recording.
 
-Every drawing function takes a view of scripts/report.py, numbers in SI units, and returns a matplotlib figure.
+The drawing functions take the views of scripts/report.py, numbers in SI units.
 Lines carry their names at their ends, so that no legend has to be looked up.
 """
 
 from __future__ import annotations
 
-import functools
 import io
 import os
 from pathlib import Path
@@ -34,21 +33,27 @@ STYLE = {k: v for k, v in mpl.rcParamsDefault.items() if not k.startswith("backe
 }
 
 
-def styled(function):
-    """Run under the one style, whatever the user's matplotlib is set to."""
+def draw(run, gates, rec=None) -> dict[str, Figure]:
+    """Every figure by name, under the one style, whatever the user's matplotlib is set to."""
+    speed, load = run.speed_step, run.load_step
+    with mpl.rc_context(STYLE):
+        figures = {
+            "overview": overview(run),
+            "speed": speeds(run),
+            "currents": currents(run, "Currents, peak"),
+            "at_speed_step": currents(run, "Currents at the speed step", speed - 15, speed + 65),
+            "at_load_step": currents(run, "Currents at the load step", load - 50, load + 350),
+            "voltages": voltages(run),
+            "phase_currents": phases(run, "i", 1.0, "Phase currents as the core sees them, loaded", "A"),
+            "duties": phases(run, "duty", 100.0, "Duties of the three legs, loaded", "%"),
+            "gates": gate_signals(gates),
+        }
+        return figures if rec is None else {**figures, "recording": recording(rec)}
 
-    @functools.wraps(function)
-    def wrapped(*args, **kwargs):
-        with mpl.rc_context(STYLE):
-            return function(*args, **kwargs)
 
-    return wrapped
-
-
-@styled
 def image(figure: Figure, kind: str, **options) -> bytes:
     """The figure as "png" or "svg"; SVG holds its letters as outlines, no font is needed to show it."""
-    with io.BytesIO() as stream:
+    with mpl.rc_context(STYLE), io.BytesIO() as stream:
         figure.savefig(stream, format=kind, **options)
         return stream.getvalue()
 
@@ -68,7 +73,8 @@ def _axes(rows: int = 1, columns: int = 1, size=(WIDTH, HEIGHT), **kwargs):
 
 def _name(axis, x, y, text: str, color: str, dy: int = 0) -> None:
     """A line's name beside its last point, moved up by ``dy`` points."""
-    axis.annotate(text, (x, y), (4, dy), textcoords="offset points", va="center", color=color, annotation_clip=False)
+    at = dict(textcoords="offset points", va="center", annotation_clip=False)
+    axis.annotate(text, (x, y), (4, dy), color=color, **at)
 
 
 def _events(axis, run, names: bool = False) -> None:
@@ -105,16 +111,14 @@ def _current_panel(axis, run, part=slice(None)) -> None:
     axis.set(ylabel="A", xlim=(ms[0], ms[-1]))
 
 
-@styled
-def speed(run) -> Figure:
+def speeds(run) -> Figure:
     figure, axis = _axes()
     _speed_panel(axis, run)
     axis.set(xlabel="time [ms]")
     return figure
 
 
-@styled
-def currents(run, title="Currents, peak", start: int = 0, end: int | None = None) -> Figure:
+def currents(run, title: str, start: int = 0, end: int | None = None) -> Figure:
     """Samples ``start`` to ``end`` of the dq currents."""
     figure, axis = _axes()
     _current_panel(axis, run, slice(start, end))
@@ -122,7 +126,6 @@ def currents(run, title="Currents, peak", start: int = 0, end: int | None = None
     return figure
 
 
-@styled
 def voltages(run) -> Figure:
     """The voltage vector in the stator's plane, and its length over the circle's radius in time."""
     figure, (plane, length) = _axes(1, 2, (WIDTH, 2.9), width_ratios=(1, 1.25))
@@ -138,7 +141,6 @@ def voltages(run) -> Figure:
     return figure
 
 
-@styled
 def phases(run, signal: str, scale: float, title: str, unit: str) -> Figure:
     """A signal of the three phases over the last 32 ms, one and a half electrical turns."""
     figure, axis = _axes()
@@ -167,7 +169,6 @@ def _gate_lines(axis, gates, start: float, end: float) -> None:
     axis.spines["left"].set_visible(False)
 
 
-@styled
 def gate_signals(gates) -> Figure:
     """The gates in one PWM period, and close up where the first leg changes over."""
     figure, (whole, close) = _axes(1, 2, (WIDTH, 3.3), width_ratios=(1.7, 1))
@@ -179,7 +180,6 @@ def gate_signals(gates) -> Figure:
     return figure
 
 
-@styled
 def recording(rec) -> Figure:
     """Speed, current and voltage over the whole recording: logged, and what the core made of the codes."""
     figure, axes = _axes(3, 1, (WIDTH, 5.2), sharex=True)
@@ -192,12 +192,12 @@ def recording(rec) -> Figure:
         axis.plot(rec.row, logged, color=REFERENCE, linewidth=2.4, label="logged")
         axis.plot(rec.row, core, color=color, linewidth=0.8, label=name)
         axis.set(title=title, ylabel=unit)
-        axis.legend(loc="lower right", bbox_to_anchor=(1, 0.98), ncols=2, frameon=False, fontsize=9, borderpad=0)
+        at = dict(loc="lower right", bbox_to_anchor=(1, 0.98), borderpad=0)
+        axis.legend(**at, ncols=2, frameon=False, fontsize=9)
     axes[-1].set(xlabel="row of the log", xlim=(0, rec.row[-1]))
     return figure
 
 
-@styled
 def overview(run) -> Figure:
     """The picture of the README: speed above, currents below."""
     figure, (above, below) = _axes(2, 1, (7.6, 4.6), sharex=True)
@@ -205,15 +205,3 @@ def overview(run) -> Figure:
     _current_panel(below, run)
     below.set(title="Currents, peak", xlabel="time [ms]")
     return figure
-
-
-OF_A_RUN = {
-    "speed": speed,
-    "currents": currents,
-    "at_speed_step": lambda run: currents(run, "Currents at the speed step", run.speed_step - 15, run.speed_step + 65),
-    "at_load_step": lambda run: currents(run, "Currents at the load step", run.load_step - 50, run.load_step + 350),
-    "voltages": voltages,
-    "phase_currents": lambda run: phases(run, "i", 1.0, "Phase currents as the core sees them, loaded", "A"),
-    "duties": lambda run: phases(run, "duty", 100.0, "Duties of the three legs, loaded", "%"),
-    "overview": overview,
-}

@@ -20,6 +20,7 @@ from scripts.scenarios import RPM
 
 TEMPLATES = Path(__file__).resolve().parent / "templates"
 SHOWN = (*("u_max", "u_alpha", "u_beta"), *("i_a", "i_b", "i_c"), *("duty_a", "duty_b", "duty_c"))
+LOGGED = "currents within {current_error_a:.2f} A of the log, formats allow {current_bound_a:.2f} A"
 LEG_A = 0b001001  # its two gates in a gate word
 SETTLED = 100  # samples before the next event (10 ms) that count as settled
 
@@ -98,7 +99,7 @@ def _tracking(error: np.ndarray, ends: dict[str, int]) -> dict[str, float]:
 
 
 def dead_times(edges: np.ndarray, carrier_half: int) -> tuple[int, int]:
-    """(times that both gates of a leg were on, shortest time [clocks] with both off); rows: period, clock, word."""
+    """(how often both gates of a leg were on, shortest time [clocks] with both off)."""
     clock = edges[:, 0] * 2 * carrier_half + edges[:, 1]
     both_on, shortest = 0, np.iinfo(np.int64).max
     for leg in range(3):
@@ -111,7 +112,7 @@ def dead_times(edges: np.ndarray, carrier_half: int) -> tuple[int, int]:
 
 
 def gate_view(run: SimpleNamespace, period: int) -> SimpleNamespace:
-    """The gates of one PWM period, times in us from its start; ``dead_us``: (off, on) of leg a's first dead time."""
+    """The gates of one PWM period, times in us from its start; ``dead_us``: leg a's first dead time."""
     inside = np.flatnonzero(run.edges[:, 0] == period)
     us = np.append(0.0, run.edges[inside, 1] * run.period_us / (2 * run.carrier_half))
     words = run.edges[np.append(inside[0] - 1, inside), 2]  # the word in force before the first edge leads
@@ -142,17 +143,10 @@ def recording_view(recording, bound, observed, drive: Drive) -> SimpleNamespace:
     )
 
 
-def recording_metrics(view: SimpleNamespace) -> dict:
-    """The core's current vector against the log [A], worst over all rows, and the bound from the formats."""
-    return {
-        "current_error_a": _rounded(view.current_error.max()),
-        "current_bound_a": _rounded(view.current_bound.max()),
-    }
-
-
-def counts(summary: dict) -> dict:
-    """A simulation's own summary under the demo's names."""
-    return {**{k: v for k, v in summary.items() if k != "seconds"}, "ghdl_seconds": summary["seconds"]}
+def recording_metrics(view: SimpleNamespace, result: dict) -> dict:
+    """The replay's counts, and the core's current vector against the log [A], worst row, with its bound."""
+    errors = {f"current_{k}_a": _rounded(getattr(view, f"current_{k}").max()) for k in ("error", "bound")}
+    return {"samples_compared": result["periods_compared"], **result, **errors}
 
 
 def verdict(summary: dict) -> str:
@@ -173,17 +167,15 @@ def text(summary: dict, drive: Drive) -> str:
     """The result for the terminal: verdict and the numbers that matter most."""
     s, rec, ns = summary, summary["recording"], summary["sample_to_duty_clocks"] / drive.core.clock_hz * 1e9
     speed, i_d, i_q = s["speed_error_rpm"], s["i_d_tracking_a"], s["i_q_tracking_a"]
-    logged = f"skipped: {rec['skipped']}" if "skipped" in rec else (
-        f"currents within {rec['current_error_a']:.2f} A of the log, formats allow {rec['current_bound_a']:.2f} A"
-    )
+    logged = "skipped: {skipped}" if "skipped" in rec else LOGGED
     return f"""{verdict(s)}
   sample to duties  {s["sample_to_duty_clocks"]} clocks, {ns:.0f} ns at {drive.core.clock_hz / 1e6:g} MHz
   speed             error {speed["before_load_step"]:.1f} rpm at 732 rpm, {speed["at_end"]:.1f} rpm under load
   load step         dip {s["speed_dip_rpm"]:.0f} rpm, lowest after {s["speed_dip_after_ms"]:.0f} ms
-  currents          i_d {i_d["rms"]:.3f} A rms from 0, i_q {i_q["settled_rms"]:.3f} A rms from its settled reference
+  currents          i_d {i_d["rms"]:.3f} A rms from 0, i_q settled {i_q["settled_rms"]:.3f} A rms from its reference
   peak current      {s["peak_current_a"]:.2f} A of {drive.current_limit_a:g} A
   gates             {s["gate_edges"]:,} edges, shortest dead time {s["shortest_dead_time_us"]:g} µs
-  recording         {logged}
+  recording         {logged.format(**rec)}
   time              {s["wall_time_s"]:.0f} s, GHDL {s["ghdl_seconds"]:.0f} s for Fig. 9"""
 
 

@@ -4,7 +4,8 @@ The carrier counts 0 .. CARRIER_HALF-1 and back, each value once a direction: 2*
 A leg wants to be high while carrier >= CARRIER_HALF - compare, for 2*compare clocks around the peak.
 Compare values, dead time and minimum pulse are taken over at the valley only, when carrier is 0 again.
 
-* Dead time: when a leg changes its mind both gates go off, the other one on ``dead_time`` clocks later.
+* Dead time: when a leg changes its mind both gates go off, the other one on ``dead_time`` clocks later; a new
+  setting counts for a dead time that has begun.
 * ``dead_time`` = 0 or >= ``min_pulse``, or ``min_pulse`` above half a period, contradict each other: the
   setting is refused (``setting_refused``), the last good one stays, and before the first good one the
   gates stay off.
@@ -38,21 +39,24 @@ class State(NamedTuple):
     level_a: int = 0
     level_b: int = 0
     level_c: int = 0
-    timer_a: int = 0
-    timer_b: int = 0
-    timer_c: int = 0
+    elapsed_a: int = 0
+    elapsed_b: int = 0
+    elapsed_c: int = 0
+
+
+SETTLED = CLOCKS.hi  # elapsed of a gate that is on: a longer dead time must not turn it off again
 
 
 @kernel
-def leg(wanted, level, timer, dead_time, on):
-    """One leg: (level, timer, high gate, low gate) of the next clock."""
+def leg(wanted, level, elapsed, dead_time, on):
+    """One leg: (level, clocks that both gates have been off, high gate, low gate) of the next clock."""
     if not on:
-        return 0, dead_time, 0, 0
+        return 0, 0, 0, 0
     if wanted != level:
-        return wanted, dead_time - 1, 0, 0
-    if timer > 0:
-        return level, timer - 1, 0, 0
-    return level, 0, level, 1 - level
+        return wanted, 1, 0, 0
+    if elapsed < dead_time:
+        return level, elapsed + 1, 0, 0
+    return level, SETTLED, level, 1 - level
 
 
 @kernel
@@ -73,9 +77,9 @@ def step(
     wanted_a = 1 if s.carrier >= carrier_half - s.compare_a else 0
     wanted_b = 1 if s.carrier >= carrier_half - s.compare_b else 0
     wanted_c = 1 if s.carrier >= carrier_half - s.compare_c else 0
-    level_a, timer_a, high_a, low_a = leg(wanted_a, s.level_a, s.timer_a, s.dead_time, on)
-    level_b, timer_b, high_b, low_b = leg(wanted_b, s.level_b, s.timer_b, s.dead_time, on)
-    level_c, timer_c, high_c, low_c = leg(wanted_c, s.level_c, s.timer_c, s.dead_time, on)
+    level_a, elapsed_a, high_a, low_a = leg(wanted_a, s.level_a, s.elapsed_a, s.dead_time, on)
+    level_b, elapsed_b, high_b, low_b = leg(wanted_b, s.level_b, s.elapsed_b, s.dead_time, on)
+    level_c, elapsed_c, high_c, low_c = leg(wanted_c, s.level_c, s.elapsed_c, s.dead_time, on)
 
     running, configured = on, s.configured
     if valley:
@@ -96,9 +100,9 @@ def step(
         level_a,
         level_b,
         level_c,
-        timer_a,
-        timer_b,
-        timer_c,
+        elapsed_a,
+        elapsed_b,
+        elapsed_c,
     )
     gate_high = high_a + 2 * high_b + 4 * high_c
     gate_low = low_a + 2 * low_b + 4 * low_c

@@ -2,7 +2,8 @@
 -- The carrier counts 0 .. CARRIER_HALF-1 and back, each value once a direction.  A leg wants to be high while
 -- carrier >= CARRIER_HALF - compare.  Compare values, dead time and minimum pulse are taken over at the valley
 -- only, when carrier is 0 again; sample marks the middle of the zero vector as the gates show it.
--- Dead time: a leg that changes its mind turns both gates off, the other one on dead_time clocks later.
+-- Dead time: a leg that changes its mind turns both gates off, the other one on dead_time clocks later; a new
+-- setting counts for a dead time that has begun.
 -- A dead time that is zero or not below min_pulse, or a min_pulse above half a period, is refused: the last good
 -- setting stays, and before the first good one the gates stay off.
 -- enable switches on at the valley and off at once; trip switches off at once and is remembered until clear_trip.
@@ -42,7 +43,7 @@ end entity gate_generation;
 
 architecture rtl of gate_generation is
   type compare_t is array (0 to 2) of unsigned(15 downto 0);
-  type timer_t is array (0 to 2) of unsigned(11 downto 0);
+  type elapsed_t is array (0 to 2) of unsigned(11 downto 0);
 
   -- State
   signal count       : unsigned(15 downto 0);
@@ -54,7 +55,7 @@ architecture rtl of gate_generation is
   signal running_now : std_logic;
   signal tripped_now : std_logic;
   signal level       : unsigned(2 downto 0);
-  signal timer       : timer_t;
+  signal elapsed     : elapsed_t;
 
   signal valley   : std_logic;
   signal good     : std_logic;
@@ -107,19 +108,21 @@ begin
       end if;
       setting_refused <= not good;
 
-      -- Legs: both gates off from the change of mind until the timer has run out
+      -- Legs: both gates off from the change of mind for the dead time; a gate that is on stays on when the dead
+      -- time grows, hence the largest count
       for k in 0 to 2 loop
         gate_high(k) <= '0';
         gate_low(k)  <= '0';
         if on_now = '0' then
-          level(k) <= '0';
-          timer(k) <= dead_used;
+          level(k)   <= '0';
+          elapsed(k) <= (others => '0');
         elsif wanted(k) /= level(k) then
-          level(k) <= wanted(k);
-          timer(k) <= dead_used - 1;
-        elsif timer(k) > 0 then
-          timer(k) <= timer(k) - 1;
+          level(k)   <= wanted(k);
+          elapsed(k) <= to_unsigned(1, 12);
+        elsif elapsed(k) < dead_used then
+          elapsed(k) <= elapsed(k) + 1;
         else
+          elapsed(k)   <= (others => '1');
           gate_high(k) <= level(k);
           gate_low(k)  <= not level(k);
         end if;
@@ -135,7 +138,7 @@ begin
         running_now     <= '0';
         tripped_now     <= '0';
         level           <= (others => '0');
-        timer           <= (others => (others => '0'));
+        elapsed         <= (others => (others => '0'));
         gate_high       <= (others => '0');
         gate_low        <= (others => '0');
         sample          <= '0';
