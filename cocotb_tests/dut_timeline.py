@@ -8,11 +8,10 @@ import re
 from pathlib import Path
 
 import cocotb
-from cocotb.clock import Clock
 from cocotb.triggers import FallingEdge
 
 from cocotb_tests.dut_bench import read
-from cocotb_tests.ghdl_device import CLOCK_NS
+from cocotb_tests.ghdl_device import prepare
 from golden_model import drive as drives
 from golden_model.registers import registers
 
@@ -28,27 +27,7 @@ def instances(top: Path) -> dict[str, str]:
 async def timeline(dut):
     labels = instances(Path(os.environ["FLUXPROOF_TOP"]))
     drive = drives.with_carrier(drives.load(os.environ["FLUXPROOF_DRIVE"]), 128)
-    for name, value in registers(drive).values._asdict().items():
-        getattr(dut, name).value = int(value)
-    for name in (
-        "sample_valid",
-        "enable",
-        "trip",
-        "clear_trip",
-        "adc_a",
-        "adc_b",
-        "adc_c",
-        "adc_u_dc",
-        "position_code",
-    ):
-        getattr(dut, name).value = 0
-    for name in ("omega_ref_in", "i_d_ref_in", "i_q_ext_in", "speed_mode_in"):
-        getattr(dut, name).value = 0
-    dut.rst.value = 1
-    Clock(dut.clk, CLOCK_NS, unit="ns").start()
-    for _ in range(4):
-        await FallingEdge(dut.clk)
-    dut.rst.value = 0
+    await prepare(dut, registers(drive).values)
     await FallingEdge(dut.clk)
     strobes = {label: getattr(dut, label) for label in labels}
     strobes = {label: (h.in_valid, h.out_valid) for label, h in strobes.items() if hasattr(h, "in_valid")}

@@ -10,6 +10,7 @@ from cocotb.utils import get_sim_time
 
 from cocotb_tests.dut_bench import read
 from golden_model.fluxproof import OBSERVED, Observed
+from golden_model.io import sample_latch
 from scripts.cosim import SAMPLE_DELAY, Period
 
 CLOCK_NS = 10
@@ -18,6 +19,18 @@ CLOCK_NS = 10
 def now() -> int:
     """Rising edges since the start of the clock; exact, the clock's period is a whole number of nanoseconds."""
     return int(get_sim_time("ns")) // CLOCK_NS
+
+
+async def prepare(dut, registers, enable: int = 0) -> None:
+    """Registers set, all other inputs zero, clock started, four clocks of reset; ends at a falling edge."""
+    inputs = {p.name: 0 for p in sample_latch.BLOCK.inputs if p.name != "run_in"}
+    inputs |= {"sample_valid": 0, "trip": 0, "clear_trip": 0, "enable": enable, "rst": 1}
+    for name, value in {**registers._asdict(), **inputs}.items():
+        getattr(dut, name).value = int(value)
+    Clock(dut.clk, CLOCK_NS, unit="ns").start()
+    for _ in range(4):
+        await FallingEdge(dut.clk)
+    dut.rst.value = 0
 
 
 class GhdlDevice:
@@ -43,28 +56,7 @@ class GhdlDevice:
                 self.edges.append((clock, word))
 
     async def start(self, registers, enable: int) -> Period:
-        dut = self.dut
-        for name, value in registers._asdict().items():
-            getattr(dut, name).value = int(value)
-        for name in (
-            "sample_valid",
-            "trip",
-            "clear_trip",
-            "adc_a",
-            "adc_b",
-            "adc_c",
-            "adc_u_dc",
-            "position_code",
-        ):
-            getattr(dut, name).value = 0
-        for name in ("omega_ref_in", "i_d_ref_in", "i_q_ext_in", "speed_mode_in"):
-            getattr(dut, name).value = 0
-        dut.enable.value = enable
-        dut.rst.value = 1
-        Clock(dut.clk, CLOCK_NS, unit="ns").start()
-        for _ in range(4):
-            await FallingEdge(dut.clk)
-        dut.rst.value = 0
+        await prepare(self.dut, registers, enable)
         cocotb.start_soon(self._watch_gates())
         self.start_clock = now()
         return await self._finish(None, 0, 0)

@@ -53,6 +53,10 @@ class Format:
         scaled = int((value / self.lsb + 0.5) // 1)
         return max(self.lo, min(self.hi, scaled))
 
+    def limit(self, value: float) -> float:
+        """``value`` limited to the range of the format: what saturation does to the exact number."""
+        return max(self.lo * self.lsb, min(self.hi * self.lsb, value))
+
     def __str__(self) -> str:
         return f"{'S' if self.signed else 'U'}({self.int_bits},{self.frac_bits})"
 

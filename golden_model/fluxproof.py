@@ -20,27 +20,6 @@ from golden_model.kernel import kernel
 from golden_model.modulation import gate_generation, pwm_compare, svm, svm_delay_compensation
 from golden_model.transforms import clarke, inverse_park, park, sincos
 
-MODULES = (
-    current_conditioning,
-    position,
-    speed,
-    u_dc_conditioning,
-    u_dc_processing,
-    clarke,
-    sincos,
-    park,
-    speed_pi,
-    current_pi,
-    current_model,
-    decoupling,
-    voltage_limit,
-    svm_delay_compensation,
-    inverse_park,
-    svm,
-    pwm_compare,
-    gate_generation,
-)
-
 # Instance of the top -> (its block, the instances it waits for).  Blocks start when the last of these is done.
 WIRING = {
     "latch": (sample_latch, ()),
@@ -63,6 +42,9 @@ WIRING = {
     "modulator": (svm, ("stator_voltage", "bus_reciprocal")),
     "compare": (pwm_compare, ("modulator",)),
 }
+
+
+MODULES = (*dict.fromkeys(module for module, _ in WIRING.values()), gate_generation)
 
 
 def schedule() -> dict[str, tuple[int, int]]:

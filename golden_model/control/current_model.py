@@ -24,7 +24,7 @@ def step(i_d, i_q, l_d, l_q, lambda_mg):
 
 def reference(v, _state):
     lambda_d, lambda_q = v["l_d"] * v["i_d"] + v["lambda_mg"], v["l_q"] * v["i_q"]
-    return {k: min(max(x, -2.0), PU.hi * PU.lsb) for k, x in (("lambda_d", lambda_d), ("lambda_q", lambda_q))}
+    return {k: PU.limit(x) for k, x in (("lambda_d", lambda_d), ("lambda_q", lambda_q))}
 
 
 def bound(_v, _state):

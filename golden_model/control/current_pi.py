@@ -59,13 +59,13 @@ def step(state, i_d, i_q, i_d_ref, i_q_ref, sat_d, sat_q, run, kp_d, ki_d, kp_q,
 def reference(v, state):
     out = {}
     for x, old in (("d", state.integral_d), ("q", state.integral_q)):
-        err = min(max(v[f"i_{x}_ref"] - v[f"i_{x}"], -2.0), PU.hi * PU.lsb)
+        err = PU.limit(v[f"i_{x}_ref"] - v[f"i_{x}"])
         held = v[f"sat_{x}"] * err > 0
         integral = old * INTEGRAL.lsb + (0.0 if held else v[f"ki_{x}"] * err)
-        integral = min(max(integral, -2.0), INTEGRAL.hi * INTEGRAL.lsb)
+        integral = INTEGRAL.limit(integral)
         total = v[f"kp_{x}"] * err + integral
         out[f"u_int_{x}"] = integral if v["run"] else 0.0
-        out[f"u_pi_{x}"] = min(max(total, -2.0), PU.hi * PU.lsb) if v["run"] else 0.0
+        out[f"u_pi_{x}"] = PU.limit(total) if v["run"] else 0.0
     return out
 
 

@@ -24,7 +24,7 @@ def step(omega_me, lambda_d, lambda_q):
 
 def reference(v, _state):
     u_d, u_q = -v["omega_me"] * v["lambda_q"], v["omega_me"] * v["lambda_d"]
-    return {k: min(max(x, -2.0), PU.hi * PU.lsb) for k, x in (("u_dec_d", u_d), ("u_dec_q", u_q))}
+    return {k: PU.limit(x) for k, x in (("u_dec_d", u_d), ("u_dec_q", u_q))}
 
 
 def bound(_v, _state):

@@ -56,7 +56,7 @@ def step(state, omega_ref, omega_me, i_q_ext, speed_mode, run, speed_kp, speed_k
 def reference(v, state):
     if not v["run"]:
         return {"i_q_ref": 0.0}
-    err = min(max(v["omega_ref"] - v["omega_me"], -2.0), PU.hi * PU.lsb)
+    err = PU.limit(v["omega_ref"] - v["omega_me"])
     asked = v["speed_kp"] * err + state.integral * INTEGRAL.lsb if v["speed_mode"] else v["i_q_ext"]
     return {"i_q_ref": min(max(asked, -v["i_max"]), v["i_max"])}
 

@@ -39,10 +39,7 @@ def step(code_a, code_b, code_c, offset_a, offset_b, offset_c, gain_a, gain_b, g
 
 
 def reference(v, _state):
-    return {
-        f"i_{x}": min(max((v[f"code_{x}"] - v[f"offset_{x}"]) * v[f"gain_{x}"], -2.0), PU.hi * PU.lsb)
-        for x in "abc"
-    }
+    return {f"i_{x}": PU.limit((v[f"code_{x}"] - v[f"offset_{x}"]) * v[f"gain_{x}"]) for x in "abc"}
 
 
 def bound(_v, _state):

@@ -48,7 +48,7 @@ def step(state, code_theta, reverse, k_speed, k_filter, position_bits):
 def reference(v, state):
     mech = -v["code_theta"] if v["reverse"] else v["code_theta"]
     delta = (mech - state.code / 2**TURN_W + 0.5) % 1.0 - 0.5 if state.seen else 0.0
-    raw = min(max(v["k_speed"] * delta, -2.0), PU.hi * PU.lsb)
+    raw = PU.limit(v["k_speed"] * delta)
     old = state.omega * INTEGRAL.lsb
     return {"omega_me": old + v["k_filter"] * (raw - old)}
 

@@ -31,8 +31,8 @@ def step(code_u_dc, u_dc_offset, u_dc_gain, k_u_max, adc_bits):
 
 
 def reference(v, _state):
-    u_dc = min(max(v["u_dc_gain"] * (v["code_u_dc"] - v["u_dc_offset"]), 0.0), U_DC.hi * U_DC.lsb)
-    return {"u_dc": u_dc, "u_max": min(v["k_u_max"] * u_dc, U_MAX.hi * U_MAX.lsb)}
+    u_dc = U_DC.limit(v["u_dc_gain"] * (v["code_u_dc"] - v["u_dc_offset"]))
+    return {"u_dc": u_dc, "u_max": U_MAX.limit(v["k_u_max"] * u_dc)}
 
 
 def bound(v, _state):

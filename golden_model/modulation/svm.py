@@ -53,7 +53,7 @@ def step(u_alpha, u_beta, m, m_beta, n):
 def reference(v, _state):
     x = v["u_alpha"] * v["m"] * 2.0 ** v["n"]
     y = v["u_beta"] * v["m_beta"] * 2.0 ** v["n"]
-    x, y = (min(max(z, -2.0), SCALED.hi * SCALED.lsb) for z in (x, y))
+    x, y = (SCALED.limit(z) for z in (x, y))
     legs = (x, y - x / 2, -y - x / 2)
     zero = -(max(legs) + min(legs)) / 2
     return {f"duty_{k}": min(max(0.5 + leg + zero, 0.0), 1.0) for k, leg in zip("abc", legs, strict=True)}

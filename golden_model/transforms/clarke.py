@@ -33,7 +33,7 @@ def step(i_a, i_b, i_c):
 def reference(v, _state):
     alpha = (2 * v["i_a"] - v["i_b"] - v["i_c"]) / 3
     beta = (v["i_b"] - v["i_c"]) / math.sqrt(3)
-    return {"i_alpha": min(max(alpha, -2.0), PU.hi * PU.lsb), "i_beta": min(max(beta, -2.0), PU.hi * PU.lsb)}
+    return {"i_alpha": PU.limit(alpha), "i_beta": PU.limit(beta)}
 
 
 def bound(v, _state):

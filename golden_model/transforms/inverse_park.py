@@ -20,8 +20,8 @@ def step(u_d, u_q, cos_theta, sin_theta):
 def reference(v, _state):
     c, s = v["cos_theta"], v["sin_theta"]
     return {
-        "u_alpha": rotate.limited(v["u_d"] * c - v["u_q"] * s),
-        "u_beta": rotate.limited(v["u_d"] * s + v["u_q"] * c),
+        "u_alpha": PU.limit(v["u_d"] * c - v["u_q"] * s),
+        "u_beta": PU.limit(v["u_d"] * s + v["u_q"] * c),
     }
 
 

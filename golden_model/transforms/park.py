@@ -20,8 +20,8 @@ def step(i_alpha, i_beta, cos_theta, sin_theta):
 def reference(v, _state):
     c, s = v["cos_theta"], v["sin_theta"]
     return {
-        "i_d": rotate.limited(v["i_alpha"] * c + v["i_beta"] * s),
-        "i_q": rotate.limited(v["i_beta"] * c - v["i_alpha"] * s),
+        "i_d": PU.limit(v["i_alpha"] * c + v["i_beta"] * s),
+        "i_q": PU.limit(v["i_beta"] * c - v["i_alpha"] * s),
     }
 
 

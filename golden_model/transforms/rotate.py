@@ -25,13 +25,9 @@ def step(x, y, cos_theta, sin_theta):
     return round_sat(sum_x, DROP, PU_W), round_sat(sum_y, DROP, PU_W)
 
 
-def limited(value):
-    return min(max(value, -2.0), PU.hi * PU.lsb)
-
-
 def reference(v, _state):
     c, s = v["cos_theta"], v["sin_theta"]
-    return {"out_x": limited(v["x"] * c - v["y"] * s), "out_y": limited(v["x"] * s + v["y"] * c)}
+    return {"out_x": PU.limit(v["x"] * c - v["y"] * s), "out_y": PU.limit(v["x"] * s + v["y"] * c)}
 
 
 def bound(_v, _state):
