@@ -29,8 +29,10 @@ from golden_model.units import from_si
 from plant import sensor_params
 from plant.sensors import current_code, position_code, u_dc_code
 from scripts.cosim import GoldenGates, Result, build_plant, compare_period
+from scripts.files import ROOT
 from scripts.scenarios import RPM
 
+FILE = "emrax228/coastdown_run.csv"
 PHASE_SHIFT = 2.0 * np.pi / 3.0
 COLUMNS = {
     "t": "t_s",
@@ -59,6 +61,13 @@ class Recording(NamedTuple):
     def omega_me(self, pole_pairs: int) -> np.ndarray:
         """Electrical speed [rad/s], negative is forward as in the log."""
         return self.rpm * RPM * pole_pairs
+
+
+def recording_path() -> tuple[Path, str | None]:
+    """Where the recording should be, and why it is skipped, if it is."""
+    folder = Path(os.environ.get("FLUXPROOF_RECORDINGS", "../shared/recordings"))
+    path = (ROOT / folder / FILE).resolve()
+    return path, None if path.exists() else f"{FILE} is not there; FLUXPROOF_RECORDINGS names its folder"
 
 
 def load_recording(path: Path | str) -> Recording:

@@ -14,17 +14,22 @@ ROOT = Path(__file__).resolve().parent.parent
 RTL = ROOT / "rtl"
 
 
+def run_folder(toplevel: str, generics: dict, rtl: Path = RTL, key: str = "") -> Path:
+    """Where ``run`` works and leaves its files; different for whatever may run at the same time."""
+    tag = hashlib.sha256(repr((str(rtl), sorted(generics.items()), key)).encode()).hexdigest()[:8]
+    return ROOT / "build" / "sim" / f"{toplevel}-{tag}"
+
+
 def run(
-    toplevel: str, module: str, generics: dict, environment: dict, rtl: Path = RTL, extra=(), key=""
+    toplevel: str, module: str, generics: dict, environment: dict, rtl: Path = RTL, key: str = ""
 ) -> Path:
     """Simulate ``toplevel`` under cocotb module ``module``; returns the folder of the run, see failure().
 
-    ``rtl`` may be another tree (a mutant's), ``extra`` more VHDL files.  Raises SystemExit or
+    ``rtl`` may be another tree (a mutant's).  Raises SystemExit or
     subprocess.CalledProcessError where the VHDL does not build.
     """
-    sources = sorted(rtl.rglob("*.vhd")) + list(extra)
-    tag = hashlib.sha256(repr((str(rtl), sorted(generics.items()), key)).encode()).hexdigest()[:8]
-    folder = ROOT / "build" / "sim" / f"{toplevel}-{tag}"
+    sources = sorted(rtl.rglob("*.vhd"))
+    folder = run_folder(toplevel, generics, rtl, key)
     (folder / "results.xml").unlink(missing_ok=True)
     runner = get_runner("ghdl")
     runner.build(

@@ -7,7 +7,6 @@ the figures and report.html.  Exit status: 0 equal in every bit, 1 where anythin
 from __future__ import annotations
 
 import argparse
-import hashlib
 import json
 import os
 import subprocess
@@ -25,12 +24,9 @@ from scripts import plots, report
 from scripts.files import BUILD, ROOT, write_json
 from scripts.scenarios import fig9
 
-DEMO = BUILD / "demo"
-DRIVES = ROOT / "docs" / "drives"
-RECORDING = "emrax228/coastdown_run.csv"
+DEMO, DRIVES = BUILD / "demo", ROOT / "docs" / "drives"
 LOOP_CARRIER, REPLAY_CARRIER = 1000, 100  # clocks in half a PWM period: GHDL pays by the clock
 LEAST_PERIODS = 2000
-INTERRUPTED = 130  # exit status, as the shell has it
 
 
 class Simulation(threading.Thread):
@@ -38,25 +34,22 @@ class Simulation(threading.Thread):
 
     def __init__(self, name, drive_file: str, carrier_half: int, module: str, total: int, **environment: str):
         super().__init__(name=name, daemon=True)
-        self.drive_file, self.module, self.total = drive_file, module, total
+        self.drive_file, self.module, self.total = drive_file, f"cocotb_tests.{module}", total
         self.drive = drives.with_carrier(drives.load(DRIVES / drive_file), carrier_half)
         self.registers = registers(self.drive)
         self.generics = {key.upper(): value for key, value in self.registers.config._asdict().items()}
-        self.environment = {
-            "FLUXPROOF_DRIVE": str(DRIVES / drive_file),
-            "FLUXPROOF_CARRIER_HALF": str(carrier_half),
-            **environment,
-        }
-        self.folder = run_folder(self.generics)
+        self.environment = environment | {"FLUXPROOF_DRIVE": str(DRIVES / drive_file)}
+        self.environment["FLUXPROOF_CARRIER_HALF"] = str(carrier_half)
+        self.folder = simulate.run_folder("fluxproof", self.generics, key="demo")
         self.problem: str | None = None
 
     def run(self) -> None:
         for name in ("progress", "result.npz", "summary.json"):  # nothing old may pass for new
             (self.folder / name).unlink(missing_ok=True)
-        module = f"cocotb_tests.{self.module}"
         try:
-            simulate.run("fluxproof", module, self.generics, self.environment, key="demo")
-            self.problem = simulate.failure(self.folder) or (None if self.summary() else "no result")
+            simulate.run("fluxproof", self.module, self.generics, self.environment, key="demo")
+            problem = simulate.failure(self.folder) or ("" if self.summary() else "no result")
+            self.problem = problem.partition("\n")[0] or None
         except (SystemExit, subprocess.CalledProcessError) as error:  # no GHDL, or VHDL that does not build
             self.problem = f"{error}; see {self.folder.relative_to(ROOT)}/build.log"
 
@@ -72,12 +65,6 @@ class Simulation(threading.Thread):
         path = self.folder / "summary.json"
         counted = json.loads(path.read_text()) if path.exists() else {}
         return {"ghdl_seconds" if k == "seconds" else k: value for k, value in counted.items()}
-
-
-def run_folder(generics: dict) -> Path:
-    """The folder that simulate.run will use (a test holds the two together); to watch it from outside."""
-    tag = hashlib.sha256(repr((str(simulate.RTL), sorted(generics.items()), "demo")).encode()).hexdigest()[:8]
-    return BUILD / "sim" / f"fluxproof-{tag}"
 
 
 class Progress:
@@ -133,11 +120,18 @@ def watch(simulations: list[Simulation], out=sys.stdout, pause: float = 0.5) -> 
         print(file=out)
 
 
-def recording_path() -> tuple[Path, str | None]:
-    """Where the recording should be, and why it is skipped, if it is."""
-    folder = Path(os.environ.get("FLUXPROOF_RECORDINGS", "../shared/recordings"))
-    path = (ROOT / folder / RECORDING).resolve()
-    return path, None if path.exists() else f"{RECORDING} is not there; FLUXPROOF_RECORDINGS names its folder"
+def prepare(carrier_half: int):
+    """(closed loop, replay, recording, why it is skipped); the last three may be None."""
+    total = len(fig9(drives.load(DRIVES / "paper001.toml")))
+    what = {"FLUXPROOF_SCENARIO": "fig9"}
+    loop = Simulation("Fig. 9", "paper001.toml", carrier_half, "dut_loop", total, **what)
+    path, skipped = dut_replay.recording_path()
+    if skipped:
+        return loop, None, None, skipped
+    recording, what = dut_replay.load_recording(path), {"FLUXPROOF_RECORDING": str(path)}
+    total = len(recording.t)
+    replay = Simulation("recording", "emrax228.toml", REPLAY_CARRIER, "dut_replay", total, **what)
+    return loop, replay, recording, None
 
 
 def collect(loop: Simulation, replay: Simulation | None, recording, skipped: str | None):
@@ -166,21 +160,15 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--picture", type=Path, metavar="FILE.png", help="write the README's picture here")
     options, began = parser.parse_args(argv), time.monotonic()
 
-    real = drives.load(DRIVES / "paper001.toml")
-    what, carrier = {"FLUXPROOF_SCENARIO": "fig9"}, options.carrier_half
-    loop = Simulation("Fig. 9", "paper001.toml", carrier, "dut_loop", len(fig9(real)), **what)
-    replay, recording, (path, skipped) = None, None, recording_path()
-    if skipped:
-        print(f"recording skipped: {skipped}")
-    else:
-        recording, what = dut_replay.load_recording(path), {"FLUXPROOF_RECORDING": str(path)}
-        rows = len(recording.t)
-        replay = Simulation("recording", "emrax228.toml", REPLAY_CARRIER, "dut_replay", rows, **what)
-    simulations = [loop] if skipped else [loop, replay]
-    print("VHDL in GHDL, golden model beside it, compared in every bit of every control period", flush=True)
+    for old in DEMO.glob("*.*"):  # a run that fails leaves nothing that looks like a result
+        old.unlink()
+    loop, replay, recording, skipped = prepare(options.carrier_half)
+    simulations = [s for s in (loop, replay) if s]
+    print("VHDL in GHDL, golden model beside it, compared in every bit of every control period")
+    print(f"recording skipped: {skipped}" if skipped else f"recording: {replay.total} rows", flush=True)
     watch(simulations)
     problems = [f"{s.name}: {s.problem}" for s in simulations if s.problem]
-    print("\n".join(problems), file=sys.stderr, end="\n" if problems else "")
+    sys.stderr.writelines(f"{problem}\n" for problem in problems)
     if not all(s.summary() for s in simulations):
         return 1
 
@@ -190,7 +178,7 @@ def main(argv: list[str] | None = None) -> int:
     if options.picture:
         plots.write_png(figures["overview"], options.picture)
     summary["wall_time_s"] = round(time.monotonic() - began, 1)
-    good = passed(summary, problems)
+    good, real = passed(summary, problems), drives.load(DRIVES / loop.drive_file)
     context = dict(good=good, problems=problems, loop=loop, replay=replay, view=view, real=real)
     page = report.write(DEMO / "report.html", figures, summary, **context)
     write_json(DEMO / "summary.json", summary)
@@ -202,4 +190,4 @@ if __name__ == "__main__":
     try:
         sys.exit(main())
     except KeyboardInterrupt:
-        sys.exit(INTERRUPTED)
+        sys.exit(130)  # as the shell has it

@@ -32,7 +32,6 @@ def run_view(arrays, drive: Drive, scenario: Scenario, register_set) -> SimpleNa
         return to_si(name, arrays[f"observed_{name}"], drive)
 
     omega_ref = to_si("omega_ref", scenario.omega_ref, drive)
-    edges = arrays["gate_edges"]
     return SimpleNamespace(
         ms=np.arange(len(scenario)) * drive.sample_time_s * 1e3,
         rpm_ref=omega_ref / (RPM * drive.machine.pole_pairs),
@@ -46,7 +45,7 @@ def run_view(arrays, drive: Drive, scenario: Scenario, register_set) -> SimpleNa
         **{name: observed(name) for name in SHOWN},
         speed_step=int(np.flatnonzero(np.diff(scenario.omega_ref))[-1]) + 1,
         load_step=int(np.flatnonzero(np.diff(scenario.load))[0]) + 1,
-        edges=edges,
+        edges=arrays["gate_edges"],
         carrier_half=register_set.config.carrier_half,
         period_us=drive.sample_time_s * 1e6,
     )
@@ -107,7 +106,7 @@ def dead_times(edges: np.ndarray, carrier_half: int) -> tuple[int, int]:
         starts = np.flatnonzero(np.diff(state, prepend=-1))
         both_on += int((state[starts] == 3).sum())
         off = np.diff(clock[starts])[state[starts][:-1] == 0]
-        shortest = min(shortest, int(off.min()))
+        shortest = int(np.min(off, initial=shortest))
     return both_on, shortest
 
 
@@ -160,7 +159,7 @@ def verdict(summary: dict) -> str:
 
 
 def _count(differences: int) -> str:
-    return f"{differences} difference{'' if differences == 1 else 's'}"
+    return f"{differences:,} difference{'' if differences == 1 else 's'}"
 
 
 def text(summary: dict, drive: Drive) -> str:
@@ -172,7 +171,7 @@ def text(summary: dict, drive: Drive) -> str:
   sample to duties  {s["sample_to_duty_clocks"]} clocks, {ns:.0f} ns at {drive.core.clock_hz / 1e6:g} MHz
   speed             error {speed["before_load_step"]:.1f} rpm at 732 rpm, {speed["at_end"]:.1f} rpm under load
   load step         dip {s["speed_dip_rpm"]:.0f} rpm, lowest after {s["speed_dip_after_ms"]:.0f} ms
-  currents          i_d {i_d["rms"]:.3f} A rms from 0, i_q settled {i_q["settled_rms"]:.3f} A rms from its reference
+  currents          i_d {i_d["rms"]:.3f} A rms from 0, i_q {i_q["settled_rms"]:.3f} A rms from its reference
   peak current      {s["peak_current_a"]:.2f} A of {drive.current_limit_a:g} A
   gates             {s["gate_edges"]:,} edges, shortest dead time {s["shortest_dead_time_us"]:g} µs
   recording         {logged.format(**rec)}
@@ -186,7 +185,7 @@ def described(drive: Drive) -> list[SimpleNamespace]:
         section = getattr(drive, name)
         given = [(f, getattr(section, f.name)) for f in dataclasses.fields(section)]
         given = [(f.name, value, key_of(f).unit) for f, value in given if value not in (f.default, None)]
-        rows = [(name, f"{value:g}", "" if unit == "1" else unit) for name, value, unit in given]
+        rows = [(name, value, "" if unit == "1" else unit) for name, value, unit in given]
         sections.append(SimpleNamespace(name=name, rows=rows))
     return sections
 
