@@ -55,7 +55,7 @@ verilog: setup ## convert the VHDL to Verilog (GHDL 5)
 
 lint: setup ## check the style of the Python (ruff) and, with a vsg.yaml, of the VHDL (vsg)
 	.venv/bin/ruff check .
-	$(if $(wildcard vsg.yaml),.venv/bin/vsg -c vsg.yaml -f $$(find rtl -name '*.vhd' | sort))
+	$(if $(wildcard vsg.yaml),.venv/bin/vsg -c vsg.yaml -f $$(find rtl tb -name '*.vhd' ! -name fluxproof_pkg.vhd | sort))
 
 lock: ## renew requirements.lock from requirements.in (newest versions that fit together)
 	rm -rf .cache/lock && python3 -m venv .cache/lock && .cache/lock/bin/pip install -q uv
