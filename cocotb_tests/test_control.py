@@ -10,7 +10,7 @@ from golden_model import drive as drives
 from golden_model import fluxproof
 from golden_model.registers import registers
 from golden_model.units import from_si
-from plant import Machine, Sensors, initial_state, plant_params, sensor_params
+from plant import FREE, IMPOSED_SPEED, Machine, Sensors, initial_state, plant_params, sensor_params
 from scripts.golden_loop import run_averaged
 from scripts.scenarios import RPM
 
@@ -33,7 +33,7 @@ def sag(start: float, stop: float, low: float):
     return course
 
 
-def simulate_drive(seconds, rpm, u_dc=None, load=None, omega_m=0.0, i_q=None, delay=True):
+def simulate_drive(seconds, rpm, u_dc=None, load=None, omega_m=0.0, i_q=None, delay=True, mode=FREE, start=None):
     """Columns i_d, i_q, lambda_d, lambda_q, omega_m, torque, u_alpha, u_beta; rpm and others are f(t) arrays."""
     n = round(seconds / T_S)
     time = np.arange(n) * T_S
@@ -47,7 +47,7 @@ def simulate_drive(seconds, rpm, u_dc=None, load=None, omega_m=0.0, i_q=None, de
     bus = np.full(n, 563.0) if u_dc is None else u_dc(time)
     torque = np.zeros(n) if load is None else load(time)
     machine = Machine.from_mapping(vars(DRIVE.machine))
-    params = plant_params(machine)
+    params = plant_params(machine, mode=mode)
     sensors = sensor_params(
         Sensors(
             current_bits=16, current_full_scale_a=12.5, u_dc_bits=16, u_dc_full_scale_v=1000, position_bits=16
@@ -57,7 +57,7 @@ def simulate_drive(seconds, rpm, u_dc=None, load=None, omega_m=0.0, i_q=None, de
     registers_used = values.values if delay else values.values._replace(k_delay=0)
     run_averaged(
         fluxproof.State(), references, bus, torque, registers_used, values.config,
-        initial_state(machine, params, omega_m=omega_m), params, sensors, T_S, out,
+        initial_state(machine, params, omega_m=omega_m, **(start or {})), params, sensors, T_S, out,
     )  # fmt: skip
     return time, out
 
@@ -122,3 +122,46 @@ def test_standstill_is_exactly_quiet():
         state, out = fluxproof.step(state, sample, values.values, values.config)
         assert (out.duty_a, out.duty_b, out.duty_c) == (32768, 32768, 32768)
         assert out.omega_me == 0
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("omega_e", [1500.0, 1800.0, 1950.0])
+def test_no_second_stable_point_at_high_speed(omega_e, sign):
+    """Kicked to minus ten ampere in both axes near the speed limit: the drive comes back and stays.
+
+    With d first and no room for the EMF it would stay at i_q = -11 A for ever (see control/voltage_limit.py).
+    """
+    speed = sign * omega_e / DRIVE.machine.pole_pairs
+    kick = {"i_d": -10.0, "i_q": -sign * 9.0}
+
+    def run(start=None):
+        return simulate_drive(
+            0.4,
+            lambda t: np.zeros_like(t),
+            i_q=lambda t: np.full_like(t, sign * 3.0),
+            load=lambda t: np.full_like(t, speed),
+            omega_m=speed,
+            mode=IMPOSED_SPEED,
+            start=start,
+        )[1][-1000:]
+
+    calm, kicked = run(), run(kick)
+    assert kicked[:, 0].mean() == pytest.approx(calm[:, 0].mean(), abs=0.1)
+    assert abs(calm[:, 0].mean()) < 0.5
+    assert kicked[:, 1].mean() == pytest.approx(calm[:, 1].mean(), abs=0.1)
+    assert sign * calm[:, 1].mean() > 0.8, "the speed leaves no current: the test shows nothing"
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_above_the_voltage_limit_the_current_stays_within_the_rated(sign):
+    """EMF 12 % above the circle, no field weakening: the references cannot hold, the current must."""
+    speed = sign * 2200.0 / DRIVE.machine.pole_pairs
+    _, out = simulate_drive(
+        0.4,
+        lambda t: np.zeros_like(t),
+        i_q=lambda t: np.full_like(t, sign * 3.0),
+        load=lambda t: np.full_like(t, speed),
+        omega_m=speed,
+        mode=IMPOSED_SPEED,
+    )
+    assert np.hypot(out[-1000:, 0], out[-1000:, 1]).max() < 5.23

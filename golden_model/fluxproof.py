@@ -90,6 +90,7 @@ class State(NamedTuple):
     of_speed: speed.State = speed.State()
     of_speed_pi: speed_pi.State = speed_pi.State()
     of_current_pi: current_pi.State = current_pi.State()
+    of_voltage_limit: voltage_limit.State = voltage_limit.State()
     sat_d: int = 0
     sat_q: int = 0
 
@@ -187,7 +188,9 @@ def step(state, sample, regs, config):
     )
     lambda_d, lambda_q = current_model.step(i_d, i_q, r.l_d, r.l_q, r.lambda_mg)
     u_dec_d, u_dec_q = decoupling.step(omega_me, lambda_d, lambda_q)
-    u_d, u_q, sat_d, sat_q = voltage_limit.step(u_pi_d, u_pi_q, u_dec_d, u_dec_q, u_max)
+    voltage_limit_state, (u_d, u_q, sat_d, sat_q) = voltage_limit.step(
+        state.of_voltage_limit, u_pi_d, u_pi_q, u_dec_d, u_dec_q, u_max
+    )
 
     (theta_out,) = svm_delay_compensation.step(theta_me, omega_me, r.k_delay)
     cos_out, sin_out = sincos.step(theta_out)
@@ -195,7 +198,7 @@ def step(state, sample, regs, config):
     duty_a, duty_b, duty_c = svm.step(u_alpha, u_beta, m, m_beta, n)
     compare_a, compare_b, compare_c = pwm_compare.step(duty_a, duty_b, duty_c, r.min_pulse, c.carrier_half)
 
-    following = State(speed_state, speed_pi_state, current_pi_state, sat_d, sat_q)
+    following = State(speed_state, speed_pi_state, current_pi_state, voltage_limit_state, sat_d, sat_q)
     return following, Observed(
         i_a, i_b, i_c, current_at_rail, u_dc, u_max, u_dc_at_rail, u_dc_low, theta_me, omega_me, i_d, i_q,
         i_q_ref, speed_limited, lambda_d, lambda_q, u_dec_d, u_dec_q, u_int_d, u_int_q, u_d, u_q, sat_d, sat_q,

@@ -1,15 +1,21 @@
 """Adds the decoupling and keeps the voltage inside the circle of radius u_max, d axis first.
 
-    u_d = limit(u_pi_d + u_dec_d, +-u_max)
+    limit = min(u_max, room),  u_d = limit(u_pi_d + u_dec_d, +-limit)
     u_q = limit(u_pi_q + u_dec_q, +-sqrt(u_max**2 - u_d**2))
+    room = sqrt(u_max**2 - min(|u_dec_q|, u_max)**2)        for the next sample
     sat_x = -1, 0, +1: the limit that holds the axis, for the regulator's integral
 
-The radicand is formed as (u_max - u)*(u_max + u); a negative factor tells that d is at its limit, and
-on which side.  Formats: sums exact; radicand exact, U(0,32), since both factors are below 2 when
-neither is negative; the root never above the true one, so the circle is never left.
+Room: d comes first in what the EMF of the last sample leaves.  Without it the drive has a second stable
+point above the speed at which kick or bus sag fill the circle: u_d at its limit, nothing for u_q, so the flux
+stays down, so i_d stays far below its reference, so u_d stays at its limit, braking with more than the rated
+current.  With it the q axis can always hold its EMF; below the limit nothing changes.
+
+Radicands are formed as (u_max - u)*(u_max + u): exact, U(0,32), both factors below 2.  The root is never
+above the true one, so the circle is never left.
 """
 
 import math
+from typing import NamedTuple
 
 from golden_model.block import Block, Port
 from golden_model.common import sqrt
@@ -25,34 +31,45 @@ def side(value, limit):
     return 1 if value > limit else (-1 if value < -limit else 0)
 
 
+class State(NamedTuple):
+    room: int = U_MAX.hi  # largest u_d that leaves the EMF its voltage
+
+
 @kernel
-def step(u_pi_d, u_pi_q, u_dec_d, u_dec_q, u_max):
+def step(state, u_pi_d, u_pi_q, u_dec_d, u_dec_q, u_max):
     sum_d = u_pi_d + u_dec_d
     sum_q = u_pi_q + u_dec_q
-    sat_d = side(sum_d, u_max)
-    u_d = clamp(sum_d, -u_max, u_max)
-    radicand = 0 if sat_d != 0 else (u_max - sum_d) * (u_max + sum_d)
-    (u_q_max,) = sqrt.step(radicand)
+    limit_d = min(u_max, state.room)
+    sat_d = side(sum_d, limit_d)
+    u_d = clamp(sum_d, -limit_d, limit_d)
+    (u_q_max,) = sqrt.step((u_max - u_d) * (u_max + u_d))
     sat_q = side(sum_q, u_q_max)
     u_q = clamp(sum_q, -u_q_max, u_q_max)
-    return u_d, u_q, sat_d, sat_q
+    emf = min(abs(u_dec_q), u_max)
+    (room,) = sqrt.step((u_max - emf) * (u_max + emf))
+    return State(room), (u_d, u_q, sat_d, sat_q)
 
 
-def reference(v, _state):
-    u_max = v["u_max"]
-    u_d = min(max(v["u_pi_d"] + v["u_dec_d"], -u_max), u_max)
-    u_q_max = math.sqrt(max(0.0, u_max**2 - u_d**2))
+def limited_d(v, state):
+    """u_d in real numbers: exact, so that only q needs a bound."""
+    limit = min(v["u_max"], state.room * U_MAX.lsb)
+    return min(max(v["u_pi_d"] + v["u_dec_d"], -limit), limit)
+
+
+def reference(v, state):
+    u_d = limited_d(v, state)
+    u_q_max = math.sqrt(max(0.0, v["u_max"] ** 2 - u_d**2))
     return {"u_d": u_d, "u_q": min(max(v["u_pi_q"] + v["u_dec_q"], -u_q_max), u_q_max)}
 
 
-def bound(v, _state):
+def bound(v, state):
     """d is exact; q carries the root's error, see sqrt."""
-    u_d = min(max(v["u_pi_d"] + v["u_dec_d"], -v["u_max"]), v["u_max"])
-    return {"u_d": 0.0, **{"u_q": sqrt.bound({"x": max(0.0, v["u_max"] ** 2 - u_d**2)}, None)["root"]}}
+    radicand = max(0.0, v["u_max"] ** 2 - limited_d(v, state) ** 2)
+    return {"u_d": 0.0, "u_q": sqrt.bound({"x": radicand}, None)["root"]}
 
 
 def stimuli(_rng, _config):
-    """On the circle, one LSB inside and outside it, both axes, all signs; a circle of radius zero."""
+    """On the circle, one LSB inside and outside it, both axes, all signs, EMF up to all of it; radius zero."""
     rows = []
     for u_max in (0, 1, 2, 20000, 37900, 65535):
         for d in (0, u_max - 1, u_max, u_max + 1, u_max * 3 // 5):
@@ -82,7 +99,9 @@ BLOCK = Block(
         Port("sat_d", SAT, lo=-1, hi=1, doc="limit that holds the d axis"),
         Port("sat_q", SAT, lo=-1, hi=1, doc="limit that holds the q axis"),
     ),
+    state=State(),
     latency=4 + sqrt.BLOCK.latency,
+    interval=5 + sqrt.BLOCK.latency,
     reference=reference,
     bound=bound,
     stimuli=stimuli,

@@ -1,10 +1,13 @@
 -- Purpose: adds the decoupling and keeps the voltage inside the circle of radius u_max, d axis first.
---   u_d = limit(u_pi_d + u_dec_d, +-u_max)
+--   limit = min(u_max, room),  u_d = limit(u_pi_d + u_dec_d, +-limit)
 --   u_q = limit(u_pi_q + u_dec_q, +-sqrt(u_max**2 - u_d**2))
+--   room = sqrt(u_max**2 - min(|u_dec_q|, u_max)**2), for the next sample
 --   sat = -1, 0, +1: the limit that holds the axis
--- The radicand is (u_max - u)*(u_max + u); a negative factor tells that d is at its limit, and on which side.
--- Formats: sums exact; radicand exact, U(0,32); PU out.
--- Latency: 10.  Rounding: none but the root's, which errs inwards: the circle is never left.
+-- Room: d comes first in what the EMF of the last sample leaves, so that the q axis can always hold its EMF;
+-- without it the drive has a second stable point at high speed, see the model.
+-- Formats: sums exact; radicands (u_max - u)*(u_max + u) exact, U(0,32); PU out.
+-- Latency: 10.  Interval: 11 (room is ready one clock after the output; both roots share multiplier and sqrt).
+-- Rounding: none but the root's, which errs inwards: the circle is never left.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -34,22 +37,32 @@ architecture rtl of voltage_limit is
   constant LATENCY : positive := VOLTAGE_LIMIT_LATENCY;
   constant W       : positive := PU_W + 2;
 
-  type wait_t is array (2 to LATENCY - 1) of signed(PU_W downto 0);
+  type sum_wait_t is array (1 to LATENCY - 1) of signed(PU_W downto 0);
   type d_wait_t is array (3 to LATENCY - 1) of signed(PU_W - 1 downto 0);
-  type sat_wait_t is array (3 to LATENCY - 1) of signed(1 downto 0);
+  type sat_wait_t is array (2 to LATENCY - 1) of signed(1 downto 0);
+
+  -- State
+  signal room : unsigned(U_MAX_W - 1 downto 0);
 
   signal valid      : std_logic_vector(0 to LATENCY);
   signal sum_d_1    : signed(PU_W downto 0);
-  signal sum_q_1    : signed(PU_W downto 0);
   signal u_max_1    : signed(U_MAX_W downto 0);
-  signal room_up_2  : signed(W - 1 downto 0);
-  signal room_dn_2  : signed(W - 1 downto 0);
+  signal limit_1    : signed(U_MAX_W downto 0);
+  signal dec_q_1    : unsigned(PU_W - 1 downto 0);
   signal sum_d_2    : signed(PU_W downto 0);
+  signal limit_2    : signed(U_MAX_W downto 0);
   signal u_max_2    : signed(U_MAX_W downto 0);
-  signal radicand_3 : unsigned(31 downto 0);
+  signal emf_2      : signed(U_MAX_W downto 0);
+  signal u_2        : signed(PU_W downto 0);
+  signal emf_3      : signed(U_MAX_W downto 0);
+  signal u_max_3    : signed(U_MAX_W downto 0);
+  signal factor_lo  : signed(W - 1 downto 0);
+  signal factor_hi  : signed(W - 1 downto 0);
+  signal radicand   : unsigned(31 downto 0);
+  signal root_start : std_logic;
   signal root_9     : unsigned(U_MAX_W - 1 downto 0);
   signal limit_9    : signed(PU_W downto 0);
-  signal sum_q      : wait_t;
+  signal sum_q      : sum_wait_t;
   signal d_wait     : d_wait_t;
   signal sat_wait   : sat_wait_t;
 begin
@@ -59,58 +72,70 @@ begin
     port map (
       clk       => clk,
       rst       => rst,
-      in_valid  => valid(3),
-      x         => radicand_3,
+      in_valid  => root_start,
+      x         => radicand,
       out_valid => open,
       root      => root_9
     );
 
-  limit_9 <= signed(resize(root_9, PU_W + 1));
+  root_start <= valid(3) or valid(4);
+  limit_9    <= signed(resize(root_9, PU_W + 1));
+
+  -- u_d, limited; then the EMF: what the multiplier makes a radicand of
+  u_2       <= resize(limit_2, PU_W + 1) when sat_wait(2) > 0 else
+               -resize(limit_2, PU_W + 1) when sat_wait(2) < 0 else
+               sum_d_2;
+  factor_lo <= resize(u_max_3, W) - emf_3 when valid(3) = '1' else resize(u_max_2, W) - u_2;
+  factor_hi <= resize(u_max_3, W) + emf_3 when valid(3) = '1' else resize(u_max_2, W) + u_2;
 
   process (clk)
   begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stage 1: sum = u_pi + u_dec
+      -- Stage 1: sum = u_pi + u_dec;  limit = min(u_max, room)
       if valid(0) = '1' then
-        sum_d_1 <= resize(u_pi_d, PU_W + 1) + resize(u_dec_d, PU_W + 1);
-        sum_q_1 <= resize(u_pi_q, PU_W + 1) + resize(u_dec_q, PU_W + 1);
-        u_max_1 <= signed('0' & u_max);
+        sum_d_1  <= resize(u_pi_d, PU_W + 1) + resize(u_dec_d, PU_W + 1);
+        sum_q(1) <= resize(u_pi_q, PU_W + 1) + resize(u_dec_q, PU_W + 1);
+        dec_q_1  <= unsigned(abs(u_dec_q));
+        u_max_1  <= signed('0' & u_max);
+        limit_1  <= signed('0' & minimum(u_max, room));
       end if;
 
-      -- Stage 2: room to either limit = u_max -+ sum_d
+      -- Stage 2: side of the limit on which sum_d is;  emf = min(|u_dec_q|, u_max)
       if valid(1) = '1' then
-        room_up_2 <= resize(u_max_1, W) - sum_d_1;
-        room_dn_2 <= resize(u_max_1, W) + sum_d_1;
-        sum_d_2   <= sum_d_1;
-        u_max_2   <= u_max_1;
-        sum_q(2)  <= sum_q_1;
-      end if;
-
-      -- Stage 3: radicand = room_up * room_dn;  u_d = sum_d, limited
-      if valid(2) = '1' then
-        radicand_3  <= resize(unsigned(room_up_2(PU_W - 1 downto 0)) * unsigned(room_dn_2(PU_W - 1 downto 0)), 32);
-        d_wait(3)   <= resize(sum_d_2, PU_W);
-        sat_wait(3) <= to_signed(0, 2);
-        sum_q(3)    <= sum_q(2);
-        if room_up_2 < 0 then
-          radicand_3  <= (others => '0');
-          d_wait(3)   <= resize(u_max_2, PU_W);
-          sat_wait(3) <= to_signed(1, 2);
-        elsif room_dn_2 < 0 then
-          radicand_3  <= (others => '0');
-          d_wait(3)   <= resize(-u_max_2, PU_W);
-          sat_wait(3) <= to_signed(-1, 2);
+        sum_d_2     <= sum_d_1;
+        limit_2     <= limit_1;
+        u_max_2     <= u_max_1;
+        emf_2       <= signed(resize(minimum(dec_q_1, resize(unsigned(u_max_1), PU_W)), U_MAX_W + 1));
+        sat_wait(2) <= to_signed(0, 2);
+        if sum_d_1 > limit_1 then
+          sat_wait(2) <= to_signed(1, 2);
+        elsif sum_d_1 < -limit_1 then
+          sat_wait(2) <= to_signed(-1, 2);
         end if;
       end if;
 
-      -- Stages 4 to 9: the root; u_d and sum_q wait for it
-      for k in 4 to LATENCY - 1 loop
+      -- Stages 3, 4: radicand = (u_max - u_d)*(u_max + u_d), then (u_max - emf)*(u_max + emf)
+      if valid(2) = '1' or valid(3) = '1' then
+        radicand <= resize(unsigned(factor_lo(PU_W - 1 downto 0)) * unsigned(factor_hi(PU_W - 1 downto 0)), 32);
+      end if;
+      if valid(2) = '1' then
+        d_wait(3) <= resize(u_2, PU_W);
+        emf_3     <= emf_2;
+        u_max_3   <= u_max_2;
+      end if;
+
+      -- Stages 4 to 9: the root of the first radicand; sum_q, u_d and its flag wait for it
+      for k in 2 to LATENCY - 1 loop
         if valid(k - 1) = '1' then
-          sum_q(k)    <= sum_q(k - 1);
-          d_wait(k)   <= d_wait(k - 1);
-          sat_wait(k) <= sat_wait(k - 1);
+          sum_q(k) <= sum_q(k - 1);
+          if k > 2 then
+            sat_wait(k) <= sat_wait(k - 1);
+          end if;
+          if k > 3 then
+            d_wait(k) <= d_wait(k - 1);
+          end if;
         end if;
       end loop;
 
@@ -127,10 +152,16 @@ begin
         end if;
       end if;
 
+      -- Stage 11: room = the root of the second radicand
+      if valid(LATENCY) = '1' then
+        room <= root_9;
+      end if;
+
       if rst = '1' then
         valid(1 to LATENCY) <= (others => '0');
         sat_d               <= (others => '0');
         sat_q               <= (others => '0');
+        room                <= (others => '1');
       end if;
     end if;
   end process;
