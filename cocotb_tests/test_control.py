@@ -125,11 +125,13 @@ def test_standstill_is_exactly_quiet():
 
 
 @pytest.mark.parametrize("sign", [1, -1])
-@pytest.mark.parametrize("omega_e", [1500.0, 1800.0, 1950.0])
-def test_no_second_stable_point_at_high_speed(omega_e, sign):
+@pytest.mark.parametrize("i_q_ref", [3.0, -3.0])
+@pytest.mark.parametrize("omega_e", [1500.0, 1800.0, 1850.0])
+def test_no_second_stable_point_at_high_speed(omega_e, i_q_ref, sign):
     """Kicked to minus ten ampere in both axes near the speed limit: the drive comes back and stays.
 
-    With d first and no room for the EMF it would stay at i_q = -11 A for ever (see control/voltage_limit.py).
+    With d first and no room for the EMF it would stay at i_q = -11 A for ever (see control/voltage_limit.py);
+    braking, it would not even need the kick.
     """
     speed = sign * omega_e / DRIVE.machine.pole_pairs
     kick = {"i_d": -10.0, "i_q": -sign * 9.0}
@@ -138,7 +140,7 @@ def test_no_second_stable_point_at_high_speed(omega_e, sign):
         return simulate_drive(
             0.4,
             lambda t: np.zeros_like(t),
-            i_q=lambda t: np.full_like(t, sign * 3.0),
+            i_q=lambda t: np.full_like(t, sign * i_q_ref),
             load=lambda t: np.full_like(t, speed),
             omega_m=speed,
             mode=IMPOSED_SPEED,
@@ -146,10 +148,9 @@ def test_no_second_stable_point_at_high_speed(omega_e, sign):
         )[1][-1000:]
 
     calm, kicked = run(), run(kick)
-    assert kicked[:, 0].mean() == pytest.approx(calm[:, 0].mean(), abs=0.1)
-    assert abs(calm[:, 0].mean()) < 0.5
-    assert kicked[:, 1].mean() == pytest.approx(calm[:, 1].mean(), abs=0.1)
-    assert sign * calm[:, 1].mean() > 0.8, "the speed leaves no current: the test shows nothing"
+    for out in (calm, kicked):
+        assert out[:, 0].mean() == pytest.approx(0.0, abs=0.1)
+        assert out[:, 1].mean() == pytest.approx(sign * i_q_ref, abs=0.1)
 
 
 @pytest.mark.parametrize("sign", [1, -1])
