@@ -130,12 +130,16 @@ begin
       for k in 2 to LATENCY - 1 loop
         if valid(k - 1) = '1' then
           sum_q(k) <= sum_q(k - 1);
-          if k > 2 then
-            sat_wait(k) <= sat_wait(k - 1);
-          end if;
-          if k > 3 then
-            d_wait(k) <= d_wait(k - 1);
-          end if;
+        end if;
+      end loop;
+      for k in 3 to LATENCY - 1 loop
+        if valid(k - 1) = '1' then
+          sat_wait(k) <= sat_wait(k - 1);
+        end if;
+      end loop;
+      for k in 4 to LATENCY - 1 loop
+        if valid(k - 1) = '1' then
+          d_wait(k) <= d_wait(k - 1);
         end if;
       end loop;
 
