@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import os
+import subprocess
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -12,6 +13,10 @@ from cocotb_tools.runner import get_runner
 
 ROOT = Path(__file__).resolve().parent.parent
 RTL = ROOT / "rtl"
+
+
+class BuildError(RuntimeError):
+    """VHDL that does not analyse or elaborate."""
 
 
 def run_folder(toplevel: str, generics: dict, rtl: Path = RTL, key: str = "") -> Path:
@@ -25,21 +30,25 @@ def run(
 ) -> Path:
     """Simulate ``toplevel`` under cocotb module ``module``; returns the folder of the run, see failure().
 
-    ``rtl`` may be another tree (a mutant's).  Raises SystemExit or
-    subprocess.CalledProcessError where the VHDL does not build.
+    ``rtl`` may be another tree (a mutant's).  Raises BuildError with GHDL's words where the VHDL does not build.
     """
     sources = sorted(rtl.rglob("*.vhd"))
     folder = run_folder(toplevel, generics, rtl, key)
     (folder / "results.xml").unlink(missing_ok=True)
     runner = get_runner("ghdl")
-    runner.build(
-        sources=sources,
-        hdl_toplevel=toplevel,
-        build_args=["--std=08"],
-        build_dir=folder,
-        always=True,
-        log_file=_log(folder, "build.log"),
-    )
+    try:
+        runner.build(
+            sources=sources,
+            hdl_toplevel=toplevel,
+            build_args=["--std=08"],
+            build_dir=folder,
+            always=True,
+            log_file=_log(folder, "build.log"),
+        )
+    except (SystemExit, RuntimeError, subprocess.CalledProcessError) as error:
+        words = (folder / "build.log").read_text().splitlines() if (folder / "build.log").exists() else []
+        told = [line for line in words if "error" in line or ".vhd:" in line] or words
+        raise BuildError(f"{toplevel} does not build: " + "\n".join(told[-12:] or [str(error)])) from error
     # GHDL's warnings about metavalues at time zero say nothing; the bench checks for metavalues itself.
     command = dict(
         hdl_toplevel=toplevel,

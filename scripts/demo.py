@@ -9,7 +9,6 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import subprocess
 import sys
 import threading
 import time
@@ -50,7 +49,7 @@ class Simulation(threading.Thread):
             simulate.run("fluxproof", self.module, self.generics, self.environment, key="demo")
             problem = simulate.failure(self.folder) or ("" if self.summary() else "no result")
             self.problem = problem.partition("\n")[0] or None
-        except (SystemExit, subprocess.CalledProcessError) as error:  # no GHDL, or VHDL that does not build
+        except (SystemExit, simulate.BuildError) as error:  # no GHDL, or VHDL that does not build
             self.problem = f"{error}; see {self.folder.relative_to(ROOT)}/build.log"
 
     def done(self) -> int:

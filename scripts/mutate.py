@@ -9,7 +9,6 @@ from __future__ import annotations
 import argparse
 import os
 import shutil
-import subprocess
 import sys
 import time
 from concurrent.futures import ProcessPoolExecutor, as_completed
@@ -64,9 +63,9 @@ def judge(number: int) -> dict:
     for toplevel, module, generics, environment in runs(file):
         try:
             folder = simulate.run(toplevel, module, generics, environment, rtl=tree)
-        except (SystemExit, subprocess.CalledProcessError, RuntimeError) as error:
+        except simulate.BuildError as error:
             # A defect that does not even compile proves nothing about the tests.
-            return verdict | {"by": f"does not build: {error}", "invalid": True}
+            return verdict | {"by": str(error), "invalid": True}
         problem = simulate.failure(folder)
         shutil.rmtree(folder, ignore_errors=True)
         if problem is not None:
