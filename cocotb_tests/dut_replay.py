@@ -7,7 +7,6 @@ moves by speed times the core's sample time, not times the log's 29 ms, in which
 
 from __future__ import annotations
 
-import json
 import os
 import time
 from collections.abc import Callable
@@ -17,7 +16,7 @@ from typing import NamedTuple
 import cocotb
 import numpy as np
 
-from cocotb_tests.dut_loop import progress
+from cocotb_tests.dut_loop import leave, progress
 from cocotb_tests.ghdl_device import GhdlDevice
 from golden_model import drive as drives
 from golden_model import fluxproof
@@ -28,7 +27,7 @@ from golden_model.transforms import clarke, sincos
 from golden_model.units import from_si
 from plant import sensor_params
 from plant.sensors import current_code, position_code, u_dc_code
-from scripts.cosim import GoldenGates, Result, build_plant, compare_period
+from scripts.cosim import INPUT_PORTS, Beside, Result, build_plant
 from scripts.files import ROOT
 from scripts.scenarios import RPM
 
@@ -118,40 +117,14 @@ def current_bound(recording: Recording, drive: Drive) -> np.ndarray:
     return vector + rounded + length * (angle + coefficients + trig)
 
 
-INPUT_PORTS = (
-    *("adc_a", "adc_b", "adc_c", "adc_u_dc", "position_code"),
-    *("omega_ref_in", "i_d_ref_in", "i_q_ext_in", "speed_mode_in"),
-)
-
-
 async def replay(device, register_set, rows: np.ndarray, tell: Callable[[int, int], None]) -> Result:
     """Feed the rows to the device, one per PWM period, and compare as the closed loop does."""
-    values, config = register_set.values, register_set.config
-    gates, state, result = GoldenGates(values, config.carrier_half), fluxproof.State(), Result()
-    observed, edges = [], []
-
-    def differ(k: int, what: str) -> None:
-        result.differences += 1
-        result.first_difference = result.first_difference or f"row {k}: {what}"
-
-    first = await device.start(values, 1)
-    _clocks, words, _length, running = gates.run((0, 0, 0), 1)
-    if not np.array_equal(first.gate_words, words):
-        differ(-1, "gates before the first sample")
+    beside = Beside(device, register_set)
+    await beside.start(1)
     for k, row in enumerate(rows.tolist()):
-        run = running
-        state, golden = fluxproof.step(state, fluxproof.Sample(*row, run), values, config)
-        clocks, words, length, running = gates.run(golden[-3:], 1)
-        got = await device.period(dict(zip(INPUT_PORTS, row, strict=True)), 1)
-        compare_period(k, got, golden, (clocks, words, length, run), differ)
-        result.sample_to_duty_clocks = max(result.sample_to_duty_clocks, got.sample_to_duty)
-        edges += [(k, int(c), int(w)) for c, w in zip(got.edge_clocks, got.gate_words, strict=True)]
-        result.periods_compared += 1
-        observed.append(golden)
+        await beside.period(dict(zip(INPUT_PORTS, row, strict=True)), 1)
         tell(k + 1, len(rows))
-    result.observed = dict(zip(fluxproof.Observed._fields, np.array(observed).T, strict=True))
-    result.gate_edges = np.array(edges, np.int64).reshape(-1, 3)
-    return result
+    return beside.finish()
 
 
 @cocotb.test()
@@ -161,15 +134,4 @@ async def recording_replay(dut):
     rows = sample_inputs(load_recording(os.environ["FLUXPROOF_RECORDING"]), drive)
     began = time.monotonic()
     result = await replay(GhdlDevice(dut), registers(drive), rows, progress)
-    np.savez("result.npz", **{f"observed_{name}": values for name, values in result.observed.items()})
-    summary = {
-        "periods_compared": result.periods_compared,
-        "differences": result.differences,
-        "first_difference": result.first_difference,
-        "sample_to_duty_clocks": result.sample_to_duty_clocks,
-        "gate_edges": len(result.gate_edges),
-        "seconds": round(time.monotonic() - began, 2),
-    }
-    with open("summary.json", "w") as stream:
-        json.dump(summary, stream)
-    assert result.differences == 0, result.first_difference
+    leave(result, time.monotonic() - began)

@@ -14,11 +14,13 @@ from typing import Protocol
 import numpy as np
 
 from golden_model import fluxproof
+from golden_model.io import sample_latch
 from golden_model.kernel import kernel
 from golden_model.modulation import gate_generation
 from plant import Inverter, Machine, Sensors, SwitchingPlant, sensor_params
 from plant.sensors import current_code, position_code, u_dc_code
 
+INPUT_PORTS = tuple(p.name for p in sample_latch.BLOCK.inputs if p.name != "run_in")
 SAMPLE_DELAY = 4  # clocks from sample_trigger to sample_valid: what a converter would take, shortened
 
 
@@ -151,6 +153,64 @@ def build_plant(drive, sensors: Sensors | None = None) -> tuple[SwitchingPlant, 
     return SwitchingPlant(machine, Inverter()), sensors
 
 
+class Beside:
+    """A device with the golden model beside it: both get the same samples, every period is compared."""
+
+    def __init__(self, device: Device, register_set):
+        self.device, self.registers, self.config = device, register_set.values, register_set.config
+        self.gates = GoldenGates(self.registers, self.config.carrier_half)
+        self.state, self.running, self.result = fluxproof.State(), 0, Result()
+        self.observed: list[fluxproof.Observed] = []
+        self.edges: list[tuple[int, int, int]] = []
+
+    def differ(self, what: str) -> None:
+        """Count a difference; the first one is kept in words."""
+        self.result.differences += 1
+        self.result.first_difference = self.result.first_difference or f"period {len(self.observed)}: {what}"
+
+    async def start(self, enable: int) -> None:
+        """Reset and run to the first sample_trigger."""
+        got = await self.device.start(self.registers, enable)
+        _clocks, words, _length, self.running = self.gates.run((0, 0, 0), enable)
+        if not np.array_equal(got.gate_words, words):
+            self.differ("gates before the first sample")
+
+    async def period(self, inputs: dict[str, int], enable: int) -> Period:
+        """One period on both; ``inputs`` by the names of INPUT_PORTS, in their order.  Returns the device's."""
+        run = self.running if enable else 0
+        sample = fluxproof.Sample(*inputs.values(), run)
+        self.state, golden = fluxproof.step(self.state, sample, self.registers, self.config)
+        clocks, words, length, self.running = self.gates.run(golden[-3:], enable)
+        got = await self.device.period(inputs, enable)
+        self.compare(got, golden, Period(None, clocks, words, length, 0, run))
+        k = len(self.observed)
+        self.edges += [(k, int(c), int(w)) for c, w in zip(got.edge_clocks, got.gate_words, strict=True)]
+        self.observed.append(golden)
+        return got
+
+    def compare(self, got: Period, golden: fluxproof.Observed, wanted: Period) -> None:
+        """``==`` on every observed value, every gate edge, the period's length and the run state."""
+        if got.observed is None:
+            self.differ("no sample came out")
+            return
+        for name, value in zip(fluxproof.Observed._fields, golden, strict=True):
+            if got.observed[name] != value:
+                self.differ(f"{name}: got {got.observed[name]}, wanted {value}")
+        if _edges(got) != _edges(wanted):
+            self.differ(f"gate edges: got {_edges(got)}, wanted {_edges(wanted)}")
+        if (got.clocks, got.running) != (wanted.clocks, wanted.running):
+            seen, right = (got.clocks, got.running), (wanted.clocks, wanted.running)
+            self.differ(f"clocks, running: got {seen}, wanted {right}")
+        self.result.sample_to_duty_clocks = max(self.result.sample_to_duty_clocks, got.sample_to_duty)
+
+    def finish(self) -> Result:
+        """What was recorded; the golden values, which the device's equal where nothing differs."""
+        self.result.periods_compared = len(self.observed)
+        self.result.observed = dict(zip(fluxproof.Observed._fields, np.array(self.observed).T, strict=True))
+        self.result.gate_edges = np.array(self.edges, np.int64).reshape(-1, 3)
+        return self.result
+
+
 async def cosimulate(
     device: Device,
     drive,
@@ -160,73 +220,31 @@ async def cosimulate(
     sensors: Sensors | None = None,
 ) -> Result:
     """Run ``scenario`` on ``device`` in closed loop and compare with the golden model at every period."""
-    registers, config = register_set.values, register_set.config
     period_s = 1.0 / drive.inverter.pwm_frequency_hz
     plant, described = build_plant(drive, sensors)
-    codes = sensor_params(described)
-    gates = GoldenGates(registers, config.carrier_half)
-    state, result, observed_rows, plant_rows, edge_rows = fluxproof.State(), Result(), [], [], []
-
-    def differ(k: int, what: str) -> None:
-        result.differences += 1
-        result.first_difference = result.first_difference or f"period {k}: {what}"
-
-    first = await device.start(registers, int(scenario.enable[0]))
-    golden_clocks, golden_words, _length, running = gates.run((0, 0, 0), int(scenario.enable[0]))
-    if not np.array_equal(first.gate_words, golden_words):
-        differ(-1, "gates before the first sample")
+    codes, plant_rows = sensor_params(described), []
+    beside = Beside(device, register_set)
+    await beside.start(int(scenario.enable[0]))
     for k in range(len(scenario)):
-        inputs = {
-            **{f"adc_{x}": current_code(codes, n, plant.i_abc[n], k) for n, x in enumerate("abc")},
-            "adc_u_dc": u_dc_code(codes, float(scenario.u_dc[k]), k),
-            "position_code": position_code(codes, plant.theta_m, k),
-            "omega_ref_in": int(scenario.omega_ref[k]),
-            "i_d_ref_in": int(scenario.i_d_ref[k]),
-            "i_q_ext_in": int(scenario.i_q_ext[k]),
-            "speed_mode_in": int(scenario.speed_mode[k]),
-        }
-        enable = int(scenario.enable[k])
-        run = running if enable else 0
-        sample = fluxproof.Sample(*inputs.values(), run)
-        state, golden = fluxproof.step(state, sample, registers, config)
-        golden_clocks, golden_words, length, running = gates.run(golden[-3:], enable)
-
-        got = await device.period(inputs, enable)
-        compare_period(k, got, golden, (golden_clocks, golden_words, length, run), differ)
-        result.sample_to_duty_clocks = max(result.sample_to_duty_clocks, got.sample_to_duty)
-        edge_rows += [(k, int(c), int(w)) for c, w in zip(got.edge_clocks, got.gate_words, strict=True)]
-        result.periods_compared += 1
-        observed_rows.append(golden)
         plant_rows.append([read(plant) for read in PLANT_SIGNALS.values()])
+        values = (
+            *(current_code(codes, n, plant.i_abc[n], k) for n in range(3)),
+            u_dc_code(codes, float(scenario.u_dc[k]), k),
+            position_code(codes, plant.theta_m, k),
+            *(scenario.omega_ref[k], scenario.i_d_ref[k], scenario.i_q_ext[k], scenario.speed_mode[k]),
+        )
+        inputs = dict(zip(INPUT_PORTS, map(int, values), strict=True))
+        got = await beside.period(inputs, int(scenario.enable[k]))
         times = got.edge_clocks * (period_s / got.clocks)
         plant.advance(times, got.gate_words, float(scenario.u_dc[k]), float(scenario.load[k]), period_s)
         progress(k + 1, len(scenario))
-    result.observed = dict(zip(fluxproof.Observed._fields, np.array(observed_rows).T, strict=True))
+    result = beside.finish()
     result.plant = dict(zip(PLANT_SIGNALS, np.array(plant_rows).T, strict=True))
-    result.gate_edges = np.array(edge_rows, np.int64).reshape(-1, 3)
     return result
 
 
-def compare_period(k: int, got: Period, golden, gates, differ: Callable[[int, str], None]) -> None:
-    """``==`` on every observed value, every gate edge, the period's length and the run state."""
-    edge_clocks, words, length, run = gates
-    if got.observed is None:
-        differ(k, "no sample came out")
-        return
-    for name, wanted in zip(fluxproof.Observed._fields, golden, strict=True):
-        if got.observed[name] != wanted:
-            differ(k, f"{name}: got {got.observed[name]}, wanted {wanted}")
-    if not np.array_equal(got.edge_clocks, edge_clocks) or not np.array_equal(got.gate_words, words):
-        differ(
-            k,
-            f"gate edges: got {_edges(got.edge_clocks, got.gate_words)}, wanted {_edges(edge_clocks, words)}",
-        )
-    if (got.clocks, got.running) != (length, run):
-        differ(k, f"clocks, running: got {(got.clocks, got.running)}, wanted {(length, run)}")
-
-
-def _edges(clocks, words) -> str:
-    return " ".join(f"{c}:{w:06b}" for c, w in zip(clocks, words, strict=False))
+def _edges(period: Period) -> str:
+    return " ".join(f"{c}:{w:06b}" for c, w in zip(period.edge_clocks, period.gate_words, strict=True))
 
 
 def run_now(coroutine):

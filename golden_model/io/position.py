@@ -14,10 +14,9 @@ POLE_PAIRS = Format(0, 6, 0)
 
 @kernel
 def step(code_theta, reverse, pole_pairs, theta_offset, position_bits):
-    aligned = code_theta << (TURN_W - position_bits)
-    mech = -aligned if reverse else aligned
-    prod = mech * pole_pairs
-    theta_me = wrap(prod + theta_offset, TURN_W)
+    prod = pole_pairs * code_theta
+    turn = prod << (TURN_W - position_bits)
+    theta_me = wrap(theta_offset - turn if reverse else theta_offset + turn, TURN_W)
     return (theta_me,)
 
 
