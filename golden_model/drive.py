@@ -12,6 +12,7 @@ Bases, where [bases] does not say otherwise (a per-unit number reaches +-2):
 """
 
 import dataclasses
+import math
 from dataclasses import dataclass
 
 from golden_model.drive_checks import check
@@ -77,6 +78,14 @@ class Control:
     current_ki_q_v_per_as: float | None = not_negative("V/(A s)", "override", None)
     speed_kp_as_per_rad: float | None = not_negative("A s/rad", "override, per electrical rad/s", None)
     speed_ki_a_per_rad: float | None = not_negative("A/rad", "override, per electrical rad", None)
+    flux_mode: int = whole(0, 3, "0: current model, 1: merged models, 2: paper 001 eq. (16), 3: eq. (17)", 3)
+    flux_crossover_hz: float | None = positive("Hz", "voltage model above, current model below", None)
+    flux_damping: float = positive("1", "damping of the merge of both models", math.sqrt(0.5))
+    flux_bandwidth_hz: float | None = positive("Hz", "compensation by delta_lambda", None)
+    flux_min_speed_rad_s: float = positive("rad/s", "mechanical; no compensation up to it", 2.0)
+    flux_compensation_limit_wb: float | None = positive("Wb", "largest compensation", None)
+    flux_kp: float | None = not_negative("1", "override", None)
+    flux_ki_per_s: float | None = not_negative("1/s", "override", None)
 
 
 @dataclass(frozen=True)
@@ -156,6 +165,12 @@ class Drive:
     def current_limit_a(self):
         limit = self.control.current_limit_a
         return self.machine.rated_current_a if limit is None else limit
+
+    @property
+    def nominal_flux_wb(self):
+        """Length of the flux linkage at i_d = 0 and the rated current."""
+        m = self.machine
+        return math.hypot(m.magnet_flux_wb, m.inductance_q_h * m.rated_current_a)
 
     @property
     def carrier_half(self):

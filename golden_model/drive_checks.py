@@ -104,4 +104,14 @@ def _current_loop(drive):
         _refuse("[control] current_bandwidth_hz", asked, f"below {limit:g} Hz; {reason}")
 
 
-RULES = (_sample_time, _carrier, _pulses, _voltage, _current, _flux, _codes, _speed_loop, _current_loop)
+def _flux_loop(drive):
+    """Paper 001, end of section 4: below the current loop and above the speed loop, or they disturb each other."""
+    control = drive.control
+    asked, most = control.flux_bandwidth_hz, control.current_bandwidth_hz
+    least = control.speed_bandwidth_hz or 0.0
+    if asked is not None and not least < asked < most:
+        allowed = f"above speed_bandwidth_hz = {least:g} Hz and below current_bandwidth_hz = {most:g} Hz"
+        _refuse("[control] flux_bandwidth_hz", asked, allowed)
+
+
+RULES = (_sample_time, _carrier, _pulses, _voltage, _current, _flux, _codes, _speed_loop, _current_loop, _flux_loop)

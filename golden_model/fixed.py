@@ -77,6 +77,12 @@ def saturate(x, width):
 
 
 @kernel
+def exceeds(x, width):
+    """1 where saturating x to ``width`` signed bits changes it, else 0."""
+    return 1 if saturate(x, width) != x else 0
+
+
+@kernel
 def saturate_u(x, width):
     """x limited to the range of an unsigned number of ``width`` bits."""
     return max(0, min((1 << width) - 1, x))

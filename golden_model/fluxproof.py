@@ -7,7 +7,19 @@ run at the clock and stand in modulation/gate_generation.
 from collections import namedtuple
 from typing import NamedTuple
 
-from golden_model.control import current_model, current_pi, decoupling, speed_pi, voltage_limit
+from golden_model.control import chord_speed, current_pi, decoupling, speed_pi, voltage_limit
+from golden_model.estimators import (
+    applied_voltage,
+    current_model,
+    delta_lambda,
+    flux_compensation,
+    flux_estimate,
+    flux_merge,
+    flux_monitor,
+    speed_reciprocal,
+    torque,
+    winding_resistance,
+)
 from golden_model.io import (
     current_conditioning,
     position,
@@ -18,7 +30,7 @@ from golden_model.io import (
 )
 from golden_model.kernel import kernel
 from golden_model.modulation import gate_generation, pwm_compare, svm, svm_delay_compensation
-from golden_model.transforms import clarke, inverse_park, park, sincos
+from golden_model.transforms import clarke, flux_inverse_park, flux_park, inverse_park, park, sincos
 
 # Instance of the top -> (its block, the instances it waits for).  Blocks start when the last of these is done.
 WIRING = {
@@ -33,14 +45,26 @@ WIRING = {
     "rotor_frame": (park, ("stator_frame", "trig")),
     "speed_regulator": (speed_pi, ("speed_measurement",)),
     "current_regulators": (current_pi, ("rotor_frame", "speed_regulator")),
-    "flux_model": (current_model, ("rotor_frame",)),
-    "cross_coupling": (decoupling, ("flux_model", "speed_measurement")),
+    "resistance": (winding_resistance, ("latch",)),
+    "merged_flux": (flux_park, ("trig",)),
+    "flux": (flux_estimate, ("rotor_frame", "merged_flux", "resistance")),
+    "chord": (chord_speed, ("speed_measurement",)),
+    "cross_coupling": (decoupling, ("flux", "chord")),
     "circle": (voltage_limit, ("current_regulators", "cross_coupling", "bus_voltage")),
     "delay": (svm_delay_compensation, ("angle", "speed_measurement")),
     "trig_out": (sincos, ("delay",)),
     "stator_voltage": (inverse_park, ("circle", "trig_out")),
     "modulator": (svm, ("stator_voltage", "bus_reciprocal")),
     "compare": (pwm_compare, ("modulator",)),
+    "period_voltage": (applied_voltage, ("bus_voltage",)),
+    "magnetic_model": (current_model, ("rotor_frame",)),
+    "model_flux": (flux_inverse_park, ("magnetic_model",)),
+    "merge": (flux_merge, ("model_flux", "period_voltage")),
+    "speed_inverse": (speed_reciprocal, ("speed_measurement",)),
+    "flux_error": (delta_lambda, ("speed_inverse", "circle")),
+    "compensation": (flux_compensation, ("flux_error",)),
+    "torque_estimate": (torque, ("flux",)),
+    "monitor": (flux_monitor, ("compensation", "merge", "bus_reciprocal")),
 }
 
 
@@ -83,6 +107,7 @@ class Sample(NamedTuple):
     i_d_ref: int
     i_q_ext: int
     speed_mode: int
+    clear_faults: int
     run: int
 
 
@@ -91,8 +116,23 @@ class State(NamedTuple):
     of_speed_pi: speed_pi.State = speed_pi.State()
     of_current_pi: current_pi.State = current_pi.State()
     of_voltage_limit: voltage_limit.State = voltage_limit.State()
+    of_flux_merge: flux_merge.State = flux_merge.State()
+    of_delta_lambda: delta_lambda.State = delta_lambda.State()
+    of_flux_compensation: flux_compensation.State = flux_compensation.State()
+    of_flux_monitor: flux_monitor.State = flux_monitor.State()
+    # Outputs that the next sample reads: the feedback paths of the top.
     sat_d: int = 0
     sat_q: int = 0
+    compare_a: int = 0
+    compare_b: int = 0
+    compare_c: int = 0
+    lambda_m_alpha: int = 0
+    lambda_m_beta: int = 0
+    merge_known: int = 0
+    lambda_pi_d: int = 0
+    lambda_pi_q: int = 0
+    lambda_add_d: int = 0
+    lambda_add_q: int = 0
 
 
 class Observed(NamedTuple):
@@ -114,6 +154,7 @@ class Observed(NamedTuple):
     speed_limited: int
     lambda_d: int
     lambda_q: int
+    omega_chord: int
     u_dec_d: int
     u_dec_q: int
     u_int_d: int
@@ -127,6 +168,20 @@ class Observed(NamedTuple):
     duty_a: int
     duty_b: int
     duty_c: int
+    u_applied_alpha: int
+    u_applied_beta: int
+    lambda_c_d: int
+    lambda_c_q: int
+    lambda_m_alpha: int
+    lambda_m_beta: int
+    merge_known: int
+    delta_lambda_d: int
+    delta_lambda_q: int
+    delta_held: int
+    lambda_pi_d: int
+    lambda_pi_q: int
+    torque: int
+    flux_faults: int
     compare_a: int
     compare_b: int
     compare_c: int
@@ -186,8 +241,25 @@ def step(state, sample, regs, config):
         r.kp_q,
         r.ki_q,
     )
-    lambda_d, lambda_q = current_model.step(i_d, i_q, r.l_d, r.l_q, r.lambda_mg)
-    u_dec_d, u_dec_q = decoupling.step(omega_me, lambda_d, lambda_q)
+    winding_r, rho = winding_resistance.step(r.r_s, r.t_s)
+    lambda_m_d, lambda_m_q = flux_park.step(state.lambda_m_alpha, state.lambda_m_beta, cos_theta, sin_theta)
+    lambda_d, lambda_q, estimate_limited = flux_estimate.step(
+        i_d,
+        i_q,
+        lambda_m_d,
+        lambda_m_q,
+        state.lambda_pi_d,
+        state.lambda_pi_q,
+        state.merge_known,
+        x.run,
+        rho,
+        r.flux_mode,
+        r.l_d,
+        r.l_q,
+        r.lambda_mg,
+    )
+    (omega_chord,) = chord_speed.step(omega_me, r.k_chord)
+    u_dec_d, u_dec_q = decoupling.step(omega_chord, lambda_d, lambda_q)
     voltage_limit_state, (u_d, u_q, sat_d, sat_q) = voltage_limit.step(
         state.of_voltage_limit, u_pi_d, u_pi_q, u_dec_d, u_dec_q, u_max
     )
@@ -198,11 +270,80 @@ def step(state, sample, regs, config):
     duty_a, duty_b, duty_c = svm.step(u_alpha, u_beta, m, m_beta, n)
     compare_a, compare_b, compare_c = pwm_compare.step(duty_a, duty_b, duty_c, r.min_pulse, c.carrier_half)
 
-    following = State(speed_state, speed_pi_state, current_pi_state, voltage_limit_state, sat_d, sat_q)
+    u_applied_alpha, u_applied_beta, voltage_known = applied_voltage.step(
+        state.compare_a, state.compare_b, state.compare_c, u_dc, u_dc_at_rail, x.run, c.carrier_half
+    )
+    lambda_c_d, lambda_c_q, model_limited = current_model.step(
+        i_d, i_q, state.lambda_add_d, state.lambda_add_q, r.l_d, r.l_q, r.lambda_mg
+    )
+    lambda_c_alpha, lambda_c_beta = flux_inverse_park.step(lambda_c_d, lambda_c_q, cos_theta, sin_theta)
+    merge_state, (lambda_m_alpha, lambda_m_beta, merge_known, merge_limited) = flux_merge.step(
+        state.of_flux_merge,
+        i_alpha,
+        i_beta,
+        lambda_c_alpha,
+        lambda_c_beta,
+        u_applied_alpha,
+        u_applied_beta,
+        voltage_known,
+        x.run,
+        rho,
+        r.omega_0,
+        r.xi,
+        r.t_s,
+    )
+    factor, n_omega = speed_reciprocal.step(omega_me, r.omega_min, r.k_ramp)
+    delta_state, (delta_lambda_d, delta_lambda_q, delta_held, delta_limited) = delta_lambda.step(
+        state.of_delta_lambda,
+        u_int_d,
+        u_int_q,
+        i_d,
+        i_q,
+        sat_d,
+        sat_q,
+        current_at_rail,
+        voltage_known,
+        x.run,
+        factor,
+        n_omega,
+        winding_r,
+    )
+    compensation_state, compensated = flux_compensation.step(
+        state.of_flux_compensation,
+        delta_lambda_d,
+        delta_lambda_q,
+        delta_held,
+        r.flux_mode,
+        r.flux_kp,
+        r.flux_ki,
+        r.delta_max,
+    )
+    lambda_pi_d, lambda_pi_q, lambda_add_d, lambda_add_q, compensation_limited = compensated
+    (torque_me,) = torque.step(lambda_d, lambda_q, i_d, i_q)
+    monitor_state, (flux_faults,) = flux_monitor.step(
+        state.of_flux_monitor,
+        current_at_rail,
+        u_dc_at_rail,
+        u_dc_low,
+        model_limited,
+        merge_limited,
+        delta_limited,
+        compensation_limited,
+        estimate_limited,
+        x.clear_faults,
+    )
+
+    following = State(
+        speed_state, speed_pi_state, current_pi_state, voltage_limit_state, merge_state, delta_state,
+        compensation_state, monitor_state, sat_d, sat_q, compare_a, compare_b, compare_c,
+        lambda_m_alpha, lambda_m_beta, merge_known, lambda_pi_d, lambda_pi_q, lambda_add_d, lambda_add_q,
+    )  # fmt: skip
     return following, Observed(
         i_a, i_b, i_c, current_at_rail, u_dc, u_max, u_dc_at_rail, u_dc_low, theta_me, omega_me, i_d, i_q,
-        i_q_ref, speed_limited, lambda_d, lambda_q, u_dec_d, u_dec_q, u_int_d, u_int_q, u_d, u_q, sat_d, sat_q,
-        u_alpha, u_beta, duty_a, duty_b, duty_c, compare_a, compare_b, compare_c,
+        i_q_ref, speed_limited, lambda_d, lambda_q, omega_chord, u_dec_d, u_dec_q, u_int_d, u_int_q, u_d, u_q,
+        sat_d, sat_q, u_alpha, u_beta, duty_a, duty_b, duty_c, u_applied_alpha, u_applied_beta,
+        lambda_c_d, lambda_c_q, lambda_m_alpha, lambda_m_beta, merge_known, delta_lambda_d, delta_lambda_q,
+        delta_held, lambda_pi_d, lambda_pi_q, torque_me, flux_faults, compare_a, compare_b, compare_c,
     )  # fmt: skip
 
 

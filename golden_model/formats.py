@@ -19,9 +19,16 @@ KP = Format(0, 8, 16)  # proportional gain, per unit
 KI = Format(0, 0, 24)  # integral gain times the sample time, per unit
 INDUCTANCE = Format(0, 4, 20)  # inductance, per unit
 INTEGRAL = Format(1, 1, 28)  # integrators: 12 bits below PU, so that small errors still count
-RECIPROCAL = Format(0, 0, 17)  # m of U_dc = 2**n / m
+RECIPROCAL = Format(0, 0, 17)  # m of 1/x = m * 2**n * 2**-17
+FLUX = Format(1, 1, 23)  # flux linkages and voltages inside the estimators: 25 bits, the multiplier's wide port
+FLUX_STATE = Format(1, 1, 30)  # flux that is integrated: 7 bits below FLUX, see docs/flux_estimator.md
+RESISTANCE = Format(0, 0, 24)  # winding resistance, and the flux it takes away in half a sample, per unit
+SAMPLE_TIME = Format(0, -1, 18)  # sample time times omega_base: below half a radian a sample at base speed
 
 PU_W, TURN_W, INTEGRAL_W = PU.width, TURN.width, INTEGRAL.width
 DUTY_ONE = 1 << DUTY.frac_bits
 TRIG_ONE = 1 << TRIG.frac_bits
+FLUX_W, FLUX_STATE_W = FLUX.width, FLUX_STATE.width
 PU_TO_INTEGRAL = INTEGRAL.frac_bits - PU.frac_bits
+PU_TO_FLUX = FLUX.frac_bits - PU.frac_bits
+FLUX_TO_STATE = FLUX_STATE.frac_bits - FLUX.frac_bits

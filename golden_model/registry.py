@@ -1,7 +1,19 @@
 """Every block of the core, one line each: add yours here and the bench finds it."""
 
-from golden_model.common import sqrt
-from golden_model.control import current_model, current_pi, decoupling, speed_pi, voltage_limit
+from golden_model.common import reciprocal, sqrt
+from golden_model.control import chord_speed, current_pi, decoupling, speed_pi, voltage_limit
+from golden_model.estimators import (
+    applied_voltage,
+    current_model,
+    delta_lambda,
+    flux_compensation,
+    flux_estimate,
+    flux_merge,
+    flux_monitor,
+    speed_reciprocal,
+    torque,
+    winding_resistance,
+)
 from golden_model.io import (
     current_conditioning,
     position,
@@ -11,12 +23,13 @@ from golden_model.io import (
     u_dc_processing,
 )
 from golden_model.modulation import gate_generation, pwm_compare, svm, svm_delay_compensation
-from golden_model.transforms import clarke, inverse_park, park, rotate, sincos
+from golden_model.transforms import clarke, flux_inverse_park, flux_park, inverse_park, park, rotate, sincos
 
 BLOCKS = {
     module.BLOCK.name: module.BLOCK
     for module in (
         sqrt,
+        reciprocal,
         sample_latch,
         current_conditioning,
         position,
@@ -29,7 +42,7 @@ BLOCKS = {
         park,
         speed_pi,
         current_pi,
-        current_model,
+        chord_speed,
         decoupling,
         voltage_limit,
         svm_delay_compensation,
@@ -37,5 +50,17 @@ BLOCKS = {
         svm,
         pwm_compare,
         gate_generation,
+        winding_resistance,
+        applied_voltage,
+        current_model,
+        flux_inverse_park,
+        flux_merge,
+        flux_park,
+        flux_estimate,
+        speed_reciprocal,
+        delta_lambda,
+        flux_compensation,
+        torque,
+        flux_monitor,
     )
 }

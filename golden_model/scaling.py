@@ -9,6 +9,13 @@ w_c:  kp = w_c*L_x,  ki = w_c*R.  The speed loop crosses over at w_s on the inte
 d(omega_me)/dt = 1.5*p**2*lambda_mg/J * i_q:  Kp = w_s*J/(1.5*p**2*lambda_mg), and Ki = Kp*w_s/5 puts the
 integral's corner a factor of five below the crossover, where it costs 11 degrees of phase (atan(1/5))
 and still removes a load step within a few times 5/w_s.
+
+Flux estimator (docs/flux_estimator.md): the regulators' integrals follow an error of the decoupling with the
+time constant (R + kp)/ki; K_p = w_f*(R + kp)/ki and K_i = w_f cancel it, and the compensation crosses over at
+w_f.  Paper 001, section 4, wants w_f below the current loop's crossover and above the speed loop's: twice the
+latter, since K_p multiplies noise, but at most half of the former, or a tenth of it without a speed loop.
+The two models cross over at an eighth of the rated electrical speed, the range of the paper's experiments; the
+compensation fades in from omega_min to half of that, because below it delta_lambda makes much of small voltages.
 """
 
 import math
@@ -17,6 +24,10 @@ from typing import NamedTuple
 from golden_model.units import TURN_RAD
 
 INTEGRAL_CORNER = 5.0  # speed crossover over the corner of the speed regulator's integral
+FLUX_OVER_SPEED, FLUX_OF_CURRENT, FLUX_ALONE = 2.0, 0.5, 0.1  # flux bandwidth over the others, see above
+FADED_IN = 0.5  # of the crossover of the two flux models: full compensation from here on
+CROSSOVER_PART = 8.0  # rated electrical speed over the crossover of the two flux models
+COMPENSATION_PART = 0.5  # of the nominal flux: what the compensation may add or take
 ROUND_UP = ("dead_time", "min_pulse")  # times that must not come out shorter than asked
 
 
@@ -95,16 +106,17 @@ def speed_gains(drive):
 def current_loop(drive):
     """Current regulators, flux model of the decoupling, advance of the output angle."""
     c, m, b, t_s = drive.control, drive.machine, drive.bases, drive.sample_time_s
-    w_c, ohm = TURN_RAD * c.current_bandwidth_hz, b.voltage_v / b.current_a
+    ohm = b.voltage_v / b.current_a
     base = base_keys(drive, "current_a", "voltage_v")
     for axis in "dq":
         henry = getattr(m, f"inductance_{axis}_h")
-        kp, kp_key = getattr(c, f"current_kp_{axis}_v_per_a"), f"[control] current_kp_{axis}_v_per_a"
-        ki, ki_key = getattr(c, f"current_ki_{axis}_v_per_as"), f"[control] current_ki_{axis}_v_per_as"
-        if kp is None:
-            kp, kp_key = w_c * henry, f"[control] current_bandwidth_hz; [machine] inductance_{axis}_h"
-        if ki is None:
-            ki, ki_key = w_c * m.resistance_ohm, "[control] current_bandwidth_hz; [machine] resistance_ohm"
+        kp, ki = current_gains(drive, axis)
+        kp_key = f"[control] current_bandwidth_hz; [machine] inductance_{axis}_h"
+        ki_key = "[control] current_bandwidth_hz; [machine] resistance_ohm"
+        if getattr(c, f"current_kp_{axis}_v_per_a") is not None:
+            kp_key = f"[control] current_kp_{axis}_v_per_a"
+        if getattr(c, f"current_ki_{axis}_v_per_as") is not None:
+            ki_key = f"[control] current_ki_{axis}_v_per_as"
         yield Entry(f"kp_{axis}", kp, "V/A", ohm, f"{kp_key}; {base}")
         yield Entry(f"ki_{axis}", ki, "V/(A s)", ohm / t_s, f"{ki_key}; {base}")
         keys = f"[machine] inductance_{axis}_h; {base}; {base_keys(drive, 'omega_me_rad_s')}"
@@ -115,6 +127,65 @@ def current_loop(drive):
     yield Entry("k_delay", c.delay_samples * t_s, "s", TURN_RAD / b.omega_me_rad_s, keys)
 
 
+def current_gains(drive, axis):
+    """(kp [V/A], ki [V/(A s)]) of one axis' current regulator."""
+    c, m = drive.control, drive.machine
+    w_c = TURN_RAD * c.current_bandwidth_hz
+    kp, ki = getattr(c, f"current_kp_{axis}_v_per_a"), getattr(c, f"current_ki_{axis}_v_per_as")
+    kp = w_c * getattr(m, f"inductance_{axis}_h") if kp is None else kp
+    return kp, w_c * m.resistance_ohm if ki is None else ki
+
+
+def flux_bandwidth_hz(drive):
+    """Crossover of the compensation by delta_lambda [Hz]."""
+    c = drive.control
+    if c.flux_bandwidth_hz is not None:
+        return c.flux_bandwidth_hz
+    if c.speed_bandwidth_hz is None:
+        return FLUX_ALONE * c.current_bandwidth_hz
+    return min(FLUX_OVER_SPEED * c.speed_bandwidth_hz, FLUX_OF_CURRENT * c.current_bandwidth_hz)
+
+
+def flux_gains(drive):
+    """(K_p [1], K_i [1/s]) of paper 001 eq. (17)."""
+    c, resistance = drive.control, drive.machine.resistance_ohm
+    gains = [current_gains(drive, axis) for axis in "dq"]
+    delays = [(resistance + kp) / ki if ki else math.inf for kp, ki in gains]
+    w_f = TURN_RAD * flux_bandwidth_hz(drive)
+    kp = w_f * sum(delays) / len(delays) if c.flux_kp is None else c.flux_kp
+    return kp, w_f if c.flux_ki_per_s is None else c.flux_ki_per_s
+
+
+def flux_estimator(drive):
+    """Merge of the flux models, compensation by delta_lambda, chord of a sample."""
+    c, m, b, t_s = drive.control, drive.machine, drive.bases, drive.sample_time_s
+    speed_base, sample = base_keys(drive, "omega_me_rad_s"), "[inverter] pwm_frequency_hz"
+    keys = f"[machine] resistance_ohm; {base_keys(drive, 'current_a', 'voltage_v')}"
+    yield Entry("r_s", m.resistance_ohm, "ohm", b.voltage_v / b.current_a, keys)
+    yield Entry("t_s", t_s, "s", 1.0 / b.omega_me_rad_s, f"{sample}; {speed_base}")
+    yield Entry("k_chord", t_s**2 / 24.0, "s2", b.omega_me_rad_s**-2, f"{sample}; {speed_base}")
+    given = c.flux_crossover_hz
+    omega_0 = m.pole_pairs * m.rated_speed_rad_s / CROSSOVER_PART if given is None else TURN_RAD * given
+    keys = "[machine] pole_pairs, rated_speed_rad_s" if given is None else "[control] flux_crossover_hz"
+    yield Entry("omega_0", omega_0, "rad/s", 1.0 / t_s, f"{keys}; {sample}")
+    yield Entry("xi", c.flux_damping, "1", 1.0, "[control] flux_damping")
+    omega_min, keys = m.pole_pairs * c.flux_min_speed_rad_s, f"[control] flux_min_speed_rad_s; {speed_base}"
+    yield Entry("omega_min", omega_min, "rad/s", b.omega_me_rad_s, keys)
+    ramp = max(FADED_IN * omega_0 - omega_min, omega_min)
+    yield Entry("k_ramp", 1.0 / ramp, "s/rad", 1.0 / b.omega_me_rad_s, keys)
+    kp, ki = flux_gains(drive)
+    keys = "[control] flux_bandwidth_hz, current_bandwidth_hz, speed_bandwidth_hz"
+    yield Entry("flux_kp", kp, "1", 1.0, keys if c.flux_kp is None else "[control] flux_kp")
+    ki_keys = keys if c.flux_ki_per_s is None else "[control] flux_ki_per_s"
+    yield Entry("flux_ki", ki, "1/s", 1.0 / t_s, f"{ki_keys}; {sample}")
+    limit, keys = c.flux_compensation_limit_wb, "[control] flux_compensation_limit_wb"
+    if limit is None:
+        limit = COMPENSATION_PART * drive.nominal_flux_wb
+        keys = "[machine] magnet_flux_wb, inductance_q_h, rated_current_a"
+    yield Entry("delta_max", limit, "Wb", b.flux_wb, f"{keys}; {base_keys(drive, 'voltage_v', 'omega_me_rad_s')}")
+    yield Entry("flux_mode", c.flux_mode, "1", 1.0, "[control] flux_mode")
+
+
 def gates(drive):
     """Times of the gate signals in clocks."""
     for name in ROUND_UP:
@@ -122,4 +193,4 @@ def gates(drive):
         yield Entry(name, getattr(drive.inverter, f"{name}_s"), "s", 1.0 / drive.core.clock_hz, keys)
 
 
-PARTS = (sensing, speed_loop, current_loop, gates)
+PARTS = (sensing, speed_loop, current_loop, flux_estimator, gates)

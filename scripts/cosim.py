@@ -232,6 +232,7 @@ async def cosimulate(
             u_dc_code(codes, float(scenario.u_dc[k]), k),
             position_code(codes, plant.theta_m, k),
             *(scenario.omega_ref[k], scenario.i_d_ref[k], scenario.i_q_ext[k], scenario.speed_mode[k]),
+            0,  # clear_faults
         )
         inputs = dict(zip(INPUT_PORTS, map(int, values), strict=True))
         got = await beside.period(inputs, int(scenario.enable[k]))

@@ -37,7 +37,7 @@ def shared_formats() -> list[str]:
     for name, fmt in vars(formats).items():
         if isinstance(fmt, Format):
             lines.append(f"  constant {name}_W : positive := {fmt.width};  -- {fmt}")
-    for name in ("PU_TO_INTEGRAL", "DUTY_ONE", "TRIG_ONE"):
+    for name in ("PU_TO_INTEGRAL", "PU_TO_FLUX", "FLUX_TO_STATE", "DUTY_ONE", "TRIG_ONE"):
         lines.append(f"  constant {name} : natural := {getattr(formats, name)};")
     return lines
 

@@ -21,10 +21,10 @@ def mixed_kernel(function):
 
 @kernel
 def run_controller(state, samples, registers, config, observed):
-    """``samples`` (n, 10) in, ``observed`` (n, len(Observed)) out, both int64; returns the last state."""
+    """``samples`` (n, 11) in, ``observed`` (n, len(Observed)) out, both int64; returns the last state."""
     for k in range(samples.shape[0]):
         x = samples[k]
-        sample = fluxproof.Sample(x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8], x[9])
+        sample = fluxproof.Sample(x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8], x[9], x[10])
         state, out = fluxproof.step(state, sample, registers, config)
         for n, value in enumerate(out):
             observed[k, n] = value
@@ -56,6 +56,7 @@ def run_averaged(
             references[k, 1],
             references[k, 2],
             references[k, 3],
+            0,
             1,
         )
         state, seen = fluxproof.step(state, sample, registers, config)

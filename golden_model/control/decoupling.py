@@ -1,7 +1,7 @@
 """Rotational voltages, the last term of paper 001 eq. (2), added to the current regulators' outputs.
 
-    u_dec_d = -omega_me*lambda_q
-    u_dec_q =  omega_me*lambda_d
+    u_dec_d = -omega_chord*lambda_q
+    u_dec_q =  omega_chord*lambda_d
 
 Formats: products exact, 32 fraction bits, rounded half up to PU.
 Saturation: at 2 per unit, twice the largest voltage that the limiter grants.
@@ -16,14 +16,14 @@ DROP = PU.frac_bits
 
 
 @kernel
-def step(omega_me, lambda_d, lambda_q):
-    prod_d = -(omega_me * lambda_q)
-    prod_q = omega_me * lambda_d
+def step(omega_chord, lambda_d, lambda_q):
+    prod_d = -(omega_chord * lambda_q)
+    prod_q = omega_chord * lambda_d
     return round_sat(prod_d, DROP, PU_W), round_sat(prod_q, DROP, PU_W)
 
 
 def reference(v, _state):
-    u_d, u_q = -v["omega_me"] * v["lambda_q"], v["omega_me"] * v["lambda_d"]
+    u_d, u_q = -v["omega_chord"] * v["lambda_q"], v["omega_chord"] * v["lambda_d"]
     return {k: PU.limit(x) for k, x in (("u_dec_d", u_d), ("u_dec_q", u_q))}
 
 
@@ -37,7 +37,7 @@ BLOCK = Block(
     paper="001, eq. (2), 'dq decoupling term' of Fig. 8",
     step=step,
     inputs=(
-        Port("omega_me", PU, doc="electrical speed"),
+        Port("omega_chord", PU, doc="electrical speed along the chord of a sample"),
         Port("lambda_d", PU, doc="flux linkage, d axis"),
         Port("lambda_q", PU, doc="flux linkage, q axis"),
     ),

@@ -22,6 +22,7 @@ def step(
     i_d_ref_in,
     i_q_ext_in,
     speed_mode_in,
+    clear_faults_in,
     run_in,
     *_widths,
 ):
@@ -35,6 +36,7 @@ def step(
         i_d_ref_in,
         i_q_ext_in,
         speed_mode_in,
+        clear_faults_in,
         run_in,
     )
 
@@ -49,6 +51,7 @@ NAMES = {
     "i_d_ref_in": "i_d_ref",
     "i_q_ext_in": "i_q_ext",
     "speed_mode_in": "speed_mode",
+    "clear_faults_in": "clear_faults",
     "run_in": "run",
 }
 _CODES = {p.name: p for b in (current_conditioning, position, u_dc_conditioning) for p in b.BLOCK.inputs}
@@ -57,6 +60,7 @@ _REFERENCES = {
     "i_d_ref": Port("i_d_ref", PU, doc="current reference, d axis"),
     "i_q_ext": Port("i_q_ext", PU, doc="current reference of torque mode, q axis"),
     "speed_mode": Port("speed_mode", BIT, doc="1: speed control, 0: torque control"),
+    "clear_faults": Port("clear_faults", BIT, doc="1: forget what is over"),
     "run": Port("run", BIT, doc="1: the gates are switching"),
 }
 _PORTS = _CODES | _REFERENCES

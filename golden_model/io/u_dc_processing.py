@@ -1,28 +1,25 @@
 """U_dc as 2**n / m, so that the modulator multiplies where it would divide.
 
-    1 / u_dc = m * 2**n * 2**-17          m in (2**16, 2**17), n in 0..5
-    m_beta   = m * sqrt(3)/2              what the beta axis needs in the modulator
+    1 / u_dc = m * 2**n * 2**-17       see common/reciprocal
+    m_beta   = m * sqrt(3)/2           what the beta axis needs in the modulator
 
-m is the rounded quotient, one bit a clock beside the data path; it is ready long before the modulator
-asks.  Error bound: |m*2**n*2**-17 * u_dc - 1| <= 2**-17 over the whole range (half an LSB of m >= 2**16;
-a whole one at u_dc = 2**-n, where 2**17 is stored as 2**17 - 1).
+m is made beside the data path; it is ready long before the modulator asks.
+Error bound: |m*2**n*2**-17 * u_dc - 1| <= 2**-17 over the whole range.
 Range: below 1/32 per unit the bus is taken for 1/32 and ``u_dc_low`` is raised: the duties then come
 out smaller than asked, never larger.
+Rounding: m_beta half up; it is below m, so it fits.
 """
 
 import math
 
 from golden_model.block import Block, Const, Port
+from golden_model.common import reciprocal
 from golden_model.fixed import Format, round_half_up
 from golden_model.formats import BIT, RECIPROCAL, U_DC
 from golden_model.kernel import kernel
 
 N_MAX = 5
-MANTISSA_ONE = 1 << U_DC.frac_bits
 U_DC_MIN = 1 << (U_DC.frac_bits - N_MAX)
-M_MAX = (1 << RECIPROCAL.width) - 1
-QUOTIENT_BITS = RECIPROCAL.width + 1  # one more than m, to round with
-NUMERATOR = 1 << (U_DC.frac_bits + QUOTIENT_BITS)
 SQRT3_2 = Const(math.sqrt(3) / 2, Format(0, 0, 17))
 K_SQRT3_2 = SQRT3_2.value
 DROP_BETA = SQRT3_2.fmt.frac_bits
@@ -30,14 +27,7 @@ DROP_BETA = SQRT3_2.fmt.frac_bits
 
 @kernel
 def step(u_dc):
-    low = 1 if u_dc < U_DC_MIN else 0
-    mantissa = max(u_dc, U_DC_MIN)
-    n = 0
-    while mantissa < MANTISSA_ONE:
-        mantissa <<= 1
-        n += 1
-    quotient = min(NUMERATOR // mantissa, (1 << QUOTIENT_BITS) - 1)
-    m = min(round_half_up(quotient, 1), M_MAX)
+    m, n, low = reciprocal.step(u_dc, N_MAX)
     m_beta = round_half_up(m * K_SQRT3_2, DROP_BETA)
     return m, m_beta, n, low
 
@@ -72,15 +62,9 @@ BLOCK = Block(
         Port("n", Format(0, 3, 0), doc="exponent of 1/u_dc"),
         Port("u_dc_low", BIT, doc="bus below 1/32 per unit"),
     ),
-    latency=23,
-    interval=23,
-    constants={
-        "N_MAX": N_MAX,
-        "U_DC_MIN": U_DC_MIN,
-        "QUOTIENT_BITS": QUOTIENT_BITS,
-        "SQRT3_2": SQRT3_2,
-        "DROP_BETA": DROP_BETA,
-    },
+    latency=reciprocal.BLOCK.latency + 2,
+    interval=reciprocal.BLOCK.interval + 2,
+    constants={"N_MAX": N_MAX, "U_DC_MIN": U_DC_MIN, "SQRT3_2": SQRT3_2, "DROP_BETA": DROP_BETA},
     reference=reference,
     bound=bound,
     stimuli=stimuli,

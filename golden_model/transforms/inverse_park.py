@@ -7,14 +7,14 @@ Formats, rounding and saturation: those of rotate.
 """
 
 from golden_model.block import Block, Port
-from golden_model.formats import PU
+from golden_model.formats import PU, PU_W
 from golden_model.kernel import kernel
 from golden_model.transforms import rotate
 
 
 @kernel
 def step(u_d, u_q, cos_theta, sin_theta):
-    return rotate.step(u_d, u_q, cos_theta, sin_theta)
+    return rotate.step(u_d, u_q, cos_theta, sin_theta, PU_W)
 
 
 def reference(v, _state):
@@ -44,5 +44,5 @@ BLOCK = Block(
     interval=rotate.BLOCK.interval,
     reference=reference,
     bound=bound,
-    stimuli=rotate.unit_vectors("u_d", "u_q"),
+    stimuli=rotate.unit_vectors("u_d", "u_q", PU),
 )

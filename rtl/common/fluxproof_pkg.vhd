@@ -22,13 +22,19 @@ package fluxproof_pkg is
   constant INDUCTANCE_W : positive := 24;  -- U(4,20)
   constant INTEGRAL_W : positive := 30;  -- S(1,28)
   constant RECIPROCAL_W : positive := 17;  -- U(0,17)
+  constant FLUX_W : positive := 25;  -- S(1,23)
+  constant FLUX_STATE_W : positive := 32;  -- S(1,30)
+  constant RESISTANCE_W : positive := 24;  -- U(0,24)
+  constant SAMPLE_TIME_W : positive := 17;  -- U(-1,18)
   constant PU_TO_INTEGRAL : natural := 12;
+  constant PU_TO_FLUX : natural := 7;
+  constant FLUX_TO_STATE : natural := 7;
   constant DUTY_ONE : natural := 65536;
   constant TRIG_ONE : natural := 65536;
 
   -- fluxproof: clocks from the raw sample to the duties, least distance of two samples
   constant FLUXPROOF_SAMPLE_TO_DUTY : positive := 38;
-  constant FLUXPROOF_SAMPLE_INTERVAL : positive := 44;
+  constant FLUXPROOF_SAMPLE_INTERVAL : positive := 47;
 
   -- sqrt: 001, section 5.2: voltage limit of the current regulation
   constant SQRT_LATENCY : positive := 6;
@@ -106,6 +112,10 @@ package fluxproof_pkg is
     10x"208", 10x"206", 10x"206", 10x"204", 10x"204", 10x"202", 10x"202", 10x"201"
   );
 
+  -- reciprocal: 001, section 5.2, U_dc processing: division by 2**n / m
+  constant RECIPROCAL_LATENCY : positive := 21;
+  constant RECIPROCAL_QUOTIENT_BITS : natural := 18;
+
   -- sample_latch: 001, Fig. 5: acquisition
   constant SAMPLE_LATCH_LATENCY : positive := 1;
 
@@ -130,7 +140,6 @@ package fluxproof_pkg is
   constant U_DC_PROCESSING_LATENCY : positive := 23;
   constant U_DC_PROCESSING_N_MAX : natural := 5;
   constant U_DC_PROCESSING_U_DC_MIN : natural := 2048;
-  constant U_DC_PROCESSING_QUOTIENT_BITS : natural := 18;
   constant U_DC_PROCESSING_SQRT3_2 : signed(17 downto 0) := to_signed(113512, 18);  -- 0.866025404 as U(0,17), signed for the multiplier
   constant U_DC_PROCESSING_DROP_BETA : natural := 17;
 
@@ -309,9 +318,11 @@ package fluxproof_pkg is
   constant CURRENT_PI_DROP_I : natural := 12;
   constant CURRENT_PI_PROPORTIONAL_W : natural := 32;
 
-  -- current_model: 001, eq. (6)
-  constant CURRENT_MODEL_LATENCY : positive := 3;
-  constant CURRENT_MODEL_DROP : natural := 20;
+  -- chord_speed: 001, eq. (2), for a voltage that is held during a sample
+  constant CHORD_SPEED_LATENCY : positive := 6;
+  constant CHORD_SPEED_DROP_SQUARE : natural := 18;
+  constant CHORD_SPEED_DROP_PART : natural := 17;
+  constant CHORD_SPEED_DROP : natural := 20;
 
   -- decoupling: 001, eq. (2), 'dq decoupling term' of Fig. 8
   constant DECOUPLING_LATENCY : positive := 3;
@@ -340,5 +351,75 @@ package fluxproof_pkg is
 
   -- gate_generation: 001, section 5.2, IGBT pulse generation
   constant GATE_GENERATION_LATENCY : positive := 1;
+
+  -- winding_resistance: 001, eq. (5): the resistive drop
+  constant WINDING_RESISTANCE_LATENCY : positive := 2;
+  constant WINDING_RESISTANCE_DROP : natural := 19;
+
+  -- applied_voltage: 001, section 2.2: u_alphabeta of eq. (5)
+  constant APPLIED_VOLTAGE_LATENCY : positive := 7;
+  constant APPLIED_VOLTAGE_K_FRAC : natural := 16;
+  constant APPLIED_VOLTAGE_SCALE_W : natural := 24;
+  constant APPLIED_VOLTAGE_DROP_SCALE : natural := 10;
+  constant APPLIED_VOLTAGE_THIRD : signed(17 downto 0) := to_signed(87381, 18);  -- 0.333333333 as U(-1,18), signed for the multiplier
+  constant APPLIED_VOLTAGE_INV_SQRT3 : signed(17 downto 0) := to_signed(75674, 18);  -- 0.577350269 as U(0,17), signed for the multiplier
+  constant APPLIED_VOLTAGE_DROP_THIRD : natural := 18;
+  constant APPLIED_VOLTAGE_DROP_INV_SQRT3 : natural := 17;
+  constant APPLIED_VOLTAGE_TO_FLUX : natural := 1;
+
+  -- current_model: 001, eq. (6); with lambda_add the last term of eq. (16)
+  constant CURRENT_MODEL_LATENCY : positive := 3;
+  constant CURRENT_MODEL_SHIFT_MG : natural := 20;
+  constant CURRENT_MODEL_SHIFT_ADD : natural := 13;
+  constant CURRENT_MODEL_DROP : natural := 13;
+
+  -- flux_inverse_park: 001, eq. (9): T_dq/alphabeta
+  constant FLUX_INVERSE_PARK_LATENCY : positive := 4;
+
+  -- flux_merge: 001, eq. (7); 'Merge of voltage and current models' of Fig. 8
+  constant FLUX_MERGE_LATENCY : positive := 8;
+  constant FLUX_MERGE_Y_W : natural := 25;
+  constant FLUX_MERGE_X_W : natural := 34;
+  constant FLUX_MERGE_DROP_RHO : natural := 10;
+  constant FLUX_MERGE_DROP_Y : natural := 16;
+  constant FLUX_MERGE_DROP_X : natural := 7;
+  constant FLUX_MERGE_DROP_XI : natural := 8;
+  constant FLUX_MERGE_DROP_U : natural := 11;
+  constant FLUX_MERGE_X_TO_STATE : natural := 6;
+
+  -- flux_park: 001, eq. (9): T_alphabeta/dq
+  constant FLUX_PARK_LATENCY : positive := 4;
+
+  -- flux_estimate: 001, eq. (17)
+  constant FLUX_ESTIMATE_LATENCY : positive := 3;
+  constant FLUX_ESTIMATE_SHIFT_BASE : natural := 17;
+  constant FLUX_ESTIMATE_SHIFT_MODEL : natural := 4;
+  constant FLUX_ESTIMATE_DROP : natural := 24;
+
+  -- speed_reciprocal: 001, section 5.2: lower limit of the speed for delta_lambda
+  constant SPEED_RECIPROCAL_LATENCY : positive := 24;
+  constant SPEED_RECIPROCAL_N_MAX : natural := 12;
+  constant SPEED_RECIPROCAL_DROP_WEIGHT : natural := 4;
+  constant SPEED_RECIPROCAL_DROP_FACTOR : natural := 16;
+  constant SPEED_RECIPROCAL_WEIGHT_ONE : natural := 65536;
+
+  -- delta_lambda: 001, eq. (15); 'delta lambda_dq' of Fig. 8
+  constant DELTA_LAMBDA_LATENCY : positive := 8;
+  constant DELTA_LAMBDA_DROP_R : natural := 12;
+  constant DELTA_LAMBDA_DROP_SHIFTED : natural := 5;
+  constant DELTA_LAMBDA_DROP_FACTOR : natural := 17;
+
+  -- flux_compensation: 001, eq. (17): (K_p + K_i/s)*delta_lambda; the last term of eq. (16)
+  constant FLUX_COMPENSATION_LATENCY : positive := 5;
+  constant FLUX_COMPENSATION_DROP_P : natural := 3;
+  constant FLUX_COMPENSATION_DROP_I : natural := 10;
+  constant FLUX_COMPENSATION_SHIFT_LIMIT : natural := 14;
+
+  -- torque: 001, eq. (4)
+  constant TORQUE_LATENCY : positive := 4;
+  constant TORQUE_DROP : natural := 16;
+
+  -- flux_monitor: none: what a drive needs besides
+  constant FLUX_MONITOR_LATENCY : positive := 1;
 
 end package fluxproof_pkg;

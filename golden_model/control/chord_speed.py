@@ -1,0 +1,57 @@
+"""The speed at which a flux seems to turn when its voltage stands still for a sample.
+
+    omega_chord = omega_me - k_chord*omega_me**3          k_chord = t_s**2/24
+
+The inverter's voltage vector does not turn within a period.  In steady state it carries the flux along the
+chord from one sample to the next, and the chord of the angle a = omega_me*T_s is 2*sin(a/2), not a:
+u = j*(2/T_s)*sin(omega_me*T_s/2)*lambda + R*i.  The decoupling multiplies by this speed; with the arc the
+flux that makes the regulators' integrals vanish would be too small by a**2/24, 1 % at half a radian a sample.
+The series' next term is a**4/1920 of it, 3e-5 at half a radian: left out.
+
+Formats: omega_me**2 U(3,14), k_chord U(-6,23), their product U(-3,20), each half up; the last rounding is to
+PU.  No saturation: k_chord*omega_me**2 < 1/16, so the result is closer to zero than omega_me and keeps its sign.
+"""
+
+from golden_model.block import Block, Port
+from golden_model.fixed import Format, round_half_up
+from golden_model.formats import PU
+from golden_model.kernel import kernel
+
+SQUARE = Format(0, 3, 14)
+K_CHORD = Format(0, -6, 23)
+PART = Format(0, -3, 20)
+DROP_SQUARE = 2 * PU.frac_bits - SQUARE.frac_bits
+DROP_PART = SQUARE.frac_bits + K_CHORD.frac_bits - PART.frac_bits
+DROP = PART.frac_bits
+
+
+@kernel
+def step(omega_me, k_chord):
+    square = round_half_up(omega_me * omega_me, DROP_SQUARE)
+    part = round_half_up(square * k_chord, DROP_PART)
+    return (omega_me - round_half_up(part * omega_me, DROP),)
+
+
+def reference(v, _state):
+    return {"omega_chord": v["omega_me"] - v["k_chord"] * v["omega_me"] ** 3}
+
+
+def bound(v, _state):
+    part = v["k_chord"] * SQUARE.lsb / 2 + PART.lsb / 2
+    return {"omega_chord": abs(v["omega_me"]) * part + PU.lsb / 2}
+
+
+BLOCK = Block(
+    name="chord_speed",
+    folder="control",
+    paper="001, eq. (2), for a voltage that is held during a sample",
+    step=step,
+    inputs=(Port("omega_me", PU, doc="electrical speed"),),
+    registers=(Port("k_chord", K_CHORD, doc="square of the sample time over 24, per unit"),),
+    outputs=(Port("omega_chord", PU, doc="electrical speed along the chord of a sample"),),
+    latency=6,
+    interval=5,
+    constants={"DROP_SQUARE": DROP_SQUARE, "DROP_PART": DROP_PART, "DROP": DROP},
+    reference=reference,
+    bound=bound,
+)

@@ -1,0 +1,134 @@
+"""What the current regulators' integrals say about the flux: paper 001 eq. (15).
+
+    delta_lambda_d =  (u_int_q - r*i_q) / omega_me
+    delta_lambda_q = -(u_int_d - r*i_d) / omega_me        1/omega_me as factor * 2**n
+
+With the decoupling fed by the estimate, the integrals hold the resistive drop and omega_me times the estimate's
+error, nothing else.  u_int is that of two samples before: a voltage asked for at one sample acts in the next
+period and shows in the currents at its end, and with the regulators' zero on the winding's pole
+R*i(k) = u_int(k-2) holds through every step of the reference, not in steady state alone.
+
+Held as it is while the integrals mean something else: voltage at its limit (sat_d, sat_q), a current converter
+at its end, bus reading lost.  Zero while the gates are off.
+
+Formats: r*i rounded half up to 28 fraction bits; difference exact; shifted by n, rounded half up and saturated to
+FLUX; times factor, rounded half up.  Saturation at 2 per unit of flux: more than the machine can have, which small
+speeds make of a small voltage error; told by ``delta_limited`` unless the weight is zero anyway.
+"""
+
+from typing import NamedTuple
+
+from golden_model.block import Block, Port
+from golden_model.control.current_pi import SAT
+from golden_model.estimators import speed_reciprocal
+from golden_model.estimators.winding_resistance import R
+from golden_model.fixed import Format, exceeds, round_half_up, saturate
+from golden_model.formats import BIT, FLUX, FLUX_W, INTEGRAL, PU, RESISTANCE
+from golden_model.kernel import kernel
+
+DROP_R = PU.frac_bits + RESISTANCE.frac_bits - INTEGRAL.frac_bits
+DROP_SHIFTED = INTEGRAL.frac_bits - FLUX.frac_bits
+DROP_FACTOR = speed_reciprocal.FACTOR.frac_bits
+
+
+class State(NamedTuple):
+    delta_d: int = 0  # FLUX
+    delta_q: int = 0
+    u_int_d_1: int = 0  # INTEGRAL, of the last sample
+    u_int_q_1: int = 0
+    u_int_d_2: int = 0  # of the sample before it
+    u_int_q_2: int = 0
+
+
+@kernel
+def axis(u_int, i, factor, n, r):
+    """One axis: (delta, 1 where it was limited)."""
+    rest = u_int - round_half_up(r * i, DROP_R)
+    shifted = round_half_up(rest << n, DROP_SHIFTED)
+    prod = saturate(shifted, FLUX_W) * factor
+    delta = round_half_up(prod, DROP_FACTOR)
+    limited = exceeds(shifted, FLUX_W) if factor != 0 else 0
+    return saturate(delta, FLUX_W), limited
+
+
+@kernel
+def step(
+    state, u_int_d, u_int_q, i_d, i_q, sat_d, sat_q, current_at_rail, voltage_known, run, factor, n_omega, r
+):
+    delta_d, limited_d = axis(state.u_int_q_2, i_q, factor, n_omega, r)
+    delta_q, limited_q = axis(state.u_int_d_2, i_d, -factor, n_omega, r)
+    limited = limited_d | limited_q
+    held = 1 if sat_d != 0 or sat_q != 0 or current_at_rail != 0 or not voltage_known else 0
+    if held:
+        delta_d, delta_q, limited = state.delta_d, state.delta_q, 0
+    if not run:
+        delta_d, delta_q, limited = 0, 0, 0
+    state = State(delta_d, delta_q, u_int_d, u_int_q, state.u_int_d_1, state.u_int_q_1)
+    return state, (delta_d, delta_q, held, limited)
+
+
+def reference(v, state):
+    if not v["run"]:
+        return {"delta_lambda_d": 0.0, "delta_lambda_q": 0.0}
+    if v["sat_d"] or v["sat_q"] or v["current_at_rail"] or not v["voltage_known"]:
+        return {"delta_lambda_d": state.delta_d * FLUX.lsb, "delta_lambda_q": state.delta_q * FLUX.lsb}
+    out = {}
+    for x, u_int, i, sign in (("d", state.u_int_q_2, v["i_q"], 1), ("q", state.u_int_d_2, v["i_d"], -1)):
+        rest = u_int * INTEGRAL.lsb - v["r"] * i
+        scaled = FLUX.limit(rest * 2.0 ** v["n_omega"])
+        out[f"delta_lambda_{x}"] = FLUX.limit(scaled * sign * v["factor"])
+    return out
+
+
+def bound(v, _state):
+    """The drop's rounding grows with 2**n, the shifted value's with the factor, then the output's."""
+    scaled = 2.0 ** v["n_omega"] * INTEGRAL.lsb / 2 + FLUX.lsb
+    return dict.fromkeys(("delta_lambda_d", "delta_lambda_q"), scaled * abs(v["factor"]) + FLUX.lsb)
+
+
+def stimuli(rng, _config):
+    """Small rests at every exponent, both signs of the speed; each reason to hold; stop and restart."""
+    calm = {"sat_d": 0, "sat_q": 0, "current_at_rail": 0, "voltage_known": 1, "run": 1, "r": 641000}
+    rows = []
+    for n in range(speed_reciprocal.N_MAX + 1):
+        for factor in (131071, -131071, 70000, -1, 0):
+            signals = {k: int(rng.integers(-(1 << 17), 1 << 17)) for k in ("u_int_d", "u_int_q")}
+            rows.append({**calm, **signals, "i_d": 7, "i_q": -900, "factor": factor, "n_omega": n})
+    for change in ({"sat_d": 1}, {"sat_q": -1}, {"current_at_rail": 4}, {"voltage_known": 0}, {"run": 0}, {}):
+        rows += [{**rows[20], **change}, {**rows[24], **change}]
+    return rows
+
+
+DELTA = (
+    Port("delta_lambda_d", FLUX, doc="flux the estimate lacks, d axis"),
+    Port("delta_lambda_q", FLUX, doc="flux the estimate lacks, q axis"),
+    Port("delta_held", BIT, doc="1: held, the integrals mean something else"),
+)
+
+BLOCK = Block(
+    name="delta_lambda",
+    folder="estimators",
+    paper="001, eq. (15); 'delta lambda_dq' of Fig. 8",
+    step=step,
+    inputs=(
+        Port("u_int_d", INTEGRAL, doc="integral part of the regulator, d axis"),
+        Port("u_int_q", INTEGRAL, doc="integral part of the regulator, q axis"),
+        Port("i_d", PU, doc="current, d axis"),
+        Port("i_q", PU, doc="current, q axis"),
+        Port("sat_d", SAT, lo=-1, hi=1, doc="limit that holds the d axis"),
+        Port("sat_q", SAT, lo=-1, hi=1, doc="limit that holds the q axis"),
+        Port("current_at_rail", Format(0, 3, 0), doc="bit x: code of phase x at its end"),
+        Port("voltage_known", BIT, doc="0: gates off or bus reading lost"),
+        Port("run", BIT, doc="1: the gates are switching"),
+        *speed_reciprocal.OUTPUTS,
+        R,
+    ),
+    outputs=(*DELTA, Port("delta_limited", BIT, doc="delta lambda reached its range")),
+    state=State(),
+    latency=8,
+    interval=2,
+    constants={"DROP_R": DROP_R, "DROP_SHIFTED": DROP_SHIFTED, "DROP_FACTOR": DROP_FACTOR},
+    reference=reference,
+    bound=bound,
+    stimuli=stimuli,
+)

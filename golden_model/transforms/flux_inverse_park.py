@@ -1,0 +1,48 @@
+"""The current model's flux linkage to the stator frame: the rotation by theta_me, in FLUX.
+
+    lambda_c_alpha = lambda_c_d*cos_theta - lambda_c_q*sin_theta
+    lambda_c_beta  = lambda_c_d*sin_theta + lambda_c_q*cos_theta
+
+Formats, rounding and saturation: those of rotate at the width of FLUX.
+"""
+
+from golden_model.block import Block, Port
+from golden_model.formats import FLUX, FLUX_W
+from golden_model.kernel import kernel
+from golden_model.transforms import rotate
+
+
+@kernel
+def step(lambda_c_d, lambda_c_q, cos_theta, sin_theta):
+    return rotate.step(lambda_c_d, lambda_c_q, cos_theta, sin_theta, FLUX_W)
+
+
+def reference(v, _state):
+    c, s, d, q = v["cos_theta"], v["sin_theta"], v["lambda_c_d"], v["lambda_c_q"]
+    return {"lambda_c_alpha": FLUX.limit(d * c - q * s), "lambda_c_beta": FLUX.limit(d * s + q * c)}
+
+
+def bound(_v, _state):
+    return {"lambda_c_alpha": FLUX.lsb / 2, "lambda_c_beta": FLUX.lsb / 2}
+
+
+BLOCK = Block(
+    name="flux_inverse_park",
+    folder="transforms",
+    paper="001, eq. (9): T_dq/alphabeta",
+    step=step,
+    inputs=(
+        Port("lambda_c_d", FLUX, doc="flux linkage of the current model, d axis"),
+        Port("lambda_c_q", FLUX, doc="flux linkage of the current model, q axis"),
+        *rotate.TRIG_PORTS,
+    ),
+    outputs=(
+        Port("lambda_c_alpha", FLUX, doc="flux linkage of the current model, alpha"),
+        Port("lambda_c_beta", FLUX, doc="flux linkage of the current model, beta"),
+    ),
+    latency=rotate.BLOCK.latency,
+    interval=rotate.BLOCK.interval,
+    reference=reference,
+    bound=bound,
+    stimuli=rotate.unit_vectors("lambda_c_d", "lambda_c_q", FLUX),
+)

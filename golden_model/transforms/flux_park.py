@@ -1,0 +1,49 @@
+"""Merged flux linkage to the rotor frame: the rotation by -theta_me, in FLUX.
+
+    lambda_m_d =  lambda_m_alpha*cos_theta + lambda_m_beta*sin_theta
+    lambda_m_q = -lambda_m_alpha*sin_theta + lambda_m_beta*cos_theta
+
+Formats, rounding and saturation: those of rotate at the width of FLUX.
+"""
+
+from golden_model.block import Block, Port
+from golden_model.formats import FLUX, FLUX_W
+from golden_model.kernel import kernel
+from golden_model.transforms import rotate
+
+
+@kernel
+def step(lambda_m_alpha, lambda_m_beta, cos_theta, sin_theta):
+    return rotate.step(lambda_m_alpha, lambda_m_beta, cos_theta, -sin_theta, FLUX_W)
+
+
+def reference(v, _state):
+    c, s, alpha, beta = v["cos_theta"], v["sin_theta"], v["lambda_m_alpha"], v["lambda_m_beta"]
+    return {"lambda_m_d": FLUX.limit(alpha * c + beta * s), "lambda_m_q": FLUX.limit(beta * c - alpha * s)}
+
+
+def bound(_v, _state):
+    return {"lambda_m_d": FLUX.lsb / 2, "lambda_m_q": FLUX.lsb / 2}
+
+
+LAMBDA_M = (
+    Port("lambda_m_alpha", FLUX, doc="merged flux before the sample's resistive drop, alpha"),
+    Port("lambda_m_beta", FLUX, doc="merged flux before the sample's resistive drop, beta"),
+)
+
+BLOCK = Block(
+    name="flux_park",
+    folder="transforms",
+    paper="001, eq. (9): T_alphabeta/dq",
+    step=step,
+    inputs=(*LAMBDA_M, *rotate.TRIG_PORTS),
+    outputs=(
+        Port("lambda_m_d", FLUX, doc="merged flux before the sample's resistive drop, d axis"),
+        Port("lambda_m_q", FLUX, doc="merged flux before the sample's resistive drop, q axis"),
+    ),
+    latency=rotate.BLOCK.latency,
+    interval=rotate.BLOCK.interval,
+    reference=reference,
+    bound=bound,
+    stimuli=rotate.unit_vectors("lambda_m_alpha", "lambda_m_beta", FLUX),
+)
