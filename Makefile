@@ -24,7 +24,7 @@ unexport PYTHONHOME
 
 PYTHON_RUN := .venv/bin/python
 
-.PHONY: help setup generate test demo bench timeline mutate verilog lint lock clean distclean
+.PHONY: help setup generate test demo papers bench timeline mutate verilog lint lock clean distclean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -40,6 +40,9 @@ test: setup ## run every test (golden model, plant, VHDL simulation)
 
 demo: setup ## run the demonstration
 	$(PYTHON_RUN) -m scripts.demo $(ARGS)
+
+papers: setup ## reproduce the papers' experiments: findings, figures, report
+	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m scripts.papers $(ARGS)
 
 bench: setup ## run the benchmarks
 	$(PYTHON_RUN) -m scripts.bench $(ARGS)

@@ -75,10 +75,14 @@ class GhdlDevice:
         began = now()
         await RisingEdge(dut.duty_valid)
         duty_clocks = now() + 1 - began  # the edge at which a follower would see duty_valid
-        await RisingEdge(dut.compare_valid)
+        await RisingEdge(dut.values_valid)
         await FallingEdge(dut.clk)
         observed = {name: read(handle, signed) for name, handle, signed in self.observed}
         return await self._finish(observed, duty_clocks, running)
+
+    def change(self, registers) -> None:
+        for name, value in registers.items():
+            getattr(self.dut, name).value = int(value)
 
     async def _finish(self, observed, duty_clocks: int, running: int) -> Period:
         await RisingEdge(self.dut.sample_trigger)

@@ -56,13 +56,13 @@ def test_vhdl_equals_python(tmp_path):
     assert len(lines) == len(rows) > 10_000
     for (drop, width, bits, x), line in zip(rows, lines, strict=True):
         fields = line.split()
-        got = [
-            number(text, signed) for text, signed in zip(fields, (True, True, False, True, True), strict=True)
-        ]
+        signs = (True, True, False, False, True, True)
+        got = [number(text, signed) for text, signed in zip(fields, signs, strict=True)]
         limit = 1 << (min(width, bits) - 1)
         wanted = [
             fixed.round_half_up(x, drop),
             fixed.saturate(x, width),
+            fixed.exceeds(x, width),
             fixed.saturate_u(x, width),
             fixed.round_sat(x, drop, width),
             fixed.clamp(x, -limit, limit),

@@ -68,11 +68,14 @@ def test_samples_as_close_as_allowed():
     assert core.get("running") == 1
     rng, state = np.random.default_rng(1), fluxproof.State()
     for _ in range(2000):
-        sample = fluxproof.Sample(*rng.integers(0, 1 << 16, 5), *rng.integers(-90000, 90000, 3), rng.integers(2), rng.integers(2), 1)
+        codes, references = rng.integers(0, 1 << 16, 5), rng.integers(-90000, 90000, 3)
+        sample = fluxproof.Sample(*codes, *references, *rng.integers(0, 2, 2), 1)
         inputs = dict(zip([p.name for p in sample_latch.BLOCK.inputs], map(int, sample), strict=True))
         inputs.pop("run_in")
         core.apply_sample(**inputs)
         core.tick(fluxproof.SAMPLE_INTERVAL - 1)
-        state, wanted = fluxproof.step(state, fluxproof.Sample(*map(int, sample)), register_set.values, config)
+        state, wanted = fluxproof.step(
+            state, fluxproof.Sample(*map(int, sample)), register_set.values, config
+        )
         got = core.get_many(fluxproof.Observed._fields)
         assert tuple(got.values()) == tuple(wanted)

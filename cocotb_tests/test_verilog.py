@@ -146,7 +146,7 @@ def test_equals_vhdl_clock_by_clock(ghdl5, generics, tmp_path, capsys):
     assert len(got) == len(wanted) == CLOCKS
 
     # Registers without a reset are undefined in VHDL and 0 in Verilog until the first sample has passed.
-    first = next(k for k, row in enumerate(wanted) if row[names.index("compare_valid")] == 1)
+    first = next(k for k, row in enumerate(wanted) if row[names.index("values_valid")] == 1)
     undefined = [k for k, row in enumerate(wanted) for value in row if value is None]
     assert max(undefined, default=0) < first, f"undefined at clock {max(undefined)}, first valid at {first}"
 
@@ -182,7 +182,7 @@ def test_run_period_records_what_a_trace_shows(ghdl5):
         rows += slow.trace(clocks - sample_at, names).tolist()
         words += [high | low << 3 for high, low, _ in rows]
         changes = [(k, words[k]) for k in range(1, clocks + 1) if words[k] != words[k - 1]]
-        assert fast.duty_at - sample_at > 0 and fast.compare_at > fast.duty_at
+        assert fast.duty_at - sample_at > 0 and fast.values_at > fast.duty_at
         assert [row[2] for row in rows] == [0] * (clocks - 1) + [1]
         assert changes == list(zip(edge_clocks.tolist(), gate_words.tolist(), strict=True))
         edges += len(changes)
@@ -198,7 +198,7 @@ def test_set_refuses_what_does_not_fit(ghdl5):
         with pytest.raises(ValueError):
             core.set(name, value)
     with pytest.raises(TimeoutError):
-        core.clocks_until("compare_valid", 50)
+        core.clocks_until("values_valid", 50)
 
 
 SHIFT = """\

@@ -20,7 +20,7 @@ KI = Format(0, 0, 24)  # integral gain times the sample time, per unit
 INDUCTANCE = Format(0, 4, 20)  # inductance, per unit
 INTEGRAL = Format(1, 1, 28)  # integrators: 12 bits below PU, so that small errors still count
 RECIPROCAL = Format(0, 0, 17)  # m of 1/x = m * 2**n * 2**-17
-FLUX = Format(1, 1, 23)  # flux linkages and voltages inside the estimators: 25 bits, the multiplier's wide port
+FLUX = Format(1, 1, 23)  # fluxes and voltages inside the estimators: 25 bits, the multiplier's wide port
 FLUX_STATE = Format(1, 1, 30)  # flux that is integrated: 7 bits below FLUX, see docs/flux_estimator.md
 RESISTANCE = Format(0, 0, 24)  # winding resistance, and the flux it takes away in half a sample, per unit
 SAMPLE_TIME = Format(0, -1, 18)  # sample time times omega_base: below half a radian a sample at base speed

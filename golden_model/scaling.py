@@ -163,7 +163,8 @@ def flux_estimator(drive):
     keys = f"[machine] resistance_ohm; {base_keys(drive, 'current_a', 'voltage_v')}"
     yield Entry("r_s", m.resistance_ohm, "ohm", b.voltage_v / b.current_a, keys)
     yield Entry("t_s", t_s, "s", 1.0 / b.omega_me_rad_s, f"{sample}; {speed_base}")
-    yield Entry("k_chord", t_s**2 / 24.0, "s2", b.omega_me_rad_s**-2, f"{sample}; {speed_base}")
+    inverse_speed = 1.0 / b.omega_me_rad_s
+    yield Entry("k_chord", t_s * t_s / 24.0, "s2", inverse_speed * inverse_speed, f"{sample}; {speed_base}")
     given = c.flux_crossover_hz
     omega_0 = m.pole_pairs * m.rated_speed_rad_s / CROSSOVER_PART if given is None else TURN_RAD * given
     keys = "[machine] pole_pairs, rated_speed_rad_s" if given is None else "[control] flux_crossover_hz"
@@ -182,7 +183,9 @@ def flux_estimator(drive):
     if limit is None:
         limit = COMPENSATION_PART * drive.nominal_flux_wb
         keys = "[machine] magnet_flux_wb, inductance_q_h, rated_current_a"
-    yield Entry("delta_max", limit, "Wb", b.flux_wb, f"{keys}; {base_keys(drive, 'voltage_v', 'omega_me_rad_s')}")
+    yield Entry(
+        "delta_max", limit, "Wb", b.flux_wb, f"{keys}; {base_keys(drive, 'voltage_v', 'omega_me_rad_s')}"
+    )
     yield Entry("flux_mode", c.flux_mode, "1", 1.0, "[control] flux_mode")
 
 

@@ -33,6 +33,7 @@ entity fluxproof is
     i_d_ref_in      : in  signed(PU_W - 1 downto 0);  -- current reference, d axis
     i_q_ext_in      : in  signed(PU_W - 1 downto 0);  -- current reference of torque mode, q axis
     speed_mode_in   : in  std_logic;  -- 1: speed control, 0: torque control
+    clear_faults_in : in  std_logic;  -- 1: forget the flux estimator's faults that are over
     enable          : in  std_logic;  -- 1: gates may switch
     trip            : in  std_logic;  -- 1: gates off, remembered
     clear_trip      : in  std_logic;  -- 1: forget the trip
@@ -60,6 +61,17 @@ entity fluxproof is
     l_d             : in  unsigned(INDUCTANCE_W - 1 downto 0);  -- inductance, d axis
     l_q             : in  unsigned(INDUCTANCE_W - 1 downto 0);  -- inductance, q axis
     lambda_mg       : in  signed(PU_W - 1 downto 0);  -- magnet flux linkage
+    r_s             : in  unsigned(RESISTANCE_W - 1 downto 0);  -- winding resistance
+    t_s             : in  unsigned(SAMPLE_TIME_W - 1 downto 0);  -- sample time, per unit
+    omega_0         : in  unsigned(15 downto 0);  -- crossover of the two models, times the sample time
+    xi              : in  unsigned(15 downto 0);  -- damping of the merge
+    omega_min       : in  unsigned(DUTY_W - 1 downto 0);  -- no compensation up to this speed
+    k_ramp          : in  unsigned(15 downto 0);  -- compensation fades in over 1/k_ramp above omega_min
+    flux_kp         : in  unsigned(16 downto 0);  -- proportional gain of the compensation
+    flux_ki         : in  unsigned(16 downto 0);  -- integral gain of the compensation times the sample time
+    delta_max       : in  unsigned(15 downto 0);  -- limit of the compensation
+    flux_mode       : in  unsigned(1 downto 0);  -- 0: eq. (6), 1: eq. (11), 2: eq. (16), 3: eq. (17)
+    k_chord         : in  unsigned(16 downto 0);  -- square of the sample time over 24, per unit
     k_delay         : in  unsigned(16 downto 0);  -- turns per unit of speed
     min_pulse       : in  unsigned(11 downto 0);  -- shortest pulse of a leg, clocks
     dead_time       : in  unsigned(11 downto 0);  -- both gates of a leg off, clocks
@@ -72,7 +84,8 @@ entity fluxproof is
     min_pulse_used  : out unsigned(11 downto 0);  -- minimum pulse in force
     carrier         : out unsigned(15 downto 0);  -- carrier, for observation
     duty_valid      : out std_logic;  -- the duties of the sample are there
-    compare_valid   : out std_logic;  -- the compare values are there, and all of the sample's values below
+    compare_valid   : out std_logic;  -- the compare values are there
+    values_valid    : out std_logic;  -- all of the sample's values below are there
     i_a             : out signed(PU_W - 1 downto 0);  -- current, phase a
     i_b             : out signed(PU_W - 1 downto 0);  -- current, phase b
     i_c             : out signed(PU_W - 1 downto 0);  -- current, phase c
@@ -89,6 +102,7 @@ entity fluxproof is
     speed_limited   : out std_logic;  -- output at its limit
     lambda_d        : out signed(PU_W - 1 downto 0);  -- flux linkage, d axis
     lambda_q        : out signed(PU_W - 1 downto 0);  -- flux linkage, q axis
+    omega_chord     : out signed(PU_W - 1 downto 0);  -- electrical speed along the chord of a sample
     u_dec_d         : out signed(PU_W - 1 downto 0);  -- rotational voltage, d axis
     u_dec_q         : out signed(PU_W - 1 downto 0);  -- rotational voltage, q axis
     u_int_d         : out signed(INTEGRAL_W - 1 downto 0);  -- its integral part, d axis
@@ -102,6 +116,20 @@ entity fluxproof is
     duty_a          : out unsigned(DUTY_W - 1 downto 0);  -- duty, leg a
     duty_b          : out unsigned(DUTY_W - 1 downto 0);  -- duty, leg b
     duty_c          : out unsigned(DUTY_W - 1 downto 0);  -- duty, leg c
+    u_applied_alpha : out signed(FLUX_W - 1 downto 0);  -- voltage of the coming period, alpha
+    u_applied_beta  : out signed(FLUX_W - 1 downto 0);  -- voltage of the coming period, beta
+    lambda_c_d      : out signed(FLUX_W - 1 downto 0);  -- flux linkage of the current model, d axis
+    lambda_c_q      : out signed(FLUX_W - 1 downto 0);  -- flux linkage of the current model, q axis
+    lambda_m_alpha  : out signed(FLUX_W - 1 downto 0);  -- merged flux before the sample's resistive drop, alpha
+    lambda_m_beta   : out signed(FLUX_W - 1 downto 0);  -- merged flux before the sample's resistive drop, beta
+    merge_known     : out std_logic;  -- the flux will be good at the next sample
+    delta_lambda_d  : out signed(FLUX_W - 1 downto 0);  -- flux the estimate lacks, d axis
+    delta_lambda_q  : out signed(FLUX_W - 1 downto 0);  -- flux the estimate lacks, q axis
+    delta_held      : out std_logic;  -- 1: held, the integrals mean something else
+    lambda_pi_d     : out signed(FLUX_W - 1 downto 0);  -- compensation, d axis
+    lambda_pi_q     : out signed(FLUX_W - 1 downto 0);  -- compensation, q axis
+    torque          : out signed(PU_W - 1 downto 0);  -- estimated torque
+    flux_faults     : out unsigned(6 downto 0);  -- what has disturbed the flux estimate, see flux_monitor
     compare_a       : out unsigned(15 downto 0);  -- compare value, leg a
     compare_b       : out unsigned(15 downto 0);  -- compare value, leg b
     compare_c       : out unsigned(15 downto 0)  -- compare value, leg c
@@ -109,47 +137,69 @@ entity fluxproof is
 end entity fluxproof;
 
 architecture rtl of fluxproof is
-  signal latch_valid      : std_logic;
-  signal code_a           : unsigned(ADC_BITS - 1 downto 0);
-  signal code_b           : unsigned(ADC_BITS - 1 downto 0);
-  signal code_c           : unsigned(ADC_BITS - 1 downto 0);
-  signal code_u_dc        : unsigned(ADC_BITS - 1 downto 0);
-  signal code_theta       : unsigned(POSITION_BITS - 1 downto 0);
-  signal omega_ref        : signed(PU_W - 1 downto 0);
-  signal i_d_ref          : signed(PU_W - 1 downto 0);
-  signal i_q_ext          : signed(PU_W - 1 downto 0);
-  signal speed_mode       : std_logic;
-  signal run              : std_logic;
-  signal current_valid    : std_logic;
-  signal theta_valid      : std_logic;
-  signal omega_valid      : std_logic;
-  signal u_dc_valid       : std_logic;
-  signal reciprocal_valid : std_logic;
-  signal m                : unsigned(RECIPROCAL_W - 1 downto 0);
-  signal m_beta           : unsigned(RECIPROCAL_W - 1 downto 0);
-  signal n                : unsigned(2 downto 0);
-  signal alpha_beta_valid : std_logic;
-  signal i_alpha          : signed(PU_W - 1 downto 0);
-  signal i_beta           : signed(PU_W - 1 downto 0);
-  signal trig_valid       : std_logic;
-  signal cos_theta        : signed(PU_W - 1 downto 0);
-  signal sin_theta        : signed(PU_W - 1 downto 0);
-  signal dq_valid         : std_logic;
-  signal i_q_ref_valid    : std_logic;
-  signal pi_valid         : std_logic;
-  signal u_pi_d           : signed(PU_W - 1 downto 0);
-  signal u_pi_q           : signed(PU_W - 1 downto 0);
-  signal lambda_valid     : std_logic;
-  signal decoupling_valid : std_logic;
-  signal dq_voltage_valid : std_logic;
-  signal theta_out_valid  : std_logic;
-  signal theta_out        : unsigned(TURN_W - 1 downto 0);
-  signal trig_out_valid   : std_logic;
-  signal cos_out          : signed(PU_W - 1 downto 0);
-  signal sin_out          : signed(PU_W - 1 downto 0);
-  signal ab_voltage_valid : std_logic;
-  signal duty_ready       : std_logic;
-  signal compare_ready    : std_logic;
+  signal latch_valid          : std_logic;
+  signal code_a               : unsigned(ADC_BITS - 1 downto 0);
+  signal code_b               : unsigned(ADC_BITS - 1 downto 0);
+  signal code_c               : unsigned(ADC_BITS - 1 downto 0);
+  signal code_u_dc            : unsigned(ADC_BITS - 1 downto 0);
+  signal code_theta           : unsigned(POSITION_BITS - 1 downto 0);
+  signal omega_ref            : signed(PU_W - 1 downto 0);
+  signal i_d_ref              : signed(PU_W - 1 downto 0);
+  signal i_q_ext              : signed(PU_W - 1 downto 0);
+  signal speed_mode           : std_logic;
+  signal run                  : std_logic;
+  signal current_valid        : std_logic;
+  signal theta_valid          : std_logic;
+  signal omega_valid          : std_logic;
+  signal u_dc_valid           : std_logic;
+  signal reciprocal_valid     : std_logic;
+  signal m                    : unsigned(RECIPROCAL_W - 1 downto 0);
+  signal m_beta               : unsigned(RECIPROCAL_W - 1 downto 0);
+  signal n                    : unsigned(2 downto 0);
+  signal alpha_beta_valid     : std_logic;
+  signal i_alpha              : signed(PU_W - 1 downto 0);
+  signal i_beta               : signed(PU_W - 1 downto 0);
+  signal trig_valid           : std_logic;
+  signal cos_theta            : signed(PU_W - 1 downto 0);
+  signal sin_theta            : signed(PU_W - 1 downto 0);
+  signal dq_valid             : std_logic;
+  signal i_q_ref_valid        : std_logic;
+  signal pi_valid             : std_logic;
+  signal u_pi_d               : signed(PU_W - 1 downto 0);
+  signal u_pi_q               : signed(PU_W - 1 downto 0);
+  signal lambda_valid         : std_logic;
+  signal decoupling_valid     : std_logic;
+  signal dq_voltage_valid     : std_logic;
+  signal theta_out_valid      : std_logic;
+  signal theta_out            : unsigned(TURN_W - 1 downto 0);
+  signal trig_out_valid       : std_logic;
+  signal cos_out              : signed(PU_W - 1 downto 0);
+  signal sin_out              : signed(PU_W - 1 downto 0);
+  signal ab_voltage_valid     : std_logic;
+  signal duty_ready           : std_logic;
+  signal compare_ready        : std_logic;
+  signal r                    : unsigned(RESISTANCE_W - 1 downto 0);
+  signal rho                  : unsigned(RESISTANCE_W - 1 downto 0);
+  signal lambda_m_d           : signed(FLUX_W - 1 downto 0);
+  signal lambda_m_q           : signed(FLUX_W - 1 downto 0);
+  signal estimate_limited     : std_logic;
+  signal voltage_known        : std_logic;
+  signal model_limited        : std_logic;
+  signal lambda_c_alpha       : signed(FLUX_W - 1 downto 0);
+  signal lambda_c_beta        : signed(FLUX_W - 1 downto 0);
+  signal merge_limited        : std_logic;
+  signal factor               : signed(17 downto 0);
+  signal n_omega              : unsigned(3 downto 0);
+  signal delta_limited        : std_logic;
+  signal lambda_add_d         : signed(FLUX_W - 1 downto 0);
+  signal lambda_add_q         : signed(FLUX_W - 1 downto 0);
+  signal compensation_limited : std_logic;
+  signal model_valid          : std_logic;
+  signal model_ab_valid       : std_logic;
+  signal factor_valid         : std_logic;
+  signal delta_valid          : std_logic;
+  signal lambda_pi_valid      : std_logic;
+  signal clear_faults         : std_logic;
 begin
 
   latch : entity work.sample_latch
@@ -158,30 +208,32 @@ begin
       POSITION_BITS => POSITION_BITS
     )
     port map (
-      clk           => clk,
-      rst           => rst,
-      in_valid      => sample_valid,
-      adc_a         => adc_a,
-      adc_b         => adc_b,
-      adc_c         => adc_c,
-      adc_u_dc      => adc_u_dc,
-      position_code => position_code,
-      omega_ref_in  => omega_ref_in,
-      i_d_ref_in    => i_d_ref_in,
-      i_q_ext_in    => i_q_ext_in,
-      speed_mode_in => speed_mode_in,
-      run_in        => running,
-      out_valid     => latch_valid,
-      code_a        => code_a,
-      code_b        => code_b,
-      code_c        => code_c,
-      code_u_dc     => code_u_dc,
-      code_theta    => code_theta,
-      omega_ref     => omega_ref,
-      i_d_ref       => i_d_ref,
-      i_q_ext       => i_q_ext,
-      speed_mode    => speed_mode,
-      run           => run
+      clk             => clk,
+      rst             => rst,
+      in_valid        => sample_valid,
+      adc_a           => adc_a,
+      adc_b           => adc_b,
+      adc_c           => adc_c,
+      adc_u_dc        => adc_u_dc,
+      position_code   => position_code,
+      omega_ref_in    => omega_ref_in,
+      i_d_ref_in      => i_d_ref_in,
+      i_q_ext_in      => i_q_ext_in,
+      speed_mode_in   => speed_mode_in,
+      clear_faults_in => clear_faults_in,
+      run_in          => running,
+      out_valid       => latch_valid,
+      code_a          => code_a,
+      code_b          => code_b,
+      code_c          => code_c,
+      code_u_dc       => code_u_dc,
+      code_theta      => code_theta,
+      omega_ref       => omega_ref,
+      i_d_ref         => i_d_ref,
+      i_q_ext         => i_q_ext,
+      speed_mode      => speed_mode,
+      clear_faults    => clear_faults,
+      run             => run
     );
 
   conditioning : entity work.current_conditioning
@@ -350,32 +402,78 @@ begin
       u_int_q   => u_int_q
     );
 
-  flux_model : entity work.current_model
+  resistance : entity work.winding_resistance
     port map (
       clk       => clk,
       rst       => rst,
-      in_valid  => dq_valid,
-      i_d       => i_d,
-      i_q       => i_q,
-      l_d       => l_d,
-      l_q       => l_q,
-      lambda_mg => lambda_mg,
-      out_valid => lambda_valid,
-      lambda_d  => lambda_d,
-      lambda_q  => lambda_q
+      in_valid  => latch_valid,
+      r_s       => r_s,
+      t_s       => t_s,
+      out_valid => open,
+      r         => r,
+      rho       => rho
+    );
+
+  merged_flux : entity work.flux_park
+    port map (
+      clk            => clk,
+      rst            => rst,
+      in_valid       => trig_valid,
+      lambda_m_alpha => lambda_m_alpha,
+      lambda_m_beta  => lambda_m_beta,
+      cos_theta      => cos_theta,
+      sin_theta      => sin_theta,
+      out_valid      => open,
+      lambda_m_d     => lambda_m_d,
+      lambda_m_q     => lambda_m_q
+    );
+
+  flux : entity work.flux_estimate
+    port map (
+      clk              => clk,
+      rst              => rst,
+      in_valid         => dq_valid,
+      i_d              => i_d,
+      i_q              => i_q,
+      lambda_m_d       => lambda_m_d,
+      lambda_m_q       => lambda_m_q,
+      lambda_pi_d      => lambda_pi_d,
+      lambda_pi_q      => lambda_pi_q,
+      merge_known      => merge_known,
+      run              => run,
+      rho              => rho,
+      flux_mode        => flux_mode,
+      l_d              => l_d,
+      l_q              => l_q,
+      lambda_mg        => lambda_mg,
+      out_valid        => lambda_valid,
+      lambda_d         => lambda_d,
+      lambda_q         => lambda_q,
+      estimate_limited => estimate_limited
+    );
+
+  chord : entity work.chord_speed
+    port map (
+      clk         => clk,
+      rst         => rst,
+      in_valid    => omega_valid,
+      omega_me    => omega_me,
+      k_chord     => k_chord,
+      out_valid   => open,
+      omega_chord => omega_chord
     );
 
   cross_coupling : entity work.decoupling
     port map (
-      clk       => clk,
-      rst       => rst,
-      in_valid  => lambda_valid,
-      omega_me  => omega_me,
-      lambda_d  => lambda_d,
-      lambda_q  => lambda_q,
-      out_valid => decoupling_valid,
-      u_dec_d   => u_dec_d,
-      u_dec_q   => u_dec_q
+      clk         => clk,
+      rst         => rst,
+      in_valid    => lambda_valid,
+      omega_chord => omega_chord,
+      lambda_d    => lambda_d,
+      lambda_q    => lambda_q,
+      out_valid   => decoupling_valid,
+      u_dec_d     => u_dec_d,
+      u_dec_q     => u_dec_q
     );
 
   circle : entity work.voltage_limit
@@ -464,6 +562,170 @@ begin
       compare_a => compare_a,
       compare_b => compare_b,
       compare_c => compare_c
+    );
+
+  period_voltage : entity work.applied_voltage
+    generic map (
+      CARRIER_HALF => CARRIER_HALF
+    )
+    port map (
+      clk             => clk,
+      rst             => rst,
+      in_valid        => u_dc_valid,
+      compare_a       => compare_a,
+      compare_b       => compare_b,
+      compare_c       => compare_c,
+      u_dc            => u_dc,
+      u_dc_at_rail    => u_dc_at_rail,
+      run             => run,
+      out_valid       => open,
+      u_applied_alpha => u_applied_alpha,
+      u_applied_beta  => u_applied_beta,
+      voltage_known   => voltage_known
+    );
+
+  magnetic_model : entity work.current_model
+    port map (
+      clk           => clk,
+      rst           => rst,
+      in_valid      => dq_valid,
+      i_d           => i_d,
+      i_q           => i_q,
+      lambda_add_d  => lambda_add_d,
+      lambda_add_q  => lambda_add_q,
+      l_d           => l_d,
+      l_q           => l_q,
+      lambda_mg     => lambda_mg,
+      out_valid     => model_valid,
+      lambda_c_d    => lambda_c_d,
+      lambda_c_q    => lambda_c_q,
+      model_limited => model_limited
+    );
+
+  model_flux : entity work.flux_inverse_park
+    port map (
+      clk            => clk,
+      rst            => rst,
+      in_valid       => model_valid,
+      lambda_c_d     => lambda_c_d,
+      lambda_c_q     => lambda_c_q,
+      cos_theta      => cos_theta,
+      sin_theta      => sin_theta,
+      out_valid      => model_ab_valid,
+      lambda_c_alpha => lambda_c_alpha,
+      lambda_c_beta  => lambda_c_beta
+    );
+
+  merge : entity work.flux_merge
+    port map (
+      clk             => clk,
+      rst             => rst,
+      in_valid        => model_ab_valid,
+      i_alpha         => i_alpha,
+      i_beta          => i_beta,
+      lambda_c_alpha  => lambda_c_alpha,
+      lambda_c_beta   => lambda_c_beta,
+      u_applied_alpha => u_applied_alpha,
+      u_applied_beta  => u_applied_beta,
+      voltage_known   => voltage_known,
+      run             => run,
+      rho             => rho,
+      omega_0         => omega_0,
+      xi              => xi,
+      t_s             => t_s,
+      out_valid       => open,
+      lambda_m_alpha  => lambda_m_alpha,
+      lambda_m_beta   => lambda_m_beta,
+      merge_known     => merge_known,
+      merge_limited   => merge_limited
+    );
+
+  speed_inverse : entity work.speed_reciprocal
+    port map (
+      clk       => clk,
+      rst       => rst,
+      in_valid  => omega_valid,
+      omega_me  => omega_me,
+      omega_min => omega_min,
+      k_ramp    => k_ramp,
+      out_valid => factor_valid,
+      factor    => factor,
+      n_omega   => n_omega
+    );
+
+  flux_error : entity work.delta_lambda
+    port map (
+      clk             => clk,
+      rst             => rst,
+      in_valid        => factor_valid,
+      u_int_d         => u_int_d,
+      u_int_q         => u_int_q,
+      i_d             => i_d,
+      i_q             => i_q,
+      sat_d           => sat_d,
+      sat_q           => sat_q,
+      current_at_rail => current_at_rail,
+      voltage_known   => voltage_known,
+      run             => run,
+      factor          => factor,
+      n_omega         => n_omega,
+      r               => r,
+      out_valid       => delta_valid,
+      delta_lambda_d  => delta_lambda_d,
+      delta_lambda_q  => delta_lambda_q,
+      delta_held      => delta_held,
+      delta_limited   => delta_limited
+    );
+
+  compensation : entity work.flux_compensation
+    port map (
+      clk                  => clk,
+      rst                  => rst,
+      in_valid             => delta_valid,
+      delta_lambda_d       => delta_lambda_d,
+      delta_lambda_q       => delta_lambda_q,
+      delta_held           => delta_held,
+      flux_mode            => flux_mode,
+      flux_kp              => flux_kp,
+      flux_ki              => flux_ki,
+      delta_max            => delta_max,
+      out_valid            => lambda_pi_valid,
+      lambda_pi_d          => lambda_pi_d,
+      lambda_pi_q          => lambda_pi_q,
+      lambda_add_d         => lambda_add_d,
+      lambda_add_q         => lambda_add_q,
+      compensation_limited => compensation_limited
+    );
+
+  torque_estimate : entity work.torque
+    port map (
+      clk       => clk,
+      rst       => rst,
+      in_valid  => lambda_valid,
+      lambda_d  => lambda_d,
+      lambda_q  => lambda_q,
+      i_d       => i_d,
+      i_q       => i_q,
+      out_valid => open,
+      torque    => torque
+    );
+
+  monitor : entity work.flux_monitor
+    port map (
+      clk                  => clk,
+      rst                  => rst,
+      in_valid             => lambda_pi_valid,
+      current_at_rail      => current_at_rail,
+      u_dc_at_rail         => u_dc_at_rail,
+      u_dc_low             => u_dc_low,
+      model_limited        => model_limited,
+      merge_limited        => merge_limited,
+      delta_limited        => delta_limited,
+      compensation_limited => compensation_limited,
+      estimate_limited     => estimate_limited,
+      clear_faults         => clear_faults,
+      out_valid            => values_valid,
+      flux_faults          => flux_faults
     );
 
   gates : entity work.gate_generation

@@ -7,7 +7,7 @@ edge is compared with ``==``.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -17,7 +17,7 @@ from golden_model import fluxproof
 from golden_model.io import sample_latch
 from golden_model.kernel import kernel
 from golden_model.modulation import gate_generation
-from plant import Inverter, Machine, Sensors, SwitchingPlant, sensor_params
+from plant import Inverter, Machine, Sensors, SwitchingPlant, centred_gates, sensor_params
 from plant.sensors import current_code, position_code, u_dc_code
 
 INPUT_PORTS = tuple(p.name for p in sample_latch.BLOCK.inputs if p.name != "run_in")
@@ -35,9 +35,24 @@ class Scenario:
     i_q_ext: np.ndarray  # integers
     speed_mode: np.ndarray  # 0 or 1
     enable: np.ndarray  # 0 or 1
+    brake: np.ndarray | None = None  # [Nm] most that a brake on the shaft can hold, see ``load_torque``
+    changes: Mapping[int, Mapping[str, int]] = field(
+        default_factory=dict
+    )  # period -> registers from there on
+    omega_m: float = 0.0  # mechanical speed at the start [rad/s]
+    clear_faults: np.ndarray | None = None  # 0 or 1; None: never
 
     def __len__(self) -> int:
         return len(self.load)
+
+
+BRAKE_SLOPE = 10.0  # Nm per rad/s: a held shaft creeps below half a rad/s, and a period still integrates well
+
+
+@kernel
+def load_torque(load, brake, omega_m):
+    """Load [Nm] and a brake that only ever opposes the motion, up to ``brake`` [Nm]."""
+    return load + max(-brake, min(brake, BRAKE_SLOPE * omega_m))
 
 
 @dataclass
@@ -60,6 +75,9 @@ class Device(Protocol):
 
     async def period(self, inputs: dict[str, int], enable: int) -> Period:
         """From this sample_trigger to the next; ``inputs`` are the raw sample's ports."""
+
+    def change(self, registers: Mapping[str, int]) -> None:
+        """Set registers, now, between two periods."""
 
 
 @kernel
@@ -139,18 +157,24 @@ PLANT_SIGNALS = {
 }
 
 
-def build_plant(drive, sensors: Sensors | None = None) -> tuple[SwitchingPlant, Sensors]:
-    """Plant and sensors as drive.toml describes them; the device's own dead time comes out of its gates."""
-    machine = Machine.from_mapping(vars(drive.machine))
+def described_sensors(drive) -> Sensors:
+    """Sensors as drive.toml describes them."""
     s = drive.sensors
-    sensors = sensors or Sensors(
+    return Sensors(
         current_bits=s.adc_bits,
         current_full_scale_a=s.current_range_a,
         u_dc_bits=s.adc_bits,
         u_dc_full_scale_v=s.u_dc_range_v,
         position_bits=s.position_bits,
     )
-    return SwitchingPlant(machine, Inverter()), sensors
+
+
+def build_plant(
+    drive, sensors: Sensors | None = None, machine: Machine | None = None, omega_m: float = 0.0
+) -> tuple[SwitchingPlant, Sensors]:
+    """Plant and sensors as drive.toml describes them; the device's own dead time comes out of its gates."""
+    machine = machine or Machine.from_mapping(vars(drive.machine))
+    return SwitchingPlant(machine, Inverter(), omega_m=omega_m), sensors or described_sensors(drive)
 
 
 class Beside:
@@ -167,6 +191,12 @@ class Beside:
         """Count a difference; the first one is kept in words."""
         self.result.differences += 1
         self.result.first_difference = self.result.first_difference or f"period {len(self.observed)}: {what}"
+
+    def change(self, registers: Mapping[str, int]) -> None:
+        """Set registers of both between two periods."""
+        self.registers = self.registers._replace(**registers)
+        self.gates.registers = self.registers
+        self.device.change(registers)
 
     async def start(self, enable: int) -> None:
         """Reset and run to the first sample_trigger."""
@@ -218,26 +248,40 @@ async def cosimulate(
     scenario: Scenario,
     progress: Callable[[int, int], None] = lambda done, total: None,
     sensors: Sensors | None = None,
+    machine: Machine | None = None,
+    ideal_inverter: bool = False,
 ) -> Result:
-    """Run ``scenario`` on ``device`` in closed loop and compare with the golden model at every period."""
+    """Run ``scenario`` on ``device`` in closed loop and compare with the golden model at every period.
+
+    ``ideal_inverter``: the plant follows the compare values in force, as if its inverter had no dead time; the
+    gates are still compared edge by edge.
+    """
     period_s = 1.0 / drive.inverter.pwm_frequency_hz
-    plant, described = build_plant(drive, sensors)
+    plant, described = build_plant(drive, sensors, machine, scenario.omega_m)
+    duties = np.zeros(3)
     codes, plant_rows = sensor_params(described), []
     beside = Beside(device, register_set)
     await beside.start(int(scenario.enable[0]))
     for k in range(len(scenario)):
+        if k in scenario.changes:
+            beside.change(scenario.changes[k])
         plant_rows.append([read(plant) for read in PLANT_SIGNALS.values()])
         values = (
             *(current_code(codes, n, plant.i_abc[n], k) for n in range(3)),
             u_dc_code(codes, float(scenario.u_dc[k]), k),
             position_code(codes, plant.theta_m, k),
             *(scenario.omega_ref[k], scenario.i_d_ref[k], scenario.i_q_ext[k], scenario.speed_mode[k]),
-            0,  # clear_faults
+            0 if scenario.clear_faults is None else scenario.clear_faults[k],
         )
         inputs = dict(zip(INPUT_PORTS, map(int, values), strict=True))
         got = await beside.period(inputs, int(scenario.enable[k]))
-        times = got.edge_clocks * (period_s / got.clocks)
-        plant.advance(times, got.gate_words, float(scenario.u_dc[k]), float(scenario.load[k]), period_s)
+        times, words = got.edge_clocks * (period_s / got.clocks), got.gate_words
+        if ideal_inverter:
+            times, words = centred_gates(duties, 0.0, period_s)
+            duties = np.array(beside.observed[-1][-3:]) / beside.config.carrier_half
+        brake = 0.0 if scenario.brake is None else scenario.brake[k]
+        load = load_torque(float(scenario.load[k]), float(brake), plant.omega_m)
+        plant.advance(times, words, float(scenario.u_dc[k]), load, period_s)
         progress(k + 1, len(scenario))
     result = beside.finish()
     result.plant = dict(zip(PLANT_SIGNALS, np.array(plant_rows).T, strict=True))

@@ -22,9 +22,13 @@ def steps(n: int, changes: dict[float, float], per_period: float) -> np.ndarray:
 
 
 def scenario(
-    drive: Drive, seconds: float, rpm, load=None, u_dc=None, i_d=None, i_q=None, torque_mode=(), off=()
-) -> Scenario:
-    """Staircases in SI units to a scenario; ``torque_mode`` and ``off`` are (from, to) intervals [s]."""
+    drive: Drive, seconds: float, rpm, load=None, u_dc=None, i_d=None, i_q=None, torque_mode=(), off=(), brake=None,
+    changes=None, start_rpm=0.0,
+) -> Scenario:  # fmt: skip
+    """Staircases in SI units to a scenario; ``torque_mode`` and ``off`` are (from, to) intervals [s].
+
+    ``changes`` maps a time [s] to the registers (integers by name) that change there.
+    """
     t_s = drive.sample_time_s
     n = round(seconds / t_s)
     omega = steps(n, rpm, t_s) * RPM * drive.machine.pole_pairs
@@ -46,6 +50,9 @@ def scenario(
         i_q_ext=integers("i_q_ext", steps(n, i_q or {}, t_s)),
         speed_mode=1 - inside(torque_mode),
         enable=1 - inside(off),
+        brake=steps(n, brake or {}, t_s),
+        changes={round(time / t_s): registers for time, registers in (changes or {}).items()},
+        omega_m=start_rpm * RPM,
     )
 
 

@@ -18,7 +18,13 @@ from cocotb_tests import simulate
 from golden_model.registry import BLOCKS
 from scripts.files import BUILD, ROOT, write_json
 
-COLOURS = {"io": "#7a8b99", "transforms": "#2a9d8f", "control": "#e76f51", "modulation": "#264653"}
+COLOURS = {
+    "io": "#7a8b99",
+    "transforms": "#2a9d8f",
+    "control": "#e76f51",
+    "modulation": "#264653",
+    "estimators": "#8e5ea2",
+}
 
 
 def measure() -> dict:

@@ -127,7 +127,7 @@ void core_read(const Core* core, const int32_t* ports, int64_t count, int64_t* v
 // `sample_at` sees sample_valid high (none does if that is never reached).  clocks[] and words[] take at
 // most `most` + 1 entries: the number of the tick after which the gate word was new, and that word; number 0
 // means that it had changed before, since the last call.  facts: entries written; the tick after which
-// duty_valid was high, and compare_valid (0: none).
+// duty_valid was high, and values_valid (0: none).
 int64_t core_run_period(Core* core, int64_t most, int64_t sample_at, int32_t* clocks, uint8_t* words,
                         int64_t* facts) {
     Vfluxproof& top = core->top;
@@ -148,7 +148,7 @@ int64_t core_run_period(Core* core, int64_t most, int64_t sample_at, int32_t* cl
         core->tick();
         look(k);
         if (top.duty_valid) facts[1] = k;
-        if (top.compare_valid) facts[2] = k;
+        if (top.values_valid) facts[2] = k;
         if (top.sample_trigger) break;
     }
     top.sample_valid = 0;

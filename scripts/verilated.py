@@ -172,7 +172,7 @@ class VerilatedCore:
         self._index = {name: k for k, name in enumerate(self.ports)}
         self._lists: dict[tuple[str, ...], np.ndarray] = {}
         self._edges = (np.empty(0, np.int32), np.empty(0, np.uint8))
-        self.duty_at = self.compare_at = 0  # ticks of the last run_period that raised the two valids, 0: none
+        self.duty_at = self.values_at = 0  # ticks of the last run_period that raised the two valids, 0: none
         self._library = _load(folder / LIBRARY)
         self._handle = self._library.core_new()
 
@@ -257,10 +257,10 @@ class VerilatedCore:
         self.set("sample_valid", 0)
 
     def run_sample(self, wait: int | None = None, most: int = 1000, **inputs: int) -> dict[str, int]:
-        """``apply_sample``, then ``wait`` ticks or until compare_valid: all outputs of the sample."""
+        """``apply_sample``, then ``wait`` ticks or until values_valid: all outputs of the sample."""
         self.apply_sample(**inputs)
         if wait is None:
-            self.clocks_until("compare_valid", most)
+            self.clocks_until("values_valid", most)
         else:
             self.tick(wait)
         return self.get_many()
@@ -276,7 +276,7 @@ class VerilatedCore:
         first where the word changed between the last call and this one, by ``tick`` and the like.
 
         ``sample``: inputs to set now, entering the core with sample_valid at tick ``sample_at``; RuntimeError
-        where the call ended before that tick.  ``duty_at`` and ``compare_at`` then say at which tick the
+        where the call ended before that tick.  ``duty_at`` and ``values_at`` then say at which tick the
         duties and all values of the sample were there; they stay readable until the next sample's.
         """
         if sample is not None:
@@ -288,10 +288,10 @@ class VerilatedCore:
         facts = np.empty(3, np.int64)
         at = 0 if sample is None else sample_at
         clocks = self._library.core_run_period(self._handle, max_clocks, at, *self._edges, facts)
-        found, self.duty_at, self.compare_at = facts.tolist()
+        found, self.duty_at, self.values_at = facts.tolist()
         if clocks < at:
             raise RuntimeError(f"the sample of tick {at} never entered: the call ended after {clocks}")
-        return clocks, self._edges[0][: found].copy(), self._edges[1][: found].copy()
+        return clocks, self._edges[0][:found].copy(), self._edges[1][:found].copy()
 
 
 def measure(carrier_half: int, periods: int) -> float:

@@ -33,6 +33,9 @@ class VerilatedDevice:
         # A tick's outputs are seen by the next one: hence one clock more than the ticks between.
         return self._finish(*ended, self.core.get_many(Observed._fields), self.core.duty_at - at + 1, running)
 
+    def change(self, registers) -> None:
+        self.core.set_many(registers)
+
     def _finish(self, clocks, edge_clocks, words, observed, duty_clocks, running) -> Period:
         edges = self.carried + [(int(c), int(w)) for c, w in zip(edge_clocks, words, strict=True)]
         self.carried = [(0, w) for c, w in edges if c == clocks]

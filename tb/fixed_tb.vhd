@@ -1,6 +1,6 @@
 -- Purpose: runs every function of fixed_pkg on the lines of a file and writes what comes out.
 -- A line holds drop, width and x as a bit string; so one run covers any number of formats.
--- Output line: round_half_up, saturate, saturate_u, round_sat, clamp to +-2**(width-2), as bit strings.
+-- Output line: round_half_up, saturate, exceeds, saturate_u, round_sat, clamp to +-2**(width-1), as bit strings.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -29,11 +29,12 @@ begin
 
     -- A window of the vector as a number whose indices do not start at zero, as in real use.
     procedure run (v : signed) is
-      constant LIMIT : signed(v'length downto 0) := shift_left(to_signed(1, v'length + 1), minimum(width, v'length) - 1);
       constant WIDE  : signed(v'length downto 0) := resize(v, v'length + 1);
+      constant LIMIT : signed(v'length downto 0) := shift_left(to_signed(1, WIDE'length), minimum(width, v'length) - 1);
     begin
       write(line_out, to_string(std_logic_vector(round_half_up(v, drop))) & " ");
       write(line_out, to_string(std_logic_vector(saturate(v, width))) & " ");
+      write(line_out, to_string(exceeds(v, width)) & " ");
       write(line_out, to_string(std_logic_vector(saturate_u(v, width))) & " ");
       write(line_out, to_string(std_logic_vector(round_sat(v, drop, width))) & " ");
       write(line_out, to_string(std_logic_vector(clamp(WIDE, -LIMIT, LIMIT))));

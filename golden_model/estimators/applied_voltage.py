@@ -112,7 +112,7 @@ BLOCK = Block(
         Port("voltage_known", BIT, doc="0: gates off or bus reading lost"),
     ),
     latency=7,
-    interval=2,
+    interval=7,
     constants={
         "K_FRAC": K_FRAC,
         "SCALE_W": SCALE.width,
@@ -123,7 +123,7 @@ BLOCK = Block(
         "DROP_INV_SQRT3": DROP_INV_SQRT3,
         "TO_FLUX": TO_FLUX,
     },
-    configs=({"CARRIER_HALF": 10000}, {"CARRIER_HALF": 100}, {"CARRIER_HALF": 32767}, {"CARRIER_HALF": 8}),
+    configs=({"CARRIER_HALF": 10000}, {"CARRIER_HALF": 100}, {"CARRIER_HALF": 32767}, {"CARRIER_HALF": 13}),
     reference=reference,
     bound=bound,
     stimuli=stimuli,

@@ -8,12 +8,14 @@ error, nothing else.  u_int is that of two samples before: a voltage asked for a
 period and shows in the currents at its end, and with the regulators' zero on the winding's pole
 R*i(k) = u_int(k-2) holds through every step of the reference, not in steady state alone.
 
-Held as it is while the integrals mean something else: voltage at its limit (sat_d, sat_q), a current converter
-at its end, bus reading lost.  Zero while the gates are off.
+Held while the integrals mean something else: voltage at its limit (sat_d, sat_q), a current converter at its end,
+bus reading lost.  Held means fading, by a sixteenth a sample, and ``delta_held`` makes flux_compensation forget as
+well: what cannot be verified must not stay.  A wrong estimate that keeps the voltage at its limit would otherwise
+keep itself.  Zero while the gates are off.
 
 Formats: r*i rounded half up to 28 fraction bits; difference exact; shifted by n, rounded half up and saturated to
-FLUX; times factor, rounded half up.  Saturation at 2 per unit of flux: more than the machine can have, which small
-speeds make of a small voltage error; told by ``delta_limited`` unless the weight is zero anyway.
+FLUX; times factor, rounded half up; what fades likewise.  Saturation at 2 per unit of flux: more than the machine
+can have, but small speeds make it of a small voltage error; told by ``delta_limited`` unless the weight is zero.
 """
 
 from typing import NamedTuple
@@ -29,6 +31,7 @@ from golden_model.kernel import kernel
 DROP_R = PU.frac_bits + RESISTANCE.frac_bits - INTEGRAL.frac_bits
 DROP_SHIFTED = INTEGRAL.frac_bits - FLUX.frac_bits
 DROP_FACTOR = speed_reciprocal.FACTOR.frac_bits
+FADE = 4
 
 
 class State(NamedTuple):
@@ -58,9 +61,11 @@ def step(
     delta_d, limited_d = axis(state.u_int_q_2, i_q, factor, n_omega, r)
     delta_q, limited_q = axis(state.u_int_d_2, i_d, -factor, n_omega, r)
     limited = limited_d | limited_q
-    held = 1 if sat_d != 0 or sat_q != 0 or current_at_rail != 0 or not voltage_known else 0
+    held = 1 if run and (sat_d != 0 or sat_q != 0 or current_at_rail != 0 or not voltage_known) else 0
     if held:
-        delta_d, delta_q, limited = state.delta_d, state.delta_q, 0
+        delta_d = state.delta_d - round_half_up(state.delta_d, FADE)
+        delta_q = state.delta_q - round_half_up(state.delta_q, FADE)
+        limited = 0
     if not run:
         delta_d, delta_q, limited = 0, 0, 0
     state = State(delta_d, delta_q, u_int_d, u_int_q, state.u_int_d_1, state.u_int_q_1)
@@ -71,7 +76,8 @@ def reference(v, state):
     if not v["run"]:
         return {"delta_lambda_d": 0.0, "delta_lambda_q": 0.0}
     if v["sat_d"] or v["sat_q"] or v["current_at_rail"] or not v["voltage_known"]:
-        return {"delta_lambda_d": state.delta_d * FLUX.lsb, "delta_lambda_q": state.delta_q * FLUX.lsb}
+        left = (1.0 - 2.0**-FADE) * FLUX.lsb
+        return {"delta_lambda_d": state.delta_d * left, "delta_lambda_q": state.delta_q * left}
     out = {}
     for x, u_int, i, sign in (("d", state.u_int_q_2, v["i_q"], 1), ("q", state.u_int_d_2, v["i_d"], -1)):
         rest = u_int * INTEGRAL.lsb - v["r"] * i
@@ -87,7 +93,7 @@ def bound(v, _state):
 
 
 def stimuli(rng, _config):
-    """Small rests at every exponent, both signs of the speed; each reason to hold; stop and restart."""
+    """Small rests at every exponent, both signs of the speed, ties, the ends of the range; held, stopped, restarted."""
     calm = {"sat_d": 0, "sat_q": 0, "current_at_rail": 0, "voltage_known": 1, "run": 1, "r": 641000}
     rows = []
     for n in range(speed_reciprocal.N_MAX + 1):
@@ -96,13 +102,24 @@ def stimuli(rng, _config):
             rows.append({**calm, **signals, "i_d": 7, "i_q": -900, "factor": factor, "n_omega": n})
     for change in ({"sat_d": 1}, {"sat_q": -1}, {"current_at_rail": 4}, {"voltage_known": 0}, {"run": 0}, {}):
         rows += [{**rows[20], **change}, {**rows[24], **change}]
+    still = {**calm, "i_d": 0, "i_q": 0, "factor": 131071}
+    for n in (0, 3, 12):
+        for end in (1 << (29 - n), -(1 << (29 - n))):
+            for off in (-33, -17, -16, -15, -1, 0, 1, 15, 16, 17, 33):
+                near = [max(min(x, INTEGRAL.hi), INTEGRAL.lo) for x in (end + off, end - off)]
+                rows.append({**still, "u_int_d": near[0], "u_int_q": near[1], "n_omega": n})
+    for factor in (65536, -65536):
+        rows += [
+            {**still, "u_int_d": 32 * k, "u_int_q": -32 * k, "factor": factor, "n_omega": 0}
+            for k in range(-5, 6)
+        ]
     return rows
 
 
 DELTA = (
     Port("delta_lambda_d", FLUX, doc="flux the estimate lacks, d axis"),
     Port("delta_lambda_q", FLUX, doc="flux the estimate lacks, q axis"),
-    Port("delta_held", BIT, doc="1: held, the integrals mean something else"),
+    Port("delta_held", BIT, doc="1: the integrals mean something else"),
 )
 
 BLOCK = Block(
@@ -126,8 +143,8 @@ BLOCK = Block(
     outputs=(*DELTA, Port("delta_limited", BIT, doc="delta lambda reached its range")),
     state=State(),
     latency=8,
-    interval=2,
-    constants={"DROP_R": DROP_R, "DROP_SHIFTED": DROP_SHIFTED, "DROP_FACTOR": DROP_FACTOR},
+    interval=8,
+    constants={"DROP_R": DROP_R, "DROP_SHIFTED": DROP_SHIFTED, "DROP_FACTOR": DROP_FACTOR, "FADE": FADE},
     reference=reference,
     bound=bound,
     stimuli=stimuli,

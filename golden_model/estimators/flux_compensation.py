@@ -1,11 +1,13 @@
 """What becomes of delta_lambda: the PI of paper 001 eq. (17), or the plain addition of eq. (16).
 
-    integral += flux_ki*delta_lambda       unless delta_lambda is held
+    integral += flux_ki*delta_lambda       or, while delta_lambda is held, -integral/2**8
     lambda_pi = flux_kp*delta_lambda + integral                         flux_mode 3
     lambda_add = delta_lambda                                           flux_mode 2
 
-Everything within +-delta_max.  The integral stays what it is while the gates are off: what the drive has learnt
-of its motor is what a restart on the fly needs.  Leaving mode 3 empties it.
+Everything within +-delta_max.  While delta_lambda is held the integral forgets, slowly enough to survive the few
+samples of a current step at the voltage limit; the merged models then carry the estimate, and at the speeds where
+the voltage is at its limit for long they follow the voltage.  While the gates are off the integral stays what it is:
+what the drive has learnt of its motor is what a restart on the fly needs.  Leaving mode 3 empties it.
 
 Formats: flux_kp U(7,10), flux_ki U(0,17); products rounded half up to S(1,30), where 2**-17 per unit times the
 smallest useful flux_ki still counts; the sum is limited, then rounded half up to FLUX, which cannot pass the
@@ -27,6 +29,7 @@ DELTA_MAX = Format(0, 0, PU.frac_bits)
 DROP_P = FLUX.frac_bits + FLUX_KP.frac_bits - FLUX_STATE.frac_bits
 DROP_I = FLUX.frac_bits + FLUX_KI.frac_bits - FLUX_STATE.frac_bits
 SHIFT_LIMIT = FLUX_STATE.frac_bits - DELTA_MAX.frac_bits
+FORGET = 8
 
 
 class State(NamedTuple):
@@ -38,7 +41,7 @@ class State(NamedTuple):
 def axis(integral, delta, held, mode, kp, ki, limit):
     """One axis: (integral, lambda_pi, lambda_add, 1 where it was limited)."""
     proportional = round_half_up(delta * kp, DROP_P)
-    increment = 0 if held else round_half_up(delta * ki, DROP_I)
+    increment = round_half_up(-integral, FORGET) if held else round_half_up(delta * ki, DROP_I)
     moved = clamp(integral + increment, -limit, limit)
     total = proportional + moved
     lambda_pi = round_half_up(clamp(total, -limit, limit), FLUX_TO_STATE)
@@ -67,7 +70,8 @@ def reference(v, state):
     limit, out = v["delta_max"], {}
     for x, old in (("d", state.integral_d), ("q", state.integral_q)):
         delta = v[f"delta_lambda_{x}"]
-        integral = old * FLUX_STATE.lsb + (0.0 if v["delta_held"] else v["flux_ki"] * delta)
+        integral = old * FLUX_STATE.lsb
+        integral += -integral * 2.0**-FORGET if v["delta_held"] else v["flux_ki"] * delta
         total = v["flux_kp"] * delta + min(max(integral, -limit), limit)
         proposed, earlier = v["flux_mode"] == PROPOSED, v["flux_mode"] == EARLIER
         out[f"lambda_pi_{x}"] = min(max(total, -limit), limit) if proposed else 0.0
@@ -113,9 +117,9 @@ BLOCK = Block(
         Port("compensation_limited", BIT, doc="the compensation reached its limit"),
     ),
     state=State(),
-    latency=5,
-    interval=2,
-    constants={"DROP_P": DROP_P, "DROP_I": DROP_I, "SHIFT_LIMIT": SHIFT_LIMIT},
+    latency=6,
+    interval=6,
+    constants={"DROP_P": DROP_P, "DROP_I": DROP_I, "SHIFT_LIMIT": SHIFT_LIMIT, "FORGET": FORGET},
     reference=reference,
     bound=bound,
     stimuli=stimuli,

@@ -41,7 +41,19 @@ def axis(i, lambda_m, lambda_pi, merged, rho, inductance, magnet):
 
 @kernel
 def step(
-    i_d, i_q, lambda_m_d, lambda_m_q, lambda_pi_d, lambda_pi_q, merge_known, run, rho, flux_mode, l_d, l_q, lambda_mg
+    i_d,
+    i_q,
+    lambda_m_d,
+    lambda_m_q,
+    lambda_pi_d,
+    lambda_pi_q,
+    merge_known,
+    run,
+    rho,
+    flux_mode,
+    l_d,
+    l_q,
+    lambda_mg,
 ):
     merged = merge_known and run and flux_mode != CURRENT_MODEL
     lambda_d, limited_d = axis(i_d, lambda_m_d, lambda_pi_d, merged, rho, l_d, lambda_mg)
@@ -70,7 +82,9 @@ def stimuli(rng, _config):
     for mode in range(4):
         for known, run in ((1, 1), (0, 1), (1, 0)):
             for m in (END_HI, END_HI - 1, END_LO, END_LO + 1, 0):
-                small = {k: int(rng.integers(-999, 999)) for k in ("i_d", "i_q", "lambda_pi_d", "lambda_pi_q")}
+                small = {
+                    k: int(rng.integers(-999, 999)) for k in ("i_d", "i_q", "lambda_pi_d", "lambda_pi_q")
+                }
                 flags = {"flux_mode": mode, "merge_known": known, "run": run}
                 rows.append({**small, **flags, "lambda_m_d": m, "lambda_m_q": -1 - m, "l_d": 1 << 20})
     return rows
@@ -101,7 +115,14 @@ BLOCK = Block(
         Port("estimate_limited", BIT, doc="the estimate reached its range"),
     ),
     latency=3,
-    constants={"SHIFT_BASE": SHIFT_BASE, "SHIFT_MODEL": SHIFT_MODEL, "DROP": DROP},
+    constants={
+        "SHIFT_BASE": SHIFT_BASE,
+        "SHIFT_MODEL": SHIFT_MODEL,
+        "DROP": DROP,
+        "CURRENT_MODEL": CURRENT_MODEL,
+        "EARLIER": EARLIER,
+        "PROPOSED": PROPOSED,
+    },
     reference=reference,
     bound=bound,
     stimuli=stimuli,

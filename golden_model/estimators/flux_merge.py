@@ -32,7 +32,17 @@ from typing import NamedTuple
 from golden_model.block import Block, Port
 from golden_model.estimators.winding_resistance import RHO, T_S
 from golden_model.fixed import Format, exceeds, round_half_up, saturate
-from golden_model.formats import BIT, FLUX, FLUX_STATE, FLUX_STATE_W, FLUX_TO_STATE, FLUX_W, PU, RESISTANCE, SAMPLE_TIME
+from golden_model.formats import (
+    BIT,
+    FLUX,
+    FLUX_STATE,
+    FLUX_STATE_W,
+    FLUX_TO_STATE,
+    FLUX_W,
+    PU,
+    RESISTANCE,
+    SAMPLE_TIME,
+)
 from golden_model.kernel import kernel
 from golden_model.transforms.flux_park import LAMBDA_M
 
@@ -87,7 +97,16 @@ def step(
 ):  # fmt: skip
     valid = state.known & run
     lambda_alpha, x_alpha, limited_alpha = axis(
-        state.lambda_alpha, state.x_alpha, i_alpha, lambda_c_alpha, u_applied_alpha, valid, rho, omega_0, xi, t_s
+        state.lambda_alpha,
+        state.x_alpha,
+        i_alpha,
+        lambda_c_alpha,
+        u_applied_alpha,
+        valid,
+        rho,
+        omega_0,
+        xi,
+        t_s,
     )
     lambda_beta, x_beta, limited_beta = axis(
         state.lambda_beta, state.x_beta, i_beta, lambda_c_beta, u_applied_beta, valid, rho, omega_0, xi, t_s
@@ -125,11 +144,20 @@ def stimuli(rng, _config):
     """A turning flux with its voltage, gains at both ends of their ranges, into the limits and back; gates off."""
     nominal = {"rho": 40000, "omega_0": 4118, "xi": 11585, "t_s": 32925, "run": 1, "voltage_known": 1}
     rows = []
-    for change in ({}, {"omega_0": OMEGA_0.hi, "xi": 32768}, {"omega_0": 256, "xi": 4096}, {"t_s": SAMPLE_TIME.hi}):
+    for change in (
+        {},
+        {"omega_0": OMEGA_0.hi, "xi": 32768},
+        {"omega_0": 256, "xi": 4096},
+        {"t_s": SAMPLE_TIME.hi},
+    ):
         for _ in range(25):
-            signals = {k: int(rng.integers(-(1 << 22), 1 << 22)) for k in ("lambda_c_alpha", "u_applied_alpha")}
+            signals = {
+                k: int(rng.integers(-(1 << 22), 1 << 22)) for k in ("lambda_c_alpha", "u_applied_alpha")
+            }
             signals |= {"lambda_c_beta": int(rng.integers(-9, 9)), "u_applied_beta": int(rng.integers(-9, 9))}
-            rows.append({**nominal, **change, **signals, "i_alpha": int(rng.integers(-9999, 9999)), "i_beta": 0})
+            rows.append(
+                {**nominal, **change, **signals, "i_alpha": int(rng.integers(-9999, 9999)), "i_beta": 0}
+            )
     for end in (FLUX.hi, FLUX.lo):
         pushed = {f"{k}_{of}": end for k in ("lambda_c", "u_applied") for of in ("alpha", "beta")}
         rows += [{**nominal, **pushed, "omega_0": OMEGA_0.hi, "i_alpha": 0, "i_beta": 0} for _ in range(40)]
@@ -164,8 +192,8 @@ BLOCK = Block(
         Port("merge_limited", BIT, doc="the merge reached its range"),
     ),
     state=State(),
-    latency=8,
-    interval=8,
+    latency=10,
+    interval=10,
     constants={
         "Y_W": Y_W,
         "X_W": X_W,

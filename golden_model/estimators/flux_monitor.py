@@ -42,7 +42,13 @@ def stimuli(_rng, _config):
     rows = []
     for name in (p.name for p in BLOCK.inputs[:-1]):
         quiet = dict.fromkeys((p.name for p in BLOCK.inputs), 0)
-        rows += [{**quiet, name: 1}, quiet, {**quiet, name: 1, "clear_faults": 1}, {**quiet, "clear_faults": 1}, quiet]
+        rows += [
+            {**quiet, name: 1},
+            quiet,
+            {**quiet, name: 1, "clear_faults": 1},
+            {**quiet, "clear_faults": 1},
+            quiet,
+        ]
     return rows
 
 

@@ -14,6 +14,9 @@ package fixed_pkg is
   -- x limited to the range of a signed number of width bits.
   function saturate (x : signed; width : positive) return signed;
 
+  -- '1' where saturating x to width signed bits changes it.
+  function exceeds (x : signed; width : positive) return std_logic;
+
   -- x limited to the range of an unsigned number of width bits.
   function saturate_u (x : signed; width : positive) return unsigned;
 
@@ -22,6 +25,12 @@ package fixed_pkg is
 
   -- x limited to [lo, hi]; lo and hi must fit the width of x.
   function clamp (x : signed; lo : signed; hi : signed) return signed;
+
+  -- a + round_half_up(v, drop) by one carry; as wide as a, which must have room for the sum.
+  function plus_rounded (a : signed; v : signed; drop : positive) return signed;
+
+  -- a - round_half_up(v, drop) by one carry; as wide as a, which must have room for the difference.
+  function minus_rounded (a : signed; v : signed; drop : positive) return signed;
 
 end package fixed_pkg;
 
@@ -37,21 +46,28 @@ package body fixed_pkg is
   end function;
 
   function saturate (x : signed; width : positive) return signed is
-    constant IN_RANGE : signed(x'length - 1 downto 0) := (others => '0');
-    alias v           : signed(x'length - 1 downto 0) is x;
-    variable result   : signed(width - 1 downto 0);
+    alias v         : signed(x'length - 1 downto 0) is x;
+    variable result : signed(width - 1 downto 0);
   begin
     if width >= x'length then
       return resize(x, width);
     end if;
-    -- In range when every bit above the result's sign repeats it.
-    if v(x'length - 1 downto width - 1) = IN_RANGE(x'length - 1 downto width - 1)
-       or not v(x'length - 1 downto width - 1) = IN_RANGE(x'length - 1 downto width - 1) then
+    if exceeds(x, width) = '0' then
       return v(width - 1 downto 0);
     end if;
     result            := (others => not v(v'high));
     result(width - 1) := v(v'high);
     return result;
+  end function;
+
+  function exceeds (x : signed; width : positive) return std_logic is
+    alias v : signed(x'length - 1 downto 0) is x;
+  begin
+    if width >= x'length then
+      return '0';
+    end if;
+    -- In range when every bit above the result's sign repeats it.
+    return (or v(v'high downto width - 1)) and not (and v(v'high downto width - 1));
   end function;
 
   function saturate_u (x : signed; width : positive) return unsigned is
@@ -85,6 +101,22 @@ package body fixed_pkg is
       return resize(hi, x'length);
     end if;
     return x;
+  end function;
+
+  function plus_rounded (a : signed; v : signed; drop : positive) return signed is
+    variable sum : signed(a'length downto 0);
+  begin
+    -- Bits below the half, which stands under a, cannot reach it.
+    sum := (a & '1') + resize(v(v'high downto drop - 1), a'length + 1);
+    return sum(a'length downto 1);
+  end function;
+
+  function minus_rounded (a : signed; v : signed; drop : positive) return signed is
+    variable difference : signed(a'length downto 0);
+  begin
+    -- What is rounded up is subtracted, so the floor needs no half.
+    difference := (a & '0') - resize(v(v'high downto drop - 1), a'length + 1);
+    return difference(a'length downto 1);
   end function;
 
 end package body fixed_pkg;

@@ -34,7 +34,7 @@ package fluxproof_pkg is
 
   -- fluxproof: clocks from the raw sample to the duties, least distance of two samples
   constant FLUXPROOF_SAMPLE_TO_DUTY : positive := 38;
-  constant FLUXPROOF_SAMPLE_INTERVAL : positive := 47;
+  constant FLUXPROOF_SAMPLE_INTERVAL : positive := 48;
 
   -- sqrt: 001, section 5.2: voltage limit of the current regulation
   constant SQRT_LATENCY : positive := 6;
@@ -377,7 +377,7 @@ package fluxproof_pkg is
   constant FLUX_INVERSE_PARK_LATENCY : positive := 4;
 
   -- flux_merge: 001, eq. (7); 'Merge of voltage and current models' of Fig. 8
-  constant FLUX_MERGE_LATENCY : positive := 8;
+  constant FLUX_MERGE_LATENCY : positive := 10;
   constant FLUX_MERGE_Y_W : natural := 25;
   constant FLUX_MERGE_X_W : natural := 34;
   constant FLUX_MERGE_DROP_RHO : natural := 10;
@@ -395,6 +395,9 @@ package fluxproof_pkg is
   constant FLUX_ESTIMATE_SHIFT_BASE : natural := 17;
   constant FLUX_ESTIMATE_SHIFT_MODEL : natural := 4;
   constant FLUX_ESTIMATE_DROP : natural := 24;
+  constant FLUX_ESTIMATE_CURRENT_MODEL : natural := 0;
+  constant FLUX_ESTIMATE_EARLIER : natural := 2;
+  constant FLUX_ESTIMATE_PROPOSED : natural := 3;
 
   -- speed_reciprocal: 001, section 5.2: lower limit of the speed for delta_lambda
   constant SPEED_RECIPROCAL_LATENCY : positive := 24;
@@ -408,12 +411,14 @@ package fluxproof_pkg is
   constant DELTA_LAMBDA_DROP_R : natural := 12;
   constant DELTA_LAMBDA_DROP_SHIFTED : natural := 5;
   constant DELTA_LAMBDA_DROP_FACTOR : natural := 17;
+  constant DELTA_LAMBDA_FADE : natural := 4;
 
   -- flux_compensation: 001, eq. (17): (K_p + K_i/s)*delta_lambda; the last term of eq. (16)
-  constant FLUX_COMPENSATION_LATENCY : positive := 5;
+  constant FLUX_COMPENSATION_LATENCY : positive := 6;
   constant FLUX_COMPENSATION_DROP_P : natural := 3;
   constant FLUX_COMPENSATION_DROP_I : natural := 10;
   constant FLUX_COMPENSATION_SHIFT_LIMIT : natural := 14;
+  constant FLUX_COMPENSATION_FORGET : natural := 8;
 
   -- torque: 001, eq. (4)
   constant TORQUE_LATENCY : positive := 4;

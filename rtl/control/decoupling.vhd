@@ -1,5 +1,5 @@
 -- Purpose: rotational voltages, the last term of paper 001 eq. (2).
---   u_dec_d = -omega_me*lambda_q;  u_dec_q = omega_me*lambda_d
+--   u_dec_d = -omega_chord*lambda_q;  u_dec_q = omega_chord*lambda_d
 -- Formats: PU in and out; products exact.
 -- Latency: 3.  Rounding: half up, saturated at 2 per unit, twice the largest voltage that the limiter grants.
 
@@ -11,15 +11,15 @@ use work.fluxproof_pkg.all;
 
 entity decoupling is
   port (
-    clk       : in  std_logic;
-    rst       : in  std_logic;
-    in_valid  : in  std_logic;
-    omega_me  : in  signed(PU_W - 1 downto 0);
-    lambda_d  : in  signed(PU_W - 1 downto 0);
-    lambda_q  : in  signed(PU_W - 1 downto 0);
-    out_valid : out std_logic;
-    u_dec_d   : out signed(PU_W - 1 downto 0);
-    u_dec_q   : out signed(PU_W - 1 downto 0)
+    clk         : in  std_logic;
+    rst         : in  std_logic;
+    in_valid    : in  std_logic;
+    omega_chord : in  signed(PU_W - 1 downto 0);
+    lambda_d    : in  signed(PU_W - 1 downto 0);
+    lambda_q    : in  signed(PU_W - 1 downto 0);
+    out_valid   : out std_logic;
+    u_dec_d     : out signed(PU_W - 1 downto 0);
+    u_dec_q     : out signed(PU_W - 1 downto 0)
   );
 end entity decoupling;
 
@@ -39,10 +39,10 @@ begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stage 1: prod_d = omega_me*lambda_q,  prod_q = omega_me*lambda_d
+      -- Stage 1: prod_d = omega_chord*lambda_q,  prod_q = omega_chord*lambda_d
       if valid(0) = '1' then
-        prod_d_1 <= omega_me * lambda_q;
-        prod_q_1 <= omega_me * lambda_d;
+        prod_d_1 <= omega_chord * lambda_q;
+        prod_q_1 <= omega_chord * lambda_d;
       end if;
 
       -- Stage 2: the d axis' term is negative

@@ -14,30 +14,32 @@ entity sample_latch is
     POSITION_BITS : positive range 8 to 18  := 16
   );
   port (
-    clk           : in  std_logic;
-    rst           : in  std_logic;
-    in_valid      : in  std_logic;
-    adc_a         : in  unsigned(ADC_BITS - 1 downto 0);
-    adc_b         : in  unsigned(ADC_BITS - 1 downto 0);
-    adc_c         : in  unsigned(ADC_BITS - 1 downto 0);
-    adc_u_dc      : in  unsigned(ADC_BITS - 1 downto 0);
-    position_code : in  unsigned(POSITION_BITS - 1 downto 0);
-    omega_ref_in  : in  signed(PU_W - 1 downto 0);
-    i_d_ref_in    : in  signed(PU_W - 1 downto 0);
-    i_q_ext_in    : in  signed(PU_W - 1 downto 0);
-    speed_mode_in : in  std_logic;
-    run_in        : in  std_logic;
-    out_valid     : out std_logic;
-    code_a        : out unsigned(ADC_BITS - 1 downto 0);
-    code_b        : out unsigned(ADC_BITS - 1 downto 0);
-    code_c        : out unsigned(ADC_BITS - 1 downto 0);
-    code_u_dc     : out unsigned(ADC_BITS - 1 downto 0);
-    code_theta    : out unsigned(POSITION_BITS - 1 downto 0);
-    omega_ref     : out signed(PU_W - 1 downto 0);
-    i_d_ref       : out signed(PU_W - 1 downto 0);
-    i_q_ext       : out signed(PU_W - 1 downto 0);
-    speed_mode    : out std_logic;
-    run           : out std_logic
+    clk             : in  std_logic;
+    rst             : in  std_logic;
+    in_valid        : in  std_logic;
+    adc_a           : in  unsigned(ADC_BITS - 1 downto 0);
+    adc_b           : in  unsigned(ADC_BITS - 1 downto 0);
+    adc_c           : in  unsigned(ADC_BITS - 1 downto 0);
+    adc_u_dc        : in  unsigned(ADC_BITS - 1 downto 0);
+    position_code   : in  unsigned(POSITION_BITS - 1 downto 0);
+    omega_ref_in    : in  signed(PU_W - 1 downto 0);
+    i_d_ref_in      : in  signed(PU_W - 1 downto 0);
+    i_q_ext_in      : in  signed(PU_W - 1 downto 0);
+    speed_mode_in   : in  std_logic;
+    clear_faults_in : in  std_logic;
+    run_in          : in  std_logic;
+    out_valid       : out std_logic;
+    code_a          : out unsigned(ADC_BITS - 1 downto 0);
+    code_b          : out unsigned(ADC_BITS - 1 downto 0);
+    code_c          : out unsigned(ADC_BITS - 1 downto 0);
+    code_u_dc       : out unsigned(ADC_BITS - 1 downto 0);
+    code_theta      : out unsigned(POSITION_BITS - 1 downto 0);
+    omega_ref       : out signed(PU_W - 1 downto 0);
+    i_d_ref         : out signed(PU_W - 1 downto 0);
+    i_q_ext         : out signed(PU_W - 1 downto 0);
+    speed_mode      : out std_logic;
+    clear_faults    : out std_logic;
+    run             : out std_logic
   );
 end entity sample_latch;
 
@@ -51,16 +53,17 @@ begin
 
       -- Stage 1: out = in
       if in_valid = '1' then
-        code_a     <= adc_a;
-        code_b     <= adc_b;
-        code_c     <= adc_c;
-        code_u_dc  <= adc_u_dc;
-        code_theta <= position_code;
-        omega_ref  <= omega_ref_in;
-        i_d_ref    <= i_d_ref_in;
-        i_q_ext    <= i_q_ext_in;
-        speed_mode <= speed_mode_in;
-        run        <= run_in;
+        code_a       <= adc_a;
+        code_b       <= adc_b;
+        code_c       <= adc_c;
+        code_u_dc    <= adc_u_dc;
+        code_theta   <= position_code;
+        omega_ref    <= omega_ref_in;
+        i_d_ref      <= i_d_ref_in;
+        i_q_ext      <= i_q_ext_in;
+        speed_mode   <= speed_mode_in;
+        clear_faults <= clear_faults_in;
+        run          <= run_in;
       end if;
 
       if rst = '1' then

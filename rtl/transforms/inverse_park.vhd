@@ -28,6 +28,9 @@ architecture rtl of inverse_park is
 begin
 
   rotation : entity work.rotate
+    generic map (
+      WIDTH => PU_W
+    )
     port map (
       clk       => clk,
       rst       => rst,

@@ -32,6 +32,9 @@ begin
   minus_sin <= -sin_theta;
 
   rotation : entity work.rotate
+    generic map (
+      WIDTH => PU_W
+    )
     port map (
       clk       => clk,
       rst       => rst,

@@ -1,7 +1,7 @@
 -- Purpose: turns a vector by the angle whose sine and cosine are given, two multipliers in two clocks.
 --   out_x = x*cos_theta - y*sin_theta
 --   out_y = x*sin_theta + y*cos_theta
--- Formats: PU and TRIG S(1,16) within +-1; products and sums exact.
+-- Formats: x, y S(1,WIDTH-2), PU or FLUX; TRIG S(1,16) within +-1; products and sums exact.
 -- Latency: 4.  Interval: 2.  Rounding: half up, saturated: a vector longer than 2 per unit is outside every base.
 
 library ieee;
@@ -11,17 +11,20 @@ use work.fixed_pkg.all;
 use work.fluxproof_pkg.all;
 
 entity rotate is
+  generic (
+    WIDTH : positive range 18 to 25 := 18
+  );
   port (
     clk       : in  std_logic;
     rst       : in  std_logic;
     in_valid  : in  std_logic;
-    x         : in  signed(PU_W - 1 downto 0);
-    y         : in  signed(PU_W - 1 downto 0);
+    x         : in  signed(WIDTH - 1 downto 0);
+    y         : in  signed(WIDTH - 1 downto 0);
     cos_theta : in  signed(TRIG_W - 1 downto 0);
     sin_theta : in  signed(TRIG_W - 1 downto 0);
     out_valid : out std_logic;
-    out_x     : out signed(PU_W - 1 downto 0);
-    out_y     : out signed(PU_W - 1 downto 0)
+    out_x     : out signed(WIDTH - 1 downto 0);
+    out_y     : out signed(WIDTH - 1 downto 0)
   );
 end entity rotate;
 
@@ -29,13 +32,13 @@ architecture rtl of rotate is
   constant LATENCY : positive := ROTATE_LATENCY;
 
   signal valid    : std_logic_vector(0 to LATENCY);
-  signal factor_0 : signed(PU_W - 1 downto 0);
-  signal prod_c   : signed(PU_W + TRIG_W - 1 downto 0);  -- by cos_theta: x at clock 1, y at clock 2
-  signal prod_s   : signed(PU_W + TRIG_W - 1 downto 0);  -- by sin_theta: x at clock 1, y at clock 2
-  signal prod_c_2 : signed(PU_W + TRIG_W - 1 downto 0);
-  signal prod_s_2 : signed(PU_W + TRIG_W - 1 downto 0);
-  signal sum_x_3  : signed(PU_W + TRIG_W downto 0);
-  signal sum_y_3  : signed(PU_W + TRIG_W downto 0);
+  signal factor_0 : signed(WIDTH - 1 downto 0);
+  signal prod_c   : signed(WIDTH + TRIG_W - 1 downto 0);  -- by cos_theta: x at clock 1, y at clock 2
+  signal prod_s   : signed(WIDTH + TRIG_W - 1 downto 0);  -- by sin_theta: x at clock 1, y at clock 2
+  signal prod_c_2 : signed(WIDTH + TRIG_W - 1 downto 0);
+  signal prod_s_2 : signed(WIDTH + TRIG_W - 1 downto 0);
+  signal sum_x_3  : signed(WIDTH + TRIG_W downto 0);
+  signal sum_y_3  : signed(WIDTH + TRIG_W downto 0);
 begin
   valid(0) <= in_valid;
   factor_0 <= y when valid(1) = '1' else x;
@@ -59,14 +62,14 @@ begin
 
       -- Stage 3: sum_x = x*cos_theta - y*sin_theta,  sum_y = x*sin_theta + y*cos_theta
       if valid(2) = '1' then
-        sum_x_3 <= resize(prod_c_2, PU_W + TRIG_W + 1) - resize(prod_s, PU_W + TRIG_W + 1);
-        sum_y_3 <= resize(prod_s_2, PU_W + TRIG_W + 1) + resize(prod_c, PU_W + TRIG_W + 1);
+        sum_x_3 <= resize(prod_c_2, WIDTH + TRIG_W + 1) - resize(prod_s, WIDTH + TRIG_W + 1);
+        sum_y_3 <= resize(prod_s_2, WIDTH + TRIG_W + 1) + resize(prod_c, WIDTH + TRIG_W + 1);
       end if;
 
       -- Stage 4: out = sum, narrowed
       if valid(3) = '1' then
-        out_x <= round_sat(sum_x_3, ROTATE_DROP, PU_W);
-        out_y <= round_sat(sum_y_3, ROTATE_DROP, PU_W);
+        out_x <= round_sat(sum_x_3, ROTATE_DROP, WIDTH);
+        out_y <= round_sat(sum_y_3, ROTATE_DROP, WIDTH);
       end if;
 
       if rst = '1' then

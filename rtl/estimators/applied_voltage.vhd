@@ -1,0 +1,155 @@
+-- Purpose: the voltage that the inverter is asked for in the coming period, stator frame; alpha first, then beta.
+--   u_applied_alpha = (2*compare_a - compare_b - compare_c) * u_dc/CARRIER_HALF * 1/3
+--   u_applied_beta  = (compare_b - compare_c)               * u_dc/CARRIER_HALF * 1/sqrt(3)
+-- voltage_known = 0: the gates are off, or the bus reading is at its end or below 1/32 per unit.
+-- Formats: compare values in clocks; u_dc*2**SHIFT/CARRIER_HALF U(2,22), with SHIFT so that the constant is in
+-- [1, 2); out FLUX.  Latency: 7 (alpha, beta follow each other).  Interval: 7.
+-- Rounding: half up after each product.  Saturated, which no compare value up to CARRIER_HALF needs.
+
+library ieee;
+use ieee.std_logic_1164.all;
+use ieee.numeric_std.all;
+use work.fixed_pkg.all;
+use work.fluxproof_pkg.all;
+
+entity applied_voltage is
+  generic (
+    CARRIER_HALF : positive range 8 to 32767 := 10000
+  );
+  port (
+    clk             : in  std_logic;
+    rst             : in  std_logic;
+    in_valid        : in  std_logic;
+    compare_a       : in  unsigned(15 downto 0);
+    compare_b       : in  unsigned(15 downto 0);
+    compare_c       : in  unsigned(15 downto 0);
+    u_dc            : in  unsigned(U_DC_W - 1 downto 0);
+    u_dc_at_rail    : in  std_logic;
+    run             : in  std_logic;
+    out_valid       : out std_logic;
+    u_applied_alpha : out signed(FLUX_W - 1 downto 0);
+    u_applied_beta  : out signed(FLUX_W - 1 downto 0);
+    voltage_known   : out std_logic
+  );
+end entity applied_voltage;
+
+architecture rtl of applied_voltage is
+
+  -- Smallest n with 2**n >= CARRIER_HALF.
+  function carrier_shift return natural is
+    variable n : natural := 0;
+  begin
+    while 2 ** n < CARRIER_HALF loop
+      n := n + 1;
+    end loop;
+    return n;
+  end function;
+
+  constant LATENCY : positive := APPLIED_VOLTAGE_LATENCY;
+  constant SCALE_W : positive := APPLIED_VOLTAGE_SCALE_W;
+  constant COEFF_W : positive := APPLIED_VOLTAGE_THIRD'length;
+  constant SHIFT   : positive := carrier_shift;
+  constant SUM_W   : positive := 18;
+
+  -- 2**SHIFT/CARRIER_HALF, half up: divided bit by bit, because 2**(K_FRAC + SHIFT) may not be an integer's value.
+  function carrier_constant return natural is
+    variable remainder : natural := 2 ** SHIFT;
+    variable quotient  : natural := 0;
+  begin
+    for k in 0 to APPLIED_VOLTAGE_K_FRAC loop
+      quotient := 2 * quotient;
+      if remainder >= CARRIER_HALF then
+        quotient  := quotient + 1;
+        remainder := remainder - CARRIER_HALF;
+      end if;
+      remainder := 2 * remainder;
+    end loop;
+    if remainder >= CARRIER_HALF then
+      quotient := quotient + 1;
+    end if;
+    return quotient;
+  end function;
+
+  constant K_CARRIER : signed(17 downto 0) := to_signed(carrier_constant, 18);
+
+  signal valid    : std_logic_vector(0 to LATENCY);
+  signal prod_1   : signed(U_DC_W + K_CARRIER'length downto 0);
+  signal scale_2  : signed(SCALE_W downto 0);
+  signal coeff_2  : signed(COEFF_W - 1 downto 0);
+  signal first_2  : unsigned(15 downto 0);
+  signal prod_3   : signed(SCALE_W + COEFF_W downto 0);
+  signal raised_3 : signed(SCALE_W + COEFF_W downto 0);
+  signal part_3   : signed(SUM_W - 1 downto 0);
+  signal scaled_4 : signed(SCALE_W downto 0);
+  signal sum_4    : signed(SUM_W - 1 downto 0);
+  signal prod_5   : signed(SCALE_W + SUM_W downto 0);
+  signal u_5      : signed(FLUX_W - 1 downto 0);
+
+  -- A compare value where differences of compare values are formed.
+  function wide (compare : unsigned) return signed is
+  begin
+    return signed(resize(compare, SUM_W));
+  end function;
+begin
+  valid(0) <= in_valid;
+
+  -- The axis of the beat: alpha first, then beta, whose sum is that of alpha with b in the place of a.
+  coeff_2  <= APPLIED_VOLTAGE_INV_SQRT3 when valid(3) = '1' else APPLIED_VOLTAGE_THIRD;
+  first_2  <= compare_b when valid(3) = '1' else compare_a;
+  raised_3 <= shift_left(prod_3, APPLIED_VOLTAGE_DROP_THIRD - APPLIED_VOLTAGE_DROP_INV_SQRT3) when valid(4) = '1' else
+              prod_3;
+  u_5      <= round_sat(prod_5, SHIFT - APPLIED_VOLTAGE_TO_FLUX, FLUX_W);
+
+  process (clk)
+  begin
+    if rising_edge(clk) then
+      valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
+
+      -- Stage 1: prod = u_dc * 2**SHIFT/CARRIER_HALF
+      if valid(0) = '1' then
+        prod_1 <= signed('0' & u_dc) * K_CARRIER;
+      end if;
+
+      -- Stage 2: scale = prod, narrowed; u_dc and the constant are below 2, so it fits
+      if valid(1) = '1' then
+        scale_2 <= resize(round_half_up(prod_1, APPLIED_VOLTAGE_DROP_SCALE), SCALE_W + 1);
+      end if;
+
+      -- Stage 3: prod = scale * 1/3 or 1/sqrt(3);  part = 2*first - compare_b
+      if valid(2) = '1' or valid(3) = '1' then
+        prod_3 <= scale_2 * coeff_2;
+        part_3 <= shift_left(wide(first_2), 1) - wide(compare_b);
+      end if;
+
+      -- Stage 4: scaled = prod, narrowed;  sum = part - compare_c
+      if valid(3) = '1' or valid(4) = '1' then
+        scaled_4 <= resize(round_half_up(raised_3, APPLIED_VOLTAGE_DROP_THIRD), SCALE_W + 1);
+        sum_4    <= part_3 - wide(compare_c);
+      end if;
+
+      -- Stage 5: prod = scaled * sum
+      if valid(4) = '1' or valid(5) = '1' then
+        prod_5 <= scaled_4 * sum_4;
+      end if;
+
+      -- Stage 6: u_applied = prod, narrowed; alpha at clock 6, beta at 7
+      if valid(5) = '1' then
+        u_applied_alpha <= u_5;
+      end if;
+      if valid(6) = '1' then
+        u_applied_beta <= u_5;
+        voltage_known  <= '0';
+        if run = '1' and u_dc_at_rail = '0' and u_dc >= U_DC_PROCESSING_U_DC_MIN then
+          voltage_known <= '1';
+        end if;
+      end if;
+
+      if rst = '1' then
+        valid(1 to LATENCY) <= (others => '0');
+      end if;
+    end if;
+  end process;
+
+  out_valid <= valid(LATENCY);
+
+end architecture rtl;
