@@ -31,6 +31,8 @@ MODERATE = {  # registers of the size a drive has, with which little saturates
     **dict.fromkeys(("kp_d", "kp_q", "k_filter", "k_delay", "lambda_mg"), 20000),
     **dict.fromkeys(("ki_d", "ki_q", "speed_ki", "l_d", "l_q"), 300000),
     **{"pole_pairs": 3, "k_speed": 4096, "u_dc_offset": 200, "k_u_max": 75000, "speed_kp": 30000},
+    **{"r_s": 600000, "t_s": 33000, "k_chord": 5500, "omega_0": 4000, "xi": 11000, "omega_min": 400},
+    **{"k_ramp": 300, "flux_kp": 4000, "flux_ki": 5000, "delta_max": 15000},
 }
 
 
@@ -58,13 +60,20 @@ def registers(rng: np.random.Generator, moderate: bool) -> dict[str, int]:
     values = {p.name: random_value(rng, p) for p in ports}
     if moderate:
         values |= {name: int(value * rng.uniform(0.5, 1.5)) for name, value in MODERATE.items()}
+        values["flux_mode"] = int(rng.integers(2, 4))
     return values
 
 
-def raw_sample(rng: np.random.Generator, generics: dict[str, int]) -> dict[str, int]:
-    """What the converters and the references may say."""
+def raw_sample(rng: np.random.Generator, generics: dict[str, int], moderate: bool = False) -> dict[str, int]:
+    """What the converters and the references may say; ``moderate``: small currents, a bus, torque mode."""
     ports = [p for p in sample_latch.BLOCK.ports(generics) if p.name != LATCHED]
-    return {p.name: random_value(rng, p) for p in ports}
+    values = {p.name: random_value(rng, p) for p in ports}
+    if moderate:
+        top = (1 << generics["ADC_BITS"]) - 1
+        values |= {f"adc_{x}": int(top * rng.uniform(0.49, 0.51)) for x in "abc"}
+        values |= {"adc_u_dc": int(0.8 * top), "speed_mode_in": 0}
+        values |= {name: int(rng.integers(-600, 600)) for name in ("i_d_ref_in", "i_q_ext_in")}
+    return values
 
 
 def stimulus(seed: int, generics: dict[str, int], clocks: int = CLOCKS) -> list[dict[str, int]]:
@@ -91,7 +100,7 @@ def stimulus(seed: int, generics: dict[str, int], clocks: int = CLOCKS) -> list[
         writes[off]["enable"], writes[off + 30]["enable"] = 0, 1
     at, number = 20, 0
     while at < clocks - 1:
-        writes[at] |= raw_sample(rng, generics)
+        writes[at] |= raw_sample(rng, generics, moderate=number % 8 < 4)
         if number % 4 == 0:
             writes[at] |= registers(rng, moderate=number % 8 == 0)
         writes[at + 1] |= raw_sample(rng, generics)
