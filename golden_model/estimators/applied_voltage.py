@@ -123,7 +123,7 @@ BLOCK = Block(
         "DROP_INV_SQRT3": DROP_INV_SQRT3,
         "TO_FLUX": TO_FLUX,
     },
-    configs=({"CARRIER_HALF": 10000}, {"CARRIER_HALF": 100}, {"CARRIER_HALF": 32767}, {"CARRIER_HALF": 13}),
+    configs=tuple({"CARRIER_HALF": half} for half in (10000, 100, 32767, 13, 8)),
     reference=reference,
     bound=bound,
     stimuli=stimuli,
