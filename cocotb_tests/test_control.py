@@ -125,7 +125,7 @@ def test_standstill_is_exactly_quiet():
     state, mid = fluxproof.State(), 1 << 15
     u_dc = round(563 / 1000 * 65536)
     for _ in range(50):
-        sample = fluxproof.Sample(mid, mid, mid, u_dc, 12345, 0, 0, 0, 1, 0, 1)
+        sample = fluxproof.Sample(mid, mid, mid, u_dc, 12345, 0, 0, 0, 1, 0, 0, 0, 1)
         state, out = fluxproof.step(state, sample, values.values, values.config)
         assert (out.duty_a, out.duty_b, out.duty_c) == (32768, 32768, 32768)
         assert out.omega_me == 0

@@ -69,7 +69,9 @@ def test_samples_as_close_as_allowed():
     rng, state = np.random.default_rng(1), fluxproof.State()
     for _ in range(2000):
         codes, references = rng.integers(0, 1 << 16, 5), rng.integers(-90000, 90000, 3)
-        sample = fluxproof.Sample(*codes, *references, *rng.integers(0, 2, 2), 1)
+        sample = fluxproof.Sample(
+            *codes, *references, rng.integers(2), rng.integers(-9999, 9999), *rng.integers(0, 2, 2), 1
+        )
         inputs = dict(zip([p.name for p in sample_latch.BLOCK.inputs], map(int, sample), strict=True))
         inputs.pop("run_in")
         core.apply_sample(**inputs)
@@ -109,7 +111,9 @@ def test_every_register_at_its_ends():
         for _ in range(60):
             for port in ports:  # some values stay for long, so that integrators reach their ends
                 if rng.integers(8) == 0:
-                    inside = run % 2 and port.name.startswith("adc")  # at its very ends a code is told, and holds
+                    inside = run % 2 and port.name.startswith(
+                        "adc"
+                    )  # at its very ends a code is told, and holds
                     ends = (port.low + inside, port.high - inside, int(rng.integers(port.low, port.high + 1)))
                     row[port.name] = int(rng.choice(ends))
             core.apply_sample(**row)

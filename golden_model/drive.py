@@ -86,6 +86,18 @@ class Control:
     flux_compensation_limit_wb: float | None = positive("Wb", "largest compensation", None)
     flux_kp: float | None = not_negative("1", "override", None)
     flux_ki_per_s: float | None = not_negative("1/s", "override", None)
+    dead_time_compensation: bool = flag("true: what dead time and drops take is compensated", True)
+    sign_current_a: float | None = positive("A", "current from which a direction is full", None)
+    v_dead_filter_hz: float = positive("Hz", "low-pass of paper 000, Fig. 3", 5.0)
+    v_dead_eta: float = positive("1", "step of the V_dead Adaline, paper 000 eq. (10)", 1e-5)
+    v_dead_gamma: float = not_negative("1", "proportional part of the compensation", 0.1)
+    v_dead_zeta: float = not_negative("1", "what the minimisation adds in a sample", 1e-4)
+    v_dead_threshold_v: float | None = not_negative("V", "of a leg, no minimisation below", None)
+    v_dead_limit_v: float | None = positive("V", "of a leg, most that is compensated", None)
+    psi_eta: float | None = positive("s2/rad2", "step of the psi_m Adaline, paper 000 eq. (13)", None)
+    psi_min_speed_rad_s: float | None = positive("rad/s", "mechanical; psi_m is held below", None)
+    winding_temp_min_c: float = real("degC", "coldest reading that is believed", -40.0)
+    winding_temp_max_c: float = real("degC", "hottest reading that is believed", 200.0)
 
 
 @dataclass(frozen=True)

@@ -114,4 +114,24 @@ def _flux_loop(drive):
         _refuse("[control] flux_bandwidth_hz", asked, allowed)
 
 
-RULES = (_sample_time, _carrier, _pulses, _voltage, _current, _flux, _codes, _speed_loop, _current_loop, _flux_loop)
+def _adaline_steps(drive):
+    """Paper 000 eq. (B.3), 0 < 2*eta*|X|**2 < 1, or the least-mean-square step grows its own error."""
+    control, machine = drive.control, drive.machine
+    if control.v_dead_eta >= 0.125:
+        why = "eq. (B.3), 2*eta*D**2 < 1 with |D| = 2; the estimate of V_dead would diverge"
+        _refuse("[control] v_dead_eta", control.v_dead_eta, f"below 0.125: {why}")
+    rated = machine.pole_pairs * machine.rated_speed_rad_s
+    most = 0.5 / rated / rated
+    if control.psi_eta is not None and control.psi_eta >= most:
+        why = (
+            f"eq. (B.3), 2*eta*omega**2 < 1 at the rated {rated:g} rad/s; the estimate of psi_m would diverge"
+        )
+        _refuse("[control] psi_eta", control.psi_eta, f"below {most:.4g} s2/rad2: {why}")
+    if not control.winding_temp_min_c < control.winding_temp_max_c:
+        _refuse("[control] winding_temp_min_c", control.winding_temp_min_c, "below winding_temp_max_c")
+
+
+RULES = (
+    _sample_time, _carrier, _pulses, _voltage, _current, _flux, _codes, _speed_loop, _current_loop, _flux_loop,
+    _adaline_steps,
+)  # fmt: skip

@@ -7,19 +7,33 @@ run at the clock and stand in modulation/gate_generation.
 from collections import namedtuple
 from typing import NamedTuple
 
-from golden_model.control import chord_speed, current_pi, decoupling, speed_pi, voltage_limit
+from golden_model.block import Port
+from golden_model.control import (
+    chord_speed,
+    current_pi,
+    dead_time_compensation,
+    decoupling,
+    speed_pi,
+    voltage_limit,
+)
+from golden_model.control.dead_time_compensation import D_D, D_Q
 from golden_model.estimators import (
     applied_voltage,
+    clean_voltage,
     current_model,
+    current_directions,
     delta_lambda,
     flux_compensation,
     flux_estimate,
     flux_merge,
     flux_monitor,
+    psi_adaline,
     speed_reciprocal,
     torque,
+    v_dead_adaline,
     winding_resistance,
 )
+from golden_model.formats import PU
 from golden_model.io import (
     current_conditioning,
     position,
@@ -50,20 +64,28 @@ WIRING = {
     "flux": (flux_estimate, ("rotor_frame", "merged_flux", "resistance")),
     "chord": (chord_speed, ("speed_measurement",)),
     "cross_coupling": (decoupling, ("flux", "chord")),
-    "circle": (voltage_limit, ("current_regulators", "cross_coupling", "bus_voltage")),
     "delay": (svm_delay_compensation, ("angle", "speed_measurement")),
     "trig_out": (sincos, ("delay",)),
+    "leg_compensation": (dead_time_compensation, ("latch",)),
+    "compensation_dq": (park, ("leg_compensation", "trig_out")),
+    "direction_functions": (park, ("trig_out",)),
+    "circle": (voltage_limit, ("current_regulators", "cross_coupling", "compensation_dq", "bus_voltage")),
     "stator_voltage": (inverse_park, ("circle", "trig_out")),
     "modulator": (svm, ("stator_voltage", "bus_reciprocal")),
     "compare": (pwm_compare, ("modulator",)),
     "period_voltage": (applied_voltage, ("bus_voltage",)),
+    "motor_voltage": (clean_voltage, ("period_voltage",)),
     "magnetic_model": (current_model, ("rotor_frame",)),
     "model_flux": (flux_inverse_park, ("magnetic_model",)),
-    "merge": (flux_merge, ("model_flux", "period_voltage")),
+    "merge": (flux_merge, ("model_flux", "motor_voltage")),
     "speed_inverse": (speed_reciprocal, ("speed_measurement",)),
     "flux_error": (delta_lambda, ("speed_inverse", "circle")),
     "compensation": (flux_compensation, ("flux_error",)),
     "torque_estimate": (torque, ("flux",)),
+    "inverter_loss": (v_dead_adaline, ("circle", "direction_functions")),
+    "magnet_flux": (psi_adaline, ("circle", "direction_functions")),
+    "directions": (current_directions, ("circle", "stator_frame", "speed_measurement")),
+    "direction_vector": (clarke, ("directions",)),
     "monitor": (flux_monitor, ("compensation", "merge", "bus_reciprocal")),
 }
 
@@ -107,6 +129,8 @@ class Sample(NamedTuple):
     i_d_ref: int
     i_q_ext: int
     speed_mode: int
+    temp_winding: int
+    temp_valid: int
     clear_faults: int
     run: int
 
@@ -120,6 +144,9 @@ class State(NamedTuple):
     of_delta_lambda: delta_lambda.State = delta_lambda.State()
     of_flux_compensation: flux_compensation.State = flux_compensation.State()
     of_flux_monitor: flux_monitor.State = flux_monitor.State()
+    of_v_dead_adaline: v_dead_adaline.State = v_dead_adaline.State()
+    of_psi_adaline: psi_adaline.State = psi_adaline.State()
+    of_clean_voltage: clean_voltage.State = clean_voltage.State()
     # Outputs that the next sample reads: the feedback paths of the top.
     sat_d: int = 0
     sat_q: int = 0
@@ -133,6 +160,10 @@ class State(NamedTuple):
     lambda_pi_q: int = 0
     lambda_add_d: int = 0
     lambda_add_q: int = 0
+    v_comp: int = 0
+    v_leg: int = 0
+    s_alpha: int = 0
+    s_beta: int = 0
 
 
 class Observed(NamedTuple):
@@ -157,6 +188,8 @@ class Observed(NamedTuple):
     omega_chord: int
     u_dec_d: int
     u_dec_q: int
+    u_comp_d: int
+    u_comp_q: int
     u_int_d: int
     u_int_q: int
     u_d: int
@@ -182,6 +215,14 @@ class Observed(NamedTuple):
     lambda_pi_q: int
     torque: int
     flux_faults: int
+    d_d: int
+    d_q: int
+    v_dead: int
+    v_comp: int
+    v_comp_limited: int
+    psi_m: int
+    psi_held: int
+    temp_lost: int
     compare_a: int
     compare_b: int
     compare_c: int
@@ -241,7 +282,9 @@ def step(state, sample, regs, config):
         r.kp_q,
         r.ki_q,
     )
-    winding_r, rho = winding_resistance.step(r.r_s, r.t_s)
+    winding_r, rho, temp_lost = winding_resistance.step(
+        x.temp_winding, x.temp_valid, r.r_s, r.tcr, r.t_0, r.t_min, r.t_max, r.t_s
+    )
     lambda_m_d, lambda_m_q = flux_park.step(state.lambda_m_alpha, state.lambda_m_beta, cos_theta, sin_theta)
     lambda_d, lambda_q, estimate_limited = flux_estimate.step(
         i_d,
@@ -260,12 +303,15 @@ def step(state, sample, regs, config):
     )
     (omega_chord,) = chord_speed.step(omega_me, r.k_chord)
     u_dec_d, u_dec_q = decoupling.step(omega_chord, lambda_d, lambda_q)
-    voltage_limit_state, (u_d, u_q, sat_d, sat_q) = voltage_limit.step(
-        state.of_voltage_limit, u_pi_d, u_pi_q, u_dec_d, u_dec_q, u_max
-    )
-
     (theta_out,) = svm_delay_compensation.step(theta_me, omega_me, r.k_delay)
     cos_out, sin_out = sincos.step(theta_out)
+    u_comp_alpha, u_comp_beta = dead_time_compensation.step(state.v_comp, state.s_alpha, state.s_beta)
+    u_comp_d, u_comp_q = park.step(u_comp_alpha, u_comp_beta, cos_out, sin_out)
+    d_d, d_q = park.step(state.s_alpha, state.s_beta, cos_out, sin_out)
+    voltage_limit_state, (u_d, u_q, sat_d, sat_q) = voltage_limit.step(
+        state.of_voltage_limit, u_pi_d, u_pi_q, u_dec_d, u_dec_q, u_comp_d, u_comp_q, u_max
+    )
+
     u_alpha, u_beta = inverse_park.step(u_d, u_q, cos_out, sin_out)
     duty_a, duty_b, duty_c = svm.step(u_alpha, u_beta, m, m_beta, n)
     compare_a, compare_b, compare_c = pwm_compare.step(duty_a, duty_b, duty_c, r.min_pulse, c.carrier_half)
@@ -273,6 +319,11 @@ def step(state, sample, regs, config):
     u_applied_alpha, u_applied_beta, voltage_known = applied_voltage.step(
         state.compare_a, state.compare_b, state.compare_c, u_dc, u_dc_at_rail, x.run, c.carrier_half
     )
+    clean_state, (u_clean_alpha, u_clean_beta) = clean_voltage.step(
+        state.of_clean_voltage, u_applied_alpha, u_applied_beta, state.s_alpha, state.s_beta, state.v_leg
+    )
+    s_a, s_b, s_c = current_directions.step(i_alpha, i_beta, omega_me, r.k_ahead, r.k_sign)
+    s_alpha, s_beta = clarke.step(s_a, s_b, s_c)
     lambda_c_d, lambda_c_q, model_limited = current_model.step(
         i_d, i_q, state.lambda_add_d, state.lambda_add_q, r.l_d, r.l_q, r.lambda_mg
     )
@@ -283,8 +334,8 @@ def step(state, sample, regs, config):
         i_beta,
         lambda_c_alpha,
         lambda_c_beta,
-        u_applied_alpha,
-        u_applied_beta,
+        u_clean_alpha,
+        u_clean_beta,
         voltage_known,
         x.run,
         rho,
@@ -333,17 +384,55 @@ def step(state, sample, regs, config):
         x.clear_faults,
     )
 
+    v_dead_state, (v_dead, v_comp, v_leg, v_comp_limited) = v_dead_adaline.step(
+        state.of_v_dead_adaline,
+        u_pi_d,
+        d_d,
+        sat_d,
+        sat_q,
+        current_at_rail,
+        voltage_known,
+        x.run,
+        r.k_lp,
+        r.eta_v,
+        r.gamma,
+        r.zeta,
+        r.v_thr,
+        r.v_comp_max,
+        r.compensate,
+    )
+    psi_state, (psi_m, psi_held) = psi_adaline.step(
+        state.of_psi_adaline,
+        u_q,
+        d_q,
+        state.v_leg,
+        i_d,
+        i_q,
+        winding_r,
+        omega_chord,
+        sat_d,
+        sat_q,
+        current_at_rail,
+        voltage_known,
+        x.run,
+        r.l_d,
+        r.eta_psi,
+        r.omega_psi_min,
+    )
+
     following = State(
         speed_state, speed_pi_state, current_pi_state, voltage_limit_state, merge_state, delta_state,
-        compensation_state, monitor_state, sat_d, sat_q, compare_a, compare_b, compare_c,
-        lambda_m_alpha, lambda_m_beta, merge_known, lambda_pi_d, lambda_pi_q, lambda_add_d, lambda_add_q,
+        compensation_state, monitor_state, v_dead_state, psi_state, clean_state, sat_d, sat_q, compare_a,
+        compare_b, compare_c, lambda_m_alpha, lambda_m_beta, merge_known, lambda_pi_d, lambda_pi_q,
+        lambda_add_d, lambda_add_q, v_comp, v_leg, s_alpha, s_beta,
     )  # fmt: skip
     return following, Observed(
         i_a, i_b, i_c, current_at_rail, u_dc, u_max, u_dc_at_rail, u_dc_low, theta_me, omega_me, i_d, i_q,
-        i_q_ref, speed_limited, lambda_d, lambda_q, omega_chord, u_dec_d, u_dec_q, u_int_d, u_int_q, u_d, u_q,
-        sat_d, sat_q, u_alpha, u_beta, duty_a, duty_b, duty_c, u_applied_alpha, u_applied_beta,
-        lambda_c_d, lambda_c_q, lambda_m_alpha, lambda_m_beta, merge_known, delta_lambda_d, delta_lambda_q,
-        delta_held, lambda_pi_d, lambda_pi_q, torque_me, flux_faults, compare_a, compare_b, compare_c,
+        i_q_ref, speed_limited, lambda_d, lambda_q, omega_chord, u_dec_d, u_dec_q, u_comp_d, u_comp_q, u_int_d,
+        u_int_q, u_d, u_q, sat_d, sat_q, u_alpha, u_beta, duty_a, duty_b, duty_c, u_applied_alpha,
+        u_applied_beta, lambda_c_d, lambda_c_q, lambda_m_alpha, lambda_m_beta, merge_known, delta_lambda_d,
+        delta_lambda_q, delta_held, lambda_pi_d, lambda_pi_q, torque_me, flux_faults, d_d, d_q, v_dead, v_comp,
+        v_comp_limited, psi_m, psi_held, temp_lost, compare_a, compare_b, compare_c,
     )  # fmt: skip
 
 
@@ -353,3 +442,6 @@ OBSERVED = {
     for p in module.BLOCK.outputs
     if p.name in Observed._fields
 }
+# What two of the Park transforms are used for; the others' outputs have the names of their use.
+OBSERVED |= {p.name: p for p in (D_D, D_Q)}
+OBSERVED |= {f"u_comp_{x}": Port(f"u_comp_{x}", PU, doc=f"compensating voltage, {x} axis") for x in "dq"}

@@ -23,9 +23,10 @@ RECIPROCAL = Format(0, 0, 17)  # m of 1/x = m * 2**n * 2**-17
 FLUX = Format(1, 1, 23)  # fluxes and voltages inside the estimators: 25 bits, the multiplier's wide port
 FLUX_STATE = Format(1, 1, 30)  # flux that is integrated: 7 bits below FLUX, see docs/flux_estimator.md
 RESISTANCE = Format(0, 0, 24)  # winding resistance, and the flux it takes away in half a sample, per unit
+V_LEG = Format(1, -1, 18)  # what dead time and device drops take from a leg, below half a voltage base
 SAMPLE_TIME = Format(0, -1, 18)  # sample time times omega_base: below half a radian a sample at base speed
 
-PU_W, TURN_W, INTEGRAL_W = PU.width, TURN.width, INTEGRAL.width
+PU_W, TURN_W, INTEGRAL_W, V_LEG_W = PU.width, TURN.width, INTEGRAL.width, V_LEG.width
 DUTY_ONE = 1 << DUTY.frac_bits
 TRIG_ONE = 1 << TRIG.frac_bits
 FLUX_W, FLUX_STATE_W = FLUX.width, FLUX_STATE.width

@@ -1,17 +1,28 @@
 """Every block of the core, one line each: add yours here and the bench finds it."""
 
 from golden_model.common import reciprocal, sqrt
-from golden_model.control import chord_speed, current_pi, decoupling, speed_pi, voltage_limit
+from golden_model.control import (
+    chord_speed,
+    current_pi,
+    dead_time_compensation,
+    decoupling,
+    speed_pi,
+    voltage_limit,
+)
 from golden_model.estimators import (
     applied_voltage,
+    clean_voltage,
     current_model,
+    current_directions,
     delta_lambda,
     flux_compensation,
     flux_estimate,
     flux_merge,
     flux_monitor,
+    psi_adaline,
     speed_reciprocal,
     torque,
+    v_dead_adaline,
     winding_resistance,
 )
 from golden_model.io import (
@@ -62,5 +73,10 @@ BLOCKS = {
         flux_compensation,
         torque,
         flux_monitor,
+        current_directions,
+        dead_time_compensation,
+        clean_voltage,
+        v_dead_adaline,
+        psi_adaline,
     )
 }

@@ -28,6 +28,20 @@ FLUX_OVER_SPEED, FLUX_OF_CURRENT, FLUX_ALONE = 2.0, 0.5, 0.1  # flux bandwidth o
 FADED_IN = 0.5  # of the crossover of the two flux models: full compensation from here on
 CROSSOVER_PART = 8.0  # rated electrical speed over the crossover of the two flux models
 COMPENSATION_PART = 0.5  # of the nominal flux: what the compensation may add or take
+SIGN_OF_RATED, SIGN_GAIN = (
+    0.02,
+    2.0,
+)  # a direction is full from the larger of: part of rated current, loss over kp
+AHEAD_SAMPLES = 2.5  # from a sample to the middle of the next sample's voltage
+THRESHOLD_OF_BASE = 2e-5  # of the voltage base: five of the format's steps
+LOSS_MARGIN, LOSS_SPARE_V = (
+    3.0,
+    3.0,
+)  # most that is compensated: three times what the data say, and device drops
+PSI_STEP, PSI_FROM = (
+    0.01,
+    0.1,
+)  # 2*eta*omega**2 at rated speed; part of rated speed from which psi_m is estimated
 ROUND_UP = ("dead_time", "min_pulse")  # times that must not come out shorter than asked
 
 
@@ -189,6 +203,62 @@ def flux_estimator(drive):
     yield Entry("flux_mode", c.flux_mode, "1", 1.0, "[control] flux_mode")
 
 
+def leg_loss_v(drive):
+    """What dead time and device drops take from a leg, from the drive's own data [V]."""
+    i = drive.inverter
+    return i.dead_time_s * i.pwm_frequency_hz * i.dc_bus_v + (i.v_switch_v + i.v_diode_v) / 2.0
+
+
+def vsi_estimators(drive):
+    """Dead-time voltage, its compensation, winding temperature and magnet flux: paper 000."""
+    c, m, b, t_s = drive.control, drive.machine, drive.bases, drive.sample_time_s
+    volts, amperes, speed = (base_keys(drive, k) for k in ("voltage_v", "current_a", "omega_me_rad_s"))
+    zone, keys = c.sign_current_a, "[control] sign_current_a"
+    if zone is None:
+        kp = min(current_gains(drive, axis)[0] for axis in "dq") or math.inf
+        zone = max(SIGN_OF_RATED * m.rated_current_a, SIGN_GAIN * leg_loss_v(drive) / kp)
+        keys = "[machine] rated_current_a; [inverter] dead_time_s; [control] current_bandwidth_hz"
+    yield Entry("k_sign", 1.0 / zone, "1/A", 1.0 / b.current_a, f"{keys}; {amperes}")
+    yield Entry(
+        "k_ahead", AHEAD_SAMPLES * t_s, "s", 1.0 / b.omega_me_rad_s, f"[inverter] pwm_frequency_hz; {speed}"
+    )
+    k_lp = -math.expm1(-TURN_RAD * c.v_dead_filter_hz * t_s)
+    yield Entry("k_lp", k_lp, "1", 1.0, "[control] v_dead_filter_hz; [inverter] pwm_frequency_hz")
+    yield Entry("eta_v", 18.0 * c.v_dead_eta, "1", 1.0, "[control] v_dead_eta")
+    yield Entry("gamma", c.v_dead_gamma, "1", 1.0, "[control] v_dead_gamma")
+    yield Entry("zeta", c.v_dead_zeta, "1", 1.0, "[control] v_dead_zeta")
+    least = THRESHOLD_OF_BASE * b.voltage_v if c.v_dead_threshold_v is None else c.v_dead_threshold_v
+    yield Entry("v_thr", least, "V", b.voltage_v, f"[control] v_dead_threshold_v; {volts}")
+    most = LOSS_MARGIN * leg_loss_v(drive) + LOSS_SPARE_V if c.v_dead_limit_v is None else c.v_dead_limit_v
+    keys = (
+        "[inverter] dead_time_s, pwm_frequency_hz, dc_bus_v"
+        if c.v_dead_limit_v is None
+        else "[control] v_dead_limit_v"
+    )
+    yield Entry("v_comp_max", most, "V", b.voltage_v, f"{keys}; {volts}")
+    yield Entry("compensate", int(c.dead_time_compensation), "1", 1.0, "[control] dead_time_compensation")
+    omega_b, keys = b.omega_me_rad_s, "[control] psi_eta"
+    eta = psi_eta(drive)
+    yield Entry("eta_psi", 2.0 * eta, "s2/rad2", 1.0 / omega_b / omega_b, f"{keys}; {speed}")
+    least = c.psi_min_speed_rad_s
+    least = PSI_FROM * m.rated_speed_rad_s if least is None else least
+    yield Entry(
+        "omega_psi_min", m.pole_pairs * least, "rad/s", omega_b, f"[control] psi_min_speed_rad_s; {speed}"
+    )
+    keys = "[machine] resistance_ohm, resistance_temp_coeff_per_k"
+    tcr = m.resistance_ohm * m.resistance_temp_coeff_per_k
+    yield Entry("tcr", tcr, "ohm/K", b.voltage_v / b.current_a, f"{keys}; {volts}; {amperes}")
+    yield Entry("t_0", m.temperature_ref_c, "degC", 1.0, "[machine] temperature_ref_c")
+    yield Entry("t_min", c.winding_temp_min_c, "degC", 1.0, "[control] winding_temp_min_c")
+    yield Entry("t_max", c.winding_temp_max_c, "degC", 1.0, "[control] winding_temp_max_c")
+
+
+def psi_eta(drive):
+    """eta of paper 000 eq. (13) [s2/rad2]; by default 2*eta*omega**2 = 0.01 at the rated speed."""
+    rated = drive.machine.pole_pairs * drive.machine.rated_speed_rad_s
+    return PSI_STEP / 2.0 / rated / rated if drive.control.psi_eta is None else drive.control.psi_eta
+
+
 def gates(drive):
     """Times of the gate signals in clocks."""
     for name in ROUND_UP:
@@ -196,4 +266,4 @@ def gates(drive):
         yield Entry(name, getattr(drive.inverter, f"{name}_s"), "s", 1.0 / drive.core.clock_hz, keys)
 
 
-PARTS = (sensing, speed_loop, current_loop, flux_estimator, gates)
+PARTS = (sensing, speed_loop, current_loop, flux_estimator, vsi_estimators, gates)

@@ -13,11 +13,13 @@ SIGNALS = {p.name: p for p in sample_latch.BLOCK.outputs} | OBSERVED  # raw samp
 
 _OF_UNIT = {
     "A": "i_a i_b i_c i_d i_q i_q_ref i_d_ref i_q_ext",
-    "V": "u_dc u_max u_dec_d u_dec_q u_int_d u_int_q u_d u_q u_alpha u_beta u_applied_alpha u_applied_beta",
+    "V": "u_dc u_max u_dec_d u_dec_q u_int_d u_int_q u_d u_q u_alpha u_beta u_applied_alpha u_applied_beta "
+    "u_comp_d u_comp_q v_dead v_comp",
     "rad/s": "omega_me omega_chord omega_ref",
     "Wb": "lambda_d lambda_q lambda_c_d lambda_c_q lambda_m_alpha lambda_m_beta delta_lambda_d delta_lambda_q "
-    "lambda_pi_d lambda_pi_q",
+    "lambda_pi_d lambda_pi_q psi_m",
     "Nm": "torque",
+    "degC": "temp_winding",
     "rad": "theta_me",
 }
 UNITS = {name: unit for unit, names in _OF_UNIT.items() for name in names.split()}  # the rest: "1"
@@ -40,6 +42,7 @@ def si_per_lsb(name, drive):
         "Wb": bases.flux_wb,
         "Nm": 1.5 * drive.machine.pole_pairs * bases.flux_wb * bases.current_a,
         "rad": TURN_RAD,
+        "degC": 1.0,
         "1": 1.0,
     }[unit(name)]
     return SIGNALS[name].fmt.lsb * scale

@@ -41,9 +41,22 @@ class Scenario:
     )  # period -> registers from there on
     omega_m: float = 0.0  # mechanical speed at the start [rad/s]
     clear_faults: np.ndarray | None = None  # 0 or 1; None: never
+    temp_winding: np.ndarray | None = (
+        None  # what the thermocouple says [degC]; NaN: lost; None: there is none
+    )
 
     def __len__(self) -> int:
         return len(self.load)
+
+    def slow_inputs(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Temperature and whether it is one, and clear_faults, as the core takes them."""
+        zeros = np.zeros(len(self), np.int64)
+        clear = zeros if self.clear_faults is None else self.clear_faults
+        if self.temp_winding is None:
+            return zeros, zeros, clear
+        valid = np.isfinite(self.temp_winding)
+        sixty_fourths = np.round(64.0 * np.where(valid, self.temp_winding, 0.0)).astype(np.int64)
+        return sixty_fourths, valid.astype(np.int64), clear
 
 
 BRAKE_SLOPE = 10.0  # Nm per rad/s: a held shaft creeps below half a rad/s, and a period still integrates well
@@ -259,7 +272,7 @@ async def cosimulate(
     period_s = 1.0 / drive.inverter.pwm_frequency_hz
     plant, described = build_plant(drive, sensors, machine, scenario.omega_m)
     duties = np.zeros(3)
-    codes, plant_rows = sensor_params(described), []
+    codes, plant_rows, slow_inputs = sensor_params(described), [], scenario.slow_inputs()
     beside = Beside(device, register_set)
     await beside.start(int(scenario.enable[0]))
     for k in range(len(scenario)):
@@ -271,7 +284,7 @@ async def cosimulate(
             u_dc_code(codes, float(scenario.u_dc[k]), k),
             position_code(codes, plant.theta_m, k),
             *(scenario.omega_ref[k], scenario.i_d_ref[k], scenario.i_q_ext[k], scenario.speed_mode[k]),
-            0 if scenario.clear_faults is None else scenario.clear_faults[k],
+            *(column[k] for column in slow_inputs),
         )
         inputs = dict(zip(INPUT_PORTS, map(int, values), strict=True))
         got = await beside.period(inputs, int(scenario.enable[k]))

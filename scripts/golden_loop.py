@@ -32,10 +32,12 @@ def mixed_kernel(function):
 
 @kernel
 def run_controller(state, samples, registers, config, observed):
-    """``samples`` (n, 11) in, ``observed`` (n, len(Observed)) out, both int64; returns the last state."""
+    """``samples`` (n, 13) in, ``observed`` (n, len(Observed)) out, both int64; returns the last state."""
     for k in range(samples.shape[0]):
         x = samples[k]
-        sample = fluxproof.Sample(x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8], x[9], x[10])
+        sample = fluxproof.Sample(
+            x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8], x[9], x[10], x[11], x[12]
+        )
         state, out = fluxproof.step(state, sample, registers, config)
         for n, value in enumerate(out):
             observed[k, n] = value
@@ -68,6 +70,8 @@ def run_averaged(
             references[k, 2],
             references[k, 3],
             0,
+            0,
+            0,
             1,
         )
         state, seen = fluxproof.step(state, sample, registers, config)
@@ -89,7 +93,7 @@ def run_switching(
 ):  # fmt: skip
     """Closed loop over the switching plant; returns the controller's state.
 
-    ``samples`` (n, 6) int64: omega_ref, i_d_ref, i_q_ext, speed_mode, clear_faults, run; ``u_dc`` [V], ``load``,
+    ``samples`` (n, 8) int64: the fields of fluxproof.Sample behind the codes; ``u_dc`` [V], ``load``,
     ``brake`` [Nm] (n,), with an imposed speed ``load`` [rad/s].  ``first``: number of the first period, for the
     sensors' noise.  ``out`` (n, 6) receives the signals of PLANT before each period, ``observed`` the core's.
     """
@@ -110,6 +114,8 @@ def run_switching(
             samples[k, 3],
             samples[k, 4],
             samples[k, 5],
+            samples[k, 6],
+            samples[k, 7],
         )
         duties[0] = state.compare_a / config.carrier_half
         duties[1] = state.compare_b / config.carrier_half
@@ -118,7 +124,7 @@ def run_switching(
         for n, value in enumerate(seen):
             observed[k, n] = value
         times, words = centred_gates(duties, dead_time_s, period_s)
-        if not samples[k, 5]:
+        if not samples[k, 7]:
             words[:] = 0
         pull = load_torque(load[k], brake[k], plant_state[L.OMEGA_M]) if free else load[k]
         advance_switching(plant_state, plant_params, times, words, u_dc[k], pull, period_s, -1.0)
@@ -145,13 +151,13 @@ def simulate(
     plant_state = initial_state(machine, params, omega_m=scenario.omega_m)
     codes = sensor_params(sensors or described_sensors(drive))
     n = len(scenario)
-    inputs = np.zeros((n, 6), np.int64)
+    inputs = np.zeros((n, 8), np.int64)
     columns = (
         scenario.omega_ref,
         scenario.i_d_ref,
         scenario.i_q_ext,
         scenario.speed_mode,
-        0 if scenario.clear_faults is None else scenario.clear_faults,
+        *scenario.slow_inputs(),
         scenario.enable,
     )
     for column, values in enumerate(columns):

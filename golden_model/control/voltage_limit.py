@@ -1,7 +1,7 @@
-"""Adds the decoupling and keeps the voltage inside the circle of radius u_max, d axis first.
+"""Adds decoupling and dead-time compensation and keeps the voltage inside the circle of radius u_max, d axis first.
 
-    limit = min(u_max, room),  u_d = limit(u_pi_d + u_dec_d, +-limit)
-    u_q = limit(u_pi_q + u_dec_q, +-sqrt(u_max**2 - u_d**2))
+    limit = min(u_max, room),  u_d = limit(u_pi_d + u_dec_d + u_comp_d, +-limit)
+    u_q = limit(u_pi_q + u_dec_q + u_comp_q, +-sqrt(u_max**2 - u_d**2))
     room = sqrt(u_max**2 - min(|u_dec_q|, u_max)**2)        for the next sample
     sat_x = -1, 0, +1: the limit that holds the axis, for the regulator's integral
 
@@ -36,9 +36,9 @@ class State(NamedTuple):
 
 
 @kernel
-def step(state, u_pi_d, u_pi_q, u_dec_d, u_dec_q, u_max):
-    sum_d = u_pi_d + u_dec_d
-    sum_q = u_pi_q + u_dec_q
+def step(state, u_pi_d, u_pi_q, u_dec_d, u_dec_q, u_comp_d, u_comp_q, u_max):
+    sum_d = u_pi_d + u_dec_d + u_comp_d
+    sum_q = u_pi_q + u_dec_q + u_comp_q
     limit_d = min(u_max, state.room)
     sat_d = side(sum_d, limit_d)
     u_d = clamp(sum_d, -limit_d, limit_d)
@@ -53,13 +53,13 @@ def step(state, u_pi_d, u_pi_q, u_dec_d, u_dec_q, u_max):
 def limited_d(v, state):
     """u_d in real numbers: exact, so that only q needs a bound."""
     limit = min(v["u_max"], state.room * U_MAX.lsb)
-    return min(max(v["u_pi_d"] + v["u_dec_d"], -limit), limit)
+    return min(max(v["u_pi_d"] + v["u_dec_d"] + v["u_comp_d"], -limit), limit)
 
 
 def reference(v, state):
     u_d = limited_d(v, state)
     u_q_max = math.sqrt(max(0.0, v["u_max"] ** 2 - u_d**2))
-    return {"u_d": u_d, "u_q": min(max(v["u_pi_q"] + v["u_dec_q"], -u_q_max), u_q_max)}
+    return {"u_d": u_d, "u_q": min(max(v["u_pi_q"] + v["u_dec_q"] + v["u_comp_q"], -u_q_max), u_q_max)}
 
 
 def bound(v, state):
@@ -75,9 +75,8 @@ def stimuli(_rng, _config):
         for d in (0, u_max - 1, u_max, u_max + 1, u_max * 3 // 5):
             for q in (0, u_max * 4 // 5 - 1, u_max * 4 // 5 + 1, 131071):
                 for s in (1, -1):
-                    rows.append(
-                        {"u_pi_d": s * d, "u_pi_q": -s * q, "u_dec_d": 0, "u_dec_q": 0, "u_max": u_max}
-                    )
+                    rest = dict.fromkeys(("u_dec_d", "u_dec_q", "u_comp_d", "u_comp_q"), 0)
+                    rows.append({"u_pi_d": s * d, "u_pi_q": -s * q, **rest, "u_max": u_max})
     return rows
 
 
@@ -91,6 +90,8 @@ BLOCK = Block(
         Port("u_pi_q", PU, doc="regulator output, q axis"),
         Port("u_dec_d", PU, doc="rotational voltage, d axis"),
         Port("u_dec_q", PU, doc="rotational voltage, q axis"),
+        Port("u_comp_d", PU, doc="compensating voltage, d axis"),
+        Port("u_comp_q", PU, doc="compensating voltage, q axis"),
         Port("u_max", U_MAX, doc="radius of the voltage circle"),
     ),
     outputs=(

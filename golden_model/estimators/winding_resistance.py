@@ -1,33 +1,65 @@
-"""The winding's resistance, and the flux that it takes away in half a sample.
+"""The winding's resistance from its temperature, paper 000 eq. (12), and the flux it takes away in half a sample.
 
-    r   = r_s
-    rho = r_s*t_s/2          t_s: the sample time in per unit, T_s*omega_base
+    r   = r_s + tcr*(temp_winding - t_0)        R = R_0 + TCR*(T_2 - T_0)
+    rho = r*t_s/2                               t_s: the sample time in per unit, T_s*omega_base
 
+Without a reading (``temp_valid`` = 0), or one outside t_min to t_max, r = r_s and ``temp_lost`` is raised.
 rho is what flux_merge and flux_estimate multiply by a current: half a sample's resistive drop, integrated.
-Both start from the one register, so they cannot contradict each other.
-Formats: product 42 fraction bits, rounded half up to U(0,24).  No overflow: r_s < 1, t_s < 1/2, rho < 1/4.
+Formats: temperatures S(9,6) in degrees, tcr U(-6,30); product 36 fraction bits, rounded half up to 24; r limited to
+0 .. 1; rho rounded half up to 24 fraction bits, below 1/4 since t_s < 1/2.
 """
 
 from golden_model.block import Block, Port
-from golden_model.fixed import round_half_up
-from golden_model.formats import RESISTANCE, SAMPLE_TIME
+from golden_model.fixed import Format, round_half_up, saturate_u
+from golden_model.formats import BIT, RESISTANCE, SAMPLE_TIME
 from golden_model.kernel import kernel
 
-DROP = SAMPLE_TIME.frac_bits + 1
+CELSIUS = Format(1, 9, 6)
+TCR = Format(0, -6, 30)
+RESISTANCE_BITS = RESISTANCE.width
+DROP_TCR = CELSIUS.frac_bits + TCR.frac_bits - RESISTANCE.frac_bits
+DROP_RHO = SAMPLE_TIME.frac_bits + 1
 
 
 @kernel
-def step(r_s, t_s):
-    prod = r_s * t_s
-    return r_s, round_half_up(prod, DROP)
+def step(temp_winding, temp_valid, r_s, tcr, t_0, t_min, t_max, t_s):
+    lost = 0 if temp_valid and t_min <= temp_winding <= t_max else 1
+    warmer = round_half_up((temp_winding - t_0) * tcr, DROP_TCR)
+    r = r_s if lost else saturate_u(r_s + warmer, RESISTANCE_BITS)
+    return r, round_half_up(r * t_s, DROP_RHO), lost
 
 
 def reference(v, _state):
-    return {"r": v["r_s"], "rho": v["r_s"] * v["t_s"] / 2}
+    trusted = v["temp_valid"] and v["t_min"] <= v["temp_winding"] <= v["t_max"]
+    r = v["r_s"] + (v["tcr"] * (v["temp_winding"] - v["t_0"]) if trusted else 0.0)
+    r = min(max(r, 0.0), RESISTANCE.hi * RESISTANCE.lsb)
+    return {"r": r, "rho": r * v["t_s"] / 2}
 
 
-def bound(_v, _state):
-    return {"r": 0.0, "rho": RESISTANCE.lsb / 2}
+def bound(v, _state):
+    return {"r": RESISTANCE.lsb / 2, "rho": RESISTANCE.lsb / 2 * (1 + v["t_s"] / 2)}
+
+
+def stimuli(_rng, _config):
+    """Temperatures at the ends of the trusted range and just outside, no reading, resistances at both ends."""
+    rows = []
+    ends = {"t_min": -50 << 6, "t_max": 200 << 6, "t_0": 25 << 6}
+    for temperature in (
+        -50 << 6,
+        (-50 << 6) - 1,
+        200 << 6,
+        (200 << 6) + 1,
+        25 << 6,
+        90 << 6,
+        CELSIUS.lo,
+        CELSIUS.hi,
+    ):
+        for valid in (1, 0):
+            for r_s, tcr in ((641729, 2562610), (0, TCR.hi), (RESISTANCE.hi, TCR.hi)):
+                rows.append(
+                    {**ends, "temp_winding": temperature, "temp_valid": valid, "r_s": r_s, "tcr": tcr}
+                )
+    return rows
 
 
 T_S = Port("t_s", SAMPLE_TIME, doc="sample time, per unit")
@@ -37,13 +69,25 @@ RHO = Port("rho", RESISTANCE, doc="flux taken away in half a sample, per unit of
 BLOCK = Block(
     name="winding_resistance",
     folder="estimators",
-    paper="001, eq. (5): the resistive drop",
+    paper="000, eq. (12)",
     step=step,
-    inputs=(),
-    registers=(Port("r_s", RESISTANCE, doc="winding resistance"), T_S),
-    outputs=(R, RHO),
-    latency=2,
-    constants={"DROP": DROP},
+    inputs=(
+        Port("temp_winding", CELSIUS, doc="winding temperature, degrees Celsius"),
+        Port("temp_valid", BIT, doc="1: the temperature is a reading"),
+    ),
+    registers=(
+        Port("r_s", RESISTANCE, doc="winding resistance at t_0"),
+        Port("tcr", TCR, doc="resistance per kelvin"),
+        Port("t_0", CELSIUS, doc="temperature of r_s"),
+        Port("t_min", CELSIUS, doc="coldest reading that is believed"),
+        Port("t_max", CELSIUS, doc="hottest reading that is believed"),
+        T_S,
+    ),
+    outputs=(R, RHO, Port("temp_lost", BIT, doc="1: no believable temperature, r is r_s")),
+    latency=6,
+    interval=6,
+    constants={"DROP_TCR": DROP_TCR, "DROP_RHO": DROP_RHO},
     reference=reference,
     bound=bound,
+    stimuli=stimuli,
 )

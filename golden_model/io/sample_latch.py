@@ -7,6 +7,7 @@ Formats: all as they come; nothing is computed.
 
 from golden_model.block import Block, Port
 from golden_model.formats import BIT, PU
+from golden_model.estimators import winding_resistance
 from golden_model.io import current_conditioning, position, u_dc_conditioning
 from golden_model.kernel import kernel
 
@@ -22,6 +23,8 @@ def step(
     i_d_ref_in,
     i_q_ext_in,
     speed_mode_in,
+    temp_winding_in,
+    temp_valid_in,
     clear_faults_in,
     run_in,
     *_widths,
@@ -36,6 +39,8 @@ def step(
         i_d_ref_in,
         i_q_ext_in,
         speed_mode_in,
+        temp_winding_in,
+        temp_valid_in,
         clear_faults_in,
         run_in,
     )
@@ -51,6 +56,8 @@ NAMES = {
     "i_d_ref_in": "i_d_ref",
     "i_q_ext_in": "i_q_ext",
     "speed_mode_in": "speed_mode",
+    "temp_winding_in": "temp_winding",
+    "temp_valid_in": "temp_valid",
     "clear_faults_in": "clear_faults",
     "run_in": "run",
 }
@@ -60,6 +67,8 @@ _REFERENCES = {
     "i_d_ref": Port("i_d_ref", PU, doc="current reference, d axis"),
     "i_q_ext": Port("i_q_ext", PU, doc="current reference of torque mode, q axis"),
     "speed_mode": Port("speed_mode", BIT, doc="1: speed control, 0: torque control"),
+    "temp_winding": winding_resistance.BLOCK.inputs[0],
+    "temp_valid": winding_resistance.BLOCK.inputs[1],
     "clear_faults": Port("clear_faults", BIT, doc="1: forget what is over"),
     "run": Port("run", BIT, doc="1: the gates are switching"),
 }

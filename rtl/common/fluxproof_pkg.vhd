@@ -25,6 +25,7 @@ package fluxproof_pkg is
   constant FLUX_W : positive := 25;  -- S(1,23)
   constant FLUX_STATE_W : positive := 32;  -- S(1,30)
   constant RESISTANCE_W : positive := 24;  -- U(0,24)
+  constant V_LEG_W : positive := 18;  -- S(-1,18)
   constant SAMPLE_TIME_W : positive := 17;  -- U(-1,18)
   constant PU_TO_INTEGRAL : natural := 12;
   constant PU_TO_FLUX : natural := 7;
@@ -33,7 +34,7 @@ package fluxproof_pkg is
   constant TRIG_ONE : natural := 65536;
 
   -- fluxproof: clocks from the raw sample to the duties, least distance of two samples
-  constant FLUXPROOF_SAMPLE_TO_DUTY : positive := 38;
+  constant FLUXPROOF_SAMPLE_TO_DUTY : positive := 39;
   constant FLUXPROOF_SAMPLE_INTERVAL : positive := 48;
 
   -- sqrt: 001, section 5.2: voltage limit of the current regulation
@@ -352,9 +353,10 @@ package fluxproof_pkg is
   -- gate_generation: 001, section 5.2, IGBT pulse generation
   constant GATE_GENERATION_LATENCY : positive := 1;
 
-  -- winding_resistance: 001, eq. (5): the resistive drop
-  constant WINDING_RESISTANCE_LATENCY : positive := 2;
-  constant WINDING_RESISTANCE_DROP : natural := 19;
+  -- winding_resistance: 000, eq. (12)
+  constant WINDING_RESISTANCE_LATENCY : positive := 6;
+  constant WINDING_RESISTANCE_DROP_TCR : natural := 12;
+  constant WINDING_RESISTANCE_DROP_RHO : natural := 19;
 
   -- applied_voltage: 001, section 2.2: u_alphabeta of eq. (5)
   constant APPLIED_VOLTAGE_LATENCY : positive := 7;
@@ -426,5 +428,47 @@ package fluxproof_pkg is
 
   -- flux_monitor: none: what a drive needs besides
   constant FLUX_MONITOR_LATENCY : positive := 1;
+
+  -- current_directions: 000, eq. (6)
+  constant CURRENT_DIRECTIONS_LATENCY : positive := 11;
+  constant CURRENT_DIRECTIONS_ONE : natural := 65536;
+  constant CURRENT_DIRECTIONS_SQRT3 : signed(17 downto 0) := to_signed(113512, 18);  -- 1.732050808 as U(1,16), signed for the multiplier
+  constant CURRENT_DIRECTIONS_DROP_TURN : natural := 16;
+  constant CURRENT_DIRECTIONS_DROP_SQRT3 : natural := 16;
+  constant CURRENT_DIRECTIONS_DROP : natural := 13;
+
+  -- dead_time_compensation: 000, section V.B, step d
+  constant DEAD_TIME_COMPENSATION_LATENCY : positive := 2;
+  constant DEAD_TIME_COMPENSATION_DROP : natural := 18;
+
+  -- clean_voltage: 000, eq. (4); 001, eq. (5): the voltage cleaned of the inverter's distortion
+  constant CLEAN_VOLTAGE_LATENCY : positive := 4;
+  constant CLEAN_VOLTAGE_DROP : natural := 11;
+
+  -- v_dead_adaline: 000, eq. (10) and Fig. 4(a)
+  constant V_DEAD_ADALINE_LATENCY : positive := 14;
+  constant V_DEAD_ADALINE_V_STATE_W : natural := 38;
+  constant V_DEAD_ADALINE_V_FINE_W : natural := 25;
+  constant V_DEAD_ADALINE_STEP_W : natural := 18;
+  constant V_DEAD_ADALINE_DROP_LP : natural := 8;
+  constant V_DEAD_ADALINE_DROP_FINE : natural := 13;
+  constant V_DEAD_ADALINE_DROP_MODEL : natural := 18;
+  constant V_DEAD_ADALINE_DROP_STEP : natural := 18;
+  constant V_DEAD_ADALINE_DROP_ETA : natural := 2;
+  constant V_DEAD_ADALINE_DROP_ZETA : natural := 9;
+  constant V_DEAD_ADALINE_DROP_GAMMA : natural := 2;
+  constant V_DEAD_ADALINE_TO_LEG : natural := 20;
+  constant V_DEAD_ADALINE_FINE_TO_LEG : natural := 7;
+
+  -- psi_adaline: 000, eq. (13), with the reluctance term of eq. (7b)
+  constant PSI_ADALINE_LATENCY : positive := 12;
+  constant PSI_ADALINE_PSI_STATE_W : natural := 36;
+  constant PSI_ADALINE_DROP_V : natural := 11;
+  constant PSI_ADALINE_DROP_R : natural := 17;
+  constant PSI_ADALINE_DROP_L : natural := 13;
+  constant PSI_ADALINE_DROP_OMEGA : natural := 16;
+  constant PSI_ADALINE_DROP_ETA : natural := 8;
+  constant PSI_ADALINE_TO_FLUX : natural := 11;
+  constant PSI_ADALINE_TO_PU : natural := 18;
 
 end package fluxproof_pkg;

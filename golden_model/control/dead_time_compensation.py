@@ -1,0 +1,53 @@
+"""What is added against dead time and device drops, in the stator frame: paper 000, section V.B.
+
+    u_comp_alpha = v_comp*s_alpha
+    u_comp_beta  = v_comp*s_beta
+
+s_alpha, s_beta: Clarke transform of the directions that the phase currents will have when this sample's voltage
+acts, as the sample before has foreseen them.  Turned into the rotor frame at that moment's angle they are the
+paper's D_d, D_q of eq. (5), a third of them, and this is its D*gamma*V_dead.
+
+Formats: products exact, 34 fraction bits, rounded half up to PU.  |s| <= 4/3 and v_comp < 1/2: no saturation.
+"""
+
+from golden_model.block import Block, Port
+from golden_model.fixed import round_half_up
+from golden_model.formats import PU, V_LEG
+from golden_model.kernel import kernel
+
+DROP = V_LEG.frac_bits
+
+
+@kernel
+def step(v_comp, s_alpha, s_beta):
+    return round_half_up(v_comp * s_alpha, DROP), round_half_up(v_comp * s_beta, DROP)
+
+
+def reference(v, _state):
+    return {f"u_comp_{x}": v["v_comp"] * v[f"s_{x}"] for x in ("alpha", "beta")}
+
+
+def bound(_v, _state):
+    return {"u_comp_alpha": PU.lsb / 2, "u_comp_beta": PU.lsb / 2}
+
+
+S_ALPHA = Port("s_alpha", PU, lo=-87400, hi=87400, doc="directions of the currents, alpha")
+S_BETA = Port("s_beta", PU, lo=-87400, hi=87400, doc="directions of the currents, beta")
+D_D = Port("d_d", PU, lo=-87400, hi=87400, doc="direction function D_d over three")
+D_Q = Port("d_q", PU, lo=-87400, hi=87400, doc="direction function D_q over three")
+
+BLOCK = Block(
+    name="dead_time_compensation",
+    folder="control",
+    paper="000, section V.B, step d",
+    step=step,
+    inputs=(Port("v_comp", V_LEG, doc="leg voltage that is compensated"), S_ALPHA, S_BETA),
+    outputs=(
+        Port("u_comp_alpha", PU, doc="compensating voltage, alpha"),
+        Port("u_comp_beta", PU, doc="compensating voltage, beta"),
+    ),
+    latency=2,
+    constants={"DROP": DROP},
+    reference=reference,
+    bound=bound,
+)

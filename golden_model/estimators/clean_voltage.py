@@ -1,0 +1,68 @@
+"""The voltage at the motor's terminals: what the inverter was asked for, less what its legs take.
+
+    u_clean_alpha = u_applied_alpha - v_leg*s_alpha(k-1)
+    u_clean_beta  = u_applied_beta  - v_leg*s_beta(k-1)
+
+s_alpha, s_beta are the directions of the phase currents as they will be when this sample's voltage acts; the voltage of
+the coming period is the last sample's, so its directions are those of one sample before.  v_leg: all that is known of
+dead time and drops, compensated and not.  The flux estimator of paper 001 takes this for u.
+
+Formats: product 34 fraction bits, rounded half up to FLUX; the difference saturates at 2 per unit, which the sum of
+the largest voltage, 1.34, and the largest leg voltage, 0.5*4/3, cannot quite exceed.
+"""
+
+from typing import NamedTuple
+
+from golden_model.block import Block, Port
+from golden_model.control.dead_time_compensation import S_ALPHA, S_BETA
+from golden_model.fixed import round_half_up, saturate
+from golden_model.formats import FLUX, FLUX_W, PU, V_LEG
+from golden_model.kernel import kernel
+
+DROP = PU.frac_bits + V_LEG.frac_bits - FLUX.frac_bits
+
+
+class State(NamedTuple):
+    s_alpha: int = 0  # PU
+    s_beta: int = 0
+
+
+@kernel
+def step(state, u_applied_alpha, u_applied_beta, s_alpha, s_beta, v_leg):
+    u_clean_alpha = saturate(u_applied_alpha - round_half_up(v_leg * state.s_alpha, DROP), FLUX_W)
+    u_clean_beta = saturate(u_applied_beta - round_half_up(v_leg * state.s_beta, DROP), FLUX_W)
+    return State(s_alpha, s_beta), (u_clean_alpha, u_clean_beta)
+
+
+def reference(v, state):
+    s = {"alpha": state.s_alpha * PU.lsb, "beta": state.s_beta * PU.lsb}
+    return {f"u_clean_{x}": FLUX.limit(v[f"u_applied_{x}"] - v["v_leg"] * s[x]) for x in s}
+
+
+def bound(_v, _state):
+    return dict.fromkeys(("u_clean_alpha", "u_clean_beta"), FLUX.lsb / 2)
+
+
+BLOCK = Block(
+    name="clean_voltage",
+    folder="estimators",
+    paper="000, eq. (4); 001, eq. (5): the voltage cleaned of the inverter's distortion",
+    step=step,
+    inputs=(
+        Port("u_applied_alpha", FLUX, doc="voltage of the coming period, alpha"),
+        Port("u_applied_beta", FLUX, doc="voltage of the coming period, beta"),
+        S_ALPHA,
+        S_BETA,
+        Port("v_leg", V_LEG, doc="leg voltage lost to dead time and drops"),
+    ),
+    outputs=(
+        Port("u_clean_alpha", FLUX, doc="voltage at the motor in the coming period, alpha"),
+        Port("u_clean_beta", FLUX, doc="voltage at the motor in the coming period, beta"),
+    ),
+    state=State(),
+    latency=4,
+    interval=4,
+    constants={"DROP": DROP},
+    reference=reference,
+    bound=bound,
+)

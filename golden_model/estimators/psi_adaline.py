@@ -1,0 +1,152 @@
+"""Adaline of the magnets' flux, paper 000 eq. (13), for any i_d and a salient motor.
+
+    e      = u_q - v_leg*d_q - r*i_q - omega*(l_d*i_d + psi_m)          eq. (7b); l_d*i_d is zero in eq. (11)
+    psi_m += eta_psi*omega*e                                            eta_psi = 2*eta
+
+u_q is what the regulators ask for, compensation of the dead time included; v_leg*d_q takes away what the legs lose.
+omega is the speed along the chord of a sample, as in the decoupling.
+Held, and told by ``psi_held``, where the speed is too low to tell the EMF from the errors of the voltage, while the
+voltage is at its limit, a converter at its end, the bus reading lost or the gates off.
+
+Formats: v_leg*d_q and r*i_q to FLUX, l_d*i_d to FLUX, saturated; their product with omega to FLUX; e FLUX, saturated;
+omega*e FLUX; psi_m S(1,34), so that an eta of 1e-4 per unit still moves it by an LSB of omega*e; out PU.  All half up.
+"""
+
+from typing import NamedTuple
+
+from golden_model.block import Block, Port
+from golden_model.control.current_pi import SAT
+from golden_model.control.dead_time_compensation import D_Q
+from golden_model.estimators.current_model import L_D
+from golden_model.estimators.v_dead_adaline import V_LEG_PORT
+from golden_model.estimators.winding_resistance import R
+from golden_model.fixed import Format, round_half_up, round_sat, saturate
+from golden_model.formats import BIT, FLUX, FLUX_W, INDUCTANCE, PU, PU_TO_FLUX, PU_W, RESISTANCE, V_LEG
+from golden_model.kernel import kernel
+
+ETA_PSI = Format(0, -2, 19)
+PSI_STATE = Format(1, 1, 34)
+PSI_STATE_W = PSI_STATE.width
+DROP_V = PU.frac_bits + V_LEG.frac_bits - FLUX.frac_bits
+DROP_R = PU.frac_bits + RESISTANCE.frac_bits - FLUX.frac_bits
+DROP_L = PU.frac_bits + INDUCTANCE.frac_bits - FLUX.frac_bits
+DROP_OMEGA = PU.frac_bits
+DROP_ETA = FLUX.frac_bits + ETA_PSI.frac_bits - PSI_STATE.frac_bits
+TO_FLUX = PSI_STATE.frac_bits - FLUX.frac_bits
+TO_PU = PSI_STATE.frac_bits - PU.frac_bits
+
+
+class State(NamedTuple):
+    psi_m: int = 0  # PSI_STATE
+
+
+@kernel
+def step(
+    state, u_q, d_q, v_leg, i_d, i_q, r, omega_chord, sat_d, sat_q, current_at_rail, voltage_known, run,
+    l_d, eta_psi, omega_psi_min,
+):  # fmt: skip
+    lost = round_half_up(v_leg * d_q, DROP_V)
+    drop = round_half_up(r * i_q, DROP_R)
+    own = saturate(round_half_up(l_d * i_d, DROP_L), FLUX_W)
+    flux = saturate(own + saturate(round_half_up(state.psi_m, TO_FLUX), FLUX_W), FLUX_W)
+    emf = round_half_up(flux * omega_chord, DROP_OMEGA)
+    e = saturate((u_q << PU_TO_FLUX) - lost - drop - emf, FLUX_W)
+    pull = round_sat(e * omega_chord, DROP_OMEGA, FLUX_W)
+    held = 1
+    if run and voltage_known and sat_d == 0 and sat_q == 0 and current_at_rail == 0:
+        held = 1 if abs(omega_chord) < omega_psi_min else 0
+    psi = state.psi_m
+    if not held:
+        psi = saturate(psi + round_half_up(pull * eta_psi, DROP_ETA), PSI_STATE_W)
+    return State(psi), (round_sat(psi, TO_PU, PU_W), held)
+
+
+def reference(v, state):
+    psi = state.psi_m * PSI_STATE.lsb
+    bad = v["sat_d"] or v["sat_q"] or v["current_at_rail"] or not (v["run"] and v["voltage_known"])
+    if not bad and abs(v["omega_chord"]) >= v["omega_psi_min"]:
+        flux = FLUX.limit(FLUX.limit(v["l_d"] * v["i_d"]) + psi)
+        lost = v["v_leg"] * v["d_q"] + v["r"] * v["i_q"]
+        e = FLUX.limit(v["u_q"] - lost - v["omega_chord"] * flux)
+        psi = PSI_STATE.limit(psi + v["eta_psi"] * FLUX.limit(v["omega_chord"] * e))
+    return {"psi_m": PU.limit(psi)}
+
+
+def bound(v, _state):
+    e = 1.5 * FLUX.lsb + 2 * (FLUX.lsb + FLUX.lsb) + FLUX.lsb
+    return {"psi_m": v["eta_psi"] * (2 * e + 2 * FLUX.lsb) + PSI_STATE.lsb + PU.lsb}
+
+
+def stimuli(rng, _config):
+    """Steady running to the estimate's rest, both directions; the lowest speed; each reason to hold; the ends."""
+    calm = {
+        "sat_d": 0,
+        "sat_q": 0,
+        "current_at_rail": 0,
+        "voltage_known": 1,
+        "run": 1,
+        "l_d": 529109,
+        "r": 641729,
+    }
+    rows = []
+    for omega in (49152, -49152, 131071, -131072):
+        for _ in range(20):
+            u_q = omega * 27000 // 65536 + int(rng.integers(-50, 50))
+            rows.append(
+                {**calm, "omega_chord": omega, "u_q": max(min(u_q, PU.hi), PU.lo), "i_d": -3000, "i_q": 9000}
+            )
+    rows = [{**row, "v_leg": 5000, "d_q": 80000, "eta_psi": 40000, "omega_psi_min": 3000} for row in rows]
+    for change in ({"sat_d": 1}, {"sat_q": -1}, {"current_at_rail": 1}, {"voltage_known": 0}, {"run": 0}):
+        rows.append({**rows[0], **change})
+    for omega in (2999, 3000, 3001, -2999, -3000, -3001):
+        rows.append({**rows[0], "omega_chord": omega})
+    for u_q in (PU.hi, PU.lo):
+        rows += [{**rows[0], "u_q": u_q, "eta_psi": ETA_PSI.hi, "omega_chord": PU.hi} for _ in range(25)]
+    return rows
+
+
+BLOCK = Block(
+    name="psi_adaline",
+    folder="estimators",
+    paper="000, eq. (13), with the reluctance term of eq. (7b)",
+    step=step,
+    inputs=(
+        Port("u_q", PU, doc="voltage, q axis"),
+        D_Q,
+        V_LEG_PORT,
+        Port("i_d", PU, doc="current, d axis"),
+        Port("i_q", PU, doc="current, q axis"),
+        R,
+        Port("omega_chord", PU, doc="electrical speed along the chord of a sample"),
+        Port("sat_d", SAT, lo=-1, hi=1, doc="limit that holds the d axis"),
+        Port("sat_q", SAT, lo=-1, hi=1, doc="limit that holds the q axis"),
+        Port("current_at_rail", Format(0, 3, 0), doc="bit x: code of phase x at its end"),
+        Port("voltage_known", BIT, doc="0: gates off or bus reading lost"),
+        Port("run", BIT, doc="1: the gates are switching"),
+    ),
+    registers=(
+        L_D,
+        Port("eta_psi", ETA_PSI, doc="step of the psi_m Adaline, 2*eta per unit"),
+        Port("omega_psi_min", Format(0, 1, 16), doc="psi_m is held below this speed"),
+    ),
+    outputs=(
+        Port("psi_m", PU, doc="flux linkage of the magnets"),
+        Port("psi_held", BIT, doc="1: psi_m is held"),
+    ),
+    state=State(),
+    latency=12,
+    interval=12,
+    constants={
+        "PSI_STATE_W": PSI_STATE_W,
+        "DROP_V": DROP_V,
+        "DROP_R": DROP_R,
+        "DROP_L": DROP_L,
+        "DROP_OMEGA": DROP_OMEGA,
+        "DROP_ETA": DROP_ETA,
+        "TO_FLUX": TO_FLUX,
+        "TO_PU": TO_PU,
+    },
+    reference=reference,
+    bound=bound,
+    stimuli=stimuli,
+)

@@ -1,0 +1,227 @@
+"""Adaline of V_dead, paper 000 eq. (10), and the minimisation of its Fig. 4(a).
+
+    lp_u += k_lp*(u_pi_d - lp_u),  u_h = u_pi_d - lp_u             Fig. 3: what the harmonics ask of the regulator
+    lp_d += k_lp*(d_d - lp_d),     d_h = d_d - lp_d                the same filter on the regressor
+    e     = u_h - v_dead*d_h
+    v_dead += eta_v*d_h*e                                          eq. (10), eta_v = 2*9*eta
+    v_sum  += zeta*v_dead                   while |v_dead| > v_thr
+    v_comp  = limit(gamma*v_dead + v_sum, +-v_comp_max)            gamma*V_dead of section V.B
+    v_leg   = v_comp + v_dead                                      all that is known of the leg's loss
+
+Sign and scale: v_dead is the voltage that a leg loses in the direction of its current, positive; the paper's V_dead is
+minus a third of it, its D three times d.  u_pi_d leaves out the decoupling, so that (8d)'s L_q*omega*i_q is not in it.
+The paper filters u_d* only: with i_d = 0 the mean of D_d is zero.  With i_d /= 0 it is not, and a regressor with a
+mean would pull the estimate to var(D_d)/mean(D_d**2) of the truth; the same filter on both sides takes the mean
+out and delays both alike (docs/vsi_estimators.md).
+Fig. 4(a) adds zeta to gamma in every step until |V_dead| < V_thr.  The product gamma*V_dead would then have to survive
+V_dead -> 0, with gamma -> infinity.  What the step adds to the product, zeta*v_dead, is kept as a sum instead.
+While the gates are off v_dead and the sum stay; nothing learns while the voltage is at its limit or a converter is.
+
+Formats: lp S(1,28); u_h, d_h PU; e FLUX; d_h*e S(-4,21), saturated there: a slower step, the same sign; v_dead and
+v_sum S(-1,38), where an eta of 1e-6 still moves them by an error of 2**-22 (docs, word lengths); v_comp, v_leg V_LEG.
+All rounded half up.  Saturation: v_dead and v_sum at half a voltage base, v_comp at v_comp_max.
+"""
+
+from typing import NamedTuple
+
+from golden_model.block import Block, Port
+from golden_model.control.current_pi import SAT
+from golden_model.control.dead_time_compensation import D_D
+from golden_model.fixed import Format, clamp, round_half_up, round_sat, saturate
+from golden_model.formats import (
+    BIT,
+    FLUX,
+    FLUX_W,
+    INTEGRAL,
+    INTEGRAL_W,
+    PU,
+    PU_TO_FLUX,
+    PU_TO_INTEGRAL,
+    PU_W,
+    V_LEG,
+    V_LEG_W,
+)
+from golden_model.kernel import kernel
+
+K_LP = Format(0, 0, 20)
+V_STATE = Format(1, -1, 38)
+V_FINE = Format(1, -1, 25)
+ETA_V = Format(0, 2, 19)
+ETA_V_MAX = (1 << ETA_V.frac_bits) * 9 // 4 - 1  # eq. (B.3): eta < 0.125, |D_d| = 2 at i_d = 0
+STEP = Format(1, -4, 21)
+GAMMA = Format(0, 2, 15)
+ZETA = Format(0, -5, 22)
+V_LEVEL = Format(0, -1, 18)
+V_STATE_W, STEP_W = V_STATE.width, STEP.width
+DROP_LP = PU.frac_bits + K_LP.frac_bits - INTEGRAL.frac_bits
+DROP_FINE = V_STATE.frac_bits - V_FINE.frac_bits
+DROP_MODEL = V_FINE.frac_bits + PU.frac_bits - FLUX.frac_bits
+DROP_STEP = FLUX.frac_bits + PU.frac_bits - STEP.frac_bits
+DROP_ETA = STEP.frac_bits + ETA_V.frac_bits - V_STATE.frac_bits
+DROP_ZETA = V_FINE.frac_bits + ZETA.frac_bits - V_STATE.frac_bits
+DROP_GAMMA = V_FINE.frac_bits + GAMMA.frac_bits - V_STATE.frac_bits
+TO_LEG = V_STATE.frac_bits - V_LEG.frac_bits
+FINE_TO_LEG = V_FINE.frac_bits - V_LEG.frac_bits
+
+
+class State(NamedTuple):
+    lp_u: int = 0  # INTEGRAL
+    lp_d: int = 0
+    v_dead: int = 0  # V_STATE
+    v_sum: int = 0
+
+
+@kernel
+def low_pass(lp, x, k_lp):
+    """(next state, x without what passed), both from the state before."""
+    err = saturate(x - round_sat(lp, PU_TO_INTEGRAL, PU_W), PU_W)
+    moved = saturate(lp + round_half_up(err * k_lp, DROP_LP), INTEGRAL_W)
+    return moved, err
+
+
+@kernel
+def step(
+    state, u_pi_d, d_d, sat_d, sat_q, current_at_rail, voltage_known, run,
+    k_lp, eta_v, gamma, zeta, v_thr, v_comp_max, compensate,
+):  # fmt: skip
+    learning = 1 if run and sat_d == 0 and sat_q == 0 and current_at_rail == 0 and voltage_known else 0
+    lp_u, u_h = low_pass(state.lp_u, u_pi_d, k_lp)
+    lp_d, d_h = low_pass(state.lp_d, d_d, k_lp)
+    if not run:
+        lp_u, lp_d = 0, 0
+    fine = round_half_up(state.v_dead, DROP_FINE)
+    e = saturate((u_h << PU_TO_FLUX) - round_half_up(fine * d_h, DROP_MODEL), FLUX_W)
+    pull = round_sat(d_h * e, DROP_STEP, STEP_W)
+    v_dead = state.v_dead
+    if learning:
+        v_dead = saturate(v_dead + round_half_up(pull * eta_v, DROP_ETA), V_STATE_W)
+    fine = round_half_up(v_dead, DROP_FINE)
+    v_sum = state.v_sum
+    if not compensate:
+        v_sum = 0
+    elif learning and abs(fine) > (v_thr << FINE_TO_LEG):
+        v_sum = saturate(v_sum + round_half_up(fine * zeta, DROP_ZETA), V_STATE_W)
+    limit = v_comp_max << TO_LEG
+    v_sum = clamp(v_sum, -limit, limit)
+    asked = v_sum + round_half_up(fine * gamma, DROP_GAMMA)
+    v_comp = round_half_up(clamp(asked, -limit, limit), TO_LEG) if compensate else 0
+    v_leg = saturate(v_comp + round_half_up(fine, FINE_TO_LEG), V_LEG_W)
+    limited = 1 if compensate and abs(asked) > limit else 0
+    outputs = (saturate(round_half_up(fine, FINE_TO_LEG), V_LEG_W), v_comp, v_leg, limited)
+    return State(lp_u, lp_d, v_dead, v_sum), outputs
+
+
+def filtered(lp, x, k_lp):
+    """The low-pass in real numbers: (next state, what is left of x)."""
+    old = lp * INTEGRAL.lsb
+    err = PU.limit(x - old)
+    return INTEGRAL.limit(old + k_lp * err), err
+
+
+def reference(v, state):
+    learning = v["run"] and not (v["sat_d"] or v["sat_q"] or v["current_at_rail"]) and v["voltage_known"]
+    _, u_h = filtered(state.lp_u, v["u_pi_d"], v["k_lp"])
+    _, d_h = filtered(state.lp_d, v["d_d"], v["k_lp"])
+    v_dead, v_sum = state.v_dead * V_STATE.lsb, state.v_sum * V_STATE.lsb
+    e = FLUX.limit(u_h - v_dead * d_h)
+    if learning:
+        v_dead = V_STATE.limit(v_dead + v["eta_v"] * STEP.limit(d_h * e))
+    limit = v["v_comp_max"]
+    if learning and abs(v_dead) > v["v_thr"]:
+        v_sum += v["zeta"] * v_dead
+    v_sum = min(max(v_sum, -limit), limit)
+    v_comp = min(max(v_sum + v["gamma"] * v_dead, -limit), limit) if v["compensate"] else 0.0
+    return {"v_dead": V_LEG.limit(v_dead), "v_comp": v_comp, "v_leg": V_LEG.limit(v_comp + v_dead)}
+
+
+def bound(v, _state):
+    """u_h and d_h are off by half an LSB of PU, v_dead in the model by half of V_FINE's; then the step's roundings.
+
+    Next to v_thr model and reference may differ in whether v_sum moves: by zeta*v_thr at most.
+    """
+    h = PU.lsb / 2 + PU.lsb  # the low-pass output rounded, and the ends of PU
+    e = h + 0.5 * h + 2 * V_FINE.lsb + FLUX.lsb
+    pull = 2 * e + 2.1 * h + STEP.lsb
+    v_dead = v["eta_v"] * pull + V_STATE.lsb + V_LEG.lsb
+    v_comp = (
+        (v["gamma"] + v["zeta"]) * (v_dead + V_FINE.lsb)
+        + v["zeta"] * v["v_thr"]
+        + 4 * V_STATE.lsb
+        + V_LEG.lsb
+    )
+    return {"v_dead": v_dead, "v_comp": v_comp, "v_leg": v_dead + v_comp}
+
+
+def stimuli(rng, _config):
+    """A sawtooth of D with the answer of a regulator; each reason not to learn; limits; thresholds; stop."""
+    calm = {"sat_d": 0, "sat_q": 0, "current_at_rail": 0, "voltage_known": 1, "run": 1, "compensate": 1}
+    gains = {"k_lp": 6600, "eta_v": 20000, "gamma": 3277, "zeta": 40000, "v_thr": 3, "v_comp_max": 6000}
+    rows = []
+    for k in range(120):
+        saw = int(43690 * ((k % 17) / 8.0 - 1.0))
+        rows.append({**calm, **gains, "d_d": saw, "u_pi_d": saw // 20 + int(rng.integers(-20, 20))})
+    for change in (
+        {"sat_d": 1}, {"sat_q": -1}, {"current_at_rail": 2}, {"voltage_known": 0}, {"run": 0}, {"compensate": 0}, {},
+        {"v_thr": V_LEVEL.hi}, {"v_comp_max": 0}, {"v_comp_max": V_LEVEL.hi, "eta_v": ETA_V_MAX},
+    ):  # fmt: skip
+        rows += [{**rows[n], **change} for n in (3, 11, 60)]
+    for sign in (1, -1):  # into both ends
+        end = {**calm, **gains, "eta_v": ETA_V_MAX, "v_comp_max": V_LEVEL.hi, "k_lp": 1, "zeta": ZETA.hi}
+        rows += [{**end, "d_d": 80000, "u_pi_d": sign * 131071} for _ in range(60)]
+    return rows
+
+
+V_DEAD = Port("v_dead", V_LEG, doc="leg voltage lost and not compensated")
+V_COMP = Port("v_comp", V_LEG, doc="leg voltage that is compensated")
+V_LEG_PORT = Port("v_leg", V_LEG, doc="leg voltage lost to dead time and drops")
+
+BLOCK = Block(
+    name="v_dead_adaline",
+    folder="estimators",
+    paper="000, eq. (10) and Fig. 4(a)",
+    step=step,
+    inputs=(
+        Port("u_pi_d", PU, doc="regulator output, d axis"),
+        D_D,
+        Port("sat_d", SAT, lo=-1, hi=1, doc="limit that holds the d axis"),
+        Port("sat_q", SAT, lo=-1, hi=1, doc="limit that holds the q axis"),
+        Port("current_at_rail", Format(0, 3, 0), doc="bit x: code of phase x at its end"),
+        Port("voltage_known", BIT, doc="0: gates off or bus reading lost"),
+        Port("run", BIT, doc="1: the gates are switching"),
+    ),
+    registers=(
+        Port("k_lp", K_LP, doc="weight of a new sample in the low-pass of Fig. 3"),
+        Port("eta_v", ETA_V, hi=ETA_V_MAX, doc="step of the V_dead Adaline, 18*eta"),
+        Port("gamma", GAMMA, doc="proportional part of the compensation"),
+        Port("zeta", ZETA, doc="what the minimisation adds in a sample"),
+        Port("v_thr", V_LEVEL, doc="no minimisation below this leg voltage"),
+        Port("v_comp_max", V_LEVEL, doc="largest leg voltage that is compensated"),
+        Port("compensate", BIT, doc="1: compensate dead time and drops"),
+    ),
+    outputs=(
+        V_DEAD,
+        V_COMP,
+        V_LEG_PORT,
+        Port("v_comp_limited", BIT, doc="the compensation reached its limit"),
+    ),
+    state=State(),
+    latency=14,
+    interval=14,
+    constants={
+        "V_STATE_W": V_STATE_W,
+        "V_FINE_W": V_FINE.width,
+        "STEP_W": STEP_W,
+        "DROP_LP": DROP_LP,
+        "DROP_FINE": DROP_FINE,
+        "DROP_MODEL": DROP_MODEL,
+        "DROP_STEP": DROP_STEP,
+        "DROP_ETA": DROP_ETA,
+        "DROP_ZETA": DROP_ZETA,
+        "DROP_GAMMA": DROP_GAMMA,
+        "TO_LEG": TO_LEG,
+        "FINE_TO_LEG": FINE_TO_LEG,
+    },
+    reference=reference,
+    bound=bound,
+    stimuli=stimuli,
+)
