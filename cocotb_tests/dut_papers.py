@@ -22,6 +22,6 @@ async def experiment(dut):
     began = time.monotonic()
     device = GhdlDevice(dut)
     result = await cosimulate(
-        device, drive, run.registers, run.scenario, progress, machine=run.machine, ideal_inverter=True
+        device, drive, run.registers, run.scenario, progress, machine=run.machine, ideal_inverter=run.end is not None
     )
     leave(result, time.monotonic() - began)

@@ -85,7 +85,6 @@ WIRING = {
     "inverter_loss": (v_dead_adaline, ("circle", "direction_functions")),
     "magnet_flux": (psi_adaline, ("circle", "direction_functions")),
     "directions": (current_directions, ("circle", "stator_frame", "speed_measurement")),
-    "direction_vector": (clarke, ("directions",)),
     "monitor": (flux_monitor, ("compensation", "merge", "bus_reciprocal")),
 }
 
@@ -322,8 +321,7 @@ def step(state, sample, regs, config):
     clean_state, (u_clean_alpha, u_clean_beta) = clean_voltage.step(
         state.of_clean_voltage, u_applied_alpha, u_applied_beta, state.s_alpha, state.s_beta, state.v_leg
     )
-    s_a, s_b, s_c = current_directions.step(i_alpha, i_beta, omega_me, r.k_ahead, r.k_sign)
-    s_alpha, s_beta = clarke.step(s_a, s_b, s_c)
+    s_alpha, s_beta = current_directions.step(i_alpha, i_beta, omega_me, r.k_ahead, r.k_sign)
     lambda_c_d, lambda_c_q, model_limited = current_model.step(
         i_d, i_q, state.lambda_add_d, state.lambda_add_q, r.l_d, r.l_q, r.lambda_mg
     )
@@ -388,6 +386,8 @@ def step(state, sample, regs, config):
         state.of_v_dead_adaline,
         u_pi_d,
         d_d,
+        i_d,
+        i_q,
         sat_d,
         sat_q,
         current_at_rail,
@@ -399,6 +399,7 @@ def step(state, sample, regs, config):
         r.zeta,
         r.v_thr,
         r.v_comp_max,
+        r.i_learn,
         r.compensate,
     )
     psi_state, (psi_m, psi_held) = psi_adaline.step(

@@ -28,10 +28,8 @@ FLUX_OVER_SPEED, FLUX_OF_CURRENT, FLUX_ALONE = 2.0, 0.5, 0.1  # flux bandwidth o
 FADED_IN = 0.5  # of the crossover of the two flux models: full compensation from here on
 CROSSOVER_PART = 8.0  # rated electrical speed over the crossover of the two flux models
 COMPENSATION_PART = 0.5  # of the nominal flux: what the compensation may add or take
-SIGN_OF_RATED, SIGN_GAIN = (
-    0.02,
-    2.0,
-)  # a direction is full from the larger of: part of rated current, loss over kp
+SIGN_OF_RATED, SIGN_GAIN = 0.005, 0.125  # a direction is full from: part of rated current, or of loss over kp
+LEARN_OF_RATED = 0.1  # of the rated current: nothing is learnt about the legs below it
 AHEAD_SAMPLES = 2.5  # from a sample to the middle of the next sample's voltage
 THRESHOLD_OF_BASE = 2e-5  # of the voltage base: five of the format's steps
 LOSS_MARGIN, LOSS_SPARE_V = (
@@ -236,6 +234,8 @@ def vsi_estimators(drive):
         else "[control] v_dead_limit_v"
     )
     yield Entry("v_comp_max", most, "V", b.voltage_v, f"{keys}; {volts}")
+    least, keys = LEARN_OF_RATED * m.rated_current_a, "[machine] rated_current_a"
+    yield Entry("i_learn", least, "A", b.current_a, f"{keys}; {amperes}")
     yield Entry("compensate", int(c.dead_time_compensation), "1", 1.0, "[control] dead_time_compensation")
     omega_b, keys = b.omega_me_rad_s, "[control] psi_eta"
     eta = psi_eta(drive)

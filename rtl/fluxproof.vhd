@@ -33,6 +33,8 @@ entity fluxproof is
     i_d_ref_in      : in  signed(PU_W - 1 downto 0);  -- current reference, d axis
     i_q_ext_in      : in  signed(PU_W - 1 downto 0);  -- current reference of torque mode, q axis
     speed_mode_in   : in  std_logic;  -- 1: speed control, 0: torque control
+    temp_winding_in : in signed(15 downto 0);  -- winding temperature, degrees Celsius
+    temp_valid_in   : in std_logic;  -- 1: the temperature is a reading
     clear_faults_in : in  std_logic;  -- 1: forget the flux estimator's faults that are over
     enable          : in  std_logic;  -- 1: gates may switch
     trip            : in  std_logic;  -- 1: gates off, remembered
@@ -72,6 +74,22 @@ entity fluxproof is
     delta_max       : in  unsigned(15 downto 0);  -- limit of the compensation
     flux_mode       : in  unsigned(1 downto 0);  -- 0: eq. (6), 1: eq. (11), 2: eq. (16), 3: eq. (17)
     k_chord         : in  unsigned(16 downto 0);  -- square of the sample time over 24, per unit
+    tcr             : in unsigned(23 downto 0);  -- resistance per kelvin
+    t_0             : in signed(15 downto 0);  -- temperature of r_s
+    t_min           : in signed(15 downto 0);  -- coldest reading that is believed
+    t_max           : in signed(15 downto 0);  -- hottest reading that is believed
+    k_lp            : in unsigned(19 downto 0);  -- weight of a new sample in the low-pass of Fig. 3
+    eta_v           : in unsigned(20 downto 0);  -- step of the V_dead Adaline, 18*eta
+    gamma           : in unsigned(16 downto 0);  -- proportional part of the compensation
+    zeta            : in unsigned(16 downto 0);  -- what the minimisation adds in a sample
+    v_thr           : in unsigned(SAMPLE_TIME_W - 1 downto 0);  -- no minimisation below this leg voltage
+    v_comp_max      : in unsigned(SAMPLE_TIME_W - 1 downto 0);  -- largest leg voltage that is compensated
+    i_learn         : in unsigned(PU_W - 2 downto 0);  -- nothing is learnt below this |i_d| + |i_q|
+    compensate      : in std_logic;  -- 1: compensate dead time and drops
+    eta_psi         : in unsigned(16 downto 0);  -- step of the psi_m Adaline, 2*eta per unit
+    omega_psi_min   : in unsigned(DUTY_W - 1 downto 0);  -- psi_m is held below this speed
+    k_ahead         : in unsigned(DUTY_W - 1 downto 0);  -- radians turned in 2.5 samples, per unit of speed
+    k_sign          : in unsigned(23 downto 0);  -- one over the current from which a direction is full
     k_delay         : in  unsigned(16 downto 0);  -- turns per unit of speed
     min_pulse       : in  unsigned(11 downto 0);  -- shortest pulse of a leg, clocks
     dead_time       : in  unsigned(11 downto 0);  -- both gates of a leg off, clocks
@@ -105,6 +123,8 @@ entity fluxproof is
     omega_chord     : out signed(PU_W - 1 downto 0);  -- electrical speed along the chord of a sample
     u_dec_d         : out signed(PU_W - 1 downto 0);  -- rotational voltage, d axis
     u_dec_q         : out signed(PU_W - 1 downto 0);  -- rotational voltage, q axis
+    u_comp_d        : out signed(PU_W - 1 downto 0);  -- compensating voltage, d axis
+    u_comp_q        : out signed(PU_W - 1 downto 0);  -- compensating voltage, q axis
     u_int_d         : out signed(INTEGRAL_W - 1 downto 0);  -- its integral part, d axis
     u_int_q         : out signed(INTEGRAL_W - 1 downto 0);  -- its integral part, q axis
     u_d             : out signed(PU_W - 1 downto 0);  -- voltage, d axis
@@ -130,6 +150,14 @@ entity fluxproof is
     lambda_pi_q     : out signed(FLUX_W - 1 downto 0);  -- compensation, q axis
     torque          : out signed(PU_W - 1 downto 0);  -- estimated torque
     flux_faults     : out unsigned(6 downto 0);  -- what has disturbed the flux estimate, see flux_monitor
+    d_d             : out signed(PU_W - 1 downto 0);  -- direction function D_d over three
+    d_q             : out signed(PU_W - 1 downto 0);  -- direction function D_q over three
+    v_dead          : out signed(V_LEG_W - 1 downto 0);  -- leg voltage lost and not compensated
+    v_comp          : out signed(V_LEG_W - 1 downto 0);  -- leg voltage that is compensated
+    v_comp_limited  : out std_logic;  -- the compensation reached its limit
+    psi_m           : out signed(PU_W - 1 downto 0);  -- flux linkage of the magnets
+    psi_held        : out std_logic;  -- 1: psi_m is held
+    temp_lost       : out std_logic;  -- 1: no believable temperature, r is r_s
     compare_a       : out unsigned(15 downto 0);  -- compare value, leg a
     compare_b       : out unsigned(15 downto 0);  -- compare value, leg b
     compare_c       : out unsigned(15 downto 0)  -- compare value, leg c
@@ -200,6 +228,17 @@ architecture rtl of fluxproof is
   signal delta_valid          : std_logic;
   signal lambda_pi_valid      : std_logic;
   signal clear_faults         : std_logic;
+  signal u_comp_alpha         : signed(PU_W - 1 downto 0);
+  signal u_comp_beta          : signed(PU_W - 1 downto 0);
+  signal u_clean_alpha        : signed(FLUX_W - 1 downto 0);
+  signal u_clean_beta         : signed(FLUX_W - 1 downto 0);
+  signal v_leg                : signed(V_LEG_W - 1 downto 0);
+  signal temp_winding         : signed(15 downto 0);
+  signal temp_valid           : std_logic;
+  signal s_alpha              : signed(PU_W - 1 downto 0);
+  signal s_beta               : signed(PU_W - 1 downto 0);
+  signal comp_valid           : std_logic;
+  signal period_valid         : std_logic;
 begin
 
   latch : entity work.sample_latch
@@ -220,6 +259,8 @@ begin
       i_d_ref_in      => i_d_ref_in,
       i_q_ext_in      => i_q_ext_in,
       speed_mode_in   => speed_mode_in,
+      temp_winding_in => temp_winding_in,
+      temp_valid_in   => temp_valid_in,
       clear_faults_in => clear_faults_in,
       run_in          => running,
       out_valid       => latch_valid,
@@ -232,6 +273,8 @@ begin
       i_d_ref         => i_d_ref,
       i_q_ext         => i_q_ext,
       speed_mode      => speed_mode,
+      temp_winding    => temp_winding,
+      temp_valid      => temp_valid,
       clear_faults    => clear_faults,
       run             => run
     );
@@ -404,14 +447,21 @@ begin
 
   resistance : entity work.winding_resistance
     port map (
-      clk       => clk,
-      rst       => rst,
-      in_valid  => latch_valid,
-      r_s       => r_s,
-      t_s       => t_s,
-      out_valid => open,
-      r         => r,
-      rho       => rho
+      clk          => clk,
+      rst          => rst,
+      in_valid     => latch_valid,
+      temp_winding => temp_winding,
+      temp_valid   => temp_valid,
+      r_s          => r_s,
+      tcr          => tcr,
+      t_0          => t_0,
+      t_min        => t_min,
+      t_max        => t_max,
+      t_s          => t_s,
+      out_valid    => open,
+      r            => r,
+      rho          => rho,
+      temp_lost    => temp_lost
     );
 
   merged_flux : entity work.flux_park
@@ -476,23 +526,6 @@ begin
       u_dec_q     => u_dec_q
     );
 
-  circle : entity work.voltage_limit
-    port map (
-      clk       => clk,
-      rst       => rst,
-      in_valid  => pi_valid,
-      u_pi_d    => u_pi_d,
-      u_pi_q    => u_pi_q,
-      u_dec_d   => u_dec_d,
-      u_dec_q   => u_dec_q,
-      u_max     => u_max,
-      out_valid => dq_voltage_valid,
-      u_d       => u_d,
-      u_q       => u_q,
-      sat_d     => sat_d,
-      sat_q     => sat_q
-    );
-
   delay : entity work.svm_delay_compensation
     port map (
       clk       => clk,
@@ -514,6 +547,66 @@ begin
       out_valid => trig_out_valid,
       cos_theta => cos_out,
       sin_theta => sin_out
+    );
+
+  leg_compensation : entity work.dead_time_compensation
+    port map (
+      clk          => clk,
+      rst          => rst,
+      in_valid     => latch_valid,
+      v_comp       => v_comp,
+      s_alpha      => s_alpha,
+      s_beta       => s_beta,
+      out_valid    => open,
+      u_comp_alpha => u_comp_alpha,
+      u_comp_beta  => u_comp_beta
+    );
+
+  compensation_dq : entity work.park
+    port map (
+      clk       => clk,
+      rst       => rst,
+      in_valid  => trig_out_valid,
+      i_alpha   => u_comp_alpha,
+      i_beta    => u_comp_beta,
+      cos_theta => cos_out,
+      sin_theta => sin_out,
+      out_valid => comp_valid,
+      i_d       => u_comp_d,
+      i_q       => u_comp_q
+    );
+
+  direction_functions : entity work.park
+    port map (
+      clk       => clk,
+      rst       => rst,
+      in_valid  => trig_out_valid,
+      i_alpha   => s_alpha,
+      i_beta    => s_beta,
+      cos_theta => cos_out,
+      sin_theta => sin_out,
+      out_valid => open,
+      i_d       => d_d,
+      i_q       => d_q
+    );
+
+  circle : entity work.voltage_limit
+    port map (
+      clk       => clk,
+      rst       => rst,
+      in_valid  => comp_valid,
+      u_pi_d    => u_pi_d,
+      u_pi_q    => u_pi_q,
+      u_dec_d   => u_dec_d,
+      u_dec_q   => u_dec_q,
+      u_comp_d  => u_comp_d,
+      u_comp_q  => u_comp_q,
+      u_max     => u_max,
+      out_valid => dq_voltage_valid,
+      u_d       => u_d,
+      u_q       => u_q,
+      sat_d     => sat_d,
+      sat_q     => sat_q
     );
 
   stator_voltage : entity work.inverse_park
@@ -578,10 +671,25 @@ begin
       u_dc            => u_dc,
       u_dc_at_rail    => u_dc_at_rail,
       run             => run,
-      out_valid       => open,
+      out_valid       => period_valid,
       u_applied_alpha => u_applied_alpha,
       u_applied_beta  => u_applied_beta,
       voltage_known   => voltage_known
+    );
+
+  motor_voltage : entity work.clean_voltage
+    port map (
+      clk             => clk,
+      rst             => rst,
+      in_valid        => period_valid,
+      u_applied_alpha => u_applied_alpha,
+      u_applied_beta  => u_applied_beta,
+      s_alpha         => s_alpha,
+      s_beta          => s_beta,
+      v_leg           => v_leg,
+      out_valid       => open,
+      u_clean_alpha   => u_clean_alpha,
+      u_clean_beta    => u_clean_beta
     );
 
   magnetic_model : entity work.current_model
@@ -625,8 +733,8 @@ begin
       i_beta          => i_beta,
       lambda_c_alpha  => lambda_c_alpha,
       lambda_c_beta   => lambda_c_beta,
-      u_applied_alpha => u_applied_alpha,
-      u_applied_beta  => u_applied_beta,
+      u_applied_alpha => u_clean_alpha,
+      u_applied_beta  => u_clean_beta,
       voltage_known   => voltage_known,
       run             => run,
       rho             => rho,
@@ -708,6 +816,75 @@ begin
       i_q       => i_q,
       out_valid => open,
       torque    => torque
+    );
+
+  inverter_loss : entity work.v_dead_adaline
+    port map (
+      clk             => clk,
+      rst             => rst,
+      in_valid        => dq_voltage_valid,
+      u_pi_d          => u_pi_d,
+      d_d             => d_d,
+      i_d             => i_d,
+      i_q             => i_q,
+      sat_d           => sat_d,
+      sat_q           => sat_q,
+      current_at_rail => current_at_rail,
+      voltage_known   => voltage_known,
+      run             => run,
+      k_lp            => k_lp,
+      eta_v           => eta_v,
+      gamma           => gamma,
+      zeta            => zeta,
+      v_thr           => v_thr,
+      v_comp_max      => v_comp_max,
+      i_learn         => i_learn,
+      compensate      => compensate,
+      out_valid       => open,
+      v_dead          => v_dead,
+      v_comp          => v_comp,
+      v_leg           => v_leg,
+      v_comp_limited  => v_comp_limited
+    );
+
+  magnet_flux : entity work.psi_adaline
+    port map (
+      clk             => clk,
+      rst             => rst,
+      in_valid        => dq_voltage_valid,
+      u_q             => u_q,
+      d_q             => d_q,
+      v_leg           => v_leg,
+      i_d             => i_d,
+      i_q             => i_q,
+      r               => r,
+      omega_chord     => omega_chord,
+      sat_d           => sat_d,
+      sat_q           => sat_q,
+      current_at_rail => current_at_rail,
+      voltage_known   => voltage_known,
+      run             => run,
+      l_d             => l_d,
+      eta_psi         => eta_psi,
+      omega_psi_min   => omega_psi_min,
+      out_valid       => open,
+      psi_m           => psi_m,
+      psi_held        => psi_held
+    );
+
+  directions : entity work.current_directions
+    port map (
+      clk       => clk,
+      rst       => rst,
+      in_valid  => dq_voltage_valid,
+      i_alpha   => i_alpha,
+      i_beta    => i_beta,
+      omega_me  => omega_me,
+      k_ahead   => k_ahead,
+      k_sign    => k_sign,
+      out_valid => open,
+      s_alpha   => s_alpha,
+      s_beta    => s_beta
     );
 
   monitor : entity work.flux_monitor

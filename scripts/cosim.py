@@ -157,6 +157,7 @@ class Result:
     first_difference: str | None = None
     sample_to_duty_clocks: int = 0
     gate_edges: np.ndarray | None = None  # rows of (period, clock, gate word) as the device gave them
+    state: fluxproof.State | None = None  # the golden model's, at the end
 
 
 PLANT_SIGNALS = {

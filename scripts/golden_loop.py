@@ -132,22 +132,17 @@ def run_switching(
 
 
 def simulate(
-    drive,
-    register_set,
-    scenario: Scenario,
-    machine=None,
-    sensors=None,
-    dead_time_s=0.0,
-    mode=FREE,
-    state=None,
-) -> Result:
+    drive, register_set, scenario: Scenario, machine=None, sensors=None, dead_time_s=0.0, mode=FREE, state=None,
+    inverter=None,
+) -> Result:  # fmt: skip
     """``scenario`` with the golden model and the switching plant, compiled; as cosim.cosimulate, but faster.
 
     The inverter follows the compare values in force with a dead time of ``dead_time_s``; zero is the ideal one that
-    paper 001 assumes.  ``mode`` IMPOSED_SPEED: the scenario's load is the mechanical speed [rad/s].
+    paper 001 assumes; ``inverter`` adds device drops.  ``state`` goes on with what a controller has learnt; the result
+    carries the last one.  ``mode`` IMPOSED_SPEED: the scenario's load is the mechanical speed [rad/s].
     """
     machine = machine or Machine.from_mapping(vars(drive.machine))
-    params = plant_params(machine, Inverter(), mode=mode)
+    params = plant_params(machine, inverter or Inverter(), mode=mode)
     plant_state = initial_state(machine, params, omega_m=scenario.omega_m)
     codes = sensor_params(sensors or described_sensors(drive))
     n = len(scenario)
@@ -179,4 +174,5 @@ def simulate(
         observed=dict(zip(names, observed.T, strict=True)),
         plant=dict(zip(PLANT, out.T, strict=True)),
         periods_compared=n,
+        state=state,
     )

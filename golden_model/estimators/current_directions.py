@@ -4,13 +4,14 @@
     x = i_alpha - turn*i_beta,  y = i_beta + turn*i_alpha       the current vector, turned ahead
     s_a = limit(k_sign*x, +-1)
     s_b = limit(k_sign*(-x + sqrt(3)*y)/2, +-1),  s_c = limit(k_sign*(-x - sqrt(3)*y)/2, +-1)
+    s_alpha, s_beta = their Clarke transform
 
 Ahead: the voltage of the next sample acts 2.5 sample times from here.  With the directions of now each crossing of
 zero would be compensated late, and the spike left over looks to the Adaline like more dead time: 13 % more at 300 rpm
 in the paper's drive.  The turn is the first term of the rotation; its length does not matter to a direction, its angle
 is short of the true one by turn**3/3, one degree at 0.37 rad.
-Near zero: eq. (6) gives zero the sign of a positive current, so noise around zero flips a whole leg voltage.  A real leg
-does not: below about its ripple the dead time fades.  Within +-1/k_sign the direction is proportional to the current.
+Near zero: eq. (6) gives zero the sign of a positive current, so noise around zero flips a whole leg voltage.  A real
+leg does not: below about its ripple the dead time fades.  Within +-1/k_sign the direction is proportional to it.
 
 Formats: turn, x, y PU; sqrt(3) U(1,16); sums saturated to PU, whose ends lie far outside the straight line;
 products with k_sign rounded half up.  Nothing else is narrowed.
@@ -22,6 +23,7 @@ from golden_model.block import Block, Const, Port
 from golden_model.fixed import Format, clamp, round_half_up, round_sat, saturate
 from golden_model.formats import PU, PU_W
 from golden_model.kernel import kernel
+from golden_model.transforms import clarke
 
 K_SIGN = Format(0, 12, 12)
 K_AHEAD = Format(0, 1, 16)
@@ -45,7 +47,9 @@ def step(i_alpha, i_beta, omega_me, k_ahead, k_sign):
     x = saturate(i_alpha - round_half_up(turn * i_beta, DROP_TURN), PU_W)
     y = saturate(i_beta + round_half_up(turn * i_alpha, DROP_TURN), PU_W)
     across = round_half_up(y * K_SQRT3, DROP_SQRT3)
-    return direction(2 * x, k_sign), direction(across - x, k_sign), direction(-across - x, k_sign)
+    return clarke.step(
+        direction(2 * x, k_sign), direction(across - x, k_sign), direction(-across - x, k_sign)
+    )
 
 
 def twice_currents(v):
@@ -57,17 +61,23 @@ def twice_currents(v):
 
 
 def reference(v, _state):
-    return {
-        f"s_{k}": min(max(v["k_sign"] / 2 * PU.limit(twice), -1.0), 1.0)
-        for k, twice in twice_currents(v).items()
-    }
+    a, b, c = (min(max(v["k_sign"] / 2 * PU.limit(x), -1.0), 1.0) for x in twice_currents(v).values())
+    return {"s_alpha": (2 * a - b - c) / 3, "s_beta": (b - c) / math.sqrt(3)}
 
 
 def bound(v, _state):
-    """turn off by half an LSB and the end of PU times a current below 2, the products rounded, sqrt(3) and across."""
+    """turn off by half an LSB and the end of PU times a current below 2, the products rounded, sqrt(3) and across.
+
+    A direction is off by that times k_sign, but never by more than two; then the Clarke transform's own error.
+    """
     xy = 2 * 1.5 * PU.lsb + PU.lsb / 2
     twice = xy + 1.8 * xy + 2 * SQRT3.fmt.lsb / 2 + PU.lsb
-    return dict.fromkeys(("s_a", "s_b", "s_c"), v["k_sign"] / 2 * twice + PU.lsb / 2)
+    direction_off = min(v["k_sign"] / 2 * twice + PU.lsb / 2, 2.0)
+    own = clarke.bound({"i_a": 1.0, "i_b": 1.0, "i_c": 1.0}, None)
+    return {
+        "s_alpha": 4 / 3 * direction_off + 2 * own["i_alpha"],
+        "s_beta": 2 / math.sqrt(3) * direction_off + 2 * own["i_beta"],
+    }
 
 
 def stimuli(rng, _config):
@@ -98,11 +108,12 @@ BLOCK = Block(
         Port("k_ahead", K_AHEAD, doc="radians turned in 2.5 samples, per unit of speed"),
         Port("k_sign", K_SIGN, doc="one over the current from which a direction is full"),
     ),
-    outputs=tuple(
-        Port(f"s_{x}", PU, lo=-ONE, hi=ONE, doc=f"direction of the current, phase {x}") for x in "abc"
+    outputs=(
+        Port("s_alpha", PU, doc="directions of the currents, alpha"),
+        Port("s_beta", PU, doc="directions of the currents, beta"),
     ),
-    latency=11,
-    interval=11,
+    latency=15,
+    interval=15,
     constants={"ONE": ONE, "SQRT3": SQRT3, "DROP_TURN": DROP_TURN, "DROP_SQRT3": DROP_SQRT3, "DROP": DROP},
     reference=reference,
     bound=bound,

@@ -102,6 +102,9 @@ def stimuli(rng, _config):
         rows.append({**rows[0], "omega_chord": omega})
     for u_q in (PU.hi, PU.lo):
         rows += [{**rows[0], "u_q": u_q, "eta_psi": ETA_PSI.hi, "omega_chord": PU.hi} for _ in range(25)]
+        for i_d in (0, 3000, -3000):  # to the end of psi_m, and back
+            end = {**rows[0], "eta_psi": ETA_PSI.hi, "omega_chord": 32768, "i_d": i_d}
+            rows += [{**end, "u_q": u_q}] * 25 + [{**end, "u_q": 0}]
     return rows
 
 
@@ -134,8 +137,8 @@ BLOCK = Block(
         Port("psi_held", BIT, doc="1: psi_m is held"),
     ),
     state=State(),
-    latency=12,
-    interval=12,
+    latency=11,
+    interval=11,
     constants={
         "PSI_STATE_W": PSI_STATE_W,
         "DROP_V": DROP_V,

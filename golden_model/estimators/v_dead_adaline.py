@@ -5,7 +5,7 @@
     e     = u_h - v_dead*d_h
     v_dead += eta_v*d_h*e                                          eq. (10), eta_v = 2*9*eta
     v_sum  += zeta*v_dead                   while |v_dead| > v_thr
-    v_comp  = limit(gamma*v_dead + v_sum, +-v_comp_max)            gamma*V_dead of section V.B
+    v_comp  = limit(gamma*v_dead + v_sum, 0, v_comp_max)           gamma*V_dead of section V.B
     v_leg   = v_comp + v_dead                                      all that is known of the leg's loss
 
 Sign and scale: v_dead is the voltage that a leg loses in the direction of its current, positive; the paper's V_dead is
@@ -15,11 +15,13 @@ mean would pull the estimate to var(D_d)/mean(D_d**2) of the truth; the same fil
 out and delays both alike (docs/vsi_estimators.md).
 Fig. 4(a) adds zeta to gamma in every step until |V_dead| < V_thr.  The product gamma*V_dead would then have to survive
 V_dead -> 0, with gamma -> infinity.  What the step adds to the product, zeta*v_dead, is kept as a sum instead.
-While the gates are off v_dead and the sum stay; nothing learns while the voltage is at its limit or a converter is.
+Nothing is learnt, and what was learnt stays, while the gates are off, the voltage or a converter is at its end, or
+|i_d| + |i_q| < i_learn: close to zero current the directions say little, and a drive that rings there would teach a
+negative loss.
 
 Formats: lp S(1,28); u_h, d_h PU; e FLUX; d_h*e S(-4,21), saturated there: a slower step, the same sign; v_dead and
 v_sum S(-1,38), where an eta of 1e-6 still moves them by an error of 2**-22 (docs, word lengths); v_comp, v_leg V_LEG.
-All rounded half up.  Saturation: v_dead and v_sum at half a voltage base, v_comp at v_comp_max.
+All rounded half up.  Limits: v_dead within +-v_comp_max, v_sum and v_comp from zero to v_comp_max, v_leg saturated.
 """
 
 from typing import NamedTuple
@@ -81,10 +83,12 @@ def low_pass(lp, x, k_lp):
 
 @kernel
 def step(
-    state, u_pi_d, d_d, sat_d, sat_q, current_at_rail, voltage_known, run,
-    k_lp, eta_v, gamma, zeta, v_thr, v_comp_max, compensate,
+    state, u_pi_d, d_d, i_d, i_q, sat_d, sat_q, current_at_rail, voltage_known, run,
+    k_lp, eta_v, gamma, zeta, v_thr, v_comp_max, i_learn, compensate,
 ):  # fmt: skip
-    learning = 1 if run and sat_d == 0 and sat_q == 0 and current_at_rail == 0 and voltage_known else 0
+    calm = run and sat_d == 0 and sat_q == 0 and current_at_rail == 0 and voltage_known
+    learning = 1 if calm and abs(i_d) + abs(i_q) >= i_learn else 0
+    limit = v_comp_max << TO_LEG
     lp_u, u_h = low_pass(state.lp_u, u_pi_d, k_lp)
     lp_d, d_h = low_pass(state.lp_d, d_d, k_lp)
     if not run:
@@ -94,21 +98,19 @@ def step(
     pull = round_sat(d_h * e, DROP_STEP, STEP_W)
     v_dead = state.v_dead
     if learning:
-        v_dead = saturate(v_dead + round_half_up(pull * eta_v, DROP_ETA), V_STATE_W)
+        v_dead = clamp(v_dead + round_half_up(pull * eta_v, DROP_ETA), -limit, limit)
     fine = round_half_up(v_dead, DROP_FINE)
     v_sum = state.v_sum
     if not compensate:
         v_sum = 0
     elif learning and abs(fine) > (v_thr << FINE_TO_LEG):
-        v_sum = saturate(v_sum + round_half_up(fine * zeta, DROP_ZETA), V_STATE_W)
-    limit = v_comp_max << TO_LEG
-    v_sum = clamp(v_sum, -limit, limit)
+        v_sum += round_half_up(fine * zeta, DROP_ZETA)
+    v_sum = clamp(v_sum, 0, limit)
     asked = v_sum + round_half_up(fine * gamma, DROP_GAMMA)
-    v_comp = round_half_up(clamp(asked, -limit, limit), TO_LEG) if compensate else 0
+    v_comp = round_half_up(clamp(asked, 0, limit), TO_LEG) if compensate else 0
     v_leg = saturate(v_comp + round_half_up(fine, FINE_TO_LEG), V_LEG_W)
-    limited = 1 if compensate and abs(asked) > limit else 0
-    outputs = (saturate(round_half_up(fine, FINE_TO_LEG), V_LEG_W), v_comp, v_leg, limited)
-    return State(lp_u, lp_d, v_dead, v_sum), outputs
+    limited = 1 if compensate and asked > limit else 0
+    return State(lp_u, lp_d, v_dead, v_sum), (round_half_up(fine, FINE_TO_LEG), v_comp, v_leg, limited)
 
 
 def filtered(lp, x, k_lp):
@@ -120,17 +122,18 @@ def filtered(lp, x, k_lp):
 
 def reference(v, state):
     learning = v["run"] and not (v["sat_d"] or v["sat_q"] or v["current_at_rail"]) and v["voltage_known"]
+    learning = learning and abs(v["i_d"]) + abs(v["i_q"]) >= v["i_learn"]
+    limit = v["v_comp_max"]
     _, u_h = filtered(state.lp_u, v["u_pi_d"], v["k_lp"])
     _, d_h = filtered(state.lp_d, v["d_d"], v["k_lp"])
     v_dead, v_sum = state.v_dead * V_STATE.lsb, state.v_sum * V_STATE.lsb
     e = FLUX.limit(u_h - v_dead * d_h)
     if learning:
-        v_dead = V_STATE.limit(v_dead + v["eta_v"] * STEP.limit(d_h * e))
-    limit = v["v_comp_max"]
+        v_dead = min(max(v_dead + v["eta_v"] * STEP.limit(d_h * e), -limit), limit)
     if learning and abs(v_dead) > v["v_thr"]:
         v_sum += v["zeta"] * v_dead
-    v_sum = min(max(v_sum, -limit), limit)
-    v_comp = min(max(v_sum + v["gamma"] * v_dead, -limit), limit) if v["compensate"] else 0.0
+    v_sum = min(max(v_sum, 0.0), limit)
+    v_comp = min(max(v_sum + v["gamma"] * v_dead, 0.0), limit) if v["compensate"] else 0.0
     return {"v_dead": V_LEG.limit(v_dead), "v_comp": v_comp, "v_leg": V_LEG.limit(v_comp + v_dead)}
 
 
@@ -155,6 +158,7 @@ def bound(v, _state):
 def stimuli(rng, _config):
     """A sawtooth of D with the answer of a regulator; each reason not to learn; limits; thresholds; stop."""
     calm = {"sat_d": 0, "sat_q": 0, "current_at_rail": 0, "voltage_known": 1, "run": 1, "compensate": 1}
+    calm |= {"i_d": -3000, "i_q": 9000, "i_learn": 12000}
     gains = {"k_lp": 6600, "eta_v": 20000, "gamma": 3277, "zeta": 40000, "v_thr": 3, "v_comp_max": 6000}
     rows = []
     for k in range(120):
@@ -162,12 +166,15 @@ def stimuli(rng, _config):
         rows.append({**calm, **gains, "d_d": saw, "u_pi_d": saw // 20 + int(rng.integers(-20, 20))})
     for change in (
         {"sat_d": 1}, {"sat_q": -1}, {"current_at_rail": 2}, {"voltage_known": 0}, {"run": 0}, {"compensate": 0}, {},
+        {"i_q": 8999}, {"i_d": 0, "i_q": -12000}, {"i_d": -11999, "i_q": 0},
         {"v_thr": V_LEVEL.hi}, {"v_comp_max": 0}, {"v_comp_max": V_LEVEL.hi, "eta_v": ETA_V_MAX},
     ):  # fmt: skip
         rows += [{**rows[n], **change} for n in (3, 11, 60)]
     for sign in (1, -1):  # into both ends
         end = {**calm, **gains, "eta_v": ETA_V_MAX, "v_comp_max": V_LEVEL.hi, "k_lp": 1, "zeta": ZETA.hi}
-        rows += [{**end, "d_d": 80000, "u_pi_d": sign * 131071} for _ in range(60)]
+        rows += [{**end, "d_d": 80000, "u_pi_d": sign * 131071} for _ in range(90)]
+    for k_lp, u_pi_d, d_d, run in ((0, 0, 0, 0), (524032, -1, 0, 1), (K_LP.hi, PU.lo, 0, 1), (0, 0, 40000, 1)):
+        rows.append({**calm, **gains, "k_lp": k_lp, "u_pi_d": u_pi_d, "d_d": d_d, "run": run})  # lp_u past its end
     return rows
 
 
@@ -183,6 +190,8 @@ BLOCK = Block(
     inputs=(
         Port("u_pi_d", PU, doc="regulator output, d axis"),
         D_D,
+        Port("i_d", PU, doc="current, d axis"),
+        Port("i_q", PU, doc="current, q axis"),
         Port("sat_d", SAT, lo=-1, hi=1, doc="limit that holds the d axis"),
         Port("sat_q", SAT, lo=-1, hi=1, doc="limit that holds the q axis"),
         Port("current_at_rail", Format(0, 3, 0), doc="bit x: code of phase x at its end"),
@@ -196,6 +205,7 @@ BLOCK = Block(
         Port("zeta", ZETA, doc="what the minimisation adds in a sample"),
         Port("v_thr", V_LEVEL, doc="no minimisation below this leg voltage"),
         Port("v_comp_max", V_LEVEL, doc="largest leg voltage that is compensated"),
+        Port("i_learn", Format(0, 1, 16), doc="nothing is learnt below this |i_d| + |i_q|"),
         Port("compensate", BIT, doc="1: compensate dead time and drops"),
     ),
     outputs=(
@@ -205,8 +215,8 @@ BLOCK = Block(
         Port("v_comp_limited", BIT, doc="the compensation reached its limit"),
     ),
     state=State(),
-    latency=14,
-    interval=14,
+    latency=17,
+    interval=17,
     constants={
         "V_STATE_W": V_STATE_W,
         "V_FINE_W": V_FINE.width,

@@ -430,7 +430,7 @@ package fluxproof_pkg is
   constant FLUX_MONITOR_LATENCY : positive := 1;
 
   -- current_directions: 000, eq. (6)
-  constant CURRENT_DIRECTIONS_LATENCY : positive := 11;
+  constant CURRENT_DIRECTIONS_LATENCY : positive := 15;
   constant CURRENT_DIRECTIONS_ONE : natural := 65536;
   constant CURRENT_DIRECTIONS_SQRT3 : signed(17 downto 0) := to_signed(113512, 18);  -- 1.732050808 as U(1,16), signed for the multiplier
   constant CURRENT_DIRECTIONS_DROP_TURN : natural := 16;
@@ -446,7 +446,7 @@ package fluxproof_pkg is
   constant CLEAN_VOLTAGE_DROP : natural := 11;
 
   -- v_dead_adaline: 000, eq. (10) and Fig. 4(a)
-  constant V_DEAD_ADALINE_LATENCY : positive := 14;
+  constant V_DEAD_ADALINE_LATENCY : positive := 17;
   constant V_DEAD_ADALINE_V_STATE_W : natural := 38;
   constant V_DEAD_ADALINE_V_FINE_W : natural := 25;
   constant V_DEAD_ADALINE_STEP_W : natural := 18;
@@ -461,7 +461,7 @@ package fluxproof_pkg is
   constant V_DEAD_ADALINE_FINE_TO_LEG : natural := 7;
 
   -- psi_adaline: 000, eq. (13), with the reluctance term of eq. (7b)
-  constant PSI_ADALINE_LATENCY : positive := 12;
+  constant PSI_ADALINE_LATENCY : positive := 11;
   constant PSI_ADALINE_PSI_STATE_W : natural := 36;
   constant PSI_ADALINE_DROP_V : natural := 11;
   constant PSI_ADALINE_DROP_R : natural := 17;

@@ -1,6 +1,6 @@
--- Purpose: adds the decoupling and keeps the voltage inside the circle of radius u_max, d axis first.
---   limit = min(u_max, room),  u_d = limit(u_pi_d + u_dec_d, +-limit)
---   u_q = limit(u_pi_q + u_dec_q, +-sqrt(u_max**2 - u_d**2))
+-- Purpose: adds decoupling and dead-time compensation, keeps the voltage in the circle of radius u_max, d axis first.
+--   limit = min(u_max, room),  u_d = limit(u_pi_d + u_dec_d + u_comp_d, +-limit)
+--   u_q = limit(u_pi_q + u_dec_q + u_comp_q, +-sqrt(u_max**2 - u_d**2))
 --   room = sqrt(u_max**2 - min(|u_dec_q|, u_max)**2), for the next sample
 --   sat = -1, 0, +1: the limit that holds the axis
 -- Room: d comes first in what the EMF of the last sample leaves, so that the q axis can always hold its EMF;
@@ -24,6 +24,8 @@ entity voltage_limit is
     u_pi_q    : in  signed(PU_W - 1 downto 0);
     u_dec_d   : in  signed(PU_W - 1 downto 0);
     u_dec_q   : in  signed(PU_W - 1 downto 0);
+    u_comp_d  : in  signed(PU_W - 1 downto 0);
+    u_comp_q  : in  signed(PU_W - 1 downto 0);
     u_max     : in  unsigned(U_MAX_W - 1 downto 0);
     out_valid : out std_logic;
     u_d       : out signed(PU_W - 1 downto 0);
@@ -36,8 +38,9 @@ end entity voltage_limit;
 architecture rtl of voltage_limit is
   constant LATENCY : positive := VOLTAGE_LIMIT_LATENCY;
   constant W       : positive := PU_W + 2;
+  constant SUM_W   : positive := PU_W + 2;
 
-  type sum_wait_t is array (1 to LATENCY - 1) of signed(PU_W downto 0);
+  type sum_wait_t is array (1 to LATENCY - 1) of signed(SUM_W - 1 downto 0);
   type d_wait_t is array (3 to LATENCY - 1) of signed(PU_W - 1 downto 0);
   type sat_wait_t is array (2 to LATENCY - 1) of signed(1 downto 0);
 
@@ -45,15 +48,15 @@ architecture rtl of voltage_limit is
   signal room : unsigned(U_MAX_W - 1 downto 0);
 
   signal valid      : std_logic_vector(0 to LATENCY);
-  signal sum_d_1    : signed(PU_W downto 0);
+  signal sum_d_1    : signed(SUM_W - 1 downto 0);
   signal u_max_1    : signed(U_MAX_W downto 0);
   signal limit_1    : signed(U_MAX_W downto 0);
   signal dec_q_1    : unsigned(PU_W - 1 downto 0);
-  signal sum_d_2    : signed(PU_W downto 0);
+  signal sum_d_2    : signed(SUM_W - 1 downto 0);
   signal limit_2    : signed(U_MAX_W downto 0);
   signal u_max_2    : signed(U_MAX_W downto 0);
   signal emf_2      : signed(U_MAX_W downto 0);
-  signal u_2        : signed(PU_W downto 0);
+  signal u_2        : signed(PU_W - 1 downto 0);
   signal emf_3      : signed(U_MAX_W downto 0);
   signal u_max_3    : signed(U_MAX_W downto 0);
   signal factor_lo  : signed(W - 1 downto 0);
@@ -82,9 +85,9 @@ begin
   limit_9    <= signed(resize(root_9, PU_W + 1));
 
   -- u_d, limited; then the EMF: what the multiplier makes a radicand of
-  u_2       <= resize(limit_2, PU_W + 1) when sat_wait(2) > 0 else
-               -resize(limit_2, PU_W + 1) when sat_wait(2) < 0 else
-               sum_d_2;
+  u_2       <= resize(limit_2, PU_W) when sat_wait(2) > 0 else
+               -resize(limit_2, PU_W) when sat_wait(2) < 0 else
+               sum_d_2(PU_W - 1 downto 0);
   factor_lo <= resize(u_max_3, W) - emf_3 when valid(3) = '1' else resize(u_max_2, W) - u_2;
   factor_hi <= resize(u_max_3, W) + emf_3 when valid(3) = '1' else resize(u_max_2, W) + u_2;
 
@@ -93,10 +96,10 @@ begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stage 1: sum = u_pi + u_dec;  limit = min(u_max, room)
+      -- Stage 1: sum = u_pi + u_dec + u_comp;  limit = min(u_max, room)
       if valid(0) = '1' then
-        sum_d_1  <= resize(u_pi_d, PU_W + 1) + resize(u_dec_d, PU_W + 1);
-        sum_q(1) <= resize(u_pi_q, PU_W + 1) + resize(u_dec_q, PU_W + 1);
+        sum_d_1  <= resize(u_pi_d, SUM_W) + resize(u_dec_d, SUM_W) + resize(u_comp_d, SUM_W);
+        sum_q(1) <= resize(u_pi_q, SUM_W) + resize(u_dec_q, SUM_W) + resize(u_comp_q, SUM_W);
         dec_q_1  <= unsigned(abs(u_dec_q));
         u_max_1  <= signed('0' & u_max);
         limit_1  <= signed('0' & minimum(u_max, room));
@@ -121,7 +124,7 @@ begin
         radicand <= resize(unsigned(factor_lo(PU_W - 1 downto 0)) * unsigned(factor_hi(PU_W - 1 downto 0)), 32);
       end if;
       if valid(2) = '1' then
-        d_wait(3) <= resize(u_2, PU_W);
+        d_wait(3) <= u_2;
         emf_3     <= emf_2;
         u_max_3   <= u_max_2;
       end if;

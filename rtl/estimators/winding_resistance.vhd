@@ -1,8 +1,10 @@
--- Purpose: the winding's resistance, and the flux that it takes away in half a sample.
---   r = r_s;  rho = r_s*t_s/2
--- Both start from the one register, so they cannot contradict each other.
--- Formats: r_s, r, rho U(0,24); t_s U(-1,18); product exact.
--- Latency: 2.  Rounding: half up.  No overflow: rho < 1/4.
+-- Purpose: the winding's resistance from its temperature, paper 000 eq. (12), and the flux it takes in half a sample.
+--   r = r_s + tcr*(temp_winding - t_0);  rho = r*t_s/2
+-- Without a reading, or with one outside t_min to t_max, r = r_s and temp_lost is raised.  Both products go through
+-- one multiplier.
+-- Formats: temperatures S(9,6), tcr U(-6,30), t_s U(-1,18), r_s, r, rho U(0,24); products exact.
+-- Latency: 6.  Interval: 6.
+-- Rounding: each product half up.  r saturates, rho cannot: it is below 1/4.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -12,39 +14,82 @@ use work.fluxproof_pkg.all;
 
 entity winding_resistance is
   port (
-    clk       : in  std_logic;
-    rst       : in  std_logic;
-    in_valid  : in  std_logic;
-    r_s       : in  unsigned(RESISTANCE_W - 1 downto 0);
-    t_s       : in  unsigned(SAMPLE_TIME_W - 1 downto 0);
-    out_valid : out std_logic;
-    r         : out unsigned(RESISTANCE_W - 1 downto 0);
-    rho       : out unsigned(RESISTANCE_W - 1 downto 0)
+    clk          : in  std_logic;
+    rst          : in  std_logic;
+    in_valid     : in  std_logic;
+    temp_winding : in  signed(15 downto 0);
+    temp_valid   : in  std_logic;
+    r_s          : in  unsigned(RESISTANCE_W - 1 downto 0);
+    tcr          : in  unsigned(23 downto 0);
+    t_0          : in  signed(15 downto 0);
+    t_min        : in  signed(15 downto 0);
+    t_max        : in  signed(15 downto 0);
+    t_s          : in  unsigned(SAMPLE_TIME_W - 1 downto 0);
+    out_valid    : out std_logic;
+    r            : out unsigned(RESISTANCE_W - 1 downto 0);
+    rho          : out unsigned(RESISTANCE_W - 1 downto 0);
+    temp_lost    : out std_logic
   );
 end entity winding_resistance;
 
 architecture rtl of winding_resistance is
   constant LATENCY : positive := WINDING_RESISTANCE_LATENCY;
+  constant WIDE_W  : positive := RESISTANCE_W + 1;
+  constant SLIM_W  : positive := SAMPLE_TIME_W + 1;
+  constant PROD_W  : positive := WIDE_W + SLIM_W;
+  constant SUM_W   : positive := PROD_W - WINDING_RESISTANCE_DROP_TCR;
 
-  signal valid  : std_logic_vector(0 to LATENCY);
-  signal prod_1 : signed(RESISTANCE_W + SAMPLE_TIME_W + 1 downto 0);
+  signal valid    : std_logic_vector(0 to LATENCY);
+  signal warmer_1 : signed(SLIM_W - 1 downto 0);
+  signal lost_1   : std_logic;
+  signal mul_a    : signed(SLIM_W - 1 downto 0);
+  signal mul_b    : signed(WIDE_W - 1 downto 0);
+  signal prod     : signed(PROD_W - 1 downto 0);
+  signal sum_3    : signed(SUM_W - 1 downto 0);
+  signal r_4      : unsigned(RESISTANCE_W - 1 downto 0);
 begin
   valid(0) <= in_valid;
+
+  mul_a <= signed('0' & t_s) when valid(4) = '1' else warmer_1;
+  mul_b <= signed('0' & r_4) when valid(4) = '1' else signed('0' & tcr);
 
   process (clk)
   begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stage 1: prod = r_s * t_s
+      -- Stage 1: warmer = temp_winding - t_0;  lost = no reading to believe
       if valid(0) = '1' then
-        prod_1 <= signed('0' & r_s) * signed('0' & t_s);
+        warmer_1 <= resize(temp_winding, SLIM_W) - resize(t_0, SLIM_W);
+        lost_1   <= '1';
+        if temp_valid = '1' and temp_winding >= t_min and temp_winding <= t_max then
+          lost_1 <= '0';
+        end if;
       end if;
 
-      -- Stage 2: r = r_s,  rho = prod/2, narrowed
-      if valid(1) = '1' then
-        r   <= r_s;
-        rho <= resize(unsigned(round_half_up(prod_1, WINDING_RESISTANCE_DROP)), RESISTANCE_W);
+      -- Stages 2, 5: prod = warmer*tcr, r*t_s
+      if valid(1) = '1' or valid(4) = '1' then
+        prod <= mul_a * mul_b;
+      end if;
+
+      -- Stage 3: sum = r_s + prod
+      if valid(2) = '1' then
+        sum_3 <= plus_rounded(signed(resize(r_s, SUM_W)), prod, WINDING_RESISTANCE_DROP_TCR);
+      end if;
+
+      -- Stage 4: r = sum, limited, or r_s
+      if valid(3) = '1' then
+        r_4 <= saturate_u(sum_3, RESISTANCE_W);
+        if lost_1 = '1' then
+          r_4 <= r_s;
+        end if;
+      end if;
+
+      -- Stage 6: rho = prod/2, narrowed
+      if valid(5) = '1' then
+        r         <= r_4;
+        rho       <= resize(unsigned(round_half_up(prod, WINDING_RESISTANCE_DROP_RHO)), RESISTANCE_W);
+        temp_lost <= lost_1;
       end if;
 
       if rst = '1' then

@@ -26,6 +26,8 @@ entity sample_latch is
     i_d_ref_in      : in  signed(PU_W - 1 downto 0);
     i_q_ext_in      : in  signed(PU_W - 1 downto 0);
     speed_mode_in   : in  std_logic;
+    temp_winding_in : in  signed(15 downto 0);
+    temp_valid_in   : in  std_logic;
     clear_faults_in : in  std_logic;
     run_in          : in  std_logic;
     out_valid       : out std_logic;
@@ -38,6 +40,8 @@ entity sample_latch is
     i_d_ref         : out signed(PU_W - 1 downto 0);
     i_q_ext         : out signed(PU_W - 1 downto 0);
     speed_mode      : out std_logic;
+    temp_winding    : out signed(15 downto 0);
+    temp_valid      : out std_logic;
     clear_faults    : out std_logic;
     run             : out std_logic
   );
@@ -62,6 +66,8 @@ begin
         i_d_ref      <= i_d_ref_in;
         i_q_ext      <= i_q_ext_in;
         speed_mode   <= speed_mode_in;
+        temp_winding <= temp_winding_in;
+        temp_valid   <= temp_valid_in;
         clear_faults <= clear_faults_in;
         run          <= run_in;
       end if;

@@ -1,7 +1,7 @@
 """`make papers`: the experiments of the papers on the golden model with the switching plant, the key ones in GHDL.
 
-Writes build/papers/flux.json, a picture of every figure and report.html.  Exit status 1 where a finding is not what
-it must be, or the VHDL differs from the golden model in any bit.
+Writes build/papers/flux.json and vsi.json, a picture of every figure and report.html.  Exit status 1 where a finding is
+not what it must be, or the VHDL differs from the golden model in any bit.
 """
 
 from __future__ import annotations
@@ -13,15 +13,34 @@ import time
 from concurrent.futures import ProcessPoolExecutor
 
 import jinja2
+import matplotlib as mpl
 
 from scripts import plots
 from scripts.files import BUILD, write_json, write_text
-from scripts.papers import flux_beyond, flux_figures, flux_plots, flux_rtl, flux_stability
+from scripts.papers import (
+    flux_beyond,
+    flux_figures,
+    flux_plots,
+    flux_rtl,
+    flux_stability,
+    vsi_beyond,
+    vsi_figures,
+    vsi_plots,
+)
 from scripts.papers.flux_bench import DRIVE, Experiment, Finding
 from scripts.report import TEMPLATES
 
 FOLDER = BUILD / "papers"
-EXPERIMENTS = (*flux_figures.EXPERIMENTS, *flux_beyond.EXPERIMENTS, flux_stability.stability)
+FLUX = (*flux_figures.EXPERIMENTS, *flux_beyond.EXPERIMENTS, flux_stability.stability)
+VSI = (*vsi_figures.EXPERIMENTS, *vsi_beyond.EXPERIMENTS)
+EXPERIMENTS = (*FLUX, *VSI)
+PLOTS = {**flux_plots.FIGURES, **vsi_plots.FIGURES}
+
+
+def draw(name: str, experiment: Experiment) -> dict:
+    """The figures of one experiment by name, under the one style."""
+    with mpl.rc_context(plots.STYLE):
+        return {f"{name}_{key}": figure for key, figure in PLOTS[name](experiment).items()}
 
 
 def report(sections: list[dict], findings: list[Finding], seconds: float) -> str:
@@ -65,33 +84,32 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--no-rtl", action="store_true", help="golden model only, without GHDL")
     arguments = parser.parse_args()
-    began, findings, sections = time.monotonic(), [], []
+    began, sections = time.monotonic(), []
+    findings: dict[str, list[Finding]] = {"flux": [], "vsi": []}
     names = [] if arguments.no_rtl else list(flux_rtl.runs(DRIVE))
     with ProcessPoolExecutor(1) as pool:  # GHDL on one core, the golden model on the other
         running = [pool.submit(flux_rtl.in_ghdl, name) for name in names]
-        for function in EXPERIMENTS:
-            start = time.monotonic()
-            experiment = function()
-            tell(experiment, time.monotonic() - start)
-            findings += experiment.findings
-            sections.append(
-                section(function.__name__, experiment, flux_plots.draw(function.__name__, experiment))
-            )
+        for paper, functions in (("flux", FLUX), ("vsi", VSI)):
+            for function in functions:
+                start = time.monotonic()
+                experiment = function()
+                tell(experiment, time.monotonic() - start)
+                findings[paper] += experiment.findings
+                sections.append(section(function.__name__, experiment, draw(function.__name__, experiment)))
         for future in running:
             start = time.monotonic()
             name, experiment = future.result()
             tell(experiment, time.monotonic() - start)
-            findings += experiment.findings
-            figures = flux_plots.rtl(name, experiment)
-            sections.append(section(f"rtl_{name}", experiment, figures))
-    write_json(FOLDER / "flux.json", [f.row() for f in findings])
-    write_text(FOLDER / "report.html", report(sections, findings, time.monotonic() - began))
-    failed = [f for f in findings if not f.passed]
-    print(
-        f"{len(findings) - len(failed)} of {len(findings)} findings as they must be; "
-        "wrote build/papers/flux.json, report.html"
-    )
-    return 1 if failed else 0
+            findings["vsi" if name in flux_rtl.OF_VSI else "flux"] += experiment.findings
+            sections.append(section(f"rtl_{name}", experiment, flux_plots.rtl(name, experiment)))
+    every = [*findings["flux"], *findings["vsi"]]
+    for paper, rows in findings.items():
+        write_json(FOLDER / f"{paper}.json", [f.row() for f in rows])
+    write_text(FOLDER / "report.html", report(sections, every, time.monotonic() - began))
+    good = sum(f.passed for f in every)
+    written = "build/papers/flux.json, vsi.json, report.html"
+    print(f"{good} of {len(every)} findings as they must be; wrote {written}")
+    return 0 if good == len(every) else 1
 
 
 if __name__ == "__main__":

@@ -14,12 +14,6 @@ SETTLED_MS = 200.0  # the start from nothing is no part of any experiment
 COLOURS = (SPEED, Q_AXIS, D_AXIS, "#8e5ea2")
 
 
-def draw(name: str, experiment: Experiment) -> dict[str, Figure]:
-    """The figures of one experiment by name, under the one style."""
-    with mpl.rc_context(STYLE):
-        return {f"{name}_{key}": figure for key, figure in FIGURES[name](experiment).items()}
-
-
 def _legend(axis) -> None:
     axis.legend(loc="lower right", bbox_to_anchor=(1, 0.98), borderpad=0, ncols=3, frameon=False, fontsize=9)
 

@@ -1,0 +1,83 @@
+-- Purpose: the voltage at the motor's terminals, asked for less what the legs take; alpha first, then beta.
+--   u_clean = u_applied - v_leg*s(k-1)
+-- s(k-1): the directions of the sample before, whose voltage fills the coming period.
+-- Formats: u FLUX, s PU, v_leg V_LEG; products exact.
+-- Latency: 4 (alpha, beta follow each other).  Interval: 4.
+-- Rounding: half up, each product.  The difference saturates.
+
+library ieee;
+use ieee.std_logic_1164.all;
+use ieee.numeric_std.all;
+use work.fixed_pkg.all;
+use work.fluxproof_pkg.all;
+
+entity clean_voltage is
+  port (
+    clk             : in  std_logic;
+    rst             : in  std_logic;
+    in_valid        : in  std_logic;
+    u_applied_alpha : in  signed(FLUX_W - 1 downto 0);
+    u_applied_beta  : in  signed(FLUX_W - 1 downto 0);
+    s_alpha         : in  signed(PU_W - 1 downto 0);
+    s_beta          : in  signed(PU_W - 1 downto 0);
+    v_leg           : in  signed(V_LEG_W - 1 downto 0);
+    out_valid       : out std_logic;
+    u_clean_alpha   : out signed(FLUX_W - 1 downto 0);
+    u_clean_beta    : out signed(FLUX_W - 1 downto 0)
+  );
+end entity clean_voltage;
+
+architecture rtl of clean_voltage is
+  constant LATENCY : positive := CLEAN_VOLTAGE_LATENCY;
+
+  -- State: the directions of the sample before
+  signal last_alpha : signed(PU_W - 1 downto 0);
+  signal last_beta  : signed(PU_W - 1 downto 0);
+
+  signal valid  : std_logic_vector(0 to LATENCY);
+  signal s_0    : signed(PU_W - 1 downto 0);
+  signal prod_1 : signed(V_LEG_W + PU_W - 1 downto 0);
+  signal u_1    : signed(FLUX_W - 1 downto 0);
+  signal diff_2 : signed(FLUX_W downto 0);
+begin
+  valid(0) <= in_valid;
+
+  s_0 <= last_beta when valid(1) = '1' else last_alpha;
+  u_1 <= u_applied_beta when valid(2) = '1' else u_applied_alpha;
+
+  process (clk)
+  begin
+    if rising_edge(clk) then
+      valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
+
+      -- Stage 1: prod = v_leg*s(k-1)
+      if valid(0) = '1' or valid(1) = '1' then
+        prod_1 <= v_leg * s_0;
+      end if;
+
+      -- Stage 2: diff = u_applied - prod
+      if valid(1) = '1' or valid(2) = '1' then
+        diff_2 <= minus_rounded(resize(u_1, FLUX_W + 1), prod_1, CLEAN_VOLTAGE_DROP);
+      end if;
+
+      -- Stage 3: u_clean = diff, narrowed; alpha at clock 3, beta at 4
+      if valid(2) = '1' then
+        u_clean_alpha <= saturate(diff_2, FLUX_W);
+      end if;
+      if valid(3) = '1' then
+        u_clean_beta <= saturate(diff_2, FLUX_W);
+        last_alpha   <= s_alpha;
+        last_beta    <= s_beta;
+      end if;
+
+      if rst = '1' then
+        valid(1 to LATENCY) <= (others => '0');
+        last_alpha          <= (others => '0');
+        last_beta           <= (others => '0');
+      end if;
+    end if;
+  end process;
+
+  out_valid <= valid(LATENCY);
+
+end architecture rtl;
