@@ -82,7 +82,8 @@ class Experiment:
 
 
 DRIVE = drives.load(PAPER_DRIVE)
-NOMINAL = registers(DRIVE)
+ALONE = {"compensate": 0, "eta_v": 0}  # paper 001 alone: neither paper 000's compensation nor its estimate
+NOMINAL = registers(DRIVE)._replace(values=registers(DRIVE).values._replace(**ALONE))
 T_S = DRIVE.sample_time_s
 
 

@@ -14,6 +14,7 @@ from plant import IMPOSED_SPEED, FluxMap, Machine
 from scripts.files import ROOT
 from scripts.golden_loop import simulate
 from scripts.papers.flux_bench import (
+    ALONE,
     CURRENT_MODEL,
     DRIVE,
     LOADED,
@@ -113,11 +114,12 @@ def brusa_map() -> Experiment:
     flux_map = FluxMap.from_points(table["id_A"], table["iq_A"], table["psid_Vs"], table["psiq_Vs"]).mended()
     drive = drives.load(BRUSA_DRIVE)
     machine = Machine.from_mapping({**vars(drive.machine), "flux_map": flux_map})
+    alone = scaled(registers(drive), {}, **ALONE)
     rows = []
     for i_d in (-110.0, -80.0, -50.0, -20.0, 0.0):
         for i_q in (-100.0, -60.0, -20.0, 20.0, 60.0, 100.0):
             scene = held_at(1000, i_d, i_q, 1.2, drive)
-            view = trace(simulate(drive, registers(drive), scene, machine, mode=IMPOSED_SPEED), scene, drive)
+            view = trace(simulate(drive, alone, scene, machine, mode=IMPOSED_SPEED), scene, drive)
             end = slice(-1000, None)
             actual = np.array([view.actual[x][end].mean() for x in "dq"])
             off = np.array([view.estimate[x][end].mean() for x in "dq"]) - actual

@@ -17,6 +17,7 @@ from plant import Machine
 from scripts.cosim import Scenario
 from scripts.papers.flux_beyond import saturating_machine
 from scripts.papers.flux_bench import (
+    ALONE,
     DRIVE,
     MAGNETIC,
     TORQUE_N,
@@ -47,7 +48,8 @@ class RtlRun(NamedTuple):
 
 def runs(drive) -> dict[str, RtlRun]:
     """The key experiments, for a drive with fewer clocks in a period."""
-    own = registers(drive)
+    full = registers(drive)
+    own = scaled(full, {}, **ALONE)
     wrong = scaled(own, dict.fromkeys(MAGNETIC, 1.3))
     ramp = np.interp(np.arange(2600), [0, 500, 1700, 2600], [200, 200, -200, -200])
     reversal = scenario(drive, 0.26, rpm={0.0: 0.0}, load={0.0: 2.0}, start_rpm=200)
@@ -60,7 +62,7 @@ def runs(drive) -> dict[str, RtlRun]:
     }
     steps = scenario(drive, 0.25, rpm={0.0: 183}, load={0.0: 3.05}, changes=changes, start_rpm=183)
     loaded = scenario(drive, 0.25, rpm={0.0: 239}, load={0.08: TORQUE_N}, start_rpm=239)
-    learning = scaled(own, {"eta_v": 400, "zeta": 200, "k_lp": 4})
+    learning = scaled(full, {"eta_v": 400, "zeta": 200, "k_lp": 4})
     switched = {0.08: {"compensate": 1}, 0.16: {"compensate": 0}}
     dead = scenario(drive, 0.2, rpm={0.0: 300}, load={0.0: 3.0}, changes=switched, start_rpm=300)
     dead = dataclasses.replace(dead, temp_winding=np.linspace(20.0, 60.0, len(dead)))
