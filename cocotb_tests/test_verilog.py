@@ -33,6 +33,8 @@ MODERATE = {  # registers of the size a drive has, with which little saturates
     **{"pole_pairs": 3, "k_speed": 4096, "u_dc_offset": 200, "k_u_max": 75000, "speed_kp": 30000},
     **{"r_s": 600000, "t_s": 33000, "k_chord": 5500, "omega_0": 4000, "xi": 11000, "omega_min": 400},
     **{"k_ramp": 300, "flux_kp": 4000, "flux_ki": 5000, "delta_max": 15000},
+    **{"k_sign": 2000000, "k_ahead": 20000, "k_lp": 3000, "eta_v": 300000, "gamma": 80000, "zeta": 80000},
+    **{"v_thr": 1, "v_comp_max": 300, "i_learn": 60, "eta_psi": 50000, "omega_psi_min": 300},
 }
 
 
@@ -60,7 +62,7 @@ def registers(rng: np.random.Generator, moderate: bool) -> dict[str, int]:
     values = {p.name: random_value(rng, p) for p in ports}
     if moderate:
         values |= {name: int(value * rng.uniform(0.5, 1.5)) for name, value in MODERATE.items()}
-        values["flux_mode"] = int(rng.integers(2, 4))
+        values |= {"flux_mode": int(rng.integers(2, 4)), "compensate": 1}
     return values
 
 
@@ -72,7 +74,7 @@ def raw_sample(rng: np.random.Generator, generics: dict[str, int], moderate: boo
         top = (1 << generics["ADC_BITS"]) - 1
         values |= {f"adc_{x}": int(top * rng.uniform(0.49, 0.51)) for x in "abc"}
         values |= {"adc_u_dc": int(0.8 * top), "speed_mode_in": 0}
-        values |= {name: int(rng.integers(-600, 600)) for name in ("i_d_ref_in", "i_q_ext_in")}
+        values |= {name: int(rng.integers(-6000, 6000)) for name in ("i_d_ref_in", "i_q_ext_in")}
     return values
 
 
@@ -80,7 +82,7 @@ def stimulus(seed: int, generics: dict[str, int], clocks: int = CLOCKS) -> list[
     """For each clock the inputs that change before its rising edge: what the core may meet, in any order.
 
     A raw sample every 60 to 80 clocks, sometimes none for longer; its inputs turn to noise one clock later.
-    Registers change with every fourth sample; resets, trips and switching off come at any time.
+    Twelve moderate samples, then four wild ones; registers change between them; resets, trips and switching off come at any time.
     """
     rng = np.random.default_rng(seed)
     writes: list[dict[str, int]] = [{} for _ in range(clocks)]
@@ -100,9 +102,9 @@ def stimulus(seed: int, generics: dict[str, int], clocks: int = CLOCKS) -> list[
         writes[off]["enable"], writes[off + 30]["enable"] = 0, 1
     at, number = 20, 0
     while at < clocks - 1:
-        writes[at] |= raw_sample(rng, generics, moderate=number % 8 < 4)
-        if number % 4 == 0:
-            writes[at] |= registers(rng, moderate=number % 8 == 0)
+        writes[at] |= raw_sample(rng, generics, moderate=number % 16 < 12)
+        if number % 16 in (0, 12, 14):
+            writes[at] |= registers(rng, moderate=number % 16 == 0)
         writes[at + 1] |= raw_sample(rng, generics)
         pulse("sample_valid", at)
         at += int(rng.integers(*GAP, endpoint=True)) + (500 if number % 17 == 16 else 0)

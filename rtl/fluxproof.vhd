@@ -200,7 +200,7 @@ architecture rtl of fluxproof is
   signal dq_voltage_valid     : std_logic;
   signal theta_out_valid      : std_logic;
   signal theta_out            : unsigned(TURN_W - 1 downto 0);
-  signal trig_out_valid       : std_logic;
+  signal voltage_trig_valid   : std_logic;
   signal cos_out              : signed(PU_W - 1 downto 0);
   signal sin_out              : signed(PU_W - 1 downto 0);
   signal ab_voltage_valid     : std_logic;
@@ -544,7 +544,7 @@ begin
       rst       => rst,
       in_valid  => theta_out_valid,
       theta     => theta_out,
-      out_valid => trig_out_valid,
+      out_valid => voltage_trig_valid,
       cos_theta => cos_out,
       sin_theta => sin_out
     );
@@ -566,7 +566,7 @@ begin
     port map (
       clk       => clk,
       rst       => rst,
-      in_valid  => trig_out_valid,
+      in_valid  => voltage_trig_valid,
       i_alpha   => u_comp_alpha,
       i_beta    => u_comp_beta,
       cos_theta => cos_out,
@@ -580,7 +580,7 @@ begin
     port map (
       clk       => clk,
       rst       => rst,
-      in_valid  => trig_out_valid,
+      in_valid  => voltage_trig_valid,
       i_alpha   => s_alpha,
       i_beta    => s_beta,
       cos_theta => cos_out,
