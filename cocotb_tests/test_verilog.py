@@ -82,7 +82,8 @@ def stimulus(seed: int, generics: dict[str, int], clocks: int = CLOCKS) -> list[
     """For each clock the inputs that change before its rising edge: what the core may meet, in any order.
 
     A raw sample every 60 to 80 clocks, sometimes none for longer; its inputs turn to noise one clock later.
-    Twelve moderate samples, then four wild ones; registers change between them; resets, trips and switching off come at any time.
+    Twelve moderate samples, then four wild ones; registers change between them; resets, trips and switching off come
+    at any time.
     """
     rng = np.random.default_rng(seed)
     writes: list[dict[str, int]] = [{} for _ in range(clocks)]
