@@ -125,7 +125,7 @@ def harmonic(signal: np.ndarray, theta: np.ndarray, order: int) -> float:
     return 2 * abs(np.mean(x * np.exp(-1j * order * turns[inside])))
 
 
-def leg_loss(run_or_none: None = None) -> float:
+def leg_loss() -> float:
     """What a leg of the plant really loses at a current well above zero [V]: dead time, and drops by what conducts.
 
     A leg with positive current loses v_switch while its upper switch is on and v_diode below it; the mean of both legs'
