@@ -14,7 +14,8 @@ from golden_model.estimators import psi_adaline, v_dead_adaline, winding_resista
 from golden_model.registers import registers
 from plant import Inverter
 from scripts.papers.__main__ import VSI
-from scripts.papers.vsi_bench import DRIVE, FAST, I_Q, NOMINAL, changed, held_at, last, leg_loss, run, without
+from scripts.papers.flux_bench import scaled
+from scripts.papers.vsi_bench import DRIVE, FAST, I_Q, NOMINAL, held_at, last, leg_loss, run, without
 
 
 @pytest.mark.parametrize("experiment", VSI, ids=[f.__name__ for f in VSI])
@@ -39,7 +40,7 @@ def real_v_dead(rows: np.ndarray, gains: dict[str, float]) -> tuple[float, float
 
 def test_one_lsb_of_v_dead():
     """The paper's own step of 1e-5 on a recorded saw-tooth: bit-exact and real-number Adaline end within one LSB."""
-    view = run(held_at(300, 0.0, I_Q, 12.0), changed(NOMINAL, compensate=0))
+    view = run(held_at(300, 0.0, I_Q, 12.0), scaled(NOMINAL, compensate=0))
     seen, values = view.result.observed, NOMINAL.values._replace(zeta=0, i_learn=0)
     u_pi_d = seen["u_d"] - seen["u_dec_d"]
     block = v_dead_adaline.BLOCK
@@ -70,7 +71,7 @@ def test_v_dead_never_stalls(eta):
 
 def test_one_lsb_of_psi():
     """Adaline of psi_m, bit-exact against real numbers on a recorded run: within one LSB at the end."""
-    view = run(held_at(300, 0.0, I_Q, 3.0), changed(NOMINAL, FAST))
+    view = run(held_at(300, 0.0, I_Q, 3.0), scaled(NOMINAL, FAST))
     seen, values = view.result.observed, NOMINAL.values
     v_leg = np.concatenate([[0], (seen["v_dead"] + seen["v_comp"])[:-1]])
     r, _rho, _lost = winding_resistance.step(
@@ -106,16 +107,16 @@ def test_thermocouple_lost_or_absurd():
 
 
 def test_psi_is_held_and_says_so_at_low_speed():
-    view = run(held_at(300, 0.0, I_Q, 2.0), changed(NOMINAL, FAST))
-    slow = run(held_at(30, 0.0, I_Q, 0.5), changed(NOMINAL, FAST), state=view.result.state)
+    view = run(held_at(300, 0.0, I_Q, 2.0), scaled(NOMINAL, FAST))
+    slow = run(held_at(30, 0.0, I_Q, 0.5), scaled(NOMINAL, FAST), state=view.result.state)
     assert slow.result.observed["psi_held"][200:].all()
     assert np.ptp(slow.psi_m[200:]) == 0 and slow.psi_m[-1] == pytest.approx(view.psi_m[-1], rel=0.05)
 
 
 def test_nothing_is_learnt_at_zero_current():
     """Ringing around zero current must not teach a negative loss; what was learnt stays, and calms the ringing."""
-    learnt = run(held_at(300, 0.0, I_Q, 4.0), changed(NOMINAL, FAST))
-    idle = run(held_at(300, 0.0, 0.0, 1.5), changed(NOMINAL, FAST), state=learnt.result.state)
+    learnt = run(held_at(300, 0.0, I_Q, 4.0), scaled(NOMINAL, FAST))
+    idle = run(held_at(300, 0.0, 0.0, 1.5), scaled(NOMINAL, FAST), state=learnt.result.state)
     raw = run(held_at(300, 0.0, 0.0, 1.5), without(NOMINAL))
     z = last(0.5)
     assert (idle.v_dead + idle.v_comp)[z].mean() == pytest.approx(leg_loss(), rel=0.05)
@@ -124,7 +125,7 @@ def test_nothing_is_learnt_at_zero_current():
 
 def test_an_ideal_inverter_is_left_alone():
     """No dead time, no drops: nothing is found, nothing compensated beyond the ripple's worth."""
-    view = run(held_at(300, 0.0, I_Q, 4.0), changed(NOMINAL, FAST), dead_time_s=0.0, inverter=Inverter())
+    view = run(held_at(300, 0.0, I_Q, 4.0), scaled(NOMINAL, FAST), dead_time_s=0.0, inverter=Inverter())
     assert np.abs(view.v_comp[last(1.0)]).max() < 0.03 and np.abs(view.i_d[last(1.0)]).max() < 0.02
 
 

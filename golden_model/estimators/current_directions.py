@@ -7,7 +7,7 @@
     s_alpha, s_beta = their Clarke transform
 
 Ahead: the voltage of the next sample acts 2.5 sample times from here.  With the directions of now each crossing of
-zero would be compensated late, and the spike left over looks to the Adaline like more dead time: 13 % more at 300 rpm
+zero would be compensated late, and the spike left over looks to the Adaline like more dead time: 10 % more at 300 rpm
 in the paper's drive.  The turn is the first term of the rotation; its length does not matter to a direction, its angle
 is short of the true one by turn**3/3, one degree at 0.37 rad.
 Near zero: eq. (6) gives zero the sign of a positive current, so noise around zero flips a whole leg voltage.  A real

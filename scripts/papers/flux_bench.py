@@ -87,10 +87,10 @@ NOMINAL = registers(DRIVE)._replace(values=registers(DRIVE).values._replace(**AL
 T_S = DRIVE.sample_time_s
 
 
-def scaled(register_set: RegisterSet, factors: dict[str, float], **changes: int) -> RegisterSet:
+def scaled(register_set: RegisterSet, factors: dict[str, float] | None = None, **changes: int) -> RegisterSet:
     """The same registers, some times a factor, some replaced."""
     values = register_set.values
-    new = {name: round(getattr(values, name) * factor) for name, factor in factors.items()}
+    new = {name: round(getattr(values, name) * factor) for name, factor in (factors or {}).items()}
     return register_set._replace(values=values._replace(**new, **changes))
 
 

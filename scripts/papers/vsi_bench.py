@@ -20,6 +20,7 @@ from plant import IMPOSED_SPEED, Inverter, Machine
 from scripts.cosim import Result, Scenario
 from scripts.files import ROOT
 from scripts.golden_loop import simulate
+from scripts.papers.flux_bench import ALONE, scaled
 from scripts.scenarios import RPM, scenario
 
 VSI_DRIVE = ROOT / "docs" / "drives" / "paper000.toml"
@@ -50,21 +51,13 @@ class Run(NamedTuple):
     psi_m: np.ndarray
     d_d: np.ndarray
     d_q: np.ndarray
-    u_pi_d: np.ndarray
     theta: np.ndarray
     result: Result
 
 
-def changed(register_set: RegisterSet, factors=None, **changes: int) -> RegisterSet:
-    """The same registers, some times a factor, some replaced."""
-    values = register_set.values
-    new = {name: round(getattr(values, name) * factor) for name, factor in (factors or {}).items()}
-    return register_set._replace(values=values._replace(**new, **changes))
-
-
 def without(register_set: RegisterSet) -> RegisterSet:
     """Neither compensated nor estimated: what a drive without paper 000 does."""
-    return changed(register_set, compensate=0, eta_v=0)
+    return scaled(register_set, {}, **ALONE)
 
 
 def trace(result: Result, drive=DRIVE) -> Run:
@@ -89,7 +82,6 @@ def trace(result: Result, drive=DRIVE) -> Run:
         psi_m=si("psi_m"),
         d_d=3.0 * si("d_d"),
         d_q=3.0 * si("d_q"),
-        u_pi_d=si("u_d") - si("u_dec_d"),
         theta=si("theta_me"),
         result=result,
     )

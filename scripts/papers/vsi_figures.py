@@ -11,7 +11,7 @@ from golden_model.drive_keys import DriveError
 from golden_model.registers import registers
 from golden_model.units import TURN_RAD
 from plant import FREE
-from scripts.papers.flux_bench import Experiment, Finding
+from scripts.papers.flux_bench import Experiment, Finding, scaled
 from scripts.papers.vsi_bench import (
     DRIVE,
     FAST,
@@ -20,7 +20,6 @@ from scripts.papers.vsi_bench import (
     NOMINAL,
     T_S,
     Run,
-    changed,
     harmonic,
     held_at,
     last,
@@ -49,7 +48,7 @@ def eq_5(theta, signs) -> tuple[np.ndarray, np.ndarray]:
 def learnt(rpm: int) -> Run:
     """Compensated and settled at i_q = 4 A; the same run serves several figures."""
     if rpm not in _LEARNT:
-        _LEARNT[rpm] = run(held_at(rpm, 0.0, I_Q, 6.0), changed(NOMINAL, FAST))
+        _LEARNT[rpm] = run(held_at(rpm, 0.0, I_Q, 6.0), scaled(NOMINAL, FAST))
     return _LEARNT[rpm]
 
 
@@ -120,7 +119,7 @@ def fig_5() -> Experiment:
     """The paper's own gains: V_dead converges for 15 s, then compensation drives it to zero."""
     start = 15.0
     scene = held_at(300, 0.0, I_Q, 50.0, changes={start: {"compensate": 1}})
-    view = run(scene, changed(NOMINAL, compensate=0))
+    view = run(scene, scaled(NOMINAL, compensate=0))
     before, end = slice(round(14 / T_S), round(start / T_S)), last(2.0)
     settled = view.v_dead[before].mean()
     reached = np.flatnonzero(np.abs(view.v_dead - settled) < 0.05 * settled)
@@ -189,7 +188,7 @@ def figs_16_17() -> Experiment:
     """A free shaft at 300 rpm under a constant load of 4 A: the 6th harmonic of the speed, 150 Hz."""
     load = 1.5 * 5 * 0.0683 * I_Q - DRIVE.machine.viscous_friction_nms * 31.4
     scene = scenario(DRIVE, 3.0, rpm={0.0: 300}, load={0.0: load}, start_rpm=300)
-    on = run(scene, changed(NOMINAL, FAST), mode=FREE, state=learnt(300).result.state)
+    on = run(scene, scaled(NOMINAL, FAST), mode=FREE, state=learnt(300).result.state)
     off = run(scene, without(NOMINAL), mode=FREE)
     z = last(1.0)
     raw, clean = (harmonic(v.rpm[z], v.theta[z], 6) for v in (off, on))
@@ -257,8 +256,8 @@ def figs_12_13() -> Experiment:
         scene = dataclasses.replace(
             held_at(300, 0.0, I_Q, 2.0), temp_winding=np.full(round(2.0 / T_S), float(winding))
         )
-        view = run(scene, changed(NOMINAL, FAST), machine, state=state)
-        lost = run(held_at(300, 0.0, I_Q, 2.0), changed(NOMINAL, FAST), machine, state=state)
+        view = run(scene, scaled(NOMINAL, FAST), machine, state=state)
+        lost = run(held_at(300, 0.0, I_Q, 2.0), scaled(NOMINAL, FAST), machine, state=state)
         state, z = view.result.state, last(0.5)
         points.append(
             (
@@ -292,7 +291,7 @@ def eq_b3() -> Experiment:
     for eta in (1e-5, 1e-3, 0.12):
         drive = dataclasses.replace(DRIVE, control=dataclasses.replace(DRIVE.control, v_dead_eta=eta))
         seconds = 20.0 if eta < 1e-4 else 3.0
-        view = run(held_at(300, 0.0, I_Q, seconds), changed(registers(drive), compensate=0, flux_mode=0))
+        view = run(held_at(300, 0.0, I_Q, seconds), scaled(registers(drive), compensate=0, flux_mode=0))
         middle, end = view.v_dead[len(view.v_dead) // 2 :].mean(), view.v_dead[last(0.5)].mean()
         steady = abs(end / middle - 1)
         found.append(

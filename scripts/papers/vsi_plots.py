@@ -122,4 +122,5 @@ FIGURES = {
     "eq_b3": _nothing,
     "any_i_d": any_i_d,
     "both_papers": both_papers,
+    "details": _nothing,
 }
