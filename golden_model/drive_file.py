@@ -29,6 +29,14 @@ def read_sections(path, schema):
         raise DriveError(f"{path}{error}") from None
 
 
+def read_tables(path):
+    """The file as nested dictionaries, nothing checked but the syntax."""
+    try:
+        return _tables(Path(path))
+    except DriveError as error:
+        raise DriveError(f"{path}{error}") from None
+
+
 def _tables(path):
     """The file as nested dictionaries; the message then starts right behind the file's name."""
     try:

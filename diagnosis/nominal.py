@@ -1,0 +1,65 @@
+"""The nominal drive: what the simulation believed, read from drive.toml.
+
+Every key of the core's own drive.toml is known here with its range, but only what a balance needs is
+required, so that a drive without the core can be described too; what is absent is None, and the effect it
+describes absent from the nominal model.  [columns] maps names of a recording's file to canonical ones.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass, field
+
+from golden_model import drive
+from golden_model.drive_file import read_sections, read_tables
+from golden_model.drive_keys import DriveError
+
+REQUIRED = {
+    "machine": ("pole_pairs", "resistance_ohm", "inductance_d_h", "inductance_q_h", "magnet_flux_wb", "rated_current_a"),
+    "inverter": ("dc_bus_v", "pwm_frequency_hz"),
+}
+
+
+def _optional(section, kind):
+    """The section's dataclass with every key optional but the required ones."""
+    fields = []
+    for f in dataclasses.fields(kind):
+        needed = f.name in REQUIRED.get(section, ())
+        default = dataclasses.MISSING if needed else None if f.default is dataclasses.MISSING else f.default
+        fields.append((f.name, f.type, dataclasses.field(default=default, metadata=f.metadata)))
+    fields.sort(key=lambda entry: entry[2].default is not dataclasses.MISSING)
+    return dataclasses.make_dataclass(kind.__name__, fields, frozen=True)
+
+
+SECTIONS = {name: _optional(name, kind) for name, kind in drive.SECTIONS.items()}
+
+
+@dataclass(frozen=True)
+class Nominal:
+    """The sections of drive.toml as objects with the attribute names of its keys, SI units, peak values."""
+
+    machine: object
+    inverter: object
+    control: object
+    sensors: object
+    core: object
+    bases: object
+    columns: dict = field(default_factory=dict)
+    path: str = ""
+
+    @property
+    def sample_time_s(self) -> float:
+        """Time between two rows that follow each other."""
+        return self.control.sample_time_s or 1.0 / self.inverter.pwm_frequency_hz
+
+
+def load_nominal(path) -> Nominal:
+    """The nominal drive of a TOML file; DriveError names file, section and key, and what was expected."""
+    sections = read_sections(path, SECTIONS)
+    columns = read_tables(path).get("columns", {})
+    if not isinstance(columns, dict):
+        raise DriveError(f"{path}: columns must be a section [columns] with lines such as 'my name' = 'i_a'")
+    m = sections["machine"]
+    if m.magnet_flux_wb <= 0.0:
+        raise DriveError(f"{path}: [machine] magnet_flux_wb = {m.magnet_flux_wb:g}: must be above 0 Wb to diagnose")
+    return Nominal(*sections.values(), columns=columns, path=str(path))

@@ -1,0 +1,103 @@
+"""A recording in canonical form: SI units, peak values, one row per control sample.
+
+Canonical columns (all optional but ``t``; see ``REQUIRED_SETS``):
+
+    t                    s      sampling instant
+    i_a i_b i_c          A      phase currents, or i_d i_q (dq, d axis at theta_e)
+    theta_e              rad    electrical angle of the d axis, wrapped or not
+    omega_e              rad/s  electrical speed
+    u_dc                 V
+    d_a d_b d_c          1      duties computed from this row's samples, in force
+                                duty_applied_after_samples periods later; or u_d_ref u_q_ref [V]
+    i_d_ref i_q_ref      A
+    temp_winding         degC
+    torque               Nm     at the shaft, positive with positive speed when motoring
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+COLUMNS = {
+    "t": "s",
+    "i_a": "A",
+    "i_b": "A",
+    "i_c": "A",
+    "i_d": "A",
+    "i_q": "A",
+    "theta_e": "rad",
+    "omega_e": "rad/s",
+    "u_dc": "V",
+    "d_a": "1",
+    "d_b": "1",
+    "d_c": "1",
+    "u_d_ref": "V",
+    "u_q_ref": "V",
+    "i_d_ref": "A",
+    "i_q_ref": "A",
+    "temp_winding": "degC",
+    "torque": "Nm",
+}
+
+
+class RecordingError(ValueError):
+    """Unusable input, in one line that names the file, the line or column, and what was expected."""
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One finding of the checks.  ``fatal``: no diagnosis is possible; else ``action`` says how it was worked round."""
+
+    code: str  # stable, lower_snake_case: gap, duplicate, clipped, stuck, unit, swapped_phases, current_sum, ...
+    message: str
+    column: str = ""
+    row: int = -1  # first row concerned, 0-based in the recording; -1: the whole column
+    count: int = 0  # rows concerned
+    action: str = ""
+    fatal: bool = False
+
+
+@dataclass
+class Recording:
+    """Canonical arrays of one recording, float64, shape (n,), and what the checks found.
+
+    ``usable``: bool (n,), False on rows that must not enter a balance (clipped, stuck, repaired).
+    ``joined``: bool (n,), True where row k+1 follows row k after one sample time; the last is False.
+    ``slow``: sampled too slowly for a balance from sample to sample; only operating points count.
+    ``meta``: what else the file held, such as registers and raw codes of a telemetry dump.
+    """
+
+    source: str
+    columns: dict[str, np.ndarray]
+    usable: np.ndarray
+    joined: np.ndarray
+    slow: bool = False
+    problems: list[Problem] = field(default_factory=list)
+    meta: dict = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        return len(self.columns["t"])
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        return self.columns[name]
+
+    def has(self, *names: str) -> bool:
+        """Whether every named column is there."""
+        return all(name in self.columns for name in names)
+
+    @property
+    def fatal(self) -> bool:
+        return any(problem.fatal for problem in self.problems)
+
+
+def from_columns(columns: dict[str, np.ndarray], sample_time_s: float, source: str = "arrays") -> Recording:
+    """A recording of arrays taken on trust: nothing is checked but lengths and gaps in time."""
+    arrays = {name: np.ascontiguousarray(values, dtype=float) for name, values in columns.items()}
+    n = {name: len(values) for name, values in arrays.items()}
+    if "t" not in arrays or len(set(n.values())) != 1:
+        raise RecordingError(f"{source}: columns of one length with a column t are needed, got {n}")
+    step = np.diff(arrays["t"])
+    joined = np.append(np.abs(step - sample_time_s) < 0.25 * sample_time_s, False)
+    return Recording(source, arrays, np.ones(len(arrays["t"]), bool), joined)

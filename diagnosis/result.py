@@ -1,0 +1,155 @@
+"""What a diagnosis says: plain dataclasses, written to diagnosis.json by ``to_json``.
+
+The stable part follows docs/diagnosis.schema.json.  ``Evidence`` is for pictures only and never leaves for JSON.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from diagnosis.recording import Problem
+
+VERDICTS = ("explained", "ambiguous", "unexplained", "no_mismatch", "digital_mismatch", "bad_recording")
+
+
+@dataclass
+class Estimate:
+    """A parameter's value with its standard deviation."""
+
+    value: float
+    sigma: float
+    unit: str
+
+
+@dataclass
+class NamedEffect:
+    """An effect that the tool asserts.
+
+    explains: share of the misfit's power above the noise floor that vanishes with it.
+    plant: what the plant is to be told, {"machine.resistance_ohm": 1.7, ...}; values may be lists and tables.
+    """
+
+    name: str
+    confidence: float
+    parameters: dict[str, Estimate]
+    explains: float
+    plant: dict = field(default_factory=dict)
+
+
+@dataclass
+class Request:
+    """A recording to make next: the operating point that separates what is tied."""
+
+    omega_e: float
+    i_d: float
+    i_q: float
+    separates: list[str]
+    why: str
+    u_dc: float | None = None
+    temp_winding: float | None = None
+
+
+@dataclass
+class OrderLine:
+    """A harmonic of the misfit in dq, per electrical turn."""
+
+    order: float
+    amplitude: float
+    unit: str
+
+
+@dataclass
+class Region:
+    """Where the misfit is larger than elsewhere: ``variable`` between low and high; rms inside and outside."""
+
+    variable: str  # omega_e, i_d, i_q, u_dc, temp_winding, t, theta_e
+    low: float
+    high: float
+    unit: str
+    rms: float
+    rms_elsewhere: float
+
+
+@dataclass
+class Location:
+    """Where the misfit lives."""
+
+    signal: str = ""
+    orders: list[OrderLine] = field(default_factory=list)
+    regions: list[Region] = field(default_factory=list)
+
+
+@dataclass
+class Fit:
+    """Misfit (rms) before and after on rows used and on operating points never fitted, beside the noise floor."""
+
+    signal: str = "u_dq"
+    unit: str = "V"
+    train_before: float = 0.0
+    train_after: float = 0.0
+    holdout_before: float = 0.0
+    holdout_after: float = 0.0
+    noise_floor: float = 0.0
+
+
+@dataclass
+class UnknownTerm:
+    """The best sparse term for what no effect explains."""
+
+    signal: str
+    formula: str
+    value: float
+    sigma: float
+    unit: str
+    explains: float
+
+
+@dataclass
+class Digital:
+    """Replay of the digital half.  first_difference: block, sample, signal, bit, recorded, golden."""
+
+    checked: bool = False
+    samples: int = 0
+    first_difference: dict | None = None
+
+
+@dataclass
+class Evidence:
+    """Block means of misfit and operating point for the pictures, all arrays of shape (n,) unless said.
+
+    before_d, before_q, after_d, after_q: misfit in dq [V]; noise: standard deviation of one block's mean [V].
+    orders: (m,) electrical orders with spectrum_before, spectrum_after: (m,) amplitudes [V].
+    angle: (b,) rad with angle_before_d, ..., the mean misfit over the electrical angle.
+    """
+
+    arrays: dict[str, np.ndarray] = field(default_factory=dict)
+
+
+@dataclass
+class Diagnosis:
+    """The answer to: why does this recording differ from its simulation?"""
+
+    verdict: str
+    sentence: str
+    effects: list[NamedEffect] = field(default_factory=list)
+    ambiguity: list[list[str]] = field(default_factory=list)
+    next_recording: list[Request] = field(default_factory=list)
+    location: Location = field(default_factory=Location)
+    fit: Fit = field(default_factory=Fit)
+    unknown_term: UnknownTerm | None = None
+    rows: int = 0
+    problems: list[Problem] = field(default_factory=list)
+    digital: Digital = field(default_factory=Digital)
+    notes: list[str] = field(default_factory=list)  # for people: what was assumed, what was not looked at
+    evidence: Evidence = field(default_factory=Evidence)
+
+    def to_json(self) -> dict:
+        """The stable mapping that diagnosis.json holds (schema 1)."""
+        plain = dataclasses.asdict(dataclasses.replace(self, evidence=Evidence()))
+        problems = plain.pop("problems")
+        for key in ("evidence", "rows"):
+            plain.pop(key)
+        return {"schema": 1, **plain, "recording": {"rows": self.rows, "problems": problems}}
