@@ -3,6 +3,8 @@
 Every key of the core's own drive.toml is known here with its range, but only what a balance needs is
 required, so that a drive without the core can be described too; what is absent is None, and the effect it
 describes absent from the nominal model.  [columns] maps names of a recording's file to canonical ones.
+[plant.machine], [plant.inverter], [plant.sensors] and [plant.timing] hold physics that the core knows nothing of,
+such as an improved drive has it; diagnosis/improved_plant.py makes a plant of all of it.
 """
 
 from __future__ import annotations
@@ -15,9 +17,11 @@ from golden_model.drive_file import read_sections, read_tables
 from golden_model.drive_keys import DriveError
 
 REQUIRED = {
-    "machine": ("pole_pairs", "resistance_ohm", "inductance_d_h", "inductance_q_h", "magnet_flux_wb", "rated_current_a"),
+    "machine": (
+        "pole_pairs", "resistance_ohm", "inductance_d_h", "inductance_q_h", "magnet_flux_wb", "rated_current_a",
+    ),
     "inverter": ("dc_bus_v", "pwm_frequency_hz"),
-}
+}  # fmt: skip
 
 
 def _optional(section, kind):
@@ -46,6 +50,7 @@ class Nominal:
     bases: object
     columns: dict = field(default_factory=dict)
     path: str = ""
+    plant: dict = field(default_factory=dict)
 
     @property
     def sample_time_s(self) -> float:
@@ -56,10 +61,13 @@ class Nominal:
 def load_nominal(path) -> Nominal:
     """The nominal drive of a TOML file; DriveError names file, section and key, and what was expected."""
     sections = read_sections(path, SECTIONS)
-    columns = read_tables(path).get("columns", {})
+    tables = read_tables(path)
+    columns, plant = tables.get("columns", {}), tables.get("plant", {})
     if not isinstance(columns, dict):
         raise DriveError(f"{path}: columns must be a section [columns] with lines such as 'my name' = 'i_a'")
+    if not isinstance(plant, dict) or not all(isinstance(table, dict) for table in plant.values()):
+        raise DriveError(f"{path}: plant must hold sections such as [plant.machine]")
     m = sections["machine"]
     if m.magnet_flux_wb <= 0.0:
         raise DriveError(f"{path}: [machine] magnet_flux_wb = {m.magnet_flux_wb:g}: must be above 0 Wb to diagnose")
-    return Nominal(*sections.values(), columns=columns, path=str(path))
+    return Nominal(*sections.values(), columns=columns, path=str(path), plant=plant)

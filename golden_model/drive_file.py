@@ -16,7 +16,8 @@ except ModuleNotFoundError:  # Python 3.10
 
 from golden_model.drive_keys import DriveError, key_of
 
-IGNORED = ("columns",)  # how recordings name their signals; read elsewhere
+# How recordings name their signals, and physics that the core knows nothing of: both are read by diagnosis/.
+IGNORED = ("columns", "plant")
 
 
 def read_sections(path, schema):

@@ -1,0 +1,43 @@
+"""The misfit of the nominal drive: the sampled flux balance and what else a recording allows to be balanced.
+
+    u:      u_mean - R mean(i) - [psi_s(i+, theta+) - psi_s(i, theta)] / T, in dq at the middle angle
+    sum:    i_a + i_b + i_c
+    torque: T_shaft - (T_airgap - B omega_m - J d omega_m / dt)
+
+The difference of flux linkages over a period is exact; nothing is differentiated.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from diagnosis.catalogue.effect import torque_of
+
+
+def misfit(view) -> dict[str, np.ndarray]:
+    """What was recorded minus what the nominal drive would need, {channel: array} (see catalogue.effect)."""
+    m = view.machine
+    exact = view.with_raw_current()
+    r = np.full(len(view), m.resistance_ohm)
+    if m.resistance_temp_coeff_per_k:
+        hot = np.where(np.isfinite(view.temp), view.temp, m.temperature_winding_c) - m.temperature_ref_c
+        r = r * (1.0 + m.resistance_temp_coeff_per_k * hot)
+    needed = r[:, None] * exact.i_mid + view.flux(exact.psi)
+    out = {"u": view.to_dq(view.u[:, 1:-1]) - needed}
+    if view.has_sum:
+        total = view.i_abc.sum(axis=2)
+        out["sum"] = 0.5 * (total[:, 1:] + total[:, :-1])
+    if np.isfinite(view.torque).any():
+        out["torque"] = view.torque - shaft_torque(view)
+    return out
+
+
+def shaft_torque(view):
+    """Torque that the nominal drive would deliver at the shaft, block means (b,) [Nm]."""
+    m = view.machine
+    omega_m = view.omega.mean(axis=1) / m.pole_pairs
+    slope = (view.omega[:, -1] - view.omega[:, 0]) / m.pole_pairs
+    slope = slope / (view.sample_time_s * (view.omega.shape[1] - 1))
+    airgap = torque_of(view, view.psi, view.i)
+    coulomb = (m.coulomb_friction_nm or 0.0) * np.sign(omega_m)
+    return airgap - (m.viscous_friction_nms or 0.0) * omega_m - coulomb - (m.inertia_kgm2 or 0.0) * slope

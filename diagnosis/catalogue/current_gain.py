@@ -1,0 +1,70 @@
+"""The current sensors' gains differ from each other."""
+
+import numpy as np
+
+from diagnosis.catalogue.effect import Effect, Parameter, current_error
+from diagnosis.result import Estimate
+
+PATTERNS = {"alpha": (2 / 3, -1 / 3, -1 / 3), "beta": (0.0, 3**-0.5, -(3**-0.5))}
+
+
+def gain_column(view, weights):
+    """Column of a pattern of relative gain errors over the three phases."""
+    i_abc = view.phases(view.i)
+    error = i_abc * np.array(weights)
+    column = current_error(view, view.from_phases(error))
+    if view.has_sum:
+        total = error.sum(axis=2)
+        column["sum"] = 0.5 * (total[:, 1:] + total[:, :-1])
+    return column
+
+
+class CurrentGain(Effect):
+    def core(self, view):
+        return {name: gain_column(view, w) for name, w in PATTERNS.items()}
+
+    def free(self, view):
+        # Two sensors and i_c = -i_a - i_b: the third phase then errs with both, which also turns the vector.
+        return {"common": gain_column(view, (1.0, 1.0, 1.0)), "turn": current_error(view, 1j * view.i)}
+
+    def floor(self, nominal):
+        return 0.0025
+
+    def size(self, c, nominal):
+        return float(np.hypot(c["alpha"], c["beta"]))
+
+    @staticmethod
+    def _gains(c):
+        return sum(c[name] * np.array(w) for name, w in PATTERNS.items()) + c.get("common", 0.0)
+
+    def corrected(self, view, c):
+        i_abc = view.phases(view.i)
+        error = i_abc * (self._gains(c) / (1.0 + self._gains(c)))
+        if c.get("turn"):
+            error = error + view.phases(1j * c["turn"] * view.i)
+        return view.without_current(error, raw_gain=1.0 + self._gains(c), turn=c.get("turn", 0.0))
+
+    def estimates(self, c, covariance, nominal):
+        names = list(c)
+        out = {}
+        for k, phase in enumerate("abc"):
+            weights = np.array([PATTERNS[n][k] if n in PATTERNS else 1.0 if n == "common" else 0.0 for n in names])
+            spread = float(np.sqrt(max(weights @ covariance @ weights, 0.0)))
+            out[f"gain_{phase}"] = Estimate(float(self._gains(c)[k]), spread, "1")
+        return out
+
+    def plant(self, c, nominal):
+        return {"sensors.current_gain_error": [float(v) for v in self._gains(c)]}
+
+
+EFFECT = CurrentGain(
+    name="current_gain",
+    title="the current sensors' gains differ from each other",
+    equation="i_measured = (1 + g_abc) i",
+    signature="order 2 in dq, in proportion to the current; phase currents that do not sum to zero",
+    confounders=("phase_resistance_asymmetry", "inductance_d", "current_scale"),
+    separated_by="a sweep of the speed: the sensors' error also follows omega L i; the sum of three measured currents",
+    parameters=tuple(Parameter(f"gain_{x}", "1", f"relative error of phase {x}") for x in "abc"),
+    absorbs=("current_scale",),
+    corrects=True,
+)

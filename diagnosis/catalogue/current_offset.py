@@ -1,0 +1,78 @@
+"""The current sensors have offsets."""
+
+import numpy as np
+
+from diagnosis.catalogue.effect import Effect, Parameter, current_error
+from diagnosis.result import Estimate
+
+PHASES = "abc"
+
+
+def _unit(view, k):
+    """One ampere in phase k, in dq at the samples."""
+    return (2 / 3) * np.exp(2j * np.pi / 3 * k) * np.exp(-1j * view.theta)
+
+
+def offset_column(view, weights, course=1.0):
+    """Column of a pattern of offsets over the three phases, times a course of time (b, 1) or one."""
+    error = sum(w * _unit(view, k) for k, w in enumerate(weights)) * course
+    column = current_error(view, error)
+    if view.has_sum:
+        column["sum"] = sum(weights) * course * np.ones(view.u_dc.shape)
+    return column
+
+
+# Common mode is seen in the sum alone; the other two turn with the rotor.
+PATTERNS = {"alpha": (2 / 3, -1 / 3, -1 / 3), "beta": (0.0, 3**-0.5, -(3**-0.5)), "zero": (1.0, 1.0, 1.0)}
+
+
+class CurrentOffset(Effect):
+    def _patterns(self, view):
+        return {k: w for k, w in PATTERNS.items() if k != "zero" or view.has_sum}
+
+    def core(self, view):
+        return {name: offset_column(view, w) for name, w in self._patterns(view).items()}
+
+    def free(self, view):
+        course = (view.t / max(view.span_s, 1e-9))[:, None]
+        return {f"{name}_drift": offset_column(view, w, course) for name, w in self._patterns(view).items()}
+
+    def floor(self, nominal):
+        return 0.0015 * nominal.machine.rated_current_a
+
+    def size(self, c, nominal):
+        return float(np.max(np.abs(self._phases(c))))
+
+    @staticmethod
+    def _phases(c, suffix=""):
+        return sum(c.get(name + suffix, 0.0) * np.array(w) for name, w in PATTERNS.items())
+
+    def corrected(self, view, c):
+        course = (view.t / max(view.span_s, 1e-9))[:, None, None]
+        error = self._phases(c) + self._phases(c, "_drift") * course  # (b, 1, 3) or (3,)
+        error = np.broadcast_to(error, (len(view), view.theta.shape[1], 3))
+        return view.without_current(error)
+
+    def estimates(self, c, covariance, nominal):
+        names = list(c)
+        out = {}
+        for k, phase in enumerate(PHASES):
+            weights = np.array([PATTERNS[name][k] if name in PATTERNS else 0.0 for name in names])
+            spread = float(np.sqrt(max(weights @ covariance @ weights, 0.0)))
+            out[f"offset_{phase}_a"] = Estimate(float(self._phases(c)[k]), spread, "A")
+        return out
+
+    def plant(self, c, nominal):
+        return {"sensors.current_offset_a": [float(v) for v in self._phases(c)]}
+
+
+EFFECT = CurrentOffset(
+    name="current_offset",
+    title="the current sensors have offsets",
+    equation="i_measured = i + o_abc",
+    signature="order 1 in dq (R o, standing still in the stator); phase currents that do not sum to zero",
+    confounders=("encoder_eccentricity", "phase_resistance_asymmetry"),
+    separated_by="a log at zero current, gates off",
+    parameters=tuple(Parameter(f"offset_{x}_a", "A", f"phase {x}, measured minus true") for x in PHASES),
+    corrects=True,
+)

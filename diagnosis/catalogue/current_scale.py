@@ -1,0 +1,36 @@
+"""All current sensors are wrong by one factor."""
+
+from diagnosis.catalogue.effect import Effect, Parameter, current_error, one, sigma
+from diagnosis.catalogue.current_gain import gain_column
+
+
+class CurrentScale(Effect):
+    def core(self, view):
+        return {"scale": gain_column(view, (1.0, 1.0, 1.0)) if view.has_sum else current_error(view, view.i)}
+
+    def floor(self, nominal):
+        return 0.004
+
+    def corrected(self, view, c):
+        factor = 1.0 / (1.0 + c["scale"])
+        return view.replace(
+            i=view.i * factor, i_raw=view.i_raw * factor, i_abc=None if view.i_abc is None else view.i_abc * factor
+        )
+
+    def estimates(self, c, covariance, nominal):
+        return one("scale", "1", c["scale"], sigma(covariance))
+
+    def plant(self, c, nominal):
+        return {"sensors.current_gain_error": [c["scale"]] * 3}
+
+
+EFFECT = CurrentScale(
+    name="current_scale",
+    title="all current sensors are wrong by one factor",
+    equation="i_measured = (1 + s) i",
+    signature="R, L_d and L_q wrong by one and the same factor",
+    confounders=("resistance", "inductance_d", "inductance_q", "cross_saturation"),
+    separated_by="an external ammeter or a torque transducer",
+    parameters=(Parameter("scale", "1", "relative error of all phases"),),
+    corrects=True,
+)

@@ -1,0 +1,42 @@
+"""The duties act later than assumed: the voltage is that of an earlier row."""
+
+import numpy as np
+
+from diagnosis.catalogue.effect import Effect, Parameter, one, sigma, voltage
+
+
+class Delay(Effect):
+    corrected_by = "u"
+
+    def core(self, view):
+        return {"tau": voltage(view.to_dq(view.u[:, 1:-1] - view.u[:, :-2]) / view.sample_time_s)}
+
+    def floor(self, nominal):
+        return 0.006 * nominal.sample_time_s
+
+    def corrected(self, view, c):
+        share = float(np.clip(c["tau"] / view.sample_time_s, -1.0, 1.0))
+        u = view.u.copy()
+        if share >= 0.0:
+            u[:, 1:] = (1.0 - share) * view.u[:, 1:] + share * view.u[:, :-1]
+        else:
+            u[:, :-1] = (1.0 + share) * view.u[:, :-1] - share * view.u[:, 1:]
+        return view.replace(u=u)
+
+    def estimates(self, c, covariance, nominal):
+        return one("delay_s", "s", c["tau"], sigma(covariance))
+
+    def plant(self, c, nominal):
+        return {"timing.delay_s": c["tau"]}
+
+
+EFFECT = Delay(
+    name="delay",
+    title="the voltage acts later than assumed",
+    equation="u(t) = u_recorded(t - tau)",
+    signature="order 0: the whole voltage turned by omega tau",
+    confounders=("encoder_offset", "sampling_skew", "iron_loss"),
+    separated_by="two speeds, both directions; load at each; a step",
+    parameters=(Parameter("delay_s", "s", "beyond duty_applied_after_samples"),),
+    corrects=True,
+)

@@ -1,0 +1,127 @@
+"""What an effect of the catalogue is, and the four ways in which physics enters the balance.
+
+The misfit of a channel is what was recorded minus what the nominal drive would need:
+
+    u       mean stator voltage of an interval in dq, complex (b, m) [V]
+    sum     i_a + i_b + i_c at the samples' middle, real (b, m) [A]
+    torque  mean shaft torque of a block, real (b,) [Nm]
+
+An effect says which *columns* it adds to the misfit, per unit of its coefficients: a ``core`` that stands for
+its usual formula and a ``free`` set that bends that formula as far as its variables and symmetry allow.  A
+name rests on what an effect depends on; no formula of a real machine is the catalogue's.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from diagnosis.result import Estimate
+
+Column = dict  # channel -> array
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A number that describes an effect.  ``least``: smaller deviations are of no interest to an engineer."""
+
+    name: str
+    unit: str
+    meaning: str
+
+
+@dataclass(frozen=True)
+class Effect:
+    """Base of the catalogue's entries; each lives in a file of its own and is found by being there.
+
+    absorbs: effects that a freer curve of this one contains; they are asserted beside it on stronger evidence only.
+    confounders: effects that look alike, with ``separated_by`` in words.
+    """
+
+    name: str
+    title: str
+    equation: str
+    signature: str
+    confounders: tuple[str, ...]
+    separated_by: str
+    parameters: tuple[Parameter, ...]
+    absorbs: tuple[str, ...] = ()
+    positive: bool = False  # the leading coefficient cannot be below zero
+    corrects: bool = False  # an error of the record rather than a term of the machine: ``corrected`` takes it away
+    smoothed: bool = False  # its terms stay on smoothed currents when the model is applied
+
+    def core(self, view) -> dict[str, Column]:
+        """Columns of the usual formula, {coefficient: column}."""
+        raise NotImplementedError
+
+    def free(self, view) -> dict[str, Column]:
+        """Further columns, for a curve as free as the effect's variables and symmetry allow."""
+        return {}
+
+    def floor(self, nominal) -> float:
+        """Least size of the effect that is worth a name, in units of ``size``."""
+        raise NotImplementedError
+
+    def size(self, c: dict[str, float], nominal) -> float:
+        """One number for how large the effect is."""
+        return abs(next(iter(c.values())))
+
+    def corrected(self, view, c: dict[str, float]):
+        """The view without this error of the record (only where ``corrects``)."""
+        raise NotImplementedError
+
+    def estimates(self, c: dict[str, float], covariance: np.ndarray, nominal) -> dict[str, Estimate]:
+        """Parameters of the effect from its coefficients, whose order is that of the covariance."""
+        raise NotImplementedError
+
+    def plant(self, c: dict[str, float], nominal) -> dict:
+        """The effect as the plant is told it, {"machine.resistance_ohm": 1.7, ...}."""
+        return {}
+
+
+def voltage(u) -> Column:
+    """A voltage that the machine or the inverter needs beyond the nominal one, (b, m) complex dq."""
+    return {"u": u}
+
+
+def flux(view, psi, torque=True) -> Column:
+    """A flux linkage beyond the nominal one, (b, m+1) complex dq."""
+    column = {"u": view.flux(psi)}
+    if torque:
+        column["torque"] = torque_of(view, psi, view.i)
+    return column
+
+
+def current_error(view, error) -> Column:
+    """Measured minus true current, (b, m+1) complex dq: the balance was made with the measured one."""
+    psi = view.inductances(error)
+    return {
+        "u": -view.machine.resistance_ohm * 0.5 * (error[:, 1:] + error[:, :-1]) - view.flux(psi),
+        "torque": -torque_of(view, psi, view.i) - torque_of(view, view.psi, error),
+    }
+
+
+def angle_error(view, delta) -> Column:
+    """Measured minus true electrical angle, (b, m+1): all that was turned to dq was turned too far."""
+    turned = -1j * view.i
+    psi = view.inductances(turned)
+    return {
+        "u": -view.flux((1j * view.psi + psi) * delta),
+        "torque": -torque_of(view, psi * delta, view.i) - torque_of(view, view.psi, turned * delta),
+    }
+
+
+def torque_of(view, psi, i):
+    """Mean air-gap torque of a block, (b,) [Nm], from flux linkage and current at the samples."""
+    return 1.5 * view.machine.pole_pairs * np.mean((np.conj(psi) * i).imag, axis=1)
+
+
+def sigma(covariance, k=0) -> float:
+    """Standard deviation of coefficient k."""
+    return float(np.sqrt(max(covariance[k, k], 0.0)))
+
+
+def one(name, unit, value, spread) -> dict[str, Estimate]:
+    """A single parameter."""
+    return {name: Estimate(float(value), float(spread), unit)}

@@ -1,0 +1,70 @@
+"""Harmonics of the magnets' flux: orders 6 and 12 in dq, in proportion to the speed, at zero current too."""
+
+import numpy as np
+
+from diagnosis.catalogue.effect import Effect, Parameter, flux
+from diagnosis.result import Estimate
+
+
+def _order(view, h):
+    """The four terms of an order: forward and backward, cosine and sine, per unit of the magnets' flux."""
+    psi_m = view.machine.magnet_flux_wb
+    turn = np.exp(1j * h * view.theta)
+    terms = {"fc": turn, "fs": 1j * turn, "bc": np.conj(turn), "bs": 1j * np.conj(turn)}
+    return {f"h{h}_{key}": flux(view, psi_m * term, torque=False) for key, term in terms.items()}
+
+
+def _dq(c, h):
+    """Amplitudes (a_d, a_q) and phase as plant.Harmonic takes them: a_d cos(h theta + phi), a_q sin(h theta + phi)."""
+    forward = c.get(f"h{h}_fc", 0.0) + 1j * c.get(f"h{h}_fs", 0.0)
+    backward = c.get(f"h{h}_bc", 0.0) + 1j * c.get(f"h{h}_bs", 0.0)
+    d, q = forward + np.conj(backward), forward - np.conj(backward)
+    phi = float(np.angle(d if abs(d) >= abs(q) else q))
+    return float((d * np.exp(-1j * phi)).real), float((q * np.exp(-1j * phi)).real), phi
+
+
+class EmfHarmonics(Effect):
+    def core(self, view):
+        return _order(view, 6)
+
+    def free(self, view):
+        return {**_order(view, 12), **_order(view, 18)}
+
+    def floor(self, nominal):
+        return 0.001
+
+    def size(self, c, nominal):
+        return float(np.sqrt(sum(v**2 for v in c.values())))
+
+    def estimates(self, c, covariance, nominal):
+        out = {}
+        for h in (6, 12):
+            index = [k for k, name in enumerate(c) if name.startswith(f"h{h}_")]
+            if index:
+                values = np.array(list(c.values()))[index]
+                size = float(np.sqrt(np.sum(values**2)))
+                spread = float(np.sqrt(np.trace(covariance[np.ix_(index, index)]) / len(index)))
+                out[f"order_{h}"] = Estimate(size, spread, "1")
+        return out
+
+    def plant(self, c, nominal):
+        rows = []
+        for h in (6, 12, 18):
+            if any(name.startswith(f"h{h}_") for name in c):
+                d, q, phi = _dq(c, h)
+                rows.append({"order": float(h), "amplitude_d": d, "amplitude_q": q, "phase_rad": phi})
+        return {"machine.emf_harmonics": rows}
+
+
+EFFECT = EmfHarmonics(
+    name="emf_harmonics",
+    title="the magnets' flux has harmonics",
+    equation="psi_dq = ... + psi_m sum_h (a_d cos(h theta + phi) + j a_q sin(h theta + phi)), h = 6, 12, 18",
+    signature="orders 6 and 12 in dq, in proportion to the speed, present without current",
+    confounders=("dead_time", "cogging"),
+    separated_by="two speeds; a spin without current",
+    parameters=(
+        Parameter("order_6", "1", "amplitude relative to the magnets' flux"),
+        Parameter("order_12", "1", "amplitude relative to the magnets' flux"),
+    ),
+)

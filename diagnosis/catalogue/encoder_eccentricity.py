@@ -1,0 +1,57 @@
+"""The encoder sits off centre: an angle error that repeats with the mechanical turn."""
+
+import numpy as np
+
+from diagnosis.catalogue.effect import Effect, Parameter, angle_error
+from diagnosis.result import Estimate
+
+
+def _turns(view, orders):
+    theta_m = view.theta / view.machine.pole_pairs
+    return {f"{f.__name__}_{n}": f(n * theta_m) for n in orders for f in (np.cos, np.sin)}
+
+
+class EncoderEccentricity(Effect):
+    def core(self, view):
+        return {name: angle_error(view, wave) for name, wave in _turns(view, (1,)).items()}
+
+    def free(self, view):
+        return {name: angle_error(view, wave) for name, wave in _turns(view, (2, 3)).items()}
+
+    def floor(self, nominal):
+        return 0.003
+
+    def size(self, c, nominal):
+        return float(np.sqrt(sum(v**2 for v in c.values())))
+
+    def corrected(self, view, c):
+        waves = _turns(view, (1, 2, 3))
+        return view.turned(sum(value * waves[name] for name, value in c.items()))
+
+    def estimates(self, c, covariance, nominal):
+        first = np.hypot(c["cos_1"], c["sin_1"])
+        spread = float(np.sqrt(0.5 * np.trace(covariance[:2, :2])))
+        return {"amplitude_rad": Estimate(float(first), spread, "rad")}
+
+    def plant(self, c, nominal):
+        p = nominal.machine.pole_pairs
+        out = {
+            "sensors.eccentricity_once_rad": float(np.hypot(c["cos_1"], c["sin_1"])) / p,
+            "sensors.eccentricity_once_phase_rad": float(np.arctan2(c["cos_1"], c["sin_1"])),
+        }
+        if "cos_2" in c:
+            out["sensors.eccentricity_twice_rad"] = float(np.hypot(c["cos_2"], c["sin_2"])) / p
+            out["sensors.eccentricity_twice_phase_rad"] = float(np.arctan2(c["cos_2"], c["sin_2"]))
+        return out
+
+
+EFFECT = EncoderEccentricity(
+    name="encoder_eccentricity",
+    title="the encoder sits off centre",
+    equation="theta_measured = theta_e + a cos(theta_m) + b sin(theta_m) (+ orders 2 and 3 per turn)",
+    signature="order 1/p in dq: omega psi_m a on the d axis",
+    confounders=("current_offset",),
+    separated_by="the mechanical index: orders per mechanical turn; more than one pole pair",
+    parameters=(Parameter("amplitude_rad", "rad", "electrical, once per mechanical turn"),),
+    corrects=True,
+)

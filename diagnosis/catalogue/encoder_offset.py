@@ -1,0 +1,34 @@
+"""The angle is measured with a constant offset."""
+
+import numpy as np
+
+from diagnosis.catalogue.effect import Effect, Parameter, angle_error, one, sigma
+
+
+class EncoderOffset(Effect):
+    def core(self, view):
+        return {"offset": angle_error(view, np.ones_like(view.theta))}
+
+    def floor(self, nominal):
+        return 0.004
+
+    def corrected(self, view, c):
+        return view.turned(c["offset"])
+
+    def estimates(self, c, covariance, nominal):
+        return one("offset_rad", "rad", c["offset"], sigma(covariance))
+
+    def plant(self, c, nominal):
+        return {"sensors.position_offset_rad": c["offset"] / nominal.machine.pole_pairs}
+
+
+EFFECT = EncoderOffset(
+    name="encoder_offset",
+    title="the angle's zero is off",
+    equation="theta_measured = theta_e + offset",
+    signature="order 0: omega psi_m offset on the d axis, at zero current too",
+    confounders=("inductance_q", "delay", "sampling_skew", "saturation"),
+    separated_by="a spin without current, both directions, two speeds",
+    parameters=(Parameter("offset_rad", "rad", "electrical, measured minus true"),),
+    corrects=True,
+)

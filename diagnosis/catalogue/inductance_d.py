@@ -1,0 +1,28 @@
+"""Inductance of the d axis other than the nameplate's: omega i_d on the q axis."""
+
+from diagnosis.catalogue.effect import Effect, Parameter, flux, one, sigma
+
+
+class InductanceD(Effect):
+    def core(self, view):
+        return {"delta_l_d": flux(view, view.i.real.astype(complex))}
+
+    def floor(self, nominal):
+        return 0.01 * nominal.machine.inductance_d_h
+
+    def estimates(self, c, covariance, nominal):
+        return one("inductance_d_h", "H", nominal.machine.inductance_d_h + c["delta_l_d"], sigma(covariance))
+
+    def plant(self, c, nominal):
+        return {"machine.inductance_d_h": nominal.machine.inductance_d_h + c["delta_l_d"]}
+
+
+EFFECT = InductanceD(
+    name="inductance_d",
+    title="inductance of the d axis differs from the nameplate",
+    equation="psi_d = (L_d + delta_l_d) i_d",
+    signature="order 0, omega i_d on the q axis; and the slope of i_d",
+    confounders=("magnet_flux", "current_gain", "cross_saturation", "saturation"),
+    separated_by="i_d other than zero, two values of it",
+    parameters=(Parameter("inductance_d_h", "H", "of the d axis"),),
+)

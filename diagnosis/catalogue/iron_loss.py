@@ -1,0 +1,55 @@
+"""Iron loss: a current j omega psi / R_fe flows beside the magnetising one, more or less with frequency."""
+
+import numpy as np
+
+from diagnosis.catalogue.effect import Effect, Parameter, one, sigma, torque_of
+
+
+def _loss(view, omega):
+    """Terms of the loss current j omega psi, per siemens."""
+    i_fe = 1j * omega * view.psi
+    psi = -view.inductances(i_fe)
+    return {"u": view.flux(psi), "torque": torque_of(view, psi, view.i) - torque_of(view, view.psi, i_fe)}
+
+
+class IronLoss(Effect):
+    def core(self, view):
+        return {"g_fe": _loss(view, view.omega)}
+
+    def free(self, view):
+        top = max(float(np.abs(view.omega).max()), 1.0)
+        soft = view.omega / np.sqrt((view.omega / top) ** 2 + 0.02**2)
+        return {"g_hysteresis": _loss(view, soft), "g_eddy": _loss(view, view.omega * np.abs(view.omega) / top)}
+
+    def floor(self, nominal):
+        m = nominal.machine
+        return 0.002 * m.rated_current_a / self._rated_emf(nominal)
+
+    @staticmethod
+    def _rated_emf(nominal):
+        return nominal.inverter.dc_bus_v / np.sqrt(3)
+
+    def size(self, c, nominal):
+        return abs(sum(c.values()))
+
+    def estimates(self, c, covariance, nominal):
+        g = sum(c.values())
+        every = np.ones(len(c))
+        spread = float(np.sqrt(max(every @ covariance @ every, 0.0)))
+        g = g if abs(g) > 1e-12 else 1e-12
+        return one("iron_resistance_ohm", "ohm", 1.0 / g, spread / g**2)
+
+    def plant(self, c, nominal):
+        return {"machine.iron_conductance_s": max(0.0, sum(c.values()))}
+
+
+EFFECT = IronLoss(
+    name="iron_loss",
+    title="loss in the iron",
+    equation="i = i_m + j omega psi / R_fe",
+    signature="order 0: omega^2 L_q psi / R_fe on the d axis, even in speed, and a drag torque",
+    confounders=("sampling_skew", "inductance_q", "resistance", "delay"),
+    separated_by="load: omega^2 i_q on the q axis; the trigger of the sampling moved; hysteresis at low speed",
+    parameters=(Parameter("iron_resistance_ohm", "ohm", "across the rotational EMF, at the largest speed"),),
+    positive=True,
+)

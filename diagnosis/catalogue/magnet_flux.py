@@ -1,0 +1,30 @@
+"""Magnet flux linkage other than the nameplate's: omega psi_m on the q axis."""
+
+import numpy as np
+
+from diagnosis.catalogue.effect import Effect, Parameter, flux, one, sigma
+
+
+class MagnetFlux(Effect):
+    def core(self, view):
+        return {"delta_psi_m": flux(view, np.ones_like(view.i))}
+
+    def floor(self, nominal):
+        return 0.003 * nominal.machine.magnet_flux_wb
+
+    def estimates(self, c, covariance, nominal):
+        return one("magnet_flux_wb", "Wb", nominal.machine.magnet_flux_wb + c["delta_psi_m"], sigma(covariance))
+
+    def plant(self, c, nominal):
+        return {"machine.magnet_flux_wb": nominal.machine.magnet_flux_wb + c["delta_psi_m"]}
+
+
+EFFECT = MagnetFlux(
+    name="magnet_flux",
+    title="flux linkage of the magnets differs from the nameplate",
+    equation="psi_d = L_d i_d + psi_m + delta_psi_m",
+    signature="order 0, in proportion to the speed, on the q axis, at every current, zero included",
+    confounders=("resistance", "cross_saturation", "magnet_temperature", "inductance_d"),
+    separated_by="three speeds; a spin without current",
+    parameters=(Parameter("magnet_flux_wb", "Wb", "peak, per phase"),),
+)

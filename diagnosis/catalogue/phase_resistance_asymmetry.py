@@ -1,0 +1,47 @@
+"""The three phases' resistances differ."""
+
+import numpy as np
+
+from diagnosis.catalogue.current_gain import PATTERNS
+from diagnosis.catalogue.effect import Effect, Parameter, voltage
+from diagnosis.result import Estimate
+
+
+class PhaseResistanceAsymmetry(Effect):
+    def core(self, view):
+        i_abc = view.phases(view.i_mid)
+        r = view.machine.resistance_ohm
+        return {name: voltage(view.from_phases(r * np.array(w) * i_abc)) for name, w in PATTERNS.items()}
+
+    def floor(self, nominal):
+        return 0.01
+
+    def size(self, c, nominal):
+        return float(np.hypot(c["alpha"], c["beta"]))
+
+    @staticmethod
+    def _phases(c):
+        return sum(c[name] * np.array(w) for name, w in PATTERNS.items())
+
+    def estimates(self, c, covariance, nominal):
+        out = {}
+        for k, phase in enumerate("abc"):
+            weights = np.array([PATTERNS[name][k] for name in c])
+            spread = float(np.sqrt(max(weights @ covariance @ weights, 0.0)))
+            out[f"asymmetry_{phase}"] = Estimate(float(self._phases(c)[k]), spread, "1")
+        return out
+
+    def plant(self, c, nominal):
+        return {"machine.phase_resistance_asymmetry": [float(v) for v in self._phases(c)]}
+
+
+EFFECT = PhaseResistanceAsymmetry(
+    name="phase_resistance_asymmetry",
+    title="the phases' resistances differ",
+    equation="u_x = R (1 + a_x) i_x, sum of a_x = 0",
+    signature="order 2 in dq, in proportion to the current, not to the speed",
+    confounders=("current_gain", "resistance"),
+    separated_by="standstill against speed: a sensor's error also follows omega L i; the sum of three measured currents",
+    parameters=tuple(Parameter(f"asymmetry_{x}", "1", f"phase {x}, relative to the mean") for x in "abc"),
+    absorbs=("resistance",),
+)

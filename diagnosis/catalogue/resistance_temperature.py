@@ -1,0 +1,48 @@
+"""The winding warms: R (1 + alpha (T - T_ref)), after the thermocouple or, without one, a course of time."""
+
+import numpy as np
+
+from diagnosis.catalogue.effect import Effect, Parameter, one, sigma, voltage
+from diagnosis.curves import courses, known_temperature, reference_c
+
+
+class ResistanceTemperature(Effect):
+    def core(self, view):
+        if known_temperature(view):
+            rise = view.machine.resistance_ohm * (view.temp - reference_c(view.nominal))
+            return {"alpha": voltage(view.i_mid * rise[:, None])}
+        course = view.t / max(view.span_s, 1e-9)
+        return {"drift": voltage(view.i_mid * course[:, None])}
+
+    def free(self, view):
+        return {f"course_{k}": voltage(view.i_mid * c[:, None]) for k, c in enumerate(courses(view)[:-1])}
+
+    def floor(self, nominal):
+        return 0.015 * nominal.machine.resistance_ohm
+
+    def size(self, c, nominal):
+        own = abs(c.get("alpha", 0.0)) * nominal.machine.resistance_ohm * 20.0 + abs(c.get("drift", 0.0))
+        return max(own, *(abs(v) for k, v in c.items() if k.startswith("course")), 0.0)
+
+    def estimates(self, c, covariance, nominal):
+        if "alpha" in c:
+            return one("resistance_temp_coeff_per_k", "1/K", c["alpha"], sigma(covariance))
+        return one("resistance_drift_ohm", "ohm", c["drift"], sigma(covariance))
+
+    def plant(self, c, nominal):
+        return {"machine.resistance_temp_coeff_per_k": c["alpha"]} if "alpha" in c else {}
+
+
+EFFECT = ResistanceTemperature(
+    name="resistance_temperature",
+    title="winding resistance changes with temperature",
+    equation="u_dq = R (1 + alpha (T - T_ref)) i_dq",
+    signature="order 0, in proportion to the current times the rise of temperature over time",
+    confounders=("resistance", "magnet_temperature"),
+    separated_by="a thermocouple; a load step while hot; standstill with current, cold and hot",
+    parameters=(
+        Parameter("resistance_temp_coeff_per_k", "1/K", "copper: 0.0039; needs temp_winding"),
+        Parameter("resistance_drift_ohm", "ohm", "from start to end, where no temperature was recorded"),
+    ),
+    absorbs=("resistance",),
+)

@@ -1,0 +1,40 @@
+"""Currents are sampled tau after the middle of the zero vector, where they slope with the EMF."""
+
+from diagnosis.catalogue.effect import Effect, Parameter, current_error, one, sigma
+
+
+def _slope(view):
+    """Slope of the measured dq current in the zero vector, seen at the angle of the valley (b, m+1) [A/s]."""
+    m = view.machine
+    emf = -m.resistance_ohm * view.i - 1j * view.omega * view.psi
+    return emf.real / m.inductance_d_h + 1j * emf.imag / m.inductance_q_h + 1j * view.omega * view.i
+
+
+class SamplingSkew(Effect):
+    def core(self, view):
+        return {"tau": current_error(view, _slope(view))}
+
+    def floor(self, nominal):
+        return 0.0012 * nominal.sample_time_s
+
+    def corrected(self, view, c):
+        error = c["tau"] * _slope(view)
+        return view.replace(i=view.i - error, i_raw=view.i_raw - view.stator(error))
+
+    def estimates(self, c, covariance, nominal):
+        return one("skew_s", "s", c["tau"], sigma(covariance))
+
+    def plant(self, c, nominal):
+        return {"timing.sampling_skew_s": c["tau"]}
+
+
+EFFECT = SamplingSkew(
+    name="sampling_skew",
+    title="currents are sampled beside the middle of the zero vector",
+    equation="i_measured = i(t + tau), di/dt = -(R i + j omega psi_m) / L",
+    signature="order 0: omega^2 psi_m tau on the d axis, as an iron loss of R_fe = -L_q / tau would make",
+    confounders=("iron_loss", "delay", "inductance_q"),
+    separated_by="load (an iron loss also follows omega^2 i_q); the trigger moved on purpose",
+    parameters=(Parameter("skew_s", "s", "positive: too late"),),
+    corrects=True,
+)

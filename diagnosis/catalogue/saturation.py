@@ -1,0 +1,76 @@
+"""Each axis saturates by its own current: psi_d = f(i_d), psi_q = g(i_q), g odd; any curve will do."""
+
+import numpy as np
+
+from diagnosis.catalogue.effect import Effect, Parameter, flux
+from diagnosis.result import Estimate
+
+
+def _q(view, shape):
+    y = view.i.imag / view.machine.rated_current_a
+    return flux(view, 1j * view.machine.inductance_q_h * view.machine.rated_current_a * shape(y))
+
+
+def _d(view, shape):
+    x = view.i.real / view.machine.rated_current_a
+    return flux(view, view.machine.inductance_d_h * view.machine.rated_current_a * shape(x) + 0j)
+
+
+class Saturation(Effect):
+    def core(self, view):
+        return {"q_3": _q(view, lambda y: y**3), "d_3": _d(view, lambda x: x**3)}
+
+    def free(self, view):
+        return {
+            "q_1": _q(view, lambda y: y),
+            "d_1": _d(view, lambda x: x),
+            "q_2": _q(view, lambda y: y * np.abs(y)),
+            "q_5": _q(view, lambda y: y**5),
+            "d_2": _d(view, lambda x: x**2),
+            "d_2s": _d(view, lambda x: x * np.abs(x)),
+        }
+
+    def floor(self, nominal):
+        return 0.006
+
+    def size(self, c, nominal):
+        """Largest bend of either curve against its own chord, relative to L i at rated current."""
+        x = np.linspace(0, 1, 21)
+        bends = []
+        for axis in "qd":
+            curve = sum(c.get(f"{axis}_{k}", 0.0) * x**p for k, p in (("2", 2), ("2s", 2), ("3", 3), ("5", 5)))
+            bends.append(np.max(np.abs(curve - x * curve[-1])))
+        return float(max(bends))
+
+    def estimates(self, c, covariance, nominal):
+        names = list(c)
+        out = {}
+        for axis in "qd":
+            l_i = getattr(nominal.machine, f"inductance_{axis}_h") * nominal.machine.rated_current_a
+            mine = np.array([1.0 if name.startswith(axis) else 0.0 for name in names])
+            spread = float(np.sqrt(max(mine @ covariance @ mine, 0.0)))
+            value = float(sum(v for name, v in c.items() if name.startswith(axis)))
+            out[f"psi_{axis}_change_at_rated_wb"] = Estimate(value * l_i, spread * l_i, "Wb")
+        return out
+
+    def plant(self, c, nominal):
+        rated2 = nominal.machine.rated_current_a**2
+        return {
+            f"machine.saturation_{axis}_per_a2": max(0.0, -sum(v for k, v in c.items() if k.startswith(axis))) / rated2
+            for axis in "dq"
+        }
+
+
+EFFECT = Saturation(
+    name="saturation",
+    title="the iron saturates along its own axis",
+    equation="psi_q = g(i_q), odd; psi_d = psi_m + f(i_d)",
+    signature="order 0, in proportion to the speed, bending with the current: about -omega i_q^3 on the d axis",
+    confounders=("inductance_q", "inductance_d", "cross_saturation", "encoder_offset"),
+    separated_by="i_q up to the rated current in several steps, both signs",
+    parameters=(
+        Parameter("psi_q_change_at_rated_wb", "Wb", "flux linkage at rated i_q against L_q i_q"),
+        Parameter("psi_d_change_at_rated_wb", "Wb", "flux linkage at i_d = rated against L_d i_d"),
+    ),
+    absorbs=("inductance_d", "inductance_q"),
+)

@@ -1,0 +1,178 @@
+"""From rows to cells: the misfit and every effect's column as harmonics of a block.
+
+The same linear functional, mean(x exp(-j h theta)), is taken of the misfit and of every column, so the
+balance holds between them exactly, whole turns or not.  What was white in the current is a difference in
+the balance and all but vanishes in the mean, so a cell's weight comes from what repeats: neighbouring
+blocks of a dwell.  A second share of variance, in proportion to the voltage, stands for the balance itself:
+ripple, sampling of the bus, a trapezoid for a mean.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from diagnosis.balance import misfit
+
+ORDERS_SUM = (0.0, 1.0)
+LEAST_TURNS = 0.8  # of a harmonic within a block, else it is no functional of its own
+SYSTEM_U = 2e-4  # of the block's voltage
+SYSTEM_DC = 1.5e-5  # of the bus
+
+
+def orders_u(pole_pairs: int) -> tuple[float, ...]:
+    """Harmonic orders in dq that a misfit is looked at in."""
+    mechanical = [n / pole_pairs for n in (1, 2, 3)]
+    both = sorted({round(h, 9) for h in [*mechanical, 0.5, 1.0, 2.0, 3.0, 4.0, 6.0, 12.0, 18.0]})
+    return (0.0, *both, *(-h for h in both))
+
+
+@dataclass
+class Cells:
+    """Rows of a weighted least-squares problem; every row is the real or imaginary part of one functional.
+
+    y: (r,) misfit; columns: {effect: {coefficient: (r,)}}; block, order, part: (r,) where a row comes from,
+    part 0 and 1 for d and q; channel: (r,) of "u", "sum", "torque"; ok: (r,) rows that count.
+    omega, level: (b,) speed and voltage of the blocks.
+    """
+
+    y: np.ndarray
+    columns: dict[str, dict[str, np.ndarray]]
+    block: np.ndarray
+    order: np.ndarray
+    part: np.ndarray
+    channel: np.ndarray
+    ok: np.ndarray
+
+
+class Projector:
+    """Functionals of one view, computed once and used for the misfit and for every column."""
+
+    def __init__(self, view):
+        self.view = view
+        self.orders = np.array(orders_u(view.machine.pole_pairs))
+        self.turns = np.exp(-1j * self.orders[None, None, :] * view.theta_mid[:, :, None])
+        b, h = len(view), len(self.orders)
+        channels = ["u"] * (b * h * 2)
+        block = [np.repeat(np.arange(b), h * 2)]
+        order = [np.tile(np.repeat(self.orders, 2), b)]
+        part = [np.tile([0, 1], b * h)]
+        span = np.abs(view.theta[:, -1] - view.theta[:, 0])
+        seen = np.abs(self.orders)[None, :] * span[:, None] >= 2 * np.pi * LEAST_TURNS
+        seen[:, 0] = True
+        # Two orders closer than a turn within the block would be one functional counted twice.
+        kept = self._apart(span)
+        ok = [np.repeat((seen & kept).ravel(), 2)]
+        if view.has_sum:
+            s = len(ORDERS_SUM)
+            channels += ["sum"] * (b * s * 2)
+            block.append(np.repeat(np.arange(b), s * 2))
+            order.append(np.tile(np.repeat(ORDERS_SUM, 2), b))
+            part.append(np.tile([0, 1], b * s))
+            turning = span >= 2 * np.pi * LEAST_TURNS
+            real = np.stack([np.ones(b, bool), np.zeros(b, bool), turning, turning], axis=1)
+            ok.append(real.ravel())
+        self.torque_seen = np.isfinite(view.torque)
+        if self.torque_seen.any():
+            channels += ["torque"] * b
+            block.append(np.arange(b))
+            order.append(np.zeros(b))
+            part.append(np.zeros(b, int))
+            ok.append(self.torque_seen)
+        self.block, self.order, self.part = (np.concatenate(x) for x in (block, order, part))
+        self.channel, self.ok = np.array(channels), np.concatenate(ok)
+
+    def _apart(self, span):
+        """(b, h) orders that differ from every kept smaller one by LEAST_TURNS within the block."""
+        kept = np.zeros((len(span), len(self.orders)), bool)
+        for k, turns in enumerate(span / (2 * np.pi)):
+            chosen = []
+            for n in np.argsort(np.abs(self.orders), kind="stable"):
+                if all(abs(self.orders[n] - c) * turns >= LEAST_TURNS for c in chosen):
+                    chosen.append(self.orders[n])
+                    kept[k, n] = True
+        return kept
+
+    def rows(self, column) -> np.ndarray:
+        """One misfit or column, {channel: array}, as rows; a channel it does not name is zero."""
+        b = len(self.view)
+        out = []
+        u = column.get("u")
+        if u is None:
+            out.append(np.zeros(b * len(self.orders) * 2))
+        else:
+            f = np.matmul(u[:, None, :], self.turns)[:, 0, :] / u.shape[1]
+            out.append(np.stack([f.real, f.imag], axis=2).ravel())
+        if self.view.has_sum:
+            s = column.get("sum")
+            if s is None:
+                out.append(np.zeros(b * len(ORDERS_SUM) * 2))
+            else:
+                f = np.stack([(s * np.exp(-1j * h * self.view.theta_mid)).mean(axis=1) for h in ORDERS_SUM], axis=1)
+                out.append(np.stack([f.real, f.imag], axis=2).ravel())
+        if self.torque_seen.any():
+            t = column.get("torque", np.zeros(b))
+            out.append(np.where(self.torque_seen, t, 0.0))
+        return np.nan_to_num(np.concatenate(out))
+
+
+def cells_of(view, effects, with_columns=True) -> Cells:
+    """Cells of a view with the columns of the effects: {name: {"core": {...}, "free": {...}}} flattened by name."""
+    p = Projector(view)
+    columns = {}
+    if with_columns:
+        for effect in effects:
+            columns[effect.name] = {
+                **{key: p.rows(col) for key, col in effect.core(view).items()},
+                **{f"~{key}": p.rows(col) for key, col in effect.free(view).items()},
+            }
+    return Cells(p.rows(misfit(view)), columns, p.block, p.order, p.part, p.channel, p.ok)
+
+
+def voltage_level(view):
+    """Length of the mean voltage vector of each block, (b,) [V]."""
+    return np.abs(view.to_dq(view.u[:, 1:-1]).mean(axis=1))
+
+
+def noise(view, cells, residual) -> np.ndarray:
+    """Standard deviation of every row (r,), from how much ``residual`` differs between neighbours of a dwell.
+
+    Neighbours share the operating point, so what differs between them is noise whatever the physics.  The
+    variance of each order and part is fitted as a + b omega^2, as the noise of a current enters with L / T
+    and with omega L.
+    """
+    omega = np.abs(view.omega.mean(axis=1))
+    top = max(float(omega.max()), 1e-9)
+    shape = np.stack([np.ones(len(view)), (omega / top) ** 2], axis=1)
+    pair = np.flatnonzero(np.diff(view.run) == 0)
+    out = np.full(len(cells.y), np.nan)
+    for channel in np.unique(cells.channel):
+        mine = cells.channel == channel
+        for order in np.unique(cells.order[mine]):
+            for part in (0, 1):
+                rows = np.flatnonzero(mine & (cells.order == order) & (cells.part == part))
+                if len(rows):
+                    out[rows] = np.sqrt(_variance(residual[rows], cells.ok[rows], pair, shape))
+    return out
+
+
+def _variance(e, ok, pair, shape):
+    """Variance a + b omega^2 of the blocks from the differences of neighbours (or from all where there are none)."""
+    both = pair[ok[pair] & ok[pair + 1]]
+    if len(both) >= 8:
+        squares, where = 0.5 * (e[both + 1] - e[both]) ** 2, 0.5 * (shape[both] + shape[both + 1])
+    else:
+        squares, where = e[ok] ** 2, shape[ok]
+    if not len(squares):
+        return np.full(len(e), 1e-30)
+    squares = np.minimum(squares, 12.0 * np.median(squares) + 1e-30)
+    a, b = squares.mean(), 0.0
+    if len(squares) >= 24:
+        low = where[:, 1] <= np.median(where[:, 1])
+        x0, x1 = where[low, 1].mean(), where[~low, 1].mean() if (~low).any() else where[low, 1].mean()
+        if x1 > x0 + 1e-6:
+            v0, v1 = squares[low].mean(), squares[~low].mean()
+            b = max((v1 - v0) / (x1 - x0), 0.0)
+            a = max(v0 - b * x0, 0.05 * squares.mean())
+    return np.maximum(a + b * shape[:, 1], 1e-30)

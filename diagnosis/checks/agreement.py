@@ -1,0 +1,49 @@
+"""How far the angle advances against what the speed says: one number that tells units and signs (no check itself).
+
+    ratio = sum(dtheta omega T) / sum((omega T)^2)
+
+over rows that follow each other, with the angle's steps taken into (-pi, pi].  It is 1 when angle and speed agree.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+MOST_ROWS = 100_000
+LEAST_TURN = 1.0  # rad in all: below it, noise of the angle decides
+
+
+def wrapped(angle):
+    """The angle in (-pi, pi]."""
+    return angle - 2.0 * np.pi * np.round(angle / (2.0 * np.pi))
+
+
+def angle_speed_ratio(recording, period, theta_factor=1.0, omega_factor=1.0) -> float | None:
+    """The ratio for rows ``period`` [s] apart; None where angle, speed or movement is missing.
+
+    None also where the angle turns by more than a third of a turn from row to row: it cannot be followed then.
+    """
+    if not recording.has("theta_e", "omega_e") or len(recording) < 3:
+        return None
+    rows = _rows(recording)
+    theta, omega = recording["theta_e"] * theta_factor, recording["omega_e"] * omega_factor
+    advance = 0.5 * (omega[rows] + omega[rows + 1]) * period
+    turned = wrapped(theta[rows + 1] - theta[rows])
+    fast = np.abs(advance) > 0.3 * np.percentile(np.abs(advance), 95)
+    advance, turned = advance[fast], turned[fast]
+    if not len(advance) or np.sum(np.abs(advance)) < LEAST_TURN or np.percentile(np.abs(advance), 95) > 2.0:
+        return None
+    if np.median(np.abs(turned)) > 2.0:
+        return None
+    ratio = float(np.sum(turned * advance) / np.sum(advance * advance))
+    scatter = float(np.median(np.abs(turned - ratio * advance)))
+    # Angles that jump at random agree with nothing, not with a small ratio.
+    return ratio if scatter < 0.5 * float(np.median(np.abs(turned))) + 1e-12 else None
+
+
+def _rows(recording) -> np.ndarray:
+    """Rows whose step in time is the usual one, at most MOST_ROWS of them, from all over the recording."""
+    step = np.diff(recording["t"])
+    usual = np.median(step[step > 0]) if np.any(step > 0) else 0.0
+    rows = np.flatnonzero((step > 0.5 * usual) & (step < 1.5 * usual) & recording.usable[1:] & recording.usable[:-1])
+    return rows[:: max(1, len(rows) // MOST_ROWS)]

@@ -1,0 +1,117 @@
+"""Does the nominal machine fit a recording as it stands, or with one change to its columns?  (No check itself.)
+
+For rows that follow each other, with space vectors in the stator frame,
+
+    r = u - R (i + i+) / 2 - [psi(i+, theta+) - psi(i, theta)] / T,    psi = (L_d i_d + j L_q i_q + psi_m) e^(j theta)
+
+is small against u for the right reading of the columns, whatever effect the drive has, and of u's size for swapped
+phases, an angle in degrees or a speed of the wrong sign.  Only fast rows are looked at: at standstill every
+reading fits.  Slow logs and logs of dq values alone use the steady dq balance instead.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+MOST_ROWS = 20_000
+FIT = 0.25  # misfit over voltage: what any real effect stays below at speed
+BETTER = 0.3  # a change must leave less than this share of the misfit
+TURNS = np.exp(2j * np.pi / 3 * np.arange(3))
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Samples at both ends of m intervals of length ``period`` [s].
+
+    i, d: (2, m, 3) phase currents [A] and (m, 3) duties in force, or None; dq: (2, m) complex dq current or None
+    u_dq: (m,) complex asked voltage or None; u_dc: (m,); theta, omega: (2, m)
+    """
+
+    machine: object
+    period: float
+    steady: bool
+    i: np.ndarray | None
+    dq: np.ndarray | None
+    d: np.ndarray | None
+    u_dq: np.ndarray | None
+    u_dc: np.ndarray | None
+    theta: np.ndarray
+    omega: np.ndarray
+
+    def change(self, **columns) -> Rows:
+        return replace(self, **columns)
+
+
+def rows_of(recording, nominal) -> Rows | None:
+    """The intervals to judge by; None without the columns or without movement to judge by."""
+    columns, machine = recording.columns, nominal.machine
+    delay = 0 if recording.slow else nominal.control.duty_applied_after_samples
+    phases, duties = recording.has("i_a", "i_b"), recording.has("d_a", "d_b", "d_c", "u_dc")
+    dq_only = recording.slow or not (phases and duties)
+    if not recording.has("theta_e", "omega_e") or (dq_only and not recording.has("i_d", "i_q", "u_q_ref")):
+        return None
+    k = _intervals(recording, delay)
+    if len(k) < 20:
+        return None
+    ends = np.stack([k, k + 1])
+    i = d = dq = u_dq = None
+    if phases:
+        i_c = columns.get("i_c", -columns["i_a"] - columns["i_b"])
+        i = np.stack([columns["i_a"][ends], columns["i_b"][ends], i_c[ends]], axis=-1)
+    if duties:
+        d = np.stack([columns[name][k - delay] for name in ("d_a", "d_b", "d_c")], axis=-1)
+    if recording.has("i_d", "i_q"):
+        dq = columns["i_d"][ends] + 1j * columns["i_q"][ends]
+    if "u_q_ref" in columns:
+        u_d = columns["u_d_ref"][k - delay] if "u_d_ref" in columns else np.nan
+        u_dq = u_d + 1j * columns["u_q_ref"][k - delay]
+    u_dc = columns["u_dc"][k] if "u_dc" in columns else None
+    rows = Rows(
+        machine, nominal.sample_time_s, dq_only, i, dq, d, u_dq, u_dc, columns["theta_e"][ends], columns["omega_e"][ends]
+    )
+    return rows if len(k) else None
+
+
+def misfit(rows: Rows) -> float:
+    """Median misfit over median voltage, of the rows where the voltage is large; 0 is a perfect fit."""
+    m = rows.machine
+    if rows.steady:
+        i, omega = rows.dq.mean(axis=0), rows.omega.mean(axis=0)
+        psi = m.inductance_d_h * i.real + 1j * m.inductance_q_h * i.imag + m.magnet_flux_wb
+        left = rows.u_dq - m.resistance_ohm * i - 1j * omega * psi
+        u = rows.u_dq
+        if np.isnan(u.real).any():
+            left, u = left.imag, u.imag
+    else:
+        i_s = (2 / 3) * rows.i @ TURNS
+        turn = np.exp(1j * rows.theta)
+        i = i_s * np.conj(turn)
+        psi = (m.inductance_d_h * i.real + 1j * m.inductance_q_h * i.imag + m.magnet_flux_wb) * turn
+        u = rows.u_dc * ((2 / 3) * rows.d @ TURNS)
+        left = u - m.resistance_ohm * i_s.mean(axis=0) - (psi[1] - psi[0]) / rows.period
+    large = np.abs(u) >= np.percentile(np.abs(u), 50)
+    size = float(np.median(np.abs(u[large])))
+    return float(np.median(np.abs(left[large]))) / size if size > 0 else np.inf
+
+
+def tells(rows: Rows) -> bool:
+    """Whether the drive moves enough for the balance to tell readings apart: EMF well above the resistive drop."""
+    if rows.steady:
+        u = rows.u_dq.imag
+        u = np.abs(u)
+    else:
+        u = np.abs(rows.u_dc * ((2 / 3) * rows.d @ TURNS))
+    drop = rows.machine.resistance_ohm * rows.machine.rated_current_a
+    return float(np.percentile(u, 75)) > max(1.5 * drop, 1.0)
+
+
+def _intervals(recording, delay) -> np.ndarray:
+    """First rows of intervals that may be judged, at most MOST_ROWS, from all over the recording."""
+    good = recording.usable[:-1] & recording.usable[1:] & recording.joined[:-1]
+    for back in range(1, delay + 1):
+        good[back:] &= recording.joined[: len(good) - back]
+    good[:delay] = False
+    k = np.flatnonzero(good)
+    return k[:: max(1, -(-len(k) // MOST_ROWS))]

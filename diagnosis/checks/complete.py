@@ -1,0 +1,52 @@
+"""What is missing and follows from what is there: speed from angle, a phase current from the other two, the bus.
+
+Zero columns of channels that were logged but not connected count as missing.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from diagnosis.checks.agreement import wrapped
+
+STAGE = "complete"
+SPEED_ROWS = 32  # over which an angle is differentiated: an encoder's code at one row tells no speed
+
+
+def check(recording, nominal) -> None:
+    columns, notes = recording.columns, recording.meta["notes"]
+    for name in ("i_c", "i_d_ref", "i_q_ref", "temp_winding", "torque"):
+        if name in columns and not np.any(columns[name]) and _moves(recording):
+            if name in ("temp_winding", "torque", "i_c"):
+                del columns[name]
+                notes.append(f"{name} is zero throughout and taken as not recorded")
+    for lost, other in (("i_a", ("i_b", "i_c")), ("i_b", ("i_a", "i_c"))):
+        if lost not in columns and recording.has(*other):
+            columns[lost] = -columns[other[0]] - columns[other[1]]
+            del columns["i_c"]
+            notes.append(f"{lost} is not recorded and taken from the sum of the phase currents")
+    if "u_dc" not in columns and recording.has("d_a", "d_b", "d_c"):
+        columns["u_dc"] = np.full(len(recording), nominal.inverter.dc_bus_v)
+        notes.append(f"u_dc is not recorded and taken as dc_bus_v = {nominal.inverter.dc_bus_v:g} V")
+    if "omega_e" not in columns and "theta_e" in columns:
+        columns["omega_e"] = speed_of(recording)
+        notes.append(f"omega_e is not recorded and taken from theta_e over {SPEED_ROWS} rows")
+    if "theta_e" not in columns and "omega_e" in columns:
+        step = np.diff(recording["t"], prepend=recording["t"][0])
+        columns["theta_e"] = wrapped(np.cumsum(columns["omega_e"] * step))
+        notes.append("theta_e is not recorded and integrated from omega_e: its zero is not the magnet's")
+
+
+def speed_of(recording) -> np.ndarray:
+    """(n,) electrical speed [rad/s] as the angle's mean slope over the rows around."""
+    t = recording["t"]
+    turned = np.cumsum(np.append(0.0, wrapped(np.diff(recording["theta_e"]))))
+    rows = np.arange(len(t))
+    first, last = np.maximum(rows - SPEED_ROWS // 2, 0), np.minimum(rows + SPEED_ROWS // 2, len(t) - 1)
+    return (turned[last] - turned[first]) / np.maximum(t[last] - t[first], 1e-12)
+
+
+def _moves(recording) -> bool:
+    """Whether any current flows: zeros mean nothing in a recording of a drive at rest."""
+    names = [name for name in ("i_a", "i_b", "i_d", "i_q") if name in recording.columns]
+    return any(np.ptp(recording[name]) > 0 for name in names)

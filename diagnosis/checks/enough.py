@@ -1,0 +1,21 @@
+"""Whether enough rows are left for a diagnosis at all."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from diagnosis.recording import Problem
+
+STAGE = "extent"
+LEAST_ROWS = 400  # two blocks of a balance in time
+LEAST_SLOW_ROWS = 20
+
+
+def check(recording, nominal) -> None:
+    n = len(recording)
+    good = recording.usable if recording.slow else recording.usable & recording.joined
+    left, least = int(np.count_nonzero(good)), LEAST_SLOW_ROWS if recording.slow else LEAST_ROWS
+    if left >= least:
+        return
+    message = f"{left} of {n} rows can be used, at least {least} are needed"
+    recording.problems.append(Problem("too_short", message, "", 0, n, fatal=True))

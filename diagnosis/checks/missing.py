@@ -1,0 +1,87 @@
+"""Missing, infinite and absurd numbers: interpolated, and their rows kept out of every balance.
+
+Slow channels of a log that was merged from several rates are mostly empty; their last value holds.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from diagnosis.recording import Problem
+
+STAGE = "values"
+ABSURD = 1e9  # no canonical column comes near it; an overflow or a wrong format does
+SLOW = ("temp_winding", "torque", "u_dc", "i_d_ref", "i_q_ref", "u_d_ref", "u_q_ref")
+OPTIONAL = ("temp_winding", "torque", "i_d_ref", "i_q_ref")
+MOST = 0.5  # a larger share missing in a column that is needed leaves no recording
+
+
+def check(recording, nominal) -> None:
+    columns = recording.columns
+    _drop_rows_without_time(recording)
+    n = len(recording)
+    for name in [c for c in columns if c != "t"]:
+        good = np.isfinite(columns[name])
+        good &= np.abs(columns[name]) < ABSURD
+        bad = n - int(np.count_nonzero(good))
+        if not bad:
+            continue
+        row = int(np.argmin(good))
+        if bad == n:
+            if name in OPTIONAL:
+                recording.meta["notes"].append(f"{name} holds no number and is left out")
+                del columns[name]
+            else:
+                recording.problems.append(Problem("missing", "holds no finite number", name, row, bad, fatal=True))
+            continue
+        if name not in SLOW and bad > MOST * n:
+            message = f"{bad} of {n} values are missing or not finite"
+            recording.problems.append(Problem("missing", message, name, row, bad, fatal=True))
+            continue
+        where = np.flatnonzero(good)
+        filled = columns[name].copy()
+        if name in SLOW and bad > 0.1 * n:
+            filled = filled[where[np.maximum(np.searchsorted(where, np.arange(n), side="right") - 1, 0)]]
+            recording.meta["notes"].append(f"{name} has a value in {n - bad} of {n} rows; the last one holds")
+        else:
+            lost = np.flatnonzero(~good)
+            filled[lost] = _between(name, lost, where, columns[name][where])
+            recording.usable[lost] = False
+            recording.problems.append(
+                Problem("missing", f"{bad} values missing or not finite", name, row, bad, "interpolated; rows not used")
+            )
+        columns[name] = filled
+
+
+def _between(name, lost, where, values):
+    """Values for lost rows; a wrapped angle must not be interpolated across its wrap, so it holds."""
+    if name == "theta_e":
+        return values[np.maximum(np.searchsorted(where, lost) - 1, 0)]
+    return np.interp(lost, where, values)
+
+
+def _drop_rows_without_time(recording) -> None:
+    t = recording.columns["t"]
+    good = np.isfinite(t) & (np.abs(t) < 1e20)
+    bad = len(t) - int(np.count_nonzero(good))
+    if not bad:
+        return
+    row = int(np.argmin(good))
+    if bad > MOST * len(t):
+        message = f"{bad} of {len(t)} times are missing or not finite"
+        recording.problems.append(Problem("missing", message, "t", row, bad, fatal=True))
+        return
+    recording.problems.append(Problem("missing", f"{bad} rows without a time", "t", row, bad, "left out"))
+    keep_rows(recording, np.flatnonzero(good))
+
+
+def keep_rows(recording, rows) -> None:
+    """Keep these rows (indices, in this order) of every array; neighbours that were none are not joined."""
+    joined = recording.joined[rows]
+    joined[:-1] &= np.diff(rows) == 1
+    if len(joined):
+        joined[-1] = False
+    recording.columns = {name: values[rows] for name, values in recording.columns.items()}
+    recording.usable, recording.joined = recording.usable[rows], joined
+    if "run" in recording.meta:
+        recording.meta["run"] = recording.meta["run"][rows]

@@ -1,0 +1,76 @@
+"""Time that runs backwards, rows that stand twice: sorted, joined end to end, or left out."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from diagnosis.checks.missing import keep_rows
+from diagnosis.recording import Problem
+
+STAGE = "time"
+RESTART_STEPS = 100  # a step back by more is a clock that began again, by less a row out of place
+
+
+def check(recording, nominal) -> None:
+    t = recording["t"]
+    if len(t) < 2:
+        recording.problems.append(Problem("too_short", f"{len(t)} rows", "t", 0, len(t), fatal=True))
+        return
+    step = np.diff(t)
+    forward = step[step > 0]
+    if not len(forward):
+        message = "time does not advance" if not np.any(step < 0) else "time runs backwards throughout"
+        recording.problems.append(Problem("time_order", message, "t", 0, len(t), fatal=True))
+        return
+    usual = float(np.median(forward))
+    back = np.flatnonzero(step < 0)
+    if len(back):
+        _mend(recording, step, back, usual)
+    _duplicates(recording)
+
+
+def _mend(recording, step, back, usual) -> None:
+    """Clocks that began again are set on; rows out of place are sorted."""
+    restarts = back[step[back] < -RESTART_STEPS * usual]
+    shuffled = len(back) > max(20, len(step) // 1000)
+    if len(restarts) and not shuffled:
+        t = recording["t"].copy()
+        for k in restarts:
+            t[k + 1 :] += t[k] - t[k + 1] + RESTART_STEPS * usual
+        recording.columns["t"] = t
+        recording.problems.append(
+            Problem("time_order", f"time begins again {len(restarts)} times", "t", int(restarts[0]) + 1, len(restarts),
+                    "each part is taken as a run of its own")
+        )  # fmt: skip
+        back = np.flatnonzero(np.diff(t) < 0)
+    if len(back):
+        rows = np.argsort(recording["t"], kind="stable")
+        keep_rows(recording, rows)
+        recording.problems.append(
+            Problem("time_order", f"time runs backwards {len(back)} times", "t", int(back[0]) + 1, len(back), "rows sorted")
+        )
+
+
+def _duplicates(recording) -> None:
+    """Rows that equal the one before in every column, time included, are left out."""
+    same = np.flatnonzero(np.diff(recording["t"]) == 0)
+    if not len(same):
+        return
+    twice = same[_equal_rows(recording, same)]
+    if len(twice):
+        keep = np.ones(len(recording), bool)
+        keep[twice + 1] = False
+        keep_rows(recording, np.flatnonzero(keep))
+        recording.joined[:-1] |= np.diff(recording["t"]) > 0
+        recording.problems.append(
+            Problem("duplicate", f"{len(twice)} rows stand twice", "t", int(twice[0]) + 1, len(twice), "left out once")
+        )
+
+
+def _equal_rows(recording, rows) -> np.ndarray:
+    """Whether row k+1 equals row k in every column but the time, for the rows k asked for."""
+    equal = np.ones(len(rows), bool)
+    for name, values in recording.columns.items():
+        if name != "t":
+            equal &= values[rows] == values[rows + 1]
+    return equal

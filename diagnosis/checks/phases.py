@@ -1,0 +1,118 @@
+"""Swapped phases, reversed sensors, wrong rotation direction: the reading that the nominal machine fits is taken.
+
+Every single change to the columns is tried on the nominal balance.  A change is made only where the recording as it
+stands does not fit at all, the changed one does, and no other change does nearly as well.  Mirrored readings (currents
+and duties both swapped, or the angle reversed) are one and the same machine; the angle is reversed then.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from diagnosis.checks.balance import BETTER, FIT, Rows, misfit, rows_of, tells
+from diagnosis.recording import Problem
+
+STAGE = "geometry"
+CLEAR = 1.6  # the second best change must be worse by this much
+
+ORDERS = {"b and c": [0, 2, 1], "a and c": [2, 1, 0], "a and b": [1, 0, 2], "b, c, a": [1, 2, 0], "c, a, b": [2, 0, 1]}
+CURRENTS, DUTIES = ("i_a", "i_b", "i_c"), ("d_a", "d_b", "d_c")
+
+
+def check(recording, nominal) -> None:
+    rows = rows_of(recording, nominal)
+    if rows is None or not tells(rows):
+        return
+    as_is = misfit(rows)
+    if as_is < FIT:
+        return
+    tried = {name: misfit(changed) for name, changed in _changes(rows).items()}
+    ranked = sorted(tried, key=tried.get)
+    best = ranked[0]
+    if tried[best] > BETTER * as_is or tried[best] > FIT:
+        return
+    second = next((name for name in ranked[1:] if tried[name] < CLEAR * tried[best]), None)
+    n = len(recording)
+    numbers = f"misfit {as_is:.0%} of the voltage as recorded, {tried[best]:.0%} with it"
+    if second:
+        message = f"{_words(best)} or {_words(second)}: {numbers}; correct [columns] in drive.toml"
+        recording.problems.append(Problem("swapped_phases", message, _column(best), 0, n, fatal=True))
+        return
+    _apply(recording, best)
+    code = "rotation" if best[0] in ("angle", "speed") else "sign" if best[0] == "sign" else "swapped_phases"
+    recording.problems.append(Problem(code, f"{_words(best)}: {numbers}", _column(best), 0, n, "worked round"))
+
+
+def _changes(rows: Rows) -> dict[tuple, Rows]:
+    """Every change that is tried, as {what: changed rows}."""
+    if rows.steady:
+        return {
+            ("speed", ""): rows.change(omega=-rows.omega),
+            ("sign", "i"): rows.change(dq=-rows.dq),
+            ("axes", ""): rows.change(dq=_swapped(rows.dq), u_dq=_swapped(rows.u_dq)),
+        }
+    changes = {("angle", ""): rows.change(theta=-rows.theta), ("sign", "i"): rows.change(i=-rows.i)}
+    for name, order in ORDERS.items():
+        changes["currents", name] = rows.change(i=rows.i[..., order])
+        changes["duties", name] = rows.change(d=rows.d[..., order])
+        if name != "b and c":
+            changes["both", name] = rows.change(i=rows.i[..., order], d=rows.d[..., order])
+    for phase in range(3):
+        sign = np.where(np.arange(3) == phase, -1.0, 1.0)
+        changes["sign", CURRENTS[phase]] = rows.change(i=rows.i * sign)
+    return changes
+
+
+def _swapped(dq):
+    return dq.imag + 1j * dq.real
+
+
+def _words(change) -> str:
+    """A change in words."""
+    what, which = change
+    if what == "angle":
+        return "the angle turns against the phase order of currents and duties"
+    if what == "speed":
+        return "the speed has the sign of the other direction"
+    if what == "axes":
+        return "the d and q axes are swapped"
+    if what == "sign":
+        return "the phase currents have the opposite sign" if which == "i" else f"{which} has the opposite sign"
+    who = {"currents": "phase currents", "duties": "duties", "both": "phase currents and duties"}[what]
+    return f"{who} {which} are swapped" if " and " in which else f"{who} stand in the order {which}"
+
+
+def _column(change) -> str:
+    """A column to name in the finding."""
+    what, which = change
+    letters = [letter for letter in which.replace(",", " ").split() if letter in "abc"]
+    if what in ("currents", "both"):
+        return f"i_{letters[0]}"
+    if what == "duties":
+        return f"d_{letters[0]}"
+    return {"angle": "theta_e", "speed": "omega_e", "axes": "i_d"}.get(what, "i_a" if which == "i" else which)
+
+
+def _apply(recording, change) -> None:
+    """Make the change in the recording."""
+    what, which = change
+    columns = recording.columns
+    if what in ("angle", "speed"):
+        for name in ("theta_e", "omega_e"):
+            columns[name] = -columns[name]
+        if "torque" in columns:
+            columns["torque"] = -columns["torque"]
+    elif what == "axes":
+        for a, b in (("i_d", "i_q"), ("u_d_ref", "u_q_ref"), ("i_d_ref", "i_q_ref")):
+            if recording.has(a, b):
+                columns[a], columns[b] = columns[b], columns[a]
+    elif what == "sign":
+        for name in [*CURRENTS, "i_d", "i_q"] if which == "i" else [which]:
+            if name in columns:
+                columns[name] = -columns[name]
+    else:
+        if "i_c" not in columns and what != "duties":
+            columns["i_c"] = -columns["i_a"] - columns["i_b"]
+        for names in (CURRENTS, DUTIES) if what == "both" else (CURRENTS,) if what == "currents" else (DUTIES,):
+            values = [columns[names[k]] for k in ORDERS[which]]
+            columns.update(zip(names, values, strict=True))

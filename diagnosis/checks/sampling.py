@@ -1,0 +1,130 @@
+"""Sampling against drive.toml: a time in other units, too coarse a time, gaps, too slow a log, a wrong sample time.
+
+A row is joined to the next when the step is the sample time.  A log that is slower than the control is marked
+slow, and its rows are joined by its own step; only operating points count then.  Whether a strange step is a
+wrong unit or a slow log is told by the angle, where it is recorded: theta must advance by omega times the step.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from diagnosis.checks.agreement import angle_speed_ratio
+from diagnosis.recording import Problem
+
+STAGE = "time"
+TOLERANCE = 0.02  # of the sample time: the clock of a logger is better, another sample time is not
+JOINED = 0.25
+SLOW_FROM = 1.5
+UNITS = {"ms": 1e3, "us": 1e6, "ns": 1e9}
+
+
+def check(recording, nominal) -> None:
+    if recording.fatal or len(recording) < 2:
+        return
+    period = nominal.sample_time_s
+    step = np.diff(recording["t"])
+    if _rebuild_coarse(recording, step, period):
+        step = np.diff(recording["t"])
+    usual = float(np.median(step[step > 0]))
+    unit = _unit(recording, usual, period)
+    if unit:
+        factor = 1.0 / UNITS[unit]
+        recording.columns["t"] = recording["t"] * factor
+        step, usual = step * factor, usual * factor
+        recording.problems.append(
+            Problem("unit", f"time advances by {usual / factor:g} a row", "t", 0, len(recording), f"taken as {unit}")
+        )
+    ratio = usual / period
+    if abs(ratio - 1.0) <= TOLERANCE:
+        usual = period
+    elif ratio >= SLOW_FROM:
+        recording.slow = True
+        message = f"a row every {usual:g} s, the control samples every {period:g} s: too slow for a balance in time"
+        recording.problems.append(
+            Problem("slow_sampling", message, "t", 0, len(recording), "only steady operating points are used")
+        )
+    elif not _time_is_wrong(recording, ratio, period):
+        message = f"a row every {usual:g} s, but [control] sample_time_s or 1 / pwm_frequency_hz is {period:g} s"
+        recording.problems.append(Problem("sample_time", message, "t", 0, len(recording), fatal=True))
+        return
+    else:
+        step, usual = np.diff(recording["t"]), period
+    _join(recording, step, usual)
+
+
+def _join(recording, step, usual) -> None:
+    """Set ``joined`` and report gaps; a change of run is no gap."""
+    width = JOINED if not recording.slow else 0.5
+    recording.joined[:-1] &= np.abs(step - usual) < width * usual
+    recording.joined[-1] = False
+    new_run = np.zeros(len(step), bool)
+    if "run" in recording.meta:
+        new_run = np.diff(recording.meta["run"]) != 0
+        recording.joined[:-1] &= ~new_run
+        recording.meta["notes"].append(f"{int(new_run.sum()) + 1} runs, taken one by one")
+    gaps = np.flatnonzero((step > 1.5 * usual) & ~new_run)
+    together = np.flatnonzero((step < 0.5 * usual) & ~new_run)
+    irregular = recording.slow and len(gaps) + len(together) > 0.2 * len(step)
+    if irregular:
+        recording.meta["notes"].append("rows are irregular in time, as slow logs are")
+        return
+    if len(gaps):
+        lost = int(np.sum(np.round(step[gaps] / usual) - 1))
+        recording.problems.append(
+            Problem("gap", f"{len(gaps)} gaps, about {lost} samples missing", "t", int(gaps[0]) + 1, len(gaps),
+                    "no balance is made across them")
+        )  # fmt: skip
+    if len(together):
+        recording.problems.append(
+            Problem("duplicate", f"{len(together)} rows hardly later than the one before", "t", int(together[0]) + 1,
+                    len(together), "no balance is made across them")
+        )  # fmt: skip
+
+
+def _unit(recording, usual, period) -> str:
+    """The unit of a time that is not in seconds, or "" where it may well be seconds."""
+    if "t" in recording.meta.get("stated_units", ()):
+        return ""
+    for unit, factor in UNITS.items():
+        if abs(usual / (period * factor) - 1.0) > TOLERANCE:
+            continue
+        ratio = angle_speed_ratio(recording, period)
+        if ratio is not None:
+            return unit if abs(ratio - 1.0) < 0.1 else ""
+        if usual > 10.0:  # nobody logs a drive once in 10 s
+            return unit
+    return ""
+
+
+def _rebuild_coarse(recording, step, period) -> bool:
+    """A time with too few digits stands still and jumps; the mean step then tells what it was."""
+    still = np.count_nonzero(step == 0)
+    if still < 0.01 * len(step):
+        return False
+    t = recording["t"]
+    mean = (t[-1] - t[0]) / len(step)
+    for factor, unit in ((1.0, "s"), *((1.0 / f, u) for u, f in UNITS.items())):
+        if abs(mean * factor / period - 1.0) <= TOLERANCE:
+            even = t[0] + np.arange(len(t)) * mean
+            if np.max(np.abs(t - even)) > np.max(step) + 2 * mean:
+                break
+            recording.columns["t"] = t[0] * factor + np.arange(len(t)) * period
+            message = f"the time has too few digits: {still} rows share one with the row before"
+            row = int(np.argmax(step == 0)) + 1
+            action = "rebuilt from the sample time" + ("" if unit == "s" else f", taken as {unit}")
+            recording.problems.append(Problem("coarse_time", message, "t", row, int(still), action))
+            return True
+    return False
+
+
+def _time_is_wrong(recording, ratio, period) -> bool:
+    """Whether the angle says that rows are one sample time apart after all; the time is then rebuilt."""
+    found = angle_speed_ratio(recording, period)
+    if found is None or abs(found - 1.0) > 0.01 or abs(ratio - 1.0) < 0.05:
+        return False
+    t = recording["t"]
+    recording.columns["t"] = t[0] + (t - t[0]) / ratio
+    message = f"time advances {ratio:.3g} times too fast for angle and speed"
+    recording.problems.append(Problem("sample_time", message, "t", 0, len(t), "rebuilt from the sample time"))
+    return True

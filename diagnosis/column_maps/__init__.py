@@ -1,0 +1,35 @@
+"""Ready-made column maps for well-known logs, one file each; a new file here is found by itself.
+
+A map has
+
+    NAME       how messages call it
+    SIGNATURE  file columns (as ``key`` writes them) that tell this log from others
+    COLUMNS    {file column: (canonical column, unit)}
+    KEY        optional: how a file column's name is simplified before it is looked up
+    ASSUMED    optional: {canonical column: constant} for what the log leaves out
+    SAMPLE_TIME_S  optional: for logs without a time column
+    RUN        optional: file column whose change starts another run
+    NOTES      optional: what a reader of the diagnosis must know
+
+The docstring of a map says where its facts come from.
+"""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+
+
+def maps() -> list:
+    """Every ready-made map."""
+    return [importlib.import_module(f"{__name__}.{m.name}") for m in pkgutil.iter_modules(__path__)]
+
+
+def plain(name: str) -> str:
+    """The name in lower case; what most logs are looked up by."""
+    return name.strip().lower()
+
+
+def last_part(name: str) -> str:
+    """The last part of a path of a tree of signals, in lower case: "odrv0.axis0.motor.foc.Iq_measured"."""
+    return plain(name).replace("/", ".").strip('."').rsplit(".", 1)[-1]

@@ -1,0 +1,36 @@
+"""Names that many people give to the canonical signals, dSPACE ControlDesk exports among them.
+
+ControlDesk names a variable by its path in the model ("Model Root/Current control/i_a"); the last part counts, and a
+last part such as Out1 does not.  Only names that can mean one thing are here.
+"""
+
+from diagnosis.column_maps import last_part as KEY  # noqa: F401
+from diagnosis.recording import COLUMNS as CANONICAL
+
+NAME = "common names"
+SIGNATURE = set()
+COLUMNS = {name: (name, unit) for name, unit in CANONICAL.items()} | {
+    "time": ("t", "s"),
+    "time_s": ("t", "s"),
+    "t_s": ("t", "s"),
+    "timestamp": ("t", "s"),
+    "ia": ("i_a", "A"),
+    "ib": ("i_b", "A"),
+    "ic": ("i_c", "A"),
+    "id": ("i_d", "A"),
+    "iq": ("i_q", "A"),
+    "id_ref": ("i_d_ref", "A"),
+    "iq_ref": ("i_q_ref", "A"),
+    "theta_el": ("theta_e", "rad"),
+    "omega_el": ("omega_e", "rad/s"),
+    "n_rpm": ("omega_e", "rpm"),
+    "speed_rpm": ("omega_e", "rpm"),
+    "udc": ("u_dc", "V"),
+    "vdc": ("u_dc", "V"),
+    "v_dc": ("u_dc", "V"),
+    "ud_ref": ("u_d_ref", "V"),
+    "uq_ref": ("u_q_ref", "V"),
+    "duty_a": ("d_a", "1"),
+    "duty_b": ("d_b", "1"),
+    "duty_c": ("d_c", "1"),
+}

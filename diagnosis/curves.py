@@ -1,0 +1,34 @@
+"""Shapes that free curves are built of."""
+
+import numpy as np
+
+
+def hats(x, knots):
+    """Piecewise-linear hat functions on the knots, one per knot but the first: (k - 1, *x.shape).
+
+    Together they make every broken line that is zero at the first knot.
+    """
+    knots = np.asarray(knots, float)
+    eye = np.eye(len(knots))
+    return np.array([np.interp(x, knots, eye[k]) for k in range(1, len(knots))])
+
+
+def courses(view, count=4):
+    """Slow courses of time (count, b), zero at the start of the recording and piecewise linear."""
+    return hats(view.t / max(view.span_s, 1e-9), np.linspace(0, 1, count + 1))
+
+
+def known_temperature(view, least_k=3.0):
+    """Whether a thermocouple was recorded and moved by ``least_k``."""
+    seen = view.temp[np.isfinite(view.temp)]
+    return len(seen) == len(view.temp) and len(seen) > 0 and np.ptp(seen) >= least_k
+
+
+def reference_c(nominal) -> float:
+    """Temperature at which the nameplate holds [degC]."""
+    return float(nominal.machine.temperature_ref_c)
+
+
+def clipped_ramps(x, widths):
+    """Odd ramps that reach one at each width: (len(widths), *x.shape)."""
+    return np.array([np.clip(x / w, -1.0, 1.0) for w in widths])

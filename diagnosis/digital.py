@@ -1,0 +1,239 @@
+"""The digital half first: did the core compute what its golden model computes?
+
+A telemetry dump holds what the core took in and what it answered.  The golden model is replayed over the samples and
+every recorded answer compared with ``==``.  Equal in every bit: the controller is acquitted, and the difference between
+recording and simulation is physics.  Not equal: the first sample, and in it the first block in the order of the data
+whose output differs, with the signal and the bit; where one wrong bit of a register, a raw sample or the start state
+explains the recording, that bit, and the block it acts in even if the core does not show that block's output.
+
+A stretch whose state at the start is unknown (the recording begins while the drive runs, or samples were lost) is
+replayed from the state that is known best, and counts once everything agrees to its end.  Where it never does, only
+the blocks without memory are judged (digital_local.py): a regulator cannot be blamed for a state that nobody recorded.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from diagnosis.digital_cause import Cause, find_cause, golden_value, lowest_bit, where_they_part
+from diagnosis.digital_flow import OWNER, block_name, first_in_flow, hidden_before
+from diagnosis.digital_local import check_rows, checkable
+from diagnosis.digital_replay import Run, run_of
+from diagnosis.recording import Recording
+from diagnosis.result import Digital
+from golden_model import fluxproof
+from golden_model.fluxproof import OBSERVED
+from golden_model.io import sample_latch
+from golden_model.kernel import CACHE_DIR
+from golden_model.units import unit
+
+CONVERGED = 1000  # rows that must agree to the end before a run-in counts
+KINDS = {
+    "register": "register {name} in the recording's header: the core behaved as with {acted} instead of {found}",
+    "sample": "raw sample {name}: the core behaved as with {acted} instead of {found}",
+    "start_state": "start state {name}: the core behaved as with {acted} instead of {found}",
+    "record": "only this one value of the record differs: it was not the core's arithmetic, later rows agree",
+}
+
+
+def replay(recording: Recording) -> tuple[Digital, list[str]]:
+    """(result.Digital, sentences for people) of a recording that holds what the core saw and answered.
+
+    Uses ``recording.meta`` as telemetry.read_dump makes it: ``registers``, ``config`` and ``samples`` at least;
+    ``observed``, or the duty columns as the core's compare values; ``start``, ``first_state``, ``gaps``.
+    ``first_difference`` has block, instance, sample (row), counter, signal, bit, recorded, golden (as hexadecimal
+    and, with unit, in SI), differing (all signals of that row), hidden (blocks upstream that nobody could see) and
+    cause (or None).  ``checked`` is False where nothing, or not the whole core, could be judged.
+    """
+    meta = recording.meta
+    missing = [
+        name for name in ("registers", "config", "samples") if not meta.get(name) and name != "samples"
+    ]
+    missing += ["samples"] if meta.get("samples") is None else []
+    if missing:
+        return Digital(), [
+            f"The digital half was not checked: the recording has no {' and no '.join(missing)} of the core."
+        ]
+    lacking = [name for name in fluxproof.Registers._fields if name not in meta["registers"]]
+    if lacking:
+        return Digital(), [
+            f"The digital half was not checked: register {lacking[0]} is not in the recording."
+        ]
+    observed = meta.get("observed") or _duties(recording, meta["config"])
+    if not observed:
+        return Digital(), [
+            "The digital half was not checked: the recording has no answer of the core, not even duties."
+        ]
+    run = run_of(meta["samples"], observed, meta["registers"], meta["config"])
+    notes = [
+        f"The dump's header was changed after it was written: {what}." for what in meta.get("altered", [])
+    ]
+    misfit = _not_of_its_format(run)
+    if misfit is not None:
+        return _result(run, recording, *misfit), notes
+    return _stretches(run, recording, notes)
+
+
+def _duties(recording: Recording, config) -> dict:
+    """Compare values out of duty columns, where these are whole clocks."""
+    if not recording.has("d_a", "d_b", "d_c"):
+        return {}
+    clocks = {f"compare_{x}": recording[f"d_{x}"] * config["carrier_half"] for x in "abc"}
+    whole = all(np.abs(v - np.round(v)).max() < 1e-3 for v in clocks.values())
+    return {name: np.round(v).astype(np.int64) for name, v in clocks.items()} if whole else {}
+
+
+def _not_of_its_format(run: Run):
+    """A raw value that its port cannot carry: (row, instance, signal, golden, cause, names) or None."""
+    for k, port in enumerate(sample_latch.BLOCK.outputs):
+        name = fluxproof.Sample._fields[k]
+        size = sample_latch.BLOCK.width_from.get(port.name)
+        fmt = (
+            size({"ADC_BITS": run.config.adc_bits, "POSITION_BITS": run.config.position_bits})
+            if size
+            else port.fmt
+        )
+        wrong = np.flatnonzero((run.samples[:, k] < fmt.lo) | (run.samples[:, k] > fmt.hi))
+        if len(wrong):
+            row = int(wrong[0])
+            value = int(run.samples[row, k])
+            acted = value & ((1 << fmt.width) - 1)
+            return (
+                row,
+                "latch",
+                name,
+                acted,
+                {"kind": "sample", "name": name, "says": f"{value} is no {fmt}"},
+                [name],
+            )
+    return None
+
+
+def _stretches(run: Run, recording: Recording, notes: list[str]) -> tuple[Digital, list[str]]:
+    """Every stretch between lost samples, the first difference in time counts."""
+    meta, n = recording.meta, len(run.samples)
+    gaps = meta.get("gaps", [])
+    ends = [*(row for row, _ in gaps), n]
+    state, known = meta.get("first_state"), meta.get("start", "unknown")
+    checked = run_in = local = 0
+    for number, (start, stop) in enumerate(zip([0, *ends[:-1]], ends, strict=True)):
+        begin = state if state is not None else fluxproof.State()
+        certain = number == 0 and known in ("reset", "state")
+        row, before, names = run.until_different(begin, start, stop)
+        if row == stop:
+            checked, state = checked + stop - start, before
+            continue
+        if certain:
+            return _differs(run, recording, begin, start, stop, row, before, names, known == "state"), notes
+        agreed = _agrees_from(run, begin, start, stop)
+        if stop - agreed >= CONVERGED:
+            run_in, checked = run_in + agreed - start, checked + stop - agreed
+            state = run.state_at(begin, start, stop)
+            continue
+        row, names, golden = check_rows(run, start, stop)
+        if row < stop:
+            signal = first_in_flow(names)
+            return _result(run, recording, row, OWNER[signal], signal, golden[signal], None, names), notes
+        local, state = local + stop - start, None
+    digital = Digital(checked=local == 0, samples=checked)
+    return digital, notes + _sentences(run, gaps, known, checked, run_in, local)
+
+
+def _agrees_from(run: Run, state, start, stop) -> int:
+    """The row from which a replay with a guessed state agrees to the end."""
+    _, last = run.differences(state, start, stop)
+    return last + 1
+
+
+def _differs(run, recording, state, start, stop, row, before, names, whole_state) -> Digital:
+    """The first difference of a stretch whose start state is known."""
+    signal = first_in_flow(names)
+    golden, instance = golden_value(run, before, row, signal), OWNER[signal]
+    cause, first = find_cause(run, state, start, stop, row, names, whole_state)
+    told = None
+    if cause is not None:
+        told = _told(cause, stop)
+        if cause.kind != "record":
+            parted, instance = where_they_part(run, cause, run.state_at(state, start, first), first, row)
+            told["row"] = parted
+    return _result(run, recording, row, instance or OWNER[signal], signal, golden, told, names)
+
+
+def _told(cause: Cause, stop) -> dict:
+    """A cause for JSON."""
+    words = {
+        "found": f"{cause.found} ({hexadecimal(cause.found)})",
+        "acted": f"{cause.acted} ({hexadecimal(cause.acted)})",
+    }
+    says = KINDS[cause.kind].format(name=cause.name, **words)
+    if cause.rows < stop:
+        says += f", up to row {cause.rows - 1}; then something else differs"
+    return {
+        "kind": cause.kind, "name": cause.name, "bit": cause.bit, "recorded": cause.found, "behaved_as": cause.acted,
+        "explains_rows_to": cause.rows, "says": says,
+    }  # fmt: skip
+
+
+def _result(run, recording, row, instance, signal, golden, cause, names) -> Digital:
+    """A difference in the form that diagnosis.json has."""
+    is_input = signal in fluxproof.Sample._fields
+    found = int(
+        run.samples[row, fluxproof.Sample._fields.index(signal)] if is_input else _recorded(run, row, signal)
+    )
+    scale = recording.meta.get("scales", {}).get(signal, 1.0)
+    physical = "code" if is_input else unit(signal)
+    counter = recording.meta.get("counter")
+    difference = {
+        "block": block_name(instance),
+        "instance": instance,
+        "sample": row,
+        "counter": int(counter[row]) if counter is not None else row,
+        "signal": signal,
+        "format": "" if is_input else str(OBSERVED[signal].fmt),
+        "bit": lowest_bit(found, golden),
+        "recorded": hexadecimal(found),
+        "golden": hexadecimal(golden),
+        "recorded_si": found * scale,
+        "golden_si": golden * scale,
+        "unit": physical,
+        "differing": sorted(names),
+        "hidden": [] if is_input else hidden_before(instance, run.names),
+        "cause": cause,
+    }
+    model = recording.meta.get("telemetry", {}).get("core", {}).get("golden_model")
+    if model not in (None, CACHE_DIR.name):
+        difference["other_golden_model"] = (
+            f"the dump was made with golden model {model}, this is {CACHE_DIR.name}"
+        )
+    return Digital(checked=True, samples=row, first_difference=difference)
+
+
+def _recorded(run, row, signal):
+    return run.recorded[row, run.names.index(signal)]
+
+
+def hexadecimal(value: int) -> str:
+    """An integer as hexadecimal, in two's complement of 32 bits where it is negative."""
+    return f"0x{value & 0xFFFFFFFF:x}"
+
+
+def _sentences(run, gaps, known, checked, run_in, local) -> list[str]:
+    """What was compared and what was not."""
+    said = []
+    if gaps:
+        lost = sum(count for _, count in gaps)
+        said.append(f"{lost} samples are missing in {len(gaps)} places, the first before row {gaps[0][0]}.")
+    if checked:
+        said.append(
+            f"The golden model gives the same in every bit: {checked} samples, {len(run.names)} signals each."
+        )
+    if run_in:
+        said.append(f"{run_in} samples served as run-in, as the core's state before them is not recorded.")
+    if local:
+        signals = checkable(run.names)
+        why = "its start state is not recorded" if known == "unknown" else "samples before it are missing"
+        said.append(
+            f"{local} samples could not be replayed, {why}: in them only what needs no state was compared, "
+            f"and equal: {', '.join(signals)}. Regulators and estimators were not checked there."
+        )
+    return said

@@ -1,0 +1,147 @@
+"""Why a replay parts from the recording: one wrong bit somewhere, looked for one bit at a time.
+
+The recorded values tell where the difference is seen; which block it comes from may be hidden, because the core does
+not show every signal.  A hypothesis makes it certain: with this bit of this register (raw sample, start state) the
+other way round, the golden model gives the recording again, bit for bit and beyond the first difference.  Then both
+runs can be traced through every hidden signal, and the block where they part first is known, not guessed.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+
+from diagnosis.digital_flow import ORDER, OWNER, first_in_flow, hidden_before, outputs_of, parted, trace
+from diagnosis.digital_replay import Run
+from golden_model import fluxproof
+from golden_model.fluxproof import REGISTERS
+from golden_model.io import sample_latch
+
+REACH = 4000  # rows before the difference from which a hypothesis is replayed: states may have parted unseen
+BEYOND = 300  # rows behind it that a hypothesis must explain to be looked at further
+STATE_BITS = 40  # widest state: V_STATE
+
+
+@dataclass(frozen=True)
+class Cause:
+    """A hypothesis that gives the recording again.
+
+    kind: "register", "sample" (one raw value), "start_state", "record" (one recorded answer).  name, bit: what is
+    wrong; found: as recorded; acted: as the core behaved.  run, state: for the replay that behaves so.
+    rows: up to which row (exclusive) it explains everything.
+    """
+
+    kind: str
+    name: str
+    bit: int
+    found: int
+    acted: int
+    run: Run
+    state: fluxproof.State
+    rows: int = 0
+
+
+def find_cause(run: Run, state, start: int, stop: int, row: int, names: list[str], whole_state: bool):
+    """(the Cause of a first difference in ``row`` or None, row from which its two runs are to be compared).
+
+    state: before ``start``, of a stretch start..stop-1 without gap.  names: signals that differ in ``row``.
+    whole_state: ``state`` was read from the recording, so that it may be what is wrong.
+    """
+    count, last = run.differences(state, start, stop)
+    if count == 1 and last == row:
+        signal = names[0]
+        found = int(run.recorded[row, run.names.index(signal)])
+        acted = golden_value(run, run.state_at(state, start, row), row, signal)
+        return Cause("record", signal, lowest_bit(found, acted), found, acted, run, state, stop), row
+    begin = max(start, row - REACH)
+    base = run.state_at(state, start, begin)
+    goal = min(stop, row + 1 + BEYOND)
+    best, first = None, row
+    before = run.state_at(base, begin, row)
+    for cause in _hypotheses(run, base, before, row, names, whole_state and begin == start):
+        at = row if cause.kind == "sample" else begin
+        reached, _, _ = cause.run.until_different(cause.state, at, goal)
+        if reached == goal < stop:
+            reached, _, _ = cause.run.until_different(cause.state, at, stop)
+        if reached > row and (best is None or reached > best.rows):
+            best, first = dataclasses.replace(cause, rows=reached), at
+            if reached == stop:
+                break
+    # A bit that explains nothing but the row where the difference shows may do so by chance.
+    return (None, row) if best is not None and best.rows == row + 1 < stop else (best, first)
+
+
+def _hypotheses(run: Run, base, before, row, names, whole_state):
+    """Single bits the other way round, likely ones first; base: state from which they run, before: the row's."""
+    for k, port in enumerate(sample_latch.BLOCK.outputs):
+        name, found = fluxproof.Sample._fields[k], int(run.samples[row, k])
+        for bit in range(port.fmt.width):
+            acted = flipped(found, bit, port.fmt)
+            yield Cause("sample", name, bit, found, acted, run._replace(patch=(row, k, acted)), before)
+    for name in _registers_near(run, names):
+        fmt, found = REGISTERS[name].fmt, getattr(run.registers, name)
+        for bit in range(fmt.width):
+            acted = flipped(found, bit, fmt)
+            changed = run._replace(registers=run.registers._replace(**{name: acted}))
+            yield Cause("register", name, bit, found, acted, changed, base)
+    if whole_state:
+        for name, bit, found, acted, state in _states(base):
+            yield Cause("start_state", name, bit, found, acted, run, state)
+
+
+def _registers_near(run, names):
+    """Registers by distance: those of the block that differs, of hidden ones before it, then all."""
+    near = [OWNER[first_in_flow(names)]]
+    near += reversed(hidden_before(near[0], run.names))
+    near += [name for name in ORDER if name not in near]
+    return list(dict.fromkeys(p.name for name in near for p in fluxproof.WIRING[name][0].BLOCK.registers))
+
+
+def _states(base):
+    """Every bit of the state the other way round: (name, bit, value, changed value, changed state)."""
+    for name, part in base._asdict().items():
+        for key, found in (part._asdict() if isinstance(part, tuple) else {"": part}).items():
+            for bit in range(STATE_BITS):
+                acted = found ^ (1 << bit)
+                changed = part._replace(**{key: acted}) if key else acted
+                yield f"{name}.{key}".rstrip("."), bit, found, acted, base._replace(**{name: changed})
+
+
+def where_they_part(run: Run, cause: Cause, state, first: int, row: int) -> tuple[int, str]:
+    """(row, instance) where the replay and the cause's run part first, hidden signals included.
+
+    state: the replay's before row ``first``, from which both run; ``row``: where the difference shows.
+    """
+    low, high = first, row  # the first row after which the states differ, by bisection
+    while low < high:
+        middle = (low + high) // 2
+        if run.state_at(state, first, middle + 1) != cause.run.state_at(cause.state, first, middle + 1):
+            high = middle
+        else:
+            low = middle + 1
+    ours, theirs = run.state_at(state, first, low), cause.run.state_at(cause.state, first, low)
+    for k in range(low, row + 1):
+        a = trace(ours, run.sample(k), run.registers, run.config)
+        b = trace(theirs, cause.run.sample(k), cause.run.registers, run.config)
+        apart = [name for name in parted(a, b) if name != "latch"]
+        if apart:
+            return k, apart[0]
+        ours, theirs = run.state_at(ours, k, k + 1), cause.run.state_at(theirs, k, k + 1)
+    return row, ""
+
+
+def golden_value(run: Run, state, row, name) -> int:
+    """What the golden model shows in a row; ``state`` is the one before it."""
+    said = trace(state, run.sample(row), run.registers, run.config)
+    return said[OWNER[name]][outputs_of(OWNER[name]).index(name)]
+
+
+def flipped(value, bit, fmt) -> int:
+    """The integer with one bit of its format the other way round, two's complement where it has a sign."""
+    bits = (int(value) ^ (1 << bit)) & ((1 << fmt.width) - 1)
+    return bits - (1 << fmt.width) if fmt.signed and bits >> (fmt.width - 1) else bits
+
+
+def lowest_bit(a: int, b: int) -> int:
+    """The lowest bit in which two integers differ."""
+    return ((a ^ b) & -(a ^ b)).bit_length() - 1

@@ -1,0 +1,102 @@
+"""Which block makes which signal, in the order of the data, and what every block of the core said in one sample.
+
+All of it follows from fluxproof.WIRING, the blocks' declared ports and fluxproof.step itself; nothing is listed twice
+but the two Park transforms whose outputs the top gives other names.
+"""
+
+from __future__ import annotations
+
+import types
+from collections import defaultdict
+
+from golden_model import fluxproof
+
+RENAMED = {"compensation_dq": ("u_comp_d", "u_comp_q"), "direction_functions": ("d_d", "d_q")}
+
+
+def _outputs(instance):
+    """The top's names for an instance's outputs."""
+    block = fluxproof.WIRING[instance][0].BLOCK
+    return RENAMED.get(instance, tuple(p.name for p in block.outputs))
+
+
+# Instances in the order in which their results are ready.
+ORDER = sorted(
+    fluxproof.WIRING, key=lambda name: (fluxproof.schedule()[name][1], list(fluxproof.WIRING).index(name))
+)
+OWNER = {
+    signal: instance
+    for instance in fluxproof.WIRING
+    for signal in _outputs(instance)
+    if signal in fluxproof.Observed._fields
+}
+
+
+def block_name(instance: str) -> str:
+    """The block behind an instance of the top."""
+    return fluxproof.WIRING[instance][0].BLOCK.name
+
+
+def first_in_flow(signals) -> str:
+    """The signal whose block is ready first, ports in the order in which the top shows them."""
+    fields = fluxproof.Observed._fields
+    return min(signals, key=lambda s: (ORDER.index(OWNER[s]), fields.index(s)))
+
+
+def hidden_before(instance: str, shown) -> list[str]:
+    """Instances upstream of one whose results are not among the signals ``shown``, in the order of the data.
+
+    A fault in one of them is seen first at ``instance``, as long as every signal between them is hidden.
+    """
+    found, waiting = set(), list(fluxproof.WIRING[instance][1])
+    while waiting:
+        name = waiting.pop()
+        hidden = [s for s in _outputs(name) if s not in shown]
+        if name in found or not hidden or name == "latch":
+            continue
+        found.add(name)
+        if len(hidden) == len(_outputs(name)):
+            waiting += fluxproof.WIRING[name][1]
+    return sorted(found, key=ORDER.index)
+
+
+class _Listener:
+    """Stands for a block's module inside fluxproof.step and notes what each call returns."""
+
+    def __init__(self, module, notes):
+        self._module, self._notes = module, notes
+
+    def step(self, *args):
+        result = self._module.step(*args)
+        self._notes[self._module].append(result[1] if self._module.BLOCK.state is not None else result)
+        return result
+
+
+def trace(state, sample, registers, config) -> dict[str, tuple]:
+    """{instance: its outputs} of one sample, hidden ones included; ``latch`` is the sample itself.
+
+    The top's step runs as plain Python with listeners in the place of the blocks.  Where one block is used several
+    times, its calls come in the order of WIRING.
+    """
+    notes = defaultdict(list)
+    modules = {module for module, _ in fluxproof.WIRING.values()}
+    step = fluxproof.step.py_func
+    names = dict(step.__globals__)
+    names |= {
+        k: _Listener(v, notes) for k, v in names.items() if isinstance(v, types.ModuleType) and v in modules
+    }
+    types.FunctionType(step.__code__, names)(state, sample, registers, config)
+    said = {}
+    for instance, (module, _) in fluxproof.WIRING.items():
+        said[instance] = tuple(sample) if instance == "latch" else tuple(map(int, notes[module].pop(0)))
+    return said
+
+
+def parted(a: dict[str, tuple], b: dict[str, tuple]) -> list[str]:
+    """Instances whose outputs differ between two traces, in the order of the data."""
+    return [name for name in ORDER if a[name] != b[name]]
+
+
+def outputs_of(instance: str) -> tuple[str, ...]:
+    """Names of an instance's outputs, as the top calls them where it shows them."""
+    return _outputs(instance)

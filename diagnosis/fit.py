@@ -1,0 +1,176 @@
+"""Weighted least squares over cells: how well a set of effects explains a misfit, and with what coefficients.
+
+A model is a set of effects, each in its core or its free form.  Its score is chi^2 plus a price for every
+coefficient, as in Schwarz's criterion; lower is better.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numba
+import numpy as np
+
+from diagnosis.cells import SYSTEM_DC, SYSTEM_U, noise, voltage_level
+
+FRESH = 0.03  # share of a column that must not be in the earlier ones, else the data do not carry it
+PER_EFFECT = 10.0  # price of an effect beside that of its coefficients: one in twenty is there by itself
+
+
+@numba.njit(cache=True)
+def _explained(gram, right, index, fresh2):
+    """Power that columns explain, taken one after the other, and which are kept: those that bring something fresh.
+
+    A Cholesky factorisation that leaves out a column whose pivot has shrunk below ``fresh2``.
+    """
+    n = len(index)
+    factor, z = np.zeros((n, n)), np.zeros(n)
+    columns, kept = np.zeros(n, np.int64), np.zeros(n, np.bool_)
+    gain, count = 0.0, 0
+    for a in range(n):
+        row = np.zeros(n)
+        pivot, value = gram[index[a], index[a]], right[index[a]]
+        for b in range(count):
+            x = gram[index[a], columns[b]]
+            for c in range(b):
+                x -= row[c] * factor[b, c]
+            row[b] = x / factor[b, b]
+            pivot -= row[b] * row[b]
+            value -= row[b] * z[b]
+        if pivot > fresh2:
+            row[count] = np.sqrt(pivot)
+            factor[count], z[count] = row, value / row[count]
+            columns[count], kept[a] = index[a], True
+            gain += z[count] ** 2
+            count += 1
+    return gain, kept
+
+
+@dataclass(frozen=True)
+class Model:
+    """Names of effects and which of them are in their free form."""
+
+    names: frozenset
+    free: frozenset = frozenset()
+
+    def __len__(self):
+        return len(self.names)
+
+    def without(self, name):
+        return Model(self.names - {name}, self.free - {name})
+
+    def with_(self, name, free=False):
+        return Model(self.names | {name}, self.free | {name} if free else self.free - {name})
+
+    def freed(self):
+        return Model(self.names, self.names)
+
+
+@dataclass
+class Solution:
+    """Coefficients {effect: {coefficient: value}} of a model, their covariance, chi^2 and degrees of freedom."""
+
+    model: Model
+    chi2: float
+    count: int  # coefficients
+    rows: int
+    c: dict = field(default_factory=dict)
+    covariance: dict = field(default_factory=dict)  # {effect: (k, k)}
+    score: float = np.inf
+    residual: np.ndarray | None = None
+    view: object = None  # the corrected view this was solved on
+    total: dict = field(default_factory=dict)  # accumulated coefficients of effects that correct the record
+
+    @property
+    def dispersion(self):
+        return self.chi2 / max(self.rows - self.count, 1)
+
+
+class Fitter:
+    """The weighted problem of one view; ``train``: (r,) rows that take part in the fit."""
+
+    def __init__(self, cells, sigma, train, price=None):
+        self.cells, self.sigma = cells, sigma
+        self.use = cells.ok & train
+        self.names, self.owner, stack = [], [], []
+        for effect, columns in cells.columns.items():
+            for key, column in columns.items():
+                self.names.append(key)
+                self.owner.append(effect)
+                stack.append(column[self.use] / sigma[self.use])
+        self.y = cells.y[self.use] / sigma[self.use]
+        a = np.array(stack).T if stack else np.zeros((len(self.y), 0))
+        self.scale = np.linalg.norm(a, axis=0)
+        self.scale[self.scale < 1e-9] = np.inf
+        self.a = a / self.scale
+        self.gram, self.right, self.power = self.a.T @ self.a, self.a.T @ self.y, float(self.y @ self.y)
+        self.price = float(np.log(max(len(self.y), 10))) if price is None else price
+        self.index = {}
+        for k, (effect, key) in enumerate(zip(self.owner, self.names, strict=True)):
+            core, free = self.index.setdefault(effect, ([], []))
+            if np.isfinite(self.scale[k]):
+                (free if key.startswith("~") else core).append(k)
+
+    def columns_of(self, model) -> np.ndarray:
+        """Indices of a model's columns, the cores first."""
+        names = sorted(model.names)
+        cores = [k for name in names for k in self.index[name][0]]
+        return np.array(cores + [k for name in names if name in model.free for k in self.index[name][1]], np.int64)
+
+    def carried(self, model) -> np.ndarray:
+        """Those of a model's columns that the data carry.
+
+        Two levels of a current carry one coefficient of a curve; a second one would be fitted to the noise
+        of the current around the levels.
+        """
+        index = self.columns_of(model)
+        return index[_explained(self.gram, self.right, index, FRESH**2)[1]]
+
+    def chi2(self, model) -> tuple[float, int]:
+        """chi^2 and the number of coefficients, from the Gram matrix alone."""
+        gain, kept = _explained(self.gram, self.right, self.columns_of(model), FRESH**2)
+        return max(self.power - gain, 0.0), int(kept.sum())
+
+    def score(self, model, dispersion=1.0) -> float:
+        """chi^2 over the dispersion plus the price of the coefficients."""
+        chi2, count = self.chi2(model)
+        return chi2 / dispersion + self.price * count + PER_EFFECT * len(model)
+
+    def solve(self, model, dispersion=1.0) -> Solution:
+        """Coefficients, covariance and residual of a model; what the data do not carry is zero."""
+        index, carried = self.columns_of(model), self.carried(model)
+        inverse = np.linalg.inv(self.gram[np.ix_(carried, carried)])
+        chi2, count = self.chi2(model)
+        out = Solution(model, chi2, count, len(self.y), score=self.score(model, dispersion))
+        at = np.searchsorted(index, carried, sorter=np.argsort(index))
+        at = np.argsort(index)[at]
+        values, covariance = np.zeros(len(index)), np.zeros((len(index),) * 2)
+        values[at] = inverse @ self.right[carried] / self.scale[carried]
+        covariance[np.ix_(at, at)] = inverse / np.outer(self.scale[carried], self.scale[carried])
+        fitted = np.zeros(len(self.cells.y))
+        for k, value in zip(index, values, strict=True):
+            fitted += value * self.cells.columns[self.owner[k]][self.names[k]]
+        for name in sorted(model.names):
+            mine = [n for n, k in enumerate(index) if self.owner[k] == name]
+            out.c[name] = {self.names[index[n]].lstrip("~"): float(values[n]) for n in mine}
+            out.covariance[name] = covariance[np.ix_(mine, mine)]
+        out.residual = self.cells.y - fitted
+        return out
+
+
+def everything(cells) -> Model:
+    """All effects in their free form."""
+    return Model(frozenset(cells.columns), frozenset(cells.columns))
+
+
+def row_sigma(view, cells) -> tuple[np.ndarray, np.ndarray]:
+    """Standard deviation of every row with and without the balance's own share: (sigma, noise)."""
+    rough = Fitter(cells, np.ones(len(cells.y)), np.ones(len(cells.y), bool)).solve(everything(cells))
+    pure = noise(view, cells, rough.residual)
+    m = view.machine
+    level = SYSTEM_U * voltage_level(view) + SYSTEM_DC * view.nominal.inverter.dc_bus_v
+    torque = 1.5 * m.pole_pairs * m.magnet_flux_wb * m.rated_current_a
+    own = np.where(cells.order == 0, 1.0, 0.5) * level[cells.block]
+    own = np.where(cells.channel == "sum", 2e-4 * m.rated_current_a, own)
+    own = np.where(cells.channel == "torque", 3e-3 * torque, own)
+    return np.hypot(pure, own), pure

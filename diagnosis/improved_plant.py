@@ -1,0 +1,173 @@
+"""A drive file as a plant: what the hardware is, out of drive.toml and its [plant.*] sections.
+
+The core's own sections describe the machine and the inverter; [sensors] says what the core takes its sensors for, so
+without [plant.sensors] they are exactly that: an offset code of 32800 is a sensor that is off by 32 codes.
+A key in [plant.machine], [plant.inverter] or [plant.sensors] replaces what follows from the core's sections; the
+names are those of plant.Machine, plant.Inverter and plant.Sensors.  Three of them have a form of their own in TOML:
+
+    emf_harmonics = [[order, amplitude_d, amplitude_q, phase_rad], ...]
+    flux_map      = a table of i_d_a (n), i_q_a (m), psi_d_wb (n x m), psi_q_wb (n x m)
+    lists of three for the phases a, b, c
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from diagnosis.nominal import Nominal, load_nominal
+from diagnosis.result import NamedEffect
+from golden_model.drive_keys import DriveError
+from plant import FluxMap, Harmonic, Inverter, Machine, Sensors
+
+FINE_BITS = 24  # of sensors that nobody has described: finer than anything that could matter
+
+
+@dataclass(frozen=True)
+class Timing:
+    """What comes at another instant than the nominal drive says.
+
+    delay_s: the voltage acts that much later than duty_applied_after_samples says.
+    sampling_skew_s: the currents are sampled that long after the PWM centre; negative: before it.
+    """
+
+    delay_s: float = 0.0
+    sampling_skew_s: float = 0.0
+
+
+class Plant(NamedTuple):
+    """A drive's hardware, as the float plant takes it."""
+
+    machine: Machine
+    inverter: Inverter
+    sensors: Sensors
+    timing: Timing
+
+
+SECTIONS = {"machine": Machine, "inverter": Inverter, "sensors": Sensors, "timing": Timing}
+KEYS = {f"{name}.{f.name}": f for name, kind in SECTIONS.items() for f in dataclasses.fields(kind)}
+# Keys of which the plant refuses a negative value, as a noisy estimate of nothing may well be one.
+NOT_NEGATIVE = {f"inverter.{f.name}" for f in dataclasses.fields(Inverter)} | {
+    f"machine.{name}"
+    for name in ("saturation_d_per_a2", "saturation_q_per_a2", "iron_conductance_s", "viscous_friction_nms",
+                 "coulomb_friction_nm")
+}  # fmt: skip
+
+
+def check_key(key: str) -> None:
+    """Refuse a plant key that no plant has; ValueError names the nearest one."""
+    if key not in KEYS:
+        near = difflib.get_close_matches(key, KEYS, n=1, cutoff=0.0)[0]
+        raise ValueError(f"{key} is not a key of the plant; the nearest known one is {near}")
+
+
+def merged(effects: list[NamedEffect]) -> dict:
+    """{plant key: (value, names of the effects behind it)}; where several effects have a say in one key, gains
+    multiply, offsets add, harmonics stand side by side, and of anything else the last one counts: effects that were
+    estimated together agree on what they share."""
+    found: dict = {}
+    for effect in effects:
+        for key, value in effect.plant.items():
+            value = plain(key, value)
+            value = max(value, 0.0) if key in NOT_NEGATIVE else value
+            before, names = found.get(key, (None, ()))
+            if before is not None and key == "sensors.current_gain_error":
+                value = tuple((1.0 + a) * (1.0 + b) - 1.0 for a, b in zip(before, value, strict=True))
+            elif before is not None and key == "sensors.current_offset_a":
+                value = tuple(a + b for a, b in zip(before, value, strict=True))
+            elif before is not None and key == "machine.emf_harmonics":
+                value = before + value
+            found[key] = (value, (*names, effect.name))
+    return found
+
+
+def plant_of(source) -> Plant:
+    """(Machine, Inverter, Sensors, Timing) of a drive file's path or of a Nominal; DriveError as in load_nominal."""
+    nominal = source if isinstance(source, Nominal) else load_nominal(source)
+    tables = {name: dict(nominal.plant.get(name, {})) for name in SECTIONS}
+    unknown = set(nominal.plant) - set(SECTIONS)
+    if unknown:
+        raise DriveError(
+            f"{nominal.path}: unknown section [plant.{unknown.pop()}]; known are {', '.join(SECTIONS)}"
+        )
+    try:
+        given = {
+            name: {k: plain(f"{name}.{k}", v) for k, v in table.items()} for name, table in tables.items()
+        }
+        return Plant(
+            Machine(**({"inertia_kgm2": 1e-3} | _described(nominal.machine, Machine) | given["machine"])),
+            Inverter(**(_described(nominal.inverter, Inverter) | given["inverter"])),
+            Sensors(**(described_sensors(nominal) | given["sensors"])),
+            Timing(**given["timing"]),
+        )
+    except (TypeError, ValueError, KeyError) as error:
+        raise DriveError(f"{nominal.path}: section [plant]: {error}") from None
+
+
+def _described(section, kind) -> dict:
+    """The section's values under the plant's names; None means that the plant's default holds."""
+    known = {f.name for f in dataclasses.fields(kind)}
+    return {k: v for k, v in vars(section).items() if k in known and v is not None}
+
+
+def described_sensors(nominal: Nominal) -> dict:
+    """Fields of plant.Sensors as [sensors] takes the hardware for; fine and without limits where it says nothing."""
+    s, reach = nominal.sensors, 10.0 * nominal.machine.rated_current_a
+    bits, full = s.adc_bits or FINE_BITS, s.current_range_a or reach
+    volts = s.u_dc_range_v or 4.0 * nominal.inverter.dc_bus_v
+    mid, turning = 2 ** (bits - 1), -1 if s.position_reverse else 1
+    return {
+        "current_bits": bits,
+        "current_full_scale_a": full,
+        "current_gain_error": tuple(1.0 / trim - 1.0 for trim in s.current_gain),
+        "current_offset_a": tuple((code - mid) * full / mid for code in s.current_offset_code or (mid,) * 3),
+        "u_dc_bits": bits,
+        "u_dc_full_scale_v": volts,
+        "u_dc_gain_error": 1.0 / s.u_dc_gain - 1.0,
+        "u_dc_offset_v": s.u_dc_offset_code * volts / 2**bits,
+        "position_bits": s.position_bits or FINE_BITS,
+        "position_offset_rad": -turning * s.theta_offset_rad / nominal.machine.pole_pairs,
+        "position_direction": turning,
+    }
+
+
+def plain(key: str, value):
+    """A TOML value as the plant's field takes it; ValueError says what is wrong."""
+    check_key(key)
+    if key == "machine.emf_harmonics":
+        return tuple(h if isinstance(h, Harmonic) else Harmonic(*map(float, h)) for h in value)
+    if key == "machine.flux_map":
+        if value is None or isinstance(value, FluxMap):
+            return value
+        return FluxMap(**{name: np.asarray(grid, float) for name, grid in value.items()})
+    if isinstance(value, (list, tuple, np.ndarray)):
+        value = tuple(float(v) for v in value)
+        if len(value) != 3:
+            raise ValueError(f"{key} needs three values, phases a, b, c, not {len(value)}")
+        return value
+    if isinstance(value, bool) or not isinstance(value, (int, float, np.number)) or not math.isfinite(value):
+        raise ValueError(f"{key} = {value!r} must be a finite number")
+    return value
+
+
+def errors_beyond(sensors: Sensors, nominal: Nominal) -> dict:
+    """What the sensors' readings are off by once the core has applied its nominal trims.
+
+    current_gain (3,), current_offset [A] (3,): reading = current * gain + offset; u_dc_gain;
+    theta_offset [rad]: electrical angle read minus the true one.
+    """
+    s, assumed = nominal.sensors, described_sensors(nominal)
+    trims, p = np.array(s.current_gain), nominal.machine.pole_pairs
+    beyond = np.subtract(sensors.current_offset_a, assumed["current_offset_a"])
+    turned = sensors.position_offset_rad - assumed["position_offset_rad"]
+    return {
+        "current_gain": trims * (1.0 + np.array(sensors.current_gain_error)),
+        "current_offset": trims * beyond,
+        "u_dc_gain": s.u_dc_gain * (1.0 + sensors.u_dc_gain_error),
+        "theta_offset": p * assumed["position_direction"] * turned,
+    }

@@ -1,0 +1,71 @@
+"""From a file to a checked canonical recording: read, map the columns, check.
+
+    recording = load_recording("log.csv", load_nominal("drive.toml"))
+
+RecordingError: nothing can be made of the file; the message is one line.  A recording that can be read but not be
+diagnosed comes back with a fatal problem.  ``meta`` of the recording holds "notes" (what was assumed or worked
+round without being wrong), "columns" (canonical name: file column) and "map" (which map was used).
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from diagnosis.checks import check_recording
+from diagnosis.columns import Plan, canonical, plan_columns
+from diagnosis.readers import read_table
+from diagnosis.readers.table import Table, shown
+from diagnosis.recording import Recording, RecordingError
+
+
+def load_recording(path, nominal) -> Recording:
+    """The recording of a file in canonical form, checked; RecordingError for unusable input.
+
+    path: a file in any format of diagnosis/readers; nominal: Nominal, with its [columns].
+    """
+    plans: list[Plan] = []
+
+    def select(names: dict[str, str]) -> list[str]:
+        plans.append(plan_columns(names, nominal, path))
+        return plans[-1].wanted()
+
+    table = read_table(path, select)
+    plan = plans[-1] if plans else plan_columns({n: table.units.get(n, "") for n in table.columns}, nominal, path)
+    recording = _recording(Path(path), table, plan, nominal)
+    check_recording(recording, nominal)
+    return recording
+
+
+def _recording(path, table: Table, plan: Plan, nominal) -> Recording:
+    """Canonical columns with a time, every row usable, nothing checked."""
+    columns = canonical(table, plan)
+    text = {name: s.column for name, s in plan.sources.items() if name not in columns}
+    if text:
+        name, column = next(iter(text.items()))
+        line = f":{table.lines[0]}" if table.lines is not None else ""
+        raise RecordingError(f"{path}{line}: column {shown(column)!r} ({name}) holds no numbers")
+    n = len(next(iter(columns.values())))
+    notes = [*table.notes, *plan.notes]
+    meta = table.meta | {"notes": notes, "map": plan.used, "columns": {k: s.column for k, s in plan.sources.items()}}
+    meta["stated_units"] = [name for name, s in plan.sources.items() if s.stated]
+    if "t" not in columns:
+        step = table.meta.get("sample_time_s") or plan.sample_time_s or nominal.sample_time_s
+        columns["t"] = step * np.arange(n)
+        notes.append(f"no time column: rows are taken to be {step:g} s apart")
+    for name, value in plan.assumed.items():
+        columns[name] = np.full(n, value)
+    if plan.run and plan.run in table.columns:
+        meta["run"] = table.columns[plan.run]
+    recording = Recording(str(path), columns, np.ones(n, bool), np.append(np.ones(n - 1, bool), False), meta=meta)
+    recording.problems += [_renamed(problem, meta["columns"]) for problem in table.problems]
+    return recording
+
+
+def _renamed(problem, columns):
+    """A reader's finding with the canonical name of its column."""
+    import dataclasses
+
+    name = next((k for k, column in columns.items() if column == problem.column), problem.column)
+    return dataclasses.replace(problem, column=name)

@@ -1,0 +1,113 @@
+"""The layout of a text table: separator, decimal mark, header, units, first line of numbers.
+
+Every pairing of separator and decimal mark is tried on the first lines; the one wins that makes the most
+numbers in lines of equally many fields.  "1,5;2,5" can only be two numbers with a decimal
+comma, "1,5,2,5" only four; nothing is guessed from a country's habits.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections import Counter
+from dataclasses import dataclass
+
+from diagnosis.recording import RecordingError
+
+SNIFF_BYTES = 1 << 18
+SNIFF_LINES = 500
+COMMENT = ("#", "%", "//")
+SEPARATORS = (";", "\t", ",", "|", " ")
+MISSING = {"", "nan", "-nan", "inf", "-inf", "+inf", "na", "n/a", "null", "none", "-"}
+NUMBER = {
+    ".": re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?"),
+    ",": re.compile(r"[+-]?(\d+,?\d*|,\d+)([eE][+-]?\d+)?"),
+}
+UNIT_LINE = re.compile(r"[\[(]?\s*(s|ms|[uµ]s|A|mA|V|mV|rad|deg|°|rpm|1/min|min-1|rad/s|°C|degC|C|Nm|N[m·.]|%|1|-|)\s*[\])]?")
+
+
+@dataclass(frozen=True)
+class Layout:
+    """first: 0-based number of the first line with numbers; names, units: one entry a field."""
+
+    encoding: str
+    separator: str
+    decimal: str
+    first: int
+    names: list[str]
+    units: list[str]
+
+
+def encoding_of(head: bytes) -> str:
+    """UTF-16 and UTF-8 by their marks, else UTF-8 where it decodes, else the Western European code page."""
+    if head.startswith((b"\xff\xfe", b"\xfe\xff")):
+        return "utf-16"
+    if head.startswith(b"\xef\xbb\xbf"):
+        return "utf-8-sig"
+    try:
+        head.decode("utf-8")
+    except UnicodeDecodeError as error:
+        if error.start < len(head) - 4:  # a character cut by the end of the head is none
+            return "cp1252"
+    return "utf-8"
+
+
+def sniff(path) -> Layout:
+    """The layout of the file; RecordingError when no line of numbers is found."""
+    with open(path, "rb") as file:
+        head = file.read(SNIFF_BYTES)
+    encoding = encoding_of(head)
+    lines = head.decode(encoding, "replace").splitlines()
+    if len(head) == SNIFF_BYTES:
+        lines.pop()  # cut by the limit
+        if not lines:
+            raise RecordingError(f"{path}:1: no line end in the first {SNIFF_BYTES} bytes; rows of numbers expected")
+    lines = lines[:SNIFF_LINES]
+    candidates = (_candidate(lines, separator, decimal) for separator in SEPARATORS for decimal in ".,")
+    score, separator, decimal, first, width = max(candidates, key=lambda c: c[0])
+    if score <= 0:
+        raise RecordingError(f"{path}: no row of numbers in the first {len(lines)} lines; a table was expected")
+    names, units = _header(lines[:first], separator, width)
+    return Layout(encoding, separator, decimal, first, names, units)
+
+
+def _candidate(lines, separator, decimal):
+    """(score, separator, decimal, first line, fields) under one assumption; a word costs two numbers."""
+    scores, first = Counter(), {}
+    for k, line in enumerate(lines):
+        if separator == decimal or not line.strip() or line.lstrip().startswith(COMMENT):
+            continue
+        fields = split(line, separator)
+        numbers = sum(bool(NUMBER[decimal].fullmatch(f)) for f in fields)
+        words = len(fields) - numbers - sum(f.lower() in MISSING for f in fields)
+        if numbers > words:
+            scores[len(fields)] += numbers - 2 * words
+            first.setdefault(len(fields), k)
+    width, score = scores.most_common(1)[0] if scores else (0, 0)
+    return score, separator, decimal, first.get(width, 0), width
+
+
+def split(line: str, separator: str) -> list[str]:
+    """The fields of one line."""
+    if separator == " ":
+        return line.split()
+    return [f.strip() for f in next(csv.reader([line], delimiter=separator, skipinitialspace=True), [])]
+
+
+def _header(lines, separator, width):
+    """(names, units) from the lines above the numbers; "1", "2", ... where there is no header."""
+    rows = []
+    for line in reversed(lines):
+        fields = split(line.strip().lstrip("#%/").strip() if line.lstrip().startswith(COMMENT) else line, separator)
+        if len(fields) == width - 1 and separator != " ":
+            fields.append("")  # rows that end in a separator
+        if len(fields) == width and any(fields):
+            rows.append(fields)
+        if len(rows) == 2:
+            break
+    names, units = [str(k + 1) for k in range(width)], [""] * width
+    if rows and len(rows) == 2 and all(UNIT_LINE.fullmatch(f) for f in rows[0]):
+        units, names = [f.strip("[]() ") for f in rows[0]], rows[1]
+    elif rows:
+        names = rows[0]
+    return [name or str(k + 1) for k, name in enumerate(names)], units

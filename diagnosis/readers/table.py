@@ -1,0 +1,112 @@
+"""What every reader returns: named numeric columns of one length, with units and where they stood in the file.
+
+A reader is one file in this folder with
+
+    FORMAT    its name in messages
+    SUFFIXES  file names that claim this format, lower case, with the dot
+    matches(head, path)  whether the content (first bytes) is this format
+    read(path, select)   -> Table
+
+``select`` is handed {column name: unit or ""} and returns the names to read, so that a file of hundreds of
+channels costs no more memory than the ones that count; None reads all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from diagnosis.recording import Problem, RecordingError
+
+MAX_ROWS = 20_000_000
+MAX_COLUMNS = 4096
+MAX_CELLS = 200_000_000  # 1.6 GB as float64: what a reader takes into memory at most
+
+Select = Callable[[dict[str, str]], list[str]]
+
+
+@dataclass
+class Table:
+    """Columns as they stood in the file: float64, shape (n,), nothing converted.
+
+    lines: (n,) line number of each row in a text file, or None.
+    text: names of columns that hold no numbers.
+    meta: what else the file held; "sample_time_s" when it states one.
+    """
+
+    columns: dict[str, np.ndarray]
+    units: dict[str, str] = field(default_factory=dict)
+    lines: np.ndarray | None = None
+    text: list[str] = field(default_factory=list)
+    problems: list[Problem] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    meta: dict = field(default_factory=dict)
+
+
+def chosen(names: dict[str, str], select: Select | None, path) -> list[str]:
+    """The names to read, at most MAX_COLUMNS."""
+    wanted = list(names) if select is None else select(names)
+    if len(wanted) > MAX_COLUMNS:
+        raise RecordingError(f"{path}: {len(wanted)} columns; at most {MAX_COLUMNS} are read")
+    if not wanted:
+        raise RecordingError(f"{path}: holds no numeric column")
+    return wanted
+
+
+def row_limit(n_columns: int) -> int:
+    """How many rows of so many columns are read at most."""
+    return min(MAX_ROWS, MAX_CELLS // max(1, n_columns))
+
+
+def too_long(limit: int, rows: int | None = None) -> Problem:
+    """The finding that says that a file was cut at ``limit`` rows."""
+    of = f" of {rows}" if rows else ""
+    return Problem(
+        "too_long", f"only the first {limit} rows{of} are read", row=limit, action="the rest is not looked at"
+    )
+
+
+def as_columns(arrays: dict[str, object], path) -> tuple[dict[str, np.ndarray], list[str]]:
+    """(numeric columns as float64, names of the others) from arrays of one length; RecordingError if ragged.
+
+    Arrays of shape (n, 1) and (1, n) count as (n,); (n, m) and (m, n) with small m become columns name[0] ...
+    Constants of one value are taken over the whole length.
+    """
+    flat: dict[str, np.ndarray] = {}
+    text = []
+    for name, value in arrays.items():
+        array = np.asarray(value)
+        if array.dtype.kind not in "biuf" or array.size == 0:
+            text.append(name)
+            continue
+        array = np.squeeze(array)
+        if array.ndim == 2 and min(array.shape) <= 64:
+            rows = array.T if array.shape[0] > array.shape[1] else array
+            flat |= {f"{name}[{k}]": row for k, row in enumerate(rows)}
+        elif array.ndim <= 1:
+            flat[name] = np.atleast_1d(array)
+        else:
+            text.append(name)
+    flat = dict(list(flat.items())[:MAX_COLUMNS])
+    n = max((len(a) for a in flat.values()), default=0)
+    if n == 0:
+        raise RecordingError(f"{path}: holds no numeric array")
+    wrong = {name: len(a) for name, a in flat.items() if len(a) not in (1, n)}
+    if wrong:
+        name, length = next(iter(wrong.items()))
+        raise RecordingError(f"{path}: array {shown(name)} has {length} values, others {n}; one length is needed")
+    limit = row_limit(len(flat))
+    columns = {}
+    for name, array in flat.items():
+        array = array[:limit].astype(float)
+        columns[name] = array if len(array) == min(n, limit) else np.full(min(n, limit), array[0])
+    return columns, text
+
+
+def shown(name: object, most: int = 60) -> str:
+    """A name from a file as text that fits a line and does no harm to a terminal."""
+    text = str(name)
+    text = text if text.isprintable() else repr(text)[1:-1]
+    return text if len(text) <= most else f"{text[: most - 3]}..."

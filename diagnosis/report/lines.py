@@ -1,0 +1,164 @@
+"""Pictures with lines and bars: misfit over time and over the angle, harmonic orders, the fit before and after.
+
+The arrays are those of diagnosis.result.Evidence; the drawing functions raise KeyError for a missing one.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from diagnosis.report import theme
+from diagnosis.report.maps import LeftOut, length
+
+POINTS = 300  # along the time axis: about one for each pixel of a phone
+WHEN = {"before": theme.BEFORE, "after": theme.AFTER}
+
+
+def over_time(e) -> theme.Picture:
+    """rms of the misfit's length in equal parts of time, the noise as a band, held-out parts shaded."""
+    t = e["t"]
+    edges = np.linspace(t[0], t[-1], min(POINTS, len(t)) + 1)
+    part = np.clip(np.searchsorted(edges, t, side="right") - 1, 0, len(edges) - 2)
+    rows = np.bincount(part, minlength=len(edges) - 1)
+    middle = (edges[1:] + edges[:-1]) / 2
+    figure, axis = theme.axes(height=2.5)
+    names, tops = [], []
+    for when in _given(e, "{}_d", "{}_q"):
+        squares = np.bincount(part, length(e, when) ** 2, len(rows))
+        rms = np.sqrt(np.divide(squares, rows, out=np.full(len(rows), np.nan), where=rows > 0))
+        _line(axis, middle, rms, WHEN[when])
+        names.append((_called(e, when), WHEN[when]))
+        tops.append(np.nanmax(rms))
+    if "noise" in e:
+        noise = np.sqrt(2.0) * float(np.ravel(e["noise"])[0])  # two axes
+        axis.axhspan(0.0, noise, color=theme.BAND, linewidth=0, zorder=0)
+        names.append(("noise band", theme.SOFT))
+        tops.append(noise)
+    if "holdout" in e and e["holdout"].any():
+        held = np.bincount(part, e["holdout"], len(rows)) > rows / 2
+        upright = dict(transform=axis.get_xaxis_transform(), color=theme.HELD, linewidth=0, zorder=-1)
+        axis.fill_between(np.repeat(edges, 2)[1:-1], 0, 1, where=np.repeat(held, 2), **upright)
+    axis.set(
+        title="Misfit", xlabel="time [s]", ylabel="V", xlim=(t[0], t[-1]), ylim=(0, 1.08 * max(tops) or 1.0)
+    )
+    theme.key(axis, *names)
+    caption = (
+        "Length of the misfit's vector over time. Shaded upright: parts held out, which no fit has seen."
+    )
+    return theme.picture("over_time", figure, caption)
+
+
+def over_angle(e) -> theme.Picture:
+    """Mean misfit over the electrical angle, d above and q below, on one scale."""
+    _same_length(e, "angle", "angle_{}_d", "angle_{}_q")
+    angle = np.degrees(e["angle"]) % 360.0
+    order = np.argsort(angle)
+    figure, panels = theme.axes(2, 1, height=3.3, sharex=True, sharey=True)
+    given = _given(e, "angle_{}_d", "angle_{}_q")
+    for axis, name in zip(panels, "dq", strict=True):
+        for when in given:
+            axis.plot(angle[order], e[f"angle_{when}_{name}"][order], color=WHEN[when])
+        axis.set(title=f"Misfit of $u_{name}$", ylabel="V", xlim=(0, 360), xticks=range(0, 361, 60))
+        theme.key(axis, *((_called(e, when), WHEN[when]) for when in given))
+    panels[-1].set_xlabel("electrical angle [°]")
+    caption = (
+        "Mean misfit over the electrical angle. Six waves in a turn point to the inverter or the magnets."
+    )
+    return theme.picture("over_angle", figure, caption)
+
+
+def orders(e) -> theme.Picture:
+    """Amplitude of each harmonic order, before and after, on a logarithmic scale."""
+    _same_length(e, "orders", "spectrum_{}")
+    values = {when: e[f"spectrum_{when}"] for when in _given(e, "spectrum_{}")}
+    positive = np.concatenate(list(values.values()))
+    positive = positive[positive > 0.0]
+    if not len(positive):
+        raise LeftOut("every harmonic of the misfit is zero")
+    top, bottom = (
+        positive.max() * 1.8,
+        min(max(positive.min() / 1.8, positive.max() * 1e-4), positive.max() / 10),
+    )
+    few = len(e["orders"]) <= 16
+    place = np.arange(len(e["orders"])) if few else e["orders"]
+    gap = 0.11 if few else 0.0
+    figure, axis = theme.axes(height=2.5)
+    for when, side in (("before", -gap), ("after", gap)):
+        if when in values:
+            heights = np.clip(values[when], bottom, top)
+            axis.vlines(place + side, bottom, heights, color=WHEN[when], linewidth=2.4 if few else 1.0)
+            axis.plot(place + side, heights, "o", color=WHEN[when], markersize=5 if few else 2)
+    if few:
+        axis.set_xticks(place, [f"{order:g}" for order in e["orders"]])
+    axis.grid(axis="x", visible=False)
+    axis.set(
+        title="Harmonics",
+        xlabel="order per electrical turn, in dq",
+        ylabel="V",
+        yscale="log",
+        ylim=(bottom, top),
+    )
+    theme.key(axis, *((_called(e, when), WHEN[when]) for when in values))
+    caption = "Amplitude of the misfit's harmonics. Order 0 is what stays the same all round the turn."
+    return theme.picture("orders", figure, caption)
+
+
+def fit_bars(fit) -> theme.Picture:
+    """rms misfit before and after, on what was fitted and on what was not, beside the noise floor."""
+    rows = [
+        ("held out, before", fit.holdout_before, theme.BEFORE),
+        ("held out, after", fit.holdout_after, theme.AFTER),
+        ("fitted, before", fit.train_before, theme.BEFORE),
+        ("fitted, after", fit.train_after, theme.AFTER),
+    ]
+    if not all(np.isfinite(value) for _, value, _ in rows) or not any(value for _, value, _ in rows):
+        raise LeftOut("the misfit was not measured")
+    figure, axis = theme.axes(height=2.3)
+    top = max(value for _, value, _ in rows)
+    for place, (_, value, color) in zip((0, 1, 2.5, 3.5), rows, strict=True):
+        axis.barh(place, value, 0.78, color=color)
+        axis.annotate(
+            f"{value:.3g} {fit.unit}", (value, place), (4, 0), textcoords="offset points", va="center"
+        )
+    if np.isfinite(fit.noise_floor) and fit.noise_floor > 0.0:
+        axis.axvline(fit.noise_floor, color=theme.INK, linewidth=1.1, linestyle=(0, (4, 2)))
+        at = dict(xycoords=("data", "axes fraction"), textcoords="offset points", va="bottom", fontsize=9)
+        axis.annotate(f"noise floor {fit.noise_floor:.3g} {fit.unit}", (fit.noise_floor, 1.0), (-2, 3), **at)
+    axis.set_yticks((0, 1, 2.5, 3.5), [name for name, _, _ in rows])
+    axis.set(xlabel=f"rms misfit of {theme.plain(fit.signal)} [{fit.unit}]", xlim=(0, 1.2 * top))
+    axis.tick_params(axis="y", length=0)
+    axis.grid(axis="y", visible=False)
+    axis.invert_yaxis()
+    return theme.picture(
+        "fit_bars",
+        figure,
+        "Misfit before and after, on operating points that were not fitted and on those that were.",
+    )
+
+
+def _called(e, when: str) -> str:
+    """Before is plainly the misfit where there is no after."""
+    return when if any("after" in name for name in e) else "misfit"
+
+
+def _line(axis, x, y, color) -> None:
+    """A line that breaks where there is nothing, and a dot where a point stands alone."""
+    axis.plot(x, y, color=color)
+    known = np.isfinite(np.pad(y, 1, constant_values=np.nan))
+    alone = known[1:-1] & ~known[:-2] & ~known[2:]
+    axis.plot(x[alone], y[alone], ".", color=color, markersize=3)
+
+
+def _same_length(e, base: str, *patterns: str) -> None:
+    names = [base, *(pattern.format(when) for pattern in patterns for when in WHEN)]
+    sizes = {name: e[name].shape for name in names if name in e}
+    if len(set(sizes.values())) > 1:
+        raise LeftOut(f"the arrays differ in length, {sizes}")
+
+
+def _given(e, *patterns: str) -> list[str]:
+    """Which of before and after have all their arrays; before must."""
+    given = [when for when in WHEN if all(pattern.format(when) in e for pattern in patterns)]
+    if "before" not in given:
+        raise KeyError(patterns[0].format("before"))
+    return given

@@ -1,0 +1,120 @@
+"""The report for people: what report.html is told, from a Diagnosis.
+
+The page needs no script and fetches nothing; Jinja escapes every text, so that names out of a file stay text.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+
+import jinja2
+
+from diagnosis.improved_core import core_values
+from diagnosis.improved_plant import merged, plant_of
+from diagnosis.nominal import SECTIONS
+from diagnosis.report import pictures, words
+
+FOLDER = Path(__file__).resolve().parent
+MOST_PROBLEMS = 60
+RPM = 9.549296585513721  # rad/s to 1/min, 60/(2 pi)
+
+
+def render(diagnosis, nominal=None, overlay: dict | None = None) -> str:
+    """The page as one string of HTML; arguments as in write.write_outputs."""
+    drawn, left_out = pictures.draw(diagnosis, overlay)
+    mood, meaning = words.VERDICTS[diagnosis.verdict]
+    compared = diagnosis.verdict not in ("bad_recording", "digital_mismatch") or bool(
+        diagnosis.evidence.arrays
+    )
+    named = {name for group in diagnosis.ambiguity for name in group} | {e.name for e in diagnosis.effects}
+    context = dict(
+        d=diagnosis,
+        mood=mood,
+        meaning=meaning,
+        compared=compared,
+        words=words,
+        text={name: words.effect_text(name) for name in sorted(named)},
+        fit=fit_view(diagnosis.fit),
+        regions=[region_view(region) for region in diagnosis.location.regions],
+        requests=[request_view(request, nominal) for request in diagnosis.next_recording],
+        plant=plant_rows(diagnosis.effects, nominal),
+        core=core_values(nominal, diagnosis.effects) if nominal is not None else [],
+        problems=sorted(diagnosis.problems, key=lambda problem: not problem.fatal)[:MOST_PROBLEMS],
+        pictures=drawn,
+        left_out=left_out if compared else [],
+        drive=nominal.path if nominal is not None else "",
+    )
+    loader = jinja2.FileSystemLoader(FOLDER)
+    environment = jinja2.Environment(
+        loader=loader, autoescape=True, trim_blocks=True, undefined=jinja2.StrictUndefined
+    )
+    html = environment.get_template("report.html").render(context)
+    return html.lstrip().encode("utf-8", "replace").decode()  # a path may hold bytes that are no text
+
+
+def fit_view(fit) -> SimpleNamespace:
+    """How many times smaller the misfit became, and how far it is from the noise; None where it was not measured."""
+
+    def ratio(above, below):
+        return above / below if above > 0.0 and below > 0.0 else None
+
+    return SimpleNamespace(
+        smaller=ratio(fit.holdout_before, fit.holdout_after),
+        over_noise=ratio(fit.holdout_after, fit.noise_floor),
+        before_over_noise=ratio(fit.holdout_before, fit.noise_floor),
+    )
+
+
+def region_view(region) -> SimpleNamespace:
+    """A row of the table of regions."""
+    name, unit = words.VARIABLES.get(region.variable, (region.variable, region.unit))
+    known = region.rms_elsewhere and region.rms is not None and region.rms_elsewhere > 0.0
+    times = words.number(region.rms / region.rms_elsewhere, 2) if known else "–"
+    return SimpleNamespace(
+        name=name,
+        span=words.span(region.low, region.high, unit),
+        inside=words.number(region.rms, 3),
+        outside=words.number(region.rms_elsewhere, 3),
+        times=times,
+    )
+
+
+def request_view(request, nominal) -> SimpleNamespace:
+    """A row of the table of recordings to make; speed in revolutions a minute too where the pole pairs are known."""
+    speed = f"{words.number(request.omega_e)} rad/s"
+    if nominal is not None:
+        speed += f" ({words.number(request.omega_e * RPM / nominal.machine.pole_pairs)} rpm)"
+    also = []
+    if request.u_dc is not None:
+        also.append(f"bus at {words.quantity(request.u_dc, 'V')}")
+    if request.temp_winding is not None:
+        also.append(f"winding at {words.quantity(request.temp_winding, '°C')}")
+    return SimpleNamespace(
+        speed=speed,
+        i_d=words.quantity(request.i_d, "A"),
+        i_q=words.quantity(request.i_q, "A"),
+        also=", ".join(also),
+        separates=request.separates,
+        why=request.why,
+    )
+
+
+def plant_rows(effects, nominal) -> list[SimpleNamespace]:
+    """What the plant is told: a row for each key with its value so far, the new one, its unit and the effects."""
+    plant, rows = plant_of(nominal) if nominal is not None else None, []
+    for key, (value, names) in merged(effects).items():
+        section, _, name = key.partition(".")
+        # A sensor's error counts from the trims in force: there is no such value in the file so far.
+        before = getattr(getattr(plant, section, None), name, None) if section != "sensors" else None
+        cells = dict(before=words.brief(before), after=words.brief(value), unit=_unit(section, name))
+        rows.append(SimpleNamespace(key=key, effects=names, **cells))
+    return rows
+
+
+def _unit(section: str, name: str) -> str:
+    """The unit of a key of drive.toml; empty for one that the nominal drive does not know."""
+    field = getattr(SECTIONS.get(section), "__dataclass_fields__", {}).get(name)
+    return (
+        words.unit_text(field.metadata["key"].unit) if field is not None and "key" in field.metadata else ""
+    )

@@ -1,0 +1,85 @@
+"""Every picture that a diagnosis can be given, and for each that cannot be drawn the reason."""
+
+from __future__ import annotations
+
+import warnings
+
+import matplotlib as mpl
+import numpy as np
+
+from diagnosis.report import lines, maps, overlay, theme
+from diagnosis.report.maps import LeftOut
+
+# name: (function of the block means, arrays it cannot do without, what the reader knows it by)
+BLOCKS = ("before_d", "before_q")
+DRAWN = {
+    "speed_current": (
+        maps.speed_current,
+        ("omega_e", "i_d", "i_q", *BLOCKS),
+        "misfit over speed and current",
+    ),
+    "angle_current": (
+        maps.angle_current,
+        ("theta_e", "i_d", "i_q", *BLOCKS),
+        "misfit over angle and current",
+    ),
+    "orders": (lines.orders, ("orders", "spectrum_before"), "harmonic orders"),
+    "over_angle": (lines.over_angle, ("angle", "angle_before_d", "angle_before_q"), "misfit over the angle"),
+    "over_time": (lines.over_time, ("t", *BLOCKS), "misfit over time"),
+}
+BLOCK_ARRAYS = (
+    "t",
+    "theta_e",
+    "omega_e",
+    "i_d",
+    "i_q",
+    "before_d",
+    "before_q",
+    "after_d",
+    "after_q",
+    "holdout",
+)
+
+
+def draw(diagnosis, laid_over: dict | None) -> tuple[dict[str, theme.Picture], list[str]]:
+    """(pictures by name, one line for each picture left out with the reason)."""
+    drawn, left_out = {}, []
+    arrays = {name: np.asarray(values) for name, values in diagnosis.evidence.arrays.items()}
+    try:
+        arrays = _clean(arrays)
+    except LeftOut as reason:
+        return {}, [f"every picture of the misfit: {reason}"] if arrays else []
+    jobs = [(name, title, needs, function, arrays) for name, (function, needs, title) in DRAWN.items()]
+    jobs.append(("fit_bars", "misfit before and after", (), lines.fit_bars, diagnosis.fit))
+    if laid_over is not None:
+        jobs.append(
+            ("overlay", "simulation over the recording", ("t", "recorded"), overlay.overlay, laid_over)
+        )
+    for name, title, needs, function, data in jobs:
+        missing = [need for need in needs if need not in data]
+        try:
+            if missing:
+                raise LeftOut(f"there is no {', '.join(missing)}")
+            with mpl.rc_context(theme.STYLE), warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # empty slices of a map are meant; a font may lack a letter
+                drawn[name] = function(data)
+        except LeftOut as reason:
+            left_out.append(f"{title}: {reason}")
+    return drawn, left_out
+
+
+def _clean(arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """The arrays without blocks that hold NaN or infinity; LeftOut where lengths disagree or nothing is left."""
+    blocks = {name: arrays[name] for name in BLOCK_ARRAYS if name in arrays}
+    sizes = {name: values.shape for name, values in blocks.items()}
+    if len(set(sizes.values())) > 1:
+        raise LeftOut(f"the block means differ in length, {sizes}")
+    rest = {name: values for name, values in arrays.items() if name not in blocks}
+    if not np.all(np.isfinite(rest.get("noise", 0.0))):
+        rest.pop("noise")
+    if not blocks:
+        return rest
+    good = np.all([np.isfinite(values.astype(float)) for values in blocks.values()], axis=0)
+    if good.sum() < 2:
+        raise LeftOut("fewer than two blocks of the recording hold finite numbers")
+    return rest | {name: values[good] for name, values in blocks.items()}

@@ -1,0 +1,94 @@
+"""One look for every picture, in light and in dark: colours are roles, which the page's style sheet fills in.
+
+A figure is drawn with the light colours; in its SVG each becomes a CSS variable, so that the same picture
+follows the reader's colour scheme.  Letters are outlines, no font is needed.  Before is vermilion and after is
+blue, a pair that survives colour-blindness; lines are named where they are, not in a legend.
+"""
+
+from __future__ import annotations
+
+import io
+import re
+from dataclasses import dataclass
+
+import matplotlib as mpl
+from markupsafe import Markup, escape
+from matplotlib.figure import Figure
+
+LIGHT = {
+    "--ink": "#1d2127",
+    "--soft": "#5c636d",
+    "--axis": "#9aa0a8",
+    "--grid": "#e8eaed",
+    "--before": "#c2461c",
+    "--after": "#1f5fa8",
+    "--recorded": "#7d8590",
+    "--band": "#dfe3e8",
+    "--held": "#f3ead2",
+    "--empty": "#eceef1",
+}
+INK, SOFT, AXIS, GRID, BEFORE, AFTER, RECORDED, BAND, HELD, EMPTY = LIGHT.values()
+WIDTH = 4.7  # inches; narrow, so that 10-point letters are still read on a phone of 400 px
+STYLE = {k: v for k, v in mpl.rcParamsDefault.items() if not k.startswith("backend")} | {
+    **{"font.size": 10.0, "text.color": INK, "axes.labelcolor": SOFT},
+    **{
+        "axes.titlesize": 10.5,
+        "axes.titleweight": "bold",
+        "axes.titlelocation": "left",
+        "axes.titlecolor": INK,
+    },
+    **{"axes.grid": True, "grid.color": GRID, "axes.axisbelow": True, "axes.edgecolor": AXIS},
+    **dict.fromkeys(("axes.spines.top", "axes.spines.right"), False),
+    **dict.fromkeys(("xtick.color", "ytick.color"), AXIS),
+    **dict.fromkeys(("xtick.labelcolor", "ytick.labelcolor"), SOFT),
+    **dict.fromkeys(("figure.facecolor", "axes.facecolor", "savefig.facecolor"), "none"),
+    **{"image.cmap": "cividis", "lines.linewidth": 1.3, "path.simplify_threshold": 0.4},
+    "svg.hashsalt": "fluxproof",  # the same figure, the same bytes
+}
+NO_METADATA = dict.fromkeys(("Creator", "Date", "Format", "Type"))
+
+
+@dataclass(frozen=True)
+class Picture:
+    """An SVG element that can stand in the page as it is, and what it shows in a sentence."""
+
+    svg: Markup
+    caption: str
+
+
+def axes(*shape: int, height: float, **kwargs):
+    """(figure, axes) of the width every picture has."""
+    figure = Figure(figsize=(WIDTH, height), layout="constrained")
+    return figure, figure.subplots(*shape, **kwargs)
+
+
+def key(axis, *words: tuple[str, str]) -> None:
+    """Names of the lines in their own colours, above the axes at the right."""
+    place, at = axis.transAxes, (1.0, 1.0)
+    for text, color in reversed(words):
+        offset = dict(xytext=(0, 4) if place is axis.transAxes else (-9, 0), textcoords="offset points")
+        at_words = dict(
+            xycoords=place, color=color, ha="right", va="bottom", fontsize=9, annotation_clip=False
+        )
+        place, at = axis.annotate(text, at, **at_words, **offset), (0.0, 0.0)
+
+
+def plain(text: str) -> str:
+    """Text of a file as a label: never read as a formula, cut to what fits."""
+    printable = "".join(c if c.isprintable() else "?" for c in str(text)).replace("$", r"\$")
+    return printable if len(printable) <= 40 else printable[:39] + "…"
+
+
+def picture(name: str, figure: Figure, caption: str) -> Picture:
+    """The figure as an inline SVG element whose colours follow the page; ``name`` keeps its ids apart."""
+    with mpl.rc_context(STYLE), io.BytesIO() as stream:
+        figure.savefig(stream, format="svg", dpi=144, metadata=NO_METADATA)
+        svg = stream.getvalue().decode()
+    svg = svg[svg.index("<svg") :]
+    svg = re.sub(r"<!--.*?-->|<style.*?</style>|<metadata.*?</metadata>", "", svg, flags=re.DOTALL)
+    svg = re.sub(r'(\bid="|url\(#|href="#)', rf"\g<1>{name}-", svg)
+    for role, color in LIGHT.items():
+        svg = svg.replace(color, f"var({role})")
+    head = re.sub(r'\s(width|height|version|xmlns)="[^"]*"', "", svg[: svg.index(">")])
+    head = f'{head} role="img" aria-label="{escape(caption)}">'
+    return Picture(Markup(head + svg[svg.index(">") + 1 :]), caption)

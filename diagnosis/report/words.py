@@ -1,0 +1,139 @@
+"""The report's words: what a verdict means, numbers as one writes them, an effect in plain language."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from types import SimpleNamespace
+
+from diagnosis.catalogue import CATALOGUE
+
+# verdict: (mood, what it means); the mood is the colour, and the word beside it says the same.
+VERDICTS = {
+    "explained": (
+        "good",
+        "Known physics accounts for the difference, on operating points that were not fitted too.",
+    ),
+    "ambiguous": ("open", "Several causes fit this recording equally well."),
+    "unexplained": ("open", "What is left is more than noise, and nothing in the catalogue explains it."),
+    "no_mismatch": ("good", "Recording and simulation agree to within the noise floor."),
+    "digital_mismatch": (
+        "bad",
+        "The controller did not compute what its golden model computes. Mend that first.",
+    ),
+    "bad_recording": ("bad", "The recording cannot carry a diagnosis. Nothing was compared."),
+}
+VARIABLES = {
+    "t": ("time", "s"),
+    "theta_e": ("electrical angle", "rad"),
+    "omega_e": ("electrical speed", "rad/s"),
+    "i_d": ("current i_d", "A"),
+    "i_q": ("current i_q", "A"),
+    "u_dc": ("bus voltage", "V"),
+    "temp_winding": ("winding temperature", "°C"),
+}
+UNITS = {"ohm": "Ω", "degC": "°C", "1": "", "Nm": "N m", "Nms": "N m s", "kgm2": "kg m²"}
+PREFIXED = ("H", "Wb", "s", "Ω")
+PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
+
+
+def number(value, digits: int = 4) -> str:
+    """A number with ``digits`` significant digits and a real minus sign; a dash for what is not known."""
+    if value is None or (isinstance(value, float) and math.isnan(value)):
+        return "–"
+    if math.isinf(value):
+        return "∞" if value > 0 else "−∞"
+    return f"{float(value):.{digits}g}".replace("-", "−")
+
+
+def unit_text(unit: str) -> str:
+    return UNITS.get(unit, unit)
+
+
+def quantity(value, unit: str, digits: int = 4) -> str:
+    """A number with its unit, 0.01607 H as 16.07 mH."""
+    factor, unit = _prefix(value, unit_text(unit))
+    return f"{number(value / factor if factor != 1.0 else value, digits)} {unit}".rstrip()
+
+
+def measured(value: float, sigma: float | None, unit: str) -> str:
+    """value ± sigma with two digits of sigma, and the unit; angles in degrees too."""
+    factor, name = _prefix(value, unit_text(unit))
+    if sigma is None or not math.isfinite(sigma) or sigma <= 0.0:
+        text = f"{quantity(value, unit)} (uncertainty unknown)"
+    else:
+        decimals = min(max(1 - math.floor(math.log10(sigma / factor)), 0), 9)
+        text = f"{value / factor:.{decimals}f} ± {sigma / factor:.{decimals}f} {name}".replace(
+            "-", "−"
+        ).rstrip()
+    return f"{text} = {number(math.degrees(value), 3)}°" if unit == "rad" else text
+
+
+def _prefix(value, unit: str) -> tuple[float, str]:
+    if unit not in PREFIXED or value is None or not math.isfinite(value) or value == 0.0:
+        return 1.0, unit
+    factor, prefix = next(((f, p) for f, p in PREFIXES if abs(value) >= 0.1 * f), PREFIXES[-1])
+    return factor, prefix + unit
+
+
+def percent(share: float) -> str:
+    """A share of 1 in percent; nothing short of it is called 100 %."""
+    if share is None or not math.isfinite(share):
+        return "–"
+    return "> 99 %" if 0.995 <= share < 1.0 else f"{100 * share:.0f} %".replace("-", "−")
+
+
+def span(low, high, unit: str) -> str:
+    """From low to high, either end open."""
+    low_open, high_open = low is None or not math.isfinite(low), high is None or not math.isfinite(high)
+    if low_open and high_open:
+        return "everywhere"
+    if low_open or high_open:
+        return f"{'below' if low_open else 'above'} {quantity(high if low_open else low, unit)}"
+    return f"{number(low)} to {number(high)} {unit_text(unit)}"
+
+
+def brief(value) -> str:
+    """A value of drive.toml as one types it there; a table by its size and range."""
+    if dataclasses.is_dataclass(value):
+        value = dataclasses.asdict(value)
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if isinstance(value, bool) or value is None:
+        return {True: "true", False: "false", None: "–"}[value]
+    if isinstance(value, int | float):
+        return f"{value:.6g}"
+    if isinstance(value, dict):
+        return "; ".join(f"{key}: {brief(item)}" for key, item in value.items())
+    if not isinstance(value, list | tuple):
+        return str(value)
+    shape, flat = [len(value)], list(value)
+    while flat and all(isinstance(item, list | tuple) for item in flat):
+        shape.append(max(len(item) for item in flat))
+        flat = [item for part in flat for item in part]
+    if not all(isinstance(item, int | float) for item in flat):
+        return " | ".join(brief(item) for item in flat) or "none"
+    if len(flat) <= 4 and len(shape) == 1:
+        return ", ".join(brief(item) for item in flat)
+    return f"{' × '.join(map(str, shape))} values from {brief(min(flat))} to {brief(max(flat))}"
+
+
+def effect_text(name: str) -> SimpleNamespace:
+    """title, equation, signature, separated_by and meanings {parameter: words} of the catalogue.
+
+    A name that the catalogue does not have stands for itself.
+    """
+    entry = CATALOGUE.get(name)
+
+    def of(key: str):
+        return getattr(entry, key, "") or ""
+
+    separated_by = of("separated_by")
+    return SimpleNamespace(
+        name=name,
+        title=of("title") or name.replace("_", " "),
+        equation=of("equation"),
+        signature=of("signature"),
+        separated_by=separated_by if isinstance(separated_by, str) else "; ".join(map(str, separated_by)),
+        meanings={parameter.name: parameter.meaning for parameter in of("parameters")},
+    )

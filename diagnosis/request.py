@@ -1,0 +1,110 @@
+"""Which recording would tell tied explanations apart: the operating points at which they differ most."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+
+from diagnosis.cells import Projector
+from diagnosis.result import Request
+
+ROWS = 200
+ENOUGH = 50.0  # squared distance, in standard deviations, that counts as told apart
+MOST = 4
+
+
+def steady_view(view, omega, i_dq, rows=ROWS):
+    """A view of made-up steady operating points of the nominal drive: omega (b,) [rad/s], i_dq (b,) complex [A]."""
+    omega, i_dq = np.asarray(omega, float), np.asarray(i_dq, complex)
+    period, b = view.sample_time_s, len(omega)
+    theta = 0.1 + omega[:, None] * period * np.arange(-1, rows + 2)
+    steady = lambda x, n: np.repeat(np.asarray(x)[:, None], n, axis=1)  # noqa: E731
+    i = steady(i_dq, rows + 1)
+    psi = view.inductances(i_dq) + view.machine.magnet_flux_wb
+    u_dq = view.machine.resistance_ohm * i_dq + 1j * omega * psi
+    middle = 0.5 * (theta[:, 1:] + theta[:, :-1])
+    inner = theta[:, 1:-1]
+    return view.replace(
+        theta=inner,
+        omega=steady(omega, rows + 1),
+        i=i,
+        i_raw=i * np.exp(1j * inner),
+        i_abc=None,
+        u=u_dq[:, None] * np.exp(1j * middle),
+        u_dc=np.full((b, rows), float(view.nominal.inverter.dc_bus_v)),
+        t=np.full(b, view.span_s),
+        temp=np.full(b, float(np.nanmedian(view.temp)) if np.isfinite(view.temp).any() else np.nan),
+        torque=np.full(b, np.nan),
+        run=np.arange(b),
+        rows=np.zeros(b, int),
+    )
+
+
+def grid(view):
+    """Operating points that the drive can run: (omega, i_dq), within its voltage and what was recorded."""
+    m = view.machine
+    rated = m.rated_current_a
+    u_max = 0.9 * view.nominal.inverter.dc_bus_v / np.sqrt(3)
+    top = max(float(np.abs(view.omega).max()), 0.25 * u_max / m.magnet_flux_wb)
+    points = []
+    for share, q, d in itertools.product((0.0, 0.1, -0.1, 0.3, -0.3, 0.6, -0.6, 1.0, -1.0), (0.0, 0.5, -0.5, 1.0, -1.0), (0.0, -0.5, 0.5)):
+        omega, i = share * top, rated * (d + 1j * q)
+        u = m.resistance_ohm * i + 1j * omega * (view.inductances(np.array(i)) + m.magnet_flux_wb)
+        if abs(i) <= 1.2 * rated and abs(u) < u_max:
+            points.append((omega, i))
+    return np.array([p[0] for p in points]), np.array([p[1] for p in points])
+
+
+def predictions(view, solution, effects):
+    """What a solution adds to the misfit of a view, as rows (r,), and the standard deviation of it (r,)."""
+    p = Projector(view)
+    total, variance = np.zeros(len(p.ok)), np.zeros(len(p.ok))
+    for name, c in solution.c.items():
+        effect = effects[name]
+        columns = {**effect.core(view), **effect.free(view)}
+        rows = np.array([p.rows(columns[key]) if key in columns else np.zeros(len(p.ok)) for key in c])
+        total += np.array(list(c.values())) @ rows
+        variance += np.einsum("ir,ij,jr->r", rows, solution.covariance[name], rows)
+    return p, total, np.sqrt(np.maximum(variance, 0.0))
+
+
+def requests(view, solutions, effects, noise_v) -> list[Request]:
+    """Operating points that separate the tied solutions best, the most telling first; empty where none does."""
+    omega, i = grid(view)
+    made = steady_view(view, omega, i)
+    rows = [predictions(made, s, effects) for s in solutions]
+    p = rows[0][0]
+    pairs = list(itertools.combinations(range(len(solutions)), 2))
+    own = np.hypot(noise_v, 3e-4 * view.nominal.inverter.dc_bus_v)
+    distance = np.zeros((len(pairs), len(omega)))
+    for n, (a, b) in enumerate(pairs):
+        difference = rows[a][1] - rows[b][1]
+        weight = np.where(p.ok & (p.channel == "u"), 1.0 / (own**2 + 0.25 * (rows[a][2] ** 2 + rows[b][2] ** 2)), 0.0)
+        np.add.at(distance[n], p.block, weight * difference**2)
+    out, reached = [], np.zeros(len(pairs))
+    while len(out) < MOST and (reached < ENOUGH).any():
+        open_pairs = reached < ENOUGH
+        gain = np.minimum(distance[open_pairs], ENOUGH).sum(axis=0)
+        k = int(np.argmax(gain))
+        told = open_pairs & (distance[:, k] >= 9.0)
+        if not told.any():
+            break
+        reached = reached + np.minimum(distance[:, k], ENOUGH)
+        names = sorted({x for n in np.flatnonzero(told) for s in pairs[n] for x in solutions[s].model.names})
+        worst = pairs[int(np.argmax(np.where(told, distance[:, k], -1)))]
+        out.append(
+            Request(float(omega[k]), float(i[k].real), float(i[k].imag), names, _why(made, k, rows, worst, solutions), float(view.nominal.inverter.dc_bus_v))
+        )
+        distance[:, k] = 0.0
+    return out
+
+
+def _why(view, k, rows, pair, solutions):
+    p = rows[0][0]
+    at = p.ok & (p.block == k) & (p.channel == "u")
+    a, b = (" with ".join(sorted(solutions[n].model.names)) for n in pair)
+    difference = np.where(at, np.abs(rows[pair[0]][1] - rows[pair[1]][1]), 0.0)
+    row = int(np.argmax(difference))
+    where = f"u_{'dq'[p.part[row]]}" + (f" at order {abs(p.order[row]):g}" if p.order[row] else "")
+    return f"{where} differs by {difference[row]:.3g} V between {a} and {b}"

@@ -1,0 +1,239 @@
+"""Which effects explain the misfit: every small set of them, solved exactly, against each other.
+
+1. All sets of up to three effects, each in core and free form, are scored on the linear problem.
+2. The best are refined: errors of the record (angle, currents, delay, bus) are taken off the data with the
+   estimate so far and the balance is made anew, until the estimate stands.
+3. Around the best refined set, effects are added, removed and exchanged until nothing scores better.
+4. An effect stays only if it earns its place beside the freest form of all others, is larger than an
+   engineer's floor and than its own uncertainty.
+5. What scores nearly as well is tied: what all tied sets share is asserted, the rest is an ambiguity.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from diagnosis.cells import cells_of
+from diagnosis.fit import Fitter, Model, Solution, everything, row_sigma
+
+MOST_AT_ONCE = 3
+REFINED = 14
+TIE = 10.0
+EARNS = 20.0  # gain in chi^2 over dispersion that an effect must bring beside the freest form of the others
+SURE = 4.0  # sizes of its own standard deviation
+
+
+@dataclass
+class Outcome:
+    """What the search found: the best solution, what is tied with it, and the problem it was solved on."""
+
+    best: Solution
+    tied: list[Solution]
+    empty: Solution
+    sigma: np.ndarray
+    pure: np.ndarray  # sigma without the balance's own share
+    train: np.ndarray
+    dispersion: float
+    final_fitter: Fitter = None
+    log: list = field(default_factory=list)
+
+
+class Search:
+    """One search over one view."""
+
+    def __init__(self, view, effects, train_blocks, progress=lambda text: None):
+        self.view, self.effects, self.progress = view, dict(effects), progress
+        self.cells = cells_of(view, self.effects.values())
+        self.sigma, self.pure = row_sigma(view, self.cells)
+        self.train = train_blocks[self.cells.block]
+        self.linear = Fitter(self.cells, self.sigma, self.train)
+        self.refined: dict[Model, Solution] = {}
+        chi2, count = self.linear.chi2(everything(self.cells))
+        self.dispersion = max(1.0, chi2 / max(len(self.linear.y) - count, 1))
+
+    def run(self) -> Outcome:
+        """The whole search."""
+        self.progress("sets of effects")
+        empty = self.refine(Model(frozenset()))
+        for model in self._linear_best():
+            self.refine(model)
+        best = self._best()
+        for _ in range(6):
+            self.progress(f"around {', '.join(sorted(best.model.names)) or 'no effect'}")
+            self._neighbours(best)
+            better = self._best()
+            if better.model == best.model:
+                break
+            best = better
+        best = self._pruned(best)
+        tied = self._tied(best)
+        fitter = self._fitter_at(best)
+        return Outcome(best, tied, empty, self.sigma, self.pure, self.train, self.dispersion, fitter)
+
+    def allowed(self, model) -> bool:
+        """Whether an absorbed effect stands only beside the free form of what absorbs it."""
+        return all(
+            name in model.free or not (set(self.effects[name].absorbs) & model.names) for name in model.names
+        )
+
+    def forms(self, names):
+        """The forms in which a set is tried: all core, each one free, all free."""
+        names = frozenset(names)
+        bendable = frozenset(n for n in names if self.linear.index[n][1])
+        free = {frozenset(), bendable, *(frozenset([n]) for n in bendable)}
+        return [m for f in free if self.allowed(m := Model(names, f))]
+
+    def plausible(self, solution) -> bool:
+        """No effect has a sign that its physics rules out, beyond doubt."""
+        for name in solution.model.names:
+            effect = self.effects[name]
+            if effect.positive:
+                c, cov = solution.c[name], solution.covariance[name]
+                if sum(c.values()) < -2.0 * np.sqrt(max(cov.sum(), 0.0)):
+                    return False
+        return True
+
+    def _linear_best(self):
+        """The most promising models of up to MOST_AT_ONCE effects on the linear problem."""
+        able = [n for n in self.effects if self.linear.index[n][0]]
+        scored = []
+        for size in range(1, MOST_AT_ONCE + 1):
+            level = []
+            for names in itertools.combinations(able, size):
+                level += [(self.linear.score(m, self.dispersion), m) for m in self.forms(names)]
+            level.sort(key=lambda entry: entry[0])
+            scored.append([m for _, m in level[: REFINED // 2 + 2 * (size == 1)]])
+            if size == 2 and level:  # only effects of good pairs go on to triples
+                good = [m for _, m in level[:60]]
+                able = [n for n in able if any(n in m.names for m in good)]
+        return [m for level in scored for m in level]
+
+    def refine(self, model) -> Solution:
+        """The model solved with its errors of the record taken off the data."""
+        if model in self.refined:
+            return self.refined[model]
+        record = [n for n in sorted(model.names) if self.effects[n].corrects]
+        if not record:
+            solution = self.linear.solve(model, self.dispersion)
+            solution.view = self.view
+        else:
+            solution = self._iterated(model, record)
+        if not self.plausible(solution):
+            solution.score = np.inf
+        self.refined[model] = solution
+        return solution
+
+    def _iterated(self, model, record):
+        totals: dict = {n: {} for n in record}
+        view, mine = self.view, [self.effects[n] for n in sorted(model.names)]
+        for step in range(4):
+            cells = self.cells if step == 0 else cells_of(view, mine)
+            solution = Fitter(cells, self.sigma, self.train, self.linear.price).solve(model, self.dispersion)
+            small = True
+            for n in record:
+                for key, value in solution.c[n].items():
+                    totals[n][key] = totals[n].get(key, 0.0) + value
+                spread = np.sqrt(np.maximum(np.diag(solution.covariance[n]), 0.0))
+                small &= all(abs(v) < 0.1 * s for v, s in zip(solution.c[n].values(), spread, strict=True))
+            if step == 3 or (small and step > 0):
+                break
+            corrected = self.corrected(totals)
+            if corrected is None:
+                solution.score = np.inf
+                break
+            view = corrected
+        for n in record:
+            solution.c[n] = dict(totals[n])
+        solution.view, solution.total = view, totals
+        return solution
+
+    def corrected(self, totals):
+        """The view without the errors of the record that the totals stand for; None where they make no sense."""
+        view = self.view
+        for name in sorted(totals, key=lambda n: n == "sampling_skew"):
+            view = self.effects[name].corrected(view, totals[name])
+            if not (np.isfinite(view.u).all() and np.isfinite(view.i_raw).all()):
+                return None
+        return view
+
+    def _best(self) -> Solution:
+        return min(self.refined.values(), key=lambda s: s.score)
+
+    def _fitter_at(self, solution) -> Fitter:
+        """The linear problem with all effects at the solution's corrected data."""
+        if solution.view is self.view or solution.view is None:
+            return self.linear
+        return Fitter(cells_of(solution.view, self.effects.values()), self.sigma, self.train, self.linear.price)
+
+    def _neighbours(self, best):
+        """Refine what lies one addition, removal, exchange or change of form away and promises something."""
+        at = self._fitter_at(best)
+        tried = []
+        names, free = best.model.names, best.model.free
+        for name in names:
+            self.refine(best.model.without(name))
+            if at.index[name][1]:
+                other = best.model.with_(name, name not in free)
+                if self.allowed(other):
+                    self.refine(other)
+        for name in self.effects:
+            if name in names or not at.index[name][0]:
+                continue
+            for bend in (False, True):
+                grown = best.model.with_(name, bend)
+                tried.append((at.score(grown, self.dispersion), grown))
+                for out in names:
+                    swapped = grown.without(out)
+                    tried.append((at.score(swapped, self.dispersion), swapped))
+        tried.sort(key=lambda entry: entry[0])
+        for score, model in [t for t in tried if self.allowed(t[1])][:10]:
+            if score < best.score + 4 * TIE:
+                self.refine(model)
+
+    def _pruned(self, best):
+        """The best model without effects that do not earn their place."""
+        while best.model.names:
+            at = self._fitter_at(best)
+            weak = {n: gain for n in sorted(best.model.names) if (gain := self.gain(best, n, at)) is not None}
+            if not weak:
+                return best
+            best = self.refine(best.model.without(min(weak, key=weak.get)))
+        return best
+
+    def gain(self, solution, name, at) -> float | None:
+        """What a weak effect brings to chi^2; None where it is large, sure and needed enough to stay.
+
+        Needed: beside the freest form of the others, on data that are not freed of this effect's error.
+        """
+        others = solution.model.without(name).freed()
+        effect = self.effects[name]
+        if effect.corrects:
+            rest = {n: c for n, c in solution.total.items() if n != name}
+            at = Fitter(
+                cells_of(self.corrected(rest), [self.effects[n] for n in sorted(solution.model.names)]),
+                self.sigma, self.train, self.linear.price,
+            )  # fmt: skip
+        without = at.chi2(others)[0]
+        with_core = at.chi2(Model(others.names | {name}, others.free))[0]
+        gain = (without - with_core) / self.dispersion
+        size = effect.size(solution.c[name], self.view.nominal)
+        if gain < EARNS or size < effect.floor(self.view.nominal):
+            return gain
+        c, cov = np.array(list(solution.c[name].values())), solution.covariance[name]
+        wald = float(c @ np.linalg.pinv(cov) @ c) / self.dispersion
+        return None if wald > SURE**2 * len(c) ** 0.5 else gain
+
+    def _tied(self, best) -> list[Solution]:
+        """Other models that explain as much: other sets of no more effects."""
+        out = []
+        for model, solution in self.refined.items():
+            if model.names == best.model.names or len(model) > len(best.model):
+                continue
+            if solution.score < best.score + TIE and model.names:
+                if all(s.model.names != model.names for s in out):
+                    out.append(solution)
+        # A model that holds another tied one is that one with a passenger.
+        return [s for s in out if not any(o.model.names < s.model.names for o in out)]

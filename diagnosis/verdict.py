@@ -1,0 +1,63 @@
+"""From what the search found to a verdict, names, ambiguities and one sentence."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from diagnosis.result import NamedEffect
+
+LEFTOVER = 2.0  # reduced chi^2 that an explanation may leave
+FLOOR_SHARE = 0.12  # of the misfit's rms: a leftover below it is the curve's, not another effect's
+
+
+def groups(best, tied):
+    """(asserted names, ambiguity sets): what all tied models share, and the rest in sets that exclude each other."""
+    models = [best.model.names, *(s.model.names for s in tied)]
+    shared = frozenset.intersection(*models)
+    rest = frozenset().union(*models) - shared
+    return sorted(shared), [sorted(rest)] if rest else []
+
+
+def named(solution, names, effects, nominal, empty, dispersion) -> list[NamedEffect]:
+    """The asserted effects with their parameters."""
+    out = []
+    for name in names:
+        effect, c, covariance = effects[name], solution.c[name], solution.covariance[name] * dispersion
+        vector = np.array(list(c.values()))
+        wald = float(vector @ np.linalg.pinv(covariance) @ vector) / max(len(vector), 1)
+        explained = max(empty.chi2 - empty.rows, 1e-9)
+        out.append(
+            NamedEffect(
+                name,
+                float(np.clip(1.0 - 1.0 / (1.0 + wald / 4.0), 0.5, 0.999)),
+                effect.estimates(c, covariance, nominal),
+                float(np.clip((empty.chi2 - solution.chi2) / explained, 0.0, 1.0)),
+                effect.plant(c, nominal),
+            )
+        )
+    return out
+
+
+def size_text(effect, estimates) -> str:
+    """'v_dead_v = 5.1 +- 0.1 V' of the effect's first parameters."""
+    parts = []
+    for key, e in list(estimates.items())[:3]:
+        unit = "" if e.unit == "1" else f" {e.unit}"
+        parts.append(f"{key} = {e.value:.4g} +- {e.sigma:.1g}{unit}")
+    return ", ".join(parts)
+
+
+def sentence(verdict, effects_named, ambiguity, fit, effects, location) -> str:
+    """The verdict in one sentence."""
+    if verdict == "no_mismatch":
+        return f"Simulation and recording agree: the misfit of {fit.train_before:.3g} V is that of noise and of the balance itself."
+    what = " and ".join(f"{effects[e.name].title} ({size_text(effects[e.name], e.parameters)})" for e in effects_named)
+    gain = f"the misfit on operating points not fitted falls from {fit.holdout_before:.3g} V to {fit.holdout_after:.3g} V"
+    if verdict == "explained":
+        return f"{what[0].upper()}{what[1:]}: {gain}."
+    if verdict == "ambiguous":
+        sets = "; ".join(" or ".join(group) for group in ambiguity)
+        first = f"{what[0].upper()}{what[1:]} for certain; beyond it t" if what else "T"
+        return f"{first}his recording cannot tell {sets} apart."
+    where = f" in {location.signal}" if location.signal else ""
+    return f"Unknown: nothing in the catalogue explains the misfit of {fit.train_before:.3g} V{where}."
