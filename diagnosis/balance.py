@@ -22,22 +22,20 @@ def misfit(view) -> dict[str, np.ndarray]:
     if m.resistance_temp_coeff_per_k:
         hot = np.where(np.isfinite(view.temp), view.temp, m.temperature_winding_c) - m.temperature_ref_c
         r = r * (1.0 + m.resistance_temp_coeff_per_k * hot)
-    needed = r[:, None] * exact.i_mid + view.flux(exact.psi)
+    needed = r[:, None] * exact.i_mid + view.flux(exact.nominal_psi)
     out = {"u": view.to_dq(view.u[:, 1:-1]) - needed}
     if view.has_sum:
         total = view.i_abc.sum(axis=2)
         out["sum"] = 0.5 * (total[:, 1:] + total[:, :-1])
     if np.isfinite(view.torque).any():
-        out["torque"] = view.torque - shaft_torque(view)
+        out["torque"] = view.torque - shaft_torque(view, exact)
     return out
 
 
-def shaft_torque(view):
-    """Torque that the nominal drive would deliver at the shaft, block means (b,) [Nm]."""
+def shaft_torque(view, exact):
+    """Torque that the nominal drive would deliver at the shaft, (b, m) [Nm]."""
     m = view.machine
-    omega_m = view.omega.mean(axis=1) / m.pole_pairs
-    slope = (view.omega[:, -1] - view.omega[:, 0]) / m.pole_pairs
-    slope = slope / (view.sample_time_s * (view.omega.shape[1] - 1))
-    airgap = torque_of(view, view.psi, view.i)
+    omega_m = view.omega_mid / m.pole_pairs
     coulomb = (m.coulomb_friction_nm or 0.0) * np.sign(omega_m)
-    return airgap - (m.viscous_friction_nms or 0.0) * omega_m - coulomb - (m.inertia_kgm2 or 0.0) * slope
+    airgap = torque_of(view, exact.nominal_psi, exact.i)
+    return airgap - (m.viscous_friction_nms or 0.0) * omega_m - coulomb - (m.inertia_kgm2 or 0.0) * view.slope_m

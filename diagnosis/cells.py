@@ -16,6 +16,7 @@ import numpy as np
 from diagnosis.balance import misfit
 
 ORDERS_SUM = (0.0, 1.0)
+ORDERS_TORQUE = (0.0, 4.0, 6.0, 8.0, 12.0, 18.0, 24.0, 30.0, 36.0)  # cogging is even per electrical turn
 LEAST_TURNS = 0.8  # of a harmonic within a block, else it is no functional of its own
 SYSTEM_U = 2e-4  # of the block's voltage
 SYSTEM_DC = 1.5e-5  # of the bus
@@ -64,24 +65,31 @@ class Projector:
         # Two orders closer than a turn within the block would be one functional counted twice.
         kept = self._apart(span)
         ok = [np.repeat((seen & kept).ravel(), 2)]
+        self.torque_seen = np.isfinite(view.torque).all(axis=1)
+        self.real = {}
         if view.has_sum:
-            s = len(ORDERS_SUM)
-            channels += ["sum"] * (b * s * 2)
-            block.append(np.repeat(np.arange(b), s * 2))
-            order.append(np.tile(np.repeat(ORDERS_SUM, 2), b))
-            part.append(np.tile([0, 1], b * s))
-            turning = span >= 2 * np.pi * LEAST_TURNS
-            real = np.stack([np.ones(b, bool), np.zeros(b, bool), turning, turning], axis=1)
-            ok.append(real.ravel())
-        self.torque_seen = np.isfinite(view.torque)
+            self.real["sum"] = ORDERS_SUM
         if self.torque_seen.any():
-            channels += ["torque"] * b
-            block.append(np.arange(b))
-            order.append(np.zeros(b))
-            part.append(np.zeros(b, int))
-            ok.append(self.torque_seen)
+            self.real["torque"] = ORDERS_TORQUE
+        for channel, orders in self.real.items():
+            n = len(orders)
+            channels += [channel] * (b * n * 2)
+            block.append(np.repeat(np.arange(b), n * 2))
+            order.append(np.tile(np.repeat(orders, 2), b))
+            part.append(np.tile([0, 1], b * n))
+            told = np.array(orders)[None, :] * span[:, None] >= 2 * np.pi * LEAST_TURNS
+            both = np.stack([told, told], axis=2)
+            both[:, 0] = [True, False]  # a mean is real
+            if channel == "torque":
+                both &= self.torque_seen[:, None, None]
+                both[:, 0] &= (view.shaft != "free")[:, None]  # a load of unknown size
+            ok.append(both.ravel())
         self.block, self.order, self.part = (np.concatenate(x) for x in (block, order, part))
         self.channel, self.ok = np.array(channels), np.concatenate(ok)
+        self.waves = {
+            channel: np.exp(-1j * np.array(orders)[None, None, :] * view.theta_mid[:, :, None])
+            for channel, orders in self.real.items()
+        }
 
     def _apart(self, span):
         """(b, h) orders that differ from every kept smaller one by LEAST_TURNS within the block."""
@@ -104,16 +112,13 @@ class Projector:
         else:
             f = np.matmul(u[:, None, :], self.turns)[:, 0, :] / u.shape[1]
             out.append(np.stack([f.real, f.imag], axis=2).ravel())
-        if self.view.has_sum:
-            s = column.get("sum")
-            if s is None:
-                out.append(np.zeros(b * len(ORDERS_SUM) * 2))
+        for channel, orders in self.real.items():
+            x = column.get(channel)
+            if x is None:
+                out.append(np.zeros(b * len(orders) * 2))
             else:
-                f = np.stack([(s * np.exp(-1j * h * self.view.theta_mid)).mean(axis=1) for h in ORDERS_SUM], axis=1)
+                f = np.matmul(x[:, None, :], self.waves[channel])[:, 0, :] / x.shape[1]
                 out.append(np.stack([f.real, f.imag], axis=2).ravel())
-        if self.torque_seen.any():
-            t = column.get("torque", np.zeros(b))
-            out.append(np.where(self.torque_seen, t, 0.0))
         return np.nan_to_num(np.concatenate(out))
 
 

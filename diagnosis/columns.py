@@ -77,7 +77,9 @@ def canonical(table: Table, plan: Plan) -> dict[str, np.ndarray]:
     for name, source in plan.sources.items():
         raw = table.columns.get(source.column)
         if raw is not None:
-            arrays[name] = raw if source.factor == 1.0 and not source.offset else raw * source.factor + source.offset
+            arrays[name] = (
+                raw if source.factor == 1.0 and not source.offset else raw * source.factor + source.offset
+            )
     return arrays
 
 
@@ -101,7 +103,9 @@ def _explicit(names, nominal, path) -> tuple[Plan, set[str]]:
         if not entry["name"]:
             continue
         if entry["name"] in plan.sources:
-            raise RecordingError(f"{where}: {entry['name']} is named by {plan.sources[entry['name']].column!r} already")
+            raise RecordingError(
+                f"{where}: {entry['name']} is named by {plan.sources[entry['name']].column!r} already"
+            )
         unit = entry.get("unit", "")
         if "factor" in entry or "offset" in entry:
             source = Source(found[key], entry.get("factor", 1.0), entry.get("offset", 0.0), "", True)
@@ -117,19 +121,27 @@ def _entry(key, value, nominal) -> dict:
     where = f"{nominal.path}: [columns] {shown(key)!r}"
     entry = {"name": value} if isinstance(value, str) else value
     if not isinstance(entry, dict) or not isinstance(entry.get("name"), str):
-        raise RecordingError(f"{where}: must be a canonical name or a table such as {{name = 'i_a', unit = 'mA'}}")
+        raise RecordingError(
+            f"{where}: must be a canonical name or a table such as {{name = 'i_a', unit = 'mA'}}"
+        )
     if entry["name"] and entry["name"] not in COLUMNS:
-        raise RecordingError(f"{where}: {shown(entry['name'])!r} is no canonical name{_nearest(entry['name'], COLUMNS)}")
+        raise RecordingError(
+            f"{where}: {shown(entry['name'])!r} is no canonical name{_nearest(entry['name'], COLUMNS)}"
+        )
     for name in entry:
         if name not in KEYS:
-            raise RecordingError(f"{where}: unknown key {shown(name)!r}; known are name, unit, factor, offset")
+            raise RecordingError(
+                f"{where}: unknown key {shown(name)!r}; known are name, unit, factor, offset"
+            )
     for name in ("factor", "offset"):
         number = entry.get(name, 1.0)
         if isinstance(number, bool) or not isinstance(number, (int, float)) or not math.isfinite(number):
             raise RecordingError(f"{where}: {name} must be a finite number")
     if entry.get("factor") == 0:
         raise RecordingError(f"{where}: factor must not be 0")
-    if not isinstance(entry.get("unit", ""), str) or ("unit" in entry and ("factor" in entry or "offset" in entry)):
+    if not isinstance(entry.get("unit", ""), str) or (
+        "unit" in entry and ("factor" in entry or "offset" in entry)
+    ):
         raise RecordingError(f"{where}: give either unit, as a string, or factor and offset")
     return entry
 
@@ -140,7 +152,9 @@ def _source(column, name, unit, nominal, where) -> Source:
         return Source(column)
     found = conversion(name, unit, nominal.machine.pole_pairs)
     if found is None:
-        raise RecordingError(f"{where}: unit {shown(unit)!r} is not known for {name}; known are {known_units(name)}")
+        raise RecordingError(
+            f"{where}: unit {shown(unit)!r} is not known for {name}; known are {known_units(name)}"
+        )
     return Source(column, *found, unit, True)
 
 
@@ -167,7 +181,11 @@ def _ready_made(plan, left, nominal, path) -> None:
         for column in left:
             keys.setdefault(key(split_unit(column)[0]), []).append(column)
         if known.SIGNATURE <= set(keys):
-            fits = {k: c for k, c in keys.items() if k in known.COLUMNS and known.COLUMNS[k][0] not in plan.sources}
+            fits = {
+                k: c
+                for k, c in keys.items()
+                if k in known.COLUMNS and known.COLUMNS[k][0] not in plan.sources
+            }
             if (len(known.SIGNATURE), len(fits)) > (len(best.SIGNATURE), len(hits)) if best else fits:
                 best, hits = known, fits
     if best is None or not hits:
@@ -180,7 +198,9 @@ def _ready_made(plan, left, nominal, path) -> None:
             )
         if name not in plan.sources:
             stated = _unit_of(columns[0], left) or unit
-            plan.sources[name] = _source(columns[0], name, stated, nominal, f"{path}: column {shown(columns[0])!r}")
+            plan.sources[name] = _source(
+                columns[0], name, stated, nominal, f"{path}: column {shown(columns[0])!r}"
+            )
     if not best.SIGNATURE:
         return
     plan.used = f"{plan.used}, {best.NAME}" if plan.used == "[columns]" else best.NAME
@@ -194,7 +214,10 @@ def _demand(plan, names, path) -> None:
     """The least a balance needs; RecordingError lists what is missing and what was found."""
     have = set(plan.sources) | set(plan.assumed)
     missing = []
-    phases, dq = {"i_a", "i_b"} <= have or {"i_a", "i_c"} <= have or {"i_b", "i_c"} <= have, {"i_d", "i_q"} <= have
+    phases, dq = (
+        {"i_a", "i_b"} <= have or {"i_a", "i_c"} <= have or {"i_b", "i_c"} <= have,
+        {"i_d", "i_q"} <= have,
+    )
     if not phases and not dq:
         missing.append("currents (i_a, i_b or i_d, i_q)")
     if not have & ({"theta_e"} if phases and not dq else {"theta_e", "omega_e"}):

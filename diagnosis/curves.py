@@ -18,6 +18,11 @@ def courses(view, count=4):
     return hats(view.t / max(view.span_s, 1e-9), np.linspace(0, 1, count + 1))
 
 
+def course(view):
+    """Time as a share of the recording, (b, 1)."""
+    return (view.t / max(view.span_s, 1e-9))[:, None]
+
+
 def known_temperature(view, least_k=3.0):
     """Whether a thermocouple was recorded and moved by ``least_k``."""
     seen = view.temp[np.isfinite(view.temp)]

@@ -32,7 +32,7 @@ KINDS = {
     "register": "register {name} in the recording's header: the core behaved as with {acted} instead of {found}",
     "sample": "raw sample {name}: the core behaved as with {acted} instead of {found}",
     "start_state": "start state {name}: the core behaved as with {acted} instead of {found}",
-    "record": "only this one value of the record differs: it was not the core's arithmetic, later rows agree",
+    "record": "only this one value of the record differs; all that is computed from it, and all later rows, agree",
 }
 
 
@@ -43,16 +43,14 @@ def replay(recording: Recording) -> tuple[Digital, list[str]]:
     ``observed``, or the duty columns as the core's compare values; ``start``, ``first_state``, ``gaps``.
     ``first_difference`` has block, instance, sample (row), counter, signal, bit, recorded, golden (as hexadecimal
     and, with unit, in SI), differing (all signals of that row), hidden (blocks upstream that nobody could see) and
-    cause (or None).  ``checked`` is False where nothing, or not the whole core, could be judged.
+    cause (or None).  ``checked`` is False where no sample of the whole core could be compared, ``samples`` says how
+    many were.
     """
     meta = recording.meta
-    missing = [
-        name for name in ("registers", "config", "samples") if not meta.get(name) and name != "samples"
-    ]
-    missing += ["samples"] if meta.get("samples") is None else []
+    missing = [name for name in ("registers", "config", "samples") if meta.get(name) is None]
     if missing:
         return Digital(), [
-            f"The digital half was not checked: the recording has no {' and no '.join(missing)} of the core."
+            f"The digital half was not checked: the recording has no {', no '.join(missing)} of the core."
         ]
     lacking = [name for name in fluxproof.Registers._fields if name not in meta["registers"]]
     if lacking:
@@ -125,17 +123,17 @@ def _stretches(run: Run, recording: Recording, notes: list[str]) -> tuple[Digita
             continue
         if certain:
             return _differs(run, recording, begin, start, stop, row, before, names, known == "state"), notes
+        fault, names, golden = check_rows(run, start, stop)
+        if fault < stop:
+            signal = first_in_flow(names)
+            return _result(run, recording, fault, OWNER[signal], signal, golden[signal], None, names), notes
         agreed = _agrees_from(run, begin, start, stop)
         if stop - agreed >= CONVERGED:
             run_in, checked = run_in + agreed - start, checked + stop - agreed
             state = run.state_at(begin, start, stop)
             continue
-        row, names, golden = check_rows(run, start, stop)
-        if row < stop:
-            signal = first_in_flow(names)
-            return _result(run, recording, row, OWNER[signal], signal, golden[signal], None, names), notes
         local, state = local + stop - start, None
-    digital = Digital(checked=local == 0, samples=checked)
+    digital = Digital(checked=checked > 0, samples=checked)
     return digital, notes + _sentences(run, gaps, known, checked, run_in, local)
 
 
@@ -169,9 +167,15 @@ def _told(cause: Cause, stop) -> dict:
     if cause.rows < stop:
         says += f", up to row {cause.rows - 1}; then something else differs"
     return {
-        "kind": cause.kind, "name": cause.name, "bit": cause.bit, "recorded": cause.found, "behaved_as": cause.acted,
-        "explains_rows_to": cause.rows, "says": says,
-    }  # fmt: skip
+        "kind": cause.kind,
+        "name": cause.name,
+        "bit": cause.bit,
+        "bits": list(cause.bits or (cause.bit,)),  # any one of them explains as much
+        "recorded": cause.found,
+        "behaved_as": cause.acted,
+        "explains_rows_to": cause.rows,
+        "says": says,
+    }
 
 
 def _result(run, recording, row, instance, signal, golden, cause, names) -> Digital:
@@ -197,7 +201,7 @@ def _result(run, recording, row, instance, signal, golden, cause, names) -> Digi
         "golden_si": golden * scale,
         "unit": physical,
         "differing": sorted(names),
-        "hidden": [] if is_input else hidden_before(instance, run.names),
+        "hidden": [] if is_input or cause else hidden_before(instance, run.names),
         "cause": cause,
     }
     model = recording.meta.get("telemetry", {}).get("core", {}).get("golden_model")
@@ -227,6 +231,8 @@ def _sentences(run, gaps, known, checked, run_in, local) -> list[str]:
         said.append(
             f"The golden model gives the same in every bit: {checked} samples, {len(run.names)} signals each."
         )
+    if checked:
+        said.append("The gates, and with them the register dead_time, lie behind what the recording shows.")
     if run_in:
         said.append(f"{run_in} samples served as run-in, as the core's state before them is not recorded.")
     if local:

@@ -1,4 +1,4 @@
-"""Why a replay parts from the recording: one wrong bit somewhere, looked for one bit at a time.
+"""Why a replay parts from the recording: one wrong bit (or digit of a register) somewhere, looked for one by one.
 
 The recorded values tell where the difference is seen; which block it comes from may be hidden, because the core does
 not show every signal.  A hypothesis makes it certain: with this bit of this register (raw sample, start state) the
@@ -39,6 +39,7 @@ class Cause:
     run: Run
     state: fluxproof.State
     rows: int = 0
+    bits: tuple = ()  # all bits of it that, alone, explain as much
 
 
 def find_cause(run: Run, state, start: int, stop: int, row: int, names: list[str], whole_state: bool):
@@ -67,8 +68,21 @@ def find_cause(run: Run, state, start: int, stop: int, row: int, names: list[str
             best, first = dataclasses.replace(cause, rows=reached), at
             if reached == stop:
                 break
+    if best is not None and best.kind == "register":
+        best = dataclasses.replace(best, bits=_as_good(run, best, base, begin))
     # A bit that explains nothing but the row where the difference shows may do so by chance.
     return (None, row) if best is not None and best.rows == row + 1 < stop else (best, first)
+
+
+def _as_good(run: Run, cause: Cause, base, begin) -> tuple:
+    """Bits of the cause's register that explain as many rows as it does: the recording cannot tell them apart."""
+    bits, fmt = [], REGISTERS[cause.name].fmt
+    for bit in range(fmt.width):
+        changed = {cause.name: flipped(cause.found, bit, fmt)}
+        other = run._replace(registers=run.registers._replace(**changed))
+        if other.until_different(base, begin, cause.rows)[0] == cause.rows:
+            bits.append(bit)
+    return tuple(bits)
 
 
 def _hypotheses(run: Run, base, before, row, names, whole_state):
@@ -80,13 +94,21 @@ def _hypotheses(run: Run, base, before, row, names, whole_state):
             yield Cause("sample", name, bit, found, acted, run._replace(patch=(row, k, acted)), before)
     for name in _registers_near(run, names):
         fmt, found = REGISTERS[name].fmt, getattr(run.registers, name)
-        for bit in range(fmt.width):
-            acted = flipped(found, bit, fmt)
+        bits = [flipped(found, bit, fmt) for bit in range(fmt.width)]
+        for acted in dict.fromkeys(bits + _slips(found, fmt)):
             changed = run._replace(registers=run.registers._replace(**{name: acted}))
-            yield Cause("register", name, bit, found, acted, changed, base)
+            yield Cause("register", name, lowest_bit(found, acted), found, acted, changed, base)
     if whole_state:
         for name, bit, found, acted, state in _states(base):
             yield Cause("start_state", name, bit, found, acted, run, state)
+
+
+def _slips(value, fmt) -> list[int]:
+    """The value with one decimal digit another: the header is text, and so a wrong bit or key strikes a digit."""
+    text = str(abs(value))
+    digits = [text[:k] + d + text[k + 1 :] for k in range(len(text)) for d in "0123456789" if d != text[k]]
+    numbers = [int(t) * (-1 if value < 0 else 1) for t in digits]
+    return [n for n in numbers if fmt.lo <= n <= fmt.hi]
 
 
 def _registers_near(run, names):

@@ -32,7 +32,11 @@ def load_recording(path, nominal) -> Recording:
         return plans[-1].wanted()
 
     table = read_table(path, select)
-    plan = plans[-1] if plans else plan_columns({n: table.units.get(n, "") for n in table.columns}, nominal, path)
+    plan = (
+        plans[-1]
+        if plans
+        else plan_columns({n: table.units.get(n, "") for n in table.columns}, nominal, path)
+    )
     recording = _recording(Path(path), table, plan, nominal)
     check_recording(recording, nominal)
     return recording
@@ -48,7 +52,11 @@ def _recording(path, table: Table, plan: Plan, nominal) -> Recording:
         raise RecordingError(f"{path}{line}: column {shown(column)!r} ({name}) holds no numbers")
     n = len(next(iter(columns.values())))
     notes = [*table.notes, *plan.notes]
-    meta = table.meta | {"notes": notes, "map": plan.used, "columns": {k: s.column for k, s in plan.sources.items()}}
+    meta = table.meta | {
+        "notes": notes,
+        "map": plan.used,
+        "columns": {k: s.column for k, s in plan.sources.items()},
+    }
     meta["stated_units"] = [name for name, s in plan.sources.items() if s.stated]
     if "t" not in columns:
         step = table.meta.get("sample_time_s") or plan.sample_time_s or nominal.sample_time_s
@@ -58,7 +66,9 @@ def _recording(path, table: Table, plan: Plan, nominal) -> Recording:
         columns[name] = np.full(n, value)
     if plan.run and plan.run in table.columns:
         meta["run"] = table.columns[plan.run]
-    recording = Recording(str(path), columns, np.ones(n, bool), np.append(np.ones(n - 1, bool), False), meta=meta)
+    recording = Recording(
+        str(path), columns, np.ones(n, bool), np.append(np.ones(n - 1, bool), False), meta=meta
+    )
     recording.problems += [_renamed(problem, meta["columns"]) for problem in table.problems]
     return recording
 

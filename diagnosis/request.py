@@ -35,7 +35,10 @@ def steady_view(view, omega, i_dq, rows=ROWS):
         u_dc=np.full((b, rows), float(view.nominal.inverter.dc_bus_v)),
         t=np.full(b, view.span_s),
         temp=np.full(b, float(np.nanmedian(view.temp)) if np.isfinite(view.temp).any() else np.nan),
-        torque=np.full(b, np.nan),
+        torque=np.full((b, rows), np.nan),
+        slope_m=np.zeros((b, rows)),
+        shaft=np.full(b, ""),
+        psi_extra=0.0,
         run=np.arange(b),
         rows=np.zeros(b, int),
     )

@@ -14,8 +14,6 @@ import numpy as np
 
 from diagnosis import verdict as words
 from diagnosis.catalogue import CATALOGUE
-from diagnosis.cells import cells_of
-from diagnosis.fit import Fitter
 from diagnosis.load import load_recording
 from diagnosis.locate import at_order, evidence, locate
 from diagnosis.nominal import Nominal, load_nominal
@@ -69,10 +67,11 @@ def _physics(recordings, nominal, progress) -> Diagnosis:
     fit = fits(search, found, held)
     location = locate(view, search.cells, found.pure)
     left = leftover(search, found)
-    names, ambiguity = words.groups(best, found.tied)
+    names, ambiguity = words.groups(best, found.tied, CATALOGUE, nominal)
+    share = (left * best.rows - best.rows) / max(empty.chi2 - best.rows, 1e-9)
     if not best.model.names:
         verdict = "no_mismatch" if left <= words.LEFTOVER else "unexplained"
-    elif left > words.LEFTOVER:
+    elif left > words.LEFTOVER and share > words.FLOOR_SHARE**2:
         verdict = "unexplained"
     else:
         verdict = "ambiguous" if ambiguity else "explained"
@@ -98,10 +97,8 @@ def _physics(recordings, nominal, progress) -> Diagnosis:
 def final_residual(search, found):
     """(cells, residual) of the best model on its corrected data, every order."""
     best = found.best
-    effects = [CATALOGUE[n] for n in sorted(best.model.names)]
-    cells = cells_of(best.view, effects)
-    solution = Fitter(cells, found.sigma, found.train).solve(best.model)
-    return cells, solution.residual
+    fitter = search._fitter(best.view, [CATALOGUE[n] for n in sorted(best.model.names)])
+    return fitter.cells, fitter.solve(best.model).residual
 
 
 def leftover(search, found) -> float:

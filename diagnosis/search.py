@@ -12,14 +12,17 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
+from diagnosis.catalogue.effect import FluxEffect
 from diagnosis.cells import cells_of
+from diagnosis.curvature import FAMILY, labels
 from diagnosis.fit import Fitter, Model, Solution, everything, row_sigma
 
 MOST_AT_ONCE = 3
+MOST_EFFECTS = 4  # more at once is no explanation
 REFINED = 14
 TIE = 10.0
 EARNS = 20.0  # gain in chi^2 over dispersion that an effect must bring beside the freest form of the others
@@ -37,8 +40,6 @@ class Outcome:
     pure: np.ndarray  # sigma without the balance's own share
     train: np.ndarray
     dispersion: float
-    final_fitter: Fitter = None
-    log: list = field(default_factory=list)
 
 
 class Search:
@@ -51,27 +52,35 @@ class Search:
         self.train = train_blocks[self.cells.block]
         self.linear = Fitter(self.cells, self.sigma, self.train)
         self.refined: dict[Model, Solution] = {}
+        self.adjust = np.zeros(len(self.cells.y))
         chi2, count = self.linear.chi2(everything(self.cells))
         self.dispersion = max(1.0, chi2 / max(len(self.linear.y) - count, 1))
 
     def run(self) -> Outcome:
         """The whole search."""
         self.progress("sets of effects")
-        empty = self.refine(Model(frozenset()))
         for model in self._linear_best():
             self.refine(model)
-        best = self._best()
+        best = self._climbed(self._best())
+        if self.take_raw(best):
+            self.refine(best.model)
+            best = self._climbed(self._best())
+        best, sure = self._labelled(best)
+        best = self._pruned(best)
+        tied = self._tied(best, sure)
+        empty = self.refine(Model(frozenset()))
+        return Outcome(best, tied, empty, self.sigma, self.pure, self.train, self.dispersion)
+
+    def _climbed(self, best) -> Solution:
+        """The best model that additions, removals and exchanges lead to."""
         for _ in range(6):
             self.progress(f"around {', '.join(sorted(best.model.names)) or 'no effect'}")
             self._neighbours(best)
             better = self._best()
             if better.model == best.model:
-                break
+                return best
             best = better
-        best = self._pruned(best)
-        tied = self._tied(best)
-        fitter = self._fitter_at(best)
-        return Outcome(best, tied, empty, self.sigma, self.pure, self.train, self.dispersion, fitter)
+        return best
 
     def allowed(self, model) -> bool:
         """Whether an absorbed effect stands only beside the free form of what absorbs it."""
@@ -112,43 +121,85 @@ class Search:
         return [m for level in scored for m in level]
 
     def refine(self, model) -> Solution:
-        """The model solved with its errors of the record taken off the data."""
+        """The model solved with its errors of the record taken off the data, and with the flux that it says."""
         if model in self.refined:
             return self.refined[model]
         record = [n for n in sorted(model.names) if self.effects[n].corrects]
-        if not record:
+        magnetic = [n for n in sorted(model.names) if isinstance(self.effects[n], FluxEffect)]
+        if record or (magnetic and "iron_loss" in model.names):
+            solution = self._iterated(model, record, magnetic)
+        else:
             solution = self.linear.solve(model, self.dispersion)
             solution.view = self.view
-        else:
-            solution = self._iterated(model, record)
         if not self.plausible(solution):
             solution.score = np.inf
         self.refined[model] = solution
         return solution
 
-    def _iterated(self, model, record):
+    def _iterated(self, model, record, magnetic):
         totals: dict = {n: {} for n in record}
         view, mine = self.view, [self.effects[n] for n in sorted(model.names)]
         for step in range(4):
-            cells = self.cells if step == 0 else cells_of(view, mine)
-            solution = Fitter(cells, self.sigma, self.train, self.linear.price).solve(model, self.dispersion)
+            fitter = self.linear if step == 0 else self._fitter(view, mine)
+            solution = fitter.solve(model, self.dispersion)
             small = True
             for n in record:
                 for key, value in solution.c[n].items():
                     totals[n][key] = totals[n].get(key, 0.0) + value
                 spread = np.sqrt(np.maximum(np.diag(solution.covariance[n]), 0.0))
-                small &= all(abs(v) < 0.1 * s for v, s in zip(solution.c[n].values(), spread, strict=True))
+                small &= all(abs(v) <= 0.1 * s for v, s in zip(solution.c[n].values(), spread, strict=True))
             if step == 3 or (small and step > 0):
                 break
             corrected = self.corrected(totals)
             if corrected is None:
                 solution.score = np.inf
                 break
-            view = corrected
+            view = self.with_flux(corrected, magnetic, solution)
         for n in record:
             solution.c[n] = dict(totals[n])
         solution.view, solution.total = view, totals
         return solution
+
+    def with_flux(self, view, magnetic, solution):
+        """The view that knows of the flux which the magnetic effects of a solution add."""
+        if not magnetic:
+            return view
+        psi = sum(self.effects[n].psi(view, solution.c[n]) for n in magnetic)
+        more = np.array([self.effects[n].delta_l(solution.c[n]) for n in magnetic]).sum(axis=0)
+        least = -0.7 * np.array([view.machine.inductance_d_h, view.machine.inductance_q_h])
+        return view.replace(psi_extra=psi, delta_l=tuple(np.maximum(more, least)))
+
+    def _fitter(self, view, effects) -> Fitter:
+        """The linear problem of a corrected view, with what is known of raw currents taken off."""
+        cells = cells_of(view, effects)
+        cells.y = cells.y - self.adjust
+        return Fitter(cells, self.sigma, self.train, self.linear.price)
+
+    def take_raw(self, solution) -> bool:
+        """Take off what the solution's terms make of the raw current beside its parabola; whether that mattered.
+
+        Terms are regressed on parabolas of the current, but the machine saw its ripple too: an inductance that
+        is wrong by a tenth leaves a tenth of the ripple's voltage, which must not pass for a harmonic.
+        """
+        adjust = np.zeros(len(self.cells.y))
+        rough = solution.view.with_raw_current()
+        for name, c in solution.c.items():
+            effect = self.effects[name]
+            if effect.corrects or effect.smoothed or name in ("friction", "cogging"):
+                continue
+            smooth, raw = (cells_of(v, [effect]).columns[name] for v in (solution.view, rough))
+            for key, value in c.items():
+                if value:
+                    k = key if key in raw else f"~{key}"
+                    adjust += value * (raw[k] - smooth[k])
+        change = np.sum(((adjust - self.adjust) / self.sigma)[self.linear.use] ** 2)
+        if change < TIE:
+            return False
+        self.cells.y = self.cells.y + self.adjust - adjust
+        self.adjust = adjust
+        self.linear = Fitter(self.cells, self.sigma, self.train, self.linear.price)
+        self.refined.clear()
+        return True
 
     def corrected(self, totals):
         """The view without the errors of the record that the totals stand for; None where they make no sense."""
@@ -164,9 +215,7 @@ class Search:
 
     def _fitter_at(self, solution) -> Fitter:
         """The linear problem with all effects at the solution's corrected data."""
-        if solution.view is self.view or solution.view is None:
-            return self.linear
-        return Fitter(cells_of(solution.view, self.effects.values()), self.sigma, self.train, self.linear.price)
+        return self.linear if solution.view is self.view else self._fitter(solution.view, self.effects.values())
 
     def _neighbours(self, best):
         """Refine what lies one addition, removal, exchange or change of form away and promises something."""
@@ -184,7 +233,8 @@ class Search:
                 continue
             for bend in (False, True):
                 grown = best.model.with_(name, bend)
-                tried.append((at.score(grown, self.dispersion), grown))
+                if len(grown) <= MOST_EFFECTS:
+                    tried.append((at.score(grown, self.dispersion), grown))
                 for out in names:
                     swapped = grown.without(out)
                     tried.append((at.score(swapped, self.dispersion), swapped))
@@ -192,6 +242,20 @@ class Search:
         for score, model in [t for t in tried if self.allowed(t[1])][:10]:
             if score < best.score + 4 * TIE:
                 self.refine(model)
+
+    def _labelled(self, best) -> tuple[Solution, bool]:
+        """The best model with its curves of flux over current called by their shape, and whether that is sure."""
+        mine = best.model.names & set(FAMILY)
+        if not mine:
+            return best, True
+        wanted, sure = labels(best.view, best)
+        if not wanted or wanted == mine:
+            return best, sure
+        names = (best.model.names - mine) | wanted
+        free = (best.model.free - mine) | {n for n in wanted if self.linear.index[n][1]}
+        if "saturation" in wanted:
+            free |= {"saturation"}
+        return self.refine(Model(names, frozenset(free & names))), sure
 
     def _pruned(self, best):
         """The best model without effects that do not earn their place."""
@@ -212,10 +276,7 @@ class Search:
         effect = self.effects[name]
         if effect.corrects:
             rest = {n: c for n, c in solution.total.items() if n != name}
-            at = Fitter(
-                cells_of(self.corrected(rest), [self.effects[n] for n in sorted(solution.model.names)]),
-                self.sigma, self.train, self.linear.price,
-            )  # fmt: skip
+            at = self._fitter(self.corrected(rest), [self.effects[n] for n in sorted(solution.model.names)])
         without = at.chi2(others)[0]
         with_core = at.chi2(Model(others.names | {name}, others.free))[0]
         gain = (without - with_core) / self.dispersion
@@ -226,11 +287,15 @@ class Search:
         wald = float(c @ np.linalg.pinv(cov) @ c) / self.dispersion
         return None if wald > SURE**2 * len(c) ** 0.5 else gain
 
-    def _tied(self, best) -> list[Solution]:
-        """Other models that explain as much: other sets of no more effects."""
+    def _tied(self, best, sure) -> list[Solution]:
+        """Other models that explain as much: other sets of no more effects.
+
+        Where the shape of the flux's curve has settled its name (``sure``), that is no difference.
+        """
+        settled = set(FAMILY) if sure and best.model.names & set(FAMILY) else set()
         out = []
         for model, solution in self.refined.items():
-            if model.names == best.model.names or len(model) > len(best.model):
+            if model.names - settled == best.model.names - settled or len(model) > len(best.model):
                 continue
             if solution.score < best.score + TIE and model.names:
                 if all(s.model.names != model.names for s in out):

@@ -100,7 +100,7 @@ def read_dump(path) -> tuple[dict[str, np.ndarray], dict]:
     meta: ``telemetry`` (the header), ``registers`` {name: integer}, ``config`` {generic: integer}, ``samples`` (n, 13)
     int64 in the order of fluxproof.Sample, ``observed`` {name: (n,) int64}, ``counter`` (n,) int64, ``start``
     ("reset", "state" or "unknown"), ``first_state`` (fluxproof.State or None), ``gaps`` [(row, samples lost before
-    it)], ``scales`` {field: SI per LSB}, ``altered`` [what was changed after writing], ``first_row`` (0).
+    it)], ``scales`` {field: SI per LSB}, ``altered`` [what was changed after writing], ``sample_time_s``.
     """
     path = Path(path)
     try:
@@ -292,5 +292,5 @@ def _meta(header, rows, names) -> dict:
         "gaps": [(int(k) + 1, int(step[k]) - 1) for k in np.flatnonzero(step != 1)],
         "scales": {entry["name"]: entry["si_per_lsb"] for entry in header["fields"]},
         "altered": [] if same else ["registers or start state do not fit their checksum"],
-        "first_row": 0,
+        "sample_time_s": header["sample_time_s"],
     }

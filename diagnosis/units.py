@@ -20,25 +20,97 @@ PEAK = math.sqrt(2.0)
 # quantity -> {unit: factor}; units marked SHAFT also take the pole pairs.
 SHAFT = "mech"
 FACTORS = {
-    "s": {"s": 1.0, "sec": 1.0, "seconds": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0},
-    "A": {"A": 1.0, "mA": 1e-3, "kA": 1e3, "Arms": PEAK, "A rms": PEAK, "A_rms": PEAK, "Apk": 1.0, "A peak": 1.0},
-    "V": {"V": 1.0, "mV": 1e-3, "kV": 1e3, "Vrms": PEAK, "V rms": PEAK, "V_rms": PEAK, "Vpk": 1.0, "V peak": 1.0},
+    "s": {
+        "s": 1.0,
+        "sec": 1.0,
+        "seconds": 1.0,
+        "ms": 1e-3,
+        "us": 1e-6,
+        "µs": 1e-6,
+        "ns": 1e-9,
+        "min": 60.0,
+        "h": 3600.0,
+    },
+    "A": {
+        "A": 1.0,
+        "mA": 1e-3,
+        "kA": 1e3,
+        "Arms": PEAK,
+        "A rms": PEAK,
+        "A_rms": PEAK,
+        "Apk": 1.0,
+        "A peak": 1.0,
+    },
+    "V": {
+        "V": 1.0,
+        "mV": 1e-3,
+        "kV": 1e3,
+        "Vrms": PEAK,
+        "V rms": PEAK,
+        "V_rms": PEAK,
+        "Vpk": 1.0,
+        "V peak": 1.0,
+    },
     "rad": {
-        "rad": 1.0, "rad el": 1.0, "mrad": 1e-3, "deg": DEGREE, "°": DEGREE, "deg el": DEGREE, "turn": TURN, "turn el": TURN,
-        "rad mech": 1.0, "deg mech": DEGREE, "turn mech": TURN, "rev": TURN,
+        "rad": 1.0,
+        "rad el": 1.0,
+        "mrad": 1e-3,
+        "deg": DEGREE,
+        "°": DEGREE,
+        "deg el": DEGREE,
+        "turn": TURN,
+        "turn el": TURN,
+        "rad mech": 1.0,
+        "deg mech": DEGREE,
+        "turn mech": TURN,
+        "rev": TURN,
     },
     "rad/s": {
-        "rad/s": 1.0, "rad/s el": 1.0, "deg/s": DEGREE, "°/s": DEGREE, "Hz": TURN, "erpm": RPM, "krpm": 1e3 * RPM, "rpm": RPM,
-        "1/min": RPM, "min-1": RPM, "rad/s mech": 1.0, "deg/s mech": DEGREE, "turn/s": TURN, "turn/s mech": TURN,
-        "rev/s": TURN, "rps": TURN,
+        "rad/s": 1.0,
+        "rad/s el": 1.0,
+        "deg/s": DEGREE,
+        "°/s": DEGREE,
+        "Hz": TURN,
+        "erpm": RPM,
+        "krpm": 1e3 * RPM,
+        "rpm": RPM,
+        "1/min": RPM,
+        "min-1": RPM,
+        "rad/s mech": 1.0,
+        "deg/s mech": DEGREE,
+        "turn/s": TURN,
+        "turn/s mech": TURN,
+        "rev/s": TURN,
+        "rps": TURN,
     },
     "1": {"1": 1.0, "-": 1.0, "": 1.0, "%": 0.01, "percent": 0.01, "permille": 1e-3, "‰": 1e-3},
-    "degC": {"degC": 1.0, "°C": 1.0, "C": 1.0, "deg C": 1.0, "celsius": 1.0, "K": 1.0, "degF": 5 / 9, "°F": 5 / 9},
+    "degC": {
+        "degC": 1.0,
+        "°C": 1.0,
+        "C": 1.0,
+        "deg C": 1.0,
+        "celsius": 1.0,
+        "K": 1.0,
+        "degF": 5 / 9,
+        "°F": 5 / 9,
+    },
     "Nm": {"Nm": 1.0, "N m": 1.0, "N*m": 1.0, "N.m": 1.0, "N·m": 1.0, "mNm": 1e-3, "kNm": 1e3},
 }
 OF_SHAFT = {
-    "rad mech", "deg mech", "turn mech", "rev", "rpm", "krpm", "1/min", "min-1", "rad/s mech", "deg/s mech", "turn/s",
-    "turn/s mech", "rev/s", "rps",
+    "rad mech",
+    "deg mech",
+    "turn mech",
+    "rev",
+    "rpm",
+    "krpm",
+    "1/min",
+    "min-1",
+    "rad/s mech",
+    "deg/s mech",
+    "turn/s",
+    "turn/s mech",
+    "rev/s",
+    "rps",
 }
 OFFSETS = {"K": -273.15, "degF": -160 / 9, "°F": -160 / 9}
 BRACKETS = re.compile(r"^(?P<name>.*?)\s*[\[(](?P<unit>[^\[\]()]*)[\])]\s*$")
@@ -65,4 +137,8 @@ def known_units(column: str) -> str:
 def split_unit(name: str) -> tuple[str, str]:
     """("i_a", "mA") of "i_a [mA]" or "i_a (mA)"; ("i_a", "") where there is none."""
     found = BRACKETS.match(name.strip())
-    return (found["name"].strip(), found["unit"].strip()) if found and found["name"].strip() else (name.strip(), "")
+    return (
+        (found["name"].strip(), found["unit"].strip())
+        if found and found["name"].strip()
+        else (name.strip(), "")
+    )

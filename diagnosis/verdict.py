@@ -10,12 +10,26 @@ LEFTOVER = 2.0  # reduced chi^2 that an explanation may leave
 FLOOR_SHARE = 0.12  # of the misfit's rms: a leftover below it is the curve's, not another effect's
 
 
-def groups(best, tied):
+CONSTANTS = {"magnet_temperature": "magnet_flux", "resistance_temperature": "resistance"}
+DRIFTS, STANDS = 0.25, 1.5  # drift over constant part: below the first it is the constant's, above 1/second nobody knows
+
+
+def groups(best, tied, effects, nominal):
     """(asserted names, ambiguity sets): what all tied models share, and the rest in sets that exclude each other."""
     models = [best.model.names, *(s.model.names for s in tied)]
     shared = frozenset.intersection(*models)
     rest = frozenset().union(*models) - shared
-    return sorted(shared), [sorted(rest)] if rest else []
+    ambiguity = [sorted(rest)] if rest else []
+    for drift, constant in CONSTANTS.items():
+        if {drift, constant} <= shared:
+            moved = effects[drift].size(best.c[drift], nominal)
+            stood = effects[constant].size(best.c[constant], nominal)
+            if moved < DRIFTS * stood:
+                shared -= {drift}
+            elif moved * STANDS > stood:  # warm from the start, or a wrong nameplate
+                shared -= {constant}
+                ambiguity.append([constant, drift])
+    return sorted(shared), ambiguity
 
 
 def named(solution, names, effects, nominal, empty, dispersion) -> list[NamedEffect]:

@@ -15,12 +15,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from diagnosis.recording import Recording, RecordingError
+from diagnosis.shaft import shaft_kind
 
 BLOCK_ROWS = 200
+SHORTER = (100, 50)  # where dwells are short
+LEAST_BLOCKS = 12
 HALF_WIDTH = 8
 MOST_BLOCKS = 700  # more rows than these blocks hold add time, not knowledge
 CURRENT_STEP = 0.08  # of rated current: a block with a larger change is a transient
 SPEED_STEP = 0.06  # of the largest speed
+
+
+STACKED = ("theta", "omega", "i", "i_raw", "u", "u_dc", "temp", "torque", "slope_m", "shaft", "rows")
 
 
 @dataclass
@@ -32,7 +38,10 @@ class View:
     i_abc: (b, m+1, 3) measured phase currents, or None where the recording has dq only [A]
     u: (b, m+2) stator-frame voltage of the intervals -1 .. m, complex [V]; u_dc: (b, m) [V]
     t, temp, run: (b,) time since the first row [s], winding temperature [degC] or nan, number of the dwell
-    torque: (b,) mean shaft torque [Nm] or nan;  omega_step: (b,) change of speed over the block [rad/s]
+    torque: (b, m) torque at the shaft [Nm], nan where nothing is known of it; slope_m: (b, m) d omega_m / dt
+    shaft: (b,) what is known of the shaft (see shaft.py)
+    psi_extra: (b, m+1) flux beyond the nominal one that is known by now, for terms that depend on the flux [Wb]
+    delta_l: what is known by now of L_d and L_q beyond the nominal [H]
     """
 
     nominal: object
@@ -47,10 +56,13 @@ class View:
     t: np.ndarray
     temp: np.ndarray
     torque: np.ndarray
+    slope_m: np.ndarray
+    shaft: np.ndarray
     run: np.ndarray
     rows: np.ndarray  # (b,) first row in its recording
     span_s: float  # length of the whole recording
-    notes: list = dataclasses.field(default_factory=list)
+    psi_extra: np.ndarray | float = 0.0
+    delta_l: tuple[float, float] = (0.0, 0.0)
 
     def __len__(self):
         return len(self.t)
@@ -75,13 +87,20 @@ class View:
         return 0.5 * (self.theta[:, 1:] + self.theta[:, :-1])
 
     @property
+    def nominal_psi(self):
+        """Nominal flux linkage of the current, (b, m+1) complex dq [Wb]."""
+        m = self.machine
+        return m.inductance_d_h * self.i.real + 1j * m.inductance_q_h * self.i.imag + m.magnet_flux_wb
+
+    @property
     def psi(self):
-        """Nominal flux linkage of the smoothed current, (b, m+1) complex dq [Wb]."""
-        return self.inductances(self.i) + self.machine.magnet_flux_wb
+        """Flux linkage of the current as far as it is known, (b, m+1) complex dq [Wb]."""
+        return self.nominal_psi + self.psi_extra
 
     def inductances(self, i):
-        """L_d i_d + j L_q i_q, the nominal flux of a dq current without the magnets [Wb]."""
-        return self.machine.inductance_d_h * i.real + 1j * self.machine.inductance_q_h * i.imag
+        """L_d i_d + j L_q i_q of a dq current, inductances as far as they are known [Wb]."""
+        l_d, l_q = self.machine.inductance_d_h + self.delta_l[0], self.machine.inductance_q_h + self.delta_l[1]
+        return l_d * i.real + 1j * l_q * i.imag
 
     @property
     def has_sum(self):
@@ -144,7 +163,7 @@ class View:
 
     def take(self, index):
         """The blocks of ``index`` only."""
-        per_block = ("theta", "omega", "i", "i_raw", "i_abc", "u", "u_dc", "t", "temp", "torque", "run", "rows")
+        per_block = (*STACKED, "i_abc", "t", "run")
         return self.replace(
             **{name: None if getattr(self, name) is None else getattr(self, name)[index] for name in per_block}
         )
@@ -221,8 +240,16 @@ def view_of(recording: Recording, nominal, block_rows=BLOCK_ROWS) -> View:
         asked[delay:] = (r["u_d_ref"] + 1j * r["u_q_ref"])[: n - delay]
         middle = np.append(0.5 * (theta_s[1:] + theta_s[:-1]), np.nan)
         u = asked * np.exp(1j * middle)
+    kind = shaft_kind(r, nominal, i_s, omega, linked)
+    torque = r["torque"] if kind == "torque" else np.full(n, 0.0 if kind in ("unloaded", "free") else np.nan)
+    slope_m = np.zeros(n)
+    slope_m[1:-2] = (theta[3:] - theta[2:-1] - theta[1:-2] + theta[:-3]) / (2 * period**2 * machine.pole_pairs)
     margin = HALF_WIDTH + delay + 2
-    starts = _steady_starts(run, i_s, omega, machine.rated_current_a, block_rows, margin)
+    lengths = [block_rows, *(n for n in SHORTER if n < block_rows)]
+    for block_rows in lengths:
+        starts = _steady_starts(run, i_s, omega, machine.rated_current_a, block_rows, margin)
+        if len(starts) >= LEAST_BLOCKS:
+            break
     if not len(starts):
         raise RecordingError(
             f"{r.source}: no stretch of {block_rows + 2 * margin} rows ({(block_rows + 2 * margin) * period * 1e3:.0f} ms) "
@@ -248,7 +275,9 @@ def view_of(recording: Recording, nominal, block_rows=BLOCK_ROWS) -> View:
         u_dc=u_dc_mid[rows],
         t=r["t"][rows].mean(axis=1) - r["t"][0],
         temp=block_mean("temp_winding"),
-        torque=block_mean("torque"),
+        torque=torque[rows],
+        slope_m=slope_m[rows],
+        shaft=np.full(len(starts), kind),
         run=dwell,
         rows=starts,
         span_s=float(r["t"][-1] - r["t"][0]),
@@ -301,7 +330,7 @@ def joined_views(views: list[View]) -> View:
     offsets_run = np.cumsum([0, *(v.run.max() + 1 for v in views)])
     stack = {
         name: np.concatenate([getattr(v, name) for v in views])
-        for name in ("theta", "omega", "i", "i_raw", "u", "u_dc", "temp", "torque", "rows")
+        for name in STACKED
     }
     phases = [v.i_abc for v in views]
     return first.replace(

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from diagnosis.catalogue.effect import Effect, Parameter, flux
+from diagnosis.catalogue.effect import FluxEffect, Parameter
 from diagnosis.result import Estimate
 
 
@@ -11,14 +11,14 @@ def _mixed(view, slope_d, slope_q):
     m = view.machine
     scale = m.inductance_q_h * m.rated_current_a
     x, y = view.i.real / m.rated_current_a, view.i.imag / m.rated_current_a
-    return flux(view, scale * (slope_d(x, y) + 1j * slope_q(x, y)))
+    return scale * (slope_d(x, y) + 1j * slope_q(x, y))
 
 
-class CrossSaturation(Effect):
-    def core(self, view):
+class CrossSaturation(FluxEffect):
+    def core_psi(self, view):
         return {"xy2": _mixed(view, lambda x, y: y**2, lambda x, y: 2 * x * y)}
 
-    def free(self, view):
+    def free_psi(self, view):
         return {
             "x2y2": _mixed(view, lambda x, y: 2 * x * y**2, lambda x, y: 2 * x**2 * y),
             "xy4": _mixed(view, lambda x, y: y**4, lambda x, y: 4 * x * y**3),

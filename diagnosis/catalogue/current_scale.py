@@ -1,20 +1,26 @@
 """All current sensors are wrong by one factor."""
 
-from diagnosis.catalogue.effect import Effect, Parameter, current_error, one, sigma
+import numpy as np
+
 from diagnosis.catalogue.current_gain import gain_column
+from diagnosis.catalogue.effect import Effect, Parameter, current_error, one, sigma
 
 
 class CurrentScale(Effect):
     def core(self, view):
         return {"scale": gain_column(view, (1.0, 1.0, 1.0)) if view.has_sum else current_error(view, view.i)}
 
+    def free(self, view):
+        return {"droop": current_error(view, view.i * np.abs(view.i / view.machine.rated_current_a) ** 2)}
+
     def floor(self, nominal):
         return 0.004
 
     def corrected(self, view, c):
-        factor = 1.0 / (1.0 + c["scale"])
+        rated = view.machine.rated_current_a
+        factor = 1.0 / (1.0 + c["scale"] + c.get("droop", 0.0) * np.abs(view.i / rated) ** 2)
         return view.replace(
-            i=view.i * factor, i_raw=view.i_raw * factor, i_abc=None if view.i_abc is None else view.i_abc * factor
+            i=view.i * factor, i_raw=view.i_raw * factor, i_abc=None if view.i_abc is None else view.i_abc * factor[..., None]
         )
 
     def estimates(self, c, covariance, nominal):

@@ -4,7 +4,7 @@ The misfit of a channel is what was recorded minus what the nominal drive would 
 
     u       mean stator voltage of an interval in dq, complex (b, m) [V]
     sum     i_a + i_b + i_c at the samples' middle, real (b, m) [A]
-    torque  mean shaft torque of a block, real (b,) [Nm]
+    torque  torque at the shaft, real (b, m) [Nm]
 
 An effect says which *columns* it adds to the misfit, per unit of its coefficients: a ``core`` that stands for
 its usual formula and a ``free`` set that bends that formula as far as its variables and symmetry allow.  A
@@ -80,17 +80,41 @@ class Effect:
         return {}
 
 
+class FluxEffect(Effect):
+    """An effect that is a flux linkage of the machine: it says its shapes, per unit of its coefficients."""
+
+    def core_psi(self, view) -> dict[str, np.ndarray]:
+        """Flux shapes of the usual formula, {coefficient: (b, m+1) complex dq}."""
+        raise NotImplementedError
+
+    def free_psi(self, view) -> dict[str, np.ndarray]:
+        """Further flux shapes."""
+        return {}
+
+    def core(self, view):
+        return {name: flux(view, psi) for name, psi in self.core_psi(view).items()}
+
+    def free(self, view):
+        return {name: flux(view, psi) for name, psi in self.free_psi(view).items()}
+
+    def psi(self, view, c) -> np.ndarray:
+        """The effect's flux linkage, (b, m+1) complex dq [Wb]."""
+        shapes = {**self.core_psi(view), **self.free_psi(view)}
+        return sum(value * shapes[name] for name, value in c.items() if value)
+
+    def delta_l(self, c) -> tuple[float, float]:
+        """What it adds to L_d and L_q [H]."""
+        return 0.0, 0.0
+
+
 def voltage(u) -> Column:
     """A voltage that the machine or the inverter needs beyond the nominal one, (b, m) complex dq."""
     return {"u": u}
 
 
-def flux(view, psi, torque=True) -> Column:
+def flux(view, psi) -> Column:
     """A flux linkage beyond the nominal one, (b, m+1) complex dq."""
-    column = {"u": view.flux(psi)}
-    if torque:
-        column["torque"] = torque_of(view, psi, view.i)
-    return column
+    return {"u": view.flux(psi), "torque": torque_of(view, psi, view.i)}
 
 
 def current_error(view, error) -> Column:
@@ -113,8 +137,9 @@ def angle_error(view, delta) -> Column:
 
 
 def torque_of(view, psi, i):
-    """Mean air-gap torque of a block, (b,) [Nm], from flux linkage and current at the samples."""
-    return 1.5 * view.machine.pole_pairs * np.mean((np.conj(psi) * i).imag, axis=1)
+    """Air-gap torque of the intervals, (b, m) [Nm], from flux linkage and current at the samples."""
+    torque = 1.5 * view.machine.pole_pairs * (np.conj(psi) * i).imag
+    return 0.5 * (torque[:, 1:] + torque[:, :-1])
 
 
 def sigma(covariance, k=0) -> float:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from diagnosis.catalogue.effect import Effect, Parameter, flux
+from diagnosis.catalogue.effect import Effect, Parameter, flux, torque_of
 from diagnosis.result import Estimate
 
 
@@ -10,8 +10,15 @@ def _order(view, h):
     """The four terms of an order: forward and backward, cosine and sine, per unit of the magnets' flux."""
     psi_m = view.machine.magnet_flux_wb
     turn = np.exp(1j * h * view.theta)
-    terms = {"fc": turn, "fs": 1j * turn, "bc": np.conj(turn), "bs": 1j * np.conj(turn)}
-    return {f"h{h}_{key}": flux(view, psi_m * term, torque=False) for key, term in terms.items()}
+    terms = {"fc": (turn, h), "fs": (1j * turn, h), "bc": (np.conj(turn), -h), "bs": (1j * np.conj(turn), -h)}
+    return {f"h{h}_{key}": _with_reluctance(view, psi_m * term, n) for key, (term, n) in terms.items()}
+
+
+def _with_reluctance(view, psi, n):
+    """Flux that turns n times an electrical turn in dq: the torque also has its slope, Re(conj(d psi / d theta) i)."""
+    column = flux(view, psi)
+    column["torque"] = column["torque"] + torque_of(view, -n * psi, view.i)
+    return column
 
 
 def _dq(c, h):

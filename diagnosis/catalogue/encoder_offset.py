@@ -3,17 +3,21 @@
 import numpy as np
 
 from diagnosis.catalogue.effect import Effect, Parameter, angle_error, one, sigma
+from diagnosis.curves import course
 
 
 class EncoderOffset(Effect):
     def core(self, view):
         return {"offset": angle_error(view, np.ones_like(view.theta))}
 
+    def free(self, view):
+        return {"creep": angle_error(view, course(view) * np.ones_like(view.theta))}
+
     def floor(self, nominal):
         return 0.004
 
     def corrected(self, view, c):
-        return view.turned(c["offset"])
+        return view.turned(c["offset"] + c.get("creep", 0.0) * course(view))
 
     def estimates(self, c, covariance, nominal):
         return one("offset_rad", "rad", c["offset"], sigma(covariance))

@@ -1,11 +1,19 @@
 """Inductance of the d axis other than the nameplate's: omega i_d on the q axis."""
 
-from diagnosis.catalogue.effect import Effect, Parameter, flux, one, sigma
+from diagnosis.catalogue.effect import FluxEffect, Parameter, one, sigma
 
 
-class InductanceD(Effect):
-    def core(self, view):
-        return {"delta_l_d": flux(view, view.i.real.astype(complex))}
+class InductanceD(FluxEffect):
+    def core_psi(self, view):
+        return {"delta_l_d": view.i.real.astype(complex)}
+
+    def free_psi(self, view):
+        x = view.i.real / view.machine.rated_current_a
+        unit = view.machine.rated_current_a * x + 0j
+        return {"bend_2": unit * x, "bend_3": unit * x**2}
+
+    def delta_l(self, c):
+        return c["delta_l_d"], 0.0
 
     def floor(self, nominal):
         return 0.01 * nominal.machine.inductance_d_h

@@ -1,11 +1,21 @@
 """Inductance of the q axis other than the nameplate's: -omega i_q on the d axis."""
 
-from diagnosis.catalogue.effect import Effect, Parameter, flux, one, sigma
+import numpy as np
+
+from diagnosis.catalogue.effect import FluxEffect, Parameter, one, sigma
 
 
-class InductanceQ(Effect):
-    def core(self, view):
-        return {"delta_l_q": flux(view, 1j * view.i.imag)}
+class InductanceQ(FluxEffect):
+    def core_psi(self, view):
+        return {"delta_l_q": 1j * view.i.imag}
+
+    def free_psi(self, view):
+        y = view.i.imag / view.machine.rated_current_a
+        unit = 1j * view.machine.rated_current_a * y
+        return {"bend_2": unit * np.abs(y), "bend_3": unit * y**2}
+
+    def delta_l(self, c):
+        return 0.0, c["delta_l_q"]
 
     def floor(self, nominal):
         return 0.01 * nominal.machine.inductance_q_h

@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from diagnosis.catalogue.effect import Effect, Parameter, flux, one, sigma
+from diagnosis.catalogue.effect import FluxEffect, Parameter, one, sigma
 
 
-class MagnetFlux(Effect):
-    def core(self, view):
-        return {"delta_psi_m": flux(view, np.ones_like(view.i))}
+class MagnetFlux(FluxEffect):
+    def core_psi(self, view):
+        return {"delta_psi_m": np.ones_like(view.i)}
 
     def floor(self, nominal):
         return 0.003 * nominal.machine.magnet_flux_wb

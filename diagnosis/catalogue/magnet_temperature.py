@@ -2,22 +2,21 @@
 
 import numpy as np
 
-from diagnosis.catalogue.effect import Effect, Parameter, flux, one, sigma
+from diagnosis.catalogue.effect import FluxEffect, Parameter, one, sigma
 from diagnosis.curves import courses, known_temperature, reference_c
 
 
-class MagnetTemperature(Effect):
-    def core(self, view):
+class MagnetTemperature(FluxEffect):
+    def core_psi(self, view):
         one_wb = np.ones_like(view.i)
         if known_temperature(view):
             rise = view.machine.magnet_flux_wb * (view.temp - reference_c(view.nominal))
-            return {"alpha_m": flux(view, one_wb * rise[:, None])}
-        course = view.t / max(view.span_s, 1e-9)
-        return {"drift": flux(view, one_wb * course[:, None])}
+            return {"alpha_m": one_wb * rise[:, None]}
+        return {"drift": one_wb * (view.t / max(view.span_s, 1e-9))[:, None]}
 
-    def free(self, view):
+    def free_psi(self, view):
         one_wb = np.ones_like(view.i)
-        return {f"course_{k}": flux(view, one_wb * c[:, None]) for k, c in enumerate(courses(view)[:-1])}
+        return {f"course_{k}": one_wb * c[:, None] for k, c in enumerate(courses(view)[:-1])}
 
     def floor(self, nominal):
         return 0.004 * nominal.machine.magnet_flux_wb

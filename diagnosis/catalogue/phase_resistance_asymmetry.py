@@ -4,6 +4,7 @@ import numpy as np
 
 from diagnosis.catalogue.current_gain import PATTERNS
 from diagnosis.catalogue.effect import Effect, Parameter, voltage
+from diagnosis.curves import course
 from diagnosis.result import Estimate
 
 
@@ -12,6 +13,11 @@ class PhaseResistanceAsymmetry(Effect):
         i_abc = view.phases(view.i_mid)
         r = view.machine.resistance_ohm
         return {name: voltage(view.from_phases(r * np.array(w) * i_abc)) for name, w in PATTERNS.items()}
+
+    def free(self, view):
+        fade = course(view)[:, :, None]
+        i_abc, r = view.phases(view.i_mid), view.machine.resistance_ohm
+        return {f"{k}_course": voltage(view.from_phases(fade * r * np.array(w) * i_abc)) for k, w in PATTERNS.items()}
 
     def floor(self, nominal):
         return 0.01
@@ -26,7 +32,7 @@ class PhaseResistanceAsymmetry(Effect):
     def estimates(self, c, covariance, nominal):
         out = {}
         for k, phase in enumerate("abc"):
-            weights = np.array([PATTERNS[name][k] for name in c])
+            weights = np.array([PATTERNS[name][k] if name in PATTERNS else 0.0 for name in c])
             spread = float(np.sqrt(max(weights @ covariance @ weights, 0.0)))
             out[f"asymmetry_{phase}"] = Estimate(float(self._phases(c)[k]), spread, "1")
         return out

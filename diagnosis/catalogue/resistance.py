@@ -1,11 +1,18 @@
 """Winding resistance other than the nameplate's: u = R i."""
 
+import numpy as np
+
 from diagnosis.catalogue.effect import Effect, Parameter, one, sigma, voltage
 
 
 class Resistance(Effect):
     def core(self, view):
         return {"delta_r": voltage(view.i_mid)}
+
+    def free(self, view):
+        # Skin effect: more ohms at speed.
+        top = max(float(np.abs(view.omega).max()), 1e-9)
+        return {"skin": voltage(view.i_mid * (view.omega_mid / top) ** 2)}
 
     def floor(self, nominal):
         return 0.01 * nominal.machine.resistance_ohm

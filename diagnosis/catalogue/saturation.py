@@ -2,25 +2,25 @@
 
 import numpy as np
 
-from diagnosis.catalogue.effect import Effect, Parameter, flux
+from diagnosis.catalogue.effect import FluxEffect, Parameter
 from diagnosis.result import Estimate
 
 
 def _q(view, shape):
     y = view.i.imag / view.machine.rated_current_a
-    return flux(view, 1j * view.machine.inductance_q_h * view.machine.rated_current_a * shape(y))
+    return 1j * view.machine.inductance_q_h * view.machine.rated_current_a * shape(y)
 
 
 def _d(view, shape):
     x = view.i.real / view.machine.rated_current_a
-    return flux(view, view.machine.inductance_d_h * view.machine.rated_current_a * shape(x) + 0j)
+    return view.machine.inductance_d_h * view.machine.rated_current_a * shape(x) + 0j
 
 
-class Saturation(Effect):
-    def core(self, view):
+class Saturation(FluxEffect):
+    def core_psi(self, view):
         return {"q_3": _q(view, lambda y: y**3), "d_3": _d(view, lambda x: x**3)}
 
-    def free(self, view):
+    def free_psi(self, view):
         return {
             "q_1": _q(view, lambda y: y),
             "d_1": _d(view, lambda x: x),

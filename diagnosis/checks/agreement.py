@@ -35,7 +35,11 @@ def angle_speed_ratio(recording, period, theta_factor=1.0, omega_factor=1.0) -> 
         return None
     if np.median(np.abs(turned)) > 2.0:
         return None
-    ratio = float(np.sum(turned * advance) / np.sum(advance * advance))
+    keep = slice(None)
+    for _ in range(3):  # a stretch in which one of them is stuck must not count
+        ratio = float(np.sum((turned * advance)[keep]) / np.sum((advance * advance)[keep]))
+        off = np.abs(turned - ratio * advance)
+        keep = off <= 4.0 * np.median(off) + 1e-12
     scatter = float(np.median(np.abs(turned - ratio * advance)))
     # Angles that jump at random agree with nothing, not with a small ratio.
     return ratio if scatter < 0.5 * float(np.median(np.abs(turned))) + 1e-12 else None
@@ -45,5 +49,7 @@ def _rows(recording) -> np.ndarray:
     """Rows whose step in time is the usual one, at most MOST_ROWS of them, from all over the recording."""
     step = np.diff(recording["t"])
     usual = np.median(step[step > 0]) if np.any(step > 0) else 0.0
-    rows = np.flatnonzero((step > 0.5 * usual) & (step < 1.5 * usual) & recording.usable[1:] & recording.usable[:-1])
+    rows = np.flatnonzero(
+        (step > 0.5 * usual) & (step < 1.5 * usual) & recording.usable[1:] & recording.usable[:-1]
+    )
     return rows[:: max(1, len(rows) // MOST_ROWS)]

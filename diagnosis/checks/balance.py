@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-MOST_ROWS = 20_000
+MOST_ROWS = 5000
 FIT = 0.25  # misfit over voltage: what any real effect stays below at speed
 BETTER = 0.3  # a change must leave less than this share of the misfit
 TURNS = np.exp(2j * np.pi / 3 * np.arange(3))
@@ -69,7 +69,16 @@ def rows_of(recording, nominal) -> Rows | None:
         u_dq = u_d + 1j * columns["u_q_ref"][k - delay]
     u_dc = columns["u_dc"][k] if "u_dc" in columns else None
     rows = Rows(
-        machine, nominal.sample_time_s, dq_only, i, dq, d, u_dq, u_dc, columns["theta_e"][ends], columns["omega_e"][ends]
+        machine,
+        nominal.sample_time_s,
+        dq_only,
+        i,
+        dq,
+        d,
+        u_dq,
+        u_dc,
+        columns["theta_e"][ends],
+        columns["omega_e"][ends],
     )
     return rows if len(k) else None
 

@@ -32,7 +32,9 @@ def check(recording, nominal) -> None:
                 recording.meta["notes"].append(f"{name} holds no number and is left out")
                 del columns[name]
             else:
-                recording.problems.append(Problem("missing", "holds no finite number", name, row, bad, fatal=True))
+                recording.problems.append(
+                    Problem("missing", "holds no finite number", name, row, bad, fatal=True)
+                )
             continue
         if name not in SLOW and bad > MOST * n:
             message = f"{bad} of {n} values are missing or not finite"
@@ -48,7 +50,14 @@ def check(recording, nominal) -> None:
             filled[lost] = _between(name, lost, where, columns[name][where])
             recording.usable[lost] = False
             recording.problems.append(
-                Problem("missing", f"{bad} values missing or not finite", name, row, bad, "interpolated; rows not used")
+                Problem(
+                    "missing",
+                    f"{bad} values missing or not finite",
+                    name,
+                    row,
+                    bad,
+                    "interpolated; rows not used",
+                )
             )
         columns[name] = filled
 

@@ -38,6 +38,9 @@ def _mend(recording, step, back, usual) -> None:
         for k in restarts:
             t[k + 1 :] += t[k] - t[k + 1] + RESTART_STEPS * usual
         recording.columns["t"] = t
+        part = np.zeros(len(t), int)
+        part[restarts + 1] = 1
+        recording.meta["run"] = recording.meta.get("run", 0) + np.cumsum(part)
         recording.problems.append(
             Problem("time_order", f"time begins again {len(restarts)} times", "t", int(restarts[0]) + 1, len(restarts),
                     "each part is taken as a run of its own")
@@ -47,7 +50,14 @@ def _mend(recording, step, back, usual) -> None:
         rows = np.argsort(recording["t"], kind="stable")
         keep_rows(recording, rows)
         recording.problems.append(
-            Problem("time_order", f"time runs backwards {len(back)} times", "t", int(back[0]) + 1, len(back), "rows sorted")
+            Problem(
+                "time_order",
+                f"time runs backwards {len(back)} times",
+                "t",
+                int(back[0]) + 1,
+                len(back),
+                "rows sorted",
+            )
         )
 
 
@@ -63,7 +73,14 @@ def _duplicates(recording) -> None:
         keep_rows(recording, np.flatnonzero(keep))
         recording.joined[:-1] |= np.diff(recording["t"]) > 0
         recording.problems.append(
-            Problem("duplicate", f"{len(twice)} rows stand twice", "t", int(twice[0]) + 1, len(twice), "left out once")
+            Problem(
+                "duplicate",
+                f"{len(twice)} rows stand twice",
+                "t",
+                int(twice[0]) + 1,
+                len(twice),
+                "left out once",
+            )
         )
 
 

@@ -9,13 +9,20 @@ from __future__ import annotations
 
 import numpy as np
 
+from diagnosis.checks.agreement import angle_speed_ratio
 from diagnosis.checks.balance import BETTER, FIT, Rows, misfit, rows_of, tells
 from diagnosis.recording import Problem
 
 STAGE = "geometry"
 CLEAR = 1.6  # the second best change must be worse by this much
 
-ORDERS = {"b and c": [0, 2, 1], "a and c": [2, 1, 0], "a and b": [1, 0, 2], "b, c, a": [1, 2, 0], "c, a, b": [2, 0, 1]}
+ORDERS = {
+    "b and c": [0, 2, 1],
+    "a and c": [2, 1, 0],
+    "a and b": [1, 0, 2],
+    "b, c, a": [1, 2, 0],
+    "c, a, b": [2, 0, 1],
+}
 CURRENTS, DUTIES = ("i_a", "i_b", "i_c"), ("d_a", "d_b", "d_c")
 
 
@@ -38,9 +45,11 @@ def check(recording, nominal) -> None:
         message = f"{_words(best)} or {_words(second)}: {numbers}; correct [columns] in drive.toml"
         recording.problems.append(Problem("swapped_phases", message, _column(best), 0, n, fatal=True))
         return
-    _apply(recording, best)
+    _apply(recording, best, nominal.sample_time_s)
     code = "rotation" if best[0] in ("angle", "speed") else "sign" if best[0] == "sign" else "swapped_phases"
-    recording.problems.append(Problem(code, f"{_words(best)}: {numbers}", _column(best), 0, n, "worked round"))
+    recording.problems.append(
+        Problem(code, f"{_words(best)}: {numbers}", _column(best), 0, n, "worked round")
+    )
 
 
 def _changes(rows: Rows) -> dict[tuple, Rows]:
@@ -77,7 +86,9 @@ def _words(change) -> str:
     if what == "axes":
         return "the d and q axes are swapped"
     if what == "sign":
-        return "the phase currents have the opposite sign" if which == "i" else f"{which} has the opposite sign"
+        return (
+            "the phase currents have the opposite sign" if which == "i" else f"{which} has the opposite sign"
+        )
     who = {"currents": "phase currents", "duties": "duties", "both": "phase currents and duties"}[what]
     return f"{who} {which} are swapped" if " and " in which else f"{who} stand in the order {which}"
 
@@ -93,15 +104,17 @@ def _column(change) -> str:
     return {"angle": "theta_e", "speed": "omega_e", "axes": "i_d"}.get(what, "i_a" if which == "i" else which)
 
 
-def _apply(recording, change) -> None:
+def _apply(recording, change, period) -> None:
     """Make the change in the recording."""
     what, which = change
     columns = recording.columns
     if what in ("angle", "speed"):
-        for name in ("theta_e", "omega_e"):
-            columns[name] = -columns[name]
-        if "torque" in columns:
-            columns["torque"] = -columns["torque"]
+        ratio = angle_speed_ratio(recording, period) if what == "angle" else None
+        columns["theta_e"] = -columns["theta_e"]
+        if ratio is None or ratio > 0.0:  # a speed of the other sign than the angle was right
+            columns["omega_e"] = -columns["omega_e"]
+            if "torque" in columns:
+                columns["torque"] = -columns["torque"]
     elif what == "axes":
         for a, b in (("i_d", "i_q"), ("u_d_ref", "u_q_ref"), ("i_d_ref", "i_q_ref")):
             if recording.has(a, b):
@@ -113,6 +126,8 @@ def _apply(recording, change) -> None:
     else:
         if "i_c" not in columns and what != "duties":
             columns["i_c"] = -columns["i_a"] - columns["i_b"]
-        for names in (CURRENTS, DUTIES) if what == "both" else (CURRENTS,) if what == "currents" else (DUTIES,):
+        for names in (
+            (CURRENTS, DUTIES) if what == "both" else (CURRENTS,) if what == "currents" else (DUTIES,)
+        ):
             values = [columns[names[k]] for k in ORDERS[which]]
             columns.update(zip(names, values, strict=True))

@@ -33,19 +33,30 @@ def check(recording, nominal) -> None:
         recording.columns["t"] = recording["t"] * factor
         step, usual = step * factor, usual * factor
         recording.problems.append(
-            Problem("unit", f"time advances by {usual / factor:g} a row", "t", 0, len(recording), f"taken as {unit}")
+            Problem(
+                "unit",
+                f"time advances by {usual / factor:g} a row",
+                "t",
+                0,
+                len(recording),
+                f"taken as {unit}",
+            )
         )
     ratio = usual / period
     if abs(ratio - 1.0) <= TOLERANCE:
         usual = period
     elif ratio >= SLOW_FROM:
         recording.slow = True
-        message = f"a row every {usual:g} s, the control samples every {period:g} s: too slow for a balance in time"
+        message = (
+            f"a row every {usual:g} s, the control samples every {period:g} s: too slow for a balance in time"
+        )
         recording.problems.append(
             Problem("slow_sampling", message, "t", 0, len(recording), "only steady operating points are used")
         )
     elif not _time_is_wrong(recording, ratio, period):
-        message = f"a row every {usual:g} s, but [control] sample_time_s or 1 / pwm_frequency_hz is {period:g} s"
+        message = (
+            f"a row every {usual:g} s, but [control] sample_time_s or 1 / pwm_frequency_hz is {period:g} s"
+        )
         recording.problems.append(Problem("sample_time", message, "t", 0, len(recording), fatal=True))
         return
     else:

@@ -24,7 +24,9 @@ def check(recording, nominal) -> None:
         if recording.has("d_a", "i_a"):
             recording.columns["omega_e"] = -recording["omega_e"]
             action = "the speed is turned round: the angle fits the currents and duties"
-            recording.problems.append(Problem("rotation", "speed and angle have opposite signs", "omega_e", 0, n, action))
+            recording.problems.append(
+                Problem("rotation", "speed and angle have opposite signs", "omega_e", 0, n, action)
+            )
         else:
             message = "speed and angle have opposite signs; which is right cannot be told from dq values"
             recording.problems.append(Problem("rotation", message, "omega_e", 0, n, "the speed is believed"))

@@ -14,6 +14,7 @@ import stat
 import warnings
 from pathlib import Path
 
+from diagnosis.readers.memory import limited_memory
 from diagnosis.readers.table import Select, Table, shown
 from diagnosis.recording import RecordingError
 
@@ -22,9 +23,12 @@ HEAD_BYTES = 4096
 
 def readers() -> list:
     """Every module of this folder that reads a format; text last, since anything may look like text."""
-    names = sorted(m.name for m in pkgutil.iter_modules(__path__) if m.name != "table")
+    names = sorted(m.name for m in pkgutil.iter_modules(__path__))
     modules = [importlib.import_module(f"{__name__}.{name}") for name in names]
-    return sorted((m for m in modules if hasattr(m, "read")), key=lambda m: m.FORMAT == "text")
+    return sorted(
+        (m for m in modules if hasattr(m, "read")),
+        key=lambda m: (not hasattr(m, "FIRST"), m.FORMAT == "text"),
+    )
 
 
 def read_table(path, select: Select | None = None) -> Table:
@@ -33,7 +37,7 @@ def read_table(path, select: Select | None = None) -> Table:
     head = _head(path)
     reader = _reader_of(path, head)
     try:
-        with warnings.catch_warnings():
+        with warnings.catch_warnings(), limited_memory():
             warnings.simplefilter("ignore")  # a damaged file's warnings end as checks or errors of our own
             return reader.read(path, select)
     except RecordingError:
@@ -73,7 +77,7 @@ def _reader_of(path: Path, head: bytes):
         formats = ", ".join(m.FORMAT for m in known)
         claimed = f"not a {claims[0].FORMAT} file as its name says" if claims else "unknown format"
         raise RecordingError(f"{path}: {claimed}; what can be read: {formats}")
-    if claims and found not in claims:
+    if claims and found not in claims and not hasattr(found, "FIRST"):
         raise RecordingError(
             f"{path}: the name says {claims[0].FORMAT}, the content is {found.FORMAT}; rename it if that is right"
         )

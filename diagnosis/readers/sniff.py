@@ -23,7 +23,9 @@ NUMBER = {
     ".": re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?"),
     ",": re.compile(r"[+-]?(\d+,?\d*|,\d+)([eE][+-]?\d+)?"),
 }
-UNIT_LINE = re.compile(r"[\[(]?\s*(s|ms|[uµ]s|A|mA|V|mV|rad|deg|°|rpm|1/min|min-1|rad/s|°C|degC|C|Nm|N[m·.]|%|1|-|)\s*[\])]?")
+UNIT_LINE = re.compile(
+    r"[\[(]?\s*(s|ms|[uµ]s|A|mA|V|mV|rad|deg|°|rpm|1/min|min-1|rad/s|°C|degC|C|Nm|N[m·.]|%|1|-|)\s*[\])]?"
+)
 
 
 @dataclass(frozen=True)
@@ -61,12 +63,16 @@ def sniff(path) -> Layout:
     if len(head) == SNIFF_BYTES:
         lines.pop()  # cut by the limit
         if not lines:
-            raise RecordingError(f"{path}:1: no line end in the first {SNIFF_BYTES} bytes; rows of numbers expected")
+            raise RecordingError(
+                f"{path}:1: no line end in the first {SNIFF_BYTES} bytes; rows of numbers expected"
+            )
     lines = lines[:SNIFF_LINES]
     candidates = (_candidate(lines, separator, decimal) for separator in SEPARATORS for decimal in ".,")
     score, separator, decimal, first, width = max(candidates, key=lambda c: c[0])
     if score <= 0:
-        raise RecordingError(f"{path}: no row of numbers in the first {len(lines)} lines; a table was expected")
+        raise RecordingError(
+            f"{path}: no row of numbers in the first {len(lines)} lines; a table was expected"
+        )
     names, units = _header(lines[:first], separator, width)
     return Layout(encoding, separator, decimal, first, names, units)
 
@@ -98,7 +104,9 @@ def _header(lines, separator, width):
     """(names, units) from the lines above the numbers; "1", "2", ... where there is no header."""
     rows = []
     for line in reversed(lines):
-        fields = split(line.strip().lstrip("#%/").strip() if line.lstrip().startswith(COMMENT) else line, separator)
+        fields = split(
+            line.strip().lstrip("#%/").strip() if line.lstrip().startswith(COMMENT) else line, separator
+        )
         if len(fields) == width - 1 and separator != " ":
             fields.append("")  # rows that end in a separator
         if len(fields) == width and any(fields):

@@ -40,7 +40,7 @@ def write_recording(path: Path, columns: dict, kind: str) -> Path:
     if kind == "csv":
         frame.to_csv(temporary, index=False, float_format="%.9g")
     else:
-        frame.astype(np.float32 if len(frame) == 0 else float).to_parquet(temporary, index=False)
+        frame.to_parquet(temporary, index=False)
     os.replace(temporary, path)
     return path
 
@@ -81,12 +81,16 @@ def generate(seed: int, out: Path, count: int, only: list[str] | None = None, jo
     """All cases of a seed into ``out``; returns the truth's SHA-256."""
     out = Path(out).resolve()
     out.mkdir(parents=True, exist_ok=True)
+    for old in [*out.glob("case_*/recording.*"), *out.glob("case_*/drive.toml"), out / "sealed.sha256"]:
+        old.unlink(missing_ok=True)
+    for old in out.glob("case_*"):
+        old.rmdir()
     work = [(seed, *entry, out) for entry in listing(seed, count, only)]
     truth = []
     with multiprocessing.get_context("spawn").Pool(jobs) as pool:
         for entry in pool.imap_unordered(generate_case, work):
             truth.append(entry)
-            print(f"\r{len(truth)} of {len(work)} cases", end="", file=sys.stderr, flush=True)
+            print(f"\r{len(truth)} of {len(work)} cases ", end="", file=sys.stderr, flush=True)
     print(file=sys.stderr)
     truth.sort(key=lambda entry: entry["case"])
     return seal(out, {"seed": seed, "cases": truth})

@@ -46,13 +46,14 @@ def _top_speed(n: Nominal, points):
 
 def current_points(rng, i_rated, with_d=True):
     """Four to eight (i_d, i_q): both signs of i_q, i_d zero and (with_d) negative."""
-    low, high, negative = rng.uniform(0.2, 0.45), rng.uniform(0.75, 1.0), -rng.uniform(0.3, 0.6)
+    low, high, negative = rng.uniform(0.2, 0.45), rng.uniform(0.75, 1.0), -rng.uniform(0.4, 0.75)
     must = [(0.0, high), (0.0, -high), (0.0, low)]
     side = math.sqrt(max(0.0, 0.95 - negative**2))
     extra = [(0.0, 0.0), (0.0, -low)]
     if with_d:
         must += [(negative, 0.0), (negative, side * rng.uniform(0.6, 1.0))]
-        extra += [(negative, -side), (0.5 * negative, 0.5 * side), (0.6 * negative, -low)]
+        must += [(0.5 * negative, -side * rng.uniform(0.3, 0.7))]  # another level, or L_d could be saturation
+        extra += [(negative, -side), (0.7 * negative, -low)]
     rng.shuffle(extra)
     points = must + extra[: rng.integers(1, min(4, len(extra) + 1))]
     rng.shuffle(points)

@@ -1,0 +1,67 @@
+"""The shaft drags: a torque against the motion that depends on the speed alone."""
+
+import numpy as np
+
+from diagnosis.catalogue.effect import Effect, Parameter
+from diagnosis.result import Estimate
+
+
+def _drag(view, shape):
+    omega_m = view.omega_mid / view.machine.pole_pairs
+    return {"torque": -shape(omega_m)}
+
+
+def _top(view):
+    return max(float(np.abs(view.omega).max()) / view.machine.pole_pairs, 1e-9)
+
+
+class Friction(Effect):
+    def core(self, view):
+        top = _top(view)
+        return {
+            "viscous": _drag(view, lambda w: w),
+            "coulomb": _drag(view, lambda w: np.tanh(w / (0.01 * top))),
+        }
+
+    def free(self, view):
+        top = _top(view)
+        return {
+            "square": _drag(view, lambda w: w * np.abs(w) / top),
+            "low": _drag(view, lambda w: np.sign(w) * np.exp(-np.abs(w) / (0.1 * top))),
+        }
+
+    def floor(self, nominal):
+        m = nominal.machine
+        return 0.006 * 1.5 * m.pole_pairs * m.magnet_flux_wb * m.rated_current_a
+
+    def size(self, c, nominal):
+        """Drag at the speed where the EMF reaches the bus, about the highest."""
+        m = nominal.machine
+        top = nominal.inverter.dc_bus_v / np.sqrt(3) / m.magnet_flux_wb / m.pole_pairs
+        return abs(c["viscous"]) * top + abs(c["coulomb"]) + abs(c.get("square", 0.0)) * top + abs(c.get("low", 0.0))
+
+    def estimates(self, c, covariance, nominal):
+        m, spread = nominal.machine, np.sqrt(np.maximum(np.diag(covariance), 0.0))
+        b, t = m.viscous_friction_nms or 0.0, m.coulomb_friction_nm or 0.0
+        return {
+            "viscous_friction_nms": Estimate(b + c["viscous"], float(spread[0]), "Nm s"),
+            "coulomb_friction_nm": Estimate(t + c["coulomb"], float(spread[1]), "Nm"),
+        }
+
+    def plant(self, c, nominal):
+        values = self.estimates(c, np.zeros((len(c),) * 2), nominal)
+        return {f"machine.{name}": max(e.value, 0.0) for name, e in values.items()}
+
+
+EFFECT = Friction(
+    name="friction",
+    title="the shaft has more friction than the nameplate says",
+    equation="T_shaft = T_airgap - B omega_m - T_c sign(omega_m)",
+    signature="torque against the motion, odd in speed, at every load",
+    confounders=("iron_loss",),
+    separated_by="a torque transducer, or a coast-down without load in both directions",
+    parameters=(
+        Parameter("viscous_friction_nms", "Nm s", "per mechanical rad/s"),
+        Parameter("coulomb_friction_nm", "Nm", "dry"),
+    ),
+)

@@ -1,0 +1,62 @@
+"""Flat tops: runs at exactly the largest or smallest value, entered at a slope that would have gone on.
+
+The natural top of a quantised sine is flat too, but the wave has all but stopped when it gets there: prolonged over
+half the flat at its mean slope over as many rows before, it would gain a few codes.  A clipped wave would have gained
+a good part of its amplitude.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from diagnosis.checks.runs import mark, quantum, runs_of_equal
+from diagnosis.recording import Problem
+
+STAGE = "signals"
+LEAST = 3  # rows
+CODES = 12.0
+SHARE = 0.03  # of the channel's range
+MOST_RUNS = 5000
+
+
+def check(recording, nominal) -> None:
+    for name in ("i_a", "i_b", "i_c"):
+        if name in recording.columns and not recording.slow:
+            _check_one(recording, name)
+
+
+def _check_one(recording, name) -> None:
+    x = recording[name]
+    high, low = float(x.max()), float(x.min())
+    step = quantum(x)
+    if high - low < 16 * step or high == low:
+        return
+    least_gain = max(CODES * step, SHARE * (high - low))
+    tops, starts, lengths = 0, [], []
+    for top in (high, low):
+        first, length = runs_of_equal(x == top, LEAST)
+        at_top = x[first] == top
+        first, length = first[at_top], length[at_top]
+        found = _clipped(x, first[:MOST_RUNS], length[:MOST_RUNS], least_gain)
+        if found:  # then its other flats are clipped too, whatever their flanks look like
+            tops += found
+            starts.append(first)
+            lengths.append(length)
+    if tops < 2:
+        return
+    first, length = np.concatenate(starts), np.concatenate(lengths)
+    count = mark(recording.usable, first, length, 1, 1)
+    row = int(first.min())
+    message = f"flat at {x[row]:.6g} A in {len(first)} places"
+    recording.problems.append(Problem("clipped", message, name, row, count, "rows not used"))
+
+
+def _clipped(x, first, length, least_gain) -> int:
+    """How many of the flats were entered and left at a slope that would have gained more than ``least_gain``."""
+    # Both flanks: a current that steps up and stays has only one.
+    before, after = first - 1 - length, first + 2 * length
+    inside = (before >= 0) & (after < len(x))
+    first, length, before, after = first[inside], length[inside], before[inside], after[inside]
+    up = np.abs(x[first - 1] - x[before]) / length
+    down = np.abs(x[first + length] - x[after]) / length
+    return int(np.count_nonzero(np.minimum(up, down) * length / 2 > least_gain))

@@ -1,0 +1,74 @@
+"""Samples that were dropped or written twice although the time goes on evenly: the angle tells.
+
+An angle advances evenly.  One row in which it advances twice as far as before and after, or not at all with every
+channel as it was, is a slip of the logger; rows are then not joined there.  A channel table that only changes every
+few rows was sampled slower than its time says.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from diagnosis.checks.agreement import wrapped
+from diagnosis.recording import Problem
+
+STAGE = "signals"
+CLEAR = 10.0  # times the usual scatter of the angle's steps
+RARE = 0.05
+HELD = 0.4
+LEAST_ADVANCE = 1e-3  # rad a row that an angle cannot miss
+
+
+def check(recording, nominal) -> None:
+    if recording.slow or not recording.has("theta_e", "omega_e"):
+        return
+    advance = wrapped(np.diff(recording["theta_e"]))
+    joined = recording.joined[:-1] & recording.usable[:-1] & recording.usable[1:]
+    if _held(recording, advance, joined, nominal.sample_time_s):
+        return
+    # What the steps before and after say; a recorded speed is filtered and lags behind.
+    expected = np.zeros_like(advance)
+    expected[1:-1] = 0.5 * (advance[:-2] + advance[2:])
+    even = np.zeros(len(advance), bool)
+    even[1:-1] = np.abs(advance[2:] - advance[:-2]) < 0.3 * np.abs(expected[1:-1])
+    scatter = 1.5 * float(np.median(np.abs(advance - expected)[joined])) if joined.any() else 0.0
+    clear = joined & even & (np.abs(expected) > max(CLEAR * scatter, 1e-4)) & (np.abs(expected) < 1.0)
+    turns = advance / np.where(expected == 0.0, 1.0, expected) - 1.0
+    where = np.flatnonzero(clear & (turns > 0.7) & (np.abs(turns - np.round(turns)) < 0.3))
+    if len(where) and len(where) <= RARE * np.count_nonzero(clear):
+        recording.joined[where] = False
+        lost = int(np.sum(np.round(turns[where])))
+        recording.problems.append(
+            Problem("dropped", f"the angle jumps ahead in {len(where)} rows, about {lost} samples missing", "theta_e",
+                    int(where[0]) + 1, len(where), "no balance is made across them")
+        )  # fmt: skip
+
+
+def _held(recording, advance, joined, period) -> bool:
+    """Deal with rows that repeat the one before; True when most do, and the recording is in truth a slow one."""
+    turning = joined & (np.abs(recording["omega_e"][1:]) * period > LEAST_ADVANCE)
+    still = np.flatnonzero(turning & (advance == 0.0))
+    still = still[_same(recording, still)]
+    if not len(still):
+        return False
+    row, count = int(still[0]) + 1, len(still)
+    slow = count > HELD * np.count_nonzero(turning)
+    if slow:
+        recording.slow = True
+        message = f"{count} rows repeat the one before: sampled slower than the time says"
+        action = "only steady operating points are used"
+    else:
+        recording.usable[still + 1] = False
+        recording.joined[still] = False
+        message, action = f"{count} rows repeat the one before", "not used"
+    recording.problems.append(Problem("repeated", message, "", row, count, action))
+    return slow
+
+
+def _same(recording, rows) -> np.ndarray:
+    """Whether row k+1 equals row k in every channel, for the rows k asked for."""
+    same = np.ones(len(rows), bool)
+    for name, values in recording.columns.items():
+        if name != "t":
+            same &= values[rows] == values[rows + 1]
+    return same

@@ -1,0 +1,99 @@
+"""Channels that stand still while the others say that they must move.
+
+A constant is not wrong by itself: a supply is constant, and so is everything of a simulated drive at rest.  A phase
+current is stuck when the angle turns on and another current changes; an angle when the speed says that it turned; a
+speed when the angle's advance has changed; a dq current when its reference moves; a duty when the angle turns a
+whole turn and the other duties change.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from diagnosis.checks.agreement import wrapped
+from diagnosis.checks.runs import mark, runs_of_equal
+from diagnosis.recording import Problem
+
+STAGE = "signals"
+LEAST = 50  # rows
+MOST_RUNS = 2000
+CURRENT = 0.1  # of rated current: what counts as a change
+DUTY = 0.03
+
+
+def check(recording, nominal) -> None:
+    if recording.slow:
+        return
+    rated = nominal.machine.rated_current_a
+    turned = _turned(recording, "omega_e", lambda w: w * nominal.sample_time_s)
+    by_angle = _turned(recording, "theta_e", lambda th: wrapped(np.diff(th, append=th[-1])))
+    tests = {
+        "theta_e": lambda a, b: abs(turned[b] - turned[a]) > 0.5,
+        "omega_e": lambda a, b: _speed_left(recording, by_angle, a, b, nominal.sample_time_s),
+    }
+    for name in ("i_a", "i_b", "i_c"):
+        others = [c for c in ("i_a", "i_b", "i_c") if c != name and c in recording.columns]
+        tests[name] = lambda a, b, o=others: (
+            max(abs(turned[b] - turned[a]), abs(by_angle[b] - by_angle[a])) > 1.0
+            and _change(recording, o, a, b) > CURRENT * rated
+        )
+    for name in ("i_d", "i_q"):
+        tests[name] = lambda a, b, o=[f"{name}_ref"]: _change(recording, o, a, b) > 2 * CURRENT * rated
+    for name in ("d_a", "d_b", "d_c"):
+        others = [c for c in ("d_a", "d_b", "d_c") if c != name]
+        tests[name] = lambda a, b, o=others: (
+            abs(by_angle[b] - by_angle[a]) > 2 * np.pi and _change(recording, o, a, b) > DUTY
+        )
+    for name, moved in tests.items():
+        if name in recording.columns:
+            _check_one(recording, name, moved)
+
+
+def _check_one(recording, name, moved) -> None:
+    first, length = runs_of_equal(recording[name], LEAST)
+    if not len(first):
+        return
+    longest = np.argsort(-length, kind="stable")[:MOST_RUNS]
+    # A clipped channel stands still too; its rows are out already.
+    fresh = [k for k in longest if recording.usable[first[k] + length[k] // 2]]
+    stuck = sorted(k for k in fresh if moved(first[k], first[k] + length[k] - 1))
+    if not stuck:
+        return
+    first, length = first[stuck], length[stuck]
+    rows = mark(recording.usable, first, length, 1, 1)
+    fatal = rows > 0.9 * len(recording)
+    value = recording[name][first[0]]
+    recording.problems.append(
+        Problem("stuck", f"stands at {value:.6g} for {rows} rows while other channels move", name, int(first[0]), rows,
+                "" if fatal else "rows not used", fatal)
+    )  # fmt: skip
+
+
+def _turned(recording, name, advance) -> np.ndarray:
+    """(n,) angle turned since the first row, from one channel; zeros without it."""
+    if name not in recording.columns:
+        return np.zeros(len(recording))
+    return np.cumsum(advance(recording[name]))
+
+
+def _speed_left(recording, by_angle, a, b, period) -> bool:
+    """Whether the angle's advance over the run's halves has changed by more than the speed did."""
+    if "theta_e" not in recording.columns or b - a < LEAST:
+        return False
+    middle = (a + b) // 2
+    first, second = (
+        (by_angle[middle] - by_angle[a]) / (middle - a),
+        (by_angle[b] - by_angle[middle]) / (b - middle),
+    )
+    told = recording["omega_e"][a] * period
+    return bool(
+        max(abs(first - told), abs(second - told)) * (b - a) > 3.0 and abs(first - second) * (b - a) > 1.0
+    )
+
+
+def _change(recording, names, a, b) -> float:
+    """The largest range of the named channels over the rows a to b."""
+    return max(
+        (float(np.ptp(recording[name][a : b + 1])) for name in names if name in recording.columns),
+        default=0.0,
+    )

@@ -1,0 +1,133 @@
+"""Angles in degrees or turns, angles and speeds of the shaft, speeds in rpm: found by what fits, and converted.
+
+For the angle, each unit is tried on the nominal stator balance; for the speed, on the angle's advance, or without one
+on the steady dq balance.  A unit is taken only where the columns as they stand do not fit and exactly one does.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from diagnosis.checks.agreement import angle_speed_ratio
+from diagnosis.checks.balance import BETTER, FIT, misfit, rows_of, tells
+from diagnosis.recording import Problem
+
+STAGE = "units"
+TURN = 2.0 * math.pi
+CLOSE = 0.05
+
+
+def check(recording, nominal) -> None:
+    p = nominal.machine.pole_pairs
+    n = len(recording)
+    angle = _angle_unit(recording, nominal, p)
+    if angle:
+        unit, factor = angle
+        recording.columns["theta_e"] = recording["theta_e"] * factor
+        recording.problems.append(Problem("unit", f"the angle is in {unit}", "theta_e", 0, n, "converted"))
+    speed = _speed_unit(recording, nominal, p)
+    if speed:
+        unit, factor = speed
+        recording.columns["omega_e"] = recording["omega_e"] * factor
+        recording.problems.append(Problem("unit", f"the speed is in {unit}", "omega_e", 0, n, "converted"))
+
+
+def _angle_units(p) -> dict[str, float]:
+    units = {"degrees": math.pi / 180, "turns": TURN}
+    if p > 1:
+        units |= {
+            "rad of the shaft": p,
+            "degrees of the shaft": p * math.pi / 180,
+            "turns of the shaft": p * TURN,
+        }
+    return units
+
+
+def _speed_units(p) -> dict[str, float]:
+    units = {"electrical rpm": TURN / 60, "electrical Hz": TURN}
+    if p > 1:
+        units |= {
+            "rad/s of the shaft": p,
+            "rpm of the shaft": p * TURN / 60,
+            "turns/s of the shaft": p * TURN,
+        }
+    else:
+        units = {"rpm": TURN / 60, "turns/s": TURN}
+    return units
+
+
+def _angle_unit(recording, nominal, p):
+    """(unit, factor) of an angle that is not in electrical rad, else None."""
+    if "theta_e" not in recording.columns or recording.slow:
+        return None
+    without_speed = "omega_e" not in recording.columns
+    if without_speed:  # the balance needs none, but its rows ask for the column
+        recording.columns["omega_e"] = np.zeros(len(recording))
+    rows = rows_of(recording, nominal)
+    if without_speed:
+        del recording.columns["omega_e"]
+    units = _angle_units(p)
+    if rows is not None and not rows.steady and tells(rows):
+        as_is = _best_direction(rows, 1.0)
+        if as_is <= FIT:
+            return None
+        tried = {unit: _best_direction(rows, factor) for unit, factor in units.items()}
+        best = min(tried, key=tried.get)
+        if tried[best] < min(FIT, BETTER * as_is):
+            return best, units[best]
+        return None
+    if "theta_e" in recording.meta.get("stated_units", ()):
+        return None
+    # Without a balance only degrees show, by their range: wrapped angles reach 180 or 360.
+    ratio = angle_speed_ratio(recording, nominal.sample_time_s)
+    if ratio is not None and abs(abs(ratio) - 1.0) < CLOSE:
+        return None
+    for unit, factor in units.items():
+        ratio = angle_speed_ratio(recording, nominal.sample_time_s, factor)
+        if ratio is not None and abs(abs(ratio) - 1.0) < CLOSE and unit.startswith("degrees"):
+            return unit, factor
+    return None
+
+
+def _best_direction(rows, factor) -> float:
+    """Misfit with the angle times factor, in the direction and phase order that suit it better."""
+    theta = rows.theta * factor
+    mirrored = rows.i[..., [0, 2, 1]]
+    return min(misfit(rows.change(theta=s * theta, i=i)) for s in (1.0, -1.0) for i in (rows.i, mirrored))
+
+
+def _speed_unit(recording, nominal, p):
+    """(unit, factor) of a speed that is not in electrical rad/s, else None."""
+    if "omega_e" not in recording.columns or "omega_e" in recording.meta.get("stated_units", ()):
+        return None
+    units = _speed_units(p)
+    if not recording.slow and "theta_e" in recording.columns:
+        period = nominal.sample_time_s
+        ratio = angle_speed_ratio(recording, period)
+        if ratio is not None and abs(abs(ratio) - 1.0) < CLOSE:
+            return None
+        for unit, factor in units.items():
+            ratio = angle_speed_ratio(recording, period, 1.0, factor)
+            if ratio is not None and abs(abs(ratio) - 1.0) < CLOSE:
+                return unit, factor
+        return None
+    if "theta_e" in recording.columns:
+        return None
+    recording.columns["theta_e"] = np.zeros(len(recording))  # the steady balance needs none
+    rows = rows_of(recording, nominal)
+    del recording.columns["theta_e"]
+    if rows is None or not rows.steady or not tells(rows):
+        return None
+    as_is = _either_sign(rows, 1.0)
+    tried = {unit: _either_sign(rows, factor) for unit, factor in units.items()}
+    ranked = sorted(tried, key=tried.get)
+    clear = len(ranked) < 2 or tried[ranked[1]] > 2 * tried[ranked[0]]
+    if as_is > 2 * FIT and tried[ranked[0]] < min(FIT, BETTER * as_is) and clear:
+        return ranked[0], units[ranked[0]]
+    return None
+
+
+def _either_sign(rows, factor) -> float:
+    return min(misfit(rows.change(omega=sign * factor * rows.omega)) for sign in (1.0, -1.0))

@@ -1,0 +1,117 @@
+"""Units that the size of the numbers gives away: percent duties, milliamps, millivolts, kelvin.
+
+A size is judged against drive.toml's rated values, with room for a factor of 20; what lies beyond and does not become
+right by one unit is refused, since a wrong guess would be a wrong diagnosis.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from diagnosis.recording import Problem
+
+STAGE = "units"
+MUCH = 20.0  # times the rated value: no overload
+PLAUSIBLE = 4.0  # times the rated value, after the conversion
+ROUNDING = 0.005
+CURRENTS = ("i_a", "i_b", "i_c", "i_d", "i_q", "i_d_ref", "i_q_ref")
+
+
+def check(recording, nominal) -> None:
+    _currents(recording, nominal.machine.rated_current_a)
+    _duties(recording)
+    _bus(recording, nominal.inverter.dc_bus_v)
+    _voltages(recording, nominal.inverter.dc_bus_v)
+    temp = recording.columns.get("temp_winding")
+    if temp is not None and 250.0 < np.median(temp) < 500.0:
+        _convert(recording, ("temp_winding",), 1.0, "kelvin", -273.15)
+
+
+def _size(values) -> float:
+    """What hardly any of the values exceeds, spikes aside; every 16th of many is enough."""
+    return float(np.percentile(np.abs(values[:: max(1, len(values) // 65536)]), 99.5))
+
+
+def _convert(recording, names, factor, unit, offset=0.0) -> None:
+    for name in names:
+        recording.columns[name] = recording[name] * factor + offset
+    recording.problems.append(
+        Problem("unit", f"{', '.join(names)} in {unit}", names[0], 0, len(recording), "converted")
+    )
+
+
+def _refuse(recording, name, message) -> None:
+    recording.problems.append(Problem("unit", message, name, 0, len(recording), fatal=True))
+
+
+def _currents(recording, rated) -> None:
+    large = {
+        name: size
+        for name in CURRENTS
+        if name in recording.columns and (size := _size(recording[name])) > MUCH * rated
+    }
+    if not large:
+        return
+    if max(large.values()) / 1000.0 <= PLAUSIBLE * rated:
+        # A unit belongs to a sensor board: all currents of a frame, unless the others are of another size.
+        _convert(recording, tuple(large), 1e-3, "mA")
+        return
+    name = max(large, key=large.get)
+    _refuse(
+        recording,
+        name,
+        f"reaches {large[name]:.4g} A, {large[name] / rated:.0f} times rated_current_a = {rated:g} A",
+    )
+
+
+def _duties(recording) -> None:
+    names = tuple(name for name in ("d_a", "d_b", "d_c") if name in recording.columns)
+    if len(names) < 3:
+        return
+    low = min(float(np.min(recording[name])) for name in names)
+    high = max(float(np.max(recording[name])) for name in names)
+    mean = float(np.mean([np.mean(recording[name]) for name in names]))
+    for factor, unit in ((100.0, "percent"), (1000.0, "permille")):
+        if (
+            low >= -ROUNDING * factor
+            and 0.1 * factor < high <= factor * (1 + ROUNDING)
+            and 0.2 * factor < mean < 0.8 * factor
+        ):
+            _convert(recording, names, 1.0 / factor, unit)
+            return
+    if low < -0.1 and high <= 1.0 + ROUNDING and low >= -1.0 - ROUNDING and abs(mean) < 0.2:
+        _refuse(
+            recording,
+            "d_a",
+            f"duties run from {low:.3g} to {high:.3g}: give their factor and offset in [columns]",
+        )
+    elif high > 1.5 or low < -0.5:
+        worst = max(names, key=lambda name: float(np.max(np.abs(recording[name]))))
+        out = (recording[worst] > 1.0 + ROUNDING) | (recording[worst] < -ROUNDING)
+        if np.count_nonzero(out) > 0.01 * len(out):
+            _refuse(
+                recording, worst, f"duties run from {low:.4g} to {high:.4g}; 0 to 1, or percent, is expected"
+            )
+
+
+def _bus(recording, nominal_v) -> None:
+    if "u_dc" not in recording.columns:
+        return
+    ratio = float(np.median(recording["u_dc"])) / nominal_v
+    for factor, unit in ((1e-3, "mV"), (1e3, "kV")):
+        if abs(ratio * factor - 1.0) < 0.3:
+            _convert(recording, ("u_dc",), factor, unit)
+            return
+    if not 0.02 < ratio < MUCH:
+        message = f"u_dc is {ratio * nominal_v:.4g} V in the middle, dc_bus_v = {nominal_v:g} V"
+        _refuse(recording, "u_dc", message)
+
+
+def _voltages(recording, nominal_v) -> None:
+    names = tuple(name for name in ("u_d_ref", "u_q_ref") if name in recording.columns)
+    size = max((_size(recording[name]) for name in names), default=0.0)
+    if size > MUCH * nominal_v:
+        if size / 1000.0 < nominal_v:
+            _convert(recording, names, 1e-3, "mV")
+        else:
+            _refuse(recording, names[0], f"voltages reach {size:.4g} V with a bus of {nominal_v:g} V")

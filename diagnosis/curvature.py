@@ -1,0 +1,73 @@
+"""Is a curve of flux over current a wrong inductance or saturation?  Both have the same free form.
+
+The surplus over the nominal flux, divided by the current, is constant for a wrong inductance and vanishes
+with the current for saturation.  Its ratio between the smallest and the largest recorded current decides;
+in between, or with one level of current, nobody can tell.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+LEAST = 0.08  # of rated current: smaller currents say nothing of a surplus
+SPREAD = 1.35  # between smallest and largest level
+STRAIGHT, BENT = 0.68, 0.55  # ratio above which it is an inductance, below which saturation
+
+FAMILY = ("inductance_d", "inductance_q", "saturation")
+
+
+def surplus(solution, axis, x):
+    """Flux beyond the nominal one at currents x (per unit of rated current), in units of H A per rated A."""
+    out = np.zeros_like(x)
+    own = solution.c.get(f"inductance_{axis}", {})
+    out += own.get(f"delta_l_{axis}", 0.0) * x
+    even = x * (x if axis == "d" else np.abs(x))
+    out += own.get("bend_2", 0.0) * even + own.get("bend_3", 0.0) * x**3
+    return out
+
+
+def saturated(solution, axis, x, inductance):
+    """The same of a saturation's coefficients."""
+    c = solution.c.get("saturation", {})
+    powers = {"1": x, "2": x * np.abs(x) if axis == "q" else x**2, "2s": x * np.abs(x), "3": x**3, "5": x**5}
+    return inductance * sum((c.get(f"{axis}_{k}", 0.0) * p for k, p in powers.items()), np.zeros_like(x))
+
+
+def ratio(view, solution, axis) -> tuple[float, float]:
+    """(ratio of the surplus inductance at small and at large current, largest surplus relative to L).
+
+    The ratio is nan where there is one level of current only.
+    """
+    m = view.machine
+    i = view.i.mean(axis=1)
+    levels = (i.real if axis == "d" else i.imag) / m.rated_current_a
+    levels = levels[np.abs(levels) > LEAST]
+    inductance = getattr(m, f"inductance_{axis}_h")
+    if not len(levels):
+        return np.nan, 0.0
+    x = np.array([levels[np.argmin(np.abs(levels))], levels[np.argmax(np.abs(levels))]])
+    if axis == "d":
+        x = np.sign(x[1]) * np.abs(x)
+    shape = (surplus(solution, axis, x) + saturated(solution, axis, x, inductance)) / x
+    largest = float(np.max(np.abs(shape * x / x[1]))) / inductance
+    if abs(x[1]) < SPREAD * abs(x[0]) or abs(shape[1]) < 1e-12:
+        return np.nan, largest
+    return float(shape[0] / shape[1]), largest
+
+
+def labels(view, solution, least=0.008) -> tuple[set[str], bool]:
+    """(names that the solution's curves deserve, whether that is beyond doubt)."""
+    names, sure = set(), True
+    for axis in "dq":
+        value, size = ratio(view, solution, axis)
+        if size < least:
+            continue
+        if not np.isfinite(value):
+            names.add(f"inductance_{axis}")
+            sure = False
+        elif value >= STRAIGHT:
+            names.add(f"inductance_{axis}")
+        else:
+            names.add("saturation")
+            sure &= value <= BENT
+    return names, sure

@@ -1,0 +1,132 @@
+"""MATLAB .mat files of versions 5 to 7.3, read with pymatreader (scipy below 7.3, h5py for 7.3).
+
+Structures are taken apart: "run.i_a", and for a list of signals with their own names, as dSPACE ControlDesk
+(X, Y(k).Name, Y(k).Data) and Simulink ("structure with time": signals(k).label, .values) write them, the signal's name.
+Objects of classes (timeseries, table) hold no plain numbers; save arrays or a structure instead.
+"""
+
+from __future__ import annotations
+
+import struct
+import zlib
+
+import numpy as np
+
+from diagnosis.readers.hdf5 import SIGNATURE, declared_cells, safe_datasets
+from diagnosis.readers.table import MAX_CELLS, Table, as_columns, chosen, row_limit, shown, too_long
+from diagnosis.recording import RecordingError
+
+FORMAT = "MATLAB"
+SUFFIXES = (".mat",)
+COMPRESSED = 15  # tag of a compressed element of a version 5 file
+NAMES, VALUES, UNITS = (
+    ("Name", "name", "label", "Label"),
+    ("Data", "data", "values", "Values"),
+    ("Unit", "unit", "Units"),
+)
+DEEP = 12
+
+
+def matches(head: bytes, path) -> bool:
+    return head.startswith((b"MATLAB 5.0 MAT-file", b"MATLAB 7.3 MAT-file"))
+
+
+def read(path, select=None) -> Table:
+    """The numeric arrays of one length, structures taken apart."""
+    from pymatreader import read_mat
+
+    with open(path, "rb") as file:
+        head = file.read(520)
+    if head[512:].startswith(SIGNATURE) or b"MATLAB 7.3" in head[:20]:
+        import h5py
+
+        with h5py.File(path, "r") as file:
+            datasets = safe_datasets(file, path)
+            if declared_cells(datasets) > MAX_CELLS:
+                raise RecordingError(f"{path}: more than {MAX_CELLS} numbers; save it in parts or as HDF5")
+    else:
+        _limit_inflated(path)
+    arrays: dict[str, np.ndarray] = {}
+    units: dict[str, str] = {}
+    for name, value in read_mat(str(path)).items():
+        if not name.startswith(("__", "#")):
+            _collect(name, value, arrays, units, 0)
+    arrays = {name: a for name, a in arrays.items() if a.size > 1}
+    names = chosen({name: units.get(name, "") for name in arrays}, select, path)
+    columns, text = as_columns({name: arrays[name] for name in names}, path)
+    table = Table(columns, {n: u for n, u in units.items() if n in columns}, text=text)
+    longest = max(arrays[name].size for name in names)
+    if longest > row_limit(len(names)) * 64:
+        table.problems.append(too_long(row_limit(len(names)), longest))
+    return table
+
+
+def _collect(name, value, arrays, units, depth) -> None:
+    """Put every numeric array below ``value`` into ``arrays`` under a name of its own."""
+    if depth > DEEP:
+        return
+    if isinstance(value, dict):
+        signal = _first(value, NAMES)
+        data = _first(value, VALUES)
+        if isinstance(data, np.ndarray) and data.dtype.kind in "biuf":
+            own = signal.strip() if isinstance(signal, str) else ""
+            own = own or ("time" if name.rsplit(".", 1)[-1].startswith("X") else name)
+            _put(own, data, arrays)
+            unit = _first(value, UNITS)
+            if isinstance(unit, str) and unit.strip():
+                units[own] = unit.strip()
+            return
+        if isinstance(data, list) and isinstance(signal, list) and len(data) == len(signal):
+            unit = _first(value, UNITS)
+            unit = unit if isinstance(unit, list) and len(unit) == len(data) else [None] * len(data)
+            for own, item, u in zip(signal, data, unit, strict=True):
+                _collect(name, {"Name": own, "Data": item, "Unit": u}, arrays, units, depth + 1)
+            return
+        for key, item in value.items():
+            # The outer structure is only the file's wrapping; inner names tell apart.
+            _collect(key if depth == 0 else f"{name}.{key}", item, arrays, units, depth + 1)
+    elif isinstance(value, list):
+        for k, item in enumerate(value):
+            _collect(f"{name}[{k}]", item, arrays, units, depth + 1)
+    elif isinstance(value, np.ndarray) and value.dtype.kind in "biuf":
+        _put(name, value, arrays)
+
+
+def _first(value, keys):
+    return next((value[key] for key in keys if key in value), None)
+
+
+def _put(name, array, arrays) -> None:
+    k = 2
+    own = name
+    while own in arrays:
+        own, k = f"{name} ({k})", k + 1
+    array = np.squeeze(array)
+    if array.ndim == 2 and min(array.shape) <= 64:
+        rows = array.T if array.shape[0] > array.shape[1] else array
+        for index, row in enumerate(rows):
+            arrays[f"{own}[{index}]"] = row
+    elif array.ndim == 1:
+        arrays[own] = array
+
+
+def _limit_inflated(path) -> None:
+    """Refuse a version 5 file whose compressed elements unpack to more than is read at most."""
+    left = 8 * MAX_CELLS
+    with open(path, "rb") as file:
+        head = file.read(128)
+        order = "<" if head[126:128] == b"IM" else ">"
+        while len(tag := file.read(8)) == 8:
+            kind, size = struct.unpack(order + "II", tag)
+            if kind != COMPRESSED:
+                file.seek(size, 1)
+                continue
+            unpacker = zlib.decompressobj()
+            while size > 0 and (packed := file.read(min(size, 1 << 20))):
+                size -= len(packed)
+                while packed:
+                    left -= len(unpacker.decompress(packed, 1 << 24))
+                    packed = unpacker.unconsumed_tail
+                    if left < 0:
+                        limit = 8 * MAX_CELLS / 1e9
+                        raise RecordingError(f"{shown(path, 200)}: unpacks to more than {limit:.1f} GB")
