@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 
 from diagnosis.nominal import load_nominal
+from diagnosis.recording import COLUMNS
 
 DRIVE = """
 [machine]
@@ -141,5 +142,31 @@ def write_mat73(path, table):
     return path
 
 
+def as_text(table, separator, decimal, header=True, units=False, before="", end="\n"):
+    """The columns as text of any layout."""
+    lines = [separator.join(table)] if header else []
+    if units:
+        lines.append(separator.join(COLUMNS[name] if COLUMNS[name] != "1" else "-" for name in table))
+    rows = np.column_stack(list(table.values()))
+    lines += [separator.join(repr(float(x)).replace(".", decimal) for x in row) for row in rows]
+    return before + "\n".join(lines) + end
+
+
 def codes(recording):
     return [p.code for p in recording.problems]
+
+
+def dump(path):
+    """A telemetry dump of the golden model's core; returns (path, drive.toml that belongs to it)."""
+    from cocotb_tests.test_registers import PAPER
+    from diagnosis import telemetry
+    from diagnosis.digital_capture import capture
+    from golden_model import drive, fluxproof
+    from golden_model.registers import registers
+    from scripts.scenarios import everything
+
+    paper = drive.load(PAPER)
+    register_set = registers(paper)
+    samples, observed, _ = capture(paper, register_set, everything(paper))
+    seen = {name: observed[name] for name in fluxproof.Observed._fields}
+    return telemetry.write_dump(path, paper, register_set, samples, seen), PAPER

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
+import pandas as pd
 import pytest
 
-from cocotb_tests.recordings_made import codes, made, nominal_of, write, write_mat73
+from cocotb_tests.recordings_made import as_text, codes, dump, made, nominal_of, write, write_mat73
 from diagnosis.load import load_recording
+from diagnosis.nominal import load_nominal
 from diagnosis.readers import read_table
 from diagnosis.recording import COLUMNS, RecordingError
 
@@ -57,15 +61,6 @@ def test_units_that_a_file_states_are_converted(tmp_path, nominal, suffix):
     assert codes(recording) == []
     for name, values in table.items():
         np.testing.assert_allclose(recording[name], values, rtol=1e-9, atol=1e-9)
-
-
-def as_text(table, separator, decimal, header=True, units=False, before="", end="\n"):
-    lines = [separator.join(table)] if header else []
-    if units:
-        lines.append(separator.join(COLUMNS[name] if COLUMNS[name] != "1" else "-" for name in table))
-    rows = np.column_stack(list(table.values()))
-    lines += [separator.join(repr(float(x)).replace(".", decimal) for x in row) for row in rows]
-    return before + "\n".join(lines) + end
 
 
 @pytest.mark.parametrize(
@@ -163,3 +158,32 @@ def test_only_wanted_columns_are_read(tmp_path):
     path = write(tmp_path / "r.parquet", made() | {f"other{k}": np.zeros(4000) for k in range(50)})
     assert set(read_table(path, lambda names: ["t", "i_a"]).columns) == {"t", "i_a"}
     assert len(read_table(path).columns) == 60
+
+
+def test_a_telemetry_dump_brings_its_registers(tmp_path):
+    path, drive = dump(tmp_path / "core.dump")
+    recording = load_recording(path, load_nominal(drive))
+    assert not recording.problems and recording.has("i_a", "theta_e", "d_a", "u_dc", "i_q_ref")
+    assert {"registers", "samples", "observed"} <= set(recording.meta) and len(
+        recording.meta["samples"]
+    ) == len(recording)
+
+
+def test_a_million_rows_in_time(tmp_path, nominal):
+    table = made(1_000_000, speed=600.0)
+    table |= {"i_d_ref": np.zeros(1_000_000), "temp_winding": np.full(1_000_000, 40.0)}
+    csv, parquet = tmp_path / "r.csv", write(tmp_path / "r.parquet", table)
+    pd.DataFrame(table).to_csv(csv, index=False, float_format="%.7g")
+    load_recording(write(tmp_path / "warm.parquet", made(600)), nominal)
+    seconds = {}
+    for name, call in {
+        "csv": lambda: read_table(csv),
+        "parquet": lambda: read_table(parquet),
+        "all": lambda: load_recording(parquet, nominal),
+    }.items():
+        start = time.process_time()
+        call()
+        seconds[name] = time.process_time() - start
+    print(seconds)
+    # Twice what was measured on one core, for slower ones.
+    assert seconds["csv"] < 12 and seconds["parquet"] < 2 and seconds["all"] < 8

@@ -16,8 +16,9 @@ import numpy as np
 from diagnosis.balance import misfit
 
 ORDERS_SUM = (0.0, 1.0)
-ORDERS_TORQUE = (0.0, 4.0, 6.0, 8.0, 12.0, 18.0, 24.0, 30.0, 36.0)  # cogging is even per electrical turn
+ORDERS_TORQUE = (1.0, 2.0, 4.0, 6.0, 8.0, 12.0, 18.0, 24.0, 30.0, 36.0)  # cogging is even per electrical turn
 LEAST_TURNS = 0.8  # of a harmonic within a block, else it is no functional of its own
+TAPERED_TURNS = 3.0  # the same under a taper, whose neighbours leak
 SYSTEM_U = 2e-4  # of the block's voltage
 SYSTEM_DC = 1.5e-5  # of the bus
 
@@ -70,14 +71,15 @@ class Projector:
         if view.has_sum:
             self.real["sum"] = ORDERS_SUM
         if self.torque_seen.any():
-            self.real["torque"] = ORDERS_TORQUE
+            self.real["torque"] = (0.0, 1.0 / view.machine.pole_pairs, *ORDERS_TORQUE)
         for channel, orders in self.real.items():
             n = len(orders)
             channels += [channel] * (b * n * 2)
             block.append(np.repeat(np.arange(b), n * 2))
             order.append(np.tile(np.repeat(orders, 2), b))
             part.append(np.tile([0, 1], b * n))
-            told = np.array(orders)[None, :] * span[:, None] >= 2 * np.pi * LEAST_TURNS
+            least = TAPERED_TURNS if channel == "torque" else LEAST_TURNS
+            told = np.array(orders)[None, :] * span[:, None] >= 2 * np.pi * least
             both = np.stack([told, told], axis=2)
             both[:, 0] = [True, False]  # a mean is real
             if channel == "torque":
@@ -90,6 +92,9 @@ class Projector:
             channel: np.exp(-1j * np.array(orders)[None, None, :] * view.theta_mid[:, :, None])
             for channel, orders in self.real.items()
         }
+        if "torque" in self.waves:  # a taper: ends of a second difference are all noise
+            m = view.theta_mid.shape[1]
+            self.waves["torque"] *= (1.0 - np.cos(2 * np.pi * (np.arange(m) + 0.5) / m))[None, :, None]
 
     def _apart(self, span):
         """(b, h) orders that differ from every kept smaller one by LEAST_TURNS within the block."""
@@ -149,11 +154,13 @@ def noise(view, cells, residual) -> np.ndarray:
     """
     omega = np.abs(view.omega.mean(axis=1))
     top = max(float(omega.max()), 1e-9)
-    shape = np.stack([np.ones(len(view)), (omega / top) ** 2], axis=1)
+    share = omega / top
     pair = np.flatnonzero(np.diff(view.run) == 0)
     out = np.full(len(cells.y), np.nan)
     for channel in np.unique(cells.channel):
         mine = cells.channel == channel
+        # A second difference of the angle is in the torque of a free shaft: its noise grows with omega^2.
+        shape = np.stack([np.ones(len(view)), share ** (4 if channel == "torque" else 2)], axis=1)
         for order in np.unique(cells.order[mine]):
             for part in (0, 1):
                 rows = np.flatnonzero(mine & (cells.order == order) & (cells.part == part))

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import difflib
 import math
+import re
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -228,16 +229,17 @@ def _demand(plan, names, path) -> None:
         found = ", ".join(shown(name, 24) for name in list(names)[:16]) + (", ..." if len(names) > 16 else "")
         why = f" ({plan.notes[-1]})" if plan.notes else ""
         raise RecordingError(
-            f"{path}: missing {' and '.join(missing)}; found columns {found}{_guesses(missing, names)}; "
+            f"{path}: missing {' and '.join(missing)}; found columns {found or 'none'}{_guesses(missing, names)}; "
             f"name them in [columns] of drive.toml{why}"
         )
 
 
 def _guesses(missing, names) -> str:
     """What the missing ones might be called in the file."""
-    wanted = [w for w in COLUMNS if any(w in text for text in missing)]
-    close = {w: difflib.get_close_matches(w, list(names), n=1, cutoff=0.6) for w in wanted}
-    pairs = [f"{shown(match[0], 24)!r} for {w}" for w, match in close.items() if match][:3]
+    wanted = [w for w in COLUMNS if any(w in re.findall(r"\w+", text) for text in missing)]
+    simple = {name.lower().replace("_", ""): name for name in names if split_unit(name)[0] not in COLUMNS}
+    close = {w: difflib.get_close_matches(w.replace("_", ""), list(simple), n=1, cutoff=0.6) for w in wanted}
+    pairs = [f"{shown(simple[match[0]], 24)!r} for {w}" for w, match in close.items() if match][:3]
     return f"; perhaps {', '.join(pairs)}" if pairs else ""
 
 

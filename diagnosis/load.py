@@ -5,15 +5,18 @@
 RecordingError: nothing can be made of the file; the message is one line.  A recording that can be read but not be
 diagnosed comes back with a fatal problem.  ``meta`` of the recording holds "notes" (what was assumed or worked
 round without being wrong), "columns" (canonical name: file column) and "map" (which map was used).
+Rows of a ``slow`` recording are joined where they follow each other by the log's own step.
 """
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 
 import numpy as np
 
 from diagnosis.checks import check_recording
+from diagnosis.checks.missing import OPTIONAL
 from diagnosis.columns import Plan, canonical, plan_columns
 from diagnosis.readers import read_table
 from diagnosis.readers.table import Table, shown
@@ -32,11 +35,7 @@ def load_recording(path, nominal) -> Recording:
         return plans[-1].wanted()
 
     table = read_table(path, select)
-    plan = (
-        plans[-1]
-        if plans
-        else plan_columns({n: table.units.get(n, "") for n in table.columns}, nominal, path)
-    )
+    plan = plans[-1]
     recording = _recording(Path(path), table, plan, nominal)
     check_recording(recording, nominal)
     return recording
@@ -46,12 +45,16 @@ def _recording(path, table: Table, plan: Plan, nominal) -> Recording:
     """Canonical columns with a time, every row usable, nothing checked."""
     columns = canonical(table, plan)
     text = {name: s.column for name, s in plan.sources.items() if name not in columns}
-    if text:
-        name, column = next(iter(text.items()))
+    lost = [name for name in text if name not in OPTIONAL]
+    if lost:
+        name, column = lost[0], text[lost[0]]
         line = f":{table.lines[0]}" if table.lines is not None else ""
         raise RecordingError(f"{path}{line}: column {shown(column)!r} ({name}) holds no numbers")
     n = len(next(iter(columns.values())))
     notes = [*table.notes, *plan.notes]
+    notes += [
+        f"{name}: column {shown(column)!r} holds no numbers and is left out" for name, column in text.items()
+    ]
     meta = table.meta | {
         "notes": notes,
         "map": plan.used,
@@ -75,7 +78,5 @@ def _recording(path, table: Table, plan: Plan, nominal) -> Recording:
 
 def _renamed(problem, columns):
     """A reader's finding with the canonical name of its column."""
-    import dataclasses
-
     name = next((k for k, column in columns.items() if column == problem.column), problem.column)
     return dataclasses.replace(problem, column=name)

@@ -13,13 +13,16 @@ from pathlib import Path
 import numpy as np
 
 from diagnosis import verdict as words
+from diagnosis.balance import misfit
 from diagnosis.catalogue import CATALOGUE
+from diagnosis.cells import voltage_level
 from diagnosis.load import load_recording
 from diagnosis.locate import at_order, evidence, locate
 from diagnosis.nominal import Nominal, load_nominal
 from diagnosis.recording import Recording
 from diagnosis.request import requests
-from diagnosis.result import Diagnosis, Fit
+from diagnosis.result import Diagnosis, Fit, UnknownTerm
+from diagnosis.scan import row_residual, stray_order, stray_swing
 from diagnosis.search import Search
 from diagnosis.unknown import sparse_term
 from diagnosis.view import joined_views, view_of
@@ -68,13 +71,18 @@ def _physics(recordings, nominal, progress) -> Diagnosis:
     location = locate(view, search.cells, found.pure)
     left = leftover(search, found)
     names, ambiguity = words.groups(best, found.tied, CATALOGUE, nominal)
-    share = (left * best.rows - best.rows) / max(empty.chi2 - best.rows, 1e-9)
+    share = fit.train_excess / max(fit.train_before, 1e-12)
+    rows = row_residual(best.view, best, CATALOGUE, misfit(best.view))
+    level = voltage_level(view)
+    stray = stray_order(best.view, rows, level) or stray_swing(best.view, rows, level)
     if not best.model.names:
         verdict = "no_mismatch" if left <= words.LEFTOVER else "unexplained"
-    elif left > words.LEFTOVER and share > words.FLOOR_SHARE**2:
+    elif left > words.LEFTOVER and share > words.FLOOR_SHARE:
         verdict = "unexplained"
     else:
         verdict = "ambiguous" if ambiguity else "explained"
+    if stray:
+        verdict = "unexplained"
     answer = Diagnosis(verdict, "", location=location, fit=fit)
     if verdict in ("explained", "ambiguous"):
         answer.effects = words.named(best, names, CATALOGUE, nominal, empty, found.dispersion)
@@ -86,6 +94,9 @@ def _physics(recordings, nominal, progress) -> Diagnosis:
     if verdict == "unexplained":
         cells, residual = final_residual(search, found)
         answer.unknown_term = sparse_term(best.view, cells, residual, found.sigma, found.train)
+        if stray:
+            answer.unknown_term = UnknownTerm("u_dq", stray.formula, stray.amplitude, 0.05 * stray.amplitude, "V", 0.5)
+    answer.stray = stray
     cells, residual = final_residual(search, found)
     answer.evidence = evidence(view, (search.cells, search.cells.y), (cells, residual), found.pure, held)
     answer.sentence = words.sentence(verdict, answer.effects, ambiguity, fit, CATALOGUE, location)
@@ -117,12 +128,14 @@ def fits(search, found, held) -> Fit:
         power = np.bincount(cells.block[use], values[use] ** 2, minlength=len(blocks))[blocks]
         return float(np.sqrt(power.mean())) if len(power) else 0.0
 
-    return Fit(
+    out = Fit(
         "u_dq",
         "V",
         rms(search.cells.y, ~held),
         rms(residual, ~held),
         rms(search.cells.y, held),
         rms(residual, held),
-        rms(found.sigma, np.ones(len(held), bool)),
+        rms(found.pure, np.ones(len(held), bool)),
     )
+    out.train_excess = float(np.sqrt(max(out.train_after**2 - rms(found.pure, ~held) ** 2, 0.0)))
+    return out

@@ -25,7 +25,8 @@ MOST_AT_ONCE = 3
 MOST_EFFECTS = 4  # more at once is no explanation
 REFINED = 14
 TIE = 10.0
-EARNS = 20.0  # gain in chi^2 over dispersion that an effect must bring beside the freest form of the others
+CURVE_SHARE = 0.01  # of what an effect contributes to a row: no curve of the catalogue fits a real one better
+EARNS = 30.0  # gain in chi^2 over dispersion that an effect must bring beside the freest form of the others
 SURE = 4.0  # sizes of its own standard deviation
 
 
@@ -65,11 +66,31 @@ class Search:
         if self.take_raw(best):
             self.refine(best.model)
             best = self._climbed(self._best())
+        if best.model.names:
+            self.allow_for_curves(best)
+            for model in self._linear_best():
+                self.refine(model)
+            self.refine(best.model)
+            best = self._climbed(self._best())
         best, sure = self._labelled(best)
         best = self._pruned(best)
         tied = self._tied(best, sure)
         empty = self.refine(Model(frozenset()))
         return Outcome(best, tied, empty, self.sigma, self.pure, self.train, self.dispersion)
+
+    def allow_for_curves(self, best):
+        """Widen every row by a share of what the best effects contribute to it, and start anew.
+
+        A second effect must explain more than a first one's curve may be off.
+        """
+        variance = self.sigma**2
+        for name, c in best.c.items():
+            columns = self.cells.columns[name]
+            rows = sum(v * columns[k if k in columns else f"~{k}"] for k, v in c.items())
+            variance = variance + (CURVE_SHARE * rows) ** 2
+        self.sigma = np.sqrt(variance)
+        self.linear = Fitter(self.cells, self.sigma, self.train)
+        self.refined.clear()
 
     def _climbed(self, best) -> Solution:
         """The best model that additions, removals and exchanges lead to."""

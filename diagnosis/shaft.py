@@ -1,22 +1,24 @@
 """What a recording knows of its shaft: a transducer, a shaft that turns freely without load, or nothing.
 
-Without a transducer the mechanical balance J d omega_m / dt = T - B omega_m holds only where nobody else
-turns the shaft, which a recording does not say.  It is taken as free when the airgap torque goes with
-J d omega_m / dt through the transients, and as unloaded when what remains is an odd function of the speed
-alone, in both directions: a load follows the speed only by chance, friction always does.
+Without a transducer the mechanical balance J d omega_m / dt = T - B omega_m - T_load holds only where nobody
+imposes the speed, which a recording does not say.  The shaft is taken as free when changes of the air-gap
+torque within a few milliseconds are, in the median, those of J d omega_m / dt: a load may step, but seldom.
+It is taken as unloaded when what remains is an odd function of the speed alone, in both directions: a load
+follows the speed only by chance, friction always does.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-FREE_CORRELATION = 0.9
+FREE_RATIO = (0.75, 1.3)  # median of torque change over inertial change
+REACH, LAG = 40, 100  # samples of the slope's half window and of a change
 ODD_SHARE = 0.96  # of the remaining torque's variance that an odd function of speed must explain
 SMALL = 0.01  # of rated torque: so little torque is no load in any case
 
 
-def shaft_kind(recording, nominal, i_s, omega, linked) -> str:
-    """'torque', 'unloaded', 'free' (a load may be there) or ''; i_s: smoothed dq current (n,), omega: (n,)."""
+def shaft_kind(recording, nominal, i_s, theta, linked) -> str:
+    """'torque', 'unloaded', 'free' (a load may be there) or ''; i_s, theta: smoothed dq current and angle (n,)."""
     if recording.has("torque"):
         return "torque"
     m = nominal.machine
@@ -24,20 +26,19 @@ def shaft_kind(recording, nominal, i_s, omega, linked) -> str:
         return ""
     period = nominal.sample_time_s
     torque = airgap(nominal, i_s)
-    omega_m = omega / m.pole_pairs
-    reach = 8
-    slope = np.full(len(omega), np.nan)
-    slope[reach:-reach] = (omega_m[2 * reach :] - omega_m[: -2 * reach]) / (2 * reach * period)
+    far = REACH * period
+    omega_m, slope = np.full(len(theta), np.nan), np.full(len(theta), np.nan)
+    ahead, here, behind = (theta[k : len(theta) - 2 * REACH + k] / m.pole_pairs for k in (2 * REACH, REACH, 0))
+    omega_m[REACH:-REACH] = (ahead - behind) / (2 * far)
+    slope[REACH:-REACH] = (ahead - 2 * here + behind) / far**2
     inert = m.inertia_kgm2 * slope
+    rated = airgap(nominal, np.array(1j * m.rated_current_a))
+    x, y = inert[LAG:] - inert[:-LAG], torque[LAG:] - torque[:-LAG]
+    moving = np.isfinite(x) & np.isfinite(y) & (np.abs(x) > 0.05 * rated)
+    if moving.sum() < 200 or not FREE_RATIO[0] < np.median(y[moving] / x[moving]) < FREE_RATIO[1]:
+        return ""
     good = np.isfinite(inert) & np.isfinite(torque)
     good[:-1] &= linked
-    rated = airgap(nominal, np.array(1j * m.rated_current_a))
-    moving = good & (np.abs(inert) > 0.05 * rated)
-    if moving.sum() < 200:
-        return ""
-    x, y = inert[moving], torque[moving]
-    if np.corrcoef(x, y)[0, 1] < FREE_CORRELATION or not 0.7 < (x @ y) / (x @ x) < 1.4:
-        return ""
     left = (torque - inert - (m.viscous_friction_nms or 0.0) * omega_m)[good][::10]
     w = omega_m[good][::10]
     if np.sqrt(np.mean(left**2)) < SMALL * rated:

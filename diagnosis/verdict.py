@@ -7,11 +7,13 @@ import numpy as np
 from diagnosis.result import NamedEffect
 
 LEFTOVER = 2.0  # reduced chi^2 that an explanation may leave
-FLOOR_SHARE = 0.12  # of the misfit's rms: a leftover below it is the curve's, not another effect's
+FLOOR_SHARE = 0.15  # of the misfit's rms: a leftover below it is the curve's, not another effect's
 
 
 CONSTANTS = {"magnet_temperature": "magnet_flux", "resistance_temperature": "resistance"}
 DRIFTS, STANDS = 0.25, 1.5  # drift over constant part: below the first it is the constant's, above 1/second nobody knows
+
+SLOPE_DEVICE, SLOPE_UNCLEAR = 0.12, 0.35  # ohmic drop at rated current over the inverter's loss
 
 
 def groups(best, tied, effects, nominal):
@@ -29,6 +31,14 @@ def groups(best, tied, effects, nominal):
             elif moved * STANDS > stood:  # warm from the start, or a wrong nameplate
                 shared -= {constant}
                 ambiguity.append([constant, drift])
+    if {"dead_time", "resistance"} <= shared:
+        # A device's slope is ohms too.
+        ohms = effects["resistance"].size(best.c["resistance"], nominal) * nominal.machine.rated_current_a
+        share = ohms / max(effects["dead_time"].size(best.c["dead_time"], nominal), 1e-9)
+        if share < SLOPE_UNCLEAR:
+            shared -= {"resistance"}
+            if share > SLOPE_DEVICE:
+                ambiguity.append(["dead_time", "resistance"])
     return sorted(shared), ambiguity
 
 

@@ -22,6 +22,7 @@ SHORTER = (100, 50)  # where dwells are short
 LEAST_BLOCKS = 12
 HALF_WIDTH = 8
 MOST_BLOCKS = 700  # more rows than these blocks hold add time, not knowledge
+SLOPE_REACH = 60  # samples over which the shaft's acceleration is taken beside a transducer
 CURRENT_STEP = 0.08  # of rated current: a block with a larger change is a transient
 SPEED_STEP = 0.06  # of the largest speed
 
@@ -240,10 +241,16 @@ def view_of(recording: Recording, nominal, block_rows=BLOCK_ROWS) -> View:
         asked[delay:] = (r["u_d_ref"] + 1j * r["u_q_ref"])[: n - delay]
         middle = np.append(0.5 * (theta_s[1:] + theta_s[:-1]), np.nan)
         u = asked * np.exp(1j * middle)
-    kind = shaft_kind(r, nominal, i_s, omega, linked)
+    kind = shaft_kind(r, nominal, i_s, theta_s, linked)
     torque = r["torque"] if kind == "torque" else np.full(n, 0.0 if kind in ("unloaded", "free") else np.nan)
     slope_m = np.zeros(n)
-    slope_m[1:-2] = (theta[3:] - theta[2:-1] - theta[1:-2] + theta[:-3]) / (2 * period**2 * machine.pole_pairs)
+    if kind == "torque":
+        # The transducer saw the ripple; what an inertia takes of it is slow.
+        far = SLOPE_REACH
+        slope_m[far:-far] = (theta_s[2 * far :] - 2 * theta_s[far:-far] + theta_s[: -2 * far]) / (far * period) ** 2
+    else:  # a free shaft shows its ripple in the angle alone
+        slope_m[1:-2] = (theta[3:] - theta[2:-1] - theta[1:-2] + theta[:-3]) / (2 * period**2)
+    slope_m = np.nan_to_num(slope_m) / machine.pole_pairs
     margin = HALF_WIDTH + delay + 2
     lengths = [block_rows, *(n for n in SHORTER if n < block_rows)]
     for block_rows in lengths:

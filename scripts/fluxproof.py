@@ -13,6 +13,8 @@ import sys
 from collections.abc import Callable
 from typing import NamedTuple
 
+from diagnosis import command as diagnose
+from diagnosis.recording import RecordingError
 from golden_model.drive_keys import DriveError
 from scripts import print_registers
 
@@ -26,6 +28,7 @@ class Command(NamedTuple):
 
 
 COMMANDS = {
+    "diagnose": Command("why a recording differs from its simulation", diagnose.arguments, diagnose.run),
     "registers": Command("the registers for a drive", print_registers.arguments, print_registers.run),
 }
 
@@ -48,14 +51,15 @@ def main(argv: list[str] | None = None) -> int:
         status = args.run(args)
         sys.stdout.flush()
         return status
-    except DriveError as error:
-        print(f"fluxproof: {error}", file=sys.stderr)
+    except (DriveError, RecordingError) as error:
+        print(f"fluxproof: {diagnose.printable(str(error), sys.stderr.encoding)}", file=sys.stderr)
     except BrokenPipeError:  # the reader, a pager or head, has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except OSError as error:
         name = f"{error.filename}: " if error.filename else ""
-        print(f"fluxproof: {name}{error.strerror or error}", file=sys.stderr)
+        text = diagnose.printable(f"{name}{error.strerror or error}", sys.stderr.encoding)
+        print(f"fluxproof: {text}", file=sys.stderr)
     return 2
 
 

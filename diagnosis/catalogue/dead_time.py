@@ -11,8 +11,12 @@ FREE_WIDTHS = (0.005, 0.05, 0.3, 0.6)
 
 
 def _losses(view, widths, factor=1.0):
-    """Loss of the legs for each width, positive along the current, in dq."""
-    ramps = clipped_ramps(view.phases(view.i_mid), [w * view.machine.rated_current_a for w in widths])
+    """Loss of the legs for each width, positive along the current, in dq.
+
+    The measured current, for what counts is when it crosses zero; the mean of an interval's two samples
+    does not correlate with their difference, which is the misfit's noise.
+    """
+    ramps = clipped_ramps(view.phases(view.with_raw_current().i_mid), [w * view.machine.rated_current_a for w in widths])
     return {w: voltage(view.from_phases(ramp) * factor) for w, ramp in zip(widths, ramps, strict=True)}
 
 

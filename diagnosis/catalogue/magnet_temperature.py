@@ -3,35 +3,32 @@
 import numpy as np
 
 from diagnosis.catalogue.effect import FluxEffect, Parameter, one, sigma
-from diagnosis.curves import courses, known_temperature, reference_c
+from diagnosis.curves import course, courses
 
 
 class MagnetTemperature(FluxEffect):
     def core_psi(self, view):
-        one_wb = np.ones_like(view.i)
-        if known_temperature(view):
-            rise = view.machine.magnet_flux_wb * (view.temp - reference_c(view.nominal))
-            return {"alpha_m": one_wb * rise[:, None]}
-        return {"drift": one_wb * (view.t / max(view.span_s, 1e-9))[:, None]}
+        return {"drift": np.ones_like(view.i) * course(view)}
 
     def free_psi(self, view):
-        one_wb = np.ones_like(view.i)
-        return {f"course_{k}": one_wb * c[:, None] for k, c in enumerate(courses(view)[:-1])}
+        return {f"course_{k}": np.ones_like(view.i) * c[:, None] for k, c in enumerate(courses(view)[:-1])}
 
     def floor(self, nominal):
         return 0.004 * nominal.machine.magnet_flux_wb
 
     def size(self, c, nominal):
-        own = abs(c.get("alpha_m", 0.0)) * nominal.machine.magnet_flux_wb * 20.0 + abs(c.get("drift", 0.0))
-        return max(own, *(abs(v) for k, v in c.items() if k.startswith("course")), 0.0)
+        """Largest change of flux since the start [Wb]."""
+        knots = np.linspace(0.0, 1.0, 5)
+        drift = c["drift"] * knots
+        drift[1:4] += [c.get(f"course_{k}", 0.0) for k in range(3)]
+        return float(np.max(np.abs(drift)))
 
     def estimates(self, c, covariance, nominal):
-        if "alpha_m" in c:
-            return one("magnet_temp_coeff_per_k", "1/K", c["alpha_m"], sigma(covariance))
         return one("magnet_flux_drift_wb", "Wb", c["drift"], sigma(covariance))
 
     def plant(self, c, nominal):
-        return {"machine.magnet_temp_coeff_per_k": c["alpha_m"]} if "alpha_m" in c else {}
+        rise = 20.0  # the plant's magnets are told a temperature; a drift is that of 20 K
+        return {"machine.magnet_temp_coeff_per_k": c["drift"] / nominal.machine.magnet_flux_wb / rise}
 
 
 EFFECT = MagnetTemperature(
@@ -41,9 +38,6 @@ EFFECT = MagnetTemperature(
     signature="order 0 on the q axis, in proportion to the speed, drifting over time",
     confounders=("magnet_flux", "resistance_temperature"),
     separated_by="hot and cold, at two speeds and without current",
-    parameters=(
-        Parameter("magnet_temp_coeff_per_k", "1/K", "NdFeB: about -0.001; the winding's temperature stands for the magnets'"),
-        Parameter("magnet_flux_drift_wb", "Wb", "from start to end, where no temperature was recorded"),
-    ),
+    parameters=(Parameter("magnet_flux_drift_wb", "Wb", "from start to end; nobody measures the magnets' temperature"),),
     absorbs=("magnet_flux",),
 )

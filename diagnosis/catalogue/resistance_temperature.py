@@ -21,8 +21,11 @@ class ResistanceTemperature(Effect):
         return 0.015 * nominal.machine.resistance_ohm
 
     def size(self, c, nominal):
-        own = abs(c.get("alpha", 0.0)) * nominal.machine.resistance_ohm * 20.0 + abs(c.get("drift", 0.0))
-        return max(own, *(abs(v) for k, v in c.items() if k.startswith("course")), 0.0)
+        """Change of resistance over the recording, or by 30 K [ohm]."""
+        knots = np.linspace(0.0, 1.0, 5)
+        drift = c.get("drift", 0.0) * knots + 30.0 * nominal.machine.resistance_ohm * abs(c.get("alpha", 0.0))
+        drift[1:4] += [c.get(f"course_{k}", 0.0) for k in range(3)]
+        return float(np.max(np.abs(drift)))
 
     def estimates(self, c, covariance, nominal):
         if "alpha" in c:

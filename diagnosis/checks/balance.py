@@ -83,8 +83,11 @@ def rows_of(recording, nominal) -> Rows | None:
     return rows if len(k) else None
 
 
-def misfit(rows: Rows) -> float:
-    """Median misfit over median voltage, of the rows where the voltage is large; 0 is a perfect fit."""
+def misfit(rows: Rows, at_current: bool = False) -> float:
+    """Median misfit over median voltage, of the rows where the voltage is large; 0 is a perfect fit.
+
+    at_current: of the rows where the current is large instead, to judge the currents by.
+    """
     m = rows.machine
     if rows.steady:
         i, omega = rows.dq.mean(axis=0), rows.omega.mean(axis=0)
@@ -100,7 +103,8 @@ def misfit(rows: Rows) -> float:
         psi = (m.inductance_d_h * i.real + 1j * m.inductance_q_h * i.imag + m.magnet_flux_wb) * turn
         u = rows.u_dc * ((2 / 3) * rows.d @ TURNS)
         left = u - m.resistance_ohm * i_s.mean(axis=0) - (psi[1] - psi[0]) / rows.period
-    large = np.abs(u) >= np.percentile(np.abs(u), 50)
+    by = np.abs(i if rows.steady else i_s[0]) if at_current else np.abs(u)
+    large = by >= np.percentile(by, 75 if at_current else 50)
     size = float(np.median(np.abs(u[large])))
     return float(np.median(np.abs(left[large]))) / size if size > 0 else np.inf
 

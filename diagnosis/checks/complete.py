@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from diagnosis.checks.agreement import wrapped
+from diagnosis.recording import Problem
 
 STAGE = "complete"
 SPEED_ROWS = 32  # over which an angle is differentiated: an encoder's code at one row tells no speed
@@ -20,6 +21,9 @@ def check(recording, nominal) -> None:
             if name in ("temp_winding", "torque", "i_c"):
                 del columns[name]
                 notes.append(f"{name} is zero throughout and taken as not recorded")
+    if recording.has("i_a", "i_b", "i_c"):
+        for name in ("i_a", "i_b"):
+            _drop_dead(recording, name, nominal.machine.rated_current_a)
     for lost, other in (("i_a", ("i_b", "i_c")), ("i_b", ("i_a", "i_c"))):
         if lost not in columns and recording.has(*other):
             columns[lost] = -columns[other[0]] - columns[other[1]]
@@ -35,6 +39,19 @@ def check(recording, nominal) -> None:
         step = np.diff(recording["t"], prepend=recording["t"][0])
         columns["theta_e"] = wrapped(np.cumsum(columns["omega_e"] * step))
         notes.append("theta_e is not recorded and integrated from omega_e: its zero is not the magnet's")
+
+
+def _drop_dead(recording, name, rated) -> None:
+    """A phase current that never changes while the other two do is no measurement; the sum gives it."""
+    others = [c for c in ("i_a", "i_b", "i_c") if c != name]
+    columns = recording.columns
+    if name not in columns or np.ptp(columns[name]) > 0 or not recording.has(*others):
+        return
+    if min(np.ptp(columns[other]) for other in others) > 0.1 * rated:
+        message = f"stands at {columns[name][0]:.6g} throughout while the other currents move"
+        n = len(recording)
+        recording.problems.append(Problem("stuck", message, name, 0, n, "taken from the other two"))
+        del columns[name]
 
 
 def speed_of(recording) -> np.ndarray:

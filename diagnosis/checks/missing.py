@@ -13,13 +13,13 @@ STAGE = "values"
 ABSURD = 1e9  # no canonical column comes near it; an overflow or a wrong format does
 SLOW = ("temp_winding", "torque", "u_dc", "i_d_ref", "i_q_ref", "u_d_ref", "u_q_ref")
 OPTIONAL = ("temp_winding", "torque", "i_d_ref", "i_q_ref")
+PHASES = ("i_a", "i_b", "i_c")
 MOST = 0.5  # a larger share missing in a column that is needed leaves no recording
 
 
 def check(recording, nominal) -> None:
-    columns = recording.columns
     _drop_rows_without_time(recording)
-    n = len(recording)
+    columns, n = recording.columns, len(recording)
     for name in [c for c in columns if c != "t"]:
         good = np.isfinite(columns[name])
         good &= np.abs(columns[name]) < ABSURD
@@ -31,6 +31,12 @@ def check(recording, nominal) -> None:
             if name in OPTIONAL:
                 recording.meta["notes"].append(f"{name} holds no number and is left out")
                 del columns[name]
+            elif name in PHASES and recording.has(*PHASES):
+                del columns[name]
+                action = "taken from the other two"
+                recording.problems.append(
+                    Problem("missing", "holds no finite number", name, row, bad, action)
+                )
             else:
                 recording.problems.append(
                     Problem("missing", "holds no finite number", name, row, bad, fatal=True)
@@ -76,7 +82,7 @@ def _drop_rows_without_time(recording) -> None:
     if not bad:
         return
     row = int(np.argmin(good))
-    if bad > MOST * len(t):
+    if bad > MOST * len(t) or len(t) - bad < 2:
         message = f"{bad} of {len(t)} times are missing or not finite"
         recording.problems.append(Problem("missing", message, "t", row, bad, fatal=True))
         return

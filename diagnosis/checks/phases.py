@@ -14,6 +14,8 @@ from diagnosis.checks.balance import BETTER, FIT, Rows, misfit, rows_of, tells
 from diagnosis.recording import Problem
 
 STAGE = "geometry"
+SMALL = 0.03  # of the voltage: less cannot be told from noise
+NOTHING = 0.8  # of the voltage: beyond any effect
 CLEAR = 1.6  # the second best change must be worse by this much
 
 ORDERS = {
@@ -30,16 +32,28 @@ def check(recording, nominal) -> None:
     rows = rows_of(recording, nominal)
     if rows is None or not tells(rows):
         return
+    changes = _changes(rows)
     as_is = misfit(rows)
-    if as_is < FIT:
+    at_current = (
+        as_is < FIT
+    )  # the voltage fits: what is left to mistake are currents that it hardly depends on
+    if at_current:
+        as_is = misfit(rows, True)
+        changes = {c: changed for c, changed in changes.items() if c[0] in ("currents", "sign")}
+    if as_is < (SMALL if at_current else FIT):
         return
-    tried = {name: misfit(changed) for name, changed in _changes(rows).items()}
+    tried = {name: misfit(changed, at_current) for name, changed in changes.items()}
     ranked = sorted(tried, key=tried.get)
     best = ranked[0]
+    n = len(recording)
     if tried[best] > BETTER * as_is or tried[best] > FIT:
+        if as_is > NOTHING:
+            message = (
+                f"the nominal machine leaves {as_is:.0%} of the voltage: check drive.toml and the columns"
+            )
+            recording.problems.append(Problem("no_fit", message, "", 0, n, "the recording is believed"))
         return
     second = next((name for name in ranked[1:] if tried[name] < CLEAR * tried[best]), None)
-    n = len(recording)
     numbers = f"misfit {as_is:.0%} of the voltage as recorded, {tried[best]:.0%} with it"
     if second:
         message = f"{_words(best)} or {_words(second)}: {numbers}; correct [columns] in drive.toml"

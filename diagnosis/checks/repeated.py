@@ -15,6 +15,8 @@ from diagnosis.recording import Problem
 STAGE = "signals"
 CLEAR = 10.0  # times the usual scatter of the angle's steps
 RARE = 0.05
+CHANCE = 20.0
+INDEPENDENT = ("i_a", "i_b", "i_d", "i_q", "theta_e", "u_dc")
 HELD = 0.4
 LEAST_ADVANCE = 1e-3  # rad a row that an angle cannot miss
 
@@ -52,6 +54,8 @@ def _held(recording, advance, joined, period) -> bool:
     if not len(still):
         return False
     row, count = int(still[0]) + 1, len(still)
+    if count <= CHANCE * _by_chance(recording):
+        return False
     slow = count > HELD * np.count_nonzero(turning)
     if slow:
         recording.slow = True
@@ -63,6 +67,19 @@ def _held(recording, advance, joined, period) -> bool:
         message, action = f"{count} rows repeat the one before", "not used"
     recording.problems.append(Problem("repeated", message, "", row, count, action))
     return slow
+
+
+def _by_chance(recording) -> float:
+    """How many rows would equal the one before if coarse channels repeated their codes independently.
+
+    The rest follows from these: equal samples make equal duties.
+    """
+    share = 1.0
+    for name in INDEPENDENT:
+        if name in recording.columns:
+            values = recording[name]
+            share *= np.count_nonzero(values[1:] == values[:-1]) / len(values)
+    return share * len(recording)
 
 
 def _same(recording, rows) -> np.ndarray:

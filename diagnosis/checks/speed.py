@@ -1,16 +1,18 @@
-"""Angle and speed that disagree: a speed of the shaft or of the wrong sign beside an electrical angle.
+"""Angle and speed that disagree: a speed of another scale or sign beside an electrical angle.
 
-The angle is believed where currents and duties were checked against it; where they cannot be (standstill, dq values),
-a contradiction in sign is left to the diagnosis and said.
+The angle is believed where the currents and duties turn with it, and the speed is then set by it.  An angle that the
+balance does not confirm and that turns at quite another rate than the speed leaves nothing to believe.
 """
 
 from __future__ import annotations
 
 from diagnosis.checks.agreement import angle_speed_ratio
+from diagnosis.checks.balance import FIT, misfit, rows_of, tells
 from diagnosis.recording import Problem
 
 STAGE = "geometry"
 LARGE = 0.05  # a speed estimate may lag or be scaled; more is another quantity
+WRONG = 2.0
 
 
 def check(recording, nominal) -> None:
@@ -20,19 +22,24 @@ def check(recording, nominal) -> None:
     if ratio is None or abs(ratio - 1.0) <= LARGE:
         return
     n = len(recording)
+    rows = rows_of(recording, nominal)
+    confirmed = rows is not None and not rows.steady and tells(rows) and misfit(rows) < 2 * FIT
     if abs(ratio + 1.0) <= LARGE:
-        if recording.has("d_a", "i_a"):
-            recording.columns["omega_e"] = -recording["omega_e"]
-            action = "the speed is turned round: the angle fits the currents and duties"
-            recording.problems.append(
-                Problem("rotation", "speed and angle have opposite signs", "omega_e", 0, n, action)
-            )
-        else:
-            message = "speed and angle have opposite signs; which is right cannot be told from dq values"
-            recording.problems.append(Problem("rotation", message, "omega_e", 0, n, "the speed is believed"))
+        message = "speed and angle have opposite signs"
+        if (
+            rows is not None and rows.steady
+        ):  # dq values: the speed was checked against them, the angle cannot be
             recording.columns["theta_e"] = -recording["theta_e"]
+            action = "the speed is believed"
+        else:
+            recording.columns["omega_e"] = -recording["omega_e"]
+            action = "the angle is believed, the speed turned round"
+        recording.problems.append(Problem("rotation", message, "omega_e", 0, n, action))
         return
     message = f"the angle advances {ratio:.3g} times as fast as the speed says"
+    if not confirmed and not 1.0 / WRONG < ratio < WRONG:
+        recording.problems.append(Problem("angle_speed", message, "omega_e", 0, n, fatal=True))
+        return
     recording.problems.append(
         Problem("angle_speed", message, "omega_e", 0, n, "the speed is taken from the angle")
     )

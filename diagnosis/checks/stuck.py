@@ -25,8 +25,7 @@ def check(recording, nominal) -> None:
     if recording.slow:
         return
     rated = nominal.machine.rated_current_a
-    turned = _turned(recording, "omega_e", lambda w: w * nominal.sample_time_s)
-    by_angle = _turned(recording, "theta_e", lambda th: wrapped(np.diff(th, append=th[-1])))
+    turned, by_angle = _turned(recording, nominal.sample_time_s)
     tests = {
         "theta_e": lambda a, b: abs(turned[b] - turned[a]) > 0.5,
         "omega_e": lambda a, b: _speed_left(recording, by_angle, a, b, nominal.sample_time_s),
@@ -69,11 +68,16 @@ def _check_one(recording, name, moved) -> None:
     )  # fmt: skip
 
 
-def _turned(recording, name, advance) -> np.ndarray:
-    """(n,) angle turned since the first row, from one channel; zeros without it."""
-    if name not in recording.columns:
-        return np.zeros(len(recording))
-    return np.cumsum(advance(recording[name]))
+def _turned(recording, period) -> tuple[np.ndarray, np.ndarray]:
+    """(n,) angle turned since the first row, by the speed and by the angle; zeros where neither is recorded."""
+    n = len(recording)
+    by_speed = recording["omega_e"] * period if "omega_e" in recording.columns else np.zeros(n)
+    by_angle = by_speed
+    if "theta_e" in recording.columns:
+        theta = recording["theta_e"]
+        # Across a gap the angle's step says nothing.
+        by_angle = np.where(recording.joined, wrapped(np.diff(theta, append=theta[-1])), by_speed)
+    return np.cumsum(by_speed), np.cumsum(by_angle)
 
 
 def _speed_left(recording, by_angle, a, b, period) -> bool:

@@ -108,10 +108,12 @@ def _speed_unit(recording, nominal, p):
         ratio = angle_speed_ratio(recording, period)
         if ratio is not None and abs(abs(ratio) - 1.0) < CLOSE:
             return None
-        for unit, factor in units.items():
-            ratio = angle_speed_ratio(recording, period, 1.0, factor)
-            if ratio is not None and abs(abs(ratio) - 1.0) < CLOSE:
-                return unit, factor
+        ratios = {u: angle_speed_ratio(recording, period, 1.0, factor) for u, factor in units.items()}
+        off = {u: abs(abs(ratio) - 1.0) for u, ratio in ratios.items() if ratio is not None}
+        # The nearest: six pole pairs and the 2 pi of a frequency are 5 % apart.
+        nearest = min(off, key=off.get, default=None)
+        if nearest and off[nearest] < CLOSE:
+            return nearest, units[nearest]
         return None
     if "theta_e" in recording.columns:
         return None

@@ -7,10 +7,13 @@ ends as RecordingError in one line.
 
 from __future__ import annotations
 
+import contextlib
+import gc
 import importlib
 import os
 import pkgutil
 import stat
+import sys
 import warnings
 from pathlib import Path
 
@@ -25,10 +28,7 @@ def readers() -> list:
     """Every module of this folder that reads a format; text last, since anything may look like text."""
     names = sorted(m.name for m in pkgutil.iter_modules(__path__))
     modules = [importlib.import_module(f"{__name__}.{name}") for name in names]
-    return sorted(
-        (m for m in modules if hasattr(m, "read")),
-        key=lambda m: (not hasattr(m, "FIRST"), m.FORMAT == "text"),
-    )
+    return sorted((m for m in modules if hasattr(m, "read")), key=lambda m: m.FORMAT == "text")
 
 
 def read_table(path, select: Select | None = None) -> Table:
@@ -36,17 +36,32 @@ def read_table(path, select: Select | None = None) -> Table:
     path = Path(path)
     head = _head(path)
     reader = _reader_of(path, head)
-    try:
-        with warnings.catch_warnings(), limited_memory():
-            warnings.simplefilter("ignore")  # a damaged file's warnings end as checks or errors of our own
+    with warnings.catch_warnings(), limited_memory(), _quiet_finalizers():
+        warnings.simplefilter("ignore")  # a damaged file's warnings end as checks or errors of our own
+        try:
             return reader.read(path, select)
-    except RecordingError:
-        raise
-    except MemoryError:
-        raise RecordingError(f"{path}: does not fit into memory") from None
-    except (Exception, SystemExit) as error:  # parsing libraries raise anything on damaged content
-        first = (str(error).strip().splitlines() or [type(error).__name__])[0]
-        raise RecordingError(f"{path}: not a readable {reader.FORMAT} file: {shown(first, 160)}") from None
+        except RecordingError as error:
+            if str(path) in str(error):
+                raise
+            failure = str(error)
+        except MemoryError:
+            failure = "does not fit into memory"
+        except (Exception, SystemExit) as error:  # parsing libraries raise anything on damaged content
+            first = (str(error).strip().splitlines() or [type(error).__name__])[0]
+            failure = f"not a readable {reader.FORMAT} file: {shown(first, 160)}"
+        gc.collect()
+    raise RecordingError(f"{path}: {failure}")
+
+
+@contextlib.contextmanager
+def _quiet_finalizers():
+    """Half-made objects of a parsing library print tracebacks when they are thrown away; not within the block."""
+    hook = sys.unraisablehook
+    sys.unraisablehook = lambda _: None
+    try:
+        yield
+    finally:
+        sys.unraisablehook = hook
 
 
 def _head(path: Path) -> bytes:
@@ -77,7 +92,7 @@ def _reader_of(path: Path, head: bytes):
         formats = ", ".join(m.FORMAT for m in known)
         claimed = f"not a {claims[0].FORMAT} file as its name says" if claims else "unknown format"
         raise RecordingError(f"{path}: {claimed}; what can be read: {formats}")
-    if claims and found not in claims and not hasattr(found, "FIRST"):
+    if claims and found not in claims:
         raise RecordingError(
             f"{path}: the name says {claims[0].FORMAT}, the content is {found.FORMAT}; rename it if that is right"
         )

@@ -5,8 +5,7 @@ from __future__ import annotations
 from diagnosis.readers.table import Table, chosen
 
 FORMAT = "telemetry dump"
-SUFFIXES = ()
-FIRST = True  # a dump may look like another format
+SUFFIXES = (".dump",)
 
 
 def matches(head: bytes, path) -> bool:

@@ -20,8 +20,8 @@ COMMENT = ("#", "%", "//")
 SEPARATORS = (";", "\t", ",", "|", " ")
 MISSING = {"", "nan", "-nan", "inf", "-inf", "+inf", "na", "n/a", "null", "none", "-"}
 NUMBER = {
-    ".": re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?"),
-    ",": re.compile(r"[+-]?(\d+,?\d*|,\d+)([eE][+-]?\d+)?"),
+    ".": re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eEdD][+-]?\d+)?"),
+    ",": re.compile(r"[+-]?(\d+(,\d*)?|,\d+)([eE][+-]?\d+)?"),
 }
 UNIT_LINE = re.compile(
     r"[\[(]?\s*(s|ms|[uµ]s|A|mA|V|mV|rad|deg|°|rpm|1/min|min-1|rad/s|°C|degC|C|Nm|N[m·.]|%|1|-|)\s*[\])]?"
@@ -74,6 +74,9 @@ def sniff(path) -> Layout:
             f"{path}: no row of numbers in the first {len(lines)} lines; a table was expected"
         )
     names, units = _header(lines[:first], separator, width)
+    above = split(lines[first - 1], separator) if first else []
+    if names[0] == "1" and len(above) > 2 and all(above) and separator != " ":
+        raise RecordingError(f"{path}:{first}: a header of {len(above)} names above rows of {width} fields")
     return Layout(encoding, separator, decimal, first, names, units)
 
 

@@ -21,7 +21,10 @@ def requested_plan(case: cases.Case, request: dict) -> plans.Plan:
     i_d, i_q = float(request["i_d"]), float(request["i_q"])
     shrink = min(1.0, i_r / max(np.hypot(i_d, i_q), 1e-9))
     i_d, i_q, omega = i_d * shrink, i_q * shrink, float(request["omega_e"])
-    bus = min(max(request.get("u_dc") or n.inverter["dc_bus_v"], 0.5 * n.inverter["dc_bus_v"]), 1.2 * n.inverter["dc_bus_v"])
+    bus = min(
+        max(request.get("u_dc") or n.inverter["dc_bus_v"], 0.5 * n.inverter["dc_bus_v"]),
+        1.2 * n.inverter["dc_bus_v"],
+    )
     limit = 0.85 * n.voltage_limit * bus / n.inverter["dc_bus_v"]
     omega = float(np.clip(omega, -1.2 * n.omega_rated, 1.2 * n.omega_rated))
     while n.voltage(omega, i_d, i_q) > limit and abs(omega) > 1e-3 * n.omega_rated:
@@ -69,5 +72,9 @@ def resolve(truth: dict, answer: dict, seed: int, folder: Path, scratch: Path, d
         columns = further_recording(case, request, seed, truth["attempt"], number)
         paths.append(write_recording(scratch / f"{truth['case']}_{number + 1}", columns, "parquet"))
     second = diagnose(paths, folder / truth["case"] / "drive.toml").to_json()
-    return {**base, "resolved": named_right(truth, second), "verdict": second["verdict"],
-            "effects": [e["name"] for e in second["effects"]]}  # fmt: skip
+    return {
+        **base,
+        "resolved": named_right(truth, second),
+        "verdict": second["verdict"],
+        "effects": [e["name"] for e in second["effects"]],
+    }

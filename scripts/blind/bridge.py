@@ -65,7 +65,7 @@ def leg_voltage(b, state, u_dc, i):
 
 @jit
 def pulse(b, duties, before, period_s, t1, t2):
-    """Edges t1, t2 (3,) [s] of the period in which ``duties`` are in force; ``before``: those one period older."""
+    """Edges t1, t2 (3,) [s] of the period in which ``duties`` are in force; ``before``: the older duties."""
     for x in range(3):
         rise, fall = duties[x], duties[x]
         if b.delay_kind == P.DELAY_MIX and b.delay > 0.0:  # an interpolating modulator

@@ -60,7 +60,14 @@ def fresh(rng, nominal: Nominal, plan: plans.Plan, with_torque: bool) -> Build:
     """A healthy drive with everyday sensors and a randomly tuned controller."""
     control = random_control(rng, nominal, plan.free)
     drive = P.ideal(nominal.machine, nominal.machine["inertia_kgm2"], control, nominal.period_s)
-    build = Build(nominal, drive, plan, with_torque, bool(rng.random() < 0.3), str(rng.choice(("csv", "parquet", "parquet"))))
+    build = Build(
+        nominal,
+        drive,
+        plan,
+        with_torque,
+        bool(rng.random() < 0.3),
+        str(rng.choice(("csv", "parquet", "parquet"))),
+    )
     build.change("sensor", **random_sensor(rng, nominal, drive.sensor, not plan.free)._asdict())
     build.change("bridge", i_zone=0.01 * nominal.machine["rated_current_a"])
     omega_m = nominal.omega_rated / nominal.machine["pole_pairs"]

@@ -13,21 +13,45 @@ from scripts.blind.magnetics import flux
 from scripts.blind.plans import grid_plan, masked_plan, one_point_plan
 
 # Shares of the strata; healthy is large because a false alarm must be rare.
-STRATA = {"healthy": 0.14, "single": 0.24, "pair": 0.16, "triple": 0.1, "masked": 0.09, "one_point": 0.09,
-          "unknown": 0.1, "damaged": 0.08}  # fmt: skip
+STRATA = {
+    "healthy": 0.14,
+    "single": 0.24,
+    "pair": 0.16,
+    "triple": 0.1,
+    "masked": 0.09,
+    "one_point": 0.09,
+    "unknown": 0.1,
+    "damaged": 0.08,
+}
 
 # The catalogue's own confounders: pairs in which one effect can pass for the other.
 CONFOUNDED = [
-    ("resistance", "iron_loss"), ("resistance", "magnet_flux"), ("resistance", "dead_time"),
-    ("resistance_temperature", "magnet_temperature"), ("inductance_d", "current_gain"),
-    ("inductance_q", "encoder_offset"), ("inductance_q", "saturation"), ("magnet_flux", "cross_saturation"),
-    ("magnet_flux", "magnet_temperature"), ("dead_time", "emf_harmonics"), ("saturation", "cross_saturation"),
-    ("cross_saturation", "inductance_d"), ("encoder_offset", "delay"), ("delay", "sampling_skew"),
-    ("sampling_skew", "iron_loss"), ("encoder_offset", "encoder_eccentricity"), ("current_offset", "cogging"),
-    ("current_gain", "phase_resistance_asymmetry"), ("current_scale", "resistance"),
-    ("udc_gain", "magnet_flux"), ("dead_time", "phase_resistance_asymmetry"), ("current_offset", "current_gain"),
-    ("friction", "cogging"), ("friction", "magnet_flux"), ("current_offset", "encoder_eccentricity"),
-]  # fmt: skip
+    ("resistance", "iron_loss"),
+    ("resistance", "magnet_flux"),
+    ("resistance", "dead_time"),
+    ("resistance_temperature", "magnet_temperature"),
+    ("inductance_d", "current_gain"),
+    ("inductance_q", "encoder_offset"),
+    ("inductance_q", "saturation"),
+    ("magnet_flux", "cross_saturation"),
+    ("magnet_flux", "magnet_temperature"),
+    ("dead_time", "emf_harmonics"),
+    ("saturation", "cross_saturation"),
+    ("cross_saturation", "inductance_d"),
+    ("encoder_offset", "delay"),
+    ("delay", "sampling_skew"),
+    ("sampling_skew", "iron_loss"),
+    ("encoder_offset", "encoder_eccentricity"),
+    ("current_offset", "cogging"),
+    ("current_gain", "phase_resistance_asymmetry"),
+    ("current_scale", "resistance"),
+    ("udc_gain", "magnet_flux"),
+    ("dead_time", "phase_resistance_asymmetry"),
+    ("current_offset", "current_gain"),
+    ("friction", "cogging"),
+    ("friction", "magnet_flux"),
+    ("current_offset", "encoder_eccentricity"),
+]
 MECHANICAL = ("cogging", "friction")
 NEED_TORQUE = (*MECHANICAL, "current_scale", "udc_gain")
 
@@ -64,7 +88,9 @@ def _effects_of(rng, stratum: str, turn: int) -> list[str]:
     """Names of the effects; ``turn`` counts the stratum's cases so that every effect has its share."""
     names = sorted(forms.EFFECTS)
     if stratum in ("single", "one_point"):
-        return [names[(turn // 2) % len(names)]] if stratum == "single" else [names[(turn * 5 + 3) % len(names)]]
+        return (
+            [names[(turn // 2) % len(names)]] if stratum == "single" else [names[(turn * 5 + 3) % len(names)]]
+        )
     if stratum == "masked":
         first = names[(turn * 7) % len(names)]
         return [first] if rng.random() < 0.6 else [first, str(rng.choice([n for n in names if n != first]))]

@@ -79,7 +79,15 @@ def missing_values(columns, rng, nominal):
 KINDS = {
     f.__name__: f
     for f in (
-        dropped_rows, duplicated_rows, stuck_column, swapped_phases, degrees, milliamperes, clipped_currents,
-        reversed_angle, percent_duties, missing_values,
-    )  # fmt: skip
+        dropped_rows,
+        duplicated_rows,
+        stuck_column,
+        swapped_phases,
+        degrees,
+        milliamperes,
+        clipped_currents,
+        reversed_angle,
+        percent_duties,
+        missing_values,
+    )
 }

@@ -46,7 +46,7 @@ def points(case) -> Points:
 
 
 class Design:
-    """Rows of one case's plan; ``variants`` gives an effect's columns, ``truth`` what the hidden drive leaves."""
+    """Rows of one case's plan: ``variants`` of an effect's columns, ``truth`` of the hidden drive."""
 
     def __init__(self, case):
         self.case, self.p = case, points(case)
@@ -65,8 +65,19 @@ class Design:
 
     def _rows(self, **lines):
         """One column: given lines (complex arrays (k,)), whitened and stacked as real numbers."""
-        names = {"mean": "mean", "p6": "+6", "m6": "-6", "p12": "+12", "m12": "-12", "p1": "+1", "m1": "-1",
-                 "p2": "+2", "m2": "-2", "pe": "+e", "me": "-e"}  # fmt: skip
+        names = {
+            "mean": "mean",
+            "p6": "+6",
+            "m6": "-6",
+            "p12": "+12",
+            "m12": "-12",
+            "p1": "+1",
+            "m1": "-1",
+            "p2": "+2",
+            "m2": "-2",
+            "pe": "+e",
+            "me": "-e",
+        }
         full = np.zeros((len(LINES), len(self.p.i)), complex)
         for name, value in lines.items():
             full[LINES.index(names.get(name, name))] = value
@@ -76,8 +87,10 @@ class Design:
     def _weights(self):
         """1 / standard deviation of each line at each point, floor included; 0 where nothing is recorded."""
         s, p, b = self.case.build.drive.sensor, self.p, self.case.build
-        psi_noise = math.hypot(self.l_q * math.hypot(s.noise_a, s.lsb_a / 3.5),
-                               self.psi_m * math.hypot(s.theta_noise, s.theta_lsb / 3.5))  # fmt: skip
+        psi_noise = math.hypot(
+            self.l_q * math.hypot(s.noise_a, s.lsb_a / 3.5),
+            self.psi_m * math.hypot(s.theta_noise, s.theta_lsb / 3.5),
+        )
         length = self.bus / math.sqrt(3.0)
         held = np.array([p.rows[p.omega == omega].sum() for omega in p.omega])
         white = np.hypot(self.r * s.noise_a, 0.5 * s.u_noise) / np.sqrt(p.rows)
@@ -96,6 +109,8 @@ class Design:
             weight[12] = weight[11] / 2.0
         elif b.plan.free:
             weight[12] = 1.0 / (5e-3 * rated)
+        if len(b.drive.shaft.cogging):  # above the sampling's reach it folds onto other orders
+            weight[12] *= np.abs(b.drive.shaft.cogging[0, 0] * p.omega / self.pairs) * self.T < 2.5
         if not s.two_sensors:
             weight[13] = 1.0 / np.hypot(s.noise_a / np.sqrt(p.rows), 3e-4 * self.i_r)
             weight[14] = weight[13]
@@ -114,40 +129,56 @@ class Design:
     def _iron(self, g):
         lost = -1j * self.p.omega * self.psi * g  # core current less terminal current
         moved = self._l(lost)
-        return self._rows(mean=1j * self.p.omega * moved,
-                          torque=self._torque(moved, self.p.i) + self._torque(self.psi, lost))  # fmt: skip
+        return self._rows(
+            mean=1j * self.p.omega * moved,
+            torque=self._torque(moved, self.p.i) + self._torque(self.psi, lost),
+        )
 
     def _skew(self, tau):
         moved = -1j * self.p.omega * tau * self.psi + self.p.omega * tau * self._l(1j * self.p.i)
-        turned = -1j * self.p.omega * tau * self.psi_m / self.l_q  # ripple current that was measured in excess
+        turned = (
+            -1j * self.p.omega * tau * self.psi_m / self.l_q
+        )  # ripple current that was measured in excess
         return self._rows(mean=-1j * self.p.omega * moved, torque=-self._torque(self.psi, turned))
 
     def _turn(self, delta, line="mean"):
         z = -1j * delta * self.psi_m + self._l(1j * delta * self.p.i) - 1j * delta * self._l(self.p.i)
         if line != "mean":
             return self._rows(**{line: 1j * self.p.omega * z})
-        torque = self._torque(self._l(1j * delta * self.p.i), self.p.i) + self._torque(self.psi, 1j * delta * self.p.i)
+        torque = self._torque(self._l(1j * delta * self.p.i), self.p.i) + self._torque(
+            self.psi, 1j * delta * self.p.i
+        )
         return self._rows(mean=1j * self.p.omega * z, torque=torque)
 
     def _offset(self, o, common):
-        return self._rows(m1=-self.r * o, p1=-1j * self.p.omega * (self.l_d - self.l_q) * np.conj(o), sum=3.0 * common)
+        return self._rows(
+            m1=-self.r * o, p1=-1j * self.p.omega * (self.l_d - self.l_q) * np.conj(o), sum=3.0 * common
+        )
 
     def _gain(self, g):
         z = g * np.conj(self.p.i)
         mean_l, half = 0.5 * (self.l_d + self.l_q), 0.5 * (self.l_d - self.l_q)
-        return self._rows(m2=-(self.r - 1j * self.p.omega * mean_l) * z, p2=-3j * self.p.omega * half * np.conj(z),
-                          sum1=1.5 * np.conj(g) * self.p.i)  # fmt: skip
+        return self._rows(
+            m2=-(self.r - 1j * self.p.omega * mean_l) * z,
+            p2=-3j * self.p.omega * half * np.conj(z),
+            sum1=1.5 * np.conj(g) * self.p.i,
+        )
 
     def _scale(self, s):
         less = -s * self.p.i
-        return self._rows(mean=self.r * less + 1j * self.p.omega * self._l(less),
-                          torque=self._torque(self._l(less), self.p.i) + self._torque(self.psi, less))  # fmt: skip
+        return self._rows(
+            mean=self.r * less + 1j * self.p.omega * self._l(less),
+            torque=self._torque(self._l(less), self.p.i) + self._torque(self.psi, less),
+        )
 
     def _dead(self, v):
         along = np.angle(self.p.i)
         size = 4.0 / math.pi * v * np.abs(self.unit)
-        return self._rows(mean=size * np.exp(1j * along), m6=size / 5.0 * np.exp(-5j * along),
-                          p6=-size / 7.0 * np.exp(7j * along))  # fmt: skip
+        return self._rows(
+            mean=size * np.exp(1j * along),
+            m6=size / 5.0 * np.exp(-5j * along),
+            p6=-size / 7.0 * np.exp(7j * along),
+        )
 
     def variants(self, name) -> list[list[np.ndarray]]:
         """An effect's columns, of a typical size each; more than one set where it may take another course."""
@@ -174,7 +205,11 @@ class Design:
             ],
             "iron_loss": lambda: [[self._iron(iron)]],
             "emf_harmonics": lambda: [
-                [self._rows(**{k: w * 0.015 * psi * p.omega}) for k in ("p6", "m6", "p12", "m12") for w in both]
+                [
+                    self._rows(**{k: w * 0.015 * psi * p.omega})
+                    for k in ("p6", "m6", "p12", "m12")
+                    for w in both
+                ]
             ],
             "delay": lambda: [[self._rows(mean=1j * p.omega * 10e-6 * self.u)]],
             "sampling_skew": lambda: [[self._skew(1e-6)]],
@@ -213,7 +248,10 @@ class Design:
         self.rise = (b.temperature(x)[at] - reference) / 50.0 if b.temperature else np.zeros(len(at))
         phases = np.array((m.r_a, m.r_b, m.r_c))[:, None] * course.r_scale[:, at] + br.r_drop
         spin = np.exp(2j * np.pi / 3.0 * np.arange(3))[:, None]
-        y = self._rows(mean=(phases.mean(0) - self.r) * p.i, m2=2.0 / 3.0 * 0.5 * (phases * spin**2).sum(0) * np.conj(p.i))
+        y = self._rows(
+            mean=(phases.mean(0) - self.r) * p.i,
+            m2=2.0 / 3.0 * 0.5 * (phases * spin**2).sum(0) * np.conj(p.i),
+        )
         more = [flux(m, z.real, z.imag)[:2] for z in p.i]
         more = np.array([f[0] + 1j * f[1] for f in more]) - self._l(p.i)
         more = more + self.psi_m * (course.psi_scale[at] - 1.0)
@@ -224,14 +262,23 @@ class Design:
             if order in (6.0, 12.0):
                 d, q = a_d * np.exp(1j * ph_d), 1j * a_q * np.exp(1j * ph_q)
                 plus, minus = 0.5 * (d + q), 0.5 * np.conj(d - q)
-                y = y + self._rows(**{f"p{int(order)}": 1j * (1 + order) * p.omega * plus,
-                                      f"m{int(order)}": 1j * (1 - order) * p.omega * minus})  # fmt: skip
+                y = y + self._rows(
+                    **{
+                        f"p{int(order)}": 1j * (1 + order) * p.omega * plus,
+                        f"m{int(order)}": 1j * (1 - order) * p.omega * minus,
+                    }
+                )
         lost = [br.dead_s / self.T * self.bus * direction(br.direction, br.i_zone, abs(z)) for z in p.i]
         lost = np.array(lost) + [drop(br, abs(z)) - br.r_drop * abs(z) for z in p.i]
         y = y + self._dead(lost / np.maximum(np.abs(self.unit), 1e-9))
         share = {P.DELAY_MIX: br.delay, P.DELAY_HALF: 0.5, P.DELAY_SHIFT: 0.1}[br.delay_kind]
         y = y + self._rows(mean=1j * p.omega * share * self.T * self.u)
-        y = y + self._turn(course.theta_offset[at]) + self._turn(0.5 * s.ecc_1, "pe") + self._turn(0.5 * s.ecc_1, "me")
+        y = (
+            y
+            + self._turn(course.theta_offset[at])
+            + self._turn(0.5 * s.ecc_1, "pe")
+            + self._turn(0.5 * s.ecc_1, "me")
+        )
         o = 2.0 / 3.0 * (course.offsets[:, at] * spin).sum(0)
         y = y + self._offset(o, course.offsets[:, at].mean(0))
         gains = np.array((s.gain_a, s.gain_b, s.gain_c))
@@ -240,5 +287,7 @@ class Design:
         if len(h.cogging):
             y = y + self._rows(cog=h.cogging[0, 1] * np.exp(1j * h.cogging[0, 2]))
         omega_m = p.omega / self.pairs
-        extra = (h.viscous - b.nominal.machine["viscous_friction_nms"]) * omega_m + h.coulomb * np.sign(omega_m)
+        extra = (h.viscous - b.nominal.machine["viscous_friction_nms"]) * omega_m + h.coulomb * np.sign(
+            omega_m
+        )
         return y + self._rows(torque=-extra)

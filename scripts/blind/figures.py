@@ -7,7 +7,7 @@ or {"error": text} where the tool broke down.  Rates come with Wilson's 95 % int
 from __future__ import annotations
 
 import math
-from collections import Counter, defaultdict
+from collections import defaultdict
 
 import numpy as np
 
@@ -109,7 +109,11 @@ def identifiable(truth) -> bool:
 
 # Relative to the largest of the three phases: one of them may well be zero.
 PHASES = ("a", "b", "c")
-GROUPS = [[f"offset_{x}_a" for x in PHASES], [f"gain_{x}" for x in PHASES], [f"asymmetry_{x}" for x in PHASES]]
+GROUPS = [
+    [f"offset_{x}_a" for x in PHASES],
+    [f"gain_{x}" for x in PHASES],
+    [f"asymmetry_{x}" for x in PHASES],
+]
 
 
 def parameter_errors(truth, answer) -> list[dict]:
@@ -128,11 +132,19 @@ def parameter_errors(truth, answer) -> list[dict]:
                 value -= np.mean([given[x]["value"] for x in group])
                 wanted -= np.mean([true[x] for x in group])
             error = value - wanted
-            found.append({
-                "case": truth["case"], "effect": effect["name"], "form": effect["form"], "parameter": name,
-                "true": wanted, "value": float(value), "sigma": sigma, "relative": abs(error) / scale,
-                "covered": bool(abs(error) <= 1.959964 * sigma),
-            })  # fmt: skip
+            found.append(
+                {
+                    "case": truth["case"],
+                    "effect": effect["name"],
+                    "form": effect["form"],
+                    "parameter": name,
+                    "true": wanted,
+                    "value": float(value),
+                    "sigma": sigma,
+                    "relative": abs(error) / scale,
+                    "covered": bool(abs(error) <= 1.959964 * sigma),
+                }
+            )
     return found
 
 
@@ -141,7 +153,12 @@ def _parameter_figures(errors):
     median = float(np.median(relative)) if relative else None
     tail = float(np.quantile(relative, 0.9)) if relative else None
     return {
-        "parameter_error_median": {"value": median, "n": len(errors), "p90": tail, **_met("parameter_error_median", median)},
+        "parameter_error_median": {
+            "value": median,
+            "n": len(errors),
+            "p90": tail,
+            **_met("parameter_error_median", median),
+        },
         "coverage_95": rate("coverage_95", [e["covered"] for e in errors]),
     }
 
@@ -158,10 +175,14 @@ def _holdout(cases):
     median = float(np.median(ratios)) if ratios else None
     worst = float(np.quantile(ratios, 0.95)) if ratios else None
     return {
-        "holdout_over_floor_median": {"value": median, "n": len(ratios), "p95": worst,
-                                      **_met("holdout_over_floor_median", median)},
+        "holdout_over_floor_median": {
+            "value": median,
+            "n": len(ratios),
+            "p95": worst,
+            **_met("holdout_over_floor_median", median),
+        },
         "holdout_within_1.1": rate("", [r <= 1.1 for r in ratios]),
-    }  # fmt: skip
+    }
 
 
 def figures(cases, resolved=()) -> dict:
@@ -188,10 +209,14 @@ def figures(cases, resolved=()) -> dict:
         "false_alarm_healthy": rate(
             "false_alarm_healthy", [a.get("verdict") != "no_mismatch" for t, a in by["healthy"]]
         ),
-        "truth_inside_ambiguity": rate("truth_inside_ambiguity", [inside_ambiguity(t, a) for t, a in said_tied]),
+        "truth_inside_ambiguity": rate(
+            "truth_inside_ambiguity", [inside_ambiguity(t, a) for t, a in said_tied]
+        ),
         "request_resolves_tie": rate("request_resolves_tie", [r["resolved"] for r in asked]),
         "ambiguous_without_request": rate("", [not r["asked"] for r in resolved]),
-        "unknown_recognised": rate("unknown_recognised", [a.get("verdict") == "unexplained" for t, a in by["unknown"]]),
+        "unknown_recognised": rate(
+            "unknown_recognised", [a.get("verdict") == "unexplained" for t, a in by["unknown"]]
+        ),
         "damage_found": rate("", [problem_found(t, a) for t, a in by["damaged"]]),
         # Where the recording cannot tell by design: right, or at least nothing wrong asserted.
         "not_identifiable_honest": rate("", [not confidently_wrong(t, a) for t, a in blind]),
@@ -200,78 +225,3 @@ def figures(cases, resolved=()) -> dict:
         **_holdout(cases),
         **_parameter_figures(errors),
     }
-
-
-def by_form(cases, resolved=()) -> dict:
-    """The figures of cases whose effects all have the catalogue's form, and of the others."""
-    split = {}
-    for kind in ("catalogue", "other"):
-        part = [(t, a) for t, a in cases if t["effects"] and form_class(t) == kind]
-        names = {t["case"] for t, a in part}
-        kept = figures(part, [r for r in resolved if r["case"] in names])
-        split[kind] = {k: v for k, v in kept.items() if v.get("n")}
-    return split
-
-
-def by_stratum(cases) -> dict:
-    """Cases, named right, ambiguous with the truth inside, wrongly asserted, verdicts, of each stratum."""
-    table = {}
-    for stratum in sorted({t["stratum"] for t, a in cases}):
-        part = [(t, a) for t, a in cases if t["stratum"] == stratum]
-        table[stratum] = {
-            "cases": len(part),
-            "identifiable": sum(identifiable(t) for t, a in part),
-            "named_right": rate("", [named_right(t, a) for t, a in part]),
-            "inside_ambiguity": rate("", [a.get("verdict") == "ambiguous" and inside_ambiguity(t, a) for t, a in part]),
-            "confidently_wrong": rate("", [confidently_wrong(t, a) for t, a in part]),
-            "verdicts": dict(Counter(a.get("verdict", "error") for t, a in part)),
-        }
-    return table
-
-
-def by_effect(cases) -> dict:
-    """How each effect fared: asserted, tied or missed where it is, and asserted where it is not."""
-    table = defaultdict(Counter)
-    for t, a in cases:
-        for effect in t["effects"]:
-            name = effect["name"]
-            row = table[name]
-            told = t["identifiable"]["effects"].get(name, False)
-            row["present"] += 1
-            row["identifiable"] += told
-            where = "asserted" if name in asserted(a) else "tied" if name in tied(a) else "missed"
-            row[where] += 1
-            row[f"identifiable_{where}"] += told
-        for name in asserted(a) - true_names(t):
-            table[name]["false"] += 1
-    return {name: dict(table[name]) for name in sorted(table)}
-
-
-def confusion(cases) -> dict:
-    """{truth: {asserted: count}}; a true effect that was not asserted is set against what was wrongly asserted
-    instead, or against (tied), (unexplained), (none)."""
-    table = defaultdict(Counter)
-    for t, a in cases:
-        names, said = true_names(t), asserted(a)
-        wrong = said - names
-        for name in names or {f"({t['stratum']})"}:
-            if name in said:
-                table[name][name] += 1
-                continue
-            if wrong:
-                table[name].update(wrong)
-            elif name in tied(a):
-                table[name]["(tied)"] += 1
-            else:
-                table[name]["(unexplained)" if a.get("verdict") == "unexplained" else "(none)"] += 1
-    return {name: dict(table[name]) for name in sorted(table)}
-
-
-def times(cases) -> dict:
-    """Seconds a case, and rows a second."""
-    seconds = np.array([a["seconds"] for t, a in cases if "seconds" in a])
-    if not len(seconds):
-        return {}
-    rows = np.array([t["rows"] for t, a in cases if "seconds" in a])
-    return {"median_s": float(np.median(seconds)), "max_s": float(seconds.max()), "sum_s": float(seconds.sum()),
-            "rows_per_s": float(rows.sum() / seconds.sum())}  # fmt: skip

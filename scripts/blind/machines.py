@@ -1,4 +1,4 @@
-"""Random drives whose per-unit values a real one could have, and the nominal drive.toml that goes with each."""
+"""Random drives with per-unit values that a real one could have, and the nominal drive.toml of each."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def _bus(rng, power):
 
 
 def random_nominal(rng) -> Nominal:
-    """One drive of 50 W to 200 kW; draws again until the current ripple is below a quarter of the rated current."""
+    """One drive of 50 W to 200 kW whose current ripple is below a quarter of the rated current."""
     while True:
         power = 10.0 ** rng.uniform(math.log10(50.0), math.log10(2e5))
         bus, f_pwm = _bus(rng, power), float(rng.choice((8e3, 10e3, 10e3, 12.5e3, 16e3, 20e3)))

@@ -6,18 +6,22 @@ from jinja2 import Environment
 
 TEMPLATE = """<!doctype html><html lang="en"><meta charset="utf-8"><title>Blind benchmark</title>
 <style>body{font:15px/1.45 sans-serif;max-width:1200px;margin:2em auto;padding:0 1em;color:#222}
-table{border-collapse:collapse;margin:.6em 0 1.6em}td,th{border-bottom:1px solid #ddd;padding:.2em .6em;text-align:right}
+table{border-collapse:collapse;margin:.6em 0 1.6em}td,th{border-bottom:1px solid #ddd;
+padding:.2em .6em;text-align:right}
 td:first-child,th:first-child{text-align:left}.met{color:#0a7a2f}.missed{color:#b00020;font-weight:bold}
 .wide{overflow-x:auto;font-size:12px}.diagonal{background:#d9f0dd}.off{background:#fbdcdc}
 th.up{writing-mode:vertical-rl;transform:rotate(180deg);text-align:left}</style>
 <h1>Blind benchmark of the diagnosis</h1>
-<p>Seed {{ r.seed }}, {{ r.cases_total }} cases; truth sealed before the run, SHA-256 <code>{{ r.sha256 }}</code>.
-{% if r.times %}{{ '%.1f' % r.times.median_s }} s a case (median), {{ '%.1f' % r.times.max_s }} s at most.{% endif %}</p>
+<p>Seed {{ r.seed }}, {{ r.cases_total }} cases; truth sealed before the run,
+SHA-256 <code>{{ r.sha256 }}</code>.
+{% if r.times %}{{ '%.1f' % r.times.median_s }} s a case (median),
+{{ '%.1f' % r.times.max_s }} s at most.{% endif %}</p>
 <h2>Figures</h2><table><tr><th>figure<th>value<th>95 % interval<th>cases<th>target<th></tr>
 {% for name, f in r.figures.items() %}<tr><td>{{ name }}<td>{{ number(f.value) }}
 <td>{% if f.low is defined %}{{ number(f.low) }} to {{ number(f.high) }}{% endif %}
 <td>{% if f.k is defined %}{{ f.k }} of {% endif %}{{ f.n }}<td>{{ f.target if f.target is defined else '' }}
-<td>{% if f.met is defined %}<span class="{{ 'met' if f.met else 'missed' }}">{{ 'met' if f.met else 'missed' }}</span>
+<td>{% if f.met is defined %}
+<span class="{{ 'met' if f.met else 'missed' }}">{{ 'met' if f.met else 'missed' }}</span>
 {% endif %}</tr>{% endfor %}</table>
 <h2>The catalogue's functional form and others</h2><table><tr><th>figure<th>catalogue<th>other</tr>
 {% for name in r.figures if name in r.by_form.catalogue or name in r.by_form.other %}<tr><td>{{ name }}
@@ -28,20 +32,24 @@ th.up{writing-mode:vertical-rl;transform:rotate(180deg);text-align:left}</style>
 <th>confidently wrong<th>verdicts</tr>
 {% for name, s in r.by_stratum.items() %}<tr><td>{{ name }}<td>{{ s.cases }}<td>{{ s.identifiable }}
 <td>{{ s.named_right.k }}<td>{{ s.inside_ambiguity.k }}<td>{{ s.confidently_wrong.k }}
-<td>{% for v, k in s.verdicts.items() %}{{ v }} {{ k }}{{ ', ' if not loop.last }}{% endfor %}</tr>{% endfor %}</table>
+<td>{% for v, k in s.verdicts.items() -%}
+{{ v }} {{ k }}{{ ', ' if not loop.last }}{% endfor %}</tr>{% endfor %}</table>
 <h2>Effects</h2><table><tr><th>effect<th>present<th>identifiable<th>of these asserted<th>tied<th>missed
 <th>asserted where absent</tr>{% for name, e in r.by_effect.items() %}<tr><td>{{ name }}
-{% for key in ('present', 'identifiable', 'identifiable_asserted', 'identifiable_tied', 'identifiable_missed', 'false') %}
+{% for key in ('present', 'identifiable', 'identifiable_asserted',
+ 'identifiable_tied', 'identifiable_missed', 'false') %}
 <td>{{ e.get(key, 0) }}{% endfor %}</tr>{% endfor %}</table>
 <h2>Truth (rows) against what was asserted (columns)</h2><div class="wide"><table><tr><th>
 {% for c in columns %}<th class="up">{{ c }}{% endfor %}</tr>
 {% for name, row in r.confusion.items() %}<tr><td>{{ name }}{% for c in columns %}
-<td{% if row.get(c) %} class="{{ 'diagonal' if c == name else 'off' if not c.startswith('(') else '' }}"{% endif %}>
+<td{% if row.get(c) %}
+ class="{{ 'diagonal' if c == name else 'off' if not c.startswith('(') else '' }}"{% endif %}>
 {{ row.get(c, '') }}{% endfor %}</tr>{% endfor %}</table></div>
 <h2>Cases that asserted something absent</h2><table><tr><th>case<th>stratum<th>truth<th>asserted<th>tied</tr>
 {% for c in r.cases if c.wrong or c.error %}<tr><td>{{ c.case }}<td>{{ c.stratum }}
 <td>{{ c.kind }}{% for e in c.truth %}{{ e.name }} ({{ e.form }}, {{ '%.2g' % e.size }}) {% endfor %}
-<td>{{ c.error or c.asserted | join(', ') }}<td>{% for g in c.ambiguity %}{{ g | join(' or ') }}; {% endfor %}</tr>
+<td>{{ c.error or c.asserted | join(', ') }}
+<td>{% for g in c.ambiguity %}{{ g | join(' or ') }}; {% endfor %}</tr>
 {% endfor %}</table></html>
 """
 

@@ -1,6 +1,6 @@
 """What one simulated drive is made of: plain named tuples that compiled code takes, SI units, peak values.
 
-``ideal()`` gives a drive in which every effect is absent; forms.py turns effects into changes of these fields.
+``ideal()`` gives a drive in which every effect is absent; an effect changes fields of it (forms.py).
 """
 
 from __future__ import annotations

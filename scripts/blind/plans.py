@@ -39,7 +39,9 @@ def _fits(n: Nominal, omega, i_d, i_q):
 def _top_speed(n: Nominal, points):
     """Highest electrical speed at which every point keeps a reserve of voltage, at most the rated one."""
     omega = n.omega_rated
-    while omega > 0.05 * n.omega_rated and not all(_fits(n, s * omega, d, q) for d, q in points for s in (1, -1)):
+    while omega > 0.05 * n.omega_rated and not all(
+        _fits(n, s * omega, d, q) for d, q in points for s in (1, -1)
+    ):
         omega *= 0.97
     return omega
 
@@ -61,7 +63,11 @@ def current_points(rng, i_rated, with_d=True):
 
 
 def _ripple(rng):
-    return float(rng.choice((0.0, rng.uniform(0.001, 0.012)))), float(rng.choice((100.0, 300.0))), rng.uniform(0, 6)
+    return (
+        float(rng.choice((0.0, rng.uniform(0.001, 0.012)))),
+        float(rng.choice((100.0, 300.0))),
+        rng.uniform(0, 6),
+    )
 
 
 def grid_plan(rng, n: Nominal, with_d=True) -> Plan:
@@ -104,7 +110,9 @@ def masked_plan(rng, n: Nominal) -> Plan:
 
 def steps(plan: Plan, column: int):
     """One value of the segments a row, shape (n,)."""
-    return np.repeat([segment[column] for segment in plan.segments], [segment[3] for segment in plan.segments])
+    return np.repeat(
+        [segment[column] for segment in plan.segments], [segment[3] for segment in plan.segments]
+    )
 
 
 def course(plan: Plan, n: Nominal) -> P.Course:
@@ -124,6 +132,14 @@ def course(plan: Plan, n: Nominal) -> P.Course:
     load = np.repeat(plan.load, [s[3] for s in plan.segments]) if plan.load else np.zeros(rows)
     one = np.ones(rows + 1)
     return P.Course(
-        u_dc, 0.0 * one, omega, np.append(load, load[-1]).astype(float), np.ones((3, rows + 1)), one.copy(),
-        np.zeros((3, rows + 1)), 0.0 * one, steps(plan, 1).astype(float), steps(plan, 2).astype(float),
-    )  # fmt: skip
+        u_dc,
+        0.0 * one,
+        omega,
+        np.append(load, load[-1]).astype(float),
+        np.ones((3, rows + 1)),
+        one.copy(),
+        np.zeros((3, rows + 1)),
+        0.0 * one,
+        steps(plan, 1).astype(float),
+        steps(plan, 2).astype(float),
+    )

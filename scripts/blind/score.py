@@ -14,7 +14,7 @@ import time
 import traceback
 from pathlib import Path
 
-from scripts.blind import figures
+from scripts.blind import figures, tables
 from scripts.blind.again import resolve
 from scripts.blind.page import page
 from scripts.blind.seal import SealError, truth_path, unseal
@@ -41,8 +41,14 @@ def _second_look(job):
     try:
         return resolve(*job, diagnose)
     except Exception as error:
-        return {"case": job[0]["case"], "asked": True, "resolved": False, "verdict": None, "effects": [],
-                "error": f"{type(error).__name__}: {error}"}  # fmt: skip
+        return {
+            "case": job[0]["case"],
+            "asked": True,
+            "resolved": False,
+            "verdict": None,
+            "effects": [],
+            "error": f"{type(error).__name__}: {error}",
+        }
 
 
 def _in_parallel(function, work, jobs, what):
@@ -54,13 +60,18 @@ def _in_parallel(function, work, jobs, what):
         for result in pool.imap_unordered(function, work):
             results.append(result)
             spent = time.perf_counter() - began
-            print(f"\r{what}: {len(results)} of {len(work)}, {spent:.0f} s ", end="", file=sys.stderr, flush=True)
+            print(
+                f"\r{what}: {len(results)} of {len(work)}, {spent:.0f} s ",
+                end="",
+                file=sys.stderr,
+                flush=True,
+            )
     print(file=sys.stderr)
     return results
 
 
 def score(folder: Path, jobs: int = 2, reuse: bool = False) -> dict:
-    """Diagnose and score the benchmark in ``folder``; returns the result and writes result.json, report.html."""
+    """Diagnose and score the benchmark in ``folder``; returns what it writes to result.json."""
     folder = Path(folder).resolve()
     if not (folder / "sealed.sha256").exists():
         raise SealError(f"{folder}/sealed.sha256: cannot be read; run python -m scripts.blind.generate")
@@ -74,11 +85,19 @@ def score(folder: Path, jobs: int = 2, reuse: bool = False) -> dict:
     truth = unseal(folder)
     cases = [(entry, answers[entry["case"]]) for entry in truth["cases"]]
     scratch = folder.parent / f"again_{folder.name}"
-    ties = [(t, a, truth["seed"], folder, scratch) for t, a in cases if a.get("verdict") == "ambiguous" and t["effects"]]
+    ties = [
+        (t, a, truth["seed"], folder, scratch)
+        for t, a in cases
+        if a.get("verdict") == "ambiguous" and t["effects"]
+    ]
     resolved = sorted(_in_parallel(_second_look, ties, jobs, "recorded again"), key=lambda r: r["case"])
     result = summary(cases, resolved)
-    result.update(seed=truth["seed"], cases_total=len(cases), sealed=truth_path(folder).name,
-                  sha256=(folder / "sealed.sha256").read_text().strip())  # fmt: skip
+    result.update(
+        seed=truth["seed"],
+        cases_total=len(cases),
+        sealed=truth_path(folder).name,
+        sha256=(folder / "sealed.sha256").read_text().strip(),
+    )
     write_json(folder.parent / "result.json", result)
     write_text(folder.parent / "report.html", page(result))
     return result
@@ -89,13 +108,13 @@ def summary(cases, resolved) -> dict:
     return {
         "schema": 1,
         "figures": figures.figures(cases, resolved),
-        "by_form": figures.by_form(cases, resolved),
-        "by_stratum": figures.by_stratum(cases),
-        "by_effect": figures.by_effect(cases),
-        "confusion": figures.confusion(cases),
+        "by_form": tables.by_form(cases, resolved),
+        "by_stratum": tables.by_stratum(cases),
+        "by_effect": tables.by_effect(cases),
+        "confusion": tables.confusion(cases),
         "parameters": [e for t, a in cases for e in figures.parameter_errors(t, a)],
         "second_looks": list(resolved),
-        "times": figures.times(cases),
+        "times": tables.times(cases),
         "cases": [_line(t, a) for t, a in cases],
     }
 
@@ -103,12 +122,18 @@ def summary(cases, resolved) -> dict:
 def _line(t, a):
     """One case in short, for whoever wants to know what went wrong."""
     return {
-        "case": t["case"], "stratum": t["stratum"], "kind": t["kind"], "identifiable": figures.identifiable(t),
+        "case": t["case"],
+        "stratum": t["stratum"],
+        "kind": t["kind"],
+        "identifiable": figures.identifiable(t),
         "truth": [{k: e[k] for k in ("name", "form", "size")} for e in t["effects"]],
-        "verdict": a.get("verdict", "error"), "asserted": sorted(figures.asserted(a)),
-        "ambiguity": a.get("ambiguity", []), "error": a.get("error"),
-        "right": figures.named_right(t, a), "wrong": figures.confidently_wrong(t, a),
-    }  # fmt: skip
+        "verdict": a.get("verdict", "error"),
+        "asserted": sorted(figures.asserted(a)),
+        "ambiguity": a.get("ambiguity", []),
+        "error": a.get("error"),
+        "right": figures.named_right(t, a),
+        "wrong": figures.confidently_wrong(t, a),
+    }
 
 
 def print_figures(result: dict):
@@ -117,7 +142,9 @@ def print_figures(result: dict):
         if f.get("value") is None:
             print(f"{name:28s} no case")
             continue
-        interval = f" [{f['low']:.3f}, {f['high']:.3f}] {f['k']} of {f['n']}" if "low" in f else f" n = {f['n']}"
+        interval = (
+            f" [{f['low']:.3f}, {f['high']:.3f}] {f['k']} of {f['n']}" if "low" in f else f" n = {f['n']}"
+        )
         verdict = "" if "met" not in f else f"   target {f['target']}: {'met' if f['met'] else 'MISSED'}"
         print(f"{name:28s} {f['value']:.4g}{interval}{verdict}")
 

@@ -38,8 +38,12 @@ def unseal(folder: Path) -> dict:
     try:
         packed, wanted = path.read_bytes(), note.read_text().strip()
     except OSError as error:
-        raise SealError(f"{error.filename}: cannot be read: {error.strerror}; run scripts.blind.generate") from None
+        raise SealError(
+            f"{error.filename}: cannot be read: {error.strerror}; run scripts.blind.generate"
+        ) from None
     found = hashlib.sha256(packed).hexdigest()
     if found != wanted:
-        raise SealError(f"{path}: SHA-256 is {found}, sealed was {wanted}: the truth was changed after sealing")
+        raise SealError(
+            f"{path}: SHA-256 is {found}, sealed was {wanted}: the truth was changed after sealing"
+        )
     return json.loads(zlib.decompress(packed))

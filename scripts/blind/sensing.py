@@ -7,7 +7,7 @@ import numba as nb
 from scripts.blind import params as P
 
 jit = nb.njit(cache=True, fastmath=False)
-TWO_PI = 2.0 * math.pi
+ROOT3 = math.sqrt(3.0)
 
 
 @jit
@@ -18,7 +18,7 @@ def rounded(x, lsb):
 
 @jit
 def phase_current(s, gain, offset, noise, i, neighbour):
-    """One sensor's reading [A]; neighbour: current [A] of the conductor beside it."""
+    """One sensor's reading [A]; neighbour: what reaches it of the other conductors [A]."""
     x = i + s.cross_talk * neighbour
     x = x * (1.0 + s.quadratic * x + s.cubic * x * x)
     x = x * (1.0 + s.scale) * (1.0 + gain) + offset + s.noise_a * noise
@@ -28,9 +28,9 @@ def phase_current(s, gain, offset, noise, i, neighbour):
 @jit
 def measure_currents(s, i, offsets, noise, out):
     """Fills out (3,) from true phase currents i (3,), offsets (3,), standard normal noise (3,)."""
-    out[0] = phase_current(s, s.gain_a, offsets[0], noise[0], i[0], i[1])
-    out[1] = phase_current(s, s.gain_b, offsets[1], noise[1], i[1], i[2])
-    out[2] = phase_current(s, s.gain_c, offsets[2], noise[2], i[2], i[0])
+    out[0] = phase_current(s, s.gain_a, offsets[0], noise[0], i[0], (i[1] - i[2]) / ROOT3)
+    out[1] = phase_current(s, s.gain_b, offsets[1], noise[1], i[1], (i[2] - i[0]) / ROOT3)
+    out[2] = phase_current(s, s.gain_c, offsets[2], noise[2], i[2], (i[0] - i[1]) / ROOT3)
     if s.two_sensors:
         out[2] = -out[0] - out[1]
 
@@ -47,7 +47,7 @@ def wave(kind, x):
 
 @jit
 def measure_angle(s, theta_m, pole_pairs, offset, noise):
-    """Electrical angle [rad], not wrapped, of the encoder at the mechanical angle [rad], mounted off by offset."""
+    """Electrical angle [rad], not wrapped, of an encoder mounted off by ``offset`` [rad] electrical."""
     error = offset + s.ecc_1 * wave(s.ecc_1_wave, theta_m + s.ecc_1_phase)
     error += s.ecc_2 * math.cos(2.0 * theta_m + s.ecc_2_phase) + s.ecc_n * math.cos(s.ecc_order * theta_m)
     return rounded(pole_pairs * theta_m + error + s.theta_noise * noise, s.theta_lsb)

@@ -22,9 +22,35 @@ from scripts.blind.sensing import measure_angle, measure_currents, rounded
 jit = nb.njit(cache=True, fastmath=False)
 ROOT3 = math.sqrt(3.0)
 TWO_PI = 2.0 * math.pi
-ROWS = ("i_a", "i_b", "i_c", "theta_e", "omega_e", "u_dc", "d_a", "d_b", "d_c", "i_d_ref", "i_q_ref", "torque")
-TRACE = ("i_alpha", "i_beta", "psi_alpha", "psi_beta", "theta_true", "omega_true", "u_mean_alpha", "u_mean_beta",
-         "i_mean_alpha", "i_mean_beta", "torque_em", "work_in", "work_out")  # fmt: skip
+ROWS = (
+    "i_a",
+    "i_b",
+    "i_c",
+    "theta_e",
+    "omega_e",
+    "u_dc",
+    "d_a",
+    "d_b",
+    "d_c",
+    "i_d_ref",
+    "i_q_ref",
+    "torque",
+)
+TRACE = (
+    "i_alpha",
+    "i_beta",
+    "psi_alpha",
+    "psi_beta",
+    "theta_true",
+    "omega_true",
+    "u_mean_alpha",
+    "u_mean_beta",
+    "i_mean_alpha",
+    "i_mean_beta",
+    "torque_em",
+    "work_in",
+    "work_out",
+)
 # Working state: flux, speed, angle, then what follows from them.
 PA, PB, OM, TH, GD, GQ, IA, IB, TQ = range(9)
 
@@ -112,7 +138,10 @@ def collect(edges, count, t1, t2, shift, dead_s, period_s):
 
 @jit
 def run(drive, course, noise, start, duty_start, substeps, rows, trace):
-    """Simulate len(rows) periods.  noise (n, 6) standard normal; start (9,) state; duty_start (3,); rows, trace are filled."""
+    """Simulate len(rows) periods and fill rows and trace.
+
+    noise: (n, 6) standard normal.  start: (9,) state.  duty_start: (3,) duties in force in the first period.
+    """
     m, b, sen, c, T = drive.motor, drive.bridge, drive.sensor, drive.control, drive.period_s
     p = m.pole_pairs
     s, mid, k1, k2 = start.copy(), start.copy(), np.zeros(5), np.zeros(5)
@@ -126,7 +155,10 @@ def run(drive, course, noise, start, duty_start, substeps, rows, trace):
     i_early[0], i_early[1] = s[IA], -0.5 * s[IA] + 0.5 * ROOT3 * s[IB]
     i_early[2] = -i_early[0] - i_early[1]
     i_low[:] = i_early
-    tracked, tracked_speed = measure_angle(sen, s[TH] + s[OM] * sen.theta_late_s, p, course.theta_offset[0], 0.0), p * s[OM]
+    tracked, tracked_speed = (
+        measure_angle(sen, s[TH] + s[OM] * sen.theta_late_s, p, course.theta_offset[0], 0.0),
+        p * s[OM],
+    )
     angle_old, speed = tracked - tracked_speed * T, tracked_speed
     l_min = min(m.l_d, m.l_q) * (0.3 if m.self_d + m.self_q + m.cross > 0 else 1.0)
     pulse(b, duties, older, T, t1, t2)
@@ -182,7 +214,9 @@ def run(drive, course, noise, start, duty_start, substeps, rows, trace):
                 if dead:
                     steps += int(length * u_dc / (b.i_zone * l_min))
                 steps = min(steps, 60) * substeps
-                advance(drive, s, mid, legs, length, steps, u_dc, r_scale, psi_scale, load, slope, k1, k2, mean)
+                advance(
+                    drive, s, mid, legs, length, steps, u_dc, r_scale, psi_scale, load, slope, k1, k2, mean
+                )
                 if sen.lowpass_s > 0.0:
                     share = 1.0 - math.exp(-length / sen.lowpass_s)
                     i_b = -0.5 * s[IA] + 0.5 * ROOT3 * s[IB]
@@ -210,7 +244,9 @@ def run(drive, course, noise, start, duty_start, substeps, rows, trace):
         speed += (1.0 - math.exp(-T * sen.omega_filter_rad_s)) * ((angle - angle_old) / T - speed)
         angle_old = angle
         omega = omega_true if sen.omega_exact else speed
-        u_meas = rounded(course.u_dc[k] * (1.0 + sen.u_gain) + sen.u_offset + sen.u_noise * noise[k, 4], sen.u_lsb)
+        u_meas = rounded(
+            course.u_dc[k] * (1.0 + sen.u_gain) + sen.u_offset + sen.u_noise * noise[k, 4], sen.u_lsb
+        )
         i_d_ref, i_q_ref = course.i_d_ref[k], course.i_q_ref[k]
         if c.speed_loop:
             i_q_ref = speed_control(c, memory, p * course.omega[k], omega, T)

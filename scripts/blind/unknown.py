@@ -18,17 +18,19 @@ def inter_turn_short(b: Build, rng, size):
 def low_flux_order(b: Build, rng, size):
     """A flux harmonic of electrical order 2 or 3 in dq, as of a damaged magnet pole."""
     a = 0.02 * size * b.nominal.machine["magnet_flux_wb"]
-    b.change("motor", psi_h=np.array([(rng.choice((2.0, 3.0)), a, rng.uniform(0, 6), a * 0.6, rng.uniform(0, 6))]))
+    b.change(
+        "motor", psi_h=np.array([(rng.choice((2.0, 3.0)), a, rng.uniform(0, 6), a * 0.6, rng.uniform(0, 6))])
+    )
 
 
 def sensor_lowpass(b: Build, rng, size):
-    """A low-pass in front of the current converters: 2 typical sampling periods' worth of lag at size 1."""
+    """A low-pass in front of the current converters; at size 1 it lags 0.4 periods."""
     b.change("sensor", lowpass_s=0.4 * size * b.nominal.period_s)
 
 
 def sensor_bend(b: Build, rng, size):
     """Current sensors with a quadratic error."""
-    b.change("sensor", quadratic=0.025 * size / b.nominal.machine["rated_current_a"])
+    b.change("sensor", quadratic=0.04 * size / b.nominal.machine["rated_current_a"])
 
 
 def angle_lag(b: Build, rng, size):
@@ -49,7 +51,7 @@ def leg_loss(b: Build, rng, size):
 
 
 def cross_talk(b: Build, rng, size):
-    """Each current sensor sees its neighbour's conductor."""
+    """Each current sensor sees the two other conductors, on either side of it: the currents seem turned."""
     b.change("sensor", cross_talk=0.06 * size)
 
 
@@ -75,7 +77,15 @@ def encoder_interpolation(b: Build, rng, size):
 KINDS = {
     f.__name__: f
     for f in (
-        inter_turn_short, low_flux_order, sensor_lowpass, sensor_bend, angle_lag, load_unbalance, leg_loss,
-        cross_talk, bus_interference, encoder_interpolation,
-    )  # fmt: skip
+        inter_turn_short,
+        low_flux_order,
+        sensor_lowpass,
+        sensor_bend,
+        angle_lag,
+        load_unbalance,
+        leg_loss,
+        cross_talk,
+        bus_interference,
+        encoder_interpolation,
+    )
 }

@@ -1,0 +1,140 @@
+"""``fluxproof diagnose``: why a recording differs from its simulation, as a command.
+
+Progress goes to stderr, the answer to stdout, the files to --out.  Exit status 0 whatever the verdict; input that
+cannot be used ends in one line and status 2 (scripts/fluxproof.py).  What takes long to import is imported when it
+runs, so that ``fluxproof --help`` stays quick.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+FOLDER = Path("build") / "diagnosis"
+MOST_PROBLEMS = 5
+RPM = 9.549296585513721  # rad/s to 1/min, 60/(2 pi)
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the subcommand."""
+    formats = "CSV, Parquet, MATLAB, MDF4, HDF5, NumPy or a telemetry dump; several of the same drive"
+    parser.add_argument("recordings", metavar="RECORDING", nargs="+", help=formats)
+    parser.add_argument("--drive", metavar="drive.toml", required=True, help="the nominal drive in SI units")
+    parser.add_argument(
+        "--out", metavar="DIR", help=f"folder for the results (default: {FOLDER}/NAME OF RECORDING)"
+    )
+    parser.add_argument("--quiet", action="store_true", help="no progress on stderr")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Diagnose, write the outputs, print the answer; returns 0."""
+    from diagnosis.nominal import load_nominal
+    from diagnosis.session import run as session
+
+    nominal = load_nominal(args.drive)
+    out = Path(args.out) if args.out else default_folder(args.recordings)
+    with Progress(quiet=args.quiet) as progress:
+        answer = session(args.recordings, nominal, out, progress)
+    for line in answer_lines(answer, nominal, out):
+        print(printable(line, sys.stdout.encoding))
+    return 0
+
+
+def default_folder(recordings) -> Path:
+    """build/diagnosis/ and the first recording's name without its suffix."""
+    more = f"_and_{len(recordings) - 1}_more" if len(recordings) > 1 else ""
+    return FOLDER / f"{Path(recordings[0]).stem}{more}"
+
+
+class Progress:
+    """What is being done, on stderr: one line that changes on a terminal, else a line for each new thing."""
+
+    def __init__(self, quiet=False, stream=None):
+        self.stream = stream or sys.stderr
+        self.quiet, self.updating, self.seen = quiet, self.stream.isatty(), set()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        if self.updating and not self.quiet:
+            self.stream.write("\r\x1b[K")
+            self.stream.flush()
+
+    def __call__(self, text: str) -> None:
+        if self.quiet or (not self.updating and text in self.seen):
+            return
+        self.seen.add(text)
+        text = printable(text, self.stream.encoding)
+        self.stream.write(f"\r\x1b[K{text[:100]} ..." if self.updating else f"{text}\n")
+        self.stream.flush()
+
+
+def printable(text: str, encoding: str | None) -> str:
+    """One line that a terminal can show: what a stranger's file put into it is not obeyed, foreign letters escaped."""
+    one = "".join(c if c.isprintable() else " " for c in text)
+    return one.encode(encoding or "utf-8", "backslashreplace").decode(encoding or "utf-8")
+
+
+def answer_lines(answer, nominal, out: Path) -> list[str]:
+    """The verdict, effects, ambiguities, next recordings, misfit, findings and the files, as lines of text."""
+    lines = [answer.sentence]
+    if answer.effects:
+        lines += ["", *effect_table(answer.effects)]
+    lines += [f"cannot tell apart: {', '.join(group)}" for group in answer.ambiguity]
+    if answer.next_recording:
+        lines += ["", "record next, held until steady:", *map(_request(nominal), answer.next_recording)]
+    if answer.unknown_term is not None:
+        u = answer.unknown_term
+        lines.append(f"best short term: {u.formula} with c = {u.value:.4g} +- {u.sigma:.1g} {u.unit}")
+    fit = answer.fit
+    if answer.verdict not in ("bad_recording", "digital_mismatch"):
+        lines.append(
+            f"misfit on operating points not fitted: {fit.holdout_before:.3g} {fit.unit} before, "
+            f"{fit.holdout_after:.3g} {fit.unit} after, noise floor {fit.noise_floor:.3g} {fit.unit}"
+        )
+    if answer.digital.checked and answer.digital.first_difference is None:
+        lines.append(f"controller: {answer.digital.samples} samples equal to the golden model in every bit")
+    lines += _problem_lines(answer.problems)
+    names = ["report.html", "diagnosis.json", *(["drive_improved.toml"] if _improved(out, answer) else [])]
+    return [*lines, "", *(f"wrote {out / name}" for name in names)]
+
+
+def _improved(out, answer) -> bool:
+    return bool(answer.effects) and (out / "drive_improved.toml").exists()
+
+
+def effect_table(effects) -> list[str]:
+    """The asserted effects, a line for each parameter, in aligned columns."""
+    from diagnosis.report.words import measured, percent
+
+    rows = [("effect", "parameter", "value", "confidence", "explains")]
+    for effect in effects:
+        first = (effect.name, percent(effect.confidence), percent(effect.explains))
+        for key, e in effect.parameters.items():
+            rows.append((first[0], key, measured(e.value, e.sigma, e.unit), *first[1:]))
+            first = ("", "", "")
+    widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
+    return [
+        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows
+    ]
+
+
+def _request(nominal):
+    """A function that writes a Request as a line; speed of the shaft too."""
+    p = nominal.machine.pole_pairs
+
+    def line(request) -> str:
+        at = f"omega_e = {request.omega_e:.4g} rad/s ({request.omega_e * RPM / p:.4g} rpm)"
+        return f"  {at}, i_d = {request.i_d:.3g} A, i_q = {request.i_q:.3g} A: {request.why}"
+
+    return line
+
+
+def _problem_lines(problems) -> list[str]:
+    """The checks' findings, fatal ones first; the rest is in the report."""
+    shown = sorted(problems, key=lambda p: not p.fatal)
+    lines = [f"recording: {p.message}{f' ({p.action})' if p.action else ''}" for p in shown[:MOST_PROBLEMS]]
+    left = len(shown) - MOST_PROBLEMS
+    return lines + ([f"recording: and {left} more findings, see the report"] if left > 0 else [])

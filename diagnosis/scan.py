@@ -1,0 +1,91 @@
+"""Two searches for what the cells' orders do not hold: other orders of the mechanical turn, and other frequencies.
+
+A misfit locked to the rotor adds up over blocks with the same phase; noise does not.  The power of the sum
+over the sum of powers is one for noise and the number of blocks for a lock.  A misfit at a frequency of its
+own, which no angle explains, stands above the noise's rising spectrum at its low end.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+MOST_ORDER = 80  # per mechanical turn
+LOCKED = 30.0  # power of the sum over sum of powers: exp(-30) by chance
+LEAST_SHARE = 1.5e-3  # of the voltage: smaller ripples are the inverter's
+SWING_SHARE = 4e-3
+SWING_RATIO = 8.0  # of the spectrum's low end over its neighbourhood
+WEIGHTS = {"1": lambda v: np.ones(len(v)), "omega": lambda v: v.omega.mean(axis=1), "i_q": lambda v: v.i.imag.mean(axis=1)}
+
+
+@dataclass
+class Stray:
+    """A misfit that nothing explains: formula and amplitude [V]."""
+
+    formula: str
+    amplitude: float
+    kind: str  # "order" or "frequency"
+
+
+def row_residual(view, solution, effects, misfit):
+    """What a solution leaves of the voltage balance, (b, m) complex dq [V]."""
+    left = misfit["u"].copy()
+    for name, c in solution.c.items():
+        effect = effects[name]
+        if effect.corrects:
+            continue
+        seen = view if effect.smoothed else view.with_raw_current()
+        columns = {**effect.core(seen), **effect.free(seen)}
+        for key, value in c.items():
+            if value and "u" in columns[key]:
+                left -= value * columns[key]["u"]
+    return left
+
+
+def stray_order(view, residual, level) -> Stray | None:
+    """The strongest order per mechanical turn, not one of dq's own, that is locked to the rotor."""
+    p, m = view.machine.pole_pairs, residual.shape[1]
+    turns = np.abs(view.theta[:, -1] - view.theta[:, 0]) / (2 * np.pi * p)
+    theta_m = view.theta_mid / p
+    taper = 1.0 - np.cos(2 * np.pi * (np.arange(m) + 0.5) / m)
+    best = None
+    for n in [*range(1, MOST_ORDER + 1), *range(-MOST_ORDER, 0)]:
+        use = (abs(n) * turns >= 2.5) & (abs(n) * turns < m / 5)
+        if use.sum() < 6:
+            continue
+        f = (residual[use] * taper * np.exp(-1j * n * theta_m[use])).mean(axis=1)
+        power = float(np.sum(np.abs(f) ** 2))
+        for text, weight in WEIGHTS.items():
+            w = weight(view)[use]
+            w = w / max(np.sqrt(np.mean(w**2)), 1e-12)
+            lock = np.abs(np.sum(w * f)) ** 2 / max(np.sum(w**2 * np.abs(f) ** 2), 1e-300)
+            amplitude = np.abs(np.sum(w * f)) / np.sum(w**2)
+            share = amplitude / max(np.sqrt(np.mean(level[use] ** 2)), 1e-12)
+            if lock > min(LOCKED, 0.7 * use.sum()) and share > LEAST_SHARE and power > 0:
+                if best is None or share > best[0]:
+                    best = (share, amplitude, n, text)
+    if best is None:
+        return None
+    _, amplitude, n, text = best
+    return Stray(f"u_d + j u_q = c * {text} * exp(j {n} theta_m + j phi)", float(amplitude), "order")
+
+
+def stray_swing(view, residual, level) -> Stray | None:
+    """A low frequency of the stator voltage's length or angle that no angle of the rotor explains."""
+    m = residual.shape[1]
+    if m < 100:
+        return None
+    taper = 1.0 - np.cos(2 * np.pi * (np.arange(m) + 0.5) / m)
+    loud = level > 0.4 * level.max()
+    u = view.to_dq(view.u[:, 1:-1]).mean(axis=1, keepdims=True)
+    along = ((residual - residual.mean(axis=1, keepdims=True)) * np.conj(u / np.abs(u).clip(1e-9))).real[loud]
+    spectrum = np.abs(np.fft.rfft(along * taper, axis=1) / m) ** 2
+    mean = spectrum.mean(axis=0)
+    low, around = mean[1:5].max(), np.median(mean[8:20])
+    amplitude = 2.0 * float(np.sqrt(mean[1:5].sum() / 1.5))
+    share = amplitude / float(np.sqrt(np.mean(level[loud] ** 2)))
+    if low < SWING_RATIO * around or share < SWING_SHARE:
+        return None
+    hertz = (1 + int(np.argmax(mean[1:5]))) / (m * view.sample_time_s)
+    return Stray(f"u in proportion to 1 + c * sin(2 pi f t), f about {hertz:.0f} Hz", amplitude, "frequency")

@@ -1,0 +1,180 @@
+"""A whole diagnosis: digital half, physics, improved drive, closed-loop comparison, files written.
+
+    from diagnosis.session import run
+    answer = run("recording.csv", "drive.toml", "build/diagnosis/recording")
+
+``diagnosis.diagnose`` answers and writes nothing; this does what a user of the command gets:
+
+1. Where the recording holds what the core saw and answered, the core is replayed.  It must be equal in every bit, else
+   that is the verdict and physics is not looked at.
+2. The physics (run.py).
+3. OUT/drive_improved.toml with what was asserted, and the closed loop of both drives laid over the recording.
+4. OUT/diagnosis.json and OUT/report.html.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from diagnosis.digital import replay
+from diagnosis.improve import write_improved
+from diagnosis.load import load_recording
+from diagnosis.nominal import Nominal, load_nominal
+from diagnosis.overlay import closed_loop
+from diagnosis.recording import Problem, Recording, RecordingError
+from diagnosis.report import write_outputs
+from diagnosis.result import Diagnosis, Digital
+from diagnosis.run import diagnose
+from golden_model.drive_keys import DriveError
+
+IMPROVED = "drive_improved.toml"
+OVERLAY_SIGNALS = ("u_d_ref", "u_q_ref")  # the currents are what a controller keeps right
+
+
+def run(recordings, drive, out, progress=lambda text: None) -> Diagnosis:
+    """Diagnose one recording, or several of the same drive, and write the outputs to the folder ``out``.
+
+    recordings: a path, a Recording, or a list of them; drive: a path to drive.toml or a Nominal; progress: called with
+    a line of text now and then.  The answer's ``digital`` and ``notes`` are filled in.
+    Raises RecordingError and DriveError for input that cannot be used, OSError where ``out`` cannot be written.
+    """
+    nominal = drive if isinstance(drive, Nominal) else load_nominal(drive)
+    if isinstance(recordings, (str, os.PathLike, Recording)):
+        recordings = [recordings]
+    loaded = []
+    for item in recordings:
+        if not isinstance(item, Recording):
+            progress(f"reading {item}")
+            item = load_recording(Path(item), nominal)
+        loaded.append(item)
+    out = _folder(Path(out), nominal)
+    digital, notes = _digital(loaded, progress)
+    if digital.first_difference is not None:
+        answer = Diagnosis("digital_mismatch", _mismatch_sentence(digital.first_difference))
+        answer.rows = sum(len(recording) for recording in loaded)
+        answer.problems = [p for recording in loaded for p in recording.problems]
+    else:
+        answer = _physics(loaded, nominal, progress)
+    answer.digital = digital
+    answer.notes = [*notes, *answer.notes, *_reading_notes(loaded)]
+    improved = _improved(nominal, answer, out)
+    laid_over = None
+    if answer.verdict not in ("bad_recording", "digital_mismatch"):
+        progress("the closed loop over the recording")
+        laid_over = _overlay(loaded[0], nominal, improved, answer)
+    progress("writing the report")
+    write_outputs(answer, out, nominal, laid_over)
+    return answer
+
+
+def _folder(out: Path, nominal: Nominal) -> Path:
+    """The folder, made before a minute of work is lost; it must not hold the drive that is diagnosed as its result."""
+    out.mkdir(parents=True, exist_ok=True)
+    target = out / IMPROVED
+    if nominal.path and target.exists() and Path(nominal.path).exists() and target.samefile(nominal.path):
+        raise DriveError(
+            f"{target}: is the drive to diagnose and would be overwritten; choose another folder"
+        )
+    return out
+
+
+def _physics(loaded, nominal, progress) -> Diagnosis:
+    """The verdict of run.py; a recording that was read but carries no balance is a bad recording."""
+    try:
+        return diagnose(loaded, nominal, progress)
+    except RecordingError as error:
+        problem = Problem("no_balance", str(error), fatal=True)
+        problems = [p for recording in loaded for p in recording.problems]
+        rows = sum(len(recording) for recording in loaded)
+        sentence = f"The recording cannot be used: {error}"
+        return Diagnosis("bad_recording", sentence, rows=rows, problems=[*problems, problem])
+
+
+def _digital(loaded, progress) -> tuple[Digital, list[str]]:
+    """Replay of every recording that holds the core's answers; the first difference counts."""
+    digital, notes = Digital(), []
+    for recording in loaded:
+        if not {"telemetry", "registers"} & set(recording.meta):
+            continue
+        progress("replaying the core")
+        found, said = replay(recording)
+        name = f"{Path(recording.source).name}: " if len(loaded) > 1 else ""
+        notes += [f"{name}{sentence}" for sentence in said]
+        digital = Digital(digital.checked or found.checked, digital.samples + found.samples)
+        if found.first_difference is not None:
+            digital.first_difference = flat(found.first_difference)
+            if len(loaded) > 1:
+                digital.first_difference["recording"] = recording.source
+            break
+    if digital.checked and digital.first_difference is None:
+        notes.append("The controller is acquitted: what differs is physics.")
+    return digital, notes
+
+
+def flat(difference: dict) -> dict:
+    """A first difference with numbers, texts and None only, as diagnosis.json has it: lists joined, cause unfolded."""
+    out = {}
+    for key, value in difference.items():
+        if isinstance(value, dict):
+            out[key] = value.get("says")
+            inner = {k: v for k, v in flat(value).items() if k != "says"}
+            out |= {f"{key}_{k}": v for k, v in inner.items()}
+        elif isinstance(value, (list, tuple)):
+            out[key] = ", ".join(map(str, value))
+        else:
+            out[key] = value
+    return out
+
+
+def _mismatch_sentence(d: dict) -> str:
+    """Block, sample, signal and bit of a first difference, and what explains it."""
+    text = (
+        f"The controller did not compute what its golden model computes: block {d['block']}, sample {d['sample']}, "
+        f"signal {d['signal']}, bit {d['bit']} (recorded {d['recorded']}, golden model {d['golden']})"
+    )
+    return f"{text}; {d['cause']}." if d.get("cause") else f"{text}."
+
+
+def _reading_notes(loaded) -> list[str]:
+    """What the reader assumed, each sentence once."""
+    notes = [note for recording in loaded for note in recording.meta.get("notes", [])]
+    return list(dict.fromkeys(notes))
+
+
+def _improved(nominal, answer, out) -> Path | None:
+    """The improved drive's file where effects were asserted; one of an earlier run is removed where not."""
+    path = out / IMPROVED
+    if not answer.effects:
+        path.unlink(missing_ok=True)
+        return None
+    try:
+        return write_improved(nominal, answer.effects, path)
+    except (DriveError, ValueError) as error:
+        path.unlink(missing_ok=True)
+        answer.notes.append(f"No {IMPROVED}: {error}.")
+        return None
+
+
+def _overlay(recording, nominal, improved, answer) -> dict | None:
+    """The closed-loop simulation over the first recording; a drive that cannot be simulated costs a note only."""
+    try:
+        laid_over = closed_loop(recording, nominal, improved)
+    except (
+        ArithmeticError,
+        IndexError,
+        KeyError,
+        TypeError,
+        ValueError,
+    ) as error:  # RecordingError, DriveError too
+        answer.notes.append(f"The closed loop was not simulated: {error}.")
+        return None
+    for signal in OVERLAY_SIGNALS:
+        before = laid_over["rms_before"].get(signal)
+        after = laid_over.get("rms_after", {}).get(signal)
+        if before is not None:
+            then = f", improved by {after:.3g} V" if after is not None else ""
+            answer.notes.append(
+                f"Simulated in closed loop, {signal} is off by {before:.3g} V rms as described{then}."
+            )
+    return laid_over

@@ -1,0 +1,114 @@
+"""From selected terms to names of effects: what an engineer would read off a sparse model of the misfit.
+
+    u_d: d, u_q: q                  resistance          (times T: resistance_temperature)
+    u_q: w                          magnet_flux         (times t: magnet_temperature)
+    u_q: w d / u_d: w q             inductance_d / inductance_q
+    u_q: w d2, w d3 / u_d: w q3     saturation; it takes the inductance of its axis with it
+    u_q: w q2.. / u_d: w d q..      cross_saturation
+    u_d: w                          encoder_offset
+    u_d: w2, with u_q: w2 q         iron_loss; without the load term sampling_skew
+    direction of the currents, 6    dead_time
+    w cos6, w sin6, 12              emf_harmonics
+    du                              delay
+    w cos e, w sin e                encoder_eccentricity
+    cos1, sin1; sum: 1              current_offset
+    cos2, sin2 times d, q           phase_resistance_asymmetry; times w: current_gain; sum: alpha, beta
+    torque: w, sgn_w / cos n, sin n friction / cogging
+
+R, L_d and L_q off by about one factor are current_scale; with psi_m too, udc_gain.  Terms that nobody could
+name (such as q in u_d) count for the fit, not for a name.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from scripts.compare.data import Data
+from scripts.compare.dictionary import TORQUE_ORDERS
+
+ALIKE = 2.0  # largest ratio of relative changes that still count as one factor
+
+
+def _table():
+    out = {
+        ("u_d", "d"): "resistance",
+        ("u_q", "q"): "resistance",
+        ("u_q", "w"): "magnet_flux",
+        ("u_q", "t w"): "magnet_temperature",
+        ("u_q", "w d"): "inductance_d",
+        ("u_d", "w q"): "inductance_q",
+        ("u_d", "w"): "encoder_offset",
+        ("u_d", "w2"): "sampling_skew",
+        ("sum", "1"): "current_offset",
+        ("sum", "alpha"): "current_gain",
+        ("sum", "beta"): "current_gain",
+        ("torque", "w"): "friction",
+        ("torque", "sgn_w"): "friction",
+        ("torque", "w abs"): "friction",
+        **{("u_q", f"w {x}"): "saturation" for x in ("d2", "d3")},
+        **{("u_d", f"w {x}"): "saturation" for x in ("q3",)},
+        **{("u_q", f"w {x}"): "cross_saturation" for x in ("q2", "dq2")},
+        **{("u_d", f"w {x}"): "cross_saturation" for x in ("dq", "d2q")},
+        **{("torque", f"{wave}{h}"): "cogging" for wave in ("cos", "sin") for h in TORQUE_ORDERS},
+    }
+    for target in ("u_d", "u_q"):
+        out |= {(target, x): "dead_time" for x in ("sgn_d", "sgn_q", "cos6", "sin6", "cos12", "sin12")}
+        out |= {(target, x): "delay" for x in ("du_d", "du_q")}
+        out[target, "T d" if target == "u_d" else "T q"] = "resistance_temperature"
+        for wave in ("cos", "sin"):
+            out |= {(target, f"w {wave}{h}"): "emf_harmonics" for h in (6, 12)}
+            out |= {(target, f"w {wave}{h}"): "encoder_eccentricity" for h in ("e", "2e")}
+            out |= {(target, f"{x}{wave}1"): "current_offset" for x in ("", "w ")}
+            out |= {(target, f"{x} {wave}2"): "phase_resistance_asymmetry" for x in "dq"}
+            out |= {(target, f"w {x} {wave}2"): "current_gain" for x in "dq"}
+    return out
+
+
+NAMES = _table()
+
+
+def effects(data: Data, model: dict[tuple[str, str], tuple[float, float]]) -> dict[str, float]:
+    """Names with their sizes (rms of their terms, in per mille of bus, rated current or torque).
+
+    model: {(equation, term): (coefficient of the unscaled column, rms contribution)}, in per mille.
+    """
+    model = dict(model)
+    for axis, linear in ((("u_d", "w q3"),), ("u_d", "w q")), ((("u_q", "w d2"), ("u_q", "w d3")), ("u_q", "w d")):
+        if any(term in model for term in axis):
+            model.pop(linear, None)
+    out: dict[str, float] = {}
+    for key, (_, size) in model.items():
+        name = NAMES.get(key)
+        if name:
+            out[name] = float(np.hypot(out.get(name, 0.0), size))
+    if "sampling_skew" in out and ("u_q", "w2 q") in model:
+        out["iron_loss"] = out.pop("sampling_skew")
+    return _one_factor(data, model, out)
+
+
+def _one_factor(data, model, names):
+    """R, L_d, L_q (and psi_m) wrong by one factor are a scale, not three parameters."""
+    m, unit = data.view.machine, data.units["u"]
+    top = float(np.abs(data.view.omega).max())
+    nominal = {
+        "resistance": (("u_q", "q"), m.resistance_ohm * m.rated_current_a),
+        "inductance_d": (("u_q", "w d"), top * m.inductance_d_h * m.rated_current_a),
+        "inductance_q": (("u_d", "w q"), -top * m.inductance_q_h * m.rated_current_a),
+        "magnet_flux": (("u_q", "w"), top * m.magnet_flux_wb),
+    }
+    change = {n: model[key][0] * unit / volts for n, (key, volts) in nominal.items() if n in names and key in model}
+    for name, needs in (
+        ("udc_gain", ("inductance_d", "inductance_q", "magnet_flux")),
+        ("current_scale", ("resistance", "inductance_d", "inductance_q")),
+    ):
+        shares = [change.get(n, 0.0) for n in needs]
+        if min(shares) * max(shares) > 0.0 and max(map(abs, shares)) < ALIKE * min(map(abs, shares)):
+            size = float(np.sqrt(sum(names[n] ** 2 for n in change)))
+            return {**{n: v for n, v in names.items() if n not in change}, name: size}
+    return names
+
+
+def dominant(sizes: dict[str, float], least: float, share: float) -> list[str]:
+    """Names whose size is at least ``least`` per mille and at least ``share`` of the largest."""
+    top = max(sizes.values(), default=0.0)
+    return sorted(name for name, size in sizes.items() if size >= least and size >= share * top)
