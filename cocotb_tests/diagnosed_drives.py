@@ -17,7 +17,7 @@ from diagnosis.recording import Recording, from_columns
 from golden_model import drive as drives
 from golden_model.registers import registers
 from golden_model.units import from_si, si_per_lsb
-from plant import IMPOSED_SPEED, Inverter, Machine, Sensors
+from plant import IMPOSED_SPEED, Inverter, Machine
 from scripts.cosim import Scenario, described_sensors
 from scripts.golden_loop import simulate
 
@@ -59,14 +59,21 @@ def scenario(plan) -> Scenario:
 
 @functools.lru_cache
 def columns(plan=GRID, machine=(), inverter=(), sensors=(), dead_time_s=0.0) -> dict[str, np.ndarray]:
-    """Canonical columns (n,) of a run; machine, inverter and sensors: what differs from the nominal, as ((key, value), ...)."""
+    """Canonical columns (n,) of a run; machine, inverter, sensors: what differs from the nominal, ((key, value), ...)."""
     result = simulate(
         DRIVE, SET, scenario(plan), machine=dataclasses.replace(MACHINE, **dict(machine)),
         sensors=dataclasses.replace(SENSORS, **dict(sensors)), inverter=Inverter(**dict(inverter)),
         dead_time_s=dead_time_s, mode=IMPOSED_SPEED,
     )  # fmt: skip
     seen = result.observed
-    names = {"i_a": "i_a", "i_b": "i_b", "i_c": "i_c", "theta_e": "theta_me", "omega_e": "omega_me", "u_dc": "u_dc"}
+    names = {
+        "i_a": "i_a",
+        "i_b": "i_b",
+        "i_c": "i_c",
+        "theta_e": "theta_me",
+        "omega_e": "omega_me",
+        "u_dc": "u_dc",
+    }
     table = {name: seen[signal] * si_per_lsb(signal, DRIVE) for name, signal in names.items()}
     table |= {f"d_{x}": seen[f"compare_{x}"] / SET.config.carrier_half for x in "abc"}
     return {"t": np.arange(len(seen["i_a"])) * DRIVE.sample_time_s} | table

@@ -15,7 +15,7 @@ import numpy as np
 
 from diagnosis.balance import misfit
 
-ORDERS_SUM = (0.0, 1.0)
+ORDERS_SUM = (0.0, 1.0, 2.0)
 ORDERS_TORQUE = (1.0, 2.0, 4.0, 6.0, 8.0, 12.0, 18.0, 24.0, 30.0, 36.0)  # cogging is even per electrical turn
 LEAST_TURNS = 0.8  # of a harmonic within a block, else it is no functional of its own
 TAPERED_TURNS = 3.0  # the same under a taper, whose neighbours leak

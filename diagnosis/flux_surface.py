@@ -29,7 +29,7 @@ INTERVALS = 22  # of the splines along each axis: finer than a machine's curves,
 DAMPING = tuple(10.0**k for k in range(-9, 2))  # relative to the mean diagonal of the normal matrix
 FOLDS = 5
 REACH = 0.75  # of the distance between neighbouring operating points: what lies nearer counts as covered
-TINY = 1e-11
+TINY = 1e-9  # damping of everything, so that what no row sees is zero: the constant of W among it
 USUAL = ("resistance", "dead_time")  # what else may be there: neither is a flux, both follow the current
 
 
@@ -117,11 +117,14 @@ class _Problem:
         self.knots = [_knots(view.i[use].real), _knots(view.i[use].imag)]
         self.sizes = [len(k) - 4 for k in self.knots]
         columns = [_slopes(view.take(use), *self.knots)]
-        self.names = []
+        usual = np.sqrt(np.mean(np.sum(np.abs(columns[0]) ** 2, axis=0)))
+        self.names, self.scale = [], []
         for name in beside:
             for key, column in CATALOGUE[name].core(view).items():
-                columns.append(column["u"].mean(axis=1)[use][:, None])
+                mean = column["u"].mean(axis=1)[use][:, None]
                 self.names.append((name, key))
+                self.scale.append(usual / max(np.linalg.norm(mean), 1e-12))
+                columns.append(mean * self.scale[-1])
         a = np.hstack(columns)
         self.a = np.vstack([a.real, a.imag])
         y = misfit(view)["u"].mean(axis=1)[use]
@@ -129,24 +132,24 @@ class _Problem:
         self.penalty = self._penalty()
 
     def _penalty(self):
-        """Third differences along both axes, and next to nothing of everything, so that what no row sees is zero."""
+        """Third differences along both axes, (k, k)."""
         n_d, n_q = self.sizes
         third = [np.diff(np.eye(n), 3, axis=0) for n in (n_d, n_q)]
         rough = np.kron(third[0].T @ third[0], np.eye(n_q)) + np.kron(np.eye(n_d), third[1].T @ third[1])
         n, k = n_d * n_q, len(self.names)
         out = np.zeros((n + k, n + k))
-        out[:n, :n] = rough + TINY * np.eye(n)
+        out[:n, :n] = rough
         return out
 
     def _scaled(self, damping):
         n = self.sizes[0] * self.sizes[1]
-        return damping * np.mean(np.einsum("rk,rk->k", self.a[:, :n], self.a[:, :n])) * self.penalty
+        usual = np.mean(np.einsum("rk,rk->k", self.a[:, :n], self.a[:, :n]))
+        return usual * (damping * self.penalty + TINY * np.eye(len(self.penalty)))
 
     def solve(self, damping, rows=slice(None)):
         """Coefficients for some of the rows."""
         a = self.a[rows]
         normal = a.T @ a + self._scaled(damping)
-        normal[np.diag_indices_from(normal)] *= 1.0 + 1e-12
         return linalg.solve(normal, a.T @ self.y[rows], assume_a="pos")
 
     def chi2(self, damping) -> float:
@@ -184,9 +187,10 @@ class _Problem:
         variance = np.sum(residual**2) / max(len(residual) - self.effective(damping), 1.0)
         normal = self.a.T @ self.a + self._scaled(damping)
         half = linalg.solve(normal, self.a.T, assume_a="pos")[n:]
-        spread = np.sqrt(variance * np.sum(half**2, axis=1))
+        scale = np.array(self.scale)
+        spread = np.sqrt(variance * np.sum(half**2, axis=1)) * scale
         beside = {}
-        for (name, key), value, sigma in zip(self.names, c[n:], spread, strict=True):
+        for (name, key), value, sigma in zip(self.names, c[n:] * scale, spread, strict=True):
             beside.setdefault(name, {})[key] = Estimate(float(value), float(sigma), "")
         return Surface(
             self.view.machine, *self.knots, c[:n].reshape(self.sizes), self.points, _spacing(self.points), beside,

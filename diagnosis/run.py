@@ -27,6 +27,7 @@ from diagnosis.search import Search
 from diagnosis.unknown import sparse_term
 from diagnosis.view import joined_views, view_of
 
+GROUP_ROWS, GROUP_CHI2, GROUP_SHARE = 12, 3.0, 0.4
 HOLDOUT_EVERY = 4  # each fourth dwell is never fitted
 
 
@@ -69,7 +70,7 @@ def _physics(recordings, nominal, progress) -> Diagnosis:
     best, empty = found.best, found.empty
     fit = fits(search, found, held)
     location = locate(view, search.cells, found.pure)
-    left = leftover(search, found)
+    left, group = leftover(search, found)
     names, ambiguity = words.groups(best, found.tied, CATALOGUE, nominal)
     share = fit.train_excess / max(fit.train_before, 1e-12)
     rows = row_residual(best.view, best, CATALOGUE, misfit(best.view))
@@ -81,8 +82,9 @@ def _physics(recordings, nominal, progress) -> Diagnosis:
         verdict = "unexplained"
     else:
         verdict = "ambiguous" if ambiguity else "explained"
-    if stray:
+    if stray or group:
         verdict = "unexplained"
+    trace = f"reduced chi2 {left:.2f}, share {share:.3f}, group {group!r}, stray {stray}"
     answer = Diagnosis(verdict, "", location=location, fit=fit)
     if verdict in ("explained", "ambiguous"):
         answer.effects = words.named(best, names, CATALOGUE, nominal, empty, found.dispersion)
@@ -96,7 +98,7 @@ def _physics(recordings, nominal, progress) -> Diagnosis:
         answer.unknown_term = sparse_term(best.view, cells, residual, found.sigma, found.train)
         if stray:
             answer.unknown_term = UnknownTerm("u_dq", stray.formula, stray.amplitude, 0.05 * stray.amplitude, "V", 0.5)
-    answer.stray = stray
+    answer.trace = trace
     cells, residual = final_residual(search, found)
     answer.evidence = evidence(view, (search.cells, search.cells.y), (cells, residual), found.pure, held)
     answer.sentence = words.sentence(verdict, answer.effects, ambiguity, fit, CATALOGUE, location)
@@ -112,11 +114,38 @@ def final_residual(search, found):
     return fitter.cells, fitter.solve(best.model).residual
 
 
-def leftover(search, found) -> float:
-    """Reduced chi^2 that the best model leaves on the rows it was fitted to."""
+def leftover(search, found) -> tuple[float, str]:
+    """Reduced chi^2 that the best model leaves on the rows it was fitted to, and the group that stands out, or ''.
+
+    A group is a channel's order.  It stands out when much is left of it that is neither noise nor a curve's
+    imperfection: an explanation leaves no group as it was.
+    """
     cells, residual = final_residual(search, found)
     use = cells.ok & found.train
-    return float(np.sum((residual[use] / found.sigma[use]) ** 2)) / max(use.sum() - found.best.count, 1)
+    chi = (residual / found.sigma) ** 2
+    worst, floor = (0.0, ""), least(search.view)
+    for channel in np.unique(cells.channel):
+        for order in np.unique(cells.order[cells.channel == channel]):
+            rows = use & (cells.channel == channel) & (cells.order == order)
+            if rows.sum() < GROUP_ROWS:
+                continue
+            after = np.mean(residual[rows] ** 2) - np.mean(found.pure[rows] ** 2)
+            before = np.mean(search.cells.y[rows] ** 2)
+            if chi[rows].mean() > GROUP_CHI2 and after > max(GROUP_SHARE**2 * before, floor[channel] ** 2):
+                share = np.sqrt(after / before)
+                worst = max(worst, (float(share), f"{channel} at order {order:g}"))
+    return float(np.sum(chi[use])) / max(use.sum() - found.best.count, 1), worst[1]
+
+
+def least(view) -> dict[str, float]:
+    """What is too little to be spoken of, per channel."""
+    m = view.machine
+    torque = 1.5 * m.pole_pairs * m.magnet_flux_wb * m.rated_current_a
+    return {
+        "u": 1e-3 * float(voltage_level(view).max()),
+        "sum": 2e-3 * m.rated_current_a,
+        "torque": 8e-3 * torque,
+    }
 
 
 def fits(search, found, held) -> Fit:

@@ -17,6 +17,8 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from threadpoolctl import threadpool_limits
+
 from diagnosis.digital import replay
 from diagnosis.improve import write_improved
 from diagnosis.load import load_recording
@@ -39,6 +41,11 @@ def run(recordings, drive, out, progress=lambda text: None) -> Diagnosis:
     a line of text now and then.  The answer's ``digital`` and ``notes`` are filled in.
     Raises RecordingError and DriveError for input that cannot be used, OSError where ``out`` cannot be written.
     """
+    with threadpool_limits(1, "blas"):  # many small matrices: a second thread waits for the first
+        return _session(recordings, drive, out, progress)
+
+
+def _session(recordings, drive, out, progress) -> Diagnosis:
     nominal = drive if isinstance(drive, Nominal) else load_nominal(drive)
     if isinstance(recordings, (str, os.PathLike, Recording)):
         recordings = [recordings]

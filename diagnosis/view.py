@@ -15,13 +15,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from diagnosis.recording import Recording, RecordingError
-from diagnosis.shaft import shaft_kind
+from diagnosis.shaft import airgap, shaft_kind
 
 BLOCK_ROWS = 200
 SHORTER = (100, 50)  # where dwells are short
 LEAST_BLOCKS = 12
 HALF_WIDTH = 8
 MOST_BLOCKS = 700  # more rows than these blocks hold add time, not knowledge
+RAMP_TORQUE = 0.02  # of rated torque: a change of inertial torque within a block beyond it is a ramp
 SLOPE_REACH = 60  # samples over which the shaft's acceleration is taken beside a transducer
 CURRENT_STEP = 0.08  # of rated current: a block with a larger change is a transient
 SPEED_STEP = 0.06  # of the largest speed
@@ -269,6 +270,11 @@ def view_of(recording: Recording, nominal, block_rows=BLOCK_ROWS) -> View:
     samples = starts[:, None] + np.arange(block_rows + 1)
     rows = starts[:, None] + np.arange(block_rows)
     around = starts[:, None] + np.arange(-1, block_rows + 1)
+    torque, slope_m = torque[rows], slope_m[rows]
+    if kind == "torque":  # an acceleration taken over many samples is wrong where a ramp ends
+        quarters = slope_m.reshape(len(starts), 4, -1).mean(axis=2)
+        swing = (machine.inertia_kgm2 or 0.0) * np.ptp(quarters, axis=1)
+        torque[swing > RAMP_TORQUE * airgap(nominal, np.array(1j * machine.rated_current_a))] = np.nan
     block_mean = lambda name: r[name][rows].mean(axis=1) if r.has(name) else np.full(len(starts), np.nan)  # noqa: E731
     return View(
         nominal=nominal,
@@ -282,8 +288,8 @@ def view_of(recording: Recording, nominal, block_rows=BLOCK_ROWS) -> View:
         u_dc=u_dc_mid[rows],
         t=r["t"][rows].mean(axis=1) - r["t"][0],
         temp=block_mean("temp_winding"),
-        torque=torque[rows],
-        slope_m=slope_m[rows],
+        torque=torque,
+        slope_m=slope_m,
         shaft=np.full(len(starts), kind),
         run=dwell,
         rows=starts,

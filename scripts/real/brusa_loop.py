@@ -21,8 +21,8 @@ from scripts.golden_loop import simulate
 from scripts.scenarios import RPM
 
 LINEAR_CURRENT_MODEL = 0  # register flux_mode: the decoupling believes the nameplate
-RAMP_S = 0.012  # from one operating point to the next; a step would saturate the voltage
-SETTLE_S = 0.012
+RAMP_S = 0.02  # from one operating point to the next; a step would saturate the voltage
+SETTLE_S = 0.02
 
 
 @dataclass(frozen=True)
