@@ -24,7 +24,7 @@ unexport PYTHONHOME
 
 PYTHON_RUN := .venv/bin/python
 
-.PHONY: help setup generate test demo papers bench timeline mutate verilog lint lock clean distclean
+.PHONY: help setup generate test demo papers bench blind real compare timeline mutate verilog lint lock clean distclean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -46,6 +46,16 @@ papers: setup ## reproduce the papers' experiments: findings, figures, report
 
 bench: setup ## run the benchmarks
 	$(PYTHON_RUN) -m scripts.bench $(ARGS)
+	$(PYTHON_RUN) -m scripts.bench_diagnose
+
+blind: setup ## run the sealed benchmark of the diagnosis
+	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m scripts.blind $(ARGS)
+
+real: setup ## diagnose the recordings of real drives
+	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m scripts.real $(ARGS)
+
+compare: setup ## diagnose the same cases with what one would use instead
+	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m scripts.compare $(ARGS)
 
 timeline: setup ## draw the timeline of one control period
 	$(PYTHON_RUN) -m scripts.timeline $(ARGS)

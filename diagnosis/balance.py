@@ -14,11 +14,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from diagnosis.catalogue.effect import torque_of
+from diagnosis.effect import torque_of
 
 
 def misfit(view) -> dict[str, np.ndarray]:
-    """What was recorded minus what the nominal drive would need, {channel: array} (see catalogue.effect)."""
+    """What was recorded minus what the nominal drive would need, {channel: array} (see effect.py)."""
     m = view.machine
     exact = view.with_raw_current()
     r = np.full(len(view), m.resistance_ohm)

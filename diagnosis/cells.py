@@ -16,7 +16,7 @@ import numpy as np
 from diagnosis.balance import misfit
 
 ORDERS_SUM = (0.0, 1.0, 2.0)
-ORDERS_TORQUE = (1.0, 2.0, 4.0, 6.0, 8.0, 12.0, 18.0, 24.0, 30.0, 36.0)  # cogging is even per electrical turn
+ORDERS_TORQUE = (1.0, *(float(h) for h in range(2, 38, 2)))  # cogging is even per electrical turn
 LEAST_TURNS = 0.8  # of a harmonic within a block, else it is no functional of its own
 TAPERED_TURNS = 3.0  # the same under a taper, whose neighbours leak
 SYSTEM_U = 2e-4  # of the block's voltage
@@ -49,10 +49,13 @@ class Cells:
 
 
 class Projector:
-    """Functionals of one view, computed once and used for the misfit and for every column."""
+    """Functionals of one view, computed once and used for the misfit and for every column.
+
+    Views of the same blocks with other angles or currents share them: any functional will do, as long as
+    it is the same on both sides of the balance.
+    """
 
     def __init__(self, view):
-        self.view = view
         self.orders = np.array(orders_u(view.machine.pole_pairs))
         self.turns = np.exp(-1j * self.orders[None, None, :] * view.theta_mid[:, :, None])
         b, h = len(view), len(self.orders)
@@ -109,7 +112,7 @@ class Projector:
 
     def rows(self, column) -> np.ndarray:
         """One misfit or column, {channel: array}, as rows; a channel it does not name is zero."""
-        b = len(self.view)
+        b = self.turns.shape[0]
         out = []
         u = column.get("u")
         if u is None:
@@ -127,16 +130,18 @@ class Projector:
         return np.nan_to_num(np.concatenate(out))
 
 
-def cells_of(view, effects, with_columns=True) -> Cells:
-    """Cells of a view with the columns of the effects: {name: {"core": {...}, "free": {...}}} flattened by name."""
-    p = Projector(view)
+def cells_of(view, effects, projector=None, free=None) -> Cells:
+    """Cells of a view with the columns of the effects, free ones marked by a leading '~'.
+
+    projector: of a view of the same blocks, where there is one.  free: names whose free columns are wanted, or all.
+    """
+    p = projector or Projector(view)
     columns = {}
-    if with_columns:
-        for effect in effects:
-            columns[effect.name] = {
-                **{key: p.rows(col) for key, col in effect.core(view).items()},
-                **{f"~{key}": p.rows(col) for key, col in effect.free(view).items()},
-            }
+    for effect in effects:
+        mine = {key: p.rows(column) for key, column in effect.core(view).items()}
+        if free is None or effect.name in free:
+            mine |= {f"~{key}": p.rows(column) for key, column in effect.free(view).items()}
+        columns[effect.name] = mine
     return Cells(p.rows(misfit(view)), columns, p.block, p.order, p.part, p.channel, p.ok)
 
 

@@ -16,20 +16,24 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy import linalg, sparse
-from scipy.interpolate import BSpline
-from scipy.spatial import cKDTree
+from scipy import linalg
+from scipy.spatial import Delaunay, cKDTree
 
 from diagnosis.balance import misfit
 from diagnosis.catalogue import CATALOGUE
+from diagnosis.flux_splines import emf_columns, gradients, knots_over, powers
 from diagnosis.result import Estimate
 from plant import FluxMap
 
-INTERVALS = 22  # of the splines along each axis: finer than a machine's curves, the damping does the rest
 DAMPING = tuple(10.0**k for k in range(-9, 2))  # relative to the mean diagonal of the normal matrix
 FOLDS = 5
-REACH = 0.75  # of the distance between neighbouring operating points: what lies nearer counts as covered
+LONGEST = 2.0  # times the usual triangle of recorded points: a longer one spans ground that nobody saw
 TINY = 1e-9  # damping of everything, so that what no row sees is zero: the constant of W among it
+SHAPES = (
+    "linear",
+    "separable",
+    "full",
+)  # inductances and magnet; each axis its own curve; any reciprocal surface
 USUAL = ("resistance", "dead_time")  # what else may be there: neither is a flux, both follow the current
 
 
@@ -38,7 +42,7 @@ class Surface:
     """A fitted surplus co-energy and what was fitted beside it.
 
     knots_d, knots_q: knots of the cubic splines [A]; weights: (n_d, n_q) coefficients [J/1.5p: Wb A].
-    points: (k,) complex operating points that were recorded, one per block [A]; spacing_a: between neighbours.
+    points: (k,) complex operating points that were recorded, one per dwell [A].
     beside: {effect: {coefficient: Estimate}} fitted along; damping: the chosen one.
     error_wb: rms error of the flux that operating points left out of the fit show, noise included.
     """
@@ -48,7 +52,6 @@ class Surface:
     knots_q: np.ndarray
     weights: np.ndarray
     points: np.ndarray
-    spacing_a: float
     beside: dict = field(default_factory=dict)
     damping: float = 0.0
     error_wb: float = np.nan
@@ -56,7 +59,7 @@ class Surface:
     def surplus(self, i) -> np.ndarray:
         """Flux beyond the nominal one, complex [Wb], of dq currents of any shape, complex [A]."""
         flat = np.ravel(i)
-        return (_gradients(flat, self.knots_d, self.knots_q) @ self.weights.ravel()).reshape(np.shape(i))
+        return (gradients(flat, self.knots_d, self.knots_q) @ self.weights.ravel()).reshape(np.shape(i))
 
     def psi(self, i) -> np.ndarray:
         """Flux linkage, magnet included, complex [Wb], of dq currents of any shape, complex [A]."""
@@ -64,10 +67,23 @@ class Surface:
         return m.inductance_d_h * i.real + m.magnet_flux_wb + 1j * m.inductance_q_h * i.imag + self.surplus(i)
 
     def covered(self, i) -> np.ndarray:
-        """Whether dq currents lie within reach of an operating point that was recorded."""
-        flat = np.ravel(i)
-        distance, _ = cKDTree(_plane(self.points)).query(_plane(flat))
-        return (distance <= REACH * self.spacing_a).reshape(np.shape(i))
+        """Whether dq currents (any shape) lie between operating points that were recorded near each other."""
+        triangles = Delaunay(_plane(self.points))
+        corners = self.points[triangles.simplices]
+        longest = np.abs(corners - np.roll(corners, 1, axis=1)).max(axis=1)
+        small = np.append(longest <= LONGEST * np.median(longest), False)  # the last stands for "outside"
+        return small[triangles.find_simplex(_plane(np.ravel(i)))].reshape(np.shape(i))
+
+    def residual(self, view) -> np.ndarray:
+        """What is left of each block's mean misfit, (b,) complex dq [V]."""
+        left = (
+            misfit(view)["u"].mean(axis=1)
+            - emf_columns(view, self.knots_d, self.knots_q) @ self.weights.ravel()
+        )
+        for name, found in self.beside.items():
+            columns = CATALOGUE[name].core(view)
+            left = left - sum(e.value * columns[key]["u"].mean(axis=1) for key, e in found.items())
+        return left
 
     def flux_map(self, step_a: float) -> tuple[FluxMap, np.ndarray]:
         """(FluxMap over the recorded rectangle in steps of about step_a, (n, m) bool of what is covered)."""
@@ -80,13 +96,34 @@ class Surface:
         return FluxMap(*axes, psi.real.copy(), psi.imag.copy()), self.covered(i)
 
 
-def flux_map(view, beside=USUAL, train=None) -> Surface:
+def flux_map(view, beside=USUAL, train=None, shape="full") -> Surface:
     """Fit the surface to the balance of a view's blocks.
 
-    beside: names of effects whose usual columns are fitted along; train: (b,) blocks that take part.
-    Raises ValueError where the recording does not spread over both currents.
+    beside: names of effects whose usual columns are fitted along; train: (b,) blocks that take part;
+    shape: one of SHAPES.  Raises ValueError where the recording does not spread over both currents.
     """
-    return _Problem(view, beside, train).surface()
+    return _Problem(view, beside, train, shape).surface()
+
+
+def ladder(view, train, beside=USUAL) -> dict[str, dict]:
+    """{shape: {"train", "holdout": rms misfit [V], "gain"}} of ever freer co-energies, the nominal one first.
+
+    gain: chi^2 over the freest one's dispersion that a shape explains beyond the one before it.  What separable
+    explains beyond linear is saturation, what full explains beyond separable is cross-saturation: names that rest on
+    which currents the flux depends on, not on a formula.  train: (b,) blocks that are fitted, the others are held out.
+    """
+    y = misfit(view)["u"].mean(axis=1)
+    rows = {"nominal": y}
+    rows |= {shape: flux_map(view, beside, train, shape).residual(view) for shape in SHAPES}
+    rms = lambda x: float(np.sqrt(np.mean(np.abs(x) ** 2)))  # noqa: E731
+    variance = rms(rows["full"][train]) ** 2
+    out, before = {}, None
+    for shape, left in rows.items():
+        power = np.sum(np.abs(left[train]) ** 2)
+        gain = 0.0 if before is None else float(2.0 * (before - power) / variance)
+        out[shape] = {"train": rms(left[train]), "holdout": rms(left[~train]), "gain": gain}
+        before = power
+    return out
 
 
 def earned(view, names, beside=USUAL, train=None) -> dict[str, float]:
@@ -99,14 +136,15 @@ def earned(view, names, beside=USUAL, train=None) -> dict[str, float]:
     rest = plain.chi2(damping)
     freedom = max(len(plain.y) - plain.effective(damping), 1.0)
     return {
-        name: float((rest - _Problem(view, (*beside, name), train).chi2(damping)) * freedom / rest) for name in names
+        name: float((rest - _Problem(view, (*beside, name), train).chi2(damping)) * freedom / rest)
+        for name in names
     }
 
 
 class _Problem:
-    """The damped least-squares problem of one view."""
+    """The damped least-squares problem of one view.  ``basis`` (n, k): the splines' weights for each coefficient."""
 
-    def __init__(self, view, beside, train):
+    def __init__(self, view, beside, train, shape="full"):
         self.view = view
         use = np.ones(len(view), bool) if train is None else np.asarray(train, bool)
         i = view.i.mean(axis=1)[use]
@@ -114,9 +152,10 @@ class _Problem:
             raise ValueError("a flux map needs operating points that spread over both i_d and i_q")
         self.points, self.run = i, view.run[use]
         self.omega = np.abs(view.omega.mean(axis=1))[use]
-        self.knots = [_knots(view.i[use].real), _knots(view.i[use].imag)]
+        self.knots = [knots_over(view.i[use].real), knots_over(view.i[use].imag)]
         self.sizes = [len(k) - 4 for k in self.knots]
-        columns = [_slopes(view.take(use), *self.knots)]
+        self.basis = _basis(shape, *self.knots)
+        columns = [emf_columns(view.take(use), *self.knots) @ self.basis]
         usual = np.sqrt(np.mean(np.sum(np.abs(columns[0]) ** 2, axis=0)))
         self.names, self.scale = [], []
         for name in beside:
@@ -136,13 +175,13 @@ class _Problem:
         n_d, n_q = self.sizes
         third = [np.diff(np.eye(n), 3, axis=0) for n in (n_d, n_q)]
         rough = np.kron(third[0].T @ third[0], np.eye(n_q)) + np.kron(np.eye(n_d), third[1].T @ third[1])
-        n, k = n_d * n_q, len(self.names)
+        n, k = self.basis.shape[1], len(self.names)
         out = np.zeros((n + k, n + k))
-        out[:n, :n] = rough
+        out[:n, :n] = self.basis.T @ rough @ self.basis
         return out
 
     def _scaled(self, damping):
-        n = self.sizes[0] * self.sizes[1]
+        n = self.basis.shape[1]
         usual = np.mean(np.einsum("rk,rk->k", self.a[:, :n], self.a[:, :n]))
         return usual * (damping * self.penalty + TINY * np.eye(len(self.penalty)))
 
@@ -182,7 +221,7 @@ class _Problem:
 
     def surface(self) -> Surface:
         error, damping = self.chosen()
-        c, n = self.solve(damping), self.sizes[0] * self.sizes[1]
+        c, n = self.solve(damping), self.basis.shape[1]
         residual = self.y - self.a @ c
         variance = np.sum(residual**2) / max(len(residual) - self.effective(damping), 1.0)
         normal = self.a.T @ self.a + self._scaled(damping)
@@ -193,66 +232,32 @@ class _Problem:
         for (name, key), value, sigma in zip(self.names, c[n:] * scale, spread, strict=True):
             beside.setdefault(name, {})[key] = Estimate(float(value), float(sigma), "")
         return Surface(
-            self.view.machine, *self.knots, c[:n].reshape(self.sizes), self.points, _spacing(self.points), beside,
-            damping, error,
+            self.view.machine, *self.knots, (self.basis @ c[:n]).reshape(self.sizes), _apart(self.points), beside, damping, error,
         )  # fmt: skip
+
+
+def _basis(shape, knots_d, knots_q):
+    """(n_d * n_q, k) weights of the tensor splines for each coefficient of a shape."""
+    x, y = powers(knots_d), powers(knots_q)
+    one_d, one_q = x[0], y[0]
+    if shape == "linear":
+        columns = [np.outer(p, one_q) for p in x[1:]] + [np.outer(one_d, p) for p in y[1:]]
+        return np.stack([c.ravel() / np.abs(c).max() for c in columns], axis=1)
+    n_d, n_q = len(one_d), len(one_q)
+    if shape == "separable":
+        return np.hstack([np.kron(np.eye(n_d), one_q[:, None]), np.kron(one_d[:, None], np.eye(n_q))])
+    return np.eye(n_d * n_q)
 
 
 def _plane(i):
     return np.stack([np.real(i), np.imag(i)], axis=1)
 
 
-def _spacing(points) -> float:
-    """Usual distance between an operating point and the nearest other one [A]; blocks of one dwell are one point."""
-    near = 0.02 * np.ptp(points.real) + 1e-9
-    tree = cKDTree(_plane(points))
-    kept = [k for k in range(len(points)) if not any(n < k for n in tree.query_ball_point(_plane(points)[k], near))]
-    distance, _ = cKDTree(_plane(points[kept])).query(_plane(points[kept]), k=2)
-    return float(np.quantile(distance[:, 1], 0.75))
-
-
-def _knots(x) -> np.ndarray:
-    """Knots of cubic splines over the range of x, a little wider."""
-    low, high = x.min(), x.max()
-    step = (high - low) * 1.02 / INTERVALS
-    return 0.5 * (low + high) + step * (np.arange(-3, INTERVALS + 4) - 0.5 * INTERVALS)
-
-
-def _gradients(i, knots_d, knots_q):
-    """Sparse (p, n_d * n_q) complex: dB/di_d + j dB/di_q of every tensor spline at dq currents (p,)."""
-    values, slopes = [], []
-    for x, knots in ((i.real, knots_d), (i.imag, knots_q)):
-        x = np.clip(x, knots[3], knots[-4] - 1e-9)
-        value = BSpline.design_matrix(x, knots, 3)
-        # The slope of a cubic B-spline on equal steps is the difference of two quadratic ones.
-        lower = BSpline.design_matrix(x, knots[1:-1], 2)
-        n, step = value.shape[1], knots[1] - knots[0]
-        difference = sparse.diags([-np.ones(n - 1), np.ones(n - 1)], [0, 1], shape=(n - 1, n))
-        slopes.append((lower @ difference / step).tocsr())
-        values.append(value.tocsr())
-    return _product(slopes[0], values[1]) + 1j * _product(values[0], slopes[1])
-
-
-def _product(first, second):
-    """Row-wise Kronecker product of two sparse matrices with equally many rows."""
-    p, n, m = first.shape[0], first.shape[1], second.shape[1]
-    a, b = first.tocoo(), second.tocsr()
-    counts = np.diff(b.indptr)[a.row]
-    start = np.repeat(b.indptr[a.row], counts)
-    within = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
-    at = start + within
-    rows, columns = np.repeat(a.row, counts), np.repeat(a.col, counts) * m + b.indices[at]
-    return sparse.csr_matrix((np.repeat(a.data, counts) * b.data[at], (rows, columns)), shape=(p, n * m))
-
-
-def _slopes(view, knots_d, knots_q):
-    """(b, n_d * n_q) complex: mean EMF of every tensor spline's flux over each block [V]."""
-    b, samples = view.i.shape
-    half = np.exp(0.5j * np.diff(view.theta, axis=1)) / view.sample_time_s / (samples - 1)
-    weight = np.zeros((b, samples), complex)
-    weight[:, 1:] += half
-    weight[:, :-1] -= np.conj(half)
-    mean = sparse.csr_matrix(
-        (weight.ravel(), (np.repeat(np.arange(b), samples), np.arange(b * samples))), shape=(b, b * samples)
-    )
-    return (mean @ _gradients(view.i.ravel(), knots_d, knots_q)).toarray()
+def _apart(points, share=0.03) -> np.ndarray:
+    """One of all points that lie nearer to each other than a share of their range: a dwell is one point."""
+    tree, near = cKDTree(_plane(points)), share * max(np.ptp(points.real), np.ptp(points.imag))
+    around = tree.query_ball_point(_plane(points), near)
+    kept = np.ones(len(points), bool)
+    for k, neighbours in enumerate(around):
+        kept[k] = not any(n < k and kept[n] for n in neighbours)
+    return points[kept]

@@ -39,6 +39,7 @@ def steady_view(view, omega, i_dq, rows=ROWS):
         slope_m=np.zeros((b, rows)),
         shaft=np.full(b, ""),
         psi_extra=0.0,
+        memo=dict(view.memo),
         run=np.arange(b),
         rows=np.zeros(b, int),
     )

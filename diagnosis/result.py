@@ -94,6 +94,12 @@ class Fit:
     holdout_after: float = 0.0
     noise_floor: float = 0.0
 
+    @property
+    def share_left(self) -> float:
+        """What is left above the noise floor on fitted rows, as a share of what was there."""
+        excess = max(self.train_after**2 - self.noise_floor**2, 0.0) ** 0.5
+        return excess / max(self.train_before, 1e-12)
+
 
 @dataclass
 class UnknownTerm:
@@ -145,11 +151,13 @@ class Diagnosis:
     digital: Digital = field(default_factory=Digital)
     notes: list[str] = field(default_factory=list)  # for people: what was assumed, what was not looked at
     evidence: Evidence = field(default_factory=Evidence)
+    search: object = field(default=None, repr=False)  # search.Outcome, for those who want to look inside
+    trace: str = ""  # the figures on which the verdict rests
 
     def to_json(self) -> dict:
         """The stable mapping that diagnosis.json holds (schema 1)."""
-        plain = dataclasses.asdict(dataclasses.replace(self, evidence=Evidence()))
+        plain = dataclasses.asdict(dataclasses.replace(self, evidence=Evidence(), search=None))
         problems = plain.pop("problems")
-        for key in ("evidence", "rows"):
+        for key in ("evidence", "rows", "search", "trace"):
             plain.pop(key)
         return {"schema": 1, **plain, "recording": {"rows": self.rows, "problems": problems}}

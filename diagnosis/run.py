@@ -22,7 +22,7 @@ from diagnosis.nominal import Nominal, load_nominal
 from diagnosis.recording import Recording
 from diagnosis.request import requests
 from diagnosis.result import Diagnosis, Fit, UnknownTerm
-from diagnosis.scan import row_residual, stray_order, stray_swing
+from diagnosis.scan import row_residual, stray_order, stray_swing, stray_torque
 from diagnosis.search import Search
 from diagnosis.unknown import sparse_term
 from diagnosis.view import joined_views, view_of
@@ -72,11 +72,16 @@ def _physics(recordings, nominal, progress) -> Diagnosis:
     location = locate(view, search.cells, found.pure)
     left, group = leftover(search, found)
     names, ambiguity = words.groups(best, found.tied, CATALOGUE, nominal)
-    share = fit.train_excess / max(fit.train_before, 1e-12)
+    names = words.carried(names, best, lambda n: search.refine(best.model.without(n)).chi2 - best.chi2)
+    share = fit.share_left
     rows = row_residual(best.view, best, CATALOGUE, misfit(best.view))
     level = voltage_level(view)
-    stray = stray_order(best.view, rows, level) or stray_swing(best.view, rows, level)
-    if not best.model.names:
+    stray = (
+        stray_order(best.view, rows, level)
+        or stray_swing(best.view, rows, level)
+        or stray_torque(best.view, search.projector, *final_residual(search, found), found.sigma)
+    )
+    if not names and not ambiguity:
         verdict = "no_mismatch" if left <= words.LEFTOVER else "unexplained"
     elif left > words.LEFTOVER and share > words.FLOOR_SHARE:
         verdict = "unexplained"
@@ -97,7 +102,8 @@ def _physics(recordings, nominal, progress) -> Diagnosis:
         cells, residual = final_residual(search, found)
         answer.unknown_term = sparse_term(best.view, cells, residual, found.sigma, found.train)
         if stray:
-            answer.unknown_term = UnknownTerm("u_dq", stray.formula, stray.amplitude, 0.05 * stray.amplitude, "V", 0.5)
+            signal, unit = ("torque", "Nm") if stray.kind == "torque" else ("u_dq", "V")
+            answer.unknown_term = UnknownTerm(signal, stray.formula, stray.amplitude, 0.05 * stray.amplitude, unit, 0.5)
     answer.trace = trace
     cells, residual = final_residual(search, found)
     answer.evidence = evidence(view, (search.cells, search.cells.y), (cells, residual), found.pure, held)
@@ -110,7 +116,7 @@ def _physics(recordings, nominal, progress) -> Diagnosis:
 def final_residual(search, found):
     """(cells, residual) of the best model on its corrected data, every order."""
     best = found.best
-    fitter = search._fitter(best.view, [CATALOGUE[n] for n in sorted(best.model.names)])
+    fitter = search.fitter(best.view, [CATALOGUE[n] for n in sorted(best.model.names)])
     return fitter.cells, fitter.solve(best.model).residual
 
 
@@ -157,14 +163,12 @@ def fits(search, found, held) -> Fit:
         power = np.bincount(cells.block[use], values[use] ** 2, minlength=len(blocks))[blocks]
         return float(np.sqrt(power.mean())) if len(power) else 0.0
 
-    out = Fit(
+    return Fit(
         "u_dq",
         "V",
         rms(search.cells.y, ~held),
         rms(residual, ~held),
         rms(search.cells.y, held),
         rms(residual, held),
-        rms(found.pure, np.ones(len(held), bool)),
+        rms(found.pure, ~held),
     )
-    out.train_excess = float(np.sqrt(max(out.train_after**2 - rms(found.pure, ~held) ** 2, 0.0)))
-    return out

@@ -14,6 +14,7 @@ import numpy as np
 MOST_ORDER = 80  # per mechanical turn
 LOCKED = 30.0  # power of the sum over sum of powers: exp(-30) by chance
 LEAST_SHARE = 1.5e-3  # of the voltage: smaller ripples are the inverter's
+TORQUE_SHARE = 0.01  # of rated torque
 SWING_SHARE = 4e-3
 SWING_RATIO = 8.0  # of the spectrum's low end over its neighbourhood
 WEIGHTS = {"1": lambda v: np.ones(len(v)), "omega": lambda v: v.omega.mean(axis=1), "i_q": lambda v: v.i.imag.mean(axis=1)}
@@ -41,6 +42,27 @@ def row_residual(view, solution, effects, misfit):
             if value and "u" in columns[key]:
                 left -= value * columns[key]["u"]
     return left
+
+
+def stray_torque(view, projector, cells, residual, sigma) -> Stray | None:
+    """A torque that repeats with the mechanical turn, once to four times: an unbalanced load, a bent shaft."""
+    use = cells.ok & (cells.channel == "torque") & (cells.order == 0)
+    if use.sum() < 12:
+        return None
+    m, best = view.machine, None
+    rated = 1.5 * m.pole_pairs * m.magnet_flux_wb * m.rated_current_a
+    for n in range(1, 5):
+        angle = n * view.theta_mid / m.pole_pairs
+        waves = [projector.rows({"torque": f(angle)})[use] / sigma[use] for f in (np.cos, np.sin)]
+        a, y = np.array(waves).T, residual[use] / sigma[use]
+        c, *_ = np.linalg.lstsq(a, y, rcond=None)
+        gain = float(y @ y - np.sum((y - a @ c) ** 2))
+        amplitude = float(np.hypot(*c))
+        if gain > 2 * LOCKED and amplitude > TORQUE_SHARE * rated and (best is None or gain > best[0]):
+            best = (gain, amplitude, n)
+    if best is None:
+        return None
+    return Stray(f"torque = c * sin({best[2]} theta_m + phi)", best[1], "torque")
 
 
 def stray_order(view, residual, level) -> Stray | None:

@@ -16,14 +16,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnosis.catalogue.effect import FluxEffect
-from diagnosis.cells import cells_of
+from diagnosis.effect import FluxEffect
+from diagnosis.cells import Projector, cells_of
 from diagnosis.curvature import FAMILY, labels
 from diagnosis.fit import Fitter, Model, Solution, everything, row_sigma
 
 MOST_AT_ONCE = 3
 MOST_EFFECTS = 4  # more at once is no explanation
 REFINED = 14
+NEIGHBOURS = 7  # refined around a best set
 TIE = 10.0
 CURVE_SHARE = 0.01  # of what an effect contributes to a row: no curve of the catalogue fits a real one better
 EARNS = 30.0  # gain in chi^2 over dispersion that an effect must bring beside the freest form of the others
@@ -48,7 +49,8 @@ class Search:
 
     def __init__(self, view, effects, train_blocks, progress=lambda text: None):
         self.view, self.effects, self.progress = view, dict(effects), progress
-        self.cells = cells_of(view, self.effects.values())
+        self.projector = Projector(view)
+        self.cells = cells_of(view, self.effects.values(), self.projector)
         self.sigma, self.pure = row_sigma(view, self.cells)
         self.train = train_blocks[self.cells.block]
         self.linear = Fitter(self.cells, self.sigma, self.train)
@@ -94,7 +96,7 @@ class Search:
 
     def _climbed(self, best) -> Solution:
         """The best model that additions, removals and exchanges lead to."""
-        for _ in range(6):
+        for _ in range(4):
             self.progress(f"around {', '.join(sorted(best.model.names)) or 'no effect'}")
             self._neighbours(best)
             better = self._best()
@@ -161,7 +163,7 @@ class Search:
         totals: dict = {n: {} for n in record}
         view, mine = self.view, [self.effects[n] for n in sorted(model.names)]
         for step in range(4):
-            fitter = self.linear if step == 0 else self._fitter(view, mine)
+            fitter = self.linear if step == 0 else self.fitter(view, mine, model.free)
             solution = fitter.solve(model, self.dispersion)
             small = True
             for n in record:
@@ -190,11 +192,12 @@ class Search:
         least = -0.7 * np.array([view.machine.inductance_d_h, view.machine.inductance_q_h])
         return view.replace(psi_extra=psi, delta_l=tuple(np.maximum(more, least)))
 
-    def _fitter(self, view, effects) -> Fitter:
+    def fitter(self, view, effects, free=None) -> Fitter:
         """The linear problem of a corrected view, with what is known of raw currents taken off."""
-        cells = cells_of(view, effects)
+        cells = cells_of(view, effects, self.projector, free)
         cells.y = cells.y - self.adjust
-        return Fitter(cells, self.sigma, self.train, self.linear.price)
+        # Smaller currents have smaller noise: without this, dividing all by one factor would pass for a better fit.
+        return Fitter(cells, self.sigma * view.noise_gain, self.train, self.linear.price)
 
     def take_raw(self, solution) -> bool:
         """Take off what the solution's terms make of the raw current beside its parabola; whether that mattered.
@@ -208,7 +211,7 @@ class Search:
             effect = self.effects[name]
             if effect.corrects or effect.smoothed or name in ("friction", "cogging"):
                 continue
-            smooth, raw = (cells_of(v, [effect]).columns[name] for v in (solution.view, rough))
+            smooth, raw = (cells_of(v, [effect], self.projector).columns[name] for v in (solution.view, rough))
             for key, value in c.items():
                 if value:
                     k = key if key in raw else f"~{key}"
@@ -236,7 +239,7 @@ class Search:
 
     def _fitter_at(self, solution) -> Fitter:
         """The linear problem with all effects at the solution's corrected data."""
-        return self.linear if solution.view is self.view else self._fitter(solution.view, self.effects.values())
+        return self.linear if solution.view is self.view else self.fitter(solution.view, self.effects.values())
 
     def _neighbours(self, best):
         """Refine what lies one addition, removal, exchange or change of form away and promises something."""
@@ -260,7 +263,7 @@ class Search:
                     swapped = grown.without(out)
                     tried.append((at.score(swapped, self.dispersion), swapped))
         tried.sort(key=lambda entry: entry[0])
-        for score, model in [t for t in tried if self.allowed(t[1])][:10]:
+        for score, model in [t for t in tried if self.allowed(t[1])][:NEIGHBOURS]:
             if score < best.score + 4 * TIE:
                 self.refine(model)
 
@@ -284,9 +287,21 @@ class Search:
             at = self._fitter_at(best)
             weak = {n: gain for n in sorted(best.model.names) if (gain := self.gain(best, n, at)) is not None}
             if not weak:
-                return best
+                pair = self._idle_pair(best)
+                if not pair:
+                    return best
+                best = self.refine(best.model.without(pair[0]).without(pair[1]))
+                continue
             best = self.refine(best.model.without(min(weak, key=weak.get)))
         return best
+
+    def _idle_pair(self, best):
+        """Two effects that all but cancel: each is needed beside the other, both together bring next to nothing."""
+        for a, b in itertools.combinations(sorted(best.model.names), 2):
+            less = self.refine(best.model.without(a).without(b))
+            if less.chi2 - best.chi2 < 2.0 * EARNS * self.dispersion:
+                return a, b
+        return None
 
     def gain(self, solution, name, at) -> float | None:
         """What a weak effect brings to chi^2; None where it is large, sure and needed enough to stay.
@@ -297,7 +312,7 @@ class Search:
         effect = self.effects[name]
         if effect.corrects:
             rest = {n: c for n, c in solution.total.items() if n != name}
-            at = self._fitter(self.corrected(rest), [self.effects[n] for n in sorted(solution.model.names)])
+            at = self.fitter(self.corrected(rest), [self.effects[n] for n in sorted(solution.model.names)])
         without = at.chi2(others)[0]
         with_core = at.chi2(Model(others.names | {name}, others.free))[0]
         gain = (without - with_core) / self.dispersion

@@ -21,7 +21,7 @@ def groups(best, tied, effects, nominal):
     models = [best.model.names, *(s.model.names for s in tied)]
     shared = frozenset.intersection(*models)
     rest = frozenset().union(*models) - shared
-    ambiguity = [sorted(rest)] if rest else []
+    ambiguity = [sorted(rest)] if len(rest) > 1 else []  # one alone is there or is not: too weak to be spoken of
     for drift, constant in CONSTANTS.items():
         if {drift, constant} <= shared:
             moved = effects[drift].size(best.c[drift], nominal)
@@ -40,6 +40,13 @@ def groups(best, tied, effects, nominal):
             if share > SLOPE_DEVICE:
                 ambiguity.append(["dead_time", "resistance"])
     return sorted(shared), ambiguity
+
+
+def carried(names, best, gains):
+    """Names whose share of the fit exceeds all that is left of it, where much is left."""
+    if best.dispersion <= LEFTOVER:
+        return names
+    return [n for n in names if gains(n) > best.chi2]
 
 
 def named(solution, names, effects, nominal, empty, dispersion) -> list[NamedEffect]:

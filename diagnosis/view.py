@@ -21,7 +21,7 @@ BLOCK_ROWS = 200
 SHORTER = (100, 50)  # where dwells are short
 LEAST_BLOCKS = 12
 HALF_WIDTH = 8
-MOST_BLOCKS = 700  # more rows than these blocks hold add time, not knowledge
+MOST_BLOCKS = 320  # more rows than these blocks hold add time, not knowledge
 RAMP_TORQUE = 0.02  # of rated torque: a change of inertial torque within a block beyond it is a ramp
 SLOPE_REACH = 60  # samples over which the shaft's acceleration is taken beside a transducer
 CURRENT_STEP = 0.08  # of rated current: a block with a larger change is a transient
@@ -65,6 +65,8 @@ class View:
     span_s: float  # length of the whole recording
     psi_extra: np.ndarray | float = 0.0
     delta_l: tuple[float, float] = (0.0, 0.0)
+    noise_gain: float = 1.0  # what a correction of the currents did to their noise
+    memo: dict = dataclasses.field(default_factory=dict)  # of effects, the same for all views of a recording
 
     def __len__(self):
         return len(self.t)

@@ -2,6 +2,7 @@
 # Set up everything the targets of the Makefile need, on Debian 12 or Ubuntu 22.04 and newer:
 #   - system packages, with apt-get (only the missing ones; needs root or sudo without a password)
 #   - .venv with the exact Python packages of requirements.lock
+#   - on Debian also chromium, if it can be had: one test opens the report in it, and is skipped without
 #   - .cache/ghdl5, the GHDL 5 used to convert the VHDL to Verilog
 # A second run only compares hashes.  Interrupted, it starts the unfinished part again.
 #
@@ -52,9 +53,19 @@ missing_packages() {
     perl -MPod::Usage -MGetopt::Long -MFindBin -e 1 2>/dev/null || missing+=(perl)
     printf '%s\n' "${missing[@]}"
 }
+# Ubuntu's chromium is no apt package, and nothing but a test needs it: no browser is no failure.
+browser_package() {
+    local seen
+    for seen in chromium chromium-browser google-chrome; do
+        if command -v "$seen" >/dev/null; then return 0; fi
+    done
+    if [ -n "$retry" ] || [ ! -e "$cache/chromium.failed" ]; then
+        if grep -qsx 'ID=debian' /etc/os-release; then echo chromium; fi
+    fi
+}
 ghdl_works() { command -v ghdl >/dev/null && ghdl --version >/dev/null 2>&1; }
 
-if have_venv && { have_ghdl5 || gave_up_ghdl5; } && [ -z "$(missing_packages)" ]; then
+if have_venv && { have_ghdl5 || gave_up_ghdl5; } && [ -z "$(missing_packages)$(browser_package)" ]; then
     if ! have_ghdl5; then no_ghdl5; fi
     exit 0
 fi
@@ -104,6 +115,15 @@ if [ "${#missing[@]}" -gt 0 ]; then
     hash -r
     still=$(missing_packages)
     [ -z "$still" ] || die "apt-get went through, but this is still not usable: $(echo $still)"
+fi
+
+browser=$(browser_package)
+if [ -n "$browser" ]; then # in a shell of its own, as install_packages ends the shell where it fails
+    if ! (install_packages "$browser"); then
+        touch "$cache/chromium.failed"
+        say "NOTE: chromium is not available; the test that opens the report in a browser is skipped." \
+            "('make setup' tries again)"
+    fi
 fi
 
 ghdl_version=$(ghdl --version | sed -n '1s/^GHDL \([^ ]*\).*/\1/p')

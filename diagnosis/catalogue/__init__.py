@@ -3,7 +3,7 @@
 import importlib
 import pkgutil
 
-from diagnosis.catalogue.effect import Effect
+from diagnosis.effect import Effect
 
 
 def _found() -> dict[str, Effect]:

@@ -2,24 +2,47 @@
 
 import numpy as np
 
-from diagnosis.catalogue.effect import Effect, Parameter
+from diagnosis.balance import misfit
+from diagnosis.effect import Effect, Parameter
 from diagnosis.result import Estimate
 
 
-def _waves(view, orders):
-    out = {}
-    for h in orders:
-        out[f"h{h}_cos"] = {"torque": np.cos(h * view.theta_mid)}
-        out[f"h{h}_sin"] = {"torque": np.sin(h * view.theta_mid)}
-    return out
+ORDERS = range(2, 38, 2)  # per electrical turn: multiples of the poles
+
+
+def _waves(view, h):
+    return {f"h{h}_cos": {"torque": np.cos(h * view.theta_mid)}, f"h{h}_sin": {"torque": np.sin(h * view.theta_mid)}}
+
+
+def _order(view) -> int:
+    """The order whose torque repeats best from block to block; it depends on slots that nobody recorded."""
+    if "cogging_order" not in view.memo:
+        view.memo["cogging_order"] = 6
+        seen = np.isfinite(view.torque).all(axis=1)
+        if seen.any():
+            torque = misfit(view)["torque"][seen]
+            torque = torque - torque.mean(axis=1, keepdims=True)
+            theta = view.theta_mid[seen]
+            taper = 1.0 - np.cos(2 * np.pi * (np.arange(theta.shape[1]) + 0.5) / theta.shape[1])
+            turns = np.abs(theta[:, -1] - theta[:, 0]) / (2 * np.pi)
+            best = 0.0
+            for h in ORDERS:
+                f = (torque * taper * np.exp(-1j * h * theta)).mean(axis=1)[h * turns > 2.0]
+                # A free shaft's acceleration is noisier the faster it turns.
+                weight = 1.0 / np.maximum(np.abs(f) ** 2, np.median(np.abs(f) ** 2)) if len(f) else np.zeros(0)
+                lock = float(np.abs(np.sum(weight * f)) ** 2 / max(np.sum(weight**2 * np.abs(f) ** 2), 1e-300))
+                if lock > best:
+                    best, view.memo["cogging_order"] = lock, h
+    return view.memo["cogging_order"]
 
 
 class Cogging(Effect):
     def core(self, view):
-        return _waves(view, (6, 12, 18))
+        return _waves(view, _order(view))
 
     def free(self, view):
-        return _waves(view, (4, 8, 24, 30, 36))
+        h = _order(view)
+        return {**_waves(view, 2 * h), **_waves(view, 3 * h)}
 
     def floor(self, nominal):
         m = nominal.machine

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from diagnosis.catalogue.effect import Effect, Parameter, current_error
+from diagnosis.effect import Effect, Parameter, current_error
 from diagnosis.result import Estimate
 
 PATTERNS = {"alpha": (2 / 3, -1 / 3, -1 / 3), "beta": (0.0, 3**-0.5, -(3**-0.5))}
@@ -42,7 +42,8 @@ class CurrentGain(Effect):
         error = i_abc * (self._gains(c) / (1.0 + self._gains(c)))
         if c.get("turn"):
             error = error + view.phases(1j * c["turn"] * view.i)
-        return view.without_current(error, raw_gain=1.0 + self._gains(c), turn=c.get("turn", 0.0))
+        mended = view.without_current(error, raw_gain=1.0 + self._gains(c), turn=c.get("turn", 0.0))
+        return mended.replace(noise_gain=view.noise_gain / (1.0 + float(np.mean(self._gains(c)))))
 
     def estimates(self, c, covariance, nominal):
         names = list(c)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from diagnosis.catalogue.effect import Effect, Parameter, current_error
+from diagnosis.effect import Effect, Parameter, current_error
 from diagnosis.result import Estimate
 
 PHASES = "abc"

@@ -3,7 +3,7 @@
 import numpy as np
 
 from diagnosis.catalogue.current_gain import gain_column
-from diagnosis.catalogue.effect import Effect, Parameter, current_error, one, sigma
+from diagnosis.effect import Effect, Parameter, current_error, one, sigma
 
 
 class CurrentScale(Effect):
@@ -20,7 +20,10 @@ class CurrentScale(Effect):
         rated = view.machine.rated_current_a
         factor = 1.0 / (1.0 + c["scale"] + c.get("droop", 0.0) * np.abs(view.i / rated) ** 2)
         return view.replace(
-            i=view.i * factor, i_raw=view.i_raw * factor, i_abc=None if view.i_abc is None else view.i_abc * factor[..., None]
+            i=view.i * factor,
+            i_raw=view.i_raw * factor,
+            i_abc=None if view.i_abc is None else view.i_abc * factor[..., None],
+            noise_gain=view.noise_gain / (1.0 + c["scale"]),
         )
 
     def estimates(self, c, covariance, nominal):

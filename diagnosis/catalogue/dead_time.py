@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from diagnosis.catalogue.effect import Effect, Parameter, voltage
+from diagnosis.effect import Effect, Parameter, voltage
 from diagnosis.curves import clipped_ramps
 from diagnosis.result import Estimate
 

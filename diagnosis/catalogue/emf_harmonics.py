@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from diagnosis.catalogue.effect import Effect, Parameter, flux, torque_of
+from diagnosis.effect import Effect, Parameter, flux, torque_of
 from diagnosis.result import Estimate
 
 

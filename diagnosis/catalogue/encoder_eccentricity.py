@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from diagnosis.catalogue.effect import Effect, Parameter, angle_error
+from diagnosis.effect import Effect, Parameter, angle_error
 from diagnosis.result import Estimate
 
 
@@ -11,12 +11,24 @@ def _turns(view, orders):
     return {f"{f.__name__}_{n}": f(n * theta_m) for n in orders for f in (np.cos, np.sin)}
 
 
+def _acceleration(view, name, wave):
+    """d omega_m / dt that a wave of the angle's error pretends, (b, m) [rad/s^2]."""
+    middle = 0.5 * (wave[:, 1:] + wave[:, :-1])
+    return -((int(name[-1]) * view.omega_mid / view.machine.pole_pairs) ** 2) * middle / view.machine.pole_pairs
+
+
+def _column(view, name, wave):
+    column = angle_error(view, wave)
+    column["torque"] = column["torque"] + (view.machine.inertia_kgm2 or 0.0) * _acceleration(view, name, wave)
+    return column
+
+
 class EncoderEccentricity(Effect):
     def core(self, view):
-        return {name: angle_error(view, wave) for name, wave in _turns(view, (1,)).items()}
+        return {name: _column(view, name, wave) for name, wave in _turns(view, (1,)).items()}
 
     def free(self, view):
-        return {name: angle_error(view, wave) for name, wave in _turns(view, (2, 3)).items()}
+        return {name: _column(view, name, wave) for name, wave in _turns(view, (2, 3)).items()}
 
     def floor(self, nominal):
         return 0.003
@@ -26,7 +38,8 @@ class EncoderEccentricity(Effect):
 
     def corrected(self, view, c):
         waves = _turns(view, (1, 2, 3))
-        return view.turned(sum(value * waves[name] for name, value in c.items()))
+        false = sum(value * _acceleration(view, name, waves[name]) for name, value in c.items())
+        return view.turned(sum(value * waves[name] for name, value in c.items())).replace(slope_m=view.slope_m - false)
 
     def estimates(self, c, covariance, nominal):
         first = np.hypot(c["cos_1"], c["sin_1"])

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from diagnosis.catalogue.effect import Effect, Parameter, angle_error, one, sigma
+from diagnosis.effect import Effect, Parameter, angle_error, one, sigma
 from diagnosis.curves import course
 
 

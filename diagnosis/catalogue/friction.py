@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from diagnosis.catalogue.effect import Effect, Parameter
+from diagnosis.effect import Effect, Parameter
 from diagnosis.result import Estimate
 
 

@@ -1,6 +1,6 @@
 """Inductance of the d axis other than the nameplate's: omega i_d on the q axis."""
 
-from diagnosis.catalogue.effect import FluxEffect, Parameter, one, sigma
+from diagnosis.effect import FluxEffect, Parameter, one, sigma
 
 
 class InductanceD(FluxEffect):

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from diagnosis.catalogue.effect import FluxEffect, Parameter, one, sigma
+from diagnosis.effect import FluxEffect, Parameter, one, sigma
 
 
 class InductanceQ(FluxEffect):

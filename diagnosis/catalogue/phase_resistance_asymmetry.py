@@ -3,7 +3,7 @@
 import numpy as np
 
 from diagnosis.catalogue.current_gain import PATTERNS
-from diagnosis.catalogue.effect import Effect, Parameter, voltage
+from diagnosis.effect import Effect, Parameter, voltage
 from diagnosis.curves import course
 from diagnosis.result import Estimate
 

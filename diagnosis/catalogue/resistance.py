@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from diagnosis.catalogue.effect import Effect, Parameter, one, sigma, voltage
+from diagnosis.effect import Effect, Parameter, one, sigma, voltage
 
 
 class Resistance(Effect):

@@ -1,6 +1,6 @@
 """Currents are sampled tau after the middle of the zero vector, where they slope with the EMF."""
 
-from diagnosis.catalogue.effect import Effect, Parameter, current_error, one, sigma
+from diagnosis.effect import Effect, Parameter, current_error, one, sigma
 
 
 def _slope(view):

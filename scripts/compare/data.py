@@ -11,7 +11,7 @@ from neighbours: blocks that follow each other at one operating point share all 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -31,6 +31,11 @@ class Data:
     view: object
     misfit: dict[str, np.ndarray]
     held: np.ndarray
+    memo: dict = field(default_factory=dict)  # of dictionary.equations
+
+    def fitted(self, channel: str) -> np.ndarray:
+        """Indices of the blocks that a fit may use; the torque of a block in a ramp is nan."""
+        return np.flatnonzero(~self.held & np.isfinite(self.misfit[channel]).all(axis=1))
 
     @property
     def units(self) -> dict[str, float]:

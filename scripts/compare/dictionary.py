@@ -105,18 +105,23 @@ def torque_terms(view) -> dict[str, np.ndarray]:
 
 def equations(data: Data, rows: int) -> list[Equation]:
     """u_d, u_q and, where recorded, sum and torque; ``rows`` neighbours are averaged on both sides."""
-    out = []
+    if rows in data.memo:
+        return data.memo[rows]
+    out = data.memo[rows] = []
     for channel, make in (("u", voltage_terms), ("sum", sum_terms), ("torque", torque_terms)):
         if channel not in data.misfit:
             continue
         terms = make(data.view)
-        fitted = averaged(np.stack([x[~data.held] for x in terms.values()], axis=2), rows).reshape(-1, len(terms))
+        use = data.fitted(channel)
+        fitted = averaged(np.stack([x[use] for x in terms.values()], axis=2), rows).reshape(-1, len(terms))
         blocks = np.stack([x.mean(axis=1) for x in terms.values()], axis=1)
         scale = np.sqrt(np.mean(fitted**2, axis=0))
         scale[scale < 1e-9] = np.inf
         y = data.misfit[channel] / data.units[channel]
         parts = {"u_d": y.real, "u_q": y.imag} if channel == "u" else {channel: y}
         for name, part in parts.items():
-            target = averaged(part[~data.held], rows).ravel()
-            out.append(Equation(name, list(terms), fitted / scale, target, blocks / scale, part.mean(axis=1), scale))
+            target = averaged(part[use], rows).ravel()
+            out.append(
+                Equation(name, list(terms), fitted / scale, target, blocks / scale, part.mean(axis=1), scale)
+            )
     return out

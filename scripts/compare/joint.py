@@ -16,10 +16,12 @@ from scipy.stats import chi2
 from scripts.compare.data import Data, averaged
 from scripts.compare.joint_model import PARAMETERS, Model
 
-MOST_BLOCKS = 160  # evenly chosen; all of them would only take longer
-FIT_GRID = [{"rows": rows} for rows in (5, 20)]
+MOST_BLOCKS = 120  # evenly chosen; all of them would only take longer
+FIT_GRID = [{"rows": 20}]
 NAME_GRID = [
-    {"floor": f, "share": s} for f in (0.1, 0.2, 0.3, 0.5, 0.7, 1.0, 1.5) for s in (0.0, 0.15, 0.3, 0.5, 0.7)
+    {"floor": f, "share": s}
+    for f in (0.1, 0.2, 0.3, 0.5, 0.7, 1.0, 1.5)
+    for s in (0.0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.5)
 ]
 STEP = 1e-3  # of a parameter's unit, for slopes
 SINGULAR = 1e-6  # share of the largest singular value below which a direction is not told at all
@@ -36,11 +38,12 @@ class Joint:
     left: np.ndarray
 
 
-def _stacked(channels, sigma, rows):
-    """One vector of the averaged channels, each over its noise; complex ones as two."""
+def _stacked(channels, sigma, rows, known):
+    """One vector of the averaged channels where ``known``, each over its noise; complex ones as two."""
     parts = []
     for name, x in channels.items():
         mean = averaged(x, rows).ravel() / sigma[name]
+        mean = mean[known[name]]
         parts += [mean.real, mean.imag] if np.iscomplexobj(mean) else [mean]
     return np.concatenate(parts)
 
@@ -50,8 +53,10 @@ def _sigma(misfit, rows):
     out = {}
     for name, x in misfit.items():
         step = np.diff(averaged(x, rows), axis=1)
-        both = np.concatenate([step.real.ravel(), step.imag.ravel()]) if np.iscomplexobj(step) else step.ravel()
-        out[name] = float(np.median(np.abs(both)) / 0.954) + 1e-12
+        both = (
+            np.concatenate([step.real.ravel(), step.imag.ravel()]) if np.iscomplexobj(step) else step.ravel()
+        )
+        out[name] = float(np.nanmedian(np.abs(both)) / 0.954) + 1e-12
     return out
 
 
@@ -63,10 +68,11 @@ def fit(data: Data, rows: int) -> Joint:
     model = Model(data, train)
     mine = {name: x[train] for name, x in data.misfit.items()}
     sigma = _sigma(mine, rows)
-    y = _stacked(mine, sigma, rows)
+    known = {name: np.isfinite(averaged(x, rows)).ravel() for name, x in mine.items()}
+    y = _stacked(mine, sigma, rows, known)
 
     def residual(p):
-        return _stacked(model(p), sigma, rows) - y
+        return _stacked(model(p), sigma, rows, known) - y
 
     def jacobian(p):
         here = residual(p)

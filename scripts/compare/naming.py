@@ -3,10 +3,10 @@
     u_d: d, u_q: q                  resistance          (times T: resistance_temperature)
     u_q: w                          magnet_flux         (times t: magnet_temperature)
     u_q: w d / u_d: w q             inductance_d / inductance_q
-    u_q: w d2, w d3 / u_d: w q3     saturation; it takes the inductance of its axis with it
+    u_q: w d2, w d3 / u_d: w q3     saturation; of it and the inductance of its axis a much smaller one is dropped
     u_q: w q2.. / u_d: w d q..      cross_saturation
     u_d: w                          encoder_offset
-    u_d: w2, with u_q: w2 q         iron_loss; without the load term sampling_skew
+    u_d: w2, with u_q: w2 q         iron_loss, which takes friction with it; without the load term sampling_skew
     direction of the currents, 6    dead_time
     w cos6, w sin6, 12              emf_harmonics
     du                              delay
@@ -24,8 +24,9 @@ from __future__ import annotations
 import numpy as np
 
 from scripts.compare.data import Data
-from scripts.compare.dictionary import TORQUE_ORDERS
+from scripts.compare.dictionary import TORQUE_ORDERS, Equation
 
+BESIDE = 0.4  # least share of the larger one at which inductance and saturation of an axis are two effects
 ALIKE = 2.0  # largest ratio of relative changes that still count as one factor
 
 
@@ -67,26 +68,36 @@ def _table():
 NAMES = _table()
 
 
-def effects(data: Data, model: dict[tuple[str, str], tuple[float, float]]) -> dict[str, float]:
-    """Names with their sizes (rms of their terms, in per mille of bus, rated current or torque).
+def effects(data: Data, models: list[tuple[Equation, np.ndarray]]) -> dict[str, float]:
+    """Names with their sizes: rms of what their terms add up to, in per mille of bus, rated current or torque.
 
-    model: {(equation, term): (coefficient of the unscaled column, rms contribution)}, in per mille.
+    models: equations with their coefficients (k,) of the scaled columns.
     """
-    model = dict(model)
-    for axis, linear in ((("u_d", "w q3"),), ("u_d", "w q")), ((("u_q", "w d2"), ("u_q", "w d3")), ("u_q", "w d")):
-        if any(term in model for term in axis):
-            model.pop(linear, None)
+    parts: dict[tuple[str, str], float] = {}
+    plain: dict[tuple[str, str], float] = {}  # coefficient of the unscaled column
+    for e, c in models:
+        plain |= {(e.name, e.terms[k]): c[k] / e.scale[k] for k in np.flatnonzero(c)}
+        owners = [NAMES.get((e.name, e.terms[k])) if c[k] else None for k in range(len(c))]
+        for owner in {x for x in owners if x}:
+            mine = [k for k, x in enumerate(owners) if x == owner]
+            parts[e.name, owner] = float(np.sqrt(np.mean((e.x[:, mine] @ c[mine]) ** 2)))
+    for equation, linear in (("u_d", "inductance_q"), ("u_q", "inductance_d")):
+        pair = [(equation, linear), (equation, "saturation")]
+        if all(key in parts for key in pair):
+            small, large = sorted(pair, key=parts.get)
+            if parts[small] < BESIDE * parts[large]:
+                parts[large] += parts.pop(small)
     out: dict[str, float] = {}
-    for key, (_, size) in model.items():
-        name = NAMES.get(key)
-        if name:
-            out[name] = float(np.hypot(out.get(name, 0.0), size))
-    if "sampling_skew" in out and ("u_q", "w2 q") in model:
+    for (_, name), size in parts.items():
+        out[name] = float(np.hypot(out.get(name, 0.0), size))
+    if "sampling_skew" in out and ("u_q", "w2 q") in plain:
         out["iron_loss"] = out.pop("sampling_skew")
-    return _one_factor(data, model, out)
+    if "iron_loss" in out and "friction" in out:
+        del out["friction"]  # an iron loss drags the shaft
+    return _one_factor(data, plain, out)
 
 
-def _one_factor(data, model, names):
+def _one_factor(data, plain, names):
     """R, L_d, L_q (and psi_m) wrong by one factor are a scale, not three parameters."""
     m, unit = data.view.machine, data.units["u"]
     top = float(np.abs(data.view.omega).max())
@@ -96,7 +107,9 @@ def _one_factor(data, model, names):
         "inductance_q": (("u_d", "w q"), -top * m.inductance_q_h * m.rated_current_a),
         "magnet_flux": (("u_q", "w"), top * m.magnet_flux_wb),
     }
-    change = {n: model[key][0] * unit / volts for n, (key, volts) in nominal.items() if n in names and key in model}
+    change = {
+        n: plain[key] * unit / volts for n, (key, volts) in nominal.items() if n in names and key in plain
+    }
     for name, needs in (
         ("udc_gain", ("inductance_d", "inductance_q", "magnet_flux")),
         ("current_scale", ("resistance", "inductance_d", "inductance_q")),
@@ -108,7 +121,23 @@ def _one_factor(data, model, names):
     return names
 
 
-def dominant(sizes: dict[str, float], least: float, share: float) -> list[str]:
-    """Names whose size is at least ``least`` per mille and at least ``share`` of the largest."""
-    top = max(sizes.values(), default=0.0)
-    return sorted(name for name, size in sizes.items() if size >= least and size >= share * top)
+MECHANICAL = ("friction", "cogging")
+NAME_GRID = [
+    {"least": x, "share": s, "mechanical": m}
+    for x in (0.05, 0.1, 0.2, 0.3, 0.5, 0.8, 1.5, 3.0)
+    for s in (0.0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.5)
+    for m in (1.0, 3.0, 10.0, 30.0)
+]
+
+
+def dominant(sizes: dict[str, float], least: float, share: float, mechanical: float) -> list[str]:
+    """Names of at least ``share`` of the largest of their kind and ``least`` (torque: ``mechanical``) per mille."""
+    kinds = (
+        ([n for n in sizes if n not in MECHANICAL], least),
+        ([n for n in sizes if n in MECHANICAL], mechanical),
+    )
+    out = []
+    for mine, floor in kinds:
+        top = max((sizes[n] for n in mine), default=0.0)
+        out += [n for n in mine if sizes[n] >= max(floor, share * top)]
+    return sorted(out)

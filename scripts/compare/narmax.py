@@ -12,21 +12,21 @@ import numpy as np
 
 from scripts.compare.data import Data
 from scripts.compare.dictionary import equations
-from scripts.compare.naming import dominant, effects
+from scripts.compare.naming import NAME_GRID, dominant, effects
 from scripts.compare.sparse import Sparse
 
 MOST_TERMS = 12
-FIT_GRID = [{"rows": rows, "least_err": x} for rows in (5, 20) for x in (0.0, 1e-3, 1e-2, 5e-2)]
-NAME_GRID = [{"least": x, "share": s} for x in (0.3, 0.6, 1.2, 2.5, 5.0) for s in (0.0, 0.15, 0.3, 0.5, 0.7)]
+__all__ = ["FIT_GRID", "NAME_GRID", "fit", "names"]
+FIT_GRID = [{"rows": rows} for rows in (5, 20, 50)]
 
 
-def fit(data: Data, rows: int, least_err: float) -> Sparse:
-    """Select terms for every equation of the case; a term below the error reduction ratio ``least_err`` is left out."""
+def fit(data: Data, rows: int) -> Sparse:
+    """Select terms for every equation of the case."""
     from sysidentpy.basis_function import Polynomial
     from sysidentpy.model_structure_selection import FROLS
     from sysidentpy.parameter_estimation import LeastSquares
 
-    found, left = {}, {}
+    models, left = [], {}
     for e in equations(data, rows):
         used = np.flatnonzero(np.isfinite(e.scale))
         model = FROLS(
@@ -46,20 +46,19 @@ def fit(data: Data, rows: int, least_err: float) -> Sparse:
         c = np.zeros(len(e.terms))
         constant = 0.0
         # Regressor codes: 0 is the constant, 2001 is x1(k-1), 3001 is x2(k-1), ...
-        for code, value, err in zip(model.final_model[:, 0], model.theta[:, 0], model.err, strict=False):
-            if err < least_err:
-                continue
+        for code, value in zip(model.final_model[:, 0], model.theta[:, 0], strict=True):
             if code:
                 c[used[int(code) // 1000 - 2]] = value
             else:
                 constant = float(value)
-        found |= {(e.name, e.terms[k]): (c[k] / e.scale[k], abs(c[k])) for k in np.flatnonzero(c)}
-        if constant and e.name == "sum":
-            found[e.name, "1"] = (constant, abs(constant))
+        if "1" in e.terms:  # the package has a constant of its own
+            c[e.terms.index("1")] += constant
+            constant = 0.0
+        models.append((e, c))
         left[e.name] = e.y_blocks - e.blocks @ c - constant
-    return Sparse(effects(data, found), (left["u_d"] + 1j * left["u_q"]) * data.units["u"])
+    return Sparse(effects(data, models), (left["u_d"] + 1j * left["u_q"]) * data.units["u"])
 
 
-def names(fitted: Sparse, least: float, share: float) -> list[str]:
+def names(fitted: Sparse, least: float, share: float, mechanical: float) -> list[str]:
     """Names of what dominates."""
-    return dominant(fitted.sizes, least, share)
+    return dominant(fitted.sizes, least, share, mechanical)

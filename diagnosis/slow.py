@@ -1,0 +1,129 @@
+"""A View of a slow log: every still stretch becomes one block that stands for an operating point.
+
+Rows of such a block are made up: constant current, voltage and speed over a few sampling periods, so that cells, fit
+and search work as on a fast recording.  The frame turns with the rotor, the angle within it stands still, and so no
+harmonic order but zero is ever seen: a slow log has none.  Three things differ from a View of real rows:
+
+    flux     the mean EMF is exactly j omega psi, not a difference of flux linkages
+    to_dq    voltages are kept in a stator frame that turns on from row to row, so that a delay has its meaning
+    phases   phase currents are those of one whole electrical turn, as what an inverter loses is a mean over it
+
+Stretches at the same operating point, however far apart in time, share a dwell: what differs between them is noise.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from diagnosis.recording import Recording
+from diagnosis.slow_stretches import Stretches, stretches
+from diagnosis.view import View
+
+ROWS = 36  # a whole turn in steps of ten degrees: the mean of what an inverter loses is right to 0.1 %
+BIN_CURRENT, BIN_SPEED = 0.05, 0.05  # of rated current and of the largest speed: the same operating point
+NO_CURRENT = 0.02  # of rated current: an axis that never carried more says nothing but noise
+MOST_ALIKE = 6  # stretches that an operating point is represented by
+
+# Effects that live in harmonics or in the instants of sampling alone: a slow log says nothing of them.
+UNSEEN = (
+    "cogging", "current_gain", "current_offset", "emf_harmonics", "encoder_eccentricity", "friction",
+    "phase_resistance_asymmetry", "sampling_skew",
+)  # fmt: skip
+
+
+@dataclass
+class SlowView(View):
+    """Operating points as blocks; see the module's header.  ``theta`` holds only what a correction has turned.
+
+    unsteady: (b,) change of the voltage around each stretch [V].
+    """
+
+    unsteady: np.ndarray | float = 0.0
+
+    def _advance(self, count, first=0.5):
+        """Angle of the rotor at intervals counted from the first sample, (b, count) [rad]."""
+        return self.omega[:, :1] * self.sample_time_s * (np.arange(count) + first)
+
+    def to_dq(self, stator):
+        return stator * np.exp(-1j * (self.theta_mid + self._advance(stator.shape[1])))
+
+    def flux(self, psi):
+        return 0.5j * self.omega_mid * (psi[:, 1:] + psi[:, :-1])
+
+    def _turn(self, count):
+        """One whole electrical turn in ``count`` or, of samples, count - 1 steps, (count,) [rad]."""
+        steps = self.theta.shape[1] - 1
+        return 2 * np.pi * (np.arange(count) + (0.5 if count == steps else 0.0)) / steps
+
+    def phases(self, i_dq):
+        turns = np.exp(-2j * np.pi / 3 * np.arange(3))
+        return ((i_dq * np.exp(1j * self._turn(i_dq.shape[1])))[..., None] * turns).real
+
+    def from_phases(self, abc):
+        stator = (2 / 3) * (abc @ np.exp(2j * np.pi / 3 * np.arange(3)))
+        return stator * np.exp(-1j * self._turn(abc.shape[1]))
+
+
+def slow_view(recording: Recording, nominal) -> SlowView:
+    """The operating points of a slow recording as blocks, alike ones next to each other.
+
+    Raises RecordingError where signals are missing or nothing stands still.
+    """
+    return view_of_points(stretches(recording, nominal), recording, nominal)
+
+
+def view_of_points(found: Stretches, recording, nominal) -> SlowView:
+    """The same of stretches that have been found."""
+    order, dwell = alike(found, nominal)
+    b, period = len(order), nominal.sample_time_s
+    held = lambda x, n: np.repeat(np.asarray(x)[order, None], n, axis=1)  # noqa: E731
+    i, omega = held(found.i, ROWS + 1), held(found.omega, ROWS + 1)
+    least = NO_CURRENT * nominal.machine.rated_current_a
+    known = np.where(np.abs(found.i.real).max() > least, i.real, 0.0)
+    known = known + 1j * np.where(np.abs(found.i.imag).max() > least, i.imag, 0.0)
+    turning = omega[:, :1] * period * (np.arange(-1, ROWS + 1) + 0.5)
+    return SlowView(
+        nominal=nominal,
+        sample_time_s=period,
+        theta=np.zeros((b, ROWS + 1)),
+        omega=omega,
+        i=known,
+        i_raw=i,
+        i_abc=None,
+        u=held(found.u, ROWS + 2) * np.exp(1j * turning),
+        u_dc=held(found.u_dc, ROWS),
+        t=found.t[order],
+        temp=found.temp[order],
+        torque=np.full((b, ROWS), np.nan),
+        slope_m=np.zeros((b, ROWS)),
+        shaft=np.full(b, ""),
+        run=dwell,
+        rows=found.first[order],
+        span_s=float(recording["t"][-1] - recording["t"][0]),
+        unsteady=found.unsteady[order],
+    )
+
+
+def alike(found: Stretches, nominal) -> tuple[np.ndarray, np.ndarray]:
+    """(indices of the stretches to use, number of the operating point of each): alike ones stand side by side.
+
+    An operating point where the drive rested for long is thinned out to MOST_ALIKE stretches spread over the time.
+    """
+    rated, top = nominal.machine.rated_current_a, max(float(np.abs(found.omega).max()), 1e-9)
+    steps = (
+        found.i.real / rated / BIN_CURRENT,
+        found.i.imag / rated / BIN_CURRENT,
+        found.omega / top / BIN_SPEED,
+    )
+    bins = np.round(np.stack(steps, axis=1)).astype(int)
+    _, point = np.unique(bins, axis=0, return_inverse=True)
+    order, dwell = [], []
+    for k in np.unique(point):
+        mine = np.flatnonzero(point.ravel() == k)
+        if len(mine) > MOST_ALIKE:
+            mine = mine[np.linspace(0, len(mine) - 1, MOST_ALIKE).round().astype(int)]
+        order += mine.tolist()
+        dwell += [int(k)] * len(mine)
+    return np.array(order), np.array(dwell)

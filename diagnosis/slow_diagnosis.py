@@ -1,0 +1,144 @@
+"""The diagnosis of slow logs: operating points, every set of effects, and what such a log cannot say.
+
+    answer = diagnose_slow([recording], nominal)
+
+It answers as diagnosis.run.diagnose does, which calls it where every recording is slow.  ``answer.search`` is the
+search, ``answer.found`` its outcome, ``answer.held`` the blocks that were not fitted.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from diagnosis import verdict as words
+from diagnosis.catalogue import CATALOGUE
+from diagnosis.locate import evidence, locate
+from diagnosis.recording import RecordingError
+from diagnosis.request import requests
+from diagnosis.result import Diagnosis, Fit
+from diagnosis.slow import UNSEEN, slow_view
+from diagnosis.slow_search import SlowSearch
+from diagnosis.view import View, joined_views
+
+LEAST_POINTS = 8
+HOLDOUT_EVERY = 4
+
+
+def diagnose_slow(recordings, nominal, progress=lambda text: None) -> Diagnosis:
+    """Diagnose slow recordings of one drive.
+
+    Raises RecordingError where too little of them stands still.
+    """
+    view = joined_views([slow_view(r, nominal) for r in recordings])
+    points = np.unique(view.run)
+    if len(points) < LEAST_POINTS:
+        raise RecordingError(
+            f"{recordings[0].source}: {len(points)} operating points stand still, {LEAST_POINTS} are needed: "
+            "hold more of them for longer, or log faster"
+        )
+    held = np.isin(view.run, points[2::HOLDOUT_EVERY])
+    search = SlowSearch(view, ~held, progress)
+    found = search.run()
+    names, ambiguity, weak = _sorted_out(found)
+    fit = _fit(search, found, held)
+    left = found.best.chi2 / max(found.best.rows - found.best.count, 1)
+    if not found.best.model.names:
+        verdict = "no_mismatch" if left <= words.LEFTOVER else "unexplained"
+    elif left > words.LEFTOVER and fit.share_left > words.FLOOR_SHARE:
+        verdict = "unexplained"
+    else:
+        verdict = "ambiguous" if ambiguity else "explained" if names else "no_mismatch"
+    answer = Diagnosis(verdict, "", location=locate(view, search.cells, found.pure), fit=fit)
+    if verdict in ("explained", "ambiguous"):
+        answer.effects = model_effects(search, found, names)
+        answer.ambiguity = ambiguity
+    if ambiguity:
+        progress("the recording that would tell")
+        plain = View(**{f.name: getattr(view, f.name) for f in dataclasses.fields(View)})
+        answer.next_recording = requests(plain, [found.best, *found.tied], CATALOGUE, fit.noise_floor)
+    cells, residual = search.residual(found.best)
+    answer.evidence = evidence(view, (search.cells, search.cells.y), (cells, residual), found.pure, held)
+    answer.sentence = words.sentence(verdict, answer.effects, ambiguity, fit, CATALOGUE, answer.location)
+    answer.notes = _notes(view, held, ambiguity, weak, found)
+    answer.search, answer.found, answer.held = search, found, held
+    return answer
+
+
+def model_effects(search, found, names=None):
+    """NamedEffects of the best model: ``names``, or all of it for a model to simulate, tied or not."""
+    names = sorted(found.best.model.names) if names is None else names
+    return words.named(found.best, names, CATALOGUE, search.view.nominal, found.empty, found.dispersion)
+
+
+def axis_misfit(search, solution, blocks) -> dict:
+    """{"d", "q": {"before", "after"}}: rms of the blocks' mean misfit (b,) bool with and without a solution [V]."""
+    cells, residual = search.residual(solution)
+    out = {}
+    for part, axis in enumerate("dq"):
+        rows = (cells.channel == "u") & (cells.order == 0) & (cells.part == part) & blocks[cells.block]
+        both = {"before": search.cells.y[rows], "after": residual[rows]}
+        out[axis] = {k: float(np.sqrt(np.mean(x**2))) if len(x) else float("nan") for k, x in both.items()}
+    return out
+
+
+def _sorted_out(found):
+    """(asserted names, ambiguity sets, names that are too weak): from what is tied with the best model."""
+    best = found.best.model.names
+    asserted, ambiguity, weak = set(best), [], set()
+    for other in found.tied:
+        gone, come = best - other.model.names, other.model.names - best
+        asserted -= gone
+        if come:
+            ambiguity.append(gone | come)
+        else:
+            weak |= gone
+    merged: list[set] = []
+    for group in ambiguity:
+        group = set(group) - weak
+        for other in [m for m in merged if m & group]:
+            merged.remove(other)
+            group |= other
+        if len(group) > 1:
+            merged.append(group)
+    return sorted(asserted), [sorted(g) for g in merged], sorted(weak)
+
+
+def _fit(search, found, held) -> Fit:
+    def both(blocks):
+        d, q = axis_misfit(search, found.best, blocks).values()
+        return [float(np.hypot(d[k], q[k])) for k in ("before", "after")]
+
+    floor = float(
+        np.sqrt(2.0 * np.mean(found.sigma[(search.cells.order == 0) & (search.cells.channel == "u")] ** 2))
+    )
+    return Fit("u_dq", "V", *both(~held), *both(held), floor)
+
+
+def _notes(view, held, ambiguity, weak, found) -> list[str]:
+    m = view.machine
+    notes = [
+        f"A slow log: {len(view)} stretches at {len(np.unique(view.run))} operating points stand still and were "
+        f"balanced, {int(held.sum())} of the stretches never fitted.",
+        f"It has no harmonics and no sampling instants, so nothing is said of {', '.join(UNSEEN)}.",
+    ]
+    i = view.i.mean(axis=1)
+    if not i.real.any():
+        notes.append(
+            "The d axis never carried a current: nothing is said of L_d and the d axis' own saturation."
+        )
+    if len({x > 0 for x in np.sign(view.omega[:, 0]) if x}) < 2:
+        notes.append(
+            "One direction only: an angle's offset, a current's sign and the inverter's loss are told apart by load and speed alone."
+        )
+    drops = m.resistance_ohm * np.abs(i).max()
+    if drops < 0.1 * np.abs(view.u).max():
+        notes.append(
+            f"At the largest current the resistance drops {drops:.2g} V of {np.abs(view.u).max():.3g} V: it is not measured here."
+        )
+    notes += [f"{name} explains a little more, but not enough to be asserted." for name in weak]
+    for group in ambiguity:
+        for name in group:
+            notes.append(f"{name} is told from its look-alikes by: {CATALOGUE[name].separated_by}.")
+    return notes

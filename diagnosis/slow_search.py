@@ -1,0 +1,171 @@
+"""The search over operating points of a slow log: few rows, so every set of effects is tried.
+
+A real drive differs from its data sheet in five things at once, and a slow log has no harmonics to tell them by.
+Adding one effect after the other then goes astray, as the first ones are blamed for the rest; with a hundred rows
+all sets of up to MOST_EFFECTS can be scored instead (a second's work), and the best refined.
+"""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+
+from diagnosis.catalogue import CATALOGUE
+from diagnosis.cells import voltage_level
+from diagnosis.fit import Fitter, Model, everything
+from diagnosis.search import Outcome, Search
+from diagnosis.slow import UNSEEN
+
+MOST_EFFECTS = 6
+REFINED = 40
+TIE = 20.0  # messages are shared by neighbouring rows: a log of this kind knows less than its rows suggest
+OWN_V, OWN_SHARE = (
+    2.5e-4,
+    2e-3,
+)  # of the bus and of the voltage: digits and instants of messages, ripple, clamping
+UNSTEADY = 0.05  # of the voltage's change around a stretch: messages of different age are put together
+LOADED = 0.02  # of rated current
+LEAST_PAIRS = 4
+LIMITS = {  # what a real drive may have, generously
+    "resistance_ohm": lambda x, n: 0.5 < x / n.machine.resistance_ohm < 4.0,
+    "inductance_d_h": lambda x, n: 0.4 < x / n.machine.inductance_d_h < 2.5,
+    "inductance_q_h": lambda x, n: 0.4 < x / n.machine.inductance_q_h < 2.5,
+    "magnet_flux_wb": lambda x, n: 0.5 < x / n.machine.magnet_flux_wb < 2.0,
+    "scale": lambda x, n: abs(x) < 0.15,
+    "udc_gain": lambda x, n: abs(x) < 0.15,
+    "offset_rad": lambda x, n: abs(x) < 0.6,
+    "delay_s": lambda x, n: abs(x) < 3.0 * n.sample_time_s,
+}
+TELLING = {name: effect for name, effect in CATALOGUE.items() if name not in UNSEEN}
+
+
+class SlowSearch(Search):
+    """Search over a SlowView; see Search for its arguments and for what ``run`` returns."""
+
+    def __init__(self, view, train_blocks, progress=lambda text: None):
+        silent = not view.i.real.any()  # the d axis never carried a current
+        effects = {n: e for n, e in TELLING.items() if not (silent and n == "inductance_d")}
+        super().__init__(view, effects, train_blocks, progress)
+        self.hidden = ("saturation", "d_") if silent else None
+        self.hide(self.cells)
+        self.sigma, self.pure = sigmas(view, self.cells)
+        self.linear = Fitter(self.cells, self.sigma, self.train)
+        chi2, count = self.linear.chi2(everything(self.cells))
+        self.dispersion = max(1.0, chi2 / max(len(self.linear.y) - count, 1))
+
+    def run(self) -> Outcome:
+        self.progress("every set of effects")
+        for model in self.every_set():
+            self.refine(model)
+        best = self.large(self._best())
+        tied = self.tied(best)
+        return Outcome(
+            best, tied, self.refine(Model(frozenset())), self.sigma, self.pure, self.train, self.dispersion
+        )
+
+    def hide(self, cells):
+        """Take the columns off that only an angle's error gives a d current to: nobody could check them."""
+        if self.hidden and self.hidden[0] in cells.columns:
+            columns = cells.columns[self.hidden[0]]
+            for key in [k for k in columns if k.lstrip("~").startswith(self.hidden[1])]:
+                del columns[key]
+
+    def fitter(self, view, effects, free=None) -> Fitter:
+        cells = super().fitter(view, effects, free).cells
+        self.hide(cells)
+        return Fitter(cells, self.sigma, self.train, self.linear.price)
+
+    def plausible(self, solution) -> bool:
+        """No parameter that no drive has: a sum of absurd ones may fit as well as the truth."""
+        nominal = self.view.nominal
+        for name in solution.model.names:
+            found = self.effects[name].estimates(solution.c[name], solution.covariance[name], nominal)
+            if any(key in LIMITS and not LIMITS[key](e.value, nominal) for key, e in found.items()):
+                return False
+        return super().plausible(solution)
+
+    def every_set(self) -> list[Model]:
+        """The most promising models of all sets of up to MOST_EFFECTS effects on the linear problem."""
+        able = [n for n in self.effects if self.linear.index[n][0]]
+        scored = []
+        for size in range(1, MOST_EFFECTS + 1):
+            for names in itertools.combinations(able, size):
+                scored += [(self.linear.score(m, self.dispersion), m) for m in self.some_forms(names)]
+        scored.sort(key=lambda entry: entry[0])
+        return [m for _, m in scored[:REFINED]]
+
+    def some_forms(self, names) -> list[Model]:
+        """All core, or one of them free: two free curves of so few rows would fit each other's noise."""
+        names = frozenset(names)
+        free = [frozenset(), *(frozenset([n]) for n in names if self.linear.index[n][1])]
+        return [m for f in free if self.allowed(m := Model(names, f))]
+
+    def large(self, best):
+        """The best model without effects that are smaller than an engineer's floor.
+
+        What an effect explains has been weighed already: against every other set, this one without it included.
+        """
+        small = [
+            n for n in best.model.names if self.effects[n].size(best.c[n], self.view.nominal) < self.floor(n)
+        ]
+        for name in small:
+            best = self.refine(best.model.without(name))
+        return best
+
+    def floor(self, name) -> float:
+        return self.effects[name].floor(self.view.nominal)
+
+    def tied(self, best):
+        """Other sets of no more effects that explain as much as the best one, each in its best form."""
+        found: dict = {}
+        for model, solution in self.refined.items():
+            if model.names == best.model.names or len(model) > len(best.model) or not model.names:
+                continue
+            if solution.score < best.score + TIE:
+                other = found.get(model.names)
+                found[model.names] = solution if other is None or solution.score < other.score else other
+        return [s for s in found.values() if not any(names < s.model.names for names in found)]
+
+    def residual(self, solution):
+        """(cells, (r,) what a solution leaves) on its corrected data."""
+        fitter = self.fitter(solution.view, [self.effects[n] for n in sorted(solution.model.names)])
+        values = np.zeros(len(fitter.cells.y))
+        for name, c in solution.c.items():
+            if not self.effects[name].corrects:
+                columns = fitter.cells.columns[name]
+                values += sum(v * columns[k if k in columns else f"~{k}"] for k, v in c.items() if v)
+        return fitter.cells, fitter.cells.y - values
+
+
+def sigmas(view, cells) -> tuple[np.ndarray, np.ndarray]:
+    """Standard deviation of every row (r,) [V], and the part that repetitions of an operating point show.
+
+    Without load the voltage stands still; under load an error in proportion to it comes on top, and where things
+    still change one in proportion to the change.
+    """
+    level, n = voltage_level(view), len(view)
+    loaded = np.abs(view.i.mean(axis=1)) > LOADED * view.machine.rated_current_a
+    rows = (cells.channel == "u") & (cells.order == 0)
+    at = np.full((n, 2), -1)
+    at[cells.block[rows], cells.part[rows]] = np.flatnonzero(rows)
+    own = np.hypot(OWN_SHARE * level, OWN_V * view.nominal.inverter.dc_bus_v)
+    own = np.hypot(own, UNSTEADY * view.unsteady)
+    start = own[cells.block]
+    rough = Fitter(cells, start, np.ones(len(cells.y), bool)).solve(everything(cells)).residual[at]
+    pairs = np.flatnonzero((np.diff(view.run) == 0) & (loaded[1:] == loaded[:-1]))
+    change = (rough[pairs + 1] - rough[pairs]) / np.sqrt(2)
+    under = loaded[pairs]
+    rest = _rms(change[~under]) if (~under).sum() >= LEAST_PAIRS else _rms(rough[~loaded])
+    relative = rough / level[:, None].clip(1e-9)
+    share = (
+        _rms(change[under] / level[pairs][under, None])
+        if under.sum() >= LEAST_PAIRS
+        else _rms(relative[loaded])
+    )
+    pure = np.hypot(rest, np.where(loaded, share * level, 0.0))
+    return np.hypot(pure, own)[cells.block], pure[cells.block]
+
+
+def _rms(x) -> float:
+    return float(np.sqrt(np.mean(np.square(x)))) if x.size else 0.0

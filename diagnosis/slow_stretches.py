@@ -1,0 +1,139 @@
+"""Stretches of a slow log in which everything stands still: what can be balanced where samples are far apart.
+
+A slow log, as of a CAN bus, holds every value until the next message or draws a line between two of them.  Its
+messages come at times of their own, so a row mixes values of different instants.  That does no harm where nothing
+changes: over two messages of the slowest signal, nominal and recorded voltage keep within a small share of the
+largest, every signal that is not at rest has been measured anew, and the rotor turns.  What still changes shortly
+before and behind says how far values of different age may lie apart: ``unsteady``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from diagnosis.recording import Recording, RecordingError
+
+SIGNALS = ("i_d", "i_q", "u_d", "u_q", "omega")
+STILL = 0.015  # of the largest voltage: what nominal and recorded voltage may change by
+LEAST_S = 0.5
+MESSAGES = 2.0  # of the slowest signal that a stretch spans
+AROUND, LOOSE = 0.5, 8.0  # shares of a window before and behind it; how much more may change there
+REST = 1e-3  # of a signal's largest value: below it need not be measured anew
+TURNS = 4.0  # electrical, within a stretch: what an inverter loses depends on the angle, its mean over turns does not
+USUAL = 0.9  # quantile of the time between changes
+
+
+@dataclass
+class Stretches:
+    """Means over each stretch, all (b,): dq current and voltage complex [A], [V], electrical speed [rad/s],
+    bus [V], winding [degC] or nan, time of the middle since the first row [s], first row and row behind the last, and
+    the change of the voltage from a little before to a little behind [V]."""
+
+    i: np.ndarray
+    u: np.ndarray
+    omega: np.ndarray
+    u_dc: np.ndarray
+    temp: np.ndarray
+    t: np.ndarray
+    first: np.ndarray
+    end: np.ndarray
+    unsteady: np.ndarray
+    window_s: float
+
+    def __len__(self):
+        return len(self.t)
+
+
+def stretches(recording: Recording, nominal) -> Stretches:
+    """The still stretches of a slow recording, none overlapping another.
+
+    Raises RecordingError where signals are missing or nothing ever stands still.
+    """
+    r, m = recording, nominal.machine
+    i, u, omega, u_dc = operating_columns(recording, nominal)
+    t = r["t"] - r["t"][0]
+    parts = dict(zip(SIGNALS, (i.real, i.imag, u.real, u.imag, omega), strict=True))
+    periods = {name: message_period(t, x) for name, x in parts.items()}
+    fresh = [
+        np.cumsum(np.append(False, np.diff(x) != 0) | (np.abs(x) < REST * np.nanmax(np.abs(x))))
+        for x in parts.values()
+    ]
+    window = max(LEAST_S, MESSAGES * max(periods.values()))
+    psi = m.inductance_d_h * i.real + m.magnet_flux_wb + 1j * m.inductance_q_h * i.imag
+    nominal_u = m.resistance_ohm * i + 1j * omega * psi
+    limit = STILL * max(np.nanmax(np.abs(nominal_u)), np.nanmax(np.abs(u)), 1e-9)
+    good = r.usable & np.isfinite(nominal_u) & np.isfinite(u)
+    step = np.diff(t)
+    broken = np.append(step > max(window / 4, 3.0 * np.median(step)), True)
+    gaps, bad = np.cumsum(np.append(0, broken[:-1])), np.cumsum(np.append(0, ~good))
+    found, k = [], 0
+    ends = np.searchsorted(t, t + window)
+    before, behind = np.searchsorted(t, t - AROUND * window), np.searchsorted(t, t + (1.0 + AROUND) * window)
+    while k < len(t) and behind[k] < len(t):
+        inner, outer = slice(k, ends[k]), slice(before[k], behind[k])
+        whole = (
+            gaps[before[k]] == gaps[behind[k] - 1] and bad[behind[k]] == bad[before[k]] and ends[k] - k >= 3
+        )
+        whole = whole and all(f[ends[k] - 1] > f[k] for f in fresh)
+        whole = whole and np.abs(omega[inner]).min() * window > 2 * np.pi * TURNS
+        if whole and all(
+            _change(x[inner]) < limit and _change(x[outer]) < LOOSE * limit for x in (nominal_u, u)
+        ):
+            found.append((k, ends[k], max(_change(nominal_u[outer]), _change(u[outer]))))
+            k = ends[k]
+        else:
+            k += 1
+    if not found:
+        raise RecordingError(
+            f"{r.source}: in no stretch of {window:.2g} s, two messages of the slowest signal, do current, speed and "
+            "voltage stand still: record operating points that last longer, or log faster"
+        )
+    mean = lambda x: np.array([np.mean(x[a:b]) for a, b, _ in found])  # noqa: E731
+    temp = r["temp_winding"] if r.has("temp_winding") else np.full(len(t), np.nan)
+    first, end, unsteady = (np.array(x) for x in zip(*found, strict=True))
+    return Stretches(
+        mean(i), mean(u), mean(omega), mean(u_dc), mean(temp), mean(t), first, end, unsteady, float(window)
+    )
+
+
+def _change(x) -> float:
+    return float(max(np.ptp(x.real), np.ptp(x.imag)))
+
+
+def operating_columns(recording: Recording, nominal):
+    """(i, u, omega, u_dc): dq current [A] and voltage [V] complex, speed [rad/s], bus [V], all (n,)."""
+    r = recording
+    if not r.has("omega_e"):
+        raise RecordingError(
+            f"{r.source}: a slow recording needs the speed omega_e: an angle this rarely says nothing"
+        )
+    omega = r["omega_e"]
+    u_dc = r["u_dc"] if r.has("u_dc") else np.full(len(r), float(nominal.inverter.dc_bus_v))
+    turns = np.exp(2j * np.pi / 3 * np.arange(3))
+    if r.has("i_d", "i_q"):
+        i = r["i_d"] + 1j * r["i_q"]
+    elif r.has("i_a", "i_b", "theta_e"):
+        third = r["i_c"] if r.has("i_c") else -r["i_a"] - r["i_b"]
+        i = (2 / 3) * (np.stack([r["i_a"], r["i_b"], third], axis=1) @ turns) * np.exp(-1j * r["theta_e"])
+    else:
+        raise RecordingError(f"{r.source}: i_d, i_q or i_a, i_b with theta_e are needed")
+    if r.has("u_d_ref", "u_q_ref"):
+        return i, r["u_d_ref"] + 1j * r["u_q_ref"], omega, u_dc
+    if not r.has("d_a", "d_b", "d_c", "theta_e"):
+        raise RecordingError(f"{r.source}: u_d_ref, u_q_ref or d_a, d_b, d_c with theta_e are needed")
+    ahead = (nominal.control.duty_applied_after_samples + 0.5) * nominal.sample_time_s * omega
+    duties = np.stack([r["d_a"], r["d_b"], r["d_c"]], axis=1)
+    return i, (2 / 3) * (duties @ turns) * u_dc * np.exp(-1j * (r["theta_e"] + ahead)), omega, u_dc
+
+
+def message_period(t, x) -> float:
+    """Usual longest time between two changes of a signal [s]; lines drawn between messages count once."""
+    bends = np.flatnonzero(np.abs(np.diff(x, 2)) > 1e-9 * max(np.nanmax(np.abs(x)), 1e-30)) + 1
+    apart = np.diff(t[bends])
+    apart = apart[apart > 1.5 * np.median(np.diff(t))]
+    if len(apart) < 4:
+        return float(np.median(np.diff(t)))
+    short = apart[apart < 10.0 * np.median(apart)]  # longer: the signal rested
+    return float(np.quantile(short, USUAL))
