@@ -21,7 +21,7 @@ from diagnosis import run as running
 from diagnosis.catalogue import CATALOGUE
 from diagnosis.improved_plant import check_key, plain
 from diagnosis.nominal import load_nominal
-from diagnosis.view import view_of
+from diagnosis.blocks import view_of
 from plant import Harmonic, flux_from_currents, machine_params
 
 NOMINAL = load_nominal(PAPER)

@@ -11,11 +11,15 @@ import pandas as pd
 import pytest
 
 from cocotb_tests import diagnosed_drives as bench
+from cocotb_tests.damaged_files import damaged_files
+from cocotb_tests.recordings_made import nominal_of
 from cocotb_tests.simulate import ROOT
 from cocotb_tests.test_diagnosis_report import failures
 from cocotb_tests.test_registers import PAPER
 from diagnosis import command, session, telemetry
+from diagnosis import diagnose as run_diagnosis
 from diagnosis.nominal import load_nominal
+from diagnosis.recording import RecordingError
 from golden_model import drive as drives
 from golden_model.registers import registers
 from scripts import fluxproof
@@ -276,3 +280,20 @@ def test_a_failing_overlay_costs_a_note_only(dump, tmp_path, monkeypatch):
     found = session.run(table_of(tmp_path / "a.csv", rows=4000), PAPER, tmp_path / "out")
     assert found.verdict == "no_mismatch" and any("no such loop" in note for note in found.notes)
     answer(tmp_path / "out")
+
+
+@pytest.mark.slow
+def test_files_with_flipped_bits_end_without_traceback_and_without_a_name(tmp_path):
+    """Bits flipped in files of every format: a reader may refuse them, the diagnosis must not believe them."""
+    nominal = nominal_of(tmp_path)
+    files = {n: path for n, (path, _) in damaged_files(tmp_path).items() if n.startswith("flip")}
+    named, refused = [], 0
+    for name, path in files.items():
+        try:
+            found = run_diagnosis(path, nominal)
+        except RecordingError:
+            refused += 1
+            continue
+        if found.effects or found.ambiguity:
+            named.append(f"{name}: {found.sentence} {[p.message for p in found.problems]}")
+    assert len(files) > 80 and refused < len(files) and not named, "\n".join(named)

@@ -47,4 +47,6 @@ def shaft_torque(view, exact):
     omega_m = view.omega_mid / m.pole_pairs
     coulomb = (m.coulomb_friction_nm or 0.0) * np.sign(omega_m)
     airgap = torque_of(view, exact.nominal_psi, exact.i)
-    return airgap - (m.viscous_friction_nms or 0.0) * omega_m - coulomb - (m.inertia_kgm2 or 0.0) * view.slope_m
+    return (
+        airgap - (m.viscous_friction_nms or 0.0) * omega_m - coulomb - (m.inertia_kgm2 or 0.0) * view.slope_m
+    )

@@ -48,7 +48,9 @@ class Effect:
     parameters: tuple[Parameter, ...]
     absorbs: tuple[str, ...] = ()
     positive: bool = False  # the leading coefficient cannot be below zero
-    corrects: bool = False  # an error of the record rather than a term of the machine: ``corrected`` takes it away
+    corrects: bool = (
+        False  # an error of the record rather than a term of the machine: ``corrected`` takes it away
+    )
     smoothed: bool = False  # its terms stay on smoothed currents when the model is applied
 
     def core(self, view) -> dict[str, Column]:

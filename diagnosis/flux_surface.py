@@ -25,6 +25,8 @@ from diagnosis.flux_splines import emf_columns, gradients, knots_over, powers
 from diagnosis.result import Estimate
 from plant import FluxMap
 
+STEPS = {"saturation": ("linear", "separable"), "cross_saturation": ("separable", "full")}
+BETTER = 1.3
 DAMPING = tuple(10.0**k for k in range(-9, 2))  # relative to the mean diagonal of the normal matrix
 FOLDS = 5
 LONGEST = 2.0  # times the usual triangle of recorded points: a longer one spans ground that nobody saw
@@ -106,24 +108,27 @@ def flux_map(view, beside=USUAL, train=None, shape="full") -> Surface:
 
 
 def ladder(view, train, beside=USUAL) -> dict[str, dict]:
-    """{shape: {"train", "holdout": rms misfit [V], "gain"}} of ever freer co-energies, the nominal one first.
+    """{shape: {"train", "holdout": rms misfit [V]}} of ever freer co-energies, the nominal one first.
 
-    gain: chi^2 over the freest one's dispersion that a shape explains beyond the one before it.  What separable
-    explains beyond linear is saturation, what full explains beyond separable is cross-saturation: names that rest on
-    which currents the flux depends on, not on a formula.  train: (b,) blocks that are fitted, the others are held out.
+    What separable predicts better than linear is saturation, what full predicts better than separable is
+    cross-saturation: names that rest on which currents the flux depends on, not on a formula.
+    train: (b,) blocks that are fitted, the others are held out.
     """
-    y = misfit(view)["u"].mean(axis=1)
-    rows = {"nominal": y}
+    rows = {"nominal": misfit(view)["u"].mean(axis=1)}
     rows |= {shape: flux_map(view, beside, train, shape).residual(view) for shape in SHAPES}
-    rms = lambda x: float(np.sqrt(np.mean(np.abs(x) ** 2)))  # noqa: E731
-    variance = rms(rows["full"][train]) ** 2
-    out, before = {}, None
-    for shape, left in rows.items():
-        power = np.sum(np.abs(left[train]) ** 2)
-        gain = 0.0 if before is None else float(2.0 * (before - power) / variance)
-        out[shape] = {"train": rms(left[train]), "holdout": rms(left[~train]), "gain": gain}
-        before = power
-    return out
+    return {
+        shape: {"train": _rms(left[train]), "holdout": _rms(left[~train])} for shape, left in rows.items()
+    }
+
+
+def names(steps: dict[str, dict], noise_v: float) -> list[str]:
+    """Names that a ladder deserves: each step must predict BETTER times as well, and by more than the noise."""
+    found = []
+    for name, (before, after) in STEPS.items():
+        worse, better = steps[before]["holdout"], steps[after]["holdout"]
+        if worse > BETTER * better and worse**2 - better**2 > noise_v**2:
+            found.append(name)
+    return found
 
 
 def earned(view, names, beside=USUAL, train=None) -> dict[str, float]:
@@ -231,9 +236,8 @@ class _Problem:
         beside = {}
         for (name, key), value, sigma in zip(self.names, c[n:] * scale, spread, strict=True):
             beside.setdefault(name, {})[key] = Estimate(float(value), float(sigma), "")
-        return Surface(
-            self.view.machine, *self.knots, (self.basis @ c[:n]).reshape(self.sizes), _apart(self.points), beside, damping, error,
-        )  # fmt: skip
+        weights = (self.basis @ c[:n]).reshape(self.sizes)
+        return Surface(self.view.machine, *self.knots, weights, _apart(self.points), beside, damping, error)
 
 
 def _basis(shape, knots_d, knots_q):
@@ -247,6 +251,10 @@ def _basis(shape, knots_d, knots_q):
     if shape == "separable":
         return np.hstack([np.kron(np.eye(n_d), one_q[:, None]), np.kron(one_d[:, None], np.eye(n_q))])
     return np.eye(n_d * n_q)
+
+
+def _rms(x) -> float:
+    return float(np.sqrt(np.mean(np.abs(x) ** 2)))
 
 
 def _plane(i):

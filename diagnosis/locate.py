@@ -27,7 +27,9 @@ def at_order(cells, values, order):
     rows = (cells.channel == "u") & (cells.order == order)
     out = np.full(cells.block.max() + 1, np.nan + 0j)
     d, q = rows & (cells.part == 0), rows & (cells.part == 1)
-    out[cells.block[d]] = np.where(cells.ok[d], values[d], np.nan) + 1j * np.where(cells.ok[q], values[q], np.nan)
+    out[cells.block[d]] = np.where(cells.ok[d], values[d], np.nan) + 1j * np.where(
+        cells.ok[q], values[q], np.nan
+    )
     return out
 
 
@@ -69,7 +71,14 @@ def _regions(view, y0):
         if best and best[0] > REGION_FACTOR:
             _, inside, a, b = best
             out.append(
-                Region(variable, float(inside.min()), float(inside.max()), unit, float(np.sqrt(a.mean())), float(np.sqrt(b.mean())))
+                Region(
+                    variable,
+                    float(inside.min()),
+                    float(inside.max()),
+                    unit,
+                    float(np.sqrt(a.mean())),
+                    float(np.sqrt(b.mean())),
+                )
             )
     return sorted(out, key=lambda r: -r.rms / max(r.rms_elsewhere, 1e-12))[:4]
 
@@ -81,7 +90,12 @@ def evidence(view, before, after, pure, holdout_blocks) -> Evidence:
     orders = np.unique(np.abs(cells.order[cells.channel == "u"]))
 
     def spectrum(c, values):
-        return np.array([np.hypot(_rms(at_order(c, values, h)), _rms(at_order(c, values, -h)) if h else 0.0) for h in orders])
+        return np.array(
+            [
+                np.hypot(_rms(at_order(c, values, h)), _rms(at_order(c, values, -h)) if h else 0.0)
+                for h in orders
+            ]
+        )
 
     arrays = {name: x for name, (x, _) in _block_means(view).items() if np.isfinite(x).all()}
     arrays |= {

@@ -52,7 +52,9 @@ def grid(view):
     u_max = 0.9 * view.nominal.inverter.dc_bus_v / np.sqrt(3)
     top = max(float(np.abs(view.omega).max()), 0.25 * u_max / m.magnet_flux_wb)
     points = []
-    for share, q, d in itertools.product((0.0, 0.1, -0.1, 0.3, -0.3, 0.6, -0.6, 1.0, -1.0), (0.0, 0.5, -0.5, 1.0, -1.0), (0.0, -0.5, 0.5)):
+    for share, q, d in itertools.product(
+        (0.0, 0.1, -0.1, 0.3, -0.3, 0.6, -0.6, 1.0, -1.0), (0.0, 0.5, -0.5, 1.0, -1.0), (0.0, -0.5, 0.5)
+    ):
         omega, i = share * top, rated * (d + 1j * q)
         u = m.resistance_ohm * i + 1j * omega * (view.inductances(np.array(i)) + m.magnet_flux_wb)
         if abs(i) <= 1.2 * rated and abs(u) < u_max:
@@ -84,7 +86,9 @@ def requests(view, solutions, effects, noise_v) -> list[Request]:
     distance = np.zeros((len(pairs), len(omega)))
     for n, (a, b) in enumerate(pairs):
         difference = rows[a][1] - rows[b][1]
-        weight = np.where(p.ok & (p.channel == "u"), 1.0 / (own**2 + 0.25 * (rows[a][2] ** 2 + rows[b][2] ** 2)), 0.0)
+        weight = np.where(
+            p.ok & (p.channel == "u"), 1.0 / (own**2 + 0.25 * (rows[a][2] ** 2 + rows[b][2] ** 2)), 0.0
+        )
         np.add.at(distance[n], p.block, weight * difference**2)
     out, reached = [], np.zeros(len(pairs))
     while len(out) < MOST and (reached < ENOUGH).any():
@@ -98,7 +102,14 @@ def requests(view, solutions, effects, noise_v) -> list[Request]:
         names = sorted({x for n in np.flatnonzero(told) for s in pairs[n] for x in solutions[s].model.names})
         worst = pairs[int(np.argmax(np.where(told, distance[:, k], -1)))]
         out.append(
-            Request(float(omega[k]), float(i[k].real), float(i[k].imag), names, _why(made, k, rows, worst, solutions), float(view.nominal.inverter.dc_bus_v))
+            Request(
+                float(omega[k]),
+                float(i[k].real),
+                float(i[k].imag),
+                names,
+                _why(made, k, rows, worst, solutions),
+                float(view.nominal.inverter.dc_bus_v),
+            )
         )
         distance[:, k] = 0.0
     return out

@@ -17,7 +17,11 @@ LEAST_SHARE = 1.5e-3  # of the voltage: smaller ripples are the inverter's
 TORQUE_SHARE = 0.01  # of rated torque
 SWING_SHARE = 4e-3
 SWING_RATIO = 8.0  # of the spectrum's low end over its neighbourhood
-WEIGHTS = {"1": lambda v: np.ones(len(v)), "omega": lambda v: v.omega.mean(axis=1), "i_q": lambda v: v.i.imag.mean(axis=1)}
+WEIGHTS = {
+    "1": lambda v: np.ones(len(v)),
+    "omega": lambda v: v.omega.mean(axis=1),
+    "i_q": lambda v: v.i.imag.mean(axis=1),
+}
 
 
 @dataclass

@@ -211,7 +211,9 @@ class Search:
             effect = self.effects[name]
             if effect.corrects or effect.smoothed or name in ("friction", "cogging"):
                 continue
-            smooth, raw = (cells_of(v, [effect], self.projector).columns[name] for v in (solution.view, rough))
+            smooth, raw = (
+                cells_of(v, [effect], self.projector).columns[name] for v in (solution.view, rough)
+            )
             for key, value in c.items():
                 if value:
                     k = key if key in raw else f"~{key}"
@@ -239,7 +241,9 @@ class Search:
 
     def _fitter_at(self, solution) -> Fitter:
         """The linear problem with all effects at the solution's corrected data."""
-        return self.linear if solution.view is self.view else self.fitter(solution.view, self.effects.values())
+        return (
+            self.linear if solution.view is self.view else self.fitter(solution.view, self.effects.values())
+        )
 
     def _neighbours(self, best):
         """Refine what lies one addition, removal, exchange or change of form away and promises something."""
@@ -322,6 +326,10 @@ class Search:
         c, cov = np.array(list(solution.c[name].values())), solution.covariance[name]
         wald = float(c @ np.linalg.pinv(cov) @ c) / self.dispersion
         return None if wald > SURE**2 * len(c) ** 0.5 else gain
+
+    def worth(self, solution, name) -> float:
+        """chi^2 that an effect of a solution takes away."""
+        return self.refine(solution.model.without(name)).chi2 - solution.chi2
 
     def _tied(self, best, sure) -> list[Solution]:
         """Other models that explain as much: other sets of no more effects.

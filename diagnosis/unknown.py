@@ -13,7 +13,6 @@ from diagnosis.result import UnknownTerm
 
 def _dependences(view):
     """{text: (b,) factor} that a term may be in proportion to, and its unit below the volt."""
-    m = view.machine
     omega, i = view.omega.mean(axis=1), view.i.mean(axis=1)
     return {
         "1": (np.ones(len(view)), "V"),

@@ -11,8 +11,12 @@ FLOOR_SHARE = 0.15  # of the misfit's rms: a leftover below it is the curve's, n
 
 
 CONSTANTS = {"magnet_temperature": "magnet_flux", "resistance_temperature": "resistance"}
-DRIFTS, STANDS = 0.25, 1.5  # drift over constant part: below the first it is the constant's, above 1/second nobody knows
+DRIFTS, STANDS = (
+    0.25,
+    1.5,
+)  # drift over constant part: below the first it is the constant's, above 1/second nobody knows
 
+LEAST_DISPERSION = 0.5
 SLOPE_DEVICE, SLOPE_UNCLEAR = 0.12, 0.35  # ohmic drop at rated current over the inverter's loss
 
 
@@ -21,7 +25,9 @@ def groups(best, tied, effects, nominal):
     models = [best.model.names, *(s.model.names for s in tied)]
     shared = frozenset.intersection(*models)
     rest = frozenset().union(*models) - shared
-    ambiguity = [sorted(rest)] if len(rest) > 1 else []  # one alone is there or is not: too weak to be spoken of
+    ambiguity = (
+        [sorted(rest)] if len(rest) > 1 else []
+    )  # one alone is there or is not: too weak to be spoken of
     for drift, constant in CONSTANTS.items():
         if {drift, constant} <= shared:
             moved = effects[drift].size(best.c[drift], nominal)
@@ -42,16 +48,27 @@ def groups(best, tied, effects, nominal):
     return sorted(shared), ambiguity
 
 
-def carried(names, best, gains):
-    """Names whose share of the fit exceeds all that is left of it, where much is left."""
+def verdict(names, ambiguity, left) -> str:
+    """The verdict from the names, the ambiguity sets and what remains."""
+    if left.stray or left.group:
+        return "unexplained"
+    if not names and not ambiguity:
+        return "no_mismatch" if left.reduced <= LEFTOVER else "unexplained"
+    if left.reduced > LEFTOVER and left.fit.share_left > FLOOR_SHARE:
+        return "unexplained"
+    return "ambiguous" if ambiguity else "explained"
+
+
+def carried(names, best, worth):
+    """Names that bring more than all that is left, where much is left; ``worth(solution, name)`` in chi^2."""
     if best.dispersion <= LEFTOVER:
         return names
-    return [n for n in names if gains(n) > best.chi2]
+    return [n for n in names if worth(best, n) > best.chi2]
 
 
-def named(solution, names, effects, nominal, empty, dispersion) -> list[NamedEffect]:
-    """The asserted effects with their parameters."""
-    out = []
+def named(solution, names, effects, nominal, empty, reduced) -> list[NamedEffect]:
+    """The asserted effects with their parameters; reduced: chi^2 per degree of freedom, which scales the errors."""
+    out, dispersion = [], max(reduced, LEAST_DISPERSION)
     for name in names:
         effect, c, covariance = effects[name], solution.c[name], solution.covariance[name] * dispersion
         vector = np.array(list(c.values()))
@@ -81,9 +98,12 @@ def size_text(effect, estimates) -> str:
 def sentence(verdict, effects_named, ambiguity, fit, effects, location) -> str:
     """The verdict in one sentence."""
     if verdict == "no_mismatch":
-        return f"Simulation and recording agree: the misfit of {fit.train_before:.3g} V is that of noise and of the balance itself."
-    what = " and ".join(f"{effects[e.name].title} ({size_text(effects[e.name], e.parameters)})" for e in effects_named)
-    gain = f"the misfit on operating points not fitted falls from {fit.holdout_before:.3g} V to {fit.holdout_after:.3g} V"
+        return f"Simulation and recording agree: the misfit of {fit.train_before:.3g} V is noise."
+    what = " and ".join(
+        f"{effects[e.name].title} ({size_text(effects[e.name], e.parameters)})" for e in effects_named
+    )
+    before, after = fit.holdout_before, fit.holdout_after
+    gain = f"the misfit on operating points not fitted falls from {before:.3g} V to {after:.3g} V"
     if verdict == "explained":
         return f"{what[0].upper()}{what[1:]}: {gain}."
     if verdict == "ambiguous":

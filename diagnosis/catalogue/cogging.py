@@ -11,7 +11,10 @@ ORDERS = range(2, 38, 2)  # per electrical turn: multiples of the poles
 
 
 def _waves(view, h):
-    return {f"h{h}_cos": {"torque": np.cos(h * view.theta_mid)}, f"h{h}_sin": {"torque": np.sin(h * view.theta_mid)}}
+    return {
+        f"h{h}_cos": {"torque": np.cos(h * view.theta_mid)},
+        f"h{h}_sin": {"torque": np.sin(h * view.theta_mid)},
+    }
 
 
 def _order(view) -> int:
@@ -29,8 +32,12 @@ def _order(view) -> int:
             for h in ORDERS:
                 f = (torque * taper * np.exp(-1j * h * theta)).mean(axis=1)[h * turns > 2.0]
                 # A free shaft's acceleration is noisier the faster it turns.
-                weight = 1.0 / np.maximum(np.abs(f) ** 2, np.median(np.abs(f) ** 2)) if len(f) else np.zeros(0)
-                lock = float(np.abs(np.sum(weight * f)) ** 2 / max(np.sum(weight**2 * np.abs(f) ** 2), 1e-300))
+                weight = (
+                    1.0 / np.maximum(np.abs(f) ** 2, np.median(np.abs(f) ** 2)) if len(f) else np.zeros(0)
+                )
+                lock = float(
+                    np.abs(np.sum(weight * f)) ** 2 / max(np.sum(weight**2 * np.abs(f) ** 2), 1e-300)
+                )
                 if lock > best:
                     best, view.memo["cogging_order"] = lock, h
     return view.memo["cogging_order"]

@@ -38,21 +38,27 @@ class CrossSaturation(FluxEffect):
 
     def estimates(self, c, covariance, nominal):
         m = nominal.machine
-        weights = np.array([{"xy2": 1.0, "xy4": 1.0, "xy1": np.sqrt(1.01) - 0.1}.get(name, 0.0) for name in c])
+        weights = np.array(
+            [{"xy2": 1.0, "xy4": 1.0, "xy1": np.sqrt(1.01) - 0.1}.get(name, 0.0) for name in c]
+        )
         scale = m.inductance_q_h / m.rated_current_a
         value = float(weights @ np.array(list(c.values()))) * scale
         spread = float(np.sqrt(max(weights @ covariance @ weights, 0.0))) * scale
         return {"cross_saturation_wb_per_a2": Estimate(-value, spread, "Wb/A2")}
 
     def plant(self, c, nominal):
-        return {"machine.cross_saturation_wb_per_a2": self.estimates(c, np.zeros((len(c),) * 2), nominal)["cross_saturation_wb_per_a2"].value}
+        return {
+            "machine.cross_saturation_wb_per_a2": self.estimates(c, np.zeros((len(c),) * 2), nominal)[
+                "cross_saturation_wb_per_a2"
+            ].value
+        }
 
 
 EFFECT = CrossSaturation(
     name="cross_saturation",
     title="the current of one axis saturates the other",
     equation="psi_d = L_d i_d + psi_m - c i_q^2, psi_q = L_q i_q - 2 c i_d i_q (one co-energy)",
-    signature="order 0, in proportion to the speed: omega i_q^2 on the q axis, even in i_q; omega i_d i_q on the d axis",
+    signature="order 0, in proportion to the speed: omega i_q^2 on the q axis, even in i_q; omega i_d i_q on d",
     confounders=("inductance_d", "magnet_flux", "current_scale", "saturation"),
     separated_by="a grid of i_d and i_q with i_q = 0 in it",
     parameters=(Parameter("cross_saturation_wb_per_a2", "Wb/A2", "c at rated i_q"),),

@@ -49,7 +49,9 @@ class CurrentGain(Effect):
         names = list(c)
         out = {}
         for k, phase in enumerate("abc"):
-            weights = np.array([PATTERNS[n][k] if n in PATTERNS else 1.0 if n == "common" else 0.0 for n in names])
+            weights = np.array(
+                [PATTERNS[n][k] if n in PATTERNS else 1.0 if n == "common" else 0.0 for n in names]
+            )
             spread = float(np.sqrt(max(weights @ covariance @ weights, 0.0)))
             out[f"gain_{phase}"] = Estimate(float(self._gains(c)[k]), spread, "1")
         return out

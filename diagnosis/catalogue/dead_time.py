@@ -16,7 +16,9 @@ def _losses(view, widths, factor=1.0):
     The measured current, for what counts is when it crosses zero; the mean of an interval's two samples
     does not correlate with their difference, which is the misfit's noise.
     """
-    ramps = clipped_ramps(view.phases(view.with_raw_current().i_mid), [w * view.machine.rated_current_a for w in widths])
+    ramps = clipped_ramps(
+        view.phases(view.with_raw_current().i_mid), [w * view.machine.rated_current_a for w in widths]
+    )
     return {w: voltage(view.from_phases(ramp) * factor) for w, ramp in zip(widths, ramps, strict=True)}
 
 
@@ -45,7 +47,9 @@ class DeadTime(Effect):
 
     def plant(self, c, nominal):
         v_dead = max(0.0, float(sum(c.values())))
-        zone = sum(abs(v) * float(k[2:]) for k, v in c.items() if k.startswith("v_")) / max(sum(map(abs, c.values())), 1e-12)
+        zone = sum(abs(v) * float(k[2:]) for k, v in c.items() if k.startswith("v_")) / max(
+            sum(map(abs, c.values())), 1e-12
+        )
         return {
             "inverter.dead_time_s": v_dead / nominal.inverter.dc_bus_v / nominal.inverter.pwm_frequency_hz,
             "inverter.zero_current_a": zone * nominal.machine.rated_current_a,

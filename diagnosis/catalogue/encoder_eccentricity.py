@@ -14,7 +14,9 @@ def _turns(view, orders):
 def _acceleration(view, name, wave):
     """d omega_m / dt that a wave of the angle's error pretends, (b, m) [rad/s^2]."""
     middle = 0.5 * (wave[:, 1:] + wave[:, :-1])
-    return -((int(name[-1]) * view.omega_mid / view.machine.pole_pairs) ** 2) * middle / view.machine.pole_pairs
+    return (
+        -((int(name[-1]) * view.omega_mid / view.machine.pole_pairs) ** 2) * middle / view.machine.pole_pairs
+    )
 
 
 def _column(view, name, wave):
@@ -39,7 +41,9 @@ class EncoderEccentricity(Effect):
     def corrected(self, view, c):
         waves = _turns(view, (1, 2, 3))
         false = sum(value * _acceleration(view, name, waves[name]) for name, value in c.items())
-        return view.turned(sum(value * waves[name] for name, value in c.items())).replace(slope_m=view.slope_m - false)
+        return view.turned(sum(value * waves[name] for name, value in c.items())).replace(
+            slope_m=view.slope_m - false
+        )
 
     def estimates(self, c, covariance, nominal):
         first = np.hypot(c["cos_1"], c["sin_1"])

@@ -38,7 +38,12 @@ class Friction(Effect):
         """Drag at the speed where the EMF reaches the bus, about the highest."""
         m = nominal.machine
         top = nominal.inverter.dc_bus_v / np.sqrt(3) / m.magnet_flux_wb / m.pole_pairs
-        return abs(c["viscous"]) * top + abs(c["coulomb"]) + abs(c.get("square", 0.0)) * top + abs(c.get("low", 0.0))
+        return (
+            abs(c["viscous"]) * top
+            + abs(c["coulomb"])
+            + abs(c.get("square", 0.0)) * top
+            + abs(c.get("low", 0.0))
+        )
 
     def estimates(self, c, covariance, nominal):
         m, spread = nominal.machine, np.sqrt(np.maximum(np.diag(covariance), 0.0))

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from diagnosis.effect import Effect, Parameter, one, sigma, torque_of
+from diagnosis.effect import Effect, Parameter, one, torque_of
 
 
 def _loss(view, omega):
@@ -19,7 +19,10 @@ class IronLoss(Effect):
     def free(self, view):
         top = max(float(np.abs(view.omega).max()), 1.0)
         soft = view.omega / np.sqrt((view.omega / top) ** 2 + 0.02**2)
-        return {"g_hysteresis": _loss(view, soft), "g_eddy": _loss(view, view.omega * np.abs(view.omega) / top)}
+        return {
+            "g_hysteresis": _loss(view, soft),
+            "g_eddy": _loss(view, view.omega * np.abs(view.omega) / top),
+        }
 
     def floor(self, nominal):
         m = nominal.machine

@@ -13,7 +13,9 @@ class MagnetFlux(FluxEffect):
         return 0.003 * nominal.machine.magnet_flux_wb
 
     def estimates(self, c, covariance, nominal):
-        return one("magnet_flux_wb", "Wb", nominal.machine.magnet_flux_wb + c["delta_psi_m"], sigma(covariance))
+        return one(
+            "magnet_flux_wb", "Wb", nominal.machine.magnet_flux_wb + c["delta_psi_m"], sigma(covariance)
+        )
 
     def plant(self, c, nominal):
         return {"machine.magnet_flux_wb": nominal.machine.magnet_flux_wb + c["delta_psi_m"]}

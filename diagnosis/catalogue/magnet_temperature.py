@@ -38,6 +38,10 @@ EFFECT = MagnetTemperature(
     signature="order 0 on the q axis, in proportion to the speed, drifting over time",
     confounders=("magnet_flux", "resistance_temperature"),
     separated_by="hot and cold, at two speeds and without current",
-    parameters=(Parameter("magnet_flux_drift_wb", "Wb", "from start to end; nobody measures the magnets' temperature"),),
+    parameters=(
+        Parameter(
+            "magnet_flux_drift_wb", "Wb", "from start to end; nobody measures the magnets' temperature"
+        ),
+    ),
     absorbs=("magnet_flux",),
 )

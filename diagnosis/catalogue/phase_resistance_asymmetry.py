@@ -17,7 +17,10 @@ class PhaseResistanceAsymmetry(Effect):
     def free(self, view):
         fade = course(view)[:, :, None]
         i_abc, r = view.phases(view.i_mid), view.machine.resistance_ohm
-        return {f"{k}_course": voltage(view.from_phases(fade * r * np.array(w) * i_abc)) for k, w in PATTERNS.items()}
+        return {
+            f"{k}_course": voltage(view.from_phases(fade * r * np.array(w) * i_abc))
+            for k, w in PATTERNS.items()
+        }
 
     def floor(self, nominal):
         return 0.01
@@ -47,7 +50,7 @@ EFFECT = PhaseResistanceAsymmetry(
     equation="u_x = R (1 + a_x) i_x, sum of a_x = 0",
     signature="order 2 in dq, in proportion to the current, not to the speed",
     confounders=("current_gain", "resistance"),
-    separated_by="standstill against speed: a sensor's error also follows omega L i; the sum of three measured currents",
+    separated_by="standstill against speed: a sensor's error follows omega L i too; the sum of three measured currents",
     parameters=tuple(Parameter(f"asymmetry_{x}", "1", f"phase {x}, relative to the mean") for x in "abc"),
     absorbs=("resistance",),
 )

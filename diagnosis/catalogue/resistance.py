@@ -30,6 +30,6 @@ EFFECT = Resistance(
     equation="u_dq = (R + delta_r) i_dq",
     signature="order 0, in proportion to the current, at every speed, standstill included",
     confounders=("iron_loss", "magnet_flux", "dead_time", "resistance_temperature"),
-    separated_by="low speed and three loads; a reversal of i_q against the magnets, several currents against the inverter",
+    separated_by="low speed and three loads; a reversal of i_q against the magnets, several currents for the inverter",
     parameters=(Parameter("resistance_ohm", "ohm", "per phase, at the recording's temperature"),),
 )

@@ -38,7 +38,9 @@ class Saturation(FluxEffect):
         x = np.linspace(0, 1, 21)
         bends = []
         for axis in "qd":
-            curve = sum(c.get(f"{axis}_{k}", 0.0) * x**p for k, p in (("2", 2), ("2s", 2), ("3", 3), ("5", 5)))
+            curve = sum(
+                c.get(f"{axis}_{k}", 0.0) * x**p for k, p in (("2", 2), ("2s", 2), ("3", 3), ("5", 5))
+            )
             bends.append(np.max(np.abs(curve - x * curve[-1])))
         return float(max(bends))
 
@@ -56,7 +58,8 @@ class Saturation(FluxEffect):
     def plant(self, c, nominal):
         rated2 = nominal.machine.rated_current_a**2
         return {
-            f"machine.saturation_{axis}_per_a2": max(0.0, -sum(v for k, v in c.items() if k.startswith(axis))) / rated2
+            f"machine.saturation_{axis}_per_a2": max(0.0, -sum(v for k, v in c.items() if k.startswith(axis)))
+            / rated2
             for axis in "dq"
         }
 

@@ -21,7 +21,7 @@ from diagnosis.load import load_recording
 from diagnosis.nominal import load_nominal
 from diagnosis.recording import RecordingError
 from diagnosis.run import holdout_blocks
-from diagnosis.view import view_of
+from diagnosis.blocks import view_of
 
 
 @dataclass

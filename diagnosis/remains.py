@@ -1,0 +1,95 @@
+"""What the best model leaves: its residual, the misfit before and after, and what stands out of the noise."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from diagnosis.balance import misfit
+from diagnosis.cells import voltage_level
+from diagnosis.result import Fit
+from diagnosis.scan import Stray, row_residual, stray_order, stray_swing, stray_torque
+
+GROUP_ROWS, GROUP_CHI2 = 12, 3.0
+GROUP_SHARE = 0.4  # of a group's misfit: an explanation leaves no group as it was
+
+
+@dataclass
+class Remains:
+    """Residual (r,) of the best model with its cells, and what it says.
+
+    reduced: chi^2 per degree of freedom on fitted rows.  group: a channel's order of which much is left, or ''.
+    stray: a misfit outside the cells' orders, or None.
+    """
+
+    cells: object
+    residual: np.ndarray
+    fit: Fit
+    reduced: float
+    group: str
+    stray: Stray | None
+
+
+def remains(search, found, held) -> Remains:
+    """Residual of the best model of a search on its corrected data; held: (b,) blocks that were not fitted."""
+    best = found.best
+    fitter = search.fitter(best.view, [search.effects[n] for n in sorted(best.model.names)])
+    cells, residual = fitter.cells, fitter.solve(best.model).residual
+    use = cells.ok & found.train
+    reduced = float(np.sum((residual[use] / found.sigma[use]) ** 2)) / max(use.sum() - best.count, 1)
+    rows = row_residual(best.view, best, search.effects, misfit(best.view))
+    level = voltage_level(search.view)
+    stray = (
+        stray_order(best.view, rows, level)
+        or stray_swing(best.view, rows, level)
+        or stray_torque(best.view, search.projector, cells, residual, found.sigma)
+    )
+    group = _standing_out(search, found, cells, residual, use)
+    return Remains(cells, residual, _fit(search, found, cells, residual, held), reduced, group, stray)
+
+
+def _standing_out(search, found, cells, residual, use) -> str:
+    """Channel and order of which the largest share is left, if that is neither noise nor a curve's imperfection."""
+    chi, floor, worst = (residual / found.sigma) ** 2, _least(search.view), (0.0, "")
+    for channel in np.unique(cells.channel):
+        for order in np.unique(cells.order[cells.channel == channel]):
+            rows = use & (cells.channel == channel) & (cells.order == order)
+            if rows.sum() < GROUP_ROWS:
+                continue
+            after = np.mean(residual[rows] ** 2) - np.mean(found.pure[rows] ** 2)
+            before = np.mean(search.cells.y[rows] ** 2)
+            if chi[rows].mean() > GROUP_CHI2 and after > max(GROUP_SHARE**2 * before, floor[channel] ** 2):
+                worst = max(worst, (float(np.sqrt(after / before)), f"{channel} at order {order:g}"))
+    return worst[1]
+
+
+def _least(view) -> dict[str, float]:
+    """What is too little to be spoken of, per channel."""
+    m = view.machine
+    torque = 1.5 * m.pole_pairs * m.magnet_flux_wb * m.rated_current_a
+    return {
+        "u": 1e-3 * float(voltage_level(view).max()),
+        "sum": 2e-3 * m.rated_current_a,
+        "torque": 8e-3 * torque,
+    }
+
+
+def _fit(search, found, cells, residual, held) -> Fit:
+    """Misfit before and after, rms over blocks of all its orders, on fitted and held-out blocks [V]."""
+
+    def rms(values, blocks):
+        use = cells.ok & (cells.channel == "u") & blocks[cells.block]
+        power = np.bincount(cells.block[use], values[use] ** 2, minlength=len(blocks))[blocks]
+        return float(np.sqrt(power.mean())) if len(power) else 0.0
+
+    before = search.cells.y + search.adjust
+    return Fit(
+        "u_dq",
+        "V",
+        rms(before, ~held),
+        rms(residual, ~held),
+        rms(before, held),
+        rms(residual, held),
+        rms(found.pure, ~held),
+    )
