@@ -21,7 +21,10 @@ MOST_BLOCKS = 320  # more rows than these blocks hold add time, not knowledge
 RAMP_TORQUE = 0.02  # of rated torque: a change of inertial torque within a block beyond it is a ramp
 SLOPE_REACH = 60  # samples over which the shaft's acceleration is taken beside a transducer
 CURRENT_STEP = 0.08  # of rated current: a block with a larger change is a transient
+RIPPLE = 0.05  # of rated current, rms around the block's parabola
 SPEED_STEP = 0.06  # of the largest speed
+SLOW_SHARE = 0.01  # of the speed at which the EMF reaches the bus: standstill is steady too
+RESTLESS = 3.0  # how much more is let pass where nothing is steady
 
 
 def smooth(values, joined_run, half=HALF_WIDTH):
@@ -73,7 +76,7 @@ def view_of(recording: Recording, nominal, block_rows=BLOCK_ROWS) -> View:
     Raises RecordingError where no block is left.
     """
     r, period, machine = recording, nominal.sample_time_s, nominal.machine
-    n, delay = len(r), nominal.control.duty_applied_after_samples
+    n = len(r)
     linked = r.joined[:-1] & r.usable[:-1] & r.usable[1:]
     run = np.concatenate([[0], np.cumsum(~linked)])
     theta = _unwrapped(r, run, period)
@@ -84,55 +87,18 @@ def view_of(recording: Recording, nominal, block_rows=BLOCK_ROWS) -> View:
     i_s = smooth(i_raw * np.exp(-1j * theta), run)
     omega = np.full(n, np.nan)
     omega[1:-1] = (theta_s[2:] - theta_s[:-2]) / (2 * period)
-    u_dc = r["u_dc"] if r.has("u_dc") else np.full(n, float(nominal.inverter.dc_bus_v))
-    u_dc_mid = np.append(0.5 * (u_dc[1:] + u_dc[:-1]), u_dc[-1])
-    asked = np.full(n, np.nan + 0j)
-    if r.has("d_a", "d_b", "d_c"):
-        duties = np.stack([r["d_a"], r["d_b"], r["d_c"]], axis=1)
-        vector = (2 / 3) * (duties @ np.exp(2j * np.pi / 3 * np.arange(3)))
-        asked[delay:] = vector[: n - delay]
-        u = asked * u_dc_mid
-    else:
-        # A controller that turns its reference by the delay's angle: it acts at the middle of its own period.
-        asked[delay:] = (r["u_d_ref"] + 1j * r["u_q_ref"])[: n - delay]
-        middle = np.append(0.5 * (theta_s[1:] + theta_s[:-1]), np.nan)
-        u = asked * np.exp(1j * middle)
-    kind = shaft_kind(r, nominal, i_s, theta_s, linked)
-    torque = r["torque"] if kind == "torque" else np.full(n, 0.0 if kind in ("unloaded", "free") else np.nan)
-    slope_m = np.zeros(n)
-    if kind == "torque":
-        # The transducer saw the ripple; what an inertia takes of it is slow.
-        far = SLOPE_REACH
-        slope_m[far:-far] = (theta_s[2 * far :] - 2 * theta_s[far:-far] + theta_s[: -2 * far]) / (
-            far * period
-        ) ** 2
-    else:  # a free shaft shows its ripple in the angle alone
-        slope_m[1:-2] = (theta[3:] - theta[2:-1] - theta[1:-2] + theta[:-3]) / (2 * period**2)
-    slope_m = np.nan_to_num(slope_m) / machine.pole_pairs
-    margin = HALF_WIDTH + delay + 2
-    lengths = [block_rows, *(n for n in SHORTER if n < block_rows)]
-    for block_rows in lengths:
-        starts = _steady_starts(run, i_s, omega, machine.rated_current_a, block_rows, margin)
-        if len(starts) >= LEAST_BLOCKS:
-            break
-    if not len(starts):
-        raise RecordingError(
-            f"{r.source}: no stretch of {block_rows + 2 * margin} rows "
-            f"({(block_rows + 2 * margin) * period * 1e3:.0f} ms) without gap in which current and speed are steady: record operating points that last longer"
-        )
-    dwell = _dwells(starts, run, i_s, omega, machine.rated_current_a, block_rows)
-    if len(starts) > MOST_BLOCKS:
-        keep = np.unique(np.linspace(0, len(starts) - 1, MOST_BLOCKS).round().astype(int))
-        starts, dwell = starts[keep], dwell[keep]
+    u, u_dc_mid = _voltage(r, nominal, theta_s)
+    kind, torque, slope_m = _mechanics(r, nominal, i_s, theta, theta_s, linked)
+    starts, dwell, block_rows = _cut(r, nominal, run, i_s, omega, block_rows)
     samples = starts[:, None] + np.arange(block_rows + 1)
     rows = starts[:, None] + np.arange(block_rows)
     around = starts[:, None] + np.arange(-1, block_rows + 1)
     torque, slope_m = torque[rows], slope_m[rows]
     if kind == "torque":  # an acceleration taken over many samples is wrong where a ramp ends
-        quarters = slope_m.reshape(len(starts), 4, -1).mean(axis=2)
-        swing = (machine.inertia_kgm2 or 0.0) * np.ptp(quarters, axis=1)
+        ends = np.array_split(slope_m, 4, axis=1)
+        swing = (machine.inertia_kgm2 or 0.0) * np.ptp([e.mean(axis=1) for e in ends], axis=0)
         torque[swing > RAMP_TORQUE * airgap(nominal, np.array(1j * machine.rated_current_a))] = np.nan
-    block_mean = lambda name: r[name][rows].mean(axis=1) if r.has(name) else np.full(len(starts), np.nan)  # noqa: E731
+    missing = np.full(len(starts), np.nan)
     return View(
         nominal=nominal,
         sample_time_s=period,
@@ -144,7 +110,7 @@ def view_of(recording: Recording, nominal, block_rows=BLOCK_ROWS) -> View:
         u=u[around],
         u_dc=u_dc_mid[rows],
         t=r["t"][rows].mean(axis=1) - r["t"][0],
-        temp=block_mean("temp_winding"),
+        temp=r["temp_winding"][rows].mean(axis=1) if r.has("temp_winding") else missing,
         torque=torque,
         slope_m=slope_m,
         shaft=np.full(len(starts), kind),
@@ -154,10 +120,69 @@ def view_of(recording: Recording, nominal, block_rows=BLOCK_ROWS) -> View:
     )
 
 
-def _steady_starts(run, i, omega, rated, block_rows, margin):
-    """First rows of the blocks that lie within a run and hold current and speed."""
+def _voltage(recording, nominal, theta_s):
+    """Stator-frame voltage (n,) complex [V] in force after each sample, and the bus voltage (n,) [V]."""
+    r, n, delay = recording, len(recording), nominal.control.duty_applied_after_samples
+    u_dc = r["u_dc"] if r.has("u_dc") else np.full(n, float(nominal.inverter.dc_bus_v))
+    u_dc_mid = np.append(0.5 * (u_dc[1:] + u_dc[:-1]), u_dc[-1])
+    asked = np.full(n, np.nan + 0j)
+    if r.has("d_a", "d_b", "d_c"):
+        duties = np.stack([r["d_a"], r["d_b"], r["d_c"]], axis=1)
+        asked[delay:] = ((2 / 3) * (duties @ np.exp(2j * np.pi / 3 * np.arange(3))))[: n - delay]
+        return asked * u_dc_mid, u_dc_mid
+    # A controller that turns its reference by the delay's angle: it acts at the middle of its own period.
+    asked[delay:] = (r["u_d_ref"] + 1j * r["u_q_ref"])[: n - delay]
+    middle = np.append(0.5 * (theta_s[1:] + theta_s[:-1]), np.nan)
+    return asked * np.exp(1j * middle), u_dc_mid
+
+
+def _mechanics(recording, nominal, i_s, theta, theta_s, linked):
+    """(kind of shaft, torque at the shaft (n,) [Nm] or nan, d omega_m / dt (n,) [rad/s^2])."""
+    n, period = len(recording), nominal.sample_time_s
+    kind = shaft_kind(recording, nominal, i_s, theta_s, linked)
+    slope = np.zeros(n)
+    if kind == "torque":
+        # The transducer saw the ripple; what an inertia takes of it is slow.
+        far = SLOPE_REACH
+        bend = theta_s[2 * far :] - 2 * theta_s[far:-far] + theta_s[: -2 * far]
+        slope[far:-far] = bend / (far * period) ** 2
+    else:  # a free shaft shows its ripple in the angle alone
+        slope[1:-2] = (theta[3:] - theta[2:-1] - theta[1:-2] + theta[:-3]) / (2 * period**2)
+    slope_m = np.nan_to_num(slope) / nominal.machine.pole_pairs
+    if kind == "torque":
+        return kind, recording["torque"], slope_m
+    return kind, np.full(n, 0.0 if kind in ("unloaded", "free") else np.nan), slope_m
+
+
+def _cut(recording, nominal, run, i_s, omega, block_rows):
+    """(first rows, dwell numbers, rows of a block); long steady blocks where there are enough of them."""
+    machine, period = nominal.machine, nominal.sample_time_s
+    margin = HALF_WIDTH + nominal.control.duty_applied_after_samples + 2
+    slow = SLOW_SHARE * nominal.inverter.dc_bus_v / machine.magnet_flux_wb
+    top = max(float(np.nanmax(np.abs(omega), initial=0.0)), slow)
+    scale = (machine.rated_current_a, top)
+    tries = [(block_rows, 1.0), *((n, 1.0) for n in SHORTER if n < block_rows), (min(SHORTER), RESTLESS)]
+    for length, patience in tries:
+        starts = _steady_starts(run, i_s, omega, scale, length, margin, patience)
+        if len(starts) >= LEAST_BLOCKS:
+            break
+    if not len(starts):
+        whole = length + 2 * margin
+        raise RecordingError(
+            f"{recording.source}: no stretch of {whole} rows ({whole * period * 1e3:.0f} ms) without gap in which "
+            "current and speed are steady: record operating points that last longer"
+        )
+    dwell = _dwells(starts, run, i_s, omega, scale, length)
+    if len(starts) > MOST_BLOCKS:
+        keep = np.unique(np.linspace(0, len(starts) - 1, MOST_BLOCKS).round().astype(int))
+        starts, dwell = starts[keep], dwell[keep]
+    return starts, dwell, length
+
+
+def _steady_starts(run, i, omega, scale, block_rows, margin, patience):
+    """First rows of the blocks that lie within a run and hold current and speed, ripple aside."""
     n, length = len(run), block_rows + 2 * margin
-    top = max(np.nanmax(np.abs(omega)), 1e-9)
+    rated, top = scale
     starts, at = [], 0
     while at + length <= n:
         end = at + length - 1
@@ -166,12 +191,14 @@ def _steady_starts(run, i, omega, rated, block_rows, margin):
             continue
         inner = slice(at + margin, at + margin + block_rows + 1)
         x, w = i[inner], omega[inner]
-        still = (
-            np.ptp(x.real) < CURRENT_STEP * rated
-            and np.ptp(x.imag) < CURRENT_STEP * rated
-            and np.ptp(w) < SPEED_STEP * top
-        )
-        if still and np.isfinite(x).all() and np.isfinite(w).all():
+        trend = parabola(x[None])[0]
+        ripple = np.sqrt(np.mean(np.abs(x - trend) ** 2))
+        if (
+            np.ptp(trend.real) < patience * CURRENT_STEP * rated
+            and np.ptp(trend.imag) < patience * CURRENT_STEP * rated
+            and ripple < patience * RIPPLE * rated
+            and np.ptp(w) < patience * SPEED_STEP * top
+        ):
             starts.append(at + margin)
             at += block_rows
         else:
@@ -179,20 +206,17 @@ def _steady_starts(run, i, omega, rated, block_rows, margin):
     return np.array(starts, int)
 
 
-def _dwells(starts, run, i, omega, rated, block_rows):
+def _dwells(starts, run, i, omega, scale, block_rows):
     """Number of the dwell each block belongs to: neighbours in time at the same operating point."""
-    top = max(np.nanmax(np.abs(omega)), 1e-9)
+    rated, top = scale
     number, out = 0, []
     for k, start in enumerate(starts):
         middle = start + block_rows // 2
         if k:
             before = starts[k - 1] + block_rows // 2
-            same = (
-                abs(i[middle] - i[before]) < CURRENT_STEP * rated
-                and abs(omega[middle] - omega[before]) < SPEED_STEP * top
-            )
-            number += not (
-                same and start - starts[k - 1] < 4 * block_rows and run[start] == run[starts[k - 1]]
-            )
+            near = abs(i[middle] - i[before]) < CURRENT_STEP * rated
+            near &= abs(omega[middle] - omega[before]) < SPEED_STEP * top
+            near &= start - starts[k - 1] < 4 * block_rows and run[start] == run[starts[k - 1]]
+            number += not near
         out.append(number)
     return np.array(out, int)
