@@ -134,7 +134,7 @@ def test_an_effect_outside_the_catalogue_is_unknown():
     assert "2 theta_e" in term.formula or "8 theta_m" in term.formula, term  # the same with four pole pairs
     # u = d psi / dt of psi = 0.01 psi_m exp(3 j theta_e) in the stator frame
     assert "c * omega *" in term.formula and term.unit == "V s/rad", term
-    assert term.value == pytest.approx(3 * 0.01 * 0.165, rel=0.1) and 0.0 < term.sigma < 0.03 * term.value, (
+    assert term.value == pytest.approx(3 * 0.01 * 0.165, rel=0.1) and 0.0 < term.sigma < 0.05 * term.value, (
         term
     )
     assert term.explains > 0.9, term

@@ -188,8 +188,11 @@ def _variance(e, ok, pair, shape):
     if len(squares) >= 24:
         low = where[:, 1] <= np.median(where[:, 1])
         x0, x1 = where[low, 1].mean(), where[~low, 1].mean() if (~low).any() else where[low, 1].mean()
-        if x1 > x0 + 1e-6:
+        if x1 > x0 + 0.1:
             v0, v1 = squares[low].mean(), squares[~low].mean()
             b = max((v1 - v0) / (x1 - x0), 0.0)
-            a = max(v0 - b * x0, 0.05 * squares.mean())
+            a = v0 - b * x0
+            if a < 0.05 * squares.mean():
+                a = 0.05 * squares.mean()
+                b = 0.95 * squares.mean() / where[:, 1].mean()
     return np.maximum(a + b * shape[:, 1], 1e-30)

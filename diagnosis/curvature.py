@@ -55,7 +55,7 @@ def ratio(view, solution, axis) -> tuple[float, float]:
     return float(shape[0] / shape[1]), largest
 
 
-def labels(view, solution, least=0.008) -> tuple[set[str], bool]:
+def labels(view, solution, least=0.012) -> tuple[set[str], bool]:
     """(names that the solution's curves deserve, whether that is beyond doubt)."""
     names, sure = set(), True
     for axis in "dq":

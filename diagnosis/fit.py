@@ -165,14 +165,19 @@ def everything(cells) -> Model:
     return Model(frozenset(cells.columns), frozenset(cells.columns))
 
 
+def rated_torque(view) -> float:
+    """Torque of the magnets at rated current [Nm]."""
+    m = view.machine
+    return 1.5 * m.pole_pairs * m.magnet_flux_wb * m.rated_current_a
+
+
 def row_sigma(view, cells) -> tuple[np.ndarray, np.ndarray]:
     """Standard deviation of every row with and without the balance's own share: (sigma, noise)."""
     rough = Fitter(cells, np.ones(len(cells.y)), np.ones(len(cells.y), bool)).solve(everything(cells))
     pure = noise(view, cells, rough.residual)
     m = view.machine
     level = SYSTEM_U * voltage_level(view) + SYSTEM_DC * view.nominal.inverter.dc_bus_v
-    torque = 1.5 * m.pole_pairs * m.magnet_flux_wb * m.rated_current_a
     own = np.where(cells.order == 0, 1.0, 0.5) * level[cells.block]
     own = np.where(cells.channel == "sum", 2e-4 * m.rated_current_a, own)
-    own = np.where(cells.channel == "torque", 3e-3 * torque, own)
+    own = np.where(cells.channel == "torque", 3e-3 * rated_torque(view), own)
     return np.hypot(pure, own), pure

@@ -12,6 +12,8 @@ from diagnosis.result import Fit
 from diagnosis.scan import Stray, row_residual, stray_order, stray_swing, stray_torque
 
 GROUP_ROWS, GROUP_CHI2 = 12, 3.0
+CURVE_LEFT = 0.06  # of the misfit's rms
+CLAMPED_LEFT = 0.15  # the same of an inverter's loss, which near zero current follows the ripple
 GROUP_SHARE = 0.4  # of a group's misfit: an explanation leaves no group as it was
 
 
@@ -39,19 +41,24 @@ def remains(search, found, held) -> Remains:
     use = cells.ok & found.train
     reduced = float(np.sum((residual[use] / found.sigma[use]) ** 2)) / max(use.sum() - best.count, 1)
     rows = row_residual(best.view, best, search.effects, misfit(best.view))
-    level = voltage_level(search.view)
+    fit = _fit(search, found, cells, residual, held)
+    # A curve that explained most of a large misfit may leave a little of it anywhere.
+    share = CLAMPED_LEFT if "dead_time" in best.model.names else CURVE_LEFT
+    floor = share * fit.train_before if best.model.names else 0.0
     stray = (
-        stray_order(best.view, rows, level)
-        or stray_swing(best.view, rows, level)
+        stray_order(best.view, rows, floor)
+        or stray_swing(best.view, rows, floor)
         or stray_torque(best.view, search.projector, cells, residual, found.sigma)
     )
-    group = _standing_out(search, found, cells, residual, use)
-    return Remains(cells, residual, _fit(search, found, cells, residual, held), reduced, group, stray)
+    least = _least(search.view)
+    least["u"] = max(least["u"], floor)
+    group = _standing_out(search, found, cells, residual, use, least)
+    return Remains(cells, residual, fit, reduced, group, stray)
 
 
-def _standing_out(search, found, cells, residual, use) -> str:
+def _standing_out(search, found, cells, residual, use, floor) -> str:
     """Channel and order of which the largest share is left, if that is neither noise nor a curve's imperfection."""
-    chi, floor, worst = (residual / found.sigma) ** 2, _least(search.view), (0.0, "")
+    chi, worst = (residual / found.sigma) ** 2, (0.0, "")
     for channel in np.unique(cells.channel):
         for order in np.unique(cells.order[cells.channel == channel]):
             rows = use & (cells.channel == channel) & (cells.order == order)

@@ -11,6 +11,7 @@ import os
 from pathlib import Path
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from diagnosis import verdict as words
 from diagnosis.blocks import view_of
@@ -39,10 +40,18 @@ def diagnose(recordings, drive, progress=lambda text: None) -> Diagnosis:
     nominal = drive if isinstance(drive, Nominal) else load_nominal(drive)
     if isinstance(recordings, (str, os.PathLike, Recording)):
         recordings = [recordings]
+    # The matrices are small: more threads than one cost more than they bring.
+    with threadpool_limits(1):
+        return _diagnose(recordings, nominal, progress)
+
+
+def _diagnose(recordings, nominal, progress) -> Diagnosis:
     loaded = []
     for item in recordings:
-        progress(f"reading {item if not isinstance(item, Recording) else item.source}")
-        loaded.append(item if isinstance(item, Recording) else load_recording(Path(item), nominal))
+        if not isinstance(item, Recording):
+            progress(f"reading {item}")
+            item = load_recording(Path(item), nominal)
+        loaded.append(item)
     problems = [p for r in loaded for p in r.problems]
     rows = sum(len(r) for r in loaded)
     if any(r.fatal for r in loaded):
@@ -72,7 +81,7 @@ def _physics(recordings, nominal, progress) -> Diagnosis:
     search = Search(view, CATALOGUE, ~held, progress)
     found = search.run()
     left = remains(search, found, held)
-    names, ambiguity = words.groups(found.best, found.tied, CATALOGUE, nominal)
+    names, ambiguity = words.groups(found.best, found.tied, CATALOGUE, nominal, found.silent)
     names = words.carried(names, found.best, search.worth)
     kind = words.verdict(names, ambiguity, left)
     answer = Diagnosis(kind, "", location=locate(view, search.cells, found.pure), fit=left.fit, search=found)
@@ -94,7 +103,9 @@ def _physics(recordings, nominal, progress) -> Diagnosis:
         f"{len(view)} steady blocks of {rows} rows were balanced, {int(held.sum())} of them never fitted."
     )
     share = left.fit.share_left
-    answer.trace = f"reduced chi2 {left.reduced:.2f}, share {share:.3f}, group {left.group!r}, stray {left.stray}"
+    answer.trace = (
+        f"reduced chi2 {left.reduced:.2f}, share {share:.3f}, group {left.group!r}, stray {left.stray}"
+    )
     return answer
 
 
@@ -103,5 +114,5 @@ def _unknown(found, left) -> UnknownTerm | None:
     stray = left.stray
     if stray is None:
         return sparse_term(found.best.view, left.cells, left.residual, found.sigma, found.train)
-    signal, unit = ("torque", "Nm") if stray.kind == "torque" else ("u_dq", "V")
-    return UnknownTerm(signal, stray.formula, stray.amplitude, 0.05 * stray.amplitude, unit, 0.5)
+    signal = "torque" if stray.kind == "torque" else "u_dq"
+    return UnknownTerm(signal, stray.formula, stray.value, stray.sigma, stray.unit, min(stray.explains, 1.0))

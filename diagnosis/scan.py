@@ -11,6 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from diagnosis.cells import voltage_level
+
 MOST_ORDER = 80  # per mechanical turn
 LOCKED = 30.0  # power of the sum over sum of powers: exp(-30) by chance
 LEAST_SHARE = 1.5e-3  # of the voltage: smaller ripples are the inverter's
@@ -18,19 +20,22 @@ TORQUE_SHARE = 0.01  # of rated torque
 SWING_SHARE = 4e-3
 SWING_RATIO = 8.0  # of the spectrum's low end over its neighbourhood
 WEIGHTS = {
-    "1": lambda v: np.ones(len(v)),
-    "omega": lambda v: v.omega.mean(axis=1),
-    "i_q": lambda v: v.i.imag.mean(axis=1),
+    "1": (lambda v: np.ones(len(v)), "V"),
+    "omega": (lambda v: v.omega.mean(axis=1), "V s/rad"),
+    "i_q": (lambda v: v.i.imag.mean(axis=1), "V/A"),
 }
 
 
 @dataclass
 class Stray:
-    """A misfit that nothing explains: formula and amplitude [V]."""
+    """A misfit that nothing explains: its formula with the value of c and that value's uncertainty."""
 
+    kind: str  # "order", "frequency" or "torque"
     formula: str
-    amplitude: float
-    kind: str  # "order" or "frequency"
+    value: float
+    sigma: float
+    unit: str
+    explains: float
 
 
 def row_residual(view, solution, effects, misfit):
@@ -66,40 +71,41 @@ def stray_torque(view, projector, cells, residual, sigma) -> Stray | None:
             best = (gain, amplitude, n)
     if best is None:
         return None
-    return Stray(f"torque = c * sin({best[2]} theta_m + phi)", best[1], "torque")
+    gain, amplitude, n = best
+    total = float(np.sum((residual[use] / sigma[use]) ** 2))
+    formula = f"torque = c * sin({n} theta_m + phi)"
+    return Stray("torque", formula, amplitude, amplitude / np.sqrt(gain), "Nm", gain / total)
 
 
-def stray_order(view, residual, level) -> Stray | None:
-    """The strongest order per mechanical turn, not one of dq's own, that is locked to the rotor."""
-    p, m = view.machine.pole_pairs, residual.shape[1]
+def stray_order(view, residual, floor) -> Stray | None:
+    """The strongest order per mechanical turn that is locked to the rotor; smaller ones than ``floor`` [V] pass."""
+    p, m, level = view.machine.pole_pairs, residual.shape[1], voltage_level(view)
     turns = np.abs(view.theta[:, -1] - view.theta[:, 0]) / (2 * np.pi * p)
     theta_m = view.theta_mid / p
     taper = 1.0 - np.cos(2 * np.pi * (np.arange(m) + 0.5) / m)
-    best = None
+    best, largest = None, 0.0
     for n in [*range(1, MOST_ORDER + 1), *range(-MOST_ORDER, 0)]:
         use = (abs(n) * turns >= 2.5) & (abs(n) * turns < m / 5)
         if use.sum() < 6:
             continue
         f = (residual[use] * taper * np.exp(-1j * n * theta_m[use])).mean(axis=1)
-        power = float(np.sum(np.abs(f) ** 2))
-        for text, weight in WEIGHTS.items():
+        least = max(floor, LEAST_SHARE * float(np.sqrt(np.mean(level[use] ** 2))))
+        for text, (weight, unit) in WEIGHTS.items():
             w = weight(view)[use]
-            w = w / max(np.sqrt(np.mean(w**2)), 1e-12)
-            lock = np.abs(np.sum(w * f)) ** 2 / max(np.sum(w**2 * np.abs(f) ** 2), 1e-300)
-            amplitude = np.abs(np.sum(w * f)) / np.sum(w**2)
-            share = amplitude / max(np.sqrt(np.mean(level[use] ** 2)), 1e-12)
-            if lock > min(LOCKED, 0.7 * use.sum()) and share > LEAST_SHARE and power > 0:
-                if best is None or share > best[0]:
-                    best = (share, amplitude, n, text)
-    if best is None:
-        return None
-    _, amplitude, n, text = best
-    return Stray(f"u_d + j u_q = c * {text} * exp(j {n} theta_m + j phi)", float(amplitude), "order")
+            total = complex(np.sum(w * f))
+            lock = abs(total) ** 2 / max(float(np.sum(w**2 * np.abs(f) ** 2)), 1e-300)
+            c = abs(total) / max(float(np.sum(w**2)), 1e-300)
+            volts = c * float(np.sqrt(np.mean(w**2)))
+            if lock > min(LOCKED, 0.7 * use.sum()) and volts > max(least, largest):
+                formula = f"u_d + j u_q = c * {text} * exp(j {n} theta_m + j phi)"
+                explains = abs(total) ** 2 / float(np.sum(w**2) * np.sum(np.abs(f) ** 2))
+                best, largest = Stray("order", formula, c, c * np.sqrt(max(1.0 - explains, 0.0) / use.sum()), unit, explains), volts
+    return best
 
 
-def stray_swing(view, residual, level) -> Stray | None:
-    """A low frequency of the stator voltage's length or angle that no angle of the rotor explains."""
-    m = residual.shape[1]
+def stray_swing(view, residual, floor) -> Stray | None:
+    """A low frequency of the voltage's length that no angle of the rotor explains; below ``floor`` [V] it passes."""
+    m, level = residual.shape[1], voltage_level(view)
     if m < 100:
         return None
     taper = 1.0 - np.cos(2 * np.pi * (np.arange(m) + 0.5) / m)
@@ -111,7 +117,10 @@ def stray_swing(view, residual, level) -> Stray | None:
     low, around = mean[1:5].max(), np.median(mean[8:20])
     amplitude = 2.0 * float(np.sqrt(mean[1:5].sum() / 1.5))
     share = amplitude / float(np.sqrt(np.mean(level[loud] ** 2)))
-    if low < SWING_RATIO * around or share < SWING_SHARE:
+    if low < SWING_RATIO * around or share < SWING_SHARE or amplitude < floor:
         return None
     hertz = (1 + int(np.argmax(mean[1:5]))) / (m * view.sample_time_s)
-    return Stray(f"u in proportion to 1 + c * sin(2 pi f t), f about {hertz:.0f} Hz", amplitude, "frequency")
+    formula = f"u in proportion to 1 + c * sin(2 pi f t), f about {hertz:.0f} Hz"
+    return Stray(
+        "frequency", formula, share, share * float(np.sqrt(around / low)), "1", float(1.0 - around / low)
+    )

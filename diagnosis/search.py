@@ -19,11 +19,19 @@ import numpy as np
 from diagnosis.effect import FluxEffect
 from diagnosis.cells import Projector, cells_of
 from diagnosis.curvature import FAMILY, labels
-from diagnosis.fit import Fitter, Model, Solution, everything, row_sigma
+from diagnosis.fit import Fitter, Model, Solution, everything, rated_torque, row_sigma
 
 MOST_AT_ONCE = 3
+NOISY_TORQUE = 0.03  # of rated torque
 MOST_EFFECTS = 4  # more at once is no explanation
 REFINED = 14
+SCALES = frozenset({"udc_gain", "current_scale", "magnet_flux"})
+SAME_SCALE = 0.03  # of what is explained: so much may be lost by one scale in place of two
+LEAST_SURPLUS, BESIDE_CROSS = (
+    0.012,
+    0.025,
+)  # of L i: a co-energy's cross term bends the axes themselves a little
+POINT = 0.12  # of top speed and rated current: closer operating points are one
 NEIGHBOURS = 7  # refined around a best set
 TIE = 10.0
 CURVE_SHARE = 0.01  # of what an effect contributes to a row: no curve of the catalogue fits a real one better
@@ -42,6 +50,15 @@ class Outcome:
     pure: np.ndarray  # sigma without the balance's own share
     train: np.ndarray
     dispersion: float
+    silent: frozenset = frozenset()  # effects of the best solution that are too small to be named beside the others
+
+
+def operating_points(view) -> int:
+    """Number of different steady points (speed, i_d, i_q) of a view; each carries two means to explain."""
+    m, omega, i = view.machine, view.omega.mean(axis=1), view.i.mean(axis=1)
+    top = max(float(np.abs(omega).max()), 1e-9)
+    points = np.stack([omega / top, i.real / m.rated_current_a, i.imag / m.rated_current_a], axis=1)
+    return len(np.unique(np.round(points / POINT), axis=0))
 
 
 class Search:
@@ -52,8 +69,13 @@ class Search:
         self.projector = Projector(view)
         self.cells = cells_of(view, self.effects.values(), self.projector)
         self.sigma, self.pure = row_sigma(view, self.cells)
+        # The acceleration of a fast free shaft is all noise; the projector's rows are those of every fit.
+        self.projector.ok &= (self.cells.channel != "torque") | (
+            self.pure < NOISY_TORQUE * rated_torque(view)
+        )
         self.train = train_blocks[self.cells.block]
         self.linear = Fitter(self.cells, self.sigma, self.train)
+        self.most = min(MOST_EFFECTS, max(1, operating_points(view) - 1))
         self.refined: dict[Model, Solution] = {}
         self.adjust = np.zeros(len(self.cells.y))
         chi2, count = self.linear.chi2(everything(self.cells))
@@ -74,11 +96,14 @@ class Search:
                 self.refine(model)
             self.refine(best.model)
             best = self._climbed(self._best())
-        best, sure = self._labelled(best)
+        best, sure = self._labelled(self._simplified(best))
         best = self._pruned(best)
         tied = self._tied(best, sure)
         empty = self.refine(Model(frozenset()))
-        return Outcome(best, tied, empty, self.sigma, self.pure, self.train, self.dispersion)
+        silent = frozenset()
+        if "cross_saturation" in best.model.names:
+            silent = (best.model.names & set(FAMILY)) - labels(best.view, best, BESIDE_CROSS)[0]
+        return Outcome(best, tied, empty, self.sigma, self.pure, self.train, self.dispersion, silent)
 
     def allow_for_curves(self, best):
         """Widen every row by a share of what the best effects contribute to it, and start anew.
@@ -132,7 +157,7 @@ class Search:
         """The most promising models of up to MOST_AT_ONCE effects on the linear problem."""
         able = [n for n in self.effects if self.linear.index[n][0]]
         scored = []
-        for size in range(1, MOST_AT_ONCE + 1):
+        for size in range(1, min(MOST_AT_ONCE, self.most) + 1):
             level = []
             for names in itertools.combinations(able, size):
                 level += [(self.linear.score(m, self.dispersion), m) for m in self.forms(names)]
@@ -261,7 +286,7 @@ class Search:
                 continue
             for bend in (False, True):
                 grown = best.model.with_(name, bend)
-                if len(grown) <= MOST_EFFECTS:
+                if len(grown) <= self.most:
                     tried.append((at.score(grown, self.dispersion), grown))
                 for out in names:
                     swapped = grown.without(out)
@@ -271,13 +296,28 @@ class Search:
             if score < best.score + 4 * TIE:
                 self.refine(model)
 
+    def _simplified(self, best) -> Solution:
+        """The best model with two scales that amount to a third one taken for that.
+
+        All of (u_dc, current, magnets) scaled alike is no change at all, so any two of them alike are the third.
+        """
+        pair = best.model.names & SCALES
+        if len(pair) != 2:
+            return best
+        (third,) = SCALES - pair
+        explained = self.refine(Model(frozenset())).chi2 - best.chi2
+        rest = Model(best.model.names - pair, best.model.free - pair)
+        singles = [self.refine(rest.with_(third, bend)) for bend in (False, True)]
+        single = min(singles, key=lambda s: s.score)
+        return single if single.chi2 - best.chi2 < SAME_SCALE * explained else best
+
     def _labelled(self, best) -> tuple[Solution, bool]:
         """The best model with its curves of flux over current called by their shape, and whether that is sure."""
         mine = best.model.names & set(FAMILY)
         if not mine:
             return best, True
-        wanted, sure = labels(best.view, best)
-        if not wanted or wanted == mine:
+        wanted, sure = labels(best.view, best, LEAST_SURPLUS)
+        if wanted == mine:
             return best, sure
         names = (best.model.names - mine) | wanted
         free = (best.model.free - mine) | {n for n in wanted if self.linear.index[n][1]}

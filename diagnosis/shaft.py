@@ -11,8 +11,8 @@ from __future__ import annotations
 
 import numpy as np
 
-FREE_RATIO = (0.75, 1.3)  # median of torque change over inertial change
-REACH, LAG = 40, 100  # samples of the slope's half window and of a change
+FREE_RATIO = (0.7, 1.35)  # median of torque change over inertial change
+REACH, LAG = 80, 200  # samples of the slope's half window and of a change
 ODD_SHARE = 0.96  # of the remaining torque's variance that an odd function of speed must explain
 SMALL = 0.01  # of rated torque: so little torque is no load in any case
 

@@ -60,6 +60,13 @@ def diagnose_slow(recordings, nominal, progress=lambda text: None) -> Diagnosis:
         answer.next_recording = requests(plain, [found.best, *found.tied], CATALOGUE, fit.noise_floor)
     cells, residual = search.residual(found.best)
     answer.evidence = evidence(view, (search.cells, search.cells.y), (cells, residual), found.pure, held)
+    for name in (
+        "theta_e",
+        "orders",
+        "spectrum_before",
+        "spectrum_after",
+    ):  # there is no angle and no harmonic
+        answer.evidence.arrays.pop(name, None)
     answer.sentence = words.sentence(verdict, answer.effects, ambiguity, fit, CATALOGUE, answer.location)
     answer.notes = _notes(view, held, ambiguity, weak, found)
     answer.search, answer.found, answer.held = search, found, held
@@ -86,23 +93,22 @@ def axis_misfit(search, solution, blocks) -> dict:
 def _sorted_out(found):
     """(asserted names, ambiguity sets, names that are too weak): from what is tied with the best model."""
     best = found.best.model.names
-    asserted, ambiguity, weak = set(best), [], set()
-    for other in found.tied:
-        gone, come = best - other.model.names, other.model.names - best
+    asserted, groups, weak = set(best), [], set()
+    differences = [(best - other.model.names, other.model.names - best) for other in found.tied]
+    for gone, come in sorted(differences, key=lambda d: len(d[0]) + len(d[1])):
         asserted -= gone
-        if come:
-            ambiguity.append(gone | come)
-        else:
+        if not come:
             weak |= gone
-    merged: list[set] = []
-    for group in ambiguity:
-        group = set(group) - weak
-        for other in [m for m in merged if m & group]:
-            merged.remove(other)
-            group |= other
+            continue
+        group = (gone | come) - weak
+        if any(group <= g for g in groups) or group <= set().union(*groups):
+            continue  # two exchanges at once, each of which is known
+        for g in [g for g in groups if g & group]:
+            groups.remove(g)
+            group = group | g
         if len(group) > 1:
-            merged.append(group)
-    return sorted(asserted), [sorted(g) for g in merged], sorted(weak)
+            groups.append(group)
+    return sorted(asserted), [sorted(g) for g in groups], sorted(weak)
 
 
 def _fit(search, found, held) -> Fit:
@@ -130,12 +136,12 @@ def _notes(view, held, ambiguity, weak, found) -> list[str]:
         )
     if len({x > 0 for x in np.sign(view.omega[:, 0]) if x}) < 2:
         notes.append(
-            "One direction only: an angle's offset, a current's sign and the inverter's loss are told apart by load and speed alone."
+            "One direction only: load and speed alone tell an angle's offset and the inverter's loss from look-alikes."
         )
     drops = m.resistance_ohm * np.abs(i).max()
     if drops < 0.1 * np.abs(view.u).max():
         notes.append(
-            f"At the largest current the resistance drops {drops:.2g} V of {np.abs(view.u).max():.3g} V: it is not measured here."
+            f"The resistance drops at most {drops:.2g} V of {np.abs(view.u).max():.3g} V: it is not measured here."
         )
     notes += [f"{name} explains a little more, but not enough to be asserted." for name in weak]
     for group in ambiguity:

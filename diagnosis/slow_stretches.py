@@ -22,7 +22,8 @@ MESSAGES = 2.0  # of the slowest signal that a stretch spans
 AROUND, LOOSE = 0.5, 8.0  # shares of a window before and behind it; how much more may change there
 REST = 1e-3  # of a signal's largest value: below it need not be measured anew
 TURNS = 4.0  # electrical, within a stretch: what an inverter loses depends on the angle, its mean over turns does not
-USUAL = 0.9  # quantile of the time between changes
+RESTED = 6.0  # times the median time between changes: longer, and the signal stood still
+USUAL = 0.9  # quantile of the others
 
 
 @dataclass
@@ -59,6 +60,7 @@ def stretches(recording: Recording, nominal) -> Stretches:
     fresh = [
         np.cumsum(np.append(False, np.diff(x) != 0) | (np.abs(x) < REST * np.nanmax(np.abs(x))))
         for x in parts.values()
+        if restless(t, x)
     ]
     window = max(LEAST_S, MESSAGES * max(periods.values()))
     psi = m.inductance_d_h * i.real + m.magnet_flux_wb + 1j * m.inductance_q_h * i.imag
@@ -129,11 +131,21 @@ def operating_columns(recording: Recording, nominal):
 
 
 def message_period(t, x) -> float:
-    """Usual longest time between two changes of a signal [s]; lines drawn between messages count once."""
-    bends = np.flatnonzero(np.abs(np.diff(x, 2)) > 1e-9 * max(np.nanmax(np.abs(x)), 1e-30)) + 1
-    apart = np.diff(t[bends])
-    apart = apart[apart > 1.5 * np.median(np.diff(t))]
+    """Usual longest time between two messages of a signal [s], from its changes; lines between messages count once."""
+    apart = _between_changes(t, x)
     if len(apart) < 4:
         return float(np.median(np.diff(t)))
-    short = apart[apart < 10.0 * np.median(apart)]  # longer: the signal rested
-    return float(np.quantile(short, USUAL))
+    return float(np.quantile(apart[apart < RESTED * np.median(apart)], USUAL))
+
+
+def restless(t, x) -> bool:
+    """Whether a signal changes with nearly every message unless it is at rest, so that no change means no message."""
+    apart, period = _between_changes(t, x), message_period(t, x)
+    active = np.abs(x) > REST * np.nanmax(np.abs(x))
+    return float(apart[apart < 3.0 * period].sum()) > 0.5 * active.mean() * (t[-1] - t[0])
+
+
+def _between_changes(t, x) -> np.ndarray:
+    bends = np.flatnonzero(np.abs(np.diff(x, 2)) > 1e-9 * max(np.nanmax(np.abs(x)), 1e-30)) + 1
+    apart = np.diff(t[bends])
+    return apart[apart > 1.5 * np.median(np.diff(t))]

@@ -17,12 +17,13 @@ DRIFTS, STANDS = (
 )  # drift over constant part: below the first it is the constant's, above 1/second nobody knows
 
 LEAST_DISPERSION = 0.5
+WORSE = 1.1
 SLOPE_DEVICE, SLOPE_UNCLEAR = 0.12, 0.35  # ohmic drop at rated current over the inverter's loss
 
 
-def groups(best, tied, effects, nominal):
+def groups(best, tied, effects, nominal, silent=frozenset()):
     """(asserted names, ambiguity sets): what all tied models share, and the rest in sets that exclude each other."""
-    models = [best.model.names, *(s.model.names for s in tied)]
+    models = [s.model.names - silent for s in (best, *tied)]
     shared = frozenset.intersection(*models)
     rest = frozenset().union(*models) - shared
     ambiguity = (
@@ -52,6 +53,8 @@ def verdict(names, ambiguity, left) -> str:
     """The verdict from the names, the ambiguity sets and what remains."""
     if left.stray or left.group:
         return "unexplained"
+    if names and left.fit.holdout_after > WORSE * max(left.fit.holdout_before, left.fit.noise_floor):
+        return "unexplained"  # a fit that does not carry over explains nothing
     if not names and not ambiguity:
         return "no_mismatch" if left.reduced <= LEFTOVER else "unexplained"
     if left.reduced > LEFTOVER and left.fit.share_left > FLOOR_SHARE:

@@ -59,7 +59,7 @@ class EmfHarmonics(Effect):
         for h in (6, 12, 18):
             if any(name.startswith(f"h{h}_") for name in c):
                 d, q, phi = _dq(c, h)
-                rows.append({"order": float(h), "amplitude_d": d, "amplitude_q": q, "phase_rad": phi})
+                rows.append([float(h), d, q, phi])
         return {"machine.emf_harmonics": rows}
 
 

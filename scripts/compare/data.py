@@ -31,11 +31,21 @@ class Data:
     view: object
     misfit: dict[str, np.ndarray]
     held: np.ndarray
-    memo: dict = field(default_factory=dict)  # of dictionary.equations
+    memo: dict = field(default_factory=dict, repr=False)  # of dictionary.equations
 
     def fitted(self, channel: str) -> np.ndarray:
         """Indices of the blocks that a fit may use; the torque of a block in a ramp is nan."""
         return np.flatnonzero(~self.held & np.isfinite(self.misfit[channel]).all(axis=1))
+
+    def voltage_change(self) -> np.ndarray:
+        """What a whole sample of delay would change, dq (b, m) [V].
+
+        From the voltage the nominal drive needs: the recorded one answers to the noise of the currents, which is
+        in the misfit, too.
+        """
+        v = self.view
+        needed = v.machine.resistance_ohm * v.i_mid + v.flux(v.nominal_psi)
+        return needed * (1.0 - np.exp(-1j * v.omega_mid * v.sample_time_s))
 
     @property
     def units(self) -> dict[str, float]:

@@ -55,9 +55,9 @@ def _course(view):
     return time, time
 
 
-def voltage_terms(view) -> dict[str, np.ndarray]:
+def voltage_terms(data: Data) -> dict[str, np.ndarray]:
     """Candidates of u_d and u_q, {name: (b, m)}."""
-    machine = view.machine
+    view, machine = data.view, data.view.machine
     i = view.i_mid / machine.rated_current_a
     top = max(float(np.abs(view.omega).max()), 1e-9)
     d, q, w, theta = i.real, i.imag, view.omega_mid / top, view.theta_mid
@@ -67,7 +67,7 @@ def voltage_terms(view) -> dict[str, np.ndarray]:
     out |= {f"w {name}".strip(): w * x for name, x in _powers(d, q, 3).items()}
     out |= {f"w2 {name}".strip(): w**2 * x for name, x in _powers(d, q, 1).items()}
     way = view.from_phases(np.clip(view.phases(view.i_mid) / (SOFT * machine.rated_current_a), -1.0, 1.0))
-    change = view.to_dq(view.u[:, 1:-1] - view.u[:, :-2])
+    change = data.voltage_change()
     out |= {"sgn_d": way.real, "sgn_q": way.imag, "du_d": change.real, "du_q": change.imag}
     out |= {"T d": warm * d, "T q": warm * q, "t w": time * w}
     for label, order, factors in (
@@ -84,14 +84,16 @@ def voltage_terms(view) -> dict[str, np.ndarray]:
     return {name: np.broadcast_to(x, d.shape) for name, x in out.items()}
 
 
-def sum_terms(view) -> dict[str, np.ndarray]:
+def sum_terms(data: Data) -> dict[str, np.ndarray]:
     """Candidates of the sum of three measured currents."""
+    view = data.view
     i = view.i_mid * np.exp(1j * view.theta_mid) / view.machine.rated_current_a
     return {"1": np.ones(i.shape), "alpha": i.real, "beta": i.imag}
 
 
-def torque_terms(view) -> dict[str, np.ndarray]:
+def torque_terms(data: Data) -> dict[str, np.ndarray]:
     """Candidates of the shaft torque."""
+    view = data.view
     i = view.i_mid / view.machine.rated_current_a
     top = max(float(np.abs(view.omega).max()), 1e-9)
     d, q, w, theta = i.real, i.imag, view.omega_mid / top, view.theta_mid
@@ -111,7 +113,7 @@ def equations(data: Data, rows: int) -> list[Equation]:
     for channel, make in (("u", voltage_terms), ("sum", sum_terms), ("torque", torque_terms)):
         if channel not in data.misfit:
             continue
-        terms = make(data.view)
+        terms = make(data)
         use = data.fitted(channel)
         fitted = averaged(np.stack([x[use] for x in terms.values()], axis=2), rows).reshape(-1, len(terms))
         blocks = np.stack([x.mean(axis=1) for x in terms.values()], axis=1)

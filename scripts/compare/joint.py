@@ -15,15 +15,17 @@ from scipy.stats import chi2
 
 from scripts.compare.data import Data, averaged
 from scripts.compare.joint_model import PARAMETERS, Model
+from scripts.compare.naming import one_factor
 
-MOST_BLOCKS = 120  # evenly chosen; all of them would only take longer
-FIT_GRID = [{"rows": 20}]
+MOST_BLOCKS = 90  # evenly chosen; all of them would only take longer
+FIT_GRID = [{"rows": rows} for rows in (20, 50)]
 NAME_GRID = [
     {"floor": f, "share": s}
     for f in (0.1, 0.2, 0.3, 0.5, 0.7, 1.0, 1.5)
     for s in (0.0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.5)
 ]
 STEP = 1e-3  # of a parameter's unit, for slopes
+FACTORS = {"resistance": "R", "inductance_d": "L_d", "inductance_q": "L_q", "magnet_flux": "psi_m"}
 SINGULAR = 1e-6  # share of the largest singular value below which a direction is not told at all
 
 
@@ -86,7 +88,7 @@ def fit(data: Data, rows: int) -> Joint:
     covariance = s2 * (vt.T * spread**2) @ vt
     rms = np.sqrt(np.mean(found.jac**2, axis=0))
     values, covariances, impact = {}, {}, {}
-    for effect in dict.fromkeys(PARAMETERS[name][0] for name in model.names):
+    for effect in dict.fromkeys(PARAMETERS[name][0] for name in model.names if PARAMETERS[name][0]):
         k = [n for n, name in enumerate(model.names) if PARAMETERS[name][0] == effect]
         values[effect], covariances[effect] = found.x[k], covariance[np.ix_(k, k)]
         impact[effect] = float(np.sqrt(np.sum((rms[k] * found.x[k]) ** 2)))
@@ -102,4 +104,5 @@ def names(fitted: Joint, floor: float, share: float) -> list[str]:
         if distance > chi2.ppf(0.95, len(x)) and np.linalg.norm(x) > floor:
             sure.append(effect)
     top = max((fitted.impact[e] for e in sure), default=0.0)
-    return sorted(e for e in sure if fitted.impact[e] >= share * top)
+    change = {e: float(fitted.values[e][0]) * PARAMETERS[p][1] for e, p in FACTORS.items()}
+    return sorted(one_factor([e for e in sure if fitted.impact[e] >= share * top], change))

@@ -4,7 +4,8 @@
     i   = (i_measured - offset) / (1 + gain),  theta = theta_measured - offset - eccentricity
 
 over one sample, exactly as the balance in data.py.  Parameters are dimensionless: zero is nominal, one is a
-change that would interest an engineer (``PARAMETERS``).
+change that would interest an engineer (``PARAMETERS``).  One scale of all currents is the same as R, L_d and
+L_q wrong by one factor, a gain of the bus the same as these and psi_m: neither can be a parameter beside them.
 """
 
 from __future__ import annotations
@@ -42,13 +43,12 @@ PARAMETERS = {
     "gain_b": ("current_gain", 0.01),
     "asym_a": ("phase_resistance_asymmetry", 0.05),  # of R
     "asym_b": ("phase_resistance_asymmetry", 0.05),
-    "scale": ("current_scale", 0.01),  # only with torque: else R, L_d and L_q take it
-    "u_dc": ("udc_gain", 0.01),
+    "k_t": ("", 0.01),  # of the torque: no effect, but what a wrong current scale or bus gain leaves there
     "viscous": ("friction", 0.02),  # of the rated torque, at the largest speed
     "coulomb": ("friction", 0.02),  # of the rated torque
     **{f"cog{h}{part}": ("cogging", 0.02) for h in TORQUE_ORDERS for part in "cs"},  # of the rated torque
 }
-ONLY = {"offset_0": "sum", "scale": "torque", "u_dc": "torque", "viscous": "torque", "coulomb": "torque"}
+ONLY = {"offset_0": "sum", "k_t": "torque", "viscous": "torque", "coulomb": "torque"}
 # Two patterns over the phases whose sum is zero.
 ALPHA, BETA = np.array([2, -1, -1]) / 3, np.array([0, 1, -1]) / np.sqrt(3)
 
@@ -73,7 +73,7 @@ class Model:
         self.warm = (v.temp - m.temperature_ref_c)[:, None] / np.ptp(temp) if known else self.time
         self.phases = v.phases(v.i)
         self.i_rate = self._slope()
-        self.du = v.u[:, 1:-1] - v.u[:, :-2]
+        self.du = data.voltage_change()[blocks]
         self.back = np.exp(-1j * v.theta_mid)
         self.nominal = None
         self.nominal = self._signals(dict.fromkeys(PARAMETERS, 0.0))
@@ -96,7 +96,7 @@ class Model:
         theta_m = v.theta / m.pole_pairs
         turn = p["angle"] + p["ecc_c"] * np.cos(theta_m) + p["ecc_s"] * np.sin(theta_m)
         offset = (p["offset_a"] * ALPHA + p["offset_b"] * BETA + p["offset_0"]) * i_r
-        gain = p["gain_a"] * ALPHA + p["gain_b"] * BETA + p["scale"]
+        gain = p["gain_a"] * ALPHA + p["gain_b"] * BETA
         phases = (self.phases - offset) / (1.0 + gain)
         theta = v.theta - turn
         rotor = np.exp(1j * theta)
@@ -112,13 +112,13 @@ class Model:
         r = m.resistance_ohm * (1.0 + p["R"] + p["R_warm"] * self.warm)
         u = r * 0.5 * (i_s[:, 1:] + i_s[:, :-1]) + (total[:, 1:] - total[:, :-1]) / v.sample_time_s
         u = u + (2 / 3) * (legs @ np.exp(2j * np.pi / 3 * np.arange(3)))
-        out = {"u": ((1.0 + p["u_dc"]) * u + p["delay"] * self.du) * self.back}
+        out = {"u": u * self.back + p["delay"] * self.du}
         if "sum" in self.channels:
             wrong = (self.phases - phases).sum(axis=2)
             out["sum"] = 0.5 * (wrong[:, 1:] + wrong[:, :-1])
         if "torque" in self.channels:
             airgap = 1.5 * m.pole_pairs * (np.conj(psi + reluctance) * i).imag
-            out["torque"] = 0.5 * (airgap[:, 1:] + airgap[:, :-1]) - self._shaft(p)
+            out["torque"] = 0.5 * (1.0 + p["k_t"]) * (airgap[:, 1:] + airgap[:, :-1]) - self._shaft(p)
         return out
 
     def _flux(self, p, i, theta):

@@ -110,14 +110,21 @@ def _one_factor(data, plain, names):
     change = {
         n: plain[key] * unit / volts for n, (key, volts) in nominal.items() if n in names and key in plain
     }
+    left = one_factor(list(names), change)
+    merged = float(np.sqrt(sum(size**2 for name, size in names.items() if name not in left)))
+    return {name: names.get(name, merged) for name in left}
+
+
+def one_factor(names: list[str], change: dict[str, float]) -> list[str]:
+    """Names in which R, L_d, L_q and psi_m, changed by about the same share, have become one scale or gain."""
     for name, needs in (
         ("udc_gain", ("inductance_d", "inductance_q", "magnet_flux")),
         ("current_scale", ("resistance", "inductance_d", "inductance_q")),
     ):
-        shares = [change.get(n, 0.0) for n in needs]
+        shares = [change.get(n, 0.0) if n in names else 0.0 for n in needs]
         if min(shares) * max(shares) > 0.0 and max(map(abs, shares)) < ALIKE * min(map(abs, shares)):
-            size = float(np.sqrt(sum(names[n] ** 2 for n in change)))
-            return {**{n: v for n, v in names.items() if n not in change}, name: size}
+            gone = {*needs, "resistance"}
+            return [n for n in names if n not in gone] + [name]
     return names
 
 

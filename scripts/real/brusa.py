@@ -59,7 +59,7 @@ def run(folder: Path, out: Path, progress=lambda text: None) -> dict:
         "brusa_flux_map",
         answer,
         nominal,
-        naming[0],
+        mapping,
         out,
         {
             "held_out": held_out(surface, view, held),
@@ -128,9 +128,9 @@ def cannot_tell(surface: Surface, truth: FluxMap) -> list[str]:
     inside = surface.covered(truth.i_d_a[:, None] + 1j * truth.i_q_a)
     r = surface.beside["resistance"]["delta_r"]
     return [
-        f"Beyond {EDGE_A:g} A nothing was recorded: {int((~inside).sum())} of the map's {inside.size} points stay unclaimed.",
+        f"Beyond {EDGE_A:g} A nothing was recorded: {int((~inside).sum())} of {inside.size} points stay unclaimed.",
         "A current scale or a bus gain multiplies the whole map and is part of it; an ammeter or a voltmeter tells.",
-        f"Resistance beside a free surface: nameplate {1e3 * r.value:+.2f} +- {1e3 * r.sigma:.2f} mohm, no evidence for more.",
+        f"Resistance beside a free surface: nameplate {1e3 * r.value:+.2f} +- {1e3 * r.sigma:.2f} mohm.",
         "A measured map is not reciprocal to the last microweber; what it is not, a co-energy cannot follow.",
     ]
 

@@ -32,7 +32,7 @@ def write(name: str, answer, nominal, recording, out: Path, more: dict, model=No
     try:
         overlay = closed_loop(recording, nominal, improved)
     except (RecordingError, DriveError, ValueError) as error:
-        why = str(error)
+        why = str(error).replace(recording.source, Path(recording.source).name)
     write_outputs(answer, folder, nominal, overlay)
     entry = {
         "verdict": answer.verdict,

@@ -1,0 +1,67 @@
+"""What to do with the model of a slow log: a flux map for the plant, bounds on what was not found, other splits."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+
+from diagnosis.effect import FluxEffect
+from diagnosis.fit import Model
+from diagnosis.slow_diagnosis import axis_misfit
+from diagnosis.slow_search import SlowSearch
+from plant import FluxMap
+
+STEPS = (9, 41)  # of the map along i_d and i_q
+ROUND = 0.15  # of rated current: what the map reaches to either side of an axis that was never driven
+SIGMAS = 2.0
+
+
+def flux_map_of(search, solution) -> FluxMap | None:
+    """The flux linkages of a solution as a map for the plant; None where it holds no effect on the flux.
+
+    It spans the recorded currents and their mirror images: the effects' formulas are odd or even in i_q.
+    """
+    magnetic = [n for n in solution.model.names if isinstance(search.effects[n], FluxEffect)]
+    if not magnetic:
+        return None
+    m, seen = search.view.machine, solution.view.i
+    edge = [max(np.abs(x).max(), ROUND * m.rated_current_a) for x in (seen.real, seen.imag)]
+    axes = [np.linspace(-e, e, n) for e, n in zip(edge, STEPS, strict=True)]
+    i = axes[0][:, None] + 1j * axes[1]
+    psi = m.inductance_d_h * i.real + m.magnet_flux_wb + 1j * m.inductance_q_h * i.imag
+    at = SimpleNamespace(i=i, machine=m, nominal=search.view.nominal)
+    for name in magnetic:
+        psi = psi + search.effects[name].psi(at, solution.c[name])
+    return FluxMap(*axes, psi.real.copy(), psi.imag.copy())
+
+
+def bounds(search, found) -> dict[str, dict]:
+    """{effect that is not in the best model: what it would be beside it}.
+
+    parameters: {name: [value, standard deviation, unit]}; score: change of the score, above 0 it is not worth its
+    price; refused: why it cannot stand beside the best model at all.
+    """
+    out = {}
+    for name, effect in search.effects.items():
+        if name in found.best.model.names or not search.linear.index[name][0]:
+            continue
+        solution = search.refine(Model(found.best.model.names | {name}, found.best.model.free))
+        if not np.isfinite(solution.score):
+            out[name] = {"refused": "with a sign or a size that no drive has"}
+            continue
+        e = effect.estimates(
+            solution.c[name], solution.covariance[name] * found.dispersion, search.view.nominal
+        )
+        out[name] = {
+            "parameters": {k: [v.value, v.sigma, v.unit] for k, v in e.items()},
+            "score": solution.score - found.best.score,
+        }
+    return out
+
+
+def on_other_rows(view, model, train) -> tuple[SlowSearch, object, dict]:
+    """(search, solution, misfit of the rows left out) of a model fitted to other rows, train (b,) bool."""
+    search = SlowSearch(view, train)
+    solution = search.refine(model)
+    return search, solution, axis_misfit(search, solution, ~train)
