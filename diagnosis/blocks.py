@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from diagnosis.recording import Recording, RecordingError
-from diagnosis.shaft import airgap, shaft_kind
+from diagnosis.shaft import airgap, is_airgap, shaft_kind
 from diagnosis.view import View
 
 BLOCK_ROWS = 200
@@ -150,7 +150,14 @@ def _mechanics(recording, nominal, i_s, theta, theta_s, linked):
         slope[1:-2] = (theta[3:] - theta[2:-1] - theta[1:-2] + theta[:-3]) / (2 * period**2)
     slope_m = np.nan_to_num(slope) / nominal.machine.pole_pairs
     if kind == "torque":
-        return kind, recording["torque"], slope_m
+        drag = (
+            (nominal.machine.viscous_friction_nms or 0.0)
+            * np.gradient(theta_s, period)
+            / nominal.machine.pole_pairs
+        )
+        drag = drag + (nominal.machine.inertia_kgm2 or 0.0) * slope_m
+        torque = recording["torque"]
+        return kind, torque - drag if is_airgap(torque, airgap(nominal, i_s), drag) else torque, slope_m
     return kind, np.full(n, 0.0 if kind in ("unloaded", "free") else np.nan), slope_m
 
 

@@ -16,6 +16,7 @@ from threadpoolctl import threadpool_limits
 from diagnosis import verdict as words
 from diagnosis.blocks import view_of
 from diagnosis.catalogue import CATALOGUE
+from diagnosis.flux_surface import USUAL, earned
 from diagnosis.load import load_recording
 from diagnosis.locate import at_order, evidence, locate
 from diagnosis.nominal import Nominal, load_nominal
@@ -23,12 +24,14 @@ from diagnosis.recording import Recording
 from diagnosis.remains import remains
 from diagnosis.request import requests
 from diagnosis.result import Diagnosis, UnknownTerm
-from diagnosis.search import Search
+from diagnosis.search import EARNS, Search
 from diagnosis.slow_diagnosis import diagnose_slow
 from diagnosis.unknown import sparse_term
 from diagnosis.view import joined_views
 
 HOLDOUT_EVERY = 4  # each fourth dwell is never fitted
+MAP_POINTS = 20  # different currents that make a flux map worth fitting
+ABSORBED = {"udc_gain", "current_scale", "inductance_d", "inductance_q"}
 
 
 def diagnose(recordings, drive, progress=lambda text: None) -> Diagnosis:
@@ -83,6 +86,8 @@ def _physics(recordings, nominal, progress) -> Diagnosis:
     left = remains(search, found, held)
     names, ambiguity = words.groups(found.best, found.tied, CATALOGUE, nominal, found.silent)
     names = words.carried(names, found.best, search.worth)
+    names, absorbed = beside_free_surface(view, names, ~held)
+    ambiguity = ambiguity + absorbed
     kind = words.verdict(names, ambiguity, left)
     answer = Diagnosis(kind, "", location=locate(view, search.cells, found.pure), fit=left.fit, search=found)
     if kind in ("explained", "ambiguous"):
@@ -107,6 +112,24 @@ def _physics(recordings, nominal, progress) -> Diagnosis:
         f"reduced chi2 {left.reduced:.2f}, share {share:.3f}, group {left.group!r}, stray {left.stray}"
     )
     return answer
+
+
+def beside_free_surface(view, names, train):
+    """(names that stay, ambiguity sets): scales and inductances must explain something beside a free flux map.
+
+    Where the operating points cover the plane of currents, a map as free as they allow can be fitted; what a
+    rigid curve of saturation leaves over is then seen for what it is.
+    """
+    curved = sorted({"saturation", "cross_saturation"} & set(names))
+    suspects = sorted(ABSORBED & set(names))
+    i = view.i.mean(axis=1) / view.machine.rated_current_a
+    points = len(np.unique(np.round(np.stack([i.real, i.imag], axis=1) / 0.12), axis=0))
+    if not curved or not suspects or points < MAP_POINTS:
+        return names, []
+    others = tuple(n for n in names if n not in suspects and n not in curved and n not in USUAL)
+    gains = earned(view, suspects, (*USUAL, *others), train)
+    weak = [n for n in suspects if gains[n] < EARNS]
+    return [n for n in names if n not in weak], [[n, *curved] for n in weak]
 
 
 def _unknown(found, left) -> UnknownTerm | None:

@@ -58,3 +58,15 @@ def airgap(nominal, i):
     m = nominal.machine
     psi = m.inductance_d_h * i.real + m.magnet_flux_wb + 1j * m.inductance_q_h * i.imag
     return 1.5 * m.pole_pairs * (np.conj(psi) * i).imag
+
+
+def is_airgap(torque, nominal_airgap, drag) -> bool:
+    """Whether a recorded torque is the air gap's, as a simulation writes it, rather than the shaft's.
+
+    torque, nominal_airgap, drag: (n,) [Nm], drag being what friction and inertia of the nameplate take.  The
+    shaft's is taken unless the other fits far better.
+    """
+    good = np.isfinite(torque) & np.isfinite(nominal_airgap) & np.isfinite(drag)
+    left = (torque - nominal_airgap)[good]
+    as_airgap, as_shaft = np.median(np.abs(left)), np.median(np.abs(left + drag[good]))
+    return bool(as_airgap < 0.4 * as_shaft)

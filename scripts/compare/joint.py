@@ -18,7 +18,7 @@ from scripts.compare.joint_model import PARAMETERS, Model
 from scripts.compare.naming import one_factor
 
 MOST_BLOCKS = 90  # evenly chosen; all of them would only take longer
-FIT_GRID = [{"rows": rows} for rows in (20, 50)]
+FIT_GRID = [{"rows": 20}]
 NAME_GRID = [
     {"floor": f, "share": s}
     for f in (0.1, 0.2, 0.3, 0.5, 0.7, 1.0, 1.5)
