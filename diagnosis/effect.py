@@ -65,6 +65,10 @@ class Effect:
         """Least size of the effect that is worth a name, in units of ``size``."""
         raise NotImplementedError
 
+    def ceiling(self, nominal) -> float:
+        """Largest size that a drive which still runs can have, in units of ``size``."""
+        return float("inf")
+
     def size(self, c: dict[str, float], nominal) -> float:
         """One number for how large the effect is."""
         return abs(next(iter(c.values())))

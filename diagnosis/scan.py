@@ -99,7 +99,8 @@ def stray_order(view, residual, floor) -> Stray | None:
             if lock > min(LOCKED, 0.7 * use.sum()) and volts > max(least, largest):
                 formula = f"u_d + j u_q = c * {text} * exp(j {n} theta_m + j phi)"
                 explains = abs(total) ** 2 / float(np.sum(w**2) * np.sum(np.abs(f) ** 2))
-                best, largest = Stray("order", formula, c, c * np.sqrt(max(1.0 - explains, 0.0) / use.sum()), unit, explains), volts
+                spread = c * float(np.sqrt(max(1.0 - explains, 0.0) / use.sum()))
+                best, largest = Stray("order", formula, c, spread, unit, explains), volts
     return best
 
 

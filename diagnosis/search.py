@@ -144,9 +144,11 @@ class Search:
         return [m for f in free if self.allowed(m := Model(names, f))]
 
     def plausible(self, solution) -> bool:
-        """No effect has a sign that its physics rules out, beyond doubt."""
+        """No effect has a size or, beyond doubt, a sign that its physics rules out."""
         for name in solution.model.names:
             effect = self.effects[name]
+            if effect.size(solution.c[name], self.view.nominal) > effect.ceiling(self.view.nominal):
+                return False
             if effect.positive:
                 c, cov = solution.c[name], solution.covariance[name]
                 if sum(c.values()) < -2.0 * np.sqrt(max(cov.sum(), 0.0)):

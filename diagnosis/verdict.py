@@ -17,7 +17,7 @@ DRIFTS, STANDS = (
 )  # drift over constant part: below the first it is the constant's, above 1/second nobody knows
 
 LEAST_DISPERSION = 0.5
-WORSE = 1.1
+WORSE = 1.05  # misfit on points not fitted, after over before
 SLOPE_DEVICE, SLOPE_UNCLEAR = 0.12, 0.35  # ohmic drop at rated current over the inverter's loss
 
 
@@ -53,7 +53,7 @@ def verdict(names, ambiguity, left) -> str:
     """The verdict from the names, the ambiguity sets and what remains."""
     if left.stray or left.group:
         return "unexplained"
-    if names and left.fit.holdout_after > WORSE * max(left.fit.holdout_before, left.fit.noise_floor):
+    if names and left.fit.holdout_after > WORSE * left.fit.holdout_before:
         return "unexplained"  # a fit that does not carry over explains nothing
     if not names and not ambiguity:
         return "no_mismatch" if left.reduced <= LEFTOVER else "unexplained"

@@ -55,6 +55,10 @@ class Cogging(Effect):
         m = nominal.machine
         return 0.006 * 1.5 * m.pole_pairs * m.magnet_flux_wb * m.rated_current_a
 
+    def ceiling(self, nominal):
+        m = nominal.machine
+        return 0.6 * 1.5 * m.pole_pairs * m.magnet_flux_wb * m.rated_current_a
+
     def size(self, c, nominal):
         return float(np.sqrt(sum(v**2 for v in c.values())))
 

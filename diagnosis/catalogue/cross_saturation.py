@@ -32,6 +32,9 @@ class CrossSaturation(FluxEffect):
     def floor(self, nominal):
         return 0.006
 
+    def ceiling(self, nominal):
+        return 1.0
+
     def size(self, c, nominal):
         """Change of psi_d by rated i_q, relative to L_q i_rated."""
         return abs(c["xy2"] + c.get("xy4", 0.0) + 0.9 * c.get("xy1", 0.0))

@@ -30,6 +30,9 @@ class CurrentGain(Effect):
     def floor(self, nominal):
         return 0.0025
 
+    def ceiling(self, nominal):
+        return 0.5
+
     def size(self, c, nominal):
         return float(np.hypot(c["alpha"], c["beta"]))
 

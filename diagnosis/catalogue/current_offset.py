@@ -40,6 +40,9 @@ class CurrentOffset(Effect):
     def floor(self, nominal):
         return 0.0015 * nominal.machine.rated_current_a
 
+    def ceiling(self, nominal):
+        return 0.4 * nominal.machine.rated_current_a
+
     def size(self, c, nominal):
         return float(np.max(np.abs(self._phases(c))))
 

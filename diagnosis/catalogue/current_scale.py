@@ -16,6 +16,9 @@ class CurrentScale(Effect):
     def floor(self, nominal):
         return 0.004
 
+    def ceiling(self, nominal):
+        return 0.6
+
     def corrected(self, view, c):
         rated = view.machine.rated_current_a
         factor = 1.0 / (1.0 + c["scale"] + c.get("droop", 0.0) * np.abs(view.i / rated) ** 2)

@@ -37,6 +37,9 @@ class DeadTime(Effect):
     def floor(self, nominal):
         return 0.0002 * nominal.inverter.dc_bus_v
 
+    def ceiling(self, nominal):
+        return 0.15 * nominal.inverter.dc_bus_v
+
     def size(self, c, nominal):
         return abs(sum(c.values()))
 

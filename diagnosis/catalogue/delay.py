@@ -14,6 +14,9 @@ class Delay(Effect):
     def floor(self, nominal):
         return 0.006 * nominal.sample_time_s
 
+    def ceiling(self, nominal):
+        return 2.5 * nominal.sample_time_s
+
     def corrected(self, view, c):
         share = float(np.clip(c["tau"] / view.sample_time_s, -1.0, 1.0))
         u = view.u.copy()

@@ -40,6 +40,9 @@ class EmfHarmonics(Effect):
     def floor(self, nominal):
         return 0.001
 
+    def ceiling(self, nominal):
+        return 0.3
+
     def size(self, c, nominal):
         return float(np.sqrt(sum(v**2 for v in c.values())))
 

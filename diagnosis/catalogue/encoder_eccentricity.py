@@ -35,6 +35,9 @@ class EncoderEccentricity(Effect):
     def floor(self, nominal):
         return 0.003
 
+    def ceiling(self, nominal):
+        return 0.5
+
     def size(self, c, nominal):
         return float(np.sqrt(sum(v**2 for v in c.values())))
 

@@ -16,6 +16,9 @@ class EncoderOffset(Effect):
     def floor(self, nominal):
         return 0.004
 
+    def ceiling(self, nominal):
+        return 0.8
+
     def corrected(self, view, c):
         return view.turned(c["offset"] + c.get("creep", 0.0) * course(view))
 

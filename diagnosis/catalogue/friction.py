@@ -34,6 +34,10 @@ class Friction(Effect):
         m = nominal.machine
         return 0.006 * 1.5 * m.pole_pairs * m.magnet_flux_wb * m.rated_current_a
 
+    def ceiling(self, nominal):
+        m = nominal.machine
+        return 1.0 * 1.5 * m.pole_pairs * m.magnet_flux_wb * m.rated_current_a
+
     def size(self, c, nominal):
         """Drag at the speed where the EMF reaches the bus, about the highest."""
         m = nominal.machine

@@ -18,6 +18,9 @@ class InductanceD(FluxEffect):
     def floor(self, nominal):
         return 0.01 * nominal.machine.inductance_d_h
 
+    def ceiling(self, nominal):
+        return 2.0 * nominal.machine.inductance_d_h
+
     def estimates(self, c, covariance, nominal):
         return one("inductance_d_h", "H", nominal.machine.inductance_d_h + c["delta_l_d"], sigma(covariance))
 

@@ -20,6 +20,9 @@ class InductanceQ(FluxEffect):
     def floor(self, nominal):
         return 0.01 * nominal.machine.inductance_q_h
 
+    def ceiling(self, nominal):
+        return 2.0 * nominal.machine.inductance_q_h
+
     def estimates(self, c, covariance, nominal):
         return one("inductance_q_h", "H", nominal.machine.inductance_q_h + c["delta_l_q"], sigma(covariance))
 

@@ -28,6 +28,9 @@ class IronLoss(Effect):
         m = nominal.machine
         return 0.002 * m.rated_current_a / self._rated_emf(nominal)
 
+    def ceiling(self, nominal):
+        return 0.5 * nominal.machine.rated_current_a / self._rated_emf(nominal)
+
     @staticmethod
     def _rated_emf(nominal):
         return nominal.inverter.dc_bus_v / np.sqrt(3)

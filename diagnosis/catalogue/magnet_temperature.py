@@ -16,6 +16,9 @@ class MagnetTemperature(FluxEffect):
     def floor(self, nominal):
         return 0.004 * nominal.machine.magnet_flux_wb
 
+    def ceiling(self, nominal):
+        return 0.4 * nominal.machine.magnet_flux_wb
+
     def size(self, c, nominal):
         """Largest change of flux since the start [Wb]."""
         knots = np.linspace(0.0, 1.0, 5)

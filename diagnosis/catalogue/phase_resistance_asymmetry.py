@@ -25,6 +25,9 @@ class PhaseResistanceAsymmetry(Effect):
     def floor(self, nominal):
         return 0.01
 
+    def ceiling(self, nominal):
+        return 2.0
+
     def size(self, c, nominal):
         return float(np.hypot(c["alpha"], c["beta"]))
 

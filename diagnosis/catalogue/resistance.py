@@ -17,6 +17,9 @@ class Resistance(Effect):
     def floor(self, nominal):
         return 0.01 * nominal.machine.resistance_ohm
 
+    def ceiling(self, nominal):
+        return 3.0 * nominal.machine.resistance_ohm
+
     def estimates(self, c, covariance, nominal):
         return one("resistance_ohm", "ohm", nominal.machine.resistance_ohm + c["delta_r"], sigma(covariance))
 

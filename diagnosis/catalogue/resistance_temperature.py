@@ -20,6 +20,9 @@ class ResistanceTemperature(Effect):
     def floor(self, nominal):
         return 0.015 * nominal.machine.resistance_ohm
 
+    def ceiling(self, nominal):
+        return 3.0 * nominal.machine.resistance_ohm
+
     def size(self, c, nominal):
         """Change of resistance over the recording, or by 30 K [ohm]."""
         knots = np.linspace(0.0, 1.0, 5)

@@ -17,6 +17,9 @@ class SamplingSkew(Effect):
     def floor(self, nominal):
         return 0.0012 * nominal.sample_time_s
 
+    def ceiling(self, nominal):
+        return 0.3 * nominal.sample_time_s
+
     def corrected(self, view, c):
         error = c["tau"] * _slope(view)
         return view.replace(i=view.i - error, i_raw=view.i_raw - view.stator(error))

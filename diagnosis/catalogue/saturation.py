@@ -33,6 +33,9 @@ class Saturation(FluxEffect):
     def floor(self, nominal):
         return 0.006
 
+    def ceiling(self, nominal):
+        return 1.0
+
     def size(self, c, nominal):
         """Largest bend of either curve against its own chord, relative to L i at rated current."""
         x = np.linspace(0, 1, 21)

@@ -11,6 +11,9 @@ class UdcGain(Effect):
     def floor(self, nominal):
         return 0.003
 
+    def ceiling(self, nominal):
+        return 0.5
+
     def corrected(self, view, c):
         factor = 1.0 / (1.0 + c["gain"])
         return view.replace(u=view.u * factor, u_dc=view.u_dc * factor)

@@ -22,7 +22,7 @@ from scripts.real.outputs import write
 
 FOLDER = Path("laas_mn4004")
 FILE = FOLDER / "acc_current.txt"
-DRIVE = ROOT / "docs" / "drives" / "mn4004.toml"
+DRIVE = ROOT / "scripts" / "real" / "mn4004.toml"
 HOLD_ROWS = 25  # that a point of the pictures stands for
 
 
