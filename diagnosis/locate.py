@@ -48,7 +48,7 @@ def locate(view, cells, pure) -> Location:
         quiet = [at_order(cells, pure, s * order) for s in ((1,) if order == 0 else (1, -1))]
         amplitude, floor = np.hypot(*map(_rms, both)) if order else _rms(both[0]), max(map(_rms, quiet))
         if amplitude > 3.0 * floor:
-            orders.append(OrderLine(float(order), float(amplitude), "V"))
+            orders.append(OrderLine(round(float(order), 4), float(amplitude), "V"))
     orders.sort(key=lambda line: -line.amplitude)
     return Location(signal, orders[:8], _regions(view, y0))
 

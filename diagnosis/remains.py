@@ -83,7 +83,10 @@ def _least(view) -> dict[str, float]:
 
 
 def _fit(search, found, cells, residual, held) -> Fit:
-    """Misfit before and after, rms over blocks of all its orders, on fitted and held-out blocks [V]."""
+    """Misfit before and after, rms over blocks of all its orders, on fitted and held-out blocks [V].
+
+    The floor is the noise together with the balance's own share, which no model can undercut.
+    """
 
     def rms(values, blocks):
         use = cells.ok & (cells.channel == "u") & blocks[cells.block]
@@ -98,5 +101,5 @@ def _fit(search, found, cells, residual, held) -> Fit:
         rms(residual, ~held),
         rms(before, held),
         rms(residual, held),
-        rms(found.pure, ~held),
+        rms(search.floor, ~held),
     )

@@ -89,7 +89,7 @@ def orders(e) -> theme.Picture:
             axis.vlines(place + side, bottom, heights, color=WHEN[when], linewidth=2.4 if few else 1.0)
             axis.plot(place + side, heights, "o", color=WHEN[when], markersize=5 if few else 2)
     if few:
-        axis.set_xticks(place, [f"{order:g}" for order in e["orders"]])
+        axis.set_xticks(place, [f"{order:.2g}" for order in e["orders"]])
     axis.grid(axis="x", visible=False)
     axis.set(
         title="Harmonics",
