@@ -46,7 +46,7 @@ def remains(search, found, held) -> Remains:
     share = CLAMPED_LEFT if "dead_time" in best.model.names else CURVE_LEFT
     floor = share * fit.train_before if best.model.names else 0.0
     stray = (
-        stray_order(best.view, rows, floor)
+        stray_order(best.view, rows, floor, sorted(_known_orders(best, "u")))
         or stray_swing(best.view, rows, floor)
         or stray_torque(best.view, search.projector, cells, residual, found.sigma)
     )
@@ -62,13 +62,21 @@ def _standing_out(search, found, cells, residual, use, floor) -> str:
     for channel in np.unique(cells.channel):
         for order in np.unique(cells.order[cells.channel == channel]):
             rows = use & (cells.channel == channel) & (cells.order == order)
-            if rows.sum() < GROUP_ROWS:
+            if rows.sum() < GROUP_ROWS or abs(order) in _known_orders(found.best, channel):
                 continue
             after = np.mean(residual[rows] ** 2) - np.mean(found.pure[rows] ** 2)
             before = np.mean(search.cells.y[rows] ** 2)
             if chi[rows].mean() > GROUP_CHI2 and after > max(GROUP_SHARE**2 * before, floor[channel] ** 2):
                 worst = max(worst, (float(np.sqrt(after / before)), f"{channel} at order {order:g}"))
     return worst[1]
+
+
+def _known_orders(best, channel) -> set[float]:
+    """Electrical orders at which an effect of the best model has more harmonics than its core."""
+    names = best.model.names
+    if channel == "u" and names & {"emf_harmonics", "dead_time"}:
+        return {12.0, 18.0, 24.0}
+    return {float(h) for h in range(2, 38, 2)} if channel == "torque" and "cogging" in names else set()
 
 
 def _least(view) -> dict[str, float]:

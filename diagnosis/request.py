@@ -115,6 +115,13 @@ def requests(view, solutions, effects, noise_v) -> list[Request]:
     return out
 
 
+def default_request(view, names, effects) -> Request:
+    """A spin without current at the highest speed, where no computed point separates the names: with the reasons."""
+    top = float(np.abs(view.omega).max())
+    why = "; ".join(f"{n}: {effects[n].separated_by}" for n in names)
+    return Request(top, 0.0, 0.0, names, why, float(view.nominal.inverter.dc_bus_v))
+
+
 def _why(view, k, rows, pair, solutions):
     p = rows[0][0]
     at = p.ok & (p.block == k) & (p.channel == "u")

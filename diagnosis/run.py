@@ -22,7 +22,7 @@ from diagnosis.locate import at_order, evidence, locate
 from diagnosis.nominal import Nominal, load_nominal
 from diagnosis.recording import Recording
 from diagnosis.remains import remains
-from diagnosis.request import requests
+from diagnosis.request import default_request, requests
 from diagnosis.result import Diagnosis, UnknownTerm
 from diagnosis.search import EARNS, Search
 from diagnosis.slow_diagnosis import diagnose_slow
@@ -96,7 +96,12 @@ def _physics(recordings, nominal, progress) -> Diagnosis:
     if kind == "ambiguous":
         progress("the recording that would tell")
         noise_v = float(np.nanmedian(np.abs(at_order(search.cells, found.pure, 0.0))))
-        answer.next_recording = requests(view, [found.best, *found.tied], CATALOGUE, noise_v)
+        rivals = [found.best, *found.tied]
+        for group in [] if found.tied else ambiguity:  # what would be there without one or the other
+            rivals += [search.refine(found.best.model.without(n)) for n in group if n in found.best.model.names]
+        answer.next_recording = requests(view, rivals, CATALOGUE, noise_v) or [
+            default_request(view, sorted({n for group in ambiguity for n in group}), CATALOGUE)
+        ]
     if kind == "unexplained":
         answer.unknown_term = _unknown(found, left)
     answer.evidence = evidence(

@@ -77,14 +77,19 @@ def stray_torque(view, projector, cells, residual, sigma) -> Stray | None:
     return Stray("torque", formula, amplitude, amplitude / np.sqrt(gain), "Nm", gain / total)
 
 
-def stray_order(view, residual, floor) -> Stray | None:
-    """The strongest order per mechanical turn that is locked to the rotor; smaller ones than ``floor`` [V] pass."""
+def stray_order(view, residual, floor, known=()) -> Stray | None:
+    """The strongest order per mechanical turn that is locked to the rotor; smaller ones than ``floor`` [V] pass.
+
+    known: electrical orders that belong to an effect which is there, at multiples and fractions of its size.
+    """
     p, m, level = view.machine.pole_pairs, residual.shape[1], voltage_level(view)
     turns = np.abs(view.theta[:, -1] - view.theta[:, 0]) / (2 * np.pi * p)
     theta_m = view.theta_mid / p
     taper = 1.0 - np.cos(2 * np.pi * (np.arange(m) + 0.5) / m)
     best, largest = None, 0.0
     for n in [*range(1, MOST_ORDER + 1), *range(-MOST_ORDER, 0)]:
+        if any(abs(n) == h * p for h in known):
+            continue
         use = (abs(n) * turns >= 2.5) & (abs(n) * turns < m / 5)
         if use.sum() < 6:
             continue

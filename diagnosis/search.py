@@ -26,6 +26,7 @@ SCALES = frozenset({"udc_gain", "current_scale", "magnet_flux"})
 SAME_SCALE = 0.03  # of what is explained: so much may be lost by one scale in place of two
 LEAST_SURPLUS = 0.012  # of L i
 BESIDE_CROSS = 0.025  # of L i: a co-energy's cross term bends the axes themselves a little
+LONE_TIE = 80.0  # margin of a tie where one operating point is all there is
 NEIGHBOURS = 7  # refined around a best set
 EARNS = 30.0  # gain in chi^2 over dispersion that an effect must bring beside the freest form of the others
 SURE = 4.0  # sizes of its own standard deviation
@@ -229,7 +230,8 @@ class Search(Refiner):
         for model, solution in self.refined.items():
             if model.names - settled == best.model.names - settled or len(model) > len(best.model):
                 continue
-            if solution.score < best.score + TIE and model.names:
+            margin = TIE if self.most > 1 else LONE_TIE
+            if solution.score < best.score + margin and model.names:
                 if all(s.model.names != model.names for s in out):
                     out.append(solution)
         # A model that holds another tied one is that one with a passenger.

@@ -16,9 +16,9 @@ DRIFTS, STANDS = (
     1.5,
 )  # drift over constant part: below the first it is the constant's, above 1/second nobody knows
 
-LEAST_DISPERSION = 0.5
+LEAST_DISPERSION = 0.8
 WORSE = 1.05  # misfit on points not fitted, after over before
-SLOPE_DEVICE, SLOPE_UNCLEAR = 0.12, 0.35  # ohmic drop at rated current over the inverter's loss
+SLOPE_DEVICE, SLOPE_UNCLEAR = 0.08, 0.2  # ohmic drop at rated current over the inverter's loss
 
 
 def groups(best, tied, effects, nominal, silent=frozenset()):

@@ -45,11 +45,12 @@ def _order(view) -> int:
 
 class Cogging(Effect):
     def core(self, view):
-        return _waves(view, _order(view))
+        h = _order(view)
+        return {**_waves(view, h), **_waves(view, 2 * h)}
 
     def free(self, view):
         h = _order(view)
-        return {**_waves(view, 2 * h), **_waves(view, 3 * h)}
+        return _waves(view, 3 * h)
 
     def floor(self, nominal):
         m = nominal.machine

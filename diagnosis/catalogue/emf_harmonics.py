@@ -15,9 +15,9 @@ def _order(view, h):
 
 
 def _with_reluctance(view, psi, n):
-    """Flux that turns n times an electrical turn in dq: the torque also has its slope, Re(conj(d psi / d theta) i)."""
+    """Flux that turns n times an electrical turn in dq: the torque also has its slope, n Im(conj(psi) i)."""
     column = flux(view, psi)
-    column["torque"] = column["torque"] + torque_of(view, -n * psi, view.i)
+    column["torque"] = column["torque"] + torque_of(view, n * psi, view.i)
     return column
 
 
@@ -38,7 +38,7 @@ class EmfHarmonics(Effect):
         return {**_order(view, 12), **_order(view, 18)}
 
     def floor(self, nominal):
-        return 0.001
+        return 0.0003
 
     def ceiling(self, nominal):
         return 0.3

@@ -1,6 +1,6 @@
 """Currents are sampled tau after the middle of the zero vector, where they slope with the EMF."""
 
-from diagnosis.effect import Effect, Parameter, current_error, one, sigma
+from diagnosis.effect import Effect, Parameter, angle_error, current_error, one, sigma
 
 
 def _slope(view):
@@ -14,6 +14,13 @@ class SamplingSkew(Effect):
     def core(self, view):
         return {"tau": current_error(view, _slope(view))}
 
+    def free(self, view):
+        # The angle latched at another instant than the currents.
+        return {"angle": angle_error(view, view.omega)}
+
+    def size(self, c, nominal):
+        return max(abs(v) for v in c.values())
+
     def floor(self, nominal):
         return 0.0012 * nominal.sample_time_s
 
@@ -21,6 +28,7 @@ class SamplingSkew(Effect):
         return 0.3 * nominal.sample_time_s
 
     def corrected(self, view, c):
+        view = view.turned(c.get("angle", 0.0) * view.omega)
         error = c["tau"] * _slope(view)
         return view.replace(i=view.i - error, i_raw=view.i_raw - view.stator(error))
 
