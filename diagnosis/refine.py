@@ -35,7 +35,7 @@ class Refiner:
         self.projector = Projector(view)
         self.cells = cells_of(view, self.effects.values(), self.projector)
         self.sigma, self.pure = row_sigma(view, self.cells)
-        self.floor = self.sigma  # before it is widened for the curves of what is found
+        self.unwidened = self.sigma  # before it is widened for the curves of what is found
         # The acceleration of a fast free shaft is all noise; the projector's rows are those of every fit.
         self.projector.ok &= (self.cells.channel != "torque") | (
             self.pure < NOISY_TORQUE * rated_torque(view)

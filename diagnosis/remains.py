@@ -109,5 +109,5 @@ def _fit(search, found, cells, residual, held) -> Fit:
         rms(residual, ~held),
         rms(before, held),
         rms(residual, held),
-        rms(search.floor, ~held),
+        rms(search.unwidened, ~held),
     )
