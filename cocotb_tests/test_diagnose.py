@@ -21,6 +21,7 @@ from diagnosis import run as running
 from diagnosis.catalogue import CATALOGUE
 from diagnosis.improved_plant import check_key, plain
 from diagnosis.nominal import load_nominal
+from diagnosis.shaft import is_airgap
 from diagnosis.blocks import view_of
 from plant import Harmonic, flux_from_currents, machine_params
 
@@ -227,3 +228,13 @@ def test_a_new_file_is_a_new_effect(tmp_path, monkeypatch):
     )
     # a_d cos and a_q sin of equal size are one wave that turns forward.
     assert answer.effects[0].parameters["order_2"].value == pytest.approx(0.01, rel=0.1)
+
+
+def test_a_transducer_is_not_taken_for_the_air_gap():
+    """The inertia's share of a shaft's torque is noise at a steady speed; it must not decide what was recorded."""
+    rng = np.random.default_rng(5)
+    omega_m = np.repeat([-60.0, -20.0, 20.0, 60.0], 500)
+    drag, gap = 0.009 * omega_m, rng.uniform(-50.0, 50.0, omega_m.size)
+    noise = rng.normal(0.0, 0.05, omega_m.size)
+    assert not is_airgap(gap - drag + noise, gap, drag)
+    assert is_airgap(gap + noise, gap, drag)

@@ -150,14 +150,11 @@ def _mechanics(recording, nominal, i_s, theta, theta_s, linked):
         slope[1:-2] = (theta[3:] - theta[2:-1] - theta[1:-2] + theta[:-3]) / (2 * period**2)
     slope_m = np.nan_to_num(slope) / nominal.machine.pole_pairs
     if kind == "torque":
-        drag = (
-            (nominal.machine.viscous_friction_nms or 0.0)
-            * np.gradient(theta_s, period)
-            / nominal.machine.pole_pairs
-        )
-        drag = drag + (nominal.machine.inertia_kgm2 or 0.0) * slope_m
-        torque = recording["torque"]
-        return kind, torque - drag if is_airgap(torque, airgap(nominal, i_s), drag) else torque, slope_m
+        omega_m = np.gradient(theta_s, period) / nominal.machine.pole_pairs
+        drag, torque = (nominal.machine.viscous_friction_nms or 0.0) * omega_m, recording["torque"]
+        if is_airgap(torque, airgap(nominal, i_s), drag):
+            torque = torque - drag - (nominal.machine.inertia_kgm2 or 0.0) * slope_m
+        return kind, torque, slope_m
     return kind, np.full(n, 0.0 if kind in ("unloaded", "free") else np.nan), slope_m
 
 

@@ -24,6 +24,7 @@ MOST_AT_ONCE = 3
 REFINED = 14
 SCALES = frozenset({"udc_gain", "current_scale", "magnet_flux"})
 SAME_SCALE = 0.03  # of what is explained: so much may be lost by one scale in place of two
+SAME_FIT = 1.25  # of chi^2: so much worse may one effect be in place of three
 LEAST_SURPLUS = 0.012  # of L i
 BESIDE_CROSS = 0.025  # of L i: a co-energy's cross term bends the axes themselves a little
 LONE_TIE = 80.0  # margin of a tie where one operating point is all there is
@@ -154,11 +155,16 @@ class Search(Refiner):
 
         All of (u_dc, current, magnets) scaled alike is no change at all, so any two of them alike are the third.
         """
+        explained = self.refine(Model(frozenset())).chi2 - best.chi2
+        if len(best.model) >= 3:  # three that amount to one: scaled currents with R and L_q set right again are L_d
+            forms = [m for n in self.effects if self.linear.index[n][0] for m in self.forms([n])]
+            single = min((self.refine(m) for m in forms), key=lambda s: s.score)
+            if single.chi2 - best.chi2 < SAME_SCALE * explained and single.chi2 < SAME_FIT * best.chi2:
+                return single
         pair = best.model.names & SCALES
         if len(pair) != 2:
             return best
         (third,) = SCALES - pair
-        explained = self.refine(Model(frozenset())).chi2 - best.chi2
         rest = Model(best.model.names - pair, best.model.free - pair)
         singles = [self.refine(rest.with_(third, bend)) for bend in (False, True)]
         single = min(singles, key=lambda s: s.score)

@@ -63,8 +63,8 @@ def airgap(nominal, i):
 def is_airgap(torque, nominal_airgap, drag) -> bool:
     """Whether a recorded torque is the air gap's, as a simulation writes it, rather than the shaft's.
 
-    torque, nominal_airgap, drag: (n,) [Nm], drag being what friction and inertia of the nameplate take.  The
-    shaft's is taken unless the other fits far better.
+    torque, nominal_airgap, drag: (n,) [Nm], drag being what friction of the nameplate takes; the inertia's
+    share is all noise at a steady speed.  The shaft's is taken unless the other fits far better.
     """
     good = np.isfinite(torque) & np.isfinite(nominal_airgap) & np.isfinite(drag)
     left = (torque - nominal_airgap)[good]
