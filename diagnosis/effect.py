@@ -24,7 +24,7 @@ Column = dict  # channel -> array
 
 @dataclass(frozen=True)
 class Parameter:
-    """A number that describes an effect.  ``least``: smaller deviations are of no interest to an engineer."""
+    """A number that describes an effect."""
 
     name: str
     unit: str
@@ -146,6 +146,12 @@ def torque_of(view, psi, i):
     """Air-gap torque of the intervals, (b, m) [Nm], from flux linkage and current at the samples."""
     torque = 1.5 * view.machine.pole_pairs * (np.conj(psi) * i).imag
     return 0.5 * (torque[:, 1:] + torque[:, :-1])
+
+
+def rated_torque(nominal) -> float:
+    """Torque of the magnets at rated current [Nm]."""
+    m = nominal.machine
+    return 1.5 * m.pole_pairs * m.magnet_flux_wb * m.rated_current_a
 
 
 def sigma(covariance, k=0) -> float:

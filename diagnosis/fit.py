@@ -12,6 +12,7 @@ import numba
 import numpy as np
 
 from diagnosis.cells import SYSTEM_DC, SYSTEM_U, noise, voltage_level
+from diagnosis.effect import rated_torque
 
 FRESH = 0.06  # share of a column that must not be in the earlier ones, else the data do not carry it
 PER_EFFECT = 10.0  # price of an effect beside that of its coefficients: one in twenty is there by itself
@@ -165,12 +166,6 @@ def everything(cells) -> Model:
     return Model(frozenset(cells.columns), frozenset(cells.columns))
 
 
-def rated_torque(view) -> float:
-    """Torque of the magnets at rated current [Nm]."""
-    m = view.machine
-    return 1.5 * m.pole_pairs * m.magnet_flux_wb * m.rated_current_a
-
-
 def row_sigma(view, cells) -> tuple[np.ndarray, np.ndarray]:
     """Standard deviation of every row with and without the balance's own share: (sigma, noise)."""
     rough = Fitter(cells, np.ones(len(cells.y)), np.ones(len(cells.y), bool)).solve(everything(cells))
@@ -179,5 +174,5 @@ def row_sigma(view, cells) -> tuple[np.ndarray, np.ndarray]:
     level = SYSTEM_U * voltage_level(view) + SYSTEM_DC * view.nominal.inverter.dc_bus_v
     own = np.where(cells.order == 0, 1.0, 0.5) * level[cells.block]
     own = np.where(cells.channel == "sum", 2e-4 * m.rated_current_a, own)
-    own = np.where(cells.channel == "torque", 3e-3 * rated_torque(view), own)
+    own = np.where(cells.channel == "torque", 3e-3 * rated_torque(view.nominal), own)
     return np.hypot(pure, own), pure

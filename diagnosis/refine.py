@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from diagnosis.cells import Projector, cells_of
-from diagnosis.effect import FluxEffect
-from diagnosis.fit import Fitter, Model, Solution, everything, rated_torque, row_sigma
+from diagnosis.effect import FluxEffect, rated_torque
+from diagnosis.fit import Fitter, Model, Solution, everything, row_sigma
 
 NOISY_TORQUE = 0.03  # of rated torque
 POINT = 0.12  # of top speed and rated current: closer operating points are one
@@ -38,7 +38,7 @@ class Refiner:
         self.unwidened = self.sigma  # before it is widened for the curves of what is found
         # The acceleration of a fast free shaft is all noise; the projector's rows are those of every fit.
         self.projector.ok &= (self.cells.channel != "torque") | (
-            self.pure < NOISY_TORQUE * rated_torque(view)
+            self.pure < NOISY_TORQUE * rated_torque(view.nominal)
         )
         self.train = train_blocks[self.cells.block]
         self.linear = Fitter(self.cells, self.sigma, self.train)

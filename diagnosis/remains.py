@@ -8,6 +8,7 @@ import numpy as np
 
 from diagnosis.balance import misfit
 from diagnosis.cells import voltage_level
+from diagnosis.effect import rated_torque
 from diagnosis.result import Fit
 from diagnosis.scan import Stray, row_residual, stray_order, stray_swing, stray_torque
 
@@ -82,7 +83,7 @@ def _known_orders(best, channel) -> set[float]:
 def _least(view) -> dict[str, float]:
     """What is too little to be spoken of, per channel."""
     m = view.machine
-    torque = 1.5 * m.pole_pairs * m.magnet_flux_wb * m.rated_current_a
+    torque = rated_torque(view.nominal)
     return {
         "u": 1e-3 * float(voltage_level(view).max()),
         "sum": 2e-3 * m.rated_current_a,

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from diagnosis.cells import voltage_level
+from diagnosis.effect import rated_torque
 
 MOST_ORDER = 80  # per mechanical turn
 LOCKED = 30.0  # power of the sum over sum of powers: exp(-30) by chance
@@ -59,7 +60,7 @@ def stray_torque(view, projector, cells, residual, sigma) -> Stray | None:
     if use.sum() < 12:
         return None
     m, best = view.machine, None
-    rated = 1.5 * m.pole_pairs * m.magnet_flux_wb * m.rated_current_a
+    rated = rated_torque(view.nominal)
     for n in range(1, 5):
         angle = n * view.theta_mid / m.pole_pairs
         waves = [projector.rows({"torque": f(angle)})[use] / sigma[use] for f in (np.cos, np.sin)]

@@ -3,7 +3,7 @@
 import numpy as np
 
 from diagnosis.balance import misfit
-from diagnosis.effect import Effect, Parameter
+from diagnosis.effect import Effect, Parameter, rated_torque
 from diagnosis.result import Estimate
 
 
@@ -53,12 +53,10 @@ class Cogging(Effect):
         return _waves(view, 3 * h)
 
     def floor(self, nominal):
-        m = nominal.machine
-        return 0.006 * 1.5 * m.pole_pairs * m.magnet_flux_wb * m.rated_current_a
+        return 0.006 * rated_torque(nominal)
 
     def ceiling(self, nominal):
-        m = nominal.machine
-        return 0.6 * 1.5 * m.pole_pairs * m.magnet_flux_wb * m.rated_current_a
+        return 0.6 * rated_torque(nominal)
 
     def size(self, c, nominal):
         return float(np.sqrt(sum(v**2 for v in c.values())))

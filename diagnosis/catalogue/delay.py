@@ -6,8 +6,6 @@ from diagnosis.effect import Effect, Parameter, one, sigma, voltage
 
 
 class Delay(Effect):
-    corrected_by = "u"
-
     def core(self, view):
         return {"tau": voltage(view.to_dq(view.u[:, 1:-1] - view.u[:, :-2]) / view.sample_time_s)}
 

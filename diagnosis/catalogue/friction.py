@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from diagnosis.effect import Effect, Parameter
+from diagnosis.effect import Effect, Parameter, rated_torque
 from diagnosis.result import Estimate
 
 
@@ -31,12 +31,10 @@ class Friction(Effect):
         }
 
     def floor(self, nominal):
-        m = nominal.machine
-        return 0.006 * 1.5 * m.pole_pairs * m.magnet_flux_wb * m.rated_current_a
+        return 0.006 * rated_torque(nominal)
 
     def ceiling(self, nominal):
-        m = nominal.machine
-        return 1.0 * 1.5 * m.pole_pairs * m.magnet_flux_wb * m.rated_current_a
+        return rated_torque(nominal)
 
     def size(self, c, nominal):
         """Drag at the speed where the EMF reaches the bus, about the highest."""
