@@ -99,6 +99,7 @@ def view_of(recording: Recording, nominal, block_rows=BLOCK_ROWS) -> View:
         swing = (machine.inertia_kgm2 or 0.0) * np.ptp([e.mean(axis=1) for e in ends], axis=0)
         torque[swing > RAMP_TORQUE * airgap(nominal, np.array(1j * machine.rated_current_a))] = np.nan
     missing = np.full(len(starts), np.nan)
+    passed = r["t"][rows].mean(axis=1) - r["t"][0]
     return View(
         nominal=nominal,
         sample_time_s=period,
@@ -109,7 +110,8 @@ def view_of(recording: Recording, nominal, block_rows=BLOCK_ROWS) -> View:
         i_abc=None if i_abc is None else i_abc[samples],
         u=u[around],
         u_dc=u_dc_mid[rows],
-        t=r["t"][rows].mean(axis=1) - r["t"][0],
+        t=passed,
+        course=passed / max(float(r["t"][-1] - r["t"][0]), 1e-9),
         temp=r["temp_winding"][rows].mean(axis=1) if r.has("temp_winding") else missing,
         torque=torque,
         slope_m=slope_m,

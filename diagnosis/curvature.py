@@ -2,7 +2,8 @@
 
 The surplus over the nominal flux, divided by the current, is constant for a wrong inductance and vanishes
 with the current for saturation.  Its ratio between the smallest and the largest recorded current decides;
-in between, or with one level of current, nobody can tell.
+in between, or with one level of current, nobody can tell.  Where the surplus changes its sign, or is far larger at
+small currents, neither alone can make it: both are there.
 """
 
 from __future__ import annotations
@@ -14,6 +15,10 @@ SPREAD = 1.35  # between smallest and largest level
 STRAIGHT, BENT = 0.68, 0.55  # ratio above which it is an inductance, below which saturation
 
 FAMILY = ("inductance_d", "inductance_q", "saturation")
+
+
+OVER, UNDER = 1.35, -0.2  # ratio beyond which both are there
+PART = 0.03  # of L: what each of the two must amount to
 
 
 def surplus(solution, axis, x):
@@ -38,21 +43,37 @@ def ratio(view, solution, axis) -> tuple[float, float]:
 
     The ratio is nan where there is one level of current only.
     """
+    x, shape, inductance = _ends(view, solution, axis)
+    if not len(x):
+        return np.nan, 0.0
+    largest = float(np.max(np.abs(shape * x / x[1]))) / inductance
+    if abs(x[1]) < SPREAD * abs(x[0]) or abs(shape[1]) < 1e-12:
+        return np.nan, largest
+    return float(shape[0] / shape[1]), largest
+
+
+def has_both(view, solution, axis) -> bool:
+    """Whether the curve of an axis needs a wrong inductance and saturation beside it."""
+    value, _ = ratio(view, solution, axis)
+    if not np.isfinite(value) or UNDER < value < OVER:
+        return False
+    _, shape, inductance = _ends(view, solution, axis)
+    return bool(min(abs(shape[0]), abs(shape[1] - shape[0])) > PART * inductance)
+
+
+def _ends(view, solution, axis):
+    """(smallest and largest current recorded [rated], surplus inductance at both [H], inductance [H])."""
     m = view.machine
     i = view.i.mean(axis=1)
     levels = (i.real if axis == "d" else i.imag) / m.rated_current_a
     levels = levels[np.abs(levels) > LEAST]
     inductance = getattr(m, f"inductance_{axis}_h")
     if not len(levels):
-        return np.nan, 0.0
+        return levels, levels, inductance
     x = np.array([levels[np.argmin(np.abs(levels))], levels[np.argmax(np.abs(levels))]])
     if axis == "d":
         x = np.sign(x[1]) * np.abs(x)
-    shape = (surplus(solution, axis, x) + saturated(solution, axis, x, inductance)) / x
-    largest = float(np.max(np.abs(shape * x / x[1]))) / inductance
-    if abs(x[1]) < SPREAD * abs(x[0]) or abs(shape[1]) < 1e-12:
-        return np.nan, largest
-    return float(shape[0] / shape[1]), largest
+    return x, (surplus(solution, axis, x) + saturated(solution, axis, x, inductance)) / x, inductance
 
 
 def labels(view, solution, least=0.012) -> tuple[set[str], bool]:
@@ -62,7 +83,9 @@ def labels(view, solution, least=0.012) -> tuple[set[str], bool]:
         value, size = ratio(view, solution, axis)
         if size < least:
             continue
-        if not np.isfinite(value):
+        if has_both(view, solution, axis):
+            names |= {f"inductance_{axis}", "saturation"}
+        elif not np.isfinite(value):
             names.add(f"inductance_{axis}")
             sure = False
         elif value >= STRAIGHT:

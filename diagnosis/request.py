@@ -14,8 +14,11 @@ ENOUGH = 50.0  # squared distance, in standard deviations, that counts as told a
 MOST = 4
 
 
-def steady_view(view, omega, i_dq, rows=ROWS):
-    """A view of made-up steady operating points of the nominal drive: omega (b,) [rad/s], i_dq (b,) complex [A]."""
+def steady_view(view, omega, i_dq, cold=False, rows=ROWS):
+    """A view of made-up steady operating points of the nominal drive: omega (b,) [rad/s], i_dq (b,) complex [A].
+
+    cold: of a machine that has cooled down; otherwise slow changes stand where the recording ended.
+    """
     omega, i_dq = np.asarray(omega, float), np.asarray(i_dq, complex)
     period, b = view.sample_time_s, len(omega)
     theta = 0.1 + omega[:, None] * period * np.arange(-1, rows + 2)
@@ -34,7 +37,8 @@ def steady_view(view, omega, i_dq, rows=ROWS):
         u=u_dq[:, None] * np.exp(1j * middle),
         u_dc=np.full((b, rows), float(view.nominal.inverter.dc_bus_v)),
         t=np.full(b, view.span_s),
-        temp=np.full(b, float(np.nanmedian(view.temp)) if np.isfinite(view.temp).any() else np.nan),
+        course=np.full(b, 0.0 if cold else 1.0),
+        temp=np.full(b, _temperature(view, cold)),
         torque=np.full((b, rows), np.nan),
         slope_m=np.zeros((b, rows)),
         shaft=np.full(b, ""),
@@ -43,6 +47,13 @@ def steady_view(view, omega, i_dq, rows=ROWS):
         run=np.arange(b),
         rows=np.zeros(b, int),
     )
+
+
+def _temperature(view, cold):
+    """Winding temperature of a further recording [degC], nan where none was recorded."""
+    if not np.isfinite(view.temp).any():
+        return np.nan
+    return float(view.machine.temperature_ref_c if cold else view.temp[np.argmax(view.course)])
 
 
 def grid(view):
@@ -75,10 +86,21 @@ def predictions(view, solution, effects):
     return p, total, np.sqrt(np.maximum(variance, 0.0))
 
 
-def requests(view, solutions, effects, noise_v) -> list[Request]:
-    """Operating points that separate the tied solutions best, the most telling first; empty where none does."""
+DRIFTS = {"magnet_temperature", "resistance_temperature"}
+
+
+def wants_cold(names) -> bool:
+    """Whether a machine that has cooled down tells the names apart: a drift has gone then, all else has not."""
+    return bool(DRIFTS & set(names)) and len(set(names)) > 1
+
+
+def requests(view, solutions, effects, noise_v, cold=False) -> list[Request]:
+    """Operating points that separate the tied solutions best, the most telling first; empty where none does.
+
+    cold: ask for a machine that has cooled down.
+    """
     omega, i = grid(view)
-    made = steady_view(view, omega, i)
+    made = steady_view(view, omega, i, cold)
     rows = [predictions(made, s, effects) for s in solutions]
     p = rows[0][0]
     pairs = list(itertools.combinations(range(len(solutions)), 2))
@@ -93,7 +115,8 @@ def requests(view, solutions, effects, noise_v) -> list[Request]:
     out, reached = [], np.zeros(len(pairs))
     while len(out) < MOST and (reached < ENOUGH).any():
         open_pairs = reached < ENOUGH
-        gain = np.minimum(distance[open_pairs], ENOUGH).sum(axis=0)
+        near = distance[open_pairs]
+        gain = np.minimum(near, ENOUGH).sum(axis=0) + 1e-3 * np.sqrt(near).sum(axis=0)  # the clearest of equals
         k = int(np.argmax(gain))
         told = open_pairs & (distance[:, k] >= 9.0)
         if not told.any():
@@ -107,19 +130,32 @@ def requests(view, solutions, effects, noise_v) -> list[Request]:
                 float(i[k].real),
                 float(i[k].imag),
                 names,
-                _why(made, k, rows, worst, solutions),
+                _why(made, k, rows, worst, solutions) + (COLD if cold else ""),
                 float(view.nominal.inverter.dc_bus_v),
+                float(view.machine.temperature_ref_c) if cold else None,
             )
         )
         distance[:, k] = 0.0
     return out
 
 
+COLD = ", once the machine has cooled down (record temp_winding)"
+
+
 def default_request(view, names, effects) -> Request:
     """A spin without current at the highest speed, where no computed point separates the names: with the reasons."""
+    cold = wants_cold(names)
     top = float(np.abs(view.omega).max())
     why = "; ".join(f"{n}: {effects[n].separated_by}" for n in names)
-    return Request(top, 0.0, 0.0, names, why, float(view.nominal.inverter.dc_bus_v))
+    return Request(
+        top,
+        0.0,
+        0.0,
+        names,
+        why + (COLD if cold else ""),
+        float(view.nominal.inverter.dc_bus_v),
+        float(view.machine.temperature_ref_c) if cold else None,
+    )
 
 
 def _why(view, k, rows, pair, solutions):

@@ -22,12 +22,12 @@ from diagnosis.locate import at_order, evidence, locate
 from diagnosis.nominal import Nominal, load_nominal
 from diagnosis.recording import Recording
 from diagnosis.remains import remains
-from diagnosis.request import default_request, requests
+from diagnosis.request import default_request, requests, wants_cold
 from diagnosis.result import Diagnosis, UnknownTerm
 from diagnosis.search import EARNS, Search
 from diagnosis.slow_diagnosis import diagnose_slow
 from diagnosis.unknown import sparse_term
-from diagnosis.view import joined_views
+from diagnosis.view import joined_views, started_cold
 
 HOLDOUT_EVERY = 4  # each fourth dwell is never fitted
 MAP_POINTS = 20  # different currents that make a flux map worth fitting
@@ -84,7 +84,7 @@ def _physics(recordings, nominal, progress) -> Diagnosis:
     search = Search(view, CATALOGUE, ~held, progress)
     found = search.run()
     left = remains(search, found, held)
-    names, ambiguity = words.groups(found.best, found.tied, CATALOGUE, nominal, found.silent)
+    names, ambiguity = words.groups(found.best, found.tied, CATALOGUE, nominal, found.silent, started_cold(view))
     names = words.carried(names, found.best, search.worth)
     names, absorbed = beside_free_surface(view, names, ~held)
     ambiguity = ambiguity + absorbed
@@ -99,8 +99,9 @@ def _physics(recordings, nominal, progress) -> Diagnosis:
         rivals = [found.best, *found.tied]
         for group in [] if found.tied else ambiguity:  # what would be there without one or the other
             rivals += [search.refine(found.best.model.without(n)) for n in group if n in found.best.model.names]
-        answer.next_recording = requests(view, rivals, CATALOGUE, noise_v) or [
-            default_request(view, sorted({n for group in ambiguity for n in group}), CATALOGUE)
+        open_names = sorted({n for group in ambiguity for n in group})
+        answer.next_recording = requests(view, rivals, CATALOGUE, noise_v, wants_cold(open_names)) or [
+            default_request(view, open_names, CATALOGUE)
         ]
     if kind == "unexplained":
         answer.unknown_term = _unknown(found, left)

@@ -52,6 +52,8 @@ class Outcome:
 class Search(Refiner):
     """One search over one view."""
 
+    together = frozenset()  # an inductance and the saturation beside it, told apart by their curve
+
     def run(self) -> Outcome:
         """The whole search."""
         self.progress("sets of effects")
@@ -179,16 +181,19 @@ class Search(Refiner):
         if wanted == mine:
             return best, sure
         names = (best.model.names - mine) | wanted
-        free = (best.model.free - mine) | {n for n in wanted if self.linear.index[n][1]}
-        if "saturation" in wanted:
-            free |= {"saturation"}
-        return self.refine(Model(names, frozenset(free & names))), sure
+        # The inductance is the straight part where both are there, the saturation's free curve all that bends.
+        self.together = wanted if "saturation" in wanted and len(wanted) > 1 else frozenset()
+        bendable = {n for n in wanted - self.together if self.linear.index[n][1]}
+        free = (best.model.free - mine) | bendable | (wanted & {"saturation"})
+        solution = self.refine(Model(names, frozenset(free & names)))
+        return (solution, sure) if np.isfinite(solution.score) else (best, False)
 
     def _pruned(self, best):
         """The best model without effects that do not earn their place."""
         while best.model.names:
             at = self._fitter_at(best)
-            weak = {n: gain for n in sorted(best.model.names) if (gain := self.gain(best, n, at)) is not None}
+            judged = sorted(best.model.names - self.together)  # those were judged by the shape of their curve
+            weak = {n: gain for n in judged if (gain := self.gain(best, n, at)) is not None}
             if not weak:
                 pair = self._idle_pair(best)
                 if not pair:
@@ -200,7 +205,7 @@ class Search(Refiner):
 
     def _idle_pair(self, best):
         """Two effects that all but cancel: each is needed beside the other, both together bring next to nothing."""
-        for a, b in itertools.combinations(sorted(best.model.names), 2):
+        for a, b in itertools.combinations(sorted(best.model.names - self.together), 2):
             less = self.refine(best.model.without(a).without(b))
             if less.chi2 - best.chi2 < 2.0 * EARNS * self.dispersion:
                 return a, b
@@ -231,10 +236,12 @@ class Search(Refiner):
 
         Where the shape of the flux's curve has settled its name (``sure``), that is no difference.
         """
-        settled = set(FAMILY) if sure and best.model.names & set(FAMILY) else set()
-        out = []
+        curved = set(FAMILY) if best.model.names & set(FAMILY) else set()
+        out, rest = [], best.model.names - curved
         for model, solution in self.refined.items():
-            if model.names - settled == best.model.names - settled or len(model) > len(best.model):
+            same = model.names - curved == rest and sure
+            passenger = model.names - curved > rest and len(best.model.names & curved) > 1
+            if same or passenger or model.names == best.model.names or len(model) > len(best.model):
                 continue
             margin = TIE if self.most > 1 else LONE_TIE
             if solution.score < best.score + margin and model.names:

@@ -95,6 +95,7 @@ def view_of_points(found: Stretches, recording, nominal) -> SlowView:
         u=held(found.u, ROWS + 2) * np.exp(1j * turning),
         u_dc=held(found.u_dc, ROWS),
         t=found.t[order],
+        course=found.t[order] / max(float(recording["t"][-1] - recording["t"][0]), 1e-9),
         temp=found.temp[order],
         torque=np.full((b, ROWS), np.nan),
         slope_m=np.zeros((b, ROWS)),

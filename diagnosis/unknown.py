@@ -27,8 +27,8 @@ def _dependences(view):
         "omega i_d": (omega * i.real, "V s/(rad A)"),
         "omega i_q^2": (omega * i.imag**2, "V s/(rad A2)"),
         "omega i_d i_q": (omega * i.real * i.imag, "V s/(rad A2)"),
-        "t": (view.t / max(view.span_s, 1e-9), "V per recording"),
-        "omega t": (omega * view.t / max(view.span_s, 1e-9), "V s/rad per recording"),
+        "t": (view.course, "V per recording"),
+        "omega t": (omega * view.course, "V s/rad per recording"),
         "u_dc": ((view.u_dc.mean(axis=1) - m_dc(view)) / m_dc(view), "V per relative u_dc"),
     }
 

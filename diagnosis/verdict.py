@@ -21,8 +21,11 @@ WORSE = 1.05  # misfit on points not fitted, after over before
 SLOPE_DEVICE, SLOPE_UNCLEAR = 0.08, 0.2  # ohmic drop at rated current over the inverter's loss
 
 
-def groups(best, tied, effects, nominal, silent=frozenset()):
-    """(asserted names, ambiguity sets): what all tied models share, and the rest in sets that exclude each other."""
+def groups(best, tied, effects, nominal, silent=frozenset(), cold=False):
+    """(asserted names, ambiguity sets): what all tied models share, and the rest in sets that exclude each other.
+
+    cold: whether the recording is known to have begun cold, so that what stood at its start is not warmth.
+    """
     models = [s.model.names - silent for s in (best, *tied)]
     shared = frozenset.intersection(*models)
     rest = frozenset().union(*models) - shared
@@ -35,7 +38,7 @@ def groups(best, tied, effects, nominal, silent=frozenset()):
             stood = effects[constant].size(best.c[constant], nominal)
             if moved < DRIFTS * stood:
                 shared -= {drift}
-            elif moved * STANDS > stood:  # warm from the start, or a wrong nameplate
+            elif moved * STANDS > stood and not cold and _like_warmth(constant, best, nominal):
                 shared -= {constant}
                 ambiguity.append([constant, drift])
     if {"dead_time", "resistance"} <= shared:
@@ -47,6 +50,14 @@ def groups(best, tied, effects, nominal, silent=frozenset()):
             if share > SLOPE_DEVICE:
                 ambiguity.append(["dead_time", "resistance"])
     return sorted(shared), ambiguity
+
+
+WARMTH = {"magnet_flux": -1.0, "resistance": 1.0}  # what a machine that was warm from the start does to it
+
+
+def _like_warmth(constant, solution, nominal) -> bool:
+    """Whether a wrong constant has the sign that warmth from the start would give it."""
+    return WARMTH[constant] * next(iter(solution.c[constant].values())) > 0.0
 
 
 def verdict(names, ambiguity, left) -> str:

@@ -25,6 +25,7 @@ class View:
     i_abc: (b, m+1, 3) measured phase currents, or None where the recording has dq only [A]
     u: (b, m+2) stator-frame voltage of the intervals -1 .. m, complex [V]; u_dc: (b, m) [V]
     t, temp, run: (b,) time since the first row [s], winding temperature [degC] or nan, number of the dwell
+    course: (b,) how far slow changes (warming, fading) have gone, from 0 at the start to 1 at the end
     torque: (b, m) torque at the shaft [Nm], nan where nothing is known of it; slope_m: (b, m) d omega_m / dt
     shaft: (b,) what is known of the shaft (see shaft.py)
     psi_extra: (b, m+1) flux beyond the nominal one that is known by now, for terms that depend on the flux [Wb]
@@ -41,6 +42,7 @@ class View:
     u: np.ndarray
     u_dc: np.ndarray
     t: np.ndarray
+    course: np.ndarray
     temp: np.ndarray
     torque: np.ndarray
     slope_m: np.ndarray
@@ -157,7 +159,7 @@ class View:
 
     def take(self, index):
         """The blocks of ``index`` only."""
-        per_block = (*STACKED, "i_abc", "t", "run")
+        per_block = (*STACKED, "i_abc", "t", "course", "run")
         return self.replace(
             **{
                 name: None if getattr(self, name) is None else getattr(self, name)[index]
@@ -167,7 +169,11 @@ class View:
 
 
 def joined_views(views: list[View]) -> View:
-    """Several recordings of one drive as one view; time runs on, dwells stay apart."""
+    """Several recordings of one drive as one view; time runs on, dwells stay apart.
+
+    Slow changes run on with the time as well, but for a recording whose winding temperature says where they
+    stand: see ``_course_of``.
+    """
     first = views[0]
     if len(views) == 1:
         return first
@@ -179,6 +185,40 @@ def joined_views(views: list[View]) -> View:
         **stack,
         i_abc=None if any(p is None for p in phases) else np.concatenate(phases),
         t=np.concatenate([v.t + o for v, o in zip(views, offsets_t[:-1], strict=True)]),
+        course=np.concatenate(
+            [_course_of(v, first, o, offsets_t[-1]) for v, o in zip(views, offsets_t[:-1], strict=True)]
+        ),
         run=np.concatenate([v.run + o for v, o in zip(views, offsets_run[:-1], strict=True)]),
         span_s=float(offsets_t[-1]),
     )
+
+
+COLD_K = 5.0  # this near to the nameplate's temperature a machine is cold
+
+
+def is_cold(view) -> np.ndarray:
+    """(b,) whether the winding is known to be at the temperature for which the nameplate holds."""
+    return np.abs(view.temp - view.machine.temperature_ref_c) < COLD_K
+
+
+def started_cold(view) -> bool:
+    """Whether it is known that slow changes began from the state for which the nameplate holds."""
+    return bool((is_cold(view) & (view.course < 0.05)).any())
+
+
+def _course_of(view, first, offset, total):
+    """(b,) course of one of several recordings: by its temperature where that tells, else by the time.
+
+    A recording that is cold throughout stands where a cold machine starts.  One at a temperature that the
+    first recording passed through stands where that was.
+    """
+    by_time = (view.t + offset) / max(total, 1e-9)
+    if view is first or not np.isfinite(view.temp).all():
+        return by_time
+    if is_cold(view).all():
+        return np.zeros(len(view))
+    known = np.isfinite(first.temp).all() and np.ptp(first.temp) > 2.0 * COLD_K
+    if not known:
+        return by_time
+    nearest = np.argmin(np.abs(first.temp[None, :] - view.temp[:, None]), axis=1)
+    return first.t[nearest] / max(total, 1e-9)

@@ -34,7 +34,7 @@ class CurrentOffset(Effect):
         return {name: offset_column(view, w) for name, w in self._patterns(view).items()}
 
     def free(self, view):
-        course = (view.t / max(view.span_s, 1e-9))[:, None]
+        course = view.course[:, None]
         return {f"{name}_drift": offset_column(view, w, course) for name, w in self._patterns(view).items()}
 
     def floor(self, nominal):
@@ -51,7 +51,7 @@ class CurrentOffset(Effect):
         return sum(c.get(name + suffix, 0.0) * np.array(w) for name, w in PATTERNS.items())
 
     def corrected(self, view, c):
-        course = (view.t / max(view.span_s, 1e-9))[:, None, None]
+        course = view.course[:, None, None]
         error = self._phases(c) + self._phases(c, "_drift") * course  # (b, 1, 3) or (3,)
         error = np.broadcast_to(error, (len(view), view.theta.shape[1], 3))
         return view.without_current(error)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from diagnosis.effect import FluxEffect, Parameter, one, sigma
-from diagnosis.curves import course, courses
+from diagnosis.curves import COURSE_KNOTS, course, courses
 
 
 class MagnetTemperature(FluxEffect):
@@ -21,8 +21,7 @@ class MagnetTemperature(FluxEffect):
 
     def size(self, c, nominal):
         """Largest change of flux since the start [Wb]."""
-        knots = np.linspace(0.0, 1.0, 5)
-        drift = c["drift"] * knots
+        drift = c["drift"] * COURSE_KNOTS
         drift[1:4] += [c.get(f"course_{k}", 0.0) for k in range(3)]
         return float(np.max(np.abs(drift)))
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from diagnosis.effect import Effect, Parameter, one, sigma, voltage
-from diagnosis.curves import courses, known_temperature, reference_c
+from diagnosis.curves import COURSE_KNOTS, course, courses, known_temperature, reference_c
 
 
 class ResistanceTemperature(Effect):
@@ -11,8 +11,7 @@ class ResistanceTemperature(Effect):
         if known_temperature(view):
             rise = view.machine.resistance_ohm * (view.temp - reference_c(view.nominal))
             return {"alpha": voltage(view.i_mid * rise[:, None])}
-        course = view.t / max(view.span_s, 1e-9)
-        return {"drift": voltage(view.i_mid * course[:, None])}
+        return {"drift": voltage(view.i_mid * course(view))}
 
     def free(self, view):
         return {f"course_{k}": voltage(view.i_mid * c[:, None]) for k, c in enumerate(courses(view)[:-1])}
@@ -25,8 +24,9 @@ class ResistanceTemperature(Effect):
 
     def size(self, c, nominal):
         """Change of resistance over the recording, or by 30 K [ohm]."""
-        knots = np.linspace(0.0, 1.0, 5)
-        drift = c.get("drift", 0.0) * knots + 30.0 * nominal.machine.resistance_ohm * abs(c.get("alpha", 0.0))
+        drift = c.get("drift", 0.0) * COURSE_KNOTS + 30.0 * nominal.machine.resistance_ohm * abs(
+            c.get("alpha", 0.0)
+        )
         drift[1:4] += [c.get(f"course_{k}", 0.0) for k in range(3)]
         return float(np.max(np.abs(drift)))
 

@@ -40,6 +40,7 @@ def further_recording(case: cases.Case, request: dict, seed: int, attempt: int, 
     """
     build = copy.copy(case.build)
     wanted, reference = request.get("temp_winding"), build.nominal.machine["temperature_ref_c"]
+    build.with_temp = build.with_temp or wanted is not None  # who is asked for a temperature records it
     cold = wanted is not None and wanted < reference + 10.0
     plan = requested_plan(case, request)
     if cold:
