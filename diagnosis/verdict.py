@@ -42,10 +42,11 @@ def groups(best, tied, effects, nominal, silent=frozenset(), cold=False):
                 shared -= {constant}
                 ambiguity.append([constant, drift])
     if {"dead_time", "resistance"} <= shared:
-        # A device's slope is ohms too.
+        # A device's slope is ohms too, but never less than none.
         ohms = effects["resistance"].size(best.c["resistance"], nominal) * nominal.machine.rated_current_a
         share = ohms / max(effects["dead_time"].size(best.c["dead_time"], nominal), 1e-9)
-        if share < SLOPE_UNCLEAR:
+        more = next(iter(best.c["resistance"].values())) > 0.0
+        if share < (SLOPE_UNCLEAR if more else SLOPE_DEVICE):
             shared -= {"resistance"}
             if share > SLOPE_DEVICE:
                 ambiguity.append(["dead_time", "resistance"])

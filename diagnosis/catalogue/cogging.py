@@ -10,10 +10,20 @@ from diagnosis.result import Estimate
 ORDERS = range(2, 38, 2)  # per electrical turn: multiples of the poles
 
 
+def _seen(view, h):
+    """Share (b, 1) of a ripple that is seen: a free shaft's acceleration is a difference over three samples.
+
+    Of e^(jwt) it makes sin(wT)/(wT) sin(wT/2)/(wT/2); a transducer shows all.
+    """
+    turned = h * view.omega.mean(axis=1, keepdims=True) * view.sample_time_s / np.pi
+    return np.where((view.shaft == "torque")[:, None], 1.0, np.sinc(turned) * np.sinc(0.5 * turned))
+
+
 def _waves(view, h):
+    seen = _seen(view, h)
     return {
-        f"h{h}_cos": {"torque": np.cos(h * view.theta_mid)},
-        f"h{h}_sin": {"torque": np.sin(h * view.theta_mid)},
+        f"h{h}_cos": {"torque": seen * np.cos(h * view.theta_mid)},
+        f"h{h}_sin": {"torque": seen * np.sin(h * view.theta_mid)},
     }
 
 

@@ -6,8 +6,9 @@ from diagnosis.effect import Effect, Parameter, voltage
 from diagnosis.curves import clipped_ramps
 from diagnosis.result import Estimate
 
+# None is so wide that it would pass for a resistance over most of the current.
 CORE_WIDTHS = (0.02, 0.12)  # of rated current: where the loss has reached its full value
-FREE_WIDTHS = (0.005, 0.05, 0.3, 0.6)
+FREE_WIDTHS = (0.005, 0.05, 0.3)
 
 
 def _losses(view, widths, factor=1.0):
@@ -45,7 +46,9 @@ class DeadTime(Effect):
 
     def estimates(self, c, covariance, nominal):
         every = np.ones(len(c))
-        spread = float(np.sqrt(max(every @ covariance @ every, 0.0)))
+        # A loss that still grows towards rated current has not shown its full value.
+        growing = c.get(f"v_{FREE_WIDTHS[-1]:g}", 0.0)
+        spread = float(np.hypot(np.sqrt(max(every @ covariance @ every, 0.0)), growing))
         return {"v_dead_v": Estimate(float(sum(c.values())), spread, "V")}
 
     def plant(self, c, nominal):
