@@ -70,6 +70,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
 }
 OUTSIDE = "registers_telemetry"  # whatever fluxproof_axi holds beside the core
 ROWS = (*GROUPS, OUTSIDE)
+BETWEEN = "between_blocks"  # the core's own logic outside every block: a word from the top, hardly a gate
 PLAIN_FOC = ("field_oriented_control", "io_svm")  # what every drive needs, with no estimator
 
 _COMMENT = re.compile(r"--[^\n]*")

