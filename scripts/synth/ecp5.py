@@ -70,7 +70,7 @@ def read_path(report: dict) -> Path_:
             through[-1][1] += 1
         else:
             through.append([kind, 1])
-    cells = tuple(f"carry of {2 * (n + 1) // 2} bits" if k == "CCU2" else k for k, n in through)
+    cells = tuple(f"carry of {n} bits" if k == "CCU2" else k for k, n in through)
     return Path_(
         signal(steps[0]["from"]["cell"]),
         signal(steps[-1]["to"]["cell"]),

@@ -115,12 +115,13 @@ class Design:
         for name in names:
             verilog, modules = self.verilog, modules_of(self.verilog, name, self.entities)
             if not modules:  # nothing of the core uses it
-                verilog = synthesize(rtl_sources(self.rtl), name, {})
-                modules = [name]
-            for module in modules:
-                script = [SYNTH.format(family=family, top=module), "tee -q -o stat.json stat -json"]
-                (cells,) = self._run(f"{family}: {module}", script, ["stat.json"], verilog)
-                counts[module] = count(cells[module])
+                verilog, modules = synthesize(rtl_sources(self.rtl), name, {}), [name]
+            script, stats = ["design -save all"], [f"{module}.json" for module in modules]
+            for module, stat in zip(modules, stats, strict=True):
+                script += ["design -load all", SYNTH.format(family=family, top=module)]
+                script += [f"tee -q -o {stat} stat -json"]
+            cells = self._run(f"{family}: {', '.join(modules)}", script, stats, verilog)
+            counts |= {m: count(c[m]) for m, c in zip(modules, cells, strict=True)}
         return counts
 
     def whole(self, family: str) -> Count:
