@@ -17,7 +17,7 @@ from collections.abc import Mapping
 from dataclasses import asdict
 
 from scripts.files import BUILD, write_json
-from scripts.synth import kept, report
+from scripts.synth import ecp5, kept, report
 from scripts.synth.count import Count
 from scripts.synth.groups import BETWEEN, ROWS
 from scripts.synth.yosys import FAMILIES, Design, SynthesisFailed, version
@@ -36,6 +36,15 @@ def figures(groups: Mapping[str, Count | None], whole: Count) -> dict[str, dict 
 def count_blocks(design: Design, names: list[str], families: list[str]) -> None:
     for family in families:
         print(f"{family}, each alone\n{report.table(design.blocks(names, family))}", flush=True)
+
+
+def route_blocks(design: Design, names: list[str]) -> None:
+    """Fmax and slowest path of each block alone on ECP5, one seed: the list of what to shorten."""
+    for name in names:
+        verilog, modules = design.modules(name)
+        for module in modules:
+            routed = ecp5.Routing(verilog, module).route(1)
+            print(f"{routed.fmax_mhz:6.1f} MHz  {module:26} {routed.path}", flush=True)
 
 
 def count_all(design: Design, families: list[str]) -> tuple[dict, dict[str, dict]]:
@@ -73,6 +82,7 @@ def main() -> int:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--block", nargs="+", metavar="ENTITY", help="count these entities alone, and stop")
+    parser.add_argument("--route", nargs="+", metavar="ENTITY", help="route these alone on ECP5, and stop")
     parser.add_argument(
         "--family", nargs="+", choices=FAMILIES, metavar="FAMILY", help=f"of {', '.join(FAMILIES)}"
     )
@@ -83,6 +93,9 @@ def main() -> int:
         design = Design()
         if arguments.block:
             count_blocks(design, arguments.block, arguments.family or ["xc7"])
+            return 0
+        if arguments.route:
+            route_blocks(design, arguments.route)
             return 0
         _, to_keep = count_all(design, arguments.family or list(FAMILIES))
         if arguments.update is not None:

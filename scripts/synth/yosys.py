@@ -68,6 +68,20 @@ def modules_of(verilog: str, entity: str, entities: Sequence[str]) -> list[str]:
     return [name for name in names if owner[name] == entity]
 
 
+def part_of(verilog: str, modules: Sequence[str]) -> str:
+    """``modules`` and what they instantiate, without the rest of the file."""
+    texts = {
+        re.match(r"module (\w+)", t).group(1): t for t in re.split(r"^(?=module )", verilog, flags=re.M)[1:]
+    }
+    needed, left = [], list(modules)
+    while left:
+        name = left.pop()
+        if name not in needed:
+            needed.append(name)
+            left += [m for m in re.findall(r"^  (\w+) \w+ \($", texts[name], re.M) if m in texts]
+    return "".join(texts[name] for name in needed)
+
+
 def entities_of(rtl: Path = RTL) -> list[str]:
     return [path.stem for path in rtl_sources(rtl) if not path.stem.endswith("_pkg")]
 
@@ -101,21 +115,22 @@ class Design:
         (name,) = modules_of(self.verilog, entity, self.entities)
         return name
 
+    def modules(self, entity: str) -> tuple[str, list[str]]:
+        """The Verilog of all modules made of ``entity``, and their names; ValueError where there is none."""
+        if entity not in self.entities:
+            raise ValueError(f"no entity {entity} under rtl; there are: {', '.join(sorted(self.entities))}")
+        if modules := modules_of(self.verilog, entity, self.entities):
+            return part_of(self.verilog, modules), modules
+        return synthesize(rtl_sources(self.rtl), entity, {}), [entity]  # nothing of the core uses it
+
     def blocks(self, names: Sequence[str], family: str) -> dict[str, Count]:
         """Each entity of ``names`` on its own, with the generics the core gives it: {module: Count}.
 
         On its own every input is free and every output is used: in the core it is rather smaller.
         """
-        unknown = [name for name in names if name not in self.entities]
-        if unknown:
-            raise ValueError(
-                f"no entity {unknown[0]} under rtl; there are: {', '.join(sorted(self.entities))}"
-            )
         counts: dict[str, Count] = {}
         for name in names:
-            verilog, modules = self.verilog, modules_of(self.verilog, name, self.entities)
-            if not modules:  # nothing of the core uses it
-                verilog, modules = synthesize(rtl_sources(self.rtl), name, {}), [name]
+            verilog, modules = self.modules(name)
             script, stats = ["design -save all"], [f"{module}.json" for module in modules]
             for module, stat in zip(modules, stats, strict=True):
                 script += ["design -load all", SYNTH.format(family=family, top=module)]
