@@ -12,6 +12,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from scripts.synth.multiplier_registers import absorb
 from scripts.synth.names import Names
 from scripts.synth.wrapper import NAME, wrap
 from scripts.synth.yosys import run, yosys
@@ -82,12 +83,20 @@ def read_path(report: dict, register: Callable[[str], str]) -> CriticalPath:
 class Routing:
     """A module in its wrapper, synthesised once for ECP5; ``route`` places and routes it with a seed."""
 
-    def __init__(self, verilog: str, module: str):
+    def __init__(self, verilog: str, module: str, absorb_registers: bool = True):
         self._scratch = tempfile.TemporaryDirectory()
         self.folder = Path(self._scratch.name)
         (self.folder / "design.v").write_text(verilog + wrap(verilog, module))
         yosys(["read_verilog design.v", f"synth_ecp5 -top {NAME} -json design.json"], self.folder)
         self.names = Names(self.folder, NAME)
+        self.multipliers = self._absorb() if absorb_registers else {}
+
+    def _absorb(self) -> dict[str, int]:
+        path = self.folder / "design.json"
+        netlist = json.loads(path.read_text())
+        done = absorb(netlist, NAME)
+        path.write_text(json.dumps(netlist))
+        return done
 
     def route(self, seed: int, extra: Sequence[str] = ()) -> Routed:
         files = ["--json", "design.json", "--report", "report.json", "--seed", str(seed)]
