@@ -8,13 +8,13 @@ import pytest
 
 from scripts import verilog
 from scripts.sources import RTL
-from scripts.synth import kept, report
+from scripts.synth import kept, report, timing
 from scripts.synth.__main__ import SMALL
 from scripts.synth.count import Count, count, read_cells
 from scripts.synth.ecp5 import read_path
 from scripts.synth.groups import CORE, GROUPS, check, instances
 from scripts.synth.wrapper import ports, wrap
-from scripts.synth.yosys import Design, modules_of
+from scripts.synth.yosys import Design, modules_of, part_of, read_sta
 
 ROW = {"lut": 1000, "ff": 500, "dsp": 20, "bram": 2}
 
@@ -82,6 +82,24 @@ def test_modules_belong_to_the_longest_name():
     entities = ["speed", "speed_pi"]
     assert modules_of(text, "speed", entities) == ["speed_16", "speed"]
     assert modules_of(text, "speed_pi", entities) == ["speed_pi", "speed_pi_3"]
+
+
+def test_a_part_has_what_it_instantiates():
+    text = "".join(
+        f"module {name}\n  (input a);\n{body}endmodule\n"
+        for name, body in (
+            ("leaf", ""),
+            ("other", ""),
+            ("one", "  leaf x (\n    .a(a));\n"),
+            ("top", "  one y (\n    .a(a));\n"),
+        )
+    )
+    part = part_of("/* heading */\n" + text, ["top"])
+    assert [line for line in part.splitlines() if line.startswith("module")] == [
+        "module top",
+        "module one",
+        "module leaf",
+    ]
 
 
 # The kept file
@@ -211,3 +229,20 @@ def test_small_blocks_are_as_kept():
     kept_counts = {"xc7, block alone": kept.read()["counts"]["xc7, block alone"]}
     assert kept.changes(kept_counts, {"xc7, block alone": counted}) == [], "make synth ARGS='--update REASON'"
     assert all(row["lut"] > 0 for row in counted.values())
+
+
+def test_logic_delay_is_read(tmp_path):
+    text = "Warning: Module 'FDRE' has no timing arcs!\nLatest arrival time in 'fluxproof' is 2678:\n"
+    (tmp_path / "sta.txt").write_text(text)
+    assert read_sta(tmp_path / "sta.txt") == {"logic_ns": 2.678, "without_arcs": ["FDRE"]}
+    (tmp_path / "sta.txt").write_text("nothing")
+    with pytest.raises(ValueError, match="sta"):
+        read_sta(tmp_path / "sta.txt")
+
+
+def test_the_verdict_names_the_median():
+    def said(*fmax):
+        return timing.verdict({"fmax_mhz": list(fmax), "median": sorted(fmax)[len(fmax) // 2]})
+
+    assert "median 130.0 MHz, 120.0 to 140.0; target 130 MHz: met" in said(140.0, 120.0, 130.0)
+    assert said(129.0).endswith("missed by 1 MHz")

