@@ -24,7 +24,7 @@ unexport PYTHONHOME
 
 PYTHON_RUN := .venv/bin/python
 
-.PHONY: help setup generate test demo papers bench blind real compare timeline mutate verilog lint lock clean distclean
+.PHONY: help setup generate test demo papers bench blind real compare timeline mutate verilog synth lint lock clean distclean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -65,6 +65,9 @@ mutate: setup ## plant faults in the VHDL and count those the tests catch
 
 verilog: setup ## convert the VHDL to Verilog (GHDL 5)
 	$(PYTHON_RUN) -m scripts.verilog $(ARGS)
+
+synth: setup ## count LUT, FF, DSP, block RAM for three Xilinx families; routed timing on ECP5
+	$(PYTHON_RUN) -m scripts.synth $(ARGS)
 
 lint: setup ## check the style of the Python (ruff) and, with a vsg.yaml, of the VHDL (vsg)
 	.venv/bin/ruff check .

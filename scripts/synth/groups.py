@@ -1,0 +1,100 @@
+"""Which instance of rtl/fluxproof.vhd belongs to which row of the report; every one to exactly one.
+
+The rows are those of paper 001, Table 1, and two of our own.  What a block is there for decides, not the
+folder it is in: chord_speed serves the decoupling, dead_time_compensation the inverter estimators.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from scripts.sources import RTL
+
+CORE = "fluxproof"
+AXI_TOP = "fluxproof_axi"
+
+GROUPS: dict[str, tuple[str, ...]] = {
+    # paper 001: voltage and current model merged, delta_lambda and its PI; torque from the estimated flux
+    "flux_estimator": (
+        "resistance",
+        "period_voltage",
+        "magnetic_model",
+        "model_flux",
+        "merge",
+        "merged_flux",
+        "flux",
+        "speed_inverse",
+        "flux_error",
+        "compensation",
+        "torque_estimate",
+        "monitor",
+    ),
+    # transforms, speed and current regulators, decoupling, limit of the voltage, delay compensation
+    "field_oriented_control": (
+        "speed_measurement",
+        "stator_frame",
+        "trig",
+        "rotor_frame",
+        "speed_regulator",
+        "current_regulators",
+        "chord",
+        "cross_coupling",
+        "delay",
+        "trig_out",
+        "circle",
+        "stator_voltage",
+    ),
+    # raw codes to per unit, U_dc without a division, modulation, compare values, gates
+    "io_svm": (
+        "latch",
+        "conditioning",
+        "angle",
+        "bus_voltage",
+        "bus_reciprocal",
+        "modulator",
+        "compare",
+        "gates",
+    ),
+    # paper 000: what dead time and drops take, its compensation, the magnets' flux
+    "vsi_psi": (
+        "inverter_loss",
+        "magnet_flux",
+        "directions",
+        "leg_compensation",
+        "compensation_dq",
+        "direction_functions",
+        "motor_voltage",
+    ),
+}
+OUTSIDE = "registers_telemetry"  # whatever fluxproof_axi holds beside the core
+ROWS = (*GROUPS, OUTSIDE)
+BETWEEN = "between_blocks"  # the core's own logic outside every block: a word from the top, hardly a gate
+PLAIN_FOC = ("field_oriented_control", "io_svm")  # what every drive needs, with no estimator
+
+_COMMENT = re.compile(r"--[^\n]*")
+_INSTANCE = re.compile(r"^\s*(\w+)\s*:\s*entity\s+work\.(\w+)", re.IGNORECASE | re.MULTILINE)
+
+
+def instances(vhdl: Path) -> dict[str, str]:
+    """{label: entity} of a file's direct instances, in lower case, in order."""
+    found = _INSTANCE.findall(_COMMENT.sub("", vhdl.read_text()))
+    return {label.lower(): entity.lower() for label, entity in found}
+
+
+def check(
+    labels: Sequence[str], groups: Mapping[str, Sequence[str]] = GROUPS, where: str = f"rtl/{CORE}.vhd"
+) -> None:
+    """Raises ValueError unless ``groups`` holds every label exactly once and no other."""
+    claimed = [label for members in groups.values() for label in members]
+    problems = [f"{name} is in no group" for name in labels if name not in claimed]
+    problems += [f"{name} is in a group and not in the file" for name in claimed if name not in labels]
+    problems += [f"{name} is in two groups" for name in dict.fromkeys(claimed) if claimed.count(name) > 1]
+    if problems:
+        raise ValueError(f"{where} and GROUPS of scripts/synth/groups.py: " + "; ".join(problems))
+
+
+def top_of(rtl: Path = RTL) -> str:
+    """fluxproof_axi where it is there, else the core."""
+    return AXI_TOP if (rtl / f"{AXI_TOP}.vhd").exists() else CORE

