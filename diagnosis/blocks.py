@@ -156,8 +156,19 @@ def _mechanics(recording, nominal, i_s, theta, theta_s, linked):
         drag, torque = (nominal.machine.viscous_friction_nms or 0.0) * omega_m, recording["torque"]
         if is_airgap(torque, airgap(nominal, i_s), drag):
             torque = torque - drag - (nominal.machine.inertia_kgm2 or 0.0) * slope_m
-        return kind, torque, slope_m
+        return kind, at_middle(torque), slope_m
     return kind, np.full(n, 0.0 if kind in ("unloaded", "free") else np.nan), slope_m
+
+
+def at_middle(x):
+    """Samples (n,) moved to the middles of their intervals, where all else of the balance is taken.
+
+    Of e^(jwt) four points leave (9 cos(wT/2) - cos(3wT/2)) / 8, less than 1 % short of one up to wT = 0.8.
+    """
+    out = np.array(x, float)
+    out[:-1] = 0.5 * (x[1:] + x[:-1])
+    out[1:-2] = (9.0 * (x[2:-1] + x[1:-2]) - (x[3:] + x[:-3])) / 16.0
+    return out
 
 
 def _cut(recording, nominal, run, i_s, omega, block_rows):

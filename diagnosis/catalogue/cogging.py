@@ -11,12 +11,15 @@ ORDERS = range(2, 38, 2)  # per electrical turn: multiples of the poles
 
 
 def _seen(view, h):
-    """Share (b, 1) of a ripple that is seen: a free shaft's acceleration is a difference over three samples.
+    """Share (b, 1) of a ripple e^(jwt) that is seen.
 
-    Of e^(jwt) it makes sin(wT)/(wT) sin(wT/2)/(wT/2); a transducer shows all.
+    A free shaft's acceleration is a difference over three samples, sin(wT)/(wT) sin(wT/2)/(wT/2); what a
+    transducer shows is moved to the middles of the intervals (blocks.at_middle).
     """
-    turned = h * view.omega.mean(axis=1, keepdims=True) * view.sample_time_s / np.pi
-    return np.where((view.shaft == "torque")[:, None], 1.0, np.sinc(turned) * np.sinc(0.5 * turned))
+    x = h * view.omega.mean(axis=1, keepdims=True) * view.sample_time_s
+    moved = (9.0 * np.cos(0.5 * x) - np.cos(1.5 * x)) / 8.0
+    difference = np.sinc(x / np.pi) * np.sinc(0.5 * x / np.pi)
+    return np.where((view.shaft == "torque")[:, None], moved, difference)
 
 
 def _waves(view, h):
