@@ -13,7 +13,7 @@ import sys
 import numpy as np
 import pytest
 
-from cocotb_tests.diagnosed_drives import DRIVE, GRID, MACHINE, POINT, recorded
+from cocotb_tests.diagnosed_drives import DRIVE, GRID, MACHINE, POINT, columns, recorded
 from cocotb_tests.simulate import ROOT
 from cocotb_tests.test_registers import PAPER
 from diagnosis import catalogue, diagnose
@@ -21,6 +21,7 @@ from diagnosis import run as running
 from diagnosis.catalogue import CATALOGUE
 from diagnosis.improved_plant import check_key, plain
 from diagnosis.nominal import load_nominal
+from diagnosis.recording import from_columns
 from diagnosis.shaft import is_airgap
 from diagnosis.blocks import view_of
 from plant import Harmonic, flux_from_currents, machine_params
@@ -238,3 +239,20 @@ def test_a_transducer_is_not_taken_for_the_air_gap():
     noise = rng.normal(0.0, 0.05, omega_m.size)
     assert not is_airgap(gap - drag + noise, gap, drag)
     assert is_airgap(gap + noise, gap, drag)
+
+
+def test_a_ripple_that_a_transducer_sees_keeps_its_size_at_any_speed_and_in_both_directions():
+    """The transducer is read with the currents, the balance is made between two samples: 4 % at these speeds."""
+    table = dict(columns(GRID))
+    theta, p = table["theta_e"], MACHINE.pole_pairs
+    alpha = (2.0 * table["i_a"] - table["i_b"] - table["i_c"]) / 3.0
+    beta = (table["i_b"] - table["i_c"]) / np.sqrt(3.0)
+    i_d, i_q = alpha * np.cos(theta) + beta * np.sin(theta), beta * np.cos(theta) - alpha * np.sin(theta)
+    psi = MACHINE.magnet_flux_wb + (MACHINE.inductance_d_h - MACHINE.inductance_q_h) * i_d
+    drag = MACHINE.viscous_friction_nms * table["omega_e"] / p
+    table["torque"] = 1.5 * p * psi * i_q - drag + 0.4 * np.sin(12 * theta + 0.7)
+    answer = diagnose(from_columns(table, DRIVE.sample_time_s), PAPER)
+    assert [e.name for e in answer.effects] == ["cogging"], told(answer)
+    found = answer.effects[0].parameters
+    assert found["cogging_order"].value == 12 * p
+    assert found["cogging_nm"].value == pytest.approx(0.4, rel=0.01)
