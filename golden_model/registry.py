@@ -1,6 +1,6 @@
 """Every block of the core, one line each: add yours here and the bench finds it."""
 
-from golden_model.common import reciprocal, sqrt
+from golden_model.common import packet_fifo, reciprocal, sqrt
 from golden_model.control import (
     chord_speed,
     current_pi,
@@ -30,6 +30,8 @@ from golden_model.io import (
     position,
     sample_latch,
     speed,
+    telemetry,
+    telemetry_words,
     u_dc_conditioning,
     u_dc_processing,
 )
@@ -78,5 +80,8 @@ BLOCKS = {
         clean_voltage,
         v_dead_adaline,
         psi_adaline,
+        packet_fifo,
+        telemetry_words,
+        telemetry,
     )
 }

@@ -1,6 +1,6 @@
-"""Writes rtl/common/fluxproof_pkg.vhd from the blocks' declarations; ``--check`` only compares.
+"""Writes rtl/common/fluxproof_pkg.vhd and rtl/io/telemetry_words.vhd from the blocks' declarations.
 
-Formats, constants, tables and latencies stand in the Python blocks and nowhere else.
+Formats, constants, tables and latencies stand in the Python blocks and nowhere else.  ``--check`` only compares.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from golden_model import fluxproof, formats
 from golden_model.block import Const
 from golden_model.fixed import Format
 from golden_model.registry import BLOCKS
+from scripts import generate_telemetry
 from scripts.files import write_text
 
 PACKAGE = Path(__file__).resolve().parent.parent / "rtl" / "common" / "fluxproof_pkg.vhd"
@@ -81,20 +82,24 @@ def render() -> str:
     return HEADER + "\n".join(lines) + "\n\nend package fluxproof_pkg;\n"
 
 
+def outputs() -> dict[Path, str]:
+    """{file: the text it must have}."""
+    return {PACKAGE: render(), generate_telemetry.ENTITY: generate_telemetry.render()}
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument(
-        "--check", action="store_true", help="fail if the committed file is stale, write nothing"
+        "--check", action="store_true", help="fail if a committed file is stale, write nothing"
     )
     arguments = parser.parse_args()
-    text = render()
-    if arguments.check:
-        if PACKAGE.read_text() != text:
-            print(f"{PACKAGE.name} is stale: run `make generate` and commit it", file=sys.stderr)
+    for path, text in outputs().items():
+        if not arguments.check:
+            write_text(path, text)
+            print(f"wrote {path.relative_to(path.parents[2])}, {len(text.splitlines())} lines")
+        elif not path.exists() or path.read_text() != text:
+            print(f"{path.name} is stale: run `make generate` and commit it", file=sys.stderr)
             return 1
-        return 0
-    write_text(PACKAGE, text)
-    print(f"wrote {PACKAGE.relative_to(PACKAGE.parents[2])}, {len(text.splitlines())} lines")
     return 0
 
 

@@ -471,4 +471,17 @@ package fluxproof_pkg is
   constant PSI_ADALINE_TO_FLUX : natural := 11;
   constant PSI_ADALINE_TO_PU : natural := 18;
 
+  -- packet_fifo: none: what a recording needs
+  constant PACKET_FIFO_LATENCY : positive := 1;
+
+  -- telemetry_words: none: what a recording needs
+  constant TELEMETRY_WORDS_LATENCY : positive := 1;
+  constant TELEMETRY_WORDS_COUNT : natural := 24;
+  constant TELEMETRY_WORDS_START : natural := 26;
+  constant TELEMETRY_WORDS_INDEX_W : natural := 5;
+
+  -- telemetry: none: what a recording needs
+  constant TELEMETRY_LATENCY : positive := 1;
+  constant TELEMETRY_AGE_W : natural := 6;
+
 end package fluxproof_pkg;
