@@ -155,12 +155,16 @@ def _held_random(block: Block, config: dict[str, int], rng, count: int) -> list[
     """Random values, each held for a random while, flags mostly at rest, so that something can happen."""
     ports = block.ports(config)
     rows: list[dict[str, int]] = []
-    row = {p.name: random_value(rng, p) for p in ports} | {"enable": 1, "trip": 0}
+    calm = {"enable": 1, "trip": 0}
+    calm = {name: value for name, value in calm.items() if name in {p.name for p in ports}}
+    row = {p.name: random_value(rng, p) for p in ports} | calm
     for _ in range(count):
         if rng.integers(30) == 0:
             port = ports[int(rng.integers(len(ports)))]
             row = {**row, port.name: random_value(rng, port)}
         if rng.integers(40) == 0:
-            row = {**row, "enable": 1, "trip": 0, "dead_time": int(rng.integers(1, 9)), "min_pulse": 10}
+            row = {**row, **calm}
+            if "dead_time" in row:
+                row = {**row, "dead_time": int(rng.integers(1, 9)), "min_pulse": 10}
         rows.append(row)
     return rows
