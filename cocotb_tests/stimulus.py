@@ -157,12 +157,15 @@ def _held_random(block: Block, config: dict[str, int], rng, count: int) -> list[
     ports = block.ports(config)
     names = {p.name for p in ports}
     rows: list[dict[str, int]] = []
-    row = {p.name: random_value(rng, p) for p in ports} | {"enable": 1, "trip": 0}
+    calm = {"enable": 1, "trip": 0}
+    row = {p.name: random_value(rng, p) for p in ports} | calm
     for _ in range(count):
         if rng.integers(30) == 0:
             port = ports[int(rng.integers(len(ports)))]
             row = {**row, port.name: random_value(rng, port)}
         if rng.integers(40) == 0:
-            row = {**row, "enable": 1, "trip": 0, "dead_time": int(rng.integers(1, 9)), "min_pulse": 10}
+            row = {**row, **calm}
+            if "dead_time" in row:
+                row = {**row, "dead_time": int(rng.integers(1, 9)), "min_pulse": 10}
         rows.append({name: value for name, value in row.items() if name in names})
     return rows

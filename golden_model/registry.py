@@ -36,6 +36,7 @@ from golden_model.io import (
     u_dc_processing,
 )
 from golden_model.modulation import gate_generation, pwm_compare, svm, svm_delay_compensation
+from golden_model.protection import fault_latch, sample_checks, sample_guard
 from golden_model.transforms import clarke, flux_inverse_park, flux_park, inverse_park, park, rotate, sincos
 
 BLOCKS = {
@@ -83,5 +84,8 @@ BLOCKS = {
         packet_fifo,
         telemetry_words,
         telemetry,
+        sample_guard,
+        sample_checks,
+        fault_latch,
     )
 }

@@ -26,6 +26,7 @@ package fluxproof_pkg is
   constant FLUX_STATE_W : positive := 32;  -- S(1,30)
   constant RESISTANCE_W : positive := 24;  -- U(0,24)
   constant V_LEG_W : positive := 18;  -- S(-1,18)
+  constant LIMIT_W : positive := 9;  -- U(1,8)
   constant SAMPLE_TIME_W : positive := 17;  -- U(-1,18)
   constant PU_TO_INTEGRAL : natural := 12;
   constant PU_TO_FLUX : natural := 7;
@@ -483,5 +484,20 @@ package fluxproof_pkg is
   -- telemetry: none: what a recording needs
   constant TELEMETRY_LATENCY : positive := 1;
   constant TELEMETRY_AGE_W : natural := 6;
+
+  -- sample_guard: none: what a drive needs besides
+  constant SAMPLE_GUARD_LATENCY : positive := 1;
+
+  -- sample_checks: none: what a drive needs besides
+  constant SAMPLE_CHECKS_LATENCY : positive := 1;
+  constant SAMPLE_CHECKS_DROP_LIMIT : natural := 8;
+  constant SAMPLE_CHECKS_DROP_JUMP : natural := 5;
+  constant SAMPLE_CHECKS_WARM : natural := 2;
+
+  -- fault_latch: none: what a drive needs besides
+  constant FAULT_LATCH_LATENCY : positive := 1;
+  constant FAULT_LATCH_LATE : natural := 6;
+  constant FAULT_LATCH_TRIP : natural := 7;
+  constant FAULT_LATCH_EARLY : natural := 8;
 
 end package fluxproof_pkg;
