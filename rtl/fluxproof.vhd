@@ -108,6 +108,7 @@ entity fluxproof is
     sample_trigger  : out std_logic;  -- middle of the zero vector: take a sample
     running         : out std_logic;  -- gates are switching
     tripped         : out std_logic;  -- a trip is remembered
+    sample_busy     : out std_logic;  -- a sample enters or is in flight: registers must not change
     fault_flags     : out unsigned(8 downto 0);  -- what has happened, see fault_latch
     first_fault     : out unsigned(7 downto 0);  -- which of them came first
     early_samples   : out unsigned(7 downto 0);  -- samples that were not let in
@@ -254,7 +255,7 @@ architecture rtl of fluxproof is
   signal s_beta               : signed(PU_W - 1 downto 0);
   signal comp_valid           : std_logic;
   signal period_valid         : std_logic;
-  signal sample_busy          : std_logic;
+  signal guard_busy           : std_logic;
   signal sample_entered       : std_logic;
   signal sample_early         : std_logic;
   signal sample_late          : std_logic;
@@ -273,13 +274,14 @@ begin
       sample_valid  => sample_valid,
       clear_trip    => clear_trip,
       watchdog      => watchdog,
-      sample_busy   => sample_busy,
+      sample_busy   => guard_busy,
       sample_early  => sample_early,
       sample_late   => sample_late,
       early_samples => early_samples
     );
 
-  sample_entered <= sample_valid and not sample_busy;
+  sample_entered <= sample_valid and not guard_busy;
+  sample_busy    <= sample_valid or guard_busy;
 
   latch : entity work.sample_latch
     generic map (
