@@ -9,7 +9,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from scripts.package.entity import Entity, Pin, read_entity
-from scripts.sources import RTL
+from scripts.sources import RTL, rtl_sources
 
 TOP = "fluxproof_axi"
 PATH = RTL / f"{TOP}.vhd"
@@ -29,6 +29,7 @@ RENAMED = {
     ("core", "trip"): "trip_now",
     ("stage", "trip"): "trip_now",
     ("stream", "enable"): "telemetry_enable",
+    ("stream", "dropped"): "telemetry_dropped",
 }
 # generics of the top: name -> (type, default, comment)
 GENERICS = {
@@ -37,6 +38,7 @@ GENERICS = {
     "POSITION_BITS": ("integer range 8 to 18", 16, "width of the position code"),
     "CARRIER_HALF": ("integer range 8 to 32767", 10000, "half a PWM period in clocks"),
 }
+LEFT_AT_DEFAULT = {"DEPTH_BITS"}  # the telemetry's queue: 512 words are one block RAM
 LITE, CODE, POSITION = "31 downto 0", "ADC_BITS - 1 downto 0", "POSITION_BITS - 1 downto 0"
 # pins of the top: name, mode, range of its bits (None: one), comment
 PINS = (
@@ -99,6 +101,12 @@ def instances(rtl: Path = RTL) -> dict[str, Entity]:
     return {label: read_entity(rtl / name) for label, name in INSTANCES.items()}
 
 
+def source_names(rtl: Path = RTL) -> list[str]:
+    """The VHDL files in compile order with this top at the end, relative to the repository's root."""
+    others = rtl_sources(rtl, without=(PATH.name,))
+    return [path.relative_to(rtl.parent).as_posix() for path in (*others, rtl / PATH.name)]
+
+
 def net_of(label: str, port: str) -> str:
     """The net that a port of an instance belongs to."""
     return RENAMED.get((label, port), port)
@@ -119,7 +127,7 @@ def wire(entities: dict[str, Entity]) -> dict[str, Pin]:
         missing = [n for n in entity.inputs if net_of(label, n) not in given | set(driven)]
         if missing:
             raise ValueError(f"{TOP}: nothing drives {', '.join(missing)} of {label} ({entity.name})")
-        unknown = set(entity.generics) - set(GENERICS)
+        unknown = set(entity.generics) - set(GENERICS) - LEFT_AT_DEFAULT
         if unknown:
             raise ValueError(f"{TOP}: no value for generic {', '.join(sorted(unknown))} of {entity.name}")
     undriven = [net for net, mode in pins.items() if mode == "out" and net not in driven]
@@ -149,10 +157,11 @@ def render(rtl: Path = RTL) -> str:
     for label, entity in entities.items():
         lines += ["", *_instance(label, entity, actuals)]
     lines.append("")
-    for net, pin in out_pins.items():
-        if net in signals:
-            source = names[net] if driven[net].left is None else f"std_logic_vector({names[net]})"
-            lines.append(f"  {pin} <= {source};")
+    copied = {net: pin for net, pin in out_pins.items() if net in signals}
+    width = max(map(len, copied.values()))
+    for net, pin in copied.items():
+        source = names[net] if driven[net].left is None else f"std_logic_vector({names[net]})"
+        lines.append(f"  {pin:{width}} <= {source};")
     return "\n".join([*lines, "", "end architecture rtl;"]) + "\n"
 
 
@@ -177,9 +186,10 @@ def _entity() -> list[str]:
 def _instance(label: str, entity: Entity, actuals: dict[str, str]) -> list[str]:
     """One instantiation; outputs that nobody reads stay open."""
     lines = [f"  {label} : entity work.{entity.name}"]
-    if entity.generics:
-        wide = max(map(len, entity.generics))
-        maps = [f"      {name:{wide}} => {name}" for name in entity.generics]
+    given = [name for name in entity.generics if name in GENERICS]
+    if given:
+        wide = max(map(len, given))
+        maps = [f"      {name:{wide}} => {name}" for name in given]
         lines += ["    generic map (", *",\n".join(maps).split("\n"), "    )"]
     wide = max(map(len, entity.pins))
     maps = [f"      {name:{wide}} => {_actual(label, pin, actuals)}" for name, pin in entity.pins.items()]

@@ -66,9 +66,14 @@ class Entity:
 
 def read_entity(path: Path) -> Entity:
     """The entity of ``path``; ValueError names the line that is not understood."""
-    found = _ENTITY.search(path.read_text())
+    return parse_entity(path.read_text(), path.name)
+
+
+def parse_entity(text: str, file: str) -> Entity:
+    """The entity in ``text``; ``file`` is what an error calls it."""
+    found = _ENTITY.search(text)
     if found is None:
-        raise ValueError(f"{path.name}: no entity")
+        raise ValueError(f"{file}: no entity")
     name, body = found.groups()
     generics: dict[str, Generic] = {}
     pins: dict[str, Pin] = {}
@@ -87,10 +92,10 @@ def read_entity(path: Path) -> Entity:
         elif part == "port" and (hit := _PORT.match(line)):
             key, mode, kind, left, right, doc = hit.groups()
             if right not in (None, "0"):
-                raise ValueError(f"{path.name}: port {key} must end at bit 0: {line.strip()}")
+                raise ValueError(f"{file}: port {key} must end at bit 0: {line.strip()}")
             pins[key] = Pin(key, mode.lower(), kind.lower(), left, (doc or "").strip())
         else:
-            raise ValueError(f"{path.name}: not understood in entity {name}: {line.strip()}")
+            raise ValueError(f"{file}: not understood in entity {name}: {line.strip()}")
     return Entity(name, generics, pins)
 
 

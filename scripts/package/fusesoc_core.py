@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from scripts.package.axi_top import GENERICS, TOP
+from scripts.package.axi_top import GENERICS, TOP, source_names
 from scripts.package.ipxact import CONSTRAINTS, LIBRARY, SUMMARY, VENDOR, project_version
-from scripts.sources import ROOT, rtl_sources
+from scripts.sources import ROOT, RTL
 
 PATH = ROOT / "fluxproof.core"
 
@@ -95,9 +95,9 @@ def vlnv() -> str:
     return f"{VENDOR}:{LIBRARY}:fluxproof:{project_version()}"
 
 
-def render(rtl: Path = ROOT / "rtl") -> str:
+def render(rtl: Path = RTL) -> str:
     """The whole file."""
-    files = [f"      - {path.relative_to(rtl.parent).as_posix()}" for path in rtl_sources(rtl)]
+    files = [f"      - {name}" for name in source_names(rtl)]
     parameters = []
     for name, (_, default, doc) in GENERICS.items():
         parameters += [

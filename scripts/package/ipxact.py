@@ -18,15 +18,16 @@ from peakrdl_ipxact.exporter import Standard
 from systemrdl import RDLCompiler
 
 from scripts.package.axi_top import PATH as TOP_PATH
-from scripts.package.entity import Entity, Generic, Pin, read_entity
-from scripts.sources import ROOT, rtl_sources
+from scripts.package.axi_top import source_names
+from scripts.package.entity import Entity, Generic, Pin, parse_entity
+from scripts.sources import ROOT, RTL
 
 SPIRIT = "http://www.spiritconsortium.org/XMLSchema/SPIRIT/1685-2009"
 XILINX = "http://www.xilinx.com"
 XSI = "http://www.w3.org/2001/XMLSchema-instance"
 
 PATH = ROOT / "component.xml"
-RDL = ROOT / "rtl" / "io" / "fluxproof.rdl"
+RDL = "io/fluxproof.rdl"  # below rtl/
 CONSTRAINTS = "scripts/vivado/fluxproof.xdc"
 XGUI = "xgui/fluxproof_axi.tcl"
 VENDOR, LIBRARY = "fluxproof", "motor_control"
@@ -85,15 +86,15 @@ def spirit(**attributes: str | int) -> dict[str, str]:
     return {f"{{{SPIRIT}}}{name}": str(value) for name, value in attributes.items()}
 
 
-def component(entity: Entity, rdl: Path = RDL, rtl: Path = ROOT / "rtl") -> etree._Element:
-    """The whole component; ``rdl`` describes its registers, ``rtl`` holds its sources."""
+def component(entity: Entity, rtl: Path = RTL) -> etree._Element:
+    """The whole component; ``rtl`` holds its sources and the description of its registers."""
     return E.component(
         E.vendor(VENDOR),
         E.library(LIBRARY),
         E.name(entity.name),
         E.version(version()),
         E.busInterfaces(*(_interface(name, entity) for name in INTERFACES)),
-        memory_maps(rdl),
+        memory_maps(rtl / RDL),
         E.model(
             E.views(
                 _view(SYNTHESIS, "Synthesis", "synthesis", entity.name),
@@ -114,9 +115,9 @@ def component(entity: Entity, rdl: Path = RDL, rtl: Path = ROOT / "rtl") -> etre
     )
 
 
-def render(rdl: Path = RDL, rtl: Path = ROOT / "rtl") -> str:
-    """component.xml as text."""
-    root = component(read_entity(rtl / TOP_PATH.name), rdl, rtl)
+def render(top: str, rtl: Path = RTL) -> str:
+    """component.xml as text; ``top`` is the text of fluxproof_axi.vhd."""
+    root = component(parse_entity(top, TOP_PATH.name), rtl)
     etree.indent(root)
     etree.cleanup_namespaces(root, top_nsmap={"spirit": SPIRIT, "xilinx": XILINX, "xsi": XSI})
     return etree.tostring(root, xml_declaration=True, encoding="UTF-8", pretty_print=True).decode()
@@ -239,7 +240,7 @@ def _file(name: str, kind: str | None, *user_kinds: str) -> etree._Element:
 
 def _vhdl_files(rtl: Path) -> list[etree._Element]:
     """In compile order; all VHDL-2008 but the top, which a block design may also take as a module."""
-    names = [path.relative_to(rtl.parent).as_posix() for path in rtl_sources(rtl)]
+    names = source_names(rtl)
     return [
         _file(n, "vhdlSource") if n.endswith(TOP_PATH.name) else _file(n, None, "vhdlSource-2008")
         for n in names

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from scripts.package.axi_top import PATH as TOP_PATH
-from scripts.package.entity import read_entity
+from scripts.package.entity import parse_entity
 from scripts.package.ipxact import XGUI
 from scripts.sources import ROOT
 
@@ -32,8 +30,8 @@ proc update_MODELPARAM_VALUE.{0} {{MODELPARAM_VALUE.{0} PARAM_VALUE.{0}}} {{
 """
 
 
-def render(rtl: Path = ROOT / "rtl") -> str:
-    """The dialog: one page with the generics."""
-    names = list(read_entity(rtl / TOP_PATH.name).generics)
+def render(top: str) -> str:
+    """The dialog: one page with the generics of ``top``, the text of fluxproof_axi.vhd."""
+    names = list(parse_entity(top, TOP_PATH.name).generics)
     shown = "".join(f'  ipgui::add_param $IPINST -name "{name}" -parent ${{page}}\n' for name in names)
     return HEAD + shown + "}\n" + "".join(ONE.format(name) for name in names)
