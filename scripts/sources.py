@@ -19,8 +19,8 @@ def rtl_sources(rtl: Path = RTL, without: Collection[str] = ()) -> list[Path]:
     """Every ``*.vhd`` under ``rtl``: packages first, then each entity behind those it instantiates.
 
     Dependencies are all mentions of ``work.NAME``, which covers ``use work.P.all`` and ``entity work.E``.
-    The order is the same on every machine; ``without``: names of files that are left out.  Raises ValueError where two files declare the same unit, and
-    graphlib.CycleError where files need each other.
+    The order is the same on every machine; ``without``: names of files that are left out.  Raises ValueError where
+    two files declare the same unit, and graphlib.CycleError where files need each other.
     """
     texts = {
         path: _COMMENT.sub("", path.read_text())
