@@ -4,7 +4,8 @@
 --   store   = write and allowed and (the register counts at once or no sample is in flight)
 --
 -- A write that must wait for the end of a sample waits, at most REGISTER_PATIENCE clocks: samples that leave no
--- gap at all end in SLVERR instead of a bus that hangs.  A read, a refusal and a write that counts at once never wait.
+-- gap at all end in SLVERR instead of a bus that hangs.  A read, a refusal and a write that counts at once never wait
+-- for a sample, though AXI4-Lite answers in order: behind a write that waits they come after it.
 -- Answers: OKAY; DECERR where no register stands at the address; SLVERR for a write that is not allowed or came late.
 -- One comparator serves every register: its ends come from tables in register_map_pkg.
 -- Formats: data as signed 32 bits; no register holds 2**31 or more.  Latency: 3 clocks without waiting; store is in

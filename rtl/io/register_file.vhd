@@ -712,7 +712,9 @@ begin
   words(17)         <= "0000000000000000000000000000000" & clear_trip;
   words(18)         <= "0000000000000000000000000000000" & clear_faults_in;
   words(19 to 31)   <= (others => (others => '0'));
-  words(32)         <= "000000000000000000" & delta_held & merge_known & temp_lost & psi_held & v_comp_limited & speed_limited & u_dc_low & u_dc_at_rail & std_logic_vector(current_at_rail) & setting_refused & tripped & running;
+  words(32)         <= "000000000000000000" & delta_held & merge_known & temp_lost & psi_held & v_comp_limited &
+                       speed_limited & u_dc_low & u_dc_at_rail & std_logic_vector(current_at_rail) &
+                       setting_refused & tripped & running;
   words(33)         <= std_logic_vector(resize(flux_faults, 32));
   words(34)         <= std_logic_vector(resize(min_pulse_used, 32));
   words(35)         <= "00000000000000" & std_logic_vector(resize(omega_me, 18));

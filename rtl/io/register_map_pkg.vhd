@@ -9,13 +9,15 @@ use ieee.numeric_std.all;
 
 package register_map_pkg is
 
+  -- Registers stand in the first 2**REGISTER_WORD_W words; REGISTER_LIMIT_W bits hold every register's range
   constant REGISTER_ADDRESS_W : positive := 12;
-  constant REGISTER_WORD_W    : positive := 7; -- registers stand in the first 2**REGISTER_WORD_W words
-  constant REGISTER_LIMIT_W   : positive := 25; -- holds the ends of every register's range
+  constant REGISTER_WORD_W    : positive := 7;
+  constant REGISTER_LIMIT_W   : positive := 25;
 
+  -- Between: counts between two samples
   constant REGISTER_NONE      : unsigned(1 downto 0) := "00";
   constant REGISTER_READ_ONLY : unsigned(1 downto 0) := "01";
-  constant REGISTER_BETWEEN   : unsigned(1 downto 0) := "10"; -- counts between two samples
+  constant REGISTER_BETWEEN   : unsigned(1 downto 0) := "10";
   constant REGISTER_AT_ONCE   : unsigned(1 downto 0) := "11";
 
   function register_access_of (word : unsigned(REGISTER_WORD_W - 1 downto 0)) return unsigned;

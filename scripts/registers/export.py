@@ -9,7 +9,7 @@ from pathlib import Path
 
 from peakrdl_cheader.exporter import CHeaderExporter
 from peakrdl_html import HTMLExporter
-from peakrdl_ipxact import IPXACTExporter
+from peakrdl_ipxact import IPXACTExporter, Standard
 from systemrdl.node import AddrmapNode
 
 from scripts.registers.compiled import Word
@@ -51,11 +51,12 @@ def html(top: AddrmapNode, folder: Path) -> Path:
 
 
 def ipxact(top: AddrmapNode, path: Path) -> Path:
-    """The IP-XACT component with the memory map (no VHDL ports: those are the package's)."""
+    """An IP-XACT component (IEEE 1685-2009, as Vivado reads) with the memory map and nothing else."""
     path.parent.mkdir(parents=True, exist_ok=True)
     fresh = path.with_name(f".{path.name}.{os.getpid()}")
-    IPXACTExporter(vendor="fluxproof", library="ip", version="1.0").export(
-        top, str(fresh), component_name=top.inst_name
+    exporter = IPXACTExporter(
+        standard=Standard.IEEE_1685_2009, vendor="fluxproof", library="ip", version="1.0"
     )
+    exporter.export(top, str(fresh), component_name=top.inst_name)
     fresh.replace(path)
     return path

@@ -102,6 +102,7 @@ def register_file(words: list[Word]) -> str:
     """rtl/io/register_file.vhd."""
     stored = [(word, word.parts[0]) for word in words if writable(word)]
     reads = _reads(words)
+    reads_width = max(len(f"words({choice})") for choice, _ in reads)
     ports = [("clk", "in", "std_logic", ""), ("rst", "in", "std_logic", "synchronous, active high")]
     ports += [(name, mode, _vector(width), "") for name, mode, width in BUS]
     ports.append(("sample_busy", "in", "std_logic", "a sample enters or is in flight"))
@@ -128,9 +129,9 @@ def register_file(words: list[Word]) -> str:
         resets=[(p.port, _reset(w, p)) for w, p in stored],
         output_width=max(len(part.port) for _, part in stored),
         kept={w.index: "pulse" not in w.kind for w, _ in stored},
-        reads=reads,
+        reads=[(choice, _wrapped(value, reads_width + len("   <= "))) for choice, value in reads],
         sign=_sign(words),
-        reads_width=max(len(f"words({choice})") for choice, _ in reads),
+        reads_width=reads_width,
     )
 
 
@@ -193,6 +194,16 @@ def _read(word: Word, sign: int) -> str:
         free = part.bit
     bits += [_zeros(free)] if free else []
     return " & ".join(bits)
+
+
+def _wrapped(value: str, indent: int) -> str:
+    """A long concatenation in lines of up to 118 characters."""
+    lines = [""]
+    for piece in value.split(" & "):
+        if indent + len(lines[-1]) + len(piece) + 3 > 118:
+            lines.append("")
+        lines[-1] += f"{piece} & "
+    return ("\n" + " " * indent).join(line.rstrip() for line in lines).removesuffix(" &")
 
 
 def _zeros(count: int) -> str:
