@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import os
+import re
+import shutil
+import subprocess
 
 import numpy as np
 import pytest
@@ -53,15 +57,17 @@ def folder():
 def golden():
     """(words (2500, COUNT) uint32, samples, observed) of the scenario in which everything happens, without RTL."""
     samples, observed, _ = golden_capture(DRIVE, SET, everything(DRIVE))
+    return packed(samples, observed), samples, observed
+
+
+def packed(samples, observed):
+    """The packets of a run, (n, COUNT) uint32, numbered from 0."""
+    names = fluxproof.Sample._fields
     rows = [
-        pack(
-            k,
-            dict(zip(fluxproof.Sample._fields, samples[k], strict=True))
-            | {n: observed[n][k] for n in PACKET},
-        )
+        pack(k, dict(zip(names, samples[k], strict=True)) | {n: observed[n][k] for n in PACKET})
         for k in range(len(samples))
     ]
-    return np.array(rows, np.uint32), samples, observed
+    return np.array(rows, np.uint32)
 
 
 def raw(words) -> bytes:
@@ -165,6 +171,31 @@ def test_begins_and_ends_anywhere(cut, golden, tmp_path):
     if cut in (1, 97):
         got, notes = digital.replay(recording(write_piece(tmp_path / "a.fluxdump", piece, DRIVE, SET)))
         assert got.first_difference is None and "not recorded" in " ".join(notes)
+
+
+@pytest.mark.parametrize(
+    ("start", "whole"), [(1, True), (400, True), (499, True), (530, False), (1500, False)]
+)
+def test_begins_before_or_while_the_drive_runs(start, whole, tmp_path, capsys):
+    """Gates off since the reset: replayed whole. Begun in mid-run: what has no memory, and that is said."""
+    scenario = everything(DRIVE)
+    first = {f.name: getattr(scenario, f.name) for f in dataclasses.fields(scenario)}
+    first = {name: v for name, v in first.items() if isinstance(v, np.ndarray)}
+    held = {
+        name: np.zeros(500, v.dtype) if name == "enable" else np.full(500, v[0]) for name, v in first.items()
+    }
+    longer = {name: np.concatenate((held[name], v)) for name, v in first.items()}
+    samples, observed, _ = golden_capture(DRIVE, SET, dataclasses.replace(scenario, **longer))
+    path = tmp_path / "capture.bin"
+    path.write_bytes(raw(packed(samples, observed)[start:]))
+    assert main(["dump", str(path), "--drive", str(PAPER)]) == 0
+    assert (
+        "begins with the gates off" if whole else "begins while the drive runs"
+    ) in capsys.readouterr().out
+    got, notes = digital.replay(recording(tmp_path / "capture.fluxdump"))
+    assert got.first_difference is None and got.checked == whole
+    assert got.samples == (3000 - start if whole else 0)
+    assert whole or "Regulators and estimators were not checked" in " ".join(notes)
 
 
 def test_lost_packets_and_the_wrap(golden, tmp_path):
@@ -306,3 +337,34 @@ def test_a_latency_that_does_not_fit_ends_the_import(monkeypatch):
     monkeypatch.setattr(telemetry_words, "WORDS", (("theta_me", "i_d"),))
     with pytest.raises(ValueError, match="theta_me and i_d do not fit into word 0"):
         telemetry_words._layout()
+
+
+def test_the_documents_reader_in_c(golden, tmp_path):
+    """The C of docs/telemetry.md gives what the Python reader gives, for every field."""
+    if shutil.which("gcc") is None:
+        pytest.skip("gcc is not installed")
+    (code,) = re.findall(r"```c\n(.*?)```", (simulate.ROOT / "docs" / "telemetry.md").read_text(), re.DOTALL)
+    table = "".join(
+        f"{{{f.word}, {f.lsb}, {f.width}, {int(f.signed)}}}, " for n, f in LAYOUT.items() if n in FIELDS
+    )
+    main_function = f"""
+#include <stdio.h>
+int main(void)
+{{
+    static const int t[][4] = {{ {table} }};
+    struct packet p;
+    while (fread(&p, sizeof p, 1, stdin) == 1)
+        for (unsigned k = 0; k < sizeof t / sizeof *t; k++)
+            printf("%d ", (int)field(&p, t[k][0], t[k][1], t[k][2], t[k][3]));
+    return 0;
+}}
+"""
+    (tmp_path / "reader.c").write_text(code + main_function)
+    subprocess.run(
+        ["gcc", "-Wall", "-Wextra", "-Werror", "-o", "reader", "reader.c"], cwd=tmp_path, check=True
+    )
+    words, _, _ = golden
+    done = subprocess.run([tmp_path / "reader"], input=raw(words[::100]), capture_output=True, check=True)
+    (piece,) = parse(raw(words[::100])).pieces
+    wanted = np.stack([piece.fields[name] for name in FIELDS], axis=1)
+    np.testing.assert_array_equal(np.array(done.stdout.split(), np.int64).reshape(wanted.shape), wanted)

@@ -15,6 +15,13 @@ from golden_model.drive import load
 from golden_model.drive_keys import DriveError
 from golden_model.registers import RegisterSet, registers
 
+REPLAY = {
+    "reset": "begins with the first sample after a reset: the golden model can replay all of it",
+    "off": "begins with the gates off: the golden model can replay it if the drive had not run since its reset",
+    "running": "begins while the drive runs: without the core's state only blocks without memory can be checked; "
+    "start the capture before the drive first runs",
+}
+
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the subcommand."""
@@ -74,12 +81,7 @@ def summary(capture, number: int) -> list[str]:
             mark = "  <- this one" if k == number else ""
             lines.append(f"  {k + 1}: from byte {other.byte}, {_numbers(other)}{mark}")
     lines.append(f"{len(piece)} samples, {_numbers(piece)}, {piece.lost} lost between them")
-    if piece.counter[0] == 0:
-        lines.append("from the reset on: the golden model can replay all of it")
-    else:
-        lines.append(
-            "begins in mid-run: regulators and estimators can be replayed only where their state can be found out"
-        )
+    lines.append(REPLAY["reset" if piece.counter[0] == 0 else "running" if piece.fields["run"][0] else "off"])
     lines += [f"{count} bytes at byte {at} belong to no whole packet" for at, count in capture.left]
     return lines
 

@@ -1,4 +1,4 @@
-"""Writes rtl/common/fluxproof_pkg.vhd and rtl/io/telemetry_words.vhd from the blocks' declarations.
+"""Writes rtl/common/fluxproof_pkg.vhd, rtl/io/telemetry_words.vhd and a table of docs/telemetry.md.
 
 Formats, constants, tables and latencies stand in the Python blocks and nowhere else.  ``--check`` only compares.
 """
@@ -14,7 +14,7 @@ from golden_model.block import Const
 from golden_model.fixed import Format
 from golden_model.registry import BLOCKS
 from scripts import generate_telemetry
-from scripts.files import write_text
+from scripts.files import ROOT, write_text
 
 PACKAGE = Path(__file__).resolve().parent.parent / "rtl" / "common" / "fluxproof_pkg.vhd"
 
@@ -84,7 +84,11 @@ def render() -> str:
 
 def outputs() -> dict[Path, str]:
     """{file: the text it must have}."""
-    return {PACKAGE: render(), generate_telemetry.ENTITY: generate_telemetry.render()}
+    return {
+        PACKAGE: render(),
+        generate_telemetry.ENTITY: generate_telemetry.render(),
+        generate_telemetry.DOCUMENT: generate_telemetry.document(),
+    }
 
 
 def main() -> int:
@@ -96,7 +100,7 @@ def main() -> int:
     for path, text in outputs().items():
         if not arguments.check:
             write_text(path, text)
-            print(f"wrote {path.relative_to(path.parents[2])}, {len(text.splitlines())} lines")
+            print(f"wrote {path.relative_to(ROOT)}, {len(text.splitlines())} lines")
         elif not path.exists() or path.read_text() != text:
             print(f"{path.name} is stale: run `make generate` and commit it", file=sys.stderr)
             return 1
