@@ -18,6 +18,7 @@ from diagnosis.digital_capture import capture
 from diagnosis.recording import RecordingError, from_columns
 from golden_model import drive as drives
 from golden_model import fluxproof
+from golden_model.io import telemetry_words
 from golden_model.registers import registers
 from golden_model.units import from_si, to_si
 from plant import Inverter
@@ -75,7 +76,7 @@ def first_row(a, b):
     return int(rows[0]) if len(rows) else None
 
 
-@pytest.mark.parametrize("names", [FIELDS, telemetry.PACKET], ids=["all signals", "packet"])
+@pytest.mark.parametrize("names", [FIELDS, telemetry_words.PACKET], ids=["all signals", "packet"])
 def test_a_clean_dump_is_acquitted(names, run, tmp_path):
     got, notes = digital.replay(recording(dump(tmp_path / "a.dump", run, names=names)))
     assert got.checked and got.samples == len(run[0]) == 2500 and got.first_difference is None
@@ -139,7 +140,7 @@ def test_a_flipped_register_names_its_block_and_sample(name, run, tmp_path):
         assert found["cause"]["behaved_as"] == getattr(SET.values, name)
 
 
-@pytest.mark.parametrize("names", [FIELDS, telemetry.PACKET], ids=["all signals", "packet"])
+@pytest.mark.parametrize("names", [FIELDS, telemetry_words.PACKET], ids=["all signals", "packet"])
 @pytest.mark.parametrize(("name", "block"), [
     ("kp_q", "current_pi"), ("k_delay", "svm_delay_compensation"), ("min_pulse", "pwm_compare"),
     ("omega_0", "flux_merge"), ("k_ramp", "speed_reciprocal"), ("k_ahead", "current_directions"),

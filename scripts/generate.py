@@ -93,6 +93,7 @@ def outputs() -> dict[Path, str]:
     return {
         PACKAGE: render(),
         generate_telemetry.ENTITY: generate_telemetry.render(),
+        generate_telemetry.DOCUMENT: generate_telemetry.document(),
         **generated.files(),
     }
 

