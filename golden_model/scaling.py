@@ -27,6 +27,8 @@ import math
 from typing import NamedTuple
 
 from golden_model.formats import LIMIT
+from golden_model.protection.fault_latch import NAMES
+from golden_model.protection.sample_checks import IGNORE
 from golden_model.units import TURN_RAD
 
 INTEGRAL_CORNER = 5.0  # speed crossover over the corner of the speed regulator's integral
@@ -50,9 +52,6 @@ TRIP_OF_LIMIT, TRIP_OF_RANGE = 2.0, 0.98  # overcurrent: of the current limit, a
 SUM_OF_RATED = 0.2  # of the rated current: sensors that disagree by more are not believed
 BUS_LOW, BUS_HIGH = 0.1, 1.3  # of the nominal bus voltage
 JUMP_CODES, JUMP_TURN = 4, 5e-4  # of the position, per sample: what the code's steps make, and noise of a sensor
-FAULTS = (
-    "overcurrent", "current_sum", "at_rail", "u_dc_low", "u_dc_high", "position", "watchdog"
-)  # bits of fault_ignore, [protection] trip_...
 ROUND_UP = ("dead_time", "min_pulse")  # times that must not come out shorter than asked
 
 
@@ -298,7 +297,7 @@ def protection(drive):
     if p.position_jump_rad is not None:
         jump, keys = p.position_jump_rad / TURN_RAD, "[protection] position_jump_rad"
     yield Entry("jump_max", jump, "turn", 1.0, keys)
-    ignored = sum((not getattr(p, f"trip_{name}")) << bit for bit, name in enumerate(FAULTS))
+    ignored = sum((not getattr(p, f"trip_{name}")) << bit for bit, name in enumerate(NAMES[: IGNORE.width]))
     yield Entry("fault_ignore", ignored, "1", 1.0, "[protection] trip_...")
     keys = "[protection] watchdog_periods; [inverter] pwm_frequency_hz; [core] clock_hz"
     yield Entry("watchdog", p.watchdog_periods * drive.sample_time_s, "s", 1.0 / drive.core.clock_hz, keys)

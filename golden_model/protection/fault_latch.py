@@ -23,6 +23,9 @@ from golden_model.protection.sample_checks import CHECKS, IGNORE
 
 FLAGS = Format(0, 9, 0)
 FAULTS = Format(0, 8, 0)  # all that can trip
+NAMES = (
+    "overcurrent", "current_sum", "at_rail", "u_dc_low", "u_dc_high", "position", "watchdog", "trip", "early",
+)  # fmt: skip
 LATE, TRIP, EARLY = 6, 7, 8
 ALWAYS = 1 << TRIP  # remembered without enable, and not to be ignored
 TRIPPING = FAULTS.hi  # all but EARLY

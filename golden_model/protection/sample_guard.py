@@ -2,8 +2,9 @@
 
 * A strobe closer than ``INTERVAL`` clocks to the last one that entered is not let in (``sample_busy``): the sample in
   flight is never disturbed.  It is told (``sample_early``) and counted in ``early_samples``, which stays at its end.
-* ``sample_late`` from ``watchdog`` clocks after the last sample on, until the next one enters.  ``watchdog`` = 0 is
-  always late: the watchdog is switched off where faults are ignored (fault_latch), never by a number.
+* ``sample_late`` is up ``watchdog`` clocks after the last sample, or after the reset, until the next one enters; a
+  sample that comes fewer clocks after the last is in time.  ``watchdog`` = 0 is always late: the watchdog is switched
+  off where faults are ignored (fault_latch), never by a number.
 
 No wrap: the age is counted up to ``watchdog`` and no further, so that any new value of it acts at once.
 Formats: clocks.  The age starts anew with the reset.
@@ -19,6 +20,7 @@ from golden_model.kernel import kernel
 AGE = Format(0, 20, 0)
 COUNT = Format(0, 8, 0)
 MOST = COUNT.hi
+AHEAD = 2  # the age enters one register and is judged into another
 
 
 class State(NamedTuple):
@@ -35,7 +37,7 @@ def step(state, sample_valid, clear_trip, watchdog, interval):
     expired = s.age >= watchdog
 
     wait = interval - 1 if entered else max(s.wait - 1, 0)
-    age = 0 if entered else (s.age if expired else s.age + 1)
+    age = AHEAD if entered else (s.age if expired else s.age + 1)
     counted = 0 if clear_trip else s.early_samples
     counted = min(counted + early, MOST)
     late = 1 if expired and not entered else 0
@@ -88,6 +90,7 @@ BLOCK = Block(
     state=State(),
     latency=1,
     clocked=True,
+    constants={"AHEAD": AHEAD},
     configs=({"INTERVAL": 48}, {"INTERVAL": 5}),
     reference=None,
     bound=None,

@@ -490,6 +490,7 @@ package fluxproof_pkg is
 
   -- sample_guard: none: what a drive needs besides
   constant SAMPLE_GUARD_LATENCY : positive := 1;
+  constant SAMPLE_GUARD_AHEAD : natural := 2;
 
   -- sample_checks: none: what a drive needs besides
   constant SAMPLE_CHECKS_LATENCY : positive := 1;

@@ -1,7 +1,7 @@
 -- Purpose: lets raw samples in no closer than the core can work on them, and tells when they stay away.
 -- A strobe closer than INTERVAL clocks to the last one that entered is not let in (sample_busy), is told
 -- (sample_early) and counted in early_samples, which stays at its end.
--- sample_late from watchdog clocks after the last sample on, until the next one enters; watchdog = 0 is always late.
+-- sample_late is up watchdog clocks after the last sample until the next one enters; watchdog = 0 is always late.
 -- Formats: clocks.  Latency: 1 (every clock is a sample).
 -- No wrap: the age is counted up to watchdog and no further, so that any new value of it acts at once.
 
@@ -51,7 +51,7 @@ begin
       -- Clocks until the next sample may enter, and since the last one did
       if entered = '1' then
         hold <= to_unsigned(INTERVAL - 1, 8);
-        age  <= (others => '0');
+        age  <= to_unsigned(SAMPLE_GUARD_AHEAD, 20);
       else
         if busy = '1' then
           hold <= hold - 1;
