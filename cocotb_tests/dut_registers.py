@@ -161,7 +161,7 @@ class Bench:
         return to_word(self.rng.choice((inside, near, self.rng.getrandbits(32))))
 
 
-@cocotb.test()
+@cocotb.test(timeout_time=500, timeout_unit="us")  # a bus that hangs
 async def every_address_after_reset(dut):
     """Reads of every word below 0x400 and of some above, aligned or not: as the twin answers."""
     bench = await Bench(dut, SEED).start()
@@ -171,7 +171,7 @@ async def every_address_after_reset(dut):
     bench.check_outputs()
 
 
-@cocotb.test()
+@cocotb.test(timeout_time=500, timeout_unit="us")  # a bus that hangs
 async def every_register_at_its_ends(dut):
     """Both ends are taken and read back, one beyond is refused and changes nothing; then a value inside."""
     bench = await Bench(dut, SEED).start()
@@ -194,7 +194,7 @@ async def every_register_at_its_ends(dut):
         assert await bench.fetch(register.address) == bench.twin.read(register.address), register.name
 
 
-@cocotb.test()
+@cocotb.test(timeout_time=500, timeout_unit="us")  # a bus that hangs
 async def writes_that_are_no_register(dut):
     """Read-only, empty and unaligned places, and every partial strobe: refused, nothing changes."""
     bench = await Bench(dut, SEED).start()
@@ -221,7 +221,7 @@ async def writes_that_are_no_register(dut):
     bench.check_outputs()
 
 
-@cocotb.test()
+@cocotb.test(timeout_time=500, timeout_unit="us")  # a bus that hangs
 async def random_traffic(dut):
     """Reads and writes of anything, back-pressure on every channel, samples all the time."""
     bench = await Bench(dut, SEED).start()
@@ -250,6 +250,47 @@ async def random_traffic(dut):
         task.cancel()
 
 
+@cocotb.test(timeout_time=500, timeout_unit="us")  # a bus that hangs
+async def answers_come_in_order(dut):
+    """Writes sent without waiting for answers, and a master slow to take them: one answer each, in order."""
+    bench = await Bench(dut, SEED).start()
+    rng = random.Random(SEED)
+    bench.master.write_if.b_channel.set_pause_generator(rng.random() < 0.9 for _ in itertools.repeat(0))
+    port, wanted = bench.master.write_if, []
+
+    async def answers():
+        return [int((await port.b_channel.recv()).bresp) for _ in range(40)]
+
+    receiving = cocotb.start_soon(answers())
+    for count in range(40):
+        address, word = rng.choice(((0x150, count), (0x124, 64), (0x3FC, 0), (0x154, 1 << 24)))
+        await port.aw_channel.send(AxiLiteAWTransaction(awaddr=address, awprot=0))
+        await port.w_channel.send(AxiLiteWTransaction(wdata=word, wstrb=15))
+        wanted.append(bench.twin.write(address, word))
+    assert await receiving == wanted and set(wanted) == {OKAY, SLVERR, DECERR}
+    for _ in range(100):
+        await FallingEdge(dut.clk)
+        assert int(dut.s_axi_bvalid.value) == 0, "an answer too many"
+    bench.check_outputs()
+
+
+@cocotb.test(timeout_time=500, timeout_unit="us")  # a bus that hangs
+async def neither_direction_starves(dut):
+    """Reads and writes both sent without a pause: they take turns."""
+    bench = await Bench(dut, SEED).start()
+    order = []
+
+    async def note(kind, operation):
+        await operation
+        order.append(kind)
+
+    tasks = [cocotb.start_soon(note("r", bench.fetch(0x000))) for _ in range(20)]
+    tasks += [cocotb.start_soon(note("w", bench.write(0x150, k))) for k in range(20)]
+    for task in tasks:
+        await with_timeout(task, 10, "us")
+    assert "rrr" not in "".join(order[:-2]) and "www" not in "".join(order[:-2]), "".join(order)
+
+
 async def steady_reads(bench: Bench) -> None:
     """Reads beside the writes, of words that never change: the two directions share one engine."""
     while True:
@@ -257,7 +298,7 @@ async def steady_reads(bench: Bench) -> None:
         assert await bench.fetch(MAP[name].address) == bench.twin.read(MAP[name].address)
 
 
-@cocotb.test()
+@cocotb.test(timeout_time=500, timeout_unit="us")  # a bus that hangs
 async def a_setting_waits_for_the_sample(dut):
     """Written in every clock of a sample, or together with its start: it counts in the first clock after it."""
     bench = await Bench(dut, SEED).start()
@@ -283,7 +324,7 @@ async def a_setting_waits_for_the_sample(dut):
             await FallingEdge(dut.clk)
 
 
-@cocotb.test()
+@cocotb.test(timeout_time=500, timeout_unit="us")  # a bus that hangs
 async def safety_never_waits(dut):
     """With samples that leave no gap: commands count within some clocks, settings end in SLVERR, nothing hangs."""
     bench = await Bench(dut, SEED).start()
@@ -309,7 +350,7 @@ async def safety_never_waits(dut):
     assert await bench.write(MAP["ki_q"].address, 77) == OKAY
 
 
-@cocotb.test()
+@cocotb.test(timeout_time=500, timeout_unit="us")  # a bus that hangs
 async def pulses_fall_back(dut):
     """clear_trip is one clock long; clear_faults is there when the next sample is taken, and gone after it."""
     bench = await Bench(dut, SEED).start()
@@ -335,7 +376,7 @@ async def pulses_fall_back(dut):
     bench.check_outputs()
 
 
-@cocotb.test()
+@cocotb.test(timeout_time=500, timeout_unit="us")  # a bus that hangs
 async def status_is_what_the_core_shows(dut):
     """Random values and both ends at every status input: each word reads them, signs extended."""
     bench = await Bench(dut, SEED).start()
@@ -351,7 +392,7 @@ async def status_is_what_the_core_shows(dut):
             assert await bench.fetch(MAP[name].address) == bench.twin.read(MAP[name].address), name
 
 
-@cocotb.test()
+@cocotb.test(timeout_time=500, timeout_unit="us")  # a bus that hangs
 async def reset_in_mid_transfer(dut):
     """rst in every phase of transfers in both directions: reset values, no answer left over, all works after it."""
     bench = await Bench(dut, SEED).start()
