@@ -181,7 +181,7 @@ def table() -> str:
     last = packet.COUNT - 1
     lines += [
         "",
-        f"Word 0 is taken {packet.START} clocks after the raw sample, word {last} {packet.START + last} clocks after it;",
+        f"Word 0 is taken {packet.START} clocks after the raw sample, word {last} {packet.START + last} clocks;",
         f"samples are at least {packet.fluxproof.SAMPLE_INTERVAL} clocks apart. The default queue (`DEPTH_BITS` = "
         f"{DEPTH_BITS}) holds {(1 << DEPTH_BITS) // packet.COUNT} packets.",
     ]
