@@ -24,8 +24,9 @@ REFERENCES = ("omega_ref", "i_d_ref", "i_q_ext", "speed_mode", "temp_winding", "
 class AxiDevice:
     """Drives fluxproof_axi: converters at the pins, the rest through registers, one period behind the scenario's.
 
-    A sample takes the references that are in the registers when it comes, so those of the next period are written when
-    the sample of this one is over.  ``scenario`` says what they will be.
+    A sample takes the references that are in the registers when it comes.  Those of the next period are written from
+    the moment on at which the sample of this one has come: the core must hold them back until it is over.  ``scenario``
+    says what they will be.
     """
 
     def __init__(self, dut, scenario: Scenario):
@@ -106,17 +107,22 @@ class AxiDevice:
         await FallingEdge(dut.aclk)
         dut.sample_valid.value = 0
         began = now()
+        self.number += 1
+        writing = cocotb.start_soon(self._references(self.number))
         await RisingEdge(dut.core.duty_valid)
         duty_clocks = now() + 1 - began
         await RisingEdge(dut.core.values_valid)
         await FallingEdge(dut.aclk)
         observed = {name: read(handle, signed) for name, handle, signed in self.observed}
-        self.number += 1
-        await self._references(self.number)
+        await writing
+        await self.after_sample()
         return await self._finish(observed, duty_clocks, running)
 
+    async def after_sample(self) -> None:
+        """What a test does when the values of a sample are there."""
+
     def change(self, registers: Mapping[str, int]) -> None:
-        """Already written at the end of the last period, see _references."""
+        """Already written in the last period, see _references."""
         assert all(self.written[name] == value for name, value in registers.items())
 
     async def _enable(self, value: int) -> None:

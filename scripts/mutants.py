@@ -264,4 +264,14 @@ MUTANTS = (
     ("room for one word too few", "common/packet_fifo.vhd", "used <= DEPTH - PACKET else", "used <= DEPTH - PACKET + 1 else"),
     ("queue not emptied by reset", "common/packet_fifo.vhd", "        used     <= (others => '0');\n", ""),
     ("decoupling starts early", "fluxproof.vhd", "      in_valid  => lambda_valid,", "      in_valid  => dq_valid,"),
+    # what surrounds the core
+    ("gates wait for the clock", "io/power_stage.vhd", "gates : process (clk, caught)\n  begin\n    if caught = '1' then", "gates : process (clk, caught)\n  begin\n    if rising_edge(clk) and caught = '1' then"),
+    ("short trip forgotten", "io/power_stage.vhd", "    if trip_pin = '1' then", "    if trip_pin = '1' and rising_edge(clk) then"),
+    ("gates let go before the core knows", "io/power_stage.vhd", "if sync_2 = '1' or rst = '1' then", "if sync_1 = '1' or rst = '1' then"),
+    ("trip kept for ever", "io/power_stage.vhd", "if sync_2 = '1' or rst = '1' then", "if rst = '1' then"),
+    ("one synchroniser stage", "io/power_stage.vhd", "trip <= sync_2;", "trip <= sync_1;"),
+    ("upper and lower gates swapped", "fluxproof_axi.vhd", "gate_high_next => gate_high_next,", "gate_high_next => gate_low_next,"),
+    ("status of the wrong axis", "fluxproof_axi.vhd", "      i_d               => i_d,\n      i_q               => i_q,", "      i_d               => i_q,\n      i_q               => i_d,"),
+    ("telemetry of stopped gates", "fluxproof_axi.vhd", "      running         => running,\n      current_at_rail", "      running         => tripped,\n      current_at_rail"),
+    ("registers change in mid-sample", "fluxproof_axi.vhd", "sample_busy       => sample_busy,", "sample_busy       => '0',"),
 )

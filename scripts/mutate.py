@@ -38,6 +38,17 @@ def plant(number: int) -> Path:
     return tree
 
 
+# Entities whose bench is their own: {entity: (cocotb module, generics, environment)}.
+OWN_BENCH = {
+    "power_stage": ("cocotb_tests.dut_power_stage", {}, {}),
+    "fluxproof_axi": (
+        "cocotb_tests.dut_axi_loop",
+        {"CARRIER_HALF": 128, "CLOCK_HZ": 2_560_000},
+        {"FLUXPROOF_DRIVE": str(DRIVE), "FLUXPROOF_CARRIER_HALF": "128", "FLUXPROOF_CLOCK_HZ": "2560000"},
+    ),
+}
+
+
 def runs(file: str):
     """(toplevel, cocotb module, generics, environment) of every run that may notice a defect in ``file``."""
     name = Path(file).stem
@@ -48,6 +59,9 @@ def runs(file: str):
             "FLUXPROOF_SCENARIO": "everything",
         }
         yield name, "cocotb_tests.dut_loop", {"CARRIER_HALF": 128}, environment
+        return
+    if name in OWN_BENCH:
+        yield name, *OWN_BENCH[name]
         return
     block = BLOCKS[name]
     for k, config in enumerate(block.configs):
