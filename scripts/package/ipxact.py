@@ -29,6 +29,7 @@ XSI = "http://www.w3.org/2001/XMLSchema-instance"
 PATH = ROOT / "component.xml"
 RDL = "io/fluxproof.rdl"  # below rtl/
 CONSTRAINTS = "scripts/vivado/fluxproof.xdc"
+CLOCK_CONSTRAINT = "scripts/vivado/fluxproof_clock.xdc"  # for the core alone: Vivado makes its own for an IP
 XGUI = "xgui/fluxproof_axi.tcl"
 VENDOR, LIBRARY = "fluxproof", "motor_control"
 TITLE = "Fluxproof PMSM drive"

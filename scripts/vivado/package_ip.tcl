@@ -26,14 +26,12 @@ proc described {name} {
 set sources [concat [glob [file join $root rtl *.vhd]] [glob [file join $root rtl * *.vhd]]]
 set top [file join $root rtl fluxproof_axi.vhd]
 set constraints [file join $root scripts vivado fluxproof.xdc]
-set constraints_ooc [file join $root scripts vivado fluxproof_ooc.xdc]
 
 create_project -force -part xc7z020clg484-1 package [file join $out package]
 add_files -norecurse $sources
 set_property file_type {VHDL 2008} [get_files $sources]
 set_property file_type VHDL [get_files $top]
-add_files -fileset constrs_1 -norecurse [list $constraints $constraints_ooc]
-set_property USED_IN {out_of_context synthesis implementation} [get_files $constraints_ooc]
+add_files -fileset constrs_1 -norecurse $constraints
 set_property top fluxproof_axi [get_filesets sources_1]
 update_compile_order -fileset sources_1
 
