@@ -394,7 +394,7 @@ async def status_is_what_the_core_shows(dut):
 
 @cocotb.test(timeout_time=500, timeout_unit="us")  # a bus that hangs
 async def reset_in_mid_transfer(dut):
-    """rst in every phase of transfers in both directions: reset values, no answer left over, all works after it."""
+    """rst of one clock or two in every phase of transfers: reset values, no answer left over, all works after it."""
     bench = await Bench(dut, SEED).start()
     bench.hold_back(0.3)
     for count in range(60):
@@ -407,8 +407,8 @@ async def reset_in_mid_transfer(dut):
             await FallingEdge(dut.clk)
         dut.rst.value = 1
         dut.sample_busy.value = 0
-        await FallingEdge(dut.clk)
-        await FallingEdge(dut.clk)
+        for _ in range(1 + count % 2):
+            await FallingEdge(dut.clk)
         for name in ("awready", "wready", "arready", "bvalid", "rvalid"):
             assert int(getattr(dut, f"s_axi_{name}").value) == 0, name
         bench.twin.reset()

@@ -2,9 +2,9 @@
 --
 --   address (and data) -> request, held until answer -> response, held until the master takes it
 --
--- A write is taken when its address and its data are both there.  Where a read and a write wait, they take turns,
--- and a response that the master leaves standing stops requests of its own direction only: neither starves the
--- other.  Every output to the bus leaves through a register; valid and payload stay until ready.
+-- A write is taken when its address and its data are both there.  A response stops requests of its own direction
+-- until the master has taken it, so that reads and writes that both wait take turns: neither starves the other.
+-- Every output to the bus leaves through a register; valid and payload stay until ready.
 -- answer may come in any clock with request = '1' but must come: it decides how long the bus waits.
 -- Formats: as AXI4-Lite has them, 32 bits of data.  A read that is refused returns zero.
 -- Latency: request one clock after the handshake, response one clock after answer.  Rounding: none.
@@ -52,7 +52,6 @@ architecture rtl of axi_lite_slave is
   type state_t is (idle, take_write, take_read, answering);
 
   signal state      : state_t;
-  signal wrote_last : std_logic;  -- the other direction's turn
   signal b_valid    : std_logic;
   signal r_valid    : std_logic;
   signal writing    : std_logic;
@@ -80,7 +79,7 @@ begin
         -- Ready is given for the one clock in which the master's valid already waits
         when idle =>
 
-          if want_write = '1' and (want_read = '0' or wrote_last = '0') then
+          if want_write = '1' then
             s_axi_awready <= '1';
             s_axi_wready  <= '1';
             state         <= take_write;
@@ -92,7 +91,6 @@ begin
         when take_write =>
 
           writing    <= '1';
-          wrote_last <= '1';
           address    <= unsigned(s_axi_awaddr);
           write_data <= s_axi_wdata;
           strobe     <= s_axi_wstrb;
@@ -101,11 +99,10 @@ begin
 
         when take_read =>
 
-          writing    <= '0';
-          wrote_last <= '0';
-          address    <= unsigned(s_axi_araddr);
-          request    <= '1';
-          state      <= answering;
+          writing <= '0';
+          address <= unsigned(s_axi_araddr);
+          request <= '1';
+          state   <= answering;
 
         -- The response register is free, or the request would not have been taken
         when answering =>
@@ -130,7 +127,6 @@ begin
 
       if rst = '1' then
         state         <= idle;
-        wrote_last    <= '0';
         request       <= '0';
         b_valid       <= '0';
         r_valid       <= '0';
