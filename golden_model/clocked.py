@@ -77,22 +77,32 @@ def step(state, inputs, regs, carrier_half):
     )
     gate_trip = 1 if x.trip or s.fault_stop or (x.sample_trip and x.enable) else 0
 
-    gate_state, (gate_high, gate_low, sample_trigger, running, tripped, setting_refused, _, _) = gate_generation.step(
-        s.of_gate_generation,
-        x.compare_a,
-        x.compare_b,
-        x.compare_c,
-        x.enable,
-        gate_trip,
-        s.gate_clear,
-        r.dead_time,
-        r.min_pulse,
-        carrier_half,
+    gate_state, (gate_high, gate_low, sample_trigger, running, tripped, setting_refused, _, _) = (
+        gate_generation.step(
+            s.of_gate_generation,
+            x.compare_a,
+            x.compare_b,
+            x.compare_c,
+            x.enable,
+            gate_trip,
+            s.gate_clear,
+            r.dead_time,
+            r.min_pulse,
+            carrier_half,
+        )
     )
     following = State(
         guard_state, latch_state, gate_state, sample_busy, sample_early, sample_late, fault_stop, gate_clear
     )
     seen = Seen(
-        gate_high, gate_low, sample_trigger, running, tripped, fault_flags, first_fault, early_samples, setting_refused
+        gate_high,
+        gate_low,
+        sample_trigger,
+        running,
+        tripped,
+        fault_flags,
+        first_fault,
+        early_samples,
+        setting_refused,
     )
     return following, entered, seen

@@ -118,7 +118,7 @@ class Sensors:
 
 @dataclass(frozen=True)
 class Protection:
-    """[protection], all optional: what turns the gates off; defaults in scaling.py, conditions in golden_model/protection.
+    """[protection], all optional: what turns the gates off; defaults in scaling.py.
 
     A condition whose trip_ key is false is told in the core's flags and does not trip.
     """

@@ -217,6 +217,12 @@ def _play(plan: Plan, pair: Pair, references: Mapping[str, int], period: int) ->
         sample = None
         if at in plan.strobes:
             pair.compare_values()
-            sample = dict(zip(INPUT_PORTS, [*(plan.codes | plan.strobes[at]).values(), *references.values()], strict=True))
+            sample = dict(
+                zip(
+                    INPUT_PORTS,
+                    [*(plan.codes | plan.strobes[at]).values(), *references.values()],
+                    strict=True,
+                )
+            )
         rows.append(pair.advance(until - at, sample, **plan.pins.get(at, {})))
     return np.concatenate(rows)

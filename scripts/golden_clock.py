@@ -81,8 +81,10 @@ class GoldenClock:
     def _enter(self, sample: Mapping[str, int]) -> None:
         """What a sample that enters at this clock comes to, and when."""
         self.samples.append(fluxproof.Sample(*sample.values(), self.running))
+        # The minimum pulse is the one in force, taken over at a valley: what the gates refuse, the duties do not see.
+        registers = self.registers._replace(min_pulse=self.state.of_gate_generation.min_pulse)
         self.of_samples, self.observed = fluxproof.step(
-            self.of_samples, self.samples[-1], self.registers, self.config
+            self.of_samples, self.samples[-1], registers, self.config
         )
         for after, names in (
             (clocked.CHECKS_CLOCKS, ("sample_faults", "sample_trip")),

@@ -1,6 +1,7 @@
 """`make mutate`: plants the defects of scripts/mutants.py in copies of the RTL, one by one; the suite must notice.
 
-A block's mutant faces that block's bench, with every configuration; a mutant of the top faces the closed loop.
+A block's mutant faces that block's bench, with every configuration; a mutant of the top faces the faults and the
+closed loop.
 Writes build/mutate/result.json.  Exit status 1 when one survives.
 """
 
@@ -14,7 +15,7 @@ import time
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 
-from cocotb_tests import simulate
+from cocotb_tests import dut_faults, simulate
 from golden_model.registry import BLOCKS
 from scripts.files import BUILD, ROOT, write_json
 from scripts.mutants import MUTANTS
@@ -58,6 +59,7 @@ def runs(file: str):
             "FLUXPROOF_CARRIER_HALF": "128",
             "FLUXPROOF_SCENARIO": "everything",
         }
+        yield name, "cocotb_tests.dut_faults", {"CARRIER_HALF": dut_faults.CARRIER_HALF}, {}
         yield name, "cocotb_tests.dut_loop", {"CARRIER_HALF": 128}, environment
         return
     if name in OWN_BENCH:

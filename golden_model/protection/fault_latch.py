@@ -61,7 +61,12 @@ def stimuli(rng, config):
         rows += [calm, calm | cause, calm, calm | other, calm | other | clear, calm | clear, calm]
         rows += [calm | cause | other, calm | cause | clear, calm | clear, calm]
         rows += [calm | cause | {"enable": 0}, calm | cause | {"enable": 0}, calm | cause, calm | clear, calm]
-        rows += [calm | cause, calm | cause | clear | {"enable": 0}, calm | cause | {"enable": 0}, calm | clear]
+        rows += [
+            calm | cause,
+            calm | cause | clear | {"enable": 0},
+            calm | cause | {"enable": 0},
+            calm | clear,
+        ]
         rows += [calm | cause | ignore, calm | other | ignore, calm | ignore | clear, calm | clear, calm]
     return rows
 

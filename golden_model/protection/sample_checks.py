@@ -75,10 +75,19 @@ def step(
 
 
 def stimuli(rng, config):
-    """Each limit met and just missed, with both signs; codes that turn, jump, freeze, pass zero; rails of any length."""
+    """Each limit met and just missed, with both signs; codes that turn, jump, freeze, pass zero; rails."""
     size = 1 << config["POSITION_BITS"]
-    limits = {"i_trip": 200, "sum_trip": 40, "rail_samples": 3, "u_dc_min": 30, "u_dc_max": 300, "jump_max": 64}
-    calm = dict.fromkeys(("i_a", "i_b", "i_c", "current_at_rail", "u_dc_at_rail", "code_theta"), 0) | {"u_dc": 40000}
+    limits = {
+        "i_trip": 200,
+        "sum_trip": 40,
+        "rail_samples": 3,
+        "u_dc_min": 30,
+        "u_dc_max": 300,
+        "jump_max": 64,
+    }
+    calm = dict.fromkeys(("i_a", "i_b", "i_c", "current_at_rail", "u_dc_at_rail", "code_theta"), 0) | {
+        "u_dc": 40000
+    }
     rows = []
     for edge in (200 << 8, -(200 << 8), 40 << 8, -(40 << 8)):
         for near in (-1, 0, 1):
