@@ -127,14 +127,17 @@ def stimulus(seed: int, generics: dict[str, int], clocks: int = CLOCKS) -> list[
     return writes
 
 
-def trace_of_vhdl(writes, core: VerilatedCore, generics: dict, folder: Path) -> list[list[int | None]]:
+def trace_of_vhdl(
+    writes, core: VerilatedCore, generics: dict, folder: Path, top: str = verilog.TOP
+) -> list[list[int | None]]:
     """The outputs of the VHDL after every clock; None where GHDL shows a metavalue."""
     given, made = folder / "stimulus.json", folder / "trace.json"
     outputs = {name: core.ports[name].signed for name in core.outputs}
-    inputs = [name for name in core.inputs if name != "clk"]
-    given.write_text(json.dumps({"inputs": inputs, "outputs": outputs, "writes": writes}))
+    inputs = [name for name in core.inputs if name != core.clock_name]
+    stimuli = {"clock": core.clock_name, "inputs": inputs, "outputs": outputs, "writes": writes}
+    given.write_text(json.dumps(stimuli))
     environment = {"FLUXPROOF_STIMULUS": str(given), "FLUXPROOF_TRACE": str(made)}
-    run = simulate.run(verilog.TOP, "cocotb_tests.trace_dut", generics, environment, key="trace")
+    run = simulate.run(top, "cocotb_tests.trace_dut", generics, environment, key="trace")
     reason = simulate.failure(run)
     assert reason is None, reason
     return json.loads(made.read_text())
@@ -145,6 +148,7 @@ def trace_of_verilog(writes: list[dict], core: VerilatedCore) -> list[list[int]]
     rows = []
     for changes in writes:
         core.set_many(changes)
+        core.settle()  # what needs no clock comes before it
         rows += core.trace(1, core.outputs).tolist()
     return rows
 
