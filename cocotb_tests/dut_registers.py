@@ -16,8 +16,10 @@ from cocotb_tests.dut_bench import read
 from golden_model.fluxproof import SAMPLE_INTERVAL
 from golden_model.io.register_file import RegisterFile, to_word
 from golden_model.io.register_map import DECERR, OKAY, PATIENCE, SLVERR, Kind, registers
+from scripts.registers.rdl import version_word
 
 GENERICS = {"adc_bits": 14, "position_bits": 17, "carrier_half": 1234, "clock_hz": 125_000_000}
+RUN = ("register_file", "cocotb_tests.dut_registers", {k.upper(): v for k, v in GENERICS.items()}, {})
 SEED = int(os.environ.get("FLUXPROOF_SEED", "1"))
 MAP = registers()
 WRITABLE = [r for r in MAP.values() if r.kind.writable]
@@ -33,7 +35,7 @@ class Bench:
     def __init__(self, dut, seed: int) -> None:
         self.dut = dut
         self.rng = random.Random(seed)
-        self.twin = RegisterFile(GENERICS, version=int(os.environ["FLUXPROOF_VERSION"]))
+        self.twin = RegisterFile(GENERICS, version=version_word())
         self.outputs = {r.name: (r, getattr(dut, r.port.name)) for r in WRITABLE}
         self.inputs = {
             f.name: getattr(dut, f.port.name) for r in MAP.values() if r.kind is Kind.STATUS for f in r.fields
@@ -414,8 +416,9 @@ async def reset_in_mid_transfer(dut):
         bench.twin.reset()
         bench.check_outputs()
         dut.rst.value = 0
-        await FallingEdge(dut.clk)
-        await FallingEdge(dut.clk)
+        for _ in range(4):
+            await FallingEdge(dut.clk)
+            bench.check_outputs()  # nothing of the transfer was left to be stored
         for register in bench.rng.sample(WRITABLE, 2):
             assert await bench.fetch(register.address) == bench.twin.read(register.address), register.name
             value = bench.rng.randint(register.port.low, register.port.high)

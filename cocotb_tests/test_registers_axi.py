@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from lxml import etree
 
-from cocotb_tests import simulate
+from cocotb_tests import dut_registers, simulate
 from golden_model import registers as drive_registers
 from golden_model.block import Port
 from golden_model.drive import load
@@ -26,7 +26,6 @@ from scripts.fluxproof import main
 from scripts.registers import export, generated, rdl, vhdl
 from scripts.registers.compiled import compile_file, words
 
-GENERICS = {"ADC_BITS": 14, "POSITION_BITS": 17, "CARRIER_HALF": 1234, "CLOCK_HZ": 125_000_000}
 PAPER = simulate.ROOT / "docs" / "drives" / "paper001.toml"
 MAP = register_map.registers()
 
@@ -38,8 +37,7 @@ def top():
 
 def test_axi_slave_equals_its_twin():
     """Every register, refusals, random traffic with back-pressure, resets: see dut_registers.py."""
-    environment = {"FLUXPROOF_VERSION": str(rdl.version_word())}
-    folder = simulate.run("register_file", "cocotb_tests.dut_registers", GENERICS, environment)
+    folder = simulate.run(*dut_registers.RUN)
     problem = simulate.failure(folder)
     assert problem is None, problem
 

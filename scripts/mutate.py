@@ -1,7 +1,7 @@
 """`make mutate`: plants the defects of scripts/mutants.py in copies of the RTL, one by one; the suite must notice.
 
 A block's mutant faces that block's bench, with every configuration; a mutant of the top faces the faults and the
-closed loop.
+closed loop; one of the registers faces their traffic on the bus; see OWN_BENCH for what surrounds the core.
 Writes build/mutate/result.json.  Exit status 1 when one survives.
 """
 
@@ -15,7 +15,7 @@ import time
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 
-from cocotb_tests import dut_faults, simulate
+from cocotb_tests import dut_faults, dut_registers, simulate
 from golden_model.registry import BLOCKS
 from scripts.files import BUILD, ROOT, write_json
 from scripts.mutants import MUTANTS
@@ -53,6 +53,9 @@ OWN_BENCH = {
 def runs(file: str):
     """(toplevel, cocotb module, generics, environment) of every run that may notice a defect in ``file``."""
     name = Path(file).stem
+    if name in ("axi_lite_slave", "register_access", "register_file", "register_map_pkg"):
+        yield dut_registers.RUN
+        return
     if name == "fluxproof":
         environment = {
             "FLUXPROOF_DRIVE": str(DRIVE),
