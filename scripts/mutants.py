@@ -259,9 +259,10 @@ MUTANTS = (
     ("legs b and a swapped", "io/telemetry_words.vhd",
      "resize(compare_b, 16) & resize(compare_a, 16)", "resize(compare_a, 16) & resize(compare_b, 16)"),
     ("queue overrun", "common/packet_fifo.vhd", "in_valid and not used(DEPTH_BITS);", "in_valid;"),
-    ("word changed before it was taken", "common/packet_fifo.vhd", "(shown = '0' or out_ready = '1')", "true"),
-    ("word shown twice", "common/packet_fifo.vhd", "shown <= fetch or (shown and not out_ready);", "shown <= fetch or shown;"),
+    ("word changed before it was taken", "common/packet_fifo.vhd", "read_valid and (out_ready or not shown);", "read_valid;"),
+    ("word shown twice", "common/packet_fifo.vhd", "shown <= move or (shown and not out_ready);", "shown <= move or shown;"),
     ("room for one word too few", "common/packet_fifo.vhd", "used <= DEPTH - PACKET else", "used <= DEPTH - PACKET + 1 else"),
-    ("queue not emptied by reset", "common/packet_fifo.vhd", "        used     <= (others => '0');\n", ""),
+    ("queue not emptied by reset", "common/packet_fifo.vhd", "        used       <= (others => '0');\n", ""),
+    ("word lost in the RAM's register", "common/packet_fifo.vhd", "fetch or (read_valid and not move);", "fetch;"),
     ("decoupling starts early", "fluxproof.vhd", "      in_valid  => lambda_valid,", "      in_valid  => dq_valid,"),
 )
