@@ -2,7 +2,7 @@
 
 ``room`` says whether a whole packet of PACKET words fits: who asks before the first word never has to wait nor to
 break off.  A word that finds the queue full is ignored.  ``out_data`` and ``out_last`` stay until ``out_ready``.
-Formats: as they come.  The RAM holds 2**DEPTH_BITS words, the output register one more.
+Formats: as they come.  The RAM holds 2**DEPTH_BITS words, its own and the output register one more each.
 """
 
 from typing import NamedTuple
@@ -14,6 +14,8 @@ from golden_model.formats import BIT
 
 class State(NamedTuple):
     ram: tuple = ()  # (word, last) in the order in which they came
+    read_valid: int = 0
+    read_word: tuple = (0, 0)
     out_valid: int = 0
     out_word: tuple = (0, 0)
 
@@ -24,15 +26,19 @@ def room(state, depth_bits, packet):
 
 
 def step(state, in_valid, in_data, in_last, out_ready, _width, depth_bits, packet):
-    ram, out_valid, out_word = state
+    ram, read_valid, read_word, out_valid, out_word = state
     full = len(ram) == 1 << depth_bits
-    fetch = len(ram) > 0 and (not out_valid or out_ready)
-    out_valid = 1 if fetch or (out_valid and not out_ready) else 0
+    move = read_valid and (not out_valid or out_ready)
+    fetch = len(ram) > 0 and (not read_valid or move)
+    out_valid = 1 if move or (out_valid and not out_ready) else 0
+    if move:
+        out_word = read_word
+    read_valid = 1 if fetch or (read_valid and not move) else 0
     if fetch:
-        out_word, ram = ram[0], ram[1:]
+        read_word, ram = ram[0], ram[1:]
     if in_valid and not full:
         ram = (*ram, (in_data, in_last))
-    following = State(ram, out_valid, out_word)
+    following = State(ram, read_valid, read_word, out_valid, out_word)
     return following, (out_valid, *out_word, room(following, depth_bits, packet))
 
 

@@ -33,9 +33,12 @@ class State(NamedTuple):
     index: int = 0
     dropped: int = 0
     sample: tuple = (0,) * len(INPUTS)
-    word_valid: int = 0
-    word: int = 0
-    last: int = 0
+    valid_1: int = 0
+    word_1: int = 0
+    last_1: int = 0
+    valid_2: int = 0
+    word_2: int = 0
+    last_2: int = 0
     queue: packet_fifo.State = packet_fifo.State()
 
 
@@ -59,15 +62,19 @@ def step(state, enable, sample_valid, m_axis_tready, *values):
         else:
             dropped = min(s.dropped + 1, DROPPED.hi)
 
-    word, last = s.word, s.last
+    word_1, last_1, word_2, last_2 = s.word_1, s.last_1, s.word_2, s.last_2
     if s.active:
         fields = {**dict(zip(INPUTS, s.sample, strict=True)), **dict(zip(SHOWN, shown, strict=True))}
-        (word,) = telemetry_words.step(s.index, s.counter, *(fields[name] for name in FIELDS))
-        last = 1 if s.index == COUNT - 1 else 0
+        (word_1,) = telemetry_words.step(s.index, s.counter, *(fields[name] for name in FIELDS))
+        last_1 = 1 if s.index == COUNT - 1 else 0
+    if s.valid_1:
+        word_2, last_2 = s.word_1, s.last_1
     queue, (tvalid, tdata, tlast, _) = packet_fifo.step(
-        s.queue, s.word_valid, s.word, s.last, m_axis_tready, WORD.width, depth_bits, COUNT
+        s.queue, s.valid_2, s.word_2, s.last_2, m_axis_tready, WORD.width, depth_bits, COUNT
     )
-    following = State(age, counter, active, index, dropped, sample, s.active, word, last, queue)
+    following = State(
+        age, counter, active, index, dropped, sample, s.active, word_1, last_1, s.valid_1, word_2, last_2, queue
+    )  # fmt: skip
     return following, (tdata, tvalid, tlast, dropped)
 
 

@@ -188,7 +188,7 @@ BLOCK = Block(
         *(PORTS[name] for name in FIELDS),
     ),
     outputs=(Port("word", WORD, doc="the packet's word"),),
-    latency=1,
+    latency=2,
     constants={"COUNT": COUNT, "START": START, "INDEX_W": INDEX.width},
     configs=({"ADC_BITS": 16, "POSITION_BITS": 16}, {"ADC_BITS": 12, "POSITION_BITS": 18}),
     width_from={name: sized(name) for name in INPUTS if sized(name)},

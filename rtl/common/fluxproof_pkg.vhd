@@ -479,7 +479,7 @@ package fluxproof_pkg is
   constant PACKET_FIFO_LATENCY : positive := 1;
 
   -- telemetry_words: none: what a recording needs
-  constant TELEMETRY_WORDS_LATENCY : positive := 1;
+  constant TELEMETRY_WORDS_LATENCY : positive := 2;
   constant TELEMETRY_WORDS_COUNT : natural := 24;
   constant TELEMETRY_WORDS_START : natural := 26;
   constant TELEMETRY_WORDS_INDEX_W : natural := 5;

@@ -7,7 +7,7 @@
 -- a packet once begun comes out whole.  A sample that comes less than FLUXPROOF_SAMPLE_INTERVAL clocks after the last
 -- one is none.
 -- Formats: all as they come, see telemetry_words.  The queue holds 2**DEPTH_BITS words.
--- Latency: the first word is shown TELEMETRY_WORDS_START + 4 clocks after sample_valid.  Rounding: none.
+-- Latency: the first word is shown TELEMETRY_WORDS_START + 5 clocks after sample_valid.  Rounding: none.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -103,8 +103,10 @@ architecture rtl of telemetry is
   signal final   : std_logic;
   signal room    : std_logic;
   signal valid_1 : std_logic;
-  signal word_1  : unsigned(31 downto 0);
   signal last_1  : std_logic;
+  signal valid_2 : std_logic;
+  signal word_2  : unsigned(31 downto 0);
+  signal last_2  : std_logic;
 begin
   taken <= '1' when sample_valid = '1' and age = AGE_END else '0';
   start <= '1' when enable = '1' and age = TELEMETRY_WORDS_START - 1 else '0';
@@ -134,15 +136,20 @@ begin
         drops <= drops + 1;
       end if;
 
-      -- Stage 1: beside the word, whether it is the last
+      -- Stages 1 and 2: beside the word, whether it is the last
+      valid_1 <= active;
       if active = '1' then
         last_1 <= final;
+      end if;
+      if valid_1 = '1' then
+        last_2 <= last_1;
       end if;
 
       if rst = '1' then
         age     <= AGE_END;
         counter <= NONE;
         active  <= '0';
+        valid_1 <= '0';
         drops   <= (others => '0');
       end if;
     end if;
@@ -232,8 +239,8 @@ begin
       flux_faults     => flux_faults,
       v_dead          => v_dead,
       v_comp          => v_comp,
-      out_valid       => valid_1,
-      word            => word_1
+      out_valid       => valid_2,
+      word            => word_2
     );
 
   queue : entity work.packet_fifo
@@ -245,9 +252,9 @@ begin
     port map (
       clk       => clk,
       rst       => rst,
-      in_valid  => valid_1,
-      in_data   => word_1,
-      in_last   => last_1,
+      in_valid  => valid_2,
+      in_data   => word_2,
+      in_last   => last_2,
       out_ready => m_axis_tready,
       out_valid => m_axis_tvalid,
       out_data  => m_axis_tdata,

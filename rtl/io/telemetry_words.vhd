@@ -2,7 +2,7 @@
 --
 -- Purpose: one word a clock of the telemetry packet, out of the core's live values.
 -- Formats: a field alone in its word is extended to 32 bits, two to 16 bits each, more stand one behind the other.
--- Latency: 1.  Rounding: none.
+-- Latency: 2; the values are taken with the first.  Rounding: none.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -61,11 +61,20 @@ entity telemetry_words is
 end entity telemetry_words;
 
 architecture rtl of telemetry_words is
-  type words_t is array (0 to 31) of unsigned(31 downto 0);
+  constant LATENCY : positive := TELEMETRY_WORDS_LATENCY;
+  constant INDEX_W : positive := TELEMETRY_WORDS_INDEX_W;
 
-  signal flags : unsigned(31 downto 0);
-  signal words : words_t;
+  type words_t is array (0 to 31) of unsigned(31 downto 0);
+  type parts_t is array (0 to 7) of unsigned(31 downto 0);
+
+  signal flags   : unsigned(31 downto 0);
+  signal words   : words_t;
+  signal valid   : std_logic_vector(0 to LATENCY);
+  signal parts_1 : parts_t;
+  signal index_1 : unsigned(INDEX_W - 3 downto 0);
 begin
+  valid(0) <= in_valid;
+
   flags(0)            <= run;
   flags(1)            <= speed_mode;
   flags(2)            <= temp_valid;
@@ -115,17 +124,27 @@ begin
   process (clk)
   begin
     if rising_edge(clk) then
-      out_valid <= in_valid;
+      valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stage 1: the word
-      if in_valid = '1' then
-        word <= words(to_integer(index));
+      -- Stage 1: of each four words one
+      if valid(0) = '1' then
+        index_1 <= index(INDEX_W - 1 downto 2);
+        for k in parts_t'range loop
+          parts_1(k) <= words(4 * k + to_integer(index(1 downto 0)));
+        end loop;
+      end if;
+
+      -- Stage 2: of these one
+      if valid(1) = '1' then
+        word <= parts_1(to_integer(index_1));
       end if;
 
       if rst = '1' then
-        out_valid <= '0';
+        valid(1 to LATENCY) <= (others => '0');
       end if;
     end if;
   end process;
+
+  out_valid <= valid(LATENCY);
 
 end architecture rtl;
