@@ -24,7 +24,7 @@ unexport PYTHONHOME
 
 PYTHON_RUN := .venv/bin/python
 
-.PHONY: help setup generate registers package test demo papers bench blind real compare timeline mutate verilog lint lock clean distclean
+.PHONY: help setup generate registers package test demo papers bench blind real compare timeline faults mutate verilog lint lock clean distclean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -65,6 +65,9 @@ compare: setup ## diagnose the same cases with what one would use instead
 
 timeline: setup ## draw the timeline of one control period
 	$(PYTHON_RUN) -m scripts.timeline $(ARGS)
+
+faults: setup ## hurt the drive: sensors, bus, strobes, registers; RTL against golden core
+	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m scripts.faults $(ARGS)
 
 mutate: setup ## plant faults in the VHDL and count those the tests catch
 	$(PYTHON_RUN) -m scripts.mutate $(ARGS)

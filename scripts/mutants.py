@@ -301,7 +301,7 @@ MUTANTS = (
     ("ignored fault trips", "protection/sample_checks.vhd", "and not fault_ignore(5 downto 0)", "and not fault_ignore(6 downto 1)"),
     ("fault cleared while it lasts", "protection/fault_latch.vhd", "(now_0(k) or not clear_trip)", "not clear_trip"),
     ("trip needs enable", "protection/fault_latch.vhd", "now_0(k) when k = FAULT_LATCH_TRIP else now_0(k) and enable", "now_0(k) and enable"),
-    ("first fault is the last", "protection/fault_latch.vhd", "if first_0 = 0 then", "if first_0 = 0 or tripping_0 /= first_0 then"),
+    ("first fault is the last", "protection/fault_latch.vhd", "if stop = '0' then", "if stop = '0' or tripping_0 /= first then"),
     ("early strobe trips", "protection/fault_latch.vhd", "tripping_0(7)          <= flags_0(7);", "tripping_0(7)          <= flags_0(7) or flags_0(8);"),
     ("trip forgotten before the flags", "protection/fault_latch.vhd", "gate_clear <= clear_trip;", "gate_clear <= '1';"),
     ("early strobe enters", "fluxproof.vhd", "sample_valid and not guard_busy", "sample_valid"),

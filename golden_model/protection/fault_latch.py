@@ -7,7 +7,7 @@
 
 A fault is remembered from ``enable`` on (``trip`` always), so that one can write the registers in peace; with a fault
 present ``enable`` does not help.  ``clear_trip`` forgets the faults whose cause is gone.
-``first_fault`` holds all that tripped in the first clock with any, until that cause is cleared.
+``first_fault`` holds all that tripped in the first clock with any, until nothing trips any more.
 ``fault_ignore``: bit x of 0 to 6 is told in the flags and does not trip; ``trip`` always does.
 ``gate_clear`` is ``clear_trip`` one clock later, when the flags have gone, for the trip memory of the gates.
 Formats: bits.
@@ -34,6 +34,7 @@ TRIPPING = FAULTS.hi  # all but EARLY
 class State(NamedTuple):
     flags: int = 0
     first: int = 0
+    stop: int = 0
 
 
 @kernel
@@ -44,9 +45,9 @@ def step(state, trip, sample_faults, sample_late, sample_early, enable, clear_tr
     kept = s.flags & now if clear_trip else s.flags
     flags = new | kept
     tripping = flags & TRIPPING & (ALWAYS | ~fault_ignore)
-    first = s.first & flags
-    first = tripping if first == 0 else first
-    return State(flags, first), (flags, first, 1 if tripping != 0 else 0, clear_trip)
+    stop = 1 if tripping != 0 else 0
+    first = s.first if s.stop else tripping
+    return State(flags, first, stop), (flags, first, stop, clear_trip)
 
 
 def stimuli(rng, config):

@@ -4,7 +4,7 @@
 --   7       input trip
 --   8       a sample came too early and was not let in: told, never a trip
 -- A fault is remembered from enable on (trip always); clear_trip forgets the faults whose cause is gone.
--- first_fault holds all that tripped in the first clock with any, until that cause is cleared.
+-- first_fault holds all that tripped in the first clock with any, until nothing trips any more.
 -- fault_ignore: bit x of 0 to 6 is told in the flags and does not trip; trip always does.
 -- gate_clear is clear_trip one clock later, when the flags have gone, for the trip memory of the gates.
 -- Formats: bits.  Latency: 1 (every clock is a sample).
@@ -37,12 +37,12 @@ architecture rtl of fault_latch is
   -- State
   signal flags : unsigned(8 downto 0);
   signal first : unsigned(7 downto 0);
+  signal stop  : std_logic;
 
   signal now_0      : unsigned(8 downto 0);
   signal new_0      : unsigned(8 downto 0);
   signal flags_0    : unsigned(8 downto 0);
   signal tripping_0 : unsigned(7 downto 0);
-  signal first_0    : unsigned(7 downto 0);
 begin
   now_0(5 downto 0)        <= sample_faults;
   now_0(FAULT_LATCH_LATE)  <= sample_late;
@@ -56,23 +56,21 @@ begin
 
   tripping_0(6 downto 0) <= flags_0(6 downto 0) and not fault_ignore;
   tripping_0(7)          <= flags_0(7);
-  first_0                <= first and flags_0(7 downto 0);
 
   process (clk)
   begin
     if rising_edge(clk) then
       flags      <= flags_0;
-      first      <= first_0;
-      fault_stop <= or tripping_0;
+      stop       <= or tripping_0;
       gate_clear <= clear_trip;
-      if first_0 = 0 then
+      if stop = '0' then
         first <= tripping_0;
       end if;
 
       if rst = '1' then
         flags      <= (others => '0');
         first      <= (others => '0');
-        fault_stop <= '0';
+        stop       <= '0';
         gate_clear <= '0';
       end if;
     end if;
@@ -80,5 +78,6 @@ begin
 
   fault_flags <= flags;
   first_fault <= first;
+  fault_stop  <= stop;
 
 end architecture rtl;

@@ -75,7 +75,7 @@ architecture rtl of sample_checks is
     if magnitude(magnitude'high) = '1' then
       magnitude := not magnitude;
     end if;
-    if unsigned(magnitude) >= limit then
+    if limit <= unsigned(magnitude) then
       return '1';
     end if;
     return '0';
