@@ -26,7 +26,7 @@ array set known {
   generate_target       {{} 2 2}
   make_wrapper          {{-files 1 -top 0} 0 0}
   launch_runs           {{-jobs 1 -to_step 1} 1 1}
-  wait_on_runs          {{} 1 1}
+  wait_on_run           {{} 1 1}
   get_runs              {{} 1 1}
   open_run              {{} 1 1}
   report_utilization    {{-hierarchical 0 -file 1} 0 0}
@@ -80,8 +80,8 @@ array set vendor_interfaces {
   xilinx.com:ip:xlconcat {}
 }
 set properties {
-  file_type USED_IN USED_IN_SYNTHESIS top ip_repo_paths name version description display_name
-  IOB IOSTANDARD PULLUP PULLDOWN PROGRESS STATS.WNS
+  file_type USED_IN top ip_repo_paths name version description display_name
+  IOB IOSTANDARD PULLUP PROGRESS STATS.WNS
 }
 
 proc call {name arguments} {

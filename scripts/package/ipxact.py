@@ -249,7 +249,8 @@ def _vhdl_files(rtl: Path) -> list[etree._Element]:
 
 
 def _constraints_file() -> etree._Element:
-    return _file(CONSTRAINTS, None, "xdc", "USED_IN_implementation", "USED_IN_synthesis")
+    """For implementation alone: it names registers, which synthesis has yet to make."""
+    return _file(CONSTRAINTS, None, "xdc", "USED_IN_implementation")
 
 
 def _vendor_extensions() -> etree._Element:

@@ -97,12 +97,12 @@ set design [get_files example.bd]
 generate_target all $design
 add_files -norecurse [make_wrapper -files $design -top]
 add_files -fileset constrs_1 -norecurse [file join $here example.xdc]
-set_property USED_IN_SYNTHESIS false [get_files example.xdc]
+set_property USED_IN implementation [get_files example.xdc]
 set_property top example_wrapper [get_filesets sources_1]
 update_compile_order -fileset sources_1
 
 launch_runs impl_1 -jobs 4
-wait_on_runs impl_1
+wait_on_run impl_1
 if {[get_property PROGRESS [get_runs impl_1]] ne "100%"} {
   error "implementation failed: see [file join $out example example.runs impl_1 runme.log]"
 }

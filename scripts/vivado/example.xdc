@@ -1,11 +1,10 @@
 # Constraints of the example design.  Pin numbers are your board's: add them here before you write a bitstream.
+# Until the FPGA is configured its pins are not driven: pull the gates down on the board.
 
 # The gates leave from the registers in the IO cells: all six at the same time, whatever the routing.
 set_property IOB TRUE [get_cells -hierarchical -filter {NAME =~ */stage/gate_high_reg*}]
 set_property IOB TRUE [get_cells -hierarchical -filter {NAME =~ */stage/gate_low_reg*}]
 set_property IOSTANDARD LVCMOS33 [get_ports -filter {NAME !~ DDR* && NAME !~ FIXED_IO*}]
-# Gates off while the FPGA is not configured.
-set_property PULLDOWN TRUE [get_ports {gate_high[*] gate_low[*]}]
 # A trip line that is broken or not connected trips.
 set_property PULLUP TRUE [get_ports trip]
 

@@ -32,6 +32,7 @@ add_files -norecurse $sources
 set_property file_type {VHDL 2008} [get_files $sources]
 set_property file_type VHDL [get_files $top]
 add_files -fileset constrs_1 -norecurse $constraints
+set_property USED_IN implementation [get_files $constraints] ;# it names registers, which synthesis has yet to make
 set_property top fluxproof_axi [get_filesets sources_1]
 update_compile_order -fileset sources_1
 
