@@ -24,7 +24,7 @@ from golden_model import fluxproof
 from golden_model.io import telemetry_words
 from golden_model.io.telemetry_words import COUNT, FIELDS, HEADER_WORD, LAYOUT, PACKET, pack
 from golden_model.registers import registers
-from scripts import dump_capture, generate
+from scripts import dump_capture, generate, generate_telemetry
 from scripts.fluxproof import main
 from scripts.golden_loop import run_controller
 from scripts.scenarios import everything
@@ -330,6 +330,10 @@ def test_generated_files_are_fresh():
     """The word multiplexer too equals what Python declares."""
     for path, text in generate.outputs().items():
         assert path.read_text() == text, f"{path.name} is stale: run `make generate` and commit it"
+    default = re.search(
+        r"DEPTH_BITS +: positive range 5 to 16 +:= (\d+)", (simulate.RTL / "io/telemetry.vhd").read_text()
+    )
+    assert int(default.group(1)) == generate_telemetry.DEPTH_BITS
 
 
 def test_a_latency_that_does_not_fit_ends_the_import(monkeypatch):
