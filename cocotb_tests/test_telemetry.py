@@ -24,7 +24,7 @@ from golden_model import fluxproof
 from golden_model.io import telemetry_words
 from golden_model.io.telemetry_words import COUNT, FIELDS, HEADER_WORD, LAYOUT, PACKET, pack
 from golden_model.registers import registers
-from scripts import dump_capture, generate
+from scripts import dump_capture, generate, generate_telemetry
 from scripts.fluxproof import main
 from scripts.golden_loop import run_controller
 from scripts.scenarios import everything
@@ -91,13 +91,18 @@ def test_stream_to_replay(folder, tmp_path, capsys):
     command = ["dump", str(folder / "capture.bin"), "--drive", str(PAPER)]
     command += ["--registers", str(tmp_path / "registers.json"), "-o", str(tmp_path / "run.fluxdump")]
     assert main(command) == 0
-    assert "300 samples, numbers 0 to 299, 0 lost" in capsys.readouterr().out
+    assert "600 samples, numbers 0 to 599, 0 lost" in capsys.readouterr().out
     found = recording(tmp_path / "run.fluxdump")
     observed = np.load(folder / "observed.npz")
     assert all(np.array_equal(found.meta["observed"][name], observed[name]) for name in PACKET)
     got, notes = digital.replay(found)
-    assert (got.checked, got.samples, got.first_difference) == (True, 300, None)
+    assert (got.checked, got.samples, got.first_difference) == (True, 600, None)
     assert f"{len(PACKET)} signals" in notes[0]
+
+    assert (
+        main(["diagnose", str(tmp_path / "run.fluxdump"), "--drive", str(PAPER), "--out", str(tmp_path)]) == 0
+    )
+    assert "controller: 600 samples equal to the golden model in every bit" in capsys.readouterr().out
 
     acting = 0
     for name in ("kp_q", "gain_a", "theta_offset", "k_delay", "r_s"):
@@ -325,6 +330,10 @@ def test_generated_files_are_fresh():
     """The word multiplexer too equals what Python declares."""
     for path, text in generate.outputs().items():
         assert path.read_text() == text, f"{path.name} is stale: run `make generate` and commit it"
+    default = re.search(
+        r"DEPTH_BITS +: positive range 5 to 16 +:= (\d+)", (simulate.RTL / "io/telemetry.vhd").read_text()
+    )
+    assert int(default.group(1)) == generate_telemetry.DEPTH_BITS
 
 
 def test_a_latency_that_does_not_fit_ends_the_import(monkeypatch):
