@@ -162,7 +162,7 @@ def test_case_in_the_converted_rtl(name):
         pytest.skip(reason)
     drive, register_set = setup(faults.CARRIER_HALF)
     case = next(c for c in cases(2 * faults.CARRIER_HALF) if c.name == name)
-    found = faults.row(case, run(case, VerilatedClock(register_set), drive, register_set), 0.1)
+    found = faults.row(case, run(case, VerilatedClock(register_set), drive, register_set))
     assert not found["problems"] and found["differences"] == 0
     assert found["samples_compared"] > 1000
 
@@ -171,19 +171,24 @@ def test_a_wrong_outcome_is_a_problem():
     """The judgement itself: a case that does not trip where it should, and one that differs, are told."""
     case = dataclasses.replace(tour(), clears=(18,))
     outcome = run(case, GoldenCore(SET), DRIVE, SET)
-    right = faults.row(case, outcome, 0.1)
+    right = faults.row(case, outcome)
     assert right["clocks_to_off"] == 2 and right["first"] == ["current_sum"]
     for changed, word in (
         ({"trips": None}, "wanted None"),
         ({"trips": "position"}, "first fault"),
         ({"rpm": 100.0}, "rpm"),
     ):
-        told = faults.row(dataclasses.replace(case, **changed), outcome, 0.1)["problems"]
+        told = faults.row(dataclasses.replace(case, **changed), outcome)["problems"]
         assert any(word in line for line in told), told
     assert any(
-        "differ" in line
-        for line in faults.row(case, dataclasses.replace(outcome, differences=1), 0.1)["problems"]
+        "differ" in line for line in faults.row(case, dataclasses.replace(outcome, differences=1))["problems"]
     )
+
+
+def test_every_case_stands_in_the_docs():
+    table = (simulate.ROOT / "docs" / "faults.md").read_text()
+    for case in cases(2 * faults.CARRIER_HALF):
+        assert f"| {case.name}: {case.text} |" in table, f"{case.name}: run `make faults ARGS=--docs`"
 
 
 def test_register_storm_leaves_the_gates_in_hand():

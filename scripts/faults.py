@@ -23,11 +23,12 @@ from scripts.scenarios import RPM
 
 CARRIER_HALF = 128
 MOST_CLOCKS = 2  # from the cause to gates off
+PERIOD_MS = 0.1
 DOCS = ROOT / "docs" / "faults.md"
 MARKS = ("<!-- table: python -m scripts.faults --docs -->", "<!-- end of table -->")
 
 
-def row(case: Case, outcome: Outcome, period_ms: float) -> dict:
+def row(case: Case, outcome: Outcome) -> dict:
     """What a case came to, times in ms."""
     o, clear = outcome, case.clears[0]
     trip, rpm = o.tripped_at, o.omega_m / RPM
@@ -39,7 +40,7 @@ def row(case: Case, outcome: Outcome, period_ms: float) -> dict:
         "clocks_from_sample": None if trip is None or o.strobed is None else trip - o.strobed,
         "after_ms": None
         if trip is None
-        else round((trip - o.begin(case.start)) / o.period_clocks * period_ms, 2),
+        else round((trip - o.begin(case.start)) / o.period_clocks * PERIOD_MS, 2),
         "flags": named(int(o.column("fault_flags")[o.begin(clear)])),
         "first": named(int(o.column("first_fault")[o.begin(clear)])),
         "early_samples": int(o.column("early_samples").max()),
@@ -49,9 +50,9 @@ def row(case: Case, outcome: Outcome, period_ms: float) -> dict:
         still = np.abs(o.i_abc).max(axis=1) < NO_CURRENT_A
         first = -(-(trip - 1) // o.period_clocks)
         flown = np.flatnonzero(still[first:clear])
-        result["no_current_after_ms"] = None if not len(flown) else round(flown[0] * period_ms, 2)
+        result["no_current_after_ms"] = None if not len(flown) else round(flown[0] * PERIOD_MS, 2)
     away = np.flatnonzero(np.abs(rpm[clear:] - case.rpm) >= NEAR_RPM)
-    result["speed_back_after_ms"] = round((away[-1] + 1 if len(away) else 0) * period_ms, 1)
+    result["speed_back_after_ms"] = round((away[-1] + 1 if len(away) else 0) * PERIOD_MS, 1)
     result["rpm_at_the_end"] = round(float(rpm[-1]), 1)
     result |= {"clocks_compared": len(o.seen), "samples_compared": o.samples, "differences": o.differences}
     return result | {"problems": problems(case, outcome, result)}
@@ -89,6 +90,11 @@ def cell(value, unit: str = "") -> str:
     return "–" if value is None else f"{value}{unit}"
 
 
+def within(ms: float | None) -> str:
+    """A time whose resolution is the period."""
+    return "–" if ms is None else "within 0.1 ms" if ms < PERIOD_MS else f"{ms} ms"
+
+
 def table(rows: list[dict]) -> str:
     """The cases as markdown."""
     head = (
@@ -98,11 +104,11 @@ def table(rows: list[dict]) -> str:
     lines = [head, "|---" * 7 + "|"]
     for r in rows:
         flags = ", ".join(f"**{f}**" if f in r["first"] else f for f in r["flags"]) or "none"
-        decay = "" if r.get("no_current_after_ms") is None else f", {r['no_current_after_ms']} ms"
+        decay = "" if r.get("no_current_after_ms") is None else f", {within(r['no_current_after_ms'])}"
         off = "stay on" if r["gates"] == "on" else "off"
         speed = "kept" if r["gates"] == "on" else cell(r["speed_back_after_ms"], " ms")
         lines.append(
-            f"| {r['name']}: {r['what']} | {off} | {cell(r['after_ms'], ' ms')} | {cell(r['clocks_to_off'])} | {flags} "
+            f"| {r['name']}: {r['what']} | {off} | {within(r['after_ms'])} | {cell(r['clocks_to_off'])} | {flags} "
             f"| {r['peak_current_a']} A{decay} | {speed} |"
         )
     return "\n".join(lines) + "\n"
@@ -126,9 +132,7 @@ def main(argv: list[str] | None = None) -> int:
     chosen = [c for c in cases(2 * CARRIER_HALF) if (options.only or "") in c.name]
     rows = []
     for case in chosen:
-        rows.append(
-            row(case, run(case, VerilatedClock(register_set), drive, register_set), drive.sample_time_s * 1e3)
-        )
+        rows.append(row(case, run(case, VerilatedClock(register_set), drive, register_set)))
         r = rows[-1]
         print(
             f"{case.name:28s} gates {r['gates']:3s} after {cell(r['clocks_to_off']):>2s} clocks, first "
