@@ -68,15 +68,15 @@ namespace eval do_ipx {}
 array set vendor_pins {
   xilinx.com:ip:processing_system7 {FCLK_CLK0 FCLK_RESET0_N M_AXI_GP0_ACLK S_AXI_HP0_ACLK IRQ_F2P}
   xilinx.com:ip:proc_sys_reset {slowest_sync_clk ext_reset_in peripheral_aresetn interconnect_aresetn}
-  xilinx.com:ip:axi_dma {s_axi_lite_aclk m_axi_s2mm_aclk axi_resetn s2mm_introut}
+  xilinx.com:ip:axi_dma {s_axi_lite_aclk m_axi_s2mm_aclk m_axi_sg_aclk axi_resetn s2mm_introut}
   xilinx.com:ip:smartconnect {aclk aresetn}
   xilinx.com:ip:xlconcat {In0 In1 dout}
 }
 array set vendor_interfaces {
   xilinx.com:ip:processing_system7 {M_AXI_GP0 S_AXI_HP0}
   xilinx.com:ip:proc_sys_reset {}
-  xilinx.com:ip:axi_dma {S_AXI_LITE S_AXIS_S2MM M_AXI_S2MM}
-  xilinx.com:ip:smartconnect {S00_AXI M00_AXI M01_AXI}
+  xilinx.com:ip:axi_dma {S_AXI_LITE S_AXIS_S2MM M_AXI_S2MM M_AXI_SG}
+  xilinx.com:ip:smartconnect {S00_AXI S01_AXI M00_AXI M01_AXI}
   xilinx.com:ip:xlconcat {}
 }
 set properties {

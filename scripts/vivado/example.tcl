@@ -45,10 +45,11 @@ set_property -dict [list \
   CONFIG.CLOCK_HZ [expr {$clock_mhz * 1000000}] \
   CONFIG.CARRIER_HALF $carrier_half] $drive
 
-# Telemetry: packets of the stream into memory, one descriptor-free transfer after another.
+# Telemetry: packets of the stream into memory, one descriptor each, as docs/telemetry.md tells.
 set dma [create_bd_cell -type ip -vlnv xilinx.com:ip:axi_dma dma]
 set_property -dict [list \
-  CONFIG.c_include_sg 0 \
+  CONFIG.c_include_sg 1 \
+  CONFIG.c_sg_include_stscntrl_strm 0 \
   CONFIG.c_include_mm2s 0 \
   CONFIG.c_include_s2mm 1 \
   CONFIG.c_s_axis_s2mm_tdata_width 32 \
@@ -57,7 +58,7 @@ set_property -dict [list \
 set control [create_bd_cell -type ip -vlnv xilinx.com:ip:smartconnect control]
 set_property -dict [list CONFIG.NUM_SI 1 CONFIG.NUM_MI 2] $control
 set memory [create_bd_cell -type ip -vlnv xilinx.com:ip:smartconnect memory]
-set_property -dict [list CONFIG.NUM_SI 1 CONFIG.NUM_MI 1] $memory
+set_property -dict [list CONFIG.NUM_SI 2 CONFIG.NUM_MI 1] $memory
 set interrupts [create_bd_cell -type ip -vlnv xilinx.com:ip:xlconcat interrupts]
 set_property CONFIG.NUM_PORTS 2 $interrupts
 
@@ -66,12 +67,13 @@ connect_bd_intf_net [get_bd_intf_pins control/M00_AXI] [get_bd_intf_pins drive/s
 connect_bd_intf_net [get_bd_intf_pins control/M01_AXI] [get_bd_intf_pins dma/S_AXI_LITE]
 connect_bd_intf_net [get_bd_intf_pins drive/m_axis] [get_bd_intf_pins dma/S_AXIS_S2MM]
 connect_bd_intf_net [get_bd_intf_pins dma/M_AXI_S2MM] [get_bd_intf_pins memory/S00_AXI]
+connect_bd_intf_net [get_bd_intf_pins dma/M_AXI_SG] [get_bd_intf_pins memory/S01_AXI]
 connect_bd_intf_net [get_bd_intf_pins memory/M00_AXI] [get_bd_intf_pins ps/S_AXI_HP0]
 
 set clock [get_bd_pins ps/FCLK_CLK0]
 foreach pin {
   ps/M_AXI_GP0_ACLK ps/S_AXI_HP0_ACLK reset/slowest_sync_clk control/aclk memory/aclk drive/aclk
-  dma/s_axi_lite_aclk dma/m_axi_s2mm_aclk
+  dma/s_axi_lite_aclk dma/m_axi_s2mm_aclk dma/m_axi_sg_aclk
 } {
   connect_bd_net $clock [get_bd_pins $pin]
 }
