@@ -24,7 +24,7 @@ unexport PYTHONHOME
 
 PYTHON_RUN := .venv/bin/python
 
-.PHONY: help setup generate test demo papers bench blind real compare timeline mutate verilog synth lint lock clean distclean
+.PHONY: help setup generate test demo papers bench blind real compare timeline mutate verilog synth lint registers package faults lock clean distclean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -32,8 +32,14 @@ help: ## list the targets
 setup: ## install what is missing: system packages, .venv, GHDL 5 (done by every other target too)
 	@bash scripts/setup.sh $(if $(filter setup,$(MAKECMDGOALS)),--retry)
 
-generate: setup ## write rtl/common/fluxproof_pkg.vhd from the golden model's constants
+generate: setup ## write what is generated: VHDL constants, registers, AXI top, C header, component.xml, fluxproof.core
 	$(PYTHON_RUN) -m scripts.generate $(ARGS)
+
+registers: setup ## write the registers' HTML pages and IP-XACT memory map to build/registers
+	$(PYTHON_RUN) -m scripts.registers $(ARGS)
+
+package: setup ## write the core as a zip file for Vivado's IP repository to build/package
+	$(PYTHON_RUN) -m scripts.package $(ARGS)
 
 test: setup ## run every test (golden model, plant, VHDL simulation)
 	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m pytest -q -n $(JOBS) --dist=worksteal $(ARGS)
@@ -59,6 +65,9 @@ compare: setup ## diagnose the same cases with what one would use instead
 
 timeline: setup ## draw the timeline of one control period
 	$(PYTHON_RUN) -m scripts.timeline $(ARGS)
+
+faults: setup ## hurt the drive: sensors, bus, strobes, registers; RTL against golden core
+	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m scripts.faults $(ARGS)
 
 mutate: setup ## plant faults in the VHDL and count those the tests catch
 	$(PYTHON_RUN) -m scripts.mutate $(ARGS)

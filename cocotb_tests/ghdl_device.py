@@ -11,7 +11,7 @@ from cocotb.utils import get_sim_time
 from cocotb_tests.dut_bench import read
 from golden_model.fluxproof import OBSERVED, Observed
 from golden_model.io import sample_latch
-from scripts.cosim import SAMPLE_DELAY, Period
+from scripts.cosim import FLAGS, SAMPLE_DELAY, Period
 
 CLOCK_NS = 10
 
@@ -93,4 +93,5 @@ class GhdlDevice:
         clocks = np.array([c - self.start_clock for c, _ in mine], np.int64)
         words = np.array([w for _, w in mine], np.int64)
         length, self.start_clock = end - self.start_clock, end
-        return Period(observed, clocks, words, length, duty_clocks, running)
+        flags = tuple(read(getattr(self.dut, name), False) for name in FLAGS)
+        return Period(observed, clocks, words, length, duty_clocks, running, flags)

@@ -26,13 +26,14 @@ def run_folder(toplevel: str, generics: dict, rtl: Path = RTL, key: str = "") ->
 
 
 def run(
-    toplevel: str, module: str, generics: dict, environment: dict, rtl: Path = RTL, key: str = ""
+    toplevel: str, module: str, generics: dict, environment: dict, rtl: Path = RTL, key: str = "", extra=()
 ) -> Path:
     """Simulate ``toplevel`` under cocotb module ``module``; returns the folder of the run, see failure().
 
-    ``rtl`` may be another tree (a mutant's).  Raises BuildError with GHDL's words where the VHDL does not build.
+    ``rtl`` may be another tree (a mutant's), ``extra`` files beside it (a test's own top).  Raises BuildError with
+    GHDL's words where the VHDL does not build.
     """
-    sources = sorted(rtl.rglob("*.vhd"))
+    sources = [*sorted(rtl.rglob("*.vhd")), *extra]
     folder = run_folder(toplevel, generics, rtl, key)
     (folder / "results.xml").unlink(missing_ok=True)
     runner = get_runner("ghdl")

@@ -133,17 +133,18 @@ def schedule(block: Block, config: dict[str, int], seed: int) -> list[Clock]:
 def _clocked_schedule(block: Block, config: dict[str, int], seed: int) -> list[Clock]:
     """For a block whose sample is the clock: its own hard cases, then random ones, with resets.
 
-    Outputs are due before the edge that follows the sample's; in reset all of them are zero.
+    Outputs are due before the edge that follows the sample's; in reset they are zero but for ``after_reset``.
     """
     rng = np.random.default_rng(seed)
     rows = block.stimuli(rng, config) + _held_random(block, config, rng, CLOCKED_RANDOM)
     clocks, state = [Clock({}, rst=1), Clock({}, rst=1)], block.state
-    outputs, of_sample = {p.name: 0 for p in block.outputs}, -1
+    at_rest = {p.name: 0 for p in block.outputs} | dict(block.after_reset)
+    outputs, of_sample = at_rest, -1
     for index, row in enumerate(rows):
         reset = int(rng.integers(700) == 0)
         clocks.append(Clock(dict(row), rst=reset, sample=index, of_sample=of_sample, expected=outputs))
         if reset:
-            state, outputs = block.state, {p.name: 0 for p in block.outputs}
+            state, outputs = block.state, at_rest
         else:
             state, outputs = block.run(state, row, config)
         of_sample = index
@@ -154,13 +155,17 @@ def _clocked_schedule(block: Block, config: dict[str, int], seed: int) -> list[C
 def _held_random(block: Block, config: dict[str, int], rng, count: int) -> list[dict[str, int]]:
     """Random values, each held for a random while, flags mostly at rest, so that something can happen."""
     ports = block.ports(config)
+    names = {p.name for p in ports}
     rows: list[dict[str, int]] = []
-    row = {p.name: random_value(rng, p) for p in ports} | {"enable": 1, "trip": 0}
+    calm = {"enable": 1, "trip": 0}
+    row = {p.name: random_value(rng, p) for p in ports} | calm
     for _ in range(count):
         if rng.integers(30) == 0:
             port = ports[int(rng.integers(len(ports)))]
             row = {**row, port.name: random_value(rng, port)}
         if rng.integers(40) == 0:
-            row = {**row, "enable": 1, "trip": 0, "dead_time": int(rng.integers(1, 9)), "min_pulse": 10}
-        rows.append(row)
+            row = {**row, **calm}
+            if "dead_time" in row:
+                row = {**row, "dead_time": int(rng.integers(1, 9)), "min_pulse": 10}
+        rows.append({name: value for name, value in row.items() if name in names})
     return rows

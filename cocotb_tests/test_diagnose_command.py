@@ -22,6 +22,7 @@ from diagnosis import diagnose as run_diagnosis
 from diagnosis.nominal import load_nominal
 from diagnosis.recording import RecordingError
 from golden_model import drive as drives
+from golden_model.io import telemetry_words
 from golden_model.registers import registers
 from scripts import fluxproof
 
@@ -51,7 +52,7 @@ def dump():
 
 def write_dump(path, dump, values=bench.SET.values, rows=None):
     samples, observed = dump
-    seen = {name: observed[name][:rows] for name in telemetry.PACKET}
+    seen = {name: observed[name][:rows] for name in telemetry_words.PACKET}
     return telemetry.write_dump(path, bench.DRIVE, bench.SET._replace(values=values), samples[:rows], seen)
 
 

@@ -111,7 +111,9 @@ def test_with_carrier_keeps_everything_but_the_clocks(half):
     scaled = with_carrier(drive, half)
     old, new = registers(drive).values, registers(scaled)
     assert new.config.carrier_half == half and scaled.sample_time_s == drive.sample_time_s
-    assert new.values._replace(dead_time=old.dead_time, min_pulse=old.min_pulse) == old
+    clocks = ("dead_time", "min_pulse", "watchdog")
+    assert new.values._replace(**{name: getattr(old, name) for name in clocks}) == old
+    assert new.values.watchdog == 3 * half
     clock = scaled.core.clock_hz
     assert new.values.dead_time == math.ceil(2e-6 * clock - 1e-6)
     assert new.values.min_pulse == max(math.ceil(3e-6 * clock - 1e-6), new.values.dead_time + 1)

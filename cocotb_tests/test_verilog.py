@@ -16,6 +16,7 @@ from cocotb_tests import simulate
 from cocotb_tests.stimulus import random_value
 from golden_model.fluxproof import REGISTERS
 from golden_model.io import sample_latch
+from golden_model.protection import fault_latch, sample_checks, sample_guard
 from scripts import verilog
 from scripts.sources import rtl_sources
 from scripts.verilated import VerilatedCore
@@ -24,6 +25,9 @@ GENERICS = {"ADC_BITS": 16, "POSITION_BITS": 16, "CARRIER_HALF": 100}
 OTHER = {"ADC_BITS": 12, "POSITION_BITS": 18, "CARRIER_HALF": 75}
 CLOCKS = 10000
 GAP = (60, 80)  # clocks from sample to sample
+PROTECTION = tuple(
+    p.name for block in (sample_guard, sample_checks, fault_latch) for p in block.BLOCK.registers
+)  # fmt: skip
 LATCHED = "run_in"  # the latch's input that the core makes itself
 MODERATE = {  # registers of the size a drive has, with which little saturates
     **dict.fromkeys(("offset_a", "offset_b", "offset_c"), 32768),
@@ -58,12 +62,18 @@ def settings(rng: np.random.Generator) -> dict[str, int]:
 
 def registers(rng: np.random.Generator, moderate: bool) -> dict[str, int]:
     """Every register but those of ``settings``: anywhere in its legal range, or within a half of MODERATE."""
-    ports = [p for p in REGISTERS.values() if p.name not in ("dead_time", "min_pulse")]
+    ports = [p for p in REGISTERS.values() if p.name not in ("dead_time", "min_pulse", *PROTECTION)]
     values = {p.name: random_value(rng, p) for p in ports}
     if moderate:
         values |= {name: int(value * rng.uniform(0.5, 1.5)) for name, value in MODERATE.items()}
         values |= {"flux_mode": int(rng.integers(2, 4)), "compensate": 1}
     return values
+
+
+def protection(rng: np.random.Generator, moderate: bool) -> dict[str, int]:
+    """Its registers anywhere in their ranges; with the moderate samples every fault is told and none trips."""
+    values = {name: random_value(rng, REGISTERS[name]) for name in PROTECTION}
+    return values | ({"fault_ignore": 127} if moderate else {})
 
 
 def raw_sample(rng: np.random.Generator, generics: dict[str, int], moderate: bool = False) -> dict[str, int]:
@@ -85,7 +95,7 @@ def stimulus(seed: int, generics: dict[str, int], clocks: int = CLOCKS) -> list[
     Twelve moderate samples, then four wild ones; registers change between them; resets, trips and switching off come
     at any time.
     """
-    rng = np.random.default_rng(seed)
+    rng, other = np.random.default_rng(seed), np.random.default_rng((seed, 1))
     writes: list[dict[str, int]] = [{} for _ in range(clocks)]
 
     def pulse(name: str, at: int, width: int = 1) -> None:
@@ -105,9 +115,11 @@ def stimulus(seed: int, generics: dict[str, int], clocks: int = CLOCKS) -> list[
     while at < clocks - 1:
         writes[at] |= raw_sample(rng, generics, moderate=number % 16 < 12)
         if number % 16 in (0, 12, 14):
-            writes[at] |= registers(rng, moderate=number % 16 == 0)
+            writes[at] |= registers(rng, moderate=number % 16 == 0) | protection(other, number % 16 == 0)
         writes[at + 1] |= raw_sample(rng, generics)
         pulse("sample_valid", at)
+        if number % 5 == 3 and at + 46 < clocks:
+            pulse("sample_valid", at + int(other.integers(2, 45)))  # too early: must change nothing but its count
         at += int(rng.integers(*GAP, endpoint=True)) + (500 if number % 17 == 16 else 0)
         number += 1
     writes[0] |= {"rst": 1, "enable": 1, "dead_time": 3, "min_pulse": 8}
@@ -115,14 +127,17 @@ def stimulus(seed: int, generics: dict[str, int], clocks: int = CLOCKS) -> list[
     return writes
 
 
-def trace_of_vhdl(writes, core: VerilatedCore, generics: dict, folder: Path) -> list[list[int | None]]:
+def trace_of_vhdl(
+    writes, core: VerilatedCore, generics: dict, folder: Path, top: str = verilog.TOP
+) -> list[list[int | None]]:
     """The outputs of the VHDL after every clock; None where GHDL shows a metavalue."""
     given, made = folder / "stimulus.json", folder / "trace.json"
     outputs = {name: core.ports[name].signed for name in core.outputs}
-    inputs = [name for name in core.inputs if name != "clk"]
-    given.write_text(json.dumps({"inputs": inputs, "outputs": outputs, "writes": writes}))
+    inputs = [name for name in core.inputs if name != core.clock_name]
+    stimuli = {"clock": core.clock_name, "inputs": inputs, "outputs": outputs, "writes": writes}
+    given.write_text(json.dumps(stimuli))
     environment = {"FLUXPROOF_STIMULUS": str(given), "FLUXPROOF_TRACE": str(made)}
-    run = simulate.run(verilog.TOP, "cocotb_tests.trace_dut", generics, environment, key="trace")
+    run = simulate.run(top, "cocotb_tests.trace_dut", generics, environment, key="trace")
     reason = simulate.failure(run)
     assert reason is None, reason
     return json.loads(made.read_text())
@@ -133,6 +148,7 @@ def trace_of_verilog(writes: list[dict], core: VerilatedCore) -> list[list[int]]
     rows = []
     for changes in writes:
         core.set_many(changes)
+        core.settle()  # what needs no clock comes before it
         rows += core.trace(1, core.outputs).tolist()
     return rows
 
@@ -175,7 +191,7 @@ def test_equals_vhdl_clock_by_clock(ghdl5, generics, tmp_path, capsys):
 
 
 def test_run_period_records_what_a_trace_shows(ghdl5):
-    settings = {"enable": 1, "dead_time": 3, "min_pulse": 8, "lambda_mg": 9000, "u_dc_gain": 60000}
+    settings = {"enable": 1, "fault_ignore": 127, "dead_time": 3, "min_pulse": 8, "lambda_mg": 9000, "u_dc_gain": 60000}
     sample, sample_at = {"adc_a": 40000, "adc_u_dc": 50000, "position_code": 777}, 5
     names = ("gate_high", "gate_low", "sample_trigger")
     fast, slow = VerilatedCore(GENERICS), VerilatedCore(GENERICS)
@@ -238,4 +254,5 @@ def test_sources_come_in_compile_order(tmp_path):
     (tmp_path / "sub" / "b.vhd").write_text("entity b is end entity;")
     (tmp_path / "z_pkg.vhd").write_text("package p is end package;")
     assert [path.stem for path in rtl_sources(tmp_path)] == ["z_pkg", "b", "a"]
-    assert [path.stem for path in rtl_sources()][-1] == verilog.TOP
+    order = [path.stem for path in rtl_sources()]
+    assert order[-2:] == [verilog.TOP, "fluxproof_axi"]

@@ -1,8 +1,8 @@
 """Runs inside the simulator: applies a stimulus file to any clocked entity and writes what every clock shows.
 
-The file is JSON.  ``inputs``: names, all 0 at first; ``outputs``: name -> whether it is signed; ``writes``:
-for each clock the inputs that change before its rising edge, name -> integer.  The result is JSON too: for
-each clock the outputs after its rising edge, in order, None for one with a bit that is neither 0 nor 1.
+The file is JSON.  ``clock``: its name; ``inputs``: names, all 0 at first; ``outputs``: name -> whether it is
+signed; ``writes``: for each clock the inputs that change before its rising edge, name -> integer.  The result is
+JSON too: for each clock the outputs after its rising edge, in order, None for one with a bit that is neither 0 nor 1.
 """
 
 from __future__ import annotations
@@ -30,11 +30,12 @@ async def trace(dut):
     outputs = [(getattr(dut, name), signed) for name, signed in stimulus["outputs"].items()]
     for name in stimulus["inputs"]:
         getattr(dut, name).value = 0
-    Clock(dut.clk, 10, unit="ns").start(start_high=False)
+    clock = getattr(dut, stimulus["clock"])
+    Clock(clock, 10, unit="ns").start(start_high=False)
     rows = []
     for writes in stimulus["writes"]:
         for name, value in writes.items():
             getattr(dut, name).value = value
-        await FallingEdge(dut.clk)
+        await FallingEdge(clock)
         rows.append([integer(handle, signed) for handle, signed in outputs])
     Path(os.environ["FLUXPROOF_TRACE"]).write_text(json.dumps(rows))

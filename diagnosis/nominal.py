@@ -48,6 +48,7 @@ class Nominal:
     sensors: object
     core: object
     bases: object
+    protection: object
     columns: dict = field(default_factory=dict)
     path: str = ""
     plant: dict = field(default_factory=dict)

@@ -6,8 +6,8 @@
     samples   u32 sample counter, then one i32 per field in the header's order
 
 All little-endian.  The fields are those of fluxproof.Sample (what the core took in), then any of fluxproof.Observed
-(what it answered); their names, formats and units come from the golden model, so they cannot drift.  ``PACKET`` is
-what the core's AXI4-Stream packet carries; a simulation can give everything.
+(what it answered); their names, formats and units come from the golden model, so they cannot drift.  A capture of the
+core's AXI4-Stream becomes a dump in telemetry_stream.py; it has the packet's fields, a simulation can give everything.
 
 ``checksum`` guards what the replay cannot judge: scales, configuration, field list.  Registers and start state have a
 checksum of their own, and one that fails is told (``altered``) and not refused: a register that is not what the
@@ -36,15 +36,6 @@ from golden_model.units import si_per_lsb, unit
 
 MAGIC = b"FLUXDUMP"
 VERSION = 1
-PACKET = (
-    "theta_me", "omega_me", "u_dc", "i_d", "i_q", "i_q_ref", "u_d", "u_q", "sat_d", "sat_q", "lambda_d", "lambda_q",
-    "v_dead", "v_comp", "psi_m", "psi_held", "temp_lost", "current_at_rail", "flux_faults", "compare_a", "compare_b",
-    "compare_c",
-)  # fmt: skip
-_UNKNOWN = set(PACKET) - set(fluxproof.Observed._fields)
-if _UNKNOWN:
-    raise NameError(f"the packet asks for what the core does not show: {_UNKNOWN}")
-
 INPUTS = dict(zip(fluxproof.Sample._fields, sample_latch.BLOCK.outputs, strict=True))
 OBSERVED = fluxproof.OBSERVED
 BASES = ("current_a", "voltage_v", "omega_me_rad_s", "flux_wb")

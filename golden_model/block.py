@@ -84,6 +84,8 @@ class Block:
     interval: int = 1
     clocked: bool = False
     atomic: bool = False  # outputs change with out_valid only
+    shown_with: Mapping[str, str] = field(default_factory=dict)  # clocked: output -> the valid it means something with
+    after_reset: Mapping[str, int] = field(default_factory=dict)  # clocked: outputs that reset does not bring to zero
     constants: Mapping[str, int | Const] = field(default_factory=dict)
     roms: Mapping[str, tuple[Format, list[int]]] = field(default_factory=dict)
     configs: tuple[Mapping[str, int], ...] = ({},)  # generics to verify with

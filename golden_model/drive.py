@@ -117,6 +117,29 @@ class Sensors:
 
 
 @dataclass(frozen=True)
+class Protection:
+    """[protection], all optional: what turns the gates off; defaults in scaling.py.
+
+    A condition whose trip_ key is false is told in the core's flags and does not trip.
+    """
+
+    current_trip_a: float | None = positive("A", "phase current, peak; twice the limit if none", None)
+    current_sum_trip_a: float | None = positive("A", "sum of the phases, a fifth of rated current if none", None)
+    rail_samples: int = whole(1, 15, "samples at the end of a code", 3)
+    u_dc_min_v: float | None = not_negative("V", "a tenth of the nominal bus if none", None)
+    u_dc_max_v: float | None = positive("V", "1.3 times the nominal bus if none", None)
+    position_jump_rad: float | None = positive("rad", "mechanical, change of the turn a sample", None)
+    watchdog_periods: float = positive("1", "longest time without a sample, in PWM periods", 1.5)
+    trip_overcurrent: bool = flag("false: told, no trip", True)
+    trip_current_sum: bool = flag("false: told, no trip; where one sensor is calculated", True)
+    trip_at_rail: bool = flag("false: told, no trip", True)
+    trip_u_dc_low: bool = flag("false: told, no trip", True)
+    trip_u_dc_high: bool = flag("false: told, no trip", True)
+    trip_position: bool = flag("false: told, no trip", True)
+    trip_watchdog: bool = flag("false: told, no trip", True)
+
+
+@dataclass(frozen=True)
 class Core:
     """[core]"""
 
@@ -155,6 +178,7 @@ class Drive:
     sensors: Sensors
     core: Core
     base_choice: BaseChoice = BaseChoice()
+    protection: Protection = Protection()
 
     def __post_init__(self):
         check(self)
@@ -197,6 +221,7 @@ SECTIONS = {
     "sensors": Sensors,
     "core": Core,
     "bases": BaseChoice,
+    "protection": Protection,
 }
 
 

@@ -131,7 +131,23 @@ def _adaline_steps(drive):
         _refuse("[control] winding_temp_min_c", control.winding_temp_min_c, "below winding_temp_max_c")
 
 
+def _protection(drive):
+    """What trips must lie outside of what the drive does every day, and inside of what its sensors see."""
+    p, limit, reach = drive.protection, drive.current_limit_a, drive.sensors.current_range_a
+    if p.current_trip_a is not None and not limit < p.current_trip_a <= reach:
+        allowed = f"above the current limit, {limit:g} A, up to [sensors] current_range_a = {reach:g} A"
+        _refuse("[protection] current_trip_a", p.current_trip_a, allowed)
+    bus, reach = drive.inverter.dc_bus_v, drive.sensors.u_dc_range_v
+    if p.u_dc_min_v is not None and not p.u_dc_min_v < bus:
+        _refuse("[protection] u_dc_min_v", p.u_dc_min_v, f"below [inverter] dc_bus_v = {bus:g} V")
+    if p.u_dc_max_v is not None and not bus < p.u_dc_max_v <= reach:
+        allowed = f"above [inverter] dc_bus_v = {bus:g} V, up to [sensors] u_dc_range_v = {reach:g} V"
+        _refuse("[protection] u_dc_max_v", p.u_dc_max_v, allowed)
+    if not p.watchdog_periods > 1.0:
+        _refuse("[protection] watchdog_periods", p.watchdog_periods, "above 1; trip_watchdog = false ignores it")
+
+
 RULES = (
     _sample_time, _carrier, _pulses, _voltage, _current, _flux, _codes, _speed_loop, _current_loop, _flux_loop,
-    _adaline_steps,
+    _adaline_steps, _protection,
 )  # fmt: skip

@@ -1,7 +1,7 @@
 """The whole core, one sample at a time: twin of rtl/fluxproof.vhd.
 
-Raw sample -> conditioning -> transforms -> control -> modulation -> compare values.  The gates themselves
-run at the clock and stand in modulation/gate_generation.
+Raw sample -> conditioning -> transforms -> control -> modulation -> compare values.  What runs
+at the clock, the gates and what keeps them off, stands in golden_model/clocked.py.
 """
 
 from collections import namedtuple
@@ -44,6 +44,7 @@ from golden_model.io import (
 )
 from golden_model.kernel import kernel
 from golden_model.modulation import gate_generation, pwm_compare, svm, svm_delay_compensation
+from golden_model.protection import fault_latch, sample_checks, sample_guard
 from golden_model.transforms import clarke, flux_inverse_park, flux_park, inverse_park, park, sincos
 
 # Instance of the top -> (its block, the instances it waits for).  Blocks start when the last of these is done.
@@ -86,10 +87,12 @@ WIRING = {
     "magnet_flux": (psi_adaline, ("circle", "direction_functions")),
     "directions": (current_directions, ("circle", "stator_frame", "speed_measurement")),
     "monitor": (flux_monitor, ("compensation", "merge", "bus_reciprocal")),
+    "checks": (sample_checks, ("conditioning", "bus_voltage")),
 }
 
 
-MODULES = (*dict.fromkeys(module for module, _ in WIRING.values()), gate_generation)
+AT_THE_CLOCK = (sample_guard, fault_latch, gate_generation)  # golden_model/clocked.py puts them together
+MODULES = (*dict.fromkeys(module for module, _ in WIRING.values()), *AT_THE_CLOCK)
 
 
 def schedule() -> dict[str, tuple[int, int]]:
@@ -146,6 +149,7 @@ class State(NamedTuple):
     of_v_dead_adaline: v_dead_adaline.State = v_dead_adaline.State()
     of_psi_adaline: psi_adaline.State = psi_adaline.State()
     of_clean_voltage: clean_voltage.State = clean_voltage.State()
+    of_sample_checks: sample_checks.State = sample_checks.State()
     # Outputs that the next sample reads: the feedback paths of the top.
     sat_d: int = 0
     sat_q: int = 0
@@ -222,6 +226,8 @@ class Observed(NamedTuple):
     psi_m: int
     psi_held: int
     temp_lost: int
+    sample_faults: int
+    sample_trip: int
     compare_a: int
     compare_b: int
     compare_c: int
@@ -421,10 +427,29 @@ def step(state, sample, regs, config):
         r.omega_psi_min,
     )
 
+    checks_state, (sample_faults, sample_trip) = sample_checks.step(
+        state.of_sample_checks,
+        i_a,
+        i_b,
+        i_c,
+        current_at_rail,
+        u_dc,
+        u_dc_at_rail,
+        x.position_code,
+        r.i_trip,
+        r.sum_trip,
+        r.rail_samples,
+        r.u_dc_min,
+        r.u_dc_max,
+        r.jump_max,
+        r.fault_ignore,
+        c.position_bits,
+    )
+
     following = State(
         speed_state, speed_pi_state, current_pi_state, voltage_limit_state, merge_state, delta_state,
-        compensation_state, monitor_state, v_dead_state, psi_state, clean_state, sat_d, sat_q, compare_a,
-        compare_b, compare_c, lambda_m_alpha, lambda_m_beta, merge_known, lambda_pi_d, lambda_pi_q,
+        compensation_state, monitor_state, v_dead_state, psi_state, clean_state, checks_state, sat_d, sat_q,
+        compare_a, compare_b, compare_c, lambda_m_alpha, lambda_m_beta, merge_known, lambda_pi_d, lambda_pi_q,
         lambda_add_d, lambda_add_q, v_comp, v_leg, s_alpha, s_beta,
     )  # fmt: skip
     return following, Observed(
@@ -433,7 +458,8 @@ def step(state, sample, regs, config):
         u_int_q, u_d, u_q, sat_d, sat_q, u_alpha, u_beta, duty_a, duty_b, duty_c, u_applied_alpha,
         u_applied_beta, lambda_c_d, lambda_c_q, lambda_m_alpha, lambda_m_beta, merge_known, delta_lambda_d,
         delta_lambda_q, delta_held, lambda_pi_d, lambda_pi_q, torque_me, flux_faults, d_d, d_q, v_dead, v_comp,
-        v_comp_limited, psi_m, psi_held, temp_lost, compare_a, compare_b, compare_c,
+        v_comp_limited, psi_m, psi_held, temp_lost, sample_faults, sample_trip, compare_a, compare_b,
+        compare_c,
     )  # fmt: skip
 
 

@@ -24,6 +24,7 @@ FLUX = Format(1, 1, 23)  # fluxes and voltages inside the estimators: 25 bits, t
 FLUX_STATE = Format(1, 1, 30)  # flux that is integrated: 7 bits below FLUX, see docs/flux_estimator.md
 RESISTANCE = Format(0, 0, 24)  # winding resistance, and the flux it takes away in half a sample, per unit
 V_LEG = Format(1, -1, 18)  # what dead time and device drops take from a leg, below half a voltage base
+LIMIT = Format(0, 1, 8)  # what trips: currents and bus voltage to a 256th of their base
 SAMPLE_TIME = Format(0, -1, 18)  # sample time times omega_base: below half a radian a sample at base speed
 
 PU_W, TURN_W, INTEGRAL_W, V_LEG_W = PU.width, TURN.width, INTEGRAL.width, V_LEG.width

@@ -1,6 +1,6 @@
 """Every block of the core, one line each: add yours here and the bench finds it."""
 
-from golden_model.common import reciprocal, sqrt
+from golden_model.common import packet_fifo, reciprocal, sqrt
 from golden_model.control import (
     chord_speed,
     current_pi,
@@ -30,10 +30,13 @@ from golden_model.io import (
     position,
     sample_latch,
     speed,
+    telemetry,
+    telemetry_words,
     u_dc_conditioning,
     u_dc_processing,
 )
 from golden_model.modulation import gate_generation, pwm_compare, svm, svm_delay_compensation
+from golden_model.protection import fault_latch, sample_checks, sample_guard
 from golden_model.transforms import clarke, flux_inverse_park, flux_park, inverse_park, park, rotate, sincos
 
 BLOCKS = {
@@ -78,5 +81,11 @@ BLOCKS = {
         clean_voltage,
         v_dead_adaline,
         psi_adaline,
+        packet_fifo,
+        telemetry_words,
+        telemetry,
+        sample_guard,
+        sample_checks,
+        fault_latch,
     )
 }

@@ -16,11 +16,19 @@ w_f.  Paper 001, section 4, wants w_f below the current loop's crossover and abo
 latter, since K_p multiplies noise, but at most half of the former, or a tenth of it without a speed loop.
 The two models cross over at an eighth of the rated electrical speed, the range of the paper's experiments; the
 compensation fades in from omega_min to half of that, because below it delta_lambda makes much of small voltages.
+
+Protection: without a key, the limits lie where no healthy drive comes: overcurrent at twice the current limit, the sum
+of the currents at a fifth of the rated current, the bus at a tenth and 1.3 times its nominal value, no sample for 1.5
+periods.  The position may be away from where the last turn a sample foretells by 5e-4 turn and four codes: no shaft
+accelerates that much in a sample, and a code that freezes is seen from that turn a sample on.
 """
 
 import math
 from typing import NamedTuple
 
+from golden_model.formats import LIMIT
+from golden_model.protection.fault_latch import NAMES
+from golden_model.protection.sample_checks import IGNORE
 from golden_model.units import TURN_RAD
 
 INTEGRAL_CORNER = 5.0  # speed crossover over the corner of the speed regulator's integral
@@ -40,6 +48,10 @@ PSI_STEP, PSI_FROM = (
     0.01,
     0.1,
 )  # 2*eta*omega**2 at rated speed; part of rated speed from which psi_m is estimated
+TRIP_OF_LIMIT, TRIP_OF_RANGE = 2.0, 0.98  # overcurrent: of the current limit, at most of the sensors' range
+SUM_OF_RATED = 0.2  # of the rated current: sensors that disagree by more are not believed
+BUS_LOW, BUS_HIGH = 0.1, 1.3  # of the nominal bus voltage
+JUMP_CODES, JUMP_TURN = 4, 5e-4  # of the position, per sample: what the code's steps make, and noise of a sensor
 ROUND_UP = ("dead_time", "min_pulse")  # times that must not come out shorter than asked
 
 
@@ -266,4 +278,37 @@ def gates(drive):
         yield Entry(name, getattr(drive.inverter, f"{name}_s"), "s", 1.0 / drive.core.clock_hz, keys)
 
 
-PARTS = (sensing, speed_loop, current_loop, flux_estimator, vsi_estimators, gates)
+def protection(drive):
+    """What turns the gates off: see golden_model/protection."""
+    p, s, b, m = drive.protection, drive.sensors, drive.bases, drive.machine
+    amperes, volts = base_keys(drive, "current_a"), base_keys(drive, "voltage_v")
+    limit, bus = drive.current_limit_a, drive.inverter.dc_bus_v
+    keys = "[machine] rated_current_a" if drive.control.current_limit_a is None else "[control] current_limit_a"
+    most = max(limit, min(TRIP_OF_LIMIT * limit, TRIP_OF_RANGE * s.current_range_a))
+    yield _limit("i_trip", p.current_trip_a, most, "A", b.current_a, "current_trip_a", keys, amperes)
+    keys, most = "[machine] rated_current_a", SUM_OF_RATED * m.rated_current_a
+    yield _limit("sum_trip", p.current_sum_trip_a, most, "A", b.current_a, "current_sum_trip_a", keys, amperes)
+    yield Entry("rail_samples", p.rail_samples, "1", 1.0, "[protection] rail_samples")
+    keys = "[inverter] dc_bus_v"
+    yield _limit("u_dc_min", p.u_dc_min_v, BUS_LOW * bus, "V", b.voltage_v, "u_dc_min_v", keys, volts)
+    most = max(bus, min(BUS_HIGH * bus, TRIP_OF_RANGE * s.u_dc_range_v))
+    yield _limit("u_dc_max", p.u_dc_max_v, most, "V", b.voltage_v, "u_dc_max_v", keys, volts)
+    jump, keys = JUMP_CODES / 2.0**s.position_bits + JUMP_TURN, "[sensors] position_bits"
+    if p.position_jump_rad is not None:
+        jump, keys = p.position_jump_rad / TURN_RAD, "[protection] position_jump_rad"
+    yield Entry("jump_max", jump, "turn", 1.0, keys)
+    ignored = sum((not getattr(p, f"trip_{name}")) << bit for bit, name in enumerate(NAMES[: IGNORE.width]))
+    yield Entry("fault_ignore", ignored, "1", 1.0, "[protection] trip_...")
+    keys = "[protection] watchdog_periods; [inverter] pwm_frequency_hz; [core] clock_hz"
+    yield Entry("watchdog", p.watchdog_periods * drive.sample_time_s, "s", 1.0 / drive.core.clock_hz, keys)
+
+
+def _limit(name, given, default, unit, base, key, default_keys, base_names):
+    """A limit in 1/256 of its base, as given or a default, which is moved to what the format can hold."""
+    if given is not None:
+        return Entry(name, given, unit, base, f"[protection] {key}; {base_names}")
+    default = min(max(default, LIMIT.lsb * base), LIMIT.hi * LIMIT.lsb * base)
+    return Entry(name, default, unit, base, f"{default_keys}; {base_names}")
+
+
+PARTS = (sensing, speed_loop, current_loop, flux_estimator, vsi_estimators, gates, protection)

@@ -7,7 +7,9 @@
 -- Formats: per unit, see golden_model/formats.py; registers as `fluxproof registers drive.toml` prints them.
 -- Latency: sample_valid to duty_valid FLUXPROOF_SAMPLE_TO_DUTY clocks; samples at least
 -- FLUXPROOF_SAMPLE_INTERVAL apart.
--- Registers change only between samples; dead_time and min_pulse at any time, they are taken over at the valley.
+-- Registers change only between samples; dead_time and min_pulse at any time, they are taken over at the valley;
+-- watchdog and fault_ignore at any time.
+-- Protection: a sample that comes too early is not let in; a bad sample, a missing one and trip turn the gates off.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -93,11 +95,23 @@ entity fluxproof is
     k_delay         : in  unsigned(16 downto 0);  -- turns per unit of speed
     min_pulse       : in  unsigned(11 downto 0);  -- shortest pulse of a leg, clocks
     dead_time       : in  unsigned(11 downto 0);  -- both gates of a leg off, clocks
+    watchdog        : in  unsigned(19 downto 0);  -- longest time without a sample, clocks
+    i_trip          : in  unsigned(LIMIT_W - 1 downto 0);  -- phase current that trips
+    sum_trip        : in  unsigned(LIMIT_W - 1 downto 0);  -- sum of the phase currents that trips
+    rail_samples    : in  unsigned(3 downto 0);  -- samples at the rail that trip
+    u_dc_min        : in  unsigned(LIMIT_W - 1 downto 0);  -- bus voltage below which it trips
+    u_dc_max        : in  unsigned(LIMIT_W - 1 downto 0);  -- bus voltage that trips
+    jump_max        : in  unsigned(11 downto 0);  -- change of the turn a sample that trips
+    fault_ignore    : in  unsigned(6 downto 0);  -- bit x: fault x is told and does not trip
     gate_high       : out unsigned(2 downto 0);  -- upper gates, bit 0 is leg a
     gate_low        : out unsigned(2 downto 0);  -- lower gates, bit 0 is leg a
     sample_trigger  : out std_logic;  -- middle of the zero vector: take a sample
     running         : out std_logic;  -- gates are switching
     tripped         : out std_logic;  -- a trip is remembered
+    sample_busy     : out std_logic;  -- a sample enters or is in flight: registers must not change
+    fault_flags     : out unsigned(8 downto 0);  -- what has happened, see fault_latch
+    first_fault     : out unsigned(7 downto 0);  -- which of them came first
+    early_samples   : out unsigned(7 downto 0);  -- samples that were not let in
     setting_refused : out std_logic;  -- dead_time and min_pulse contradict each other
     min_pulse_used  : out unsigned(11 downto 0);  -- minimum pulse in force
     carrier         : out unsigned(15 downto 0);  -- carrier, for observation
@@ -158,6 +172,8 @@ entity fluxproof is
     psi_m           : out signed(PU_W - 1 downto 0);  -- flux linkage of the magnets
     psi_held        : out std_logic;  -- 1: psi_m is held
     temp_lost       : out std_logic;  -- 1: no believable temperature, r is r_s
+    sample_faults   : out unsigned(5 downto 0);  -- what is wrong with this sample, see sample_checks
+    sample_trip     : out std_logic;  -- any of them trips
     compare_a       : out unsigned(15 downto 0);  -- compare value, leg a
     compare_b       : out unsigned(15 downto 0);  -- compare value, leg b
     compare_c       : out unsigned(15 downto 0)  -- compare value, leg c
@@ -239,7 +255,33 @@ architecture rtl of fluxproof is
   signal s_beta               : signed(PU_W - 1 downto 0);
   signal comp_valid           : std_logic;
   signal period_valid         : std_logic;
+  signal guard_busy           : std_logic;
+  signal sample_entered       : std_logic;
+  signal sample_early         : std_logic;
+  signal sample_late          : std_logic;
+  signal fault_stop           : std_logic;
+  signal gate_trip            : std_logic;
+  signal gate_clear           : std_logic;
 begin
+
+  guard : entity work.sample_guard
+    generic map (
+      INTERVAL => FLUXPROOF_SAMPLE_INTERVAL
+    )
+    port map (
+      clk           => clk,
+      rst           => rst,
+      sample_valid  => sample_valid,
+      clear_trip    => clear_trip,
+      watchdog      => watchdog,
+      sample_busy   => guard_busy,
+      sample_early  => sample_early,
+      sample_late   => sample_late,
+      early_samples => early_samples
+    );
+
+  sample_entered <= sample_valid and not guard_busy;
+  sample_busy    <= sample_valid or guard_busy;
 
   latch : entity work.sample_latch
     generic map (
@@ -249,7 +291,7 @@ begin
     port map (
       clk             => clk,
       rst             => rst,
-      in_valid        => sample_valid,
+      in_valid        => sample_entered,
       adc_a           => adc_a,
       adc_b           => adc_b,
       adc_c           => adc_c,
@@ -905,6 +947,53 @@ begin
       flux_faults          => flux_faults
     );
 
+  checks : entity work.sample_checks
+    generic map (
+      POSITION_BITS => POSITION_BITS
+    )
+    port map (
+      clk             => clk,
+      rst             => rst,
+      in_valid        => current_valid,
+      i_a             => i_a,
+      i_b             => i_b,
+      i_c             => i_c,
+      current_at_rail => current_at_rail,
+      u_dc            => u_dc,
+      u_dc_at_rail    => u_dc_at_rail,
+      code_theta      => code_theta,
+      i_trip          => i_trip,
+      sum_trip        => sum_trip,
+      rail_samples    => rail_samples,
+      u_dc_min        => u_dc_min,
+      u_dc_max        => u_dc_max,
+      jump_max        => jump_max,
+      fault_ignore    => fault_ignore,
+      out_valid       => open,
+      sample_faults   => sample_faults,
+      sample_trip     => sample_trip
+    );
+
+  fault_memory : entity work.fault_latch
+    port map (
+      clk           => clk,
+      rst           => rst,
+      trip          => trip,
+      sample_faults => sample_faults,
+      sample_late   => sample_late,
+      sample_early  => sample_early,
+      enable        => enable,
+      clear_trip    => clear_trip,
+      fault_ignore  => fault_ignore,
+      fault_flags   => fault_flags,
+      first_fault   => first_fault,
+      fault_stop    => fault_stop,
+      gate_clear    => gate_clear
+    );
+
+  -- A bad sample need not wait for the fault memory; without enable the gates are off, and nothing is remembered.
+  gate_trip <= trip or fault_stop or (sample_trip and enable);
+
   gates : entity work.gate_generation
     generic map (
       CARRIER_HALF => CARRIER_HALF
@@ -916,8 +1005,8 @@ begin
       compare_b       => compare_b,
       compare_c       => compare_c,
       enable          => enable,
-      trip            => trip,
-      clear_trip      => clear_trip,
+      trip            => gate_trip,
+      clear_trip      => gate_clear,
       dead_time       => dead_time,
       min_pulse       => min_pulse,
       gate_high       => gate_high,

@@ -16,9 +16,9 @@ import numpy as np
 from golden_model import fluxproof
 from golden_model.io import sample_latch
 from golden_model.kernel import kernel
-from golden_model.modulation import gate_generation
 from plant import Inverter, Machine, Sensors, SwitchingPlant, centred_gates, sensor_params
 from plant.sensors import current_code, position_code, u_dc_code
+from scripts.golden_clock import SEEN, GoldenClock
 
 INPUT_PORTS = tuple(p.name for p in sample_latch.BLOCK.inputs if p.name != "run_in")
 SAMPLE_DELAY = 4  # clocks from sample_trigger to sample_valid: what a converter would take, shortened
@@ -78,6 +78,7 @@ class Period:
     clocks: int
     sample_to_duty: int
     running: int  # when the sample was taken
+    flags: tuple[int, ...] = ()  # FLAGS at the end
 
 
 class Device(Protocol):
@@ -93,57 +94,39 @@ class Device(Protocol):
         """Set registers, now, between two periods."""
 
 
-@kernel
-def gate_period(
-    state, compare_a, compare_b, compare_c, enable, dead_time, min_pulse, carrier_half, word, clocks, words
-):
-    """Golden gates from one sample_trigger to the next: (state, running, last word, edges written, clocks).
-
-    ``clocks``, ``words`` receive the edges; ``word`` is the gate word in force, six bits, upper gates first.
-    """
-    edges = 0
-    for clock in range(1, 4 * carrier_half):
-        state, out = gate_generation.step(
-            state, compare_a, compare_b, compare_c, enable, 0, 0, dead_time, min_pulse, carrier_half
-        )
-        now = out[0] + 8 * out[1]
-        if now != word:
-            word = now
-            clocks[edges], words[edges] = clock, now
-            edges += 1
-        if out[2]:
-            return state, out[3], word, edges, clock
-    return state, -1, word, edges, -1
+def gate_words(seen: np.ndarray) -> np.ndarray:
+    """Six bits, upper gates first, after every clock of GoldenClock.advance."""
+    return seen[:, SEEN.index("gate_high")] + 8 * seen[:, SEEN.index("gate_low")]
 
 
-class GoldenGates:
-    """The golden gate generator as a period machine; an edge on the last clock belongs to the next period."""
+FLAGS = ("fault_flags", "first_fault", "early_samples")
 
-    def __init__(self, registers, carrier_half: int):
-        self.state, self.word, self.carried = gate_generation.BLOCK.state, 0, None
-        self.registers, self.carrier_half = registers, carrier_half
-        self.clocks, self.words = np.zeros(64, np.int64), np.zeros(64, np.int64)
 
-    def run(self, compare: tuple[int, int, int], enable: int) -> tuple[np.ndarray, np.ndarray, int, int]:
-        """One period: (edge clocks, gate words, clocks, running at its end)."""
-        start = self.word
-        self.state, running, self.word, count, length = gate_period(
-            self.state,
-            *compare,
-            enable,
-            self.registers.dead_time,
-            self.registers.min_pulse,
-            self.carrier_half,
-            start,
-            self.clocks,
-            self.words,
-        )
-        edges = [(int(c), int(w)) for c, w in zip(self.clocks[:count], self.words[:count], strict=True)]
+class GoldenPeriods:
+    """The golden core as a period machine; an edge on the last clock belongs to the next period."""
+
+    def __init__(self, register_set):
+        self.core = GoldenClock(register_set.values, register_set.config)
+        self.word, self.carried = 0, None
+
+    def run(self, inputs: dict[str, int] | None, enable: int) -> Period:
+        """From this sample_trigger to the next, with the sample where there is one."""
+        core, limit, seen, running = self.core, 4 * self.core.config.carrier_half, [], 0
+        if inputs is not None:
+            seen = [core.advance(SAMPLE_DELAY, enable=enable)]
+            running = core.running
+        seen.append(core.advance(limit, inputs, until_trigger=True, enable=enable))
+        seen = np.concatenate(seen)
+        words = gate_words(seen)
+        clocks = np.flatnonzero(np.diff(words, prepend=self.word))
+        edges = [(int(c) + 1, int(words[c])) for c in clocks]
+        self.word, length = int(words[-1]), len(seen)
         if self.carried is not None:
             edges.insert(0, (0, self.carried))
         self.carried = edges.pop()[1] if edges and edges[-1][0] == length else None
-        clocks = np.array([c for c, _ in edges], np.int64)
-        return clocks, np.array([w for _, w in edges], np.int64), int(length), int(running)
+        columns = np.array(edges, np.int64).reshape(-1, 2).T
+        flags = tuple(int(seen[-1, SEEN.index(name)]) for name in FLAGS)
+        return Period(None, columns[0], columns[1], length, 0, running, flags)
 
 
 @dataclass
@@ -195,9 +178,8 @@ class Beside:
     """A device with the golden model beside it: both get the same samples, every period is compared."""
 
     def __init__(self, device: Device, register_set):
-        self.device, self.registers, self.config = device, register_set.values, register_set.config
-        self.gates = GoldenGates(self.registers, self.config.carrier_half)
-        self.state, self.running, self.result = fluxproof.State(), 0, Result()
+        self.device, self.config = device, register_set.config
+        self.golden, self.result = GoldenPeriods(register_set), Result()
         self.observed: list[fluxproof.Observed] = []
         self.edges: list[tuple[int, int, int]] = []
 
@@ -208,25 +190,20 @@ class Beside:
 
     def change(self, registers: Mapping[str, int]) -> None:
         """Set registers of both between two periods."""
-        self.registers = self.registers._replace(**registers)
-        self.gates.registers = self.registers
+        self.golden.core.registers = self.golden.core.registers._replace(**registers)
         self.device.change(registers)
 
     async def start(self, enable: int) -> None:
         """Reset and run to the first sample_trigger."""
-        got = await self.device.start(self.registers, enable)
-        _clocks, words, _length, self.running = self.gates.run((0, 0, 0), enable)
-        if not np.array_equal(got.gate_words, words):
+        got = await self.device.start(self.golden.core.registers, enable)
+        if not np.array_equal(got.gate_words, self.golden.run(None, enable).gate_words):
             self.differ("gates before the first sample")
 
     async def period(self, inputs: dict[str, int], enable: int) -> Period:
         """One period on both; ``inputs`` by the names of INPUT_PORTS, in their order.  Returns the device's."""
-        run = self.running if enable else 0
-        sample = fluxproof.Sample(*inputs.values(), run)
-        self.state, golden = fluxproof.step(self.state, sample, self.registers, self.config)
-        clocks, words, length, self.running = self.gates.run(golden[-3:], enable)
-        got = await self.device.period(inputs, enable)
-        self.compare(got, golden, Period(None, clocks, words, length, 0, run))
+        wanted = self.golden.run(inputs, enable)
+        got, golden = await self.device.period(inputs, enable), self.golden.core.observed
+        self.compare(got, golden, wanted)
         k = len(self.observed)
         self.edges += [(k, int(c), int(w)) for c, w in zip(got.edge_clocks, got.gate_words, strict=True)]
         self.observed.append(golden)
@@ -242,9 +219,9 @@ class Beside:
                 self.differ(f"{name}: got {got.observed[name]}, wanted {value}")
         if _edges(got) != _edges(wanted):
             self.differ(f"gate edges: got {_edges(got)}, wanted {_edges(wanted)}")
-        if (got.clocks, got.running) != (wanted.clocks, wanted.running):
-            seen, right = (got.clocks, got.running), (wanted.clocks, wanted.running)
-            self.differ(f"clocks, running: got {seen}, wanted {right}")
+        seen, right = ((p.clocks, p.running, *p.flags) for p in (got, wanted))
+        if seen != right:
+            self.differ(f"clocks, running, {', '.join(FLAGS)}: got {seen}, wanted {right}")
         self.result.sample_to_duty_clocks = max(self.result.sample_to_duty_clocks, got.sample_to_duty)
 
     def finish(self) -> Result:

@@ -16,7 +16,7 @@ from typing import NamedTuple
 from diagnosis import command as diagnose
 from diagnosis.recording import RecordingError
 from golden_model.drive_keys import DriveError
-from scripts import print_registers
+from scripts import dump_capture, print_registers
 
 
 class Command(NamedTuple):
@@ -29,6 +29,9 @@ class Command(NamedTuple):
 
 COMMANDS = {
     "diagnose": Command("why a recording differs from its simulation", diagnose.arguments, diagnose.run),
+    "dump": Command(
+        "a captured telemetry stream to what diagnose takes", dump_capture.arguments, dump_capture.run
+    ),
     "registers": Command("the registers for a drive", print_registers.arguments, print_registers.run),
 }
 

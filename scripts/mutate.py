@@ -1,6 +1,7 @@
 """`make mutate`: plants the defects of scripts/mutants.py in copies of the RTL, one by one; the suite must notice.
 
-A block's mutant faces that block's bench, with every configuration; a mutant of the top faces the closed loop.
+A block's mutant faces that block's bench, with every configuration; a mutant of the top faces the faults and the
+closed loop; one of the registers faces their traffic on the bus; see OWN_BENCH for what surrounds the core.
 Writes build/mutate/result.json.  Exit status 1 when one survives.
 """
 
@@ -14,7 +15,7 @@ import time
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 
-from cocotb_tests import simulate
+from cocotb_tests import dut_faults, dut_registers, simulate
 from golden_model.registry import BLOCKS
 from scripts.files import BUILD, ROOT, write_json
 from scripts.mutants import MUTANTS
@@ -38,16 +39,34 @@ def plant(number: int) -> Path:
     return tree
 
 
+# Entities whose bench is their own: {entity: (cocotb module, generics, environment)}.
+OWN_BENCH = {
+    "power_stage": ("cocotb_tests.dut_power_stage", {}, {}),
+    "fluxproof_axi": (
+        "cocotb_tests.dut_axi_loop",
+        {"CARRIER_HALF": 128, "CLOCK_HZ": 2_560_000},
+        {"FLUXPROOF_DRIVE": str(DRIVE), "FLUXPROOF_CARRIER_HALF": "128", "FLUXPROOF_CLOCK_HZ": "2560000"},
+    ),
+}
+
+
 def runs(file: str):
     """(toplevel, cocotb module, generics, environment) of every run that may notice a defect in ``file``."""
     name = Path(file).stem
+    if name in ("axi_lite_slave", "register_access", "register_file", "register_map_pkg"):
+        yield dut_registers.RUN
+        return
     if name == "fluxproof":
         environment = {
             "FLUXPROOF_DRIVE": str(DRIVE),
             "FLUXPROOF_CARRIER_HALF": "128",
             "FLUXPROOF_SCENARIO": "everything",
         }
+        yield name, "cocotb_tests.dut_faults", {"CARRIER_HALF": dut_faults.CARRIER_HALF}, {}
         yield name, "cocotb_tests.dut_loop", {"CARRIER_HALF": 128}, environment
+        return
+    if name in OWN_BENCH:
+        yield name, *OWN_BENCH[name]
         return
     block = BLOCKS[name]
     for k, config in enumerate(block.configs):

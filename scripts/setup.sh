@@ -49,6 +49,7 @@ missing_packages() {
     command -v g++ >/dev/null || missing+=(g++)
     command -v gcc >/dev/null || missing+=(gcc)
     command -v make >/dev/null || missing+=(make)
+    command -v tclsh >/dev/null || missing+=(tcl)
     [ -e /usr/include/zlib.h ] || missing+=(zlib1g-dev)
     perl -MPod::Usage -MGetopt::Long -MFindBin -e 1 2>/dev/null || missing+=(perl)
     printf '%s\n' "${missing[@]}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Collection
 from graphlib import TopologicalSorter
 from pathlib import Path
 
@@ -14,14 +15,18 @@ _UNIT = re.compile(r"^\s*(package|entity)\s+(\w+)\s+is\b", re.IGNORECASE | re.MU
 _USE = re.compile(r"\bwork\.(\w+)", re.IGNORECASE)
 
 
-def rtl_sources(rtl: Path = RTL) -> list[Path]:
+def rtl_sources(rtl: Path = RTL, without: Collection[str] = ()) -> list[Path]:
     """Every ``*.vhd`` under ``rtl``: packages first, then each entity behind those it instantiates.
 
     Dependencies are all mentions of ``work.NAME``, which covers ``use work.P.all`` and ``entity work.E``.
-    The order is the same on every machine.  Raises ValueError where two files declare the same unit, and
-    graphlib.CycleError where files need each other.
+    The order is the same on every machine; ``without``: names of files that are left out.  Raises ValueError where
+    two files declare the same unit, and graphlib.CycleError where files need each other.
     """
-    texts = {path: _COMMENT.sub("", path.read_text()) for path in sorted(rtl.rglob("*.vhd"))}
+    texts = {
+        path: _COMMENT.sub("", path.read_text())
+        for path in sorted(rtl.rglob("*.vhd"))
+        if path.name not in without
+    }
     declared_by: dict[str, Path] = {}
     packages = set()
     for path, text in texts.items():

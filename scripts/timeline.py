@@ -24,6 +24,7 @@ COLOURS = {
     "control": "#e76f51",
     "modulation": "#264653",
     "estimators": "#8e5ea2",
+    "protection": "#c9a227",
 }
 
 

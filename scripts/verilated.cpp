@@ -2,15 +2,16 @@
 //
 // One source for every set of generics: scripts/verilated.py writes ports.inc with a line
 //     PORT(name, width, is_signed)
-// for each port of the top.  Functions name a port by its line number, from 0.
+// for each port of the top, and defines CORE_CLOCK, the name of its clock, and CORE_SHOWS_VALIDS where it has
+// duty_valid and values_valid.  Functions name a port by its line number, from 0.
 //
-// A tick is one rising edge of clk: inputs set before it are seen by it, outputs read after it are what the
+// A tick is one rising edge of the clock: inputs set before it are seen by it, outputs read after it are what the
 // registers hold from this edge on.
 
 #include <cstdint>
 #include <memory>
 
-#include "Vfluxproof.h"
+#include "Vcore.h"
 #include "verilated.h"
 
 namespace {
@@ -50,7 +51,7 @@ struct Port {
 
 struct Core {
     VerilatedContext context;
-    Vfluxproof top{&context, "fluxproof"};
+    Vcore top{&context, "core"};
     int64_t clock = 0;       // ticks since construction
     uint8_t reported = 0;    // gate word that the last run_period ended with
     const Port ports[sizeof(
@@ -71,9 +72,9 @@ struct Core {
     ~Core() { top.final(); }
 
     void tick() {
-        top.clk = 1;
+        top.CORE_CLOCK = 1;
         top.eval();
-        top.clk = 0;
+        top.CORE_CLOCK = 0;
         top.eval();
         ++clock;
     }
@@ -130,7 +131,7 @@ void core_read(const Core* core, const int32_t* ports, int64_t count, int64_t* v
 // duty_valid was high, and values_valid (0: none).
 int64_t core_run_period(Core* core, int64_t most, int64_t sample_at, int32_t* clocks, uint8_t* words,
                         int64_t* facts) {
-    Vfluxproof& top = core->top;
+    Vcore& top = core->top;
     int64_t found = 0;
     const auto look = [&](int64_t k) {
         const uint8_t word = core->gate_word();
@@ -147,8 +148,10 @@ int64_t core_run_period(Core* core, int64_t most, int64_t sample_at, int32_t* cl
         top.sample_valid = k == sample_at;
         core->tick();
         look(k);
+#ifdef CORE_SHOWS_VALIDS
         if (top.duty_valid) facts[1] = k;
         if (top.values_valid) facts[2] = k;
+#endif
         if (top.sample_trigger) break;
     }
     top.sample_valid = 0;

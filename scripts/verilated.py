@@ -6,7 +6,7 @@
     clocks, edge_clocks, gate_words = core.run_period(30000, sample={"adc_a": 32768, ...}, sample_at=50)
 
 Values are the integers on the ports, signed where the VHDL says so.  Time is counted in ticks, that is rising
-edges of ``clk``: what is set before a tick is seen by it, what is read after a tick holds from that edge on.
+edges of the clock: what is set before a tick is seen by it, what is read after a tick holds from that edge on.
 """
 
 from __future__ import annotations
@@ -35,7 +35,9 @@ WRAPPER = Path(__file__).with_suffix(".cpp")
 LIBRARY = "libcore.so"
 
 # Registers without a reset start as 0; what the VHDL calls 'U' there is the business of the comparing test.
-VERILATOR_FLAGS = "--cc -O3 --x-assign fast --x-initial fast --no-assert -Wno-lint -Wno-fatal".split()
+# GHDL writes Verilog, in which SystemVerilog's words (final, ...) are names like any other.
+VERILATOR_FLAGS = "--cc --language 1364-2005 -O3 --x-assign fast --x-initial fast".split()
+VERILATOR_FLAGS += "--no-assert -Wno-lint -Wno-fatal".split()
 DEFINES = ["VERILATOR=1", "VL_IGNORE_UNKNOWN_ARCH"]
 DEFINES += [f"VM_{x}=0" for x in "COVERAGE SC TIMING TRACE TRACE_FST TRACE_VCD TRACE_SAIF".split()]
 COMPILE = ["-std=gnu++17", "-fPIC", "-fno-semantic-interposition", "-w", *(f"-D{name}" for name in DEFINES)]
@@ -83,12 +85,24 @@ def _locked(path: Path) -> Iterator[None]:
         yield
 
 
-def _compile(folder: Path, ports: Iterable[VerilogPort]) -> None:
-    """Turns ``folder``/fluxproof.v into ``folder``/libcore.so."""
+def _defines(names: Iterable[str]) -> list[str]:
+    """What verilated.cpp must know of a top with these ports."""
+    valids = ["-DCORE_SHOWS_VALIDS"] if {"duty_valid", "values_valid"} <= set(names) else []
+    return [f"-DCORE_CLOCK={_clock(names)}", *valids]
+
+
+def _clock(names: Iterable[str]) -> str:
+    """The clock among the ports."""
+    return "clk" if "clk" in names else "aclk"
+
+
+def _compile(folder: Path, top: str, ports: tuple[VerilogPort, ...]) -> None:
+    """Turns ``folder``/``top``.v into ``folder``/libcore.so."""
     verilator, _, root = find_verilator()
     compiler = _compiler()
+    defines = _defines([p.name for p in ports])
     (folder / "ports.inc").write_text("".join(f"PORT({p.name}, {p.width}, {int(p.signed)})\n" for p in ports))
-    _run([verilator, *VERILATOR_FLAGS, "--Mdir", "obj", "--top-module", TOP, f"{TOP}.v"], folder)
+    _run([verilator, *VERILATOR_FLAGS, "--Mdir", "obj", "--prefix", "Vcore", "--top-module", top, f"{top}.v"], folder)
     model = sorted(folder.glob("obj/*.cpp"))
     parts = {
         HOT: [WRAPPER, *(path for path in model if "Slow" not in path.name)],
@@ -101,18 +115,18 @@ def _compile(folder: Path, ports: Iterable[VerilogPort]) -> None:
     for level, sources in parts.items():
         # A folder each: the compiler names an object after its source, and two are called verilated.cpp.
         (folder / level).mkdir()
-        _run([compiler, *COMPILE, level, *includes, "-c", *map(str, sources)], folder / level)
+        _run([compiler, *COMPILE, *defines, level, *includes, "-c", *map(str, sources)], folder / level)
         objects += sorted(str(path) for path in (folder / level).glob("*.o"))
     # The hot objects stay first: of an inline function compiled in several, the linker keeps the first.
     _run([compiler, "-shared", "-pthread", "-o", LIBRARY, *objects], folder)
 
 
-def build(generics: Mapping[str, int], rtl: Path = RTL) -> Path:
-    """The folder with libcore.so and fluxproof.v for these generics, made if it is not there yet.
+def build(generics: Mapping[str, int], rtl: Path = RTL, top: str = TOP) -> Path:
+    """The folder with libcore.so and ``top``.v for these generics, made if it is not there yet.
 
     Processes that want the same one wait for the first; a folder appears under its name only when complete.
     """
-    verilog = convert(generics, ROOT / "build" / "verilog" / conversion_key(generics, rtl), rtl)
+    verilog = convert(generics, ROOT / "build" / "verilog" / conversion_key(generics, rtl, top), rtl, top)
     tools = (find_verilator()[1], _compiler(), VERILATOR_FLAGS, COMPILE, HOT, SLOW, LIBRARY_LEVEL)
     # The text, not the VHDL, is what gets compiled: someone may be editing the VHDL just now.
     text = verilog.read_bytes()
@@ -123,11 +137,11 @@ def build(generics: Mapping[str, int], rtl: Path = RTL) -> Path:
         if not folder.exists():
             with tempfile.TemporaryDirectory(prefix=f"{folder.name}.", dir=CACHE) as scratch:
                 work = Path(scratch)
-                (work / f"{TOP}.v").write_bytes(text)
-                _compile(work, top_ports(work / f"{TOP}.v", rtl))
+                (work / f"{top}.v").write_bytes(text)
+                _compile(work, top, top_ports(work / f"{top}.v", rtl, top))
                 finished = work / "finished"
                 finished.mkdir()
-                for name in (LIBRARY, f"{TOP}.v"):
+                for name in (LIBRARY, f"{top}.v"):
                     os.replace(work / name, finished / name)
                 os.replace(finished, folder)
     return folder
@@ -161,12 +175,16 @@ def _load(path: Path) -> ctypes.CDLL:
 
 
 class VerilatedCore:
-    """One core with all inputs 0, before its first clock; as many as wanted may live side by side."""
+    """One core with all inputs 0, before its first clock; as many as wanted may live side by side.
 
-    def __init__(self, generics: Mapping[str, int] | None = None, rtl: Path = RTL):
+    ``top`` is the entity: the core, or the AXI top around it, which does not show the two valids.
+    """
+
+    def __init__(self, generics: Mapping[str, int] | None = None, rtl: Path = RTL, top: str = TOP):
         self._handle = None
-        folder = build(dict(generics or {}), rtl)
-        self.ports = {p.name: p for p in top_ports(folder / f"{TOP}.v", rtl)}
+        folder = build(dict(generics or {}), rtl, top)
+        self.ports = {p.name: p for p in top_ports(folder / f"{top}.v", rtl, top)}
+        self.clock_name = _clock(self.ports)
         self.inputs = tuple(name for name, p in self.ports.items() if p.is_input)
         self.outputs = tuple(name for name, p in self.ports.items() if not p.is_input)
         self._index = {name: k for k, name in enumerate(self.ports)}
@@ -194,7 +212,7 @@ class VerilatedCore:
     def set(self, name: str, value: int) -> None:
         """Drives an input from the next tick on; ValueError where the value does not fit the port."""
         port, value = self.ports[name], int(value)
-        if not port.is_input or name == "clk":
+        if not port.is_input or name == self.clock_name:
             raise ValueError(f"{name} is not an input to set")
         if not port.low <= value <= port.high:
             raise ValueError(f"{name}={value} does not fit {port.low} .. {port.high}")
@@ -230,10 +248,11 @@ class VerilatedCore:
         self._library.core_tick(self._handle, n)
 
     def reset(self, n: int = 4) -> None:
-        """``n`` clocks with rst high; rst is low afterwards, the other inputs stay."""
-        self.set("rst", 1)
+        """``n`` clocks of reset, which is over afterwards; the other inputs stay."""
+        name, on = ("rst", 1) if "rst" in self.ports else ("aresetn", 0)
+        self.set(name, on)
         self.tick(n)
-        self.set("rst", 0)
+        self.set(name, 1 - on)
 
     def clocks_until(self, name: str, most: int) -> int:
         """Ticks, at least once, until port ``name`` is not 0: how many; TimeoutError beyond ``most``."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from golden_model.fluxproof import Config, Observed
-from scripts.cosim import SAMPLE_DELAY, Period
+from scripts.cosim import FLAGS, SAMPLE_DELAY, Period
 from scripts.verilated import VerilatedCore
 
 
@@ -41,4 +41,5 @@ class VerilatedDevice:
         self.carried = [(0, w) for c, w in edges if c == clocks]
         edges = [(c, w) for c, w in edges if c != clocks]
         columns = np.array(edges, np.int64).reshape(-1, 2).T
-        return Period(observed, columns[0], columns[1], clocks, duty_clocks, running)
+        flags = tuple(self.core.get_many(FLAGS).values())
+        return Period(observed, columns[0], columns[1], clocks, duty_clocks, running, flags)

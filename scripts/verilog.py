@@ -95,30 +95,30 @@ def synthesize(sources: Sequence[Path], top: str, generics: Mapping[str, int]) -
     return done.stdout
 
 
-def conversion_key(generics: Mapping[str, int], rtl: Path = RTL) -> str:
+def conversion_key(generics: Mapping[str, int], rtl: Path = RTL, top: str = TOP) -> str:
     """16 hex digits that change with the sources, the generics and the version of GHDL."""
-    digest = hashlib.sha256(repr((find_ghdl()[1], TOP, sorted(generics.items()))).encode())
+    digest = hashlib.sha256(repr((find_ghdl()[1], top, sorted(generics.items()))).encode())
     for path in rtl_sources(rtl):
         digest.update(str(path.relative_to(rtl)).encode() + b"\0" + path.read_bytes())
     return digest.hexdigest()[:16]
 
 
-def convert(generics: Mapping[str, int], out_dir: Path | str, rtl: Path = RTL) -> Path:
-    """Writes ``out_dir``/fluxproof.v with these generics (the VHDL's defaults for the others) if it is stale.
+def convert(generics: Mapping[str, int], out_dir: Path | str, rtl: Path = RTL, top: str = TOP) -> Path:
+    """Writes ``out_dir``/``top``.v with these generics (the VHDL's defaults for the others) if it is stale.
 
     Safe beside another process that writes the same file: it appears complete or not at all.
     """
-    path = Path(out_dir) / f"{TOP}.v"
-    key = conversion_key(generics, rtl)
-    if _key_of(path) == key:
+    path = Path(out_dir) / f"{top}.v"
+    key = conversion_key(generics, rtl, top)
+    if _key_of(path, top) == key:
         return path
     text, converted = "", None
     while converted != key:  # once, unless someone saves a source meanwhile
         converted = key
-        text = synthesize(rtl_sources(rtl), TOP, generics)
-        key = conversion_key(generics, rtl)
+        text = synthesize(rtl_sources(rtl), top, generics)
+        key = conversion_key(generics, rtl, top)
     setting = ", ".join(f"{name}={value}" for name, value in generics.items()) or "as in the VHDL"
-    heading = f"// {TOP} {key}: converted from VHDL by GHDL {find_ghdl()[1]}; generics: {setting}\n"
+    heading = f"// {top} {key}: converted from VHDL by GHDL {find_ghdl()[1]}; generics: {setting}\n"
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_suffix(f".{os.getpid()}.tmp")
     temporary.write_text(heading + text)
@@ -126,22 +126,22 @@ def convert(generics: Mapping[str, int], out_dir: Path | str, rtl: Path = RTL) -
     return path
 
 
-def _key_of(path: Path) -> str | None:
+def _key_of(path: Path, top: str) -> str | None:
     """The key in the first line of a converted file, or None."""
     if not path.exists():
         return None
     with path.open() as file:
-        found = re.match(rf"// {TOP} (\w+):", file.readline())
+        found = re.match(rf"// {top} (\w+):", file.readline())
     return found.group(1) if found else None
 
 
-def top_ports(verilog: Path, rtl: Path = RTL) -> tuple[VerilogPort, ...]:
+def top_ports(verilog: Path, rtl: Path = RTL, top: str = TOP) -> tuple[VerilogPort, ...]:
     """The ports of the converted top in order: widths from the Verilog, signs from the VHDL entity."""
-    header = re.search(rf"^module {TOP}\s*\((.*?)\);", verilog.read_text(), re.MULTILINE | re.DOTALL)
-    entities = {name.lower(): body for name, body in _ENTITY.findall((rtl / f"{TOP}.vhd").read_text())}
-    if header is None or TOP not in entities:
-        raise ValueError(f"no {TOP} in {verilog.name}, or none in {TOP}.vhd")
-    kinds = {name.lower(): kind.lower() for name, kind in _VHDL_PORT.findall(entities[TOP])}
+    header = re.search(rf"^module {top}\s*\((.*?)\);", verilog.read_text(), re.MULTILINE | re.DOTALL)
+    entities = {name.lower(): body for name, body in _ENTITY.findall((rtl / f"{top}.vhd").read_text())}
+    if header is None or top not in entities:
+        raise ValueError(f"no {top} in {verilog.name}, or none in {top}.vhd")
+    kinds = {name.lower(): kind.lower() for name, kind in _VHDL_PORT.findall(entities[top])}
     ports = tuple(
         VerilogPort(name, int(msb or 0) + 1, kinds[name] == "signed", direction == "input")
         for direction, msb, name in _VERILOG_PORT.findall(header.group(1))

@@ -26,6 +26,7 @@ package fluxproof_pkg is
   constant FLUX_STATE_W : positive := 32;  -- S(1,30)
   constant RESISTANCE_W : positive := 24;  -- U(0,24)
   constant V_LEG_W : positive := 18;  -- S(-1,18)
+  constant LIMIT_W : positive := 9;  -- U(1,8)
   constant SAMPLE_TIME_W : positive := 17;  -- U(-1,18)
   constant PU_TO_INTEGRAL : natural := 12;
   constant PU_TO_FLUX : natural := 7;
@@ -36,6 +37,9 @@ package fluxproof_pkg is
   -- fluxproof: clocks from the raw sample to the duties, least distance of two samples
   constant FLUXPROOF_SAMPLE_TO_DUTY : positive := 39;
   constant FLUXPROOF_SAMPLE_INTERVAL : positive := 48;
+
+  -- register_access: clocks that a write waits for the end of a sample
+  constant REGISTER_PATIENCE : positive := 64;
 
   -- sqrt: 001, section 5.2: voltage limit of the current regulation
   constant SQRT_LATENCY : positive := 6;
@@ -470,5 +474,34 @@ package fluxproof_pkg is
   constant PSI_ADALINE_DROP_ETA : natural := 8;
   constant PSI_ADALINE_TO_FLUX : natural := 11;
   constant PSI_ADALINE_TO_PU : natural := 18;
+
+  -- packet_fifo: none: what a recording needs
+  constant PACKET_FIFO_LATENCY : positive := 1;
+
+  -- telemetry_words: none: what a recording needs
+  constant TELEMETRY_WORDS_LATENCY : positive := 2;
+  constant TELEMETRY_WORDS_COUNT : natural := 24;
+  constant TELEMETRY_WORDS_START : natural := 26;
+  constant TELEMETRY_WORDS_INDEX_W : natural := 5;
+
+  -- telemetry: none: what a recording needs
+  constant TELEMETRY_LATENCY : positive := 1;
+  constant TELEMETRY_AGE_W : natural := 6;
+
+  -- sample_guard: none: what a drive needs besides
+  constant SAMPLE_GUARD_LATENCY : positive := 1;
+  constant SAMPLE_GUARD_AHEAD : natural := 2;
+
+  -- sample_checks: none: what a drive needs besides
+  constant SAMPLE_CHECKS_LATENCY : positive := 1;
+  constant SAMPLE_CHECKS_DROP_LIMIT : natural := 8;
+  constant SAMPLE_CHECKS_DROP_JUMP : natural := 5;
+  constant SAMPLE_CHECKS_WARM : natural := 2;
+
+  -- fault_latch: none: what a drive needs besides
+  constant FAULT_LATCH_LATENCY : positive := 1;
+  constant FAULT_LATCH_LATE : natural := 6;
+  constant FAULT_LATCH_TRIP : natural := 7;
+  constant FAULT_LATCH_EARLY : natural := 8;
 
 end package fluxproof_pkg;

@@ -1,0 +1,108 @@
+"""What of the core runs at the clock: sample guard, fault memory and gates, wired as in rtl/fluxproof.vhd.
+
+One step is one clock; ``State`` holds the blocks' states and the registers between them.  ``compare_*``,
+``sample_faults`` and ``sample_trip`` come from fluxproof.step, ``COMPARE_CLOCKS`` and ``CHECKS_CLOCKS`` after the
+clock at which a sample has entered: from the step behind those on.
+"""
+
+from typing import NamedTuple
+
+from golden_model import fluxproof
+from golden_model.kernel import kernel
+from golden_model.modulation import gate_generation
+from golden_model.protection import fault_latch, sample_guard
+
+INTERVAL = fluxproof.SAMPLE_INTERVAL
+COMPARE_CLOCKS, CHECKS_CLOCKS = (fluxproof.schedule()[name][1] for name in ("compare", "checks"))
+
+
+class State(NamedTuple):
+    of_sample_guard: sample_guard.State = sample_guard.State()
+    of_fault_latch: fault_latch.State = fault_latch.State()
+    of_gate_generation: gate_generation.State = gate_generation.State()
+    # Outputs that the next clock reads
+    sample_busy: int = 0
+    sample_early: int = 0
+    sample_late: int = 0
+    fault_stop: int = 0
+    gate_clear: int = 0
+
+
+class Inputs(NamedTuple):
+    """What the clock sees of the core's inputs and of the sample that is worked on."""
+
+    sample_valid: int = 0
+    enable: int = 0
+    trip: int = 0
+    clear_trip: int = 0
+    sample_faults: int = 0
+    sample_trip: int = 0
+    compare_a: int = 0
+    compare_b: int = 0
+    compare_c: int = 0
+
+
+class Seen(NamedTuple):
+    """What the core shows after a clock, by the names of its ports."""
+
+    gate_high: int
+    gate_low: int
+    sample_trigger: int
+    running: int
+    tripped: int
+    fault_flags: int
+    first_fault: int
+    early_samples: int
+    setting_refused: int
+
+
+@kernel
+def step(state, inputs, regs, carrier_half):
+    """One clock: (next state, whether a sample has entered at it, Seen)."""
+    s, x, r = state, inputs, regs
+    guard_state, (sample_busy, sample_early, sample_late, early_samples) = sample_guard.step(
+        s.of_sample_guard, x.sample_valid, x.clear_trip, r.watchdog, INTERVAL
+    )
+    entered = 1 if x.sample_valid and not s.sample_busy else 0
+
+    latch_state, (fault_flags, first_fault, fault_stop, gate_clear) = fault_latch.step(
+        s.of_fault_latch,
+        x.trip,
+        x.sample_faults,
+        s.sample_late,
+        s.sample_early,
+        x.enable,
+        x.clear_trip,
+        r.fault_ignore,
+    )
+    gate_trip = 1 if x.trip or s.fault_stop or (x.sample_trip and x.enable) else 0
+
+    gate_state, (gate_high, gate_low, sample_trigger, running, tripped, setting_refused, _, _) = (
+        gate_generation.step(
+            s.of_gate_generation,
+            x.compare_a,
+            x.compare_b,
+            x.compare_c,
+            x.enable,
+            gate_trip,
+            s.gate_clear,
+            r.dead_time,
+            r.min_pulse,
+            carrier_half,
+        )
+    )
+    following = State(
+        guard_state, latch_state, gate_state, sample_busy, sample_early, sample_late, fault_stop, gate_clear
+    )
+    seen = Seen(
+        gate_high,
+        gate_low,
+        sample_trigger,
+        running,
+        tripped,
+        fault_flags,
+        first_fault,
+        early_samples,
+        setting_refused,
+    )
+    return following, entered, seen

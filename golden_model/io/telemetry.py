@@ -1,0 +1,137 @@
+"""An AXI4-Stream packet for every sample: what the core took in, what it answered, and the sample's number.
+
+A packet's words (telemetry_words) are taken from the core's live values, one a clock from TELEMETRY_WORDS_START clocks
+after the sample on, into a queue (packet_fifo) that the sink empties at its pace.
+
+* The controller never waits.  A sample whose packet does not fit into the queue has none: ``dropped`` counts it, up to
+  65535, and the reader sees the gap in the samples' numbers, which run on, modulo 2**32, from 0 after a reset.
+* ``enable`` is looked at before the first word: a packet once begun comes out whole.
+* As in the core a sample that comes less than SAMPLE_INTERVAL clocks after the last one is none; it is not counted.
+
+Formats: all as they come, see telemetry_words.
+"""
+
+from typing import NamedTuple
+
+from golden_model import fluxproof
+from golden_model.block import Block, Port
+from golden_model.common import packet_fifo
+from golden_model.fixed import Format
+from golden_model.formats import BIT
+from golden_model.io import sample_latch, telemetry_words
+from golden_model.io.telemetry_words import COUNT, FIELDS, INPUTS, PORTS, START, WORD
+
+INTERVAL = fluxproof.SAMPLE_INTERVAL
+DROPPED = Format(0, 16, 0)
+SHOWN = tuple(name for name in fluxproof.Observed._fields if name in FIELDS)
+
+
+class State(NamedTuple):
+    age: int = INTERVAL  # clocks since the sample, up to INTERVAL
+    counter: int = WORD.hi  # number of the sample
+    active: int = 0
+    index: int = 0
+    dropped: int = 0
+    sample: tuple = (0,) * len(INPUTS)
+    valid_1: int = 0
+    word_1: int = 0
+    last_1: int = 0
+    valid_2: int = 0
+    word_2: int = 0
+    last_2: int = 0
+    queue: packet_fifo.State = packet_fifo.State()
+
+
+def step(state, enable, sample_valid, m_axis_tready, *values):
+    """One clock; ``values``: the raw sample, the core's values in the order of SHOWN, generics behind them."""
+    s, depth_bits = state, values[-1]
+    raw, shown = values[: len(INPUTS)], values[len(INPUTS) : len(INPUTS) + len(SHOWN)]
+
+    taken = sample_valid and s.age == INTERVAL
+    sample = sample_latch.step.py_func(*raw) if taken else s.sample
+    age = 1 if taken else min(s.age + 1, INTERVAL)
+    counter = (s.counter + 1) & WORD.hi if taken else s.counter
+
+    active, index, dropped = s.active, s.index, s.dropped
+    if s.active:
+        index = s.index + 1
+        active = 0 if s.index == COUNT - 1 else 1
+    if s.age == START - 1 and enable:
+        if packet_fifo.room(s.queue, depth_bits, COUNT):
+            active, index = 1, 0
+        else:
+            dropped = min(s.dropped + 1, DROPPED.hi)
+
+    word_1, last_1, word_2, last_2 = s.word_1, s.last_1, s.word_2, s.last_2
+    if s.active:
+        fields = {**dict(zip(INPUTS, s.sample, strict=True)), **dict(zip(SHOWN, shown, strict=True))}
+        (word_1,) = telemetry_words.step(s.index, s.counter, *(fields[name] for name in FIELDS))
+        last_1 = 1 if s.index == COUNT - 1 else 0
+    if s.valid_1:
+        word_2, last_2 = s.word_1, s.last_1
+    queue, (tvalid, tdata, tlast, _) = packet_fifo.step(
+        s.queue, s.valid_2, s.word_2, s.last_2, m_axis_tready, WORD.width, depth_bits, COUNT
+    )
+    following = State(
+        age, counter, active, index, dropped, sample, s.active, word_1, last_1, s.valid_1, word_2, last_2, queue
+    )  # fmt: skip
+    return following, (tdata, tvalid, tlast, dropped)
+
+
+def stimuli(rng, config):
+    """Samples at the shortest distance and too early ones, every value changing at every clock; a slow sink, a fast
+    one, one that stops; switched off and on."""
+    ports = BLOCK.ports(config)
+    rows, wait = [], 0
+    for clock in range(6000):
+        stalled = 1500 < clock < 3000
+        ready = (
+            int(rng.integers(4) > 0) if clock < 1500 else int(not stalled and rng.integers(8) > clock // 1000)
+        )
+        early = rng.integers(200) == 0
+        row = {p.name: int(rng.integers(p.low, p.high + 1)) for p in ports}
+        row |= {"m_axis_tready": ready, "sample_valid": int(wait == 0 or early), "enable": 1}
+        if 4000 < clock < 4700:
+            row["enable"] = int(rng.integers(2))
+        wait = INTERVAL - 1 if wait == 0 else wait - 1
+        if wait == 0 and rng.integers(5) == 0:
+            wait = int(rng.integers(1, 40))
+        rows.append(row)
+    return rows
+
+
+_RAW = {p.name: p for p in sample_latch.BLOCK.inputs}
+BLOCK = Block(
+    name="telemetry",
+    folder="io",
+    paper="none: what a recording needs",
+    step=step,
+    inputs=(
+        Port("enable", BIT, doc="1: send packets"),
+        Port("sample_valid", BIT, doc="the raw sample below is there"),
+        Port("m_axis_tready", BIT, doc="the sink takes the word"),
+        *(Port("running" if name == "run_in" else name, p.fmt, doc=p.doc) for name, p in _RAW.items()),
+        *(PORTS[name] for name in SHOWN),
+    ),
+    outputs=(
+        Port("m_axis_tdata", WORD, doc="a word of the packet"),
+        Port("m_axis_tvalid", BIT, doc="it is there"),
+        Port("m_axis_tlast", BIT, doc="it is the packet's last"),
+        Port("dropped", DROPPED, doc="samples without a packet for want of room"),
+    ),
+    state=State(),
+    latency=1,
+    clocked=True,
+    shown_with={"m_axis_tdata": "m_axis_tvalid", "m_axis_tlast": "m_axis_tvalid"},
+    constants={"AGE_W": INTERVAL.bit_length()},
+    configs=(
+        {"ADC_BITS": 16, "POSITION_BITS": 16, "DEPTH_BITS": 6},
+        {"ADC_BITS": 12, "POSITION_BITS": 18, "DEPTH_BITS": 5},
+    ),
+    width_from={
+        name: sample_latch.sized(out) for name, out in sample_latch.NAMES.items() if sample_latch.sized(out)
+    },
+    reference=None,
+    bound=None,
+    stimuli=stimuli,
+)

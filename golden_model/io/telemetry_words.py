@@ -1,0 +1,198 @@
+"""The telemetry packet: which field stands where in its words; one word a clock out of the core's live values.
+
+``WORDS`` is the one place that says what a packet holds.  The VHDL twin is generated from it, the reader of a
+capture and ``fluxproof diagnose`` take it from here.  A word holds
+
+* one field, extended to 32 bits by its sign or with zeros, or
+* two of at most 16 bits, each extended to 16, the first in the low half, or
+* several, one behind the other from bit 0 on, zeros above (a signed one has its sign in its own top bit).
+
+Nothing is copied before it is sent: the values of a sample stay until the next one's replace them, and the packet
+takes each between the two (``window``).  The order of the words and ``START`` follow from that; a latency that no
+longer fits ends the import with the word's name.
+"""
+
+from typing import NamedTuple
+
+from golden_model import fluxproof
+from golden_model.block import Block, Port
+from golden_model.fixed import Format
+from golden_model.io import sample_latch
+
+VERSION = 1
+MAGIC = 0x4650  # "FP"
+HEADER, COUNTER = "header", "counter"
+WORDS = (
+    (HEADER,),
+    (COUNTER,),
+    ("adc_a", "adc_b"),
+    ("adc_c", "adc_u_dc"),
+    ("position_code",),
+    ("omega_ref",),
+    ("i_d_ref",),
+    ("i_q_ext",),
+    ("theta_me",),
+    ("omega_me",),
+    ("u_dc",),
+    ("i_d",),
+    ("i_q",),
+    ("i_q_ref",),
+    ("lambda_d",),
+    ("lambda_q",),
+    ("u_d",),
+    ("u_q",),
+    ("compare_a", "compare_b"),
+    ("compare_c", "temp_winding"),
+    ("psi_m",),
+    ("run", "speed_mode", "temp_valid", "clear_faults", "current_at_rail", "temp_lost", "sat_d", "sat_q",
+     "psi_held", "flux_faults"),
+    ("v_dead",),
+    ("v_comp",),
+)  # fmt: skip
+COUNT = len(WORDS)
+HEADER_WORD = MAGIC << 16 | VERSION << 8 | COUNT
+WORD = Format(0, 32, 0)
+INDEX = Format(0, (COUNT - 1).bit_length(), 0)
+
+
+class Field(NamedTuple):
+    """Where a field stands: ``width`` bits of word ``word`` from bit ``lsb`` on; ``port`` says what they mean."""
+
+    word: int
+    lsb: int
+    width: int
+    port: Port
+
+    @property
+    def signed(self) -> bool:
+        return bool(self.port.fmt.signed)
+
+
+# A code's port has the width that the generics give it; the packet has room for the widest.
+_WIDEST = {"code_theta": Format(0, 0, 18)}
+INPUTS = {
+    name: Port(name, _WIDEST.get(port.name, port.fmt), doc=port.doc)
+    for name, port in zip(fluxproof.Sample._fields, sample_latch.BLOCK.outputs, strict=True)
+}
+PORTS = INPUTS | fluxproof.OBSERVED
+
+
+def _layout() -> dict[str, Field]:
+    """{field: Field} of WORDS, in their order; ValueError where a word cannot hold its fields."""
+    layout = {}
+    for number, names in enumerate(WORDS):
+        widths = [WORD.width if n in (HEADER, COUNTER) else PORTS[n].fmt.width for n in names]
+        if len(names) <= 2:
+            room = WORD.width // len(names)
+            if max(widths) > room:
+                raise ValueError(f"telemetry: {' and '.join(names)} do not fit into word {number}")
+            widths = [room] * len(names)
+        if sum(widths) > WORD.width:
+            raise ValueError(f"telemetry: word {number} would have {sum(widths)} bits: {', '.join(names)}")
+        lsb = 0
+        for name, width in zip(names, widths, strict=True):
+            port = PORTS.get(name, Port(name, WORD))
+            layout[name] = Field(number, lsb, width, port)
+            lsb += width
+    return layout
+
+
+LAYOUT = _layout()
+FIELDS = tuple(name for name in LAYOUT if name not in (HEADER, COUNTER))
+PACKET = tuple(name for name in FIELDS if name not in INPUTS)  # what the core answered
+_MISSING = set(INPUTS) - set(FIELDS)
+if _MISSING:
+    raise ValueError(
+        f"telemetry: the golden model cannot replay a packet without {', '.join(sorted(_MISSING))}"
+    )
+
+
+def owner(name: str) -> str:
+    """The instance of the top that makes a field; two Park transforms' outputs have the names of their use."""
+    used = {"u_comp_d": "compensation_dq", "u_comp_q": "compensation_dq"}
+    used |= {"d_d": "direction_functions", "d_q": "direction_functions"}
+    if name in INPUTS:
+        return "latch"
+    if name in used:
+        return used[name]
+    return next(i for i, (m, _) in fluxproof.WIRING.items() if name in {p.name for p in m.BLOCK.outputs})
+
+
+def window(names) -> tuple[int, int]:
+    """(first, last) clock edge since the raw sample's at which all these fields are this sample's.
+
+    From the last result on; up to the edge at which the next sample, as close as it may come, reaches the first of
+    their blocks: outputs change behind that edge at the earliest.
+    """
+    times = [fluxproof.schedule()[owner(name)] for name in names]
+    return max(last for _, last in times), fluxproof.SAMPLE_INTERVAL + min(first for first, _ in times)
+
+
+def _start() -> int:
+    """The earliest edge for word 0, one edge a word, so that every word lies in its window."""
+    windows = [window(names) if names[0] in LAYOUT and names[0] in PORTS else (1, 10**6) for names in WORDS]
+    start = max(first - number for number, (first, _) in enumerate(windows))
+    for number, (first, last) in enumerate(windows):
+        if not first <= start + number <= last:
+            raise ValueError(
+                f"telemetry: word {number} ({', '.join(WORDS[number])}) would be taken {start + number} clocks after "
+                f"the sample, its fields are there from {first} to {last}: move the word"
+            )
+    if COUNT > fluxproof.SAMPLE_INTERVAL:
+        raise ValueError(f"telemetry: {COUNT} words do not fit between two samples")
+    return start
+
+
+START = _start()
+
+
+def pack(counter: int, values) -> tuple[int, ...]:
+    """The words of one packet; values {field: integer}, more are ignored."""
+    known = {HEADER: HEADER_WORD, COUNTER: counter, **values}
+    words = [0] * COUNT
+    for name, field in LAYOUT.items():
+        words[field.word] |= (int(known[name]) & ((1 << field.width) - 1)) << field.lsb
+    return tuple(words)
+
+
+def step(index, counter, *values):
+    """Word ``index`` of the packet; ``values`` in the order of FIELDS, generics behind them."""
+    return (pack(counter, dict(zip(FIELDS, values, strict=False)))[index],)
+
+
+def stimuli(rng, config):
+    """Every word with all fields at their one end, at the other, and at random."""
+    ports = [p for p in BLOCK.ports(config) if p.name != "index"]
+    rows = []
+    for index in range(COUNT):
+        for choose in (lambda p: p.low, lambda p: p.high, lambda p: int(rng.integers(p.low, p.high + 1))):
+            rows += [{p.name: choose(p) for p in ports} | {"index": index}]
+    return rows
+
+
+def sized(name):
+    """The format function of a code's port, which a generic decides, or None."""
+    return sample_latch.sized(
+        dict(zip(INPUTS, (p.name for p in sample_latch.BLOCK.outputs), strict=True))[name]
+    )
+
+
+BLOCK = Block(
+    name="telemetry_words",
+    folder="io",
+    paper="none: what a recording needs",
+    step=step,
+    inputs=(
+        Port("index", INDEX, hi=COUNT - 1, doc="which word"),
+        Port("counter", WORD, doc="number of the sample"),
+        *(PORTS[name] for name in FIELDS),
+    ),
+    outputs=(Port("word", WORD, doc="the packet's word"),),
+    latency=2,
+    constants={"COUNT": COUNT, "START": START, "INDEX_W": INDEX.width},
+    configs=({"ADC_BITS": 16, "POSITION_BITS": 16}, {"ADC_BITS": 12, "POSITION_BITS": 18}),
+    width_from={name: sized(name) for name in INPUTS if sized(name)},
+    reference=None,
+    bound=None,
+    stimuli=stimuli,
+)

@@ -1,0 +1,102 @@
+"""Remembers which faults there were and which came first, and keeps the gates off until told to forget; every clock.
+
+    0 to 5  what is wrong with a sample, see sample_checks
+    6       no sample for ``watchdog`` clocks
+    7       input ``trip``
+    8       a sample came too early and was not let in: told, never a trip
+
+A fault is remembered from ``enable`` on (``trip`` always), so that one can write the registers in peace; with a fault
+present ``enable`` does not help.  ``clear_trip`` forgets the faults whose cause is gone.
+``first_fault`` holds all that tripped in the first clock with any, until nothing trips any more.
+``fault_ignore``: bit x of 0 to 6 is told in the flags and does not trip; ``trip`` always does.
+``gate_clear`` is ``clear_trip`` one clock later, when the flags have gone, for the trip memory of the gates.
+Formats: bits.
+"""
+
+from typing import NamedTuple
+
+from golden_model.block import Block, Port
+from golden_model.fixed import Format
+from golden_model.formats import BIT
+from golden_model.kernel import kernel
+from golden_model.protection.sample_checks import CHECKS, IGNORE
+
+FLAGS = Format(0, 9, 0)
+FAULTS = Format(0, 8, 0)  # all that can trip
+NAMES = (
+    "overcurrent", "current_sum", "at_rail", "u_dc_low", "u_dc_high", "position", "watchdog", "trip", "early",
+)  # fmt: skip
+LATE, TRIP, EARLY = 6, 7, 8
+ALWAYS = 1 << TRIP  # remembered without enable, and not to be ignored
+TRIPPING = FAULTS.hi  # all but EARLY
+
+
+class State(NamedTuple):
+    flags: int = 0
+    first: int = 0
+    stop: int = 0
+
+
+@kernel
+def step(state, trip, sample_faults, sample_late, sample_early, enable, clear_trip, fault_ignore):
+    s = state
+    now = sample_faults + (sample_late << LATE) + (trip << TRIP) + (sample_early << EARLY)
+    new = now if enable else now & ALWAYS
+    kept = s.flags & now if clear_trip else s.flags
+    flags = new | kept
+    tripping = flags & TRIPPING & (ALWAYS | ~fault_ignore)
+    stop = 1 if tripping != 0 else 0
+    first = s.first if s.stop else tripping
+    return State(flags, first, stop), (flags, first, stop, clear_trip)
+
+
+def stimuli(rng, config):
+    """Each fault alone and two after another, cleared while it lasts and when it is gone, ignored, without enable."""
+    calm = dict.fromkeys((p.name for p in BLOCK.inputs + BLOCK.registers), 0) | {"enable": 1}
+    causes = [{"sample_faults": 1 << k} for k in range(6)]
+    causes += [{"sample_late": 1}, {"trip": 1}, {"sample_early": 1}]
+    rows = []
+    for k, cause in enumerate(causes):
+        other = causes[(k + 4) % len(causes)]
+        clear, ignore = {"clear_trip": 1}, {"fault_ignore": 1 << min(k, 6)}
+        rows += [calm, calm | cause, calm, calm | other, calm | other | clear, calm | clear, calm]
+        rows += [calm | cause | other, calm | cause | clear, calm | clear, calm]
+        rows += [calm | cause | {"enable": 0}, calm | cause | {"enable": 0}, calm | cause, calm | clear, calm]
+        rows += [
+            calm | cause,
+            calm | cause | clear | {"enable": 0},
+            calm | cause | {"enable": 0},
+            calm | clear,
+        ]
+        rows += [calm | cause | ignore, calm | other | ignore, calm | ignore | clear, calm | clear, calm]
+    return rows
+
+
+BLOCK = Block(
+    name="fault_latch",
+    folder="protection",
+    paper="none: what a drive needs besides",
+    step=step,
+    inputs=(
+        Port("trip", BIT, doc="1: gates off, remembered"),
+        Port("sample_faults", CHECKS, doc="what is wrong with the last sample"),
+        Port("sample_late", BIT, doc="the last sample is older than the watchdog allows"),
+        Port("sample_early", BIT, doc="a sample was not let in"),
+        Port("enable", BIT, doc="1: gates may switch"),
+        Port("clear_trip", BIT, doc="1: forget what is over"),
+    ),
+    registers=(Port("fault_ignore", IGNORE, doc="bit x: fault x is told and does not trip"),),
+    outputs=(
+        Port("fault_flags", FLAGS, doc="what has happened, see fault_latch"),
+        Port("first_fault", FAULTS, doc="which of them came first"),
+        Port("fault_stop", BIT, doc="1: gates off"),
+        Port("gate_clear", BIT, doc="clear_trip, when the flags have gone"),
+    ),
+    state=State(),
+    latency=1,
+    clocked=True,
+    constants={"LATE": LATE, "TRIP": TRIP, "EARLY": EARLY},
+    reference=None,
+    bound=None,
+    stimuli=stimuli,
+)

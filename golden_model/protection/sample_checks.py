@@ -1,0 +1,145 @@
+"""What a raw sample says that no healthy drive can say: one bit each, judged anew with every sample.
+
+    0  overcurrent    |i_x| >= i_trip in any phase
+    1  current sum    |i_a + i_b + i_c| >= sum_trip: a sensor is lost, stuck or wrong
+    2  at the rail    a code at its end, in ``rail_samples`` samples one after another
+    3  bus low        u_dc < u_dc_min
+    4  bus high       u_dc >= u_dc_max
+    5  position       |code - (2*code' - code'')| >= jump_max: the shaft cannot change its speed that much in a sample
+
+Check 5 sees a jump of the code, and a code that freezes while the shaft turns by ``jump_max`` a sample or more; a
+slower shaft whose code freezes it cannot tell from one at rest.  It waits for three samples after a reset.
+``sample_trip``: any of them that ``fault_ignore`` does not name.
+
+Formats: currents and voltage are cut (floor) to U(1,8), |x| is the one's complement where x is negative: a negative
+current trips one LSB (16 bits) later than a positive one, the sum at most 3/256 per unit later or earlier.
+Codes in 1/2**18 turn, their difference is the shorter way round, cut to U(-1,13).  The rail counter stays at its end.
+"""
+
+from typing import NamedTuple
+
+from golden_model.block import Block, Port
+from golden_model.fixed import Format, wrap, wrap_s
+from golden_model.formats import BIT, LIMIT, PU, TURN_W, U_DC
+from golden_model.io.position import code_format
+from golden_model.kernel import kernel
+
+JUMP = Format(0, -1, 13)
+SAMPLES = Format(0, 4, 0)
+CHECKS = Format(0, 6, 0)
+IGNORE = Format(0, 7, 0)  # those of fault_latch that are not always to trip
+DROP_LIMIT = PU.frac_bits - LIMIT.frac_bits
+DROP_JUMP = TURN_W - JUMP.frac_bits
+WARM = 2  # samples before the next code can be foretold
+SAMPLES_HI = SAMPLES.hi
+
+
+class State(NamedTuple):
+    code: int = 0  # of the last sample, in 1/2**18 turn
+    expected: int = 0  # of the coming sample, if the speed stays
+    seen: int = 0  # samples since the reset, WARM at most
+    railed: int = 0  # samples at the rail one after another, 15 at most
+
+
+@kernel
+def magnitude(x):
+    """|x|, as one's complement where x is negative."""
+    return x if x >= 0 else -1 - x
+
+
+@kernel
+def step(
+    state, i_a, i_b, i_c, current_at_rail, u_dc, u_dc_at_rail, code_theta, i_trip, sum_trip, rail_samples, u_dc_min,
+    u_dc_max, jump_max, fault_ignore, position_bits,
+):  # fmt: skip
+    s = state
+    a, b, c = i_a >> DROP_LIMIT, i_b >> DROP_LIMIT, i_c >> DROP_LIMIT
+    over = 1 if magnitude(a) >= i_trip or magnitude(b) >= i_trip or magnitude(c) >= i_trip else 0
+    unbalanced = 1 if magnitude(a + b + c) >= sum_trip else 0
+
+    at_rail = current_at_rail != 0 or u_dc_at_rail != 0
+    railed = min(s.railed + 1, SAMPLES_HI) if at_rail else 0
+    stuck = 1 if at_rail and railed >= rail_samples else 0
+
+    bus = u_dc >> DROP_LIMIT
+    low = 1 if bus < u_dc_min else 0
+    high = 1 if bus >= u_dc_max else 0
+
+    code = code_theta << (TURN_W - position_bits)
+    off = magnitude(wrap_s(code - s.expected, TURN_W)) >> DROP_JUMP
+    jumped = 1 if s.seen == WARM and off >= jump_max else 0
+
+    faults = over + 2 * unbalanced + 4 * stuck + 8 * low + 16 * high + 32 * jumped
+    following = State(code, wrap(2 * code - s.code, TURN_W), min(s.seen + 1, WARM), railed)
+    return following, (faults, 1 if faults & ~fault_ignore else 0)
+
+
+def stimuli(rng, config):
+    """Each limit met and just missed, with both signs; codes that turn, jump, freeze, pass zero; rails."""
+    size = 1 << config["POSITION_BITS"]
+    limits = {
+        "i_trip": 200,
+        "sum_trip": 40,
+        "rail_samples": 3,
+        "u_dc_min": 30,
+        "u_dc_max": 300,
+        "jump_max": 64,
+    }
+    calm = dict.fromkeys(("i_a", "i_b", "i_c", "current_at_rail", "u_dc_at_rail", "code_theta"), 0) | {
+        "u_dc": 40000
+    }
+    rows = []
+    for edge in (200 << 8, -(200 << 8), 40 << 8, -(40 << 8)):
+        for near in (-1, 0, 1):
+            rows += [calm | limits | {f"i_{x}": edge + near} for x in "abc"]
+            rows.append(calm | limits | {"i_a": 20000, "i_b": -20000, "i_c": edge + near})
+    for edge in (30 << 8, 300 << 8):
+        rows += [calm | limits | {"u_dc": edge + near} for near in (-1, 0, 1)]
+    for length in (1, 2, 3, 4, 20):
+        rows += [calm | limits | {"current_at_rail": int(rng.integers(1, 8))} for _ in range(length)]
+        rows += [calm | limits] + [calm | limits | {"u_dc_at_rail": 1}] * length + [calm | limits]
+    for ignored in range(6):
+        rows.append(calm | limits | {"i_b": 60000, "u_dc": 0, "fault_ignore": 1 << ignored})
+    code = 0
+    for turn in (0, 1, size // 300, -size // 300, size // 120, -size // 120, size // 2, size // 3, 0):
+        for _ in range(6):
+            code = (code + turn) % size
+            rows.append(calm | limits | {"code_theta": code})
+        rows += [calm | limits | {"code_theta": code}] * 3
+    return rows
+
+
+BLOCK = Block(
+    name="sample_checks",
+    folder="protection",
+    paper="none: what a drive needs besides",
+    step=step,
+    inputs=tuple(Port(f"i_{x}", PU, doc=f"current, phase {x}") for x in "abc")
+    + (
+        Port("current_at_rail", Format(0, 3, 0), doc="bit x: code of phase x at its end"),
+        Port("u_dc", U_DC, doc="bus voltage"),
+        Port("u_dc_at_rail", BIT, doc="bus code at either end"),
+        Port("code_theta", Format(0, 0, 16), doc="position code, one mechanical turn"),
+    ),
+    registers=(
+        Port("i_trip", LIMIT, doc="phase current that trips"),
+        Port("sum_trip", LIMIT, doc="sum of the phase currents that trips"),
+        Port("rail_samples", SAMPLES, doc="samples at the rail that trip"),
+        Port("u_dc_min", LIMIT, doc="bus voltage below which it trips"),
+        Port("u_dc_max", LIMIT, doc="bus voltage that trips"),
+        Port("jump_max", JUMP, doc="change of the turn a sample that trips"),
+        Port("fault_ignore", IGNORE, doc="bit x: fault x is told and does not trip"),
+    ),
+    outputs=(
+        Port("sample_faults", CHECKS, doc="what is wrong with this sample, see sample_checks"),
+        Port("sample_trip", BIT, doc="any of them trips"),
+    ),
+    state=State(),
+    latency=1,
+    constants={"DROP_LIMIT": DROP_LIMIT, "DROP_JUMP": DROP_JUMP, "WARM": WARM},
+    configs=({"POSITION_BITS": 16}, {"POSITION_BITS": 12}, {"POSITION_BITS": 18}),
+    width_from={"code_theta": code_format},
+    reference=None,
+    bound=None,
+    stimuli=stimuli,
+)

@@ -1,0 +1,101 @@
+-- Purpose: a queue of words in block RAM for an AXI4-Stream: takes a word a clock, gives one when the sink is ready.
+-- room says whether a whole packet of PACKET words fits: who asks before the first word never has to wait nor to
+-- break off.  A word that finds the queue full is ignored.  out_data and out_last stay until out_ready.
+-- Formats: as they come.  The RAM holds 2**DEPTH_BITS words, its own and the output register one more each: a RAM's
+-- output is slow, and what leaves the core starts at a register.
+-- Latency: a word is shown three clocks after it came where the queue was empty.  Rounding: none.
+
+library ieee;
+use ieee.std_logic_1164.all;
+use ieee.numeric_std.all;
+
+entity packet_fifo is
+  generic (
+    WIDTH      : positive range 1 to 71 := 32;
+    DEPTH_BITS : positive range 3 to 16 := 9;
+    PACKET     : positive               := 24
+  );
+  port (
+    clk       : in  std_logic;
+    rst       : in  std_logic;
+    in_valid  : in  std_logic;
+    in_data   : in  unsigned(WIDTH - 1 downto 0);
+    in_last   : in  std_logic;
+    out_ready : in  std_logic;
+    out_valid : out std_logic;
+    out_data  : out unsigned(WIDTH - 1 downto 0);
+    out_last  : out std_logic;
+    room      : out std_logic
+  );
+end entity packet_fifo;
+
+architecture rtl of packet_fifo is
+  constant DEPTH : positive := 2 ** DEPTH_BITS;
+
+  type ram_t is array (0 to DEPTH - 1) of unsigned(WIDTH downto 0);
+
+  signal ram : ram_t;
+
+  -- yosys: no word is read in the clock that writes it, so nothing need be built for that case
+  attribute no_rw_check : boolean;
+  attribute no_rw_check of ram : signal is true;
+
+  -- State
+  signal used       : unsigned(DEPTH_BITS downto 0);  -- words in the RAM
+  signal write_at   : unsigned(DEPTH_BITS - 1 downto 0);
+  signal read_at    : unsigned(DEPTH_BITS - 1 downto 0);
+  signal read_valid : std_logic;
+  signal read_word  : unsigned(WIDTH downto 0);
+  signal shown      : std_logic;
+  signal out_word   : unsigned(WIDTH downto 0);
+
+  signal take  : std_logic;
+  signal fetch : std_logic;
+  signal move  : std_logic;
+begin
+  take  <= in_valid and not used(DEPTH_BITS);
+  move  <= read_valid and (out_ready or not shown);
+  fetch <= '1' when used /= 0 and (read_valid = '0' or move = '1') else '0';
+
+  process (clk)
+  begin
+    if rising_edge(clk) then
+      -- The RAM's write port and, with its own register, its read port; never the same word in the same clock
+      if take = '1' then
+        ram(to_integer(write_at)) <= in_last & in_data;
+        write_at                  <= write_at + 1;
+      end if;
+      if fetch = '1' then
+        read_word <= ram(to_integer(read_at));
+        read_at   <= read_at + 1;
+      end if;
+      read_valid <= fetch or (read_valid and not move);
+
+      -- The output register
+      if move = '1' then
+        out_word <= read_word;
+      end if;
+      shown <= move or (shown and not out_ready);
+
+      if take = '1' and fetch = '0' then
+        used <= used + 1;
+      elsif take = '0' and fetch = '1' then
+        used <= used - 1;
+      end if;
+
+      if rst = '1' then
+        used       <= (others => '0');
+        write_at   <= (others => '0');
+        read_at    <= (others => '0');
+        read_valid <= '0';
+        shown      <= '0';
+      end if;
+    end if;
+  end process;
+
+  out_valid <= shown;
+  out_data  <= out_word(WIDTH - 1 downto 0);
+  out_last  <= out_word(WIDTH);
+  room      <= '1' when used <= DEPTH - PACKET else '0';
+
+end architecture rtl;

@@ -1,0 +1,84 @@
+-- Purpose: the power stage's side of the AXI top: the trip pin comes in, the six gates leave through registers.
+-- trip_pin may change at any time and be as short as a flip-flop notices.  It sets `caught` without a clock, and
+-- `caught` clears the gates' registers without a clock: the gates go off even if clk has stopped.  Two registers
+-- (ASYNC_REG) bring it to clk as `trip`.  When the core has been told and the pin is low, `caught` lets go: always
+-- just after an edge of clk, when the core's own gates are already off, and its memory keeps them off.
+-- This is the one place with an asynchronous set or clear; scripts/vivado/fluxproof.xdc holds its exception.
+-- The gates and sample_trigger leave together, one register behind gate_generation, so that they fit IO cells.
+-- Latency: gates 1; trip_pin to gates off 0, to trip 2.  Formats: bits.  Rounding: none.
+
+library ieee;
+use ieee.std_logic_1164.all;
+use ieee.numeric_std.all;
+
+entity power_stage is
+  port (
+    clk            : in  std_logic;
+    rst            : in  std_logic;  -- synchronous, active high
+    trip_pin       : in  std_logic;  -- asynchronous, 1: gates off
+    gate_high_next : in  unsigned(2 downto 0);  -- upper gates of gate_generation
+    gate_low_next  : in  unsigned(2 downto 0);  -- lower gates of gate_generation
+    trigger_next   : in  std_logic;  -- middle of the zero vector
+    trip           : out std_logic;  -- the trip, synchronous to clk
+    gate_high      : out std_logic_vector(2 downto 0);  -- upper gates, bit 0 is leg a
+    gate_low       : out std_logic_vector(2 downto 0);  -- lower gates, bit 0 is leg a
+    sample_trigger : out std_logic  -- middle of the zero vector as the gates show it
+  );
+end entity power_stage;
+
+architecture rtl of power_stage is
+  attribute async_reg : string;
+
+  -- An FPGA starts a register with a set at 1 and the others at 0: gates off before the first clock.
+  signal caught : std_logic;
+  signal sync_1 : std_logic;
+  signal sync_2 : std_logic;
+
+  attribute async_reg of sync_1 : signal is "TRUE";
+  attribute async_reg of sync_2 : signal is "TRUE";
+begin
+
+  catching : process (clk, trip_pin)
+  begin
+    if trip_pin = '1' then
+      caught <= '1';
+    elsif rising_edge(clk) then
+      if sync_2 = '1' or rst = '1' then
+        caught <= '0';
+      end if;
+    end if;
+  end process;
+
+  synchronising : process (clk)
+  begin
+    if rising_edge(clk) then
+      -- Stage 1 and 2: trip = caught
+      sync_1 <= caught;
+      sync_2 <= sync_1;
+
+      -- Stage 1: out = in
+      sample_trigger <= trigger_next;
+
+      if rst = '1' then
+        sync_1         <= '0';
+        sync_2         <= '0';
+        sample_trigger <= '0';
+      end if;
+    end if;
+  end process;
+
+  gates : process (clk, caught)
+  begin
+    if caught = '1' then
+      gate_high <= (others => '0');
+      gate_low  <= (others => '0');
+    elsif rising_edge(clk) then
+      -- Stage 1: out = in
+      gate_high <= std_logic_vector(gate_high_next);
+      gate_low  <= std_logic_vector(gate_low_next);
+    end if;
+  end process;
+
+  trip <= sync_2;
+
+end architecture rtl;

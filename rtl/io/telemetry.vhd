@@ -1,0 +1,267 @@
+-- Purpose: an AXI4-Stream packet for every sample: what the core took in, what it answered, and the sample's number.
+-- A packet's words (telemetry_words) are taken from the core's live values, one a clock from TELEMETRY_WORDS_START
+-- clocks after the sample on, when they are there and before the next sample's replace them, into a queue
+-- (packet_fifo) that the sink empties at its pace.
+-- The controller never waits: a sample whose packet does not fit into the queue has none, and dropped counts it up to
+-- 65535.  The samples' numbers run on, modulo 2**32, from 0 after a reset.  enable is looked at before the first word:
+-- a packet once begun comes out whole.  A sample that comes less than FLUXPROOF_SAMPLE_INTERVAL clocks after the last
+-- one is none.
+-- Formats: all as they come, see telemetry_words.  The queue holds 2**DEPTH_BITS words.
+-- Latency: the first word is shown TELEMETRY_WORDS_START + 5 clocks after sample_valid.  Rounding: none.
+
+library ieee;
+use ieee.std_logic_1164.all;
+use ieee.numeric_std.all;
+use work.fluxproof_pkg.all;
+
+entity telemetry is
+  generic (
+    ADC_BITS      : positive range 12 to 16 := 16;
+    POSITION_BITS : positive range 8 to 18  := 16;
+    DEPTH_BITS    : positive range 5 to 16  := 9
+  );
+  port (
+    clk             : in  std_logic;
+    rst             : in  std_logic;  -- synchronous, active high
+    enable          : in  std_logic;  -- 1: send packets
+    sample_valid    : in  std_logic;  -- the raw sample below is there
+    m_axis_tready   : in  std_logic;  -- the sink takes the word
+    adc_a           : in  unsigned(ADC_BITS - 1 downto 0);  -- ADC code, phase a
+    adc_b           : in  unsigned(ADC_BITS - 1 downto 0);  -- ADC code, phase b
+    adc_c           : in  unsigned(ADC_BITS - 1 downto 0);  -- ADC code, phase c
+    adc_u_dc        : in  unsigned(ADC_BITS - 1 downto 0);  -- ADC code, bus voltage
+    position_code   : in  unsigned(POSITION_BITS - 1 downto 0);  -- position code, one mechanical turn
+    omega_ref_in    : in  signed(PU_W - 1 downto 0);  -- speed reference
+    i_d_ref_in      : in  signed(PU_W - 1 downto 0);  -- current reference, d axis
+    i_q_ext_in      : in  signed(PU_W - 1 downto 0);  -- current reference of torque mode, q axis
+    speed_mode_in   : in  std_logic;  -- 1: speed control, 0: torque control
+    temp_winding_in : in  signed(15 downto 0);  -- winding temperature, degrees Celsius
+    temp_valid_in   : in  std_logic;  -- 1: the temperature is a reading
+    clear_faults_in : in  std_logic;  -- 1: forget what is over
+    running         : in  std_logic;  -- 1: the gates are switching
+    current_at_rail : in  unsigned(2 downto 0);  -- bit x: code of phase x at its end
+    u_dc            : in  unsigned(DUTY_W - 1 downto 0);  -- bus voltage
+    theta_me        : in  unsigned(TURN_W - 1 downto 0);  -- electrical angle
+    omega_me        : in  signed(PU_W - 1 downto 0);  -- electrical speed
+    i_d             : in  signed(PU_W - 1 downto 0);  -- current, d axis
+    i_q             : in  signed(PU_W - 1 downto 0);  -- current, q axis
+    i_q_ref         : in  signed(PU_W - 1 downto 0);  -- current reference, q axis
+    lambda_d        : in  signed(PU_W - 1 downto 0);  -- flux linkage, d axis
+    lambda_q        : in  signed(PU_W - 1 downto 0);  -- flux linkage, q axis
+    u_d             : in  signed(PU_W - 1 downto 0);  -- voltage, d axis
+    u_q             : in  signed(PU_W - 1 downto 0);  -- voltage, q axis
+    sat_d           : in  signed(1 downto 0);  -- limit that holds the d axis
+    sat_q           : in  signed(1 downto 0);  -- limit that holds the q axis
+    flux_faults     : in  unsigned(6 downto 0);  -- what has disturbed the flux estimate, see flux_monitor
+    v_dead          : in  signed(V_LEG_W - 1 downto 0);  -- leg voltage lost and not compensated
+    v_comp          : in  signed(V_LEG_W - 1 downto 0);  -- leg voltage that is compensated
+    psi_m           : in  signed(PU_W - 1 downto 0);  -- flux linkage of the magnets
+    psi_held        : in  std_logic;  -- 1: psi_m is held
+    temp_lost       : in  std_logic;  -- 1: no believable temperature, r is r_s
+    compare_a       : in  unsigned(15 downto 0);  -- compare value, leg a
+    compare_b       : in  unsigned(15 downto 0);  -- compare value, leg b
+    compare_c       : in  unsigned(15 downto 0);  -- compare value, leg c
+    m_axis_tdata    : out unsigned(31 downto 0);  -- a word of the packet
+    m_axis_tvalid   : out std_logic;  -- it is there
+    m_axis_tlast    : out std_logic;  -- it is the packet's last
+    dropped         : out unsigned(15 downto 0)  -- samples without a packet for want of room
+  );
+end entity telemetry;
+
+architecture rtl of telemetry is
+  constant COUNT   : positive := TELEMETRY_WORDS_COUNT;
+  constant INDEX_W : positive := TELEMETRY_WORDS_INDEX_W;
+  constant AGE_W   : positive := TELEMETRY_AGE_W;
+
+  constant AGE_END : unsigned(AGE_W - 1 downto 0) := to_unsigned(FLUXPROOF_SAMPLE_INTERVAL, AGE_W);
+  constant NONE    : unsigned(31 downto 0)        := (others => '1');  -- the first sample is number 0
+
+  -- The sample as the core holds it
+  signal code_a       : unsigned(ADC_BITS - 1 downto 0);
+  signal code_b       : unsigned(ADC_BITS - 1 downto 0);
+  signal code_c       : unsigned(ADC_BITS - 1 downto 0);
+  signal code_u_dc    : unsigned(ADC_BITS - 1 downto 0);
+  signal code_theta   : unsigned(POSITION_BITS - 1 downto 0);
+  signal omega_ref    : signed(PU_W - 1 downto 0);
+  signal i_d_ref      : signed(PU_W - 1 downto 0);
+  signal i_q_ext      : signed(PU_W - 1 downto 0);
+  signal speed_mode   : std_logic;
+  signal temp_winding : signed(15 downto 0);
+  signal temp_valid   : std_logic;
+  signal clear_faults : std_logic;
+  signal run          : std_logic;
+
+  -- State
+  signal age     : unsigned(AGE_W - 1 downto 0);  -- clocks since the sample, up to FLUXPROOF_SAMPLE_INTERVAL
+  signal counter : unsigned(31 downto 0);  -- number of the sample
+  signal active  : std_logic;
+  signal index   : unsigned(INDEX_W - 1 downto 0);
+  signal drops   : unsigned(15 downto 0);
+
+  signal taken   : std_logic;
+  signal start   : std_logic;
+  signal final   : std_logic;
+  signal room    : std_logic;
+  signal valid_1 : std_logic;
+  signal last_1  : std_logic;
+  signal valid_2 : std_logic;
+  signal word_2  : unsigned(31 downto 0);
+  signal last_2  : std_logic;
+begin
+  taken <= '1' when sample_valid = '1' and age = AGE_END else '0';
+  start <= '1' when enable = '1' and age = TELEMETRY_WORDS_START - 1 else '0';
+  final <= '1' when index = COUNT - 1 else '0';
+
+  process (clk)
+  begin
+    if rising_edge(clk) then
+      -- The sample's age and number
+      if taken = '1' then
+        age     <= to_unsigned(1, AGE_W);
+        counter <= counter + 1;
+      elsif age /= AGE_END then
+        age <= age + 1;
+      end if;
+
+      -- The packet: begun only where all of it fits
+      if active = '1' then
+        index  <= index + 1;
+        active <= not final;
+      end if;
+      if start = '1' and room = '1' then
+        active <= '1';
+        index  <= (others => '0');
+      end if;
+      if start = '1' and room = '0' and drops /= 65535 then
+        drops <= drops + 1;
+      end if;
+
+      -- Stages 1 and 2: beside the word, whether it is the last
+      valid_1 <= active;
+      if active = '1' then
+        last_1 <= final;
+      end if;
+      if valid_1 = '1' then
+        last_2 <= last_1;
+      end if;
+
+      if rst = '1' then
+        age     <= AGE_END;
+        counter <= NONE;
+        active  <= '0';
+        valid_1 <= '0';
+        drops   <= (others => '0');
+      end if;
+    end if;
+  end process;
+
+  latch : entity work.sample_latch
+    generic map (
+      ADC_BITS      => ADC_BITS,
+      POSITION_BITS => POSITION_BITS
+    )
+    port map (
+      clk             => clk,
+      rst             => rst,
+      in_valid        => taken,
+      adc_a           => adc_a,
+      adc_b           => adc_b,
+      adc_c           => adc_c,
+      adc_u_dc        => adc_u_dc,
+      position_code   => position_code,
+      omega_ref_in    => omega_ref_in,
+      i_d_ref_in      => i_d_ref_in,
+      i_q_ext_in      => i_q_ext_in,
+      speed_mode_in   => speed_mode_in,
+      temp_winding_in => temp_winding_in,
+      temp_valid_in   => temp_valid_in,
+      clear_faults_in => clear_faults_in,
+      run_in          => running,
+      out_valid       => open,
+      code_a          => code_a,
+      code_b          => code_b,
+      code_c          => code_c,
+      code_u_dc       => code_u_dc,
+      code_theta      => code_theta,
+      omega_ref       => omega_ref,
+      i_d_ref         => i_d_ref,
+      i_q_ext         => i_q_ext,
+      speed_mode      => speed_mode,
+      temp_winding    => temp_winding,
+      temp_valid      => temp_valid,
+      clear_faults    => clear_faults,
+      run             => run
+    );
+
+  words : entity work.telemetry_words
+    generic map (
+      ADC_BITS      => ADC_BITS,
+      POSITION_BITS => POSITION_BITS
+    )
+    port map (
+      clk             => clk,
+      rst             => rst,
+      in_valid        => active,
+      index           => index,
+      counter         => counter,
+      adc_a           => code_a,
+      adc_b           => code_b,
+      adc_c           => code_c,
+      adc_u_dc        => code_u_dc,
+      position_code   => code_theta,
+      omega_ref       => omega_ref,
+      i_d_ref         => i_d_ref,
+      i_q_ext         => i_q_ext,
+      theta_me        => theta_me,
+      omega_me        => omega_me,
+      u_dc            => u_dc,
+      i_d             => i_d,
+      i_q             => i_q,
+      i_q_ref         => i_q_ref,
+      lambda_d        => lambda_d,
+      lambda_q        => lambda_q,
+      u_d             => u_d,
+      u_q             => u_q,
+      compare_a       => compare_a,
+      compare_b       => compare_b,
+      compare_c       => compare_c,
+      temp_winding    => temp_winding,
+      psi_m           => psi_m,
+      run             => run,
+      speed_mode      => speed_mode,
+      temp_valid      => temp_valid,
+      clear_faults    => clear_faults,
+      current_at_rail => current_at_rail,
+      temp_lost       => temp_lost,
+      sat_d           => sat_d,
+      sat_q           => sat_q,
+      psi_held        => psi_held,
+      flux_faults     => flux_faults,
+      v_dead          => v_dead,
+      v_comp          => v_comp,
+      out_valid       => valid_2,
+      word            => word_2
+    );
+
+  queue : entity work.packet_fifo
+    generic map (
+      WIDTH      => 32,
+      DEPTH_BITS => DEPTH_BITS,
+      PACKET     => COUNT
+    )
+    port map (
+      clk       => clk,
+      rst       => rst,
+      in_valid  => valid_2,
+      in_data   => word_2,
+      in_last   => last_2,
+      out_ready => m_axis_tready,
+      out_valid => m_axis_tvalid,
+      out_data  => m_axis_tdata,
+      out_last  => m_axis_tlast,
+      room      => room
+    );
+
+  dropped <= drops;
+
+end architecture rtl;

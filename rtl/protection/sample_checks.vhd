@@ -1,0 +1,138 @@
+-- Purpose: what a raw sample says that no healthy drive can say, one bit each, judged anew with every sample.
+--   0  overcurrent    |i_x| >= i_trip in any phase
+--   1  current sum    |i_a + i_b + i_c| >= sum_trip
+--   2  at the rail    a code at its end, in rail_samples samples one after another
+--   3  bus low        u_dc < u_dc_min
+--   4  bus high       u_dc >= u_dc_max
+--   5  position       |code - (2*code' - code'')| >= jump_max, from the third sample after a reset on
+-- sample_trip: any of them that fault_ignore does not name.
+-- Formats: limits U(1,8), jump_max U(-1,13), codes in 1/2**18 turn, differences the shorter way round.
+-- Latency: 1.  Rounding: values are cut (floor) to the limits' formats, |x| is the one's complement where x is
+-- negative: a negative current trips one LSB later, the sum up to 3/256 later or earlier.  No overflow: the sum has
+-- two bits more than its terms, the rail counter stays at its end.
+
+library ieee;
+use ieee.std_logic_1164.all;
+use ieee.numeric_std.all;
+use work.fixed_pkg.all;
+use work.fluxproof_pkg.all;
+
+entity sample_checks is
+  generic (
+    POSITION_BITS : positive range 8 to 18 := 16
+  );
+  port (
+    clk             : in  std_logic;
+    rst             : in  std_logic;
+    in_valid        : in  std_logic;
+    i_a             : in  signed(PU_W - 1 downto 0);
+    i_b             : in  signed(PU_W - 1 downto 0);
+    i_c             : in  signed(PU_W - 1 downto 0);
+    current_at_rail : in  unsigned(2 downto 0);
+    u_dc            : in  unsigned(DUTY_W - 1 downto 0);
+    u_dc_at_rail    : in  std_logic;
+    code_theta      : in  unsigned(POSITION_BITS - 1 downto 0);
+    i_trip          : in  unsigned(LIMIT_W - 1 downto 0);
+    sum_trip        : in  unsigned(LIMIT_W - 1 downto 0);
+    rail_samples    : in  unsigned(3 downto 0);
+    u_dc_min        : in  unsigned(LIMIT_W - 1 downto 0);
+    u_dc_max        : in  unsigned(LIMIT_W - 1 downto 0);
+    jump_max        : in  unsigned(11 downto 0);
+    fault_ignore    : in  unsigned(6 downto 0);
+    out_valid       : out std_logic;
+    sample_faults   : out unsigned(5 downto 0);
+    sample_trip     : out std_logic
+  );
+end entity sample_checks;
+
+architecture rtl of sample_checks is
+  constant LATENCY : positive := SAMPLE_CHECKS_LATENCY;
+  constant DROP    : natural  := SAMPLE_CHECKS_DROP_LIMIT;
+
+  -- State
+  signal code     : unsigned(TURN_W - 1 downto 0);
+  signal expected : unsigned(TURN_W - 1 downto 0);
+  signal seen     : unsigned(1 downto 0);
+  signal railed   : unsigned(3 downto 0);
+
+  signal valid     : std_logic_vector(0 to LATENCY);
+  signal a_0       : signed(LIMIT_W downto 0);
+  signal b_0       : signed(LIMIT_W downto 0);
+  signal c_0       : signed(LIMIT_W downto 0);
+  signal sum_0     : signed(LIMIT_W + 2 downto 0);
+  signal bus_0     : unsigned(LIMIT_W - 1 downto 0);
+  signal code_0    : unsigned(TURN_W - 1 downto 0);
+  signal away_0    : signed(TURN_W - 1 downto 0);
+  signal off_0     : signed(TURN_W - 1 - SAMPLE_CHECKS_DROP_JUMP downto 0);
+  signal at_rail_0 : std_logic;
+  signal railed_0  : unsigned(3 downto 0);
+  signal faults_0  : unsigned(5 downto 0);
+
+  function reaches (x : signed; limit : unsigned) return std_logic is
+    variable magnitude : signed(x'length - 1 downto 0);
+  begin
+    magnitude := x;
+    if magnitude(magnitude'high) = '1' then
+      magnitude := not magnitude;
+    end if;
+    if limit <= unsigned(magnitude) then
+      return '1';
+    end if;
+    return '0';
+  end function;
+begin
+  valid(0) <= in_valid;
+
+  a_0       <= i_a(PU_W - 1 downto DROP);
+  b_0       <= i_b(PU_W - 1 downto DROP);
+  c_0       <= i_c(PU_W - 1 downto DROP);
+  sum_0     <= resize(a_0, LIMIT_W + 3) + b_0 + c_0;
+  bus_0     <= u_dc(DUTY_W - 1 downto DROP);
+  code_0    <= shift_left(resize(code_theta, TURN_W), TURN_W - POSITION_BITS);
+  away_0    <= signed(code_0 - expected);
+  off_0     <= away_0(TURN_W - 1 downto SAMPLE_CHECKS_DROP_JUMP);
+  at_rail_0 <= (or current_at_rail) or u_dc_at_rail;
+  railed_0  <= railed when railed = 15 else railed + 1;
+
+  faults_0(0) <= reaches(a_0, i_trip) or reaches(b_0, i_trip) or reaches(c_0, i_trip);
+  faults_0(1) <= reaches(sum_0, sum_trip);
+  faults_0(2) <= at_rail_0 when railed_0 >= rail_samples else '0';
+  faults_0(3) <= '1' when bus_0 < u_dc_min else '0';
+  faults_0(4) <= '1' when bus_0 >= u_dc_max else '0';
+  faults_0(5) <= reaches(off_0, jump_max) when seen = SAMPLE_CHECKS_WARM else '0';
+
+  process (clk)
+  begin
+    if rising_edge(clk) then
+      valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
+
+      -- Stage 1: faults of this sample; expected = 2*code - code' for the next
+      if valid(0) = '1' then
+        sample_faults <= faults_0;
+        sample_trip   <= or (faults_0 and not fault_ignore(5 downto 0));
+        code          <= code_0;
+        expected      <= shift_left(code_0, 1) - code;
+        railed        <= (others => '0');
+        if at_rail_0 = '1' then
+          railed <= railed_0;
+        end if;
+        if seen /= SAMPLE_CHECKS_WARM then
+          seen <= seen + 1;
+        end if;
+      end if;
+
+      if rst = '1' then
+        valid(1 to LATENCY) <= (others => '0');
+        code                <= (others => '0');
+        expected            <= (others => '0');
+        seen                <= (others => '0');
+        railed              <= (others => '0');
+        sample_faults       <= (others => '0');
+        sample_trip         <= '0';
+      end if;
+    end if;
+  end process;
+
+  out_valid <= valid(LATENCY);
+
+end architecture rtl;

@@ -1,0 +1,89 @@
+-- Purpose: lets raw samples in no closer than the core can work on them, and tells when they stay away.
+-- A strobe closer than INTERVAL clocks to the last one that entered is not let in (sample_busy), is told
+-- (sample_early) and counted in early_samples, which stays at its end.
+-- sample_late is up watchdog clocks after the last sample until the next one enters; watchdog = 0 is always late.
+-- Formats: clocks.  Latency: 1 (every clock is a sample).
+-- No wrap: the age is counted up to watchdog and no further, so that any new value of it acts at once.
+
+library ieee;
+use ieee.std_logic_1164.all;
+use ieee.numeric_std.all;
+use work.fixed_pkg.all;
+use work.fluxproof_pkg.all;
+
+entity sample_guard is
+  generic (
+    INTERVAL : positive range 2 to 256 := 48
+  );
+  port (
+    clk           : in  std_logic;
+    rst           : in  std_logic;
+    sample_valid  : in  std_logic;
+    clear_trip    : in  std_logic;
+    watchdog      : in  unsigned(19 downto 0);
+    sample_busy   : out std_logic;
+    sample_early  : out std_logic;
+    sample_late   : out std_logic;
+    early_samples : out unsigned(7 downto 0)
+  );
+end entity sample_guard;
+
+architecture rtl of sample_guard is
+  -- State
+  signal hold    : unsigned(7 downto 0);
+  signal age     : unsigned(19 downto 0);
+  signal counted : unsigned(7 downto 0);
+
+  signal busy    : std_logic;
+  signal entered : std_logic;
+  signal early   : std_logic;
+  signal expired : std_logic;
+begin
+  busy    <= or hold;
+  entered <= sample_valid and not busy;
+  early   <= sample_valid and busy;
+  expired <= '1' when age >= watchdog else '0';
+
+  process (clk)
+    variable counted_v : unsigned(7 downto 0);
+  begin
+    if rising_edge(clk) then
+      -- Clocks until the next sample may enter, and since the last one did
+      if entered = '1' then
+        hold <= to_unsigned(INTERVAL - 1, 8);
+        age  <= to_unsigned(SAMPLE_GUARD_AHEAD, 20);
+      else
+        if busy = '1' then
+          hold <= hold - 1;
+        end if;
+        if expired = '0' then
+          age <= age + 1;
+        end if;
+      end if;
+
+      -- What is told
+      counted_v := counted;
+      if clear_trip = '1' then
+        counted_v := (others => '0');
+      end if;
+      if early = '1' and counted_v /= 255 then
+        counted_v := counted_v + 1;
+      end if;
+      counted      <= counted_v;
+      sample_early <= early;
+      sample_late  <= expired and not entered;
+
+      if rst = '1' then
+        hold         <= (others => '0');
+        age          <= (others => '0');
+        counted      <= (others => '0');
+        sample_early <= '0';
+        sample_late  <= '0';
+      end if;
+    end if;
+  end process;
+
+  sample_busy   <= busy;
+  early_samples <= counted;
+
+end architecture rtl;

@@ -1,0 +1,1 @@
+"""Packaging: the AXI top, IP-XACT, FuseSoC; all generated from the entities and the register map."""

@@ -1,0 +1,22 @@
+"""Every committed file that makes the core a part of somebody's project, as text; see scripts/generate.py."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from scripts.package import axi_top, fusesoc_core, ipxact, xgui
+from scripts.sources import RTL
+
+
+def files(rtl: Path = RTL) -> dict[Path, str]:
+    """{path: text}: the AXI top, and what describes it for Vivado and FuseSoC.
+
+    ``rtl`` holds the entities that the top is made of.  The top itself need not be there yet.
+    """
+    top = axi_top.render(rtl)
+    return {
+        axi_top.PATH: top,
+        ipxact.PATH: ipxact.render(top, rtl),
+        xgui.PATH: xgui.render(top),
+        fusesoc_core.PATH: fusesoc_core.render(rtl),
+    }

@@ -1,0 +1,203 @@
+/* Brings a drive up over its registers: is it the right core, load the drive, check, enable, ramp the speed up and
+ * down, read back, stop.  The gates are off before it starts and, whatever goes wrong, when it ends.
+ *
+ *   fluxproof registers drive.toml --format c > drive_registers.h
+ *   cc -Wall -Wextra -I software -I . software/bring_up.c software/bus_uio.c -o bring_up
+ *   ./bring_up 300          speed in rpm
+ */
+
+#include "fluxproof_bus.h"
+#include "fluxproof_registers.h" /* generated with the core: where each register is */
+#include "drive_registers.h"     /* generated from your drive.toml: what goes into it */
+
+#include <math.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+#define AT(name) ((uint32_t)offsetof(fluxproof_t, name))
+#define COUNT(list) (sizeof(list) / sizeof(list)[0])
+
+enum { STEPS = 20, STEP_US = 10000, SETTLE_STEPS = 20 };
+
+static const double PI = 3.14159265358979;
+
+/* ------------------------------------------------------------------ small helpers */
+
+/* Off first, words later. */
+static void fail(const char *format, ...)
+{
+    bus_write(AT(enable), 0);
+    va_list arguments;
+    va_start(arguments, format);
+    fputs("bring_up: ", stderr);
+    vfprintf(stderr, format, arguments);
+    fputc('\n', stderr);
+    va_end(arguments);
+    exit(1);
+}
+
+static void put(uint32_t offset, uint32_t value)
+{
+    if (!bus_write(offset, value))
+        fail("the core refused 0x%08x at 0x%03x", (unsigned)value, (unsigned)offset);
+}
+
+static uint32_t get(uint32_t offset)
+{
+    uint32_t value;
+    if (!bus_read(offset, &value))
+        fail("nothing to read at 0x%03x", (unsigned)offset);
+    return value;
+}
+
+static int32_t get_signed(uint32_t offset)
+{
+    return (int32_t)get(offset);
+}
+
+static bool flag(uint32_t mask)
+{
+    return (get(AT(flags)) & mask) != 0;
+}
+
+/* ------------------------------------------------------------------ the steps */
+
+static void identify(void)
+{
+    uint32_t letters = get(AT(identification)), version = get(AT(version));
+    if (letters != FLUXPROOF__IDENTIFICATION__VALUE_reset)
+        fail("no Fluxproof core here: identification is 0x%08x", (unsigned)letters);
+    if (version >> 16 != FLUXPROOF__VERSION__VALUE_reset >> 16)
+        fail("core version 0x%06x, header 0x%06x", (unsigned)version, FLUXPROOF__VERSION__VALUE_reset);
+    printf("core %u.%u.%u, %u Hz\n", version >> 16 & 255, version >> 8 & 255, version & 255, get(AT(clock_hz)));
+}
+
+/* The register values were worked out for these widths and this carrier. */
+static void check_generics(void)
+{
+    const struct {
+        const char *name;
+        uint32_t offset, wanted;
+    } list[] = {
+        {"ADC_BITS", AT(adc_bits), FLUXPROOF_ADC_BITS},
+        {"POSITION_BITS", AT(position_bits), FLUXPROOF_POSITION_BITS},
+        {"CARRIER_HALF", AT(carrier_half), FLUXPROOF_CARRIER_HALF},
+    };
+    for (size_t k = 0; k < COUNT(list); k++) {
+        uint32_t got = get(list[k].offset);
+        if (got != list[k].wanted)
+            fail("the core has %s = %u, drive_registers.h is for %u", list[k].name, (unsigned)got,
+                 (unsigned)list[k].wanted);
+    }
+}
+
+static void load_drive(void)
+{
+    put(AT(enable), 0);
+    put(AT(omega_ref), 0);
+    put(AT(i_d_ref), 0);
+    put(AT(speed_mode), 1);
+    for (size_t k = 0; k < COUNT(fluxproof_settings); k++)
+        put(fluxproof_settings[k].offset, (uint32_t)fluxproof_settings[k].value);
+    for (size_t k = 0; k < COUNT(fluxproof_settings); k++) {
+        uint32_t got = get(fluxproof_settings[k].offset);
+        if (got != (uint32_t)fluxproof_settings[k].value)
+            fail("0x%03x holds 0x%08x, wanted 0x%08x", (unsigned)fluxproof_settings[k].offset, (unsigned)got,
+                 (unsigned)fluxproof_settings[k].value);
+    }
+    printf("%u registers loaded and read back\n", (unsigned)COUNT(fluxproof_settings));
+}
+
+/* With the gates off: settings taken, sensors sane, old faults forgotten. */
+static void check_at_rest(void)
+{
+    wait_us(1000);
+    if (flag(FLUXPROOF__FLAGS__SETTING_REFUSED_bm))
+        fail("dead_time and min_pulse contradict each other");
+    if (flag(FLUXPROOF__FLAGS__CURRENT_AT_RAIL_bm))
+        fail("a current code is at its end: is the converter connected?");
+    if (flag(FLUXPROOF__FLAGS__U_DC_LOW_bm))
+        fail("no bus voltage");
+    put(AT(clear_trip), 1);
+    put(AT(clear_faults), 1);
+    wait_us(1000);
+    if (flag(FLUXPROOF__FLAGS__TRIPPED_bm))
+        fail("tripped, and the cause is still there: fault_flags 0x%03x", (unsigned)get(AT(fault_flags)));
+    printf("bus %.1f V\n", get(AT(u_dc)) / 65536.0 * FLUXPROOF_BASE_VOLTAGE_V);
+}
+
+static void enable_gates(void)
+{
+    put(AT(enable), 1);
+    wait_us(1000);
+    if (!flag(FLUXPROOF__FLAGS__RUNNING_bm))
+        fail("gates do not start: flags 0x%04x, first_fault 0x%02x", (unsigned)get(AT(flags)),
+             (unsigned)get(AT(first_fault)));
+}
+
+/* Mechanical speed in rpm from and to the core's per unit of electrical speed. */
+static double rpm_per_unit(void)
+{
+    return FLUXPROOF_BASE_OMEGA_ME_RAD_S / get(AT(pole_pairs)) * 30.0 / PI / 65536.0;
+}
+
+static double speed_rpm(void)
+{
+    return get_signed(AT(omega_me)) * rpm_per_unit();
+}
+
+static double current_a(uint32_t offset)
+{
+    return get_signed(offset) / 65536.0 * FLUXPROOF_BASE_CURRENT_A;
+}
+
+static void check_running(void)
+{
+    if (flag(FLUXPROOF__FLAGS__TRIPPED_bm))
+        fail("tripped at %.0f rpm: first_fault 0x%02x", speed_rpm(), (unsigned)get(AT(first_fault)));
+}
+
+static void ramp(double from, double to)
+{
+    for (int k = 1; k <= STEPS; k++) {
+        double rpm = from + (to - from) * k / STEPS;
+        put(AT(omega_ref), (uint32_t)(int32_t)lround(rpm / rpm_per_unit()));
+        wait_us(STEP_US);
+        check_running();
+    }
+    for (int k = 0; k < SETTLE_STEPS; k++) {
+        wait_us(STEP_US);
+        check_running();
+    }
+    printf("%.0f rpm wanted, %.1f rpm measured, i_d %.2f A, i_q %.2f A\n", to, speed_rpm(), current_a(AT(i_d)),
+           current_a(AT(i_q)));
+}
+
+static void stop(void)
+{
+    put(AT(enable), 0);
+    wait_us(1000);
+    if (flag(FLUXPROOF__FLAGS__RUNNING_bm))
+        fail("gates still switch after enable = 0");
+    puts("stopped, gates off");
+}
+
+int main(int argc, char **argv)
+{
+    setvbuf(stdout, NULL, _IOLBF, 0);
+    double rpm = argc > 1 ? atof(argv[1]) : 300.0;
+    identify();
+    check_generics();
+    load_drive();
+    check_at_rest();
+    enable_gates();
+    ramp(0.0, rpm);
+    double reached = speed_rpm();
+    if (fabs(reached - rpm) > 0.02 * fabs(rpm) + 5.0)
+        fail("%.1f rpm instead of %.0f", reached, rpm);
+    ramp(rpm, 0.0);
+    stop();
+    return 0;
+}
