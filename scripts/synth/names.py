@@ -28,7 +28,9 @@ class Names:
         netlist = json.loads((folder / "design.json").read_text())
         self._cells = netlist["modules"][NAME]["cells"]
         nets = netlist["modules"][NAME]["netnames"]
-        self._chain = {b: (c, n) for c in ("given", "taken") for n, b in enumerate(nets[c]["bits"])}
+        self._chain = {
+            b: (c, n) for c in ("given", "taken") for n, b in enumerate(nets.get(c, {}).get("bits", []))
+        }
         self._ports = chains((folder / "design.v").read_text(), module)
         self._lines = (folder / "design.v").read_text().splitlines()
         self._starts, self._modules, self._signals = [], [], {}
@@ -39,9 +41,11 @@ class Names:
             elif (found := _SIGNAL.match(line)) and self._modules:
                 self._signals[self._modules[-1], found.group(2)] = found.group(1)
 
-    def _port(self, bit: int) -> str:
+    def _port(self, bit: int, near: str) -> str:
         """``input NAME`` or ``output NAME`` that a register of the wrapper stands for."""
-        chain, place = self._chain[bit]
+        chain, place = self._chain.get(bit, ("", 0))
+        if not chain:
+            return near
         members = self._ports["given" if chain == "given" else "made"]
         name = members[bisect_right([low for _, low in members], place) - 1][0]
         return f"{'input' if chain == 'given' else 'output'} {name}"
@@ -55,7 +59,7 @@ class Names:
         first, last = int(found.group(1)), int(found.group(2))
         module = self._modules[bisect_right(self._starts, first) - 1]
         if module == NAME:
-            return self._port(known["connections"]["Q"][0])
+            return self._port(known["connections"]["Q"][0], near)
         for line in self._lines[first - 1 : last]:
             if assigned := _ASSIGNED.match(line):
                 net = assigned.group(1)
