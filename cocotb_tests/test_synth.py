@@ -225,6 +225,7 @@ endmodule
         "dut.a_TRELLIS_FF_Q": cell("TRELLIS_FF", chain, 31),
         "taken_TRELLIS_FF_Q": cell("TRELLIS_FF", chain, 40),
         "x_LUT4_Z": {"type": "LUT4", "attributes": {}},
+        "dut.n9.0.0": {"type": "DP16KD", "attributes": {}},
     }
     nets = {"given": {"bits": [30, 31]}, "taken": {"bits": [40, 41]}}
     (tmp_path / "design.json").write_text(
@@ -237,6 +238,7 @@ endmodule
         "input a",
         "output c",
         "x",
+        "block RAM dut.n9.0.0",
     ]
 
 

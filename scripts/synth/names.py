@@ -55,7 +55,7 @@ class Names:
         near, known = _TAIL.split(cell, maxsplit=1)[0], self._cells.get(cell, {})
         found = _LINE.search(known.get("attributes", {}).get("src", ""))
         if not found:
-            return near
+            return f"block RAM {near}" if known.get("type") == "DP16KD" else near
         first, last = int(found.group(1)), int(found.group(2))
         module = self._modules[bisect_right(self._starts, first) - 1]
         if module == NAME:
