@@ -13,6 +13,7 @@ from scripts.synth.__main__ import SMALL
 from scripts.synth.count import Count, count, read_cells
 from scripts.synth.ecp5 import read_path
 from scripts.synth.groups import CORE, GROUPS, check, instances
+from scripts.synth.names import Names
 from scripts.synth.wrapper import ports, wrap
 from scripts.synth.yosys import Design, modules_of, part_of, read_sta
 
@@ -192,6 +193,53 @@ def test_the_wrapper_reaches_every_bit():
     text = wrap(MODULE, "m")
     assert "m dut (.clk(clk), .a(given[2:0]), .b(given[3:3]), .c(made[1:0]), .d(made[2:2]));" in text
     assert "reg [3:0] given" in text and "reg [2:0] taken" in text
+
+
+def test_registers_have_the_names_of_the_vhdl(tmp_path):
+    verilog = """module m
+  (input  clk,
+   input [1:0] a,
+   output [1:0] c);
+  reg [1:0] n7_q;
+  assign prod_2 = n7_q; // (signal)
+  /* control/x.vhd:12:3  */
+  assign n6_o = $signed(a) * $signed(a); // smul
+  always @(posedge clk)
+    n7_q <= n6_o;
+endmodule
+"""
+    text = verilog + wrap(verilog, "m")
+    (tmp_path / "design.v").write_text(text)
+    chain = next(n for n, line in enumerate(text.splitlines(), 1) if "given <=" in line)
+
+    def cell(kind, line, bit=99):
+        return {
+            "type": kind,
+            "attributes": {"src": f"design.v:{line}.3-{line + 1}.9"},
+            "connections": {"Q": [bit]},
+        }
+
+    cells = {
+        "x_TRELLIS_FF_Q_1": cell("TRELLIS_FF", 9),
+        "x_MULT18X18D_P9": cell("MULT18X18D", 8),
+        "dut.a_TRELLIS_FF_Q": cell("TRELLIS_FF", chain, 31),
+        "taken_TRELLIS_FF_Q": cell("TRELLIS_FF", chain, 40),
+        "x_LUT4_Z": {"type": "LUT4", "attributes": {}},
+        "dut.n9.0.0": {"type": "DP16KD", "attributes": {}},
+    }
+    nets = {"given": {"bits": [30, 31]}, "taken": {"bits": [40, 41]}}
+    (tmp_path / "design.json").write_text(
+        json.dumps({"modules": {"shifted": {"cells": cells, "netnames": nets}}})
+    )
+    names = Names(tmp_path, "m")
+    assert [names.register(name) for name in cells] == [
+        "m.prod_2",
+        "multiplier of control/x.vhd:12",
+        "input a",
+        "output c",
+        "x",
+        "block RAM dut.n9.0.0",
+    ]
 
 
 def test_a_path_is_read_from_the_report():

@@ -88,7 +88,7 @@ class Routing:
         self.folder = Path(self._scratch.name)
         (self.folder / "design.v").write_text(verilog + wrap(verilog, module))
         yosys(["read_verilog design.v", f"synth_ecp5 -top {NAME} -json design.json"], self.folder)
-        self.names = Names(self.folder, NAME)
+        self.names = Names(self.folder, module)
         self.multipliers = self._absorb() if absorb_registers else {}
 
     def _absorb(self) -> dict[str, int]:
