@@ -215,8 +215,8 @@ BLOCK = Block(
         Port("v_comp_limited", BIT, doc="the compensation reached its limit"),
     ),
     state=State(),
-    latency=17,
-    interval=17,
+    latency=24,
+    interval=24,
     constants={
         "V_STATE_W": V_STATE_W,
         "V_FINE_W": V_FINE.width,

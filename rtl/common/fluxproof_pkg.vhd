@@ -35,7 +35,7 @@ package fluxproof_pkg is
 
   -- fluxproof: clocks from the raw sample to the duties, least distance of two samples
   constant FLUXPROOF_SAMPLE_TO_DUTY : positive := 39;
-  constant FLUXPROOF_SAMPLE_INTERVAL : positive := 48;
+  constant FLUXPROOF_SAMPLE_INTERVAL : positive := 55;
 
   -- sqrt: 001, section 5.2: voltage limit of the current regulation
   constant SQRT_LATENCY : positive := 6;
@@ -446,7 +446,7 @@ package fluxproof_pkg is
   constant CLEAN_VOLTAGE_DROP : natural := 11;
 
   -- v_dead_adaline: 000, eq. (10) and Fig. 4(a)
-  constant V_DEAD_ADALINE_LATENCY : positive := 17;
+  constant V_DEAD_ADALINE_LATENCY : positive := 24;
   constant V_DEAD_ADALINE_V_STATE_W : natural := 38;
   constant V_DEAD_ADALINE_V_FINE_W : natural := 25;
   constant V_DEAD_ADALINE_STEP_W : natural := 18;
