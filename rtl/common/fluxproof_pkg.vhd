@@ -379,7 +379,7 @@ package fluxproof_pkg is
   constant FLUX_INVERSE_PARK_LATENCY : positive := 4;
 
   -- flux_merge: 001, eq. (7); 'Merge of voltage and current models' of Fig. 8
-  constant FLUX_MERGE_LATENCY : positive := 10;
+  constant FLUX_MERGE_LATENCY : positive := 25;
   constant FLUX_MERGE_Y_W : natural := 25;
   constant FLUX_MERGE_X_W : natural := 34;
   constant FLUX_MERGE_DROP_RHO : natural := 10;
