@@ -416,7 +416,7 @@ package fluxproof_pkg is
   constant DELTA_LAMBDA_FADE : natural := 4;
 
   -- flux_compensation: 001, eq. (17): (K_p + K_i/s)*delta_lambda; the last term of eq. (16)
-  constant FLUX_COMPENSATION_LATENCY : positive := 6;
+  constant FLUX_COMPENSATION_LATENCY : positive := 10;
   constant FLUX_COMPENSATION_DROP_P : natural := 3;
   constant FLUX_COMPENSATION_DROP_I : natural := 10;
   constant FLUX_COMPENSATION_SHIFT_LIMIT : natural := 14;
