@@ -35,7 +35,7 @@ package fluxproof_pkg is
 
   -- fluxproof: clocks from the raw sample to the duties, least distance of two samples
   constant FLUXPROOF_SAMPLE_TO_DUTY : positive := 39;
-  constant FLUXPROOF_SAMPLE_INTERVAL : positive := 55;
+  constant FLUXPROOF_SAMPLE_INTERVAL : positive := 56;
 
   -- sqrt: 001, section 5.2: voltage limit of the current regulation
   constant SQRT_LATENCY : positive := 6;
@@ -423,14 +423,14 @@ package fluxproof_pkg is
   constant FLUX_COMPENSATION_FORGET : natural := 8;
 
   -- torque: 001, eq. (4)
-  constant TORQUE_LATENCY : positive := 4;
+  constant TORQUE_LATENCY : positive := 5;
   constant TORQUE_DROP : natural := 16;
 
   -- flux_monitor: none: what a drive needs besides
   constant FLUX_MONITOR_LATENCY : positive := 1;
 
   -- current_directions: 000, eq. (6)
-  constant CURRENT_DIRECTIONS_LATENCY : positive := 15;
+  constant CURRENT_DIRECTIONS_LATENCY : positive := 25;
   constant CURRENT_DIRECTIONS_ONE : natural := 65536;
   constant CURRENT_DIRECTIONS_SQRT3 : signed(17 downto 0) := to_signed(113512, 18);  -- 1.732050808 as U(1,16), signed for the multiplier
   constant CURRENT_DIRECTIONS_DROP_TURN : natural := 16;
