@@ -354,7 +354,7 @@ package fluxproof_pkg is
   constant GATE_GENERATION_LATENCY : positive := 1;
 
   -- winding_resistance: 000, eq. (12)
-  constant WINDING_RESISTANCE_LATENCY : positive := 6;
+  constant WINDING_RESISTANCE_LATENCY : positive := 7;
   constant WINDING_RESISTANCE_DROP_TCR : natural := 12;
   constant WINDING_RESISTANCE_DROP_RHO : natural := 19;
 
@@ -442,7 +442,7 @@ package fluxproof_pkg is
   constant DEAD_TIME_COMPENSATION_DROP : natural := 18;
 
   -- clean_voltage: 000, eq. (4); 001, eq. (5): the voltage cleaned of the inverter's distortion
-  constant CLEAN_VOLTAGE_LATENCY : positive := 4;
+  constant CLEAN_VOLTAGE_LATENCY : positive := 5;
   constant CLEAN_VOLTAGE_DROP : natural := 11;
 
   -- v_dead_adaline: 000, eq. (10) and Fig. 4(a)
