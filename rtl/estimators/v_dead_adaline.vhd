@@ -46,21 +46,21 @@ entity v_dead_adaline is
 end entity v_dead_adaline;
 
 architecture rtl of v_dead_adaline is
-  constant LATENCY     : positive := V_DEAD_ADALINE_LATENCY;
-  constant STATE_W     : positive := V_DEAD_ADALINE_V_STATE_W;
-  constant FINE_W      : positive := V_DEAD_ADALINE_V_FINE_W;
-  constant STEP_W      : positive := V_DEAD_ADALINE_STEP_W;
-  constant DROP_LP     : positive := V_DEAD_ADALINE_DROP_LP;
-  constant DROP_MODEL  : positive := V_DEAD_ADALINE_DROP_MODEL;
-  constant DROP_STEP   : positive := V_DEAD_ADALINE_DROP_STEP;
-  constant DROP_ETA    : positive := V_DEAD_ADALINE_DROP_ETA;
-  constant DROP_ZETA   : positive := V_DEAD_ADALINE_DROP_ZETA;
-  constant DROP_GAMMA  : positive := V_DEAD_ADALINE_DROP_GAMMA;
-  constant TO_LEG      : positive := V_DEAD_ADALINE_TO_LEG;
-  constant FINE_TO_LEG : positive := V_DEAD_ADALINE_FINE_TO_LEG;
-  constant SUM_W       : positive := 48;
-  constant ONE         : positive := DROP_STEP - FINE_TO_LEG;  -- fine*2**ONE drops to V_LEG what d_h*e drops
-  constant TO_ZETA     : natural  := DROP_ZETA - DROP_LP;        -- k_lp*2**TO_ZETA drops what zeta drops
+  constant LATENCY     : positive                     := V_DEAD_ADALINE_LATENCY;
+  constant STATE_W     : positive                     := V_DEAD_ADALINE_V_STATE_W;
+  constant FINE_W      : positive                     := V_DEAD_ADALINE_V_FINE_W;
+  constant STEP_W      : positive                     := V_DEAD_ADALINE_STEP_W;
+  constant DROP_LP     : positive                     := V_DEAD_ADALINE_DROP_LP;
+  constant DROP_MODEL  : positive                     := V_DEAD_ADALINE_DROP_MODEL;
+  constant DROP_STEP   : positive                     := V_DEAD_ADALINE_DROP_STEP;
+  constant DROP_ETA    : positive                     := V_DEAD_ADALINE_DROP_ETA;
+  constant DROP_ZETA   : positive                     := V_DEAD_ADALINE_DROP_ZETA;
+  constant DROP_GAMMA  : positive                     := V_DEAD_ADALINE_DROP_GAMMA;
+  constant TO_LEG      : positive                     := V_DEAD_ADALINE_TO_LEG;
+  constant FINE_TO_LEG : positive                     := V_DEAD_ADALINE_FINE_TO_LEG;
+  constant SUM_W       : positive                     := 48;
+  constant ONE         : positive                     := DROP_STEP - FINE_TO_LEG;  -- fine*2**ONE drops to V_LEG what d_h*e drops
+  constant TO_ZETA     : natural                      := DROP_ZETA - DROP_LP;        -- k_lp*2**TO_ZETA drops what zeta drops
   constant LP_ZERO     : signed(STATE_W - 1 downto 0) := to_signed(2 ** (PU_TO_INTEGRAL - 1), STATE_W);
 
   -- State; lp_u, lp_d and v_sum take turns at one scale: next, then, last.  lp holds half an LSB of PU more, so that
@@ -100,11 +100,11 @@ architecture rtl of v_dead_adaline is
   -- so_far + |x|; what the complement of a negative x lacks comes as a carry.
   function longer (so_far : unsigned; x : signed) return unsigned is
     variable more : unsigned(so_far'length - 1 downto 0);
-    variable sum  : unsigned(so_far'length downto 0);
+    variable both : unsigned(so_far'length downto 0);
   begin
     more := resize(unsigned(x xor x(x'high)), so_far'length);
-    sum  := (more & x(x'high)) + (so_far & x(x'high));
-    return sum(so_far'length downto 1);
+    both := (more & x(x'high)) + (so_far & x(x'high));
+    return both(so_far'length downto 1);
   end function;
 begin
   valid(0) <= in_valid;
@@ -115,7 +115,6 @@ begin
   h   <= saturate(not diff, PU_W);
 
   lp_0 <= turn_next(INTEGRAL_W - 1 downto PU_TO_INTEGRAL);
-
 
   factor_b <= h when valid(1) = '1' or valid(5) = '1' else
               pull_12 when valid(12) = '1' else
