@@ -59,8 +59,8 @@ architecture rtl of v_dead_adaline is
   constant TO_LEG      : positive                     := V_DEAD_ADALINE_TO_LEG;
   constant FINE_TO_LEG : positive                     := V_DEAD_ADALINE_FINE_TO_LEG;
   constant SUM_W       : positive                     := 48;
-  constant ONE         : positive                     := DROP_STEP - FINE_TO_LEG;  -- fine*2**ONE drops to V_LEG what d_h*e drops
-  constant TO_ZETA     : natural                      := DROP_ZETA - DROP_LP;        -- k_lp*2**TO_ZETA drops what zeta drops
+  constant ONE         : positive                     := DROP_STEP - FINE_TO_LEG;  -- fine*2**ONE drops what d_h*e does
+  constant TO_ZETA     : natural                      := DROP_ZETA - DROP_LP;        -- k_lp*2**TO_ZETA as zeta does
   constant LP_ZERO     : signed(STATE_W - 1 downto 0) := to_signed(2 ** (PU_TO_INTEGRAL - 1), STATE_W);
 
   -- State; lp_u, lp_d and v_sum take turns at one scale: next, then, last.  lp holds half an LSB of PU more, so that
@@ -94,7 +94,8 @@ architecture rtl of v_dead_adaline is
   signal v         : signed(STATE_W + 2 downto 0);       -- v_state moved at clock 15, v_comp asked for at clock 22
   signal v_past    : std_logic;
   signal v_end_15  : signed(V_LEG_W - 1 downto 0);
-  signal adding_18 : std_logic;
+  signal adding_17 : std_logic;
+  signal zeta_17   : signed(PU_W - 1 downto 0);
   signal dead_23   : signed(V_LEG_W - 1 downto 0);
 
   -- so_far + |x|; what the complement of a negative x lacks comes as a carry.
@@ -116,9 +117,12 @@ begin
 
   lp_0 <= turn_next(INTEGRAL_W - 1 downto PU_TO_INTEGRAL);
 
+  adding_17 <= learning and beyond(fine, v_thr, FINE_TO_LEG);
+  zeta_17   <= signed('0' & zeta) when adding_17 = '1' else (others => '0');
+
   factor_b <= h when valid(1) = '1' or valid(5) = '1' else
               pull_12 when valid(12) = '1' else
-              signed('0' & zeta) when valid(17) = '1' else
+              zeta_17 when valid(17) = '1' else
               signed('0' & gamma) when valid(18) = '1' else
               to_signed(2 ** ONE, PU_W);
 
@@ -174,9 +178,6 @@ begin
       if (valid(2) or valid(6) or valid(7) or valid(10) or valid(13) or valid(18) or valid(19) or valid(21)) = '1' then
         prod <= mul_a * mul_b;
       end if;
-      if valid(18) = '1' and adding_18 = '0' then
-        prod <= (others => '0');
-      end if;
 
       -- Stages 4, 8, 9, 12, 15, 20, 22, 23: sum = addend + prod
       if (valid(3) or valid(7) or valid(8) or valid(11) or valid(14) or valid(19) or valid(21) or valid(22)) = '1' then
@@ -228,10 +229,9 @@ begin
         fine <= resize(round_half_up(v_state, V_DEAD_ADALINE_DROP_FINE), FINE_W);
       end if;
 
-      -- Stage 18: adding = |fine| > v_thr
+      -- Stage 18: fine, and zeta where |fine| > v_thr
       if valid(17) = '1' then
-        adding_18 <= learning and beyond(fine, v_thr, FINE_TO_LEG);
-        mul_a     <= fine;
+        mul_a <= fine;
       end if;
 
       -- Stages 22, 23: v_comp = v_sum + fine*gamma, narrowed and limited; the rounding moves nothing past the limit
