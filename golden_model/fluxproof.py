@@ -85,8 +85,8 @@ WIRING = {
     "torque_estimate": (torque, ("flux",)),
     "inverter_loss": (v_dead_adaline, ("circle", "direction_functions")),
     "magnet_flux": (psi_adaline, ("circle", "direction_functions")),
-    "directions": (current_directions, ("circle", "stator_frame", "speed_measurement")),
-    "monitor": (flux_monitor, ("compensation", "merge", "bus_reciprocal")),
+    "directions": (current_directions, ("compensation_dq", "stator_frame", "speed_measurement")),
+    "monitor": (flux_monitor, ("inverter_loss", "compensation", "merge", "bus_reciprocal")),
     "checks": (sample_checks, ("conditioning", "bus_voltage")),
 }
 

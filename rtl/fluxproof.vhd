@@ -242,7 +242,7 @@ architecture rtl of fluxproof is
   signal model_ab_valid       : std_logic;
   signal factor_valid         : std_logic;
   signal delta_valid          : std_logic;
-  signal lambda_pi_valid      : std_logic;
+  signal loss_valid           : std_logic;
   signal clear_faults         : std_logic;
   signal u_comp_alpha         : signed(PU_W - 1 downto 0);
   signal u_comp_beta          : signed(PU_W - 1 downto 0);
@@ -839,7 +839,7 @@ begin
       flux_kp              => flux_kp,
       flux_ki              => flux_ki,
       delta_max            => delta_max,
-      out_valid            => lambda_pi_valid,
+      out_valid            => open,
       lambda_pi_d          => lambda_pi_d,
       lambda_pi_q          => lambda_pi_q,
       lambda_add_d         => lambda_add_d,
@@ -882,7 +882,7 @@ begin
       v_comp_max      => v_comp_max,
       i_learn         => i_learn,
       compensate      => compensate,
-      out_valid       => open,
+      out_valid       => loss_valid,
       v_dead          => v_dead,
       v_comp          => v_comp,
       v_leg           => v_leg,
@@ -918,7 +918,7 @@ begin
     port map (
       clk       => clk,
       rst       => rst,
-      in_valid  => dq_voltage_valid,
+      in_valid  => comp_valid,
       i_alpha   => i_alpha,
       i_beta    => i_beta,
       omega_me  => omega_me,
@@ -933,7 +933,7 @@ begin
     port map (
       clk                  => clk,
       rst                  => rst,
-      in_valid             => lambda_pi_valid,
+      in_valid             => loss_valid,
       current_at_rail      => current_at_rail,
       u_dc_at_rail         => u_dc_at_rail,
       u_dc_low             => u_dc_low,

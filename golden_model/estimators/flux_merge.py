@@ -192,8 +192,8 @@ BLOCK = Block(
         Port("merge_limited", BIT, doc="the merge reached its range"),
     ),
     state=State(),
-    latency=10,
-    interval=10,
+    latency=25,
+    interval=25,
     constants={
         "Y_W": Y_W,
         "X_W": X_W,

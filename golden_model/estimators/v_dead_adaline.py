@@ -175,6 +175,11 @@ def stimuli(rng, _config):
         rows += [{**end, "d_d": 80000, "u_pi_d": sign * 131071} for _ in range(90)]
     for k_lp, u_pi_d, d_d, run in ((0, 0, 0, 0), (524032, -1, 0, 1), (K_LP.hi, PU.lo, 0, 1), (0, 0, 40000, 1)):
         rows.append({**calm, **gains, "k_lp": k_lp, "u_pi_d": u_pi_d, "d_d": d_d, "run": run})  # lp_u past its end
+    for k_lp, u_pi_d, d_d, run in (
+        (0, 0, 0, 0), (524032, -1, 0, 1), (K_LP.hi, PU.lo, 0, 1), (652288, PU.lo + 1, 0, 1), (0, PU.lo, 40000, 1),
+    ):  # fmt: skip
+        end = {**calm, **gains, "eta_v": ETA_V_MAX, "run": run}
+        rows.append({**end, "k_lp": k_lp, "u_pi_d": u_pi_d, "d_d": d_d})  # lp_u past its end shows a sample later
     return rows
 
 
@@ -215,8 +220,8 @@ BLOCK = Block(
         Port("v_comp_limited", BIT, doc="the compensation reached its limit"),
     ),
     state=State(),
-    latency=17,
-    interval=17,
+    latency=24,
+    interval=24,
     constants={
         "V_STATE_W": V_STATE_W,
         "V_FINE_W": V_FINE.width,

@@ -32,6 +32,14 @@ package fixed_pkg is
   -- a - round_half_up(v, drop) by one carry; as wide as a, which must have room for the difference.
   function minus_rounded (a : signed; v : signed; drop : positive) return signed;
 
+  -- a at the scale of a product that drops bits, with the half that rounds it, for the adder behind a multiplier:
+  -- (rounding_base(a, drop, width) + v) / 2**drop = a + round_half_up(v, drop), floored by a slice.  With the
+  -- complement of a the complement of a - round_half_up(v, drop) comes out: that adder only adds.
+  function rounding_base (a : signed; drop : positive; width : positive) return signed;
+
+  -- '1' where x > limit*2**shift or x < -limit*2**shift, by one comparison; the sign of x tells which.
+  function beyond (x : signed; limit : unsigned; shift : positive) return std_logic;
+
 end package fixed_pkg;
 
 package body fixed_pkg is
@@ -117,6 +125,26 @@ package body fixed_pkg is
     -- What is rounded up is subtracted, so the floor needs no half.
     difference := (a & '0') - resize(v(v'high downto drop - 1), a'length + 1);
     return difference(a'length downto 1);
+  end function;
+
+  function rounding_base (a : signed; drop : positive; width : positive) return signed is
+    variable result : signed(width - 1 downto 0) := shift_left(resize(a, width), drop);
+  begin
+    result(drop - 1) := '1';
+    return result;
+  end function;
+
+  function beyond (x : signed; limit : unsigned; shift : positive) return std_logic is
+    alias v       : signed(x'length - 1 downto 0) is x;
+    variable size : unsigned(x'length - 2 - shift downto 0);
+    variable more : std_logic;
+    variable room : signed(maximum(size'length, limit'length) + 1 downto 0);
+  begin
+    -- The complement of a negative x is one less than -x: so where it reaches the limit, -x is past it.
+    size := unsigned(v(v'high - 1 downto shift) xor v(v'high));
+    more := v(v'high) or (or v(shift - 1 downto 0));
+    room := signed(resize(limit & '0', room'length)) - signed(resize(size & more, room'length));
+    return room(room'high);
   end function;
 
 end package body fixed_pkg;

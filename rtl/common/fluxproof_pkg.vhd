@@ -36,10 +36,10 @@ package fluxproof_pkg is
 
   -- fluxproof: clocks from the raw sample to the duties, least distance of two samples
   constant FLUXPROOF_SAMPLE_TO_DUTY : positive := 39;
-  constant FLUXPROOF_SAMPLE_INTERVAL : positive := 48;
+  constant FLUXPROOF_SAMPLE_INTERVAL : positive := 56;
 
   -- register_access: clocks that a write waits for the end of a sample
-  constant REGISTER_PATIENCE : positive := 64;
+  constant REGISTER_PATIENCE : positive := 72;
 
   -- sqrt: 001, section 5.2: voltage limit of the current regulation
   constant SQRT_LATENCY : positive := 6;
@@ -358,7 +358,7 @@ package fluxproof_pkg is
   constant GATE_GENERATION_LATENCY : positive := 1;
 
   -- winding_resistance: 000, eq. (12)
-  constant WINDING_RESISTANCE_LATENCY : positive := 6;
+  constant WINDING_RESISTANCE_LATENCY : positive := 7;
   constant WINDING_RESISTANCE_DROP_TCR : natural := 12;
   constant WINDING_RESISTANCE_DROP_RHO : natural := 19;
 
@@ -383,7 +383,7 @@ package fluxproof_pkg is
   constant FLUX_INVERSE_PARK_LATENCY : positive := 4;
 
   -- flux_merge: 001, eq. (7); 'Merge of voltage and current models' of Fig. 8
-  constant FLUX_MERGE_LATENCY : positive := 10;
+  constant FLUX_MERGE_LATENCY : positive := 25;
   constant FLUX_MERGE_Y_W : natural := 25;
   constant FLUX_MERGE_X_W : natural := 34;
   constant FLUX_MERGE_DROP_RHO : natural := 10;
@@ -413,28 +413,28 @@ package fluxproof_pkg is
   constant SPEED_RECIPROCAL_WEIGHT_ONE : natural := 65536;
 
   -- delta_lambda: 001, eq. (15); 'delta lambda_dq' of Fig. 8
-  constant DELTA_LAMBDA_LATENCY : positive := 8;
+  constant DELTA_LAMBDA_LATENCY : positive := 10;
   constant DELTA_LAMBDA_DROP_R : natural := 12;
   constant DELTA_LAMBDA_DROP_SHIFTED : natural := 5;
   constant DELTA_LAMBDA_DROP_FACTOR : natural := 17;
   constant DELTA_LAMBDA_FADE : natural := 4;
 
   -- flux_compensation: 001, eq. (17): (K_p + K_i/s)*delta_lambda; the last term of eq. (16)
-  constant FLUX_COMPENSATION_LATENCY : positive := 6;
+  constant FLUX_COMPENSATION_LATENCY : positive := 10;
   constant FLUX_COMPENSATION_DROP_P : natural := 3;
   constant FLUX_COMPENSATION_DROP_I : natural := 10;
   constant FLUX_COMPENSATION_SHIFT_LIMIT : natural := 14;
   constant FLUX_COMPENSATION_FORGET : natural := 8;
 
   -- torque: 001, eq. (4)
-  constant TORQUE_LATENCY : positive := 4;
+  constant TORQUE_LATENCY : positive := 5;
   constant TORQUE_DROP : natural := 16;
 
   -- flux_monitor: none: what a drive needs besides
   constant FLUX_MONITOR_LATENCY : positive := 1;
 
   -- current_directions: 000, eq. (6)
-  constant CURRENT_DIRECTIONS_LATENCY : positive := 15;
+  constant CURRENT_DIRECTIONS_LATENCY : positive := 25;
   constant CURRENT_DIRECTIONS_ONE : natural := 65536;
   constant CURRENT_DIRECTIONS_SQRT3 : signed(17 downto 0) := to_signed(113512, 18);  -- 1.732050808 as U(1,16), signed for the multiplier
   constant CURRENT_DIRECTIONS_DROP_TURN : natural := 16;
@@ -446,11 +446,11 @@ package fluxproof_pkg is
   constant DEAD_TIME_COMPENSATION_DROP : natural := 18;
 
   -- clean_voltage: 000, eq. (4); 001, eq. (5): the voltage cleaned of the inverter's distortion
-  constant CLEAN_VOLTAGE_LATENCY : positive := 4;
+  constant CLEAN_VOLTAGE_LATENCY : positive := 5;
   constant CLEAN_VOLTAGE_DROP : natural := 11;
 
   -- v_dead_adaline: 000, eq. (10) and Fig. 4(a)
-  constant V_DEAD_ADALINE_LATENCY : positive := 17;
+  constant V_DEAD_ADALINE_LATENCY : positive := 24;
   constant V_DEAD_ADALINE_V_STATE_W : natural := 38;
   constant V_DEAD_ADALINE_V_FINE_W : natural := 25;
   constant V_DEAD_ADALINE_STEP_W : natural := 18;
@@ -465,7 +465,7 @@ package fluxproof_pkg is
   constant V_DEAD_ADALINE_FINE_TO_LEG : natural := 7;
 
   -- psi_adaline: 000, eq. (13), with the reluctance term of eq. (7b)
-  constant PSI_ADALINE_LATENCY : positive := 11;
+  constant PSI_ADALINE_LATENCY : positive := 15;
   constant PSI_ADALINE_PSI_STATE_W : natural := 36;
   constant PSI_ADALINE_DROP_V : natural := 11;
   constant PSI_ADALINE_DROP_R : natural := 17;
@@ -481,7 +481,7 @@ package fluxproof_pkg is
   -- telemetry_words: none: what a recording needs
   constant TELEMETRY_WORDS_LATENCY : positive := 2;
   constant TELEMETRY_WORDS_COUNT : natural := 24;
-  constant TELEMETRY_WORDS_START : natural := 26;
+  constant TELEMETRY_WORDS_START : natural := 34;
   constant TELEMETRY_WORDS_INDEX_W : natural := 5;
 
   -- telemetry: none: what a recording needs

@@ -2,7 +2,7 @@
 --   u_clean = u_applied - v_leg*s(k-1)
 -- s(k-1): the directions of the sample before, whose voltage fills the coming period.
 -- Formats: u FLUX, s PU, v_leg V_LEG; products exact.
--- Latency: 4 (alpha, beta follow each other).  Interval: 4.
+-- Latency: 5 (alpha, beta follow each other).  Interval: 5.
 -- Rounding: half up, each product.  The difference saturates.
 
 library ieee;
@@ -29,43 +29,51 @@ end entity clean_voltage;
 
 architecture rtl of clean_voltage is
   constant LATENCY : positive := CLEAN_VOLTAGE_LATENCY;
+  constant DROP    : positive := CLEAN_VOLTAGE_DROP;
+  constant SUM_W   : positive := FLUX_W + 1 + DROP;
 
   -- State: the directions of the sample before
   signal last_alpha : signed(PU_W - 1 downto 0);
   signal last_beta  : signed(PU_W - 1 downto 0);
 
   signal valid  : std_logic_vector(0 to LATENCY);
-  signal s_0    : signed(PU_W - 1 downto 0);
-  signal prod_1 : signed(V_LEG_W + PU_W - 1 downto 0);
-  signal u_1    : signed(FLUX_W - 1 downto 0);
-  signal diff_2 : signed(FLUX_W downto 0);
+  signal s_1    : signed(PU_W - 1 downto 0);
+  signal prod_2 : signed(V_LEG_W + PU_W - 1 downto 0);
+  signal u_2    : signed(FLUX_W - 1 downto 0);
+  signal sum_3  : signed(SUM_W - 1 downto 0);
+  signal diff_3 : signed(FLUX_W downto 0);
 begin
   valid(0) <= in_valid;
 
-  s_0 <= last_beta when valid(1) = '1' else last_alpha;
-  u_1 <= u_applied_beta when valid(2) = '1' else u_applied_alpha;
+  u_2 <= u_applied_beta when valid(3) = '1' else u_applied_alpha;
+
+  -- sum is the complement of u_applied - prod: the adder behind the multiplier only adds.
+  diff_3 <= not sum_3(FLUX_W + DROP downto DROP);
 
   process (clk)
   begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stage 1: prod = v_leg*s(k-1)
+      -- Stages 1, 2: prod = v_leg*s(k-1)
       if valid(0) = '1' or valid(1) = '1' then
-        prod_1 <= v_leg * s_0;
+        s_1 <= last_beta when valid(1) = '1' else last_alpha;
       end if;
-
-      -- Stage 2: diff = u_applied - prod
       if valid(1) = '1' or valid(2) = '1' then
-        diff_2 <= minus_rounded(resize(u_1, FLUX_W + 1), prod_1, CLEAN_VOLTAGE_DROP);
+        prod_2 <= v_leg * s_1;
       end if;
 
-      -- Stage 3: u_clean = diff, narrowed; alpha at clock 3, beta at 4
-      if valid(2) = '1' then
-        u_clean_alpha <= saturate(diff_2, FLUX_W);
+      -- Stage 3: diff = u_applied - prod
+      if valid(2) = '1' or valid(3) = '1' then
+        sum_3 <= rounding_base(not u_2, DROP, SUM_W) + prod_2;
       end if;
+
+      -- Stage 4: u_clean = diff, narrowed; alpha at clock 4, beta at 5
       if valid(3) = '1' then
-        u_clean_beta <= saturate(diff_2, FLUX_W);
+        u_clean_alpha <= saturate(diff_3, FLUX_W);
+      end if;
+      if valid(4) = '1' then
+        u_clean_beta <= saturate(diff_3, FLUX_W);
         last_alpha   <= s_alpha;
         last_beta    <= s_beta;
       end if;

@@ -5,7 +5,7 @@
 --   lambda_add = limit(delta_lambda)                                                      flux_mode 2
 -- limit: to +-delta_max, and told.  The addition is the PI with a gain of one and no integral.
 -- Formats: flux_kp U(7,10), flux_ki U(0,17), products and integral S(1,30), delta_max U(0,16), out FLUX.
--- Latency: 6 (d, q follow each other).  Interval: 6.  Rounding: half up; the limit is a multiple of FLUX's LSB.
+-- Latency: 10 (d, then q).  Interval: 10.  Rounding: half up; the limit is a multiple of FLUX's LSB.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -39,80 +39,63 @@ architecture rtl of flux_compensation is
   constant SHIFT_LIMIT : positive              := FLUX_COMPENSATION_SHIFT_LIMIT;
   constant DROP_P      : positive              := FLUX_COMPENSATION_DROP_P;
   constant DROP_I      : positive              := FLUX_COMPENSATION_DROP_I;
+  constant FORGET      : positive              := FLUX_COMPENSATION_FORGET;
   constant EARLIER     : natural               := FLUX_ESTIMATE_EARLIER;
   constant PROPOSED    : natural               := FLUX_ESTIMATE_PROPOSED;
   constant KP_ONE      : unsigned(16 downto 0) := to_unsigned(2 ** (DROP_P + FLUX_TO_STATE), 17);
-  constant LIMIT_W     : positive              := delta_max'length + 2;
-  constant TOTAL_W     : positive              := FLUX_W + flux_kp'length + 2 - DROP_P;
+  constant SUM_W       : positive              := FLUX_W + flux_kp'length + 2;
+  constant TURN        : positive              := 4;  -- clocks that q comes behind d
 
   -- State: the axes take turns: the one that comes next, and the other
   signal integral       : signed(FLUX_STATE_W - 1 downto 0);
   signal integral_other : signed(FLUX_STATE_W - 1 downto 0);
 
-  signal valid      : std_logic_vector(0 to LATENCY);
-  signal lower      : signed(LIMIT_W - 1 downto 0);
-  signal upper      : signed(LIMIT_W - 1 downto 0);
-  signal delta_0    : signed(FLUX_W - 1 downto 0);
-  signal integral_0 : signed(FLUX_STATE_W downto 0);
-  signal kp_2       : unsigned(flux_kp'range);
-  signal prod_i_1   : signed(FLUX_W + flux_ki'length downto 0);
-  signal sum_2      : signed(FLUX_STATE_W + 1 downto 0);
-  signal prod_p_3   : signed(FLUX_W + flux_kp'length downto 0);
-  signal moved_2    : signed(FLUX_STATE_W - 1 downto 0);
-  signal total_4    : signed(TOTAL_W - 1 downto 0);
-  signal side_4     : signed(1 downto 0);
-  signal lambda_4   : signed(FLUX_W - 1 downto 0);
-  signal limited_5  : std_logic;
-
-  -- +1 above, -1 below +-limit, which counts from bit SHIFT_LIMIT on: only x has bits below that.
-  function side (x : signed; limit : signed) return signed is
-    alias v       : signed(x'length - 1 downto 0) is x;
-    variable more : std_logic;
-    variable room : signed(x'length - SHIFT_LIMIT downto 0);
-  begin
-    more := or v(SHIFT_LIMIT - 1 downto 0);
-    room := resize(v(v'high downto SHIFT_LIMIT), room'length) + limit;
-    if (v(v'high downto SHIFT_LIMIT) & more) > (limit & '0') then
-      return "01";
-    elsif room < 0 then
-      return "11";
-    end if;
-    return "00";
-  end function;
+  signal valid     : std_logic_vector(0 to LATENCY);
+  signal step      : std_logic_vector(0 to LATENCY - TURN);  -- of either axis
+  signal upper     : signed(FLUX_STATE_W - 1 downto 0);
+  signal lower     : signed(FLUX_STATE_W - 1 downto 0);
+  signal kp        : unsigned(flux_kp'range);
+  signal delta_0   : signed(FLUX_W - 1 downto 0);
+  signal delta_1   : signed(FLUX_W - 1 downto 0);
+  signal down_0    : std_logic;
+  signal mul_a_1   : signed(FLUX_W - 1 downto 0);
+  signal mul_b_1   : signed(flux_ki'length downto 0);
+  signal prod_i_2  : signed(FLUX_W + flux_ki'length downto 0);
+  signal sum_i_3   : signed(SUM_W - 1 downto 0);
+  signal moved_3   : signed(SUM_W - 1 - DROP_I downto 0);
+  signal past_3    : std_logic;
+  signal prod_p_4  : signed(FLUX_W + flux_kp'length downto 0);
+  signal sum_p_5   : signed(SUM_W - 1 downto 0);
+  signal total_5   : signed(SUM_W - 1 - DROP_P downto 0);
+  signal past_5    : std_logic;
+  signal lambda_5  : signed(FLUX_W - 1 downto 0);
+  signal limited_6 : std_logic;
 begin
-  valid(0)   <= in_valid;
-  upper      <= signed(resize(delta_max, LIMIT_W));
-  lower      <= -signed(resize(delta_max, LIMIT_W));
-  delta_0    <= delta_lambda_q when valid(1) = '1' or valid(3) = '1' else delta_lambda_d;
-  kp_2       <= flux_kp when flux_mode = PROPOSED else KP_ONE;
-  side_4     <= side(total_4, upper);
-  integral_0 <= resize(integral_other, FLUX_STATE_W + 1) when valid(1) = '1' else resize(integral, FLUX_STATE_W + 1);
+  valid(0) <= in_valid;
+  step     <= valid(0 to LATENCY - TURN) or valid(TURN to LATENCY);
+  upper    <= shift_left(signed(resize(delta_max, FLUX_STATE_W)), SHIFT_LIMIT);
+  lower    <= shift_left(-signed(resize(delta_max, FLUX_STATE_W)), SHIFT_LIMIT);
+  kp       <= flux_kp when flux_mode = PROPOSED else KP_ONE;
+  delta_0  <= delta_lambda_q when valid(TURN) = '1' else delta_lambda_d;
+  moved_3  <= sum_i_3(SUM_W - 1 downto DROP_I);
+  past_3   <= beyond(moved_3, delta_max, SHIFT_LIMIT);
+  total_5  <= sum_p_5(SUM_W - 1 downto DROP_P);
+  past_5   <= beyond(total_5, delta_max, SHIFT_LIMIT);
 
-  -- The next integral of the axis
-  process (all)
-    variable out_of : signed(1 downto 0);
-  begin
-    out_of  := side(sum_2, upper);
-    moved_2 <= sum_2(FLUX_STATE_W - 1 downto 0);
-    if flux_mode /= PROPOSED then
-      moved_2 <= (others => '0');
-    elsif out_of > 0 then
-      moved_2 <= shift_left(resize(upper, FLUX_STATE_W), SHIFT_LIMIT);
-    elsif out_of < 0 then
-      moved_2 <= shift_left(resize(lower, FLUX_STATE_W), SHIFT_LIMIT);
-    end if;
-  end process;
+  -- -integral/2**FORGET, half up: the complement of the upper bits, one more unless the lower are past the half.
+  down_0 <= integral(FORGET - 1) and (or integral(FORGET - 2 downto 0));
 
   -- The limited total; the limit is put in behind the rounding, which cannot move anything past it.
   process (all)
-    variable rounded : signed(TOTAL_W - FLUX_TO_STATE downto 0);
+    variable rounded : signed(SUM_W - DROP_P - FLUX_TO_STATE downto 0);
   begin
-    rounded  := round_half_up(total_4, FLUX_TO_STATE);
-    lambda_4 <= rounded(FLUX_W - 1 downto 0);
-    if side_4 > 0 then
-      lambda_4 <= shift_left(resize(upper, FLUX_W), PU_TO_FLUX);
-    elsif side_4 < 0 then
-      lambda_4 <= shift_left(resize(lower, FLUX_W), PU_TO_FLUX);
+    rounded  := round_half_up(total_5, FLUX_TO_STATE);
+    lambda_5 <= rounded(FLUX_W - 1 downto 0);
+    if past_5 = '1' then
+      lambda_5 <= upper(FLUX_STATE_W - 1 downto FLUX_TO_STATE);
+      if total_5 < 0 then
+        lambda_5 <= lower(FLUX_STATE_W - 1 downto FLUX_TO_STATE);
+      end if;
     end if;
   end process;
 
@@ -121,58 +104,65 @@ begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stage 1: prod_i = flux_ki*delta_lambda, or what is forgotten while it is held
-      if valid(0) = '1' or valid(1) = '1' then
-        prod_i_1 <= delta_0 * signed('0' & flux_ki);
+      -- Stage 1: the factors of flux_ki*delta_lambda, or of what is forgotten while it is held
+      if step(0) = '1' then
+        delta_1 <= delta_0;
+        mul_a_1 <= delta_0;
+        mul_b_1 <= signed('0' & flux_ki);
         if delta_held = '1' then
-          prod_i_1 <= shift_left(resize(-integral_0, prod_i_1'length), DROP_I - FLUX_COMPENSATION_FORGET);
+          mul_a_1 <= (not integral(FLUX_STATE_W - 1 downto FORGET)) & (not down_0);
+          mul_b_1 <= to_signed(2 ** (DROP_I - 1), mul_b_1'length);
         end if;
       end if;
 
-      -- Stage 2: sum = integral + prod_i
-      if valid(1) = '1' or valid(2) = '1' then
-        sum_2 <= plus_rounded(resize(integral, FLUX_STATE_W + 2), prod_i_1, DROP_I);
+      -- Stages 2, 3: sum_i = integral + prod_i
+      if step(1) = '1' then
+        prod_i_2 <= mul_a_1 * mul_b_1;
       end if;
-      if valid(1) = '1' then
-        integral <= integral_other;
-      end if;
-
-      -- Stage 3: integral = sum, limited;  prod_p = flux_kp*delta_lambda
-      if valid(2) = '1' or valid(3) = '1' then
-        integral_other <= moved_2;
-        prod_p_3       <= delta_0 * signed('0' & kp_2);
-      end if;
-      if valid(3) = '1' then
-        integral <= integral_other;
+      if step(2) = '1' then
+        sum_i_3 <= rounding_base(integral, DROP_I, SUM_W) + prod_i_2;
       end if;
 
-      -- Stage 4: total = integral + prod_p
-      if valid(3) = '1' or valid(4) = '1' then
-        total_4 <= plus_rounded(resize(integral_other, TOTAL_W), prod_p_3, DROP_P);
+      -- Stage 4: integral = sum_i, limited;  prod_p = flux_kp*delta_lambda
+      if step(3) = '1' then
+        prod_p_4       <= delta_1 * signed('0' & kp);
+        integral       <= integral_other;
+        integral_other <= moved_3(FLUX_STATE_W - 1 downto 0);
+      end if;
+      if step(3) = '1' and past_3 = '1' then
+        integral_other <= lower when moved_3 < 0 else upper;
+      end if;
+      if step(3) = '1' and flux_mode /= PROPOSED then
+        integral_other <= (others => '0');
       end if;
 
-      -- Stage 5: lambda = total, narrowed and limited; d at clock 5, q at 6
-      if valid(4) = '1' then
-        limited_5    <= side_4(0);
-        lambda_pi_d  <= lambda_4;
-        lambda_add_d <= lambda_4;
-        if flux_mode /= PROPOSED then
-          lambda_pi_d <= (others => '0');
-        end if;
-        if flux_mode /= EARLIER then
-          lambda_add_d <= (others => '0');
-        end if;
+      -- Stage 5: sum_p = integral + prod_p
+      if step(4) = '1' then
+        sum_p_5 <= rounding_base(integral_other, DROP_P, SUM_W) + prod_p_4;
       end if;
+
+      -- Stage 6: lambda = sum_p, narrowed and limited; d at clock 6, q at 10
       if valid(5) = '1' then
-        compensation_limited <= (limited_5 or side_4(0)) when flux_mode = EARLIER or flux_mode = PROPOSED else '0';
-        lambda_pi_q          <= lambda_4;
-        lambda_add_q         <= lambda_4;
-        if flux_mode /= PROPOSED then
-          lambda_pi_q <= (others => '0');
-        end if;
-        if flux_mode /= EARLIER then
-          lambda_add_q <= (others => '0');
-        end if;
+        limited_6    <= past_5;
+        lambda_pi_d  <= lambda_5;
+        lambda_add_d <= lambda_5;
+      end if;
+      if valid(LATENCY - 1) = '1' then
+        compensation_limited <= (limited_6 or past_5) when flux_mode = EARLIER or flux_mode = PROPOSED else '0';
+        lambda_pi_q          <= lambda_5;
+        lambda_add_q         <= lambda_5;
+      end if;
+      if valid(5) = '1' and flux_mode /= PROPOSED then
+        lambda_pi_d <= (others => '0');
+      end if;
+      if valid(5) = '1' and flux_mode /= EARLIER then
+        lambda_add_d <= (others => '0');
+      end if;
+      if valid(LATENCY - 1) = '1' and flux_mode /= PROPOSED then
+        lambda_pi_q <= (others => '0');
+      end if;
+      if valid(LATENCY - 1) = '1' and flux_mode /= EARLIER then
+        lambda_add_q <= (others => '0');
       end if;
 
       if rst = '1' then

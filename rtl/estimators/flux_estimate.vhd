@@ -40,11 +40,12 @@ end entity flux_estimate;
 architecture rtl of flux_estimate is
   constant LATENCY       : positive := FLUX_ESTIMATE_LATENCY;
   constant CURRENT_MODEL : natural  := FLUX_ESTIMATE_CURRENT_MODEL;
-  constant DROP_MERGED   : positive := FLUX_ESTIMATE_SHIFT_BASE;
-  constant DROP_MODEL    : positive := FLUX_ESTIMATE_SHIFT_BASE - FLUX_ESTIMATE_SHIFT_MODEL;
+  constant SHIFT_MERGED  : positive := FLUX_ESTIMATE_SHIFT_BASE;
+  constant SHIFT_MODEL   : positive := FLUX_ESTIMATE_SHIFT_BASE - FLUX_ESTIMATE_SHIFT_MODEL;
   constant DROP          : positive := FLUX_ESTIMATE_DROP - FLUX_ESTIMATE_SHIFT_BASE;
   constant PROD_W        : positive := PU_W + RESISTANCE_W + 1;
-  constant SUM_W         : positive := PROD_W - DROP_MODEL + 1;
+  constant SUM_W         : positive := FLUX_W + 1 + SHIFT_MERGED + 2;
+  constant SCALED_W      : positive := SUM_W - SHIFT_MODEL;
 
   signal valid       : std_logic_vector(0 to LATENCY);
   signal merged_0    : std_logic;
@@ -61,8 +62,9 @@ architecture rtl of flux_estimate is
   signal ended_2     : std_logic;
   signal sum_d_2     : signed(SUM_W - 1 downto 0);
   signal sum_q_2     : signed(SUM_W - 1 downto 0);
-  signal rounded_d_2 : signed(SUM_W - DROP downto 0);
-  signal rounded_q_2 : signed(SUM_W - DROP downto 0);
+  signal merged_2    : std_logic;
+  signal rounded_d_2 : signed(SCALED_W - DROP downto 0);
+  signal rounded_q_2 : signed(SCALED_W - DROP downto 0);
 
   -- Whether x is the first or the last number of its format.
   function at_end (x : signed) return std_logic is
@@ -71,21 +73,23 @@ architecture rtl of flux_estimate is
     return (v(v'high) and not (or v(v'high - 1 downto 0))) or (not v(v'high) and (and v(v'high - 1 downto 0)));
   end function;
 
-  -- base + prod, or base - prod of the merged flux, floored to the LSB of base by one carry.
-  function affine (base : signed; prod : signed; merged : std_logic) return signed is
-    variable addend : signed(SUM_W - 1 downto 0);
-    variable carry  : std_logic;
-    variable sum    : signed(SUM_W downto 0);
+  -- base at the scale of the product, or its complement, from which the complement of base - prod comes: the adder
+  -- behind the multiplier only adds.
+  function aligned (base : signed; merged : std_logic) return signed is
   begin
-    addend := resize(prod(PROD_W - 1 downto DROP_MODEL), SUM_W);
-    carry  := '0';
     if merged = '1' then
-      -- The complement is one less than -prod unless something is dropped, which the floor of -prod counts.
-      addend := not resize(prod(PROD_W - 1 downto DROP_MERGED), SUM_W);
-      carry  := not (or prod(DROP_MERGED - 1 downto 0));
+      return not shift_left(resize(base, SUM_W), SHIFT_MERGED);
     end if;
-    sum := (resize(base, SUM_W) & carry) + (addend & carry);
-    return sum(SUM_W downto 1);
+    return shift_left(resize(base, SUM_W), SHIFT_MODEL);
+  end function;
+
+  -- The sum at the scale of FLUX, floored.
+  function scaled (sum : signed; merged : std_logic) return signed is
+  begin
+    if merged = '1' then
+      return not resize(sum(SUM_W - 1 downto SHIFT_MERGED), SCALED_W);
+    end if;
+    return sum(SUM_W - 1 downto SHIFT_MODEL);
   end function;
 begin
   valid(0) <= in_valid;
@@ -97,8 +101,8 @@ begin
                 shift_left(resize(lambda_mg, FLUX_W + 1), PU_TO_FLUX);
   start_q_0  <= resize(lambda_m_q, FLUX_W + 1) when merged_0 = '1' else (others => '0');
 
-  rounded_d_2 <= round_half_up(sum_d_2, DROP);
-  rounded_q_2 <= round_half_up(sum_q_2, DROP);
+  rounded_d_2 <= round_half_up(scaled(sum_d_2, merged_2), DROP);
+  rounded_q_2 <= round_half_up(scaled(sum_q_2, merged_2), DROP);
 
   process (clk)
   begin
@@ -117,9 +121,10 @@ begin
 
       -- Stage 2: sum = base - prod or base + prod
       if valid(1) = '1' then
-        ended_2 <= ended_1;
-        sum_d_2 <= affine(base_d_1, prod_d_1, merged_1);
-        sum_q_2 <= affine(base_q_1, prod_q_1, merged_1);
+        ended_2  <= ended_1;
+        merged_2 <= merged_1;
+        sum_d_2  <= aligned(base_d_1, merged_1) + prod_d_1;
+        sum_q_2  <= aligned(base_q_1, merged_1) + prod_q_1;
       end if;
 
       -- Stage 3: lambda = sum, narrowed
