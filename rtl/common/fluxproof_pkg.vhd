@@ -34,8 +34,8 @@ package fluxproof_pkg is
   constant TRIG_ONE : natural := 65536;
 
   -- fluxproof: clocks from the raw sample to the duties, least distance of two samples
-  constant FLUXPROOF_SAMPLE_TO_DUTY : positive := 39;
-  constant FLUXPROOF_SAMPLE_INTERVAL : positive := 48;
+  constant FLUXPROOF_SAMPLE_TO_DUTY : positive := 40;
+  constant FLUXPROOF_SAMPLE_INTERVAL : positive := 49;
 
   -- sqrt: 001, section 5.2: voltage limit of the current regulation
   constant SQRT_LATENCY : positive := 6;
@@ -330,7 +330,7 @@ package fluxproof_pkg is
   constant DECOUPLING_DROP : natural := 16;
 
   -- voltage_limit: 001, Fig. 1: decoupling at the regulators' output; limit of the space-vector modulation
-  constant VOLTAGE_LIMIT_LATENCY : positive := 10;
+  constant VOLTAGE_LIMIT_LATENCY : positive := 11;
 
   -- svm_delay_compensation: 001, section 5.2, SVM delay compensation
   constant SVM_DELAY_COMPENSATION_LATENCY : positive := 2;
