@@ -147,7 +147,7 @@ package fluxproof_pkg is
   constant U_DC_PROCESSING_SHIFT_CLOCKS : natural := 3;
 
   -- clarke: 001, eq. (1): stator frame
-  constant CLARKE_LATENCY : positive := 3;
+  constant CLARKE_LATENCY : positive := 4;
   constant CLARKE_THIRD : signed(17 downto 0) := to_signed(87381, 18);  -- 0.333333333 as U(-1,18), signed for the multiplier
   constant CLARKE_INV_SQRT3 : signed(17 downto 0) := to_signed(75674, 18);  -- 0.577350269 as U(0,17), signed for the multiplier
   constant CLARKE_DROP_ALPHA : natural := 18;

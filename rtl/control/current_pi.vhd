@@ -60,10 +60,8 @@ architecture rtl of current_pi is
   signal err_3    : signed(PU_W - 1 downto 0);
   signal kp_3     : unsigned(KP_W - 1 downto 0);
   signal sum_i_3  : signed(PU_W + KI_W downto 0);
-  signal run_3    : std_logic;
   signal prod_p_4 : signed(PU_W + KP_W downto 0);
   signal half_4   : signed(INTEGRAL_W downto 0);
-  signal run_4    : std_logic;
   signal sum_p_4  : signed(SUM_W - 1 downto 0);
   signal u_pi_4   : signed(PU_W - 1 downto 0);
 begin
@@ -73,11 +71,10 @@ begin
   i_0     <= i_q when valid(1) = '1' else i_d;
   i_ref_0 <= i_q_ref when valid(1) = '1' else i_d_ref;
 
-  hold_1 <= (sat_1(1) and err_1(err_1'high)) or (sat_1(0) and not sat_1(1) and not err_1(err_1'high));
+  hold_1 <= not run_1 or (sat_1(1) and err_1(err_1'high)) or (sat_1(0) and not sat_1(1) and not err_1(err_1'high));
 
   sum_p_4 <= resize(prod_p_4, SUM_W) + (half_4 & half(CURRENT_PI_DROP_P, CURRENT_PI_DROP_P));
-  u_pi_4  <= saturate(shift_right(sum_p_4, CURRENT_PI_DROP_P + PU_TO_INTEGRAL), PU_W) when run_4 = '1' else
-             (others => '0');
+  u_pi_4  <= saturate(shift_right(sum_p_4, CURRENT_PI_DROP_P + PU_TO_INTEGRAL), PU_W);
 
   process (clk)
     variable integral : signed(INTEGRAL_W - 1 downto 0);
@@ -97,14 +94,14 @@ begin
         end if;
       end if;
 
-      -- Stage 2: prod_i = ki*err unless held
+      -- Stage 2: prod_i = ki*err unless held or not running
       if valid(1) = '1' or valid(2) = '1' then
         prod_i_2 <= err_1 * signed('0' & ki_1);
-        if hold_1 = '1' then
-          prod_i_2 <= (others => '0');
-        end if;
-        err_2 <= err_1;
-        run_2 <= run_1;
+        err_2    <= err_1;
+        run_2    <= run_1;
+      end if;
+      if hold_1 = '1' then
+        prod_i_2 <= (others => '0');
       end if;
 
       -- Stage 3: int + prod_i, with half an LSB to round with
@@ -112,7 +109,9 @@ begin
         sum_i_3 <= prod_i_2 + (integral_2 & half(CURRENT_PI_DROP_I, CURRENT_PI_DROP_I));
         err_3   <= err_2;
         kp_3    <= kp_d;
-        run_3   <= run_2;
+        if run_2 = '0' then
+          err_3 <= (others => '0');
+        end if;
         if valid(3) = '1' then
           kp_3 <= kp_q;
         end if;
@@ -122,17 +121,17 @@ begin
       if valid(3) = '1' or valid(4) = '1' then
         integral   := saturate(shift_right(sum_i_3, CURRENT_PI_DROP_I), INTEGRAL_W);
         integral_4 <= integral;
-        if run_3 = '0' then
-          integral_4 <= (others => '0');
-        end if;
-        half_4   <= integral + half(PU_TO_INTEGRAL, INTEGRAL_W + 1);
-        prod_p_4 <= err_3 * signed('0' & kp_3);
-        run_4    <= run_3;
+        half_4     <= integral + half(PU_TO_INTEGRAL, INTEGRAL_W + 1);
+        prod_p_4   <= err_3 * signed('0' & kp_3);
       end if;
 
-      -- The turn of the integrals: to that of q once the d axis has taken its own, and back for the next sample
+      -- The turn of the integrals: to that of q once the d axis has taken its own, and back for the next sample;
+      -- both start from zero while not running
       if valid(2) = '1' or valid(4) = '1' then
         integral_2 <= integral_4;
+      end if;
+      if (valid(1) = '1' and run_1 = '0') or (valid(2) = '1' and run_2 = '0') then
+        integral_2 <= (others => '0');
       end if;
 
       -- Stage 5: u_pi = proportional + int, narrowed; d at clock 5, q at 6

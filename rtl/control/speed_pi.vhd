@@ -54,6 +54,7 @@ architecture rtl of speed_pi is
   signal total_3    : signed(TOTAL_W - 1 downto 0);
   signal moved_3    : signed(INTEGRAL_W downto 0);
   signal v_3        : signed(PU_W downto 0);
+  signal far_3      : std_logic;
   signal v_4        : signed(PU_W downto 0);
   signal beyond_4   : std_logic;
   signal held_5     : std_logic;
@@ -64,10 +65,12 @@ begin
   total_3 <= sum_p_3(SUM_W - 1 downto SUM_W - TOTAL_W);
   moved_3 <= sum_i_3(SPEED_PI_DROP_I + INTEGRAL_W downto SPEED_PI_DROP_I);
 
-  -- The beat's value in PU, one bit more where it may be beyond: the current asked for, then the integral
-  v_3 <= resize(i_q_ext, PU_W + 1) when speed_mode = '0' else
-         moved_3(INTEGRAL_W downto PU_TO_INTEGRAL) when valid(4) = '1' else
-         saturate(total_3, PU_W + 1);
+  -- The beat's value in PU, one bit more where it may be beyond: the current asked for, then the integral; far: bits
+  -- above those say that the current is beyond any limit, and only its sign counts
+  v_3   <= resize(i_q_ext, PU_W + 1) when speed_mode = '0' else
+           moved_3(INTEGRAL_W downto PU_TO_INTEGRAL) when valid(4) = '1' else
+           total_3(TOTAL_W - 1) & total_3(PU_W - 1 downto 0);
+  far_3 <= exceeds(total_3, PU_W + 1) and speed_mode and not valid(4);
 
   -- v within +-i_max
   process (all)
@@ -115,7 +118,7 @@ begin
         v_4      <= v_3;
         carry    := not v_3(v_3'high) and not valid(4);
         rest     := (resize(i_max, PU_W + 1) & '1') + ((v_3 xor (v_3'range => not v_3(v_3'high))) & carry);
-        beyond_4 <= rest(rest'high);
+        beyond_4 <= rest(rest'high) or far_3;
       end if;
 
       -- Stage 5: i_q_ref = limit(total or i_q_ext)

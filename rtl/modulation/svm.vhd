@@ -43,7 +43,8 @@ architecture rtl of svm is
   signal leg_b_3   : signed(LEG_W - 1 downto 0);
   signal minus_c_3 : signed(LEG_W - 1 downto 0);
   signal alike_3   : std_logic;
-  signal apart_3   : signed(LEG_W downto 0);
+  signal beta_3    : signed(LEG_W - 1 downto 0);
+  signal apart_3   : signed(LEG_W + 1 downto 0);
   signal mid_3     : signed(LEG_W - 1 downto 0);
   signal carry_3   : signed(1 downto 0);
   signal leg_a_4   : signed(LEG_W - 1 downto 0);
@@ -70,12 +71,12 @@ begin
   y_2 <= saturate(shift_right(prod_y_2, SVM_DROP_SCALED), SVM_SCALED_W);
 
   -- 3x less 2y, both taken as positive, with the sign of x; the legs hold -x and 2y
-  apart_3 <= resize(leg_a_3, LEG_W + 1) - leg_b_3 when alike_3 = '1' else
-             resize(leg_a_3, LEG_W + 1) + minus_c_3;
-  mid_3   <= leg_a_3 when apart_3(LEG_W) /= leg_a_3(LEG_W - 1) else
+  beta_3  <= not leg_b_3 when alike_3 = '1' else minus_c_3;
+  apart_3 <= (resize(leg_a_3, LEG_W + 1) & alike_3) + (beta_3 & alike_3);
+  mid_3   <= leg_a_3 when apart_3(LEG_W + 1) /= leg_a_3(LEG_W - 1) else
              leg_b_3 when alike_3 = '1' else
              not minus_c_3;
-  carry_3 <= '0' & (not alike_3 and not (apart_3(LEG_W) xor leg_a_3(LEG_W - 1)));
+  carry_3 <= '0' & (not alike_3 and not (apart_3(LEG_W + 1) xor leg_a_3(LEG_W - 1)));
 
   process (clk)
   begin

@@ -42,15 +42,18 @@ architecture rtl of sincos is
 
   -- A quarter turn swaps sine and cosine and turns the sign of one, a half turn those of both.
   function turned (own, other : signed; swap, minus : std_logic) return signed is
-    variable v   : signed(FINE_W - 1 downto 0) := own;
-    variable sum : signed(FINE_W downto 0);
+    variable v     : signed(FINE_W - 1 downto 0) := own;
+    variable carry : signed(1 downto 0);
   begin
     if swap = '1' then
       v := other;
     end if;
-    -- -v is not v and a carry; half an LSB of the output goes the same way.
-    sum := ((v xor (v'range => minus)) & minus) + (half(SINCOS_DROP_OUT, FINE_W) & minus);
-    return resize(shift_right(sum, SINCOS_DROP_OUT + 1), TRIG_W);
+    -- -v is not v and one more, which reaches the half LSB only through zeros below it.
+    carry := '0' & (v(SINCOS_DROP_OUT - 1) xor minus);
+    if v(SINCOS_DROP_OUT - 2 downto 0) = 0 then
+      carry(0) := v(SINCOS_DROP_OUT - 1) or minus;
+    end if;
+    return (v(v'high downto SINCOS_DROP_OUT) xor (TRIG_W - 1 downto 0 => minus)) + carry;
   end function;
 begin
   valid(0) <= in_valid;
