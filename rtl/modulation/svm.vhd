@@ -54,8 +54,8 @@ architecture rtl of svm is
 
   -- 1/2 + sum/4, sum being leg + mid/2 with the half LSB in it, clamped to 0..1.
   function to_duty (sum : signed) return unsigned is
-    constant FLOORED : signed(sum'length - 3 downto 0)   := sum(sum'high downto 2);
-    variable duty    : unsigned(DUTY_W - 1 downto 0) := (others => '0');
+    constant FLOORED : signed(sum'length - 3 downto 0) := sum(sum'high downto 2);
+    variable duty    : unsigned(DUTY_W - 1 downto 0)   := (others => '0');
   begin
     if exceeds(FLOORED, DUTY_W - 1) = '1' then
       duty(DUTY_W - 1) := not FLOORED(FLOORED'high);

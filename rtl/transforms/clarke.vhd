@@ -31,14 +31,14 @@ architecture rtl of clarke is
   constant SUM_W  : positive := PU_W + 2;
   constant PROD_W : positive := SUM_W + PU_W;
 
-  signal valid   : std_logic_vector(0 to LATENCY);
-  signal first_0 : signed(SUM_W - 1 downto 0);
-  signal sum_1   : signed(SUM_W - 1 downto 0);
+  signal valid    : std_logic_vector(0 to LATENCY);
+  signal first_0  : signed(SUM_W - 1 downto 0);
+  signal sum_1    : signed(SUM_W - 1 downto 0);
   signal factor_1 : signed(PU_W - 1 downto 0);
-  signal prod_2  : signed(PROD_W - 1 downto 0);
-  signal half_2  : signed(PROD_W - 1 downto 0);
-  signal sum_2   : signed(PROD_W - 1 downto 0);
-  signal i_2     : signed(PU_W - 1 downto 0);
+  signal prod_2   : signed(PROD_W - 1 downto 0);
+  signal half_2   : signed(PROD_W - 1 downto 0);
+  signal sum_2    : signed(PROD_W - 1 downto 0);
+  signal i_2      : signed(PU_W - 1 downto 0);
 begin
   valid(0) <= in_valid;
 
@@ -59,7 +59,7 @@ begin
 
       -- Stage 1: sum = 2*i_a - i_b - i_c, then i_b - i_c
       if valid(0) = '1' or valid(1) = '1' then
-        sum_1   <= first_0 - i_c;
+        sum_1    <= first_0 - i_c;
         factor_1 <= resize(CLARKE_THIRD, PU_W);
         if valid(1) = '1' then
           factor_1 <= resize(CLARKE_INV_SQRT3, PU_W);

@@ -28,7 +28,8 @@ architecture rtl of sincos is
   constant FINE_W     : positive := 24;  -- S(1,22)
 
   signal valid      : std_logic_vector(0 to LATENCY);
-  signal address_1  : unsigned(SINCOS_ADDRESS_BITS - 1 downto 0);
+  signal address_0  : unsigned(SINCOS_ADDRESS_BITS - 1 downto 0);
+  signal table_1    : unsigned(17 downto 0);
   signal low_1      : unsigned(DELTA_BITS - 1 downto 0);
   signal quadrant_1 : unsigned(1 downto 0);
   signal table_2    : unsigned(17 downto 0);
@@ -56,7 +57,8 @@ architecture rtl of sincos is
     return (v(v'high downto SINCOS_DROP_OUT) xor (TRIG_W - 1 downto 0 => minus)) + carry;
   end function;
 begin
-  valid(0) <= in_valid;
+  valid(0)  <= in_valid;
+  address_0 <= theta(TURN_W - 3 downto DELTA_BITS) xor (SINCOS_ADDRESS_BITS - 1 downto 0 => valid(1));
 
   -- The cosine's product is subtracted: delta has turned its sign, and what is below the cut is rounded up.
   base_3 <= signed(shift_left(resize(table_2, base_3'length), SINCOS_TABLE_SHIFT + SINCOS_DROP_PROD)) or
@@ -69,18 +71,19 @@ begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stage 1: theta = quadrant, address, low bits of delta;  c, s, c stand at not address, address, not address
+      -- Stages 1, 2, 3: theta = quadrant, address, low bits of delta;  c, s, c from both ends of the table
       if valid(0) = '1' then
         quadrant_1 <= theta(TURN_W - 1 downto TURN_W - 2);
-        address_1  <= theta(TURN_W - 3 downto DELTA_BITS);
         low_1      <= theta(DELTA_BITS - 1 downto 0);
-      elsif valid(1) = '1' or valid(2) = '1' then
-        address_1 <= not address_1;
       end if;
 
-      -- Stages 2, 3, 4: c, s, c from both ends of the table;  delta in radians, then -delta
+      if valid(0) = '1' or valid(1) = '1' or valid(2) = '1' then
+        table_1 <= SINCOS_SINE(to_integer(not address_0));
+      end if;
+
+      -- Stages 2, 3, 4: c, s, c wait, for a block RAM's output comes late in its clock;  delta in radians, then -delta
       if valid(1) = '1' or valid(2) = '1' or valid(3) = '1' then
-        table_2 <= SINCOS_SINE(to_integer(not address_1));
+        table_2 <= table_1;
       end if;
       if valid(1) = '1' or valid(2) = '1' then
         delta := SINCOS_DELTA(to_integer(low_1));
