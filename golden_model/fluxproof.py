@@ -85,7 +85,8 @@ WIRING = {
     "inverter_loss": (v_dead_adaline, ("circle", "direction_functions")),
     "magnet_flux": (psi_adaline, ("circle", "direction_functions")),
     "directions": (current_directions, ("circle", "stator_frame", "speed_measurement")),
-    "monitor": (flux_monitor, ("compensation", "merge", "bus_reciprocal")),
+    # Its flags would be there earlier; values_valid says that all of a sample's values are.
+    "monitor": (flux_monitor, ("compensation", "merge", "bus_reciprocal", "inverter_loss")),
 }
 
 

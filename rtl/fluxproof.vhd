@@ -203,6 +203,7 @@ architecture rtl of fluxproof is
   signal cos_out              : signed(PU_W - 1 downto 0);
   signal sin_out              : signed(PU_W - 1 downto 0);
   signal ab_voltage_valid     : std_logic;
+  signal v_dead_valid         : std_logic;
   signal duty_ready           : std_logic;
   signal compare_ready        : std_logic;
   signal r                    : unsigned(RESISTANCE_W - 1 downto 0);
@@ -225,7 +226,6 @@ architecture rtl of fluxproof is
   signal model_ab_valid       : std_logic;
   signal factor_valid         : std_logic;
   signal delta_valid          : std_logic;
-  signal lambda_pi_valid      : std_logic;
   signal clear_faults         : std_logic;
   signal u_comp_alpha         : signed(PU_W - 1 downto 0);
   signal u_comp_beta          : signed(PU_W - 1 downto 0);
@@ -794,7 +794,7 @@ begin
       flux_kp              => flux_kp,
       flux_ki              => flux_ki,
       delta_max            => delta_max,
-      out_valid            => lambda_pi_valid,
+      out_valid            => open,
       lambda_pi_d          => lambda_pi_d,
       lambda_pi_q          => lambda_pi_q,
       lambda_add_d         => lambda_add_d,
@@ -837,7 +837,7 @@ begin
       v_comp_max      => v_comp_max,
       i_learn         => i_learn,
       compensate      => compensate,
-      out_valid       => open,
+      out_valid       => v_dead_valid,
       v_dead          => v_dead,
       v_comp          => v_comp,
       v_leg           => v_leg,
@@ -888,7 +888,7 @@ begin
     port map (
       clk                  => clk,
       rst                  => rst,
-      in_valid             => lambda_pi_valid,
+      in_valid             => v_dead_valid,
       current_at_rail      => current_at_rail,
       u_dc_at_rail         => u_dc_at_rail,
       u_dc_low             => u_dc_low,
