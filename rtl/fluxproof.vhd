@@ -197,9 +197,8 @@ architecture rtl of fluxproof is
   signal omega_valid          : std_logic;
   signal u_dc_valid           : std_logic;
   signal reciprocal_valid     : std_logic;
-  signal m                    : unsigned(RECIPROCAL_W - 1 downto 0);
-  signal m_beta               : unsigned(RECIPROCAL_W - 1 downto 0);
-  signal n                    : unsigned(2 downto 0);
+  signal inverse              : unsigned(U_DC_PROCESSING_INVERSE_W - 1 downto 0);
+  signal inverse_beta         : unsigned(U_DC_PROCESSING_INVERSE_W - 1 downto 0);
   signal alpha_beta_valid     : std_logic;
   signal i_alpha              : signed(PU_W - 1 downto 0);
   signal i_beta               : signed(PU_W - 1 downto 0);
@@ -397,15 +396,14 @@ begin
 
   bus_reciprocal : entity work.u_dc_processing
     port map (
-      clk       => clk,
-      rst       => rst,
-      in_valid  => u_dc_valid,
-      u_dc      => u_dc,
-      out_valid => reciprocal_valid,
-      m         => m,
-      m_beta    => m_beta,
-      n         => n,
-      u_dc_low  => u_dc_low
+      clk          => clk,
+      rst          => rst,
+      in_valid     => u_dc_valid,
+      u_dc         => u_dc,
+      out_valid    => reciprocal_valid,
+      inverse      => inverse,
+      inverse_beta => inverse_beta,
+      u_dc_low     => u_dc_low
     );
 
   stator_frame : entity work.clarke
@@ -667,18 +665,17 @@ begin
 
   modulator : entity work.svm
     port map (
-      clk       => clk,
-      rst       => rst,
-      in_valid  => ab_voltage_valid,
-      u_alpha   => u_alpha,
-      u_beta    => u_beta,
-      m         => m,
-      m_beta    => m_beta,
-      n         => n,
-      out_valid => duty_ready,
-      duty_a    => duty_a,
-      duty_b    => duty_b,
-      duty_c    => duty_c
+      clk          => clk,
+      rst          => rst,
+      in_valid     => ab_voltage_valid,
+      u_alpha      => u_alpha,
+      u_beta       => u_beta,
+      inverse      => inverse,
+      inverse_beta => inverse_beta,
+      out_valid    => duty_ready,
+      duty_a       => duty_a,
+      duty_b       => duty_b,
+      duty_c       => duty_c
     );
 
   compare : entity work.pwm_compare
