@@ -24,7 +24,7 @@ unexport PYTHONHOME
 
 PYTHON_RUN := .venv/bin/python
 
-.PHONY: help setup generate test demo papers bench blind real compare timeline mutate verilog lint lock clean distclean
+.PHONY: help setup generate test demo papers bench blind real compare timeline mutate prove verilog lint lock clean distclean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -62,6 +62,9 @@ timeline: setup ## draw the timeline of one control period
 
 mutate: setup ## plant faults in the VHDL and count those the tests catch
 	$(PYTHON_RUN) -m scripts.mutate $(ARGS)
+
+prove: setup ## prove properties of the gates, the pipeline, the rounding, the buses, and show each a planted fault
+	$(PYTHON_RUN) -m scripts.prove $(ARGS)
 
 verilog: setup ## convert the VHDL to Verilog (GHDL 5)
 	$(PYTHON_RUN) -m scripts.verilog $(ARGS)
