@@ -33,12 +33,13 @@ def harness(entity: str, start: str, ends: tuple[tuple[str, int], ...], interval
     checks = "\n".join(
         f"    assert ({name} == flight[{latency - 1}]);\n    cover ({name});" for name, latency in ends
     )
+    header, wires = ",\n".join(inputs), "\n  ".join(f"wire {name};" for name in sorted(strobes))
     return f"""\
 // Made from the declarations of {entity}.
 module formal_top (
-{",\n".join(inputs)}
+{header}
 );
-  {"\n  ".join(f"wire {name};" for name in sorted(strobes))}
+  {wires}
   {entity} dut ({", ".join(wired)});
 
   reg begun = 0;
@@ -46,10 +47,9 @@ module formal_top (
   always @* if (!begun) assume (rst);
 
   // Samples keep their distance, whatever resets come between.
-  reg [7:0] since = {interval - 1};
+  reg [7:0] since = {interval};
   always @(posedge clk) since <= {start} ? 1 : since < {interval} ? since + 1 : since;
   always @* if ({start}) assume (since >= {interval});
-  always @* if (!begun) assume (!{start});
 
   // flight[k]: a sample went in k + 1 clocks ago and no reset has come since
   reg [{longest - 1}:0] flight;
