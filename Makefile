@@ -24,7 +24,7 @@ unexport PYTHONHOME
 
 PYTHON_RUN := .venv/bin/python
 
-.PHONY: help setup generate test demo papers bench blind real compare timeline mutate prove verilog lint lock clean distclean
+.PHONY: help setup generate registers test demo papers bench blind real compare timeline mutate prove verilog lint lock clean distclean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -32,8 +32,11 @@ help: ## list the targets
 setup: ## install what is missing: system packages, .venv, GHDL 5 (done by every other target too)
 	@bash scripts/setup.sh $(if $(filter setup,$(MAKECMDGOALS)),--retry)
 
-generate: setup ## write rtl/common/fluxproof_pkg.vhd from the golden model's constants
+generate: setup ## write the VHDL constants, the registers' VHDL, SystemRDL, C header and names from the golden model
 	$(PYTHON_RUN) -m scripts.generate $(ARGS)
+
+registers: setup ## write the registers' HTML pages and IP-XACT memory map to build/registers
+	$(PYTHON_RUN) -m scripts.registers $(ARGS)
 
 test: setup ## run every test (golden model, plant, VHDL simulation)
 	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m pytest -q -n $(JOBS) --dist=worksteal $(ARGS)

@@ -1,17 +1,20 @@
-"""Writes rtl/common/fluxproof_pkg.vhd from the blocks' declarations; ``--check`` only compares.
+"""Writes rtl/common/fluxproof_pkg.vhd from the blocks' declarations, and what the register map gives
+(scripts/registers/generated.py); ``--check`` only compares.
 
-Formats, constants, tables and latencies stand in the Python blocks and nowhere else.
+Formats, constants, tables, latencies and addresses stand in Python and nowhere else.
 """
 
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from pathlib import Path
 
 from golden_model import fluxproof, formats
 from golden_model.block import Const
 from golden_model.fixed import Format
+from golden_model.io import register_map
 from golden_model.registry import BLOCKS
 from scripts.files import write_text
 
@@ -71,6 +74,8 @@ def render() -> str:
     lines += ["", "  -- fluxproof: clocks from the raw sample to the duties, least distance of two samples"]
     lines.append(f"  constant FLUXPROOF_SAMPLE_TO_DUTY : positive := {fluxproof.SAMPLE_TO_DUTY};")
     lines.append(f"  constant FLUXPROOF_SAMPLE_INTERVAL : positive := {fluxproof.SAMPLE_INTERVAL};")
+    lines += ["", "  -- register_access: clocks that a write waits for the end of a sample"]
+    lines.append(f"  constant REGISTER_PATIENCE : positive := {register_map.PATIENCE};")
     for block in BLOCKS.values():
         prefix = block.name.upper()
         lines += ["", f"  -- {block.name}: {block.paper}"]
@@ -81,21 +86,25 @@ def render() -> str:
     return HEADER + "\n".join(lines) + "\n\nend package fluxproof_pkg;\n"
 
 
+def outputs() -> dict[Path, str]:
+    """{path: text} of every generated file."""
+    from scripts.registers import generated  # needs systemrdl-compiler and peakrdl, which nothing above does
+
+    return {PACKAGE: render(), **generated.files()}
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument(
-        "--check", action="store_true", help="fail if the committed file is stale, write nothing"
-    )
+    parser.add_argument("--check", action="store_true", help="fail if a committed file is stale, write nothing")
     arguments = parser.parse_args()
-    text = render()
-    if arguments.check:
-        if PACKAGE.read_text() != text:
-            print(f"{PACKAGE.name} is stale: run `make generate` and commit it", file=sys.stderr)
-            return 1
-        return 0
-    write_text(PACKAGE, text)
-    print(f"wrote {PACKAGE.relative_to(PACKAGE.parents[2])}, {len(text.splitlines())} lines")
-    return 0
+    stale = {path: text for path, text in outputs().items() if not path.exists() or path.read_text() != text}
+    for path, text in stale.items():
+        if arguments.check:
+            print(f"{path.name} is stale: run `make generate` and commit it", file=sys.stderr)
+        else:
+            write_text(path, text)
+            print(f"wrote {os.path.relpath(path)}, {len(text.splitlines())} lines")
+    return int(arguments.check and bool(stale))
 
 
 if __name__ == "__main__":

@@ -37,6 +37,9 @@ package fluxproof_pkg is
   constant FLUXPROOF_SAMPLE_TO_DUTY : positive := 39;
   constant FLUXPROOF_SAMPLE_INTERVAL : positive := 48;
 
+  -- register_access: clocks that a write waits for the end of a sample
+  constant REGISTER_PATIENCE : positive := 64;
+
   -- sqrt: 001, section 5.2: voltage limit of the current regulation
   constant SQRT_LATENCY : positive := 6;
   constant SQRT_DROP_X : natural := 12;

@@ -1,0 +1,111 @@
+"""The registers behind the bus, one transaction at a time: twin of rtl/io/register_file.vhd and register_access.vhd.
+
+A write counts or is refused as a whole; the answer says which (OKAY, SLVERR, DECERR of AXI4).  When it counts is
+the RTL's matter (see register_map.Kind); this model is told of a sample by ``sample()``.
+Formats: words are 32 bits as software sees them, unsigned; ``values`` holds the integers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from golden_model.fluxproof import Registers
+from golden_model.io.register_map import (
+    ADDRESS_BITS,
+    DECERR,
+    GENERICS,
+    OKAY,
+    SLVERR,
+    Kind,
+    Register,
+    registers,
+)
+
+ALL_STROBES = 0b1111
+MASK = 0xFFFFFFFF
+
+
+def to_word(value: int) -> int:
+    """A register's integer as 32 bits, sign extended."""
+    return value & MASK
+
+
+def from_word(word: int) -> int:
+    """32 bits as the signed integer that the range is compared with."""
+    return word - (1 << 32) if word >> 31 else word
+
+
+class RegisterFile:
+    """The map with what its registers hold; generics and version as the core was built.
+
+    ``generics``: {"adc_bits": ..., "position_bits": ..., "carrier_half": ..., "clock_hz": ...}.
+    """
+
+    def __init__(self, generics: Mapping[str, int], version: int = 0) -> None:
+        self.map = registers()
+        self.at = {register.address: register for register in self.map.values()}
+        if set(generics) != set(GENERICS):
+            raise ValueError(f"generics are {', '.join(sorted(generics))}: wanted {', '.join(GENERICS)}")
+        self._constant = {**generics, "identification": self.map["identification"].reset, "version": version}
+        self.status: dict[str, int] = {
+            field.name: 0
+            for register in self.map.values()
+            if register.kind is Kind.STATUS
+            for field in register.fields
+        }
+        self.reset()
+
+    def reset(self) -> None:
+        """What ``rst`` does: every register to its reset value."""
+        self.values = {r.name: r.reset for r in self.map.values() if r.kind.writable}
+
+    def write(self, address: int, word: int, strobe: int = ALL_STROBES) -> int:
+        """A write on the bus; returns the answer.  A refused one changes nothing."""
+        register = self._at(address)
+        if register is None:
+            return DECERR
+        if not register.kind.writable or strobe != ALL_STROBES:
+            return SLVERR
+        value = from_word(word)
+        if not register.port.low <= value <= register.port.high:
+            return SLVERR
+        self.values[register.name] = value
+        return OKAY
+
+    def read(self, address: int) -> tuple[int, int]:
+        """A read on the bus: (answer, word); the word of a refused one is zero."""
+        register = self._at(address)
+        if register is None:
+            return DECERR, 0
+        return OKAY, self._word(register)
+
+    def clock(self) -> None:
+        """A clock has passed since the last write: pulses fall back."""
+        self._fall(Kind.PULSE)
+
+    def sample(self) -> None:
+        """A sample was taken: the pulses that waited for it fall back."""
+        self._fall(Kind.SAMPLE_PULSE)
+
+    def settings(self) -> Registers:
+        """The core's registers as the core's model takes them."""
+        return Registers(*(self.values[name] for name in Registers._fields))
+
+    def _at(self, address: int) -> Register | None:
+        """The register at a byte address of the window; None where none stands."""
+        return self.at.get(address % (1 << ADDRESS_BITS))
+
+    def _fall(self, kind: Kind) -> None:
+        for register in self.map.values():
+            if register.kind is kind:
+                self.values[register.name] = 0
+
+    def _word(self, register: Register) -> int:
+        if register.name in self._constant:
+            return to_word(self._constant[register.name])
+        if register.kind.writable:
+            return to_word(self.values[register.name])
+        word = 0
+        for field in register.fields:
+            word |= (self.status[field.name] & ((1 << field.width) - 1)) << field.bit
+        return word

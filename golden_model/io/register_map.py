@@ -1,0 +1,244 @@
+"""Where software finds the core: one fixed address for every register, command and status value.
+
+A register of the core gets its address by one line in ``SETTINGS``; without one, ``registers()`` says so.
+An address once given stays: adding a register never moves another, and a removed one leaves its place empty.
+Formats, ranges and meanings are those of the blocks' ports; nothing is declared a second time here.
+
+Words of 32 bits; negative values are sign-extended.  When a write counts (``Kind``):
+
+* SETTING: between two samples, never inside one; the write is answered when it counts.
+* COMMAND, PULSE: at the next clock, samples or not.  A pulse takes a one and falls back by itself.
+* SAMPLE_PULSE: between two samples; falls back when a sample has taken it.
+* STATUS, CONSTANT, GENERIC: read only; a constant is known here, a generic when the core is built.
+
+From this map scripts/registers writes the SystemRDL, and from that alone everything else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum
+
+from golden_model import fluxproof
+from golden_model.block import Port
+from golden_model.fixed import Format
+from golden_model.formats import BIT
+from golden_model.io import sample_latch
+from golden_model.modulation import gate_generation
+
+ADDRESS_BITS, WORDS = 12, 256  # the slave answers to 4 KiB; registers stand in the first WORDS words
+OKAY, SLVERR, DECERR = 0, 2, 3  # answers of AXI4
+PATIENCE = fluxproof.SAMPLE_INTERVAL + 16  # clocks that a write waits for the end of a sample
+IDENTIFICATION = int.from_bytes(b"FLUX", "big")
+
+WORD = Format(0, 32, 0)
+GENERICS = ("adc_bits", "position_bits", "carrier_half", "clock_hz")
+
+
+class Kind(Enum):
+    """What a register is and when a write to it counts."""
+
+    SETTING = "setting"
+    COMMAND = "command"
+    PULSE = "pulse"
+    SAMPLE_PULSE = "sample pulse"
+    STATUS = "status"
+    CONSTANT = "constant"
+    GENERIC = "generic"
+
+    @property
+    def writable(self) -> bool:
+        return self in (Kind.SETTING, Kind.COMMAND, Kind.PULSE, Kind.SAMPLE_PULSE)
+
+    @property
+    def waits(self) -> bool:
+        """The write waits until no sample is in flight."""
+        return self in (Kind.SETTING, Kind.SAMPLE_PULSE)
+
+
+@dataclass(frozen=True)
+class Field:
+    """Bits of a word; ``port`` is the core's port behind them, whose name may differ from the field's."""
+
+    name: str
+    port: Port
+    bit: int = 0
+
+    @property
+    def width(self) -> int:
+        """Bits in the word: a signed number has its sign up to the word's last bit."""
+        return 32 - self.bit if self.port.fmt.signed else self.port.fmt.width
+
+
+@dataclass(frozen=True)
+class Register:
+    """One word of the map; ``reset`` is what it holds after a reset (a constant: always)."""
+
+    name: str
+    address: int
+    kind: Kind
+    fields: tuple[Field, ...]
+    doc: str
+    reset: int = 0
+
+    @property
+    def port(self) -> Port:
+        """The port of a register that is one number."""
+        return self.fields[0].port
+
+
+_SETTINGS = """
+    100 offset_a      104 offset_b       108 offset_c     10c gain_a         110 gain_b       114 gain_c
+    118 u_dc_offset   11c u_dc_gain      120 k_u_max      124 pole_pairs     128 reverse      12c theta_offset
+    130 k_speed       134 k_filter       140 speed_kp     144 speed_ki       148 i_max
+    150 kp_d          154 ki_d           158 kp_q         15c ki_q           160 l_d          164 l_q
+    168 lambda_mg     16c k_delay        170 dead_time    174 min_pulse
+    180 flux_mode     184 r_s            188 t_s          18c omega_0        190 xi           194 omega_min
+    198 k_ramp        19c flux_kp        1a0 flux_ki      1a4 delta_max      1a8 k_chord
+    1b0 tcr           1b4 t_0            1b8 t_min        1bc t_max
+    1c0 compensate    1c4 k_lp           1c8 eta_v        1cc gamma          1d0 zeta         1d4 v_thr
+    1d8 v_comp_max    1dc i_learn        1e0 eta_psi      1e4 omega_psi_min  1e8 k_ahead      1ec k_sign
+"""  # 200 to 3fc are free
+_COMMANDS = {
+    "enable": (0x040, Kind.COMMAND),
+    "clear_trip": (0x044, Kind.PULSE),
+    "clear_faults": (0x048, Kind.SAMPLE_PULSE),
+    "telemetry_enable": (0x04C, Kind.COMMAND),
+    "omega_ref": (0x050, Kind.SETTING),
+    "i_d_ref": (0x054, Kind.SETTING),
+    "i_q_ext": (0x058, Kind.SETTING),
+    "speed_mode": (0x05C, Kind.SETTING),
+    "temp_winding": (0x060, Kind.SETTING),
+    "temp_valid": (0x064, Kind.SETTING),
+}
+_STATUS = """
+    084 flux_faults   088 min_pulse_used  08c omega_me     090 theta_me       094 i_d          098 i_q
+    09c i_q_ref       0a0 u_dc            0a4 u_d          0a8 u_q            0ac torque       0b0 lambda_d
+    0b4 lambda_q      0b8 psi_m           0bc v_dead       0c0 v_comp
+    0c4 telemetry_sent                    0c8 telemetry_dropped
+"""
+# Bits of the word "flags", read together: name -> lowest bit.
+_FLAGS = {
+    "running": 0,
+    "tripped": 1,
+    "setting_refused": 2,
+    "current_at_rail": 3,
+    "u_dc_at_rail": 6,
+    "u_dc_low": 7,
+    "speed_limited": 8,
+    "v_comp_limited": 9,
+    "psi_held": 10,
+    "temp_lost": 11,
+    "merge_known": 12,
+    "delta_held": 13,
+}
+
+# Pins of the core: what it takes in each sample or clock that no software could give.
+PINS = ("adc_a", "adc_b", "adc_c", "adc_u_dc", "position_code", "trip")
+INTERNAL = ("run_in", "compare_a", "compare_b", "compare_c")  # from one block to another
+_BESIDE_THE_CORE = {
+    p.name: p
+    for p in (
+        Port("telemetry_enable", BIT, doc="1: send a packet for each sample"),
+        Port("telemetry_sent", WORD, doc="packets sent, modulo 2^32"),
+        Port("telemetry_dropped", WORD, doc="samples dropped because the sink stalled, modulo 2^32"),
+    )
+}
+
+
+def _table(text: str) -> dict[str, int]:
+    """{name: address} of a table of hexadecimal addresses and names; a name twice is a ValueError."""
+    words = text.split()
+    table = dict(zip(words[1::2], (int(word, 16) for word in words[::2]), strict=True))
+    if 2 * len(table) != len(words):
+        raise ValueError(f"register map: named twice: {sorted({w for w in words if words.count(w) > 1})}")
+    return table
+
+
+SETTINGS, STATUS = _table(_SETTINGS), _table(_STATUS)
+
+
+def inputs() -> dict[str, Port]:
+    """What the core takes in beside its registers and pins, by the name that software uses."""
+    ports = (*sample_latch.BLOCK.inputs, *gate_generation.BLOCK.inputs, _BESIDE_THE_CORE["telemetry_enable"])
+    return {p.name.removesuffix("_in"): p for p in ports if p.name not in PINS + INTERNAL}
+
+
+def observables() -> dict[str, Port]:
+    """What the core and the telemetry show."""
+    gates = {p.name: p for p in gate_generation.BLOCK.outputs}
+    return gates | dict(fluxproof.OBSERVED) | _BESIDE_THE_CORE
+
+
+def _read_only() -> list[Register]:
+    """Identification, version, generics, status."""
+    shown = observables()
+
+    def word(name: str, address: int, kind: Kind, doc: str, reset: int = 0) -> Register:
+        return Register(name, address, kind, (Field(name, Port(name, WORD, doc=doc)),), doc, reset)
+
+    flags = tuple(Field(name, shown[name], bit) for name, bit in _FLAGS.items())
+    return [
+        word("identification", 0x000, Kind.CONSTANT, "the letters FLUX", IDENTIFICATION),
+        word("version", 0x004, Kind.CONSTANT, "version of the core: major, minor, patch in bits 23 to 0"),
+        word("adc_bits", 0x008, Kind.GENERIC, "bits of an ADC code"),
+        word("position_bits", 0x00C, Kind.GENERIC, "bits of a position code"),
+        word("carrier_half", 0x010, Kind.GENERIC, "half a PWM period in clocks"),
+        word("clock_hz", 0x014, Kind.GENERIC, "frequency of the clock, Hz"),
+        Register("flags", 0x080, Kind.STATUS, flags, "what the core says about itself, in one word"),
+        *(
+            Register(name, address, Kind.STATUS, (Field(name, shown[name]),), shown[name].doc)
+            for name, address in STATUS.items()
+        ),
+    ]
+
+
+def _writable(settings: Mapping[str, Port]) -> list[Register]:
+    """Commands and the core's registers; ValueError where one has no address, or an address no register."""
+    given = inputs()
+    for what, ports, table in (("register", settings, SETTINGS), ("command", given, _COMMANDS)):
+        if missing := sorted(set(ports) - set(table)):
+            raise ValueError(f"register map: {what} {', '.join(missing)} of the core has no address")
+        if unknown := sorted(set(table) - set(ports)):
+            raise ValueError(f"register map: {', '.join(unknown)} has an address, but the core has none such")
+    found = [(name, address, kind, given[name]) for name, (address, kind) in _COMMANDS.items()]
+    found += [(name, SETTINGS[name], Kind.SETTING, port) for name, port in settings.items()]
+    return [
+        Register(name, address, kind, (Field(name, port),), port.doc, max(port.low, min(port.high, 0)))
+        for name, address, kind, port in found
+    ]
+
+
+def registers(settings: Mapping[str, Port] = fluxproof.REGISTERS) -> dict[str, Register]:
+    """The map by name, in the order of the addresses; ValueError says what contradicts itself.
+
+    A register's reset value is zero, or what is legal next to it: no gain, no limit, gates off.
+    """
+    ordered = sorted(_read_only() + _writable(settings), key=lambda r: r.address)
+    for before, after in zip(ordered, ordered[1:]):
+        if before.address == after.address:
+            raise ValueError(
+                f"register map: {before.name} and {after.name} share address {after.address:#05x}"
+            )
+    for register in ordered:
+        _check(register)
+    result = {r.name: r for r in ordered}
+    if len(result) != len(ordered):
+        raise ValueError("register map: two registers have the same name")
+    return result
+
+
+def _check(register: Register) -> None:
+    if register.address % 4 or not 0 <= register.address < 4 * WORDS:
+        raise ValueError(
+            f"register map: {register.name} at {register.address:#x}: wanted is a multiple of 4 below {4 * WORDS:#x}"
+        )
+    taken = 0
+    for f in register.fields:
+        bits = ((1 << f.width) - 1) << f.bit
+        if bits & taken or bits >> 32:
+            raise ValueError(f"register map: {register.name}: {f.name} does not fit bit {f.bit} of its word")
+        taken |= bits
+    if register.kind.writable and not -(1 << 31) <= register.port.low <= register.port.high < 1 << 31:
+        raise ValueError(f"register map: {register.name} does not fit a signed word of 32 bits")

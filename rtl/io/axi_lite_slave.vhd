@@ -1,0 +1,148 @@
+-- Purpose: the handshake of an AXI4-Lite slave, one request at a time; what a request does is decided behind it.
+--
+--   address (and data) -> request, held until answer -> response, held until the master takes it
+--
+-- A write is taken when its address and its data are both there.  Where a read and a write wait, they take turns,
+-- and a response that the master leaves standing stops requests of its own direction only: neither starves the
+-- other.  Every output to the bus leaves through a register; valid and payload stay until ready.
+-- answer may come in any clock with request = '1' but must come: it decides how long the bus waits.
+-- Formats: as AXI4-Lite has them, 32 bits of data.  A read that is refused returns zero.
+-- Latency: request one clock after the handshake, response one clock after answer.  Rounding: none.
+
+library ieee;
+use ieee.std_logic_1164.all;
+use ieee.numeric_std.all;
+
+entity axi_lite_slave is
+  generic (
+    ADDRESS_BITS : positive := 12
+  );
+  port (
+    clk           : in  std_logic;
+    rst           : in  std_logic;
+    s_axi_awaddr  : in  std_logic_vector(ADDRESS_BITS - 1 downto 0);
+    s_axi_awvalid : in  std_logic;
+    s_axi_awready : out std_logic;
+    s_axi_wdata   : in  std_logic_vector(31 downto 0);
+    s_axi_wstrb   : in  std_logic_vector(3 downto 0);
+    s_axi_wvalid  : in  std_logic;
+    s_axi_wready  : out std_logic;
+    s_axi_bresp   : out std_logic_vector(1 downto 0);
+    s_axi_bvalid  : out std_logic;
+    s_axi_bready  : in  std_logic;
+    s_axi_araddr  : in  std_logic_vector(ADDRESS_BITS - 1 downto 0);
+    s_axi_arvalid : in  std_logic;
+    s_axi_arready : out std_logic;
+    s_axi_rdata   : out std_logic_vector(31 downto 0);
+    s_axi_rresp   : out std_logic_vector(1 downto 0);
+    s_axi_rvalid  : out std_logic;
+    s_axi_rready  : in  std_logic;
+    request       : out std_logic;  -- the four below are a request, until answer
+    write         : out std_logic;  -- 1: write, 0: read
+    address       : out unsigned(ADDRESS_BITS - 1 downto 0);
+    write_data    : out std_logic_vector(31 downto 0);
+    strobe        : out std_logic_vector(3 downto 0);
+    answer        : in  std_logic;  -- the request is done, the two below belong to it
+    response      : in  std_logic_vector(1 downto 0);
+    read_data     : in  std_logic_vector(31 downto 0)
+  );
+end entity axi_lite_slave;
+
+architecture rtl of axi_lite_slave is
+  type state_t is (idle, take_write, take_read, answering);
+
+  signal state      : state_t;
+  signal wrote_last : std_logic;  -- the other direction's turn
+  signal b_valid    : std_logic;
+  signal r_valid    : std_logic;
+  signal writing    : std_logic;
+  signal want_write : std_logic;
+  signal want_read  : std_logic;
+begin
+  want_write <= s_axi_awvalid and s_axi_wvalid and not b_valid;
+  want_read  <= s_axi_arvalid and not r_valid;
+
+  process (clk)
+  begin
+    if rising_edge(clk) then
+      s_axi_awready <= '0';
+      s_axi_wready  <= '0';
+      s_axi_arready <= '0';
+      if s_axi_bready = '1' then
+        b_valid <= '0';
+      end if;
+      if s_axi_rready = '1' then
+        r_valid <= '0';
+      end if;
+
+      case state is
+
+        -- Ready is given for the one clock in which the master's valid already waits
+        when idle =>
+
+          if want_write = '1' and (want_read = '0' or wrote_last = '0') then
+            s_axi_awready <= '1';
+            s_axi_wready  <= '1';
+            state         <= take_write;
+          elsif want_read = '1' then
+            s_axi_arready <= '1';
+            state         <= take_read;
+          end if;
+
+        when take_write =>
+
+          writing    <= '1';
+          wrote_last <= '1';
+          address    <= unsigned(s_axi_awaddr);
+          write_data <= s_axi_wdata;
+          strobe     <= s_axi_wstrb;
+          request    <= '1';
+          state      <= answering;
+
+        when take_read =>
+
+          writing    <= '0';
+          wrote_last <= '0';
+          address    <= unsigned(s_axi_araddr);
+          request    <= '1';
+          state      <= answering;
+
+        -- The response register is free, or the request would not have been taken
+        when answering =>
+
+          if answer = '1' then
+            request <= '0';
+            state   <= idle;
+            if writing = '1' then
+              b_valid     <= '1';
+              s_axi_bresp <= response;
+            else
+              r_valid     <= '1';
+              s_axi_rresp <= response;
+              s_axi_rdata <= read_data;
+              if response /= "00" then
+                s_axi_rdata <= (others => '0');
+              end if;
+            end if;
+          end if;
+
+      end case;
+
+      if rst = '1' then
+        state         <= idle;
+        wrote_last    <= '0';
+        request       <= '0';
+        b_valid       <= '0';
+        r_valid       <= '0';
+        s_axi_awready <= '0';
+        s_axi_wready  <= '0';
+        s_axi_arready <= '0';
+      end if;
+    end if;
+  end process;
+
+  write        <= writing;
+  s_axi_bvalid <= b_valid;
+  s_axi_rvalid <= r_valid;
+
+end architecture rtl;

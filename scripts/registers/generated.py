@@ -1,0 +1,40 @@
+"""Every committed file that comes from the register map, as text: the SystemRDL, and what that alone gives."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+from systemrdl.node import AddrmapNode
+
+from scripts.files import ROOT
+from scripts.registers import export, rdl, vhdl
+from scripts.registers.compiled import compile_file, words
+
+RDL = ROOT / "rtl" / "io" / "fluxproof.rdl"
+MAP_PACKAGE = ROOT / "rtl" / "io" / "register_map_pkg.vhd"
+REGISTER_FILE = ROOT / "rtl" / "io" / "register_file.vhd"
+C_HEADER = ROOT / "software" / "fluxproof_registers.h"
+NAMES = ROOT / "golden_model" / "io" / "register_names.py"
+
+
+def compiled(text: str) -> AddrmapNode:
+    """The elaborated map of a SystemRDL text."""
+    with tempfile.TemporaryDirectory() as scratch:
+        path = Path(scratch) / RDL.name
+        path.write_text(text)
+        return compile_file(path)
+
+
+def files() -> dict[Path, str]:
+    """{path: text} of all of them."""
+    text = rdl.render()
+    top = compiled(text)
+    found = words(top)
+    return {
+        RDL: text,
+        MAP_PACKAGE: vhdl.package(found),
+        REGISTER_FILE: vhdl.register_file(found),
+        C_HEADER: export.c_header(top, C_HEADER.name),
+        NAMES: export.python_names(found),
+    }

@@ -1,0 +1,221 @@
+"""The VHDL of the register map, from the compiled SystemRDL alone: register_map_pkg.vhd, register_file.vhd."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import jinja2
+
+from scripts.files import ROOT
+from scripts.registers.compiled import Part, Word
+
+TEMPLATES = ROOT / "scripts" / "templates"
+ADDRESS_BITS = 12
+GENERICS = {
+    "ADC_BITS": 16,
+    "POSITION_BITS": 16,
+    "CARRIER_HALF": 10000,
+    "CLOCK_HZ": 200000000,
+}  # as in the core
+BETWEEN, AT_ONCE = ("setting", "sample pulse"), ("command", "pulse")
+BUS = (
+    ("s_axi_awaddr", "in", 12),
+    ("s_axi_awvalid", "in", 1),
+    ("s_axi_awready", "out", 1),
+    ("s_axi_wdata", "in", 32),
+    ("s_axi_wstrb", "in", 4),
+    ("s_axi_wvalid", "in", 1),
+    ("s_axi_wready", "out", 1),
+    ("s_axi_bresp", "out", 2),
+    ("s_axi_bvalid", "out", 1),
+    ("s_axi_bready", "in", 1),
+    ("s_axi_araddr", "in", 12),
+    ("s_axi_arvalid", "in", 1),
+    ("s_axi_arready", "out", 1),
+    ("s_axi_rdata", "out", 32),
+    ("s_axi_rresp", "out", 2),
+    ("s_axi_rvalid", "out", 1),
+    ("s_axi_rready", "in", 1),
+)
+
+
+def writable(word: Word) -> bool:
+    """Whether software can write the register."""
+    return word.kind in BETWEEN + AT_ONCE
+
+
+def word_bits(words: list[Word]) -> int:
+    """Address bits of a word: enough for the last register."""
+    return max(word.index for word in words).bit_length()
+
+
+def package(words: list[Word]) -> str:
+    """rtl/io/register_map_pkg.vhd."""
+    limits = [end for word in words if writable(word) for end in (word.parts[0].low, word.parts[0].high)]
+    bits = max((end if end >= 0 else ~end).bit_length() + 1 for end in limits)
+
+    def limit(end: int) -> str:
+        return f"to_signed({end}, REGISTER_LIMIT_W)"
+
+    def access(word: Word) -> str:
+        names = {**dict.fromkeys(BETWEEN, "REGISTER_BETWEEN"), **dict.fromkeys(AT_ONCE, "REGISTER_AT_ONCE")}
+        return names.get(word.kind, "REGISTER_READ_ONLY")
+
+    stored, shown = [w for w in words if writable(w)], [w for w in words if w.kind == "status"]
+    tables = [
+        ("access", "unsigned", _arms(words, access, "REGISTER_NONE"), "REGISTER_NONE"),
+        ("low", "signed", _arms(stored, lambda w: limit(w.parts[0].low), limit(0)), limit(0)),
+        ("high", "signed", _arms(stored, lambda w: limit(w.parts[0].high), limit(0)), limit(0)),
+        ("signed", "std_logic", _arms(shown, lambda w: f"'{int(w.parts[0].signed)}'", "'0'"), "'0'"),
+    ]
+    return _render(
+        "register_map_pkg.vhd.j2",
+        address_bits=ADDRESS_BITS,
+        word_bits=word_bits(words),
+        limit_bits=bits,
+        tables=tables,
+    )
+
+
+def _arms(words: list[Word], value_of: Callable[[Word], str], default: str) -> list[tuple[str, str]]:
+    """(value, choices) of a case statement: each value once, ten words a line, runs of neighbours as ranges."""
+    of_value: dict[str, list[int]] = {}
+    for word in words:
+        of_value.setdefault(value_of(word), []).append(word.index)
+    of_value.pop(default, None)
+    return [(value, _choices(indices)) for value, indices in of_value.items()]
+
+
+def _choices(indices: list[int]) -> str:
+    runs: list[list[int]] = []
+    for index in indices:
+        if runs and runs[-1][1] == index - 1:
+            runs[-1][1] = index
+        else:
+            runs.append([index, index])
+    words = [str(a) if a == b else f"{a} to {b}" for a, b in runs]
+    lines = [" | ".join(words[k : k + 10]) for k in range(0, len(words), 10)]
+    return " |\n           ".join(lines)
+
+
+def register_file(words: list[Word]) -> str:
+    """rtl/io/register_file.vhd."""
+    stored = [(word, word.parts[0]) for word in words if writable(word)]
+    reads = _reads(words)
+    reads_width = max(len(f"words({choice})") for choice, _ in reads)
+    ports = [("clk", "in", "std_logic", ""), ("rst", "in", "std_logic", "synchronous, active high")]
+    ports += [(name, mode, _vector(width), "") for name, mode, width in BUS]
+    ports.append(("sample_busy", "in", "std_logic", "a sample enters or is in flight"))
+    ports += [(p.port, "out", p.vhdl_type, f"{w.address:03x} {p.doc}") for w, p in stored]
+    ports += [
+        (p.port, "in", p.vhdl_type, f"{w.address:03x} {p.doc}")
+        for w in words
+        if w.kind == "status"
+        for p in w.parts
+    ]
+    names = [name for name, *_ in ports]
+    if twice := sorted({name for name in names if names.count(name) > 1}):
+        raise ValueError(f"register file: two registers with the port {', '.join(twice)}")
+    return _render(
+        "register_file.vhd.j2",
+        generics=GENERICS,
+        generic_width=max(map(len, GENERICS)),
+        ports=ports,
+        port_width=max(map(len, names)),
+        bus=[name for name, *_ in BUS],
+        pulses=[p.port for w, p in stored if w.kind == "pulse"],
+        sample_pulses=[p.port for w, p in stored if w.kind == "sample pulse"],
+        stores=[(w.index, p.port, _from_word(p)) for w, p in stored],
+        resets=[(p.port, _reset(w, p)) for w, p in stored],
+        output_width=max(len(part.port) for _, part in stored),
+        kept={w.index: "pulse" not in w.kind for w, _ in stored},
+        reads=[(choice, _wrapped(value, reads_width + len("   <= "))) for choice, value in reads],
+        sign=_sign(words),
+        reads_width=reads_width,
+    )
+
+
+def _vector(width: int) -> str:
+    return "std_logic" if width == 1 else f"std_logic_vector({width - 1} downto 0)"
+
+
+def _from_word(part: Part) -> str:
+    if part.vhdl_type == "std_logic":
+        return "data(0)"
+    return f"{'signed' if part.signed else 'unsigned'}(data({part.port_width - 1} downto 0))"
+
+
+def _reset(word: Word, part: Part) -> str:
+    if part.vhdl_type == "std_logic":
+        return f"'{word.reset}'"
+    if word.reset == 0:
+        return "(others => '0')"
+    value = word.reset - (1 << 32) if part.signed and word.reset >> 31 else word.reset
+    return f"to_{'signed' if part.signed else 'unsigned'}({value}, {part.port_width})"
+
+
+def _sign(words: list[Word]) -> int:
+    """The bit from which every signed word is extended: the sign of the widest."""
+    return max(part.port_width for word in words for part in word.parts if part.signed) - 1
+
+
+def _reads(words: list[Word]) -> list[tuple[str, str]]:
+    """(index or range, what it reads) of every word and of the zeros between; stored words: their reset value."""
+    rows: list[tuple[str, str]] = []
+    following = 0
+    for word in words:
+        if writable(word) and "pulse" not in word.kind and not word.reset:
+            continue
+        rows += _gap(following, word.index)
+        rows.append((str(word.index), _read(word, _sign(words))))
+        following = word.index + 1
+    return rows + _gap(following, 1 << word_bits(words))
+
+
+def _gap(start: int, end: int) -> list[tuple[str, str]]:
+    return [(f"{start} to {end - 1}", "(others => (others => '0'))")] if start < end else []
+
+
+def _read(word: Word, sign: int) -> str:
+    if word.kind in ("constant", "setting", "command"):
+        return f'x"{word.reset:08X}"'
+    if word.kind == "generic":
+        return f"std_logic_vector(to_unsigned({word.name.upper()}, 32))"
+    if word.parts[0].signed:
+        return f"{_zeros(31 - sign)} & std_logic_vector(resize({word.parts[0].port}, {sign + 1}))"
+    if len(word.parts) == 1 and word.parts[0].vhdl_type != "std_logic":
+        return f"std_logic_vector(resize({word.parts[0].port}, 32))"
+    bits: list[str] = []  # from bit 31 down
+    free = 32
+    for part in sorted(word.parts, key=lambda p: -p.bit):
+        top = part.bit + part.width
+        bits += [_zeros(free - top)] if free > top else []
+        bits.append(part.port if part.vhdl_type == "std_logic" else f"std_logic_vector({part.port})")
+        free = part.bit
+    bits += [_zeros(free)] if free else []
+    return " & ".join(bits)
+
+
+def _wrapped(value: str, indent: int) -> str:
+    """A long concatenation in lines of up to 118 characters."""
+    lines = [""]
+    for piece in value.split(" & "):
+        if indent + len(lines[-1]) + len(piece) + 3 > 118:
+            lines.append("")
+        lines[-1] += f"{piece} & "
+    return ("\n" + " " * indent).join(line.rstrip() for line in lines).removesuffix(" &")
+
+
+def _zeros(count: int) -> str:
+    return '"' + "0" * count + '"'
+
+
+def _render(template: str, **context) -> str:
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(TEMPLATES),
+        undefined=jinja2.StrictUndefined,
+        keep_trailing_newline=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    return environment.get_template(template).render(**context)
