@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from scripts.prove import gates, narrowing, pipeline
+from scripts.prove import buses, gates, narrowing, pipeline
 from scripts.prove.proof import Proof
 
 
 def catalogue() -> tuple[Proof, ...]:
-    return (*gates.PROOFS, *narrowing.proofs(), *pipeline.proofs())
+    return (*gates.PROOFS, *buses.PROOFS, *narrowing.proofs(), *pipeline.proofs())
