@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from golden_model.modulation import pwm_compare
 from scripts.prove.proof import Fault, Proof, committed
 
 GATES = "modulation/gate_generation.vhd"
+COMPARE = "modulation/pwm_compare.vhd"
 SPIES = ("count", "down", "compare", "dead_used", "pulse_used", "configured", "level", "elapsed")
 FULL = {"CARRIER_HALF": 10000}  # 200 MHz, 10 kHz: the default of the core
 SMALL = {"CARRIER_HALF": 8}  # a period of 16 clocks, so that a search sees several
@@ -23,6 +25,23 @@ def gate_proof(name: str, says: str, macro: str, *faults: Fault, **more) -> Proo
         search_generics=SMALL,
         search_depth=SEVERAL_PERIODS,
         **more,
+    )
+
+
+def compare_proof(name: str, says: str, macro: str, *faults: Fault, method: str = "pdr") -> Proof:
+    block = pwm_compare.BLOCK
+    return Proof(
+        name=name,
+        says=says,
+        entity=block.name,
+        harness=committed("pwm_compare.sv"),
+        faults=faults,
+        method=method,
+        depth=block.latency + 2,
+        generics=FULL,
+        macros=(macro, f"LATENCY={block.latency}", f"INTERVAL={block.interval}"),
+        assumed="duties from 0 to 1, samples at their distance, min_pulse stays while a sample is on its way",
+        search_depth=3 * block.latency,
     )
 
 
@@ -77,5 +96,28 @@ PROOFS = (
         Fault("contradiction accepted", GATES, "dead_time < min_pulse and", "dead_time <= min_pulse and"),
         Fault("runs unconfigured", GATES, "enable and (configured or good) and not tripping", "enable and not tripping"),
         Fault("long minimum pulse accepted", GATES, " and resize(min_pulse, 16) <= CARRIER_HALF else", " else"),
+    ),
+    gate_proof(
+        "minimum_pulse",
+        "a gate that is on stays on for min_pulse - dead_time at least, unless trip, enable or reset cut it",
+        "GATE_PULSE",
+        Fault("gate off when the dead time grows", GATES, "          elapsed(k)   <= (others => '1');\n", ""),
+        Fault("duty taken at the peak too", GATES, "      if valley = '1' then\n        compare     <= (compare_a",
+              "      if count = CARRIER_HALF - 1 then\n        compare     <= (compare_a"),
+        assumed="the compare values taken over fit the minimum pulse taken over with them (see minimum_pulse_asked)",
+    ),
+    compare_proof(
+        "minimum_pulse_asked",
+        "no compare value asks for a pulse or a low end of a period below min_pulse",
+        "MINIMUM",
+        Fault("minimum pulse one short", COMPARE, "HALF - compare_2 < min_pulse_2", "HALF - compare_2 < min_pulse_2 - 1"),
+        Fault("pulses dropped by half their length", COMPARE, "(compare_2 & '0') < min_pulse_2", "('0' & compare_2(15 downto 1)) + 1 < min_pulse_2(11 downto 3)"),
+        method="induction",
+    ),
+    compare_proof(
+        "compare_together",
+        "the three compare values change together, with out_valid and at no other clock",
+        "TOGETHER",
+        Fault("compare values in two steps", COMPARE, "        kept_a_3 <= dropped_2;", "        kept_a_3 <= dropped_2;\n        compare_a <= dropped_2;"),
     ),
 )

@@ -204,6 +204,34 @@ module formal_top (
   end
 `endif
 
+`ifdef GATE_PULSE
+  // What pwm_compare sees to: no duty asks for less than the minimum pulse that comes into force with it.
+  wire [11:0] pulse_next = good ? min_pulse : pulse_in_force;
+  wire fits = asked == 0 || asked == HALF || (asked < HALF && 2 * asked >= pulse_next && HALF - asked >= pulse_next);
+  always @* if (begun && valley) assume (fits);
+
+  // How long a gate has been on, and the settings when the leg made up its mind.
+  reg [11:0] on_time, pulse_then, dead_then, room_before;
+  reg was_cut, was_running;
+  wire fall = (was_high && !high) || (was_low && !low);
+  always @(posedge clk) begin
+    on_time <= !(high || low) ? 0 : &on_time ? on_time : on_time + 1;
+    if (wanted != was_wanted || !was_running) begin
+      pulse_then <= pulse_in_force;
+      dead_then  <= dead_in_force;
+    end
+    room_before <= pulse_then - dead_then;
+    was_running <= running;
+    was_cut     <= rst || trip || !enable;
+    if (rst) {was_running, pulse_then, dead_then, room_before} <= 0;
+  end
+  always @(posedge clk) if (begun && !was_cut && fall) begin
+    assert (on_time >= room_before);
+    cover (was_high && on_time == room_before && room_before > 1);
+    cover (was_low && on_time == room_before && room_before > 1);
+  end
+`endif
+
 `ifdef LEMMAS
   wire [15:0] compare_of_leg = leg == 0 ? spy_compare[47:32] : leg == 1 ? spy_compare[31:16] : spy_compare[15:0];
   wire [11:0] elapsed = leg == 0 ? spy_elapsed[35:24] : leg == 1 ? spy_elapsed[23:12] : spy_elapsed[11:0];
@@ -225,5 +253,34 @@ module formal_top (
     if (high || low) assert (level == was_wanted && accepted && allowed);
     if (!settled) assert (elapsed <= off_time + 13'd1);
   end
+
+`ifdef GATE_PULSE
+  // Where the carrier is in its period, and for how many clocks the leg has wanted what it wants.
+  wire [16:0] at = spy_down ? 2 * HALF - 1 - spy_count : {1'b0, spy_count};
+  wire on = running && was_running;
+  reg [15:0] held;
+  always @(posedge clk) held <= rst || wanted != was_wanted || !was_running ? 1 : &held ? held : held + 1;
+
+  always @(posedge clk) if (begun) begin
+    assert (compare == 0 || compare == HALF
+            || (compare < HALF && 2 * compare >= pulse_in_force && HALF - compare >= pulse_in_force));
+    if (running && !was_running) assert (at == 0);
+    if (high || low) assert (was_running);
+    if (on) begin
+      assert (pulse_then > dead_then && dead_then > 0);
+      // Since when the leg wants it: from the compare value and the carrier
+      if (at == 0) assert (settled && held >= pulse_then);
+      if (at > 0 && was_wanted) assert (held + HALF >= at + compare && at > HALF - compare && at <= HALF + compare);
+      if (at > 0 && !was_wanted && at > HALF) assert (held + HALF + compare >= at && at > HALF + compare);
+      if (at > 0 && !was_wanted && at <= HALF) assert (held >= at && at <= HALF - compare);
+      assert (held >= pulse_then || (pulse_then == pulse_in_force && dead_then == dead_in_force));
+      // What it means for the gate
+      assert (level == was_wanted);
+      if (!settled) assert (elapsed == held && elapsed <= dead_in_force && dead_then == dead_in_force);
+      if (!settled) assert (pulse_then == pulse_in_force);
+      if (settled) assert (&on_time || held <= on_time + dead_then + 16'd1);
+    end
+  end
+`endif
 `endif
 endmodule
