@@ -21,7 +21,7 @@ module formal_top (
     input [11:0] dead_time,
     input [11:0] min_pulse
 );
-  localparam HALF = `CARRIER_HALF;
+  localparam [16:0] HALF = `CARRIER_HALF;  // sized: the solver's arithmetic is as wide as this
 
   wire [ 2:0] gate_high;
   wire [ 2:0] gate_low;
@@ -207,7 +207,7 @@ module formal_top (
 `ifdef GATE_PULSE
   // What pwm_compare sees to: no duty asks for less than the minimum pulse that comes into force with it.
   wire [11:0] pulse_next = good ? min_pulse : pulse_in_force;
-  wire fits = asked == 0 || asked == HALF || (asked < HALF && 2 * asked >= pulse_next && HALF - asked >= pulse_next);
+  wire fits = asked == 0 || asked == HALF || (asked < HALF && {asked, 1'b0} >= pulse_next && HALF - asked >= pulse_next);
   always @* if (begun && valley) assume (fits);
 
   // How long a gate has been on, and the settings when the leg made up its mind.
@@ -247,7 +247,8 @@ module formal_top (
     assert (accepted == spy_configured);
     assert (tripped == locked);
     if (accepted) assert (dead_in_force > 0 && dead_in_force < pulse_in_force && pulse_in_force <= HALF);
-    if (running) assert (accepted && allowed);
+    if (running) assert (accepted && allowed && !locked);
+    if (high || low) assert (running);
     // A gate is on where the leg has settled, and only there
     assert (high == (settled && level) && low == (settled && !level));
     if (high || low) assert (level == was_wanted && accepted && allowed);
@@ -256,15 +257,16 @@ module formal_top (
 
 `ifdef GATE_PULSE
   // Where the carrier is in its period, and for how many clocks the leg has wanted what it wants.
-  wire [16:0] at = spy_down ? 2 * HALF - 1 - spy_count : {1'b0, spy_count};
+  wire [16:0] at = spy_down ? {HALF[15:0], 1'b0} - 17'd1 - spy_count : {1'b0, spy_count};
   wire on = running && was_running;
   reg [15:0] held;
   always @(posedge clk) held <= rst || wanted != was_wanted || !was_running ? 1 : &held ? held : held + 1;
 
   always @(posedge clk) if (begun) begin
     assert (compare == 0 || compare == HALF
-            || (compare < HALF && 2 * compare >= pulse_in_force && HALF - compare >= pulse_in_force));
+            || (compare < HALF && {compare, 1'b0} >= pulse_in_force && HALF - compare >= pulse_in_force));
     if (running && !was_running) assert (at == 0);
+    if (!was_running) assert (elapsed == 0 && !level);
     if (high || low) assert (was_running);
     if (on) begin
       assert (pulse_then > dead_then && dead_then > 0);
