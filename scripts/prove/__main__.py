@@ -11,19 +11,12 @@ import time
 from concurrent.futures import ThreadPoolExecutor, as_completed
 
 from scripts.files import write_json
+from scripts.prove import document
 from scripts.prove.catalogue import catalogue
+from scripts.prove.document import method_of
 from scripts.prove.judge import judge
 from scripts.prove.solve import FOLDER
 from scripts.verilog import NoUsableGhdl, find_ghdl
-
-
-def method_of(entry: dict) -> str:
-    """In two words how a property was proved."""
-    if entry["method"] == "pdr":
-        return "pdr, unbounded"
-    if entry["method"] == "induction":
-        return f"induction, k = {entry['depth']}"
-    return f"up to clock {entry['depth']} only"
 
 
 def line_of(entry: dict) -> str:
@@ -40,7 +33,15 @@ def main() -> int:
     parser.add_argument("--jobs", type=int, default=2, help="proofs at a time")
     parser.add_argument("--limit", type=int, default=120, help="seconds for one question to the solver")
     parser.add_argument("--list", action="store_true", help="print the properties and end")
+    parser.add_argument(
+        "--document", action="store_true", help="write the last whole run's table to docs/proofs.md, end"
+    )
     arguments = parser.parse_args()
+    if arguments.document:
+        if not (FOLDER / "result.json").exists():
+            parser.exit(1, "prove: no build/prove/result.json yet; `make prove` writes it\n")
+        print(f"wrote {document.write()}")
+        return 0
     proofs = [p for p in catalogue() if arguments.only in p.name or arguments.only in p.entity]
     if arguments.list:
         print("\n".join(f"{p.name}: {p.says}" for p in proofs))

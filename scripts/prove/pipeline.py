@@ -26,7 +26,11 @@ def ports(verilog: str, entity: str) -> list[tuple[str, str, str]]:
 def harness(entity: str, start: str, ends: tuple[tuple[str, int], ...], interval: int, verilog: str) -> str:
     """``formal_top``: each strobe of ``ends`` is ``start`` that many clocks ago, samples ``interval`` clocks apart."""
     found = ports(verilog, entity)
-    inputs = [f"    input {width} {name}".replace("  ", " ") for direction, width, name in found if direction == "input"]
+    inputs = [
+        f"    input {width} {name}".replace("  ", " ")
+        for direction, width, name in found
+        if direction == "input"
+    ]
     strobes = {name for name, _ in ends}
     wired = [f".{name}({name})" for direction, _, name in found if direction == "input" or name in strobes]
     longest = max(latency for _, latency in ends)
@@ -67,7 +71,10 @@ def fault_files(block: Block) -> list[str]:
     """The block's file, then those of the entities it is made of."""
     own = f"{block.folder}/{block.name}.vhd"
     inner = re.findall(r"entity work\.(\w+)", (ROOT / "rtl" / own).read_text())
-    return [own, *(str(p.relative_to(ROOT / "rtl")) for name in inner for p in (ROOT / "rtl").rglob(f"{name}.vhd"))]
+    return [
+        own,
+        *(str(p.relative_to(ROOT / "rtl")) for name in inner for p in (ROOT / "rtl").rglob(f"{name}.vhd")),
+    ]
 
 
 # What blocks are written with, in the order of preference: (what it breaks, text, its replacement).
@@ -109,7 +116,11 @@ def core_ends() -> tuple[tuple[str, int], ...]:
     times = fluxproof.schedule()
     return tuple(
         (name, times[instance][1])
-        for name, instance in (("duty_valid", "modulator"), ("compare_valid", "compare"), ("values_valid", "monitor"))
+        for name, instance in (
+            ("duty_valid", "modulator"),
+            ("compare_valid", "compare"),
+            ("values_valid", "monitor"),
+        )
     )
 
 
@@ -122,10 +133,18 @@ def core_proof() -> Proof:
         entity="fluxproof",
         harness=partial(harness, "fluxproof", "sample_valid", ends, fluxproof.SAMPLE_INTERVAL),
         faults=(
-            Fault("compare starts with the voltage", "fluxproof.vhd",
-                  "      in_valid  => duty_ready,\n", "      in_valid  => ab_voltage_valid,\n"),
-            Fault("angle does not wait for the reset", "modulation/svm_delay_compensation.vhd",
-                  "        valid(1 to LATENCY) <= (others => '0');\n", "        null;\n"),
+            Fault(
+                "compare starts with the voltage",
+                "fluxproof.vhd",
+                "      in_valid  => duty_ready,\n",
+                "      in_valid  => ab_voltage_valid,\n",
+            ),
+            Fault(
+                "angle does not wait for the reset",
+                "modulation/svm_delay_compensation.vhd",
+                "        valid(1 to LATENCY) <= (others => '0');\n",
+                "        null;\n",
+            ),
         ),
         depth=longest + 2,
         generics={"CARRIER_HALF": 10000},

