@@ -24,7 +24,7 @@ unexport PYTHONHOME
 
 PYTHON_RUN := .venv/bin/python
 
-.PHONY: help setup generate test demo papers bench blind real compare timeline mutate verilog synth lint registers package faults lock clean distclean
+.PHONY: help setup generate test demo papers bench blind real compare timeline mutate verilog synth lint registers package prove faults lock clean distclean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -71,6 +71,9 @@ faults: setup ## hurt the drive: sensors, bus, strobes, registers; RTL against g
 
 mutate: setup ## plant faults in the VHDL and count those the tests catch
 	$(PYTHON_RUN) -m scripts.mutate $(ARGS)
+
+prove: setup ## prove properties of the gates, the pipeline, the rounding, the buses, and show each a planted fault
+	$(PYTHON_RUN) -m scripts.prove $(ARGS)
 
 verilog: setup ## convert the VHDL to Verilog (GHDL 5)
 	$(PYTHON_RUN) -m scripts.verilog $(ARGS)

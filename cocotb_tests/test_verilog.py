@@ -190,6 +190,19 @@ def test_equals_vhdl_clock_by_clock(ghdl5, generics, tmp_path, capsys):
         print(f"\nseed {seed}: {equal}; {len(undefined)} values undefined before clock {first}")
 
 
+def test_constant_wider_than_the_vector(ghdl5, tmp_path):
+    """min_pulse has 12 bits and CARRIER_HALF more: GHDL 5 compares with what 12 bits leave of it, were it not widened."""
+    generics = GENERICS | {"CARRIER_HALF": 5000}
+    core = VerilatedCore(generics)
+    settings = [{"dead_time": 3, "min_pulse": pulse} for pulse in (900, 1000, 4095, 2, 904, 905)]
+    writes = [{"rst": 1, "enable": 0}, {}, {"rst": 0}, *settings, {}]
+    refused = core.outputs.index("setting_refused")
+    got = [row[refused] for row in trace_of_verilog(writes, core)]
+    wanted = [row[refused] for row in trace_of_vhdl(writes, core, generics, tmp_path)]
+    assert got[1:] == wanted[1:]
+    assert got[3:9] == [0, 0, 0, 1, 0, 0]
+
+
 def test_run_period_records_what_a_trace_shows(ghdl5):
     settings = {"enable": 1, "fault_ignore": 127, "dead_time": 3, "min_pulse": 8, "lambda_mg": 9000, "u_dc_gain": 60000}
     sample, sample_at = {"adc_a": 40000, "adc_u_dc": 50000, "position_code": 777}, 5

@@ -182,7 +182,7 @@ MUTANTS = (
     ("duty taken at once", "modulation/gate_generation.vhd", "+ compare(k) >= CARRIER_HALF", "+ compare_a >= CARRIER_HALF"),
     ("contradiction accepted", "modulation/gate_generation.vhd", "dead_time < min_pulse and", "dead_time <= min_pulse and"),
     ("zero dead time accepted", "modulation/gate_generation.vhd", "good     <= '1' when dead_time > 0 and", "good     <= '1' when"),
-    ("long minimum pulse accepted", "modulation/gate_generation.vhd", " and min_pulse <= CARRIER_HALF else", " else"),
+    ("long minimum pulse accepted", "modulation/gate_generation.vhd", " and resize(min_pulse, 16) <= CARRIER_HALF else", " else"),
     ("runs unconfigured", "modulation/gate_generation.vhd", "enable and (configured or good) and not tripping", "enable and not tripping"),
     ("carrier skips the top", "modulation/gate_generation.vhd",
      "count = CARRIER_HALF - 1 then", "count = CARRIER_HALF - 2 then"),

@@ -1,0 +1,191 @@
+"""The gates: what may never happen to a leg, whatever the inputs do at whatever clock."""
+
+from __future__ import annotations
+
+from golden_model.modulation import pwm_compare
+from scripts.prove.proof import Fault, Proof, committed
+
+GATES = "modulation/gate_generation.vhd"
+COMPARE = "modulation/pwm_compare.vhd"
+SPIES = ("count", "down", "compare", "dead_used", "pulse_used", "configured", "level", "elapsed")
+FULL = {"CARRIER_HALF": 10000}  # 200 MHz, 10 kHz: the default of the core
+SMALL = {"CARRIER_HALF": 8}  # a period of 16 clocks, so that a search sees several
+SEVERAL_PERIODS = 48
+
+
+def gate_proof(name: str, says: str, macro: str, *faults: Fault, **more) -> Proof:
+    return Proof(
+        name=f"gates_{name}",
+        says=says,
+        entity="gate_generation",
+        harness=committed("gate_generation.sv"),
+        faults=faults,
+        generics=FULL,
+        macros=(macro,),
+        spies=SPIES,
+        search_generics=SMALL,
+        search_depth=SEVERAL_PERIODS,
+        **more,
+    )
+
+
+def compare_proof(name: str, says: str, macro: str, *faults: Fault, method: str = "pdr") -> Proof:
+    block = pwm_compare.BLOCK
+    return Proof(
+        name=name,
+        says=says,
+        entity=block.name,
+        harness=committed("pwm_compare.sv"),
+        faults=faults,
+        method=method,
+        depth=block.latency + 2,
+        generics=FULL,
+        macros=(macro, f"LATENCY={block.latency}", f"INTERVAL={block.interval}"),
+        assumed="duties from 0 to 1, samples at their distance, min_pulse stays while a sample is on its way",
+        search_depth=3 * block.latency,
+    )
+
+
+PROOFS = (
+    gate_proof(
+        "never_both",
+        "both gates of a leg are never on",
+        "NEVER_BOTH",
+        Fault(
+            "low gate follows the carrier at once",
+            GATES,
+            "gate_low(k)  <= not level(k);",
+            "gate_low(k)  <= '1';",
+        ),
+    ),
+    gate_proof(
+        "dead_time",
+        "between two gates of a leg both are off for the dead time in force, also while the register changes",
+        "DEAD_TIME",
+        Fault(
+            "dead time one short",
+            GATES,
+            "elsif elapsed(k) < dead_used then",
+            "elsif elapsed(k) + 1 < dead_used then",
+        ),
+        Fault(
+            "no dead time after enable",
+            GATES,
+            "elapsed(k) <= (others => '0');",
+            "elapsed(k) <= (others => '1');",
+        ),
+        Fault(
+            "dead time counted on", GATES, "elapsed(k) <= to_unsigned(1, 12);", "elapsed(k) <= elapsed(k);"
+        ),
+    ),
+    gate_proof(
+        "trip_off",
+        "every gate is off one clock after trip",
+        "TRIP_OFF",
+        Fault(
+            "trip waits for the valley",
+            GATES,
+            "running_now and enable and not trip;",
+            "running_now and enable;",
+        ),
+    ),
+    gate_proof(
+        "trip_held",
+        "after a trip the gates stay off until clear_trip without trip, then enable at a valley",
+        "TRIP_HELD",
+        Fault("trip not remembered", GATES, "trip or (tripped_now and not clear_trip)", "trip"),
+        Fault(
+            "trip cleared while it lasts",
+            GATES,
+            "trip or (tripped_now and not clear_trip)",
+            "(trip or tripped_now) and not clear_trip",
+        ),
+        Fault(
+            "on again before the valley",
+            GATES,
+            "      running_now <= on_now;",
+            "      running_now <= running_now and not tripping;",
+        ),
+    ),
+    gate_proof(
+        "enable_off",
+        "every gate is off one clock after enable is taken away",
+        "ENABLE_OFF",
+        Fault(
+            "enable drops at the valley",
+            GATES,
+            "running_now and enable and not trip;",
+            "running_now and not trip;",
+        ),
+    ),
+    gate_proof(
+        "duty_at_the_valley",
+        "a gate follows the compare value of the last valley and no later one",
+        "AT_THE_VALLEY",
+        Fault("duty taken at once", GATES, "+ compare(k) >= CARRIER_HALF", "+ compare_a >= CARRIER_HALF"),
+        Fault(
+            "duty taken at the peak too",
+            GATES,
+            "      if valley = '1' then\n        compare     <= (compare_a",
+            "      if count = CARRIER_HALF - 1 then\n        compare     <= (compare_a",
+        ),
+    ),
+    gate_proof(
+        "settings",
+        "dead time and minimum pulse change at the valley, never to contradicting ones, and no gate is on before the first",
+        "SETTINGS",
+        Fault("contradiction accepted", GATES, "dead_time < min_pulse and", "dead_time <= min_pulse and"),
+        Fault(
+            "runs unconfigured",
+            GATES,
+            "enable and (configured or good) and not tripping",
+            "enable and not tripping",
+        ),
+        Fault(
+            "long minimum pulse accepted", GATES, " and resize(min_pulse, 16) <= CARRIER_HALF else", " else"
+        ),
+    ),
+    gate_proof(
+        "minimum_pulse",
+        "a gate that is on stays on for min_pulse - dead_time at least, unless trip, enable or reset cut it",
+        "GATE_PULSE",
+        Fault("gate off when the dead time grows", GATES, "          elapsed(k)   <= (others => '1');\n", ""),
+        Fault(
+            "duty taken at the peak too",
+            GATES,
+            "      if valley = '1' then\n        compare     <= (compare_a",
+            "      if count = CARRIER_HALF - 1 then\n        compare     <= (compare_a",
+        ),
+        patience=600,
+        assumed="the compare values taken over fit the minimum pulse taken over with them (see minimum_pulse_asked)",
+    ),
+    compare_proof(
+        "minimum_pulse_asked",
+        "no compare value asks for a pulse or a low end of a period below min_pulse",
+        "MINIMUM",
+        Fault(
+            "minimum pulse one short",
+            COMPARE,
+            "HALF - compare_2 < min_pulse_2",
+            "HALF - compare_2 < min_pulse_2 - 1",
+        ),
+        Fault(
+            "pulses dropped by half their length",
+            COMPARE,
+            "(compare_2 & '0') < min_pulse_2",
+            "('0' & compare_2(15 downto 1)) + 1 < min_pulse_2(11 downto 3)",
+        ),
+        method="induction",
+    ),
+    compare_proof(
+        "compare_together",
+        "the three compare values change together, with out_valid and at no other clock",
+        "TOGETHER",
+        Fault(
+            "compare values in two steps",
+            COMPARE,
+            "        kept_a_3 <= dropped_2;",
+            "        kept_a_3 <= dropped_2;\n        compare_a <= dropped_2;",
+        ),
+    ),
+)

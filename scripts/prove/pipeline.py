@@ -1,0 +1,157 @@
+"""Every block's out_valid: exactly LATENCY clocks after in_valid, never without a sample, none after a reset.
+
+The harness is made from what the block declares, so a block of the registry is proved without a line here.
+"""
+
+from __future__ import annotations
+
+import re
+from functools import partial
+
+from golden_model import fluxproof
+from golden_model.block import Block
+from golden_model.registry import BLOCKS
+from scripts.files import ROOT
+from scripts.prove.proof import Fault, Proof
+
+_PORT = re.compile(r"\b(input|output)\s+(\[\d+:0\]\s*)?(\w+)")
+
+
+def ports(verilog: str, entity: str) -> list[tuple[str, str, str]]:
+    """(direction, range, name) of each port of the module."""
+    header = re.search(rf"^module {entity}\s*\((.*?)\);", verilog, re.MULTILINE | re.DOTALL)
+    return [(direction, width.strip(), name) for direction, width, name in _PORT.findall(header.group(1))]
+
+
+def harness(entity: str, start: str, ends: tuple[tuple[str, int], ...], interval: int, verilog: str) -> str:
+    """``formal_top``: each strobe of ``ends`` is ``start`` that many clocks ago, samples ``interval`` clocks apart."""
+    found = ports(verilog, entity)
+    inputs = [
+        f"    input {width} {name}".replace("  ", " ")
+        for direction, width, name in found
+        if direction == "input"
+    ]
+    strobes = {name for name, _ in ends}
+    wired = [f".{name}({name})" for direction, _, name in found if direction == "input" or name in strobes]
+    longest = max(latency for _, latency in ends)
+    checks = "\n".join(
+        f"    assert ({name} == flight[{latency - 1}]);\n    cover ({name});" for name, latency in ends
+    )
+    header, wires = ",\n".join(inputs), "\n  ".join(f"wire {name};" for name in sorted(strobes))
+    return f"""\
+// Made from the declarations of {entity}.
+module formal_top (
+{header}
+);
+  {wires}
+  {entity} dut ({", ".join(wired)});
+
+  reg begun = 0;
+  always @(posedge clk) begun <= 1;
+  always @* if (!begun) assume (rst);
+
+  // Samples keep their distance, whatever resets come between.
+  reg [7:0] since = {interval};
+  always @(posedge clk) since <= {start} ? 1 : since < {interval} ? since + 1 : since;
+  always @* if ({start}) assume (since >= {interval});
+
+  // flight[k]: a sample went in k + 1 clocks ago and no reset has come since
+  reg [{longest - 1}:0] flight;
+  always @(posedge clk) flight <= rst ? 0 : {{flight, {start}}};
+
+  always @(posedge clk) if (begun) begin
+{checks}
+    assert (since <= {interval});
+  end
+endmodule
+"""
+
+
+def fault_files(block: Block) -> list[str]:
+    """The block's file, then those of the entities it is made of."""
+    own = f"{block.folder}/{block.name}.vhd"
+    inner = re.findall(r"entity work\.(\w+)", (ROOT / "rtl" / own).read_text())
+    return [
+        own,
+        *(str(p.relative_to(ROOT / "rtl")) for name in inner for p in (ROOT / "rtl").rglob(f"{name}.vhd")),
+    ]
+
+
+# What blocks are written with, in the order of preference: (what it breaks, text, its replacement).
+PATTERNS = (
+    ("valid a clock early", "out_valid <= valid(LATENCY);", "out_valid <= valid(LATENCY - 1);"),
+    ("valid a clock early", "out_valid   <= valid(LATENCY);", "out_valid   <= valid(LATENCY - 1);"),
+    ("valid survives reset", "        valid(1 to LATENCY) <= (others => '0');\n", "        null;\n"),
+    ("valid survives reset", "out_valid <= '0';", "null;"),
+)
+
+
+def faults(block: Block) -> tuple[Fault, ...]:
+    """Up to two faults of the strobe, in the block or in the entity that does its work."""
+    made: dict[str, Fault] = {}
+    for file in fault_files(block):
+        text = (ROOT / "rtl" / file).read_text()
+        for says, old, new in PATTERNS:
+            if text.count(old) == 1:
+                made.setdefault(says, Fault(says, file, old, new))
+    return tuple(made.values())
+
+
+def block_proof(block: Block) -> Proof:
+    return Proof(
+        name=f"pipeline_{block.name}",
+        says=f"out_valid of {block.name} comes {block.latency} clocks after in_valid, never otherwise; reset clears",
+        entity=block.name,
+        harness=partial(harness, block.name, "in_valid", (("out_valid", block.latency),), block.interval),
+        faults=faults(block),
+        depth=block.latency + 2,
+        generics=dict(block.configs[0]),
+        assumed=f"samples at least {block.interval} clocks apart" if block.interval > 1 else "nothing",
+        search_depth=2 * block.latency + 4,
+    )
+
+
+def core_ends() -> tuple[tuple[str, int], ...]:
+    """The strobes of the whole core with their clocks, from the declared latencies."""
+    times = fluxproof.schedule()
+    return tuple(
+        (name, times[instance][1])
+        for name, instance in (
+            ("duty_valid", "modulator"),
+            ("compare_valid", "compare"),
+            ("values_valid", "monitor"),
+        )
+    )
+
+
+def core_proof() -> Proof:
+    ends = core_ends()
+    longest = max(latency for _, latency in ends)
+    return Proof(
+        name="pipeline_fluxproof",
+        says="duty_valid, compare_valid and values_valid of the core come at their declared clocks, never otherwise",
+        entity="fluxproof",
+        harness=partial(harness, "fluxproof", "sample_valid", ends, fluxproof.SAMPLE_INTERVAL),
+        faults=(
+            Fault(
+                "compare starts with the voltage",
+                "fluxproof.vhd",
+                "      in_valid  => duty_ready,\n",
+                "      in_valid  => ab_voltage_valid,\n",
+            ),
+            Fault(
+                "angle does not wait for the reset",
+                "modulation/svm_delay_compensation.vhd",
+                "        valid(1 to LATENCY) <= (others => '0');\n",
+                "        null;\n",
+            ),
+        ),
+        depth=longest + 2,
+        generics={"CARRIER_HALF": 10000},
+        assumed=f"samples at least {fluxproof.SAMPLE_INTERVAL} clocks apart",
+        search_depth=2 * longest,
+    )
+
+
+def proofs() -> tuple[Proof, ...]:
+    return (*(block_proof(b) for b in BLOCKS.values() if not b.clocked), core_proof())

@@ -1,0 +1,62 @@
+"""What a proof is: an entity, a harness around it, a method, and the planted faults that it must notice."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+HARNESSES = Path(__file__).resolve().parents[2] / "tb" / "formal"
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A planted fault: ``old`` stands exactly once in the file ``file`` of rtl/ and becomes ``new``."""
+
+    says: str
+    file: str
+    old: str
+    new: str
+
+
+@dataclass(frozen=True)
+class Proof:
+    """One property of one entity.
+
+    ``harness`` makes the SystemVerilog module ``formal_top`` from the entity's Verilog; its asserts are the
+    property, its assumes what ``assumed`` says in words, its covers what must be reachable under the assumptions.
+    ``spies`` are signals of the entity that the harness sees as outputs spy_NAME where LEMMAS is defined: lemmas help
+    induction and are proved with the property.  The faults face the property alone, up to ``search_depth`` clocks
+    from reset, with ``search_generics``.
+    """
+
+    name: str
+    says: str
+    entity: str
+    harness: Callable[[str], str]
+    faults: tuple[Fault, ...]
+    method: str = "induction"  # induction (z3), pdr (ABC), bmc (z3, bounded)
+    depth: int = 3  # clocks: k of the induction or the bound
+    generics: Mapping[str, int] = field(default_factory=dict)
+    macros: tuple[str, ...] = ()
+    spies: tuple[str, ...] = ()
+    assumed: str = "nothing"
+    search_generics: Mapping[str, int] | None = None  # None: those of the proof
+    search_depth: int = 20
+    covers: bool = True
+    patience: int = 0  # seconds that this proof is known to need more than others
+    vhdl: Callable[[], str] | None = None  # a generated entity around the RTL under proof
+
+    @property
+    def mode(self) -> str:
+        """``prove``: without a bound; ``bmc``: up to ``depth`` clocks from reset."""
+        return "bmc" if self.method == "bmc" else "prove"
+
+    @property
+    def searched_with(self) -> Mapping[str, int]:
+        return self.generics if self.search_generics is None else self.search_generics
+
+
+def committed(file: str) -> Callable[[str], str]:
+    """The harness tb/formal/``file``, which stands for itself."""
+    return lambda verilog: (HARNESSES / file).read_text()

