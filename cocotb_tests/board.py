@@ -1,4 +1,4 @@
-"""A board for software to run on: a drive with its motor, reached as software/fluxproof_bus.h has it, over pipes.
+"""A board for software to run on: a drive with its motor, reached as docs/software/fluxproof_bus.h has it, over pipes.
 
 What is on it, the golden model or the RTL, comes in the classes below; time runs only while software waits.
 """

@@ -1,4 +1,4 @@
-"""software/bring_up.c on the golden model and on the RTL behind AXI: the motor turns, what is wrong is told."""
+"""docs/software/bring_up.c on the golden model and on the RTL behind AXI: the motor turns, what is wrong is told."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from scripts.print_registers import c_lines
 from scripts.registers.rdl import version_word
 
 PAPER = ROOT / "docs" / "drives" / "paper001.toml"
-SOFTWARE = ROOT / "software"
+SOFTWARE = ROOT / "docs" / "software"
 STRICT = ("-std=c11", "-O1", "-Wall", "-Wextra", "-Werror", "-pedantic")
 RPM = 30 / math.pi
 

@@ -16,7 +16,7 @@ from golden_model import fluxproof
 from golden_model.drive_keys import DriveError
 from golden_model.io import sample_latch
 from golden_model.registers import registers
-from golden_model.protection.fault_latch import NAMES
+from golden_model.io.fault_latch import NAMES
 from scripts import faults
 from scripts.cosim import INPUT_PORTS, gate_words
 from scripts.fault_bench import named, run, setup

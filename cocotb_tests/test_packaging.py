@@ -155,7 +155,7 @@ def test_zip_is_an_ip_repository(component, tmp_path, monkeypatch, capsys):
     with zipfile.ZipFile(path) as archive:
         inside = set(archive.namelist())
     named = {e.text for e in component.iterfind("s:fileSets/s:fileSet/s:file/s:name", S)}
-    assert named | {"component.xml", "LICENSE", "software/bring_up.c"} <= inside
+    assert named | {"component.xml", "LICENSE", "docs/software/bring_up.c"} <= inside
     assert package_command.pack(path).read_bytes() == first
     damaged = tmp_path / "component.xml"
     damaged.write_text(ipxact.PATH.read_text().replace("<spirit:direction>in<", "<spirit:direction>into<", 1))

@@ -16,7 +16,7 @@ from cocotb_tests import simulate
 from cocotb_tests.stimulus import random_value
 from golden_model.fluxproof import REGISTERS
 from golden_model.io import sample_latch
-from golden_model.protection import fault_latch, sample_checks, sample_guard
+from golden_model.io import fault_latch, sample_checks, sample_guard
 from scripts import verilog
 from scripts.sources import rtl_sources
 from scripts.verilated import VerilatedCore

@@ -10,7 +10,7 @@ from typing import NamedTuple
 from golden_model import fluxproof
 from golden_model.kernel import kernel
 from golden_model.modulation import gate_generation
-from golden_model.protection import fault_latch, sample_guard
+from golden_model.io import fault_latch, sample_guard
 
 INTERVAL = fluxproof.SAMPLE_INTERVAL
 COMPARE_CLOCKS, CHECKS_CLOCKS = (fluxproof.schedule()[name][1] for name in ("compare", "checks"))

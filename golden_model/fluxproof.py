@@ -36,7 +36,10 @@ from golden_model.estimators import (
 from golden_model.formats import PU
 from golden_model.io import (
     current_conditioning,
+    fault_latch,
     position,
+    sample_checks,
+    sample_guard,
     sample_latch,
     speed,
     u_dc_conditioning,
@@ -44,7 +47,6 @@ from golden_model.io import (
 )
 from golden_model.kernel import kernel
 from golden_model.modulation import gate_generation, pwm_compare, svm, svm_delay_compensation
-from golden_model.protection import fault_latch, sample_checks, sample_guard
 from golden_model.transforms import clarke, flux_inverse_park, flux_park, inverse_park, park, sincos
 
 # Instance of the top -> (its block, the instances it waits for).  Blocks start when the last of these is done.

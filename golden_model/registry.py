@@ -27,7 +27,10 @@ from golden_model.estimators import (
 )
 from golden_model.io import (
     current_conditioning,
+    fault_latch,
     position,
+    sample_checks,
+    sample_guard,
     sample_latch,
     speed,
     telemetry,
@@ -36,7 +39,6 @@ from golden_model.io import (
     u_dc_processing,
 )
 from golden_model.modulation import gate_generation, pwm_compare, svm, svm_delay_compensation
-from golden_model.protection import fault_latch, sample_checks, sample_guard
 from golden_model.transforms import clarke, flux_inverse_park, flux_park, inverse_park, park, rotate, sincos
 
 BLOCKS = {

@@ -27,8 +27,8 @@ import math
 from typing import NamedTuple
 
 from golden_model.formats import LIMIT
-from golden_model.protection.fault_latch import NAMES
-from golden_model.protection.sample_checks import IGNORE
+from golden_model.io.fault_latch import NAMES
+from golden_model.io.sample_checks import IGNORE
 from golden_model.units import TURN_RAD
 
 INTEGRAL_CORNER = 5.0  # speed crossover over the corner of the speed regulator's integral
@@ -279,7 +279,7 @@ def gates(drive):
 
 
 def protection(drive):
-    """What turns the gates off: see golden_model/protection."""
+    """What turns the gates off: see golden_model/io."""
     p, s, b, m = drive.protection, drive.sensors, drive.bases, drive.machine
     amperes, volts = base_keys(drive, "current_a"), base_keys(drive, "voltage_v")
     limit, bus = drive.current_limit_a, drive.inverter.dc_bus_v

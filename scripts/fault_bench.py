@@ -14,7 +14,7 @@ import numpy as np
 
 from golden_model import clocked, fluxproof
 from golden_model import drive as drives
-from golden_model.protection.fault_latch import LATE, NAMES
+from golden_model.io.fault_latch import LATE, NAMES
 from golden_model.registers import registers
 from golden_model.units import from_si
 from plant import sensor_params

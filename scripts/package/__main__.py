@@ -20,7 +20,7 @@ from scripts.package import ipxact, packaged
 from scripts.package.axi_top import TOP
 from scripts.sources import ROOT
 
-BESIDE = ("LICENSE", "software")  # what software needs, and may do, with the core
+BESIDE = ("LICENSE", "docs/software")  # what software needs, and may do, with the core
 
 
 def schema() -> etree.XMLSchema:

@@ -14,7 +14,7 @@ from scripts.registers.compiled import compile_file, words
 RDL = ROOT / "rtl" / "io" / "fluxproof.rdl"
 MAP_PACKAGE = ROOT / "rtl" / "io" / "register_map_pkg.vhd"
 REGISTER_FILE = ROOT / "rtl" / "io" / "register_file.vhd"
-C_HEADER = ROOT / "software" / "fluxproof_registers.h"
+C_HEADER = ROOT / "docs" / "software" / "fluxproof_registers.h"
 NAMES = ROOT / "golden_model" / "io" / "register_names.py"
 
 

@@ -1,6 +1,6 @@
 """Which instance of rtl/fluxproof.vhd belongs to which row of the report; every one to exactly one.
 
-The rows are those of paper 001, Table 1, and two of our own.  What a block is there for decides, not the
+The rows are those of paper 001, Table 1, and three of our own.  What a block is there for decides, not the
 folder it is in: chord_speed serves the decoupling, dead_time_compensation the inverter estimators.
 """
 
@@ -66,6 +66,12 @@ GROUPS: dict[str, tuple[str, ...]] = {
         "compensation_dq",
         "direction_functions",
         "motor_voltage",
+    ),
+    # what no peer's figure has in it: limits of currents, bus and position, watchdog, memory of faults
+    "protection": (
+        "guard",
+        "checks",
+        "fault_memory",
     ),
 }
 OUTSIDE = "registers_telemetry"  # whatever fluxproof_axi holds beside the core

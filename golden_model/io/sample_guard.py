@@ -73,7 +73,7 @@ def stimuli(rng, config):
 
 BLOCK = Block(
     name="sample_guard",
-    folder="protection",
+    folder="io",
     paper="none: what a drive needs besides",
     step=step,
     inputs=(

@@ -2,7 +2,7 @@
  * down, read back, stop.  The gates are off before it starts and, whatever goes wrong, when it ends.
  *
  *   fluxproof registers drive.toml --format c > drive_registers.h
- *   cc -Wall -Wextra -I software -I . software/bring_up.c software/bus_uio.c -o bring_up
+ *   cc -Wall -Wextra -I docs/software -I . docs/software/bring_up.c docs/software/bus_uio.c -o bring_up
  *   ./bring_up 300          speed in rpm
  */
 

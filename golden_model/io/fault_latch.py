@@ -19,7 +19,7 @@ from golden_model.block import Block, Port
 from golden_model.fixed import Format
 from golden_model.formats import BIT
 from golden_model.kernel import kernel
-from golden_model.protection.sample_checks import CHECKS, IGNORE
+from golden_model.io.sample_checks import CHECKS, IGNORE
 
 FLAGS = Format(0, 9, 0)
 FAULTS = Format(0, 8, 0)  # all that can trip
@@ -74,7 +74,7 @@ def stimuli(rng, config):
 
 BLOCK = Block(
     name="fault_latch",
-    folder="protection",
+    folder="io",
     paper="none: what a drive needs besides",
     step=step,
     inputs=(

@@ -111,7 +111,7 @@ def stimuli(rng, config):
 
 BLOCK = Block(
     name="sample_checks",
-    folder="protection",
+    folder="io",
     paper="none: what a drive needs besides",
     step=step,
     inputs=tuple(Port(f"i_{x}", PU, doc=f"current, phase {x}") for x in "abc")
