@@ -17,7 +17,7 @@ HEADINGS = {
     **{"lut": "LUT", "lut_memory": "of them memory", "ff": "FF", "dsp": "DSP48", "bram": "RAMB36"},
     **{"carry_bits": "carry bits", "muxf": "MUXF"},
 }
-COLOURS = dict(zip(ROWS, ("#8e5ea2", "#e76f51", "#2a9d8f", "#e9c46a", "#7a8b99"), strict=True))
+COLOURS = dict(zip(ROWS, ("#8e5ea2", "#e76f51", "#2a9d8f", "#e9c46a", "#577590", "#7a8b99"), strict=True))
 # (figure, the most it may be): the targets, on xc7
 TARGETS = {"foc": {"lut": 2000, "dsp": 26}, "core": {"lut": 5000, "dsp": 64}}
 
