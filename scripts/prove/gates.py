@@ -132,7 +132,7 @@ PROOFS = (
     ),
     gate_proof(
         "settings",
-        "dead time and minimum pulse change at the valley, never to contradicting ones, and no gate is on before the first",
+        "dead time and minimum pulse change at the valley, never to contradicting ones; no gate is on before",
         "SETTINGS",
         Fault("contradiction accepted", GATES, "dead_time < min_pulse and", "dead_time <= min_pulse and"),
         Fault(

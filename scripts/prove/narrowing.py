@@ -55,7 +55,8 @@ FAULTS = {
         "if v(v'high downto width + 1) = ZERO(v'high downto width + 1) then",
     ),
     "round_sat": Fault(
-        "wraps", PACKAGE, "return saturate(round_half_up(x, drop), width);", "return resize(round_half_up(x, drop), width);"
+        "wraps", PACKAGE, "return saturate(round_half_up(x, drop), width);",
+        "return resize(round_half_up(x, drop), width);",
     ),
     "clamp": Fault("no upper limit", PACKAGE, "return resize(hi, x'length);", "return x;"),
     "plus_rounded": Fault("half lost", PACKAGE, "sum := (a & '1')", "sum := (a & '0')"),
@@ -65,7 +66,7 @@ FAULTS = {
 
 @lru_cache(maxsize=1)
 def widths_in_use() -> dict[str, tuple[tuple[int, ...], ...]]:
-    """{function: sorted widths}, from an elaboration of the core; RuntimeError where GHDL refuses or reports nothing."""
+    """{function: sorted widths}, from an elaboration of the core; RuntimeError where GHDL reports nothing."""
     ghdl, _ = find_ghdl()
     with tempfile.TemporaryDirectory() as scratch:
         tree = Path(scratch) / "rtl"
@@ -156,8 +157,8 @@ def wanted(name: str, w: tuple[int, ...]) -> tuple[str, str]:
         return f"(({value} + 64'sd{1 << (drop - 1)}) >>> {drop})" if drop else value
 
     def limited(value: str, low: int, high: int) -> str:
-        sign = "-" if low < 0 else ""
-        return f"({value} > 64'sd{high} ? 64'sd{high} : {value} < {sign}64'sd{abs(low)} ? {sign}64'sd{abs(low)} : {value})"
+        least, most = f"{'-' if low < 0 else ''}64'sd{abs(low)}", f"64'sd{high}"
+        return f"({value} > {most} ? {most} : {value} < {least} ? {least} : {value})"
 
     def limits(width: int) -> tuple[int, int]:
         return -(1 << (width - 1)), (1 << (width - 1)) - 1
