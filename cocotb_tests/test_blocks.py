@@ -97,10 +97,10 @@ def test_u_dc_reciprocal_over_the_whole_range():
     from golden_model.io import u_dc_processing
 
     for u_dc in range(u_dc_processing.U_DC_MIN, 1 << 17):
-        m, _beta, n, low = u_dc_processing.step(u_dc)
+        inverse, _beta, low = u_dc_processing.step(u_dc)
         assert low == 0
-        assert abs(m * 2.0**n * 2.0**-17 * (u_dc * 2.0**-16) - 1) <= 2.0**-17
-    below = u_dc_processing.step(u_dc_processing.U_DC_MIN)[:3]
+        assert abs(inverse * 2.0**-17 * (u_dc * 2.0**-16) - 1) <= 2.0**-17
+    below = u_dc_processing.step(u_dc_processing.U_DC_MIN)[:2]
     for u_dc in (0, 1, u_dc_processing.U_DC_MIN - 1):
         assert u_dc_processing.step(u_dc) == (*below, 1)
 

@@ -85,7 +85,8 @@ WIRING = {
     "inverter_loss": (v_dead_adaline, ("circle", "direction_functions")),
     "magnet_flux": (psi_adaline, ("circle", "direction_functions")),
     "directions": (current_directions, ("circle", "stator_frame", "speed_measurement")),
-    "monitor": (flux_monitor, ("compensation", "merge", "bus_reciprocal")),
+    # Its flags would be there earlier; values_valid says that all of a sample's values are.
+    "monitor": (flux_monitor, ("compensation", "merge", "bus_reciprocal", "inverter_loss")),
 }
 
 
@@ -250,7 +251,7 @@ def step(state, sample, regs, config):
     u_dc, u_max, u_dc_at_rail = u_dc_conditioning.step(
         x.adc_u_dc, r.u_dc_offset, r.u_dc_gain, r.k_u_max, c.adc_bits
     )
-    m, m_beta, n, u_dc_low = u_dc_processing.step(u_dc)
+    inverse, inverse_beta, u_dc_low = u_dc_processing.step(u_dc)
 
     i_alpha, i_beta = clarke.step(i_a, i_b, i_c)
     cos_theta, sin_theta = sincos.step(theta_me)
@@ -312,7 +313,7 @@ def step(state, sample, regs, config):
     )
 
     u_alpha, u_beta = inverse_park.step(u_d, u_q, cos_out, sin_out)
-    duty_a, duty_b, duty_c = svm.step(u_alpha, u_beta, m, m_beta, n)
+    duty_a, duty_b, duty_c = svm.step(u_alpha, u_beta, inverse, inverse_beta)
     compare_a, compare_b, compare_c = pwm_compare.step(duty_a, duty_b, duty_c, r.min_pulse, c.carrier_half)
 
     u_applied_alpha, u_applied_beta, voltage_known = applied_voltage.step(

@@ -181,9 +181,8 @@ architecture rtl of fluxproof is
   signal omega_valid          : std_logic;
   signal u_dc_valid           : std_logic;
   signal reciprocal_valid     : std_logic;
-  signal m                    : unsigned(RECIPROCAL_W - 1 downto 0);
-  signal m_beta               : unsigned(RECIPROCAL_W - 1 downto 0);
-  signal n                    : unsigned(2 downto 0);
+  signal inverse              : unsigned(U_DC_PROCESSING_INVERSE_W - 1 downto 0);
+  signal inverse_beta         : unsigned(U_DC_PROCESSING_INVERSE_W - 1 downto 0);
   signal alpha_beta_valid     : std_logic;
   signal i_alpha              : signed(PU_W - 1 downto 0);
   signal i_beta               : signed(PU_W - 1 downto 0);
@@ -204,6 +203,7 @@ architecture rtl of fluxproof is
   signal cos_out              : signed(PU_W - 1 downto 0);
   signal sin_out              : signed(PU_W - 1 downto 0);
   signal ab_voltage_valid     : std_logic;
+  signal v_dead_valid         : std_logic;
   signal duty_ready           : std_logic;
   signal compare_ready        : std_logic;
   signal r                    : unsigned(RESISTANCE_W - 1 downto 0);
@@ -226,7 +226,6 @@ architecture rtl of fluxproof is
   signal model_ab_valid       : std_logic;
   signal factor_valid         : std_logic;
   signal delta_valid          : std_logic;
-  signal lambda_pi_valid      : std_logic;
   signal clear_faults         : std_logic;
   signal u_comp_alpha         : signed(PU_W - 1 downto 0);
   signal u_comp_beta          : signed(PU_W - 1 downto 0);
@@ -355,15 +354,14 @@ begin
 
   bus_reciprocal : entity work.u_dc_processing
     port map (
-      clk       => clk,
-      rst       => rst,
-      in_valid  => u_dc_valid,
-      u_dc      => u_dc,
-      out_valid => reciprocal_valid,
-      m         => m,
-      m_beta    => m_beta,
-      n         => n,
-      u_dc_low  => u_dc_low
+      clk          => clk,
+      rst          => rst,
+      in_valid     => u_dc_valid,
+      u_dc         => u_dc,
+      out_valid    => reciprocal_valid,
+      inverse      => inverse,
+      inverse_beta => inverse_beta,
+      u_dc_low     => u_dc_low
     );
 
   stator_frame : entity work.clarke
@@ -625,18 +623,17 @@ begin
 
   modulator : entity work.svm
     port map (
-      clk       => clk,
-      rst       => rst,
-      in_valid  => ab_voltage_valid,
-      u_alpha   => u_alpha,
-      u_beta    => u_beta,
-      m         => m,
-      m_beta    => m_beta,
-      n         => n,
-      out_valid => duty_ready,
-      duty_a    => duty_a,
-      duty_b    => duty_b,
-      duty_c    => duty_c
+      clk          => clk,
+      rst          => rst,
+      in_valid     => ab_voltage_valid,
+      u_alpha      => u_alpha,
+      u_beta       => u_beta,
+      inverse      => inverse,
+      inverse_beta => inverse_beta,
+      out_valid    => duty_ready,
+      duty_a       => duty_a,
+      duty_b       => duty_b,
+      duty_c       => duty_c
     );
 
   compare : entity work.pwm_compare
@@ -797,7 +794,7 @@ begin
       flux_kp              => flux_kp,
       flux_ki              => flux_ki,
       delta_max            => delta_max,
-      out_valid            => lambda_pi_valid,
+      out_valid            => open,
       lambda_pi_d          => lambda_pi_d,
       lambda_pi_q          => lambda_pi_q,
       lambda_add_d         => lambda_add_d,
@@ -840,7 +837,7 @@ begin
       v_comp_max      => v_comp_max,
       i_learn         => i_learn,
       compensate      => compensate,
-      out_valid       => open,
+      out_valid       => v_dead_valid,
       v_dead          => v_dead,
       v_comp          => v_comp,
       v_leg           => v_leg,
@@ -891,7 +888,7 @@ begin
     port map (
       clk                  => clk,
       rst                  => rst,
-      in_valid             => lambda_pi_valid,
+      in_valid             => v_dead_valid,
       current_at_rail      => current_at_rail,
       u_dc_at_rail         => u_dc_at_rail,
       u_dc_low             => u_dc_low,

@@ -115,7 +115,7 @@ BLOCK = Block(
     ),
     state=State(),
     latency=6,
-    interval=2,
+    interval=3,
     constants={"DROP_P": DROP_P, "DROP_I": DROP_I, "PROPORTIONAL_W": PROPORTIONAL_W},
     reference=reference,
     bound=bound,

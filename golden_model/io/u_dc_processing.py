@@ -1,13 +1,14 @@
 """U_dc as 2**n / m, so that the modulator multiplies where it would divide.
 
-    1 / u_dc = m * 2**n * 2**-17       see common/reciprocal
-    m_beta   = m * sqrt(3)/2           what the beta axis needs in the modulator
+    inverse      = 1 / u_dc = m * 2**n * 2**-17            m and n: see common/reciprocal
+    inverse_beta = m_beta * 2**n * 2**-17,  m_beta = m * sqrt(3)/2    what the beta axis needs in the modulator
 
-m is made beside the data path; it is ready long before the modulator asks.
-Error bound: |m*2**n*2**-17 * u_dc - 1| <= 2**-17 over the whole range.
+Both are made beside the data path and are ready before the modulator asks.
+Error bound: |inverse * u_dc - 1| <= 2**-17 over the whole range.
 Range: below 1/32 per unit the bus is taken for 1/32 and ``u_dc_low`` is raised: the duties then come
 out smaller than asked, never larger.
-Rounding: m_beta half up; it is below m, so it fits.
+Formats: m, m_beta U(0,17); inverse, inverse_beta U(5,17).
+Rounding: m_beta half up; it is below m, so it fits.  The shift by n loses nothing.
 """
 
 import math
@@ -19,6 +20,9 @@ from golden_model.formats import BIT, RECIPROCAL, U_DC
 from golden_model.kernel import kernel
 
 N_MAX = 5
+INVERSE = Format(0, N_MAX, RECIPROCAL.frac_bits)
+INVERSE_W = INVERSE.width
+SHIFT_CLOCKS = (N_MAX + 1) // 2  # two bits a clock
 U_DC_MIN = 1 << (U_DC.frac_bits - N_MAX)
 SQRT3_2 = Const(math.sqrt(3) / 2, Format(0, 0, 17))
 K_SQRT3_2 = SQRT3_2.value
@@ -29,19 +33,20 @@ DROP_BETA = SQRT3_2.fmt.frac_bits
 def step(u_dc):
     m, n, low = reciprocal.step(u_dc, N_MAX)
     m_beta = round_half_up(m * K_SQRT3_2, DROP_BETA)
-    return m, m_beta, n, low
+    return m << n, m_beta << n, low
 
 
 def reference(v, _state):
+    inverse = 1.0 / max(v["u_dc"], U_DC_MIN * U_DC.lsb)
+    return {"inverse": inverse, "inverse_beta": inverse * math.sqrt(3) / 2}
+
+
+def bound(v, _state):
     u_dc = max(v["u_dc"], U_DC_MIN * U_DC.lsb)
-    n = max(0, -math.floor(math.log2(u_dc)))
-    m = 1.0 / (u_dc * 2.0**n)
-    return {"m": m, "m_beta": m * math.sqrt(3) / 2, "n": n}
-
-
-def bound(_v, _state):
-    m = RECIPROCAL.lsb
-    return {"m": m, "m_beta": m * math.sqrt(3) / 2 + RECIPROCAL.lsb / 2 + SQRT3_2.fmt.lsb / 2, "n": 0}
+    scale = 2.0 ** max(0, -math.floor(math.log2(u_dc)))
+    m = RECIPROCAL.lsb * scale
+    beta = m * math.sqrt(3) / 2 + (RECIPROCAL.lsb + SQRT3_2.fmt.lsb) / 2 * scale
+    return {"inverse": m, "inverse_beta": beta}
 
 
 def stimuli(_rng, _config):
@@ -57,14 +62,20 @@ BLOCK = Block(
     step=step,
     inputs=(Port("u_dc", U_DC, doc="bus voltage"),),
     outputs=(
-        Port("m", RECIPROCAL, doc="mantissa of 1/u_dc"),
-        Port("m_beta", RECIPROCAL, doc="m * sqrt(3)/2"),
-        Port("n", Format(0, 3, 0), doc="exponent of 1/u_dc"),
+        Port("inverse", INVERSE, doc="1/u_dc"),
+        Port("inverse_beta", INVERSE, doc="sqrt(3)/2/u_dc"),
         Port("u_dc_low", BIT, doc="bus below 1/32 per unit"),
     ),
-    latency=reciprocal.BLOCK.latency + 2,
-    interval=reciprocal.BLOCK.interval + 2,
-    constants={"N_MAX": N_MAX, "U_DC_MIN": U_DC_MIN, "SQRT3_2": SQRT3_2, "DROP_BETA": DROP_BETA},
+    latency=reciprocal.BLOCK.latency + 3 + SHIFT_CLOCKS,
+    interval=reciprocal.BLOCK.interval + 3 + SHIFT_CLOCKS,
+    constants={
+        "N_MAX": N_MAX,
+        "U_DC_MIN": U_DC_MIN,
+        "SQRT3_2": SQRT3_2,
+        "DROP_BETA": DROP_BETA,
+        "INVERSE_W": INVERSE_W,
+        "SHIFT_CLOCKS": SHIFT_CLOCKS,
+    },
     reference=reference,
     bound=bound,
     stimuli=stimuli,

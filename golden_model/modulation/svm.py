@@ -1,11 +1,11 @@
 """Symmetrical space-vector modulation: stator voltage to three duties, without a divider.
 
-    x = u_alpha/u_dc,  y = sqrt(3)/2*u_beta/u_dc          by m, m_beta and n of u_dc_processing
+    x = u_alpha/u_dc,  y = sqrt(3)/2*u_beta/u_dc          by inverse and inverse_beta of u_dc_processing
     legs a = x,  b = -x/2 + y,  c = -x/2 - y
     duty = 1/2 + leg + mid(a,b,c)/2                       half the middle leg centres the three pulses
 
 a + b + c = 0, so the zero-sequence voltage -(max + min)/2 of the symmetrical pattern is half the middle
-leg.  Formats: products 33 fraction bits, shifted by n, rounded half up to S(1,17) and saturated at two
+leg.  Formats: products 33 fraction bits, rounded half up to S(1,17) and saturated at two
 bus voltages, which the clamp of the duty swallows; legs and sum exact; duty rounded half up, then
 clamped to 0..1 (over-modulation).
 """
@@ -14,24 +14,24 @@ import math
 
 from golden_model.block import Block, Port
 from golden_model.fixed import Format, clamp, round_half_up, round_sat
-from golden_model.formats import DUTY, DUTY_ONE, PU, RECIPROCAL
-from golden_model.io.u_dc_processing import N_MAX
+from golden_model.formats import DUTY, DUTY_ONE, PU
+from golden_model.io.u_dc_processing import INVERSE
 from golden_model.kernel import kernel
 
 SCALED = Format(1, 1, 17)
 SCALED_W = SCALED.width
-DROP_SCALED = PU.frac_bits + RECIPROCAL.frac_bits - SCALED.frac_bits
+DROP_SCALED = PU.frac_bits + INVERSE.frac_bits - SCALED.frac_bits
 SUM_FRAC = SCALED.frac_bits + 2
 HALF = 1 << (SUM_FRAC - 1)
 DROP_DUTY = SUM_FRAC - DUTY.frac_bits
 
 
 @kernel
-def step(u_alpha, u_beta, m, m_beta, n):
-    prod_x = u_alpha * m
-    prod_y = u_beta * m_beta
-    x = round_sat(prod_x << n, DROP_SCALED, SCALED_W)
-    y = round_sat(prod_y << n, DROP_SCALED, SCALED_W)
+def step(u_alpha, u_beta, inverse, inverse_beta):
+    prod_x = u_alpha * inverse
+    prod_y = u_beta * inverse_beta
+    x = round_sat(prod_x, DROP_SCALED, SCALED_W)
+    y = round_sat(prod_y, DROP_SCALED, SCALED_W)
     leg_a = 2 * x
     leg_b = 2 * y - x
     leg_c = -2 * y - x
@@ -51,8 +51,8 @@ def step(u_alpha, u_beta, m, m_beta, n):
 
 
 def reference(v, _state):
-    x = v["u_alpha"] * v["m"] * 2.0 ** v["n"]
-    y = v["u_beta"] * v["m_beta"] * 2.0 ** v["n"]
+    x = v["u_alpha"] * v["inverse"]
+    y = v["u_beta"] * v["inverse_beta"]
     x, y = (SCALED.limit(z) for z in (x, y))
     legs = (x, y - x / 2, -y - x / 2)
     zero = -(max(legs) + min(legs)) / 2
@@ -67,7 +67,7 @@ def bound(_v, _state):
 def stimuli(_rng, _config):
     """Zero vector at every bus voltage; every sector border and corner, inside and beyond the hexagon."""
     rows = [
-        {"u_alpha": 0, "u_beta": 0, "m": m, "m_beta": m * 7 // 8, "n": n}
+        {"u_alpha": 0, "u_beta": 0, "inverse": m << n, "inverse_beta": (m * 7 // 8) << n}
         for m in (65536, 131071)
         for n in range(6)
     ]
@@ -75,7 +75,7 @@ def stimuli(_rng, _config):
         for k in range(24):
             a, b = radius * math.cos(k * math.pi / 12), radius * math.sin(k * math.pi / 12)
             rows += [
-                {"u_alpha": round(a) + da, "u_beta": round(b), "m": 131071, "m_beta": 113511, "n": 0}
+                {"u_alpha": round(a) + da, "u_beta": round(b), "inverse": 131071, "inverse_beta": 113511}
                 for da in (-1, 0, 1)
                 if abs(round(a) + da) <= PU.hi
             ]
@@ -90,9 +90,8 @@ BLOCK = Block(
     inputs=(
         Port("u_alpha", PU, doc="voltage, alpha"),
         Port("u_beta", PU, doc="voltage, beta"),
-        Port("m", RECIPROCAL, doc="mantissa of 1/u_dc"),
-        Port("m_beta", RECIPROCAL, doc="m * sqrt(3)/2"),
-        Port("n", Format(0, 3, 0), hi=N_MAX, doc="exponent of 1/u_dc"),
+        Port("inverse", INVERSE, doc="1/u_dc"),
+        Port("inverse_beta", INVERSE, doc="sqrt(3)/2/u_dc"),
     ),
     outputs=tuple(Port(f"duty_{k}", DUTY, hi=DUTY_ONE, doc=f"duty, leg {k}") for k in "abc"),
     latency=5,

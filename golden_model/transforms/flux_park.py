@@ -14,7 +14,8 @@ from golden_model.transforms import rotate
 
 @kernel
 def step(lambda_m_alpha, lambda_m_beta, cos_theta, sin_theta):
-    return rotate.step(lambda_m_alpha, lambda_m_beta, cos_theta, -sin_theta, FLUX_W)
+    lambda_m_q, lambda_m_d = rotate.step(lambda_m_beta, lambda_m_alpha, cos_theta, sin_theta, FLUX_W)
+    return lambda_m_d, lambda_m_q
 
 
 def reference(v, _state):

@@ -3,7 +3,8 @@
     i_d =  i_alpha*cos_theta + i_beta*sin_theta
     i_q = -i_alpha*sin_theta + i_beta*cos_theta
 
-Formats, rounding and saturation: those of rotate.  Negating the sine cannot overflow, it is within +-1.
+Formats, rounding and saturation: those of rotate.  A rotation forwards of the swapped axes is
+the rotation back.
 """
 
 from golden_model.block import Block, Port
@@ -14,7 +15,8 @@ from golden_model.transforms import rotate
 
 @kernel
 def step(i_alpha, i_beta, cos_theta, sin_theta):
-    return rotate.step(i_alpha, i_beta, cos_theta, -sin_theta, PU_W)
+    i_q, i_d = rotate.step(i_beta, i_alpha, cos_theta, sin_theta, PU_W)
+    return i_d, i_q
 
 
 def reference(v, _state):

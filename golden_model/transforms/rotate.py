@@ -70,7 +70,7 @@ BLOCK = Block(
         Port("out_y", PU, doc="second component, turned"),
     ),
     latency=4,
-    interval=2,
+    interval=3,
     constants={"DROP": DROP},
     configs=({"WIDTH": PU_W}, {"WIDTH": FLUX_W}),
     width_from=dict.fromkeys(("x", "y", "out_x", "out_y"), sized),

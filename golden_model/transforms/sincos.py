@@ -82,7 +82,7 @@ BLOCK = Block(
     inputs=(Port("theta", TURN, doc="angle"),),
     outputs=(Port("cos_theta", TRIG, doc="cosine", **OUT), Port("sin_theta", TRIG, doc="sine", **OUT)),
     latency=6,
-    interval=2,
+    interval=3,
     constants={
         "ADDRESS_BITS": ADDRESS_BITS,
         "DROP_PROD": DROP_PROD,

@@ -11,6 +11,10 @@ package fixed_pkg is
   -- x / 2**drop, halves towards plus infinity; one bit wider than x cut by drop, so it cannot overflow.
   function round_half_up (x : signed; drop : natural) return signed;
 
+  -- Half an LSB of what stays when drop bits go: added to a product in the multiplier's own adder, it makes the
+  -- cut a rounding half up.  A product of two signed numbers has room for it.
+  function half (drop : positive; width : positive) return signed;
+
   -- x limited to the range of a signed number of width bits.
   function saturate (x : signed; width : positive) return signed;
 
@@ -43,6 +47,11 @@ package body fixed_pkg is
       wide := wide + shift_left(to_signed(1, x'length + 1), drop - 1);
     end if;
     return wide(x'length downto drop);
+  end function;
+
+  function half (drop : positive; width : positive) return signed is
+  begin
+    return shift_left(to_signed(1, width), drop - 1);
   end function;
 
   function saturate (x : signed; width : positive) return signed is

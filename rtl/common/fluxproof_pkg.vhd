@@ -34,8 +34,8 @@ package fluxproof_pkg is
   constant TRIG_ONE : natural := 65536;
 
   -- fluxproof: clocks from the raw sample to the duties, least distance of two samples
-  constant FLUXPROOF_SAMPLE_TO_DUTY : positive := 39;
-  constant FLUXPROOF_SAMPLE_INTERVAL : positive := 48;
+  constant FLUXPROOF_SAMPLE_TO_DUTY : positive := 40;
+  constant FLUXPROOF_SAMPLE_INTERVAL : positive := 50;
 
   -- register_access: clocks that a write waits for the end of a sample
   constant REGISTER_PATIENCE : positive := 64;
@@ -141,14 +141,16 @@ package fluxproof_pkg is
   constant U_DC_CONDITIONING_DROP_U_MAX : natural := 17;
 
   -- u_dc_processing: 001, section 5.2, U_dc processing
-  constant U_DC_PROCESSING_LATENCY : positive := 23;
+  constant U_DC_PROCESSING_LATENCY : positive := 27;
   constant U_DC_PROCESSING_N_MAX : natural := 5;
   constant U_DC_PROCESSING_U_DC_MIN : natural := 2048;
   constant U_DC_PROCESSING_SQRT3_2 : signed(17 downto 0) := to_signed(113512, 18);  -- 0.866025404 as U(0,17), signed for the multiplier
   constant U_DC_PROCESSING_DROP_BETA : natural := 17;
+  constant U_DC_PROCESSING_INVERSE_W : natural := 22;
+  constant U_DC_PROCESSING_SHIFT_CLOCKS : natural := 3;
 
   -- clarke: 001, eq. (1): stator frame
-  constant CLARKE_LATENCY : positive := 3;
+  constant CLARKE_LATENCY : positive := 4;
   constant CLARKE_THIRD : signed(17 downto 0) := to_signed(87381, 18);  -- 0.333333333 as U(-1,18), signed for the multiplier
   constant CLARKE_INV_SQRT3 : signed(17 downto 0) := to_signed(75674, 18);  -- 0.577350269 as U(0,17), signed for the multiplier
   constant CLARKE_DROP_ALPHA : natural := 18;
@@ -311,7 +313,7 @@ package fluxproof_pkg is
   constant PARK_LATENCY : positive := 4;
 
   -- speed_pi: 001, section 5.3: speed regulator with limited current reference
-  constant SPEED_PI_LATENCY : positive := 5;
+  constant SPEED_PI_LATENCY : positive := 6;
   constant SPEED_PI_DROP_P : natural := 4;
   constant SPEED_PI_DROP_I : natural := 12;
   constant SPEED_PI_PROPORTIONAL_W : natural := 32;
@@ -333,7 +335,7 @@ package fluxproof_pkg is
   constant DECOUPLING_DROP : natural := 16;
 
   -- voltage_limit: 001, Fig. 1: decoupling at the regulators' output; limit of the space-vector modulation
-  constant VOLTAGE_LIMIT_LATENCY : positive := 10;
+  constant VOLTAGE_LIMIT_LATENCY : positive := 11;
 
   -- svm_delay_compensation: 001, section 5.2, SVM delay compensation
   constant SVM_DELAY_COMPENSATION_LATENCY : positive := 2;

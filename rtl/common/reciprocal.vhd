@@ -39,6 +39,7 @@ architecture rtl of reciprocal is
   signal shift     : natural range 0 to N_MAX;
   signal remainder : unsigned(U_DC_W - 1 downto 0);
   signal trial     : unsigned(U_DC_W downto 0);
+  signal rest      : unsigned(U_DC_W downto 0);
   signal quotient  : unsigned(BITS - 1 downto 0);
   signal dividing  : std_logic;
 
@@ -56,6 +57,7 @@ begin
   valid(0) <= in_valid;
   dividing <= or valid(2 to BITS + 1);
   trial    <= remainder & '0';
+  rest     <= trial - mantissa;
 
   process (clk)
     variable rounded : unsigned(BITS downto 0);
@@ -82,11 +84,10 @@ begin
 
       -- Stages 3 to 20: one bit of quotient = 2**34 / mantissa
       if dividing = '1' then
-        quotient  <= quotient(BITS - 2 downto 0) & '0';
+        quotient  <= quotient(BITS - 2 downto 0) & not rest(U_DC_W);
         remainder <= trial(U_DC_W - 1 downto 0);
-        if trial >= mantissa then
-          quotient  <= quotient(BITS - 2 downto 0) & '1';
-          remainder <= resize(trial - mantissa, U_DC_W);
+        if rest(U_DC_W) = '0' then
+          remainder <= rest(U_DC_W - 1 downto 0);
         end if;
       end if;
 

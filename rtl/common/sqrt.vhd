@@ -24,48 +24,50 @@ architecture rtl of sqrt is
   constant LATENCY : positive := SQRT_LATENCY;
 
   signal valid      : std_logic_vector(0 to LATENCY);
+  signal bytes_0    : unsigned(1 downto 0);
+  signal pairs_1    : unsigned(1 downto 0);
   signal x_1        : unsigned(31 downto 0);
-  signal shift_1    : unsigned(3 downto 0);
+  signal shift_1    : unsigned(1 downto 0);
   signal mantissa_2 : unsigned(19 downto 0);
   signal shift_2    : unsigned(3 downto 0);
   signal base_3     : unsigned(17 downto 0);
   signal slope_3    : unsigned(9 downto 0);
   signal rest_3     : unsigned(11 downto 0);
   signal shift_3    : unsigned(3 downto 0);
-  signal prod_4     : unsigned(21 downto 0);
+  signal prod_4     : signed(23 downto 0);
   signal base_4     : unsigned(17 downto 0);
   signal shift_4    : unsigned(3 downto 0);
-  signal fine_5     : unsigned(17 downto 0);
+  signal fine_5     : signed(18 + SQRT_REST_BITS downto 0);
   signal shift_5    : unsigned(3 downto 0);
+  signal nibbles_5  : unsigned(U_MAX_W - 1 downto 0);
 
-  -- Pairs of leading zeros.
-  function leading_pairs (v : unsigned(31 downto 0)) return natural is
+  -- Which of four groups of bits is the first with a one in it; the last where none of the others has.
+  function leading_zeros (first, second, third : std_logic) return unsigned is
   begin
-    for k in 0 to 14 loop
-      if v(31 - 2 * k) = '1' or v(30 - 2 * k) = '1' then
-        return k;
-      end if;
-    end loop;
-    return 15;
+    return (not first and not second) & (not first and (second or not third));
   end function;
 begin
-  valid(0) <= in_valid;
+  valid(0)  <= in_valid;
+  bytes_0   <= leading_zeros(or x(31 downto 24), or x(23 downto 16), or x(15 downto 8));
+  pairs_1   <= leading_zeros(or x_1(31 downto 30), or x_1(29 downto 28), or x_1(27 downto 26));
+  nibbles_5 <= shift_right(unsigned(fine_5(17 + SQRT_REST_BITS downto SQRT_REST_BITS + SQRT_DROP_OUT)),
+                           to_integer(shift_5(3 downto 2) & "00"));
 
   process (clk)
   begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stage 1: shift = pairs of leading zeros
+      -- Stage 1: zero bytes shifted out, four pairs each
       if valid(0) = '1' then
-        x_1     <= x;
-        shift_1 <= to_unsigned(leading_pairs(x), 4);
+        x_1     <= shift_left(x, to_integer(bytes_0 & "000"));
+        shift_1 <= bytes_0;
       end if;
 
       -- Stage 2: mantissa = x * 4**shift, cut to 20 bits
       if valid(1) = '1' then
-        mantissa_2 <= resize(shift_right(shift_left(x_1, to_integer(shift_1 & '0')), SQRT_DROP_X), 20);
-        shift_2    <= shift_1;
+        mantissa_2 <= resize(shift_right(shift_left(x_1, to_integer(pairs_1 & '0')), SQRT_DROP_X), 20);
+        shift_2    <= shift_1 & pairs_1;
       end if;
 
       -- Stage 3: base, slope from the table
@@ -78,20 +80,20 @@ begin
 
       -- Stage 4: prod = slope * rest
       if valid(3) = '1' then
-        prod_4  <= slope_3 * rest_3;
+        prod_4  <= signed('0' & slope_3) * signed('0' & rest_3);
         base_4  <= base_3;
         shift_4 <= shift_3;
       end if;
 
-      -- Stage 5: fine = base + prod, floored
+      -- Stage 5: fine = base + prod, its bits below the table's still there
       if valid(4) = '1' then
-        fine_5  <= base_4 + prod_4(21 downto SQRT_REST_BITS);
+        fine_5  <= prod_4 + shift_left(signed(resize(base_4, fine_5'length)), SQRT_REST_BITS);
         shift_5 <= shift_4;
       end if;
 
-      -- Stage 6: root = fine * 2**-shift, floored
+      -- Stage 6: root = fine * 2**-shift, floored; by whole nibbles, then by the rest
       if valid(5) = '1' then
-        root <= resize(shift_right(shift_right(fine_5, to_integer(shift_5)), SQRT_DROP_OUT), U_MAX_W);
+        root <= resize(shift_right(nibbles_5, to_integer(shift_5(1 downto 0))), U_MAX_W);
       end if;
 
       if rst = '1' then

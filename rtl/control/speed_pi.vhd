@@ -3,9 +3,11 @@
 --   integral += speed_ki*err unless u is beyond the limit and err pushes further
 -- Torque mode (speed_mode = 0): i_q_ref is i_q_ext, limited, and the integral follows it.
 -- run = 0: output and integral are zero.
--- Formats: err PU, proportional part S(3,28), integral S(1,28), output PU.
--- Latency: 5.  Interval: 5.  Rounding: half up; err saturates, the proportional part saturates at 8, far
--- beyond the output's limit; the integral is kept within +-i_max.
+-- Two beats through one comparison with i_max: what is asked for, then the integral.  |v| = (v xor s) + s, s its sign.
+-- Formats: err PU, proportional part 28 fraction bits, integral S(1,28), output PU.
+-- Latency: 6.  Interval: 6.  Rounding: half up; err saturates; the proportional part needs no limit of its own, as
+-- what it asks for beyond i_max is cut anyway, and the increment none, as speed_ki < 1; the integral is kept within
+-- +-i_max.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -34,33 +36,58 @@ end entity speed_pi;
 
 architecture rtl of speed_pi is
   constant LATENCY : positive := SPEED_PI_LATENCY;
-  constant P_W     : positive := SPEED_PI_PROPORTIONAL_W;
-  constant TOTAL_W : positive := P_W + 1 - PU_TO_INTEGRAL + 1;
+  constant SUM_W   : positive := PU_W + KP_W + 2;
+  constant TOTAL_W : positive := SUM_W - SPEED_PI_DROP_P - PU_TO_INTEGRAL;
 
   -- State
   signal integral : signed(INTEGRAL_W - 1 downto 0);
 
-  signal valid          : std_logic_vector(0 to LATENCY);
-  signal err_1          : signed(PU_W - 1 downto 0);
-  signal prod_p_2       : signed(PU_W + KP_W downto 0);
-  signal prod_i_2       : signed(PU_W + KI_W downto 0);
-  signal proportional_3 : signed(P_W - 1 downto 0);
-  signal increment_3    : signed(INTEGRAL_W - 1 downto 0);
-  signal total_4        : signed(TOTAL_W - 1 downto 0);
-  signal moved_4        : signed(INTEGRAL_W downto 0);
-  signal asked_4        : signed(TOTAL_W - 1 downto 0);
-  signal above_4        : std_logic;
-  signal below_4        : std_logic;
-  signal limit          : signed(INTEGRAL_W downto 0);
+  signal valid      : std_logic_vector(0 to LATENCY);
+  signal err_1      : signed(PU_W - 1 downto 0);
+  signal prod_p_2   : signed(PU_W + KP_W downto 0);
+  signal prod_i_2   : signed(PU_W + KI_W downto 0);
+  signal integral_2 : signed(INTEGRAL_W downto 0);
+  signal rises_2    : std_logic;
+  signal falls_2    : std_logic;
+  signal sum_p_3    : signed(SUM_W - 1 downto 0);
+  signal sum_i_3    : signed(PU_W + KI_W downto 0);
+  signal total_3    : signed(TOTAL_W - 1 downto 0);
+  signal moved_3    : signed(INTEGRAL_W downto 0);
+  signal v_3        : signed(PU_W downto 0);
+  signal far_3      : std_logic;
+  signal v_4        : signed(PU_W downto 0);
+  signal beyond_4   : std_logic;
+  signal held_5     : std_logic;
+  signal limited_4  : signed(PU_W - 1 downto 0);
 begin
   valid(0) <= in_valid;
 
-  asked_4 <= total_4 when speed_mode = '1' else resize(i_q_ext, TOTAL_W);
-  above_4 <= '1' when asked_4 > i_max else '0';
-  below_4 <= '1' when asked_4 < -i_max else '0';
-  limit   <= shift_left(resize(i_max, INTEGRAL_W + 1), PU_TO_INTEGRAL);
+  total_3 <= sum_p_3(SUM_W - 1 downto SUM_W - TOTAL_W);
+  moved_3 <= sum_i_3(SPEED_PI_DROP_I + INTEGRAL_W downto SPEED_PI_DROP_I);
+
+  -- The beat's value in PU, one bit more where it may be beyond: the current asked for, then the integral; far: bits
+  -- above those say that the current is beyond any limit, and only its sign counts
+  v_3   <= resize(i_q_ext, PU_W + 1) when speed_mode = '0' else
+           moved_3(INTEGRAL_W downto PU_TO_INTEGRAL) when valid(4) = '1' else
+           total_3(TOTAL_W - 1) & total_3(PU_W - 1 downto 0);
+  far_3 <= exceeds(total_3, PU_W + 1) and speed_mode and not valid(4);
+
+  -- v within +-i_max
+  process (all)
+    variable minus : signed(PU_W - 1 downto 0);
+    variable carry : signed(1 downto 0);
+  begin
+    minus     := (others => v_4(v_4'high));
+    carry     := '0' & (v_4(v_4'high) and beyond_4);
+    limited_4 <= v_4(PU_W - 1 downto 0) + carry;
+    if beyond_4 = '1' then
+      limited_4 <= (i_max xor minus) + carry;
+    end if;
+  end process;
 
   process (clk)
+    variable rest  : signed(PU_W + 1 downto 0);
+    variable carry : std_logic;
   begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
@@ -70,37 +97,51 @@ begin
         err_1 <= saturate(resize(omega_ref, PU_W + 1) - resize(omega_me, PU_W + 1), PU_W);
       end if;
 
-      -- Stage 2: prod_p = speed_kp*err, prod_i = speed_ki*err
+      -- Stage 2: prod_p = speed_kp*err, prod_i = speed_ki*err;  the integral and half an LSB of the output
       if valid(1) = '1' then
-        prod_p_2 <= err_1 * signed('0' & speed_kp);
-        prod_i_2 <= err_1 * signed('0' & speed_ki);
+        prod_p_2   <= err_1 * signed('0' & speed_kp);
+        prod_i_2   <= err_1 * signed('0' & speed_ki);
+        integral_2 <= integral + half(PU_TO_INTEGRAL, INTEGRAL_W + 1);
+        rises_2    <= '1' when err_1 > 0 else '0';
+        falls_2    <= err_1(err_1'high);
       end if;
 
-      -- Stage 3: proportional, increment = products, narrowed
+      -- Stage 3: total = proportional + integral;  moved = integral + increment;  both with half an LSB to round with
       if valid(2) = '1' then
-        proportional_3 <= round_sat(prod_p_2, SPEED_PI_DROP_P, P_W);
-        increment_3    <= round_sat(prod_i_2, SPEED_PI_DROP_I, INTEGRAL_W);
+        sum_p_3 <= resize(prod_p_2, SUM_W) + (integral_2 & half(SPEED_PI_DROP_P, SPEED_PI_DROP_P));
+        sum_i_3 <= prod_i_2 + (integral & half(SPEED_PI_DROP_I, SPEED_PI_DROP_I));
       end if;
 
-      -- Stage 4: total = proportional + integral;  moved = integral + increment
-      if valid(3) = '1' then
-        total_4 <= round_half_up(resize(proportional_3, P_W + 1) + integral, PU_TO_INTEGRAL);
-        moved_4 <= resize(integral, INTEGRAL_W + 1) + increment_3;
+      -- Stages 4, 5: what is asked for, then the integral, against i_max: i_max - |v|, less one for an integral
+      -- above zero, whose bits below v count too
+      if valid(3) = '1' or valid(4) = '1' then
+        v_4      <= v_3;
+        carry    := not v_3(v_3'high) and not valid(4);
+        rest     := (resize(i_max, PU_W + 1) & '1') + ((v_3 xor (v_3'range => not v_3(v_3'high))) & carry);
+        beyond_4 <= rest(rest'high) or far_3;
       end if;
 
-      -- Stage 5: i_q_ref = limit(total or i_q_ext);  integral = moved unless held
+      -- Stage 5: i_q_ref = limit(total or i_q_ext)
       if valid(4) = '1' then
-        speed_limited <= above_4 or below_4;
-        i_q_ref       <= resize(clamp(asked_4, resize(-i_max, TOTAL_W), resize(i_max, TOTAL_W)), PU_W);
-        if speed_mode = '0' then
-          integral <= resize(shift_left(resize(clamp(i_q_ext, -i_max, i_max), INTEGRAL_W), PU_TO_INTEGRAL), INTEGRAL_W);
-        elsif not (above_4 = '1' and err_1 > 0) and not (below_4 = '1' and err_1 < 0) then
-          integral <= resize(clamp(moved_4, -limit, limit), INTEGRAL_W);
+        i_q_ref       <= limited_4;
+        speed_limited <= beyond_4;
+        held_5        <= speed_mode and beyond_4 and ((rises_2 and not v_4(v_4'high)) or (falls_2 and v_4(v_4'high)));
+        if run = '0' then
+          i_q_ref       <= (others => '0');
+          speed_limited <= '0';
+        end if;
+      end if;
+
+      -- Stage 6: integral = moved unless held
+      if valid(5) = '1' then
+        if held_5 = '0' then
+          integral <= limited_4 & moved_3(PU_TO_INTEGRAL - 1 downto 0);
+          if speed_mode = '0' or beyond_4 = '1' then
+            integral(PU_TO_INTEGRAL - 1 downto 0) <= (others => '0');
+          end if;
         end if;
         if run = '0' then
-          speed_limited <= '0';
-          i_q_ref       <= (others => '0');
-          integral      <= (others => '0');
+          integral <= (others => '0');
         end if;
       end if;
 

@@ -6,7 +6,9 @@
 -- Room: d comes first in what the EMF of the last sample leaves, so that the q axis can always hold its EMF;
 -- without it the drive has a second stable point at high speed, see the model.
 -- Formats: sums exact; radicands (u_max - u)*(u_max + u) exact, U(0,32); PU out.
--- Latency: 10.  Interval: 11 (room is ready one clock after the output; both roots share multiplier and sqrt).
+-- Latency: 11.  Interval: 12 (room is ready one clock after the output).
+-- Three beats through one adder, one comparison, one multiplier and one root: sum_d against limit, the EMF against
+-- u_max, and sum_q, which waits for its limit.  Signs are taken off by inversion: |v| = (v xor s) + s, s the sign.
 -- Rounding: none but the root's, which errs inwards: the circle is never left.
 
 library ieee;
@@ -37,37 +39,57 @@ end entity voltage_limit;
 
 architecture rtl of voltage_limit is
   constant LATENCY : positive := VOLTAGE_LIMIT_LATENCY;
-  constant W       : positive := PU_W + 2;
   constant SUM_W   : positive := PU_W + 2;
-
-  type sum_wait_t is array (1 to LATENCY - 1) of signed(SUM_W - 1 downto 0);
-  type d_wait_t is array (3 to LATENCY - 1) of signed(PU_W - 1 downto 0);
-  type sat_wait_t is array (2 to LATENCY - 1) of signed(1 downto 0);
+  constant PART_W  : positive := PU_W - 1;  -- u_max - u and u_max + u, from 0 to 2
 
   -- State
   signal room : unsigned(U_MAX_W - 1 downto 0);
 
   signal valid      : std_logic_vector(0 to LATENCY);
-  signal sum_d_1    : signed(SUM_W - 1 downto 0);
-  signal u_max_1    : signed(U_MAX_W downto 0);
-  signal limit_1    : signed(U_MAX_W downto 0);
-  signal dec_q_1    : unsigned(PU_W - 1 downto 0);
-  signal sum_d_2    : signed(SUM_W - 1 downto 0);
-  signal limit_2    : signed(U_MAX_W downto 0);
-  signal u_max_2    : signed(U_MAX_W downto 0);
-  signal emf_2      : signed(U_MAX_W downto 0);
-  signal u_2        : signed(PU_W - 1 downto 0);
-  signal emf_3      : signed(U_MAX_W downto 0);
-  signal u_max_3    : signed(U_MAX_W downto 0);
-  signal factor_lo  : signed(W - 1 downto 0);
-  signal factor_hi  : signed(W - 1 downto 0);
-  signal radicand   : unsigned(31 downto 0);
+  signal pi_0       : signed(PU_W - 1 downto 0);
+  signal dec_0      : signed(PU_W - 1 downto 0);
+  signal comp_0     : signed(PU_W - 1 downto 0);
+  signal v_1        : signed(SUM_W - 1 downto 0);
+  signal limit_1    : unsigned(U_MAX_W - 1 downto 0);
+  signal v_2        : signed(SUM_W - 1 downto 0);
+  signal limit_2    : unsigned(U_MAX_W - 1 downto 0);
+  signal beyond_2   : std_logic;
+  signal part_2     : unsigned(U_MAX_W - 1 downto 0);
+  signal carry_2    : std_logic;
+  signal lo_3       : unsigned(PART_W - 1 downto 0);
+  signal hi_3       : unsigned(PART_W - 1 downto 0);
+  signal radicand_4 : unsigned(31 downto 0);
   signal root_start : std_logic;
-  signal root_9     : unsigned(U_MAX_W - 1 downto 0);
-  signal limit_9    : signed(PU_W downto 0);
-  signal sum_q      : sum_wait_t;
-  signal d_wait     : d_wait_t;
-  signal sat_wait   : sat_wait_t;
+  signal root_10    : unsigned(U_MAX_W - 1 downto 0);
+  signal beyond_10  : std_logic;
+
+  -- '1' where |v| > limit: limit - |v| is below zero.
+  function beyond (v : signed; limit : unsigned) return std_logic is
+    constant MINUS : signed(v'length - 1 downto 0) := (others => not v(v'high));
+    variable rest  : signed(v'length downto 0);
+  begin
+    rest := (signed(resize(limit, v'length)) & '1') + ((v xor MINUS) & not v(v'high));
+    return rest(rest'high);
+  end function;
+
+  -- v within +-limit.
+  function limited (v : signed; limit : unsigned; out_of_it : std_logic) return signed is
+    constant MINUS  : signed(PU_W - 1 downto 0) := (others => v(v'high));
+    variable result : signed(PU_W - 1 downto 0) := v(PU_W - 1 downto 0);
+    variable carry  : signed(1 downto 0)        := "00";
+  begin
+    if out_of_it = '1' then
+      result   := signed(resize(limit, PU_W)) xor MINUS;
+      carry(0) := v(v'high);
+    end if;
+    return result + carry;
+  end function;
+
+  -- -1, 0, +1: the limit that holds v.
+  function side (v : signed; out_of_it : std_logic) return signed is
+  begin
+    return signed'((v(v'high) and out_of_it) & out_of_it);
+  end function;
 begin
   valid(0) <= in_valid;
 
@@ -76,92 +98,75 @@ begin
       clk       => clk,
       rst       => rst,
       in_valid  => root_start,
-      x         => radicand,
+      x         => radicand_4,
       out_valid => open,
-      root      => root_9
+      root      => root_10
     );
 
-  root_start <= valid(3) or valid(4);
-  limit_9    <= signed(resize(root_9, PU_W + 1));
+  root_start <= valid(4) or valid(5);
 
-  -- u_d, limited; then the EMF: what the multiplier makes a radicand of
-  u_2       <= resize(limit_2, PU_W) when sat_wait(2) > 0 else
-               -resize(limit_2, PU_W) when sat_wait(2) < 0 else
-               sum_d_2(PU_W - 1 downto 0);
-  factor_lo <= resize(u_max_3, W) - emf_3 when valid(3) = '1' else resize(u_max_2, W) - u_2;
-  factor_hi <= resize(u_max_3, W) + emf_3 when valid(3) = '1' else resize(u_max_2, W) + u_2;
+  -- The beat's voltages: the d axis while in_valid, then the EMF alone, then the q axis
+  pi_0   <= (others => '0') when valid(1) = '1' else u_pi_q when valid(2) = '1' else u_pi_d;
+  dec_0  <= u_dec_q when valid(1) = '1' or valid(2) = '1' else u_dec_d;
+  comp_0 <= (others => '0') when valid(1) = '1' else u_comp_q when valid(2) = '1' else u_comp_d;
+
+  -- |v| or, beyond it, the limit, but for a carry where |v| is that of a negative number
+  part_2  <= limit_2 when beyond_2 = '1' else
+             unsigned(v_2(U_MAX_W - 1 downto 0)) xor (U_MAX_W - 1 downto 0 => v_2(v_2'high));
+  carry_2 <= v_2(v_2'high) and not beyond_2;
+
+  beyond_10 <= beyond(v_1, root_10);
 
   process (clk)
+    variable high, low : unsigned(PART_W downto 0);
   begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stage 1: sum = u_pi + u_dec + u_comp;  limit = min(u_max, room)
-      if valid(0) = '1' then
-        sum_d_1  <= resize(u_pi_d, SUM_W) + resize(u_dec_d, SUM_W) + resize(u_comp_d, SUM_W);
-        sum_q(1) <= resize(u_pi_q, SUM_W) + resize(u_dec_q, SUM_W) + resize(u_comp_q, SUM_W);
-        dec_q_1  <= unsigned(abs(u_dec_q));
-        u_max_1  <= signed('0' & u_max);
-        limit_1  <= signed('0' & minimum(u_max, room));
+      -- Stages 1, 2, 3: v = u_pi + u_dec + u_comp of the d axis, the EMF, the q axis;  limit = min(u_max, room), u_max
+      if valid(0) = '1' or valid(1) = '1' or valid(2) = '1' then
+        v_1 <= resize(pi_0, SUM_W) + resize(dec_0, SUM_W) + resize(comp_0, SUM_W);
       end if;
-
-      -- Stage 2: side of the limit on which sum_d is;  emf = min(|u_dec_q|, u_max)
-      if valid(1) = '1' then
-        sum_d_2     <= sum_d_1;
-        limit_2     <= limit_1;
-        u_max_2     <= u_max_1;
-        emf_2       <= signed(resize(minimum(dec_q_1, resize(unsigned(u_max_1), PU_W)), U_MAX_W + 1));
-        sat_wait(2) <= to_signed(0, 2);
-        if sum_d_1 > limit_1 then
-          sat_wait(2) <= to_signed(1, 2);
-        elsif sum_d_1 < -limit_1 then
-          sat_wait(2) <= to_signed(-1, 2);
+      if valid(0) = '1' or valid(1) = '1' then
+        limit_1 <= u_max;
+        if valid(1) = '0' and room < u_max then
+          limit_1 <= room;
         end if;
       end if;
 
-      -- Stages 3, 4: radicand = (u_max - u_d)*(u_max + u_d), then (u_max - emf)*(u_max + emf)
-      if valid(2) = '1' or valid(3) = '1' then
-        radicand <= resize(unsigned(factor_lo(PU_W - 1 downto 0)) * unsigned(factor_hi(PU_W - 1 downto 0)), 32);
+      -- Stages 2, 3: is it beyond its limit
+      if valid(1) = '1' or valid(2) = '1' then
+        v_2      <= v_1;
+        limit_2  <= limit_1;
+        beyond_2 <= beyond(v_1, limit_1);
       end if;
+
+      -- Stage 3: u_d, limited.  Stages 3, 4: lo = u_max - |u|,  hi = u_max + |u|
       if valid(2) = '1' then
-        d_wait(3) <= u_2;
-        emf_3     <= emf_2;
-        u_max_3   <= u_max_2;
+        u_d   <= limited(v_2, limit_2, beyond_2);
+        sat_d <= side(v_2, beyond_2);
+      end if;
+      if valid(2) = '1' or valid(3) = '1' then
+        low  := (resize(u_max, PART_W) & not carry_2) + ((not resize(part_2, PART_W)) & not carry_2);
+        high := (resize(u_max, PART_W) & carry_2) + (resize(part_2, PART_W) & carry_2);
+        lo_3 <= low(PART_W downto 1);
+        hi_3 <= high(PART_W downto 1);
       end if;
 
-      -- Stages 4 to 9: the root of the first radicand; sum_q, u_d and its flag wait for it
-      for k in 2 to LATENCY - 1 loop
-        if valid(k - 1) = '1' then
-          sum_q(k) <= sum_q(k - 1);
-        end if;
-      end loop;
-      for k in 3 to LATENCY - 1 loop
-        if valid(k - 1) = '1' then
-          sat_wait(k) <= sat_wait(k - 1);
-        end if;
-      end loop;
-      for k in 4 to LATENCY - 1 loop
-        if valid(k - 1) = '1' then
-          d_wait(k) <= d_wait(k - 1);
-        end if;
-      end loop;
-
-      -- Stage 10: u_q = sum_q, limited to the root
-      if valid(LATENCY - 1) = '1' then
-        u_d   <= d_wait(LATENCY - 1);
-        sat_d <= sat_wait(LATENCY - 1);
-        u_q   <= resize(clamp(sum_q(LATENCY - 1), -limit_9, limit_9), PU_W);
-        sat_q <= to_signed(0, 2);
-        if sum_q(LATENCY - 1) > limit_9 then
-          sat_q <= to_signed(1, 2);
-        elsif sum_q(LATENCY - 1) < -limit_9 then
-          sat_q <= to_signed(-1, 2);
-        end if;
+      -- Stages 4, 5: radicand = lo*hi;  stages 5 to 11: its root
+      if valid(3) = '1' or valid(4) = '1' then
+        radicand_4 <= resize(lo_3 * hi_3, 32);
       end if;
 
-      -- Stage 11: room = the root of the second radicand
+      -- Stage 11: u_q = sum_q, limited to the root
+      if valid(10) = '1' then
+        u_q   <= limited(v_1, root_10, beyond_10);
+        sat_q <= side(v_1, beyond_10);
+      end if;
+
+      -- Stage 12: room = the root of the second radicand
       if valid(LATENCY) = '1' then
-        room <= root_9;
+        room <= root_10;
       end if;
 
       if rst = '1' then

@@ -38,11 +38,11 @@ architecture rtl of current_conditioning is
   constant LATENCY : positive := CURRENT_CONDITIONING_LATENCY;
 
   signal valid    : std_logic_vector(0 to LATENCY);
-  signal code_0   : unsigned(CODE_W - 1 downto 0);
+  signal code_0   : unsigned(ADC_BITS - 1 downto 0);
   signal offset_0 : unsigned(CODE_W - 1 downto 0);
   signal gain_0   : signed(GAIN_W - 1 downto 0);
   signal rail_1   : unsigned(2 downto 0);
-  signal rail_3   : unsigned(2 downto 0);
+  signal rail_4   : unsigned(2 downto 0);
   signal diff_1   : signed(CODE_W downto 0);
   signal gain_1   : signed(GAIN_W - 1 downto 0);
   signal prod_2   : signed(CODE_W + GAIN_W downto 0);
@@ -62,9 +62,7 @@ begin
   valid(0) <= in_valid;
 
   -- The channel of the beat: a while in_valid, then b, then c.
-  code_0   <= left_aligned(code_b) when valid(1) = '1' else
-              left_aligned(code_c) when valid(2) = '1' else
-              left_aligned(code_a);
+  code_0   <= code_b when valid(1) = '1' else code_c when valid(2) = '1' else code_a;
   offset_0 <= offset_b when valid(1) = '1' else offset_c when valid(2) = '1' else offset_a;
   gain_0   <= gain_b when valid(1) = '1' else gain_c when valid(2) = '1' else gain_a;
   i_3      <= round_sat(prod_2, CURRENT_CONDITIONING_DROP, PU_W);
@@ -76,11 +74,9 @@ begin
 
       -- Stage 1: diff = code - offset, channel by channel
       if valid(0) = '1' or valid(1) = '1' or valid(2) = '1' then
-        diff_1 <= signed('0' & code_0) - signed('0' & offset_0);
+        diff_1 <= signed('0' & left_aligned(code_0)) - signed('0' & offset_0);
         gain_1 <= gain_0;
-      end if;
-      if valid(0) = '1' then
-        rail_1 <= at_rail(code_c) & at_rail(code_b) & at_rail(code_a);
+        rail_1 <= at_rail(code_0) & rail_1(2 downto 1);
       end if;
 
       -- Stage 2: prod = diff * gain
@@ -90,15 +86,17 @@ begin
 
       -- Stage 3: i = prod, narrowed; a at clock 3, b at 4, c at 5
       if valid(2) = '1' then
-        i_a    <= i_3;
-        rail_3 <= rail_1;
+        i_a <= i_3;
       end if;
       if valid(3) = '1' then
         i_b <= i_3;
       end if;
+      if valid(3) = '1' then
+        rail_4 <= rail_1;
+      end if;
       if valid(4) = '1' then
         i_c             <= i_3;
-        current_at_rail <= rail_3;
+        current_at_rail <= rail_4;
       end if;
 
       if rst = '1' then

@@ -36,6 +36,7 @@ begin
   turn_1   <= shift_left(resize(prod_1, TURN_W), TURN_W - POSITION_BITS);
 
   process (clk)
+    variable sum : unsigned(TURN_W downto 0);
   begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
@@ -47,11 +48,9 @@ begin
 
       -- Stage 2: theta_me = theta_offset +- prod, modulo one turn
       if valid(1) = '1' then
-        if reverse = '1' then
-          theta_me <= theta_offset - turn_1;
-        else
-          theta_me <= theta_offset + turn_1;
-        end if;
+        -- -turn_1 is not turn_1 and a carry
+        sum      := (theta_offset & reverse) + ((turn_1 xor (turn_1'range => reverse)) & reverse);
+        theta_me <= sum(TURN_W downto 1);
       end if;
 
       if rst = '1' then

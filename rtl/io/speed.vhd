@@ -2,7 +2,7 @@
 --   raw(k)      = k_speed * wrap(code(k) - code(k-1))
 --   omega_me(k) = omega_me(k-1) + k_filter*(raw(k) - omega_me(k-1))
 -- Formats: difference S(-1,18) of a turn, k_speed U(12,12), k_filter U(1,16), state S(1,28), output PU.
--- Latency: 7.  Interval: 3 (the state is read at stage 4 and written at stage 6).
+-- Latency: 7.  Interval: 4 (the state is read from stage 4 on and written at stage 7).
 -- Rounding: half up; raw saturates at 2 per unit, the state moves between values in range.
 -- The first sample after reset has no predecessor: its difference is zero.
 
@@ -39,22 +39,23 @@ architecture rtl of speed is
   signal omega      : signed(INTEGRAL_W - 1 downto 0);
   signal delta_1    : signed(TURN_W - 1 downto 0);
   signal prod_raw_2 : signed(TURN_W + 24 downto 0);
-  signal raw_3      : signed(PU_W - 1 downto 0);
+  signal sum_raw_3  : signed(TURN_W + 24 downto 0);
   signal err_4      : signed(PU_W downto 0);
   signal prod_err_5 : signed(PU_W + 18 downto 0);
+  signal sum_6      : signed(PU_W + 18 downto 0);
+  signal omega_6    : signed(INTEGRAL_W - 1 downto 0);
+  signal omega_pu   : signed(PU_W - 1 downto 0);
 
+  -- -code is not code and a carry.
   function aligned (code : unsigned; minus : std_logic) return unsigned is
-    variable turn : unsigned(TURN_W - 1 downto 0);
+    constant TURN : unsigned(code'length - 1 downto 0) := (code xor (code'range => minus)) + unsigned'('0' & minus);
   begin
-    turn := shift_left(resize(code, TURN_W), TURN_W - code'length);
-    if minus = '1' then
-      turn := 0 - turn;
-    end if;
-    return turn;
+    return shift_left(resize(TURN, TURN_W), TURN_W - code'length);
   end function;
 begin
   valid(0) <= in_valid;
   mech_0   <= aligned(code_theta, reverse);
+  omega_6  <= saturate(shift_right(sum_6, SPEED_DROP_STATE), INTEGRAL_W);
 
   process (clk)
   begin
@@ -76,14 +77,14 @@ begin
         prod_raw_2 <= delta_1 * signed('0' & k_speed);
       end if;
 
-      -- Stage 3: raw = prod_raw, narrowed
+      -- Stage 3: half an LSB of raw to round with
       if valid(2) = '1' then
-        raw_3 <= round_sat(prod_raw_2, SPEED_DROP_RAW, PU_W);
+        sum_raw_3 <= prod_raw_2 + half(SPEED_DROP_RAW, prod_raw_2'length);
       end if;
 
-      -- Stage 4: err = raw - omega_me
+      -- Stage 4: err = raw - omega_me, raw narrowed
       if valid(3) = '1' then
-        err_4 <= resize(raw_3, PU_W + 1) - round_sat(omega, PU_TO_INTEGRAL, PU_W);
+        err_4 <= resize(saturate(shift_right(sum_raw_3, SPEED_DROP_RAW), PU_W), PU_W + 1) - omega_pu;
       end if;
 
       -- Stage 5: prod_err = err * k_filter
@@ -91,24 +92,27 @@ begin
         prod_err_5 <= err_4 * signed('0' & k_filter);
       end if;
 
-      -- Stage 6: omega = omega + prod_err
+      -- Stage 6: omega + prod_err, with half an LSB to round with
       if valid(5) = '1' then
-        omega <= saturate(omega + round_half_up(prod_err_5, SPEED_DROP_STATE), INTEGRAL_W);
+        sum_6 <= prod_err_5 + (omega & half(SPEED_DROP_STATE, SPEED_DROP_STATE));
       end if;
 
-      -- Stage 7: omega_me = omega, narrowed
+      -- Stage 7: omega, omega_me = the sum, narrowed
       if valid(6) = '1' then
-        omega_me <= round_sat(omega, PU_TO_INTEGRAL, PU_W);
+        omega    <= omega_6;
+        omega_pu <= round_sat(omega_6, PU_TO_INTEGRAL, PU_W);
       end if;
 
       if rst = '1' then
         valid(1 to LATENCY) <= (others => '0');
         seen                <= '0';
         omega               <= (others => '0');
+        omega_pu            <= (others => '0');
       end if;
     end if;
   end process;
 
   out_valid <= valid(LATENCY);
+  omega_me  <= omega_pu;
 
 end architecture rtl;

@@ -42,11 +42,17 @@ architecture rtl of u_dc_conditioning is
   signal mul_a  : signed(17 downto 0);
   signal mul_b  : signed(17 downto 0);
   signal prod   : signed(35 downto 0);
+  signal half_1 : signed(35 downto 0);
+  signal sum    : signed(35 downto 0);
 begin
   valid(0) <= in_valid;
 
   mul_a <= signed('0' & u_dc_3) when valid(3) = '1' else resize(diff_1, 18);
   mul_b <= signed('0' & k_u_max) when valid(3) = '1' else u_dc_gain;
+
+  -- Half an LSB of u_dc to round with, in the multiplier's adder; u_max is floored
+  half_1 <= half(U_DC_CONDITIONING_DROP_U_DC, 36) when valid(2) = '1' else (others => '0');
+  sum    <= prod + half_1;
 
   process (clk)
   begin
@@ -66,14 +72,14 @@ begin
 
       -- Stage 3: u_dc = prod, narrowed
       if valid(2) = '1' then
-        u_dc_3 <= saturate_u(round_half_up(prod, U_DC_CONDITIONING_DROP_U_DC), U_DC_W);
+        u_dc_3 <= saturate_u(shift_right(sum, U_DC_CONDITIONING_DROP_U_DC), U_DC_W);
         rail_3 <= rail_1;
       end if;
 
       -- Stage 5: u_max = prod, floored
       if valid(4) = '1' then
         u_dc         <= u_dc_3;
-        u_max        <= saturate_u(shift_right(prod, U_DC_CONDITIONING_DROP_U_MAX), U_MAX_W);
+        u_max        <= saturate_u(shift_right(sum, U_DC_CONDITIONING_DROP_U_MAX), U_MAX_W);
         u_dc_at_rail <= rail_3;
       end if;
 

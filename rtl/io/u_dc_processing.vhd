@@ -1,7 +1,8 @@
 -- Purpose: U_dc as 2**n / m, so that the modulator multiplies where it would divide.
---   1/u_dc = m * 2**n * 2**-17, see reciprocal;  m_beta = m * sqrt(3)/2
--- Formats: u_dc U(1,16); m, m_beta U(0,17).  Latency: 23.  Interval: 23.
--- Rounding: m as reciprocal makes it, m_beta half up.
+--   inverse = 1/u_dc = m * 2**n * 2**-17, see reciprocal
+--   inverse_beta = m_beta * 2**n * 2**-17,  m_beta = m * sqrt(3)/2
+-- Formats: u_dc U(1,16); m, m_beta U(0,17); inverse, inverse_beta U(5,17).  Latency: 27.  Interval: 27.
+-- Rounding: m as reciprocal makes it, m_beta half up; the shift by n, two bits a clock, loses nothing.
 -- Below 1/32 per unit the bus is taken for 1/32 and u_dc_low is raised.
 
 library ieee;
@@ -12,31 +13,33 @@ use work.fluxproof_pkg.all;
 
 entity u_dc_processing is
   port (
-    clk       : in  std_logic;
-    rst       : in  std_logic;
-    in_valid  : in  std_logic;
-    u_dc      : in  unsigned(U_DC_W - 1 downto 0);
-    out_valid : out std_logic;
-    m         : out unsigned(RECIPROCAL_W - 1 downto 0);
-    m_beta    : out unsigned(RECIPROCAL_W - 1 downto 0);
-    n         : out unsigned(2 downto 0);
-    u_dc_low  : out std_logic
+    clk          : in  std_logic;
+    rst          : in  std_logic;
+    in_valid     : in  std_logic;
+    u_dc         : in  unsigned(U_DC_W - 1 downto 0);
+    out_valid    : out std_logic;
+    inverse      : out unsigned(U_DC_PROCESSING_INVERSE_W - 1 downto 0);
+    inverse_beta : out unsigned(U_DC_PROCESSING_INVERSE_W - 1 downto 0);
+    u_dc_low     : out std_logic
   );
 end entity u_dc_processing;
 
 architecture rtl of u_dc_processing is
-  constant LATENCY : positive := U_DC_PROCESSING_LATENCY;
+  constant LATENCY   : positive := U_DC_PROCESSING_LATENCY;
+  constant INVERSE_W : positive := U_DC_PROCESSING_INVERSE_W;
 
   signal valid   : std_logic_vector(0 to LATENCY);
   signal m_21    : unsigned(RECIPROCAL_W - 1 downto 0);
   signal n_21    : unsigned(3 downto 0);
   signal low_21  : std_logic;
   signal prod_22 : signed(2 * RECIPROCAL_W + 1 downto 0);
+  signal prod_23 : signed(2 * RECIPROCAL_W + 1 downto 0);
+  signal n_left  : unsigned(2 downto 0);
 begin
   valid(0) <= in_valid;
 
   -- Stages 1 to 21: m, n, low
-  inverse : entity work.reciprocal
+  mantissa : entity work.reciprocal
     generic map (
       N_MAX => U_DC_PROCESSING_N_MAX
     )
@@ -61,16 +64,30 @@ begin
         prod_22 <= signed('0' & m_21) * U_DC_PROCESSING_SQRT3_2;
       end if;
 
-      -- Stage 23: m_beta = prod, narrowed; it is below m, so it fits
+      -- Stage 23: half an LSB of m_beta to round with
       if valid(22) = '1' then
-        m        <= m_21;
-        m_beta   <= saturate_u(round_half_up(prod_22, U_DC_PROCESSING_DROP_BETA), RECIPROCAL_W);
-        n        <= n_21(2 downto 0);
-        u_dc_low <= low_21;
+        prod_23 <= prod_22 + half(U_DC_PROCESSING_DROP_BETA, prod_22'length);
+      end if;
+
+      -- Stage 24: m, m_beta = prod, narrowed; it is below m, so it fits.  Stages 25 to 27: inverse = m * 2**n
+      if valid(23) = '1' then
+        inverse      <= resize(m_21, INVERSE_W);
+        inverse_beta <= resize(unsigned(shift_right(prod_23, U_DC_PROCESSING_DROP_BETA)), INVERSE_W);
+        n_left       <= n_21(2 downto 0);
+        u_dc_low     <= low_21;
+      elsif n_left > 1 then
+        inverse      <= shift_left(inverse, 2);
+        inverse_beta <= shift_left(inverse_beta, 2);
+        n_left       <= n_left - 2;
+      elsif n_left > 0 then
+        inverse      <= shift_left(inverse, 1);
+        inverse_beta <= shift_left(inverse_beta, 1);
+        n_left       <= (others => '0');
       end if;
 
       if rst = '1' then
         valid(1 to LATENCY) <= (others => '0');
+        n_left              <= (others => '0');
       end if;
     end if;
   end process;

@@ -56,6 +56,7 @@ architecture rtl of gate_generation is
   signal tripped_now : std_logic;
   signal level       : unsigned(2 downto 0);
   signal elapsed     : elapsed_t;
+  signal settled     : unsigned(2 downto 0);
 
   signal valley   : std_logic;
   signal good     : std_logic;
@@ -77,16 +78,13 @@ begin
   begin
     if rising_edge(clk) then
       -- Carrier: up, twice the top value, down, twice zero
-      if down = '0' then
-        if count = CARRIER_HALF - 1 then
-          down <= '1';
-        else
-          count <= count + 1;
-        end if;
+      if down = '0' and count = CARRIER_HALF - 1 then
+        down <= '1';
       elsif valley = '1' then
         down <= '0';
       else
-        count <= count - 1;
+        -- One up or, all ones, one down
+        count <= count + (unsigned'(14 downto 0 => down) & '1');
       end if;
 
       -- The gates leave one register behind the carrier, and so does the mark of the zero vector's middle
@@ -110,20 +108,22 @@ begin
       setting_refused <= not good;
 
       -- Legs: both gates off from the change of mind for the dead time; a gate that is on stays on when the dead
-      -- time grows, hence the largest count
+      -- time grows, hence settled
       for k in 0 to 2 loop
         gate_high(k) <= '0';
         gate_low(k)  <= '0';
         if on_now = '0' then
           level(k)   <= '0';
+          settled(k) <= '0';
           elapsed(k) <= (others => '0');
         elsif wanted(k) /= level(k) then
           level(k)   <= wanted(k);
+          settled(k) <= '0';
           elapsed(k) <= to_unsigned(1, 12);
-        elsif elapsed(k) < dead_used then
+        elsif settled(k) = '0' and elapsed(k) < dead_used then
           elapsed(k) <= elapsed(k) + 1;
         else
-          elapsed(k)   <= (others => '1');
+          settled(k)   <= '1';
           gate_high(k) <= level(k);
           gate_low(k)  <= not level(k);
         end if;
@@ -140,6 +140,7 @@ begin
         tripped_now     <= '0';
         level           <= (others => '0');
         elapsed         <= (others => (others => '0'));
+        settled         <= (others => '0');
         gate_high       <= (others => '0');
         gate_low        <= (others => '0');
         sample          <= '0';

@@ -48,7 +48,7 @@ begin
 
   duty_0    <= duty_b when valid(1) = '1' else duty_c when valid(2) = '1' else duty_a;
   dropped_2 <= to_unsigned(0, 16) when (compare_2 & '0') < min_pulse_2 else
-               HALF when HALF - compare_2 < min_pulse_2 else
+               HALF when resize(compare_2, 17) + min_pulse_2 > HALF else
                compare_2;
 
   process (clk)

@@ -28,6 +28,7 @@ architecture rtl of svm_delay_compensation is
   signal valid   : std_logic_vector(0 to LATENCY);
   signal prod_1  : signed(PU_W + 17 downto 0);
   signal theta_1 : unsigned(TURN_W - 1 downto 0);
+  signal sum_2   : signed(PU_W + 17 downto 0);
 begin
   valid(0) <= in_valid;
 
@@ -42,9 +43,9 @@ begin
         theta_1 <= theta_me;
       end if;
 
-      -- Stage 2: theta_out = theta_me + prod, modulo one turn
+      -- Stage 2: theta_me + prod, with half an LSB to round with; the slice below is the angle modulo one turn
       if valid(1) = '1' then
-        theta_out <= theta_1 + resize(unsigned(round_half_up(prod_1, SVM_DELAY_COMPENSATION_DROP)), TURN_W);
+        sum_2 <= prod_1 + (signed(theta_1) & half(SVM_DELAY_COMPENSATION_DROP, SVM_DELAY_COMPENSATION_DROP));
       end if;
 
       if rst = '1' then
@@ -54,5 +55,6 @@ begin
   end process;
 
   out_valid <= valid(LATENCY);
+  theta_out <= unsigned(sum_2(SVM_DELAY_COMPENSATION_DROP + TURN_W - 1 downto SVM_DELAY_COMPENSATION_DROP));
 
 end architecture rtl;

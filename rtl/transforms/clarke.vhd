@@ -2,7 +2,8 @@
 --   i_alpha = (2*i_a - i_b - i_c) / 3
 --   i_beta  = (i_b - i_c) / sqrt(3)
 -- Formats: sums exact; 1/3 as S(0,-1,18), 1/sqrt(3) as S(0,0,17); PU out.
--- Latency: 3.  Rounding: half up, saturated: 8/3 per unit needs three currents against each other.
+-- Latency: 4 (alpha and beta follow each other through one multiplier).  Interval: 2.
+-- Rounding: half up, saturated: 8/3 per unit needs three currents against each other.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -27,35 +28,55 @@ end entity clarke;
 architecture rtl of clarke is
   constant LATENCY : positive := CLARKE_LATENCY;
 
-  signal valid        : std_logic_vector(0 to LATENCY);
-  signal sum_alpha_1  : signed(PU_W + 1 downto 0);
-  signal sum_beta_1   : signed(PU_W downto 0);
-  signal prod_alpha_2 : signed(PU_W + CLARKE_THIRD'length + 1 downto 0);
-  signal prod_beta_2  : signed(PU_W + CLARKE_INV_SQRT3'length downto 0);
+  constant SUM_W  : positive := PU_W + 2;
+  constant PROD_W : positive := SUM_W + PU_W;
+
+  signal valid    : std_logic_vector(0 to LATENCY);
+  signal first_0  : signed(SUM_W - 1 downto 0);
+  signal sum_1    : signed(SUM_W - 1 downto 0);
+  signal factor_1 : signed(PU_W - 1 downto 0);
+  signal prod_2   : signed(PROD_W - 1 downto 0);
+  signal half_2   : signed(PROD_W - 1 downto 0);
+  signal sum_2    : signed(PROD_W - 1 downto 0);
+  signal i_2      : signed(PU_W - 1 downto 0);
 begin
   valid(0) <= in_valid;
+
+  -- The component of the beat: alpha while in_valid, then beta
+  first_0 <= resize(i_b, SUM_W) when valid(1) = '1' else
+             shift_left(resize(i_a, SUM_W), 1) - i_b;
+
+  -- Rounded in the multiplier's adder
+  half_2 <= half(CLARKE_DROP_ALPHA, PROD_W) when valid(2) = '1' else half(CLARKE_DROP_BETA, PROD_W);
+  sum_2  <= prod_2 + half_2;
+  i_2    <= saturate(shift_right(sum_2, CLARKE_DROP_ALPHA), PU_W) when valid(2) = '1' else
+            saturate(shift_right(sum_2, CLARKE_DROP_BETA), PU_W);
 
   process (clk)
   begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stage 1: sum_alpha = 2*i_a - i_b - i_c,  sum_beta = i_b - i_c
-      if valid(0) = '1' then
-        sum_alpha_1 <= shift_left(resize(i_a, PU_W + 2), 1) - resize(i_b, PU_W + 2) - resize(i_c, PU_W + 2);
-        sum_beta_1  <= resize(i_b, PU_W + 1) - resize(i_c, PU_W + 1);
+      -- Stage 1: sum = 2*i_a - i_b - i_c, then i_b - i_c
+      if valid(0) = '1' or valid(1) = '1' then
+        sum_1    <= first_0 - i_c;
+        factor_1 <= resize(CLARKE_THIRD, PU_W);
+        if valid(1) = '1' then
+          factor_1 <= resize(CLARKE_INV_SQRT3, PU_W);
+        end if;
       end if;
 
       -- Stage 2: prod = sum * coefficient
-      if valid(1) = '1' then
-        prod_alpha_2 <= sum_alpha_1 * CLARKE_THIRD;
-        prod_beta_2  <= sum_beta_1 * CLARKE_INV_SQRT3;
+      if valid(1) = '1' or valid(2) = '1' then
+        prod_2 <= sum_1 * factor_1;
       end if;
 
-      -- Stage 3: i = prod, narrowed
+      -- Stage 3, 4: i = prod, narrowed; alpha at clock 3, beta at 4
       if valid(2) = '1' then
-        i_alpha <= round_sat(prod_alpha_2, CLARKE_DROP_ALPHA, PU_W);
-        i_beta  <= round_sat(prod_beta_2, CLARKE_DROP_BETA, PU_W);
+        i_alpha <= i_2;
+      end if;
+      if valid(3) = '1' then
+        i_beta <= i_2;
       end if;
 
       if rst = '1' then

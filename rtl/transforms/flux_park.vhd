@@ -25,12 +25,9 @@ entity flux_park is
 end entity flux_park;
 
 architecture rtl of flux_park is
-  signal minus_sin : signed(TRIG_W - 1 downto 0);
 begin
 
-  -- Cannot overflow: the sine is within +-1 and its format reaches 2.
-  minus_sin <= -sin_theta;
-
+  -- A rotation forwards of the swapped axes is the rotation back.
   rotation : entity work.rotate
     generic map (
       WIDTH => FLUX_W
@@ -39,13 +36,13 @@ begin
       clk       => clk,
       rst       => rst,
       in_valid  => in_valid,
-      x         => lambda_m_alpha,
-      y         => lambda_m_beta,
+      x         => lambda_m_beta,
+      y         => lambda_m_alpha,
       cos_theta => cos_theta,
-      sin_theta => minus_sin,
+      sin_theta => sin_theta,
       out_valid => out_valid,
-      out_x     => lambda_m_d,
-      out_y     => lambda_m_q
+      out_x     => lambda_m_q,
+      out_y     => lambda_m_d
     );
 
 end architecture rtl;

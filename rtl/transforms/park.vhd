@@ -25,12 +25,9 @@ entity park is
 end entity park;
 
 architecture rtl of park is
-  signal minus_sin : signed(TRIG_W - 1 downto 0);
 begin
 
-  -- Cannot overflow: the sine is within +-1 and its format reaches 2.
-  minus_sin <= -sin_theta;
-
+  -- A rotation forwards of the swapped axes is the rotation back.
   rotation : entity work.rotate
     generic map (
       WIDTH => PU_W
@@ -39,13 +36,13 @@ begin
       clk       => clk,
       rst       => rst,
       in_valid  => in_valid,
-      x         => i_alpha,
-      y         => i_beta,
+      x         => i_beta,
+      y         => i_alpha,
       cos_theta => cos_theta,
-      sin_theta => minus_sin,
+      sin_theta => sin_theta,
       out_valid => out_valid,
-      out_x     => i_d,
-      out_y     => i_q
+      out_x     => i_q,
+      out_y     => i_d
     );
 
 end architecture rtl;

@@ -2,7 +2,8 @@
 --   out_x = x*cos_theta - y*sin_theta
 --   out_y = x*sin_theta + y*cos_theta
 -- Formats: x, y S(1,WIDTH-2), PU or FLUX; TRIG S(1,16) within +-1; products and sums exact.
--- Latency: 4.  Interval: 2.  Rounding: half up, saturated: a vector longer than 2 per unit is outside every base.
+-- One multiplier for sin_theta, a clock ahead of the one for cos_theta, which adds; out_y comes a clock before out_x.
+-- Latency: 4.  Interval: 3.  Rounding: half up, saturated: a vector longer than 2 per unit is outside every base.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -31,45 +32,51 @@ end entity rotate;
 architecture rtl of rotate is
   constant LATENCY : positive := ROTATE_LATENCY;
 
-  signal valid    : std_logic_vector(0 to LATENCY);
-  signal factor_0 : signed(WIDTH - 1 downto 0);
-  signal prod_c   : signed(WIDTH + TRIG_W - 1 downto 0);  -- by cos_theta: x at clock 1, y at clock 2
-  signal prod_s   : signed(WIDTH + TRIG_W - 1 downto 0);  -- by sin_theta: x at clock 1, y at clock 2
-  signal prod_c_2 : signed(WIDTH + TRIG_W - 1 downto 0);
-  signal prod_s_2 : signed(WIDTH + TRIG_W - 1 downto 0);
-  signal sum_x_3  : signed(WIDTH + TRIG_W downto 0);
-  signal sum_y_3  : signed(WIDTH + TRIG_W downto 0);
+  signal valid      : std_logic_vector(0 to LATENCY);
+  signal factor_s_0 : signed(WIDTH - 1 downto 0);
+  signal factor_c_1 : signed(WIDTH - 1 downto 0);
+  signal prod_s     : signed(WIDTH + TRIG_W - 1 downto 0);  -- at clock 1 of x, at clock 2 of not y
+  signal rest       : signed(TRIG_W - 1 downto 0);
+  signal sum_s      : signed(WIDTH + TRIG_W - 1 downto 0);  -- at clock 2 x*sin_theta, at clock 3 -y*sin_theta
+  signal prod_c     : signed(WIDTH + TRIG_W - 1 downto 0);  -- at clock 2 of y, at clock 3 of x
+  signal sum        : signed(WIDTH + TRIG_W downto 0);
+  signal out_2      : signed(WIDTH - 1 downto 0);
 begin
   valid(0) <= in_valid;
-  factor_0 <= y when valid(1) = '1' else x;
+
+  -- -y*sin_theta is made of not y, which is -y - 1, and the missing sin_theta: no carry before the multiplier
+  factor_s_0 <= not y when valid(1) = '1' else x;
+  factor_c_1 <= x when valid(2) = '1' else y;
+
+  sum   <= resize(prod_c, WIDTH + TRIG_W + 1) + sum_s;
+  out_2 <= saturate(shift_right(sum, ROTATE_DROP), WIDTH);
 
   process (clk)
   begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stage 1: prod = x*cos_theta, x*sin_theta, a clock later y*cos_theta, y*sin_theta
+      -- Stages 1, 2: prod_s = x*sin_theta, then (not y)*sin_theta;  rest: half an LSB to round with, then sin_theta too
       if valid(0) = '1' or valid(1) = '1' then
-        prod_c <= factor_0 * cos_theta;
-        prod_s <= factor_0 * sin_theta;
+        prod_s <= factor_s_0 * sin_theta;
+        rest   <= half(ROTATE_DROP, TRIG_W);
+        if valid(1) = '1' then
+          rest <= sin_theta + half(ROTATE_DROP, TRIG_W);
+        end if;
       end if;
 
-      -- Stage 2: the products of x wait for those of y
-      if valid(1) = '1' then
-        prod_c_2 <= prod_c;
-        prod_s_2 <= prod_s;
+      -- Stages 2, 3: sum_s = x*sin_theta, then -y*sin_theta;  prod_c = y*cos_theta, then x*cos_theta
+      if valid(1) = '1' or valid(2) = '1' then
+        sum_s  <= prod_s + rest;
+        prod_c <= factor_c_1 * cos_theta;
       end if;
 
-      -- Stage 3: sum_x = x*cos_theta - y*sin_theta,  sum_y = x*sin_theta + y*cos_theta
+      -- Stages 3, 4: out_y = x*sin_theta + y*cos_theta, then out_x = x*cos_theta - y*sin_theta, narrowed
       if valid(2) = '1' then
-        sum_x_3 <= resize(prod_c_2, WIDTH + TRIG_W + 1) - resize(prod_s, WIDTH + TRIG_W + 1);
-        sum_y_3 <= resize(prod_s_2, WIDTH + TRIG_W + 1) + resize(prod_c, WIDTH + TRIG_W + 1);
+        out_y <= out_2;
       end if;
-
-      -- Stage 4: out = sum, narrowed
       if valid(3) = '1' then
-        out_x <= round_sat(sum_x_3, ROTATE_DROP, WIDTH);
-        out_y <= round_sat(sum_y_3, ROTATE_DROP, WIDTH);
+        out_x <= out_2;
       end if;
 
       if rst = '1' then

@@ -1,7 +1,7 @@
 -- Purpose: sine and cosine of an angle by one quarter-wave table, both outputs interpolated.
 --   theta = quadrant + (address + 1/2)/4096 + delta;  sin = S + delta*C,  cos = C - delta*S
 -- Formats: table U(0,18), delta S(-10,22) radians, interpolated value 22 fraction bits, TRIG out.
--- Latency: 6.  Interval: 2 (one multiplier makes both products).
+-- Latency: 6.  Interval: 3 (one read port and one multiplier: C, S and C again are read, delta*C comes first).
 -- Rounding: product floored to 22 fraction bits, output half up; 1.0 is reached and fits, no saturation.
 
 library ieee;
@@ -28,93 +28,91 @@ architecture rtl of sincos is
   constant FINE_W     : positive := 24;  -- S(1,22)
 
   signal valid      : std_logic_vector(0 to LATENCY);
-  signal address_1  : unsigned(SINCOS_ADDRESS_BITS - 1 downto 0);
+  signal address_0  : unsigned(SINCOS_ADDRESS_BITS - 1 downto 0);
+  signal table_1    : unsigned(17 downto 0);
   signal low_1      : unsigned(DELTA_BITS - 1 downto 0);
   signal quadrant_1 : unsigned(1 downto 0);
-  signal s_2        : unsigned(17 downto 0);
-  signal c_2        : unsigned(17 downto 0);
+  signal table_2    : unsigned(17 downto 0);
   signal delta_2    : signed(12 downto 0);
-  signal quadrant_2 : unsigned(1 downto 0);
-  signal factor_2   : unsigned(17 downto 0);
   signal prod_3     : signed(31 downto 0);
-  signal step_3     : signed(FINE_W - 1 downto 0);
-  signal s_3        : unsigned(17 downto 0);
-  signal c_3        : unsigned(17 downto 0);
-  signal quadrant_3 : unsigned(1 downto 0);
-  signal fine_s_4   : signed(FINE_W - 1 downto 0);
+  signal base_3     : signed(FINE_W + SINCOS_DROP_PROD - 1 downto 0);
+  signal quadrant_4 : unsigned(1 downto 0);
+  signal sum_4      : signed(FINE_W + SINCOS_DROP_PROD - 1 downto 0);  -- for the sine at clock 4, the cosine at 5
+  signal fine_4     : signed(FINE_W - 1 downto 0);
   signal fine_s_5   : signed(FINE_W - 1 downto 0);
-  signal fine_c_5   : signed(FINE_W - 1 downto 0);
-  signal quadrant_5 : unsigned(1 downto 0);
-
-  function extended (x : unsigned) return signed is
-  begin
-    return signed(shift_left(resize(x, FINE_W), SINCOS_TABLE_SHIFT));
-  end function;
 
   -- A quarter turn swaps sine and cosine and turns the sign of one, a half turn those of both.
   function turned (own, other : signed; swap, minus : std_logic) return signed is
-    variable v : signed(FINE_W - 1 downto 0) := own;
+    variable v     : signed(FINE_W - 1 downto 0) := own;
+    variable carry : signed(1 downto 0);
   begin
     if swap = '1' then
       v := other;
     end if;
-    if minus = '1' then
-      v := -v;
+    -- -v is not v and one more, which reaches the half LSB only through zeros below it.
+    carry := '0' & (v(SINCOS_DROP_OUT - 1) xor minus);
+    if v(SINCOS_DROP_OUT - 2 downto 0) = 0 then
+      carry(0) := v(SINCOS_DROP_OUT - 1) or minus;
     end if;
-    return resize(round_half_up(v, SINCOS_DROP_OUT), TRIG_W);
+    return (v(v'high downto SINCOS_DROP_OUT) xor (TRIG_W - 1 downto 0 => minus)) + carry;
   end function;
 begin
-  valid(0) <= in_valid;
+  valid(0)  <= in_valid;
+  address_0 <= theta(TURN_W - 3 downto DELTA_BITS) xor (SINCOS_ADDRESS_BITS - 1 downto 0 => valid(1));
 
-  factor_2 <= s_2 when valid(3) = '1' else c_2;
-  step_3   <= resize(shift_right(prod_3, SINCOS_DROP_PROD), FINE_W);
+  -- The cosine's product is subtracted: delta has turned its sign, and what is below the cut is rounded up.
+  base_3 <= signed(shift_left(resize(table_2, base_3'length), SINCOS_TABLE_SHIFT + SINCOS_DROP_PROD)) or
+            signed(resize(unsigned'(SINCOS_DROP_PROD - 1 downto 0 => valid(4)), base_3'length));
+  fine_4 <= sum_4(sum_4'high downto SINCOS_DROP_PROD);
 
   process (clk)
+    variable delta : signed(12 downto 0);
   begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stage 1: theta = quadrant, address, low bits of delta
+      -- Stages 1, 2, 3: theta = quadrant, address, low bits of delta;  c, s, c from both ends of the table
       if valid(0) = '1' then
         quadrant_1 <= theta(TURN_W - 1 downto TURN_W - 2);
-        address_1  <= theta(TURN_W - 3 downto DELTA_BITS);
         low_1      <= theta(DELTA_BITS - 1 downto 0);
       end if;
 
-      -- Stage 2: s, c from both ends of the table, delta in radians
-      if valid(1) = '1' then
-        s_2        <= SINCOS_SINE(to_integer(address_1));
-        c_2        <= SINCOS_SINE(to_integer(not address_1));
-        delta_2    <= SINCOS_DELTA(to_integer(low_1));
-        quadrant_2 <= quadrant_1;
+      if valid(0) = '1' or valid(1) = '1' or valid(2) = '1' then
+        table_1 <= SINCOS_SINE(to_integer(not address_0));
       end if;
 
-      -- Stage 3: prod = delta*c, a clock later delta*s
+      -- Stages 2, 3, 4: c, s, c wait, for a block RAM's output comes late in its clock;  delta in radians, then -delta
+      if valid(1) = '1' or valid(2) = '1' or valid(3) = '1' then
+        table_2 <= table_1;
+      end if;
+      if valid(1) = '1' or valid(2) = '1' then
+        delta := SINCOS_DELTA(to_integer(low_1));
+        if valid(2) = '1' then
+          delta := not delta_2;
+        end if;
+        delta_2 <= delta + signed'('0' & valid(2));
+      end if;
+
+      -- Stages 3, 4: prod = delta*c, then -delta*s
       if valid(2) = '1' or valid(3) = '1' then
-        prod_3 <= delta_2 * signed('0' & factor_2);
-      end if;
-      if valid(2) = '1' then
-        s_3        <= s_2;
-        c_3        <= c_2;
-        quadrant_3 <= quadrant_2;
+        prod_3 <= delta_2 * signed('0' & table_2);
       end if;
 
-      -- Stage 4: fine_s = s + delta*c
+      -- Stages 4, 5: fine_s = s + delta*c, then fine_c = c - delta*s
+      if valid(3) = '1' or valid(4) = '1' then
+        sum_4 <= base_3 + prod_3;
+      end if;
       if valid(3) = '1' then
-        fine_s_4 <= extended(s_3) + step_3;
+        quadrant_4 <= quadrant_1;
       end if;
-
-      -- Stage 5: fine_c = c - delta*s
       if valid(4) = '1' then
-        fine_c_5   <= extended(c_3) - step_3;
-        fine_s_5   <= fine_s_4;
-        quadrant_5 <= quadrant_3;
+        fine_s_5 <= fine_4;
       end if;
 
       -- Stage 6: into the quadrant, narrowed
       if valid(5) = '1' then
-        sin_theta <= turned(fine_s_5, fine_c_5, quadrant_5(0), quadrant_5(1));
-        cos_theta <= turned(fine_c_5, fine_s_5, quadrant_5(0), quadrant_5(1) xor quadrant_5(0));
+        sin_theta <= turned(fine_s_5, fine_4, quadrant_4(0), quadrant_4(1));
+        cos_theta <= turned(fine_4, fine_s_5, quadrant_4(0), quadrant_4(1) xor quadrant_4(0));
       end if;
 
       if rst = '1' then
