@@ -38,7 +38,7 @@ package fluxproof_pkg is
   constant FLUXPROOF_SAMPLE_INTERVAL : positive := 50;
 
   -- register_access: clocks that a write waits for the end of a sample
-  constant REGISTER_PATIENCE : positive := 64;
+  constant REGISTER_PATIENCE : positive := 66;
 
   -- sqrt: 001, section 5.2: voltage limit of the current regulation
   constant SQRT_LATENCY : positive := 6;

@@ -32,6 +32,18 @@ REPORTS = {
     "minus_rounded": ("a'length", "v'length", "drop"),
 }
 
+# A function that the core has no use for at present stays proved, in one combination.
+UNUSED = {
+    "round_half_up": (20, 4),
+    "saturate": (20, 12),
+    "exceeds": (20, 12),
+    "saturate_u": (20, 12),
+    "round_sat": (20, 4, 12),
+    "clamp": (20, 20, 20),
+    "plus_rounded": (24, 20, 4),
+    "minus_rounded": (24, 20, 4),
+}
+
 REPORTER = """
   function used (said : string) return natural is
   begin
@@ -89,11 +101,9 @@ def widths_in_use() -> dict[str, tuple[tuple[int, ...], ...]]:
     seen: dict[str, set] = {name: set() for name in REPORTS}
     for name, widths in re.findall(r"\bused (\w+) ([\d ]+)", done.stdout + done.stderr):
         seen[name].add(tuple(map(int, widths.split())))
-    if done.returncode or not all(seen.values()):
-        raise RuntimeError(
-            f"cannot find the widths in use: {done.stderr[-300:] or [n for n in seen if not seen[n]]}"
-        )
-    return {name: tuple(sorted(widths)) for name, widths in seen.items()}
+    if done.returncode or not any(seen.values()):
+        raise RuntimeError(f"cannot find the widths in use: {done.stderr[-300:]}")
+    return {name: tuple(sorted(widths or {UNUSED[name]})) for name, widths in seen.items()}
 
 
 def call(name: str, w: tuple[int, ...]) -> tuple[str, int, bool]:
