@@ -1,4 +1,4 @@
-"""`make prove` in small: two properties with their planted faults, and that a proof which does not hold is told apart."""
+"""`make prove` in small: two properties with their planted faults; what does not hold is told apart."""
 
 from __future__ import annotations
 

@@ -191,7 +191,7 @@ def test_equals_vhdl_clock_by_clock(ghdl5, generics, tmp_path, capsys):
 
 
 def test_constant_wider_than_the_vector(ghdl5, tmp_path):
-    """min_pulse has 12 bits and CARRIER_HALF more: GHDL 5 compares with what 12 bits leave of it, were it not widened."""
+    """min_pulse has 12 bits, CARRIER_HALF more: GHDL 5 would compare with what 12 bits leave of it."""
     generics = GENERICS | {"CARRIER_HALF": 5000}
     core = VerilatedCore(generics)
     settings = [{"dead_time": 3, "min_pulse": pulse} for pulse in (900, 1000, 4095, 2, 904, 905)]

@@ -64,8 +64,8 @@ architecture rtl of gate_generation is
   signal tripping : std_logic;
   signal wanted   : unsigned(2 downto 0);
 begin
+  -- In good: GHDL 5 cuts a number down to the width it is compared with, so the pulse gets the number's width.
   valley   <= '1' when count = 0 and down = '1' else '0';
-  -- GHDL 5 cuts a number down to the width it is compared with, so the pulse gets the number's width.
   good     <= '1' when dead_time > 0 and dead_time < min_pulse and resize(min_pulse, 16) <= CARRIER_HALF else '0';
   on_now   <= running_now and enable and not trip;
   tripping <= trip or (tripped_now and not clear_trip);

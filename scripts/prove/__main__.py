@@ -12,7 +12,7 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 
 from scripts.files import write_json
 from scripts.prove import document
-from scripts.prove.catalogue import catalogue
+from scripts.prove.catalogue import catalogue, left_out
 from scripts.prove.document import method_of
 from scripts.prove.judge import judge
 from scripts.prove.solve import FOLDER
@@ -52,6 +52,8 @@ def main() -> int:
         find_ghdl()
     except NoUsableGhdl as reason:
         parser.exit(1, f"prove: {reason}\n")
+    for entity in left_out():
+        print(f"nothing proved of {entity}: it does not stand in rtl/")
     began, entries = time.monotonic(), {}
     with ThreadPoolExecutor(arguments.jobs) as pool:
         running = {pool.submit(judge, proof, arguments.limit): proof.name for proof in proofs}

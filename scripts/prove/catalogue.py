@@ -2,9 +2,24 @@
 
 from __future__ import annotations
 
-from scripts.prove import buses, gates, narrowing, pipeline
+from scripts.prove import buses, core, gates, narrowing, pipeline, protection
 from scripts.prove.proof import Proof
+from scripts.sources import RTL
+
+
+def every_proof() -> tuple[Proof, ...]:
+    """The whole catalogue."""
+    written = (*gates.PROOFS, *core.PROOFS, *protection.PROOFS, *buses.PROOFS)
+    return (*written, *narrowing.proofs(), *pipeline.proofs())
 
 
 def catalogue() -> tuple[Proof, ...]:
-    return (*gates.PROOFS, *buses.PROOFS, *narrowing.proofs(), *pipeline.proofs())
+    """The proofs whose entity stands in rtl/ or is made for them."""
+    entities = {path.stem for path in RTL.rglob("*.vhd")}
+    return tuple(proof for proof in every_proof() if proof.vhdl is not None or proof.entity in entities)
+
+
+def left_out() -> tuple[str, ...]:
+    """The entities that proofs are written for and that do not stand in rtl/."""
+    here = {proof.name for proof in catalogue()}
+    return tuple(dict.fromkeys(proof.entity for proof in every_proof() if proof.name not in here))

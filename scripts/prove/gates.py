@@ -7,7 +7,7 @@ from scripts.prove.proof import Fault, Proof, committed
 
 GATES = "modulation/gate_generation.vhd"
 COMPARE = "modulation/pwm_compare.vhd"
-SPIES = ("count", "down", "compare", "dead_used", "pulse_used", "configured", "level", "elapsed")
+SPIES = ("count", "down", "compare", "dead_used", "pulse_used", "configured", "level", "elapsed", "settled")
 FULL = {"CARRIER_HALF": 10000}  # 200 MHz, 10 kHz: the default of the core
 SMALL = {"CARRIER_HALF": 8}  # a period of 16 clocks, so that a search sees several
 SEVERAL_PERIODS = 48
@@ -65,8 +65,8 @@ PROOFS = (
         Fault(
             "dead time one short",
             GATES,
-            "elsif elapsed(k) < dead_used then",
-            "elsif elapsed(k) + 1 < dead_used then",
+            "elapsed(k) < dead_used then",
+            "elapsed(k) + 1 < dead_used then",
         ),
         Fault(
             "no dead time after enable",
@@ -132,7 +132,7 @@ PROOFS = (
     ),
     gate_proof(
         "settings",
-        "dead time and minimum pulse change at the valley, never to contradicting ones, and no gate is on before the first",
+        "dead time and minimum pulse change at the valley, never to contradicting ones; no gate is on before",
         "SETTINGS",
         Fault("contradiction accepted", GATES, "dead_time < min_pulse and", "dead_time <= min_pulse and"),
         Fault(
@@ -149,7 +149,7 @@ PROOFS = (
         "minimum_pulse",
         "a gate that is on stays on for min_pulse - dead_time at least, unless trip, enable or reset cut it",
         "GATE_PULSE",
-        Fault("gate off when the dead time grows", GATES, "          elapsed(k)   <= (others => '1');\n", ""),
+        Fault("gate off when the dead time grows", GATES, "          settled(k)   <= '1';\n", ""),
         Fault(
             "duty taken at the peak too",
             GATES,
@@ -166,8 +166,8 @@ PROOFS = (
         Fault(
             "minimum pulse one short",
             COMPARE,
-            "HALF - compare_2 < min_pulse_2",
-            "HALF - compare_2 < min_pulse_2 - 1",
+            "resize(compare_2, 17) + min_pulse_2 > HALF",
+            "resize(compare_2, 17) + min_pulse_2 > HALF + 1",
         ),
         Fault(
             "pulses dropped by half their length",

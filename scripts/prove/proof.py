@@ -44,6 +44,7 @@ class Proof:
     search_generics: Mapping[str, int] | None = None  # None: those of the proof
     search_depth: int = 20
     covers: bool = True
+    cut: Callable[[str], tuple[str, ...]] | None = None  # modules of the Verilog whose outputs become free
     patience: int = 0  # seconds that this proof is known to need more than others
     vhdl: Callable[[], str] | None = None  # a generated entity around the RTL under proof
 

@@ -1,4 +1,4 @@
-"""One question to the solver: converts the VHDL, writes the job of sby, runs it within a time limit, reads the answer."""
+"""One question to the solver: converts the VHDL, writes the job of sby, runs it within a limit, reads the answer."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class BrokenProof(RuntimeError):
 
 @dataclass(frozen=True)
 class Answer:
-    """``status`` of sby: PASS, FAIL, UNKNOWN (induction does not hold), TIMEOUT; ``line`` of the first failed assert."""
+    """``status`` of sby: PASS, FAIL, UNKNOWN (induction fails), TIMEOUT; ``line`` of the first failed assert."""
 
     status: str
     line: str
@@ -83,9 +83,10 @@ def convert(proof: Proof, generics: Mapping[str, int], rtl: Path, scratch: Path)
     return synthesize(sources, proof.entity, generics)
 
 
-def job(method: str, depth: int, macros: tuple[str, ...], limit: int) -> str:
+def job(method: str, depth: int, macros: tuple[str, ...], limit: int, cut: tuple[str, ...] = ()) -> str:
     """The file that sby reads."""
     defines = " ".join(f"-D{macro}" for macro in macros)
+    freed = f"blackbox {' '.join(cut)}\ncutpoint -blackbox\n" if cut else ""
     return f"""\
 [options]
 mode {MODES[method]}
@@ -100,7 +101,8 @@ vcd off
 [script]
 read_verilog dut.v
 read_verilog -sv -formal {defines} harness.sv
-prep -flatten -top formal_top
+hierarchy -top formal_top
+{freed}prep -flatten -top formal_top
 opt_clean -purge
 
 [files]
@@ -133,7 +135,7 @@ def ask(
         macros += ("LEMMAS",)
     write_text(folder / "dut.v", verilog)
     write_text(folder / "harness.sv", proof.harness(verilog))
-    write_text(folder / "job.sby", job(method, depth, macros, limit))
+    write_text(folder / "job.sby", job(method, depth, macros, limit, proof.cut(verilog) if proof.cut else ()))
     began = time.monotonic()
     said = run_sby(folder, limit)
     seconds = time.monotonic() - began

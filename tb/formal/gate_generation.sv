@@ -39,6 +39,7 @@ module formal_top (
   wire [11:0] spy_pulse_used;
   wire        spy_configured;
   wire [ 2:0] spy_level;
+  wire [ 2:0] spy_settled;
   wire [35:0] spy_elapsed;  // leg a is the uppermost
 `endif
 
@@ -70,7 +71,8 @@ module formal_top (
       .spy_pulse_used(spy_pulse_used),
       .spy_configured(spy_configured),
       .spy_level(spy_level),
-      .spy_elapsed(spy_elapsed)
+      .spy_elapsed(spy_elapsed),
+      .spy_settled(spy_settled)
 `endif
   );
 
@@ -236,7 +238,7 @@ module formal_top (
   wire [15:0] compare_of_leg = leg == 0 ? spy_compare[47:32] : leg == 1 ? spy_compare[31:16] : spy_compare[15:0];
   wire [11:0] elapsed = leg == 0 ? spy_elapsed[35:24] : leg == 1 ? spy_elapsed[23:12] : spy_elapsed[11:0];
   wire level = leg == 0 ? spy_level[0] : leg == 1 ? spy_level[1] : spy_level[2];
-  wire settled = &elapsed;
+  wire settled = leg == 0 ? spy_settled[0] : leg == 1 ? spy_settled[1] : spy_settled[2];
 
   always @(posedge clk) if (begun) begin
     // The same valley, the same settings

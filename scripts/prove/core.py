@@ -1,0 +1,87 @@
+"""The gates at the pins of the whole core: that its wiring keeps what gate_generation promises.
+
+Every other block is cut off and may say anything at any clock, which only makes the claim stronger.
+"""
+
+from __future__ import annotations
+
+import re
+
+from scripts.prove.gates import SEVERAL_PERIODS, SMALL
+from scripts.prove.pipeline import ports
+from scripts.prove.proof import HARNESSES, Fault, Proof
+
+CORE = "fluxproof"
+OUTPUTS = ("gate_high", "gate_low", "tripped")
+KEPT = ("gate_generation", "fault_latch")  # what stands between trip and the gates
+
+
+def harness(verilog: str) -> str:
+    """``formal_top``: the core with every input free, the gates looked at, the promises of tb/formal/core.sv."""
+    found = ports(verilog, CORE)
+    inputs = [(width, name) for direction, width, name in found if direction == "input"]
+    looked_at = [(width, name) for direction, width, name in found if name in OUTPUTS]
+    header = ",\n".join(f"    input {width} {name}" for width, name in inputs)
+    wires = "\n".join(f"  wire {width} {name};" for width, name in looked_at)
+    wiring = ", ".join(f".{name}({name})" for _, name in [*inputs, *looked_at])
+    body = (HARNESSES / "core.sv").read_text()
+    return f"module formal_top (\n{header}\n);\n{wires}\n  {CORE} dut ({wiring});\n{body}endmodule\n"
+
+
+def cut(verilog: str) -> tuple[str, ...]:
+    """The modules that are cut off: all but the top and those of KEPT."""
+    modules = re.findall(r"^module (\w+)", verilog, re.MULTILINE)
+    return tuple(m for m in modules if m != CORE and not any(m.startswith(kept) for kept in KEPT))
+
+
+def core_proof(name: str, says: str, macro: str, *faults: Fault) -> Proof:
+    return Proof(
+        name=f"core_{name}",
+        says=says,
+        entity=CORE,
+        harness=harness,
+        faults=faults,
+        method="pdr",
+        generics={"CARRIER_HALF": 10000},
+        macros=(macro,),
+        search_generics=SMALL,
+        search_depth=SEVERAL_PERIODS,
+        cut=cut,
+    )
+
+
+PROOFS = (
+    core_proof(
+        "never_both",
+        "at the pins of the core both gates of a leg are never on",
+        "NEVER_BOTH",
+        Fault(
+            "low gates not connected",
+            f"{CORE}.vhd",
+            "      gate_low        => gate_low,\n",
+            "      gate_low        => open,\n",
+        ),
+    ),
+    core_proof(
+        "trip",
+        "trip to all gates off in one clock, and off until clear_trip without trip",
+        "TRIP",
+        Fault(
+            "clear while it is there",
+            "modulation/gate_generation.vhd",
+            "trip or (tripped_now and not clear_trip)",
+            "(trip or tripped_now) and not clear_trip",
+        ),
+    ),
+    core_proof(
+        "enable",
+        "enable to all gates off in one clock",
+        "ENABLE",
+        Fault(
+            "enable held high",
+            f"{CORE}.vhd",
+            "      enable          => enable,\n",
+            "      enable          => '1',\n",
+        ),
+    ),
+)

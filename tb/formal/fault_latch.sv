@@ -1,0 +1,71 @@
+// What the memory of faults promises, around the converted entity fault_latch and through its ports alone.
+// One property at a time: the macro of its name is defined when this file is read.
+
+module formal_top (
+    input       clk,
+    input       rst,
+    input       trip,
+    input [5:0] sample_faults,
+    input       sample_late,
+    input       sample_early,
+    input       enable,
+    input       clear_trip,
+    input [6:0] fault_ignore
+);
+  wire [8:0] fault_flags;
+  wire [7:0] first_fault;
+  wire fault_stop, gate_clear;
+
+  fault_latch dut (
+      .clk(clk),
+      .rst(rst),
+      .trip(trip),
+      .sample_faults(sample_faults),
+      .sample_late(sample_late),
+      .sample_early(sample_early),
+      .enable(enable),
+      .clear_trip(clear_trip),
+      .fault_ignore(fault_ignore),
+      .fault_flags(fault_flags),
+      .first_fault(first_fault),
+      .fault_stop(fault_stop),
+      .gate_clear(gate_clear)
+  );
+
+  reg begun = 0;
+  always @(posedge clk) begun <= 1;
+  always @* if (!begun) assume (rst);
+
+  reg rest, was_trip, was_enable, was_clear, was_stop;
+  reg [6:0] was_cause, was_ignore;
+  reg [8:0] was_flags;
+  reg [7:0] was_first;
+  always @(posedge clk) begin
+    {rest, was_trip, was_enable, was_clear, was_stop} <= {rst, trip, enable, clear_trip, fault_stop};
+    {was_cause, was_ignore} <= {sample_late, sample_faults, fault_ignore};
+    {was_flags, was_first} <= {fault_flags, first_fault};
+  end
+
+`ifdef STOP
+  // A cause that is not ignored stops in the next clock, with its flag; without clear_trip nothing is forgotten.
+  always @(posedge clk) if (begun && !rest) begin
+    if (was_trip) assert (fault_stop && fault_flags[7]);
+    if (was_enable && (was_cause & ~was_ignore) != 0) assert (fault_stop);
+    if (was_enable) assert ((was_cause & ~fault_flags[6:0]) == 0);
+    if (!was_clear) assert ((was_flags & ~fault_flags) == 0);
+    if (!was_clear && was_stop && (was_ignore & fault_flags[6:0]) == 0 && fault_flags[6:0] != 0) assert (fault_stop);
+    if (was_clear && was_trip) assert (fault_stop);
+    cover (fault_stop && !was_trip);
+    cover (was_stop && !fault_stop);
+  end
+`endif
+
+`ifdef FIRST
+  // What stopped first is told until nothing stops any more.
+  always @(posedge clk) if (begun && !rest) begin
+    if (was_stop) assert (first_fault == was_first);
+    if (fault_stop && !was_stop) assert (first_fault != 0);
+    cover (was_stop && first_fault != fault_flags[7:0]);
+  end
+`endif
+endmodule
