@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from scripts.prove.proof import Fault, Proof, committed
 
-LATCH = "protection/fault_latch.vhd"
-GUARD = "protection/sample_guard.vhd"
+LATCH = "io/fault_latch.vhd"
+GUARD = "io/sample_guard.vhd"
 
 
 def proof(name: str, says: str, entity: str, macros: tuple[str, ...], *faults: Fault, **more) -> Proof:
