@@ -174,6 +174,7 @@ def test_small_changes_do_not_add_up():
 
 def test_sums_and_targets():
     groups = {name: Count(lut=1000, dsp=13) for name in GROUPS} | {"registers_telemetry": None}
+    groups["protection"] = Count()
     total = report.sums(groups)
     assert (total["foc"].lut, total["core"].lut, total["sum"].lut) == (2000, 4000, 4000)
     assert [line.rsplit(": ", 1)[1] for line in report.against_targets(groups)] == ["met"] * 4

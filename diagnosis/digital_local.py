@@ -119,7 +119,7 @@ def _one(x, r, c, now, before):
     )
     (theta_me,) = position.step(x[4], r.reverse, r.pole_pairs, r.theta_offset, c.position_bits)
     u_dc, u_max, u_rail = u_dc_conditioning.step(x[3], r.u_dc_offset, r.u_dc_gain, r.k_u_max, c.adc_bits)
-    m, m_beta, n, u_low = u_dc_processing.step(u_dc)
+    inverse, inverse_beta, u_low = u_dc_processing.step(u_dc)
     i_alpha, i_beta = clarke.step(i_a, i_b, i_c)
     cosine, sine = sincos.step(theta_me)
     i_d, i_q = park.step(i_alpha, i_beta, cosine, sine)
@@ -134,7 +134,7 @@ def _one(x, r, c, now, before):
     (theta_out,) = svm_delay_compensation.step(theta_me, omega_me, r.k_delay)
     cosine, sine = sincos.step(theta_out)
     u_alpha, u_beta = inverse_park.step(u_d, u_q, cosine, sine)
-    duty_a, duty_b, duty_c = svm.step(u_alpha, u_beta, m, m_beta, n)
+    duty_a, duty_b, duty_c = svm.step(u_alpha, u_beta, inverse, inverse_beta)
     new_a, new_b, new_c = pwm_compare.step(duty_a, duty_b, duty_c, r.min_pulse, c.carrier_half)
     on_alpha, on_beta, _ = applied_voltage.step(
         compare_a, compare_b, compare_c, u_dc, u_rail, x[12], c.carrier_half

@@ -28,10 +28,10 @@ def _told(view, columns):
 
 class Saturation(FluxEffect):
     def core_psi(self, view):
-        return _told(view, {"q_3": _q(view, lambda y: y**3), "d_3": _d(view, lambda x: x**3)})
+        return {"q_3": _q(view, lambda y: y**3), "d_3": _d(view, lambda x: x**3)}
 
     def free_psi(self, view):
-        columns = {
+        return {
             "q_1": _q(view, lambda y: y),
             "d_1": _d(view, lambda x: x),
             "q_2": _q(view, lambda y: y * np.abs(y)),
@@ -39,7 +39,12 @@ class Saturation(FluxEffect):
             "d_2": _d(view, lambda x: x**2),
             "d_2s": _d(view, lambda x: x * np.abs(x)),
         }
-        return _told(view, columns)
+
+    def core(self, view):
+        return _told(view, super().core(view))
+
+    def free(self, view):
+        return _told(view, super().free(view))
 
     def floor(self, nominal):
         return 0.006

@@ -32,11 +32,11 @@ entity current_directions is
 end entity current_directions;
 
 architecture rtl of current_directions is
-  constant LATENCY : positive := CURRENT_DIRECTIONS_LATENCY;
-  constant WIDE_W  : positive := k_sign'length + 1;
-  constant TURN_BY : positive := CURRENT_DIRECTIONS_DROP_TURN;
-  constant DROP    : positive := CURRENT_DIRECTIONS_DROP;
-  constant SUM_W   : positive := PU_W + WIDE_W;
+  constant LATENCY : positive                    := CURRENT_DIRECTIONS_LATENCY;
+  constant WIDE_W  : positive                    := k_sign'length + 1;
+  constant TURN_BY : positive                    := CURRENT_DIRECTIONS_DROP_TURN;
+  constant DROP    : positive                    := CURRENT_DIRECTIONS_DROP;
+  constant SUM_W   : positive                    := PU_W + WIDE_W;
   constant ONE     : signed(PU_W - 1 downto 0)   := to_signed(CURRENT_DIRECTIONS_ONE, PU_W);
   constant THIRD   : signed(WIDE_W - 1 downto 0) := resize(CLARKE_THIRD, WIDE_W);
   constant BY_BETA : signed(WIDE_W - 1 downto 0) := resize(CLARKE_INV_SQRT3, WIDE_W);
