@@ -256,3 +256,13 @@ def test_a_ripple_that_a_transducer_sees_keeps_its_size_at_any_speed_and_in_both
     found = answer.effects[0].parameters
     assert found["cogging_order"].value == 12 * p
     assert found["cogging_nm"].value == pytest.approx(0.4, rel=0.01)
+
+
+def test_a_spin_without_current_is_diagnosed():
+    """No effect that needs current has a column then; the search must not trip over it."""
+    plan = tuple((speed, 0.0, 0.0) for speed in (160.0, -160.0, 80.0, -80.0, 40.0, -40.0, 120.0, -120.0))
+    weak = 0.9 * MACHINE.magnet_flux_wb
+    answer = diagnose(recorded(plan, machine={"magnet_flux_wb": weak}), PAPER)
+    assert answer.verdict in ("explained", "ambiguous"), told(answer)
+    assert not {e.name for e in answer.effects} - {"magnet_flux"}, told(answer)
+    assert "magnet_flux" in {e.name for e in answer.effects} | {n for group in answer.ambiguity for n in group}

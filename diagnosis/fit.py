@@ -106,9 +106,9 @@ class Fitter:
         self.a = a / self.scale
         self.gram, self.right, self.power = self.a.T @ self.a, self.a.T @ self.y, float(self.y @ self.y)
         self.price = float(np.log(max(len(self.y), 10))) if price is None else price
-        self.index = {}
+        self.index = {effect: ([], []) for effect in cells.columns}  # also one that the recording says nothing of
         for k, (effect, key) in enumerate(zip(self.owner, self.names, strict=True)):
-            core, free = self.index.setdefault(effect, ([], []))
+            core, free = self.index[effect]
             if np.isfinite(self.scale[k]):
                 (free if key.startswith("~") else core).append(k)
 
