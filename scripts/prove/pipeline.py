@@ -23,21 +23,32 @@ def ports(verilog: str, entity: str) -> list[tuple[str, str, str]]:
     return [(direction, width.strip(), name) for direction, width, name in _PORT.findall(header.group(1))]
 
 
-def harness(entity: str, start: str, ends: tuple[tuple[str, int], ...], interval: int, verilog: str) -> str:
-    """``formal_top``: each strobe of ``ends`` is ``start`` that many clocks ago, samples ``interval`` clocks apart."""
+def harness(
+    entity: str, start: str, ends: tuple[tuple[str, int], ...], interval: int, verilog: str, guarded: bool = False
+) -> str:
+    """``formal_top``: each strobe of ``ends`` is ``start`` that many clocks ago, samples ``interval`` clocks apart.
+
+    guarded: the entity has a sample_guard; that it lets every one of these samples in is shown too.
+    """
     found = ports(verilog, entity)
     inputs = [
         f"    input {width} {name}".replace("  ", " ")
         for direction, width, name in found
         if direction == "input"
     ]
-    strobes = {name for name, _ in ends}
+    strobes = {name for name, _ in ends} | ({"sample_busy", "early_samples"} if guarded else set())
     wired = [f".{name}({name})" for direction, _, name in found if direction == "input" or name in strobes]
     longest = max(latency for _, latency in ends)
     checks = "\n".join(
         f"    assert ({name} == flight[{latency - 1}]);\n    cover ({name});" for name, latency in ends
     )
-    header, wires = ",\n".join(inputs), "\n  ".join(f"wire {name};" for name in sorted(strobes))
+    header, wires = ",\n".join(inputs), "\n  ".join(
+        f"wire {width} {name};" for _, width, name in found if name in strobes
+    )
+    if guarded:
+        checks += f"""
+    assert (early_samples == 0);
+    if (!{start}) assert (!sample_busy || since < {interval});"""
     return f"""\
 // Made from the declarations of {entity}.
 module formal_top (
@@ -131,7 +142,7 @@ def core_proof() -> Proof:
         name="pipeline_fluxproof",
         says="duty_valid, compare_valid and values_valid of the core come at their declared clocks, never otherwise",
         entity="fluxproof",
-        harness=partial(harness, "fluxproof", "sample_valid", ends, fluxproof.SAMPLE_INTERVAL),
+        harness=partial(harness, "fluxproof", "sample_valid", ends, fluxproof.SAMPLE_INTERVAL, guarded=True),
         faults=(
             Fault(
                 "compare starts with the voltage",
@@ -146,7 +157,7 @@ def core_proof() -> Proof:
                 "        null;\n",
             ),
         ),
-        depth=longest + 2,
+        depth=fluxproof.SAMPLE_INTERVAL + 4,  # a sample that was not let in is told a clock later
         generics={"CARRIER_HALF": 10000},
         assumed=f"samples at least {fluxproof.SAMPLE_INTERVAL} clocks apart",
         search_depth=2 * longest,
