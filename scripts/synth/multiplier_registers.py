@@ -77,9 +77,9 @@ def absorb(netlist: dict, top: str) -> dict[str, int]:
                 done["removed"] += 1
             _set(cell, "P", control, behind)
             done["P"] += 1
-        for side in ("A", "B"):
-            if operand := _operand(cell, side, cells, nets):
-                control, before = operand
+        operands = [_operand(cell, side, cells, nets) for side in ("A", "B")]
+        if all(operands):
+            for side, (control, before) in zip(("A", "B"), operands, strict=True):
                 for pin, bit in before.items():
                     nets.readers[cell["connections"][pin][0]].remove((names[id(cell)], pin))
                     nets.readers[bit].append((names[id(cell)], pin))
