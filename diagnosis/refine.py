@@ -19,12 +19,17 @@ MOST_EFFECTS = 4  # more at once is no explanation
 TIE = 10.0
 
 
-def operating_points(view) -> int:
-    """Number of different steady points (speed, i_d, i_q) of a view; each carries two means to explain."""
+def point_numbers(view) -> np.ndarray:
+    """(b,) number of the steady point (speed, i_d, i_q) at which each block of a view stands."""
     m, omega, i = view.machine, view.omega.mean(axis=1), view.i.mean(axis=1)
     top = max(float(np.abs(omega).max()), 1e-9)
     points = np.stack([omega / top, i.real / m.rated_current_a, i.imag / m.rated_current_a], axis=1)
-    return len(np.unique(np.round(points / POINT), axis=0))
+    return np.unique(np.round(points / POINT), axis=0, return_inverse=True)[1].ravel()
+
+
+def operating_points(view) -> int:
+    """Number of different steady points of a view; each carries two means to explain."""
+    return int(point_numbers(view).max()) + 1
 
 
 class Refiner:
@@ -54,7 +59,7 @@ class Refiner:
             return self.refined[model]
         record = [n for n in sorted(model.names) if self.effects[n].corrects]
         magnetic = [n for n in sorted(model.names) if isinstance(self.effects[n], FluxEffect)]
-        if record or (magnetic and "iron_loss" in model.names):
+        if record or "iron_loss" in model.names:
             solution = self._iterated(model, record, magnetic)
         else:
             solution = self.linear.solve(model, self.dispersion)
@@ -89,13 +94,14 @@ class Refiner:
         return solution
 
     def with_flux(self, view, magnetic, solution):
-        """The view that knows of the flux which the magnetic effects of a solution add."""
-        if not magnetic:
-            return view
-        psi = sum(self.effects[n].psi(view, solution.c[n]) for n in magnetic)
-        more = np.array([self.effects[n].delta_l(solution.c[n]) for n in magnetic]).sum(axis=0)
+        """The view that knows of the flux which the magnetic effects of a solution add and the iron loss takes."""
+        psi = sum((self.effects[n].psi(view, solution.c[n]) for n in magnetic), np.zeros_like(view.i))
+        more = np.array([self.effects[n].delta_l(solution.c[n]) for n in magnetic] or [(0.0, 0.0)]).sum(axis=0)
         least = -0.7 * np.array([view.machine.inductance_d_h, view.machine.inductance_q_h])
-        return view.replace(psi_extra=psi, delta_l=tuple(np.maximum(more, least)))
+        view = view.replace(psi_extra=psi, delta_l=tuple(np.maximum(more, least)))
+        if "iron_loss" in solution.c:
+            view = view.replace(psi_extra=psi + self.effects["iron_loss"].psi(view, solution.c["iron_loss"]))
+        return view
 
     def fitter(self, view, effects, free=None) -> Fitter:
         """The linear problem of a corrected view, with what is known of raw currents taken off."""

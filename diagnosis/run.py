@@ -26,6 +26,7 @@ from diagnosis.request import default_request, requests, wants_cold
 from diagnosis.result import Diagnosis, UnknownTerm
 from diagnosis.search import EARNS, Search
 from diagnosis.slow_diagnosis import diagnose_slow
+from diagnosis.uncertainty import Spread
 from diagnosis.unknown import sparse_term
 from diagnosis.view import joined_views, started_cold
 
@@ -91,7 +92,7 @@ def _physics(recordings, nominal, progress) -> Diagnosis:
     kind = words.verdict(names, ambiguity, left)
     answer = Diagnosis(kind, "", location=locate(view, search.cells, found.pure), fit=left.fit, search=found)
     if kind in ("explained", "ambiguous"):
-        answer.effects = words.named(found.best, names, CATALOGUE, nominal, found.empty, left.reduced)
+        answer.effects = words.named(Spread(search, found.best, left.reduced), names, found.empty)
         answer.ambiguity = ambiguity
     if kind == "ambiguous":
         progress("the recording that would tell")

@@ -16,7 +16,6 @@ DRIFTS, STANDS = (
     1.5,
 )  # drift over constant part: below the first it is the constant's, above 1/second nobody knows
 
-LEAST_DISPERSION = 0.8
 WORSE = 1.05  # misfit on points not fitted, after over before
 # Ohmic drop at rated current over the inverter's loss: one that fades in slowly still grows by a tenth of it.
 SLOPE_DEVICE, SLOPE_UNCLEAR = 0.12, 0.2
@@ -82,11 +81,12 @@ def carried(names, best, worth):
     return [n for n in names if worth(best, n) > best.chi2]
 
 
-def named(solution, names, effects, nominal, empty, reduced) -> list[NamedEffect]:
-    """The asserted effects with their parameters; reduced: chi^2 per degree of freedom, which scales the errors."""
-    out, dispersion = [], max(reduced, LEAST_DISPERSION)
+def named(spread, names, empty) -> list[NamedEffect]:
+    """The asserted effects of a solution with their parameters; spread: uncertainty.Spread of it."""
+    out, solution, effects = [], spread.solution, spread.search.effects
+    others = spread.others() if names else []
     for name in names:
-        effect, c, covariance = effects[name], solution.c[name], solution.covariance[name] * dispersion
+        effect, c, covariance = effects[name], solution.c[name], spread.covariance[name]
         vector = np.array(list(c.values()))
         wald = float(vector @ np.linalg.pinv(covariance) @ vector) / max(len(vector), 1)
         explained = max(empty.chi2 - empty.rows, 1e-9)
@@ -94,9 +94,9 @@ def named(solution, names, effects, nominal, empty, reduced) -> list[NamedEffect
             NamedEffect(
                 name,
                 float(np.clip(1.0 - 1.0 / (1.0 + wald / 4.0), 0.5, 0.999)),
-                effect.estimates(c, covariance, nominal),
+                spread.estimates(name, others),
                 float(np.clip((empty.chi2 - solution.chi2) / explained, 0.0, 1.0)),
-                effect.plant(c, nominal),
+                effect.plant(c, solution.view.nominal),
             )
         )
     return out

@@ -5,6 +5,9 @@ import numpy as np
 from diagnosis.effect import Effect, Parameter, one, sigma, voltage
 
 
+MOST = 1.2  # periods: past a whole one the mix goes on in a straight line, or an estimate there could not come back
+
+
 class Delay(Effect):
     def core(self, view):
         return {"tau": voltage(view.to_dq(view.u[:, 1:-1] - view.u[:, :-2]) / view.sample_time_s)}
@@ -16,7 +19,7 @@ class Delay(Effect):
         return 2.5 * nominal.sample_time_s
 
     def corrected(self, view, c):
-        share = float(np.clip(c["tau"] / view.sample_time_s, -1.0, 1.0))
+        share = float(np.clip(c["tau"] / view.sample_time_s, -MOST, MOST))
         u = view.u.copy()
         if share >= 0.0:
             u[:, 1:] = (1.0 - share) * view.u[:, 1:] + share * view.u[:, :-1]
