@@ -20,6 +20,7 @@ import numpy as np
 from diagnosis.result import Estimate
 
 Column = dict  # channel -> array
+DOUBT = 2.0  # standard deviations that a value must be on the wrong side to be ruled out
 
 
 @dataclass(frozen=True)
@@ -72,6 +73,10 @@ class Effect:
     def size(self, c: dict[str, float], nominal) -> float:
         """One number for how large the effect is."""
         return abs(next(iter(c.values())))
+
+    def possible(self, c: dict[str, float], covariance: np.ndarray, nominal) -> bool:
+        """Whether the coefficients are not, beyond doubt, what physics rules out; covariance in their order."""
+        return not self.positive or sum(c.values()) >= -DOUBT * np.sqrt(max(covariance.sum(), 0.0))
 
     def corrected(self, view, c: dict[str, float]):
         """The view without this error of the record (only where ``corrects``)."""

@@ -110,12 +110,36 @@ class Refiner:
         # Smaller currents have smaller noise: without this, dividing all by one factor would pass for a better fit.
         return Fitter(cells, self.sigma * view.noise_gain, self.train, self.linear.price)
 
-    def take_raw(self, solution) -> bool:
-        """Take off what the solution's terms make of the raw current beside its parabola; whether that mattered.
+    def take_raw(self, solutions) -> Solution | None:
+        """Take off what a solution's terms make of the raw current beside its parabola, and solve it again.
 
         Terms are regressed on parabolas of the current, but the machine saw its ripple too: an inductance that
-        is wrong by a tenth leaves a tenth of the ripple's voltage, which must not pass for a harmonic.
+        is wrong by a tenth leaves a tenth of the ripple's voltage, which must not pass for a harmonic.  Of the
+        solutions that is done with the one which then scores best; None where no ripple matters or none gains.
         """
+        tried = []
+        for solution in solutions:
+            adjust = self._of_ripple(solution)
+            change = np.sum(((adjust - self.adjust) / self.sigma)[self.linear.use] ** 2)
+            if change < TIE:
+                tried.append((solution.score, None, solution.model))
+                continue
+            model, view = solution.model, solution.view
+            cells = cells_of(view, [self.effects[n] for n in sorted(model.names)], self.projector, model.free)
+            cells.y = cells.y - adjust
+            fitter = Fitter(cells, self.sigma * view.noise_gain, self.train, self.linear.price)
+            tried.append((fitter.score(model, self.dispersion), adjust, model))
+        _, adjust, model = min(tried, key=lambda entry: entry[0])
+        if adjust is None:
+            return None
+        self.cells.y = self.cells.y + self.adjust - adjust
+        self.adjust = adjust
+        self.linear = Fitter(self.cells, self.sigma, self.train, self.linear.price)
+        self.refined.clear()
+        return self.refine(model)
+
+    def _of_ripple(self, solution):
+        """Rows (r,) that a solution's terms make of the raw current less those of its parabola."""
         adjust = np.zeros(len(self.cells.y))
         rough = solution.view.with_raw_current()
         for name, c in solution.c.items():
@@ -129,14 +153,7 @@ class Refiner:
                 if value:
                     k = key if key in raw else f"~{key}"
                     adjust += value * (raw[k] - smooth[k])
-        change = np.sum(((adjust - self.adjust) / self.sigma)[self.linear.use] ** 2)
-        if change < TIE:
-            return False
-        self.cells.y = self.cells.y + self.adjust - adjust
-        self.adjust = adjust
-        self.linear = Fitter(self.cells, self.sigma, self.train, self.linear.price)
-        self.refined.clear()
-        return True
+        return adjust
 
     def allow_for_curves(self, best):
         """Widen every row by a share of what the best effects contribute to it, and start anew.
@@ -167,10 +184,8 @@ class Refiner:
             effect = self.effects[name]
             if effect.size(solution.c[name], self.view.nominal) > effect.ceiling(self.view.nominal):
                 return False
-            if effect.positive:
-                c, cov = solution.c[name], solution.covariance[name]
-                if sum(c.values()) < -2.0 * np.sqrt(max(cov.sum(), 0.0)):
-                    return False
+            if not effect.possible(solution.c[name], solution.covariance[name], self.view.nominal):
+                return False
         return True
 
     def worth(self, solution, name) -> float:
