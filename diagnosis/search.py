@@ -236,7 +236,8 @@ class Search(Refiner):
         with_core = at.chi2(Model(others.names | {name}, others.free))[0]
         gain = (without - with_core) / self.dispersion
         size = effect.size(solution.c[name], self.view.nominal)
-        if gain < EARNS or size < effect.floor(self.view.nominal):
+        floor = max(effect.floor(self.view.nominal), effect.overshadowed(solution.c, self.view.nominal))
+        if gain < EARNS or size < floor:
             return gain
         c, cov = np.array(list(solution.c[name].values())), solution.covariance[name]
         wald = float(c @ np.linalg.pinv(cov) @ c) / self.dispersion

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from diagnosis.effect import Effect, Parameter, one, sigma, voltage
+from diagnosis.effect import Effect, Parameter, half_dead_time, one, sigma, voltage
 
 
 MOST = 1.2  # periods: past a whole one the mix goes on in a straight line, or an estimate there could not come back
@@ -14,6 +14,9 @@ class Delay(Effect):
 
     def floor(self, nominal):
         return 0.006 * nominal.sample_time_s
+
+    def overshadowed(self, c, nominal):
+        return half_dead_time(c, nominal)
 
     def ceiling(self, nominal):
         return 2.5 * nominal.sample_time_s

@@ -1,6 +1,6 @@
 """Currents are sampled tau after the middle of the zero vector, where they slope with the EMF."""
 
-from diagnosis.effect import Effect, Parameter, angle_error, current_error, one, sigma
+from diagnosis.effect import Effect, Parameter, angle_error, current_error, half_dead_time, one, sigma
 
 
 def _slope(view):
@@ -23,6 +23,9 @@ class SamplingSkew(Effect):
 
     def floor(self, nominal):
         return 0.0012 * nominal.sample_time_s
+
+    def overshadowed(self, c, nominal):
+        return half_dead_time(c, nominal)
 
     def ceiling(self, nominal):
         return 0.3 * nominal.sample_time_s
