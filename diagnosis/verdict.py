@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from diagnosis.catalogue.dead_time import FREE_WIDTHS
 from diagnosis.result import NamedEffect
 
 LEFTOVER = 2.0  # reduced chi^2 that an explanation may leave
@@ -11,14 +12,14 @@ FLOOR_SHARE = 0.15  # of the misfit's rms: a leftover below it is the curve's, n
 
 
 CONSTANTS = {"magnet_temperature": "magnet_flux", "resistance_temperature": "resistance"}
-DRIFTS, STANDS = (
-    0.25,
-    1.5,
-)  # drift over constant part: below the first it is the constant's, above 1/second nobody knows
+# Drift over constant part: below the first it is the constant's, above 1 / second nobody knows.
+DRIFTS, STANDS = 0.25, 1.5
+STEADY = 0.1  # constant over drift: a thermocouple lags, and so much of a drift may seem to stand
 
 WORSE = 1.05  # misfit on points not fitted, after over before
 # Ohmic drop at rated current over the inverter's loss: one that fades in slowly still grows by a tenth of it.
 SLOPE_DEVICE, SLOPE_UNCLEAR = 0.12, 0.2
+WIDEST = f"v_{FREE_WIDTHS[-1]:g}"
 
 
 def groups(best, tied, effects, nominal, silent=frozenset(), cold=False):
@@ -38,14 +39,18 @@ def groups(best, tied, effects, nominal, silent=frozenset(), cold=False):
             stood = effects[constant].size(best.c[constant], nominal)
             if moved < DRIFTS * stood:
                 shared -= {drift}
+            elif stood < STEADY * moved:
+                shared -= {constant}
             elif moved * STANDS > stood and not cold and _like_warmth(constant, best, nominal):
                 shared -= {constant}
                 ambiguity.append([constant, drift])
     if {"dead_time", "resistance"} <= shared:
         # A device's slope is ohms too, but never less than none.
         ohms = effects["resistance"].size(best.c["resistance"], nominal) * nominal.machine.rated_current_a
-        share = ohms / max(effects["dead_time"].size(best.c["dead_time"], nominal), 1e-9)
         more = next(iter(best.c["resistance"].values())) > 0.0
+        if more:  # a loss that still grows at a third of rated current grows about as much again up to all of it
+            ohms -= max(best.c["dead_time"].get(WIDEST, 0.0), 0.0)
+        share = ohms / max(effects["dead_time"].size(best.c["dead_time"], nominal), 1e-9)
         if share < (SLOPE_UNCLEAR if more else SLOPE_DEVICE):
             shared -= {"resistance"}
             if share > SLOPE_DEVICE:
