@@ -92,7 +92,8 @@ def _physics(recordings, nominal, progress) -> Diagnosis:
     kind = words.verdict(names, ambiguity, left)
     answer = Diagnosis(kind, "", location=locate(view, search.cells, found.pure), fit=left.fit, search=found)
     if kind in ("explained", "ambiguous"):
-        answer.effects = words.named(Spread(search, found.best, left.reduced), names, found.empty)
+        if names:
+            answer.effects = words.named(Spread(search, found.best, left.reduced), names, found.empty)
         answer.ambiguity = ambiguity
     if kind == "ambiguous":
         progress("the recording that would tell")

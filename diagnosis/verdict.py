@@ -111,8 +111,7 @@ def lives(cells, name, c, sigma, use):
 
 def named(spread, names, empty) -> list[NamedEffect]:
     """The asserted effects of a solution with their parameters; spread: uncertainty.Spread of it."""
-    out, solution, effects = [], spread.solution, spread.search.effects
-    others = spread.others() if names else []
+    out, solution, effects, others = [], spread.solution, spread.search.effects, spread.others()
     for name in names:
         effect, c, covariance = effects[name], solution.c[name], spread.covariance[name]
         vector = np.array(list(c.values()))
