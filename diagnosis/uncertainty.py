@@ -23,12 +23,38 @@ LEAST_POINTS = 6  # more operating points than coefficients, else their scatter 
 LEAST_DISPERSION = 0.8
 
 
-class Spread:
-    """Covariances of a refined solution and the models that would move its parameters."""
+class Plain:
+    """What a fit itself says: its covariances {effect: (k, k)}, by chi^2 per degree of freedom."""
+
+    def __init__(self, solution, effects, nominal, reduced):
+        self.solution, self.effects, self.nominal, self.reduced = solution, effects, nominal, reduced
+        wider = max(reduced, LEAST_DISPERSION)
+        self.covariance = {name: matrix * wider for name, matrix in solution.covariance.items()}
+
+    def others(self) -> list[dict]:
+        """Coefficients {effect: {...}} that other admissible models give the solution's effects."""
+        return []
+
+    def estimates(self, name, others):
+        """Parameters {name: Estimate} of an effect; others: what ``others`` gave."""
+        effect, nominal = self.effects[name], self.nominal
+        out = effect.estimates(self.solution.c[name], self.covariance[name], nominal)
+        own = {key: estimate.sigma for key, estimate in out.items()}
+        for c in others:
+            moved = effect.estimates(c[name], np.zeros((len(c[name]),) * 2), nominal)
+            for key in out.keys() & moved.keys():
+                shift = moved[key].value - out[key].value
+                out[key].sigma = float(max(out[key].sigma, np.hypot(own[key], shift)))
+        return out
+
+
+class Spread(Plain):
+    """Covariances of a refined solution of a search, and the models that would move its parameters."""
 
     def __init__(self, search, solution, reduced):
         """reduced: chi^2 per degree of freedom that the solution leaves."""
-        self.search, self.solution, self.reduced = search, solution, reduced
+        super().__init__(solution, search.effects, search.view.nominal, reduced)
+        self.search = search
         view, model = solution.view, solution.model
         self.fitter = f = search.fitter(view, [search.effects[n] for n in sorted(model.names)])
         self.carried = f.carried(model)
@@ -98,18 +124,6 @@ class Spread:
         able = [n for n in self.search.effects if at.index[n][0]]
         freed = [model.with_(n, True) for n in sorted(model.names - model.free)]
         return freed + [model.with_(n, bent) for n in able if n not in model.names for bent in (False, True)]
-
-    def estimates(self, name, others):
-        """Parameters {name: Estimate} of an effect; others: what ``others`` gave."""
-        effect, nominal = self.search.effects[name], self.solution.view.nominal
-        out = effect.estimates(self.solution.c[name], self.covariance[name], nominal)
-        own = {key: estimate.sigma for key, estimate in out.items()}
-        for c in others:
-            moved = effect.estimates(c[name], np.zeros((len(c[name]),) * 2), nominal)
-            for key in out.keys() & moved.keys():
-                shift = moved[key].value - out[key].value
-                out[key].sigma = float(max(out[key].sigma, np.hypot(own[key], shift)))
-        return out
 
 
 def larger(first, second):

@@ -110,8 +110,8 @@ def lives(cells, name, c, sigma, use):
 
 
 def named(spread, names, empty) -> list[NamedEffect]:
-    """The asserted effects of a solution with their parameters; spread: uncertainty.Spread of it."""
-    out, solution, effects, others = [], spread.solution, spread.search.effects, spread.others()
+    """The asserted effects of a solution with their parameters; spread: uncertainty.Plain of it."""
+    out, solution, effects, others = [], spread.solution, spread.effects, spread.others()
     for name in names:
         effect, c, covariance = effects[name], solution.c[name], spread.covariance[name]
         vector = np.array(list(c.values()))
@@ -123,7 +123,7 @@ def named(spread, names, empty) -> list[NamedEffect]:
                 float(np.clip(1.0 - 1.0 / (1.0 + wald / 4.0), 0.5, 0.999)),
                 spread.estimates(name, others),
                 float(np.clip((empty.chi2 - solution.chi2) / explained, 0.0, 1.0)),
-                effect.plant(c, solution.view.nominal),
+                effect.plant(c, spread.nominal),
             )
         )
     return out
