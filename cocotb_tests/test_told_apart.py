@@ -14,6 +14,7 @@ from diagnosis.catalogue import CATALOGUE
 from diagnosis.curvature import has_both, labels
 from diagnosis.nominal import load_nominal
 from diagnosis.balance import misfit
+from diagnosis.effect import rated_torque
 from diagnosis.fit import Model
 from diagnosis.refine import Refiner
 from diagnosis.request import wants_cold
@@ -130,6 +131,17 @@ def test_a_harmonic_that_repeats_better_is_not_the_order_of_the_cogging(view):
             f"h{order}",
             f"h{2 * order}",
         }
+
+
+def test_a_load_out_of_balance_is_not_the_noise_of_a_transducer(view):
+    """It differs from one short block to the next, as noise does; of a shaft that turns freely that is noise."""
+    quiet = view.replace(torque=np.zeros(view.u_dc.shape), shaft=np.full(len(view), "torque"), memo={})
+    swing = 0.15 * rated_torque(NOMINAL) * np.sin(view.theta_mid / MACHINE.pole_pairs)
+    heavy = quiet.replace(torque=swing - misfit(quiet)["torque"], memo={})
+    for kind, kept in (("torque", True), ("unloaded", False)):
+        refiner = Refiner(heavy.replace(shaft=np.full(len(view), kind)), {}, np.ones(len(view), bool))
+        mean = (refiner.cells.channel == "torque") & (refiner.cells.order == 0) & (refiner.cells.part == 0)
+        assert refiner.cells.ok[mean].any() == kept
 
 
 def test_an_axis_without_current_has_no_curve(view):

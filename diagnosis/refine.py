@@ -41,10 +41,11 @@ class Refiner:
         self.cells = cells_of(view, self.effects.values(), self.projector)
         self.sigma, self.pure = row_sigma(view, self.cells)
         self.unwidened = self.sigma  # before it is widened for the curves of what is found
-        # The acceleration of a fast free shaft is all noise; the projector's rows are those of every fit.
-        self.projector.ok &= (self.cells.channel != "torque") | (
-            self.pure < NOISY_TORQUE * rated_torque(view.nominal)
-        )
+        # The acceleration of a fast free shaft is all noise; what a transducer shows of an unbalanced load is not,
+        # though it differs from block to block.  The projector's rows are those of every fit.
+        noisy = self.pure >= NOISY_TORQUE * rated_torque(view.nominal)
+        measured = (view.shaft == "torque")[self.cells.block]
+        self.projector.ok &= (self.cells.channel != "torque") | measured | ~noisy
         self.train = train_blocks[self.cells.block]
         self.linear = Fitter(self.cells, self.sigma, self.train)
         self.most = min(MOST_EFFECTS, max(1, operating_points(view) - 1))
@@ -96,7 +97,9 @@ class Refiner:
     def with_flux(self, view, magnetic, solution):
         """The view that knows of the flux which the magnetic effects of a solution add and the iron loss takes."""
         psi = sum((self.effects[n].psi(view, solution.c[n]) for n in magnetic), np.zeros_like(view.i))
-        more = np.array([self.effects[n].delta_l(solution.c[n]) for n in magnetic] or [(0.0, 0.0)]).sum(axis=0)
+        more = np.array([self.effects[n].delta_l(solution.c[n]) for n in magnetic] or [(0.0, 0.0)]).sum(
+            axis=0
+        )
         least = -0.7 * np.array([view.machine.inductance_d_h, view.machine.inductance_q_h])
         view = view.replace(psi_extra=psi, delta_l=tuple(np.maximum(more, least)))
         if "iron_loss" in solution.c:

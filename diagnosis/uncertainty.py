@@ -13,6 +13,7 @@ The covariance of a least-squares fit takes every cell's error for its own.  Thr
 from __future__ import annotations
 
 import numpy as np
+from scipy import stats
 
 from diagnosis.fit import PER_EFFECT
 from diagnosis.refine import TIE, point_numbers
@@ -72,7 +73,9 @@ class Spread(Plain):
         if len(names) < k + LEAST_POINTS:
             return np.zeros((k, k))
         scores = np.array([self.columns[group == g].T @ self.error[group == g] for g in names])
-        return self.inverse @ (scores.T @ scores) @ self.inverse * len(names) / (len(names) - k)
+        # Few of them know their own scatter badly: the quantile of Student's distribution for the normal one.
+        wider = (stats.t.ppf(0.975, len(names) - k) / stats.norm.ppf(0.975)) ** 2
+        return self.inverse @ (scores.T @ scores) @ self.inverse * wider * len(names) / (len(names) - k)
 
     def _common(self):
         """Covariance (k, k) of what the balance is off by in common."""
@@ -116,7 +119,9 @@ class Spread(Plain):
             if gain > best - TIE:
                 c = at.solve(other).c
                 moved = {n: {k: c[n][k] - base.c[n].get(k, 0.0) for k in c[n]} for n in model.names}
-                out.append({n: {k: solution.c[n].get(k, 0.0) + v for k, v in moved[n].items()} for n in moved})
+                out.append(
+                    {n: {k: solution.c[n].get(k, 0.0) + v for k, v in moved[n].items()} for n in moved}
+                )
         return out
 
     def _larger_models(self, at):

@@ -94,7 +94,9 @@ def carried(names, found, cells, worth):
         return names
     use = cells.ok & found.train
     left = np.where(use, (best.residual / found.sigma) ** 2, 0.0)
-    return [n for n in names if worth(best, n) > float(left[lives(cells, n, best.c[n], found.sigma, use)].sum())]
+    return [
+        n for n in names if worth(best, n) > float(left[lives(cells, n, best.c[n], found.sigma, use)].sum())
+    ]
 
 
 def lives(cells, name, c, sigma, use):
