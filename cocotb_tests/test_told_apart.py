@@ -7,15 +7,16 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from cocotb_tests.diagnosed_drives import MACHINE, recorded
+from cocotb_tests.diagnosed_drives import GRID, MACHINE, columns, recorded
 from cocotb_tests.test_registers import PAPER
-from diagnosis.blocks import view_of
+from diagnosis.blocks import view_of, views_of
 from diagnosis.catalogue import CATALOGUE
 from diagnosis.curvature import has_both, labels
 from diagnosis.nominal import load_nominal
 from diagnosis.balance import misfit
 from diagnosis.effect import rated_torque
 from diagnosis.fit import Model
+from diagnosis.recording import from_columns
 from diagnosis.refine import Refiner
 from diagnosis.request import wants_cold
 from diagnosis.verdict import carried, groups
@@ -45,6 +46,16 @@ def test_a_further_recording_stands_where_its_temperature_says(view):
     assert started_cold(joined_views([heating, warm(view, COLD + 1.0)]))
     assert wants_cold({"magnet_flux", "magnet_temperature"}) and not wants_cold({"delay", "sampling_skew"})
     assert not wants_cold({"magnet_temperature", "resistance_temperature"})  # both would have gone
+
+
+def test_a_short_further_recording_joins_a_long_one():
+    """Short dwells are cut into shorter blocks; both recordings must then be."""
+    long, short = recorded(), columns(GRID)
+    short = from_columns({name: values[:1600] for name, values in short.items()}, NOMINAL.sample_time_s)
+    alone = [view_of(r, NOMINAL).u_dc.shape[1] for r in (long, short)]
+    assert alone[0] > alone[1]
+    joined = joined_views(views_of([long, short], NOMINAL))
+    assert joined.u_dc.shape[1] == alone[1] and joined.t.max() > long["t"][-1]
 
 
 def solution(**c):

@@ -14,7 +14,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from diagnosis import verdict as words
-from diagnosis.blocks import view_of
+from diagnosis.blocks import views_of
 from diagnosis.catalogue import CATALOGUE
 from diagnosis.flux_surface import USUAL, earned
 from diagnosis.load import load_recording
@@ -80,7 +80,7 @@ def holdout_blocks(view) -> np.ndarray:
 
 
 def _physics(recordings, nominal, progress) -> Diagnosis:
-    view = joined_views([view_of(r, nominal) for r in recordings])
+    view = joined_views(views_of(recordings, nominal))
     held = holdout_blocks(view)
     search = Search(view, CATALOGUE, ~held, progress)
     found = search.run()
