@@ -19,6 +19,7 @@ from diagnosis.fit import Model
 from diagnosis.recording import from_columns
 from diagnosis.refine import Refiner
 from diagnosis.request import wants_cold
+from diagnosis.run import held_out
 from diagnosis.verdict import carried, groups
 from diagnosis.view import joined_views, started_cold
 
@@ -56,6 +57,14 @@ def test_a_short_further_recording_joins_a_long_one():
     assert alone[0] > alone[1]
     joined = joined_views(views_of([long, short], NOMINAL))
     assert joined.u_dc.shape[1] == alone[1] and joined.t.max() > long["t"][-1]
+
+
+def test_a_further_recording_of_one_point_is_fitted(view):
+    """Hold-out takes every fourth dwell of each recording: of the one that was asked for never all."""
+    one = view.take(view.run == 0)
+    for dwells in (8, 9, 10, 11):
+        held = held_out([view.take(view.run < dwells), one])
+        assert held.any() and len(one) > 1 and not held[-len(one) :].all()
 
 
 def solution(**c):

@@ -79,9 +79,15 @@ def holdout_blocks(view) -> np.ndarray:
     return np.arange(len(view)) % HOLDOUT_EVERY == 2
 
 
+def held_out(views) -> np.ndarray:
+    """(b,) blocks of all recordings that are not fitted: a part of each, never all of one that was asked for."""
+    return np.concatenate([holdout_blocks(v) for v in views])
+
+
 def _physics(recordings, nominal, progress) -> Diagnosis:
-    view = joined_views(views_of(recordings, nominal))
-    held = holdout_blocks(view)
+    views = views_of(recordings, nominal)
+    view = joined_views(views)
+    held = held_out(views)
     search = Search(view, CATALOGUE, ~held, progress)
     found = search.run()
     left = remains(search, found, held)
