@@ -7,14 +7,20 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from cocotb_tests.diagnosed_drives import MACHINE, recorded
+from cocotb_tests.diagnosed_drives import GRID, MACHINE, columns, recorded
 from cocotb_tests.test_registers import PAPER
-from diagnosis.blocks import view_of
+from diagnosis.blocks import view_of, views_of
 from diagnosis.catalogue import CATALOGUE
 from diagnosis.curvature import has_both, labels
 from diagnosis.nominal import load_nominal
+from diagnosis.balance import misfit
+from diagnosis.effect import rated_torque
+from diagnosis.fit import Model
+from diagnosis.recording import from_columns
+from diagnosis.refine import Refiner
 from diagnosis.request import wants_cold
-from diagnosis.verdict import groups
+from diagnosis.run import held_out
+from diagnosis.verdict import carried, groups
 from diagnosis.view import joined_views, started_cold
 
 NOMINAL = load_nominal(PAPER)
@@ -40,6 +46,25 @@ def test_a_further_recording_stands_where_its_temperature_says(view):
     assert not started_cold(heating) and not started_cold(view)
     assert started_cold(joined_views([heating, warm(view, COLD + 1.0)]))
     assert wants_cold({"magnet_flux", "magnet_temperature"}) and not wants_cold({"delay", "sampling_skew"})
+    assert not wants_cold({"magnet_temperature", "resistance_temperature"})  # both would have gone
+
+
+def test_a_short_further_recording_joins_a_long_one():
+    """Short dwells are cut into shorter blocks; both recordings must then be."""
+    long, short = recorded(), columns(GRID)
+    short = from_columns({name: values[:1600] for name, values in short.items()}, NOMINAL.sample_time_s)
+    alone = [view_of(r, NOMINAL).u_dc.shape[1] for r in (long, short)]
+    assert alone[0] > alone[1]
+    joined = joined_views(views_of([long, short], NOMINAL))
+    assert joined.u_dc.shape[1] == alone[1] and joined.t.max() > long["t"][-1]
+
+
+def test_a_further_recording_of_one_point_is_fitted(view):
+    """Hold-out takes every fourth dwell of each recording: of the one that was asked for never all."""
+    one = view.take(view.run == 0)
+    for dwells in (8, 9, 10, 11):
+        held = held_out([view.take(view.run < dwells), one])
+        assert held.any() and len(one) > 1 and not held[-len(one) :].all()
 
 
 def solution(**c):
@@ -58,6 +83,8 @@ def test_a_constant_beside_a_drift_is_both_only_where_warmth_cannot_be_it():
     assert of({}, magnet_flux=flux(-0.05), magnet_temperature=drift) == (both[1:], [both])
     assert of({"cold": True}, magnet_flux=flux(-0.05), magnet_temperature=drift) == (both, [])
     assert of({}, magnet_flux=flux(+0.05), magnet_temperature=drift) == (both, [])
+    # A course that lags leaves a little that seems to stand.
+    assert of({"cold": True}, magnet_flux=flux(-0.004), magnet_temperature=drift) == (both[1:], [])
 
 
 def test_ohms_beside_dead_time_are_a_resistance_where_no_device_has_them():
@@ -67,6 +94,95 @@ def test_ohms_beside_dead_time_are_a_resistance_where_no_device_has_them():
     assert of({}, dead_time=dead, resistance=share(0.16)) == (["dead_time"], [["dead_time", "resistance"]])
     assert of({}, dead_time=dead, resistance=share(0.3)) == (["dead_time", "resistance"], [])
     assert of({}, dead_time=dead, resistance=share(-0.16)) == (["dead_time", "resistance"], [])
+
+
+def test_ohms_are_those_of_a_device_that_goes_on_growing_but_not_of_one_that_stands_still():
+    i, both = NOMINAL.machine.rated_current_a, ["dead_time", "resistance"]
+
+    def judged(growth, share):
+        dead = {"v_0.02": 4.0, "v_0.12": 1.0 - growth, "v_0.3": growth}
+        return of({}, dead_time=dead, resistance={"delta_r": share * 5.0 / i})
+
+    assert judged(1.0, 0.24) == (["dead_time"], [])  # 1.2 V of ohms, 1 V of growth: a drop in log(i)
+    assert judged(0.5, 0.24) == (both, [])
+    assert judged(0.5, 0.16) == (["dead_time"], [both])
+    assert judged(0.1, 0.16) == (both, [])
+    assert judged(0.1, 0.1) == (["dead_time"], [])
+
+
+def test_what_is_left_elsewhere_says_nothing_against_an_effect(view):
+    """Ohms live at order 0; what a dead time's curve leaves at order 6 must not take their name, at order 0 it must."""
+    effects = {n: CATALOGUE[n] for n in ("resistance", "dead_time")}
+    refiner = Refiner(view, effects, np.ones(len(view), bool))
+    cells, worth = refiner.cells, lambda s, name: 2000.0
+    best = refiner.refine(Model(frozenset(effects)))
+    best.c["resistance"]["delta_r"], best.chi2 = 0.1, 1e6
+    found = SimpleNamespace(best=best, sigma=refiner.sigma, train=np.ones(len(cells.y), bool))
+    for order, names in ((6, ["resistance"]), (0, [])):
+        mine = (cells.channel == "u") & (cells.order == order) & cells.ok
+        best.residual = np.where(mine, np.sqrt(5000.0 / mine.sum()) * refiner.sigma, 0.0)
+        assert carried(["resistance"], found, cells, worth) == names
+
+
+def test_a_delay_within_half_a_dead_time_is_the_dead_time():
+    bus, period = NOMINAL.inverter.dc_bus_v, NOMINAL.sample_time_s
+    c = {"dead_time": {"v_0.02": 0.02 * bus, "v_0.12": 0.01 * bus}, "delay": {"tau": 1e-6}}
+    for name in ("delay", "sampling_skew"):
+        assert CATALOGUE[name].overshadowed(c, NOMINAL) == pytest.approx(0.015 * period)
+        assert CATALOGUE[name].overshadowed({"delay": c["delay"]}, NOMINAL) == 0.0
+
+
+def test_a_shaft_does_not_drive_itself():
+    possible, sure = CATALOGUE["friction"].possible, np.diag([1e-12, 1e-12])
+    viscous = NOMINAL.machine.viscous_friction_nms
+    assert possible({"viscous": -0.9 * viscous, "coulomb": 0.0}, sure, NOMINAL)
+    assert not possible({"viscous": -1.5 * viscous, "coulomb": 0.0}, sure, NOMINAL)
+    assert possible({"viscous": -1.5 * viscous, "coulomb": 0.0}, np.diag([viscous**2, 0.0]), NOMINAL)
+
+
+def test_a_harmonic_that_repeats_better_is_not_the_order_of_the_cogging(view):
+    """Order 8 is seen in more of the slow blocks than order 4, so that it locks better; it is still the harmonic."""
+    quiet = view.replace(torque=np.zeros(view.u_dc.shape), shaft=np.full(len(view), "torque"), memo={})
+    nominal = -misfit(quiet)["torque"]
+    for first, second, order in ((1.0, 0.4, 4), (0.0, 1.0, 8)):
+        waves = first * np.sin(4 * view.theta_mid + 0.3) + second * np.sin(8 * view.theta_mid + 1.0)
+        cogging = quiet.replace(torque=nominal + waves, memo={})
+        assert {key.split("_")[0] for key in CATALOGUE["cogging"].core(cogging)} == {
+            f"h{order}",
+            f"h{2 * order}",
+        }
+
+
+def test_a_load_out_of_balance_is_not_the_noise_of_a_transducer(view):
+    """It differs from one short block to the next, as noise does; of a shaft that turns freely that is noise."""
+    quiet = view.replace(torque=np.zeros(view.u_dc.shape), shaft=np.full(len(view), "torque"), memo={})
+    swing = 0.15 * rated_torque(NOMINAL) * np.sin(view.theta_mid / MACHINE.pole_pairs)
+    heavy = quiet.replace(torque=swing - misfit(quiet)["torque"], memo={})
+    for kind, kept in (("torque", True), ("unloaded", False)):
+        refiner = Refiner(heavy.replace(shaft=np.full(len(view), kind)), {}, np.ones(len(view), bool))
+        mean = (refiner.cells.channel == "torque") & (refiner.cells.order == 0) & (refiner.cells.part == 0)
+        assert refiner.cells.ok[mean].any() == kept
+
+
+def test_an_axis_without_current_has_no_curve(view):
+    still = view.replace(i=1j * view.i.imag + 0.01 * view.machine.rated_current_a, memo={})
+    assert set(CATALOGUE["inductance_d"].free(view)) == {"bend_2", "bend_3"}
+    assert CATALOGUE["inductance_d"].free(still) == {} and CATALOGUE["inductance_q"].free(still)
+    later = view.replace(memo=still.memo)  # said once for all views of a recording
+    assert CATALOGUE["inductance_d"].free(later) == {}
+
+
+def test_ripple_is_taken_off_only_where_that_explains_more():
+    """A set whose ripple is absurd must not spoil the data for all others."""
+    view = view_of(recorded(machine={"inductance_q_h": 1.15 * MACHINE.inductance_q_h}), NOMINAL)
+    effects = {n: CATALOGUE[n] for n in ("inductance_d", "inductance_q")}
+    refiner = Refiner(view, effects, np.ones(len(view), bool))
+    right = refiner.refine(Model(frozenset(["inductance_q"])))
+    absurd = refiner.refine(Model(frozenset(["inductance_d"])))
+    absurd.c["inductance_d"] = {"delta_l_d": 40.0 * MACHINE.inductance_d_h}
+    taken = refiner.take_raw([absurd, right])
+    assert taken is None or taken.model == right.model
+    assert refiner.refine(right.model).dispersion < 1.5 * right.dispersion
 
 
 def test_a_curve_that_turns_its_sign_needs_an_inductance_and_saturation(view):

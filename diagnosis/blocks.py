@@ -122,6 +122,16 @@ def view_of(recording: Recording, nominal, block_rows=BLOCK_ROWS) -> View:
     )
 
 
+def views_of(recordings, nominal) -> list[View]:
+    """Views of several recordings of a drive, all in blocks as short as the shortest that one of them needs."""
+    views = [view_of(r, nominal) for r in recordings]
+    shortest = min(v.u_dc.shape[1] for v in views)
+    return [
+        v if v.u_dc.shape[1] == shortest else view_of(r, nominal, shortest)
+        for r, v in zip(recordings, views, strict=True)
+    ]
+
+
 def _voltage(recording, nominal, theta_s):
     """Stator-frame voltage (n,) complex [V] in force after each sample, and the bus voltage (n,) [V]."""
     r, n, delay = recording, len(recording), nominal.control.duty_applied_after_samples

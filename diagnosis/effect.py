@@ -20,6 +20,7 @@ import numpy as np
 from diagnosis.result import Estimate
 
 Column = dict  # channel -> array
+DOUBT = 2.0  # standard deviations that a value must be on the wrong side to be ruled out
 
 
 @dataclass(frozen=True)
@@ -65,6 +66,10 @@ class Effect:
         """Least size of the effect that is worth a name, in units of ``size``."""
         raise NotImplementedError
 
+    def overshadowed(self, c: dict[str, dict], nominal) -> float:
+        """Size up to which another effect of a model with coefficients c makes the same by itself."""
+        return 0.0
+
     def ceiling(self, nominal) -> float:
         """Largest size that a drive which still runs can have, in units of ``size``."""
         return float("inf")
@@ -72,6 +77,10 @@ class Effect:
     def size(self, c: dict[str, float], nominal) -> float:
         """One number for how large the effect is."""
         return abs(next(iter(c.values())))
+
+    def possible(self, c: dict[str, float], covariance: np.ndarray, nominal) -> bool:
+        """Whether the coefficients are not, beyond doubt, what physics rules out; covariance in their order."""
+        return not self.positive or sum(c.values()) >= -DOUBT * np.sqrt(max(covariance.sum(), 0.0))
 
     def corrected(self, view, c: dict[str, float]):
         """The view without this error of the record (only where ``corrects``)."""
@@ -146,6 +155,15 @@ def torque_of(view, psi, i):
     """Air-gap torque of the intervals, (b, m) [Nm], from flux linkage and current at the samples."""
     torque = 1.5 * view.machine.pole_pairs * (np.conj(psi) * i).imag
     return 0.5 * (torque[:, 1:] + torque[:, :-1])
+
+
+def half_dead_time(c, nominal) -> float:
+    """By how much a model's dead time moves the middle of every pulse [s]: one of its edges is late by the whole.
+
+    c: {effect: {coefficient: value}}.
+    """
+    share = abs(sum(c.get("dead_time", {}).values())) / nominal.inverter.dc_bus_v
+    return 0.5 * share * nominal.sample_time_s
 
 
 def rated_torque(nominal) -> float:

@@ -19,12 +19,17 @@ MOST_EFFECTS = 4  # more at once is no explanation
 TIE = 10.0
 
 
-def operating_points(view) -> int:
-    """Number of different steady points (speed, i_d, i_q) of a view; each carries two means to explain."""
+def point_numbers(view) -> np.ndarray:
+    """(b,) number of the steady point (speed, i_d, i_q) at which each block of a view stands."""
     m, omega, i = view.machine, view.omega.mean(axis=1), view.i.mean(axis=1)
     top = max(float(np.abs(omega).max()), 1e-9)
     points = np.stack([omega / top, i.real / m.rated_current_a, i.imag / m.rated_current_a], axis=1)
-    return len(np.unique(np.round(points / POINT), axis=0))
+    return np.unique(np.round(points / POINT), axis=0, return_inverse=True)[1].ravel()
+
+
+def operating_points(view) -> int:
+    """Number of different steady points of a view; each carries two means to explain."""
+    return int(point_numbers(view).max()) + 1
 
 
 class Refiner:
@@ -36,10 +41,11 @@ class Refiner:
         self.cells = cells_of(view, self.effects.values(), self.projector)
         self.sigma, self.pure = row_sigma(view, self.cells)
         self.unwidened = self.sigma  # before it is widened for the curves of what is found
-        # The acceleration of a fast free shaft is all noise; the projector's rows are those of every fit.
-        self.projector.ok &= (self.cells.channel != "torque") | (
-            self.pure < NOISY_TORQUE * rated_torque(view.nominal)
-        )
+        # The acceleration of a fast free shaft is all noise; what a transducer shows of an unbalanced load is not,
+        # though it differs from block to block.  The projector's rows are those of every fit.
+        noisy = self.pure >= NOISY_TORQUE * rated_torque(view.nominal)
+        measured = (view.shaft == "torque")[self.cells.block]
+        self.projector.ok &= (self.cells.channel != "torque") | measured | ~noisy
         self.train = train_blocks[self.cells.block]
         self.linear = Fitter(self.cells, self.sigma, self.train)
         self.most = min(MOST_EFFECTS, max(1, operating_points(view) - 1))
@@ -54,7 +60,7 @@ class Refiner:
             return self.refined[model]
         record = [n for n in sorted(model.names) if self.effects[n].corrects]
         magnetic = [n for n in sorted(model.names) if isinstance(self.effects[n], FluxEffect)]
-        if record or (magnetic and "iron_loss" in model.names):
+        if record or "iron_loss" in model.names:
             solution = self._iterated(model, record, magnetic)
         else:
             solution = self.linear.solve(model, self.dispersion)
@@ -89,13 +95,16 @@ class Refiner:
         return solution
 
     def with_flux(self, view, magnetic, solution):
-        """The view that knows of the flux which the magnetic effects of a solution add."""
-        if not magnetic:
-            return view
-        psi = sum(self.effects[n].psi(view, solution.c[n]) for n in magnetic)
-        more = np.array([self.effects[n].delta_l(solution.c[n]) for n in magnetic]).sum(axis=0)
+        """The view that knows of the flux which the magnetic effects of a solution add and the iron loss takes."""
+        psi = sum((self.effects[n].psi(view, solution.c[n]) for n in magnetic), np.zeros_like(view.i))
+        more = np.array([self.effects[n].delta_l(solution.c[n]) for n in magnetic] or [(0.0, 0.0)]).sum(
+            axis=0
+        )
         least = -0.7 * np.array([view.machine.inductance_d_h, view.machine.inductance_q_h])
-        return view.replace(psi_extra=psi, delta_l=tuple(np.maximum(more, least)))
+        view = view.replace(psi_extra=psi, delta_l=tuple(np.maximum(more, least)))
+        if "iron_loss" in solution.c:
+            view = view.replace(psi_extra=psi + self.effects["iron_loss"].psi(view, solution.c["iron_loss"]))
+        return view
 
     def fitter(self, view, effects, free=None) -> Fitter:
         """The linear problem of a corrected view, with what is known of raw currents taken off."""
@@ -104,12 +113,36 @@ class Refiner:
         # Smaller currents have smaller noise: without this, dividing all by one factor would pass for a better fit.
         return Fitter(cells, self.sigma * view.noise_gain, self.train, self.linear.price)
 
-    def take_raw(self, solution) -> bool:
-        """Take off what the solution's terms make of the raw current beside its parabola; whether that mattered.
+    def take_raw(self, solutions) -> Solution | None:
+        """Take off what a solution's terms make of the raw current beside its parabola, and solve it again.
 
         Terms are regressed on parabolas of the current, but the machine saw its ripple too: an inductance that
-        is wrong by a tenth leaves a tenth of the ripple's voltage, which must not pass for a harmonic.
+        is wrong by a tenth leaves a tenth of the ripple's voltage, which must not pass for a harmonic.  Of the
+        solutions that is done with the one which then scores best; None where no ripple matters or none gains.
         """
+        tried = []
+        for solution in solutions:
+            adjust = self._of_ripple(solution)
+            change = np.sum(((adjust - self.adjust) / self.sigma)[self.linear.use] ** 2)
+            if change < TIE:
+                tried.append((solution.score, None, solution.model))
+                continue
+            model, view = solution.model, solution.view
+            cells = cells_of(view, [self.effects[n] for n in sorted(model.names)], self.projector, model.free)
+            cells.y = cells.y - adjust
+            fitter = Fitter(cells, self.sigma * view.noise_gain, self.train, self.linear.price)
+            tried.append((fitter.score(model, self.dispersion), adjust, model))
+        _, adjust, model = min(tried, key=lambda entry: entry[0])
+        if adjust is None:
+            return None
+        self.cells.y = self.cells.y + self.adjust - adjust
+        self.adjust = adjust
+        self.linear = Fitter(self.cells, self.sigma, self.train, self.linear.price)
+        self.refined.clear()
+        return self.refine(model)
+
+    def _of_ripple(self, solution):
+        """Rows (r,) that a solution's terms make of the raw current less those of its parabola."""
         adjust = np.zeros(len(self.cells.y))
         rough = solution.view.with_raw_current()
         for name, c in solution.c.items():
@@ -123,14 +156,7 @@ class Refiner:
                 if value:
                     k = key if key in raw else f"~{key}"
                     adjust += value * (raw[k] - smooth[k])
-        change = np.sum(((adjust - self.adjust) / self.sigma)[self.linear.use] ** 2)
-        if change < TIE:
-            return False
-        self.cells.y = self.cells.y + self.adjust - adjust
-        self.adjust = adjust
-        self.linear = Fitter(self.cells, self.sigma, self.train, self.linear.price)
-        self.refined.clear()
-        return True
+        return adjust
 
     def allow_for_curves(self, best):
         """Widen every row by a share of what the best effects contribute to it, and start anew.
@@ -161,10 +187,8 @@ class Refiner:
             effect = self.effects[name]
             if effect.size(solution.c[name], self.view.nominal) > effect.ceiling(self.view.nominal):
                 return False
-            if effect.positive:
-                c, cov = solution.c[name], solution.covariance[name]
-                if sum(c.values()) < -2.0 * np.sqrt(max(cov.sum(), 0.0)):
-                    return False
+            if not effect.possible(solution.c[name], solution.covariance[name], self.view.nominal):
+                return False
         return True
 
     def worth(self, solution, name) -> float:

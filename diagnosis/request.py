@@ -90,8 +90,12 @@ DRIFTS = {"magnet_temperature", "resistance_temperature"}
 
 
 def wants_cold(names) -> bool:
-    """Whether a machine that has cooled down tells the names apart: a drift has gone then, all else has not."""
-    return bool(DRIFTS & set(names)) and len(set(names)) > 1
+    """Whether a machine that has cooled down tells the names apart: a drift has gone then, all else has not.
+
+    Two drifts have then gone both: they are told apart while the machine is warm, by the load.
+    """
+    names = set(names)
+    return bool(DRIFTS & names) and not names <= DRIFTS
 
 
 def requests(view, solutions, effects, noise_v, cold=False) -> list[Request]:

@@ -14,7 +14,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from diagnosis import verdict as words
-from diagnosis.blocks import view_of
+from diagnosis.blocks import views_of
 from diagnosis.catalogue import CATALOGUE
 from diagnosis.flux_surface import USUAL, earned
 from diagnosis.load import load_recording
@@ -26,6 +26,7 @@ from diagnosis.request import default_request, requests, wants_cold
 from diagnosis.result import Diagnosis, UnknownTerm
 from diagnosis.search import EARNS, Search
 from diagnosis.slow_diagnosis import diagnose_slow
+from diagnosis.uncertainty import Spread
 from diagnosis.unknown import sparse_term
 from diagnosis.view import joined_views, started_cold
 
@@ -78,20 +79,27 @@ def holdout_blocks(view) -> np.ndarray:
     return np.arange(len(view)) % HOLDOUT_EVERY == 2
 
 
+def held_out(views) -> np.ndarray:
+    """(b,) blocks of all recordings that are not fitted: a part of each, never all of one that was asked for."""
+    return np.concatenate([holdout_blocks(v) for v in views])
+
+
 def _physics(recordings, nominal, progress) -> Diagnosis:
-    view = joined_views([view_of(r, nominal) for r in recordings])
-    held = holdout_blocks(view)
+    views = views_of(recordings, nominal)
+    view = joined_views(views)
+    held = held_out(views)
     search = Search(view, CATALOGUE, ~held, progress)
     found = search.run()
     left = remains(search, found, held)
     names, ambiguity = words.groups(found.best, found.tied, CATALOGUE, nominal, found.silent, started_cold(view))
-    names = words.carried(names, found.best, search.worth)
+    names = words.carried(names, found, left.cells, search.worth)
     names, absorbed = beside_free_surface(view, names, ~held)
     ambiguity = ambiguity + absorbed
     kind = words.verdict(names, ambiguity, left)
     answer = Diagnosis(kind, "", location=locate(view, search.cells, found.pure), fit=left.fit, search=found)
     if kind in ("explained", "ambiguous"):
-        answer.effects = words.named(found.best, names, CATALOGUE, nominal, found.empty, left.reduced)
+        if names:
+            answer.effects = words.named(Spread(search, found.best, left.reduced), names, found.empty)
         answer.ambiguity = ambiguity
     if kind == "ambiguous":
         progress("the recording that would tell")

@@ -60,8 +60,7 @@ class Search(Refiner):
         for model in self._linear_best():
             self.refine(model)
         best = self._climbed(self._best())
-        if self.take_raw(best):
-            self.refine(best.model)
+        if self.take_raw(self._by_size()):
             best = self._climbed(self._best())
         if best.model.names:
             self.allow_for_curves(best)
@@ -77,6 +76,18 @@ class Search(Refiner):
         if "cross_saturation" in best.model.names:
             silent = (best.model.names & set(FAMILY)) - labels(best.view, best, BESIDE_CROSS)[0]
         return Outcome(best, tied, empty, self.sigma, self.pure, self.train, self.dispersion, silent)
+
+    def _by_size(self) -> list[Solution]:
+        """The best solution of each number of effects.
+
+        Ripple that a wrong inductance turns into voltage draws in effects which are not there.
+        """
+        leaders = {}
+        for solution in self.refined.values():
+            known = leaders.get(len(solution.model))
+            if np.isfinite(solution.score) and (known is None or solution.score < known.score):
+                leaders[len(solution.model)] = solution
+        return list(leaders.values())
 
     def _climbed(self, best) -> Solution:
         """The best model that additions, removals and exchanges lead to."""
@@ -225,7 +236,8 @@ class Search(Refiner):
         with_core = at.chi2(Model(others.names | {name}, others.free))[0]
         gain = (without - with_core) / self.dispersion
         size = effect.size(solution.c[name], self.view.nominal)
-        if gain < EARNS or size < effect.floor(self.view.nominal):
+        floor = max(effect.floor(self.view.nominal), effect.overshadowed(solution.c, self.view.nominal))
+        if gain < EARNS or size < floor:
             return gain
         c, cov = np.array(list(solution.c[name].values())), solution.covariance[name]
         wald = float(c @ np.linalg.pinv(cov) @ c) / self.dispersion

@@ -20,6 +20,7 @@ from diagnosis.request import requests
 from diagnosis.result import Diagnosis, Fit
 from diagnosis.slow import UNSEEN, slow_view
 from diagnosis.slow_search import SlowSearch
+from diagnosis.uncertainty import Plain
 from diagnosis.view import View, joined_views
 
 LEAST_POINTS = 8
@@ -76,7 +77,8 @@ def diagnose_slow(recordings, nominal, progress=lambda text: None) -> Diagnosis:
 def model_effects(search, found, names=None):
     """NamedEffects of the best model: ``names``, or all of it for a model to simulate, tied or not."""
     names = sorted(found.best.model.names) if names is None else names
-    return words.named(found.best, names, CATALOGUE, search.view.nominal, found.empty, found.dispersion)
+    spread = Plain(found.best, CATALOGUE, search.view.nominal, found.dispersion)
+    return words.named(spread, names, found.empty)
 
 
 def axis_misfit(search, solution, blocks) -> dict:

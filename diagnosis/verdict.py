@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from diagnosis.catalogue.dead_time import FREE_WIDTHS
 from diagnosis.result import NamedEffect
 
 LEFTOVER = 2.0  # reduced chi^2 that an explanation may leave
@@ -11,15 +12,18 @@ FLOOR_SHARE = 0.15  # of the misfit's rms: a leftover below it is the curve's, n
 
 
 CONSTANTS = {"magnet_temperature": "magnet_flux", "resistance_temperature": "resistance"}
-DRIFTS, STANDS = (
-    0.25,
-    1.5,
-)  # drift over constant part: below the first it is the constant's, above 1/second nobody knows
+# Drift over constant part: below the first it is the constant's, above 1 / second nobody knows.
+DRIFTS, STANDS = 0.25, 1.5
+STEADY = 0.1  # constant over drift: a thermocouple lags, and so much of a drift may seem to stand
 
-LEAST_DISPERSION = 0.8
+HOLDS = 0.05
 WORSE = 1.05  # misfit on points not fitted, after over before
 # Ohmic drop at rated current over the inverter's loss: one that fades in slowly still grows by a tenth of it.
 SLOPE_DEVICE, SLOPE_UNCLEAR = 0.12, 0.2
+# The same over what the loss grows between a tenth and a third of rated current: a drop in log(i) grows about as much
+# again up to all of it, and one that has come to a stand there does not begin anew.
+GROWS_ON, STANDS_STILL = 1.5, 3.0
+WIDEST = f"v_{FREE_WIDTHS[-1]:g}"
 
 
 def groups(best, tied, effects, nominal, silent=frozenset(), cold=False):
@@ -39,6 +43,8 @@ def groups(best, tied, effects, nominal, silent=frozenset(), cold=False):
             stood = effects[constant].size(best.c[constant], nominal)
             if moved < DRIFTS * stood:
                 shared -= {drift}
+            elif stood < STEADY * moved:
+                shared -= {constant}
             elif moved * STANDS > stood and not cold and _like_warmth(constant, best, nominal):
                 shared -= {constant}
                 ambiguity.append([constant, drift])
@@ -46,10 +52,12 @@ def groups(best, tied, effects, nominal, silent=frozenset(), cold=False):
         # A device's slope is ohms too, but never less than none.
         ohms = effects["resistance"].size(best.c["resistance"], nominal) * nominal.machine.rated_current_a
         share = ohms / max(effects["dead_time"].size(best.c["dead_time"], nominal), 1e-9)
-        more = next(iter(best.c["resistance"].values())) > 0.0
-        if share < (SLOPE_UNCLEAR if more else SLOPE_DEVICE):
+        growth, least = best.c["dead_time"].get(WIDEST, 0.0), SLOPE_UNCLEAR
+        if next(iter(best.c["resistance"].values())) < 0.0 or growth and ohms > STANDS_STILL * abs(growth):
+            least = SLOPE_DEVICE
+        if share < least or ohms < GROWS_ON * growth:
             shared -= {"resistance"}
-            if share > SLOPE_DEVICE:
+            if share > SLOPE_DEVICE and ohms > GROWS_ON * growth:
                 ambiguity.append(["dead_time", "resistance"])
     return sorted(shared), ambiguity
 
@@ -75,18 +83,39 @@ def verdict(names, ambiguity, left) -> str:
     return "ambiguous" if ambiguity else "explained"
 
 
-def carried(names, best, worth):
-    """Names that bring more than all that is left, where much is left; ``worth(solution, name)`` in chi^2."""
+def carried(names, found, cells, worth):
+    """Names that bring more than what is left where they live, where much is left; ``worth(solution, name)`` in chi^2.
+
+    A harmonic that a dead time's curve leaves says nothing against ohms: what counts are the orders of a channel that
+    hold the effect.  cells: of the solution's view.
+    """
+    best = found.best
     if best.dispersion <= LEFTOVER:
         return names
-    return [n for n in names if worth(best, n) > best.chi2]
+    use = cells.ok & found.train
+    left = np.where(use, (best.residual / found.sigma) ** 2, 0.0)
+    return [
+        n for n in names if worth(best, n) > float(left[lives(cells, n, best.c[n], found.sigma, use)].sum())
+    ]
 
 
-def named(solution, names, effects, nominal, empty, reduced) -> list[NamedEffect]:
-    """The asserted effects with their parameters; reduced: chi^2 per degree of freedom, which scales the errors."""
-    out, dispersion = [], max(reduced, LEAST_DISPERSION)
+def lives(cells, name, c, sigma, use):
+    """(r,) rows of the channels' orders that hold an effect with coefficients c, each at least HOLDS of its power."""
+    columns = cells.columns[name]
+    own = sum(v * columns[k if k in columns else f"~{k}"] for k, v in c.items())
+    power, out = np.where(use, (own / sigma) ** 2, 0.0), np.zeros(len(use), bool)
+    for channel in np.unique(cells.channel):
+        for order in np.unique(cells.order[cells.channel == channel]):
+            rows = (cells.channel == channel) & (cells.order == order)
+            out |= rows & (power[rows].sum() >= HOLDS * power.sum())
+    return out
+
+
+def named(spread, names, empty) -> list[NamedEffect]:
+    """The asserted effects of a solution with their parameters; spread: uncertainty.Plain of it."""
+    out, solution, effects, others = [], spread.solution, spread.effects, spread.others()
     for name in names:
-        effect, c, covariance = effects[name], solution.c[name], solution.covariance[name] * dispersion
+        effect, c, covariance = effects[name], solution.c[name], spread.covariance[name]
         vector = np.array(list(c.values()))
         wald = float(vector @ np.linalg.pinv(covariance) @ vector) / max(len(vector), 1)
         explained = max(empty.chi2 - empty.rows, 1e-9)
@@ -94,9 +123,9 @@ def named(solution, names, effects, nominal, empty, reduced) -> list[NamedEffect
             NamedEffect(
                 name,
                 float(np.clip(1.0 - 1.0 / (1.0 + wald / 4.0), 0.5, 0.999)),
-                effect.estimates(c, covariance, nominal),
+                spread.estimates(name, others),
                 float(np.clip((empty.chi2 - solution.chi2) / explained, 0.0, 1.0)),
-                effect.plant(c, nominal),
+                effect.plant(c, spread.nominal),
             )
         )
     return out

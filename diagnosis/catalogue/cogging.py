@@ -30,8 +30,14 @@ def _waves(view, h):
     }
 
 
+LOCKS = 0.5  # of the best lock: so well an order must repeat to be one of the cogging's
+
+
 def _order(view) -> int:
-    """The order whose torque repeats best from block to block; it depends on slots that nobody recorded."""
+    """The largest order of those whose torque repeats from block to block; it depends on slots that nobody recorded.
+
+    Harmonics of the cogging repeat as well as the cogging itself, so that the best lock alone may be a harmonic's.
+    """
     if "cogging_order" not in view.memo:
         view.memo["cogging_order"] = 6
         seen = np.isfinite(view.torque).all(axis=1)
@@ -41,7 +47,7 @@ def _order(view) -> int:
             theta = view.theta_mid[seen]
             taper = 1.0 - np.cos(2 * np.pi * (np.arange(theta.shape[1]) + 0.5) / theta.shape[1])
             turns = np.abs(theta[:, -1] - theta[:, 0]) / (2 * np.pi)
-            best = 0.0
+            found = []
             for h in ORDERS:
                 f = (torque * taper * np.exp(-1j * h * theta)).mean(axis=1)[h * turns > 2.0]
                 # A free shaft's acceleration is noisier the faster it turns.
@@ -51,8 +57,10 @@ def _order(view) -> int:
                 lock = float(
                     np.abs(np.sum(weight * f)) ** 2 / max(np.sum(weight**2 * np.abs(f) ** 2), 1e-300)
                 )
-                if lock > best:
-                    best, view.memo["cogging_order"] = lock, h
+                found.append((lock, float(np.abs(np.sum(weight * f)) / max(np.sum(weight), 1e-300)), h))
+            least = LOCKS * max(lock for lock, _, _ in found)
+            if least > 0.0:
+                view.memo["cogging_order"] = max((size, h) for lock, size, h in found if lock >= least)[1]
     return view.memo["cogging_order"]
 
 

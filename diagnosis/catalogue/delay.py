@@ -2,7 +2,10 @@
 
 import numpy as np
 
-from diagnosis.effect import Effect, Parameter, one, sigma, voltage
+from diagnosis.effect import Effect, Parameter, half_dead_time, one, sigma, voltage
+
+
+MOST = 1.2  # periods: past a whole one the mix goes on in a straight line, or an estimate there could not come back
 
 
 class Delay(Effect):
@@ -12,11 +15,14 @@ class Delay(Effect):
     def floor(self, nominal):
         return 0.006 * nominal.sample_time_s
 
+    def overshadowed(self, c, nominal):
+        return half_dead_time(c, nominal)
+
     def ceiling(self, nominal):
         return 2.5 * nominal.sample_time_s
 
     def corrected(self, view, c):
-        share = float(np.clip(c["tau"] / view.sample_time_s, -1.0, 1.0))
+        share = float(np.clip(c["tau"] / view.sample_time_s, -MOST, MOST))
         u = view.u.copy()
         if share >= 0.0:
             u[:, 1:] = (1.0 - share) * view.u[:, 1:] + share * view.u[:, :-1]

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from diagnosis.effect import Effect, Parameter, rated_torque
+from diagnosis.effect import DOUBT, Effect, Parameter, rated_torque
 from diagnosis.result import Estimate
 
 
@@ -46,6 +46,15 @@ class Friction(Effect):
             + abs(c.get("square", 0.0)) * top
             + abs(c.get("low", 0.0))
         )
+
+    def possible(self, c, covariance, nominal):
+        """A shaft does not drive itself: the whole drag at the highest speed of ``size`` is not negative."""
+        m = nominal.machine
+        top = nominal.inverter.dc_bus_v / np.sqrt(3) / m.magnet_flux_wb / m.pole_pairs
+        weights = np.array([{"viscous": top, "coulomb": 1.0, "square": top}.get(name, 0.0) for name in c])
+        drag = (m.viscous_friction_nms or 0.0) * top + (m.coulomb_friction_nm or 0.0)
+        drag += float(weights @ np.array(list(c.values())))
+        return drag >= -DOUBT * np.sqrt(max(weights @ covariance @ weights, 0.0))
 
     def estimates(self, c, covariance, nominal):
         m, spread = nominal.machine, np.sqrt(np.maximum(np.diag(covariance), 0.0))

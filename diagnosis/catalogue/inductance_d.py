@@ -1,6 +1,10 @@
 """Inductance of the d axis other than the nameplate's: omega i_d on the q axis."""
 
+import numpy as np
+
 from diagnosis.effect import FluxEffect, Parameter, one, sigma
+
+LEAST = 0.08  # of rated current: a smaller one says nothing of a curve
 
 
 class InductanceD(FluxEffect):
@@ -11,6 +15,11 @@ class InductanceD(FluxEffect):
         x = view.i.real / view.machine.rated_current_a
         unit = view.machine.rated_current_a * x + 0j
         return {"bend_2": unit * x, "bend_3": unit * x**2}
+
+    def free(self, view):
+        carried = np.abs(view.i.real).max() > LEAST * view.machine.rated_current_a
+        # Said once for all views of a recording: corrected currents must not change what there is to fit.
+        return super().free(view) if view.memo.setdefault("curve_d", bool(carried)) else {}
 
     def delta_l(self, c):
         return c["delta_l_d"], 0.0

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from diagnosis.catalogue.inductance_d import LEAST
 from diagnosis.effect import FluxEffect, Parameter, one, sigma
 
 
@@ -13,6 +14,11 @@ class InductanceQ(FluxEffect):
         y = view.i.imag / view.machine.rated_current_a
         unit = 1j * view.machine.rated_current_a * y
         return {"bend_2": unit * np.abs(y), "bend_3": unit * y**2}
+
+    def free(self, view):
+        carried = np.abs(view.i.imag).max() > LEAST * view.machine.rated_current_a
+        # Said once for all views of a recording: corrected currents must not change what there is to fit.
+        return super().free(view) if view.memo.setdefault("curve_q", bool(carried)) else {}
 
     def delta_l(self, c):
         return 0.0, c["delta_l_q"]

@@ -5,6 +5,16 @@ import numpy as np
 from diagnosis.effect import Effect, Parameter, one, torque_of
 
 
+def _speeds(view):
+    """Speeds (b, m+1) [rad/s] that the terms of the loss current follow: as they are, levelling off, squared."""
+    top = max(float(np.abs(view.omega).max()), 1.0)
+    return {
+        "g_fe": view.omega,
+        "g_hysteresis": view.omega / np.sqrt((view.omega / top) ** 2 + 0.02**2),
+        "g_eddy": view.omega * np.abs(view.omega) / top,
+    }
+
+
 def _loss(view, omega):
     """Terms of the loss current j omega psi, per siemens."""
     i_fe = 1j * omega * view.psi
@@ -14,15 +24,22 @@ def _loss(view, omega):
 
 class IronLoss(Effect):
     def core(self, view):
-        return {"g_fe": _loss(view, view.omega)}
+        return {"g_fe": _loss(view, _speeds(view)["g_fe"])}
 
     def free(self, view):
-        top = max(float(np.abs(view.omega).max()), 1.0)
-        soft = view.omega / np.sqrt((view.omega / top) ** 2 + 0.02**2)
-        return {
-            "g_hysteresis": _loss(view, soft),
-            "g_eddy": _loss(view, view.omega * np.abs(view.omega) / top),
-        }
+        speeds = _speeds(view)
+        return {key: _loss(view, speeds[key]) for key in ("g_hysteresis", "g_eddy")}
+
+    @staticmethod
+    def psi(view, c):
+        """Flux linkage (b, m+1) complex dq [Wb] that is not there, as the loss current does not magnetise.
+
+        The loss current itself follows the flux that is left, so that this is more than the first order.
+        """
+        speeds = _speeds(view)
+        conductance = 1j * sum(value * speeds[key] for key, value in c.items())
+        first = view.inductances(conductance * view.psi)
+        return -view.inductances(conductance * (view.psi - first))
 
     def floor(self, nominal):
         m = nominal.machine

@@ -1,6 +1,8 @@
 """Currents are sampled tau after the middle of the zero vector, where they slope with the EMF."""
 
-from diagnosis.effect import Effect, Parameter, angle_error, current_error, one, sigma
+import numpy as np
+
+from diagnosis.effect import Effect, Parameter, angle_error, current_error, half_dead_time, one
 
 
 def _slope(view):
@@ -24,6 +26,9 @@ class SamplingSkew(Effect):
     def floor(self, nominal):
         return 0.0012 * nominal.sample_time_s
 
+    def overshadowed(self, c, nominal):
+        return half_dead_time(c, nominal)
+
     def ceiling(self, nominal):
         return 0.3 * nominal.sample_time_s
 
@@ -33,7 +38,10 @@ class SamplingSkew(Effect):
         return view.replace(i=view.i - error, i_raw=view.i_raw - view.stator(error))
 
     def estimates(self, c, covariance, nominal):
-        return one("skew_s", "s", c["tau"], sigma(covariance))
+        # Of the currents against the angle: whichever of the two is latched beside the valley.
+        weights = np.array([{"tau": 1.0, "angle": -1.0}[name] for name in c])
+        spread = np.sqrt(max(weights @ covariance @ weights, 0.0))
+        return one("skew_s", "s", c["tau"] - c.get("angle", 0.0), spread)
 
     def plant(self, c, nominal):
         return {"timing.sampling_skew_s": c["tau"]}
@@ -46,6 +54,6 @@ EFFECT = SamplingSkew(
     signature="order 0: omega^2 psi_m tau on the d axis, as an iron loss of R_fe = -L_q / tau would make",
     confounders=("iron_loss", "delay", "inductance_q"),
     separated_by="load (an iron loss also follows omega^2 i_q); the trigger moved on purpose",
-    parameters=(Parameter("skew_s", "s", "positive: too late"),),
+    parameters=(Parameter("skew_s", "s", "of the currents against the angle; positive: too late"),),
     corrects=True,
 )

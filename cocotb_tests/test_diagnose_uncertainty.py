@@ -1,0 +1,125 @@
+"""How sure a diagnosis is of its parameters, and the corrections without which no interval could be right."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from cocotb_tests.diagnosed_drives import MACHINE, recorded
+from cocotb_tests.test_registers import PAPER
+from diagnosis.blocks import view_of
+from diagnosis.catalogue import CATALOGUE
+from diagnosis.fit import Model
+from diagnosis.nominal import load_nominal
+from diagnosis.refine import Refiner
+from diagnosis.uncertainty import Spread, larger
+
+NOMINAL = load_nominal(PAPER)
+T = NOMINAL.sample_time_s
+
+
+@pytest.fixture(scope="module")
+def view():
+    return view_of(recorded(), NOMINAL)
+
+
+def fitted(view, *names, effects=None):
+    """(refiner, solution) of a set of effects on a view, all blocks fitted."""
+    refiner = Refiner(view, effects or {n: CATALOGUE[n] for n in names}, np.ones(len(view), bool))
+    return refiner, refiner.refine(Model(frozenset(names)))
+
+
+def test_the_larger_of_two_covariances_is_below_neither():
+    rng = np.random.default_rng(3)
+    for _ in range(20):
+        a, b = ((m := rng.standard_normal((4, 4))) @ m.T + 0.1 * np.eye(4) for _ in range(2))
+        both = larger(a, b)
+        assert min(np.linalg.eigvalsh(both - a).min(), np.linalg.eigvalsh(both - b).min()) > -1e-9
+        assert np.allclose(larger(a, 1e-3 * a), a)
+
+
+def test_an_error_that_an_operating_point_keeps_widens_the_interval(view):
+    refiner, calm = fitted(view, "magnet_flux")
+    before = Spread(refiner, calm, 1.0).covariance["magnet_flux"][0, 0]
+    dwell = view.run[refiner.cells.block]
+    push = np.random.default_rng(1).standard_normal(dwell.max() + 1)[
+        dwell
+    ]  # the same in all blocks of a dwell
+    mean = (refiner.cells.order == 0) & (refiner.cells.channel == "u") & (refiner.cells.part == 1)
+    refiner.adjust = np.where(mean, 4.0 * refiner.sigma * push, 0.0)
+    refiner.linear.y += (refiner.adjust / refiner.sigma)[refiner.linear.use]
+    pushed = Spread(refiner, calm, 1.0).covariance["magnet_flux"][0, 0]
+    assert pushed > 4.0 * before
+
+
+def test_what_the_balance_is_off_by_in_common_does_not_average_out(view):
+    """However many blocks there are, the magnets' flux is not known better than the voltage is balanced."""
+    refiner, solution = fitted(view, "magnet_flux")
+    spread = Spread(refiner, solution, 1e-9)
+    assert np.sqrt(spread._common()[0, 0]) == pytest.approx(2e-5 * MACHINE.magnet_flux_wb, rel=0.5)
+    without = spread.covariance["magnet_flux"][0, 0] - spread._common()[0, 0]
+    assert 0.0 < without < spread.covariance["magnet_flux"][0, 0]
+
+
+def test_an_effect_too_small_for_a_name_widens_what_it_would_move():
+    """Magnets 2 % weak, and resistance in error by less than a name: the flux may be off by what that moves it."""
+    r = MACHINE.resistance_ohm
+    view = view_of(recorded(machine={"resistance_ohm": 1.008 * r}), NOMINAL)
+    effects = {n: CATALOGUE[n] for n in ("magnet_flux", "inductance_d", "resistance")}
+    refiner, solution = fitted(view, "magnet_flux", effects=effects)
+    spread = Spread(refiner, solution, solution.dispersion)
+    others = spread.others()
+    alone = spread.estimates("magnet_flux", [])["magnet_flux_wb"]
+    together = spread.estimates("magnet_flux", others)["magnet_flux_wb"]
+    beside = refiner.refine(Model(frozenset(["magnet_flux", "resistance"])))
+    moved = beside.c["magnet_flux"]["delta_psi_m"] - solution.c["magnet_flux"]["delta_psi_m"]
+    assert others and together.value == alone.value
+    assert together.sigma == pytest.approx(np.hypot(alone.sigma, moved), rel=0.05)
+    assert not Spread(*fitted(view, "magnet_flux", "resistance", effects=effects), 1.0).others()
+
+
+def test_a_delay_of_a_whole_period_is_found_without_bias(view):
+    """The linear estimate lies past the whole period; the correction must let it come back."""
+    early = view.u.copy()
+    early[:, :-1] = view.u[:, 1:]  # recorded a row before it acts
+    late = view.replace(u=early, theta=view.theta, memo={})
+    refiner, solution = fitted(late, "delay")
+    tau, sigma = solution.c["delay"]["tau"], float(np.sqrt(solution.covariance["delay"][0, 0]))
+    assert abs(tau - T) < 3.0 * sigma and abs(tau - T) < 2e-3 * T
+    further = (
+        CATALOGUE["delay"].corrected(late, {"tau": 1.1 * T}).u
+        - CATALOGUE["delay"].corrected(late, {"tau": T}).u
+    )
+    assert np.abs(further[:, 1:]).max() > 0.0
+
+
+def test_the_loss_current_follows_the_flux_that_it_leaves(view):
+    """i_fe = j omega g psi(i - i_fe), solved exactly for both axes, against what the iron loss takes off the flux."""
+    m, g = view.machine, 0.02 * view.machine.rated_current_a / (400.0 * view.machine.magnet_flux_wb)
+    # psi_d = psi0_d + L_d w g psi_q, psi_q = psi0_q - L_q w g psi_d
+    a, b = m.inductance_d_h * view.omega * g, m.inductance_q_h * view.omega * g
+    psi = view.psi
+    d = (psi.real + a * psi.imag) / (1.0 + a * b)
+    q = psi.imag - b * d
+    exact = d + 1j * q - psi
+    taken = CATALOGUE["iron_loss"].psi(view, {"g_fe": g})
+    first = -view.inductances(1j * view.omega * g * psi)
+    assert np.abs(taken - exact).max() < 0.1 * np.abs(first - exact).max()
+
+
+def test_an_iron_loss_has_its_size():
+    g = 0.04 * NOMINAL.machine.rated_current_a / (640.0 * MACHINE.magnet_flux_wb)
+    view = view_of(recorded(machine={"iron_conductance_s": g}), NOMINAL)
+    _, solution = fitted(view, "iron_loss")
+    found = solution.c["iron_loss"]["g_fe"]
+    linear = Refiner(view, {"iron_loss": CATALOGUE["iron_loss"]}, np.ones(len(view), bool)).linear
+    first = linear.solve(solution.model).c["iron_loss"]["g_fe"]
+    assert abs(found - g) < abs(first - g)
+
+
+def test_a_skew_is_that_of_the_currents_against_the_angle():
+    estimates = CATALOGUE["sampling_skew"].estimates
+    c, covariance = {"tau": 0.2e-6, "angle": -0.8e-6}, np.array([[4.0, 3.9], [3.9, 4.0]]) * 1e-14
+    skew = estimates(c, covariance, NOMINAL)["skew_s"]
+    assert skew.value == pytest.approx(1e-6) and skew.sigma == pytest.approx(np.sqrt(0.2e-14))
+    assert estimates({"tau": 0.3e-6}, covariance[:1, :1], NOMINAL)["skew_s"].value == pytest.approx(0.3e-6)

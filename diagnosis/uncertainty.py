@@ -1,0 +1,140 @@
+"""How sure the parameters of a solution are, beyond what the scatter of its cells says.
+
+The covariance of a least-squares fit takes every cell's error for its own.  Three kinds of error are not:
+
+- what a curve leaves at an operating point is the same in all its blocks: the sandwich over operating points
+  (Liang and Zeger, Biometrika 73, 1986) counts each of them once;
+- what the balance itself is off by (ripple, sampling of the bus) follows the voltage in one and the same way: a
+  common share of it, along and across, is carried through to the coefficients;
+- another form moves them: where a freer curve, or an effect that is too small for a name, would score better, the
+  parameters may be wrong by as much as it moves them.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import stats
+
+from diagnosis.fit import PER_EFFECT
+from diagnosis.refine import TIE, point_numbers
+
+# Of the voltage, and of the bus along the current: rms of what healthy recordings show of each.
+COMMON_U, COMMON_DC = 2e-5, 1e-5
+LEAST_POINTS = 6  # more operating points than coefficients, else their scatter says nothing
+LEAST_DISPERSION = 0.8
+
+
+class Plain:
+    """What a fit itself says: its covariances {effect: (k, k)}, by chi^2 per degree of freedom."""
+
+    def __init__(self, solution, effects, nominal, reduced):
+        self.solution, self.effects, self.nominal, self.reduced = solution, effects, nominal, reduced
+        wider = max(reduced, LEAST_DISPERSION)
+        self.covariance = {name: matrix * wider for name, matrix in solution.covariance.items()}
+
+    def others(self) -> list[dict]:
+        """Coefficients {effect: {...}} that other admissible models give the solution's effects."""
+        return []
+
+    def estimates(self, name, others):
+        """Parameters {name: Estimate} of an effect; others: what ``others`` gave."""
+        effect, nominal = self.effects[name], self.nominal
+        out = effect.estimates(self.solution.c[name], self.covariance[name], nominal)
+        own = {key: estimate.sigma for key, estimate in out.items()}
+        for c in others:
+            moved = effect.estimates(c[name], np.zeros((len(c[name]),) * 2), nominal)
+            for key in out.keys() & moved.keys():
+                shift = moved[key].value - out[key].value
+                out[key].sigma = float(max(out[key].sigma, np.hypot(own[key], shift)))
+        return out
+
+
+class Spread(Plain):
+    """Covariances of a refined solution of a search, and the models that would move its parameters."""
+
+    def __init__(self, search, solution, reduced):
+        """reduced: chi^2 per degree of freedom that the solution leaves."""
+        super().__init__(solution, search.effects, search.view.nominal, reduced)
+        self.search = search
+        view, model = solution.view, solution.model
+        self.fitter = f = search.fitter(view, [search.effects[n] for n in sorted(model.names)])
+        self.carried = f.carried(model)
+        self.sigma = f.sigma[f.use]
+        self.columns = f.a[:, self.carried] * f.scale[self.carried]
+        self.inverse = np.linalg.inv(self.columns.T @ self.columns)
+        self.error = f.solve(model).residual[f.use] / self.sigma
+        own = larger(self.inverse * max(reduced, LEAST_DISPERSION), self._between_points())
+        self.covariance = self._by_effect(own + self._common())
+
+    def _between_points(self):
+        """Covariance (k, k) from how the operating points differ; zero where they are too few."""
+        group = point_numbers(self.solution.view)[self.fitter.cells.block[self.fitter.use]]
+        names, k = np.unique(group), len(self.carried)
+        if len(names) < k + LEAST_POINTS:
+            return np.zeros((k, k))
+        scores = np.array([self.columns[group == g].T @ self.error[group == g] for g in names])
+        # Few of them know their own scatter badly: the quantile of Student's distribution for the normal one.
+        wider = (stats.t.ppf(0.975, len(names) - k) / stats.norm.ppf(0.975)) ** 2
+        return self.inverse @ (scores.T @ scores) @ self.inverse * wider * len(names) / (len(names) - k)
+
+    def _common(self):
+        """Covariance (k, k) of what the balance is off by in common."""
+        view, f = self.solution.view, self.fitter
+        u, bus = view.to_dq(view.u[:, 1:-1]), view.nominal.inverter.dc_bus_v
+        along = view.i_mid / np.abs(view.i_mid).clip(0.02 * view.machine.rated_current_a)
+        patterns = (COMMON_U * u, 1j * COMMON_U * u, COMMON_DC * bus * along)
+        rows = np.array([self.search.projector.rows({"u": p})[f.use] / self.sigma for p in patterns]).T
+        moved = self.inverse @ (self.columns.T @ rows)
+        return moved @ moved.T
+
+    def _by_effect(self, matrix):
+        """A covariance of the carried columns as {effect: (k, k)} in the order of each effect's coefficients."""
+        f, model, out = self.fitter, self.solution.model, {}
+        place = {k: n for n, k in enumerate(self.carried)}
+        index = f.columns_of(model)
+        for name in model.names:
+            mine = [k for k in index if f.owner[k] == name]
+            out[name] = np.array([[matrix[place[a], place[b]] if a in place and b in place else 0.0 for b in mine]
+                                  for a in mine])  # fmt: skip
+        return out
+
+    def others(self) -> list[dict]:
+        """Coefficients {effect: {...}} that the best of the larger models give the solution's effects.
+
+        A larger model frees a curve or has one effect more, which was too small for a name.  Of those that score better
+        than the solution itself, the best and what is tied with it; none where the solution is the best there is.
+        """
+        search, solution, model = self.search, self.solution, self.solution.model
+        at = search.fitter(solution.view, search.effects.values())
+        base, found = at.solve(model), []
+        for other in self._larger_models(at):
+            chi2, count = at.chi2(other)
+            price = at.price * (count - base.count) + PER_EFFECT * (len(other) - len(model))
+            gain = (base.chi2 - chi2) / max(self.reduced, LEAST_DISPERSION) - price
+            if count > base.count and gain > 0.0:
+                found.append((gain, other))
+        best = max((gain for gain, _ in found), default=0.0)
+        out = []
+        for gain, other in found:
+            if gain > best - TIE:
+                c = at.solve(other).c
+                moved = {n: {k: c[n][k] - base.c[n].get(k, 0.0) for k in c[n]} for n in model.names}
+                out.append(
+                    {n: {k: solution.c[n].get(k, 0.0) + v for k, v in moved[n].items()} for n in moved}
+                )
+        return out
+
+    def _larger_models(self, at):
+        model = self.solution.model
+        able = [n for n in self.search.effects if at.index[n][0]]
+        freed = [model.with_(n, True) for n in sorted(model.names - model.free)]
+        return freed + [model.with_(n, bent) for n in able if n not in model.names for bent in (False, True)]
+
+
+def larger(first, second):
+    """A covariance that is in no direction below either of two, the first of which is regular."""
+    root = np.linalg.cholesky(first)
+    inverse = np.linalg.inv(root)
+    values, vectors = np.linalg.eigh(inverse @ second @ inverse.T)
+    grown = root @ vectors
+    return (grown * np.maximum(values, 1.0)) @ grown.T
