@@ -109,11 +109,13 @@ def faults(block: Block) -> tuple[Fault, ...]:
 
 
 def block_proof(block: Block) -> Proof:
+    ends = (("out_valid", block.latency), *((("out_soon", block.latency - 1),) if block.soon else ()))
     return Proof(
         name=f"pipeline_{block.name}",
-        says=f"out_valid of {block.name} comes {block.latency} clocks after in_valid, never otherwise; reset clears",
+        says=f"out_valid of {block.name} comes {block.latency} clocks after in_valid, never otherwise; reset clears"
+        + (", out_soon one clock before" if block.soon else ""),
         entity=block.name,
-        harness=partial(harness, block.name, "in_valid", (("out_valid", block.latency),), block.interval),
+        harness=partial(harness, block.name, "in_valid", ends, block.interval),
         faults=faults(block),
         depth=block.latency + 2,
         generics=dict(block.configs[0]),
