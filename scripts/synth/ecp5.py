@@ -14,6 +14,7 @@ from pathlib import Path
 
 from scripts.synth.multiplier_registers import absorb
 from scripts.synth.names import Names
+from scripts.synth.split_products import retime
 from scripts.synth.wrapper import NAME, wrap
 from scripts.synth.yosys import run, yosys
 
@@ -94,7 +95,8 @@ class Routing:
     def _absorb(self) -> dict[str, int]:
         path = self.folder / "design.json"
         netlist = json.loads(path.read_text())
-        done = absorb(netlist, NAME)
+        done = {"split": retime(netlist, NAME)["multipliers"]}
+        done |= absorb(netlist, NAME)
         path.write_text(json.dumps(netlist))
         return done
 

@@ -4,9 +4,10 @@ A MULT18X18D has registers at A, B and P.  yosys uses the like for Xilinx, not f
 then runs from flip-flop to flip-flop through 3.9 ns of multiplier and twice the routing.  This pass edits the mapped
 netlist (yosys' JSON) before place and route.
 
-An operand's register moves in if each of its bits is 0 or comes from a flip-flop, all with the same clock and
-enable, none with reset or initial 1; the flip-flops stay where something else reads them too.  The product's moves in
-if each used bit goes to one such flip-flop and nowhere else.
+The operands' registers move in if each bit of both is 0 or comes from a flip-flop, all of an operand with the same
+clock and enable, none with reset or initial 1; the flip-flops stay where something else reads them too.  One operand
+alone does not: nextpnr then times the multiplier as if neither had a register.  The product's moves in if each used
+bit goes to one such flip-flop and nowhere else.
 """
 
 from __future__ import annotations
@@ -38,16 +39,18 @@ def control_of(cell: dict) -> Control | None:
     return Control(nets["CLK"][0], nets["CE"][0] if mux == "CE" else None)
 
 
-class _Nets:
-    """Who drives a bit, and how many read it."""
+class Nets:
+    """Who drives a bit, and who reads it; ``free`` is the first number no bit has."""
 
     def __init__(self, module: dict):
         self.flip_flop: dict[int, str] = {}  # by the bit at Q
+        self.driver: dict[int, str] = {}
         self.readers: dict[int, list[tuple[str, str]]] = defaultdict(list)  # bit: (cell, port)
         for name, cell in module["cells"].items():
             for port, bits in cell["connections"].items():
                 for bit in bits:
                     if cell["port_directions"][port] == "output":
+                        self.driver[bit] = name
                         if cell["type"] == "TRELLIS_FF":
                             self.flip_flop[bit] = name
                     elif not isinstance(bit, str):
@@ -55,27 +58,27 @@ class _Nets:
         for port in module["ports"].values():
             for bit in port["bits"] if port["direction"] == "output" else ():
                 self.readers[bit].append(("", "pad"))
+        self.free = 1 + max([2, *self.driver, *self.readers], key=lambda bit: -1 if isinstance(bit, str) else bit)
 
 
 def absorb(netlist: dict, top: str) -> dict[str, int]:
     """Changes ``netlist`` in place; {"A", "B", "P"}: how many multipliers got that register, "removed": FFs."""
     module = netlist["modules"][top]
     cells = module["cells"]
-    nets = _Nets(module)
+    nets = Nets(module)
     done = dict.fromkeys((*BITS, "removed"), 0)
     names = {id(cell): name for name, cell in cells.items()}
     multipliers = [cell for cell in cells.values() if cell["type"] == "MULT18X18D"]
     for cell in multipliers:
-        cell["port_directions"].update(
-            {f"{pin}{n}": "input" for pin in ("CLK", "CE", "RST") for n in range(4)}
-        )
-        if product := _product(cell, cells, nets):
+        if "REG_OUTPUT_CLK" in cell["parameters"]:
+            done["P"] += 1
+        elif product := _product(cell, cells, nets):
             control, behind = product
             for pin, bit in behind.items():
                 ((name, _),) = nets.readers.pop(cell["connections"][pin][0])
                 del cells[name], nets.flip_flop[bit]
                 done["removed"] += 1
-            _set(cell, "P", control, behind)
+            set_register(cell, "P", control, behind)
             done["P"] += 1
         operands = [_operand(cell, side, cells, nets) for side in ("A", "B")]
         if all(operands):
@@ -83,7 +86,7 @@ def absorb(netlist: dict, top: str) -> dict[str, int]:
                 for pin, bit in before.items():
                     nets.readers[cell["connections"][pin][0]].remove((names[id(cell)], pin))
                     nets.readers[bit].append((names[id(cell)], pin))
-                _set(cell, side, control, before)
+                set_register(cell, side, control, before)
                 done[side] += 1
     # What only fed multipliers has no reader left.
     for bit, name in nets.flip_flop.items():
@@ -93,7 +96,7 @@ def absorb(netlist: dict, top: str) -> dict[str, int]:
     return done
 
 
-def _operand(cell: dict, side: str, cells: dict, nets: _Nets):
+def _operand(cell: dict, side: str, cells: dict, nets: Nets):
     """(control, the bits in front of the flip-flops) of operand A or B, or None."""
     pins = [cell["connections"][f"{side}{n}"][0] for n in range(BITS[side])]
     moved, controls = {}, set()
@@ -109,7 +112,7 @@ def _operand(cell: dict, side: str, cells: dict, nets: _Nets):
     return (controls.pop(), moved) if len(controls) == 1 else None
 
 
-def _product(cell: dict, cells: dict, nets: _Nets):
+def _product(cell: dict, cells: dict, nets: Nets):
     """(control, the bits behind the flip-flops) of the product, or None."""
     moved, controls = {}, set()
     for n in range(BITS["P"]):
@@ -128,9 +131,10 @@ def _product(cell: dict, cells: dict, nets: _Nets):
     return (controls.pop(), moved) if len(controls) == 1 else None
 
 
-def _set(cell: dict, side: str, control: Control, bits: dict[str, int]) -> None:
+def set_register(cell: dict, side: str, control: Control, bits: dict[str, int]) -> None:
     """Connects ``bits`` and switches the register on."""
     place, number = PLACES[side]
+    cell["port_directions"].update({f"{pin}{n}": "input" for pin in ("CLK", "CE", "RST") for n in range(4)})
     cell["connections"].update({pin: [bit] for pin, bit in bits.items()})
     cell["connections"]["CLK0"] = [control.clock]
     cell["connections"][f"CE{number}"] = ["1" if control.enable is None else control.enable]

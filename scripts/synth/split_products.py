@@ -1,0 +1,193 @@
+"""Moves the register behind a product of more than 18 x 18 bits to before the adder that puts its parts together.
+
+A 7-series multiplier takes 25 x 18 bits and has its product's register inside.  On ECP5 yosys makes it of two
+MULT18X18D, whose parts an adder sums before the register: a multiplier, a carry chain and two nets between two clocks
+where the VHDL says a multiplication.  This pass edits the mapped netlist (yosys' JSON): the parts go into the
+multipliers' own product registers, what else the adder takes into flip-flops of the same control, and the sum is made
+behind them.  Every register of the VHDL keeps its values at every clock; only the adder changes sides.
+
+It is done where that shortens the longer of the two paths by `Delays`, a rough sum of cells and nets: not where the
+adder would meet a long path behind the register.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from scripts.synth.multiplier_registers import BITS, Control, Nets, control_of, set_register
+
+ADDER = "CCU2C"
+CONSTANTS = ("0", "1", "x", "z")
+# ns on LFE5U speed grade 6, of nextpnr's reports here; NET is what a short net costs.
+NET, TO_Q, MULTIPLIER, MEMORY, CARRY_STEP = 1.1, 0.5, 3.9, 5.6, 0.07
+THROUGH = {"LUT4": 0.24, "PFUMX": 0.2, "L6MUX21": 0.2, "CCU2C": 0.45, "MULT18X18D": MULTIPLIER}
+INSIDE = ("PFUMX", "L6MUX21")  # their inputs come over wires of the slice
+
+
+class Delays:
+    """About how long after a clock a bit is there, and how long before the next it must be."""
+
+    def __init__(self, cells: dict, nets: Nets):
+        self._cells, self._nets = cells, nets
+        self._arrival: dict = {}
+        self._rest: dict = {}
+
+    def arrival(self, bit) -> float:
+        """ns from the clock to ``bit``, at the pin that makes it."""
+        if bit not in self._arrival:
+            self._arrival[bit] = 0.0  # a loop, if there were one, ends here
+            self._arrival[bit] = self._made(bit)
+        return self._arrival[bit]
+
+    def _made(self, bit) -> float:
+        name = self._nets.driver.get(bit)
+        cell = self._cells.get(name, {"type": "input"})
+        if cell["type"] == "DP16KD":
+            return MEMORY
+        if cell["type"] not in THROUGH:
+            return TO_Q
+        return max(self._inputs(cell), default=0.0)
+
+    def _inputs(self, cell: dict):
+        for port, bits in cell["connections"].items():
+            if cell["port_directions"][port] == "input" and bits[0] not in CONSTANTS:
+                yield self.arrival(bits[0]) + step(cell, port)
+
+    def rest(self, bit) -> float:
+        """ns from the pin that makes ``bit`` to the next register."""
+        if bit not in self._rest:
+            self._rest[bit] = 0.0
+            self._rest[bit] = max(
+                (self._onward(*reader) for reader in self._nets.readers.get(bit, [])), default=0.0
+            )
+        return self._rest[bit]
+
+    def _onward(self, name: str, port: str) -> float:
+        cell = self._cells.get(name, {"type": "output"})
+        if cell["type"] not in THROUGH:
+            return NET
+        if cell["type"] == "MULT18X18D" and "REG_OUTPUT_CLK" in cell["parameters"]:
+            return NET + MULTIPLIER
+        return step(cell, port) + max(self.rest(bit) for bit in outputs(cell))
+
+
+def step(cell: dict, port: str) -> float:
+    """ns from the pin that feeds ``port`` through the cell."""
+    if port == "CIN":
+        return CARRY_STEP
+    return THROUGH[cell["type"]] + (0.0 if cell["type"] in INSIDE and port != "C0" else NET)
+
+
+@dataclass
+class Cloud:
+    """What stands between the products and their register: names of cells; ``into`` = bits that come from elsewhere."""
+
+    multipliers: list[str] = field(default_factory=list)
+    adders: list[str] = field(default_factory=list)
+    flip_flops: list[str] = field(default_factory=list)
+    into: list[int] = field(default_factory=list)
+
+
+def outputs(cell: dict) -> list[int]:
+    return [
+        bit
+        for port, bits in cell["connections"].items()
+        if cell["port_directions"][port] == "output"
+        for bit in bits
+    ]
+
+
+def cloud_of(start: str, cells: dict, nets: Nets) -> tuple[Cloud, Control] | None:
+    """Adders and registers behind the product of ``start``; None where anything but adders leads to registers."""
+    cloud, control = Cloud(), set()
+    waiting, seen = [start], {start}
+
+    def meet(name: str) -> None:
+        if name not in seen:
+            seen.add(name)
+            waiting.append(name)
+
+    while waiting:
+        name = waiting.pop()
+        cell = cells[name]
+        (cloud.multipliers if cell["type"] == "MULT18X18D" else cloud.adders).append(name)
+        if cell["type"] == ADDER:
+            for port, bits in cell["connections"].items():
+                maker = nets.driver.get(bits[0], "") if cell["port_directions"][port] == "input" else ""
+                # A carry is never cut, and a product is registered whole.
+                if maker and (port == "CIN" or cells[maker]["type"] == "MULT18X18D"):
+                    meet(maker)
+        for bit in outputs(cell):
+            for reader, port in nets.readers.get(bit, []):
+                kind = cells[reader]["type"] if reader else "pad"
+                if kind == "TRELLIS_FF" and port == "DI":
+                    control.add(control_of(cells[reader]))
+                    cloud.flip_flops.append(reader)
+                elif kind == ADDER:
+                    meet(reader)
+                else:
+                    return None
+    if (
+        any(cells[name]["type"] not in ("MULT18X18D", ADDER) for name in seen)
+        or len(control) != 1
+        or None in control
+    ):
+        return None
+    inside = {bit for name in seen for bit in outputs(cells[name])}
+    into = {
+        bits[0]
+        for name in cloud.adders
+        for port, bits in cells[name]["connections"].items()
+        if cells[name]["port_directions"][port] == "input" and bits[0] not in CONSTANTS
+    }
+    cloud.into = sorted(into - inside)
+    return cloud, control.pop()
+
+
+def shorter(cloud: Cloud, cells: dict, delays: Delays) -> bool:
+    """Whether the longer of the two paths is shorter with the register in front of the adder."""
+    behind = [cells[name]["connections"] for name in cloud.flip_flops]
+    now = max(max(delays.arrival(c["DI"][0]), TO_Q + delays.rest(c["Q"][0])) for c in behind)
+    products = [bit for name in cloud.multipliers for bit in outputs(cells[name])]
+    from_product = {bit: delays.arrival(bit) for bit in (*products, *cloud.into)}
+    adder = max(delays.arrival(c["DI"][0]) for c in behind) - max(from_product.values())
+    then = max(*from_product.values(), TO_Q + adder + max(delays.rest(c["Q"][0]) for c in behind))
+    return then < now
+
+
+def retime(netlist: dict, top: str) -> dict[str, int]:
+    """Changes ``netlist`` in place; {"multipliers", "removed", "added"}: how many registered now, and flip-flops."""
+    cells = netlist["modules"][top]["cells"]
+    done = {"multipliers": 0, "removed": 0, "added": 0}
+    for start in [name for name, cell in cells.items() if cell["type"] == "MULT18X18D"]:
+        if "REG_OUTPUT_CLK" in cells[start]["parameters"]:
+            continue
+        nets = Nets(netlist["modules"][top])
+        found = cloud_of(start, cells, nets)
+        if not found or not found[0].adders:
+            continue
+        cloud, control = found
+        behind = [cells[name]["connections"] for name in cloud.flip_flops]
+        if len({c["DI"][0] for c in behind}) != len(behind) or not shorter(cloud, cells, Delays(cells, nets)):
+            continue
+        model = cells[cloud.flip_flops[0]]
+        moved = {c["DI"][0]: c["Q"][0] for c in behind}
+        for n, bit in enumerate(cloud.into):
+            moved[bit] = nets.free
+            nets.free += 1
+            connections = {**model["connections"], "DI": [bit], "Q": [moved[bit]]}
+            cells[f"{cloud.flip_flops[0]}_before_{n}"] = {**model, "connections": connections}
+        for name in cloud.multipliers + cloud.adders:
+            connections = cells[name]["connections"]
+            connections.update({port: [moved.get(bits[0], bits[0])] for port, bits in connections.items()})
+            if name in cloud.multipliers:
+                product = {
+                    f"P{n}": connections[f"P{n}"][0] for n in range(BITS["P"]) if f"P{n}" in connections
+                }
+                set_register(cells[name], "P", control, product)
+        for name in cloud.flip_flops:
+            del cells[name]
+        done["multipliers"] += len(cloud.multipliers)
+        done["removed"] += len(cloud.flip_flops)
+        done["added"] += len(cloud.into)
+    return done
