@@ -93,11 +93,13 @@ WIRING = {
 }
 
 
-# (instance, one that it waits for): it starts with the other's out_soon, the rest of whose outputs it takes late.
-SOON = {
+# (instance, one that it waits for): it starts a clock before the other's out_valid.  What it needs first is there with
+# the other's out_soon, the rest it takes late.
+EARLY = {
     ("stator_frame", "conditioning"),
     ("rotor_frame", "stator_frame"),
     ("current_regulators", "rotor_frame"),
+    ("current_regulators", "speed_regulator"),
     ("circle", "current_regulators"),
     ("circle", "compensation_dq"),
     ("stator_voltage", "circle"),
@@ -111,7 +113,7 @@ def schedule() -> dict[str, tuple[int, int]]:
     """{instance: (first clock, last clock)} since the raw sample, from the declared latencies alone."""
     times: dict[str, tuple[int, int]] = {}
     for instance, (module, awaited) in WIRING.items():
-        first = max((times[name][1] - ((instance, name) in SOON) for name in awaited), default=0)
+        first = max((times[name][1] - ((instance, name) in EARLY) for name in awaited), default=0)
         times[instance] = (first, first + module.BLOCK.latency)
     return times
 

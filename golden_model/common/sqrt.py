@@ -69,7 +69,7 @@ BLOCK = Block(
     step=step,
     inputs=(Port("x", X, doc="radicand"),),
     outputs=(Port("root", U_MAX, doc="square root, never above the true one"),),
-    latency=6,
+    latency=5,
     constants={"DROP_X": DROP_X, "DROP_OUT": DROP_OUT, "REST_BITS": REST_BITS},
     roms={"BASE": (ROOT, list(BASE_ROM)), "SLOPE": (SLOPE_FMT, list(SLOPE_ROM))},
     reference=reference,

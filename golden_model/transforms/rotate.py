@@ -70,7 +70,7 @@ BLOCK = Block(
         Port("out_y", PU, doc="second component, turned"),
     ),
     latency=5,
-    interval=3,
+    interval=4,
     soon=("out_y",),
     constants={"DROP": DROP},
     configs=({"WIDTH": PU_W}, {"WIDTH": FLUX_W}),

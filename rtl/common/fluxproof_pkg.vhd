@@ -36,13 +36,13 @@ package fluxproof_pkg is
 
   -- fluxproof: clocks from the raw sample to the duties, least distance of two samples
   constant FLUXPROOF_SAMPLE_TO_DUTY : positive := 40;
-  constant FLUXPROOF_SAMPLE_INTERVAL : positive := 57;
+  constant FLUXPROOF_SAMPLE_INTERVAL : positive := 56;
 
   -- register_access: clocks that a write waits for the end of a sample
-  constant REGISTER_PATIENCE : positive := 73;
+  constant REGISTER_PATIENCE : positive := 72;
 
   -- sqrt: 001, section 5.2: voltage limit of the current regulation
-  constant SQRT_LATENCY : positive := 6;
+  constant SQRT_LATENCY : positive := 5;
   constant SQRT_DROP_X : natural := 12;
   constant SQRT_DROP_OUT : natural := 2;
   constant SQRT_REST_BITS : natural := 12;
@@ -151,7 +151,7 @@ package fluxproof_pkg is
   constant U_DC_PROCESSING_SHIFT_CLOCKS : natural := 3;
 
   -- clarke: 001, eq. (1): stator frame
-  constant CLARKE_LATENCY : positive := 4;
+  constant CLARKE_LATENCY : positive := 5;
   constant CLARKE_THIRD : signed(17 downto 0) := to_signed(87381, 18);  -- 0.333333333 as U(-1,18), signed for the multiplier
   constant CLARKE_INV_SQRT3 : signed(17 downto 0) := to_signed(75674, 18);  -- 0.577350269 as U(0,17), signed for the multiplier
   constant CLARKE_DROP_ALPHA : natural := 18;
@@ -307,11 +307,11 @@ package fluxproof_pkg is
   );
 
   -- rotate: 001, eq. (9): T_dq/alphabeta
-  constant ROTATE_LATENCY : positive := 4;
+  constant ROTATE_LATENCY : positive := 5;
   constant ROTATE_DROP : natural := 16;
 
   -- park: 001, eq. (9): T_alphabeta/dq
-  constant PARK_LATENCY : positive := 4;
+  constant PARK_LATENCY : positive := 5;
 
   -- speed_pi: 001, section 5.3: speed regulator with limited current reference
   constant SPEED_PI_LATENCY : positive := 6;
@@ -320,7 +320,7 @@ package fluxproof_pkg is
   constant SPEED_PI_PROPORTIONAL_W : natural := 32;
 
   -- current_pi: 001, Fig. 8 and section 5.2: PI_idq
-  constant CURRENT_PI_LATENCY : positive := 6;
+  constant CURRENT_PI_LATENCY : positive := 7;
   constant CURRENT_PI_DROP_P : natural := 4;
   constant CURRENT_PI_DROP_I : natural := 12;
   constant CURRENT_PI_PROPORTIONAL_W : natural := 32;
@@ -332,21 +332,21 @@ package fluxproof_pkg is
   constant CHORD_SPEED_DROP : natural := 20;
 
   -- decoupling: 001, eq. (2), 'dq decoupling term' of Fig. 8
-  constant DECOUPLING_LATENCY : positive := 3;
+  constant DECOUPLING_LATENCY : positive := 2;
   constant DECOUPLING_DROP : natural := 16;
 
   -- voltage_limit: 001, Fig. 1: decoupling at the regulators' output; limit of the space-vector modulation
   constant VOLTAGE_LIMIT_LATENCY : positive := 11;
 
   -- svm_delay_compensation: 001, section 5.2, SVM delay compensation
-  constant SVM_DELAY_COMPENSATION_LATENCY : positive := 2;
+  constant SVM_DELAY_COMPENSATION_LATENCY : positive := 1;
   constant SVM_DELAY_COMPENSATION_DROP : natural := 15;
 
   -- inverse_park: 001, eq. (9): T_dq/alphabeta
-  constant INVERSE_PARK_LATENCY : positive := 4;
+  constant INVERSE_PARK_LATENCY : positive := 5;
 
   -- svm: 001, section 5.2, SVM with U_dc = 2**n/m
-  constant SVM_LATENCY : positive := 5;
+  constant SVM_LATENCY : positive := 6;
   constant SVM_DROP_SCALED : natural := 16;
   constant SVM_SCALED_W : natural := 19;
   constant SVM_HALF : natural := 262144;
@@ -382,7 +382,7 @@ package fluxproof_pkg is
   constant CURRENT_MODEL_DROP : natural := 13;
 
   -- flux_inverse_park: 001, eq. (9): T_dq/alphabeta
-  constant FLUX_INVERSE_PARK_LATENCY : positive := 4;
+  constant FLUX_INVERSE_PARK_LATENCY : positive := 5;
 
   -- flux_merge: 001, eq. (7); 'Merge of voltage and current models' of Fig. 8
   constant FLUX_MERGE_LATENCY : positive := 25;
@@ -396,7 +396,7 @@ package fluxproof_pkg is
   constant FLUX_MERGE_X_TO_STATE : natural := 6;
 
   -- flux_park: 001, eq. (9): T_alphabeta/dq
-  constant FLUX_PARK_LATENCY : positive := 4;
+  constant FLUX_PARK_LATENCY : positive := 5;
 
   -- flux_estimate: 001, eq. (17)
   constant FLUX_ESTIMATE_LATENCY : positive := 3;
@@ -483,7 +483,7 @@ package fluxproof_pkg is
   -- telemetry_words: none: what a recording needs
   constant TELEMETRY_WORDS_LATENCY : positive := 2;
   constant TELEMETRY_WORDS_COUNT : natural := 24;
-  constant TELEMETRY_WORDS_START : natural := 35;
+  constant TELEMETRY_WORDS_START : natural := 34;
   constant TELEMETRY_WORDS_INDEX_W : natural := 5;
 
   -- telemetry: none: what a recording needs

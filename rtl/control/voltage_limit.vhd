@@ -6,7 +6,8 @@
 -- Room: d comes first in what the EMF of the last sample leaves, so that the q axis can always hold its EMF;
 -- without it the drive has a second stable point at high speed, see the model.
 -- Formats: sums exact; radicands (u_max - u)*(u_max + u) exact, U(0,32); PU out.
--- Latency: 11.  Interval: 12 (room is ready one clock after the output).
+-- Latency: 11; u_d is there with out_soon.  Interval: 12 (room is ready one clock after the output).
+-- The q axis' inputs are needed a clock after the d axis'.
 -- Three beats through one adder, one comparison, one multiplier and one root: sum_d against limit, the EMF against
 -- u_max, and sum_q, which waits for its limit.  Signs are taken off by inversion: |v| = (v xor s) + s, s the sign.
 -- Rounding: none but the root's, which errs inwards: the circle is never left.
@@ -29,6 +30,7 @@ entity voltage_limit is
     u_comp_d  : in  signed(PU_W - 1 downto 0);
     u_comp_q  : in  signed(PU_W - 1 downto 0);
     u_max     : in  unsigned(U_MAX_W - 1 downto 0);
+    out_soon  : out std_logic;
     out_valid : out std_logic;
     u_d       : out signed(PU_W - 1 downto 0);
     u_q       : out signed(PU_W - 1 downto 0);
@@ -60,6 +62,7 @@ architecture rtl of voltage_limit is
   signal hi_3       : unsigned(PART_W - 1 downto 0);
   signal radicand_4 : unsigned(31 downto 0);
   signal root_start : std_logic;
+  signal root_9     : unsigned(U_MAX_W - 1 downto 0);
   signal root_10    : unsigned(U_MAX_W - 1 downto 0);
   signal beyond_10  : std_logic;
 
@@ -100,7 +103,7 @@ begin
       in_valid  => root_start,
       x         => radicand_4,
       out_valid => open,
-      root      => root_10
+      root      => root_9
     );
 
   root_start <= valid(4) or valid(5);
@@ -114,8 +117,6 @@ begin
   part_2  <= limit_2 when beyond_2 = '1' else
              unsigned(v_2(U_MAX_W - 1 downto 0)) xor (U_MAX_W - 1 downto 0 => v_2(v_2'high));
   carry_2 <= v_2(v_2'high) and not beyond_2;
-
-  beyond_10 <= beyond(v_1, root_10);
 
   process (clk)
     variable high, low : unsigned(PART_W downto 0);
@@ -153,9 +154,15 @@ begin
         hi_3 <= high(PART_W downto 1);
       end if;
 
-      -- Stages 4, 5: radicand = lo*hi;  stages 5 to 11: its root
+      -- Stages 4, 5: radicand = lo*hi;  stages 5 to 10: its root
       if valid(3) = '1' or valid(4) = '1' then
         radicand_4 <= resize(lo_3 * hi_3, 32);
+      end if;
+
+      -- Stage 10: is sum_q beyond the root
+      if valid(9) = '1' or valid(10) = '1' then
+        root_10   <= root_9;
+        beyond_10 <= beyond(v_1, root_9);
       end if;
 
       -- Stage 11: u_q = sum_q, limited to the root
@@ -178,6 +185,7 @@ begin
     end if;
   end process;
 
+  out_soon  <= valid(LATENCY - 1);
   out_valid <= valid(LATENCY);
 
 end architecture rtl;

@@ -1,7 +1,7 @@
 -- Purpose: rotor frame to stator frame, the rotation by theta.
 --   u_alpha = u_d*cos_theta - u_q*sin_theta
 --   u_beta  = u_d*sin_theta + u_q*cos_theta
--- Formats, latency (5), interval (3), rounding: those of rotate.
+-- Formats, latency (5), interval (4), rounding: those of rotate.
 
 library ieee;
 use ieee.std_logic_1164.all;

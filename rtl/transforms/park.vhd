@@ -1,7 +1,7 @@
 -- Purpose: stator frame to rotor frame, the rotation by -theta_me.
 --   i_d =  i_alpha*cos_theta + i_beta*sin_theta
 --   i_q = -i_alpha*sin_theta + i_beta*cos_theta
--- Formats, latency (5), interval (3), rounding: those of rotate.
+-- Formats, latency (5), interval (4), rounding: those of rotate.
 
 library ieee;
 use ieee.std_logic_1164.all;

@@ -4,8 +4,8 @@
 -- Formats: x, y S(1,WIDTH-2), PU or FLUX; TRIG S(1,16) within +-1; products and sums exact.
 -- One multiplier for sin_theta, a clock ahead of the one for cos_theta, which adds; y is needed a clock after x, and
 -- out_y comes a clock before out_x, with out_soon.
--- Latency: 5.  Interval: 3.  Rounding: half up, saturated: a vector longer than 2 per unit is outside every base.
--- A sum stays below 4 per unit, so its two top bits say whether it fits.
+-- Latency: 5.  Interval: 4.  Rounding: half up, saturated: a vector longer than 2 per unit is outside every base.
+-- A sum is at most 4 per unit, so its three top bits say whether it fits.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -34,7 +34,7 @@ end entity rotate;
 
 architecture rtl of rotate is
   constant LATENCY : positive := ROTATE_LATENCY;
-  constant SUM_W   : positive := WIDTH + TRIG_W - 1;
+  constant SUM_W   : positive := WIDTH + TRIG_W;
 
   signal valid      : std_logic_vector(0 to LATENCY);
   signal factor_s_0 : signed(WIDTH - 1 downto 0);
@@ -54,7 +54,7 @@ begin
   factor_s_0 <= not y when valid(1) = '1' else x;
   factor_c_1 <= x when valid(2) = '1' else y;
 
-  sum   <= prod_c(SUM_W - 1 downto 0) + sum_s(SUM_W - 1 downto 0);
+  sum   <= prod_c + sum_s;
   out_3 <= saturate(sum(SUM_W - 1 downto ROTATE_DROP), WIDTH);
 
   process (clk)
