@@ -87,7 +87,7 @@ begin
       if valid(1) = '1' or valid(2) = '1' then
         delta_2 <= SINCOS_DELTA(to_integer(low_1));
         if valid(2) = '1' then
-          delta_2 <= -SINCOS_DELTA(to_integer(low_1));
+          delta_2 <= SINCOS_MINUS_DELTA(to_integer(low_1));
         end if;
       end if;
 
