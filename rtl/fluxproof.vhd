@@ -193,7 +193,6 @@ architecture rtl of fluxproof is
   signal speed_mode           : std_logic;
   signal run                  : std_logic;
   signal current_soon         : std_logic;
-  signal current_valid        : std_logic;
   signal theta_valid          : std_logic;
   signal omega_valid          : std_logic;
   signal u_dc_valid           : std_logic;
@@ -201,7 +200,6 @@ architecture rtl of fluxproof is
   signal inverse              : unsigned(U_DC_PROCESSING_INVERSE_W - 1 downto 0);
   signal inverse_beta         : unsigned(U_DC_PROCESSING_INVERSE_W - 1 downto 0);
   signal alpha_beta_soon      : std_logic;
-  signal alpha_beta_valid     : std_logic;
   signal i_alpha              : signed(PU_W - 1 downto 0);
   signal i_beta               : signed(PU_W - 1 downto 0);
   signal trig_valid           : std_logic;
@@ -342,7 +340,7 @@ begin
       gain_b          => gain_b,
       gain_c          => gain_c,
       out_soon        => current_soon,
-      out_valid       => current_valid,
+      out_valid       => open,
       i_a             => i_a,
       i_b             => i_b,
       i_c             => i_c,
@@ -420,7 +418,7 @@ begin
       i_b       => i_b,
       i_c       => i_c,
       out_soon  => alpha_beta_soon,
-      out_valid => alpha_beta_valid,
+      out_valid => open,
       i_alpha   => i_alpha,
       i_beta    => i_beta
     );
@@ -962,7 +960,7 @@ begin
     port map (
       clk             => clk,
       rst             => rst,
-      in_valid        => current_valid,
+      in_valid        => u_dc_valid,
       i_a             => i_a,
       i_b             => i_b,
       i_c             => i_c,

@@ -360,7 +360,7 @@ package fluxproof_pkg is
   constant SVM_DROP_DUTY : natural := 3;
 
   -- pwm_compare: 001, section 5.2, IGBT pulse generation
-  constant PWM_COMPARE_LATENCY : positive := 5;
+  constant PWM_COMPARE_LATENCY : positive := 7;
   constant PWM_COMPARE_DROP : natural := 16;
 
   -- gate_generation: 001, section 5.2, IGBT pulse generation
@@ -502,7 +502,7 @@ package fluxproof_pkg is
   constant SAMPLE_GUARD_AHEAD : natural := 2;
 
   -- sample_checks: none: what a drive needs besides
-  constant SAMPLE_CHECKS_LATENCY : positive := 1;
+  constant SAMPLE_CHECKS_LATENCY : positive := 4;
   constant SAMPLE_CHECKS_DROP_LIMIT : natural := 8;
   constant SAMPLE_CHECKS_DROP_JUMP : natural := 5;
   constant SAMPLE_CHECKS_WARM : natural := 2;

@@ -42,6 +42,7 @@ architecture rtl of svm is
   signal y_3       : signed(SVM_SCALED_W - 1 downto 0);
   signal alike_3   : std_logic;
   signal triple_3  : signed(LEG_W - 1 downto 0);
+  signal double_3  : signed(LEG_W - 1 downto 0);  -- 2y, or its complement where y has the sign of x
   signal apart_3   : signed(LEG_W + 1 downto 0);
   signal leg_a_4   : signed(LEG_W - 1 downto 0);
   signal leg_b_4   : signed(LEG_W - 1 downto 0);
@@ -73,8 +74,8 @@ begin
   -- 3x less 2y, both taken as positive, with the sign of x
   alike_3  <= x_3(x_3'high) xnor y_3(y_3'high);
   triple_3 <= shift_left(resize(x_3, LEG_W), 1) + x_3;
-  apart_3  <= (resize(triple_3, LEG_W + 1) & alike_3) +
-              ((shift_left(resize(y_3, LEG_W), 1) xor (LEG_W - 1 downto 0 => alike_3)) & alike_3);
+  double_3 <= shift_left(resize(y_3, LEG_W), 1) xor (LEG_W - 1 downto 0 => alike_3);
+  apart_3  <= resize(triple_3 & alike_3, LEG_W + 2) + (double_3 & alike_3);
 
   mid_4   <= leg_a_4 when a_mid_4 = '1' else
              leg_b_4 when alike_4 = '1' else

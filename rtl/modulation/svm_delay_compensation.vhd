@@ -1,7 +1,8 @@
 -- Purpose: angle at which the voltage will act, theta_out = theta_me + k_delay*omega_me, modulo one turn.
 -- k_delay = 1.5*T_s*omega_base/(2*pi): a duty acts on average 1.5 sample times after the sampling instant.
 -- Formats: theta TURN U(0,18), omega_me PU, k_delay U(0,17).
--- Latency: 1 (the sum behind the product's register).  Rounding: product half up to TURN; the sum wraps, it is an angle.
+-- Latency: 1 (the sum is made behind the register of the product).
+-- Rounding: product half up to TURN; the sum wraps, it is an angle.
 
 library ieee;
 use ieee.std_logic_1164.all;
