@@ -111,7 +111,7 @@ MUTANTS = (
     ("q axis with d gains", "control/current_pi.vhd", "          kp_3 <= kp_q;\n", "          kp_3 <= kp_d;\n"),
     ("latch swaps b and c", "io/sample_latch.vhd", "code_b       <= adc_b;", "code_b       <= adc_c;"),
     ("temperature always a reading", "io/sample_latch.vhd", "temp_valid   <= temp_valid_in;", "temp_valid   <= '1';"),
-    ("q limit without compensation", "control/voltage_limit.vhd", "u_comp_q when valid(2)", "u_comp_d when valid(2)"),
+    ("q limit without compensation", "control/voltage_limit.vhd", "u_comp_q when others", "u_comp_d when others"),
     ("sum of three voltages wraps", "control/voltage_limit.vhd",
      "constant SUM_W   : positive := PU_W + 2;", "constant SUM_W   : positive := PU_W + 1;"),
     ("direction floors", "estimators/current_directions.vhd", 'rounding_base("0", DROP, SUM_W);', "(others => '0');"),

@@ -8,8 +8,8 @@
 -- Formats: sums exact; radicands (u_max - u)*(u_max + u) exact, U(0,32); PU out.
 -- Latency: 11; u_d is there with out_soon.  Interval: 12 (room is ready one clock after the output).
 -- The q axis' inputs are needed a clock after the d axis'.
--- Three beats through one adder, one comparison, one multiplier and one root: sum_d against limit, the EMF against
--- u_max, and sum_q, which waits for its limit.  Signs are taken off by inversion: |v| = (v xor s) + s, s the sign.
+-- One adder, one comparison, one multiplier and one root: sum_d against limit, the EMF against u_max, and sum_q, which
+-- grows out of the EMF in two more beats and waits for its limit.  Signs are taken off by inversion: |v| = (v xor s) + s, s the sign.
 -- Rounding: none but the root's, which errs inwards: the circle is never left.
 
 library ieee;
@@ -48,9 +48,10 @@ architecture rtl of voltage_limit is
   signal room : unsigned(U_MAX_W - 1 downto 0);
 
   signal valid      : std_logic_vector(0 to LATENCY);
-  signal pi_0       : signed(PU_W - 1 downto 0);
-  signal dec_0      : signed(PU_W - 1 downto 0);
-  signal comp_0     : signed(PU_W - 1 downto 0);
+  signal beat       : unsigned(1 downto 0);
+  signal part_0     : signed(SUM_W - 1 downto 0);
+  signal so_far_0   : signed(SUM_W - 1 downto 0);
+  signal next_0     : signed(PU_W - 1 downto 0);
   signal v_1        : signed(SUM_W - 1 downto 0);
   signal limit_1    : unsigned(U_MAX_W - 1 downto 0);
   signal v_2        : signed(SUM_W - 1 downto 0);
@@ -108,10 +109,15 @@ begin
 
   root_start <= valid(4) or valid(5);
 
-  -- The beat's voltages: the d axis while in_valid, then the EMF alone, then the q axis
-  pi_0   <= (others => '0') when valid(1) = '1' else u_pi_q when valid(2) = '1' else u_pi_d;
-  dec_0  <= u_dec_q when valid(1) = '1' or valid(2) = '1' else u_dec_d;
-  comp_0 <= (others => '0') when valid(1) = '1' else u_comp_q when valid(2) = '1' else u_comp_d;
+  -- The beat's voltages: the d axis while in_valid, then the EMF alone, then the rest of the q axis
+  part_0   <= resize(u_pi_d, SUM_W) + u_comp_d;
+  so_far_0 <= part_0 when beat = 0 else (others => '0') when beat = 1 else v_1;
+
+  with beat select next_0 <=
+    u_dec_d when "00",
+    u_dec_q when "01",
+    u_pi_q when "10",
+    u_comp_q when others;
 
   -- |v| or, beyond it, the limit, but for a carry where |v| is that of a negative number
   part_2  <= limit_2 when beyond_2 = '1' else
@@ -124,9 +130,10 @@ begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stages 1, 2, 3: v = u_pi + u_dec + u_comp of the d axis, the EMF, the q axis;  limit = min(u_max, room), u_max
-      if valid(0) = '1' or valid(1) = '1' or valid(2) = '1' then
-        v_1 <= resize(pi_0, SUM_W) + resize(dec_0, SUM_W) + resize(comp_0, SUM_W);
+      -- Stages 1 to 4: v = u_pi + u_dec + u_comp of the d axis, the EMF, the q axis;  limit = min(u_max, room), u_max
+      beat <= (valid(1) or valid(2)) & (valid(0) or valid(2));
+      if valid(0) = '1' or beat /= 0 then
+        v_1 <= so_far_0 + next_0;
       end if;
       if valid(0) = '1' or valid(1) = '1' then
         limit_1 <= u_max;
@@ -178,6 +185,7 @@ begin
 
       if rst = '1' then
         valid(1 to LATENCY) <= (others => '0');
+        beat                <= (others => '0');
         sat_d               <= (others => '0');
         sat_q               <= (others => '0');
         room                <= (others => '1');
