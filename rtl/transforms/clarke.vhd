@@ -41,8 +41,8 @@ architecture rtl of clarke is
   signal sum_1    : signed(SUM_W - 1 downto 0);
   signal factor_1 : signed(PU_W - 1 downto 0);
   signal prod_2   : signed(PROD_W - 1 downto 0);
-  signal half_2   : signed(PROD_W - 1 downto 0);
-  signal sum_3    : signed(PROD_W - 1 downto 0);
+  signal half_2   : signed(CLARKE_DROP_ALPHA + PU_W downto 0);
+  signal sum_3    : signed(CLARKE_DROP_ALPHA + PU_W downto 0);
   signal i_3      : signed(PU_W - 1 downto 0);
 begin
   valid(0) <= in_valid;
@@ -51,7 +51,7 @@ begin
   first_0  <= shift_left(resize(i_a, SUM_W), 1) when valid(1) = '1' else resize(i_b, SUM_W);
   second_0 <= both_1 when valid(1) = '1' else resize(i_c, SUM_W);
 
-  half_2 <= half(CLARKE_DROP_ALPHA, PROD_W) when valid(3) = '1' else half(CLARKE_DROP_BETA, PROD_W);
+  half_2 <= half(CLARKE_DROP_ALPHA, half_2'length) when valid(3) = '1' else half(CLARKE_DROP_BETA, half_2'length);
   i_3    <= saturate(sum_3(CLARKE_DROP_ALPHA + PU_W downto CLARKE_DROP_ALPHA), PU_W) when valid(4) = '1' else
             saturate(sum_3(CLARKE_DROP_BETA + PU_W downto CLARKE_DROP_BETA), PU_W);
 
@@ -79,7 +79,7 @@ begin
 
       -- Stages 3, 4: half an LSB to round with
       if valid(2) = '1' or valid(3) = '1' then
-        sum_3 <= prod_2 + half_2;
+        sum_3 <= prod_2(sum_3'range) + half_2;
       end if;
 
       -- Stages 4, 5: i_beta, then i_alpha, narrowed

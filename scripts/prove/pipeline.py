@@ -95,14 +95,15 @@ PATTERNS = (
     ("valid survives reset", "        valid(1 to LATENCY) <= (others => '0');\n", "        null;\n"),
     ("valid survives reset", "out_valid <= '0';", "null;"),
 )
+SOON = ("first outputs told with the last", "out_soon  <= valid(LATENCY - 1);", "out_soon  <= valid(LATENCY);")
 
 
 def faults(block: Block) -> tuple[Fault, ...]:
-    """Up to two faults of the strobe, in the block or in the entity that does its work."""
+    """Up to two faults of the strobe and one of out_soon, in the block or in the entity that does its work."""
     made: dict[str, Fault] = {}
     for file in fault_files(block):
         text = (ROOT / "rtl" / file).read_text()
-        for says, old, new in PATTERNS:
+        for says, old, new in (*PATTERNS, *((SOON,) if block.soon else ())):
             if text.count(old) == 1:
                 made.setdefault(says, Fault(says, file, old, new))
     return tuple(made.values())
