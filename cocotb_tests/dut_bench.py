@@ -60,6 +60,11 @@ async def equals_model(dut):
             if valid != clock.out_valid:
                 wrong = [("out_valid", valid, clock.out_valid)]
                 raise AssertionError(report(block, config, seed, number, clock.of_sample, rows, wrong))
+            if block.soon:
+                pairs = [("out_soon", read(dut.out_soon, False), int(bool(clock.soon)))]
+                pairs += [(n, read(h, s), clock.soon[n]) for n, h, s in outputs if n in clock.soon]
+                if wrong := [row for row in pairs if row[1] != row[2]]:
+                    raise AssertionError(report(block, config, seed, number, clock.of_sample, rows, wrong))
         if block.atomic:
             seen = [read(handle, signed) for _, handle, signed in outputs]
             if held is not None and not clock.out_valid and seen != held:

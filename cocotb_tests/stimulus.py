@@ -2,7 +2,7 @@
 
 Every registered block gets the same treatment: all corner combinations of its ports (sampled where there
 are too many), its own hard cases, seeded random values; samples back to back and with gaps; inputs that
-turn to noise as soon as the contract lets them; resets in mid-stream, with samples in flight.
+are noise before and after the contract wants them; resets in mid-stream, with samples in flight.
 """
 
 from __future__ import annotations
@@ -32,6 +32,7 @@ class Clock:
     out_valid: int = 0
     of_sample: int = -1  # index of the sample whose outputs are due here
     expected: dict[str, int] = field(default_factory=dict)
+    soon: dict[str, int] = field(default_factory=dict)  # outputs due with out_soon
 
 
 def corner_values(port: Port) -> list[int]:
@@ -102,6 +103,9 @@ def schedule(block: Block, config: dict[str, int], seed: int) -> list[Clock]:
             clocks.append(Clock(writes))
 
     due: list[tuple[int, int, dict[str, int]]] = []
+    soon: list[tuple[int, int, dict[str, int]]] = []
+    late = [p for p in noise_ports if p.late]
+    arrivals: list[tuple[int, Port, int, int]] = []
     for index, row in enumerate(samples(block, config, seed)):
         wanted_registers = {p.name: row[p.name] for p in block.registers}
         start = max(len(clocks), last + block.interval)
@@ -117,6 +121,7 @@ def schedule(block: Block, config: dict[str, int], seed: int) -> list[Clock]:
             clocks.append(Clock(dict(row), in_valid=int(rng.integers(2)), rst=1))
             registers = wanted_registers
             due = [d for d in due if d[0] < len(clocks)]
+            soon = [d for d in soon if d[0] < len(clocks)]
             state = block.state
         pad_to(max(len(clocks), last + block.interval))
         last = len(clocks)
@@ -124,7 +129,15 @@ def schedule(block: Block, config: dict[str, int], seed: int) -> list[Clock]:
         registers = wanted_registers
         state, outputs = block.run(state, row, config)
         due.append((last + block.latency, index, outputs))
+        if block.soon:
+            soon.append((last + block.latency - 1, index, {name: outputs[name] for name in block.soon}))
+        arrivals += [(last, p, row[p.name], random_value(rng, p)) for p in late]
     pad_to(len(clocks) + 2 * block.latency + 2)
+    for start, port, value, noise in arrivals:
+        clocks[start].writes[port.name] = noise
+        clocks[start + port.late].writes[port.name] = value
+    for when, index, outputs in soon:
+        clocks[when].of_sample, clocks[when].soon = index, outputs
     for when, index, outputs in due:
         clocks[when].out_valid, clocks[when].of_sample, clocks[when].expected = 1, index, outputs
     return clocks

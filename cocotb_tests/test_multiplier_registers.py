@@ -7,7 +7,7 @@ import copy
 import numpy as np
 import pytest
 
-from scripts.synth.multiplier_registers import BITS, absorb
+from scripts.synth.multiplier_registers import BITS, absorb, merge_twins
 
 CLOCK, ENABLE_1, ENABLE_2, RESET, FIRST = 2, 3, 4, 5, 10
 CLOCKS = 60
@@ -149,3 +149,46 @@ def test_the_simulation_sees_a_wrong_register():
     absorb(after, "t")
     del after["modules"]["t"]["cells"]["m"]["parameters"]["REG_INPUTA_CLK"]
     assert simulate(before, 0) != simulate(after, 0)
+
+
+def with_twin(**changes) -> dict:
+    """A product whose top bit two flip-flops hold, as they do where a product is wider than it needs to be."""
+    netlist = design()
+    module = netlist["modules"]["t"]
+    top, twin = module["cells"]["P35"]["connections"]["DI"][0], 9999
+    module["cells"]["twin"] = flip_flop(top, twin, **changes)
+    module["ports"]["y"]["bits"].append(twin)
+    return netlist
+
+
+@pytest.mark.parametrize(("changes", "gone"), [({}, 1), ({"enable": ENABLE_1}, 0), ({"LSR": RESET}, 0)])
+def test_twins_become_one(changes, gone):
+    before = with_twin(**changes)
+    after = copy.deepcopy(before)
+    assert absorb(copy.deepcopy(before), "t")["P"] == 0
+    assert merge_twins(after["modules"]["t"]) == gone
+    assert absorb(after, "t")["P"] == gone
+    assert simulate(after, 3) == simulate(before, 3)
+
+
+@pytest.mark.parametrize(
+    ("cells", "moved"),
+    [(["LUT4"], 1), (["LUT4", "PFUMX"], 1), (["LUT4", "LUT4"], 0), (["CCU2C"], 0), (["LUT4", "CCU2C"], 0)],
+)
+def test_operands_behind_logic_stay_out(cells, moved):
+    """An operand's register moves into the multiplier from behind one LUT, not from behind more."""
+    netlist = design()
+    module = netlist["modules"]["t"]
+    bit = module["cells"]["A0"]["connections"]["DI"][0]
+    for n, kind in enumerate(cells):
+        directions = {"A": "input", "Z": "output"}
+        nets = {"A": [bit], "Z": [9000 + n]}
+        module["cells"][f"logic_{n}"] = {
+            "type": kind,
+            "parameters": {},
+            "connections": nets,
+            "port_directions": directions,
+        }
+        bit = 9000 + n
+    module["cells"]["A0"]["connections"]["DI"] = [bit]
+    assert absorb(netlist, "t")["A"] == moved

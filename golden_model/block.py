@@ -4,9 +4,12 @@ The contract every block keeps, in the model and in the RTL:
 
 * A sample enters on the clock edge at which ``in_valid`` is high.  Its inputs stay as they are for
   ``interval`` clocks from that edge, which is also the least distance of two samples.
+* An input that is declared ``late`` is there that many clocks later, and not needed before.
 * Registers change only while no sample is in flight.
 * ``out_valid`` is high ``latency`` clocks later, for one clock, and the outputs stay until the next
   sample's may change them; those of an ``atomic`` block change together, with ``out_valid`` only.
+* The outputs named in ``soon`` are there a clock earlier, told by a second strobe, ``out_soon``: a block that
+  needs them first starts there and takes the others late.
 * ``rst`` is synchronous and active high.  It empties the pipeline and brings the state to
   ``state``; it promises nothing about the outputs, which nobody may read without ``out_valid``.
 * A clocked block (``clocked=True``) has no strobes: each clock is a sample, latency is one.
@@ -21,7 +24,7 @@ state has ``step(state, ...)`` and returns ``(state, outputs)``, state being a N
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from golden_model.fixed import Format
@@ -37,6 +40,7 @@ class Port:
     lo: int | None = None
     hi: int | None = None
     doc: str = ""
+    late: int = 0  # an input's: clocks after in_valid, less than the block's interval
 
     @property
     def low(self) -> int:
@@ -84,6 +88,7 @@ class Block:
     interval: int = 1
     clocked: bool = False
     atomic: bool = False  # outputs change with out_valid only
+    soon: tuple[str, ...] = ()  # outputs that are there with out_soon, a clock before out_valid
     shown_with: Mapping[str, str] = field(default_factory=dict)  # clocked: output -> the valid it means something with
     after_reset: Mapping[str, int] = field(default_factory=dict)  # clocked: outputs that reset does not bring to zero
     constants: Mapping[str, int | Const] = field(default_factory=dict)
@@ -102,7 +107,7 @@ class Block:
 
     def _sized(self, port: Port, config: Mapping[str, int]) -> Port:
         size = self.width_from.get(port.name)
-        return port if size is None else Port(port.name, size(config), port.lo, port.hi, port.doc)
+        return port if size is None else replace(port, fmt=size(config))
 
     def run(self, state, values: Mapping[str, int], config: Mapping[str, int]):
         """One sample by name: returns (next state, {output: integer})."""

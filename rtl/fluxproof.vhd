@@ -192,26 +192,27 @@ architecture rtl of fluxproof is
   signal i_q_ext              : signed(PU_W - 1 downto 0);
   signal speed_mode           : std_logic;
   signal run                  : std_logic;
-  signal current_valid        : std_logic;
+  signal current_soon         : std_logic;
   signal theta_valid          : std_logic;
   signal omega_valid          : std_logic;
   signal u_dc_valid           : std_logic;
   signal reciprocal_valid     : std_logic;
   signal inverse              : unsigned(U_DC_PROCESSING_INVERSE_W - 1 downto 0);
   signal inverse_beta         : unsigned(U_DC_PROCESSING_INVERSE_W - 1 downto 0);
-  signal alpha_beta_valid     : std_logic;
+  signal alpha_beta_soon      : std_logic;
   signal i_alpha              : signed(PU_W - 1 downto 0);
   signal i_beta               : signed(PU_W - 1 downto 0);
   signal trig_valid           : std_logic;
   signal cos_theta            : signed(PU_W - 1 downto 0);
   signal sin_theta            : signed(PU_W - 1 downto 0);
+  signal dq_soon              : std_logic;
   signal dq_valid             : std_logic;
-  signal i_q_ref_valid        : std_logic;
   signal pi_valid             : std_logic;
   signal u_pi_d               : signed(PU_W - 1 downto 0);
   signal u_pi_q               : signed(PU_W - 1 downto 0);
   signal lambda_valid         : std_logic;
   signal decoupling_valid     : std_logic;
+  signal dq_voltage_soon      : std_logic;
   signal dq_voltage_valid     : std_logic;
   signal theta_out_valid      : std_logic;
   signal theta_out            : unsigned(TURN_W - 1 downto 0);
@@ -252,6 +253,7 @@ architecture rtl of fluxproof is
   signal temp_valid           : std_logic;
   signal s_alpha              : signed(PU_W - 1 downto 0);
   signal s_beta               : signed(PU_W - 1 downto 0);
+  signal comp_soon            : std_logic;
   signal comp_valid           : std_logic;
   signal period_valid         : std_logic;
   signal guard_busy           : std_logic;
@@ -337,7 +339,8 @@ begin
       gain_a          => gain_a,
       gain_b          => gain_b,
       gain_c          => gain_c,
-      out_valid       => current_valid,
+      out_soon        => current_soon,
+      out_valid       => open,
       i_a             => i_a,
       i_b             => i_b,
       i_c             => i_c,
@@ -410,11 +413,12 @@ begin
     port map (
       clk       => clk,
       rst       => rst,
-      in_valid  => current_valid,
+      in_valid  => current_soon,
       i_a       => i_a,
       i_b       => i_b,
       i_c       => i_c,
-      out_valid => alpha_beta_valid,
+      out_soon  => alpha_beta_soon,
+      out_valid => open,
       i_alpha   => i_alpha,
       i_beta    => i_beta
     );
@@ -434,11 +438,12 @@ begin
     port map (
       clk       => clk,
       rst       => rst,
-      in_valid  => alpha_beta_valid,
+      in_valid  => alpha_beta_soon,
       i_alpha   => i_alpha,
       i_beta    => i_beta,
       cos_theta => cos_theta,
       sin_theta => sin_theta,
+      out_soon  => dq_soon,
       out_valid => dq_valid,
       i_d       => i_d,
       i_q       => i_q
@@ -457,7 +462,7 @@ begin
       speed_kp      => speed_kp,
       speed_ki      => speed_ki,
       i_max         => i_max,
-      out_valid     => i_q_ref_valid,
+      out_valid     => open,
       i_q_ref       => i_q_ref,
       speed_limited => speed_limited
     );
@@ -466,7 +471,7 @@ begin
     port map (
       clk       => clk,
       rst       => rst,
-      in_valid  => i_q_ref_valid,
+      in_valid  => dq_soon,
       i_d       => i_d,
       i_q       => i_q,
       i_d_ref   => i_d_ref,
@@ -478,6 +483,7 @@ begin
       ki_d      => ki_d,
       kp_q      => kp_q,
       ki_q      => ki_q,
+      out_soon  => open,
       out_valid => pi_valid,
       u_pi_d    => u_pi_d,
       u_pi_q    => u_pi_q,
@@ -611,6 +617,7 @@ begin
       i_beta    => u_comp_beta,
       cos_theta => cos_out,
       sin_theta => sin_out,
+      out_soon  => comp_soon,
       out_valid => comp_valid,
       i_d       => u_comp_d,
       i_q       => u_comp_q
@@ -625,6 +632,7 @@ begin
       i_beta    => s_beta,
       cos_theta => cos_out,
       sin_theta => sin_out,
+      out_soon  => open,
       out_valid => open,
       i_d       => d_d,
       i_q       => d_q
@@ -634,7 +642,7 @@ begin
     port map (
       clk       => clk,
       rst       => rst,
-      in_valid  => comp_valid,
+      in_valid  => comp_soon,
       u_pi_d    => u_pi_d,
       u_pi_q    => u_pi_q,
       u_dec_d   => u_dec_d,
@@ -642,6 +650,7 @@ begin
       u_comp_d  => u_comp_d,
       u_comp_q  => u_comp_q,
       u_max     => u_max,
+      out_soon  => dq_voltage_soon,
       out_valid => dq_voltage_valid,
       u_d       => u_d,
       u_q       => u_q,
@@ -653,7 +662,7 @@ begin
     port map (
       clk       => clk,
       rst       => rst,
-      in_valid  => dq_voltage_valid,
+      in_valid  => dq_voltage_soon,
       u_d       => u_d,
       u_q       => u_q,
       cos_theta => cos_out,
@@ -951,7 +960,7 @@ begin
     port map (
       clk             => clk,
       rst             => rst,
-      in_valid        => current_valid,
+      in_valid        => u_dc_valid,
       i_a             => i_a,
       i_b             => i_b,
       i_c             => i_c,

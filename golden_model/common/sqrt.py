@@ -27,6 +27,19 @@ _USED = range(1 << (ADDRESS_BITS - 2), 1 << ADDRESS_BITS)
 BASE_ROM = tuple(_EDGES[k] if k in _USED else 0 for k in range(1 << ADDRESS_BITS))
 SLOPE_ROM = tuple(_EDGES[k + 1] - _EDGES[k] if k in _USED else 0 for k in range(1 << ADDRESS_BITS))
 BASE, SLOPE = np.array(BASE_ROM), np.array(SLOPE_ROM)
+# What the RTL stores, one table for each quarter in use: the leading bit, always one there, is left out.
+BASE_LOW, SLOPE_LOW = Format(0, -1, ROOT.frac_bits), Format(0, SLOPE_FMT.int_bits - 1, SLOPE_FMT.frac_bits)
+
+
+def quarter(rom, fmt, number):
+    """(format, integers) of the table of one quarter, without the bit above ``fmt``, which must be one."""
+    size = 1 << (ADDRESS_BITS - 2)
+    low = [value - (1 << fmt.width) for value in rom[number * size : (number + 1) * size]]
+    if not all(0 <= value <= fmt.hi for value in low):
+        raise ValueError(f"quarter {number} of the square root's table has an entry without its leading bit")
+    return fmt, low
+
+
 DROP_X = X.width - ADDRESS_BITS - REST_BITS
 DROP_OUT = ROOT.frac_bits - U_MAX.frac_bits
 
@@ -69,9 +82,13 @@ BLOCK = Block(
     step=step,
     inputs=(Port("x", X, doc="radicand"),),
     outputs=(Port("root", U_MAX, doc="square root, never above the true one"),),
-    latency=6,
+    latency=5,
     constants={"DROP_X": DROP_X, "DROP_OUT": DROP_OUT, "REST_BITS": REST_BITS},
-    roms={"BASE": (ROOT, list(BASE_ROM)), "SLOPE": (SLOPE_FMT, list(SLOPE_ROM))},
+    roms={
+        f"{name}_{number}": quarter(rom, fmt, number)
+        for name, rom, fmt in (("BASE", BASE_ROM, BASE_LOW), ("SLOPE", SLOPE_ROM, SLOPE_LOW))
+        for number in (1, 2, 3)
+    },
     reference=reference,
     bound=bound,
     stimuli=stimuli,

@@ -45,7 +45,7 @@ BLOCK = Block(
         Port("u_dec_d", PU, doc="rotational voltage, d axis"),
         Port("u_dec_q", PU, doc="rotational voltage, q axis"),
     ),
-    latency=3,
+    latency=2,
     constants={"DROP": DROP},
     reference=reference,
     bound=bound,

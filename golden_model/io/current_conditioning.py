@@ -78,6 +78,7 @@ BLOCK = Block(
     outputs=tuple(Port(f"i_{x}", PU, doc=f"current, phase {x}") for x in "abc")
     + (Port("current_at_rail", Format(0, 3, 0), doc="bit x: code of phase x at its end"),),
     latency=5,
+    soon=("i_b", "i_c"),
     interval=3,
     constants={"DROP": DROP},
     configs=({"ADC_BITS": 16}, {"ADC_BITS": 14}, {"ADC_BITS": 12}),

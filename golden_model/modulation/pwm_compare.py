@@ -78,7 +78,7 @@ BLOCK = Block(
     inputs=tuple(Port(f"duty_{k}", DUTY, hi=DUTY_ONE, doc=f"duty, leg {k}") for k in "abc"),
     registers=(Port("min_pulse", CLOCKS, doc="shortest pulse of a leg, clocks"),),
     outputs=tuple(Port(f"compare_{k}", COUNT, doc=f"compare value, leg {k}") for k in "abc"),
-    latency=5,
+    latency=7,
     interval=3,
     atomic=True,
     constants={"DROP": DROP},

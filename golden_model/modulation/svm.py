@@ -94,7 +94,7 @@ BLOCK = Block(
         Port("inverse_beta", INVERSE, doc="sqrt(3)/2/u_dc"),
     ),
     outputs=tuple(Port(f"duty_{k}", DUTY, hi=DUTY_ONE, doc=f"duty, leg {k}") for k in "abc"),
-    latency=5,
+    latency=6,
     constants={"DROP_SCALED": DROP_SCALED, "SCALED_W": SCALED_W, "HALF": HALF, "DROP_DUTY": DROP_DUTY},
     reference=reference,
     bound=bound,

@@ -38,7 +38,7 @@ BLOCK = Block(
     inputs=(Port("theta_me", TURN, doc="electrical angle"), Port("omega_me", PU, doc="electrical speed")),
     registers=(Port("k_delay", K_DELAY, doc="turns per unit of speed"),),
     outputs=(Port("theta_out", TURN, doc="electrical angle when the voltage acts"),),
-    latency=2,
+    latency=1,
     constants={"DROP": DROP},
     reference=reference,
     bound=bound,

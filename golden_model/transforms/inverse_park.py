@@ -36,7 +36,7 @@ BLOCK = Block(
     step=step,
     inputs=(
         Port("u_d", PU, doc="voltage, d axis"),
-        Port("u_q", PU, doc="voltage, q axis"),
+        Port("u_q", PU, late=1, doc="voltage, q axis"),
         *rotate.TRIG_PORTS,
     ),
     outputs=(Port("u_alpha", PU, doc="voltage, alpha"), Port("u_beta", PU, doc="voltage, beta")),

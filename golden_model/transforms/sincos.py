@@ -89,7 +89,11 @@ BLOCK = Block(
         "TABLE_SHIFT": TABLE_SHIFT,
         "DROP_OUT": DROP_OUT,
     },
-    roms={"SINE": (TABLE, list(SINE_ROM)), "DELTA": (DELTA, list(DELTA_ROM))},
+    roms={
+        "SINE": (TABLE, list(SINE_ROM)),
+        "DELTA": (DELTA, list(DELTA_ROM)),
+        "MINUS_DELTA": (DELTA, [-delta for delta in DELTA_ROM]),
+    },
     reference=reference,
     bound=bound,
     stimuli=stimuli,

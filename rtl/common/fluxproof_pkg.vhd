@@ -36,85 +36,81 @@ package fluxproof_pkg is
 
   -- fluxproof: clocks from the raw sample to the duties, least distance of two samples
   constant FLUXPROOF_SAMPLE_TO_DUTY : positive := 40;
-  constant FLUXPROOF_SAMPLE_INTERVAL : positive := 57;
+  constant FLUXPROOF_SAMPLE_INTERVAL : positive := 56;
 
   -- register_access: clocks that a write waits for the end of a sample
-  constant REGISTER_PATIENCE : positive := 73;
+  constant REGISTER_PATIENCE : positive := 72;
 
   -- sqrt: 001, section 5.2: voltage limit of the current regulation
-  constant SQRT_LATENCY : positive := 6;
+  constant SQRT_LATENCY : positive := 5;
   constant SQRT_DROP_X : natural := 12;
   constant SQRT_DROP_OUT : natural := 2;
   constant SQRT_REST_BITS : natural := 12;
-  type sqrt_base_t is array (0 to 255) of unsigned(17 downto 0);
-  constant SQRT_BASE : sqrt_base_t := (  -- U(0,18)
-    18x"00000", 18x"00000", 18x"00000", 18x"00000", 18x"00000", 18x"00000", 18x"00000", 18x"00000",
-    18x"00000", 18x"00000", 18x"00000", 18x"00000", 18x"00000", 18x"00000", 18x"00000", 18x"00000",
-    18x"00000", 18x"00000", 18x"00000", 18x"00000", 18x"00000", 18x"00000", 18x"00000", 18x"00000",
-    18x"00000", 18x"00000", 18x"00000", 18x"00000", 18x"00000", 18x"00000", 18x"00000", 18x"00000",
-    18x"00000", 18x"00000", 18x"00000", 18x"00000", 18x"00000", 18x"00000", 18x"00000", 18x"00000",
-    18x"00000", 18x"00000", 18x"00000", 18x"00000", 18x"00000", 18x"00000", 18x"00000", 18x"00000",
-    18x"00000", 18x"00000", 18x"00000", 18x"00000", 18x"00000", 18x"00000", 18x"00000", 18x"00000",
-    18x"00000", 18x"00000", 18x"00000", 18x"00000", 18x"00000", 18x"00000", 18x"00000", 18x"00000",
-    18x"20000", 18x"203fc", 18x"207f0", 18x"20bdc", 18x"20fc1", 18x"2139f", 18x"21776", 18x"21b46",
-    18x"21f0e", 18x"222d0", 18x"2268c", 18x"22a41", 18x"22df0", 18x"23199", 18x"2353b", 18x"238d8",
-    18x"23c6e", 18x"24000", 18x"2438b", 18x"24711", 18x"24a91", 18x"24e0d", 18x"25182", 18x"254f3",
-    18x"2585f", 18x"25bc6", 18x"25f28", 18x"26285", 18x"265dd", 18x"26931", 18x"26c80", 18x"26fcb",
-    18x"27311", 18x"27653", 18x"27991", 18x"27cca", 18x"28000", 18x"28331", 18x"2865e", 18x"28987",
-    18x"28cac", 18x"28fce", 18x"292eb", 18x"29605", 18x"2991b", 18x"29c2d", 18x"29f3c", 18x"2a248",
-    18x"2a54f", 18x"2a854", 18x"2ab55", 18x"2ae52", 18x"2b14d", 18x"2b444", 18x"2b737", 18x"2ba28",
-    18x"2bd15", 18x"2c000", 18x"2c2e7", 18x"2c5cb", 18x"2c8ac", 18x"2cb8a", 18x"2ce65", 18x"2d13e",
-    18x"2d413", 18x"2d6e6", 18x"2d9b6", 18x"2dc83", 18x"2df4d", 18x"2e215", 18x"2e4da", 18x"2e79c",
-    18x"2ea5c", 18x"2ed19", 18x"2efd4", 18x"2f28c", 18x"2f542", 18x"2f7f5", 18x"2faa5", 18x"2fd54",
-    18x"30000", 18x"302a9", 18x"30550", 18x"307f5", 18x"30a97", 18x"30d38", 18x"30fd6", 18x"31271",
-    18x"3150b", 18x"317a2", 18x"31a38", 18x"31ccb", 18x"31f5c", 18x"321ea", 18x"32477", 18x"32702",
-    18x"3298b", 18x"32c11", 18x"32e96", 18x"33118", 18x"33399", 18x"33618", 18x"33895", 18x"33b0f",
-    18x"33d88", 18x"34000", 18x"34275", 18x"344e8", 18x"3475a", 18x"349c9", 18x"34c37", 18x"34ea3",
-    18x"3510e", 18x"35376", 18x"355dd", 18x"35842", 18x"35aa6", 18x"35d08", 18x"35f68", 18x"361c6",
-    18x"36423", 18x"3667e", 18x"368d7", 18x"36b2f", 18x"36d86", 18x"36fda", 18x"3722d", 18x"3747f",
-    18x"376cf", 18x"3791d", 18x"37b6a", 18x"37db6", 18x"38000", 18x"38248", 18x"3848f", 18x"386d4",
-    18x"38918", 18x"38b5b", 18x"38d9c", 18x"38fdc", 18x"3921a", 18x"39457", 18x"39692", 18x"398cc",
-    18x"39b05", 18x"39d3c", 18x"39f72", 18x"3a1a7", 18x"3a3da", 18x"3a60c", 18x"3a83d", 18x"3aa6c",
-    18x"3ac9a", 18x"3aec7", 18x"3b0f2", 18x"3b31d", 18x"3b545", 18x"3b76d", 18x"3b994", 18x"3bbb9",
-    18x"3bddd", 18x"3c000", 18x"3c221", 18x"3c441", 18x"3c660", 18x"3c87e", 18x"3ca9b", 18x"3ccb7",
-    18x"3ced1", 18x"3d0ea", 18x"3d303", 18x"3d519", 18x"3d72f", 18x"3d944", 18x"3db58", 18x"3dd6a",
-    18x"3df7b", 18x"3e18c", 18x"3e39b", 18x"3e5a9", 18x"3e7b6", 18x"3e9c2", 18x"3ebcc", 18x"3edd6",
-    18x"3efdf", 18x"3f1e7", 18x"3f3ed", 18x"3f5f3", 18x"3f7f7", 18x"3f9fb", 18x"3fbfd", 18x"3fdff"
+  type sqrt_base_1_t is array (0 to 63) of unsigned(16 downto 0);
+  constant SQRT_BASE_1 : sqrt_base_1_t := (  -- U(-1,18)
+    17x"00000", 17x"003fc", 17x"007f0", 17x"00bdc", 17x"00fc1", 17x"0139f", 17x"01776", 17x"01b46",
+    17x"01f0e", 17x"022d0", 17x"0268c", 17x"02a41", 17x"02df0", 17x"03199", 17x"0353b", 17x"038d8",
+    17x"03c6e", 17x"04000", 17x"0438b", 17x"04711", 17x"04a91", 17x"04e0d", 17x"05182", 17x"054f3",
+    17x"0585f", 17x"05bc6", 17x"05f28", 17x"06285", 17x"065dd", 17x"06931", 17x"06c80", 17x"06fcb",
+    17x"07311", 17x"07653", 17x"07991", 17x"07cca", 17x"08000", 17x"08331", 17x"0865e", 17x"08987",
+    17x"08cac", 17x"08fce", 17x"092eb", 17x"09605", 17x"0991b", 17x"09c2d", 17x"09f3c", 17x"0a248",
+    17x"0a54f", 17x"0a854", 17x"0ab55", 17x"0ae52", 17x"0b14d", 17x"0b444", 17x"0b737", 17x"0ba28",
+    17x"0bd15", 17x"0c000", 17x"0c2e7", 17x"0c5cb", 17x"0c8ac", 17x"0cb8a", 17x"0ce65", 17x"0d13e"
   );
-  type sqrt_slope_t is array (0 to 255) of unsigned(9 downto 0);
-  constant SQRT_SLOPE : sqrt_slope_t := (  -- U(-8,18)
-    10x"000", 10x"000", 10x"000", 10x"000", 10x"000", 10x"000", 10x"000", 10x"000",
-    10x"000", 10x"000", 10x"000", 10x"000", 10x"000", 10x"000", 10x"000", 10x"000",
-    10x"000", 10x"000", 10x"000", 10x"000", 10x"000", 10x"000", 10x"000", 10x"000",
-    10x"000", 10x"000", 10x"000", 10x"000", 10x"000", 10x"000", 10x"000", 10x"000",
-    10x"000", 10x"000", 10x"000", 10x"000", 10x"000", 10x"000", 10x"000", 10x"000",
-    10x"000", 10x"000", 10x"000", 10x"000", 10x"000", 10x"000", 10x"000", 10x"000",
-    10x"000", 10x"000", 10x"000", 10x"000", 10x"000", 10x"000", 10x"000", 10x"000",
-    10x"000", 10x"000", 10x"000", 10x"000", 10x"000", 10x"000", 10x"000", 10x"000",
-    10x"3fc", 10x"3f4", 10x"3ec", 10x"3e5", 10x"3de", 10x"3d7", 10x"3d0", 10x"3c8",
-    10x"3c2", 10x"3bc", 10x"3b5", 10x"3af", 10x"3a9", 10x"3a2", 10x"39d", 10x"396",
-    10x"392", 10x"38b", 10x"386", 10x"380", 10x"37c", 10x"375", 10x"371", 10x"36c",
-    10x"367", 10x"362", 10x"35d", 10x"358", 10x"354", 10x"34f", 10x"34b", 10x"346",
-    10x"342", 10x"33e", 10x"339", 10x"336", 10x"331", 10x"32d", 10x"329", 10x"325",
-    10x"322", 10x"31d", 10x"31a", 10x"316", 10x"312", 10x"30f", 10x"30c", 10x"307",
-    10x"305", 10x"301", 10x"2fd", 10x"2fb", 10x"2f7", 10x"2f3", 10x"2f1", 10x"2ed",
-    10x"2eb", 10x"2e7", 10x"2e4", 10x"2e1", 10x"2de", 10x"2db", 10x"2d9", 10x"2d5",
-    10x"2d3", 10x"2d0", 10x"2cd", 10x"2ca", 10x"2c8", 10x"2c5", 10x"2c2", 10x"2c0",
-    10x"2bd", 10x"2bb", 10x"2b8", 10x"2b6", 10x"2b3", 10x"2b0", 10x"2af", 10x"2ac",
-    10x"2a9", 10x"2a7", 10x"2a5", 10x"2a2", 10x"2a1", 10x"29e", 10x"29b", 10x"29a",
-    10x"297", 10x"296", 10x"293", 10x"291", 10x"28e", 10x"28d", 10x"28b", 10x"289",
-    10x"286", 10x"285", 10x"282", 10x"281", 10x"27f", 10x"27d", 10x"27a", 10x"279",
-    10x"278", 10x"275", 10x"273", 10x"272", 10x"26f", 10x"26e", 10x"26c", 10x"26b",
-    10x"268", 10x"267", 10x"265", 10x"264", 10x"262", 10x"260", 10x"25e", 10x"25d",
-    10x"25b", 10x"259", 10x"258", 10x"257", 10x"254", 10x"253", 10x"252", 10x"250",
-    10x"24e", 10x"24d", 10x"24c", 10x"24a", 10x"248", 10x"247", 10x"245", 10x"244",
-    10x"243", 10x"241", 10x"240", 10x"23e", 10x"23d", 10x"23b", 10x"23a", 10x"239",
-    10x"237", 10x"236", 10x"235", 10x"233", 10x"232", 10x"231", 10x"22f", 10x"22e",
-    10x"22d", 10x"22b", 10x"22b", 10x"228", 10x"228", 10x"227", 10x"225", 10x"224",
-    10x"223", 10x"221", 10x"220", 10x"21f", 10x"21e", 10x"21d", 10x"21c", 10x"21a",
-    10x"219", 10x"219", 10x"216", 10x"216", 10x"215", 10x"214", 10x"212", 10x"211",
-    10x"211", 10x"20f", 10x"20e", 10x"20d", 10x"20c", 10x"20a", 10x"20a", 10x"209",
-    10x"208", 10x"206", 10x"206", 10x"204", 10x"204", 10x"202", 10x"202", 10x"201"
+  type sqrt_base_2_t is array (0 to 63) of unsigned(16 downto 0);
+  constant SQRT_BASE_2 : sqrt_base_2_t := (  -- U(-1,18)
+    17x"0d413", 17x"0d6e6", 17x"0d9b6", 17x"0dc83", 17x"0df4d", 17x"0e215", 17x"0e4da", 17x"0e79c",
+    17x"0ea5c", 17x"0ed19", 17x"0efd4", 17x"0f28c", 17x"0f542", 17x"0f7f5", 17x"0faa5", 17x"0fd54",
+    17x"10000", 17x"102a9", 17x"10550", 17x"107f5", 17x"10a97", 17x"10d38", 17x"10fd6", 17x"11271",
+    17x"1150b", 17x"117a2", 17x"11a38", 17x"11ccb", 17x"11f5c", 17x"121ea", 17x"12477", 17x"12702",
+    17x"1298b", 17x"12c11", 17x"12e96", 17x"13118", 17x"13399", 17x"13618", 17x"13895", 17x"13b0f",
+    17x"13d88", 17x"14000", 17x"14275", 17x"144e8", 17x"1475a", 17x"149c9", 17x"14c37", 17x"14ea3",
+    17x"1510e", 17x"15376", 17x"155dd", 17x"15842", 17x"15aa6", 17x"15d08", 17x"15f68", 17x"161c6",
+    17x"16423", 17x"1667e", 17x"168d7", 17x"16b2f", 17x"16d86", 17x"16fda", 17x"1722d", 17x"1747f"
+  );
+  type sqrt_base_3_t is array (0 to 63) of unsigned(16 downto 0);
+  constant SQRT_BASE_3 : sqrt_base_3_t := (  -- U(-1,18)
+    17x"176cf", 17x"1791d", 17x"17b6a", 17x"17db6", 17x"18000", 17x"18248", 17x"1848f", 17x"186d4",
+    17x"18918", 17x"18b5b", 17x"18d9c", 17x"18fdc", 17x"1921a", 17x"19457", 17x"19692", 17x"198cc",
+    17x"19b05", 17x"19d3c", 17x"19f72", 17x"1a1a7", 17x"1a3da", 17x"1a60c", 17x"1a83d", 17x"1aa6c",
+    17x"1ac9a", 17x"1aec7", 17x"1b0f2", 17x"1b31d", 17x"1b545", 17x"1b76d", 17x"1b994", 17x"1bbb9",
+    17x"1bddd", 17x"1c000", 17x"1c221", 17x"1c441", 17x"1c660", 17x"1c87e", 17x"1ca9b", 17x"1ccb7",
+    17x"1ced1", 17x"1d0ea", 17x"1d303", 17x"1d519", 17x"1d72f", 17x"1d944", 17x"1db58", 17x"1dd6a",
+    17x"1df7b", 17x"1e18c", 17x"1e39b", 17x"1e5a9", 17x"1e7b6", 17x"1e9c2", 17x"1ebcc", 17x"1edd6",
+    17x"1efdf", 17x"1f1e7", 17x"1f3ed", 17x"1f5f3", 17x"1f7f7", 17x"1f9fb", 17x"1fbfd", 17x"1fdff"
+  );
+  type sqrt_slope_1_t is array (0 to 63) of unsigned(8 downto 0);
+  constant SQRT_SLOPE_1 : sqrt_slope_1_t := (  -- U(-9,18)
+    9x"1fc", 9x"1f4", 9x"1ec", 9x"1e5", 9x"1de", 9x"1d7", 9x"1d0", 9x"1c8",
+    9x"1c2", 9x"1bc", 9x"1b5", 9x"1af", 9x"1a9", 9x"1a2", 9x"19d", 9x"196",
+    9x"192", 9x"18b", 9x"186", 9x"180", 9x"17c", 9x"175", 9x"171", 9x"16c",
+    9x"167", 9x"162", 9x"15d", 9x"158", 9x"154", 9x"14f", 9x"14b", 9x"146",
+    9x"142", 9x"13e", 9x"139", 9x"136", 9x"131", 9x"12d", 9x"129", 9x"125",
+    9x"122", 9x"11d", 9x"11a", 9x"116", 9x"112", 9x"10f", 9x"10c", 9x"107",
+    9x"105", 9x"101", 9x"0fd", 9x"0fb", 9x"0f7", 9x"0f3", 9x"0f1", 9x"0ed",
+    9x"0eb", 9x"0e7", 9x"0e4", 9x"0e1", 9x"0de", 9x"0db", 9x"0d9", 9x"0d5"
+  );
+  type sqrt_slope_2_t is array (0 to 63) of unsigned(8 downto 0);
+  constant SQRT_SLOPE_2 : sqrt_slope_2_t := (  -- U(-9,18)
+    9x"0d3", 9x"0d0", 9x"0cd", 9x"0ca", 9x"0c8", 9x"0c5", 9x"0c2", 9x"0c0",
+    9x"0bd", 9x"0bb", 9x"0b8", 9x"0b6", 9x"0b3", 9x"0b0", 9x"0af", 9x"0ac",
+    9x"0a9", 9x"0a7", 9x"0a5", 9x"0a2", 9x"0a1", 9x"09e", 9x"09b", 9x"09a",
+    9x"097", 9x"096", 9x"093", 9x"091", 9x"08e", 9x"08d", 9x"08b", 9x"089",
+    9x"086", 9x"085", 9x"082", 9x"081", 9x"07f", 9x"07d", 9x"07a", 9x"079",
+    9x"078", 9x"075", 9x"073", 9x"072", 9x"06f", 9x"06e", 9x"06c", 9x"06b",
+    9x"068", 9x"067", 9x"065", 9x"064", 9x"062", 9x"060", 9x"05e", 9x"05d",
+    9x"05b", 9x"059", 9x"058", 9x"057", 9x"054", 9x"053", 9x"052", 9x"050"
+  );
+  type sqrt_slope_3_t is array (0 to 63) of unsigned(8 downto 0);
+  constant SQRT_SLOPE_3 : sqrt_slope_3_t := (  -- U(-9,18)
+    9x"04e", 9x"04d", 9x"04c", 9x"04a", 9x"048", 9x"047", 9x"045", 9x"044",
+    9x"043", 9x"041", 9x"040", 9x"03e", 9x"03d", 9x"03b", 9x"03a", 9x"039",
+    9x"037", 9x"036", 9x"035", 9x"033", 9x"032", 9x"031", 9x"02f", 9x"02e",
+    9x"02d", 9x"02b", 9x"02b", 9x"028", 9x"028", 9x"027", 9x"025", 9x"024",
+    9x"023", 9x"021", 9x"020", 9x"01f", 9x"01e", 9x"01d", 9x"01c", 9x"01a",
+    9x"019", 9x"019", 9x"016", 9x"016", 9x"015", 9x"014", 9x"012", 9x"011",
+    9x"011", 9x"00f", 9x"00e", 9x"00d", 9x"00c", 9x"00a", 9x"00a", 9x"009",
+    9x"008", 9x"006", 9x"006", 9x"004", 9x"004", 9x"002", 9x"002", 9x"001"
   );
 
   -- reciprocal: 001, section 5.2, U_dc processing: division by 2**n / m
@@ -137,7 +133,7 @@ package fluxproof_pkg is
   constant SPEED_DROP_STATE : natural := 4;
 
   -- u_dc_conditioning: 001, section 5.2, I/O conditioning
-  constant U_DC_CONDITIONING_LATENCY : positive := 5;
+  constant U_DC_CONDITIONING_LATENCY : positive := 6;
   constant U_DC_CONDITIONING_DROP_U_DC : natural := 15;
   constant U_DC_CONDITIONING_DROP_U_MAX : natural := 17;
 
@@ -151,7 +147,7 @@ package fluxproof_pkg is
   constant U_DC_PROCESSING_SHIFT_CLOCKS : natural := 3;
 
   -- clarke: 001, eq. (1): stator frame
-  constant CLARKE_LATENCY : positive := 4;
+  constant CLARKE_LATENCY : positive := 5;
   constant CLARKE_THIRD : signed(17 downto 0) := to_signed(87381, 18);  -- 0.333333333 as U(-1,18), signed for the multiplier
   constant CLARKE_INV_SQRT3 : signed(17 downto 0) := to_signed(75674, 18);  -- 0.577350269 as U(0,17), signed for the multiplier
   constant CLARKE_DROP_ALPHA : natural := 18;
@@ -305,13 +301,24 @@ package fluxproof_pkg is
     13x"0648", 13x"06ad", 13x"0712", 13x"0776", 13x"07db", 13x"083f", 13x"08a4", 13x"0908",
     13x"096d", 13x"09d1", 13x"0a36", 13x"0a9a", 13x"0aff", 13x"0b63", 13x"0bc8", 13x"0c2c"
   );
+  type sincos_minus_delta_t is array (0 to 63) of signed(12 downto 0);
+  constant SINCOS_MINUS_DELTA : sincos_minus_delta_t := (  -- S(-10,22)
+    13x"0c91", 13x"0c2c", 13x"0bc8", 13x"0b63", 13x"0aff", 13x"0a9a", 13x"0a36", 13x"09d1",
+    13x"096d", 13x"0908", 13x"08a4", 13x"083f", 13x"07db", 13x"0776", 13x"0712", 13x"06ad",
+    13x"0648", 13x"05e4", 13x"057f", 13x"051b", 13x"04b6", 13x"0452", 13x"03ed", 13x"0389",
+    13x"0324", 13x"02c0", 13x"025b", 13x"01f7", 13x"0192", 13x"012e", 13x"00c9", 13x"0065",
+    13x"0000", 13x"1f9b", 13x"1f37", 13x"1ed2", 13x"1e6e", 13x"1e09", 13x"1da5", 13x"1d40",
+    13x"1cdc", 13x"1c77", 13x"1c13", 13x"1bae", 13x"1b4a", 13x"1ae5", 13x"1a81", 13x"1a1c",
+    13x"19b8", 13x"1953", 13x"18ee", 13x"188a", 13x"1825", 13x"17c1", 13x"175c", 13x"16f8",
+    13x"1693", 13x"162f", 13x"15ca", 13x"1566", 13x"1501", 13x"149d", 13x"1438", 13x"13d4"
+  );
 
   -- rotate: 001, eq. (9): T_dq/alphabeta
-  constant ROTATE_LATENCY : positive := 4;
+  constant ROTATE_LATENCY : positive := 5;
   constant ROTATE_DROP : natural := 16;
 
   -- park: 001, eq. (9): T_alphabeta/dq
-  constant PARK_LATENCY : positive := 4;
+  constant PARK_LATENCY : positive := 5;
 
   -- speed_pi: 001, section 5.3: speed regulator with limited current reference
   constant SPEED_PI_LATENCY : positive := 6;
@@ -320,40 +327,40 @@ package fluxproof_pkg is
   constant SPEED_PI_PROPORTIONAL_W : natural := 32;
 
   -- current_pi: 001, Fig. 8 and section 5.2: PI_idq
-  constant CURRENT_PI_LATENCY : positive := 6;
+  constant CURRENT_PI_LATENCY : positive := 7;
   constant CURRENT_PI_DROP_P : natural := 4;
   constant CURRENT_PI_DROP_I : natural := 12;
   constant CURRENT_PI_PROPORTIONAL_W : natural := 32;
 
   -- chord_speed: 001, eq. (2), for a voltage that is held during a sample
-  constant CHORD_SPEED_LATENCY : positive := 6;
+  constant CHORD_SPEED_LATENCY : positive := 9;
   constant CHORD_SPEED_DROP_SQUARE : natural := 18;
   constant CHORD_SPEED_DROP_PART : natural := 17;
   constant CHORD_SPEED_DROP : natural := 20;
 
   -- decoupling: 001, eq. (2), 'dq decoupling term' of Fig. 8
-  constant DECOUPLING_LATENCY : positive := 3;
+  constant DECOUPLING_LATENCY : positive := 2;
   constant DECOUPLING_DROP : natural := 16;
 
   -- voltage_limit: 001, Fig. 1: decoupling at the regulators' output; limit of the space-vector modulation
   constant VOLTAGE_LIMIT_LATENCY : positive := 11;
 
   -- svm_delay_compensation: 001, section 5.2, SVM delay compensation
-  constant SVM_DELAY_COMPENSATION_LATENCY : positive := 2;
+  constant SVM_DELAY_COMPENSATION_LATENCY : positive := 1;
   constant SVM_DELAY_COMPENSATION_DROP : natural := 15;
 
   -- inverse_park: 001, eq. (9): T_dq/alphabeta
-  constant INVERSE_PARK_LATENCY : positive := 4;
+  constant INVERSE_PARK_LATENCY : positive := 5;
 
   -- svm: 001, section 5.2, SVM with U_dc = 2**n/m
-  constant SVM_LATENCY : positive := 5;
+  constant SVM_LATENCY : positive := 6;
   constant SVM_DROP_SCALED : natural := 16;
   constant SVM_SCALED_W : natural := 19;
   constant SVM_HALF : natural := 262144;
   constant SVM_DROP_DUTY : natural := 3;
 
   -- pwm_compare: 001, section 5.2, IGBT pulse generation
-  constant PWM_COMPARE_LATENCY : positive := 5;
+  constant PWM_COMPARE_LATENCY : positive := 7;
   constant PWM_COMPARE_DROP : natural := 16;
 
   -- gate_generation: 001, section 5.2, IGBT pulse generation
@@ -382,7 +389,7 @@ package fluxproof_pkg is
   constant CURRENT_MODEL_DROP : natural := 13;
 
   -- flux_inverse_park: 001, eq. (9): T_dq/alphabeta
-  constant FLUX_INVERSE_PARK_LATENCY : positive := 4;
+  constant FLUX_INVERSE_PARK_LATENCY : positive := 5;
 
   -- flux_merge: 001, eq. (7); 'Merge of voltage and current models' of Fig. 8
   constant FLUX_MERGE_LATENCY : positive := 25;
@@ -396,7 +403,7 @@ package fluxproof_pkg is
   constant FLUX_MERGE_X_TO_STATE : natural := 6;
 
   -- flux_park: 001, eq. (9): T_alphabeta/dq
-  constant FLUX_PARK_LATENCY : positive := 4;
+  constant FLUX_PARK_LATENCY : positive := 5;
 
   -- flux_estimate: 001, eq. (17)
   constant FLUX_ESTIMATE_LATENCY : positive := 3;
@@ -483,7 +490,7 @@ package fluxproof_pkg is
   -- telemetry_words: none: what a recording needs
   constant TELEMETRY_WORDS_LATENCY : positive := 2;
   constant TELEMETRY_WORDS_COUNT : natural := 24;
-  constant TELEMETRY_WORDS_START : natural := 35;
+  constant TELEMETRY_WORDS_START : natural := 34;
   constant TELEMETRY_WORDS_INDEX_W : natural := 5;
 
   -- telemetry: none: what a recording needs
@@ -495,7 +502,7 @@ package fluxproof_pkg is
   constant SAMPLE_GUARD_AHEAD : natural := 2;
 
   -- sample_checks: none: what a drive needs besides
-  constant SAMPLE_CHECKS_LATENCY : positive := 1;
+  constant SAMPLE_CHECKS_LATENCY : positive := 4;
   constant SAMPLE_CHECKS_DROP_LIMIT : natural := 8;
   constant SAMPLE_CHECKS_DROP_JUMP : natural := 5;
   constant SAMPLE_CHECKS_WARM : natural := 2;

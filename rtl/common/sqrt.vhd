@@ -1,7 +1,9 @@
 -- Purpose: square root by table and chord, never above the true root.
 --   x = mantissa * 4**-shift, mantissa in [1/4, 1);  root = (BASE + SLOPE*rest) * 2**-shift
 -- Formats: x U(0,32); mantissa cut to 20 bits, 8 of address and 12 of rest; tables U(0,18); root U(0,16).
--- Latency: 6.  Rounding: every step floors, so the result errs downwards only; no saturation is reachable.
+-- A table for each quarter that mantissas are in; they leave out the leading bit, which is one.  x = 0 takes those of
+-- the second quarter with a base below 1/2 and no rest: its root is floored to 0.
+-- Latency: 5.  Rounding: every step floors, so the result errs downwards only; no saturation is reachable.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -29,7 +31,11 @@ architecture rtl of sqrt is
   signal x_1        : unsigned(31 downto 0);
   signal shift_1    : unsigned(1 downto 0);
   signal mantissa_2 : unsigned(19 downto 0);
+  signal quarter_2  : unsigned(1 downto 0);
+  signal address_2  : natural range 0 to 63;
   signal shift_2    : unsigned(3 downto 0);
+  signal base_2     : unsigned(16 downto 0);
+  signal slope_2    : unsigned(8 downto 0);
   signal base_3     : unsigned(17 downto 0);
   signal slope_3    : unsigned(9 downto 0);
   signal rest_3     : unsigned(11 downto 0);
@@ -37,9 +43,9 @@ architecture rtl of sqrt is
   signal prod_4     : signed(23 downto 0);
   signal base_4     : unsigned(17 downto 0);
   signal shift_4    : unsigned(3 downto 0);
-  signal fine_5     : signed(18 + SQRT_REST_BITS downto 0);
-  signal shift_5    : unsigned(3 downto 0);
-  signal nibbles_5  : unsigned(U_MAX_W - 1 downto 0);
+  signal fine_4     : signed(18 + SQRT_REST_BITS downto 0);
+  signal root_5     : unsigned(U_MAX_W - 1 downto 0);
+  signal shift_5    : unsigned(1 downto 0);
 
   -- Which of four groups of bits is the first with a one in it; the last where none of the others has.
   function leading_zeros (first, second, third : std_logic) return unsigned is
@@ -47,11 +53,20 @@ architecture rtl of sqrt is
     return (not first and not second) & (not first and (second or not third));
   end function;
 begin
-  valid(0)  <= in_valid;
-  bytes_0   <= leading_zeros(or x(31 downto 24), or x(23 downto 16), or x(15 downto 8));
-  pairs_1   <= leading_zeros(or x_1(31 downto 30), or x_1(29 downto 28), or x_1(27 downto 26));
-  nibbles_5 <= shift_right(unsigned(fine_5(17 + SQRT_REST_BITS downto SQRT_REST_BITS + SQRT_DROP_OUT)),
-                           to_integer(shift_5(3 downto 2) & "00"));
+  valid(0) <= in_valid;
+  bytes_0  <= leading_zeros(or x(31 downto 24), or x(23 downto 16), or x(15 downto 8));
+  pairs_1  <= leading_zeros(or x_1(31 downto 30), or x_1(29 downto 28), or x_1(27 downto 26));
+
+  quarter_2 <= mantissa_2(19 downto 18);
+  address_2 <= to_integer(mantissa_2(17 downto SQRT_REST_BITS));
+  base_2    <= SQRT_BASE_3(address_2) when quarter_2 = 3 else
+               SQRT_BASE_2(address_2) when quarter_2 = 2 else
+               SQRT_BASE_1(address_2);
+  slope_2   <= SQRT_SLOPE_3(address_2) when quarter_2 = 3 else
+               SQRT_SLOPE_2(address_2) when quarter_2 = 2 else
+               SQRT_SLOPE_1(address_2);
+
+  fine_4 <= prod_4 + shift_left(signed(resize(base_4, fine_4'length)), SQRT_REST_BITS);
 
   process (clk)
   begin
@@ -72,8 +87,8 @@ begin
 
       -- Stage 3: base, slope from the table
       if valid(2) = '1' then
-        base_3  <= SQRT_BASE(to_integer(mantissa_2(19 downto SQRT_REST_BITS)));
-        slope_3 <= SQRT_SLOPE(to_integer(mantissa_2(19 downto SQRT_REST_BITS)));
+        base_3  <= (or quarter_2) & base_2;
+        slope_3 <= '1' & slope_2;
         rest_3  <= mantissa_2(SQRT_REST_BITS - 1 downto 0);
         shift_3 <= shift_2;
       end if;
@@ -85,15 +100,11 @@ begin
         shift_4 <= shift_3;
       end if;
 
-      -- Stage 5: fine = base + prod, its bits below the table's still there
+      -- Stage 5: root = fine * 2**-shift, floored: fine = base + prod, shifted by whole nibbles, here
       if valid(4) = '1' then
-        fine_5  <= prod_4 + shift_left(signed(resize(base_4, fine_5'length)), SQRT_REST_BITS);
-        shift_5 <= shift_4;
-      end if;
-
-      -- Stage 6: root = fine * 2**-shift, floored; by whole nibbles, then by the rest
-      if valid(5) = '1' then
-        root <= resize(shift_right(nibbles_5, to_integer(shift_5(1 downto 0))), U_MAX_W);
+        root_5  <= shift_right(unsigned(fine_4(17 + SQRT_REST_BITS downto SQRT_REST_BITS + SQRT_DROP_OUT)),
+                               to_integer(shift_4(3 downto 2) & "00"));
+        shift_5 <= shift_4(1 downto 0);
       end if;
 
       if rst = '1' then
@@ -102,6 +113,8 @@ begin
     end if;
   end process;
 
+  -- The rest of the shift, behind the register
+  root      <= shift_right(root_5, to_integer(shift_5));
   out_valid <= valid(LATENCY);
 
 end architecture rtl;

@@ -2,7 +2,7 @@
 --   omega_chord = omega_me - k_chord*omega_me**3
 -- Three products one after the other, through one multiplier.
 -- Formats: PU in and out; omega_me**2 U(3,14), k_chord U(-6,23), their product U(-3,20).
--- Latency: 6.  Interval: 5.
+-- Latency: 9.  Interval: 8.
 -- Rounding: every product half up.  No saturation: k_chord*omega_me**2 < 1/16, so the result keeps its sign.
 
 library ieee;
@@ -30,43 +30,52 @@ architecture rtl of chord_speed is
   signal mul_a    : signed(PU_W - 1 downto 0);
   signal mul_b    : signed(PU_W - 1 downto 0);
   signal prod     : signed(2 * PU_W - 1 downto 0);
-  signal square_2 : signed(PU_W - 1 downto 0);
-  signal part_4   : signed(PU_W - 1 downto 0);
-  signal omega_5  : signed(PU_W - 1 downto 0);
+  signal square_3 : signed(PU_W - 1 downto 0);
+  signal part_6   : signed(PU_W - 1 downto 0);
+  signal omega_8  : signed(PU_W - 1 downto 0);
 begin
   valid(0) <= in_valid;
-
-  mul_a <= square_2 when valid(2) = '1' else part_4 when valid(4) = '1' else omega_me;
-  mul_b <= signed('0' & k_chord) when valid(2) = '1' else omega_me;
 
   process (clk)
   begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stages 1, 3, 5: prod = omega_me*omega_me, square*k_chord, part*omega_me
-      if valid(0) = '1' or valid(2) = '1' or valid(4) = '1' then
+      -- Stages 1, 4, 7: the factors
+      if valid(0) = '1' or valid(3) = '1' or valid(6) = '1' then
+        mul_a <= omega_me;
+        mul_b <= omega_me;
+        if valid(3) = '1' then
+          mul_a <= square_3;
+          mul_b <= signed('0' & k_chord);
+        elsif valid(6) = '1' then
+          mul_a <= part_6;
+        end if;
+      end if;
+
+      -- Stages 2, 5, 8: prod = omega_me*omega_me, square*k_chord, part*omega_me
+      if valid(1) = '1' or valid(4) = '1' or valid(7) = '1' then
         prod <= mul_a * mul_b;
       end if;
 
-      -- Stage 2: square = prod, narrowed; at most 4, so it fits
-      if valid(1) = '1' then
-        square_2 <= resize(round_half_up(prod, CHORD_SPEED_DROP_SQUARE), PU_W);
+      -- Stage 3: square = prod, narrowed; at most 4, so it fits
+      if valid(2) = '1' then
+        square_3 <= resize(round_half_up(prod, CHORD_SPEED_DROP_SQUARE), PU_W);
       end if;
 
-      -- Stage 4: part = prod, narrowed; at most 1/16, so it fits
-      if valid(3) = '1' then
-        part_4 <= resize(round_half_up(prod, CHORD_SPEED_DROP_PART), PU_W);
-      end if;
-
-      -- Stage 5: the next sample may bring its speed
-      if valid(4) = '1' then
-        omega_5 <= omega_me;
-      end if;
-
-      -- Stage 6: omega_chord = omega - prod, narrowed
+      -- Stage 6: part = prod, narrowed; at most 1/16, so it fits
       if valid(5) = '1' then
-        omega_chord <= omega_5 - resize(round_half_up(prod, CHORD_SPEED_DROP), PU_W);
+        part_6 <= resize(round_half_up(prod, CHORD_SPEED_DROP_PART), PU_W);
+      end if;
+
+      -- Stage 8: the next sample may bring its speed
+      if valid(7) = '1' then
+        omega_8 <= omega_me;
+      end if;
+
+      -- Stage 9: omega_chord = omega - prod, narrowed
+      if valid(8) = '1' then
+        omega_chord <= omega_8 - resize(round_half_up(prod, CHORD_SPEED_DROP), PU_W);
       end if;
 
       if rst = '1' then

@@ -3,7 +3,8 @@
 --   int += ki*err unless the voltage was at its limit and err pushes further
 -- sat_d, sat_q (-1, 0, +1): the limit that held the axis in the sample before.  run = 0: all zero.
 -- Formats: err PU, proportional part 28 fraction bits, integral S(1,28), output PU.
--- Latency: 6 (d, q follow each other).  Interval: 3.
+-- Latency: 7 (d, q follow each other: i_q and i_q_ref are needed a clock after i_d, u_pi_d comes with out_soon).
+-- Interval: 3.
 -- Rounding: half up.  err, integral and output saturate at 2 per unit, twice what the limiter grants; the
 -- proportional part needs no limit of its own, as what it asks for beyond 2 is cut anyway, and the increment none,
 -- as ki < 1.
@@ -30,6 +31,7 @@ entity current_pi is
     ki_d      : in  unsigned(KI_W - 1 downto 0);
     kp_q      : in  unsigned(KP_W - 1 downto 0);
     ki_q      : in  unsigned(KI_W - 1 downto 0);
+    out_soon  : out std_logic;
     out_valid : out std_logic;
     u_pi_d    : out signed(PU_W - 1 downto 0);
     u_pi_q    : out signed(PU_W - 1 downto 0);
@@ -56,14 +58,20 @@ architecture rtl of current_pi is
   signal hold_1   : std_logic;
   signal err_2    : signed(PU_W - 1 downto 0);
   signal prod_i_2 : signed(PU_W + KI_W downto 0);
+  signal hold_2   : std_logic;
   signal run_2    : std_logic;
   signal err_3    : signed(PU_W - 1 downto 0);
   signal kp_3     : unsigned(KP_W - 1 downto 0);
   signal sum_i_3  : signed(PU_W + KI_W downto 0);
+  signal hold_3   : std_logic;
+  signal old_3    : signed(INTEGRAL_W - 1 downto 0);
+  signal run_3    : std_logic;
   signal prod_p_4 : signed(PU_W + KP_W downto 0);
   signal half_4   : signed(INTEGRAL_W downto 0);
-  signal sum_p_4  : signed(SUM_W - 1 downto 0);
-  signal u_pi_4   : signed(PU_W - 1 downto 0);
+  signal run_4    : std_logic;
+  signal sum_p_5  : signed(SUM_W - 1 downto 0);
+  signal run_5    : std_logic;
+  signal u_pi_5   : signed(PU_W - 1 downto 0);
 begin
   valid(0) <= in_valid;
 
@@ -73,8 +81,8 @@ begin
 
   hold_1 <= not run_1 or (sat_1(1) and err_1(err_1'high)) or (sat_1(0) and not sat_1(1) and not err_1(err_1'high));
 
-  sum_p_4 <= resize(prod_p_4, SUM_W) + (half_4 & half(CURRENT_PI_DROP_P, CURRENT_PI_DROP_P));
-  u_pi_4  <= saturate(shift_right(sum_p_4, CURRENT_PI_DROP_P + PU_TO_INTEGRAL), PU_W);
+  u_pi_5 <= (others => '0') when run_5 = '0' else
+            saturate(shift_right(sum_p_5, CURRENT_PI_DROP_P + PU_TO_INTEGRAL), PU_W);
 
   process (clk)
     variable integral : signed(INTEGRAL_W - 1 downto 0);
@@ -94,35 +102,37 @@ begin
         end if;
       end if;
 
-      -- Stage 2: prod_i = ki*err unless held or not running
+      -- Stage 2: prod_i = ki*err
       if valid(1) = '1' or valid(2) = '1' then
         prod_i_2 <= err_1 * signed('0' & ki_1);
+        hold_2   <= hold_1;
         err_2    <= err_1;
         run_2    <= run_1;
-      end if;
-      if hold_1 = '1' then
-        prod_i_2 <= (others => '0');
       end if;
 
       -- Stage 3: int + prod_i, with half an LSB to round with
       if valid(2) = '1' or valid(3) = '1' then
         sum_i_3 <= prod_i_2 + (integral_2 & half(CURRENT_PI_DROP_I, CURRENT_PI_DROP_I));
+        hold_3  <= hold_2;
+        old_3   <= integral_2;
+        run_3   <= run_2;
         err_3   <= err_2;
         kp_3    <= kp_d;
-        if run_2 = '0' then
-          err_3 <= (others => '0');
-        end if;
         if valid(3) = '1' then
           kp_3 <= kp_q;
         end if;
       end if;
 
-      -- Stage 4: int, narrowed;  prod_p = kp*err;  half an LSB of the output to round with
+      -- Stage 4: int, narrowed, or the old one where held;  prod_p = kp*err;  half an LSB of the output to round with
       if valid(3) = '1' or valid(4) = '1' then
-        integral   := saturate(shift_right(sum_i_3, CURRENT_PI_DROP_I), INTEGRAL_W);
+        integral := old_3;
+        if hold_3 = '0' then
+          integral := saturate(shift_right(sum_i_3, CURRENT_PI_DROP_I), INTEGRAL_W);
+        end if;
         integral_4 <= integral;
         half_4     <= integral + half(PU_TO_INTEGRAL, INTEGRAL_W + 1);
         prod_p_4   <= err_3 * signed('0' & kp_3);
+        run_4      <= run_3;
       end if;
 
       -- The turn of the integrals: to that of q once the d axis has taken its own, and back for the next sample;
@@ -134,14 +144,24 @@ begin
         integral_2 <= (others => '0');
       end if;
 
-      -- Stage 5: u_pi = proportional + int, narrowed; d at clock 5, q at 6
+      -- Stage 5: proportional + int
+      if valid(4) = '1' or valid(5) = '1' then
+        sum_p_5 <= resize(prod_p_4, SUM_W) + (half_4 & half(CURRENT_PI_DROP_P, CURRENT_PI_DROP_P));
+        run_5   <= run_4;
+      end if;
       if valid(4) = '1' then
-        u_pi_d  <= u_pi_4;
         u_int_d <= integral_4;
       end if;
       if valid(5) = '1' then
-        u_pi_q  <= u_pi_4;
         u_int_q <= integral_4;
+      end if;
+
+      -- Stage 6: u_pi, narrowed; d at clock 6, q at 7; zero while not running
+      if valid(5) = '1' then
+        u_pi_d <= u_pi_5;
+      end if;
+      if valid(6) = '1' then
+        u_pi_q <= u_pi_5;
       end if;
 
       if rst = '1' then
@@ -152,6 +172,7 @@ begin
     end if;
   end process;
 
+  out_soon  <= valid(LATENCY - 1);
   out_valid <= valid(LATENCY);
 
 end architecture rtl;

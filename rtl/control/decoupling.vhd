@@ -1,7 +1,7 @@
 -- Purpose: rotational voltages, the last term of paper 001 eq. (2).
 --   u_dec_d = -omega_chord*lambda_q;  u_dec_q = omega_chord*lambda_d
 -- Formats: PU in and out; products exact.
--- Latency: 3.  Rounding: half up, saturated at 2 per unit, twice the largest voltage that the limiter grants.
+-- Latency: 2.  Rounding: half up, saturated at 2 per unit, twice the largest voltage that the limiter grants.
 -- -v is not v and a carry, so that -v rounded half up is not (v - half - 1) floored, and -half - 1 is not half.
 
 library ieee;
@@ -30,10 +30,14 @@ architecture rtl of decoupling is
   signal valid    : std_logic_vector(0 to LATENCY);
   signal prod_d_1 : signed(2 * PU_W - 1 downto 0);
   signal prod_q_1 : signed(2 * PU_W - 1 downto 0);
-  signal prod_d_2 : signed(2 * PU_W - 1 downto 0);
-  signal prod_q_2 : signed(2 * PU_W - 1 downto 0);
+  signal sum_d_1  : signed(2 * PU_W - 1 downto 0);
+  signal sum_q_1  : signed(2 * PU_W - 1 downto 0);
 begin
   valid(0) <= in_valid;
+
+  -- Half an LSB to round with
+  sum_d_1 <= prod_d_1 + not half(DECOUPLING_DROP, 2 * PU_W);
+  sum_q_1 <= prod_q_1 + half(DECOUPLING_DROP, 2 * PU_W);
 
   process (clk)
   begin
@@ -46,16 +50,10 @@ begin
         prod_q_1 <= omega_chord * lambda_d;
       end if;
 
-      -- Stage 2: half an LSB to round with
+      -- Stage 2: u_dec = -prod_d and prod_q, narrowed
       if valid(1) = '1' then
-        prod_d_2 <= prod_d_1 + not half(DECOUPLING_DROP, 2 * PU_W);
-        prod_q_2 <= prod_q_1 + half(DECOUPLING_DROP, 2 * PU_W);
-      end if;
-
-      -- Stage 3: u_dec = -prod_d and prod_q, narrowed
-      if valid(2) = '1' then
-        u_dec_d <= saturate(shift_right(not prod_d_2, DECOUPLING_DROP), PU_W);
-        u_dec_q <= saturate(shift_right(prod_q_2, DECOUPLING_DROP), PU_W);
+        u_dec_d <= saturate(shift_right(not sum_d_1, DECOUPLING_DROP), PU_W);
+        u_dec_q <= saturate(shift_right(sum_q_1, DECOUPLING_DROP), PU_W);
       end if;
 
       if rst = '1' then

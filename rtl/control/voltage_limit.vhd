@@ -6,9 +6,10 @@
 -- Room: d comes first in what the EMF of the last sample leaves, so that the q axis can always hold its EMF;
 -- without it the drive has a second stable point at high speed, see the model.
 -- Formats: sums exact; radicands (u_max - u)*(u_max + u) exact, U(0,32); PU out.
--- Latency: 11.  Interval: 12 (room is ready one clock after the output).
--- Three beats through one adder, one comparison, one multiplier and one root: sum_d against limit, the EMF against
--- u_max, and sum_q, which waits for its limit.  Signs are taken off by inversion: |v| = (v xor s) + s, s the sign.
+-- Latency: 11; u_d is there with out_soon.  Interval: 12 (room is ready one clock after the output).
+-- The q axis' inputs are needed a clock after the d axis'.
+-- One adder, one comparison, one multiplier and one root: sum_d against limit, the EMF against u_max, and sum_q, which
+-- grows out of the EMF in two more beats and waits for its limit.  Signs are taken off by inversion: |v| = (v xor s) + s, s the sign.
 -- Rounding: none but the root's, which errs inwards: the circle is never left.
 
 library ieee;
@@ -29,6 +30,7 @@ entity voltage_limit is
     u_comp_d  : in  signed(PU_W - 1 downto 0);
     u_comp_q  : in  signed(PU_W - 1 downto 0);
     u_max     : in  unsigned(U_MAX_W - 1 downto 0);
+    out_soon  : out std_logic;
     out_valid : out std_logic;
     u_d       : out signed(PU_W - 1 downto 0);
     u_q       : out signed(PU_W - 1 downto 0);
@@ -46,9 +48,10 @@ architecture rtl of voltage_limit is
   signal room : unsigned(U_MAX_W - 1 downto 0);
 
   signal valid      : std_logic_vector(0 to LATENCY);
-  signal pi_0       : signed(PU_W - 1 downto 0);
-  signal dec_0      : signed(PU_W - 1 downto 0);
-  signal comp_0     : signed(PU_W - 1 downto 0);
+  signal beat       : unsigned(1 downto 0);
+  signal part_0     : signed(SUM_W - 1 downto 0);
+  signal so_far_0   : signed(SUM_W - 1 downto 0);
+  signal next_0     : signed(PU_W - 1 downto 0);
   signal v_1        : signed(SUM_W - 1 downto 0);
   signal limit_1    : unsigned(U_MAX_W - 1 downto 0);
   signal v_2        : signed(SUM_W - 1 downto 0);
@@ -60,6 +63,7 @@ architecture rtl of voltage_limit is
   signal hi_3       : unsigned(PART_W - 1 downto 0);
   signal radicand_4 : unsigned(31 downto 0);
   signal root_start : std_logic;
+  signal root_9     : unsigned(U_MAX_W - 1 downto 0);
   signal root_10    : unsigned(U_MAX_W - 1 downto 0);
   signal beyond_10  : std_logic;
 
@@ -100,22 +104,25 @@ begin
       in_valid  => root_start,
       x         => radicand_4,
       out_valid => open,
-      root      => root_10
+      root      => root_9
     );
 
   root_start <= valid(4) or valid(5);
 
-  -- The beat's voltages: the d axis while in_valid, then the EMF alone, then the q axis
-  pi_0   <= (others => '0') when valid(1) = '1' else u_pi_q when valid(2) = '1' else u_pi_d;
-  dec_0  <= u_dec_q when valid(1) = '1' or valid(2) = '1' else u_dec_d;
-  comp_0 <= (others => '0') when valid(1) = '1' else u_comp_q when valid(2) = '1' else u_comp_d;
+  -- The beat's voltages: the d axis while in_valid, then the EMF alone, then the rest of the q axis
+  part_0   <= resize(u_pi_d, SUM_W) + u_comp_d;
+  so_far_0 <= part_0 when beat = 0 else (others => '0') when beat = 1 else v_1;
+
+  with beat select next_0 <=
+    u_dec_d when "00",
+    u_dec_q when "01",
+    u_pi_q when "10",
+    u_comp_q when others;
 
   -- |v| or, beyond it, the limit, but for a carry where |v| is that of a negative number
   part_2  <= limit_2 when beyond_2 = '1' else
              unsigned(v_2(U_MAX_W - 1 downto 0)) xor (U_MAX_W - 1 downto 0 => v_2(v_2'high));
   carry_2 <= v_2(v_2'high) and not beyond_2;
-
-  beyond_10 <= beyond(v_1, root_10);
 
   process (clk)
     variable high, low : unsigned(PART_W downto 0);
@@ -123,9 +130,10 @@ begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stages 1, 2, 3: v = u_pi + u_dec + u_comp of the d axis, the EMF, the q axis;  limit = min(u_max, room), u_max
-      if valid(0) = '1' or valid(1) = '1' or valid(2) = '1' then
-        v_1 <= resize(pi_0, SUM_W) + resize(dec_0, SUM_W) + resize(comp_0, SUM_W);
+      -- Stages 1 to 4: v = u_pi + u_dec + u_comp of the d axis, the EMF, the q axis;  limit = min(u_max, room), u_max
+      beat <= (valid(1) or valid(2)) & (valid(0) or valid(2));
+      if valid(0) = '1' or beat /= 0 then
+        v_1 <= so_far_0 + next_0;
       end if;
       if valid(0) = '1' or valid(1) = '1' then
         limit_1 <= u_max;
@@ -153,9 +161,15 @@ begin
         hi_3 <= high(PART_W downto 1);
       end if;
 
-      -- Stages 4, 5: radicand = lo*hi;  stages 5 to 11: its root
+      -- Stages 4, 5: radicand = lo*hi;  stages 5 to 10: its root
       if valid(3) = '1' or valid(4) = '1' then
         radicand_4 <= resize(lo_3 * hi_3, 32);
+      end if;
+
+      -- Stage 10: is sum_q beyond the root
+      if valid(9) = '1' or valid(10) = '1' then
+        root_10   <= root_9;
+        beyond_10 <= beyond(v_1, root_9);
       end if;
 
       -- Stage 11: u_q = sum_q, limited to the root
@@ -171,6 +185,7 @@ begin
 
       if rst = '1' then
         valid(1 to LATENCY) <= (others => '0');
+        beat                <= (others => '0');
         sat_d               <= (others => '0');
         sat_q               <= (others => '0');
         room                <= (others => '1');
@@ -178,6 +193,7 @@ begin
     end if;
   end process;
 
+  out_soon  <= valid(LATENCY - 1);
   out_valid <= valid(LATENCY);
 
 end architecture rtl;

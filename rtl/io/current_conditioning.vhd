@@ -1,7 +1,8 @@
 -- Purpose: ADC codes to phase currents, i_x = gain_x * (code_x - offset_x), one multiplier for three channels.
 -- Formats: code of ADC_BITS, moved to the left edge of CODE U(1,15); gain S(1,16); current PU.
--- Latency: 5 (channels a, b, c follow each other).  Interval: 3.
+-- Latency: 5 (channels b, c, a follow each other; b and c are there with out_soon).  Interval: 3.
 -- Rounding: 31 fraction bits half up to 16, saturated: more than 2 per unit is no sensor scaled to its base.
+-- A product is below 4 per unit, so two bits say whether it fits.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -26,6 +27,7 @@ entity current_conditioning is
     gain_a          : in  signed(GAIN_W - 1 downto 0);
     gain_b          : in  signed(GAIN_W - 1 downto 0);
     gain_c          : in  signed(GAIN_W - 1 downto 0);
+    out_soon        : out std_logic;
     out_valid       : out std_logic;
     i_a             : out signed(PU_W - 1 downto 0);
     i_b             : out signed(PU_W - 1 downto 0);
@@ -36,6 +38,7 @@ end entity current_conditioning;
 
 architecture rtl of current_conditioning is
   constant LATENCY : positive := CURRENT_CONDITIONING_LATENCY;
+  constant SUM_W   : positive := CODE_W + GAIN_W;
 
   signal valid    : std_logic_vector(0 to LATENCY);
   signal code_0   : unsigned(ADC_BITS - 1 downto 0);
@@ -46,7 +49,8 @@ architecture rtl of current_conditioning is
   signal diff_1   : signed(CODE_W downto 0);
   signal gain_1   : signed(GAIN_W - 1 downto 0);
   signal prod_2   : signed(CODE_W + GAIN_W downto 0);
-  signal i_3      : signed(PU_W - 1 downto 0);
+  signal sum_2    : signed(SUM_W - 1 downto 0);
+  signal i_2      : signed(PU_W - 1 downto 0);
 
   function left_aligned (code : unsigned) return unsigned is
   begin
@@ -61,11 +65,13 @@ architecture rtl of current_conditioning is
 begin
   valid(0) <= in_valid;
 
-  -- The channel of the beat: a while in_valid, then b, then c.
-  code_0   <= code_b when valid(1) = '1' else code_c when valid(2) = '1' else code_a;
-  offset_0 <= offset_b when valid(1) = '1' else offset_c when valid(2) = '1' else offset_a;
-  gain_0   <= gain_b when valid(1) = '1' else gain_c when valid(2) = '1' else gain_a;
-  i_3      <= round_sat(prod_2, CURRENT_CONDITIONING_DROP, PU_W);
+  -- The channel of the beat: b while in_valid, then c, then a
+  code_0   <= code_c when valid(1) = '1' else code_a when valid(2) = '1' else code_b;
+  offset_0 <= offset_c when valid(1) = '1' else offset_a when valid(2) = '1' else offset_b;
+  gain_0   <= gain_c when valid(1) = '1' else gain_a when valid(2) = '1' else gain_b;
+
+  sum_2 <= prod_2(SUM_W - 1 downto 0) + half(CURRENT_CONDITIONING_DROP, SUM_W);
+  i_2   <= saturate(sum_2(SUM_W - 1 downto CURRENT_CONDITIONING_DROP), PU_W);
 
   process (clk)
   begin
@@ -84,19 +90,19 @@ begin
         prod_2 <= diff_1 * gain_1;
       end if;
 
-      -- Stage 3: i = prod, narrowed; a at clock 3, b at 4, c at 5
+      -- Stage 3: i = prod, narrowed; b at clock 3, c at 4, a at 5
       if valid(2) = '1' then
-        i_a <= i_3;
+        i_b <= i_2;
       end if;
       if valid(3) = '1' then
-        i_b <= i_3;
+        i_c <= i_2;
       end if;
       if valid(3) = '1' then
         rail_4 <= rail_1;
       end if;
       if valid(4) = '1' then
-        i_c             <= i_3;
-        current_at_rail <= rail_4;
+        i_a             <= i_2;
+        current_at_rail <= rail_4(1 downto 0) & rail_4(2);
       end if;
 
       if rst = '1' then
@@ -105,6 +111,7 @@ begin
     end if;
   end process;
 
+  out_soon  <= valid(LATENCY - 1);
   out_valid <= valid(LATENCY);
 
 end architecture rtl;

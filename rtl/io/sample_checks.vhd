@@ -7,7 +7,7 @@
 --   5  position       |code - (2*code' - code'')| >= jump_max, from the third sample after a reset on
 -- sample_trip: any of them that fault_ignore does not name.
 -- Formats: limits U(1,8), jump_max U(-1,13), codes in 1/2**18 turn, differences the shorter way round.
--- Latency: 1.  Rounding: values are cut (floor) to the limits' formats, |x| is the one's complement where x is
+-- Latency: 4.  Interval: 3.  Rounding: values are cut (floor) to the limits' formats, |x| is the one's complement where x is
 -- negative: a negative current trips one LSB later, the sum up to 3/256 later or earlier.  No overflow: the sum has
 -- two bits more than its terms, the rail counter stays at its end.
 
@@ -59,14 +59,19 @@ architecture rtl of sample_checks is
   signal a_0       : signed(LIMIT_W downto 0);
   signal b_0       : signed(LIMIT_W downto 0);
   signal c_0       : signed(LIMIT_W downto 0);
-  signal sum_0     : signed(LIMIT_W + 2 downto 0);
   signal bus_0     : unsigned(LIMIT_W - 1 downto 0);
   signal code_0    : unsigned(TURN_W - 1 downto 0);
-  signal away_0    : signed(TURN_W - 1 downto 0);
-  signal off_0     : signed(TURN_W - 1 - SAMPLE_CHECKS_DROP_JUMP downto 0);
   signal at_rail_0 : std_logic;
   signal railed_0  : unsigned(3 downto 0);
-  signal faults_0  : unsigned(5 downto 0);
+  signal pair_1    : signed(LIMIT_W + 2 downto 0);
+  signal away_1    : signed(TURN_W - 1 downto 0);
+  signal known_1   : std_logic;
+  signal stuck_1   : std_logic;
+  signal sum_2     : signed(LIMIT_W + 2 downto 0);
+  signal off_2     : signed(TURN_W - 1 - SAMPLE_CHECKS_DROP_JUMP downto 0);
+  signal over_3    : unsigned(2 downto 0);
+  signal checks_3  : unsigned(5 downto 1);
+  signal faults_3  : unsigned(5 downto 0);
 
   function reaches (x : signed; limit : unsigned) return std_logic is
     variable magnitude : signed(x'length - 1 downto 0);
@@ -80,45 +85,71 @@ architecture rtl of sample_checks is
     end if;
     return '0';
   end function;
+
+  function less (x : unsigned; limit : unsigned) return std_logic is
+  begin
+    if x < limit then
+      return '1';
+    end if;
+    return '0';
+  end function;
 begin
   valid(0) <= in_valid;
 
   a_0       <= i_a(PU_W - 1 downto DROP);
   b_0       <= i_b(PU_W - 1 downto DROP);
   c_0       <= i_c(PU_W - 1 downto DROP);
-  sum_0     <= resize(a_0, LIMIT_W + 3) + b_0 + c_0;
   bus_0     <= u_dc(DUTY_W - 1 downto DROP);
   code_0    <= shift_left(resize(code_theta, TURN_W), TURN_W - POSITION_BITS);
-  away_0    <= signed(code_0 - expected);
-  off_0     <= away_0(TURN_W - 1 downto SAMPLE_CHECKS_DROP_JUMP);
   at_rail_0 <= (or current_at_rail) or u_dc_at_rail;
   railed_0  <= railed when railed = 15 else railed + 1;
 
-  faults_0(0) <= reaches(a_0, i_trip) or reaches(b_0, i_trip) or reaches(c_0, i_trip);
-  faults_0(1) <= reaches(sum_0, sum_trip);
-  faults_0(2) <= at_rail_0 when railed_0 >= rail_samples else '0';
-  faults_0(3) <= '1' when bus_0 < u_dc_min else '0';
-  faults_0(4) <= '1' when bus_0 >= u_dc_max else '0';
-  faults_0(5) <= reaches(off_0, jump_max) when seen = SAMPLE_CHECKS_WARM else '0';
+  off_2    <= away_1(TURN_W - 1 downto SAMPLE_CHECKS_DROP_JUMP);
+  faults_3 <= checks_3 & (or over_3);
 
   process (clk)
   begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stage 1: faults of this sample; expected = 2*code - code' for the next
+      -- Stage 1: how far the code is from the expected one; expected = 2*code - code' for the next;  i_a + i_b
       if valid(0) = '1' then
-        sample_faults <= faults_0;
-        sample_trip   <= or (faults_0 and not fault_ignore(5 downto 0));
-        code          <= code_0;
-        expected      <= shift_left(code_0, 1) - code;
-        railed        <= (others => '0');
+        pair_1   <= resize(a_0, LIMIT_W + 3) + b_0;
+        away_1   <= signed(code_0 - expected);
+        known_1  <= '1' when seen = SAMPLE_CHECKS_WARM else '0';
+        stuck_1  <= at_rail_0 when railed_0 >= rail_samples else '0';
+        code     <= code_0;
+        expected <= shift_left(code_0, 1) - code;
+        railed   <= (others => '0');
         if at_rail_0 = '1' then
           railed <= railed_0;
         end if;
         if seen /= SAMPLE_CHECKS_WARM then
           seen <= seen + 1;
         end if;
+      end if;
+
+      -- Stage 2: i_a + i_b + i_c
+      if valid(1) = '1' then
+        sum_2 <= pair_1 + c_0;
+      end if;
+
+      -- Stage 3: each against its limit
+      if valid(2) = '1' then
+        over_3(0)   <= reaches(a_0, i_trip);
+        over_3(1)   <= reaches(b_0, i_trip);
+        over_3(2)   <= reaches(c_0, i_trip);
+        checks_3(1) <= reaches(sum_2, sum_trip);
+        checks_3(2) <= stuck_1;
+        checks_3(3) <= less(bus_0, u_dc_min);
+        checks_3(4) <= not less(bus_0, u_dc_max);
+        checks_3(5) <= reaches(off_2, jump_max) and known_1;
+      end if;
+
+      -- Stage 4: faults of this sample
+      if valid(3) = '1' then
+        sample_faults <= faults_3;
+        sample_trip   <= or (faults_3 and not fault_ignore(5 downto 0));
       end if;
 
       if rst = '1' then

@@ -100,7 +100,7 @@ begin
       -- Stage 7: omega, omega_me = the sum, narrowed
       if valid(6) = '1' then
         omega    <= omega_6;
-        omega_pu <= round_sat(omega_6, PU_TO_INTEGRAL, PU_W);
+        omega_pu <= round_sat(shift_right(sum_6, SPEED_DROP_STATE), PU_TO_INTEGRAL, PU_W);
       end if;
 
       if rst = '1' then

@@ -2,7 +2,7 @@
 --   u_dc  = u_dc_gain * (code_u_dc - u_dc_offset), not below zero
 --   u_max = k_u_max * u_dc
 -- Formats: code of ADC_BITS, moved to the left edge of CODE U(1,15); gain S(1,16); k_u_max U(0,17).
--- Latency: 5.  Interval: 3 (both products share a multiplier, two clocks apart).
+-- Latency: 6.  Interval: 4 (both products share a multiplier, three clocks apart).
 -- Rounding: u_dc half up, saturated at 0 and 2; u_max floor, so that the circle is never drawn larger
 -- than the bus allows, saturated at 1.
 
@@ -37,7 +37,7 @@ architecture rtl of u_dc_conditioning is
   signal valid  : std_logic_vector(0 to LATENCY);
   signal rail_1 : std_logic;
   signal rail_3 : std_logic;
-  signal diff_1 : signed(CODE_W downto 0);
+  signal diff_0 : signed(CODE_W downto 0);
   signal u_dc_3 : unsigned(U_DC_W - 1 downto 0);
   signal mul_a  : signed(17 downto 0);
   signal mul_b  : signed(17 downto 0);
@@ -47,8 +47,7 @@ architecture rtl of u_dc_conditioning is
 begin
   valid(0) <= in_valid;
 
-  mul_a <= signed('0' & u_dc_3) when valid(3) = '1' else resize(diff_1, 18);
-  mul_b <= signed('0' & k_u_max) when valid(3) = '1' else u_dc_gain;
+  diff_0 <= signed('0' & shift_left(resize(code_u_dc, CODE_W), CODE_W - ADC_BITS)) - signed('0' & u_dc_offset);
 
   -- Half an LSB of u_dc to round with, in the multiplier's adder; u_max is floored
   half_1 <= half(U_DC_CONDITIONING_DROP_U_DC, 36) when valid(2) = '1' else (others => '0');
@@ -59,14 +58,21 @@ begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stage 1: diff = code - offset
+      -- Stages 1, 4: diff = code - offset and u_dc_gain, then u_dc and k_u_max
+      if valid(0) = '1' or valid(3) = '1' then
+        mul_a <= resize(diff_0, 18);
+        mul_b <= u_dc_gain;
+        if valid(3) = '1' then
+          mul_a <= signed('0' & u_dc_3);
+          mul_b <= signed('0' & k_u_max);
+        end if;
+      end if;
       if valid(0) = '1' then
-        diff_1 <= signed('0' & shift_left(resize(code_u_dc, CODE_W), CODE_W - ADC_BITS)) - signed('0' & u_dc_offset);
         rail_1 <= (and code_u_dc) or (nor code_u_dc);
       end if;
 
-      -- Stages 2, 4: prod = diff * u_dc_gain, then u_dc * k_u_max
-      if valid(1) = '1' or valid(3) = '1' then
+      -- Stages 2, 5: prod = diff * u_dc_gain, then u_dc * k_u_max
+      if valid(1) = '1' or valid(4) = '1' then
         prod <= mul_a * mul_b;
       end if;
 
@@ -76,8 +82,8 @@ begin
         rail_3 <= rail_1;
       end if;
 
-      -- Stage 5: u_max = prod, floored
-      if valid(4) = '1' then
+      -- Stage 6: u_max = prod, floored
+      if valid(5) = '1' then
         u_dc         <= u_dc_3;
         u_max        <= saturate_u(shift_right(sum, U_DC_CONDITIONING_DROP_U_MAX), U_MAX_W);
         u_dc_at_rail <= rail_3;

@@ -44,9 +44,10 @@ end entity gate_generation;
 architecture rtl of gate_generation is
   type compare_t is array (0 to 2) of unsigned(15 downto 0);
   type elapsed_t is array (0 to 2) of unsigned(11 downto 0);
+  type lead_t is array (0 to 2) of signed(17 downto 0);
 
   -- State
-  signal count       : unsigned(15 downto 0);
+  signal below       : signed(15 downto 0);  -- the carrier less CARRIER_HALF, never above -1
   signal down        : std_logic;
   signal compare     : compare_t;
   signal dead_used   : unsigned(11 downto 0);
@@ -58,40 +59,43 @@ architecture rtl of gate_generation is
   signal elapsed     : elapsed_t;
   signal settled     : unsigned(2 downto 0);
 
+  signal count    : unsigned(15 downto 0);
+  signal bottom   : std_logic;
   signal valley   : std_logic;
   signal good     : std_logic;
   signal on_now   : std_logic;
   signal tripping : std_logic;
+  signal lead     : lead_t;  -- by how much the carrier has passed the leg's edge
   signal wanted   : unsigned(2 downto 0);
 begin
   -- In good: GHDL 5 cuts a number down to the width it is compared with, so the pulse gets the number's width.
-  valley   <= '1' when count = 0 and down = '1' else '0';
+  count    <= unsigned(below + CARRIER_HALF);
+  bottom   <= '1' when below = -CARRIER_HALF else '0';
+  valley   <= bottom and down;
   good     <= '1' when dead_time > 0 and dead_time < min_pulse and resize(min_pulse, 16) <= CARRIER_HALF else '0';
   on_now   <= running_now and enable and not trip;
   tripping <= trip or (tripped_now and not clear_trip);
 
   legs : for k in 0 to 2 generate
-    wanted(k) <= '1' when resize(count, 17) + compare(k) >= CARRIER_HALF else '0';
+    lead(k)   <= resize(below, 18) + signed(resize(compare(k), 18));
+    wanted(k) <= not lead(k)(17);
   end generate;
 
   process (clk)
   begin
     if rising_edge(clk) then
       -- Carrier: up, twice the top value, down, twice zero
-      if down = '0' and count = CARRIER_HALF - 1 then
+      if down = '0' and below = -1 then
         down <= '1';
       elsif valley = '1' then
         down <= '0';
       else
         -- One up or, all ones, one down
-        count <= count + (unsigned'(14 downto 0 => down) & '1');
+        below <= below + (signed'(14 downto 0 => down) & '1');
       end if;
 
       -- The gates leave one register behind the carrier, and so does the mark of the zero vector's middle
-      sample <= '0';
-      if count = 0 and down = '0' then
-        sample <= '1';
-      end if;
+      sample <= bottom and not down;
 
       -- At the valley: what the next period works with
       running_now <= on_now;
@@ -130,7 +134,7 @@ begin
       end loop;
 
       if rst = '1' then
-        count           <= (others => '0');
+        below           <= to_signed(-CARRIER_HALF, 16);
         down            <= '0';
         compare         <= (others => (others => '0'));
         dead_used       <= (others => '0');

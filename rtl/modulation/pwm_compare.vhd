@@ -2,7 +2,7 @@
 --   2*compare < min_pulse: 0;  CARRIER_HALF - compare < min_pulse: CARRIER_HALF
 -- A low end of a period counts alone, because the period before or after may be high throughout.
 -- Formats: duty U(1,16), 0 to 1; compare 0 to CARRIER_HALF; min_pulse in clocks.
--- Latency: 5 (legs a, b, c follow each other).  Interval: 3.  The three values change together.
+-- Latency: 7 (legs a, b, c follow each other).  Interval: 3.  The three values change together.
 -- Rounding: half up to whole clocks; no overflow, duty <= 1.
 
 library ieee;
@@ -36,49 +36,65 @@ architecture rtl of pwm_compare is
 
   signal valid       : std_logic_vector(0 to LATENCY);
   signal duty_0      : unsigned(DUTY_W - 1 downto 0);
-  signal prod_1      : signed(DUTY_W + 17 downto 0);
+  signal duty_1      : unsigned(DUTY_W - 1 downto 0);
   signal min_pulse_1 : unsigned(11 downto 0);
-  signal compare_2   : unsigned(15 downto 0);
+  signal prod_2      : signed(DUTY_W + 17 downto 0);
   signal min_pulse_2 : unsigned(11 downto 0);
-  signal dropped_2   : unsigned(15 downto 0);
-  signal kept_a_3    : unsigned(15 downto 0);
-  signal kept_b_4    : unsigned(15 downto 0);
+  signal compare_3   : unsigned(15 downto 0);
+  signal min_pulse_3 : unsigned(11 downto 0);
+  signal compare_4   : unsigned(15 downto 0);
+  signal short_4     : std_logic;
+  signal long_4      : std_logic;
+  signal dropped_4   : unsigned(15 downto 0);
+  signal kept_a_5    : unsigned(15 downto 0);
+  signal kept_b_6    : unsigned(15 downto 0);
 begin
   valid(0) <= in_valid;
 
   duty_0    <= duty_b when valid(1) = '1' else duty_c when valid(2) = '1' else duty_a;
-  dropped_2 <= to_unsigned(0, 16) when (compare_2 & '0') < min_pulse_2 else
-               HALF when resize(compare_2, 17) + min_pulse_2 > HALF else
-               compare_2;
+  dropped_4 <= to_unsigned(0, 16) when short_4 = '1' else HALF when long_4 = '1' else compare_4;
 
   process (clk)
   begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stage 1: prod = duty * CARRIER_HALF, leg by leg
+      -- Stage 1: leg by leg
       if valid(0) = '1' or valid(1) = '1' or valid(2) = '1' then
-        prod_1      <= signed('0' & duty_0) * signed('0' & HALF);
+        duty_1      <= duty_0;
         min_pulse_1 <= min_pulse;
       end if;
 
-      -- Stage 2: compare = prod in clocks
+      -- Stage 2: prod = duty * CARRIER_HALF
       if valid(1) = '1' or valid(2) = '1' or valid(3) = '1' then
-        compare_2   <= resize(unsigned(round_half_up(prod_1, PWM_COMPARE_DROP)), 16);
+        prod_2      <= signed('0' & duty_1) * signed('0' & HALF);
         min_pulse_2 <= min_pulse_1;
       end if;
 
-      -- Stage 3: short pulses dropped; a and b wait for c
-      if valid(2) = '1' then
-        kept_a_3 <= dropped_2;
+      -- Stage 3: compare = prod in clocks
+      if valid(2) = '1' or valid(3) = '1' or valid(4) = '1' then
+        compare_3   <= resize(unsigned(round_half_up(prod_2, PWM_COMPARE_DROP)), 16);
+        min_pulse_3 <= min_pulse_2;
       end if;
-      if valid(3) = '1' then
-        kept_b_4 <= dropped_2;
+
+      -- Stage 4: is a pulse of the low or of the high end too short
+      if valid(3) = '1' or valid(4) = '1' or valid(5) = '1' then
+        compare_4 <= compare_3;
+        short_4   <= '1' when (compare_3 & '0') < min_pulse_3 else '0';
+        long_4    <= '1' when resize(compare_3, 17) + min_pulse_3 > HALF else '0';
       end if;
+
+      -- Stage 5: short pulses dropped; a and b wait for c
       if valid(4) = '1' then
-        compare_a <= kept_a_3;
-        compare_b <= kept_b_4;
-        compare_c <= dropped_2;
+        kept_a_5 <= dropped_4;
+      end if;
+      if valid(5) = '1' then
+        kept_b_6 <= dropped_4;
+      end if;
+      if valid(6) = '1' then
+        compare_a <= kept_a_5;
+        compare_b <= kept_b_6;
+        compare_c <= dropped_4;
       end if;
 
       if rst = '1' then

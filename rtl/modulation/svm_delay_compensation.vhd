@@ -1,7 +1,8 @@
 -- Purpose: angle at which the voltage will act, theta_out = theta_me + k_delay*omega_me, modulo one turn.
 -- k_delay = 1.5*T_s*omega_base/(2*pi): a duty acts on average 1.5 sample times after the sampling instant.
 -- Formats: theta TURN U(0,18), omega_me PU, k_delay U(0,17).
--- Latency: 2.  Rounding: product half up to TURN; the sum wraps, it is an angle.
+-- Latency: 1 (the sum is made behind the register of the product).
+-- Rounding: product half up to TURN; the sum wraps, it is an angle.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -28,9 +29,12 @@ architecture rtl of svm_delay_compensation is
   signal valid   : std_logic_vector(0 to LATENCY);
   signal prod_1  : signed(PU_W + 17 downto 0);
   signal theta_1 : unsigned(TURN_W - 1 downto 0);
-  signal sum_2   : signed(PU_W + 17 downto 0);
+  signal sum_1   : signed(PU_W + 17 downto 0);
 begin
   valid(0) <= in_valid;
+
+  -- theta_me + prod, with half an LSB to round with; the slice below is the angle modulo one turn
+  sum_1 <= prod_1 + (signed(theta_1) & half(SVM_DELAY_COMPENSATION_DROP, SVM_DELAY_COMPENSATION_DROP));
 
   process (clk)
   begin
@@ -43,11 +47,6 @@ begin
         theta_1 <= theta_me;
       end if;
 
-      -- Stage 2: theta_me + prod, with half an LSB to round with; the slice below is the angle modulo one turn
-      if valid(1) = '1' then
-        sum_2 <= prod_1 + (signed(theta_1) & half(SVM_DELAY_COMPENSATION_DROP, SVM_DELAY_COMPENSATION_DROP));
-      end if;
-
       if rst = '1' then
         valid(1 to LATENCY) <= (others => '0');
       end if;
@@ -55,6 +54,6 @@ begin
   end process;
 
   out_valid <= valid(LATENCY);
-  theta_out <= unsigned(sum_2(SVM_DELAY_COMPENSATION_DROP + TURN_W - 1 downto SVM_DELAY_COMPENSATION_DROP));
+  theta_out <= unsigned(sum_1(SVM_DELAY_COMPENSATION_DROP + TURN_W - 1 downto SVM_DELAY_COMPENSATION_DROP));
 
 end architecture rtl;

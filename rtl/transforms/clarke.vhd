@@ -2,8 +2,10 @@
 --   i_alpha = (2*i_a - i_b - i_c) / 3
 --   i_beta  = (i_b - i_c) / sqrt(3)
 -- Formats: sums exact; 1/3 as S(0,-1,18), 1/sqrt(3) as S(0,0,17); PU out.
--- Latency: 4 (alpha and beta follow each other through one multiplier).  Interval: 2.
+-- Latency: 5 (beta and alpha follow each other through one multiplier).  Interval: 2.
+-- i_a is needed a clock after i_b and i_c; i_beta comes a clock before i_alpha, with out_soon.
 -- Rounding: half up, saturated: 8/3 per unit needs three currents against each other.
+-- A product is below 4 per unit, so two bits say whether it fits.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -19,6 +21,7 @@ entity clarke is
     i_a       : in  signed(PU_W - 1 downto 0);
     i_b       : in  signed(PU_W - 1 downto 0);
     i_c       : in  signed(PU_W - 1 downto 0);
+    out_soon  : out std_logic;
     out_valid : out std_logic;
     i_alpha   : out signed(PU_W - 1 downto 0);
     i_beta    : out signed(PU_W - 1 downto 0)
@@ -33,50 +36,58 @@ architecture rtl of clarke is
 
   signal valid    : std_logic_vector(0 to LATENCY);
   signal first_0  : signed(SUM_W - 1 downto 0);
+  signal second_0 : signed(SUM_W - 1 downto 0);
+  signal both_1   : signed(SUM_W - 1 downto 0);
   signal sum_1    : signed(SUM_W - 1 downto 0);
   signal factor_1 : signed(PU_W - 1 downto 0);
   signal prod_2   : signed(PROD_W - 1 downto 0);
-  signal half_2   : signed(PROD_W - 1 downto 0);
-  signal sum_2    : signed(PROD_W - 1 downto 0);
-  signal i_2      : signed(PU_W - 1 downto 0);
+  signal half_2   : signed(CLARKE_DROP_ALPHA + PU_W downto 0);
+  signal sum_3    : signed(CLARKE_DROP_ALPHA + PU_W downto 0);
+  signal i_3      : signed(PU_W - 1 downto 0);
 begin
   valid(0) <= in_valid;
 
-  -- The component of the beat: alpha while in_valid, then beta
-  first_0 <= resize(i_b, SUM_W) when valid(1) = '1' else
-             shift_left(resize(i_a, SUM_W), 1) - i_b;
+  -- The component of the beat: beta while in_valid, then alpha
+  first_0  <= shift_left(resize(i_a, SUM_W), 1) when valid(1) = '1' else resize(i_b, SUM_W);
+  second_0 <= both_1 when valid(1) = '1' else resize(i_c, SUM_W);
 
-  -- Rounded in the multiplier's adder
-  half_2 <= half(CLARKE_DROP_ALPHA, PROD_W) when valid(2) = '1' else half(CLARKE_DROP_BETA, PROD_W);
-  sum_2  <= prod_2 + half_2;
-  i_2    <= saturate(shift_right(sum_2, CLARKE_DROP_ALPHA), PU_W) when valid(2) = '1' else
-            saturate(shift_right(sum_2, CLARKE_DROP_BETA), PU_W);
+  half_2 <= half(CLARKE_DROP_ALPHA, half_2'length) when valid(3) = '1' else half(CLARKE_DROP_BETA, half_2'length);
+  i_3    <= saturate(sum_3(CLARKE_DROP_ALPHA + PU_W downto CLARKE_DROP_ALPHA), PU_W) when valid(4) = '1' else
+            saturate(sum_3(CLARKE_DROP_BETA + PU_W downto CLARKE_DROP_BETA), PU_W);
 
   process (clk)
   begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stage 1: sum = 2*i_a - i_b - i_c, then i_b - i_c
+      -- Stages 1, 2: sum = i_b - i_c, then 2*i_a - (i_b + i_c)
+      if valid(0) = '1' then
+        both_1 <= resize(i_b, SUM_W) + i_c;
+      end if;
       if valid(0) = '1' or valid(1) = '1' then
-        sum_1    <= first_0 - i_c;
-        factor_1 <= resize(CLARKE_THIRD, PU_W);
+        sum_1    <= first_0 - second_0;
+        factor_1 <= resize(CLARKE_INV_SQRT3, PU_W);
         if valid(1) = '1' then
-          factor_1 <= resize(CLARKE_INV_SQRT3, PU_W);
+          factor_1 <= resize(CLARKE_THIRD, PU_W);
         end if;
       end if;
 
-      -- Stage 2: prod = sum * coefficient
+      -- Stages 2, 3: prod = sum * coefficient
       if valid(1) = '1' or valid(2) = '1' then
         prod_2 <= sum_1 * factor_1;
       end if;
 
-      -- Stage 3, 4: i = prod, narrowed; alpha at clock 3, beta at 4
-      if valid(2) = '1' then
-        i_alpha <= i_2;
+      -- Stages 3, 4: half an LSB to round with
+      if valid(2) = '1' or valid(3) = '1' then
+        sum_3 <= prod_2(sum_3'range) + half_2;
       end if;
+
+      -- Stages 4, 5: i_beta, then i_alpha, narrowed
       if valid(3) = '1' then
-        i_beta <= i_2;
+        i_beta <= i_3;
+      end if;
+      if valid(4) = '1' then
+        i_alpha <= i_3;
       end if;
 
       if rst = '1' then
@@ -85,6 +96,7 @@ begin
     end if;
   end process;
 
+  out_soon  <= valid(LATENCY - 1);
   out_valid <= valid(LATENCY);
 
 end architecture rtl;

@@ -1,7 +1,7 @@
 -- Purpose: the current model's flux linkage to the stator frame, the rotation by theta_me.
 --   lambda_c_alpha = lambda_c_d*cos_theta - lambda_c_q*sin_theta
 --   lambda_c_beta  = lambda_c_d*sin_theta + lambda_c_q*cos_theta
--- Formats, latency (4), interval (2), rounding: those of rotate at the width of FLUX.
+-- Formats, latency (5), interval (4), rounding: those of rotate at the width of FLUX.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -39,6 +39,7 @@ begin
       y         => lambda_c_q,
       cos_theta => cos_theta,
       sin_theta => sin_theta,
+      out_soon  => open,
       out_valid => out_valid,
       out_x     => lambda_c_alpha,
       out_y     => lambda_c_beta

@@ -1,7 +1,7 @@
 -- Purpose: rotor frame to stator frame, the rotation by theta.
 --   u_alpha = u_d*cos_theta - u_q*sin_theta
 --   u_beta  = u_d*sin_theta + u_q*cos_theta
--- Formats, latency (4), interval (2), rounding: those of rotate.
+-- Formats, latency (5), interval (4), rounding: those of rotate.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -39,6 +39,7 @@ begin
       y         => u_q,
       cos_theta => cos_theta,
       sin_theta => sin_theta,
+      out_soon  => open,
       out_valid => out_valid,
       out_x     => u_alpha,
       out_y     => u_beta

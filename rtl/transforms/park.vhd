@@ -1,7 +1,7 @@
 -- Purpose: stator frame to rotor frame, the rotation by -theta_me.
 --   i_d =  i_alpha*cos_theta + i_beta*sin_theta
 --   i_q = -i_alpha*sin_theta + i_beta*cos_theta
--- Formats, latency (4), interval (2), rounding: those of rotate.
+-- Formats, latency (5), interval (4), rounding: those of rotate.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -18,6 +18,7 @@ entity park is
     i_beta    : in  signed(PU_W - 1 downto 0);
     cos_theta : in  signed(TRIG_W - 1 downto 0);
     sin_theta : in  signed(TRIG_W - 1 downto 0);
+    out_soon  : out std_logic;
     out_valid : out std_logic;
     i_d       : out signed(PU_W - 1 downto 0);
     i_q       : out signed(PU_W - 1 downto 0)
@@ -40,6 +41,7 @@ begin
       y         => i_alpha,
       cos_theta => cos_theta,
       sin_theta => sin_theta,
+      out_soon  => out_soon,
       out_valid => out_valid,
       out_x     => i_q,
       out_y     => i_d

@@ -2,8 +2,10 @@
 --   out_x = x*cos_theta - y*sin_theta
 --   out_y = x*sin_theta + y*cos_theta
 -- Formats: x, y S(1,WIDTH-2), PU or FLUX; TRIG S(1,16) within +-1; products and sums exact.
--- One multiplier for sin_theta, a clock ahead of the one for cos_theta, which adds; out_y comes a clock before out_x.
--- Latency: 4.  Interval: 3.  Rounding: half up, saturated: a vector longer than 2 per unit is outside every base.
+-- One multiplier for sin_theta, a clock ahead of the one for cos_theta, which adds; y is needed a clock after x, and
+-- out_y comes a clock before out_x, with out_soon.
+-- Latency: 5.  Interval: 4.  Rounding: half up, saturated: a vector longer than 2 per unit is outside every base.
+-- A sum is at most 4 per unit, so its three top bits say whether it fits.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -23,6 +25,7 @@ entity rotate is
     y         : in  signed(WIDTH - 1 downto 0);
     cos_theta : in  signed(TRIG_W - 1 downto 0);
     sin_theta : in  signed(TRIG_W - 1 downto 0);
+    out_soon  : out std_logic;
     out_valid : out std_logic;
     out_x     : out signed(WIDTH - 1 downto 0);
     out_y     : out signed(WIDTH - 1 downto 0)
@@ -31,16 +34,19 @@ end entity rotate;
 
 architecture rtl of rotate is
   constant LATENCY : positive := ROTATE_LATENCY;
+  constant SUM_W   : positive := WIDTH + TRIG_W;
 
   signal valid      : std_logic_vector(0 to LATENCY);
   signal factor_s_0 : signed(WIDTH - 1 downto 0);
+  signal factor_s   : signed(WIDTH - 1 downto 0);           -- at clock 1 x, at clock 2 not y
   signal factor_c_1 : signed(WIDTH - 1 downto 0);
-  signal prod_s     : signed(WIDTH + TRIG_W - 1 downto 0);  -- at clock 1 of x, at clock 2 of not y
+  signal factor_c   : signed(WIDTH - 1 downto 0);           -- at clock 2 y, at clock 3 x
+  signal prod_s     : signed(WIDTH + TRIG_W - 1 downto 0);  -- at clock 2 of x, at clock 3 of not y
   signal rest       : signed(TRIG_W - 1 downto 0);
-  signal sum_s      : signed(WIDTH + TRIG_W - 1 downto 0);  -- at clock 2 x*sin_theta, at clock 3 -y*sin_theta
-  signal prod_c     : signed(WIDTH + TRIG_W - 1 downto 0);  -- at clock 2 of y, at clock 3 of x
-  signal sum        : signed(WIDTH + TRIG_W downto 0);
-  signal out_2      : signed(WIDTH - 1 downto 0);
+  signal sum_s      : signed(WIDTH + TRIG_W - 1 downto 0);  -- at clock 3 x*sin_theta, at clock 4 -y*sin_theta
+  signal prod_c     : signed(WIDTH + TRIG_W - 1 downto 0);  -- at clock 3 of y, at clock 4 of x
+  signal sum        : signed(SUM_W - 1 downto 0);
+  signal out_3      : signed(WIDTH - 1 downto 0);
 begin
   valid(0) <= in_valid;
 
@@ -48,35 +54,43 @@ begin
   factor_s_0 <= not y when valid(1) = '1' else x;
   factor_c_1 <= x when valid(2) = '1' else y;
 
-  sum   <= resize(prod_c, WIDTH + TRIG_W + 1) + sum_s;
-  out_2 <= saturate(shift_right(sum, ROTATE_DROP), WIDTH);
+  sum   <= prod_c + sum_s;
+  out_3 <= saturate(sum(SUM_W - 1 downto ROTATE_DROP), WIDTH);
 
   process (clk)
   begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stages 1, 2: prod_s = x*sin_theta, then (not y)*sin_theta;  rest: half an LSB to round with, then sin_theta too
+      -- Stages 1, 2: x, then not y;  stages 2, 3: y, then x
       if valid(0) = '1' or valid(1) = '1' then
-        prod_s <= factor_s_0 * sin_theta;
+        factor_s <= factor_s_0;
+      end if;
+      if valid(1) = '1' or valid(2) = '1' then
+        factor_c <= factor_c_1;
+      end if;
+
+      -- Stages 2, 3: prod_s = x*sin_theta, then (not y)*sin_theta;  rest: half an LSB to round with, then sin_theta too
+      if valid(1) = '1' or valid(2) = '1' then
+        prod_s <= factor_s * sin_theta;
         rest   <= half(ROTATE_DROP, TRIG_W);
-        if valid(1) = '1' then
+        if valid(2) = '1' then
           rest <= sin_theta + half(ROTATE_DROP, TRIG_W);
         end if;
       end if;
 
-      -- Stages 2, 3: sum_s = x*sin_theta, then -y*sin_theta;  prod_c = y*cos_theta, then x*cos_theta
-      if valid(1) = '1' or valid(2) = '1' then
+      -- Stages 3, 4: sum_s = x*sin_theta, then -y*sin_theta;  prod_c = y*cos_theta, then x*cos_theta
+      if valid(2) = '1' or valid(3) = '1' then
         sum_s  <= prod_s + rest;
-        prod_c <= factor_c_1 * cos_theta;
+        prod_c <= factor_c * cos_theta;
       end if;
 
-      -- Stages 3, 4: out_y = x*sin_theta + y*cos_theta, then out_x = x*cos_theta - y*sin_theta, narrowed
-      if valid(2) = '1' then
-        out_y <= out_2;
-      end if;
+      -- Stages 4, 5: out_y = x*sin_theta + y*cos_theta, then out_x = x*cos_theta - y*sin_theta, narrowed
       if valid(3) = '1' then
-        out_x <= out_2;
+        out_y <= out_3;
+      end if;
+      if valid(4) = '1' then
+        out_x <= out_3;
       end if;
 
       if rst = '1' then
@@ -85,6 +99,7 @@ begin
     end if;
   end process;
 
+  out_soon  <= valid(LATENCY - 1);
   out_valid <= valid(LATENCY);
 
 end architecture rtl;

@@ -66,7 +66,6 @@ begin
   fine_4 <= sum_4(sum_4'high downto SINCOS_DROP_PROD);
 
   process (clk)
-    variable delta : signed(12 downto 0);
   begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
@@ -86,11 +85,10 @@ begin
         table_2 <= table_1;
       end if;
       if valid(1) = '1' or valid(2) = '1' then
-        delta := SINCOS_DELTA(to_integer(low_1));
+        delta_2 <= SINCOS_DELTA(to_integer(low_1));
         if valid(2) = '1' then
-          delta := not delta_2;
+          delta_2 <= SINCOS_MINUS_DELTA(to_integer(low_1));
         end if;
-        delta_2 <= delta + signed'('0' & valid(2));
       end if;
 
       -- Stages 3, 4: prod = delta*c, then -delta*s

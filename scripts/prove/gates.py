@@ -122,7 +122,7 @@ PROOFS = (
         "duty_at_the_valley",
         "a gate follows the compare value of the last valley and no later one",
         "AT_THE_VALLEY",
-        Fault("duty taken at once", GATES, "+ compare(k) >= CARRIER_HALF", "+ compare_a >= CARRIER_HALF"),
+        Fault("duty taken at once", GATES, "resize(compare(k), 18)", "resize(compare_a, 18)"),
         Fault(
             "duty taken at the peak too",
             GATES,
@@ -166,14 +166,14 @@ PROOFS = (
         Fault(
             "minimum pulse one short",
             COMPARE,
-            "resize(compare_2, 17) + min_pulse_2 > HALF",
-            "resize(compare_2, 17) + min_pulse_2 > HALF + 1",
+            "resize(compare_3, 17) + min_pulse_3 > HALF",
+            "resize(compare_3, 17) + min_pulse_3 > HALF + 1",
         ),
         Fault(
             "pulses dropped by half their length",
             COMPARE,
-            "(compare_2 & '0') < min_pulse_2",
-            "('0' & compare_2(15 downto 1)) + 1 < min_pulse_2(11 downto 3)",
+            "(compare_3 & '0') < min_pulse_3",
+            "('0' & compare_3(15 downto 1)) + 1 < min_pulse_3(11 downto 3)",
         ),
         method="induction",
     ),
@@ -184,8 +184,8 @@ PROOFS = (
         Fault(
             "compare values in two steps",
             COMPARE,
-            "        kept_a_3 <= dropped_2;",
-            "        kept_a_3 <= dropped_2;\n        compare_a <= dropped_2;",
+            "        kept_a_5 <= dropped_4;",
+            "        kept_a_5 <= dropped_4;\n        compare_a <= dropped_4;",
         ),
     ),
 )

@@ -95,25 +95,28 @@ PATTERNS = (
     ("valid survives reset", "        valid(1 to LATENCY) <= (others => '0');\n", "        null;\n"),
     ("valid survives reset", "out_valid <= '0';", "null;"),
 )
+SOON = ("first outputs told with the last", "out_soon  <= valid(LATENCY - 1);", "out_soon  <= valid(LATENCY);")
 
 
 def faults(block: Block) -> tuple[Fault, ...]:
-    """Up to two faults of the strobe, in the block or in the entity that does its work."""
+    """Up to two faults of the strobe and one of out_soon, in the block or in the entity that does its work."""
     made: dict[str, Fault] = {}
     for file in fault_files(block):
         text = (ROOT / "rtl" / file).read_text()
-        for says, old, new in PATTERNS:
+        for says, old, new in (*PATTERNS, *((SOON,) if block.soon else ())):
             if text.count(old) == 1:
                 made.setdefault(says, Fault(says, file, old, new))
     return tuple(made.values())
 
 
 def block_proof(block: Block) -> Proof:
+    ends = (("out_valid", block.latency), *((("out_soon", block.latency - 1),) if block.soon else ()))
     return Proof(
         name=f"pipeline_{block.name}",
-        says=f"out_valid of {block.name} comes {block.latency} clocks after in_valid, never otherwise; reset clears",
+        says=f"out_valid of {block.name} comes {block.latency} clocks after in_valid, never otherwise; reset clears"
+        + (", out_soon one clock before" if block.soon else ""),
         entity=block.name,
-        harness=partial(harness, block.name, "in_valid", (("out_valid", block.latency),), block.interval),
+        harness=partial(harness, block.name, "in_valid", ends, block.interval),
         faults=faults(block),
         depth=block.latency + 2,
         generics=dict(block.configs[0]),

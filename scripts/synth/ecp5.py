@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from scripts.synth.multiplier_registers import absorb
+from scripts.synth.multiplier_registers import absorb, merge_twins
 from scripts.synth.names import Names
 from scripts.synth.split_products import retime
 from scripts.synth.wrapper import NAME, wrap
@@ -95,7 +95,8 @@ class Routing:
     def _absorb(self) -> dict[str, int]:
         path = self.folder / "design.json"
         netlist = json.loads(path.read_text())
-        done = {"split": retime(netlist, NAME)["multipliers"]}
+        done = {"twins": merge_twins(netlist["modules"][NAME])}
+        done |= {"split": retime(netlist, NAME)["multipliers"]}
         done |= absorb(netlist, NAME)
         path.write_text(json.dumps(netlist))
         return done

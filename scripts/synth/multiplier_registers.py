@@ -6,16 +6,19 @@ netlist (yosys' JSON) before place and route.
 
 The operands' registers move in if each bit of both is 0 or comes from a flip-flop, all of an operand with the same
 clock and enable, none with reset or initial 1; the flip-flops stay where something else reads them too.  One operand
-alone does not: nextpnr then times the multiplier as if neither had a register.  The product's moves in if each used
-bit goes to one such flip-flop and nowhere else.
+alone does not: nextpnr then times the multiplier as if neither had a register.  Nor does one behind more than a LUT:
+a flip-flop stands beside its LUT, a multiplier does not, and with its product's register the way from a flip-flop
+through it is the shorter one.  The product's moves in if each used bit goes to one such flip-flop and nowhere else.
 """
 
 from __future__ import annotations
 
+import json
 from collections import defaultdict
 from dataclasses import dataclass
 
 BITS = {"A": 18, "B": 18, "P": 36}
+LOGIC = {"LUT4": 1, "PFUMX": 0, "L6MUX21": 0, "CCU2C": 2}  # how many LUTs a cell counts for
 PLACES = {"A": ("INPUTA", 0), "B": ("INPUTB", 1), "P": ("OUTPUT", 2)}  # (parameter's name, number of its CE)
 
 
@@ -61,6 +64,28 @@ class Nets:
         self.free = 1 + max([2, *self.driver, *self.readers], key=lambda bit: -1 if isinstance(bit, str) else bit)
 
 
+def merge_twins(module: dict) -> int:
+    """Makes one of flip-flops that are the same at every clock, and says how many went: two bits of a register that
+    hold one sign would keep the product's register outside."""
+    first: dict[str, int] = {}
+    same: dict[int, int] = {}
+    for name, cell in list(module["cells"].items()):
+        if cell["type"] != "TRELLIS_FF" or cell.get("attributes", {}).get("keep") or "DI" not in cell["connections"]:
+            continue
+        inputs = {port: bits for port, bits in cell["connections"].items() if port != "Q"}
+        (bit,) = cell["connections"]["Q"]
+        kept = first.setdefault(json.dumps([cell["parameters"], inputs], sort_keys=True), bit)
+        if kept != bit:
+            same[bit] = kept
+            del module["cells"][name]
+    wired = [cell["connections"] for cell in module["cells"].values()]
+    for connections in wired:
+        connections.update({port: [same.get(b, b) for b in bits] for port, bits in connections.items()})
+    for named in (*module["ports"].values(), *module.get("netnames", {}).values()):
+        named["bits"] = [same.get(b, b) for b in named["bits"]]
+    return len(same)
+
+
 def absorb(netlist: dict, top: str) -> dict[str, int]:
     """Changes ``netlist`` in place; {"A", "B", "P"}: how many multipliers got that register, "removed": FFs."""
     module = netlist["modules"][top]
@@ -96,6 +121,17 @@ def absorb(netlist: dict, top: str) -> dict[str, int]:
     return done
 
 
+def shallow(bit, cells: dict, nets: Nets, luts: int = 1) -> bool:
+    """Whether ``bit`` is made by registers and at most ``luts`` LUTs one after the other."""
+    cell = cells.get(nets.driver.get(bit), {"type": "input"})
+    if cell["type"] not in LOGIC:
+        return True
+    left = luts - LOGIC[cell["type"]]
+    directions = cell["port_directions"]
+    inputs = (b for port, bits in cell["connections"].items() if directions[port] == "input" for b in bits)
+    return left >= 0 and all(shallow(b, cells, nets, left) for b in inputs)
+
+
 def _operand(cell: dict, side: str, cells: dict, nets: Nets):
     """(control, the bits in front of the flip-flops) of operand A or B, or None."""
     pins = [cell["connections"][f"{side}{n}"][0] for n in range(BITS[side])]
@@ -109,6 +145,8 @@ def _operand(cell: dict, side: str, cells: dict, nets: Nets):
             return None
         controls.add(control)
         moved[f"{side}{n}"] = cells[name]["connections"]["DI"][0]
+    if not all(shallow(bit, cells, nets) for bit in moved.values()):
+        return None
     return (controls.pop(), moved) if len(controls) == 1 else None
 
 
