@@ -17,7 +17,7 @@ from typing import NamedTuple
 from golden_model.block import Block, Port
 from golden_model.control.current_pi import SAT
 from golden_model.control.dead_time_compensation import D_Q
-from golden_model.estimators.current_model import L_D
+from golden_model.estimators.flux_models import L_D
 from golden_model.estimators.v_dead_adaline import V_LEG_PORT
 from golden_model.estimators.winding_resistance import R
 from golden_model.fixed import Format, round_half_up, round_sat, saturate

@@ -360,7 +360,7 @@ package fluxproof_pkg is
   constant GATE_GENERATION_LATENCY : positive := 1;
 
   -- winding_resistance: 000, eq. (12)
-  constant WINDING_RESISTANCE_LATENCY : positive := 7;
+  constant WINDING_RESISTANCE_LATENCY : positive := 8;
   constant WINDING_RESISTANCE_DROP_TCR : natural := 12;
   constant WINDING_RESISTANCE_DROP_RHO : natural := 19;
 
@@ -376,16 +376,13 @@ package fluxproof_pkg is
   constant APPLIED_VOLTAGE_TO_FLUX : natural := 1;
 
   -- current_model: 001, eq. (6); with lambda_add the last term of eq. (16)
-  constant CURRENT_MODEL_LATENCY : positive := 3;
-  constant CURRENT_MODEL_SHIFT_MG : natural := 20;
-  constant CURRENT_MODEL_SHIFT_ADD : natural := 13;
-  constant CURRENT_MODEL_DROP : natural := 13;
+  constant CURRENT_MODEL_LATENCY : positive := 4;
 
   -- flux_inverse_park: 001, eq. (9): T_dq/alphabeta
   constant FLUX_INVERSE_PARK_LATENCY : positive := 4;
 
   -- flux_merge: 001, eq. (7); 'Merge of voltage and current models' of Fig. 8
-  constant FLUX_MERGE_LATENCY : positive := 25;
+  constant FLUX_MERGE_LATENCY : positive := 31;
   constant FLUX_MERGE_Y_W : natural := 25;
   constant FLUX_MERGE_X_W : natural := 34;
   constant FLUX_MERGE_DROP_RHO : natural := 10;
@@ -398,14 +395,20 @@ package fluxproof_pkg is
   -- flux_park: 001, eq. (9): T_alphabeta/dq
   constant FLUX_PARK_LATENCY : positive := 4;
 
+  -- flux_models: 001, eq. (6) and (11)
+  constant FLUX_MODELS_LATENCY : positive := 2;
+  constant FLUX_MODELS_MODEL_FLUX_W : natural := 31;
+  constant FLUX_MODELS_MERGED_FLUX_W : natural := 26;
+  constant FLUX_MODELS_SHIFT_MG : natural := 20;
+  constant FLUX_MODELS_DROP_MODEL : natural := 12;
+  constant FLUX_MODELS_DROP_MERGED : natural := 17;
+  constant FLUX_MODELS_HALF_PU : natural := 64;
+  constant FLUX_MODELS_CURRENT_MODEL : natural := 0;
+  constant FLUX_MODELS_EARLIER : natural := 2;
+  constant FLUX_MODELS_PROPOSED : natural := 3;
+
   -- flux_estimate: 001, eq. (17)
-  constant FLUX_ESTIMATE_LATENCY : positive := 3;
-  constant FLUX_ESTIMATE_SHIFT_BASE : natural := 17;
-  constant FLUX_ESTIMATE_SHIFT_MODEL : natural := 4;
-  constant FLUX_ESTIMATE_DROP : natural := 24;
-  constant FLUX_ESTIMATE_CURRENT_MODEL : natural := 0;
-  constant FLUX_ESTIMATE_EARLIER : natural := 2;
-  constant FLUX_ESTIMATE_PROPOSED : natural := 3;
+  constant FLUX_ESTIMATE_LATENCY : positive := 1;
 
   -- speed_reciprocal: 001, section 5.2: lower limit of the speed for delta_lambda
   constant SPEED_RECIPROCAL_LATENCY : positive := 24;
