@@ -57,7 +57,12 @@ architecture rtl of flux_merge is
   -- An LSB less than half: -rho*i is half down where rho*i is half up.
   constant HALF_DOWN : signed(DROP_RHO - 1 downto 0) := (DROP_RHO - 1 => '0', others => '1');
 
-  type source_t is (LESS_DROP, MODEL, TOTAL, OTHER);
+  -- Where flux comes from
+  subtype source_t is std_logic_vector(1 downto 0);
+  constant LESS_DROP : source_t := "00";
+  constant MODEL     : source_t := "01";
+  constant TOTAL     : source_t := "10";
+  constant OTHER     : source_t := "11";
 
   -- State, with merge_known; the axes take turns: the one that comes next, and the other
   signal flux       : signed(TOTAL_W - 1 downto 0);
@@ -154,16 +159,17 @@ begin
         source <= OTHER;
       end if;
       if (step(3) or step(12) or step(14) or step(15)) = '1' then
-        case source is
-          when LESS_DROP =>
-            flux <= resize(saturate(less_r, FLUX_STATE_W), TOTAL_W);
-          when MODEL =>
+        if source(1) = '0' then
+          flux <= resize(saturate(less_r, FLUX_STATE_W), TOTAL_W);
+          if source(0) = '1' then
             flux <= shift_left(resize(lambda_c_1, TOTAL_W), FLUX_TO_STATE);
-          when TOTAL =>
-            flux <= total_12;
-          when OTHER =>
+          end if;
+        else
+          flux <= total_12;
+          if source(0) = '1' then
             flux <= flux_other;
-        end case;
+          end if;
+        end if;
       end if;
       if step(15) = '1' then
         flux_other <= flux;
