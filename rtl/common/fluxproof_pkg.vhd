@@ -470,7 +470,7 @@ package fluxproof_pkg is
   constant V_DEAD_ADALINE_FINE_TO_LEG : natural := 7;
 
   -- psi_adaline: 000, eq. (13), with the reluctance term of eq. (7b)
-  constant PSI_ADALINE_LATENCY : positive := 15;
+  constant PSI_ADALINE_LATENCY : positive := 14;
   constant PSI_ADALINE_PSI_STATE_W : natural := 36;
   constant PSI_ADALINE_DROP_V : natural := 11;
   constant PSI_ADALINE_DROP_R : natural := 17;

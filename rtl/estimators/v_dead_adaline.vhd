@@ -119,13 +119,13 @@ architecture rtl of v_dead_adaline is
     return unsigned(both(so_far'length downto 1));
   end function;
 
-  -- Whether v is at the end of +-v_comp_max or past it; where it is at the end, to put it there does not move it.
+  -- Whether a positive v is at v_comp_max or past it; where it is at it, to put it there does not move it.
   function at_limit (v : signed; v_comp_max : unsigned) return std_logic is
     alias u       : signed(v'length - 1 downto 0) is v;
-    variable rest : signed(v'length - TO_LEG downto 0);
+    variable room : signed(v'length - TO_LEG + 1 downto 0);
   begin
-    rest := resize(u(u'high downto TO_LEG) xor u(u'high), rest'length) - signed(resize(v_comp_max, rest'length));
-    return not rest(rest'high);
+    room := signed(resize(v_comp_max & '0', room'length)) - resize(u(u'high downto TO_LEG) & '1', room'length);
+    return room(room'high);
   end function;
 begin
   valid(0) <= in_valid;
@@ -225,7 +225,7 @@ begin
 
       -- Stages 16, 17: v_state = sum, limited
       if valid(15) = '1' then
-        past_16  <= at_limit(v_15, v_comp_max);
+        past_16  <= at_limit(v_15 xor v_15(v_15'high), v_comp_max);
         under_16 <= v_15(v_15'high);
       end if;
       if valid(15) = '1' and learning = '1' then
