@@ -447,7 +447,7 @@ package fluxproof_pkg is
   constant CURRENT_DIRECTIONS_DROP : natural := 13;
 
   -- dead_time_compensation: 000, section V.B, step d
-  constant DEAD_TIME_COMPENSATION_LATENCY : positive := 2;
+  constant DEAD_TIME_COMPENSATION_LATENCY : positive := 4;
   constant DEAD_TIME_COMPENSATION_DROP : natural := 18;
 
   -- clean_voltage: 000, eq. (4); 001, eq. (5): the voltage cleaned of the inverter's distortion
