@@ -365,7 +365,7 @@ package fluxproof_pkg is
   constant WINDING_RESISTANCE_DROP_RHO : natural := 19;
 
   -- applied_voltage: 001, section 2.2: u_alphabeta of eq. (5)
-  constant APPLIED_VOLTAGE_LATENCY : positive := 7;
+  constant APPLIED_VOLTAGE_LATENCY : positive := 11;
   constant APPLIED_VOLTAGE_K_FRAC : natural := 16;
   constant APPLIED_VOLTAGE_SCALE_W : natural := 24;
   constant APPLIED_VOLTAGE_DROP_SCALE : natural := 10;
