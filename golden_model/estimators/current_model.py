@@ -25,9 +25,7 @@ def step(model_d, model_q, lambda_add_d, lambda_add_q):
 
 
 def reference(v, _state):
-    return {
-        f"lambda_c_{x}": FLUX.limit(v[f"model_{x}"] + v[f"lambda_add_{x}"]) for x in ("d", "q")
-    }
+    return {f"lambda_c_{x}": FLUX.limit(v[f"model_{x}"] + v[f"lambda_add_{x}"]) for x in ("d", "q")}
 
 
 def bound(_v, _state):

@@ -66,7 +66,7 @@ T_S = Port("t_s", SAMPLE_TIME, doc="sample time, per unit")
 R = Port("r", RESISTANCE, doc="winding resistance in use")
 MINUS_RESISTANCE = Format(1, 0, RESISTANCE.frac_bits)
 MINUS_RHO = Port(
-    "minus_rho", MINUS_RESISTANCE, -RESISTANCE.hi, 0, "flux that half a sample adds, per unit of current; not above zero"
+    "minus_rho", MINUS_RESISTANCE, -RESISTANCE.hi, 0, "less the flux that half a sample takes, per unit of current"
 )
 
 BLOCK = Block(

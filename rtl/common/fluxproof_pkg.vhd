@@ -36,10 +36,10 @@ package fluxproof_pkg is
 
   -- fluxproof: clocks from the raw sample to the duties, least distance of two samples
   constant FLUXPROOF_SAMPLE_TO_DUTY : positive := 40;
-  constant FLUXPROOF_SAMPLE_INTERVAL : positive := 60;
+  constant FLUXPROOF_SAMPLE_INTERVAL : positive := 61;
 
   -- register_access: clocks that a write waits for the end of a sample
-  constant REGISTER_PATIENCE : positive := 76;
+  constant REGISTER_PATIENCE : positive := 77;
 
   -- sqrt: 001, section 5.2: voltage limit of the current regulation
   constant SQRT_LATENCY : positive := 6;
@@ -455,7 +455,7 @@ package fluxproof_pkg is
   constant CLEAN_VOLTAGE_DROP : natural := 11;
 
   -- v_dead_adaline: 000, eq. (10) and Fig. 4(a)
-  constant V_DEAD_ADALINE_LATENCY : positive := 27;
+  constant V_DEAD_ADALINE_LATENCY : positive := 28;
   constant V_DEAD_ADALINE_V_STATE_W : natural := 38;
   constant V_DEAD_ADALINE_V_FINE_W : natural := 25;
   constant V_DEAD_ADALINE_STEP_W : natural := 18;
@@ -486,7 +486,7 @@ package fluxproof_pkg is
   -- telemetry_words: none: what a recording needs
   constant TELEMETRY_WORDS_LATENCY : positive := 2;
   constant TELEMETRY_WORDS_COUNT : natural := 24;
-  constant TELEMETRY_WORDS_START : natural := 38;
+  constant TELEMETRY_WORDS_START : natural := 39;
   constant TELEMETRY_WORDS_INDEX_W : natural := 5;
 
   -- telemetry: none: what a recording needs

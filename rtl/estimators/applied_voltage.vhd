@@ -74,14 +74,14 @@ architecture rtl of applied_voltage is
   constant K_CARRIER : signed(17 downto 0) := to_signed(carrier_constant, 18);
 
   -- What rounds each product, in the adder behind its multiplier
-  constant HALF_SCALE : signed(U_DC_W + K_CARRIER'length downto 0)
-    := half(APPLIED_VOLTAGE_DROP_SCALE, U_DC_W + K_CARRIER'length + 1);
-  constant HALF_U     : signed(SCALE_W + SUM_W downto 0)
-    := half(SHIFT - APPLIED_VOLTAGE_TO_FLUX, SCALE_W + SUM_W + 1);
+  constant PROD_1_W   : positive                      := U_DC_W + K_CARRIER'length + 1;
+  constant PROD_8_W   : positive                      := SCALE_W + SUM_W + 1;
+  constant HALF_SCALE : signed(PROD_1_W - 1 downto 0) := half(APPLIED_VOLTAGE_DROP_SCALE, PROD_1_W);
+  constant HALF_U     : signed(PROD_8_W - 1 downto 0) := half(SHIFT - APPLIED_VOLTAGE_TO_FLUX, PROD_8_W);
 
   signal valid    : std_logic_vector(0 to LATENCY);
-  signal prod_1   : signed(U_DC_W + K_CARRIER'length downto 0);
-  signal sum_2    : signed(U_DC_W + K_CARRIER'length downto 0);
+  signal prod_1   : signed(PROD_1_W - 1 downto 0);
+  signal sum_2    : signed(PROD_1_W - 1 downto 0);
   signal scale_2  : signed(SCALE_W downto 0);
   signal beta_3   : std_logic;
   signal coeff_3  : signed(COEFF_W - 1 downto 0);
@@ -93,8 +93,8 @@ architecture rtl of applied_voltage is
   signal part_6   : signed(SUM_W - 1 downto 0);
   signal clocks_7 : signed(SUM_W - 1 downto 0);
   signal scaled_7 : signed(SCALE_W downto 0);
-  signal prod_8   : signed(SCALE_W + SUM_W downto 0);
-  signal sum_9    : signed(SCALE_W + SUM_W downto 0);
+  signal prod_8   : signed(PROD_8_W - 1 downto 0);
+  signal sum_9    : signed(PROD_8_W - 1 downto 0);
   signal u_9      : signed(FLUX_W - 1 downto 0);
 
   -- A compare value where differences of compare values are formed.

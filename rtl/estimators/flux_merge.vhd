@@ -58,11 +58,10 @@ architecture rtl of flux_merge is
   constant HALF_DOWN : signed(DROP_RHO - 1 downto 0) := (DROP_RHO - 1 => '0', others => '1');
 
   -- Where flux comes from
-  subtype source_t is std_logic_vector(1 downto 0);
-  constant LESS_DROP : source_t := "00";
-  constant MODEL     : source_t := "01";
-  constant TOTAL     : source_t := "10";
-  constant OTHER     : source_t := "11";
+  constant LESS_DROP : std_logic_vector(1 downto 0) := "00";
+  constant MODEL     : std_logic_vector(1 downto 0) := "01";
+  constant TOTAL     : std_logic_vector(1 downto 0) := "10";
+  constant OTHER     : std_logic_vector(1 downto 0) := "11";
 
   -- State, with merge_known; the axes take turns: the one that comes next, and the other
   signal flux       : signed(TOTAL_W - 1 downto 0);
@@ -75,15 +74,15 @@ architecture rtl of flux_merge is
   signal beta       : std_logic;
   signal trusted    : std_logic;
   signal limited    : std_logic;                              -- by any stage of either axis
-  signal source     : source_t;                               -- of flux, at the next clock that it moves
+  signal source     : std_logic_vector(1 downto 0);                               -- of flux, at the next clock that it moves
   signal i_1        : signed(PU_W - 1 downto 0);
   signal lambda_c_1 : signed(FLUX_W - 1 downto 0);
   signal u_1        : signed(FLUX_W - 1 downto 0);
   signal prod_r_2   : signed(PU_W + RESISTANCE_W downto 0);
   signal prod_u_2   : signed(FLUX_W + SAMPLE_TIME_W downto 0);
-  signal sum_r      : signed(SUM_R_W - 1 downto 0);           -- flux - rho*i: at clock 3, then at clock 14
+  signal sum_r      : signed(SUM_R_W - 1 downto 0);           -- at clock 3, then at clock 14
   signal less_r     : signed(TOTAL_W downto 0);
-  signal top        : std_logic;                              -- flux would be rounded past its end, as it was a clock ago
+  signal top        : std_logic;                              -- flux a clock ago: would be rounded past its end
   signal rounded    : signed(FLUX_STATE_W downto FLUX_TO_STATE);
   signal diff_5     : signed(FLUX_W + 1 downto 0);
   signal eps_6      : signed(FLUX_W downto 0);
@@ -110,7 +109,7 @@ begin
 
   -- lambda_c - flux, rounded by one carry, which is the half of flux below its end.
   diff_5 <= (lambda_c_1(FLUX_W - 1) & lambda_c_1 & '0')
-            - (flux(FLUX_STATE_W - 1) & flux(FLUX_STATE_W - 1 downto FLUX_TO_STATE) & (flux(FLUX_TO_STATE - 1) and not top));
+            - (resize(flux(FLUX_STATE_W - 1 downto FLUX_TO_STATE), FLUX_W + 1) & (flux(FLUX_TO_STATE - 1) and not top));
 
   process (clk)
   begin

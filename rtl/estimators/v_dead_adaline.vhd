@@ -6,7 +6,7 @@
 -- voltage is at its limit, a converter at its end, the voltage not known, the gates off or |i_d| + |i_q| < i_learn.
 -- The filters share a multiplier, fine*d_h, d_h*e and eta_v*pull another, each with the adder behind it.
 -- Formats: lp S(1,28), u_h and d_h PU, e FLUX, d_h*e S(-4,21), v_dead and v_sum S(-1,38), v_comp and v_leg V_LEG.
--- Latency: 27.  Interval: 27.
+-- Latency: 28.  Interval: 28.
 -- Rounding: half up.
 
 library ieee;
@@ -71,43 +71,43 @@ architecture rtl of v_dead_adaline is
   signal v_sum   : signed(STATE_W - 1 downto 0);
   signal fine    : signed(FINE_W - 1 downto 0);
 
-  signal valid    : std_logic_vector(0 to LATENCY);
-  signal learning : std_logic;
-  signal i_0      : signed(PU_W - 1 downto 0);
-  signal size     : unsigned(PU_W downto 0);               -- |i_d| at clock 2, |i_d| + |i_q| at clock 3
-  signal strong_4 : std_logic;
-  signal x_0      : signed(PU_W - 1 downto 0);
-  signal room     : signed(PU_W + 1 downto 0);
-  signal diff     : signed(PU_W downto 0);                 -- complement of u_pi_d - lp_u, of d_d - lp_d
-  signal h        : signed(PU_W - 1 downto 0);             -- u_h at clock 2, d_h from clock 6 on
-  signal u_h_6    : signed(PU_W - 1 downto 0);
-  signal prod_lp  : signed(k_lp'length + PU_W downto 0);
-  signal sum_lp   : signed(k_lp'length + PU_W + 1 downto 0);
-  signal moved    : signed(INTEGRAL_W - 1 downto 0);       -- lp_u at clock 4, lp_d at clock 8
-  signal lp_under : std_logic;
-  signal mul_a    : signed(FLUX_W - 1 downto 0);           -- fine at clock 7, e at clock 10, eta_v at clock 13
-  signal mul_b    : signed(PU_W - 1 downto 0);             -- d_h at clock 7, pull at clock 13
-  signal prod     : signed(PROD_W - 1 downto 0);
-  signal addend   : signed(SUM_W - 1 downto 0);
-  signal sum      : signed(SUM_W - 1 downto 0);
-  signal e_9      : signed(FLUX_W - 1 downto 0);
-  signal pull_12  : signed(STEP_W - 1 downto 0);
-  signal v_15     : signed(STATE_W downto 0);
-  signal past_16  : std_logic;
-  signal under_16 : std_logic;
-  signal end_16   : signed(V_LEG_W - 1 downto 0);
-  signal zeta_19  : unsigned(zeta'range);
-  signal prod_z   : signed(FINE_W + zeta'length downto 0);
-  signal sum_z    : signed(SUM_Z_W - 1 downto 0);
-  signal v_sum_21 : signed(STATE_W downto 0);
-  signal past_22  : std_logic;
-  signal under_22 : std_logic;
-  signal prod_g   : signed(FINE_W + gamma'length downto 0);
-  signal sum_g    : signed(FINE_W + gamma'length + 2 downto 0);
-  signal v_24     : signed(FINE_W + gamma'length + 2 - DROP_GAMMA downto 0);
-  signal past_25  : std_logic;
-  signal under_25 : std_logic;
-  signal dead     : signed(FINE_W - FINE_TO_LEG downto 0);
+  signal valid     : std_logic_vector(0 to LATENCY);
+  signal learning  : std_logic;
+  signal i_0       : signed(PU_W - 1 downto 0);
+  signal size      : unsigned(PU_W downto 0);               -- |i_d| at clock 2, |i_d| + |i_q| at clock 3
+  signal strong_4  : std_logic;
+  signal x_0       : signed(PU_W - 1 downto 0);
+  signal room      : signed(PU_W + 1 downto 0);
+  signal diff      : signed(PU_W downto 0);                 -- complement of u_pi_d - lp_u, of d_d - lp_d
+  signal h         : signed(PU_W - 1 downto 0);             -- u_h at clock 2, d_h from clock 6 on
+  signal u_h_6     : signed(PU_W - 1 downto 0);
+  signal prod_lp   : signed(k_lp'length + PU_W downto 0);
+  signal sum_lp    : signed(k_lp'length + PU_W + 1 downto 0);
+  signal moved     : signed(INTEGRAL_W - 1 downto 0);       -- lp_u at clock 4, lp_d at clock 8
+  signal lp_under  : std_logic;
+  signal mul_a     : signed(FLUX_W - 1 downto 0);           -- fine at clock 7, e at clock 10, eta_v at clock 13
+  signal mul_b     : signed(PU_W - 1 downto 0);             -- d_h at clock 7, pull at clock 13
+  signal prod      : signed(PROD_W - 1 downto 0);
+  signal addend    : signed(SUM_W - 1 downto 0);
+  signal sum       : signed(SUM_W - 1 downto 0);
+  signal e_9       : signed(FLUX_W - 1 downto 0);
+  signal pull_12   : signed(STEP_W - 1 downto 0);
+  signal v_15      : signed(STATE_W downto 0);
+  signal past_16   : std_logic;
+  signal under_16  : std_logic;
+  signal end_16    : signed(V_LEG_W - 1 downto 0);
+  signal adding_19 : std_logic;
+  signal zeta_20   : unsigned(zeta'range);
+  signal prod_z    : signed(FINE_W + zeta'length downto 0);
+  signal sum_z     : signed(SUM_Z_W - 1 downto 0);
+  signal v_sum_22  : signed(STATE_W downto 0);
+  signal past_23   : std_logic;
+  signal under_23  : std_logic;
+  signal prod_g    : signed(FINE_W + gamma'length downto 0);
+  signal sum_g     : signed(FINE_W + gamma'length + 2 downto 0);
+  signal v_25      : signed(FINE_W + gamma'length + 2 - DROP_GAMMA downto 0);
+  signal past_26   : std_logic;
+  signal under_26  : std_logic;
 
   -- so_far + |x|, as so_far - x for a negative x, else as so_far less the complement of x and one more.
   function longer (so_far : unsigned; x : signed) return unsigned is
@@ -150,9 +150,8 @@ begin
   pull_12  <= saturate(sum(SUM_W - 1 downto DROP_STEP), STEP_W);
   v_15     <= sum(STATE_W + DROP_ETA downto DROP_ETA);
   end_16   <= -signed('0' & v_comp_max) when under_16 = '1' else signed('0' & v_comp_max);
-  v_sum_21 <= sum_z(SUM_Z_W - 1 downto DROP_ZETA);
-  v_24     <= sum_g(sum_g'high downto DROP_GAMMA);
-  dead     <= round_half_up(fine, FINE_TO_LEG);
+  v_sum_22 <= sum_z(SUM_Z_W - 1 downto DROP_ZETA);
+  v_25     <= sum_g(sum_g'high downto DROP_GAMMA);
 
   process (clk)
   begin
@@ -240,61 +239,66 @@ begin
         fine <= resize(round_half_up(v_state, V_DEAD_ADALINE_DROP_FINE), FINE_W);
       end if;
 
-      -- Stage 19: zeta where |fine| > v_thr;  stages 20, 21: sum_z = v_sum + zeta*fine
+      -- Stages 19, 20: zeta where |fine| > v_thr;  stages 21, 22: sum_z = v_sum + zeta*fine
       if valid(18) = '1' then
-        zeta_19 <= zeta;
-        if learning = '0' or beyond(fine, v_thr, FINE_TO_LEG) = '0' then
-          zeta_19 <= (others => '0');
-        end if;
+        adding_19 <= learning and beyond(fine, v_thr, FINE_TO_LEG);
       end if;
       if valid(19) = '1' then
-        prod_z <= fine * signed('0' & zeta_19);
+        zeta_20 <= zeta;
+        if adding_19 = '0' then
+          zeta_20 <= (others => '0');
+        end if;
       end if;
       if valid(20) = '1' then
+        prod_z <= fine * signed('0' & zeta_20);
+      end if;
+      if valid(21) = '1' then
         sum_z <= rounding_base(v_sum, DROP_ZETA, SUM_Z_W) + prod_z;
       end if;
 
-      -- Stages 22, 23: v_sum = sum_z, limited
-      if valid(21) = '1' then
-        past_22  <= at_limit(v_sum_21, v_comp_max);
-        under_22 <= v_sum_21(v_sum_21'high);
-        v_sum    <= v_sum_21(STATE_W - 1 downto 0);
+      -- Stages 23, 24: v_sum = sum_z, limited
+      if valid(22) = '1' then
+        past_23  <= at_limit(v_sum_22, v_comp_max);
+        under_23 <= v_sum_22(v_sum_22'high);
+        v_sum    <= v_sum_22(STATE_W - 1 downto 0);
       end if;
-      if valid(22) = '1' and past_22 = '1' then
+      if valid(23) = '1' and past_23 = '1' then
         v_sum <= shift_left(resize(signed('0' & v_comp_max), STATE_W), TO_LEG);
       end if;
-      if valid(22) = '1' and (compensate = '0' or under_22 = '1') then
+      if valid(23) = '1' and (compensate = '0' or under_23 = '1') then
         v_sum <= (others => '0');
       end if;
 
-      -- Stages 23, 24: sum_g = v_sum + gamma*fine
-      if valid(22) = '1' then
+      -- Stages 24, 25: sum_g = v_sum + gamma*fine
+      if valid(23) = '1' then
         prod_g <= fine * signed('0' & gamma);
       end if;
-      if valid(23) = '1' then
+      if valid(24) = '1' then
         sum_g <= rounding_base(v_sum, DROP_GAMMA, sum_g'length) + prod_g;
       end if;
 
-      -- Stages 25, 26: v_comp = sum_g, narrowed and limited; the rounding moves nothing past the limit
-      if valid(24) = '1' then
-        past_25        <= beyond(v_24, v_comp_max, TO_LEG);
-        under_25       <= v_24(v_24'high);
-        v_comp         <= resize(round_half_up(v_24, TO_LEG), V_LEG_W);
+      -- Stages 26, 27: v_comp = sum_g, narrowed and limited; the rounding moves nothing past the limit
+      if valid(25) = '1' then
+        past_26        <= beyond(v_25, v_comp_max, TO_LEG);
+        under_26       <= v_25(v_25'high);
+        v_comp         <= resize(round_half_up(v_25, TO_LEG), V_LEG_W);
         v_comp_limited <= '0';
       end if;
-      if valid(25) = '1' and past_25 = '1' then
+      if valid(26) = '1' and past_26 = '1' then
         v_comp         <= signed('0' & v_comp_max);
         v_comp_limited <= '1';
       end if;
-      if valid(25) = '1' and (compensate = '0' or under_25 = '1') then
+      if valid(26) = '1' and (compensate = '0' or under_26 = '1') then
         v_comp         <= (others => '0');
         v_comp_limited <= '0';
       end if;
 
-      -- Stage 27: v_dead = fine, narrowed;  v_leg = v_comp + v_dead
+      -- Stages 27, 28: v_dead = fine, narrowed;  v_leg = v_comp + v_dead
       if valid(26) = '1' then
-        v_dead <= resize(dead, V_LEG_W);
-        v_leg  <= saturate(resize(v_comp, V_LEG_W + 1) + dead, V_LEG_W);
+        v_dead <= resize(round_half_up(fine, FINE_TO_LEG), V_LEG_W);
+      end if;
+      if valid(27) = '1' then
+        v_leg <= saturate(resize(v_comp, V_LEG_W + 1) + v_dead, V_LEG_W);
       end if;
 
       if rst = '1' then
