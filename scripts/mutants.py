@@ -118,7 +118,7 @@ MUTANTS = (
     ("direction floors", "estimators/current_directions.vhd", 'rounding_base("0", DROP, SUM_W);', "(others => '0');"),
     ("directions with another root of three", "estimators/current_directions.vhd",
      "resize(CURRENT_DIRECTIONS_SQRT3, WIDE_W)", "resize(CURRENT_DIRECTIONS_SQRT3 + 1, WIDE_W)"),
-    ("direction of c with the sign of b", "estimators/current_directions.vhd", "across <= across_11 xor valid(12);", "across <= across_11;"),
+    ("direction of c with the sign of b", "estimators/current_directions.vhd", "-ROOT when valid(8)", "ROOT when valid(8)"),
     ("twice the current wraps", "estimators/current_directions.vhd",
      "saturate((not not_x_7) & '0', PU_W)", "(not not_x_7(PU_W - 2 downto 0)) & '0'"),
     ("both turned products of one current", "estimators/current_directions.vhd",

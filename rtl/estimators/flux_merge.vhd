@@ -74,7 +74,7 @@ architecture rtl of flux_merge is
   signal beta       : std_logic;
   signal trusted    : std_logic;
   signal limited    : std_logic;                              -- by any stage of either axis
-  signal source     : std_logic_vector(1 downto 0);                               -- of flux, at the next clock that it moves
+  signal source     : std_logic_vector(1 downto 0);                               -- flux of a clock ago rounds past its end
   signal i_1        : signed(PU_W - 1 downto 0);
   signal lambda_c_1 : signed(FLUX_W - 1 downto 0);
   signal u_1        : signed(FLUX_W - 1 downto 0);
