@@ -73,16 +73,16 @@ architecture rtl of flux_merge is
   signal step       : std_logic_vector(0 to LATENCY - TURN);  -- of either axis
   signal beta       : std_logic;
   signal trusted    : std_logic;
-  signal limited    : std_logic;                              -- by any stage of either axis
-  signal source     : std_logic_vector(1 downto 0);                               -- flux of a clock ago rounds past its end
+  signal limited    : std_logic;  -- by any stage of either axis
+  signal source     : std_logic_vector(1 downto 0);  -- of flux, when it moves next
   signal i_1        : signed(PU_W - 1 downto 0);
   signal lambda_c_1 : signed(FLUX_W - 1 downto 0);
   signal u_1        : signed(FLUX_W - 1 downto 0);
   signal prod_r_2   : signed(PU_W + RESISTANCE_W downto 0);
   signal prod_u_2   : signed(FLUX_W + SAMPLE_TIME_W downto 0);
-  signal sum_r      : signed(SUM_R_W - 1 downto 0);           -- at clock 3, then at clock 14
+  signal sum_r      : signed(SUM_R_W - 1 downto 0);  -- at clock 3, then at clock 14
   signal less_r     : signed(TOTAL_W downto 0);
-  signal top        : std_logic;                              -- flux a clock ago: would be rounded past its end
+  signal top        : std_logic;  -- flux a clock ago: would be rounded past its end
   signal rounded    : signed(FLUX_STATE_W downto FLUX_TO_STATE);
   signal diff_5     : signed(FLUX_W + 1 downto 0);
   signal eps_6      : signed(FLUX_W downto 0);
