@@ -8,7 +8,7 @@ import pytest
 from cocotb_tests.simulate import ROOT
 from golden_model import drive as drives
 from golden_model import fluxproof
-from golden_model.estimators import flux_estimate
+from golden_model.estimators import flux_models
 from golden_model.registers import registers
 from golden_model.units import from_si
 from plant import FREE, IMPOSED_SPEED, Machine, Sensors, initial_state, plant_params, sensor_params
@@ -110,7 +110,7 @@ def test_delay_compensation_in_both_directions(sign):
     """
 
     def settle(changes):
-        changes = {"flux_mode": flux_estimate.CURRENT_MODEL, **changes}
+        changes = {"flux_mode": flux_models.CURRENT_MODEL, **changes}
         _, out = simulate_drive(
             0.6, lambda t: np.full_like(t, sign * 2500.0), omega_m=sign * 2500 * RPM, changes=changes
         )

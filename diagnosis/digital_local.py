@@ -11,7 +11,7 @@ import numpy as np
 
 from diagnosis.digital_replay import FIELDS, Run
 from golden_model.control import chord_speed, decoupling
-from golden_model.estimators import applied_voltage, flux_estimate, torque, winding_resistance
+from golden_model.estimators import applied_voltage, flux_estimate, flux_models, torque, winding_resistance
 from golden_model.io import current_conditioning, position, u_dc_conditioning, u_dc_processing
 from golden_model.kernel import kernel
 from golden_model.modulation import pwm_compare, svm, svm_delay_compensation
@@ -123,12 +123,15 @@ def _one(x, r, c, now, before):
     i_alpha, i_beta = clarke.step(i_a, i_b, i_c)
     cosine, sine = sincos.step(theta_me)
     i_d, i_q = park.step(i_alpha, i_beta, cosine, sine)
-    _, rho, lost = winding_resistance.step(x[9], x[10], r.r_s, r.tcr, r.t_0, r.t_min, r.t_max, r.t_s)
+    _, minus_rho, lost = winding_resistance.step(x[9], x[10], r.r_s, r.tcr, r.t_0, r.t_min, r.t_max, r.t_s)
     flux_d, flux_q = flux_park.step(lambda_m_alpha, lambda_m_beta, cosine, sine)
-    own_d, own_q, _ = flux_estimate.step(
-        i_d, i_q, flux_d, flux_q, lambda_pi_d, lambda_pi_q, before[7], x[12], rho, r.flux_mode, r.l_d, r.l_q,
+    model_d, model_q, merged_d, merged_q, merged, ended, raised_d, raised_q = flux_models.step(
+        i_d, i_q, flux_d, flux_q, lambda_pi_d, lambda_pi_q, before[7], x[12], minus_rho, r.flux_mode, r.l_d, r.l_q,
         r.lambda_mg,
     )  # fmt: skip
+    own_d, own_q, _ = flux_estimate.step(
+        model_d, model_q, merged_d, merged_q, merged, ended, raised_d, raised_q
+    )
     (chord,) = chord_speed.step(omega_me, r.k_chord)
     dec_d, dec_q = decoupling.step(omega_chord, lambda_d, lambda_q)
     (theta_out,) = svm_delay_compensation.step(theta_me, omega_me, r.k_delay)

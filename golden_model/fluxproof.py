@@ -26,6 +26,7 @@ from golden_model.estimators import (
     flux_compensation,
     flux_estimate,
     flux_merge,
+    flux_models,
     flux_monitor,
     psi_adaline,
     speed_reciprocal,
@@ -64,7 +65,8 @@ WIRING = {
     "current_regulators": (current_pi, ("rotor_frame", "speed_regulator")),
     "resistance": (winding_resistance, ("latch",)),
     "merged_flux": (flux_park, ("trig",)),
-    "flux": (flux_estimate, ("rotor_frame", "merged_flux", "resistance")),
+    "models": (flux_models, ("rotor_frame", "merged_flux", "resistance")),
+    "flux": (flux_estimate, ("models",)),
     "chord": (chord_speed, ("speed_measurement",)),
     "cross_coupling": (decoupling, ("flux", "chord")),
     "delay": (svm_delay_compensation, ("angle", "speed_measurement")),
@@ -78,7 +80,7 @@ WIRING = {
     "compare": (pwm_compare, ("modulator",)),
     "period_voltage": (applied_voltage, ("bus_voltage",)),
     "motor_voltage": (clean_voltage, ("period_voltage",)),
-    "magnetic_model": (current_model, ("rotor_frame",)),
+    "magnetic_model": (current_model, ("models",)),
     "model_flux": (flux_inverse_park, ("magnetic_model",)),
     "merge": (flux_merge, ("model_flux", "motor_voltage")),
     "speed_inverse": (speed_reciprocal, ("speed_measurement",)),
@@ -301,11 +303,11 @@ def step(state, sample, regs, config):
         r.kp_q,
         r.ki_q,
     )
-    winding_r, rho, temp_lost = winding_resistance.step(
+    winding_r, minus_rho, temp_lost = winding_resistance.step(
         x.temp_winding, x.temp_valid, r.r_s, r.tcr, r.t_0, r.t_min, r.t_max, r.t_s
     )
     lambda_m_d, lambda_m_q = flux_park.step(state.lambda_m_alpha, state.lambda_m_beta, cos_theta, sin_theta)
-    lambda_d, lambda_q, estimate_limited = flux_estimate.step(
+    model_d, model_q, merged_d, merged_q, merged, ended, raised_d, raised_q = flux_models.step(
         i_d,
         i_q,
         lambda_m_d,
@@ -314,11 +316,14 @@ def step(state, sample, regs, config):
         state.lambda_pi_q,
         state.merge_known,
         x.run,
-        rho,
+        minus_rho,
         r.flux_mode,
         r.l_d,
         r.l_q,
         r.lambda_mg,
+    )
+    lambda_d, lambda_q, estimate_limited = flux_estimate.step(
+        model_d, model_q, merged_d, merged_q, merged, ended, raised_d, raised_q
     )
     (omega_chord,) = chord_speed.step(omega_me, r.k_chord)
     u_dec_d, u_dec_q = decoupling.step(omega_chord, lambda_d, lambda_q)
@@ -343,7 +348,7 @@ def step(state, sample, regs, config):
     )
     s_alpha, s_beta = current_directions.step(i_alpha, i_beta, omega_me, r.k_ahead, r.k_sign)
     lambda_c_d, lambda_c_q, model_limited = current_model.step(
-        i_d, i_q, state.lambda_add_d, state.lambda_add_q, r.l_d, r.l_q, r.lambda_mg
+        model_d, model_q, state.lambda_add_d, state.lambda_add_q
     )
     lambda_c_alpha, lambda_c_beta = flux_inverse_park.step(lambda_c_d, lambda_c_q, cos_theta, sin_theta)
     merge_state, (lambda_m_alpha, lambda_m_beta, merge_known, merge_limited) = flux_merge.step(
@@ -356,7 +361,7 @@ def step(state, sample, regs, config):
         u_clean_beta,
         voltage_known,
         x.run,
-        rho,
+        minus_rho,
         r.omega_0,
         r.xi,
         r.t_s,

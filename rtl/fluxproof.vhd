@@ -223,7 +223,7 @@ architecture rtl of fluxproof is
   signal duty_ready           : std_logic;
   signal compare_ready        : std_logic;
   signal r                    : unsigned(RESISTANCE_W - 1 downto 0);
-  signal rho                  : unsigned(RESISTANCE_W - 1 downto 0);
+  signal minus_rho            : signed(RESISTANCE_W downto 0);
   signal lambda_m_d           : signed(FLUX_W - 1 downto 0);
   signal lambda_m_q           : signed(FLUX_W - 1 downto 0);
   signal estimate_limited     : std_logic;
@@ -238,6 +238,15 @@ architecture rtl of fluxproof is
   signal lambda_add_d         : signed(FLUX_W - 1 downto 0);
   signal lambda_add_q         : signed(FLUX_W - 1 downto 0);
   signal compensation_limited : std_logic;
+  signal models_valid         : std_logic;
+  signal model_d              : signed(FLUX_MODELS_MODEL_FLUX_W - 1 downto 0);
+  signal model_q              : signed(FLUX_MODELS_MODEL_FLUX_W - 1 downto 0);
+  signal merged_d             : signed(FLUX_MODELS_MERGED_FLUX_W - 1 downto 0);
+  signal merged_q             : signed(FLUX_MODELS_MERGED_FLUX_W - 1 downto 0);
+  signal merged               : std_logic;
+  signal ended                : std_logic;
+  signal raised_d             : signed(FLUX_MODELS_MERGED_FLUX_W - 1 downto 0);
+  signal raised_q             : signed(FLUX_MODELS_MERGED_FLUX_W - 1 downto 0);
   signal model_valid          : std_logic;
   signal model_ab_valid       : std_logic;
   signal factor_valid         : std_logic;
@@ -506,7 +515,7 @@ begin
       t_s          => t_s,
       out_valid    => open,
       r            => r,
-      rho          => rho,
+      minus_rho    => minus_rho,
       temp_lost    => temp_lost
     );
 
@@ -524,24 +533,48 @@ begin
       lambda_m_q     => lambda_m_q
     );
 
+  models : entity work.flux_models
+    port map (
+      clk         => clk,
+      rst         => rst,
+      in_valid    => dq_valid,
+      i_d         => i_d,
+      i_q         => i_q,
+      lambda_m_d  => lambda_m_d,
+      lambda_m_q  => lambda_m_q,
+      lambda_pi_d => lambda_pi_d,
+      lambda_pi_q => lambda_pi_q,
+      merge_known => merge_known,
+      run         => run,
+      minus_rho   => minus_rho,
+      flux_mode   => flux_mode,
+      l_d         => l_d,
+      l_q         => l_q,
+      lambda_mg   => lambda_mg,
+      out_valid   => models_valid,
+      model_d     => model_d,
+      model_q     => model_q,
+      merged_d    => merged_d,
+      merged_q    => merged_q,
+      merged      => merged,
+      ended       => ended,
+      raised_d    => raised_d,
+      raised_q    => raised_q
+    );
+
   flux : entity work.flux_estimate
     port map (
       clk              => clk,
       rst              => rst,
-      in_valid         => dq_valid,
-      i_d              => i_d,
-      i_q              => i_q,
-      lambda_m_d       => lambda_m_d,
-      lambda_m_q       => lambda_m_q,
-      lambda_pi_d      => lambda_pi_d,
-      lambda_pi_q      => lambda_pi_q,
-      merge_known      => merge_known,
-      run              => run,
-      rho              => rho,
-      flux_mode        => flux_mode,
-      l_d              => l_d,
-      l_q              => l_q,
-      lambda_mg        => lambda_mg,
+      in_valid         => models_valid,
+      model_d          => model_d,
+      model_q          => model_q,
+      merged_d         => merged_d,
+      merged_q         => merged_q,
+      merged           => merged,
+      ended            => ended,
+      raised_d         => raised_d,
+      raised_q         => raised_q,
       out_valid        => lambda_valid,
       lambda_d         => lambda_d,
       lambda_q         => lambda_q,
@@ -744,14 +777,11 @@ begin
     port map (
       clk           => clk,
       rst           => rst,
-      in_valid      => dq_valid,
-      i_d           => i_d,
-      i_q           => i_q,
+      in_valid      => models_valid,
+      model_d       => model_d,
+      model_q       => model_q,
       lambda_add_d  => lambda_add_d,
       lambda_add_q  => lambda_add_q,
-      l_d           => l_d,
-      l_q           => l_q,
-      lambda_mg     => lambda_mg,
       out_valid     => model_valid,
       lambda_c_d    => lambda_c_d,
       lambda_c_q    => lambda_c_q,
@@ -785,7 +815,7 @@ begin
       u_applied_beta  => u_clean_beta,
       voltage_known   => voltage_known,
       run             => run,
-      rho             => rho,
+      minus_rho       => minus_rho,
       omega_0         => omega_0,
       xi              => xi,
       t_s             => t_s,

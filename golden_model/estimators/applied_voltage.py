@@ -111,8 +111,8 @@ BLOCK = Block(
         Port("u_applied_beta", FLUX, doc="voltage of the coming period, beta"),
         Port("voltage_known", BIT, doc="0: gates off or bus reading lost"),
     ),
-    latency=7,
-    interval=7,
+    latency=11,
+    interval=11,
     constants={
         "K_FRAC": K_FRAC,
         "SCALE_W": SCALE.width,

@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 from golden_model.block import Block, Port
 from golden_model.estimators.delta_lambda import DELTA
-from golden_model.estimators.flux_estimate import EARLIER, FLUX_MODE, PROPOSED
+from golden_model.estimators.flux_models import EARLIER, FLUX_MODE, PROPOSED
 from golden_model.fixed import Format, clamp, round_half_up
 from golden_model.formats import BIT, FLUX, FLUX_STATE, FLUX_TO_STATE, PU
 from golden_model.kernel import kernel

@@ -30,7 +30,7 @@ time constant.  y needs none: |eps| <= 2 and w < 1/4.
 from typing import NamedTuple
 
 from golden_model.block import Block, Port
-from golden_model.estimators.winding_resistance import RHO, T_S
+from golden_model.estimators.winding_resistance import MINUS_RHO, T_S
 from golden_model.fixed import Format, exceeds, round_half_up, saturate
 from golden_model.formats import (
     BIT,
@@ -68,9 +68,9 @@ class State(NamedTuple):
 
 
 @kernel
-def axis(carried, x, i, lambda_c, u, valid, rho, omega_0, xi, t_s):
+def axis(carried, x, i, lambda_c, u, valid, minus_rho, omega_0, xi, t_s):
     """One axis: (carried flux, x, 1 where anything was limited)."""
-    drop = round_half_up(rho * i, DROP_RHO)
+    drop = round_half_up(-minus_rho * i, DROP_RHO)
     now = carried - drop
     lambda_now = saturate(now, FLUX_STATE_W)
     flux = round_half_up(lambda_now, FLUX_TO_STATE)
@@ -93,7 +93,7 @@ def axis(carried, x, i, lambda_c, u, valid, rho, omega_0, xi, t_s):
 @kernel
 def step(
     state, i_alpha, i_beta, lambda_c_alpha, lambda_c_beta, u_applied_alpha, u_applied_beta, voltage_known, run,
-    rho, omega_0, xi, t_s,
+    minus_rho, omega_0, xi, t_s,
 ):  # fmt: skip
     valid = state.known & run
     lambda_alpha, x_alpha, limited_alpha = axis(
@@ -103,13 +103,13 @@ def step(
         lambda_c_alpha,
         u_applied_alpha,
         valid,
-        rho,
+        minus_rho,
         omega_0,
         xi,
         t_s,
     )
     lambda_beta, x_beta, limited_beta = axis(
-        state.lambda_beta, state.x_beta, i_beta, lambda_c_beta, u_applied_beta, valid, rho, omega_0, xi, t_s
+        state.lambda_beta, state.x_beta, i_beta, lambda_c_beta, u_applied_beta, valid, minus_rho, omega_0, xi, t_s
     )
     lambda_m_alpha = saturate(round_half_up(lambda_alpha, FLUX_TO_STATE), FLUX_W)
     lambda_m_beta = saturate(round_half_up(lambda_beta, FLUX_TO_STATE), FLUX_W)
@@ -121,7 +121,7 @@ def reference(v, state):
     out = {}
     for n, of in enumerate(("alpha", "beta")):
         carried, x = state[n] * FLUX_STATE.lsb, state[2 + n] * X.lsb
-        drop = v["rho"] * v[f"i_{of}"]
+        drop = -v["minus_rho"] * v[f"i_{of}"]
         now = FLUX_STATE.limit(carried - drop)
         eps = FLUX.limit(v[f"lambda_c_{of}"] - now)
         y = v["omega_0"] * eps
@@ -142,7 +142,7 @@ def bound(v, _state):
 
 def stimuli(rng, _config):
     """A turning flux with its voltage, gains at both ends of their ranges, into the limits and back; gates off."""
-    nominal = {"rho": 40000, "omega_0": 4118, "xi": 11585, "t_s": 32925, "run": 1, "voltage_known": 1}
+    nominal = {"minus_rho": -40000, "omega_0": 4118, "xi": 11585, "t_s": 32925, "run": 1, "voltage_known": 1}
     rows = []
     for change in (
         {},
@@ -179,7 +179,7 @@ BLOCK = Block(
         Port("u_applied_beta", FLUX, doc="voltage of the coming period, beta"),
         Port("voltage_known", BIT, doc="0: gates off or bus reading lost"),
         Port("run", BIT, doc="1: the gates are switching"),
-        RHO,
+        MINUS_RHO,
     ),
     registers=(
         Port("omega_0", OMEGA_0, lo=1 << 8, doc="crossover of the two models, times the sample time"),
@@ -192,8 +192,8 @@ BLOCK = Block(
         Port("merge_limited", BIT, doc="the merge reached its range"),
     ),
     state=State(),
-    latency=25,
-    interval=25,
+    latency=31,
+    interval=31,
     constants={
         "Y_W": Y_W,
         "X_W": X_W,

@@ -17,7 +17,7 @@ from typing import NamedTuple
 from golden_model.block import Block, Port
 from golden_model.control.current_pi import SAT
 from golden_model.control.dead_time_compensation import D_Q
-from golden_model.estimators.current_model import L_D
+from golden_model.estimators.flux_models import L_D
 from golden_model.estimators.v_dead_adaline import V_LEG_PORT
 from golden_model.estimators.winding_resistance import R
 from golden_model.fixed import Format, round_half_up, round_sat, saturate
@@ -137,8 +137,8 @@ BLOCK = Block(
         Port("psi_held", BIT, doc="1: psi_m is held"),
     ),
     state=State(),
-    latency=15,
-    interval=15,
+    latency=14,
+    interval=14,
     constants={
         "PSI_STATE_W": PSI_STATE_W,
         "DROP_V": DROP_V,

@@ -220,8 +220,8 @@ BLOCK = Block(
         Port("v_comp_limited", BIT, doc="the compensation reached its limit"),
     ),
     state=State(),
-    latency=24,
-    interval=24,
+    latency=28,
+    interval=28,
     constants={
         "V_STATE_W": V_STATE_W,
         "V_FINE_W": V_FINE.width,

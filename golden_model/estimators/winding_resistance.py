@@ -1,12 +1,12 @@
 """The winding's resistance from its temperature, paper 000 eq. (12), and the flux it takes away in half a sample.
 
     r   = r_s + tcr*(temp_winding - t_0)        R = R_0 + TCR*(T_2 - T_0)
-    rho = r*t_s/2                               t_s: the sample time in per unit, T_s*omega_base
+    minus_rho = -r*t_s/2                        t_s: the sample time in per unit, T_s*omega_base
 
 Without a reading (``temp_valid`` = 0), or one outside t_min to t_max, r = r_s and ``temp_lost`` is raised.
-rho is what flux_merge and flux_estimate multiply by a current: half a sample's resistive drop, integrated.
+minus_rho is what flux_merge and flux_models multiply by a current and add: half a sample's resistive drop, integrated.
 Formats: temperatures S(9,6) in degrees, tcr U(-6,30); product 36 fraction bits, rounded half up to 24; r limited to
-0 .. 1; rho rounded half up to 24 fraction bits, below 1/4 since t_s < 1/2.
+0 .. 1; rho rounded half up to 24 fraction bits, then negated, within 1/4 since t_s < 1/2.
 """
 
 from golden_model.block import Block, Port
@@ -26,18 +26,18 @@ def step(temp_winding, temp_valid, r_s, tcr, t_0, t_min, t_max, t_s):
     lost = 0 if temp_valid and t_min <= temp_winding <= t_max else 1
     warmer = round_half_up((temp_winding - t_0) * tcr, DROP_TCR)
     r = r_s if lost else saturate_u(r_s + warmer, RESISTANCE_BITS)
-    return r, round_half_up(r * t_s, DROP_RHO), lost
+    return r, -round_half_up(r * t_s, DROP_RHO), lost
 
 
 def reference(v, _state):
     trusted = v["temp_valid"] and v["t_min"] <= v["temp_winding"] <= v["t_max"]
     r = v["r_s"] + (v["tcr"] * (v["temp_winding"] - v["t_0"]) if trusted else 0.0)
     r = min(max(r, 0.0), RESISTANCE.hi * RESISTANCE.lsb)
-    return {"r": r, "rho": r * v["t_s"] / 2}
+    return {"r": r, "minus_rho": -r * v["t_s"] / 2}
 
 
 def bound(v, _state):
-    return {"r": RESISTANCE.lsb / 2, "rho": RESISTANCE.lsb / 2 * (1 + v["t_s"] / 2)}
+    return {"r": RESISTANCE.lsb / 2, "minus_rho": RESISTANCE.lsb / 2 * (1 + v["t_s"] / 2)}
 
 
 def stimuli(_rng, _config):
@@ -64,7 +64,10 @@ def stimuli(_rng, _config):
 
 T_S = Port("t_s", SAMPLE_TIME, doc="sample time, per unit")
 R = Port("r", RESISTANCE, doc="winding resistance in use")
-RHO = Port("rho", RESISTANCE, doc="flux taken away in half a sample, per unit of current")
+MINUS_RESISTANCE = Format(1, 0, RESISTANCE.frac_bits)
+MINUS_RHO = Port(
+    "minus_rho", MINUS_RESISTANCE, -RESISTANCE.hi, 0, "less the flux that half a sample takes, per unit of current"
+)
 
 BLOCK = Block(
     name="winding_resistance",
@@ -83,9 +86,9 @@ BLOCK = Block(
         Port("t_max", CELSIUS, doc="hottest reading that is believed"),
         T_S,
     ),
-    outputs=(R, RHO, Port("temp_lost", BIT, doc="1: no believable temperature, r is r_s")),
-    latency=7,
-    interval=7,
+    outputs=(R, MINUS_RHO, Port("temp_lost", BIT, doc="1: no believable temperature, r is r_s")),
+    latency=8,
+    interval=8,
     constants={"DROP_TCR": DROP_TCR, "DROP_RHO": DROP_RHO},
     reference=reference,
     bound=bound,

@@ -32,16 +32,18 @@ LAMBDA_M = (
     Port("lambda_m_beta", FLUX, doc="merged flux before the sample's resistive drop, beta"),
 )
 
+LAMBDA_M_DQ = (
+    Port("lambda_m_d", FLUX, doc="merged flux before the sample's resistive drop, d axis"),
+    Port("lambda_m_q", FLUX, doc="merged flux before the sample's resistive drop, q axis"),
+)
+
 BLOCK = Block(
     name="flux_park",
     folder="transforms",
     paper="001, eq. (9): T_alphabeta/dq",
     step=step,
     inputs=(*LAMBDA_M, *rotate.TRIG_PORTS),
-    outputs=(
-        Port("lambda_m_d", FLUX, doc="merged flux before the sample's resistive drop, d axis"),
-        Port("lambda_m_q", FLUX, doc="merged flux before the sample's resistive drop, q axis"),
-    ),
+    outputs=LAMBDA_M_DQ,
     latency=rotate.BLOCK.latency,
     interval=rotate.BLOCK.interval,
     reference=reference,

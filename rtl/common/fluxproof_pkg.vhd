@@ -36,10 +36,10 @@ package fluxproof_pkg is
 
   -- fluxproof: clocks from the raw sample to the duties, least distance of two samples
   constant FLUXPROOF_SAMPLE_TO_DUTY : positive := 40;
-  constant FLUXPROOF_SAMPLE_INTERVAL : positive := 56;
+  constant FLUXPROOF_SAMPLE_INTERVAL : positive := 60;
 
   -- register_access: clocks that a write waits for the end of a sample
-  constant REGISTER_PATIENCE : positive := 72;
+  constant REGISTER_PATIENCE : positive := 76;
 
   -- sqrt: 001, section 5.2: voltage limit of the current regulation
   constant SQRT_LATENCY : positive := 5;
@@ -367,12 +367,12 @@ package fluxproof_pkg is
   constant GATE_GENERATION_LATENCY : positive := 1;
 
   -- winding_resistance: 000, eq. (12)
-  constant WINDING_RESISTANCE_LATENCY : positive := 7;
+  constant WINDING_RESISTANCE_LATENCY : positive := 8;
   constant WINDING_RESISTANCE_DROP_TCR : natural := 12;
   constant WINDING_RESISTANCE_DROP_RHO : natural := 19;
 
   -- applied_voltage: 001, section 2.2: u_alphabeta of eq. (5)
-  constant APPLIED_VOLTAGE_LATENCY : positive := 7;
+  constant APPLIED_VOLTAGE_LATENCY : positive := 11;
   constant APPLIED_VOLTAGE_K_FRAC : natural := 16;
   constant APPLIED_VOLTAGE_SCALE_W : natural := 24;
   constant APPLIED_VOLTAGE_DROP_SCALE : natural := 10;
@@ -383,16 +383,13 @@ package fluxproof_pkg is
   constant APPLIED_VOLTAGE_TO_FLUX : natural := 1;
 
   -- current_model: 001, eq. (6); with lambda_add the last term of eq. (16)
-  constant CURRENT_MODEL_LATENCY : positive := 3;
-  constant CURRENT_MODEL_SHIFT_MG : natural := 20;
-  constant CURRENT_MODEL_SHIFT_ADD : natural := 13;
-  constant CURRENT_MODEL_DROP : natural := 13;
+  constant CURRENT_MODEL_LATENCY : positive := 4;
 
   -- flux_inverse_park: 001, eq. (9): T_dq/alphabeta
   constant FLUX_INVERSE_PARK_LATENCY : positive := 5;
 
   -- flux_merge: 001, eq. (7); 'Merge of voltage and current models' of Fig. 8
-  constant FLUX_MERGE_LATENCY : positive := 25;
+  constant FLUX_MERGE_LATENCY : positive := 31;
   constant FLUX_MERGE_Y_W : natural := 25;
   constant FLUX_MERGE_X_W : natural := 34;
   constant FLUX_MERGE_DROP_RHO : natural := 10;
@@ -405,14 +402,20 @@ package fluxproof_pkg is
   -- flux_park: 001, eq. (9): T_alphabeta/dq
   constant FLUX_PARK_LATENCY : positive := 5;
 
+  -- flux_models: 001, eq. (6) and (11)
+  constant FLUX_MODELS_LATENCY : positive := 2;
+  constant FLUX_MODELS_MODEL_FLUX_W : natural := 31;
+  constant FLUX_MODELS_MERGED_FLUX_W : natural := 26;
+  constant FLUX_MODELS_SHIFT_MG : natural := 20;
+  constant FLUX_MODELS_DROP_MODEL : natural := 12;
+  constant FLUX_MODELS_DROP_MERGED : natural := 17;
+  constant FLUX_MODELS_HALF_PU : natural := 64;
+  constant FLUX_MODELS_CURRENT_MODEL : natural := 0;
+  constant FLUX_MODELS_EARLIER : natural := 2;
+  constant FLUX_MODELS_PROPOSED : natural := 3;
+
   -- flux_estimate: 001, eq. (17)
-  constant FLUX_ESTIMATE_LATENCY : positive := 3;
-  constant FLUX_ESTIMATE_SHIFT_BASE : natural := 17;
-  constant FLUX_ESTIMATE_SHIFT_MODEL : natural := 4;
-  constant FLUX_ESTIMATE_DROP : natural := 24;
-  constant FLUX_ESTIMATE_CURRENT_MODEL : natural := 0;
-  constant FLUX_ESTIMATE_EARLIER : natural := 2;
-  constant FLUX_ESTIMATE_PROPOSED : natural := 3;
+  constant FLUX_ESTIMATE_LATENCY : positive := 1;
 
   -- speed_reciprocal: 001, section 5.2: lower limit of the speed for delta_lambda
   constant SPEED_RECIPROCAL_LATENCY : positive := 24;
@@ -443,7 +446,7 @@ package fluxproof_pkg is
   constant FLUX_MONITOR_LATENCY : positive := 1;
 
   -- current_directions: 000, eq. (6)
-  constant CURRENT_DIRECTIONS_LATENCY : positive := 25;
+  constant CURRENT_DIRECTIONS_LATENCY : positive := 24;
   constant CURRENT_DIRECTIONS_ONE : natural := 65536;
   constant CURRENT_DIRECTIONS_SQRT3 : signed(17 downto 0) := to_signed(113512, 18);  -- 1.732050808 as U(1,16), signed for the multiplier
   constant CURRENT_DIRECTIONS_DROP_TURN : natural := 16;
@@ -451,7 +454,7 @@ package fluxproof_pkg is
   constant CURRENT_DIRECTIONS_DROP : natural := 13;
 
   -- dead_time_compensation: 000, section V.B, step d
-  constant DEAD_TIME_COMPENSATION_LATENCY : positive := 2;
+  constant DEAD_TIME_COMPENSATION_LATENCY : positive := 4;
   constant DEAD_TIME_COMPENSATION_DROP : natural := 18;
 
   -- clean_voltage: 000, eq. (4); 001, eq. (5): the voltage cleaned of the inverter's distortion
@@ -459,7 +462,7 @@ package fluxproof_pkg is
   constant CLEAN_VOLTAGE_DROP : natural := 11;
 
   -- v_dead_adaline: 000, eq. (10) and Fig. 4(a)
-  constant V_DEAD_ADALINE_LATENCY : positive := 24;
+  constant V_DEAD_ADALINE_LATENCY : positive := 28;
   constant V_DEAD_ADALINE_V_STATE_W : natural := 38;
   constant V_DEAD_ADALINE_V_FINE_W : natural := 25;
   constant V_DEAD_ADALINE_STEP_W : natural := 18;
@@ -474,7 +477,7 @@ package fluxproof_pkg is
   constant V_DEAD_ADALINE_FINE_TO_LEG : natural := 7;
 
   -- psi_adaline: 000, eq. (13), with the reluctance term of eq. (7b)
-  constant PSI_ADALINE_LATENCY : positive := 15;
+  constant PSI_ADALINE_LATENCY : positive := 14;
   constant PSI_ADALINE_PSI_STATE_W : natural := 36;
   constant PSI_ADALINE_DROP_V : natural := 11;
   constant PSI_ADALINE_DROP_R : natural := 17;
@@ -490,7 +493,7 @@ package fluxproof_pkg is
   -- telemetry_words: none: what a recording needs
   constant TELEMETRY_WORDS_LATENCY : positive := 2;
   constant TELEMETRY_WORDS_COUNT : natural := 24;
-  constant TELEMETRY_WORDS_START : natural := 34;
+  constant TELEMETRY_WORDS_START : natural := 38;
   constant TELEMETRY_WORDS_INDEX_W : natural := 5;
 
   -- telemetry: none: what a recording needs

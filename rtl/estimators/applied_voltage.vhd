@@ -3,7 +3,8 @@
 --   u_applied_beta  = (compare_b - compare_c)               * u_dc/CARRIER_HALF * 1/sqrt(3)
 -- voltage_known = 0: the gates are off, or the bus reading is at its end or below 1/32 per unit.
 -- Formats: compare values in clocks; u_dc*2**SHIFT/CARRIER_HALF U(2,22), with SHIFT so that the constant is in
--- [1, 2); out FLUX.  Latency: 7 (alpha, beta follow each other).  Interval: 7.
+-- [1, 2); out FLUX.
+-- Latency: 11 (alpha, beta follow each other).  Interval: 11.
 -- Rounding: half up after each product.  Saturated, which no compare value up to CARRIER_HALF needs.
 
 library ieee;
@@ -72,18 +73,29 @@ architecture rtl of applied_voltage is
 
   constant K_CARRIER : signed(17 downto 0) := to_signed(carrier_constant, 18);
 
+  -- What rounds each product, in the adder behind its multiplier
+  constant PROD_1_W   : positive                      := U_DC_W + K_CARRIER'length + 1;
+  constant PROD_8_W   : positive                      := SCALE_W + SUM_W + 1;
+  constant HALF_SCALE : signed(PROD_1_W - 1 downto 0) := half(APPLIED_VOLTAGE_DROP_SCALE, PROD_1_W);
+  constant HALF_U     : signed(PROD_8_W - 1 downto 0) := half(SHIFT - APPLIED_VOLTAGE_TO_FLUX, PROD_8_W);
+
   signal valid    : std_logic_vector(0 to LATENCY);
-  signal prod_1   : signed(U_DC_W + K_CARRIER'length downto 0);
+  signal prod_1   : signed(PROD_1_W - 1 downto 0);
+  signal sum_2    : signed(PROD_1_W - 1 downto 0);
   signal scale_2  : signed(SCALE_W downto 0);
-  signal coeff_2  : signed(COEFF_W - 1 downto 0);
-  signal first_2  : unsigned(15 downto 0);
-  signal prod_3   : signed(SCALE_W + COEFF_W downto 0);
-  signal raised_3 : signed(SCALE_W + COEFF_W downto 0);
-  signal part_3   : signed(SUM_W - 1 downto 0);
-  signal scaled_4 : signed(SCALE_W downto 0);
-  signal sum_4    : signed(SUM_W - 1 downto 0);
-  signal prod_5   : signed(SCALE_W + SUM_W downto 0);
-  signal u_5      : signed(FLUX_W - 1 downto 0);
+  signal beta_3   : std_logic;
+  signal coeff_3  : signed(COEFF_W - 1 downto 0);
+  signal prod_4   : signed(SCALE_W + COEFF_W downto 0);
+  signal half_4   : signed(SCALE_W + COEFF_W downto 0);
+  signal sum_5    : signed(SCALE_W + COEFF_W downto 0);
+  signal first_5  : unsigned(15 downto 0);
+  signal scaled_6 : signed(SCALE_W downto 0);
+  signal part_6   : signed(SUM_W - 1 downto 0);
+  signal clocks_7 : signed(SUM_W - 1 downto 0);
+  signal scaled_7 : signed(SCALE_W downto 0);
+  signal prod_8   : signed(PROD_8_W - 1 downto 0);
+  signal sum_9    : signed(PROD_8_W - 1 downto 0);
+  signal u_9      : signed(FLUX_W - 1 downto 0);
 
   -- A compare value where differences of compare values are formed.
   function wide (compare : unsigned) return signed is
@@ -93,51 +105,65 @@ architecture rtl of applied_voltage is
 begin
   valid(0) <= in_valid;
 
+  -- u_dc and the constant are below 2, so it fits.
+  scale_2 <= resize(sum_2(sum_2'high downto APPLIED_VOLTAGE_DROP_SCALE), SCALE_W + 1);
+
   -- The axis of the beat: alpha first, then beta, whose sum is that of alpha with b in the place of a.
-  coeff_2  <= APPLIED_VOLTAGE_INV_SQRT3 when valid(3) = '1' else APPLIED_VOLTAGE_THIRD;
-  first_2  <= compare_b when valid(3) = '1' else compare_a;
-  raised_3 <= shift_left(prod_3, APPLIED_VOLTAGE_DROP_THIRD - APPLIED_VOLTAGE_DROP_INV_SQRT3) when valid(4) = '1' else
-              prod_3;
-  u_5      <= round_sat(prod_5, SHIFT - APPLIED_VOLTAGE_TO_FLUX, FLUX_W);
+  beta_3  <= valid(4);
+  coeff_3 <= APPLIED_VOLTAGE_INV_SQRT3 when beta_3 = '1' else APPLIED_VOLTAGE_THIRD;
+  half_4  <= half(APPLIED_VOLTAGE_DROP_INV_SQRT3, SCALE_W + COEFF_W + 1) when valid(5) = '1' else
+             half(APPLIED_VOLTAGE_DROP_THIRD, SCALE_W + COEFF_W + 1);
+  first_5 <= compare_b when valid(6) = '1' else compare_a;
+  u_9     <= saturate(sum_9(sum_9'high downto SHIFT - APPLIED_VOLTAGE_TO_FLUX), FLUX_W);
 
   process (clk)
   begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stage 1: prod = u_dc * 2**SHIFT/CARRIER_HALF
+      -- Stages 1, 2: scale = u_dc * 2**SHIFT/CARRIER_HALF
       if valid(0) = '1' then
         prod_1 <= signed('0' & u_dc) * K_CARRIER;
       end if;
-
-      -- Stage 2: scale = prod, narrowed; u_dc and the constant are below 2, so it fits
       if valid(1) = '1' then
-        scale_2 <= resize(round_half_up(prod_1, APPLIED_VOLTAGE_DROP_SCALE), SCALE_W + 1);
+        sum_2 <= prod_1 + HALF_SCALE;
       end if;
 
-      -- Stage 3: prod = scale * 1/3 or 1/sqrt(3);  part = 2*first - compare_b
-      if valid(2) = '1' or valid(3) = '1' then
-        prod_3 <= scale_2 * coeff_2;
-        part_3 <= shift_left(wide(first_2), 1) - wide(compare_b);
-      end if;
-
-      -- Stage 4: scaled = prod, narrowed;  sum = part - compare_c
+      -- Stages 4 to 6: scaled = scale * 1/3 or 1/sqrt(3);  part = 2*first - compare_b
       if valid(3) = '1' or valid(4) = '1' then
-        scaled_4 <= resize(round_half_up(raised_3, APPLIED_VOLTAGE_DROP_THIRD), SCALE_W + 1);
-        sum_4    <= part_3 - wide(compare_c);
+        prod_4 <= scale_2 * coeff_3;
       end if;
-
-      -- Stage 5: prod = scaled * sum
       if valid(4) = '1' or valid(5) = '1' then
-        prod_5 <= scaled_4 * sum_4;
+        sum_5 <= prod_4 + half_4;
+      end if;
+      if valid(5) = '1' or valid(6) = '1' then
+        scaled_6 <= sum_5(SCALE_W + APPLIED_VOLTAGE_DROP_THIRD downto APPLIED_VOLTAGE_DROP_THIRD);
+        if valid(6) = '1' then
+          scaled_6 <= sum_5(SCALE_W + APPLIED_VOLTAGE_DROP_INV_SQRT3 downto APPLIED_VOLTAGE_DROP_INV_SQRT3);
+        end if;
+        part_6 <= shift_left(wide(first_5), 1) - wide(compare_b);
       end if;
 
-      -- Stage 6: u_applied = prod, narrowed; alpha at clock 6, beta at 7
-      if valid(5) = '1' then
-        u_applied_alpha <= u_5;
+      -- Stage 7: clocks = part - compare_c
+      if valid(6) = '1' or valid(7) = '1' then
+        scaled_7 <= scaled_6;
+        clocks_7 <= part_6 - wide(compare_c);
       end if;
-      if valid(6) = '1' then
-        u_applied_beta <= u_5;
+
+      -- Stages 8, 9: u = scaled * clocks
+      if valid(7) = '1' or valid(8) = '1' then
+        prod_8 <= scaled_7 * clocks_7;
+      end if;
+      if valid(8) = '1' or valid(9) = '1' then
+        sum_9 <= prod_8 + HALF_U;
+      end if;
+
+      -- Stage 10: u_applied = u, narrowed; alpha at clock 10, beta at 11
+      if valid(9) = '1' then
+        u_applied_alpha <= u_9;
+      end if;
+      if valid(10) = '1' then
+        u_applied_beta <= u_9;
         voltage_known  <= '0';
         if run = '1' and u_dc_at_rail = '0' and u_dc >= U_DC_PROCESSING_U_DC_MIN then
           voltage_known <= '1';

@@ -3,10 +3,11 @@
 --   s_a = limit(k_sign*x, +-1)
 --   s_b = limit(k_sign*(-x + sqrt(3)*y)/2, +-1);  s_c = limit(k_sign*(-x - sqrt(3)*y)/2, +-1)
 --   s_alpha, s_beta: their Clarke transform
--- Twelve products one after the other, through one multiplier and the adder behind it: sum = addend + mul_a*mul_b.  The
--- last five are transforms/clarke, which cannot saturate here.  The outputs are state: the next sample starts with them.
+-- Thirteen products one after the other, through one multiplier and the adder behind it: sum = addend + mul_a*mul_b.
+-- The last five are transforms/clarke, which cannot saturate here.  The outputs are state: the next sample starts with
+-- them.
 -- Formats: PU in and out; k_ahead U(1,16), sqrt(3) U(1,16), k_sign U(12,12); products exact.
--- Latency: 25.  Interval: 25.
+-- Latency: 24.  Interval: 24.
 -- Rounding: every product half up.  turn, x, y and twice each phase current saturate.
 
 library ieee;
@@ -38,8 +39,12 @@ architecture rtl of current_directions is
   constant DROP    : positive                    := CURRENT_DIRECTIONS_DROP;
   constant SUM_W   : positive                    := PU_W + WIDE_W;
   constant ONE     : signed(PU_W - 1 downto 0)   := to_signed(CURRENT_DIRECTIONS_ONE, PU_W);
+  constant ROOT    : signed(WIDE_W - 1 downto 0) := resize(CURRENT_DIRECTIONS_SQRT3, WIDE_W);
   constant THIRD   : signed(WIDE_W - 1 downto 0) := resize(CLARKE_THIRD, WIDE_W);
   constant BY_BETA : signed(WIDE_W - 1 downto 0) := resize(CLARKE_INV_SQRT3, WIDE_W);
+
+  -- An LSB less than half: what is rounded half up and then negated is half down.
+  constant HALF_DOWN : signed(TURN_BY - 1 downto 0) := (TURN_BY - 1 => '0', others => '1');
 
   signal valid     : std_logic_vector(0 to LATENCY);
   signal factor_a  : signed(WIDE_W - 1 downto 0);
@@ -52,9 +57,6 @@ architecture rtl of current_directions is
   signal narrow    : signed(PU_W - 1 downto 0);
   signal not_x_7   : signed(PU_W - 1 downto 0);
   signal minus_x_8 : signed(PU_W downto 0);
-  signal across_11 : signed(PU_W downto 0);
-  signal across    : signed(PU_W downto 0);         -- across at clock 11, its complement at clock 12
-  signal twice     : signed(PU_W + 2 downto 0);     -- twice the current of phase b at clock 12, of phase c at clock 13
   signal s         : signed(SUM_W - 1 - DROP downto 0);
   signal s_past    : std_logic;
   signal s_end     : signed(PU_W - 1 downto 0);
@@ -65,7 +67,6 @@ begin
   valid(0) <= in_valid;
 
   narrow <= saturate(sum(SUM_W - 1 downto TURN_BY), PU_W);
-  across <= across_11 xor valid(12);
 
   -- A direction, and whether it is past one: its bits from that of one on are not all alike.
   s      <= sum(SUM_W - 1 downto DROP);
@@ -74,26 +75,28 @@ begin
 
   factor_a <= resize(i_beta, WIDE_W) when valid(3) = '1' else
               resize(i_alpha, WIDE_W) when valid(4) = '1' else
-              signed('0' & k_sign) when valid(8) = '1' else
+              ROOT when valid(7) = '1' else
+              -ROOT when valid(8) = '1' else
+              signed('0' & k_sign) when valid(10) = '1' else
               signed(resize(k_ahead, WIDE_W)) when valid(0) = '1' else
-              resize(CURRENT_DIRECTIONS_SQRT3, WIDE_W) when valid(7) = '1' else
-              shift_left(THIRD, 1) when valid(17) = '1' else
-              -THIRD when valid(18) = '1' else
+              shift_left(THIRD, 1) when valid(18) = '1' else
+              -THIRD when valid(16) = '1' else
               -BY_BETA when valid(20) = '1' else
               BY_BETA;
-  factor_b <= narrow when valid(3) = '1' or valid(7) = '1' else
-              saturate((not not_x_7) & '0', PU_W) when valid(8) = '1' else
-              saturate(twice(PU_W + 2 downto 1), PU_W) when valid(12) = '1' or valid(13) = '1' else
+  factor_b <= narrow when (valid(3) or valid(7) or valid(10) or valid(11)) = '1' else
+              saturate((not not_x_7) & '0', PU_W) when valid(12) = '1' else
               omega_me when valid(0) = '1' else
               s_next;
 
   -- x comes as its complement: the adder behind the multiplier only adds.
   addend <= rounding_base(not i_alpha, TURN_BY, SUM_W) when valid(5) = '1' else
             rounding_base(i_beta, TURN_BY, SUM_W) when valid(6) = '1' else
-            sum when valid(20) = '1' or valid(21) = '1' or valid(23) = '1' else
-            rounding_base("0", CLARKE_DROP_ALPHA, SUM_W) when valid(19) = '1' else
-            rounding_base("0", CLARKE_DROP_BETA, SUM_W) when valid(22) = '1' else
-            rounding_base("0", TURN_BY, SUM_W) when valid(2) = '1' or valid(9) = '1' else
+            rounding_base(minus_x_8, TURN_BY, SUM_W) when valid(9) = '1' else
+            resize(minus_x_8 & HALF_DOWN, SUM_W) when valid(10) = '1' else
+            sum when valid(19) = '1' or valid(20) = '1' or valid(22) = '1' else
+            rounding_base("0", CLARKE_DROP_ALPHA, SUM_W) when valid(18) = '1' else
+            rounding_base("0", CLARKE_DROP_BETA, SUM_W) when valid(21) = '1' else
+            rounding_base("0", TURN_BY, SUM_W) when valid(2) = '1' else
             rounding_base("0", DROP, SUM_W);
 
   process (clk)
@@ -101,26 +104,28 @@ begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stages 1, 4, 5, 8, 9, 13, 14, 18 to 22: the factors; where one of them is missing it stays
-      if (valid(0) or valid(3) or valid(4) or valid(7) or valid(8) or valid(17) or valid(18) or valid(20)
-          or valid(21)) = '1' then
+      -- Stages 1, 4, 5, 8, 9, 11 to 13, 17 to 21: the factors; where one of them is missing it stays
+      if (valid(0) or valid(3) or valid(4) or valid(7) or valid(8) or valid(10) or valid(16) or valid(18) or valid(19)
+          or valid(20)) = '1' then
         mul_a <= factor_a;
       end if;
-      if (valid(0) or valid(3) or valid(7) or valid(8) or valid(12) or valid(13) or valid(17) or valid(18) or valid(19)
-          or valid(21)) = '1' then
+      if (valid(0) or valid(3) or valid(7) or valid(10) or valid(11) or valid(12) or valid(16) or valid(17) or valid(18)
+          or valid(19) or valid(20)) = '1' then
         mul_b <= factor_b;
       end if;
 
-      -- Stages 2, 5, 6, 9, 10, 14, 15: prod = omega_me*k_ahead, turn*i_beta, turn*i_alpha, sqrt(3)*y, then k_sign times
-      -- twice each phase current;  stages 19 to 23: 2/3*s_a, -1/3*s_b, -1/3*s_c, -s_c/sqrt(3), s_b/sqrt(3)
-      if (valid(1) or valid(4) or valid(5) or valid(8) or valid(9) or valid(13) or valid(14) or valid(18) or valid(19)
-          or valid(20) or valid(21) or valid(22)) = '1' then
+      -- Stages 2, 5, 6, 9, 10, 12 to 14: prod = omega_me*k_ahead, turn*i_beta, turn*i_alpha, sqrt(3)*y, -sqrt(3)*y,
+      -- then k_sign times twice the currents of b, c, a;  stages 18 to 22: -1/3*s_b, -1/3*s_c, 2/3*s_a,
+      -- s_b/sqrt(3), -s_c/sqrt(3)
+      if (valid(1) or valid(4) or valid(5) or valid(8) or valid(9) or valid(11) or valid(12) or valid(13) or valid(17)
+          or valid(18) or valid(19) or valid(20) or valid(21)) = '1' then
         prod <= mul_a * mul_b;
       end if;
 
-      -- Stages 3, 6, 7, 10, 11, 15, 16, 20 to 24: sum = turn, not x, y, across, s_a, s_b, s_c, s_alpha, s_beta
-      if (valid(2) or valid(5) or valid(6) or valid(9) or valid(10) or valid(14) or valid(15) or valid(19) or valid(20)
-          or valid(21) or valid(22) or valid(23)) = '1' then
+      -- Stages 3, 6, 7, 10, 11, 13 to 15, 19 to 23: sum = turn, not x, y, twice b, twice c, s_b, s_c, s_a, s_alpha,
+      -- s_beta
+      if (valid(2) or valid(5) or valid(6) or valid(9) or valid(10) or valid(12) or valid(13) or valid(14) or valid(18)
+          or valid(19) or valid(20) or valid(21) or valid(22)) = '1' then
         sum <= addend + prod;
       end if;
 
@@ -132,34 +137,24 @@ begin
         minus_x_8 <= resize(not_x_7, PU_W + 1) + 1;
       end if;
 
-      -- Stage 11: across = sum, narrowed; at most 2*sqrt(3), so it fits
-      if valid(10) = '1' then
-        across_11 <= sum(PU_W + TURN_BY downto TURN_BY);
-      end if;
-
-      -- Stages 12, 13: twice = across - x, then -across - x; what the complement lacks comes as a carry
-      if valid(11) = '1' or valid(12) = '1' then
-        twice <= (resize(minus_x_8, PU_W + 2) & valid(12)) + (resize(across, PU_W + 2) & valid(12));
-      end if;
-
-      -- Stages 12, 16, 17: s = sum, narrowed and limited;  stages 18 to 21: they take turns as factors
-      if (valid(11) or valid(15) or valid(16) or valid(17) or valid(18) or valid(19) or valid(20)) = '1' then
+      -- Stages 14 to 16: s = sum, narrowed and limited;  stages 17 to 21: they take turns as factors
+      if (valid(13) or valid(14) or valid(15) or valid(16) or valid(17) or valid(18) or valid(19)) = '1' then
         s_next <= s_then;
         s_then <= s_last;
         s_last <= s_next;
       end if;
-      if (valid(11) or valid(15) or valid(16)) = '1' then
+      if (valid(13) or valid(14) or valid(15)) = '1' then
         s_last <= s(PU_W - 1 downto 0);
       end if;
-      if (valid(11) or valid(15) or valid(16)) = '1' and s_past = '1' then
+      if (valid(13) or valid(14) or valid(15)) = '1' and s_past = '1' then
         s_last <= s_end;
       end if;
 
-      -- Stages 23, 25: s_alpha, s_beta = sum, narrowed
-      if valid(22) = '1' then
+      -- Stages 22, 24: s_alpha, s_beta = sum, narrowed
+      if valid(21) = '1' then
         s_alpha <= sum(PU_W - 1 + CLARKE_DROP_ALPHA downto CLARKE_DROP_ALPHA);
       end if;
-      if valid(24) = '1' then
+      if valid(23) = '1' then
         s_beta <= sum(PU_W - 1 + CLARKE_DROP_BETA downto CLARKE_DROP_BETA);
       end if;
 

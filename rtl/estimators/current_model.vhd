@@ -1,10 +1,11 @@
--- Purpose: flux linkages from currents by the linear magnetic model, paper 001 eq. (6).
+-- Purpose: flux linkages from currents by the linear magnetic model, paper 001 eq. (6); d first, then q.
 --   lambda_c_d = l_d*i_d + lambda_mg + lambda_add_d
 --   lambda_c_q = l_q*i_q             + lambda_add_q
--- lambda_add is the correction of eq. (16), zero in every other mode.
--- Formats: inductances U(4,20), currents and lambda_mg PU, lambda_add and results FLUX; products and sums exact.
--- Latency: 3.  Rounding: half up, saturated at 2 per unit, twice the flux that full voltage makes at base speed;
--- model_limited tells it.
+-- The products are those of flux_models.  lambda_add is the correction of eq. (16), zero in every other mode.
+-- Formats: model S(6,24); lambda_add and results FLUX.
+-- Latency: 4 (d, q follow each other).  Interval: 4.
+-- Rounding: half up, saturated at 2 per unit, twice the flux that full voltage makes at base speed; model_limited
+-- tells it.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -17,13 +18,10 @@ entity current_model is
     clk           : in  std_logic;
     rst           : in  std_logic;
     in_valid      : in  std_logic;
-    i_d           : in  signed(PU_W - 1 downto 0);
-    i_q           : in  signed(PU_W - 1 downto 0);
+    model_d       : in  signed(FLUX_MODELS_MODEL_FLUX_W - 1 downto 0);
+    model_q       : in  signed(FLUX_MODELS_MODEL_FLUX_W - 1 downto 0);
     lambda_add_d  : in  signed(FLUX_W - 1 downto 0);
     lambda_add_q  : in  signed(FLUX_W - 1 downto 0);
-    l_d           : in  unsigned(INDUCTANCE_W - 1 downto 0);
-    l_q           : in  unsigned(INDUCTANCE_W - 1 downto 0);
-    lambda_mg     : in  signed(PU_W - 1 downto 0);
     out_valid     : out std_logic;
     lambda_c_d    : out signed(FLUX_W - 1 downto 0);
     lambda_c_q    : out signed(FLUX_W - 1 downto 0);
@@ -32,49 +30,46 @@ entity current_model is
 end entity current_model;
 
 architecture rtl of current_model is
-  constant LATENCY  : positive := CURRENT_MODEL_LATENCY;
-  constant SHIFT_MG : natural  := CURRENT_MODEL_SHIFT_MG - CURRENT_MODEL_SHIFT_ADD;
-  constant SUM_W    : positive := PU_W + INDUCTANCE_W + 2;
+  constant LATENCY : positive := CURRENT_MODEL_LATENCY;
+  constant SUM_W   : positive := FLUX_MODELS_MODEL_FLUX_W;
 
-  signal valid       : std_logic_vector(0 to LATENCY);
-  signal prod_d_1    : signed(PU_W + INDUCTANCE_W downto 0);
-  signal prod_q_1    : signed(PU_W + INDUCTANCE_W downto 0);
-  signal base_d_1    : signed(FLUX_W downto 0);
-  signal base_q_1    : signed(FLUX_W downto 0);
-  signal sum_d_2     : signed(SUM_W - 1 downto 0);
-  signal sum_q_2     : signed(SUM_W - 1 downto 0);
-  signal rounded_d_2 : signed(SUM_W - CURRENT_MODEL_DROP downto 0);
-  signal rounded_q_2 : signed(SUM_W - CURRENT_MODEL_DROP downto 0);
+  signal valid     : std_logic_vector(0 to LATENCY);
+  signal model_0   : signed(SUM_W - 1 downto 0);
+  signal add_0     : signed(FLUX_W - 1 downto 0);
+  signal sum_1     : signed(SUM_W - 1 downto 0);
+  signal rounded_2 : signed(SUM_W - 2 downto 0);
 begin
   valid(0) <= in_valid;
 
-  rounded_d_2 <= round_half_up(sum_d_2, CURRENT_MODEL_DROP);
-  rounded_q_2 <= round_half_up(sum_q_2, CURRENT_MODEL_DROP);
+  -- The axis of the beat
+  model_0 <= model_q when valid(1) = '1' else model_d;
+  add_0   <= lambda_add_q when valid(1) = '1' else lambda_add_d;
 
   process (clk)
   begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stage 1: prod = l * i,  base_d = lambda_mg + lambda_add_d,  base_q = lambda_add_q
-      if valid(0) = '1' then
-        prod_d_1 <= i_d * signed('0' & l_d);
-        prod_q_1 <= i_q * signed('0' & l_q);
-        base_d_1 <= shift_left(resize(lambda_mg, FLUX_W + 1), SHIFT_MG) + lambda_add_d;
-        base_q_1 <= resize(lambda_add_q, FLUX_W + 1);
+      -- Stage 1: sum = model + lambda_add; below 37 per unit, so it fits
+      if valid(0) = '1' or valid(1) = '1' then
+        sum_1 <= (add_0 & '0') + model_0;
       end if;
 
-      -- Stage 2: sum = prod + base
-      if valid(1) = '1' then
-        sum_d_2 <= prod_d_1 + shift_left(resize(base_d_1, SUM_W), CURRENT_MODEL_SHIFT_ADD);
-        sum_q_2 <= prod_q_1 + shift_left(resize(base_q_1, SUM_W), CURRENT_MODEL_SHIFT_ADD);
+      -- Stage 2: sum, rounded
+      if valid(1) = '1' or valid(2) = '1' then
+        rounded_2 <= resize(round_half_up(sum_1, 1), SUM_W - 1);
       end if;
 
-      -- Stage 3: lambda_c = sum, narrowed
+      -- Stage 3: lambda_c = sum, narrowed; d at clock 3, q at 4
       if valid(2) = '1' then
-        lambda_c_d    <= saturate(rounded_d_2, FLUX_W);
-        lambda_c_q    <= saturate(rounded_q_2, FLUX_W);
-        model_limited <= exceeds(rounded_d_2, FLUX_W) or exceeds(rounded_q_2, FLUX_W);
+        lambda_c_d    <= saturate(rounded_2, FLUX_W);
+        model_limited <= exceeds(rounded_2, FLUX_W);
+      end if;
+      if valid(3) = '1' then
+        lambda_c_q <= saturate(rounded_2, FLUX_W);
+        if exceeds(rounded_2, FLUX_W) = '1' then
+          model_limited <= '1';
+        end if;
       end if;
 
       if rst = '1' then

@@ -40,8 +40,8 @@ architecture rtl of flux_compensation is
   constant DROP_P      : positive              := FLUX_COMPENSATION_DROP_P;
   constant DROP_I      : positive              := FLUX_COMPENSATION_DROP_I;
   constant FORGET      : positive              := FLUX_COMPENSATION_FORGET;
-  constant EARLIER     : natural               := FLUX_ESTIMATE_EARLIER;
-  constant PROPOSED    : natural               := FLUX_ESTIMATE_PROPOSED;
+  constant EARLIER     : natural               := FLUX_MODELS_EARLIER;
+  constant PROPOSED    : natural               := FLUX_MODELS_PROPOSED;
   constant KP_ONE      : unsigned(16 downto 0) := to_unsigned(2 ** (DROP_P + FLUX_TO_STATE), 17);
   constant SUM_W       : positive              := FLUX_W + flux_kp'length + 2;
   constant TURN        : positive              := 4;  -- clocks that q comes behind d

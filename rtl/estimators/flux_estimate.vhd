@@ -1,10 +1,10 @@
 -- Purpose: the estimated flux linkages, paper 001 eq. (17): merged models plus the compensation.
---   lambda_d = lambda_m_d - rho*i_d + lambda_pi_d      where the voltage is known and a merge is wanted
---   lambda_d = lambda_mg + l_d*i_d  + lambda_pi_d      else; q alike, without lambda_mg
--- Formats: currents and lambda_mg PU, lambda_m and lambda_pi FLUX; sum in FLUX with four more integer bits.
--- Latency: 3.  Interval: 1.
--- Rounding: the product is floored to FLUX's LSB, which the sum's half up to PU cannot see.  Saturated and told;
--- a merged flux at its end is told too: the rotation before has saturated.
+--   lambda_d = merged_d + raised_d      where merged;  raised: lambda_pi and half an LSB of PU
+--   lambda_d = model_d  + raised_d      else; q alike
+-- Formats: model S(6,24), merged and raised S(2,23); the sum in FLUX with two more integer bits, out PU.
+-- Latency: 1.
+-- Rounding: half up to PU, by a cut: raised brings the half.  Saturated and told; a merged flux at its end
+-- is told too.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -17,19 +17,14 @@ entity flux_estimate is
     clk              : in  std_logic;
     rst              : in  std_logic;
     in_valid         : in  std_logic;
-    i_d              : in  signed(PU_W - 1 downto 0);
-    i_q              : in  signed(PU_W - 1 downto 0);
-    lambda_m_d       : in  signed(FLUX_W - 1 downto 0);
-    lambda_m_q       : in  signed(FLUX_W - 1 downto 0);
-    lambda_pi_d      : in  signed(FLUX_W - 1 downto 0);
-    lambda_pi_q      : in  signed(FLUX_W - 1 downto 0);
-    merge_known      : in  std_logic;
-    run              : in  std_logic;
-    rho              : in  unsigned(RESISTANCE_W - 1 downto 0);
-    flux_mode        : in  unsigned(1 downto 0);
-    l_d              : in  unsigned(INDUCTANCE_W - 1 downto 0);
-    l_q              : in  unsigned(INDUCTANCE_W - 1 downto 0);
-    lambda_mg        : in  signed(PU_W - 1 downto 0);
+    model_d          : in  signed(FLUX_MODELS_MODEL_FLUX_W - 1 downto 0);
+    model_q          : in  signed(FLUX_MODELS_MODEL_FLUX_W - 1 downto 0);
+    merged_d         : in  signed(FLUX_MODELS_MERGED_FLUX_W - 1 downto 0);
+    merged_q         : in  signed(FLUX_MODELS_MERGED_FLUX_W - 1 downto 0);
+    merged           : in  std_logic;
+    ended            : in  std_logic;
+    raised_d         : in  signed(FLUX_MODELS_MERGED_FLUX_W - 1 downto 0);
+    raised_q         : in  signed(FLUX_MODELS_MERGED_FLUX_W - 1 downto 0);
     out_valid        : out std_logic;
     lambda_d         : out signed(PU_W - 1 downto 0);
     lambda_q         : out signed(PU_W - 1 downto 0);
@@ -38,100 +33,63 @@ entity flux_estimate is
 end entity flux_estimate;
 
 architecture rtl of flux_estimate is
-  constant LATENCY       : positive := FLUX_ESTIMATE_LATENCY;
-  constant CURRENT_MODEL : natural  := FLUX_ESTIMATE_CURRENT_MODEL;
-  constant SHIFT_MERGED  : positive := FLUX_ESTIMATE_SHIFT_BASE;
-  constant SHIFT_MODEL   : positive := FLUX_ESTIMATE_SHIFT_BASE - FLUX_ESTIMATE_SHIFT_MODEL;
-  constant DROP          : positive := FLUX_ESTIMATE_DROP - FLUX_ESTIMATE_SHIFT_BASE;
-  constant PROD_W        : positive := PU_W + RESISTANCE_W + 1;
-  constant SUM_W         : positive := FLUX_W + 1 + SHIFT_MERGED + 2;
-  constant SCALED_W      : positive := SUM_W - SHIFT_MODEL;
+  constant LATENCY : positive := FLUX_ESTIMATE_LATENCY;
+  constant SUM_W   : positive := FLUX_MODELS_MERGED_FLUX_W + 1;
 
-  signal valid       : std_logic_vector(0 to LATENCY);
-  signal merged_0    : std_logic;
-  signal factor_d_0  : unsigned(RESISTANCE_W - 1 downto 0);
-  signal factor_q_0  : unsigned(RESISTANCE_W - 1 downto 0);
-  signal start_d_0   : signed(FLUX_W downto 0);
-  signal start_q_0   : signed(FLUX_W downto 0);
-  signal merged_1    : std_logic;
-  signal ended_1     : std_logic;
-  signal prod_d_1    : signed(PROD_W - 1 downto 0);
-  signal prod_q_1    : signed(PROD_W - 1 downto 0);
-  signal base_d_1    : signed(FLUX_W downto 0);
-  signal base_q_1    : signed(FLUX_W downto 0);
-  signal ended_2     : std_logic;
-  signal sum_d_2     : signed(SUM_W - 1 downto 0);
-  signal sum_q_2     : signed(SUM_W - 1 downto 0);
-  signal merged_2    : std_logic;
-  signal rounded_d_2 : signed(SCALED_W - DROP downto 0);
-  signal rounded_q_2 : signed(SCALED_W - DROP downto 0);
+  signal valid     : std_logic_vector(0 to LATENCY);
+  signal far_d     : std_logic;
+  signal far_q     : std_logic;
+  signal chosen_d  : signed(SUM_W - 1 downto 0);
+  signal chosen_q  : signed(SUM_W - 1 downto 0);
+  signal sum_d     : signed(SUM_W - 1 downto 0);
+  signal sum_q     : signed(SUM_W - 1 downto 0);
+  signal cut_d     : signed(SUM_W - 1 - PU_TO_FLUX downto 0);
+  signal cut_q     : signed(SUM_W - 1 - PU_TO_FLUX downto 0);
+  signal limited_d : std_logic;
+  signal limited_q : std_logic;
+  signal below_d   : std_logic;
+  signal below_q   : std_logic;
 
-  -- Whether x is the first or the last number of its format.
-  function at_end (x : signed) return std_logic is
-    alias v : signed(x'length - 1 downto 0) is x;
+  -- The cut sum, or the end of PU on the given side where it is limited.
+  function narrowed (cut : signed; limited : std_logic; below : std_logic) return signed is
+    variable result : signed(PU_W - 1 downto 0) := cut(PU_W - 1 downto 0);
   begin
-    return (v(v'high) and not (or v(v'high - 1 downto 0))) or (not v(v'high) and (and v(v'high - 1 downto 0)));
-  end function;
-
-  -- base at the scale of the product, or its complement, from which the complement of base - prod comes: the adder
-  -- behind the multiplier only adds.
-  function aligned (base : signed; merged : std_logic) return signed is
-  begin
-    if merged = '1' then
-      return not shift_left(resize(base, SUM_W), SHIFT_MERGED);
+    if limited = '1' then
+      result           := (others => not below);
+      result(PU_W - 1) := below;
     end if;
-    return shift_left(resize(base, SUM_W), SHIFT_MODEL);
-  end function;
-
-  -- The sum at the scale of FLUX, floored.
-  function scaled (sum : signed; merged : std_logic) return signed is
-  begin
-    if merged = '1' then
-      return not resize(sum(SUM_W - 1 downto SHIFT_MERGED), SCALED_W);
-    end if;
-    return sum(SUM_W - 1 downto SHIFT_MODEL);
+    return result;
   end function;
 begin
   valid(0) <= in_valid;
 
-  merged_0   <= merge_known and run when flux_mode /= CURRENT_MODEL else '0';
-  factor_d_0 <= rho when merged_0 = '1' else l_d;
-  factor_q_0 <= rho when merged_0 = '1' else l_q;
-  start_d_0  <= resize(lambda_m_d, FLUX_W + 1) when merged_0 = '1' else
-                shift_left(resize(lambda_mg, FLUX_W + 1), PU_TO_FLUX);
-  start_q_0  <= resize(lambda_m_q, FLUX_W + 1) when merged_0 = '1' else (others => '0');
+  -- From 4 per unit on the sum, which is less than the compensation's 2 off, is past the end whatever it is.
+  far_d <= exceeds(model_d, FLUX_MODELS_MERGED_FLUX_W + 1) and not merged;
+  far_q <= exceeds(model_q, FLUX_MODELS_MERGED_FLUX_W + 1) and not merged;
 
-  rounded_d_2 <= round_half_up(scaled(sum_d_2, merged_2), DROP);
-  rounded_q_2 <= round_half_up(scaled(sum_q_2, merged_2), DROP);
+  chosen_d <= resize(merged_d, SUM_W) when merged = '1' else model_d(SUM_W downto 1);
+  chosen_q <= resize(merged_q, SUM_W) when merged = '1' else model_q(SUM_W downto 1);
+
+  -- Below 4 and 2 per unit where it counts: the sum fits.
+  sum_d     <= raised_d + chosen_d;
+  sum_q     <= raised_q + chosen_q;
+  cut_d     <= sum_d(SUM_W - 1 downto PU_TO_FLUX);
+  cut_q     <= sum_q(SUM_W - 1 downto PU_TO_FLUX);
+  limited_d <= far_d or exceeds(cut_d, PU_W);
+  limited_q <= far_q or exceeds(cut_q, PU_W);
+  below_d   <= model_d(model_d'high) when far_d = '1' else cut_d(cut_d'high);
+  below_q   <= model_q(model_q'high) when far_q = '1' else cut_q(cut_q'high);
 
   process (clk)
   begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stage 1: prod = rho*i or l*i;  base = lambda_m or lambda_mg, + lambda_pi
+      -- Stage 1: lambda = chosen + raised, narrowed
       if valid(0) = '1' then
-        merged_1 <= merged_0;
-        ended_1  <= merged_0 and (at_end(lambda_m_d) or at_end(lambda_m_q));
-        prod_d_1 <= i_d * signed('0' & factor_d_0);
-        prod_q_1 <= i_q * signed('0' & factor_q_0);
-        base_d_1 <= lambda_pi_d + start_d_0;
-        base_q_1 <= lambda_pi_q + start_q_0;
-      end if;
-
-      -- Stage 2: sum = base - prod or base + prod
-      if valid(1) = '1' then
-        ended_2  <= ended_1;
-        merged_2 <= merged_1;
-        sum_d_2  <= aligned(base_d_1, merged_1) + prod_d_1;
-        sum_q_2  <= aligned(base_q_1, merged_1) + prod_q_1;
-      end if;
-
-      -- Stage 3: lambda = sum, narrowed
-      if valid(2) = '1' then
-        lambda_d         <= saturate(rounded_d_2, PU_W);
-        lambda_q         <= saturate(rounded_q_2, PU_W);
-        estimate_limited <= ended_2 or exceeds(rounded_d_2, PU_W) or exceeds(rounded_q_2, PU_W);
+        lambda_d         <= narrowed(cut_d, limited_d, below_d);
+        lambda_q         <= narrowed(cut_q, limited_q, below_q);
+        estimate_limited <= ended or limited_d or limited_q;
       end if;
 
       if rst = '1' then

@@ -4,9 +4,9 @@
 --   v_comp = limit(gamma*v_dead + v_sum);  v_leg = v_comp + v_dead
 -- v_dead within +-v_comp_max; v_sum and v_comp from zero to v_comp_max, which is told.  Nothing learns while the
 -- voltage is at its limit, a converter at its end, the voltage not known, the gates off or |i_d| + |i_q| < i_learn.
--- Eight products one after the other, through one multiplier and the adder behind it: sum = addend + mul_a*mul_b.
+-- The filters share a multiplier, fine*d_h, d_h*e and eta_v*pull another, each with the adder behind it.
 -- Formats: lp S(1,28), u_h and d_h PU, e FLUX, d_h*e S(-4,21), v_dead and v_sum S(-1,38), v_comp and v_leg V_LEG.
--- Latency: 24.  Interval: 24.
+-- Latency: 28.  Interval: 28.
 -- Rounding: half up.
 
 library ieee;
@@ -46,66 +46,86 @@ entity v_dead_adaline is
 end entity v_dead_adaline;
 
 architecture rtl of v_dead_adaline is
-  constant LATENCY     : positive                     := V_DEAD_ADALINE_LATENCY;
-  constant STATE_W     : positive                     := V_DEAD_ADALINE_V_STATE_W;
-  constant FINE_W      : positive                     := V_DEAD_ADALINE_V_FINE_W;
-  constant STEP_W      : positive                     := V_DEAD_ADALINE_STEP_W;
-  constant DROP_LP     : positive                     := V_DEAD_ADALINE_DROP_LP;
-  constant DROP_MODEL  : positive                     := V_DEAD_ADALINE_DROP_MODEL;
-  constant DROP_STEP   : positive                     := V_DEAD_ADALINE_DROP_STEP;
-  constant DROP_ETA    : positive                     := V_DEAD_ADALINE_DROP_ETA;
-  constant DROP_ZETA   : positive                     := V_DEAD_ADALINE_DROP_ZETA;
-  constant DROP_GAMMA  : positive                     := V_DEAD_ADALINE_DROP_GAMMA;
-  constant TO_LEG      : positive                     := V_DEAD_ADALINE_TO_LEG;
-  constant FINE_TO_LEG : positive                     := V_DEAD_ADALINE_FINE_TO_LEG;
-  constant SUM_W       : positive                     := 48;
-  constant ONE         : positive                     := DROP_STEP - FINE_TO_LEG;  -- fine*2**ONE drops what d_h*e does
-  constant TO_ZETA     : natural                      := DROP_ZETA - DROP_LP;        -- k_lp*2**TO_ZETA as zeta does
-  constant LP_ZERO     : signed(STATE_W - 1 downto 0) := to_signed(2 ** (PU_TO_INTEGRAL - 1), STATE_W);
+  constant LATENCY     : positive                        := V_DEAD_ADALINE_LATENCY;
+  constant STATE_W     : positive                        := V_DEAD_ADALINE_V_STATE_W;
+  constant FINE_W      : positive                        := V_DEAD_ADALINE_V_FINE_W;
+  constant STEP_W      : positive                        := V_DEAD_ADALINE_STEP_W;
+  constant DROP_LP     : positive                        := V_DEAD_ADALINE_DROP_LP;
+  constant DROP_MODEL  : positive                        := V_DEAD_ADALINE_DROP_MODEL;
+  constant DROP_STEP   : positive                        := V_DEAD_ADALINE_DROP_STEP;
+  constant DROP_ETA    : positive                        := V_DEAD_ADALINE_DROP_ETA;
+  constant DROP_ZETA   : positive                        := V_DEAD_ADALINE_DROP_ZETA;
+  constant DROP_GAMMA  : positive                        := V_DEAD_ADALINE_DROP_GAMMA;
+  constant TO_LEG      : positive                        := V_DEAD_ADALINE_TO_LEG;
+  constant FINE_TO_LEG : positive                        := V_DEAD_ADALINE_FINE_TO_LEG;
+  constant PROD_W      : positive                        := FLUX_W + PU_W;
+  constant SUM_W       : positive                        := PROD_W + 1;
+  constant SUM_Z_W     : positive                        := STATE_W + 1 + DROP_ZETA;
+  constant LP_ZERO     : signed(INTEGRAL_W - 1 downto 0) := to_signed(2 ** (PU_TO_INTEGRAL - 1), INTEGRAL_W);
 
-  -- State; lp_u, lp_d and v_sum take turns at one scale: next, then, last.  lp holds half an LSB of PU more, so that
-  -- its upper bits are lp rounded.  Fine: v_state rounded, as the next sample's model takes it too.
-  signal turn_next : signed(STATE_W - 1 downto 0);
-  signal turn_then : signed(STATE_W - 1 downto 0);
-  signal turn_last : signed(STATE_W - 1 downto 0);
-  signal v_state   : signed(STATE_W - 1 downto 0);
-  signal fine      : signed(FINE_W - 1 downto 0);
+  -- State; lp_u and lp_d take turns and hold half an LSB of PU more, so that their upper bits are lp rounded.  Fine:
+  -- v_state rounded, as the next sample's model takes it too.
+  signal lp_next : signed(INTEGRAL_W - 1 downto 0);
+  signal lp_last : signed(INTEGRAL_W - 1 downto 0);
+  signal v_state : signed(STATE_W - 1 downto 0);
+  signal v_sum   : signed(STATE_W - 1 downto 0);
+  signal fine    : signed(FINE_W - 1 downto 0);
 
   signal valid     : std_logic_vector(0 to LATENCY);
   signal learning  : std_logic;
   signal i_0       : signed(PU_W - 1 downto 0);
-  signal size      : unsigned(PU_W downto 0);           -- |i_d| at clock 2, |i_d| + |i_q| at clock 3
+  signal size      : unsigned(PU_W downto 0);               -- |i_d| at clock 2, |i_d| + |i_q| at clock 3
   signal strong_4  : std_logic;
   signal x_0       : signed(PU_W - 1 downto 0);
-  signal diff      : signed(PU_W downto 0);             -- complement of u_pi_d - lp_u, of d_d - lp_d
-  signal h         : signed(PU_W - 1 downto 0);
-  signal u_h_2     : signed(PU_W - 1 downto 0);
-  signal factor_b  : signed(PU_W - 1 downto 0);
-  signal mul_a     : signed(FLUX_W - 1 downto 0);
-  signal mul_b     : signed(PU_W - 1 downto 0);
-  signal prod      : signed(FLUX_W + PU_W - 1 downto 0);
+  signal room      : signed(PU_W + 1 downto 0);
+  signal diff      : signed(PU_W downto 0);                 -- complement of u_pi_d - lp_u, of d_d - lp_d
+  signal h         : signed(PU_W - 1 downto 0);             -- u_h at clock 2, d_h from clock 6 on
+  signal u_h_6     : signed(PU_W - 1 downto 0);
+  signal prod_lp   : signed(k_lp'length + PU_W downto 0);
+  signal sum_lp    : signed(k_lp'length + PU_W + 1 downto 0);
+  signal moved     : signed(INTEGRAL_W - 1 downto 0);       -- lp_u at clock 4, lp_d at clock 8
+  signal lp_under  : std_logic;
+  signal mul_a     : signed(FLUX_W - 1 downto 0);           -- fine at clock 7, e at clock 10, eta_v at clock 13
+  signal mul_b     : signed(PU_W - 1 downto 0);             -- d_h at clock 7, pull at clock 13
+  signal prod      : signed(PROD_W - 1 downto 0);
   signal addend    : signed(SUM_W - 1 downto 0);
   signal sum       : signed(SUM_W - 1 downto 0);
-  signal moved     : signed(STATE_W downto 0);          -- lp_u at clock 4, lp_d at clock 8, v_sum at clock 20
-  signal lp_0      : signed(PU_W - 1 downto 0);
-  signal lp_under  : std_logic;
   signal e_9       : signed(FLUX_W - 1 downto 0);
   signal pull_12   : signed(STEP_W - 1 downto 0);
-  signal v         : signed(STATE_W + 2 downto 0);       -- v_state moved at clock 15, v_comp asked for at clock 22
-  signal v_past    : std_logic;
-  signal v_end_15  : signed(V_LEG_W - 1 downto 0);
-  signal adding_17 : std_logic;
-  signal zeta_17   : signed(PU_W - 1 downto 0);
-  signal dead_23   : signed(V_LEG_W - 1 downto 0);
+  signal v_15      : signed(STATE_W downto 0);
+  signal past_16   : std_logic;
+  signal under_16  : std_logic;
+  signal end_16    : signed(V_LEG_W - 1 downto 0);
+  signal adding_19 : std_logic;
+  signal zeta_20   : unsigned(zeta'range);
+  signal prod_z    : signed(FINE_W + zeta'length downto 0);
+  signal sum_z     : signed(SUM_Z_W - 1 downto 0);
+  signal v_sum_22  : signed(STATE_W downto 0);
+  signal past_23   : std_logic;
+  signal under_23  : std_logic;
+  signal prod_g    : signed(FINE_W + gamma'length downto 0);
+  signal sum_g     : signed(FINE_W + gamma'length + 2 downto 0);
+  signal v_25      : signed(FINE_W + gamma'length + 2 - DROP_GAMMA downto 0);
+  signal past_26   : std_logic;
+  signal under_26  : std_logic;
 
-  -- so_far + |x|; what the complement of a negative x lacks comes as a carry.
+  -- so_far + |x|, as so_far - x for a negative x, else as so_far less the complement of x and one more.
   function longer (so_far : unsigned; x : signed) return unsigned is
-    variable more : unsigned(so_far'length - 1 downto 0);
-    variable both : unsigned(so_far'length downto 0);
+    variable less : signed(so_far'length - 1 downto 0);
+    variable both : signed(so_far'length downto 0);
   begin
-    more := resize(unsigned(x xor x(x'high)), so_far'length);
-    both := (more & x(x'high)) + (so_far & x(x'high));
-    return both(so_far'length downto 1);
+    less := resize(x xor not x(x'high), so_far'length);
+    both := signed(so_far & '0') - (less & not x(x'high));
+    return unsigned(both(so_far'length downto 1));
+  end function;
+
+  -- Whether a positive v is at v_comp_max or past it; where it is at it, to put it there does not move it.
+  function at_limit (v : signed; v_comp_max : unsigned) return std_logic is
+    alias u       : signed(v'length - 1 downto 0) is v;
+    variable room : signed(v'length - TO_LEG + 1 downto 0);
+  begin
+    room := signed(resize(v_comp_max & '0', room'length)) - resize(u(u'high downto TO_LEG) & '1', room'length);
+    return room(room'high);
   end function;
 begin
   valid(0) <= in_valid;
@@ -113,35 +133,25 @@ begin
 
   i_0 <= i_q when valid(2) = '1' else i_d;
   x_0 <= d_d when valid(4) = '1' else u_pi_d;
-  h   <= saturate(not diff, PU_W);
 
-  lp_0 <= turn_next(INTEGRAL_W - 1 downto PU_TO_INTEGRAL);
-
-  adding_17 <= learning and beyond(fine, v_thr, FINE_TO_LEG);
-  zeta_17   <= signed('0' & zeta) when adding_17 = '1' else (others => '0');
-
-  factor_b <= h when valid(1) = '1' or valid(5) = '1' else
-              pull_12 when valid(12) = '1' else
-              zeta_17 when valid(17) = '1' else
-              signed('0' & gamma) when valid(18) = '1' else
-              to_signed(2 ** ONE, PU_W);
-
-  addend <= rounding_base(turn_next, DROP_ZETA, SUM_W) when valid(3) = '1' or valid(7) = '1' or valid(19) = '1' else
-            rounding_base(not shift_left(resize(u_h_2, FLUX_W), PU_TO_FLUX), DROP_MODEL, SUM_W) when valid(8) = '1' else
-            rounding_base(v_state, DROP_ETA, SUM_W) when valid(14) = '1' else
-            rounding_base(turn_last, DROP_GAMMA, SUM_W) when valid(21) = '1' else
-            rounding_base("0", DROP_STEP, SUM_W);
+  -- lp - x - 1
+  room <= (resize(lp_next(INTEGRAL_W - 1 downto PU_TO_INTEGRAL), PU_W + 1) & '0') - (resize(x_0, PU_W + 1) & '1');
 
   -- A low-pass with k_lp < 1 leaves the range of what it filters by half an LSB of PU at most: that is within
   -- INTEGRAL at the upper end of PU, and below its lower end where lp, which is half an LSB more, has no such bit.
-  moved    <= sum(SUM_W - 1 downto DROP_ZETA);
+  moved    <= sum_lp(INTEGRAL_W - 1 + DROP_LP downto DROP_LP);
   lp_under <= moved(INTEGRAL_W - 1) and not (or moved(INTEGRAL_W - 2 downto PU_TO_INTEGRAL - 1));
+
+  addend <= rounding_base(not shift_left(resize(u_h_6, FLUX_W), PU_TO_FLUX), DROP_MODEL, SUM_W) when valid(8) = '1' else
+            rounding_base(v_state, DROP_ETA, SUM_W) when valid(14) = '1' else
+            rounding_base("0", DROP_STEP, SUM_W);
+
   e_9      <= saturate(not sum(SUM_W - 1 downto DROP_MODEL), FLUX_W);
   pull_12  <= saturate(sum(SUM_W - 1 downto DROP_STEP), STEP_W);
-  v        <= sum(STATE_W + 2 + DROP_ETA downto DROP_ETA);
-  v_past   <= beyond(v, v_comp_max, TO_LEG);
-  v_end_15 <= -signed('0' & v_comp_max) when v < 0 else signed('0' & v_comp_max);
-  dead_23  <= sum(V_LEG_W - 1 + DROP_STEP downto DROP_STEP);
+  v_15     <= sum(STATE_W + DROP_ETA downto DROP_ETA);
+  end_16   <= -signed('0' & v_comp_max) when under_16 = '1' else signed('0' & v_comp_max);
+  v_sum_22 <= sum_z(SUM_Z_W - 1 downto DROP_ZETA);
+  v_25     <= sum_g(sum_g'high downto DROP_GAMMA);
 
   process (clk)
   begin
@@ -161,105 +171,142 @@ begin
         end if;
       end if;
 
-      -- Stages 1, 2: u_h = u_pi_d - lp_u;  stages 5, 6: d_h = d_d - lp_d, which stays in mul_b until clock 12
+      -- Stages 1, 2: u_h = u_pi_d - lp_u;  stages 5, 6: d_h = d_d - lp_d
       if valid(0) = '1' or valid(4) = '1' then
-        diff <= (not resize(x_0, PU_W + 1)) + lp_0;
+        diff <= room(PU_W + 1 downto 1);
       end if;
-      if valid(1) = '1' then
-        u_h_2 <= h;
-        mul_a <= shift_left(signed(resize(k_lp, FLUX_W)), TO_ZETA);
-      end if;
-      if (valid(1) or valid(5) or valid(12) or valid(17) or valid(18) or valid(19)) = '1' then
-        mul_b <= factor_b;
+      if valid(1) = '1' or valid(5) = '1' then
+        h     <= saturate(not diff, PU_W);
+        u_h_6 <= h;
       end if;
 
-      -- Stages 3, 7, 8, 11, 14, 19, 20, 22: prod = k_lp*u_h, k_lp*d_h, fine*d_h, e*d_h, eta_v*pull, fine*zeta,
-      -- fine*gamma, fine*2**ONE
-      if (valid(2) or valid(6) or valid(7) or valid(10) or valid(13) or valid(18) or valid(19) or valid(21)) = '1' then
+      -- Stages 3 to 5, 7 to 9: lp_u += k_lp*u_h, lp_d += k_lp*d_h
+      if valid(2) = '1' or valid(6) = '1' then
+        prod_lp <= signed('0' & k_lp) * h;
+      end if;
+      if valid(3) = '1' or valid(7) = '1' then
+        sum_lp  <= rounding_base(lp_next, DROP_LP, sum_lp'length) + prod_lp;
+        lp_next <= lp_last;
+      end if;
+      if valid(4) = '1' or valid(8) = '1' then
+        lp_last <= moved;
+      end if;
+      if (valid(4) = '1' or valid(8) = '1') and lp_under = '1' then
+        lp_last(PU_TO_INTEGRAL - 1 downto 0) <= LP_ZERO(PU_TO_INTEGRAL - 1 downto 0);
+      end if;
+      if (valid(4) = '1' or valid(8) = '1') and run = '0' then
+        lp_last <= LP_ZERO;
+      end if;
+
+      -- Stages 7, 10, 13: fine and d_h, e and d_h, eta_v and pull
+      if valid(6) = '1' or valid(9) = '1' or valid(12) = '1' then
+        mul_a <= signed(resize(eta_v, FLUX_W));
+        if valid(6) = '1' then
+          mul_a <= fine;
+        end if;
+        if valid(9) = '1' then
+          mul_a <= e_9;
+        end if;
+      end if;
+      if valid(6) = '1' or valid(12) = '1' then
+        mul_b <= pull_12 when valid(12) = '1' else h;
+      end if;
+
+      -- Stages 8, 11, 14: prod = fine*d_h, e*d_h, eta_v*pull
+      if valid(7) = '1' or valid(10) = '1' or valid(13) = '1' then
         prod <= mul_a * mul_b;
       end if;
 
-      -- Stages 4, 8, 9, 12, 15, 20, 22, 23: sum = addend + prod
-      if (valid(3) or valid(7) or valid(8) or valid(11) or valid(14) or valid(19) or valid(21) or valid(22)) = '1' then
+      -- Stages 9, 12, 15: sum = not e = not u_h + prod, pull, v_state + prod
+      if valid(8) = '1' or valid(11) = '1' or valid(14) = '1' then
         sum <= addend + prod;
       end if;
 
-      -- Stages 4, 5, 8, 9, 20, 21: lp_u += k_lp*u_h, lp_d += k_lp*d_h, v_sum += zeta*fine where it adds; limited
-      if valid(3) = '1' or valid(7) = '1' or valid(19) = '1' then
-        turn_next <= turn_then;
-        turn_then <= turn_last;
+      -- Stages 16, 17: v_state = sum, limited
+      if valid(15) = '1' then
+        past_16  <= at_limit(v_15 xor v_15(v_15'high), v_comp_max);
+        under_16 <= v_15(v_15'high);
       end if;
-      if valid(4) = '1' or valid(8) = '1' or valid(20) = '1' then
-        turn_last <= moved(STATE_W - 1 downto 0);
-      end if;
-      if (valid(4) = '1' or valid(8) = '1') and lp_under = '1' then
-        turn_last(PU_TO_INTEGRAL - 1 downto 0) <= LP_ZERO(PU_TO_INTEGRAL - 1 downto 0);
-      end if;
-      if (valid(4) = '1' or valid(8) = '1') and run = '0' then
-        turn_last <= LP_ZERO;
-      end if;
-      if valid(20) = '1' and beyond(moved, v_comp_max, TO_LEG) = '1' then
-        turn_last <= shift_left(resize(signed('0' & v_comp_max), STATE_W), TO_LEG);
-      end if;
-      if valid(20) = '1' and (compensate = '0' or moved < 0) then
-        turn_last <= (others => '0');
-      end if;
-
-      -- Stages 9, 10: e = u_h - fine*d_h
-      if valid(6) = '1' then
-        mul_a <= fine;
-      end if;
-      if valid(9) = '1' then
-        mul_a <= e_9;
-      end if;
-
-      -- Stages 12, 13: pull = e*d_h
-      if valid(12) = '1' then
-        mul_a <= signed(resize(eta_v, FLUX_W));
-      end if;
-
-      -- Stages 15 to 17: v_state += eta_v*pull, limited;  fine = v_state, narrowed
       if valid(15) = '1' and learning = '1' then
-        v_state <= v(STATE_W - 1 downto 0);
+        v_state <= v_15(STATE_W - 1 downto 0);
       end if;
-      if valid(15) = '1' and learning = '1' and v_past = '1' then
-        v_state <= shift_left(resize(v_end_15, STATE_W), TO_LEG);
+      if valid(16) = '1' and learning = '1' and past_16 = '1' then
+        v_state <= shift_left(resize(end_16, STATE_W), TO_LEG);
       end if;
-      if valid(16) = '1' then
+
+      -- Stage 18: fine = v_state, narrowed
+      if valid(17) = '1' then
         fine <= resize(round_half_up(v_state, V_DEAD_ADALINE_DROP_FINE), FINE_W);
       end if;
 
-      -- Stage 18: fine, and zeta where |fine| > v_thr
-      if valid(17) = '1' then
-        mul_a <= fine;
+      -- Stages 19, 20: zeta where |fine| > v_thr;  stages 21, 22: sum_z = v_sum + zeta*fine
+      if valid(18) = '1' then
+        adding_19 <= learning and beyond(fine, v_thr, FINE_TO_LEG);
       end if;
-
-      -- Stages 22, 23: v_comp = v_sum + fine*gamma, narrowed and limited; the rounding moves nothing past the limit
-      if valid(22) = '1' then
-        v_comp         <= resize(round_half_up(v, TO_LEG), V_LEG_W);
-        v_comp_limited <= '0';
-        if v_past = '1' then
-          v_comp         <= signed('0' & v_comp_max);
-          v_comp_limited <= '1';
+      if valid(19) = '1' then
+        zeta_20 <= zeta;
+        if adding_19 = '0' then
+          zeta_20 <= (others => '0');
         end if;
       end if;
-      if valid(22) = '1' and (compensate = '0' or v < 0) then
+      if valid(20) = '1' then
+        prod_z <= fine * signed('0' & zeta_20);
+      end if;
+      if valid(21) = '1' then
+        sum_z <= rounding_base(v_sum, DROP_ZETA, SUM_Z_W) + prod_z;
+      end if;
+
+      -- Stages 23, 24: v_sum = sum_z, limited
+      if valid(22) = '1' then
+        past_23  <= at_limit(v_sum_22, v_comp_max);
+        under_23 <= v_sum_22(v_sum_22'high);
+        v_sum    <= v_sum_22(STATE_W - 1 downto 0);
+      end if;
+      if valid(23) = '1' and past_23 = '1' then
+        v_sum <= shift_left(resize(signed('0' & v_comp_max), STATE_W), TO_LEG);
+      end if;
+      if valid(23) = '1' and (compensate = '0' or under_23 = '1') then
+        v_sum <= (others => '0');
+      end if;
+
+      -- Stages 24, 25: sum_g = v_sum + gamma*fine
+      if valid(23) = '1' then
+        prod_g <= fine * signed('0' & gamma);
+      end if;
+      if valid(24) = '1' then
+        sum_g <= rounding_base(v_sum, DROP_GAMMA, sum_g'length) + prod_g;
+      end if;
+
+      -- Stages 26, 27: v_comp = sum_g, narrowed and limited; the rounding moves nothing past the limit
+      if valid(25) = '1' then
+        past_26        <= beyond(v_25, v_comp_max, TO_LEG);
+        under_26       <= v_25(v_25'high);
+        v_comp         <= resize(round_half_up(v_25, TO_LEG), V_LEG_W);
+        v_comp_limited <= '0';
+      end if;
+      if valid(26) = '1' and past_26 = '1' then
+        v_comp         <= signed('0' & v_comp_max);
+        v_comp_limited <= '1';
+      end if;
+      if valid(26) = '1' and (compensate = '0' or under_26 = '1') then
         v_comp         <= (others => '0');
         v_comp_limited <= '0';
       end if;
 
-      -- Stages 23, 24: v_dead = fine, narrowed;  v_leg = v_comp + v_dead
-      if valid(23) = '1' then
-        v_dead <= dead_23;
-        v_leg  <= saturate(resize(v_comp, V_LEG_W + 1) + dead_23, V_LEG_W);
+      -- Stages 27, 28: v_dead = fine, narrowed;  v_leg = v_comp + v_dead
+      if valid(26) = '1' then
+        v_dead <= resize(round_half_up(fine, FINE_TO_LEG), V_LEG_W);
+      end if;
+      if valid(27) = '1' then
+        v_leg <= saturate(resize(v_comp, V_LEG_W + 1) + v_dead, V_LEG_W);
       end if;
 
       if rst = '1' then
         valid(1 to LATENCY) <= (others => '0');
-        turn_next           <= LP_ZERO;
-        turn_then           <= LP_ZERO;
-        turn_last           <= (others => '0');
+        lp_next             <= LP_ZERO;
+        lp_last             <= LP_ZERO;
         v_state             <= (others => '0');
+        v_sum               <= (others => '0');
         fine                <= (others => '0');
         v_comp              <= (others => '0');
         v_leg               <= (others => '0');

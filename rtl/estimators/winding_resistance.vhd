@@ -1,10 +1,10 @@
 -- Purpose: the winding's resistance from its temperature, paper 000 eq. (12), and the flux it takes in half a sample.
---   r = r_s + tcr*(temp_winding - t_0);  rho = r*t_s/2
+--   r = r_s + tcr*(temp_winding - t_0);  minus_rho = -r*t_s/2
 -- Without a reading, or with one outside t_min to t_max, r = r_s and temp_lost is raised.  Both products go through
 -- one multiplier and the adder behind it.
 -- Formats: temperatures S(9,6), tcr U(-6,30), t_s U(-1,18), r_s, r, rho U(0,24); products exact.
--- Latency: 7.  Interval: 7.
--- Rounding: each product half up.  r saturates, rho cannot: it is below 1/4.
+-- Latency: 8.  Interval: 8.
+-- Rounding: each product half up, rho before it is negated.  r saturates, rho cannot: it is below 1/4.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -27,7 +27,7 @@ entity winding_resistance is
     t_s          : in  unsigned(SAMPLE_TIME_W - 1 downto 0);
     out_valid    : out std_logic;
     r            : out unsigned(RESISTANCE_W - 1 downto 0);
-    rho          : out unsigned(RESISTANCE_W - 1 downto 0);
+    minus_rho    : out signed(RESISTANCE_W downto 0);
     temp_lost    : out std_logic
   );
 end entity winding_resistance;
@@ -38,30 +38,40 @@ architecture rtl of winding_resistance is
   constant SLIM_W   : positive := SAMPLE_TIME_W + 1;
   constant PROD_W   : positive := WIDE_W + SLIM_W;
   constant DROP_TCR : positive := WINDING_RESISTANCE_DROP_TCR;
+  constant DROP_RHO : positive := WINDING_RESISTANCE_DROP_RHO;
+
+  -- An LSB less than half: what is rounded half up and then negated is half down.
+  constant HALF_DOWN : signed(PROD_W - 1 downto 0) := (DROP_RHO - 2 downto 0 => '1', others => '0');
 
   signal valid  : std_logic_vector(0 to LATENCY);
   signal lost_1 : std_logic;
-  signal mul_a  : signed(SLIM_W - 1 downto 0);  -- temp_winding - t_0 at clock 1, t_s at clock 4
-  signal mul_b  : signed(WIDE_W - 1 downto 0);  -- tcr at clock 1, r at clock 4
+  signal from_0 : signed(SLIM_W - 1 downto 0);
+  signal less_0 : signed(SLIM_W - 1 downto 0);
+  signal slim   : signed(SLIM_W - 1 downto 0);          -- temp_winding - t_0 at clock 1, -t_s at clock 5
+  signal wide   : unsigned(RESISTANCE_W - 1 downto 0);  -- tcr at clock 1, r at clock 5
   signal prod   : signed(PROD_W - 1 downto 0);
   signal addend : signed(PROD_W - 1 downto 0);
   signal sum    : signed(PROD_W - 1 downto 0);
-  signal r_3    : unsigned(RESISTANCE_W - 1 downto 0);
 begin
   valid(0) <= in_valid;
 
-  r_3 <= r_s when lost_1 = '1' else
-         saturate_u(sum(PROD_W - 1 downto DROP_TCR), RESISTANCE_W);
+  from_0 <= resize(temp_winding, SLIM_W) when valid(0) = '1' else (others => '0');
+  less_0 <= resize(t_0, SLIM_W) when valid(0) = '1' else signed('0' & t_s);
 
   process (clk)
   begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stage 1: warmer = temp_winding - t_0 and tcr;  lost = no reading to believe
+      -- Stage 1: warmer = temp_winding - t_0 and tcr;  lost = no reading to believe;  stage 2: warmer = 0 where lost
+      if valid(0) = '1' or valid(4) = '1' then
+        slim <= from_0 - less_0;
+      end if;
+      if valid(1) = '1' and lost_1 = '1' then
+        slim <= (others => '0');
+      end if;
       if valid(0) = '1' then
-        mul_a  <= resize(temp_winding, SLIM_W) - resize(t_0, SLIM_W);
-        mul_b  <= signed('0' & tcr);
+        wide   <= tcr;
         addend <= rounding_base(signed('0' & r_s), DROP_TCR, PROD_W);
         lost_1 <= '1';
         if temp_valid = '1' and temp_winding >= t_min and temp_winding <= t_max then
@@ -69,29 +79,25 @@ begin
         end if;
       end if;
 
-      -- Stages 2, 5: prod = warmer*tcr, r*t_s
-      if valid(1) = '1' or valid(4) = '1' then
-        prod <= mul_a * mul_b;
+      -- Stages 3, 6: prod = warmer*tcr, -t_s*r
+      if valid(2) = '1' or valid(5) = '1' then
+        prod <= slim * signed('0' & wide);
       end if;
 
-      -- Stages 3, 6: sum = r_s + prod, prod
-      if valid(2) = '1' or valid(5) = '1' then
+      -- Stages 4, 7: sum = r_s + prod, prod
+      if valid(3) = '1' or valid(6) = '1' then
         sum <= addend + prod;
       end if;
 
-      -- Stage 4: r = sum, limited, or r_s;  nothing but half an LSB goes with the next product
-      if valid(3) = '1' then
-        r     <= r_3;
-        mul_a <= signed('0' & t_s);
-        mul_b <= signed('0' & r_3);
-      end if;
-      if valid(3) = '1' then
-        addend <= rounding_base("0", WINDING_RESISTANCE_DROP_RHO, PROD_W);
+      -- Stage 5: r = sum, limited;  nothing but what rounds goes with the next product
+      if valid(4) = '1' then
+        wide   <= saturate_u(sum(PROD_W - 1 downto DROP_TCR), RESISTANCE_W);
+        addend <= HALF_DOWN;
       end if;
 
-      -- Stage 7: rho = prod/2, narrowed
-      if valid(6) = '1' then
-        rho       <= unsigned(sum(RESISTANCE_W - 1 + WINDING_RESISTANCE_DROP_RHO downto WINDING_RESISTANCE_DROP_RHO));
+      -- Stage 8: minus_rho = prod/2, narrowed
+      if valid(7) = '1' then
+        minus_rho <= resize(sum(PROD_W - 1 downto DROP_RHO), RESISTANCE_W + 1);
         temp_lost <= lost_1;
       end if;
 
@@ -101,6 +107,7 @@ begin
     end if;
   end process;
 
+  r         <= wide;
   out_valid <= valid(LATENCY);
 
 end architecture rtl;

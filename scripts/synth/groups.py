@@ -24,6 +24,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
         "model_flux",
         "merge",
         "merged_flux",
+        "models",
         "flux",
         "speed_inverse",
         "flux_error",

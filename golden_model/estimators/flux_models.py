@@ -1,0 +1,132 @@
+"""What both models say about this sample's flux linkages; flux_estimate and current_model take them from here.
+
+    model_d  = l_d*i_d + lambda_mg,  model_q = l_q*i_q     the linear magnetic model, paper 001 eq. (6)
+    merged_d = lambda_m_d - rho*i_d;  q alike              the merged models, eq. (11), at this sample
+
+lambda_m is the flux that flux_merge carried here from the last sample, all but this sample's resistive drop.  Both are
+affine in the current that has just been measured: one multiplication behind the Park transform.
+``merged`` chooses: the merged flux where the voltage is known and flux_mode wants a merge, else the current model.
+``ended``: the chosen merged flux is at its end, where the rotation before has saturated.
+
+``raised``: the compensation and half an LSB of PU, so that flux_estimate rounds half up by a cut.
+
+Formats: products and sums exact.  model is floored to half an LSB of FLUX, merged to FLUX: rounding half up to PU does
+not see what the floor took.
+"""
+
+from golden_model.block import Block, Port
+from golden_model.estimators.winding_resistance import MINUS_RHO
+from golden_model.fixed import Format
+from golden_model.formats import BIT, FLUX, INDUCTANCE, PU, PU_TO_FLUX, RESISTANCE
+from golden_model.kernel import kernel
+from golden_model.transforms.flux_park import LAMBDA_M_DQ
+
+MODE = Format(0, 2, 0)
+CURRENT_MODEL, MERGED, EARLIER, PROPOSED = 0, 1, 2, 3
+MODEL_FLUX = Format(1, 6, FLUX.frac_bits + 1)
+MERGED_FLUX = Format(1, 2, FLUX.frac_bits)  # of the compensation too
+SHIFT_MG = INDUCTANCE.frac_bits
+DROP_MODEL = PU.frac_bits + INDUCTANCE.frac_bits - MODEL_FLUX.frac_bits
+DROP_MERGED = PU.frac_bits + RESISTANCE.frac_bits - MERGED_FLUX.frac_bits
+HALF_PU = 1 << (PU_TO_FLUX - 1)
+END_HI, END_LO = FLUX.hi, FLUX.lo
+MODEL_MAX = 35 << MODEL_FLUX.frac_bits  # 16 of inductance times 2 of current, and the magnets
+
+
+@kernel
+def step(
+    i_d, i_q, lambda_m_d, lambda_m_q, lambda_pi_d, lambda_pi_q, merge_known, run, minus_rho,
+    flux_mode, l_d, l_q, lambda_mg,
+):  # fmt: skip
+    model_d = (l_d * i_d + (lambda_mg << SHIFT_MG)) >> DROP_MODEL
+    model_q = (l_q * i_q) >> DROP_MODEL
+    merged_d = ((lambda_m_d << DROP_MERGED) + minus_rho * i_d) >> DROP_MERGED
+    merged_q = ((lambda_m_q << DROP_MERGED) + minus_rho * i_q) >> DROP_MERGED
+    merged = 1 if merge_known and run and flux_mode != CURRENT_MODEL else 0
+    end_d = lambda_m_d == END_HI or lambda_m_d == END_LO
+    end_q = lambda_m_q == END_HI or lambda_m_q == END_LO
+    ended = 1 if merged and (end_d or end_q) else 0
+    return model_d, model_q, merged_d, merged_q, merged, ended, lambda_pi_d + HALF_PU, lambda_pi_q + HALF_PU
+
+
+def reference(v, _state):
+    out = {}
+    for x, magnet in (("d", v["lambda_mg"]), ("q", 0.0)):
+        out[f"model_{x}"] = v[f"l_{x}"] * v[f"i_{x}"] + magnet
+        out[f"merged_{x}"] = v[f"lambda_m_{x}"] + v["minus_rho"] * v[f"i_{x}"]
+        out[f"raised_{x}"] = v[f"lambda_pi_{x}"] + PU.lsb / 2
+    return out
+
+
+def bound(_v, _state):
+    return {
+        **dict.fromkeys(("model_d", "model_q"), MODEL_FLUX.lsb),
+        **dict.fromkeys(("merged_d", "merged_q"), FLUX.lsb),
+        **dict.fromkeys(("raised_d", "raised_q"), 0.0),
+    }
+
+
+def stimuli(rng, _config):
+    """Every mode with the voltage known and not; a merged flux at its ends and next to them."""
+    rows = []
+    for mode in range(4):
+        for known, run in ((1, 1), (0, 1), (1, 0)):
+            for m in (END_HI, END_HI - 1, END_LO, END_LO + 1, 0):
+                small = {k: int(rng.integers(-999, 999)) for k in ("i_d", "i_q")}
+                flags = {"flux_mode": mode, "merge_known": known, "run": run}
+                rows.append({**small, **flags, "lambda_m_d": m, "lambda_m_q": 7, "l_d": 1 << 20})
+                rows.append({**small, **flags, "lambda_m_d": -7, "lambda_m_q": m, "l_q": 1 << 20})
+    return rows
+
+
+FLUX_MODE = Port("flux_mode", MODE, doc="0: eq. (6), 1: eq. (11), 2: eq. (16), 3: eq. (17)")
+L_D = Port("l_d", INDUCTANCE, doc="inductance, d axis")
+L_Q = Port("l_q", INDUCTANCE, doc="inductance, q axis")
+LAMBDA_MG = Port("lambda_mg", PU, doc="magnet flux linkage")
+MODEL = (
+    Port("model_d", MODEL_FLUX, -MODEL_MAX, MODEL_MAX, "flux linkage from the current, d axis"),
+    Port("model_q", MODEL_FLUX, -MODEL_MAX, MODEL_MAX, "flux linkage from the current, q axis"),
+)
+CHOSEN = (
+    Port("merged_d", MERGED_FLUX, doc="merged flux at this sample, d axis"),
+    Port("merged_q", MERGED_FLUX, doc="merged flux at this sample, q axis"),
+    Port("merged", BIT, doc="1: the merged flux counts, else the current model's"),
+    Port("ended", BIT, doc="1: it counts and is at its end"),
+    Port("raised_d", MERGED_FLUX, FLUX.lo, FLUX.hi + HALF_PU, "compensation and half an LSB of PU, d axis"),
+    Port("raised_q", MERGED_FLUX, FLUX.lo, FLUX.hi + HALF_PU, "compensation and half an LSB of PU, q axis"),
+)
+
+BLOCK = Block(
+    name="flux_models",
+    folder="estimators",
+    paper="001, eq. (6) and (11)",
+    step=step,
+    inputs=(
+        Port("i_d", PU, doc="current, d axis"),
+        Port("i_q", PU, doc="current, q axis"),
+        *LAMBDA_M_DQ,
+        Port("lambda_pi_d", FLUX, doc="compensation, d axis"),
+        Port("lambda_pi_q", FLUX, doc="compensation, q axis"),
+        Port("merge_known", BIT, doc="the merged flux is good"),
+        Port("run", BIT, doc="1: the gates are switching"),
+        MINUS_RHO,
+    ),
+    registers=(FLUX_MODE, L_D, L_Q, LAMBDA_MG),
+    outputs=(*MODEL, *CHOSEN),
+    latency=2,
+    interval=2,
+    constants={
+        "MODEL_FLUX_W": MODEL_FLUX.width,
+        "MERGED_FLUX_W": MERGED_FLUX.width,
+        "SHIFT_MG": SHIFT_MG,
+        "DROP_MODEL": DROP_MODEL,
+        "DROP_MERGED": DROP_MERGED,
+        "HALF_PU": HALF_PU,
+        "CURRENT_MODEL": CURRENT_MODEL,
+        "EARLIER": EARLIER,
+        "PROPOSED": PROPOSED,
+    },
+    reference=reference,
+    bound=bound,
+    stimuli=stimuli,
+)

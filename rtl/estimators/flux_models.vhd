@@ -1,0 +1,122 @@
+-- Purpose: what both models say about this sample's flux linkages, for flux_estimate and current_model.
+--   model_d  = l_d*i_d + lambda_mg,  model_q = l_q*i_q      paper 001 eq. (6)
+--   merged_d = lambda_m_d - rho*i_d;  q alike               eq. (11)
+-- merged: the merged flux counts (voltage known, a merge wanted), else the current model's; ended: it is at its end,
+-- where the rotation before has saturated.  raised: lambda_pi and half an LSB of PU.
+-- Formats: currents and lambda_mg PU, lambda_m FLUX; products exact; model S(6,24), merged S(2,23).
+-- Latency: 2.  Interval: 2.
+-- Rounding: floored, which rounding half up to PU does not see; with raised that is a cut.
+
+library ieee;
+use ieee.std_logic_1164.all;
+use ieee.numeric_std.all;
+use work.fixed_pkg.all;
+use work.fluxproof_pkg.all;
+
+entity flux_models is
+  port (
+    clk         : in  std_logic;
+    rst         : in  std_logic;
+    in_valid    : in  std_logic;
+    i_d         : in  signed(PU_W - 1 downto 0);
+    i_q         : in  signed(PU_W - 1 downto 0);
+    lambda_m_d  : in  signed(FLUX_W - 1 downto 0);
+    lambda_m_q  : in  signed(FLUX_W - 1 downto 0);
+    lambda_pi_d : in  signed(FLUX_W - 1 downto 0);
+    lambda_pi_q : in  signed(FLUX_W - 1 downto 0);
+    merge_known : in  std_logic;
+    run         : in  std_logic;
+    minus_rho   : in  signed(RESISTANCE_W downto 0);
+    flux_mode   : in  unsigned(1 downto 0);
+    l_d         : in  unsigned(INDUCTANCE_W - 1 downto 0);
+    l_q         : in  unsigned(INDUCTANCE_W - 1 downto 0);
+    lambda_mg   : in  signed(PU_W - 1 downto 0);
+    out_valid   : out std_logic;
+    model_d     : out signed(FLUX_MODELS_MODEL_FLUX_W - 1 downto 0);
+    model_q     : out signed(FLUX_MODELS_MODEL_FLUX_W - 1 downto 0);
+    merged_d    : out signed(FLUX_MODELS_MERGED_FLUX_W - 1 downto 0);
+    merged_q    : out signed(FLUX_MODELS_MERGED_FLUX_W - 1 downto 0);
+    merged      : out std_logic;
+    ended       : out std_logic;
+    raised_d    : out signed(FLUX_MODELS_MERGED_FLUX_W - 1 downto 0);
+    raised_q    : out signed(FLUX_MODELS_MERGED_FLUX_W - 1 downto 0)
+  );
+end entity flux_models;
+
+architecture rtl of flux_models is
+  constant LATENCY     : positive := FLUX_MODELS_LATENCY;
+  constant SHIFT_MG    : positive := FLUX_MODELS_SHIFT_MG;
+  constant DROP_MODEL  : positive := FLUX_MODELS_DROP_MODEL;
+  constant DROP_MERGED : positive := FLUX_MODELS_DROP_MERGED;
+  constant PROD_W      : positive := PU_W + INDUCTANCE_W + 1;
+  constant SUM_W       : positive := PROD_W + 1;
+
+  signal valid         : std_logic_vector(0 to LATENCY);
+  signal prod_model_d  : signed(PROD_W - 1 downto 0);
+  signal prod_model_q  : signed(PROD_W - 1 downto 0);
+  signal prod_merged_d : signed(PROD_W - 1 downto 0);
+  signal prod_merged_q : signed(PROD_W - 1 downto 0);
+  signal merged_1      : std_logic;
+  signal ended_1       : std_logic;
+  signal sum_model_d   : signed(SUM_W - 1 downto 0);
+  signal sum_model_q   : signed(SUM_W - 1 downto 0);
+  signal sum_merged_d  : signed(SUM_W - 1 downto 0);
+  signal sum_merged_q  : signed(SUM_W - 1 downto 0);
+
+  -- Whether x is the first or the last number of its format: no bit is like the sign.
+  function at_end (x : signed) return std_logic is
+    alias v : signed(x'length - 1 downto 0) is x;
+  begin
+    return and (v(v'high - 1 downto 0) xor v(v'high));
+  end function;
+
+  function raised (lambda_pi : signed) return signed is
+  begin
+    return resize(lambda_pi, FLUX_MODELS_MERGED_FLUX_W) + FLUX_MODELS_HALF_PU;
+  end function;
+begin
+  valid(0) <= in_valid;
+
+  process (clk)
+  begin
+    if rising_edge(clk) then
+      valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
+
+      -- Stage 1: prod_model = l*i;  prod_merged = -rho*i
+      if valid(0) = '1' then
+        prod_model_d  <= i_d * signed('0' & l_d);
+        prod_model_q  <= i_q * signed('0' & l_q);
+        prod_merged_d <= i_d * minus_rho;
+        prod_merged_q <= i_q * minus_rho;
+        ended_1       <= at_end(lambda_m_d) or at_end(lambda_m_q);
+        merged_1      <= '0';
+        if flux_mode /= FLUX_MODELS_CURRENT_MODEL then
+          merged_1 <= merge_known and run;
+        end if;
+      end if;
+
+      -- Stage 2: model = prod_model + lambda_mg;  merged = lambda_m + prod_merged;  raised = lambda_pi + half
+      if valid(1) = '1' then
+        sum_model_d  <= shift_left(resize(lambda_mg, SUM_W), SHIFT_MG) + prod_model_d;
+        sum_model_q  <= resize(prod_model_q, SUM_W);
+        sum_merged_d <= shift_left(resize(lambda_m_d, SUM_W), DROP_MERGED) + prod_merged_d;
+        sum_merged_q <= shift_left(resize(lambda_m_q, SUM_W), DROP_MERGED) + prod_merged_q;
+        raised_d     <= raised(lambda_pi_d);
+        raised_q     <= raised(lambda_pi_q);
+        merged       <= merged_1;
+        ended        <= merged_1 and ended_1;
+      end if;
+
+      if rst = '1' then
+        valid(1 to LATENCY) <= (others => '0');
+      end if;
+    end if;
+  end process;
+
+  model_d   <= sum_model_d(model_d'length - 1 + DROP_MODEL downto DROP_MODEL);
+  model_q   <= sum_model_q(model_q'length - 1 + DROP_MODEL downto DROP_MODEL);
+  merged_d  <= sum_merged_d(merged_d'length - 1 + DROP_MERGED downto DROP_MERGED);
+  merged_q  <= sum_merged_q(merged_q'length - 1 + DROP_MERGED downto DROP_MERGED);
+  out_valid <= valid(LATENCY);
+
+end architecture rtl;
