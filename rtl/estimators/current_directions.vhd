@@ -52,7 +52,6 @@ architecture rtl of current_directions is
   signal mul_a     : signed(WIDE_W - 1 downto 0);
   signal mul_b     : signed(PU_W - 1 downto 0);
   signal prod      : signed(SUM_W - 1 downto 0);
-  signal base      : signed(SUM_W - 1 downto 0);
   signal addend    : signed(SUM_W - 1 downto 0);
   signal sum       : signed(SUM_W - 1 downto 0);
   signal narrow    : signed(PU_W - 1 downto 0);
@@ -89,7 +88,16 @@ begin
               omega_me when valid(0) = '1' else
               s_next;
 
-  addend <= sum when (valid(19) or valid(20) or valid(22)) = '1' else base;
+  -- x comes as its complement: the adder behind the multiplier only adds.
+  addend <= rounding_base(not i_alpha, TURN_BY, SUM_W) when valid(5) = '1' else
+            rounding_base(i_beta, TURN_BY, SUM_W) when valid(6) = '1' else
+            rounding_base(minus_x_8, TURN_BY, SUM_W) when valid(9) = '1' else
+            resize(minus_x_8 & HALF_DOWN, SUM_W) when valid(10) = '1' else
+            sum when valid(19) = '1' or valid(20) = '1' or valid(22) = '1' else
+            rounding_base("0", CLARKE_DROP_ALPHA, SUM_W) when valid(18) = '1' else
+            rounding_base("0", CLARKE_DROP_BETA, SUM_W) when valid(21) = '1' else
+            rounding_base("0", TURN_BY, SUM_W) when valid(2) = '1' else
+            rounding_base("0", DROP, SUM_W);
 
   process (clk)
   begin
@@ -104,19 +112,6 @@ begin
       if (valid(0) or valid(3) or valid(7) or valid(10) or valid(11) or valid(12) or valid(16) or valid(17) or valid(18)
           or valid(19) or valid(20)) = '1' then
         mul_b <= factor_b;
-      end if;
-
-      -- Stages 2, 5, 6, 9, 10, 12, 18, 21: what goes with the product and rounds it.  x comes as its complement: the
-      -- adder behind the multiplier only adds.
-      if (valid(1) or valid(4) or valid(5) or valid(8) or valid(9) or valid(11) or valid(17) or valid(20)) = '1' then
-        base <= rounding_base(not i_alpha, TURN_BY, SUM_W) when valid(4) = '1' else
-                rounding_base(i_beta, TURN_BY, SUM_W) when valid(5) = '1' else
-                rounding_base(minus_x_8, TURN_BY, SUM_W) when valid(8) = '1' else
-                resize(minus_x_8 & HALF_DOWN, SUM_W) when valid(9) = '1' else
-                rounding_base("0", CLARKE_DROP_ALPHA, SUM_W) when valid(17) = '1' else
-                rounding_base("0", CLARKE_DROP_BETA, SUM_W) when valid(20) = '1' else
-                rounding_base("0", TURN_BY, SUM_W) when valid(1) = '1' else
-                rounding_base("0", DROP, SUM_W);
       end if;
 
       -- Stages 2, 5, 6, 9, 10, 12 to 14: prod = omega_me*k_ahead, turn*i_beta, turn*i_alpha, sqrt(3)*y, -sqrt(3)*y,
