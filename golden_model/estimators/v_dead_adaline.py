@@ -173,6 +173,8 @@ def stimuli(rng, _config):
     for sign in (1, -1):  # into both ends
         end = {**calm, **gains, "eta_v": ETA_V_MAX, "v_comp_max": V_LEVEL.hi, "k_lp": 1, "zeta": ZETA.hi}
         rows += [{**end, "d_d": 80000, "u_pi_d": sign * 131071} for _ in range(90)]
+        still = {**rows[-1], "v_thr": V_LEVEL.hi}  # v_dead is at the threshold, and not above it
+        rows += [{**still, "compensate": 0}, still, still]
     for k_lp, u_pi_d, d_d, run in ((0, 0, 0, 0), (524032, -1, 0, 1), (K_LP.hi, PU.lo, 0, 1), (0, 0, 40000, 1)):
         rows.append({**calm, **gains, "k_lp": k_lp, "u_pi_d": u_pi_d, "d_d": d_d, "run": run})  # lp_u past its end
     for k_lp, u_pi_d, d_d, run in (
