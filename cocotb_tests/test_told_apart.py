@@ -121,7 +121,10 @@ def test_what_is_left_elsewhere_says_nothing_against_an_effect(view):
     for order, names in ((6, ["resistance"]), (0, [])):
         mine = (cells.channel == "u") & (cells.order == order) & cells.ok
         best.residual = np.where(mine, np.sqrt(5000.0 / mine.sum()) * refiner.sigma, 0.0)
-        assert carried(["resistance"], found, cells, worth) == names
+        assert carried(["resistance"], found, cells, worth, CATALOGUE) == names
+    of_record = {"resistance": SimpleNamespace(corrects=True)}  # such an error acts everywhere
+    best.residual = np.where((cells.order == 6) & cells.ok, refiner.sigma, 0.0) * 10.0
+    assert carried(["resistance"], found, cells, worth, of_record) == []
 
 
 def test_a_delay_within_half_a_dead_time_is_the_dead_time():

@@ -92,7 +92,7 @@ def _physics(recordings, nominal, progress) -> Diagnosis:
     found = search.run()
     left = remains(search, found, held)
     names, ambiguity = words.groups(found.best, found.tied, CATALOGUE, nominal, found.silent, started_cold(view))
-    names = words.carried(names, found, left.cells, search.worth)
+    names = words.carried(names, found, left.cells, search.worth, CATALOGUE)
     names, absorbed = beside_free_surface(view, names, ~held)
     ambiguity = ambiguity + absorbed
     kind = words.verdict(names, ambiguity, left)

@@ -83,20 +83,24 @@ def verdict(names, ambiguity, left) -> str:
     return "ambiguous" if ambiguity else "explained"
 
 
-def carried(names, found, cells, worth):
+def carried(names, found, cells, worth, effects):
     """Names that bring more than what is left where they live, where much is left; ``worth(solution, name)`` in chi^2.
 
     A harmonic that a dead time's curve leaves says nothing against ohms: what counts are the orders of a channel that
-    hold the effect.  cells: of the solution's view.
+    hold the effect.  An error of the record acts on all of it, so that all that is left speaks against it.
+    cells: of the solution's view.
     """
     best = found.best
     if best.dispersion <= LEFTOVER:
         return names
     use = cells.ok & found.train
     left = np.where(use, (best.residual / found.sigma) ** 2, 0.0)
-    return [
-        n for n in names if worth(best, n) > float(left[lives(cells, n, best.c[n], found.sigma, use)].sum())
-    ]
+    everywhere = np.ones(len(use), bool)
+
+    def where(name):
+        return everywhere if effects[name].corrects else lives(cells, name, best.c[name], found.sigma, use)
+
+    return [n for n in names if worth(best, n) > float(left[where(n)].sum())]
 
 
 def lives(cells, name, c, sigma, use):
