@@ -77,7 +77,7 @@ def _compiler() -> str:
 
 
 @contextlib.contextmanager
-def _locked(path: Path) -> Iterator[None]:
+def locked(path: Path) -> Iterator[None]:
     """Holds the file's lock; the system frees it when the process ends, however it ends."""
     path.parent.mkdir(parents=True, exist_ok=True)
     with path.open("w") as handle:
@@ -96,7 +96,7 @@ def _clock(names: Iterable[str]) -> str:
     return "clk" if "clk" in names else "aclk"
 
 
-def _compile(folder: Path, top: str, ports: tuple[VerilogPort, ...]) -> None:
+def compile_library(folder: Path, top: str, ports: tuple[VerilogPort, ...]) -> None:
     """Turns ``folder``/``top``.v into ``folder``/libcore.so."""
     verilator, _, root = find_verilator()
     compiler = _compiler()
@@ -133,12 +133,12 @@ def build(generics: Mapping[str, int], rtl: Path = RTL, top: str = TOP) -> Path:
     folder = CACHE / hashlib.sha256(repr(tools).encode() + WRAPPER.read_bytes() + text).hexdigest()[:16]
     if folder.exists():
         return folder
-    with _locked(folder.with_suffix(".lock")):
+    with locked(folder.with_suffix(".lock")):
         if not folder.exists():
             with tempfile.TemporaryDirectory(prefix=f"{folder.name}.", dir=CACHE) as scratch:
                 work = Path(scratch)
                 (work / f"{top}.v").write_bytes(text)
-                _compile(work, top, top_ports(work / f"{top}.v", rtl, top))
+                compile_library(work, top, top_ports(work / f"{top}.v", rtl, top))
                 finished = work / "finished"
                 finished.mkdir()
                 for name in (LIBRARY, f"{top}.v"):
@@ -177,12 +177,19 @@ def _load(path: Path) -> ctypes.CDLL:
 class VerilatedCore:
     """One core with all inputs 0, before its first clock; as many as wanted may live side by side.
 
-    ``top`` is the entity: the core, or the AXI top around it, which does not show the two valids.
+    ``top`` is the entity: the core, or the AXI top around it, which does not show the two valids; ``folder`` has
+    another library with the same ports.
     """
 
-    def __init__(self, generics: Mapping[str, int] | None = None, rtl: Path = RTL, top: str = TOP):
+    def __init__(
+        self,
+        generics: Mapping[str, int] | None = None,
+        rtl: Path = RTL,
+        top: str = TOP,
+        folder: Path | None = None,
+    ):
         self._handle = None
-        folder = build(dict(generics or {}), rtl, top)
+        folder = folder or build(dict(generics or {}), rtl, top)
         self.ports = {p.name: p for p in top_ports(folder / f"{top}.v", rtl, top)}
         self.clock_name = _clock(self.ports)
         self.inputs = tuple(name for name, p in self.ports.items() if p.is_input)

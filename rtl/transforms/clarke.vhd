@@ -37,6 +37,7 @@ architecture rtl of clarke is
   signal valid    : std_logic_vector(0 to LATENCY);
   signal first_0  : signed(SUM_W - 1 downto 0);
   signal second_0 : signed(SUM_W - 1 downto 0);
+  signal sum_0    : signed(SUM_W downto 0);
   signal both_1   : signed(SUM_W - 1 downto 0);
   signal sum_1    : signed(SUM_W - 1 downto 0);
   signal factor_1 : signed(PU_W - 1 downto 0);
@@ -50,6 +51,10 @@ begin
   -- The component of the beat: beta while in_valid, then alpha
   first_0  <= shift_left(resize(i_a, SUM_W), 1) when valid(1) = '1' else resize(i_b, SUM_W);
   second_0 <= both_1 when valid(1) = '1' else resize(i_c, SUM_W);
+
+  -- first - second by a carry in: as a plain difference before the multiplier yosys takes it for the DSP48's
+  -- pre-adder and forgets the operands' signs
+  sum_0 <= (first_0 & '1') + ((not second_0) & '1');
 
   half_2 <= half(CLARKE_DROP_ALPHA, half_2'length) when valid(3) = '1' else half(CLARKE_DROP_BETA, half_2'length);
   i_3    <= saturate(sum_3(CLARKE_DROP_ALPHA + PU_W downto CLARKE_DROP_ALPHA), PU_W) when valid(4) = '1' else
@@ -65,7 +70,7 @@ begin
         both_1 <= resize(i_b, SUM_W) + i_c;
       end if;
       if valid(0) = '1' or valid(1) = '1' then
-        sum_1    <= first_0 - second_0;
+        sum_1    <= sum_0(SUM_W downto 1);
         factor_1 <= resize(CLARKE_INV_SQRT3, PU_W);
         if valid(1) = '1' then
           factor_1 <= resize(CLARKE_THIRD, PU_W);

@@ -1,0 +1,32 @@
+"""The netlist that is counted computes what the VHDL does: every output at every clock, whole core, 7 series."""
+
+from __future__ import annotations
+
+import pytest
+
+from cocotb_tests.test_verilog import GENERICS, differences, stimulus, trace_of_verilog
+from scripts import verilog
+from scripts.synth.mapped import MappedCore
+from scripts.verilated import VerilatedCore
+
+CLOCKS = 6000
+
+
+def test_mapped_netlist_equals_the_core(capsys):
+    try:
+        verilog.find_ghdl()
+    except verilog.NoUsableGhdl as reason:
+        pytest.skip(str(reason))
+    core, mapped = VerilatedCore(GENERICS), MappedCore(GENERICS)
+    assert core.outputs == mapped.outputs
+    writes = stimulus(2, GENERICS, CLOCKS)
+    wanted, got = trace_of_verilog(writes, core), trace_of_verilog(writes, mapped)
+    wrong = [
+        line.replace("in Verilog", "in the netlist").replace("VHDL", "the core")
+        for line in differences(core.outputs, wanted, got)
+    ]
+    assert not wrong, "\n".join([f"{len(wrong)} differences", *wrong[:12]])
+    still = [name for j, name in enumerate(core.outputs) if len({row[j] for row in wanted}) < 2]
+    assert not still, f"the stimulus never moves {still}"
+    with capsys.disabled():
+        print(f"\n{CLOCKS} clocks x {len(core.outputs)} outputs of the mapped netlist are equal")
