@@ -58,7 +58,7 @@ MUTANTS = (
      "signed('0' & left_aligned(code_0)) - signed", "signed('0' & left_aligned(code_0)) + signed"),
     ("reverse ignored", "io/position.vhd", "(turn_1 xor (turn_1'range => reverse))", "turn_1"),
     ("speed backwards", "io/speed.vhd", "signed(mech_0 - code_last)", "signed(code_last - mech_0)"),
-    ("clarke b and c swapped", "transforms/clarke.vhd", "sum_1    <= first_0 - second_0;", "sum_1    <= second_0 - first_0;"),
+    ("clarke b and c swapped", "transforms/clarke.vhd", "(first_0 & '1') + ((not second_0) & '1')", "(second_0 & '1') + ((not first_0) & '1')"),
     ("rotation the other way", "transforms/rotate.vhd", "not y when valid(1)", "y when valid(1)"),
     ("park turns forward", "transforms/park.vhd", "x         => i_beta", "x         => i_alpha"),
     ("inverse park turns back", "transforms/inverse_park.vhd", "sin_theta => sin_theta,", "sin_theta => -sin_theta,"),
