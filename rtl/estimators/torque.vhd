@@ -32,6 +32,7 @@ architecture rtl of torque is
   signal i_1      : signed(PU_W - 1 downto 0);
   signal prod_2   : signed(2 * PU_W - 1 downto 0);
   signal addend_2 : signed(SUM_W - 1 downto 0);
+  signal sum_2    : signed(SUM_W downto 0);
   signal sum_3    : signed(SUM_W - 1 downto 0);
 begin
   valid(0) <= in_valid;
@@ -39,6 +40,10 @@ begin
   -- -lambda_q*i_d is made of not lambda_q, which is -lambda_q - 1, and the missing i_d: no carry before the multiplier.
   addend_2 <= sum_3 when valid(3) = '1' else
               rounding_base("0", TORQUE_DROP, SUM_W) + i_d;
+
+  -- prod + addend, as prod - not addend - 1 with the borrow from one bit more below: yosys would put a plain sum with
+  -- its own feedback into the DSP48, wrongly
+  sum_2 <= (prod_2(prod_2'high) & prod_2 & '0') - ((not addend_2) & '1');
 
   process (clk)
   begin
@@ -58,7 +63,7 @@ begin
 
       -- Stages 3, 4: sum = i_d + lambda_d*i_q, a clock later lambda_d*i_q - lambda_q*i_d; with half an LSB to round
       if valid(2) = '1' or valid(3) = '1' then
-        sum_3 <= addend_2 + prod_2;
+        sum_3 <= sum_2(SUM_W downto 1);
       end if;
 
       -- Stage 5: torque = sum, narrowed
