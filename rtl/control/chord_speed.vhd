@@ -75,7 +75,7 @@ begin
 
       -- Stage 9: omega_chord = omega - prod, narrowed
       if valid(8) = '1' then
-        omega_chord <= omega_8 - resize(round_half_up(prod, CHORD_SPEED_DROP), PU_W);
+        omega_chord <= minus_rounded(omega_8, prod, CHORD_SPEED_DROP);
       end if;
 
       if rst = '1' then
