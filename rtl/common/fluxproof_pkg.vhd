@@ -157,7 +157,8 @@ package fluxproof_pkg is
   constant CLARKE_DROP_BETA : natural := 17;
 
   -- sincos: 001, eq. (12)
-  constant SINCOS_LATENCY : positive := 6;
+  constant SINCOS_LATENCY : positive := 12;
+  constant SINCOS_PASS : natural := 6;
   constant SINCOS_ADDRESS_BITS : natural := 10;
   constant SINCOS_DROP_PROD : natural := 18;
   constant SINCOS_TABLE_SHIFT : natural := 4;
