@@ -94,8 +94,8 @@ WIRING = {
 }
 
 
-# (instance, one that it waits for): clocks before the other's out_valid at which it starts.  What it needs first is there
-# with the other's out_soon, the rest it takes late.
+# (instance, one that it waits for): clocks before the other's out_valid at which it starts.  What it needs first is
+# there with the other's out_soon, the rest it takes late.
 EARLY = {
     ("stator_frame", "conditioning"): 1,
     ("rotor_frame", "stator_frame"): 1,

@@ -98,7 +98,11 @@ PATTERNS = (
 )
 SOON = (
     ("first outputs told with the last", "out_soon  <= valid(LATENCY - 1);", "out_soon  <= valid(LATENCY);"),
-    ("first outputs told late", "out_soon  <= valid(LATENCY - SINCOS_PASS);", "out_soon  <= valid(LATENCY - SINCOS_PASS + 1);"),
+    (
+        "first outputs told late",
+        "out_soon  <= valid(LATENCY - SINCOS_PASS);",
+        "out_soon  <= valid(LATENCY - SINCOS_PASS + 1);",
+    ),
 )
 
 
