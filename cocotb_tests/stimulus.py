@@ -130,7 +130,7 @@ def schedule(block: Block, config: dict[str, int], seed: int) -> list[Clock]:
         state, outputs = block.run(state, row, config)
         due.append((last + block.latency, index, outputs))
         if block.soon:
-            soon.append((last + block.latency - 1, index, {name: outputs[name] for name in block.soon}))
+            soon.append((last + block.latency - block.ahead, index, {name: outputs[name] for name in block.soon}))
         arrivals += [(last, p, row[p.name], random_value(rng, p)) for p in late]
     pad_to(len(clocks) + 2 * block.latency + 2)
     for start, port, value, noise in arrivals:

@@ -87,7 +87,7 @@ def test_sincos_at_every_angle():
 
     bound = sincos.bound(None, None)["cos_theta"]
     angles = np.arange(1 << 18)
-    got = np.array([sincos.step(int(t)) for t in angles]) * 2.0**-16
+    got = np.array([sincos.turn(int(t)) for t in angles]) * 2.0**-16
     exact = np.stack([np.cos(angles * 2 * np.pi / 2**18), np.sin(angles * 2 * np.pi / 2**18)], axis=1)
     assert np.abs(got - exact).max() <= bound
     assert np.abs(np.hypot(*got.T) - 1).max() <= 2 * bound

@@ -20,10 +20,14 @@ def _outputs(instance):
     return RENAMED.get(instance, tuple(p.name for p in block.outputs))
 
 
-# Instances in the order in which their results are ready.
-ORDER = sorted(
-    fluxproof.WIRING, key=lambda name: (fluxproof.schedule()[name][1], list(fluxproof.WIRING).index(name))
-)
+def _first_results(instance: str) -> int:
+    """Clock at which an instance tells its first results; its followers may start there."""
+    block = fluxproof.WIRING[instance][0].BLOCK
+    return fluxproof.schedule()[instance][1] - (block.ahead if block.soon else 0)
+
+
+# Instances in the order in which their first results are ready.
+ORDER = sorted(fluxproof.WIRING, key=lambda name: (_first_results(name), list(fluxproof.WIRING).index(name)))
 OWNER = {
     signal: instance
     for instance in fluxproof.WIRING
@@ -43,21 +47,37 @@ def first_in_flow(signals) -> str:
     return min(signals, key=lambda s: (ORDER.index(OWNER[s]), fields.index(s)))
 
 
+def _awaited(name: str, follower: str) -> list[str]:
+    """What an instance waits for until it has all that ``follower`` takes of it.
+
+    A follower that starts earlier than it takes anything late takes only what comes with out_soon, and on that
+    nothing depends that the instance itself takes no sooner.
+    """
+    block = fluxproof.WIRING[name][0].BLOCK
+    taken_late = max(p.late for p in fluxproof.WIRING[follower][0].BLOCK.inputs)
+    first_only = fluxproof.EARLY.get((follower, name), 0) > taken_late
+    return [
+        source
+        for source in fluxproof.WIRING[name][1]
+        if not first_only or fluxproof.EARLY.get((name, source), 0) < block.latency - block.ahead
+    ]
+
+
 def hidden_before(instance: str, shown) -> list[str]:
     """Instances upstream of one whose results are not among the signals ``shown``, in the order of the data.
 
     A fault in one of them is seen first at ``instance``, as long as every signal between them is hidden.
     """
-    found, waiting = set(), list(fluxproof.WIRING[instance][1])
+    seen, waiting = set(), [(name, instance) for name in fluxproof.WIRING[instance][1]]
     while waiting:
-        name = waiting.pop()
+        name, follower = waiting.pop()
         hidden = [s for s in _outputs(name) if s not in shown]
-        if name in found or not hidden or name == "latch":
+        if (name, follower) in seen or not hidden or name == "latch":
             continue
-        found.add(name)
+        seen.add((name, follower))
         if len(hidden) == len(_outputs(name)):
-            waiting += fluxproof.WIRING[name][1]
-    return sorted(found, key=ORDER.index)
+            waiting += [(source, name) for source in _awaited(name, follower)]
+    return sorted({name for name, _ in seen}, key=ORDER.index)
 
 
 class _Listener:

@@ -121,10 +121,11 @@ def _one(x, r, c, now, before):
     u_dc, u_max, u_rail = u_dc_conditioning.step(x[3], r.u_dc_offset, r.u_dc_gain, r.k_u_max, c.adc_bits)
     inverse, inverse_beta, u_low = u_dc_processing.step(u_dc)
     i_alpha, i_beta = clarke.step(i_a, i_b, i_c)
-    cosine, sine = sincos.step(theta_me)
-    i_d, i_q = park.step(i_alpha, i_beta, cosine, sine)
+    (theta_out,) = svm_delay_compensation.step(theta_me, omega_me, r.k_delay)
+    cos_theta, sin_theta, cos_out, sin_out = sincos.step(theta_me, theta_out)
+    i_d, i_q = park.step(i_alpha, i_beta, cos_theta, sin_theta)
     _, minus_rho, lost = winding_resistance.step(x[9], x[10], r.r_s, r.tcr, r.t_0, r.t_min, r.t_max, r.t_s)
-    flux_d, flux_q = flux_park.step(lambda_m_alpha, lambda_m_beta, cosine, sine)
+    flux_d, flux_q = flux_park.step(lambda_m_alpha, lambda_m_beta, cos_theta, sin_theta)
     model_d, model_q, merged_d, merged_q, merged, ended, raised_d, raised_q = flux_models.step(
         i_d, i_q, flux_d, flux_q, lambda_pi_d, lambda_pi_q, before[7], x[12], minus_rho, r.flux_mode, r.l_d, r.l_q,
         r.lambda_mg,
@@ -134,9 +135,7 @@ def _one(x, r, c, now, before):
     )
     (chord,) = chord_speed.step(omega_me, r.k_chord)
     dec_d, dec_q = decoupling.step(omega_chord, lambda_d, lambda_q)
-    (theta_out,) = svm_delay_compensation.step(theta_me, omega_me, r.k_delay)
-    cosine, sine = sincos.step(theta_out)
-    u_alpha, u_beta = inverse_park.step(u_d, u_q, cosine, sine)
+    u_alpha, u_beta = inverse_park.step(u_d, u_q, cos_out, sin_out)
     duty_a, duty_b, duty_c = svm.step(u_alpha, u_beta, inverse, inverse_beta)
     new_a, new_b, new_c = pwm_compare.step(duty_a, duty_b, duty_c, r.min_pulse, c.carrier_half)
     on_alpha, on_beta, _ = applied_voltage.step(

@@ -8,8 +8,8 @@ The contract every block keeps, in the model and in the RTL:
 * Registers change only while no sample is in flight.
 * ``out_valid`` is high ``latency`` clocks later, for one clock, and the outputs stay until the next
   sample's may change them; those of an ``atomic`` block change together, with ``out_valid`` only.
-* The outputs named in ``soon`` are there a clock earlier, told by a second strobe, ``out_soon``: a block that
-  needs them first starts there and takes the others late.
+* The outputs named in ``soon`` are there ``ahead`` clocks earlier, one if nothing is said, told by a second
+  strobe, ``out_soon``: a block that needs them first starts there and takes the others late.
 * ``rst`` is synchronous and active high.  It empties the pipeline and brings the state to
   ``state``; it promises nothing about the outputs, which nobody may read without ``out_valid``.
 * A clocked block (``clocked=True``) has no strobes: each clock is a sample, latency is one.
@@ -88,7 +88,8 @@ class Block:
     interval: int = 1
     clocked: bool = False
     atomic: bool = False  # outputs change with out_valid only
-    soon: tuple[str, ...] = ()  # outputs that are there with out_soon, a clock before out_valid
+    soon: tuple[str, ...] = ()  # outputs that are there with out_soon
+    ahead: int = 1  # clocks that out_soon comes before out_valid
     shown_with: Mapping[str, str] = field(default_factory=dict)  # clocked: output -> the valid it means something with
     after_reset: Mapping[str, int] = field(default_factory=dict)  # clocked: outputs that reset does not bring to zero
     constants: Mapping[str, int | Const] = field(default_factory=dict)

@@ -59,7 +59,8 @@ WIRING = {
     "bus_voltage": (u_dc_conditioning, ("latch",)),
     "bus_reciprocal": (u_dc_processing, ("bus_voltage",)),
     "stator_frame": (clarke, ("conditioning",)),
-    "trig": (sincos, ("angle",)),
+    "delay": (svm_delay_compensation, ("angle", "speed_measurement")),
+    "trig": (sincos, ("angle", "delay")),
     "rotor_frame": (park, ("stator_frame", "trig")),
     "speed_regulator": (speed_pi, ("speed_measurement",)),
     "current_regulators": (current_pi, ("rotor_frame", "speed_regulator")),
@@ -69,13 +70,11 @@ WIRING = {
     "flux": (flux_estimate, ("models",)),
     "chord": (chord_speed, ("speed_measurement",)),
     "cross_coupling": (decoupling, ("flux", "chord")),
-    "delay": (svm_delay_compensation, ("angle", "speed_measurement")),
-    "trig_out": (sincos, ("delay",)),
     "leg_compensation": (dead_time_compensation, ("latch",)),
-    "compensation_dq": (park, ("leg_compensation", "trig_out")),
-    "direction_functions": (park, ("trig_out",)),
+    "compensation_dq": (park, ("leg_compensation", "trig")),
+    "direction_functions": (park, ("trig",)),
     "circle": (voltage_limit, ("current_regulators", "cross_coupling", "compensation_dq", "bus_voltage")),
-    "stator_voltage": (inverse_park, ("circle", "trig_out")),
+    "stator_voltage": (inverse_park, ("circle", "trig")),
     "modulator": (svm, ("stator_voltage", "bus_reciprocal")),
     "compare": (pwm_compare, ("modulator",)),
     "period_voltage": (applied_voltage, ("bus_voltage",)),
@@ -95,16 +94,19 @@ WIRING = {
 }
 
 
-# (instance, one that it waits for): it starts a clock before the other's out_valid.  What it needs first is there with
-# the other's out_soon, the rest it takes late.
+# (instance, one that it waits for): clocks before the other's out_valid at which it starts.  What it needs first is
+# there with the other's out_soon, the rest it takes late.
 EARLY = {
-    ("stator_frame", "conditioning"),
-    ("rotor_frame", "stator_frame"),
-    ("current_regulators", "rotor_frame"),
-    ("current_regulators", "speed_regulator"),
-    ("circle", "current_regulators"),
-    ("circle", "compensation_dq"),
-    ("stator_voltage", "circle"),
+    ("stator_frame", "conditioning"): 1,
+    ("rotor_frame", "stator_frame"): 1,
+    ("trig", "delay"): sincos.PASS,
+    ("rotor_frame", "trig"): sincos.PASS,
+    ("merged_flux", "trig"): sincos.PASS,
+    ("current_regulators", "rotor_frame"): 1,
+    ("current_regulators", "speed_regulator"): 1,
+    ("circle", "current_regulators"): 1,
+    ("circle", "compensation_dq"): 1,
+    ("stator_voltage", "circle"): 1,
 }
 
 AT_THE_CLOCK = (sample_guard, fault_latch, gate_generation)  # golden_model/clocked.py puts them together
@@ -115,7 +117,7 @@ def schedule() -> dict[str, tuple[int, int]]:
     """{instance: (first clock, last clock)} since the raw sample, from the declared latencies alone."""
     times: dict[str, tuple[int, int]] = {}
     for instance, (module, awaited) in WIRING.items():
-        first = max((times[name][1] - ((instance, name) in EARLY) for name in awaited), default=0)
+        first = max((times[name][1] - EARLY.get((instance, name), 0) for name in awaited), default=0)
         times[instance] = (first, first + module.BLOCK.latency)
     return times
 
@@ -275,7 +277,8 @@ def step(state, sample, regs, config):
     inverse, inverse_beta, u_dc_low = u_dc_processing.step(u_dc)
 
     i_alpha, i_beta = clarke.step(i_a, i_b, i_c)
-    cos_theta, sin_theta = sincos.step(theta_me)
+    (theta_out,) = svm_delay_compensation.step(theta_me, omega_me, r.k_delay)
+    cos_theta, sin_theta, cos_out, sin_out = sincos.step(theta_me, theta_out)
     i_d, i_q = park.step(i_alpha, i_beta, cos_theta, sin_theta)
 
     speed_pi_state, (i_q_ref, speed_limited) = speed_pi.step(
@@ -327,8 +330,6 @@ def step(state, sample, regs, config):
     )
     (omega_chord,) = chord_speed.step(omega_me, r.k_chord)
     u_dec_d, u_dec_q = decoupling.step(omega_chord, lambda_d, lambda_q)
-    (theta_out,) = svm_delay_compensation.step(theta_me, omega_me, r.k_delay)
-    cos_out, sin_out = sincos.step(theta_out)
     u_comp_alpha, u_comp_beta = dead_time_compensation.step(state.v_comp, state.s_alpha, state.s_beta)
     u_comp_d, u_comp_q = park.step(u_comp_alpha, u_comp_beta, cos_out, sin_out)
     d_d, d_q = park.step(state.s_alpha, state.s_beta, cos_out, sin_out)

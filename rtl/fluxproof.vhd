@@ -202,6 +202,7 @@ architecture rtl of fluxproof is
   signal alpha_beta_soon      : std_logic;
   signal i_alpha              : signed(PU_W - 1 downto 0);
   signal i_beta               : signed(PU_W - 1 downto 0);
+  signal trig_soon            : std_logic;
   signal trig_valid           : std_logic;
   signal cos_theta            : signed(PU_W - 1 downto 0);
   signal sin_theta            : signed(PU_W - 1 downto 0);
@@ -214,9 +215,7 @@ architecture rtl of fluxproof is
   signal decoupling_valid     : std_logic;
   signal dq_voltage_soon      : std_logic;
   signal dq_voltage_valid     : std_logic;
-  signal theta_out_valid      : std_logic;
   signal theta_out            : unsigned(TURN_W - 1 downto 0);
-  signal voltage_trig_valid   : std_logic;
   signal cos_out              : signed(PU_W - 1 downto 0);
   signal sin_out              : signed(PU_W - 1 downto 0);
   signal ab_voltage_valid     : std_logic;
@@ -432,15 +431,31 @@ begin
       i_beta    => i_beta
     );
 
+  delay : entity work.svm_delay_compensation
+    port map (
+      clk       => clk,
+      rst       => rst,
+      in_valid  => omega_valid,
+      theta_me  => theta_me,
+      omega_me  => omega_me,
+      k_delay   => k_delay,
+      out_valid => open,
+      theta_out => theta_out
+    );
+
   trig : entity work.sincos
     port map (
       clk       => clk,
       rst       => rst,
       in_valid  => theta_valid,
-      theta     => theta_me,
+      theta_me  => theta_me,
+      theta_out => theta_out,
+      out_soon  => trig_soon,
       out_valid => trig_valid,
       cos_theta => cos_theta,
-      sin_theta => sin_theta
+      sin_theta => sin_theta,
+      cos_out   => cos_out,
+      sin_out   => sin_out
     );
 
   rotor_frame : entity work.park
@@ -523,7 +538,7 @@ begin
     port map (
       clk            => clk,
       rst            => rst,
-      in_valid       => trig_valid,
+      in_valid       => trig_soon,
       lambda_m_alpha => lambda_m_alpha,
       lambda_m_beta  => lambda_m_beta,
       cos_theta      => cos_theta,
@@ -605,29 +620,6 @@ begin
       u_dec_q     => u_dec_q
     );
 
-  delay : entity work.svm_delay_compensation
-    port map (
-      clk       => clk,
-      rst       => rst,
-      in_valid  => omega_valid,
-      theta_me  => theta_me,
-      omega_me  => omega_me,
-      k_delay   => k_delay,
-      out_valid => theta_out_valid,
-      theta_out => theta_out
-    );
-
-  trig_out : entity work.sincos
-    port map (
-      clk       => clk,
-      rst       => rst,
-      in_valid  => theta_out_valid,
-      theta     => theta_out,
-      out_valid => voltage_trig_valid,
-      cos_theta => cos_out,
-      sin_theta => sin_out
-    );
-
   leg_compensation : entity work.dead_time_compensation
     port map (
       clk          => clk,
@@ -645,7 +637,7 @@ begin
     port map (
       clk       => clk,
       rst       => rst,
-      in_valid  => voltage_trig_valid,
+      in_valid  => trig_valid,
       i_alpha   => u_comp_alpha,
       i_beta    => u_comp_beta,
       cos_theta => cos_out,
@@ -660,7 +652,7 @@ begin
     port map (
       clk       => clk,
       rst       => rst,
-      in_valid  => voltage_trig_valid,
+      in_valid  => trig_valid,
       i_alpha   => s_alpha,
       i_beta    => s_beta,
       cos_theta => cos_out,

@@ -27,18 +27,14 @@ _USED = range(1 << (ADDRESS_BITS - 2), 1 << ADDRESS_BITS)
 BASE_ROM = tuple(_EDGES[k] if k in _USED else 0 for k in range(1 << ADDRESS_BITS))
 SLOPE_ROM = tuple(_EDGES[k + 1] - _EDGES[k] if k in _USED else 0 for k in range(1 << ADDRESS_BITS))
 BASE, SLOPE = np.array(BASE_ROM), np.array(SLOPE_ROM)
-# What the RTL stores, one table for each quarter in use: the leading bit, always one there, is left out.
-BASE_LOW, SLOPE_LOW = Format(0, -1, ROOT.frac_bits), Format(0, SLOPE_FMT.int_bits - 1, SLOPE_FMT.frac_bits)
-
-
-def quarter(rom, fmt, number):
-    """(format, integers) of the table of one quarter, without the bit above ``fmt``, which must be one."""
-    size = 1 << (ADDRESS_BITS - 2)
-    low = [value - (1 << fmt.width) for value in rom[number * size : (number + 1) * size]]
-    if not all(0 <= value <= fmt.hi for value in low):
-        raise ValueError(f"quarter {number} of the square root's table has an entry without its leading bit")
-    return fmt, low
-
+# What the RTL stores: base and slope in one word, doubled where the last bit of shift, the address' highest, is 0.  So
+# every shift is odd there, one step of the shifter is in the table, and the table fills its block RAM.
+CHORD = Format(0, 0, ROOT.width + SLOPE_FMT.width + 2)
+CHORD_ROM = tuple(
+    ((base << (SLOPE_FMT.width + 1)) + slope) << doubled
+    for doubled in (1, 0)
+    for base, slope in zip(BASE_ROM, SLOPE_ROM, strict=True)
+)
 
 DROP_X = X.width - ADDRESS_BITS - REST_BITS
 DROP_OUT = ROOT.frac_bits - U_MAX.frac_bits
@@ -83,12 +79,14 @@ BLOCK = Block(
     inputs=(Port("x", X, doc="radicand"),),
     outputs=(Port("root", U_MAX, doc="square root, never above the true one"),),
     latency=5,
-    constants={"DROP_X": DROP_X, "DROP_OUT": DROP_OUT, "REST_BITS": REST_BITS},
-    roms={
-        f"{name}_{number}": quarter(rom, fmt, number)
-        for name, rom, fmt in (("BASE", BASE_ROM, BASE_LOW), ("SLOPE", SLOPE_ROM, SLOPE_LOW))
-        for number in (1, 2, 3)
+    constants={
+        "DROP_X": DROP_X,
+        "DROP_OUT": DROP_OUT,
+        "REST_BITS": REST_BITS,
+        "BASE_BITS": ROOT.width + 1,
+        "SLOPE_BITS": SLOPE_FMT.width + 1,
     },
+    roms={"CHORD": (CHORD, list(CHORD_ROM))},
     reference=reference,
     bound=bound,
     stimuli=stimuli,

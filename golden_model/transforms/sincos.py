@@ -1,4 +1,4 @@
-"""Sine and cosine of an angle: one quarter-wave table of 1024 entries, both outputs interpolated.
+"""Sine and cosine of two angles, one after the other: a quarter-wave table of 1024 entries, all outputs interpolated.
 
     theta = quadrant + (address + 1/2)/4096 + delta          turns, |delta| < 2**-13
     sin   = S + delta*C,  cos = C - delta*S                  S, C from the table at both ends
@@ -36,7 +36,8 @@ SINE, DELTAS = np.array(SINE_ROM), np.array(DELTA_ROM)
 
 
 @kernel
-def step(theta):
+def turn(theta):
+    """(cosine, sine) of one angle."""
     quadrant = theta >> (TURN_W - 2)
     address = (theta >> DELTA_BITS) & ((1 << ADDRESS_BITS) - 1)
     delta = DELTAS[theta & ((1 << DELTA_BITS) - 1)]
@@ -55,35 +56,63 @@ def step(theta):
     return round_half_up(turned_c, DROP_OUT), round_half_up(turned_s, DROP_OUT)
 
 
+@kernel
+def step(theta_me, theta_out):
+    cos_theta, sin_theta = turn(theta_me)
+    cos_out, sin_out = turn(theta_out)
+    return cos_theta, sin_theta, cos_out, sin_out
+
+
 def reference(v, _state):
-    angle = 2 * math.pi * v["theta"]
-    return {"cos_theta": math.cos(angle), "sin_theta": math.sin(angle)}
+    now, then = 2 * math.pi * v["theta_me"], 2 * math.pi * v["theta_out"]
+    return {
+        "cos_theta": math.cos(now),
+        "sin_theta": math.sin(now),
+        "cos_out": math.cos(then),
+        "sin_out": math.sin(then),
+    }
 
 
 def bound(_v, _state):
     half_delta = math.pi * TURN.lsb * (1 << DELTA_BITS)
     error = TRIG.lsb / 2 + TABLE.lsb + half_delta**2 / 2 + DELTA.lsb / 2 + 2.0**-FRAC + half_delta * TABLE.lsb
-    return {"cos_theta": error, "sin_theta": error}
+    return dict.fromkeys(("cos_theta", "sin_theta", "cos_out", "sin_out"), error)
 
 
 def stimuli(_rng, _config):
-    """Either side of every quadrant and of 64 table borders."""
+    """Either side of every quadrant and of 64 table borders, the other angle half a turn and a few away."""
     size = 1 << TURN_W
-    return [{"theta": (k * size // 64 + d) % size} for k in range(64) for d in (-1, 0, 1)]
+    return [
+        {"theta_me": (k * size // 64 + d) % size, "theta_out": (k * size // 64 + size // 2 - 3 * d) % size}
+        for k in range(64)
+        for d in (-1, 0, 1)
+    ]
 
 
 OUT = {"lo": -TRIG_ONE, "hi": TRIG_ONE}
+PASS = 6  # clocks that one angle takes; the second one comes when the first is through
 
 BLOCK = Block(
     name="sincos",
     folder="transforms",
     paper="001, eq. (12)",
     step=step,
-    inputs=(Port("theta", TURN, doc="angle"),),
-    outputs=(Port("cos_theta", TRIG, doc="cosine", **OUT), Port("sin_theta", TRIG, doc="sine", **OUT)),
-    latency=6,
-    interval=3,
+    inputs=(
+        Port("theta_me", TURN, doc="electrical angle of the sample"),
+        Port("theta_out", TURN, late=PASS, doc="angle at which the voltage will act"),
+    ),
+    outputs=(
+        Port("cos_theta", TRIG, doc="cosine of theta_me", **OUT),
+        Port("sin_theta", TRIG, doc="sine of theta_me", **OUT),
+        Port("cos_out", TRIG, doc="cosine of theta_out", **OUT),
+        Port("sin_out", TRIG, doc="sine of theta_out", **OUT),
+    ),
+    latency=2 * PASS,
+    interval=PASS + 3,
+    soon=("cos_theta", "sin_theta"),
+    ahead=PASS,
     constants={
+        "PASS": PASS,
         "ADDRESS_BITS": ADDRESS_BITS,
         "DROP_PROD": DROP_PROD,
         "TABLE_SHIFT": TABLE_SHIFT,

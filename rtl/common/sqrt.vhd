@@ -1,8 +1,7 @@
 -- Purpose: square root by table and chord, never above the true root.
 --   x = mantissa * 4**-shift, mantissa in [1/4, 1);  root = (BASE + SLOPE*rest) * 2**-shift
--- Formats: x U(0,32); mantissa cut to 20 bits, 8 of address and 12 of rest; tables U(0,18); root U(0,16).
--- A table for each quarter that mantissas are in; they leave out the leading bit, which is one.  x = 0 takes those of
--- the second quarter with a base below 1/2 and no rest: its root is floored to 0.
+-- Formats: x U(0,32); mantissa cut to 20 bits, 8 of address and 12 of rest; base, slope U(0,18); root U(0,16).
+-- Both stand in one word of a block RAM, doubled where shift is even: what is left to shift is odd.
 -- Latency: 5.  Rounding: every step floors, so the result errs downwards only; no saturation is reachable.
 
 library ieee;
@@ -30,22 +29,21 @@ architecture rtl of sqrt is
   signal pairs_1    : unsigned(1 downto 0);
   signal x_1        : unsigned(31 downto 0);
   signal shift_1    : unsigned(1 downto 0);
-  signal mantissa_2 : unsigned(19 downto 0);
-  signal quarter_2  : unsigned(1 downto 0);
-  signal address_2  : natural range 0 to 63;
-  signal shift_2    : unsigned(3 downto 0);
-  signal base_2     : unsigned(16 downto 0);
-  signal slope_2    : unsigned(8 downto 0);
-  signal base_3     : unsigned(17 downto 0);
-  signal slope_3    : unsigned(9 downto 0);
-  signal rest_3     : unsigned(11 downto 0);
-  signal shift_3    : unsigned(3 downto 0);
-  signal prod_4     : signed(23 downto 0);
-  signal base_4     : unsigned(17 downto 0);
-  signal shift_4    : unsigned(3 downto 0);
-  signal fine_4     : signed(18 + SQRT_REST_BITS downto 0);
+  signal mantissa_1 : unsigned(19 downto 0);
+  signal address_1  : unsigned(8 downto 0);
+  signal chord_2    : unsigned(SQRT_BASE_BITS + SQRT_SLOPE_BITS - 1 downto 0);
+  signal rest_2     : unsigned(SQRT_REST_BITS - 1 downto 0);
+  signal shift_2    : unsigned(2 downto 0);
+  signal base_3     : unsigned(SQRT_BASE_BITS - 1 downto 0);
+  signal slope_3    : unsigned(SQRT_SLOPE_BITS - 1 downto 0);
+  signal rest_3     : unsigned(SQRT_REST_BITS - 1 downto 0);
+  signal shift_3    : unsigned(2 downto 0);
+  signal prod_4     : signed(SQRT_SLOPE_BITS + SQRT_REST_BITS + 1 downto 0);
+  signal base_4     : unsigned(SQRT_BASE_BITS - 1 downto 0);
+  signal shift_4    : unsigned(2 downto 0);
+  signal fine_4     : signed(SQRT_BASE_BITS + SQRT_REST_BITS downto 0);
   signal root_5     : unsigned(U_MAX_W - 1 downto 0);
-  signal shift_5    : unsigned(1 downto 0);
+  signal shift_5    : std_logic;
 
   -- Which of four groups of bits is the first with a one in it; the last where none of the others has.
   function leading_zeros (first, second, third : std_logic) return unsigned is
@@ -57,14 +55,8 @@ begin
   bytes_0  <= leading_zeros(or x(31 downto 24), or x(23 downto 16), or x(15 downto 8));
   pairs_1  <= leading_zeros(or x_1(31 downto 30), or x_1(29 downto 28), or x_1(27 downto 26));
 
-  quarter_2 <= mantissa_2(19 downto 18);
-  address_2 <= to_integer(mantissa_2(17 downto SQRT_REST_BITS));
-  base_2    <= SQRT_BASE_3(address_2) when quarter_2 = 3 else
-               SQRT_BASE_2(address_2) when quarter_2 = 2 else
-               SQRT_BASE_1(address_2);
-  slope_2   <= SQRT_SLOPE_3(address_2) when quarter_2 = 3 else
-               SQRT_SLOPE_2(address_2) when quarter_2 = 2 else
-               SQRT_SLOPE_1(address_2);
+  mantissa_1 <= resize(shift_right(shift_left(x_1, to_integer(pairs_1 & '0')), SQRT_DROP_X), 20);
+  address_1  <= pairs_1(0) & mantissa_1(19 downto SQRT_REST_BITS);
 
   fine_4 <= prod_4 + shift_left(signed(resize(base_4, fine_4'length)), SQRT_REST_BITS);
 
@@ -79,17 +71,18 @@ begin
         shift_1 <= bytes_0;
       end if;
 
-      -- Stage 2: mantissa = x * 4**shift, cut to 20 bits
+      -- Stage 2: mantissa = x * 4**shift, cut to 20 bits;  base, slope from the table
       if valid(1) = '1' then
-        mantissa_2 <= resize(shift_right(shift_left(x_1, to_integer(pairs_1 & '0')), SQRT_DROP_X), 20);
-        shift_2    <= shift_1 & pairs_1;
+        chord_2 <= SQRT_CHORD(to_integer(address_1));
+        rest_2  <= mantissa_1(SQRT_REST_BITS - 1 downto 0);
+        shift_2 <= shift_1 & pairs_1(1);
       end if;
 
-      -- Stage 3: base, slope from the table
+      -- Stage 3: base, slope wait, for a block RAM's output comes late in its clock
       if valid(2) = '1' then
-        base_3  <= (or quarter_2) & base_2;
-        slope_3 <= '1' & slope_2;
-        rest_3  <= mantissa_2(SQRT_REST_BITS - 1 downto 0);
+        base_3  <= chord_2(chord_2'high downto SQRT_SLOPE_BITS);
+        slope_3 <= chord_2(SQRT_SLOPE_BITS - 1 downto 0);
+        rest_3  <= rest_2;
         shift_3 <= shift_2;
       end if;
 
@@ -102,9 +95,9 @@ begin
 
       -- Stage 5: root = fine * 2**-shift, floored: fine = base + prod, shifted by whole nibbles, here
       if valid(4) = '1' then
-        root_5  <= shift_right(unsigned(fine_4(17 + SQRT_REST_BITS downto SQRT_REST_BITS + SQRT_DROP_OUT)),
-                               to_integer(shift_4(3 downto 2) & "00"));
-        shift_5 <= shift_4(1 downto 0);
+        root_5  <= resize(shift_right(unsigned(fine_4(fine_4'high - 1 downto SQRT_REST_BITS + SQRT_DROP_OUT + 1)),
+                                      to_integer(shift_4(2 downto 1) & "00")), U_MAX_W);
+        shift_5 <= shift_4(0);
       end if;
 
       if rst = '1' then
@@ -114,7 +107,7 @@ begin
   end process;
 
   -- The rest of the shift, behind the register
-  root      <= shift_right(root_5, to_integer(shift_5));
+  root      <= shift_right(root_5, 2) when shift_5 = '1' else root_5;
   out_valid <= valid(LATENCY);
 
 end architecture rtl;

@@ -9,7 +9,8 @@
 -- Latency: 11; u_d is there with out_soon.  Interval: 12 (room is ready one clock after the output).
 -- The q axis' inputs are needed a clock after the d axis'.
 -- One adder, one comparison, one multiplier and one root: sum_d against limit, the EMF against u_max, and sum_q, which
--- grows out of the EMF in two more beats and waits for its limit.  Signs are taken off by inversion: |v| = (v xor s) + s, s the sign.
+-- grows out of the EMF in two more beats and waits for its limit, the root.
+-- Signs are taken off by inversion: |v| = (v xor s) + s, s the sign.
 -- Rounding: none but the root's, which errs inwards: the circle is never left.
 
 library ieee;
@@ -54,9 +55,12 @@ architecture rtl of voltage_limit is
   signal next_0     : signed(PU_W - 1 downto 0);
   signal v_1        : signed(SUM_W - 1 downto 0);
   signal limit_1    : unsigned(U_MAX_W - 1 downto 0);
+  signal bound_1    : unsigned(U_MAX_W - 1 downto 0);  -- limit_1; at clocks 9 and 10 the root
   signal v_2        : signed(SUM_W - 1 downto 0);
   signal limit_2    : unsigned(U_MAX_W - 1 downto 0);
   signal beyond_2   : std_logic;
+  signal limited_2  : signed(PU_W - 1 downto 0);
+  signal side_2     : signed(1 downto 0);  -- -1, 0, +1: the limit that holds v
   signal part_2     : unsigned(U_MAX_W - 1 downto 0);
   signal carry_2    : std_logic;
   signal lo_3       : unsigned(PART_W - 1 downto 0);
@@ -64,8 +68,6 @@ architecture rtl of voltage_limit is
   signal radicand_4 : unsigned(31 downto 0);
   signal root_start : std_logic;
   signal root_9     : unsigned(U_MAX_W - 1 downto 0);
-  signal root_10    : unsigned(U_MAX_W - 1 downto 0);
-  signal beyond_10  : std_logic;
 
   -- '1' where |v| > limit: limit - |v| is below zero.
   function beyond (v : signed; limit : unsigned) return std_logic is
@@ -74,25 +76,6 @@ architecture rtl of voltage_limit is
   begin
     rest := (signed(resize(limit, v'length)) & '1') + ((v xor MINUS) & not v(v'high));
     return rest(rest'high);
-  end function;
-
-  -- v within +-limit.
-  function limited (v : signed; limit : unsigned; out_of_it : std_logic) return signed is
-    constant MINUS  : signed(PU_W - 1 downto 0) := (others => v(v'high));
-    variable result : signed(PU_W - 1 downto 0) := v(PU_W - 1 downto 0);
-    variable carry  : signed(1 downto 0)        := "00";
-  begin
-    if out_of_it = '1' then
-      result   := signed(resize(limit, PU_W)) xor MINUS;
-      carry(0) := v(v'high);
-    end if;
-    return result + carry;
-  end function;
-
-  -- -1, 0, +1: the limit that holds v.
-  function side (v : signed; out_of_it : std_logic) return signed is
-  begin
-    return signed'((v(v'high) and out_of_it) & out_of_it);
   end function;
 begin
   valid(0) <= in_valid;
@@ -119,6 +102,24 @@ begin
     u_pi_q when "10",
     u_comp_q when others;
 
+  bound_1 <= root_9 when valid(9) = '1' or valid(10) = '1' else limit_1;
+
+  -- v within +-limit
+  process (all)
+    variable within : signed(PU_W - 1 downto 0);
+    variable carry  : signed(1 downto 0);
+  begin
+    within := v_2(PU_W - 1 downto 0);
+    carry  := "00";
+    if beyond_2 = '1' then
+      within   := signed(resize(limit_2, PU_W)) xor (PU_W - 1 downto 0 => v_2(v_2'high));
+      carry(0) := v_2(v_2'high);
+    end if;
+    limited_2 <= within + carry;
+  end process;
+
+  side_2 <= (v_2(v_2'high) and beyond_2) & beyond_2;
+
   -- |v| or, beyond it, the limit, but for a carry where |v| is that of a negative number
   part_2  <= limit_2 when beyond_2 = '1' else
              unsigned(v_2(U_MAX_W - 1 downto 0)) xor (U_MAX_W - 1 downto 0 => v_2(v_2'high));
@@ -142,17 +143,17 @@ begin
         end if;
       end if;
 
-      -- Stages 2, 3: is it beyond its limit
-      if valid(1) = '1' or valid(2) = '1' then
+      -- Stages 2, 3, 10: is it beyond its limit, and 11, where limit is the root that room becomes
+      if valid(1) = '1' or valid(2) = '1' or valid(9) = '1' or valid(10) = '1' then
         v_2      <= v_1;
-        limit_2  <= limit_1;
-        beyond_2 <= beyond(v_1, limit_1);
+        limit_2  <= bound_1;
+        beyond_2 <= beyond(v_1, bound_1);
       end if;
 
-      -- Stage 3: u_d, limited.  Stages 3, 4: lo = u_max - |u|,  hi = u_max + |u|
+      -- Stage 3: u_d = sum_d, limited.  Stages 3, 4: lo = u_max - |u|,  hi = u_max + |u|
       if valid(2) = '1' then
-        u_d   <= limited(v_2, limit_2, beyond_2);
-        sat_d <= side(v_2, beyond_2);
+        u_d   <= limited_2;
+        sat_d <= side_2;
       end if;
       if valid(2) = '1' or valid(3) = '1' then
         low  := (resize(u_max, PART_W) & not carry_2) + ((not resize(part_2, PART_W)) & not carry_2);
@@ -166,21 +167,15 @@ begin
         radicand_4 <= resize(lo_3 * hi_3, 32);
       end if;
 
-      -- Stage 10: is sum_q beyond the root
-      if valid(9) = '1' or valid(10) = '1' then
-        root_10   <= root_9;
-        beyond_10 <= beyond(v_1, root_9);
-      end if;
-
       -- Stage 11: u_q = sum_q, limited to the root
       if valid(10) = '1' then
-        u_q   <= limited(v_1, root_10, beyond_10);
-        sat_q <= side(v_1, beyond_10);
+        u_q   <= limited_2;
+        sat_q <= side_2;
       end if;
 
       -- Stage 12: room = the root of the second radicand
       if valid(LATENCY) = '1' then
-        room <= root_10;
+        room <= limit_2;
       end if;
 
       if rst = '1' then

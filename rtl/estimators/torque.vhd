@@ -1,7 +1,7 @@
 -- Purpose: estimated torque, paper 001 eq. (4), both products through one multiplier.
 --   torque = lambda_d*i_q - lambda_q*i_d        per unit of 3/2*p*lambda_base*I_base
 -- Formats: PU in and out; products and difference exact.
--- Latency: 5.  Interval: 3.  Rounding: half up, saturated at 2 per unit; flux and current at their bases make one.
+-- Latency: 6.  Interval: 4.  Rounding: half up, saturated at 2 per unit; flux and current at their bases make one.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -28,46 +28,49 @@ architecture rtl of torque is
   constant SUM_W   : positive := 2 * PU_W + 1;
 
   signal valid    : std_logic_vector(0 to LATENCY);
-  signal lambda_1 : signed(PU_W - 1 downto 0);
+  signal lambda_0 : signed(PU_W downto 0);
+  signal factor_0 : signed(PU_W + 1 downto 0);
+  signal lambda_1 : signed(PU_W downto 0);
   signal i_1      : signed(PU_W - 1 downto 0);
-  signal prod_2   : signed(2 * PU_W - 1 downto 0);
+  signal prod_2   : signed(SUM_W - 1 downto 0);
   signal addend_2 : signed(SUM_W - 1 downto 0);
-  signal sum_2    : signed(SUM_W downto 0);
   signal sum_3    : signed(SUM_W - 1 downto 0);
 begin
   valid(0) <= in_valid;
 
-  -- -lambda_q*i_d is made of not lambda_q, which is -lambda_q - 1, and the missing i_d: no carry before the multiplier.
-  addend_2 <= sum_3 when valid(3) = '1' else
-              rounding_base("0", TORQUE_DROP, SUM_W) + i_d;
-
-  -- prod + addend, as prod - not addend - 1 with the borrow from one bit more below: yosys would put a plain sum with
-  -- its own feedback into the DSP48, wrongly
-  sum_2 <= (prod_2(prod_2'high) & prod_2 & '0') - ((not addend_2) & '1');
+  -- lambda_d, then not lambda_q and a carry from one bit below: a plain sum before the multiplier yosys takes for the
+  -- DSP48's pre-adder and forgets the operands' signs
+  lambda_0 <= not resize(lambda_q, PU_W + 1) when valid(2) = '1' else resize(lambda_d, PU_W + 1);
+  factor_0 <= (lambda_0 & '1') + signed'('0' & valid(2));
 
   process (clk)
   begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stages 1, 2: lambda_d and i_q, a clock later not lambda_q and i_d
-      if valid(0) = '1' or valid(1) = '1' then
-        lambda_1 <= not lambda_q when valid(1) = '1' else lambda_d;
-        i_1      <= i_d when valid(1) = '1' else i_q;
+      -- Stages 1, 3: lambda_d and i_q, then -lambda_q and i_d
+      if valid(0) = '1' or valid(2) = '1' then
+        lambda_1 <= factor_0(PU_W + 1 downto 1);
+        i_1      <= i_d when valid(2) = '1' else i_q;
       end if;
 
-      -- Stages 2, 3: prod = lambda_d*i_q, a clock later -lambda_q*i_d - i_d
-      if valid(1) = '1' or valid(2) = '1' then
-        prod_2 <= lambda_1 * i_1;
+      -- Stages 2, 4: prod = lambda_d*i_q, then -lambda_q*i_d;  what it is added to: half an LSB to round with, then
+      -- the sum so far, from a register of its own, for yosys would put feedback into the DSP48, wrongly
+      if valid(1) = '1' or valid(3) = '1' then
+        prod_2   <= lambda_1 * i_1;
+        addend_2 <= sum_3;
+        if valid(1) = '1' then
+          addend_2 <= half(TORQUE_DROP, SUM_W);
+        end if;
       end if;
 
-      -- Stages 3, 4: sum = i_d + lambda_d*i_q, a clock later lambda_d*i_q - lambda_q*i_d; with half an LSB to round
-      if valid(2) = '1' or valid(3) = '1' then
-        sum_3 <= sum_2(SUM_W downto 1);
+      -- Stages 3, 5: lambda_d*i_q, then lambda_d*i_q - lambda_q*i_d
+      if valid(2) = '1' or valid(4) = '1' then
+        sum_3 <= prod_2 + addend_2;
       end if;
 
-      -- Stage 5: torque = sum, narrowed
-      if valid(4) = '1' then
+      -- Stage 6: torque = sum, narrowed
+      if valid(5) = '1' then
         torque <= saturate(sum_3(SUM_W - 1 downto TORQUE_DROP), PU_W);
       end if;
 

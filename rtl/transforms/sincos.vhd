@@ -1,7 +1,8 @@
--- Purpose: sine and cosine of an angle by one quarter-wave table, both outputs interpolated.
+-- Purpose: sine and cosine of two angles by one quarter-wave table, all outputs interpolated.
 --   theta = quadrant + (address + 1/2)/4096 + delta;  sin = S + delta*C,  cos = C - delta*S
 -- Formats: table U(0,18), delta S(-10,22) radians, interpolated value 22 fraction bits, TRIG out.
--- Latency: 6.  Interval: 3 (one read port and one multiplier: C, S and C again are read, delta*C comes first).
+-- Latency: 12, 6 for each angle: theta_out is needed when theta_me is through, whose outputs come with out_soon.
+-- Interval: 9 (one read port and one multiplier: C, S and C again are read, delta*C comes first).
 -- Rounding: product floored to 22 fraction bits, output half up; 1.0 is reached and fits, no saturation.
 
 library ieee;
@@ -15,10 +16,14 @@ entity sincos is
     clk       : in  std_logic;
     rst       : in  std_logic;
     in_valid  : in  std_logic;
-    theta     : in  unsigned(TURN_W - 1 downto 0);
+    theta_me  : in  unsigned(TURN_W - 1 downto 0);
+    theta_out : in  unsigned(TURN_W - 1 downto 0);
+    out_soon  : out std_logic;
     out_valid : out std_logic;
     cos_theta : out signed(TRIG_W - 1 downto 0);
-    sin_theta : out signed(TRIG_W - 1 downto 0)
+    sin_theta : out signed(TRIG_W - 1 downto 0);
+    cos_out   : out signed(TRIG_W - 1 downto 0);
+    sin_out   : out signed(TRIG_W - 1 downto 0)
   );
 end entity sincos;
 
@@ -28,6 +33,9 @@ architecture rtl of sincos is
   constant FINE_W     : positive := 24;  -- S(1,22)
 
   signal valid      : std_logic_vector(0 to LATENCY);
+  signal beat       : std_logic_vector(0 to SINCOS_PASS - 1);  -- valid of either angle
+  signal second     : std_logic;
+  signal theta      : unsigned(TURN_W - 1 downto 0);
   signal address_0  : unsigned(SINCOS_ADDRESS_BITS - 1 downto 0);
   signal table_1    : unsigned(17 downto 0);
   signal low_1      : unsigned(DELTA_BITS - 1 downto 0);
@@ -40,6 +48,8 @@ architecture rtl of sincos is
   signal sum_4      : signed(FINE_W + SINCOS_DROP_PROD - 1 downto 0);  -- for the sine at clock 4, the cosine at 5
   signal fine_4     : signed(FINE_W - 1 downto 0);
   signal fine_s_5   : signed(FINE_W - 1 downto 0);
+  signal sin_5      : signed(TRIG_W - 1 downto 0);
+  signal cos_5      : signed(TRIG_W - 1 downto 0);
 
   -- A quarter turn swaps sine and cosine and turns the sign of one, a half turn those of both.
   function turned (own, other : signed; swap, minus : std_logic) return signed is
@@ -57,68 +67,84 @@ architecture rtl of sincos is
     return (v(v'high downto SINCOS_DROP_OUT) xor (TRIG_W - 1 downto 0 => minus)) + carry;
   end function;
 begin
-  valid(0)  <= in_valid;
-  address_0 <= theta(TURN_W - 3 downto DELTA_BITS) xor (SINCOS_ADDRESS_BITS - 1 downto 0 => valid(1));
+  valid(0) <= in_valid;
+  beat(0)  <= valid(0) or valid(SINCOS_PASS);
+
+  theta     <= theta_out when second = '1' else theta_me;
+  address_0 <= theta(TURN_W - 3 downto DELTA_BITS) xor (SINCOS_ADDRESS_BITS - 1 downto 0 => beat(1));
 
   -- The cosine's product is subtracted: delta has turned its sign, and what is below the cut is rounded up.
   base_3 <= signed(shift_left(resize(table_2, base_3'length), SINCOS_TABLE_SHIFT + SINCOS_DROP_PROD)) or
-            signed(resize(unsigned'(SINCOS_DROP_PROD - 1 downto 0 => valid(4)), base_3'length));
+            signed(resize(unsigned'(SINCOS_DROP_PROD - 1 downto 0 => beat(4)), base_3'length));
   fine_4 <= sum_4(sum_4'high downto SINCOS_DROP_PROD);
+
+  sin_5 <= turned(fine_s_5, fine_4, quadrant_4(0), quadrant_4(1));
+  cos_5 <= turned(fine_4, fine_s_5, quadrant_4(0), quadrant_4(1) xor quadrant_4(0));
 
   process (clk)
   begin
     if rising_edge(clk) then
-      valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
+      valid(1 to LATENCY)        <= valid(0 to LATENCY - 1);
+      beat(1 to SINCOS_PASS - 1) <= beat(0 to SINCOS_PASS - 2);
+
+      -- The second angle's turn: the three clocks in which it is read
+      second <= valid(SINCOS_PASS - 1) or valid(SINCOS_PASS) or valid(SINCOS_PASS + 1);
 
       -- Stages 1, 2, 3: theta = quadrant, address, low bits of delta;  c, s, c from both ends of the table
-      if valid(0) = '1' then
+      if beat(0) = '1' then
         quadrant_1 <= theta(TURN_W - 1 downto TURN_W - 2);
         low_1      <= theta(DELTA_BITS - 1 downto 0);
       end if;
 
-      if valid(0) = '1' or valid(1) = '1' or valid(2) = '1' then
+      if beat(0) = '1' or beat(1) = '1' or beat(2) = '1' then
         table_1 <= SINCOS_SINE(to_integer(not address_0));
       end if;
 
       -- Stages 2, 3, 4: c, s, c wait, for a block RAM's output comes late in its clock;  delta in radians, then -delta
-      if valid(1) = '1' or valid(2) = '1' or valid(3) = '1' then
+      if beat(1) = '1' or beat(2) = '1' or beat(3) = '1' then
         table_2 <= table_1;
       end if;
-      if valid(1) = '1' or valid(2) = '1' then
+      if beat(1) = '1' or beat(2) = '1' then
         delta_2 <= SINCOS_DELTA(to_integer(low_1));
-        if valid(2) = '1' then
+        if beat(2) = '1' then
           delta_2 <= SINCOS_MINUS_DELTA(to_integer(low_1));
         end if;
       end if;
 
       -- Stages 3, 4: prod = delta*c, then -delta*s
-      if valid(2) = '1' or valid(3) = '1' then
+      if beat(2) = '1' or beat(3) = '1' then
         prod_3 <= delta_2 * signed('0' & table_2);
       end if;
 
       -- Stages 4, 5: fine_s = s + delta*c, then fine_c = c - delta*s
-      if valid(3) = '1' or valid(4) = '1' then
+      if beat(3) = '1' or beat(4) = '1' then
         sum_4 <= base_3 + prod_3;
       end if;
-      if valid(3) = '1' then
+      if beat(3) = '1' then
         quadrant_4 <= quadrant_1;
       end if;
-      if valid(4) = '1' then
+      if beat(4) = '1' then
         fine_s_5 <= fine_4;
       end if;
 
-      -- Stage 6: into the quadrant, narrowed
-      if valid(5) = '1' then
-        sin_theta <= turned(fine_s_5, fine_4, quadrant_4(0), quadrant_4(1));
-        cos_theta <= turned(fine_4, fine_s_5, quadrant_4(0), quadrant_4(1) xor quadrant_4(0));
+      -- Stages 6, 12: into the quadrant, narrowed
+      if valid(SINCOS_PASS - 1) = '1' then
+        sin_theta <= sin_5;
+        cos_theta <= cos_5;
+      end if;
+      if valid(LATENCY - 1) = '1' then
+        sin_out <= sin_5;
+        cos_out <= cos_5;
       end if;
 
       if rst = '1' then
-        valid(1 to LATENCY) <= (others => '0');
+        valid(1 to LATENCY)        <= (others => '0');
+        beat(1 to SINCOS_PASS - 1) <= (others => '0');
       end if;
     end if;
   end process;
 
+  out_soon  <= valid(LATENCY - SINCOS_PASS);
   out_valid <= valid(LATENCY);
 
 end architecture rtl;

@@ -93,9 +93,17 @@ PATTERNS = (
     ("valid a clock early", "out_valid <= valid(LATENCY);", "out_valid <= valid(LATENCY - 1);"),
     ("valid a clock early", "out_valid   <= valid(LATENCY);", "out_valid   <= valid(LATENCY - 1);"),
     ("valid survives reset", "        valid(1 to LATENCY) <= (others => '0');\n", "        null;\n"),
+    ("valid survives reset", "        valid(1 to LATENCY)        <= (others => '0');\n", "        null;\n"),
     ("valid survives reset", "out_valid <= '0';", "null;"),
 )
-SOON = ("first outputs told with the last", "out_soon  <= valid(LATENCY - 1);", "out_soon  <= valid(LATENCY);")
+SOON = (
+    ("first outputs told with the last", "out_soon  <= valid(LATENCY - 1);", "out_soon  <= valid(LATENCY);"),
+    (
+        "first outputs told late",
+        "out_soon  <= valid(LATENCY - SINCOS_PASS);",
+        "out_soon  <= valid(LATENCY - SINCOS_PASS + 1);",
+    ),
+)
 
 
 def faults(block: Block) -> tuple[Fault, ...]:
@@ -103,18 +111,20 @@ def faults(block: Block) -> tuple[Fault, ...]:
     made: dict[str, Fault] = {}
     for file in fault_files(block):
         text = (ROOT / "rtl" / file).read_text()
-        for says, old, new in (*PATTERNS, *((SOON,) if block.soon else ())):
+        for says, old, new in (*PATTERNS, *(SOON if block.soon else ())):
             if text.count(old) == 1:
                 made.setdefault(says, Fault(says, file, old, new))
     return tuple(made.values())
 
 
 def block_proof(block: Block) -> Proof:
-    ends = (("out_valid", block.latency), *((("out_soon", block.latency - 1),) if block.soon else ()))
+    soon = (("out_soon", block.latency - block.ahead),) if block.soon else ()
+    ends = (("out_valid", block.latency), *soon)
+    ahead = "one clock" if block.ahead == 1 else f"{block.ahead} clocks"
     return Proof(
         name=f"pipeline_{block.name}",
         says=f"out_valid of {block.name} comes {block.latency} clocks after in_valid, never otherwise; reset clears"
-        + (", out_soon one clock before" if block.soon else ""),
+        + (f", out_soon {ahead} before" if block.soon else ""),
         entity=block.name,
         harness=partial(harness, block.name, "in_valid", ends, block.interval),
         faults=faults(block),
@@ -155,8 +165,8 @@ def core_proof() -> Proof:
             ),
             Fault(
                 "angle does not wait for the reset",
-                "modulation/svm_delay_compensation.vhd",
-                "        valid(1 to LATENCY) <= (others => '0');\n",
+                "transforms/sincos.vhd",
+                "        valid(1 to LATENCY)        <= (others => '0');\n",
                 "        null;\n",
             ),
         ),

@@ -43,7 +43,6 @@ GROUPS: dict[str, tuple[str, ...]] = {
         "chord",
         "cross_coupling",
         "delay",
-        "trig_out",
         "circle",
         "stator_voltage",
     ),
