@@ -13,7 +13,7 @@ MUTANTS = (
      "shift_right(sum, U_DC_CONDITIONING_DROP_U_MAX)", "shift_right(sum + 1, U_DC_CONDITIONING_DROP_U_MAX)"),
     ("reciprocal not rounded", "common/reciprocal.vhd", "('0' & quotient) + 1;", "('0' & quotient);"),
     ("clarke alpha floors", "transforms/clarke.vhd",
-     "half(CLARKE_DROP_ALPHA, PROD_W) when", "half(CLARKE_DROP_BETA, PROD_W) when"),
+     "half(CLARKE_DROP_ALPHA, half_2'length) when", "half(CLARKE_DROP_BETA, half_2'length) when"),
     ("rotation floors y", "transforms/rotate.vhd", "rest   <= half(ROTATE_DROP, TRIG_W);", "rest   <= (others => '0');"),
     ("cosine's product floored", "transforms/sincos.vhd",
      "SINCOS_DROP_PROD - 1 downto 0 => beat(4))", "SINCOS_DROP_PROD - 1 downto 0 => '0')"),
