@@ -22,7 +22,7 @@ from diagnosis.locate import at_order, evidence, locate
 from diagnosis.nominal import Nominal, load_nominal
 from diagnosis.recording import Recording
 from diagnosis.remains import remains
-from diagnosis.request import default_request, requests, wants_cold
+from diagnosis.request import requests, wants_cold
 from diagnosis.result import Diagnosis, UnknownTerm
 from diagnosis.search import EARNS, Search
 from diagnosis.slow_diagnosis import diagnose_slow
@@ -108,9 +108,7 @@ def _physics(recordings, nominal, progress) -> Diagnosis:
         for group in [] if found.tied else ambiguity:  # what would be there without one or the other
             rivals += [search.refine(found.best.model.without(n)) for n in group if n in found.best.model.names]
         open_names = sorted({n for group in ambiguity for n in group})
-        answer.next_recording = requests(view, rivals, CATALOGUE, noise_v, wants_cold(open_names)) or [
-            default_request(view, open_names, CATALOGUE)
-        ]
+        answer.next_recording = requests(search, rivals, noise_v, wants_cold(open_names))
     if kind == "unexplained":
         answer.unknown_term = _unknown(found, left)
     answer.evidence = evidence(

@@ -15,10 +15,11 @@ import itertools
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import stats
 
 from diagnosis.curvature import FAMILY, labels
 from diagnosis.fit import Fitter, Model, Solution
-from diagnosis.refine import TIE, Refiner
+from diagnosis.refine import TIE, Refiner, point_numbers
 
 MOST_AT_ONCE = 3
 REFINED = 14
@@ -30,6 +31,7 @@ BESIDE_CROSS = 0.025  # of L i: a co-energy's cross term bends the axes themselv
 LONE_TIE = 80.0  # margin of a tie where one operating point is all there is
 NEIGHBOURS = 7  # refined around a best set
 EARNS = 30.0  # gain in chi^2 over dispersion that an effect must bring beside the freest form of the others
+LEAST_POINTS, LEAST_SPREAD = 4.0, 0.2  # operating points that say how large errors really are; no smaller than that
 SURE = 4.0  # sizes of its own standard deviation
 
 
@@ -235,28 +237,61 @@ class Search(Refiner):
         without = at.chi2(others)[0]
         with_core = at.chi2(Model(others.names | {name}, others.free))[0]
         gain = (without - with_core) / self.dispersion
-        size = effect.size(solution.c[name], self.view.nominal)
-        floor = max(effect.floor(self.view.nominal), effect.overshadowed(solution.c, self.view.nominal))
-        if gain < EARNS or size < floor:
+        if gain < EARNS or self.small(solution, name):
             return gain
         c, cov = np.array(list(solution.c[name].values())), solution.covariance[name]
         wald = float(c @ np.linalg.pinv(cov) @ c) / self.dispersion
         return None if wald > SURE**2 * len(c) ** 0.5 else gain
 
+    def as_good(self, best, other, margin) -> bool:
+        """Whether a solution scores within a margin of the best where the rows' errors are as small as they turn out.
+
+        A row's standard deviation holds a share for the balance itself which is a bound: where two explanations differ,
+        the residuals at the operating points may be far smaller, and a difference in chi^2 then says more.
+        """
+        gained = (other.chi2 - best.chi2) / self.dispersion
+        return other.score - best.score + gained * (1.0 / self._spread(best, other) - 1.0) < margin
+
+    def _spread(self, best, other) -> float:
+        """Variance of what the best solution leaves along the direction in which another one differs, over the rows' own.
+
+        Summed by operating point first, as what the balance is off by is the same in all blocks of one; at most one.
+        """
+        use = self.cells.ok & self.train
+        own, rival = (s.residual[use] / (self.sigma * s.view.noise_gain)[use] for s in (best, other))
+        point = point_numbers(self.view)[self.cells.block[use]]
+        along, apart = (np.bincount(point, w * (rival - own)) for w in (own, rival - own))
+        if not apart.sum() > 0.0:
+            return 1.0
+        points = apart.sum() ** 2 / np.sum(apart**2)  # so many that count
+        if points < LEAST_POINTS:
+            return 1.0
+        # Few of them know their own scatter badly: the quantile of Student's distribution for the normal one.
+        wider = (stats.t.ppf(0.975, points - 1.0) / stats.norm.ppf(0.975)) ** 2
+        return float(np.clip(wider * np.sum(along**2) / apart.sum(), LEAST_SPREAD, 1.0))
+
+    def small(self, solution, name) -> bool:
+        """Whether an effect of a solution is below what anybody would act on."""
+        effect, nominal = self.effects[name], self.view.nominal
+        floor = max(effect.floor(nominal), effect.overshadowed(solution.c, nominal))
+        return effect.size(solution.c[name], nominal) < floor
+
     def _tied(self, best, sure) -> list[Solution]:
-        """Other models that explain as much: other sets of no more effects.
+        """Other models that explain as much: other sets of no more effects, each large enough for a name.
 
         Where the shape of the flux's curve has settled its name (``sure``), that is no difference.
         """
         curved = set(FAMILY) if best.model.names & set(FAMILY) else set()
         out, rest = [], best.model.names - curved
         for model, solution in self.refined.items():
+            if np.isfinite(solution.score) and any(self.small(solution, n) for n in model.names):
+                continue
             same = model.names - curved == rest and sure
             passenger = model.names - curved > rest and len(best.model.names & curved) > 1
             if same or passenger or model.names == best.model.names or len(model) > len(best.model):
                 continue
             margin = TIE if self.most > 1 else LONE_TIE
-            if solution.score < best.score + margin and model.names:
+            if solution.score < best.score + margin and model.names and self.as_good(best, solution, margin):
                 if all(s.model.names != model.names for s in out):
                     out.append(solution)
         # A model that holds another tied one is that one with a passenger.

@@ -57,8 +57,7 @@ def diagnose_slow(recordings, nominal, progress=lambda text: None) -> Diagnosis:
         answer.ambiguity = ambiguity
     if ambiguity:
         progress("the recording that would tell")
-        plain = View(**{f.name: getattr(view, f.name) for f in dataclasses.fields(View)})
-        answer.next_recording = requests(plain, [found.best, *found.tied], CATALOGUE, fit.noise_floor)
+        answer.next_recording = requests(search, [found.best, *found.tied], fit.noise_floor)
     cells, residual = search.residual(found.best)
     answer.evidence = evidence(view, (search.cells, search.cells.y), (cells, residual), found.pure, held)
     for name in (

@@ -64,8 +64,13 @@ class View:
 
     @property
     def i_mid(self):
-        """Smoothed dq current of an interval, (b, m) complex [A]."""
-        return 0.5 * (self.i[:, 1:] + self.i[:, :-1])
+        """Mean of an interval's two samples in the stator frame, in dq at its middle angle, (b, m) complex [A].
+
+        The mean in dq would be longer by (omega T)^2 / 8: half a per cent of R i passes for ohms that fade with the
+        speed, or beside an iron loss for a sampling skew.
+        """
+        half = np.exp(0.5j * np.diff(self.theta, axis=1))
+        return 0.5 * (half * self.i[:, 1:] + np.conj(half) * self.i[:, :-1])
 
     @property
     def omega_mid(self):

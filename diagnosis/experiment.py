@@ -1,0 +1,74 @@
+"""Which few operating points, recorded together, leave tied explanations the least room.
+
+The distance of two fixed predictions says too much: given the new points a rival is fitted anew, and takes up what it
+can.  What counts is the misfit that is left to it then, over the old rows and the new ones:
+
+    D^2 = min over b of |d - X b|^2 + b' P b = d'd - g' (P + X'X)^-1 g,   g = X'd
+
+d: what the explanation taken for the truth adds at the new points beyond the rival, X: the rival's columns there, both
+in standard deviations; P: what the old rows know of the rival's coefficients.  d'd, g and X'X are sums over the points,
+so sets of points are tried fast: the best set is the one whose closest pair is the farthest apart.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+
+ENOUGH = 400.0  # D^2 beyond which more says nothing
+BENDS = 0.3  # of an effect's own size: how far a part of its curve that no row has shown yet may go
+
+
+@dataclass
+class Rivalry:
+    """One explanation taken for the truth, another fitted against it; arrays over the candidates (n, ...)."""
+
+    power: np.ndarray  # (n,) d'd
+    taken: np.ndarray  # (n, k) X'd
+    gram: np.ndarray  # (n, k, k) X'X
+    known: np.ndarray  # (k, k) P
+
+    def left(self, points) -> float:
+        """D^2 of a set of candidates."""
+        points = list(points)
+        g = self.taken[points].sum(axis=0)
+        room = self.known + self.gram[points].sum(axis=0)
+        return float(max(self.power[points].sum() - g @ np.linalg.solve(room, g), 0.0))
+
+
+def rivalry(truth, rival, columns, known, sigma, block, count) -> Rivalry:
+    """What `rival` cannot take up of `truth`: rows (r,) of both at the candidates, columns (k, r), sigma (r,) inf where unused."""
+    d, x = (truth - rival) / sigma, columns / sigma
+    scale = np.sqrt(np.diag(known))
+    x, known = x / scale[:, None], known / np.outer(scale, scale)
+    k = len(x)
+    power, taken, gram = np.zeros(count), np.zeros((count, k)), np.zeros((count, k, k))
+    np.add.at(power, block, d**2)
+    np.add.at(taken, block, (x * d).T)
+    np.add.at(gram, block, np.einsum("ir,jr->rij", x, x))
+    return Rivalry(power, taken, gram, known + 1e-9 * np.eye(k))
+
+
+def value(rivalries, points) -> tuple[float, float]:
+    """(the closest pair's D^2, the sum of roots that settles equals), each D^2 up to ENOUGH."""
+    left = np.minimum([r.left(points) for r in rivalries], ENOUGH)
+    return float(left.min()), float(np.sqrt(left).sum())
+
+
+def best_points(rivalries, count, most) -> list[int]:
+    """Up to `most` of `count` candidates that leave the closest pair farthest apart, the most telling first."""
+    chosen: list[int] = []
+    for _ in range(most):
+        chosen.append(max(range(count), key=lambda k: value(rivalries, [*chosen, k])))
+        if value(rivalries, chosen)[0] >= ENOUGH:
+            break
+    for _ in range(3):
+        before = value(rivalries, chosen)
+        for place in range(len(chosen)):
+            rest = chosen[:place] + chosen[place + 1 :]
+            chosen = rest[:place] + [max(range(count), key=lambda k: value(rivalries, [*rest, k]))] + rest[place:]
+        if value(rivalries, chosen) <= before:
+            break
+    return chosen
