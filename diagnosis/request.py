@@ -134,7 +134,8 @@ def requests(search, solutions, noise_v, cold=False) -> list[Request]:
     for s in solutions:
         told.append(sum((v * of[n][k] for n, c in s.c.items() for k, v in c.items() if k in of[n]), np.zeros(len(p.ok))))
         columns = {(n, k): column for n in sorted(s.model.names) for k, column in of[n].items() if column.any()}
-        knows.append((np.array(list(columns.values())), known_of(search, s, columns)))
+        stack = np.array(list(columns.values())).reshape(len(columns), len(p.ok))
+        knows.append((stack, known_of(search, s, columns)))
     pairs = list(itertools.permutations(range(len(solutions)), 2))
     rivals = [rivalry(told[a], told[b], *knows[b], sigma, p.block, len(omega)) for a, b in pairs]
     chosen = best_points(rivals, len(omega), MOST)
