@@ -12,12 +12,12 @@ so sets of points are tried fast: the best set is the one whose closest pair is 
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import dataclass
 
 import numpy as np
 
 ENOUGH = 400.0  # D^2 beyond which more says nothing
+ROUNDS = 4  # of exchanges
 BENDS = 0.3  # of an effect's own size: how far a part of its curve that no row has shown yet may go
 
 
@@ -32,10 +32,15 @@ class Rivalry:
 
     def left(self, points) -> float:
         """D^2 of a set of candidates."""
-        points = list(points)
-        g = self.taken[points].sum(axis=0)
-        room = self.known + self.gram[points].sum(axis=0)
-        return float(max(self.power[points].sum() - g @ np.linalg.solve(room, g), 0.0))
+        *rest, last = points
+        return float(self.left_with(rest)[last])
+
+    def left_with(self, rest) -> np.ndarray:
+        """(n,) D^2 of a set of candidates with each further one."""
+        g = self.taken[rest].sum(axis=0) + self.taken
+        room = self.known + self.gram[rest].sum(axis=0) + self.gram
+        taken = np.einsum("nk,nk->n", g, np.linalg.solve(room, g[..., None])[..., 0])
+        return np.maximum(self.power[rest].sum() + self.power - taken, 0.0)
 
 
 def rivalry(truth, rival, columns, known, sigma, block, count) -> Rivalry:
@@ -51,24 +56,26 @@ def rivalry(truth, rival, columns, known, sigma, block, count) -> Rivalry:
     return Rivalry(power, taken, gram, known + 1e-9 * np.eye(k))
 
 
-def value(rivalries, points) -> tuple[float, float]:
-    """(the closest pair's D^2, the sum of roots that settles equals), each D^2 up to ENOUGH."""
-    left = np.minimum([r.left(points) for r in rivalries], ENOUGH)
-    return float(left.min()), float(np.sqrt(left).sum())
+def values(rivalries, rest) -> np.ndarray:
+    """(n,) worth of a set of candidates with each further one: the closest pair's D^2; all pairs settle equals."""
+    left = np.minimum([r.left_with(rest) for r in rivalries], ENOUGH)
+    return left.min(axis=0) + 1e-3 * np.sqrt(left).sum(axis=0)
 
 
-def best_points(rivalries, count, most) -> list[int]:
-    """Up to `most` of `count` candidates that leave the closest pair farthest apart, the most telling first."""
+def best_points(rivalries, most) -> list[int]:
+    """Up to `most` candidates that leave the closest pair farthest apart, the most telling first."""
     chosen: list[int] = []
-    for _ in range(most):
-        chosen.append(max(range(count), key=lambda k: value(rivalries, [*chosen, k])))
-        if value(rivalries, chosen)[0] >= ENOUGH:
-            break
-    for _ in range(3):
-        before = value(rivalries, chosen)
+    while len(chosen) < most and not (chosen and reached >= ENOUGH):
+        worth = values(rivalries, chosen)
+        chosen.append(int(np.argmax(worth)))
+        reached = worth.max()
+    for _ in range(ROUNDS):
+        before = list(chosen)
         for place in range(len(chosen)):
             rest = chosen[:place] + chosen[place + 1 :]
-            chosen = rest[:place] + [max(range(count), key=lambda k: value(rivalries, [*rest, k]))] + rest[place:]
-        if value(rivalries, chosen) <= before:
+            worth = values(rivalries, rest)
+            if worth.max() > worth[chosen[place]] + 1e-9:
+                chosen[place] = int(np.argmax(worth))
+        if chosen == before:
             break
     return chosen

@@ -21,10 +21,11 @@ MOST = 3
 def steady_view(view, omega, i_dq, cold=False, rows=ROWS):
     """A view of made-up steady operating points of the nominal drive: omega (b,) [rad/s], i_dq (b,) complex [A].
 
-    cold: of a machine that has cooled down; otherwise slow changes stand where the recording ended.
+    cold: (b,) those of a machine that has cooled down; at others slow changes stand where the recording ended.
     """
     omega, i_dq = np.asarray(omega, float), np.asarray(i_dq, complex)
     period, b = view.sample_time_s, len(omega)
+    cold = np.broadcast_to(cold, (b,))
     theta = 0.1 + omega[:, None] * period * np.arange(-1, rows + 2)
     steady = lambda x, n: np.repeat(np.asarray(x)[:, None], n, axis=1)  # noqa: E731
     i = steady(i_dq, rows + 1)
@@ -41,8 +42,8 @@ def steady_view(view, omega, i_dq, cold=False, rows=ROWS):
         u=u_dq[:, None] * np.exp(1j * middle),
         u_dc=np.full((b, rows), float(view.nominal.inverter.dc_bus_v)),
         t=np.full(b, view.span_s),
-        course=np.full(b, 0.0 if cold else 1.0),
-        temp=np.full(b, _temperature(view, cold)),
+        course=np.where(cold, 0.0, 1.0),
+        temp=np.where(cold, _temperature(view, True), _temperature(view, False)),
         torque=np.full((b, rows), np.nan),
         slope_m=np.zeros((b, rows)),
         shaft=np.full(b, ""),
@@ -60,7 +61,7 @@ def _temperature(view, cold):
     return float(view.machine.temperature_ref_c if cold else view.temp[np.argmax(view.course)])
 
 
-SPEEDS = (0.0, 0.1, -0.1, 0.3, -0.3, 0.6, -0.6, 1.0, -1.0)  # of the highest
+SPEEDS = (0.0, *(s * x for x in (0.1, 0.3, 0.6, 1.0, 1.2) for s in (1.0, -1.0)))  # of the highest recorded one
 CURRENTS = (0.0, *(r * np.exp(1j * np.pi / 6 * n) for r in (0.25, 0.6, 1.0) for n in range(12)))  # of the rated one
 REACHED = 0.5  # of the speed at which the EMF takes the bus: any drive may run so fast
 
@@ -120,11 +121,14 @@ def wants_cold(names) -> bool:
 def requests(search, solutions, noise_v, cold=False) -> list[Request]:
     """Up to MOST operating points that separate the tied solutions best when all are recorded, the most telling first.
 
-    cold: ask for a machine that has cooled down.
+    cold: some of them may be those of a machine that has cooled down.
     """
     view, effects = View(**{f.name: getattr(search.view, f.name) for f in fields(View)}), search.effects
     omega, i = grid(view)
-    made = steady_view(view, omega, i, cold)
+    if cold:  # each point may be asked for warm or cold
+        omega, i = np.tile(omega, 2), np.tile(i, 2)
+    cooled = np.arange(len(omega)) >= len(omega) // 2 if cold else np.zeros(len(omega), bool)
+    made = steady_view(view, omega, i, cooled)
     p = Projector(made)
     drive = view.nominal.inverter.dc_bus_v
     own = np.hypot(noise_v, SYSTEM_U * voltage_level(made) + SYSTEM_DC * drive)[p.block] / np.sqrt(BLOCKS)
@@ -138,7 +142,7 @@ def requests(search, solutions, noise_v, cold=False) -> list[Request]:
         knows.append((stack, known_of(search, s, columns)))
     pairs = list(itertools.permutations(range(len(solutions)), 2))
     rivals = [rivalry(told[a], told[b], *knows[b], sigma, p.block, len(omega)) for a, b in pairs]
-    chosen = best_points(rivals, len(omega), MOST)
+    chosen = best_points(rivals, MOST)
     out = []
     for k in chosen:
         each = [r.left([k]) for r in rivals]
@@ -150,9 +154,9 @@ def requests(search, solutions, noise_v, cold=False) -> list[Request]:
                 float(i[k].real),
                 float(i[k].imag),
                 names,
-                _why(p, k, told, worst, solutions) + (COLD if cold else ""),
+                _why(p, k, told, worst, solutions) + (COLD if cooled[k] else ""),
                 float(drive),
-                float(view.machine.temperature_ref_c) if cold else None,
+                float(view.machine.temperature_ref_c) if cooled[k] else None,
             )
         )
     return out
@@ -171,9 +175,9 @@ def default_request(view, names, effects) -> Request:
         0.0,
         0.0,
         names,
-        why + (COLD if cold else ""),
+        why + (COLD if cooled[k] else ""),
         float(view.nominal.inverter.dc_bus_v),
-        float(view.machine.temperature_ref_c) if cold else None,
+        float(view.machine.temperature_ref_c) if cooled[k] else None,
     )
 
 
