@@ -202,7 +202,30 @@ class Search(Refiner):
         return (solution, sure) if np.isfinite(solution.score) else (best, False)
 
     def _pruned(self, best):
-        """The best model without effects that do not earn their place."""
+        """The best model of effects that all earn their place.
+
+        What is left of a large model need not be the best of its size: one that was blamed for a part of several
+        others stays, when those have gone.
+        """
+        best = self._earning(best)
+        curved, tried = best.model.names & set(FAMILY), {best.model}
+        while True:
+            better = [
+                s
+                for model, s in self.refined.items()
+                if model not in tried and model.names and len(model) <= len(best.model)
+                if s.score < best.score - TIE and model.names & set(FAMILY) <= curved
+            ]
+            if not better:
+                return best
+            first = min(better, key=lambda s: s.score)
+            tried.add(first.model)
+            other = self._earning(first)
+            if other.score < best.score:
+                best = other
+
+    def _earning(self, best):
+        """A model without effects that do not earn their place."""
         while best.model.names:
             at = self._fitter_at(best)
             judged = sorted(best.model.names - self.together)  # those were judged by the shape of their curve

@@ -176,13 +176,14 @@ class View:
 def joined_views(views: list[View]) -> View:
     """Several recordings of one drive as one view; time runs on, dwells stay apart.
 
-    Slow changes run on with the time as well, but for a recording whose winding temperature says where they
-    stand: see ``_course_of``.
+    Slow changes run on with the time as well, but for a recording that is short beside the first one, in which they
+    stand, and one whose winding temperature says where they stand: see ``_course_of``.
     """
     first = views[0]
     if len(views) == 1:
         return first
     offsets_t = np.cumsum([0.0, *(v.span_s for v in views)])
+    slow = np.cumsum([0.0, first.span_s, *(v.span_s if v.span_s >= first.span_s else 0.0 for v in views[1:])])
     offsets_run = np.cumsum([0, *(v.run.max() + 1 for v in views)])
     stack = {name: np.concatenate([getattr(v, name) for v in views]) for name in STACKED}
     phases = [v.i_abc for v in views]
@@ -191,7 +192,7 @@ def joined_views(views: list[View]) -> View:
         i_abc=None if any(p is None for p in phases) else np.concatenate(phases),
         t=np.concatenate([v.t + o for v, o in zip(views, offsets_t[:-1], strict=True)]),
         course=np.concatenate(
-            [_course_of(v, first, o, offsets_t[-1]) for v, o in zip(views, offsets_t[:-1], strict=True)]
+            [_course_of(v, first, a, b, slow[-1]) for v, a, b in zip(views, slow[:-1], slow[1:], strict=True)]
         ),
         run=np.concatenate([v.run + o for v, o in zip(views, offsets_run[:-1], strict=True)]),
         span_s=float(offsets_t[-1]),
@@ -211,13 +212,13 @@ def started_cold(view) -> bool:
     return bool((is_cold(view) & (view.course < 0.05)).any())
 
 
-def _course_of(view, first, offset, total):
-    """(b,) course of one of several recordings: by its temperature where that tells, else by the time.
+def _course_of(view, first, begin, end, total):
+    """(b,) course of one of several recordings: by its temperature where that tells, else from begin to end [s].
 
     A recording that is cold throughout stands where a cold machine starts.  One at a temperature that the
     first recording passed through stands where that was.
     """
-    by_time = (view.t + offset) / max(total, 1e-9)
+    by_time = np.minimum(view.t + begin, end) / max(total, 1e-9)
     if view is first or not np.isfinite(view.temp).all():
         return by_time
     if is_cold(view).all():
