@@ -18,7 +18,7 @@ import numpy as np
 
 ENOUGH = 400.0  # D^2 beyond which more says nothing
 ROUNDS = 4  # of exchanges
-BENDS = 0.3  # of an effect's own size: how far a part of its curve that no row has shown yet may go
+BENDS = 1.0  # of an effect's own size: how far a part of its curve that no row has shown yet may go
 
 
 @dataclass

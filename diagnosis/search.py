@@ -77,6 +77,7 @@ class Search(Refiner):
         silent = frozenset()
         if "cross_saturation" in best.model.names:
             silent = (best.model.names & set(FAMILY)) - labels(best.view, best, BESIDE_CROSS)[0]
+        silent |= {n for n in best.model.names if self.small(best, n)}
         return Outcome(best, tied, empty, self.sigma, self.pure, self.train, self.dispersion, silent)
 
     def _by_size(self) -> list[Solution]:
@@ -248,8 +249,9 @@ class Search(Refiner):
         return None
 
     def gain(self, solution, name, at) -> float | None:
-        """What a weak effect brings to chi^2; None where it is large, sure and needed enough to stay.
+        """What a weak effect brings to chi^2; None where it is sure and needed enough to stay.
 
+        One that is too small for a name stays as well, unnamed, or others would be blamed for what it does.
         Needed: beside the freest form of the others, on data that are not freed of this effect's error.
         """
         others = solution.model.without(name).freed()
@@ -260,7 +262,7 @@ class Search(Refiner):
         without = at.chi2(others)[0]
         with_core = at.chi2(Model(others.names | {name}, others.free))[0]
         gain = (without - with_core) / self.dispersion
-        if gain < EARNS or self.small(solution, name):
+        if gain < EARNS:
             return gain
         c, cov = np.array(list(solution.c[name].values())), solution.covariance[name]
         wald = float(c @ np.linalg.pinv(cov) @ c) / self.dispersion
@@ -304,10 +306,15 @@ class Search(Refiner):
 
         Where the shape of the flux's curve has settled its name (``sure``), that is no difference.
         """
+        silent = {n for n in best.model.names if self.small(best, n)}
+        if silent == best.model.names:
+            return []
         curved = set(FAMILY) if best.model.names & set(FAMILY) else set()
         out, rest = [], best.model.names - curved
         for model, solution in self.refined.items():
-            if np.isfinite(solution.score) and any(self.small(solution, n) for n in model.names):
+            if np.isfinite(solution.score) and any(self.small(solution, n) for n in model.names - silent):
+                continue
+            if model.names - silent == best.model.names - silent:
                 continue
             same = model.names - curved == rest and sure
             passenger = model.names - curved > rest and len(best.model.names & curved) > 1

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from diagnosis.effect import Effect, Parameter, one, sigma, voltage
+from diagnosis.effect import DOUBT, Effect, Parameter, one, sigma, voltage
 
 
 class Resistance(Effect):
@@ -13,6 +13,10 @@ class Resistance(Effect):
         # Skin effect: more ohms at speed.
         top = max(float(np.abs(view.omega).max()), 1e-9)
         return {"skin": voltage(view.i_mid * (view.omega_mid / top) ** 2)}
+
+    def possible(self, c, covariance, nominal):
+        # Ohms grow with the frequency, they do not fade.
+        return c.get("skin", 0.0) >= -DOUBT * sigma(covariance, len(c) - 1)
 
     def floor(self, nominal):
         return 0.01 * nominal.machine.resistance_ohm
