@@ -48,7 +48,7 @@ def steady_view(view, omega, i_dq, cold=False, rows=ROWS):
         slope_m=np.zeros((b, rows)),
         shaft=np.full(b, ""),
         psi_extra=0.0,
-        memo=dict(view.memo),
+        memo={**view.memo, "top_speed": view.top_speed},
         run=np.arange(b),
         rows=np.zeros(b, int),
     )
@@ -71,7 +71,7 @@ def grid(view):
     m = view.machine
     linear = view.nominal.inverter.dc_bus_v / np.sqrt(3)
     u_max = np.clip(float(voltage_level(view).max()), 0.74 * linear, 0.9 * linear)
-    top = max(float(np.abs(view.omega).max()), REACHED * u_max / m.magnet_flux_wb)
+    top = max(view.top_speed, REACHED * u_max / m.magnet_flux_wb)
     omega, i = np.meshgrid(top * np.array(SPEEDS), m.rated_current_a * np.array(CURRENTS))
     omega, i = omega.ravel(), i.ravel()
     u = m.resistance_ohm * i + 1j * omega * (view.inductances(i) + m.magnet_flux_wb)

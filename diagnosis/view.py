@@ -78,6 +78,11 @@ class View:
         return 0.5 * (self.omega[:, 1:] + self.omega[:, :-1])
 
     @property
+    def top_speed(self):
+        """Largest speed of the recording [rad/s], also of a view of points that were made up beside it."""
+        return self.memo.get("top_speed") or max(float(np.abs(self.omega).max()), 1e-9)
+
+    @property
     def theta_mid(self):
         """Angle in the middle of an interval, (b, m) [rad]."""
         return 0.5 * (self.theta[:, 1:] + self.theta[:, :-1])
