@@ -25,6 +25,7 @@ MOST_AT_ONCE = 3
 REFINED = 14
 SCALES = frozenset({"udc_gain", "current_scale", "magnet_flux"})
 SAME_SCALE = 0.03  # of what is explained: so much may be lost by one scale in place of two
+ALIKE = 0.1  # of a scale: so near are two the same
 SAME_FIT = 1.25  # of chi^2: so much worse may one effect be in place of three
 LEAST_SURPLUS = 0.012  # of L i
 BESIDE_CROSS = 0.025  # of L i: a co-energy's cross term bends the axes themselves a little
@@ -109,6 +110,12 @@ class Search(Refiner):
             name in model.free or not (set(self.effects[name].absorbs) & model.names) for name in model.names
         )
 
+    def admitted(self, model) -> Model:
+        """The model with those effects freed that absorb another one of it."""
+        return Model(
+            model.names, model.free | {n for n in model.names if set(self.effects[n].absorbs) & model.names}
+        )
+
     def forms(self, names):
         """The forms in which a set is tried: all core, each one free, all free."""
         names = frozenset(names)
@@ -155,7 +162,7 @@ class Search(Refiner):
             if name in names or not at.index[name][0]:
                 continue
             for bend in (False, True):
-                grown = best.model.with_(name, bend)
+                grown = self.admitted(best.model.with_(name, bend))
                 if len(grown) <= self.most:
                     tried.append((at.score(grown, self.dispersion), grown))
                 for out in names:
@@ -177,6 +184,10 @@ class Search(Refiner):
             single = min((self.refine(m) for m in forms), key=lambda s: s.score)
             if single.chi2 - best.chi2 < SAME_SCALE * explained and single.chi2 < SAME_FIT * best.chi2:
                 return single
+        if self._scaled_alike(best):
+            rest = best.model.without("udc_gain").with_("current_gain", False)
+            single = self.refine(self.admitted(rest.with_("magnet_flux")))
+            return single if single.chi2 - best.chi2 < SAME_SCALE * explained else best
         pair = best.model.names & SCALES
         if len(pair) != 2:
             return best
@@ -185,6 +196,14 @@ class Search(Refiner):
         singles = [self.refine(rest.with_(third, bend)) for bend in (False, True)]
         single = min(singles, key=lambda s: s.score)
         return single if single.chi2 - best.chi2 < SAME_SCALE * explained else best
+
+    @staticmethod
+    def _scaled_alike(solution) -> bool:
+        """Whether the bus and all current sensors are off by one factor: then neither is, but the magnets are."""
+        if not {"udc_gain", "current_gain"} <= solution.model.names or "magnet_flux" in solution.model.names:
+            return False
+        bus, currents = solution.c["udc_gain"]["gain"], solution.c["current_gain"].get("common", 0.0)
+        return abs(bus - currents) < ALIKE * abs(bus)
 
     def _labelled(self, best) -> tuple[Solution, bool]:
         """The best model with its curves of flux over current called by their shape, and whether that is sure."""
@@ -312,7 +331,9 @@ class Search(Refiner):
         curved = set(FAMILY) if best.model.names & set(FAMILY) else set()
         out, rest = [], best.model.names - curved
         for model, solution in self.refined.items():
-            if np.isfinite(solution.score) and any(self.small(solution, n) for n in model.names - silent):
+            if not np.isfinite(solution.score) or self._scaled_alike(solution):
+                continue
+            if any(self.small(solution, n) for n in model.names - silent):
                 continue
             if model.names - silent == best.model.names - silent:
                 continue
