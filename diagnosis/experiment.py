@@ -44,7 +44,10 @@ class Rivalry:
 
 
 def rivalry(truth, rival, columns, known, sigma, block, count) -> Rivalry:
-    """What `rival` cannot take up of `truth`: rows (r,) of both at the candidates, columns (k, r), sigma (r,) inf where unused."""
+    """What `rival` cannot take up of `truth`, rows (r,) of both at the candidates.
+
+    columns: (k, r) of the rival; known: (k, k); sigma: (r,) inf where a row does not count; block: (r,) candidate of count.
+    """
     d, x = (truth - rival) / sigma, columns / sigma
     scale = np.sqrt(np.diag(known))
     x, known = x / scale[:, None], known / np.outer(scale, scale)
@@ -64,8 +67,8 @@ def values(rivalries, rest) -> np.ndarray:
 
 def best_points(rivalries, most) -> list[int]:
     """Up to `most` candidates that leave the closest pair farthest apart, the most telling first."""
-    chosen: list[int] = []
-    while len(chosen) < most and not (chosen and reached >= ENOUGH):
+    chosen, reached = [], 0.0
+    while len(chosen) < most and reached < ENOUGH:
         worth = values(rivalries, chosen)
         chosen.append(int(np.argmax(worth)))
         reached = worth.max()

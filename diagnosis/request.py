@@ -9,7 +9,6 @@ import numpy as np
 
 from diagnosis.cells import SYSTEM_DC, SYSTEM_U, Projector, voltage_level
 from diagnosis.experiment import BENDS, best_points, rivalry
-from diagnosis.fit import Model
 from diagnosis.result import Request
 from diagnosis.view import View
 
@@ -88,13 +87,16 @@ def columns_at(p, view, effect) -> dict:
 def known_of(search, solution, columns) -> np.ndarray:
     """What the recording knows (k, k) of a solution's coefficients, in its effects' freest form.
 
-    columns: {(effect, coefficient): rows at the candidates}, which say how much a coefficient that the recording does not
-    show may yet amount to.
+    columns: {(effect, coefficient): rows at the candidates}, which say how much a coefficient that the recording does
+    not show may yet amount to.
     """
     names = sorted(solution.model.names)
     f = search.fitter(solution.view, [search.effects[n] for n in names])
-    place = {(o, k.lstrip("~")): n for n, (o, k) in enumerate(zip(f.owner, f.names, strict=True)) if np.isfinite(f.scale[n])}
-    own = {n: sum(np.abs(c) * np.linalg.norm(columns[n, k]) for k, c in solution.c[n].items() if (n, k) in columns) for n in names}
+    shown = [n for n in range(len(f.names)) if np.isfinite(f.scale[n])]
+    place = {(f.owner[n], f.names[n].lstrip("~")): n for n in shown}
+    own = dict.fromkeys(names, 0.0)
+    for (n, key), column in columns.items():
+        own[n] += abs(solution.c[n].get(key, 0.0)) * np.linalg.norm(column)
     out = np.zeros((len(columns),) * 2)
     for a, key_a in enumerate(columns):
         size = np.linalg.norm(columns[key_a])
@@ -136,7 +138,8 @@ def requests(search, solutions, noise_v, cold=False) -> list[Request]:
     of = {n: columns_at(p, made, effects[n]) for s in solutions for n in s.model.names}
     told, knows = [], []
     for s in solutions:
-        told.append(sum((v * of[n][k] for n, c in s.c.items() for k, v in c.items() if k in of[n]), np.zeros(len(p.ok))))
+        parts = (v * of[n][k] for n, c in s.c.items() for k, v in c.items() if k in of[n])
+        told.append(sum(parts, np.zeros(len(p.ok))))
         columns = {(n, k): column for n in sorted(s.model.names) for k, column in of[n].items() if column.any()}
         stack = np.array(list(columns.values())).reshape(len(columns), len(p.ok))
         knows.append((stack, known_of(search, s, columns)))
@@ -163,22 +166,6 @@ def requests(search, solutions, noise_v, cold=False) -> list[Request]:
 
 
 COLD = ", once the machine has cooled down (record temp_winding)"
-
-
-def default_request(view, names, effects) -> Request:
-    """A spin without current at the highest speed, where no computed point separates the names: with the reasons."""
-    cold = wants_cold(names)
-    top = float(np.abs(view.omega).max())
-    why = "; ".join(f"{n}: {effects[n].separated_by}" for n in names)
-    return Request(
-        top,
-        0.0,
-        0.0,
-        names,
-        why + (COLD if cooled[k] else ""),
-        float(view.nominal.inverter.dc_bus_v),
-        float(view.machine.temperature_ref_c) if cooled[k] else None,
-    )
 
 
 def _why(p, k, told, pair, solutions):

@@ -8,7 +8,6 @@ search, ``answer.found`` its outcome, ``answer.held`` the blocks that were not f
 
 from __future__ import annotations
 
-import dataclasses
 
 import numpy as np
 
@@ -21,7 +20,7 @@ from diagnosis.result import Diagnosis, Fit
 from diagnosis.slow import UNSEEN, slow_view
 from diagnosis.slow_search import SlowSearch
 from diagnosis.uncertainty import Plain
-from diagnosis.view import View, joined_views
+from diagnosis.view import joined_views
 
 LEAST_POINTS = 8
 HOLDOUT_EVERY = 4
