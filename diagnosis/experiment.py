@@ -46,7 +46,7 @@ class Rivalry:
 def rivalry(truth, rival, columns, known, sigma, block, count) -> Rivalry:
     """What `rival` cannot take up of `truth`, rows (r,) of both at the candidates.
 
-    columns: (k, r) of the rival; known: (k, k); sigma: (r,), inf for rows that do not count; block: (r,) their candidate.
+    columns: (k, r) of the rival; known: (k, k); sigma: (r,), inf where a row does not count; block: (r,) its candidate.
     """
     d, x = (truth - rival) / sigma, columns / sigma
     scale = np.sqrt(np.diag(known))
