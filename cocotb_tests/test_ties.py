@@ -76,6 +76,14 @@ def test_voltage_late_and_angle_early_alike_are_a_filter_of_the_currents():
     assert lag_of_currents(solved("delay", delay={"tau": 1e-5})) == 0.0
 
 
+def test_currents_and_angle_late_alike_are_no_skew_between_them():
+    """Gates that are shifted against the converters are a delay; a skew takes up what the shift does to the ripple."""
+    size = CATALOGUE["sampling_skew"].size
+    assert size({"tau": 1.02e-5, "angle": 1.05e-5}, NOMINAL) == 0.0
+    assert size({"tau": 1e-6}, NOMINAL) == size({"tau": 1e-6, "angle": 0.0}, NOMINAL) == 1e-6
+    assert size({"tau": 6e-8, "angle": 2.57e-6}, NOMINAL) == 2.57e-6
+
+
 def test_bus_and_sensors_off_alike_are_no_explanation():
     of = lambda bus, common: solved("udc_gain", "current_gain", udc_gain={"gain": bus}, current_gain={"common": common})  # noqa: E731
     assert Search.scaled_alike(of(-0.12, -0.121)) and not Search.scaled_alike(of(-0.12, 0.01))

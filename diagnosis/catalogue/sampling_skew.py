@@ -4,6 +4,8 @@ import numpy as np
 
 from diagnosis.effect import Effect, Parameter, angle_error, current_error, half_dead_time, one
 
+ALIKE = 0.1
+
 
 def _slope(view):
     """Slope of the measured dq current in the zero vector, seen at the angle of the valley (b, m+1) [A/s]."""
@@ -21,6 +23,9 @@ class SamplingSkew(Effect):
         return {"angle": angle_error(view, view.omega)}
 
     def size(self, c, nominal):
+        # Currents and angle that are late alike are no skew: the gates are early, and the voltage with them.
+        if abs(c["tau"] - c.get("angle", 0.0)) < ALIKE * abs(c["tau"]):
+            return 0.0
         return max(abs(v) for v in c.values())
 
     def floor(self, nominal):
