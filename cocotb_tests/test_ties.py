@@ -156,3 +156,14 @@ def test_small_is_below_what_anybody_would_act_on(search):
     r = NOMINAL.machine.resistance_ohm
     of = lambda share: SimpleNamespace(c={"resistance": {"delta_r": share * r}})  # noqa: E731
     assert search.small(of(0.009), "resistance") and not search.small(of(0.011), "resistance")
+
+
+def test_what_is_too_small_may_be_something_else_at_one_operating_point(view):
+    lone = object.__new__(Search)
+    lone.view, lone.effects, lone.dispersion = view, CATALOGUE, 1.0
+    tiny, other = ({"delta_psi_m": 1e-4 * MACHINE.magnet_flux_wb}, {"delta_r": 0.2 * MACHINE.resistance_ohm})
+    best, rival = solved("magnet_flux", magnet_flux=tiny), solved("resistance", score=125.0, resistance=other)
+    lone.refined, lone.as_good = {s.model: s for s in (best, rival)}, lambda *args: True
+    for most, tied in ((1, [rival]), (3, [])):
+        lone.most = most
+        assert lone._tied(best, True) == tied

@@ -75,7 +75,8 @@ class Search(Ties):
         silent = frozenset()
         if "cross_saturation" in best.model.names:
             silent = (best.model.names & set(FAMILY)) - labels(best.view, best, BESIDE_CROSS)[0]
-        silent |= {n for n in best.model.names if self.small(best, n)}
+        if self.most > 1 or not tied:
+            silent |= {n for n in best.model.names if self.small(best, n)}
         return Outcome(best, tied, empty, self.sigma, self.pure, self.train, self.dispersion, silent)
 
     def _by_size(self) -> list[Solution]:

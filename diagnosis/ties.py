@@ -65,7 +65,9 @@ class Ties(Refiner):
         """
         silent = {n for n in best.model.names if self.small(best, n)}
         if silent == best.model.names:
-            return []
+            if self.most > 1:
+                return []
+            silent = set()  # at one operating point what is too small may be something else that is not
         curved = set(FAMILY) if best.model.names & set(FAMILY) else set()
         out, rest = [], best.model.names - curved
         for model, solution in self.refined.items():
