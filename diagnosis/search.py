@@ -30,6 +30,7 @@ LEAST_SURPLUS = 0.012  # of L i
 BESIDE_CROSS = 0.025  # of L i: a co-energy's cross term bends the axes themselves a little
 NEIGHBOURS = 7  # refined around a best set
 EARNS = 30.0  # gain in chi^2 over dispersion that an effect must bring beside the freest form of the others
+SECOND_THOUGHTS = 4  # better models that are looked at when a large one has been pruned
 SURE = 4.0  # sizes of its own standard deviation
 
 
@@ -219,7 +220,7 @@ class Search(Ties):
         """
         best = self._earning(best)
         curved, tried = best.model.names & set(FAMILY), {best.model}
-        while True:
+        for _ in range(SECOND_THOUGHTS):
             better = [
                 s
                 for model, s in self.refined.items()
@@ -227,12 +228,13 @@ class Search(Ties):
                 if s.score < best.score - TIE and model.names & set(FAMILY) <= curved
             ]
             if not better:
-                return best
+                break
             first = min(better, key=lambda s: s.score)
             tried.add(first.model)
             other = self._earning(first)
             if other.score < best.score:
                 best = other
+        return best
 
     def _earning(self, best):
         """A model without effects that do not earn their place."""
