@@ -23,15 +23,16 @@ class SamplingSkew(Effect):
         return {"angle": angle_error(view, view.omega)}
 
     def size(self, c, nominal):
-        # Currents and angle that are late alike are no skew: the gates are early, and the voltage with them.
-        if abs(c["tau"] - c.get("angle", 0.0)) < ALIKE * abs(c["tau"]):
-            return 0.0
         return max(abs(v) for v in c.values())
 
     def floor(self, nominal):
         return 0.0012 * nominal.sample_time_s
 
     def overshadowed(self, c, nominal):
+        own = c.get("sampling_skew", {"tau": 0.0})
+        # Currents and angle that are late alike are no skew: the gates are early, and the voltage with them.
+        if abs(own["tau"] - own.get("angle", 0.0)) < ALIKE * abs(own["tau"]):
+            return float("inf")
         return half_dead_time(c, nominal)
 
     def ceiling(self, nominal):
