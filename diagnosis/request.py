@@ -1,26 +1,30 @@
-"""Which recording would tell tied explanations apart: the operating points at which they differ most."""
+"""Which recording would tell tied explanations apart: the operating points that leave a rival the least room."""
 
 from __future__ import annotations
 
 import itertools
+from dataclasses import fields
 
 import numpy as np
 
-from diagnosis.cells import Projector
+from diagnosis.cells import SYSTEM_DC, SYSTEM_U, Projector, voltage_level
+from diagnosis.experiment import BENDS, best_points, rivalry
 from diagnosis.result import Request
+from diagnosis.view import View
 
 ROWS = 200
-ENOUGH = 50.0  # squared distance, in standard deviations, that counts as told apart
-MOST = 4
+BLOCKS = 20  # that a dwell of half a second is worth
+MOST = 3
 
 
 def steady_view(view, omega, i_dq, cold=False, rows=ROWS):
     """A view of made-up steady operating points of the nominal drive: omega (b,) [rad/s], i_dq (b,) complex [A].
 
-    cold: of a machine that has cooled down; otherwise slow changes stand where the recording ended.
+    cold: (b,) those of a machine that has cooled down; at others slow changes stand where the recording ended.
     """
     omega, i_dq = np.asarray(omega, float), np.asarray(i_dq, complex)
     period, b = view.sample_time_s, len(omega)
+    cold = np.broadcast_to(cold, (b,))
     theta = 0.1 + omega[:, None] * period * np.arange(-1, rows + 2)
     steady = lambda x, n: np.repeat(np.asarray(x)[:, None], n, axis=1)  # noqa: E731
     i = steady(i_dq, rows + 1)
@@ -37,13 +41,13 @@ def steady_view(view, omega, i_dq, cold=False, rows=ROWS):
         u=u_dq[:, None] * np.exp(1j * middle),
         u_dc=np.full((b, rows), float(view.nominal.inverter.dc_bus_v)),
         t=np.full(b, view.span_s),
-        course=np.full(b, 0.0 if cold else 1.0),
-        temp=np.full(b, _temperature(view, cold)),
+        course=np.where(cold, 0.0, 1.0),
+        temp=np.where(cold, _temperature(view, True), _temperature(view, False)),
         torque=np.full((b, rows), np.nan),
         slope_m=np.zeros((b, rows)),
         shaft=np.full(b, ""),
         psi_extra=0.0,
-        memo=dict(view.memo),
+        memo={**view.memo, "top_speed": view.top_speed},
         run=np.arange(b),
         rows=np.zeros(b, int),
     )
@@ -56,34 +60,52 @@ def _temperature(view, cold):
     return float(view.machine.temperature_ref_c if cold else view.temp[np.argmax(view.course)])
 
 
+SPEEDS = (0.0, *(s * x for x in (0.1, 0.3, 0.6, 1.0, 1.2) for s in (1.0, -1.0)))  # of the highest recorded one
+CURRENTS = (0.0, *(r * np.exp(1j * np.pi / 6 * n) for r in (0.25, 0.6, 1.0) for n in range(12)))  # of the rated one
+REACHED = 0.5  # of the speed at which the EMF takes the bus: any drive may run so fast
+
+
 def grid(view):
     """Operating points that the drive can run: (omega, i_dq), within its voltage and what was recorded."""
     m = view.machine
-    rated = m.rated_current_a
-    u_max = 0.9 * view.nominal.inverter.dc_bus_v / np.sqrt(3)
-    top = max(float(np.abs(view.omega).max()), 0.25 * u_max / m.magnet_flux_wb)
-    points = []
-    for share, q, d in itertools.product(
-        (0.0, 0.1, -0.1, 0.3, -0.3, 0.6, -0.6, 1.0, -1.0), (0.0, 0.5, -0.5, 1.0, -1.0), (0.0, -0.5, 0.5)
-    ):
-        omega, i = share * top, rated * (d + 1j * q)
-        u = m.resistance_ohm * i + 1j * omega * (view.inductances(np.array(i)) + m.magnet_flux_wb)
-        if abs(i) <= 1.2 * rated and abs(u) < u_max:
-            points.append((omega, i))
-    return np.array([p[0] for p in points]), np.array([p[1] for p in points])
+    linear = view.nominal.inverter.dc_bus_v / np.sqrt(3)
+    u_max = np.clip(float(voltage_level(view).max()), 0.74 * linear, 0.9 * linear)
+    top = max(view.top_speed, REACHED * u_max / m.magnet_flux_wb)
+    omega, i = np.meshgrid(top * np.array(SPEEDS), m.rated_current_a * np.array(CURRENTS))
+    omega, i = omega.ravel(), i.ravel()
+    u = m.resistance_ohm * i + 1j * omega * (view.inductances(i) + m.magnet_flux_wb)
+    within = np.abs(u) <= u_max
+    return omega[within], i[within]
 
 
-def predictions(view, solution, effects):
-    """What a solution adds to the misfit of a view, as rows (r,), and the standard deviation of it (r,)."""
-    p = Projector(view)
-    total, variance = np.zeros(len(p.ok)), np.zeros(len(p.ok))
-    for name, c in solution.c.items():
-        effect = effects[name]
-        columns = {**effect.core(view), **effect.free(view)}
-        rows = np.array([p.rows(columns[key]) if key in columns else np.zeros(len(p.ok)) for key in c])
-        total += np.array(list(c.values())) @ rows
-        variance += np.einsum("ir,ij,jr->r", rows, solution.covariance[name], rows)
-    return p, total, np.sqrt(np.maximum(variance, 0.0))
+def columns_at(p, view, effect) -> dict:
+    """Rows {coefficient: (r,)} of an effect's core and free columns at the blocks of a view."""
+    core, free = effect.core(view), effect.free(view)
+    return {key: p.rows(column) for key, column in {**core, **free}.items()}
+
+
+def known_of(search, solution, columns) -> np.ndarray:
+    """What the recording knows (k, k) of a solution's coefficients, in its effects' freest form.
+
+    columns: {(effect, coefficient): rows at the candidates}, which say how much a coefficient that the recording does
+    not show may yet amount to.
+    """
+    names = sorted(solution.model.names)
+    f = search.fitter(solution.view, [search.effects[n] for n in names])
+    shown = [n for n in range(len(f.names)) if np.isfinite(f.scale[n])]
+    place = {(f.owner[n], f.names[n].lstrip("~")): n for n in shown}
+    own = dict.fromkeys(names, 0.0)
+    for (n, key), column in columns.items():
+        own[n] += abs(solution.c[n].get(key, 0.0)) * np.linalg.norm(column)
+    out = np.zeros((len(columns),) * 2)
+    for a, key_a in enumerate(columns):
+        size = np.linalg.norm(columns[key_a])
+        out[a, a] += (size / (BENDS * own[key_a[0]] + 1e-12 * size + 1e-30)) ** 2
+        for b, key_b in enumerate(columns):
+            if key_a in place and key_b in place:
+                m, n = place[key_a], place[key_b]
+                out[a, b] += f.gram[m, n] * f.scale[m] * f.scale[n]
+    return out
 
 
 DRIFTS = {"magnet_temperature", "resistance_temperature"}
@@ -98,75 +120,58 @@ def wants_cold(names) -> bool:
     return bool(DRIFTS & names) and not names <= DRIFTS
 
 
-def requests(view, solutions, effects, noise_v, cold=False) -> list[Request]:
-    """Operating points that separate the tied solutions best, the most telling first; empty where none does.
+def requests(search, solutions, noise_v, cold=False) -> list[Request]:
+    """Up to MOST operating points that separate the tied solutions best when all are recorded, the most telling first.
 
-    cold: ask for a machine that has cooled down.
+    cold: some of them may be those of a machine that has cooled down.
     """
+    view, effects = View(**{f.name: getattr(search.view, f.name) for f in fields(View)}), search.effects
     omega, i = grid(view)
-    made = steady_view(view, omega, i, cold)
-    rows = [predictions(made, s, effects) for s in solutions]
-    p = rows[0][0]
-    pairs = list(itertools.combinations(range(len(solutions)), 2))
-    own = np.hypot(noise_v, 3e-4 * view.nominal.inverter.dc_bus_v)
-    distance = np.zeros((len(pairs), len(omega)))
-    for n, (a, b) in enumerate(pairs):
-        difference = rows[a][1] - rows[b][1]
-        weight = np.where(
-            p.ok & (p.channel == "u"), 1.0 / (own**2 + 0.25 * (rows[a][2] ** 2 + rows[b][2] ** 2)), 0.0
-        )
-        np.add.at(distance[n], p.block, weight * difference**2)
-    out, reached = [], np.zeros(len(pairs))
-    while len(out) < MOST and (reached < ENOUGH).any():
-        open_pairs = reached < ENOUGH
-        near = distance[open_pairs]
-        gain = np.minimum(near, ENOUGH).sum(axis=0) + 1e-3 * np.sqrt(near).sum(axis=0)  # the clearest of equals
-        k = int(np.argmax(gain))
-        told = open_pairs & (distance[:, k] >= 9.0)
-        if not told.any():
-            break
-        reached = reached + np.minimum(distance[:, k], ENOUGH)
-        names = sorted({x for n in np.flatnonzero(told) for s in pairs[n] for x in solutions[s].model.names})
-        worst = pairs[int(np.argmax(np.where(told, distance[:, k], -1)))]
+    if cold:  # each point may be asked for warm or cold
+        omega, i = np.tile(omega, 2), np.tile(i, 2)
+    cooled = np.arange(len(omega)) >= len(omega) // 2 if cold else np.zeros(len(omega), bool)
+    made = steady_view(view, omega, i, cooled)
+    p = Projector(made)
+    drive = view.nominal.inverter.dc_bus_v
+    own = np.hypot(noise_v, SYSTEM_U * voltage_level(made) + SYSTEM_DC * drive)[p.block] / np.sqrt(BLOCKS)
+    sigma = np.where(p.ok & (p.channel == "u"), own, np.inf)
+    of = {n: columns_at(p, made, effects[n]) for s in solutions for n in s.model.names}
+    told, knows = [], []
+    for s in solutions:
+        parts = (v * of[n][k] for n, c in s.c.items() for k, v in c.items() if k in of[n])
+        told.append(sum(parts, np.zeros(len(p.ok))))
+        columns = {(n, k): column for n in sorted(s.model.names) for k, column in of[n].items() if column.any()}
+        stack = np.array(list(columns.values())).reshape(len(columns), len(p.ok))
+        knows.append((stack, known_of(search, s, columns)))
+    pairs = list(itertools.permutations(range(len(solutions)), 2))
+    rivals = [rivalry(told[a], told[b], *knows[b], sigma, p.block, len(omega)) for a, b in pairs]
+    chosen = best_points(rivals, MOST)
+    out = []
+    for k in chosen:
+        each = [r.left([k]) for r in rivals]
+        worst = pairs[int(np.argmax(each))]
+        names = sorted({x for n in worst for x in solutions[n].model.names})
         out.append(
             Request(
                 float(omega[k]),
                 float(i[k].real),
                 float(i[k].imag),
                 names,
-                _why(made, k, rows, worst, solutions) + (COLD if cold else ""),
-                float(view.nominal.inverter.dc_bus_v),
-                float(view.machine.temperature_ref_c) if cold else None,
+                _why(p, k, told, worst, solutions) + (COLD if cooled[k] else ""),
+                float(drive),
+                float(view.machine.temperature_ref_c) if cooled[k] else None,
             )
         )
-        distance[:, k] = 0.0
     return out
 
 
 COLD = ", once the machine has cooled down (record temp_winding)"
 
 
-def default_request(view, names, effects) -> Request:
-    """A spin without current at the highest speed, where no computed point separates the names: with the reasons."""
-    cold = wants_cold(names)
-    top = float(np.abs(view.omega).max())
-    why = "; ".join(f"{n}: {effects[n].separated_by}" for n in names)
-    return Request(
-        top,
-        0.0,
-        0.0,
-        names,
-        why + (COLD if cold else ""),
-        float(view.nominal.inverter.dc_bus_v),
-        float(view.machine.temperature_ref_c) if cold else None,
-    )
-
-
-def _why(view, k, rows, pair, solutions):
-    p = rows[0][0]
+def _why(p, k, told, pair, solutions):
     at = p.ok & (p.block == k) & (p.channel == "u")
     a, b = (" with ".join(sorted(solutions[n].model.names)) for n in pair)
-    difference = np.where(at, np.abs(rows[pair[0]][1] - rows[pair[1]][1]), 0.0)
+    difference = np.where(at, np.abs(told[pair[0]] - told[pair[1]]), 0.0)
     row = int(np.argmax(difference))
     where = f"u_{'dq'[p.part[row]]}" + (f" at order {abs(p.order[row]):g}" if p.order[row] else "")
     return f"{where} differs by {difference[row]:.3g} V between {a} and {b}"

@@ -22,7 +22,7 @@ from diagnosis.locate import at_order, evidence, locate
 from diagnosis.nominal import Nominal, load_nominal
 from diagnosis.recording import Recording
 from diagnosis.remains import remains
-from diagnosis.request import default_request, requests, wants_cold
+from diagnosis.request import requests, wants_cold
 from diagnosis.result import Diagnosis, UnknownTerm
 from diagnosis.search import EARNS, Search
 from diagnosis.slow_diagnosis import diagnose_slow
@@ -95,7 +95,8 @@ def _physics(recordings, nominal, progress) -> Diagnosis:
     names = words.carried(names, found, left.cells, search.worth, CATALOGUE)
     names, absorbed = beside_free_surface(view, names, ~held)
     ambiguity = ambiguity + absorbed
-    kind = words.verdict(names, ambiguity, left)
+    lag = words.lag_of_currents(found.best)
+    kind = words.verdict(names, ambiguity, left, lag)
     answer = Diagnosis(kind, "", location=locate(view, search.cells, found.pure), fit=left.fit, search=found)
     if kind in ("explained", "ambiguous"):
         if names:
@@ -108,11 +109,9 @@ def _physics(recordings, nominal, progress) -> Diagnosis:
         for group in [] if found.tied else ambiguity:  # what would be there without one or the other
             rivals += [search.refine(found.best.model.without(n)) for n in group if n in found.best.model.names]
         open_names = sorted({n for group in ambiguity for n in group})
-        answer.next_recording = requests(view, rivals, CATALOGUE, noise_v, wants_cold(open_names)) or [
-            default_request(view, open_names, CATALOGUE)
-        ]
+        answer.next_recording = requests(search, rivals, noise_v, wants_cold(open_names))
     if kind == "unexplained":
-        answer.unknown_term = _unknown(found, left)
+        answer.unknown_term = _lag(found, lag) if lag else _unknown(found, left)
     answer.evidence = evidence(
         view, (search.cells, search.cells.y), (left.cells, left.residual), found.pure, held
     )
@@ -144,6 +143,14 @@ def beside_free_surface(view, names, train):
     gains = earned(view, suspects, (*USUAL, *others), train)
     weak = [n for n in suspects if gains[n] < EARNS]
     return [n for n in names if n not in weak], [[n, *curved] for n in weak]
+
+
+def _lag(found, lag) -> UnknownTerm:
+    """Currents that are measured late, as a filter in front of the converters makes them."""
+    best, empty = found.best, found.empty
+    spread = float(np.sqrt(best.covariance["delay"][0, 0]))
+    share = (empty.chi2 - best.chi2) / max(empty.chi2 - empty.rows, 1e-9)
+    return UnknownTerm("i_abc", "-lag di/dt", lag, spread, "s", float(np.clip(share, 0.0, 1.0)))
 
 
 def _unknown(found, left) -> UnknownTerm | None:

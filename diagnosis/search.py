@@ -18,7 +18,8 @@ import numpy as np
 
 from diagnosis.curvature import FAMILY, labels
 from diagnosis.fit import Fitter, Model, Solution
-from diagnosis.refine import TIE, Refiner
+from diagnosis.refine import TIE
+from diagnosis.ties import Ties
 
 MOST_AT_ONCE = 3
 REFINED = 14
@@ -27,9 +28,9 @@ SAME_SCALE = 0.03  # of what is explained: so much may be lost by one scale in p
 SAME_FIT = 1.25  # of chi^2: so much worse may one effect be in place of three
 LEAST_SURPLUS = 0.012  # of L i
 BESIDE_CROSS = 0.025  # of L i: a co-energy's cross term bends the axes themselves a little
-LONE_TIE = 80.0  # margin of a tie where one operating point is all there is
 NEIGHBOURS = 7  # refined around a best set
 EARNS = 30.0  # gain in chi^2 over dispersion that an effect must bring beside the freest form of the others
+SECOND_THOUGHTS = 4  # better models that are looked at when a large one has been pruned
 SURE = 4.0  # sizes of its own standard deviation
 
 
@@ -49,7 +50,7 @@ class Outcome:
     )  # effects of the best solution that are too small to be named beside the others
 
 
-class Search(Refiner):
+class Search(Ties):
     """One search over one view."""
 
     together = frozenset()  # an inductance and the saturation beside it, told apart by their curve
@@ -75,6 +76,8 @@ class Search(Refiner):
         silent = frozenset()
         if "cross_saturation" in best.model.names:
             silent = (best.model.names & set(FAMILY)) - labels(best.view, best, BESIDE_CROSS)[0]
+        if self.most > 1 or not tied:
+            silent |= {n for n in best.model.names if self.small(best, n)}
         return Outcome(best, tied, empty, self.sigma, self.pure, self.train, self.dispersion, silent)
 
     def _by_size(self) -> list[Solution]:
@@ -104,6 +107,12 @@ class Search(Refiner):
         """Whether an absorbed effect stands only beside the free form of what absorbs it."""
         return all(
             name in model.free or not (set(self.effects[name].absorbs) & model.names) for name in model.names
+        )
+
+    def admitted(self, model) -> Model:
+        """The model with those effects freed that absorb another one of it."""
+        return Model(
+            model.names, model.free | {n for n in model.names if set(self.effects[n].absorbs) & model.names}
         )
 
     def forms(self, names):
@@ -152,7 +161,7 @@ class Search(Refiner):
             if name in names or not at.index[name][0]:
                 continue
             for bend in (False, True):
-                grown = best.model.with_(name, bend)
+                grown = self.admitted(best.model.with_(name, bend))
                 if len(grown) <= self.most:
                     tried.append((at.score(grown, self.dispersion), grown))
                 for out in names:
@@ -174,6 +183,10 @@ class Search(Refiner):
             single = min((self.refine(m) for m in forms), key=lambda s: s.score)
             if single.chi2 - best.chi2 < SAME_SCALE * explained and single.chi2 < SAME_FIT * best.chi2:
                 return single
+        if self.scaled_alike(best):
+            rest = best.model.without("udc_gain").with_("current_gain", False)
+            single = self.refine(self.admitted(rest.with_("magnet_flux")))
+            return single if single.chi2 - best.chi2 < SAME_SCALE * explained else best
         pair = best.model.names & SCALES
         if len(pair) != 2:
             return best
@@ -200,7 +213,31 @@ class Search(Refiner):
         return (solution, sure) if np.isfinite(solution.score) else (best, False)
 
     def _pruned(self, best):
-        """The best model without effects that do not earn their place."""
+        """The best model of effects that all earn their place.
+
+        What is left of a large model need not be the best of its size: one that was blamed for a part of several
+        others stays, when those have gone.
+        """
+        best = self._earning(best)
+        curved, tried = best.model.names & set(FAMILY), {best.model}
+        for _ in range(SECOND_THOUGHTS):
+            better = [
+                s
+                for model, s in self.refined.items()
+                if model not in tried and model.names and len(model) <= len(best.model)
+                if s.score < best.score - TIE and model.names & set(FAMILY) <= curved
+            ]
+            if not better:
+                break
+            first = min(better, key=lambda s: s.score)
+            tried.add(first.model)
+            other = self._earning(first)
+            if other.score < best.score:
+                best = other
+        return best
+
+    def _earning(self, best):
+        """A model without effects that do not earn their place."""
         while best.model.names:
             at = self._fitter_at(best)
             judged = sorted(best.model.names - self.together)  # those were judged by the shape of their curve
@@ -223,8 +260,9 @@ class Search(Refiner):
         return None
 
     def gain(self, solution, name, at) -> float | None:
-        """What a weak effect brings to chi^2; None where it is large, sure and needed enough to stay.
+        """What a weak effect brings to chi^2; None where it is sure and needed enough to stay.
 
+        One that is too small for a name stays as well, unnamed, or others would be blamed for what it does.
         Needed: beside the freest form of the others, on data that are not freed of this effect's error.
         """
         others = solution.model.without(name).freed()
@@ -235,29 +273,8 @@ class Search(Refiner):
         without = at.chi2(others)[0]
         with_core = at.chi2(Model(others.names | {name}, others.free))[0]
         gain = (without - with_core) / self.dispersion
-        size = effect.size(solution.c[name], self.view.nominal)
-        floor = max(effect.floor(self.view.nominal), effect.overshadowed(solution.c, self.view.nominal))
-        if gain < EARNS or size < floor:
+        if gain < EARNS:
             return gain
         c, cov = np.array(list(solution.c[name].values())), solution.covariance[name]
         wald = float(c @ np.linalg.pinv(cov) @ c) / self.dispersion
         return None if wald > SURE**2 * len(c) ** 0.5 else gain
-
-    def _tied(self, best, sure) -> list[Solution]:
-        """Other models that explain as much: other sets of no more effects.
-
-        Where the shape of the flux's curve has settled its name (``sure``), that is no difference.
-        """
-        curved = set(FAMILY) if best.model.names & set(FAMILY) else set()
-        out, rest = [], best.model.names - curved
-        for model, solution in self.refined.items():
-            same = model.names - curved == rest and sure
-            passenger = model.names - curved > rest and len(best.model.names & curved) > 1
-            if same or passenger or model.names == best.model.names or len(model) > len(best.model):
-                continue
-            margin = TIE if self.most > 1 else LONE_TIE
-            if solution.score < best.score + margin and model.names:
-                if all(s.model.names != model.names for s in out):
-                    out.append(solution)
-        # A model that holds another tied one is that one with a passenger.
-        return [s for s in out if not any(o.model.names < s.model.names for o in out)]

@@ -8,7 +8,6 @@ search, ``answer.found`` its outcome, ``answer.held`` the blocks that were not f
 
 from __future__ import annotations
 
-import dataclasses
 
 import numpy as np
 
@@ -21,7 +20,7 @@ from diagnosis.result import Diagnosis, Fit
 from diagnosis.slow import UNSEEN, slow_view
 from diagnosis.slow_search import SlowSearch
 from diagnosis.uncertainty import Plain
-from diagnosis.view import View, joined_views
+from diagnosis.view import joined_views
 
 LEAST_POINTS = 8
 HOLDOUT_EVERY = 4
@@ -57,8 +56,7 @@ def diagnose_slow(recordings, nominal, progress=lambda text: None) -> Diagnosis:
         answer.ambiguity = ambiguity
     if ambiguity:
         progress("the recording that would tell")
-        plain = View(**{f.name: getattr(view, f.name) for f in dataclasses.fields(View)})
-        answer.next_recording = requests(plain, [found.best, *found.tied], CATALOGUE, fit.noise_floor)
+        answer.next_recording = requests(search, [found.best, *found.tied], fit.noise_floor)
     cells, residual = search.residual(found.best)
     answer.evidence = evidence(view, (search.cells, search.cells.y), (cells, residual), found.pure, held)
     for name in (

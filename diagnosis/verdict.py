@@ -23,6 +23,7 @@ SLOPE_DEVICE, SLOPE_UNCLEAR = 0.12, 0.2
 # The same over what the loss grows between a tenth and a third of rated current: a drop in log(i) grows about as much
 # again up to all of it, and one that has come to a stand there does not begin anew.
 GROWS_ON, STANDS_STILL = 1.5, 3.0
+SAME_LAG = 0.1  # so near are two times the same
 WIDEST = f"v_{FREE_WIDTHS[-1]:g}"
 
 
@@ -70,9 +71,22 @@ def _like_warmth(constant, solution, nominal) -> bool:
     return WARMTH[constant] * next(iter(solution.c[constant].values())) > 0.0
 
 
-def verdict(names, ambiguity, left) -> str:
-    """The verdict from the names, the ambiguity sets and what remains."""
-    if left.stray or left.group:
+def lag_of_currents(solution) -> float:
+    """By how much the measured currents alone are late [s], where a delay and a skew of a solution say that; else 0.
+
+    Voltage late and angle early by the same are nothing but currents that are late: a filter in front of the
+    converters.  No effect is that, and neither of the two names is.
+    """
+    c = solution.c
+    if not {"delay", "sampling_skew"} <= solution.model.names:
+        return 0.0
+    delay, skew = c["delay"]["tau"], c["sampling_skew"]["tau"] - c["sampling_skew"].get("angle", 0.0)
+    return delay if abs(delay + skew) < SAME_LAG * delay else 0.0
+
+
+def verdict(names, ambiguity, left, lag=0.0) -> str:
+    """The verdict from the names, the ambiguity sets, what remains and a lag that no effect is."""
+    if left.stray or left.group or lag:
         return "unexplained"
     if names and left.fit.holdout_after > WORSE * left.fit.holdout_before:
         return "unexplained"  # a fit that does not carry over explains nothing

@@ -6,6 +6,11 @@ from diagnosis.effect import Effect, Parameter, angle_error
 from diagnosis.result import Estimate
 
 
+def _more(view):
+    """Orders per turn of a wave that is no cosine: where one falls onto the electrical turn it passes for an offset."""
+    return sorted({2, 3, view.machine.pole_pairs} - {1})
+
+
 def _turns(view, orders):
     theta_m = view.theta / view.machine.pole_pairs
     return {f"{f.__name__}_{n}": f(n * theta_m) for n in orders for f in (np.cos, np.sin)}
@@ -15,7 +20,7 @@ def _acceleration(view, name, wave):
     """d omega_m / dt that a wave of the angle's error pretends, (b, m) [rad/s^2]."""
     middle = 0.5 * (wave[:, 1:] + wave[:, :-1])
     return (
-        -((int(name[-1]) * view.omega_mid / view.machine.pole_pairs) ** 2) * middle / view.machine.pole_pairs
+        -((int(name.split("_")[1]) * view.omega_mid / view.machine.pole_pairs) ** 2) * middle / view.machine.pole_pairs
     )
 
 
@@ -30,7 +35,7 @@ class EncoderEccentricity(Effect):
         return {name: _column(view, name, wave) for name, wave in _turns(view, (1,)).items()}
 
     def free(self, view):
-        return {name: _column(view, name, wave) for name, wave in _turns(view, (2, 3)).items()}
+        return {name: _column(view, name, wave) for name, wave in _turns(view, _more(view)).items()}
 
     def floor(self, nominal):
         return 0.003
@@ -42,7 +47,7 @@ class EncoderEccentricity(Effect):
         return float(np.sqrt(sum(v**2 for v in c.values())))
 
     def corrected(self, view, c):
-        waves = _turns(view, (1, 2, 3))
+        waves = _turns(view, (1, *_more(view)))
         false = sum(value * _acceleration(view, name, waves[name]) for name, value in c.items())
         return view.turned(sum(value * waves[name] for name, value in c.items())).replace(
             slope_m=view.slope_m - false
@@ -68,7 +73,7 @@ class EncoderEccentricity(Effect):
 EFFECT = EncoderEccentricity(
     name="encoder_eccentricity",
     title="the encoder sits off centre",
-    equation="theta_measured = theta_e + a cos(theta_m) + b sin(theta_m) (+ orders 2 and 3 per turn)",
+    equation="theta_measured = theta_e + a cos(theta_m) + b sin(theta_m) (+ orders 2, 3 and p per turn)",
     signature="order 1/p in dq: omega psi_m a on the d axis",
     confounders=("current_offset",),
     separated_by="the mechanical index: orders per mechanical turn; more than one pole pair",

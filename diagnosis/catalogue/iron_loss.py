@@ -7,7 +7,7 @@ from diagnosis.effect import Effect, Parameter, one, torque_of
 
 def _speeds(view):
     """Speeds (b, m+1) [rad/s] that the terms of the loss current follow: as they are, levelling off, squared."""
-    top = max(float(np.abs(view.omega).max()), 1.0)
+    top = max(view.top_speed, 1.0)
     return {
         "g_fe": view.omega,
         "g_hysteresis": view.omega / np.sqrt((view.omega / top) ** 2 + 0.02**2),

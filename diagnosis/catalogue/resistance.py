@@ -1,8 +1,6 @@
 """Winding resistance other than the nameplate's: u = R i."""
 
-import numpy as np
-
-from diagnosis.effect import Effect, Parameter, one, sigma, voltage
+from diagnosis.effect import DOUBT, Effect, Parameter, one, sigma, voltage
 
 
 class Resistance(Effect):
@@ -11,8 +9,11 @@ class Resistance(Effect):
 
     def free(self, view):
         # Skin effect: more ohms at speed.
-        top = max(float(np.abs(view.omega).max()), 1e-9)
-        return {"skin": voltage(view.i_mid * (view.omega_mid / top) ** 2)}
+        return {"skin": voltage(view.i_mid * (view.omega_mid / view.top_speed) ** 2)}
+
+    def possible(self, c, covariance, nominal):
+        # Ohms grow with the frequency, they do not fade.
+        return c.get("skin", 0.0) >= -DOUBT * sigma(covariance, len(c) - 1)
 
     def floor(self, nominal):
         return 0.01 * nominal.machine.resistance_ohm

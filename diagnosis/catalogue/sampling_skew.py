@@ -4,6 +4,8 @@ import numpy as np
 
 from diagnosis.effect import Effect, Parameter, angle_error, current_error, half_dead_time, one
 
+ALIKE = 0.1
+
 
 def _slope(view):
     """Slope of the measured dq current in the zero vector, seen at the angle of the valley (b, m+1) [A/s]."""
@@ -27,6 +29,10 @@ class SamplingSkew(Effect):
         return 0.0012 * nominal.sample_time_s
 
     def overshadowed(self, c, nominal):
+        own = c.get("sampling_skew", {"tau": 0.0})
+        # Currents and angle that are late alike are no skew: the gates are early, and the voltage with them.
+        if abs(own["tau"] - own.get("angle", 0.0)) < ALIKE * abs(own["tau"]):
+            return float("inf")
         return half_dead_time(c, nominal)
 
     def ceiling(self, nominal):

@@ -1,0 +1,168 @@
+"""When one explanation is another's equal, what is no explanation at all, and what must not be blamed on others."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from cocotb_tests.diagnosed_drives import GRID, MACHINE, columns, recorded
+from cocotb_tests.test_registers import PAPER
+from diagnosis import diagnose
+from diagnosis.balance import bulge
+from diagnosis.blocks import view_of
+from diagnosis.catalogue import CATALOGUE
+from diagnosis.fit import Model, Solution
+from diagnosis.nominal import load_nominal
+from diagnosis.recording import from_columns
+from diagnosis.search import Search
+from diagnosis.verdict import lag_of_currents
+from diagnosis.view import joined_views
+
+NOMINAL = load_nominal(PAPER)
+
+
+@pytest.fixture(scope="module")
+def view():
+    return view_of(recorded(), NOMINAL)
+
+
+@pytest.fixture(scope="module")
+def search(view):
+    return Search(view, CATALOGUE, np.ones(len(view), bool))
+
+
+def solved(*names, chi2=100.0, score=120.0, **c) -> Solution:
+    return Solution(Model(frozenset(names)), chi2, 1, 1000, c=c, score=score)
+
+
+def test_the_mean_current_of_a_period_is_that_of_the_stator_frame(view):
+    """The flux moves in a straight line while the rotor turns; the current is integrated here point by point."""
+    m, omega, i = MACHINE, 900.0, -2.0 + 4.0j
+    period = NOMINAL.sample_time_s
+    theta = np.array([[-0.5, 0.5]]) * omega * period
+    psi = m.inductance_d_h * i.real + m.magnet_flux_wb + 1j * m.inductance_q_h * i.imag
+    begin, end = psi * np.exp(1j * theta[0])
+    share = (np.arange(20000) + 0.5) / 20000
+    turn = np.exp(1j * (theta[0, 0] + share * omega * period))
+    linked = (begin + share * (end - begin)) / turn
+    mean = np.mean(turn * ((linked.real - m.magnet_flux_wb) / m.inductance_d_h + 1j * linked.imag / m.inductance_q_h))
+    made = view.replace(theta=theta, i=np.full((1, 2), i), omega=np.full((1, 2), omega))
+    plain = i - bulge(made)[0, 0]
+    assert abs(made.i_mid[0, 0] - bulge(made)[0, 0] - mean) < 0.02 * abs(plain - mean)
+
+
+def test_ohms_do_not_fade_with_the_speed():
+    possible, sure = CATALOGUE["resistance"].possible, np.diag([1e-6, 1e-6])
+    assert possible({"delta_r": -0.2}, sure[:1, :1], NOMINAL) and possible({"delta_r": 0.1, "skin": 0.1}, sure, NOMINAL)
+    assert not possible({"delta_r": 0.1, "skin": -0.1}, sure, NOMINAL)
+    assert possible({"delta_r": 0.1, "skin": -0.1}, np.diag([1e-6, 0.01]), NOMINAL)
+
+
+def test_a_wave_of_the_encoder_at_the_electrical_turn_is_no_current_offset():
+    table = dict(columns(GRID))
+    theta = np.unwrap(table["theta_e"])
+    table["theta_e"] = theta + 0.03 * np.cos(theta / MACHINE.pole_pairs) + 0.002 * np.cos(theta + 0.4)
+    answer = diagnose(from_columns(table, NOMINAL.sample_time_s), PAPER)
+    assert [e.name for e in answer.effects] == ["encoder_eccentricity"], answer.sentence
+    assert answer.effects[0].parameters["amplitude_rad"].value == pytest.approx(0.03, rel=0.02)
+
+
+def test_voltage_late_and_angle_early_alike_are_a_filter_of_the_currents():
+    lag = lambda delay, **c: lag_of_currents(solved("delay", "sampling_skew", delay={"tau": delay}, sampling_skew=c))  # noqa: E731
+    assert lag(1e-5, tau=-1.03e-5) == lag(1e-5, tau=0.0, angle=0.97e-5) == 1e-5
+    assert lag(1e-5, tau=-2e-6) == lag(1e-5, tau=1e-5) == lag(-1e-5, tau=1e-5) == 0.0
+    assert lag_of_currents(solved("delay", delay={"tau": 1e-5})) == 0.0
+
+
+def test_currents_and_angle_late_alike_are_no_skew_between_them():
+    """Gates that are shifted against the converters are a delay; a skew takes up what the shift does to the ripple."""
+    shadow = lambda **c: CATALOGUE["sampling_skew"].overshadowed({"sampling_skew": c}, NOMINAL)  # noqa: E731
+    assert shadow(tau=1.02e-5, angle=1.05e-5) == np.inf
+    assert shadow(tau=1e-6) == shadow(tau=1e-6, angle=0.0) == shadow(tau=6e-8, angle=2.57e-6) == 0.0
+
+
+def test_bus_and_sensors_off_alike_are_no_explanation():
+    of = lambda bus, common: solved("udc_gain", "current_gain", udc_gain={"gain": bus}, current_gain={"common": common})  # noqa: E731
+    assert Search.scaled_alike(of(-0.12, -0.121)) and not Search.scaled_alike(of(-0.12, 0.01))
+    assert not Search.scaled_alike(solved("udc_gain", udc_gain={"gain": -0.12}))
+
+
+def test_an_exchange_frees_what_absorbs_the_newcomer(search):
+    both = Model(frozenset(["magnet_flux", "magnet_temperature"]))
+    assert not search.allowed(both) and search.allowed(search.admitted(both))
+    assert search.admitted(both).free == {"magnet_temperature"}
+    alone = Model(frozenset(["resistance"]))
+    assert search.admitted(alone) == alone
+
+
+def test_a_difference_counts_by_the_errors_that_the_operating_points_show(view, search):
+    """Five units of chi^2 are a tie where rows scatter as assumed, but not where they scatter by a third of it."""
+    use = search.cells.ok & search.train
+    draw = np.random.default_rng(4).standard_normal((2, len(use)))
+    apart = np.where(use, draw[0], 0.0)  # where the other one differs
+    apart *= np.sqrt(5.0 / (apart @ apart))
+
+    def compared(scatter):
+        left = scatter * draw[1]
+        left -= apart * (left @ apart) / 5.0  # so that chi^2 differs by that of the difference
+        best, other = solved("delay"), solved("sampling_skew", chi2=105.0, score=125.0)
+        for s, residual in ((best, left), (other, left + apart)):
+            s.residual, s.view = residual * search.sigma, view
+        assert np.sum(((left + apart) ** 2 - left**2)[use]) == pytest.approx(5.0)
+        return search.as_good(best, other, 10.0)
+
+    assert compared(1.0) and not compared(0.33)
+
+
+def test_one_operating_point_does_not_say_how_large_errors_are(view):
+    one = view.take(view.run == 3)
+    lone = Search(one, {n: CATALOGUE[n] for n in ("resistance", "magnet_flux")}, np.ones(len(one), bool))
+    use = lone.cells.ok
+    best, other = solved("resistance"), solved("magnet_flux", chi2=105.0, score=125.0)
+    best.residual, other.residual = np.zeros(len(use)), 0.1 * lone.sigma
+    best.view = other.view = one
+    assert lone.as_good(best, other, 10.0)
+
+
+def test_what_remains_of_a_large_model_gives_way_to_a_better_one_of_its_size():
+    search = object.__new__(Search)
+    large, remains = solved("delay", "iron_loss", score=50.0), solved("delay", score=400.0)
+    better, curved = solved("sampling_skew", score=90.0), solved("saturation", score=60.0)
+    search.refined = {s.model: s for s in (large, remains, better, curved)}
+    search._earning = lambda s: remains if s is large else s
+    assert search._pruned(large) is better  # not the curve, whose name is a matter of its shape
+    search._earning = lambda s: remains
+    assert search._pruned(large) is remains  # the better one's effect does not earn its place
+
+
+def test_what_is_too_small_for_a_name_stays_unnamed():
+    answer = diagnose(recorded(machine={"resistance_ohm": 1.007 * MACHINE.resistance_ohm}), NOMINAL)
+    assert answer.verdict == "no_mismatch" and not answer.effects
+    assert answer.search.silent == answer.search.best.model.names == {"resistance"} and not answer.search.tied
+
+
+def test_a_further_recording_that_is_short_has_no_slow_change_of_its_own(view):
+    short = view.take(view.run == 2).replace(span_s=0.1 * view.span_s)
+    course = joined_views([view, short, short]).course
+    assert np.all(course[len(view) :] == 1.0) and course[len(view) - 1] == pytest.approx(view.course[-1])
+    as_long = joined_views([view, view]).course
+    assert as_long[len(view) - 1] == pytest.approx(0.5 * view.course[-1]) and as_long[-1] > 0.9
+
+
+def test_small_is_below_what_anybody_would_act_on(search):
+    r = NOMINAL.machine.resistance_ohm
+    of = lambda share: SimpleNamespace(c={"resistance": {"delta_r": share * r}})  # noqa: E731
+    assert search.small(of(0.009), "resistance") and not search.small(of(0.011), "resistance")
+
+
+def test_what_is_too_small_may_be_something_else_at_one_operating_point(view):
+    lone = object.__new__(Search)
+    lone.view, lone.effects, lone.dispersion = view, CATALOGUE, 1.0
+    tiny, other = ({"delta_psi_m": 1e-4 * MACHINE.magnet_flux_wb}, {"delta_r": 0.2 * MACHINE.resistance_ohm})
+    best, rival = solved("magnet_flux", magnet_flux=tiny), solved("resistance", score=125.0, resistance=other)
+    lone.refined, lone.as_good = {s.model: s for s in (best, rival)}, lambda *args: True
+    for most, tied in ((1, [rival]), (3, [])):
+        lone.most = most
+        assert lone._tied(best, True) == tied

@@ -1,0 +1,89 @@
+"""What explains a recording as well as the best solution does, and what is no other explanation at all."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import stats
+
+from diagnosis.curvature import FAMILY
+from diagnosis.fit import Solution
+from diagnosis.refine import TIE, Refiner, point_numbers
+
+ALIKE = 0.1  # of a scale: so near are two the same
+LEAST_POINTS, LEAST_SPREAD = 4.0, 0.2  # operating points that say how large errors really are; no smaller than that
+LONE_TIE = 80.0  # margin of a tie where one operating point is all there is
+
+
+class Ties(Refiner):
+    """Refined solutions against each other."""
+
+    @staticmethod
+    def scaled_alike(solution) -> bool:
+        """Whether the bus and all current sensors are off by one factor: then neither is, but the magnets are."""
+        if not {"udc_gain", "current_gain"} <= solution.model.names or "magnet_flux" in solution.model.names:
+            return False
+        bus, currents = solution.c["udc_gain"]["gain"], solution.c["current_gain"].get("common", 0.0)
+        return abs(bus - currents) < ALIKE * abs(bus)
+
+    def as_good(self, best, other, margin) -> bool:
+        """Whether a solution scores within a margin of the best where the rows' errors are as small as they turn out.
+
+        A row's standard deviation holds a share for the balance itself which is a bound: where two explanations differ,
+        the residuals at the operating points may be far smaller, and a difference in chi^2 then says more.
+        """
+        gained = (other.chi2 - best.chi2) / self.dispersion
+        return other.score - best.score + gained * (1.0 / self._spread(best, other) - 1.0) < margin
+
+    def _spread(self, best, other) -> float:
+        """Variance of what the best solution leaves along where another one differs, over that of the rows.
+
+        Summed by operating point first, as what the balance is off by is the same in all blocks of one; at most one.
+        """
+        use = self.cells.ok & self.train
+        own, rival = (s.residual[use] / (self.sigma * s.view.noise_gain)[use] for s in (best, other))
+        point = point_numbers(self.view)[self.cells.block[use]]
+        along, apart = (np.bincount(point, w * (rival - own)) for w in (own, rival - own))
+        if not apart.sum() > 0.0:
+            return 1.0
+        points = apart.sum() ** 2 / np.sum(apart**2)  # so many that count
+        if points < LEAST_POINTS:
+            return 1.0
+        # Few of them know their own scatter badly: the quantile of Student's distribution for the normal one.
+        wider = (stats.t.ppf(0.975, points - 1.0) / stats.norm.ppf(0.975)) ** 2
+        return float(np.clip(wider * np.sum(along**2) / apart.sum(), LEAST_SPREAD, 1.0))
+
+    def small(self, solution, name) -> bool:
+        """Whether an effect of a solution is below what anybody would act on."""
+        effect, nominal = self.effects[name], self.view.nominal
+        floor = max(effect.floor(nominal), effect.overshadowed(solution.c, nominal))
+        return effect.size(solution.c[name], nominal) < floor
+
+    def _tied(self, best, sure) -> list[Solution]:
+        """Other models that explain as much: other sets of no more effects, each large enough for a name.
+
+        Where the shape of the flux's curve has settled its name (``sure``), that is no difference.
+        """
+        silent = {n for n in best.model.names if self.small(best, n)}
+        if silent == best.model.names:
+            if self.most > 1:
+                return []
+            silent = set()  # at one operating point what is too small may be something else that is not
+        curved = set(FAMILY) if best.model.names & set(FAMILY) else set()
+        out, rest = [], best.model.names - curved
+        for model, solution in self.refined.items():
+            if not np.isfinite(solution.score) or self.scaled_alike(solution):
+                continue
+            if any(self.small(solution, n) for n in model.names - silent):
+                continue
+            if model.names - silent == best.model.names - silent:
+                continue
+            same = model.names - curved == rest and sure
+            passenger = model.names - curved > rest and len(best.model.names & curved) > 1
+            if same or passenger or model.names == best.model.names or len(model) > len(best.model):
+                continue
+            margin = TIE if self.most > 1 else LONE_TIE
+            if solution.score < best.score + margin and model.names and self.as_good(best, solution, margin):
+                if all(s.model.names != model.names for s in out):
+                    out.append(solution)
+        # A model that holds another tied one is that one with a passenger.
+        return [s for s in out if not any(o.model.names < s.model.names for o in out)]
