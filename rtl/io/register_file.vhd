@@ -8,7 +8,7 @@
 -- sample_busy must be high in each clock with sample_valid and from there until nothing of the sample is in flight:
 -- no output that a sample uses changes at an edge with sample_busy = '1'.
 -- Refused writes change nothing; what is refused, and the answers: register_access.vhd.
--- Formats: those of the core's ports.  Latency: 3 clocks from request to answer, more while a write waits for the
+-- Formats: those of the core's ports.  Latency: 4 clocks from request to answer, more while a write waits for the
 -- end of a sample.  Rounding: none.
 
 library ieee;
@@ -153,6 +153,7 @@ end entity register_file;
 
 architecture rtl of register_file is
   type words_t is array (0 to 2**REGISTER_WORD_W - 1) of std_logic_vector(31 downto 0);
+  type rows_t is array (0 to 2**(REGISTER_WORD_W - 3) - 1) of std_logic_vector(31 downto 0);
   type copy_t is array (0 to 2**REGISTER_WORD_W - 1) of std_logic_vector(REGISTER_LIMIT_W - 1 downto 0);
 
   signal request   : std_logic;
@@ -160,7 +161,9 @@ architecture rtl of register_file is
   signal address   : unsigned(REGISTER_ADDRESS_W - 1 downto 0);
   signal data      : std_logic_vector(31 downto 0);
   signal strobe    : std_logic_vector(3 downto 0);
+  signal armed     : std_logic;
   signal store     : std_logic;
+  signal stored    : std_logic;
   signal answer    : std_logic;
   signal response  : std_logic_vector(1 downto 0);
   signal read_data : std_logic_vector(31 downto 0);
@@ -170,9 +173,17 @@ architecture rtl of register_file is
   attribute ram_style : string;
   attribute ram_style of copy : signal is "distributed";
 
-  signal written   : std_logic_vector(0 to 2**REGISTER_WORD_W - 1);
-  signal is_signed : std_logic;
-  signal picked    : std_logic_vector(31 downto 0);
+  signal written : std_logic_vector(0 to 2**REGISTER_WORD_W - 1);
+
+  -- The address of a write halfway decoded: a register is where its row and its column meet
+  signal row    : std_logic_vector(0 to 2**(REGISTER_WORD_W - 3) - 1);
+  signal column : std_logic_vector(0 to 7);
+
+  signal is_signed    : std_logic;
+  signal is_written   : std_logic;
+  signal written_rows : std_logic_vector(0 to 2**(REGISTER_WORD_W - 3) - 1);
+  signal picked       : std_logic_vector(31 downto 0);
+  signal picked_rows  : rows_t;
 begin
 
   bus_slave : entity work.axi_lite_slave
@@ -219,6 +230,7 @@ begin
       data        => data,
       strobe      => strobe,
       sample_busy => sample_busy,
+      armed       => armed,
       store       => store,
       answer      => answer,
       response    => response
@@ -235,374 +247,291 @@ begin
         clear_faults_in <= '0';
       end if;
 
-      if store = '1' then
-
-        case word is
-
-          when 16 =>
-
-            enable      <= data(0);
-            written(16) <= '1';
-
-          when 17 =>
-
-            clear_trip <= data(0);
-
-          when 18 =>
-
-            clear_faults_in <= data(0);
-
-          when 19 =>
-
-            telemetry_enable <= data(0);
-            written(19)      <= '1';
-
-          when 20 =>
-
-            omega_ref_in <= signed(data(17 downto 0));
-            written(20)  <= '1';
-
-          when 21 =>
-
-            i_d_ref_in  <= signed(data(17 downto 0));
-            written(21) <= '1';
-
-          when 22 =>
-
-            i_q_ext_in  <= signed(data(17 downto 0));
-            written(22) <= '1';
-
-          when 23 =>
-
-            speed_mode_in <= data(0);
-            written(23)   <= '1';
-
-          when 24 =>
-
-            temp_winding_in <= signed(data(15 downto 0));
-            written(24)     <= '1';
-
-          when 25 =>
-
-            temp_valid_in <= data(0);
-            written(25)   <= '1';
-
-          when 64 =>
-
-            offset_a    <= unsigned(data(15 downto 0));
-            written(64) <= '1';
-
-          when 65 =>
-
-            offset_b    <= unsigned(data(15 downto 0));
-            written(65) <= '1';
-
-          when 66 =>
-
-            offset_c    <= unsigned(data(15 downto 0));
-            written(66) <= '1';
-
-          when 67 =>
-
-            gain_a      <= signed(data(17 downto 0));
-            written(67) <= '1';
-
-          when 68 =>
-
-            gain_b      <= signed(data(17 downto 0));
-            written(68) <= '1';
-
-          when 69 =>
-
-            gain_c      <= signed(data(17 downto 0));
-            written(69) <= '1';
-
-          when 70 =>
-
-            u_dc_offset <= unsigned(data(15 downto 0));
-            written(70) <= '1';
-
-          when 71 =>
-
-            u_dc_gain   <= signed(data(17 downto 0));
-            written(71) <= '1';
-
-          when 72 =>
-
-            k_u_max     <= unsigned(data(16 downto 0));
-            written(72) <= '1';
-
-          when 73 =>
-
-            pole_pairs  <= unsigned(data(5 downto 0));
-            written(73) <= '1';
-
-          when 74 =>
-
-            reverse     <= data(0);
-            written(74) <= '1';
-
-          when 75 =>
-
-            theta_offset <= unsigned(data(17 downto 0));
-            written(75)  <= '1';
-
-          when 76 =>
-
-            k_speed     <= unsigned(data(23 downto 0));
-            written(76) <= '1';
-
-          when 77 =>
-
-            k_filter    <= unsigned(data(16 downto 0));
-            written(77) <= '1';
-
-          when 78 =>
-
-            rail_samples <= unsigned(data(3 downto 0));
-            written(78)  <= '1';
-
-          when 79 =>
-
-            jump_max    <= unsigned(data(11 downto 0));
-            written(79) <= '1';
-
-          when 80 =>
-
-            speed_kp    <= unsigned(data(23 downto 0));
-            written(80) <= '1';
-
-          when 81 =>
-
-            speed_ki    <= unsigned(data(23 downto 0));
-            written(81) <= '1';
-
-          when 82 =>
-
-            i_max       <= signed(data(17 downto 0));
-            written(82) <= '1';
-
-          when 84 =>
-
-            kp_d        <= unsigned(data(23 downto 0));
-            written(84) <= '1';
-
-          when 85 =>
-
-            ki_d        <= unsigned(data(23 downto 0));
-            written(85) <= '1';
-
-          when 86 =>
-
-            kp_q        <= unsigned(data(23 downto 0));
-            written(86) <= '1';
-
-          when 87 =>
-
-            ki_q        <= unsigned(data(23 downto 0));
-            written(87) <= '1';
-
-          when 88 =>
-
-            l_d         <= unsigned(data(23 downto 0));
-            written(88) <= '1';
-
-          when 89 =>
-
-            l_q         <= unsigned(data(23 downto 0));
-            written(89) <= '1';
-
-          when 90 =>
-
-            lambda_mg   <= signed(data(17 downto 0));
-            written(90) <= '1';
-
-          when 91 =>
-
-            k_delay     <= unsigned(data(16 downto 0));
-            written(91) <= '1';
-
-          when 92 =>
-
-            dead_time   <= unsigned(data(11 downto 0));
-            written(92) <= '1';
-
-          when 93 =>
-
-            min_pulse   <= unsigned(data(11 downto 0));
-            written(93) <= '1';
-
-          when 94 =>
-
-            watchdog    <= unsigned(data(19 downto 0));
-            written(94) <= '1';
-
-          when 95 =>
-
-            fault_ignore <= unsigned(data(6 downto 0));
-            written(95)  <= '1';
-
-          when 96 =>
-
-            flux_mode   <= unsigned(data(1 downto 0));
-            written(96) <= '1';
-
-          when 97 =>
-
-            r_s         <= unsigned(data(23 downto 0));
-            written(97) <= '1';
-
-          when 98 =>
-
-            t_s         <= unsigned(data(16 downto 0));
-            written(98) <= '1';
-
-          when 99 =>
-
-            omega_0     <= unsigned(data(15 downto 0));
-            written(99) <= '1';
-
-          when 100 =>
-
-            xi           <= unsigned(data(15 downto 0));
-            written(100) <= '1';
-
-          when 101 =>
-
-            omega_min    <= unsigned(data(16 downto 0));
-            written(101) <= '1';
-
-          when 102 =>
-
-            k_ramp       <= unsigned(data(15 downto 0));
-            written(102) <= '1';
-
-          when 103 =>
-
-            flux_kp      <= unsigned(data(16 downto 0));
-            written(103) <= '1';
-
-          when 104 =>
-
-            flux_ki      <= unsigned(data(16 downto 0));
-            written(104) <= '1';
-
-          when 105 =>
-
-            delta_max    <= unsigned(data(15 downto 0));
-            written(105) <= '1';
-
-          when 106 =>
-
-            k_chord      <= unsigned(data(16 downto 0));
-            written(106) <= '1';
-
-          when 108 =>
-
-            tcr          <= unsigned(data(23 downto 0));
-            written(108) <= '1';
-
-          when 109 =>
-
-            t_0          <= signed(data(15 downto 0));
-            written(109) <= '1';
-
-          when 110 =>
-
-            t_min        <= signed(data(15 downto 0));
-            written(110) <= '1';
-
-          when 111 =>
-
-            t_max        <= signed(data(15 downto 0));
-            written(111) <= '1';
-
-          when 112 =>
-
-            compensate   <= data(0);
-            written(112) <= '1';
-
-          when 113 =>
-
-            k_lp         <= unsigned(data(19 downto 0));
-            written(113) <= '1';
-
-          when 114 =>
-
-            eta_v        <= unsigned(data(20 downto 0));
-            written(114) <= '1';
-
-          when 115 =>
-
-            gamma        <= unsigned(data(16 downto 0));
-            written(115) <= '1';
-
-          when 116 =>
-
-            zeta         <= unsigned(data(16 downto 0));
-            written(116) <= '1';
-
-          when 117 =>
-
-            v_thr        <= unsigned(data(16 downto 0));
-            written(117) <= '1';
-
-          when 118 =>
-
-            v_comp_max   <= unsigned(data(16 downto 0));
-            written(118) <= '1';
-
-          when 119 =>
-
-            i_learn      <= unsigned(data(16 downto 0));
-            written(119) <= '1';
-
-          when 120 =>
-
-            eta_psi      <= unsigned(data(16 downto 0));
-            written(120) <= '1';
-
-          when 121 =>
-
-            omega_psi_min <= unsigned(data(16 downto 0));
-            written(121)  <= '1';
-
-          when 122 =>
-
-            k_ahead      <= unsigned(data(16 downto 0));
-            written(122) <= '1';
-
-          when 123 =>
-
-            k_sign       <= unsigned(data(23 downto 0));
-            written(123) <= '1';
-
-          when 124 =>
-
-            i_trip       <= unsigned(data(8 downto 0));
-            written(124) <= '1';
-
-          when 125 =>
-
-            sum_trip     <= unsigned(data(8 downto 0));
-            written(125) <= '1';
-
-          when 126 =>
-
-            u_dc_min     <= unsigned(data(8 downto 0));
-            written(126) <= '1';
-
-          when 127 =>
-
-            u_dc_max     <= unsigned(data(8 downto 0));
-            written(127) <= '1';
-
-          when others =>
-
-            null;
-
-        end case;
-
+      if (row(2) and column(0)) = '1' then
+        enable      <= data(0);
+        written(16) <= '1';
+      end if;
+      if (row(2) and column(1)) = '1' then
+        clear_trip <= data(0);
+      end if;
+      if (row(2) and column(2) and not sample_busy) = '1' then
+        clear_faults_in <= data(0);
+      end if;
+      if (row(2) and column(3)) = '1' then
+        telemetry_enable <= data(0);
+        written(19)      <= '1';
+      end if;
+      if (row(2) and column(4) and not sample_busy) = '1' then
+        omega_ref_in <= signed(data(17 downto 0));
+        written(20)  <= '1';
+      end if;
+      if (row(2) and column(5) and not sample_busy) = '1' then
+        i_d_ref_in  <= signed(data(17 downto 0));
+        written(21) <= '1';
+      end if;
+      if (row(2) and column(6) and not sample_busy) = '1' then
+        i_q_ext_in  <= signed(data(17 downto 0));
+        written(22) <= '1';
+      end if;
+      if (row(2) and column(7) and not sample_busy) = '1' then
+        speed_mode_in <= data(0);
+        written(23)   <= '1';
+      end if;
+      if (row(3) and column(0) and not sample_busy) = '1' then
+        temp_winding_in <= signed(data(15 downto 0));
+        written(24)     <= '1';
+      end if;
+      if (row(3) and column(1) and not sample_busy) = '1' then
+        temp_valid_in <= data(0);
+        written(25)   <= '1';
+      end if;
+      if (row(8) and column(0) and not sample_busy) = '1' then
+        offset_a    <= unsigned(data(15 downto 0));
+        written(64) <= '1';
+      end if;
+      if (row(8) and column(1) and not sample_busy) = '1' then
+        offset_b    <= unsigned(data(15 downto 0));
+        written(65) <= '1';
+      end if;
+      if (row(8) and column(2) and not sample_busy) = '1' then
+        offset_c    <= unsigned(data(15 downto 0));
+        written(66) <= '1';
+      end if;
+      if (row(8) and column(3) and not sample_busy) = '1' then
+        gain_a      <= signed(data(17 downto 0));
+        written(67) <= '1';
+      end if;
+      if (row(8) and column(4) and not sample_busy) = '1' then
+        gain_b      <= signed(data(17 downto 0));
+        written(68) <= '1';
+      end if;
+      if (row(8) and column(5) and not sample_busy) = '1' then
+        gain_c      <= signed(data(17 downto 0));
+        written(69) <= '1';
+      end if;
+      if (row(8) and column(6) and not sample_busy) = '1' then
+        u_dc_offset <= unsigned(data(15 downto 0));
+        written(70) <= '1';
+      end if;
+      if (row(8) and column(7) and not sample_busy) = '1' then
+        u_dc_gain   <= signed(data(17 downto 0));
+        written(71) <= '1';
+      end if;
+      if (row(9) and column(0) and not sample_busy) = '1' then
+        k_u_max     <= unsigned(data(16 downto 0));
+        written(72) <= '1';
+      end if;
+      if (row(9) and column(1) and not sample_busy) = '1' then
+        pole_pairs  <= unsigned(data(5 downto 0));
+        written(73) <= '1';
+      end if;
+      if (row(9) and column(2) and not sample_busy) = '1' then
+        reverse     <= data(0);
+        written(74) <= '1';
+      end if;
+      if (row(9) and column(3) and not sample_busy) = '1' then
+        theta_offset <= unsigned(data(17 downto 0));
+        written(75)  <= '1';
+      end if;
+      if (row(9) and column(4) and not sample_busy) = '1' then
+        k_speed     <= unsigned(data(23 downto 0));
+        written(76) <= '1';
+      end if;
+      if (row(9) and column(5) and not sample_busy) = '1' then
+        k_filter    <= unsigned(data(16 downto 0));
+        written(77) <= '1';
+      end if;
+      if (row(9) and column(6) and not sample_busy) = '1' then
+        rail_samples <= unsigned(data(3 downto 0));
+        written(78)  <= '1';
+      end if;
+      if (row(9) and column(7) and not sample_busy) = '1' then
+        jump_max    <= unsigned(data(11 downto 0));
+        written(79) <= '1';
+      end if;
+      if (row(10) and column(0) and not sample_busy) = '1' then
+        speed_kp    <= unsigned(data(23 downto 0));
+        written(80) <= '1';
+      end if;
+      if (row(10) and column(1) and not sample_busy) = '1' then
+        speed_ki    <= unsigned(data(23 downto 0));
+        written(81) <= '1';
+      end if;
+      if (row(10) and column(2) and not sample_busy) = '1' then
+        i_max       <= signed(data(17 downto 0));
+        written(82) <= '1';
+      end if;
+      if (row(10) and column(4) and not sample_busy) = '1' then
+        kp_d        <= unsigned(data(23 downto 0));
+        written(84) <= '1';
+      end if;
+      if (row(10) and column(5) and not sample_busy) = '1' then
+        ki_d        <= unsigned(data(23 downto 0));
+        written(85) <= '1';
+      end if;
+      if (row(10) and column(6) and not sample_busy) = '1' then
+        kp_q        <= unsigned(data(23 downto 0));
+        written(86) <= '1';
+      end if;
+      if (row(10) and column(7) and not sample_busy) = '1' then
+        ki_q        <= unsigned(data(23 downto 0));
+        written(87) <= '1';
+      end if;
+      if (row(11) and column(0) and not sample_busy) = '1' then
+        l_d         <= unsigned(data(23 downto 0));
+        written(88) <= '1';
+      end if;
+      if (row(11) and column(1) and not sample_busy) = '1' then
+        l_q         <= unsigned(data(23 downto 0));
+        written(89) <= '1';
+      end if;
+      if (row(11) and column(2) and not sample_busy) = '1' then
+        lambda_mg   <= signed(data(17 downto 0));
+        written(90) <= '1';
+      end if;
+      if (row(11) and column(3) and not sample_busy) = '1' then
+        k_delay     <= unsigned(data(16 downto 0));
+        written(91) <= '1';
+      end if;
+      if (row(11) and column(4) and not sample_busy) = '1' then
+        dead_time   <= unsigned(data(11 downto 0));
+        written(92) <= '1';
+      end if;
+      if (row(11) and column(5) and not sample_busy) = '1' then
+        min_pulse   <= unsigned(data(11 downto 0));
+        written(93) <= '1';
+      end if;
+      if (row(11) and column(6) and not sample_busy) = '1' then
+        watchdog    <= unsigned(data(19 downto 0));
+        written(94) <= '1';
+      end if;
+      if (row(11) and column(7) and not sample_busy) = '1' then
+        fault_ignore <= unsigned(data(6 downto 0));
+        written(95)  <= '1';
+      end if;
+      if (row(12) and column(0) and not sample_busy) = '1' then
+        flux_mode   <= unsigned(data(1 downto 0));
+        written(96) <= '1';
+      end if;
+      if (row(12) and column(1) and not sample_busy) = '1' then
+        r_s         <= unsigned(data(23 downto 0));
+        written(97) <= '1';
+      end if;
+      if (row(12) and column(2) and not sample_busy) = '1' then
+        t_s         <= unsigned(data(16 downto 0));
+        written(98) <= '1';
+      end if;
+      if (row(12) and column(3) and not sample_busy) = '1' then
+        omega_0     <= unsigned(data(15 downto 0));
+        written(99) <= '1';
+      end if;
+      if (row(12) and column(4) and not sample_busy) = '1' then
+        xi           <= unsigned(data(15 downto 0));
+        written(100) <= '1';
+      end if;
+      if (row(12) and column(5) and not sample_busy) = '1' then
+        omega_min    <= unsigned(data(16 downto 0));
+        written(101) <= '1';
+      end if;
+      if (row(12) and column(6) and not sample_busy) = '1' then
+        k_ramp       <= unsigned(data(15 downto 0));
+        written(102) <= '1';
+      end if;
+      if (row(12) and column(7) and not sample_busy) = '1' then
+        flux_kp      <= unsigned(data(16 downto 0));
+        written(103) <= '1';
+      end if;
+      if (row(13) and column(0) and not sample_busy) = '1' then
+        flux_ki      <= unsigned(data(16 downto 0));
+        written(104) <= '1';
+      end if;
+      if (row(13) and column(1) and not sample_busy) = '1' then
+        delta_max    <= unsigned(data(15 downto 0));
+        written(105) <= '1';
+      end if;
+      if (row(13) and column(2) and not sample_busy) = '1' then
+        k_chord      <= unsigned(data(16 downto 0));
+        written(106) <= '1';
+      end if;
+      if (row(13) and column(4) and not sample_busy) = '1' then
+        tcr          <= unsigned(data(23 downto 0));
+        written(108) <= '1';
+      end if;
+      if (row(13) and column(5) and not sample_busy) = '1' then
+        t_0          <= signed(data(15 downto 0));
+        written(109) <= '1';
+      end if;
+      if (row(13) and column(6) and not sample_busy) = '1' then
+        t_min        <= signed(data(15 downto 0));
+        written(110) <= '1';
+      end if;
+      if (row(13) and column(7) and not sample_busy) = '1' then
+        t_max        <= signed(data(15 downto 0));
+        written(111) <= '1';
+      end if;
+      if (row(14) and column(0) and not sample_busy) = '1' then
+        compensate   <= data(0);
+        written(112) <= '1';
+      end if;
+      if (row(14) and column(1) and not sample_busy) = '1' then
+        k_lp         <= unsigned(data(19 downto 0));
+        written(113) <= '1';
+      end if;
+      if (row(14) and column(2) and not sample_busy) = '1' then
+        eta_v        <= unsigned(data(20 downto 0));
+        written(114) <= '1';
+      end if;
+      if (row(14) and column(3) and not sample_busy) = '1' then
+        gamma        <= unsigned(data(16 downto 0));
+        written(115) <= '1';
+      end if;
+      if (row(14) and column(4) and not sample_busy) = '1' then
+        zeta         <= unsigned(data(16 downto 0));
+        written(116) <= '1';
+      end if;
+      if (row(14) and column(5) and not sample_busy) = '1' then
+        v_thr        <= unsigned(data(16 downto 0));
+        written(117) <= '1';
+      end if;
+      if (row(14) and column(6) and not sample_busy) = '1' then
+        v_comp_max   <= unsigned(data(16 downto 0));
+        written(118) <= '1';
+      end if;
+      if (row(14) and column(7) and not sample_busy) = '1' then
+        i_learn      <= unsigned(data(16 downto 0));
+        written(119) <= '1';
+      end if;
+      if (row(15) and column(0) and not sample_busy) = '1' then
+        eta_psi      <= unsigned(data(16 downto 0));
+        written(120) <= '1';
+      end if;
+      if (row(15) and column(1) and not sample_busy) = '1' then
+        omega_psi_min <= unsigned(data(16 downto 0));
+        written(121)  <= '1';
+      end if;
+      if (row(15) and column(2) and not sample_busy) = '1' then
+        k_ahead      <= unsigned(data(16 downto 0));
+        written(122) <= '1';
+      end if;
+      if (row(15) and column(3) and not sample_busy) = '1' then
+        k_sign       <= unsigned(data(23 downto 0));
+        written(123) <= '1';
+      end if;
+      if (row(15) and column(4) and not sample_busy) = '1' then
+        i_trip       <= unsigned(data(8 downto 0));
+        written(124) <= '1';
+      end if;
+      if (row(15) and column(5) and not sample_busy) = '1' then
+        sum_trip     <= unsigned(data(8 downto 0));
+        written(125) <= '1';
+      end if;
+      if (row(15) and column(6) and not sample_busy) = '1' then
+        u_dc_min     <= unsigned(data(8 downto 0));
+        written(126) <= '1';
+      end if;
+      if (row(15) and column(7) and not sample_busy) = '1' then
+        u_dc_max     <= unsigned(data(8 downto 0));
+        written(127) <= '1';
       end if;
 
       if rst = '1' then
@@ -688,18 +617,43 @@ begin
   process (clk)
   begin
     if rising_edge(clk) then
-      if store = '1' then
+      stored <= store;
+      if stored = '1' then
         copy(word) <= data(REGISTER_LIMIT_W - 1 downto 0);
       end if;
     end if;
   end process;
 
-  -- Signs are extended behind the selection: fewer multiplexers
-  picked    <= words(word);
-  read_data <= std_logic_vector(resize(signed(copy(word)), 32)) when written(word) = '1' else
-               std_logic_vector(resize(signed(picked(17 downto 0)), 32)) when is_signed = '1' else
-               picked;
-  is_signed <= register_signed_of(to_unsigned(word, REGISTER_WORD_W));
+  -- A request stands for three clocks before its answer.  A write is armed in the last of them, so that what tells
+  -- the registers comes from flip-flops: they stand beside what uses them, all over the chip.  A read is picked in each
+  -- row, then among rows, then its sign is extended, behind the selection for fewer multiplexers
+  process (clk)
+  begin
+    if rising_edge(clk) then
+      row                <= (others => '0');
+      row(word / 8)      <= armed;
+      column             <= (others => '0');
+      column(word mod 8) <= '1';
+      for r in rows_t'range loop
+        picked_rows(r)  <= words(8 * r + word mod 8);
+        written_rows(r) <= written(8 * r + word mod 8);
+      end loop;
+      picked     <= picked_rows(word / 8);
+      is_written <= written_rows(word / 8);
+      is_signed  <= register_signed_of(to_unsigned(word, REGISTER_WORD_W));
+      if is_written = '1' then
+        read_data <= std_logic_vector(resize(signed(copy(word)), 32));
+      elsif is_signed = '1' then
+        read_data <= std_logic_vector(resize(signed(picked(17 downto 0)), 32));
+      else
+        read_data <= picked;
+      end if;
+
+      if rst = '1' then
+        row <= (others => '0');
+      end if;
+    end if;
+  end process;
 
   -- What the other words hold, signed numbers in 18 bits; the places between are zero
   words(0)          <= x"464C5558";

@@ -31,15 +31,14 @@ end entity sample_guard;
 architecture rtl of sample_guard is
   -- State
   signal hold    : unsigned(7 downto 0);
+  signal busy    : std_logic;  -- hold /= 0; a register, as what waits for the end of a sample hangs on it
   signal age     : unsigned(19 downto 0);
   signal counted : unsigned(7 downto 0);
 
-  signal busy    : std_logic;
   signal entered : std_logic;
   signal early   : std_logic;
   signal expired : std_logic;
 begin
-  busy    <= or hold;
   entered <= sample_valid and not busy;
   early   <= sample_valid and busy;
   expired <= '1' when age >= watchdog else '0';
@@ -51,10 +50,12 @@ begin
       -- Clocks until the next sample may enter, and since the last one did
       if entered = '1' then
         hold <= to_unsigned(INTERVAL - 1, 8);
+        busy <= '1';
         age  <= to_unsigned(SAMPLE_GUARD_AHEAD, 20);
       else
         if busy = '1' then
           hold <= hold - 1;
+          busy <= '0' when hold = 1 else '1';
         end if;
         if expired = '0' then
           age <= age + 1;
@@ -75,6 +76,7 @@ begin
 
       if rst = '1' then
         hold         <= (others => '0');
+        busy         <= '0';
         age          <= (others => '0');
         counted      <= (others => '0');
         sample_early <= '0';

@@ -93,7 +93,7 @@ PROOFS = (
     ),
     slave_proof(
         "progress",
-        "neither reads nor writes starve: taken within 12 clocks",
+        "neither reads nor writes starve: taken within 14 clocks",
         "PROGRESS",
         Fault(
             "reads wait for the master to take a write's answer",
@@ -101,7 +101,7 @@ PROOFS = (
             "s_axi_arvalid and not r_valid",
             "s_axi_arvalid and not r_valid and not b_valid",
         ),
-        assumed=f"{MASTER} and takes answers of this direction at once; the registers answer within 3 clocks",
+        assumed=f"{MASTER} and takes answers of this direction at once; the registers answer within 4 clocks",
     ),
     slave_proof(
         "in_reset",

@@ -129,6 +129,7 @@ def register_file(words: list[Word]) -> str:
         resets=[(p.port, _reset(w, p)) for w, p in stored],
         output_width=max(len(part.port) for _, part in stored),
         kept={w.index: "pulse" not in w.kind for w, _ in stored},
+        at_once={w.index: w.kind in AT_ONCE for w, _ in stored},
         reads=[(choice, _wrapped(value, reads_width + len("   <= "))) for choice, value in reads],
         sign=_sign(words),
         reads_width=reads_width,

@@ -146,8 +146,8 @@ module formal_top (
 `endif
 
 `ifdef PROGRESS
-  // Nobody starves: with answers within 3 clocks and responses of its own direction taken at once, a request is taken
-  // within 12 clocks, whatever the other direction does.  `writes` is either direction.
+  // Nobody starves: with answers within 4 clocks and responses of its own direction taken at once, a request is taken
+  // within 14 clocks, whatever the other direction does.  `writes` is either direction.
   (* anyconst *) wire writes;
   reg [1:0] slow;
   reg [3:0] aw_wait, ar_wait;
@@ -158,9 +158,9 @@ module formal_top (
     if (rst) {slow, aw_wait, ar_wait} <= 0;
   end
   always @* if (begun) assume (writes ? bready : rready);
-  always @* if (begun && slow == 2) assume (answer);
+  always @* if (begun && slow == 3) assume (answer);
   always @(posedge clk) if (begun) begin
-    assert ((writes ? aw_wait : ar_wait) < 12);
+    assert ((writes ? aw_wait : ar_wait) < 14);
     cover (writes && aw_wait == 6);
     cover (!writes && ar_wait == 6 && bvalid);
   end
