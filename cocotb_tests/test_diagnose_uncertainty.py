@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -12,7 +14,8 @@ from diagnosis.catalogue import CATALOGUE
 from diagnosis.fit import Model
 from diagnosis.nominal import load_nominal
 from diagnosis.refine import Refiner
-from diagnosis.uncertainty import Spread, larger
+from diagnosis.uncertainty import Plain, Spread, larger
+from diagnosis.verdict import named
 
 NOMINAL = load_nominal(PAPER)
 T = NOMINAL.sample_time_s
@@ -123,3 +126,19 @@ def test_a_skew_is_that_of_the_currents_against_the_angle():
     skew = estimates(c, covariance, NOMINAL)["skew_s"]
     assert skew.value == pytest.approx(1e-6) and skew.sigma == pytest.approx(np.sqrt(0.2e-14))
     assert estimates({"tau": 0.3e-6}, covariance[:1, :1], NOMINAL)["skew_s"].value == pytest.approx(0.3e-6)
+
+
+def test_a_share_of_the_resistance_is_one_of_the_true_resistance():
+    """Phases 10 % apart in a winding of 1.3 times the nameplate's ohms: not 13 %, though that cannot be excluded."""
+    apart, names = (0.1, -0.05, -0.05), ("resistance", "phase_resistance_asymmetry")
+    machine = {"resistance_ohm": 1.3 * MACHINE.resistance_ohm, "phase_resistance_asymmetry": apart}
+    _, solution = fitted(view_of(recorded(machine=machine), NOMINAL), *names)
+    empty = SimpleNamespace(chi2=2.0 * solution.chi2, rows=1.0)
+    effects = {e.name: e for e in named(Plain(solution, CATALOGUE, NOMINAL, 1.0), names, empty)}
+    found = effects["phase_resistance_asymmetry"]
+    values = [found.parameters[f"asymmetry_{x}"].value for x in "abc"]
+    assert values == pytest.approx(apart, abs=2e-3)
+    assert found.plant["machine.phase_resistance_asymmetry"] == pytest.approx(values)
+    assert found.parameters["asymmetry_a"].sigma == pytest.approx(0.03, rel=0.1)
+    alone = named(Plain(solution, CATALOGUE, NOMINAL, 1.0), names[1:], empty)[0].parameters["asymmetry_a"]
+    assert alone.value == pytest.approx(1.3 * values[0], rel=0.01) and alone.sigma < 0.01

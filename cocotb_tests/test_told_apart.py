@@ -68,7 +68,7 @@ def test_a_further_recording_of_one_point_is_fitted(view):
 
 
 def solution(**c):
-    return SimpleNamespace(c=c, model=SimpleNamespace(names=frozenset(c)))
+    return SimpleNamespace(c=c, model=SimpleNamespace(names=frozenset(c)), view=None)
 
 
 def of(known, **c):
@@ -85,6 +85,19 @@ def test_a_constant_beside_a_drift_is_both_only_where_warmth_cannot_be_it():
     assert of({}, magnet_flux=flux(+0.05), magnet_temperature=drift) == (both, [])
     # A course that lags leaves a little that seems to stand.
     assert of({"cold": True}, magnet_flux=flux(-0.004), magnet_temperature=drift) == (both[1:], [])
+
+
+def test_what_a_thermocouple_lags_is_small_beside_all_that_the_winding_warmed(view):
+    """The lag makes ohms that seem to stand; they grow with the rise of temperature, 100 K here and not 30 K."""
+    ohms = MACHINE.resistance_ohm
+    hot = warm(view, np.linspace(COLD, COLD + 100.0, len(view)))
+    for share, names in (
+        (0.03, ["resistance_temperature"]),
+        (0.06, ["resistance", "resistance_temperature"]),
+    ):
+        found = solution(resistance={"delta_r": share * ohms}, resistance_temperature={"alpha": 0.0039})
+        found.view = hot
+        assert groups(found, [], CATALOGUE, NOMINAL, cold=True) == (names, [])
 
 
 def test_ohms_beside_dead_time_are_a_resistance_where_no_device_has_them():

@@ -90,6 +90,10 @@ class Effect:
         """Parameters of the effect from its coefficients, whose order is that of the covariance."""
         raise NotImplementedError
 
+    def relative(self, c: dict[str, dict], nominal) -> float:
+        """What the coefficients are multiplied by beside the other named effects, c of all of them."""
+        return 1.0
+
     def plant(self, c: dict[str, float], nominal) -> dict:
         """The effect as the plant is told it, {"machine.resistance_ohm": 1.7, ...}."""
         return {}
@@ -164,6 +168,12 @@ def half_dead_time(c, nominal) -> float:
     """
     share = abs(sum(c.get("dead_time", {}).values())) / nominal.inverter.dc_bus_v
     return 0.5 * share * nominal.sample_time_s
+
+
+def to_true_resistance(c, nominal) -> float:
+    """Nominal resistance over the one that named effects with coefficients c say: for shares of the resistance."""
+    r = nominal.machine.resistance_ohm
+    return r / max(r + c.get("resistance", {}).get("delta_r", 0.0), 0.1 * r)
 
 
 def rated_torque(nominal) -> float:

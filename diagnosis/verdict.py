@@ -44,7 +44,7 @@ def groups(best, tied, effects, nominal, silent=frozenset(), cold=False):
             stood = effects[constant].size(best.c[constant], nominal)
             if moved < DRIFTS * stood:
                 shared -= {drift}
-            elif stood < STEADY * moved:
+            elif stood < STEADY * effects[drift].moved(best.c[drift], best.view):
                 shared -= {constant}
             elif moved * STANDS > stood and not cold and _like_warmth(constant, best, nominal):
                 shared -= {constant}
@@ -137,13 +137,18 @@ def named(spread, names, empty) -> list[NamedEffect]:
         vector = np.array(list(c.values()))
         wald = float(vector @ np.linalg.pinv(covariance) @ vector) / max(len(vector), 1)
         explained = max(empty.chi2 - empty.rows, 1e-9)
+        share = effect.relative({n: solution.c[n] for n in names}, spread.nominal)
+        estimates = spread.estimates(name, others)
+        for e in estimates.values() if share != 1.0 else ():
+            # Either may be what it is a share of: ohms beyond the nameplate's may stand outside the winding.
+            e.value, e.sigma = share * e.value, float(np.hypot(share * e.sigma, (1.0 - share) * e.value))
         out.append(
             NamedEffect(
                 name,
                 float(np.clip(1.0 - 1.0 / (1.0 + wald / 4.0), 0.5, 0.999)),
-                spread.estimates(name, others),
+                estimates,
                 float(np.clip((empty.chi2 - solution.chi2) / explained, 0.0, 1.0)),
-                effect.plant(c, spread.nominal),
+                effect.plant({k: share * v for k, v in c.items()}, spread.nominal),
             )
         )
     return out

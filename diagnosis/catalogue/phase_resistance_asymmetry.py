@@ -3,7 +3,7 @@
 import numpy as np
 
 from diagnosis.catalogue.current_gain import PATTERNS
-from diagnosis.effect import Effect, Parameter, voltage
+from diagnosis.effect import Effect, Parameter, to_true_resistance, voltage
 from diagnosis.curves import course
 from diagnosis.result import Estimate
 
@@ -42,6 +42,9 @@ class PhaseResistanceAsymmetry(Effect):
             spread = float(np.sqrt(max(weights @ covariance @ weights, 0.0)))
             out[f"asymmetry_{phase}"] = Estimate(float(self._phases(c)[k]), spread, "1")
         return out
+
+    def relative(self, c, nominal):
+        return to_true_resistance(c, nominal)
 
     def plant(self, c, nominal):
         return {"machine.phase_resistance_asymmetry": [float(v) for v in self._phases(c)]}

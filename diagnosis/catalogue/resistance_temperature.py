@@ -2,8 +2,15 @@
 
 import numpy as np
 
-from diagnosis.effect import Effect, Parameter, one, sigma, voltage
+from diagnosis.effect import Effect, Parameter, one, sigma, to_true_resistance, voltage
 from diagnosis.curves import COURSE_KNOTS, course, courses, known_temperature, reference_c
+
+
+def _change(c, by_alpha):
+    """Largest change since the start [ohm]; by_alpha: that of a coefficient of 1/K [ohm K]."""
+    drift = c.get("drift", 0.0) * COURSE_KNOTS + by_alpha * abs(c.get("alpha", 0.0))
+    drift[1:4] += [c.get(f"course_{k}", 0.0) for k in range(3)]
+    return float(np.max(np.abs(drift)))
 
 
 class ResistanceTemperature(Effect):
@@ -24,11 +31,15 @@ class ResistanceTemperature(Effect):
 
     def size(self, c, nominal):
         """Change of resistance over the recording, or by 30 K [ohm]."""
-        drift = c.get("drift", 0.0) * COURSE_KNOTS + 30.0 * nominal.machine.resistance_ohm * abs(
-            c.get("alpha", 0.0)
-        )
-        drift[1:4] += [c.get(f"course_{k}", 0.0) for k in range(3)]
-        return float(np.max(np.abs(drift)))
+        return _change(c, 30.0 * nominal.machine.resistance_ohm)
+
+    def moved(self, c, view):
+        """Change of resistance over the recording [ohm]."""
+        warmed = float(np.ptp(view.temp)) if "alpha" in c else 0.0
+        return _change(c, warmed * view.machine.resistance_ohm)
+
+    def relative(self, c, nominal):
+        return to_true_resistance(c, nominal) if "alpha" in c["resistance_temperature"] else 1.0
 
     def estimates(self, c, covariance, nominal):
         if "alpha" in c:
