@@ -613,7 +613,8 @@ begin
   end process;
 
   -- What was stored is read from a RAM with the data of the registers, which costs far less than choosing among
-  -- them; until its first write since reset a register reads its reset value
+  -- them; until its first write since reset a register reads its reset value.  It is written a clock after store: word
+  -- and data stand still until the next request is taken, two clocks after the answer
   process (clk)
   begin
     if rising_edge(clk) then
