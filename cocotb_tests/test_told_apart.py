@@ -188,6 +188,17 @@ def test_an_axis_without_current_has_no_curve(view):
     assert CATALOGUE["inductance_d"].free(later) == {}
 
 
+def test_a_curve_over_a_current_that_is_an_error_of_the_record_widens_nothing(view):
+    """Freed of the record's errors the data carry a d current that they do not carry raw."""
+    still = view.replace(i=1j * view.i.imag + 0.01 * view.machine.rated_current_a, memo={})
+    refiner = Refiner(still, {"saturation": CATALOGUE["saturation"]}, np.ones(len(view), bool))
+    before = refiner.sigma.copy()
+    refiner.allow_for_curves(solution(saturation={"d_3": 0.1}))
+    assert np.array_equal(refiner.sigma, before)
+    refiner.allow_for_curves(solution(saturation={"d_3": 0.1, "q_3": 0.1}))
+    assert (refiner.sigma >= before).all() and (refiner.sigma > before).any()
+
+
 def test_ripple_is_taken_off_only_where_that_explains_more():
     """A set whose ripple is absurd must not spoil the data for all others."""
     view = view_of(recorded(machine={"inductance_q_h": 1.15 * MACHINE.inductance_q_h}), NOMINAL)

@@ -32,6 +32,14 @@ def operating_points(view) -> int:
     return int(point_numbers(view).max()) + 1
 
 
+def told(columns, key) -> str:
+    """Name of a coefficient's column, core or free; "" in a view where its axis carries too little current.
+
+    The data of a solution are freed of its errors of the record: a column may be there and not in the raw ones.
+    """
+    return next((k for k in (key, f"~{key}") if k in columns), "")
+
+
 class Refiner:
     """The linear problem of a view and the solutions that were refined on it."""
 
@@ -153,9 +161,8 @@ class Refiner:
                 cells_of(v, [effect], self.projector).columns[name] for v in (solution.view, rough)
             )
             for key, value in c.items():
-                if value:
-                    k = key if key in raw else f"~{key}"
-                    adjust += value * (raw[k] - smooth[k])
+                if value and told(raw, key) and told(smooth, key):
+                    adjust += value * (raw[told(raw, key)] - smooth[told(smooth, key)])
         return adjust
 
     def allow_for_curves(self, best):
@@ -166,7 +173,7 @@ class Refiner:
         variance = self.sigma**2
         for name, c in best.c.items():
             columns = self.cells.columns[name]
-            rows = sum(v * columns[k if k in columns else f"~{k}"] for k, v in c.items())
+            rows = sum(v * columns[told(columns, k)] for k, v in c.items() if told(columns, k))
             variance = variance + (CURVE_SHARE * rows) ** 2
         self.sigma = np.sqrt(variance)
         self.linear = Fitter(self.cells, self.sigma, self.train)
