@@ -145,6 +145,14 @@ def cells_of(view, effects, projector=None, free=None) -> Cells:
     return Cells(p.rows(misfit(view)), columns, p.block, p.order, p.part, p.channel, p.ok)
 
 
+def told(columns, key) -> str:
+    """Name of a coefficient's column, core or free; "" in a view where its axis carries too little current.
+
+    The data of a solution are freed of its errors of the record: a column may be there and not in the raw ones.
+    """
+    return next((k for k in (key, f"~{key}") if k in columns), "")
+
+
 def voltage_level(view):
     """Length of the mean voltage vector of each block, (b,) [V]."""
     return np.abs(view.to_dq(view.u[:, 1:-1]).mean(axis=1))

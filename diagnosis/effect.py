@@ -21,6 +21,7 @@ from diagnosis.result import Estimate
 
 Column = dict  # channel -> array
 DOUBT = 2.0  # standard deviations that a value must be on the wrong side to be ruled out
+ALIKE = 0.1  # so near, relative, are two the same
 
 
 @dataclass(frozen=True)
@@ -77,6 +78,10 @@ class Effect:
     def size(self, c: dict[str, float], nominal) -> float:
         """One number for how large the effect is."""
         return abs(next(iter(c.values())))
+
+    def moved(self, c: dict[str, float], view) -> float:
+        """How much the effect changed over a recording, in units of ``size``: a drift is its own change."""
+        return self.size(c, view.nominal)
 
     def possible(self, c: dict[str, float], covariance: np.ndarray, nominal) -> bool:
         """Whether the coefficients are not, beyond doubt, what physics rules out; covariance in their order."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from diagnosis.cells import Projector, cells_of
+from diagnosis.cells import Projector, cells_of, told
 from diagnosis.effect import FluxEffect, rated_torque
 from diagnosis.fit import Fitter, Model, Solution, everything, row_sigma
 
@@ -30,14 +30,6 @@ def point_numbers(view) -> np.ndarray:
 def operating_points(view) -> int:
     """Number of different steady points of a view; each carries two means to explain."""
     return int(point_numbers(view).max()) + 1
-
-
-def told(columns, key) -> str:
-    """Name of a coefficient's column, core or free; "" in a view where its axis carries too little current.
-
-    The data of a solution are freed of its errors of the record: a column may be there and not in the raw ones.
-    """
-    return next((k for k in (key, f"~{key}") if k in columns), "")
 
 
 class Refiner:

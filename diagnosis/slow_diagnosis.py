@@ -8,7 +8,6 @@ search, ``answer.found`` its outcome, ``answer.held`` the blocks that were not f
 
 from __future__ import annotations
 
-
 import numpy as np
 
 from diagnosis import verdict as words

@@ -12,7 +12,7 @@ import itertools
 import numpy as np
 
 from diagnosis.catalogue import CATALOGUE
-from diagnosis.cells import voltage_level
+from diagnosis.cells import told, voltage_level
 from diagnosis.fit import Fitter, Model, everything
 from diagnosis.search import Outcome, Search
 from diagnosis.slow import UNSEEN
@@ -134,7 +134,7 @@ class SlowSearch(Search):
         for name, c in solution.c.items():
             if not self.effects[name].corrects:
                 columns = fitter.cells.columns[name]
-                values += sum(v * columns[k if k in columns else f"~{k}"] for k, v in c.items() if v)
+                values += sum(v * columns[told(columns, k)] for k, v in c.items() if v and told(columns, k))
         return fitter.cells, fitter.cells.y - values
 
 

@@ -6,10 +6,10 @@ import numpy as np
 from scipy import stats
 
 from diagnosis.curvature import FAMILY
+from diagnosis.effect import ALIKE
 from diagnosis.fit import Solution
 from diagnosis.refine import TIE, Refiner, point_numbers
 
-ALIKE = 0.1  # of a scale: so near are two the same
 LEAST_POINTS, LEAST_SPREAD = 4.0, 0.2  # operating points that say how large errors really are; no smaller than that
 LONE_TIE = 80.0  # margin of a tie where one operating point is all there is
 

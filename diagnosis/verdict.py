@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from diagnosis.catalogue.dead_time import FREE_WIDTHS
+from diagnosis.cells import told
+from diagnosis.effect import ALIKE
 from diagnosis.result import NamedEffect
 
 LEFTOVER = 2.0  # reduced chi^2 that an explanation may leave
@@ -23,7 +25,6 @@ SLOPE_DEVICE, SLOPE_UNCLEAR = 0.12, 0.2
 # The same over what the loss grows between a tenth and a third of rated current: a drop in log(i) grows about as much
 # again up to all of it, and one that has come to a stand there does not begin anew.
 GROWS_ON, STANDS_STILL = 1.5, 3.0
-SAME_LAG = 0.1  # so near are two times the same
 WIDEST = f"v_{FREE_WIDTHS[-1]:g}"
 
 
@@ -81,7 +82,7 @@ def lag_of_currents(solution) -> float:
     if not {"delay", "sampling_skew"} <= solution.model.names:
         return 0.0
     delay, skew = c["delay"]["tau"], c["sampling_skew"]["tau"] - c["sampling_skew"].get("angle", 0.0)
-    return delay if abs(delay + skew) < SAME_LAG * delay else 0.0
+    return delay if abs(delay + skew) < ALIKE * delay else 0.0
 
 
 def verdict(names, ambiguity, left, lag=0.0) -> str:
@@ -120,7 +121,7 @@ def carried(names, found, cells, worth, effects):
 def lives(cells, name, c, sigma, use):
     """(r,) rows of the channels' orders that hold an effect with coefficients c, each at least HOLDS of its power."""
     columns = cells.columns[name]
-    own = sum(v * columns[k if k in columns else f"~{k}"] for k, v in c.items())
+    own = sum(v * columns[told(columns, k)] for k, v in c.items() if told(columns, k))
     power, out = np.where(use, (own / sigma) ** 2, 0.0), np.zeros(len(use), bool)
     for channel in np.unique(cells.channel):
         for order in np.unique(cells.order[cells.channel == channel]):

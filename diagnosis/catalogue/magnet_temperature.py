@@ -25,10 +25,6 @@ class MagnetTemperature(FluxEffect):
         drift[1:4] += [c.get(f"course_{k}", 0.0) for k in range(3)]
         return float(np.max(np.abs(drift)))
 
-    def moved(self, c, view):
-        """The same: the drift is that of the recording."""
-        return self.size(c, None)
-
     def estimates(self, c, covariance, nominal):
         return one("magnet_flux_drift_wb", "Wb", c["drift"], sigma(covariance))
 

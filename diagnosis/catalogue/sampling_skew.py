@@ -2,9 +2,7 @@
 
 import numpy as np
 
-from diagnosis.effect import Effect, Parameter, angle_error, current_error, half_dead_time, one
-
-ALIKE = 0.1
+from diagnosis.effect import ALIKE, Effect, Parameter, angle_error, current_error, half_dead_time, one
 
 
 def _slope(view):
