@@ -21,7 +21,7 @@ import shutil
 import subprocess
 import tempfile
 import time
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import lru_cache
 from pathlib import Path
 
@@ -122,14 +122,21 @@ def compile_library(folder: Path, top: str, ports: tuple[VerilogPort, ...]) -> N
 
 
 def build(generics: Mapping[str, int], rtl: Path = RTL, top: str = TOP) -> Path:
-    """The folder with libcore.so and ``top``.v for these generics, made if it is not there yet.
+    """The folder with libcore.so and ``top``.v for these generics, made if it is not there yet."""
+    verilog = convert(generics, ROOT / "build" / "verilog" / conversion_key(generics, rtl, top), rtl, top)
+    # The text, not the VHDL, is what gets compiled: someone may be editing the VHDL just now.
+    return compiled(verilog.read_bytes(), rtl, top)
 
+
+def compiled(
+    text: bytes, rtl: Path, top: str, key: object = None, change: Callable[[Path], None] = lambda work: None
+) -> Path:
+    """The folder with libcore.so and ``top``.v, which holds ``text``, made if it is not there yet.
+
+    change(work): puts what is to be compiled in its place in work/top.v; key: all that this depends on.
     Processes that want the same one wait for the first; a folder appears under its name only when complete.
     """
-    verilog = convert(generics, ROOT / "build" / "verilog" / conversion_key(generics, rtl, top), rtl, top)
-    tools = (find_verilator()[1], _compiler(), VERILATOR_FLAGS, COMPILE, HOT, SLOW, LIBRARY_LEVEL)
-    # The text, not the VHDL, is what gets compiled: someone may be editing the VHDL just now.
-    text = verilog.read_bytes()
+    tools = (find_verilator()[1], _compiler(), VERILATOR_FLAGS, COMPILE, HOT, SLOW, LIBRARY_LEVEL, key)
     folder = CACHE / hashlib.sha256(repr(tools).encode() + WRAPPER.read_bytes() + text).hexdigest()[:16]
     if folder.exists():
         return folder
@@ -138,11 +145,13 @@ def build(generics: Mapping[str, int], rtl: Path = RTL, top: str = TOP) -> Path:
             with tempfile.TemporaryDirectory(prefix=f"{folder.name}.", dir=CACHE) as scratch:
                 work = Path(scratch)
                 (work / f"{top}.v").write_bytes(text)
-                compile_library(work, top, top_ports(work / f"{top}.v", rtl, top))
+                ports = top_ports(work / f"{top}.v", rtl, top)
+                change(work)
+                compile_library(work, top, ports)
                 finished = work / "finished"
                 finished.mkdir()
-                for name in (LIBRARY, f"{top}.v"):
-                    os.replace(work / name, finished / name)
+                os.replace(work / LIBRARY, finished / LIBRARY)
+                (finished / f"{top}.v").write_bytes(text)  # the ports are read from it
                 os.replace(finished, folder)
     return folder
 

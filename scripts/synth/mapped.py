@@ -1,22 +1,20 @@
 """The mapped netlist as something that runs: what yosys made of the core for Xilinx, cell by cell, in Verilator.
 
-A count is worth nothing where the mapping is wrong, and yosys has packed adders into a DSP48 wrongly before (a sum
-register wider than needed; a feedback multiplexer in front of the sum).  The netlist is put together again from yosys'
-own models of the cells.  Block RAM has no such model: the tables become LUTs here, everything else is as counted.
+A count is worth nothing where the mapping is wrong, and yosys has packed adders into a DSP48 wrongly before (a
+difference into the pre-adder without its signs; a sum with its own feedback).  The netlist is put together again from
+yosys' own models of the cells.  Block RAM has no such model: tables are LUTs here, everything else is as counted.
 """
 
 from __future__ import annotations
 
-import hashlib
 import os
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 
 from scripts.sources import RTL
 from scripts.synth.yosys import SYNTH, version, yosys
-from scripts.verilated import CACHE, LIBRARY, VerilatedCore, compile_library, locked
-from scripts.verilog import TOP, conversion_key, convert, top_ports
+from scripts.verilated import CACHE, VerilatedCore, compiled
+from scripts.verilog import TOP, conversion_key, convert
 
 
 def scripts_for(family: str, top: str) -> tuple[list[str], list[str]]:
@@ -41,26 +39,13 @@ def build(generics: Mapping[str, int], family: str, rtl: Path = RTL, top: str = 
     """The folder with the compiled netlist and ``top``.v, made if it is not there yet."""
     source = convert(generics, CACHE.parent / "verilog" / conversion_key(generics, rtl, top), rtl, top)
     scripts = scripts_for(family, top)
-    key = hashlib.sha256(repr((scripts, version())).encode() + source.read_bytes()).hexdigest()[:16]
-    folder = CACHE / f"mapped_{key}"
-    if folder.exists():
-        return folder
-    with locked(folder.with_suffix(".lock")):
-        if not folder.exists():
-            with tempfile.TemporaryDirectory(prefix=f"{folder.name}.", dir=CACHE) as scratch:
-                work = Path(scratch)
-                (work / f"{top}.v").write_bytes(source.read_bytes())
-                for script in scripts:
-                    yosys(script, work)
-                ports = top_ports(work / f"{top}.v", rtl, top)
-                os.replace(work / "mapped.v", work / f"{top}.v")
-                compile_library(work, top, ports)
-                finished = work / "finished"
-                finished.mkdir()
-                os.replace(work / LIBRARY, finished / LIBRARY)
-                (finished / f"{top}.v").write_bytes(source.read_bytes())  # the ports are read from it
-                os.replace(finished, folder)
-    return folder
+
+    def map_it(work: Path) -> None:
+        for script in scripts:
+            yosys(script, work)
+        os.replace(work / "mapped.v", work / f"{top}.v")
+
+    return compiled(source.read_bytes(), rtl, top, (scripts, version()), map_it)
 
 
 class MappedCore(VerilatedCore):
