@@ -18,6 +18,10 @@ package fixed_pkg is
   -- x limited to the range of a signed number of width bits.
   function saturate (x : signed; width : positive) return signed;
 
+  -- The same where far has been found a clock earlier: '1' where the value is out of range by bits that x lacks; x has
+  -- its sign.
+  function saturate (x : signed; far : std_logic; width : positive) return signed;
+
   -- '1' where saturating x to width signed bits changes it.
   function exceeds (x : signed; width : positive) return std_logic;
 
@@ -63,13 +67,18 @@ package body fixed_pkg is
   end function;
 
   function saturate (x : signed; width : positive) return signed is
-    alias v         : signed(x'length - 1 downto 0) is x;
-    variable result : signed(width - 1 downto 0);
   begin
     if width >= x'length then
       return resize(x, width);
     end if;
-    if exceeds(x, width) = '0' then
+    return saturate(x, '0', width);
+  end function;
+
+  function saturate (x : signed; far : std_logic; width : positive) return signed is
+    alias v         : signed(x'length - 1 downto 0) is x;
+    variable result : signed(width - 1 downto 0);
+  begin
+    if far = '0' and exceeds(x, width) = '0' then
       return v(width - 1 downto 0);
     end if;
     result            := (others => not v(v'high));
@@ -84,7 +93,7 @@ package body fixed_pkg is
       return '0';
     end if;
     -- In range when every bit above the result's sign repeats it.
-    return (or v(v'high downto width - 1)) and not (and v(v'high downto width - 1));
+    return or (v(v'high downto width) xor v(v'high - 1 downto width - 1));
   end function;
 
   function saturate_u (x : signed; width : positive) return unsigned is

@@ -5,6 +5,7 @@
 -- Latency: 7.  Interval: 4 (the state is read from stage 4 on and written at stage 7).
 -- Rounding: half up; raw saturates at 2 per unit, the state moves between values in range.
 -- The first sample after reset has no predecessor: its difference is zero.
+-- The difference is one sum: code, turned where the sensor counts backwards, and minus the last one, made beside it.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -33,58 +34,67 @@ architecture rtl of speed is
   constant LATENCY : positive := SPEED_LATENCY;
 
   signal valid      : std_logic_vector(0 to LATENCY);
-  signal mech_0     : unsigned(TURN_W - 1 downto 0);
-  signal code_last  : unsigned(TURN_W - 1 downto 0);
+  signal minus_last : unsigned(POSITION_BITS - 1 downto 0);
   signal seen       : std_logic;
   signal omega      : signed(INTEGRAL_W - 1 downto 0);
   signal delta_1    : signed(TURN_W - 1 downto 0);
   signal prod_raw_2 : signed(TURN_W + 24 downto 0);
   signal sum_raw_3  : signed(TURN_W + 24 downto 0);
+  signal falls_2    : std_logic;
+  signal raw_3      : signed(TURN_W + 24 - SPEED_DROP_RAW downto 0);
+  signal err_end_3  : signed(PU_W downto 0);  -- err of a raw beyond its range
   signal err_4      : signed(PU_W downto 0);
   signal prod_err_5 : signed(PU_W + 18 downto 0);
   signal sum_6      : signed(PU_W + 18 downto 0);
   signal omega_6    : signed(INTEGRAL_W - 1 downto 0);
   signal omega_pu   : signed(PU_W - 1 downto 0);
 
-  -- -code is not code and a carry.
-  function aligned (code : unsigned; minus : std_logic) return unsigned is
-    constant TURN : unsigned(code'length - 1 downto 0) := (code xor (code'range => minus)) + unsigned'('0' & minus);
+  -- The code, or its complement with the one that it lacks in the bit below.
+  function turned (code : unsigned; minus : std_logic) return unsigned is
   begin
-    return shift_left(resize(TURN, TURN_W), TURN_W - code'length);
+    return (code xor (code'range => minus)) & minus;
   end function;
 begin
   valid(0) <= in_valid;
-  mech_0   <= aligned(code_theta, reverse);
+  raw_3    <= sum_raw_3(sum_raw_3'high downto SPEED_DROP_RAW);
   omega_6  <= saturate(shift_right(sum_6, SPEED_DROP_STATE), INTEGRAL_W);
 
   process (clk)
+    variable code  : unsigned(POSITION_BITS downto 0);
+    variable minus : unsigned(POSITION_BITS downto 0);
+    variable delta : unsigned(POSITION_BITS downto 0);
   begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
       -- Stage 1: delta = code - last code, the shorter way round
       if valid(0) = '1' then
-        delta_1   <= (others => '0');
-        code_last <= mech_0;
-        seen      <= '1';
-        if seen = '1' then
-          delta_1 <= signed(mech_0 - code_last);
-        end if;
+        code       := turned(code_theta, reverse);
+        minus      := turned(code_theta, not reverse) + 1;
+        delta      := (code and (code'range => seen)) + (minus_last & '1');
+        delta_1    <= shift_left(resize(signed(delta(POSITION_BITS downto 1)), TURN_W), TURN_W - POSITION_BITS);
+        minus_last <= minus(POSITION_BITS downto 1);
+        seen       <= '1';
       end if;
 
       -- Stage 2: prod_raw = delta * k_speed
       if valid(1) = '1' then
         prod_raw_2 <= delta_1 * signed('0' & k_speed);
+        falls_2    <= delta_1(delta_1'high);
       end if;
 
-      -- Stage 3: half an LSB of raw to round with
+      -- Stage 3: half an LSB of raw to round with;  err if raw is cut, to the end that delta points to
       if valid(2) = '1' then
         sum_raw_3 <= prod_raw_2 + half(SPEED_DROP_RAW, prod_raw_2'length);
+        err_end_3 <= resize(signed'(falls_2 & (PU_W - 2 downto 0 => not falls_2)), PU_W + 1) - omega_pu;
       end if;
 
       -- Stage 4: err = raw - omega_me, raw narrowed
       if valid(3) = '1' then
-        err_4 <= resize(saturate(shift_right(sum_raw_3, SPEED_DROP_RAW), PU_W), PU_W + 1) - omega_pu;
+        err_4 <= resize(raw_3(PU_W - 1 downto 0), PU_W + 1) - omega_pu;
+        if exceeds(raw_3, PU_W) = '1' then
+          err_4 <= err_end_3;
+        end if;
       end if;
 
       -- Stage 5: prod_err = err * k_filter
@@ -106,6 +116,7 @@ begin
       if rst = '1' then
         valid(1 to LATENCY) <= (others => '0');
         seen                <= '0';
+        minus_last          <= (others => '0');
         omega               <= (others => '0');
         omega_pu            <= (others => '0');
       end if;

@@ -51,20 +51,19 @@ architecture rtl of sincos is
   signal sin_5      : signed(TRIG_W - 1 downto 0);
   signal cos_5      : signed(TRIG_W - 1 downto 0);
 
-  -- A quarter turn swaps sine and cosine and turns the sign of one, a half turn those of both.
+  -- A quarter turn swaps sine and cosine and turns the sign of one, a half turn those of both.  Rounded half up: the
+  -- complement lacks one, which comes from the bit below the last together with that of the sum.
   function turned (own, other : signed; swap, minus : std_logic) return signed is
-    variable v     : signed(FINE_W - 1 downto 0) := own;
-    variable carry : signed(1 downto 0);
+    constant ONE_MORE : unsigned(SINCOS_DROP_OUT downto 0) := (SINCOS_DROP_OUT => '1', 0 => minus, others => '0');
+    variable v        : signed(FINE_W - 1 downto 0)        := own;
+    variable sum      : signed(FINE_W downto 0);
   begin
     if swap = '1' then
       v := other;
     end if;
-    -- -v is not v and one more, which reaches the half LSB only through zeros below it.
-    carry := '0' & (v(SINCOS_DROP_OUT - 1) xor minus);
-    if v(SINCOS_DROP_OUT - 2 downto 0) = 0 then
-      carry(0) := v(SINCOS_DROP_OUT - 1) or minus;
-    end if;
-    return (v(v'high downto SINCOS_DROP_OUT) xor (TRIG_W - 1 downto 0 => minus)) + carry;
+    v   := v xor (v'range => minus);
+    sum := (v & '1') + signed(resize(ONE_MORE, sum'length));
+    return sum(FINE_W downto SINCOS_DROP_OUT + 1);
   end function;
 begin
   valid(0) <= in_valid;

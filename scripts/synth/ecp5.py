@@ -1,4 +1,4 @@
-"""Routed timing on an ECP5, the one family with an open and timed place and route here: synth_ecp5, nextpnr.
+"""Routed timing on an ECP5, the one family with an open and timed place and route here: yosys, nextpnr.
 
 Every number is for LFE5U-85F, speed grade 6, in the wrapper of wrapper.py.
 """
@@ -22,7 +22,40 @@ DEVICE = ["--85k", "--package", "CABGA756", "--speed", "6"]
 GOAL_MHZ = 200  # what placer and router are asked for: more than there is, so that they keep trying
 # A second algorithm of the router: several times faster here, and no slower in its result.
 EFFORT = ["--router", "router2", "--freq", str(GOAL_MHZ)]
+# What synth_lattice legalises to, less the latches and asynchronous resets that the core does not have.
+FLIP_FLOPS = ("$_DFF_?_ 01", "$_DFFE_??_ 01", "$_SDFF_?P?_ r", "$_SDFFE_?P??_ r")
 LENIENT = ["--lpf-allow-unconstrained", "--timing-allow-fail"]
+
+
+def mapping() -> list[str]:
+    """synth_lattice's steps, with two changes for speed.
+
+    Each entity is mapped to LUTs by itself and the hierarchy goes after that: what is not on the slowest path of
+    all is mapped for area, and in one piece that would be all but one block.
+
+    A flip-flop takes its synchronous reset at its own pin only where that comes from a register or a port.  yosys
+    makes a reset of whatever clears a register, so also of a limiter's or a shift's zero: the condition then runs
+    over one more LUT and a net to all of them, where the LUT in front of each has an input left.
+    """
+    whole = f"synth_lattice -family ecp5 -noflatten -top {NAME}"
+    flip_flops = " ".join(f"-cell {cell}" for cell in FLIP_FLOPS)
+    return [
+        f"{whole} -run begin:map_ffs",
+        "opt_clean",
+        "select -set registered t:$_*DFF*_ %co1:+[Q] w:* %i i:* %u",
+        "select -set at_pin @registered %co1:+[SRST] t:$_SDFF* %i",
+        "dffunmap -srst-only t:$_SDFF* @at_pin %d",
+        f"dfflegalize {flip_flops}",
+        "opt_merge",
+        "techmap -D NO_LUT -map +/lattice/cells_map_trellis.v",
+        "opt_expr -undriven -mux_undef",
+        "simplemap",
+        "opt_clean",
+        f"{whole} -run map_luts:map_cells",
+        "flatten",
+        "opt_clean",
+        f"{whole} -run map_cells: -json design.json",
+    ]
 
 
 @dataclass(frozen=True)
@@ -88,7 +121,7 @@ class Routing:
         self._scratch = tempfile.TemporaryDirectory()
         self.folder = Path(self._scratch.name)
         (self.folder / "design.v").write_text(verilog + wrap(verilog, module))
-        yosys(["read_verilog design.v", f"synth_ecp5 -top {NAME} -json design.json"], self.folder)
+        yosys(["read_verilog design.v", *mapping()], self.folder)
         self.names = Names(self.folder, module)
         self.multipliers = self._absorb() if absorb_registers else {}
 
