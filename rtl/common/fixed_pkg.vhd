@@ -34,6 +34,9 @@ package fixed_pkg is
   -- x limited to [lo, hi]; lo and hi must fit the width of x.
   function clamp (x : signed; lo : signed; hi : signed) return signed;
 
+  -- a + 1 where carry = '1', which a must have room for: by the carry of one sum, from the bit below.
+  function plus_carry (a : signed; carry : std_logic) return signed;
+
   -- a + round_half_up(v, drop) by one carry; as wide as a, which must have room for the sum.
   function plus_rounded (a : signed; v : signed; drop : positive) return signed;
 
@@ -127,6 +130,13 @@ package body fixed_pkg is
       return resize(hi, x'length);
     end if;
     return x;
+  end function;
+
+  function plus_carry (a : signed; carry : std_logic) return signed is
+    variable sum : signed(a'length downto 0);
+  begin
+    sum := (a & '1') + signed(resize(unsigned'(0 => carry), a'length + 1));
+    return sum(a'length downto 1);
   end function;
 
   function plus_rounded (a : signed; v : signed; drop : positive) return signed is

@@ -5,7 +5,7 @@
 -- run = 0: output and integral are zero.
 -- Two beats through one comparison with i_max: what is asked for, then the integral.  |v| = (v xor s) + s, s its sign.
 -- Formats: err PU, proportional part 28 fraction bits, integral S(1,28), output PU.
--- Latency: 6.  Interval: 6.  Rounding: half up; err saturates; the proportional part needs no limit of its own, as
+-- Latency: 6; the integral follows a clock later.  Interval: 6.  Rounding: half up; err saturates; the proportional part needs no limit of its own, as
 -- what it asks for beyond i_max is cut anyway, and the increment none, as speed_ki < 1; the integral is kept within
 -- +-i_max.
 
@@ -56,9 +56,14 @@ architecture rtl of speed_pi is
   signal v_3        : signed(PU_W downto 0);
   signal far_3      : std_logic;
   signal v_4        : signed(PU_W downto 0);
-  signal beyond_4   : std_logic;
-  signal held_5     : std_logic;
-  signal limited_4  : signed(PU_W - 1 downto 0);
+  signal far_4      : std_logic;
+  signal room_4     : signed(PU_W + 1 downto 0);
+  signal v_5        : signed(PU_W downto 0);
+  signal limit_5    : signed(PU_W - 1 downto 0);
+  signal beyond_5   : std_logic;
+  signal limited_5  : signed(PU_W - 1 downto 0);
+  signal held_6     : std_logic;
+  signal whole_6    : std_logic;
 begin
   valid(0) <= in_valid;
 
@@ -72,22 +77,35 @@ begin
            total_3(TOTAL_W - 1) & total_3(PU_W - 1 downto 0);
   far_3 <= exceeds(total_3, PU_W + 1) and speed_mode and not valid(4);
 
+  -- room = i_max - |v|, less one for an integral above zero, whose bits below v count too; nothing of v where it is far
+  -- beyond but a one that makes it so, nothing at all while not running
+  process (all)
+    variable minus : signed(PU_W downto 0);
+    variable carry : std_logic;
+  begin
+    minus  := v_4 xor (PU_W downto 0 => not v_4(v_4'high));
+    carry  := not v_4(v_4'high) and not valid(5);
+    if far_4 = '1' then
+      minus := (PU_W => '1', others => '0');
+    end if;
+    if run = '0' then
+      minus := (others => '0');
+    end if;
+    room_4 <= (resize(i_max, PU_W + 1) & '1') + (minus & carry);
+  end process;
+
   -- v within +-i_max
   process (all)
-    variable minus : signed(PU_W - 1 downto 0);
-    variable carry : signed(1 downto 0);
+    variable within : signed(PU_W - 1 downto 0);
   begin
-    minus     := (others => v_4(v_4'high));
-    carry     := '0' & (v_4(v_4'high) and beyond_4);
-    limited_4 <= v_4(PU_W - 1 downto 0) + carry;
-    if beyond_4 = '1' then
-      limited_4 <= (i_max xor minus) + carry;
+    within := v_5(PU_W - 1 downto 0);
+    if beyond_5 = '1' then
+      within := limit_5 xor (within'range => v_5(v_5'high));
     end if;
+    limited_5 <= plus_carry(within, beyond_5 and v_5(v_5'high));
   end process;
 
   process (clk)
-    variable rest  : signed(PU_W + 1 downto 0);
-    variable carry : std_logic;
   begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
@@ -112,36 +130,32 @@ begin
         sum_i_3 <= prod_i_2 + (integral & half(SPEED_PI_DROP_I, SPEED_PI_DROP_I));
       end if;
 
-      -- Stages 4, 5: what is asked for, then the integral, against i_max: i_max - |v|, less one for an integral
-      -- above zero, whose bits below v count too
+      -- Stages 4, 5: what is asked for, then the integral
       if valid(3) = '1' or valid(4) = '1' then
-        v_4      <= v_3;
-        carry    := not v_3(v_3'high) and not valid(4);
-        rest     := (resize(i_max, PU_W + 1) & '1') + ((v_3 xor (v_3'range => not v_3(v_3'high))) & carry);
-        beyond_4 <= rest(rest'high) or far_3;
+        v_4   <= v_3;
+        far_4 <= far_3;
       end if;
 
-      -- Stage 5: i_q_ref = limit(total or i_q_ext)
-      if valid(4) = '1' then
-        i_q_ref       <= limited_4;
-        speed_limited <= beyond_4;
-        held_5        <= speed_mode and beyond_4 and ((rises_2 and not v_4(v_4'high)) or (falls_2 and v_4(v_4'high)));
-        if run = '0' then
-          i_q_ref       <= (others => '0');
-          speed_limited <= '0';
-        end if;
+      -- Stages 5, 6: v against i_max
+      if valid(4) = '1' or valid(5) = '1' then
+        v_5      <= v_4 and (v_4'range => run);
+        limit_5  <= i_max;
+        beyond_5 <= room_4(room_4'high);
       end if;
 
-      -- Stage 6: integral = moved unless held
+      -- Stage 6: i_q_ref = limit(total or i_q_ext)
       if valid(5) = '1' then
-        if held_5 = '0' then
-          integral <= limited_4 & moved_3(PU_TO_INTEGRAL - 1 downto 0);
-          if speed_mode = '0' or beyond_4 = '1' then
-            integral(PU_TO_INTEGRAL - 1 downto 0) <= (others => '0');
-          end if;
-        end if;
-        if run = '0' then
-          integral <= (others => '0');
+        i_q_ref       <= limited_5;
+        speed_limited <= beyond_5;
+        held_6        <= speed_mode and beyond_5 and ((rises_2 and not v_5(v_5'high)) or (falls_2 and v_5(v_5'high)));
+        whole_6       <= not speed_mode or not run;
+      end if;
+
+      -- Stage 7: integral = moved, limited, unless held
+      if valid(6) = '1' and held_6 = '0' then
+        integral <= limited_5 & moved_3(PU_TO_INTEGRAL - 1 downto 0);
+        if whole_6 = '1' or beyond_5 = '1' then
+          integral(PU_TO_INTEGRAL - 1 downto 0) <= (others => '0');
         end if;
       end if;
 

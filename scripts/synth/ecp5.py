@@ -22,8 +22,10 @@ DEVICE = ["--85k", "--package", "CABGA756", "--speed", "6"]
 GOAL_MHZ = 200  # what placer and router are asked for: more than there is, so that they keep trying
 # A second algorithm of the router: several times faster here, and no slower in its result.
 EFFORT = ["--router", "router2", "--freq", str(GOAL_MHZ)]
-# What synth_lattice legalises to, less the latches and asynchronous resets that the core does not have.
-FLIP_FLOPS = ("$_DFF_?_ 01", "$_DFFE_??_ 01", "$_SDFF_?P?_ r", "$_SDFFE_?P??_ r")
+# What synth_lattice legalises to, less latches: the core has none.
+FLIP_FLOPS = (
+    "$_DFF_?_ 01", "$_DFF_?P?_ r", "$_SDFF_?P?_ r", "$_DFFE_??_ 01", "$_DFFE_?P??_ r", "$_SDFFE_?P??_ r",
+)
 LENIENT = ["--lpf-allow-unconstrained", "--timing-allow-fail"]
 
 
