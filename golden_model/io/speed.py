@@ -84,7 +84,7 @@ BLOCK = Block(
     outputs=(Port("omega_me", PU, doc="electrical speed"),),
     state=State(),
     latency=7,
-    interval=4,
+    interval=5,
     constants={"DROP_RAW": DROP_RAW, "DROP_STATE": DROP_STATE},
     configs=({"POSITION_BITS": 16}, {"POSITION_BITS": 12}, {"POSITION_BITS": 18}),
     width_from={"code_theta": code_format},

@@ -26,6 +26,7 @@ architecture rtl of sqrt is
 
   signal valid      : std_logic_vector(0 to LATENCY);
   signal bytes_0    : unsigned(1 downto 0);
+  signal pairs_0    : unsigned(1 downto 0);
   signal pairs_1    : unsigned(1 downto 0);
   signal x_1        : unsigned(31 downto 0);
   signal shift_1    : unsigned(1 downto 0);
@@ -50,10 +51,22 @@ architecture rtl of sqrt is
   begin
     return (not first and not second) & (not first and (second or not third));
   end function;
+
+  -- The same of the four pairs of a byte.
+  function zero_pairs (byte : unsigned) return unsigned is
+    alias b : unsigned(7 downto 0) is byte;
+  begin
+    return leading_zeros(b(7) or b(6), b(5) or b(4), b(3) or b(2));
+  end function;
 begin
   valid(0) <= in_valid;
   bytes_0  <= leading_zeros(or x(31 downto 24), or x(23 downto 16), or x(15 downto 8));
-  pairs_1  <= leading_zeros(or x_1(31 downto 30), or x_1(29 downto 28), or x_1(27 downto 26));
+
+  with bytes_0 select pairs_0 <=
+    zero_pairs(x(31 downto 24)) when "00",
+    zero_pairs(x(23 downto 16)) when "01",
+    zero_pairs(x(15 downto 8)) when "10",
+    zero_pairs(x(7 downto 0)) when others;
 
   mantissa_1 <= resize(shift_right(shift_left(x_1, to_integer(pairs_1 & '0')), SQRT_DROP_X), 20);
   address_1  <= pairs_1(0) & mantissa_1(19 downto SQRT_REST_BITS);
@@ -65,10 +78,11 @@ begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stage 1: zero bytes shifted out, four pairs each
+      -- Stage 1: zero bytes shifted out, four pairs each, and the pairs counted that go then
       if valid(0) = '1' then
         x_1     <= shift_left(x, to_integer(bytes_0 & "000"));
         shift_1 <= bytes_0;
+        pairs_1 <= pairs_0;
       end if;
 
       -- Stage 2: mantissa = x * 4**shift, cut to 20 bits;  base, slope from the table

@@ -50,9 +50,8 @@ architecture rtl of voltage_limit is
 
   signal valid      : std_logic_vector(0 to LATENCY);
   signal beat       : unsigned(1 downto 0);
-  signal part_0     : signed(SUM_W - 1 downto 0);
   signal so_far_0   : signed(SUM_W - 1 downto 0);
-  signal next_0     : signed(PU_W - 1 downto 0);
+  signal next_0     : signed(SUM_W - 1 downto 0);
   signal v_1        : signed(SUM_W - 1 downto 0);
   signal limit_1    : unsigned(U_MAX_W - 1 downto 0);
   signal bound_1    : unsigned(U_MAX_W - 1 downto 0);  -- limit_1; at clocks 9 and 10 the root
@@ -92,15 +91,18 @@ begin
 
   root_start <= valid(4) or valid(5);
 
-  -- The beat's voltages: the d axis while in_valid, then the EMF alone, then the rest of the q axis
-  part_0   <= resize(u_pi_d, SUM_W) + u_comp_d;
-  so_far_0 <= part_0 when beat = 0 else (others => '0') when beat = 1 else v_1;
+  -- The beat's voltages: the three of the d axis while in_valid, as sums and carries of their bits, then the EMF alone,
+  -- then the rest of the q axis
+  with beat select so_far_0 <=
+    resize(u_pi_d xor u_dec_d xor u_comp_d, SUM_W) when "00",
+    (others => '0') when "01",
+    v_1 when others;
 
   with beat select next_0 <=
-    u_dec_d when "00",
-    u_dec_q when "01",
-    u_pi_q when "10",
-    u_comp_q when others;
+    shift_left(resize((u_pi_d and u_dec_d) or (u_pi_d and u_comp_d) or (u_dec_d and u_comp_d), SUM_W), 1) when "00",
+    resize(u_dec_q, SUM_W) when "01",
+    resize(u_pi_q, SUM_W) when "10",
+    resize(u_comp_q, SUM_W) when others;
 
   bound_1 <= root_9 when valid(9) = '1' or valid(10) = '1' else limit_1;
 

@@ -44,8 +44,8 @@ architecture rtl of current_conditioning is
   signal code_0   : unsigned(ADC_BITS - 1 downto 0);
   signal offset_0 : unsigned(CODE_W - 1 downto 0);
   signal gain_0   : signed(GAIN_W - 1 downto 0);
-  signal rail_1   : unsigned(2 downto 0);
-  signal rail_4   : unsigned(2 downto 0);
+  signal code_1   : unsigned(ADC_BITS - 1 downto 0);
+  signal rail_2   : unsigned(2 downto 0);
   signal diff_1   : signed(CODE_W downto 0);
   signal gain_1   : signed(GAIN_W - 1 downto 0);
   signal prod_2   : signed(CODE_W + GAIN_W downto 0);
@@ -82,12 +82,13 @@ begin
       if valid(0) = '1' or valid(1) = '1' or valid(2) = '1' then
         diff_1 <= signed('0' & left_aligned(code_0)) - signed('0' & offset_0);
         gain_1 <= gain_0;
-        rail_1 <= at_rail(code_0) & rail_1(2 downto 1);
+        code_1 <= code_0;
       end if;
 
-      -- Stage 2: prod = diff * gain
+      -- Stage 2: prod = diff * gain;  rail: the channel's, behind those before it
       if valid(1) = '1' or valid(2) = '1' or valid(3) = '1' then
         prod_2 <= diff_1 * gain_1;
+        rail_2 <= at_rail(code_1) & rail_2(2 downto 1);
       end if;
 
       -- Stage 3: i = prod, narrowed; b at clock 3, c at 4, a at 5
@@ -97,12 +98,9 @@ begin
       if valid(3) = '1' then
         i_c <= i_2;
       end if;
-      if valid(3) = '1' then
-        rail_4 <= rail_1;
-      end if;
       if valid(4) = '1' then
         i_a             <= i_2;
-        current_at_rail <= rail_4(1 downto 0) & rail_4(2);
+        current_at_rail <= rail_2(1 downto 0) & rail_2(2);
       end if;
 
       if rst = '1' then

@@ -2,7 +2,7 @@
 --   raw(k)      = k_speed * wrap(code(k) - code(k-1))
 --   omega_me(k) = omega_me(k-1) + k_filter*(raw(k) - omega_me(k-1))
 -- Formats: difference S(-1,18) of a turn, k_speed U(12,12), k_filter U(1,16), state S(1,28), output PU.
--- Latency: 7.  Interval: 4 (the state is read from stage 4 on and written at stage 7).
+-- Latency: 7.  Interval: 5 (the state is read from stage 3 on and written at stage 7).
 -- Rounding: half up; raw saturates at 2 per unit, the state moves between values in range.
 -- The first sample after reset has no predecessor: its difference is zero.
 -- The difference is one sum: code, turned where the sensor counts backwards, and minus the last one, made beside it.

@@ -71,11 +71,12 @@ architecture rtl of svm is
 begin
   valid(0) <= in_valid;
 
-  -- 3x less 2y, both taken as positive, with the sign of x
+  -- 3x less 2y, both taken as positive, with the sign of x; a bit above the sum's, where 3x lacks that sign: there
+  -- 1 says that 2y is the larger
   alike_3  <= x_3(x_3'high) xnor y_3(y_3'high);
   triple_3 <= shift_left(resize(x_3, LEG_W), 1) + x_3;
   double_3 <= shift_left(resize(y_3, LEG_W), 1) xor (LEG_W - 1 downto 0 => alike_3);
-  apart_3  <= resize(triple_3 & alike_3, LEG_W + 2) + (double_3 & alike_3);
+  apart_3  <= signed('0' & triple_3 & alike_3) + (double_3 & alike_3);
 
   mid_4   <= leg_a_4 when a_mid_4 = '1' else
              leg_b_4 when alike_4 = '1' else
@@ -111,7 +112,7 @@ begin
         leg_b_4   <= shift_left(resize(y_3, LEG_W), 1) - x_3;
         minus_c_4 <= shift_left(resize(y_3, LEG_W), 1) + x_3;
         alike_4   <= alike_3;
-        a_mid_4   <= apart_3(LEG_W + 1) xor x_3(x_3'high);
+        a_mid_4   <= apart_3(LEG_W + 1);
       end if;
 
       -- Stage 5: the middle leg, with half an LSB of the duty to round with
