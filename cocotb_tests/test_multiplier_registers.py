@@ -7,7 +7,8 @@ import copy
 import numpy as np
 import pytest
 
-from scripts.synth.multiplier_registers import BITS, absorb, merge_twins
+from scripts.synth.multiplier_registers import absorb
+from scripts.synth.netlist import BITS, merge_twins
 
 CLOCK, ENABLE_1, ENABLE_2, RESET, FIRST = 2, 3, 4, 5, 10
 CLOCKS = 60
@@ -173,12 +174,30 @@ def test_twins_become_one(changes, gone):
 
 @pytest.mark.parametrize(
     ("cells", "moved"),
-    [(["LUT4"], 1), (["LUT4", "PFUMX"], 1), (["LUT4", "LUT4"], 0), (["CCU2C"], 0), (["LUT4", "CCU2C"], 0)],
+    [
+        (["LUT4"], 1),
+        (["LUT4", "PFUMX"], 1),
+        (["CCU2C"], 1),
+        (["LUT4", "LUT4", "LUT4"], 0),
+        (["LUT4", "CCU2C"], 0),
+    ],
 )
-def test_operands_behind_logic_stay_out(cells, moved):
-    """An operand's register moves into the multiplier from behind one LUT, not from behind more."""
+@pytest.mark.parametrize("logic_behind", [False, True])
+def test_operands_behind_logic_stay_out(cells, moved, logic_behind):
+    """An operand's register moves into the multiplier where the way to it is shorter than the one through it from
+    outside: from behind little, and from behind anything where the product has no register and logic follows."""
     netlist = design()
     module = netlist["modules"]["t"]
+    if logic_behind:
+        product = module["cells"]["m"]["connections"]["P0"][0]
+        nets = {"A": [product], "Z": [8999]}
+        module["cells"]["behind"] = {
+            "type": "LUT4",
+            "parameters": {},
+            "connections": nets,
+            "port_directions": {"A": "input", "Z": "output"},
+        }
+        module["cells"]["P0"]["connections"]["DI"] = [8999]
     bit = module["cells"]["A0"]["connections"]["DI"][0]
     for n, kind in enumerate(cells):
         directions = {"A": "input", "Z": "output"}
@@ -191,4 +210,4 @@ def test_operands_behind_logic_stay_out(cells, moved):
         }
         bit = 9000 + n
     module["cells"]["A0"]["connections"]["DI"] = [bit]
-    assert absorb(netlist, "t")["A"] == moved
+    assert absorb(netlist, "t")["A"] == (moved or logic_behind)

@@ -7,8 +7,9 @@ import copy
 import pytest
 
 from cocotb_tests.test_multiplier_registers import ENABLE_1, ENABLE_2, FIRST, RESET, flip_flop, simulate
+from scripts.synth.delays import NET
 from scripts.synth.multiplier_registers import absorb
-from scripts.synth.split_products import NET, retime
+from scripts.synth.split_products import retime
 
 GIVEN = 36  # bits from FIRST on that the simulation makes random: 18 of b, 18 of a, which is cut in two
 LOW, ADDED = 10, 24  # bits of the first part; bits of the adder

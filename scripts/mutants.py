@@ -85,7 +85,6 @@ MUTANTS = (
      "saturate(resize(omega_ref, PU_W + 1) - resize(omega_me, PU_W + 1), PU_W)", "omega_ref - omega_me"),
     ("integral without limit", "control/speed_pi.vhd",
      "beyond_5 <= room_4(room_4'high);", "beyond_5 <= room_4(room_4'high) and not valid(5);"),
-    ("integral limited by the next sample", "control/speed_pi.vhd", "within := limit_5 xor", "within := i_max xor"),
     ("integral of the next sample's mode", "control/speed_pi.vhd", "if whole_6 = '1' or", "if speed_mode = '0' or"),
     ("integration never held", "control/speed_pi.vhd", "valid(6) = '1' and held_6 = '0'", "valid(6) = '1'"),
     ("proportional part wraps", "control/speed_pi.vhd",

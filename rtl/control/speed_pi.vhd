@@ -59,7 +59,6 @@ architecture rtl of speed_pi is
   signal far_4      : std_logic;
   signal room_4     : signed(PU_W + 1 downto 0);
   signal v_5        : signed(PU_W downto 0);
-  signal limit_5    : signed(PU_W - 1 downto 0);
   signal beyond_5   : std_logic;
   signal limited_5  : signed(PU_W - 1 downto 0);
   signal held_6     : std_logic;
@@ -100,7 +99,7 @@ begin
   begin
     within := v_5(PU_W - 1 downto 0);
     if beyond_5 = '1' then
-      within := limit_5 xor (within'range => v_5(v_5'high));
+      within := i_max xor (within'range => v_5(v_5'high));
     end if;
     limited_5 <= plus_carry(within, beyond_5 and v_5(v_5'high));
   end process;
@@ -139,7 +138,6 @@ begin
       -- Stages 5, 6: v against i_max
       if valid(4) = '1' or valid(5) = '1' then
         v_5      <= v_4 and (v_4'range => run);
-        limit_5  <= i_max;
         beyond_5 <= room_4(room_4'high);
       end if;
 

@@ -12,8 +12,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from scripts.synth.multiplier_registers import absorb, merge_twins
+from scripts.synth.delays import NET
+from scripts.synth.multiplier_registers import absorb
 from scripts.synth.names import Names
+from scripts.synth.netlist import merge_twins
 from scripts.synth.split_products import retime
 from scripts.synth.wrapper import NAME, wrap
 from scripts.synth.yosys import run, yosys
@@ -26,7 +28,6 @@ EFFORT = ["--router", "router2", "--freq", str(GOAL_MHZ)]
 FLIP_FLOPS = (
     "$_DFF_?_ 01", "$_DFF_?P?_ r", "$_SDFF_?P?_ r", "$_DFFE_??_ 01", "$_DFFE_?P??_ r", "$_SDFFE_?P??_ r",
 )
-NET_PS = 1700  # what a net costs in these routes
 LENIENT = ["--lpf-allow-unconstrained", "--timing-allow-fail"]
 
 
@@ -57,7 +58,7 @@ def mapping() -> list[str]:
         "simplemap",
         "opt_clean",
         "check -latchonly -assert",
-        f"abc9 -W {NET_PS}",
+        f"abc9 -W {1000 * NET:.0f}",
         "clean",
         "flatten",
         "opt_clean",
