@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from scripts.synth.delays import NET
+from scripts.synth.fan_out import share_out
 from scripts.synth.multiplier_registers import absorb
 from scripts.synth.names import Names
 from scripts.synth.netlist import merge_twins
@@ -49,7 +50,7 @@ def mapping() -> list[str]:
         f"{whole} -run begin:map_ffs",
         "opt_clean",
         "select -set registered t:$_*DFF*_ %co1:+[Q] w:* %i i:* %u",
-        "select -set at_pin @registered %co1:+[SRST] t:$_SDFF* %i",
+        "select -set at_pin @registered %co1:+[R] t:$_SDFF* %i",
         "dffunmap -srst-only t:$_SDFF* @at_pin %d",
         f"dfflegalize {flip_flops}",
         "opt_merge",
@@ -125,20 +126,21 @@ def read_path(report: dict, register: Callable[[str], str]) -> CriticalPath:
 class Routing:
     """A module in its wrapper, synthesised once for ECP5; ``route`` places and routes it with a seed."""
 
-    def __init__(self, verilog: str, module: str, absorb_registers: bool = True):
+    def __init__(self, verilog: str, module: str, passes: bool = True):
         self._scratch = tempfile.TemporaryDirectory()
         self.folder = Path(self._scratch.name)
         (self.folder / "design.v").write_text(verilog + wrap(verilog, module))
         yosys(["read_verilog design.v", *mapping()], self.folder)
         self.names = Names(self.folder, module)
-        self.multipliers = self._absorb() if absorb_registers else {}
+        self.passes = self._pass() if passes else {}
 
-    def _absorb(self) -> dict[str, int]:
+    def _pass(self) -> dict[str, int]:
         path = self.folder / "design.json"
         netlist = json.loads(path.read_text())
         done = {"twins": merge_twins(netlist["modules"][NAME])}
         done |= {"split": retime(netlist, NAME)["multipliers"]}
         done |= absorb(netlist, NAME)
+        done |= {"copies": share_out(netlist, NAME)}
         path.write_text(json.dumps(netlist))
         return done
 

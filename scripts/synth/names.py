@@ -11,6 +11,7 @@ import re
 from bisect import bisect_right
 from pathlib import Path
 
+from scripts.synth.fan_out import COPY
 from scripts.synth.wrapper import NAME, chains
 
 _MODULE = re.compile(r"^module (\w+)")
@@ -52,6 +53,7 @@ class Names:
 
     def register(self, cell: str) -> str:
         """``module.signal`` of a flip-flop; "multiplier of FILE:LINE"; the wrapper's: "input NAME", "output NAME"."""
+        cell = cell.split(COPY, maxsplit=1)[0]
         near, known = _TAIL.split(cell, maxsplit=1)[0], self._cells.get(cell, {})
         found = _LINE.search(known.get("attributes", {}).get("src", ""))
         if not found:

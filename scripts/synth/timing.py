@@ -8,6 +8,7 @@ import time
 from collections.abc import Sequence
 
 from scripts.synth.ecp5 import DEVICE, Routing
+from scripts.synth.netlist import BITS
 from scripts.synth.yosys import Design
 
 TARGET_MHZ = 130
@@ -35,7 +36,8 @@ def routed(design: Design, seeds: Sequence[int]) -> dict:
         "seeds": list(seeds),
         "slowest_paths": paths,
         "device": "LFE5U-85F " + " ".join(DEVICE[1:]),
-        "multipliers_with_registers": routing.multipliers,
+        "multipliers_with_registers": {side: routing.passes[side] for side in BITS},
+        "copies": routing.passes["copies"],
     }
 
 

@@ -1,0 +1,68 @@
+"""Cells copied for many readers: made-up netlists compute the same, and nothing has more readers than is allowed."""
+
+from __future__ import annotations
+
+import copy
+
+import pytest
+
+from cocotb_tests.test_multiplier_registers import ENABLE_1, FIRST, RESET, flip_flop, simulate
+from scripts.synth.fan_out import COPY, share_out
+from scripts.synth.netlist import Nets
+
+READERS, MOST = 100, 8
+
+
+def design() -> dict:
+    """A bit through two registers that enables, resets and is read by ``READERS`` registers in turn."""
+    cells = {"early": flip_flop(FIRST, 100), "late": flip_flop(100, 101, ENABLE_1, LSR=RESET)}
+    for n in range(READERS):
+        given, q = FIRST + 1 + n % 30, 200 + n
+        cells[f"r{n:02d}"] = (
+            flip_flop(given, q, 101) if n % 3 == 0
+            else flip_flop(given, q, LSR=101) if n % 3 == 1
+            else flip_flop(101, q)
+        )  # fmt: skip
+    ports = {"y": {"direction": "output", "bits": [200 + n for n in range(READERS)]}}
+    return {"modules": {"t": {"cells": cells, "ports": ports}}}
+
+
+def fan_outs(netlist: dict) -> list[int]:
+    nets = Nets(netlist["modules"]["t"])
+    return [len(nets.readers[bit]) for bit in nets.driver]
+
+
+def test_copies_do_what_the_register_did():
+    before = design()
+    after = copy.deepcopy(before)
+    assert max(fan_outs(before)) == READERS
+    added = share_out(after, "t", MOST)
+    assert max(fan_outs(after)) <= MOST
+    # 100 readers are 13 copies' work, and 13 copies two registers' in front of them.
+    assert added == 12 + 1
+    assert simulate(after, 1) == simulate(before, 1)
+
+
+@pytest.mark.parametrize("break_it", ["DI", "CE"])
+def test_a_copy_with_another_input_is_noticed(break_it):
+    before = design()
+    after = copy.deepcopy(before)
+    share_out(after, "t", MOST)
+    name = next(name for name in after["modules"]["t"]["cells"] if COPY in name and name.startswith("late"))
+    after["modules"]["t"]["cells"][name]["connections"][break_it] = [FIRST + 35]
+    assert simulate(before, 1) != simulate(after, 1)
+
+
+def test_readers_of_one_register_stay_together():
+    netlist = design()
+    share_out(netlist, "t", MOST)
+    cells = netlist["modules"]["t"]["cells"]
+    reads = [max(bits[0] for port, bits in cells[f"r{n:02d}"]["connections"].items() if port in ("CE", "LSR", "DI")
+                 and bits[0] not in ("0", *range(FIRST, 99))) for n in range(READERS)]  # fmt: skip
+    assert sum(a != b for a, b in zip(reads, reads[1:], strict=False)) == 12
+
+
+def test_kept_cells_are_not_copied():
+    netlist = design()
+    netlist["modules"]["t"]["cells"]["late"]["attributes"] = {"keep": 1}
+    assert share_out(netlist, "t", MOST) == 0
