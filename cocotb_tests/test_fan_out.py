@@ -53,6 +53,20 @@ def test_a_copy_with_another_input_is_noticed(break_it):
     assert simulate(before, 1) != simulate(after, 1)
 
 
+def test_other_bits_of_a_port_stay():
+    netlist = design()
+    cells = netlist["modules"]["t"]["cells"]
+    for n in range(READERS):
+        port = {"DI": [300 + n, 101, "0", 400 + n]}
+        cells[f"m{n:02d}"] = {
+            "type": "TRELLIS_DPR16X4", "parameters": {}, "connections": port, "port_directions": {"DI": "input"}
+        }  # fmt: skip
+    share_out(netlist, "t", MOST)
+    ports = [cells[f"m{n:02d}"]["connections"]["DI"] for n in range(READERS)]
+    assert [(a, c, d) for a, _, c, d in ports] == [(300 + n, "0", 400 + n) for n in range(READERS)]
+    assert len({b for _, b, _, _ in ports}) > 1
+
+
 def test_readers_of_one_register_stay_together():
     netlist = design()
     share_out(netlist, "t", MOST)

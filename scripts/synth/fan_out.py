@@ -37,7 +37,9 @@ def share_out(netlist: dict, top: str, most: int = MOST) -> int:
             cells[copy] = {**model, "connections": {**model["connections"], OUTPUT[model["type"]]: [made]}}
             nets.driver[made], nets.readers[made] = copy, readers[start : start + share]
             for cell, port in nets.readers[made]:
-                cells[cell]["connections"] = {**cells[cell]["connections"], port: [made]}
+                connections = cells[cell]["connections"]
+                moved = [made if old == bit else old for old in connections[port]]
+                cells[cell]["connections"] = {**connections, port: moved}
             for port, source in given:
                 if not isinstance(source, str) and port != "CLK":
                     nets.readers[source].append((copy, port))
