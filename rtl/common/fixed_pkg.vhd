@@ -144,15 +144,20 @@ package body fixed_pkg is
   end function;
 
   function beyond (x : signed; limit : unsigned; shift : positive) return std_logic is
-    alias v       : signed(x'length - 1 downto 0) is x;
-    variable size : unsigned(x'length - 2 - shift downto 0);
-    variable more : std_logic;
-    variable room : signed(maximum(size'length, limit'length) + 1 downto 0);
+    constant PARTS : positive := (shift + 3) / 4;
+    alias v        : signed(x'length - 1 downto 0) is x;
+    variable size  : unsigned(x'length - 2 - shift downto 0);
+    variable more  : unsigned(PARTS - 1 downto 0);
+    variable room  : signed(maximum(size'length, limit'length) + PARTS downto 0);
   begin
     -- The complement of a negative x is one less than -x: so where it reaches the limit, -x is past it.
     size := unsigned(v(v'high - 1 downto shift) xor v(v'high));
-    more := v(v'high) or (or v(shift - 1 downto 0));
-    room := signed(resize(limit & '0', room'length)) - signed(resize(size & more, room'length));
+    -- What is below the limit's LSB, in parts that the carry of the comparison joins.
+    for k in more'range loop
+      more(k) := or v(minimum(4 * k + 3, shift - 1) downto 4 * k);
+    end loop;
+    more(0) := more(0) or v(v'high);
+    room    := signed(resize(limit & (PARTS - 1 downto 0 => '0'), room'length)) - signed(resize(size & more, room'length));
     return room(room'high);
   end function;
 

@@ -54,7 +54,7 @@ architecture rtl of delta_lambda is
   signal u_int_q_2 : signed(INTEGRAL_W - 1 downto 0);
 
   signal valid     : std_logic_vector(0 to LATENCY);
-  signal held      : std_logic;
+  signal held_1    : std_logic;
   signal limited   : std_logic;  -- in either axis
   signal i_1       : signed(PU_W - 1 downto 0);
   signal prod_2    : signed(PU_W + RESISTANCE_W downto 0);
@@ -64,6 +64,7 @@ architecture rtl of delta_lambda is
   signal over_3    : std_logic;
   signal coarse_4  : signed(FIT_W - 1 downto 0);
   signal over_4    : std_logic;
+  signal more_4    : std_logic;
   signal sign_4    : std_logic;
   signal shifted_5 : signed(FIT_W downto 0);
   signal rounded_5 : signed(FLUX_W + 1 downto 0);
@@ -75,7 +76,6 @@ architecture rtl of delta_lambda is
   signal delta_8   : signed(FLUX_W - 1 downto 0);
 begin
   valid(0) <= in_valid;
-  held     <= run when sat_d /= 0 or sat_q /= 0 or current_at_rail /= 0 or voltage_known = '0' else '0';
 
   -- The axis of the beat: d, made of the quantities of q, then q, made of those of d.
   u_int_2 <= u_int_d_2 when valid(3) = '1' else u_int_q_2;
@@ -84,13 +84,20 @@ begin
   -- sum is the complement of u_int - prod: the adder behind the multiplier only adds.
   rest_3 <= not sum_3(REST_W - 1 + DROP_R downto DROP_R);
 
-  -- Whether a bit unlike the sign is shifted into the sign or past it.
+  -- Whether a bit unlike the sign is shifted into the sign or past it: by fours, by the remainder.
   process (all)
   begin
     over_3 <= '0';
-    for k in 0 to SPEED_RECIPROCAL_N_MAX - 1 loop
-      if n_omega > k and rest_3(FIT_W - 1 - k) /= rest_3(REST_W - 1) then
+    for k in 0 to SPEED_RECIPROCAL_N_MAX / 4 - 1 loop
+      if n_omega(3 downto 2) > k and (or (rest_3(FIT_W - 1 - 4 * k downto FIT_W - 4 - 4 * k) xor rest_3(REST_W - 1))) = '1'
+      then
         over_3 <= '1';
+      end if;
+    end loop;
+    more_4 <= over_4;
+    for k in 0 to 2 loop
+      if n_omega(1 downto 0) > k and coarse_4(FIT_W - 1 - k) /= sign_4 then
+        more_4 <= '1';
       end if;
     end loop;
   end process;
@@ -99,13 +106,16 @@ begin
 
   -- Half up of prod for d, of -prod for q: the complement of prod less half an LSB and one is -prod and half an LSB.
   half_7  <= rounding_base("0", DROP, PROD_W + 1) xor valid(8);
-  delta_8 <= minus_rounded(old_8, old_8, DELTA_LAMBDA_FADE) when held = '1' else
+  delta_8 <= minus_rounded(old_8, old_8, DELTA_LAMBDA_FADE) when held_1 = '1' else
              saturate(sum_8(PROD_W downto DROP) xor valid(9), FLUX_W);
 
   process (clk)
   begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
+
+      -- Stage 1: held = run where the integrals mean something else
+      held_1 <= run when sat_d /= 0 or sat_q /= 0 or current_at_rail /= 0 or voltage_known = '0' else '0';
 
       -- Stages 1, 2: prod = r*i
       if valid(0) = '1' then
@@ -132,7 +142,7 @@ begin
       if valid(4) = '1' or valid(5) = '1' then
         shifted_5        <= '0' & shift_left(coarse_4, to_integer(n_omega(1 downto 0)));
         shifted_5(FIT_W) <= sign_4;
-        if over_4 = '1' then
+        if more_4 = '1' then
           -- Two bits, so that rounding cannot bring a negative one back.
           shifted_5(FIT_W - 1 downto FIT_W - 2) <= (others => not sign_4);
         end if;
@@ -163,9 +173,9 @@ begin
       end if;
       if valid(9) = '1' then
         delta_lambda_q <= delta_8;
-        delta_held     <= held;
+        delta_held     <= held_1;
         delta_limited  <= '0';
-        if run = '1' and held = '0' and factor /= 0 then
+        if run = '1' and held_1 = '0' and factor /= 0 then
           delta_limited <= limited;
         end if;
         u_int_d_1 <= u_int_d;
