@@ -21,6 +21,9 @@ package fixed_pkg is
   -- '1' where saturating x to width signed bits changes it.
   function exceeds (x : signed; width : positive) return std_logic;
 
+  -- saturate in the clock after: x limited to width signed bits, past telling whether it exceeds them.
+  function narrowed (x : signed; past : std_logic; width : positive) return signed;
+
   -- x limited to the range of an unsigned number of width bits.
   function saturate_u (x : signed; width : positive) return unsigned;
 
@@ -85,6 +88,17 @@ package body fixed_pkg is
     end if;
     -- In range when every bit above the result's sign repeats it.
     return (or v(v'high downto width - 1)) and not (and v(v'high downto width - 1));
+  end function;
+
+  function narrowed (x : signed; past : std_logic; width : positive) return signed is
+    alias v         : signed(x'length - 1 downto 0) is x;
+    variable result : signed(width - 1 downto 0) := v(width - 1 downto 0);
+  begin
+    if past = '1' then
+      result            := (others => not v(v'high));
+      result(width - 1) := v(v'high);
+    end if;
+    return result;
   end function;
 
   function saturate_u (x : signed; width : positive) return unsigned is

@@ -429,7 +429,7 @@ package fluxproof_pkg is
   constant SPEED_RECIPROCAL_WEIGHT_ONE : natural := 65536;
 
   -- delta_lambda: 001, eq. (15); 'delta lambda_dq' of Fig. 8
-  constant DELTA_LAMBDA_LATENCY : positive := 10;
+  constant DELTA_LAMBDA_LATENCY : positive := 11;
   constant DELTA_LAMBDA_DROP_R : natural := 12;
   constant DELTA_LAMBDA_DROP_SHIFTED : natural := 5;
   constant DELTA_LAMBDA_DROP_FACTOR : natural := 17;
@@ -481,7 +481,7 @@ package fluxproof_pkg is
   constant V_DEAD_ADALINE_FINE_TO_LEG : natural := 7;
 
   -- psi_adaline: 000, eq. (13), with the reluctance term of eq. (7b)
-  constant PSI_ADALINE_LATENCY : positive := 16;
+  constant PSI_ADALINE_LATENCY : positive := 17;
   constant PSI_ADALINE_PSI_STATE_W : natural := 36;
   constant PSI_ADALINE_DROP_V : natural := 11;
   constant PSI_ADALINE_DROP_R : natural := 17;

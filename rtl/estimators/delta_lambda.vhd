@@ -4,7 +4,7 @@
 -- u_int is that of two samples before.  While the integrals mean something else (a limit, a current converter at its
 -- end, voltage not known) delta_lambda fades by a sixteenth a sample; zero while the gates are off.
 -- Formats: r U(0,24), u_int and the difference 28 fraction bits, factor S(0,17), out FLUX.
--- Latency: 10 (d, q follow each other).  Interval: 10.
+-- Latency: 11 (d, q follow each other).  Interval: 11.
 -- Rounding: half up after r*i, the shift and the factor.  The shifted difference and the result saturate; the former
 -- is told unless the factor is zero.
 
@@ -55,6 +55,7 @@ architecture rtl of delta_lambda is
 
   signal valid     : std_logic_vector(0 to LATENCY);
   signal held_1    : std_logic;
+  signal moving_1  : std_logic;  -- the factor is not zero
   signal limited   : std_logic;  -- in either axis
   signal i_1       : signed(PU_W - 1 downto 0);
   signal prod_2    : signed(PU_W + RESISTANCE_W downto 0);
@@ -67,13 +68,18 @@ architecture rtl of delta_lambda is
   signal more_4    : std_logic;
   signal sign_4    : std_logic;
   signal shifted_5 : signed(FIT_W downto 0);
+  signal over_5    : std_logic;
+  signal past_5    : std_logic;
   signal rounded_5 : signed(FLUX_W + 1 downto 0);
   signal value_6   : signed(FLUX_W - 1 downto 0);
   signal prod_7    : signed(PROD_W - 1 downto 0);
   signal half_7    : signed(PROD_W downto 0);
   signal sum_8     : signed(PROD_W downto 0);
   signal old_8     : signed(FLUX_W - 1 downto 0);
-  signal delta_8   : signed(FLUX_W - 1 downto 0);
+  signal sum_9     : signed(PROD_W - DROP downto 0);
+  signal past_9    : std_logic;
+  signal faded_9   : signed(FLUX_W - 1 downto 0);
+  signal delta_9   : signed(FLUX_W - 1 downto 0);
 begin
   valid(0) <= in_valid;
 
@@ -103,11 +109,12 @@ begin
   end process;
 
   rounded_5 <= round_half_up(shifted_5, DELTA_LAMBDA_DROP_SHIFTED);
+  past_5    <= over_5 or exceeds(rounded_5, FLUX_W);
 
   -- Half up of prod for d, of -prod for q: the complement of prod less half an LSB and one is -prod and half an LSB.
   half_7  <= rounding_base("0", DROP, PROD_W + 1) xor valid(8);
-  delta_8 <= minus_rounded(old_8, old_8, DELTA_LAMBDA_FADE) when held_1 = '1' else
-             saturate(sum_8(PROD_W downto DROP) xor valid(9), FLUX_W);
+  delta_9 <= faded_9 when held_1 = '1' else
+             narrowed(sum_9, past_9, FLUX_W) xor valid(10);
 
   process (clk)
   begin
@@ -115,7 +122,8 @@ begin
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
       -- Stage 1: held = run where the integrals mean something else
-      held_1 <= run when sat_d /= 0 or sat_q /= 0 or current_at_rail /= 0 or voltage_known = '0' else '0';
+      held_1   <= run when sat_d /= 0 or sat_q /= 0 or current_at_rail /= 0 or voltage_known = '0' else '0';
+      moving_1 <= or factor;
 
       -- Stages 1, 2: prod = r*i
       if valid(0) = '1' then
@@ -134,24 +142,17 @@ begin
       end if;
 
       -- Stages 4, 5: shifted = rest * 2**n_omega, by fours, then the remainder
-      if valid(3) = '1' or valid(4) = '1' then
-        coarse_4 <= shift_left(rest_3(FIT_W - 1 downto 0), to_integer(n_omega(3 downto 2) & "00"));
-        over_4   <= over_3;
-        sign_4   <= rest_3(REST_W - 1);
-      end if;
-      if valid(4) = '1' or valid(5) = '1' then
-        shifted_5        <= '0' & shift_left(coarse_4, to_integer(n_omega(1 downto 0)));
-        shifted_5(FIT_W) <= sign_4;
-        if more_4 = '1' then
-          -- Two bits, so that rounding cannot bring a negative one back.
-          shifted_5(FIT_W - 1 downto FIT_W - 2) <= (others => not sign_4);
-        end if;
-      end if;
+      coarse_4         <= shift_left(rest_3(FIT_W - 1 downto 0), to_integer(n_omega(3 downto 2) & "00"));
+      over_4           <= over_3;
+      sign_4           <= rest_3(REST_W - 1);
+      shifted_5        <= '0' & shift_left(coarse_4, to_integer(n_omega(1 downto 0)));
+      shifted_5(FIT_W) <= sign_4;
+      over_5           <= more_4;
 
-      -- Stage 6: value = shifted, narrowed
+      -- Stage 6: value = shifted, narrowed; rounding may take a negative one's sign, not the one before it
       if valid(5) = '1' or valid(6) = '1' then
-        value_6 <= saturate(rounded_5, FLUX_W);
-        if exceeds(rounded_5, FLUX_W) = '1' then
+        value_6 <= narrowed(shifted_5(FIT_W) & rounded_5(FLUX_W - 1 downto 0), past_5, FLUX_W);
+        if past_5 = '1' then
           limited <= '1';
         end if;
       end if;
@@ -164,26 +165,30 @@ begin
         sum_8 <= half_7 + prod_7;
       end if;
 
-      -- Stage 9: delta_lambda = sum for d, -sum for q, narrowed, or what is left of it; d at clock 9, q at 10
-      if valid(8) = '1' then
-        delta_lambda_d <= delta_8;
+      -- Stage 9: whether the sum fits, and what is left of delta_lambda where it is held
+      if valid(8) = '1' or valid(9) = '1' then
+        sum_9   <= sum_8(PROD_W downto DROP);
+        past_9  <= exceeds(sum_8(PROD_W downto DROP), FLUX_W);
+        faded_9 <= minus_rounded(old_8, old_8, DELTA_LAMBDA_FADE);
       end if;
-      if valid(8) = '1' and run = '0' then
+
+      -- Stage 10: delta_lambda = sum for d, -sum for q, narrowed, or what is left of it; d at clock 10, q at 11
+      if valid(9) = '1' then
+        delta_lambda_d <= delta_9;
+      end if;
+      if valid(9) = '1' and run = '0' then
         delta_lambda_d <= (others => '0');
       end if;
-      if valid(9) = '1' then
-        delta_lambda_q <= delta_8;
+      if valid(10) = '1' then
+        delta_lambda_q <= delta_9;
         delta_held     <= held_1;
-        delta_limited  <= '0';
-        if run = '1' and held_1 = '0' and factor /= 0 then
-          delta_limited <= limited;
-        end if;
+        delta_limited  <= limited and moving_1 and run and not held_1;
         u_int_d_1 <= u_int_d;
         u_int_q_1 <= u_int_q;
         u_int_d_2 <= u_int_d_1;
         u_int_q_2 <= u_int_q_1;
       end if;
-      if valid(9) = '1' and run = '0' then
+      if valid(10) = '1' and run = '0' then
         delta_lambda_q <= (others => '0');
       end if;
 

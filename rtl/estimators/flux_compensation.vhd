@@ -78,7 +78,6 @@ begin
   step     <= valid(0 to LATENCY - TURN) or valid(TURN to LATENCY);
   upper    <= shift_left(signed(resize(delta_max, FLUX_STATE_W)), SHIFT_LIMIT);
   lower    <= shift_left(-signed(resize(delta_max, FLUX_STATE_W)), SHIFT_LIMIT);
-  kp       <= flux_kp when flux_mode = PROPOSED else KP_ONE;
   delta_0  <= delta_lambda_q when valid(TURN) = '1' else delta_lambda_d;
   moved_3  <= sum_i_3(SUM_W - 1 downto DROP_I);
   total_6  <= sum_p_6(SUM_W - 1 downto DROP_P);
@@ -116,7 +115,8 @@ begin
         sum_i_3 <= rounding_base(integral, DROP_I, SUM_W) + prod_i_2;
       end if;
 
-      -- Stage 4: prod_p = flux_kp*delta_lambda;  stages 4, 5: integral = sum_i, limited
+      -- Stage 4: prod_p = kp*delta_lambda, kp a setting;  stages 4, 5: integral = sum_i, limited
+      kp <= flux_kp when flux_mode = PROPOSED else KP_ONE;
       if step(3) = '1' then
         prod_p_4       <= delta_1 * signed('0' & kp);
         past_4         <= beyond(moved_3, delta_max, SHIFT_LIMIT);

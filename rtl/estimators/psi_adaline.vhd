@@ -4,7 +4,7 @@
 -- known or the gates off.
 -- r*i_q, v_leg*d_q, flux*omega_chord and e*omega_chord share a multiplier and the adder behind it.
 -- Formats: products and e FLUX, psi_m inside S(1,34), out PU.
--- Latency: 16.  Interval: 16.
+-- Latency: 17.  Interval: 17.
 -- Rounding: half up.  l_d*i_d, the flux, e, omega_chord*e and psi_m saturate.
 
 library ieee;
@@ -62,6 +62,7 @@ architecture rtl of psi_adaline is
   signal slow_1   : std_logic;
   signal prod_own : signed(PROD_W - 1 downto 0);
   signal sum_own  : signed(PROD_W downto 0);
+  signal past_3   : std_logic;
   signal own_3    : signed(FLUX_W - 1 downto 0);
   signal half_3   : std_logic;
   signal sum_flux : signed(FLUX_W + 1 downto 0);
@@ -77,7 +78,7 @@ architecture rtl of psi_adaline is
   signal sum      : signed(SUM_W - 1 downto 0);
   signal prod_psi : signed(FLUX_W + eta_psi'length downto 0);
   signal sum_psi  : signed(SUM_P_W - 1 downto 0);
-  signal half_15  : std_logic;
+  signal half_16  : std_logic;
 
   -- The half that rounds psi to width bits; next to the end of the range it would round past it.
   function half_below_end (x : signed; width : positive) return std_logic is
@@ -92,6 +93,7 @@ begin
   slow_1 <= not room_1(PU_W - 1) and ((or room_1(PU_W - 2 downto 1)) or (room_1(0) and not omega_chord(PU_W - 1)));
 
   -- own + psi rounded, by one carry: what the complement of own lacks and the half.
+  own_3    <= narrowed(sum_own(PROD_W downto DROP_L), past_3, FLUX_W);
   sum_flux <= (resize(psi(STATE_W - 1 downto TO_FLUX), FLUX_W + 1) & half_3) - (resize(not own_3, FLUX_W + 1) & '1');
 
   factor_a <= saturate(flux_4, FLUX_W) when valid(4) = '1' else
@@ -108,7 +110,6 @@ begin
           rounding_base(sum(SUM_W - 1 downto DROP_R), DROP_OMEGA, SUM_W) when valid(5) = '1' else
           rounding_base("0", DROP_OMEGA, SUM_W);
 
-  half_15 <= half_below_end(psi, PU_W);
 
   process (clk)
   begin
@@ -124,7 +125,7 @@ begin
       -- stays, and prod_own is flux_models' prod_model_d as long as both are always written.
       prod_own <= signed('0' & l_d) * i_d;
       sum_own  <= rounding_base("0", DROP_L, PROD_W + 1) + prod_own;
-      own_3    <= saturate(sum_own(PROD_W downto DROP_L), FLUX_W);
+      past_3   <= exceeds(sum_own(PROD_W downto DROP_L), FLUX_W);
       half_3   <= half_below_end(psi, FLUX_W);
       flux_4   <= sum_flux(FLUX_W + 1 downto 1);
 
@@ -151,9 +152,10 @@ begin
         psi <= saturate(sum_psi(SUM_P_W - 1 downto DROP_ETA), STATE_W);
       end if;
 
-      -- Stage 16: psi_m = psi, narrowed
-      if valid(15) = '1' then
-        psi_m <= signed'('0' & half_15) + psi(STATE_W - 1 downto TO_PU);
+      -- Stages 16, 17: psi_m = psi, narrowed
+      half_16 <= half_below_end(psi, PU_W);
+      if valid(16) = '1' then
+        psi_m <= signed'('0' & half_16) + psi(STATE_W - 1 downto TO_PU);
       end if;
 
       if rst = '1' then

@@ -84,14 +84,15 @@ architecture rtl of v_dead_adaline is
   signal prod_lp   : signed(k_lp'length + PU_W downto 0);
   signal sum_lp    : signed(k_lp'length + PU_W + 1 downto 0);
   signal moved     : signed(INTEGRAL_W - 1 downto 0);       -- lp_u at clock 4, lp_d at clock 8
-  signal lp_under  : std_logic;
+  signal lp_under  : std_logic_vector(1 downto 0);          -- by halves of what is above half an LSB of PU
   signal mul_a     : signed(FLUX_W - 1 downto 0);           -- fine at clock 7, e at clock 10, eta_v at clock 14
   signal mul_b     : signed(PU_W - 1 downto 0);             -- d_h at clock 7, pull at clock 14
   signal prod      : signed(PROD_W - 1 downto 0);
   signal addend    : signed(SUM_W - 1 downto 0);
   signal sum       : signed(SUM_W - 1 downto 0);
   signal e_9       : signed(FLUX_W - 1 downto 0);
-  signal pull_13   : signed(STEP_W - 1 downto 0);
+  signal pull_13   : signed(SUM_W - 1 - DROP_STEP downto 0);
+  signal past_13   : std_logic;
   signal v_16      : signed(STATE_W downto 0);
   signal past_17   : std_logic;
   signal under_17  : std_logic;
@@ -138,7 +139,7 @@ begin
 
   -- A low-pass with k_lp < 1 leaves the range of what it filters by half an LSB of PU at most: that is within
   -- INTEGRAL at the upper end of PU, and below its lower end where lp, which is half an LSB more, has no such bit.
-  moved <= sum_lp(INTEGRAL_W - 1 + DROP_LP downto DROP_LP);
+  moved    <= sum_lp(INTEGRAL_W - 1 + DROP_LP downto DROP_LP);
 
   e_9      <= saturate(not sum(SUM_W - 1 downto DROP_MODEL), FLUX_W);
   v_16     <= sum(STATE_W + DROP_ETA downto DROP_ETA);
@@ -176,7 +177,7 @@ begin
         u_h_6 <= h;
       end if;
 
-      -- Stages 3 to 6, 7 to 10: lp_u += k_lp*u_h, lp_d += k_lp*d_h
+      -- Stages 3 to 7, 7 to 11: lp_u += k_lp*u_h, lp_d += k_lp*d_h
       if valid(2) = '1' or valid(6) = '1' then
         prod_lp <= signed('0' & k_lp) * h;
       end if;
@@ -187,11 +188,12 @@ begin
       if valid(4) = '1' or valid(8) = '1' then
         lp_last <= moved;
       end if;
-      lp_under <= moved(INTEGRAL_W - 1) and not (or moved(INTEGRAL_W - 2 downto PU_TO_INTEGRAL - 1));
-      if (valid(5) = '1' or valid(9) = '1') and lp_under = '1' then
+      lp_under(1) <= lp_last(INTEGRAL_W - 1) and not (or lp_last(INTEGRAL_W - 2 downto INTEGRAL_W - PU_W / 2));
+      lp_under(0) <= not (or lp_last(INTEGRAL_W - PU_W / 2 - 1 downto PU_TO_INTEGRAL - 1));
+      if (valid(6) = '1' or valid(10) = '1') and lp_under = "11" then
         lp_last(PU_TO_INTEGRAL - 1 downto 0) <= LP_ZERO(PU_TO_INTEGRAL - 1 downto 0);
       end if;
-      if (valid(4) = '1' or valid(8) = '1') and run = '0' then
+      if (valid(6) = '1' or valid(10) = '1') and run = '0' then
         lp_last <= LP_ZERO;
       end if;
 
@@ -206,10 +208,11 @@ begin
         end if;
       end if;
       if valid(12) = '1' then
-        pull_13 <= saturate(sum(SUM_W - 1 downto DROP_STEP), STEP_W);
+        pull_13 <= sum(SUM_W - 1 downto DROP_STEP);
+        past_13 <= exceeds(sum(SUM_W - 1 downto DROP_STEP), STEP_W);
       end if;
       if valid(6) = '1' or valid(13) = '1' then
-        mul_b <= pull_13 when valid(13) = '1' else h;
+        mul_b <= narrowed(pull_13, past_13, STEP_W) when valid(13) = '1' else h;
       end if;
 
       -- Stages 8, 11, 15: prod = fine*d_h, e*d_h, eta_v*pull
@@ -248,11 +251,11 @@ begin
 
       -- Stages 20, 21: zeta where |fine| > v_thr;  stages 22, 23: sum_z = v_sum + zeta*fine
       if valid(19) = '1' then
-        adding_20 <= learning and beyond(fine, v_thr, FINE_TO_LEG);
+        adding_20 <= beyond(fine, v_thr, FINE_TO_LEG);
       end if;
       if valid(20) = '1' then
         zeta_21 <= zeta;
-        if adding_20 = '0' then
+        if adding_20 = '0' or learning = '0' then
           zeta_21 <= (others => '0');
         end if;
       end if;
@@ -265,15 +268,15 @@ begin
 
       -- Stages 24, 25: v_sum = sum_z, limited
       if valid(23) = '1' then
-        past_24  <= at_limit(v_sum_23, v_comp_max);
-        under_24 <= v_sum_23(v_sum_23'high);
+        past_24  <= at_limit(v_sum_23, v_comp_max) or v_sum_23(v_sum_23'high) or not compensate;
+        under_24 <= v_sum_23(v_sum_23'high) or not compensate;
         v_sum    <= v_sum_23(STATE_W - 1 downto 0);
       end if;
       if valid(24) = '1' and past_24 = '1' then
         v_sum <= shift_left(resize(signed('0' & v_comp_max), STATE_W), TO_LEG);
-      end if;
-      if valid(24) = '1' and (compensate = '0' or under_24 = '1') then
-        v_sum <= (others => '0');
+        if under_24 = '1' then
+          v_sum <= (others => '0');
+        end if;
       end if;
 
       -- Stages 25, 26: sum_g = v_sum + gamma*fine
@@ -287,7 +290,7 @@ begin
       -- Stages 27, 28: v_comp = sum_g, narrowed and limited; the rounding moves nothing past the limit
       if valid(26) = '1' then
         past_27        <= beyond(v_26, v_comp_max, TO_LEG);
-        under_27       <= v_26(v_26'high);
+        under_27       <= v_26(v_26'high) or not compensate;
         v_comp         <= resize(round_half_up(v_26, TO_LEG), V_LEG_W);
         v_comp_limited <= '0';
       end if;
@@ -295,7 +298,7 @@ begin
         v_comp         <= signed('0' & v_comp_max);
         v_comp_limited <= '1';
       end if;
-      if valid(27) = '1' and (compensate = '0' or under_27 = '1') then
+      if valid(27) = '1' and under_27 = '1' then
         v_comp         <= (others => '0');
         v_comp_limited <= '0';
       end if;
