@@ -63,8 +63,6 @@ begin
   valid(0) <= in_valid;
   fours_0  <= leading_zeros(x, 4, FOURS);
 
-  -- Below the least number the fours are all used up, and the rest does not reach the leading one.
-  low_1    <= '1' when fours_1 = FOURS and shifted_1(U_DC_W - 1 downto U_DC_W - 1 - N_MAX mod 4) = 0 else '0';
   trial    <= remainder & '0';
   rest     <= trial - mantissa;
 
@@ -75,6 +73,7 @@ begin
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
       -- Stage 1: shifted = x * 2**(4*fours); x stays, so no enable has to wait for the shift
+      low_1     <= '1' when x(U_DC_W - 1 downto U_DC_W - 1 - N_MAX) = 0 else '0';
       fours_1   <= fours_0;
       shifted_1 <= shift_left(x, 4 * fours_0);
 

@@ -4,8 +4,8 @@
 --   s_b = limit(k_sign*(-x + sqrt(3)*y)/2, +-1);  s_c = limit(k_sign*(-x - sqrt(3)*y)/2, +-1)
 --   s_alpha, s_beta: their Clarke transform
 -- Thirteen products one after the other, through one multiplier and the adder behind it: sum = addend + mul_a*mul_b.
--- The last five are transforms/clarke, which cannot saturate here, alpha's and beta's by turns.  The outputs are state: the next sample starts with
--- them.
+-- The last five are transforms/clarke, which cannot saturate here, alpha's and beta's by turns.  The outputs are state:
+-- the next sample starts with them.
 -- Formats: PU in and out; k_ahead U(1,16), sqrt(3) U(1,16), k_sign U(12,12); products exact.
 -- Latency: 31.  Interval: 31.
 -- Rounding: every product half up.  turn, x, y and twice each phase current saturate.
@@ -50,6 +50,7 @@ architecture rtl of current_directions is
   signal by_sign    : std_logic;                          -- the factor is k_sign
   signal by_phase   : std_logic;                          -- the other factor is a direction
   signal on_sum     : std_logic;                          -- the sum goes on
+  signal s_moves    : std_logic;
   signal constant_a : signed(WIDE_W - 1 downto 0);
   signal factor_a   : signed(WIDE_W - 1 downto 0);
   signal factor_b   : signed(PU_W - 1 downto 0);
@@ -110,6 +111,7 @@ begin
       by_sign    <= or valid(15 to 17);
       by_phase   <= or valid(22 to 26);
       on_sum     <= or valid(25 to 27);
+      s_moves    <= valid(19) or valid(20) or valid(21) or valid(23) or valid(25);
       constant_a <= when_set(ROOT, valid(10)) or when_set(-ROOT, valid(11)) or when_set(-THIRD, valid(22) or valid(24))
                     or when_set(BY_BETA, valid(23)) or when_set(-BY_BETA, valid(25))
                     or when_set(shift_left(THIRD, 1), valid(26));
@@ -145,7 +147,7 @@ begin
       -- stages 25, 27: the next phase
       s      <= sum(SUM_W - 1 downto DROP);
       s_past <= exceeds(sum(SUM_W - 1 downto DROP), PU_W - 1);
-      if (valid(20) or valid(21) or valid(22) or valid(24) or valid(26)) = '1' then
+      if s_moves = '1' then
         s_next <= s_then;
         s_then <= s_last;
         s_last <= s(PU_W - 1 downto 0);

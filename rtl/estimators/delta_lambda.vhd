@@ -55,7 +55,7 @@ architecture rtl of delta_lambda is
 
   signal valid     : std_logic_vector(0 to LATENCY);
   signal held_1    : std_logic;
-  signal moving_1  : std_logic;  -- the factor is not zero
+  signal moving_1  : std_logic_vector(1 downto 0);  -- whether the factor is not zero, by halves
   signal limited   : std_logic;  -- in either axis
   signal i_1       : signed(PU_W - 1 downto 0);
   signal prod_2    : signed(PU_W + RESISTANCE_W downto 0);
@@ -123,7 +123,7 @@ begin
 
       -- Stage 1: held = run where the integrals mean something else
       held_1   <= run when sat_d /= 0 or sat_q /= 0 or current_at_rail /= 0 or voltage_known = '0' else '0';
-      moving_1 <= or factor;
+      moving_1 <= (or factor(RECIPROCAL_W downto RECIPROCAL_W / 2)) & (or factor(RECIPROCAL_W / 2 - 1 downto 0));
 
       -- Stages 1, 2: prod = r*i
       if valid(0) = '1' then
@@ -182,7 +182,7 @@ begin
       if valid(10) = '1' then
         delta_lambda_q <= delta_9;
         delta_held     <= held_1;
-        delta_limited  <= limited and moving_1 and run and not held_1;
+        delta_limited  <= limited and (or moving_1) and run and not held_1;
         u_int_d_1 <= u_int_d;
         u_int_q_1 <= u_int_q;
         u_int_d_2 <= u_int_d_1;
