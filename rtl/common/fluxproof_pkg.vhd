@@ -429,7 +429,7 @@ package fluxproof_pkg is
   constant SPEED_RECIPROCAL_WEIGHT_ONE : natural := 65536;
 
   -- delta_lambda: 001, eq. (15); 'delta lambda_dq' of Fig. 8
-  constant DELTA_LAMBDA_LATENCY : positive := 11;
+  constant DELTA_LAMBDA_LATENCY : positive := 12;
   constant DELTA_LAMBDA_DROP_R : natural := 12;
   constant DELTA_LAMBDA_DROP_SHIFTED : natural := 5;
   constant DELTA_LAMBDA_DROP_FACTOR : natural := 17;

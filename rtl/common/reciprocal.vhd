@@ -37,7 +37,8 @@ architecture rtl of reciprocal is
   signal fours_0   : natural range 0 to FOURS;
   signal fours_1   : natural range 0 to FOURS;
   signal shifted_1 : unsigned(U_DC_W - 1 downto 0);
-  signal low_1     : std_logic;
+  signal shifted_0 : unsigned(U_DC_W - 1 downto 0);
+  signal low_1     : std_logic_vector(1 downto 0);  -- below the least number, by halves
   signal low_2     : std_logic;
   signal mantissa  : unsigned(U_DC_W - 1 downto 0);
   signal shift     : natural range 0 to N_MAX;
@@ -63,8 +64,19 @@ begin
   valid(0) <= in_valid;
   fours_0  <= leading_zeros(x, 4, FOURS);
 
-  trial    <= remainder & '0';
-  rest     <= trial - mantissa;
+  trial <= remainder & '0';
+  rest  <= trial - mantissa;
+
+  -- The first group with a one chooses, without waiting for the number of zeros.
+  process (all)
+  begin
+    shifted_0 <= shift_left(x, 4 * FOURS);
+    for k in FOURS - 1 downto 0 loop
+      if x(U_DC_W - 1 - 4 * k downto U_DC_W - 4 - 4 * k) /= 0 then
+        shifted_0 <= shift_left(x, 4 * k);
+      end if;
+    end loop;
+  end process;
 
   process (clk)
     variable rounded : unsigned(BITS - 1 downto 0);
@@ -73,16 +85,17 @@ begin
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
       -- Stage 1: shifted = x * 2**(4*fours); x stays, so no enable has to wait for the shift
-      low_1     <= '1' when x(U_DC_W - 1 downto U_DC_W - 1 - N_MAX) = 0 else '0';
+      low_1(1)  <= not (or x(U_DC_W - 1 downto U_DC_W - 1 - N_MAX / 2));
+      low_1(0)  <= not (or x(U_DC_W - 2 - N_MAX / 2 downto U_DC_W - 1 - N_MAX));
       fours_1   <= fours_0;
-      shifted_1 <= shift_left(x, 4 * fours_0);
+      shifted_1 <= shifted_0;
 
       -- Stage 2: mantissa = x * 2**shift, in [1, 2); the least x gives one
       if valid(1) = '1' then
-        low_2    <= low_1;
+        low_2    <= and low_1;
         shift    <= N_MAX;
         mantissa <= (U_DC_W - 1 => '1', others => '0');
-        if low_1 = '0' then
+        if low_1 /= "11" then
           shift    <= 4 * fours_1 + leading_zeros(shifted_1, 1, 3);
           mantissa <= shift_left(shifted_1, leading_zeros(shifted_1, 1, 3));
         end if;

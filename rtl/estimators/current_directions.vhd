@@ -48,9 +48,13 @@ architecture rtl of current_directions is
 
   signal valid      : std_logic_vector(0 to LATENCY);
   signal by_sign    : std_logic;                          -- the factor is k_sign
+  signal by_current : std_logic;                          -- the factor is a current
+  signal by_third   : std_logic;                          -- the factor will be -1/3
   signal by_phase   : std_logic;                          -- the other factor is a direction
   signal on_sum     : std_logic;                          -- the sum goes on
+  signal on_sign    : std_logic;                          -- half an LSB of a direction
   signal s_moves    : std_logic;
+  signal current_a  : signed(PU_W - 1 downto 0);
   signal constant_a : signed(WIDE_W - 1 downto 0);
   signal factor_a   : signed(WIDE_W - 1 downto 0);
   signal factor_b   : signed(PU_W - 1 downto 0);
@@ -65,8 +69,9 @@ architecture rtl of current_directions is
   signal narrow     : signed(PU_W - 1 downto 0);          -- turn at clock 5, not x at 10, y at 11, b at 16, c at 17
   signal minus_x_11 : signed(PU_W downto 0);
   signal twice_a_11 : signed(PU_W - 1 downto 0);
-  signal s          : signed(SUM_W - 1 - DROP downto 0);  -- a direction, and whether it is past one
-  signal s_past     : std_logic;
+  signal s          : signed(SUM_W - 1 - DROP downto 0);  -- a direction; the bits from that of one on: any, all
+  signal s_any      : std_logic;
+  signal s_all      : std_logic;
   signal s_next     : signed(PU_W - 1 downto 0);          -- the phases: the one that comes next, the others
   signal s_then     : signed(PU_W - 1 downto 0);
   signal s_last     : signed(PU_W - 1 downto 0);
@@ -82,8 +87,7 @@ begin
 
   -- Each is chosen by one bit, so that no choice waits for another.
   factor_a <= when_set(signed(resize(k_ahead, WIDE_W)), valid(0))
-              or when_set(resize(i_beta, WIDE_W), valid(5))
-              or when_set(resize(i_alpha, WIDE_W), valid(6))
+              or when_set(resize(current_a, WIDE_W), by_current)
               or when_set(signed('0' & k_sign), by_sign)
               or constant_a;
   factor_b <= omega_me when valid(0) = '1' else
@@ -92,15 +96,15 @@ begin
               narrow;
 
   -- x comes as its complement: the adder behind the multiplier only adds.
-  base <= rounding_base(not i_alpha, TURN_BY, SUM_W) when valid(6) = '1' else
-          rounding_base(i_beta, TURN_BY, SUM_W) when valid(7) = '1' else
-          rounding_base(minus_x_11, TURN_BY, SUM_W) when valid(12) = '1' else
-          resize(minus_x_11 & HALF_DOWN, SUM_W) when valid(13) = '1' else
-          sum when on_sum = '1' else
-          rounding_base("0", CLARKE_DROP_ALPHA, SUM_W) when valid(24) = '1' else
-          rounding_base("0", CLARKE_DROP_BETA, SUM_W) when valid(25) = '1' else
-          rounding_base("0", TURN_BY, SUM_W) when valid(1) = '1' else
-          rounding_base("0", DROP, SUM_W);
+  base <= when_set(rounding_base(not i_alpha, TURN_BY, SUM_W), valid(6))
+          or when_set(rounding_base(i_beta, TURN_BY, SUM_W), valid(7))
+          or when_set(rounding_base(minus_x_11, TURN_BY, SUM_W), valid(12))
+          or when_set(resize(minus_x_11 & HALF_DOWN, SUM_W), valid(13))
+          or when_set(sum, on_sum)
+          or when_set(rounding_base("0", CLARKE_DROP_ALPHA, SUM_W), valid(24))
+          or when_set(rounding_base("0", CLARKE_DROP_BETA, SUM_W), valid(25))
+          or when_set(rounding_base("0", TURN_BY, SUM_W), valid(1))
+          or when_set(rounding_base("0", DROP, SUM_W), on_sign);
 
   process (clk)
   begin
@@ -109,10 +113,14 @@ begin
 
       -- What is chosen by more than one clock is known a clock before.
       by_sign    <= or valid(15 to 17);
+      by_current <= valid(4) or valid(5);
+      by_third   <= valid(21) or valid(23);
       by_phase   <= or valid(22 to 26);
       on_sum     <= or valid(25 to 27);
+      on_sign    <= by_sign;
       s_moves    <= valid(19) or valid(20) or valid(21) or valid(23) or valid(25);
-      constant_a <= when_set(ROOT, valid(10)) or when_set(-ROOT, valid(11)) or when_set(-THIRD, valid(22) or valid(24))
+      current_a  <= i_beta when valid(4) = '1' else i_alpha;
+      constant_a <= when_set(ROOT, valid(10)) or when_set(-ROOT, valid(11)) or when_set(-THIRD, by_third)
                     or when_set(BY_BETA, valid(23)) or when_set(-BY_BETA, valid(25))
                     or when_set(shift_left(THIRD, 1), valid(26));
 
@@ -145,13 +153,14 @@ begin
 
       -- Stages 20 to 23: s = sum, narrowed and limited: past one where its bits from that of one on are not all alike;
       -- stages 25, 27: the next phase
-      s      <= sum(SUM_W - 1 downto DROP);
-      s_past <= exceeds(sum(SUM_W - 1 downto DROP), PU_W - 1);
+      s     <= sum(SUM_W - 1 downto DROP);
+      s_any <= or sum(SUM_W - 1 downto DROP + PU_W - 2);
+      s_all <= and sum(SUM_W - 1 downto DROP + PU_W - 2);
       if s_moves = '1' then
         s_next <= s_then;
         s_then <= s_last;
         s_last <= s(PU_W - 1 downto 0);
-        if s_past = '1' then
+        if s_any = '1' and s_all = '0' then
           s_last <= -ONE when s < 0 else ONE;
         end if;
       end if;

@@ -74,6 +74,7 @@ architecture rtl of flux_merge is
   signal beta       : std_logic;
   signal trusted    : std_logic;
   signal limited    : std_logic;  -- by any stage of either axis
+  signal limits     : std_logic_vector(2 downto 0);  -- a stage does: lambda, eps, x
   signal moves      : std_logic;  -- flux does
   signal source     : std_logic_vector(1 downto 0);  -- of flux, when it moves next
   signal i_1        : signed(PU_W - 1 downto 0);
@@ -83,7 +84,6 @@ architecture rtl of flux_merge is
   signal prod_u_2   : signed(FLUX_W + SAMPLE_TIME_W downto 0);
   signal sum_r      : signed(SUM_R_W - 1 downto 0);  -- at clock 3, then at clock 14
   signal less_r     : signed(TOTAL_W downto 0);
-  signal past_r     : std_logic;
   signal top        : std_logic_vector(1 downto 0);  -- flux a clock ago: would be rounded past its end, by halves
   signal rounded    : signed(FLUX_STATE_W downto FLUX_TO_STATE);
   signal diff_5     : signed(FLUX_W + 1 downto 0);
@@ -132,9 +132,6 @@ begin
         lambda_c_1 <= lambda_c_beta when beta = '1' else lambda_c_alpha;
         u_1        <= u_applied_beta when beta = '1' else u_applied_alpha;
       end if;
-      if valid(0) = '1' then
-        limited <= '0';
-      end if;
 
       -- Stage 2: prod_r = -rho*i;  prod_u = t_s*u_applied
       if step(1) = '1' then
@@ -176,10 +173,7 @@ begin
       if step(15) = '1' then
         flux_other <= flux;
       end if;
-      past_r <= exceeds(less_r, FLUX_STATE_W);
-      if ((step(4) and trusted) or step(15)) = '1' and past_r = '1' then
-        limited <= '1';
-      end if;
+      limits(0) <= ((step(3) and trusted) or step(14)) and exceeds(less_r, FLUX_STATE_W);
 
       -- Stages 5, 16: next to the end of the range the flux would be rounded past it: saturated before it is rounded.
       top(1) <= not flux(FLUX_STATE_W - 1) and (and flux(FLUX_STATE_W - 2 downto FLUX_STATE_W / 2));
@@ -191,10 +185,8 @@ begin
       end if;
       if step(6) = '1' then
         eps_7 <= saturate(eps_6, FLUX_W);
-        if exceeds(eps_6, FLUX_W) = '1' then
-          limited <= '1';
-        end if;
       end if;
+      limits(1) <= step(6) and exceeds(eps_6, FLUX_W);
 
       -- Stages 8, 9: y = omega_0*eps; |eps| <= 2 and omega_0 < 1/4, so it fits
       if step(7) = '1' then
@@ -221,10 +213,9 @@ begin
         x        <= x_other;
         x_other  <= saturate(moved_11, X_W);
         sum_u_12 <= rounding_base(sum_xi_11(PROD_X_W downto DROP_XI), DROP_U, SUM_U_W) + prod_u_2;
-        if exceeds(moved_11, X_W) = '1' then
-          limited <= '1';
-        end if;
       end if;
+      limits(2) <= step(11) and exceeds(moved_11, X_W);
+      limited   <= (or limits) or (limited and not valid(0));
       if valid(0) = '1' and trusted = '0' then
         x       <= (others => '0');
         x_other <= (others => '0');

@@ -64,6 +64,7 @@ architecture rtl of psi_adaline is
   signal sum_own  : signed(PROD_W downto 0);
   signal past_3   : std_logic;
   signal own_3    : signed(FLUX_W - 1 downto 0);
+  signal end_3    : std_logic_vector(1 downto 0);
   signal half_3   : std_logic;
   signal sum_flux : signed(FLUX_W + 1 downto 0);
   signal flux_4   : signed(FLUX_W downto 0);
@@ -78,13 +79,15 @@ architecture rtl of psi_adaline is
   signal sum      : signed(SUM_W - 1 downto 0);
   signal prod_psi : signed(FLUX_W + eta_psi'length downto 0);
   signal sum_psi  : signed(SUM_P_W - 1 downto 0);
+  signal end_16   : std_logic_vector(1 downto 0);
   signal half_16  : std_logic;
 
-  -- The half that rounds psi to width bits; next to the end of the range it would round past it.
-  function half_below_end (x : signed; width : positive) return std_logic is
+  -- Whether x, cut to width bits, is the last number: a half would round it past the end of its range.  By halves.
+  function at_end (x : signed; width : positive) return std_logic_vector is
     alias v : signed(x'length - 1 downto 0) is x;
   begin
-    return v(v'high - width) and not (not v(v'high) and (and v(v'high - 1 downto v'high - width + 1)));
+    return (not v(v'high) and (and v(v'high - 1 downto v'high - width / 2)))
+           & (and v(v'high - width / 2 - 1 downto v'high - width + 1));
   end function;
 begin
   valid(0) <= in_valid;
@@ -94,6 +97,8 @@ begin
 
   -- own + psi rounded, by one carry: what the complement of own lacks and the half.
   own_3    <= narrowed(sum_own(PROD_W downto DROP_L), past_3, FLUX_W);
+  half_3   <= psi(TO_FLUX - 1) and not (and end_3);
+  half_16  <= psi(TO_PU - 1) and not (and end_16);
   sum_flux <= (resize(psi(STATE_W - 1 downto TO_FLUX), FLUX_W + 1) & half_3) - (resize(not own_3, FLUX_W + 1) & '1');
 
   factor_a <= saturate(flux_4, FLUX_W) when valid(4) = '1' else
@@ -110,7 +115,6 @@ begin
           rounding_base(sum(SUM_W - 1 downto DROP_R), DROP_OMEGA, SUM_W) when valid(5) = '1' else
           rounding_base("0", DROP_OMEGA, SUM_W);
 
-
   process (clk)
   begin
     if rising_edge(clk) then
@@ -126,7 +130,7 @@ begin
       prod_own <= signed('0' & l_d) * i_d;
       sum_own  <= rounding_base("0", DROP_L, PROD_W + 1) + prod_own;
       past_3   <= exceeds(sum_own(PROD_W downto DROP_L), FLUX_W);
-      half_3   <= half_below_end(psi, FLUX_W);
+      end_3    <= at_end(psi, FLUX_W);
       flux_4   <= sum_flux(FLUX_W + 1 downto 1);
 
       -- Stages 1, 3, 5, 9: r and i_q, v_leg and d_q, flux and omega_chord, e and omega_chord
@@ -153,7 +157,7 @@ begin
       end if;
 
       -- Stages 16, 17: psi_m = psi, narrowed
-      half_16 <= half_below_end(psi, PU_W);
+      end_16 <= at_end(psi, PU_W);
       if valid(16) = '1' then
         psi_m <= signed'('0' & half_16) + psi(STATE_W - 1 downto TO_PU);
       end if;

@@ -139,7 +139,7 @@ begin
 
   -- A low-pass with k_lp < 1 leaves the range of what it filters by half an LSB of PU at most: that is within
   -- INTEGRAL at the upper end of PU, and below its lower end where lp, which is half an LSB more, has no such bit.
-  moved    <= sum_lp(INTEGRAL_W - 1 + DROP_LP downto DROP_LP);
+  moved <= sum_lp(INTEGRAL_W - 1 + DROP_LP downto DROP_LP);
 
   e_9      <= saturate(not sum(SUM_W - 1 downto DROP_MODEL), FLUX_W);
   v_16     <= sum(STATE_W + DROP_ETA downto DROP_ETA);
