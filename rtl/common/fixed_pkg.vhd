@@ -171,7 +171,8 @@ package body fixed_pkg is
       more(k) := or v(minimum(4 * k + 3, shift - 1) downto 4 * k);
     end loop;
     more(0) := more(0) or v(v'high);
-    room    := signed(resize(limit & (PARTS - 1 downto 0 => '0'), room'length)) - signed(resize(size & more, room'length));
+    room    := signed(resize(limit & (PARTS - 1 downto 0 => '0'), room'length))
+               - signed(resize(size & more, room'length));
     return room(room'high);
   end function;
 

@@ -111,7 +111,8 @@ begin
 
   -- lambda_c - flux, rounded by one carry, which is the half of flux below its end.
   diff_5 <= (lambda_c_1(FLUX_W - 1) & lambda_c_1 & '0')
-            - (resize(flux(FLUX_STATE_W - 1 downto FLUX_TO_STATE), FLUX_W + 1) & (flux(FLUX_TO_STATE - 1) and not (and top)));
+            - (resize(flux(FLUX_STATE_W - 1 downto FLUX_TO_STATE), FLUX_W + 1)
+               & (flux(FLUX_TO_STATE - 1) and not (and top)));
 
   process (clk)
   begin

@@ -268,15 +268,15 @@ begin
 
       -- Stages 24, 25: v_sum = sum_z, limited
       if valid(23) = '1' then
-        past_24  <= at_limit(v_sum_23, v_comp_max) or v_sum_23(v_sum_23'high) or not compensate;
+        past_24  <= at_limit(v_sum_23, v_comp_max);
         under_24 <= v_sum_23(v_sum_23'high) or not compensate;
         v_sum    <= v_sum_23(STATE_W - 1 downto 0);
       end if;
       if valid(24) = '1' and past_24 = '1' then
         v_sum <= shift_left(resize(signed('0' & v_comp_max), STATE_W), TO_LEG);
-        if under_24 = '1' then
-          v_sum <= (others => '0');
-        end if;
+      end if;
+      if valid(24) = '1' and under_24 = '1' then
+        v_sum <= (others => '0');
       end if;
 
       -- Stages 25, 26: sum_g = v_sum + gamma*fine
