@@ -36,21 +36,25 @@ architecture rtl of flux_estimate is
   constant LATENCY : positive := FLUX_ESTIMATE_LATENCY;
   constant SUM_W   : positive := FLUX_MODELS_MERGED_FLUX_W + 1;
 
-  signal valid  : std_logic_vector(0 to LATENCY);
-  signal far_d  : std_logic;
-  signal far_q  : std_logic;
-  signal sum_md : signed(SUM_W - 1 downto 0);                -- of the merged flux; sum_c: of the current model's
-  signal sum_mq : signed(SUM_W - 1 downto 0);
-  signal sum_cd : signed(SUM_W - 1 downto 0);
-  signal sum_cq : signed(SUM_W - 1 downto 0);
-  signal cut_md : signed(SUM_W - 1 - PU_TO_FLUX downto 0);
-  signal cut_mq : signed(SUM_W - 1 - PU_TO_FLUX downto 0);
-  signal cut_cd : signed(SUM_W - 1 - PU_TO_FLUX downto 0);
-  signal cut_cq : signed(SUM_W - 1 - PU_TO_FLUX downto 0);
-  signal past_m : std_logic_vector(1 downto 0);              -- limited: q, d
-  signal past_c : std_logic_vector(1 downto 0);
-  signal back_d : std_logic;                                 -- the current model's is negative
-  signal back_q : std_logic;
+  signal valid    : std_logic_vector(0 to LATENCY);
+  signal far_d    : std_logic;
+  signal far_q    : std_logic;
+  signal sum_md   : signed(SUM_W - 1 downto 0);                -- of the merged flux; sum_c: of the current model's
+  signal sum_mq   : signed(SUM_W - 1 downto 0);
+  signal sum_cd   : signed(SUM_W - 1 downto 0);
+  signal sum_cq   : signed(SUM_W - 1 downto 0);
+  signal cut_md   : signed(SUM_W - 1 - PU_TO_FLUX downto 0);
+  signal cut_mq   : signed(SUM_W - 1 - PU_TO_FLUX downto 0);
+  signal cut_cd   : signed(SUM_W - 1 - PU_TO_FLUX downto 0);
+  signal cut_cq   : signed(SUM_W - 1 - PU_TO_FLUX downto 0);
+  signal past_m   : std_logic_vector(1 downto 0);              -- limited: q, d
+  signal past_c   : std_logic_vector(1 downto 0);
+  signal past_m_1 : std_logic_vector(1 downto 0);
+  signal past_c_1 : std_logic_vector(1 downto 0);
+  signal merged_1 : std_logic;
+  signal ended_1  : std_logic;
+  signal back_d   : std_logic;                                 -- the current model's is negative
+  signal back_q   : std_logic;
 
   -- The cut sum, or the end of PU on the given side where it is limited.
   function narrowed (cut : signed; limited : std_logic; below : std_logic) return signed is
@@ -86,6 +90,9 @@ begin
   back_d    <= model_d(model_d'high) when far_d = '1' else cut_cd(cut_cd'high);
   back_q    <= model_q(model_q'high) when far_q = '1' else cut_cq(cut_cq'high);
 
+  -- The flag is not needed as early as the flux: what is behind the adder meets behind the register.
+  estimate_limited <= ended_1 or (or past_m_1) when merged_1 = '1' else ended_1 or (or past_c_1);
+
   process (clk)
   begin
     if rising_edge(clk) then
@@ -93,11 +100,14 @@ begin
 
       -- Stage 1: lambda = chosen + raised, narrowed
       if valid(0) = '1' then
-        lambda_d         <= narrowed(cut_md, past_m(0), cut_md(cut_md'high)) when merged = '1' else
-                            narrowed(cut_cd, past_c(0), back_d);
-        lambda_q         <= narrowed(cut_mq, past_m(1), cut_mq(cut_mq'high)) when merged = '1' else
-                            narrowed(cut_cq, past_c(1), back_q);
-        estimate_limited <= ended or (or past_m) when merged = '1' else ended or (or past_c);
+        lambda_d <= narrowed(cut_md, past_m(0), cut_md(cut_md'high)) when merged = '1' else
+                    narrowed(cut_cd, past_c(0), back_d);
+        lambda_q <= narrowed(cut_mq, past_m(1), cut_mq(cut_mq'high)) when merged = '1' else
+                    narrowed(cut_cq, past_c(1), back_q);
+        ended_1  <= ended;
+        merged_1 <= merged;
+        past_m_1 <= past_m;
+        past_c_1 <= past_c;
       end if;
 
       if rst = '1' then

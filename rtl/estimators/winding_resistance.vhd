@@ -52,6 +52,14 @@ architecture rtl of winding_resistance is
   signal prod   : signed(PROD_W - 1 downto 0);
   signal addend : signed(PROD_W - 1 downto 0);
   signal sum    : signed(PROD_W - 1 downto 0);
+
+  -- Whether a < b, by one carry: comparisons with settings that are constants would become a tree of LUTs.
+  function below (a : signed; b : signed) return std_logic is
+    variable room : signed(a'length downto 0);
+  begin
+    room := resize(a, a'length + 1) - resize(b, a'length + 1);
+    return room(room'high);
+  end function;
 begin
   valid(0) <= in_valid;
 
@@ -73,16 +81,7 @@ begin
       if valid(0) = '1' then
         wide   <= tcr;
         addend <= rounding_base(signed('0' & r_s), DROP_TCR, PROD_W);
-        lost_1 <= "000";
-        if temp_valid = '0' then
-          lost_1(2) <= '1';
-        end if;
-        if temp_winding < t_min then
-          lost_1(1) <= '1';
-        end if;
-        if temp_winding > t_max then
-          lost_1(0) <= '1';
-        end if;
+        lost_1 <= (not temp_valid) & below(temp_winding, t_min) & below(t_max, temp_winding);
       end if;
 
       -- Stages 3, 6: prod = warmer*tcr, -t_s*r
