@@ -290,7 +290,7 @@ MUTANTS = (
     ("integrals of one sample before", "estimators/delta_lambda.vhd",
      "u_int_d_2 when valid(3) = '1' else u_int_q_2", "u_int_d_1 when valid(3) = '1' else u_int_q_1"),
     ("delta q with the sign of d", "estimators/delta_lambda.vhd", "past_10, FLUX_W) xor valid(11)", "past_10, FLUX_W)"),
-    ("lost bit not noticed", "estimators/delta_lambda.vhd", "if n_omega(1 downto 0) > k and", "if n_omega(1 downto 0) > k + 1 and"),
+    ("lost bit not noticed", "estimators/delta_lambda.vhd", "if n_omega(3 downto 2) > k and", "if n_omega(3 downto 2) > k + 1 and"),
     ("delta held while the gates are off", "estimators/delta_lambda.vhd", "held_1   <= run and", "held_1   <="),
     ("integral moves while held", "estimators/flux_compensation.vhd", "if delta_held = '1' then", "if delta_held = '1' and flux_mode /= PROPOSED then"),
     ("limit told past the limit", "estimators/flux_compensation.vhd",
