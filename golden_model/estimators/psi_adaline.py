@@ -137,8 +137,8 @@ BLOCK = Block(
         Port("psi_held", BIT, doc="1: psi_m is held"),
     ),
     state=State(),
-    latency=14,
-    interval=14,
+    latency=17,
+    interval=17,
     constants={
         "PSI_STATE_W": PSI_STATE_W,
         "DROP_V": DROP_V,

@@ -222,8 +222,8 @@ BLOCK = Block(
         Port("v_comp_limited", BIT, doc="the compensation reached its limit"),
     ),
     state=State(),
-    latency=28,
-    interval=28,
+    latency=29,
+    interval=29,
     constants={
         "V_STATE_W": V_STATE_W,
         "V_FINE_W": V_FINE.width,

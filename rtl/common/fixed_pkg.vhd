@@ -25,6 +25,9 @@ package fixed_pkg is
   -- '1' where saturating x to width signed bits changes it.
   function exceeds (x : signed; width : positive) return std_logic;
 
+  -- saturate in the clock after: x limited to width signed bits, past telling whether it exceeds them.
+  function narrowed (x : signed; past : std_logic; width : positive) return signed;
+
   -- x limited to the range of an unsigned number of width bits.
   function saturate_u (x : signed; width : positive) return unsigned;
 
@@ -99,6 +102,17 @@ package body fixed_pkg is
     return or (v(v'high downto width) xor v(v'high - 1 downto width - 1));
   end function;
 
+  function narrowed (x : signed; past : std_logic; width : positive) return signed is
+    alias v         : signed(x'length - 1 downto 0) is x;
+    variable result : signed(width - 1 downto 0) := v(width - 1 downto 0);
+  begin
+    if past = '1' then
+      result            := (others => not v(v'high));
+      result(width - 1) := v(v'high);
+    end if;
+    return result;
+  end function;
+
   function saturate_u (x : signed; width : positive) return unsigned is
     alias v         : signed(x'length - 1 downto 0) is x;
     constant ZERO   : signed(x'length - 1 downto 0) := (others => '0');
@@ -163,15 +177,21 @@ package body fixed_pkg is
   end function;
 
   function beyond (x : signed; limit : unsigned; shift : positive) return std_logic is
-    alias v       : signed(x'length - 1 downto 0) is x;
-    variable size : unsigned(x'length - 2 - shift downto 0);
-    variable more : std_logic;
-    variable room : signed(maximum(size'length, limit'length) + 1 downto 0);
+    constant PARTS : positive := (shift + 3) / 4;
+    alias v        : signed(x'length - 1 downto 0) is x;
+    variable size  : unsigned(x'length - 2 - shift downto 0);
+    variable more  : unsigned(PARTS - 1 downto 0);
+    variable room  : signed(maximum(size'length, limit'length) + PARTS downto 0);
   begin
     -- The complement of a negative x is one less than -x: so where it reaches the limit, -x is past it.
     size := unsigned(v(v'high - 1 downto shift) xor v(v'high));
-    more := v(v'high) or (or v(shift - 1 downto 0));
-    room := signed(resize(limit & '0', room'length)) - signed(resize(size & more, room'length));
+    -- What is below the limit's LSB, in parts that the carry of the comparison joins.
+    for k in more'range loop
+      more(k) := or v(minimum(4 * k + 3, shift - 1) downto 4 * k);
+    end loop;
+    more(0) := more(0) or v(v'high);
+    room    := signed(resize(limit & (PARTS - 1 downto 0 => '0'), room'length))
+               - signed(resize(size & more, room'length));
     return room(room'high);
   end function;
 

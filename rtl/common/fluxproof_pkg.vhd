@@ -36,10 +36,10 @@ package fluxproof_pkg is
 
   -- fluxproof: clocks from the raw sample to the duties, least distance of two samples
   constant FLUXPROOF_SAMPLE_TO_DUTY : positive := 40;
-  constant FLUXPROOF_SAMPLE_INTERVAL : positive := 60;
+  constant FLUXPROOF_SAMPLE_INTERVAL : positive := 61;
 
   -- register_access: clocks that a write waits for the end of a sample
-  constant REGISTER_PATIENCE : positive := 76;
+  constant REGISTER_PATIENCE : positive := 77;
 
   -- sqrt: 001, section 5.2: voltage limit of the current regulation
   constant SQRT_LATENCY : positive := 5;
@@ -429,14 +429,14 @@ package fluxproof_pkg is
   constant SPEED_RECIPROCAL_WEIGHT_ONE : natural := 65536;
 
   -- delta_lambda: 001, eq. (15); 'delta lambda_dq' of Fig. 8
-  constant DELTA_LAMBDA_LATENCY : positive := 10;
+  constant DELTA_LAMBDA_LATENCY : positive := 12;
   constant DELTA_LAMBDA_DROP_R : natural := 12;
   constant DELTA_LAMBDA_DROP_SHIFTED : natural := 5;
   constant DELTA_LAMBDA_DROP_FACTOR : natural := 17;
   constant DELTA_LAMBDA_FADE : natural := 4;
 
   -- flux_compensation: 001, eq. (17): (K_p + K_i/s)*delta_lambda; the last term of eq. (16)
-  constant FLUX_COMPENSATION_LATENCY : positive := 10;
+  constant FLUX_COMPENSATION_LATENCY : positive := 12;
   constant FLUX_COMPENSATION_DROP_P : natural := 3;
   constant FLUX_COMPENSATION_DROP_I : natural := 10;
   constant FLUX_COMPENSATION_SHIFT_LIMIT : natural := 14;
@@ -450,7 +450,7 @@ package fluxproof_pkg is
   constant FLUX_MONITOR_LATENCY : positive := 1;
 
   -- current_directions: 000, eq. (6)
-  constant CURRENT_DIRECTIONS_LATENCY : positive := 24;
+  constant CURRENT_DIRECTIONS_LATENCY : positive := 31;
   constant CURRENT_DIRECTIONS_ONE : natural := 65536;
   constant CURRENT_DIRECTIONS_SQRT3 : signed(17 downto 0) := to_signed(113512, 18);  -- 1.732050808 as U(1,16), signed for the multiplier
   constant CURRENT_DIRECTIONS_DROP_TURN : natural := 16;
@@ -466,7 +466,7 @@ package fluxproof_pkg is
   constant CLEAN_VOLTAGE_DROP : natural := 11;
 
   -- v_dead_adaline: 000, eq. (10) and Fig. 4(a)
-  constant V_DEAD_ADALINE_LATENCY : positive := 28;
+  constant V_DEAD_ADALINE_LATENCY : positive := 29;
   constant V_DEAD_ADALINE_V_STATE_W : natural := 38;
   constant V_DEAD_ADALINE_V_FINE_W : natural := 25;
   constant V_DEAD_ADALINE_STEP_W : natural := 18;
@@ -481,7 +481,7 @@ package fluxproof_pkg is
   constant V_DEAD_ADALINE_FINE_TO_LEG : natural := 7;
 
   -- psi_adaline: 000, eq. (13), with the reluctance term of eq. (7b)
-  constant PSI_ADALINE_LATENCY : positive := 14;
+  constant PSI_ADALINE_LATENCY : positive := 17;
   constant PSI_ADALINE_PSI_STATE_W : natural := 36;
   constant PSI_ADALINE_DROP_V : natural := 11;
   constant PSI_ADALINE_DROP_R : natural := 17;
@@ -497,7 +497,7 @@ package fluxproof_pkg is
   -- telemetry_words: none: what a recording needs
   constant TELEMETRY_WORDS_LATENCY : positive := 2;
   constant TELEMETRY_WORDS_COUNT : natural := 24;
-  constant TELEMETRY_WORDS_START : natural := 38;
+  constant TELEMETRY_WORDS_START : natural := 39;
   constant TELEMETRY_WORDS_INDEX_W : natural := 5;
 
   -- telemetry: none: what a recording needs

@@ -1,6 +1,7 @@
 -- Purpose: 1/x as m * 2**n, the division that no data path contains.
 --   1/x = m * 2**n * 2**-17, m in (2**16, 2**17), n in 0..N_MAX
--- Method: x is brought to [1, 2) by n shifts; its reciprocal is made one quotient bit a clock.
+-- Method: x is brought to [1, 2) by n shifts, by fours, then by the rest; its reciprocal is made one quotient bit a
+-- clock.
 -- Formats: x U(1,16); m U(0,17).  Latency: 21.  Interval: 21.
 -- Rounding: quotient half up; 2**17 is stored as 2**17 - 1.  Relative error of m <= 2**-17.
 -- Below 2**-N_MAX x is taken for 2**-N_MAX and low is raised.
@@ -28,13 +29,17 @@ entity reciprocal is
 end entity reciprocal;
 
 architecture rtl of reciprocal is
-  constant LATENCY : positive                      := RECIPROCAL_LATENCY;
-  constant BITS    : positive                      := RECIPROCAL_QUOTIENT_BITS;
-  constant LEAST   : unsigned(U_DC_W - 1 downto 0) := shift_left(to_unsigned(1, U_DC_W), U_DC_W - 1 - N_MAX);
+  constant LATENCY : positive := RECIPROCAL_LATENCY;
+  constant BITS    : positive := RECIPROCAL_QUOTIENT_BITS;
+  constant FOURS   : natural  := N_MAX / 4;
 
   signal valid     : std_logic_vector(0 to LATENCY);
-  signal low_1     : std_logic;
-  signal floored_1 : unsigned(U_DC_W - 1 downto 0);
+  signal fours_0   : natural range 0 to FOURS;
+  signal fours_1   : natural range 0 to FOURS;
+  signal shifted_1 : unsigned(U_DC_W - 1 downto 0);
+  signal shifted_0 : unsigned(U_DC_W - 1 downto 0);
+  signal low_1     : std_logic_vector(1 downto 0);  -- below the least number, by halves
+  signal low_2     : std_logic;
   signal mantissa  : unsigned(U_DC_W - 1 downto 0);
   signal shift     : natural range 0 to N_MAX;
   signal remainder : unsigned(U_DC_W - 1 downto 0);
@@ -42,68 +47,90 @@ architecture rtl of reciprocal is
   signal rest      : unsigned(U_DC_W downto 0);
   signal quotient  : unsigned(BITS - 1 downto 0);
   signal dividing  : std_logic;
+  signal one       : std_logic;  -- the mantissa is one: m would be 2**17
 
-  -- Left shifts that bring the leading one to the mantissa's top bit.
-  function leading_zeros (v : unsigned) return natural is
+  -- Groups of so many bits, at most so many, that are zero at the top.
+  function leading_zeros (v : unsigned; group_w : positive; most : natural) return natural is
+    alias u : unsigned(v'length - 1 downto 0) is v;
   begin
-    for k in 0 to N_MAX - 1 loop
-      if v(v'high - k) = '1' then
+    for k in 0 to most - 1 loop
+      if (or u(u'high - k * group_w downto u'high - k * group_w - group_w + 1)) = '1' then
         return k;
       end if;
     end loop;
-    return N_MAX;
+    return most;
   end function;
 begin
   valid(0) <= in_valid;
-  dividing <= or valid(2 to BITS + 1);
-  trial    <= remainder & '0';
-  rest     <= trial - mantissa;
+  fours_0  <= leading_zeros(x, 4, FOURS);
+
+  trial <= remainder & '0';
+  rest  <= trial - mantissa;
+
+  -- The first group with a one chooses, without waiting for the number of zeros.
+  process (all)
+  begin
+    shifted_0 <= shift_left(x, 4 * FOURS);
+    for k in FOURS - 1 downto 0 loop
+      if x(U_DC_W - 1 - 4 * k downto U_DC_W - 4 - 4 * k) /= 0 then
+        shifted_0 <= shift_left(x, 4 * k);
+      end if;
+    end loop;
+  end process;
 
   process (clk)
-    variable rounded : unsigned(BITS downto 0);
+    variable rounded : unsigned(BITS - 1 downto 0);
   begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stage 1: x = max(x, 2**-N_MAX)
-      if valid(0) = '1' then
-        low_1     <= '0';
-        floored_1 <= x;
-        if x < LEAST then
-          low_1     <= '1';
-          floored_1 <= LEAST;
+      -- Stage 1: shifted = x * 2**(4*fours); x stays, so no enable has to wait for the shift
+      low_1(1)  <= not (or x(U_DC_W - 1 downto U_DC_W - 1 - N_MAX / 2));
+      low_1(0)  <= not (or x(U_DC_W - 2 - N_MAX / 2 downto U_DC_W - 1 - N_MAX));
+      fours_1   <= fours_0;
+      shifted_1 <= shifted_0;
+
+      -- Stage 2: mantissa = x * 2**shift, in [1, 2); the least x gives one
+      if valid(1) = '1' then
+        low_2    <= and low_1;
+        shift    <= N_MAX;
+        mantissa <= (U_DC_W - 1 => '1', others => '0');
+        if low_1 /= "11" then
+          shift    <= 4 * fours_1 + leading_zeros(shifted_1, 1, 3);
+          mantissa <= shift_left(shifted_1, leading_zeros(shifted_1, 1, 3));
         end if;
       end if;
 
-      -- Stage 2: mantissa = x * 2**shift, in [1, 2)
-      if valid(1) = '1' then
-        shift     <= leading_zeros(floored_1);
-        mantissa  <= shift_left(floored_1, leading_zeros(floored_1));
-        remainder <= (U_DC_W - 1 => '1', others => '0');
-      end if;
-
       -- Stages 3 to 20: one bit of quotient = 2**34 / mantissa
+      one <= '1' when mantissa(U_DC_W - 2 downto 0) = 0 else '0';
+      if valid(0) = '1' then
+        dividing <= '1';
+      elsif valid(BITS + 1) = '1' then
+        dividing <= '0';
+      end if;
       if dividing = '1' then
         quotient  <= quotient(BITS - 2 downto 0) & not rest(U_DC_W);
         remainder <= trial(U_DC_W - 1 downto 0);
         if rest(U_DC_W) = '0' then
           remainder <= rest(U_DC_W - 1 downto 0);
         end if;
+        remainder(0) <= mantissa(0) and not rest(U_DC_W);
+        if valid(1) = '1' then
+          remainder <= (U_DC_W - 1 => '1', others => '0');
+        end if;
       end if;
 
       -- Stage 21: m = quotient, half up, 2**17 stored as 2**17 - 1
       if valid(20) = '1' then
-        rounded := ('0' & quotient) + 1;
+        rounded := (quotient(BITS - 1 downto 1) & (quotient(0) and not one)) + 1;
         m       <= rounded(RECIPROCAL_W downto 1);
         n       <= to_unsigned(shift, 4);
-        low     <= low_1;
-        if rounded(BITS) = '1' then
-          m <= (others => '1');
-        end if;
+        low     <= low_2;
       end if;
 
       if rst = '1' then
         valid(1 to LATENCY) <= (others => '0');
+        dividing            <= '0';
       end if;
     end if;
   end process;

@@ -83,7 +83,6 @@ architecture rtl of applied_voltage is
   signal prod_1   : signed(PROD_1_W - 1 downto 0);
   signal sum_2    : signed(PROD_1_W - 1 downto 0);
   signal scale_2  : signed(SCALE_W downto 0);
-  signal beta_3   : std_logic;
   signal coeff_3  : signed(COEFF_W - 1 downto 0);
   signal prod_4   : signed(SCALE_W + COEFF_W downto 0);
   signal half_4   : signed(SCALE_W + COEFF_W downto 0);
@@ -109,8 +108,6 @@ begin
   scale_2 <= resize(sum_2(sum_2'high downto APPLIED_VOLTAGE_DROP_SCALE), SCALE_W + 1);
 
   -- The axis of the beat: alpha first, then beta, whose sum is that of alpha with b in the place of a.
-  beta_3  <= valid(4);
-  coeff_3 <= APPLIED_VOLTAGE_INV_SQRT3 when beta_3 = '1' else APPLIED_VOLTAGE_THIRD;
   half_4  <= half(APPLIED_VOLTAGE_DROP_INV_SQRT3, SCALE_W + COEFF_W + 1) when valid(5) = '1' else
              half(APPLIED_VOLTAGE_DROP_THIRD, SCALE_W + COEFF_W + 1);
   first_5 <= compare_b when valid(6) = '1' else compare_a;
@@ -130,6 +127,7 @@ begin
       end if;
 
       -- Stages 4 to 6: scaled = scale * 1/3 or 1/sqrt(3);  part = 2*first - compare_b
+      coeff_3 <= APPLIED_VOLTAGE_INV_SQRT3 when valid(3) = '1' else APPLIED_VOLTAGE_THIRD;
       if valid(3) = '1' or valid(4) = '1' then
         prod_4 <= scale_2 * coeff_3;
       end if;
@@ -158,13 +156,13 @@ begin
         sum_9 <= prod_8 + HALF_U;
       end if;
 
-      -- Stage 10: u_applied = u, narrowed; alpha at clock 10, beta at 11
-      if valid(9) = '1' then
-        u_applied_alpha <= u_9;
+      -- Stage 10: u_applied = u, narrowed; alpha at clock 10, from where it moves on, beta at 11
+      if valid(9) = '1' or valid(10) = '1' then
+        u_applied_beta  <= u_9;
+        u_applied_alpha <= u_applied_beta;
       end if;
       if valid(10) = '1' then
-        u_applied_beta <= u_9;
-        voltage_known  <= '0';
+        voltage_known <= '0';
         if run = '1' and u_dc_at_rail = '0' and u_dc >= U_DC_PROCESSING_U_DC_MIN then
           voltage_known <= '1';
         end if;

@@ -4,10 +4,10 @@
 --   s_b = limit(k_sign*(-x + sqrt(3)*y)/2, +-1);  s_c = limit(k_sign*(-x - sqrt(3)*y)/2, +-1)
 --   s_alpha, s_beta: their Clarke transform
 -- Thirteen products one after the other, through one multiplier and the adder behind it: sum = addend + mul_a*mul_b.
--- The last five are transforms/clarke, which cannot saturate here.  The outputs are state: the next sample starts with
--- them.
+-- The last five are transforms/clarke, which cannot saturate here, alpha's and beta's by turns.  The outputs are state:
+-- the next sample starts with them.
 -- Formats: PU in and out; k_ahead U(1,16), sqrt(3) U(1,16), k_sign U(12,12); products exact.
--- Latency: 24.  Interval: 24.
+-- Latency: 31.  Interval: 31.
 -- Rounding: every product half up.  turn, x, y and twice each phase current saturate.
 
 library ieee;
@@ -46,116 +46,131 @@ architecture rtl of current_directions is
   -- An LSB less than half: what is rounded half up and then negated is half down.
   constant HALF_DOWN : signed(TURN_BY - 1 downto 0) := (TURN_BY - 1 => '0', others => '1');
 
-  signal valid     : std_logic_vector(0 to LATENCY);
-  signal factor_a  : signed(WIDE_W - 1 downto 0);
-  signal factor_b  : signed(PU_W - 1 downto 0);
-  signal mul_a     : signed(WIDE_W - 1 downto 0);
-  signal mul_b     : signed(PU_W - 1 downto 0);
-  signal prod      : signed(SUM_W - 1 downto 0);
-  signal addend    : signed(SUM_W - 1 downto 0);
-  signal sum       : signed(SUM_W - 1 downto 0);
-  signal narrow    : signed(PU_W - 1 downto 0);
-  signal not_x_7   : signed(PU_W - 1 downto 0);
-  signal minus_x_8 : signed(PU_W downto 0);
-  signal s         : signed(SUM_W - 1 - DROP downto 0);
-  signal s_past    : std_logic;
-  signal s_end     : signed(PU_W - 1 downto 0);
-  signal s_next    : signed(PU_W - 1 downto 0);     -- the phases take turns: the one that comes next, the others
-  signal s_then    : signed(PU_W - 1 downto 0);
-  signal s_last    : signed(PU_W - 1 downto 0);
+  signal valid      : std_logic_vector(0 to LATENCY);
+  signal by_sign    : std_logic;                          -- the factor is k_sign
+  signal by_current : std_logic;                          -- the factor is a current
+  signal by_third   : std_logic;                          -- the factor will be -1/3
+  signal by_phase   : std_logic;                          -- the other factor is a direction
+  signal on_sum     : std_logic;                          -- the sum goes on
+  signal on_sign    : std_logic;                          -- half an LSB of a direction
+  signal s_moves    : std_logic;
+  signal current_a  : signed(PU_W - 1 downto 0);
+  signal constant_a : signed(WIDE_W - 1 downto 0);
+  signal factor_a   : signed(WIDE_W - 1 downto 0);
+  signal factor_b   : signed(PU_W - 1 downto 0);
+  signal mul_a      : signed(WIDE_W - 1 downto 0);
+  signal mul_b      : signed(PU_W - 1 downto 0);
+  signal prod       : signed(SUM_W - 1 downto 0);
+  signal base       : signed(SUM_W - 1 downto 0);
+  signal addend     : signed(SUM_W - 1 downto 0);
+  signal sum        : signed(SUM_W - 1 downto 0);
+  signal cut        : signed(SUM_W - 1 - TURN_BY downto 0);  -- the sum a clock ago, and whether it exceeds PU
+  signal past       : std_logic;
+  signal narrow     : signed(PU_W - 1 downto 0);          -- turn at clock 5, not x at 10, y at 11, b at 16, c at 17
+  signal minus_x_11 : signed(PU_W downto 0);
+  signal twice_a_11 : signed(PU_W - 1 downto 0);
+  signal s          : signed(SUM_W - 1 - DROP downto 0);  -- a direction; the bits from that of one on: any, all
+  signal s_any      : std_logic;
+  signal s_all      : std_logic;
+  signal s_next     : signed(PU_W - 1 downto 0);          -- the phases: the one that comes next, the others
+  signal s_then     : signed(PU_W - 1 downto 0);
+  signal s_last     : signed(PU_W - 1 downto 0);
+
+  -- v where sel is '1', else zero
+  function when_set (v : signed; sel : std_logic) return signed is
+    alias u : signed(v'length - 1 downto 0) is v;
+  begin
+    return u and (v'length - 1 downto 0 => sel);
+  end function;
 begin
   valid(0) <= in_valid;
 
-  narrow <= saturate(sum(SUM_W - 1 downto TURN_BY), PU_W);
-
-  -- A direction, and whether it is past one: its bits from that of one on are not all alike.
-  s      <= sum(SUM_W - 1 downto DROP);
-  s_past <= exceeds(s, PU_W - 1);
-  s_end  <= -ONE when s < 0 else ONE;
-
-  factor_a <= resize(i_beta, WIDE_W) when valid(3) = '1' else
-              resize(i_alpha, WIDE_W) when valid(4) = '1' else
-              ROOT when valid(7) = '1' else
-              -ROOT when valid(8) = '1' else
-              signed('0' & k_sign) when valid(10) = '1' else
-              signed(resize(k_ahead, WIDE_W)) when valid(0) = '1' else
-              shift_left(THIRD, 1) when valid(18) = '1' else
-              -THIRD when valid(16) = '1' else
-              -BY_BETA when valid(20) = '1' else
-              BY_BETA;
-  factor_b <= narrow when (valid(3) or valid(7) or valid(10) or valid(11)) = '1' else
-              saturate((not not_x_7) & '0', PU_W) when valid(12) = '1' else
-              omega_me when valid(0) = '1' else
-              s_next;
+  -- Each is chosen by one bit, so that no choice waits for another.
+  factor_a <= when_set(signed(resize(k_ahead, WIDE_W)), valid(0))
+              or when_set(resize(current_a, WIDE_W), by_current)
+              or when_set(signed('0' & k_sign), by_sign)
+              or constant_a;
+  factor_b <= omega_me when valid(0) = '1' else
+              twice_a_11 when valid(18) = '1' else
+              s_next when by_phase = '1' else
+              narrow;
 
   -- x comes as its complement: the adder behind the multiplier only adds.
-  addend <= rounding_base(not i_alpha, TURN_BY, SUM_W) when valid(5) = '1' else
-            rounding_base(i_beta, TURN_BY, SUM_W) when valid(6) = '1' else
-            rounding_base(minus_x_8, TURN_BY, SUM_W) when valid(9) = '1' else
-            resize(minus_x_8 & HALF_DOWN, SUM_W) when valid(10) = '1' else
-            sum when valid(19) = '1' or valid(20) = '1' or valid(22) = '1' else
-            rounding_base("0", CLARKE_DROP_ALPHA, SUM_W) when valid(18) = '1' else
-            rounding_base("0", CLARKE_DROP_BETA, SUM_W) when valid(21) = '1' else
-            rounding_base("0", TURN_BY, SUM_W) when valid(2) = '1' else
-            rounding_base("0", DROP, SUM_W);
+  base <= when_set(rounding_base(not i_alpha, TURN_BY, SUM_W), valid(6))
+          or when_set(rounding_base(i_beta, TURN_BY, SUM_W), valid(7))
+          or when_set(rounding_base(minus_x_11, TURN_BY, SUM_W), valid(12))
+          or when_set(resize(minus_x_11 & HALF_DOWN, SUM_W), valid(13))
+          or when_set(sum, on_sum)
+          or when_set(rounding_base("0", CLARKE_DROP_ALPHA, SUM_W), valid(24))
+          or when_set(rounding_base("0", CLARKE_DROP_BETA, SUM_W), valid(25))
+          or when_set(rounding_base("0", TURN_BY, SUM_W), valid(1))
+          or when_set(rounding_base("0", DROP, SUM_W), on_sign);
 
   process (clk)
   begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stages 1, 4, 5, 8, 9, 11 to 13, 17 to 21: the factors; where one of them is missing it stays
-      if (valid(0) or valid(3) or valid(4) or valid(7) or valid(8) or valid(10) or valid(16) or valid(18) or valid(19)
-          or valid(20)) = '1' then
-        mul_a <= factor_a;
-      end if;
-      if (valid(0) or valid(3) or valid(7) or valid(10) or valid(11) or valid(12) or valid(16) or valid(17) or valid(18)
-          or valid(19) or valid(20)) = '1' then
-        mul_b <= factor_b;
+      -- What is chosen by more than one clock is known a clock before.
+      by_sign    <= or valid(15 to 17);
+      by_current <= valid(4) or valid(5);
+      by_third   <= valid(21) or valid(23);
+      by_phase   <= or valid(22 to 26);
+      on_sum     <= or valid(25 to 27);
+      on_sign    <= by_sign;
+      s_moves    <= valid(19) or valid(20) or valid(21) or valid(23) or valid(25);
+      current_a  <= i_beta when valid(4) = '1' else i_alpha;
+      constant_a <= when_set(ROOT, valid(10)) or when_set(-ROOT, valid(11)) or when_set(-THIRD, by_third)
+                    or when_set(BY_BETA, valid(23)) or when_set(-BY_BETA, valid(25))
+                    or when_set(shift_left(THIRD, 1), valid(26));
+
+      -- Stages 1, 6, 7, 12, 13, 17 to 19, 24 to 28: the factors
+      mul_a <= factor_a;
+      mul_b <= factor_b;
+
+      -- Stages 2, 7, 8, 13, 14, 18 to 20: prod = omega_me*k_ahead, turn*i_beta, turn*i_alpha, sqrt(3)*y, -sqrt(3)*y,
+      -- then k_sign times twice the currents of b, c, a;  stages 25 to 29: -1/3*s_b, s_b/sqrt(3), -1/3*s_c,
+      -- -s_c/sqrt(3), 2/3*s_a; and what it is added to
+      prod   <= mul_a * mul_b;
+      addend <= base;
+
+      -- Stages 3, 8, 9, 14, 15, 19 to 21, 26 to 30: sum = turn, not x, y, twice b, twice c, s_b, s_c, s_a, s_alpha and
+      -- s_beta by turns
+      sum <= addend + prod;
+
+      -- Stages 4, 5, 9 to 11, 15 to 17: narrow = sum, narrowed
+      cut  <= sum(SUM_W - 1 downto TURN_BY);
+      past <= exceeds(sum(SUM_W - 1 downto TURN_BY), PU_W);
+      if (valid(4) or valid(9) or valid(10) or valid(15) or valid(16)) = '1' then
+        narrow <= narrowed(cut, past, PU_W);
       end if;
 
-      -- Stages 2, 5, 6, 9, 10, 12 to 14: prod = omega_me*k_ahead, turn*i_beta, turn*i_alpha, sqrt(3)*y, -sqrt(3)*y,
-      -- then k_sign times twice the currents of b, c, a;  stages 18 to 22: -1/3*s_b, -1/3*s_c, 2/3*s_a,
-      -- s_b/sqrt(3), -s_c/sqrt(3)
-      if (valid(1) or valid(4) or valid(5) or valid(8) or valid(9) or valid(11) or valid(12) or valid(13) or valid(17)
-          or valid(18) or valid(19) or valid(20) or valid(21)) = '1' then
-        prod <= mul_a * mul_b;
+      -- Stage 11: minus_x = not_x + 1;  twice_a = 2*x, narrowed
+      if valid(10) = '1' then
+        minus_x_11 <= resize(narrow, PU_W + 1) + 1;
+        twice_a_11 <= saturate((not narrow) & '0', PU_W);
       end if;
 
-      -- Stages 3, 6, 7, 10, 11, 13 to 15, 19 to 23: sum = turn, not x, y, twice b, twice c, s_b, s_c, s_a, s_alpha,
-      -- s_beta
-      if (valid(2) or valid(5) or valid(6) or valid(9) or valid(10) or valid(12) or valid(13) or valid(14) or valid(18)
-          or valid(19) or valid(20) or valid(21) or valid(22)) = '1' then
-        sum <= addend + prod;
-      end if;
-
-      -- Stages 7, 8: not_x = sum, narrowed;  minus_x = not_x + 1
-      if valid(6) = '1' then
-        not_x_7 <= narrow;
-      end if;
-      if valid(7) = '1' then
-        minus_x_8 <= resize(not_x_7, PU_W + 1) + 1;
-      end if;
-
-      -- Stages 14 to 16: s = sum, narrowed and limited;  stages 17 to 21: they take turns as factors
-      if (valid(13) or valid(14) or valid(15) or valid(16) or valid(17) or valid(18) or valid(19)) = '1' then
+      -- Stages 20 to 23: s = sum, narrowed and limited: past one where its bits from that of one on are not all alike;
+      -- stages 25, 27: the next phase
+      s     <= sum(SUM_W - 1 downto DROP);
+      s_any <= or sum(SUM_W - 1 downto DROP + PU_W - 2);
+      s_all <= and sum(SUM_W - 1 downto DROP + PU_W - 2);
+      if s_moves = '1' then
         s_next <= s_then;
         s_then <= s_last;
-        s_last <= s_next;
-      end if;
-      if (valid(13) or valid(14) or valid(15)) = '1' then
         s_last <= s(PU_W - 1 downto 0);
-      end if;
-      if (valid(13) or valid(14) or valid(15)) = '1' and s_past = '1' then
-        s_last <= s_end;
+        if s_any = '1' and s_all = '0' then
+          s_last <= -ONE when s < 0 else ONE;
+        end if;
       end if;
 
-      -- Stages 22, 24: s_alpha, s_beta = sum, narrowed
-      if valid(21) = '1' then
-        s_alpha <= sum(PU_W - 1 + CLARKE_DROP_ALPHA downto CLARKE_DROP_ALPHA);
-      end if;
-      if valid(23) = '1' then
+      -- Stages 30, 31: s_beta, s_alpha = sum, narrowed
+      if valid(29) = '1' then
         s_beta <= sum(PU_W - 1 + CLARKE_DROP_BETA downto CLARKE_DROP_BETA);
+      end if;
+      if valid(30) = '1' then
+        s_alpha <= sum(PU_W - 1 + CLARKE_DROP_ALPHA downto CLARKE_DROP_ALPHA);
       end if;
 
       if rst = '1' then

@@ -60,16 +60,11 @@ begin
         rounded_2 <= resize(round_half_up(sum_1, 1), SUM_W - 1);
       end if;
 
-      -- Stage 3: lambda_c = sum, narrowed; d at clock 3, q at 4
-      if valid(2) = '1' then
-        lambda_c_d    <= saturate(rounded_2, FLUX_W);
-        model_limited <= exceeds(rounded_2, FLUX_W);
-      end if;
-      if valid(3) = '1' then
-        lambda_c_q <= saturate(rounded_2, FLUX_W);
-        if exceeds(rounded_2, FLUX_W) = '1' then
-          model_limited <= '1';
-        end if;
+      -- Stage 3: lambda_c = sum, narrowed; d at clock 3, from where it moves on, q at 4
+      if valid(2) = '1' or valid(3) = '1' then
+        lambda_c_q    <= saturate(rounded_2, FLUX_W);
+        lambda_c_d    <= lambda_c_q;
+        model_limited <= exceeds(rounded_2, FLUX_W) or (model_limited and valid(3));
       end if;
 
       if rst = '1' then

@@ -4,7 +4,7 @@
 -- u_int is that of two samples before.  While the integrals mean something else (a limit, a current converter at its
 -- end, voltage not known) delta_lambda fades by a sixteenth a sample; zero while the gates are off.
 -- Formats: r U(0,24), u_int and the difference 28 fraction bits, factor S(0,17), out FLUX.
--- Latency: 10 (d, q follow each other).  Interval: 10.
+-- Latency: 12 (d, q follow each other).  Interval: 12.
 -- Rounding: half up after r*i, the shift and the factor.  The shifted difference and the result saturate; the former
 -- is told unless the factor is zero.
 
@@ -54,43 +54,52 @@ architecture rtl of delta_lambda is
   signal u_int_q_2 : signed(INTEGRAL_W - 1 downto 0);
 
   signal valid     : std_logic_vector(0 to LATENCY);
-  signal held      : std_logic;
+  signal held_1    : std_logic;
+  signal moving_1  : std_logic_vector(1 downto 0);  -- whether the factor is not zero, by halves
   signal limited   : std_logic;  -- in either axis
   signal i_1       : signed(PU_W - 1 downto 0);
   signal prod_2    : signed(PU_W + RESISTANCE_W downto 0);
   signal u_int_2   : signed(INTEGRAL_W - 1 downto 0);
   signal sum_3     : signed(REST_W + DROP_R downto 0);
   signal rest_3    : signed(REST_W - 1 downto 0);
-  signal over_3    : std_logic;
   signal coarse_4  : signed(FIT_W - 1 downto 0);
-  signal over_4    : std_logic;
+  signal over_4    : std_logic_vector(2 downto 0);
+  signal more_4    : std_logic;
   signal sign_4    : std_logic;
   signal shifted_5 : signed(FIT_W downto 0);
+  signal over_5    : std_logic;
+  signal rounded_6 : signed(FLUX_W downto 0);
+  signal past_6    : std_logic;
   signal rounded_5 : signed(FLUX_W + 1 downto 0);
-  signal value_6   : signed(FLUX_W - 1 downto 0);
-  signal prod_7    : signed(PROD_W - 1 downto 0);
-  signal half_7    : signed(PROD_W downto 0);
-  signal sum_8     : signed(PROD_W downto 0);
-  signal old_8     : signed(FLUX_W - 1 downto 0);
-  signal delta_8   : signed(FLUX_W - 1 downto 0);
+  signal value_7   : signed(FLUX_W - 1 downto 0);
+  signal prod_8    : signed(PROD_W - 1 downto 0);
+  signal half_8    : signed(PROD_W downto 0);
+  signal sum_9     : signed(PROD_W downto 0);
+  signal old_9     : signed(FLUX_W - 1 downto 0);
+  signal sum_10    : signed(PROD_W - DROP downto 0);
+  signal past_10   : std_logic;
+  signal faded_10  : signed(FLUX_W - 1 downto 0);
+  signal delta_10  : signed(FLUX_W - 1 downto 0);
 begin
   valid(0) <= in_valid;
-  held     <= run when sat_d /= 0 or sat_q /= 0 or current_at_rail /= 0 or voltage_known = '0' else '0';
 
   -- The axis of the beat: d, made of the quantities of q, then q, made of those of d.
   u_int_2 <= u_int_d_2 when valid(3) = '1' else u_int_q_2;
-  old_8   <= delta_lambda_q when valid(9) = '1' else delta_lambda_d;
+  old_9   <= delta_lambda_q when valid(10) = '1' else delta_lambda_d;
 
   -- sum is the complement of u_int - prod: the adder behind the multiplier only adds.
   rest_3 <= not sum_3(REST_W - 1 + DROP_R downto DROP_R);
 
-  -- Whether a bit unlike the sign is shifted into the sign or past it.
+  -- Whether a bit unlike the sign is shifted into the sign or past it: by fours, by the remainder.
   process (all)
   begin
-    over_3 <= '0';
-    for k in 0 to SPEED_RECIPROCAL_N_MAX - 1 loop
-      if n_omega > k and rest_3(FIT_W - 1 - k) /= rest_3(REST_W - 1) then
-        over_3 <= '1';
+    more_4 <= '0';
+    for k in 0 to 2 loop
+      if n_omega(3 downto 2) > k and over_4(k) = '1' then
+        more_4 <= '1';
+      end if;
+      if n_omega(1 downto 0) > k and coarse_4(FIT_W - 1 - k) /= sign_4 then
+        more_4 <= '1';
       end if;
     end loop;
   end process;
@@ -98,19 +107,20 @@ begin
   rounded_5 <= round_half_up(shifted_5, DELTA_LAMBDA_DROP_SHIFTED);
 
   -- Half up of prod for d, of -prod for q: the complement of prod less half an LSB and one is -prod and half an LSB.
-  half_7  <= rounding_base("0", DROP, PROD_W + 1) xor valid(8);
-  delta_8 <= minus_rounded(old_8, old_8, DELTA_LAMBDA_FADE) when held = '1' else
-             saturate(sum_8(PROD_W downto DROP) xor valid(9), FLUX_W);
+  half_8   <= rounding_base("0", DROP, PROD_W + 1) xor valid(9);
+  delta_10 <= faded_10 when held_1 = '1' else
+              narrowed(sum_10, past_10, FLUX_W) xor valid(11);
 
   process (clk)
   begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
+      -- Stage 1: held = run where the integrals mean something else
+      held_1   <= run and ((or sat_d) or (or sat_q) or (or current_at_rail) or not voltage_known);
+      moving_1 <= (or factor(RECIPROCAL_W downto RECIPROCAL_W / 2)) & (or factor(RECIPROCAL_W / 2 - 1 downto 0));
+
       -- Stages 1, 2: prod = r*i
-      if valid(0) = '1' then
-        limited <= '0';
-      end if;
       if valid(0) = '1' or valid(1) = '1' then
         i_1 <= i_d when valid(1) = '1' else i_q;
       end if;
@@ -124,56 +134,55 @@ begin
       end if;
 
       -- Stages 4, 5: shifted = rest * 2**n_omega, by fours, then the remainder
-      if valid(3) = '1' or valid(4) = '1' then
-        coarse_4 <= shift_left(rest_3(FIT_W - 1 downto 0), to_integer(n_omega(3 downto 2) & "00"));
-        over_4   <= over_3;
-        sign_4   <= rest_3(REST_W - 1);
-      end if;
-      if valid(4) = '1' or valid(5) = '1' then
-        shifted_5        <= '0' & shift_left(coarse_4, to_integer(n_omega(1 downto 0)));
-        shifted_5(FIT_W) <= sign_4;
-        if over_4 = '1' then
-          -- Two bits, so that rounding cannot bring a negative one back.
-          shifted_5(FIT_W - 1 downto FIT_W - 2) <= (others => not sign_4);
-        end if;
-      end if;
+      coarse_4 <= shift_left(rest_3(FIT_W - 1 downto 0), to_integer(n_omega(3 downto 2) & "00"));
+      for k in over_4'range loop
+        over_4(k) <= or (rest_3(FIT_W - 1 - 4 * k downto FIT_W - 4 - 4 * k) xor rest_3(REST_W - 1));
+      end loop;
+      sign_4           <= rest_3(REST_W - 1);
+      shifted_5        <= '0' & shift_left(coarse_4, to_integer(n_omega(1 downto 0)));
+      shifted_5(FIT_W) <= sign_4;
+      over_5           <= more_4;
 
-      -- Stage 6: value = shifted, narrowed
-      if valid(5) = '1' or valid(6) = '1' then
-        value_6 <= saturate(rounded_5, FLUX_W);
-        if exceeds(rounded_5, FLUX_W) = '1' then
-          limited <= '1';
-        end if;
-      end if;
-
-      -- Stages 7, 8: sum = value * factor and its half
+      -- Stages 6, 7: value = shifted, narrowed; rounding may take a negative one's sign, not the one before it
+      rounded_6 <= shifted_5(FIT_W) & rounded_5(FLUX_W - 1 downto 0);
+      past_6    <= over_5 or exceeds(rounded_5, FLUX_W);
       if valid(6) = '1' or valid(7) = '1' then
-        prod_7 <= value_6 * factor;
-      end if;
-      if valid(7) = '1' or valid(8) = '1' then
-        sum_8 <= half_7 + prod_7;
+        value_7 <= narrowed(rounded_6, past_6, FLUX_W);
+        limited <= past_6 or (limited and valid(7));
       end if;
 
-      -- Stage 9: delta_lambda = sum for d, -sum for q, narrowed, or what is left of it; d at clock 9, q at 10
-      if valid(8) = '1' then
-        delta_lambda_d <= delta_8;
+      -- Stages 8, 9: sum = value * factor and its half
+      if valid(7) = '1' or valid(8) = '1' then
+        prod_8 <= value_7 * factor;
       end if;
-      if valid(8) = '1' and run = '0' then
+      if valid(8) = '1' or valid(9) = '1' then
+        sum_9 <= half_8 + prod_8;
+      end if;
+
+      -- Stage 10: whether the sum fits, and what is left of delta_lambda where it is held
+      if valid(9) = '1' or valid(10) = '1' then
+        sum_10   <= sum_9(PROD_W downto DROP);
+        past_10  <= exceeds(sum_9(PROD_W downto DROP), FLUX_W);
+        faded_10 <= minus_rounded(old_9, old_9, DELTA_LAMBDA_FADE);
+      end if;
+
+      -- Stage 11: delta_lambda = sum for d, -sum for q, narrowed, or what is left of it; d at clock 11, q at 12
+      if valid(10) = '1' then
+        delta_lambda_d <= delta_10;
+      end if;
+      if valid(10) = '1' and run = '0' then
         delta_lambda_d <= (others => '0');
       end if;
-      if valid(9) = '1' then
-        delta_lambda_q <= delta_8;
-        delta_held     <= held;
-        delta_limited  <= '0';
-        if run = '1' and held = '0' and factor /= 0 then
-          delta_limited <= limited;
-        end if;
-        u_int_d_1 <= u_int_d;
-        u_int_q_1 <= u_int_q;
-        u_int_d_2 <= u_int_d_1;
-        u_int_q_2 <= u_int_q_1;
+      if valid(11) = '1' then
+        delta_lambda_q <= delta_10;
+        delta_held     <= held_1;
+        delta_limited  <= limited and (or moving_1) and run and not held_1;
+        u_int_d_1      <= u_int_d;
+        u_int_q_1      <= u_int_q;
+        u_int_d_2      <= u_int_d_1;
+        u_int_q_2      <= u_int_q_1;
       end if;
-      if valid(9) = '1' and run = '0' then
+      if valid(11) = '1' and run = '0' then
         delta_lambda_q <= (others => '0');
       end if;
 

@@ -5,7 +5,7 @@
 --   lambda_add = limit(delta_lambda)                                                      flux_mode 2
 -- limit: to +-delta_max, and told.  The addition is the PI with a gain of one and no integral.
 -- Formats: flux_kp U(7,10), flux_ki U(0,17), products and integral S(1,30), delta_max U(0,16), out FLUX.
--- Latency: 10 (d, then q).  Interval: 10.  Rounding: half up; the limit is a multiple of FLUX's LSB.
+-- Latency: 12 (d, then q).  Interval: 12.  Rounding: half up; the limit is a multiple of FLUX's LSB.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -63,43 +63,35 @@ architecture rtl of flux_compensation is
   signal prod_i_2  : signed(FLUX_W + flux_ki'length downto 0);
   signal sum_i_3   : signed(SUM_W - 1 downto 0);
   signal moved_3   : signed(SUM_W - 1 - DROP_I downto 0);
-  signal past_3    : std_logic;
+  signal past_4    : std_logic;
+  signal under_4   : std_logic;
   signal prod_p_4  : signed(FLUX_W + flux_kp'length downto 0);
-  signal sum_p_5   : signed(SUM_W - 1 downto 0);
-  signal total_5   : signed(SUM_W - 1 - DROP_P downto 0);
-  signal past_5    : std_logic;
-  signal lambda_5  : signed(FLUX_W - 1 downto 0);
-  signal limited_6 : std_logic;
+  signal sum_p_6   : signed(SUM_W - 1 downto 0);
+  signal total_6   : signed(SUM_W - 1 - DROP_P downto 0);
+  signal past_7    : std_logic;
+  signal under_7   : std_logic;
+  signal rounded_7 : signed(FLUX_W - 1 downto 0);
+  signal lambda_7  : signed(FLUX_W - 1 downto 0);
+  signal limited_8 : std_logic;
 begin
   valid(0) <= in_valid;
   step     <= valid(0 to LATENCY - TURN) or valid(TURN to LATENCY);
   upper    <= shift_left(signed(resize(delta_max, FLUX_STATE_W)), SHIFT_LIMIT);
   lower    <= shift_left(-signed(resize(delta_max, FLUX_STATE_W)), SHIFT_LIMIT);
-  kp       <= flux_kp when flux_mode = PROPOSED else KP_ONE;
   delta_0  <= delta_lambda_q when valid(TURN) = '1' else delta_lambda_d;
   moved_3  <= sum_i_3(SUM_W - 1 downto DROP_I);
-  past_3   <= beyond(moved_3, delta_max, SHIFT_LIMIT);
-  total_5  <= sum_p_5(SUM_W - 1 downto DROP_P);
-  past_5   <= beyond(total_5, delta_max, SHIFT_LIMIT);
+  total_6  <= sum_p_6(SUM_W - 1 downto DROP_P);
 
   -- -integral/2**FORGET, half up: the complement of the upper bits, one more unless the lower are past the half.
   down_0 <= integral(FORGET - 1) and (or integral(FORGET - 2 downto 0));
 
   -- The limited total; the limit is put in behind the rounding, which cannot move anything past it.
-  process (all)
-    variable rounded : signed(SUM_W - DROP_P - FLUX_TO_STATE downto 0);
-  begin
-    rounded  := round_half_up(total_5, FLUX_TO_STATE);
-    lambda_5 <= rounded(FLUX_W - 1 downto 0);
-    if past_5 = '1' then
-      lambda_5 <= upper(FLUX_STATE_W - 1 downto FLUX_TO_STATE);
-      if total_5 < 0 then
-        lambda_5 <= lower(FLUX_STATE_W - 1 downto FLUX_TO_STATE);
-      end if;
-    end if;
-  end process;
+  lambda_7 <= rounded_7 when past_7 = '0' else
+              lower(FLUX_STATE_W - 1 downto FLUX_TO_STATE) when under_7 = '1' else
+              upper(FLUX_STATE_W - 1 downto FLUX_TO_STATE);
 
   process (clk)
+    variable rounded : signed(SUM_W - DROP_P - FLUX_TO_STATE downto 0);
   begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
@@ -123,39 +115,48 @@ begin
         sum_i_3 <= rounding_base(integral, DROP_I, SUM_W) + prod_i_2;
       end if;
 
-      -- Stage 4: integral = sum_i, limited;  prod_p = flux_kp*delta_lambda
+      -- Stage 4: prod_p = kp*delta_lambda, kp a setting;  stages 4, 5: integral = sum_i, limited
+      kp <= flux_kp when flux_mode = PROPOSED else KP_ONE;
       if step(3) = '1' then
         prod_p_4       <= delta_1 * signed('0' & kp);
+        past_4         <= beyond(moved_3, delta_max, SHIFT_LIMIT);
+        under_4        <= moved_3(moved_3'high);
         integral       <= integral_other;
         integral_other <= moved_3(FLUX_STATE_W - 1 downto 0);
       end if;
-      if step(3) = '1' and past_3 = '1' then
-        integral_other <= lower when moved_3 < 0 else upper;
+      if step(4) = '1' and past_4 = '1' then
+        integral_other <= lower when under_4 = '1' else upper;
       end if;
-      if step(3) = '1' and flux_mode /= PROPOSED then
+      if step(4) = '1' and flux_mode /= PROPOSED then
         integral_other <= (others => '0');
       end if;
 
-      -- Stage 5: sum_p = integral + prod_p
-      if step(4) = '1' then
-        sum_p_5 <= rounding_base(integral_other, DROP_P, SUM_W) + prod_p_4;
+      -- Stage 6: sum_p = integral + prod_p
+      if step(5) = '1' then
+        sum_p_6 <= rounding_base(integral_other, DROP_P, SUM_W) + prod_p_4;
       end if;
 
-      -- Stage 6: lambda = sum_p, narrowed and limited; d at clock 6, q at 10
-      if valid(5) = '1' then
-        limited_6    <= past_5;
-        lambda_pi_d  <= lambda_5;
-        lambda_add_d <= lambda_5;
+      -- Stages 7, 8: lambda = sum_p, narrowed and limited; d at clock 8, q at 12
+      if step(6) = '1' then
+        rounded   := round_half_up(total_6, FLUX_TO_STATE);
+        rounded_7 <= rounded(FLUX_W - 1 downto 0);
+        past_7    <= beyond(total_6, delta_max, SHIFT_LIMIT);
+        under_7   <= total_6(total_6'high);
+      end if;
+      if valid(7) = '1' then
+        limited_8    <= past_7;
+        lambda_pi_d  <= lambda_7;
+        lambda_add_d <= lambda_7;
       end if;
       if valid(LATENCY - 1) = '1' then
-        compensation_limited <= (limited_6 or past_5) when flux_mode = EARLIER or flux_mode = PROPOSED else '0';
-        lambda_pi_q          <= lambda_5;
-        lambda_add_q         <= lambda_5;
+        compensation_limited <= (limited_8 or past_7) when flux_mode = EARLIER or flux_mode = PROPOSED else '0';
+        lambda_pi_q          <= lambda_7;
+        lambda_add_q         <= lambda_7;
       end if;
-      if valid(5) = '1' and flux_mode /= PROPOSED then
+      if valid(7) = '1' and flux_mode /= PROPOSED then
         lambda_pi_d <= (others => '0');
       end if;
-      if valid(5) = '1' and flux_mode /= EARLIER then
+      if valid(7) = '1' and flux_mode /= EARLIER then
         lambda_add_d <= (others => '0');
       end if;
       if valid(LATENCY - 1) = '1' and flux_mode /= PROPOSED then

@@ -36,19 +36,25 @@ architecture rtl of flux_estimate is
   constant LATENCY : positive := FLUX_ESTIMATE_LATENCY;
   constant SUM_W   : positive := FLUX_MODELS_MERGED_FLUX_W + 1;
 
-  signal valid     : std_logic_vector(0 to LATENCY);
-  signal far_d     : std_logic;
-  signal far_q     : std_logic;
-  signal chosen_d  : signed(SUM_W - 1 downto 0);
-  signal chosen_q  : signed(SUM_W - 1 downto 0);
-  signal sum_d     : signed(SUM_W - 1 downto 0);
-  signal sum_q     : signed(SUM_W - 1 downto 0);
-  signal cut_d     : signed(SUM_W - 1 - PU_TO_FLUX downto 0);
-  signal cut_q     : signed(SUM_W - 1 - PU_TO_FLUX downto 0);
-  signal limited_d : std_logic;
-  signal limited_q : std_logic;
-  signal below_d   : std_logic;
-  signal below_q   : std_logic;
+  signal valid    : std_logic_vector(0 to LATENCY);
+  signal far_d    : std_logic;
+  signal far_q    : std_logic;
+  signal sum_md   : signed(SUM_W - 1 downto 0);                -- of the merged flux; sum_c: of the current model's
+  signal sum_mq   : signed(SUM_W - 1 downto 0);
+  signal sum_cd   : signed(SUM_W - 1 downto 0);
+  signal sum_cq   : signed(SUM_W - 1 downto 0);
+  signal cut_md   : signed(SUM_W - 1 - PU_TO_FLUX downto 0);
+  signal cut_mq   : signed(SUM_W - 1 - PU_TO_FLUX downto 0);
+  signal cut_cd   : signed(SUM_W - 1 - PU_TO_FLUX downto 0);
+  signal cut_cq   : signed(SUM_W - 1 - PU_TO_FLUX downto 0);
+  signal past_m   : std_logic_vector(1 downto 0);              -- limited: q, d
+  signal past_c   : std_logic_vector(1 downto 0);
+  signal past_m_1 : std_logic_vector(1 downto 0);
+  signal past_c_1 : std_logic_vector(1 downto 0);
+  signal merged_1 : std_logic;
+  signal ended_1  : std_logic;
+  signal back_d   : std_logic;                                 -- the current model's is negative
+  signal back_q   : std_logic;
 
   -- The cut sum, or the end of PU on the given side where it is limited.
   function narrowed (cut : signed; limited : std_logic; below : std_logic) return signed is
@@ -64,21 +70,28 @@ begin
   valid(0) <= in_valid;
 
   -- From 4 per unit on the sum, which is less than the compensation's 2 off, is past the end whatever it is.
-  far_d <= exceeds(model_d, FLUX_MODELS_MERGED_FLUX_W + 1) and not merged;
-  far_q <= exceeds(model_q, FLUX_MODELS_MERGED_FLUX_W + 1) and not merged;
+  far_d <= exceeds(model_d, FLUX_MODELS_MERGED_FLUX_W + 1);
+  far_q <= exceeds(model_q, FLUX_MODELS_MERGED_FLUX_W + 1);
 
-  chosen_d <= resize(merged_d, SUM_W) when merged = '1' else model_d(SUM_W downto 1);
-  chosen_q <= resize(merged_q, SUM_W) when merged = '1' else model_q(SUM_W downto 1);
+  -- Below 4 and 2 per unit where it counts: the sum fits.  Either sum is made and narrowed, and chosen last: a choice
+  -- in front of the adder would make the longest path longer.
+  sum_md    <= raised_d + resize(merged_d, SUM_W);
+  sum_mq    <= raised_q + resize(merged_q, SUM_W);
+  sum_cd    <= raised_d + model_d(SUM_W downto 1);
+  sum_cq    <= raised_q + model_q(SUM_W downto 1);
+  cut_md    <= sum_md(SUM_W - 1 downto PU_TO_FLUX);
+  cut_mq    <= sum_mq(SUM_W - 1 downto PU_TO_FLUX);
+  cut_cd    <= sum_cd(SUM_W - 1 downto PU_TO_FLUX);
+  cut_cq    <= sum_cq(SUM_W - 1 downto PU_TO_FLUX);
+  past_m(0) <= exceeds(cut_md, PU_W);
+  past_m(1) <= exceeds(cut_mq, PU_W);
+  past_c(0) <= far_d or exceeds(cut_cd, PU_W);
+  past_c(1) <= far_q or exceeds(cut_cq, PU_W);
+  back_d    <= model_d(model_d'high) when far_d = '1' else cut_cd(cut_cd'high);
+  back_q    <= model_q(model_q'high) when far_q = '1' else cut_cq(cut_cq'high);
 
-  -- Below 4 and 2 per unit where it counts: the sum fits.
-  sum_d     <= raised_d + chosen_d;
-  sum_q     <= raised_q + chosen_q;
-  cut_d     <= sum_d(SUM_W - 1 downto PU_TO_FLUX);
-  cut_q     <= sum_q(SUM_W - 1 downto PU_TO_FLUX);
-  limited_d <= far_d or exceeds(cut_d, PU_W);
-  limited_q <= far_q or exceeds(cut_q, PU_W);
-  below_d   <= model_d(model_d'high) when far_d = '1' else cut_d(cut_d'high);
-  below_q   <= model_q(model_q'high) when far_q = '1' else cut_q(cut_q'high);
+  -- The flag is not needed as early as the flux: what is behind the adder meets behind the register.
+  estimate_limited <= ended_1 or (or past_m_1) when merged_1 = '1' else ended_1 or (or past_c_1);
 
   process (clk)
   begin
@@ -87,9 +100,14 @@ begin
 
       -- Stage 1: lambda = chosen + raised, narrowed
       if valid(0) = '1' then
-        lambda_d         <= narrowed(cut_d, limited_d, below_d);
-        lambda_q         <= narrowed(cut_q, limited_q, below_q);
-        estimate_limited <= ended or limited_d or limited_q;
+        lambda_d <= narrowed(cut_md, past_m(0), cut_md(cut_md'high)) when merged = '1' else
+                    narrowed(cut_cd, past_c(0), back_d);
+        lambda_q <= narrowed(cut_mq, past_m(1), cut_mq(cut_mq'high)) when merged = '1' else
+                    narrowed(cut_cq, past_c(1), back_q);
+        ended_1  <= ended;
+        merged_1 <= merged;
+        past_m_1 <= past_m;
+        past_c_1 <= past_c;
       end if;
 
       if rst = '1' then

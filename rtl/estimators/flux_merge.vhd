@@ -74,6 +74,8 @@ architecture rtl of flux_merge is
   signal beta       : std_logic;
   signal trusted    : std_logic;
   signal limited    : std_logic;  -- by any stage of either axis
+  signal limits     : std_logic_vector(2 downto 0);  -- a stage does: lambda, eps, x
+  signal moves      : std_logic;  -- flux does
   signal source     : std_logic_vector(1 downto 0);  -- of flux, when it moves next
   signal i_1        : signed(PU_W - 1 downto 0);
   signal lambda_c_1 : signed(FLUX_W - 1 downto 0);
@@ -82,7 +84,7 @@ architecture rtl of flux_merge is
   signal prod_u_2   : signed(FLUX_W + SAMPLE_TIME_W downto 0);
   signal sum_r      : signed(SUM_R_W - 1 downto 0);  -- at clock 3, then at clock 14
   signal less_r     : signed(TOTAL_W downto 0);
-  signal top        : std_logic;  -- flux a clock ago: would be rounded past its end
+  signal top        : std_logic_vector(1 downto 0);  -- flux a clock ago: would be rounded past its end, by halves
   signal rounded    : signed(FLUX_STATE_W downto FLUX_TO_STATE);
   signal diff_5     : signed(FLUX_W + 1 downto 0);
   signal eps_6      : signed(FLUX_W downto 0);
@@ -109,7 +111,8 @@ begin
 
   -- lambda_c - flux, rounded by one carry, which is the half of flux below its end.
   diff_5 <= (lambda_c_1(FLUX_W - 1) & lambda_c_1 & '0')
-            - (resize(flux(FLUX_STATE_W - 1 downto FLUX_TO_STATE), FLUX_W + 1) & (flux(FLUX_TO_STATE - 1) and not top));
+            - (resize(flux(FLUX_STATE_W - 1 downto FLUX_TO_STATE), FLUX_W + 1)
+               & (flux(FLUX_TO_STATE - 1) and not (and top)));
 
   process (clk)
   begin
@@ -129,9 +132,6 @@ begin
         i_1        <= i_beta when beta = '1' else i_alpha;
         lambda_c_1 <= lambda_c_beta when beta = '1' else lambda_c_alpha;
         u_1        <= u_applied_beta when beta = '1' else u_applied_alpha;
-      end if;
-      if valid(0) = '1' then
-        limited <= '0';
       end if;
 
       -- Stage 2: prod_r = -rho*i;  prod_u = t_s*u_applied
@@ -157,7 +157,8 @@ begin
       if step(14) = '1' then
         source <= OTHER;
       end if;
-      if (step(3) or step(12) or step(14) or step(15)) = '1' then
+      moves <= step(2) or step(11) or step(13) or step(14);
+      if moves = '1' then
         if source(1) = '0' then
           flux <= resize(saturate(less_r, FLUX_STATE_W), TOTAL_W);
           if source(0) = '1' then
@@ -173,12 +174,11 @@ begin
       if step(15) = '1' then
         flux_other <= flux;
       end if;
-      if ((step(3) and trusted) or step(14)) = '1' and exceeds(less_r, FLUX_STATE_W) = '1' then
-        limited <= '1';
-      end if;
+      limits(0) <= ((step(3) and trusted) or step(14)) and exceeds(less_r, FLUX_STATE_W);
 
       -- Stages 5, 16: next to the end of the range the flux would be rounded past it: saturated before it is rounded.
-      top <= not flux(FLUX_STATE_W - 1) and (and flux(FLUX_STATE_W - 2 downto FLUX_TO_STATE - 1));
+      top(1) <= not flux(FLUX_STATE_W - 1) and (and flux(FLUX_STATE_W - 2 downto FLUX_STATE_W / 2));
+      top(0) <= and flux(FLUX_STATE_W / 2 - 1 downto FLUX_TO_STATE - 1);
 
       -- Stages 6, 7: eps = lambda_c - lambda
       if step(5) = '1' then
@@ -186,10 +186,8 @@ begin
       end if;
       if step(6) = '1' then
         eps_7 <= saturate(eps_6, FLUX_W);
-        if exceeds(eps_6, FLUX_W) = '1' then
-          limited <= '1';
-        end if;
       end if;
+      limits(1) <= step(6) and exceeds(eps_6, FLUX_W);
 
       -- Stages 8, 9: y = omega_0*eps; |eps| <= 2 and omega_0 < 1/4, so it fits
       if step(7) = '1' then
@@ -216,10 +214,9 @@ begin
         x        <= x_other;
         x_other  <= saturate(moved_11, X_W);
         sum_u_12 <= rounding_base(sum_xi_11(PROD_X_W downto DROP_XI), DROP_U, SUM_U_W) + prod_u_2;
-        if exceeds(moved_11, X_W) = '1' then
-          limited <= '1';
-        end if;
       end if;
+      limits(2) <= step(11) and exceeds(moved_11, X_W);
+      limited   <= (or limits) or (limited and not valid(0));
       if valid(0) = '1' and trusted = '0' then
         x       <= (others => '0');
         x_other <= (others => '0');
@@ -249,7 +246,7 @@ begin
     end if;
   end process;
 
-  rounded <= signed'('0' & (flux_other(FLUX_TO_STATE - 1) and not top))
+  rounded <= signed'('0' & (flux_other(FLUX_TO_STATE - 1) and not (and top)))
              + resize(flux_other(FLUX_STATE_W - 1 downto FLUX_TO_STATE), rounded'length);
 
   out_valid <= valid(LATENCY);

@@ -50,6 +50,8 @@ architecture rtl of flux_models is
   constant DROP_MERGED : positive := FLUX_MODELS_DROP_MERGED;
   constant PROD_W      : positive := PU_W + INDUCTANCE_W + 1;
   constant SUM_W       : positive := PROD_W + 1;
+  constant PART_W      : positive := 6;
+  constant PARTS       : positive := (FLUX_W + PART_W - 2) / PART_W;
 
   signal valid         : std_logic_vector(0 to LATENCY);
   signal prod_model_d  : signed(PROD_W - 1 downto 0);
@@ -57,17 +59,22 @@ architecture rtl of flux_models is
   signal prod_merged_d : signed(PROD_W - 1 downto 0);
   signal prod_merged_q : signed(PROD_W - 1 downto 0);
   signal merged_1      : std_logic;
-  signal ended_1       : std_logic;
+  signal ended_d_1     : std_logic_vector(PARTS - 1 downto 0);
+  signal ended_q_1     : std_logic_vector(PARTS - 1 downto 0);
   signal sum_model_d   : signed(SUM_W - 1 downto 0);
   signal sum_model_q   : signed(SUM_W - 1 downto 0);
   signal sum_merged_d  : signed(SUM_W - 1 downto 0);
   signal sum_merged_q  : signed(SUM_W - 1 downto 0);
 
-  -- Whether x is the first or the last number of its format: no bit is like the sign.
-  function at_end (x : signed) return std_logic is
-    alias v : signed(x'length - 1 downto 0) is x;
+  -- Whether x is the first or the last number of its format: no bit is like the sign.  By parts, for the clock after.
+  function at_end (x : signed) return std_logic_vector is
+    alias v         : signed(x'length - 1 downto 0) is x;
+    variable result : std_logic_vector(PARTS - 1 downto 0);
   begin
-    return and (v(v'high - 1 downto 0) xor v(v'high));
+    for k in result'range loop
+      result(k) := and (v(minimum(PART_W * k + PART_W, v'high) - 1 downto PART_W * k) xor v(v'high));
+    end loop;
+    return result;
   end function;
 
   function raised (lambda_pi : signed) return signed is
@@ -83,13 +90,14 @@ begin
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
       -- Stage 1: prod_model = l*i;  prod_merged = -rho*i
+      prod_model_d  <= i_d * signed('0' & l_d);
+      prod_model_q  <= i_q * signed('0' & l_q);
+      prod_merged_d <= i_d * minus_rho;
+      prod_merged_q <= i_q * minus_rho;
       if valid(0) = '1' then
-        prod_model_d  <= i_d * signed('0' & l_d);
-        prod_model_q  <= i_q * signed('0' & l_q);
-        prod_merged_d <= i_d * minus_rho;
-        prod_merged_q <= i_q * minus_rho;
-        ended_1       <= at_end(lambda_m_d) or at_end(lambda_m_q);
-        merged_1      <= '0';
+        ended_d_1 <= at_end(lambda_m_d);
+        ended_q_1 <= at_end(lambda_m_q);
+        merged_1  <= '0';
         if flux_mode /= FLUX_MODELS_CURRENT_MODEL then
           merged_1 <= merge_known and run;
         end if;
@@ -104,7 +112,7 @@ begin
         raised_d     <= raised(lambda_pi_d);
         raised_q     <= raised(lambda_pi_q);
         merged       <= merged_1;
-        ended        <= merged_1 and ended_1;
+        ended        <= merged_1 and ((and ended_d_1) or (and ended_q_1));
       end if;
 
       if rst = '1' then

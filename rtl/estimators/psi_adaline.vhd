@@ -4,7 +4,7 @@
 -- known or the gates off.
 -- r*i_q, v_leg*d_q, flux*omega_chord and e*omega_chord share a multiplier and the adder behind it.
 -- Formats: products and e FLUX, psi_m inside S(1,34), out PU.
--- Latency: 14.  Interval: 14.
+-- Latency: 17.  Interval: 17.
 -- Rounding: half up.  l_d*i_d, the flux, e, omega_chord*e and psi_m saturate.
 
 library ieee;
@@ -62,58 +62,58 @@ architecture rtl of psi_adaline is
   signal slow_1   : std_logic;
   signal prod_own : signed(PROD_W - 1 downto 0);
   signal sum_own  : signed(PROD_W downto 0);
-  signal own_2    : signed(FLUX_W - 1 downto 0);
-  signal half_2   : std_logic;
+  signal past_3   : std_logic;
+  signal own_3    : signed(FLUX_W - 1 downto 0);
+  signal end_3    : std_logic_vector(1 downto 0);
+  signal half_3   : std_logic;
   signal sum_flux : signed(FLUX_W + 1 downto 0);
-  signal flux_3   : signed(FLUX_W downto 0);
-  signal narrow   : signed(FLUX_W - 1 downto 0);
+  signal flux_4   : signed(FLUX_W downto 0);
+  signal narrow   : signed(FLUX_W - 1 downto 0);            -- e at clock 8, pull at clock 12
   signal factor_a : signed(FLUX_W - 1 downto 0);
   signal factor_b : signed(PU_W - 1 downto 0);
   signal mul_a    : signed(FLUX_W - 1 downto 0);
   signal mul_b    : signed(PU_W - 1 downto 0);
   signal prod     : signed(PROD_W - 1 downto 0);
+  signal base     : signed(SUM_W - 1 downto 0);
   signal addend   : signed(SUM_W - 1 downto 0);
   signal sum      : signed(SUM_W - 1 downto 0);
-  signal pull_10  : signed(FLUX_W - 1 downto 0);
   signal prod_psi : signed(FLUX_W + eta_psi'length downto 0);
   signal sum_psi  : signed(SUM_P_W - 1 downto 0);
-  signal half_13  : std_logic;
+  signal end_16   : std_logic_vector(1 downto 0);
+  signal half_16  : std_logic;
 
-  -- The half that rounds psi to width bits; next to the end of the range it would round past it.
-  function half_below_end (x : signed; width : positive) return std_logic is
+  -- Whether x, cut to width bits, is the last number: a half would round it past the end of its range.  By halves.
+  function at_end (x : signed; width : positive) return std_logic_vector is
     alias v : signed(x'length - 1 downto 0) is x;
   begin
-    return v(v'high - width) and not (not v(v'high) and (and v(v'high - 1 downto v'high - width + 1)));
+    return (not v(v'high) and (and v(v'high - 1 downto v'high - width / 2)))
+           & (and v(v'high - width / 2 - 1 downto v'high - width + 1));
   end function;
 begin
   valid(0) <= in_valid;
-  learning <= run and voltage_known when sat_d = 0 and sat_q = 0 and current_at_rail = 0 else '0';
 
   -- |omega_chord| < omega_psi_min; the complement of a negative speed is one less than its size.
   slow_1 <= not room_1(PU_W - 1) and ((or room_1(PU_W - 2 downto 1)) or (room_1(0) and not omega_chord(PU_W - 1)));
 
   -- own + psi rounded, by one carry: what the complement of own lacks and the half.
-  own_2    <= saturate(sum_own(PROD_W downto DROP_L), FLUX_W);
-  half_2   <= half_below_end(psi, FLUX_W);
-  sum_flux <= (resize(psi(STATE_W - 1 downto TO_FLUX), FLUX_W + 1) & half_2) - (resize(not own_2, FLUX_W + 1) & '1');
+  own_3    <= narrowed(sum_own(PROD_W downto DROP_L), past_3, FLUX_W);
+  half_3   <= psi(TO_FLUX - 1) and not (and end_3);
+  half_16  <= psi(TO_PU - 1) and not (and end_16);
+  sum_flux <= (resize(psi(STATE_W - 1 downto TO_FLUX), FLUX_W + 1) & half_3) - (resize(not own_3, FLUX_W + 1) & '1');
 
-  narrow <= saturate(sum(SUM_W - 1 downto DROP_OMEGA), FLUX_W);
-
-  factor_a <= saturate(flux_3, FLUX_W) when valid(3) = '1' else
-              not narrow when valid(6) = '1' else
-              shift_left(resize(v_leg, FLUX_W), TO_R) when valid(1) = '1' else
+  factor_a <= saturate(flux_4, FLUX_W) when valid(4) = '1' else
+              not narrow when valid(8) = '1' else
+              shift_left(resize(v_leg, FLUX_W), TO_R) when valid(2) = '1' else
               signed('0' & r);
-  factor_b <= omega_chord when valid(3) = '1' else
-              d_q when valid(1) = '1' else
-              i_q;
+  factor_b <= i_q when valid(0) = '1' else
+              d_q when valid(2) = '1' else
+              omega_chord;
 
   -- e grows as its complement: the adder behind the multiplier only adds.
-  addend <= rounding_base(not shift_left(resize(u_q, FLUX_W), PU_TO_FLUX), DROP_R, SUM_W) when valid(2) = '1' else
-            rounding_base(sum(SUM_W - 1 downto DROP_R), DROP_R, SUM_W) when valid(3) = '1' else
-            rounding_base(sum(SUM_W - 1 downto DROP_R), DROP_OMEGA, SUM_W) when valid(5) = '1' else
-            rounding_base("0", DROP_OMEGA, SUM_W);
-
-  half_13 <= half_below_end(psi, PU_W);
+  base <= rounding_base(not shift_left(resize(u_q, FLUX_W), PU_TO_FLUX), DROP_R, SUM_W) when valid(1) = '1' else
+          rounding_base(sum(SUM_W - 1 downto DROP_R), DROP_R, SUM_W) when valid(3) = '1' else
+          rounding_base(sum(SUM_W - 1 downto DROP_R), DROP_OMEGA, SUM_W) when valid(5) = '1' else
+          rounding_base("0", DROP_OMEGA, SUM_W);
 
   process (clk)
   begin
@@ -125,53 +125,41 @@ begin
         room_1 <= signed('0' & omega_psi_min) - (omega_chord xor omega_chord(PU_W - 1));
       end if;
 
-      -- Stages 1 to 3: flux = l_d*i_d + psi, each narrowed
-      if valid(0) = '1' then
-        prod_own <= signed('0' & l_d) * i_d;
-      end if;
-      if valid(1) = '1' then
-        sum_own <= rounding_base("0", DROP_L, PROD_W + 1) + prod_own;
-      end if;
-      if valid(2) = '1' then
-        flux_3 <= sum_flux(FLUX_W + 1 downto 1);
-      end if;
+      -- Stages 1 to 4: flux = l_d*i_d + psi, each narrowed.  From here to sum_psi nothing needs an enable: every factor
+      -- stays, and prod_own is flux_models' prod_model_d as long as both are always written.
+      prod_own <= signed('0' & l_d) * i_d;
+      sum_own  <= rounding_base("0", DROP_L, PROD_W + 1) + prod_own;
+      past_3   <= exceeds(sum_own(PROD_W downto DROP_L), FLUX_W);
+      end_3    <= at_end(psi, FLUX_W);
+      flux_4   <= sum_flux(FLUX_W + 1 downto 1);
 
-      -- Stages 1, 2, 4, 7: r and i_q, v_leg and d_q, flux and omega_chord, e
-      if (valid(0) or valid(1) or valid(3) or valid(6)) = '1' then
-        mul_a <= factor_a;
-      end if;
-      if (valid(0) or valid(1) or valid(3)) = '1' then
-        mul_b <= factor_b;
-      end if;
+      -- Stages 1, 3, 5, 9: r and i_q, v_leg and d_q, flux and omega_chord, e and omega_chord
+      mul_a <= factor_a;
+      mul_b <= factor_b;
 
-      -- Stages 2, 3, 5, 8: prod = r*i_q, v_leg*d_q, flux*omega_chord, e*omega_chord
-      if (valid(1) or valid(2) or valid(4) or valid(7)) = '1' then
-        prod <= mul_a * mul_b;
-      end if;
+      -- Stages 2, 4, 6, 10: prod = r*i_q, v_leg*d_q, flux*omega_chord, e*omega_chord, and what it is added to
+      prod   <= mul_a * mul_b;
+      addend <= base;
 
-      -- Stages 3, 4, 6, 9: sum = e = u_q - prod, e -= prod, e -= prod, pull
-      if (valid(2) or valid(3) or valid(5) or valid(8)) = '1' then
-        sum <= addend + prod;
-      end if;
+      -- Stages 3, 5, 7, 11: sum = e = u_q - prod, e -= prod, e -= prod, pull;  stages 8, 12: narrowed
+      sum    <= addend + prod;
+      narrow <= saturate(sum(SUM_W - 1 downto DROP_OMEGA), FLUX_W);
 
-      -- Stages 10 to 13: psi += eta_psi*pull, narrowed, unless it is held
-      if valid(9) = '1' then
-        pull_10  <= narrow;
+      -- Stages 13 to 15: psi += eta_psi*pull, narrowed, unless it is held
+      learning <= run and voltage_known when sat_d = 0 and sat_q = 0 and current_at_rail = 0 else '0';
+      if valid(11) = '1' then
         psi_held <= slow_1 or not learning;
       end if;
-      if valid(10) = '1' then
-        prod_psi <= pull_10 * signed('0' & eta_psi);
-      end if;
-      if valid(11) = '1' then
-        sum_psi <= rounding_base(psi, DROP_ETA, SUM_P_W) + prod_psi;
-      end if;
-      if valid(12) = '1' and psi_held = '0' then
+      prod_psi <= narrow * signed('0' & eta_psi);
+      sum_psi  <= rounding_base(psi, DROP_ETA, SUM_P_W) + prod_psi;
+      if valid(14) = '1' and psi_held = '0' then
         psi <= saturate(sum_psi(SUM_P_W - 1 downto DROP_ETA), STATE_W);
       end if;
 
-      -- Stage 14: psi_m = psi, narrowed
-      if valid(13) = '1' then
-        psi_m <= signed'('0' & half_13) + psi(STATE_W - 1 downto TO_PU);
+      -- Stages 16, 17: psi_m = psi, narrowed
+      end_16 <= at_end(psi, PU_W);
+      if valid(16) = '1' then
+        psi_m <= signed'('0' & half_16) + psi(STATE_W - 1 downto TO_PU);
       end if;
 
       if rst = '1' then

@@ -34,8 +34,10 @@ architecture rtl of speed_reciprocal is
   signal above_1     : signed(U_DC_W downto 0);
   signal above_2     : signed(U_DC_W downto 0);
   signal prod_3      : signed(U_DC_W + k_ramp'length + 1 downto 0);
-  signal ramp_3      : signed(U_DC_W + k_ramp'length + 2 - SPEED_RECIPROCAL_DROP_WEIGHT downto 0);
-  signal weight_4    : unsigned(WEIGHT_W - 1 downto 0);
+  signal sum_4       : signed(U_DC_W + k_ramp'length + 2 downto 0);
+  signal ramp_4      : signed(U_DC_W + k_ramp'length + 2 - SPEED_RECIPROCAL_DROP_WEIGHT downto 0);
+  signal past_5      : std_logic;
+  signal weight_6    : unsigned(WEIGHT_W - 1 downto 0);
   signal m_22        : unsigned(RECIPROCAL_W - 1 downto 0);
   signal prod_23     : signed(RECIPROCAL_W + WEIGHT_W + 1 downto 0);
   signal turned_23   : signed(RECIPROCAL_W + WEIGHT_W + 2 - SPEED_RECIPROCAL_DROP_FACTOR downto 0);
@@ -59,7 +61,7 @@ begin
 
   size_0  <= abs(resize(omega_me, PU_W + 1));
   above_1 <= signed('0' & magnitude_1) - signed('0' & omega_min);
-  ramp_3  <= round_half_up(prod_3, SPEED_RECIPROCAL_DROP_WEIGHT);
+  ramp_4  <= sum_4(sum_4'high downto SPEED_RECIPROCAL_DROP_WEIGHT);
 
   -- The complement turns half up into half down, which is what the negative of a number rounded half up needs.
   turned_23 <= not prod_23(prod_23'high downto SPEED_RECIPROCAL_DROP_FACTOR - 1) when omega_me < 0 else
@@ -88,17 +90,26 @@ begin
         prod_3 <= above_2 * signed('0' & k_ramp);
       end if;
 
-      -- Stage 4: weight = prod, narrowed, at most 1
+      -- Stages 4 to 6: weight = prod, narrowed, at most 1
       if valid(3) = '1' then
-        weight_4 <= unsigned(ramp_3(WEIGHT_W - 1 downto 0));
-        if ramp_3(ramp_3'high downto WEIGHT_W - 1) /= 0 then
-          weight_4 <= to_unsigned(SPEED_RECIPROCAL_WEIGHT_ONE, WEIGHT_W);
+        sum_4 <= rounding_base("0", SPEED_RECIPROCAL_DROP_WEIGHT, sum_4'length) + prod_3;
+      end if;
+      if valid(4) = '1' then
+        past_5 <= '0';
+        if ramp_4(ramp_4'high downto WEIGHT_W - 1) /= 0 then
+          past_5 <= '1';
+        end if;
+      end if;
+      if valid(5) = '1' then
+        weight_6 <= unsigned(ramp_4(WEIGHT_W - 1 downto 0));
+        if past_5 = '1' then
+          weight_6 <= to_unsigned(SPEED_RECIPROCAL_WEIGHT_ONE, WEIGHT_W);
         end if;
       end if;
 
       -- Stage 23: prod = m * weight
       if valid(22) = '1' then
-        prod_23 <= signed('0' & m_22) * signed('0' & weight_4);
+        prod_23 <= signed('0' & m_22) * signed('0' & weight_6);
       end if;
 
       -- Stage 24: factor = prod, narrowed, with the sign of omega_me; m*weight < 1, so it fits

@@ -6,7 +6,7 @@
 -- voltage is at its limit, a converter at its end, the voltage not known, the gates off or |i_d| + |i_q| < i_learn.
 -- The filters share a multiplier, fine*d_h, d_h*e and eta_v*pull another, each with the adder behind it.
 -- Formats: lp S(1,28), u_h and d_h PU, e FLUX, d_h*e S(-4,21), v_dead and v_sum S(-1,38), v_comp and v_leg V_LEG.
--- Latency: 28.  Interval: 28.
+-- Latency: 29.  Interval: 29.
 -- Rounding: half up.
 
 library ieee;
@@ -84,30 +84,31 @@ architecture rtl of v_dead_adaline is
   signal prod_lp   : signed(k_lp'length + PU_W downto 0);
   signal sum_lp    : signed(k_lp'length + PU_W + 1 downto 0);
   signal moved     : signed(INTEGRAL_W - 1 downto 0);       -- lp_u at clock 4, lp_d at clock 8
-  signal lp_under  : std_logic;
-  signal mul_a     : signed(FLUX_W - 1 downto 0);           -- fine at clock 7, e at clock 10, eta_v at clock 13
-  signal mul_b     : signed(PU_W - 1 downto 0);             -- d_h at clock 7, pull at clock 13
+  signal lp_under  : std_logic_vector(1 downto 0);          -- by halves of what is above half an LSB of PU
+  signal mul_a     : signed(FLUX_W - 1 downto 0);           -- fine at clock 7, e at clock 10, eta_v at clock 14
+  signal mul_b     : signed(PU_W - 1 downto 0);             -- d_h at clock 7, pull at clock 14
   signal prod      : signed(PROD_W - 1 downto 0);
   signal addend    : signed(SUM_W - 1 downto 0);
   signal sum       : signed(SUM_W - 1 downto 0);
   signal e_9       : signed(FLUX_W - 1 downto 0);
-  signal pull_12   : signed(STEP_W - 1 downto 0);
-  signal v_15      : signed(STATE_W downto 0);
-  signal past_16   : std_logic;
-  signal under_16  : std_logic;
-  signal end_16    : signed(V_LEG_W - 1 downto 0);
-  signal adding_19 : std_logic;
-  signal zeta_20   : unsigned(zeta'range);
+  signal pull_13   : signed(SUM_W - 1 - DROP_STEP downto 0);
+  signal past_13   : std_logic;
+  signal v_16      : signed(STATE_W downto 0);
+  signal past_17   : std_logic;
+  signal under_17  : std_logic;
+  signal end_17    : signed(V_LEG_W - 1 downto 0);
+  signal adding_20 : std_logic;
+  signal zeta_21   : unsigned(zeta'range);
   signal prod_z    : signed(FINE_W + zeta'length downto 0);
   signal sum_z     : signed(SUM_Z_W - 1 downto 0);
-  signal v_sum_22  : signed(STATE_W downto 0);
-  signal past_23   : std_logic;
-  signal under_23  : std_logic;
+  signal v_sum_23  : signed(STATE_W downto 0);
+  signal past_24   : std_logic;
+  signal under_24  : std_logic;
   signal prod_g    : signed(FINE_W + gamma'length downto 0);
   signal sum_g     : signed(FINE_W + gamma'length + 2 downto 0);
-  signal v_25      : signed(FINE_W + gamma'length + 2 - DROP_GAMMA downto 0);
-  signal past_26   : std_logic;
-  signal under_26  : std_logic;
+  signal v_26      : signed(FINE_W + gamma'length + 2 - DROP_GAMMA downto 0);
+  signal past_27   : std_logic;
+  signal under_27  : std_logic;
 
   -- so_far + |x|, as so_far - x for a negative x, else as so_far less the complement of x and one more.
   function longer (so_far : unsigned; x : signed) return unsigned is
@@ -129,7 +130,6 @@ architecture rtl of v_dead_adaline is
   end function;
 begin
   valid(0) <= in_valid;
-  learning <= run and voltage_known and strong_4 when sat_d = 0 and sat_q = 0 and current_at_rail = 0 else '0';
 
   i_0 <= i_q when valid(2) = '1' else i_d;
   x_0 <= d_d when valid(4) = '1' else u_pi_d;
@@ -139,24 +139,21 @@ begin
 
   -- A low-pass with k_lp < 1 leaves the range of what it filters by half an LSB of PU at most: that is within
   -- INTEGRAL at the upper end of PU, and below its lower end where lp, which is half an LSB more, has no such bit.
-  moved    <= sum_lp(INTEGRAL_W - 1 + DROP_LP downto DROP_LP);
-  lp_under <= moved(INTEGRAL_W - 1) and not (or moved(INTEGRAL_W - 2 downto PU_TO_INTEGRAL - 1));
-
-  addend <= rounding_base(not shift_left(resize(u_h_6, FLUX_W), PU_TO_FLUX), DROP_MODEL, SUM_W) when valid(8) = '1' else
-            rounding_base(v_state, DROP_ETA, SUM_W) when valid(14) = '1' else
-            rounding_base("0", DROP_STEP, SUM_W);
+  moved <= sum_lp(INTEGRAL_W - 1 + DROP_LP downto DROP_LP);
 
   e_9      <= saturate(not sum(SUM_W - 1 downto DROP_MODEL), FLUX_W);
-  pull_12  <= saturate(sum(SUM_W - 1 downto DROP_STEP), STEP_W);
-  v_15     <= sum(STATE_W + DROP_ETA downto DROP_ETA);
-  end_16   <= -signed('0' & v_comp_max) when under_16 = '1' else signed('0' & v_comp_max);
-  v_sum_22 <= sum_z(SUM_Z_W - 1 downto DROP_ZETA);
-  v_25     <= sum_g(sum_g'high downto DROP_GAMMA);
+  v_16     <= sum(STATE_W + DROP_ETA downto DROP_ETA);
+  end_17   <= -signed('0' & v_comp_max) when under_17 = '1' else signed('0' & v_comp_max);
+  v_sum_23 <= sum_z(SUM_Z_W - 1 downto DROP_ZETA);
+  v_26     <= sum_g(sum_g'high downto DROP_GAMMA);
 
   process (clk)
   begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
+
+      -- Clock 5 on: whether a sample is learned from
+      learning <= run and voltage_known and strong_4 when sat_d = 0 and sat_q = 0 and current_at_rail = 0 else '0';
 
       -- Stages 1 to 4: size = |i_d| + |i_q|;  strong = size >= i_learn
       if valid(0) = '1' then
@@ -180,7 +177,7 @@ begin
         u_h_6 <= h;
       end if;
 
-      -- Stages 3 to 5, 7 to 9: lp_u += k_lp*u_h, lp_d += k_lp*d_h
+      -- Stages 3 to 7, 7 to 11: lp_u += k_lp*u_h, lp_d += k_lp*d_h
       if valid(2) = '1' or valid(6) = '1' then
         prod_lp <= signed('0' & k_lp) * h;
       end if;
@@ -191,15 +188,17 @@ begin
       if valid(4) = '1' or valid(8) = '1' then
         lp_last <= moved;
       end if;
-      if (valid(4) = '1' or valid(8) = '1') and lp_under = '1' then
+      lp_under(1) <= lp_last(INTEGRAL_W - 1) and not (or lp_last(INTEGRAL_W - 2 downto INTEGRAL_W - PU_W / 2));
+      lp_under(0) <= not (or lp_last(INTEGRAL_W - PU_W / 2 - 1 downto PU_TO_INTEGRAL - 1));
+      if (valid(6) = '1' or valid(10) = '1') and lp_under = "11" then
         lp_last(PU_TO_INTEGRAL - 1 downto 0) <= LP_ZERO(PU_TO_INTEGRAL - 1 downto 0);
       end if;
-      if (valid(4) = '1' or valid(8) = '1') and run = '0' then
+      if (valid(6) = '1' or valid(10) = '1') and run = '0' then
         lp_last <= LP_ZERO;
       end if;
 
-      -- Stages 7, 10, 13: fine and d_h, e and d_h, eta_v and pull
-      if valid(6) = '1' or valid(9) = '1' or valid(12) = '1' then
+      -- Stages 7, 10, 14: fine and d_h, e and d_h, eta_v and pull
+      if valid(6) = '1' or valid(9) = '1' or valid(13) = '1' then
         mul_a <= signed(resize(eta_v, FLUX_W));
         if valid(6) = '1' then
           mul_a <= fine;
@@ -208,96 +207,107 @@ begin
           mul_a <= e_9;
         end if;
       end if;
-      if valid(6) = '1' or valid(12) = '1' then
-        mul_b <= pull_12 when valid(12) = '1' else h;
+      if valid(12) = '1' then
+        pull_13 <= sum(SUM_W - 1 downto DROP_STEP);
+        past_13 <= exceeds(sum(SUM_W - 1 downto DROP_STEP), STEP_W);
+      end if;
+      if valid(6) = '1' or valid(13) = '1' then
+        mul_b <= narrowed(pull_13, past_13, STEP_W) when valid(13) = '1' else h;
       end if;
 
-      -- Stages 8, 11, 14: prod = fine*d_h, e*d_h, eta_v*pull
-      if valid(7) = '1' or valid(10) = '1' or valid(13) = '1' then
+      -- Stages 8, 11, 15: prod = fine*d_h, e*d_h, eta_v*pull
+      if valid(7) = '1' or valid(10) = '1' or valid(14) = '1' then
         prod <= mul_a * mul_b;
       end if;
 
-      -- Stages 9, 12, 15: sum = not e = not u_h + prod, pull, v_state + prod
-      if valid(8) = '1' or valid(11) = '1' or valid(14) = '1' then
+      -- Stages 9, 12, 16: sum = not e = not u_h + prod, pull, v_state + prod
+      addend <= rounding_base("0", DROP_STEP, SUM_W);
+      if valid(7) = '1' then
+        addend <= rounding_base(not shift_left(resize(u_h_6, FLUX_W), PU_TO_FLUX), DROP_MODEL, SUM_W);
+      end if;
+      if valid(14) = '1' then
+        addend <= rounding_base(v_state, DROP_ETA, SUM_W);
+      end if;
+      if valid(8) = '1' or valid(11) = '1' or valid(15) = '1' then
         sum <= addend + prod;
       end if;
 
-      -- Stages 16, 17: v_state = sum, limited
-      if valid(15) = '1' then
-        past_16  <= at_limit(v_15 xor v_15(v_15'high), v_comp_max);
-        under_16 <= v_15(v_15'high);
+      -- Stages 17, 18: v_state = sum, limited
+      if valid(16) = '1' then
+        past_17  <= at_limit(v_16 xor v_16(v_16'high), v_comp_max);
+        under_17 <= v_16(v_16'high);
       end if;
-      if valid(15) = '1' and learning = '1' then
-        v_state <= v_15(STATE_W - 1 downto 0);
+      if valid(16) = '1' and learning = '1' then
+        v_state <= v_16(STATE_W - 1 downto 0);
       end if;
-      if valid(16) = '1' and learning = '1' and past_16 = '1' then
-        v_state <= shift_left(resize(end_16, STATE_W), TO_LEG);
+      if valid(17) = '1' and learning = '1' and past_17 = '1' then
+        v_state <= shift_left(resize(end_17, STATE_W), TO_LEG);
       end if;
 
-      -- Stage 18: fine = v_state, narrowed
-      if valid(17) = '1' then
+      -- Stage 19: fine = v_state, narrowed
+      if valid(18) = '1' then
         fine <= resize(round_half_up(v_state, V_DEAD_ADALINE_DROP_FINE), FINE_W);
       end if;
 
-      -- Stages 19, 20: zeta where |fine| > v_thr;  stages 21, 22: sum_z = v_sum + zeta*fine
-      if valid(18) = '1' then
-        adding_19 <= learning and beyond(fine, v_thr, FINE_TO_LEG);
-      end if;
+      -- Stages 20, 21: zeta where |fine| > v_thr;  stages 22, 23: sum_z = v_sum + zeta*fine
       if valid(19) = '1' then
-        zeta_20 <= zeta;
-        if adding_19 = '0' then
-          zeta_20 <= (others => '0');
-        end if;
+        adding_20 <= beyond(fine, v_thr, FINE_TO_LEG);
       end if;
       if valid(20) = '1' then
-        prod_z <= fine * signed('0' & zeta_20);
+        zeta_21 <= zeta;
+        if adding_20 = '0' or learning = '0' then
+          zeta_21 <= (others => '0');
+        end if;
       end if;
       if valid(21) = '1' then
+        prod_z <= fine * signed('0' & zeta_21);
+      end if;
+      if valid(22) = '1' then
         sum_z <= rounding_base(v_sum, DROP_ZETA, SUM_Z_W) + prod_z;
       end if;
 
-      -- Stages 23, 24: v_sum = sum_z, limited
-      if valid(22) = '1' then
-        past_23  <= at_limit(v_sum_22, v_comp_max);
-        under_23 <= v_sum_22(v_sum_22'high);
-        v_sum    <= v_sum_22(STATE_W - 1 downto 0);
+      -- Stages 24, 25: v_sum = sum_z, limited
+      if valid(23) = '1' then
+        past_24  <= at_limit(v_sum_23, v_comp_max);
+        under_24 <= v_sum_23(v_sum_23'high) or not compensate;
+        v_sum    <= v_sum_23(STATE_W - 1 downto 0);
       end if;
-      if valid(23) = '1' and past_23 = '1' then
+      if valid(24) = '1' and past_24 = '1' then
         v_sum <= shift_left(resize(signed('0' & v_comp_max), STATE_W), TO_LEG);
       end if;
-      if valid(23) = '1' and (compensate = '0' or under_23 = '1') then
+      if valid(24) = '1' and under_24 = '1' then
         v_sum <= (others => '0');
       end if;
 
-      -- Stages 24, 25: sum_g = v_sum + gamma*fine
-      if valid(23) = '1' then
+      -- Stages 25, 26: sum_g = v_sum + gamma*fine
+      if valid(24) = '1' then
         prod_g <= fine * signed('0' & gamma);
       end if;
-      if valid(24) = '1' then
+      if valid(25) = '1' then
         sum_g <= rounding_base(v_sum, DROP_GAMMA, sum_g'length) + prod_g;
       end if;
 
-      -- Stages 26, 27: v_comp = sum_g, narrowed and limited; the rounding moves nothing past the limit
-      if valid(25) = '1' then
-        past_26        <= beyond(v_25, v_comp_max, TO_LEG);
-        under_26       <= v_25(v_25'high);
-        v_comp         <= resize(round_half_up(v_25, TO_LEG), V_LEG_W);
+      -- Stages 27, 28: v_comp = sum_g, narrowed and limited; the rounding moves nothing past the limit
+      if valid(26) = '1' then
+        past_27        <= beyond(v_26, v_comp_max, TO_LEG);
+        under_27       <= v_26(v_26'high) or not compensate;
+        v_comp         <= resize(round_half_up(v_26, TO_LEG), V_LEG_W);
         v_comp_limited <= '0';
       end if;
-      if valid(26) = '1' and past_26 = '1' then
+      if valid(27) = '1' and past_27 = '1' then
         v_comp         <= signed('0' & v_comp_max);
         v_comp_limited <= '1';
       end if;
-      if valid(26) = '1' and (compensate = '0' or under_26 = '1') then
+      if valid(27) = '1' and under_27 = '1' then
         v_comp         <= (others => '0');
         v_comp_limited <= '0';
       end if;
 
-      -- Stages 27, 28: v_dead = fine, narrowed;  v_leg = v_comp + v_dead
-      if valid(26) = '1' then
+      -- Stages 28, 29: v_dead = fine, narrowed;  v_leg = v_comp + v_dead
+      if valid(27) = '1' then
         v_dead <= resize(round_half_up(fine, FINE_TO_LEG), V_LEG_W);
       end if;
-      if valid(27) = '1' then
+      if valid(28) = '1' then
         v_leg <= saturate(resize(v_comp, V_LEG_W + 1) + v_dead, V_LEG_W);
       end if;
 

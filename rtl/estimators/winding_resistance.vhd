@@ -44,7 +44,7 @@ architecture rtl of winding_resistance is
   constant HALF_DOWN : signed(PROD_W - 1 downto 0) := (DROP_RHO - 2 downto 0 => '1', others => '0');
 
   signal valid  : std_logic_vector(0 to LATENCY);
-  signal lost_1 : std_logic;
+  signal lost_1 : std_logic_vector(2 downto 0);         -- no reading, too cold, too hot
   signal from_0 : signed(SLIM_W - 1 downto 0);
   signal less_0 : signed(SLIM_W - 1 downto 0);
   signal slim   : signed(SLIM_W - 1 downto 0);          -- temp_winding - t_0 at clock 1, -t_s at clock 5
@@ -52,6 +52,14 @@ architecture rtl of winding_resistance is
   signal prod   : signed(PROD_W - 1 downto 0);
   signal addend : signed(PROD_W - 1 downto 0);
   signal sum    : signed(PROD_W - 1 downto 0);
+
+  -- Whether a < b, by one carry: comparisons with settings that are constants would become a tree of LUTs.
+  function below (a : signed; b : signed) return std_logic is
+    variable room : signed(a'length downto 0);
+  begin
+    room := resize(a, a'length + 1) - resize(b, a'length + 1);
+    return room(room'high);
+  end function;
 begin
   valid(0) <= in_valid;
 
@@ -67,16 +75,13 @@ begin
       if valid(0) = '1' or valid(4) = '1' then
         slim <= from_0 - less_0;
       end if;
-      if valid(1) = '1' and lost_1 = '1' then
+      if valid(1) = '1' and lost_1 /= "000" then
         slim <= (others => '0');
       end if;
       if valid(0) = '1' then
         wide   <= tcr;
         addend <= rounding_base(signed('0' & r_s), DROP_TCR, PROD_W);
-        lost_1 <= '1';
-        if temp_valid = '1' and temp_winding >= t_min and temp_winding <= t_max then
-          lost_1 <= '0';
-        end if;
+        lost_1 <= (not temp_valid) & below(temp_winding, t_min) & below(t_max, temp_winding);
       end if;
 
       -- Stages 3, 6: prod = warmer*tcr, -t_s*r
@@ -98,7 +103,7 @@ begin
       -- Stage 8: minus_rho = prod/2, narrowed
       if valid(7) = '1' then
         minus_rho <= resize(sum(PROD_W - 1 downto DROP_RHO), RESISTANCE_W + 1);
-        temp_lost <= lost_1;
+        temp_lost <= or lost_1;
       end if;
 
       if rst = '1' then

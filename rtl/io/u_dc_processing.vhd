@@ -34,7 +34,8 @@ architecture rtl of u_dc_processing is
   signal low_21  : std_logic;
   signal prod_22 : signed(2 * RECIPROCAL_W + 1 downto 0);
   signal prod_23 : signed(2 * RECIPROCAL_W + 1 downto 0);
-  signal n_left  : unsigned(2 downto 0);
+  signal by_two  : std_logic;
+  signal by_one  : std_logic;
 begin
   valid(0) <= in_valid;
 
@@ -73,21 +74,21 @@ begin
       if valid(23) = '1' then
         inverse      <= resize(m_21, INVERSE_W);
         inverse_beta <= resize(unsigned(shift_right(prod_23, U_DC_PROCESSING_DROP_BETA)), INVERSE_W);
-        n_left       <= n_21(2 downto 0);
         u_dc_low     <= low_21;
-      elsif n_left > 1 then
+      elsif by_two = '1' then
         inverse      <= shift_left(inverse, 2);
         inverse_beta <= shift_left(inverse_beta, 2);
-        n_left       <= n_left - 2;
-      elsif n_left > 0 then
+      elsif by_one = '1' then
         inverse      <= shift_left(inverse, 1);
         inverse_beta <= shift_left(inverse_beta, 1);
-        n_left       <= (others => '0');
       end if;
+
+      -- n, at most 5, as two twos and a one; which of them is known a clock before
+      by_two <= (valid(23) and n_21(2)) or (valid(24) and (n_21(2) or n_21(1)));
+      by_one <= valid(25) and n_21(0);
 
       if rst = '1' then
         valid(1 to LATENCY) <= (others => '0');
-        n_left              <= (others => '0');
       end if;
     end if;
   end process;
