@@ -93,12 +93,12 @@ begin
         r_valid <= '0';
       end if;
 
-      -- The response register is free, or the request would not have been taken; until valid it takes what there is,
-      -- as an answer comes late
-      if b_valid = '0' then
+      -- The response register is free, or the request would not have been taken; it takes what there is until the
+      -- answer, as that comes late
+      if answering = '1' and writing = '1' then
         s_axi_bresp <= response;
       end if;
-      if r_valid = '0' then
+      if answering = '1' and writing = '0' then
         s_axi_rresp <= response;
         s_axi_rdata <= read_data;
       end if;
@@ -112,6 +112,7 @@ begin
 
       if rst = '1' then
         idle       <= '1';
+        address    <= (others => '0');
         take_write <= '0';
         take_read  <= '0';
         answering  <= '0';

@@ -54,7 +54,7 @@ PROOFS = (
             "      if s_axi_bready = '1' then\n        b_valid <= '0';\n      end if;",
             "      b_valid <= '0';",
         ),
-        Fault("data change while they wait", SLAVE, "if r_valid = '0' then", "if b_valid = '0' then"),
+        Fault("data change while they wait", SLAVE, "answering = '1' and writing = '0'", "writing = '0'"),
     ),
     slave_proof(
         "one_answer",
