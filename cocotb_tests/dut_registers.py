@@ -209,6 +209,28 @@ async def safety_never_waits(dut):
 
 
 @cocotb.test(timeout_time=500, timeout_unit="us")  # a bus that hangs
+async def the_last_clock_of_patience(dut):
+    """A sample that ends in every clock around the end of the patience: OKAY and stored, or SLVERR and never stored."""
+    bench = await Bench(dut, SEED).start()
+    register, answers = MAP["ki_q"], []
+    for number, busy in enumerate(range(PATIENCE - 4, PATIENCE + 16)):
+        dut.sample_busy.value = 1
+        await FallingEdge(dut.clk)
+        writing = cocotb.start_soon(bench.write(register.address, 100 + number))
+        for _ in range(busy):
+            await FallingEdge(dut.clk)
+        dut.sample_busy.value = 0
+        answers.append(await writing)
+        if answers[-1] == OKAY:
+            bench.twin.write(register.address, 100 + number)
+        for _ in range(6):
+            await FallingEdge(dut.clk)
+            bench.check_outputs()
+        assert await bench.fetch(register.address) == bench.twin.read(register.address), busy
+    assert answers == sorted(answers) and {*answers} == {OKAY, SLVERR}
+
+
+@cocotb.test(timeout_time=500, timeout_unit="us")  # a bus that hangs
 async def pulses_fall_back(dut):
     """clear_trip is one clock long; clear_faults is there when the next sample is taken, and gone after it."""
     bench = await Bench(dut, SEED).start()

@@ -42,6 +42,8 @@ architecture rtl of packet_fifo is
 
   -- State
   signal used       : unsigned(DEPTH_BITS downto 0);  -- words in the RAM
+  signal some       : std_logic;  -- used /= 0; a register, as all that leaves the RAM hangs on it
+  signal fits       : std_logic;  -- used <= DEPTH - PACKET, likewise
   signal write_at   : unsigned(DEPTH_BITS - 1 downto 0);
   signal read_at    : unsigned(DEPTH_BITS - 1 downto 0);
   signal read_valid : std_logic;
@@ -55,7 +57,7 @@ architecture rtl of packet_fifo is
 begin
   take  <= in_valid and not used(DEPTH_BITS);
   move  <= read_valid and (out_ready or not shown);
-  fetch <= '1' when used /= 0 and (read_valid = '0' or move = '1') else '0';
+  fetch <= some and (out_ready or not read_valid or not shown);
 
   process (clk)
   begin
@@ -77,14 +79,24 @@ begin
       end if;
       shown <= move or (shown and not out_ready);
 
-      if take = '1' and fetch = '0' then
-        used <= used + 1;
-      elsif take = '0' and fetch = '1' then
-        used <= used - 1;
+      -- One more or, all ones, one less
+      if take /= fetch then
+        used <= used + unsigned(signed'(DEPTH_BITS - 1 downto 0 => fetch) & '1');
+      end if;
+      some <= take or (some and not fetch);
+      if used > 1 then
+        some <= '1';
+      end if;
+      fits <= '0';
+      if used < DEPTH - PACKET or (used = DEPTH - PACKET and (fetch or not take) = '1') or
+         (used = DEPTH - PACKET + 1 and (fetch and not take) = '1') then
+        fits <= '1';
       end if;
 
       if rst = '1' then
         used       <= (others => '0');
+        some       <= '0';
+        fits       <= '1';
         write_at   <= (others => '0');
         read_at    <= (others => '0');
         read_valid <= '0';
@@ -96,6 +108,6 @@ begin
   out_valid <= shown;
   out_data  <= out_word(WIDTH - 1 downto 0);
   out_last  <= out_word(WIDTH);
-  room      <= '1' when used <= DEPTH - PACKET else '0';
+  room      <= fits;
 
 end architecture rtl;

@@ -6,7 +6,7 @@
 -- until the master has taken it, so that reads and writes that both wait take turns: neither starves the other.
 -- Every output to the bus leaves through a register; valid and payload stay until ready.
 -- answer may come in any clock with request = '1' but must come: it decides how long the bus waits.
--- Formats: as AXI4-Lite has them, 32 bits of data.  A read that is refused returns zero.
+-- Formats: as AXI4-Lite has them, 32 bits of data.  Who refuses a read gives zero as its data.
 -- Latency: request one clock after the handshake, response one clock after answer.  Rounding: none.
 
 library ieee;
@@ -49,24 +49,43 @@ entity axi_lite_slave is
 end entity axi_lite_slave;
 
 architecture rtl of axi_lite_slave is
-  type state_t is (idle, take_write, take_read, answering);
+  -- State, one of four at a time, each a register of its own as all else hangs on it
+  signal idle       : std_logic;
+  signal take_write : std_logic;
+  signal take_read  : std_logic;
+  signal answering  : std_logic;
 
-  signal state      : state_t;
   signal b_valid    : std_logic;
   signal r_valid    : std_logic;
   signal writing    : std_logic;
   signal want_write : std_logic;
   signal want_read  : std_logic;
+  signal answered   : std_logic;
 begin
   want_write <= s_axi_awvalid and s_axi_wvalid and not b_valid;
   want_read  <= s_axi_arvalid and not r_valid;
+  answered   <= answering and answer;
 
   process (clk)
   begin
     if rising_edge(clk) then
-      s_axi_awready <= '0';
-      s_axi_wready  <= '0';
-      s_axi_arready <= '0';
+      -- Ready is given for the one clock in which the master's valid already waits
+      take_write <= idle and want_write;
+      take_read  <= idle and want_read and not want_write;
+      answering  <= take_write or take_read or (answering and not answer);
+      idle       <= (idle and not (want_write or want_read)) or answered;
+
+      if take_write = '1' then
+        writing    <= '1';
+        address    <= unsigned(s_axi_awaddr);
+        write_data <= s_axi_wdata;
+        strobe     <= s_axi_wstrb;
+      end if;
+      if take_read = '1' then
+        writing <= '0';
+        address <= unsigned(s_axi_araddr);
+      end if;
+
       if s_axi_bready = '1' then
         b_valid <= '0';
       end if;
@@ -74,71 +93,41 @@ begin
         r_valid <= '0';
       end if;
 
-      case state is
-
-        -- Ready is given for the one clock in which the master's valid already waits
-        when idle =>
-
-          if want_write = '1' then
-            s_axi_awready <= '1';
-            s_axi_wready  <= '1';
-            state         <= take_write;
-          elsif want_read = '1' then
-            s_axi_arready <= '1';
-            state         <= take_read;
-          end if;
-
-        when take_write =>
-
-          writing    <= '1';
-          address    <= unsigned(s_axi_awaddr);
-          write_data <= s_axi_wdata;
-          strobe     <= s_axi_wstrb;
-          request    <= '1';
-          state      <= answering;
-
-        when take_read =>
-
-          writing <= '0';
-          address <= unsigned(s_axi_araddr);
-          request <= '1';
-          state   <= answering;
-
-        -- The response register is free, or the request would not have been taken
-        when answering =>
-
-          if answer = '1' then
-            request <= '0';
-            state   <= idle;
-            if writing = '1' then
-              b_valid     <= '1';
-              s_axi_bresp <= response;
-            else
-              r_valid     <= '1';
-              s_axi_rresp <= response;
-              s_axi_rdata <= read_data;
-              if response /= "00" then
-                s_axi_rdata <= (others => '0');
-              end if;
-            end if;
-          end if;
-
-      end case;
+      -- The response register is free, or the request would not have been taken; it takes what there is until the
+      -- answer, as that comes late
+      if answering = '1' and writing = '1' then
+        s_axi_bresp <= response;
+      end if;
+      if answering = '1' and writing = '0' then
+        s_axi_rresp <= response;
+        s_axi_rdata <= read_data;
+      end if;
+      if answered = '1' then
+        if writing = '1' then
+          b_valid <= '1';
+        else
+          r_valid <= '1';
+        end if;
+      end if;
 
       if rst = '1' then
-        state         <= idle;
-        request       <= '0';
-        b_valid       <= '0';
-        r_valid       <= '0';
-        s_axi_awready <= '0';
-        s_axi_wready  <= '0';
-        s_axi_arready <= '0';
+        idle       <= '1';
+        address    <= (others => '0');
+        take_write <= '0';
+        take_read  <= '0';
+        answering  <= '0';
+        b_valid    <= '0';
+        r_valid    <= '0';
       end if;
     end if;
   end process;
 
-  write        <= writing;
-  s_axi_bvalid <= b_valid;
-  s_axi_rvalid <= r_valid;
+  request       <= answering;
+  write         <= writing;
+  s_axi_awready <= take_write;
+  s_axi_wready  <= take_write;
+  s_axi_arready <= take_read;
+  s_axi_bvalid  <= b_valid;
+  s_axi_rvalid  <= r_valid;
 
 end architecture rtl;

@@ -8,8 +8,8 @@
 -- for a sample, though AXI4-Lite answers in order: behind a write that waits they come after it.
 -- Answers: OKAY; DECERR where no register stands at the address; SLVERR for a write that is not allowed or came late.
 -- One comparator serves every register: its ends come from tables in register_map_pkg.
--- Formats: data as signed 32 bits; no register holds 2**31 or more.  Latency: 4 clocks without waiting; store is in
--- the clock before the edge at which the register changes.  armed comes a clock before store can: behind a register it
+-- Formats: data as signed 32 bits; no register holds 2**31 or more.  Latency: 5 clocks without waiting; store is in
+-- the clock before the edge at which the register changes.  arming comes a clock before store can: behind a register it
 -- and sample_busy are all that a register needs to know, so that no long path tells it.  Rounding: none.
 
 library ieee;
@@ -22,16 +22,17 @@ entity register_access is
   port (
     clk         : in  std_logic;
     rst         : in  std_logic;
-    request     : in  std_logic;  -- held until answer
+    request     : in  std_logic;  -- held until answer, then low for a clock; what it carries stays two longer
     write       : in  std_logic;
     address     : in  unsigned(REGISTER_ADDRESS_W - 1 downto 0);
     data        : in  std_logic_vector(31 downto 0);
     strobe      : in  std_logic_vector(3 downto 0);
     sample_busy : in  std_logic;  -- a sample enters or is in flight: nothing it uses may change at this edge
-    armed       : out std_logic;  -- from the next clock on the register takes the data, once it may
+    arming      : out std_logic;  -- in the next clock the register takes the data, if it may
     store       : out std_logic;  -- the register takes the data at this edge
     answer      : out std_logic;
-    response    : out std_logic_vector(1 downto 0)
+    response    : out std_logic_vector(1 downto 0);
+    found       : out std_logic  -- a register stands at the address; there three clocks after the request
   );
 end entity register_access;
 
@@ -40,81 +41,131 @@ architecture rtl of register_access is
   constant SLVERR : std_logic_vector(1 downto 0) := "10";
   constant DECERR : std_logic_vector(1 downto 0) := "11";
 
-  signal word      : unsigned(REGISTER_WORD_W - 1 downto 0);
-  signal valid_1   : std_logic;
-  signal access_1  : unsigned(1 downto 0);
-  signal low_1     : signed(REGISTER_LIMIT_W - 1 downto 0);
-  signal high_1    : signed(REGISTER_LIMIT_W - 1 downto 0);
-  signal valid_2   : std_logic;
-  signal found_2   : std_logic;
-  signal allowed_2 : std_logic;
-  signal at_once_2 : std_logic;
-  signal valid_3   : std_logic;
-  signal allowed_3 : std_logic;
-  signal at_once_3 : std_logic;
-  signal found_3   : std_logic;
-  signal waited    : natural range 0 to REGISTER_PATIENCE;
-  signal granted   : std_logic;
-  signal late      : std_logic;
-  signal done      : std_logic;
-begin
-  word <= address(REGISTER_WORD_W + 1 downto 2);
+  signal word   : unsigned(REGISTER_WORD_W - 1 downto 0);
+  signal number : signed(REGISTER_LIMIT_W - 1 downto 0);
 
-  granted <= allowed_3 and (at_once_3 or not sample_busy);
-  late    <= '1' when waited = REGISTER_PATIENCE else '0';
-  done    <= valid_3 and (granted or late or not (write and allowed_3));
+  type accesses_t is array (0 to 2**(REGISTER_WORD_W - 4) - 1) of unsigned(1 downto 0);
+  type ranges_t is array (0 to 2**(REGISTER_WORD_W - 4) - 1) of unsigned(REGISTER_RANGE_W - 1 downto 0);
+
+  signal begun      : std_logic;
+  signal valid      : std_logic_vector(1 to 4);
+  signal accesses_1 : accesses_t;
+  signal ranges_1   : ranges_t;
+  signal inside_1   : std_logic;
+  signal fits_1     : std_logic;
+  signal access_2   : unsigned(1 downto 0);
+  signal range_2    : unsigned(REGISTER_RANGE_W - 1 downto 0);
+  signal writable_3 : std_logic;
+  signal between_3  : std_logic;
+  signal low_3      : signed(REGISTER_LIMIT_W - 1 downto 0);
+  signal high_3     : signed(REGISTER_LIMIT_W - 1 downto 0);
+  signal over_4     : std_logic;
+  signal under_4    : std_logic;
+  signal allowed_4  : std_logic;
+  signal judged_5   : std_logic;
+  signal armed_5    : std_logic;
+  signal patient_5  : std_logic;
+  signal waits_5    : std_logic;
+  signal granted_5  : std_logic;
+  signal waited     : natural range 0 to REGISTER_PATIENCE + 1;
+  signal may_stay   : std_logic;
+  signal in_time    : std_logic;
+
+  -- a < b as a sign alone: a carry chain with nothing before and behind it
+  function below (a, b : signed(REGISTER_LIMIT_W - 1 downto 0)) return std_logic is
+    variable difference : signed(REGISTER_LIMIT_W downto 0);
+  begin
+    difference := resize(a, REGISTER_LIMIT_W + 1) - resize(b, REGISTER_LIMIT_W + 1);
+    return difference(REGISTER_LIMIT_W);
+  end function;
+begin
+  word   <= address(REGISTER_WORD_W + 1 downto 2);
+  number <= signed(data(REGISTER_LIMIT_W - 1 downto 0));
+
+  allowed_4 <= valid(4) and writable_3 and not (over_4 or under_4);
+  waits_5   <= patient_5 and sample_busy and in_time;
+  granted_5 <= armed_5 and in_time and not (between_3 and sample_busy);
 
   process (clk)
   begin
     if rising_edge(clk) then
-      valid_1 <= request and not done;
-      valid_2 <= valid_1 and not done;
-      valid_3 <= valid_2 and not done;
+      -- What a stage says of the request stays true as long as that stands; valid says since when
+      begun         <= request;
+      valid(1)      <= request and not begun;
+      valid(2 to 4) <= valid(1 to 3);
+      judged_5      <= valid(4) or waits_5;
 
-      -- Stage 1: what the tables say about the word
-      access_1 <= register_access_of(word);
-      low_1    <= register_low_of(word);
-      high_1   <= register_high_of(word);
-
-      -- Stage 2: found = register at the address; allowed = writable and a whole word and low <= data <= high
-      found_2   <= '0';
-      allowed_2 <= '0';
-      at_once_2 <= '0';
-      if access_1 /= REGISTER_NONE and address(1 downto 0) = 0 and shift_right(address, REGISTER_WORD_W + 2) = 0 then
-        found_2 <= '1';
-        if access_1 /= REGISTER_READ_ONLY and strobe = "1111" and signed(data) >= low_1 and signed(data) <= high_1 then
-          allowed_2 <= '1';
-        end if;
+      -- Stage 1: what the tables say about the word of each sixteen;  inside = the address is aligned and in the map;
+      -- fits = a whole word, in the bits of the limits
+      for k in ranges_t'range loop
+        accesses_1(k) <= register_access_of(to_unsigned(k, REGISTER_WORD_W - 4) & word(3 downto 0));
+        ranges_1(k)   <= register_range_of(to_unsigned(k, REGISTER_WORD_W - 4) & word(3 downto 0));
+      end loop;
+      inside_1 <= '0';
+      if address(1 downto 0) = 0 and shift_right(address, REGISTER_WORD_W + 2) = 0 then
+        inside_1 <= '1';
       end if;
-      if access_1 = REGISTER_AT_ONCE then
-        at_once_2 <= '1';
+      fits_1 <= '0';
+      if strobe = "1111" and resize(number, 32) = signed(data) then
+        fits_1 <= '1';
       end if;
 
-      -- Stage 3: the register is told, see armed
-      found_3   <= found_2;
-      allowed_3 <= allowed_2;
-      at_once_3 <= at_once_2;
+      -- Stage 2: which of them
+      access_2 <= accesses_1(to_integer(word(REGISTER_WORD_W - 1 downto 4)));
+      range_2  <= ranges_1(to_integer(word(REGISTER_WORD_W - 1 downto 4)));
+
+      -- Stage 3: found = a register at the address; writable = one that software writes, and the data fit
+      found      <= '0';
+      writable_3 <= '0';
+      between_3  <= '0';
+      if access_2 /= REGISTER_NONE then
+        found <= inside_1;
+      end if;
+      if access_2 = REGISTER_BETWEEN or access_2 = REGISTER_AT_ONCE then
+        writable_3 <= inside_1 and fits_1 and write;
+      end if;
+      if access_2 = REGISTER_BETWEEN then
+        between_3 <= '1';
+      end if;
+      low_3  <= register_low_of(range_2);
+      high_3 <= register_high_of(range_2);
+
+      -- Stage 4: allowed = writable and low <= data <= high
+      under_4 <= below(number, low_3);
+      over_4  <= below(high_3, number);
+
+      -- Stage 5: armed = allowed and not taken yet; patient where a sample can be in its way
+      armed_5   <= allowed_4 or waits_5;
+      patient_5 <= (allowed_4 and between_3) or waits_5;
 
       -- Clocks that a write has waited for the end of a sample
       waited <= 0;
-      if valid_3 = '1' and done = '0' then
+      if patient_5 = '1' then
         waited <= waited + 1;
       end if;
+      may_stay <= '0' when waited = REGISTER_PATIENCE - 2 else '1';
+      in_time  <= may_stay;
 
       if rst = '1' then
-        valid_1 <= '0';
-        valid_2 <= '0';
-        valid_3 <= '0';
-        waited  <= 0;
+        begun     <= '0';
+        valid     <= (others => '0');
+        judged_5  <= '0';
+        armed_5   <= '0';
+        patient_5 <= '0';
+        waited    <= 0;
+        may_stay  <= '1';
+        in_time   <= '1';
       end if;
     end if;
   end process;
 
-  armed    <= valid_2 and write and allowed_2 and not done;
-  store    <= valid_3 and write and granted;
-  answer   <= done;
-  response <= DECERR when found_3 = '0' else
-              SLVERR when write = '1' and granted = '0' else
+  -- It says nothing of sample_busy, which comes late: a register that may take the data is told so for a clock more,
+  -- takes the same again or nothing, but is told no more in the clock that refuses
+  arming   <= allowed_4 or (patient_5 and may_stay and in_time);
+  store    <= granted_5;
+  answer   <= judged_5 and not waits_5;
+  response <= DECERR when found = '0' else
+              SLVERR when write = '1' and granted_5 = '0' else
               OKAY;
 
 end architecture rtl;

@@ -7,8 +7,8 @@
 --
 -- sample_busy must be high in each clock with sample_valid and from there until nothing of the sample is in flight:
 -- no output that a sample uses changes at an edge with sample_busy = '1'.
--- Refused writes change nothing; what is refused, and the answers: register_access.vhd.
--- Formats: those of the core's ports.  Latency: 4 clocks from request to answer, more while a write waits for the
+-- Refused writes change nothing, refused reads give zero; what is refused, and the answers: register_access.vhd.
+-- Formats: those of the core's ports.  Latency: 6 clocks from request to answer, more while a write waits for the
 -- end of a sample.  Rounding: none.
 
 library ieee;
@@ -153,37 +153,50 @@ end entity register_file;
 
 architecture rtl of register_file is
   type words_t is array (0 to 2**REGISTER_WORD_W - 1) of std_logic_vector(31 downto 0);
-  type rows_t is array (0 to 2**(REGISTER_WORD_W - 3) - 1) of std_logic_vector(31 downto 0);
-  type copy_t is array (0 to 2**REGISTER_WORD_W - 1) of std_logic_vector(REGISTER_LIMIT_W - 1 downto 0);
+  type fours_t is array (0 to 2**(REGISTER_WORD_W - 2) - 1) of std_logic_vector(31 downto 0);
+  type sixteens_t is array (0 to 2**(REGISTER_WORD_W - 4) - 1) of std_logic_vector(31 downto 0);
+  type copy_t is array (0 to 2**(REGISTER_WORD_W - 1) - 1) of std_logic_vector(REGISTER_LIMIT_W - 1 downto 0);
+
+  constant HALF : positive := 2**(REGISTER_WORD_W - 1);
 
   signal request   : std_logic;
   signal write     : std_logic;
   signal address   : unsigned(REGISTER_ADDRESS_W - 1 downto 0);
   signal data      : std_logic_vector(31 downto 0);
   signal strobe    : std_logic_vector(3 downto 0);
-  signal armed     : std_logic;
+  signal arming    : std_logic;
   signal store     : std_logic;
   signal stored    : std_logic;
   signal answer    : std_logic;
   signal response  : std_logic_vector(1 downto 0);
+  signal found     : std_logic;
   signal read_data : std_logic_vector(31 downto 0);
   signal word      : natural range 0 to 2**REGISTER_WORD_W - 1;
   signal words     : words_t;
-  signal copy      : copy_t;
+  signal copy_low  : copy_t;
+  signal copy_high : copy_t;
   attribute ram_style : string;
-  attribute ram_style of copy : signal is "distributed";
+  attribute ram_style of copy_low  : signal is "distributed";
+  attribute ram_style of copy_high : signal is "distributed";
 
   signal written : std_logic_vector(0 to 2**REGISTER_WORD_W - 1);
 
   -- The address of a write halfway decoded: a register is where its row and its column meet
+  signal row_at : std_logic_vector(0 to 2**(REGISTER_WORD_W - 3) - 1);
   signal row    : std_logic_vector(0 to 2**(REGISTER_WORD_W - 3) - 1);
   signal column : std_logic_vector(0 to 7);
 
-  signal is_signed    : std_logic;
-  signal is_written   : std_logic;
-  signal written_rows : std_logic_vector(0 to 2**(REGISTER_WORD_W - 3) - 1);
-  signal picked       : std_logic_vector(31 downto 0);
-  signal picked_rows  : rows_t;
+  signal word_1             : natural range 0 to 2**REGISTER_WORD_W - 1;
+  signal copied_low_1       : std_logic_vector(REGISTER_LIMIT_W - 1 downto 0);
+  signal copied_high_1      : std_logic_vector(REGISTER_LIMIT_W - 1 downto 0);
+  signal is_signed_1        : std_logic;
+  signal picked_fours_1     : fours_t;
+  signal written_fours_1    : std_logic_vector(0 to 2**(REGISTER_WORD_W - 2) - 1);
+  signal picked_sixteens_2  : sixteens_t;
+  signal written_sixteens_2 : std_logic_vector(0 to 2**(REGISTER_WORD_W - 4) - 1);
+  signal copied_2           : std_logic_vector(REGISTER_LIMIT_W - 1 downto 0);
+  signal picked_3           : std_logic_vector(31 downto 0);
+  signal is_written_3       : std_logic;
 begin
 
   bus_slave : entity work.axi_lite_slave
@@ -230,10 +243,11 @@ begin
       data        => data,
       strobe      => strobe,
       sample_busy => sample_busy,
-      armed       => armed,
+      arming      => arming,
       store       => store,
       answer      => answer,
-      response    => response
+      response    => response,
+      found       => found
     );
 
   word <= to_integer(address(REGISTER_WORD_W + 1 downto 2));
@@ -619,39 +633,68 @@ begin
   begin
     if rising_edge(clk) then
       stored <= store;
-      if stored = '1' then
-        copy(word) <= data(REGISTER_LIMIT_W - 1 downto 0);
+      if stored = '1' and word_1 < HALF then
+        copy_low(word_1 mod HALF) <= data(REGISTER_LIMIT_W - 1 downto 0);
+      end if;
+      if stored = '1' and word_1 >= HALF then
+        copy_high(word_1 mod HALF) <= data(REGISTER_LIMIT_W - 1 downto 0);
       end if;
     end if;
   end process;
 
-  -- A request stands for three clocks before its answer.  A write is armed in the last of them, so that what tells
-  -- the registers comes from flip-flops: they stand beside what uses them, all over the chip.  A read is picked in each
-  -- row, then among rows, then its sign is extended, behind the selection for fewer multiplexers
+  -- A write is told to the registers by flip-flops: they stand beside what uses them, all over the chip
   process (clk)
   begin
     if rising_edge(clk) then
-      row                <= (others => '0');
-      row(word / 8)      <= armed;
+      row_at             <= (others => '0');
+      row_at(word / 8)   <= '1';
       column             <= (others => '0');
       column(word mod 8) <= '1';
-      for r in rows_t'range loop
-        picked_rows(r)  <= words(8 * r + word mod 8);
-        written_rows(r) <= written(8 * r + word mod 8);
+      for r in row'range loop
+        row(r) <= row_at(r) and arming;
       end loop;
-      picked     <= picked_rows(word / 8);
-      is_written <= written_rows(word / 8);
-      is_signed  <= register_signed_of(to_unsigned(word, REGISTER_WORD_W));
-      if is_written = '1' then
-        read_data <= std_logic_vector(resize(signed(copy(word)), 32));
-      elsif is_signed = '1' then
-        read_data <= std_logic_vector(resize(signed(picked(17 downto 0)), 32));
-      else
-        read_data <= picked;
-      end if;
 
       if rst = '1' then
         row <= (others => '0');
+      end if;
+    end if;
+  end process;
+
+  -- A request stands five clocks before its answer.  A read goes through little in each, for a fast clock
+  process (clk)
+  begin
+    if rising_edge(clk) then
+      -- Stage 1: of each four words one, and what the RAMs have
+      word_1        <= word;
+      copied_low_1  <= copy_low(word mod HALF);
+      copied_high_1 <= copy_high(word mod HALF);
+      is_signed_1   <= register_signed_of(to_unsigned(word, REGISTER_WORD_W));
+      for k in fours_t'range loop
+        picked_fours_1(k)  <= words(4 * k + word mod 4);
+        written_fours_1(k) <= written(4 * k + word mod 4);
+      end loop;
+
+      -- Stage 2: of each sixteen words one
+      copied_2 <= copied_high_1 when word_1 >= HALF else copied_low_1;
+      for k in sixteens_t'range loop
+        picked_sixteens_2(k)  <= picked_fours_1(4 * k + word_1 / 4 mod 4);
+        written_sixteens_2(k) <= written_fours_1(4 * k + word_1 / 4 mod 4);
+      end loop;
+
+      -- Stage 3: of these one
+      picked_3     <= picked_sixteens_2(word_1 / 16);
+      is_written_3 <= written_sixteens_2(word_1 / 16);
+
+      -- Stage 4: the sign, behind the selection for fewer multiplexers
+      if is_written_3 = '1' then
+        read_data <= std_logic_vector(resize(signed(copied_2), 32));
+      elsif is_signed_1 = '1' then
+        read_data <= std_logic_vector(resize(signed(picked_3(17 downto 0)), 32));
+      else
+        read_data <= picked_3;
+      end if;
+      if found = '0' then
+        read_data <= (others => '0');
       end if;
     end if;
   end process;

@@ -62,11 +62,11 @@ architecture rtl of sample_checks is
   signal bus_0     : unsigned(LIMIT_W - 1 downto 0);
   signal code_0    : unsigned(TURN_W - 1 downto 0);
   signal at_rail_0 : std_logic;
-  signal railed_0  : unsigned(3 downto 0);
+  signal at_rail_1 : std_logic;
+  signal railed_1  : unsigned(3 downto 0);
   signal pair_1    : signed(LIMIT_W + 2 downto 0);
   signal away_1    : signed(TURN_W - 1 downto 0);
   signal known_1   : std_logic;
-  signal stuck_1   : std_logic;
   signal sum_2     : signed(LIMIT_W + 2 downto 0);
   signal off_2     : signed(TURN_W - 1 - SAMPLE_CHECKS_DROP_JUMP downto 0);
   signal over_3    : unsigned(2 downto 0);
@@ -86,6 +86,19 @@ architecture rtl of sample_checks is
     return '0';
   end function;
 
+  -- The same as a sign alone, for wide numbers: a carry chain with nothing behind it
+  function exceeds (x : signed; limit : unsigned) return std_logic is
+    variable magnitude : signed(x'length downto 0);
+    variable beyond    : signed(x'length downto 0);
+  begin
+    magnitude := resize(x, x'length + 1);
+    if x(x'high) = '1' then
+      magnitude := not magnitude;
+    end if;
+    beyond := magnitude - signed(resize(limit, x'length + 1));
+    return not beyond(beyond'high);
+  end function;
+
   function less (x : unsigned; limit : unsigned) return std_logic is
   begin
     if x < limit then
@@ -102,7 +115,7 @@ begin
   bus_0     <= u_dc(DUTY_W - 1 downto DROP);
   code_0    <= shift_left(resize(code_theta, TURN_W), TURN_W - POSITION_BITS);
   at_rail_0 <= (or current_at_rail) or u_dc_at_rail;
-  railed_0  <= railed when railed = 15 else railed + 1;
+  railed_1  <= railed when railed = 15 else railed + 1;
 
   off_2    <= away_1(TURN_W - 1 downto SAMPLE_CHECKS_DROP_JUMP);
   faults_3 <= checks_3 & (or over_3);
@@ -114,24 +127,24 @@ begin
 
       -- Stage 1: how far the code is from the expected one; expected = 2*code - code' for the next;  i_a + i_b
       if valid(0) = '1' then
-        pair_1   <= resize(a_0, LIMIT_W + 3) + b_0;
-        away_1   <= signed(code_0 - expected);
-        known_1  <= '1' when seen = SAMPLE_CHECKS_WARM else '0';
-        stuck_1  <= at_rail_0 when railed_0 >= rail_samples else '0';
-        code     <= code_0;
-        expected <= shift_left(code_0, 1) - code;
-        railed   <= (others => '0');
-        if at_rail_0 = '1' then
-          railed <= railed_0;
-        end if;
+        pair_1    <= resize(a_0, LIMIT_W + 3) + b_0;
+        away_1    <= signed(code_0 - expected);
+        known_1   <= '1' when seen = SAMPLE_CHECKS_WARM else '0';
+        code      <= code_0;
+        expected  <= shift_left(code_0, 1) - code;
+        at_rail_1 <= at_rail_0;
         if seen /= SAMPLE_CHECKS_WARM then
           seen <= seen + 1;
         end if;
       end if;
 
-      -- Stage 2: i_a + i_b + i_c
+      -- Stage 2: i_a + i_b + i_c;  samples at the rail
       if valid(1) = '1' then
-        sum_2 <= pair_1 + c_0;
+        sum_2  <= pair_1 + c_0;
+        railed <= (others => '0');
+        if at_rail_1 = '1' then
+          railed <= railed_1;
+        end if;
       end if;
 
       -- Stage 3: each against its limit
@@ -140,10 +153,10 @@ begin
         over_3(1)   <= reaches(b_0, i_trip);
         over_3(2)   <= reaches(c_0, i_trip);
         checks_3(1) <= reaches(sum_2, sum_trip);
-        checks_3(2) <= stuck_1;
+        checks_3(2) <= '1' when railed > 0 and railed >= rail_samples else '0';
         checks_3(3) <= less(bus_0, u_dc_min);
         checks_3(4) <= not less(bus_0, u_dc_max);
-        checks_3(5) <= reaches(off_2, jump_max) and known_1;
+        checks_3(5) <= exceeds(off_2, jump_max) and known_1;
       end if;
 
       -- Stage 4: faults of this sample

@@ -93,6 +93,9 @@ architecture rtl of telemetry is
 
   -- State
   signal age     : unsigned(AGE_W - 1 downto 0);  -- clocks since the sample, up to FLUXPROOF_SAMPLE_INTERVAL
+  signal free    : std_logic;  -- age is there
+  signal ready   : std_logic;  -- age = TELEMETRY_WORDS_START - 1
+  signal full    : std_logic;  -- drops is at its end; it counts once a sample, so that this may be a clock behind
   signal counter : unsigned(31 downto 0);  -- number of the sample
   signal active  : std_logic;
   signal index   : unsigned(INDEX_W - 1 downto 0);
@@ -108,8 +111,8 @@ architecture rtl of telemetry is
   signal word_2  : unsigned(31 downto 0);
   signal last_2  : std_logic;
 begin
-  taken <= '1' when sample_valid = '1' and age = AGE_END else '0';
-  start <= '1' when enable = '1' and age = TELEMETRY_WORDS_START - 1 else '0';
+  taken <= sample_valid and free;
+  start <= enable and ready;
   final <= '1' when index = COUNT - 1 else '0';
 
   process (clk)
@@ -118,10 +121,13 @@ begin
       -- The sample's age and number
       if taken = '1' then
         age     <= to_unsigned(1, AGE_W);
+        free    <= '0';
         counter <= counter + 1;
-      elsif age /= AGE_END then
-        age <= age + 1;
+      elsif free = '0' then
+        age  <= age + 1;
+        free <= '1' when age = AGE_END - 1 else '0';
       end if;
+      ready <= '1' when age = TELEMETRY_WORDS_START - 2 else '0';
 
       -- The packet: begun only where all of it fits
       if active = '1' then
@@ -132,9 +138,10 @@ begin
         active <= '1';
         index  <= (others => '0');
       end if;
-      if start = '1' and room = '0' and drops /= 65535 then
+      if start = '1' and room = '0' and full = '0' then
         drops <= drops + 1;
       end if;
+      full <= '1' when drops = 65535 else '0';
 
       -- Stages 1 and 2: beside the word, whether it is the last
       valid_1 <= active;
@@ -147,6 +154,9 @@ begin
 
       if rst = '1' then
         age     <= AGE_END;
+        free    <= '1';
+        ready   <= '0';
+        full    <= '0';
         counter <= NONE;
         active  <= '0';
         valid_1 <= '0';

@@ -43,49 +43,63 @@ end entity gate_generation;
 
 architecture rtl of gate_generation is
   type compare_t is array (0 to 2) of unsigned(15 downto 0);
-  type elapsed_t is array (0 to 2) of unsigned(11 downto 0);
+  type since_t is array (0 to 2) of unsigned(11 downto 0);
   type lead_t is array (0 to 2) of signed(17 downto 0);
 
-  -- State
+  -- State.  Where the carrier is and what a dead time begun needs to know is seen a clock ahead and kept in
+  -- registers, so that little stands between two of them
   signal below       : signed(15 downto 0);  -- the carrier less CARRIER_HALF, never above -1
   signal down        : std_logic;
+  signal top         : std_logic;  -- the last clock of the way up
+  signal valley      : std_logic;  -- the last clock of the way down
+  signal middle      : std_logic;  -- the first clock of the way up
   signal compare     : compare_t;
   signal dead_used   : unsigned(11 downto 0);
+  signal dead_is_one : std_logic;
   signal pulse_used  : unsigned(11 downto 0);
   signal configured  : std_logic;
   signal running_now : std_logic;
   signal tripped_now : std_logic;
   signal level       : unsigned(2 downto 0);
-  signal elapsed     : elapsed_t;
-  signal settled     : unsigned(2 downto 0);
+  signal was_off     : std_logic;
+  signal changed     : unsigned(2 downto 0);  -- the leg changed its mind in the clock before
+  signal same        : unsigned(2 downto 0);  -- it was on and did not
+  signal since       : since_t;  -- clocks since then, from the second on
 
   signal count    : unsigned(15 downto 0);
-  signal bottom   : std_logic;
-  signal valley   : std_logic;
+  signal nothing  : signed(12 downto 0);
+  signal shorter  : signed(12 downto 0);
   signal good     : std_logic;
   signal on_now   : std_logic;
   signal tripping : std_logic;
   signal lead     : lead_t;  -- by how much the carrier has passed the leg's edge
+  signal missing  : lead_t;  -- by how much the dead time is not over
   signal wanted   : unsigned(2 downto 0);
+  signal over     : unsigned(2 downto 0);
 begin
   -- In good: GHDL 5 cuts a number down to the width it is compared with, so the pulse gets the number's width.
   count    <= unsigned(below + CARRIER_HALF);
-  bottom   <= '1' when below = -CARRIER_HALF else '0';
-  valley   <= bottom and down;
-  good     <= '1' when dead_time > 0 and dead_time < min_pulse and resize(min_pulse, 16) <= CARRIER_HALF else '0';
+  shorter  <= signed('0' & dead_time) - signed('0' & min_pulse);
+  nothing  <= signed('0' & dead_time) - 1;
+  good     <= '1' when nothing(12) = '0' and shorter(12) = '1' and resize(min_pulse, 16) <= CARRIER_HALF else '0';
   on_now   <= running_now and enable and not trip;
   tripping <= trip or (tripped_now and not clear_trip);
 
   legs : for k in 0 to 2 generate
-    lead(k)   <= resize(below, 18) + signed(resize(compare(k), 18));
-    wanted(k) <= not lead(k)(17);
+    lead(k)    <= resize(below, 18) + signed(resize(compare(k), 18));
+    wanted(k)  <= not lead(k)(17);
+    missing(k) <= signed(resize(since(k), 18)) - signed(resize(dead_used, 18));
+    over(k)    <= gate_high(k) or gate_low(k) or (changed(k) and dead_is_one) or (same(k) and not missing(k)(17));
   end generate;
 
   process (clk)
   begin
     if rising_edge(clk) then
       -- Carrier: up, twice the top value, down, twice zero
-      if down = '0' and below = -1 then
+      top    <= '1' when below = -2 and down = '0' else '0';
+      valley <= '1' when below = 1 - CARRIER_HALF and down = '1' else '0';
+      middle <= valley;
+      if top = '1' then
         down <= '1';
       elsif valley = '1' then
         down <= '0';
@@ -95,7 +109,7 @@ begin
       end if;
 
       -- The gates leave one register behind the carrier, and so does the mark of the zero vector's middle
-      sample <= bottom and not down;
+      sample <= middle;
 
       -- At the valley: what the next period works with
       running_now <= on_now;
@@ -104,47 +118,56 @@ begin
         compare     <= (compare_a, compare_b, compare_c);
         running_now <= enable and (configured or good) and not tripping;
         if good = '1' then
-          dead_used  <= dead_time;
-          pulse_used <= min_pulse;
-          configured <= '1';
+          dead_used   <= dead_time;
+          dead_is_one <= '1' when dead_time = 1 else '0';
+          pulse_used  <= min_pulse;
+          configured  <= '1';
         end if;
       end if;
       setting_refused <= not good;
 
       -- Legs: both gates off from the change of mind for the dead time; a gate that is on stays on when the dead
-      -- time grows, hence settled
+      -- time grows
+      was_off <= not on_now;
       for k in 0 to 2 loop
-        gate_high(k) <= '0';
-        gate_low(k)  <= '0';
+        level(k)     <= wanted(k);
+        changed(k)   <= wanted(k) xor level(k);
+        same(k)      <= wanted(k) xnor level(k);
+        gate_high(k) <= over(k) and wanted(k) and level(k);
+        gate_low(k)  <= over(k) and not (wanted(k) or level(k));
         if on_now = '0' then
-          level(k)   <= '0';
-          settled(k) <= '0';
-          elapsed(k) <= (others => '0');
-        elsif wanted(k) /= level(k) then
-          level(k)   <= wanted(k);
-          settled(k) <= '0';
-          elapsed(k) <= to_unsigned(1, 12);
-        elsif settled(k) = '0' and elapsed(k) < dead_used then
-          elapsed(k) <= elapsed(k) + 1;
+          level(k)     <= '0';
+          changed(k)   <= '0';
+          same(k)      <= '0';
+          gate_high(k) <= '0';
+          gate_low(k)  <= '0';
+        end if;
+        if changed(k) = '1' then
+          since(k) <= to_unsigned(2, 12);
+        elsif was_off = '1' then
+          since(k) <= to_unsigned(1, 12);
         else
-          settled(k)   <= '1';
-          gate_high(k) <= level(k);
-          gate_low(k)  <= not level(k);
+          since(k) <= since(k) + 1;
         end if;
       end loop;
 
       if rst = '1' then
         below           <= to_signed(-CARRIER_HALF, 16);
         down            <= '0';
+        top             <= '0';
+        valley          <= '0';
+        middle          <= '1';
         compare         <= (others => (others => '0'));
         dead_used       <= (others => '0');
+        dead_is_one     <= '0';
         pulse_used      <= (others => '0');
         configured      <= '0';
         running_now     <= '0';
         tripped_now     <= '0';
         level           <= (others => '0');
-        elapsed         <= (others => (others => '0'));
-        settled         <= (others => '0');
+        was_off         <= '1';
+        changed         <= (others => '0');
+        same            <= (others => '0');
         gate_high       <= (others => '0');
         gate_low        <= (others => '0');
         sample          <= '0';

@@ -42,6 +42,8 @@ architecture rtl of pwm_compare is
   signal min_pulse_2 : unsigned(11 downto 0);
   signal compare_3   : unsigned(15 downto 0);
   signal min_pulse_3 : unsigned(11 downto 0);
+  signal longest_3   : signed(17 downto 0);
+  signal high_end_3  : signed(17 downto 0);
   signal compare_4   : unsigned(15 downto 0);
   signal short_4     : std_logic;
   signal long_4      : std_logic;
@@ -51,7 +53,10 @@ architecture rtl of pwm_compare is
 begin
   valid(0) <= in_valid;
 
-  duty_0    <= duty_b when valid(1) = '1' else duty_c when valid(2) = '1' else duty_a;
+  duty_0 <= duty_b when valid(1) = '1' else duty_c when valid(2) = '1' else duty_a;
+  -- Below zero where the low end is too short: a sign, for a carry chain with nothing behind it
+  high_end_3 <= longest_3 - signed(resize(compare_3, 18));
+
   dropped_4 <= to_unsigned(0, 16) when short_4 = '1' else HALF when long_4 = '1' else compare_4;
 
   process (clk)
@@ -71,17 +76,18 @@ begin
         min_pulse_2 <= min_pulse_1;
       end if;
 
-      -- Stage 3: compare = prod in clocks
+      -- Stage 3: compare = prod in clocks;  longest = CARRIER_HALF - min_pulse
       if valid(2) = '1' or valid(3) = '1' or valid(4) = '1' then
         compare_3   <= resize(unsigned(round_half_up(prod_2, PWM_COMPARE_DROP)), 16);
         min_pulse_3 <= min_pulse_2;
+        longest_3   <= signed(resize(HALF, 18)) - signed(resize(min_pulse_2, 18));
       end if;
 
       -- Stage 4: is a pulse of the low or of the high end too short
       if valid(3) = '1' or valid(4) = '1' or valid(5) = '1' then
         compare_4 <= compare_3;
         short_4   <= '1' when (compare_3 & '0') < min_pulse_3 else '0';
-        long_4    <= '1' when resize(compare_3, 17) + min_pulse_3 > HALF else '0';
+        long_4    <= high_end_3(17);
       end if;
 
       -- Stage 5: short pulses dropped; a and b wait for c

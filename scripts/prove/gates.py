@@ -7,7 +7,10 @@ from scripts.prove.proof import Fault, Proof, committed
 
 GATES = "modulation/gate_generation.vhd"
 COMPARE = "modulation/pwm_compare.vhd"
-SPIES = ("count", "down", "compare", "dead_used", "pulse_used", "configured", "level", "elapsed", "settled")
+SPIES = (
+    *("count", "down", "top", "valley", "compare", "dead_used", "dead_is_one", "pulse_used", "configured"),
+    *("level", "was_off", "changed", "same", "since"),
+)
 FULL = {"CARRIER_HALF": 10000}  # 200 MHz, 10 kHz: the default of the core
 SMALL = {"CARRIER_HALF": 8}  # a period of 16 clocks, so that a search sees several
 SEVERAL_PERIODS = 48
@@ -54,8 +57,8 @@ PROOFS = (
         Fault(
             "low gate follows the carrier at once",
             GATES,
-            "gate_low(k)  <= not level(k);",
-            "gate_low(k)  <= '1';",
+            "and not (wanted(k) or level(k));",
+            "and not (wanted(k) xor level(k));",
         ),
     ),
     gate_proof(
@@ -65,17 +68,17 @@ PROOFS = (
         Fault(
             "dead time one short",
             GATES,
-            "elapsed(k) < dead_used then",
-            "elapsed(k) + 1 < dead_used then",
+            "resize(since(k), 18))",
+            "resize(since(k) + 1, 18))",
         ),
         Fault(
             "no dead time after enable",
             GATES,
-            "elapsed(k) <= (others => '0');",
-            "elapsed(k) <= (others => '1');",
+            "(same(k) and not missing(k)(17))",
+            "not missing(k)(17)",
         ),
         Fault(
-            "dead time counted on", GATES, "elapsed(k) <= to_unsigned(1, 12);", "elapsed(k) <= elapsed(k);"
+            "dead time counted on", GATES, "since(k) <= to_unsigned(2, 12);", "since(k) <= since(k) + 1;"
         ),
     ),
     gate_proof(
@@ -127,14 +130,19 @@ PROOFS = (
             "duty taken at the peak too",
             GATES,
             "      if valley = '1' then\n        compare     <= (compare_a",
-            "      if count = CARRIER_HALF - 1 then\n        compare     <= (compare_a",
+            "      if valley = '1' or top = '1' then\n        compare     <= (compare_a",
         ),
     ),
     gate_proof(
         "settings",
         "dead time and minimum pulse change at the valley, never to contradicting ones; no gate is on before",
         "SETTINGS",
-        Fault("contradiction accepted", GATES, "dead_time < min_pulse and", "dead_time <= min_pulse and"),
+        Fault(
+            "contradiction accepted",
+            GATES,
+            "signed('0' & dead_time) - signed",
+            "signed('0' & dead_time) - 1 - signed",
+        ),
         Fault(
             "runs unconfigured",
             GATES,
@@ -149,12 +157,12 @@ PROOFS = (
         "minimum_pulse",
         "a gate that is on stays on for min_pulse - dead_time at least, unless trip, enable or reset cut it",
         "GATE_PULSE",
-        Fault("gate off when the dead time grows", GATES, "          settled(k)   <= '1';\n", ""),
+        Fault("gate off when the dead time grows", GATES, "gate_high(k) or gate_low(k) or", "gate_low(k) or"),
         Fault(
             "duty taken at the peak too",
             GATES,
             "      if valley = '1' then\n        compare     <= (compare_a",
-            "      if count = CARRIER_HALF - 1 then\n        compare     <= (compare_a",
+            "      if valley = '1' or top = '1' then\n        compare     <= (compare_a",
         ),
         patience=600,
         assumed="the compare values taken over fit the minimum pulse taken over with them (see minimum_pulse_asked)",
@@ -166,8 +174,8 @@ PROOFS = (
         Fault(
             "minimum pulse one short",
             COMPARE,
-            "resize(compare_3, 17) + min_pulse_3 > HALF",
-            "resize(compare_3, 17) + min_pulse_3 > HALF + 1",
+            "signed(resize(HALF, 18)) - signed",
+            "signed(resize(HALF, 18)) + 1 - signed",
         ),
         Fault(
             "pulses dropped by half their length",

@@ -51,8 +51,8 @@ def word_bits(words: list[Word]) -> int:
 
 def package(words: list[Word]) -> str:
     """rtl/io/register_map_pkg.vhd."""
-    limits = [end for word in words if writable(word) for end in (word.parts[0].low, word.parts[0].high)]
-    bits = max((end if end >= 0 else ~end).bit_length() + 1 for end in limits)
+    ends = [end for word in words if writable(word) for end in (word.parts[0].low, word.parts[0].high)]
+    bits = max((end if end >= 0 else ~end).bit_length() + 1 for end in ends)
 
     def limit(end: int) -> str:
         return f"to_signed({end}, REGISTER_LIMIT_W)"
@@ -62,28 +62,49 @@ def package(words: list[Word]) -> str:
         return names.get(word.kind, "REGISTER_READ_ONLY")
 
     stored, shown = [w for w in words if writable(w)], [w for w in words if w.kind == "status"]
+    # Those from zero last: what tells them from the others is then little
+    ranges = sorted({(w.parts[0].low, w.parts[0].high) for w in stored}, key=lambda r: (r[0] == 0, r))
+    bits_of_range = (len(ranges) - 1).bit_length()
+
+    def range_of(word: Word) -> str:
+        number = ranges.index((word.parts[0].low, word.parts[0].high))
+        return f"to_unsigned({number}, REGISTER_RANGE_W)"
+
+    def limits_of(end: int) -> list[tuple[str, str]]:
+        return _arms([(k, limit(both[end])) for k, both in enumerate(ranges)], limit(0), 1 << bits_of_range)
+
+    def of_words(chosen: list[Word], value_of: Callable[[Word], str], default: str) -> list[tuple[str, str]]:
+        return _arms([(word.index, value_of(word)) for word in chosen], default, 1 << word_bits(words))
+
+    by_word, by_range = ("word", "REGISTER_WORD_W"), ("number", "REGISTER_RANGE_W")
+    signed, none = of_words(shown, lambda w: f"'{int(w.parts[0].signed)}'", "'0'"), "REGISTER_NONE"
+    numbers, limits = "unsigned(REGISTER_RANGE_W - 1 downto 0)", "signed(REGISTER_LIMIT_W - 1 downto 0)"
+    first = "to_unsigned(0, REGISTER_RANGE_W)"
     tables = [
-        ("access", "unsigned", _arms(words, access, "REGISTER_NONE"), "REGISTER_NONE"),
-        ("low", "signed", _arms(stored, lambda w: limit(w.parts[0].low), limit(0)), limit(0)),
-        ("high", "signed", _arms(stored, lambda w: limit(w.parts[0].high), limit(0)), limit(0)),
-        ("signed", "std_logic", _arms(shown, lambda w: f"'{int(w.parts[0].signed)}'", "'0'"), "'0'"),
+        ("access", *by_word, "unsigned(1 downto 0)", "unsigned", of_words(words, access, none)),
+        ("range", *by_word, numbers, "unsigned", of_words(stored, range_of, first)),
+        ("signed", *by_word, "std_logic", "std_logic", signed),
+        ("low", *by_range, limits, "signed", limits_of(0)),
+        ("high", *by_range, limits, "signed", limits_of(1)),
     ]
     return _render(
         "register_map_pkg.vhd.j2",
         address_bits=ADDRESS_BITS,
         word_bits=word_bits(words),
         limit_bits=bits,
+        range_bits=bits_of_range,
         tables=tables,
     )
 
 
-def _arms(words: list[Word], value_of: Callable[[Word], str], default: str) -> list[tuple[str, str]]:
-    """(value, choices) of a case statement: each value once, ten words a line, runs of neighbours as ranges."""
+def _arms(table: list[tuple[int, str]], default: str, size: int) -> list[tuple[str, str]]:
+    """(value, choices) of an aggregate: each value once, runs of neighbours as ranges, the keys between as told."""
     of_value: dict[str, list[int]] = {}
-    for word in words:
-        of_value.setdefault(value_of(word), []).append(word.index)
-    of_value.pop(default, None)
-    return [(value, _choices(indices)) for value, indices in of_value.items()]
+    for key, value in (dict.fromkeys(range(size), default) | dict(table)).items():
+        of_value.setdefault(value, []).append(key)
+    chosen = {value: _choices(keys) for value, keys in of_value.items()}
+    width = max(map(len, chosen.values()))
+    return [(value, choices.ljust(width)) for value, choices in chosen.items()]
 
 
 def _choices(indices: list[int]) -> str:
@@ -93,9 +114,7 @@ def _choices(indices: list[int]) -> str:
             runs[-1][1] = index
         else:
             runs.append([index, index])
-    words = [str(a) if a == b else f"{a} to {b}" for a, b in runs]
-    lines = [" | ".join(words[k : k + 10]) for k in range(0, len(words), 10)]
-    return " |\n           ".join(lines)
+    return " | ".join(str(a) if a == b else f"{a} to {b}" for a, b in runs)
 
 
 def register_file(words: list[Word]) -> str:

@@ -136,7 +136,7 @@ module formal_top (
     if (was_request && was_answer && was_write) assert (bvalid && bresp == was_response);
     if (was_request && was_answer && !was_write) begin
       assert (rvalid && rresp == was_response);
-      assert (rdata == (was_response == 0 ? was_read_data : 0));
+      assert (rdata == was_read_data);
     end
     if (bvalid && !was_bvalid) assert (was_request && was_answer && was_write);
     if (rvalid && !was_rvalid) assert (was_request && was_answer && !was_write);
@@ -146,11 +146,11 @@ module formal_top (
 `endif
 
 `ifdef PROGRESS
-  // Nobody starves: with answers within 4 clocks and responses of its own direction taken at once, a request is taken
-  // within 14 clocks, whatever the other direction does.  `writes` is either direction.
+  // Nobody starves: with answers within 6 clocks and responses of its own direction taken at once, a request is taken
+  // within 18 clocks, whatever the other direction does.  `writes` is either direction.
   (* anyconst *) wire writes;
-  reg [1:0] slow;
-  reg [3:0] aw_wait, ar_wait;
+  reg [2:0] slow;
+  reg [4:0] aw_wait, ar_wait;
   always @(posedge clk) begin
     slow    <= request && !answer ? slow + 1 : 0;
     aw_wait <= awvalid && wvalid && !awready ? aw_wait + 1 : 0;
@@ -158,9 +158,9 @@ module formal_top (
     if (rst) {slow, aw_wait, ar_wait} <= 0;
   end
   always @* if (begun) assume (writes ? bready : rready);
-  always @* if (begun && slow == 3) assume (answer);
+  always @* if (begun && slow == 5) assume (answer);
   always @(posedge clk) if (begun) begin
-    assert ((writes ? aw_wait : ar_wait) < 14);
+    assert ((writes ? aw_wait : ar_wait) < 18);
     cover (writes && aw_wait == 6);
     cover (!writes && ar_wait == 6 && bvalid);
   end

@@ -33,14 +33,17 @@ module formal_top (
   wire [15:0] carrier;
 `ifdef LEMMAS
   wire [15:0] spy_count;
-  wire        spy_down;
+  wire        spy_down, spy_top, spy_valley;
   wire [47:0] spy_compare;  // leg a is the uppermost
   wire [11:0] spy_dead_used;
+  wire        spy_dead_is_one;
   wire [11:0] spy_pulse_used;
   wire        spy_configured;
   wire [ 2:0] spy_level;
-  wire [ 2:0] spy_settled;
-  wire [35:0] spy_elapsed;  // leg a is the uppermost
+  wire        spy_was_off;
+  wire [ 2:0] spy_changed;
+  wire [ 2:0] spy_same;
+  wire [35:0] spy_since;  // leg a is the uppermost
 `endif
 
   gate_generation dut (
@@ -66,13 +69,18 @@ module formal_top (
       ,
       .spy_count(spy_count),
       .spy_down(spy_down),
+      .spy_top(spy_top),
+      .spy_valley(spy_valley),
       .spy_compare(spy_compare),
       .spy_dead_used(spy_dead_used),
+      .spy_dead_is_one(spy_dead_is_one),
       .spy_pulse_used(spy_pulse_used),
       .spy_configured(spy_configured),
       .spy_level(spy_level),
-      .spy_elapsed(spy_elapsed),
-      .spy_settled(spy_settled)
+      .spy_was_off(spy_was_off),
+      .spy_changed(spy_changed),
+      .spy_same(spy_same),
+      .spy_since(spy_since)
 `endif
   );
 
@@ -236,14 +244,25 @@ module formal_top (
 
 `ifdef LEMMAS
   wire [15:0] compare_of_leg = leg == 0 ? spy_compare[47:32] : leg == 1 ? spy_compare[31:16] : spy_compare[15:0];
-  wire [11:0] elapsed = leg == 0 ? spy_elapsed[35:24] : leg == 1 ? spy_elapsed[23:12] : spy_elapsed[11:0];
+  wire [11:0] since = leg == 0 ? spy_since[35:24] : leg == 1 ? spy_since[23:12] : spy_since[11:0];
+  wire changed = leg == 0 ? spy_changed[0] : leg == 1 ? spy_changed[1] : spy_changed[2];
+  // Clocks of the dead time that have gone: the counter starts a clock late
+  wire [11:0] elapsed = changed ? 12'd1 : spy_was_off ? 12'd0 : since;
   wire level = leg == 0 ? spy_level[0] : leg == 1 ? spy_level[1] : spy_level[2];
-  wire settled = leg == 0 ? spy_settled[0] : leg == 1 ? spy_settled[1] : spy_settled[2];
+  wire same = leg == 0 ? spy_same[0] : leg == 1 ? spy_same[1] : spy_same[2];
+  wire settled = high || low;
 
   always @(posedge clk) if (begun) begin
     // The same valley, the same settings
     assert (carrier == spy_count && spy_count < HALF);
     if (spy_count == 0) assert (spy_down == was_one);
+    assert (spy_valley == (spy_count == 0 && spy_down));
+    assert (spy_top == (spy_count == HALF - 1 && !spy_down));
+    assert (spy_dead_is_one == (spy_dead_used == 1));
+    if (changed) assert (!spy_was_off && !settled);
+    assert (same == !(changed || spy_was_off));
+    if (spy_was_off) assert (!settled && !level && !high && !low);
+    if (running && !spy_was_off) assert (accepted);
     assert (compare == compare_of_leg);
     assert (dead_in_force == spy_dead_used && pulse_in_force == spy_pulse_used);
     assert (accepted == spy_configured);
