@@ -224,7 +224,7 @@ class Search(Ties):
             better = [
                 s
                 for model, s in self.refined.items()
-                if model not in tried and model.names and len(model) <= len(best.model)
+                if model not in tried and model.names and len(model) <= max(len(best.model), 1)
                 if s.score < best.score - TIE and model.names & set(FAMILY) <= curved
             ]
             if not better:
