@@ -38,7 +38,7 @@ class Refiner:
     def __init__(self, view, effects, train_blocks, progress=lambda text: None):
         self.view, self.effects, self.progress = view, dict(effects), progress
         self.most = min(MOST_EFFECTS, max(1, operating_points(view) - 1))
-        view.memo["lone"] = operating_points(view) == 1
+        view.memo["lone"] = self.most == 1
         self.projector = Projector(view)
         self.cells = cells_of(view, self.effects.values(), self.projector)
         self.sigma, self.pure = row_sigma(view, self.cells)

@@ -14,8 +14,8 @@ class Delay(Effect):
         return {"tau": voltage(view.to_dq(view.u[:, 1:-1] - view.u[:, :-2]) / view.sample_time_s)}
 
     def free(self, view):
-        # Gates that are late as a whole let the converters sample off the valley too.  More operating points tell
-        # that from a skew, and have it as one beside the delay; at a single one it is but another form of the delay.
+        # Gates that are late as a whole let the converters sample off the valley too.  That is a skew beside the delay
+        # where there are points enough for two effects; where there are not it is but another form of the delay.
         return {"off_valley": skewed(view)} if view.lone else {}
 
     def possible(self, c, covariance, nominal):
