@@ -184,8 +184,9 @@ class Search(Ties):
             if single.chi2 - best.chi2 < SAME_SCALE * explained and single.chi2 < SAME_FIT * best.chi2:
                 return single
         if self.scaled_alike(best):
-            rest = best.model.without("udc_gain").with_("current_gain", False)
-            single = self.refine(self.admitted(rest.with_("magnet_flux")))
+            rest = best.model.without("udc_gain").with_("magnet_flux")
+            singles = [self.refine(self.admitted(rest.with_("current_gain", bend))) for bend in (False, True)]
+            single = min(singles, key=lambda s: s.score)
             return single if single.chi2 - best.chi2 < SAME_SCALE * explained else best
         pair = best.model.names & SCALES
         if len(pair) != 2:
@@ -231,7 +232,7 @@ class Search(Ties):
                 break
             first = min(better, key=lambda s: s.score)
             tried.add(first.model)
-            other = self._earning(first)
+            other = self._earning(self._simplified(first))
             if other.score < best.score:
                 best = other
         return best
