@@ -36,9 +36,9 @@ class Refiner:
     """The linear problem of a view and the solutions that were refined on it."""
 
     def __init__(self, view, effects, train_blocks, progress=lambda text: None):
-        self.view, self.effects, self.progress = view, dict(effects), progress
         self.most = min(MOST_EFFECTS, max(1, operating_points(view) - 1))
-        view.memo["lone"] = self.most == 1
+        view = view.replace(memo={**view.memo, "lone": self.most == 1})
+        self.view, self.effects, self.progress = view, dict(effects), progress
         self.projector = Projector(view)
         self.cells = cells_of(view, self.effects.values(), self.projector)
         self.sigma, self.pure = row_sigma(view, self.cells)
