@@ -251,7 +251,8 @@ def test_hysteresis_draws_its_current_at_a_low_speed_too(view):
     g = 0.3 * view.machine.rated_current_a / (slow.top_speed * MACHINE.magnet_flux_wb)
     assert not CATALOGUE["iron_loss"].too_large({"g_fe": g}, slow)
     assert CATALOGUE["iron_loss"].too_large({"g_fe": g}, view.replace(memo={}))
-    assert CATALOGUE["udc_gain"].too_large({"gain": 0.6}, view) and not CATALOGUE["udc_gain"].too_large({"gain": 0.4}, view)
+    bus = CATALOGUE["udc_gain"].too_large
+    assert bus({"gain": 0.6}, view) and not bus({"gain": 0.4}, view)
 
 
 def test_a_constant_must_outlast_the_start_of_a_recording(view):

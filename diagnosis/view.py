@@ -84,7 +84,7 @@ class View:
 
     @property
     def lone(self):
-        """Whether the recording has points for one effect only, also of a view of points that were made up beside it."""
+        """Whether the recording has points for one effect only; so have points that were made up beside it."""
         return self.memo.get("lone", False)
 
     @property
