@@ -109,7 +109,7 @@ class Spread(Plain):
         f, c = self.fitter, self.solution.c[name]
         own, hidden = [n for n in f.columns_of(self.solution.model) if f.owner[n] == name], f.a[:, k]
         taken = dict(zip(self.carried, self.inverse @ (self.columns.T @ hidden), strict=True))  # of true columns
-        found = sum(c[f.names[n].lstrip("~")] * f.scale[n] * f.a[:, n] for n in own)
+        found = sum(c.get(f.names[n].lstrip("~"), 0.0) * f.scale[n] * f.a[:, n] for n in own)
         along = np.array([1.0 / f.scale[k] if n == k else -taken.get(n, 0.0) for n in own])
         self.covariance[name] += (hidden @ found) ** 2 * np.outer(along, along)
 
