@@ -7,12 +7,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from cocotb_tests.diagnosed_drives import MACHINE, recorded
+from cocotb_tests.diagnosed_drives import DRIVE, MACHINE, POINT, columns, recorded
 from cocotb_tests.test_registers import PAPER
 from diagnosis.blocks import view_of
 from diagnosis.catalogue import CATALOGUE
 from diagnosis.fit import Model
 from diagnosis.nominal import load_nominal
+from diagnosis.recording import from_columns
 from diagnosis.refine import Refiner
 from diagnosis.uncertainty import Plain, Spread, larger
 from diagnosis.verdict import named
@@ -142,3 +143,32 @@ def test_a_share_of_the_resistance_is_one_of_the_true_resistance():
     assert found.parameters["asymmetry_a"].sigma == pytest.approx(0.03, rel=0.1)
     alone = named(Plain(solution, CATALOGUE, NOMINAL, 1.0), names[1:], empty)[0].parameters["asymmetry_a"]
     assert alone.value == pytest.approx(1.3 * values[0], rel=0.01) and alone.sigma < 0.01
+
+
+def test_at_one_speed_dry_friction_may_be_viscous():
+    """A drag of 0.3 Nm at one speed: any part of it may be the one or the other, their sum is known."""
+    table, p = dict(columns(POINT)), MACHINE.pole_pairs
+    turns = np.exp(1j * table["theta_e"])
+    i = (2 / 3) * sum(table[f"i_{x}"] * np.exp(2j * np.pi / 3 * k) for k, x in enumerate("abc")) / turns
+    psi = MACHINE.magnet_flux_wb + (MACHINE.inductance_d_h - MACHINE.inductance_q_h) * i.real
+    omega = table["omega_e"] / p
+    table["torque"] = 1.5 * p * psi * i.imag - MACHINE.viscous_friction_nms * omega - 0.3
+    view = view_of(from_columns(table, DRIVE.sample_time_s), NOMINAL)
+    spread = Spread(*fitted(view, "friction"), 1.0)
+    found = spread.estimates("friction", [])
+    viscous, dry = found["viscous_friction_nms"], found["coulomb_friction_nm"]
+    speed = float(omega.mean())
+    assert dry.value + (viscous.value - MACHINE.viscous_friction_nms) * speed == pytest.approx(0.3, rel=0.03)
+    assert dry.sigma == pytest.approx(0.3, rel=0.03) and viscous.sigma * speed == pytest.approx(0.3, rel=0.03)
+    both = np.array([speed, 1.0])
+    assert np.sqrt(both @ spread.covariance["friction"][:2, :2] @ both) < 0.03
+
+
+def test_what_no_row_has_shown_is_no_parameter():
+    """Without current on an axis, or without an order, nothing is known of its curve: it is not zero."""
+    of = lambda name, *c: CATALOGUE[name].estimates(dict(c), np.diag([(1e-3 * v) ** 2 for _, v in c]), NOMINAL)  # noqa: E731
+    assert set(of("saturation", ("q_3", -0.1))) == {"psi_q_change_at_rated_wb"}
+    assert set(of("saturation", ("q_3", -0.1), ("d_3", 0.1))) == {f"psi_{x}_change_at_rated_wb" for x in "dq"}
+    waves = [(f"h6_{k}", 0.01) for k in range(4)] + [(f"h12_{k}", 0.0) for k in range(4)]
+    assert set(of("emf_harmonics", *waves)) == {"order_6"}
+    assert set(of("emf_harmonics", *waves[:4], *((k, 0.01) for k, _ in waves[4:]))) == {"order_6", "order_12"}

@@ -13,11 +13,13 @@ from diagnosis import diagnose
 from diagnosis.balance import bulge
 from diagnosis.blocks import view_of
 from diagnosis.catalogue import CATALOGUE
+from diagnosis.catalogue.current_gain import PATTERNS
+from diagnosis.catalogue.sampling_skew import unskewed
 from diagnosis.fit import Model, Solution
 from diagnosis.nominal import load_nominal
 from diagnosis.recording import from_columns
 from diagnosis.search import Search
-from diagnosis.verdict import lag_of_currents
+from diagnosis.verdict import groups, lag_of_currents
 from diagnosis.view import joined_views
 
 NOMINAL = load_nominal(PAPER)
@@ -128,6 +130,7 @@ def test_one_operating_point_does_not_say_how_large_errors_are(view):
 
 def test_what_remains_of_a_large_model_gives_way_to_a_better_one_of_its_size():
     search = object.__new__(Search)
+    search._simplified = lambda s: s
     large, remains = solved("delay", "iron_loss", score=50.0), solved("delay", score=400.0)
     better, curved = solved("sampling_skew", score=90.0), solved("saturation", score=60.0)
     search.refined = {s.model: s for s in (large, remains, better, curved)}
@@ -135,6 +138,22 @@ def test_what_remains_of_a_large_model_gives_way_to_a_better_one_of_its_size():
     assert search._pruned(large) is better  # not the curve, whose name is a matter of its shape
     search._earning = lambda s: remains
     assert search._pruned(large) is remains  # the better one's effect does not earn its place
+    nothing = solved(score=500.0)
+    search._earning = lambda s: nothing if s is large else s
+    assert search._pruned(large) is better  # though of nothing there is nothing of its size
+
+
+def test_second_thoughts_take_two_scales_for_the_third():
+    """Bus and sensors alike are the magnets: they must not come back when what was simplified has been pruned."""
+    search = object.__new__(Search)
+    magnets, remains = solved("magnet_flux", "current_gain", score=90.0), solved("magnet_flux", "delay", score=400.0)
+    alike = solved("udc_gain", "current_gain", score=50.0)
+    search.refined = {s.model: s for s in (remains, alike)}
+    search._earning = lambda s: remains if s is magnets else s
+    search._simplified = lambda s: magnets if s is alike else s
+    assert search._pruned(magnets) is remains
+    search._simplified = lambda s: s
+    assert search._pruned(magnets) is alike
 
 
 def test_what_is_too_small_for_a_name_stays_unnamed():
@@ -166,3 +185,87 @@ def test_what_is_too_small_may_be_something_else_at_one_operating_point(view):
     for most, tied in ((1, [rival]), (3, [])):
         lone.most = most
         assert lone._tied(best, True) == tied
+
+
+def test_another_cause_is_no_passenger_of_two_curves(view):
+    """A bus gain for two wrong inductances is an explanation; one of the two and something beside it is not."""
+    lone = object.__new__(Search)
+    lone.view, lone.effects, lone.most, lone.as_good = view, CATALOGUE, 1, lambda *args: True
+    m = MACHINE
+    d, q = ({"delta_l_d": 0.1 * m.inductance_d_h}, {"delta_l_q": 0.1 * m.inductance_q_h})
+    best = solved("inductance_d", "inductance_q", inductance_d=d, inductance_q=q)
+    gain = solved("udc_gain", score=125.0, udc_gain={"gain": -0.03})
+    beside = solved("inductance_d", "encoder_offset", score=125.0, inductance_d=d, encoder_offset={"offset": 0.03})
+    lone.refined = {s.model: s for s in (best, gain, beside)}
+    assert lone._tied(best, False) == [gain]
+
+
+def shifted_gates(plan):
+    """A view of a recording whose gates are late by 30 us, so that its currents are taken 18 us off the valley."""
+    view = view_of(recorded(plan), NOMINAL)
+    return CATALOGUE["delay"].corrected(unskewed(view, -18e-6), {"tau": -30e-6})
+
+
+def test_gates_that_are_late_sample_off_the_valley():
+    """At one operating point that is but another form of a delay; where there are more it is a skew beside it."""
+    view = shifted_gates(((80.0, -2.0, 3.0),) * 20)
+    search = Search(view, CATALOGUE, np.ones(len(view), bool))
+    found = search.run()
+    assert "delay" in set().union(*(s.model.names for s in (found.best, *found.tied)))
+    assert set(CATALOGUE["delay"].free(search.view)) == {"off_valley"} and not CATALOGUE["delay"].free(view)
+    c = search.refine(Model(frozenset(["delay"]), frozenset(["delay"]))).c["delay"]
+    assert c["tau"] == pytest.approx(30e-6, rel=0.1) and c["off_valley"] == pytest.approx(18e-6, rel=0.1)
+    possible, sure = CATALOGUE["delay"].possible, np.diag([1e-16, 1e-16])
+    assert possible(c, sure, NOMINAL) and not possible({"tau": 1e-5, "off_valley": 2e-5}, sure, NOMINAL)
+
+
+def test_gains_that_do_not_differ_do_not_turn_the_vector():
+    possible, sure = CATALOGUE["current_gain"].possible, 1e-12 * np.eye(4)
+    of = lambda turn, alpha: {"alpha": alpha, "beta": 0.0, "common": 0.02, "turn": turn}  # noqa: E731
+    assert not possible(of(0.04, 1e-5), sure, NOMINAL) and possible(of(0.04, 1e-5), 1e-3 * np.eye(4), NOMINAL)
+    assert possible(of(0.02 / 6, 0.02), sure, NOMINAL) and possible({"alpha": 0.02, "beta": 0.0}, sure[:2, :2], NOMINAL)
+
+
+def test_two_sensors_turn_the_vector_by_no_more_than_is_allowed(view):
+    """The largest turn that two gains and i_c = -i_a - i_b can make, over what the unequal gains themselves make."""
+    i_abc, effect = view.phases(view.i), CATALOGUE["current_gain"]
+    error = i_abc * np.array([0.02, -0.02, 0.0])
+    error[..., 2] = -error[..., 0] - error[..., 1]
+    turns = [*gain_waves(view), view.i, 1j * view.i]
+    stack = np.array([np.concatenate([w.real.ravel(), w.imag.ravel()]) for w in turns]).T
+    wanted = view.from_phases(error)
+    c = np.linalg.lstsq(stack, np.concatenate([wanted.real.ravel(), wanted.imag.ravel()]), rcond=None)[0]
+    c = dict(zip(("alpha", "beta", "common", "turn"), map(float, c), strict=True))
+    assert abs(c["turn"]) == pytest.approx(effect.size(c, NOMINAL) / 6, rel=0.01)
+    assert effect.possible(c, 1e-16 * np.eye(4), NOMINAL)
+
+
+def gain_waves(view):
+    """Current errors of a unit of the two patterns of gains."""
+    return [view.from_phases(view.phases(view.i) * np.array(w)) for w in PATTERNS.values()]
+
+
+def test_hysteresis_draws_its_current_at_a_low_speed_too(view):
+    """Half the rated current is the bound at the recorded speeds: a tenth of the speed, ten times the conductance."""
+    slow = view.replace(omega=0.1 * view.omega, memo={})
+    g = 0.3 * view.machine.rated_current_a / (slow.top_speed * MACHINE.magnet_flux_wb)
+    assert not CATALOGUE["iron_loss"].too_large({"g_fe": g}, slow)
+    assert CATALOGUE["iron_loss"].too_large({"g_fe": g}, view.replace(memo={}))
+    bus = CATALOGUE["udc_gain"].too_large
+    assert bus({"gain": 0.6}, view) and not bus({"gain": 0.4}, view)
+
+
+def test_a_constant_must_outlast_the_start_of_a_recording(view):
+    """A lagging thermocouple leaves a step within the first knot of a drift, which a constant would set right again."""
+    names = frozenset(["magnet_flux", "magnet_temperature"])
+    psi = MACHINE.magnet_flux_wb
+
+    def named(constant, step):
+        c = {"drift": -0.02 * psi, "course_0": step, "course_1": 0.7 * step, "course_2": 0.4 * step}
+        best = Solution(Model(names, names), 1.0, 5, 100, view=view)
+        best.c = {"magnet_flux": {"delta_psi_m": constant}, "magnet_temperature": c}
+        return groups(best, [], CATALOGUE, NOMINAL, cold=True)
+
+    assert named(0.006 * psi, -0.005 * psi) == (["magnet_temperature"], [])
+    assert named(0.006 * psi, 0.0) == named(0.006 * psi, 0.005 * psi) == (sorted(names), [])
+    assert named(-0.006 * psi, -0.005 * psi) == (sorted(names), [])

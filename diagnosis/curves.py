@@ -22,6 +22,12 @@ def courses(view):
     return hats(view.course, COURSE_KNOTS)
 
 
+def step_at_start(c) -> float:
+    """By how much a free course differs at the start from where its next stretch comes from: c of ``courses``."""
+    first, second = c.get("course_0", 0.0), c.get("course_1", 0.0)
+    return first - (second - first) * COURSE_KNOTS[1] / (COURSE_KNOTS[2] - COURSE_KNOTS[1])
+
+
 def course(view):
     """Time as a share of the recording, (b, 1)."""
     return view.course[:, None]

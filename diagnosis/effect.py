@@ -75,6 +75,10 @@ class Effect:
         """Largest size that a drive which still runs can have, in units of ``size``."""
         return float("inf")
 
+    def too_large(self, c: dict[str, float], view) -> bool:
+        """Whether no drive that still runs has coefficients c in a recording."""
+        return self.size(c, view.nominal) > self.ceiling(view.nominal)
+
     def size(self, c: dict[str, float], nominal) -> float:
         """One number for how large the effect is."""
         return abs(next(iter(c.values())))

@@ -36,6 +36,8 @@ class Refiner:
     """The linear problem of a view and the solutions that were refined on it."""
 
     def __init__(self, view, effects, train_blocks, progress=lambda text: None):
+        self.most = min(MOST_EFFECTS, max(1, operating_points(view) - 1))
+        view = view.replace(memo={**view.memo, "lone": self.most == 1})
         self.view, self.effects, self.progress = view, dict(effects), progress
         self.projector = Projector(view)
         self.cells = cells_of(view, self.effects.values(), self.projector)
@@ -48,7 +50,6 @@ class Refiner:
         self.projector.ok &= (self.cells.channel != "torque") | measured | ~noisy
         self.train = train_blocks[self.cells.block]
         self.linear = Fitter(self.cells, self.sigma, self.train)
-        self.most = min(MOST_EFFECTS, max(1, operating_points(view) - 1))
         self.refined: dict[Model, Solution] = {}
         self.adjust = np.zeros(len(self.cells.y))
         chi2, count = self.linear.chi2(everything(self.cells))
@@ -184,7 +185,7 @@ class Refiner:
         """No effect has a size or, beyond doubt, a sign that its physics rules out."""
         for name in solution.model.names:
             effect = self.effects[name]
-            if effect.size(solution.c[name], self.view.nominal) > effect.ceiling(self.view.nominal):
+            if effect.too_large(solution.c[name], self.view):
                 return False
             if not effect.possible(solution.c[name], solution.covariance[name], self.view.nominal):
                 return False

@@ -184,8 +184,9 @@ class Search(Ties):
             if single.chi2 - best.chi2 < SAME_SCALE * explained and single.chi2 < SAME_FIT * best.chi2:
                 return single
         if self.scaled_alike(best):
-            rest = best.model.without("udc_gain").with_("current_gain", False)
-            single = self.refine(self.admitted(rest.with_("magnet_flux")))
+            rest = best.model.without("udc_gain").with_("magnet_flux")
+            singles = [self.refine(self.admitted(rest.with_("current_gain", bend))) for bend in (False, True)]
+            single = min(singles, key=lambda s: s.score)
             return single if single.chi2 - best.chi2 < SAME_SCALE * explained else best
         pair = best.model.names & SCALES
         if len(pair) != 2:
@@ -224,14 +225,14 @@ class Search(Ties):
             better = [
                 s
                 for model, s in self.refined.items()
-                if model not in tried and model.names and len(model) <= len(best.model)
+                if model not in tried and model.names and len(model) <= max(len(best.model), 1)
                 if s.score < best.score - TIE and model.names & set(FAMILY) <= curved
             ]
             if not better:
                 break
             first = min(better, key=lambda s: s.score)
             tried.add(first.model)
-            other = self._earning(first)
+            other = self._earning(self._simplified(first))
             if other.score < best.score:
                 best = other
         return best

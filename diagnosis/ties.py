@@ -78,7 +78,7 @@ class Ties(Refiner):
             if model.names - silent == best.model.names - silent:
                 continue
             same = model.names - curved == rest and sure
-            passenger = model.names - curved > rest and len(best.model.names & curved) > 1
+            passenger = model.names - curved > rest and model.names & curved and len(best.model.names & curved) > 1
             if same or passenger or model.names == best.model.names or len(model) > len(best.model):
                 continue
             margin = TIE if self.most > 1 else LONE_TIE

@@ -65,6 +65,9 @@ class Spread(Plain):
         self.error = f.solve(model).residual[f.use] / self.sigma
         own = larger(self.inverse * max(reduced, LEAST_DISPERSION), self._between_points())
         self.covariance = self._by_effect(own + self._common())
+        for name in model.names:
+            for k in set(f.index[name][0]) - set(self.carried):
+                self._hidden(name, k)
 
     def _between_points(self):
         """Covariance (k, k) from how the operating points differ; zero where they are too few."""
@@ -97,6 +100,18 @@ class Spread(Plain):
             out[name] = np.array([[matrix[place[a], place[b]] if a in place and b in place else 0.0 for b in mine]
                                   for a in mine])  # fmt: skip
         return out
+
+    def _hidden(self, name, k):
+        """Widen an effect's covariance by a coefficient of its formula, column k, that is others' in this recording.
+
+        At one speed dry friction is viscous: any part of what was found may be the one or the other.
+        """
+        f, c = self.fitter, self.solution.c[name]
+        own, hidden = [n for n in f.columns_of(self.solution.model) if f.owner[n] == name], f.a[:, k]
+        taken = dict(zip(self.carried, self.inverse @ (self.columns.T @ hidden), strict=True))  # of true columns
+        found = sum(c.get(f.names[n].lstrip("~"), 0.0) * f.scale[n] * f.a[:, n] for n in own)
+        along = np.array([1.0 / f.scale[k] if n == k else -taken.get(n, 0.0) for n in own])
+        self.covariance[name] += (hidden @ found) ** 2 * np.outer(along, along)
 
     def others(self) -> list[dict]:
         """Coefficients {effect: {...}} that the best of the larger models give the solution's effects.

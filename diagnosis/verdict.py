@@ -6,6 +6,7 @@ import numpy as np
 
 from diagnosis.catalogue.dead_time import FREE_WIDTHS
 from diagnosis.cells import told
+from diagnosis.curves import step_at_start
 from diagnosis.effect import ALIKE
 from diagnosis.result import NamedEffect
 
@@ -45,7 +46,7 @@ def groups(best, tied, effects, nominal, silent=frozenset(), cold=False):
             stood = effects[constant].size(best.c[constant], nominal)
             if moved < DRIFTS * stood:
                 shared -= {drift}
-            elif stood < STEADY * effects[drift].moved(best.c[drift], best.view):
+            elif _stays(constant, drift, best, effects) < STEADY * effects[drift].moved(best.c[drift], best.view):
                 shared -= {constant}
             elif moved * STANDS > stood and not cold and _like_warmth(constant, best, nominal):
                 shared -= {constant}
@@ -62,6 +63,17 @@ def groups(best, tied, effects, nominal, silent=frozenset(), cold=False):
             if share > SLOPE_DEVICE and ohms > GROWS_ON * growth:
                 ambiguity.append(["dead_time", "resistance"])
     return sorted(shared), ambiguity
+
+
+def _stays(constant, drift, solution, effects) -> float:
+    """Size of a constant, less what the drift's free course takes back of it as soon as the recording has begun.
+
+    A thermocouple that lags leaves a step there which is in no other part of the recording.
+    """
+    (value, *_), step = solution.c[constant].values(), step_at_start(solution.c[drift])
+    if value * step < 0.0:
+        value = np.sign(value) * max(abs(value) - abs(step), 0.0)
+    return effects[constant].size({next(iter(solution.c[constant])): value}, solution.view.nominal)
 
 
 WARMTH = {"magnet_flux": -1.0, "resistance": 1.0}  # what a machine that was warm from the start does to it

@@ -2,9 +2,11 @@
 
 import numpy as np
 
-from diagnosis.effect import Effect, Parameter, current_error
+from diagnosis.effect import DOUBT, Effect, Parameter, current_error, sigma
 from diagnosis.result import Estimate
 
+# Two sensors that differ by g turn the vector by 0.29 g where they make a wave of 0.58 g; twice that for good measure.
+MOST_TURN = 1 / 3
 PATTERNS = {"alpha": (2 / 3, -1 / 3, -1 / 3), "beta": (0.0, 3**-0.5, -(3**-0.5))}
 
 
@@ -35,6 +37,12 @@ class CurrentGain(Effect):
 
     def size(self, c, nominal):
         return float(np.hypot(c["alpha"], c["beta"]))
+
+    def possible(self, c, covariance, nominal):
+        """Gains that hardly differ do not turn the vector: a scale and a turn alone are other effects."""
+        if not c.get("turn"):
+            return True
+        return abs(c["turn"]) <= MOST_TURN * self.size(c, nominal) + DOUBT * sigma(covariance, list(c).index("turn"))
 
     @staticmethod
     def _gains(c):

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from diagnosis.effect import Effect, Parameter, half_dead_time, one, sigma, voltage
+from diagnosis.catalogue.sampling_skew import skewed, unskewed
+from diagnosis.effect import DOUBT, Effect, Parameter, half_dead_time, one, sigma, voltage
 
 
 MOST = 1.2  # periods: past a whole one the mix goes on in a straight line, or an estimate there could not come back
@@ -11,6 +12,16 @@ MOST = 1.2  # periods: past a whole one the mix goes on in a straight line, or a
 class Delay(Effect):
     def core(self, view):
         return {"tau": voltage(view.to_dq(view.u[:, 1:-1] - view.u[:, :-2]) / view.sample_time_s)}
+
+    def free(self, view):
+        # Gates that are late as a whole let the converters sample off the valley too.  That is a skew beside the delay
+        # where there are points enough for two effects; where there are not it is but another form of the delay.
+        return {"off_valley": skewed(view)} if view.lone else {}
+
+    def possible(self, c, covariance, nominal):
+        """The sampling is no farther off the valley than the gates are late."""
+        off = abs(c.get("off_valley", 0.0))
+        return not off or off <= abs(c["tau"]) + DOUBT * sigma(covariance, list(c).index("off_valley"))
 
     def floor(self, nominal):
         return 0.006 * nominal.sample_time_s
@@ -28,7 +39,7 @@ class Delay(Effect):
             u[:, 1:] = (1.0 - share) * view.u[:, 1:] + share * view.u[:, :-1]
         else:
             u[:, :-1] = (1.0 + share) * view.u[:, :-1] - share * view.u[:, 1:]
-        return view.replace(u=u)
+        return unskewed(view.replace(u=u), c.get("off_valley", 0.0))
 
     def estimates(self, c, covariance, nominal):
         return one("delay_s", "s", c["tau"], sigma(covariance))

@@ -54,7 +54,8 @@ class EmfHarmonics(Effect):
                 values = np.array(list(c.values()))[index]
                 size = float(np.sqrt(np.sum(values**2)))
                 spread = float(np.sqrt(np.trace(covariance[np.ix_(index, index)]) / len(index)))
-                out[f"order_{h}"] = Estimate(size, spread, "1")
+                if size or spread:  # an order that no row has shown is not known to be none
+                    out[f"order_{h}"] = Estimate(size, spread, "1")
         return out
 
     def plant(self, c, nominal):

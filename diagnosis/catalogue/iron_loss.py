@@ -45,8 +45,10 @@ class IronLoss(Effect):
         m = nominal.machine
         return 0.002 * m.rated_current_a / self._rated_emf(nominal)
 
-    def ceiling(self, nominal):
-        return 0.5 * nominal.machine.rated_current_a / self._rated_emf(nominal)
+    def too_large(self, c, view):
+        """Hysteresis draws its current at every speed, so that no conductance is too large at a low one."""
+        emf = view.top_speed * view.machine.magnet_flux_wb
+        return self.size(c, view.nominal) * emf > 0.5 * view.machine.rated_current_a
 
     @staticmethod
     def _rated_emf(nominal):

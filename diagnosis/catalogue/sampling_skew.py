@@ -12,9 +12,20 @@ def _slope(view):
     return emf.real / m.inductance_d_h + 1j * emf.imag / m.inductance_q_h + 1j * view.omega * view.i
 
 
+def skewed(view):
+    """Column of currents that are sampled off the valley, per second."""
+    return current_error(view, _slope(view))
+
+
+def unskewed(view, tau):
+    """The view without what sampling off the valley by tau [s] adds to the currents."""
+    error = tau * _slope(view)
+    return view.replace(i=view.i - error, i_raw=view.i_raw - view.stator(error)) if tau else view
+
+
 class SamplingSkew(Effect):
     def core(self, view):
-        return {"tau": current_error(view, _slope(view))}
+        return {"tau": skewed(view)}
 
     def free(self, view):
         # The angle latched at another instant than the currents.
@@ -37,9 +48,7 @@ class SamplingSkew(Effect):
         return 0.3 * nominal.sample_time_s
 
     def corrected(self, view, c):
-        view = view.turned(c.get("angle", 0.0) * view.omega)
-        error = c["tau"] * _slope(view)
-        return view.replace(i=view.i - error, i_raw=view.i_raw - view.stator(error))
+        return unskewed(view.turned(c.get("angle", 0.0) * view.omega), c["tau"])
 
     def estimates(self, c, covariance, nominal):
         # Of the currents against the angle: whichever of the two is latched beside the valley.

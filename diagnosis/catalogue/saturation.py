@@ -71,7 +71,8 @@ class Saturation(FluxEffect):
             mine = np.array([1.0 if name.startswith(axis) else 0.0 for name in names])
             spread = float(np.sqrt(max(mine @ covariance @ mine, 0.0)))
             value = float(sum(v for name, v in c.items() if name.startswith(axis)))
-            out[f"psi_{axis}_change_at_rated_wb"] = Estimate(value * l_i, spread * l_i, "Wb")
+            if value or spread:  # an axis without current says nothing of its curve
+                out[f"psi_{axis}_change_at_rated_wb"] = Estimate(value * l_i, spread * l_i, "Wb")
         return out
 
     def plant(self, c, nominal):
