@@ -26,7 +26,7 @@ MUTANTS = (
      "unsigned(round_half_up(prod_2, PWM_COMPARE_DROP))", "unsigned(shift_right(prod_2, PWM_COMPARE_DROP))"),
     # registers on the bus
     ("answer does not wait for the master", "io/axi_lite_slave.vhd",
-     "      if s_axi_bready = '1' then\n        b_valid <= '0';\n      end if;", "      b_valid <= '0';"),
+     " or (b_valid and not s_axi_bready);", ";"),
     ("read taken while an answer waits", "io/axi_lite_slave.vhd", "s_axi_arvalid and not r_valid", "s_axi_arvalid"),
     ("write taken while an answer waits", "io/axi_lite_slave.vhd", "s_axi_wvalid and not b_valid", "s_axi_wvalid"),
     ("read answer survives reset", "io/axi_lite_slave.vhd", "        r_valid    <= '0';\n", ""),

@@ -86,12 +86,8 @@ begin
         address <= unsigned(s_axi_araddr);
       end if;
 
-      if s_axi_bready = '1' then
-        b_valid <= '0';
-      end if;
-      if s_axi_rready = '1' then
-        r_valid <= '0';
-      end if;
+      b_valid <= (answered and writing) or (b_valid and not s_axi_bready);
+      r_valid <= (answered and not writing) or (r_valid and not s_axi_rready);
 
       -- The response register is free, or the request would not have been taken; it takes what there is until the
       -- answer, as that comes late
@@ -101,13 +97,6 @@ begin
       if answering = '1' and writing = '0' then
         s_axi_rresp <= response;
         s_axi_rdata <= read_data;
-      end if;
-      if answered = '1' then
-        if writing = '1' then
-          b_valid <= '1';
-        else
-          r_valid <= '1';
-        end if;
       end if;
 
       if rst = '1' then

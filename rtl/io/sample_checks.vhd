@@ -152,7 +152,7 @@ begin
         over_3(0)   <= reaches(a_0, i_trip);
         over_3(1)   <= reaches(b_0, i_trip);
         over_3(2)   <= reaches(c_0, i_trip);
-        checks_3(1) <= reaches(sum_2, sum_trip);
+        checks_3(1) <= exceeds(sum_2, sum_trip);
         checks_3(2) <= '1' when railed > 0 and railed >= rail_samples else '0';
         checks_3(3) <= less(bus_0, u_dc_min);
         checks_3(4) <= not less(bus_0, u_dc_max);

@@ -51,8 +51,8 @@ PROOFS = (
         Fault(
             "response falls by itself",
             SLAVE,
-            "      if s_axi_bready = '1' then\n        b_valid <= '0';\n      end if;",
-            "      b_valid <= '0';",
+            " or (b_valid and not s_axi_bready);",
+            ";",
         ),
         Fault("data change while they wait", SLAVE, "answering = '1' and writing = '0'", "writing = '0'"),
     ),
