@@ -53,6 +53,31 @@ def test_a_copy_with_another_input_is_noticed(break_it):
     assert simulate(before, 1) != simulate(after, 1)
 
 
+def test_a_late_lut_stands_beside_each_of_its_flip_flops():
+    """LUTs in a row and a multiplexer of the slice at their end: both flip-flops behind it get all of the slice."""
+    netlist = design()
+    cells = netlist["modules"]["t"]["cells"]
+
+    def gate(kind: str, ports: dict) -> dict:
+        directions = {port: "output" if port == "Z" else "input" for port in ports}
+        connections = {port: [bit] for port, bit in ports.items()}
+        return {"type": kind, "parameters": {}, "connections": connections, "port_directions": directions}
+
+    for n in range(3):
+        cells[f"l{n}"] = gate("LUT4", {"A": 100 if n == 0 else 599 + n, "Z": 600 + n})
+    for n in (0, 1):
+        cells[f"half{n}"] = gate("LUT4", {"A": 602, "Z": 610 + n})
+        cells[f"taker{n}"] = flip_flop(620, 630 + n)
+    cells["mux"] = gate("PFUMX", {"ALUT": 610, "BLUT": 611, "C0": FIRST, "Z": 620})
+    assert share_out(netlist, "t", READERS) == 3
+    first, second = (cells[f"taker{n}"]["connections"]["DI"][0] for n in (0, 1))
+    nets = Nets(netlist["modules"]["t"])
+    muxes = [cells[nets.driver[bit]]["connections"] for bit in (first, second)]
+    assert len({first, second}) == 2
+    assert len({mux[port][0] for mux in muxes for port in ("ALUT", "BLUT")}) == 4
+    assert {mux["C0"][0] for mux in muxes} == {FIRST}
+
+
 def test_other_bits_of_a_port_stay():
     netlist = design()
     cells = netlist["modules"]["t"]["cells"]

@@ -57,7 +57,7 @@ MUTANTS = (
     ("half a duty off", "modulation/svm.vhd", "to_signed(2 ** (SVM_DROP_DUTY - 1), LEG_W)", "to_signed(0, LEG_W)"),
     ("root's doubled half", "common/sqrt.vhd", "<= pairs_1(0) & mantissa_1", "<= not pairs_1(0) & mantissa_1"),
     ("root's third byte", "common/sqrt.vhd", "or x(15 downto 8)", "or x(15 downto 9)"),
-    ("pairs of another byte", "common/sqrt.vhd", 'zero_pairs(x(15 downto 8)) when "10"', 'zero_pairs(x(23 downto 16)) when "10"'),
+    ("pairs of another byte", "common/sqrt.vhd", "upper_1 <= zero_pairs(x(15 downto 8));", "upper_1 <= zero_pairs(x(31 downto 24));"),
     ("carries of three voltages lost", "control/voltage_limit.vhd",
      "(u_pi_d and u_dec_d) or (u_pi_d and u_comp_d) or (u_dec_d and u_comp_d)", "(u_pi_d and u_dec_d) or (u_pi_d and u_comp_d)"),
     ("quotient starts wrong", "common/reciprocal.vhd",

@@ -26,7 +26,9 @@ architecture rtl of sqrt is
 
   signal valid      : std_logic_vector(0 to LATENCY);
   signal bytes_0    : unsigned(1 downto 0);
-  signal pairs_0    : unsigned(1 downto 0);
+  signal small_0    : std_logic;
+  signal upper_1    : unsigned(1 downto 0);
+  signal lower_1    : unsigned(1 downto 0);
   signal pairs_1    : unsigned(1 downto 0);
   signal x_1        : unsigned(31 downto 0);
   signal shift_1    : unsigned(1 downto 0);
@@ -62,11 +64,8 @@ begin
   valid(0) <= in_valid;
   bytes_0  <= leading_zeros(or x(31 downto 24), or x(23 downto 16), or x(15 downto 8));
 
-  with bytes_0 select pairs_0 <=
-    zero_pairs(x(31 downto 24)) when "00",
-    zero_pairs(x(23 downto 16)) when "01",
-    zero_pairs(x(15 downto 8)) when "10",
-    zero_pairs(x(7 downto 0)) when others;
+  small_0 <= nor x(31 downto 16);
+  pairs_1 <= lower_1 when shift_1(0) = '1' else upper_1;
 
   mantissa_1 <= resize(shift_right(shift_left(x_1, to_integer(pairs_1 & '0')), SQRT_DROP_X), 20);
   address_1  <= pairs_1(0) & mantissa_1(19 downto SQRT_REST_BITS);
@@ -78,11 +77,16 @@ begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stage 1: zero bytes shifted out, four pairs each, and the pairs counted that go then
+      -- Stage 1: zero bytes shifted out, four pairs each;  zero pairs of both bytes of the half that stays
       if valid(0) = '1' then
         x_1     <= shift_left(x, to_integer(bytes_0 & "000"));
         shift_1 <= bytes_0;
-        pairs_1 <= pairs_0;
+        upper_1 <= zero_pairs(x(31 downto 24));
+        lower_1 <= zero_pairs(x(23 downto 16));
+        if small_0 = '1' then
+          upper_1 <= zero_pairs(x(15 downto 8));
+          lower_1 <= zero_pairs(x(7 downto 0));
+        end if;
       end if;
 
       -- Stage 2: mantissa = x * 4**shift, cut to 20 bits;  base, slope from the table

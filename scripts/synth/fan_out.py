@@ -3,47 +3,87 @@
 A valid bit enables dozens of flip-flops and chooses for dozens of LUTs; a reset reaches thousands.  nextpnr keeps one
 such cell in one place.  Readers are shared out in the order of their names, which the blocks and registers of the VHDL
 gave them: those of one register stay together.
+
+A LUT has one flip-flop beside it.  Where several take what it makes, all but one are behind a net of their own; those
+get a LUT of their own if it is late.
 """
 
 from __future__ import annotations
 
+from scripts.synth.delays import Delays
 from scripts.synth.netlist import Nets
 
-OUTPUT = {"TRELLIS_FF": "Q", "LUT4": "Z"}
+FLIP_FLOP, LUT = "TRELLIS_FF", "LUT4"
+OUTPUT = {FLIP_FLOP: "Q", LUT: "Z", "PFUMX": "Z", "L6MUX21": "Z"}
+INSIDE = {"PFUMX": ("ALUT", "BLUT"), "L6MUX21": ("D0", "D1")}  # by wires of the slice: their makers go along
 MOST = 32  # readers of one copy
+LATE = 4.0  # ns after the clock at which a net more in front of a flip-flop is one too many
 COPY = "_copy_"  # stands in a copy's name behind that of the cell it copies
+
+
+class Copies:
+    """The cells of a netlist, and more of them."""
+
+    def __init__(self, module: dict):
+        self.cells, self.nets, self.added = module["cells"], Nets(module), 0
+
+    def copy(self, bit: int) -> int:
+        """A bit made by a copy of what makes ``bit``, without readers."""
+        name, made = self.nets.driver[bit], self.nets.free
+        self.nets.free += 1
+        self.added += 1
+        model = self.cells[name]
+        connections = {**model["connections"], OUTPUT[model["type"]]: [made]}
+        for port in INSIDE.get(model["type"], ()):
+            connections[port] = [self.copy(connections[port][0])]
+        copy = f"{name}{COPY}{made}"
+        self.cells[copy] = {**model, "connections": connections}
+        self.nets.driver[made] = copy
+        for port, (source, *_) in connections.items():
+            if port != OUTPUT[model["type"]] and not isinstance(source, str):
+                self.nets.readers[source].append((copy, port))
+        return made
+
+    def hand_over(self, bit: int, readers: list[tuple[str, str]]) -> None:
+        """``readers`` of ``bit`` read a copy of it from now on."""
+        made = self.copy(bit)
+        for cell, port in readers:
+            connections = self.cells[cell]["connections"]
+            moved = [made if old == bit else old for old in connections[port]]
+            self.cells[cell]["connections"] = {**connections, port: moved}
+            self.nets.readers[bit].remove((cell, port))
+            self.nets.readers[made].append((cell, port))
 
 
 def share_out(netlist: dict, top: str, most: int = MOST) -> int:
     """Changes ``netlist`` in place; how many copies were added."""
-    module = netlist["modules"][top]
-    cells, nets = module["cells"], Nets(module)
-    added = 0
+    copies = Copies(netlist["modules"][top])
+    cells, nets = copies.cells, copies.nets
+    delays = Delays(cells, nets)
+    late = {bit for bit in nets.driver if delays.arrival(bit) > LATE}
+    own_luts(copies, late)
     waiting = sorted(nets.driver)
     while waiting:
         bit = waiting.pop()
-        name, readers = nets.driver[bit], nets.readers.get(bit, [])
-        model = cells[name]
-        kept = model.get("attributes", {}).get("keep")
-        if len(readers) <= most or model["type"] not in OUTPUT or kept or any(not cell for cell, _ in readers):
+        model, readers = cells[nets.driver[bit]], sorted(nets.readers.get(bit, []))
+        connections = model["connections"]
+        if len(readers) <= most or model["type"] not in (FLIP_FLOP, LUT) or any(not cell for cell, _ in readers):
             continue
-        given = [(port, bits[0]) for port, bits in model["connections"].items() if port != OUTPUT[model["type"]]]
-        readers.sort()
+        if model.get("attributes", {}).get("keep") or connections.get("DI", [None])[0] in late:
+            continue
         share = -(-len(readers) // -(-len(readers) // most))
-        nets.readers[bit] = readers[:share]
         for start in range(share, len(readers), share):
-            copy, made = f"{name}{COPY}{nets.free}", nets.free
-            nets.free += 1
-            cells[copy] = {**model, "connections": {**model["connections"], OUTPUT[model["type"]]: [made]}}
-            nets.driver[made], nets.readers[made] = copy, readers[start : start + share]
-            for cell, port in nets.readers[made]:
-                connections = cells[cell]["connections"]
-                moved = [made if old == bit else old for old in connections[port]]
-                cells[cell]["connections"] = {**connections, port: moved}
-            for port, source in given:
-                if not isinstance(source, str) and port != "CLK":
-                    nets.readers[source].append((copy, port))
-            added += 1
+            copies.hand_over(bit, readers[start : start + share])
         # What the copies read has more readers now.
-        waiting += [source for _, source in given if source in nets.driver]
-    return added
+        waiting += [source for (source, *_) in connections.values() if source != bit and source in nets.driver]
+    return copies.added
+
+
+def own_luts(copies: Copies, late: set[int]) -> None:
+    """Gives each flip-flop that takes a late bit of a LUT one of its own."""
+    for bit in sorted(late):
+        if copies.cells[copies.nets.driver[bit]]["type"] in (LUT, *INSIDE):
+            takers = [(cell, port) for cell, port in copies.nets.readers.get(bit, []) if cell and port == "DI"]
+            for taker in takers[1:]:
+                if copies.cells[taker[0]]["type"] == FLIP_FLOP:
+                    copies.hand_over(bit, [taker])
