@@ -3,7 +3,7 @@
 --   out_y = x*sin_theta + y*cos_theta
 -- Formats: x, y S(1,WIDTH-2), PU or FLUX; TRIG S(1,16) within +-1; products and sums exact.
 -- One multiplier for sin_theta, a clock ahead of the one for cos_theta, which adds; y is needed a clock after x, and
--- out_y comes a clock before out_x, with out_soon.
+-- out_y comes a clock before out_x, with out_soon.  Sine and cosine serve several rotations: each holds its own.
 -- Latency: 5.  Interval: 4.  Rounding: half up, saturated: a vector longer than 2 per unit is outside every base.
 -- A sum is at most 4 per unit, so its three top bits say whether it fits.
 
@@ -37,6 +37,8 @@ architecture rtl of rotate is
   constant SUM_W   : positive := WIDTH + TRIG_W;
 
   signal valid      : std_logic_vector(0 to LATENCY);
+  signal cos_1      : signed(TRIG_W - 1 downto 0);
+  signal sin_1      : signed(TRIG_W - 1 downto 0);
   signal factor_s_0 : signed(WIDTH - 1 downto 0);
   signal factor_s   : signed(WIDTH - 1 downto 0);           -- at clock 1 x, at clock 2 not y
   signal factor_c_1 : signed(WIDTH - 1 downto 0);
@@ -62,7 +64,11 @@ begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stages 1, 2: x, then not y;  stages 2, 3: y, then x
+      -- Stage 1: the angle.  Stages 1, 2: x, then not y;  stages 2, 3: y, then x
+      if valid(0) = '1' then
+        cos_1 <= cos_theta;
+        sin_1 <= sin_theta;
+      end if;
       if valid(0) = '1' or valid(1) = '1' then
         factor_s <= factor_s_0;
       end if;
@@ -72,17 +78,17 @@ begin
 
       -- Stages 2, 3: prod_s = x*sin_theta, then (not y)*sin_theta;  rest: half an LSB to round with, then sin_theta too
       if valid(1) = '1' or valid(2) = '1' then
-        prod_s <= factor_s * sin_theta;
+        prod_s <= factor_s * sin_1;
         rest   <= half(ROTATE_DROP, TRIG_W);
         if valid(2) = '1' then
-          rest <= sin_theta + half(ROTATE_DROP, TRIG_W);
+          rest <= sin_1 + half(ROTATE_DROP, TRIG_W);
         end if;
       end if;
 
       -- Stages 3, 4: sum_s = x*sin_theta, then -y*sin_theta;  prod_c = y*cos_theta, then x*cos_theta
       if valid(2) = '1' or valid(3) = '1' then
         sum_s  <= prod_s + rest;
-        prod_c <= factor_c * cos_theta;
+        prod_c <= factor_c * cos_1;
       end if;
 
       -- Stages 4, 5: out_y = x*sin_theta + y*cos_theta, then out_x = x*cos_theta - y*sin_theta, narrowed

@@ -16,7 +16,7 @@ from scripts.synth.netlist import Nets
 FLIP_FLOP, LUT = "TRELLIS_FF", "LUT4"
 OUTPUT = {FLIP_FLOP: "Q", LUT: "Z", "PFUMX": "Z", "L6MUX21": "Z"}
 INSIDE = {"PFUMX": ("ALUT", "BLUT"), "L6MUX21": ("D0", "D1")}  # by wires of the slice: their makers go along
-MOST = 32  # readers of one copy
+MOST = 16  # readers of one copy
 LATE = 4.0  # ns after the clock at which a net more in front of a flip-flop is one too many
 COPY = "_copy_"  # stands in a copy's name behind that of the cell it copies
 
