@@ -82,8 +82,8 @@ begin
     variable minus : signed(PU_W downto 0);
     variable carry : std_logic;
   begin
-    minus  := v_4 xor (PU_W downto 0 => not v_4(v_4'high));
-    carry  := not v_4(v_4'high) and not valid(5);
+    minus := v_4 xor (PU_W downto 0 => not v_4(v_4'high));
+    carry := not v_4(v_4'high) and not valid(5);
     if far_4 = '1' then
       minus := (PU_W => '1', others => '0');
     end if;
