@@ -75,8 +75,8 @@ PROOFS = (
         Fault(
             "a write answers as a read",
             SLAVE,
-            "        if writing = '1' then",
-            "        if write_data(0) = '1' then",
+            "(answered and writing)",
+            "(answered and write_data(0))",
         ),
     ),
     slave_proof(
