@@ -18,10 +18,6 @@ package fixed_pkg is
   -- x limited to the range of a signed number of width bits.
   function saturate (x : signed; width : positive) return signed;
 
-  -- The same where far has been found a clock earlier: '1' where the value is out of range by bits that x lacks; x has
-  -- its sign.
-  function saturate (x : signed; far : std_logic; width : positive) return signed;
-
   -- '1' where saturating x to width signed bits changes it.
   function exceeds (x : signed; width : positive) return std_logic;
 
@@ -73,18 +69,13 @@ package body fixed_pkg is
   end function;
 
   function saturate (x : signed; width : positive) return signed is
+    alias v         : signed(x'length - 1 downto 0) is x;
+    variable result : signed(width - 1 downto 0);
   begin
     if width >= x'length then
       return resize(x, width);
     end if;
-    return saturate(x, '0', width);
-  end function;
-
-  function saturate (x : signed; far : std_logic; width : positive) return signed is
-    alias v         : signed(x'length - 1 downto 0) is x;
-    variable result : signed(width - 1 downto 0);
-  begin
-    if far = '0' and exceeds(x, width) = '0' then
+    if exceeds(x, width) = '0' then
       return v(width - 1 downto 0);
     end if;
     result            := (others => not v(v'high));
@@ -147,10 +138,10 @@ package body fixed_pkg is
   end function;
 
   function plus_carry (a : signed; carry : std_logic) return signed is
-    variable sum : signed(a'length downto 0);
+    variable raised : signed(a'length downto 0);
   begin
-    sum := (a & '1') + signed(resize(unsigned'(0 => carry), a'length + 1));
-    return sum(a'length downto 1);
+    raised := (a & '1') + signed(resize(unsigned'(0 => carry), a'length + 1));
+    return raised(a'length downto 1);
   end function;
 
   function plus_rounded (a : signed; v : signed; drop : positive) return signed is

@@ -23,8 +23,8 @@ from scripts.synth.yosys import run, yosys
 
 DEVICE = ["--85k", "--package", "CABGA756", "--speed", "6"]
 GOAL_MHZ = 200  # what placer and router are asked for: more than there is, so that they keep trying
-# A second algorithm of the router: several times faster here, and no slower in its result.  The placer's weight of timing
-# is 10 if not told: then some multipliers stand far from what follows them, in some seeds only.
+# A second algorithm of the router: several times faster here, and no slower in its result.  The placer weighs timing
+# with 10 if not told: then some multipliers stand far from what follows them, in some seeds only.
 EFFORT = ["--router", "router2", "--placer-heap-timingweight", "40", "--freq", str(GOAL_MHZ)]
 # What synth_lattice legalises to, less latches: the core has none.
 FLIP_FLOPS = (
