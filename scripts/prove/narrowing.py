@@ -59,8 +59,8 @@ FAULTS = {
     ),
     "saturate": Fault("wraps", PACKAGE, "if exceeds(x, width) = '0' then", "if true then"),
     "exceeds": Fault(
-        "a bit too many allowed", PACKAGE, "or (v(v'high downto width) xor v(v'high - 1 downto width - 1))",
-        "or (v(v'high downto width + 1) xor v(v'high - 1 downto width))",
+        "beyond the upper end not seen", PACKAGE, "or (v(v'high downto width) xor v(v'high - 1 downto width - 1))",
+        "or (v(v'high downto width) and not v(v'high - 1 downto width - 1))",
     ),
     "saturate_u": Fault(
         "wraps just above the range", PACKAGE, "if v(v'high downto width) = ZERO(v'high downto width) then",
