@@ -5,9 +5,9 @@
 -- Clock: everything works on aclk.  All inputs but trip must be synchronous to it: bring converter and encoder
 -- signals through registers of aclk, sample_valid one clock long when the codes are stable.  trip is the one
 -- asynchronous input; io/power_stage takes it in.
--- Reset: aresetn, synchronous to aclk, for at least 4 clocks; inside, a clock later, it is a rst of each instance,
--- active high, out of a flip-flop of its own: thousands of registers read it.  While it lasts all gates are off;
--- afterwards enable, every register and the memory of trips are at their reset values (all off).
+-- Reset: aresetn, synchronous to aclk, for at least 4 clocks; inside, a clock later, it is rst, active high, out of a
+-- flip-flop that tools can copy.  While it lasts all gates are off; afterwards enable, every register and the memory
+-- of trips are at their reset values (all off).
 -- Formats: codes as the converters give them; registers as `fluxproof registers drive.toml` prints them.
 -- Latency: sample_valid to duties FLUXPROOF_SAMPLE_TO_DUTY clocks; trip to gates off 0 clocks.
 -- The file keeps to VHDL-93 so that a block design can also take it as a module.
@@ -65,10 +65,7 @@ entity fluxproof_axi is
 end entity fluxproof_axi;
 
 architecture rtl of fluxproof_axi is
-  signal rst_registers     : std_logic;
-  signal rst_core          : std_logic;
-  signal rst_stream        : std_logic;
-  signal rst_stage         : std_logic;
+  signal rst               : std_logic;
   signal enable            : std_logic;
   signal clear_trip        : std_logic;
   signal clear_faults_in   : std_logic;
@@ -184,22 +181,12 @@ architecture rtl of fluxproof_axi is
   signal m_axis_tdata_out  : unsigned(31 downto 0);
   signal telemetry_dropped : unsigned(15 downto 0);
   signal trip_now          : std_logic;
-
-  -- Copies that synthesis would otherwise make one of
-  attribute keep : string;
-  attribute keep of rst_registers : signal is "true";
-  attribute keep of rst_core      : signal is "true";
-  attribute keep of rst_stream    : signal is "true";
-  attribute keep of rst_stage     : signal is "true";
 begin
 
   process (aclk)
   begin
     if rising_edge(aclk) then
-      rst_registers <= not aresetn;
-      rst_core      <= not aresetn;
-      rst_stream    <= not aresetn;
-      rst_stage     <= not aresetn;
+      rst <= not aresetn;
     end if;
   end process;
 
@@ -212,7 +199,7 @@ begin
     )
     port map (
       clk               => aclk,
-      rst               => rst_registers,
+      rst               => rst,
       s_axi_awaddr      => s_axi_awaddr,
       s_axi_awvalid     => s_axi_awvalid,
       s_axi_awready     => s_axi_awready,
@@ -345,7 +332,7 @@ begin
     )
     port map (
       clk             => aclk,
-      rst             => rst_core,
+      rst             => rst,
       sample_valid    => sample_valid,
       adc_a           => unsigned(adc_a),
       adc_b           => unsigned(adc_b),
@@ -507,7 +494,7 @@ begin
     )
     port map (
       clk             => aclk,
-      rst             => rst_stream,
+      rst             => rst,
       enable          => telemetry_enable,
       sample_valid    => sample_valid,
       m_axis_tready   => m_axis_tready,
@@ -555,7 +542,7 @@ begin
   stage : entity work.power_stage
     port map (
       clk            => aclk,
-      rst            => rst_stage,
+      rst            => rst,
       trip_pin       => trip,
       gate_high_next => gate_high_next,
       gate_low_next  => gate_low_next,

@@ -87,7 +87,7 @@ architecture rtl of sample_checks is
   end function;
 
   -- The same as a sign alone, for wide numbers: a carry chain with nothing behind it
-  function exceeds (x : signed; limit : unsigned) return std_logic is
+  function reaches_wide (x : signed; limit : unsigned) return std_logic is
     variable magnitude : signed(x'length downto 0);
     variable beyond    : signed(x'length downto 0);
   begin
@@ -152,11 +152,11 @@ begin
         over_3(0)   <= reaches(a_0, i_trip);
         over_3(1)   <= reaches(b_0, i_trip);
         over_3(2)   <= reaches(c_0, i_trip);
-        checks_3(1) <= exceeds(sum_2, sum_trip);
+        checks_3(1) <= reaches_wide(sum_2, sum_trip);
         checks_3(2) <= '1' when railed > 0 and railed >= rail_samples else '0';
         checks_3(3) <= less(bus_0, u_dc_min);
         checks_3(4) <= not less(bus_0, u_dc_max);
-        checks_3(5) <= exceeds(off_2, jump_max) and known_1;
+        checks_3(5) <= reaches_wide(off_2, jump_max) and known_1;
       end if;
 
       -- Stage 4: faults of this sample

@@ -79,7 +79,6 @@ PINS = (
     ("gate_low", "out", "2 downto 0", "lower gates, bit 0 is leg a"),
     ("irq", "out", None, "level: a trip is remembered"),
 )
-RESET = "rst"  # port; its net has the instance's name behind it
 NETS_OF_PINS = {"trip": "trip_pin", "aclk": "clk", "irq": "tripped"}  # pin -> net, where the names differ
 
 HEADER = """\
@@ -90,9 +89,9 @@ HEADER = """\
 -- Clock: everything works on aclk.  All inputs but trip must be synchronous to it: bring converter and encoder
 -- signals through registers of aclk, sample_valid one clock long when the codes are stable.  trip is the one
 -- asynchronous input; io/power_stage takes it in.
--- Reset: aresetn, synchronous to aclk, for at least 4 clocks; inside, a clock later, it is a rst of each instance,
--- active high, out of a flip-flop of its own: thousands of registers read it.  While it lasts all gates are off;
--- afterwards enable, every register and the memory of trips are at their reset values (all off).
+-- Reset: aresetn, synchronous to aclk, for at least 4 clocks; inside, a clock later, it is rst, active high, out of a
+-- flip-flop that tools can copy.  While it lasts all gates are off; afterwards enable, every register and the memory
+-- of trips are at their reset values (all off).
 -- Formats: codes as the converters give them; registers as `fluxproof registers drive.toml` prints them.
 -- Latency: sample_valid to duties FLUXPROOF_SAMPLE_TO_DUTY clocks; trip to gates off 0 clocks.
 -- The file keeps to VHDL-93 so that a block design can also take it as a module."""
@@ -111,18 +110,13 @@ def source_names(rtl: Path = RTL) -> list[str]:
 
 def net_of(label: str, port: str) -> str:
     """The net that a port of an instance belongs to."""
-    return reset_of(label) if port == RESET else RENAMED.get((label, port), port)
-
-
-def reset_of(label: str) -> str:
-    """The net of an instance's own reset."""
-    return f"{RESET}_{label}"
+    return RENAMED.get((label, port), port)
 
 
 def wire(entities: dict[str, Entity]) -> dict[str, Pin]:
     """{net: the instance's port that drives it}; ValueError for a port without driver, or with two."""
     pins = {NETS_OF_PINS.get(name, name): mode for name, mode, _, _ in PINS}
-    given = {net for net, mode in pins.items() if mode == "in"} | set(map(reset_of, entities))
+    given = {net for net, mode in pins.items() if mode == "in"} | {"rst"}
     driven: dict[str, Pin] = {}
     for label, entity in entities.items():
         for pin in entity.outputs.values():
@@ -158,15 +152,10 @@ def render(rtl: Path = RTL) -> str:
     lines = [HEADER, "", "library ieee;", "use ieee.std_logic_1164.all;", "use ieee.numeric_std.all;"]
     lines += ["use work.fluxproof_pkg.all;", "", *_entity(), "", f"architecture rtl of {TOP} is"]
     width = max(map(len, names.values()))
-    resets = [reset_of(label) for label in entities]
-    lines += [f"  signal {net:{width}} : std_logic;" for net in resets]
+    lines.append(f"  signal {'rst':{width}} : std_logic;")
     lines += [f"  signal {names[net]:{width}} : {pin.vhdl_type};" for net, pin in signals.items()]
-    lines += ["", "  -- Copies that synthesis would otherwise make one of", "  attribute keep : string;"]
-    wide = max(map(len, resets))
-    lines += [f'  attribute keep of {net:{wide}} : signal is "true";' for net in resets]
     lines += ["begin", "", "  process (aclk)", "  begin", "    if rising_edge(aclk) then"]
-    lines += [f"      {net:{wide}} <= not aresetn;" for net in resets]
-    lines += ["    end if;", "  end process;"]
+    lines += ["      rst <= not aresetn;", "    end if;", "  end process;"]
     for label, entity in entities.items():
         lines += ["", *_instance(label, entity, actuals)]
     lines.append("")

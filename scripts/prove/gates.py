@@ -154,10 +154,17 @@ PROOFS = (
         ),
     ),
     gate_proof(
+        "stays_on",
+        "a gate that is on goes off only when its leg changes its mind, or for trip, enable or reset",
+        "STAYS_ON",
+        # Of the low gate: the high one is on at the valley only after half a period, beyond what a search sees of it.
+        Fault("gate off when the dead time grows", GATES, "gate_high(k) or gate_low(k) or", "gate_high(k) or"),
+    ),
+    gate_proof(
         "minimum_pulse",
         "a gate that is on stays on for min_pulse - dead_time at least, unless trip, enable or reset cut it",
         "GATE_PULSE",
-        Fault("gate off when the dead time grows", GATES, "gate_high(k) or gate_low(k) or", "gate_low(k) or"),
+        Fault("dead time one too long", GATES, "resize(since(k), 18))", "resize(since(k) - 1, 18))"),
         Fault(
             "duty taken at the peak too",
             GATES,

@@ -133,7 +133,7 @@ module formal_top (
   end
 
   // The clock before, for what the gates show one register later.
-  reg was_high, was_low, was_wanted, was_trip, was_enable;
+  reg was_high, was_low, was_wanted, was_trip, was_enable, was_cut;
   reg [11:0] dead_before;
   always @(posedge clk) begin
     was_high    <= high;
@@ -141,6 +141,7 @@ module formal_top (
     was_wanted  <= wanted;
     was_trip    <= trip;
     was_enable  <= enable;
+    was_cut     <= rst || trip || !enable;
     dead_before <= dead_in_force;
   end
   // Clocks for which both gates of the leg have been off, as far as the counter goes.
@@ -214,6 +215,18 @@ module formal_top (
   end
 `endif
 
+`ifdef STAYS_ON
+  // Also while the dead time grows, and for longer than the dead time's counter counts.
+  reg grown;
+  always @(posedge clk) grown <= (high || low) && !rst && (grown || dead_in_force > dead_before);
+  always @(posedge clk) if (begun && !was_cut) begin
+    if (was_high && was_wanted) assert (high);
+    if (was_low && !was_wanted) assert (low);
+    cover (was_high && !high);
+    cover (low && grown);
+  end
+`endif
+
 `ifdef GATE_PULSE
   // What pwm_compare sees to: no duty asks for less than the minimum pulse that comes into force with it.
   wire [11:0] pulse_next = good ? min_pulse : pulse_in_force;
@@ -222,7 +235,7 @@ module formal_top (
 
   // How long a gate has been on, and the settings when the leg made up its mind.
   reg [11:0] on_time, pulse_then, dead_then, room_before;
-  reg was_cut, was_running;
+  reg was_running;
   wire fall = (was_high && !high) || (was_low && !low);
   always @(posedge clk) begin
     on_time <= !(high || low) ? 0 : &on_time ? on_time : on_time + 1;
@@ -232,7 +245,6 @@ module formal_top (
     end
     room_before <= pulse_then - dead_then;
     was_running <= running;
-    was_cut     <= rst || trip || !enable;
     if (rst) {was_running, pulse_then, dead_then, room_before} <= 0;
   end
   always @(posedge clk) if (begun && !was_cut && fall) begin
