@@ -30,7 +30,7 @@ MUTANTS = (
     ("read taken while an answer waits", "io/axi_lite_slave.vhd", "s_axi_arvalid and not r_valid", "s_axi_arvalid"),
     ("write taken while an answer waits", "io/axi_lite_slave.vhd", "s_axi_wvalid and not b_valid", "s_axi_wvalid"),
     ("read answer survives reset", "io/axi_lite_slave.vhd", "        r_valid    <= '0';\n", ""),
-    ("setting answered inside a sample", "io/register_access.vhd", "between_3 and sample_busy", "between_3 and sample_busy and in_time"),
+    ("setting answered inside a sample", "io/register_access.vhd", " and not (between_3 and sample_busy);", ";"),
     ("refused write stored after the sample", "io/register_access.vhd", "patient_5 and may_stay and in_time", "patient_5"),
     ("setting refused inside a sample", "io/register_access.vhd", "patient_5 and sample_busy and in_time", "'0'"),
     ("setting counts inside a sample", "io/register_file.vhd", "(row(2) and column(4) and not sample_busy)", "(row(2) and column(4))"),
