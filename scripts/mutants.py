@@ -117,8 +117,7 @@ MUTANTS = (
     # latency, pipeline, handshake
     ("one clock late", "transforms/clarke.vhd", "out_valid <= valid(LATENCY);", "out_valid <= valid(LATENCY) when rising_edge(clk);"),
     ("one clock early", "control/decoupling.vhd", "out_valid <= valid(LATENCY);", "out_valid <= valid(LATENCY - 1);"),
-    ("rail flag of the next sample", "io/current_conditioning.vhd",
-     "if valid(1) = '1' or valid(2) = '1' or valid(3) = '1' then\n        prod_2 <= diff_1 * gain_1;", "if valid(0) = '1' or valid(1) = '1' or valid(2) = '1' or valid(3) = '1' then\n        prod_2 <= diff_1 * gain_1;"),
+    ("rail flags in the order of their beats", "io/current_conditioning.vhd", "rail_2(1 downto 0) & rail_2(2);", "rail_2;"),
     ("quadrant of the next sample", "transforms/sincos.vhd",
      "quadrant_4(0), quadrant_4(1));", "quadrant_1(0), quadrant_1(1));"),
     ("second angle's turn too short", "transforms/sincos.vhd",
@@ -201,7 +200,7 @@ MUTANTS = (
     ("dead time of one clock counted as two", "modulation/gate_generation.vhd",
      "(changed(k) and dead_is_one)", "'0'"),
     ("gate off when the dead time grows", "modulation/gate_generation.vhd",
-     "gate_high(k) or gate_low(k) or", "gate_low(k) or"),
+     "gate_high(k) or gate_low(k) or", "gate_high(k) or"),
     ("trip not remembered", "modulation/gate_generation.vhd", "tripping <= trip or (tripped_now and not clear_trip);", "tripping <= trip;"),
     ("trip waits for the valley", "modulation/gate_generation.vhd", "on_now   <= running_now and enable and not trip;", "on_now   <= running_now and enable;"),
     ("enable drops at the valley", "modulation/gate_generation.vhd", "on_now   <= running_now and enable and not trip;", "on_now   <= running_now and not trip;"),

@@ -177,9 +177,10 @@ def stimuli(rng, _config):
         rows += [{**still, "compensate": 0}, still, still]
     for k_lp, u_pi_d, d_d, run in ((0, 0, 0, 0), (524032, -1, 0, 1), (K_LP.hi, PU.lo, 0, 1), (0, 0, 40000, 1)):
         rows.append({**calm, **gains, "k_lp": k_lp, "u_pi_d": u_pi_d, "d_d": d_d, "run": run})  # lp_u past its end
-    for k_lp, u_pi_d, d_d, run in (
+    past_its_end = (
         (0, 0, 0, 0), (524032, -1, 0, 1), (K_LP.hi, PU.lo, 0, 1), (652288, PU.lo + 1, 0, 1), (0, PU.lo, 40000, 1),
-    ):  # fmt: skip
+    )  # fmt: skip
+    for k_lp, u_pi_d, d_d, run in 3 * past_its_end:  # three times: a reset may come between
         end = {**calm, **gains, "eta_v": ETA_V_MAX, "run": run}
         rows.append({**end, "k_lp": k_lp, "u_pi_d": u_pi_d, "d_d": d_d})  # lp_u past its end shows a sample later
     return rows

@@ -132,7 +132,11 @@ def stimuli(rng, config):
             period, settings
         )
         compare = [int(rng.integers(0, half + 1)) for _ in range(3)]
-        compare = {2: [0, half, half // 2], 3: [half, 0, half], 4: [1, half - 1, 0]}.get(period, compare)
+        # The low gates have been on for less than the dead time that comes at the valley
+        settings = {29: {"dead_time": 30, "min_pulse": 31}}.get(period, settings)
+        compare = {
+            2: [0, half, half // 2], 3: [half, 0, half], 4: [1, half - 1, 0], 28: [half - 8, half - 9, half - 12],
+        }.get(period, compare)  # fmt: skip
         for clock in range(2 * half):
             row = dict(zip(("compare_a", "compare_b", "compare_c"), compare, strict=True), **settings)
             row |= {"enable": int(period != 12 or clock < half // 3), "trip": 0, "clear_trip": 0}
