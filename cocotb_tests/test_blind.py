@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from scripts.blind import cases, damage, forms, generate, identifiable, params, plans, unknown
-from scripts.blind.again import requested_plan
-from scripts.blind.build import fresh
+from scripts.blind.again import further_recording, requested_plan
+from scripts.blind.build import Build, fresh
 from scripts.blind.design import LINES, Design
 from scripts.blind.machines import random_nominal
 from scripts.blind.magnetics import current, flux
@@ -272,6 +272,24 @@ def test_request_beyond_the_drive_is_brought_within():
     omega, i_d, i_q, rows = plan.segments[0]
     assert n.voltage(omega, i_d, i_q) <= 0.85 * n.voltage_limit and rows > 100
     assert i_q == pytest.approx(n.machine["rated_current_a"])
+
+
+def test_a_point_at_which_the_drive_cannot_stand_is_approached(monkeypatch):
+    """Iron that has no current for its flux is met with less current."""
+    case, asked = cases.make(1, 1, "healthy", 0), {"omega_e": 50.0, "i_d": 0.0, "i_q": 1e5}
+    rated = case.build.nominal.machine["rated_current_a"]
+
+    def record(self, rng, plan, x_start):
+        i_q = plan.segments[0][2]
+        if i_q > 0.8 * rated:
+            raise ZeroDivisionError
+        return {"i_q": i_q}, None
+
+    monkeypatch.setattr(Build, "record", record)
+    assert further_recording(case, asked, 1, 0, 0)["i_q"] == pytest.approx(0.7 * rated)
+    monkeypatch.setattr(Build, "record", lambda *args, **more: 1 / 0)
+    with pytest.raises(RuntimeError, match="does not stand"):
+        further_recording(case, asked, 1, 0, 0)
 
 
 def test_seal_notices_a_change(tmp_path):

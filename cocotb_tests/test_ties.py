@@ -18,6 +18,7 @@ from diagnosis.catalogue.sampling_skew import unskewed
 from diagnosis.fit import Model, Solution
 from diagnosis.nominal import load_nominal
 from diagnosis.recording import from_columns
+from diagnosis.refine import operating_points, point_numbers
 from diagnosis.search import Search
 from diagnosis.verdict import groups, lag_of_currents
 from diagnosis.view import joined_views
@@ -176,6 +177,45 @@ def test_small_is_below_what_anybody_would_act_on(search):
     assert search.small(of(0.009), "resistance") and not search.small(of(0.011), "resistance")
 
 
+def points_view(*points):
+    """What counting needs of a view whose blocks stand at (speed, i_q), per unit."""
+    omega, i_q = 500.0 * np.array(points)[:, :1], NOMINAL.machine.rated_current_a * np.array(points)[:, 1:]
+    return SimpleNamespace(machine=NOMINAL.machine, omega=np.repeat(omega, 3, axis=1), i=np.repeat(1j * i_q, 3, axis=1))
+
+
+def test_an_operating_point_is_not_cut_in_two():
+    """Blocks scatter about their point wherever it stands; fixed bounds would make two of some."""
+    for i_q in np.linspace(0.1, 0.9, 81):
+        scattered = [(1.0, i_q + 0.004 * (-1) ** n) for n in range(6)]
+        assert operating_points(points_view(*scattered)) == 1
+    assert point_numbers(points_view((1.0, 0.2), (1.0, 0.6), (1.0, 0.21), (-1.0, 0.2))).tolist() == [0, 1, 0, 2]
+
+
+def test_more_effects_are_tried_where_more_points_pay_for_them(view):
+    """Four points are eight means: three effects with their curves would explain anything."""
+    point = point_numbers(view)
+    chosen = np.roll(np.unique(point), -point[np.argmax(np.abs(view.omega).max(axis=1))])  # the fastest one first
+    firsts = [view.take(np.isin(point, chosen[:n])) for n in (1, 2, 3, 4, 7)]
+    assert [operating_points(v) for v in firsts] == [1, 2, 3, 4, 7]
+    most = [Search(v, {"delay": CATALOGUE["delay"]}, np.ones(len(v), bool)).most for v in firsts]
+    assert most == [1, 1, 2, 2, 4]
+
+
+def test_hysteresis_draws_nothing_from_the_noise_of_a_standstill(view):
+    noise = np.random.default_rng(6).standard_normal(view.omega.shape)
+    still = view.replace(omega=0.3 * (noise - noise.mean(axis=1, keepdims=True)), memo={"top_speed": 500.0})
+    column = CATALOGUE["iron_loss"].free(still)["g_hysteresis"]["u"]
+    assert np.abs(column).max() < 1e-9 * np.abs(CATALOGUE["iron_loss"].free(view)["g_hysteresis"]["u"]).max()
+
+
+def test_at_one_operating_point_every_effect_is_looked_at(view):
+    """A delay taken off the data may score far better than its linear column says, and be tied."""
+    one = view.take(view.run == 3)
+    lone = Search(one, CATALOGUE, np.ones(len(one), bool))
+    able = {n for n in CATALOGUE if lone.linear.index[n][0]}
+    assert lone.most == 1 and set().union(*(m.names for m in lone._linear_best())) == able
+
+
 def test_what_is_too_small_may_be_something_else_at_one_operating_point(view):
     lone = object.__new__(Search)
     lone.view, lone.effects, lone.dispersion = view, CATALOGUE, 1.0
@@ -185,6 +225,21 @@ def test_what_is_too_small_may_be_something_else_at_one_operating_point(view):
     for most, tied in ((1, [rival]), (3, [])):
         lone.most = most
         assert lone._tied(best, True) == tied
+
+
+def test_a_name_that_something_nameless_replaces_is_not_certain(view):
+    """A delay and a skew too small for a name fit as well as the delay and a bus gain: the gain need not be there."""
+    few = object.__new__(Search)
+    few.view, few.effects, few.most, few.as_good = view, CATALOGUE, 2, lambda *args: True
+    late, gain = {"tau": 5e-5}, {"gain": 0.0033}
+    best = solved("delay", "udc_gain", delay=late, udc_gain=gain)
+    rival = solved("delay", "sampling_skew", score=125.0, delay=late, sampling_skew={"tau": 1e-8})
+    nothing = solved("sampling_skew", score=125.0, sampling_skew={"tau": 1e-8})
+    other = solved("delay", "iron_loss", "sampling_skew", score=125.0, delay=late, sampling_skew={"tau": 1e-8})
+    other.c["iron_loss"] = {"g_fe": 0.1}
+    few.refined = {s.model: s for s in (best, rival, nothing, other)}
+    assert few._tied(best, True) == [rival]
+    assert groups(best, [rival], CATALOGUE, NOMINAL, frozenset(["sampling_skew"])) == (["delay"], [])
 
 
 def test_another_cause_is_no_passenger_of_two_curves(view):

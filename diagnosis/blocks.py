@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from diagnosis.recording import Recording, RecordingError
+from diagnosis.settling import settled
 from diagnosis.shaft import airgap, is_airgap, shaft_kind
 from diagnosis.view import View
 
@@ -100,7 +101,7 @@ def view_of(recording: Recording, nominal, block_rows=BLOCK_ROWS) -> View:
         torque[swing > RAMP_TORQUE * airgap(nominal, np.array(1j * machine.rated_current_a))] = np.nan
     missing = np.full(len(starts), np.nan)
     passed = r["t"][rows].mean(axis=1) - r["t"][0]
-    return View(
+    view = View(
         nominal=nominal,
         sample_time_s=period,
         theta=theta_s[samples],
@@ -120,6 +121,7 @@ def view_of(recording: Recording, nominal, block_rows=BLOCK_ROWS) -> View:
         rows=starts,
         span_s=float(r["t"][-1] - r["t"][0]),
     )
+    return settled(view)
 
 
 def views_of(recordings, nominal) -> list[View]:

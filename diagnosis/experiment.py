@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 ENOUGH = 400.0  # D^2 beyond which more says nothing
+EQUALS = 0.05  # weight of all pairs' D^2 beside the closest one's
 ROUNDS = 4  # of exchanges
 BENDS = 1.0  # of an effect's own size: how far a part of its curve that no row has shown yet may go
 
@@ -59,24 +60,59 @@ def rivalry(truth, rival, columns, known, sigma, block, count) -> Rivalry:
     return Rivalry(power, taken, gram, known + 1e-9 * np.eye(k))
 
 
-def values(rivalries, rest) -> np.ndarray:
-    """(n,) worth of a set of candidates with each further one: the closest pair's D^2; all pairs settle equals."""
-    left = np.minimum([r.left_with(rest) for r in rivalries], ENOUGH)
-    return left.min(axis=0) + 1e-3 * np.sqrt(left).sum(axis=0)
+def closest(left, enough=np.inf) -> np.ndarray:
+    """D^2 of the closest pair, as far as it says anything; left: (pairs, ...)."""
+    return np.minimum(left, enough).min(axis=0)
 
 
-def best_points(rivalries, most) -> list[int]:
-    """Up to `most` candidates that leave the closest pair farthest apart, the most telling first."""
-    chosen, reached = [], 0.0
-    while len(chosen) < most and reached < ENOUGH:
-        worth = values(rivalries, chosen)
-        chosen.append(int(np.argmax(worth)))
-        reached = worth.max()
+def told(rivalries, points) -> float:
+    """D^2 of the closest pair at a set of candidates."""
+    return float(closest(np.array([r.left(points) for r in rivalries]))) if points else 0.0
+
+
+def values(rivalries, rest, cost, enough=np.inf) -> np.ndarray:
+    """(n,) worth of a set of candidates with each further one: the closest pair's D^2; all pairs settle equals.
+
+    cost: (n,) of a candidate, as a share of D^2 that another one may lack.  A candidate of the set is worth nothing a
+    second time: what the balance is off by at a point is the same again.
+    """
+    left = np.array([r.left_with(rest) for r in rivalries])
+    worth = np.log1p(closest(left, enough)) + EQUALS * np.log1p(left).mean(axis=0) - cost
+    worth[rest] = -np.inf
+    return worth
+
+
+def spare_values(rivalries, rest, cost) -> np.ndarray:
+    """(n,) the same where enough is enough and any other point may be lost: each bears out what the rest say."""
+    worth = values(rivalries, rest, cost, ENOUGH)
+    for k in rest:
+        left = np.array([r.left_with([n for n in rest if n != k]) for r in rivalries])
+        worth = worth + np.log1p(closest(left, ENOUGH))
+    return worth
+
+
+def best_points(rivalries, most, doubt=0.0, strain=0.0) -> list[int]:
+    """`most` different candidates that leave the closest pair farthest apart, the least dispensable first.
+
+    doubt, strain: (n,) of a candidate, as a share of D^2 that another one may lack.  The strain counts where there is
+    more than enough to be had.
+    """
+    chosen = []
+    while len(chosen) < most:
+        chosen.append(int(np.argmax(values(rivalries, chosen, doubt))))
+    chosen = exchanged(rivalries, chosen, values, doubt)
+    if told(rivalries, chosen) >= ENOUGH:
+        chosen = exchanged(rivalries, chosen, spare_values, doubt + strain)
+    return sorted(chosen, key=lambda k: told(rivalries, [n for n in chosen if n != k]))
+
+
+def exchanged(rivalries, chosen, worth_of, cost) -> list[int]:
+    """A set of candidates with each exchanged for a better one until none is."""
+    chosen = list(chosen)
     for _ in range(ROUNDS):
         before = list(chosen)
         for place in range(len(chosen)):
-            rest = chosen[:place] + chosen[place + 1 :]
-            worth = values(rivalries, rest)
+            worth = worth_of(rivalries, chosen[:place] + chosen[place + 1 :], cost)
             if worth.max() > worth[chosen[place]] + 1e-9:
                 chosen[place] = int(np.argmax(worth))
         if chosen == before:

@@ -13,22 +13,34 @@ from diagnosis.effect import FluxEffect, rated_torque
 from diagnosis.fit import Fitter, Model, Solution, everything, row_sigma
 
 NOISY_TORQUE = 0.03  # of rated torque
-POINT = 0.12  # of top speed and rated current: closer operating points are one
+POINT = 0.08  # of top speed and rated current: closer operating points are one
 CURVE_SHARE = 0.01  # of what an effect contributes to a row: no curve of the catalogue fits a real one better
 MOST_EFFECTS = 4  # more at once is no explanation
 TIE = 10.0
 
 
 def point_numbers(view) -> np.ndarray:
-    """(b,) number of the steady point (speed, i_d, i_q) at which each block of a view stands."""
+    """(b,) number of the steady point (speed, i_d, i_q) at which each block of a view stands.
+
+    A point begins with the first block that is far from all points so far: fixed bounds would cut some in two.
+    """
     m, omega, i = view.machine, view.omega.mean(axis=1), view.i.mean(axis=1)
     top = max(float(np.abs(omega).max()), 1e-9)
     points = np.stack([omega / top, i.real / m.rated_current_a, i.imag / m.rated_current_a], axis=1)
-    return np.unique(np.round(points / POINT), axis=0, return_inverse=True)[1].ravel()
+    number, free = np.full(len(points), -1), 0
+    while (number < 0).any():
+        first = points[np.argmax(number < 0)]
+        number[(number < 0) & (np.abs(points - first).max(axis=1) < POINT)] = free
+        free += 1
+    return number
 
 
 def operating_points(view) -> int:
-    """Number of different steady points of a view; each carries two means to explain."""
+    """Number of different steady points of a view.
+
+    Each carries two means, and an effect has two or three coefficients: more effects than every second point pays for
+    would explain anything.
+    """
     return int(point_numbers(view).max()) + 1
 
 
@@ -36,7 +48,7 @@ class Refiner:
     """The linear problem of a view and the solutions that were refined on it."""
 
     def __init__(self, view, effects, train_blocks, progress=lambda text: None):
-        self.most = min(MOST_EFFECTS, max(1, operating_points(view) - 1))
+        self.most = min(MOST_EFFECTS, (operating_points(view) + 1) // 2)
         view = view.replace(memo={**view.memo, "lone": self.most == 1})
         self.view, self.effects, self.progress = view, dict(effects), progress
         self.projector = Projector(view)

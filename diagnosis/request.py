@@ -8,13 +8,18 @@ from dataclasses import fields
 import numpy as np
 
 from diagnosis.cells import SYSTEM_DC, SYSTEM_U, Projector, voltage_level
+from diagnosis.curvature import LEAST
 from diagnosis.experiment import BENDS, best_points, rivalry
+from diagnosis.fit import FRESH
 from diagnosis.result import Request
 from diagnosis.view import View
 
 ROWS = 200
 BLOCKS = 20  # that a dwell of half a second is worth
 MOST = 3
+# Share of D^2 that a point may lack beside one on an axis without current so far, which has unknowns of its own, and
+# beside one at full speed and rated current: what nobody has thought of yet grows with both.
+NEW_AXIS, STRAIN = 0.2, 0.2
 
 
 def steady_view(view, omega, i_dq, cold=False, rows=ROWS):
@@ -74,8 +79,15 @@ def grid(view):
     omega, i = np.meshgrid(top * np.array(SPEEDS), m.rated_current_a * np.array(CURRENTS))
     omega, i = omega.ravel(), i.ravel()
     u = m.resistance_ohm * i + 1j * omega * (view.inductances(i) + m.magnet_flux_wb)
-    within = np.abs(u) <= u_max
+    within = (np.abs(u) <= u_max) & ((omega != 0.0) | (i != 0.0))  # at rest without current there is nothing to see
     return omega[within], i[within]
+
+
+def new_axes(view, i) -> np.ndarray:
+    """(n,) number of axes that carried no current in the recording and carry some at currents i (n,) [A]."""
+    least, seen = LEAST * view.machine.rated_current_a, view.i.mean(axis=1)
+    quiet = [part for part in (np.real, np.imag) if np.abs(part(seen)).max() < least]
+    return sum((np.abs(part(i)) >= least for part in quiet), np.zeros(len(i)))
 
 
 def columns_at(p, view, effect) -> dict:
@@ -92,15 +104,16 @@ def known_of(search, solution, columns) -> np.ndarray:
     """
     names = sorted(solution.model.names)
     f = search.fitter(solution.view, [search.effects[n] for n in names])
-    shown = [n for n in range(len(f.names)) if np.isfinite(f.scale[n])]
-    place = {(f.owner[n], f.names[n].lstrip("~")): n for n in shown}
-    own = dict.fromkeys(names, 0.0)
-    for (n, key), column in columns.items():
-        own[n] += abs(solution.c[n].get(key, 0.0)) * np.linalg.norm(column)
+    place = {(f.owner[n], f.names[n].lstrip("~")): n for n in range(len(f.names)) if np.isfinite(f.scale[n])}
     out = np.zeros((len(columns),) * 2)
     for a, key_a in enumerate(columns):
-        size = np.linalg.norm(columns[key_a])
-        out[a, a] += (size / (BENDS * own[key_a[0]] + 1e-12 * size + 1e-30)) ** 2
+        mine = [key for key in columns if key[0] == key_a[0]]
+        seen = {key: f.scale[place[key]] for key in mine if key in place}
+        # As large as the effect itself where it was recorded; beyond, a curve over speed may well be larger.
+        shown = seen.get(key_a, 0.0) > FRESH * max(seen.values(), default=0.0)
+        size = seen if shown else {key: np.linalg.norm(columns[key]) for key in mine}
+        own = sum(abs(solution.c[n].get(key, 0.0)) * length for (n, key), length in size.items())
+        out[a, a] += (size[key_a] / (BENDS * own + 1e-12 * size[key_a] + 1e-30)) ** 2
         for b, key_b in enumerate(columns):
             if key_a in place and key_b in place:
                 m, n = place[key_a], place[key_b]
@@ -145,7 +158,8 @@ def requests(search, solutions, noise_v, cold=False) -> list[Request]:
         knows.append((stack, known_of(search, s, columns)))
     pairs = list(itertools.permutations(range(len(solutions)), 2))
     rivals = [rivalry(told[a], told[b], *knows[b], sigma, p.block, len(omega)) for a, b in pairs]
-    chosen = best_points(rivals, MOST)
+    effort = (omega / np.abs(omega).max()) ** 2 + np.abs(i / view.machine.rated_current_a) ** 2
+    chosen = best_points(rivals, MOST, NEW_AXIS * new_axes(view, i), STRAIN * effort)
     out = []
     for k in chosen:
         each = [r.left([k]) for r in rivals]

@@ -77,7 +77,9 @@ class Search(Ties):
         if "cross_saturation" in best.model.names:
             silent = (best.model.names & set(FAMILY)) - labels(best.view, best, BESIDE_CROSS)[0]
         if self.most > 1 or not tied:
-            silent |= {n for n in best.model.names if self.small(best, n)}
+            silent |= self.nameless(best)
+        said = best.model.names.union(*(s.model.names - self.nameless(s) for s in tied))
+        silent |= frozenset().union(*(s.model.names for s in tied)) - said
         return Outcome(best, tied, empty, self.sigma, self.pure, self.train, self.dispersion, silent)
 
     def _by_size(self) -> list[Solution]:
@@ -131,7 +133,9 @@ class Search(Ties):
             for names in itertools.combinations(able, size):
                 level += [(self.linear.score(m, self.dispersion), m) for m in self.forms(names)]
             level.sort(key=lambda entry: entry[0])
-            scored.append([m for _, m in level[: REFINED // 2 + 2 * (size == 1)]])
+            # Where one effect is all there can be, each is another answer, and a correction may be worth much.
+            count = len(level) if self.most == 1 else REFINED // 2 + 2 * (size == 1)
+            scored.append([m for _, m in level[:count]])
             if size == 2 and level:  # only effects of good pairs go on to triples
                 good = [m for _, m in level[:60]]
                 able = [n for n in able if any(n in m.names for m in good)]

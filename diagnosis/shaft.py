@@ -14,6 +14,7 @@ import numpy as np
 FREE_RATIO = (0.7, 1.35)  # median of torque change over inertial change
 REACH, LAG = 80, 200  # samples of the slope's half window and of a change
 ODD_SHARE = 0.96  # of the remaining torque's variance that an odd function of speed must explain
+ONE_SPEED = 0.8  # small over large drag, from which on there is but one speed
 SMALL = 0.01  # of rated torque: so little torque is no load in any case
 
 
@@ -64,8 +65,12 @@ def is_airgap(torque, nominal_airgap, drag) -> bool:
     """Whether a recorded torque is the air gap's, as a simulation writes it, rather than the shaft's.
 
     torque, nominal_airgap, drag: (n,) [Nm], drag being what friction of the nameplate takes; the inertia's
-    share is all noise at a steady speed.  The shaft's is taken unless the other fits far better.
+    share is all noise at a steady speed.  The shaft's is taken unless the other fits far better at several speeds: at
+    one, anything that is missing in the nominal torque may be as large as the drag.
     """
+    low, high = np.nanquantile(drag, (0.05, 0.95))
+    if min(abs(low), abs(high)) > ONE_SPEED * max(abs(low), abs(high)) and low * high > 0.0:
+        return False
     good = np.isfinite(torque) & np.isfinite(nominal_airgap) & np.isfinite(drag)
     left = (torque - nominal_airgap)[good]
     as_airgap, as_shaft = np.median(np.abs(left)), np.median(np.abs(left + drag[good]))

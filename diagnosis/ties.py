@@ -58,24 +58,28 @@ class Ties(Refiner):
         floor = max(effect.floor(nominal), effect.overshadowed(solution.c, nominal))
         return effect.size(solution.c[name], nominal) < floor
 
+    def nameless(self, solution) -> frozenset:
+        """Effects of a solution that are too small for a name."""
+        return frozenset(n for n in solution.model.names if self.small(solution, n))
+
     def _tied(self, best, sure) -> list[Solution]:
         """Other models that explain as much: other sets of no more effects, each large enough for a name.
 
+        One with an effect that is not counts where it has only names of the best one: the others need not be there.
         Where the shape of the flux's curve has settled its name (``sure``), that is no difference.
         """
-        silent = {n for n in best.model.names if self.small(best, n)}
+        silent = self.nameless(best)
         if silent == best.model.names:
             if self.most > 1:
                 return []
-            silent = set()  # at one operating point what is too small may be something else that is not
+            silent = frozenset()  # at one operating point what is too small may be something else that is not
         curved = set(FAMILY) if best.model.names & set(FAMILY) else set()
         out, rest = [], best.model.names - curved
         for model, solution in self.refined.items():
             if not np.isfinite(solution.score) or self.scaled_alike(solution):
                 continue
-            if any(self.small(solution, n) for n in model.names - silent):
-                continue
-            if model.names - silent == best.model.names - silent:
+            said, rival = best.model.names - silent, model.names - silent - self.nameless(solution)
+            if rival == said or not rival or rival != model.names - silent and not rival < said:
                 continue
             same = model.names - curved == rest and sure
             passenger = model.names - curved > rest and model.names & curved and len(best.model.names & curved) > 1

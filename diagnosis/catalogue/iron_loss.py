@@ -8,9 +8,11 @@ from diagnosis.effect import Effect, Parameter, one, torque_of
 def _speeds(view):
     """Speeds (b, m+1) [rad/s] that the terms of the loss current follow: as they are, levelling off, squared."""
     top = max(view.top_speed, 1.0)
+    # At standstill the noise of the speed would be that of a full hysteresis, and its slope a voltage.
+    steady = np.broadcast_to(view.omega.mean(axis=1, keepdims=True), view.omega.shape)
     return {
         "g_fe": view.omega,
-        "g_hysteresis": view.omega / np.sqrt((view.omega / top) ** 2 + 0.02**2),
+        "g_hysteresis": steady / np.sqrt((steady / top) ** 2 + 0.02**2),
         "g_eddy": view.omega * np.abs(view.omega) / top,
     }
 
