@@ -70,7 +70,7 @@ class Search(Ties):
             self.refine(best.model)
             best = self._climbed(self._best())
         best, sure = self._labelled(self._simplified(best))
-        best = self._pruned(best)
+        best = self._with_curve(self._pruned(best))
         tied = self._tied(best, sure)
         empty = self.refine(Model(frozenset()))
         silent = frozenset()
@@ -179,7 +179,8 @@ class Search(Ties):
         """
         explained = self.refine(Model(frozenset())).chi2 - best.chi2
         if len(best.model) >= 3:  # three that amount to one: scaled currents with R and L_q set right again are L_d
-            forms = [m for n in self.effects if self.linear.index[n][0] for m in self.forms([n])]
+            able = [n for n in self.effects if self.linear.index[n][0] and n not in best.model.names]
+            forms = [m for n in able for m in self.forms([n])]
             single = min((self.refine(m) for m in forms), key=lambda s: s.score)
             if single.chi2 - best.chi2 < SAME_SCALE * explained and single.chi2 < SAME_FIT * best.chi2:
                 return single
@@ -236,6 +237,13 @@ class Search(Ties):
             if other.score < best.score:
                 best = other
         return best
+
+    def _with_curve(self, best):
+        """The best model with a dead time's curve free beside ohms: what it grows says whose they are (verdict.py)."""
+        if not {"dead_time", "resistance"} <= best.model.names:
+            return best
+        freed = self.refine(best.model.with_("dead_time", True))
+        return freed if np.isfinite(freed.score) else best
 
     def _earning(self, best):
         """A model without effects that do not earn their place."""
