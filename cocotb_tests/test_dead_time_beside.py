@@ -80,7 +80,7 @@ def test_where_currents_are_near_zero_a_loss_is_in_doubt(strong):
     assert full_loss(c) == 3.5
     idle = view.replace(i_raw=1e-3 * view.i_raw)
     assert np.allclose(effect.doubt(c, idle), 0.35)
-    assert np.all(effect.doubt(c, view) < 0.05)
+    assert np.median(effect.doubt(c, view)) < 0.03
 
 
 @pytest.mark.parametrize(

@@ -20,7 +20,7 @@ from diagnosis.recording import from_columns
 from diagnosis.refine import Refiner
 from diagnosis.request import wants_cold
 from diagnosis.run import held_out
-from diagnosis.verdict import carried, groups
+from diagnosis.verdict import beyond_doubt, carried, groups
 from diagnosis.view import joined_views, started_cold
 
 NOMINAL = load_nominal(PAPER)
@@ -245,3 +245,13 @@ def test_a_flux_that_is_lost_from_the_start_is_no_drift():
     assert not possible(drift(recovering), np.zeros((4, 4)), NOMINAL)
     assert possible(drift(warming), np.zeros((4, 4)), NOMINAL)
     assert possible({"drift": -1e-3}, np.zeros((1, 1)), NOMINAL)
+
+
+def test_a_name_is_larger_than_what_the_operating_points_leave_open():
+    """A wrong bus of a few blocks alone: a gain of 0.4 +- 0.8 that other blocks contradict."""
+    c = {"udc_gain": {"gain": 0.4}, "friction": {"viscous": 1.0, "coulomb": 1.0}}
+    either = np.array([[1.0, -1.0], [-1.0, 1.0]])  # dry or viscous at one speed, but friction
+    spread = SimpleNamespace(solution=SimpleNamespace(c=c), covariance={"friction": 1e-4 * np.eye(2) + 9.0 * either})
+    for sigma, names in ((0.8, ["friction"]), (0.05, ["udc_gain", "friction"])):
+        spread.covariance["udc_gain"] = np.array([[sigma**2]])
+        assert beyond_doubt(spread, ["udc_gain", "friction"]) == names

@@ -177,10 +177,9 @@ class Refiner:
             self.view = self.view.replace(late_s=late)
             self._weigh()
         variance = self.sigma**2
+        variance = variance + np.where(self.cells.channel == "u", self.doubt(best)[self.cells.block], 0.0) ** 2
         for name, c in best.c.items():
-            columns, doubt = self.cells.columns[name], self.effects[name].doubt(c, self.view)
-            doubt = np.broadcast_to(doubt, (len(self.view),))[self.cells.block]
-            variance = variance + np.where(self.cells.channel == "u", doubt, 0.0) ** 2
+            columns = self.cells.columns[name]
             rows = sum(v * columns[told(columns, k)] for k, v in c.items() if told(columns, k))
             variance = variance + (CURVE_SHARE * rows) ** 2
         self.sigma = np.sqrt(variance)
@@ -189,6 +188,11 @@ class Refiner:
             self._pose()
         else:
             self.linear = Fitter(self.cells, self.sigma, self.train)
+
+    def doubt(self, solution) -> np.ndarray:
+        """Voltage (b,) [V] in each block that no curve of a solution's effects could tell."""
+        parts = [self.effects[name].doubt(c, self.view) for name, c in solution.c.items()]
+        return np.sqrt(sum((np.square(part) for part in parts), np.zeros(len(self.view))))
 
     def corrected(self, totals):
         """The view without the errors of the record that the totals stand for; None where they make no sense."""

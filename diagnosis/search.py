@@ -179,11 +179,10 @@ class Search(Ties):
         """
         explained = self.refine(Model(frozenset())).chi2 - best.chi2
         if len(best.model) >= 3:  # three that amount to one: scaled currents with R and L_q set right again are L_d
-            able = [n for n in self.effects if self.linear.index[n][0] and n not in best.model.names]
-            forms = [m for n in able for m in self.forms([n])]
-            single = min((self.refine(m) for m in forms), key=lambda s: s.score)
-            if single.chi2 - best.chi2 < SAME_SCALE * explained and single.chi2 < SAME_FIT * best.chi2:
-                return single
+            forms = [m for n in self.effects if self.linear.index[n][0] for m in self.forms([n])]
+            alike = [s for m in forms if self._replaces(s := self.refine(m), best, explained)]
+            if alike:
+                return min(alike, key=lambda s: s.score)
         if self.scaled_alike(best):
             rest = best.model.without("udc_gain").with_("magnet_flux")
             singles = [self.refine(self.admitted(rest.with_("current_gain", bend))) for bend in (False, True)]
@@ -197,6 +196,16 @@ class Search(Ties):
         singles = [self.refine(rest.with_(third, bend)) for bend in (False, True)]
         single = min(singles, key=lambda s: s.score)
         return single if single.chi2 - best.chi2 < SAME_SCALE * explained else best
+
+    def _replaces(self, single, best, explained) -> bool:
+        """Whether one effect explains what three or more do: one of themselves only if the others do not earn a place.
+
+        Of a dominant one and two small ones the dominant one is always most of it.
+        """
+        lost = single.chi2 - best.chi2
+        if single.model.names < best.model.names and lost > EARNS * self.dispersion * (len(best.model) - 1):
+            return False
+        return lost < SAME_SCALE * explained and single.chi2 < SAME_FIT * best.chi2
 
     def _labelled(self, best) -> tuple[Solution, bool]:
         """The best model with its curves of flux over current called by their shape, and whether that is sure."""

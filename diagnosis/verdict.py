@@ -19,6 +19,7 @@ DRIFTS, STANDS = 0.25, 1.5
 STEADY = 0.1  # constant over drift: a thermocouple lags, and so much of a drift may seem to stand
 
 HOLDS = 0.05
+LEAST_WEIGHT = 4.0  # of a name: two standard deviations
 WORSE = 1.05  # misfit on points not fitted, after over before
 # Ohmic drop at rated current over the inverter's loss: a device's own slope is seldom larger.
 SLOPE_DEVICE, SLOPE_UNCLEAR = 0.12, 0.2
@@ -155,13 +156,22 @@ def lives(cells, name, c, sigma, use):
     return out
 
 
+def beyond_doubt(spread, names) -> list[str]:
+    """Names whose coefficients are larger than their uncertainty where every operating point is counted once."""
+    return [name for name in names if _weight(spread, name) >= LEAST_WEIGHT]
+
+
+def _weight(spread, name) -> float:
+    """Square of an effect's coefficients in standard deviations, per coefficient."""
+    c, covariance = np.array(list(spread.solution.c[name].values())), spread.covariance[name]
+    return float(c @ np.linalg.pinv(covariance) @ c) / max(len(c), 1)
+
+
 def named(spread, names, empty) -> list[NamedEffect]:
     """The asserted effects of a solution with their parameters; spread: uncertainty.Plain of it."""
     out, solution, effects, others = [], spread.solution, spread.effects, spread.others()
     for name in names:
-        effect, c, covariance = effects[name], solution.c[name], spread.covariance[name]
-        vector = np.array(list(c.values()))
-        wald = float(vector @ np.linalg.pinv(covariance) @ vector) / max(len(vector), 1)
+        effect, c = effects[name], solution.c[name]
         explained = max(empty.chi2 - empty.rows, 1e-9)
         share = effect.relative({n: solution.c[n] for n in names}, spread.nominal)
         estimates = spread.estimates(name, others)
@@ -171,7 +181,7 @@ def named(spread, names, empty) -> list[NamedEffect]:
         out.append(
             NamedEffect(
                 name,
-                float(np.clip(1.0 - 1.0 / (1.0 + wald / 4.0), 0.5, 0.999)),
+                float(np.clip(1.0 - 1.0 / (1.0 + _weight(spread, name) / 4.0), 0.5, 0.999)),
                 estimates,
                 float(np.clip((empty.chi2 - solution.chi2) / explained, 0.0, 1.0)),
                 effect.plant({k: share * v for k, v in c.items()}, spread.nominal),
