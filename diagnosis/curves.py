@@ -42,8 +42,3 @@ def known_temperature(view, least_k=3.0):
 def reference_c(nominal) -> float:
     """Temperature at which the nameplate holds [degC]."""
     return float(nominal.machine.temperature_ref_c)
-
-
-def clipped_ramps(x, widths):
-    """Odd ramps that reach one at each width: (len(widths), *x.shape)."""
-    return np.array([np.clip(x / w, -1.0, 1.0) for w in widths])

@@ -83,6 +83,10 @@ class Effect:
         """One number for how large the effect is."""
         return abs(next(iter(c.values())))
 
+    def doubt(self, c: dict[str, float], view) -> np.ndarray | float:
+        """Voltage (b,) [V] that no curve of the effect could tell, beside its share of what the curve says."""
+        return 0.0
+
     def moved(self, c: dict[str, float], view) -> float:
         """How much the effect changed over a recording, in units of ``size``: a drift is its own change."""
         return self.size(c, view.nominal)
@@ -164,10 +168,27 @@ def angle_error(view, delta) -> Column:
     }
 
 
+def zero_vector_slope(view):
+    """Slope of the measured dq current in the zero vector, seen at the angle of the valley (b, m+1) [A/s]."""
+    m = view.machine
+    emf = -m.resistance_ohm * view.i - 1j * view.omega * view.psi
+    return emf.real / m.inductance_d_h + 1j * emf.imag / m.inductance_q_h + 1j * view.omega * view.i
+
+
 def torque_of(view, psi, i):
     """Air-gap torque of the intervals, (b, m) [Nm], from flux linkage and current at the samples."""
     torque = 1.5 * view.machine.pole_pairs * (np.conj(psi) * i).imag
     return 0.5 * (torque[:, 1:] + torque[:, :-1])
+
+
+def full_loss(c) -> float:
+    """Full value [V] of a dead time with coefficients c: the bumps of its curve are those near zero current."""
+    return float(sum(v for key, v in c.items() if not key.startswith("bump")))
+
+
+def within_dead_time(c, nominal) -> float:
+    """Up to which a delay or skew is nothing but the dead time of a model with coefficients c [s]."""
+    return (1.0 + ALIKE) * half_dead_time(c, nominal)
 
 
 def half_dead_time(c, nominal) -> float:
@@ -175,7 +196,7 @@ def half_dead_time(c, nominal) -> float:
 
     c: {effect: {coefficient: value}}.
     """
-    share = abs(sum(c.get("dead_time", {}).values())) / nominal.inverter.dc_bus_v
+    share = abs(full_loss(c.get("dead_time", {}))) / nominal.inverter.dc_bus_v
     return 0.5 * share * nominal.sample_time_s
 
 

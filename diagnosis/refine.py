@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from diagnosis.cells import Projector, cells_of, told
-from diagnosis.effect import FluxEffect, rated_torque
+from diagnosis.effect import FluxEffect, half_dead_time, rated_torque
 from diagnosis.fit import Fitter, Model, Solution, everything, row_sigma
 
 NOISY_TORQUE = 0.03  # of rated torque
@@ -52,18 +52,27 @@ class Refiner:
         view = view.replace(memo={**view.memo, "lone": self.most == 1})
         self.view, self.effects, self.progress = view, dict(effects), progress
         self.projector = Projector(view)
-        self.cells = cells_of(view, self.effects.values(), self.projector)
-        self.sigma, self.pure = row_sigma(view, self.cells)
-        self.unwidened = self.sigma  # before it is widened for the curves of what is found
+        self.train = train_blocks[self.projector.block]
+        self.adjust = np.zeros(len(self.train))
+        self._weigh()
         # The acceleration of a fast free shaft is all noise; what a transducer shows of an unbalanced load is not,
         # though it differs from block to block.  The projector's rows are those of every fit.
         noisy = self.pure >= NOISY_TORQUE * rated_torque(view.nominal)
         measured = (view.shaft == "torque")[self.cells.block]
         self.projector.ok &= (self.cells.channel != "torque") | measured | ~noisy
-        self.train = train_blocks[self.cells.block]
-        self.linear = Fitter(self.cells, self.sigma, self.train)
         self.refined: dict[Model, Solution] = {}
-        self.adjust = np.zeros(len(self.cells.y))
+        self._pose()
+
+    def _weigh(self):
+        """The view's cells, with what is known of raw currents taken off, and their standard deviations."""
+        self.cells = cells_of(self.view, self.effects.values(), self.projector)
+        self.cells.y = self.cells.y - self.adjust
+        self.sigma, self.pure = row_sigma(self.view, self.cells)
+        self.unwidened = self.sigma  # before it is widened for the curves of what is found
+
+    def _pose(self):
+        """The linear problem of the cells, and what is left of it when every effect is as free as can be."""
+        self.linear = Fitter(self.cells, self.sigma, self.train)
         chi2, count = self.linear.chi2(everything(self.cells))
         self.dispersion = max(1.0, chi2 / max(len(self.linear.y) - count, 1))
 
@@ -171,18 +180,31 @@ class Refiner:
         return adjust
 
     def allow_for_curves(self, best):
-        """Widen every row by a share of what the best effects contribute to it, and start anew.
+        """Widen every row by what the best effects' curves may be off there, and start anew.
 
-        A second effect must explain more than a first one's curve may be off.
+        A second effect must explain more than a share of what a first one contributes.
         """
+        late = half_dead_time(best.c, self.view.nominal)
+        if late:
+            self.view = self.view.replace(late_s=late)
+            self._weigh()
         variance = self.sigma**2
+        variance = variance + np.where(self.cells.channel == "u", self.doubt(best)[self.cells.block], 0.0) ** 2
         for name, c in best.c.items():
             columns = self.cells.columns[name]
             rows = sum(v * columns[told(columns, k)] for k, v in c.items() if told(columns, k))
             variance = variance + (CURVE_SHARE * rows) ** 2
         self.sigma = np.sqrt(variance)
-        self.linear = Fitter(self.cells, self.sigma, self.train)
         self.refined.clear()
+        if late:
+            self._pose()
+        else:
+            self.linear = Fitter(self.cells, self.sigma, self.train)
+
+    def doubt(self, solution) -> np.ndarray:
+        """Voltage (b,) [V] in each block that no curve of a solution's effects could tell."""
+        parts = [self.effects[name].doubt(c, self.view) for name, c in solution.c.items()]
+        return np.sqrt(sum((np.square(part) for part in parts), np.zeros(len(self.view))))
 
     def corrected(self, totals):
         """The view without the errors of the record that the totals stand for; None where they make no sense."""

@@ -46,15 +46,21 @@ def remains(search, found, held) -> Remains:
     # A curve that explained most of a large misfit may leave a little of it anywhere.
     share = CLAMPED_LEFT if "dead_time" in best.model.names else CURVE_LEFT
     floor = share * fit.train_before if best.model.names else 0.0
-    stray = (
-        stray_order(best.view, rows, floor, sorted(_known_orders(best, "u")))
-        or stray_swing(best.view, rows, floor)
-        or stray_torque(best.view, search.projector, cells, residual, found.sigma)
+    told = np.flatnonzero(search.doubt(best) <= CURVE_LEFT * fit.train_before)
+    stray = _stray(best, best.view.take(told), rows[told], floor) or stray_torque(
+        best.view, search.projector, cells, residual, found.sigma
     )
     least = _least(search.view)
     least["u"] = max(least["u"], floor)
     group = _standing_out(search, found, cells, residual, use, least)
     return Remains(cells, residual, fit, reduced, group, stray)
+
+
+def _stray(best, view, rows, floor) -> Stray | None:
+    """A misfit outside the cells' orders in the residual rows (b, m) of a view's blocks, none where there are none."""
+    if not len(view):
+        return None
+    return stray_order(view, rows, floor, sorted(_known_orders(best, "u"))) or stray_swing(view, rows, floor)
 
 
 def _standing_out(search, found, cells, residual, use, floor) -> str:

@@ -95,12 +95,14 @@ def _physics(recordings, nominal, progress) -> Diagnosis:
     names = words.carried(names, found, left.cells, search.worth, CATALOGUE)
     names, absorbed = beside_free_surface(view, names, ~held)
     ambiguity = ambiguity + absorbed
+    spread = Spread(search, found.best, left.reduced) if names else None
+    names = words.beyond_doubt(spread, names) if names else names
     lag = words.lag_of_currents(found.best)
     kind = words.verdict(names, ambiguity, left, lag)
     answer = Diagnosis(kind, "", location=locate(view, search.cells, found.pure), fit=left.fit, search=found)
     if kind in ("explained", "ambiguous"):
         if names:
-            answer.effects = words.named(Spread(search, found.best, left.reduced), names, found.empty)
+            answer.effects = words.named(spread, names, found.empty)
         answer.ambiguity = ambiguity
     if kind == "ambiguous":
         progress("the recording that would tell")

@@ -70,7 +70,7 @@ class Search(Ties):
             self.refine(best.model)
             best = self._climbed(self._best())
         best, sure = self._labelled(self._simplified(best))
-        best = self._pruned(best)
+        best = self._with_curve(self._pruned(best))
         tied = self._tied(best, sure)
         empty = self.refine(Model(frozenset()))
         silent = frozenset()
@@ -184,9 +184,9 @@ class Search(Ties):
         explained = self.refine(Model(frozenset())).chi2 - best.chi2
         if len(best.model) >= 3:  # three that amount to one: scaled currents with R and L_q set right again are L_d
             forms = [m for n in self.effects if self.linear.index[n][0] for m in self.forms([n])]
-            single = min((self.refine(m) for m in forms), key=lambda s: s.score)
-            if single.chi2 - best.chi2 < SAME_SCALE * explained and single.chi2 < SAME_FIT * best.chi2:
-                return single
+            alike = [s for m in forms if self._replaces(s := self.refine(m), best, explained)]
+            if alike:
+                return min(alike, key=lambda s: s.score)
         if self.scaled_alike(best):
             rest = best.model.without("udc_gain").with_("magnet_flux")
             singles = [self.refine(self.admitted(rest.with_("current_gain", bend))) for bend in (False, True)]
@@ -200,6 +200,16 @@ class Search(Ties):
         singles = [self.refine(rest.with_(third, bend)) for bend in (False, True)]
         single = min(singles, key=lambda s: s.score)
         return single if single.chi2 - best.chi2 < SAME_SCALE * explained else best
+
+    def _replaces(self, single, best, explained) -> bool:
+        """Whether one effect explains what three or more do: one of themselves only if the others do not earn a place.
+
+        Of a dominant one and two small ones the dominant one is always most of it.
+        """
+        lost = single.chi2 - best.chi2
+        if single.model.names < best.model.names and lost > EARNS * self.dispersion * (len(best.model) - 1):
+            return False
+        return lost < SAME_SCALE * explained and single.chi2 < SAME_FIT * best.chi2
 
     def _labelled(self, best) -> tuple[Solution, bool]:
         """The best model with its curves of flux over current called by their shape, and whether that is sure."""
@@ -240,6 +250,13 @@ class Search(Ties):
             if other.score < best.score:
                 best = other
         return best
+
+    def _with_curve(self, best):
+        """The best model with a dead time's curve free beside ohms: what it grows says whose they are (verdict.py)."""
+        if not {"dead_time", "resistance"} <= best.model.names:
+            return best
+        freed = self.refine(best.model.with_("dead_time", True))
+        return freed if np.isfinite(freed.score) else best
 
     def _earning(self, best):
         """A model without effects that do not earn their place."""

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from diagnosis.catalogue.dead_time import FREE_WIDTHS
 from diagnosis.cells import told
 from diagnosis.curves import step_at_start
-from diagnosis.effect import ALIKE
+from diagnosis.effect import ALIKE, DOUBT, sigma
 from diagnosis.result import NamedEffect
 
 LEFTOVER = 2.0  # reduced chi^2 that an explanation may leave
@@ -20,13 +19,13 @@ DRIFTS, STANDS = 0.25, 1.5
 STEADY = 0.1  # constant over drift: a thermocouple lags, and so much of a drift may seem to stand
 
 HOLDS = 0.05
+LEAST_WEIGHT = 4.0  # of a name: two standard deviations
 WORSE = 1.05  # misfit on points not fitted, after over before
-# Ohmic drop at rated current over the inverter's loss: one that fades in slowly still grows by a tenth of it.
+# Ohmic drop at rated current over the inverter's loss: a device's own slope is seldom larger.
 SLOPE_DEVICE, SLOPE_UNCLEAR = 0.12, 0.2
-# The same over what the loss grows between a tenth and a third of rated current: a drop in log(i) grows about as much
-# again up to all of it, and one that has come to a stand there does not begin anew.
-GROWS_ON, STANDS_STILL = 1.5, 3.0
-WIDEST = f"v_{FREE_WIDTHS[-1]:g}"
+# The same over what the loss grows between 0.12 and 0.3 of rated current: a drop in log(i), fitted with ohms, has up to
+# 4.7, every curve that levels off less.  Below the first they are the device's, beyond the second they are not.
+GROWS_ON, STANDS_STILL = 2.5, 5.0
 
 
 def groups(best, tied, effects, nominal, silent=frozenset(), cold=False):
@@ -52,17 +51,32 @@ def groups(best, tied, effects, nominal, silent=frozenset(), cold=False):
                 shared -= {constant}
                 ambiguity.append([constant, drift])
     if {"dead_time", "resistance"} <= shared:
-        # A device's slope is ohms too, but never less than none.
-        ohms = effects["resistance"].size(best.c["resistance"], nominal) * nominal.machine.rated_current_a
-        share = ohms / max(effects["dead_time"].size(best.c["dead_time"], nominal), 1e-9)
-        growth, least = best.c["dead_time"].get(WIDEST, 0.0), SLOPE_UNCLEAR
-        if next(iter(best.c["resistance"].values())) < 0.0 or growth and ohms > STANDS_STILL * abs(growth):
-            least = SLOPE_DEVICE
-        if share < least or ohms < GROWS_ON * growth:
+        owner = owner_of_ohms(best, effects, nominal)
+        if owner != "resistance":
             shared -= {"resistance"}
-            if share > SLOPE_DEVICE and ohms > GROWS_ON * growth:
-                ambiguity.append(["dead_time", "resistance"])
+            ambiguity += [["dead_time", "resistance"]] if not owner else []
     return sorted(shared), ambiguity
+
+
+def owner_of_ohms(solution, effects, nominal) -> str:
+    """dead_time or resistance: whose the ohms beside an inverter's loss are; "" where nobody can tell.
+
+    A device's slope is ohms too, but never less than none, and one that grows up to rated current grows before as well.
+    """
+    (signed, *_), loss = solution.c["resistance"].values(), solution.c["dead_time"]
+    ohms = abs(signed) * nominal.machine.rated_current_a
+    if signed < 0.0:
+        return "resistance"
+    growth = loss.get("growth", 0.0)
+    if growth:
+        at = list(loss).index("growth")
+        most = abs(growth) + DOUBT * sigma(solution.covariance["dead_time"], at)
+        if ohms > STANDS_STILL * most:
+            return "resistance"
+    share = ohms / max(effects["dead_time"].size(loss, nominal), 1e-9)
+    if ohms < GROWS_ON * growth or share < SLOPE_DEVICE:
+        return "dead_time"
+    return "resistance" if share >= SLOPE_UNCLEAR else ""
 
 
 def _stays(constant, drift, solution, effects) -> float:
@@ -142,13 +156,22 @@ def lives(cells, name, c, sigma, use):
     return out
 
 
+def beyond_doubt(spread, names) -> list[str]:
+    """Names whose coefficients are larger than their uncertainty where every operating point is counted once."""
+    return [name for name in names if _weight(spread, name) >= LEAST_WEIGHT]
+
+
+def _weight(spread, name) -> float:
+    """Square of an effect's coefficients in standard deviations, per coefficient."""
+    c, covariance = np.array(list(spread.solution.c[name].values())), spread.covariance[name]
+    return float(c @ np.linalg.pinv(covariance) @ c) / max(len(c), 1)
+
+
 def named(spread, names, empty) -> list[NamedEffect]:
     """The asserted effects of a solution with their parameters; spread: uncertainty.Plain of it."""
     out, solution, effects, others = [], spread.solution, spread.effects, spread.others()
     for name in names:
-        effect, c, covariance = effects[name], solution.c[name], spread.covariance[name]
-        vector = np.array(list(c.values()))
-        wald = float(vector @ np.linalg.pinv(covariance) @ vector) / max(len(vector), 1)
+        effect, c = effects[name], solution.c[name]
         explained = max(empty.chi2 - empty.rows, 1e-9)
         share = effect.relative({n: solution.c[n] for n in names}, spread.nominal)
         estimates = spread.estimates(name, others)
@@ -158,7 +181,7 @@ def named(spread, names, empty) -> list[NamedEffect]:
         out.append(
             NamedEffect(
                 name,
-                float(np.clip(1.0 - 1.0 / (1.0 + wald / 4.0), 0.5, 0.999)),
+                float(np.clip(1.0 - 1.0 / (1.0 + _weight(spread, name) / 4.0), 0.5, 0.999)),
                 estimates,
                 float(np.clip((empty.chi2 - solution.chi2) / explained, 0.0, 1.0)),
                 effect.plant({k: share * v for k, v in c.items()}, spread.nominal),

@@ -30,6 +30,7 @@ class View:
     shaft: (b,) what is known of the shaft (see shaft.py)
     psi_extra: (b, m+1) flux beyond the nominal one that is known by now, for terms that depend on the flux [Wb]
     delta_l: what is known by now of L_d and L_q beyond the nominal [H]
+    late_s: by how much the dead time that is known by now moves the middle of every pulse [s]
     """
 
     nominal: object
@@ -52,6 +53,7 @@ class View:
     span_s: float  # length of the whole recording
     psi_extra: np.ndarray | float = 0.0
     delta_l: tuple[float, float] = (0.0, 0.0)
+    late_s: float = 0.0
     noise_gain: float = 1.0  # what a correction of the currents did to their noise
     memo: dict = dataclasses.field(default_factory=dict)  # of effects, the same for all views of a recording
 

@@ -2,38 +2,69 @@
 
 import numpy as np
 
-from diagnosis.effect import Effect, Parameter, voltage
-from diagnosis.curves import clipped_ramps
+from diagnosis.effect import DOUBT, Effect, Parameter, full_loss, voltage, zero_vector_slope
 from diagnosis.result import Estimate
 
 # None is so wide that it would pass for a resistance over most of the current.
-CORE_WIDTHS = (0.02, 0.12)  # of rated current: where the loss has reached its full value
-FREE_WIDTHS = (0.005, 0.05, 0.3)
+WIDTHS = (0.02, 0.12)  # of rated current: where the loss of the core has reached its full value
+KNOTS = (0.0, 0.005, 0.02, 0.05, 0.12)  # of rated current: between them the curve is free, each bump by itself
+STILL_GROWS = (0.12, 0.3)  # of rated current: beyond, what grows on is ohms
+RIPPLE = 1 / 32  # of what the bus drives through an inductance in a period: a quarter of the largest ripple
+CLAMPED = 0.1  # of the loss while a current is so near zero that ripple decides which diode conducts
 
 
-def _losses(view, widths, factor=1.0):
-    """Loss of the legs for each width, positive along the current, in dq.
+def _currents(view):
+    """Phase currents (b, m, 3) [A] in the middle of the pulses, which is where the edges of a leg have their mean.
 
     The measured current, for what counts is when it crosses zero; the mean of an interval's two samples
-    does not correlate with their difference, which is the misfit's noise.
+    does not correlate with their difference, which is the misfit's noise.  One edge of every pulse is late by the
+    whole dead time, whatever the current's sign: the converters sample half of it before the middle of the zero
+    vector, and the current goes on with its slope there.
     """
-    ramps = clipped_ramps(
-        view.phases(view.with_raw_current().i_mid), [w * view.machine.rated_current_a for w in widths]
-    )
-    return {w: voltage(view.from_phases(ramp) * factor) for w, ramp in zip(widths, ramps, strict=True)}
+    exact = view.with_raw_current()
+    return view.phases(exact.replace(i=exact.i + view.late_s * zero_vector_slope(view)).i_mid)
+
+
+def _leg_losses(view, shapes):
+    """Losses {name: column} of the legs, each an odd function of the current over the rated one, in dq."""
+    x = _currents(view) / view.machine.rated_current_a
+    return {name: voltage(view.from_phases(shape(x))) for name, shape in shapes.items()}
+
+
+def _following_bus(view, columns):
+    """The columns where the bus is another than the nominal one: dead time is a share of the period."""
+    factor = view.u_dc / view.nominal.inverter.dc_bus_v
+    return {name: voltage(column["u"] * factor) for name, column in columns.items()}
+
+
+def _at_full(c):
+    """Weights of the coefficients in the full loss, in their order."""
+    return np.array([full_loss({key: 1.0}) for key in c])
+
+
+def _bump(x, knots):
+    return np.sign(x) * np.interp(np.abs(x), knots, (0.0, 1.0, 0.0))
 
 
 class DeadTime(Effect):
     def core(self, view):
-        factor = view.u_dc / view.nominal.inverter.dc_bus_v
-        return {f"v_{w:g}": column for w, column in _losses(view, CORE_WIDTHS, factor).items()}
+        ramps = {f"v_{w:g}": lambda x, w=w: np.clip(x / w, -1.0, 1.0) for w in WIDTHS}
+        return _following_bus(view, _leg_losses(view, ramps))
 
     def free(self, view):
-        factor = view.u_dc / view.nominal.inverter.dc_bus_v
-        out = {f"v_{w:g}": column for w, column in _losses(view, FREE_WIDTHS, factor).items()}
+        # Bumps rather than further ramps: a ramp between two others is nearly their mean, and would not count as told.
+        places = [k for k in range(1, len(KNOTS) - 1) if KNOTS[k] not in WIDTHS]
+        shapes = {f"bump_{KNOTS[k]:g}": lambda x, k=k: _bump(x, KNOTS[k - 1 : k + 2]) for k in places}
+        shapes["growth"] = lambda x: np.sign(x) * np.interp(np.abs(x), STILL_GROWS, (0.0, 1.0))
+        out = _following_bus(view, _leg_losses(view, shapes))
         if np.ptp(view.u_dc.mean(axis=1)) > 0.04 * view.nominal.inverter.dc_bus_v:
-            out["drop"] = _losses(view, (0.05,))[0.05]  # device drops do not follow the bus
+            # Device drops do not follow the bus.
+            out |= _leg_losses(view, {"drop": lambda x: np.clip(x / 0.05, -1.0, 1.0)})
         return out
+
+    def possible(self, c, covariance, nominal):
+        at_full = _at_full(c)
+        return bool(at_full @ list(c.values()) >= -DOUBT * np.sqrt(max(at_full @ covariance @ at_full, 0.0)))
 
     def floor(self, nominal):
         return 0.0002 * nominal.inverter.dc_bus_v
@@ -42,20 +73,24 @@ class DeadTime(Effect):
         return 0.15 * nominal.inverter.dc_bus_v
 
     def size(self, c, nominal):
-        return abs(sum(c.values()))
+        return abs(full_loss(c))
+
+    def doubt(self, c, view):
+        """What is lost is no function of the current while that is within its ripple or what the dead time moves it."""
+        m, period, loss = view.machine, view.sample_time_s, self.size(c, view.nominal)
+        reach = period * (RIPPLE * view.u_dc.mean() + 0.5 * loss) / min(m.inductance_d_h, m.inductance_q_h)
+        return CLAMPED * loss * np.mean(np.abs(_currents(view)) < reach, axis=(1, 2))
 
     def estimates(self, c, covariance, nominal):
-        every = np.ones(len(c))
+        at_full = _at_full(c)
         # A loss that still grows towards rated current has not shown its full value.
-        growing = c.get(f"v_{FREE_WIDTHS[-1]:g}", 0.0)
-        spread = float(np.hypot(np.sqrt(max(every @ covariance @ every, 0.0)), growing))
-        return {"v_dead_v": Estimate(float(sum(c.values())), spread, "V")}
+        spread = float(np.hypot(np.sqrt(max(at_full @ covariance @ at_full, 0.0)), c.get("growth", 0.0)))
+        return {"v_dead_v": Estimate(full_loss(c), spread, "V")}
 
     def plant(self, c, nominal):
-        v_dead = max(0.0, float(sum(c.values())))
-        zone = sum(abs(v) * float(k[2:]) for k, v in c.items() if k.startswith("v_")) / max(
-            sum(map(abs, c.values())), 1e-12
-        )
+        v_dead = max(0.0, full_loss(c))
+        ramps = {float(k[2:]): abs(v) for k, v in c.items() if k.startswith("v_")}
+        zone = sum(w * v for w, v in ramps.items()) / max(sum(ramps.values()), 1e-12)
         return {
             "inverter.dead_time_s": v_dead / nominal.inverter.dc_bus_v / nominal.inverter.pwm_frequency_hz,
             "inverter.zero_current_a": zone * nominal.machine.rated_current_a,
@@ -70,6 +105,5 @@ EFFECT = DeadTime(
     confounders=("resistance", "emf_harmonics"),
     separated_by="several currents, i_q reversed; another bus voltage or PWM frequency splits dead time from drops",
     parameters=(Parameter("v_dead_v", "V", "loss of a leg, full value"),),
-    positive=True,
     smoothed=True,
 )

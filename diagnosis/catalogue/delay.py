@@ -3,7 +3,7 @@
 import numpy as np
 
 from diagnosis.catalogue.sampling_skew import skewed, unskewed
-from diagnosis.effect import DOUBT, Effect, Parameter, half_dead_time, one, sigma, voltage
+from diagnosis.effect import DOUBT, Effect, Parameter, one, sigma, voltage, within_dead_time
 
 
 MOST = 1.2  # periods: past a whole one the mix goes on in a straight line, or an estimate there could not come back
@@ -27,7 +27,7 @@ class Delay(Effect):
         return 0.006 * nominal.sample_time_s
 
     def overshadowed(self, c, nominal):
-        return half_dead_time(c, nominal)
+        return within_dead_time(c, nominal)
 
     def ceiling(self, nominal):
         return 2.5 * nominal.sample_time_s

@@ -3,7 +3,9 @@
 import numpy as np
 
 from diagnosis.effect import FluxEffect, Parameter, one, sigma
-from diagnosis.curves import COURSE_KNOTS, course, courses
+from diagnosis.curves import COURSE_KNOTS, course, courses, step_at_start
+
+MOST_AT_ONCE = 4.0  # step at the start over all that changes later
 
 
 class MagnetTemperature(FluxEffect):
@@ -19,11 +21,21 @@ class MagnetTemperature(FluxEffect):
     def ceiling(self, nominal):
         return 0.4 * nominal.machine.magnet_flux_wb
 
-    def size(self, c, nominal):
-        """Largest change of flux since the start [Wb]."""
+    @staticmethod
+    def _at_knots(c):
+        """Change of flux since the start, at the knots of the course [Wb]."""
         drift = c["drift"] * COURSE_KNOTS
         drift[1:4] += [c.get(f"course_{k}", 0.0) for k in range(3)]
-        return float(np.max(np.abs(drift)))
+        return drift
+
+    def size(self, c, nominal):
+        """Largest change of flux since the start [Wb]."""
+        return float(np.max(np.abs(self._at_knots(c))))
+
+    def possible(self, c, covariance, nominal):
+        """Nothing warms at once: what is there from the start, but for a little, is a wrong constant."""
+        later = self._at_knots(c)[1:]
+        return abs(step_at_start(c)) <= MOST_AT_ONCE * float(np.max(np.abs(later - later[0])))
 
     def estimates(self, c, covariance, nominal):
         return one("magnet_flux_drift_wb", "Wb", c["drift"], sigma(covariance))

@@ -2,24 +2,19 @@
 
 import numpy as np
 
-from diagnosis.effect import ALIKE, Effect, Parameter, angle_error, current_error, half_dead_time, one
-
-
-def _slope(view):
-    """Slope of the measured dq current in the zero vector, seen at the angle of the valley (b, m+1) [A/s]."""
-    m = view.machine
-    emf = -m.resistance_ohm * view.i - 1j * view.omega * view.psi
-    return emf.real / m.inductance_d_h + 1j * emf.imag / m.inductance_q_h + 1j * view.omega * view.i
+from diagnosis.effect import (
+    ALIKE, Effect, Parameter, angle_error, current_error, one, within_dead_time, zero_vector_slope,
+)  # fmt: skip
 
 
 def skewed(view):
     """Column of currents that are sampled off the valley, per second."""
-    return current_error(view, _slope(view))
+    return current_error(view, zero_vector_slope(view))
 
 
 def unskewed(view, tau):
     """The view without what sampling off the valley by tau [s] adds to the currents."""
-    error = tau * _slope(view)
+    error = tau * zero_vector_slope(view)
     return view.replace(i=view.i - error, i_raw=view.i_raw - view.stator(error)) if tau else view
 
 
@@ -42,7 +37,7 @@ class SamplingSkew(Effect):
         # Currents and angle that are late alike are no skew: the gates are early, and the voltage with them.
         if abs(own["tau"] - own.get("angle", 0.0)) < ALIKE * abs(own["tau"]):
             return float("inf")
-        return half_dead_time(c, nominal)
+        return within_dead_time(c, nominal)
 
     def ceiling(self, nominal):
         return 0.3 * nominal.sample_time_s
