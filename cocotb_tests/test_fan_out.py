@@ -105,3 +105,17 @@ def test_kept_cells_are_not_copied():
     netlist = design()
     netlist["modules"]["t"]["cells"]["late"]["attributes"] = {"keep": 1}
     assert share_out(netlist, "t", MOST) == 0
+
+
+def test_luts_are_shared_out_by_what_they_serve():
+    """Two blocks of LUTs whose own names alternate: each copy serves one block."""
+    cells = {"source": flip_flop(FIRST, 100)}
+    for n in range(16):
+        ports = {"A": [100], "Z": [200 + n]}
+        directions = {"A": "input", "Z": "output"}
+        cells[f"l{n:02d}"] = {"type": "LUT4", "parameters": {}, "connections": ports, "port_directions": directions}
+        cells[f"{'ab'[n % 2]}.r{n:02d}"] = flip_flop(200 + n, 300 + n)
+    netlist = {"modules": {"t": {"cells": cells, "ports": {}}}}
+    assert share_out(netlist, "t", 8) == 1
+    read = [{cells[f"l{n:02d}"]["connections"]["A"][0] for n in range(block, 16, 2)} for block in (0, 1)]
+    assert len(read[0]) == len(read[1]) == 1 and read[0] != read[1]

@@ -11,6 +11,7 @@ from scripts.synth.netlist import CONSTANTS, Nets, outputs
 # ns on LFE5U speed grade 6
 NET, TO_Q, MULTIPLIER, MEMORY, CARRY_STEP = 1.7, 0.5, 3.9, 5.6, 0.07
 THROUGH = {"LUT4": 0.24, "PFUMX": 0.2, "L6MUX21": 0.2, "CCU2C": 0.45, "MULT18X18D": MULTIPLIER}
+CONTROL = ("CLK", "CE", "RST")  # pins of a multiplier that lead to its registers alone
 INSIDE = ("PFUMX", "L6MUX21")  # their inputs come over wires of the slice
 
 
@@ -34,8 +35,10 @@ class Delays:
         cell = self._cells.get(name, {"type": "input"})
         if cell["type"] == "DP16KD":
             return MEMORY
-        if cell["type"] not in THROUGH:
+        if cell["type"] not in THROUGH or "REG_OUTPUT_CLK" in cell["parameters"]:
             return TO_Q
+        if "REG_INPUTA_CLK" in cell["parameters"]:
+            return MULTIPLIER
         return max(self._inputs(cell), default=0.0)
 
     def _inputs(self, cell: dict):
@@ -54,9 +57,10 @@ class Delays:
 
     def _onward(self, name: str, port: str) -> float:
         cell = self._cells.get(name, {"type": "output"})
-        if cell["type"] not in THROUGH:
+        control = cell["type"] == "MULT18X18D" and port.startswith(CONTROL)
+        if cell["type"] not in THROUGH or control or "REG_INPUTA_CLK" in cell["parameters"]:
             return NET
-        if cell["type"] == "MULT18X18D" and "REG_OUTPUT_CLK" in cell["parameters"]:
+        if "REG_OUTPUT_CLK" in cell["parameters"]:
             return NET + MULTIPLIER
         return step(cell, port) + max(self.rest(bit) for bit in outputs(cell))
 

