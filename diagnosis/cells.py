@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from diagnosis.balance import misfit
+from diagnosis.torque_order import torque_orders
 
 ORDERS_SUM = (0.0, 1.0, 2.0)
-ORDERS_TORQUE = (1.0, *(float(h) for h in range(2, 38, 2)))  # cogging is even per electrical turn
 LEAST_TURNS = 0.8  # of a harmonic within a block, else it is no functional of its own
 TAPERED_TURNS = 3.0  # the same under a taper, whose neighbours leak
 SYSTEM_U = 2e-4  # of the block's voltage
@@ -74,7 +74,7 @@ class Projector:
         if view.has_sum:
             self.real["sum"] = ORDERS_SUM
         if self.torque_seen.any():
-            self.real["torque"] = (0.0, 1.0 / view.machine.pole_pairs, *ORDERS_TORQUE)
+            self.real["torque"] = (0.0, *torque_orders(view))
         for channel, orders in self.real.items():
             n = len(orders)
             channels += [channel] * (b * n * 2)

@@ -2,12 +2,9 @@
 
 import numpy as np
 
-from diagnosis.balance import misfit
 from diagnosis.effect import Effect, Parameter, rated_torque
 from diagnosis.result import Estimate
-
-
-ORDERS = range(2, 38, 2)  # per electrical turn: multiples of the poles
+from diagnosis.torque_order import repeating_order
 
 
 def _seen(view, h):
@@ -30,47 +27,13 @@ def _waves(view, h):
     }
 
 
-LOCKS = 0.5  # of the best lock: so well an order must repeat to be one of the cogging's
-
-
-def _order(view) -> int:
-    """The largest order of those whose torque repeats from block to block; it depends on slots that nobody recorded.
-
-    Harmonics of the cogging repeat as well as the cogging itself, so that the best lock alone may be a harmonic's.
-    """
-    if "cogging_order" not in view.memo:
-        view.memo["cogging_order"] = 6
-        seen = np.isfinite(view.torque).all(axis=1)
-        if seen.any():
-            torque = misfit(view)["torque"][seen]
-            torque = torque - torque.mean(axis=1, keepdims=True)
-            theta = view.theta_mid[seen]
-            taper = 1.0 - np.cos(2 * np.pi * (np.arange(theta.shape[1]) + 0.5) / theta.shape[1])
-            turns = np.abs(theta[:, -1] - theta[:, 0]) / (2 * np.pi)
-            found = []
-            for h in ORDERS:
-                f = (torque * taper * np.exp(-1j * h * theta)).mean(axis=1)[h * turns > 2.0]
-                # A free shaft's acceleration is noisier the faster it turns.
-                weight = (
-                    1.0 / np.maximum(np.abs(f) ** 2, np.median(np.abs(f) ** 2)) if len(f) else np.zeros(0)
-                )
-                lock = float(
-                    np.abs(np.sum(weight * f)) ** 2 / max(np.sum(weight**2 * np.abs(f) ** 2), 1e-300)
-                )
-                found.append((lock, float(np.abs(np.sum(weight * f)) / max(np.sum(weight), 1e-300)), h))
-            least = LOCKS * max(lock for lock, _, _ in found)
-            if least > 0.0:
-                view.memo["cogging_order"] = max((size, h) for lock, size, h in found if lock >= least)[1]
-    return view.memo["cogging_order"]
-
-
 class Cogging(Effect):
     def core(self, view):
-        h = _order(view)
+        h = repeating_order(view)
         return {**_waves(view, h), **_waves(view, 2 * h)}
 
     def free(self, view):
-        h = _order(view)
+        h = repeating_order(view)
         return _waves(view, 3 * h)
 
     def floor(self, nominal):
