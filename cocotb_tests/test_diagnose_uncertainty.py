@@ -15,8 +15,9 @@ from diagnosis.fit import Model
 from diagnosis.nominal import load_nominal
 from diagnosis.recording import from_columns
 from diagnosis.refine import Refiner
+from diagnosis.result import Estimate
 from diagnosis.uncertainty import Plain, Spread, larger
-from diagnosis.verdict import named
+from diagnosis.verdict import beyond_doubt, named
 
 NOMINAL = load_nominal(PAPER)
 T = NOMINAL.sample_time_s
@@ -172,3 +173,15 @@ def test_what_no_row_has_shown_is_no_parameter():
     waves = [(f"h6_{k}", 0.01) for k in range(4)] + [(f"h12_{k}", 0.0) for k in range(4)]
     assert set(of("emf_harmonics", *waves)) == {"order_6"}
     assert set(of("emf_harmonics", *waves[:4], *((k, 0.01) for k, _ in waves[4:]))) == {"order_6", "order_12"}
+
+
+@pytest.mark.parametrize(("known", "stays"), [((3.0, 0.1), True), ((0.6, 0.1), True), ((0.4, 0.1), False)])
+def test_a_name_of_which_no_parameter_is_known_is_none(known, stays):
+    """However well it fits: values beside standard deviations of one; friction's two parts may hold each other's."""
+    spread = SimpleNamespace(
+        solution=SimpleNamespace(c={"friction": {"viscous": 5.0, "coulomb": 5.0}}),
+        covariance={"friction": np.eye(2)},
+        others=list,
+        estimates=lambda name, others: {str(k): Estimate(v, 1.0, "Nm") for k, v in enumerate(known)},
+    )
+    assert beyond_doubt(spread, ["friction"]) == ["friction"] * stays

@@ -20,6 +20,7 @@ STEADY = 0.1  # constant over drift: a thermocouple lags, and so much of a drift
 
 HOLDS = 0.05
 LEAST_WEIGHT = 4.0  # of a name: two standard deviations
+LEAST_KNOWN = 0.5  # of a parameter's stated standard deviation: at one speed friction's two parts hold each other's
 WORSE = 1.05  # misfit on points not fitted, after over before
 # Ohmic drop at rated current over the inverter's loss: a device's own slope is seldom larger.
 SLOPE_DEVICE, SLOPE_UNCLEAR = 0.12, 0.2
@@ -157,8 +158,16 @@ def lives(cells, name, c, sigma, use):
 
 
 def beyond_doubt(spread, names) -> list[str]:
-    """Names whose coefficients are larger than their uncertainty where every operating point is counted once."""
-    return [name for name in names if _weight(spread, name) >= LEAST_WEIGHT]
+    """Names whose coefficients are larger than their uncertainty where every operating point is counted once.
+
+    A name of which no parameter is known to twice its value says nothing either, whatever the fit makes of it.
+    """
+    others = spread.others()
+    return [name for name in names if _weight(spread, name) >= LEAST_WEIGHT and _known(spread.estimates(name, others))]
+
+
+def _known(estimates) -> bool:
+    return not estimates or any(abs(e.value) >= LEAST_KNOWN * e.sigma for e in estimates.values())
 
 
 def _weight(spread, name) -> float:
