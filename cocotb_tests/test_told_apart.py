@@ -252,6 +252,7 @@ def test_a_name_is_larger_than_what_the_operating_points_leave_open():
     c = {"udc_gain": {"gain": 0.4}, "friction": {"viscous": 1.0, "coulomb": 1.0}}
     either = np.array([[1.0, -1.0], [-1.0, 1.0]])  # dry or viscous at one speed, but friction
     spread = SimpleNamespace(solution=SimpleNamespace(c=c), covariance={"friction": 1e-4 * np.eye(2) + 9.0 * either})
+    spread.others, spread.estimates = list, lambda name, others: {}
     for sigma, names in ((0.8, ["friction"]), (0.05, ["udc_gain", "friction"])):
         spread.covariance["udc_gain"] = np.array([[sigma**2]])
         assert beyond_doubt(spread, ["udc_gain", "friction"]) == names
