@@ -100,18 +100,20 @@ def test_currents_and_one_inductance_off_alike_are_the_ohms_and_the_other_induct
     """Currents of 0.94 with L_q of 0.94 leave L_q as it is: R is wrong, and L_d by another amount."""
     m, psi = view.machine, {"alpha": 0.007, "beta": -0.012}
     nothing = solved(chi2=4e5, score=4e5)
-    plain = solved("current_gain", "inductance_d", "resistance", chi2=1200.0, free=["inductance_d"])
+    plain = solved("current_gain", "inductance_d", "resistance", chi2=1500.0, free=["inductance_d"])
     alone = solved("inductance_d", "resistance", chi2=9000.0, free=["inductance_d"])
 
-    def called(share):
+    def called(share, noise=1.2):
         l_d, l_q = {"delta_l_d": 0.3 * m.inductance_d_h}, {"delta_l_q": share * m.inductance_q_h}
         names = ("current_gain", "inductance_d", "inductance_q")
         best = solved(*names, chi2=1090.0, free=names, current_gain={**psi, "common": -0.058})
         best.c |= {"inductance_d": l_d, "inductance_q": l_q}
+        best.view = view.replace(noise_gain=noise)  # larger currents have larger noise, and a smaller chi^2
         known = {"take_raw": lambda solutions: None, "_climbed": lambda s: s}
         return stub(view, best, nothing, plain, alone, **known)._unscaled(best).model
 
     assert called(-0.0576) == plain.model
+    assert called(-0.0576, noise=1.0) != plain.model
     assert called(-0.02).names == called(0.058).names == {"current_gain", "inductance_d", "inductance_q"}
 
 

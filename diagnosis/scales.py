@@ -6,6 +6,8 @@ and L_q: any of such a set are the rest of it, and where what was found are alik
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from diagnosis.effect import ALIKE
 from diagnosis.fit import Model, Solution
 from diagnosis.ties import SCALES, Ties
@@ -80,7 +82,9 @@ class Scales(Ties):
                 continue
             plain = self.refine(self.admitted(Model(names, best.model.free & names - {"current_gain"})))
             plain = self.take_raw([plain]) or plain
-            if self._as_complete(plain, best, explained):
+            # What makes larger currents of the recorded ones makes larger noise of theirs; so does a larger inductance.
+            same_noise = replace(plain, chi2=plain.chi2 / best.view.noise_gain**2)
+            if self._as_complete(same_noise, best, explained):
                 return self._climbed(plain)
         return self.take_raw([best]) or self.refine(best.model)
 
