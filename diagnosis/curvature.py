@@ -10,6 +10,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from diagnosis.catalogue.saturation import q_curves
+from diagnosis.effect import flux
+
 LEAST = 0.08  # of rated current: smaller currents say nothing of a surplus
 SPREAD = 1.35  # between smallest and largest level
 STRAIGHT, BENT = 0.68, 0.55  # ratio above which it is an inductance, below which saturation
@@ -19,6 +22,7 @@ FAMILY = ("inductance_d", "inductance_q", "saturation")
 
 OVER, UNDER = 1.35, -0.2  # ratio beyond which both are there
 PART = 0.03  # of L: what each of the two must amount to
+LEAST_GAIN = 30.0  # of chi^2, over the dispersion, that a straight part must bring beside any saturation
 
 
 def surplus(solution, axis, x):
@@ -55,10 +59,23 @@ def ratio(view, solution, axis) -> tuple[float, float]:
 def has_both(view, solution, axis) -> bool:
     """Whether the curve of an axis needs a wrong inductance and saturation beside it."""
     value, _ = ratio(view, solution, axis)
-    if not np.isfinite(value) or UNDER < value < OVER:
+    if not np.isfinite(value):
         return False
-    _, shape, inductance = _ends(view, solution, axis)
+    x, shape, inductance = _ends(view, solution, axis)
+    if UNDER < value < OVER and not (value > 1.0 and _levels_off(x, shape)):
+        return False
     return bool(min(abs(shape[0]), abs(shape[1] - shape[0])) > PART * inductance)
+
+
+def _levels_off(x, shape) -> bool:
+    """Whether a surplus that falls from a smaller to a larger current would be far smaller yet at rated current.
+
+    Between two currents near each other it has little room to fall: what counts is its fall from none to the rated one,
+    along a parabola.
+    """
+    bend = (shape[1] - shape[0]) / (x[1] ** 2 - x[0] ** 2)
+    straight = shape[0] - bend * x[0] ** 2
+    return bool((straight + bend) / straight < 1.0 / OVER)
 
 
 def _ends(view, solution, axis):
@@ -94,3 +111,24 @@ def labels(view, solution, least=0.012) -> tuple[set[str], bool]:
             names.add("saturation")
             sure &= value <= BENT
     return names, sure
+
+
+def straight_beside_saturation(search, solution) -> bool:
+    """Whether the q axis has a wrong inductance beside its saturation, whatever the curve of that.
+
+    Saturation vanishes at small currents faster than these do: |i| i, i^3 and i^5 together are any such curve.
+    """
+    f = search.fitter(solution.view, [search.effects[n] for n in sorted(solution.model.names)])
+    axis = {("inductance_q", key) for key in ("delta_l_q", "bend_2", "bend_3")}
+    axis |= {("saturation", f"q_{key}") for key in (1, 2, 3, 5)}
+    kept = [k for k in f.carried(solution.model) if (f.owner[k], f.names[k].lstrip("~")) not in axis]
+    view = solution.view
+    powers = [search.projector.rows(flux(view, psi))[f.use] / f.sigma[f.use] for psi in q_curves(view)]
+    if not all(row.any() for row in powers):
+        return False
+    straight, *bent = (row / np.linalg.norm(row) for row in powers)
+    a = np.column_stack([f.a[:, kept], *bent, straight])
+    c, *_ = np.linalg.lstsq(a, f.y, rcond=None)
+    without, *_ = np.linalg.lstsq(a[:, :-1], f.y, rcond=None)
+    gain = float(np.sum((f.y - a[:, :-1] @ without) ** 2) - np.sum((f.y - a @ c) ** 2))
+    return bool(gain > LEAST_GAIN * search.dispersion and abs(c[-1]) > PART * np.linalg.norm(powers[0]))

@@ -20,6 +20,7 @@ from diagnosis.flux_surface import USUAL, earned
 from diagnosis.load import load_recording
 from diagnosis.locate import at_order, evidence, locate
 from diagnosis.nominal import Nominal, load_nominal
+from diagnosis.ohms import straight_ohms
 from diagnosis.recording import Recording
 from diagnosis.remains import remains
 from diagnosis.request import requests, wants_cold
@@ -91,7 +92,11 @@ def _physics(recordings, nominal, progress) -> Diagnosis:
     search = Search(view, CATALOGUE, ~held, progress)
     found = search.run()
     left = remains(search, found, held)
-    names, ambiguity = words.groups(found.best, found.tied, CATALOGUE, nominal, found.silent, started_cold(view))
+    both = {"dead_time", "resistance"} <= found.best.model.names
+    straight = straight_ohms(search, found.best) if both else None
+    names, ambiguity = words.groups(
+        found.best, found.tied, CATALOGUE, nominal, found.silent, started_cold(view), straight
+    )
     names = words.carried(names, found, left.cells, search.worth, CATALOGUE)
     names, absorbed = beside_free_surface(view, names, ~held)
     ambiguity = ambiguity + absorbed

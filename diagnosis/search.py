@@ -16,20 +16,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnosis.curvature import FAMILY, labels
+from diagnosis.curvature import FAMILY, labels, straight_beside_saturation
 from diagnosis.fit import Fitter, Model, Solution
 from diagnosis.refine import TIE
-from diagnosis.ties import Ties
+from diagnosis.scales import EARNS, Scales
 
 MOST_AT_ONCE = 3
 REFINED = 14
-SCALES = frozenset({"udc_gain", "current_scale", "magnet_flux"})
-SAME_SCALE = 0.03  # of what is explained: so much may be lost by one scale in place of two
-SAME_FIT = 1.25  # of chi^2: so much worse may one effect be in place of three
 LEAST_SURPLUS = 0.012  # of L i
 BESIDE_CROSS = 0.025  # of L i: a co-energy's cross term bends the axes themselves a little
 NEIGHBOURS = 7  # refined around a best set
-EARNS = 30.0  # gain in chi^2 over dispersion that an effect must bring beside the freest form of the others
 SECOND_THOUGHTS = 4  # better models that are looked at when a large one has been pruned
 SURE = 4.0  # sizes of its own standard deviation
 
@@ -50,7 +46,7 @@ class Outcome:
     )  # effects of the best solution that are too small to be named beside the others
 
 
-class Search(Ties):
+class Search(Scales):
     """One search over one view."""
 
     together = frozenset()  # an inductance and the saturation beside it, told apart by their curve
@@ -70,7 +66,8 @@ class Search(Ties):
             self.refine(best.model)
             best = self._climbed(self._best())
         best, sure = self._labelled(self._simplified(best))
-        best = self._with_curve(self._pruned(best))
+        best = self._unscaled(best)
+        best = self._with_curve(self._completed(self._pruned(best)))
         tied = self._tied(best, sure)
         empty = self.refine(Model(frozenset()))
         silent = frozenset()
@@ -176,47 +173,14 @@ class Search(Ties):
             if score < best.score + 4 * TIE:
                 self.refine(model)
 
-    def _simplified(self, best) -> Solution:
-        """The best model with two scales that amount to a third one taken for that.
-
-        All of (u_dc, current, magnets) scaled alike is no change at all, so any two of them alike are the third.
-        """
-        explained = self.refine(Model(frozenset())).chi2 - best.chi2
-        if len(best.model) >= 3:  # three that amount to one: scaled currents with R and L_q set right again are L_d
-            forms = [m for n in self.effects if self.linear.index[n][0] for m in self.forms([n])]
-            alike = [s for m in forms if self._replaces(s := self.refine(m), best, explained)]
-            if alike:
-                return min(alike, key=lambda s: s.score)
-        if self.scaled_alike(best):
-            rest = best.model.without("udc_gain").with_("magnet_flux")
-            singles = [self.refine(self.admitted(rest.with_("current_gain", bend))) for bend in (False, True)]
-            single = min(singles, key=lambda s: s.score)
-            return single if single.chi2 - best.chi2 < SAME_SCALE * explained else best
-        pair = best.model.names & SCALES
-        if len(pair) != 2:
-            return best
-        (third,) = SCALES - pair
-        rest = Model(best.model.names - pair, best.model.free - pair)
-        singles = [self.refine(rest.with_(third, bend)) for bend in (False, True)]
-        single = min(singles, key=lambda s: s.score)
-        return single if single.chi2 - best.chi2 < SAME_SCALE * explained else best
-
-    def _replaces(self, single, best, explained) -> bool:
-        """Whether one effect explains what three or more do: one of themselves only if the others do not earn a place.
-
-        Of a dominant one and two small ones the dominant one is always most of it.
-        """
-        lost = single.chi2 - best.chi2
-        if single.model.names < best.model.names and lost > EARNS * self.dispersion * (len(best.model) - 1):
-            return False
-        return lost < SAME_SCALE * explained and single.chi2 < SAME_FIT * best.chi2
-
     def _labelled(self, best) -> tuple[Solution, bool]:
         """The best model with its curves of flux over current called by their shape, and whether that is sure."""
         mine = best.model.names & set(FAMILY)
         if not mine:
             return best, True
         wanted, sure = labels(best.view, best, LEAST_SURPLUS)
+        if "saturation" in wanted and straight_beside_saturation(self, best):
+            wanted = wanted | {"inductance_q"}
         if wanted == mine:
             return best, sure
         names = (best.model.names - mine) | wanted
@@ -241,6 +205,7 @@ class Search(Ties):
                 for model, s in self.refined.items()
                 if model not in tried and model.names and len(model) <= max(len(best.model), 1)
                 if s.score < best.score - TIE and model.names & set(FAMILY) <= curved
+                if model.names & self.together in (frozenset(), self.together)
             ]
             if not better:
                 break
@@ -249,6 +214,29 @@ class Search(Ties):
             other = self._earning(self._simplified(first))
             if other.score < best.score:
                 best = other
+        return best
+
+    def _completed(self, best):
+        """The best model with what else earns its place once those have gone that did not.
+
+        The search may have ended far from there: an effect that was blamed for several others hides those it left out.
+        """
+        for _ in range(MOST_AT_ONCE):
+            self._neighbours(best)
+            curved = best.model.names & set(FAMILY)
+            larger = [
+                s
+                for model, s in self.refined.items()
+                if model.names > best.model.names and len(model) == len(best.model) + 1
+                if s.score < best.score - TIE and model.names & set(FAMILY) <= curved
+            ]
+            for first in sorted(larger, key=lambda s: s.score):
+                other = self._earning(first)
+                if other.model.names > best.model.names and other.score < best.score - TIE:
+                    best = other
+                    break
+            else:
+                return best
         return best
 
     def _with_curve(self, best):

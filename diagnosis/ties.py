@@ -6,11 +6,12 @@ import numpy as np
 from scipy import stats
 
 from diagnosis.curvature import FAMILY
-from diagnosis.effect import ALIKE
+from diagnosis.effect import ALIKE, DOUBT, sigma
 from diagnosis.fit import Solution
 from diagnosis.refine import TIE, Refiner, point_numbers
 
 LEAST_POINTS, LEAST_SPREAD = 4.0, 0.2  # operating points that say how large errors really are; no smaller than that
+SCALES = frozenset({"udc_gain", "current_scale", "magnet_flux"})  # any two of them are any other two, but for torque
 LONE_TIE = 80.0  # margin of a tie where one operating point is all there is
 
 
@@ -52,11 +53,22 @@ class Ties(Refiner):
         wider = (stats.t.ppf(0.975, points - 1.0) / stats.norm.ppf(0.975)) ** 2
         return float(np.clip(wider * np.sum(along**2) / apart.sum(), LEAST_SPREAD, 1.0))
 
+    @staticmethod
+    def _other_scales(model, other) -> bool:
+        """Whether two models differ only in which two of the three scales they have."""
+        pairs = model.names & SCALES, other.names & SCALES
+        return len(pairs[0]) == len(pairs[1]) == 2 and model.names - SCALES == other.names - SCALES
+
     def small(self, solution, name) -> bool:
-        """Whether an effect of a solution is below what anybody would act on."""
+        """Whether an effect of a solution is below what anybody would act on.
+
+        What another effect makes by itself must be exceeded beyond doubt.
+        """
         effect, nominal = self.effects[name], self.view.nominal
-        floor = max(effect.floor(nominal), effect.overshadowed(solution.c, nominal))
-        return effect.size(solution.c[name], nominal) < floor
+        shadow = effect.overshadowed(solution.c, nominal)
+        if shadow:
+            shadow += DOUBT * sigma(solution.covariance[name])
+        return effect.size(solution.c[name], nominal) < max(effect.floor(nominal), shadow)
 
     def nameless(self, solution) -> frozenset:
         """Effects of a solution that are too small for a name."""
@@ -86,6 +98,8 @@ class Ties(Refiner):
             if same or passenger or model.names == best.model.names or len(model) > len(best.model):
                 continue
             margin = TIE if self.most > 1 else LONE_TIE
+            if self._other_scales(best.model, model):  # then a form is free because it must be, and not by its merit
+                margin += max(self.linear.price * (solution.count - best.count), 0.0)
             if solution.score < best.score + margin and model.names and self.as_good(best, solution, margin):
                 if all(s.model.names != model.names for s in out):
                     out.append(solution)

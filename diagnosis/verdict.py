@@ -27,12 +27,14 @@ SLOPE_DEVICE, SLOPE_UNCLEAR = 0.12, 0.2
 # The same over what the loss grows between 0.12 and 0.3 of rated current: a drop in log(i), fitted with ohms, has up to
 # 4.7, every curve that levels off less.  Below the first they are the device's, beyond the second they are not.
 GROWS_ON, STANDS_STILL = 2.5, 5.0
+STRAIGHT = 0.03  # of the inverter's loss: fewer ohms than that may be what is wrong with its curve
 
 
-def groups(best, tied, effects, nominal, silent=frozenset(), cold=False):
+def groups(best, tied, effects, nominal, silent=frozenset(), cold=False, straight=None):
     """(asserted names, ambiguity sets): what all tied models share, and the rest in sets that exclude each other.
 
-    cold: whether the recording is known to have begun cold, so that what stood at its start is not warmth.
+    straight: (least, most) [V] of ohms at rated current that no device makes (ohms.py).  cold: whether the
+    recording is known to have begun cold, so that what stood at its start is not warmth.
     """
     models = [s.model.names - silent for s in (best, *tied)]
     shared = frozenset.intersection(*models)
@@ -52,18 +54,32 @@ def groups(best, tied, effects, nominal, silent=frozenset(), cold=False):
                 shared -= {constant}
                 ambiguity.append([constant, drift])
     if {"dead_time", "resistance"} <= shared:
-        owner = owner_of_ohms(best, effects, nominal)
+        owner = owner_of_ohms(best, effects, nominal, straight)
         if owner != "resistance":
             shared -= {"resistance"}
             ambiguity += [["dead_time", "resistance"]] if not owner else []
     return sorted(shared), ambiguity
 
 
-def owner_of_ohms(solution, effects, nominal) -> str:
+def owner_of_ohms(solution, effects, nominal, straight=None) -> str:
     """dead_time or resistance: whose the ohms beside an inverter's loss are; "" where nobody can tell.
 
     A device's slope is ohms too, but never less than none, and one that grows up to rated current grows before as well.
+    straight: (least, most) of them [V] that are none's.  More than all that the loss grows are a winding's; where they
+    may be none, they are the device's.
     """
+    least, most = straight or (-np.inf, np.inf)
+    loss = solution.c["dead_time"]
+    size = effects["dead_time"].size(loss, nominal)
+    owner = _owner_by_growth(solution, size, nominal)
+    if least > max(abs(loss.get("growth", 0.0)), STRAIGHT * size):
+        return "resistance"
+    maybe_none = straight and least <= STRAIGHT * size and most >= -STRAIGHT * size
+    return "dead_time" if not owner and maybe_none else owner
+
+
+def _owner_by_growth(solution, size, nominal) -> str:
+    """The same by what a loss of a full size [V] grows between 0.12 and 0.3 of rated current."""
     (signed, *_), loss = solution.c["resistance"].values(), solution.c["dead_time"]
     ohms = abs(signed) * nominal.machine.rated_current_a
     if signed < 0.0:
@@ -74,7 +90,7 @@ def owner_of_ohms(solution, effects, nominal) -> str:
         most = abs(growth) + DOUBT * sigma(solution.covariance["dead_time"], at)
         if ohms > STANDS_STILL * most:
             return "resistance"
-    share = ohms / max(effects["dead_time"].size(loss, nominal), 1e-9)
+    share = ohms / max(size, 1e-9)
     if ohms < GROWS_ON * growth or share < SLOPE_DEVICE:
         return "dead_time"
     return "resistance" if share >= SLOPE_UNCLEAR else ""

@@ -46,6 +46,16 @@ def _bump(x, knots):
     return np.sign(x) * np.interp(np.abs(x), knots, (0.0, 1.0, 0.0))
 
 
+def device_tails(view):
+    """Columns of what a device still takes beyond the last knot: a drop in log(i), a commutation that fades in 1/i."""
+    last = KNOTS[-1]
+    shapes = {
+        "log": lambda x: np.sign(x) * np.log(np.maximum(np.abs(x) / last, 1.0)),
+        "fade": lambda x: np.sign(x) * (1.0 - last / np.maximum(np.abs(x), last)),
+    }
+    return _following_bus(view, _leg_losses(view, shapes))
+
+
 class DeadTime(Effect):
     def core(self, view):
         ramps = {f"v_{w:g}": lambda x, w=w: np.clip(x / w, -1.0, 1.0) for w in WIDTHS}

@@ -16,6 +16,11 @@ def _d(view, shape):
     return view.machine.inductance_d_h * view.machine.rated_current_a * shape(x) + 0j
 
 
+def q_curves(view):
+    """Fluxes (b, m+1) complex dq [Wb] over i_q, per L_q i at rated current: the straight one, then bent ones."""
+    return [_q(view, shape) for shape in (lambda y: y, lambda y: y * np.abs(y), lambda y: y**3, lambda y: y**5)]
+
+
 LEAST = 0.08  # of rated current: an axis that carries less says nothing of its curve
 
 
