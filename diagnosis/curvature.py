@@ -21,6 +21,12 @@ OVER, UNDER = 1.35, -0.2  # ratio beyond which both are there
 PART = 0.03  # of L: what each of the two must amount to
 
 
+def axes_told(view) -> str:
+    """The axes, of "dq", that carry enough current in a view to say something of their flux."""
+    i = view.i.mean(axis=1) / view.machine.rated_current_a
+    return "".join(axis for axis, part in zip("dq", (i.real, i.imag), strict=True) if np.abs(part).max() > LEAST)
+
+
 def surplus(solution, axis, x):
     """Flux beyond the nominal one at currents x (per unit of rated current), in units of H A per rated A."""
     out = np.zeros_like(x)

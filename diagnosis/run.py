@@ -108,6 +108,7 @@ def _physics(recordings, nominal, progress) -> Diagnosis:
         progress("the recording that would tell")
         noise_v = float(np.nanmedian(np.abs(at_order(search.cells, found.pure, 0.0))))
         rivals = [found.best, *found.tied]
+        rivals += search.straightened(rivals)
         for group in [] if found.tied else ambiguity:  # what would be there without one or the other
             rivals += [search.refine(found.best.model.without(n)) for n in group if n in found.best.model.names]
         open_names = sorted({n for group in ambiguity for n in group})
