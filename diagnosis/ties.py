@@ -9,6 +9,7 @@ from diagnosis.curvature import FAMILY, axes_told
 from diagnosis.curves import courses
 from diagnosis.effect import ALIKE
 from diagnosis.fit import Model, Solution
+from diagnosis.idle import unseen_loss
 from diagnosis.refine import TIE, Refiner, operating_points, point_numbers
 
 LEAST_POINTS, LEAST_SPREAD = 4.0, 0.2  # operating points that say how large errors really are; no smaller than that
@@ -133,7 +134,9 @@ class Ties(Refiner):
                     out.append(solution)
         # A model that holds a tied one, or what the best one says and scores no better, is that one with a passenger.
         enough = lambda s: [*out, *(p for p in plain if p.score <= s.score)]  # noqa: E731
-        return [s for s in out if not any(o.model.names < s.model.names for o in enough(s))]
+        out = [s for s in out if not any(o.model.names < s.model.names for o in enough(s))]
+        loss = self.effects.get("dead_time") if self.most == 1 else None
+        return out + (unseen_loss(self.view, loss, [best, *out]) if loss else [])
 
     def straightened(self, solutions) -> list[Solution]:
         """Solutions with a wrong inductance of each axis in place of a saturation, where they are not among these.
