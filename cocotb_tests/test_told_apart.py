@@ -45,8 +45,16 @@ def test_a_further_recording_stands_where_its_temperature_says(view):
     assert np.ptp(middle) == 0.0 and middle[0] == pytest.approx(0.25, abs=0.03)  # half of the first half
     assert not started_cold(heating) and not started_cold(view)
     assert started_cold(joined_views([heating, warm(view, COLD + 1.0)]))
-    assert wants_cold({"magnet_flux", "magnet_temperature"}) and not wants_cold({"delay", "sampling_skew"})
-    assert not wants_cold({"magnet_temperature", "resistance_temperature"})  # both would have gone
+    assert wants_cold({"magnet_flux", "magnet_temperature"}, view) and not wants_cold({"delay", "sampling_skew"}, view)
+    assert not wants_cold({"magnet_temperature", "resistance_temperature"}, view)  # both would have gone
+
+
+def test_a_winding_that_stayed_cold_does_not_say_where_a_drift_stands(view):
+    """Magnets warm by their own losses: a further recording with a cold winding is not one of cold magnets."""
+    cold = warm(view, COLD + 1.0)
+    short = cold.take(view.run == 0).replace(span_s=0.1 * view.span_s)
+    assert np.all(joined_views([cold, short]).course[len(view) :] == 1.0)
+    assert not wants_cold({"magnet_flux", "magnet_temperature"}, cold)
 
 
 def test_a_short_further_recording_joins_a_long_one():

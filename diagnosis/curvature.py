@@ -25,6 +25,12 @@ PART = 0.03  # of L: what each of the two must amount to
 LEAST_GAIN = 30.0  # of chi^2, over the dispersion, that a straight part must bring beside any saturation
 
 
+def axes_told(view) -> str:
+    """The axes, of "dq", that carry enough current in a view to say something of their flux."""
+    i = view.i.mean(axis=1) / view.machine.rated_current_a
+    return "".join(axis for axis, part in zip("dq", (i.real, i.imag), strict=True) if np.abs(part).max() > LEAST)
+
+
 def surplus(solution, axis, x):
     """Flux beyond the nominal one at currents x (per unit of rated current), in units of H A per rated A."""
     out = np.zeros_like(x)

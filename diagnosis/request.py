@@ -12,7 +12,7 @@ from diagnosis.curvature import LEAST
 from diagnosis.experiment import BENDS, best_points, rivalry
 from diagnosis.fit import FRESH
 from diagnosis.result import Request
-from diagnosis.view import View
+from diagnosis.view import View, stayed_cold
 
 ROWS = 200
 BLOCKS = 20  # that a dwell of half a second is worth
@@ -124,13 +124,14 @@ def known_of(search, solution, columns) -> np.ndarray:
 DRIFTS = {"magnet_temperature", "resistance_temperature"}
 
 
-def wants_cold(names) -> bool:
+def wants_cold(names, view) -> bool:
     """Whether a machine that has cooled down tells the names apart: a drift has gone then, all else has not.
 
-    Two drifts have then gone both: they are told apart while the machine is warm, by the load.
+    Two drifts have then gone both: they are told apart while the machine is warm, by the load.  A winding that stayed
+    cold while something drifted cannot say of a further recording of the view that this has gone.
     """
     names = set(names)
-    return bool(DRIFTS & names) and not names <= DRIFTS
+    return bool(DRIFTS & names) and not names <= DRIFTS and not stayed_cold(view)
 
 
 def requests(search, solutions, noise_v, cold=False) -> list[Request]:

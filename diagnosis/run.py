@@ -113,10 +113,11 @@ def _physics(recordings, nominal, progress) -> Diagnosis:
         progress("the recording that would tell")
         noise_v = float(np.nanmedian(np.abs(at_order(search.cells, found.pure, 0.0))))
         rivals = [found.best, *found.tied]
+        rivals += search.straightened(rivals)
         for group in [] if found.tied else ambiguity:  # what would be there without one or the other
             rivals += [search.refine(found.best.model.without(n)) for n in group if n in found.best.model.names]
         open_names = sorted({n for group in ambiguity for n in group})
-        answer.next_recording = requests(search, rivals, noise_v, wants_cold(open_names))
+        answer.next_recording = requests(search, rivals, noise_v, wants_cold(open_names, view))
     if kind == "unexplained":
         answer.unknown_term = _lag(found, lag) if lag else _unknown(found, left)
     answer.evidence = evidence(

@@ -25,6 +25,7 @@ class Scales(Ties):
         """The best model with two scales that amount to a third one taken for that.
 
         All of (u_dc, current, magnets) scaled alike is no change at all, so any two of them alike are the third.
+        Ohms and the inductances of all axes with current, off alike, are the current's scale.
         """
         explained = self.refine(Model(frozenset())).chi2 - best.chi2
         if len(best.model) >= 3:  # three that amount to one: scaled currents with R and L_q set right again are L_d
@@ -32,15 +33,15 @@ class Scales(Ties):
             alike = [s for m in forms if self._replaces(s := self.refine(m), best, explained)]
             if alike:
                 return min(alike, key=lambda s: s.score)
-        if self.scaled_alike(best):
+        if "current_gain" in best.model.names and self.scaled_alike(best):
             rest = best.model.without("udc_gain").with_("magnet_flux")
             singles = [self.refine(self.admitted(rest.with_("current_gain", bend))) for bend in (False, True)]
             single = min(singles, key=lambda s: s.score)
             return single if self._as_complete(single, best, explained) else best
-        pair = best.model.names & SCALES
+        pair = best.model.names if self.impedance_alike(best) else best.model.names & SCALES
         if len(pair) != 2:
             return best
-        (third,) = SCALES - pair
+        (third,) = SCALES - pair if pair <= SCALES else {"current_scale"}
         rest = Model(best.model.names - pair, best.model.free - pair)
         singles = [self.refine(rest.with_(third, bend)) for bend in (False, True)]
         single = min(singles, key=lambda s: s.score)

@@ -5,14 +5,17 @@ from __future__ import annotations
 import numpy as np
 from scipy import stats
 
-from diagnosis.curvature import FAMILY
+from diagnosis.curvature import FAMILY, axes_told
+from diagnosis.curves import courses
 from diagnosis.effect import ALIKE, DOUBT, sigma
-from diagnosis.fit import Solution
-from diagnosis.refine import TIE, Refiner, point_numbers
+from diagnosis.fit import Model, Solution
+from diagnosis.idle import unseen_loss
+from diagnosis.refine import TIE, Refiner, operating_points, point_numbers
 
 LEAST_POINTS, LEAST_SPREAD = 4.0, 0.2  # operating points that say how large errors really are; no smaller than that
 SCALES = frozenset({"udc_gain", "current_scale", "magnet_flux"})  # any two of them are any other two, but for torque
-LONE_TIE = 80.0  # margin of a tie where one operating point is all there is
+LONE_TIE = 30.0  # margin of a tie where one operating point is all there is
+FILTERED = 0.2  # of the rows' scatter: so much a correction of the record may take or add and say nothing
 
 
 class Ties(Refiner):
@@ -21,19 +24,56 @@ class Ties(Refiner):
     @staticmethod
     def scaled_alike(solution) -> bool:
         """Whether the bus and all current sensors are off by one factor: then neither is, but the magnets are."""
-        if not {"udc_gain", "current_gain"} <= solution.model.names or "magnet_flux" in solution.model.names:
+        c = solution.c
+        if "udc_gain" not in c or "magnet_flux" in c or not {"current_gain", "current_scale"} & set(c):
             return False
-        bus, currents = solution.c["udc_gain"]["gain"], solution.c["current_gain"].get("common", 0.0)
-        return abs(bus - currents) < ALIKE * abs(bus)
+        bus, currents = c["udc_gain"]["gain"], c.get("current_gain", {}).get("common", 0.0)
+        return abs(bus - currents - c.get("current_scale", {}).get("scale", 0.0)) < ALIKE * abs(bus)
+
+    def impedance_alike(self, solution) -> bool:
+        """Whether ohms and every inductance that a current shows are off by one factor: then the current sensors are.
+
+        Where an axis carries no current, that takes two coefficients only.
+        """
+        m, c = self.view.machine, solution.c
+        inductances = {f"inductance_{axis}" for axis in axes_told(self.view)}
+        if not inductances or solution.model.names != {"resistance"} | inductances:
+            return False
+        shares = [c["resistance"]["delta_r"] / m.resistance_ohm]
+        shares += [c[n][f"delta_l_{n[-1]}"] / getattr(m, f"{n}_h") for n in sorted(inductances)]
+        return float(np.ptp(shares)) < ALIKE * max(np.abs(shares))
 
     def as_good(self, best, other, margin) -> bool:
         """Whether a solution scores within a margin of the best where the rows' errors are as small as they turn out.
 
         A row's standard deviation holds a share for the balance itself which is a bound: where two explanations differ,
         the residuals at the operating points may be far smaller, and a difference in chi^2 then says more.
+
+        At one operating point what stands there, or drifts, is two or three numbers, and the rows' scatter the rest of
+        chi^2: a delay that is no delay averages two voltages and leaves less noise.
         """
+        if self.most == 1:
+            own, rival = self._scatter(best), self._scatter(other)
+            filtered = np.clip(rival - own, -FILTERED * own, FILTERED * own)
+            return other.score - best.score - filtered / self.dispersion < margin
         gained = (other.chi2 - best.chi2) / self.dispersion
         return other.score - best.score + gained * (1.0 / self._spread(best, other) - 1.0) < margin
+
+    def _scatter(self, solution) -> float:
+        """chi^2 of a solution that is neither a mean nor a slow course of one functional over the blocks."""
+        points = np.eye(operating_points(self.view))[point_numbers(self.view)]
+        slow = np.concatenate([points, courses(self.view).T], axis=1)
+        use, cells, out = np.flatnonzero(self.cells.ok & self.train), self.cells, 0.0
+        error = (solution.residual / (self.sigma * solution.view.noise_gain))[use]
+        _, channel = np.unique(cells.channel[use], return_inverse=True)
+        kinds = np.stack([channel, cells.order[use], cells.part[use]], axis=1)
+        _, kind = np.unique(kinds, axis=0, return_inverse=True)
+        for k in range(kind.max() + 1):
+            rows = np.flatnonzero(kind == k)
+            stands = slow[cells.block[use[rows]]] / self.sigma[use[rows], None]
+            stands = stands / np.linalg.norm(stands, axis=0).max()
+            out += float(np.sum((error[rows] - stands @ np.linalg.lstsq(stands, error[rows], rcond=None)[0]) ** 2))
+        return out
 
     def _spread(self, best, other) -> float:
         """Variance of what the best solution leaves along where another one differs, over that of the rows.
@@ -86,11 +126,13 @@ class Ties(Refiner):
                 return []
             silent = frozenset()  # at one operating point what is too small may be something else that is not
         curved = set(FAMILY) if best.model.names & set(FAMILY) else set()
-        out, rest = [], best.model.names - curved
+        out, rest, plain = [], best.model.names - curved, []
         for model, solution in self.refined.items():
             if not np.isfinite(solution.score) or self.scaled_alike(solution):
                 continue
             said, rival = best.model.names - silent, model.names - silent - self.nameless(solution)
+            if rival == model.names == said:
+                plain.append(solution)
             if rival == said or not rival or rival != model.names - silent and not rival < said:
                 continue
             same = model.names - curved == rest and sure
@@ -100,8 +142,24 @@ class Ties(Refiner):
             margin = TIE if self.most > 1 else LONE_TIE
             if self._other_scales(best.model, model):  # then a form is free because it must be, and not by its merit
                 margin += max(self.linear.price * (solution.count - best.count), 0.0)
-            if solution.score < best.score + margin and model.names and self.as_good(best, solution, margin):
+            near = solution.score < best.score + margin or self.most == 1
+            if near and model.names and self.as_good(best, solution, margin):
                 if all(s.model.names != model.names for s in out):
                     out.append(solution)
-        # A model that holds another tied one is that one with a passenger.
-        return [s for s in out if not any(o.model.names < s.model.names for o in out)]
+        # A model that holds a tied one, or what the best one says and scores no better, is that one with a passenger.
+        enough = lambda s: [*out, *(p for p in plain if p.score <= s.score)]  # noqa: E731
+        out = [s for s in out if not any(o.model.names < s.model.names for o in enough(s))]
+        loss = self.effects.get("dead_time") if self.most == 1 else None
+        return out + (unseen_loss(self.view, loss, [best, *out]) if loss else [])
+
+    def straightened(self, solutions) -> list[Solution]:
+        """Solutions with a wrong inductance of each axis in place of a saturation, where they are not among these.
+
+        At one operating point that is one effect more and therefore not tied, but no other level of current was seen.
+        """
+        if self.most > 1:
+            return []
+        straight = {f"inductance_{axis}" for axis in axes_told(self.view)}
+        models = {Model(s.model.names - {"saturation"} | straight) for s in solutions if "saturation" in s.model.names}
+        others = [self.refine(m) for m in models if all(s.model.names != m.names for s in solutions)]
+        return [s for s in others if np.isfinite(s.score)]

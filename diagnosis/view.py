@@ -219,6 +219,11 @@ def is_cold(view) -> np.ndarray:
     return np.abs(view.temp - view.machine.temperature_ref_c) < COLD_K
 
 
+def stayed_cold(view) -> bool:
+    """Whether the winding is known to have been cold throughout: what drifted then, it does not tell the time of."""
+    return bool(is_cold(view).all())
+
+
 def started_cold(view) -> bool:
     """Whether it is known that slow changes began from the state for which the nameplate holds."""
     return bool((is_cold(view) & (view.course < 0.05)).any())
@@ -227,13 +232,14 @@ def started_cold(view) -> bool:
 def _course_of(view, first, begin, end, total):
     """(b,) course of one of several recordings: by its temperature where that tells, else from begin to end [s].
 
-    A recording that is cold throughout stands where a cold machine starts.  One at a temperature that the
-    first recording passed through stands where that was.
+    A recording that is cold throughout stands where a cold machine starts, unless the first one was cold throughout
+    as well: magnets warm by their own losses.  One at a temperature that the first recording passed through stands
+    where that was.
     """
     by_time = np.minimum(view.t + begin, end) / max(total, 1e-9)
-    if view is first or not np.isfinite(view.temp).all():
+    if view is first or not np.isfinite(view.temp).all() or stayed_cold(first):
         return by_time
-    if is_cold(view).all():
+    if stayed_cold(view):
         return np.zeros(len(view))
     known = np.isfinite(first.temp).all() and np.ptp(first.temp) > 2.0 * COLD_K
     if not known:
