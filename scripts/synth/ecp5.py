@@ -40,7 +40,7 @@ FLOORPLANS, FIRST_SEED = 2, 1  # placements from which the sites of the multipli
 # MHz that the router is asked for, one after the other until it gets there within so many rounds.  It makes its way by
 # giving wires to whoever needs them most; a net that comes off badly it leaves, unless told to route again what misses
 # the clock.  Where the clock is out of reach it never ends.
-CLOCKS_MHZ, ROUNDS, MOST_ROUNDS = (110, 105, 100), 60, 1000
+CLOCKS_MHZ, ROUNDS, MOST_ROUNDS = (115, 110, 105, 100), 100, 1000
 _ROUND = re.compile(r"iter=(\d+) ")
 
 
