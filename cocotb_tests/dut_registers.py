@@ -257,6 +257,35 @@ async def pulses_fall_back(dut):
 
 
 @cocotb.test(timeout_time=500, timeout_unit="us")  # a bus that hangs
+async def a_pulse_that_rises_as_a_sample_enters_waits_for_the_next(dut):
+    """Written in every clock around the edge that takes a sample in: each pulse is seen by one sample, none by two."""
+    bench = await Bench(dut, SEED).start()
+    rose = []
+    for lead in range(-2, 12):
+        writing = cocotb.start_soon(bench.write(MAP["clear_faults"].address, 1))
+        for _ in range(lead):
+            await FallingEdge(dut.clk)
+        taken = []  # what each sample saw at its edge: the clock before sample_busy is high
+        for _ in range(4):
+            taken.append(int(dut.clear_faults_in.value))
+            await FallingEdge(dut.clk)
+            before = taken[-1] == 0 and int(dut.clear_faults_in.value) == 1
+            dut.sample_busy.value = 1
+            for _ in range(SAMPLE_INTERVAL - 1):
+                await FallingEdge(dut.clk)
+            dut.sample_busy.value = 0
+            rose.append(before)
+            for _ in range(20):
+                await FallingEdge(dut.clk)
+        assert await writing == OKAY
+        assert sum(taken) == 1, f"lead {lead}: samples saw {taken}"
+        bench.twin.write(MAP["clear_faults"].address, 1)
+        bench.twin.sample()
+        bench.check_outputs()
+    assert any(rose)  # at the very edge
+
+
+@cocotb.test(timeout_time=500, timeout_unit="us")  # a bus that hangs
 async def status_is_what_the_core_shows(dut):
     """Random values and both ends at every status input: each word reads them, signs extended."""
     bench = await Bench(dut, SEED).start()

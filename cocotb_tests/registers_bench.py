@@ -105,6 +105,7 @@ class Bench:
     async def watch_outputs(self) -> None:
         """No register that a sample uses changes at an edge with sample_busy."""
         dut, before, busy, rst = self.dut, None, 0, 1
+        was_busy, taken = 0, 0
         clear_trip_was = 0
         while True:
             await FallingEdge(dut.clk)
@@ -117,9 +118,11 @@ class Bench:
                         f"{name} rose inside a sample"
                     )
             assert not (now["clear_trip"] and clear_trip_was), "clear_trip longer than a clock"
-            if busy:
+            if busy and not was_busy and taken:
                 assert rst or not now["clear_faults"], "clear_faults stayed although a sample took it"
             clear_trip_was = now["clear_trip"]
+            # sample_busy is up from the clock after the edge at which a sample took what was there before that
+            was_busy, taken = busy, before is not None and before["clear_faults"]
             # Inputs change at falling edges, in tasks that may run after this one: read what the edge will see.
             before = now
             await RisingEdge(dut.clk)
@@ -142,12 +145,15 @@ class Bench:
                     waiting[channel] = seen
 
     async def samples(self, shortest_gap: int) -> None:
-        """sample_busy as the top makes it: an interval long, gaps of any length from the shortest on."""
+        """sample_busy as the top makes it, gaps of any length from the shortest on."""
         while True:
+            taken = int(self.dut.clear_faults_in.value)
+            await FallingEdge(self.dut.clk)  # the edge at which the sample came was before it
             self.dut.sample_busy.value = 1
-            for _ in range(SAMPLE_INTERVAL):
+            for _ in range(SAMPLE_INTERVAL - 1):
                 await FallingEdge(self.dut.clk)
-            self.twin.sample()
+            if taken:
+                self.twin.sample()
             self.dut.sample_busy.value = 0
             for _ in range(self.rng.choice((shortest_gap, shortest_gap + 1, 7, 30, 120))):
                 await FallingEdge(self.dut.clk)

@@ -7,7 +7,7 @@ import copy
 import pytest
 
 from cocotb_tests.test_multiplier_registers import ENABLE_1, FIRST, RESET, flip_flop, simulate
-from scripts.synth.fan_out import COPY, share_out
+from scripts.synth.fan_out import COPY, share_out, shares
 from scripts.synth.netlist import Nets
 
 READERS, MOST = 100, 8
@@ -119,3 +119,49 @@ def test_luts_are_shared_out_by_what_they_serve():
     assert share_out(netlist, "t", 8) == 1
     read = [{cells[f"l{n:02d}"]["connections"]["A"][0] for n in range(block, 16, 2)} for block in (0, 1)]
     assert len(read[0]) == len(read[1]) == 1 and read[0] != read[1]
+
+
+@pytest.mark.parametrize(
+    ("blocks", "apart", "parts"),
+    [
+        ("aaabbbccc", False, ["aaabbb", "ccc"]),  # as many blocks as go together, none cut
+        ("aaabbbccc", True, ["aaa", "bbb", "ccc"]),
+        ("aabbbbbbb", False, ["aa", "bbbbbbb"]),
+        ("a" * 9 + "bb", False, ["a" * 5, "aaaabb"]),  # a large one in equal parts
+    ],
+)
+def test_blocks_are_cut_only_where_they_are_large(blocks, apart, parts):
+    readers = [(block, n) for n, block in enumerate(blocks)]
+    found = shares(readers, 8, apart)
+    assert ["".join(block for block, _ in part) for part in found] == parts
+    assert [reader for part in found for reader in part] == readers
+
+
+@pytest.mark.parametrize(
+    ("parameters", "before", "copied"),
+    [({}, "flip-flop", 1), ({"REG_INPUTA_CLK": "CLK0"}, "flip-flop", 0), ({}, "LUT", 0)],
+)
+def test_a_multiplier_has_its_operand_for_itself(parameters, before, copied):
+    """A register that a multiplier of one block and a register of another read: two, where a net more before it costs
+    nothing and the multiplier has no register itself."""
+    ports = {"A0": [101], "B0": [FIRST], "P0": [200]}
+    cells = {
+        "c.first": flip_flop(FIRST + 1, 100),
+        "c.setting": flip_flop(100, 101, ENABLE_1, LSR=RESET),
+        "a.product": {
+            "type": "MULT18X18D", "parameters": parameters, "connections": ports,
+            "port_directions": {port: "output" if port == "P0" else "input" for port in ports},
+        },
+        "a.taken": flip_flop(200, 201),
+        "b.other": flip_flop(101, 202),
+    }  # fmt: skip
+    if before == "LUT":
+        cells["c.first"] = {
+            "type": "LUT4", "parameters": {}, "connections": {"A": [FIRST + 1], "Z": [100]},
+            "port_directions": {"A": "input", "Z": "output"},
+        }  # fmt: skip
+        cells["c.source"] = flip_flop(FIRST + 2, FIRST + 1)
+    outputs = {"y": {"direction": "output", "bits": [201, 202]}}
+    netlist = {"modules": {"t": {"cells": cells, "ports": outputs}}}
+    assert share_out(netlist, "t", READERS) == copied
+    assert (cells["a.product"]["connections"]["A0"] != cells["b.other"]["connections"]["DI"]) == bool(copied)

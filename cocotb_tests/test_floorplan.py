@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 
 from scripts.synth import floorplan
-from scripts.synth.floorplan import BLOCKS, KIND, MOST, ROWS, SITES, Plan, assign, bel, costs, fix, shared
+from scripts.synth.delays import MULTIPLIER, NET, TO_Q
+from scripts.synth.floorplan import BLOCKS, KIND, MOST, ROWS, SITES, Plan, assign, bel, beside, costs, fix, shared
 
 CLOCK, HERD = 2, 30
 FAR = [n for n, (x, *_) in enumerate(SITES) if x >= 96]
@@ -50,7 +51,7 @@ def placed(start: list[int], tiles: list[tuple[int, int]]) -> dict:
 def test_a_multiplier_goes_to_what_it_serves():
     tiles = [(BLOCKS[n // 3] + 2, ROWS[n % 3] + 1) for n in range(HERD)]
     start = dict(zip((f"m{n}" for n in range(HERD)), FAR[:HERD], strict=True))
-    cost = costs(placed(list(start.values()), tiles))
+    cost = costs(placed(list(start.values()), tiles), beside(module()))
     found = assign(module()["cells"], cost, start, 60_000)
     assert len(set(found.values())) == HERD
     for n, (x, y) in enumerate(tiles):
@@ -65,7 +66,7 @@ def test_blocks_stay_legal_where_all_want_the_same():
         cells[f"m{n}"]["connections"] |= {"CE1": [200 + n], "CE2": [300 + n]}
         cells[f"m{n}"]["port_directions"] |= {"CE1": "input", "CE2": "input"}
     start = {f"m{n}": 4 * n for n in range(13)}
-    cost = costs(placed(list(start.values()), [(60, 35)] * 13))
+    cost = costs(placed(list(start.values()), [(60, 35)] * 13), beside(module(13)))
     found = assign(cells, cost, start, 60_000)
     assert sum(cost[name][site] for name, site in found.items()) < sum(cost[name][site] for name, site in start.items())
     assert len({site // 4 for site in found.values()}) == 13
@@ -88,9 +89,29 @@ def test_what_a_block_takes():
 def test_one_long_net_is_dearer_than_two_of_half_its_length():
     there = placed([0], [(10, 34)])
     there["cells"]["out0"]["attributes"]["NEXTPNR_BEL"] = "X110/Y34/A.FF0"
-    (cost,) = costs(there).values()
+    (cost,) = costs(there, {"m0": {"A0": 4.0, "P0": 4.0}}).values()
     column, row, _ = SITES[int(cost.argmin())]
     assert row == 34 and abs(column - 60) < 6
+
+
+def test_the_net_with_less_time_is_the_shorter():
+    """Without the net it takes 3 ns longer in front of the multiplier than behind: it stands nearer to its source."""
+    there = placed([0], [(10, 34)])
+    there["cells"]["out0"]["attributes"]["NEXTPNR_BEL"] = "X110/Y34/A.FF0"
+    (cost,) = costs(there, {"m0": {"A0": 6.0, "P0": 3.0}}).values()
+    column, row, _ = SITES[int(cost.argmin())]
+    assert row == 34 and column < 45
+
+
+@pytest.mark.parametrize(
+    ("registers", "before", "behind"),
+    [("", TO_Q + MULTIPLIER + NET, TO_Q + NET + MULTIPLIER), ("A", TO_Q, MULTIPLIER)],
+)
+def test_what_is_beside_a_net(registers, before, behind):
+    """Without a register the path goes on through the multiplier; with one it ends there and another begins."""
+    there = module(1)
+    there["cells"]["m0"]["parameters"] = {f"REG_INPUT{side}_CLK": "CLK0" for side in registers}
+    assert beside(there)["m0"] == pytest.approx({"A0": before, "P0": behind})
 
 
 @pytest.mark.parametrize("seed", [1, 2])

@@ -152,17 +152,19 @@ def test_the_simulation_sees_a_wrong_register():
     assert simulate(before, 0) != simulate(after, 0)
 
 
-def with_twin(**changes) -> dict:
+def with_twin(block: str = "", **changes) -> dict:
     """A product whose top bit two flip-flops hold, as they do where a product is wider than it needs to be."""
     netlist = design()
     module = netlist["modules"]["t"]
     top, twin = module["cells"]["P35"]["connections"]["DI"][0], 9999
-    module["cells"]["twin"] = flip_flop(top, twin, **changes)
+    module["cells"][f"{block}twin"] = flip_flop(top, twin, **changes)
     module["ports"]["y"]["bits"].append(twin)
     return netlist
 
 
-@pytest.mark.parametrize(("changes", "gone"), [({}, 1), ({"enable": ENABLE_1}, 0), ({"LSR": RESET}, 0)])
+@pytest.mark.parametrize(
+    ("changes", "gone"), [({}, 1), ({"enable": ENABLE_1}, 0), ({"LSR": RESET}, 0), ({"block": "other."}, 0)]
+)
 def test_twins_become_one(changes, gone):
     before = with_twin(**changes)
     after = copy.deepcopy(before)

@@ -104,6 +104,8 @@ EARLY = {
     ("merged_flux", "trig"): sincos.PASS,
     ("current_regulators", "rotor_frame"): 1,
     ("current_regulators", "speed_regulator"): 1,
+    ("models", "rotor_frame"): 1,
+    ("models", "merged_flux"): 1,
     ("circle", "current_regulators"): 1,
     ("circle", "compensation_dq"): 1,
     ("stator_voltage", "circle"): 1,

@@ -7,7 +7,8 @@
 -- Formats: per unit, see golden_model/formats.py; registers as `fluxproof registers drive.toml` prints them.
 -- Latency: sample_valid to duty_valid FLUXPROOF_SAMPLE_TO_DUTY clocks; samples at least
 -- FLUXPROOF_SAMPLE_INTERVAL apart.
--- Registers change only between samples; dead_time and min_pulse at any time, they are taken over at the valley;
+-- Registers change only between samples, at the latest at the edge that takes a sample in (a setting then counts for
+-- this sample, a reference for the next); dead_time and min_pulse at any time, they are taken over at the valley;
 -- watchdog and fault_ignore at any time.
 -- Protection: a sample that comes too early is not let in; a bad sample, a missing one and trip turn the gates off.
 
@@ -108,7 +109,7 @@ entity fluxproof is
     sample_trigger  : out std_logic;  -- middle of the zero vector: take a sample
     running         : out std_logic;  -- gates are switching
     tripped         : out std_logic;  -- a trip is remembered
-    sample_busy     : out std_logic;  -- a sample enters or is in flight: registers must not change
+    sample_busy     : out std_logic;  -- a sample is in flight: registers must not change
     fault_flags     : out unsigned(8 downto 0);  -- what has happened, see fault_latch
     first_fault     : out unsigned(7 downto 0);  -- which of them came first
     early_samples   : out unsigned(7 downto 0);  -- samples that were not let in
@@ -207,7 +208,6 @@ architecture rtl of fluxproof is
   signal cos_theta            : signed(PU_W - 1 downto 0);
   signal sin_theta            : signed(PU_W - 1 downto 0);
   signal dq_soon              : std_logic;
-  signal dq_valid             : std_logic;
   signal pi_valid             : std_logic;
   signal u_pi_d               : signed(PU_W - 1 downto 0);
   signal u_pi_q               : signed(PU_W - 1 downto 0);
@@ -290,7 +290,7 @@ begin
     );
 
   sample_entered <= sample_valid and not guard_busy;
-  sample_busy    <= sample_valid or guard_busy;
+  sample_busy    <= guard_busy;
 
   latch : entity work.sample_latch
     generic map (
@@ -468,7 +468,7 @@ begin
       cos_theta => cos_theta,
       sin_theta => sin_theta,
       out_soon  => dq_soon,
-      out_valid => dq_valid,
+      out_valid => open,
       i_d       => i_d,
       i_q       => i_q
     );
@@ -552,7 +552,7 @@ begin
     port map (
       clk         => clk,
       rst         => rst,
-      in_valid    => dq_valid,
+      in_valid    => dq_soon,
       i_d         => i_d,
       i_q         => i_q,
       lambda_m_d  => lambda_m_d,

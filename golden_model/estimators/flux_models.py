@@ -113,8 +113,8 @@ BLOCK = Block(
     ),
     registers=(FLUX_MODE, L_D, L_Q, LAMBDA_MG),
     outputs=(*MODEL, *CHOSEN),
-    latency=2,
-    interval=2,
+    latency=3,
+    interval=3,
     constants={
         "MODEL_FLUX_W": MODEL_FLUX.width,
         "MERGED_FLUX_W": MERGED_FLUX.width,

@@ -407,7 +407,7 @@ package fluxproof_pkg is
   constant FLUX_PARK_LATENCY : positive := 5;
 
   -- flux_models: 001, eq. (6) and (11)
-  constant FLUX_MODELS_LATENCY : positive := 2;
+  constant FLUX_MODELS_LATENCY : positive := 3;
   constant FLUX_MODELS_MODEL_FLUX_W : natural := 31;
   constant FLUX_MODELS_MERGED_FLUX_W : natural := 26;
   constant FLUX_MODELS_SHIFT_MG : natural := 20;

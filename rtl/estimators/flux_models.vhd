@@ -4,7 +4,7 @@
 -- merged: the merged flux counts (voltage known, a merge wanted), else the current model's; ended: it is at its end,
 -- where the rotation before has saturated.  raised: lambda_pi and half an LSB of PU.
 -- Formats: currents and lambda_mg PU, lambda_m FLUX; products exact; model S(6,24), merged S(2,23).
--- Latency: 2.  Interval: 2.
+-- Latency: 3; i_d with in_valid, i_q and the fluxes a clock later.  Interval: 3.
 -- Rounding: floored, which rounding half up to PU does not see; with raised that is a cut.
 
 library ieee;
@@ -54,13 +54,16 @@ architecture rtl of flux_models is
   constant PARTS       : positive := (FLUX_W + PART_W - 2) / PART_W;
 
   signal valid         : std_logic_vector(0 to LATENCY);
+  signal i_d_1         : signed(PU_W - 1 downto 0);
+  signal l_d_1         : unsigned(INDUCTANCE_W - 1 downto 0);
+  signal minus_rho_1   : signed(RESISTANCE_W downto 0);
   signal prod_model_d  : signed(PROD_W - 1 downto 0);
   signal prod_model_q  : signed(PROD_W - 1 downto 0);
   signal prod_merged_d : signed(PROD_W - 1 downto 0);
   signal prod_merged_q : signed(PROD_W - 1 downto 0);
-  signal merged_1      : std_logic;
-  signal ended_d_1     : std_logic_vector(PARTS - 1 downto 0);
-  signal ended_q_1     : std_logic_vector(PARTS - 1 downto 0);
+  signal merged_2      : std_logic;
+  signal ended_d_2     : std_logic_vector(PARTS - 1 downto 0);
+  signal ended_q_2     : std_logic_vector(PARTS - 1 downto 0);
   signal sum_model_d   : signed(SUM_W - 1 downto 0);
   signal sum_model_q   : signed(SUM_W - 1 downto 0);
   signal sum_merged_d  : signed(SUM_W - 1 downto 0);
@@ -89,30 +92,35 @@ begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stage 1: prod_model = l*i;  prod_merged = -rho*i
-      prod_model_d  <= i_d * signed('0' & l_d);
+      -- Stage 1: d's operands, in registers of the multipliers; i_q comes too late for one
+      i_d_1       <= i_d;
+      l_d_1       <= l_d;
+      minus_rho_1 <= minus_rho;
+
+      -- Stage 2: prod_model = l*i;  prod_merged = -rho*i
+      prod_model_d  <= i_d_1 * signed('0' & l_d_1);
       prod_model_q  <= i_q * signed('0' & l_q);
-      prod_merged_d <= i_d * minus_rho;
-      prod_merged_q <= i_q * minus_rho;
-      if valid(0) = '1' then
-        ended_d_1 <= at_end(lambda_m_d);
-        ended_q_1 <= at_end(lambda_m_q);
-        merged_1  <= '0';
+      prod_merged_d <= i_d_1 * minus_rho_1;
+      prod_merged_q <= i_q * minus_rho_1;
+      if valid(1) = '1' then
+        ended_d_2 <= at_end(lambda_m_d);
+        ended_q_2 <= at_end(lambda_m_q);
+        merged_2  <= '0';
         if flux_mode /= FLUX_MODELS_CURRENT_MODEL then
-          merged_1 <= merge_known and run;
+          merged_2 <= merge_known and run;
         end if;
       end if;
 
-      -- Stage 2: model = prod_model + lambda_mg;  merged = lambda_m + prod_merged;  raised = lambda_pi + half
-      if valid(1) = '1' then
+      -- Stage 3: model = prod_model + lambda_mg;  merged = lambda_m + prod_merged;  raised = lambda_pi + half
+      if valid(2) = '1' then
         sum_model_d  <= shift_left(resize(lambda_mg, SUM_W), SHIFT_MG) + prod_model_d;
         sum_model_q  <= resize(prod_model_q, SUM_W);
         sum_merged_d <= shift_left(resize(lambda_m_d, SUM_W), DROP_MERGED) + prod_merged_d;
         sum_merged_q <= shift_left(resize(lambda_m_q, SUM_W), DROP_MERGED) + prod_merged_q;
         raised_d     <= raised(lambda_pi_d);
         raised_q     <= raised(lambda_pi_q);
-        merged       <= merged_1;
-        ended        <= merged_1 and ((and ended_d_1) or (and ended_q_1));
+        merged       <= merged_2;
+        ended        <= merged_2 and ((and ended_d_2) or (and ended_q_2));
       end if;
 
       if rst = '1' then

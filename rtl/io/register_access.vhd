@@ -27,7 +27,7 @@ entity register_access is
     address     : in  unsigned(REGISTER_ADDRESS_W - 1 downto 0);
     data        : in  std_logic_vector(31 downto 0);
     strobe      : in  std_logic_vector(3 downto 0);
-    sample_busy : in  std_logic;  -- a sample enters or is in flight: nothing it uses may change at this edge
+    sample_busy : in  std_logic;  -- a sample is in flight: nothing it uses may change at this edge
     arming      : out std_logic;  -- in the next clock the register takes the data, if it may
     store       : out std_logic;  -- the register takes the data at this edge
     answer      : out std_logic;

@@ -5,8 +5,8 @@
 --   write: setting <= data between two samples, command <= data at once; a pulse falls back by itself
 --   read:  the word at the address, signed numbers with their sign extended
 --
--- sample_busy must be high in each clock with sample_valid and from there until nothing of the sample is in flight:
--- no output that a sample uses changes at an edge with sample_busy = '1'.
+-- sample_busy must be high from the clock after a sample was taken in until nothing of it is in flight: no output that
+-- a sample uses changes at an edge with sample_busy = '1'.
 -- Refused writes change nothing, refused reads give zero; what is refused, and the answers: register_access.vhd.
 -- Formats: those of the core's ports.  Latency: 6 clocks from request to answer, more while a write waits for the
 -- end of a sample.  Rounding: none.
@@ -43,7 +43,7 @@ entity register_file is
     s_axi_rresp       : out std_logic_vector(1 downto 0);
     s_axi_rvalid      : out std_logic;
     s_axi_rready      : in  std_logic;
-    sample_busy       : in  std_logic;  -- a sample enters or is in flight
+    sample_busy       : in  std_logic;  -- a sample is in flight
     enable            : out std_logic;  -- 040 1: gates may switch
     clear_trip        : out std_logic;  -- 044 1: forget the trip
     clear_faults_in   : out std_logic;  -- 048 1: forget what is over
@@ -185,6 +185,11 @@ architecture rtl of register_file is
   signal row_at : std_logic_vector(0 to 2**(REGISTER_WORD_W - 3) - 1);
   signal row    : std_logic_vector(0 to 2**(REGISTER_WORD_W - 3) - 1);
   signal column : std_logic_vector(0 to 7);
+  signal told   : std_logic_vector(31 downto 0);
+
+  -- A clock ago
+  signal was_busy            : std_logic;
+  signal was_clear_faults_in : std_logic;
 
   signal word_1             : natural range 0 to 2**REGISTER_WORD_W - 1;
   signal copied_low_1       : std_logic_vector(REGISTER_LIMIT_W - 1 downto 0);
@@ -255,296 +260,297 @@ begin
   process (clk)
   begin
     if rising_edge(clk) then
-      -- Pulses fall back: at the next clock, or when a sample has taken them
+      -- Pulses fall back: at the next clock, or when a sample has taken them: not the one that
+      -- came in at the edge at which they rose
       clear_trip <= '0';
-      if sample_busy = '1' then
+      if (sample_busy and not was_busy and was_clear_faults_in) = '1' then
         clear_faults_in <= '0';
       end if;
 
       if (row(2) and column(0)) = '1' then
-        enable      <= data(0);
+        enable      <= told(0);
         written(16) <= '1';
       end if;
       if (row(2) and column(1)) = '1' then
-        clear_trip <= data(0);
+        clear_trip <= told(0);
       end if;
       if (row(2) and column(2) and not sample_busy) = '1' then
-        clear_faults_in <= data(0);
+        clear_faults_in <= told(0);
       end if;
       if (row(2) and column(3)) = '1' then
-        telemetry_enable <= data(0);
+        telemetry_enable <= told(0);
         written(19)      <= '1';
       end if;
       if (row(2) and column(4) and not sample_busy) = '1' then
-        omega_ref_in <= signed(data(17 downto 0));
+        omega_ref_in <= signed(told(17 downto 0));
         written(20)  <= '1';
       end if;
       if (row(2) and column(5) and not sample_busy) = '1' then
-        i_d_ref_in  <= signed(data(17 downto 0));
+        i_d_ref_in  <= signed(told(17 downto 0));
         written(21) <= '1';
       end if;
       if (row(2) and column(6) and not sample_busy) = '1' then
-        i_q_ext_in  <= signed(data(17 downto 0));
+        i_q_ext_in  <= signed(told(17 downto 0));
         written(22) <= '1';
       end if;
       if (row(2) and column(7) and not sample_busy) = '1' then
-        speed_mode_in <= data(0);
+        speed_mode_in <= told(0);
         written(23)   <= '1';
       end if;
       if (row(3) and column(0) and not sample_busy) = '1' then
-        temp_winding_in <= signed(data(15 downto 0));
+        temp_winding_in <= signed(told(15 downto 0));
         written(24)     <= '1';
       end if;
       if (row(3) and column(1) and not sample_busy) = '1' then
-        temp_valid_in <= data(0);
+        temp_valid_in <= told(0);
         written(25)   <= '1';
       end if;
       if (row(8) and column(0) and not sample_busy) = '1' then
-        offset_a    <= unsigned(data(15 downto 0));
+        offset_a    <= unsigned(told(15 downto 0));
         written(64) <= '1';
       end if;
       if (row(8) and column(1) and not sample_busy) = '1' then
-        offset_b    <= unsigned(data(15 downto 0));
+        offset_b    <= unsigned(told(15 downto 0));
         written(65) <= '1';
       end if;
       if (row(8) and column(2) and not sample_busy) = '1' then
-        offset_c    <= unsigned(data(15 downto 0));
+        offset_c    <= unsigned(told(15 downto 0));
         written(66) <= '1';
       end if;
       if (row(8) and column(3) and not sample_busy) = '1' then
-        gain_a      <= signed(data(17 downto 0));
+        gain_a      <= signed(told(17 downto 0));
         written(67) <= '1';
       end if;
       if (row(8) and column(4) and not sample_busy) = '1' then
-        gain_b      <= signed(data(17 downto 0));
+        gain_b      <= signed(told(17 downto 0));
         written(68) <= '1';
       end if;
       if (row(8) and column(5) and not sample_busy) = '1' then
-        gain_c      <= signed(data(17 downto 0));
+        gain_c      <= signed(told(17 downto 0));
         written(69) <= '1';
       end if;
       if (row(8) and column(6) and not sample_busy) = '1' then
-        u_dc_offset <= unsigned(data(15 downto 0));
+        u_dc_offset <= unsigned(told(15 downto 0));
         written(70) <= '1';
       end if;
       if (row(8) and column(7) and not sample_busy) = '1' then
-        u_dc_gain   <= signed(data(17 downto 0));
+        u_dc_gain   <= signed(told(17 downto 0));
         written(71) <= '1';
       end if;
       if (row(9) and column(0) and not sample_busy) = '1' then
-        k_u_max     <= unsigned(data(16 downto 0));
+        k_u_max     <= unsigned(told(16 downto 0));
         written(72) <= '1';
       end if;
       if (row(9) and column(1) and not sample_busy) = '1' then
-        pole_pairs  <= unsigned(data(5 downto 0));
+        pole_pairs  <= unsigned(told(5 downto 0));
         written(73) <= '1';
       end if;
       if (row(9) and column(2) and not sample_busy) = '1' then
-        reverse     <= data(0);
+        reverse     <= told(0);
         written(74) <= '1';
       end if;
       if (row(9) and column(3) and not sample_busy) = '1' then
-        theta_offset <= unsigned(data(17 downto 0));
+        theta_offset <= unsigned(told(17 downto 0));
         written(75)  <= '1';
       end if;
       if (row(9) and column(4) and not sample_busy) = '1' then
-        k_speed     <= unsigned(data(23 downto 0));
+        k_speed     <= unsigned(told(23 downto 0));
         written(76) <= '1';
       end if;
       if (row(9) and column(5) and not sample_busy) = '1' then
-        k_filter    <= unsigned(data(16 downto 0));
+        k_filter    <= unsigned(told(16 downto 0));
         written(77) <= '1';
       end if;
       if (row(9) and column(6) and not sample_busy) = '1' then
-        rail_samples <= unsigned(data(3 downto 0));
+        rail_samples <= unsigned(told(3 downto 0));
         written(78)  <= '1';
       end if;
       if (row(9) and column(7) and not sample_busy) = '1' then
-        jump_max    <= unsigned(data(11 downto 0));
+        jump_max    <= unsigned(told(11 downto 0));
         written(79) <= '1';
       end if;
       if (row(10) and column(0) and not sample_busy) = '1' then
-        speed_kp    <= unsigned(data(23 downto 0));
+        speed_kp    <= unsigned(told(23 downto 0));
         written(80) <= '1';
       end if;
       if (row(10) and column(1) and not sample_busy) = '1' then
-        speed_ki    <= unsigned(data(23 downto 0));
+        speed_ki    <= unsigned(told(23 downto 0));
         written(81) <= '1';
       end if;
       if (row(10) and column(2) and not sample_busy) = '1' then
-        i_max       <= signed(data(17 downto 0));
+        i_max       <= signed(told(17 downto 0));
         written(82) <= '1';
       end if;
       if (row(10) and column(4) and not sample_busy) = '1' then
-        kp_d        <= unsigned(data(23 downto 0));
+        kp_d        <= unsigned(told(23 downto 0));
         written(84) <= '1';
       end if;
       if (row(10) and column(5) and not sample_busy) = '1' then
-        ki_d        <= unsigned(data(23 downto 0));
+        ki_d        <= unsigned(told(23 downto 0));
         written(85) <= '1';
       end if;
       if (row(10) and column(6) and not sample_busy) = '1' then
-        kp_q        <= unsigned(data(23 downto 0));
+        kp_q        <= unsigned(told(23 downto 0));
         written(86) <= '1';
       end if;
       if (row(10) and column(7) and not sample_busy) = '1' then
-        ki_q        <= unsigned(data(23 downto 0));
+        ki_q        <= unsigned(told(23 downto 0));
         written(87) <= '1';
       end if;
       if (row(11) and column(0) and not sample_busy) = '1' then
-        l_d         <= unsigned(data(23 downto 0));
+        l_d         <= unsigned(told(23 downto 0));
         written(88) <= '1';
       end if;
       if (row(11) and column(1) and not sample_busy) = '1' then
-        l_q         <= unsigned(data(23 downto 0));
+        l_q         <= unsigned(told(23 downto 0));
         written(89) <= '1';
       end if;
       if (row(11) and column(2) and not sample_busy) = '1' then
-        lambda_mg   <= signed(data(17 downto 0));
+        lambda_mg   <= signed(told(17 downto 0));
         written(90) <= '1';
       end if;
       if (row(11) and column(3) and not sample_busy) = '1' then
-        k_delay     <= unsigned(data(16 downto 0));
+        k_delay     <= unsigned(told(16 downto 0));
         written(91) <= '1';
       end if;
       if (row(11) and column(4) and not sample_busy) = '1' then
-        dead_time   <= unsigned(data(11 downto 0));
+        dead_time   <= unsigned(told(11 downto 0));
         written(92) <= '1';
       end if;
       if (row(11) and column(5) and not sample_busy) = '1' then
-        min_pulse   <= unsigned(data(11 downto 0));
+        min_pulse   <= unsigned(told(11 downto 0));
         written(93) <= '1';
       end if;
       if (row(11) and column(6) and not sample_busy) = '1' then
-        watchdog    <= unsigned(data(19 downto 0));
+        watchdog    <= unsigned(told(19 downto 0));
         written(94) <= '1';
       end if;
       if (row(11) and column(7) and not sample_busy) = '1' then
-        fault_ignore <= unsigned(data(6 downto 0));
+        fault_ignore <= unsigned(told(6 downto 0));
         written(95)  <= '1';
       end if;
       if (row(12) and column(0) and not sample_busy) = '1' then
-        flux_mode   <= unsigned(data(1 downto 0));
+        flux_mode   <= unsigned(told(1 downto 0));
         written(96) <= '1';
       end if;
       if (row(12) and column(1) and not sample_busy) = '1' then
-        r_s         <= unsigned(data(23 downto 0));
+        r_s         <= unsigned(told(23 downto 0));
         written(97) <= '1';
       end if;
       if (row(12) and column(2) and not sample_busy) = '1' then
-        t_s         <= unsigned(data(16 downto 0));
+        t_s         <= unsigned(told(16 downto 0));
         written(98) <= '1';
       end if;
       if (row(12) and column(3) and not sample_busy) = '1' then
-        omega_0     <= unsigned(data(15 downto 0));
+        omega_0     <= unsigned(told(15 downto 0));
         written(99) <= '1';
       end if;
       if (row(12) and column(4) and not sample_busy) = '1' then
-        xi           <= unsigned(data(15 downto 0));
+        xi           <= unsigned(told(15 downto 0));
         written(100) <= '1';
       end if;
       if (row(12) and column(5) and not sample_busy) = '1' then
-        omega_min    <= unsigned(data(16 downto 0));
+        omega_min    <= unsigned(told(16 downto 0));
         written(101) <= '1';
       end if;
       if (row(12) and column(6) and not sample_busy) = '1' then
-        k_ramp       <= unsigned(data(15 downto 0));
+        k_ramp       <= unsigned(told(15 downto 0));
         written(102) <= '1';
       end if;
       if (row(12) and column(7) and not sample_busy) = '1' then
-        flux_kp      <= unsigned(data(16 downto 0));
+        flux_kp      <= unsigned(told(16 downto 0));
         written(103) <= '1';
       end if;
       if (row(13) and column(0) and not sample_busy) = '1' then
-        flux_ki      <= unsigned(data(16 downto 0));
+        flux_ki      <= unsigned(told(16 downto 0));
         written(104) <= '1';
       end if;
       if (row(13) and column(1) and not sample_busy) = '1' then
-        delta_max    <= unsigned(data(15 downto 0));
+        delta_max    <= unsigned(told(15 downto 0));
         written(105) <= '1';
       end if;
       if (row(13) and column(2) and not sample_busy) = '1' then
-        k_chord      <= unsigned(data(16 downto 0));
+        k_chord      <= unsigned(told(16 downto 0));
         written(106) <= '1';
       end if;
       if (row(13) and column(4) and not sample_busy) = '1' then
-        tcr          <= unsigned(data(23 downto 0));
+        tcr          <= unsigned(told(23 downto 0));
         written(108) <= '1';
       end if;
       if (row(13) and column(5) and not sample_busy) = '1' then
-        t_0          <= signed(data(15 downto 0));
+        t_0          <= signed(told(15 downto 0));
         written(109) <= '1';
       end if;
       if (row(13) and column(6) and not sample_busy) = '1' then
-        t_min        <= signed(data(15 downto 0));
+        t_min        <= signed(told(15 downto 0));
         written(110) <= '1';
       end if;
       if (row(13) and column(7) and not sample_busy) = '1' then
-        t_max        <= signed(data(15 downto 0));
+        t_max        <= signed(told(15 downto 0));
         written(111) <= '1';
       end if;
       if (row(14) and column(0) and not sample_busy) = '1' then
-        compensate   <= data(0);
+        compensate   <= told(0);
         written(112) <= '1';
       end if;
       if (row(14) and column(1) and not sample_busy) = '1' then
-        k_lp         <= unsigned(data(19 downto 0));
+        k_lp         <= unsigned(told(19 downto 0));
         written(113) <= '1';
       end if;
       if (row(14) and column(2) and not sample_busy) = '1' then
-        eta_v        <= unsigned(data(20 downto 0));
+        eta_v        <= unsigned(told(20 downto 0));
         written(114) <= '1';
       end if;
       if (row(14) and column(3) and not sample_busy) = '1' then
-        gamma        <= unsigned(data(16 downto 0));
+        gamma        <= unsigned(told(16 downto 0));
         written(115) <= '1';
       end if;
       if (row(14) and column(4) and not sample_busy) = '1' then
-        zeta         <= unsigned(data(16 downto 0));
+        zeta         <= unsigned(told(16 downto 0));
         written(116) <= '1';
       end if;
       if (row(14) and column(5) and not sample_busy) = '1' then
-        v_thr        <= unsigned(data(16 downto 0));
+        v_thr        <= unsigned(told(16 downto 0));
         written(117) <= '1';
       end if;
       if (row(14) and column(6) and not sample_busy) = '1' then
-        v_comp_max   <= unsigned(data(16 downto 0));
+        v_comp_max   <= unsigned(told(16 downto 0));
         written(118) <= '1';
       end if;
       if (row(14) and column(7) and not sample_busy) = '1' then
-        i_learn      <= unsigned(data(16 downto 0));
+        i_learn      <= unsigned(told(16 downto 0));
         written(119) <= '1';
       end if;
       if (row(15) and column(0) and not sample_busy) = '1' then
-        eta_psi      <= unsigned(data(16 downto 0));
+        eta_psi      <= unsigned(told(16 downto 0));
         written(120) <= '1';
       end if;
       if (row(15) and column(1) and not sample_busy) = '1' then
-        omega_psi_min <= unsigned(data(16 downto 0));
+        omega_psi_min <= unsigned(told(16 downto 0));
         written(121)  <= '1';
       end if;
       if (row(15) and column(2) and not sample_busy) = '1' then
-        k_ahead      <= unsigned(data(16 downto 0));
+        k_ahead      <= unsigned(told(16 downto 0));
         written(122) <= '1';
       end if;
       if (row(15) and column(3) and not sample_busy) = '1' then
-        k_sign       <= unsigned(data(23 downto 0));
+        k_sign       <= unsigned(told(23 downto 0));
         written(123) <= '1';
       end if;
       if (row(15) and column(4) and not sample_busy) = '1' then
-        i_trip       <= unsigned(data(8 downto 0));
+        i_trip       <= unsigned(told(8 downto 0));
         written(124) <= '1';
       end if;
       if (row(15) and column(5) and not sample_busy) = '1' then
-        sum_trip     <= unsigned(data(8 downto 0));
+        sum_trip     <= unsigned(told(8 downto 0));
         written(125) <= '1';
       end if;
       if (row(15) and column(6) and not sample_busy) = '1' then
-        u_dc_min     <= unsigned(data(8 downto 0));
+        u_dc_min     <= unsigned(told(8 downto 0));
         written(126) <= '1';
       end if;
       if (row(15) and column(7) and not sample_busy) = '1' then
-        u_dc_max     <= unsigned(data(8 downto 0));
+        u_dc_max     <= unsigned(told(8 downto 0));
         written(127) <= '1';
       end if;
 
@@ -626,6 +632,14 @@ begin
     end if;
   end process;
 
+  process (clk)
+  begin
+    if rising_edge(clk) then
+      was_busy            <= sample_busy;
+      was_clear_faults_in <= clear_faults_in;
+    end if;
+  end process;
+
   -- What was stored is read from a RAM with the data of the registers, which costs far less than choosing among
   -- them; until its first write since reset a register reads its reset value.  It is written a clock after store: word
   -- and data stand still until the next request is taken, two clocks after the answer
@@ -646,6 +660,7 @@ begin
   process (clk)
   begin
     if rising_edge(clk) then
+      told               <= data;
       row_at             <= (others => '0');
       row_at(word / 8)   <= '1';
       column             <= (others => '0');

@@ -124,7 +124,7 @@ def register_file(words: list[Word]) -> str:
     reads_width = max(len(f"words({choice})") for choice, _ in reads)
     ports = [("clk", "in", "std_logic", ""), ("rst", "in", "std_logic", "synchronous, active high")]
     ports += [(name, mode, _vector(width), "") for name, mode, width in BUS]
-    ports.append(("sample_busy", "in", "std_logic", "a sample enters or is in flight"))
+    ports.append(("sample_busy", "in", "std_logic", "a sample is in flight"))
     ports += [(p.port, "out", p.vhdl_type, f"{w.address:03x} {p.doc}") for w, p in stored]
     ports += [
         (p.port, "in", p.vhdl_type, f"{w.address:03x} {p.doc}")
@@ -161,8 +161,8 @@ def _vector(width: int) -> str:
 
 def _from_word(part: Part) -> str:
     if part.vhdl_type == "std_logic":
-        return "data(0)"
-    return f"{'signed' if part.signed else 'unsigned'}(data({part.port_width - 1} downto 0))"
+        return "told(0)"
+    return f"{'signed' if part.signed else 'unsigned'}(told({part.port_width - 1} downto 0))"
 
 
 def _reset(word: Word, part: Part) -> str:

@@ -2,7 +2,11 @@
 
 A valid bit enables dozens of flip-flops and chooses for dozens of LUTs; a reset reaches thousands.  nextpnr keeps one
 such cell in one place.  Readers are shared out in the order of the registers they lead to, by the names that the blocks
-and registers of the VHDL gave those: what serves one register stays together, and so does what serves one block.
+and registers of the VHDL gave those: what serves one register stays together, and so does what serves one block.  A
+strobe that starts several blocks is copied for each, unless they are more than a copy may have readers.
+
+A multiplier without operands' registers leaves little for the net in front of it: a register that comes from another
+one, so that there is time for a net more before it, is copied for each block where it feeds such a multiplier.
 
 A LUT has one flip-flop beside it.  Where several take what it makes, all but one are behind a net of their own; those
 get a LUT of their own if it is late.
@@ -10,10 +14,12 @@ get a LUT of their own if it is late.
 
 from __future__ import annotations
 
-from scripts.synth.delays import Delays
+from itertools import groupby
+
+from scripts.synth.delays import TO_Q, Delays
 from scripts.synth.netlist import Nets
 
-FLIP_FLOP, LUT = "TRELLIS_FF", "LUT4"
+FLIP_FLOP, LUT, MULTIPLIER = "TRELLIS_FF", "LUT4", "MULT18X18D"
 OUTPUT = {FLIP_FLOP: "Q", LUT: "Z", "PFUMX": "Z", "L6MUX21": "Z"}
 INSIDE = {"PFUMX": ("ALUT", "BLUT"), "L6MUX21": ("D0", "D1")}  # by wires of the slice: their makers go along
 MOST = 16  # readers of one copy
@@ -71,6 +77,7 @@ def share_out(netlist: dict, top: str, most: int = MOST) -> int:
     delays = Delays(cells, nets)
     late = {bit for bit in nets.driver if delays.arrival(bit) > LATE}
     own_luts(copies, late)
+    beside_multipliers(copies, delays)
     waiting = sorted(nets.driver)
     while waiting:
         bit = waiting.pop()
@@ -81,12 +88,56 @@ def share_out(netlist: dict, top: str, most: int = MOST) -> int:
             continue
         if model.get("attributes", {}).get("keep") or connections.get("DI", [None])[0] in late:
             continue
-        share = -(-len(readers) // -(-len(readers) // most))
-        for start in range(share, len(readers), share):
-            copies.hand_over(bit, readers[start : start + share])
+        blocks = [block_of(copies.register(cell)) for cell, _ in readers]
+        apart = model["type"] == FLIP_FLOP and len(set(blocks)) <= most
+        for share in shares(list(zip(blocks, readers, strict=True)), most, apart)[1:]:
+            copies.hand_over(bit, [reader for _, reader in share])
         # What the copies read has more readers now.
         waiting += [source for (source, *_) in connections.values() if source != bit and source in nets.driver]
     return copies.added
+
+
+def block_of(name: str) -> str:
+    """The block that a cell is in, by its name."""
+    return name.rpartition(".")[0]
+
+
+def shares(readers: list[tuple], most: int, apart: bool) -> list[list[tuple]]:
+    """``readers``, (block, reader) in order, in parts of at most ``most``; a block is cut only where it alone has
+    more.  ``apart``: no part serves two blocks."""
+    parts: list[list[tuple]] = [[]]
+    for _, group in groupby(readers, lambda reader: reader[0]):
+        members = list(group)
+        size = -(-len(members) // -(-len(members) // most))
+        for start in range(0, len(members), size):
+            part = members[start : start + size]
+            if parts[-1] and (apart or len(parts[-1]) + len(part) > most):
+                parts.append([])
+            parts[-1] += part
+    return parts
+
+
+def beside_multipliers(copies: Copies, delays: Delays) -> None:
+    """Gives each block with an unregistered multiplier its own copy of a register that other blocks read too."""
+    cells, nets = copies.cells, copies.nets
+
+    def is_operand(reader: tuple[str, str]) -> bool:
+        name, port = reader
+        cell = cells.get(name, {"type": ""})
+        return cell["type"] == MULTIPLIER and port[0] in "AB" and "REG_INPUTA_CLK" not in cell["parameters"]
+
+    for bit, name in sorted(nets.flip_flop.items()):
+        model, readers = cells[name], sorted(nets.readers.get(bit, []))
+        if model.get("attributes", {}).get("keep") or any(not cell for cell, _ in readers):
+            continue
+        if delays.arrival(model["connections"].get("DI", ["x"])[0]) > TO_Q:
+            continue
+        by_block: dict[str, list] = {}
+        for reader in readers:
+            by_block.setdefault(block_of(copies.register(reader[0])), []).append(reader)
+        alone = [group for group in by_block.values() if any(map(is_operand, group))]
+        for group in alone if len(alone) < len(by_block) else alone[1:]:
+            copies.hand_over(bit, group)
 
 
 def own_luts(copies: Copies, late: set[int]) -> None:

@@ -5,8 +5,10 @@ takes no more than four clock enables in all, so that it ends wherever one is fr
 a placement known the choice is a small problem of its own, and the next placement gathers the logic around the
 multipliers, which stay.
 
-The cost of a site is the sum over the multiplier's nets of the net's delay to the power of POWER, each delay as nextpnr
-estimates it between two places; the power makes one long net dearer than several that are not.  Multipliers change
+The cost of a site is the sum over the multiplier's nets of the delay of the longest path over it to the power of POWER:
+the net as nextpnr estimates it between two places, the rest by `Delays`.  The power makes one long path dearer than
+several that are not, and what is beside the net tells apart those that may be long: a multiplier without its operands'
+registers leaves little to the net in front of it.  Multipliers change
 sites one or two at a time, to worse ones too at first, and the best that was seen counts (simulated annealing); the
 same placement gives the same sites.
 """
@@ -19,6 +21,7 @@ import re
 
 import numpy as np
 
+from scripts.synth.delays import MULTIPLIER, NET, Delays
 from scripts.synth.netlist import Nets
 
 KIND = "MULT18X18D"
@@ -26,7 +29,7 @@ KIND = "MULT18X18D"
 ROWS, BLOCKS, PLACES = (10, 34, 58), (4, 13, 22, 31, 40, 49, 58, 69, 78, 87, 96, 105, 114), (0, 1, 4, 5)
 SITES = [(x + z, y, z) for y in ROWS for x in BLOCKS for z in PLACES]
 SHARED, MOST = ("CLK", "CE", "RST"), 4  # a block takes no more than MOST nets of each
-POWER, STEPS = 3, 400_000
+POWER, STEPS = 8, 400_000
 _DATA = re.compile(r"[ABP]\d+")
 
 
@@ -48,8 +51,28 @@ def net(dx: np.ndarray, dy: np.ndarray) -> np.ndarray:
     return 0.076 * (6 + 2 * near + far)
 
 
-def costs(placed: dict) -> dict[str, np.ndarray]:
-    """{multiplier: cost of each of SITES} of a module as nextpnr wrote it after a placement."""
+def beside(module: dict) -> dict[str, dict[str, float]]:
+    """{multiplier: {data pin: ns of the longest path over the pin, but for the net at it}} of a mapped module."""
+    cells, nets = module["cells"], Nets(module)
+    delays = Delays(cells, nets)
+    found = {}
+    for name in (name for name, cell in cells.items() if cell["type"] == KIND):
+        wired, parameters = cells[name]["connections"], cells[name]["parameters"]
+        pins = {pin: bits[0] for pin, bits in wired.items() if _DATA.fullmatch(pin) and not isinstance(bits[0], str)}
+        behind = {pin: delays.rest(bit) for pin, bit in pins.items() if pin[0] == "P"}
+        through = 0.0
+        if "REG_INPUTA_CLK" not in parameters:
+            through = MULTIPLIER
+            if "REG_OUTPUT_CLK" not in parameters:
+                through += max(behind.values(), default=0.0)
+        found[name] = {
+            pin: delays.arrival(bit) + (behind[pin] - NET if pin in behind else through) for pin, bit in pins.items()
+        }
+    return found
+
+
+def costs(placed: dict, others: dict[str, dict[str, float]]) -> dict[str, np.ndarray]:
+    """{multiplier: cost of each of SITES} of a module as nextpnr wrote it after a placement; ``others`` = `beside`."""
     cells, nets = placed["cells"], Nets(placed)
     # A constant is made wherever it is needed.
     where = {name: at(cell) for name, cell in cells.items() if not name.startswith("$PACKER")}
@@ -57,11 +80,11 @@ def costs(placed: dict) -> dict[str, np.ndarray]:
     found = {}
     for name in (name for name, cell in cells.items() if cell["type"] == KIND):
         cost = found[name] = np.zeros(len(SITES))
-        for pin, bits in cells[name]["connections"].items():
-            for bit in bits if _DATA.fullmatch(pin) else ():
+        for pin, other in others[name].items():
+            for bit in cells[name]["connections"][pin]:
                 ends = {reader for reader, _ in nets.readers.get(bit, [])} if pin[0] == "P" else {nets.driver.get(bit)}
                 for x, y in (where[end] for end in sorted(ends & where.keys())):
-                    cost += net(abs(columns - x), abs(rows - y)) ** POWER
+                    cost += (other + net(abs(columns - x), abs(rows - y))) ** POWER
     return found
 
 
@@ -134,7 +157,7 @@ def fix(netlist: dict, top: str, placed: dict) -> None:
     cells = netlist["modules"][top]["cells"]
     there = max(placed["modules"].values(), key=lambda module: len(module["cells"]))  # beside it are empty models
     index = {bel(n): n for n in range(len(SITES))}
-    cost = costs(there)
+    cost = costs(there, beside(netlist["modules"][top]))
     start = {name: index[there["cells"][name]["attributes"]["NEXTPNR_BEL"]] for name in cost}
     for name, site in assign(cells, cost, start).items():
         cells[name]["attributes"] = {**cells[name].get("attributes", {}), "BEL": bel(site)}

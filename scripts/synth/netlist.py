@@ -64,8 +64,9 @@ def outputs(cell: dict) -> list[int]:
 
 
 def merge_twins(module: dict) -> int:
-    """Makes one of flip-flops that are the same at every clock, and says how many went: two bits of a register that
-    hold one sign would keep the product's register outside."""
+    """Makes one of a block's flip-flops that are the same at every clock, and says how many went: two bits of a
+    register that hold one sign would keep the product's register outside.  Those of two blocks both stay: blocks that
+    begin together count their clocks each for itself, and one that stood for all would be far from most."""
     first: dict[str, int] = {}
     same: dict[int, int] = {}
     for name, cell in list(module["cells"].items()):
@@ -73,7 +74,8 @@ def merge_twins(module: dict) -> int:
             continue
         inputs = {port: bits for port, bits in cell["connections"].items() if port != "Q"}
         (bit,) = cell["connections"]["Q"]
-        kept = first.setdefault(json.dumps([cell["parameters"], inputs], sort_keys=True), bit)
+        block = name.rpartition(".")[0]
+        kept = first.setdefault(json.dumps([block, cell["parameters"], inputs], sort_keys=True), bit)
         if kept != bit:
             same[bit] = kept
             del module["cells"][name]

@@ -1,0 +1,51 @@
+"""The router is asked for less until it gets there; a made-up one that reaches some clock and else goes on for ever."""
+
+from __future__ import annotations
+
+import json
+import sys
+
+import pytest
+
+from scripts.synth import ecp5
+from scripts.synth.yosys import SynthesisFailed
+
+ROUTER = """#!{python}
+import itertools, json
+settings = json.load(open("wanted.json"))["modules"]["top"]["settings"]
+if "{fails}":
+    print("no such option")
+    raise SystemExit(1)
+asked = float(settings["target_freq"]) / 1e6 if "router/tmg_ripup" in settings else 0.0
+for number in itertools.count(1) if asked > {reached} else (1, 2):
+    print(f"Info:     iter={{number}} wires=3 overused=0", flush=True)
+json.dump({{"fmax": {{"clk": {{"achieved": asked or 90.0}}}}}}, open("report.json", "w"))
+"""
+
+
+def routing(tmp_path, monkeypatch, reached: float, fails: str = "") -> ecp5.Routing:
+    router = tmp_path / "router"
+    router.write_text(ROUTER.format(python=sys.executable, reached=reached, fails=fails))
+    router.chmod(0o755)
+    made = ecp5.Routing.__new__(ecp5.Routing)
+    made.folder = tmp_path
+    placed = {"modules": {"top": {"cells": {"c": {}}, "settings": {"target_freq": "200e6"}}}}
+    (tmp_path / "placed.json").write_text(json.dumps(placed))
+    made._nextpnr = lambda seed, extra: None
+    made.names = type("Names", (), {"register": staticmethod(str)})
+    monkeypatch.setattr(ecp5, "tool", lambda name: str(router))
+    monkeypatch.setattr(ecp5, "read_path", lambda report, register: None)
+    return made
+
+
+@pytest.mark.parametrize(
+    ("reached", "fmax"),
+    [(300, ecp5.CLOCKS_MHZ[0]), (ecp5.CLOCKS_MHZ[1], ecp5.CLOCKS_MHZ[1]), (ecp5.CLOCKS_MHZ[-1] - 1, 90)],
+)
+def test_the_fastest_clock_that_is_reached(tmp_path, monkeypatch, reached, fmax):
+    assert routing(tmp_path, monkeypatch, reached).route(1).fmax_mhz == fmax
+
+
+def test_a_router_that_fails_is_told(tmp_path, monkeypatch):
+    with pytest.raises(SynthesisFailed, match="no such option"):
+        routing(tmp_path, monkeypatch, 300, fails="yes").route(1)
