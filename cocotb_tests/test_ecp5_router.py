@@ -19,11 +19,14 @@ if "{fails}":
 asked = float(settings["target_freq"]) / 1e6 if "router/tmg_ripup" in settings else 0.0
 for number in itertools.count(1) if asked > {reached} else (1, 2):
     print(f"Info:     iter={{number}} wires=3 overused=0", flush=True)
-json.dump({{"fmax": {{"clk": {{"achieved": asked or 90.0}}}}}}, open("report.json", "w"))
+json.dump({{"fmax": {{"clk": {{"achieved": asked or 80.0}}}}}}, open("report.json", "w"))
 """
 
 
-def routing(tmp_path, monkeypatch, reached: float, fails: str = "") -> ecp5.Routing:
+PLACER = "Info: Max frequency for clock 'clk': 90.00 MHz\nInfo: Max frequency for clock 'clk': 100.00 MHz (FAIL)\n"
+
+
+def routing(tmp_path, monkeypatch, reached: float, fails: str = "", said: str = PLACER) -> ecp5.Routing:
     router = tmp_path / "router"
     router.write_text(ROUTER.format(python=sys.executable, reached=reached, fails=fails))
     router.chmod(0o755)
@@ -31,7 +34,7 @@ def routing(tmp_path, monkeypatch, reached: float, fails: str = "") -> ecp5.Rout
     made.folder = tmp_path
     placed = {"modules": {"top": {"cells": {"c": {}}, "settings": {"target_freq": "200e6"}}}}
     (tmp_path / "placed.json").write_text(json.dumps(placed))
-    made._nextpnr = lambda seed, extra: None
+    made._nextpnr = lambda seed, extra: said
     made.names = type("Names", (), {"register": staticmethod(str)})
     monkeypatch.setattr(ecp5, "tool", lambda name: str(router))
     monkeypatch.setattr(ecp5, "read_path", lambda report, register: None)
@@ -40,7 +43,7 @@ def routing(tmp_path, monkeypatch, reached: float, fails: str = "") -> ecp5.Rout
 
 @pytest.mark.parametrize(
     ("reached", "fmax"),
-    [(300, ecp5.CLOCKS_MHZ[0]), (ecp5.CLOCKS_MHZ[1], ecp5.CLOCKS_MHZ[1]), (ecp5.CLOCKS_MHZ[-1] - 1, 90)],
+    [(300, 98.0), (95, 94.0), (91, 90.0), (89, 80.0)],
 )
 def test_the_fastest_clock_that_is_reached(tmp_path, monkeypatch, reached, fmax):
     assert routing(tmp_path, monkeypatch, reached).route(1).fmax_mhz == fmax
@@ -49,3 +52,8 @@ def test_the_fastest_clock_that_is_reached(tmp_path, monkeypatch, reached, fmax)
 def test_a_router_that_fails_is_told(tmp_path, monkeypatch):
     with pytest.raises(SynthesisFailed, match="no such option"):
         routing(tmp_path, monkeypatch, 300, fails="yes").route(1)
+
+
+def test_a_placer_without_an_estimate_is_told(tmp_path, monkeypatch):
+    with pytest.raises(SynthesisFailed, match="no frequency"):
+        routing(tmp_path, monkeypatch, 300, said="Info: placed").route(1)

