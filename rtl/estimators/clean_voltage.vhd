@@ -38,6 +38,7 @@ architecture rtl of clean_voltage is
 
   signal valid  : std_logic_vector(0 to LATENCY);
   signal s_1    : signed(PU_W - 1 downto 0);
+  signal v_1    : signed(V_LEG_W - 1 downto 0);  -- v_leg, in the multiplier's own register: it comes from afar
   signal prod_2 : signed(V_LEG_W + PU_W - 1 downto 0);
   signal u_2    : signed(FLUX_W - 1 downto 0);
   signal sum_3  : signed(SUM_W - 1 downto 0);
@@ -58,9 +59,10 @@ begin
       -- Stages 1, 2: prod = v_leg*s(k-1)
       if valid(0) = '1' or valid(1) = '1' then
         s_1 <= last_beta when valid(1) = '1' else last_alpha;
+        v_1 <= v_leg;
       end if;
       if valid(1) = '1' or valid(2) = '1' then
-        prod_2 <= v_leg * s_1;
+        prod_2 <= v_1 * s_1;
       end if;
 
       -- Stage 3: diff = u_applied - prod
