@@ -387,7 +387,7 @@ package fluxproof_pkg is
   constant APPLIED_VOLTAGE_TO_FLUX : natural := 1;
 
   -- current_model: 001, eq. (6); with lambda_add the last term of eq. (16)
-  constant CURRENT_MODEL_LATENCY : positive := 4;
+  constant CURRENT_MODEL_LATENCY : positive := 5;
 
   -- flux_inverse_park: 001, eq. (9): T_dq/alphabeta
   constant FLUX_INVERSE_PARK_LATENCY : positive := 5;
@@ -409,8 +409,9 @@ package fluxproof_pkg is
   -- flux_models: 001, eq. (6) and (11)
   constant FLUX_MODELS_LATENCY : positive := 3;
   constant FLUX_MODELS_MODEL_FLUX_W : natural := 31;
-  constant FLUX_MODELS_MERGED_FLUX_W : natural := 26;
-  constant FLUX_MODELS_SHIFT_MG : natural := 20;
+  constant FLUX_MODELS_MERGED_FLUX_W : natural := 27;
+  constant FLUX_MODELS_RAISED_W : natural := 26;
+  constant FLUX_MODELS_SHIFT_MODEL : natural := 13;
   constant FLUX_MODELS_DROP_MODEL : natural := 12;
   constant FLUX_MODELS_DROP_MERGED : natural := 17;
   constant FLUX_MODELS_HALF_PU : natural := 64;
