@@ -444,7 +444,7 @@ package fluxproof_pkg is
   constant FLUX_COMPENSATION_FORGET : natural := 8;
 
   -- torque: 001, eq. (4)
-  constant TORQUE_LATENCY : positive := 6;
+  constant TORQUE_LATENCY : positive := 7;
   constant TORQUE_DROP : natural := 16;
 
   -- flux_monitor: none: what a drive needs besides
@@ -482,7 +482,7 @@ package fluxproof_pkg is
   constant V_DEAD_ADALINE_FINE_TO_LEG : natural := 7;
 
   -- psi_adaline: 000, eq. (13), with the reluctance term of eq. (7b)
-  constant PSI_ADALINE_LATENCY : positive := 17;
+  constant PSI_ADALINE_LATENCY : positive := 18;
   constant PSI_ADALINE_PSI_STATE_W : natural := 36;
   constant PSI_ADALINE_DROP_V : natural := 11;
   constant PSI_ADALINE_DROP_R : natural := 17;
