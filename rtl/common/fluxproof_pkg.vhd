@@ -498,7 +498,7 @@ package fluxproof_pkg is
   -- telemetry_words: none: what a recording needs
   constant TELEMETRY_WORDS_LATENCY : positive := 2;
   constant TELEMETRY_WORDS_COUNT : natural := 24;
-  constant TELEMETRY_WORDS_START : natural := 39;
+  constant TELEMETRY_WORDS_START : natural := 40;
   constant TELEMETRY_WORDS_INDEX_W : natural := 5;
 
   -- telemetry: none: what a recording needs
