@@ -126,13 +126,11 @@ def _one(x, r, c, now, before):
     i_d, i_q = park.step(i_alpha, i_beta, cos_theta, sin_theta)
     _, minus_rho, lost = winding_resistance.step(x[9], x[10], r.r_s, r.tcr, r.t_0, r.t_min, r.t_max, r.t_s)
     flux_d, flux_q = flux_park.step(lambda_m_alpha, lambda_m_beta, cos_theta, sin_theta)
-    model_d, model_q, merged_d, merged_q, merged, ended, raised_d, raised_q = flux_models.step(
+    model_d, model_q, merged_d, merged_q, merged, ended, _, _ = flux_models.step(
         i_d, i_q, flux_d, flux_q, lambda_pi_d, lambda_pi_q, before[7], x[12], minus_rho, r.flux_mode, r.l_d, r.l_q,
         r.lambda_mg,
     )  # fmt: skip
-    own_d, own_q, _ = flux_estimate.step(
-        model_d, model_q, merged_d, merged_q, merged, ended, raised_d, raised_q
-    )
+    own_d, own_q, _ = flux_estimate.step(model_d, model_q, merged_d, merged_q, merged, ended)
     (chord,) = chord_speed.step(omega_me, r.k_chord)
     dec_d, dec_q = decoupling.step(omega_chord, lambda_d, lambda_q)
     u_alpha, u_beta = inverse_park.step(u_d, u_q, cos_out, sin_out)

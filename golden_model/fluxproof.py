@@ -328,7 +328,7 @@ def step(state, sample, regs, config):
         r.lambda_mg,
     )
     lambda_d, lambda_q, estimate_limited = flux_estimate.step(
-        model_d, model_q, merged_d, merged_q, merged, ended, raised_d, raised_q
+        model_d, model_q, merged_d, merged_q, merged, ended
     )
     (omega_chord,) = chord_speed.step(omega_me, r.k_chord)
     u_dec_d, u_dec_q = decoupling.step(omega_chord, lambda_d, lambda_q)
@@ -351,7 +351,7 @@ def step(state, sample, regs, config):
     )
     s_alpha, s_beta = current_directions.step(i_alpha, i_beta, omega_me, r.k_ahead, r.k_sign)
     lambda_c_d, lambda_c_q, model_limited = current_model.step(
-        model_d, model_q, state.lambda_add_d, state.lambda_add_q
+        model_d, model_q, raised_d, raised_q, state.lambda_add_d, state.lambda_add_q
     )
     lambda_c_alpha, lambda_c_beta = flux_inverse_park.step(lambda_c_d, lambda_c_q, cos_theta, sin_theta)
     merge_state, (lambda_m_alpha, lambda_m_beta, merge_known, merge_limited) = flux_merge.step(

@@ -244,8 +244,8 @@ architecture rtl of fluxproof is
   signal merged_q             : signed(FLUX_MODELS_MERGED_FLUX_W - 1 downto 0);
   signal merged               : std_logic;
   signal ended                : std_logic;
-  signal raised_d             : signed(FLUX_MODELS_MERGED_FLUX_W - 1 downto 0);
-  signal raised_q             : signed(FLUX_MODELS_MERGED_FLUX_W - 1 downto 0);
+  signal raised_d             : signed(FLUX_MODELS_RAISED_W - 1 downto 0);
+  signal raised_q             : signed(FLUX_MODELS_RAISED_W - 1 downto 0);
   signal model_valid          : std_logic;
   signal model_ab_valid       : std_logic;
   signal factor_valid         : std_logic;
@@ -588,8 +588,6 @@ begin
       merged_q         => merged_q,
       merged           => merged,
       ended            => ended,
-      raised_d         => raised_d,
-      raised_q         => raised_q,
       out_valid        => lambda_valid,
       lambda_d         => lambda_d,
       lambda_q         => lambda_q,
@@ -772,6 +770,8 @@ begin
       in_valid      => models_valid,
       model_d       => model_d,
       model_q       => model_q,
+      raised_d      => raised_d,
+      raised_q      => raised_q,
       lambda_add_d  => lambda_add_d,
       lambda_add_q  => lambda_add_q,
       out_valid     => model_valid,

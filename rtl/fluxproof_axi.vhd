@@ -5,9 +5,9 @@
 -- Clock: everything works on aclk.  All inputs but trip must be synchronous to it: bring converter and encoder
 -- signals through registers of aclk, sample_valid one clock long when the codes are stable.  trip is the one
 -- asynchronous input; io/power_stage takes it in.
--- Reset: aresetn, synchronous to aclk, for at least 4 clocks; inside, a clock later, it is rst, active high, out of a
--- flip-flop that tools can copy.  While it lasts all gates are off; afterwards enable, every register and the memory
--- of trips are at their reset values (all off).
+-- Reset: aresetn, synchronous to aclk, for at least 4 clocks; inside, two clocks later, it is rst, active high, out of
+-- a flip-flop that tools can copy; the one before it stands by the pin.  While it lasts all gates are off; afterwards
+-- enable, every register and the memory of trips are at their reset values (all off).
 -- Formats: codes as the converters give them; registers as `fluxproof registers drive.toml` prints them.
 -- Latency: sample_valid to duties FLUXPROOF_SAMPLE_TO_DUTY clocks; trip to gates off 0 clocks.
 -- The file keeps to VHDL-93 so that a block design can also take it as a module.
@@ -65,6 +65,7 @@ entity fluxproof_axi is
 end entity fluxproof_axi;
 
 architecture rtl of fluxproof_axi is
+  signal rst_1             : std_logic;
   signal rst               : std_logic;
   signal enable            : std_logic;
   signal clear_trip        : std_logic;
@@ -186,7 +187,8 @@ begin
   process (aclk)
   begin
     if rising_edge(aclk) then
-      rst <= not aresetn;
+      rst_1 <= not aresetn;
+      rst   <= rst_1;
     end if;
   end process;
 

@@ -3,29 +3,31 @@
     lambda_c_d = l_d*i_d + lambda_mg + lambda_add_d
     lambda_c_q = l_q*i_q             + lambda_add_q
 
-The products are those of flux_models.  ``lambda_add`` is the earlier scheme's correction, eq. (16), which adds
+``model`` is that of flux_models, which has ``raised``, the estimate's compensation, in it; that is taken off again.
+``lambda_add`` is the earlier scheme's correction, eq. (16), which adds
 delta_lambda to this model; zero in every other mode (see flux_compensation).
 Formats: model with one bit more than FLUX; sum rounded half up to FLUX.
 Saturation: at 2 per unit of flux, twice what full voltage makes at base speed; told by ``model_limited``.
 """
 
 from golden_model.block import Block, Port
-from golden_model.estimators.flux_models import MODEL
+from golden_model.estimators.flux_models import MODEL, RAISED_DQ
 from golden_model.fixed import exceeds, round_half_up, saturate
 from golden_model.formats import BIT, FLUX, FLUX_W
 from golden_model.kernel import kernel
 
 
 @kernel
-def step(model_d, model_q, lambda_add_d, lambda_add_q):
-    rounded_d = round_half_up(model_d + (lambda_add_d << 1), 1)
-    rounded_q = round_half_up(model_q + (lambda_add_q << 1), 1)
+def step(model_d, model_q, raised_d, raised_q, lambda_add_d, lambda_add_q):
+    rounded_d = round_half_up(model_d + ((lambda_add_d - raised_d) << 1), 1)
+    rounded_q = round_half_up(model_q + ((lambda_add_q - raised_q) << 1), 1)
     limited = exceeds(rounded_d, FLUX_W) | exceeds(rounded_q, FLUX_W)
     return saturate(rounded_d, FLUX_W), saturate(rounded_q, FLUX_W), limited
 
 
 def reference(v, _state):
-    return {f"lambda_c_{x}": FLUX.limit(v[f"model_{x}"] + v[f"lambda_add_{x}"]) for x in ("d", "q")}
+    sums = {x: v[f"model_{x}"] - v[f"raised_{x}"] + v[f"lambda_add_{x}"] for x in ("d", "q")}
+    return {f"lambda_c_{x}": FLUX.limit(total) for x, total in sums.items()}
 
 
 def bound(_v, _state):
@@ -39,6 +41,7 @@ BLOCK = Block(
     step=step,
     inputs=(
         *MODEL,
+        *RAISED_DQ,
         Port("lambda_add_d", FLUX, doc="correction of eq. (16), d axis"),
         Port("lambda_add_q", FLUX, doc="correction of eq. (16), q axis"),
     ),
@@ -47,7 +50,7 @@ BLOCK = Block(
         Port("lambda_c_q", FLUX, doc="flux linkage of the current model, q axis"),
         Port("model_limited", BIT, doc="the current model reached its range"),
     ),
-    latency=4,
+    latency=5,
     interval=4,
     reference=reference,
     bound=bound,

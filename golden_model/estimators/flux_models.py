@@ -1,14 +1,16 @@
 """What both models say about this sample's flux linkages; flux_estimate and current_model take them from here.
 
-    model_d  = l_d*i_d + lambda_mg,  model_q = l_q*i_q     the linear magnetic model, paper 001 eq. (6)
-    merged_d = lambda_m_d - rho*i_d;  q alike              the merged models, eq. (11), at this sample
+    model_d  = l_d*i_d + lambda_mg + raised_d     the linear magnetic model, paper 001 eq. (6)
+    model_q  = l_q*i_q + raised_q
+    merged_d = lambda_m_d - rho*i_d + raised_d    the merged models, eq. (11), at this sample; q alike
 
 lambda_m is the flux that flux_merge carried here from the last sample, all but this sample's resistive drop.  Both are
 affine in the current that has just been measured: one multiplication behind the Park transform.
 ``merged`` chooses: the merged flux where the voltage is known and flux_mode wants a merge, else the current model.
 ``ended``: the chosen merged flux is at its end, where the rotation before has saturated.
 
-``raised``: the compensation and half an LSB of PU, so that flux_estimate rounds half up by a cut.
+``raised``: the compensation and half an LSB of PU, so that flux_estimate rounds half up by a cut and adds nothing;
+known from the last sample, it is added to what does not wait for the current.  current_model takes it off again.
 
 Formats: products and sums exact.  model is floored to half an LSB of FLUX, merged to FLUX: rounding half up to PU does
 not see what the floor took.
@@ -24,13 +26,15 @@ from golden_model.transforms.flux_park import LAMBDA_M_DQ
 MODE = Format(0, 2, 0)
 CURRENT_MODEL, MERGED, EARLIER, PROPOSED = 0, 1, 2, 3
 MODEL_FLUX = Format(1, 6, FLUX.frac_bits + 1)
-MERGED_FLUX = Format(1, 2, FLUX.frac_bits)  # of the compensation too
+MERGED_FLUX = Format(1, 3, FLUX.frac_bits)
+RAISED = Format(1, 2, FLUX.frac_bits)
 SHIFT_MG = INDUCTANCE.frac_bits
+SHIFT_MODEL = PU.frac_bits + INDUCTANCE.frac_bits - FLUX.frac_bits
 DROP_MODEL = PU.frac_bits + INDUCTANCE.frac_bits - MODEL_FLUX.frac_bits
 DROP_MERGED = PU.frac_bits + RESISTANCE.frac_bits - MERGED_FLUX.frac_bits
 HALF_PU = 1 << (PU_TO_FLUX - 1)
 END_HI, END_LO = FLUX.hi, FLUX.lo
-MODEL_MAX = 35 << MODEL_FLUX.frac_bits  # 16 of inductance times 2 of current, and the magnets
+MODEL_MAX = 37 << MODEL_FLUX.frac_bits  # 16 of inductance times 2 of current, the magnets and the compensation
 
 
 @kernel
@@ -38,23 +42,25 @@ def step(
     i_d, i_q, lambda_m_d, lambda_m_q, lambda_pi_d, lambda_pi_q, merge_known, run, minus_rho,
     flux_mode, l_d, l_q, lambda_mg,
 ):  # fmt: skip
-    model_d = (l_d * i_d + (lambda_mg << SHIFT_MG)) >> DROP_MODEL
-    model_q = (l_q * i_q) >> DROP_MODEL
-    merged_d = ((lambda_m_d << DROP_MERGED) + minus_rho * i_d) >> DROP_MERGED
-    merged_q = ((lambda_m_q << DROP_MERGED) + minus_rho * i_q) >> DROP_MERGED
+    raised_d, raised_q = lambda_pi_d + HALF_PU, lambda_pi_q + HALF_PU
+    model_d = (l_d * i_d + (lambda_mg << SHIFT_MG) + (raised_d << SHIFT_MODEL)) >> DROP_MODEL
+    model_q = (l_q * i_q + (raised_q << SHIFT_MODEL)) >> DROP_MODEL
+    merged_d = (((lambda_m_d + raised_d) << DROP_MERGED) + minus_rho * i_d) >> DROP_MERGED
+    merged_q = (((lambda_m_q + raised_q) << DROP_MERGED) + minus_rho * i_q) >> DROP_MERGED
     merged = 1 if merge_known and run and flux_mode != CURRENT_MODEL else 0
     end_d = lambda_m_d == END_HI or lambda_m_d == END_LO
     end_q = lambda_m_q == END_HI or lambda_m_q == END_LO
     ended = 1 if merged and (end_d or end_q) else 0
-    return model_d, model_q, merged_d, merged_q, merged, ended, lambda_pi_d + HALF_PU, lambda_pi_q + HALF_PU
+    return model_d, model_q, merged_d, merged_q, merged, ended, raised_d, raised_q
 
 
 def reference(v, _state):
     out = {}
     for x, magnet in (("d", v["lambda_mg"]), ("q", 0.0)):
-        out[f"model_{x}"] = v[f"l_{x}"] * v[f"i_{x}"] + magnet
-        out[f"merged_{x}"] = v[f"lambda_m_{x}"] + v["minus_rho"] * v[f"i_{x}"]
-        out[f"raised_{x}"] = v[f"lambda_pi_{x}"] + PU.lsb / 2
+        raised = v[f"lambda_pi_{x}"] + PU.lsb / 2
+        out[f"model_{x}"] = v[f"l_{x}"] * v[f"i_{x}"] + magnet + raised
+        out[f"merged_{x}"] = v[f"lambda_m_{x}"] + v["minus_rho"] * v[f"i_{x}"] + raised
+        out[f"raised_{x}"] = raised
     return out
 
 
@@ -84,16 +90,18 @@ L_D = Port("l_d", INDUCTANCE, doc="inductance, d axis")
 L_Q = Port("l_q", INDUCTANCE, doc="inductance, q axis")
 LAMBDA_MG = Port("lambda_mg", PU, doc="magnet flux linkage")
 MODEL = (
-    Port("model_d", MODEL_FLUX, -MODEL_MAX, MODEL_MAX, "flux linkage from the current, d axis"),
-    Port("model_q", MODEL_FLUX, -MODEL_MAX, MODEL_MAX, "flux linkage from the current, q axis"),
+    Port("model_d", MODEL_FLUX, -MODEL_MAX, MODEL_MAX, "flux linkage from the current, and raised, d axis"),
+    Port("model_q", MODEL_FLUX, -MODEL_MAX, MODEL_MAX, "flux linkage from the current, and raised, q axis"),
 )
 CHOSEN = (
-    Port("merged_d", MERGED_FLUX, doc="merged flux at this sample, d axis"),
-    Port("merged_q", MERGED_FLUX, doc="merged flux at this sample, q axis"),
+    Port("merged_d", MERGED_FLUX, doc="merged flux at this sample, and raised, d axis"),
+    Port("merged_q", MERGED_FLUX, doc="merged flux at this sample, and raised, q axis"),
     Port("merged", BIT, doc="1: the merged flux counts, else the current model's"),
     Port("ended", BIT, doc="1: it counts and is at its end"),
-    Port("raised_d", MERGED_FLUX, FLUX.lo, FLUX.hi + HALF_PU, "compensation and half an LSB of PU, d axis"),
-    Port("raised_q", MERGED_FLUX, FLUX.lo, FLUX.hi + HALF_PU, "compensation and half an LSB of PU, q axis"),
+)
+RAISED_DQ = (
+    Port("raised_d", RAISED, FLUX.lo, FLUX.hi + HALF_PU, "compensation and half an LSB of PU, d axis"),
+    Port("raised_q", RAISED, FLUX.lo, FLUX.hi + HALF_PU, "compensation and half an LSB of PU, q axis"),
 )
 
 BLOCK = Block(
@@ -112,13 +120,14 @@ BLOCK = Block(
         MINUS_RHO,
     ),
     registers=(FLUX_MODE, L_D, L_Q, LAMBDA_MG),
-    outputs=(*MODEL, *CHOSEN),
+    outputs=(*MODEL, *CHOSEN, *RAISED_DQ),
     latency=3,
     interval=3,
     constants={
         "MODEL_FLUX_W": MODEL_FLUX.width,
         "MERGED_FLUX_W": MERGED_FLUX.width,
-        "SHIFT_MG": SHIFT_MG,
+        "RAISED_W": RAISED.width,
+        "SHIFT_MODEL": SHIFT_MODEL,
         "DROP_MODEL": DROP_MODEL,
         "DROP_MERGED": DROP_MERGED,
         "HALF_PU": HALF_PU,

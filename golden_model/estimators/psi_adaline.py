@@ -137,8 +137,8 @@ BLOCK = Block(
         Port("psi_held", BIT, doc="1: psi_m is held"),
     ),
     state=State(),
-    latency=17,
-    interval=17,
+    latency=18,
+    interval=18,
     constants={
         "PSI_STATE_W": PSI_STATE_W,
         "DROP_V": DROP_V,

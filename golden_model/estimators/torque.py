@@ -41,7 +41,7 @@ BLOCK = Block(
         Port("i_q", PU, doc="current, q axis"),
     ),
     outputs=(Port("torque", PU, doc="estimated torque"),),
-    latency=6,
+    latency=7,
     interval=4,
     constants={"DROP": DROP},
     reference=reference,

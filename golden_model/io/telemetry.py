@@ -1,7 +1,7 @@
 """An AXI4-Stream packet for every sample: what the core took in, what it answered, and the sample's number.
 
 A packet's words (telemetry_words) are taken from the core's live values, one a clock from TELEMETRY_WORDS_START clocks
-after the sample on, into a queue (packet_fifo) that the sink empties at its pace.
+after the sample on, as they were a clock before, into a queue (packet_fifo) that the sink empties at its pace.
 
 * The controller never waits.  A sample whose packet does not fit into the queue has none: ``dropped`` counts it, up to
   65535, and the reader sees the gap in the samples' numbers, which run on, modulo 2**32, from 0 after a reset.
@@ -33,6 +33,7 @@ class State(NamedTuple):
     index: int = 0
     dropped: int = 0
     sample: tuple = (0,) * len(INPUTS)
+    shown: tuple = (0,) * len(SHOWN)  # the core's values a clock before
     valid_1: int = 0
     word_1: int = 0
     last_1: int = 0
@@ -64,7 +65,7 @@ def step(state, enable, sample_valid, m_axis_tready, *values):
 
     word_1, last_1, word_2, last_2 = s.word_1, s.last_1, s.word_2, s.last_2
     if s.active:
-        fields = {**dict(zip(INPUTS, s.sample, strict=True)), **dict(zip(SHOWN, shown, strict=True))}
+        fields = {**dict(zip(INPUTS, s.sample, strict=True)), **dict(zip(SHOWN, s.shown, strict=True))}
         (word_1,) = telemetry_words.step(s.index, s.counter, *(fields[name] for name in FIELDS))
         last_1 = 1 if s.index == COUNT - 1 else 0
     if s.valid_1:
@@ -73,7 +74,8 @@ def step(state, enable, sample_valid, m_axis_tready, *values):
         s.queue, s.valid_2, s.word_2, s.last_2, m_axis_tready, WORD.width, depth_bits, COUNT
     )
     following = State(
-        age, counter, active, index, dropped, sample, s.active, word_1, last_1, s.valid_1, word_2, last_2, queue
+        age, counter, active, index, dropped, sample, tuple(shown),
+        s.active, word_1, last_1, s.valid_1, word_2, last_2, queue,
     )  # fmt: skip
     return following, (tdata, tvalid, tlast, dropped)
 

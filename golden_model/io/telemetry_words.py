@@ -7,9 +7,10 @@ capture and ``fluxproof diagnose`` take it from here.  A word holds
 * two of at most 16 bits, each extended to 16, the first in the low half, or
 * several, one behind the other from bit 0 on, zeros above (a signed one has its sign in its own top bit).
 
-Nothing is copied before it is sent: the values of a sample stay until the next one's replace them, and the packet
-takes each between the two (``window``).  The order of the words and ``START`` follow from that; a latency that no
-longer fits ends the import with the word's name.
+No packet is copied before it is sent: the values of a sample stay until the next one's replace them, and the packet
+takes each between the two (``window``), the core's as they were a clock before: they come from all over the chip and
+go through a register first.  The order of the words and ``START`` follow from that; a latency that no longer fits
+ends the import with the word's name.
 """
 
 from typing import NamedTuple
@@ -122,10 +123,15 @@ def window(names) -> tuple[int, int]:
     """(first, last) clock edge since the raw sample's at which all these fields are this sample's.
 
     From the last result on; up to the edge at which the next sample, as close as it may come, reaches the first of
-    their blocks: outputs change behind that edge at the earliest.
+    their blocks: outputs change behind that edge at the earliest.  What the core answered is taken a clock old.
     """
-    times = [fluxproof.schedule()[owner(name)] for name in names]
-    return max(last for _, last in times), fluxproof.SAMPLE_INTERVAL + min(first for first, _ in times)
+    starts, ends = [], []
+    for name in names:
+        first, last = fluxproof.schedule()[owner(name)]
+        old = 0 if name in INPUTS else 1
+        starts.append(first + old)
+        ends.append(last + old)
+    return max(ends), fluxproof.SAMPLE_INTERVAL + min(starts)
 
 
 def _start() -> int:

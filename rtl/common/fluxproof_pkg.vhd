@@ -387,7 +387,7 @@ package fluxproof_pkg is
   constant APPLIED_VOLTAGE_TO_FLUX : natural := 1;
 
   -- current_model: 001, eq. (6); with lambda_add the last term of eq. (16)
-  constant CURRENT_MODEL_LATENCY : positive := 4;
+  constant CURRENT_MODEL_LATENCY : positive := 5;
 
   -- flux_inverse_park: 001, eq. (9): T_dq/alphabeta
   constant FLUX_INVERSE_PARK_LATENCY : positive := 5;
@@ -409,8 +409,9 @@ package fluxproof_pkg is
   -- flux_models: 001, eq. (6) and (11)
   constant FLUX_MODELS_LATENCY : positive := 3;
   constant FLUX_MODELS_MODEL_FLUX_W : natural := 31;
-  constant FLUX_MODELS_MERGED_FLUX_W : natural := 26;
-  constant FLUX_MODELS_SHIFT_MG : natural := 20;
+  constant FLUX_MODELS_MERGED_FLUX_W : natural := 27;
+  constant FLUX_MODELS_RAISED_W : natural := 26;
+  constant FLUX_MODELS_SHIFT_MODEL : natural := 13;
   constant FLUX_MODELS_DROP_MODEL : natural := 12;
   constant FLUX_MODELS_DROP_MERGED : natural := 17;
   constant FLUX_MODELS_HALF_PU : natural := 64;
@@ -443,7 +444,7 @@ package fluxproof_pkg is
   constant FLUX_COMPENSATION_FORGET : natural := 8;
 
   -- torque: 001, eq. (4)
-  constant TORQUE_LATENCY : positive := 6;
+  constant TORQUE_LATENCY : positive := 7;
   constant TORQUE_DROP : natural := 16;
 
   -- flux_monitor: none: what a drive needs besides
@@ -481,7 +482,7 @@ package fluxproof_pkg is
   constant V_DEAD_ADALINE_FINE_TO_LEG : natural := 7;
 
   -- psi_adaline: 000, eq. (13), with the reluctance term of eq. (7b)
-  constant PSI_ADALINE_LATENCY : positive := 17;
+  constant PSI_ADALINE_LATENCY : positive := 18;
   constant PSI_ADALINE_PSI_STATE_W : natural := 36;
   constant PSI_ADALINE_DROP_V : natural := 11;
   constant PSI_ADALINE_DROP_R : natural := 17;
@@ -497,7 +498,7 @@ package fluxproof_pkg is
   -- telemetry_words: none: what a recording needs
   constant TELEMETRY_WORDS_LATENCY : positive := 2;
   constant TELEMETRY_WORDS_COUNT : natural := 24;
-  constant TELEMETRY_WORDS_START : natural := 39;
+  constant TELEMETRY_WORDS_START : natural := 40;
   constant TELEMETRY_WORDS_INDEX_W : natural := 5;
 
   -- telemetry: none: what a recording needs

@@ -1,9 +1,10 @@
 -- Purpose: flux linkages from currents by the linear magnetic model, paper 001 eq. (6); d first, then q.
---   lambda_c_d = l_d*i_d + lambda_mg + lambda_add_d
---   lambda_c_q = l_q*i_q             + lambda_add_q
--- The products are those of flux_models.  lambda_add is the correction of eq. (16), zero in every other mode.
--- Formats: model S(6,24); lambda_add and results FLUX.
--- Latency: 4 (d, q follow each other).  Interval: 4.
+--   lambda_c_d = l_d*i_d + lambda_mg + lambda_add_d = model_d + (lambda_add_d - raised_d)
+--   lambda_c_q = l_q*i_q             + lambda_add_q = model_q + (lambda_add_q - raised_q)
+-- model is that of flux_models, which has the estimate's compensation in it; here that goes again, as there is time for
+-- it here and not there.  lambda_add is the correction of eq. (16), zero in every other mode.
+-- Formats: model S(6,24), raised S(2,23); lambda_add and results FLUX; sums exact.
+-- Latency: 5 (d, q follow each other).  Interval: 4.
 -- Rounding: half up, saturated at 2 per unit, twice the flux that full voltage makes at base speed; model_limited
 -- tells it.
 
@@ -20,6 +21,8 @@ entity current_model is
     in_valid      : in  std_logic;
     model_d       : in  signed(FLUX_MODELS_MODEL_FLUX_W - 1 downto 0);
     model_q       : in  signed(FLUX_MODELS_MODEL_FLUX_W - 1 downto 0);
+    raised_d      : in  signed(FLUX_MODELS_RAISED_W - 1 downto 0);
+    raised_q      : in  signed(FLUX_MODELS_RAISED_W - 1 downto 0);
     lambda_add_d  : in  signed(FLUX_W - 1 downto 0);
     lambda_add_q  : in  signed(FLUX_W - 1 downto 0);
     out_valid     : out std_logic;
@@ -32,39 +35,48 @@ end entity current_model;
 architecture rtl of current_model is
   constant LATENCY : positive := CURRENT_MODEL_LATENCY;
   constant SUM_W   : positive := FLUX_MODELS_MODEL_FLUX_W;
+  constant REST_W  : positive := FLUX_MODELS_RAISED_W + 1;
 
   signal valid     : std_logic_vector(0 to LATENCY);
-  signal model_0   : signed(SUM_W - 1 downto 0);
-  signal add_0     : signed(FLUX_W - 1 downto 0);
-  signal sum_1     : signed(SUM_W - 1 downto 0);
-  signal rounded_2 : signed(SUM_W - 2 downto 0);
+  signal add_0     : signed(REST_W - 1 downto 0);
+  signal raised_0  : signed(REST_W - 1 downto 0);
+  signal rest_1    : signed(REST_W - 1 downto 0);
+  signal model_1   : signed(SUM_W - 1 downto 0);
+  signal sum_2     : signed(SUM_W - 1 downto 0);
+  signal rounded_3 : signed(SUM_W - 2 downto 0);
 begin
   valid(0) <= in_valid;
 
   -- The axis of the beat
-  model_0 <= model_q when valid(1) = '1' else model_d;
-  add_0   <= lambda_add_q when valid(1) = '1' else lambda_add_d;
+  add_0    <= resize(lambda_add_q, REST_W) when valid(1) = '1' else resize(lambda_add_d, REST_W);
+  raised_0 <= resize(raised_q, REST_W) when valid(1) = '1' else resize(raised_d, REST_W);
+  model_1  <= model_q when valid(2) = '1' else model_d;
 
   process (clk)
   begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stage 1: sum = model + lambda_add; below 37 per unit, so it fits
+      -- Stage 1: rest = lambda_add - raised
       if valid(0) = '1' or valid(1) = '1' then
-        sum_1 <= (add_0 & '0') + model_0;
+        rest_1 <= add_0 - raised_0;
       end if;
 
-      -- Stage 2: sum, rounded
+      -- Stage 2: sum = model + rest; below 37 per unit, so it fits
       if valid(1) = '1' or valid(2) = '1' then
-        rounded_2 <= resize(round_half_up(sum_1, 1), SUM_W - 1);
+        sum_2 <= (rest_1 & '0') + model_1;
       end if;
 
-      -- Stage 3: lambda_c = sum, narrowed; d at clock 3, from where it moves on, q at 4
+      -- Stage 3: sum, rounded
       if valid(2) = '1' or valid(3) = '1' then
-        lambda_c_q    <= saturate(rounded_2, FLUX_W);
+        rounded_3 <= resize(round_half_up(sum_2, 1), SUM_W - 1);
+      end if;
+
+      -- Stage 4: lambda_c = sum, narrowed; d at clock 4, from where it moves on, q at 5
+      if valid(3) = '1' or valid(4) = '1' then
+        lambda_c_q    <= saturate(rounded_3, FLUX_W);
         lambda_c_d    <= lambda_c_q;
-        model_limited <= exceeds(rounded_2, FLUX_W) or (model_limited and valid(3));
+        model_limited <= exceeds(rounded_3, FLUX_W) or (model_limited and valid(4));
       end if;
 
       if rst = '1' then

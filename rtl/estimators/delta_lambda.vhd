@@ -53,33 +53,35 @@ architecture rtl of delta_lambda is
   signal u_int_d_2 : signed(INTEGRAL_W - 1 downto 0);
   signal u_int_q_2 : signed(INTEGRAL_W - 1 downto 0);
 
-  signal valid     : std_logic_vector(0 to LATENCY);
-  signal held_1    : std_logic;
-  signal moving_1  : std_logic_vector(1 downto 0);  -- whether the factor is not zero, by halves
-  signal limited   : std_logic;  -- in either axis
-  signal i_1       : signed(PU_W - 1 downto 0);
-  signal prod_2    : signed(PU_W + RESISTANCE_W downto 0);
-  signal u_int_2   : signed(INTEGRAL_W - 1 downto 0);
-  signal sum_3     : signed(REST_W + DROP_R downto 0);
-  signal rest_3    : signed(REST_W - 1 downto 0);
-  signal coarse_4  : signed(FIT_W - 1 downto 0);
-  signal over_4    : std_logic_vector(2 downto 0);
-  signal more_4    : std_logic;
-  signal sign_4    : std_logic;
-  signal shifted_5 : signed(FIT_W downto 0);
-  signal over_5    : std_logic;
-  signal rounded_6 : signed(FLUX_W downto 0);
-  signal past_6    : std_logic;
-  signal rounded_5 : signed(FLUX_W + 1 downto 0);
-  signal value_7   : signed(FLUX_W - 1 downto 0);
-  signal prod_8    : signed(PROD_W - 1 downto 0);
-  signal half_8    : signed(PROD_W downto 0);
-  signal sum_9     : signed(PROD_W downto 0);
-  signal old_9     : signed(FLUX_W - 1 downto 0);
-  signal sum_10    : signed(PROD_W - DROP downto 0);
-  signal past_10   : std_logic;
-  signal faded_10  : signed(FLUX_W - 1 downto 0);
-  signal delta_10  : signed(FLUX_W - 1 downto 0);
+  signal valid      : std_logic_vector(0 to LATENCY);
+  signal free_1     : std_logic;                     -- no limit holds the voltage
+  signal measured_1 : std_logic;
+  signal held_2     : std_logic;
+  signal moving_1   : std_logic_vector(1 downto 0);  -- whether the factor is not zero, by halves
+  signal limited    : std_logic;  -- in either axis
+  signal i_1        : signed(PU_W - 1 downto 0);
+  signal prod_2     : signed(PU_W + RESISTANCE_W downto 0);
+  signal u_int_2    : signed(INTEGRAL_W - 1 downto 0);
+  signal sum_3      : signed(REST_W + DROP_R downto 0);
+  signal rest_3     : signed(REST_W - 1 downto 0);
+  signal coarse_4   : signed(FIT_W - 1 downto 0);
+  signal over_4     : std_logic_vector(2 downto 0);
+  signal more_4     : std_logic;
+  signal sign_4     : std_logic;
+  signal shifted_5  : signed(FIT_W downto 0);
+  signal over_5     : std_logic;
+  signal rounded_6  : signed(FLUX_W downto 0);
+  signal past_6     : std_logic;
+  signal rounded_5  : signed(FLUX_W + 1 downto 0);
+  signal value_7    : signed(FLUX_W - 1 downto 0);
+  signal prod_8     : signed(PROD_W - 1 downto 0);
+  signal half_8     : signed(PROD_W downto 0);
+  signal sum_9      : signed(PROD_W downto 0);
+  signal old_9      : signed(FLUX_W - 1 downto 0);
+  signal sum_10     : signed(PROD_W - DROP downto 0);
+  signal past_10    : std_logic;
+  signal faded_10   : signed(FLUX_W - 1 downto 0);
+  signal delta_10   : signed(FLUX_W - 1 downto 0);
 begin
   valid(0) <= in_valid;
 
@@ -108,7 +110,7 @@ begin
 
   -- Half up of prod for d, of -prod for q: the complement of prod less half an LSB and one is -prod and half an LSB.
   half_8   <= rounding_base("0", DROP, PROD_W + 1) xor valid(9);
-  delta_10 <= faded_10 when held_1 = '1' else
+  delta_10 <= faded_10 when held_2 = '1' else
               narrowed(sum_10, past_10, FLUX_W) xor valid(11);
 
   process (clk)
@@ -116,8 +118,12 @@ begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stage 1: held = run where the integrals mean something else
-      held_1   <= run and ((or sat_d) or (or sat_q) or (or current_at_rail) or not voltage_known);
+      -- Stages 1, 2: held = run where the integrals mean something else; by halves, as the flags come from afar
+      free_1     <= not ((or sat_d) or (or sat_q));
+      measured_1 <= voltage_known and not (or current_at_rail);
+      held_2     <= run and not (free_1 and measured_1);
+
+      -- Stage 1: whether there is a factor
       moving_1 <= (or factor(RECIPROCAL_W downto RECIPROCAL_W / 2)) & (or factor(RECIPROCAL_W / 2 - 1 downto 0));
 
       -- Stages 1, 2: prod = r*i
@@ -175,8 +181,8 @@ begin
       end if;
       if valid(11) = '1' then
         delta_lambda_q <= delta_10;
-        delta_held     <= held_1;
-        delta_limited  <= limited and (or moving_1) and run and not held_1;
+        delta_held     <= held_2;
+        delta_limited  <= limited and (or moving_1) and run and not held_2;
         u_int_d_1      <= u_int_d;
         u_int_q_1      <= u_int_q;
         u_int_d_2      <= u_int_d_1;

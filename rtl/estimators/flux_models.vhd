@@ -1,10 +1,11 @@
 -- Purpose: what both models say about this sample's flux linkages, for flux_estimate and current_model.
---   model_d  = l_d*i_d + lambda_mg,  model_q = l_q*i_q      paper 001 eq. (6)
---   merged_d = lambda_m_d - rho*i_d;  q alike               eq. (11)
+--   model_d  = l_d*i_d + lambda_mg + raised_d,  model_q = l_q*i_q + raised_q      paper 001 eq. (6)
+--   merged_d = lambda_m_d - rho*i_d + raised_d;  q alike                          eq. (11)
+-- raised: lambda_pi and half an LSB of PU.  It is in both, so that nothing is left to add behind them.
 -- merged: the merged flux counts (voltage known, a merge wanted), else the current model's; ended: it is at its end,
--- where the rotation before has saturated.  raised: lambda_pi and half an LSB of PU.
--- Formats: currents and lambda_mg PU, lambda_m FLUX; products exact; model S(6,24), merged S(2,23).
--- Latency: 3; i_d with in_valid, i_q and the fluxes a clock later.  Interval: 3.
+-- where the rotation before has saturated.
+-- Formats: currents and lambda_mg PU, fluxes FLUX; products exact; model S(6,24), merged S(3,23), raised S(2,23).
+-- Latency: 3; i_q and lambda_m a clock after in_valid.  Interval: 3.
 -- Rounding: floored, which rounding half up to PU does not see; with raised that is a cut.
 
 library ieee;
@@ -38,18 +39,19 @@ entity flux_models is
     merged_q    : out signed(FLUX_MODELS_MERGED_FLUX_W - 1 downto 0);
     merged      : out std_logic;
     ended       : out std_logic;
-    raised_d    : out signed(FLUX_MODELS_MERGED_FLUX_W - 1 downto 0);
-    raised_q    : out signed(FLUX_MODELS_MERGED_FLUX_W - 1 downto 0)
+    raised_d    : out signed(FLUX_MODELS_RAISED_W - 1 downto 0);
+    raised_q    : out signed(FLUX_MODELS_RAISED_W - 1 downto 0)
   );
 end entity flux_models;
 
 architecture rtl of flux_models is
   constant LATENCY     : positive := FLUX_MODELS_LATENCY;
-  constant SHIFT_MG    : positive := FLUX_MODELS_SHIFT_MG;
+  constant SHIFT_MODEL : positive := FLUX_MODELS_SHIFT_MODEL;
   constant DROP_MODEL  : positive := FLUX_MODELS_DROP_MODEL;
   constant DROP_MERGED : positive := FLUX_MODELS_DROP_MERGED;
   constant PROD_W      : positive := PU_W + INDUCTANCE_W + 1;
   constant SUM_W       : positive := PROD_W + 1;
+  constant BASE_W      : positive := FLUX_MODELS_MERGED_FLUX_W;
   constant PART_W      : positive := 6;
   constant PARTS       : positive := (FLUX_W + PART_W - 2) / PART_W;
 
@@ -61,6 +63,9 @@ architecture rtl of flux_models is
   signal prod_model_q  : signed(PROD_W - 1 downto 0);
   signal prod_merged_d : signed(PROD_W - 1 downto 0);
   signal prod_merged_q : signed(PROD_W - 1 downto 0);
+  signal base_model_d  : signed(BASE_W - 1 downto 0);
+  signal base_merged_d : signed(BASE_W - 1 downto 0);
+  signal base_merged_q : signed(BASE_W - 1 downto 0);
   signal merged_2      : std_logic;
   signal ended_d_2     : std_logic_vector(PARTS - 1 downto 0);
   signal ended_q_2     : std_logic_vector(PARTS - 1 downto 0);
@@ -82,7 +87,7 @@ architecture rtl of flux_models is
 
   function raised (lambda_pi : signed) return signed is
   begin
-    return resize(lambda_pi, FLUX_MODELS_MERGED_FLUX_W) + FLUX_MODELS_HALF_PU;
+    return resize(lambda_pi, FLUX_MODELS_RAISED_W) + FLUX_MODELS_HALF_PU;
   end function;
 begin
   valid(0) <= in_valid;
@@ -92,33 +97,38 @@ begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stage 1: d's operands, in registers of the multipliers; i_q comes too late for one
+      -- Stage 1: d's operands, in registers of the multipliers; i_q comes too late for one.  raised = lambda_pi + half
       i_d_1       <= i_d;
       l_d_1       <= l_d;
       minus_rho_1 <= minus_rho;
+      if valid(0) = '1' then
+        raised_d <= raised(lambda_pi_d);
+        raised_q <= raised(lambda_pi_q);
+      end if;
 
-      -- Stage 2: prod_model = l*i;  prod_merged = -rho*i
+      -- Stage 2: prod_model = l*i;  prod_merged = -rho*i;  base: all that does not wait for the current
       prod_model_d  <= i_d_1 * signed('0' & l_d_1);
       prod_model_q  <= i_q * signed('0' & l_q);
       prod_merged_d <= i_d_1 * minus_rho_1;
       prod_merged_q <= i_q * minus_rho_1;
       if valid(1) = '1' then
-        ended_d_2 <= at_end(lambda_m_d);
-        ended_q_2 <= at_end(lambda_m_q);
-        merged_2  <= '0';
+        base_model_d  <= shift_left(resize(lambda_mg, BASE_W), PU_TO_FLUX) + raised_d;
+        base_merged_d <= resize(lambda_m_d, BASE_W) + raised_d;
+        base_merged_q <= resize(lambda_m_q, BASE_W) + raised_q;
+        ended_d_2     <= at_end(lambda_m_d);
+        ended_q_2     <= at_end(lambda_m_q);
+        merged_2      <= '0';
         if flux_mode /= FLUX_MODELS_CURRENT_MODEL then
           merged_2 <= merge_known and run;
         end if;
       end if;
 
-      -- Stage 3: model = prod_model + lambda_mg;  merged = lambda_m + prod_merged;  raised = lambda_pi + half
+      -- Stage 3: model = base + prod_model, where base is raised alone in q;  merged = base + prod_merged
       if valid(2) = '1' then
-        sum_model_d  <= shift_left(resize(lambda_mg, SUM_W), SHIFT_MG) + prod_model_d;
-        sum_model_q  <= resize(prod_model_q, SUM_W);
-        sum_merged_d <= shift_left(resize(lambda_m_d, SUM_W), DROP_MERGED) + prod_merged_d;
-        sum_merged_q <= shift_left(resize(lambda_m_q, SUM_W), DROP_MERGED) + prod_merged_q;
-        raised_d     <= raised(lambda_pi_d);
-        raised_q     <= raised(lambda_pi_q);
+        sum_model_d  <= shift_left(resize(base_model_d, SUM_W), SHIFT_MODEL) + prod_model_d;
+        sum_model_q  <= shift_left(resize(raised_q, SUM_W), SHIFT_MODEL) + prod_model_q;
+        sum_merged_d <= shift_left(resize(base_merged_d, SUM_W), DROP_MERGED) + prod_merged_d;
+        sum_merged_q <= shift_left(resize(base_merged_q, SUM_W), DROP_MERGED) + prod_merged_q;
         merged       <= merged_2;
         ended        <= merged_2 and ((and ended_d_2) or (and ended_q_2));
       end if;

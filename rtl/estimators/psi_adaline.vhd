@@ -4,7 +4,7 @@
 -- known or the gates off.
 -- r*i_q, v_leg*d_q, flux*omega_chord and e*omega_chord share a multiplier and the adder behind it.
 -- Formats: products and e FLUX, psi_m inside S(1,34), out PU.
--- Latency: 17.  Interval: 17.
+-- Latency: 18.  Interval: 18.
 -- Rounding: half up.  l_d*i_d, the flux, e, omega_chord*e and psi_m saturate.
 
 library ieee;
@@ -57,9 +57,17 @@ architecture rtl of psi_adaline is
   signal psi : signed(STATE_W - 1 downto 0);
 
   signal valid    : std_logic_vector(0 to LATENCY);
+  signal free     : std_logic;                              -- no limit holds the voltage
+  signal measured : std_logic;
   signal learning : std_logic;
-  signal room_1   : signed(PU_W - 1 downto 0);
-  signal slow_1   : std_logic;
+  signal u_q_1    : signed(PU_W - 1 downto 0);
+  signal d_q_1    : signed(PU_W - 1 downto 0);
+  signal v_leg_1  : signed(V_LEG_W - 1 downto 0);
+  signal i_q_1    : signed(PU_W - 1 downto 0);
+  signal r_1      : unsigned(RESISTANCE_W - 1 downto 0);
+  signal omega_1  : signed(PU_W - 1 downto 0);
+  signal room_2   : signed(PU_W - 1 downto 0);
+  signal slow_2   : std_logic;
   signal prod_own : signed(PROD_W - 1 downto 0);
   signal sum_own  : signed(PROD_W downto 0);
   signal past_3   : std_logic;
@@ -68,7 +76,7 @@ architecture rtl of psi_adaline is
   signal half_3   : std_logic;
   signal sum_flux : signed(FLUX_W + 1 downto 0);
   signal flux_4   : signed(FLUX_W downto 0);
-  signal narrow   : signed(FLUX_W - 1 downto 0);            -- e at clock 8, pull at clock 12
+  signal narrow   : signed(FLUX_W - 1 downto 0);            -- e at clock 9, pull at clock 13
   signal factor_a : signed(FLUX_W - 1 downto 0);
   signal factor_b : signed(PU_W - 1 downto 0);
   signal mul_a    : signed(FLUX_W - 1 downto 0);
@@ -79,8 +87,8 @@ architecture rtl of psi_adaline is
   signal sum      : signed(SUM_W - 1 downto 0);
   signal prod_psi : signed(FLUX_W + eta_psi'length downto 0);
   signal sum_psi  : signed(SUM_P_W - 1 downto 0);
-  signal end_16   : std_logic_vector(1 downto 0);
-  signal half_16  : std_logic;
+  signal end_17   : std_logic_vector(1 downto 0);
+  signal half_17  : std_logic;
 
   -- Whether x, cut to width bits, is the last number: a half would round it past the end of its range.  By halves.
   function at_end (x : signed; width : positive) return std_logic_vector is
@@ -93,26 +101,26 @@ begin
   valid(0) <= in_valid;
 
   -- |omega_chord| < omega_psi_min; the complement of a negative speed is one less than its size.
-  slow_1 <= not room_1(PU_W - 1) and ((or room_1(PU_W - 2 downto 1)) or (room_1(0) and not omega_chord(PU_W - 1)));
+  slow_2 <= not room_2(PU_W - 1) and ((or room_2(PU_W - 2 downto 1)) or (room_2(0) and not omega_1(PU_W - 1)));
 
   -- own + psi rounded, by one carry: what the complement of own lacks and the half.
   own_3    <= narrowed(sum_own(PROD_W downto DROP_L), past_3, FLUX_W);
   half_3   <= psi(TO_FLUX - 1) and not (and end_3);
-  half_16  <= psi(TO_PU - 1) and not (and end_16);
+  half_17  <= psi(TO_PU - 1) and not (and end_17);
   sum_flux <= (resize(psi(STATE_W - 1 downto TO_FLUX), FLUX_W + 1) & half_3) - (resize(not own_3, FLUX_W + 1) & '1');
 
-  factor_a <= saturate(flux_4, FLUX_W) when valid(4) = '1' else
-              not narrow when valid(8) = '1' else
-              shift_left(resize(v_leg, FLUX_W), TO_R) when valid(2) = '1' else
-              signed('0' & r);
-  factor_b <= i_q when valid(0) = '1' else
-              d_q when valid(2) = '1' else
-              omega_chord;
+  factor_a <= saturate(flux_4, FLUX_W) when valid(5) = '1' else
+              not narrow when valid(9) = '1' else
+              shift_left(resize(v_leg_1, FLUX_W), TO_R) when valid(3) = '1' else
+              signed('0' & r_1);
+  factor_b <= i_q_1 when valid(1) = '1' else
+              d_q_1 when valid(3) = '1' else
+              omega_1;
 
   -- e grows as its complement: the adder behind the multiplier only adds.
-  base <= rounding_base(not shift_left(resize(u_q, FLUX_W), PU_TO_FLUX), DROP_R, SUM_W) when valid(1) = '1' else
-          rounding_base(sum(SUM_W - 1 downto DROP_R), DROP_R, SUM_W) when valid(3) = '1' else
-          rounding_base(sum(SUM_W - 1 downto DROP_R), DROP_OMEGA, SUM_W) when valid(5) = '1' else
+  base <= rounding_base(not shift_left(resize(u_q_1, FLUX_W), PU_TO_FLUX), DROP_R, SUM_W) when valid(2) = '1' else
+          rounding_base(sum(SUM_W - 1 downto DROP_R), DROP_R, SUM_W) when valid(4) = '1' else
+          rounding_base(sum(SUM_W - 1 downto DROP_R), DROP_OMEGA, SUM_W) when valid(6) = '1' else
           rounding_base("0", DROP_OMEGA, SUM_W);
 
   process (clk)
@@ -120,9 +128,20 @@ begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stage 1: room = omega_psi_min - |omega_chord|
+      -- Stage 1: what comes from all over the chip, in registers that can stand here; with an enable, as without one
+      -- they would be v_dead_adaline's, which stand there
       if valid(0) = '1' then
-        room_1 <= signed('0' & omega_psi_min) - (omega_chord xor omega_chord(PU_W - 1));
+        u_q_1   <= u_q;
+        d_q_1   <= d_q;
+        v_leg_1 <= v_leg;
+        i_q_1   <= i_q;
+        r_1     <= r;
+        omega_1 <= omega_chord;
+      end if;
+
+      -- Stage 2: room = omega_psi_min - |omega_chord|
+      if valid(1) = '1' then
+        room_2 <= signed('0' & omega_psi_min) - (omega_1 xor omega_1(PU_W - 1));
       end if;
 
       -- Stages 1 to 4: flux = l_d*i_d + psi, each narrowed.  From here to sum_psi nothing needs an enable: every factor
@@ -133,33 +152,35 @@ begin
       end_3    <= at_end(psi, FLUX_W);
       flux_4   <= sum_flux(FLUX_W + 1 downto 1);
 
-      -- Stages 1, 3, 5, 9: r and i_q, v_leg and d_q, flux and omega_chord, e and omega_chord
+      -- Stages 2, 4, 6, 10: r and i_q, v_leg and d_q, flux and omega_chord, e and omega_chord
       mul_a <= factor_a;
       mul_b <= factor_b;
 
-      -- Stages 2, 4, 6, 10: prod = r*i_q, v_leg*d_q, flux*omega_chord, e*omega_chord, and what it is added to
+      -- Stages 3, 5, 7, 11: prod = r*i_q, v_leg*d_q, flux*omega_chord, e*omega_chord, and what it is added to
       prod   <= mul_a * mul_b;
       addend <= base;
 
-      -- Stages 3, 5, 7, 11: sum = e = u_q - prod, e -= prod, e -= prod, pull;  stages 8, 12: narrowed
+      -- Stages 4, 6, 8, 12: sum = e = u_q - prod, e -= prod, e -= prod, pull;  stages 9, 13: narrowed
       sum    <= addend + prod;
       narrow <= saturate(sum(SUM_W - 1 downto DROP_OMEGA), FLUX_W);
 
-      -- Stages 13 to 15: psi += eta_psi*pull, narrowed, unless it is held
-      learning <= run and voltage_known when sat_d = 0 and sat_q = 0 and current_at_rail = 0 else '0';
-      if valid(11) = '1' then
-        psi_held <= slow_1 or not learning;
+      -- Stages 14 to 16: psi += eta_psi*pull, narrowed, unless it is held
+      free     <= '1' when sat_d = 0 and sat_q = 0 else '0';
+      measured <= voltage_known when current_at_rail = 0 else '0';
+      learning <= run and free and measured;
+      if valid(12) = '1' then
+        psi_held <= slow_2 or not learning;
       end if;
       prod_psi <= narrow * signed('0' & eta_psi);
       sum_psi  <= rounding_base(psi, DROP_ETA, SUM_P_W) + prod_psi;
-      if valid(14) = '1' and psi_held = '0' then
+      if valid(15) = '1' and psi_held = '0' then
         psi <= saturate(sum_psi(SUM_P_W - 1 downto DROP_ETA), STATE_W);
       end if;
 
-      -- Stages 16, 17: psi_m = psi, narrowed
-      end_16 <= at_end(psi, PU_W);
-      if valid(16) = '1' then
-        psi_m <= signed'('0' & half_16) + psi(STATE_W - 1 downto TO_PU);
+      -- Stages 17, 18: psi_m = psi, narrowed
+      end_17 <= at_end(psi, PU_W);
+      if valid(17) = '1' then
+        psi_m <= signed'('0' & half_17) + psi(STATE_W - 1 downto TO_PU);
       end if;
 
       if rst = '1' then

@@ -1,7 +1,7 @@
 -- Purpose: estimated torque, paper 001 eq. (4), both products through one multiplier.
 --   torque = lambda_d*i_q - lambda_q*i_d        per unit of 3/2*p*lambda_base*I_base
 -- Formats: PU in and out; products and difference exact.
--- Latency: 6.  Interval: 4.  Rounding: half up, saturated at 2 per unit; flux and current at their bases make one.
+-- Latency: 7.  Interval: 4.  Rounding: half up, saturated at 2 per unit; flux and current at their bases make one.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -27,51 +27,57 @@ architecture rtl of torque is
   constant LATENCY : positive := TORQUE_LATENCY;
   constant SUM_W   : positive := 2 * PU_W + 1;
 
-  signal valid    : std_logic_vector(0 to LATENCY);
-  signal lambda_0 : signed(PU_W downto 0);
-  signal factor_0 : signed(PU_W + 1 downto 0);
-  signal lambda_1 : signed(PU_W downto 0);
-  signal i_1      : signed(PU_W - 1 downto 0);
-  signal prod_2   : signed(SUM_W - 1 downto 0);
-  signal addend_2 : signed(SUM_W - 1 downto 0);
-  signal sum_3    : signed(SUM_W - 1 downto 0);
+  signal valid      : std_logic_vector(0 to LATENCY);
+  signal lambda_d_1 : signed(PU_W - 1 downto 0);
+  signal lambda_q_1 : signed(PU_W - 1 downto 0);
+  signal lambda_1   : signed(PU_W downto 0);
+  signal factor_1   : signed(PU_W + 1 downto 0);
+  signal lambda_2   : signed(PU_W downto 0);
+  signal i_2        : signed(PU_W - 1 downto 0);
+  signal prod_3     : signed(SUM_W - 1 downto 0);
+  signal addend_3   : signed(SUM_W - 1 downto 0);
+  signal sum_4      : signed(SUM_W - 1 downto 0);
 begin
   valid(0) <= in_valid;
 
   -- lambda_d, then not lambda_q and a carry from one bit below: a plain sum before the multiplier yosys takes for the
   -- DSP48's pre-adder and forgets the operands' signs
-  lambda_0 <= not resize(lambda_q, PU_W + 1) when valid(2) = '1' else resize(lambda_d, PU_W + 1);
-  factor_0 <= (lambda_0 & '1') + signed'('0' & valid(2));
+  lambda_1 <= not resize(lambda_q_1, PU_W + 1) when valid(3) = '1' else resize(lambda_d_1, PU_W + 1);
+  factor_1 <= (lambda_1 & '1') + signed'('0' & valid(3));
 
   process (clk)
   begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stages 1, 3: lambda_d and i_q, then -lambda_q and i_d
-      if valid(0) = '1' or valid(2) = '1' then
-        lambda_1 <= factor_0(PU_W + 1 downto 1);
-        i_1      <= i_d when valid(2) = '1' else i_q;
+      -- Stage 1: the flux, next to the multiplier
+      lambda_d_1 <= lambda_d;
+      lambda_q_1 <= lambda_q;
+
+      -- Stages 2, 4: lambda_d and i_q, then -lambda_q and i_d
+      if valid(1) = '1' or valid(3) = '1' then
+        lambda_2 <= factor_1(PU_W + 1 downto 1);
+        i_2      <= i_d when valid(3) = '1' else i_q;
       end if;
 
-      -- Stages 2, 4: prod = lambda_d*i_q, then -lambda_q*i_d;  what it is added to: half an LSB to round with, then
+      -- Stages 3, 5: prod = lambda_d*i_q, then -lambda_q*i_d;  what it is added to: half an LSB to round with, then
       -- the sum so far, from a register of its own, for yosys would put feedback into the DSP48, wrongly
-      if valid(1) = '1' or valid(3) = '1' then
-        prod_2   <= lambda_1 * i_1;
-        addend_2 <= sum_3;
-        if valid(1) = '1' then
-          addend_2 <= half(TORQUE_DROP, SUM_W);
+      if valid(2) = '1' or valid(4) = '1' then
+        prod_3   <= lambda_2 * i_2;
+        addend_3 <= sum_4;
+        if valid(2) = '1' then
+          addend_3 <= half(TORQUE_DROP, SUM_W);
         end if;
       end if;
 
-      -- Stages 3, 5: lambda_d*i_q, then lambda_d*i_q - lambda_q*i_d
-      if valid(2) = '1' or valid(4) = '1' then
-        sum_3 <= prod_2 + addend_2;
+      -- Stages 4, 6: lambda_d*i_q, then lambda_d*i_q - lambda_q*i_d
+      if valid(3) = '1' or valid(5) = '1' then
+        sum_4 <= prod_3 + addend_3;
       end if;
 
-      -- Stage 6: torque = sum, narrowed
-      if valid(5) = '1' then
-        torque <= saturate(sum_3(SUM_W - 1 downto TORQUE_DROP), PU_W);
+      -- Stage 7: torque = sum, narrowed
+      if valid(6) = '1' then
+        torque <= saturate(sum_4(SUM_W - 1 downto TORQUE_DROP), PU_W);
       end if;
 
       if rst = '1' then

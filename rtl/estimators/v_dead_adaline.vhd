@@ -73,17 +73,22 @@ architecture rtl of v_dead_adaline is
 
   signal valid     : std_logic_vector(0 to LATENCY);
   signal learning  : std_logic;
-  signal i_0       : signed(PU_W - 1 downto 0);
-  signal size      : unsigned(PU_W downto 0);               -- |i_d| at clock 2, |i_d| + |i_q| at clock 3
-  signal strong_4  : std_logic;
-  signal x_0       : signed(PU_W - 1 downto 0);
+  signal free      : std_logic;                             -- no limit holds the voltage
+  signal measured  : std_logic;
+  signal u_1       : signed(PU_W - 1 downto 0);
+  signal d_1       : signed(PU_W - 1 downto 0);
+  signal i_d_1     : signed(PU_W - 1 downto 0);
+  signal i_q_1     : signed(PU_W - 1 downto 0);
+  signal i_1       : signed(PU_W - 1 downto 0);
+  signal size      : unsigned(PU_W downto 0);               -- |i_d| at clock 3, |i_d| + |i_q| at clock 4
+  signal strong_5  : std_logic;
+  signal x_1       : signed(PU_W - 1 downto 0);
   signal room      : signed(PU_W + 1 downto 0);
-  signal diff      : signed(PU_W downto 0);                 -- complement of u_pi_d - lp_u, of d_d - lp_d
-  signal h         : signed(PU_W - 1 downto 0);             -- u_h at clock 2, d_h from clock 6 on
-  signal u_h_6     : signed(PU_W - 1 downto 0);
+  signal diff      : signed(PU_W downto 0);                 -- complement of d_d - lp_d, of u_pi_d - lp_u
+  signal h         : signed(PU_W - 1 downto 0);             -- d_h at clock 3, u_h from clock 7 on
   signal prod_lp   : signed(k_lp'length + PU_W downto 0);
   signal sum_lp    : signed(k_lp'length + PU_W + 1 downto 0);
-  signal moved     : signed(INTEGRAL_W - 1 downto 0);       -- lp_u at clock 4, lp_d at clock 8
+  signal moved     : signed(INTEGRAL_W - 1 downto 0);       -- lp_d at clock 5, lp_u at clock 9
   signal lp_under  : std_logic_vector(1 downto 0);          -- by halves of what is above half an LSB of PU
   signal mul_a     : signed(FLUX_W - 1 downto 0);           -- fine at clock 7, e at clock 10, eta_v at clock 14
   signal mul_b     : signed(PU_W - 1 downto 0);             -- d_h at clock 7, pull at clock 14
@@ -131,11 +136,11 @@ architecture rtl of v_dead_adaline is
 begin
   valid(0) <= in_valid;
 
-  i_0 <= i_q when valid(2) = '1' else i_d;
-  x_0 <= d_d when valid(4) = '1' else u_pi_d;
+  i_1 <= i_q_1 when valid(3) = '1' else i_d_1;
+  x_1 <= u_1 when valid(5) = '1' else d_1;
 
   -- lp - x - 1
-  room <= (resize(lp_next(INTEGRAL_W - 1 downto PU_TO_INTEGRAL), PU_W + 1) & '0') - (resize(x_0, PU_W + 1) & '1');
+  room <= (resize(lp_next(INTEGRAL_W - 1 downto PU_TO_INTEGRAL), PU_W + 1) & '0') - (resize(x_1, PU_W + 1) & '1');
 
   -- A low-pass with k_lp < 1 leaves the range of what it filters by half an LSB of PU at most: that is within
   -- INTEGRAL at the upper end of PU, and below its lower end where lp, which is half an LSB more, has no such bit.
@@ -152,48 +157,55 @@ begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Clock 5 on: whether a sample is learned from
-      learning <= run and voltage_known and strong_4 when sat_d = 0 and sat_q = 0 and current_at_rail = 0 else '0';
+      -- Stage 1: what comes from all over the chip, in registers that can stand here
+      u_1      <= u_pi_d;
+      d_1      <= d_d;
+      i_d_1    <= i_d;
+      i_q_1    <= i_q;
+      free     <= '1' when sat_d = 0 and sat_q = 0 else '0';
+      measured <= voltage_known when current_at_rail = 0 else '0';
 
-      -- Stages 1 to 4: size = |i_d| + |i_q|;  strong = size >= i_learn
-      if valid(0) = '1' then
+      -- Clock 6 on: whether a sample is learned from
+      learning <= run and free and measured and strong_5;
+
+      -- Stages 2 to 5: size = |i_d| + |i_q|;  strong = size >= i_learn
+      if valid(1) = '1' then
         size <= (others => '0');
-      elsif valid(1) = '1' or valid(2) = '1' then
-        size <= longer(size, i_0);
+      elsif valid(2) = '1' or valid(3) = '1' then
+        size <= longer(size, i_1);
       end if;
-      if valid(3) = '1' then
-        strong_4 <= '0';
+      if valid(4) = '1' then
+        strong_5 <= '0';
         if size >= i_learn then
-          strong_4 <= '1';
+          strong_5 <= '1';
         end if;
       end if;
 
-      -- Stages 1, 2: u_h = u_pi_d - lp_u;  stages 5, 6: d_h = d_d - lp_d
-      if valid(0) = '1' or valid(4) = '1' then
+      -- Stages 2, 3: d_h = d_d - lp_d;  stages 6, 7: u_h = u_pi_d - lp_u, which is needed last
+      if valid(1) = '1' or valid(5) = '1' then
         diff <= room(PU_W + 1 downto 1);
       end if;
-      if valid(1) = '1' or valid(5) = '1' then
-        h     <= saturate(not diff, PU_W);
-        u_h_6 <= h;
+      if valid(2) = '1' or valid(6) = '1' then
+        h <= saturate(not diff, PU_W);
       end if;
 
-      -- Stages 3 to 7, 7 to 11: lp_u += k_lp*u_h, lp_d += k_lp*d_h
-      if valid(2) = '1' or valid(6) = '1' then
+      -- Stages 4 to 8, 8 to 12: lp_d += k_lp*d_h, lp_u += k_lp*u_h
+      if valid(3) = '1' or valid(7) = '1' then
         prod_lp <= signed('0' & k_lp) * h;
       end if;
-      if valid(3) = '1' or valid(7) = '1' then
+      if valid(4) = '1' or valid(8) = '1' then
         sum_lp  <= rounding_base(lp_next, DROP_LP, sum_lp'length) + prod_lp;
         lp_next <= lp_last;
       end if;
-      if valid(4) = '1' or valid(8) = '1' then
+      if valid(5) = '1' or valid(9) = '1' then
         lp_last <= moved;
       end if;
       lp_under(1) <= lp_last(INTEGRAL_W - 1) and not (or lp_last(INTEGRAL_W - 2 downto INTEGRAL_W - PU_W / 2));
       lp_under(0) <= not (or lp_last(INTEGRAL_W - PU_W / 2 - 1 downto PU_TO_INTEGRAL - 1));
-      if (valid(6) = '1' or valid(10) = '1') and lp_under = "11" then
+      if (valid(7) = '1' or valid(11) = '1') and lp_under = "11" then
         lp_last(PU_TO_INTEGRAL - 1 downto 0) <= LP_ZERO(PU_TO_INTEGRAL - 1 downto 0);
       end if;
-      if (valid(6) = '1' or valid(10) = '1') and run = '0' then
+      if (valid(7) = '1' or valid(11) = '1') and run = '0' then
         lp_last <= LP_ZERO;
       end if;
 
@@ -223,7 +235,7 @@ begin
       -- Stages 9, 12, 16: sum = not e = not u_h + prod, pull, v_state + prod
       addend <= rounding_base("0", DROP_STEP, SUM_W);
       if valid(7) = '1' then
-        addend <= rounding_base(not shift_left(resize(u_h_6, FLUX_W), PU_TO_FLUX), DROP_MODEL, SUM_W);
+        addend <= rounding_base(not shift_left(resize(h, FLUX_W), PU_TO_FLUX), DROP_MODEL, SUM_W);
       end if;
       if valid(14) = '1' then
         addend <= rounding_base(v_state, DROP_ETA, SUM_W);

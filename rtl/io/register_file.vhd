@@ -172,6 +172,7 @@ architecture rtl of register_file is
   signal found     : std_logic;
   signal read_data : std_logic_vector(31 downto 0);
   signal word      : natural range 0 to 2**REGISTER_WORD_W - 1;
+  signal shown     : words_t;
   signal words     : words_t;
   signal copy_low  : copy_t;
   signal copy_high : copy_t;
@@ -679,6 +680,9 @@ begin
   process (clk)
   begin
     if rising_edge(clk) then
+      -- What the core shows comes from all over the chip: it is read from here, a clock later
+      words <= shown;
+
       -- Stage 1: of each four words one, and what the RAMs have
       word_1        <= word;
       copied_low_1  <= copy_low(word mod HALF);
@@ -715,45 +719,45 @@ begin
   end process;
 
   -- What the other words hold, signed numbers in 18 bits; the places between are zero
-  words(0)          <= x"464C5558";
-  words(1)          <= x"00000100";
-  words(2)          <= std_logic_vector(to_unsigned(ADC_BITS, 32));
-  words(3)          <= std_logic_vector(to_unsigned(POSITION_BITS, 32));
-  words(4)          <= std_logic_vector(to_unsigned(CARRIER_HALF, 32));
-  words(5)          <= std_logic_vector(to_unsigned(CLOCK_HZ, 32));
-  words(6 to 16)    <= (others => (others => '0'));
-  words(17)         <= "0000000000000000000000000000000" & clear_trip;
-  words(18)         <= "0000000000000000000000000000000" & clear_faults_in;
-  words(19 to 31)   <= (others => (others => '0'));
-  words(32)         <= "000000000000000000" & delta_held & merge_known & temp_lost & psi_held & v_comp_limited &
+  shown(0)          <= x"464C5558";
+  shown(1)          <= x"00000100";
+  shown(2)          <= std_logic_vector(to_unsigned(ADC_BITS, 32));
+  shown(3)          <= std_logic_vector(to_unsigned(POSITION_BITS, 32));
+  shown(4)          <= std_logic_vector(to_unsigned(CARRIER_HALF, 32));
+  shown(5)          <= std_logic_vector(to_unsigned(CLOCK_HZ, 32));
+  shown(6 to 16)    <= (others => (others => '0'));
+  shown(17)         <= "0000000000000000000000000000000" & clear_trip;
+  shown(18)         <= "0000000000000000000000000000000" & clear_faults_in;
+  shown(19 to 31)   <= (others => (others => '0'));
+  shown(32)         <= "000000000000000000" & delta_held & merge_known & temp_lost & psi_held & v_comp_limited &
                        speed_limited & u_dc_low & u_dc_at_rail & std_logic_vector(current_at_rail) &
                        setting_refused & tripped & running;
-  words(33)         <= std_logic_vector(resize(flux_faults, 32));
-  words(34)         <= std_logic_vector(resize(min_pulse_used, 32));
-  words(35)         <= "00000000000000" & std_logic_vector(resize(omega_me, 18));
-  words(36)         <= std_logic_vector(resize(theta_me, 32));
-  words(37)         <= "00000000000000" & std_logic_vector(resize(i_d, 18));
-  words(38)         <= "00000000000000" & std_logic_vector(resize(i_q, 18));
-  words(39)         <= "00000000000000" & std_logic_vector(resize(i_q_ref, 18));
-  words(40)         <= std_logic_vector(resize(u_dc, 32));
-  words(41)         <= "00000000000000" & std_logic_vector(resize(u_d, 18));
-  words(42)         <= "00000000000000" & std_logic_vector(resize(u_q, 18));
-  words(43)         <= "00000000000000" & std_logic_vector(resize(torque, 18));
-  words(44)         <= "00000000000000" & std_logic_vector(resize(lambda_d, 18));
-  words(45)         <= "00000000000000" & std_logic_vector(resize(lambda_q, 18));
-  words(46)         <= "00000000000000" & std_logic_vector(resize(psi_m, 18));
-  words(47)         <= "00000000000000" & std_logic_vector(resize(v_dead, 18));
-  words(48)         <= "00000000000000" & std_logic_vector(resize(v_comp, 18));
-  words(49 to 49)   <= (others => (others => '0'));
-  words(50)         <= std_logic_vector(resize(telemetry_dropped, 32));
-  words(51)         <= std_logic_vector(resize(fault_flags, 32));
-  words(52)         <= std_logic_vector(resize(first_fault, 32));
-  words(53)         <= std_logic_vector(resize(early_samples, 32));
-  words(54 to 72)   <= (others => (others => '0'));
-  words(73)         <= x"00000001";
-  words(74 to 98)   <= (others => (others => '0'));
-  words(99)         <= x"00000100";
-  words(100)        <= x"00001000";
-  words(101 to 127) <= (others => (others => '0'));
+  shown(33)         <= std_logic_vector(resize(flux_faults, 32));
+  shown(34)         <= std_logic_vector(resize(min_pulse_used, 32));
+  shown(35)         <= "00000000000000" & std_logic_vector(resize(omega_me, 18));
+  shown(36)         <= std_logic_vector(resize(theta_me, 32));
+  shown(37)         <= "00000000000000" & std_logic_vector(resize(i_d, 18));
+  shown(38)         <= "00000000000000" & std_logic_vector(resize(i_q, 18));
+  shown(39)         <= "00000000000000" & std_logic_vector(resize(i_q_ref, 18));
+  shown(40)         <= std_logic_vector(resize(u_dc, 32));
+  shown(41)         <= "00000000000000" & std_logic_vector(resize(u_d, 18));
+  shown(42)         <= "00000000000000" & std_logic_vector(resize(u_q, 18));
+  shown(43)         <= "00000000000000" & std_logic_vector(resize(torque, 18));
+  shown(44)         <= "00000000000000" & std_logic_vector(resize(lambda_d, 18));
+  shown(45)         <= "00000000000000" & std_logic_vector(resize(lambda_q, 18));
+  shown(46)         <= "00000000000000" & std_logic_vector(resize(psi_m, 18));
+  shown(47)         <= "00000000000000" & std_logic_vector(resize(v_dead, 18));
+  shown(48)         <= "00000000000000" & std_logic_vector(resize(v_comp, 18));
+  shown(49 to 49)   <= (others => (others => '0'));
+  shown(50)         <= std_logic_vector(resize(telemetry_dropped, 32));
+  shown(51)         <= std_logic_vector(resize(fault_flags, 32));
+  shown(52)         <= std_logic_vector(resize(first_fault, 32));
+  shown(53)         <= std_logic_vector(resize(early_samples, 32));
+  shown(54 to 72)   <= (others => (others => '0'));
+  shown(73)         <= x"00000001";
+  shown(74 to 98)   <= (others => (others => '0'));
+  shown(99)         <= x"00000100";
+  shown(100)        <= x"00001000";
+  shown(101 to 127) <= (others => (others => '0'));
 
 end architecture rtl;

@@ -1,7 +1,7 @@
 -- Purpose: an AXI4-Stream packet for every sample: what the core took in, what it answered, and the sample's number.
 -- A packet's words (telemetry_words) are taken from the core's live values, one a clock from TELEMETRY_WORDS_START
--- clocks after the sample on, when they are there and before the next sample's replace them, into a queue
--- (packet_fifo) that the sink empties at its pace.
+-- clocks after the sample on, as they were a clock before: when they are there and before the next sample's replace
+-- them.  They go into a queue (packet_fifo) that the sink empties at its pace.
 -- The controller never waits: a sample whose packet does not fit into the queue has none, and dropped counts it up to
 -- 65535.  The samples' numbers run on, modulo 2**32, from 0 after a reset.  enable is looked at before the first word:
 -- a packet once begun comes out whole.  A sample that comes less than FLUXPROOF_SAMPLE_INTERVAL clocks after the last
@@ -91,6 +91,30 @@ architecture rtl of telemetry is
   signal clear_faults : std_logic;
   signal run          : std_logic;
 
+  -- What the core shows, a clock old
+  signal current_at_rail_1 : unsigned(2 downto 0);
+  signal u_dc_1            : unsigned(DUTY_W - 1 downto 0);
+  signal theta_me_1        : unsigned(TURN_W - 1 downto 0);
+  signal omega_me_1        : signed(PU_W - 1 downto 0);
+  signal i_d_1             : signed(PU_W - 1 downto 0);
+  signal i_q_1             : signed(PU_W - 1 downto 0);
+  signal i_q_ref_1         : signed(PU_W - 1 downto 0);
+  signal lambda_d_1        : signed(PU_W - 1 downto 0);
+  signal lambda_q_1        : signed(PU_W - 1 downto 0);
+  signal u_d_1             : signed(PU_W - 1 downto 0);
+  signal u_q_1             : signed(PU_W - 1 downto 0);
+  signal sat_d_1           : signed(1 downto 0);
+  signal sat_q_1           : signed(1 downto 0);
+  signal flux_faults_1     : unsigned(6 downto 0);
+  signal v_dead_1          : signed(V_LEG_W - 1 downto 0);
+  signal v_comp_1          : signed(V_LEG_W - 1 downto 0);
+  signal psi_m_1           : signed(PU_W - 1 downto 0);
+  signal psi_held_1        : std_logic;
+  signal temp_lost_1       : std_logic;
+  signal compare_a_1       : unsigned(15 downto 0);
+  signal compare_b_1       : unsigned(15 downto 0);
+  signal compare_c_1       : unsigned(15 downto 0);
+
   -- State
   signal age     : unsigned(AGE_W - 1 downto 0);  -- clocks since the sample, up to FLUXPROOF_SAMPLE_INTERVAL
   signal free    : std_logic;  -- age is there
@@ -118,6 +142,30 @@ begin
   process (clk)
   begin
     if rising_edge(clk) then
+      -- What the core shows comes from all over the chip
+      current_at_rail_1 <= current_at_rail;
+      u_dc_1            <= u_dc;
+      theta_me_1        <= theta_me;
+      omega_me_1        <= omega_me;
+      i_d_1             <= i_d;
+      i_q_1             <= i_q;
+      i_q_ref_1         <= i_q_ref;
+      lambda_d_1        <= lambda_d;
+      lambda_q_1        <= lambda_q;
+      u_d_1             <= u_d;
+      u_q_1             <= u_q;
+      sat_d_1           <= sat_d;
+      sat_q_1           <= sat_q;
+      flux_faults_1     <= flux_faults;
+      v_dead_1          <= v_dead;
+      v_comp_1          <= v_comp;
+      psi_m_1           <= psi_m;
+      psi_held_1        <= psi_held;
+      temp_lost_1       <= temp_lost;
+      compare_a_1       <= compare_a;
+      compare_b_1       <= compare_b;
+      compare_c_1       <= compare_c;
+
       -- The sample's age and number
       if taken = '1' then
         age     <= to_unsigned(1, AGE_W);
@@ -222,33 +270,33 @@ begin
       omega_ref       => omega_ref,
       i_d_ref         => i_d_ref,
       i_q_ext         => i_q_ext,
-      theta_me        => theta_me,
-      omega_me        => omega_me,
-      u_dc            => u_dc,
-      i_d             => i_d,
-      i_q             => i_q,
-      i_q_ref         => i_q_ref,
-      lambda_d        => lambda_d,
-      lambda_q        => lambda_q,
-      u_d             => u_d,
-      u_q             => u_q,
-      compare_a       => compare_a,
-      compare_b       => compare_b,
-      compare_c       => compare_c,
+      theta_me        => theta_me_1,
+      omega_me        => omega_me_1,
+      u_dc            => u_dc_1,
+      i_d             => i_d_1,
+      i_q             => i_q_1,
+      i_q_ref         => i_q_ref_1,
+      lambda_d        => lambda_d_1,
+      lambda_q        => lambda_q_1,
+      u_d             => u_d_1,
+      u_q             => u_q_1,
+      compare_a       => compare_a_1,
+      compare_b       => compare_b_1,
+      compare_c       => compare_c_1,
       temp_winding    => temp_winding,
-      psi_m           => psi_m,
+      psi_m           => psi_m_1,
       run             => run,
       speed_mode      => speed_mode,
       temp_valid      => temp_valid,
       clear_faults    => clear_faults,
-      current_at_rail => current_at_rail,
-      temp_lost       => temp_lost,
-      sat_d           => sat_d,
-      sat_q           => sat_q,
-      psi_held        => psi_held,
-      flux_faults     => flux_faults,
-      v_dead          => v_dead,
-      v_comp          => v_comp,
+      current_at_rail => current_at_rail_1,
+      temp_lost       => temp_lost_1,
+      sat_d           => sat_d_1,
+      sat_q           => sat_q_1,
+      psi_held        => psi_held_1,
+      flux_faults     => flux_faults_1,
+      v_dead          => v_dead_1,
+      v_comp          => v_comp_1,
       out_valid       => valid_2,
       word            => word_2
     );

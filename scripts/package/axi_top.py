@@ -89,9 +89,9 @@ HEADER = """\
 -- Clock: everything works on aclk.  All inputs but trip must be synchronous to it: bring converter and encoder
 -- signals through registers of aclk, sample_valid one clock long when the codes are stable.  trip is the one
 -- asynchronous input; io/power_stage takes it in.
--- Reset: aresetn, synchronous to aclk, for at least 4 clocks; inside, a clock later, it is rst, active high, out of a
--- flip-flop that tools can copy.  While it lasts all gates are off; afterwards enable, every register and the memory
--- of trips are at their reset values (all off).
+-- Reset: aresetn, synchronous to aclk, for at least 4 clocks; inside, two clocks later, it is rst, active high, out of
+-- a flip-flop that tools can copy; the one before it stands by the pin.  While it lasts all gates are off; afterwards
+-- enable, every register and the memory of trips are at their reset values (all off).
 -- Formats: codes as the converters give them; registers as `fluxproof registers drive.toml` prints them.
 -- Latency: sample_valid to duties FLUXPROOF_SAMPLE_TO_DUTY clocks; trip to gates off 0 clocks.
 -- The file keeps to VHDL-93 so that a block design can also take it as a module."""
@@ -116,7 +116,7 @@ def net_of(label: str, port: str) -> str:
 def wire(entities: dict[str, Entity]) -> dict[str, Pin]:
     """{net: the instance's port that drives it}; ValueError for a port without driver, or with two."""
     pins = {NETS_OF_PINS.get(name, name): mode for name, mode, _, _ in PINS}
-    given = {net for net, mode in pins.items() if mode == "in"} | {"rst"}
+    given = {net for net, mode in pins.items() if mode == "in"} | {"rst", "rst_1"}
     driven: dict[str, Pin] = {}
     for label, entity in entities.items():
         for pin in entity.outputs.values():
@@ -152,10 +152,10 @@ def render(rtl: Path = RTL) -> str:
     lines = [HEADER, "", "library ieee;", "use ieee.std_logic_1164.all;", "use ieee.numeric_std.all;"]
     lines += ["use work.fluxproof_pkg.all;", "", *_entity(), "", f"architecture rtl of {TOP} is"]
     width = max(map(len, names.values()))
-    lines.append(f"  signal {'rst':{width}} : std_logic;")
+    lines += [f"  signal {name:{width}} : std_logic;" for name in ("rst_1", "rst")]
     lines += [f"  signal {names[net]:{width}} : {pin.vhdl_type};" for net, pin in signals.items()]
     lines += ["begin", "", "  process (aclk)", "  begin", "    if rising_edge(aclk) then"]
-    lines += ["      rst <= not aresetn;", "    end if;", "  end process;"]
+    lines += ["      rst_1 <= not aresetn;", "      rst   <= rst_1;", "    end if;", "  end process;"]
     for label, entity in entities.items():
         lines += ["", *_instance(label, entity, actuals)]
     lines.append("")

@@ -121,7 +121,7 @@ def register_file(words: list[Word]) -> str:
     """rtl/io/register_file.vhd."""
     stored = [(word, word.parts[0]) for word in words if writable(word)]
     reads = _reads(words)
-    reads_width = max(len(f"words({choice})") for choice, _ in reads)
+    reads_width = max(len(f"shown({choice})") for choice, _ in reads)
     ports = [("clk", "in", "std_logic", ""), ("rst", "in", "std_logic", "synchronous, active high")]
     ports += [(name, mode, _vector(width), "") for name, mode, width in BUS]
     ports.append(("sample_busy", "in", "std_logic", "a sample is in flight"))
