@@ -74,7 +74,7 @@ def bel_of(x: int, y: int, lane: int, part: str) -> str:
 
 
 def scattered(seed: int = 1, count: int = 150) -> Made:
-    """Chains of a flip-flop, two LUTs (now and then a wide multiplexer or eight steps of carry) and the flip-flop beside
+    """Chains of a flip-flop, two LUTs (now and then a wide multiplexer or eight carries) and the flip-flop beside
     the last, each cell anywhere; three clock enables, three resets."""
     made, generator = Made(), np.random.default_rng(seed)
     tiles = [(x, y) for x in range(3, 40) for y in range(11, 21)]
