@@ -49,10 +49,11 @@ def routing(tmp_path, monkeypatch, reached: float, fails: str = "") -> ecp5.Rout
 
 @pytest.mark.parametrize(
     ("reached", "fmax"),
-    [(300, 98.0), (95, 94.0), (91, 90.0), (89, 80.0)],
+    [(300, 76.0), (75, 73.0), (71, 70.0), (69, 80.0)],
 )
 def test_the_fastest_clock_that_is_reached(tmp_path, monkeypatch, reached, fmax):
-    assert routing(tmp_path, monkeypatch, reached).route(1).fmax_mhz == fmax
+    """What is asked are shares of the estimate of 100 MHz; where none is reached the router is asked for nothing."""
+    assert routing(tmp_path, monkeypatch, reached).route(1).fmax_mhz == pytest.approx(fmax)
 
 
 def test_a_router_that_fails_is_told(tmp_path, monkeypatch):

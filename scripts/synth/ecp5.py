@@ -42,7 +42,7 @@ FLOORPLANS, FIRST_SEED = 2, 1  # placements from which the sites of the multipli
 # Of the estimate: the clocks that the router is asked for, one after the other until it gets there within so many
 # rounds.  It makes its way by giving wires to whoever needs them most; a net that comes off badly it leaves,
 # unless told to route again what misses the clock.  Where the clock is out of reach it never ends.
-SHARES, ROUNDS, MOST_ROUNDS = (0.98, 0.94, 0.9), 80, 1000
+SHARES, ROUNDS, MOST_ROUNDS = (0.76, 0.73, 0.7), 60, 1000
 _ROUND = re.compile(r"iter=(\d+) ")
 
 

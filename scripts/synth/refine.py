@@ -19,7 +19,7 @@ from scripts.synth.paths import NEVER, Paths
 
 ROUNDS, MOVES = 1000, 60_000  # paths are looked at again after so many moves
 TAU = 200.0  # ps: a path so much below the slowest counts a third of it
-HOT, WIDE = 30.0, 60  # heat, and reach in tiles, at the start
+HOT, WIDE = 60.0, 60  # heat, and reach in tiles, at the start
 GOAL = 6000.0  # ps: nothing is gained by a path shorter than this
 ALL_ALIKE = 0.6  # of the average chance to move: what a cell has that no slow path goes through
 
