@@ -75,14 +75,14 @@ def bel_of(x: int, y: int, lane: int, part: str) -> str:
 
 def scattered(seed: int = 1, count: int = 150) -> Made:
     """Chains of a flip-flop, two LUTs (now and then a wide multiplexer or eight carries) and the flip-flop beside
-    the last, each cell anywhere; three clock enables, three resets."""
+    the last, each cell anywhere; three clock enables, six resets."""
     made, generator = Made(), np.random.default_rng(seed)
     tiles = [(x, y) for x in range(3, 40) for y in range(11, 21)]
     free = [tiles[n] for n in generator.permutation(len(tiles))]
     enables = [made.add("TRELLIS_FF", bel_of(*free.pop(), 0, "FF"), {}, "Q") for _ in range(3)]
-    resets = [made.add("TRELLIS_FF", bel_of(*free.pop(), 0, "FF"), {}, "Q") for _ in range(3)]
+    resets = [made.add("TRELLIS_FF", bel_of(*free.pop(), 0, "FF"), {}, "Q") for _ in range(6)]
     for n in range(count):
-        control = {"CE": enables[n % 3], **({"LSR": resets[n % 5]} if n % 5 < 3 else {})}
+        control = {"CE": enables[n % 3], **({"LSR": resets[n % 7]} if n % 7 < 6 else {})}
         tile = free[2 * n % len(free)]
         other = free[(2 * n + 1) % len(free)]
         lap = 2 * n // len(free)
@@ -174,7 +174,7 @@ def test_the_rules_are_needed(tmp_path, monkeypatch, rule):
     anneal.anneal.recompile()
     try:
         folder = scattered().write(tmp_path)
-        refine(folder, 1, rounds=10)
+        refine(folder, 1, rounds=20, heat=20.0)
         with pytest.raises(AssertionError):
             legal(placed(folder))
     finally:
