@@ -22,7 +22,8 @@ INTEGRAL = Format(1, 1, 28)  # integrators: 12 bits below PU, so that small erro
 RECIPROCAL = Format(0, 0, 17)  # m of 1/x = m * 2**n * 2**-17
 FLUX = Format(1, 1, 23)  # fluxes and voltages inside the estimators: 25 bits, the multiplier's wide port
 FLUX_STATE = Format(1, 1, 30)  # flux that is integrated: 7 bits below FLUX, see docs/flux_estimator.md
-RESISTANCE = Format(0, 0, 24)  # winding resistance, and the flux it takes away in half a sample, per unit
+RESISTANCE = Format(0, 0, 24)  # winding resistance, per unit
+MINUS_RHO = Format(1, -2, 24)  # less the flux that it takes away in half a sample: -1/4 to 0, both included
 V_LEG = Format(1, -1, 18)  # what dead time and device drops take from a leg, below half a voltage base
 LIMIT = Format(0, 1, 8)  # what trips: currents and bus voltage to a 256th of their base
 SAMPLE_TIME = Format(0, -1, 18)  # sample time times omega_base: below half a radian a sample at base speed

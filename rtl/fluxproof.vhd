@@ -222,7 +222,7 @@ architecture rtl of fluxproof is
   signal duty_ready           : std_logic;
   signal compare_ready        : std_logic;
   signal r                    : unsigned(RESISTANCE_W - 1 downto 0);
-  signal minus_rho            : signed(RESISTANCE_W downto 0);
+  signal minus_rho            : signed(MINUS_RHO_W - 1 downto 0);
   signal lambda_m_d           : signed(FLUX_W - 1 downto 0);
   signal lambda_m_q           : signed(FLUX_W - 1 downto 0);
   signal estimate_limited     : std_logic;

@@ -169,7 +169,7 @@ MUTANTS = (
     ("q limit not told", "estimators/current_model.vhd",
      "model_limited <= exceeds(rounded_3, FLUX_W) or (model_limited and valid(4));", "if valid(3) = '1' then model_limited <= exceeds(rounded_3, FLUX_W); end if;"),
     ("whole sample's resistive flux", "estimators/winding_resistance.vhd",
-     "sum(PROD_W - 1 downto DROP_RHO)", "sum(PROD_W - 1 downto DROP_RHO - 1)"),
+     "sum(MINUS_RHO_W - 1 + DROP_RHO downto DROP_RHO)", "sum(MINUS_RHO_W - 2 + DROP_RHO downto DROP_RHO - 1)"),
     ("resistive flux floors", "estimators/winding_resistance.vhd",
      "addend <= HALF_DOWN;", "addend <= (others => '0');"),
     ("torque added", "estimators/torque.vhd", "not resize(lambda_q_1, PU_W + 1)", "resize(lambda_q_1, PU_W + 1)"),

@@ -9,6 +9,7 @@ Formats: temperatures S(9,6) in degrees, tcr U(-6,30); product 36 fraction bits,
 0 .. 1; rho rounded half up to 24 fraction bits, then negated, within 1/4 since t_s < 1/2.
 """
 
+from golden_model import formats
 from golden_model.block import Block, Port
 from golden_model.fixed import Format, round_half_up, saturate_u
 from golden_model.formats import BIT, RESISTANCE, SAMPLE_TIME
@@ -64,9 +65,8 @@ def stimuli(_rng, _config):
 
 T_S = Port("t_s", SAMPLE_TIME, doc="sample time, per unit")
 R = Port("r", RESISTANCE, doc="winding resistance in use")
-MINUS_RESISTANCE = Format(1, 0, RESISTANCE.frac_bits)
 MINUS_RHO = Port(
-    "minus_rho", MINUS_RESISTANCE, -RESISTANCE.hi, 0, "less the flux that half a sample takes, per unit of current"
+    "minus_rho", formats.MINUS_RHO, hi=0, doc="less the flux that half a sample takes, per unit of current"
 )
 
 BLOCK = Block(

@@ -25,6 +25,7 @@ package fluxproof_pkg is
   constant FLUX_W : positive := 25;  -- S(1,23)
   constant FLUX_STATE_W : positive := 32;  -- S(1,30)
   constant RESISTANCE_W : positive := 24;  -- U(0,24)
+  constant MINUS_RHO_W : positive := 23;  -- S(-2,24)
   constant V_LEG_W : positive := 18;  -- S(-1,18)
   constant LIMIT_W : positive := 9;  -- U(1,8)
   constant SAMPLE_TIME_W : positive := 17;  -- U(-1,18)

@@ -27,7 +27,7 @@ entity flux_merge is
     u_applied_beta  : in  signed(FLUX_W - 1 downto 0);
     voltage_known   : in  std_logic;
     run             : in  std_logic;
-    minus_rho       : in  signed(RESISTANCE_W downto 0);
+    minus_rho       : in  signed(MINUS_RHO_W - 1 downto 0);
     omega_0         : in  unsigned(15 downto 0);
     xi              : in  unsigned(15 downto 0);
     t_s             : in  unsigned(SAMPLE_TIME_W - 1 downto 0);
@@ -80,7 +80,7 @@ architecture rtl of flux_merge is
   signal i_1        : signed(PU_W - 1 downto 0);
   signal lambda_c_1 : signed(FLUX_W - 1 downto 0);
   signal u_1        : signed(FLUX_W - 1 downto 0);
-  signal prod_r_2   : signed(PU_W + RESISTANCE_W downto 0);
+  signal prod_r_2   : signed(PU_W + MINUS_RHO_W - 1 downto 0);
   signal prod_u_2   : signed(FLUX_W + SAMPLE_TIME_W downto 0);
   signal sum_r      : signed(SUM_R_W - 1 downto 0);  -- at clock 3, then at clock 14
   signal less_r     : signed(TOTAL_W downto 0);

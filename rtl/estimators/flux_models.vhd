@@ -27,7 +27,7 @@ entity flux_models is
     lambda_pi_q : in  signed(FLUX_W - 1 downto 0);
     merge_known : in  std_logic;
     run         : in  std_logic;
-    minus_rho   : in  signed(RESISTANCE_W downto 0);
+    minus_rho   : in  signed(MINUS_RHO_W - 1 downto 0);
     flux_mode   : in  unsigned(1 downto 0);
     l_d         : in  unsigned(INDUCTANCE_W - 1 downto 0);
     l_q         : in  unsigned(INDUCTANCE_W - 1 downto 0);
@@ -58,11 +58,11 @@ architecture rtl of flux_models is
   signal valid         : std_logic_vector(0 to LATENCY);
   signal i_d_1         : signed(PU_W - 1 downto 0);
   signal l_d_1         : unsigned(INDUCTANCE_W - 1 downto 0);
-  signal minus_rho_1   : signed(RESISTANCE_W downto 0);
+  signal minus_rho_1   : signed(MINUS_RHO_W - 1 downto 0);
   signal prod_model_d  : signed(PROD_W - 1 downto 0);
   signal prod_model_q  : signed(PROD_W - 1 downto 0);
-  signal prod_merged_d : signed(PROD_W - 1 downto 0);
-  signal prod_merged_q : signed(PROD_W - 1 downto 0);
+  signal prod_merged_d : signed(PU_W + MINUS_RHO_W - 1 downto 0);
+  signal prod_merged_q : signed(PU_W + MINUS_RHO_W - 1 downto 0);
   signal base_model_d  : signed(BASE_W - 1 downto 0);
   signal base_merged_d : signed(BASE_W - 1 downto 0);
   signal base_merged_q : signed(BASE_W - 1 downto 0);

@@ -2,7 +2,7 @@
 --   r = r_s + tcr*(temp_winding - t_0);  minus_rho = -r*t_s/2
 -- Without a reading, or with one outside t_min to t_max, r = r_s and temp_lost is raised.  Both products go through
 -- one multiplier and the adder behind it.
--- Formats: temperatures S(9,6), tcr U(-6,30), t_s U(-1,18), r_s, r, rho U(0,24); products exact.
+-- Formats: temperatures S(9,6), tcr U(-6,30), t_s U(-1,18), r_s, r U(0,24), minus_rho S(-2,24); products exact.
 -- Latency: 8.  Interval: 8.
 -- Rounding: each product half up, rho before it is negated.  r saturates, rho cannot: it is below 1/4.
 
@@ -27,7 +27,7 @@ entity winding_resistance is
     t_s          : in  unsigned(SAMPLE_TIME_W - 1 downto 0);
     out_valid    : out std_logic;
     r            : out unsigned(RESISTANCE_W - 1 downto 0);
-    minus_rho    : out signed(RESISTANCE_W downto 0);
+    minus_rho    : out signed(MINUS_RHO_W - 1 downto 0);
     temp_lost    : out std_logic
   );
 end entity winding_resistance;
@@ -102,7 +102,7 @@ begin
 
       -- Stage 8: minus_rho = prod/2, narrowed
       if valid(7) = '1' then
-        minus_rho <= resize(sum(PROD_W - 1 downto DROP_RHO), RESISTANCE_W + 1);
+        minus_rho <= sum(MINUS_RHO_W - 1 + DROP_RHO downto DROP_RHO);
         temp_lost <= or lost_1;
       end if;
 
