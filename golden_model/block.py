@@ -96,7 +96,9 @@ class Block:
     roms: Mapping[str, tuple[Format, list[int]]] = field(default_factory=dict)
     configs: tuple[Mapping[str, int], ...] = ({},)  # generics to verify with
     stimuli: Callable | None = None  # (rng, config) -> list of {port: value}: the block's own hard cases
+    possible: Callable | None = None  # {port: value} -> the nearest that can occur
     width_from: Mapping[str, Callable] = field(default_factory=dict)  # port -> config -> Format
+    range_from: Mapping[str, Callable] = field(default_factory=dict)  # port -> config -> (lo, hi)
 
     def ports(self, config: Mapping[str, int]) -> tuple[Port, ...]:
         """Inputs and registers with the formats that the generics give them."""
@@ -107,8 +109,12 @@ class Block:
         return tuple(self._sized(p, config) for p in self.outputs)
 
     def _sized(self, port: Port, config: Mapping[str, int]) -> Port:
-        size = self.width_from.get(port.name)
-        return port if size is None else replace(port, fmt=size(config))
+        if size := self.width_from.get(port.name):
+            port = replace(port, fmt=size(config))
+        if ends := self.range_from.get(port.name):
+            lo, hi = ends(config)
+            port = replace(port, lo=lo, hi=hi)
+        return port
 
     def run(self, state, values: Mapping[str, int], config: Mapping[str, int]):
         """One sample by name: returns (next state, {output: integer})."""

@@ -31,6 +31,7 @@ SAMPLE_TIME = Format(0, -1, 18)  # sample time times omega_base: below half a ra
 PU_W, TURN_W, INTEGRAL_W, V_LEG_W = PU.width, TURN.width, INTEGRAL.width, V_LEG.width
 DUTY_ONE = 1 << DUTY.frac_bits
 TRIG_ONE = 1 << TRIG.frac_bits
+VECTOR = 11 << (PU.frac_bits - 3)  # 1.375: a vector with both components below it is shorter than 2, however turned
 FLUX_W, FLUX_STATE_W = FLUX.width, FLUX_STATE.width
 PU_TO_INTEGRAL = INTEGRAL.frac_bits - PU.frac_bits
 PU_TO_FLUX = FLUX.frac_bits - PU.frac_bits

@@ -82,6 +82,9 @@ MUTANTS = (
     # saturation and limits
     ("current wraps", "io/current_conditioning.vhd",
      "saturate(sum_2(SUM_W - 1 downto CURRENT_CONDITIONING_DROP), PU_W)", "sum_2(SUM_W - 2 downto CURRENT_CONDITIONING_DROP)"),
+    ("clarke limits high for low", "transforms/clarke.vhd", "return not HIGHEST;", "return HIGHEST;"),
+    ("clarke limits an eighth late", "transforms/clarke.vhd", "if EIGHTHS >= MOST then", "if EIGHTHS > MOST then"),
+    ("flux past its range wraps", "transforms/rotate.vhd", "when WIDTH = PU_W else", "when WIDTH >= PU_W else"),
     ("bus voltage below zero", "io/u_dc_conditioning.vhd",
      "saturate_u(shift_right(sum, U_DC_CONDITIONING_DROP_U_DC), U_DC_W)", "resize(unsigned(shift_right(sum, U_DC_CONDITIONING_DROP_U_DC)), U_DC_W)"),
     ("speed error wraps", "control/speed_pi.vhd",

@@ -4,15 +4,15 @@
     i_beta  = (i_b - i_c) / sqrt(3)
 
 Formats: sums exact; times 1/3 as S(0,-1,18) and 1/sqrt(3) as S(0,0,17), relative error 4e-6 each;
-rounded half up to PU.  Saturation: i_alpha can reach 8/3 when three currents of 2 per unit point
-against each other, which currents that sum to zero never do.
+rounded half up to PU.  Limit: +-1.375 per unit (VECTOR), so that park need not limit what it turns; the base is
+what the sensor can measure, and currents that sum to zero give no component beyond the largest of them.
 """
 
 import math
 
 from golden_model.block import Block, Const, Port
-from golden_model.fixed import Format, round_sat
-from golden_model.formats import PU, PU_W
+from golden_model.fixed import Format, clamp, round_half_up
+from golden_model.formats import PU, VECTOR
 from golden_model.kernel import kernel
 
 THIRD = Const(1 / 3, Format(0, -1, 18))
@@ -22,18 +22,24 @@ DROP_ALPHA, DROP_BETA = THIRD.fmt.frac_bits, INV_SQRT3.fmt.frac_bits
 
 
 @kernel
+def limited(x):
+    return clamp(x, -VECTOR, VECTOR - 1)
+
+
+@kernel
 def step(i_a, i_b, i_c):
     sum_alpha = 2 * i_a - i_b - i_c
     sum_beta = i_b - i_c
     prod_alpha = sum_alpha * K_THIRD
     prod_beta = sum_beta * K_INV_SQRT3
-    return round_sat(prod_alpha, DROP_ALPHA, PU_W), round_sat(prod_beta, DROP_BETA, PU_W)
+    return limited(round_half_up(prod_alpha, DROP_ALPHA)), limited(round_half_up(prod_beta, DROP_BETA))
 
 
 def reference(v, _state):
     alpha = (2 * v["i_a"] - v["i_b"] - v["i_c"]) / 3
     beta = (v["i_b"] - v["i_c"]) / math.sqrt(3)
-    return {"i_alpha": PU.limit(alpha), "i_beta": PU.limit(beta)}
+    low, high = I_ALPHA.low * PU.lsb, I_ALPHA.high * PU.lsb
+    return {"i_alpha": clamp(alpha, low, high), "i_beta": clamp(beta, low, high)}
 
 
 def bound(v, _state):
@@ -43,17 +49,26 @@ def bound(v, _state):
     return {"i_alpha": PU.lsb / 2 + alpha, "i_beta": PU.lsb / 2 + beta}
 
 
+I_ALPHA = Port("i_alpha", PU, -VECTOR, VECTOR - 1, doc="current, alpha")
+I_BETA = Port("i_beta", PU, -VECTOR, VECTOR - 1, doc="current, beta")
+
 BLOCK = Block(
     name="clarke",
     folder="transforms",
     paper="001, eq. (1): stator frame",
     step=step,
     inputs=tuple(Port(f"i_{x}", PU, late=int(x == "a"), doc=f"current, phase {x}") for x in "abc"),
-    outputs=(Port("i_alpha", PU, doc="current, alpha"), Port("i_beta", PU, doc="current, beta")),
+    outputs=(I_ALPHA, I_BETA),
     latency=5,
     soon=("i_beta",),
     interval=2,
-    constants={"THIRD": THIRD, "INV_SQRT3": INV_SQRT3, "DROP_ALPHA": DROP_ALPHA, "DROP_BETA": DROP_BETA},
+    constants={
+        "THIRD": THIRD,
+        "INV_SQRT3": INV_SQRT3,
+        "DROP_ALPHA": DROP_ALPHA,
+        "DROP_BETA": DROP_BETA,
+        "VECTOR": VECTOR,
+    },
     reference=reference,
     bound=bound,
 )

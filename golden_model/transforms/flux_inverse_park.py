@@ -44,5 +44,5 @@ BLOCK = Block(
     interval=rotate.BLOCK.interval,
     reference=reference,
     bound=bound,
-    stimuli=rotate.unit_vectors("lambda_c_d", "lambda_c_q", FLUX),
+    stimuli=rotate.unit_vectors("lambda_c_d", "lambda_c_q", FLUX_W),
 )

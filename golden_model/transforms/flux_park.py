@@ -48,5 +48,5 @@ BLOCK = Block(
     interval=rotate.BLOCK.interval,
     reference=reference,
     bound=bound,
-    stimuli=rotate.unit_vectors("lambda_m_alpha", "lambda_m_beta", FLUX),
+    stimuli=rotate.unit_vectors("lambda_m_alpha", "lambda_m_beta", FLUX_W),
 )

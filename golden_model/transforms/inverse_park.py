@@ -3,11 +3,11 @@
     u_alpha = u_d*cos_theta - u_q*sin_theta
     u_beta  = u_d*sin_theta + u_q*cos_theta
 
-Formats, rounding and saturation: those of rotate.
+Formats, rounding and range: those of rotate; the voltage is within the circle, below 1 per unit.
 """
 
 from golden_model.block import Block, Port
-from golden_model.formats import PU, PU_W
+from golden_model.formats import PU, PU_W, VECTOR
 from golden_model.kernel import kernel
 from golden_model.transforms import rotate
 
@@ -19,10 +19,7 @@ def step(u_d, u_q, cos_theta, sin_theta):
 
 def reference(v, _state):
     c, s = v["cos_theta"], v["sin_theta"]
-    return {
-        "u_alpha": PU.limit(v["u_d"] * c - v["u_q"] * s),
-        "u_beta": PU.limit(v["u_d"] * s + v["u_q"] * c),
-    }
+    return {"u_alpha": v["u_d"] * c - v["u_q"] * s, "u_beta": v["u_d"] * s + v["u_q"] * c}
 
 
 def bound(_v, _state):
@@ -35,8 +32,8 @@ BLOCK = Block(
     paper="001, eq. (9): T_dq/alphabeta",
     step=step,
     inputs=(
-        Port("u_d", PU, doc="voltage, d axis"),
-        Port("u_q", PU, late=1, doc="voltage, q axis"),
+        Port("u_d", PU, -VECTOR, VECTOR - 1, doc="voltage, d axis"),
+        Port("u_q", PU, -VECTOR, VECTOR - 1, late=1, doc="voltage, q axis"),
         *rotate.TRIG_PORTS,
     ),
     outputs=(Port("u_alpha", PU, doc="voltage, alpha"), Port("u_beta", PU, doc="voltage, beta")),
@@ -44,5 +41,6 @@ BLOCK = Block(
     interval=rotate.BLOCK.interval,
     reference=reference,
     bound=bound,
-    stimuli=rotate.unit_vectors("u_d", "u_q", PU),
+    stimuli=rotate.unit_vectors("u_d", "u_q", PU_W),
+    possible=rotate.on_circle,
 )

@@ -3,14 +3,16 @@
     i_d =  i_alpha*cos_theta + i_beta*sin_theta
     i_q = -i_alpha*sin_theta + i_beta*cos_theta
 
-Formats, rounding and saturation: those of rotate.  A rotation forwards of the swapped axes is
+Formats, rounding and range: those of rotate.  A rotation forwards of the swapped axes is
 the rotation back.
 """
+
+from dataclasses import replace
 
 from golden_model.block import Block, Port
 from golden_model.formats import PU, PU_W
 from golden_model.kernel import kernel
-from golden_model.transforms import rotate
+from golden_model.transforms import clarke, rotate
 
 
 @kernel
@@ -21,10 +23,7 @@ def step(i_alpha, i_beta, cos_theta, sin_theta):
 
 def reference(v, _state):
     c, s = v["cos_theta"], v["sin_theta"]
-    return {
-        "i_d": PU.limit(v["i_alpha"] * c + v["i_beta"] * s),
-        "i_q": PU.limit(v["i_beta"] * c - v["i_alpha"] * s),
-    }
+    return {"i_d": v["i_alpha"] * c + v["i_beta"] * s, "i_q": v["i_beta"] * c - v["i_alpha"] * s}
 
 
 def bound(_v, _state):
@@ -37,8 +36,8 @@ BLOCK = Block(
     paper="001, eq. (9): T_alphabeta/dq",
     step=step,
     inputs=(
-        Port("i_alpha", PU, late=1, doc="current, alpha"),
-        Port("i_beta", PU, doc="current, beta"),
+        replace(clarke.I_ALPHA, late=1),
+        clarke.I_BETA,
         *rotate.TRIG_PORTS,
     ),
     outputs=(Port("i_d", PU, doc="current, d axis"), Port("i_q", PU, doc="current, q axis")),
@@ -47,5 +46,6 @@ BLOCK = Block(
     interval=rotate.BLOCK.interval,
     reference=reference,
     bound=bound,
-    stimuli=rotate.unit_vectors("i_alpha", "i_beta", PU),
+    stimuli=rotate.unit_vectors("i_alpha", "i_beta", PU_W),
+    possible=rotate.on_circle,
 )

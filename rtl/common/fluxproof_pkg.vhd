@@ -156,6 +156,7 @@ package fluxproof_pkg is
   constant CLARKE_INV_SQRT3 : signed(17 downto 0) := to_signed(75674, 18);  -- 0.577350269 as U(0,17), signed for the multiplier
   constant CLARKE_DROP_ALPHA : natural := 18;
   constant CLARKE_DROP_BETA : natural := 17;
+  constant CLARKE_VECTOR : natural := 90112;
 
   -- sincos: 001, eq. (12)
   constant SINCOS_LATENCY : positive := 12;

@@ -91,12 +91,10 @@ begin
         rail_2 <= at_rail(code_1) & rail_2(2 downto 1);
       end if;
 
-      -- Stage 3: i = prod, narrowed; b at clock 3, c at 4, a at 5
-      if valid(2) = '1' then
-        i_b <= i_2;
-      end if;
-      if valid(3) = '1' then
+      -- Stage 3: i = prod, narrowed; b at clock 3, c at 4, a at 5.  b comes over c: the limit has a reader less.
+      if valid(2) = '1' or valid(3) = '1' then
         i_c <= i_2;
+        i_b <= i_c;
       end if;
       if valid(4) = '1' then
         i_a             <= i_2;

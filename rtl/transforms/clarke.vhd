@@ -4,8 +4,8 @@
 -- Formats: sums exact; 1/3 as S(0,-1,18), 1/sqrt(3) as S(0,0,17); PU out.
 -- Latency: 5 (beta and alpha follow each other through one multiplier).  Interval: 2.
 -- i_a is needed a clock after i_b and i_c; i_beta comes a clock before i_alpha, with out_soon.
--- Rounding: half up, saturated: 8/3 per unit needs three currents against each other.
--- A product is below 4 per unit, so two bits say whether it fits.
+-- Rounding: half up, limited to +-1.375 per unit, so that park need not limit what it turns: the base is what the
+-- sensor can measure.  A product is below 4 per unit.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -44,7 +44,22 @@ architecture rtl of clarke is
   signal prod_2   : signed(PROD_W - 1 downto 0);
   signal half_2   : signed(CLARKE_DROP_ALPHA + PU_W downto 0);
   signal sum_3    : signed(CLARKE_DROP_ALPHA + PU_W downto 0);
+  signal wide_3   : signed(PU_W downto 0);
   signal i_3      : signed(PU_W - 1 downto 0);
+
+  -- The limits are whole eighths, so those say whether x is beyond.
+  function limited (x : signed(PU_W downto 0)) return signed is
+    constant HIGHEST : signed(PU_W - 1 downto 0)    := to_signed(CLARKE_VECTOR - 1, PU_W);
+    constant EIGHTHS : signed(PU_W downto PU_W - 5) := x(PU_W downto PU_W - 5);
+    constant MOST    : positive                     := CLARKE_VECTOR / 2 ** (PU_W - 5);
+  begin
+    if EIGHTHS >= MOST then
+      return HIGHEST;
+    elsif EIGHTHS < -MOST then
+      return not HIGHEST;
+    end if;
+    return x(PU_W - 1 downto 0);
+  end function;
 begin
   valid(0) <= in_valid;
 
@@ -57,8 +72,9 @@ begin
   sum_0 <= (first_0 & '1') + ((not second_0) & '1');
 
   half_2 <= half(CLARKE_DROP_ALPHA, half_2'length) when valid(3) = '1' else half(CLARKE_DROP_BETA, half_2'length);
-  i_3    <= saturate(sum_3(CLARKE_DROP_ALPHA + PU_W downto CLARKE_DROP_ALPHA), PU_W) when valid(4) = '1' else
-            saturate(sum_3(CLARKE_DROP_BETA + PU_W downto CLARKE_DROP_BETA), PU_W);
+  wide_3 <= sum_3(CLARKE_DROP_ALPHA + PU_W downto CLARKE_DROP_ALPHA) when valid(4) = '1' else
+            sum_3(CLARKE_DROP_BETA + PU_W downto CLARKE_DROP_BETA);
+  i_3    <= limited(wide_3);
 
   process (clk)
   begin
@@ -87,7 +103,7 @@ begin
         sum_3 <= prod_2(sum_3'range) + half_2;
       end if;
 
-      -- Stages 4, 5: i_beta, then i_alpha, narrowed
+      -- Stages 4, 5: i_beta, then i_alpha, limited
       if valid(3) = '1' then
         i_beta <= i_3;
       end if;

@@ -3,9 +3,9 @@
 --   out_y = x*sin_theta + y*cos_theta
 -- Formats: x, y S(1,WIDTH-2), PU or FLUX; TRIG S(1,16) within +-1; products and sums exact.
 -- One multiplier for sin_theta, a clock ahead of the one for cos_theta, which adds; y is needed a clock after x, and
--- out_y comes a clock before out_x, with out_soon.  Sine and cosine serve several rotations: each holds its own.
--- Latency: 5.  Interval: 4.  Rounding: half up, saturated: a vector longer than 2 per unit is outside every base.
--- A sum is at most 4 per unit, so its three top bits say whether it fits.
+-- in PU out_y comes a clock before out_x, with out_soon.  Sine and cosine serve several rotations: each holds its own.
+-- Latency: 5.  Interval: 4.  Rounding: half up.  A flux saturates: a sum is at most 4 per unit, so its three top bits
+-- say whether it fits.  Currents and voltages come within 1.375 per unit, so they are shorter than 2, however turned.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -57,7 +57,8 @@ begin
   factor_c_1 <= x when valid(2) = '1' else y;
 
   sum   <= prod_c + sum_s;
-  out_3 <= saturate(sum(SUM_W - 1 downto ROTATE_DROP), WIDTH);
+  out_3 <= sum(WIDTH - 1 + ROTATE_DROP downto ROTATE_DROP) when WIDTH = PU_W else
+           saturate(sum(SUM_W - 1 downto ROTATE_DROP), WIDTH);
 
   process (clk)
   begin
@@ -91,12 +92,18 @@ begin
         prod_c <= factor_c * cos_1;
       end if;
 
-      -- Stages 4, 5: out_y = x*sin_theta + y*cos_theta, then out_x = x*cos_theta - y*sin_theta, narrowed
-      if valid(3) = '1' then
-        out_y <= out_3;
-      end if;
-      if valid(4) = '1' then
+      -- Stages 4, 5: out_y = x*sin_theta + y*cos_theta, then out_x = x*cos_theta - y*sin_theta, narrowed.  A flux's
+      -- out_y comes over out_x: half as many readers of its limit
+      if WIDTH = PU_W then
+        if valid(3) = '1' then
+          out_y <= out_3;
+        end if;
+        if valid(4) = '1' then
+          out_x <= out_3;
+        end if;
+      elsif valid(3) = '1' or valid(4) = '1' then
         out_x <= out_3;
+        out_y <= out_x;
       end if;
 
       if rst = '1' then

@@ -13,7 +13,7 @@ import numpy as np
 
 from scripts.files import write_text
 from scripts.synth import sdf
-from scripts.synth.anneal import Chip, Wish, anneal
+from scripts.synth.anneal import MULTIPLIER, Chip, Wish, anneal
 from scripts.synth.chip import load, movable, save
 from scripts.synth.netlist import placed_module
 from scripts.synth.paths import NEVER, Paths
@@ -22,6 +22,8 @@ ROUNDS, MOVES = 1000, 60_000  # paths are looked at again after so many moves
 TAU = 200.0  # ps: a path so much below the slowest counts a third of it
 HOT, WIDE = 60.0, 60  # heat, and reach in tiles, at the start
 GOAL = 6000.0  # ps: nothing is gained by a path shorter than this
+# ps that a routed wire takes beyond its length: a net with many readers branches, and many wires leave a multiplier
+EACH_READER, MOST_READERS, FROM_MULTIPLIER = 18.0, 60, 300.0
 ALL_ALIKE = 0.6  # of the average chance to move: what a cell has that no slow path goes through
 
 
@@ -45,9 +47,11 @@ def refine(folder: Path, seed: int, multipliers: bool = False, rounds: int = ROU
 def settle(chip: Chip, paths: Paths, units: np.ndarray, seed: int, rounds: int, heat: float) -> tuple[float, Chip]:
     """Anneals ``chip``; (the slowest path of the best placement seen, ps; that placement)."""
     best, kept = np.inf, chip
+    beyond = EACH_READER * (np.minimum(paths.readers, MOST_READERS) - 1)
+    beyond[chip.kind[paths.source] == MULTIPLIER] += FROM_MULTIPLIER
     for n in range(rounds + 1):
         wire_ps = chip.ps[abs(chip.x[chip.source] - chip.x[chip.sink]), abs(chip.y[chip.source] - chip.y[chip.sink])]
-        slowest, over = paths.slowest(wire_ps)
+        slowest, over = paths.slowest(wire_ps + beyond)
         if slowest < best:
             best, kept = slowest, chip._replace(place=chip.place.copy(), site=chip.site.copy())
         left = 1 - n / rounds
