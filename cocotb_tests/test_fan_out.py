@@ -121,6 +121,21 @@ def test_luts_are_shared_out_by_what_they_serve():
     assert len(read[0]) == len(read[1]) == 1 and read[0] != read[1]
 
 
+def test_multipliers_of_a_block_share_their_enable():
+    """Four share a site, which has few enables: by their names alone, each would read another copy."""
+    cells = {"source": flip_flop(FIRST, 100)}
+    for n in range(24):
+        cells[f"b.r{n:02d}"] = flip_flop(FIRST + 1, 200 + n, 100)
+    for n in range(4):
+        cells[f"b.r{6 * n:02d}_product"] = {
+            "type": "MULT18X18D", "parameters": {}, "connections": {"CE0": [100], "P0": [300 + n]},
+            "port_directions": {"CE0": "input", "P0": "output"},
+        }  # fmt: skip
+    netlist = {"modules": {"t": {"cells": cells, "ports": {}}}}
+    assert share_out(netlist, "t", 8) > 1
+    assert len({cells[f"b.r{6 * n:02d}_product"]["connections"]["CE0"][0] for n in range(4)}) == 1
+
+
 @pytest.mark.parametrize(
     ("blocks", "apart", "parts"),
     [

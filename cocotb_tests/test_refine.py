@@ -11,7 +11,7 @@ import pytest
 from scripts.synth import anneal, chip, sdf
 from scripts.synth.floorplan import SITES, bel
 from scripts.synth.paths import Paths
-from scripts.synth.refine import refine
+from scripts.synth.refine import EACH_READER, FROM_MULTIPLIER, beyond, refine
 
 CLOCK, SLICES = 1, "ABCD"
 DELAYS = """(DELAYFILE
@@ -150,7 +150,7 @@ def slowest(folder) -> float:
     paths = Paths(cells, number, sdf.read(folder / "delays.sdf"))
     made = chip.load(cells, number, paths)
     wires = made.ps[abs(made.x[made.source] - made.x[made.sink]), abs(made.y[made.source] - made.y[made.sink])]
-    return paths.slowest(wires)[0] / 1000
+    return paths.slowest(wires + beyond(made, paths))[0] / 1000
 
 
 def test_paths_get_shorter_and_everything_stays_legal(tmp_path):
@@ -190,6 +190,19 @@ def test_a_path_by_hand(tmp_path):
     made.add("TRELLIS_FF", bel_of(5, 9, 0, "FF"), {"M": last}, "Q")
     folder = made.write(tmp_path)
     assert slowest(folder) == pytest.approx((525 + (640 + 2 * 85) + 236 + (640 + 6 * 85)) / 1000)
+
+
+def test_many_readers_take_longer(tmp_path):
+    made = Made()
+    begin = made.add("TRELLIS_FF", bel_of(3, 3, 0, "FF"), {}, "Q")
+    product = made.add("MULT18X18D", bel(0), {"A0": begin}, "P0")
+    for n in range(3):
+        made.add("TRELLIS_FF", bel_of(5 + n, 3, 0, "FF"), {"M": begin if n else product}, "Q")
+    cells = placed(made.write(tmp_path))
+    number = {name: n for n, name in enumerate(cells)}
+    paths = Paths(cells, number, sdf.read(tmp_path / "delays.sdf"))
+    more = beyond(chip.load(cells, number, paths), paths)
+    assert sorted(more) == [2 * EACH_READER] * 3 + [FROM_MULTIPLIER]
 
 
 def test_a_loop_is_told(tmp_path):

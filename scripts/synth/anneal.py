@@ -23,6 +23,7 @@ LANES = 8  # places for a LUT and a flip-flop in a tile
 BOTH, LUT_ALONE, FLIP_FLOP_ALONE = 0, 1, 2  # what a move exchanges
 LUT, FLIP_FLOP, MULTIPLIER = 1, 2, 3  # kinds of cells; 0 never moves
 NONE = -1
+AS_MANY = 20.0  # a multiplier has so many wires for each of another cell, and is to be as hot
 
 
 class Chip(NamedTuple):
@@ -320,7 +321,7 @@ def anneal(chip, wish, units, chances, heat, reach, moves, seed):
                 fits = fits and (what == LUT_ALONE or _tile_fits(at // LANES, flip_flop_at, reset))
         if fits:
             after = _cost(moved, count, stamp, turn, x, y, source, sink, weight, begin, wire, ps, rest, goal, tau)
-            if _granted(after - before, heat):
+            if _granted(after - before, heat * AS_MANY if multiplier else heat):
                 made += 1
                 continue
         if multiplier:

@@ -42,6 +42,11 @@ class Copies:
             name = min((reader for reader, _ in self.nets.readers.get(made, [])), default=name)
         return name
 
+    def order(self, reader: tuple[str, str]) -> tuple:
+        """By blocks, in each the multipliers first, as a site's four share their enables, then by registers."""
+        register = self.register(reader[0])
+        return block_of(register), self.cells.get(reader[0], {"type": ""})["type"] != MULTIPLIER, register, reader
+
     def copy(self, bit: int) -> int:
         """A bit made by a copy of what makes ``bit``, without readers."""
         name, made = self.nets.driver[bit], self.nets.free
@@ -82,7 +87,7 @@ def share_out(netlist: dict, top: str, most: int = MOST) -> int:
     while waiting:
         bit = waiting.pop()
         model = cells[nets.driver[bit]]
-        readers = sorted(nets.readers.get(bit, []), key=lambda reader: (copies.register(reader[0]), reader))
+        readers = sorted(nets.readers.get(bit, []), key=copies.order)
         connections = model["connections"]
         if len(readers) <= most or model["type"] not in (FLIP_FLOP, LUT) or any(not cell for cell, _ in readers):
             continue

@@ -19,7 +19,8 @@ from scripts.synth.netlist import placed_module
 from scripts.synth.paths import NEVER, Paths
 
 ROUNDS, MOVES = 1000, 60_000  # paths are looked at again after so many moves
-TAU = 200.0  # ps: a path so much below the slowest counts a third of it
+TAU, SOFTER = 200.0, 300.0  # ps: a path so much below the slowest counts a third of it; so much more at the start
+BEYOND = 4.0  # tau by which paths may get slower than the slowest at the start
 HOT, WIDE = 60.0, 60  # heat, and reach in tiles, at the start
 GOAL = 6000.0  # ps: nothing is gained by a path shorter than this
 # ps that a routed wire takes beyond its length: a net with many readers branches, and many wires leave a multiplier
@@ -44,23 +45,27 @@ def refine(folder: Path, seed: int, multipliers: bool = False, rounds: int = ROU
     return best / 1000
 
 
+def beyond(chip: Chip, paths: Paths) -> np.ndarray:
+    """What each wire takes beyond its length, ps."""
+    readers = EACH_READER * (np.minimum(paths.readers, MOST_READERS) - 1)
+    return readers + FROM_MULTIPLIER * (chip.kind[paths.source] == MULTIPLIER)
+
+
 def settle(chip: Chip, paths: Paths, units: np.ndarray, seed: int, rounds: int, heat: float) -> tuple[float, Chip]:
     """Anneals ``chip``; (the slowest path of the best placement seen, ps; that placement)."""
-    best, kept = np.inf, chip
-    beyond = EACH_READER * (np.minimum(paths.readers, MOST_READERS) - 1)
-    beyond[chip.kind[paths.source] == MULTIPLIER] += FROM_MULTIPLIER
+    best, kept, more = np.inf, chip, beyond(chip, paths)
     for n in range(rounds + 1):
         wire_ps = chip.ps[abs(chip.x[chip.source] - chip.x[chip.sink]), abs(chip.y[chip.source] - chip.y[chip.sink])]
-        slowest, over = paths.slowest(wire_ps + beyond)
-        if slowest < best:
+        slowest, over = paths.slowest(wire_ps + more)
+        if slowest <= best:  # the later has the shorter wires
             best, kept = slowest, chip._replace(place=chip.place.copy(), site=chip.site.copy())
         left = 1 - n / rounds
         if not left:
             break
-        goal = max(slowest, GOAL)
-        urgent = np.exp((over - goal) / TAU)
+        tau, goal = TAU + SOFTER * left, max(slowest, GOAL)
+        urgent = np.exp((over - goal) / tau)
         rest = np.where(over > 0, over - wire_ps, NEVER)
-        wish = Wish(rest, chip.weight + urgent, goal, TAU)
+        wish = Wish(rest, chip.weight + urgent, goal + BEYOND * tau * left, tau)
         reach = max(2, int(WIDE * left**1.5))
         anneal(chip, wish, units, _chances(chip, units, urgent), heat * left**2, reach, MOVES, seed * 100_000 + n)
     return best, kept
