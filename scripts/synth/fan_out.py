@@ -32,6 +32,7 @@ class Copies:
 
     def __init__(self, module: dict):
         self.cells, self.nets, self.added = module["cells"], Nets(module), 0
+        self.read_more: list[int] = []  # what copies read: it has more readers than before
 
     def register(self, name: str) -> str:
         """What a cell leads to: itself, or through LUTs the first by name of those that read it."""
@@ -62,6 +63,7 @@ class Copies:
         for port, (source, *_) in connections.items():
             if port != OUTPUT[model["type"]] and not isinstance(source, str):
                 self.nets.readers[source].append((copy, port))
+                self.read_more.append(source)
         return made
 
     def hand_over(self, bit: int, readers: list[tuple[str, str]]) -> None:
@@ -89,7 +91,7 @@ def share_out(netlist: dict, top: str, most: int = MOST) -> int:
         model = cells[nets.driver[bit]]
         readers = sorted(nets.readers.get(bit, []), key=copies.order)
         connections = model["connections"]
-        if len(readers) <= most or model["type"] not in (FLIP_FLOP, LUT) or any(not cell for cell, _ in readers):
+        if len(readers) <= most or model["type"] not in OUTPUT or any(not cell for cell, _ in readers):
             continue
         if model.get("attributes", {}).get("keep") or connections.get("DI", [None])[0] in late:
             continue
@@ -97,8 +99,8 @@ def share_out(netlist: dict, top: str, most: int = MOST) -> int:
         apart = model["type"] == FLIP_FLOP and len(set(blocks)) <= most
         for share in shares(list(zip(blocks, readers, strict=True)), most, apart)[1:]:
             copies.hand_over(bit, [reader for _, reader in share])
-        # What the copies read has more readers now.
-        waiting += [source for (source, *_) in connections.values() if source != bit and source in nets.driver]
+        waiting += [source for source in copies.read_more if source != bit and source in nets.driver]
+        copies.read_more.clear()
     return copies.added
 
 
