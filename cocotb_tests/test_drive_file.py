@@ -126,6 +126,8 @@ def test_contradictions_are_found_without_a_file():
     with pytest.raises(DriveError, match="whole number from 8 to 32767"):
         with_carrier(drive, 7)
     assert isinstance(with_carrier(drive, 8), Drive)
+    with pytest.raises(DriveError, match=r"the current limit = 5.23 .* up to 4.125 A, 1.375 \* \[bases\] current_a"):
+        dataclasses.replace(drive, base_choice=dataclasses.replace(drive.base_choice, current_a=3.0))
 
 
 @each_drive

@@ -3,7 +3,7 @@
 Peak values throughout, amplitude-invariant dq frames, angles and speeds electrical unless a name says
 otherwise.  ``load(path)`` reads a file; ``registers.registers(drive)`` makes the core's integers of it.
 
-Bases, where [bases] does not say otherwise (a per-unit number reaches +-2):
+Bases, where [bases] does not say otherwise (a per-unit number reaches +-2, a current in the stator frame +-1.375):
 
     I_base      current at the upper end of the ADC code
     U_base      half the voltage at full bus code, so that the code's scale ends at 2

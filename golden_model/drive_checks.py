@@ -3,6 +3,7 @@
 import math
 
 from golden_model.drive_keys import DriveError
+from golden_model.formats import PU, VECTOR
 
 CARRIER_HALF_RANGE = (8, 32767)  # generic CARRIER_HALF of rtl/fluxproof.vhd
 WHOLE = 1e-6  # relative; a decimal fraction typed with seven digits still counts as exact
@@ -63,6 +64,9 @@ def _current(drive):
         given = drive.control.current_limit_a is not None
         key = "[control] current_limit_a" if given else "[machine] rated_current_a"
         _refuse(key, limit, f"up to [sensors] current_range_a = {reach:g} A")
+    most = VECTOR * PU.lsb * drive.bases.current_a
+    if limit > most:
+        _refuse("the current limit", limit, f"up to {most:g} A, 1.375 * [bases] current_a: clarke limits beyond")
 
 
 def _flux(drive):
