@@ -7,7 +7,7 @@ import copy
 import pytest
 
 from cocotb_tests.test_multiplier_registers import ENABLE_1, FIRST, RESET, flip_flop, simulate
-from scripts.synth.fan_out import COPY, share_out, shares
+from scripts.synth.fan_out import COPY, MOST_LATE, share_out, shares
 from scripts.synth.netlist import Nets
 
 READERS, MOST = 100, 8
@@ -53,15 +53,30 @@ def test_a_copy_with_another_input_is_noticed(break_it):
     assert simulate(before, 1) != simulate(after, 1)
 
 
+def gate(kind: str, ports: dict) -> dict:
+    """A cell whose output is Z."""
+    directions = {port: "output" if port == "Z" else "input" for port in ports}
+    connections = {port: [bit] for port, bit in ports.items()}
+    return {"type": kind, "parameters": {}, "connections": connections, "port_directions": directions}
+
+
+def test_a_late_register_has_fewer_copies():
+    """Three LUTs in front of the register that a hundred read."""
+    netlist = design()
+    cells = netlist["modules"]["t"]["cells"]
+    for n in range(3):
+        cells[f"l{n}"] = gate("LUT4", {"A": 100 if n == 0 else 599 + n, "Z": 600 + n})
+    cells["late"]["connections"]["DI"] = [602]
+    assert share_out(netlist, "t", MOST) == -(-READERS // MOST_LATE) - 1
+    assert max(fan_outs(netlist)) <= MOST_LATE
+    copies = [cell for name, cell in cells.items() if name.startswith("late")]
+    assert {cell["connections"]["DI"][0] for cell in copies} == {602}
+
+
 def test_a_late_lut_stands_beside_each_of_its_flip_flops():
     """LUTs in a row and a multiplexer of the slice at their end: both flip-flops behind it get all of the slice."""
     netlist = design()
     cells = netlist["modules"]["t"]["cells"]
-
-    def gate(kind: str, ports: dict) -> dict:
-        directions = {port: "output" if port == "Z" else "input" for port in ports}
-        connections = {port: [bit] for port, bit in ports.items()}
-        return {"type": kind, "parameters": {}, "connections": connections, "port_directions": directions}
 
     for n in range(3):
         cells[f"l{n}"] = gate("LUT4", {"A": 100 if n == 0 else 599 + n, "Z": 600 + n})

@@ -99,6 +99,44 @@ def test_left_as_it_is(arguments):
     assert after == before
 
 
+def twice_registered(enable=None, third=False, watched=False, second: dict | None = None) -> dict:
+    """``design``, but for two flip-flops in front of each bit of the operands; ``watched``: something else reads one of
+    the first; ``second``: changes to one of the second."""
+    netlist = design(third=third)
+    module = netlist["modules"]["t"]
+    cells, bit, behind = module["cells"], 20000, {}
+    for n in range(FIRST, FIRST + GIVEN):
+        cells[f"first{n}"] = flip_flop(n, bit, enable)
+        cells[f"second{n}"] = flip_flop(bit, bit + 1, enable, **((second or {}) if n == FIRST + 5 else {}))
+        behind[n], bit = bit + 1, bit + 2
+    for multiplier in ("m_low", "m_high"):
+        connections = cells[multiplier]["connections"]
+        connections.update({pin: [behind.get(bits[0], bits[0])] for pin, bits in connections.items()})
+    module["ports"]["y"]["bits"] += [20000] if watched else []
+    return netlist
+
+
+@pytest.mark.parametrize("enable", [None, ENABLE_1])
+def test_operands_second_registers_go_behind_the_multipliers(enable):
+    before = twice_registered(enable)
+    after = copy.deepcopy(before)
+    assert retime(after, "t") == {"multipliers": 2, "removed": GIVEN, "added": 0}
+    assert absorb(after, "t") == {"A": 2, "B": 2, "P": 2, "removed": GIVEN}
+    kept = [name for name in after["modules"]["t"]["cells"] if name.startswith("p")]
+    assert len(kept) == LOW + ADDED  # the register behind the adder
+    for seed in range(3):
+        assert simulate(before, seed) == simulate(after, seed)
+
+
+@pytest.mark.parametrize("arguments", [{"watched": True}, {"third": True}, {"second": {"CE": ENABLE_2}}])
+def test_or_the_product_register_goes_before_the_adder(arguments):
+    before = twice_registered(ENABLE_1, **arguments)
+    after = copy.deepcopy(before)
+    assert retime(after, "t")["removed"] == LOW + ADDED
+    for seed in range(3):
+        assert simulate(before, seed) == simulate(after, seed)
+
+
 def test_a_short_path_behind_is_no_reason_against():
     levels = 2
     assert levels * NET < 3.9

@@ -14,7 +14,7 @@ import pytest
 
 from cocotb_tests import simulate
 from cocotb_tests.stimulus import random_value
-from golden_model.fluxproof import REGISTERS
+from golden_model.fluxproof import REGISTERS, SAMPLE_INTERVAL
 from golden_model.io import sample_latch
 from golden_model.io import fault_latch, sample_checks, sample_guard
 from scripts import verilog
@@ -24,7 +24,7 @@ from scripts.verilated import VerilatedCore
 GENERICS = {"ADC_BITS": 16, "POSITION_BITS": 16, "CARRIER_HALF": 100}
 OTHER = {"ADC_BITS": 12, "POSITION_BITS": 18, "CARRIER_HALF": 75}
 CLOCKS = 10000
-GAP = (60, 80)  # clocks from sample to sample
+GAP = (SAMPLE_INTERVAL, 80)  # clocks from sample to sample
 PROTECTION = tuple(
     p.name for block in (sample_guard, sample_checks, fault_latch) for p in block.BLOCK.registers
 )  # fmt: skip
@@ -91,7 +91,7 @@ def raw_sample(rng: np.random.Generator, generics: dict[str, int], moderate: boo
 def stimulus(seed: int, generics: dict[str, int], clocks: int = CLOCKS) -> list[dict[str, int]]:
     """For each clock the inputs that change before its rising edge: what the core may meet, in any order.
 
-    A raw sample every 60 to 80 clocks, sometimes none for longer; its inputs turn to noise one clock later.
+    A raw sample every GAP clocks, sometimes none for longer; its inputs turn to noise one clock later.
     Twelve moderate samples, then four wild ones; registers change between them; resets, trips and switching off come
     at any time.
     """

@@ -98,7 +98,6 @@ class Block:
     stimuli: Callable | None = None  # (rng, config) -> list of {port: value}: the block's own hard cases
     possible: Callable | None = None  # {port: value} -> the nearest that can occur
     width_from: Mapping[str, Callable] = field(default_factory=dict)  # port -> config -> Format
-    range_from: Mapping[str, Callable] = field(default_factory=dict)  # port -> config -> (lo, hi)
 
     def ports(self, config: Mapping[str, int]) -> tuple[Port, ...]:
         """Inputs and registers with the formats that the generics give them."""
@@ -111,9 +110,6 @@ class Block:
     def _sized(self, port: Port, config: Mapping[str, int]) -> Port:
         if size := self.width_from.get(port.name):
             port = replace(port, fmt=size(config))
-        if ends := self.range_from.get(port.name):
-            lo, hi = ends(config)
-            port = replace(port, lo=lo, hi=hi)
         return port
 
     def run(self, state, values: Mapping[str, int], config: Mapping[str, int]):

@@ -40,7 +40,16 @@ from golden_model.io import (
     u_dc_processing,
 )
 from golden_model.modulation import gate_generation, pwm_compare, svm, svm_delay_compensation
-from golden_model.transforms import clarke, flux_inverse_park, flux_park, inverse_park, park, rotate, sincos
+from golden_model.transforms import (
+    clarke,
+    flux_inverse_park,
+    flux_park,
+    flux_rotate,
+    inverse_park,
+    park,
+    rotate,
+    sincos,
+)
 
 BLOCKS = {
     module.BLOCK.name: module.BLOCK
@@ -70,6 +79,7 @@ BLOCKS = {
         winding_resistance,
         applied_voltage,
         current_model,
+        flux_rotate,
         flux_inverse_park,
         flux_merge,
         flux_park,

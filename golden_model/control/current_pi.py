@@ -114,7 +114,7 @@ BLOCK = Block(
         Port("u_int_q", INTEGRAL, doc="its integral part, q axis"),
     ),
     state=State(),
-    latency=7,
+    latency=8,
     soon=("u_pi_d",),
     interval=3,
     constants={"DROP_P": DROP_P, "DROP_I": DROP_I, "PROPORTIONAL_W": PROPORTIONAL_W},

@@ -16,6 +16,8 @@ Formats: products and sums exact.  model is floored to half an LSB of FLUX, merg
 not see what the floor took.
 """
 
+from dataclasses import replace
+
 from golden_model.block import Block, Port
 from golden_model.estimators.winding_resistance import MINUS_RHO
 from golden_model.fixed import Format
@@ -111,8 +113,8 @@ BLOCK = Block(
     step=step,
     inputs=(
         Port("i_d", PU, doc="current, d axis"),
-        Port("i_q", PU, doc="current, q axis"),
-        *LAMBDA_M_DQ,
+        Port("i_q", PU, late=1, doc="current, q axis"),
+        *(replace(port, late=2) for port in LAMBDA_M_DQ),
         Port("lambda_pi_d", FLUX, doc="compensation, d axis"),
         Port("lambda_pi_q", FLUX, doc="compensation, q axis"),
         Port("merge_known", BIT, doc="the merged flux is good"),
@@ -121,7 +123,7 @@ BLOCK = Block(
     ),
     registers=(FLUX_MODE, L_D, L_Q, LAMBDA_MG),
     outputs=(*MODEL, *CHOSEN, *RAISED_DQ),
-    latency=3,
+    latency=4,
     interval=3,
     constants={
         "MODEL_FLUX_W": MODEL_FLUX.width,

@@ -5,15 +5,16 @@
     duty = 1/2 + leg + mid(a,b,c)/2                       half the middle leg centres the three pulses
 
 a + b + c = 0, so the zero-sequence voltage -(max + min)/2 of the symmetrical pattern is half the middle
-leg.  Formats: products 33 fraction bits, rounded half up to S(1,17) and saturated at two
-bus voltages, which the clamp of the duty swallows; legs and sum exact; duty rounded half up, then
+leg.  Formats: products 33 fraction bits, rounded half up to S(1,17); legs and sum exact; duty rounded half up, then
 clamped to 0..1 (over-modulation).
+Range: the voltage comes below two bus voltages, so x and y need no limit.  voltage_limit grants less than one: k_u_max
+is below 1, and the circle's radius and the inverses are made of the same sample's u_dc.
 """
 
 import math
 
 from golden_model.block import Block, Port
-from golden_model.fixed import Format, clamp, round_half_up, round_sat
+from golden_model.fixed import Format, clamp, round_half_up
 from golden_model.formats import DUTY, DUTY_ONE, PU
 from golden_model.io.u_dc_processing import INVERSE
 from golden_model.kernel import kernel
@@ -30,8 +31,8 @@ DROP_DUTY = SUM_FRAC - DUTY.frac_bits
 def step(u_alpha, u_beta, inverse, inverse_beta):
     prod_x = u_alpha * inverse
     prod_y = u_beta * inverse_beta
-    x = round_sat(prod_x, DROP_SCALED, SCALED_W)
-    y = round_sat(prod_y, DROP_SCALED, SCALED_W)
+    x = round_half_up(prod_x, DROP_SCALED)
+    y = round_half_up(prod_y, DROP_SCALED)
     leg_a = 2 * x
     leg_b = 2 * y - x
     leg_c = -2 * y - x
@@ -53,7 +54,6 @@ def step(u_alpha, u_beta, inverse, inverse_beta):
 def reference(v, _state):
     x = v["u_alpha"] * v["inverse"]
     y = v["u_beta"] * v["inverse_beta"]
-    x, y = (SCALED.limit(z) for z in (x, y))
     legs = (x, y - x / 2, -y - x / 2)
     zero = -(max(legs) + min(legs)) / 2
     return {f"duty_{k}": min(max(0.5 + leg + zero, 0.0), 1.0) for k, leg in zip("abc", legs, strict=True)}
@@ -62,6 +62,15 @@ def reference(v, _state):
 def bound(_v, _state):
     """x and y within half an LSB each move a duty by at most 1.5 of it; then the duty's own rounding."""
     return {f"duty_{k}": 1.5 * SCALED.lsb + DUTY.lsb / 2 for k in "abc"}
+
+
+def below_two(v):
+    """``v`` with a voltage below two bus voltages, the next smaller where it is not."""
+    out = dict(v)
+    for u, inverse in (("u_alpha", "inverse"), ("u_beta", "inverse_beta")):
+        most = ((SCALED.hi << DROP_SCALED) - 1) // max(v[inverse], 1)
+        out[u] = min(max(v[u], -most), most)
+    return out
 
 
 def stimuli(_rng, _config):
@@ -94,9 +103,10 @@ BLOCK = Block(
         Port("inverse_beta", INVERSE, doc="sqrt(3)/2/u_dc"),
     ),
     outputs=tuple(Port(f"duty_{k}", DUTY, hi=DUTY_ONE, doc=f"duty, leg {k}") for k in "abc"),
-    latency=6,
+    latency=5,
     constants={"DROP_SCALED": DROP_SCALED, "SCALED_W": SCALED_W, "HALF": HALF, "DROP_DUTY": DROP_DUTY},
     reference=reference,
     bound=bound,
     stimuli=stimuli,
+    possible=below_two,
 )

@@ -3,18 +3,18 @@
     lambda_c_alpha = lambda_c_d*cos_theta - lambda_c_q*sin_theta
     lambda_c_beta  = lambda_c_d*sin_theta + lambda_c_q*cos_theta
 
-Formats, rounding and saturation: those of rotate at the width of FLUX.
+Formats, rounding and saturation: those of flux_rotate.
 """
 
 from golden_model.block import Block, Port
-from golden_model.formats import FLUX, FLUX_W
+from golden_model.formats import FLUX
 from golden_model.kernel import kernel
-from golden_model.transforms import rotate
+from golden_model.transforms import flux_rotate, rotate
 
 
 @kernel
 def step(lambda_c_d, lambda_c_q, cos_theta, sin_theta):
-    return rotate.step(lambda_c_d, lambda_c_q, cos_theta, sin_theta, FLUX_W)
+    return flux_rotate.step(lambda_c_d, lambda_c_q, cos_theta, sin_theta)
 
 
 def reference(v, _state):
@@ -40,9 +40,9 @@ BLOCK = Block(
         Port("lambda_c_alpha", FLUX, doc="flux linkage of the current model, alpha"),
         Port("lambda_c_beta", FLUX, doc="flux linkage of the current model, beta"),
     ),
-    latency=rotate.BLOCK.latency,
-    interval=rotate.BLOCK.interval,
+    latency=flux_rotate.BLOCK.latency,
+    interval=flux_rotate.BLOCK.interval,
     reference=reference,
     bound=bound,
-    stimuli=rotate.unit_vectors("lambda_c_d", "lambda_c_q", FLUX_W),
+    stimuli=flux_rotate.unit_vectors("lambda_c_d", "lambda_c_q"),
 )

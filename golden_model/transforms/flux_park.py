@@ -3,18 +3,18 @@
     lambda_m_d =  lambda_m_alpha*cos_theta + lambda_m_beta*sin_theta
     lambda_m_q = -lambda_m_alpha*sin_theta + lambda_m_beta*cos_theta
 
-Formats, rounding and saturation: those of rotate at the width of FLUX.
+Formats, rounding and saturation: those of flux_rotate.
 """
 
 from golden_model.block import Block, Port
-from golden_model.formats import FLUX, FLUX_W
+from golden_model.formats import FLUX
 from golden_model.kernel import kernel
-from golden_model.transforms import rotate
+from golden_model.transforms import flux_rotate, rotate
 
 
 @kernel
 def step(lambda_m_alpha, lambda_m_beta, cos_theta, sin_theta):
-    lambda_m_q, lambda_m_d = rotate.step(lambda_m_beta, lambda_m_alpha, cos_theta, sin_theta, FLUX_W)
+    lambda_m_q, lambda_m_d = flux_rotate.step(lambda_m_beta, lambda_m_alpha, cos_theta, sin_theta)
     return lambda_m_d, lambda_m_q
 
 
@@ -44,9 +44,9 @@ BLOCK = Block(
     step=step,
     inputs=(*LAMBDA_M, *rotate.TRIG_PORTS),
     outputs=LAMBDA_M_DQ,
-    latency=rotate.BLOCK.latency,
-    interval=rotate.BLOCK.interval,
+    latency=flux_rotate.BLOCK.latency,
+    interval=flux_rotate.BLOCK.interval,
     reference=reference,
     bound=bound,
-    stimuli=rotate.unit_vectors("lambda_m_alpha", "lambda_m_beta", FLUX_W),
+    stimuli=flux_rotate.unit_vectors("lambda_m_alpha", "lambda_m_beta"),
 )

@@ -7,14 +7,14 @@ Formats, rounding and range: those of rotate; the voltage is within the circle, 
 """
 
 from golden_model.block import Block, Port
-from golden_model.formats import PU, PU_W, VECTOR
+from golden_model.formats import PU, VECTOR
 from golden_model.kernel import kernel
 from golden_model.transforms import rotate
 
 
 @kernel
 def step(u_d, u_q, cos_theta, sin_theta):
-    return rotate.step(u_d, u_q, cos_theta, sin_theta, PU_W)
+    return rotate.step(u_d, u_q, cos_theta, sin_theta)
 
 
 def reference(v, _state):
@@ -41,6 +41,6 @@ BLOCK = Block(
     interval=rotate.BLOCK.interval,
     reference=reference,
     bound=bound,
-    stimuli=rotate.unit_vectors("u_d", "u_q", PU_W),
+    stimuli=rotate.unit_vectors("u_d", "u_q"),
     possible=rotate.on_circle,
 )

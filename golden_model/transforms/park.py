@@ -10,14 +10,14 @@ the rotation back.
 from dataclasses import replace
 
 from golden_model.block import Block, Port
-from golden_model.formats import PU, PU_W
+from golden_model.formats import PU
 from golden_model.kernel import kernel
 from golden_model.transforms import clarke, rotate
 
 
 @kernel
 def step(i_alpha, i_beta, cos_theta, sin_theta):
-    i_q, i_d = rotate.step(i_beta, i_alpha, cos_theta, sin_theta, PU_W)
+    i_q, i_d = rotate.step(i_beta, i_alpha, cos_theta, sin_theta)
     return i_d, i_q
 
 
@@ -46,6 +46,6 @@ BLOCK = Block(
     interval=rotate.BLOCK.interval,
     reference=reference,
     bound=bound,
-    stimuli=rotate.unit_vectors("i_alpha", "i_beta", PU_W),
+    stimuli=rotate.unit_vectors("i_alpha", "i_beta"),
     possible=rotate.on_circle,
 )

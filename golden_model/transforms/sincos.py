@@ -90,7 +90,8 @@ def stimuli(_rng, _config):
 
 
 OUT = {"lo": -TRIG_ONE, "hi": TRIG_ONE}
-PASS = 6  # clocks that one angle takes; the second one comes when the first is through
+PASS = 6  # clocks that one angle takes; the second one comes when the first is through, and waits for one more
+AHEAD = PASS + 1
 
 BLOCK = Block(
     name="sincos",
@@ -107,10 +108,10 @@ BLOCK = Block(
         Port("cos_out", TRIG, doc="cosine of theta_out", **OUT),
         Port("sin_out", TRIG, doc="sine of theta_out", **OUT),
     ),
-    latency=2 * PASS,
+    latency=PASS + AHEAD,
     interval=PASS + 3,
     soon=("cos_theta", "sin_theta"),
-    ahead=PASS,
+    ahead=AHEAD,
     constants={
         "PASS": PASS,
         "ADDRESS_BITS": ADDRESS_BITS,

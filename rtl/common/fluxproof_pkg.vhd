@@ -37,10 +37,10 @@ package fluxproof_pkg is
 
   -- fluxproof: clocks from the raw sample to the duties, least distance of two samples
   constant FLUXPROOF_SAMPLE_TO_DUTY : positive := 40;
-  constant FLUXPROOF_SAMPLE_INTERVAL : positive := 61;
+  constant FLUXPROOF_SAMPLE_INTERVAL : positive := 62;
 
   -- register_access: clocks that a write waits for the end of a sample
-  constant REGISTER_PATIENCE : positive := 77;
+  constant REGISTER_PATIENCE : positive := 78;
 
   -- sqrt: 001, section 5.2: voltage limit of the current regulation
   constant SQRT_LATENCY : positive := 5;
@@ -159,7 +159,7 @@ package fluxproof_pkg is
   constant CLARKE_VECTOR : natural := 90112;
 
   -- sincos: 001, eq. (12)
-  constant SINCOS_LATENCY : positive := 12;
+  constant SINCOS_LATENCY : positive := 13;
   constant SINCOS_PASS : natural := 6;
   constant SINCOS_ADDRESS_BITS : natural := 10;
   constant SINCOS_DROP_PROD : natural := 18;
@@ -333,7 +333,7 @@ package fluxproof_pkg is
   constant SPEED_PI_PROPORTIONAL_W : natural := 32;
 
   -- current_pi: 001, Fig. 8 and section 5.2: PI_idq
-  constant CURRENT_PI_LATENCY : positive := 7;
+  constant CURRENT_PI_LATENCY : positive := 8;
   constant CURRENT_PI_DROP_P : natural := 4;
   constant CURRENT_PI_DROP_I : natural := 12;
   constant CURRENT_PI_PROPORTIONAL_W : natural := 32;
@@ -359,7 +359,7 @@ package fluxproof_pkg is
   constant INVERSE_PARK_LATENCY : positive := 5;
 
   -- svm: 001, section 5.2, SVM with U_dc = 2**n/m
-  constant SVM_LATENCY : positive := 6;
+  constant SVM_LATENCY : positive := 5;
   constant SVM_DROP_SCALED : natural := 16;
   constant SVM_SCALED_W : natural := 19;
   constant SVM_HALF : natural := 262144;
@@ -391,8 +391,12 @@ package fluxproof_pkg is
   -- current_model: 001, eq. (6); with lambda_add the last term of eq. (16)
   constant CURRENT_MODEL_LATENCY : positive := 5;
 
+  -- flux_rotate: 001, eq. (9): T_dq/alphabeta
+  constant FLUX_ROTATE_LATENCY : positive := 6;
+  constant FLUX_ROTATE_DROP : natural := 16;
+
   -- flux_inverse_park: 001, eq. (9): T_dq/alphabeta
-  constant FLUX_INVERSE_PARK_LATENCY : positive := 5;
+  constant FLUX_INVERSE_PARK_LATENCY : positive := 6;
 
   -- flux_merge: 001, eq. (7); 'Merge of voltage and current models' of Fig. 8
   constant FLUX_MERGE_LATENCY : positive := 31;
@@ -406,10 +410,10 @@ package fluxproof_pkg is
   constant FLUX_MERGE_X_TO_STATE : natural := 6;
 
   -- flux_park: 001, eq. (9): T_alphabeta/dq
-  constant FLUX_PARK_LATENCY : positive := 5;
+  constant FLUX_PARK_LATENCY : positive := 6;
 
   -- flux_models: 001, eq. (6) and (11)
-  constant FLUX_MODELS_LATENCY : positive := 3;
+  constant FLUX_MODELS_LATENCY : positive := 4;
   constant FLUX_MODELS_MODEL_FLUX_W : natural := 31;
   constant FLUX_MODELS_MERGED_FLUX_W : natural := 27;
   constant FLUX_MODELS_RAISED_W : natural := 26;
@@ -500,7 +504,7 @@ package fluxproof_pkg is
   -- telemetry_words: none: what a recording needs
   constant TELEMETRY_WORDS_LATENCY : positive := 2;
   constant TELEMETRY_WORDS_COUNT : natural := 24;
-  constant TELEMETRY_WORDS_START : natural := 40;
+  constant TELEMETRY_WORDS_START : natural := 41;
   constant TELEMETRY_WORDS_INDEX_W : natural := 5;
 
   -- telemetry: none: what a recording needs

@@ -25,13 +25,13 @@ architecture rtl of sqrt is
   constant LATENCY : positive := SQRT_LATENCY;
 
   signal valid      : std_logic_vector(0 to LATENCY);
-  signal bytes_0    : unsigned(1 downto 0);
   signal small_0    : std_logic;
+  signal small_1    : std_logic;
+  signal byte_1     : std_logic;
   signal upper_1    : unsigned(1 downto 0);
   signal lower_1    : unsigned(1 downto 0);
   signal pairs_1    : unsigned(1 downto 0);
   signal x_1        : unsigned(31 downto 0);
-  signal shift_1    : unsigned(1 downto 0);
   signal mantissa_1 : unsigned(19 downto 0);
   signal address_1  : unsigned(8 downto 0);
   signal chord_2    : unsigned(SQRT_BASE_BITS + SQRT_SLOPE_BITS - 1 downto 0);
@@ -48,26 +48,18 @@ architecture rtl of sqrt is
   signal root_5     : unsigned(U_MAX_W - 1 downto 0);
   signal shift_5    : std_logic;
 
-  -- Which of four groups of bits is the first with a one in it; the last where none of the others has.
-  function leading_zeros (first, second, third : std_logic) return unsigned is
-  begin
-    return (not first and not second) & (not first and (second or not third));
-  end function;
-
-  -- The same of the four pairs of a byte.
+  -- How many pairs of zeros a byte begins with, 3 where it is empty.
   function zero_pairs (byte : unsigned) return unsigned is
     alias b : unsigned(7 downto 0) is byte;
   begin
-    return leading_zeros(b(7) or b(6), b(5) or b(4), b(3) or b(2));
+    return (nor b(7 downto 4)) & ((nor b(7 downto 6)) and ((or b(5 downto 4)) or (nor b(3 downto 2))));
   end function;
 begin
   valid(0) <= in_valid;
-  bytes_0  <= leading_zeros(or x(31 downto 24), or x(23 downto 16), or x(15 downto 8));
+  small_0  <= nor x(31 downto 16);
+  pairs_1  <= lower_1 when byte_1 = '1' else upper_1;
 
-  small_0 <= nor x(31 downto 16);
-  pairs_1 <= lower_1 when shift_1(0) = '1' else upper_1;
-
-  mantissa_1 <= resize(shift_right(shift_left(x_1, to_integer(pairs_1 & '0')), SQRT_DROP_X), 20);
+  mantissa_1 <= resize(shift_right(shift_left(x_1, to_integer(byte_1 & pairs_1 & '0')), SQRT_DROP_X), 20);
   address_1  <= pairs_1(0) & mantissa_1(19 downto SQRT_REST_BITS);
 
   fine_4 <= prod_4 + shift_left(signed(resize(base_4, fine_4'length)), SQRT_REST_BITS);
@@ -77,13 +69,17 @@ begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stage 1: zero bytes shifted out, four pairs each;  zero pairs of both bytes of the half that stays
+      -- Stage 1: 16 zeros shifted out where it begins with them;  is the first byte left empty, the zero pairs of it
+      -- and of the next
       if valid(0) = '1' then
-        x_1     <= shift_left(x, to_integer(bytes_0 & "000"));
-        shift_1 <= bytes_0;
+        x_1     <= x;
+        small_1 <= small_0;
+        byte_1  <= nor x(31 downto 24);
         upper_1 <= zero_pairs(x(31 downto 24));
         lower_1 <= zero_pairs(x(23 downto 16));
         if small_0 = '1' then
+          x_1     <= shift_left(x, 16);
+          byte_1  <= nor x(15 downto 8);
           upper_1 <= zero_pairs(x(15 downto 8));
           lower_1 <= zero_pairs(x(7 downto 0));
         end if;
@@ -93,7 +89,7 @@ begin
       if valid(1) = '1' then
         chord_2 <= SQRT_CHORD(to_integer(address_1));
         rest_2  <= mantissa_1(SQRT_REST_BITS - 1 downto 0);
-        shift_2 <= shift_1 & pairs_1(1);
+        shift_2 <= small_1 & byte_1 & pairs_1(1);
       end if;
 
       -- Stage 3: base, slope wait, for a block RAM's output comes late in its clock

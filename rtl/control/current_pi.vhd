@@ -3,7 +3,7 @@
 --   int += ki*err unless the voltage was at its limit and err pushes further
 -- sat_d, sat_q (-1, 0, +1): the limit that held the axis in the sample before.  run = 0: all zero.
 -- Formats: err PU, proportional part 28 fraction bits, integral S(1,28), output PU.
--- Latency: 7 (d, q follow each other: i_q and i_q_ref are needed a clock after i_d, u_pi_d comes with out_soon).
+-- Latency: 8 (d, q follow each other: i_q and i_q_ref are needed a clock after i_d, u_pi_d comes with out_soon).
 -- Interval: 3.
 -- Rounding: half up.  err, integral and output saturate at 2 per unit, twice what the limiter grants; the
 -- proportional part needs no limit of its own, as what it asks for beyond 2 is cut anyway, and the increment none,
@@ -44,34 +44,38 @@ architecture rtl of current_pi is
   constant LATENCY : positive := CURRENT_PI_LATENCY;
   constant SUM_W   : positive := PU_W + KP_W + 2;
 
-  -- State: the integrals of both axes take turns; before the d axis' beat integral_4 is that of q
-  signal integral_2 : signed(INTEGRAL_W - 1 downto 0);
-  signal integral_4 : signed(INTEGRAL_W - 1 downto 0);
+  -- State: the integrals of both axes take turns; before the d axis' beat integral_5 is that of q
+  signal integral_3 : signed(INTEGRAL_W - 1 downto 0);
+  signal integral_5 : signed(INTEGRAL_W - 1 downto 0);
 
   signal valid    : std_logic_vector(0 to LATENCY);
   signal i_0      : signed(PU_W - 1 downto 0);
   signal i_ref_0  : signed(PU_W - 1 downto 0);
-  signal err_1    : signed(PU_W - 1 downto 0);
+  signal diff_1   : signed(PU_W downto 0);
   signal ki_1     : unsigned(KI_W - 1 downto 0);
   signal sat_1    : signed(1 downto 0);
   signal run_1    : std_logic;
   signal hold_1   : std_logic;
   signal err_2    : signed(PU_W - 1 downto 0);
-  signal prod_i_2 : signed(PU_W + KI_W downto 0);
+  signal ki_2     : unsigned(KI_W - 1 downto 0);
   signal hold_2   : std_logic;
   signal run_2    : std_logic;
   signal err_3    : signed(PU_W - 1 downto 0);
-  signal kp_3     : unsigned(KP_W - 1 downto 0);
-  signal sum_i_3  : signed(PU_W + KI_W downto 0);
+  signal prod_i_3 : signed(PU_W + KI_W downto 0);
   signal hold_3   : std_logic;
-  signal old_3    : signed(INTEGRAL_W - 1 downto 0);
   signal run_3    : std_logic;
-  signal prod_p_4 : signed(PU_W + KP_W downto 0);
-  signal half_4   : signed(INTEGRAL_W downto 0);
+  signal err_4    : signed(PU_W - 1 downto 0);
+  signal kp_4     : unsigned(KP_W - 1 downto 0);
+  signal sum_i_4  : signed(PU_W + KI_W downto 0);
+  signal hold_4   : std_logic;
+  signal old_4    : signed(INTEGRAL_W - 1 downto 0);
   signal run_4    : std_logic;
-  signal sum_p_5  : signed(SUM_W - 1 downto 0);
+  signal prod_p_5 : signed(PU_W + KP_W downto 0);
+  signal half_5   : signed(INTEGRAL_W downto 0);
   signal run_5    : std_logic;
-  signal u_pi_5   : signed(PU_W - 1 downto 0);
+  signal sum_p_6  : signed(SUM_W - 1 downto 0);
+  signal run_6    : std_logic;
+  signal u_pi_6   : signed(PU_W - 1 downto 0);
 begin
   valid(0) <= in_valid;
 
@@ -79,10 +83,10 @@ begin
   i_0     <= i_q when valid(1) = '1' else i_d;
   i_ref_0 <= i_q_ref when valid(1) = '1' else i_d_ref;
 
-  hold_1 <= not run_1 or (sat_1(1) and err_1(err_1'high)) or (sat_1(0) and not sat_1(1) and not err_1(err_1'high));
+  hold_1 <= not run_1 or (sat_1(1) and diff_1(diff_1'high)) or (sat_1(0) and not sat_1(1) and not diff_1(diff_1'high));
 
-  u_pi_5 <= (others => '0') when run_5 = '0' else
-            saturate(shift_right(sum_p_5, CURRENT_PI_DROP_P + PU_TO_INTEGRAL), PU_W);
+  u_pi_6 <= (others => '0') when run_6 = '0' else
+            saturate(shift_right(sum_p_6, CURRENT_PI_DROP_P + PU_TO_INTEGRAL), PU_W);
 
   process (clk)
     variable integral : signed(INTEGRAL_W - 1 downto 0);
@@ -90,84 +94,92 @@ begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stage 1: err = i_ref - i
+      -- Stage 1: diff = i_ref - i
       if valid(0) = '1' or valid(1) = '1' then
-        err_1 <= saturate(resize(i_ref_0, PU_W + 1) - resize(i_0, PU_W + 1), PU_W);
-        ki_1  <= ki_d;
-        sat_1 <= sat_d;
-        run_1 <= run;
+        diff_1 <= resize(i_ref_0, PU_W + 1) - resize(i_0, PU_W + 1);
+        ki_1   <= ki_d;
+        sat_1  <= sat_d;
+        run_1  <= run;
         if valid(1) = '1' then
           ki_1  <= ki_q;
           sat_1 <= sat_q;
         end if;
       end if;
 
-      -- Stage 2: prod_i = ki*err
+      -- Stage 2: err = diff, limited
       if valid(1) = '1' or valid(2) = '1' then
-        prod_i_2 <= err_1 * signed('0' & ki_1);
-        hold_2   <= hold_1;
-        err_2    <= err_1;
-        run_2    <= run_1;
+        err_2  <= saturate(diff_1, PU_W);
+        ki_2   <= ki_1;
+        hold_2 <= hold_1;
+        run_2  <= run_1;
       end if;
 
-      -- Stage 3: int + prod_i, with half an LSB to round with
+      -- Stage 3: prod_i = ki*err
       if valid(2) = '1' or valid(3) = '1' then
-        sum_i_3 <= prod_i_2 + (integral_2 & half(CURRENT_PI_DROP_I, CURRENT_PI_DROP_I));
-        hold_3  <= hold_2;
-        old_3   <= integral_2;
-        run_3   <= run_2;
-        err_3   <= err_2;
-        kp_3    <= kp_d;
-        if valid(3) = '1' then
-          kp_3 <= kp_q;
+        prod_i_3 <= err_2 * signed('0' & ki_2);
+        hold_3   <= hold_2;
+        err_3    <= err_2;
+        run_3    <= run_2;
+      end if;
+
+      -- Stage 4: int + prod_i, with half an LSB to round with
+      if valid(3) = '1' or valid(4) = '1' then
+        sum_i_4 <= prod_i_3 + (integral_3 & half(CURRENT_PI_DROP_I, CURRENT_PI_DROP_I));
+        hold_4  <= hold_3;
+        old_4   <= integral_3;
+        run_4   <= run_3;
+        err_4   <= err_3;
+        kp_4    <= kp_d;
+        if valid(4) = '1' then
+          kp_4 <= kp_q;
         end if;
       end if;
 
-      -- Stage 4: int, narrowed, or the old one where held;  prod_p = kp*err;  half an LSB of the output to round with
-      if valid(3) = '1' or valid(4) = '1' then
-        integral := old_3;
-        if hold_3 = '0' then
-          integral := saturate(shift_right(sum_i_3, CURRENT_PI_DROP_I), INTEGRAL_W);
+      -- Stage 5: int, narrowed, or the old one where held;  prod_p = kp*err;  half an LSB of the output to round with
+      if valid(4) = '1' or valid(5) = '1' then
+        integral := old_4;
+        if hold_4 = '0' then
+          integral := saturate(shift_right(sum_i_4, CURRENT_PI_DROP_I), INTEGRAL_W);
         end if;
-        integral_4 <= integral;
-        half_4     <= integral + half(PU_TO_INTEGRAL, INTEGRAL_W + 1);
-        prod_p_4   <= err_3 * signed('0' & kp_3);
-        run_4      <= run_3;
+        integral_5 <= integral;
+        half_5     <= integral + half(PU_TO_INTEGRAL, INTEGRAL_W + 1);
+        prod_p_5   <= err_4 * signed('0' & kp_4);
+        run_5      <= run_4;
       end if;
 
       -- The turn of the integrals: to that of q once the d axis has taken its own, and back for the next sample;
       -- both start from zero while not running
-      if valid(2) = '1' or valid(4) = '1' then
-        integral_2 <= integral_4;
+      if valid(3) = '1' or valid(5) = '1' then
+        integral_3 <= integral_5;
       end if;
-      if (valid(1) = '1' and run_1 = '0') or (valid(2) = '1' and run_2 = '0') then
-        integral_2 <= (others => '0');
-      end if;
-
-      -- Stage 5: proportional + int
-      if valid(4) = '1' or valid(5) = '1' then
-        sum_p_5 <= resize(prod_p_4, SUM_W) + (half_4 & half(CURRENT_PI_DROP_P, CURRENT_PI_DROP_P));
-        run_5   <= run_4;
-      end if;
-      if valid(4) = '1' then
-        u_int_d <= integral_4;
-      end if;
-      if valid(5) = '1' then
-        u_int_q <= integral_4;
+      if (valid(2) = '1' and run_2 = '0') or (valid(3) = '1' and run_3 = '0') then
+        integral_3 <= (others => '0');
       end if;
 
-      -- Stage 6: u_pi, narrowed; d at clock 6, q at 7; zero while not running
+      -- Stage 6: proportional + int
+      if valid(5) = '1' or valid(6) = '1' then
+        sum_p_6 <= resize(prod_p_5, SUM_W) + (half_5 & half(CURRENT_PI_DROP_P, CURRENT_PI_DROP_P));
+        run_6   <= run_5;
+      end if;
       if valid(5) = '1' then
-        u_pi_d <= u_pi_5;
+        u_int_d <= integral_5;
       end if;
       if valid(6) = '1' then
-        u_pi_q <= u_pi_5;
+        u_int_q <= integral_5;
+      end if;
+
+      -- Stage 7: u_pi, narrowed; d at clock 7, q at 8; zero while not running
+      if valid(6) = '1' then
+        u_pi_d <= u_pi_6;
+      end if;
+      if valid(7) = '1' then
+        u_pi_q <= u_pi_6;
       end if;
 
       if rst = '1' then
         valid(1 to LATENCY) <= (others => '0');
-        integral_2          <= (others => '0');
-        integral_4          <= (others => '0');
+        integral_3          <= (others => '0');
+        integral_5          <= (others => '0');
       end if;
     end if;
   end process;

@@ -5,7 +5,7 @@
 -- merged: the merged flux counts (voltage known, a merge wanted), else the current model's; ended: it is at its end,
 -- where the rotation before has saturated.
 -- Formats: currents and lambda_mg PU, fluxes FLUX; products exact; model S(6,24), merged S(3,23), raised S(2,23).
--- Latency: 3; i_q and lambda_m a clock after in_valid.  Interval: 3.
+-- Latency: 4; i_q is needed a clock after in_valid, lambda_m two.  Interval: 3.
 -- Rounding: floored, which rounding half up to PU does not see; with raised that is a cut.
 
 library ieee;
@@ -56,9 +56,11 @@ architecture rtl of flux_models is
   constant PARTS       : positive := (FLUX_W + PART_W - 2) / PART_W;
 
   signal valid         : std_logic_vector(0 to LATENCY);
-  signal i_d_1         : signed(PU_W - 1 downto 0);
-  signal l_d_1         : unsigned(INDUCTANCE_W - 1 downto 0);
-  signal minus_rho_1   : signed(MINUS_RHO_W - 1 downto 0);
+  signal i_d_2         : signed(PU_W - 1 downto 0);
+  signal i_q_2         : signed(PU_W - 1 downto 0);
+  signal l_d_2         : unsigned(INDUCTANCE_W - 1 downto 0);
+  signal l_q_2         : unsigned(INDUCTANCE_W - 1 downto 0);
+  signal minus_rho_2   : signed(MINUS_RHO_W - 1 downto 0);
   signal prod_model_d  : signed(PROD_W - 1 downto 0);
   signal prod_model_q  : signed(PROD_W - 1 downto 0);
   signal prod_merged_d : signed(PU_W + MINUS_RHO_W - 1 downto 0);
@@ -66,9 +68,9 @@ architecture rtl of flux_models is
   signal base_model_d  : signed(BASE_W - 1 downto 0);
   signal base_merged_d : signed(BASE_W - 1 downto 0);
   signal base_merged_q : signed(BASE_W - 1 downto 0);
-  signal merged_2      : std_logic;
-  signal ended_d_2     : std_logic_vector(PARTS - 1 downto 0);
-  signal ended_q_2     : std_logic_vector(PARTS - 1 downto 0);
+  signal merged_3      : std_logic;
+  signal ended_d_3     : std_logic_vector(PARTS - 1 downto 0);
+  signal ended_q_3     : std_logic_vector(PARTS - 1 downto 0);
   signal sum_model_d   : signed(SUM_W - 1 downto 0);
   signal sum_model_q   : signed(SUM_W - 1 downto 0);
   signal sum_merged_d  : signed(SUM_W - 1 downto 0);
@@ -97,40 +99,43 @@ begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stage 1: d's operands, in registers of the multipliers; i_q comes too late for one.  raised = lambda_pi + half
-      i_d_1       <= i_d;
-      l_d_1       <= l_d;
-      minus_rho_1 <= minus_rho;
-      if valid(0) = '1' then
+      -- Stage 2: the operands, in registers of the multipliers: the currents come from afar, i_q a clock after i_d;
+      -- raised = lambda_pi + half
+      i_d_2       <= i_d;
+      i_q_2       <= i_q;
+      l_d_2       <= l_d;
+      l_q_2       <= l_q;
+      minus_rho_2 <= minus_rho;
+      if valid(1) = '1' then
         raised_d <= raised(lambda_pi_d);
         raised_q <= raised(lambda_pi_q);
       end if;
 
-      -- Stage 2: prod_model = l*i;  prod_merged = -rho*i;  base: all that does not wait for the current
-      prod_model_d  <= i_d_1 * signed('0' & l_d_1);
-      prod_model_q  <= i_q * signed('0' & l_q);
-      prod_merged_d <= i_d_1 * minus_rho_1;
-      prod_merged_q <= i_q * minus_rho_1;
-      if valid(1) = '1' then
+      -- Stage 3: prod_model = l*i;  prod_merged = -rho*i;  base: all that does not wait for the current
+      prod_model_d  <= i_d_2 * signed('0' & l_d_2);
+      prod_model_q  <= i_q_2 * signed('0' & l_q_2);
+      prod_merged_d <= i_d_2 * minus_rho_2;
+      prod_merged_q <= i_q_2 * minus_rho_2;
+      if valid(2) = '1' then
         base_model_d  <= shift_left(resize(lambda_mg, BASE_W), PU_TO_FLUX) + raised_d;
         base_merged_d <= resize(lambda_m_d, BASE_W) + raised_d;
         base_merged_q <= resize(lambda_m_q, BASE_W) + raised_q;
-        ended_d_2     <= at_end(lambda_m_d);
-        ended_q_2     <= at_end(lambda_m_q);
-        merged_2      <= '0';
+        ended_d_3     <= at_end(lambda_m_d);
+        ended_q_3     <= at_end(lambda_m_q);
+        merged_3      <= '0';
         if flux_mode /= FLUX_MODELS_CURRENT_MODEL then
-          merged_2 <= merge_known and run;
+          merged_3 <= merge_known and run;
         end if;
       end if;
 
-      -- Stage 3: model = base + prod_model, where base is raised alone in q;  merged = base + prod_merged
-      if valid(2) = '1' then
+      -- Stage 4: model = base + prod_model, where base is raised alone in q;  merged = base + prod_merged
+      if valid(3) = '1' then
         sum_model_d  <= shift_left(resize(base_model_d, SUM_W), SHIFT_MODEL) + prod_model_d;
         sum_model_q  <= shift_left(resize(raised_q, SUM_W), SHIFT_MODEL) + prod_model_q;
         sum_merged_d <= shift_left(resize(base_merged_d, SUM_W), DROP_MERGED) + prod_merged_d;
         sum_merged_q <= shift_left(resize(base_merged_q, SUM_W), DROP_MERGED) + prod_merged_q;
-        merged       <= merged_2;
-        ended        <= merged_2 and ((and ended_d_2) or (and ended_q_2));
+        merged       <= merged_3;
+        ended        <= merged_3 and ((and ended_d_3) or (and ended_q_3));
       end if;
 
       if rst = '1' then

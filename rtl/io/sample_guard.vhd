@@ -32,6 +32,7 @@ architecture rtl of sample_guard is
   -- State
   signal hold    : unsigned(7 downto 0);
   signal busy    : std_logic;  -- hold /= 0; a register, as what waits for the end of a sample hangs on it
+  signal last    : std_logic;  -- hold = 1
   signal age     : unsigned(19 downto 0);
   signal counted : unsigned(7 downto 0);
 
@@ -51,11 +52,13 @@ begin
       if entered = '1' then
         hold <= to_unsigned(INTERVAL - 1, 8);
         busy <= '1';
+        last <= '1' when INTERVAL = 2 else '0';
         age  <= to_unsigned(SAMPLE_GUARD_AHEAD, 20);
       else
         if busy = '1' then
           hold <= hold - 1;
-          busy <= '0' when hold = 1 else '1';
+          busy <= not last;
+          last <= '1' when hold = 2 else '0';
         end if;
         if expired = '0' then
           age <= age + 1;
@@ -77,6 +80,7 @@ begin
       if rst = '1' then
         hold         <= (others => '0');
         busy         <= '0';
+        last         <= '0';
         age          <= (others => '0');
         counted      <= (others => '0');
         sample_early <= '0';

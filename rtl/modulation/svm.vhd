@@ -3,7 +3,8 @@
 --   legs a = x, b = -x/2 + y, c = -x/2 - y;  duty = 1/2 + leg + mid(a,b,c)/2
 -- The middle leg is a while |3x| <= |2y|; else b where x and y have one sign, c where they have not: the near one.
 -- Formats: products 33 fraction bits; x, y S(1,17); legs S(3,18), exact; duty U(1,16), 0 to 1.
--- Latency: 6.  Rounding: half up.  x, y saturate at two bus voltages, which the clamp of the duty swallows.
+-- Latency: 5.  Rounding: half up.  x, y come below two bus voltages: voltage_limit grants less
+-- than one, as k_u_max is below 1.
 -- The legs sum to zero, so leg + mid/2 is at most half the distance of two legs: below 4, two bits above a duty's sign.
 
 library ieee;
@@ -38,23 +39,23 @@ architecture rtl of svm is
   signal prod_y_1  : signed(PROD_W - 1 downto 0);
   signal prod_x_2  : signed(PROD_W - 1 downto 0);
   signal prod_y_2  : signed(PROD_W - 1 downto 0);
-  signal x_3       : signed(SVM_SCALED_W - 1 downto 0);
-  signal y_3       : signed(SVM_SCALED_W - 1 downto 0);
+  signal x_2       : signed(SVM_SCALED_W - 1 downto 0);
+  signal y_2       : signed(SVM_SCALED_W - 1 downto 0);
+  signal alike_2   : std_logic;
+  signal triple_2  : signed(LEG_W - 1 downto 0);
+  signal double_2  : signed(LEG_W - 1 downto 0);  -- 2y, or its complement where y has the sign of x
+  signal apart_2   : signed(LEG_W + 1 downto 0);
+  signal leg_a_3   : signed(LEG_W - 1 downto 0);
+  signal leg_b_3   : signed(LEG_W - 1 downto 0);
+  signal minus_c_3 : signed(LEG_W - 1 downto 0);
   signal alike_3   : std_logic;
-  signal triple_3  : signed(LEG_W - 1 downto 0);
-  signal double_3  : signed(LEG_W - 1 downto 0);  -- 2y, or its complement where y has the sign of x
-  signal apart_3   : signed(LEG_W + 1 downto 0);
+  signal a_mid_3   : std_logic;
+  signal mid_3     : signed(LEG_W - 1 downto 0);
+  signal carry_3   : signed(1 downto 0);
   signal leg_a_4   : signed(LEG_W - 1 downto 0);
   signal leg_b_4   : signed(LEG_W - 1 downto 0);
   signal minus_c_4 : signed(LEG_W - 1 downto 0);
-  signal alike_4   : std_logic;
-  signal a_mid_4   : std_logic;
   signal mid_4     : signed(LEG_W - 1 downto 0);
-  signal carry_4   : signed(1 downto 0);
-  signal leg_a_5   : signed(LEG_W - 1 downto 0);
-  signal leg_b_5   : signed(LEG_W - 1 downto 0);
-  signal minus_c_5 : signed(LEG_W - 1 downto 0);
-  signal mid_5     : signed(LEG_W - 1 downto 0);
 
   -- 1/2 + sum/4, sum being leg + mid/2 with the half LSB in it, clamped to 0..1.
   function to_duty (sum : signed) return unsigned is
@@ -71,17 +72,20 @@ architecture rtl of svm is
 begin
   valid(0) <= in_valid;
 
+  x_2 <= prod_x_2(SVM_DROP_SCALED + SVM_SCALED_W - 1 downto SVM_DROP_SCALED);
+  y_2 <= prod_y_2(SVM_DROP_SCALED + SVM_SCALED_W - 1 downto SVM_DROP_SCALED);
+
   -- 3x less 2y, both taken as positive, with the sign of x; a bit above the sum's, where 3x lacks that sign: there
   -- 1 says that 2y is the larger
-  alike_3  <= x_3(x_3'high) xnor y_3(y_3'high);
-  triple_3 <= shift_left(resize(x_3, LEG_W), 1) + x_3;
-  double_3 <= shift_left(resize(y_3, LEG_W), 1) xor (LEG_W - 1 downto 0 => alike_3);
-  apart_3  <= signed('0' & triple_3 & alike_3) + (double_3 & alike_3);
+  alike_2  <= x_2(x_2'high) xnor y_2(y_2'high);
+  triple_2 <= shift_left(resize(x_2, LEG_W), 1) + x_2;
+  double_2 <= shift_left(resize(y_2, LEG_W), 1) xor (LEG_W - 1 downto 0 => alike_2);
+  apart_2  <= signed('0' & triple_2 & alike_2) + (double_2 & alike_2);
 
-  mid_4   <= leg_a_4 when a_mid_4 = '1' else
-             leg_b_4 when alike_4 = '1' else
-             not minus_c_4;
-  carry_4 <= '0' & not (a_mid_4 or alike_4);
+  mid_3   <= leg_a_3 when a_mid_3 = '1' else
+             leg_b_3 when alike_3 = '1' else
+             not minus_c_3;
+  carry_3 <= '0' & not (a_mid_3 or alike_3);
 
   process (clk)
   begin
@@ -100,34 +104,28 @@ begin
         prod_y_2 <= prod_y_1 + half(SVM_DROP_SCALED, PROD_W);
       end if;
 
-      -- Stage 3: x, y = prod, narrowed
+      -- Stage 3: legs with one more fraction bit, c as its negative; which of them is in the middle
       if valid(2) = '1' then
-        x_3 <= saturate(shift_right(prod_x_2, SVM_DROP_SCALED), SVM_SCALED_W);
-        y_3 <= saturate(shift_right(prod_y_2, SVM_DROP_SCALED), SVM_SCALED_W);
+        leg_a_3   <= shift_left(resize(x_2, LEG_W), 1);
+        leg_b_3   <= shift_left(resize(y_2, LEG_W), 1) - x_2;
+        minus_c_3 <= shift_left(resize(y_2, LEG_W), 1) + x_2;
+        alike_3   <= alike_2;
+        a_mid_3   <= apart_2(LEG_W + 1);
       end if;
 
-      -- Stage 4: legs with one more fraction bit, c as its negative; which of them is in the middle
+      -- Stage 4: the middle leg, with half an LSB of the duty to round with
       if valid(3) = '1' then
-        leg_a_4   <= shift_left(resize(x_3, LEG_W), 1);
-        leg_b_4   <= shift_left(resize(y_3, LEG_W), 1) - x_3;
-        minus_c_4 <= shift_left(resize(y_3, LEG_W), 1) + x_3;
-        alike_4   <= alike_3;
-        a_mid_4   <= apart_3(LEG_W + 1);
+        leg_a_4   <= leg_a_3;
+        leg_b_4   <= leg_b_3;
+        minus_c_4 <= minus_c_3;
+        mid_4     <= mid_3 + (to_signed(2 ** (SVM_DROP_DUTY - 1), LEG_W) or resize(carry_3, LEG_W));
       end if;
 
-      -- Stage 5: the middle leg, with half an LSB of the duty to round with
+      -- Stage 5: duty = 1/2 + leg + mid/2, narrowed and clamped to 0..1
       if valid(4) = '1' then
-        leg_a_5   <= leg_a_4;
-        leg_b_5   <= leg_b_4;
-        minus_c_5 <= minus_c_4;
-        mid_5     <= mid_4 + (to_signed(2 ** (SVM_DROP_DUTY - 1), LEG_W) or resize(carry_4, LEG_W));
-      end if;
-
-      -- Stage 6: duty = 1/2 + leg + mid/2, narrowed and clamped to 0..1
-      if valid(5) = '1' then
-        duty_a <= to_duty(leg_a_5 + mid_5(LEG_W - 1 downto 1));
-        duty_b <= to_duty(leg_b_5 + mid_5(LEG_W - 1 downto 1));
-        duty_c <= to_duty(mid_5(LEG_W - 1 downto 1) - minus_c_5);
+        duty_a <= to_duty(leg_a_4 + mid_4(LEG_W - 1 downto 1));
+        duty_b <= to_duty(leg_b_4 + mid_4(LEG_W - 1 downto 1));
+        duty_c <= to_duty(mid_4(LEG_W - 1 downto 1) - minus_c_4);
       end if;
 
       if rst = '1' then

@@ -1,7 +1,7 @@
 -- Purpose: the current model's flux linkage to the stator frame, the rotation by theta_me.
 --   lambda_c_alpha = lambda_c_d*cos_theta - lambda_c_q*sin_theta
 --   lambda_c_beta  = lambda_c_d*sin_theta + lambda_c_q*cos_theta
--- Formats, latency (5), interval (4), rounding: those of rotate at the width of FLUX.
+-- Formats, latency (6), interval (3), rounding: those of flux_rotate.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -27,10 +27,7 @@ end entity flux_inverse_park;
 architecture rtl of flux_inverse_park is
 begin
 
-  rotation : entity work.rotate
-    generic map (
-      WIDTH => FLUX_W
-    )
+  rotation : entity work.flux_rotate
     port map (
       clk       => clk,
       rst       => rst,
@@ -39,7 +36,6 @@ begin
       y         => lambda_c_q,
       cos_theta => cos_theta,
       sin_theta => sin_theta,
-      out_soon  => open,
       out_valid => out_valid,
       out_x     => lambda_c_alpha,
       out_y     => lambda_c_beta

@@ -1,7 +1,7 @@
 -- Purpose: merged flux linkage to the rotor frame, the rotation by -theta_me.
 --   lambda_m_d =  lambda_m_alpha*cos_theta + lambda_m_beta*sin_theta
 --   lambda_m_q = -lambda_m_alpha*sin_theta + lambda_m_beta*cos_theta
--- Formats, latency (5), interval (4), rounding: those of rotate at the width of FLUX.
+-- Formats, latency (6), interval (3), rounding: those of flux_rotate.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -28,10 +28,7 @@ architecture rtl of flux_park is
 begin
 
   -- A rotation forwards of the swapped axes is the rotation back.
-  rotation : entity work.rotate
-    generic map (
-      WIDTH => FLUX_W
-    )
+  rotation : entity work.flux_rotate
     port map (
       clk       => clk,
       rst       => rst,
@@ -40,7 +37,6 @@ begin
       y         => lambda_m_alpha,
       cos_theta => cos_theta,
       sin_theta => sin_theta,
-      out_soon  => open,
       out_valid => out_valid,
       out_x     => lambda_m_q,
       out_y     => lambda_m_d

@@ -28,9 +28,6 @@ architecture rtl of inverse_park is
 begin
 
   rotation : entity work.rotate
-    generic map (
-      WIDTH => PU_W
-    )
     port map (
       clk       => clk,
       rst       => rst,

@@ -30,9 +30,6 @@ begin
 
   -- A rotation forwards of the swapped axes is the rotation back.
   rotation : entity work.rotate
-    generic map (
-      WIDTH => PU_W
-    )
     port map (
       clk       => clk,
       rst       => rst,

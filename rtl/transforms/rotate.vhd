@@ -1,11 +1,11 @@
 -- Purpose: turns a vector by the angle whose sine and cosine are given, two multipliers in two clocks.
 --   out_x = x*cos_theta - y*sin_theta
 --   out_y = x*sin_theta + y*cos_theta
--- Formats: x, y S(1,WIDTH-2), PU or FLUX; TRIG S(1,16) within +-1; products and sums exact.
+-- Formats: x, y PU; TRIG S(1,16) within +-1; products and sums exact.
 -- One multiplier for sin_theta, a clock ahead of the one for cos_theta, which adds; y is needed a clock after x, and
--- in PU out_y comes a clock before out_x, with out_soon.  Sine and cosine serve several rotations: each holds its own.
--- Latency: 5.  Interval: 4.  Rounding: half up.  A flux saturates: a sum is at most 4 per unit, so its three top bits
--- say whether it fits.  Currents and voltages come within 1.375 per unit, so they are shorter than 2, however turned.
+-- out_y comes a clock before out_x, with out_soon.  Sine and cosine serve several rotations: each holds its own.
+-- Latency: 5.  Interval: 4.  Rounding: half up.  Currents and voltages come within 1.375 per unit, so they are shorter
+-- than 2, however turned: no saturation.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -14,41 +14,38 @@ use work.fixed_pkg.all;
 use work.fluxproof_pkg.all;
 
 entity rotate is
-  generic (
-    WIDTH : positive range 18 to 25 := 18
-  );
   port (
     clk       : in  std_logic;
     rst       : in  std_logic;
     in_valid  : in  std_logic;
-    x         : in  signed(WIDTH - 1 downto 0);
-    y         : in  signed(WIDTH - 1 downto 0);
+    x         : in  signed(PU_W - 1 downto 0);
+    y         : in  signed(PU_W - 1 downto 0);
     cos_theta : in  signed(TRIG_W - 1 downto 0);
     sin_theta : in  signed(TRIG_W - 1 downto 0);
     out_soon  : out std_logic;
     out_valid : out std_logic;
-    out_x     : out signed(WIDTH - 1 downto 0);
-    out_y     : out signed(WIDTH - 1 downto 0)
+    out_x     : out signed(PU_W - 1 downto 0);
+    out_y     : out signed(PU_W - 1 downto 0)
   );
 end entity rotate;
 
 architecture rtl of rotate is
   constant LATENCY : positive := ROTATE_LATENCY;
-  constant SUM_W   : positive := WIDTH + TRIG_W;
+  constant PROD_W  : positive := PU_W + TRIG_W;
 
   signal valid      : std_logic_vector(0 to LATENCY);
   signal cos_1      : signed(TRIG_W - 1 downto 0);
   signal sin_1      : signed(TRIG_W - 1 downto 0);
-  signal factor_s_0 : signed(WIDTH - 1 downto 0);
-  signal factor_s   : signed(WIDTH - 1 downto 0);           -- at clock 1 x, at clock 2 not y
-  signal factor_c_1 : signed(WIDTH - 1 downto 0);
-  signal factor_c   : signed(WIDTH - 1 downto 0);           -- at clock 2 y, at clock 3 x
-  signal prod_s     : signed(WIDTH + TRIG_W - 1 downto 0);  -- at clock 2 of x, at clock 3 of not y
+  signal factor_s_0 : signed(PU_W - 1 downto 0);
+  signal factor_s   : signed(PU_W - 1 downto 0);           -- at clock 1 x, at clock 2 not y
+  signal factor_c_1 : signed(PU_W - 1 downto 0);
+  signal factor_c   : signed(PU_W - 1 downto 0);           -- at clock 2 y, at clock 3 x
+  signal prod_s     : signed(PROD_W - 1 downto 0);  -- at clock 2 of x, at clock 3 of not y
   signal rest       : signed(TRIG_W - 1 downto 0);
-  signal sum_s      : signed(WIDTH + TRIG_W - 1 downto 0);  -- at clock 3 x*sin_theta, at clock 4 -y*sin_theta
-  signal prod_c     : signed(WIDTH + TRIG_W - 1 downto 0);  -- at clock 3 of y, at clock 4 of x
-  signal sum        : signed(SUM_W - 1 downto 0);
-  signal out_3      : signed(WIDTH - 1 downto 0);
+  signal sum_s      : signed(PROD_W - 1 downto 0);  -- at clock 3 x*sin_theta, at clock 4 -y*sin_theta
+  signal prod_c     : signed(PROD_W - 1 downto 0);  -- at clock 3 of y, at clock 4 of x
+  signal sum        : signed(PROD_W - 1 downto 0);
+  signal out_3      : signed(PU_W - 1 downto 0);
 begin
   valid(0) <= in_valid;
 
@@ -57,8 +54,7 @@ begin
   factor_c_1 <= x when valid(2) = '1' else y;
 
   sum   <= prod_c + sum_s;
-  out_3 <= sum(WIDTH - 1 + ROTATE_DROP downto ROTATE_DROP) when WIDTH = PU_W else
-           saturate(sum(SUM_W - 1 downto ROTATE_DROP), WIDTH);
+  out_3 <= sum(PU_W - 1 + ROTATE_DROP downto ROTATE_DROP);
 
   process (clk)
   begin
@@ -92,18 +88,12 @@ begin
         prod_c <= factor_c * cos_1;
       end if;
 
-      -- Stages 4, 5: out_y = x*sin_theta + y*cos_theta, then out_x = x*cos_theta - y*sin_theta, narrowed.  A flux's
-      -- out_y comes over out_x: half as many readers of its limit
-      if WIDTH = PU_W then
-        if valid(3) = '1' then
-          out_y <= out_3;
-        end if;
-        if valid(4) = '1' then
-          out_x <= out_3;
-        end if;
-      elsif valid(3) = '1' or valid(4) = '1' then
+      -- Stages 4, 5: out_y = x*sin_theta + y*cos_theta, then out_x = x*cos_theta - y*sin_theta, narrowed
+      if valid(3) = '1' then
+        out_y <= out_3;
+      end if;
+      if valid(4) = '1' then
         out_x <= out_3;
-        out_y <= out_x;
       end if;
 
       if rst = '1' then

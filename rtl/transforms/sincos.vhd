@@ -1,7 +1,8 @@
 -- Purpose: sine and cosine of two angles by one quarter-wave table, all outputs interpolated.
 --   theta = quadrant + (address + 1/2)/4096 + delta;  sin = S + delta*C,  cos = C - delta*S
 -- Formats: table U(0,18), delta S(-10,22) radians, interpolated value 22 fraction bits, TRIG out.
--- Latency: 12, 6 for each angle: theta_out is needed when theta_me is through, whose outputs come with out_soon.
+-- Latency: 13, 6 for each angle: theta_out is needed when theta_me is through, whose outputs come with out_soon; its
+-- own stand in a register more, as they go far and there is time.
 -- Interval: 9 (one read port and one multiplier: C, S and C again are read, delta*C comes first).
 -- Rounding: product floored to 22 fraction bits, output half up; 1.0 is reached and fits, no saturation.
 
@@ -50,6 +51,8 @@ architecture rtl of sincos is
   signal fine_s_5   : signed(FINE_W - 1 downto 0);
   signal sin_5      : signed(TRIG_W - 1 downto 0);
   signal cos_5      : signed(TRIG_W - 1 downto 0);
+  signal sin_6      : signed(TRIG_W - 1 downto 0);
+  signal cos_6      : signed(TRIG_W - 1 downto 0);
 
   -- A quarter turn swaps sine and cosine and turns the sign of one, a half turn those of both.  Rounded half up: the
   -- complement lacks one, which comes from the bit below the last together with that of the sum.
@@ -126,14 +129,16 @@ begin
         fine_s_5 <= fine_4;
       end if;
 
-      -- Stages 6, 12: into the quadrant, narrowed
+      -- Stages 6, 12: into the quadrant, narrowed;  stage 13: the second angle's, for all that is to act then
       if valid(SINCOS_PASS - 1) = '1' then
         sin_theta <= sin_5;
         cos_theta <= cos_5;
       end if;
+      sin_6 <= sin_5;
+      cos_6 <= cos_5;
       if valid(LATENCY - 1) = '1' then
-        sin_out <= sin_5;
-        cos_out <= cos_5;
+        sin_out <= sin_6;
+        cos_out <= cos_6;
       end if;
 
       if rst = '1' then
@@ -143,7 +148,7 @@ begin
     end if;
   end process;
 
-  out_soon  <= valid(LATENCY - SINCOS_PASS);
+  out_soon  <= valid(SINCOS_PASS);
   out_valid <= valid(LATENCY);
 
 end architecture rtl;

@@ -24,6 +24,7 @@ OUTPUT = {FLIP_FLOP: "Q", LUT: "Z", "PFUMX": "Z", "L6MUX21": "Z"}
 INSIDE = {"PFUMX": ("ALUT", "BLUT"), "L6MUX21": ("D0", "D1")}  # by wires of the slice: their makers go along
 MOST = 16  # readers of one copy
 LATE = 4.5  # ns after the clock at which a net more in front of a flip-flop is one too many: behind three LUTs
+MOST_LATE = 48  # readers of one copy where what it takes is late: each copy is one more that waits for it
 COPY = "_copy_"  # stands in a copy's name behind that of the cell it copies
 
 
@@ -91,13 +92,14 @@ def share_out(netlist: dict, top: str, most: int = MOST) -> int:
         model = cells[nets.driver[bit]]
         readers = sorted(nets.readers.get(bit, []), key=copies.order)
         connections = model["connections"]
-        if len(readers) <= most or model["type"] not in OUTPUT or any(not cell for cell, _ in readers):
+        limit = MOST_LATE if connections.get("DI", [None])[0] in late else most
+        if len(readers) <= limit or model["type"] not in OUTPUT or any(not cell for cell, _ in readers):
             continue
-        if model.get("attributes", {}).get("keep") or connections.get("DI", [None])[0] in late:
+        if model.get("attributes", {}).get("keep"):
             continue
         blocks = [block_of(copies.register(cell)) for cell, _ in readers]
         apart = model["type"] == FLIP_FLOP and len(set(blocks)) <= most
-        for share in shares(list(zip(blocks, readers, strict=True)), most, apart)[1:]:
+        for share in shares(list(zip(blocks, readers, strict=True)), limit, apart)[1:]:
             copies.hand_over(bit, [reader for _, reader in share])
         waiting += [source for source in copies.read_more if source != bit and source in nets.driver]
         copies.read_more.clear()

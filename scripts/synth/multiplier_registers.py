@@ -36,7 +36,7 @@ def absorb(netlist: dict, top: str) -> dict[str, int]:
                 done["removed"] += 1
             set_register(cell, "P", control, behind)
             done["P"] += 1
-        operands = [_operand(cell, side, cells, nets) for side in ("A", "B")]
+        operands = [operand_of(cell, side, cells, nets) for side in ("A", "B")]
         if all(operands) and shorter(cell, [bit for _, before in operands for bit in before.values()], cells, nets):
             for side, (control, before) in zip(("A", "B"), operands, strict=True):
                 for pin, bit in before.items():
@@ -64,7 +64,7 @@ def shorter(cell: dict, before: list[int], cells: dict, nets: Nets) -> bool:
     return max(arrival + NET, MULTIPLIER + rest) < max(arrival, TO_Q + NET + MULTIPLIER + rest)
 
 
-def _operand(cell: dict, side: str, cells: dict, nets: Nets):
+def operand_of(cell: dict, side: str, cells: dict, nets: Nets):
     """(control, the bits in front of the flip-flops) of operand A or B, or None."""
     pins = [cell["connections"][f"{side}{n}"][0] for n in range(BITS[side])]
     moved, controls = {}, set()

@@ -6,8 +6,11 @@ where the VHDL says a multiplication.  This pass edits the mapped netlist (yosys
 multipliers' own product registers, what else the adder takes into flip-flops of the same control, and the sum is made
 behind them.  Every register of the VHDL keeps its values at every clock; only the adder changes sides.
 
-It is done where that shortens the longer of the two paths by `Delays`, a rough sum of cells and nets: not where the
-adder would meet a long path behind the register.
+Where the VHDL gives the operands two registers each, the second goes behind the multipliers instead, and the register
+behind the adder stays: a clock for the multiplication, one for the adder.
+
+The first is done where that shortens the longer of the two paths by `Delays`, a rough sum of cells and nets: not where
+the adder would meet a long path behind the register.
 """
 
 from __future__ import annotations
@@ -15,7 +18,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from scripts.synth.delays import TO_Q, Delays
+from scripts.synth.multiplier_registers import operand_of
 from scripts.synth.netlist import ADDER, BITS, CONSTANTS, Control, Nets, control_of, outputs, set_register
+
 
 @dataclass
 class Cloud:
@@ -74,6 +79,27 @@ def cloud_of(start: str, cells: dict, nets: Nets) -> tuple[Cloud, Control] | Non
     return cloud, control.pop()
 
 
+def second_registers(cloud: Cloud, cells: dict, nets: Nets) -> tuple[Control, dict[str, dict[str, int]]] | None:
+    """(control, {multiplier: {pin: bit in front of its flip-flop}}) where all operands come from flip-flops of one
+    control, and those from others that nothing else reads; else None."""
+    operands = {(name, side): operand_of(cells[name], side, cells, nets) for name in cloud.multipliers for side in "AB"}
+    if cloud.into or not all(operands.values()):
+        return None
+    control, *others = {control for control, _ in operands.values()}
+    before = {name: operands[name, "A"][1] | operands[name, "B"][1] for name in cloud.multipliers}
+    bits = {bit for pins in before.values() for bit in pins.values()}
+    readers = [reader for bit in bits for reader in nets.readers[bit]]
+    if others or not bits <= nets.flip_flop.keys() or any(port != "DI" for _, port in readers):
+        return None
+    return control, before
+
+
+def product_of(cell: dict) -> dict[str, int]:
+    """{pin: bit} of the product."""
+    pins = (f"P{n}" for n in range(BITS["P"]))
+    return {pin: cell["connections"][pin][0] for pin in pins if pin in cell["connections"]}
+
+
 def shorter(cloud: Cloud, cells: dict, delays: Delays) -> bool:
     """Whether the longer of the two paths is shorter with the register in front of the adder."""
     behind = [cells[name]["connections"] for name in cloud.flip_flops]
@@ -97,6 +123,18 @@ def retime(netlist: dict, top: str) -> dict[str, int]:
         if not found or not found[0].adders:
             continue
         cloud, control = found
+        if twice := second_registers(cloud, cells, nets):
+            control, before = twice
+            passed = {cells[name]["connections"][pin][0] for name, pins in before.items() for pin in pins}
+            for name, pins in before.items():
+                cells[name]["connections"].update({pin: [bit] for pin, bit in pins.items()})
+                set_register(cells[name], "P", control, product_of(cells[name]))
+            unread = [bit for bit in passed if all(name in before for name, _ in nets.readers[bit])]
+            for bit in unread:
+                del cells[nets.flip_flop[bit]]
+            done["multipliers"] += len(before)
+            done["removed"] += len(unread)
+            continue
         behind = [cells[name]["connections"] for name in cloud.flip_flops]
         if len({c["DI"][0] for c in behind}) != len(behind) or not shorter(cloud, cells, Delays(cells, nets)):
             continue
@@ -111,10 +149,7 @@ def retime(netlist: dict, top: str) -> dict[str, int]:
             connections = cells[name]["connections"]
             connections.update({port: [moved.get(bits[0], bits[0])] for port, bits in connections.items()})
             if name in cloud.multipliers:
-                product = {
-                    f"P{n}": connections[f"P{n}"][0] for n in range(BITS["P"]) if f"P{n}" in connections
-                }
-                set_register(cells[name], "P", control, product)
+                set_register(cells[name], "P", control, product_of(cells[name]))
         for name in cloud.flip_flops:
             del cells[name]
         done["multipliers"] += len(cloud.multipliers)

@@ -1,0 +1,22 @@
+"""What a block takes for granted about its inputs, held by the blocks before it: over every value that decides it."""
+
+from __future__ import annotations
+
+from golden_model.formats import PU, U_DC, U_MAX
+from golden_model.io import u_dc_conditioning, u_dc_processing
+from golden_model.modulation import svm
+
+ROUNDING = 2  # LSB that the rotation back may add to what the circle grants
+
+
+def test_modulator_is_asked_for_less_than_two_bus_voltages():
+    """At every bus voltage, with the widest circle that k_u_max allows."""
+    widest = u_dc_conditioning.K_U_MAX.hi
+    largest = 0
+    for u_dc in range(U_DC.hi + 1):
+        u_max = min(u_dc * widest >> u_dc_conditioning.DROP_U_MAX, U_MAX.hi)
+        inverse, inverse_beta, _ = u_dc_processing.step(u_dc)
+        largest = max(largest, (u_max + ROUNDING) * max(inverse, inverse_beta))
+    one_bus = 1 << (PU.frac_bits + u_dc_processing.INVERSE.frac_bits)
+    assert 0.99 * one_bus < largest < 1.01 * one_bus
+    assert largest >> svm.DROP_SCALED <= svm.SCALED.hi
