@@ -13,14 +13,14 @@ from scripts.synth.netlist import Nets
 READERS, MOST = 100, 8
 
 
-def design() -> dict:
-    """A bit through two registers that enables, resets and is read by ``READERS`` registers in turn."""
+def design(resets: bool = False) -> dict:
+    """A bit through two registers that enables and is read by ``READERS`` registers in turn; or resets some as well."""
     cells = {"early": flip_flop(FIRST, 100), "late": flip_flop(100, 101, ENABLE_1, LSR=RESET)}
     for n in range(READERS):
         given, q = FIRST + 1 + n % 30, 200 + n
         cells[f"r{n:02d}"] = (
             flip_flop(given, q, 101) if n % 3 == 0
-            else flip_flop(given, q, LSR=101) if n % 3 == 1
+            else flip_flop(given, q, LSR=101) if n % 3 == 1 and resets
             else flip_flop(101, q)
         )  # fmt: skip
     ports = {"y": {"direction": "output", "bits": [200 + n for n in range(READERS)]}}
@@ -40,6 +40,19 @@ def test_copies_do_what_the_register_did():
     assert max(fan_outs(after)) <= MOST
     # 100 readers are 13 copies' work, and 13 copies two registers' in front of them.
     assert added == 12 + 1
+    assert simulate(after, 1) == simulate(before, 1)
+
+
+def test_what_is_reset_shares_a_reset():
+    """Those of a tile must have one reset: they all keep theirs, apart from what else reads the bit."""
+    before = design(resets=True)
+    after = copy.deepcopy(before)
+    share_out(after, "t", MOST)
+    cells = after["modules"]["t"]["cells"].values()
+    resets = {tuple(cell["connections"]["LSR"]) for cell in cells if cell["connections"].get("LSR", ["0"]) != ["0"]}
+    assert len(resets - {(RESET,)}) == 1
+    rest = [cell["connections"][port][0] for cell in cells for port in ("CE", "DI") if port in cell["connections"]]
+    assert not {bit for (bit,) in resets} & set(rest)
     assert simulate(after, 1) == simulate(before, 1)
 
 

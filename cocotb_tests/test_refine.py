@@ -126,8 +126,7 @@ def legal(cells: dict) -> None:
         wired = cell["connections"]
         if cell["type"] == "TRELLIS_FF":
             slices[x, y, lane // 2].add((str(wired.get("CE")), str(wired.get("LSR"))))
-            if "LSR" in wired:
-                tiles[x, y].add(wired["LSR"][0])
+            tiles[x, y].add(str(wired.get("LSR")))
             if "DI" in wired:
                 assert where(cells[driver[wired["DI"][0]]]) == (x, y, lane)
             else:
@@ -140,7 +139,7 @@ def legal(cells: dict) -> None:
             if "FCI" in wired:
                 assert where(cells[driver[wired["FCI"][0]]]) == (x, y, lane - 1)
     assert all(len(kinds) == 1 for kinds in slices.values())
-    assert all(len(resets) <= 2 for resets in tiles.values())
+    assert all(len(resets) == 1 for resets in tiles.values())
     assert not any(lane.get("chooses") and lane.get("M taken") for lane in luts.values())
 
 

@@ -11,9 +11,10 @@ from scripts.sources import RTL
 from scripts.synth import kept, report, timing
 from scripts.synth.__main__ import SMALL
 from scripts.synth.count import Count, count, read_cells
-from scripts.synth.ecp5 import read_path
+from scripts.synth.ecp5 import described
 from scripts.synth.groups import CORE, GROUPS, check, instances
 from scripts.synth.names import Names
+from scripts.synth.routed import Slowest
 from scripts.synth.wrapper import ports, wrap
 from scripts.synth.yosys import Design, modules_of, part_of, read_sta
 
@@ -243,25 +244,12 @@ endmodule
     ]
 
 
-def test_a_path_is_read_from_the_report():
-    def step(kind, cell, delay):
-        return {"type": kind, "delay": delay, "from": {"cell": cell}, "to": {"cell": cell}}
-
-    steps = [
-        step("clk-to-q", "dut.merge.n1_o_TRELLIS_FF_Q_3", 0.5),
-        step("routing", "x", 1.0),
-        step("logic", "dut.merge.p_MULT18X18D_P9", 3.9),
-        step("routing", "x", 1.0),
-        step("logic", "dut.merge.n3_CCU2C_S0$CCU2_COMB0", 0.4),
-        step("logic", "dut.merge.n3_CCU2C_S0$CCU2_COMB1", 0.1),
-        step("logic", "dut.merge.n4_o_LUT4_Z", 0.2),
-        step("setup", "dut.flux.n4_q_TRELLIS_FF_Q", 0.0),
-    ]
-    other = {"from": "<async>", "to": "posedge clk", "path": []}
-    worst = {"from": "posedge clk", "to": "posedge clk", "path": steps}
-    path = read_path({"critical_paths": [other, worst]}, str.upper)
-    assert (path.start, path.end) == (steps[0]["from"]["cell"].upper(), steps[-1]["to"]["cell"].upper())
-    assert path.delay == pytest.approx(7.1) and path.logic == pytest.approx(5.1)
+def test_a_path_in_words():
+    carry = ["n3_CCU2C_S0$CCU2_COMB0", "n3_CCU2C_S0$CCU2_COMB1"]
+    cells = ["n1_o_TRELLIS_FF_Q_3", "p_MULT18X18D_P9", *carry, "n4_o_LUT4_Z"]
+    path = described(Slowest([(cell, "F") for cell in cells], "n4_q_TRELLIS_FF_Q", 7.1, 5.1), str.upper)
+    assert (path.start, path.end) == (cells[0].upper(), "N4_Q_TRELLIS_FF_Q")
+    assert (path.delay, path.logic) == (7.1, 5.1)
     assert path.cells == ("MULT18X18D", "carry of 2 bits", "LUT4")
 
 

@@ -40,7 +40,7 @@ class Chip(NamedTuple):
     chooses: np.ndarray  # bool: a multiplexer that needs the slice's M
     beside: np.ndarray  # bool: a LUT and the flip-flop that takes its output inside the slice
     control: np.ndarray  # clock enable and reset of a flip-flop: one of each in a slice
-    reset: np.ndarray  # of a flip-flop: two in a tile
+    reset: np.ndarray  # of a flip-flop: one in a tile, none being one too
     enables: np.ndarray  # of a multiplier, 4 columns: four in a block
     resets: np.ndarray
     # of each place, tile, site
@@ -95,18 +95,14 @@ def _slice_fits(place, lut_at, flip_flop_at, carry, control, chooses, beside):
 
 @_part
 def _tile_fits(tile, flip_flop_at, resets):
-    one = other = NONE
+    one = NONE
     for place in range(tile * LANES, (tile + 1) * LANES):
         flip_flop = flip_flop_at[place]
-        reset = resets[flip_flop] if flip_flop >= 0 else NONE
-        if reset < 0:
+        if flip_flop < 0:
             continue
-        if one < 0 or reset == one:
-            one = reset
-        elif other < 0 or reset == other:
-            other = reset
-        else:
+        if one >= 0 and resets[flip_flop] != one:
             return False
+        one = resets[flip_flop]
     return True
 
 

@@ -75,8 +75,7 @@ def load(cells: dict, number: dict[str, int], paths: Paths) -> Chip:
             enable, reset = tuple(wired.get("CE") or ()), tuple(wired.get("LSR") or ())
             modes = tuple(parameters.get(mode) for mode in ("CEMUX", "LSRMUX", "CLKMUX", "GSR", "SRMODE"))
             ints["control"][n] = _mark(marks, ("control", enable, reset, modes))
-            if reset:
-                ints["reset"][n] = _mark(marks, ("reset", reset, modes[1], modes[4]))
+            ints["reset"][n] = _mark(marks, ("reset", reset, modes[1], modes[4] == "ASYNC"))
         elif kind[n] == MULTIPLIER:
             ints["site"][n] = site_of[cell["attributes"][BEL]]
             for pin, table in nets.items():

@@ -24,6 +24,7 @@ OUTPUT = {FLIP_FLOP: "Q", LUT: "Z", "PFUMX": "Z", "L6MUX21": "Z"}
 INSIDE = {"PFUMX": ("ALUT", "BLUT"), "L6MUX21": ("D0", "D1")}  # by wires of the slice: their makers go along
 MOST = 16  # readers of one copy
 LATE = 4.5  # ns after the clock at which a net more in front of a flip-flop is one too many: behind three LUTs
+MOST_RESET = 160  # flip-flops that one copy resets: those of a tile share one reset, so few are better than near ones
 MOST_LATE = 48  # readers of one copy where what it takes is late: each copy is one more that waits for it
 COPY = "_copy_"  # stands in a copy's name behind that of the cell it copies
 
@@ -67,8 +68,8 @@ class Copies:
                 self.read_more.append(source)
         return made
 
-    def hand_over(self, bit: int, readers: list[tuple[str, str]]) -> None:
-        """``readers`` of ``bit`` read a copy of it from now on."""
+    def hand_over(self, bit: int, readers: list[tuple[str, str]]) -> int:
+        """``readers`` of ``bit`` read a copy of it from now on, which is returned."""
         made = self.copy(bit)
         for cell, port in readers:
             connections = self.cells[cell]["connections"]
@@ -76,6 +77,7 @@ class Copies:
             self.cells[cell]["connections"] = {**connections, port: moved}
             self.nets.readers[bit].remove((cell, port))
             self.nets.readers[made].append((cell, port))
+        return made
 
 
 def share_out(netlist: dict, top: str, most: int = MOST) -> int:
@@ -92,10 +94,16 @@ def share_out(netlist: dict, top: str, most: int = MOST) -> int:
         model = cells[nets.driver[bit]]
         readers = sorted(nets.readers.get(bit, []), key=copies.order)
         connections = model["connections"]
+        resets = [reader for reader in readers if reader[1] == "LSR"]
         limit = MOST_LATE if connections.get("DI", [None])[0] in late else most
+        if len(resets) == len(readers):
+            limit = MOST_RESET
         if len(readers) <= limit or model["type"] not in OUTPUT or any(not cell for cell, _ in readers):
             continue
         if model.get("attributes", {}).get("keep"):
+            continue
+        if 0 < len(resets) < len(readers):
+            waiting += [bit, copies.hand_over(bit, resets)]
             continue
         blocks = [block_of(copies.register(cell)) for cell, _ in readers]
         apart = model["type"] == FLIP_FLOP and len(set(blocks)) <= most

@@ -1,7 +1,8 @@
 """Static timing of a placed ECP5 design whose wires' delays are those of a table: the slowest path over each wire.
 
 A node is a pin that drives.  An arc goes from a node over a wire and through a cell to the next; a wire joins two cells
-once, however many pins it ends at.  Times in ps.
+once, however many pins it ends at, and those inside a slice take nothing.  By pins, each pin has a wire of its own,
+inside a slice too.  Times in ps.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ NEVER = -1e9  # of a node that no clock reaches, and of a wire without a path
 class Paths:
     """The wires of a design, and the arcs over them in an order in which each follows those before it."""
 
-    def __init__(self, cells: dict, number: dict[str, int], delays: CellDelays):
+    def __init__(self, cells: dict, number: dict[str, int], delays: CellDelays, by_pin: bool = False):
         driver = {
             bits[0]: (name, port)
             for name, cell in cells.items()
@@ -29,7 +30,7 @@ class Paths:
             if bits and cell["port_directions"][port] == "output"
         }
         nodes = {pin: n for n, pin in enumerate(sorted(set(driver.values())))}
-        wires: dict[tuple[int, int], int] = {}
+        wires: dict[tuple, int] = {}
         arcs, ends, behind = [], [], defaultdict(list)
         for name, cell in cells.items():
             for port, bits in cell["connections"].items():
@@ -40,8 +41,8 @@ class Paths:
                 if (not through and before is None) or "TRELLIS_IO" in (cell["type"], cells[maker]["type"]):
                     continue
                 node, wire = nodes[maker, output], -1
-                if port not in INSIDE:
-                    wire = wires.setdefault((node, number[name]), len(wires))
+                if by_pin or port not in INSIDE:
+                    wire = wires.setdefault((node, name, port if by_pin else ""), len(wires))
                 for made, ps in through:
                     if (name, made) in nodes:
                         behind[node].append(len(arcs))
@@ -50,10 +51,12 @@ class Paths:
                     ends.append((node, before, wire))
         rank = _order(len(nodes), arcs, behind)
         arcs.sort(key=lambda arc: rank[arc[0]])
-        self.source = np.array([number[name] for name, _ in nodes])[[node for node, _ in wires]]
-        self.sink = np.array([reader for _, reader in wires])
-        readers = np.bincount([node for node, _ in wires], minlength=len(nodes))
-        self.readers = readers[[node for node, _ in wires]]
+        drives = [node for node, *_ in wires]
+        self.source = np.array([number[name] for name, _ in nodes])[drives]
+        self.sink = np.array([number[name] for _, name, _ in wires])
+        self.readers = np.bincount(drives, minlength=len(nodes))[drives]
+        self.pins = [(name, port) for _, name, port in wires]  # of each wire, by pins
+        self.drivers = list(nodes)  # of each node
         self.start = np.array([delays.clocked.get(pin, NEVER) for pin in nodes], float)
         self._arcs = tuple(np.array(column) for column in zip(*arcs, strict=True))
         self._ends = tuple(np.array(column) for column in zip(*ends, strict=True))
@@ -62,6 +65,25 @@ class Paths:
         """(the slowest path, the slowest over each wire), ps, the wires taking ``wire_ps``."""
         over = np.full(len(self.source), NEVER)
         return _run(*self._arcs, *self._ends, self.start, wire_ps, over), over
+
+    def worst(self, wire_ps: np.ndarray) -> tuple[list[tuple[str, str]], str, float, float]:
+        """(pins that drive along the slowest path, the cell that it ends at, ps of it, ps of it on wires), by pins."""
+        arrival, came = self.start.copy(), {}
+        for first, then, ps, wire in zip(*self._arcs, strict=True):
+            if arrival[first] + wire_ps[wire] + ps > arrival[then]:
+                arrival[then] = arrival[first] + wire_ps[wire] + ps
+                came[then] = first, wire
+        node, before, wire = (np.array(column) for column in self._ends)
+        times = arrival[node] + wire_ps[wire] + before
+        last = int(times.argmax())
+        at, on_wires, driving = int(node[last]), wire_ps[wire[last]], []
+        while True:
+            driving.append(self.drivers[at])
+            if at not in came:
+                break
+            at, over = came[at]
+            on_wires += wire_ps[over]
+        return driving[::-1], self.pins[wire[last]][0], float(times[last]), float(on_wires)
 
 
 def _order(count: int, arcs: list[tuple], behind: dict[int, list[int]]) -> list[int]:

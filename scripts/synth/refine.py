@@ -25,6 +25,7 @@ HOT, WIDE = 60.0, 60  # heat, and reach in tiles, at the start
 GOAL = 6000.0  # ps: nothing is gained by a path shorter than this
 # ps that a routed wire takes beyond its length: a net with many readers branches, and many wires leave a multiplier
 EACH_READER, MOST_READERS, FROM_MULTIPLIER = 18.0, 60, 300.0
+CARRIES = 0.5  # of what the router takes carry chains for beyond what they take: it must get there as well
 ALL_ALIKE = 0.6  # of the average chance to move: what a cell has that no slow path goes through
 
 
@@ -37,7 +38,7 @@ def refine(folder: Path, seed: int, multipliers: bool = False, rounds: int = ROU
     design = json.loads((folder / "placed.json").read_text())
     cells = placed_module(design)["cells"]
     number = {name: n for n, name in enumerate(cells)}
-    paths = Paths(cells, number, sdf.read(folder / "delays.sdf"))
+    paths = Paths(cells, number, sdf.read_again(sdf.read(folder / "delays.sdf"), CARRIES))
     chip = load(cells, number, paths)
     best, kept = settle(chip, paths, movable(chip, multipliers), seed, rounds, heat)
     save(kept, cells, number)
