@@ -11,7 +11,7 @@ import pytest
 from scripts.synth import anneal, chip, sdf
 from scripts.synth.floorplan import SITES, bel
 from scripts.synth.paths import Paths
-from scripts.synth.refine import EACH_READER, FROM_MULTIPLIER, beyond, refine
+from scripts.synth.refine import EACH_READER, FROM_MULTIPLIER, INTO_CARRY, INTO_MULTIPLIER, beyond, refine
 
 CLOCK, SLICES = 1, "ABCD"
 DELAYS = """(DELAYFILE
@@ -191,17 +191,20 @@ def test_a_path_by_hand(tmp_path):
     assert slowest(folder) == pytest.approx((525 + (640 + 2 * 85) + 236 + (640 + 6 * 85)) / 1000)
 
 
-def test_many_readers_take_longer(tmp_path):
+def test_what_takes_longer_than_its_way(tmp_path):
+    """Many readers, a multiplier at either end, a carry chain at the end."""
     made = Made()
     begin = made.add("TRELLIS_FF", bel_of(3, 3, 0, "FF"), {}, "Q")
     product = made.add("MULT18X18D", bel(0), {"A0": begin}, "P0")
     for n in range(3):
         made.add("TRELLIS_FF", bel_of(5 + n, 3, 0, "FF"), {"M": begin if n else product}, "Q")
+    made.add("TRELLIS_COMB", bel_of(9, 3, 0, "K"), {"A": product}, "FCO", {"MODE": "CCU2"})
     cells = placed(made.write(tmp_path))
     number = {name: n for n, name in enumerate(cells)}
     paths = Paths(cells, number, sdf.read(tmp_path / "delays.sdf"))
     more = beyond(chip.load(cells, number, paths), paths)
-    assert sorted(more) == [2 * EACH_READER] * 3 + [FROM_MULTIPLIER]
+    behind = EACH_READER + FROM_MULTIPLIER  # two readers
+    assert sorted(more) == [*[2 * EACH_READER] * 2, 2 * EACH_READER + INTO_MULTIPLIER, behind, behind + INTO_CARRY]
 
 
 def test_a_loop_is_told(tmp_path):

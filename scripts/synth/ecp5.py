@@ -45,8 +45,7 @@ PINS = {"shift_in": "L2", "shift_out": "L31", "load": "C17"}
 FLOORPLANS, FIRST_SEED = 2, 1  # placements from which the sites of the multipliers are chosen, before they are refined
 # Of the estimate: the clocks that the router is asked for, one after the other until it gets there within so many
 # rounds.  It makes its way by giving wires to whoever needs them most; a net that comes off badly it leaves,
-# unless told to route again what misses the clock.  Where the clock is out of reach it never ends; where it is
-# reached, what is faster is left to chance, so it is asked without any clock as well.
+# unless told to route again what misses the clock.  Where the clock is out of reach it never ends.
 SHARES, ROUNDS, MOST_ROUNDS = (0.90, 0.86), 150, 1000
 # nextpnr's own price of a wire that two nets want rises so fast that the clock is forgotten over it, and what it
 # expects of the way to go is more than that takes, so it goes the first way it finds.
@@ -219,7 +218,7 @@ class Routing:
         return True
 
     def route(self, seed: int) -> Routed:
-        """Places, refines and routes, for the largest of SHARES that is reached and as it comes; the better of them."""
+        """Places, refines and routes for the largest of SHARES that is reached, else as fast as it comes."""
         with tempfile.TemporaryDirectory() as scratch:
             folder = Path(scratch)
             for name in ("design.json", "pins.lpf"):
@@ -228,10 +227,9 @@ class Routing:
             estimate = 1000 / refine(folder, seed)
             clocks = (share * estimate for share in SHARES)
             wanted = ({"router/tmg_ripup": "1", "target_freq": f"{clock * 1e6:f}"} for clock in clocks)
-            reached = any(self._routes(folder, PATIENT | settings, ROUNDS) for settings in wanted)
-            found = [self._slowest(folder)] if reached else []
-            self._routes(folder, PATIENT, MOST_ROUNDS)
-            path = min([*found, self._slowest(folder)], key=lambda path: path.delay)
+            if not any(self._routes(folder, PATIENT | settings, ROUNDS) for settings in wanted):
+                self._routes(folder, PATIENT, MOST_ROUNDS)
+            path = self._slowest(folder)
         return Routed(seed, 1000 / path.delay, described(path, self.names.register))
 
     @staticmethod

@@ -23,8 +23,9 @@ TAU, SOFTER = 200.0, 300.0  # ps: a path so much below the slowest counts a thir
 BEYOND = 4.0  # tau by which paths may get slower than the slowest at the start
 HOT, WIDE = 60.0, 60  # heat, and reach in tiles, at the start
 GOAL = 6000.0  # ps: nothing is gained by a path shorter than this
-# ps that a routed wire takes beyond its length: a net with many readers branches, and many wires leave a multiplier
-EACH_READER, MOST_READERS, FROM_MULTIPLIER = 18.0, 60, 300.0
+# ps that a routed wire takes beyond its length: a net with many readers branches, many wires leave or enter a
+# multiplier, and a step of a carry chain takes each bit at one pin where a LUT takes it at any of four
+EACH_READER, MOST_READERS, FROM_MULTIPLIER, INTO_MULTIPLIER, INTO_CARRY = 18.0, 60, 300.0, 150.0, 250.0
 CARRIES = 0.5  # of what the router takes carry chains for beyond what they take: it must get there as well
 ALL_ALIKE = 0.6  # of the average chance to move: what a cell has that no slow path goes through
 
@@ -48,8 +49,10 @@ def refine(folder: Path, seed: int, multipliers: bool = False, rounds: int = ROU
 
 def beyond(chip: Chip, paths: Paths) -> np.ndarray:
     """What each wire takes beyond its length, ps."""
-    readers = EACH_READER * (np.minimum(paths.readers, MOST_READERS) - 1)
-    return readers + FROM_MULTIPLIER * (chip.kind[paths.source] == MULTIPLIER)
+    more = EACH_READER * (np.minimum(paths.readers, MOST_READERS) - 1)
+    more += FROM_MULTIPLIER * (chip.kind[paths.source] == MULTIPLIER)
+    more += INTO_MULTIPLIER * (chip.kind[paths.sink] == MULTIPLIER)
+    return more + INTO_CARRY * chip.carry[paths.sink]
 
 
 def settle(chip: Chip, paths: Paths, units: np.ndarray, seed: int, rounds: int, heat: float) -> tuple[float, Chip]:
