@@ -5,6 +5,8 @@ such cell in one place.  Readers are shared out in the order of the registers th
 and registers of the VHDL gave those: what serves one register stays together, and so does what serves one block.  A
 strobe that starts several blocks is copied for each, unless they are more than a copy may have readers.
 
+What is reset shares few copies of the reset, apart from what else reads it: flip-flops of a tile must have one.
+
 A multiplier without operands' registers leaves little for the net in front of it: a register that comes from another
 one, so that there is time for a net more before it, is copied for each block where it feeds such a multiplier.
 
