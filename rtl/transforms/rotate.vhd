@@ -37,9 +37,9 @@ architecture rtl of rotate is
   signal cos_1      : signed(TRIG_W - 1 downto 0);
   signal sin_1      : signed(TRIG_W - 1 downto 0);
   signal factor_s_0 : signed(PU_W - 1 downto 0);
-  signal factor_s   : signed(PU_W - 1 downto 0);           -- at clock 1 x, at clock 2 not y
+  signal factor_s   : signed(PU_W - 1 downto 0);    -- at clock 1 x, at clock 2 not y
   signal factor_c_1 : signed(PU_W - 1 downto 0);
-  signal factor_c   : signed(PU_W - 1 downto 0);           -- at clock 2 y, at clock 3 x
+  signal factor_c   : signed(PU_W - 1 downto 0);    -- at clock 2 y, at clock 3 x
   signal prod_s     : signed(PROD_W - 1 downto 0);  -- at clock 2 of x, at clock 3 of not y
   signal rest       : signed(TRIG_W - 1 downto 0);
   signal sum_s      : signed(PROD_W - 1 downto 0);  -- at clock 3 x*sin_theta, at clock 4 -y*sin_theta
