@@ -90,8 +90,8 @@ def stimuli(_rng, _config):
 
 
 OUT = {"lo": -TRIG_ONE, "hi": TRIG_ONE}
-PASS = 6  # clocks that one angle takes; the second one comes when the first is through, and waits for one more
-AHEAD = PASS + 1
+PASS = 6  # clocks that one angle takes; the second one comes when the first is through
+AHEAD = PASS + 1  # clocks that the first angle's values come before those of the second, which have a register more
 
 BLOCK = Block(
     name="sincos",
