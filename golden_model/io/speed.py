@@ -5,16 +5,18 @@
 
 Formats: the difference is the shorter way round, S(-1,18) of a mechanical turn, so speeds up to half
 a turn a sample are told apart.  raw is rounded half up to PU; the filter's state has 12 bits more, so
-that it comes to rest within one PU LSB of its input.  k_filter = 1 is no filter.
+that it comes to rest within one PU LSB of its input, and holds half an LSB of PU more, so that its upper
+bits are omega_me rounded.  k_filter = 1 is no filter.
 The first sample after reset has no predecessor: its difference is zero.
-Saturation: raw saturates at 2 per unit; the state moves between values in range and cannot leave it.
+Saturation: raw saturates at 2 per unit; the state moves from its upper bits towards raw by no more than their
+distance, as k_filter <= 1, keeps what is below them, and so cannot leave its range.
 """
 
 from typing import NamedTuple
 
 from golden_model.block import Block, Port
-from golden_model.fixed import Format, round_sat, wrap_s
-from golden_model.formats import BIT, INTEGRAL, INTEGRAL_W, PU, PU_TO_INTEGRAL, PU_W, TURN_W
+from golden_model.fixed import Format, round_half_up, round_sat, wrap_s
+from golden_model.formats import BIT, INTEGRAL, PU, PU_TO_INTEGRAL, PU_W, TURN_W
 from golden_model.io.position import code_format
 from golden_model.kernel import kernel
 
@@ -22,12 +24,13 @@ K_SPEED = Format(0, 12, 12)
 K_FILTER = Format(0, 1, 16)
 DROP_RAW = TURN_W + K_SPEED.frac_bits - PU.frac_bits
 DROP_STATE = PU.frac_bits + K_FILTER.frac_bits - INTEGRAL.frac_bits
+OMEGA_ZERO = 1 << (PU_TO_INTEGRAL - 1)
 
 
 class State(NamedTuple):
     code: int = 0
     seen: int = 0
-    omega: int = 0  # INTEGRAL
+    omega: int = OMEGA_ZERO  # INTEGRAL
 
 
 @kernel
@@ -37,19 +40,17 @@ def step(state, code_theta, reverse, k_speed, k_filter, position_bits):
     delta = wrap_s(mech - state.code, TURN_W) if state.seen else 0
     prod_raw = delta * k_speed
     raw = round_sat(prod_raw, DROP_RAW, PU_W)
-    err = raw - round_sat(state.omega, PU_TO_INTEGRAL, PU_W)
+    err = raw - (state.omega >> PU_TO_INTEGRAL)
     prod_err = err * k_filter
-    move = (prod_err + (1 << (DROP_STATE - 1))) >> DROP_STATE
-    omega = round_sat(state.omega + move, 0, INTEGRAL_W)
-    omega_me = round_sat(omega, PU_TO_INTEGRAL, PU_W)
-    return State(mech, 1, omega), (omega_me,)
+    omega = state.omega + round_half_up(prod_err, DROP_STATE)
+    return State(mech, 1, omega), (omega >> PU_TO_INTEGRAL,)
 
 
 def reference(v, state):
     mech = -v["code_theta"] if v["reverse"] else v["code_theta"]
     delta = (mech - state.code / 2**TURN_W + 0.5) % 1.0 - 0.5 if state.seen else 0.0
     raw = PU.limit(v["k_speed"] * delta)
-    old = state.omega * INTEGRAL.lsb
+    old = (state.omega - OMEGA_ZERO) * INTEGRAL.lsb
     return {"omega_me": old + v["k_filter"] * (raw - old)}
 
 
@@ -83,8 +84,8 @@ BLOCK = Block(
     ),
     outputs=(Port("omega_me", PU, doc="electrical speed"),),
     state=State(),
-    latency=7,
-    interval=5,
+    latency=6,
+    interval=4,
     constants={"DROP_RAW": DROP_RAW, "DROP_STATE": DROP_STATE},
     configs=({"POSITION_BITS": 16}, {"POSITION_BITS": 12}, {"POSITION_BITS": 18}),
     width_from={"code_theta": code_format},

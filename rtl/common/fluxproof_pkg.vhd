@@ -132,7 +132,7 @@ package fluxproof_pkg is
   constant POSITION_LATENCY : positive := 2;
 
   -- speed: 001, section 5.1, speed by differentiating two consecutive samples
-  constant SPEED_LATENCY : positive := 7;
+  constant SPEED_LATENCY : positive := 6;
   constant SPEED_DROP_RAW : natural := 14;
   constant SPEED_DROP_STATE : natural := 4;
 
@@ -327,7 +327,7 @@ package fluxproof_pkg is
   constant PARK_LATENCY : positive := 5;
 
   -- speed_pi: 001, section 5.3: speed regulator with limited current reference
-  constant SPEED_PI_LATENCY : positive := 6;
+  constant SPEED_PI_LATENCY : positive := 7;
   constant SPEED_PI_DROP_P : natural := 4;
   constant SPEED_PI_DROP_I : natural := 12;
   constant SPEED_PI_PROPORTIONAL_W : natural := 32;

@@ -5,9 +5,9 @@
 -- run = 0: output and integral are zero.
 -- Two beats through one comparison with i_max: what is asked for, then the integral.  |v| = (v xor s) + s, s its sign.
 -- Formats: err PU, proportional part 28 fraction bits, integral S(1,28), output PU.
--- Latency: 6; the integral follows a clock later.  Interval: 6.  Rounding: half up; err saturates; the proportional part needs no limit of its own, as
--- what it asks for beyond i_max is cut anyway, and the increment none, as speed_ki < 1; the integral is kept within
--- +-i_max.
+-- Latency: 7; the integral follows a clock later.  Interval: 7.
+-- Rounding: half up; err saturates; the proportional part needs no limit of its own, as what it asks for beyond i_max
+-- is cut anyway, and the increment none, as speed_ki < 1; the integral is kept within +-i_max.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -43,38 +43,41 @@ architecture rtl of speed_pi is
   signal integral : signed(INTEGRAL_W - 1 downto 0);
 
   signal valid      : std_logic_vector(0 to LATENCY);
-  signal err_1      : signed(PU_W - 1 downto 0);
-  signal prod_p_2   : signed(PU_W + KP_W downto 0);
-  signal prod_i_2   : signed(PU_W + KI_W downto 0);
-  signal integral_2 : signed(INTEGRAL_W downto 0);
-  signal rises_2    : std_logic;
-  signal falls_2    : std_logic;
-  signal sum_p_3    : signed(SUM_W - 1 downto 0);
-  signal sum_i_3    : signed(PU_W + KI_W downto 0);
-  signal total_3    : signed(TOTAL_W - 1 downto 0);
-  signal moved_3    : signed(INTEGRAL_W downto 0);
-  signal v_3        : signed(PU_W downto 0);
-  signal far_3      : std_logic;
+  signal diff_1     : signed(PU_W downto 0);
+  signal kp_2       : unsigned(KP_W - 1 downto 0);
+  signal ki_2       : unsigned(KI_W - 1 downto 0);
+  signal err_2      : signed(PU_W - 1 downto 0);
+  signal prod_p_3   : signed(PU_W + KP_W downto 0);
+  signal prod_i_3   : signed(PU_W + KI_W downto 0);
+  signal integral_3 : signed(INTEGRAL_W downto 0);
+  signal rises_3    : std_logic;
+  signal falls_3    : std_logic;
+  signal sum_p_4    : signed(SUM_W - 1 downto 0);
+  signal sum_i_4    : signed(PU_W + KI_W downto 0);
+  signal total_4    : signed(TOTAL_W - 1 downto 0);
+  signal moved_4    : signed(INTEGRAL_W downto 0);
   signal v_4        : signed(PU_W downto 0);
   signal far_4      : std_logic;
-  signal room_4     : signed(PU_W + 1 downto 0);
   signal v_5        : signed(PU_W downto 0);
-  signal beyond_5   : std_logic;
-  signal limited_5  : signed(PU_W - 1 downto 0);
-  signal held_6     : std_logic;
-  signal whole_6    : std_logic;
+  signal far_5      : std_logic;
+  signal room_5     : signed(PU_W + 1 downto 0);
+  signal v_6        : signed(PU_W downto 0);
+  signal beyond_6   : std_logic;
+  signal limited_6  : signed(PU_W - 1 downto 0);
+  signal held_7     : std_logic;
+  signal whole_7    : std_logic;
 begin
   valid(0) <= in_valid;
 
-  total_3 <= sum_p_3(SUM_W - 1 downto SUM_W - TOTAL_W);
-  moved_3 <= sum_i_3(SPEED_PI_DROP_I + INTEGRAL_W downto SPEED_PI_DROP_I);
+  total_4 <= sum_p_4(SUM_W - 1 downto SUM_W - TOTAL_W);
+  moved_4 <= sum_i_4(SPEED_PI_DROP_I + INTEGRAL_W downto SPEED_PI_DROP_I);
 
   -- The beat's value in PU, one bit more where it may be beyond: the current asked for, then the integral; far: bits
   -- above those say that the current is beyond any limit, and only its sign counts
-  v_3   <= resize(i_q_ext, PU_W + 1) when speed_mode = '0' else
-           moved_3(INTEGRAL_W downto PU_TO_INTEGRAL) when valid(4) = '1' else
-           total_3(TOTAL_W - 1) & total_3(PU_W - 1 downto 0);
-  far_3 <= exceeds(total_3, PU_W + 1) and speed_mode and not valid(4);
+  v_4   <= resize(i_q_ext, PU_W + 1) when speed_mode = '0' else
+           moved_4(INTEGRAL_W downto PU_TO_INTEGRAL) when valid(5) = '1' else
+           total_4(TOTAL_W - 1) & total_4(PU_W - 1 downto 0);
+  far_4 <= exceeds(total_4, PU_W + 1) and speed_mode and not valid(5);
 
   -- room = i_max - |v|, less one for an integral above zero, whose bits below v count too; nothing of v where it is far
   -- beyond but a one that makes it so, nothing at all while not running
@@ -82,26 +85,26 @@ begin
     variable minus : signed(PU_W downto 0);
     variable carry : std_logic;
   begin
-    minus := v_4 xor (PU_W downto 0 => not v_4(v_4'high));
-    carry := not v_4(v_4'high) and not valid(5);
-    if far_4 = '1' then
+    minus := v_5 xor (PU_W downto 0 => not v_5(v_5'high));
+    carry := not v_5(v_5'high) and not valid(6);
+    if far_5 = '1' then
       minus := (PU_W => '1', others => '0');
     end if;
     if run = '0' then
       minus := (others => '0');
     end if;
-    room_4 <= (resize(i_max, PU_W + 1) & '1') + (minus & carry);
+    room_5 <= (resize(i_max, PU_W + 1) & '1') + (minus & carry);
   end process;
 
   -- v within +-i_max
   process (all)
     variable within : signed(PU_W - 1 downto 0);
   begin
-    within := v_5(PU_W - 1 downto 0);
-    if beyond_5 = '1' then
-      within := i_max xor (within'range => v_5(v_5'high));
+    within := v_6(PU_W - 1 downto 0);
+    if beyond_6 = '1' then
+      within := i_max xor (within'range => v_6(v_6'high));
     end if;
-    limited_5 <= plus_carry(within, beyond_5 and v_5(v_5'high));
+    limited_6 <= plus_carry(within, beyond_6 and v_6(v_6'high));
   end process;
 
   process (clk)
@@ -109,50 +112,57 @@ begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stage 1: err = omega_ref - omega_me
+      -- Stage 1: diff = omega_ref - omega_me
       if valid(0) = '1' then
-        err_1 <= saturate(resize(omega_ref, PU_W + 1) - resize(omega_me, PU_W + 1), PU_W);
+        diff_1 <= resize(omega_ref, PU_W + 1) - resize(omega_me, PU_W + 1);
       end if;
 
-      -- Stage 2: prod_p = speed_kp*err, prod_i = speed_ki*err;  the integral and half an LSB of the output
+      -- Stage 2: err = diff, limited;  gains come from afar
+      kp_2 <= speed_kp;
+      ki_2 <= speed_ki;
       if valid(1) = '1' then
-        prod_p_2   <= err_1 * signed('0' & speed_kp);
-        prod_i_2   <= err_1 * signed('0' & speed_ki);
-        integral_2 <= integral + half(PU_TO_INTEGRAL, INTEGRAL_W + 1);
-        rises_2    <= '1' when err_1 > 0 else '0';
-        falls_2    <= err_1(err_1'high);
+        err_2 <= saturate(diff_1, PU_W);
       end if;
 
-      -- Stage 3: total = proportional + integral;  moved = integral + increment;  both with half an LSB to round with
+      -- Stage 3: prod_p = speed_kp*err, prod_i = speed_ki*err;  the integral and half an LSB of the output
       if valid(2) = '1' then
-        sum_p_3 <= resize(prod_p_2, SUM_W) + (integral_2 & half(SPEED_PI_DROP_P, SPEED_PI_DROP_P));
-        sum_i_3 <= prod_i_2 + (integral & half(SPEED_PI_DROP_I, SPEED_PI_DROP_I));
+        prod_p_3   <= err_2 * signed('0' & kp_2);
+        prod_i_3   <= err_2 * signed('0' & ki_2);
+        integral_3 <= integral + half(PU_TO_INTEGRAL, INTEGRAL_W + 1);
+        rises_3    <= '1' when err_2 > 0 else '0';
+        falls_3    <= err_2(err_2'high);
       end if;
 
-      -- Stages 4, 5: what is asked for, then the integral
-      if valid(3) = '1' or valid(4) = '1' then
-        v_4   <= v_3;
-        far_4 <= far_3;
+      -- Stage 4: total = proportional + integral;  moved = integral + increment;  both with half an LSB to round with
+      if valid(3) = '1' then
+        sum_p_4 <= resize(prod_p_3, SUM_W) + (integral_3 & half(SPEED_PI_DROP_P, SPEED_PI_DROP_P));
+        sum_i_4 <= prod_i_3 + (integral & half(SPEED_PI_DROP_I, SPEED_PI_DROP_I));
       end if;
 
-      -- Stages 5, 6: v against i_max
+      -- Stages 5, 6: what is asked for, then the integral
       if valid(4) = '1' or valid(5) = '1' then
-        v_5      <= v_4 and (v_4'range => run);
-        beyond_5 <= room_4(room_4'high);
+        v_5   <= v_4;
+        far_5 <= far_4;
       end if;
 
-      -- Stage 6: i_q_ref = limit(total or i_q_ext)
-      if valid(5) = '1' then
-        i_q_ref       <= limited_5;
-        speed_limited <= beyond_5;
-        held_6        <= speed_mode and beyond_5 and ((rises_2 and not v_5(v_5'high)) or (falls_2 and v_5(v_5'high)));
-        whole_6       <= not speed_mode or not run;
+      -- Stages 6, 7: v against i_max
+      if valid(5) = '1' or valid(6) = '1' then
+        v_6      <= v_5 and (v_5'range => run);
+        beyond_6 <= room_5(room_5'high);
       end if;
 
-      -- Stage 7: integral = moved, limited, unless held
-      if valid(6) = '1' and held_6 = '0' then
-        integral <= limited_5 & moved_3(PU_TO_INTEGRAL - 1 downto 0);
-        if whole_6 = '1' or beyond_5 = '1' then
+      -- Stage 7: i_q_ref = limit(total or i_q_ext)
+      if valid(6) = '1' then
+        i_q_ref       <= limited_6;
+        speed_limited <= beyond_6;
+        held_7        <= speed_mode and beyond_6 and ((rises_3 and not v_6(v_6'high)) or (falls_3 and v_6(v_6'high)));
+        whole_7       <= not speed_mode or not run;
+      end if;
+
+      -- Stage 8: integral = moved, limited, unless held
+      if valid(7) = '1' and held_7 = '0' then
+        integral <= limited_6 & moved_4(PU_TO_INTEGRAL - 1 downto 0);
+        if whole_7 = '1' or beyond_6 = '1' then
           integral(PU_TO_INTEGRAL - 1 downto 0) <= (others => '0');
         end if;
       end if;

@@ -80,6 +80,8 @@ architecture rtl of flux_merge is
   signal i_1        : signed(PU_W - 1 downto 0);
   signal lambda_c_1 : signed(FLUX_W - 1 downto 0);
   signal u_1        : signed(FLUX_W - 1 downto 0);
+  signal t_s_1      : unsigned(t_s'range);
+  signal omega_0_1  : unsigned(omega_0'range);
   signal prod_r_2   : signed(PU_W + MINUS_RHO_W - 1 downto 0);
   signal prod_u_2   : signed(FLUX_W + SAMPLE_TIME_W downto 0);
   signal sum_r      : signed(SUM_R_W - 1 downto 0);  -- at clock 3, then at clock 14
@@ -127,7 +129,9 @@ begin
         beta <= '0';
       end if;
 
-      -- Stage 1: the axis' inputs
+      -- Stage 1: the axis' inputs;  settings come from afar
+      t_s_1     <= t_s;
+      omega_0_1 <= omega_0;
       if step(0) = '1' then
         i_1        <= i_beta when beta = '1' else i_alpha;
         lambda_c_1 <= lambda_c_beta when beta = '1' else lambda_c_alpha;
@@ -137,7 +141,7 @@ begin
       -- Stage 2: prod_r = -rho*i;  prod_u = t_s*u_applied
       if step(1) = '1' then
         prod_r_2 <= i_1 * minus_rho;
-        prod_u_2 <= u_1 * signed('0' & t_s);
+        prod_u_2 <= u_1 * signed('0' & t_s_1);
       end if;
 
       -- Stages 3, 14: sum_r = flux + prod_r: carried - rho*i, total - rho*i
@@ -191,7 +195,7 @@ begin
 
       -- Stages 8, 9: y = omega_0*eps; |eps| <= 2 and omega_0 < 1/4, so it fits
       if step(7) = '1' then
-        prod_y_8 <= eps_7 * signed('0' & omega_0);
+        prod_y_8 <= eps_7 * signed('0' & omega_0_1);
       end if;
       if step(8) = '1' then
         sum_y_9 <= rounding_base("0", DROP_Y, PROD_Y_W) + prod_y_8;

@@ -86,6 +86,7 @@ architecture rtl of v_dead_adaline is
   signal room      : signed(PU_W + 1 downto 0);
   signal diff      : signed(PU_W downto 0);                 -- complement of d_d - lp_d, of u_pi_d - lp_u
   signal h         : signed(PU_W - 1 downto 0);             -- d_h at clock 3, u_h from clock 7 on
+  signal k_lp_1    : unsigned(k_lp'range);
   signal prod_lp   : signed(k_lp'length + PU_W downto 0);
   signal sum_lp    : signed(k_lp'length + PU_W + 1 downto 0);
   signal moved     : signed(INTEGRAL_W - 1 downto 0);       -- lp_d at clock 5, lp_u at clock 9
@@ -162,6 +163,7 @@ begin
       d_1      <= d_d;
       i_d_1    <= i_d;
       i_q_1    <= i_q;
+      k_lp_1   <= k_lp;
       free     <= '1' when sat_d = 0 and sat_q = 0 else '0';
       measured <= voltage_known when current_at_rail = 0 else '0';
 
@@ -191,7 +193,7 @@ begin
 
       -- Stages 4 to 8, 8 to 12: lp_d += k_lp*d_h, lp_u += k_lp*u_h
       if valid(3) = '1' or valid(7) = '1' then
-        prod_lp <= signed('0' & k_lp) * h;
+        prod_lp <= signed('0' & k_lp_1) * h;
       end if;
       if valid(4) = '1' or valid(8) = '1' then
         sum_lp  <= rounding_base(lp_next, DROP_LP, sum_lp'length) + prod_lp;

@@ -1,9 +1,10 @@
 -- Purpose: speed from two consecutive position codes, then a first-order filter.
 --   raw(k)      = k_speed * wrap(code(k) - code(k-1))
 --   omega_me(k) = omega_me(k-1) + k_filter*(raw(k) - omega_me(k-1))
--- Formats: difference S(-1,18) of a turn, k_speed U(12,12), k_filter U(1,16), state S(1,28), output PU.
--- Latency: 7.  Interval: 5 (the state is read from stage 3 on and written at stage 7).
--- Rounding: half up; raw saturates at 2 per unit, the state moves between values in range.
+-- Formats: difference S(-1,18) of a turn, k_speed U(12,12), k_filter U(1,16) up to 1, state S(1,28), output PU.
+-- Latency: 6.  Interval: 4 (the state is read from stage 3 on and written at stage 6).
+-- Rounding: half up; raw saturates at 2 per unit.  The state holds half an LSB of PU more than omega_me, so that its
+-- upper bits are omega_me rounded; it moves between values in range by no more than their distance and needs no limit.
 -- The first sample after reset has no predecessor: its difference is zero.
 -- The difference is one sum: code, turned where the sensor counts backwards, and minus the last one, made beside it.
 
@@ -31,12 +32,18 @@ entity speed is
 end entity speed;
 
 architecture rtl of speed is
-  constant LATENCY : positive := SPEED_LATENCY;
+  constant LATENCY    : positive                        := SPEED_LATENCY;
+  constant SUM_W      : positive                        := INTEGRAL_W + SPEED_DROP_STATE;
+  constant OMEGA_ZERO : signed(INTEGRAL_W - 1 downto 0) := to_signed(2 ** (PU_TO_INTEGRAL - 1), INTEGRAL_W);
+
+  -- State, with minus_last and seen: omega at its top
+  signal sum_6 : signed(SUM_W - 1 downto 0);
 
   signal valid      : std_logic_vector(0 to LATENCY);
   signal minus_last : unsigned(POSITION_BITS - 1 downto 0);
   signal seen       : std_logic;
   signal omega      : signed(INTEGRAL_W - 1 downto 0);
+  signal omega_pu   : signed(PU_W - 1 downto 0);
   signal delta_1    : signed(TURN_W - 1 downto 0);
   signal prod_raw_2 : signed(TURN_W + 24 downto 0);
   signal sum_raw_3  : signed(TURN_W + 24 downto 0);
@@ -45,9 +52,6 @@ architecture rtl of speed is
   signal err_end_3  : signed(PU_W downto 0);  -- err of a raw beyond its range
   signal err_4      : signed(PU_W downto 0);
   signal prod_err_5 : signed(PU_W + 18 downto 0);
-  signal sum_6      : signed(PU_W + 18 downto 0);
-  signal omega_6    : signed(INTEGRAL_W - 1 downto 0);
-  signal omega_pu   : signed(PU_W - 1 downto 0);
 
   -- The code, or its complement with the one that it lacks in the bit below.
   function turned (code : unsigned; minus : std_logic) return unsigned is
@@ -57,7 +61,8 @@ architecture rtl of speed is
 begin
   valid(0) <= in_valid;
   raw_3    <= sum_raw_3(sum_raw_3'high downto SPEED_DROP_RAW);
-  omega_6  <= saturate(shift_right(sum_6, SPEED_DROP_STATE), INTEGRAL_W);
+  omega    <= sum_6(SUM_W - 1 downto SPEED_DROP_STATE);
+  omega_pu <= omega(INTEGRAL_W - 1 downto PU_TO_INTEGRAL);
 
   process (clk)
     variable code  : unsigned(POSITION_BITS downto 0);
@@ -104,21 +109,14 @@ begin
 
       -- Stage 6: omega + prod_err, with half an LSB to round with
       if valid(5) = '1' then
-        sum_6 <= prod_err_5 + (omega & half(SPEED_DROP_STATE, SPEED_DROP_STATE));
-      end if;
-
-      -- Stage 7: omega, omega_me = the sum, narrowed
-      if valid(6) = '1' then
-        omega    <= omega_6;
-        omega_pu <= round_sat(shift_right(sum_6, SPEED_DROP_STATE), PU_TO_INTEGRAL, PU_W);
+        sum_6 <= prod_err_5(SUM_W - 1 downto 0) + (omega & half(SPEED_DROP_STATE, SPEED_DROP_STATE));
       end if;
 
       if rst = '1' then
         valid(1 to LATENCY) <= (others => '0');
         seen                <= '0';
         minus_last          <= (others => '0');
-        omega               <= (others => '0');
-        omega_pu            <= (others => '0');
+        sum_6               <= shift_left(resize(OMEGA_ZERO, SUM_W), SPEED_DROP_STATE);
       end if;
     end if;
   end process;

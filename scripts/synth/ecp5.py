@@ -16,6 +16,7 @@ from itertools import groupby
 from pathlib import Path
 
 from scripts.synth import routed, sdf
+from scripts.synth.carry_save import save_carries
 from scripts.synth.chip import BEL
 from scripts.synth.delays import NET
 from scripts.synth.fan_out import share_out
@@ -46,7 +47,7 @@ FLOORPLANS, FIRST_SEED = 2, 1  # placements from which the sites of the multipli
 # Of the estimate: the clocks that the router is asked for, one after the other until it gets there within so many
 # rounds.  It makes its way by giving wires to whoever needs them most; a net that comes off badly it leaves,
 # unless told to route again what misses the clock.  Where the clock is out of reach it never ends.
-SHARES, ROUNDS, MOST_ROUNDS = (0.93, 0.89), 150, 1000
+SHARES, ROUNDS, MOST_ROUNDS = (0.95, 0.92, 0.89), 150, 1000
 # nextpnr's own price of a wire that two nets want rises so fast that the clock is forgotten over it, and what it
 # expects of the way to go is more than that takes, so it goes the first way it finds.
 PATIENT = {
@@ -56,8 +57,8 @@ ALIKE_MHZ = 0.05  # by so much nextpnr's report and ours may differ: it rounds e
 _ROUND = re.compile(r"iter=(\d+) ")
 
 
-def mapping() -> list[str]:
-    """synth_lattice's steps, with three changes for speed.
+def mapping(top: str = NAME, options: str = "") -> list[str]:
+    """synth_lattice's steps, with ``options`` of its own, for module ``top``, with three changes for speed.
 
     ABC is told what a net costs here; synth_lattice's 300 ps make it take another LUT where a carry chain is slow.
 
@@ -68,7 +69,7 @@ def mapping() -> list[str]:
     makes a reset of whatever clears a register, so also of a limiter's or a shift's zero: the condition then runs
     over one more LUT and a net to all of them, where the LUT in front of each has an input left.
     """
-    whole = f"synth_lattice -family ecp5 -noflatten -top {NAME}"
+    whole = f"synth_lattice -family ecp5 -noflatten -top {top} {options}"
     flip_flops = " ".join(f"-cell {cell}" for cell in FLIP_FLOPS)
     return [
         f"{whole} -run begin:map_ffs",
@@ -147,6 +148,15 @@ def _placed(folder: Path) -> dict:
     return json.loads((folder / "placed.json").read_text())
 
 
+def reshape(netlist: dict, top: str) -> dict[str, int]:
+    """The passes over a mapped netlist, in place; what each did."""
+    done = {"twins": merge_twins(netlist["modules"][top])}
+    done |= {"split": retime(netlist, top)["multipliers"]}
+    done |= absorb(netlist, top)
+    done |= {"carries_saved": save_carries(netlist, top)["chains"]}
+    return done | {"copies": share_out(netlist, top)}
+
+
 class Routing:
     """A module in its wrapper, synthesised once for ECP5; ``route`` places and routes it with a seed."""
 
@@ -187,10 +197,7 @@ class Routing:
     def _pass(self) -> dict[str, int]:
         path = self.folder / "design.json"
         netlist = json.loads(path.read_text())
-        done = {"twins": merge_twins(netlist["modules"][NAME])}
-        done |= {"split": retime(netlist, NAME)["multipliers"]}
-        done |= absorb(netlist, NAME)
-        done |= {"copies": share_out(netlist, NAME)}
+        done = reshape(netlist, NAME)
         path.write_text(json.dumps(netlist))
         self._floorplan(netlist)
         return done

@@ -7,7 +7,7 @@ netlist (yosys' JSON) before place and route.
 The operands' registers move in if each bit of both is 0 or comes from a flip-flop, all of an operand with the same
 clock and enable, none with reset or initial 1; the flip-flops stay where something else reads them too.  One operand
 alone does not: nextpnr then times the multiplier as if neither had a register.  A flip-flop stands beside its LUT, a
-multiplier does not: so they move only where the longer of the two paths gets shorter, by `Delays`.
+multiplier does not: so they move only where the longer of the two paths gets shorter, by `Delays`, or hardly longer.
 The product's moves in if each used bit goes to one such flip-flop and nowhere else.
 """
 
@@ -15,6 +15,8 @@ from __future__ import annotations
 
 from scripts.synth.delays import MULTIPLIER, NET, TO_Q, Delays
 from scripts.synth.netlist import BITS, Nets, control_of, set_register
+
+ALIKE = 0.1  # ns by which the longer path may get longer: the shorter one is shorter by as much as a net or two
 
 
 def absorb(netlist: dict, top: str) -> dict[str, int]:
@@ -61,7 +63,7 @@ def shorter(cell: dict, before: list[int], cells: dict, nets: Nets) -> bool:
     if "REG_OUTPUT_CLK" not in cell["parameters"]:
         products = (cell["connections"].get(f"P{n}", ["0"])[0] for n in range(BITS["P"]))
         rest = max(map(delays.rest, products))
-    return max(arrival + NET, MULTIPLIER + rest) < max(arrival, TO_Q + NET + MULTIPLIER + rest)
+    return max(arrival + NET, MULTIPLIER + rest) < ALIKE + max(arrival, TO_Q + NET + MULTIPLIER + rest)
 
 
 def operand_of(cell: dict, side: str, cells: dict, nets: Nets):
