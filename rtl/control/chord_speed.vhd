@@ -68,9 +68,9 @@ begin
         part_6 <= resize(round_half_up(prod, CHORD_SPEED_DROP_PART), PU_W);
       end if;
 
-      -- Stage 8: the next sample may bring its speed
+      -- Stage 8: omega_me once more, from the factor beside the multiplier: the speed itself may stand far away
       if valid(7) = '1' then
-        omega_8 <= omega_me;
+        omega_8 <= mul_b;
       end if;
 
       -- Stage 9: omega_chord = omega - prod, narrowed

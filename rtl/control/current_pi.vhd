@@ -69,12 +69,9 @@ architecture rtl of current_pi is
   signal sum_i_4  : signed(PU_W + KI_W downto 0);
   signal hold_4   : std_logic;
   signal old_4    : signed(INTEGRAL_W - 1 downto 0);
-  signal run_4    : std_logic;
   signal prod_p_5 : signed(PU_W + KP_W downto 0);
   signal half_5   : signed(INTEGRAL_W downto 0);
-  signal run_5    : std_logic;
   signal sum_p_6  : signed(SUM_W - 1 downto 0);
-  signal run_6    : std_logic;
   signal u_pi_6   : signed(PU_W - 1 downto 0);
 begin
   valid(0) <= in_valid;
@@ -85,8 +82,7 @@ begin
 
   hold_1 <= not run_1 or (sat_1(1) and diff_1(diff_1'high)) or (sat_1(0) and not sat_1(1) and not diff_1(diff_1'high));
 
-  u_pi_6 <= (others => '0') when run_6 = '0' else
-            saturate(shift_right(sum_p_6, CURRENT_PI_DROP_P + PU_TO_INTEGRAL), PU_W);
+  u_pi_6 <= saturate(shift_right(sum_p_6, CURRENT_PI_DROP_P + PU_TO_INTEGRAL), PU_W);
 
   process (clk)
     variable integral : signed(INTEGRAL_W - 1 downto 0);
@@ -122,16 +118,18 @@ begin
         run_3    <= run_2;
       end if;
 
-      -- Stage 4: int + prod_i, with half an LSB to round with
+      -- Stage 4: int + prod_i, with half an LSB to round with;  kp, or zero while not running, as the integral then is
       if valid(3) = '1' or valid(4) = '1' then
         sum_i_4 <= prod_i_3 + (integral_3 & half(CURRENT_PI_DROP_I, CURRENT_PI_DROP_I));
         hold_4  <= hold_3;
         old_4   <= integral_3;
-        run_4   <= run_3;
         err_4   <= err_3;
         kp_4    <= kp_d;
         if valid(4) = '1' then
           kp_4 <= kp_q;
+        end if;
+        if run_3 = '0' then
+          kp_4 <= (others => '0');
         end if;
       end if;
 
@@ -144,7 +142,6 @@ begin
         integral_5 <= integral;
         half_5     <= integral + half(PU_TO_INTEGRAL, INTEGRAL_W + 1);
         prod_p_5   <= err_4 * signed('0' & kp_4);
-        run_5      <= run_4;
       end if;
 
       -- The turn of the integrals: to that of q once the d axis has taken its own, and back for the next sample;
@@ -159,7 +156,6 @@ begin
       -- Stage 6: proportional + int
       if valid(5) = '1' or valid(6) = '1' then
         sum_p_6 <= resize(prod_p_5, SUM_W) + (half_5 & half(CURRENT_PI_DROP_P, CURRENT_PI_DROP_P));
-        run_6   <= run_5;
       end if;
       if valid(5) = '1' then
         u_int_d <= integral_5;
@@ -168,7 +164,7 @@ begin
         u_int_q <= integral_5;
       end if;
 
-      -- Stage 7: u_pi, narrowed; d at clock 7, q at 8; zero while not running
+      -- Stage 7: u_pi, narrowed; d at clock 7, q at 8
       if valid(6) = '1' then
         u_pi_d <= u_pi_6;
       end if;

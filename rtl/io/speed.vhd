@@ -32,18 +32,18 @@ entity speed is
 end entity speed;
 
 architecture rtl of speed is
-  constant LATENCY    : positive                        := SPEED_LATENCY;
-  constant SUM_W      : positive                        := INTEGRAL_W + SPEED_DROP_STATE;
-  constant OMEGA_ZERO : signed(INTEGRAL_W - 1 downto 0) := to_signed(2 ** (PU_TO_INTEGRAL - 1), INTEGRAL_W);
+  constant LATENCY : positive := SPEED_LATENCY;
+  constant SUM_W   : positive := INTEGRAL_W + SPEED_DROP_STATE;
+  constant REST_W  : positive := PU_TO_INTEGRAL + SPEED_DROP_STATE;
 
-  -- State, with minus_last and seen: omega at its top
-  signal sum_6 : signed(SUM_W - 1 downto 0);
+  -- State, with minus_last and seen: omega and what is below it in the sum.  Two registers, as a DSP48's own resets to
+  -- zero and yosys takes it nevertheless for one that does not
+  signal omega_6 : signed(PU_W - 1 downto 0);
+  signal rest_6  : signed(REST_W - 1 downto 0);
 
   signal valid      : std_logic_vector(0 to LATENCY);
   signal minus_last : unsigned(POSITION_BITS - 1 downto 0);
   signal seen       : std_logic;
-  signal omega      : signed(INTEGRAL_W - 1 downto 0);
-  signal omega_pu   : signed(PU_W - 1 downto 0);
   signal delta_1    : signed(TURN_W - 1 downto 0);
   signal prod_raw_2 : signed(TURN_W + 24 downto 0);
   signal sum_raw_3  : signed(TURN_W + 24 downto 0);
@@ -61,13 +61,13 @@ architecture rtl of speed is
 begin
   valid(0) <= in_valid;
   raw_3    <= sum_raw_3(sum_raw_3'high downto SPEED_DROP_RAW);
-  omega    <= sum_6(SUM_W - 1 downto SPEED_DROP_STATE);
-  omega_pu <= omega(INTEGRAL_W - 1 downto PU_TO_INTEGRAL);
 
   process (clk)
     variable code  : unsigned(POSITION_BITS downto 0);
     variable minus : unsigned(POSITION_BITS downto 0);
     variable delta : unsigned(POSITION_BITS downto 0);
+    variable state : signed(INTEGRAL_W - 1 downto 0);
+    variable sum   : signed(SUM_W - 1 downto 0);
   begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
@@ -91,12 +91,12 @@ begin
       -- Stage 3: half an LSB of raw to round with;  err if raw is cut, to the end that delta points to
       if valid(2) = '1' then
         sum_raw_3 <= prod_raw_2 + half(SPEED_DROP_RAW, prod_raw_2'length);
-        err_end_3 <= resize(signed'(falls_2 & (PU_W - 2 downto 0 => not falls_2)), PU_W + 1) - omega_pu;
+        err_end_3 <= resize(signed'(falls_2 & (PU_W - 2 downto 0 => not falls_2)), PU_W + 1) - omega_6;
       end if;
 
       -- Stage 4: err = raw - omega_me, raw narrowed
       if valid(3) = '1' then
-        err_4 <= resize(raw_3(PU_W - 1 downto 0), PU_W + 1) - omega_pu;
+        err_4 <= resize(raw_3(PU_W - 1 downto 0), PU_W + 1) - omega_6;
         if exceeds(raw_3, PU_W) = '1' then
           err_4 <= err_end_3;
         end if;
@@ -109,19 +109,23 @@ begin
 
       -- Stage 6: omega + prod_err, with half an LSB to round with
       if valid(5) = '1' then
-        sum_6 <= prod_err_5(SUM_W - 1 downto 0) + (omega & half(SPEED_DROP_STATE, SPEED_DROP_STATE));
+        state   := omega_6 & rest_6(REST_W - 1 downto SPEED_DROP_STATE);
+        sum     := prod_err_5(SUM_W - 1 downto 0) + (state & half(SPEED_DROP_STATE, SPEED_DROP_STATE));
+        omega_6 <= sum(SUM_W - 1 downto REST_W);
+        rest_6  <= sum(REST_W - 1 downto 0);
       end if;
 
       if rst = '1' then
         valid(1 to LATENCY) <= (others => '0');
         seen                <= '0';
         minus_last          <= (others => '0');
-        sum_6               <= shift_left(resize(OMEGA_ZERO, SUM_W), SPEED_DROP_STATE);
+        omega_6             <= (others => '0');
+        rest_6              <= half(REST_W, REST_W);
       end if;
     end if;
   end process;
 
   out_valid <= valid(LATENCY);
-  omega_me  <= omega_pu;
+  omega_me  <= omega_6;
 
 end architecture rtl;
