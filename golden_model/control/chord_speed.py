@@ -49,7 +49,7 @@ BLOCK = Block(
     inputs=(Port("omega_me", PU, doc="electrical speed"),),
     registers=(Port("k_chord", K_CHORD, doc="square of the sample time over 24, per unit"),),
     outputs=(Port("omega_chord", PU, doc="electrical speed along the chord of a sample"),),
-    latency=10,
+    latency=9,
     interval=8,
     constants={"DROP_SQUARE": DROP_SQUARE, "DROP_PART": DROP_PART, "DROP": DROP},
     reference=reference,

@@ -339,7 +339,7 @@ package fluxproof_pkg is
   constant CURRENT_PI_PROPORTIONAL_W : natural := 32;
 
   -- chord_speed: 001, eq. (2), for a voltage that is held during a sample
-  constant CHORD_SPEED_LATENCY : positive := 10;
+  constant CHORD_SPEED_LATENCY : positive := 9;
   constant CHORD_SPEED_DROP_SQUARE : natural := 18;
   constant CHORD_SPEED_DROP_PART : natural := 17;
   constant CHORD_SPEED_DROP : natural := 20;

@@ -54,18 +54,12 @@ architecture rtl of sqrt is
   begin
     return (nor b(7 downto 4)) & ((nor b(7 downto 6)) and ((or b(5 downto 4)) or (nor b(3 downto 2))));
   end function;
-
-  function normalised (x : unsigned; pairs : unsigned) return unsigned is
-  begin
-    return resize(shift_right(shift_left(x, to_integer(pairs & '0')), SQRT_DROP_X), 20);
-  end function;
 begin
   valid(0) <= in_valid;
   small_0  <= nor x(31 downto 16);
   pairs_1  <= lower_1 when byte_1 = '1' else upper_1;
 
-  -- Each byte with its own pairs, then one of the two: half as far as one shift by what pairs_1 turns out to be
-  mantissa_1 <= normalised(shift_left(x_1, 8), lower_1) when byte_1 = '1' else normalised(x_1, upper_1);
+  mantissa_1 <= resize(shift_right(shift_left(x_1, to_integer(byte_1 & pairs_1 & '0')), SQRT_DROP_X), 20);
   address_1  <= pairs_1(0) & mantissa_1(19 downto SQRT_REST_BITS);
 
   fine_4 <= prod_4 + shift_left(signed(resize(base_4, fine_4'length)), SQRT_REST_BITS);

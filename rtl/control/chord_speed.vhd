@@ -2,7 +2,7 @@
 --   omega_chord = omega_me - k_chord*omega_me**3
 -- Three products one after the other, through one multiplier.
 -- Formats: PU in and out; omega_me**2 U(3,14), k_chord U(-6,23), their product U(-3,20).
--- Latency: 10.  Interval: 8.
+-- Latency: 9.  Interval: 8.
 -- Rounding: every product half up.  No saturation: k_chord*omega_me**2 < 1/16, so the result keeps its sign.
 
 library ieee;
@@ -33,7 +33,6 @@ architecture rtl of chord_speed is
   signal square_3 : signed(PU_W - 1 downto 0);
   signal part_6   : signed(PU_W - 1 downto 0);
   signal omega_8  : signed(PU_W - 1 downto 0);
-  signal omega_9  : signed(PU_W - 1 downto 0);
 begin
   valid(0) <= in_valid;
 
@@ -74,12 +73,9 @@ begin
         omega_8 <= mul_b;
       end if;
 
-      -- Stages 9, 10: omega_chord = omega - prod, narrowed;  once more, as its readers stand far apart
+      -- Stage 9: omega_chord = omega - prod, narrowed
       if valid(8) = '1' then
-        omega_9 <= minus_rounded(omega_8, prod, CHORD_SPEED_DROP);
-      end if;
-      if valid(9) = '1' then
-        omega_chord <= omega_9;
+        omega_chord <= minus_rounded(omega_8, prod, CHORD_SPEED_DROP);
       end if;
 
       if rst = '1' then

@@ -105,8 +105,6 @@ architecture rtl of v_dead_adaline is
   signal end_17    : signed(V_LEG_W - 1 downto 0);
   signal adding_20 : std_logic;
   signal zeta_21   : unsigned(zeta'range);
-  signal gamma_21  : unsigned(gamma'range);
-  signal fine_21   : signed(FINE_W - 1 downto 0);
   signal prod_z    : signed(FINE_W + zeta'length downto 0);
   signal sum_z     : signed(SUM_Z_W - 1 downto 0);
   signal v_sum_23  : signed(STATE_W downto 0);
@@ -265,8 +263,7 @@ begin
         fine <= resize(round_half_up(v_state, V_DEAD_ADALINE_DROP_FINE), FINE_W);
       end if;
 
-      -- Stages 20, 21: zeta where |fine| > v_thr, fine and gamma in registers that a multiplier can take in, for they
-      -- are not reset;  stages 22, 23: sum_z = v_sum + zeta*fine
+      -- Stages 20, 21: zeta where |fine| > v_thr;  stages 22, 23: sum_z = v_sum + zeta*fine
       if valid(19) = '1' then
         adding_20 <= beyond(fine, v_thr, FINE_TO_LEG);
       end if;
@@ -275,11 +272,9 @@ begin
         if adding_20 = '0' or learning = '0' then
           zeta_21 <= (others => '0');
         end if;
-        fine_21  <= fine;
-        gamma_21 <= gamma;
       end if;
       if valid(21) = '1' then
-        prod_z <= fine_21 * signed('0' & zeta_21);
+        prod_z <= fine * signed('0' & zeta_21);
       end if;
       if valid(22) = '1' then
         sum_z <= rounding_base(v_sum, DROP_ZETA, SUM_Z_W) + prod_z;
@@ -300,7 +295,7 @@ begin
 
       -- Stages 25, 26: sum_g = v_sum + gamma*fine
       if valid(24) = '1' then
-        prod_g <= fine_21 * signed('0' & gamma_21);
+        prod_g <= fine * signed('0' & gamma);
       end if;
       if valid(25) = '1' then
         sum_g <= rounding_base(v_sum, DROP_GAMMA, sum_g'length) + prod_g;

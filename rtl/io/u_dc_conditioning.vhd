@@ -36,27 +36,29 @@ architecture rtl of u_dc_conditioning is
 
   signal valid  : std_logic_vector(0 to LATENCY);
   signal rail_1 : std_logic;
-  signal rail_4 : std_logic;
+  signal rail_3 : std_logic;
   signal diff_0 : signed(CODE_W downto 0);
   signal u_dc_3 : unsigned(U_DC_W - 1 downto 0);
-  signal u_dc_4 : unsigned(U_DC_W - 1 downto 0);
   signal mul_a  : signed(17 downto 0);
   signal mul_b  : signed(17 downto 0);
   signal prod   : signed(35 downto 0);
-  signal sum_3  : signed(35 downto 0);
+  signal half_1 : signed(35 downto 0);
+  signal sum    : signed(35 downto 0);
 begin
   valid(0) <= in_valid;
 
   diff_0 <= signed('0' & shift_left(resize(code_u_dc, CODE_W), CODE_W - ADC_BITS)) - signed('0' & u_dc_offset);
 
-  u_dc_3 <= saturate_u(shift_right(sum_3, U_DC_CONDITIONING_DROP_U_DC), U_DC_W);
+  -- Half an LSB of u_dc to round with, in the multiplier's adder; u_max is floored
+  half_1 <= half(U_DC_CONDITIONING_DROP_U_DC, 36) when valid(2) = '1' else (others => '0');
+  sum    <= prod + half_1;
 
   process (clk)
   begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stages 1, 4: diff = code - offset and u_dc_gain, then u_dc = sum, narrowed, and k_u_max
+      -- Stages 1, 4: diff = code - offset and u_dc_gain, then u_dc and k_u_max
       if valid(0) = '1' or valid(3) = '1' then
         mul_a <= resize(diff_0, 18);
         mul_b <= u_dc_gain;
@@ -68,26 +70,23 @@ begin
       if valid(0) = '1' then
         rail_1 <= (and code_u_dc) or (nor code_u_dc);
       end if;
-      if valid(3) = '1' then
-        u_dc_4 <= u_dc_3;
-        rail_4 <= rail_1;
-      end if;
 
       -- Stages 2, 5: prod = diff * u_dc_gain, then u_dc * k_u_max
       if valid(1) = '1' or valid(4) = '1' then
         prod <= mul_a * mul_b;
       end if;
 
-      -- Stage 3: sum = prod, with half an LSB of u_dc to round with
+      -- Stage 3: u_dc = prod, narrowed
       if valid(2) = '1' then
-        sum_3 <= prod + half(U_DC_CONDITIONING_DROP_U_DC, 36);
+        u_dc_3 <= saturate_u(shift_right(sum, U_DC_CONDITIONING_DROP_U_DC), U_DC_W);
+        rail_3 <= rail_1;
       end if;
 
       -- Stage 6: u_max = prod, floored
       if valid(5) = '1' then
-        u_dc         <= u_dc_4;
-        u_max        <= saturate_u(shift_right(prod, U_DC_CONDITIONING_DROP_U_MAX), U_MAX_W);
-        u_dc_at_rail <= rail_4;
+        u_dc         <= u_dc_3;
+        u_max        <= saturate_u(shift_right(sum, U_DC_CONDITIONING_DROP_U_MAX), U_MAX_W);
+        u_dc_at_rail <= rail_3;
       end if;
 
       if rst = '1' then

@@ -47,7 +47,7 @@ FLOORPLANS, FIRST_SEED = 2, 1  # placements from which the sites of the multipli
 # Of the estimate: the clocks that the router is asked for, one after the other until it gets there within so many
 # rounds.  It makes its way by giving wires to whoever needs them most; a net that comes off badly it leaves,
 # unless told to route again what misses the clock.  Where the clock is out of reach it never ends.
-SHARES, ROUNDS, MOST_ROUNDS = (0.99, 0.97, 0.95, 0.93, 0.91), 150, 1000
+SHARES, ROUNDS, MOST_ROUNDS = (0.99, 0.96, 0.93), 150, 1000
 # nextpnr's own price of a wire that two nets want rises so fast that the clock is forgotten over it, and what it
 # expects of the way to go is more than that takes, so it goes the first way it finds.
 PATIENT = {
