@@ -46,29 +46,29 @@ test: setup ## run every test (golden model, plant, VHDL simulation)
 	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m pytest -q -n $(JOBS) --dist=worksteal $(ARGS)
 
 demo: setup ## run the demonstration
-	$(PYTHON_RUN) -m scripts.demo $(ARGS)
+	$(PYTHON_RUN) -m studies.demo $(ARGS)
 
 papers: setup ## reproduce the papers' experiments: findings, figures, report
-	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m scripts.papers $(ARGS)
+	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m studies.papers $(ARGS)
 
 bench: setup ## run the benchmarks
-	$(PYTHON_RUN) -m scripts.bench $(ARGS)
-	$(PYTHON_RUN) -m scripts.bench_diagnose
+	$(PYTHON_RUN) -m studies.bench.golden $(ARGS)
+	$(PYTHON_RUN) -m studies.bench.diagnose
 
 blind: setup ## run the sealed benchmark of the diagnosis
-	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m scripts.blind $(ARGS)
+	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m studies.blind $(ARGS)
 
 real: setup ## diagnose the recordings of real drives
-	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m scripts.real $(ARGS)
+	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m studies.real $(ARGS)
 
 compare: setup ## diagnose the same cases with what one would use instead
-	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m scripts.compare $(ARGS)
+	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m studies.compare $(ARGS)
 
 timeline: setup ## draw the timeline of one control period
-	$(PYTHON_RUN) -m scripts.timeline $(ARGS)
+	$(PYTHON_RUN) -m studies.timeline $(ARGS)
 
 faults: setup ## hurt the drive: sensors, bus, strobes, registers; RTL against golden core
-	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m scripts.faults $(ARGS)
+	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m studies.faults $(ARGS)
 
 mutate: setup ## plant faults in the VHDL and count those the tests catch
 	$(PYTHON_RUN) -m scripts.mutate $(ARGS)
@@ -77,7 +77,7 @@ prove: setup ## prove properties of the gates, the pipeline, the rounding, the b
 	$(PYTHON_RUN) -m scripts.prove $(ARGS)
 
 verilog: setup ## convert the VHDL to Verilog (GHDL 5)
-	$(PYTHON_RUN) -m scripts.verilog $(ARGS)
+	$(PYTHON_RUN) -m fluxproof.cosim.verilog $(ARGS)
 
 synth: setup ## count LUT, FF, DSP, block RAM for three Xilinx families; routed timing on ECP5
 	$(PYTHON_RUN) -m scripts.synth $(ARGS)

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from diagnosis.effect import torque_of
+from fluxproof.diagnosis.effect import torque_of
 
 
 def misfit(view) -> dict[str, np.ndarray]:

@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from diagnosis.recording import Recording, RecordingError
-from diagnosis.settling import settled
-from diagnosis.shaft import airgap, is_airgap, shaft_kind
-from diagnosis.view import View
+from fluxproof.diagnosis.recording import Recording, RecordingError
+from fluxproof.diagnosis.settling import settled
+from fluxproof.diagnosis.shaft import airgap, is_airgap, shaft_kind
+from fluxproof.diagnosis.view import View
 
 BLOCK_ROWS = 200
 SHORTER = (100, 50)  # where dwells are short

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnosis.balance import misfit
-from diagnosis.torque_order import torque_orders
+from fluxproof.diagnosis.balance import misfit
+from fluxproof.diagnosis.torque_order import torque_orders
 
 ORDERS_SUM = (0.0, 1.0, 2.0)
 LEAST_TURNS = 0.8  # of a harmonic within a block, else it is no functional of its own

@@ -23,10 +23,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from diagnosis.column_maps import maps, plain
-from diagnosis.readers.table import Table, shown
-from diagnosis.recording import COLUMNS, RecordingError
-from diagnosis.units import conversion, known_units, split_unit
+from fluxproof.diagnosis.column_maps import maps, plain
+from fluxproof.diagnosis.readers.table import Table, shown
+from fluxproof.diagnosis.recording import COLUMNS, RecordingError
+from fluxproof.diagnosis.units import conversion, known_units, split_unit
 
 KEYS = {"name", "unit", "factor", "offset"}
 

@@ -1,7 +1,7 @@
 """``fluxproof diagnose``: why a recording differs from its simulation, as a command.
 
 Progress goes to stderr, the answer to stdout, the files to --out.  Exit status 0 whatever the verdict; input that
-cannot be used ends in one line and status 2 (scripts/fluxproof.py).  What takes long to import is imported when it
+cannot be used ends in one line and status 2 (fluxproof/command.py).  What takes long to import is imported when it
 runs, so that ``fluxproof --help`` stays quick.
 """
 
@@ -29,8 +29,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Diagnose, write the outputs, print the answer; returns 0."""
-    from diagnosis.nominal import load_nominal
-    from diagnosis.session import run as session
+    from fluxproof.diagnosis.nominal import load_nominal
+    from fluxproof.diagnosis.session import run as session
 
     nominal = load_nominal(args.drive)
     out = Path(args.out) if args.out else default_folder(args.recordings)
@@ -107,7 +107,7 @@ def _improved(out, answer) -> bool:
 
 def effect_table(effects) -> list[str]:
     """The asserted effects, a line for each parameter, in aligned columns."""
-    from diagnosis.report.words import measured, percent
+    from fluxproof.diagnosis.report.words import measured, percent
 
     rows = [("effect", "parameter", "value", "confidence", "explains")]
     for effect in effects:

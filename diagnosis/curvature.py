@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from diagnosis.catalogue.saturation import q_curves
-from diagnosis.effect import flux
+from fluxproof.diagnosis.catalogue.saturation import q_curves
+from fluxproof.diagnosis.effect import flux
 
 LEAST = 0.08  # of rated current: smaller currents say nothing of a surplus
 SPREAD = 1.35  # between smallest and largest level

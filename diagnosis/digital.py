@@ -15,17 +15,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from diagnosis.digital_cause import Cause, find_cause, golden_value, lowest_bit, where_they_part
-from diagnosis.digital_flow import OWNER, block_name, first_in_flow, hidden_before
-from diagnosis.digital_local import check_rows, checkable
-from diagnosis.digital_replay import Run, run_of
-from diagnosis.recording import Recording
-from diagnosis.result import Digital
-from golden_model import fluxproof
-from golden_model.fluxproof import OBSERVED
-from golden_model.io import sample_latch
-from golden_model.kernel import CACHE_DIR
-from golden_model.units import unit
+from fluxproof.diagnosis.digital_cause import Cause, find_cause, golden_value, lowest_bit, where_they_part
+from fluxproof.diagnosis.digital_flow import OWNER, block_name, first_in_flow, hidden_before
+from fluxproof.diagnosis.digital_local import check_rows, checkable
+from fluxproof.diagnosis.digital_replay import Run, run_of
+from fluxproof.diagnosis.recording import Recording
+from fluxproof.diagnosis.result import Digital
+from fluxproof.golden_model import fluxproof
+from fluxproof.golden_model.fluxproof import OBSERVED
+from fluxproof.golden_model.io import sample_latch
+from fluxproof.golden_model.kernel import CACHE_DIR
+from fluxproof.golden_model.units import unit
 
 CONVERGED = 1000  # rows that must agree to the end before a run-in counts
 KINDS = {

@@ -7,8 +7,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from golden_model import fluxproof
-from plant import (
+from fluxproof.cosim.closed_loop import Scenario, described_sensors
+from fluxproof.cosim.golden_loop import mixed_kernel
+from fluxproof.golden_model import fluxproof
+from fluxproof.plant import (
     Inverter,
     Machine,
     Sensors,
@@ -20,9 +22,7 @@ from plant import (
     sensor_params,
     u_dc_code,
 )
-from plant import layout as L
-from scripts.cosim import Scenario, described_sensors
-from scripts.golden_loop import mixed_kernel
+from fluxproof.plant import layout as L
 
 
 def capture(drive, register_set, scenario: Scenario, machine=None, inverter=None, sensors: Sensors | None = None,

@@ -11,11 +11,19 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass
 
-from diagnosis.digital_flow import ORDER, OWNER, first_in_flow, hidden_before, outputs_of, parted, trace
-from diagnosis.digital_replay import Run
-from golden_model import fluxproof
-from golden_model.fluxproof import REGISTERS
-from golden_model.io import sample_latch
+from fluxproof.diagnosis.digital_flow import (
+    ORDER,
+    OWNER,
+    first_in_flow,
+    hidden_before,
+    outputs_of,
+    parted,
+    trace,
+)
+from fluxproof.diagnosis.digital_replay import Run
+from fluxproof.golden_model import fluxproof
+from fluxproof.golden_model.fluxproof import REGISTERS
+from fluxproof.golden_model.io import sample_latch
 
 REACH = 4000  # rows before the difference from which a hypothesis is replayed: states may have parted unseen
 BEYOND = 300  # rows behind it that a hypothesis must explain to be looked at further

@@ -9,7 +9,7 @@ from __future__ import annotations
 import types
 from collections import defaultdict
 
-from golden_model import fluxproof
+from fluxproof.golden_model import fluxproof
 
 RENAMED = {"compensation_dq": ("u_comp_d", "u_comp_q"), "direction_functions": ("d_d", "d_q")}
 

@@ -9,13 +9,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from diagnosis.digital_replay import FIELDS, Run
-from golden_model.control import chord_speed, decoupling
-from golden_model.estimators import applied_voltage, flux_estimate, flux_models, torque, winding_resistance
-from golden_model.io import current_conditioning, position, u_dc_conditioning, u_dc_processing
-from golden_model.kernel import kernel
-from golden_model.modulation import pwm_compare, svm, svm_delay_compensation
-from golden_model.transforms import clarke, flux_park, inverse_park, park, sincos
+from fluxproof.diagnosis.digital_replay import FIELDS, Run
+from fluxproof.golden_model.control import chord_speed, decoupling
+from fluxproof.golden_model.estimators import (
+    applied_voltage,
+    flux_estimate,
+    flux_models,
+    torque,
+    winding_resistance,
+)
+from fluxproof.golden_model.io import current_conditioning, position, u_dc_conditioning, u_dc_processing
+from fluxproof.golden_model.kernel import kernel
+from fluxproof.golden_model.modulation import pwm_compare, svm, svm_delay_compensation
+from fluxproof.golden_model.transforms import clarke, flux_park, inverse_park, park, sincos
 
 AT_ONCE = 1 << 16
 # Signal -> recorded signals that it is made of, besides the raw sample; those of BEFORE from the row before.

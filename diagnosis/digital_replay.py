@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from golden_model import fluxproof
-from golden_model.kernel import kernel
+from fluxproof.golden_model import fluxproof
+from fluxproof.golden_model.kernel import kernel
 
 FIELDS = fluxproof.Observed._fields
 

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnosis.result import Estimate
+from fluxproof.diagnosis.result import Estimate
 
 Column = dict  # channel -> array
 DOUBT = 2.0  # standard deviations that a value must be on the wrong side to be ruled out

@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 import numba
 import numpy as np
 
-from diagnosis.cells import SYSTEM_DC, SYSTEM_U, noise, voltage_level
-from diagnosis.effect import rated_torque
+from fluxproof.diagnosis.cells import SYSTEM_DC, SYSTEM_U, noise, voltage_level
+from fluxproof.diagnosis.effect import rated_torque
 
 FRESH = 0.06  # share of a column that must not be in the earlier ones, else the data do not carry it
 PER_EFFECT = 10.0  # price of an effect beside that of its coefficients: one in twenty is there by itself

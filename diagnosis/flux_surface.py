@@ -19,11 +19,11 @@ import numpy as np
 from scipy import linalg
 from scipy.spatial import Delaunay, cKDTree
 
-from diagnosis.balance import misfit
-from diagnosis.catalogue import CATALOGUE
-from diagnosis.flux_splines import emf_columns, gradients, knots_over, powers
-from diagnosis.result import Estimate
-from plant import FluxMap
+from fluxproof.diagnosis.balance import misfit
+from fluxproof.diagnosis.catalogue import CATALOGUE
+from fluxproof.diagnosis.flux_splines import emf_columns, gradients, knots_over, powers
+from fluxproof.diagnosis.result import Estimate
+from fluxproof.plant import FluxMap
 
 STEPS = {"saturation": ("linear", "separable"), "cross_saturation": ("separable", "full")}
 BETTER = 1.3

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from diagnosis.catalogue.dead_time import RIPPLE, WIDTHS
-from diagnosis.fit import Model, Solution
+from fluxproof.diagnosis.catalogue.dead_time import RIPPLE, WIDTHS
+from fluxproof.diagnosis.fit import Model, Solution
 
 
 def carries_none(view) -> bool:

@@ -15,12 +15,12 @@ from pathlib import Path
 import numpy as np
 import tomlkit
 
-from diagnosis.improved_core import CoreValue, core_changes, core_values
-from diagnosis.improved_plant import Plant, Timing, described_sensors, merged, plant_of
-from diagnosis.nominal import Nominal
-from diagnosis.result import NamedEffect
-from golden_model import drive as drives
-from plant import FluxMap, Harmonic
+from fluxproof.diagnosis.improved_core import CoreValue, core_changes, core_values
+from fluxproof.diagnosis.improved_plant import Plant, Timing, described_sensors, merged, plant_of
+from fluxproof.diagnosis.nominal import Nominal
+from fluxproof.diagnosis.result import NamedEffect
+from fluxproof.golden_model import drive as drives
+from fluxproof.plant import FluxMap, Harmonic
 
 __all__ = ["CoreValue", "Plant", "Timing", "core_values", "improved_toml", "plant_of", "write_improved"]
 

@@ -15,13 +15,13 @@ from __future__ import annotations
 import dataclasses
 from typing import NamedTuple
 
-from diagnosis.improved_plant import merged
-from diagnosis.nominal import Nominal
-from diagnosis.result import NamedEffect
-from golden_model import drive as drives
-from golden_model.drive_keys import DriveError, key_of
-from golden_model.registers import registers
-from golden_model.scaling import LOSS_MARGIN, LOSS_SPARE_V
+from fluxproof.diagnosis.improved_plant import merged
+from fluxproof.diagnosis.nominal import Nominal
+from fluxproof.diagnosis.result import NamedEffect
+from fluxproof.golden_model import drive as drives
+from fluxproof.golden_model.drive_keys import DriveError, key_of
+from fluxproof.golden_model.registers import registers
+from fluxproof.golden_model.scaling import LOSS_MARGIN, LOSS_SPARE_V
 
 ORDERS = ("inverter.dead_time_s",)  # keys of drive.toml that command the hardware instead of describing it
 DESCRIBED = ("machine", "inverter")  # sections whose keys mean the same to the core and to the plant

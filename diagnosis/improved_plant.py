@@ -20,10 +20,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from diagnosis.nominal import Nominal, load_nominal
-from diagnosis.result import NamedEffect
-from golden_model.drive_keys import DriveError
-from plant import FluxMap, Harmonic, Inverter, Machine, Sensors
+from fluxproof.diagnosis.nominal import Nominal, load_nominal
+from fluxproof.diagnosis.result import NamedEffect
+from fluxproof.golden_model.drive_keys import DriveError
+from fluxproof.plant import FluxMap, Harmonic, Inverter, Machine, Sensors
 
 FINE_BITS = 24  # of sensors that nobody has described: finer than anything that could matter
 

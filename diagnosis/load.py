@@ -15,12 +15,12 @@ from pathlib import Path
 
 import numpy as np
 
-from diagnosis.checks import check_recording
-from diagnosis.checks.missing import OPTIONAL
-from diagnosis.columns import Plan, canonical, plan_columns
-from diagnosis.readers import read_table
-from diagnosis.readers.table import Table, shown
-from diagnosis.recording import Recording, RecordingError
+from fluxproof.diagnosis.checks import check_recording
+from fluxproof.diagnosis.checks.missing import OPTIONAL
+from fluxproof.diagnosis.columns import Plan, canonical, plan_columns
+from fluxproof.diagnosis.readers import read_table
+from fluxproof.diagnosis.readers.table import Table, shown
+from fluxproof.diagnosis.recording import Recording, RecordingError
 
 
 def load_recording(path, nominal) -> Recording:

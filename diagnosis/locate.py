@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from diagnosis.result import Evidence, Location, OrderLine, Region
+from fluxproof.diagnosis.result import Evidence, Location, OrderLine, Region
 
 REGION_FACTOR = 1.5  # a region is told when its misfit is this much larger than elsewhere
 

@@ -12,9 +12,9 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass, field
 
-from golden_model import drive
-from golden_model.drive_file import read_sections, read_tables
-from golden_model.drive_keys import DriveError
+from fluxproof.golden_model import drive
+from fluxproof.golden_model.drive_file import read_sections, read_tables
+from fluxproof.golden_model.drive_keys import DriveError
 
 REQUIRED = {
     "machine": (

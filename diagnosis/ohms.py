@@ -11,8 +11,8 @@ import itertools
 
 import numpy as np
 
-from diagnosis.catalogue.dead_time import device_tails
-from diagnosis.effect import DOUBT
+from fluxproof.diagnosis.catalogue.dead_time import device_tails
+from fluxproof.diagnosis.effect import DOUBT
 
 LEAST_DISPERSION = 0.8
 

@@ -11,13 +11,13 @@ import dataclasses
 
 import numpy as np
 
-from diagnosis.improved_plant import Plant, errors_beyond, plant_of
-from diagnosis.nominal import Nominal, load_nominal
-from diagnosis.overlay_inputs import SETTLING_ROWS, Stretch, dq, dq_currents, stretches
-from diagnosis.overlay_loop import Controller, Errors, run_loop
-from diagnosis.recording import Recording, RecordingError
-from golden_model.scaling import current_gains
-from plant import IMPOSED_SPEED, initial_state, plant_params
+from fluxproof.diagnosis.improved_plant import Plant, errors_beyond, plant_of
+from fluxproof.diagnosis.nominal import Nominal, load_nominal
+from fluxproof.diagnosis.overlay_inputs import SETTLING_ROWS, Stretch, dq, dq_currents, stretches
+from fluxproof.diagnosis.overlay_loop import Controller, Errors, run_loop
+from fluxproof.diagnosis.recording import Recording, RecordingError
+from fluxproof.golden_model.scaling import current_gains
+from fluxproof.plant import IMPOSED_SPEED, initial_state, plant_params
 
 MOST_POINTS = 4_000
 SIGNALS = ("u_d_ref", "u_q_ref", "i_d", "i_q")

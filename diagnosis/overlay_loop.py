@@ -14,10 +14,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from plant import advance_averaged, skewed_currents
-from plant import layout as L
-from plant.jit import njit
-from plant.transforms import clarke, inverse_clarke
+from fluxproof.plant import advance_averaged, skewed_currents
+from fluxproof.plant import layout as L
+from fluxproof.plant.jit import njit
+from fluxproof.plant.transforms import clarke, inverse_clarke
 
 
 class Controller(NamedTuple):

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from diagnosis.cells import Projector, cells_of, told
-from diagnosis.effect import FluxEffect, half_dead_time, rated_torque
-from diagnosis.fit import Fitter, Model, Solution, everything, row_sigma
+from fluxproof.diagnosis.cells import Projector, cells_of, told
+from fluxproof.diagnosis.effect import FluxEffect, half_dead_time, rated_torque
+from fluxproof.diagnosis.fit import Fitter, Model, Solution, everything, row_sigma
 
 NOISY_TORQUE = 0.03  # of rated torque
 POINT = 0.08  # of top speed and rated current: closer operating points are one

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnosis.balance import misfit
-from diagnosis.cells import voltage_level
-from diagnosis.effect import rated_torque
-from diagnosis.result import Fit
-from diagnosis.scan import Stray, row_residual, stray_order, stray_swing, stray_torque
+from fluxproof.diagnosis.balance import misfit
+from fluxproof.diagnosis.cells import voltage_level
+from fluxproof.diagnosis.effect import rated_torque
+from fluxproof.diagnosis.result import Fit
+from fluxproof.diagnosis.scan import Stray, row_residual, stray_order, stray_swing, stray_torque
 
 GROUP_ROWS, GROUP_CHI2 = 12, 3.0
 CURVE_LEFT = 0.06  # of the misfit's rms

@@ -7,12 +7,12 @@ from dataclasses import fields
 
 import numpy as np
 
-from diagnosis.cells import SYSTEM_DC, SYSTEM_U, Projector, voltage_level
-from diagnosis.curvature import LEAST
-from diagnosis.experiment import BENDS, best_points, rivalry
-from diagnosis.fit import FRESH
-from diagnosis.result import Request
-from diagnosis.view import View, stayed_cold
+from fluxproof.diagnosis.cells import SYSTEM_DC, SYSTEM_U, Projector, voltage_level
+from fluxproof.diagnosis.curvature import LEAST
+from fluxproof.diagnosis.experiment import BENDS, best_points, rivalry
+from fluxproof.diagnosis.fit import FRESH
+from fluxproof.diagnosis.result import Request
+from fluxproof.diagnosis.view import View, stayed_cold
 
 ROWS = 200
 BLOCKS = 20  # that a dwell of half a second is worth

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from diagnosis.recording import Problem
+from fluxproof.diagnosis.recording import Problem
 
 VERDICTS = ("explained", "ambiguous", "unexplained", "no_mismatch", "digital_mismatch", "bad_recording")
 

@@ -13,23 +13,23 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from diagnosis import verdict as words
-from diagnosis.blocks import views_of
-from diagnosis.catalogue import CATALOGUE
-from diagnosis.flux_surface import USUAL, earned
-from diagnosis.load import load_recording
-from diagnosis.locate import at_order, evidence, locate
-from diagnosis.nominal import Nominal, load_nominal
-from diagnosis.ohms import straight_ohms
-from diagnosis.recording import Recording
-from diagnosis.remains import remains
-from diagnosis.request import requests, wants_cold
-from diagnosis.result import Diagnosis, UnknownTerm
-from diagnosis.search import EARNS, Search
-from diagnosis.slow_diagnosis import diagnose_slow
-from diagnosis.uncertainty import Spread
-from diagnosis.unknown import sparse_term
-from diagnosis.view import joined_views, started_cold
+from fluxproof.diagnosis import verdict as words
+from fluxproof.diagnosis.blocks import views_of
+from fluxproof.diagnosis.catalogue import CATALOGUE
+from fluxproof.diagnosis.flux_surface import USUAL, earned
+from fluxproof.diagnosis.load import load_recording
+from fluxproof.diagnosis.locate import at_order, evidence, locate
+from fluxproof.diagnosis.nominal import Nominal, load_nominal
+from fluxproof.diagnosis.ohms import straight_ohms
+from fluxproof.diagnosis.recording import Recording
+from fluxproof.diagnosis.remains import remains
+from fluxproof.diagnosis.request import requests, wants_cold
+from fluxproof.diagnosis.result import Diagnosis, UnknownTerm
+from fluxproof.diagnosis.search import EARNS, Search
+from fluxproof.diagnosis.slow_diagnosis import diagnose_slow
+from fluxproof.diagnosis.uncertainty import Spread
+from fluxproof.diagnosis.unknown import sparse_term
+from fluxproof.diagnosis.view import joined_views, started_cold
 
 HOLDOUT_EVERY = 4  # each fourth dwell is never fitted
 MAP_POINTS = 20  # different currents that make a flux map worth fitting

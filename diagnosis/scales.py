@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from diagnosis.effect import ALIKE
-from diagnosis.fit import Model, Solution
-from diagnosis.ties import SCALES, Ties
+from fluxproof.diagnosis.effect import ALIKE
+from fluxproof.diagnosis.fit import Model, Solution
+from fluxproof.diagnosis.ties import SCALES, Ties
 
 EARNS = 30.0  # gain in chi^2 over dispersion that an effect must bring beside the freest form of the others
 SAME_SCALE = 0.03  # of what is explained: so much may be lost by one scale in place of two

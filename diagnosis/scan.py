@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnosis.cells import voltage_level
-from diagnosis.effect import rated_torque
+from fluxproof.diagnosis.cells import voltage_level
+from fluxproof.diagnosis.effect import rated_torque
 
 MOST_ORDER = 80  # per mechanical turn
 LOCKED = 30.0  # power of the sum over sum of powers: exp(-30) by chance

@@ -16,10 +16,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnosis.curvature import FAMILY, labels, straight_beside_saturation
-from diagnosis.fit import Fitter, Model, Solution
-from diagnosis.refine import TIE
-from diagnosis.scales import EARNS, Scales
+from fluxproof.diagnosis.curvature import FAMILY, labels, straight_beside_saturation
+from fluxproof.diagnosis.fit import Fitter, Model, Solution
+from fluxproof.diagnosis.refine import TIE
+from fluxproof.diagnosis.scales import EARNS, Scales
 
 MOST_AT_ONCE = 3
 REFINED = 14

@@ -19,16 +19,16 @@ from pathlib import Path
 
 from threadpoolctl import threadpool_limits
 
-from diagnosis.digital import replay
-from diagnosis.improve import write_improved
-from diagnosis.load import load_recording
-from diagnosis.nominal import Nominal, load_nominal
-from diagnosis.overlay import closed_loop
-from diagnosis.recording import Problem, Recording, RecordingError
-from diagnosis.report import write_outputs
-from diagnosis.result import Diagnosis, Digital
-from diagnosis.run import diagnose
-from golden_model.drive_keys import DriveError
+from fluxproof.diagnosis.digital import replay
+from fluxproof.diagnosis.improve import write_improved
+from fluxproof.diagnosis.load import load_recording
+from fluxproof.diagnosis.nominal import Nominal, load_nominal
+from fluxproof.diagnosis.overlay import closed_loop
+from fluxproof.diagnosis.recording import Problem, Recording, RecordingError
+from fluxproof.diagnosis.report import write_outputs
+from fluxproof.diagnosis.result import Diagnosis, Digital
+from fluxproof.diagnosis.run import diagnose
+from fluxproof.golden_model.drive_keys import DriveError
 
 IMPROVED = "drive_improved.toml"
 OVERLAY_SIGNALS = ("u_d_ref", "u_q_ref")  # the currents are what a controller keeps right

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from diagnosis.balance import misfit
+from fluxproof.diagnosis.balance import misfit
 
 LEAST_BLOCKS = 8  # of the first dwell: fewer do not say what the scatter is
 MOST_DROPPED = 3

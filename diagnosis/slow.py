@@ -17,9 +17,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnosis.recording import Recording
-from diagnosis.slow_stretches import Stretches, stretches
-from diagnosis.view import View
+from fluxproof.diagnosis.recording import Recording
+from fluxproof.diagnosis.slow_stretches import Stretches, stretches
+from fluxproof.diagnosis.view import View
 
 ROWS = 36  # a whole turn in steps of ten degrees: the mean of what an inverter loses is right to 0.1 %
 BIN_CURRENT, BIN_SPEED = 0.05, 0.05  # of rated current and of the largest speed: the same operating point

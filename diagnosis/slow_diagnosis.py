@@ -10,16 +10,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from diagnosis import verdict as words
-from diagnosis.catalogue import CATALOGUE
-from diagnosis.locate import evidence, locate
-from diagnosis.recording import RecordingError
-from diagnosis.request import requests
-from diagnosis.result import Diagnosis, Fit
-from diagnosis.slow import UNSEEN, slow_view
-from diagnosis.slow_search import SlowSearch
-from diagnosis.uncertainty import Plain
-from diagnosis.view import joined_views
+from fluxproof.diagnosis import verdict as words
+from fluxproof.diagnosis.catalogue import CATALOGUE
+from fluxproof.diagnosis.locate import evidence, locate
+from fluxproof.diagnosis.recording import RecordingError
+from fluxproof.diagnosis.request import requests
+from fluxproof.diagnosis.result import Diagnosis, Fit
+from fluxproof.diagnosis.slow import UNSEEN, slow_view
+from fluxproof.diagnosis.slow_search import SlowSearch
+from fluxproof.diagnosis.uncertainty import Plain
+from fluxproof.diagnosis.view import joined_views
 
 LEAST_POINTS = 8
 HOLDOUT_EVERY = 4

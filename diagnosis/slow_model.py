@@ -6,11 +6,11 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from diagnosis.effect import FluxEffect
-from diagnosis.fit import Model
-from diagnosis.slow_diagnosis import axis_misfit
-from diagnosis.slow_search import SlowSearch
-from plant import FluxMap
+from fluxproof.diagnosis.effect import FluxEffect
+from fluxproof.diagnosis.fit import Model
+from fluxproof.diagnosis.slow_diagnosis import axis_misfit
+from fluxproof.diagnosis.slow_search import SlowSearch
+from fluxproof.plant import FluxMap
 
 STEPS = (9, 41)  # of the map along i_d and i_q
 ROUND = 0.15  # of rated current: what the map reaches to either side of an axis that was never driven

@@ -11,11 +11,11 @@ import itertools
 
 import numpy as np
 
-from diagnosis.catalogue import CATALOGUE
-from diagnosis.cells import told, voltage_level
-from diagnosis.fit import Fitter, Model, everything
-from diagnosis.search import Outcome, Search
-from diagnosis.slow import UNSEEN
+from fluxproof.diagnosis.catalogue import CATALOGUE
+from fluxproof.diagnosis.cells import told, voltage_level
+from fluxproof.diagnosis.fit import Fitter, Model, everything
+from fluxproof.diagnosis.search import Outcome, Search
+from fluxproof.diagnosis.slow import UNSEEN
 
 MOST_EFFECTS = 6
 REFINED = 40

@@ -26,13 +26,13 @@ from pathlib import Path
 
 import numpy as np
 
-from diagnosis.recording import RecordingError
-from diagnosis.telemetry_columns import columns_of
-from golden_model import fluxproof
-from golden_model.drive_checks import CARRIER_HALF_RANGE
-from golden_model.io import sample_latch
-from golden_model.kernel import CACHE_DIR
-from golden_model.units import si_per_lsb, unit
+from fluxproof.diagnosis.recording import RecordingError
+from fluxproof.diagnosis.telemetry_columns import columns_of
+from fluxproof.golden_model import fluxproof
+from fluxproof.golden_model.drive_checks import CARRIER_HALF_RANGE
+from fluxproof.golden_model.io import sample_latch
+from fluxproof.golden_model.kernel import CACHE_DIR
+from fluxproof.golden_model.units import si_per_lsb, unit
 
 MAGIC = b"FLUXDUMP"
 VERSION = 1

@@ -10,9 +10,9 @@ import math
 
 import numpy as np
 
-from golden_model.fluxproof import REGISTERS, Sample
-from golden_model.formats import CODE, TURN
-from golden_model.units import TURN_RAD
+from fluxproof.golden_model.fluxproof import REGISTERS, Sample
+from fluxproof.golden_model.formats import CODE, TURN
+from fluxproof.golden_model.units import TURN_RAD
 
 
 def columns_of(meta: dict) -> dict[str, np.ndarray]:

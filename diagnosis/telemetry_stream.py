@@ -16,11 +16,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from diagnosis.recording import RecordingError
-from diagnosis.telemetry import write_dump
-from golden_model.fluxproof import Sample
-from golden_model.io import telemetry_words as packet
-from golden_model.io.telemetry_words import COUNT, COUNTER, FIELDS, HEADER_WORD, LAYOUT, PACKET
+from fluxproof.diagnosis.recording import RecordingError
+from fluxproof.diagnosis.telemetry import write_dump
+from fluxproof.golden_model.fluxproof import Sample
+from fluxproof.golden_model.io import telemetry_words as packet
+from fluxproof.golden_model.io.telemetry_words import COUNT, COUNTER, FIELDS, HEADER_WORD, LAYOUT, PACKET
 
 SIZE = 4 * COUNT
 MARK = HEADER_WORD.to_bytes(4, "little")

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 from scipy import stats
 
-from diagnosis.curvature import FAMILY, axes_told
-from diagnosis.curves import courses
-from diagnosis.effect import ALIKE, DOUBT, sigma
-from diagnosis.fit import Model, Solution
-from diagnosis.idle import unseen_loss
-from diagnosis.refine import TIE, Refiner, operating_points, point_numbers
+from fluxproof.diagnosis.curvature import FAMILY, axes_told
+from fluxproof.diagnosis.curves import courses
+from fluxproof.diagnosis.effect import ALIKE, DOUBT, sigma
+from fluxproof.diagnosis.fit import Model, Solution
+from fluxproof.diagnosis.idle import unseen_loss
+from fluxproof.diagnosis.refine import TIE, Refiner, operating_points, point_numbers
 
 LEAST_POINTS, LEAST_SPREAD = 4.0, 0.2  # operating points that say how large errors really are; no smaller than that
 SCALES = frozenset({"udc_gain", "current_scale", "magnet_flux"})  # any two of them are any other two, but for torque

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from diagnosis.balance import misfit
+from fluxproof.diagnosis.balance import misfit
 
 ORDERS = range(2, 110, 2)  # per electrical turn: cogging's are even
 ALWAYS = range(2, 38, 2)  # looked at in every recording

@@ -15,8 +15,8 @@ from __future__ import annotations
 import numpy as np
 from scipy import stats
 
-from diagnosis.fit import PER_EFFECT
-from diagnosis.refine import TIE, point_numbers
+from fluxproof.diagnosis.fit import PER_EFFECT
+from fluxproof.diagnosis.refine import TIE, point_numbers
 
 # Of the voltage, and of the bus along the current: rms of what healthy recordings show of each.
 COMMON_U, COMMON_DC = 2e-5, 1e-5

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from diagnosis.result import UnknownTerm
+from fluxproof.diagnosis.result import UnknownTerm
 
 
 def _dependences(view):

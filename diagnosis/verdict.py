@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from diagnosis.cells import told
-from diagnosis.curves import step_at_start
-from diagnosis.effect import ALIKE, DOUBT, sigma
-from diagnosis.result import NamedEffect
+from fluxproof.diagnosis.cells import told
+from fluxproof.diagnosis.curves import step_at_start
+from fluxproof.diagnosis.effect import ALIKE, DOUBT, sigma
+from fluxproof.diagnosis.result import NamedEffect
 
 LEFTOVER = 2.0  # reduced chi^2 that an explanation may leave
 FLOOR_SHARE = 0.15  # of the misfit's rms: a leftover below it is the curve's, not another effect's

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-
 STACKED = ("theta", "omega", "i", "i_raw", "u", "u_dc", "temp", "torque", "slope_m", "shaft", "rows")
 
 

@@ -27,8 +27,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from golden_model.fixed import Format
-from golden_model.formats import BIT
+from fluxproof.golden_model.fixed import Format
+from fluxproof.golden_model.formats import BIT
 
 
 @dataclass(frozen=True)
@@ -98,6 +98,12 @@ class Block:
     stimuli: Callable | None = None  # (rng, config) -> list of {port: value}: the block's own hard cases
     possible: Callable | None = None  # {port: value} -> the nearest that can occur
     width_from: Mapping[str, Callable] = field(default_factory=dict)  # port -> config -> Format
+    generated: bool = False  # the VHDL is written by `make generate`
+
+    @property
+    def vhdl(self) -> str:
+        """The block's VHDL file, below rtl/."""
+        return f"{'generated' if self.generated else self.folder}/{self.name}.vhd"
 
     def ports(self, config: Mapping[str, int]) -> tuple[Port, ...]:
         """Inputs and registers with the formats that the generics give them."""

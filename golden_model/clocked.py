@@ -7,10 +7,10 @@ clock at which a sample has entered: from the step behind those on.
 
 from typing import NamedTuple
 
-from golden_model import fluxproof
-from golden_model.kernel import kernel
-from golden_model.modulation import gate_generation
-from golden_model.io import fault_latch, sample_guard
+from fluxproof.golden_model import fluxproof
+from fluxproof.golden_model.io import fault_latch, sample_guard
+from fluxproof.golden_model.kernel import kernel
+from fluxproof.golden_model.modulation import gate_generation
 
 INTERVAL = fluxproof.SAMPLE_INTERVAL
 COMPARE_CLOCKS, CHECKS_CLOCKS = (fluxproof.schedule()[name][1] for name in ("compare", "checks"))

@@ -15,9 +15,9 @@ import dataclasses
 import math
 from dataclasses import dataclass
 
-from golden_model.drive_checks import check
-from golden_model.drive_file import read_sections
-from golden_model.drive_keys import DriveError, flag, not_negative, positive, real, whole
+from fluxproof.golden_model.drive_checks import check
+from fluxproof.golden_model.drive_file import read_sections
+from fluxproof.golden_model.drive_keys import DriveError, flag, not_negative, positive, real, whole
 
 
 @dataclass(frozen=True)

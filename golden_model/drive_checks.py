@@ -2,8 +2,8 @@
 
 import math
 
-from golden_model.drive_keys import DriveError
-from golden_model.formats import PU, VECTOR
+from fluxproof.golden_model.drive_keys import DriveError
+from fluxproof.golden_model.formats import PU, VECTOR
 
 CARRIER_HALF_RANGE = (8, 32767)  # generic CARRIER_HALF of rtl/fluxproof.vhd
 WHOLE = 1e-6  # relative; a decimal fraction typed with seven digits still counts as exact

@@ -14,7 +14,7 @@ try:
 except ModuleNotFoundError:  # Python 3.10
     import tomli as tomllib
 
-from golden_model.drive_keys import DriveError, key_of
+from fluxproof.golden_model.drive_keys import DriveError, key_of
 
 # How recordings name their signals, and physics that the core knows nothing of: both are read by diagnosis/.
 IGNORED = ("columns", "plant")

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from golden_model.kernel import kernel
+from fluxproof.golden_model.kernel import kernel
 
 
 @dataclass(frozen=True)

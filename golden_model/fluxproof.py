@@ -7,8 +7,8 @@ at the clock, the gates and what keeps them off, stands in golden_model/clocked.
 from collections import namedtuple
 from typing import NamedTuple
 
-from golden_model.block import Port
-from golden_model.control import (
+from fluxproof.golden_model.block import Port
+from fluxproof.golden_model.control import (
     chord_speed,
     current_pi,
     dead_time_compensation,
@@ -16,12 +16,12 @@ from golden_model.control import (
     speed_pi,
     voltage_limit,
 )
-from golden_model.control.dead_time_compensation import D_D, D_Q
-from golden_model.estimators import (
+from fluxproof.golden_model.control.dead_time_compensation import D_D, D_Q
+from fluxproof.golden_model.estimators import (
     applied_voltage,
     clean_voltage,
-    current_model,
     current_directions,
+    current_model,
     delta_lambda,
     flux_compensation,
     flux_estimate,
@@ -34,8 +34,8 @@ from golden_model.estimators import (
     v_dead_adaline,
     winding_resistance,
 )
-from golden_model.formats import PU
-from golden_model.io import (
+from fluxproof.golden_model.formats import PU
+from fluxproof.golden_model.io import (
     current_conditioning,
     fault_latch,
     position,
@@ -46,9 +46,9 @@ from golden_model.io import (
     u_dc_conditioning,
     u_dc_processing,
 )
-from golden_model.kernel import kernel
-from golden_model.modulation import gate_generation, pwm_compare, svm, svm_delay_compensation
-from golden_model.transforms import clarke, flux_inverse_park, flux_park, inverse_park, park, sincos
+from fluxproof.golden_model.kernel import kernel
+from fluxproof.golden_model.modulation import gate_generation, pwm_compare, svm, svm_delay_compensation
+from fluxproof.golden_model.transforms import clarke, flux_inverse_park, flux_park, inverse_park, park, sincos
 
 # Instance of the top -> (its block, the instances it waits for).  Blocks start when the last of these is done.
 WIRING = {

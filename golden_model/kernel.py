@@ -24,13 +24,19 @@ def _source_hash() -> str:
     return digest.hexdigest()[:16]
 
 
-def _cache_dir() -> Path:
-    build = PACKAGE.parent / "build"
-    root = build if os.access(PACKAGE.parent, os.W_OK) else Path(tempfile.gettempdir())
-    return root / "numba" / _source_hash()
+def _cache_root() -> Path:
+    """build/ of a checkout; for an installed package the user's cache folder, else the temporary one."""
+    if (PACKAGE.parent / "pyproject.toml").is_file() and os.access(PACKAGE.parent, os.W_OK):
+        return PACKAGE.parent / "build"
+    try:
+        cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "fluxproof"
+        cache.mkdir(parents=True, exist_ok=True)
+    except (OSError, RuntimeError):  # read-only, or a user without a home
+        return Path(tempfile.gettempdir()) / "fluxproof"
+    return cache
 
 
-CACHE_DIR = _cache_dir()
+CACHE_DIR = _cache_root() / "numba" / _source_hash()
 
 
 def kernel(function, cache_dir: Path = CACHE_DIR):

@@ -1,7 +1,7 @@
 """Every block of the core, one line each: add yours here and the bench finds it."""
 
-from golden_model.common import packet_fifo, reciprocal, sqrt
-from golden_model.control import (
+from fluxproof.golden_model.common import packet_fifo, reciprocal, sqrt
+from fluxproof.golden_model.control import (
     chord_speed,
     current_pi,
     dead_time_compensation,
@@ -9,11 +9,11 @@ from golden_model.control import (
     speed_pi,
     voltage_limit,
 )
-from golden_model.estimators import (
+from fluxproof.golden_model.estimators import (
     applied_voltage,
     clean_voltage,
-    current_model,
     current_directions,
+    current_model,
     delta_lambda,
     flux_compensation,
     flux_estimate,
@@ -26,7 +26,7 @@ from golden_model.estimators import (
     v_dead_adaline,
     winding_resistance,
 )
-from golden_model.io import (
+from fluxproof.golden_model.io import (
     current_conditioning,
     fault_latch,
     position,
@@ -39,8 +39,8 @@ from golden_model.io import (
     u_dc_conditioning,
     u_dc_processing,
 )
-from golden_model.modulation import gate_generation, pwm_compare, svm, svm_delay_compensation
-from golden_model.transforms import (
+from fluxproof.golden_model.modulation import gate_generation, pwm_compare, svm, svm_delay_compensation
+from fluxproof.golden_model.transforms import (
     clarke,
     flux_inverse_park,
     flux_park,

@@ -26,10 +26,10 @@ accelerates that much in a sample, and a code that freezes is seen from that tur
 import math
 from typing import NamedTuple
 
-from golden_model.formats import LIMIT
-from golden_model.io.fault_latch import NAMES
-from golden_model.io.sample_checks import IGNORE
-from golden_model.units import TURN_RAD
+from fluxproof.golden_model.formats import LIMIT
+from fluxproof.golden_model.io.fault_latch import NAMES
+from fluxproof.golden_model.io.sample_checks import IGNORE
+from fluxproof.golden_model.units import TURN_RAD
 
 INTEGRAL_CORNER = 5.0  # speed crossover over the corner of the speed regulator's integral
 FLUX_OVER_SPEED, FLUX_OF_CURRENT, FLUX_ALONE = 2.0, 0.5, 0.1  # flux bandwidth over the others, see above

@@ -5,8 +5,8 @@ The scale of a signal is what its LSB means: format LSB times base.  Compare val
 
 import math
 
-from golden_model.fluxproof import OBSERVED
-from golden_model.io import sample_latch
+from fluxproof.golden_model.fluxproof import OBSERVED
+from fluxproof.golden_model.io import sample_latch
 
 TURN_RAD = 2.0 * math.pi
 SIGNALS = {p.name: p for p in sample_latch.BLOCK.outputs} | OBSERVED  # raw sample and references first

@@ -5,17 +5,17 @@ convention, phase order a, b, c.  This package knows nothing of the rest of the
 project: it stands for the hardware.
 """
 
-from plant import layout
-from plant.averaged import advance_averaged, skewed_currents
-from plant.drive_plant import AveragedPlant, SwitchingPlant, initial_state, plant_params
-from plant.flux_map import FluxMap
-from plant.inverter import Inverter, averaged_leg_voltage
-from plant.kernel import PlantParams, refresh
-from plant.layout import STATE_SIZE, empty_state, state_names
-from plant.mechanics import FREE, IMPOSED_SPEED, Profile, profile, profile_at
-from plant.modulation import centred_gates
-from plant.pmsm import Harmonic, Machine, flux_from_currents, machine_params
-from plant.sensors import (
+from fluxproof.plant import layout
+from fluxproof.plant.averaged import advance_averaged, skewed_currents
+from fluxproof.plant.drive_plant import AveragedPlant, SwitchingPlant, initial_state, plant_params
+from fluxproof.plant.flux_map import FluxMap
+from fluxproof.plant.inverter import Inverter, averaged_leg_voltage
+from fluxproof.plant.kernel import PlantParams, refresh
+from fluxproof.plant.layout import STATE_SIZE, empty_state, state_names
+from fluxproof.plant.mechanics import FREE, IMPOSED_SPEED, Profile, profile, profile_at
+from fluxproof.plant.modulation import centred_gates
+from fluxproof.plant.pmsm import Harmonic, Machine, flux_from_currents, machine_params
+from fluxproof.plant.sensors import (
     Sensors,
     current_code,
     hash_normal,
@@ -23,7 +23,7 @@ from plant.sensors import (
     sensor_params,
     u_dc_code,
 )
-from plant.switching import advance_switching
+from fluxproof.plant.switching import advance_switching
 
 __all__ = [
     "FREE",

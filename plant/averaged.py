@@ -1,10 +1,10 @@
 """Averaged plant: one voltage vector per period, from duties and the inverter's errors."""
 
-from plant import layout as L
-from plant.inverter import averaged_leg
-from plant.jit import njit
-from plant.kernel import accept, clear_means, refresh, sources, try_step
-from plant.mechanics import IMPOSED_SPEED
+from fluxproof.plant import layout as L
+from fluxproof.plant.inverter import averaged_leg
+from fluxproof.plant.jit import njit
+from fluxproof.plant.kernel import accept, clear_means, refresh, sources, try_step
+from fluxproof.plant.mechanics import IMPOSED_SPEED
 
 _NONE = (0.0, 0.0, 0.0)
 

@@ -8,13 +8,13 @@ import math
 
 import numpy as np
 
-from plant import layout as L
-from plant.averaged import advance_averaged, skewed_currents
-from plant.inverter import Inverter, inverter_params
-from plant.kernel import PlantParams, refresh
-from plant.mechanics import FREE, mechanics_params
-from plant.pmsm import flux_from_currents, harmonic_flux, machine_params, magnet_flux
-from plant.switching import advance_switching
+from fluxproof.plant import layout as L
+from fluxproof.plant.averaged import advance_averaged, skewed_currents
+from fluxproof.plant.inverter import Inverter, inverter_params
+from fluxproof.plant.kernel import PlantParams, refresh
+from fluxproof.plant.mechanics import FREE, mechanics_params
+from fluxproof.plant.pmsm import flux_from_currents, harmonic_flux, machine_params, magnet_flux
+from fluxproof.plant.switching import advance_switching
 
 
 def plant_params(machine, inverter=None, mode=FREE, substeps=2, max_step_s=10e-6):

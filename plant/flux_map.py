@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import isotonic_regression
 
-from plant.jit import njit
+from fluxproof.plant.jit import njit
 
 
 @dataclass(frozen=True, eq=False)

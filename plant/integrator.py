@@ -10,8 +10,8 @@ exactly; only the resistive drop and the shaft are approximated):
 import math
 from typing import NamedTuple
 
-from plant.jit import njit
-from plant.pmsm import currents_from_flux, harmonic_flux
+from fluxproof.plant.jit import njit
+from fluxproof.plant.pmsm import currents_from_flux, harmonic_flux
 
 
 class Drive(NamedTuple):

@@ -13,7 +13,7 @@ resistance r:  u = v - r i, from the negative rail.
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from plant.jit import njit
+from fluxproof.plant.jit import njit
 
 
 @dataclass(frozen=True)

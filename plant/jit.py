@@ -24,9 +24,20 @@ def _source_hash():
     return digest.hexdigest()[:16]
 
 
+def _cache_root():
+    """build/ of a checkout; for an installed package the user's cache folder, else the temporary one."""
+    if (PACKAGE.parent / "pyproject.toml").is_file() and os.access(PACKAGE.parent, os.W_OK):
+        return PACKAGE.parent / "build"
+    try:
+        cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "fluxproof"
+        cache.mkdir(parents=True, exist_ok=True)
+    except (OSError, RuntimeError):  # read-only, or a user without a home
+        return Path(tempfile.gettempdir()) / "fluxproof"
+    return cache
+
+
 SOURCE_HASH = _source_hash()
-_ROOT = PACKAGE.parent / "build" if os.access(PACKAGE.parent, os.W_OK) else Path(tempfile.gettempdir())
-CACHE_DIR = _ROOT / "numba" / SOURCE_HASH
+CACHE_DIR = _cache_root() / "numba" / SOURCE_HASH
 
 
 def njit(function):

@@ -3,13 +3,13 @@
 import math
 from typing import NamedTuple
 
-from plant import layout as L
-from plant.integrator import Drive, observe, rk4_step
-from plant.inverter import InverterParams
-from plant.jit import njit
-from plant.mechanics import FREE, MechanicsParams, shaft_drive, stop_at_zero
-from plant.pmsm import MachineParams, magnet_flux
-from plant.transforms import clarke, inverse_clarke, phase_matrix
+from fluxproof.plant import layout as L
+from fluxproof.plant.integrator import Drive, observe, rk4_step
+from fluxproof.plant.inverter import InverterParams
+from fluxproof.plant.jit import njit
+from fluxproof.plant.mechanics import FREE, MechanicsParams, shaft_drive, stop_at_zero
+from fluxproof.plant.pmsm import MachineParams, magnet_flux
+from fluxproof.plant.transforms import clarke, inverse_clarke, phase_matrix
 
 
 class PlantParams(NamedTuple):

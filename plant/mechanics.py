@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from plant.jit import njit
+from fluxproof.plant.jit import njit
 
 FREE = 0
 IMPOSED_SPEED = 1

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from plant.jit import njit
+from fluxproof.plant.jit import njit
 
 
 @njit

@@ -30,8 +30,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from plant.flux_map import FluxMap, map_currents, map_flux
-from plant.jit import njit
+from fluxproof.plant.flux_map import FluxMap, map_currents, map_flux
+from fluxproof.plant.jit import njit
 
 LINEAR = 0
 SATURATED = 1

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from plant.jit import njit
+from fluxproof.plant.jit import njit
 
 
 @dataclass(frozen=True)

@@ -7,12 +7,12 @@ at which a conducting leg reaches zero is located by root finding.  A blocked
 leg is released in the sub-step in which it could no longer be kept at zero.
 """
 
-from plant import layout as L
-from plant.inverter import switched_leg
-from plant.jit import njit
-from plant.kernel import accept, clear_means, refresh, sources, try_step
-from plant.mechanics import IMPOSED_SPEED
-from plant.transforms import clarke, inverse_clarke
+from fluxproof.plant import layout as L
+from fluxproof.plant.inverter import switched_leg
+from fluxproof.plant.jit import njit
+from fluxproof.plant.kernel import accept, clear_means, refresh, sources, try_step
+from fluxproof.plant.mechanics import IMPOSED_SPEED
+from fluxproof.plant.transforms import clarke, inverse_clarke
 
 ZERO_CURRENT_A = 1e-7  # smaller is zero: far below any sensor, far above rounding
 _SHORTEST_S = 1e-13  # a remainder this short is dropped

@@ -2,7 +2,7 @@
 
 import math
 
-from plant.jit import njit
+from fluxproof.plant.jit import njit
 
 SQRT3 = math.sqrt(3.0)
 

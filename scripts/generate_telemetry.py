@@ -8,14 +8,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from golden_model import formats
-from golden_model.block import Port
-from golden_model.fixed import Format
-from golden_model.io import telemetry_words as packet
-from golden_model.units import UNITS
+from fluxproof.golden_model import formats
+from fluxproof.golden_model.block import Port
+from fluxproof.golden_model.fixed import Format
+from fluxproof.golden_model.io import telemetry_words as packet
+from fluxproof.golden_model.units import UNITS
 
 ROOT = Path(__file__).resolve().parent.parent
-ENTITY = ROOT / "rtl" / "io" / "telemetry_words.vhd"
+ENTITY = ROOT / "rtl" / "generated" / "telemetry_words.vhd"
 DOCUMENT = ROOT / "docs" / "telemetry.md"
 BEGIN, END = "<!-- packet: written by `make generate` -->\n", "<!-- end of packet -->\n"
 

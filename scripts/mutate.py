@@ -1,96 +1,82 @@
-"""`make mutate`: plants the defects of scripts/mutants.py in copies of the RTL, one by one; the suite must notice.
+"""`make mutate`: plants the defects of scripts/mutants.py in copies of the RTL, one by one; the tests must notice.
 
-A block's mutant faces that block's bench, with every configuration; a mutant of the top faces the faults and the
-closed loop; one of the registers faces their traffic on the bus; see OWN_BENCH for what surrounds the core.
-Writes build/mutate/result.json.  Exit status 1 when one survives.
+Each copy is named to the tests by $FLUXPROOF_RTL.  A block's defect is judged by that block's bench with every
+configuration; TESTS lists who judges the files that have no bench of that kind.
+Writes build/mutate/result.json.  Exit status 1 when a defect is not noticed.
 """
 
 from __future__ import annotations
 
 import argparse
 import os
+import re
 import shutil
+import subprocess
 import sys
 import time
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
 
-from cocotb_tests import dut_faults, dut_registers, simulate
-from golden_model.registry import BLOCKS
-from scripts.files import BUILD, ROOT, write_json
+from fluxproof.checkout import BUILD, ROOT
+from fluxproof.files import write_json
+from fluxproof.golden_model.registry import BLOCKS
 from scripts.mutants import MUTANTS
 
 FOLDER = BUILD / "mutate"
-DRIVE = ROOT / "docs" / "drives" / "paper001.toml"
+REGISTERS = ["cocotb_tests/blocks/test_registers_axi.py::test_axi_slave_equals_its_twin"]
+TOP = [
+    "cocotb_tests/core/test_faults.py::test_tour_in_ghdl",
+    "cocotb_tests/core/test_closed_loop.py::test_everything_at_once",
+]
+# File below rtl/, without its folder and suffix -> the tests that notice a defect in it; others: the block's bench.
+TESTS = {
+    **dict.fromkeys(("axi_lite_slave", "register_access", "register_file", "register_map_pkg"), REGISTERS),
+    "fluxproof": TOP,
+    "power_stage": ["cocotb_tests/blocks/test_power_stage.py"],
+    "fluxproof_axi": ["cocotb_tests/core/test_axi_top.py"],
+}
+WHY = re.compile(r"^E\s+(?:AssertionError: )?(.*\S)", re.MULTILINE)
 
 
 def plant(number: int) -> Path:
-    """A copy of the RTL with one defect; ValueError where its text does not stand exactly once."""
+    """A copy of the RTL with one defect; ValueError where its text is not there exactly once."""
     name, file, old, new = MUTANTS[number]
-    tree = FOLDER / f"{number:02d}"
+    tree = FOLDER / f"{number:03d}"
     shutil.rmtree(tree, ignore_errors=True)
     shutil.copytree(ROOT / "rtl", tree)
     text = (tree / file).read_text()
     if text.count(old) != 1:
-        raise ValueError(
-            f"mutant '{name}': its text stands {text.count(old)} times in rtl/{file}, expected once"
-        )
+        raise ValueError(f"mutant '{name}': its text occurs {text.count(old)} times in rtl/{file}, not once")
     (tree / file).write_text(text.replace(old, new))
     return tree
 
 
-# Entities whose bench is their own: {entity: (cocotb module, generics, environment)}.
-OWN_BENCH = {
-    "power_stage": ("cocotb_tests.dut_power_stage", {}, {}),
-    "fluxproof_axi": (
-        "cocotb_tests.dut_axi_loop",
-        {"CARRIER_HALF": 128, "CLOCK_HZ": 2_560_000},
-        {"FLUXPROOF_DRIVE": str(DRIVE), "FLUXPROOF_CARRIER_HALF": "128", "FLUXPROOF_CLOCK_HZ": "2560000"},
-    ),
-}
-
-
-def runs(file: str):
-    """(toplevel, cocotb module, generics, environment) of every run that may notice a defect in ``file``."""
+def tests_of(file: str) -> list[str]:
+    """What pytest runs to judge a defect in this file of rtl/."""
     name = Path(file).stem
-    if name in ("axi_lite_slave", "register_access", "register_file", "register_map_pkg"):
-        yield dut_registers.RUN
-        return
-    if name == "fluxproof":
-        environment = {
-            "FLUXPROOF_DRIVE": str(DRIVE),
-            "FLUXPROOF_CARRIER_HALF": "128",
-            "FLUXPROOF_SCENARIO": "everything",
-        }
-        yield name, "cocotb_tests.dut_faults", {"CARRIER_HALF": dut_faults.CARRIER_HALF}, {}
-        yield name, "cocotb_tests.dut_loop", {"CARRIER_HALF": 128}, environment
-        return
-    if name in OWN_BENCH:
-        yield name, *OWN_BENCH[name]
-        return
-    block = BLOCKS[name]
-    for k, config in enumerate(block.configs):
-        environment = {"FLUXPROOF_BLOCK": name, "FLUXPROOF_CONFIG": str(k), "FLUXPROOF_SEED": "1"}
-        yield name, "cocotb_tests.dut_bench", dict(config), environment
+    if name in TESTS:
+        return TESTS[name]
+    bench = "cocotb_tests/blocks/test_blocks.py::test_rtl_equals_model"
+    return [f"{bench}[{name}-{k}]" for k in range(len(BLOCKS[name].configs))]
 
 
 def judge(number: int) -> dict:
-    """Run the suite against one mutant; ``killed`` and what noticed it."""
+    """Run the tests against one mutant; ``killed`` and what noticed it."""
     name, file, _old, _new = MUTANTS[number]
-    verdict = {"mutant": name, "file": f"rtl/{file}", "killed": False, "by": None}
     tree = plant(number)
-    for toplevel, module, generics, environment in runs(file):
-        try:
-            folder = simulate.run(toplevel, module, generics, environment, rtl=tree)
-        except simulate.BuildError as error:
-            # A defect that does not even compile proves nothing about the tests.
-            return verdict | {"by": str(error), "invalid": True}
-        problem = simulate.failure(folder)
-        shutil.rmtree(folder, ignore_errors=True)
-        if problem is not None:
-            shutil.rmtree(tree, ignore_errors=True)
-            first = next((line for line in problem.splitlines() if line.strip()), "failed")
-            return verdict | {"killed": True, "by": first[:200]}
+    command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", *tests_of(file)]
+    environment = {**os.environ, "FLUXPROOF_RTL": str(tree)}
+    done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True)
+    verdict = {"mutant": name, "file": f"rtl/{file}", "killed": done.returncode == 1, "by": None}
+    if done.returncode not in (0, 1):
+        words = done.stdout[-2000:] + done.stderr[-500:]
+        raise RuntimeError(f"mutant '{name}': pytest could not run its tests:\n{words}")
+    if verdict["killed"]:
+        found = WHY.search(done.stdout)
+        verdict["by"] = found[1][:200] if found else "a test failed"
+        if "BuildError" in done.stdout:  # a defect that does not even compile says nothing about the tests
+            verdict |= {"killed": False, "invalid": True}
+    shutil.rmtree(tree, ignore_errors=True)
     return verdict
 
 
@@ -101,7 +87,7 @@ def main() -> int:
     arguments = parser.parse_args()
     chosen = [n for n, m in enumerate(MUTANTS) if not arguments.only or arguments.only in m[0] + m[1]]
     began, verdicts = time.monotonic(), []
-    with ProcessPoolExecutor(arguments.jobs) as pool:
+    with ThreadPoolExecutor(arguments.jobs) as pool:
         for done, future in enumerate(as_completed([pool.submit(judge, n) for n in chosen]), 1):
             verdict = future.result()
             verdicts.append(verdict)

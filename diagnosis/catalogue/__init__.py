@@ -3,7 +3,7 @@
 import importlib
 import pkgutil
 
-from diagnosis.effect import Effect
+from fluxproof.diagnosis.effect import Effect
 
 
 def _found() -> dict[str, Effect]:

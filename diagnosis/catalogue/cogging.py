@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from diagnosis.effect import Effect, Parameter, rated_torque
-from diagnosis.result import Estimate
-from diagnosis.torque_order import repeating_order
+from fluxproof.diagnosis.effect import Effect, Parameter, rated_torque
+from fluxproof.diagnosis.result import Estimate
+from fluxproof.diagnosis.torque_order import repeating_order
 
 
 def _seen(view, h):

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from diagnosis.effect import DOUBT, Effect, Parameter, current_error, sigma
-from diagnosis.result import Estimate
+from fluxproof.diagnosis.effect import DOUBT, Effect, Parameter, current_error, sigma
+from fluxproof.diagnosis.result import Estimate
 
 # Two sensors that differ by g turn the vector by 0.29 g where they make a wave of 0.58 g; twice that for good measure.
 MOST_TURN = 1 / 3

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from diagnosis.effect import Effect, Parameter, current_error
-from diagnosis.result import Estimate
+from fluxproof.diagnosis.effect import Effect, Parameter, current_error
+from fluxproof.diagnosis.result import Estimate
 
 PHASES = "abc"
 

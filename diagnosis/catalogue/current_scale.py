@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from diagnosis.catalogue.current_gain import gain_column
-from diagnosis.effect import Effect, Parameter, current_error, one, sigma
+from fluxproof.diagnosis.catalogue.current_gain import gain_column
+from fluxproof.diagnosis.effect import Effect, Parameter, current_error, one, sigma
 
 
 class CurrentScale(Effect):

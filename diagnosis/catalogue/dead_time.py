@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from diagnosis.effect import DOUBT, Effect, Parameter, full_loss, voltage, zero_vector_slope
-from diagnosis.result import Estimate
+from fluxproof.diagnosis.effect import DOUBT, Effect, Parameter, full_loss, voltage, zero_vector_slope
+from fluxproof.diagnosis.result import Estimate
 
 # None is so wide that it would pass for a resistance over most of the current.
 WIDTHS = (0.02, 0.12)  # of rated current: where the loss of the core has reached its full value

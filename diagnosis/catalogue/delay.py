@@ -2,9 +2,8 @@
 
 import numpy as np
 
-from diagnosis.catalogue.sampling_skew import skewed, unskewed
-from diagnosis.effect import DOUBT, Effect, Parameter, one, sigma, voltage, within_dead_time
-
+from fluxproof.diagnosis.catalogue.sampling_skew import skewed, unskewed
+from fluxproof.diagnosis.effect import DOUBT, Effect, Parameter, one, sigma, voltage, within_dead_time
 
 MOST = 1.2  # periods: past a whole one the mix goes on in a straight line, or an estimate there could not come back
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from diagnosis.effect import Effect, Parameter, flux, torque_of
-from diagnosis.result import Estimate
+from fluxproof.diagnosis.effect import Effect, Parameter, flux, torque_of
+from fluxproof.diagnosis.result import Estimate
 
 
 def _order(view, h):

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from diagnosis.effect import Effect, Parameter, angle_error
-from diagnosis.result import Estimate
+from fluxproof.diagnosis.effect import Effect, Parameter, angle_error
+from fluxproof.diagnosis.result import Estimate
 
 
 def _more(view):

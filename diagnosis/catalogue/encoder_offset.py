@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from diagnosis.effect import Effect, Parameter, angle_error, one, sigma
-from diagnosis.curves import course
+from fluxproof.diagnosis.curves import course
+from fluxproof.diagnosis.effect import Effect, Parameter, angle_error, one, sigma
 
 
 class EncoderOffset(Effect):

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from diagnosis.effect import DOUBT, Effect, Parameter, rated_torque
-from diagnosis.result import Estimate
+from fluxproof.diagnosis.effect import DOUBT, Effect, Parameter, rated_torque
+from fluxproof.diagnosis.result import Estimate
 
 
 def _drag(view, shape):

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from diagnosis.effect import FluxEffect, Parameter, one, sigma
+from fluxproof.diagnosis.effect import FluxEffect, Parameter, one, sigma
 
 LEAST = 0.08  # of rated current: a smaller one says nothing of a curve
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from diagnosis.catalogue.inductance_d import LEAST
-from diagnosis.effect import FluxEffect, Parameter, one, sigma
+from fluxproof.diagnosis.catalogue.inductance_d import LEAST
+from fluxproof.diagnosis.effect import FluxEffect, Parameter, one, sigma
 
 
 class InductanceQ(FluxEffect):

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from diagnosis.effect import FluxEffect, Parameter, one, sigma
+from fluxproof.diagnosis.effect import FluxEffect, Parameter, one, sigma
 
 
 class MagnetFlux(FluxEffect):

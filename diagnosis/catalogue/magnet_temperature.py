@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from diagnosis.effect import FluxEffect, Parameter, one, sigma
-from diagnosis.curves import COURSE_KNOTS, course, courses, step_at_start
+from fluxproof.diagnosis.curves import COURSE_KNOTS, course, courses, step_at_start
+from fluxproof.diagnosis.effect import FluxEffect, Parameter, one, sigma
 
 MOST_AT_ONCE = 4.0  # step at the start over all that changes later
 

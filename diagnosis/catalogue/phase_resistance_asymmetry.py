@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from diagnosis.catalogue.current_gain import PATTERNS
-from diagnosis.effect import Effect, Parameter, to_true_resistance, voltage
-from diagnosis.curves import course
-from diagnosis.result import Estimate
+from fluxproof.diagnosis.catalogue.current_gain import PATTERNS
+from fluxproof.diagnosis.curves import course
+from fluxproof.diagnosis.effect import Effect, Parameter, to_true_resistance, voltage
+from fluxproof.diagnosis.result import Estimate
 
 
 class PhaseResistanceAsymmetry(Effect):

@@ -1,6 +1,6 @@
 """Winding resistance other than the nameplate's: u = R i."""
 
-from diagnosis.effect import DOUBT, Effect, Parameter, one, sigma, voltage
+from fluxproof.diagnosis.effect import DOUBT, Effect, Parameter, one, sigma, voltage
 
 
 class Resistance(Effect):

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from diagnosis.effect import Effect, Parameter, one, sigma, to_true_resistance, voltage
-from diagnosis.curves import COURSE_KNOTS, course, courses, known_temperature, reference_c
+from fluxproof.diagnosis.curves import COURSE_KNOTS, course, courses, known_temperature, reference_c
+from fluxproof.diagnosis.effect import Effect, Parameter, one, sigma, to_true_resistance, voltage
 
 
 def _change(c, by_alpha):

@@ -2,8 +2,15 @@
 
 import numpy as np
 
-from diagnosis.effect import (
-    ALIKE, Effect, Parameter, angle_error, current_error, one, within_dead_time, zero_vector_slope,
+from fluxproof.diagnosis.effect import (
+    ALIKE,
+    Effect,
+    Parameter,
+    angle_error,
+    current_error,
+    one,
+    within_dead_time,
+    zero_vector_slope,
 )  # fmt: skip
 
 

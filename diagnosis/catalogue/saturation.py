@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from diagnosis.effect import FluxEffect, Parameter
-from diagnosis.result import Estimate
+from fluxproof.diagnosis.effect import FluxEffect, Parameter
+from fluxproof.diagnosis.result import Estimate
 
 
 def _q(view, shape):

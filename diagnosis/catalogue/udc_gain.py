@@ -1,6 +1,6 @@
 """The bus voltage is measured with a wrong gain: every voltage is scaled."""
 
-from diagnosis.effect import Effect, Parameter, one, sigma, voltage
+from fluxproof.diagnosis.effect import Effect, Parameter, one, sigma, voltage
 
 
 class UdcGain(Effect):

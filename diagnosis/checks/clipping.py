@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from diagnosis.checks.runs import mark, quantum, runs_of_equal
-from diagnosis.recording import Problem
+from fluxproof.diagnosis.checks.runs import mark, quantum, runs_of_equal
+from fluxproof.diagnosis.recording import Problem
 
 STAGE = "signals"
 LEAST = 3  # rows

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from diagnosis.checks.agreement import wrapped
-from diagnosis.recording import Problem
+from fluxproof.diagnosis.checks.agreement import wrapped
+from fluxproof.diagnosis.recording import Problem
 
 STAGE = "complete"
 SPEED_ROWS = 32  # over which an angle is differentiated: an encoder's code at one row tells no speed

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from diagnosis.recording import Problem
+from fluxproof.diagnosis.recording import Problem
 
 STAGE = "signals"
 ROUNDING = 0.005  # duties of 12 bits and their rounding stay within

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from diagnosis.recording import Problem
+from fluxproof.diagnosis.recording import Problem
 
 STAGE = "values"
 ABSURD = 1e9  # no canonical column comes near it; an overflow or a wrong format does

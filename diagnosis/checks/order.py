@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from diagnosis.checks.missing import keep_rows
-from diagnosis.recording import Problem
+from fluxproof.diagnosis.checks.missing import keep_rows
+from fluxproof.diagnosis.recording import Problem
 
 STAGE = "time"
 RESTART_STEPS = 100  # a step back by more is a clock that began again, by less a row out of place

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from diagnosis.checks.agreement import angle_speed_ratio
-from diagnosis.checks.balance import BETTER, FIT, Rows, misfit, rows_of, tells
-from diagnosis.recording import Problem
+from fluxproof.diagnosis.checks.agreement import angle_speed_ratio
+from fluxproof.diagnosis.checks.balance import BETTER, FIT, Rows, misfit, rows_of, tells
+from fluxproof.diagnosis.recording import Problem
 
 STAGE = "geometry"
 SMALL = 0.03  # of the voltage: less cannot be told from noise

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from diagnosis.checks.agreement import wrapped
-from diagnosis.recording import Problem
+from fluxproof.diagnosis.checks.agreement import wrapped
+from fluxproof.diagnosis.recording import Problem
 
 STAGE = "signals"
 CLEAR = 10.0  # times the usual scatter of the angle's steps

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from diagnosis.checks.agreement import angle_speed_ratio
-from diagnosis.recording import Problem
+from fluxproof.diagnosis.checks.agreement import angle_speed_ratio
+from fluxproof.diagnosis.recording import Problem
 
 STAGE = "time"
 TOLERANCE = 0.02  # of the sample time: the clock of a logger is better, another sample time is not

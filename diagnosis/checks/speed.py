@@ -6,9 +6,9 @@ balance does not confirm and that turns at quite another rate than the speed lea
 
 from __future__ import annotations
 
-from diagnosis.checks.agreement import angle_speed_ratio
-from diagnosis.checks.balance import FIT, misfit, rows_of, tells
-from diagnosis.recording import Problem
+from fluxproof.diagnosis.checks.agreement import angle_speed_ratio
+from fluxproof.diagnosis.checks.balance import FIT, misfit, rows_of, tells
+from fluxproof.diagnosis.recording import Problem
 
 STAGE = "geometry"
 LARGE = 0.05  # a speed estimate may lag or be scaled; more is another quantity

@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from diagnosis.checks.agreement import wrapped
-from diagnosis.checks.runs import mark, runs_of_equal
-from diagnosis.recording import Problem
+from fluxproof.diagnosis.checks.agreement import wrapped
+from fluxproof.diagnosis.checks.runs import mark, runs_of_equal
+from fluxproof.diagnosis.recording import Problem
 
 STAGE = "signals"
 LEAST = 50  # rows

@@ -10,9 +10,9 @@ import math
 
 import numpy as np
 
-from diagnosis.checks.agreement import angle_speed_ratio
-from diagnosis.checks.balance import BETTER, FIT, misfit, rows_of, tells
-from diagnosis.recording import Problem
+from fluxproof.diagnosis.checks.agreement import angle_speed_ratio
+from fluxproof.diagnosis.checks.balance import BETTER, FIT, misfit, rows_of, tells
+from fluxproof.diagnosis.recording import Problem
 
 STAGE = "units"
 TURN = 2.0 * math.pi

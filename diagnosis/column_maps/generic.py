@@ -4,8 +4,8 @@ ControlDesk names a variable by its path in the model ("Model Root/Current contr
 last part such as Out1 does not.  Only names that can mean one thing are here.
 """
 
-from diagnosis.column_maps import last_part as KEY  # noqa: F401
-from diagnosis.recording import COLUMNS as CANONICAL
+from fluxproof.diagnosis.column_maps import last_part as KEY  # noqa: F401
+from fluxproof.diagnosis.recording import COLUMNS as CANONICAL
 
 NAME = "common names"
 SIGNATURE = set()

@@ -5,7 +5,7 @@ bus_V, motor_temp_C; BldcServoControl: d_V, q_V) and docs/protocol/registers.  P
 the output shaft: with a gear, give the motor's speed by [columns] instead.
 """
 
-from diagnosis.column_maps import last_part as KEY  # noqa: F401
+from fluxproof.diagnosis.column_maps import last_part as KEY  # noqa: F401
 
 NAME = "moteus"
 SIGNATURE = {"d_a", "q_a", "d_v", "q_v"}

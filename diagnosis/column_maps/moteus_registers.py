@@ -4,7 +4,7 @@ Source: github.com/mjbots/moteus, the register list of its protocol: velocity in
 second, D_CURRENT, Q_CURRENT [A], VOLTAGE (bus), VOLTAGE_DQ_D, VOLTAGE_DQ_Q [V], MOTOR_TEMPERATURE [degC].
 """
 
-from diagnosis.column_maps import last_part as KEY  # noqa: F401
+from fluxproof.diagnosis.column_maps import last_part as KEY  # noqa: F401
 
 NAME = "moteus registers"
 SIGNATURE = {"d_current", "q_current", "velocity"}

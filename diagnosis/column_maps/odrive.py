@@ -5,7 +5,7 @@ the integrators of the current controllers, equal to the voltage at steady opera
 log over USB can show.  vel_estimate and pos_vel_mapper.vel are turns of the shaft a second.
 """
 
-from diagnosis.column_maps import last_part as KEY  # noqa: F401
+from fluxproof.diagnosis.column_maps import last_part as KEY  # noqa: F401
 
 NAME = "ODrive"
 SIGNATURE = {"iq_measured", "id_measured"}

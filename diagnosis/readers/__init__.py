@@ -17,9 +17,9 @@ import sys
 import warnings
 from pathlib import Path
 
-from diagnosis.readers.memory import limited_memory
-from diagnosis.readers.table import Select, Table, shown
-from diagnosis.recording import RecordingError
+from fluxproof.diagnosis.readers.memory import limited_memory
+from fluxproof.diagnosis.readers.table import Select, Table, shown
+from fluxproof.diagnosis.recording import RecordingError
 
 HEAD_BYTES = 4096
 

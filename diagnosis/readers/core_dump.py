@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from diagnosis.readers.table import Table, chosen
+from fluxproof.diagnosis.readers.table import Table, chosen
 
 FORMAT = "telemetry dump"
 SUFFIXES = (".dump",)
@@ -10,7 +10,7 @@ SUFFIXES = (".dump",)
 
 def matches(head: bytes, path) -> bool:
     try:
-        from diagnosis import telemetry
+        from fluxproof.diagnosis import telemetry
     except ImportError:
         return False
     try:
@@ -21,7 +21,7 @@ def matches(head: bytes, path) -> bool:
 
 def read(path, select=None) -> Table:
     """The canonical columns that the dump's words stand for; registers and raw codes in ``meta``."""
-    from diagnosis import telemetry
+    from fluxproof.diagnosis import telemetry
 
     columns, meta = telemetry.read_dump(path)
     names = chosen(dict.fromkeys(columns, ""), select, path)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from diagnosis.readers.table import Table, chosen, row_limit, too_long
-from diagnosis.recording import RecordingError
+from fluxproof.diagnosis.readers.table import Table, chosen, row_limit, too_long
+from fluxproof.diagnosis.recording import RecordingError
 
 FORMAT = "Parquet"
 SUFFIXES = (".parquet", ".pq")

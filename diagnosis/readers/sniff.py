@@ -12,7 +12,7 @@ import re
 from collections import Counter
 from dataclasses import dataclass
 
-from diagnosis.recording import RecordingError
+from fluxproof.diagnosis.recording import RecordingError
 
 SNIFF_BYTES = 1 << 18
 SNIFF_LINES = 500

@@ -10,9 +10,9 @@ import re
 
 import numpy as np
 
-from diagnosis.readers.sniff import sniff
-from diagnosis.readers.table import Table, chosen, row_limit, shown, too_long
-from diagnosis.recording import Problem, RecordingError
+from fluxproof.diagnosis.readers.sniff import sniff
+from fluxproof.diagnosis.readers.table import Table, chosen, row_limit, shown, too_long
+from fluxproof.diagnosis.recording import Problem, RecordingError
 
 FORMAT = "text"
 SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".asc", ".log")

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from diagnosis.report import theme
-from diagnosis.report.maps import LeftOut, length
+from fluxproof.diagnosis.report import theme
+from fluxproof.diagnosis.report.maps import LeftOut, length
 
 POINTS = 300  # along the time axis: about one for each pixel of a phone
 WHEN = {"before": theme.BEFORE, "after": theme.AFTER}

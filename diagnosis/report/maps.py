@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.colors import Normalize
 from scipy.stats import binned_statistic_2d
 
-from diagnosis.report import theme
+from fluxproof.diagnosis.report import theme
 
 CELLS = (28, 24, 20, 16, 13, 10)  # along each axis, finest first; with 28 a cell is 4 pixels wide on a phone
 FILLED = 0.9  # of what the coarsest cells fill: finer ones would show stripes between the operating points

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from diagnosis.recording import COLUMNS
-from diagnosis.report import theme
-from diagnosis.report.maps import LeftOut
+from fluxproof.diagnosis.recording import COLUMNS
+from fluxproof.diagnosis.report import theme
+from fluxproof.diagnosis.report.maps import LeftOut
 
 POINTS = 300  # rows of the close-up, and about the pixels of a phone
 MOST_COLUMNS = 6

@@ -10,10 +10,10 @@ from types import SimpleNamespace
 
 import jinja2
 
-from diagnosis.improved_core import core_values
-from diagnosis.improved_plant import merged, plant_of
-from diagnosis.nominal import SECTIONS
-from diagnosis.report import pictures, words
+from fluxproof.diagnosis.improved_core import core_values
+from fluxproof.diagnosis.improved_plant import merged, plant_of
+from fluxproof.diagnosis.nominal import SECTIONS
+from fluxproof.diagnosis.report import pictures, words
 
 FOLDER = Path(__file__).resolve().parent
 MOST_PROBLEMS = 60

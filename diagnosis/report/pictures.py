@@ -7,8 +7,8 @@ import warnings
 import matplotlib as mpl
 import numpy as np
 
-from diagnosis.report import lines, maps, overlay, theme
-from diagnosis.report.maps import LeftOut
+from fluxproof.diagnosis.report import lines, maps, overlay, theme
+from fluxproof.diagnosis.report.maps import LeftOut
 
 # name: (function of the block means, arrays it cannot do without, what the reader knows it by)
 BLOCKS = ("before_d", "before_q")

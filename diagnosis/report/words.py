@@ -6,7 +6,7 @@ import dataclasses
 import math
 from types import SimpleNamespace
 
-from diagnosis.catalogue import CATALOGUE
+from fluxproof.diagnosis.catalogue import CATALOGUE
 
 # verdict: (mood, what it means); the mood is the colour, and the word beside it says the same.
 VERDICTS = {

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from diagnosis.report import page
-from scripts.files import write_json, write_text
+from fluxproof.diagnosis.report import page
+from fluxproof.files import write_json, write_text
 
 # Keys whose number may be unknown or open-ended; null in the schema too.  Elsewhere NaN is a fault of ours.
 MAY_BE_NULL = frozenset(

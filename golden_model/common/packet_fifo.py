@@ -7,9 +7,9 @@ Formats: as they come.  The RAM holds 2**DEPTH_BITS words, its own and the outpu
 
 from typing import NamedTuple
 
-from golden_model.block import Block, Port
-from golden_model.fixed import Format
-from golden_model.formats import BIT
+from fluxproof.golden_model.block import Block, Port
+from fluxproof.golden_model.fixed import Format
+from fluxproof.golden_model.formats import BIT
 
 
 class State(NamedTuple):

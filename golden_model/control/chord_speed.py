@@ -12,10 +12,10 @@ Formats: omega_me**2 U(3,14), k_chord U(-6,23), their product U(-3,20), each hal
 PU.  No saturation: k_chord*omega_me**2 < 1/16, so the result is closer to zero than omega_me and keeps its sign.
 """
 
-from golden_model.block import Block, Port
-from golden_model.fixed import Format, round_half_up
-from golden_model.formats import PU
-from golden_model.kernel import kernel
+from fluxproof.golden_model.block import Block, Port
+from fluxproof.golden_model.fixed import Format, round_half_up
+from fluxproof.golden_model.formats import PU
+from fluxproof.golden_model.kernel import kernel
 
 SQUARE = Format(0, 3, 14)
 K_CHORD = Format(0, -6, 23)

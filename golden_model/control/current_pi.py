@@ -16,10 +16,10 @@ sum exact, rounded half up to PU and saturated, again twice the limiter's.
 
 from typing import NamedTuple
 
-from golden_model.block import Block, Port
-from golden_model.fixed import Format, round_sat, saturate
-from golden_model.formats import BIT, INTEGRAL, INTEGRAL_W, KI, KP, PU, PU_TO_INTEGRAL, PU_W
-from golden_model.kernel import kernel
+from fluxproof.golden_model.block import Block, Port
+from fluxproof.golden_model.fixed import Format, round_sat, saturate
+from fluxproof.golden_model.formats import BIT, INTEGRAL, INTEGRAL_W, KI, KP, PU, PU_TO_INTEGRAL, PU_W
+from fluxproof.golden_model.kernel import kernel
 
 PROPORTIONAL = Format(1, 3, 28)
 PROPORTIONAL_W = PROPORTIONAL.width

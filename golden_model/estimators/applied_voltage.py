@@ -15,12 +15,12 @@ Saturation: none for compare values up to CARRIER_HALF, |u_applied| <= 2/3*u_dc 
 
 import math
 
-from golden_model.block import Block, Const, Port
-from golden_model.fixed import Format, round_half_up, round_sat
-from golden_model.formats import BIT, FLUX, FLUX_W, U_DC
-from golden_model.io.u_dc_processing import U_DC_MIN
-from golden_model.kernel import kernel
-from golden_model.modulation.pwm_compare import COUNT
+from fluxproof.golden_model.block import Block, Const, Port
+from fluxproof.golden_model.fixed import Format, round_half_up, round_sat
+from fluxproof.golden_model.formats import BIT, FLUX, FLUX_W, U_DC
+from fluxproof.golden_model.io.u_dc_processing import U_DC_MIN
+from fluxproof.golden_model.kernel import kernel
+from fluxproof.golden_model.modulation.pwm_compare import COUNT
 
 K_FRAC = 16  # fraction bits of 2**SHIFT/CARRIER_HALF
 SCALE = Format(0, 2, 22)

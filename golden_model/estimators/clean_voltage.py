@@ -13,11 +13,11 @@ the largest voltage, 1.34, and the largest leg voltage, 0.5*4/3, cannot quite ex
 
 from typing import NamedTuple
 
-from golden_model.block import Block, Port
-from golden_model.control.dead_time_compensation import S_ALPHA, S_BETA
-from golden_model.fixed import round_half_up, saturate
-from golden_model.formats import FLUX, FLUX_W, PU, V_LEG
-from golden_model.kernel import kernel
+from fluxproof.golden_model.block import Block, Port
+from fluxproof.golden_model.control.dead_time_compensation import S_ALPHA, S_BETA
+from fluxproof.golden_model.fixed import round_half_up, saturate
+from fluxproof.golden_model.formats import FLUX, FLUX_W, PU, V_LEG
+from fluxproof.golden_model.kernel import kernel
 
 DROP = PU.frac_bits + V_LEG.frac_bits - FLUX.frac_bits
 

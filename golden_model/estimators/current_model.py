@@ -10,11 +10,11 @@ Formats: model with one bit more than FLUX; sum rounded half up to FLUX.
 Saturation: at 2 per unit of flux, twice what full voltage makes at base speed; told by ``model_limited``.
 """
 
-from golden_model.block import Block, Port
-from golden_model.estimators.flux_models import MODEL, RAISED_DQ
-from golden_model.fixed import exceeds, round_half_up, saturate
-from golden_model.formats import BIT, FLUX, FLUX_W
-from golden_model.kernel import kernel
+from fluxproof.golden_model.block import Block, Port
+from fluxproof.golden_model.estimators.flux_models import MODEL, RAISED_DQ
+from fluxproof.golden_model.fixed import exceeds, round_half_up, saturate
+from fluxproof.golden_model.formats import BIT, FLUX, FLUX_W
+from fluxproof.golden_model.kernel import kernel
 
 
 @kernel

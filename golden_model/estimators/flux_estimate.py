@@ -12,11 +12,11 @@ Saturation: at 2 per unit of flux, twice what full voltage makes at base speed; 
 which also tells of a merged flux at its end.
 """
 
-from golden_model.block import Block, Port
-from golden_model.estimators.flux_models import CHOSEN, MODEL
-from golden_model.fixed import exceeds, saturate
-from golden_model.formats import BIT, PU, PU_TO_FLUX, PU_W
-from golden_model.kernel import kernel
+from fluxproof.golden_model.block import Block, Port
+from fluxproof.golden_model.estimators.flux_models import CHOSEN, MODEL
+from fluxproof.golden_model.fixed import exceeds, saturate
+from fluxproof.golden_model.formats import BIT, PU, PU_TO_FLUX, PU_W
+from fluxproof.golden_model.kernel import kernel
 
 
 @kernel

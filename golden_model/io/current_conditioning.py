@@ -6,10 +6,10 @@ Saturation: |code - offset| < 2 and |gain| <= 2 can reach 4 per unit; beyond 2 t
 which no sensor does that is scaled to its base.
 """
 
-from golden_model.block import Block, Port
-from golden_model.fixed import Format, round_sat
-from golden_model.formats import CODE, GAIN, PU, PU_W
-from golden_model.kernel import kernel
+from fluxproof.golden_model.block import Block, Port
+from fluxproof.golden_model.fixed import Format, round_sat
+from fluxproof.golden_model.formats import CODE, GAIN, PU, PU_W
+from fluxproof.golden_model.kernel import kernel
 
 DROP = CODE.frac_bits + GAIN.frac_bits - PU.frac_bits
 

@@ -15,11 +15,11 @@ Formats: bits.
 
 from typing import NamedTuple
 
-from golden_model.block import Block, Port
-from golden_model.fixed import Format
-from golden_model.formats import BIT
-from golden_model.kernel import kernel
-from golden_model.io.sample_checks import CHECKS, IGNORE
+from fluxproof.golden_model.block import Block, Port
+from fluxproof.golden_model.fixed import Format
+from fluxproof.golden_model.formats import BIT
+from fluxproof.golden_model.io.sample_checks import CHECKS, IGNORE
+from fluxproof.golden_model.kernel import kernel
 
 FLAGS = Format(0, 9, 0)
 FAULTS = Format(0, 8, 0)  # all that can trip

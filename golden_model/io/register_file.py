@@ -1,4 +1,4 @@
-"""The registers behind the bus, one transaction at a time: twin of rtl/io/register_file.vhd and register_access.vhd.
+"""The registers behind the bus, one transaction at a time: twin of generated/register_file.vhd and register_access.vhd.
 
 A write counts or is refused as a whole; the answer says which (OKAY, SLVERR, DECERR of AXI4).  When it counts is
 the RTL's matter (see register_map.Kind); this model is told of a sample by ``sample()``.
@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from golden_model.fluxproof import Registers
-from golden_model.io.register_map import (
+from fluxproof.golden_model.fluxproof import Registers
+from fluxproof.golden_model.io.register_map import (
     ADDRESS_BITS,
     DECERR,
     GENERICS,

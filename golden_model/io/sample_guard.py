@@ -12,10 +12,10 @@ Formats: clocks.  The age starts anew with the reset.
 
 from typing import NamedTuple
 
-from golden_model.block import Block, Port
-from golden_model.fixed import Format
-from golden_model.formats import BIT
-from golden_model.kernel import kernel
+from fluxproof.golden_model.block import Block, Port
+from fluxproof.golden_model.fixed import Format
+from fluxproof.golden_model.formats import BIT
+from fluxproof.golden_model.kernel import kernel
 
 AGE = Format(0, 20, 0)
 COUNT = Format(0, 8, 0)

@@ -15,10 +15,10 @@ ends the import with the word's name.
 
 from typing import NamedTuple
 
-from golden_model import fluxproof
-from golden_model.block import Block, Port
-from golden_model.fixed import Format
-from golden_model.io import sample_latch
+from fluxproof.golden_model import fluxproof
+from fluxproof.golden_model.block import Block, Port
+from fluxproof.golden_model.fixed import Format
+from fluxproof.golden_model.io import sample_latch
 
 VERSION = 1
 MAGIC = 0x4650  # "FP"
@@ -186,6 +186,7 @@ def sized(name):
 BLOCK = Block(
     name="telemetry_words",
     folder="io",
+    generated=True,
     paper="none: what a recording needs",
     step=step,
     inputs=(

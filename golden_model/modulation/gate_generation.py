@@ -16,11 +16,11 @@ Compare values, dead time and minimum pulse are taken over at the valley only, w
 
 from typing import NamedTuple
 
-from golden_model.block import Block, Port
-from golden_model.fixed import Format
-from golden_model.formats import BIT
-from golden_model.kernel import kernel
-from golden_model.modulation.pwm_compare import CLOCKS, COUNT
+from fluxproof.golden_model.block import Block, Port
+from fluxproof.golden_model.fixed import Format
+from fluxproof.golden_model.formats import BIT
+from fluxproof.golden_model.kernel import kernel
+from fluxproof.golden_model.modulation.pwm_compare import CLOCKS, COUNT
 
 LEGS = Format(0, 3, 0)
 

@@ -10,10 +10,10 @@ what the sensor can measure, and currents that sum to zero give no component bey
 
 import math
 
-from golden_model.block import Block, Const, Port
-from golden_model.fixed import Format, clamp, round_half_up
-from golden_model.formats import PU, VECTOR
-from golden_model.kernel import kernel
+from fluxproof.golden_model.block import Block, Const, Port
+from fluxproof.golden_model.fixed import Format, clamp, round_half_up
+from fluxproof.golden_model.formats import PU, VECTOR
+from fluxproof.golden_model.kernel import kernel
 
 THIRD = Const(1 / 3, Format(0, -1, 18))
 INV_SQRT3 = Const(1 / math.sqrt(3), Format(0, 0, 17))

@@ -10,10 +10,10 @@ need no limit behind the adder.
 
 import math
 
-from golden_model.block import Block, Port
-from golden_model.fixed import round_half_up
-from golden_model.formats import PU, TRIG, TRIG_ONE, VECTOR
-from golden_model.kernel import kernel
+from fluxproof.golden_model.block import Block, Port
+from fluxproof.golden_model.fixed import round_half_up
+from fluxproof.golden_model.formats import PU, TRIG, TRIG_ONE, VECTOR
+from fluxproof.golden_model.kernel import kernel
 
 DROP = TRIG.frac_bits
 

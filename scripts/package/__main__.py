@@ -15,10 +15,9 @@ from pathlib import Path
 
 from lxml import etree
 
-from scripts.files import BUILD
+from fluxproof.checkout import BUILD, ROOT
 from scripts.package import ipxact, packaged
 from scripts.package.axi_top import TOP
-from scripts.sources import ROOT
 
 BESIDE = ("LICENSE", "docs/software")  # what software needs, and may do, with the core
 

@@ -1,4 +1,4 @@
-"""Writes rtl/fluxproof_axi.vhd: the core, its registers, its telemetry and the power stage's pins, wired by name.
+"""Writes generated/fluxproof_axi.vhd: the core, its registers, its telemetry and the power stage's pins, wired by name.
 
 A port of one instance meets the port of the same name of another; RENAMED lists the exceptions.  Whatever stays
 without a driver is an error, so a register or status value added to the core needs no edit here.
@@ -8,15 +8,16 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from fluxproof.checkout import RTL
+from fluxproof.cosim.sources import rtl_sources
 from scripts.package.entity import Entity, Pin, read_entity
-from scripts.sources import RTL, rtl_sources
 
 TOP = "fluxproof_axi"
-PATH = RTL / f"{TOP}.vhd"
+PATH = RTL / "generated" / f"{TOP}.vhd"
 
 # label of the instance -> the entity's file below rtl/
 INSTANCES = {
-    "registers": "io/register_file.vhd",
+    "registers": "generated/register_file.vhd",
     "core": "fluxproof.vhd",
     "stream": "io/telemetry.vhd",
     "stage": "io/power_stage.vhd",

@@ -1,12 +1,12 @@
-"""Writes fluxproof.core for FuseSoC (CAPI2): lint, simulation, synthesis; the files are those of scripts/sources.py."""
+"""Writes fluxproof.core for FuseSoC (CAPI2): lint, simulation, synthesis; the files are those of cosim/sources.py."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
+from fluxproof.checkout import ROOT, RTL
 from scripts.package.axi_top import GENERICS, TOP, source_names
 from scripts.package.ipxact import CLOCK_CONSTRAINT, CONSTRAINTS, LIBRARY, SUMMARY, VENDOR, project_version
-from scripts.sources import ROOT, RTL
 
 PATH = ROOT / "fluxproof.core"
 

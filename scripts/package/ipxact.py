@@ -1,7 +1,7 @@
 """Writes component.xml, the IP-XACT description (IEEE 1685-2009) of fluxproof_axi that Vivado takes as it is.
 
 Ports and generics come from the VHDL entity, the memory map from the registers' SystemRDL, the files from
-scripts/sources.py.  What IEEE 1685 leaves to the tool (views, families, the form of a VHDL-2008 file) is written the
+cosim/sources.py.  What IEEE 1685 leaves to the tool (views, families, the form of a VHDL-2008 file) is written the
 way Vivado writes it.
 """
 
@@ -17,17 +17,17 @@ from peakrdl_ipxact import IPXACTExporter
 from peakrdl_ipxact.exporter import Standard
 from systemrdl import RDLCompiler
 
+from fluxproof.checkout import ROOT, RTL
 from scripts.package.axi_top import PATH as TOP_PATH
 from scripts.package.axi_top import source_names
 from scripts.package.entity import Entity, Generic, Pin, parse_entity
-from scripts.sources import ROOT, RTL
 
 SPIRIT = "http://www.spiritconsortium.org/XMLSchema/SPIRIT/1685-2009"
 XILINX = "http://www.xilinx.com"
 XSI = "http://www.w3.org/2001/XMLSchema-instance"
 
 PATH = ROOT / "component.xml"
-RDL = "io/fluxproof.rdl"  # below rtl/
+RDL = "generated/fluxproof.rdl"  # below rtl/
 CONSTRAINTS = "scripts/vivado/fluxproof.xdc"
 CLOCK_CONSTRAINT = "scripts/vivado/fluxproof_clock.xdc"  # for the core alone: Vivado makes its own for an IP
 XGUI = "xgui/fluxproof_axi.tcl"

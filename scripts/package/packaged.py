@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from fluxproof.checkout import RTL
 from scripts.package import axi_top, fusesoc_core, ipxact, xgui
-from scripts.sources import RTL
 
 
 def files(rtl: Path = RTL) -> dict[Path, str]:

@@ -1,4 +1,4 @@
-"""A generator for FuseSoC: converts the top of fluxproof.core to Verilog with GHDL 5 (scripts/verilog.py).
+"""A generator for FuseSoC: converts the top of fluxproof.core to Verilog with GHDL 5 (cosim/verilog.py).
 
 FuseSoC starts it in an empty folder with the name of a YAML file; it leaves NAME.v and a core that holds it.
 """
@@ -27,8 +27,8 @@ def main(configuration: Path) -> None:
 
     given = yaml.safe_load(configuration.read_text())
     sys.path.insert(0, given["files_root"])  # FuseSoC starts this file from anywhere
-    from scripts.sources import rtl_sources
-    from scripts.verilog import NoUsableGhdl, synthesize
+    from fluxproof.cosim.sources import rtl_sources
+    from fluxproof.cosim.verilog import NoUsableGhdl, synthesize
 
     top = given["parameters"]["top"]
     sources = rtl_sources(Path(given["files_root"]) / "rtl")

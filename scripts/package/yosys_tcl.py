@@ -15,7 +15,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from scripts.sources import ROOT
+from fluxproof.checkout import ROOT
 
 
 def link(folder: Path) -> Path:

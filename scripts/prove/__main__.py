@@ -10,13 +10,13 @@ import sys
 import time
 from concurrent.futures import ThreadPoolExecutor, as_completed
 
-from scripts.files import write_json
+from fluxproof.cosim.verilog import NoUsableGhdl, find_ghdl
+from fluxproof.files import write_json
 from scripts.prove import document
 from scripts.prove.catalogue import catalogue, left_out
 from scripts.prove.document import method_of
 from scripts.prove.judge import judge
 from scripts.prove.solve import FOLDER
-from scripts.verilog import NoUsableGhdl, find_ghdl
 
 
 def line_of(entry: dict) -> str:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from fluxproof.checkout import RTL
 from scripts.prove import buses, core, gates, narrowing, pipeline, protection
 from scripts.prove.proof import Proof
-from scripts.sources import RTL
 
 
 def every_proof() -> tuple[Proof, ...]:

@@ -6,7 +6,8 @@ import json
 from datetime import date
 from pathlib import Path
 
-from scripts.files import ROOT, write_text
+from fluxproof.checkout import ROOT
+from fluxproof.files import write_text
 from scripts.prove.solve import FOLDER
 
 DOCUMENT = ROOT / "docs" / "proofs.md"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from scripts.files import ROOT
+from fluxproof.checkout import ROOT
 from scripts.prove.proof import Proof
 from scripts.prove.solve import FOLDER, BrokenProof, ask, plant
 

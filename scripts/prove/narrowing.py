@@ -13,10 +13,10 @@ import tempfile
 from functools import lru_cache, partial
 from pathlib import Path
 
-from scripts.files import ROOT
+from fluxproof.checkout import ROOT
+from fluxproof.cosim.sources import rtl_sources
+from fluxproof.cosim.verilog import TOP, find_ghdl
 from scripts.prove.proof import Fault, Proof
-from scripts.sources import rtl_sources
-from scripts.verilog import TOP, find_ghdl
 
 PACKAGE = "common/fixed_pkg.vhd"
 

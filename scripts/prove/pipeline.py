@@ -8,10 +8,10 @@ from __future__ import annotations
 import re
 from functools import partial
 
-from golden_model import fluxproof
-from golden_model.block import Block
-from golden_model.registry import BLOCKS
-from scripts.files import ROOT
+from fluxproof.checkout import ROOT
+from fluxproof.golden_model import fluxproof
+from fluxproof.golden_model.block import Block
+from fluxproof.golden_model.registry import BLOCKS
 from scripts.prove.proof import Fault, Proof
 
 _PORT = re.compile(r"\b(input|output)\s+(\[\d+:0\]\s*)?(\w+)")
@@ -80,7 +80,7 @@ endmodule
 
 def fault_files(block: Block) -> list[str]:
     """The block's file, then those of the entities it is made of."""
-    own = f"{block.folder}/{block.name}.vhd"
+    own = block.vhdl
     inner = re.findall(r"entity work\.(\w+)", (ROOT / "rtl" / own).read_text())
     return [
         own,

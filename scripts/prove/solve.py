@@ -13,10 +13,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from scripts.files import BUILD, ROOT, write_text
+from fluxproof.checkout import BUILD, ROOT
+from fluxproof.cosim.sources import rtl_sources
+from fluxproof.cosim.verilog import synthesize
+from fluxproof.files import write_text
 from scripts.prove.proof import Fault, Proof
-from scripts.sources import rtl_sources
-from scripts.verilog import synthesize
 
 FOLDER = BUILD / "prove"
 ENGINES = {

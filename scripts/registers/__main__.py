@@ -1,11 +1,11 @@
-"""`make registers`: HTML pages and the IP-XACT memory map from rtl/io/fluxproof.rdl, into build/registers."""
+"""`make registers`: HTML pages and the IP-XACT memory map from rtl/generated/fluxproof.rdl, into build/registers."""
 
 from __future__ import annotations
 
 import argparse
 import os
 
-from scripts.files import BUILD
+from fluxproof.checkout import BUILD
 from scripts.registers import export
 from scripts.registers.compiled import compile_file, words
 from scripts.registers.generated import RDL

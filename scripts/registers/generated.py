@@ -7,15 +7,15 @@ from pathlib import Path
 
 from systemrdl.node import AddrmapNode
 
-from scripts.files import ROOT
+from fluxproof.checkout import ROOT
 from scripts.registers import export, rdl, vhdl
 from scripts.registers.compiled import compile_file, words
 
-RDL = ROOT / "rtl" / "io" / "fluxproof.rdl"
-MAP_PACKAGE = ROOT / "rtl" / "io" / "register_map_pkg.vhd"
-REGISTER_FILE = ROOT / "rtl" / "io" / "register_file.vhd"
+RDL = ROOT / "rtl" / "generated" / "fluxproof.rdl"
+MAP_PACKAGE = ROOT / "rtl" / "generated" / "register_map_pkg.vhd"
+REGISTER_FILE = ROOT / "rtl" / "generated" / "register_file.vhd"
 C_HEADER = ROOT / "docs" / "software" / "fluxproof_registers.h"
-NAMES = ROOT / "golden_model" / "io" / "register_names.py"
+NAMES = ROOT / "golden_model" / "generated" / "register_names.py"
 
 
 def compiled(text: str) -> AddrmapNode:

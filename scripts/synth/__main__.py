@@ -16,7 +16,8 @@ import time
 from collections.abc import Mapping
 from dataclasses import asdict
 
-from scripts.files import BUILD, write_json
+from fluxproof.checkout import BUILD
+from fluxproof.files import write_json
 from scripts.synth import ecp5, kept, report, timing
 from scripts.synth.count import Count
 from scripts.synth.groups import BETWEEN, ROWS

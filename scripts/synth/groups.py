@@ -10,7 +10,7 @@ import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from scripts.sources import RTL
+from fluxproof.checkout import RTL
 
 CORE = "fluxproof"
 AXI_TOP = "fluxproof_axi"

@@ -11,7 +11,8 @@ import json
 from collections.abc import Mapping
 from pathlib import Path
 
-from scripts.files import ROOT, write_json
+from fluxproof.checkout import ROOT
+from fluxproof.files import write_json
 
 KEPT = ROOT / "docs" / "synth" / "counts.json"
 LIMIT = 0.03

@@ -12,13 +12,12 @@ import os
 from collections.abc import Mapping
 from pathlib import Path
 
-from scripts.sources import RTL
+from fluxproof.checkout import RTL
+from fluxproof.cosim.verilated import CACHE, VerilatedCore, compiled
+from fluxproof.cosim.verilog import TOP, conversion_key, convert
 from scripts.synth.ecp5 import mapping, reshape
 from scripts.synth.netlist import BITS
 from scripts.synth.yosys import SYNTH, version, yosys
-from scripts.verilated import CACHE, VerilatedCore, compiled
-from scripts.verilog import TOP, conversion_key, convert
-
 
 # What yosys has no model of.  Ports and parameters are those that the mapping and our passes use.
 MULTIPLIER = """

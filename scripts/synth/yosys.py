@@ -11,10 +11,11 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from scripts.sources import RTL, rtl_sources
+from fluxproof.checkout import RTL
+from fluxproof.cosim.sources import rtl_sources
+from fluxproof.cosim.verilog import synthesize
 from scripts.synth.count import Count, count, read_cells
 from scripts.synth.groups import BETWEEN, CORE, GROUPS, OUTSIDE, PLAIN_FOC, check, instances, top_of
-from scripts.verilog import synthesize
 
 FAMILIES = ("xc7", "xc6v", "xcup")
 # Out of context: no pads, no clock buffer.  The rest as yosys' users have it, peers' figures included.

@@ -24,7 +24,7 @@ proc described {name} {
 
 # Vivado finds the compile order itself.
 set sources [concat [glob [file join $root rtl *.vhd]] [glob [file join $root rtl * *.vhd]]]
-set top [file join $root rtl fluxproof_axi.vhd]
+set top [file join $root rtl generated fluxproof_axi.vhd]
 set constraints [file join $root scripts vivado fluxproof.xdc]
 
 create_project -force -part xc7z020clg484-1 package [file join $out package]

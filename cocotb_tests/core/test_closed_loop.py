@@ -1,0 +1,126 @@
+"""The VHDL in closed loop in GHDL: equal to the golden model at every period; PWM timing on its own gate edges."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+
+from fluxproof.checkout import ROOT
+from fluxproof.cosim import ghdl
+from fluxproof.golden_model import drive as drives
+from fluxproof.golden_model import fluxproof
+from fluxproof.golden_model.registers import registers
+from studies import timeline
+
+PAPER = ROOT / "docs" / "drives" / "paper001.toml"
+
+
+def close_loop(path, scenario: str, carrier_half: int, key: str = ""):
+    """(summary, arrays, registers, config) of one run; fails with the first difference."""
+    drive = drives.with_carrier(drives.load(path), carrier_half)
+    register_set = registers(drive)
+    config = register_set.config
+    generics = {name.upper(): value for name, value in config._asdict().items()}
+    environment = {
+        "FLUXPROOF_DRIVE": str(path),
+        "FLUXPROOF_CARRIER_HALF": str(carrier_half),
+        "FLUXPROOF_SCENARIO": scenario,
+    }
+    folder = ghdl.run("fluxproof", "fluxproof.cosim.dut_loop", generics, environment, key=f"{scenario}{key}")
+    problem = ghdl.failure(folder)
+    assert problem is None, problem
+    arrays = np.load(folder / "result.npz")
+    return json.loads((folder / "summary.json").read_text()), arrays, register_set
+
+
+def test_everything_at_once():
+    """One run of 2,500 periods, looked at from several sides (one test, so that it is simulated once)."""
+    summary, arrays, register_set = close_loop(PAPER, "everything", 128)
+    check_equal_at_every_period(summary, arrays)
+    check_sensible_motion(arrays)
+    for leg in range(3):
+        check_pwm_timing(arrays, register_set, leg)
+
+
+def check_equal_at_every_period(summary, arrays):
+    assert summary["sample_to_duty_clocks"] == fluxproof.SAMPLE_TO_DUTY
+    assert summary["periods_compared"] >= 2000 and summary["differences"] == 0
+    # The scenario must have been as hard as it claims.
+    assert np.count_nonzero(arrays["observed_sat_q"]) > 100, "the voltage was never at its limit"
+    assert np.count_nonzero(arrays["observed_speed_limited"]) > 100, (
+        "the speed regulator was never at its limit"
+    )
+    assert arrays["plant_omega_m"].max() > 70 and arrays["plant_omega_m"].min() < -30
+    assert np.abs(arrays["plant_torque"]).max() > 4
+
+
+def check_sensible_motion(arrays):
+    """Speed and current follow their references where nothing is at a limit: a bit-exact model of nonsense fails."""
+    drive = drives.load(PAPER)
+    i_q = arrays["observed_i_q"] * drive.bases.current_a / 2**16
+    i_q_ref = arrays["observed_i_q_ref"] * drive.bases.current_a / 2**16
+    loaded = slice(800, 890)
+    assert np.abs(i_q[loaded] - i_q_ref[loaded]).max() < 0.3
+    assert abs(arrays["plant_omega_m"][1950:2100].mean() * 30 / np.pi + 300) < 60
+
+
+def leg_runs(edges: np.ndarray, leg: int, period: int):
+    """[(start, stop, which)] of one leg's gate pulses in clocks since the start; which is 'high' or 'low'."""
+    clocks = edges[:, 0] * period + edges[:, 1]
+    runs = []
+    for name, bit in (("high", leg), ("low", leg + 3)):
+        on = (edges[:, 2] >> bit) & 1
+        change = np.flatnonzero(np.diff(on, prepend=0))
+        starts, stops = clocks[change[on[change] == 1]], clocks[change[on[change] == 0]]
+        runs += [(int(a), int(b), name) for a, b in zip(starts, stops, strict=False)]
+    return sorted(runs)
+
+
+def check_pwm_timing(arrays, register_set, leg: int):
+    """Dead time, symmetry, duty, update instant, minimum pulse: measured on edges, without the gate model."""
+    values, half = register_set.values, register_set.config.carrier_half
+    edges, period = arrays["gate_edges"], 2 * half
+    assert not np.any(edges[:, 2] & (edges[:, 2] >> 3) & 7), "both gates of a leg are on"
+    runs = leg_runs(edges, leg, period)
+    compare = arrays[f"observed_compare_{'abc'[leg]}"]
+    enable_gap = (2140 * period, 2260 * period)  # the scenario switches off here: gates stay off longer
+    whole = 0
+    for (_, stop, which), (start, _, following) in zip(runs, runs[1:], strict=False):
+        if enable_gap[0] < stop < enable_gap[1]:
+            continue
+        assert which != following, "a gate pulsed twice without the other between"
+        assert start - stop == values.dead_time
+    for start, stop, which in runs:
+        if enable_gap[0] < start < enable_gap[1] or stop > enable_gap[0] > start:
+            continue
+        assert stop - start >= values.min_pulse - values.dead_time
+        k = start // period
+        if which == "high" and k >= 2 and stop < (k + 1) * period:
+            # The duty of the sample of the period before, around the middle of this one, on by dead time later.
+            wanted = compare[k - 1]
+            assert start - k * period == half - wanted + values.dead_time
+            assert stop - k * period == half + wanted
+            whole += 1
+    assert whole > 1500
+
+
+def test_smallest_converters(tmp_path):
+    """12-bit currents and a 12-bit resolver: the other end of the generics."""
+    text = (
+        PAPER.read_text()
+        .replace("adc_bits = 16", "adc_bits = 12")
+        .replace("position_bits = 16", "position_bits = 12")
+    )
+    path = tmp_path / "coarse.toml"
+    path.write_text(text)
+    summary, _, register_set = close_loop(path, "short", 100, key="coarse")
+    assert (register_set.config.adc_bits, register_set.config.position_bits) == (12, 12)
+    assert summary["differences"] == 0 and summary["periods_compared"] == 300
+
+
+def test_timeline():
+    """Every block starts when its last input is there and takes its declared latency, measured in the RTL."""
+    measured = timeline.measure()
+    assert {row["instance"]: (row["first"], row["last"]) for row in measured["blocks"]} == fluxproof.schedule()
+    assert measured["sample_to_duty_clocks"] == fluxproof.SAMPLE_TO_DUTY <= 40

@@ -1,0 +1,166 @@
+"""Every mistake in drive.toml or on the command line ends in one clear line; the table and the JSON file."""
+
+import dataclasses
+import json
+import subprocess
+import sys
+
+import pytest
+
+from cocotb_tests.core.test_registers import PAPER, ROOT, each_drive, edited
+from fluxproof.command import main
+from fluxproof.golden_model.drive import Drive, load, with_carrier
+from fluxproof.golden_model.drive_keys import DriveError
+from fluxproof.golden_model.fluxproof import REGISTERS, Registers
+from fluxproof.golden_model.registers import registers
+
+WRONG = {  # section, line, what the message must contain besides the file's name
+    "unknown key": (
+        "machine", "resistence_ohm = 1", "[machine] unknown key resistence_ohm", "resistance_ohm",
+    ),
+    "wrong type": ("machine", 'pole_pairs = "4"', "[machine] pole_pairs", "string", "whole number"),
+    "fraction": ("machine", "pole_pairs = 4.5", "[machine] pole_pairs = 4.5", "whole number", "1 up to 63"),
+    "boolean": ("machine", "resistance_ohm = true", "[machine] resistance_ohm = true", "boolean"),
+    "not boolean": ("sensors", "position_reverse = 1", "[sensors] position_reverse = 1", "true or false"),
+    "short list": ("sensors", "current_gain = [1, 2]", "[sensors] current_gain", "a list of 3"),
+    "no list": ("sensors", "current_gain = 1", "[sensors] current_gain", "a list of 3"),
+    "list of words": ("sensors", 'current_gain = [1, 1, "x"]', "[sensors] current_gain = 'x'", "number"),
+    "negative": ("machine", "resistance_ohm = -1", "[machine] resistance_ohm = -1", "above 0 ohm"),
+    "not a number": ("machine", "resistance_ohm = nan", "[machine] resistance_ohm = nan", "above 0 ohm"),
+    "infinite": ("machine", "resistance_ohm = inf", "[machine] resistance_ohm = inf", "above 0 ohm"),
+    "huge": ("machine", f"pole_pairs = {10**400}", "[machine] pole_pairs", "1 up to 63"),
+    "huge real": ("machine", f"resistance_ohm = {10**400}", "[machine] resistance_ohm", "above 0 ohm"),
+    "extreme": ("machine", "rated_speed_rad_s = 1e-320", "rated_speed_rad_s", "give no number"),
+    "date": ("machine", "resistance_ohm = 2020-01-01", "[machine] resistance_ohm", "number"),
+    "adc bits": ("sensors", "adc_bits = 18", "[sensors] adc_bits = 18", "12 up to 16"),
+    "reserve": ("control", "voltage_reserve = 1", "[control] voltage_reserve = 1", "0 up to 0.99"),
+    "zero inertia": (
+        "machine", "inertia_kgm2 = 0", "[machine] inertia_kgm2 = 0", "above 0", "speed_bandwidth_hz",
+    ),
+    "no magnet": ("machine", "magnet_flux_wb = 0", "[machine] magnet_flux_wb = 0", "speed_bandwidth_hz"),
+    "sample time": (
+        "control", "sample_time_s = 5e-5", "[control] sample_time_s = 5e-05", "0.0001 s", "pwm_freq",
+    ),
+    "clock": (
+        "core", "clock_hz = 200.001e6", "[core] clock_hz", "[inverter] pwm_frequency_hz", "whole number",
+    ),
+    "slow clock": ("core", "clock_hz = 1e5", "[core] clock_hz", "8 to 32767"),
+    "tiny pwm": ("core", "clock_hz = 1e300", "[core] clock_hz", "8 to 32767"),
+    "dead time": ("inverter", "dead_time_s = 3e-6", "[inverter] dead_time_s", "below min_pulse_s = 3e-06 s"),
+    "no dead time": ("inverter", "dead_time_s = 0", "[inverter] dead_time_s = 0", "above 0 s"),
+    "min pulse": ("inverter", "min_pulse_s = 60e-6", "[inverter] min_pulse_s", "5e-05 s"),
+    "bus": ("inverter", "dc_bus_v = 900", "[inverter] dc_bus_v = 900", "sqrt(3)", "866.025 V"),
+    "bus range": ("inverter", "dc_bus_v = 1100", "[inverter] dc_bus_v = 1100", "u_dc_range_v = 1000 V"),
+    "limit": (
+        "control", "current_limit_a = 13", "[control] current_limit_a = 13", "current_range_a = 12.5 A",
+    ),
+    "offset": ("sensors", "current_offset_code = [0, 1, 65536]", "current_offset_code = 65536", "0 to 65535"),
+    "bus offset": ("sensors", "u_dc_offset_code = 7e4", "[sensors] u_dc_offset_code = 70000", "0 to 65535"),
+    "unstable": (
+        "control", "current_bandwidth_hz = 2e3", "[control] current_bandwidth_hz", "below 1666.67 Hz",
+    ),
+    "flux": ("machine", "inductance_q_h = 0.2", "[machine] inductance_q_h times", "0.796178 Wb", "[bases]"),
+    "register base": (
+        "machine", "magnet_flux_wb = 2", "register lambda_mg", "[sensors] u_dc_range_v; [machine] pole_pairs",
+    ),
+    "register high": (
+        "control", "current_kp_d_v_per_a = 2e4", "register kp_d", "current_kp_d_v_per_a", "16777215",
+    ),
+    "register trim": ("sensors", "u_dc_gain = 2.5", "register u_dc_gain", "u_dc_gain", "-131072 to 131071"),
+    "register zero": (
+        "control", "speed_ki_a_per_rad = 1e-9", "register speed_ki", "rounds to zero", "at least",
+    ),
+    "long pulse": ("inverter", "min_pulse_s = 40e-6", "register min_pulse", "[inverter] min_pulse_s", "4095"),
+}
+
+
+def check_message(capsys, path, words):
+    """Exit status 2, nothing on stdout, one line on stderr with the file's name and the words."""
+    assert main(["registers", str(path)]) == 2
+    out, err = capsys.readouterr()
+    assert out == "" and err.count("\n") == 1
+    for word in (str(path), *words):
+        assert word in err
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_wrong_values_are_one_clear_line(tmp_path, capsys, case):
+    section, line, *words = WRONG[case]
+    check_message(capsys, edited(tmp_path, section, line), words)
+
+
+TEXTS = {
+    "syntax": ("[machine]\npole_pairs = = 4\n", ":2: not TOML"),
+    "end of file": ("[machine]\npole_pairs = [4", ":2: not TOML"),
+    "duplicate": ("[machine]\na = 1\na = 2\n", ":3: not TOML"),
+    "empty": ("", "section [machine] is missing", "resistance_ohm"),
+    "missing key": (
+        "[machine]\npole_pairs = 4\n", "[machine] resistance_ohm is missing", "number, above 0 ohm",
+    ),
+    "section name": ("[machines]\n", "unknown section machines", "machine"),
+    "odd section name": ('["a\\nb"]\n', "unknown section 'a\\nb'"),
+    "key outside": ("pole_pairs = 4\n", "unknown section pole_pairs"),
+    "not a section": ("machine = 4\n", "machine must be a section", "whole number"),
+    "tables": ("[[machine]]\n", "machine must be a section", "list"),
+    "deep": ("a = " + "[" * 100000, "not TOML"),
+}
+
+
+@pytest.mark.parametrize("case", TEXTS)
+def test_wrong_files_are_one_clear_line(tmp_path, capsys, case):
+    text, *words = TEXTS[case]
+    check_message(capsys, edited(tmp_path, None, text=text), words)
+
+
+def test_files_that_cannot_be_read(tmp_path, capsys):
+    check_message(capsys, tmp_path / "none.toml", ["cannot be read"])
+    check_message(capsys, tmp_path, ["cannot be read"])
+    (tmp_path / "latin.toml").write_bytes(b"# one\n# \xe9\n")
+    check_message(capsys, tmp_path / "latin.toml", [":2: not UTF-8"])
+
+
+def test_contradictions_are_found_without_a_file():
+    drive = load(PAPER)
+    with pytest.raises(DriveError, match="min_pulse_s"):
+        dataclasses.replace(drive, inverter=dataclasses.replace(drive.inverter, min_pulse_s=1e-6))
+    with pytest.raises(DriveError, match="whole number from 8 to 32767"):
+        with_carrier(drive, 7)
+    assert isinstance(with_carrier(drive, 8), Drive)
+    with pytest.raises(DriveError, match=r"the current limit = 5.23 .* up to 4.125 A, 1.375 \* \[bases\] current_a"):
+        dataclasses.replace(drive, base_choice=dataclasses.replace(drive.base_choice, current_a=3.0))
+
+
+@each_drive
+def test_command_prints_an_aligned_table_and_the_same_as_json(tmp_path, capsys, path):
+    target = tmp_path / "registers.json"
+    assert main(["registers", str(path), "--json", str(target)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    drive, result = load(path), registers(load(path))
+    assert lines[0].startswith("bases") and f"{drive.bases.current_a:g} A" in lines[0]
+    assert f"CARRIER_HALF = {drive.carrier_half}" in lines[1]
+    table = lines[5:]
+    assert len(table) == len(REGISTERS) and len({len(line) for line in table}) == 1
+    data = json.loads(target.read_text())
+    assert data["generics"] == result.config._asdict() and data["bases"]["flux_wb"] == drive.bases.flux_wb
+    for line, name, value in zip(table, Registers._fields, result.values, strict=True):
+        assert line.split()[0] == name and str(value) in line.split()
+        assert data["registers"][name]["integer"] == value
+    assert [p.name for p in tmp_path.iterdir()] == ["registers.json"]
+
+
+def test_command_line_mistakes_exit_with_2(capsys, tmp_path):
+    for arguments in ([], ["nonsense"], ["registers"], ["registers", str(PAPER), "--jsn", "x"]):
+        with pytest.raises(SystemExit) as stopped:
+            main(arguments)
+        assert stopped.value.code == 2
+    (tmp_path / "file").write_text("")
+    assert main(["registers", str(PAPER), "--json", str(tmp_path / "file" / "below")]) == 2
+    assert capsys.readouterr().err.splitlines()[-1].startswith("fluxproof: ")
+
+
+def test_command_as_a_process_closes_its_pipe_quietly():
+    command = [sys.executable, "-m", "fluxproof.command", "registers", str(PAPER)]
+    with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        process.stdout.close()
+        assert process.stderr.read() == b""
+        assert process.wait() == 0

@@ -1,0 +1,269 @@
+"""Faults: what must hold of the protection, on the golden core, the VHDL in GHDL and the converted RTL."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+
+from cocotb_tests.core.test_long_loop import ghdl5_missing
+from cocotb_tests.core.test_registers import PAPER, edited, row
+from fluxproof.checkout import ROOT
+from fluxproof.cosim import ghdl
+from fluxproof.cosim.closed_loop import INPUT_PORTS, gate_words
+from fluxproof.cosim.golden_clock import SEEN, GoldenClock
+from fluxproof.golden_model import drive as drives
+from fluxproof.golden_model import fluxproof
+from fluxproof.golden_model.drive_keys import DriveError
+from fluxproof.golden_model.io import sample_latch
+from fluxproof.golden_model.io.fault_latch import NAMES
+from fluxproof.golden_model.registers import registers
+from studies import faults
+from studies.faults.bench import named, run, setup
+from studies.faults.cases import cases, tour
+from studies.faults.cores import GoldenCore, VerilatedClock
+
+HALF = 64
+DRIVE, SET = setup(HALF)
+MIDDLE = (
+    dict.fromkeys(INPUT_PORTS, 0)
+    | {f"adc_{x}": 32768 for x in "abc"}
+    | {"adc_u_dc": 40000, "speed_mode_in": 1}
+)
+
+
+def column(rows, name):
+    return rows[:, SEEN.index(name)]
+
+
+def running_core(**changes):
+    """A golden core whose gates switch, three samples old, at the begin of a period."""
+    core = GoldenClock(SET.values._replace(**changes), SET.config)
+    core.advance(1, enable=1)
+    for _ in range(3):
+        core.advance(4)
+        core.advance(2 * HALF - 4, MIDDLE)
+    assert core.running
+    return core
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_no_strobe_disturbs_a_sample(seed):
+    """Strobes at any time: what enters is never closer than the core's interval; the rest is counted."""
+    rng, core, strobes = np.random.default_rng(seed), running_core(fault_ignore=127), 0
+    near, before, entered = fluxproof.SAMPLE_INTERVAL, len(core.samples), []
+    for _ in range(400):
+        count, at = len(core.samples), core.clock
+        strobes += 1
+        rows = core.advance(int(rng.choice([1, 2, 30, near - 2, near - 1, near, near + 1, 120])), MIDDLE)
+        if len(core.samples) > count:
+            entered.append(at)
+    assert np.diff(entered).min() == fluxproof.SAMPLE_INTERVAL
+    assert strobes - (len(core.samples) - before) >= 50
+    assert column(rows, "early_samples")[-1] == min(255, strobes - (len(core.samples) - before))
+    assert named(column(rows, "fault_flags")[-1])[-1] == "early" and not column(rows, "tripped").any()
+
+
+@pytest.mark.parametrize("watchdog", [130, 200, 1000])
+def test_watchdog_in_clocks(watchdog):
+    """Gates off two clocks after the watchdog's time, counted from the last sample; a sample in time resets it."""
+    core = running_core(watchdog=watchdog)
+    core.advance(4)
+    rows = core.advance(watchdog - 1, MIDDLE)
+    assert not column(rows, "tripped").any()
+    rows = core.advance(1500, MIDDLE)
+    off = int(np.flatnonzero(column(rows, "tripped"))[0]) + 1
+    assert off == watchdog + 2 and not gate_words(rows)[off - 1 :].any()
+    assert named(column(rows, "first_fault")[-1]) == ["watchdog"]
+
+
+@pytest.mark.parametrize("bit", range(7))
+def test_each_fault_alone(bit):
+    """Stops the gates, is named, is not forgotten while its cause lasts, and only told where it is ignored."""
+    bad = [
+        {"adc_a": 62000},
+        {"adc_b": 36000},
+        {"adc_c": 65535},
+        {"adc_u_dc": 900},
+        {"adc_u_dc": 50000},
+        {},
+        None,
+    ][bit]
+    open_limits = {"i_trip": 511, "sum_trip": 511} if bit == 2 else {"sum_trip": 511} if bit == 0 else {}
+    for ignored in (0, 1 << bit):
+        core, code = running_core(fault_ignore=ignored, **open_limits), 0
+        core.advance(4)
+        for k in range(5):
+            code = code + 5000 * (k + 1) if bit == 5 else 0
+            sample = None if bad is None else MIDDLE | bad | {"position_code": code}
+            rows = core.advance(2 * HALF, sample, clear_trip=0)
+        assert named(column(rows, "fault_flags")[-1]) == [NAMES[bit]]
+        assert bool(gate_words(rows).any()) == bool(ignored) == (not column(rows, "tripped")[-1])
+        rows = core.advance(3 * 2 * HALF, clear_trip=1, enable=1) if bad is None else None
+        if bad is not None:
+            core.advance(1, sample, clear_trip=1)  # the cause is still there
+            rows = core.advance(2 * HALF - 1, clear_trip=0)
+        assert named(column(rows, "fault_flags")[-1]) == [NAMES[bit]]
+        assert bool(gate_words(rows).any()) == bool(ignored)
+        for _ in range(4):  # the cause goes: still off, until it is cleared
+            rows = core.advance(2 * HALF, MIDDLE | {"position_code": code % 65536}, clear_trip=0)
+        assert bool(gate_words(rows).any()) == bool(ignored)
+        core.advance(1, clear_trip=1)
+        core.advance(3, clear_trip=0)
+        for _ in range(3):
+            rows = core.advance(2 * HALF, MIDDLE | {"position_code": code % 65536})
+        assert gate_words(rows).any() and not column(rows, "fault_flags").any()
+
+
+def test_registers_are_written_in_peace():
+    """All registers zero, as after a reset of the bus: every fault is there, none is remembered before enable."""
+    core = GoldenClock(fluxproof.Registers(*([0] * len(fluxproof.Registers._fields))), SET.config)
+    for _ in range(4):
+        rows = core.advance(2 * HALF, MIDDLE)
+    assert not column(rows, "fault_flags").any() and not column(rows, "tripped").any()
+    core.registers = SET.values
+    rows = core.advance(2 * HALF, MIDDLE)  # a sample that the new registers judge
+    assert not column(rows, "tripped").any()
+    for _ in range(4):
+        rows = core.advance(2 * HALF, MIDDLE, enable=1)
+    assert gate_words(rows).any()
+
+
+def test_enable_does_not_help_against_a_fault():
+    core = GoldenClock(SET.values, SET.config)
+    core.advance(4)
+    bad = MIDDLE | {"adc_u_dc": 0}
+    for _ in range(3):
+        rows = core.advance(2 * HALF, bad, enable=0)
+    for _ in range(5):
+        rows = core.advance(2 * HALF, bad, enable=1)
+        assert not gate_words(rows).any()
+    assert column(rows, "fault_flags")[-1] and not column(rows, "running").any()
+
+
+def test_tour_in_ghdl():
+    """The VHDL in GHDL through six faults: equal to the golden core in every clock."""
+    generics = {name.upper(): value for name, value in SET.config._asdict().items()}
+    folder = ghdl.run("fluxproof", "cocotb_tests.support.dut_faults", generics, {}, key="faults")
+    problem = ghdl.failure(folder)
+    assert problem is None, problem
+    summary = json.loads((folder / "summary.json").read_text())
+    told = np.bitwise_or.reduce(summary["faults"])
+    assert set(named(int(told))) >= {"current_sum", "position", "watchdog", "trip", "early", "u_dc_low"}
+
+
+@pytest.mark.parametrize(
+    "name", ["current sensor lost", "strobe missing", "strobe too early", "bus collapses"]
+)
+def test_case_in_the_converted_rtl(name):
+    reason = ghdl5_missing()
+    if reason:
+        pytest.skip(reason)
+    drive, register_set = setup(faults.CARRIER_HALF)
+    case = next(c for c in cases(2 * faults.CARRIER_HALF) if c.name == name)
+    found = faults.row(case, run(case, VerilatedClock(register_set), drive, register_set))
+    assert not found["problems"] and found["differences"] == 0
+    assert found["samples_compared"] > 1000
+
+
+def test_a_wrong_outcome_is_a_problem():
+    """The judgement itself: a case that does not trip where it should, and one that differs, are told."""
+    case = dataclasses.replace(tour(), clears=(18,))
+    outcome = run(case, GoldenCore(SET), DRIVE, SET)
+    right = faults.row(case, outcome)
+    assert right["clocks_to_off"] == 2 and right["first"] == ["current_sum"]
+    for changed, word in (
+        ({"trips": None}, "wanted None"),
+        ({"trips": "position"}, "first fault"),
+        ({"rpm": 100.0}, "rpm"),
+    ):
+        told = faults.row(dataclasses.replace(case, **changed), outcome)["problems"]
+        assert any(word in line for line in told), told
+    assert any(
+        "differ" in line for line in faults.row(case, dataclasses.replace(outcome, differences=1))["problems"]
+    )
+
+
+def test_every_case_stands_in_the_docs():
+    table = (ROOT / "docs" / "faults.md").read_text()
+    for case in cases(2 * faults.CARRIER_HALF):
+        assert f"| {case.name}: {case.text} |" in table, f"{case.name}: run `make faults ARGS=--docs`"
+
+
+def test_register_storm_leaves_the_gates_in_hand():
+    """Any value of any register at any clock, strobes and stops at any clock: never both gates, off is off, no hang."""
+    reason = ghdl5_missing()
+    if reason:
+        pytest.skip(reason)
+    device, rng, runs = VerilatedClock(SET), np.random.default_rng(5), 0
+    core, usual = device.core, SET.values._asdict()
+    ports = [p for p in sample_latch.BLOCK.ports({"ADC_BITS": 16, "POSITION_BITS": 16}) if p.name != "run_in"]
+    core.set_many({"enable": 1})
+    for storm in range(60):
+        for _ in range(40):
+            name, port = list(fluxproof.REGISTERS.items())[rng.integers(len(fluxproof.REGISTERS))]
+            core.set(
+                name, int(rng.choice([port.fmt.lo, port.fmt.hi, rng.integers(port.fmt.lo, port.fmt.hi + 1)]))
+            )
+            core.set_many(
+                {p.name: int(rng.integers(p.fmt.lo, p.fmt.hi + 1)) for p in ports} | {"sample_valid": 1}
+            )
+            words = gate_words(core.trace(int(rng.integers(1, 90)), SEEN))
+            core.set("sample_valid", 0)
+            words = np.append(words, gate_words(core.trace(int(rng.integers(1, 90)), SEEN)))
+            assert not np.any(words & words >> 3 & 7), "both gates of a leg are on"
+        core.set_many({"enable": storm % 2, "trip": 1 - storm % 2})
+        core.tick(1)
+        core.set("trip", 0)
+        if storm % 2 == 0:
+            assert not gate_words(core.trace(600, SEEN)).any(), "a gate came on after a trip"
+        core.set_many(usual | MIDDLE | {"enable": 1})
+        for period in range(8):  # the position code needs three samples to be believed again
+            core.set_many({"clear_trip": int(period == 4), "sample_valid": 1})
+            core.tick(1)
+            core.set_many({"clear_trip": 0, "sample_valid": 0})
+            core.tick(2 * HALF - 1)
+        runs += core.get("running")
+        assert core.get("running") and not core.get("tripped"), f"storm {storm}: the core does not come back"
+    assert runs == 60
+
+
+def test_defaults_of_the_drive_file():
+    """Counted by hand: limit 5.23 A, range 12.5 A, bus 563 V of 500 V base, 16 bits, 20,000 clocks a period."""
+    values = registers(drives.load(PAPER)).values
+    assert values.i_trip == round(256 * 2 * 5.23 / 12.5) and values.sum_trip == round(256 * 0.2 * 5.23 / 12.5)
+    assert (values.u_dc_min, values.u_dc_max) == (round(256 * 56.3 / 500), round(256 * 1.3 * 563 / 500))
+    assert values.jump_max == round((4 / 65536 + 5e-4) * 8192) and values.watchdog == 30000
+    assert (values.rail_samples, values.fault_ignore) == (3, 0)
+
+
+def with_protection(tmp_path, lines):
+    return edited(tmp_path, None, text=f"{PAPER.read_text()}\n[protection]\n{lines}\n")
+
+
+def test_protection_keys(tmp_path):
+    path = with_protection(
+        tmp_path, "current_trip_a = 8\nu_dc_max_v = 700\ntrip_watchdog = false\ntrip_u_dc_low = false"
+    )
+    assert (row(path, "i_trip").integer, row(path, "u_dc_max").integer) == (
+        round(8 / 12.5 * 256),
+        round(700 / 500 * 256),
+    )
+    assert row(path, "fault_ignore").integer == 0b1001000
+    assert row(with_protection(tmp_path, "position_jump_rad = 0.01"), "jump_max").integer == 13
+    assert row(with_protection(tmp_path, "watchdog_periods = 3"), "watchdog").integer == 60000
+
+
+@pytest.mark.parametrize(("line", "words"), [
+    ("current_trip_a = 5", r"current_trip_a = 5 is out of range: allowed is above the current limit, 5.23"),
+    ("u_dc_min_v = 600", r"u_dc_min_v = 600 is out of range: allowed is below \[inverter\] dc_bus_v = 563 V"),
+    ("u_dc_max_v = 500", r"u_dc_max_v = 500 is out of range: allowed is above \[inverter\] dc_bus_v"),
+    ("watchdog_periods = 1", "watchdog_periods = 1 is out of range: allowed is above 1; trip_watchdog = false"),
+    ("rail_samples = 16", "rail_samples = 16 is out of range: allowed is 1 up to 15"),
+    ("watchdog = 3", "unknown key watchdog; the nearest known one is trip_watchdog"),
+])  # fmt: skip
+def test_contradictions_are_refused(tmp_path, line, words):
+    with pytest.raises(DriveError, match=words):
+        drives.load(with_protection(tmp_path, line))

@@ -1,0 +1,124 @@
+"""Long closed loops at the full 200 MHz / 10 kHz ratio: the converted RTL, compiled, equal to the golden model."""
+
+from __future__ import annotations
+
+import shutil
+
+import numpy as np
+import pytest
+
+from fluxproof.checkout import ROOT
+from fluxproof.cosim import verilog
+from fluxproof.cosim.closed_loop import cosimulate, run_now
+from fluxproof.cosim.scenarios import SCENARIOS
+from fluxproof.golden_model import drive as drives
+from fluxproof.golden_model import fluxproof
+from fluxproof.golden_model.io import sample_latch
+from fluxproof.golden_model.registers import registers
+
+DRIVE = drives.load(ROOT / "docs" / "drives" / "paper001.toml")
+NO_TRIP = fluxproof.REGISTERS["fault_ignore"].high  # samples that no healthy drive gives shall not stop the gates
+
+
+def ghdl5_missing() -> str | None:
+    """Why the conversion cannot run here, or None."""
+    try:
+        verilog.find_ghdl()
+    except RuntimeError as error:
+        return str(error)
+    return None if shutil.which("g++") else "g++ is not installed"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["fig9", "full_speed"])
+def test_full_ratio(name):
+    reason = ghdl5_missing()
+    if reason:
+        pytest.skip(reason)
+    from fluxproof.cosim.verilated_device import VerilatedDevice
+
+    register_set = registers(DRIVE)
+    assert register_set.config.carrier_half == 10_000
+    result = run_now(
+        cosimulate(VerilatedDevice(register_set.config), DRIVE, register_set, SCENARIOS[name](DRIVE))
+    )
+    assert result.differences == 0, result.first_difference
+    assert result.periods_compared >= 3000
+    assert result.sample_to_duty_clocks == fluxproof.SAMPLE_TO_DUTY
+    rpm = result.plant["omega_m"] * 30 / np.pi
+    if name == "fig9":
+        assert abs(rpm[-1] - 732) < 15 and rpm[1750] == pytest.approx(732, abs=15)
+    else:
+        assert rpm.max() > 2000 and rpm.min() < -1000
+        assert np.count_nonzero(result.observed["sat_q"]) > 200, "the voltage circle was never reached"
+
+
+def test_samples_as_close_as_allowed():
+    """Random raw samples FLUXPROOF_SAMPLE_INTERVAL clocks apart: each equals the golden model."""
+    reason = ghdl5_missing()
+    if reason:
+        pytest.skip(reason)
+    from fluxproof.cosim.verilated import VerilatedCore
+
+    register_set = registers(drives.with_carrier(DRIVE, 100))
+    config = register_set.config
+    core = VerilatedCore({name.upper(): value for name, value in config._asdict().items()})
+    core.reset()
+    values = register_set.values._replace(fault_ignore=NO_TRIP)
+    core.set_many({**values._asdict(), "enable": 1})
+    core.tick(3 * 2 * config.carrier_half)
+    assert core.get("running") == 1
+    rng, state = np.random.default_rng(1), fluxproof.State()
+    for _ in range(2000):
+        codes, references = rng.integers(0, 1 << 16, 5), rng.integers(-90000, 90000, 3)
+        sample = fluxproof.Sample(
+            *codes, *references, rng.integers(2), rng.integers(-9999, 9999), *rng.integers(0, 2, 2), 1
+        )
+        inputs = dict(zip([p.name for p in sample_latch.BLOCK.inputs], map(int, sample), strict=True))
+        inputs.pop("run_in")
+        core.apply_sample(**inputs)
+        core.tick(fluxproof.SAMPLE_INTERVAL - 1)
+        state, wanted = fluxproof.step(state, fluxproof.Sample(*map(int, sample)), values, config)
+        got = core.get_many(fluxproof.Observed._fields)
+        assert tuple(got.values()) == tuple(wanted)
+
+
+def test_every_register_at_its_ends():
+    """Samples at the ends of their codes, registers at the ends of their ranges, in every mixture: no bit differs.
+
+    The RTL computes in words of the declared widths, the model in 64 bits: a wrap-around anywhere would show here.
+    """
+    reason = ghdl5_missing()
+    if reason:
+        pytest.skip(reason)
+    from fluxproof.cosim.verilated import VerilatedCore
+
+    register_set = registers(drives.with_carrier(DRIVE, 100))
+    config, rng, seen = register_set.config, np.random.default_rng(2), 0
+    core = VerilatedCore({name.upper(): value for name, value in config._asdict().items()})
+    ports = [p for p in sample_latch.BLOCK.ports({"ADC_BITS": 16, "POSITION_BITS": 16}) if p.name != "run_in"]
+    for run in range(120):
+        values = register_set.values
+        for name, port in fluxproof.REGISTERS.items():
+            if rng.integers(3) > run % 2 and name not in ("dead_time", "min_pulse", "flux_mode"):
+                values = values._replace(**{name: int(rng.choice((port.low, port.high)))})
+        values = values._replace(flux_mode=run % 4, fault_ignore=NO_TRIP)
+        core.reset()
+        core.set_many({**values._asdict(), "enable": 1})
+        core.tick(3 * 2 * config.carrier_half)
+        assert core.get("running") == 1
+        state, row = fluxproof.State(), {p.name: int(rng.choice((p.low, p.high))) for p in ports}
+        for _ in range(60):
+            for port in ports:  # some values stay for long, so that integrators reach their ends
+                if rng.integers(8) == 0:
+                    inside = run % 2 and port.name.startswith(
+                        "adc"
+                    )  # at its very ends a code is told, and holds
+                    ends = (port.low + inside, port.high - inside, int(rng.integers(port.low, port.high + 1)))
+                    row[port.name] = int(rng.choice(ends))
+            core.apply_sample(**row)
+            core.tick(fluxproof.SAMPLE_INTERVAL - 1)
+            state, wanted = fluxproof.step(state, fluxproof.Sample(*row.values(), 1), values, config)
+            assert tuple(core.get_many(fluxproof.Observed._fields).values()) == tuple(wanted), (run, row)
+            seen |= wanted.flux_faults
+    assert seen == 127, f"only the faults {seen:07b} were ever provoked"

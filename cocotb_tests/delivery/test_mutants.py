@@ -1,0 +1,15 @@
+"""Every planted defect still stands in the RTL once and changes it; whether the tests notice it, `make mutate` says."""
+
+from __future__ import annotations
+
+import pytest
+
+from fluxproof.checkout import RTL
+from scripts.mutants import MUTANTS
+
+
+@pytest.mark.parametrize("mutant", MUTANTS, ids=lambda m: m[0].replace(" ", "_"))
+def test_text_of_a_planted_defect_stands(mutant):
+    _, file, old, new = mutant
+    assert (RTL / file).read_text().count(old) == 1
+    assert old != new

@@ -1,0 +1,166 @@
+"""The AXI top and component.xml: fresh, valid by the schema, and what the VHDL and the register map say."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+import zipfile
+
+import pytest
+from lxml import etree
+
+from fluxproof.checkout import ROOT, RTL
+from fluxproof.cosim.sources import rtl_sources
+from scripts.package import __main__ as package_command
+from scripts.package import axi_top, ipxact, packaged
+from scripts.package.entity import read_entity
+from scripts.registers.compiled import compile_file, words
+
+S = {"s": ipxact.SPIRIT}
+
+
+def names(elements) -> list[str]:
+    """The text of spirit:name of each."""
+    return [e.findtext("s:name", namespaces=S) for e in elements]
+
+
+@pytest.fixture(scope="module")
+def component():
+    return etree.parse(ipxact.PATH).getroot()
+
+
+# ---------------------------------------------------------------- generated files
+
+
+def test_committed_files_are_fresh():
+    stale = [path.name for path, text in packaged.files().items() if path.read_text() != text]
+    assert not stale, f"{stale}: run `make generate` and commit"
+
+
+def test_same_files_whether_the_top_is_there_or_not(tmp_path):
+    """The first run must write what the second finds right."""
+    shutil.copytree(RTL, tmp_path / "rtl")
+    (tmp_path / "rtl" / axi_top.PATH.name).unlink()
+    assert packaged.files(tmp_path / "rtl") == packaged.files()
+
+
+def test_top_says_what_is_not_connected(tmp_path):
+    shutil.copytree(RTL, tmp_path / "rtl")
+    path = tmp_path / "rtl" / "fluxproof.vhd"
+    text = path.read_text()
+    path.write_text(
+        text.replace("    dead_time       : in", "    live_time : in bit;\n    dead_time       : in", 1)
+    )
+    with pytest.raises(ValueError, match=r"nothing drives live_time of core \(fluxproof\)"):
+        axi_top.render(tmp_path / "rtl")
+    path.write_text(text.replace("    tripped         : out", "    gone : out", 1))
+    with pytest.raises(ValueError, match="nothing drives tripped of registers"):
+        axi_top.render(tmp_path / "rtl")
+    path.write_text(text.replace("    tripped         : out", "    irq, tripped    : out", 1))
+    with pytest.raises(ValueError, match="fluxproof.vhd: not understood in entity fluxproof: irq, tripped"):
+        axi_top.render(tmp_path / "rtl")
+
+
+def test_top_keeps_to_vhdl_93(tmp_path):
+    """A block design takes no VHDL-2008 top as a module; what it instantiates is empty here, ports as they are."""
+    widths = re.findall(
+        r"^  constant \w+_W : positive := \d+;", (RTL / "generated" / "fluxproof_pkg.vhd").read_text(), re.M
+    )
+    context = "library ieee;\nuse ieee.std_logic_1164.all;\nuse ieee.numeric_std.all;\nuse work.fluxproof_pkg.all;\n"
+    text = "package fluxproof_pkg is\n" + "\n".join(widths) + "\nend fluxproof_pkg;\n"
+    for name in axi_top.INSTANCES.values():
+        entity = re.search(
+            r"^entity (\w+) is.*?^end entity", (RTL / name).read_text(), re.MULTILINE | re.DOTALL
+        )
+        text += f"{context}{entity[0]};\narchitecture none of {entity[1]} is begin end none;\n"
+    (tmp_path / "around.vhd").write_text(text)
+    for path in ("around.vhd", str(axi_top.PATH)):
+        done = subprocess.run(["ghdl", "-a", "--std=93", path], cwd=tmp_path, capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+
+
+# ---------------------------------------------------------------- IP-XACT
+
+
+def test_component_validates_and_a_damaged_one_does_not(component):
+    valid = package_command.schema()
+    assert valid.validate(component), valid.error_log
+    for path in (
+        "s:model/s:ports/s:port/s:wire/s:direction",
+        "s:memoryMaps/s:memoryMap/s:addressBlock/s:range",
+    ):
+        damaged = etree.fromstring(etree.tostring(component))
+        element = damaged.find(path, S)
+        element.getparent().remove(element)
+        assert not valid.validate(damaged), f"{path} may be missing"
+
+
+def test_component_tells_what_the_vhdl_has(component):
+    entity = read_entity(axi_top.PATH)
+    ports = component.findall("s:model/s:ports/s:port", S)
+    assert names(ports) == list(entity.pins)
+    for port in ports:
+        pin = entity.pins[port.findtext("s:name", namespaces=S)]
+        assert port.findtext("s:wire/s:direction", namespaces=S) == pin.mode
+        left = port.find("s:wire/s:vector/s:left", S)
+        assert (left is None) == (pin.left is None), pin.name
+        if left is not None:
+            generics = {n: g.default for n, g in entity.generics.items()}
+            assert int(left.text) == eval(pin.left, {}, generics), pin.name
+    parameters = {
+        e.findtext("s:name", namespaces=S): e.find("s:value", S)
+        for e in component.findall("s:parameters/s:parameter", S)
+    }
+    assert set(parameters) == set(entity.generics) | {"Component_Name"}
+    for name, generic in entity.generics.items():
+        limits = [int(parameters[name].get(f"{{{ipxact.SPIRIT}}}{end}")) for end in ("minimum", "maximum")]
+        assert (int(parameters[name].text), *limits) == (generic.default, generic.low, generic.high)
+
+
+def test_interfaces_take_each_bus_pin_once(component):
+    taken = [
+        e.text
+        for e in component.iterfind("s:busInterfaces/s:busInterface/s:portMaps//s:physicalPort/s:name", S)
+    ]
+    assert len(taken) == len(set(taken))
+    buses = {p for p in read_entity(axi_top.PATH).pins if re.match("s_axi_|m_axis_", p)}
+    assert buses | {"aclk", "aresetn", "irq"} == set(taken)
+
+
+def test_memory_map_is_the_registers(component):
+    block = component.find("s:memoryMaps/s:memoryMap/s:addressBlock", S)
+    assert int(block.findtext("s:range", namespaces=S)) == 4096
+    got = {
+        r.findtext("s:name", namespaces=S): int(r.findtext("s:addressOffset", namespaces=S), 0)
+        for r in block.findall("s:register", S)
+    }
+    assert got == {w.name: w.address for w in words(compile_file(RTL / ipxact.RDL))}
+
+
+def test_files_of_the_component_exist_in_compile_order(component):
+    entries = component.findall("s:fileSets/s:fileSet", S)
+    assert all((ROOT / name).exists() for fileset in entries for name in names(fileset.findall("s:file", S)))
+    for fileset in entries[:2]:
+        vhdl = [name for name in names(fileset.findall("s:file", S)) if name.endswith(".vhd")]
+        assert vhdl == axi_top.source_names()
+        assert set(vhdl) == {p.relative_to(ROOT).as_posix() for p in rtl_sources()}
+
+
+def test_zip_is_an_ip_repository(component, tmp_path, monkeypatch, capsys):
+    """Whatever component.xml names is inside; a stale or invalid one is not packed."""
+    assert package_command.problems() == []
+    path = package_command.pack(tmp_path / "core.zip")
+    first = path.read_bytes()
+    with zipfile.ZipFile(path) as archive:
+        inside = set(archive.namelist())
+    named = {e.text for e in component.iterfind("s:fileSets/s:fileSet/s:file/s:name", S)}
+    assert named | {"component.xml", "LICENSE", "docs/software/bring_up.c"} <= inside
+    assert package_command.pack(path).read_bytes() == first
+    damaged = tmp_path / "component.xml"
+    damaged.write_text(ipxact.PATH.read_text().replace("<spirit:direction>in<", "<spirit:direction>into<", 1))
+    monkeypatch.setattr(ipxact, "PATH", damaged)
+    monkeypatch.setattr(packaged, "files", lambda: {})
+    monkeypatch.setattr("sys.argv", ["package"])
+    assert package_command.main() == 1
+    assert re.search(r"package: component.xml:\d+: .*'into'", capsys.readouterr().err)

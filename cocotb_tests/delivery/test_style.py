@@ -1,0 +1,26 @@
+"""House style: vsg on the VHDL, ruff on the Python; the same as `make lint`."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+
+import pytest
+
+from fluxproof.checkout import ROOT
+
+
+def run(command: list[str]) -> None:
+    if shutil.which(command[0]) is None:
+        pytest.skip(f"{command[0]} is not installed")
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-1000:]
+
+
+def test_vhdl_style():
+    sources = sorted((ROOT / "rtl").rglob("*.vhd")) + sorted((ROOT / "tb").glob("*.vhd"))
+    run(["vsg", "-c", "vsg.yaml", "-f", *(str(s) for s in sources if s.name != "fluxproof_pkg.vhd")])
+
+
+def test_python_style():
+    run(["ruff", "check", "."])

@@ -1,0 +1,285 @@
+"""`make synth`: what is counted, what is kept, and that the blocks still are as small as the file says."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from fluxproof.checkout import RTL
+from fluxproof.cosim import verilog
+from scripts.synth import kept, report, timing
+from scripts.synth.__main__ import SMALL
+from scripts.synth.count import Count, count, read_cells
+from scripts.synth.ecp5 import described
+from scripts.synth.groups import CORE, GROUPS, check, instances
+from scripts.synth.names import Names
+from scripts.synth.routed import Slowest
+from scripts.synth.wrapper import ports, wrap
+from scripts.synth.yosys import Design, modules_of, part_of, read_sta
+
+ROW = {"lut": 1000, "ff": 500, "dsp": 20, "bram": 2}
+
+
+def one(**figures) -> dict:
+    """Counts of one family and one row, made up."""
+    return {"xc7": {"svm": {**ROW, **figures}}}
+
+
+# The groups
+
+
+def test_every_instance_has_one_group():
+    check(list(instances(RTL / f"{CORE}.vhd")))
+
+
+@pytest.mark.parametrize(
+    ("labels", "groups", "words"),
+    [
+        (["a", "b"], {"x": ("a",)}, "b is in no group"),
+        (["a"], {"x": ("a", "b")}, "b is in a group and not in the file"),
+        (["a", "b"], {"x": ("a", "b"), "y": ("b",)}, "b is in two groups"),
+    ],
+)
+def test_a_wrong_assignment_is_named(labels, groups, words):
+    with pytest.raises(ValueError, match=words):
+        check(labels, groups)
+
+
+def test_instances_are_read_without_comments(tmp_path):
+    file = tmp_path / "x.vhd"
+    file.write_text(
+        "  A_1 : entity work.one\n  -- b : entity work.two\n  c: entity WORK.three generic map (\n"
+    )
+    assert instances(file) == {"a_1": "one", "c": "three"}
+
+
+# The cells
+
+
+def test_cells_are_counted_by_kind():
+    cells = {"LUT2": 3, "INV": 2, "FDRE": 5, "FDSE": 1, "DSP48E1": 2, "RAMB18E1": 3, "RAMB36E1": 1}
+    cells |= {"SRL16E": 4, "RAM64M": 1, "CARRY4": 2, "CARRY8": 1, "MUXF7": 6, "$scopeinfo": 9, "LDCE": 1}
+    assert count(cells) == Count(
+        lut=3 + 2 + 4 + 4, ff=6, dsp=2, bram=2.5, lut_memory=8, muxf=6, carry_bits=16, latches=1
+    )
+
+
+def test_an_unknown_cell_is_an_error():
+    with pytest.raises(ValueError, match="URAM288"):
+        count({"URAM288": 1})
+
+
+def test_instances_are_not_cells(tmp_path):
+    modules = {
+        "\\top": {"num_cells_by_type": {"LUT2": 1, "sub": 2}},
+        "\\sub": {"num_cells_by_type": {"INV": 1}},
+    }
+    (tmp_path / "s.json").write_text(json.dumps({"modules": modules}))
+    assert read_cells(tmp_path / "s.json") == {"top": {"LUT2": 1}, "sub": {"INV": 1}}
+
+
+def test_modules_belong_to_the_longest_name():
+    text = "module speed_16\nmodule speed_pi\nmodule speed_pi_3\nmodule speed\nmodule speeds\n"
+    entities = ["speed", "speed_pi"]
+    assert modules_of(text, "speed", entities) == ["speed_16", "speed"]
+    assert modules_of(text, "speed_pi", entities) == ["speed_pi", "speed_pi_3"]
+
+
+def test_a_part_has_what_it_instantiates():
+    text = "".join(
+        f"module {name}\n  (input a);\n{body}endmodule\n"
+        for name, body in (
+            ("leaf", ""),
+            ("other", ""),
+            ("one", "  leaf x (\n    .a(a));\n"),
+            ("top", "  one y (\n    .a(a));\n"),
+        )
+    )
+    part = part_of("/* heading */\n" + text, ["top"])
+    assert [line for line in part.splitlines() if line.startswith("module")] == [
+        "module top",
+        "module one",
+        "module leaf",
+    ]
+
+
+# The kept file
+
+
+@pytest.mark.parametrize("name", kept.FIGURES)
+@pytest.mark.parametrize("before", range(0, 120, 7))
+def test_changes_at_the_limit(name, before):
+    """Every count near every kept one: a change is told exactly where it is above 3 %, both ways."""
+    for after in range(0, 130):
+        off = 100 * abs(after - before) > 3 * before
+        assert bool(kept.changes(one(**{name: before}), one(**{name: after}))) == off, (before, after)
+
+
+def test_a_change_names_family_row_figure_and_both_values():
+    assert kept.changes(one(), one(lut=1031)) == ["xc7 svm lut: 1000 kept, 1031 counted"]
+    assert len(kept.changes(one(), one(lut=900, ff=600, dsp=19, bram=0))) == 4
+
+
+def test_rows_that_come_and_go():
+    there, absent = one(lut=1000), {"xc7": {"svm": None}}
+    assert kept.changes(absent, absent) == []
+    assert kept.changes(absent, there) == ["xc7 svm: was not there"]
+    assert kept.changes(there, absent) == ["xc7 svm: was there"]
+    assert kept.changes({}, there) == ["xc7 svm: never kept"]
+    assert kept.changes({"xc7": {"svm": {"lut": 1000}}}, there)[0] == "xc7 svm ff: none kept, 500 counted"
+    assert kept.changes(there, {}) == []  # a family that was not counted
+
+
+def test_update_keeps_the_rest_and_logs(tmp_path):
+    path = tmp_path / "counts.json"
+    kept.update({"xc7": {"a": ROW, "b": ROW}}, "first", "Yosys 1", path, "2026-01-01")
+    moved = kept.update(
+        {"xc7": {"a": {**ROW, "lut": 1029, "ff": 400}}}, " second ", "Yosys 2", path, "2026-01-02"
+    )
+    now = kept.read(path)
+    assert moved == ["xc7 a ff: 500 kept, 400 counted"]
+    assert now["counts"] == {"xc7": {"a": {**ROW, "lut": 1029, "ff": 400}, "b": ROW}}
+    assert now["tool"] == "Yosys 2"
+    assert [(e["date"], e["reason"]) for e in now["log"]] == [
+        ("2026-01-01", "first"),
+        ("2026-01-02", "second"),
+    ]
+    assert now["log"][1]["changes"] == moved
+
+
+def test_update_wants_a_reason(tmp_path):
+    with pytest.raises(ValueError, match="reason"):
+        kept.update(one(lut=1), "  ", "Yosys 1", tmp_path / "counts.json")
+    assert not (tmp_path / "counts.json").exists()
+
+
+@pytest.mark.parametrize(
+    ("text", "words"), [("{", "line 1"), ("{}", "'counts'"), ('{"counts": {}, "log": 3}', "'log'")]
+)
+def test_a_broken_file_is_named(tmp_path, text, words):
+    path = tmp_path / "counts.json"
+    path.write_text(text)
+    with pytest.raises(ValueError, match=f"counts.json.*{words}"):
+        kept.read(path)
+
+
+def test_small_changes_do_not_add_up():
+    """Two steps of 2 % without an update are told at the second, for the kept figure has not moved."""
+    assert kept.changes(one(), one(lut=1020)) == []
+    assert kept.changes(one(), one(lut=1040)) != []
+
+
+# The report
+
+
+def test_sums_and_targets():
+    groups = {name: Count(lut=1000, dsp=13) for name in GROUPS} | {"registers_telemetry": None}
+    groups["protection"] = Count()
+    total = report.sums(groups)
+    assert (total["foc"].lut, total["core"].lut, total["sum"].lut) == (2000, 4000, 4000)
+    assert [line.rsplit(": ", 1)[1] for line in report.against_targets(groups)] == ["met"] * 4
+    groups["io_svm"] = Count(lut=1001, dsp=14)
+    assert [line.rsplit(": ", 1)[1] for line in report.against_targets(groups)][:2] == ["missed by 1"] * 2
+    assert "not there" in report.table(groups)
+
+
+# The wrapper and the routed path
+
+
+MODULE = "module m\n  (input  clk,\n   input  [2:0] a,\n   input b,\n   output [1:0] c,\n   output d);\nendmodule\n"
+
+
+def test_the_wrapper_reaches_every_bit():
+    assert ports(MODULE, "m")[1:3] == [("input", "a", 3), ("input", "b", 1)]
+    text = wrap(MODULE, "m")
+    assert "m dut (.clk(clk), .a(given[2:0]), .b(given[3:3]), .c(made[1:0]), .d(made[2:2]));" in text
+    assert "reg [3:0] given" in text and "reg [2:0] taken" in text
+
+
+def test_registers_have_the_names_of_the_vhdl(tmp_path):
+    verilog = """module m
+  (input  clk,
+   input [1:0] a,
+   output [1:0] c);
+  reg [1:0] n7_q;
+  assign prod_2 = n7_q; // (signal)
+  /* control/x.vhd:12:3  */
+  assign n6_o = $signed(a) * $signed(a); // smul
+  always @(posedge clk)
+    n7_q <= n6_o;
+endmodule
+"""
+    text = verilog + wrap(verilog, "m")
+    (tmp_path / "design.v").write_text(text)
+    chain = next(n for n, line in enumerate(text.splitlines(), 1) if "given <=" in line)
+
+    def cell(kind, line, bit=99):
+        return {
+            "type": kind,
+            "attributes": {"src": f"design.v:{line}.3-{line + 1}.9"},
+            "connections": {"Q": [bit]},
+        }
+
+    cells = {
+        "x_TRELLIS_FF_Q_1": cell("TRELLIS_FF", 9),
+        "x_MULT18X18D_P9": cell("MULT18X18D", 8),
+        "dut.a_TRELLIS_FF_Q": cell("TRELLIS_FF", chain, 31),
+        "taken_TRELLIS_FF_Q": cell("TRELLIS_FF", chain, 40),
+        "x_LUT4_Z": {"type": "LUT4", "attributes": {}},
+        "dut.n9.0.0": {"type": "DP16KD", "attributes": {}},
+    }
+    nets = {"given": {"bits": [30, 31]}, "taken": {"bits": [40, 41]}}
+    (tmp_path / "design.json").write_text(
+        json.dumps({"modules": {"shifted": {"cells": cells, "netnames": nets}}})
+    )
+    names = Names(tmp_path, "m")
+    assert [names.register(name) for name in cells] == [
+        "m.prod_2",
+        "multiplier of control/x.vhd:12",
+        "input a",
+        "output c",
+        "x",
+        "block RAM dut.n9.0.0",
+    ]
+
+
+def test_a_path_in_words():
+    carry = ["n3_CCU2C_S0$CCU2_COMB0", "n3_CCU2C_S0$CCU2_COMB1"]
+    cells = ["n1_o_TRELLIS_FF_Q_3", "p_MULT18X18D_P9", *carry, "n4_o_LUT4_Z"]
+    path = described(Slowest([(cell, "F") for cell in cells], "n4_q_TRELLIS_FF_Q", 7.1, 5.1), str.upper)
+    assert (path.start, path.end) == (cells[0].upper(), "N4_Q_TRELLIS_FF_Q")
+    assert (path.delay, path.logic) == (7.1, 5.1)
+    assert path.cells == ("MULT18X18D", "carry of 2 bits", "LUT4")
+
+
+# The real thing
+
+
+def test_small_blocks_are_as_kept():
+    """Three blocks through GHDL 5 and yosys, against docs/synth/counts.json."""
+    try:
+        verilog.find_ghdl()
+    except verilog.NoUsableGhdl as reason:
+        pytest.skip(str(reason))
+    counted = {n: c.kept() for n, c in Design(quiet=True).blocks(SMALL, "xc7").items()}
+    kept_counts = {"xc7, block alone": kept.read()["counts"]["xc7, block alone"]}
+    assert kept.changes(kept_counts, {"xc7, block alone": counted}) == [], "make synth ARGS='--update REASON'"
+    assert all(row["lut"] > 0 for row in counted.values())
+
+
+def test_logic_delay_is_read(tmp_path):
+    text = "Warning: Module 'FDRE' has no timing arcs!\nLatest arrival time in 'fluxproof' is 2678:\n"
+    (tmp_path / "sta.txt").write_text(text)
+    assert read_sta(tmp_path / "sta.txt") == {"logic_ns": 2.678, "without_arcs": ["FDRE"]}
+    (tmp_path / "sta.txt").write_text("nothing")
+    with pytest.raises(ValueError, match="sta"):
+        read_sta(tmp_path / "sta.txt")
+
+
+def test_the_verdict_names_the_median():
+    def said(*fmax):
+        return timing.verdict({"fmax_mhz": list(fmax), "median": sorted(fmax)[len(fmax) // 2]})
+
+    assert "median 130.0 MHz, 120.0 to 140.0; target 130 MHz: met" in said(140.0, 120.0, 130.0)
+    assert said(129.0).endswith("missed by 1 MHz")

@@ -1,0 +1,123 @@
+"""The Tcl for Vivado run by tclsh against a stub that knows the commands, the files and the core's pins."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+from lxml import etree
+
+from fluxproof.checkout import ROOT, RTL
+from fluxproof.cosim.sources import rtl_sources
+from scripts.package import axi_top, ipxact
+
+S = {"s": ipxact.SPIRIT}
+VIVADO = ROOT / "scripts" / "vivado"
+
+
+@pytest.fixture(scope="module")
+def facts(tmp_path_factory):
+    """component.xml in the words of vivado_stub.tcl."""
+    component = etree.parse(ipxact.PATH).getroot()
+
+    def tcl(elements) -> str:
+        return "{" + " ".join(e.findtext("s:name", namespaces=S) for e in elements) + "}"
+
+    vlnv = ":".join(component.findtext(f"s:{part}", namespaces=S) for part in ("vendor", "library", "name"))
+    path = tmp_path_factory.mktemp("vivado") / "facts.tcl"
+    path.write_text(
+        f"set core_vlnv {vlnv}\n"
+        f"set core_pins {tcl(component.findall('s:model/s:ports/s:port', S))}\n"
+        f"set core_interfaces {tcl(component.findall('s:busInterfaces/s:busInterface', S))}\n"
+        f"set core_parameters {tcl(component.findall('s:model/s:modelParameters/s:modelParameter', S))}\n"
+    )
+    return path
+
+
+def needs_tclsh() -> None:
+    """Skips where there is no Tcl."""
+    if shutil.which("tclsh") is None:
+        pytest.skip("there is no tclsh here")
+
+
+def stubbed(facts: Path, script: Path, *arguments: str) -> subprocess.CompletedProcess:
+    """``script`` under vivado_stub.tcl."""
+    needs_tclsh()
+    stub = ROOT / "cocotb_tests" / "vivado_stub.tcl"
+    return subprocess.run(
+        ["tclsh", str(stub), str(facts), str(script), *arguments], capture_output=True, text=True
+    )
+
+
+def test_packaging_script(facts, tmp_path):
+    done = stubbed(facts, VIVADO / "package_ip.tcl", str(tmp_path))
+    assert done.returncode == 0, done.stderr
+    added = re.search(r"^add_files -norecurse 1 \{(.*)\}", done.stdout, re.MULTILINE)[1].split()
+    assert set(map(Path, added)) == set(rtl_sources())
+    assert f"set_property  version {ipxact.version()} " in done.stdout
+    assert "ipx::check_integrity" in done.stdout and f"-root_dir {tmp_path}/ip" in done.stdout
+
+
+def test_example_script(facts, tmp_path):
+    done = stubbed(facts, VIVADO / "example.tcl", str(tmp_path), "xc7z045ffg900-2")
+    assert done.returncode == 0, done.stderr
+    assert "create_project -part xc7z045ffg900-2 -force 1 example" in done.stdout
+    for report in ("utilization", "timing", "cdc", "drc"):
+        assert f"-file {tmp_path}/reports/{report}.rpt" in done.stdout
+
+
+@pytest.mark.parametrize("name", ["fluxproof.xdc", "fluxproof_clock.xdc", "example.xdc"])
+def test_constraints(facts, name):
+    done = stubbed(facts, VIVADO / name)
+    assert done.returncode == 0, done.stderr
+
+
+def test_constraints_name_registers_that_exist():
+    """Labels of the top and signals of its blocks, as Vivado names their registers."""
+    top = axi_top.PATH.read_text()
+    found = 0
+    for name in ("fluxproof.xdc", "example.xdc"):
+        for label, register in re.findall(r"(\w+)/(\w+)_reg\b", (VIVADO / name).read_text()):
+            entity = re.search(rf"^  {label} : entity work\.(\w+)", top, re.MULTILINE)[1]
+            assert re.search(rf"\b{register} +<=", (RTL / "io" / f"{entity}.vhd").read_text()), register
+            found += 1
+    assert found == 3
+
+
+@pytest.mark.parametrize(
+    ("script", "old", "new", "told"),
+    [
+        ("package_ip.tcl", "update_compile_order", "update_compile_orders", "unknown command: update_compile_orders"),
+        ("package_ip.tcl", "fluxproof.xdc", "fluxprof.xdc", "no file"),
+        ("package_ip.tcl", "-busif $interface", "-bus $interface", "has no option -bus"),
+        ("package_ip.tcl", "ipx::infer_bus_interface irq", "ipx::infer_bus_interface irk", "no port irk"),
+        ("example.tcl", "CONFIG.CARRIER_HALF", "CONFIG.CARRIER", "no parameter CONFIG.CARRIER"),
+        ("example.tcl", "drive/irq", "drive/interrupt", "no pin interrupt"),
+        ("example.tcl", "adc_u_dc position_code trip", "position_code trip", "adc_u_dc is not connected"),
+        ("example.tcl", "[file join $out ip]", "[file join $out ip2]", "does not hold"),
+        ("example.tcl", "-dict [list CONFIG.NUM_SI 1 CONFIG.NUM_MI 2] $control", "-dict {A 1} $control", "property A"),
+    ],
+)  # fmt: skip
+def test_stub_notices_what_is_wrong(facts, tmp_path, script, old, new, told):
+    """A stub that lets everything through would prove nothing."""
+    for path in ("scripts/vivado", "rtl"):
+        shutil.copytree(ROOT / path, tmp_path / path)
+    shutil.copy(ipxact.PATH, tmp_path)
+    copy = tmp_path / "scripts" / "vivado" / script
+    text = copy.read_text()
+    assert old in text
+    copy.write_text(text.replace(old, new))
+    done = stubbed(facts, copy, str(tmp_path / "out"))
+    assert done.returncode != 0 and told in done.stderr, done.stderr
+
+
+def test_dialog_hands_every_generic_on(facts, tmp_path):
+    """xgui: every generic has its field, and its value reaches the model."""
+    text = (ROOT / ipxact.XGUI).read_text()
+    for name in axi_top.GENERICS:
+        assert f'ipgui::add_param $IPINST -name "{name}"' in text
+        assert f"proc update_MODELPARAM_VALUE.{name} {{MODELPARAM_VALUE.{name} PARAM_VALUE.{name}}}" in text
+    assert text.count("{") == text.count("}")

@@ -1,0 +1,100 @@
+"""Dead time: its loss follows the current in the middle of the pulses, and what its curve leaves is neither taken for
+physics that is not there nor hides what is.
+
+Recordings are those of the blind benchmark's drives, whose inverter switches at instants and clamps near zero.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fluxproof.diagnosis import diagnose
+from fluxproof.diagnosis.blocks import view_of
+from fluxproof.diagnosis.catalogue import CATALOGUE
+from fluxproof.diagnosis.effect import full_loss, half_dead_time
+from fluxproof.diagnosis.fit import Fitter, Model
+from fluxproof.diagnosis.nominal import load_nominal
+from fluxproof.diagnosis.recording import from_columns
+from fluxproof.diagnosis.refine import Refiner
+from studies.blind import cases
+from studies.blind.generate import listing
+
+DEAD_TIME = Model(frozenset({"dead_time"}), frozenset({"dead_time"}))
+
+
+def drive_of(seed, number, folder, trace=False):
+    """(case, nominal drive, recording, trace or None) of a case of the benchmark."""
+    entry = next(e for e in listing(seed, 300, None) if e[0] == number)
+    case = cases.make(seed, *entry)
+    columns, _, held = cases.record(case, seed, trace=trace)
+    path = folder / "drive.toml"
+    path.write_text(case.build.nominal.toml())
+    nominal = load_nominal(path)
+    return case, nominal, from_columns(columns, nominal.sample_time_s), held
+
+
+@pytest.fixture(scope="module")
+def strong(tmp_path_factory):
+    """A drive that loses 6 % of its bus, what it loses as cells, and its view."""
+    case, nominal, recording, held = drive_of(27182818, 130, tmp_path_factory.mktemp("strong"), trace=True)
+    view = view_of(recording, nominal)
+    refiner = Refiner(view, {"dead_time": CATALOGUE["dead_time"]}, np.ones(len(view), bool))
+    rows = view.rows[:, None] + np.arange(view.u_dc.shape[1])
+    mean = (held["u_mean_alpha"] + 1j * held["u_mean_beta"])[rows]
+    return case, refiner, refiner.projector.rows({"u": view.to_dq(view.u[:, 1:-1] - mean)})
+
+
+def across(refiner, loss):
+    """rms [V] of what the dead time's curve leaves of a loss at order 0, across the current, of blocks with current."""
+    refiner.cells.y = loss
+    solution = Fitter(refiner.cells, refiner.sigma, refiner.train).solve(DEAD_TIME)
+    left = solution.residual[(refiner.cells.order == 0) & (refiner.cells.channel == "u")].reshape(-1, 2)
+    i = refiner.view.i.mean(axis=1)
+    loaded = np.abs(i) > 0.1 * refiner.view.machine.rated_current_a
+    return float(np.sqrt(np.mean(((left @ [1, 1j]) / (i / np.abs(i))).imag[loaded] ** 2))), solution
+
+
+def test_the_loss_follows_the_current_in_the_middle_of_the_pulses(strong):
+    """One edge of every pulse is late by the whole dead time, so that the converters sample before the middle."""
+    case, refiner, loss = strong
+    before, solution = across(refiner, loss)
+    late = half_dead_time(solution.c, refiner.view.nominal)
+    assert late == pytest.approx(0.5 * case.build.drive.bridge.dead_s, rel=0.15)
+    refiner.view = refiner.view.replace(late_s=late)
+    refiner._weigh()
+    assert across(refiner, loss)[0] < before / 3.0
+
+
+def test_every_part_of_the_curve_is_told(strong):
+    """A column that counts as carried by others would be left out, and what a loss grows be wrong by the rest."""
+    _, refiner, loss = strong
+    c = across(refiner, loss)[1].c["dead_time"]
+    assert all(c.values())
+    assert 0.0 < c["growth"] < 0.08 * full_loss(c)  # a diode's logarithm in a loss that is mostly dead time
+
+
+def test_where_currents_are_near_zero_a_loss_is_in_doubt(strong):
+    _, refiner, _ = strong
+    view, effect, c = refiner.view, CATALOGUE["dead_time"], {"v_0.02": 3.0, "v_0.12": 0.5, "bump_0.05": 0.3}
+    assert full_loss(c) == 3.5
+    idle = view.replace(i_raw=1e-3 * view.i_raw)
+    assert np.allclose(effect.doubt(c, idle), 0.35)
+    assert np.median(effect.doubt(c, view)) < 0.03
+
+
+@pytest.mark.parametrize(
+    ("seed", "number", "names"),
+    [
+        (27182818, 130, ["dead_time"]),  # no inductance of the d axis for what the late pulses leave
+        (27182818, 229, ["dead_time", "phase_resistance_asymmetry"]),  # not one effect for being most of it
+        (27182818, 30, ["dead_time", "resistance"]),  # no drift and no inductance for what is lost at no current
+        # Ohms of a tenth of the loss, which itself has come to a stand.
+        (14142135, 24, ["dead_time", "encoder_eccentricity", "resistance"]),
+        (14142135, 263, ["dead_time"]),  # ohms that a diode's logarithm looks like
+    ],
+)
+def test_beside_strong_dead_time(seed, number, names, tmp_path):
+    _, nominal, recording, _ = drive_of(seed, number, tmp_path)
+    answer = diagnose(recording, nominal)
+    assert (answer.verdict, [e.name for e in answer.effects]) == ("explained", names)

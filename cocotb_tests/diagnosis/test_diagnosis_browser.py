@@ -1,0 +1,102 @@
+"""report.html in headless Chromium: what a reader on a phone sees, in light and in dark.
+
+The page stands in a frame of 400 px, unchanged and with its own Content-Security-Policy; a script outside the frame
+looks at it and leaves what it saw in the dumped DOM.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import subprocess
+from html import unescape
+
+import pytest
+
+from cocotb_tests.support.diagnosis_samples import html_of, made_up, write_all
+from fluxproof.diagnosis import result
+
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+PROBE = """<body style="margin:0"><pre id="seen"></pre><iframe id="f" style="border:0;width:%dpx;height:800px"></iframe>
+<script>
+const frame = document.getElementById("f"), say = v => document.getElementById("seen").textContent = JSON.stringify(v);
+frame.onload = async () => {
+  const doc = frame.contentDocument, all = s => [...doc.querySelectorAll(s)];
+  const wide = async href => {
+    const i = new Image(); i.src = href; await i.decode().catch(() => 0); return i.naturalWidth;
+  };
+  const href = e => e.getAttribute("src") || e.getAttribute("href") || e.getAttribute("xlink:href") || "";
+  const rasters = all("img, image");
+  say({
+    first: doc.body.innerText.trim().split("\\n")[0],
+    overflow: doc.documentElement.scrollWidth - doc.documentElement.clientWidth,
+    width: doc.documentElement.clientWidth,
+    cut: all("p, td, th, code, h1, h2, h3, svg").filter(e => e.getBoundingClientRect().right > %d).length,
+    pictures: all("figure svg").map(e => Math.min(e.getBoundingClientRect().width, e.getBoundingClientRect().height)),
+    rasters: await Promise.all(rasters.map(e => wide(href(e)))),
+    links: all("[src], [href], [*|href]").map(href).filter(h => !/^(data:image.png|#)/.test(h)),
+    fetched: frame.contentWindow.performance.getEntriesByType("resource").map(e => e.name)
+      .filter(name => !name.startsWith("data:")),
+    scripts: all("script").length, title: doc.title, ink: getComputedStyle(doc.body).color,
+  });
+};
+frame.srcdoc = %s;
+</script>"""
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    """{verdict: folder with both files}."""
+    return write_all(tmp_path_factory.mktemp("out"))
+
+
+def seen(html: str, folder, *flags: str, width: int = 400) -> tuple[dict, str]:
+    """(what the probe saw of the page in a frame of that width, what the browser logged)."""
+    if CHROMIUM is None:
+        pytest.skip("chromium is not installed (Debian package chromium)")
+    page = folder / "probe.html"
+    page.write_text(PROBE % (width, width, json.dumps(html).replace("</", "<\\/")), encoding="utf-8")
+    browser = [CHROMIUM, "--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", *flags]
+    browser += [
+        f"--user-data-dir={folder / 'profile'}",
+        "--enable-logging=stderr",
+        "--virtual-time-budget=20000",
+    ]
+    done = subprocess.run(
+        [*browser, "--dump-dom", page.as_uri()], capture_output=True, text=True, timeout=120, encoding="utf-8"
+    )
+    found = re.search(r'<pre id="seen">(.+?)</pre>', done.stdout, re.DOTALL)
+    assert found, done.stderr[-2000:]
+    return json.loads(unescape(found[1])), "\n".join(s for s in done.stderr.splitlines() if "CONSOLE" in s)
+
+
+@pytest.mark.parametrize("verdict", result.VERDICTS)
+def test_in_a_browser(written, tmp_path, verdict):
+    """On a phone of 400 px: the sentence first, nothing wider than the screen, every picture there, nothing fetched."""
+    saw, log = seen(html_of(written[verdict]), tmp_path)
+    assert log == ""
+    assert saw["first"] == made_up()[verdict].sentence
+    assert saw["width"] == pytest.approx(400, abs=20) and saw["overflow"] <= 0 and saw["cut"] == 0
+    expected = {"explained": 7, "ambiguous": 6, "unexplained": 6, "no_mismatch": 6}.get(verdict, 0)
+    assert len(saw["pictures"]) == expected and all(size > 100 for size in saw["pictures"])
+    assert len(saw["rasters"]) == {7: 6, 6: 6}.get(expected, 0) - 2 * (verdict == "no_mismatch")
+    assert all(wide > 0 for wide in saw["rasters"])
+    assert saw["links"] == saw["fetched"] == [] and saw["scripts"] == 0
+    assert saw["title"] == f"Fluxproof diagnosis: {verdict.replace('_', ' ')}"
+
+
+def test_in_a_dark_browser(written, tmp_path):
+    light, _ = seen(html_of(written["explained"]), tmp_path, "--blink-settings=preferredColorScheme=1")
+    dark, log = seen(html_of(written["explained"]), tmp_path, "--blink-settings=preferredColorScheme=0")
+    assert light["ink"] == "rgb(29, 33, 39)" and dark["ink"] == "rgb(230, 233, 237)" and log == ""
+
+
+def test_the_probe_sees_what_is_wrong(written, tmp_path):
+    """The same eyes on a page with a picture from elsewhere, a broken one, a script and a line that is too wide."""
+    wrong = """<p style="width: 900px">wide</p><img src="http://127.0.0.1:9/x.png"><script>0</script>
+    <img src="data:image/png;base64,AAAA">"""
+    saw, log = seen(html_of(written["bad_recording"]).replace("<body>", "<body>" + wrong), tmp_path)
+    assert saw["first"] == "wide" and saw["overflow"] > 300 and saw["cut"] > 0
+    assert saw["rasters"] == [0, 0] and "http://127.0.0.1:9/x.png" in saw["links"] and saw["scripts"] == 1
+    assert "Content Security Policy" in log

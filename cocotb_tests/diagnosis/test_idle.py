@@ -1,0 +1,61 @@
+"""Dead time at an operating point without current is called something else, and stands beside that."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from cocotb_tests.core.test_registers import PAPER
+from cocotb_tests.support.diagnosed_drives import MACHINE, recorded
+from fluxproof.diagnosis import diagnose
+from fluxproof.diagnosis.blocks import view_of
+from fluxproof.diagnosis.catalogue import CATALOGUE
+from fluxproof.diagnosis.fit import Model, Solution
+from fluxproof.diagnosis.idle import carries_none, unseen_loss
+from fluxproof.diagnosis.nominal import load_nominal
+
+NOMINAL = load_nominal(PAPER)
+BUS, PERIOD = NOMINAL.inverter.dc_bus_v, NOMINAL.sample_time_s
+STILL = ((160.0, 0.0, 0.0),) * 20
+
+
+@pytest.fixture(scope="module")
+def still():
+    return view_of(recorded(STILL, machine={"magnet_flux_wb": 0.97 * MACHINE.magnet_flux_wb}), NOMINAL)
+
+
+def said(**c) -> Solution:
+    return Solution(Model(frozenset(c)), 100.0, 1, 1000, c=c, score=120.0)
+
+
+def loss_of(view, *solutions) -> float:
+    """Loss [V] of the dead time that stands beside the solutions, 0 where none does."""
+    beside = unseen_loss(view, CATALOGUE["dead_time"], solutions)
+    return CATALOGUE["dead_time"].size(beside[0].c["dead_time"], NOMINAL) if beside else 0.0
+
+
+def test_late_pulses_may_be_those_of_a_dead_time(still):
+    late = {"tau": 0.02 * PERIOD}
+    assert loss_of(still, said(delay=late)) == loss_of(still, said(sampling_skew=late)) == pytest.approx(0.02 * BUS)
+    assert not loss_of(still, said(delay={"tau": -0.02 * PERIOD}))  # none makes them early
+    assert not loss_of(still, said(delay={"tau": PERIOD}))  # nor late by all of a period
+    assert not loss_of(still, said(delay=late), said(dead_time={"v_0.02": 1.0}))
+
+
+def test_less_flux_may_be_the_loss_of_a_dead_time(still):
+    less, more = ({"delta_psi_m": share * MACHINE.magnet_flux_wb} for share in (-0.005, 0.005))
+    lacking = loss_of(still, said(magnet_flux=less))
+    assert 0.0 < lacking == pytest.approx(loss_of(still, said(udc_gain={"gain": -0.005})))
+    assert not loss_of(still, said(magnet_flux=more))
+
+
+def test_a_current_shows_the_loss_itself(still):
+    assert carries_none(still)
+    loaded = still.replace(i=still.i + 0.5j * NOMINAL.machine.rated_current_a)
+    assert not carries_none(loaded) and not loss_of(loaded, said(delay={"tau": 0.02 * PERIOD}))
+
+
+def test_without_current_less_flux_is_not_certain():
+    answer = diagnose(recorded(STILL, machine={"magnet_flux_wb": 0.995 * MACHINE.magnet_flux_wb}), NOMINAL)
+    assert answer.verdict == "ambiguous" and {"dead_time", "magnet_flux"} <= set().union(*answer.ambiguity)
+    assert any(np.hypot(r.i_d, r.i_q) > 0.1 * NOMINAL.machine.rated_current_a for r in answer.next_recording)

@@ -1,0 +1,144 @@
+"""Which recording a diagnosis asks for: the points that leave the least room to a rival that is fitted anew."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from cocotb_tests.core.test_registers import PAPER
+from cocotb_tests.support.diagnosed_drives import MACHINE, recorded
+from fluxproof.diagnosis.blocks import view_of
+from fluxproof.diagnosis.catalogue import CATALOGUE
+from fluxproof.diagnosis.experiment import ENOUGH, best_points, rivalry, told
+from fluxproof.diagnosis.fit import Model
+from fluxproof.diagnosis.nominal import load_nominal
+from fluxproof.diagnosis.refine import Refiner
+from fluxproof.diagnosis.request import grid, known_of, new_axes, requests, steady_view
+
+NOMINAL = load_nominal(PAPER)
+RATED = NOMINAL.machine.rated_current_a
+NOISE_V = 0.005
+LOSSY = {"iron_conductance_s": 1 / 3000.0}
+STILL = tuple((w, 0.0, 0.0) for w in (160.0, -160.0, 80.0, -80.0, 40.0, -120.0)) * 2  # spun without current
+
+
+def search_of(**deviation):
+    """A search's problem of a recording, all blocks fitted."""
+    view = view_of(recorded(**deviation), NOMINAL)
+    return Refiner(view, CATALOGUE, np.ones(len(view), bool))
+
+
+@pytest.fixture(scope="module")
+def lossy():
+    return search_of(machine=LOSSY)
+
+
+def on_a_line(known, sigma=0.2):
+    """A parabola taken for the truth, a straight line b x fitted against it at nine candidates from -1 to 1."""
+    x = np.linspace(-1.0, 1.0, 9)
+    return rivalry(x**2, 0.0 * x, x[None, :], np.array([[known]]), np.full(9, sigma), np.arange(9), 9)
+
+
+def test_what_a_rival_can_take_up_is_no_distance():
+    """At one point a line passes through the parabola; a point and its mirror image leave it nothing to gain."""
+    free, settled = on_a_line(1e-6), on_a_line(1e12)
+    assert free.left([8]) < 1e-4 < 24.0 < settled.left([8])
+    assert free.left([0, 8]) == pytest.approx(2.0 / 0.2**2, rel=1e-6)
+    x, y = np.array([0.5, 1.0]), np.array([0.25, 1.0])  # the formula against a fit
+    b = (x @ y) / (x @ x)
+    assert free.left([6, 8]) == pytest.approx(np.sum((y - b * x) ** 2) / 0.2**2, rel=1e-6)
+
+
+def test_points_are_chosen_together():
+    """Of a rival that nothing settles yet each point alone is worth nothing, a point and its mirror image most."""
+    assert sorted(best_points([on_a_line(1e-6)], 2)) == [0, 8]
+
+
+def test_a_point_is_asked_for_once():
+    """Where one point would do, others must bear it out: an explanation that is not tied yet may stand there too."""
+    for sigma in (0.2, 0.01):
+        assert sorted(best_points([on_a_line(1e12, sigma)], 3)) in ([0, 1, 8], [0, 7, 8])
+
+
+def test_what_is_told_anyway_is_asked_for_where_it_strains_the_drive_least():
+    strain = 0.2 * np.linspace(-1.0, 1.0, 9) ** 2
+    faint, clear = on_a_line(1e12), on_a_line(1e12, 1e-4)
+    assert set(best_points([faint], 2, 0.0, strain)) == {0, 8}
+    mild = best_points([clear], 3, 0.0, strain)
+    assert not {0, 8} & set(mild)
+    assert all(told([clear], [n for n in mild if n != k]) >= ENOUGH for k in mild)  # any of them may be lost
+    out = np.where(np.abs(np.linspace(-1.0, 1.0, 9)) < 0.6, 0.0, 10.0)
+    assert sorted(best_points([on_a_line(1e-6)], 2, out)) == [2, 6]
+
+
+def test_a_skew_is_told_from_an_iron_loss_under_load():
+    """Without current both are omega^2 psi_m on the d axis; the loss follows the flux of the load as well."""
+    still = view_of(recorded(STILL, machine=LOSSY), NOMINAL)
+    search = Refiner(still, CATALOGUE, np.ones(len(still), bool))
+    solutions = [search.refine(Model(frozenset([n]))) for n in ("iron_loss", "sampling_skew")]
+    asked = requests(search, solutions, 0.05)
+    top = np.abs(still.omega).max()
+    assert asked and all(abs(r.omega_e) > 0.9 * top for r in asked)
+    assert all(np.hypot(r.i_d, r.i_q) > 0.5 * RATED for r in asked)
+    assert set(asked[0].separates) == {"iron_loss", "sampling_skew"} and " V between " in asked[0].why
+
+
+def test_a_new_axis_is_asked_for_only_where_it_tells_more():
+    """Curves over i_q are told by i_q; what i_d brings with it would have to be told as well."""
+    view = view_of(recorded(machine={"inductance_q_h": 1.1 * MACHINE.inductance_q_h}), NOMINAL)
+    only_q = view.take(np.abs(view.i.real.mean(axis=1)) < 0.05 * RATED)
+    search = Refiner(only_q, CATALOGUE, np.ones(len(only_q), bool))
+    solutions = [search.refine(Model(frozenset([n]))) for n in ("inductance_q", "saturation")]
+    assert all(abs(r.i_d) < 1e-9 for r in requests(search, solutions, NOISE_V))
+    on_d = np.array([-0.5 * RATED, 0.5j * RATED, 0.0])
+    assert new_axes(only_q, on_d).tolist() == [1.0, 0.0, 0.0] and not new_axes(view, on_d).any()
+
+
+def test_there_is_always_something_to_ask_for(lossy):
+    """Where no point tells much, those that tell most are asked for."""
+    same = lossy.refine(Model(frozenset(["sampling_skew"])))
+    weak = lossy.refine(Model(frozenset(["sampling_skew", "udc_gain"])))
+    assert 1 <= len(requests(lossy, [same, weak], 100.0)) <= 3
+
+
+def test_a_constant_is_told_from_a_drift_cold():
+    search = search_of(machine={"magnet_flux_wb": 0.97 * MACHINE.magnet_flux_wb})
+    solutions = [search.refine(Model(frozenset([n]))) for n in ("magnet_flux", "magnet_temperature")]
+    for s in solutions:  # as one operating point would leave it: both the same at the end of the recording
+        s.c[next(iter(s.c))] = {k: -0.005 for k in s.c[next(iter(s.c))]}
+    warm, cold = (requests(search, solutions, NOISE_V, cold=x) for x in (False, True))
+    assert all(r.temp_winding is None for r in warm)
+    assert cold[0].temp_winding == NOMINAL.machine.temperature_ref_c and "cooled down" in cold[0].why
+
+
+def test_warm_and_cold_points_stand_in_one_view(lossy):
+    made = steady_view(lossy.view, [100.0, 100.0], [1j, 1j], np.array([False, True]))
+    assert made.course.tolist() == [1.0, 0.0]
+    assert made.top_speed == lossy.view.top_speed > 100.0  # to which a curve over speed refers
+
+
+def test_points_are_within_what_the_drive_was_seen_to_reach(lossy):
+    view = lossy.view
+    omega, i = grid(view)
+    half = 0.5 * 0.9 * NOMINAL.inverter.dc_bus_v / np.sqrt(3) / NOMINAL.machine.magnet_flux_wb
+    assert np.abs(omega).max() <= 1.2001 * max(np.abs(view.omega).max(), half)
+    assert np.abs(i).max() <= 1.0001 * RATED
+    u = NOMINAL.machine.resistance_ohm * i + 1j * omega * (view.inductances(i) + NOMINAL.machine.magnet_flux_wb)
+    assert np.abs(u).max() <= 0.9 * NOMINAL.inverter.dc_bus_v / np.sqrt(3)
+    assert {(np.sign(w), np.sign(x.imag.round(9))) for w, x in zip(omega, i, strict=True)} >= {(1, 1), (1, -1), (-1, 1)}
+
+
+def test_a_part_of_a_curve_that_was_not_seen_is_not_known(lossy):
+    """At one speed ohms and their growth with it are one thing: their sum is known, neither of them is."""
+    view = lossy.view
+    one = view.take(np.isclose(view.omega.mean(axis=1), view.omega.max(), rtol=0.05))
+    search = Refiner(one, {"resistance": CATALOGUE["resistance"]}, np.ones(len(one), bool))
+    solution = search.refine(Model(frozenset(["resistance"])))
+    solution.c["resistance"]["delta_r"] = 0.3
+    at_rest, at_speed = np.array([1.0, 0.0]), np.array([1.0, 1.0])
+    known = known_of(search, solution, {("resistance", k): np.ones(9) for k in ("delta_r", "skin")})
+    doubt = np.linalg.inv(known)
+    assert at_rest @ doubt @ at_rest > 100.0 * (at_speed @ doubt @ at_speed)
+    # Candidates that are eight times as fast do not make it better known where it was recorded.
+    columns = {("resistance", k): n * np.ones(9) for k, n in (("delta_r", 1.0), ("skin", 64.0))}
+    assert np.allclose(known_of(search, solution, columns), known)

@@ -1,0 +1,173 @@
+"""The demo's pieces: numbers on made-up data, a self-contained page, a recording through its codes."""
+
+from __future__ import annotations
+
+import base64
+import io
+import json
+import re
+from collections import namedtuple
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from fluxproof.cosim import dut_replay, ghdl
+from fluxproof.cosim.golden_loop import run_controller
+from fluxproof.cosim.scenarios import RPM, fig9
+from fluxproof.golden_model import drive as drives
+from fluxproof.golden_model import fluxproof
+from fluxproof.golden_model.fluxproof import Observed
+from fluxproof.golden_model.registers import registers
+from fluxproof.golden_model.units import from_si, to_si
+from studies import demo
+from studies.demo import plots, report
+
+
+@pytest.fixture(scope="module")
+def drive():
+    return drives.with_carrier(drives.load(demo.DRIVES / "paper001.toml"), 1000)
+
+
+def edges_of_a_run(periods: int) -> np.ndarray:
+    """Leg a switches at clocks 500 and 1500 of each period with 40 clocks of dead time; b and c stay low."""
+    others = 0b110000
+    one = [(500, others), (540, others | 1), (1500, others), (1540, others | 8)]
+    return np.array([(k, clock, word) for k in range(periods) for clock, word in one], np.int64)
+
+
+@pytest.fixture(scope="module")
+def made_up(drive):
+    """A run whose speed is 2 rpm low throughout but dips by 50 rpm 10 ms after the load step."""
+    scenario, n = fig9(drive), len(fig9(drive))
+    zeros = np.zeros(n, np.int64)
+    arrays = {f"observed_{name}": zeros for name in Observed._fields}
+    for name, value in (("i_q_ref", 2.0), ("u_max", 300.0), ("u_alpha", 150.0)):
+        arrays[f"observed_{name}"] = np.full(n, from_si(name, value, drive))
+    arrays["gate_edges"] = edges_of_a_run(n)
+    omega = to_si("omega_ref", scenario.omega_ref, drive) / drive.machine.pole_pairs - 2 * RPM
+    load_step = int(np.flatnonzero(scenario.load)[0])
+    omega[load_step + 100] -= 48 * RPM
+    arrays |= {"plant_omega_m": omega, "plant_i_d": np.full(n, 0.3), "plant_i_q": np.full(n, 1.6)}
+    return report.run_view(arrays, drive, scenario, registers(drive))
+
+
+def test_metrics(made_up):
+    m = report.metrics(made_up)
+    assert m["speed_error_rpm"]["worst"] == pytest.approx(2.0, abs=0.02)
+    assert m["speed_dip_rpm"] == pytest.approx(50.0, abs=0.02)
+    assert m["speed_dip_after_ms"] == pytest.approx(10.0)
+    assert m["i_d_tracking_a"] == pytest.approx(dict(rms=0.3, worst=0.3, settled_rms=0.3, settled_worst=0.3))
+    assert m["i_q_tracking_a"]["rms"] == pytest.approx(0.4, abs=1e-3)
+    assert m["peak_current_a"] == pytest.approx(np.hypot(0.3, 1.6), abs=1e-4)
+    assert m["voltage_of_circle_percent"] == pytest.approx(50.0, abs=0.01)
+    assert (m["both_gates_on"], m["shortest_dead_time_us"]) == (0, 2.0)
+
+
+def test_dead_times_notice_a_shoot_through():
+    edges = edges_of_a_run(3)
+    assert report.dead_times(edges, 1000) == (0, 40)
+    edges[5, 2] |= 8  # lower gate still on when the upper one comes
+    assert report.dead_times(edges, 1000)[0] == 1
+
+
+def test_gate_view_finds_the_dead_time(made_up):
+    gates = report.gate_view(made_up, 7)
+    assert gates.words[0] == 0b111000  # what the period before left
+    assert gates.dead_us == pytest.approx((25.0, 27.0))
+
+
+def summary_of(run) -> dict:
+    counts = dict(periods_compared=3000, differences=0, sample_to_duty_clocks=38, gate_edges=9)
+    counts |= dict(ghdl_seconds=1.0)
+    return {**counts, **report.metrics(run), "recording": {"skipped": "not here"}, "wall_time_s": 2.0}
+
+
+def test_report_is_self_contained(made_up, drive, tmp_path):
+    figures = plots.draw(made_up, report.gate_view(made_up, 7))
+    loop = SimpleNamespace(drive=drive, drive_file="paper001.toml", registers=registers(drive))
+    context = dict(good=True, problems=[], loop=loop, replay=None, view=None, real=drive)
+    page = report.write(tmp_path / "report.html", figures, summary_of(made_up), **context).read_text()
+    assert "3,000 periods, 0 differences" in page and "Skipped: not here" in page
+    images = re.findall(r'src="data:image/svg\+xml;base64,([A-Za-z0-9+/=]+)"', page)
+    assert len(images) == page.count("src=") == len(figures) - 1  # all but the README's picture
+    assert not re.search(r"href|url\(|@import|<script|<link", page)
+    for image in images:  # inside a drawing, only its own parts are referred to
+        assert not re.search(rb'href="(?!#)|url\((?!#)|@import', base64.b64decode(image))
+
+
+def test_verdict_and_exit_status(made_up):
+    summary = summary_of(made_up)
+    assert demo.passed(summary, []) and not demo.passed(summary, ["Fig. 9: a problem"])
+    assert not demo.passed({**summary, "periods_compared": 1999}, [])
+    assert not demo.passed({**summary, "recording": {"differences": 1}}, [])
+    assert "1 difference," in report.verdict({**summary, "differences": 1})
+
+
+def test_progress_lines():
+    """Plain lines at every 10 %; on a terminal one line that fits, with the time left."""
+    kind = namedtuple("Simulation", "name total")
+    loop, replay = kind("Fig. 9", 3000), kind("recording", 14595)
+    plain = demo.Progress([loop, replay], io.StringIO())
+    plain.show({loop: 0, replay: 0}, 0.0)
+    plain.show({loop: 60, replay: 290}, 1.0)
+    plain.show({loop: 360, replay: 300}, 11.0)
+    assert plain.out.getvalue() == "Fig. 9: 10 %, 360 of 3000 periods, 30/s, 88 s left\n"
+    for columns in (60, 79, 200):
+        line = plain.line({loop: 1500, replay: 14595}, 61.0, columns)
+        assert len(line) <= columns and "1500/3000" in line
+        assert columns < 79 or line.endswith("s left")
+
+
+def test_replay_in_ghdl(tmp_path):
+    """A made-up log, through standstill and both directions, equal in every bit of every sample."""
+    columns = dict.fromkeys(dut_replay.COLUMNS.values(), np.zeros(60))
+    columns |= {"iq_A": np.linspace(-330, 330, 60), "id_A": np.full(60, -20.0)}
+    columns |= {"n_rpm": np.linspace(-2000, 2000, 60), "current_cmd": np.linspace(0, 1, 60)}
+    columns["u_dc_V"] = np.full(60, 400.0)
+    log, table = tmp_path / "log.csv", np.column_stack(list(columns.values()))
+    np.savetxt(log, table, delimiter=",", header=",".join(columns), comments="")
+    where = {"FLUXPROOF_RECORDING": str(log)}
+    run = demo.Simulation("made up", "emrax228.toml", demo.REPLAY_CARRIER, "dut_replay", 60, **where)
+    module = "fluxproof.cosim.dut_replay"
+    folder = ghdl.run("fluxproof", module, run.generics, run.environment, key="test_demo")
+    problem = ghdl.failure(folder)
+    assert problem is None, problem
+    counted = json.loads((folder / "summary.json").read_text())
+    assert (counted["periods_compared"], counted["differences"]) == (60, 0) and counted["gate_edges"] > 500
+
+
+@pytest.fixture(scope="module")
+def recording():
+    path, skipped = dut_replay.recording_path()
+    if skipped:
+        pytest.skip(skipped)
+    return dut_replay.load_recording(path)
+
+
+def test_recording_survives_its_codes(recording):
+    """What the golden model sees in the codes is the log, within what the formats of codes and core allow."""
+    drive = drives.load(demo.DRIVES / "emrax228.toml")
+    register_set = registers(drive)
+    rows = dut_replay.sample_inputs(recording, drive)
+    samples = np.column_stack([rows, np.ones(len(rows), np.int64)])
+    observed = np.zeros((len(rows), len(Observed._fields)), np.int64)
+    run_controller(fluxproof.State(), samples, register_set.values, register_set.config, observed)
+    arrays = {f"observed_{name}": observed[:, k] for k, name in enumerate(Observed._fields)}
+    bound = dut_replay.current_bound(recording, drive)
+    view = report.recording_view(recording, bound, arrays, drive)
+    assert np.all(view.current_error <= bound)
+    assert bound.max() < 0.01 * view.top_current  # a bound that says something
+    assert not arrays["observed_current_at_rail"].any()
+    assert np.abs(view.omega_core - view.omega)[100:].mean() < 0.02 * view.top_speed
+
+
+def test_replay_has_a_port_for_every_column():
+    assert len(dut_replay.INPUT_PORTS) + 1 == len(fluxproof.Sample._fields)
+    wanted = [name.removesuffix("_in") for name in dut_replay.INPUT_PORTS]
+    assert wanted == list(fluxproof.Sample._fields[:-1])
+
+
+def test_missing_recording_is_a_reason(monkeypatch):
+    monkeypatch.setenv("FLUXPROOF_RECORDINGS", "/nonexistent")
+    assert "coastdown_run.csv is not there" in dut_replay.recording_path()[1]

@@ -1,0 +1,98 @@
+"""Inside the simulator: pulses of every length on the trip pin at any time, also while the clock stands still."""
+
+from __future__ import annotations
+
+import random
+
+import cocotb
+from cocotb.clock import Clock
+from cocotb.triggers import FallingEdge, ReadOnly, RisingEdge, Timer
+
+from fluxproof.cosim.block_bench import read
+
+PERIOD_NS = 10
+
+
+def gates(dut) -> int:
+    """All six as one word."""
+    return read(dut.gate_high, False) | read(dut.gate_low, False) << 3
+
+
+async def started(dut):
+    """Reset is over, the pin is low, the core wants gates on; returns the clock."""
+    for name in ("trip_pin", "trigger_next"):
+        getattr(dut, name).value = 0
+    dut.gate_high_next.value, dut.gate_low_next.value = 0b101, 0b010
+    dut.rst.value = 1
+    clock = Clock(dut.clk, PERIOD_NS, unit="ns")
+    clock.start()
+    for _ in range(4):
+        await FallingEdge(dut.clk)
+    dut.rst.value = 0
+    for _ in range(3):
+        await FallingEdge(dut.clk)
+    assert gates(dut) == 0b010101 and read(dut.trip, False) == 0
+    return clock
+
+
+@cocotb.test()
+async def registers_everything_once(dut):
+    await started(dut)
+    rng = random.Random(1)
+    for _ in range(200):
+        now = (rng.randrange(8), rng.randrange(8), rng.randrange(2))
+        dut.gate_high_next.value, dut.gate_low_next.value, dut.trigger_next.value = now
+        await FallingEdge(dut.clk)
+        assert (read(dut.gate_high, False), read(dut.gate_low, False), read(dut.sample_trigger, False)) == now
+        assert read(dut.trip, False) == 0
+
+
+@cocotb.test()
+async def no_pulse_is_lost(dut):
+    """Gates off without a clock; trip two edges later; gates stay off until the core has seen it and the pin is low."""
+    await started(dut)
+    rng = random.Random(2)
+    for _ in range(400):
+        # The core's side: it wants gates on all the time, so whatever keeps them off is here.
+        await RisingEdge(dut.clk)
+        await Timer(rng.randrange(1, PERIOD_NS), "ns")
+        width = rng.choice((1, 2, rng.randrange(1, 12), rng.randrange(1, 200)))
+        dut.trip_pin.value = 1
+        await Timer(100, "ps")
+        await ReadOnly()
+        assert gates(dut) == 0, "the gates waited for a clock"
+        cocotb.start_soon(release(dut, width * 1000 - 100))
+        for edge in range(1, 60):
+            await RisingEdge(dut.clk)
+            await Timer(10, "ps")
+            trip = read(dut.trip, False)
+            assert trip == (edge >= 2) or edge > 2, f"trip after {edge} edges"
+            if gates(dut):
+                # Told after edge 2, the core acts at edge 3, and edge 4 takes what it says then.
+                assert edge >= 4, "gates on before the core was told"
+                assert read(dut.trip_pin, False) == 0
+            if edge > 2 and not trip:
+                break
+        else:
+            raise AssertionError("trip never fell")
+        assert gates(dut) == 0b010101
+        await FallingEdge(dut.clk)
+
+
+async def release(dut, picoseconds: int) -> None:
+    """The pin falls after this time."""
+    await Timer(picoseconds, "ps")
+    dut.trip_pin.value = 0
+
+
+@cocotb.test()
+async def works_without_a_clock(dut):
+    clock = await started(dut)
+    clock.stop()
+    await Timer(7, "ns")
+    dut.trip_pin.value = 1
+    await Timer(1, "ns")
+    assert gates(dut) == 0
+    dut.trip_pin.value = 0
+    await Timer(1000, "ns")
+    assert gates(dut) == 0, "gates on again although nobody was told"

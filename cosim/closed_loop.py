@@ -1,0 +1,292 @@
+"""Closed loop: gate edges switch the plant, the plant's sensors feed the core, the golden model runs beside it.
+
+The device under test is anything that can run one PWM period (see Device): the VHDL in GHDL, its Verilog
+conversion in Verilator, or the golden model itself.  All see the same codes; every observed value and every gate
+edge is compared with ``==``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+
+from fluxproof.cosim.golden_clock import SEEN, GoldenClock
+from fluxproof.golden_model import fluxproof
+from fluxproof.golden_model.io import sample_latch
+from fluxproof.golden_model.kernel import kernel
+from fluxproof.plant import Inverter, Machine, Sensors, SwitchingPlant, centred_gates, sensor_params
+from fluxproof.plant.sensors import current_code, position_code, u_dc_code
+
+INPUT_PORTS = tuple(p.name for p in sample_latch.BLOCK.inputs if p.name != "run_in")
+SAMPLE_DELAY = 4  # clocks from sample_trigger to sample_valid: what a converter would take, shortened
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """What happens, period by period: arrays of one length."""
+
+    omega_ref: np.ndarray  # integers, per unit format
+    load: np.ndarray  # [Nm]
+    u_dc: np.ndarray  # [V]
+    i_d_ref: np.ndarray  # integers
+    i_q_ext: np.ndarray  # integers
+    speed_mode: np.ndarray  # 0 or 1
+    enable: np.ndarray  # 0 or 1
+    brake: np.ndarray | None = None  # [Nm] most that a brake on the shaft can hold, see ``load_torque``
+    changes: Mapping[int, Mapping[str, int]] = field(
+        default_factory=dict
+    )  # period -> registers from there on
+    omega_m: float = 0.0  # mechanical speed at the start [rad/s]
+    clear_faults: np.ndarray | None = None  # 0 or 1; None: never
+    temp_winding: np.ndarray | None = (
+        None  # what the thermocouple says [degC]; NaN: lost; None: there is none
+    )
+
+    def __len__(self) -> int:
+        return len(self.load)
+
+    def slow_inputs(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Temperature and whether it is one, and clear_faults, as the core takes them."""
+        zeros = np.zeros(len(self), np.int64)
+        clear = zeros if self.clear_faults is None else self.clear_faults
+        if self.temp_winding is None:
+            return zeros, zeros, clear
+        valid = np.isfinite(self.temp_winding)
+        sixty_fourths = np.round(64.0 * np.where(valid, self.temp_winding, 0.0)).astype(np.int64)
+        return sixty_fourths, valid.astype(np.int64), clear
+
+
+BRAKE_SLOPE = 10.0  # Nm per rad/s: a held shaft creeps below half a rad/s, and a period still integrates well
+
+
+@kernel
+def load_torque(load, brake, omega_m):
+    """Load [Nm] and a brake that only ever opposes the motion, up to ``brake`` [Nm]."""
+    return load + max(-brake, min(brake, BRAKE_SLOPE * omega_m))
+
+
+@dataclass
+class Period:
+    """What a device did in one period, from one sample_trigger to the next."""
+
+    observed: dict[str, int] | None  # None where no sample came out
+    edge_clocks: np.ndarray
+    gate_words: np.ndarray
+    clocks: int
+    sample_to_duty: int
+    running: int  # when the sample was taken
+    flags: tuple[int, ...] = ()  # FLAGS at the end
+
+
+class Device(Protocol):
+    """Runs one period: takes the sample SAMPLE_DELAY clocks after sample_trigger."""
+
+    async def start(self, registers, enable: int) -> Period:
+        """Reset, set the registers, run to the first sample_trigger."""
+
+    async def period(self, inputs: dict[str, int], enable: int) -> Period:
+        """From this sample_trigger to the next; ``inputs`` are the raw sample's ports."""
+
+    def change(self, registers: Mapping[str, int]) -> None:
+        """Set registers, now, between two periods."""
+
+
+def gate_words(seen: np.ndarray) -> np.ndarray:
+    """Six bits, upper gates first, after every clock of GoldenClock.advance."""
+    return seen[:, SEEN.index("gate_high")] + 8 * seen[:, SEEN.index("gate_low")]
+
+
+FLAGS = ("fault_flags", "first_fault", "early_samples")
+
+
+class GoldenPeriods:
+    """The golden core as a period machine; an edge on the last clock belongs to the next period."""
+
+    def __init__(self, register_set):
+        self.core = GoldenClock(register_set.values, register_set.config)
+        self.word, self.carried = 0, None
+
+    def run(self, inputs: dict[str, int] | None, enable: int) -> Period:
+        """From this sample_trigger to the next, with the sample where there is one."""
+        core, limit, seen, running = self.core, 4 * self.core.config.carrier_half, [], 0
+        if inputs is not None:
+            seen = [core.advance(SAMPLE_DELAY, enable=enable)]
+            running = core.running
+        seen.append(core.advance(limit, inputs, until_trigger=True, enable=enable))
+        seen = np.concatenate(seen)
+        words = gate_words(seen)
+        clocks = np.flatnonzero(np.diff(words, prepend=self.word))
+        edges = [(int(c) + 1, int(words[c])) for c in clocks]
+        self.word, length = int(words[-1]), len(seen)
+        if self.carried is not None:
+            edges.insert(0, (0, self.carried))
+        self.carried = edges.pop()[1] if edges and edges[-1][0] == length else None
+        columns = np.array(edges, np.int64).reshape(-1, 2).T
+        flags = tuple(int(seen[-1, SEEN.index(name)]) for name in FLAGS)
+        return Period(None, columns[0], columns[1], length, 0, running, flags)
+
+
+@dataclass
+class Result:
+    """Everything recorded: one row per period, integers as the core shows them, plant in SI units."""
+
+    observed: dict[str, np.ndarray] = field(default_factory=dict)
+    plant: dict[str, np.ndarray] = field(default_factory=dict)
+    periods_compared: int = 0
+    differences: int = 0
+    first_difference: str | None = None
+    sample_to_duty_clocks: int = 0
+    gate_edges: np.ndarray | None = None  # rows of (period, clock, gate word) as the device gave them
+    state: fluxproof.State | None = None  # the golden model's, at the end
+
+
+PLANT_SIGNALS = {
+    "i_a": lambda p: p.i_abc[0],
+    "i_d": lambda p: p.i_dq[0],
+    "i_q": lambda p: p.i_dq[1],
+    "lambda_d": lambda p: p.lambda_dq[0],
+    "lambda_q": lambda p: p.lambda_dq[1],
+    "omega_m": lambda p: p.omega_m,
+    "torque": lambda p: p.torque,
+}
+
+
+def described_sensors(drive) -> Sensors:
+    """Sensors as drive.toml describes them."""
+    s = drive.sensors
+    return Sensors(
+        current_bits=s.adc_bits,
+        current_full_scale_a=s.current_range_a,
+        u_dc_bits=s.adc_bits,
+        u_dc_full_scale_v=s.u_dc_range_v,
+        position_bits=s.position_bits,
+    )
+
+
+def build_plant(
+    drive, sensors: Sensors | None = None, machine: Machine | None = None, omega_m: float = 0.0
+) -> tuple[SwitchingPlant, Sensors]:
+    """Plant and sensors as drive.toml describes them; the device's own dead time comes out of its gates."""
+    machine = machine or Machine.from_mapping(vars(drive.machine))
+    return SwitchingPlant(machine, Inverter(), omega_m=omega_m), sensors or described_sensors(drive)
+
+
+class Beside:
+    """A device with the golden model beside it: both get the same samples, every period is compared."""
+
+    def __init__(self, device: Device, register_set):
+        self.device, self.config = device, register_set.config
+        self.golden, self.result = GoldenPeriods(register_set), Result()
+        self.observed: list[fluxproof.Observed] = []
+        self.edges: list[tuple[int, int, int]] = []
+
+    def differ(self, what: str) -> None:
+        """Count a difference; the first one is kept in words."""
+        self.result.differences += 1
+        self.result.first_difference = self.result.first_difference or f"period {len(self.observed)}: {what}"
+
+    def change(self, registers: Mapping[str, int]) -> None:
+        """Set registers of both between two periods."""
+        self.golden.core.registers = self.golden.core.registers._replace(**registers)
+        self.device.change(registers)
+
+    async def start(self, enable: int) -> None:
+        """Reset and run to the first sample_trigger."""
+        got = await self.device.start(self.golden.core.registers, enable)
+        if not np.array_equal(got.gate_words, self.golden.run(None, enable).gate_words):
+            self.differ("gates before the first sample")
+
+    async def period(self, inputs: dict[str, int], enable: int) -> Period:
+        """One period on both; ``inputs`` by the names of INPUT_PORTS, in their order.  Returns the device's."""
+        wanted = self.golden.run(inputs, enable)
+        got, golden = await self.device.period(inputs, enable), self.golden.core.observed
+        self.compare(got, golden, wanted)
+        k = len(self.observed)
+        self.edges += [(k, int(c), int(w)) for c, w in zip(got.edge_clocks, got.gate_words, strict=True)]
+        self.observed.append(golden)
+        return got
+
+    def compare(self, got: Period, golden: fluxproof.Observed, wanted: Period) -> None:
+        """``==`` on every observed value, every gate edge, the period's length and the run state."""
+        if got.observed is None:
+            self.differ("no sample came out")
+            return
+        for name, value in zip(fluxproof.Observed._fields, golden, strict=True):
+            if got.observed[name] != value:
+                self.differ(f"{name}: got {got.observed[name]}, wanted {value}")
+        if _edges(got) != _edges(wanted):
+            self.differ(f"gate edges: got {_edges(got)}, wanted {_edges(wanted)}")
+        seen, right = ((p.clocks, p.running, *p.flags) for p in (got, wanted))
+        if seen != right:
+            self.differ(f"clocks, running, {', '.join(FLAGS)}: got {seen}, wanted {right}")
+        self.result.sample_to_duty_clocks = max(self.result.sample_to_duty_clocks, got.sample_to_duty)
+
+    def finish(self) -> Result:
+        """What was recorded; the golden values, which the device's equal where nothing differs."""
+        self.result.periods_compared = len(self.observed)
+        self.result.observed = dict(zip(fluxproof.Observed._fields, np.array(self.observed).T, strict=True))
+        self.result.gate_edges = np.array(self.edges, np.int64).reshape(-1, 3)
+        return self.result
+
+
+async def cosimulate(
+    device: Device,
+    drive,
+    register_set,
+    scenario: Scenario,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+    sensors: Sensors | None = None,
+    machine: Machine | None = None,
+    ideal_inverter: bool = False,
+) -> Result:
+    """Run ``scenario`` on ``device`` in closed loop and compare with the golden model at every period.
+
+    ``ideal_inverter``: the plant follows the compare values in force, as if its inverter had no dead time; the
+    gates are still compared edge by edge.
+    """
+    period_s = 1.0 / drive.inverter.pwm_frequency_hz
+    plant, described = build_plant(drive, sensors, machine, scenario.omega_m)
+    duties = np.zeros(3)
+    codes, plant_rows, slow_inputs = sensor_params(described), [], scenario.slow_inputs()
+    beside = Beside(device, register_set)
+    await beside.start(int(scenario.enable[0]))
+    for k in range(len(scenario)):
+        if k in scenario.changes:
+            beside.change(scenario.changes[k])
+        plant_rows.append([read(plant) for read in PLANT_SIGNALS.values()])
+        values = (
+            *(current_code(codes, n, plant.i_abc[n], k) for n in range(3)),
+            u_dc_code(codes, float(scenario.u_dc[k]), k),
+            position_code(codes, plant.theta_m, k),
+            *(scenario.omega_ref[k], scenario.i_d_ref[k], scenario.i_q_ext[k], scenario.speed_mode[k]),
+            *(column[k] for column in slow_inputs),
+        )
+        inputs = dict(zip(INPUT_PORTS, map(int, values), strict=True))
+        got = await beside.period(inputs, int(scenario.enable[k]))
+        times, words = got.edge_clocks * (period_s / got.clocks), got.gate_words
+        if ideal_inverter:
+            times, words = centred_gates(duties, 0.0, period_s)
+            duties = np.array(beside.observed[-1][-3:]) / beside.config.carrier_half
+        brake = 0.0 if scenario.brake is None else scenario.brake[k]
+        load = load_torque(float(scenario.load[k]), float(brake), plant.omega_m)
+        plant.advance(times, words, float(scenario.u_dc[k]), load, period_s)
+        progress(k + 1, len(scenario))
+    result = beside.finish()
+    result.plant = dict(zip(PLANT_SIGNALS, np.array(plant_rows).T, strict=True))
+    return result
+
+
+def _edges(period: Period) -> str:
+    return " ".join(f"{c}:{w:06b}" for c, w in zip(period.edge_clocks, period.gate_words, strict=True))
+
+
+def run_now(coroutine):
+    """Drive a coroutine that never waits: the devices that are plain function calls."""
+    try:
+        coroutine.send(None)
+    except StopIteration as stop:
+        return stop.value
+    raise RuntimeError("the coroutine waited for something; run it inside its simulator")

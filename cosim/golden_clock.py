@@ -1,0 +1,93 @@
+"""The golden core clock by clock: raw samples in at any clock, what the ports show out after every clock.
+
+The sample's values come from fluxproof.step at once and are given to what runs at the clock (golden_model/clocked.py)
+when the core's declared latencies say that they are there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from fluxproof.golden_model import clocked, fluxproof
+from fluxproof.golden_model.kernel import kernel
+
+SEEN = clocked.Seen._fields
+
+
+@kernel
+def run_clocks(state, inputs, regs, carrier_half, until_trigger, seen):
+    """Clocks with the same inputs, one row of ``seen`` each: (state, clocks made, whether the last took a sample)."""
+    entered = 0
+    for k in range(seen.shape[0]):
+        state, entered, now = clocked.step(state, inputs, regs, carrier_half)
+        row = seen[k]  # unpacked and not looped over, which compiles to a hundred times as much
+        row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7], row[8] = now
+        if until_trigger and now.sample_trigger:
+            return state, k + 1, entered
+    return state, seen.shape[0], entered
+
+
+class GoldenClock:
+    """One golden core after its reset; ``registers`` may be replaced at any clock."""
+
+    def __init__(self, registers: fluxproof.Registers, config: fluxproof.Config):
+        self.registers, self.config = registers, config
+        self.state, self.of_samples = clocked.State(), fluxproof.State()
+        self.inputs = clocked.Inputs()
+        self.clock = 0
+        self.running = 0
+        self.samples: list[fluxproof.Sample] = []  # those that have entered
+        self.observed: fluxproof.Observed | None = None  # of the last of them
+        self._due: list[tuple[int, dict[str, int]]] = []
+
+    def advance(
+        self, clocks: int, sample: Mapping[str, int] | None = None, until_trigger: bool = False, **pins: int
+    ) -> np.ndarray:
+        """(clocks made, len(SEEN)) integers; fewer than ``clocks`` where ``until_trigger`` saw sample_trigger.
+
+        ``sample``: the raw sample's ports, given with sample_valid at the first of the clocks.  ``pins``: enable, trip,
+        clear_trip from now on.
+        """
+        self.inputs = self.inputs._replace(**pins)
+        rows, left = [], clocks
+        while left:
+            for at, values in self._due:
+                if at == self.clock:
+                    self.inputs = self.inputs._replace(**values)
+            self._due = [due for due in self._due if due[0] > self.clock]
+            strobe = sample is not None and left == clocks
+            length = 1 if strobe else min([left, *(at - self.clock for at, _ in self._due)])
+            seen = np.zeros((length, len(SEEN)), np.int64)
+            self.state, made, entered = run_clocks(
+                self.state,
+                self.inputs._replace(sample_valid=int(strobe)),
+                self.registers,
+                self.config.carrier_half,
+                until_trigger,
+                seen,
+            )
+            if entered:
+                self._enter(sample)
+            self.clock += made
+            left -= made
+            self.running = int(seen[made - 1, SEEN.index("running")])
+            rows.append(seen[:made])
+            if until_trigger and seen[made - 1, SEEN.index("sample_trigger")]:
+                break
+        return np.concatenate(rows)
+
+    def _enter(self, sample: Mapping[str, int]) -> None:
+        """What a sample that enters at this clock comes to, and when."""
+        self.samples.append(fluxproof.Sample(*sample.values(), self.running))
+        # The minimum pulse is the one in force, taken over at a valley: what the gates refuse, the duties do not see.
+        registers = self.registers._replace(min_pulse=self.state.of_gate_generation.min_pulse)
+        self.of_samples, self.observed = fluxproof.step(
+            self.of_samples, self.samples[-1], registers, self.config
+        )
+        for after, names in (
+            (clocked.CHECKS_CLOCKS, ("sample_faults", "sample_trip")),
+            (clocked.COMPARE_CLOCKS, ("compare_a", "compare_b", "compare_c")),
+        ):
+            self._due.append((self.clock + after, {name: getattr(self.observed, name) for name in names}))

@@ -1,0 +1,89 @@
+"""What the drive is put through: Fig. 9 of paper 001, and the same compressed with everything else that can happen."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from fluxproof.cosim.closed_loop import Scenario
+from fluxproof.golden_model.drive import Drive
+from fluxproof.golden_model.units import from_si
+
+RPM = 2 * math.pi / 60  # mechanical rad/s
+
+
+def steps(n: int, changes: dict[float, float], per_period: float) -> np.ndarray:
+    """A staircase over n periods: ``changes`` maps a time [s] to the value from then on; zero before."""
+    values = np.zeros(n)
+    for time, value in sorted(changes.items()):
+        values[round(time / per_period) :] = value
+    return values
+
+
+def scenario(
+    drive: Drive, seconds: float, rpm, load=None, u_dc=None, i_d=None, i_q=None, torque_mode=(), off=(), brake=None,
+    changes=None, start_rpm=0.0,
+) -> Scenario:  # fmt: skip
+    """Staircases in SI units to a scenario; ``torque_mode`` and ``off`` are (from, to) intervals [s].
+
+    ``changes`` maps a time [s] to the registers (integers by name) that change there.
+    """
+    t_s = drive.sample_time_s
+    n = round(seconds / t_s)
+    omega = steps(n, rpm, t_s) * RPM * drive.machine.pole_pairs
+
+    def integers(name: str, values: np.ndarray) -> np.ndarray:
+        return np.array([from_si(name, v, drive) for v in values], np.int64)
+
+    def inside(intervals) -> np.ndarray:
+        flags = np.zeros(n, np.int64)
+        for start, stop in intervals:
+            flags[round(start / t_s) : round(stop / t_s)] = 1
+        return flags
+
+    return Scenario(
+        omega_ref=integers("omega_ref", omega),
+        load=steps(n, load or {}, t_s),
+        u_dc=steps(n, {0.0: drive.inverter.dc_bus_v} | (u_dc or {}), t_s),
+        i_d_ref=integers("i_d_ref", steps(n, i_d or {}, t_s)),
+        i_q_ext=integers("i_q_ext", steps(n, i_q or {}, t_s)),
+        speed_mode=1 - inside(torque_mode),
+        enable=1 - inside(off),
+        brake=steps(n, brake or {}, t_s),
+        changes={round(time / t_s): registers for time, registers in (changes or {}).items()},
+        omega_m=start_rpm * RPM,
+    )
+
+
+def fig9(drive: Drive) -> Scenario:
+    """183 to 732 rpm, then the nominal load of 3.7 Nm, i_d = 0: paper 001, Fig. 9; first up from rest."""
+    return scenario(drive, 0.30, rpm={0.0: 183, 0.08: 732}, load={0.18: 3.7})
+
+
+def everything(drive: Drive) -> Scenario:
+    """0.25 s: speed step, load step, bus sag into voltage saturation and back, i_d, torque mode, reversal, stop."""
+    return scenario(
+        drive,
+        0.25,
+        rpm={0.0: 183, 0.02: 732, 0.16: -300, 0.235: -500},
+        load={0.06: 3.7, 0.15: 0.0},
+        u_dc={0.09: 80.0, 0.12: drive.inverter.dc_bus_v},
+        i_d={0.13: -2.0, 0.14: 0.0},
+        i_q={0.145: -1.5},
+        torque_mode=((0.145, 0.155),),
+        off=((0.215, 0.225),),
+    )
+
+
+def full_speed(drive: Drive) -> Scenario:
+    """On a bus of 300 V towards the rated speed and back through zero: the voltage circle holds for long."""
+    return scenario(drive, 0.4, rpm={0.0: 2900, 0.2: -2900}, u_dc={0.0: 300.0})
+
+
+def short(drive: Drive) -> Scenario:
+    """30 ms: start, load, reversal; for configurations that only need to be shown to work."""
+    return scenario(drive, 0.03, rpm={0.0: 400, 0.02: -400}, load={0.01: 2.0})
+
+
+SCENARIOS = {"fig9": fig9, "short": short, "everything": everything, "full_speed": full_speed}

@@ -1,0 +1,7 @@
+"""``python -m fluxproof``: the same as the command ``fluxproof``."""
+
+import sys
+
+from fluxproof.command import main
+
+sys.exit(main())

@@ -1,0 +1,70 @@
+"""The command ``fluxproof``: ``fluxproof registers drive.toml`` and what stands beside it in COMMANDS.
+
+Exit status: 0 done, 2 bad input (one line on stderr says which and why), 1 where a command found a fault.
+A command is a module with two functions: ``arguments(parser)`` declares its options, ``run(args)`` returns
+the exit status; a line in COMMANDS makes it known.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Callable
+from typing import NamedTuple
+
+from fluxproof import dump_capture, print_registers
+from fluxproof.diagnosis import command as diagnose
+from fluxproof.diagnosis.recording import RecordingError
+from fluxproof.golden_model.drive_keys import DriveError
+
+
+class Command(NamedTuple):
+    """One subcommand: a line of help, the options it takes, what it does."""
+
+    help: str
+    arguments: Callable[[argparse.ArgumentParser], None]
+    run: Callable[[argparse.Namespace], int]
+
+
+COMMANDS = {
+    "diagnose": Command("why a recording differs from its simulation", diagnose.arguments, diagnose.run),
+    "dump": Command(
+        "a captured telemetry stream to what diagnose takes", dump_capture.arguments, dump_capture.run
+    ),
+    "registers": Command("the registers for a drive", print_registers.arguments, print_registers.run),
+}
+
+
+def parser() -> argparse.ArgumentParser:
+    """The command line with every subcommand."""
+    top = argparse.ArgumentParser(prog="fluxproof", description="Tools around the Fluxproof drive core.")
+    commands = top.add_subparsers(metavar="command", required=True)
+    for name, command in COMMANDS.items():
+        sub = commands.add_parser(name, help=command.help, description=command.help)
+        command.arguments(sub)
+        sub.set_defaults(run=command.run)
+    return top
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run a subcommand; bad input and unusable files end in one line and status 2, never in a traceback."""
+    args = parser().parse_args(argv)
+    try:
+        status = args.run(args)
+        sys.stdout.flush()
+        return status
+    except (DriveError, RecordingError) as error:
+        print(f"fluxproof: {diagnose.printable(str(error), sys.stderr.encoding)}", file=sys.stderr)
+    except BrokenPipeError:  # the reader, a pager or head, has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except OSError as error:
+        name = f"{error.filename}: " if error.filename else ""
+        text = diagnose.printable(f"{name}{error.strerror or error}", sys.stderr.encoding)
+        print(f"fluxproof: {text}", file=sys.stderr)
+    return 2
+
+
+if __name__ == "__main__":
+    sys.exit(main())

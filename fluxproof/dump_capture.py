@@ -1,0 +1,126 @@
+"""``fluxproof dump``: the words that a DMA took from the telemetry stream, to a dump that ``fluxproof diagnose`` takes.
+
+The registers are those of drive.toml, or of a JSON file where the core ran with others: ``{"kp_d": 1234, ...}`` with
+integers, or what ``fluxproof registers --json`` writes.  Names that the file leaves out are those of drive.toml.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+
+from fluxproof.golden_model import fluxproof
+from fluxproof.golden_model.drive import load
+from fluxproof.golden_model.drive_keys import DriveError
+from fluxproof.golden_model.registers import RegisterSet, registers
+
+REPLAY = {
+    "reset": "begins with the first sample after a reset: the golden model can replay all of it",
+    "off": "begins with the gates off: the golden model can replay it if the drive had not run since its reset",
+    "running": "begins while the drive runs: without the core's state only blocks without memory can be checked; "
+    "start the capture before the drive first runs",
+}
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the subcommand."""
+    parser.add_argument(
+        "capture", metavar="capture.bin", help="32-bit words, little-endian, as a DMA leaves them"
+    )
+    parser.add_argument(
+        "--drive", metavar="drive.toml", required=True, help="the drive that the core was set up for"
+    )
+    parser.add_argument(
+        "--registers", metavar="FILE", help="JSON: the registers' integers, where they were others"
+    )
+    parser.add_argument(
+        "--piece", type=int, metavar="N", help="which piece of a capture with a reset inside, from 1 on"
+    )
+    parser.add_argument(
+        "-o", "--out", metavar="FILE", help="the dump (default: the capture's name with .fluxdump)"
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Write the dump, say what is in it; returns 0."""
+    from fluxproof.diagnosis.telemetry_stream import read_capture, write_piece  # takes a second to import
+
+    drive = load(args.drive)
+    try:
+        register_set = registers(drive)
+    except DriveError as error:
+        raise DriveError(f"{args.drive}: {error}") from None
+    if args.registers:
+        register_set = with_registers(register_set, Path(args.registers))
+    capture = read_capture(args.capture)
+    number = chosen(capture.pieces, args.piece, args.capture)
+    out = Path(args.out) if args.out else Path(args.capture).with_suffix(".fluxdump")
+    write_piece(out, capture.pieces[number], drive, register_set)
+    print("\n".join(summary(capture, number)))
+    print(f"wrote {out}")
+    return 0
+
+
+def chosen(pieces, wanted: int | None, name) -> int:
+    """Index of the piece asked for, by default the longest."""
+    if wanted is None:
+        return max(range(len(pieces)), key=lambda k: len(pieces[k]))
+    if not 1 <= wanted <= len(pieces):
+        raise DriveError(f"--piece {wanted}: {name} has pieces 1 to {len(pieces)}")
+    return wanted - 1
+
+
+def summary(capture, number: int) -> list[str]:
+    """What the dump holds and what it does not."""
+    piece = capture.pieces[number]
+    lines = []
+    if len(capture.pieces) > 1:
+        lines.append(f"the samples' numbers go back in {len(capture.pieces) - 1} places (a reset?); pieces:")
+        for k, other in enumerate(capture.pieces):
+            mark = "  <- this one" if k == number else ""
+            lines.append(f"  {k + 1}: from byte {other.byte}, {_numbers(other)}{mark}")
+    lines.append(f"{len(piece)} samples, {_numbers(piece)}, {piece.lost} lost between them")
+    lines.append(REPLAY["reset" if piece.counter[0] == 0 else "running" if piece.fields["run"][0] else "off"])
+    lines += [f"{count} bytes at byte {at} belong to no whole packet" for at, count in capture.left]
+    return lines
+
+
+def _numbers(piece) -> str:
+    return f"numbers {piece.counter[0] % 2**32} to {piece.counter[-1] % 2**32}"
+
+
+def with_registers(base: RegisterSet, path: Path) -> RegisterSet:
+    """``base`` with the integers of a JSON file; DriveError names what cannot be a register of this core."""
+    from fluxproof.diagnosis.telemetry import CONFIG
+
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+    except (ValueError, RecursionError) as error:
+        raise DriveError(f"{path}: not JSON: {error}") from None
+    if not isinstance(data, dict):
+        raise DriveError(f"{path}: expected an object of registers, found {type(data).__name__}")
+    whole = isinstance(data.get("registers"), dict)
+    values = {name: _integer(value) for name, value in (data["registers"] if whole else data).items()}
+    generics = data.get("generics", {}) if whole else {}
+    if not isinstance(generics, dict):
+        raise DriveError(f"{path}: generics: expected an object, found {type(generics).__name__}")
+    ranges = {name: (port.low, port.high) for name, port in fluxproof.REGISTERS.items()}
+    _check(path, "register", values, ranges)
+    _check(path, "generic", generics, CONFIG)
+    return base._replace(values=base.values._replace(**values), config=base.config._replace(**generics))
+
+
+def _integer(value):
+    """A register's integer, bare or in the table that ``fluxproof registers --json`` writes."""
+    return value.get("integer") if isinstance(value, dict) else value
+
+
+def _check(path, kind, values, ranges) -> None:
+    for name, value in values.items():
+        if name not in ranges:
+            raise DriveError(f"{path}: {kind} {name!r} is unknown; known are {', '.join(ranges)}")
+        low, high = ranges[name]
+        if type(value) is not int or not low <= value <= high:
+            shown = json.dumps(value)[:40]
+            raise DriveError(f"{path}: {kind} {name} = {shown}: expected an integer from {low} to {high}")

@@ -1,0 +1,129 @@
+"""``fluxproof registers``: each register in SI units, as integer, and what the integer really stands for.
+
+With ``--format c`` or ``json`` the same integers as a list of (address, value) for a driver to load.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+
+from fluxproof.files import write_json
+from fluxproof.golden_model.drive import Drive, load
+from fluxproof.golden_model.drive_keys import DriveError
+from fluxproof.golden_model.generated.register_names import ADDRESSES
+from fluxproof.golden_model.registers import RegisterSet, Row, registers
+
+HEAD = ("register", "address", "SI value", "unit", "integer", "represented", "error", "legal range")
+LEFT = (0, 3)  # columns of words; numbers stand at the right
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the subcommand."""
+    parser.add_argument("drive", metavar="drive.toml", help="the drive in SI units, see docs/drives/")
+    parser.add_argument(
+        "--format",
+        choices=("table", "c", "json"),
+        default="table",
+        help="table (default); c: a header with an array to load; json: a list of name, address, value",
+    )
+    parser.add_argument("--json", metavar="FILE", help="write the same to FILE, machine-readable")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print the table and write the JSON file if one is asked for."""
+    drive = load(args.drive)
+    try:
+        result = registers(drive)
+    except DriveError as error:
+        raise DriveError(f"{args.drive}: {error}") from None
+    if args.json:
+        write_json(Path(args.json), as_json(drive, result))
+    if args.format == "c":
+        print("\n".join(c_lines(args.drive, drive, result)))
+    elif args.format == "json":
+        print(json.dumps(load_list(result), indent=2))
+    else:
+        print("\n".join(bases_lines(drive, result) + [""] + table(result.rows)))
+    return 0
+
+
+def load_list(result: RegisterSet) -> list[dict]:
+    """What a driver writes: byte address and integer of each register."""
+    return [{"name": r.name, "address": ADDRESSES[r.name], "value": r.integer} for r in result.rows]
+
+
+def c_lines(name: str, drive: Drive, result: RegisterSet) -> list[str]:
+    """A C header: the bases, the generics that the core must have been built with, the values to load."""
+    bases = {**vars(drive.bases), "flux_wb": drive.bases.flux_wb, "sample_time_s": drive.sample_time_s}
+    rows = []
+    for r in result.rows:
+        unit = "" if r.unit == "1" else f" {r.unit}"
+        rows.append(
+            f"    {{0x{ADDRESSES[r.name]:03X}, {r.integer}}}, /* {r.name}: {r.represented:.7g}{unit} */"
+        )
+    return [
+        f"/* {Path(name).name} by `fluxproof registers --format c`: write each value to its offset. */",
+        "#ifndef FLUXPROOF_SETTINGS_H",
+        "#define FLUXPROOF_SETTINGS_H",
+        "#include <stdint.h>",
+        "",
+        "/* What 1.0 per unit stands for; peak values, electrical speed. */",
+        *(f"#define FLUXPROOF_BASE_{key.upper()} {value!r}" for key, value in bases.items()),
+        "/* What the core must have been built with. */",
+        *(f"#define FLUXPROOF_{key.upper()} {value}" for key, value in result.config._asdict().items()),
+        "",
+        "struct fluxproof_setting {",
+        "    uint16_t offset;",
+        "    int32_t value;",
+        "};",
+        "",
+        "static const struct fluxproof_setting fluxproof_settings[] = {",
+        *rows,
+        "};",
+        "#endif",
+    ]
+
+
+def bases_lines(drive: Drive, result: RegisterSet) -> list[str]:
+    """What 1.0 per unit stands for, and the generics."""
+    bases, config = drive.bases, result.config._asdict()
+    return [
+        f"bases     {bases.current_a:g} A, {bases.voltage_v:g} V, {bases.omega_me_rad_s:g} rad/s electrical,"
+        f" {bases.flux_wb:.6g} Wb; all peak; T_s = {drive.sample_time_s:g} s",
+        "generics  " + ", ".join(f"{name.upper()} = {value}" for name, value in config.items()),
+    ]
+
+
+def table(rows: tuple[Row, ...]) -> list[str]:
+    """The registers as aligned columns under a heading."""
+    cells = [HEAD] + [_cells(row) for row in rows]
+    widths = [max(len(line[k]) for line in cells) for k in range(len(HEAD))]
+    lines = ["  ".join(_padded(k, cell, widths[k]) for k, cell in enumerate(line)).rstrip() for line in cells]
+    return [lines[0], "-" * max(map(len, lines)), *lines[1:]]
+
+
+def _padded(column: int, cell: str, width: int) -> str:
+    return cell.ljust(width) if column in LEFT else cell.rjust(width)
+
+
+def _cells(row: Row) -> tuple[str, ...]:
+    """One register in words; the error is relative, or absolute with its unit where the value is zero."""
+    error = f"{row.relative:+.1e}" if row.relative is not None else f"{row.error:+g} abs"
+    legal = f"{row.low}..{row.high}"
+    address = f"0x{ADDRESSES[row.name]:03X}"
+    return row.name, address, f"{row.si:.7g}", row.unit, str(row.integer), f"{row.represented:.7g}", error, legal
+
+
+def as_json(drive: Drive, result: RegisterSet) -> dict:
+    """The table for programs; SI units throughout."""
+    bases = {**vars(drive.bases), "flux_wb": drive.bases.flux_wb, "sample_time_s": drive.sample_time_s}
+    rows = {
+        row.name: {
+            "address": ADDRESSES[row.name],
+            **{k: v for k, v in row._asdict().items() if k != "name"},
+        }
+        for row in result.rows
+    }
+    return {"bases": bases, "generics": result.config._asdict(), "registers": rows}

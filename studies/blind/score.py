@@ -1,0 +1,169 @@
+"""Diagnose every case of a sealed benchmark, then open the truth and score: `python -m studies.blind.score`.
+
+Writes result.json (every figure with its Wilson interval) and report.html into the folder above the cases.
+The truth is read only after the last diagnosis; its hash must be the sealed one.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import multiprocessing
+import sys
+import time
+import traceback
+from pathlib import Path
+
+from fluxproof.checkout import BUILD
+from fluxproof.files import write_json, write_text
+from studies.blind import figures, tables
+from studies.blind.again import resolve
+from studies.blind.page import page
+from studies.blind.seal import SealError, truth_path, unseal
+
+
+def answer_of(folder: Path) -> tuple[str, dict]:
+    """(case, answer) of one case folder; a crash of the tool is an answer too, {"error": ...}."""
+    from fluxproof.diagnosis import diagnose
+
+    recording = next(p for p in sorted(folder.iterdir()) if p.stem == "recording")
+    began = time.perf_counter()
+    try:
+        answer = diagnose(recording, folder / "drive.toml").to_json()
+        answer["seconds"] = time.perf_counter() - began
+    except Exception as error:  # the benchmark counts breakdowns and goes on
+        answer = {"error": f"{type(error).__name__}: {error}", "trace": traceback.format_exc(limit=-4)}
+    return folder.name, json.loads(json.dumps(answer, default=float))
+
+
+def _second_look(job):
+    from fluxproof.diagnosis import diagnose
+
+    try:
+        return resolve(*job, diagnose)
+    except Exception as error:
+        return {
+            "case": job[0]["case"],
+            "asked": True,
+            "resolved": False,
+            "verdict": None,
+            "effects": [],
+            "error": f"{type(error).__name__}: {error}",
+        }
+
+
+def _in_parallel(function, work, jobs, what):
+    """Results in any order, with a progress line."""
+    results, began = [], time.perf_counter()
+    if not work:
+        return results
+    with multiprocessing.get_context("spawn").Pool(jobs) as pool:
+        for result in pool.imap_unordered(function, work):
+            results.append(result)
+            spent = time.perf_counter() - began
+            print(
+                f"\r{what}: {len(results)} of {len(work)}, {spent:.0f} s ",
+                end="",
+                file=sys.stderr,
+                flush=True,
+            )
+    print(file=sys.stderr)
+    return results
+
+
+def score(folder: Path, jobs: int = 2, reuse: bool = False) -> dict:
+    """Diagnose and score the benchmark in ``folder``; returns what it writes to result.json."""
+    folder = Path(folder).resolve()
+    if not (folder / "sealed.sha256").exists():
+        raise SealError(f"{folder}/sealed.sha256: cannot be read; run python -m studies.blind.generate")
+    kept = folder.parent / f"answers_{folder.name}.json"
+    if reuse and kept.exists():
+        answers = json.loads(kept.read_text())
+    else:
+        work = sorted(p for p in folder.iterdir() if p.name.startswith("case_"))
+        answers = dict(_in_parallel(answer_of, work, jobs, "diagnosed"))
+        write_json(kept, answers)
+    truth = unseal(folder)
+    cases = [(entry, answers[entry["case"]]) for entry in truth["cases"]]
+    scratch = folder.parent / f"again_{folder.name}"
+    ties = [
+        (t, a, truth["seed"], folder, scratch)
+        for t, a in cases
+        if a.get("verdict") == "ambiguous" and t["effects"]
+    ]
+    resolved = sorted(_in_parallel(_second_look, ties, jobs, "recorded again"), key=lambda r: r["case"])
+    result = summary(cases, resolved)
+    result.update(
+        seed=truth["seed"],
+        cases_total=len(cases),
+        sealed=truth_path(folder).name,
+        sha256=(folder / "sealed.sha256").read_text().strip(),
+    )
+    write_json(folder.parent / "result.json", result)
+    write_text(folder.parent / "report.html", page(result))
+    return result
+
+
+def summary(cases, resolved) -> dict:
+    """Everything that result.json holds about (truth, answer) pairs."""
+    return {
+        "schema": 1,
+        "figures": figures.figures(cases, resolved),
+        "by_form": tables.by_form(cases, resolved),
+        "by_stratum": tables.by_stratum(cases),
+        "by_effect": tables.by_effect(cases),
+        "confusion": tables.confusion(cases),
+        "parameters": [e for t, a in cases for e in figures.parameter_errors(t, a)],
+        "second_looks": list(resolved),
+        "times": tables.times(cases),
+        "cases": [_line(t, a) for t, a in cases],
+    }
+
+
+def _line(t, a):
+    """One case in short, for whoever wants to know what went wrong."""
+    return {
+        "case": t["case"],
+        "stratum": t["stratum"],
+        "kind": t["kind"],
+        "identifiable": figures.identifiable(t),
+        "truth": [{k: e[k] for k in ("name", "form", "size")} for e in t["effects"]],
+        "verdict": a.get("verdict", "error"),
+        "asserted": sorted(figures.asserted(a)),
+        "ambiguity": a.get("ambiguity", []),
+        "error": a.get("error"),
+        "right": figures.named_right(t, a),
+        "wrong": figures.confidently_wrong(t, a),
+    }
+
+
+def print_figures(result: dict):
+    """The table of figures, one a line."""
+    for name, f in result["figures"].items():
+        if f.get("value") is None:
+            print(f"{name:28s} no case")
+            continue
+        interval = (
+            f" [{f['low']:.3f}, {f['high']:.3f}] {f['k']} of {f['n']}" if "low" in f else f" n = {f['n']}"
+        )
+        verdict = "" if "met" not in f else f"   target {f['target']}: {'met' if f['met'] else 'MISSED'}"
+        print(f"{name:28s} {f['value']:.4g}{interval}{verdict}")
+
+
+def main(arguments=None) -> int:
+    """The command line; 0 when scored, 2 when the truth is missing or was changed."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("folder", type=Path, nargs="?", default=BUILD / "blind" / "seed1")
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--reuse", action="store_true", help="score the answers of the last run again")
+    options = parser.parse_args(arguments)
+    try:
+        print_figures(score(options.folder, options.jobs, options.reuse))
+    except SealError as error:
+        print(error, file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

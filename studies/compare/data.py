@@ -1,0 +1,97 @@
+"""One case as every method gets it: the nominal drive's misfit in steady blocks and what may explain it.
+
+    u      u_recorded - R mean(i) - [psi(i+, theta+) - psi(i, theta)] / T in dq, complex (b, m) [V]
+    sum    i_a + i_b + i_c, where three currents were measured, (b, m) [A]
+    torque shaft torque less that of the nominal drive, where a transducer was recorded, (b, m) [Nm]
+
+One in four operating points is never fitted, the same ones for every method.  The measure of what a model
+leaves is the rms over these held-out blocks of the block means of u (200 rows each).  The noise floor comes
+from neighbours: blocks that follow each other at one operating point share all physics.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from fluxproof.diagnosis.balance import misfit
+from fluxproof.diagnosis.blocks import view_of
+from fluxproof.diagnosis.load import load_recording
+from fluxproof.diagnosis.nominal import load_nominal
+from fluxproof.diagnosis.recording import RecordingError
+from fluxproof.diagnosis.run import holdout_blocks
+
+
+@dataclass
+class Data:
+    """view: diagnosis.view.View of b blocks of m rows; misfit: {channel: (b, m)}; held: bool (b,)."""
+
+    view: object
+    misfit: dict[str, np.ndarray]
+    held: np.ndarray
+    memo: dict = field(default_factory=dict, repr=False)  # of dictionary.equations
+
+    def fitted(self, channel: str) -> np.ndarray:
+        """Indices of the blocks that a fit may use; the torque of a block in a ramp is nan."""
+        return np.flatnonzero(~self.held & np.isfinite(self.misfit[channel]).all(axis=1))
+
+    def voltage_change(self) -> np.ndarray:
+        """What a whole sample of delay would change, dq (b, m) [V].
+
+        From the voltage the nominal drive needs: the recorded one answers to the noise of the currents, which is
+        in the misfit, too.
+        """
+        v = self.view
+        needed = v.machine.resistance_ohm * v.i_mid + v.flux(v.nominal_psi)
+        return needed * (1.0 - np.exp(-1j * v.omega_mid * v.sample_time_s))
+
+    @property
+    def units(self) -> dict[str, float]:
+        """One per mille of the bus [V], of the rated current [A], of the rated torque [Nm]."""
+        n, m = self.view.nominal, self.view.machine
+        torque = 1.5 * m.pole_pairs * m.magnet_flux_wb * m.rated_current_a
+        return {"u": 1e-3 * n.inverter.dc_bus_v, "sum": 1e-3 * m.rated_current_a, "torque": 1e-3 * torque}
+
+
+def recording_of(folder: Path) -> Path:
+    """The recording in a case's folder."""
+    return next(path for path in sorted(folder.iterdir()) if path.stem == "recording")
+
+
+def load(folder: Path) -> Data:
+    """Read, check and balance the case in ``folder``; RecordingError where the recording is unusable."""
+    nominal = load_nominal(folder / "drive.toml")
+    recording = load_recording(recording_of(folder), nominal)
+    if recording.fatal:
+        raise RecordingError(f"{recording.source}: unusable: {recording.problems[0].message}")
+    view = view_of(recording, nominal)
+    whole = np.isfinite(view.u).all(axis=1) & np.isfinite(view.u_dc).all(axis=1)
+    view = view.take(whole)
+    channels = misfit(view)
+    if "torque" in channels and not (view.shaft == "torque").all():
+        del channels["torque"]  # without a transducer nobody knows the load
+    return Data(view, channels, holdout_blocks(view))
+
+
+def averaged(x: np.ndarray, rows: int) -> np.ndarray:
+    """Means of ``rows`` neighbours within each block, (b, m, ...) to (b, m // rows, ...).
+
+    The balance telescopes: the mean of a flux difference keeps the noise of two samples only.
+    """
+    b, m = x.shape[:2]
+    return x[:, : m // rows * rows].reshape(b, m // rows, rows, *x.shape[2:]).mean(axis=2)
+
+
+def holdout_rms(left: np.ndarray, held: np.ndarray) -> float:
+    """Rms over held-out blocks of a model's remaining block means ``left``, complex (b,) [V]."""
+    return float(np.sqrt(np.mean(np.abs(left[held]) ** 2)))
+
+
+def neighbour_rms(left: np.ndarray, run: np.ndarray) -> float:
+    """Noise of one block mean [V], from the differences between neighbouring blocks of a dwell; nan without any."""
+    pair = np.flatnonzero((np.diff(run) == 0) & np.isfinite(left[1:] - left[:-1]))
+    if not len(pair):
+        return float("nan")
+    return float(np.sqrt(0.5 * np.mean(np.abs(left[pair + 1] - left[pair]) ** 2)))
