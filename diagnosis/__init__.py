@@ -5,7 +5,7 @@ __all__ = ["diagnose"]
 
 def __getattr__(name):
     if name == "diagnose":
-        from fluxproof.diagnosis.run import diagnose
+        from fluxproof.diagnosis.session import diagnose
 
         return diagnose
     raise AttributeError(name)

@@ -1,13 +1,13 @@
 """A whole diagnosis: digital half, physics, improved drive, closed-loop comparison, files written.
 
-    from diagnosis.session import run
-    answer = run("recording.csv", "drive.toml", "build/diagnosis/recording")
+    from fluxproof import diagnose
+    answer = diagnose("recording.csv", "drive.toml")
 
-``diagnosis.diagnose`` answers and writes nothing; this does what a user of the command gets:
+``diagnose`` answers and writes nothing (steps 1 and 2); ``run`` does what a user of the command gets:
 
 1. Where the recording holds what the core saw and answered, the core is replayed.  It must be equal in every bit, else
    that is the verdict and physics is not looked at.
-2. The physics (run.py).
+2. The physics (physics.py).
 3. OUT/drive_improved.toml with what was asserted, and the closed loop of both drives laid over the recording.
 4. OUT/diagnosis.json and OUT/report.html.
 """
@@ -24,29 +24,46 @@ from fluxproof.diagnosis.improve import write_improved
 from fluxproof.diagnosis.load import load_recording
 from fluxproof.diagnosis.nominal import Nominal, load_nominal
 from fluxproof.diagnosis.overlay import closed_loop
+from fluxproof.diagnosis.physics import explain
 from fluxproof.diagnosis.recording import Problem, Recording, RecordingError
 from fluxproof.diagnosis.report import write_outputs
 from fluxproof.diagnosis.result import Diagnosis, Digital
-from fluxproof.diagnosis.run import diagnose
 from fluxproof.golden_model.drive_keys import DriveError
 
 IMPROVED = "drive_improved.toml"
 OVERLAY_SIGNALS = ("u_d_ref", "u_q_ref")  # the currents are what a controller keeps right
 
 
-def run(recordings, drive, out, progress=lambda text: None) -> Diagnosis:
-    """Diagnose one recording, or several of the same drive, and write the outputs to the folder ``out``.
+def diagnose(recordings, drive, progress=lambda text: None) -> Diagnosis:
+    """Diagnose one recording, or several of the same drive, against a nominal drive; writes nothing.
 
     recordings: a path, a Recording, or a list of them; drive: a path to drive.toml or a Nominal; progress: called with
-    a line of text now and then.  The answer's ``digital`` and ``notes`` are filled in.
-    Raises RecordingError and DriveError for input that cannot be used, OSError where ``out`` cannot be written.
+    a line of text now and then.  Where the recordings hold the core's own answers, the core is replayed first.
+    Raises RecordingError and DriveError for input that cannot be used.
     """
-    with threadpool_limits(1, "blas"):  # many small matrices: a second thread waits for the first
-        return _session(recordings, drive, out, progress)
-
-
-def _session(recordings, drive, out, progress) -> Diagnosis:
     nominal = drive if isinstance(drive, Nominal) else load_nominal(drive)
+    with threadpool_limits(1):  # many small matrices: a second thread waits for the first
+        return _diagnose(_loaded(recordings, nominal, progress), nominal, progress)
+
+
+def run(recordings, drive, out, progress=lambda text: None) -> Diagnosis:
+    """``diagnose``, and the outputs written to the folder ``out``; OSError where it cannot be written."""
+    nominal = drive if isinstance(drive, Nominal) else load_nominal(drive)
+    with threadpool_limits(1):
+        loaded = _loaded(recordings, nominal, progress)
+        out = _folder(Path(out), nominal)
+        answer = _diagnose(loaded, nominal, progress)
+        improved = _improved(nominal, answer, out)
+        laid_over = None
+        if answer.verdict not in ("bad_recording", "digital_mismatch"):
+            progress("the closed loop over the recording")
+            laid_over = _overlay(loaded[0], nominal, improved, answer)
+        progress("writing the report")
+        write_outputs(answer, out, nominal, laid_over)
+    return answer
+
+
+def _loaded(recordings, nominal, progress) -> list[Recording]:
     if isinstance(recordings, (str, os.PathLike, Recording)):
         recordings = [recordings]
     loaded = []
@@ -55,7 +72,11 @@ def _session(recordings, drive, out, progress) -> Diagnosis:
             progress(f"reading {item}")
             item = load_recording(Path(item), nominal)
         loaded.append(item)
-    out = _folder(Path(out), nominal)
+    return loaded
+
+
+def _diagnose(loaded, nominal, progress) -> Diagnosis:
+    """The digital half, then the physics where the controller computed what its golden model computes."""
     digital, notes = _digital(loaded, progress)
     if digital.first_difference is not None:
         answer = Diagnosis("digital_mismatch", _mismatch_sentence(digital.first_difference))
@@ -65,13 +86,6 @@ def _session(recordings, drive, out, progress) -> Diagnosis:
         answer = _physics(loaded, nominal, progress)
     answer.digital = digital
     answer.notes = [*notes, *answer.notes, *_reading_notes(loaded)]
-    improved = _improved(nominal, answer, out)
-    laid_over = None
-    if answer.verdict not in ("bad_recording", "digital_mismatch"):
-        progress("the closed loop over the recording")
-        laid_over = _overlay(loaded[0], nominal, improved, answer)
-    progress("writing the report")
-    write_outputs(answer, out, nominal, laid_over)
     return answer
 
 
@@ -87,9 +101,9 @@ def _folder(out: Path, nominal: Nominal) -> Path:
 
 
 def _physics(loaded, nominal, progress) -> Diagnosis:
-    """The verdict of run.py; a recording that was read but carries no balance is a bad recording."""
+    """The verdict of physics.py; a recording that was read but carries no balance is a bad recording."""
     try:
-        return diagnose(loaded, nominal, progress)
+        return explain(loaded, nominal, progress)
     except RecordingError as error:
         problem = Problem("no_balance", str(error), fatal=True)
         problems = [p for recording in loaded for p in recording.problems]

@@ -2,7 +2,7 @@
 
     answer = diagnose_slow([recording], nominal)
 
-It answers as diagnosis.run.diagnose does, which calls it where every recording is slow.  ``answer.search`` is the
+It answers as physics.explain does, which calls it where every recording is slow.  ``answer.search`` is the
 search, ``answer.found`` its outcome, ``answer.held`` the blocks that were not fitted.
 """
 

@@ -16,10 +16,10 @@ from fluxproof.diagnosis.curvature import has_both, labels
 from fluxproof.diagnosis.effect import rated_torque
 from fluxproof.diagnosis.fit import Model
 from fluxproof.diagnosis.nominal import load_nominal
+from fluxproof.diagnosis.physics import held_out
 from fluxproof.diagnosis.recording import from_columns
 from fluxproof.diagnosis.refine import Refiner
 from fluxproof.diagnosis.request import wants_cold
-from fluxproof.diagnosis.run import held_out
 from fluxproof.diagnosis.verdict import beyond_doubt, carried, groups
 from fluxproof.diagnosis.view import joined_views, started_cold
 

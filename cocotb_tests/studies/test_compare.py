@@ -8,8 +8,8 @@ import pytest
 from fluxproof.diagnosis.balance import misfit
 from fluxproof.diagnosis.blocks import view_of
 from fluxproof.diagnosis.nominal import load_nominal
+from fluxproof.diagnosis.physics import holdout_blocks
 from fluxproof.diagnosis.recording import from_columns
-from fluxproof.diagnosis.run import holdout_blocks
 from studies.compare import __main__ as command
 from studies.compare.data import Data, holdout_rms, neighbour_rms
 from studies.compare.methods import METHODS, PACKAGES, TITLES, tuned

@@ -20,8 +20,8 @@ from fluxproof.diagnosis.balance import misfit
 from fluxproof.diagnosis.blocks import view_of
 from fluxproof.diagnosis.load import load_recording
 from fluxproof.diagnosis.nominal import load_nominal
+from fluxproof.diagnosis.physics import holdout_blocks
 from fluxproof.diagnosis.recording import RecordingError
-from fluxproof.diagnosis.run import holdout_blocks
 
 
 @dataclass

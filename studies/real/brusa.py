@@ -12,12 +12,13 @@ from pathlib import Path
 import numpy as np
 
 from fluxproof.checkout import ROOT
+from fluxproof.diagnosis import diagnose
 from fluxproof.diagnosis.balance import misfit
 from fluxproof.diagnosis.blocks import view_of
 from fluxproof.diagnosis.flux_surface import Surface, earned, flux_map, ladder, names
 from fluxproof.diagnosis.nominal import load_nominal
+from fluxproof.diagnosis.physics import holdout_blocks
 from fluxproof.diagnosis.result import Estimate, Fit, NamedEffect
-from fluxproof.diagnosis.run import diagnose, holdout_blocks
 from fluxproof.diagnosis.view import joined_views
 from fluxproof.files import write_text
 from fluxproof.plant import FluxMap

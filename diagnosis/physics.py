@@ -1,25 +1,15 @@
-"""Why does a recording differ from its simulation: the whole way from files to a Diagnosis.
-
-from diagnosis import diagnose
-answer = diagnose("recording.csv", "drive.toml")
-print(answer.sentence)
-"""
+"""The physical half of a diagnosis: from loaded recordings to effects, ambiguities and what remains unexplained."""
 
 from __future__ import annotations
 
-import os
-from pathlib import Path
-
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from fluxproof.diagnosis import verdict as words
 from fluxproof.diagnosis.blocks import views_of
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.flux_surface import USUAL, earned
-from fluxproof.diagnosis.load import load_recording
 from fluxproof.diagnosis.locate import at_order, evidence, locate
-from fluxproof.diagnosis.nominal import Nominal, load_nominal
+from fluxproof.diagnosis.nominal import Nominal
 from fluxproof.diagnosis.ohms import straight_ohms
 from fluxproof.diagnosis.recording import Recording
 from fluxproof.diagnosis.remains import remains
@@ -36,27 +26,11 @@ MAP_POINTS = 20  # different currents that make a flux map worth fitting
 ABSORBED = {"udc_gain", "current_scale", "inductance_d", "inductance_q"}
 
 
-def diagnose(recordings, drive, progress=lambda text: None) -> Diagnosis:
-    """Diagnose one recording, or several of the same drive, against a nominal drive.
+def explain(loaded: list[Recording], nominal: Nominal, progress=lambda text: None) -> Diagnosis:
+    """Explain one recording, or several of the same drive, against a nominal drive.
 
-    recordings: a path, a Recording, or a list of them; drive: a path to drive.toml or a Nominal.
-    Raises RecordingError and golden_model's DriveError for input that cannot be used.
+    Raises RecordingError where the recordings hold no operating point that can be balanced.
     """
-    nominal = drive if isinstance(drive, Nominal) else load_nominal(drive)
-    if isinstance(recordings, (str, os.PathLike, Recording)):
-        recordings = [recordings]
-    # The matrices are small: more threads than one cost more than they bring.
-    with threadpool_limits(1):
-        return _diagnose(recordings, nominal, progress)
-
-
-def _diagnose(recordings, nominal, progress) -> Diagnosis:
-    loaded = []
-    for item in recordings:
-        if not isinstance(item, Recording):
-            progress(f"reading {item}")
-            item = load_recording(Path(item), nominal)
-        loaded.append(item)
     problems = [p for r in loaded for p in r.problems]
     rows = sum(len(r) for r in loaded)
     if any(r.fatal for r in loaded):
