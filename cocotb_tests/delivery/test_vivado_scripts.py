@@ -46,7 +46,7 @@ def needs_tclsh() -> None:
 def stubbed(facts: Path, script: Path, *arguments: str) -> subprocess.CompletedProcess:
     """``script`` under vivado_stub.tcl."""
     needs_tclsh()
-    stub = ROOT / "cocotb_tests" / "vivado_stub.tcl"
+    stub = ROOT / "cocotb_tests" / "support" / "vivado_stub.tcl"
     return subprocess.run(
         ["tclsh", str(stub), str(facts), str(script), *arguments], capture_output=True, text=True
     )
