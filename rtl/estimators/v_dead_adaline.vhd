@@ -235,7 +235,9 @@ begin
       end if;
 
       -- Stages 9, 12, 16: sum = not e = not u_h + prod, pull, v_state + prod
-      addend <= rounding_base("0", DROP_STEP, SUM_W);
+      if valid(10) = '1' then
+        addend <= rounding_base("0", DROP_STEP, SUM_W);
+      end if;
       if valid(7) = '1' then
         addend <= rounding_base(not shift_left(resize(h, FLUX_W), PU_TO_FLUX), DROP_MODEL, SUM_W);
       end if;
