@@ -48,7 +48,7 @@ ghdl5_key=$(hash_of scripts/setup/ghdl5.sh)
 
 # ---------------------------------------------------------------- fast path
 ghdl5_settled() { ! needs ghdl5 || have_ghdl5 || gave_up_ghdl5; }
-if [ -z "$(missing_packages)$(browser_package)$(missing_groups)$(uncompiled)" ] && ghdl5_settled; then
+if [ -z "$(missing_packages)$(missing_groups)$(uncompiled)" ] && ! browser_missing && ghdl5_settled; then
     if needs ghdl5 && ! have_ghdl5; then no_ghdl5; fi
     exit 0
 fi
@@ -65,7 +65,6 @@ fi
 
 mapfile -t groups < <(missing_groups)
 mapfile -t missing < <(missing_packages | sed '/^$/d')
-browser=$(browser_package)
 
 # Everything below that can be done beside something else is: processes of the background, waited for at the end.
 background=()
@@ -104,12 +103,7 @@ if needs ghdl; then
         0.* | 1.*) say "NOTE: the simulations were tried with GHDL 2.0 and 5.0, this older one may not do" ;;
     esac
 fi
-install_browser() {
-    become_root "$browser"
-    if [ -z "$lists_read" ]; then read_package_lists; fi
-    install_packages "$browser"
-}
-if [ -n "$browser" ] && ! (install_browser); then # in a shell of its own, as a failure ends the shell
+if browser_missing && ! (install_browser); then # in a shell of its own, as a failure ends the shell
     touch "$cache/chromium.failed"
     say "NOTE: chromium is not available; the test that opens the report in a browser is skipped." \
         "('make setup' tries again)"

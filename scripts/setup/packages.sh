@@ -25,15 +25,20 @@ missing_packages() {
 }
 
 # Ubuntu's chromium is no apt package, and nothing but a test needs it: no browser is no failure.
-browser_package() {
+browser_missing() {
     local seen
-    needs browser || return 0
-    for seen in chromium chromium-browser google-chrome; do
-        if command -v "$seen" >/dev/null; then return 0; fi
+    needs browser || return 1
+    for seen in chromium chromium-headless-shell chromium-browser google-chrome; do
+        if command -v "$seen" >/dev/null; then return 1; fi
     done
-    if [ -n "$retry" ] || [ ! -e "$cache/chromium.failed" ]; then
-        if grep -qsx 'ID=debian' /etc/os-release; then echo chromium; fi
-    fi
+    { [ -n "$retry" ] || [ ! -e "$cache/chromium.failed" ]; } && grep -qsx 'ID=debian' /etc/os-release
+}
+install_browser() { # the one without windows where there is such a package, which brings two thirds of the others
+    local package=chromium
+    become_root $package
+    if [ -z "$lists_read" ]; then read_package_lists; fi
+    if apt-cache show chromium-headless-shell >/dev/null 2>&1; then package=chromium-headless-shell; fi
+    install_packages $package
 }
 
 # Sets $as_root to the command that runs another as root; ends the set-up where there is none.
