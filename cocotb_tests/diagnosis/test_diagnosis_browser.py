@@ -17,7 +17,8 @@ import pytest
 from cocotb_tests.support.diagnosis_samples import html_of, made_up, write_all
 from fluxproof.diagnosis import result
 
-CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+BROWSERS = "chromium", "chromium-headless-shell", "chromium-browser", "google-chrome"
+CHROMIUM = next(filter(None, map(shutil.which, BROWSERS)), None)
 PROBE = """<body style="margin:0"><pre id="seen"></pre><iframe id="f" style="border:0;width:%dpx;height:800px"></iframe>
 <script>
 const frame = document.getElementById("f"), say = v => document.getElementById("seen").textContent = JSON.stringify(v);
