@@ -146,8 +146,7 @@ begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stage 1: what comes from all over the chip, in registers that can stand here; with an enable, as without one
-      -- they would be v_dead_adaline's, which stand there
+      -- Stage 1: the sample's inputs, which come from other blocks
       if valid(0) = '1' then
         u_q_1   <= u_q;
         d_q_1   <= d_q;
@@ -163,7 +162,7 @@ begin
       end if;
 
       -- Stages 1 to 4: flux = l_d*i_d + psi, each narrowed.  From here to sum_psi nothing needs an enable: every factor
-      -- stays, and prod_own is flux_models' prod_model_d as long as both are always written.
+      -- stays.
       prod_own <= own_1;
       sum_own  <= own_2;
       past_3   <= past_2;

@@ -158,7 +158,7 @@ begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stage 1: what comes from all over the chip, in registers that can stand here
+      -- Stage 1: the inputs, which come from other blocks
       u_1      <= u_pi_d;
       d_1      <= d_d;
       i_d_1    <= i_d;

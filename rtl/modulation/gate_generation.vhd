@@ -117,11 +117,12 @@ begin
       if valley = '1' then
         compare     <= (compare_a, compare_b, compare_c);
         running_now <= enable and (configured or good) and not tripping;
-        -- As sums of products: of a choice the tools make an enable, one more LUT and a net to all of them
-        dead_used   <= (dead_time and (11 downto 0 => good)) or (dead_used and (11 downto 0 => not good));
-        dead_is_one <= ((dead_time ?= 1) and good) or (dead_is_one and not good);
-        pulse_used  <= (min_pulse and (11 downto 0 => good)) or (pulse_used and (11 downto 0 => not good));
-        configured  <= configured or good;
+        if good = '1' then
+          dead_used   <= dead_time;
+          dead_is_one <= dead_time ?= 1;
+          pulse_used  <= min_pulse;
+          configured  <= '1';
+        end if;
       end if;
       setting_refused <= not good;
 

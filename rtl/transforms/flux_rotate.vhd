@@ -2,8 +2,8 @@
 --   out_x = x*cos_theta - y*sin_theta
 --   out_y = x*sin_theta + y*cos_theta
 -- Formats: x, y FLUX; TRIG S(1,16) within +-1; products and sums exact.
--- As rotate, but 25 bits wide: operands have two registers, as where a multiplier takes 18 bits the second belongs
--- between its parts' products and the adder that puts them together.  No enables: inputs stay for the interval.
+-- As rotate, but 25 bits wide: operands have two registers, of which the second may be moved behind the partial
+-- products where a multiplier takes only 18 bits.  No enables: inputs stay for the interval.
 -- Latency: 6.  Interval: 3.  Rounding: half up.  Saturation: a sum is at most 4 per unit, so its three top bits say
 -- whether it fits; out_y comes over out_x, half as many readers of the limit.
 
