@@ -1,8 +1,8 @@
 """`make lock`: writes requirements.lock and requirements/*.txt from the lists in pyproject.toml.
 
-One resolution for every group, Python version and system goes to requirements.lock, with hashes. requirements/GROUP.txt
-lists what a group takes of it, so two groups never disagree about a version; it has no hashes, as the installation
-reads those from requirements.lock.  Only installer.txt has its own: pip installs that one alone.
+One resolution for every group, Python version and system goes to requirements.lock, with hashes.
+requirements/GROUP.txt lists what a group takes of it, so two groups never disagree about a version; it has no hashes,
+as the installation reads those from requirements.lock.  Only installer.txt has its own: pip installs that one alone.
 
 usage: python scripts/setup/lock.py UV [--keep]     --keep: leave versions as they are where they still fit
 """

