@@ -82,8 +82,8 @@ class Projector:
             order.append(np.tile(np.repeat(orders, 2), b))
             part.append(np.tile([0, 1], b * n))
             least = TAPERED_TURNS if channel == "torque" else LEAST_TURNS
-            told = np.array(orders)[None, :] * span[:, None] >= 2 * np.pi * least
-            both = np.stack([told, told], axis=2)
+            enough = np.array(orders)[None, :] * span[:, None] >= 2 * np.pi * least
+            both = np.stack([enough, enough], axis=2)
             both[:, 0] = [True, False]  # a mean is real
             if channel == "torque":
                 both &= self.torque_seen[:, None, None]
@@ -145,7 +145,7 @@ def cells_of(view, effects, projector=None, free=None) -> Cells:
     return Cells(p.rows(misfit(view)), columns, p.block, p.order, p.part, p.channel, p.ok)
 
 
-def told(columns, key) -> str:
+def column_name(columns, key) -> str:
     """Name of a coefficient's column, core or free; "" in a view where its axis carries too little current.
 
     The data of a solution are freed of its errors of the record: a column may be there and not in the raw ones.

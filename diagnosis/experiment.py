@@ -65,7 +65,7 @@ def closest(left, enough=np.inf) -> np.ndarray:
     return np.minimum(left, enough).min(axis=0)
 
 
-def told(rivalries, points) -> float:
+def closest_distance(rivalries, points) -> float:
     """D^2 of the closest pair at a set of candidates."""
     return float(closest(np.array([r.left(points) for r in rivalries]))) if points else 0.0
 
@@ -101,9 +101,9 @@ def best_points(rivalries, most, doubt=0.0, strain=0.0) -> list[int]:
     while len(chosen) < most:
         chosen.append(int(np.argmax(values(rivalries, chosen, doubt))))
     chosen = exchanged(rivalries, chosen, values, doubt)
-    if told(rivalries, chosen) >= ENOUGH:
+    if closest_distance(rivalries, chosen) >= ENOUGH:
         chosen = exchanged(rivalries, chosen, spare_values, doubt + strain)
-    return sorted(chosen, key=lambda k: told(rivalries, [n for n in chosen if n != k]))
+    return sorted(chosen, key=lambda k: closest_distance(rivalries, [n for n in chosen if n != k]))
 
 
 def exchanged(rivalries, chosen, worth_of, cost) -> list[int]:

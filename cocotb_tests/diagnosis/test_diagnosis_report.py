@@ -103,18 +103,18 @@ def test_what_is_not_finite_becomes_null_or_is_refused(written, tmp_path):
 
 def test_page_says_all(written):
     page = html_of(written["explained"])
-    for said in ("0.901 ± 0.011 V", "&gt; 99 %", "−0.410 ± 0.020 mH", "= 2.01°", "10 times smaller",
+    for said in ("0.901 ± 0.011 V", "&gt; 99 %", "−0.410 ± 0.020 mH", "= 2.01°", "by a factor of 10",
                  "order 6 with 0.225 V", "0.01581", "drive_improved.toml", "equal in every bit",
                  "three samples are missing", "no torque"):  # fmt: skip
         assert said in page, said
     page = html_of(written["ambiguous"])
-    for said in ("Cannot tell", "314 rad/s (749.6 rpm)", "winding at 80 °C", "an offset stays on d"):
+    for said in ("Not separable", "314 rad/s (749.6 rpm)", "winding at 80 °C", "an offset stays on d"):
         assert said in page, said
     assert "c * omega_e * abs(i_q) * cos(2*theta_e)" in html_of(written["unexplained"])
     assert "1.02 times the noise floor" in html_of(written["no_mismatch"])
     assert re.search(r"<td[^>]*>golden</td><td><code>0x0124", html_of(written["digital_mismatch"]))
     page = html_of(written["bad_recording"])
-    assert page.index("current_sum") < page.index("clipped") and "How much better" not in page
+    assert page.index("current_sum") < page.index("clipped") and "Improvement" not in page
 
 
 def test_page_takes_nothing_from_a_file_for_markup(written, tmp_path):
