@@ -145,7 +145,7 @@ def cells_of(view, effects, projector=None, free=None) -> Cells:
     return Cells(p.rows(misfit(view)), columns, p.block, p.order, p.part, p.channel, p.ok)
 
 
-def column_name(columns, key) -> str:
+def column_of(columns, key) -> str:
     """Name of a coefficient's column, core or free; "" in a view where its axis carries too little current.
 
     The data of a solution are freed of its errors of the record: a column may be there and not in the raw ones.

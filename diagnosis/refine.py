@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fluxproof.diagnosis.cells import Projector, cells_of, column_name
+from fluxproof.diagnosis.cells import Projector, cells_of, column_of
 from fluxproof.diagnosis.effect import FluxEffect, half_dead_time, rated_torque
 from fluxproof.diagnosis.fit import Fitter, Model, Solution, everything, row_sigma
 
@@ -175,8 +175,8 @@ class Refiner:
                 cells_of(v, [effect], self.projector).columns[name] for v in (solution.view, rough)
             )
             for key, value in c.items():
-                if value and column_name(raw, key) and column_name(smooth, key):
-                    adjust += value * (raw[column_name(raw, key)] - smooth[column_name(smooth, key)])
+                if value and column_of(raw, key) and column_of(smooth, key):
+                    adjust += value * (raw[column_of(raw, key)] - smooth[column_of(smooth, key)])
         return adjust
 
     def allow_for_curves(self, best):
@@ -192,7 +192,7 @@ class Refiner:
         variance = variance + np.where(self.cells.channel == "u", self.doubt(best)[self.cells.block], 0.0) ** 2
         for name, c in best.c.items():
             columns = self.cells.columns[name]
-            rows = sum(v * columns[column_name(columns, k)] for k, v in c.items() if column_name(columns, k))
+            rows = sum(v * columns[column_of(columns, k)] for k, v in c.items() if column_of(columns, k))
             variance = variance + (CURVE_SHARE * rows) ** 2
         self.sigma = np.sqrt(variance)
         self.refined.clear()

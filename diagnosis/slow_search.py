@@ -12,7 +12,7 @@ import itertools
 import numpy as np
 
 from fluxproof.diagnosis.catalogue import CATALOGUE
-from fluxproof.diagnosis.cells import column_name, voltage_level
+from fluxproof.diagnosis.cells import column_of, voltage_level
 from fluxproof.diagnosis.fit import Fitter, Model, everything
 from fluxproof.diagnosis.search import Outcome, Search
 from fluxproof.diagnosis.slow import UNSEEN
@@ -134,7 +134,7 @@ class SlowSearch(Search):
         for name, c in solution.c.items():
             if not self.effects[name].corrects:
                 columns = fitter.cells.columns[name]
-                values += sum(v * columns[column_name(columns, k)] for k, v in c.items() if v and column_name(columns, k))
+                values += sum(v * columns[column_of(columns, k)] for k, v in c.items() if v and column_of(columns, k))
         return fitter.cells, fitter.cells.y - values
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fluxproof.diagnosis.cells import column_name
+from fluxproof.diagnosis.cells import column_of
 from fluxproof.diagnosis.curves import step_at_start
 from fluxproof.diagnosis.effect import ALIKE, DOUBT, sigma
 from fluxproof.diagnosis.result import NamedEffect
@@ -167,7 +167,7 @@ def carried(names, found, cells, worth, effects):
 def lives(cells, name, c, sigma, use):
     """(r,) bool: rows of the channels and orders that contain at least HOLDS of the power of an effect with c."""
     columns = cells.columns[name]
-    own = sum(v * columns[column_name(columns, k)] for k, v in c.items() if column_name(columns, k))
+    own = sum(v * columns[column_of(columns, k)] for k, v in c.items() if column_of(columns, k))
     power, out = np.where(use, (own / sigma) ** 2, 0.0), np.zeros(len(use), bool)
     for channel in np.unique(cells.channel):
         for order in np.unique(cells.order[cells.channel == channel]):
