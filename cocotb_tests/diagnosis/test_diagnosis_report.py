@@ -134,10 +134,10 @@ def test_page_takes_nothing_from_a_file_for_markup(written, tmp_path):
 @pytest.mark.parametrize(
     "without, picture, said",
     [
-        ({"theta_e"}, "angle_current", "misfit over angle and current: there is no theta_e"),
-        ({"orders"}, "orders", "harmonic orders: there is no orders"),
-        ({"t"}, "over_time", "misfit over time: there is no t"),
-        ({"angle_before_q"}, "over_angle", "misfit over the angle: there is no angle_before_q"),
+        ({"theta_e"}, "angle_current", "misfit over angle and current: theta_e is missing"),
+        ({"orders"}, "orders", "harmonic orders: orders is missing"),
+        ({"t"}, "over_time", "misfit over time: t is missing"),
+        ({"angle_before_q"}, "over_angle", "misfit over the angle: angle_before_q is missing"),
     ],
 )
 def test_picture_left_out_is_said(tmp_path, without, picture, said):

@@ -370,5 +370,5 @@ def test_the_overlay_takes_what_there_is(healthy):
         holed[name][1000:1003] = np.nan
     holed = closed_loop(from_columns(holed, 1e-4), nominal)
     assert np.isfinite(holed["simulated_before"]["u_q_ref"]).all() and holed["rms_before"]["u_q_ref"] < 6.0
-    with pytest.raises(RecordingError, match="follow each other"):
+    with pytest.raises(RecordingError, match="consecutive rows"):
         closed_loop(from_columns(columns, 2e-4), nominal)
