@@ -185,7 +185,7 @@ def test_every_effect_of_the_issue_has_a_file_of_its_own():
 
 NEW_EFFECT = """
 import numpy as np
-from diagnosis.effect import FluxEffect, Parameter, one, sigma
+from fluxproof.diagnosis.effect import FluxEffect, Parameter, one, sigma
 
 class SecondHarmonic(FluxEffect):
     def core_psi(self, view):

@@ -240,7 +240,7 @@ def test_options_that_are_missing_end_with_usage(capsys):
 
 
 def test_help_does_not_wait_for_what_only_a_diagnosis_needs():
-    slow = ("pandas", "matplotlib", "diagnosis.session")
+    slow = ("pandas", "matplotlib", "fluxproof.diagnosis.session")
     code = f"import sys, fluxproof.command; print([m for m in {slow} if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
