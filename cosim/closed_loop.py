@@ -1,6 +1,6 @@
-"""Closed loop: gate edges switch the plant, the plant's sensors feed the core, the golden model runs beside it.
+"""Closed loop: gate edges switch the plant, the plant's sensors feed the core, the golden model runs in parallel.
 
-The device under test is anything that can run one PWM period (see Device): the VHDL in GHDL, its Verilog
+The device under test runs one PWM period at a time (see Device): the VHDL in GHDL, its Verilog
 conversion in Verilator, or the golden model itself.  All see the same codes; every observed value and every gate
 edge is compared with ``==``.
 """
@@ -21,12 +21,12 @@ from fluxproof.plant import Inverter, Machine, Sensors, SwitchingPlant, centred_
 from fluxproof.plant.sensors import current_code, position_code, u_dc_code
 
 INPUT_PORTS = tuple(p.name for p in sample_latch.BLOCK.inputs if p.name != "run_in")
-SAMPLE_DELAY = 4  # clocks from sample_trigger to sample_valid: what a converter would take, shortened
+SAMPLE_DELAY = 4  # clocks from sample_trigger to sample_valid: the conversion time of an ADC, shortened
 
 
 @dataclass(frozen=True)
 class Scenario:
-    """What happens, period by period: arrays of one length."""
+    """References, load and bus voltage per period: arrays of equal length."""
 
     omega_ref: np.ndarray  # integers, per unit format
     load: np.ndarray  # [Nm]
@@ -35,21 +35,21 @@ class Scenario:
     i_q_ext: np.ndarray  # integers
     speed_mode: np.ndarray  # 0 or 1
     enable: np.ndarray  # 0 or 1
-    brake: np.ndarray | None = None  # [Nm] most that a brake on the shaft can hold, see ``load_torque``
+    brake: np.ndarray | None = None  # [Nm] largest torque of a brake on the shaft, see ``load_torque``
     changes: Mapping[int, Mapping[str, int]] = field(
         default_factory=dict
     )  # period -> registers from there on
     omega_m: float = 0.0  # mechanical speed at the start [rad/s]
     clear_faults: np.ndarray | None = None  # 0 or 1; None: never
     temp_winding: np.ndarray | None = (
-        None  # what the thermocouple says [degC]; NaN: lost; None: there is none
+        None  # winding temperature [degC]; NaN: reading lost; None: no sensor
     )
 
     def __len__(self) -> int:
         return len(self.load)
 
     def slow_inputs(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Temperature and whether it is one, and clear_faults, as the core takes them."""
+        """(temperature, whether it is valid, clear_faults) as inputs of the core."""
         zeros = np.zeros(len(self), np.int64)
         clear = zeros if self.clear_faults is None else self.clear_faults
         if self.temp_winding is None:
@@ -64,15 +64,15 @@ BRAKE_SLOPE = 10.0  # Nm per rad/s: a held shaft creeps below half a rad/s, and 
 
 @kernel
 def load_torque(load, brake, omega_m):
-    """Load [Nm] and a brake that only ever opposes the motion, up to ``brake`` [Nm]."""
+    """Load [Nm] plus a brake torque that opposes the motion, up to ``brake`` [Nm]."""
     return load + max(-brake, min(brake, BRAKE_SLOPE * omega_m))
 
 
 @dataclass
 class Period:
-    """What a device did in one period, from one sample_trigger to the next."""
+    """The outputs of a device in one period, from one sample_trigger to the next."""
 
-    observed: dict[str, int] | None  # None where no sample came out
+    observed: dict[str, int] | None  # None if no sample was processed
     edge_clocks: np.ndarray
     gate_words: np.ndarray
     clocks: int
@@ -110,7 +110,7 @@ class GoldenPeriods:
         self.word, self.carried = 0, None
 
     def run(self, inputs: dict[str, int] | None, enable: int) -> Period:
-        """From this sample_trigger to the next, with the sample where there is one."""
+        """Run from this sample_trigger to the next, with a sample or None."""
         core, limit, seen, running = self.core, 4 * self.core.config.carrier_half, [], 0
         if inputs is not None:
             seen = [core.advance(SAMPLE_DELAY, enable=enable)]
@@ -131,7 +131,7 @@ class GoldenPeriods:
 
 @dataclass
 class Result:
-    """Everything recorded: one row per period, integers as the core shows them, plant in SI units."""
+    """The recorded run: one row per period, integers of the core, plant in SI units."""
 
     observed: dict[str, np.ndarray] = field(default_factory=dict)
     plant: dict[str, np.ndarray] = field(default_factory=dict)
@@ -139,7 +139,7 @@ class Result:
     differences: int = 0
     first_difference: str | None = None
     sample_to_duty_clocks: int = 0
-    gate_edges: np.ndarray | None = None  # rows of (period, clock, gate word) as the device gave them
+    gate_edges: np.ndarray | None = None  # rows of (period, clock, gate word) of the device
     state: fluxproof.State | None = None  # the golden model's, at the end
 
 
@@ -169,13 +169,13 @@ def described_sensors(drive) -> Sensors:
 def build_plant(
     drive, sensors: Sensors | None = None, machine: Machine | None = None, omega_m: float = 0.0
 ) -> tuple[SwitchingPlant, Sensors]:
-    """Plant and sensors as drive.toml describes them; the device's own dead time comes out of its gates."""
+    """Plant and sensors as drive.toml describes them; the dead time is that of the device's gates."""
     machine = machine or Machine.from_mapping(vars(drive.machine))
     return SwitchingPlant(machine, Inverter(), omega_m=omega_m), sensors or described_sensors(drive)
 
 
 class Beside:
-    """A device with the golden model beside it: both get the same samples, every period is compared."""
+    """A device and the golden model in parallel: both get the same samples, every period is compared."""
 
     def __init__(self, device: Device, register_set):
         self.device, self.config = device, register_set.config
@@ -184,7 +184,7 @@ class Beside:
         self.edges: list[tuple[int, int, int]] = []
 
     def differ(self, what: str) -> None:
-        """Count a difference; the first one is kept in words."""
+        """Count a difference and keep the message of the first one."""
         self.result.differences += 1
         self.result.first_difference = self.result.first_difference or f"period {len(self.observed)}: {what}"
 
@@ -225,7 +225,7 @@ class Beside:
         self.result.sample_to_duty_clocks = max(self.result.sample_to_duty_clocks, got.sample_to_duty)
 
     def finish(self) -> Result:
-        """What was recorded; the golden values, which the device's equal where nothing differs."""
+        """The recorded run with the golden values, which equal the device's if there is no difference."""
         self.result.periods_compared = len(self.observed)
         self.result.observed = dict(zip(fluxproof.Observed._fields, np.array(self.observed).T, strict=True))
         self.result.gate_edges = np.array(self.edges, np.int64).reshape(-1, 3)
@@ -284,9 +284,9 @@ def _edges(period: Period) -> str:
 
 
 def run_now(coroutine):
-    """Drive a coroutine that never waits: the devices that are plain function calls."""
+    """Run a coroutine that never waits, for devices that are plain function calls."""
     try:
         coroutine.send(None)
     except StopIteration as stop:
         return stop.value
-    raise RuntimeError("the coroutine waited for something; run it inside its simulator")
+    raise RuntimeError("the coroutine waits for a simulator; run it inside the simulator")

@@ -1,7 +1,7 @@
-"""The golden core clock by clock: raw samples in at any clock, what the ports show out after every clock.
+"""The golden core clock by clock: raw samples may enter at any clock, the port values are returned after every clock.
 
-The sample's values come from fluxproof.step at once and are given to what runs at the clock (golden_model/clocked.py)
-when the core's declared latencies say that they are there.
+fluxproof.step calculates the values of a sample at once; the clocked part (golden_model/clocked.py) gets them after
+the declared latencies.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ def run_clocks(state, inputs, regs, carrier_half, until_trigger, seen):
     entered = 0
     for k in range(seen.shape[0]):
         state, entered, now = clocked.step(state, inputs, regs, carrier_half)
-        row = seen[k]  # unpacked and not looped over, which compiles to a hundred times as much
+        row = seen[k]  # unpacked, because a loop compiles to a hundred times as much code
         row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7], row[8] = now
         if until_trigger and now.sample_trigger:
             return state, k + 1, entered
@@ -38,16 +38,16 @@ class GoldenClock:
         self.inputs = clocked.Inputs()
         self.clock = 0
         self.running = 0
-        self.samples: list[fluxproof.Sample] = []  # those that have entered
-        self.observed: fluxproof.Observed | None = None  # of the last of them
+        self.samples: list[fluxproof.Sample] = []  # accepted samples
+        self.observed: fluxproof.Observed | None = None  # values of the last accepted sample
         self._due: list[tuple[int, dict[str, int]]] = []
 
     def advance(
         self, clocks: int, sample: Mapping[str, int] | None = None, until_trigger: bool = False, **pins: int
     ) -> np.ndarray:
-        """(clocks made, len(SEEN)) integers; fewer than ``clocks`` where ``until_trigger`` saw sample_trigger.
+        """(clocks made, len(SEEN)) integers; fewer than ``clocks`` if ``until_trigger`` found sample_trigger.
 
-        ``sample``: the raw sample's ports, given with sample_valid at the first of the clocks.  ``pins``: enable, trip,
+        ``sample``: the raw sample's ports, applied with sample_valid at the first clock.  ``pins``: enable, trip,
         clear_trip from now on.
         """
         self.inputs = self.inputs._replace(**pins)
@@ -79,9 +79,9 @@ class GoldenClock:
         return np.concatenate(rows)
 
     def _enter(self, sample: Mapping[str, int]) -> None:
-        """What a sample that enters at this clock comes to, and when."""
+        """The results of a sample that enters at this clock, and their clocks."""
         self.samples.append(fluxproof.Sample(*sample.values(), self.running))
-        # The minimum pulse is the one in force, taken over at a valley: what the gates refuse, the duties do not see.
+        # The duties use the minimum pulse in force, updated at a valley, not a setting that the gates refuse.
         registers = self.registers._replace(min_pulse=self.state.of_gate_generation.min_pulse)
         self.of_samples, self.observed = fluxproof.step(
             self.of_samples, self.samples[-1], registers, self.config

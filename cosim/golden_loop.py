@@ -1,4 +1,4 @@
-"""The golden model in compiled loops: the controller alone, closed over the averaged and the switching plant."""
+"""The golden model in compiled loops: open loop, and closed with the averaged or the switching plant."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ def run_switching(
 ):  # fmt: skip
     """Closed loop over the switching plant; returns the controller's state.
 
-    ``samples`` (n, 8) int64: the fields of fluxproof.Sample behind the codes; ``u_dc`` [V], ``load``,
+    ``samples`` (n, 8) int64: the fields of fluxproof.Sample after the codes; ``u_dc`` [V], ``load``,
     ``brake`` [Nm] (n,), with an imposed speed ``load`` [rad/s].  ``first``: number of the first period, for the
     sensors' noise.  ``out`` (n, 6) receives the signals of PLANT before each period, ``observed`` the core's.
     """
@@ -137,9 +137,9 @@ def simulate(
 ) -> Result:  # fmt: skip
     """``scenario`` with the golden model and the switching plant, compiled; as cosim.cosimulate, but faster.
 
-    The inverter follows the compare values in force with a dead time of ``dead_time_s``; zero is the ideal one that
-    paper 001 assumes; ``inverter`` adds device drops.  ``state`` goes on with what a controller has learnt; the result
-    carries the last one.  ``mode`` IMPOSED_SPEED: the scenario's load is the mechanical speed [rad/s].
+    The inverter follows the compare values in force with a dead time of ``dead_time_s``; zero is the ideal inverter
+    that paper 001 assumes; ``inverter`` adds device drops.  ``state`` is the controller's initial state; the result has
+    the last one.  ``mode`` IMPOSED_SPEED: the scenario's load is the mechanical speed [rad/s].
     """
     machine = machine or Machine.from_mapping(vars(drive.machine))
     params = plant_params(machine, inverter or Inverter(), mode=mode)

@@ -1,4 +1,4 @@
-"""What the drive is put through: Fig. 9 of paper 001, and the same compressed with everything else that can happen."""
+"""Scenarios for the drive: Fig. 9 of paper 001, and shorter ones that cover the other operating conditions."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ RPM = 2 * math.pi / 60  # mechanical rad/s
 
 
 def steps(n: int, changes: dict[float, float], per_period: float) -> np.ndarray:
-    """A staircase over n periods: ``changes`` maps a time [s] to the value from then on; zero before."""
+    """A step function over n periods: ``changes`` maps a time [s] to the value from then on; zero before."""
     values = np.zeros(n)
     for time, value in sorted(changes.items()):
         values[round(time / per_period) :] = value
@@ -25,7 +25,7 @@ def scenario(
     drive: Drive, seconds: float, rpm, load=None, u_dc=None, i_d=None, i_q=None, torque_mode=(), off=(), brake=None,
     changes=None, start_rpm=0.0,
 ) -> Scenario:  # fmt: skip
-    """Staircases in SI units to a scenario; ``torque_mode`` and ``off`` are (from, to) intervals [s].
+    """A scenario from step functions in SI units; ``torque_mode`` and ``off`` are (from, to) intervals [s].
 
     ``changes`` maps a time [s] to the registers (integers by name) that change there.
     """
@@ -57,7 +57,7 @@ def scenario(
 
 
 def fig9(drive: Drive) -> Scenario:
-    """183 to 732 rpm, then the nominal load of 3.7 Nm, i_d = 0: paper 001, Fig. 9; first up from rest."""
+    """Start, 183 to 732 rpm, then the nominal load of 3.7 Nm, i_d = 0: paper 001, Fig. 9."""
     return scenario(drive, 0.30, rpm={0.0: 183, 0.08: 732}, load={0.18: 3.7})
 
 
@@ -77,12 +77,12 @@ def everything(drive: Drive) -> Scenario:
 
 
 def full_speed(drive: Drive) -> Scenario:
-    """On a bus of 300 V towards the rated speed and back through zero: the voltage circle holds for long."""
+    """On a bus of 300 V towards the rated speed and back through zero: long periods at the voltage limit."""
     return scenario(drive, 0.4, rpm={0.0: 2900, 0.2: -2900}, u_dc={0.0: 300.0})
 
 
 def short(drive: Drive) -> Scenario:
-    """30 ms: start, load, reversal; for configurations that only need to be shown to work."""
+    """30 ms: start, load, reversal; for a short functional check of a configuration."""
     return scenario(drive, 0.03, rpm={0.0: 400, 0.02: -400}, load={0.01: 2.0})
 
 

@@ -9,14 +9,14 @@ from pathlib import Path
 
 __all__ = ["diagnose"]
 
-# In a checkout the rooms (golden_model, plant, cosim, diagnosis) are beside this folder; a wheel holds them inside it.
+# In a checkout golden_model, plant, cosim and diagnosis are next to this folder; in a wheel they are inside it.
 _ROOT = Path(__file__).resolve().parent.parent
 if (_ROOT / "pyproject.toml").is_file() and (_ROOT / "golden_model").is_dir():
     __path__.append(str(_ROOT))
 
 
 def __getattr__(name: str):
-    """``diagnose`` is imported when it is first used: it takes a second, which ``fluxproof --help`` need not wait."""
+    """Import ``diagnose`` on first use: it takes a second, which ``fluxproof --help`` should not wait."""
     if name == "diagnose":
         from fluxproof.diagnosis.session import diagnose
 

@@ -1,4 +1,4 @@
-"""The folders of a checkout, for what builds, checks and studies the core; an installed package has none of them."""
+"""Folders of a checkout, for building, checking and studying the core; absent in an installed package."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-# The VHDL under test.  Another tree, such as one with a planted defect, is named by the variable.
+# The VHDL under test; the variable selects another tree, for example one with a planted defect.
 RTL = Path(os.environ.get("FLUXPROOF_RTL") or ROOT / "rtl").resolve()
 BUILD = ROOT / "build"
 DRIVES = ROOT / "docs" / "drives"

@@ -1,8 +1,8 @@
-"""The command ``fluxproof``: ``fluxproof registers drive.toml`` and what stands beside it in COMMANDS.
+"""The command ``fluxproof`` with the subcommands listed in COMMANDS, e.g. ``fluxproof registers drive.toml``.
 
-Exit status: 0 done, 2 bad input (one line on stderr says which and why), 1 where a command found a fault.
-A command is a module with two functions: ``arguments(parser)`` declares its options, ``run(args)`` returns
-the exit status; a line in COMMANDS makes it known.
+Exit status: 0 done, 2 bad input (one line on stderr says which and why), 1 if a command found a fault.
+A subcommand is a module with two functions: ``arguments(parser)`` declares its options, ``run(args)`` returns
+the exit status; an entry in COMMANDS registers it.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from fluxproof.golden_model.drive_keys import DriveError
 
 
 class Command(NamedTuple):
-    """One subcommand: a line of help, the options it takes, what it does."""
+    """One subcommand: a line of help, its options, its function."""
 
     help: str
     arguments: Callable[[argparse.ArgumentParser], None]
@@ -48,7 +48,7 @@ def parser() -> argparse.ArgumentParser:
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Run a subcommand; bad input and unusable files end in one line and status 2, never in a traceback."""
+    """Run a subcommand; bad input and unreadable files give one line and status 2, never a traceback."""
     args = parser().parse_args(argv)
     try:
         status = args.run(args)
@@ -56,7 +56,7 @@ def main(argv: list[str] | None = None) -> int:
         return status
     except (DriveError, RecordingError) as error:
         print(f"fluxproof: {diagnose.printable(str(error), sys.stderr.encoding)}", file=sys.stderr)
-    except BrokenPipeError:  # the reader, a pager or head, has seen enough
+    except BrokenPipeError:  # the reader, a pager or head, has closed the pipe
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except OSError as error:

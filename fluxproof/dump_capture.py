@@ -1,7 +1,7 @@
-"""``fluxproof dump``: the words that a DMA took from the telemetry stream, to a dump that ``fluxproof diagnose`` takes.
+"""``fluxproof dump``: converts the telemetry words stored by a DMA to a dump for ``fluxproof diagnose``.
 
-The registers are those of drive.toml, or of a JSON file where the core ran with others: ``{"kp_d": 1234, ...}`` with
-integers, or what ``fluxproof registers --json`` writes.  Names that the file leaves out are those of drive.toml.
+The registers are those of drive.toml, or of a JSON file if the core ran with others: ``{"kp_d": 1234, ...}`` with
+integers, or the output of ``fluxproof registers --json``.  Registers that the file omits are those of drive.toml.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ REPLAY = {
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the subcommand."""
     parser.add_argument(
-        "capture", metavar="capture.bin", help="32-bit words, little-endian, as a DMA leaves them"
+        "capture", metavar="capture.bin", help="32-bit words, little-endian, as stored by a DMA"
     )
     parser.add_argument(
-        "--drive", metavar="drive.toml", required=True, help="the drive that the core was set up for"
+        "--drive", metavar="drive.toml", required=True, help="the drive that the core was configured for"
     )
     parser.add_argument(
-        "--registers", metavar="FILE", help="JSON: the registers' integers, where they were others"
+        "--registers", metavar="FILE", help="JSON: integers of the registers that differ from drive.toml"
     )
     parser.add_argument(
         "--piece", type=int, metavar="N", help="which piece of a capture with a reset inside, from 1 on"
@@ -43,7 +43,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Write the dump, say what is in it; returns 0."""
+    """Write the dump and print its contents; returns 0."""
     from fluxproof.diagnosis.telemetry_stream import read_capture, write_piece  # takes a second to import
 
     drive = load(args.drive)
@@ -63,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def chosen(pieces, wanted: int | None, name) -> int:
-    """Index of the piece asked for, by default the longest."""
+    """Index of the requested piece, by default the longest."""
     if wanted is None:
         return max(range(len(pieces)), key=lambda k: len(pieces[k]))
     if not 1 <= wanted <= len(pieces):
@@ -72,7 +72,7 @@ def chosen(pieces, wanted: int | None, name) -> int:
 
 
 def summary(capture, number: int) -> list[str]:
-    """What the dump holds and what it does not."""
+    """Lines on the contents of the dump and what is missing."""
     piece = capture.pieces[number]
     lines = []
     if len(capture.pieces) > 1:
@@ -91,7 +91,7 @@ def _numbers(piece) -> str:
 
 
 def with_registers(base: RegisterSet, path: Path) -> RegisterSet:
-    """``base`` with the integers of a JSON file; DriveError names what cannot be a register of this core."""
+    """``base`` with the integers of a JSON file; DriveError names an unknown register or an invalid value."""
     from fluxproof.diagnosis.telemetry import CONFIG
 
     try:

@@ -1,4 +1,4 @@
-"""Writing results: to a temporary name first, then renamed, so that nothing is ever half-written."""
+"""Writing results: to a temporary name first, then renamed, so that no file is incomplete."""
 
 from __future__ import annotations
 

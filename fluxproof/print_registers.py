@@ -1,4 +1,4 @@
-"""``fluxproof registers``: each register in SI units, as integer, and what the integer really stands for.
+"""``fluxproof registers``: each register in SI units, as integer, and the SI value of the integer.
 
 With ``--format c`` or ``json`` the same integers as a list of (address, value) for a driver to load.
 """
@@ -16,7 +16,7 @@ from fluxproof.golden_model.generated.register_names import ADDRESSES
 from fluxproof.golden_model.registers import RegisterSet, Row, registers
 
 HEAD = ("register", "address", "SI value", "unit", "integer", "represented", "error", "legal range")
-LEFT = (0, 3)  # columns of words; numbers stand at the right
+LEFT = (0, 3)  # columns of words; numbers are right-aligned
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -50,12 +50,12 @@ def run(args: argparse.Namespace) -> int:
 
 
 def load_list(result: RegisterSet) -> list[dict]:
-    """What a driver writes: byte address and integer of each register."""
+    """The writes of a driver: byte address and integer of each register."""
     return [{"name": r.name, "address": ADDRESSES[r.name], "value": r.integer} for r in result.rows]
 
 
 def c_lines(name: str, drive: Drive, result: RegisterSet) -> list[str]:
-    """A C header: the bases, the generics that the core must have been built with, the values to load."""
+    """A C header: the bases, the generics the core must be built with, the values to load."""
     bases = {**vars(drive.bases), "flux_wb": drive.bases.flux_wb, "sample_time_s": drive.sample_time_s}
     rows = []
     for r in result.rows:
@@ -87,7 +87,7 @@ def c_lines(name: str, drive: Drive, result: RegisterSet) -> list[str]:
 
 
 def bases_lines(drive: Drive, result: RegisterSet) -> list[str]:
-    """What 1.0 per unit stands for, and the generics."""
+    """The SI values of 1.0 per unit, and the generics."""
     bases, config = drive.bases, result.config._asdict()
     return [
         f"bases     {bases.current_a:g} A, {bases.voltage_v:g} V, {bases.omega_me_rad_s:g} rad/s electrical,"
@@ -109,7 +109,7 @@ def _padded(column: int, cell: str, width: int) -> str:
 
 
 def _cells(row: Row) -> tuple[str, ...]:
-    """One register in words; the error is relative, or absolute with its unit where the value is zero."""
+    """One register in words; the error is relative, or absolute with its unit if the value is zero."""
     error = f"{row.relative:+.1e}" if row.relative is not None else f"{row.error:+g} abs"
     legal = f"{row.low}..{row.high}"
     address = f"0x{ADDRESSES[row.name]:03X}"
@@ -117,7 +117,7 @@ def _cells(row: Row) -> tuple[str, ...]:
 
 
 def as_json(drive: Drive, result: RegisterSet) -> dict:
-    """The table for programs; SI units throughout."""
+    """The table as JSON data; SI units throughout."""
     bases = {**vars(drive.bases), "flux_wb": drive.bases.flux_wb, "sample_time_s": drive.sample_time_s}
     rows = {
         row.name: {

@@ -1,21 +1,21 @@
-"""What a block declares, once: ports with formats, registers, latency, model, reference, bounds.
+"""The declaration of a block: ports with formats, registers, latency, model, reference, error bounds.
 
-The contract every block keeps, in the model and in the RTL:
+The contract of every block, in the model and in the RTL:
 
-* A sample enters on the clock edge at which ``in_valid`` is high.  Its inputs stay as they are for
+* A sample enters on the clock edge at which ``in_valid`` is high.  Its inputs stay constant for
   ``interval`` clocks from that edge, which is also the least distance of two samples.
-* An input that is declared ``late`` is there that many clocks later, and not needed before.
+* An input that is declared ``late`` is valid that many clocks later and not read before.
 * Registers change only while no sample is in flight.
-* ``out_valid`` is high ``latency`` clocks later, for one clock, and the outputs stay until the next
-  sample's may change them; those of an ``atomic`` block change together, with ``out_valid`` only.
-* The outputs named in ``soon`` are there ``ahead`` clocks earlier, one if nothing is said, told by a second
-  strobe, ``out_soon``: a block that needs them first starts there and takes the others late.
-* ``rst`` is synchronous and active high.  It empties the pipeline and brings the state to
-  ``state``; it promises nothing about the outputs, which nobody may read without ``out_valid``.
-* A clocked block (``clocked=True``) has no strobes: each clock is a sample, latency is one.
+* ``out_valid`` is high ``latency`` clocks later, for one clock.  The outputs stay until the next
+  sample changes them; the outputs of an ``atomic`` block change together, with ``out_valid`` only.
+* The outputs named in ``soon`` are valid ``ahead`` clocks earlier (default 1), marked by a second
+  strobe, ``out_soon``: a block that needs them first starts there and declares the others late.
+* ``rst`` is synchronous and active high.  It empties the pipeline and sets the state to ``state``;
+  the outputs are undefined after it and must not be read without ``out_valid``.
+* A clocked block (``clocked=True``) has no strobes: each clock is a sample, the latency is one.
 
-``reference`` and ``bound`` see the values as real numbers, the state as the integers it holds before
-the sample, so that what they promise is one sample's error, derived from the formats alone.
+``reference`` and ``bound`` take the values as real numbers and the state as the integers before the
+sample.  The bound is therefore the error of one sample, derived from the formats alone.
 
 ``step(*inputs, *registers, *generics)`` returns a tuple in the order of ``outputs``; a block with
 state has ``step(state, ...)`` and returns ``(state, outputs)``, state being a NamedTuple of integers.
@@ -40,7 +40,7 @@ class Port:
     lo: int | None = None
     hi: int | None = None
     doc: str = ""
-    late: int = 0  # an input's: clocks after in_valid, less than the block's interval
+    late: int = 0  # input only: clocks after in_valid, less than the block's interval
 
     @property
     def low(self) -> int:
@@ -57,7 +57,7 @@ class Port:
 
 @dataclass(frozen=True)
 class Const:
-    """A real number rounded into a format: what the VHDL package will hold."""
+    """A real number rounded to a format: a constant of the VHDL package."""
 
     real: float
     fmt: Format
@@ -88,15 +88,15 @@ class Block:
     interval: int = 1
     clocked: bool = False
     atomic: bool = False  # outputs change with out_valid only
-    soon: tuple[str, ...] = ()  # outputs that are there with out_soon
+    soon: tuple[str, ...] = ()  # outputs that are valid with out_soon
     ahead: int = 1  # clocks that out_soon comes before out_valid
-    shown_with: Mapping[str, str] = field(default_factory=dict)  # clocked: output -> the valid it means something with
-    after_reset: Mapping[str, int] = field(default_factory=dict)  # clocked: outputs that reset does not bring to zero
+    shown_with: Mapping[str, str] = field(default_factory=dict)  # clocked: output -> the output that marks it valid
+    after_reset: Mapping[str, int] = field(default_factory=dict)  # clocked: outputs that are not zero after reset
     constants: Mapping[str, int | Const] = field(default_factory=dict)
     roms: Mapping[str, tuple[Format, list[int]]] = field(default_factory=dict)
     configs: tuple[Mapping[str, int], ...] = ({},)  # generics to verify with
-    stimuli: Callable | None = None  # (rng, config) -> list of {port: value}: the block's own hard cases
-    possible: Callable | None = None  # {port: value} -> the nearest that can occur
+    stimuli: Callable | None = None  # (rng, config) -> list of {port: value}: corner cases of the block
+    possible: Callable | None = None  # {port: value} -> the nearest values that can occur
     width_from: Mapping[str, Callable] = field(default_factory=dict)  # port -> config -> Format
     generated: bool = False  # the VHDL is written by `make generate`
 

@@ -1,8 +1,8 @@
-"""What of the core runs at the clock: sample guard, fault memory and gates, wired as in rtl/fluxproof.vhd.
+"""The part of the core that runs at every clock: sample guard, fault latch and gates, wired as in rtl/fluxproof.vhd.
 
 One step is one clock; ``State`` holds the blocks' states and the registers between them.  ``compare_*``,
-``sample_faults`` and ``sample_trip`` come from fluxproof.step, ``COMPARE_CLOCKS`` and ``CHECKS_CLOCKS`` after the
-clock at which a sample has entered: from the step behind those on.
+``sample_faults`` and ``sample_trip`` come from fluxproof.step.  They are valid ``COMPARE_CLOCKS`` and
+``CHECKS_CLOCKS`` clocks after the clock at which the sample entered, from the following step on.
 """
 
 from typing import NamedTuple
@@ -29,7 +29,7 @@ class State(NamedTuple):
 
 
 class Inputs(NamedTuple):
-    """What the clock sees of the core's inputs and of the sample that is worked on."""
+    """Inputs of one clock: the core's inputs and the results of the sample in flight."""
 
     sample_valid: int = 0
     enable: int = 0
@@ -43,7 +43,7 @@ class Inputs(NamedTuple):
 
 
 class Seen(NamedTuple):
-    """What the core shows after a clock, by the names of its ports."""
+    """Outputs of the core after a clock, by the names of its ports."""
 
     gate_high: int
     gate_low: int

@@ -3,7 +3,7 @@
 Peak values throughout, amplitude-invariant dq frames, angles and speeds electrical unless a name says
 otherwise.  ``load(path)`` reads a file; ``registers.registers(drive)`` makes the core's integers of it.
 
-Bases, where [bases] does not say otherwise (a per-unit number reaches +-2, a current in the stator frame +-1.375):
+Default bases, unless [bases] gives others (range of a per-unit number +-2, of a current in the stator frame +-1.375):
 
     I_base      current at the upper end of the ADC code
     U_base      half the voltage at full bus code, so that the code's scale ends at 2
@@ -62,7 +62,7 @@ class Inverter:
 
 @dataclass(frozen=True)
 class Control:
-    """[control]; a gain given here overrides what the bandwidths would make."""
+    """[control]; a gain given here overrides the one calculated from the bandwidths."""
 
     current_bandwidth_hz: float = positive("Hz", "current loop")
     sample_time_s: float | None = positive("s", "1 / pwm_frequency_hz", None)
@@ -82,22 +82,22 @@ class Control:
     flux_crossover_hz: float | None = positive("Hz", "voltage model above, current model below", None)
     flux_damping: float = positive("1", "damping of the merge of both models", math.sqrt(0.5))
     flux_bandwidth_hz: float | None = positive("Hz", "compensation by delta_lambda", None)
-    flux_min_speed_rad_s: float = positive("rad/s", "mechanical; no compensation up to it", 2.0)
+    flux_min_speed_rad_s: float = positive("rad/s", "mechanical; no compensation below", 2.0)
     flux_compensation_limit_wb: float | None = positive("Wb", "largest compensation", None)
     flux_kp: float | None = not_negative("1", "override", None)
     flux_ki_per_s: float | None = not_negative("1/s", "override", None)
-    dead_time_compensation: bool = flag("true: what dead time and drops take is compensated", True)
-    sign_current_a: float | None = positive("A", "current from which a direction is full", None)
+    dead_time_compensation: bool = flag("true: compensate dead time and device drops", True)
+    sign_current_a: float | None = positive("A", "current above which a direction is +-1", None)
     v_dead_filter_hz: float = positive("Hz", "low-pass of paper 000, Fig. 3", 5.0)
     v_dead_eta: float = positive("1", "step of the V_dead Adaline, paper 000 eq. (10)", 1e-5)
     v_dead_gamma: float = not_negative("1", "proportional part of the compensation", 0.1)
-    v_dead_zeta: float = not_negative("1", "what the minimisation adds in a sample", 1e-4)
-    v_dead_threshold_v: float | None = not_negative("V", "of a leg, no minimisation below", None)
-    v_dead_limit_v: float | None = positive("V", "of a leg, most that is compensated", None)
+    v_dead_zeta: float = not_negative("1", "gain of the minimisation per sample", 1e-4)
+    v_dead_threshold_v: float | None = not_negative("V", "leg voltage below which the minimisation stops", None)
+    v_dead_limit_v: float | None = positive("V", "largest leg voltage that is compensated", None)
     psi_eta: float | None = positive("s2/rad2", "step of the psi_m Adaline, paper 000 eq. (13)", None)
     psi_min_speed_rad_s: float | None = positive("rad/s", "mechanical; psi_m is held below", None)
-    winding_temp_min_c: float = real("degC", "coldest reading that is believed", -40.0)
-    winding_temp_max_c: float = real("degC", "hottest reading that is believed", 200.0)
+    winding_temp_min_c: float = real("degC", "lowest valid temperature", -40.0)
+    winding_temp_max_c: float = real("degC", "highest valid temperature", 200.0)
 
 
 @dataclass(frozen=True)
@@ -120,7 +120,7 @@ class Sensors:
 class Protection:
     """[protection], all optional: what turns the gates off; defaults in scaling.py.
 
-    A condition whose trip_ key is false is told in the core's flags and does not trip.
+    A condition whose trip_ key is false is reported in the core's flags and does not trip.
     """
 
     current_trip_a: float | None = positive("A", "phase current, peak; twice the limit if none", None)
@@ -128,15 +128,15 @@ class Protection:
     rail_samples: int = whole(1, 15, "samples at the end of a code", 3)
     u_dc_min_v: float | None = not_negative("V", "a tenth of the nominal bus if none", None)
     u_dc_max_v: float | None = positive("V", "1.3 times the nominal bus if none", None)
-    position_jump_rad: float | None = positive("rad", "mechanical, change of the turn a sample", None)
+    position_jump_rad: float | None = positive("rad", "mechanical, deviation from the extrapolated position", None)
     watchdog_periods: float = positive("1", "longest time without a sample, in PWM periods", 1.5)
-    trip_overcurrent: bool = flag("false: told, no trip", True)
-    trip_current_sum: bool = flag("false: told, no trip; where one sensor is calculated", True)
-    trip_at_rail: bool = flag("false: told, no trip", True)
-    trip_u_dc_low: bool = flag("false: told, no trip", True)
-    trip_u_dc_high: bool = flag("false: told, no trip", True)
-    trip_position: bool = flag("false: told, no trip", True)
-    trip_watchdog: bool = flag("false: told, no trip", True)
+    trip_overcurrent: bool = flag("false: reported, no trip", True)
+    trip_current_sum: bool = flag("false: reported, no trip; for a third current calculated from two", True)
+    trip_at_rail: bool = flag("false: reported, no trip", True)
+    trip_u_dc_low: bool = flag("false: reported, no trip", True)
+    trip_u_dc_high: bool = flag("false: reported, no trip", True)
+    trip_position: bool = flag("false: reported, no trip", True)
+    trip_watchdog: bool = flag("false: reported, no trip", True)
 
 
 @dataclass(frozen=True)
@@ -157,7 +157,7 @@ class BaseChoice:
 
 @dataclass(frozen=True)
 class Bases:
-    """What 1.0 per unit stands for, SI, peak, electrical."""
+    """The SI values of 1.0 per unit; peak values, electrical speed."""
 
     current_a: float
     voltage_v: float
@@ -194,7 +194,7 @@ class Drive:
 
     @property
     def sample_time_s(self):
-        """One sample a PWM period, at the valley of the carrier."""
+        """One sample per PWM period, at the valley of the carrier."""
         return 1.0 / self.inverter.pwm_frequency_hz
 
     @property
@@ -204,13 +204,13 @@ class Drive:
 
     @property
     def nominal_flux_wb(self):
-        """Length of the flux linkage at i_d = 0 and the rated current."""
+        """Magnitude of the flux linkage at i_d = 0 and rated current."""
         m = self.machine
         return math.hypot(m.magnet_flux_wb, m.inductance_q_h * m.rated_current_a)
 
     @property
     def carrier_half(self):
-        """Half a PWM period in clocks; ``check`` has made sure that it is whole."""
+        """Half a PWM period in clocks; ``check`` ensures that it is an integer."""
         return round(self.core.clock_hz / (2.0 * self.inverter.pwm_frequency_hz))
 
 
@@ -226,7 +226,7 @@ SECTIONS = {
 
 
 def load(path):
-    """The drive that a TOML file describes; DriveError says what is wrong with it."""
+    """Read a drive from a TOML file; DriveError names the file, the key and what is wrong."""
     sections = read_sections(path, SECTIONS)
     try:
         return Drive(*sections.values())
@@ -235,10 +235,10 @@ def load(path):
 
 
 def with_carrier(drive, carrier_half):
-    """The same drive with ``carrier_half`` clocks in half a PWM period, for simulations at the clock.
+    """The same drive with ``carrier_half`` clocks in half a PWM period, for clock-accurate simulations.
 
-    Only the clock changes, to ``2*carrier_half*pwm_frequency``; sampling and every gain stay.  Dead
-    time and minimum pulse keep their seconds and become other, fewer clocks.
+    Only the clock changes, to ``2*carrier_half*pwm_frequency``; sample time and gains stay.  Dead
+    time and minimum pulse keep their values in seconds, so their number of clocks changes.
     """
     core = dataclasses.replace(drive.core, clock_hz=2.0 * carrier_half * drive.inverter.pwm_frequency_hz)
     return dataclasses.replace(drive, core=core)

@@ -1,4 +1,4 @@
-"""Checks between the sections of a drive: settings that are fine alone and contradict each other."""
+"""Checks across the sections of a drive: settings that are valid alone but contradict each other."""
 
 import math
 
@@ -6,7 +6,7 @@ from fluxproof.golden_model.drive_keys import DriveError
 from fluxproof.golden_model.formats import PU, VECTOR
 
 CARRIER_HALF_RANGE = (8, 32767)  # generic CARRIER_HALF of rtl/fluxproof.vhd
-WHOLE = 1e-6  # relative; a decimal fraction typed with seven digits still counts as exact
+WHOLE = 1e-6  # relative; a decimal fraction with seven digits counts as exact
 
 
 def check(drive):
@@ -99,7 +99,7 @@ def _speed_loop(drive):
 
 
 def _current_loop(drive):
-    """A delay of d samples turns the loop's phase by 90 degrees at 1/(4*d*T_s): unstable from there."""
+    """A delay of d samples shifts the phase of the loop by 90 degrees at 1/(4*d*T_s): unstable from there."""
     control = drive.control
     asked, four_delays = control.current_bandwidth_hz, 4.0 * control.delay_samples * drive.sample_time_s
     if asked * four_delays >= 1.0:
@@ -109,7 +109,7 @@ def _current_loop(drive):
 
 
 def _flux_loop(drive):
-    """Paper 001, end of section 4: below the current loop and above the speed loop, or they disturb each other."""
+    """Paper 001, end of section 4: below the current loop and above the speed loop, otherwise the loops interact."""
     control = drive.control
     asked, most = control.flux_bandwidth_hz, control.current_bandwidth_hz
     least = control.speed_bandwidth_hz or 0.0
@@ -119,7 +119,7 @@ def _flux_loop(drive):
 
 
 def _adaline_steps(drive):
-    """Paper 000 eq. (B.3), 0 < 2*eta*|X|**2 < 1, or the least-mean-square step grows its own error."""
+    """Paper 000 eq. (B.3), 0 < 2*eta*|X|**2 < 1, otherwise the least-mean-square step diverges."""
     control, machine = drive.control, drive.machine
     if control.v_dead_eta >= 0.125:
         why = "eq. (B.3), 2*eta*D**2 < 1 with |D| = 2; the estimate of V_dead would diverge"
@@ -136,7 +136,7 @@ def _adaline_steps(drive):
 
 
 def _protection(drive):
-    """What trips must lie outside of what the drive does every day, and inside of what its sensors see."""
+    """A trip level must lie outside the operating range of the drive and inside the range of its sensors."""
     p, limit, reach = drive.protection, drive.current_limit_a, drive.sensors.current_range_a
     if p.current_trip_a is not None and not limit < p.current_trip_a <= reach:
         allowed = f"above the current limit, {limit:g} A, up to [sensors] current_range_a = {reach:g} A"

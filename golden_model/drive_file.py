@@ -1,7 +1,7 @@
-"""Reads a TOML file into the dataclasses that declare its sections; every fault is one clear line.
+"""Reads a TOML file into the dataclasses that declare its sections; every error is a message of one line.
 
-Messages name the file, the section and the key, and what would have been right: the allowed range, the
-type, or for an unknown name the nearest known one.
+A message names the file, the section and the key, and what is allowed: the range, the type, or for an
+unknown name the nearest known one.
 """
 
 import dataclasses
@@ -16,7 +16,7 @@ except ModuleNotFoundError:  # Python 3.10
 
 from fluxproof.golden_model.drive_keys import DriveError, key_of
 
-# How recordings name their signals, and physics that the core knows nothing of: both are read by diagnosis/.
+# Column names of recordings and physics beyond the core's model: both are read by diagnosis/.
 IGNORED = ("columns", "plant")
 
 
@@ -31,7 +31,7 @@ def read_sections(path, schema):
 
 
 def read_tables(path):
-    """The file as nested dictionaries, nothing checked but the syntax."""
+    """The file as nested dictionaries; only the TOML syntax is checked."""
     try:
         return _tables(Path(path))
     except DriveError as error:
@@ -39,7 +39,7 @@ def read_tables(path):
 
 
 def _tables(path):
-    """The file as nested dictionaries; the message then starts right behind the file's name."""
+    """The file as nested dictionaries; an error message starts right after the file name."""
     try:
         text = path.read_bytes().decode("utf-8")
     except UnicodeDecodeError as error:
@@ -54,7 +54,7 @@ def _tables(path):
 
 
 def _syntax_message(message, text):
-    """':line: what TOML says'; the parser puts the line at the end, in words."""
+    """':line: message of the TOML parser', which puts the line at its end."""
     at = re.search(r" \(at line (\d+), column (\d+)\)$", message)
     if at:
         return f":{at[1]}: not TOML: {message[: at.start()]} (column {at[2]})"

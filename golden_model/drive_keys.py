@@ -1,7 +1,7 @@
 """How a key of drive.toml is declared: type, unit and allowed range, written once at the dataclass field.
 
 A section of the file is a frozen dataclass whose fields are made with the functions below; drive_file
-reads any such dataclass and words the messages, so that a new key is one line in drive.py.
+reads any such dataclass and writes the error messages, so that a new key is one line in drive.py.
 """
 
 import dataclasses
@@ -10,7 +10,7 @@ from dataclasses import MISSING, dataclass
 
 
 class DriveError(ValueError):
-    """What is wrong with a drive description, in one line for its author."""
+    """An invalid drive description; the message is one line for its author."""
 
 
 @dataclass(frozen=True)

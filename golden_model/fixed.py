@@ -1,11 +1,11 @@
-"""Fixed-point formats and the two narrowing operations, twin of rtl/common/fixed_pkg.vhd.
+"""Fixed-point formats and the two narrowing operations; twin of rtl/common/fixed_pkg.vhd.
 
-A value is an integer; its format says what the integer means.  Python integers are unbounded
-and the compiled kernels use 64 bits, so every product that a block forms must fit 63 bits:
+A value is an integer; its format gives the meaning of the integer.  Python integers are unbounded
+and the compiled kernels use 64 bits, so every product must fit 63 bits:
 the widest is 25 x 18 bits with an exponent shift of 5.
 
 Rounding is half up (add half an output LSB, then floor) and overflow saturates.  A block that
-does anything else, a floor or a modulo, says so where it does it.
+does anything else, floor or modulo, documents it there.
 """
 
 from __future__ import annotations
@@ -43,18 +43,18 @@ class Format:
         return 2.0**-self.frac_bits
 
     def to_float(self, value: int) -> float:
-        """The number that an integer of this format stands for."""
+        """The real number that an integer of this format represents."""
         return value * self.lsb
 
     def to_int(self, value: float) -> int:
         """Nearest integer (half up), saturated.  Raises ValueError for NaN or infinity."""
         if value != value or value in (float("inf"), float("-inf")):
-            raise ValueError(f"{value} is not a number that {self} can hold")
+            raise ValueError(f"{value} cannot be represented in the format {self}")
         scaled = int((value / self.lsb + 0.5) // 1)
         return max(self.lo, min(self.hi, scaled))
 
     def limit(self, value: float) -> float:
-        """``value`` limited to the range of the format: what saturation does to the exact number."""
+        """``value`` limited to the range of the format: saturation of the exact number."""
         return max(self.lo * self.lsb, min(self.hi * self.lsb, value))
 
     def __str__(self) -> str:
@@ -78,7 +78,7 @@ def saturate(x, width):
 
 @kernel
 def exceeds(x, width):
-    """1 where saturating x to ``width`` signed bits changes it, else 0."""
+    """1 if saturating x to ``width`` signed bits changes it, else 0."""
     return 1 if saturate(x, width) != x else 0
 
 
@@ -102,12 +102,12 @@ def clamp(x, lo, hi):
 
 @kernel
 def wrap(x, width):
-    """x modulo 2**width as an unsigned number: the meaning of an angle, never of a quantity."""
+    """x modulo 2**width as an unsigned number; for angles only."""
     return x & ((1 << width) - 1)
 
 
 @kernel
 def wrap_s(x, width):
-    """x modulo 2**width as a signed number: the shorter way round between two angles."""
+    """x modulo 2**width as a signed number: the shorter of the two differences of two angles."""
     half = 1 << (width - 1)
     return ((x + half) & ((1 << width) - 1)) - half

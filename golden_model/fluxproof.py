@@ -1,7 +1,7 @@
 """The whole core, one sample at a time: twin of rtl/fluxproof.vhd.
 
 Raw sample -> conditioning -> transforms -> control -> modulation -> compare values.  What runs
-at the clock, the gates and what keeps them off, stands in golden_model/clocked.py.
+at every clock (sample guard, fault latch, gate generation) is in golden_model/clocked.py.
 """
 
 from collections import namedtuple
@@ -50,7 +50,7 @@ from fluxproof.golden_model.kernel import kernel
 from fluxproof.golden_model.modulation import gate_generation, pwm_compare, svm, svm_delay_compensation
 from fluxproof.golden_model.transforms import clarke, flux_inverse_park, flux_park, inverse_park, park, sincos
 
-# Instance of the top -> (its block, the instances it waits for).  Blocks start when the last of these is done.
+# Instance of the top -> (its block, the instances it waits for).  A block starts when the last of them is done.
 WIRING = {
     "latch": (sample_latch, ()),
     "conditioning": (current_conditioning, ("latch",)),
@@ -94,8 +94,8 @@ WIRING = {
 }
 
 
-# (instance, one that it waits for): clocks before the other's out_valid at which it starts.  What it needs first is
-# there with the other's out_soon, the rest it takes late.
+# (instance, predecessor): clocks before the predecessor's out_valid at which the instance starts.  The first inputs
+# come with the predecessor's out_soon, the others are declared late.
 EARLY = {
     ("stator_frame", "conditioning"): 1,
     ("rotor_frame", "stator_frame"): 1,
@@ -111,12 +111,12 @@ EARLY = {
     ("stator_voltage", "circle"): 1,
 }
 
-AT_THE_CLOCK = (sample_guard, fault_latch, gate_generation)  # golden_model/clocked.py puts them together
+AT_THE_CLOCK = (sample_guard, fault_latch, gate_generation)  # wired in golden_model/clocked.py
 MODULES = (*dict.fromkeys(module for module, _ in WIRING.values()), *AT_THE_CLOCK)
 
 
 def schedule() -> dict[str, tuple[int, int]]:
-    """{instance: (first clock, last clock)} since the raw sample, from the declared latencies alone."""
+    """{instance: (first clock, last clock)} counted from the raw sample, from the declared latencies alone."""
     times: dict[str, tuple[int, int]] = {}
     for instance, (module, awaited) in WIRING.items():
         first = max((times[name][1] - EARLY.get((instance, name), 0) for name in awaited), default=0)
@@ -140,7 +140,7 @@ class Config(NamedTuple):
 
 
 class Sample(NamedTuple):
-    """What the core takes in at one sampling instant; formats as in io/sample_latch."""
+    """Inputs of the core at one sampling instant; formats as in io/sample_latch."""
 
     adc_a: int
     adc_b: int
@@ -170,7 +170,7 @@ class State(NamedTuple):
     of_psi_adaline: psi_adaline.State = psi_adaline.State()
     of_clean_voltage: clean_voltage.State = clean_voltage.State()
     of_sample_checks: sample_checks.State = sample_checks.State()
-    # Outputs that the next sample reads: the feedback paths of the top.
+    # Outputs that the next sample reads: the feedback paths of the top entity.
     sat_d: int = 0
     sat_q: int = 0
     compare_a: int = 0
@@ -190,7 +190,7 @@ class State(NamedTuple):
 
 
 class Observed(NamedTuple):
-    """Every intermediate value that the top entity shows, in the order of its ports."""
+    """Every intermediate value at the ports of the top entity, in the order of the ports."""
 
     i_a: int
     i_b: int
@@ -491,6 +491,6 @@ OBSERVED = {
     for p in module.BLOCK.outputs
     if p.name in Observed._fields
 }
-# What two of the Park transforms are used for; the others' outputs have the names of their use.
+# Two Park transforms whose outputs are renamed at the top; the others' outputs already have the names of their use.
 OBSERVED |= {p.name: p for p in (D_D, D_Q)}
-OBSERVED |= {f"u_comp_{x}": Port(f"u_comp_{x}", PU, doc=f"compensating voltage, {x} axis") for x in "dq"}
+OBSERVED |= {f"u_comp_{x}": Port(f"u_comp_{x}", PU, doc=f"compensation voltage, {x} axis") for x in "dq"}

@@ -1,7 +1,7 @@
 """Formats and constants that several blocks share.  Everything is per unit of the bases in drive.py.
 
 ``PU`` has 18 bits, the narrow port of every FPGA multiplier of the last twenty years, and a range
-of two: the base is what the sensor can measure, and sums of two such quantities still fit.
+of two: the base is the measuring range of the sensor, and sums of two such quantities still fit.
 """
 
 from fluxproof.golden_model.fixed import Format
@@ -18,20 +18,20 @@ GAIN = Format(1, 1, 16)  # sensor gain, negative for a reversed sensor
 KP = Format(0, 8, 16)  # proportional gain, per unit
 KI = Format(0, 0, 24)  # integral gain times the sample time, per unit
 INDUCTANCE = Format(0, 4, 20)  # inductance, per unit
-INTEGRAL = Format(1, 1, 28)  # integrators: 12 bits below PU, so that small errors still count
+INTEGRAL = Format(1, 1, 28)  # integrators: 12 bits below PU, so that small errors still move them
 RECIPROCAL = Format(0, 0, 17)  # m of 1/x = m * 2**n * 2**-17
 FLUX = Format(1, 1, 23)  # fluxes and voltages inside the estimators: 25 bits, the multiplier's wide port
 FLUX_STATE = Format(1, 1, 30)  # flux that is integrated: 7 bits below FLUX, see docs/flux_estimator.md
 RESISTANCE = Format(0, 0, 24)  # winding resistance, per unit
-MINUS_RHO = Format(1, -2, 24)  # less the flux that it takes away in half a sample: -1/4 to 0, both included
-V_LEG = Format(1, -1, 18)  # what dead time and device drops take from a leg, below half a voltage base
-LIMIT = Format(0, 1, 8)  # what trips: currents and bus voltage to a 256th of their base
+MINUS_RHO = Format(1, -2, 24)  # minus the resistive flux drop of half a sample: -1/4 to 0, both included
+V_LEG = Format(1, -1, 18)  # leg voltage loss by dead time and device drops, below half a voltage base
+LIMIT = Format(0, 1, 8)  # trip levels: currents and bus voltage in steps of a 256th of their base
 SAMPLE_TIME = Format(0, -1, 18)  # sample time times omega_base: below half a radian a sample at base speed
 
 PU_W, TURN_W, INTEGRAL_W, V_LEG_W = PU.width, TURN.width, INTEGRAL.width, V_LEG.width
 DUTY_ONE = 1 << DUTY.frac_bits
 TRIG_ONE = 1 << TRIG.frac_bits
-VECTOR = 11 << (PU.frac_bits - 3)  # 1.375: a vector with both components below it is shorter than 2, however turned
+VECTOR = 11 << (PU.frac_bits - 3)  # 1.375: a vector with both components below it is shorter than 2 at every angle
 FLUX_W, FLUX_STATE_W = FLUX.width, FLUX_STATE.width
 PU_TO_INTEGRAL = INTEGRAL.frac_bits - PU.frac_bits
 PU_TO_FLUX = FLUX.frac_bits - PU.frac_bits

@@ -1,7 +1,7 @@
 """``@kernel``: a function that runs as plain Python and, compiled by numba, a thousand times faster.
 
-The compiled code is cached on disk.  numba notices a change of the file a kernel stands in but
-not of the files it calls, so the cache folder's name is a hash of the whole package: a stale
+The compiled code is cached on disk.  numba notices a change of the kernel's own file but
+not of the files it calls, so the name of the cache folder is a hash of the whole package: a stale
 kernel cannot be loaded.
 """
 
@@ -42,8 +42,8 @@ CACHE_DIR = _cache_root() / "numba" / _source_hash()
 def kernel(function, cache_dir: Path = CACHE_DIR):
     """Compile ``function`` with numba on first call; ``function.py_func`` stays plain Python.
 
-    A kernel outside this package that calls more than this package gives a ``cache_dir`` of its own,
-    named after everything it calls.
+    A kernel outside this package that calls code outside this package needs a ``cache_dir`` of its own,
+    named after a hash of everything it calls.
     """
     previous = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(cache_dir)

@@ -1,7 +1,7 @@
-"""A drive in SI units to the integers of the core's registers: docs/drives/*.toml -> Registers, Config.
+"""Converts a drive in SI units to the integers of the core's registers: docs/drives/*.toml -> Registers, Config.
 
-``integer = SI value / scale / LSB``, rounded half up; what each register holds and why is in scaling.py.
-Two times are rounded up, because dead time and minimum pulse must not come out shorter than asked.
+``integer = SI value / scale / LSB``, rounded half up; scaling.py gives the value and scale of each register.
+Dead time and minimum pulse are rounded up, because they must not be shorter than specified.
 """
 
 import math
@@ -29,7 +29,7 @@ class Row(NamedTuple):
 
 
 class RegisterSet(NamedTuple):
-    """Integers for the core, generics for its top entity, and how they came about."""
+    """Register integers, generics of the top entity, and one row per register with its derivation."""
 
     values: Registers
     config: Config
@@ -37,7 +37,7 @@ class RegisterSet(NamedTuple):
 
 
 def registers(drive: Drive) -> RegisterSet:
-    """All registers of a drive; DriveError names the keys of one that does not fit its range."""
+    """All registers of a drive; DriveError names the keys behind a value that is out of range."""
     entries = {e.name: e for part in PARTS for e in part(drive)}
     rows = {name: _row(entries[name], port) for name, port in REGISTERS.items()}
     _keep_pulse_above_dead_time(rows, drive)
@@ -47,12 +47,12 @@ def registers(drive: Drive) -> RegisterSet:
 
 
 def _row(entry, port):
-    """The entry as an integer of the port's format, refused where the port cannot hold it."""
+    """The entry as an integer of the port's format; DriveError if it does not fit."""
     lsb, up = port.fmt.lsb, entry.name in ROUND_UP
     value = entry.si / entry.scale if entry.scale else math.inf
     if not math.isfinite(value):
         raise DriveError(f"register {entry.name} from {entry.keys}: these values give no number")
-    # A relative 1e-9 above a whole number of clocks is the division's rounding, not a clock more.
+    # A value within a relative 1e-9 above a whole number of clocks is that number: rounding of the division.
     integer = math.ceil(value / lsb * (1.0 - 1e-9)) if up else math.floor(value / lsb + 0.5)
     if entry.unit == "rad":
         integer %= port.fmt.hi + 1  # an angle wraps: just below a turn rounds to zero
@@ -82,7 +82,7 @@ def _printed(entry, port, integer):
 
 
 def _keep_pulse_above_dead_time(rows, drive):
-    """On a coarse clock both times may round up to the same clock; the pulse then takes the next one."""
+    """With a slow clock both times may round up to the same clock; the pulse is then one clock longer."""
     dead, most = rows["dead_time"].integer, min(drive.carrier_half, REGISTERS["min_pulse"].high)
     pulse = max(rows["min_pulse"].integer, dead + 1)
     if pulse > most:

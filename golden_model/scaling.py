@@ -1,26 +1,26 @@
-"""What each register holds: its SI value, and the scale that 1.0 of its format stands for.
+"""The SI value of each register, and its scale: the SI value of 1.0 in the format of the register.
 
 A scale is a product of the bases I, U, w (electrical speed), U/w (flux linkage) and the sample time T_s;
 it follows from the block's equation.  Example: u = kp*i in per unit is u/U = kp*(I/U) * i/I, so 1.0 of kp
-stands for U/I volts per ampere.
+is U/I volts per ampere.
 
 Regulators.  The current loops cancel the pole of R and L with the zero of the PI and cross over at
 w_c:  kp = w_c*L_x,  ki = w_c*R.  The speed loop crosses over at w_s on the integrator
 d(omega_me)/dt = 1.5*p**2*lambda_mg/J * i_q:  Kp = w_s*J/(1.5*p**2*lambda_mg), and Ki = Kp*w_s/5 puts the
-integral's corner a factor of five below the crossover, where it costs 11 degrees of phase (atan(1/5))
-and still removes a load step within a few times 5/w_s.
+corner of the integral a factor of five below the crossover, where it reduces the phase margin by 11 degrees
+(atan(1/5)) and still removes a load step within a few times 5/w_s.
 
 Flux estimator (docs/flux_estimator.md): the regulators' integrals follow an error of the decoupling with the
 time constant (R + kp)/ki; K_p = w_f*(R + kp)/ki and K_i = w_f cancel it, and the compensation crosses over at
-w_f.  Paper 001, section 4, wants w_f below the current loop's crossover and above the speed loop's: twice the
+w_f.  Paper 001, section 4, requires w_f below the current loop's crossover and above the speed loop's: twice the
 latter, since K_p multiplies noise, but at most half of the former, or a tenth of it without a speed loop.
 The two models cross over at an eighth of the rated electrical speed, the range of the paper's experiments; the
-compensation fades in from omega_min to half of that, because below it delta_lambda makes much of small voltages.
+compensation fades in from omega_min to half of that, because below it delta_lambda amplifies small voltage errors.
 
-Protection: without a key, the limits lie where no healthy drive comes: overcurrent at twice the current limit, the sum
+Protection: the default limits lie outside the range of a healthy drive: overcurrent at twice the current limit, the sum
 of the currents at a fifth of the rated current, the bus at a tenth and 1.3 times its nominal value, no sample for 1.5
-periods.  The position may be away from where the last turn a sample foretells by 5e-4 turn and four codes: no shaft
-accelerates that much in a sample, and a code that freezes is seen from that turn a sample on.
+periods.  The position may deviate from its linear extrapolation by 5e-4 turn plus four codes: no shaft
+accelerates that much within a sample, and a frozen code is detected from that rotation per sample on.
 """
 
 import math
@@ -36,27 +36,27 @@ FLUX_OVER_SPEED, FLUX_OF_CURRENT, FLUX_ALONE = 2.0, 0.5, 0.1  # flux bandwidth o
 FADED_IN = 0.5  # of the crossover of the two flux models: full compensation from here on
 CROSSOVER_PART = 8.0  # rated electrical speed over the crossover of the two flux models
 COMPENSATION_PART = 0.5  # of the nominal flux: what the compensation may add or take
-SIGN_OF_RATED, SIGN_GAIN = 0.005, 0.125  # a direction is full from: part of rated current, or of loss over kp
-LEARN_OF_RATED = 0.1  # of the rated current: nothing is learnt about the legs below it
+SIGN_OF_RATED, SIGN_GAIN = 0.005, 0.125  # |direction| = 1 from: part of rated current, or of leg loss / kp
+LEARN_OF_RATED = 0.1  # of the rated current: the V_dead Adaline is held below
 AHEAD_SAMPLES = 2.5  # from a sample to the middle of the next sample's voltage
 THRESHOLD_OF_BASE = 2e-5  # of the voltage base: five of the format's steps
 LOSS_MARGIN, LOSS_SPARE_V = (
     3.0,
     3.0,
-)  # most that is compensated: three times what the data say, and device drops
+)  # largest compensation: factor on the leg loss of the data sheet, plus device drops
 PSI_STEP, PSI_FROM = (
     0.01,
     0.1,
 )  # 2*eta*omega**2 at rated speed; part of rated speed from which psi_m is estimated
 TRIP_OF_LIMIT, TRIP_OF_RANGE = 2.0, 0.98  # overcurrent: of the current limit, at most of the sensors' range
-SUM_OF_RATED = 0.2  # of the rated current: sensors that disagree by more are not believed
+SUM_OF_RATED = 0.2  # of the rated current: a larger sum of the phase currents is a sensor fault
 BUS_LOW, BUS_HIGH = 0.1, 1.3  # of the nominal bus voltage
-JUMP_CODES, JUMP_TURN = 4, 5e-4  # of the position, per sample: what the code's steps make, and noise of a sensor
-ROUND_UP = ("dead_time", "min_pulse")  # times that must not come out shorter than asked
+JUMP_CODES, JUMP_TURN = 4, 5e-4  # of the position, per sample: quantisation of the code, and noise of the sensor
+ROUND_UP = ("dead_time", "min_pulse")  # times that must not be shorter than specified
 
 
 class Entry(NamedTuple):
-    """What one register shall hold: SI value, its unit, SI per 1.0 of the format, keys that made it."""
+    """The value for one register: SI value, unit, SI value of 1.0 in its format, keys it is derived from."""
 
     name: str
     si: float
@@ -66,7 +66,7 @@ class Entry(NamedTuple):
 
 
 def base_keys(drive, *names):
-    """Where the bases come from: the keys of [bases], or those that stand in for the ones not given."""
+    """The keys that determine the bases: those of [bases], or the defaults of bases that are not given."""
     origin = {
         "current_a": "[sensors] current_range_a",
         "voltage_v": "[sensors] u_dc_range_v",
@@ -214,7 +214,7 @@ def flux_estimator(drive):
 
 
 def leg_loss_v(drive):
-    """What dead time and device drops take from a leg, from the drive's own data [V]."""
+    """Leg voltage loss by dead time and device drops, calculated from the drive's data [V]."""
     i = drive.inverter
     return i.dead_time_s * i.pwm_frequency_hz * i.dc_bus_v + (i.v_switch_v + i.v_diode_v) / 2.0
 
@@ -279,7 +279,7 @@ def gates(drive):
 
 
 def protection(drive):
-    """What turns the gates off: see golden_model/io."""
+    """Trip levels and ignored faults: see golden_model/io."""
     p, s, b, m = drive.protection, drive.sensors, drive.bases, drive.machine
     amperes, volts = base_keys(drive, "current_a"), base_keys(drive, "voltage_v")
     limit, bus = drive.current_limit_a, drive.inverter.dc_bus_v
@@ -304,7 +304,7 @@ def protection(drive):
 
 
 def _limit(name, given, default, unit, base, key, default_keys, base_names):
-    """A limit in 1/256 of its base, as given or a default, which is moved to what the format can hold."""
+    """A limit in 1/256 of its base, as given, or the default clipped to the range of the format."""
     if given is not None:
         return Entry(name, given, unit, base, f"[protection] {key}; {base_names}")
     default = min(max(default, LIMIT.lsb * base), LIMIT.hi * LIMIT.lsb * base)

@@ -1,6 +1,6 @@
-"""Integers of the core's signals to SI units and back; the unit of each signal stands in ``UNITS``.
+"""Integers of the core's signals to SI units and back; ``UNITS`` gives the unit of each signal.
 
-The scale of a signal is what its LSB means: format LSB times base.  Compare values count clocks.
+The scale of a signal is the value of its LSB: format LSB times base.  Compare values count clocks.
 """
 
 import math
@@ -31,7 +31,7 @@ def unit(name):
 
 
 def si_per_lsb(name, drive):
-    """What one LSB of the signal means; multiply whole arrays of integers by it."""
+    """SI value of one LSB of the signal; KeyError for an unknown signal."""
     if name not in SIGNALS:
         raise KeyError(f"{name} is not a signal; known are {', '.join(SIGNALS)}")
     bases = drive.bases
@@ -57,7 +57,7 @@ def from_si(name, value, drive):
     """Nearest integer for a value in SI units; angles wrap, anything else out of range is a ValueError."""
     port, lsb = SIGNALS.get(name), si_per_lsb(name, drive)
     if not math.isfinite(value):
-        raise ValueError(f"{name} = {value} is not a number the core can take")
+        raise ValueError(f"{name} = {value} is not a finite number")
     integer = math.floor(value / lsb + 0.5)
     if unit(name) == "rad":
         return integer % (port.fmt.hi + 1)

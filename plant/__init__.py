@@ -1,8 +1,8 @@
 """Float physics of the drive: machine, shaft, inverter and sensors, in SI units.
 
 Amplitude-invariant Clarke, d axis at the electrical angle theta, motor
-convention, phase order a, b, c.  This package knows nothing of the rest of the
-project: it stands for the hardware.
+convention, phase order a, b, c.  This package imports nothing else of the
+project: it models the hardware.
 """
 
 from fluxproof.plant import layout

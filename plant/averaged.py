@@ -1,4 +1,4 @@
-"""Averaged plant: one voltage vector per period, from duties and the inverter's errors."""
+"""Averaged plant: one voltage vector per period, from the duties and the inverter's voltage errors."""
 
 from fluxproof.plant import layout as L
 from fluxproof.plant.inverter import averaged_leg
@@ -16,7 +16,7 @@ def advance_averaged(state, params, duties, u_dc, load, period_s):
     duties: three indexable values, high time of the legs / period, clipped to 0..1.
     u_dc: bus voltage [V].  load: load torque [Nm], or in IMPOSED_SPEED mode the
     mechanical speed [rad/s] at the period's end, reached along a ramp.
-    The legs' errors follow the currents at the start of each sub-step.
+    The voltage errors of the legs depend on the currents at the start of each sub-step.
     """
     inv = params.inverter
     acceleration = 0.0
@@ -50,8 +50,8 @@ def skewed_currents(state, params, skew_s):
     """Phase currents (a, b, c) [A] skew_s seconds after (before, if negative) the state.
 
     The PWM centre lies within a zero vector, so the machine is short-circuited
-    around it: the currents move with their ripple slope, not with the mean one.
-    Holds while |skew_s| is less than half the zero vector.
+    around it: the currents change with their ripple slope, not with the mean slope.
+    Valid while |skew_s| is less than half the zero vector.
     """
     drive = sources(state, params, _NONE, _NONE, state[L.TORQUE], state[L.TORQUE], 0.0)
     step = try_step(state, params, drive, skew_s)

@@ -1,4 +1,4 @@
-"""Python side of the plant: build parameters and states, and two convenient classes.
+"""Python side of the plant: functions that build parameters and states, and two convenience classes.
 
 Loops that need speed call the kernels `advance_averaged` and `advance_switching`
 from their own compiled code, with the parameters and the state built here.
@@ -44,7 +44,7 @@ def initial_state(machine, params, i_d=0.0, i_q=0.0, omega_m=0.0, theta_m=0.0, g
     h_d, h_q, _, _ = harmonic_flux(m, psi_m, theta_m)
     iron = m.iron_conductance * m.pole_pairs * omega_m
     x_d, x_q = i_d, i_q
-    for _ in range(50):  # the iron-loss current is small: plain substitution converges
+    for _ in range(50):  # the iron-loss current is small: fixed-point iteration converges
         psi_d, psi_q = flux_from_currents(m, psi_m, x_d, x_q)
         psi_d, psi_q = psi_d + h_d, psi_q + h_q
         if iron == 0.0:
@@ -59,7 +59,7 @@ def initial_state(machine, params, i_d=0.0, i_q=0.0, omega_m=0.0, theta_m=0.0, g
 
 
 class _Plant:
-    """State and parameters of one drive, with readable access to the outputs."""
+    """State and parameters of one drive, with properties for the outputs."""
 
     def __init__(self, machine, inverter=None, mode=FREE, substeps=2, max_step_s=10e-6, **start):
         self.params = plant_params(machine, inverter, mode, substeps, max_step_s)
@@ -112,7 +112,7 @@ class _Plant:
 
 
 class AveragedPlant(_Plant):
-    """Drive that takes duties once a period."""
+    """Drive with the averaged plant: duties once per period."""
 
     def advance(self, duties, u_dc, load, period_s):
         """One period (see `advance_averaged`); returns the state vector."""
@@ -126,7 +126,7 @@ class AveragedPlant(_Plant):
 
 
 class SwitchingPlant(_Plant):
-    """Drive that takes gate edges once a period."""
+    """Drive with the switching plant: gate edges once per period."""
 
     def advance(self, edge_times, gate_words, u_dc, load, period_s, probe_s=-1.0):
         """One period (see `advance_switching`); returns the state vector."""

@@ -1,9 +1,9 @@
 """Gridded flux maps: psi_d(i_d, i_q), psi_q(i_d, i_q) and their inverse.
 
-Interpolation is bicubic (Catmull-Rom): it passes through the grid's points and
+Interpolation is bicubic (Catmull-Rom): it passes through the grid points and
 has continuous first derivatives, so the incremental inductances do not jump at
 cell borders and Newton's method inverts the map in a few steps.  Outside the
-grid the map goes on linearly with the border's slope.
+grid the map is extrapolated linearly with the slope at the border.
 """
 
 from dataclasses import dataclass
@@ -55,8 +55,8 @@ class FluxMap:
     def folds(self):
         """Number of points, of a grid twice as fine, at which the map has no unique inverse.
 
-        There an incremental inductance is not positive: no passive machine does
-        that, a noisy measurement may.
+        There an incremental inductance is not positive: impossible in a passive
+        machine, possible in a noisy measurement.
         """
         table, axes = self.table(), self.axes()
         count = 0
@@ -70,7 +70,7 @@ class FluxMap:
         """Return the nearest map whose flux rises along its own axis, line by line.
 
         Least squares under the condition that every step rises by at least
-        floor x the median step.  Lines that keep the condition are untouched.
+        floor x the median step.  Lines that fulfil the condition are unchanged.
         """
         return FluxMap(
             self.i_d_a, self.i_q_a, _rising(self.psi_d_wb.T, floor).T, _rising(self.psi_q_wb, floor)
@@ -91,7 +91,7 @@ class FluxMap:
     def table(self):
         """Return both maps with a linearly extrapolated border, (2, n+2, m+2).
 
-        The border gives the cubic its outer support points.
+        The border provides the outer support points of the cubic.
         """
         padded = [np.pad(g, 1, mode="reflect", reflect_type="odd") for g in (self.psi_d_wb, self.psi_q_wb)]
         return np.ascontiguousarray(padded, dtype=float)
@@ -173,8 +173,8 @@ def map_flux(table, axes, i_d, i_q):
 def map_currents(table, axes, psi_d, psi_q, guess_d, guess_q):
     """Invert the map by Newton from a guess (the last currents); returns (i_d, i_q) in A.
 
-    The first steps are limited to five cells: a far guess may sit where the
-    machine is saturated and the slope points past the solution.
+    The first steps are limited to five cells: a distant guess may be in the
+    saturated region, where the slope overshoots the solution.
     """
     i_d, i_q = guess_d, guess_q
     for _ in range(60):

@@ -21,10 +21,10 @@ class Inverter:
     """Inverter data; every zero means that the effect is absent.
 
     dead_time_s and zero_current_a concern the averaged model: the switching
-    model has its dead time in the gate signals and finds zero current itself.
+    model gets its dead time from the gate signals and locates zero current itself.
     zero_current_a: half width of the linear zone around zero current, in which
-    dead time and drops fade out; zero gives a pure sign, which makes a current
-    near zero chatter by dead_time u_dc / L as each sub-step overshoots.
+    dead time and drops fade out; zero gives a pure sign function, with which a
+    current near zero chatters by dead_time u_dc / L because each sub-step overshoots.
     """
 
     dead_time_s: float = 0.0
@@ -36,7 +36,7 @@ class Inverter:
 
 
 class InverterParams(NamedTuple):
-    """What the kernels need of the inverter (build with `inverter_params`)."""
+    """Inverter parameters for the kernels (build with `inverter_params`)."""
 
     dead_time: float
     v_switch: float
@@ -44,7 +44,7 @@ class InverterParams(NamedTuple):
     r_switch: float
     r_diode: float
     zero_current: float
-    ideal: bool  # nothing depends on the current: the averaged kernel skips it
+    ideal: bool  # no dependence on the current: skipped by the averaged kernel
 
 
 def inverter_params(inverter):
@@ -61,7 +61,7 @@ def averaged_leg(inv, duty, u_dc, current, period_s):
     """Mean Thevenin source (v [V], r [ohm]) of a leg over one period.
 
     Dead time delays every turn-on: with i > 0 the leg's high time shrinks by
-    dead_time once a period (v lower by u_dc dead_time / period), with i < 0 it
+    dead_time once per period (v lower by u_dc dead_time / period), with i < 0 it
     grows.  A pulse shorter than the dead time vanishes; a leg that does not
     switch (duty 0 or 1) loses nothing.
     """
@@ -92,7 +92,7 @@ def averaged_leg_voltage(inv, duty, u_dc, current, period_s):
 def switched_leg(inv, upper, lower, u_dc):
     """Leg with constant gates: (v for i > 0, v for i < 0, r for i > 0, r for i < 0).
 
-    At zero current the leg may float anywhere between the two voltages.  They
+    At zero current the leg voltage may take any value between the two.  They
     coincide only for a gated leg with ideal devices.
     """
     if upper and lower:

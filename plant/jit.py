@@ -1,8 +1,8 @@
 """`njit` with a cache on disk that follows the whole package.
 
 numba renews a cached function when its own file changes, not when a file that
-it calls does (a state index in `layout`, say).  Here the cache folder is named
-after a hash of the package, so stale machine code cannot be loaded.  Code
+it calls does (a state index in `layout`, say).  Here the name of the cache folder
+is a hash of the package, so stale machine code cannot be loaded.  Code
 elsewhere that compiles the plant's kernels into its own and caches the result
 must include `SOURCE_HASH` in its key.
 """

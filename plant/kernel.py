@@ -1,4 +1,4 @@
-"""What both plants share: parameters, outputs, and a step of the whole drive."""
+"""Common parts of both plants: parameters, outputs, and a step of the whole drive."""
 
 import math
 from typing import NamedTuple
@@ -62,7 +62,7 @@ def try_step(state, params, drive, step_s):
 
 @njit
 def accept(state, drive, step, step_s, period_s):
-    """Write a Step into the state and add its share to the period's means."""
+    """Write a Step into the state and add its contribution to the means of the period."""
     omega, theta = stop_at_zero(
         drive.friction, state[L.OMEGA_M], state[L.THETA_M], step.omega, step.theta, step_s
     )

@@ -7,7 +7,7 @@ module constants, so numba folds them into the compiled code.
 
 import numpy as np
 
-# --- state proper -----------------------------------------------------------
+# --- state variables -----------------------------------------------------------
 LAMBDA_ALPHA = 0  # stator flux linkage, stator frame [Wb]
 LAMBDA_BETA = 1
 OMEGA_M = 2  # mechanical speed [rad/s]

@@ -15,7 +15,7 @@ IMPOSED_SPEED = 1
 
 
 class MechanicsParams(NamedTuple):
-    """What the kernels need of the shaft (build with `mechanics_params`)."""
+    """Shaft parameters for the kernels (build with `mechanics_params`)."""
 
     mode: int  # FREE or IMPOSED_SPEED
     inverse_inertia: float  # [1/(kg m^2)]
@@ -46,7 +46,7 @@ def mechanics_params(machine, mode=FREE):
 
 
 def profile(times, values, linear=False):
-    """Build a Profile; held values step at their time, linear ones are joined."""
+    """Build a Profile; held values change stepwise at their time, linear ones are interpolated."""
     times, values = np.asarray(times, float), np.asarray(values, float)
     if times.ndim != 1 or times.shape != values.shape or not len(times) or (np.diff(times) < 0).any():
         raise ValueError("profile: times must rise and match the values")
@@ -55,7 +55,7 @@ def profile(times, values, linear=False):
 
 @njit
 def profile_at(profile, t):
-    """Value of a Profile at the time t [s]; the ends are held."""
+    """Value of a Profile at the time t [s]; constant before the first and after the last time."""
     times, values = profile.times, profile.values
     k = np.searchsorted(times, t, side="right") - 1
     if k < 0:
@@ -69,10 +69,10 @@ def profile_at(profile, t):
 
 @njit
 def shaft_drive(mech, omega, torque, load):
-    """Decide how the shaft moves in the coming sub-step: (free, Coulomb torque).
+    """State of the shaft in the coming sub-step: (free, Coulomb torque).
 
-    free is 1.0 or 0.0 (held by stiction).  At rest, friction balances whatever
-    is applied up to its limit; beyond it, it opposes the coming motion.
+    free is 1.0 or 0.0 (held by stiction).  At rest, friction balances the applied
+    torque up to its limit; beyond the limit it opposes the motion.
     """
     if mech.coulomb == 0.0:
         return 1.0, 0.0
@@ -88,10 +88,10 @@ def shaft_drive(mech, omega, torque, load):
 
 @njit
 def stop_at_zero(friction, omega_0, theta_0, omega, theta, step_s):
-    """Bring a shaft that friction has just stopped to rest: (omega, theta).
+    """Set the speed to zero when friction has stopped the shaft within a sub-step: (omega, theta).
 
-    Without it a sub-step that passes zero speed would let friction drive the
-    shaft backwards.  The angle is that of a uniform braking to zero.
+    Otherwise friction would accelerate the shaft backwards in a sub-step that
+    crosses zero speed.  The angle is that of a uniform deceleration to zero.
     """
     if friction * omega >= 0.0:
         return omega, theta

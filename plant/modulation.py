@@ -10,8 +10,8 @@ def centred_gates(duties, dead_time_s, period_s):
     """Edges and gate words of one period: (times (n,) float64 [s], words (n,) int64).
 
     The period starts in the middle of the lower zero vector.  Every turn-on is
-    delayed by dead_time_s, every turn-off is prompt, and a pulse that would not
-    outlast the dead time vanishes; a leg at duty 0 or 1 does not switch.  The
+    delayed by dead_time_s, every turn-off is immediate, and a pulse shorter than
+    the dead time is dropped; a leg at duty 0 or 1 does not switch.  The
     first edge is at 0 and assumes that the previous period had the same duties.
     """
     times, legs, upper, lower = np.zeros(15), np.zeros(15, np.int64), np.zeros(15), np.zeros(15)

@@ -2,7 +2,7 @@
 
 Flux linkage is the state; currents follow from it.  The functional magnetic
 model is the derivative of a stored field energy W (the Legendre dual of the
-co-energy), so it is reciprocal whatever its coefficients:
+co-energy), so it is reciprocal for any coefficients:
 
     x = (psi_d - psi_m) / L_d,   y = psi_q / L_q          "unsaturated currents" [A]
     W = L_d (x^2/2 + s_d x^4/4) + L_q (y^2/2 + s_q y^4/4) + c r(x) y^2
@@ -12,16 +12,16 @@ co-energy), so it is reciprocal whatever its coefficients:
 with r(x) = x / sqrt(1 + (x/x_c)^2), x_c = L_q / (4 |c|), which equals x for
 small x and keeps W bounded below.  To first order this is the usual picture
 psi_q = L_q (i_q - s_q i_q^3) - 2 c i_d i_q,  psi_d = L_d i_d + psi_m - c i_q^2;
-at larger currents it bends otherwise, as real machines do.
+at larger currents it deviates from it, as real machines do.
 
 Magnet harmonics in the rotor frame, angle n theta + phi, relative to psi_m:
     psi_hd = a_d psi_m cos(.),  psi_hq = a_q psi_m sin(.)
     T = 1.5 p (psi_d i_q - psi_q i_d + dpsi_hd/dtheta i_d + dpsi_hq/dtheta i_q) + cogging
-which closes the power balance exactly (psi includes psi_h).
+which fulfils the power balance exactly (psi includes psi_h).
 
 Iron loss is a conductance across the rotational EMF: the terminal current is
-i + g w J psi.  The transformer EMF is left out, so the current stays a
-function of the state and does not jump with the PWM edges.
+i + g w J psi.  The transformer EMF is neglected, so the current is a function
+of the state and does not jump at the PWM edges.
 """
 
 import math
@@ -66,7 +66,7 @@ class Machine:
     coulomb_friction_nm: float = 0.0
     resistance_temp_coeff_per_k: float = 0.0  # copper: 0.0039
     magnet_temp_coeff_per_k: float = 0.0  # NdFeB: about -0.001
-    temperature_winding_c: float = 20.0  # initial; the state carries it on
+    temperature_winding_c: float = 20.0  # initial value; then in the state
     temperature_magnet_c: float = 20.0
     temperature_ref_c: float = 20.0
     saturation_d_per_a2: float = 0.0  # s_d
@@ -89,7 +89,7 @@ class Machine:
 
 
 class MachineParams(NamedTuple):
-    """What the kernels need of the machine (build with `machine_params`)."""
+    """Machine parameters for the kernels (build with `machine_params`)."""
 
     model: int  # LINEAR, SATURATED or MAPPED
     pole_pairs: float
@@ -114,7 +114,7 @@ class MachineParams(NamedTuple):
 
 
 def machine_params(machine):
-    """Build MachineParams from a Machine, refusing what has no meaning."""
+    """Build MachineParams from a Machine; ValueError for values without physical meaning."""
     m = machine
     for name in ("pole_pairs", "inductance_d_h", "inductance_q_h"):
         if getattr(m, name) <= 0:
@@ -188,8 +188,9 @@ def magnet_flux(m, temperature_c):
 def currents_from_flux(m, psi_m, psi_d, psi_q, guess_d, guess_q):
     """Magnetising currents (i_d, i_q) [A] of the flux without its harmonics [Wb].
 
-    psi_m: magnet flux at temperature.  A flux map contains the reference magnet,
-    so only its drift is taken off.  The guess serves the map's inversion alone.
+    psi_m: magnet flux at temperature.  A flux map contains the flux of the magnet at
+    reference temperature, so only its drift is subtracted.  The guess is used for
+    the inversion of a map only.
     """
     if m.model == MAPPED:
         drift = psi_m - m.magnet_flux
@@ -203,7 +204,7 @@ def currents_from_flux(m, psi_m, psi_d, psi_q, guess_d, guess_q):
 
 @njit
 def flux_from_currents(m, psi_m, i_d, i_q):
-    """Flux linkage (psi_d, psi_q) [Wb], harmonics left out, of magnetising currents [A]."""
+    """Flux linkage (psi_d, psi_q) [Wb], without harmonics, of magnetising currents [A]."""
     if m.model == MAPPED:
         psi_d, psi_q, _, _, _, _ = map_flux(m.map_table, m.map_axes, i_d, i_q)
         return psi_d + (psi_m - m.magnet_flux), psi_q

@@ -1,7 +1,7 @@
 """Sensors: current and bus-voltage converters, position sensor, seeded noise.
 
 Noise is a hash of (seed, channel, sample number): any sample can be repeated
-alone, and adding a sensor does not change the others' noise.
+alone, and an additional sensor does not change the noise of the others.
 """
 
 import math
@@ -46,7 +46,7 @@ class Sensors:
 
 
 class SensorParams(NamedTuple):
-    """What the kernels need of the sensors (build with `sensor_params`)."""
+    """Sensor parameters for the kernels (build with `sensor_params`)."""
 
     current_bits: int
     current_per_a: float  # codes per ampere
@@ -113,7 +113,7 @@ def _uniform(seed, channel, sample, part):
 
 @njit
 def hash_normal(seed, channel, sample):
-    """Standard normal number that depends on its three whole arguments alone."""
+    """Standard normal number, a function of its three integer arguments only."""
     radius = math.sqrt(-2.0 * math.log(_uniform(seed, channel, sample, 0)))
     return radius * math.cos(2.0 * math.pi * _uniform(seed, channel, sample, 1))
 

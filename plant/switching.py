@@ -2,9 +2,9 @@
 
 Between two edges every leg is in one of three modes: conducting with positive
 or negative current (a Thevenin source, see `inverter`), or blocked at zero
-current, its voltage then being whatever keeps the current at zero.  The instant
-at which a conducting leg reaches zero is located by root finding.  A blocked
-leg is released in the sub-step in which it could no longer be kept at zero.
+current, with the voltage that keeps the current at zero.  Root finding locates the
+instant at which the current of a conducting leg reaches zero.  A blocked leg starts
+to conduct in the sub-step in which no such voltage exists any more.
 """
 
 from fluxproof.plant import layout as L
@@ -14,9 +14,9 @@ from fluxproof.plant.kernel import accept, clear_means, refresh, sources, try_st
 from fluxproof.plant.mechanics import IMPOSED_SPEED
 from fluxproof.plant.transforms import clarke, inverse_clarke
 
-ZERO_CURRENT_A = 1e-7  # smaller is zero: far below any sensor, far above rounding
-_SHORTEST_S = 1e-13  # a remainder this short is dropped
-_TRIAL_V = 100.0  # any voltage will do: currents are all but affine in it
+ZERO_CURRENT_A = 1e-7  # smaller counts as zero: far below any sensor's resolution, far above rounding
+_SHORTEST_S = 1e-13  # shorter remainders are dropped
+_TRIAL_V = 100.0  # any voltage: the currents are nearly affine in it
 
 
 @njit
@@ -45,8 +45,9 @@ def _replace(triple, k, value):
 def _settle_leg(state, params, v, r, k, low, high, slope, load, acceleration, step_s):
     """Source (v, r) of leg k at zero current, the other legs being fixed; blocked or not.
 
-    Driven positive even at its low voltage, or negative even at its high one, it
-    conducts; otherwise its voltage is the one that ends the step at zero current.
+    If the current would become positive even at the low voltage, or negative even at
+    the high one, the leg conducts; otherwise it has the voltage that gives zero current
+    at the end of the step.
     """
     v_low, r_low = _replace(v, k, low[k]), _replace(r, k, slope[0][k])
     _, _, moved = _trial(state, params, v_low, r_low, load, acceleration, step_s)
@@ -93,7 +94,7 @@ def _natural_voltage(state, params, load, acceleration, step_s):
 
 @njit
 def _legs(alpha, beta):
-    """Leg voltages that give a stator-frame voltage, their sum being zero."""
+    """Leg voltages with zero sum for a stator-frame voltage."""
     a, b, c = inverse_clarke(alpha, beta)
     return a, b, c
 
@@ -128,7 +129,7 @@ def _choose(state, params, low, high, slope, load, acceleration, step_s):
             second = k
     if low[first] - e[first] <= high[second] - e[second]:
         return e, (0.0, 0.0, 0.0)
-    # The leg that pulls the star point up most and the one that holds it down conduct.
+    # The legs with the highest and the lowest voltage conduct.
     third = 3 - first - second
     v = _replace(_replace(low, first, low[first]), second, high[second])
     r = _replace(slope[0], second, slope[1][second])
@@ -180,7 +181,7 @@ def _advance_constant(state, params, word, u_dc, load, acceleration, duration_s,
     slope = ((a_rp, b_rp, c_rp), (a_rn, b_rn, c_rn))
     left = duration_s
     while left > _SHORTEST_S:
-        # Equal parts, so that no sliver remains.
+        # Equal parts, so that no very short step remains.
         step_s = left / max(1.0, -(-left // params.max_step_s))
         v, r = _choose(state, params, low, high, slope, load, acceleration, step_s)
         drive, step, moved = _trial(state, params, v, r, load, acceleration, step_s)
@@ -189,7 +190,7 @@ def _advance_constant(state, params, word, u_dc, load, acceleration, duration_s,
             x = _locate(state, params, v, r, k, moved[L.I_A + k], load, acceleration, step_s)
             if x > _SHORTEST_S:
                 step_s = x
-                # A leg blocked meanwhile needs its voltage for the shorter step.
+                # The voltage of a blocked leg is recalculated for the shorter step.
                 v, r = _choose(state, params, low, high, slope, load, acceleration, step_s)
                 drive, step, moved = _trial(state, params, v, r, load, acceleration, step_s)
         accept(state, drive, step, step_s, period_s)
@@ -203,7 +204,7 @@ def advance_switching(state, params, edge_times, gate_words, u_dc, load, period_
 
     edge_times: (n,) rising, within 0..period_s [s]; gate_words: (n,) integers,
     in force from their edge on (bits 0..2 upper a, b, c; 3..5 lower a, b, c).
-    Before the first edge the word in state[GATES] holds.  u_dc [V].
+    Before the first edge the word in state[GATES] applies.  u_dc [V].
     load: as in `advance_averaged`.  probe_s: instant at which the currents and
     the angle are copied to PROBE_A.. (an ADC trigger); negative means never.
     Raises ValueError when both gates of a leg are on.

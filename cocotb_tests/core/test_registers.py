@@ -99,7 +99,7 @@ def test_from_si_refuses_and_angles_wrap():
     assert from_si("theta_me", -math.pi, drive) == 2**17
     with pytest.raises(ValueError, match=r"i_q_ext = 26 A is out of range: allowed is -25 to 24\.9998"):
         from_si("i_q_ext", 26.0, drive)
-    with pytest.raises(ValueError, match="not a number"):
+    with pytest.raises(ValueError, match="not a finite number"):
         from_si("i_q_ext", math.nan, drive)
     with pytest.raises(KeyError, match="known are"):
         si_per_lsb("i_x", drive)

@@ -1,8 +1,9 @@
-"""A queue of words in block RAM for an AXI4-Stream: takes a word a clock, gives one when the sink is ready.
+"""A FIFO in block RAM for an AXI4-Stream: accepts one word per clock, outputs one when the sink is ready.
 
-``room`` says whether a whole packet of PACKET words fits: who asks before the first word never has to wait nor to
-break off.  A word that finds the queue full is ignored.  ``out_data`` and ``out_last`` stay until ``out_ready``.
-Formats: as they come.  The RAM holds 2**DEPTH_BITS words, its own and the output register one more each.
+``room`` = 1: the FIFO has space for a whole packet of PACKET words.  A writer that checks it before the first word
+never waits and never breaks off a packet.  A word written to a full FIFO is ignored.  ``out_data`` and ``out_last``
+stay until ``out_ready``.
+Formats: unchanged.  The RAM holds 2**DEPTH_BITS words, its read register and the output register one more each.
 """
 
 from typing import NamedTuple
@@ -13,7 +14,7 @@ from fluxproof.golden_model.formats import BIT
 
 
 class State(NamedTuple):
-    ram: tuple = ()  # (word, last) in the order in which they came
+    ram: tuple = ()  # (word, last), oldest first
     read_valid: int = 0
     read_word: tuple = (0, 0)
     out_valid: int = 0
@@ -21,7 +22,7 @@ class State(NamedTuple):
 
 
 def room(state, depth_bits, packet):
-    """1 where ``packet`` more words fit into the RAM."""
+    """1 if ``packet`` more words fit into the RAM, else 0."""
     return 1 if len(state.ram) <= (1 << depth_bits) - packet else 0
 
 
@@ -43,7 +44,7 @@ def step(state, in_valid, in_data, in_last, out_ready, _width, depth_bits, packe
 
 
 def stimuli(rng, config):
-    """Filled to the brim and beyond, emptied to nothing, both at once, at every pace of the sink."""
+    """Filled beyond full, emptied completely, both at once, at every rate of the sink."""
     rows = []
     for writes, reads in (
         (10, 0),
@@ -72,19 +73,19 @@ def stimuli(rng, config):
 BLOCK = Block(
     name="packet_fifo",
     folder="common",
-    paper="none: what a recording needs",
+    paper="none: recording of samples",
     step=step,
     inputs=(
-        Port("in_valid", BIT, doc="1: a word is there"),
+        Port("in_valid", BIT, doc="1: the input word is valid"),
         Port("in_data", Format(0, 32, 0), doc="the word"),
-        Port("in_last", BIT, doc="1: it is the packet's last"),
-        Port("out_ready", BIT, doc="1: the sink takes the word that is shown"),
+        Port("in_last", BIT, doc="1: last word of its packet"),
+        Port("out_ready", BIT, doc="1: the sink accepts the output word"),
     ),
     outputs=(
-        Port("out_valid", BIT, doc="1: a word is shown"),
+        Port("out_valid", BIT, doc="1: the output word is valid"),
         Port("out_data", Format(0, 32, 0), doc="the oldest word"),
-        Port("out_last", BIT, doc="1: it is its packet's last"),
-        Port("room", BIT, doc="1: a whole packet fits"),
+        Port("out_last", BIT, doc="1: last word of its packet"),
+        Port("room", BIT, doc="1: the queue has space for a whole packet"),
     ),
     state=State(),
     latency=1,

@@ -1,12 +1,12 @@
-"""1/x as m * 2**n, one quotient bit a clock: the division that no data path contains.
+"""1/x as m * 2**n, one quotient bit per clock, outside the data path.
 
     1 / x = m * 2**n * 2**-17          m in (2**16, 2**17), n in 0..N_MAX
 
-Method: x is brought to [1, 2) by n shifts; m is the rounded quotient.
-Error bound: |m*2**n*2**-17 * x - 1| <= 2**-17 over the whole range (half an LSB of m >= 2**16; a whole one
+Method: n shifts bring x into [1, 2); m is the rounded quotient.
+Error bound: |m*2**n*2**-17 * x - 1| <= 2**-17 over the whole range (half an LSB of m >= 2**16; one LSB
 at x = 2**-n, where 2**17 is stored as 2**17 - 1).
-Range: below 2**-N_MAX x is taken for 2**-N_MAX and ``low`` is raised: the reciprocal then comes out
-smaller than asked, never larger.
+Range: an x below 2**-N_MAX is replaced by 2**-N_MAX and ``low`` is 1: the reciprocal is then
+too small, never too large.
 """
 
 import math
@@ -19,7 +19,7 @@ from fluxproof.golden_model.kernel import kernel
 X = U_DC
 MANTISSA_ONE = 1 << X.frac_bits
 M_MAX = (1 << RECIPROCAL.width) - 1
-QUOTIENT_BITS = RECIPROCAL.width + 1  # one more than m, to round with
+QUOTIENT_BITS = RECIPROCAL.width + 1  # one more than m, for rounding
 NUMERATOR = 1 << (X.frac_bits + QUOTIENT_BITS)
 SHIFT = Format(0, 4, 0)
 

@@ -1,12 +1,12 @@
-"""The speed at which a flux seems to turn when its voltage stands still for a sample.
+"""The speed that belongs to the chord of the flux, because the voltage vector is constant during a sample.
 
     omega_chord = omega_me - k_chord*omega_me**3          k_chord = t_s**2/24
 
-The inverter's voltage vector does not turn within a period.  In steady state it carries the flux along the
+The inverter's voltage vector does not rotate within a period.  In steady state it carries the flux along the
 chord from one sample to the next, and the chord of the angle a = omega_me*T_s is 2*sin(a/2), not a:
-u = j*(2/T_s)*sin(omega_me*T_s/2)*lambda + R*i.  The decoupling multiplies by this speed; with the arc the
-flux that makes the regulators' integrals vanish would be too small by a**2/24, 1 % at half a radian a sample.
-The series' next term is a**4/1920 of it, 3e-5 at half a radian: left out.
+u = j*(2/T_s)*sin(omega_me*T_s/2)*lambda + R*i.  The decoupling multiplies by this speed; with omega_me the
+flux at which the regulators' integrals vanish would be too small by a**2/24, 1 % at half a radian per sample.
+The next term of the series is a**4/1920, 3e-5 at half a radian: neglected.
 
 Formats: omega_me**2 U(3,14), k_chord U(-6,23), their product U(-3,20), each half up; the last rounding is to
 PU.  No saturation: k_chord*omega_me**2 < 1/16, so the result is closer to zero than omega_me and keeps its sign.
@@ -47,7 +47,7 @@ BLOCK = Block(
     paper="001, eq. (2), for a voltage that is held during a sample",
     step=step,
     inputs=(Port("omega_me", PU, doc="electrical speed"),),
-    registers=(Port("k_chord", K_CHORD, doc="square of the sample time over 24, per unit"),),
+    registers=(Port("k_chord", K_CHORD, doc="(sample time)**2 / 24, per unit"),),
     outputs=(Port("omega_chord", PU, doc="electrical speed along the chord of a sample"),),
     latency=9,
     interval=8,

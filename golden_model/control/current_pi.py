@@ -4,8 +4,8 @@
     int  += ki*err      unless the voltage was at its limit and err pushes further
     u_pi  = kp*err + int
 
-``sat_d``, ``sat_q`` (-1, 0, +1) say at which limit voltage_limit held the axis in the sample before;
-waiting one sample keeps this block independent of the limiter and lets the integral run on for at most
+``sat_d``, ``sat_q`` (-1, 0, +1) are the limits that were active in voltage_limit in the previous sample.
+This delay of one sample keeps the block independent of the limiter; the integral winds up for at most
 that sample.  ``run`` = 0: outputs and integrals are zero.
 
 Formats: err saturated to PU; proportional part rounded half up to S(3,28), whose limit of 8 lies so far
@@ -97,8 +97,8 @@ BLOCK = Block(
         Port("i_q", PU, late=1, doc="current, q axis"),
         Port("i_d_ref", PU, doc="current reference, d axis"),
         Port("i_q_ref", PU, late=1, doc="current reference, q axis"),
-        Port("sat_d", SAT, lo=-1, hi=1, doc="limit that held the d axis"),
-        Port("sat_q", SAT, lo=-1, hi=1, doc="limit that held the q axis"),
+        Port("sat_d", SAT, lo=-1, hi=1, doc="active limit of the last sample, d axis: 1 upper, -1 lower, 0 none"),
+        Port("sat_q", SAT, lo=-1, hi=1, doc="active limit of the last sample, q axis: 1 upper, -1 lower, 0 none"),
         Port("run", BIT, doc="0: outputs and integrals zero"),
     ),
     registers=(
@@ -108,8 +108,8 @@ BLOCK = Block(
         Port("ki_q", KI, doc="integral gain times sample time, q axis"),
     ),
     outputs=(
-        Port("u_pi_d", PU, doc="regulator output, d axis"),
-        Port("u_pi_q", PU, doc="regulator output, q axis"),
+        Port("u_pi_d", PU, doc="output of the current regulator, d axis"),
+        Port("u_pi_q", PU, doc="output of the current regulator, q axis"),
         Port("u_int_d", INTEGRAL, doc="its integral part, d axis"),
         Port("u_int_q", INTEGRAL, doc="its integral part, q axis"),
     ),

@@ -1,11 +1,11 @@
-"""What is added against dead time and device drops, in the stator frame: paper 000, section V.B.
+"""The compensation voltage for dead time and device drops, in the stator frame: paper 000, section V.B.
 
     u_comp_alpha = v_comp*s_alpha
     u_comp_beta  = v_comp*s_beta
 
 s_alpha, s_beta: Clarke transform of the directions that the phase currents will have when this sample's voltage
-acts, as the sample before has foreseen them.  Turned into the rotor frame at that moment's angle they are the
-paper's D_d, D_q of eq. (5), a third of them, and this is its D*gamma*V_dead.
+acts, predicted in the previous sample.  Rotated into the rotor frame by the angle of that instant they are a third
+of the paper's D_d, D_q of eq. (5), and this voltage is its D*gamma*V_dead.
 
 Formats: products exact, 34 fraction bits, rounded half up to PU.  |s| <= 4/3 and v_comp < 1/2: no saturation.
 """
@@ -33,8 +33,8 @@ def bound(_v, _state):
 
 S_ALPHA = Port("s_alpha", PU, lo=-87400, hi=87400, doc="directions of the currents, alpha")
 S_BETA = Port("s_beta", PU, lo=-87400, hi=87400, doc="directions of the currents, beta")
-D_D = Port("d_d", PU, lo=-87400, hi=87400, doc="direction function D_d over three")
-D_Q = Port("d_q", PU, lo=-87400, hi=87400, doc="direction function D_q over three")
+D_D = Port("d_d", PU, lo=-87400, hi=87400, doc="direction function D_d / 3")
+D_Q = Port("d_q", PU, lo=-87400, hi=87400, doc="direction function D_q / 3")
 
 BLOCK = Block(
     name="dead_time_compensation",
@@ -43,8 +43,8 @@ BLOCK = Block(
     step=step,
     inputs=(Port("v_comp", V_LEG, doc="leg voltage that is compensated"), S_ALPHA, S_BETA),
     outputs=(
-        Port("u_comp_alpha", PU, doc="compensating voltage, alpha"),
-        Port("u_comp_beta", PU, doc="compensating voltage, beta"),
+        Port("u_comp_alpha", PU, doc="compensation voltage, alpha"),
+        Port("u_comp_beta", PU, doc="compensation voltage, beta"),
     ),
     latency=4,
     interval=4,

@@ -4,7 +4,7 @@
     u_dec_q =  omega_chord*lambda_d
 
 Formats: products exact, 32 fraction bits, rounded half up to PU.
-Saturation: at 2 per unit, twice the largest voltage that the limiter grants.
+Saturation: at 2 per unit, twice the largest voltage of the limiter.
 """
 
 from fluxproof.golden_model.block import Block, Port

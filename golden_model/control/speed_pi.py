@@ -6,7 +6,7 @@
     integral += speed_ki*err      unless u is beyond the limit and err pushes further
 
 Torque mode (``speed_mode`` = 0): i_q_ref is ``i_q_ext``, limited, and the integral follows it, so that
-a change to speed mode starts from the torque at hand.  ``run`` = 0: output and integral are zero.
+a change to speed mode is bumpless.  ``run`` = 0: output and integral are zero.
 
 Formats: err saturated to PU; proportional part rounded half up to S(3,28): its limit of 8 lies so far
 beyond that of the output that saturating it changes nothing; increment rounded half up to S(1,28), where
@@ -66,7 +66,7 @@ def bound(_v, _state):
 
 
 def stimuli(_rng, _config):
-    """A minute of saturation in both directions with recovery, torque mode, stop and restart."""
+    """Saturation in both directions with recovery, torque mode, stop and restart."""
     regs = {
         "speed_kp": 5 << 16,
         "speed_ki": 1 << 20,
@@ -104,7 +104,7 @@ BLOCK = Block(
     ),
     outputs=(
         Port("i_q_ref", PU, doc="current reference, q axis"),
-        Port("speed_limited", BIT, doc="output at its limit"),
+        Port("speed_limited", BIT, doc="1: output at its limit"),
     ),
     state=State(),
     latency=7,

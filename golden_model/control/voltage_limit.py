@@ -3,12 +3,12 @@
     limit = min(u_max, room),  u_d = limit(u_pi_d + u_dec_d + u_comp_d, +-limit)
     u_q = limit(u_pi_q + u_dec_q + u_comp_q, +-sqrt(u_max**2 - u_d**2))
     room = sqrt(u_max**2 - min(|u_dec_q|, u_max)**2)        for the next sample
-    sat_x = -1, 0, +1: the limit that holds the axis, for the regulator's integral
+    sat_x = -1, 0, +1: the active limit of the axis, for the anti-windup of the regulator
 
-Room: d comes first in what the EMF of the last sample leaves.  Without it the drive has a second stable
-point above the speed at which kick or bus sag fill the circle: u_d at its limit, nothing for u_q, so the flux
-stays down, so i_d stays far below its reference, so u_d stays at its limit, braking with more than the rated
-current.  With it the q axis can always hold its EMF; below the limit nothing changes.
+Room: the d axis has priority, but only within the voltage that remains beside the EMF of the last sample.  Without
+this the drive has a second stable point near the voltage limit, reached by a disturbance or a bus sag: u_d at its
+limit, no voltage for u_q, hence little flux, hence i_d far below its reference, hence u_d at its limit, braking with
+more than the rated current.  With it the q axis can always balance its EMF; below the limit nothing changes.
 
 Radicands are formed as (u_max - u)*(u_max + u): exact, U(0,32), both factors below 2.  The root is never
 above the true one, so the circle is never left.
@@ -32,7 +32,7 @@ def side(value, limit):
 
 
 class State(NamedTuple):
-    room: int = U_MAX.hi  # largest u_d that leaves the EMF its voltage
+    room: int = U_MAX.hi  # largest u_d that leaves enough voltage for the EMF
 
 
 @kernel
@@ -69,7 +69,7 @@ def bound(v, state):
 
 
 def stimuli(_rng, _config):
-    """On the circle, one LSB inside and outside it, both axes, all signs, EMF up to all of it; radius zero."""
+    """On the circle, one LSB inside and outside, both axes, all signs, EMF up to the full radius; radius zero."""
     rows = []
     for u_max in (0, 1, 2, 20000, 37900, 65535):
         for d in (0, u_max - 1, u_max, u_max + 1, u_max * 3 // 5):
@@ -86,19 +86,19 @@ BLOCK = Block(
     paper="001, Fig. 1: decoupling at the regulators' output; limit of the space-vector modulation",
     step=step,
     inputs=(
-        Port("u_pi_d", PU, doc="regulator output, d axis"),
-        Port("u_pi_q", PU, late=1, doc="regulator output, q axis"),
+        Port("u_pi_d", PU, doc="output of the current regulator, d axis"),
+        Port("u_pi_q", PU, late=1, doc="output of the current regulator, q axis"),
         Port("u_dec_d", PU, doc="rotational voltage, d axis"),
         Port("u_dec_q", PU, late=1, doc="rotational voltage, q axis"),
-        Port("u_comp_d", PU, doc="compensating voltage, d axis"),
-        Port("u_comp_q", PU, late=1, doc="compensating voltage, q axis"),
+        Port("u_comp_d", PU, doc="compensation voltage, d axis"),
+        Port("u_comp_q", PU, late=1, doc="compensation voltage, q axis"),
         Port("u_max", U_MAX, doc="radius of the voltage circle"),
     ),
     outputs=(
         Port("u_d", PU, doc="voltage, d axis"),
         Port("u_q", PU, doc="voltage, q axis"),
-        Port("sat_d", SAT, lo=-1, hi=1, doc="limit that holds the d axis"),
-        Port("sat_q", SAT, lo=-1, hi=1, doc="limit that holds the q axis"),
+        Port("sat_d", SAT, lo=-1, hi=1, doc="active limit, d axis: 1 upper, -1 lower, 0 none"),
+        Port("sat_q", SAT, lo=-1, hi=1, doc="active limit, q axis: 1 upper, -1 lower, 0 none"),
     ),
     state=State(),
     latency=6 + sqrt.BLOCK.latency,

@@ -1,15 +1,15 @@
-"""The voltage that the inverter is really asked for in the coming period, in the stator frame.
+"""The voltage commanded to the inverter for the coming period, in the stator frame.
 
     u_applied_alpha = (2*compare_a - compare_b - compare_c) / (3*CARRIER_HALF)       * u_dc
     u_applied_beta  = (compare_b - compare_c)               / (sqrt(3)*CARRIER_HALF) * u_dc
 
-The compare values are those of the sample before: the carrier takes them over at this sampling instant and
-they act until the next one.  Voltage limit, over-modulation, minimum pulse and rounding to whole clocks are in
-them, and the bus voltage is the one that is there while they act, not the one they were made for.
-``voltage_known`` = 0: the gates are off or the bus reading is lost; nobody knows the voltage then.
+The compare values are those of the previous sample: the carrier loads them at this sampling instant and
+they act until the next one.  They include voltage limit, over-modulation, minimum pulse and rounding to whole
+clocks.  The bus voltage is the one measured now, not the one the compare values were calculated with.
+``voltage_known`` = 0: the gates are off or the bus reading is lost, so the voltage is unknown.
 
-Formats: 2**SHIFT/CARRIER_HALF is a 17-bit constant in [1, 2) made from the generic; u_dc times it U(2,22); the
-constants 1/3 and 1/sqrt(3) scale that, half up; the last product is cut by SHIFT and rounded half up to FLUX.
+Formats: 2**SHIFT/CARRIER_HALF is a 17-bit constant in [1, 2) derived from the generic; u_dc times it U(2,22); the
+constants 1/3 and 1/sqrt(3) scale that, half up; the last product is shifted by SHIFT and rounded half up to FLUX.
 Saturation: none for compare values up to CARRIER_HALF, |u_applied| <= 2/3*u_dc < 1.34.
 """
 
@@ -57,7 +57,7 @@ def step(compare_a, compare_b, compare_c, u_dc, u_dc_at_rail, run, carrier_half)
 
 
 def sums(v):
-    """Both axes' clocks, as parts of the carrier that the constants 1/3 and 1/sqrt(3) scale."""
+    """{axis: (combination of the compare values in clocks, its constant 1/3 or 1/sqrt(3))}."""
     a, b, c = (v[f"compare_{k}"] for k in "abc")
     return {"alpha": (2 * a - b - c, 1 / 3), "beta": (b - c, 1 / math.sqrt(3))}
 
@@ -82,7 +82,7 @@ def bound(v, _state):
 
 
 def stimuli(rng, config):
-    """Legal compare values at the ends of the carrier and between; bus at its ends; each reason to know nothing."""
+    """Legal compare values at the ends of the carrier and between; bus at its ends; each cause of unknown voltage."""
     half = config["CARRIER_HALF"]
     rows = []
     for u_dc in (0, U_DC_MIN - 1, U_DC_MIN, 73400, U_DC.hi):

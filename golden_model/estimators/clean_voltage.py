@@ -1,14 +1,14 @@
-"""The voltage at the motor's terminals: what the inverter was asked for, less what its legs take.
+"""The voltage at the motor's terminals: the commanded voltage minus the voltage loss of the inverter's legs.
 
     u_clean_alpha = u_applied_alpha - v_leg*s_alpha(k-1)
     u_clean_beta  = u_applied_beta  - v_leg*s_beta(k-1)
 
 s_alpha, s_beta are the directions of the phase currents as they will be when this sample's voltage acts; the voltage of
-the coming period is the last sample's, so its directions are those of one sample before.  v_leg: all that is known of
-dead time and drops, compensated and not.  The flux estimator of paper 001 takes this for u.
+the coming period is that of the previous sample, and so are its directions.  v_leg is the whole estimated loss by dead
+time and drops, compensated or not.  The flux estimator of paper 001 uses the result as u.
 
-Formats: product 34 fraction bits, rounded half up to FLUX; the difference saturates at 2 per unit, which the sum of
-the largest voltage, 1.34, and the largest leg voltage, 0.5*4/3, cannot quite exceed.
+Formats: product 34 fraction bits, rounded half up to FLUX; the difference saturates at 2 per unit, just above the
+largest sum of voltage, 1.34, and leg voltage, 0.5*4/3.
 """
 
 from typing import NamedTuple
@@ -46,14 +46,14 @@ def bound(_v, _state):
 BLOCK = Block(
     name="clean_voltage",
     folder="estimators",
-    paper="000, eq. (4); 001, eq. (5): the voltage cleaned of the inverter's distortion",
+    paper="000, eq. (4); 001, eq. (5): the voltage without the inverter's distortion",
     step=step,
     inputs=(
         Port("u_applied_alpha", FLUX, doc="voltage of the coming period, alpha"),
         Port("u_applied_beta", FLUX, doc="voltage of the coming period, beta"),
         S_ALPHA,
         S_BETA,
-        Port("v_leg", V_LEG, doc="leg voltage lost to dead time and drops"),
+        Port("v_leg", V_LEG, doc="leg voltage loss by dead time and device drops"),
     ),
     outputs=(
         Port("u_clean_alpha", FLUX, doc="voltage at the motor in the coming period, alpha"),

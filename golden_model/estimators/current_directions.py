@@ -1,20 +1,21 @@
-"""Directions that the phase currents will have when the next sample's voltage acts: paper 000 eq. (6).
+"""Predicted directions of the phase currents when the next sample's voltage acts: paper 000 eq. (6).
 
-    turn = k_ahead*omega_me                                     2.5 samples of turning, in radians
-    x = i_alpha - turn*i_beta,  y = i_beta + turn*i_alpha       the current vector, turned ahead
+    turn = k_ahead*omega_me                                     rotation during 2.5 samples, in radians
+    x = i_alpha - turn*i_beta,  y = i_beta + turn*i_alpha       the current vector, rotated ahead
     s_a = limit(k_sign*x, +-1)
     s_b = limit(k_sign*(-x + sqrt(3)*y)/2, +-1),  s_c = limit(k_sign*(-x - sqrt(3)*y)/2, +-1)
     s_alpha, s_beta = their Clarke transform
 
-Ahead: the voltage of the next sample acts 2.5 sample times from here.  With the directions of now each crossing of
-zero would be compensated late, and the spike left over looks to the Adaline like more dead time: 10 % more at 300 rpm
-in the paper's drive.  The turn is the first term of the rotation; its length does not matter to a direction, its angle
-is short of the true one by turn**3/3, one degree at 0.37 rad.
-Near zero: eq. (6) gives zero the sign of a positive current, so noise around zero flips a whole leg voltage.  A real
-leg does not: below about its ripple the dead time fades.  Within +-1/k_sign the direction is proportional to it.
+Prediction: the voltage of the next sample acts 2.5 sample times from now.  With the present directions each zero
+crossing would be compensated late, and the remaining spike would increase the estimated loss: by 10 % at 300 rpm in
+the paper's drive.  The rotation is replaced by its first-order term; the magnitude does not matter to a direction, and
+the angle is too small by turn**3/3, one degree at 0.37 rad.
+Near zero: eq. (6) gives zero the sign of a positive current, so noise around zero would switch a whole leg voltage.  In
+a real leg the effect of dead time fades below the ripple current.  Within +-1/k_sign the direction is proportional to
+the current.
 
-Formats: turn, x, y PU; sqrt(3) U(1,16); sums saturated to PU, whose ends lie far outside the straight line;
-products with k_sign rounded half up.  Nothing else is narrowed.
+Formats: turn, x, y PU; sqrt(3) U(1,16); sums saturated to PU, whose ends lie far outside the proportional
+range; products with k_sign rounded half up.  All other operations are exact.
 """
 
 import math
@@ -32,7 +33,7 @@ SQRT3 = Const(math.sqrt(3), Format(0, 1, 16))
 K_SQRT3 = SQRT3.value
 DROP_TURN = PU.frac_bits
 DROP_SQRT3 = SQRT3.fmt.frac_bits
-DROP = K_SIGN.frac_bits + 1  # twice each phase current is what is formed
+DROP = K_SIGN.frac_bits + 1  # the block calculates twice each phase current
 
 
 @kernel
@@ -53,7 +54,7 @@ def step(i_alpha, i_beta, omega_me, k_ahead, k_sign):
 
 
 def twice_currents(v):
-    """Twice the phase currents, turned ahead, in real numbers."""
+    """Twice the phase currents, rotated ahead, in real numbers."""
     turn = PU.limit(v["omega_me"] * v["k_ahead"])
     x, y = PU.limit(v["i_alpha"] - turn * v["i_beta"]), PU.limit(v["i_beta"] + turn * v["i_alpha"])
     across = math.sqrt(3) * y
@@ -66,9 +67,9 @@ def reference(v, _state):
 
 
 def bound(v, _state):
-    """turn off by half an LSB and the end of PU times a current below 2, the products rounded, sqrt(3) and across.
+    """Errors of turn (half an LSB, and the end of PU) times a current below 2, of the products, of sqrt(3), of across.
 
-    A direction is off by that times k_sign, but never by more than two; then the Clarke transform's own error.
+    k_sign multiplies them into the error of a direction, at most two; the error of the Clarke transform is added.
     """
     xy = 2 * 1.5 * PU.lsb + PU.lsb / 2
     twice = xy + 1.8 * xy + 2 * SQRT3.fmt.lsb / 2 + PU.lsb
@@ -81,7 +82,7 @@ def bound(v, _state):
 
 
 def stimuli(rng, _config):
-    """A turning vector of several lengths at several speeds; currents around the straight line; the ends."""
+    """A rotating vector of several magnitudes and speeds; currents in and around the proportional range; the ends."""
     rows = []
     for omega, length in ((0, 20000), (65536, 20000), (-131072, 500), (131071, 131071)):
         for k in range(24):
@@ -105,8 +106,8 @@ BLOCK = Block(
         Port("omega_me", PU, doc="electrical speed"),
     ),
     registers=(
-        Port("k_ahead", K_AHEAD, doc="radians turned in 2.5 samples, per unit of speed"),
-        Port("k_sign", K_SIGN, doc="one over the current from which a direction is full"),
+        Port("k_ahead", K_AHEAD, doc="angle of 2.5 sample times in radians, per unit of speed"),
+        Port("k_sign", K_SIGN, doc="1 / (current above which a direction is +-1)"),
     ),
     outputs=(
         Port("s_alpha", PU, doc="directions of the currents, alpha"),

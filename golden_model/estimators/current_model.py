@@ -3,11 +3,11 @@
     lambda_c_d = l_d*i_d + lambda_mg + lambda_add_d
     lambda_c_q = l_q*i_q             + lambda_add_q
 
-``model`` is that of flux_models, which has ``raised``, the estimate's compensation, in it; that is taken off again.
-``lambda_add`` is the earlier scheme's correction, eq. (16), which adds
-delta_lambda to this model; zero in every other mode (see flux_compensation).
+``model`` comes from flux_models and includes ``raised``, the compensation of the estimate, which is subtracted again.
+``lambda_add`` is the correction of the earlier scheme, eq. (16), which adds delta_lambda to this model; zero in every
+other mode (see flux_compensation).
 Formats: model with one bit more than FLUX; sum rounded half up to FLUX.
-Saturation: at 2 per unit of flux, twice what full voltage makes at base speed; told by ``model_limited``.
+Saturation: at 2 per unit of flux, twice the flux of full voltage at base speed; reported by ``model_limited``.
 """
 
 from fluxproof.golden_model.block import Block, Port

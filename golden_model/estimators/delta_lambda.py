@@ -1,21 +1,21 @@
-"""What the current regulators' integrals say about the flux: paper 001 eq. (15).
+"""The error of the flux estimate, from the integrals of the current regulators: paper 001 eq. (15).
 
     delta_lambda_d =  (u_int_q - r*i_q) / omega_me
     delta_lambda_q = -(u_int_d - r*i_d) / omega_me        1/omega_me as factor * 2**n
 
-With the decoupling fed by the estimate, the integrals hold the resistive drop and omega_me times the estimate's
-error, nothing else.  u_int is that of two samples before: a voltage asked for at one sample acts in the next
-period and shows in the currents at its end, and with the regulators' zero on the winding's pole
-R*i(k) = u_int(k-2) holds through every step of the reference, not in steady state alone.
+When the decoupling uses the estimate, the integrals contain only the resistive drop and omega_me times the error of
+the estimate.  u_int is taken from two samples before: the voltage commanded at one sample acts in the next period
+and changes the currents at its end.  With the regulator's zero on the pole of the winding, R*i(k) = u_int(k-2) is
+valid during every step of the reference, not only in steady state.
 
-Held while the integrals mean something else: voltage at its limit (sat_d, sat_q), a current converter at its end,
-bus reading lost.  Held means fading, by a sixteenth a sample, and ``delta_held`` makes flux_compensation forget as
-well: what cannot be verified must not stay.  A wrong estimate that keeps the voltage at its limit would otherwise
-keep itself.  Zero while the gates are off.
+Held while the integrals contain other voltages: voltage at its limit (sat_d, sat_q), a current converter at its end,
+bus reading lost.  While held, delta_lambda decays by a sixteenth per sample, and ``delta_held`` makes the integral in
+flux_compensation decay too: otherwise a wrong estimate that drives the voltage to its limit would persist.  Zero while
+the gates are off.
 
 Formats: r*i rounded half up to 28 fraction bits; difference exact; shifted by n, rounded half up and saturated to
-FLUX; times factor, rounded half up; what fades likewise.  Saturation at 2 per unit of flux: more than the machine
-can have, but small speeds make it of a small voltage error; told by ``delta_limited`` unless the weight is zero.
+FLUX; times factor, rounded half up; the decay likewise.  Saturation at 2 per unit of flux, more than the machine can
+have, but reached at low speed by a small voltage error; reported by ``delta_limited`` unless the weight is zero.
 """
 
 from typing import NamedTuple
@@ -39,13 +39,13 @@ class State(NamedTuple):
     delta_q: int = 0
     u_int_d_1: int = 0  # INTEGRAL, of the last sample
     u_int_q_1: int = 0
-    u_int_d_2: int = 0  # of the sample before it
+    u_int_d_2: int = 0  # of the sample before
     u_int_q_2: int = 0
 
 
 @kernel
 def axis(u_int, i, factor, n, r):
-    """One axis: (delta, 1 where it was limited)."""
+    """One axis: (delta, 1 if it was limited)."""
     rest = u_int - round_half_up(r * i, DROP_R)
     shifted = round_half_up(rest << n, DROP_SHIFTED)
     prod = saturate(shifted, FLUX_W) * factor
@@ -87,13 +87,13 @@ def reference(v, state):
 
 
 def bound(v, _state):
-    """The drop's rounding grows with 2**n, the shifted value's with the factor, then the output's."""
+    """Rounding of the drop times 2**n and of the shifted value, both times the factor; then of the output."""
     scaled = 2.0 ** v["n_omega"] * INTEGRAL.lsb / 2 + FLUX.lsb
     return dict.fromkeys(("delta_lambda_d", "delta_lambda_q"), scaled * abs(v["factor"]) + FLUX.lsb)
 
 
 def stimuli(rng, _config):
-    """Small rests at every exponent, both signs of the speed, ties, the ends of the range; held, stopped, restarted."""
+    """Small differences at every exponent, both signs of the speed, ties, range ends; held, stopped, restarted."""
     calm = {"sat_d": 0, "sat_q": 0, "current_at_rail": 0, "voltage_known": 1, "run": 1, "r": 641000}
     rows = []
     for n in range(speed_reciprocal.N_MAX + 1):
@@ -117,9 +117,9 @@ def stimuli(rng, _config):
 
 
 DELTA = (
-    Port("delta_lambda_d", FLUX, doc="flux the estimate lacks, d axis"),
-    Port("delta_lambda_q", FLUX, doc="flux the estimate lacks, q axis"),
-    Port("delta_held", BIT, doc="1: the integrals mean something else"),
+    Port("delta_lambda_d", FLUX, doc="flux linkage missing in the estimate, d axis"),
+    Port("delta_lambda_q", FLUX, doc="flux linkage missing in the estimate, q axis"),
+    Port("delta_held", BIT, doc="1: held, the integrals do not show the flux error"),
 )
 
 BLOCK = Block(
@@ -132,9 +132,9 @@ BLOCK = Block(
         Port("u_int_q", INTEGRAL, doc="integral part of the regulator, q axis"),
         Port("i_d", PU, doc="current, d axis"),
         Port("i_q", PU, doc="current, q axis"),
-        Port("sat_d", SAT, lo=-1, hi=1, doc="limit that holds the d axis"),
-        Port("sat_q", SAT, lo=-1, hi=1, doc="limit that holds the q axis"),
-        Port("current_at_rail", Format(0, 3, 0), doc="bit x: code of phase x at its end"),
+        Port("sat_d", SAT, lo=-1, hi=1, doc="active limit, d axis: 1 upper, -1 lower, 0 none"),
+        Port("sat_q", SAT, lo=-1, hi=1, doc="active limit, q axis: 1 upper, -1 lower, 0 none"),
+        Port("current_at_rail", Format(0, 3, 0), doc="bit x: ADC code of phase x at either end"),
         Port("voltage_known", BIT, doc="0: gates off or bus reading lost"),
         Port("run", BIT, doc="1: the gates are switching"),
         *speed_reciprocal.OUTPUTS,

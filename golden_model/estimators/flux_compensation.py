@@ -1,17 +1,17 @@
-"""What becomes of delta_lambda: the PI of paper 001 eq. (17), or the plain addition of eq. (16).
+"""The compensation from delta_lambda: the PI of paper 001 eq. (17), or the plain addition of eq. (16).
 
     integral += flux_ki*delta_lambda       or, while delta_lambda is held, -integral/2**8
     lambda_pi = flux_kp*delta_lambda + integral                         flux_mode 3
     lambda_add = delta_lambda                                           flux_mode 2
 
-Everything within +-delta_max.  While delta_lambda is held the integral forgets, slowly enough to survive the few
-samples of a current step at the voltage limit; the merged models then carry the estimate, and at the speeds where
-the voltage is at its limit for long they follow the voltage.  While the gates are off the integral stays what it is:
-what the drive has learnt of its motor is what a restart on the fly needs.  Leaving mode 3 empties it.
+All values are limited to +-delta_max.  While delta_lambda is held the integral decays, slowly enough to survive the
+few samples of a current step at the voltage limit.  In a longer limitation the merged models give the estimate; at the
+speeds where that happens they follow the voltage model.  While the gates are off the integral keeps its value, which a
+restart on the fly needs.  Leaving mode 3 clears it.
 
 Formats: flux_kp U(7,10), flux_ki U(0,17); products rounded half up to S(1,30), where 2**-17 per unit times the
-smallest useful flux_ki still counts; the sum is limited, then rounded half up to FLUX, which cannot pass the
-limit, a multiple of FLUX's LSB.  Saturation: at delta_max, on purpose; told by ``compensation_limited``.
+smallest useful flux_ki still moves the integral; the sum is limited, then rounded half up to FLUX, which cannot exceed
+the limit, a multiple of FLUX's LSB.  Saturation: at delta_max, intended; reported by ``compensation_limited``.
 """
 
 from typing import NamedTuple
@@ -39,7 +39,7 @@ class State(NamedTuple):
 
 @kernel
 def axis(integral, delta, held, mode, kp, ki, limit):
-    """One axis: (integral, lambda_pi, lambda_add, 1 where it was limited)."""
+    """One axis: (integral, lambda_pi, lambda_add, 1 if it was limited)."""
     proportional = round_half_up(delta * kp, DROP_P)
     increment = round_half_up(-integral, FORGET) if held else round_half_up(delta * ki, DROP_I)
     moved = clamp(integral + increment, -limit, limit)

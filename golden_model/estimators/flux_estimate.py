@@ -1,15 +1,15 @@
 """The estimated flux linkages, paper 001 eq. (17): merged models plus the compensation.
 
-    lambda_d = merged_d      where the voltage is known and a merge is wanted (``merged``)
-    lambda_d = model_d       else; q alike
+    lambda_d = merged_d      if the voltage is known and flux_mode selects the merge (``merged`` = 1)
+    lambda_d = model_d       otherwise; likewise for q
 
-Both models are those of flux_models, for the current that has just been measured, with the compensation in them: the
-decoupling gets this sample's flux, not the last one's.
+Both models come from flux_models, for the current of this sample and with the compensation included: the decoupling
+uses the flux of this sample, not of the previous one.
 flux_mode: 0 current model alone (6), 1 merged models (11), 2 earlier scheme (16), 3 proposed scheme (17).
 
-Formats: half an LSB of PU comes with the compensation, so that the flux is rounded half up by a cut.
-Saturation: at 2 per unit of flux, twice what full voltage makes at base speed; told by ``estimate_limited``,
-which also tells of a merged flux at its end.
+Formats: the compensation includes half an LSB of PU, so that truncation rounds the flux half up.
+Saturation: at 2 per unit of flux, twice the flux of full voltage at base speed; reported by ``estimate_limited``,
+which also reports a saturated merged flux.
 """
 
 from fluxproof.golden_model.block import Block, Port
@@ -21,7 +21,7 @@ from fluxproof.golden_model.kernel import kernel
 
 @kernel
 def axis(model, merged_flux, merged):
-    """One axis: (flux linkage, 1 where it was limited)."""
+    """One axis: (flux linkage, 1 if it was limited)."""
     cut = merged_flux >> PU_TO_FLUX if merged else model >> (PU_TO_FLUX + 1)
     return saturate(cut, PU_W), exceeds(cut, PU_W)
 

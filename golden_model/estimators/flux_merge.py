@@ -1,29 +1,29 @@
-"""Merge of voltage and current models in the stator frame: paper 001 eq. (7), without a pure integrator.
+"""Merge of the voltage and current models in the stator frame: paper 001 eq. (7), without a pure integrator.
 
 Continuous, with the error eps = lambda_c - lambda of the current model against the merged flux:
 
     d(lambda)/dt = u - R*i + 2*xi*omega_0*eps + x          d(x)/dt = omega_0**2 * eps
 
 which is (7) exactly: with N = 2*xi*omega_0*s + omega_0**2, lambda = (s**2*lambda_v + N*lambda_c)/(s**2 + N).
-Per sample, w = omega_0*T_s, rho = R*T_s/2, both axes alike (docs/flux_estimator.md derives it and its poles):
+Per sample and axis, with w = omega_0*T_s, rho = R*T_s/2 (docs/flux_estimator.md derives it and its poles):
 
-    lambda      = lambda_m - rho*i             the flux at this sample; lambda_m is what the last sample left
+    lambda      = lambda_m - rho*i             the flux at this sample; lambda_m is from the last sample
     eps         = lambda_c - lambda
     y           = w*eps
     x          += w*y
     lambda_m    = lambda + 2*xi*y + x          corrected ...
-                  + t_s*u_applied - rho*i      ... and carried to the next sample, but for its resistive drop
+                  + t_s*u_applied - rho*i      ... and integrated to the next sample, without its resistive drop
 
-The flux balance over a period is exact for the voltage and takes the mean of both ends' currents.  The drop
-at the period's end is left to those who know that current: this block and flux_estimate, a sample later.
-Where the voltage of the last period is not known (gates off, bus reading lost), the current model stands in:
+The flux balance over a period is exact for the voltage and uses the mean of the currents at both ends.  The drop of
+the current at the end of the period is subtracted one sample later, here and in flux_models.
+If the voltage of the last period is unknown (gates off, bus reading lost), the current model replaces the merge:
 lambda = lambda_c, x = 0.
 
 Formats: lambda S(1,30), eps and u FLUX, y S(-1,25), x S(-3,36); all products exact, each rounded half up.
 Stall: y rounds to zero below eps = 2**-26/w, x below y = 2**-37/w: less than one LSB of lambda_dq for
 w >= 2**-10 (docs, word lengths).
-Saturation: lambda and eps at 2 per unit of flux, x at 1/8 per unit a sample, a voltage error of 1/(8*t_s) per
-unit; no drive that fits its bases comes there.  ``merge_limited`` tells, and the filter forgets it with its own
+Saturation: lambda and eps at 2 per unit of flux, x at 1/8 per unit per sample, a voltage error of 1/(8*t_s) per
+unit; not reached by a drive within its bases.  ``merge_limited`` reports it, and the filter recovers with its own
 time constant.  y needs none: |eps| <= 2 and w < 1/4.
 """
 
@@ -60,16 +60,16 @@ X_TO_STATE = X.frac_bits - FLUX_STATE.frac_bits
 
 
 class State(NamedTuple):
-    lambda_alpha: int = 0  # FLUX_STATE: carried to this sample, but for its resistive drop
+    lambda_alpha: int = 0  # FLUX_STATE: integrated to this sample, without its resistive drop
     lambda_beta: int = 0
-    x_alpha: int = 0  # X: what the integral of eps adds each sample
+    x_alpha: int = 0  # X: integral of eps, per sample
     x_beta: int = 0
     known: int = 0  # the voltage of the last period was known
 
 
 @kernel
 def axis(carried, x, i, lambda_c, u, valid, minus_rho, omega_0, xi, t_s):
-    """One axis: (carried flux, x, 1 where anything was limited)."""
+    """One axis: (flux integrated to the next sample, x, 1 if anything was limited)."""
     drop = round_half_up(-minus_rho * i, DROP_RHO)
     now = carried - drop
     lambda_now = saturate(now, FLUX_STATE_W)
@@ -133,15 +133,15 @@ def reference(v, state):
 
 
 def bound(v, _state):
-    """Each rounding half an LSB of where it goes, weighted by what follows it."""
+    """Each rounding is half an LSB of its format, weighted by the gains that follow."""
     inner = FLUX_STATE.lsb / 2
-    y = v["omega_0"] * (inner + FLUX.lsb) + Y.lsb / 2  # flux rounded, and the end of its range an LSB early
+    y = v["omega_0"] * (inner + FLUX.lsb) + Y.lsb / 2  # rounding of the flux, and one LSB at the end of its range
     total = 4 * inner + 2 * v["xi"] * y + v["omega_0"] * y + X.lsb / 2 + inner
     return dict.fromkeys(("lambda_m_alpha", "lambda_m_beta"), total + FLUX.lsb)
 
 
 def stimuli(rng, _config):
-    """A turning flux with its voltage, gains at both ends of their ranges, into the limits and back; gates off."""
+    """Random flux and voltage, gains at both ends of their ranges, into the limits and back; gates off."""
     nominal = {"minus_rho": -40000, "omega_0": 4118, "xi": 11585, "t_s": 32925, "run": 1, "voltage_known": 1}
     rows = []
     for change in (
@@ -188,7 +188,7 @@ BLOCK = Block(
     ),
     outputs=(
         *LAMBDA_M,
-        Port("merge_known", BIT, doc="the flux will be good at the next sample"),
+        Port("merge_known", BIT, doc="1: the merged flux is valid at the next sample"),
         Port("merge_limited", BIT, doc="the merge reached its range"),
     ),
     state=State(),

@@ -1,19 +1,19 @@
-"""What both models say about this sample's flux linkages; flux_estimate and current_model take them from here.
+"""The flux linkages of this sample by both models, for flux_estimate and current_model.
 
     model_d  = l_d*i_d + lambda_mg + raised_d     the linear magnetic model, paper 001 eq. (6)
     model_q  = l_q*i_q + raised_q
-    merged_d = lambda_m_d - rho*i_d + raised_d    the merged models, eq. (11), at this sample; q alike
+    merged_d = lambda_m_d - rho*i_d + raised_d    the merged models, eq. (11), at this sample; likewise for q
 
-lambda_m is the flux that flux_merge carried here from the last sample, all but this sample's resistive drop.  Both are
-affine in the current that has just been measured: one multiplication behind the Park transform.
-``merged`` chooses: the merged flux where the voltage is known and flux_mode wants a merge, else the current model.
-``ended``: the chosen merged flux is at its end, where the rotation before has saturated.
+lambda_m is the flux that flux_merge integrated from the last sample, without this sample's resistive drop.  Both models
+are affine in the measured current: one multiplication after the Park transform.
+``merged`` selects: the merged flux if the voltage is known and flux_mode selects a merge, otherwise the current model.
+``ended``: the selected merged flux is at the end of its range, because the rotation before has saturated.
 
-``raised``: the compensation and half an LSB of PU, so that flux_estimate rounds half up by a cut and adds nothing;
-known from the last sample, it is added to what does not wait for the current.  current_model takes it off again.
+``raised``: the compensation plus half an LSB of PU, so that truncation in flux_estimate rounds half up.  It is known
+from the last sample and added before the current is available.  current_model subtracts it again.
 
-Formats: products and sums exact.  model is floored to half an LSB of FLUX, merged to FLUX: rounding half up to PU does
-not see what the floor took.
+Formats: products and sums exact.  model is floored to half an LSB of FLUX, merged to FLUX: the floor does not change
+the rounding half up to PU.
 """
 
 from dataclasses import replace
@@ -36,7 +36,7 @@ DROP_MODEL = PU.frac_bits + INDUCTANCE.frac_bits - MODEL_FLUX.frac_bits
 DROP_MERGED = PU.frac_bits + RESISTANCE.frac_bits - MERGED_FLUX.frac_bits
 HALF_PU = 1 << (PU_TO_FLUX - 1)
 END_HI, END_LO = FLUX.hi, FLUX.lo
-MODEL_MAX = 37 << MODEL_FLUX.frac_bits  # 16 of inductance times 2 of current, the magnets and the compensation
+MODEL_MAX = 37 << MODEL_FLUX.frac_bits  # 16 of inductance times 2 of current, plus magnet flux and compensation
 
 
 @kernel
@@ -92,14 +92,14 @@ L_D = Port("l_d", INDUCTANCE, doc="inductance, d axis")
 L_Q = Port("l_q", INDUCTANCE, doc="inductance, q axis")
 LAMBDA_MG = Port("lambda_mg", PU, doc="magnet flux linkage")
 MODEL = (
-    Port("model_d", MODEL_FLUX, -MODEL_MAX, MODEL_MAX, "flux linkage from the current, and raised, d axis"),
-    Port("model_q", MODEL_FLUX, -MODEL_MAX, MODEL_MAX, "flux linkage from the current, and raised, q axis"),
+    Port("model_d", MODEL_FLUX, -MODEL_MAX, MODEL_MAX, "flux linkage of the current model plus raised, d axis"),
+    Port("model_q", MODEL_FLUX, -MODEL_MAX, MODEL_MAX, "flux linkage of the current model plus raised, q axis"),
 )
 CHOSEN = (
-    Port("merged_d", MERGED_FLUX, doc="merged flux at this sample, and raised, d axis"),
-    Port("merged_q", MERGED_FLUX, doc="merged flux at this sample, and raised, q axis"),
-    Port("merged", BIT, doc="1: the merged flux counts, else the current model's"),
-    Port("ended", BIT, doc="1: it counts and is at its end"),
+    Port("merged_d", MERGED_FLUX, doc="merged flux at this sample plus raised, d axis"),
+    Port("merged_q", MERGED_FLUX, doc="merged flux at this sample plus raised, q axis"),
+    Port("merged", BIT, doc="1: the merged flux is used, 0: the current model"),
+    Port("ended", BIT, doc="1: the merged flux is used and saturated"),
 )
 RAISED_DQ = (
     Port("raised_d", RAISED, FLUX.lo, FLUX.hi + HALF_PU, "compensation and half an LSB of PU, d axis"),
@@ -117,7 +117,7 @@ BLOCK = Block(
         *(replace(port, late=2) for port in LAMBDA_M_DQ),
         Port("lambda_pi_d", FLUX, doc="compensation, d axis"),
         Port("lambda_pi_q", FLUX, doc="compensation, q axis"),
-        Port("merge_known", BIT, doc="the merged flux is good"),
+        Port("merge_known", BIT, doc="1: the merged flux is valid"),
         Port("run", BIT, doc="1: the gates are switching"),
         MINUS_RHO,
     ),

@@ -1,13 +1,13 @@
-"""Remembers what made the flux estimate untrustworthy, until it is told to forget.
+"""Latches the conditions that disturb the flux estimate, until they are cleared.
 
-Bit by bit, each set for good by one bad sample and cleared by ``clear_faults`` (which a bad sample outlives):
+One bit per condition, set by a single sample and cleared by ``clear_faults`` unless the condition persists:
 
     0  a current converter at its end            4  delta_lambda at its range
     1  bus reading at its end or below 1/32      5  compensation at delta_max
     2  current model at its range                6  estimate, or a rotation before it, at its range
     3  merge at its range
 
-The flags change nothing: every limit is a saturation, and the estimate recovers by itself.
+The flags have no effect in the core: every limit is a saturation, and the estimate recovers without a reset.
 Formats: bits.
 """
 
@@ -38,7 +38,7 @@ def step(
 
 
 def stimuli(_rng, _config):
-    """Every flag alone, remembered, then forgotten; forgetting while it lasts."""
+    """Every flag alone, latched, then cleared; cleared while the condition persists."""
     rows = []
     for name in (p.name for p in BLOCK.inputs[:-1]):
         quiet = dict.fromkeys((p.name for p in BLOCK.inputs), 0)
@@ -55,10 +55,10 @@ def stimuli(_rng, _config):
 BLOCK = Block(
     name="flux_monitor",
     folder="estimators",
-    paper="none: what a drive needs besides",
+    paper="none: protection and diagnosis of the drive",
     step=step,
     inputs=(
-        Port("current_at_rail", Format(0, 3, 0), doc="bit x: code of phase x at its end"),
+        Port("current_at_rail", Format(0, 3, 0), doc="bit x: ADC code of phase x at either end"),
         Port("u_dc_at_rail", BIT, doc="bus reading at either end"),
         Port("u_dc_low", BIT, doc="bus below 1/32 per unit"),
         Port("model_limited", BIT, doc="the current model reached its range"),
@@ -66,7 +66,7 @@ BLOCK = Block(
         Port("delta_limited", BIT, doc="delta lambda reached its range"),
         Port("compensation_limited", BIT, doc="the compensation reached its limit"),
         Port("estimate_limited", BIT, doc="the estimate reached its range"),
-        Port("clear_faults", BIT, doc="1: forget what is over"),
+        Port("clear_faults", BIT, doc="1: clear the flags whose cause is gone"),
     ),
     outputs=(Port("flux_faults", FAULTS, doc="what has disturbed the flux estimate, see flux_monitor"),),
     state=State(),

@@ -1,11 +1,11 @@
-"""Adaline of the magnets' flux, paper 000 eq. (13), for any i_d and a salient motor.
+"""Adaline of the magnet flux, paper 000 eq. (13), extended to any i_d and salient motors.
 
     e      = u_q - v_leg*d_q - r*i_q - omega*(l_d*i_d + psi_m)          eq. (7b); l_d*i_d is zero in eq. (11)
     psi_m += eta_psi*omega*e                                            eta_psi = 2*eta
 
-u_q is what the regulators ask for, compensation of the dead time included; v_leg*d_q takes away what the legs lose.
-omega is the speed along the chord of a sample, as in the decoupling.
-Held, and told by ``psi_held``, where the speed is too low to tell the EMF from the errors of the voltage, while the
+u_q is the commanded voltage including the dead-time compensation; v_leg*d_q is the voltage loss of the legs.
+omega is the chord speed, as in the decoupling.
+Held, and reported by ``psi_held``, if the speed is so low that errors of the voltage dominate the EMF, or while the
 voltage is at its limit, a converter at its end, the bus reading lost or the gates off.
 
 Formats: v_leg*d_q and r*i_q to FLUX, l_d*i_d to FLUX, saturated; their product with omega to FLUX; e FLUX, saturated;
@@ -88,7 +88,7 @@ def bound(v, _state):
 
 
 def stimuli(rng, _config):
-    """Steady running to the estimate's rest, both directions; the lowest speed; each reason to hold; the ends."""
+    """Constant speed until the estimate settles, both directions; the lowest speed; each cause of a hold; the ends."""
     calm = {
         "sat_d": 0,
         "sat_q": 0,
@@ -131,9 +131,9 @@ BLOCK = Block(
         Port("i_q", PU, doc="current, q axis"),
         R,
         Port("omega_chord", PU, doc="electrical speed along the chord of a sample"),
-        Port("sat_d", SAT, lo=-1, hi=1, doc="limit that holds the d axis"),
-        Port("sat_q", SAT, lo=-1, hi=1, doc="limit that holds the q axis"),
-        Port("current_at_rail", Format(0, 3, 0), doc="bit x: code of phase x at its end"),
+        Port("sat_d", SAT, lo=-1, hi=1, doc="active limit, d axis: 1 upper, -1 lower, 0 none"),
+        Port("sat_q", SAT, lo=-1, hi=1, doc="active limit, q axis: 1 upper, -1 lower, 0 none"),
+        Port("current_at_rail", Format(0, 3, 0), doc="bit x: ADC code of phase x at either end"),
         Port("voltage_known", BIT, doc="0: gates off or bus reading lost"),
         Port("run", BIT, doc="1: the gates are switching"),
     ),

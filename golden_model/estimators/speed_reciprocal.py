@@ -3,12 +3,12 @@
     factor * 2**n = weight/omega_me
     weight = limit((|omega_me| - omega_min)*k_ramp, 0, 1)
 
-Paper 001, section 5.2: within +-2 rad/s no compensation is calculated.  A plain threshold would make delta_lambda
-jump there, by as much as the estimate is wrong; the weight brings it to nothing along a ramp of 1/k_ramp above
-omega_min, so it is continuous at every speed and zero from -omega_min to omega_min.
+Paper 001, section 5.2: within +-2 rad/s no compensation is calculated.  With a plain threshold delta_lambda would
+jump there by the error of the estimate.  The weight reduces it to zero along a ramp of 1/k_ramp above omega_min, so
+it is continuous at every speed and zero from -omega_min to omega_min.
 
 Formats: reciprocal as in common/reciprocal, |omega_me| from 2**-12 on; weight U(1,16), half up; factor signed, 17
-fraction bits, half up: m*weight <= m < 1, so it fits.  |omega_me| = 2 is taken for the next number below.
+fraction bits, half up: m*weight <= m < 1, so it fits.  |omega_me| = 2 is replaced by the next smaller number.
 """
 
 from fluxproof.golden_model.block import Block, Port
@@ -46,7 +46,7 @@ def reference(v, _state):
 
 
 def bound(_v, _state):
-    """m is off by one LSB, the weight by half of one of 2**-16, the product is rounded."""
+    """Errors of m (one LSB) and of the weight (half an LSB of 2**-16), and the rounding of the product."""
     return {"factor": RECIPROCAL.lsb + DUTY.lsb / 2 + FACTOR.lsb / 2}
 
 

@@ -3,7 +3,7 @@
     torque = lambda_d*i_q - lambda_q*i_d        per unit of 3/2*p*lambda_base*I_base
 
 Formats: products exact, 32 fraction bits; difference rounded half up to PU.
-Saturation: at 2 per unit; flux and current both at their bases make one.
+Saturation: at 2 per unit; flux and current both at their bases give 1.
 """
 
 from fluxproof.golden_model.block import Block, Port

@@ -1,26 +1,25 @@
 """Adaline of V_dead, paper 000 eq. (10), and the minimisation of its Fig. 4(a).
 
-    lp_u += k_lp*(u_pi_d - lp_u),  u_h = u_pi_d - lp_u             Fig. 3: what the harmonics ask of the regulator
+    lp_u += k_lp*(u_pi_d - lp_u),  u_h = u_pi_d - lp_u             Fig. 3: harmonics in the regulator output
     lp_d += k_lp*(d_d - lp_d),     d_h = d_d - lp_d                the same filter on the regressor
     e     = u_h - v_dead*d_h
     v_dead += eta_v*d_h*e                                          eq. (10), eta_v = 2*9*eta
     v_sum  += zeta*v_dead                   while |v_dead| > v_thr
     v_comp  = limit(gamma*v_dead + v_sum, 0, v_comp_max)           gamma*V_dead of section V.B
-    v_leg   = v_comp + v_dead                                      all that is known of the leg's loss
+    v_leg   = v_comp + v_dead                                      the whole estimated loss of a leg
 
-Sign and scale: v_dead is the voltage that a leg loses in the direction of its current, positive; the paper's V_dead is
-minus a third of it, its D three times d.  u_pi_d leaves out the decoupling, so that (8d)'s L_q*omega*i_q is not in it.
+Sign and scale: v_dead is the voltage loss of a leg in the direction of its current, positive; the paper's V_dead is
+minus a third of it, and its D is three times d.  u_pi_d excludes the decoupling, and with it L_q*omega*i_q of (8d).
 The paper filters u_d* only: with i_d = 0 the mean of D_d is zero.  With i_d /= 0 it is not, and a regressor with a
-mean would pull the estimate to var(D_d)/mean(D_d**2) of the truth; the same filter on both sides takes the mean
-out and delays both alike (docs/vsi_estimators.md).
-Fig. 4(a) adds zeta to gamma in every step until |V_dead| < V_thr.  The product gamma*V_dead would then have to survive
-V_dead -> 0, with gamma -> infinity.  What the step adds to the product, zeta*v_dead, is kept as a sum instead.
-Nothing is learnt, and what was learnt stays, while the gates are off, the voltage or a converter is at its end, or
-|i_d| + |i_q| < i_learn: close to zero current the directions say little, and a drive that rings there would teach a
-negative loss.
+mean would bias the estimate to var(D_d)/mean(D_d**2) of the true value; the same filter on both signals removes the
+mean and delays both equally (docs/vsi_estimators.md).
+Fig. 4(a) adds zeta to gamma in every step until |V_dead| < V_thr.  While V_dead -> 0 the product gamma*V_dead must
+stay, so gamma -> infinity.  Instead, v_sum accumulates the increments of the product, zeta*v_dead.
+The Adaline is held while the gates are off, the voltage or a converter is at its end, or |i_d| + |i_q| < i_learn: close
+to zero current the directions are uncertain, and an oscillation there would give a negative loss.
 
-Formats: lp S(1,28); u_h, d_h PU; e FLUX; d_h*e S(-4,21), saturated there: a slower step, the same sign; v_dead and
-v_sum S(-1,38), where an eta of 1e-6 still moves them by an error of 2**-22 (docs, word lengths); v_comp, v_leg V_LEG.
+Formats: lp S(1,28); u_h, d_h PU; e FLUX; d_h*e S(-4,21), saturated: a smaller step with the same sign; v_dead and
+v_sum S(-1,38), where an eta of 1e-6 and an error of 2**-22 still change them (docs, word lengths); v_comp, v_leg V_LEG.
 All rounded half up.  Limits: v_dead within +-v_comp_max, v_sum and v_comp from zero to v_comp_max, v_leg saturated.
 """
 
@@ -75,7 +74,7 @@ class State(NamedTuple):
 
 @kernel
 def low_pass(lp, x, k_lp):
-    """(next state, x without what passed), both from the state before."""
+    """(next state, x minus the low-pass output), both from the state before."""
     err = saturate(x - round_sat(lp, PU_TO_INTEGRAL, PU_W), PU_W)
     moved = saturate(lp + round_half_up(err * k_lp, DROP_LP), INTEGRAL_W)
     return moved, err
@@ -114,7 +113,7 @@ def step(
 
 
 def filtered(lp, x, k_lp):
-    """The low-pass in real numbers: (next state, what is left of x)."""
+    """The low-pass in real numbers: (next state, x minus the low-pass output)."""
     old = lp * INTEGRAL.lsb
     err = PU.limit(x - old)
     return INTEGRAL.limit(old + k_lp * err), err
@@ -138,9 +137,9 @@ def reference(v, state):
 
 
 def bound(v, _state):
-    """u_h and d_h are off by half an LSB of PU, v_dead in the model by half of V_FINE's; then the step's roundings.
+    """Errors of u_h and d_h (half an LSB of PU) and of v_dead (half an LSB of V_FINE), then the roundings of the step.
 
-    Next to v_thr model and reference may differ in whether v_sum moves: by zeta*v_thr at most.
+    Close to v_thr model and reference may disagree on the increment of v_sum, zeta*v_thr at most.
     """
     h = PU.lsb / 2 + PU.lsb  # the low-pass output rounded, and the ends of PU
     e = h + 0.5 * h + 2 * V_FINE.lsb + FLUX.lsb
@@ -156,7 +155,7 @@ def bound(v, _state):
 
 
 def stimuli(rng, _config):
-    """A sawtooth of D with the answer of a regulator; each reason not to learn; limits; thresholds; stop."""
+    """A sawtooth of D with a regulator's response; each cause of a hold; limits; thresholds; stop."""
     calm = {"sat_d": 0, "sat_q": 0, "current_at_rail": 0, "voltage_known": 1, "run": 1, "compensate": 1}
     calm |= {"i_d": -3000, "i_q": 9000, "i_learn": 12000}
     gains = {"k_lp": 6600, "eta_v": 20000, "gamma": 3277, "zeta": 40000, "v_thr": 3, "v_comp_max": 6000}
@@ -173,22 +172,22 @@ def stimuli(rng, _config):
     for sign in (1, -1):  # into both ends
         end = {**calm, **gains, "eta_v": ETA_V_MAX, "v_comp_max": V_LEVEL.hi, "k_lp": 1, "zeta": ZETA.hi}
         rows += [{**end, "d_d": 80000, "u_pi_d": sign * 131071} for _ in range(90)]
-        still = {**rows[-1], "v_thr": V_LEVEL.hi}  # v_dead is at the threshold, and not above it
+        still = {**rows[-1], "v_thr": V_LEVEL.hi}  # v_dead is at the threshold, not above
         rows += [{**still, "compensate": 0}, still, still]
     for k_lp, u_pi_d, d_d, run in ((0, 0, 0, 0), (524032, -1, 0, 1), (K_LP.hi, PU.lo, 0, 1), (0, 0, 40000, 1)):
-        rows.append({**calm, **gains, "k_lp": k_lp, "u_pi_d": u_pi_d, "d_d": d_d, "run": run})  # lp_u past its end
+        rows.append({**calm, **gains, "k_lp": k_lp, "u_pi_d": u_pi_d, "d_d": d_d, "run": run})  # lp_u beyond its range
     past_its_end = (
         (0, 0, 0, 0), (524032, -1, 0, 1), (K_LP.hi, PU.lo, 0, 1), (652288, PU.lo + 1, 0, 1), (0, PU.lo, 40000, 1),
     )  # fmt: skip
-    for k_lp, u_pi_d, d_d, run in 3 * past_its_end:  # three times: a reset may come between
+    for k_lp, u_pi_d, d_d, run in 3 * past_its_end:  # three times: a reset may occur between
         end = {**calm, **gains, "eta_v": ETA_V_MAX, "run": run}
-        rows.append({**end, "k_lp": k_lp, "u_pi_d": u_pi_d, "d_d": d_d})  # lp_u past its end shows a sample later
+        rows.append({**end, "k_lp": k_lp, "u_pi_d": u_pi_d, "d_d": d_d})  # shows one sample later
     return rows
 
 
-V_DEAD = Port("v_dead", V_LEG, doc="leg voltage lost and not compensated")
+V_DEAD = Port("v_dead", V_LEG, doc="leg voltage loss that is not compensated")
 V_COMP = Port("v_comp", V_LEG, doc="leg voltage that is compensated")
-V_LEG_PORT = Port("v_leg", V_LEG, doc="leg voltage lost to dead time and drops")
+V_LEG_PORT = Port("v_leg", V_LEG, doc="leg voltage loss by dead time and device drops")
 
 BLOCK = Block(
     name="v_dead_adaline",
@@ -196,13 +195,13 @@ BLOCK = Block(
     paper="000, eq. (10) and Fig. 4(a)",
     step=step,
     inputs=(
-        Port("u_pi_d", PU, doc="regulator output, d axis"),
+        Port("u_pi_d", PU, doc="output of the current regulator, d axis"),
         D_D,
         Port("i_d", PU, doc="current, d axis"),
         Port("i_q", PU, doc="current, q axis"),
-        Port("sat_d", SAT, lo=-1, hi=1, doc="limit that holds the d axis"),
-        Port("sat_q", SAT, lo=-1, hi=1, doc="limit that holds the q axis"),
-        Port("current_at_rail", Format(0, 3, 0), doc="bit x: code of phase x at its end"),
+        Port("sat_d", SAT, lo=-1, hi=1, doc="active limit, d axis: 1 upper, -1 lower, 0 none"),
+        Port("sat_q", SAT, lo=-1, hi=1, doc="active limit, q axis: 1 upper, -1 lower, 0 none"),
+        Port("current_at_rail", Format(0, 3, 0), doc="bit x: ADC code of phase x at either end"),
         Port("voltage_known", BIT, doc="0: gates off or bus reading lost"),
         Port("run", BIT, doc="1: the gates are switching"),
     ),
@@ -210,10 +209,10 @@ BLOCK = Block(
         Port("k_lp", K_LP, doc="weight of a new sample in the low-pass of Fig. 3"),
         Port("eta_v", ETA_V, hi=ETA_V_MAX, doc="step of the V_dead Adaline, 18*eta"),
         Port("gamma", GAMMA, doc="proportional part of the compensation"),
-        Port("zeta", ZETA, doc="what the minimisation adds in a sample"),
-        Port("v_thr", V_LEVEL, doc="no minimisation below this leg voltage"),
+        Port("zeta", ZETA, doc="gain of the minimisation per sample"),
+        Port("v_thr", V_LEVEL, doc="no minimisation below this |v_dead|"),
         Port("v_comp_max", V_LEVEL, doc="largest leg voltage that is compensated"),
-        Port("i_learn", Format(0, 1, 16), doc="nothing is learnt below this |i_d| + |i_q|"),
+        Port("i_learn", Format(0, 1, 16), doc="the V_dead Adaline is held below this |i_d| + |i_q|"),
         Port("compensate", BIT, doc="1: compensate dead time and drops"),
     ),
     outputs=(

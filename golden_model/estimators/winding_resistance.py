@@ -1,10 +1,10 @@
-"""The winding's resistance from its temperature, paper 000 eq. (12), and the flux it takes away in half a sample.
+"""The winding resistance from its temperature, paper 000 eq. (12), and the resistive flux drop of half a sample.
 
     r   = r_s + tcr*(temp_winding - t_0)        R = R_0 + TCR*(T_2 - T_0)
     minus_rho = -r*t_s/2                        t_s: the sample time in per unit, T_s*omega_base
 
-Without a reading (``temp_valid`` = 0), or one outside t_min to t_max, r = r_s and ``temp_lost`` is raised.
-minus_rho is what flux_merge and flux_models multiply by a current and add: half a sample's resistive drop, integrated.
+Without a valid reading (``temp_valid`` = 0, or outside t_min to t_max) r = r_s and ``temp_lost`` is 1.
+flux_merge and flux_models multiply minus_rho by a current: the resistive voltage drop integrated over half a sample.
 Formats: temperatures S(9,6) in degrees, tcr U(-6,30); product 36 fraction bits, rounded half up to 24; r limited to
 0 .. 1; rho rounded half up to 24 fraction bits, then negated, within 1/4 since t_s < 1/2.
 """
@@ -42,7 +42,7 @@ def bound(v, _state):
 
 
 def stimuli(_rng, _config):
-    """Temperatures at the ends of the trusted range and just outside, no reading, resistances at both ends."""
+    """Temperatures at the ends of the valid range and just outside, no reading, resistances at both ends."""
     rows = []
     ends = {"t_min": -50 << 6, "t_max": 200 << 6, "t_0": 25 << 6}
     for temperature in (
@@ -66,7 +66,7 @@ def stimuli(_rng, _config):
 T_S = Port("t_s", SAMPLE_TIME, doc="sample time, per unit")
 R = Port("r", RESISTANCE, doc="winding resistance in use")
 MINUS_RHO = Port(
-    "minus_rho", formats.MINUS_RHO, hi=0, doc="less the flux that half a sample takes, per unit of current"
+    "minus_rho", formats.MINUS_RHO, hi=0, doc="minus the resistive flux drop of half a sample, per unit of current"
 )
 
 BLOCK = Block(
@@ -76,17 +76,17 @@ BLOCK = Block(
     step=step,
     inputs=(
         Port("temp_winding", CELSIUS, doc="winding temperature, degrees Celsius"),
-        Port("temp_valid", BIT, doc="1: the temperature is a reading"),
+        Port("temp_valid", BIT, doc="1: temp_winding is valid"),
     ),
     registers=(
         Port("r_s", RESISTANCE, doc="winding resistance at t_0"),
-        Port("tcr", TCR, doc="resistance per kelvin"),
+        Port("tcr", TCR, doc="change of r_s per kelvin"),
         Port("t_0", CELSIUS, doc="temperature of r_s"),
-        Port("t_min", CELSIUS, doc="coldest reading that is believed"),
-        Port("t_max", CELSIUS, doc="hottest reading that is believed"),
+        Port("t_min", CELSIUS, doc="lowest valid temperature"),
+        Port("t_max", CELSIUS, doc="highest valid temperature"),
         T_S,
     ),
-    outputs=(R, MINUS_RHO, Port("temp_lost", BIT, doc="1: no believable temperature, r is r_s")),
+    outputs=(R, MINUS_RHO, Port("temp_lost", BIT, doc="1: no valid temperature, r = r_s")),
     latency=8,
     interval=8,
     constants={"DROP_TCR": DROP_TCR, "DROP_RHO": DROP_RHO},

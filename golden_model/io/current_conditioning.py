@@ -1,9 +1,9 @@
 """ADC codes to phase currents: i_x = gain_x * (code_x - offset_x), one multiplier for three channels.
 
-Formats: codes of 12 to 16 bits are moved to the left edge of 16 bits, so that offset and gain mean
-the same for every converter.  Difference S(1,15) x gain S(1,16) = 31 fraction bits, rounded half up to PU.
-Saturation: |code - offset| < 2 and |gain| <= 2 can reach 4 per unit; beyond 2 the current saturates,
-which no sensor does that is scaled to its base.
+Formats: codes of 12 to 16 bits are left-aligned in 16 bits, so that offset and gain do not depend on
+the converter's resolution.  Difference S(1,15) x gain S(1,16) = 31 fraction bits, rounded half up to PU.
+Saturation: |code - offset| < 2 and |gain| <= 2 can reach 4 per unit; beyond 2 the current saturates;
+a sensor that is scaled to its base does not reach it.
 """
 
 from fluxproof.golden_model.block import Block, Port
@@ -24,7 +24,7 @@ def condition(code, offset, gain, shift):
 
 @kernel
 def at_rail(code, adc_bits):
-    """1 for the lowest and the highest code: the converter cannot tell how far beyond the input is."""
+    """1 for the lowest and the highest code: the input may be beyond the range of the converter."""
     return 1 if code == 0 or code == (1 << adc_bits) - 1 else 0
 
 
@@ -43,7 +43,7 @@ def reference(v, _state):
 
 
 def bound(_v, _state):
-    """Only the last rounding loses anything."""
+    """Only the last step rounds."""
     return {f"i_{x}": PU.lsb / 2 for x in "abc"}
 
 
@@ -76,7 +76,7 @@ BLOCK = Block(
     )
     + tuple(Port(f"gain_{x}", GAIN, doc=f"current per code, phase {x}") for x in "abc"),
     outputs=tuple(Port(f"i_{x}", PU, doc=f"current, phase {x}") for x in "abc")
-    + (Port("current_at_rail", Format(0, 3, 0), doc="bit x: code of phase x at its end"),),
+    + (Port("current_at_rail", Format(0, 3, 0), doc="bit x: ADC code of phase x at either end"),),
     latency=5,
     soon=("i_b", "i_c"),
     interval=3,

@@ -1,15 +1,15 @@
-"""Remembers which faults there were and which came first, and keeps the gates off until told to forget; every clock.
+"""Latches the faults and the first fault, and keeps the gates off until ``clear_trip``; runs at every clock.
 
-    0 to 5  what is wrong with a sample, see sample_checks
+    0 to 5  faults of a sample, see sample_checks
     6       no sample for ``watchdog`` clocks
     7       input ``trip``
-    8       a sample came too early and was not let in: told, never a trip
+    8       a sample came too early and was rejected: reported, never a trip
 
-A fault is remembered from ``enable`` on (``trip`` always), so that one can write the registers in peace; with a fault
-present ``enable`` does not help.  ``clear_trip`` forgets the faults whose cause is gone.
-``first_fault`` holds all that tripped in the first clock with any, until nothing trips any more.
-``fault_ignore``: bit x of 0 to 6 is told in the flags and does not trip; ``trip`` always does.
-``gate_clear`` is ``clear_trip`` one clock later, when the flags have gone, for the trip memory of the gates.
+Faults are latched while ``enable`` is 1 (``trip`` always), so that registers can be written before; while a fault is
+present ``enable`` has no effect.  ``clear_trip`` clears the faults whose cause is gone.
+``first_fault`` contains all faults of the first clock that tripped, until nothing trips any more.
+``fault_ignore``: fault x of 0 to 6 is reported in the flags and does not trip; ``trip`` always trips.
+``gate_clear`` is ``clear_trip`` one clock later, when the flags are cleared, for the trip latch of the gates.
 Formats: bits.
 """
 
@@ -22,12 +22,12 @@ from fluxproof.golden_model.io.sample_checks import CHECKS, IGNORE
 from fluxproof.golden_model.kernel import kernel
 
 FLAGS = Format(0, 9, 0)
-FAULTS = Format(0, 8, 0)  # all that can trip
+FAULTS = Format(0, 8, 0)  # the faults that can trip
 NAMES = (
     "overcurrent", "current_sum", "at_rail", "u_dc_low", "u_dc_high", "position", "watchdog", "trip", "early",
 )  # fmt: skip
 LATE, TRIP, EARLY = 6, 7, 8
-ALWAYS = 1 << TRIP  # remembered without enable, and not to be ignored
+ALWAYS = 1 << TRIP  # latched without enable, and cannot be ignored
 TRIPPING = FAULTS.hi  # all but EARLY
 
 
@@ -51,7 +51,7 @@ def step(state, trip, sample_faults, sample_late, sample_early, enable, clear_tr
 
 
 def stimuli(rng, config):
-    """Each fault alone and two after another, cleared while it lasts and when it is gone, ignored, without enable."""
+    """Each fault alone and two in sequence, cleared while present and when gone, ignored, without enable."""
     calm = dict.fromkeys((p.name for p in BLOCK.inputs + BLOCK.registers), 0) | {"enable": 1}
     causes = [{"sample_faults": 1 << k} for k in range(6)]
     causes += [{"sample_late": 1}, {"trip": 1}, {"sample_early": 1}]
@@ -75,22 +75,22 @@ def stimuli(rng, config):
 BLOCK = Block(
     name="fault_latch",
     folder="io",
-    paper="none: what a drive needs besides",
+    paper="none: protection and diagnosis of the drive",
     step=step,
     inputs=(
-        Port("trip", BIT, doc="1: gates off, remembered"),
+        Port("trip", BIT, doc="1: gates off, latched"),
         Port("sample_faults", CHECKS, doc="what is wrong with the last sample"),
-        Port("sample_late", BIT, doc="the last sample is older than the watchdog allows"),
-        Port("sample_early", BIT, doc="a sample was not let in"),
+        Port("sample_late", BIT, doc="1: the last sample is older than watchdog clocks"),
+        Port("sample_early", BIT, doc="1: a sample came too early and was rejected"),
         Port("enable", BIT, doc="1: gates may switch"),
-        Port("clear_trip", BIT, doc="1: forget what is over"),
+        Port("clear_trip", BIT, doc="1: clear the flags whose cause is gone"),
     ),
-    registers=(Port("fault_ignore", IGNORE, doc="bit x: fault x is told and does not trip"),),
+    registers=(Port("fault_ignore", IGNORE, doc="bit x: fault x is reported and does not trip"),),
     outputs=(
-        Port("fault_flags", FLAGS, doc="what has happened, see fault_latch"),
-        Port("first_fault", FAULTS, doc="which of them came first"),
+        Port("fault_flags", FLAGS, doc="faults since the last clear_trip, see fault_latch"),
+        Port("first_fault", FAULTS, doc="faults that tripped first"),
         Port("fault_stop", BIT, doc="1: gates off"),
-        Port("gate_clear", BIT, doc="clear_trip, when the flags have gone"),
+        Port("gate_clear", BIT, doc="clear_trip one clock later, when the flags are cleared"),
     ),
     state=State(),
     latency=1,

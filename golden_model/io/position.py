@@ -1,7 +1,7 @@
 """Resolver or encoder code to electrical angle: theta_me = pole_pairs * code + theta_offset, modulo one turn.
 
-Formats: a code of 8 to 18 bits is moved to the left edge of 18 bits.  Nothing is rounded; every
-operation is modulo one turn by meaning.  ``reverse`` = 1 turns the sense of rotation (code -> -code).
+Formats: a code of 8 to 18 bits is left-aligned in 18 bits.  Nothing is rounded; every operation is
+modulo one turn, because angles wrap.  ``reverse`` = 1 inverts the sense of rotation (code -> -code).
 """
 
 from fluxproof.golden_model.block import Block, Port
@@ -52,7 +52,7 @@ BLOCK = Block(
     step=step,
     inputs=(Port("code_theta", Format(0, 0, 16), doc="position code, one mechanical turn"),),
     registers=(
-        Port("reverse", BIT, doc="1: code counts against the phase order"),
+        Port("reverse", BIT, doc="1: code counts opposite to the phase order"),
         Port("pole_pairs", POLE_PAIRS, lo=1, doc="pole pairs"),
         Port("theta_offset", TURN, doc="electrical angle at code zero"),
     ),

@@ -1,7 +1,7 @@
 """The registers behind the bus, one transaction at a time: twin of generated/register_file.vhd and register_access.vhd.
 
-A write counts or is refused as a whole; the answer says which (OKAY, SLVERR, DECERR of AXI4).  When it counts is
-the RTL's matter (see register_map.Kind); this model is told of a sample by ``sample()``.
+A write takes effect or is refused as a whole; the response says which (OKAY, SLVERR, DECERR of AXI4).  The RTL decides
+when it takes effect (see register_map.Kind); the caller reports samples to this model by ``sample()``.
 Formats: words are 32 bits as software sees them, unsigned; ``values`` holds the integers.
 """
 
@@ -31,12 +31,12 @@ def to_word(value: int) -> int:
 
 
 def from_word(word: int) -> int:
-    """32 bits as the signed integer that the range is compared with."""
+    """32 bits as a signed integer, for the range check."""
     return word - (1 << 32) if word >> 31 else word
 
 
 class RegisterFile:
-    """The map with what its registers hold; generics and version as the core was built.
+    """The register map with its values; generics and version of the core as built.
 
     ``generics``: {"adc_bits": ..., "position_bits": ..., "carrier_half": ..., "clock_hz": ...}.
     """
@@ -45,7 +45,7 @@ class RegisterFile:
         self.map = registers()
         self.at = {register.address: register for register in self.map.values()}
         if set(generics) != set(GENERICS):
-            raise ValueError(f"generics are {', '.join(sorted(generics))}: wanted {', '.join(GENERICS)}")
+            raise ValueError(f"generics are {', '.join(sorted(generics))}: expected {', '.join(GENERICS)}")
         self._constant = {**generics, "identification": self.map["identification"].reset, "version": version}
         self.status: dict[str, int] = {
             field.name: 0
@@ -60,7 +60,7 @@ class RegisterFile:
         self.values = {r.name: r.reset for r in self.map.values() if r.kind.writable}
 
     def write(self, address: int, word: int, strobe: int = ALL_STROBES) -> int:
-        """A write on the bus; returns the answer.  A refused one changes nothing."""
+        """A write on the bus; returns the response.  A refused write changes nothing."""
         register = self._at(address)
         if register is None:
             return DECERR
@@ -73,26 +73,26 @@ class RegisterFile:
         return OKAY
 
     def read(self, address: int) -> tuple[int, int]:
-        """A read on the bus: (answer, word); the word of a refused one is zero."""
+        """A read on the bus: (response, word); the word of a refused read is zero."""
         register = self._at(address)
         if register is None:
             return DECERR, 0
         return OKAY, self._word(register)
 
     def clock(self) -> None:
-        """A clock has passed since the last write: pulses fall back."""
+        """One clock after the last write: pulses return to zero."""
         self._fall(Kind.PULSE)
 
     def sample(self) -> None:
-        """A sample was taken: the pulses that waited for it fall back."""
+        """A sample was taken: the pulses that waited for it return to zero."""
         self._fall(Kind.SAMPLE_PULSE)
 
     def settings(self) -> Registers:
-        """The core's registers as the core's model takes them."""
+        """The core's registers as a Registers tuple for fluxproof.step."""
         return Registers(*(self.values[name] for name in Registers._fields))
 
     def _at(self, address: int) -> Register | None:
-        """The register at a byte address of the window; None where none stands."""
+        """The register at a byte address of the window; None if the address is free."""
         return self.at.get(address % (1 << ADDRESS_BITS))
 
     def _fall(self, kind: Kind) -> None:

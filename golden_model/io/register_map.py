@@ -1,17 +1,17 @@
-"""Where software finds the core: one fixed address for every register, command and status value.
+"""The register map for software: one fixed address for every register, command and status value.
 
-A register of the core gets its address by one line in ``SETTINGS``; without one, ``registers()`` says so.
-An address once given stays: adding a register never moves another, and a removed one leaves its place empty.
-Formats, ranges and meanings are those of the blocks' ports; nothing is declared a second time here.
+The address of a register is one entry in ``_SETTINGS``; ``registers()`` raises an error for a register without one.
+Addresses never change: a new register does not move others, and the address of a removed one stays free.
+Formats, ranges and meanings come from the ports of the blocks; nothing is declared a second time here.
 
-Words of 32 bits; negative values are sign-extended.  When a write counts (``Kind``):
+Words have 32 bits; negative values are sign-extended.  When a write takes effect (``Kind``):
 
-* SETTING: between two samples, never inside one; the write is answered when it counts.
-* COMMAND, PULSE: at the next clock, samples or not.  A pulse takes a one and falls back by itself.
-* SAMPLE_PULSE: between two samples; falls back when a sample has taken it.
-* STATUS, CONSTANT, GENERIC: read only; a constant is known here, a generic when the core is built.
+* SETTING: between two samples, never during one; the bus response comes when the write takes effect.
+* COMMAND, PULSE: at the next clock.  A pulse is set by a one and returns to zero after one clock.
+* SAMPLE_PULSE: between two samples; returns to zero after the next sample.
+* STATUS, CONSTANT, GENERIC: read only; a constant is fixed here, a generic when the core is built.
 
-From this map scripts/registers writes the SystemRDL, and from that alone everything else.
+scripts/registers writes the SystemRDL from this map, and everything else from the SystemRDL.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ from fluxproof.golden_model.formats import BIT
 from fluxproof.golden_model.io import fault_latch, sample_guard, sample_latch, telemetry
 from fluxproof.golden_model.modulation import gate_generation
 
-ADDRESS_BITS, WORDS = 12, 256  # the slave answers to 4 KiB; registers stand in the first WORDS words
-OKAY, SLVERR, DECERR = 0, 2, 3  # answers of AXI4
+ADDRESS_BITS, WORDS = 12, 256  # the slave decodes 4 KiB; the registers are in the first WORDS words
+OKAY, SLVERR, DECERR = 0, 2, 3  # responses of AXI4
 PATIENCE = fluxproof.SAMPLE_INTERVAL + 16  # clocks that a write waits for the end of a sample
 IDENTIFICATION = int.from_bytes(b"FLUX", "big")
 
@@ -37,7 +37,7 @@ GENERICS = ("adc_bits", "position_bits", "carrier_half", "clock_hz")
 
 
 class Kind(Enum):
-    """What a register is and when a write to it counts."""
+    """The kind of a register, which decides when a write to it takes effect."""
 
     SETTING = "setting"
     COMMAND = "command"
@@ -59,7 +59,7 @@ class Kind(Enum):
 
 @dataclass(frozen=True)
 class Field:
-    """Bits of a word; ``port`` is the core's port behind them, whose name may differ from the field's."""
+    """Bits of a word; ``port`` is the corresponding port of the core, whose name may differ from the field's."""
 
     name: str
     port: Port
@@ -67,13 +67,13 @@ class Field:
 
     @property
     def width(self) -> int:
-        """Bits in the word: a signed number has its sign up to the word's last bit."""
+        """Bits in the word: a signed number is sign-extended to the last bit of the word."""
         return 32 - self.bit if self.port.fmt.signed else self.port.fmt.width
 
 
 @dataclass(frozen=True)
 class Register:
-    """One word of the map; ``reset`` is what it holds after a reset (a constant: always)."""
+    """One word of the map; ``reset`` is its value after a reset (of a constant: always)."""
 
     name: str
     address: int
@@ -137,9 +137,9 @@ _FLAGS = {
     "delta_held": 13,
 }
 
-# Pins of the core: what it takes in each sample or clock that no software could give.
+# Pins of the core: inputs per sample or clock that do not come from software.
 PINS = ("adc_a", "adc_b", "adc_c", "adc_u_dc", "position_code", "trip")
-INTERNAL = ("run_in", "compare_a", "compare_b", "compare_c")  # from one block to another
+INTERNAL = ("run_in", "compare_a", "compare_b", "compare_c")  # between two blocks
 _BESIDE_THE_CORE = {
     p.name: p
     for p in (
@@ -150,7 +150,7 @@ _BESIDE_THE_CORE = {
 
 
 def _table(text: str) -> dict[str, int]:
-    """{name: address} of a table of hexadecimal addresses and names; a name twice is a ValueError."""
+    """{name: address} of a table of hexadecimal addresses and names; ValueError for a duplicate name."""
     words = text.split()
     table = dict(zip(words[1::2], (int(word, 16) for word in words[::2]), strict=True))
     if 2 * len(table) != len(words):
@@ -162,13 +162,13 @@ SETTINGS, STATUS = _table(_SETTINGS), _table(_STATUS)
 
 
 def inputs() -> dict[str, Port]:
-    """What the core takes in beside its registers and pins, by the name that software uses."""
+    """The inputs of the core that are neither registers nor pins, by the name for software."""
     ports = (*sample_latch.BLOCK.inputs, *gate_generation.BLOCK.inputs, _BESIDE_THE_CORE["telemetry_enable"])
     return {p.name.removesuffix("_in"): p for p in ports if p.name not in PINS + INTERNAL}
 
 
 def observables() -> dict[str, Port]:
-    """What the core and the telemetry show."""
+    """The outputs of the core and the telemetry that can be read as status."""
     clocked = (gate_generation, fault_latch, sample_guard)
     gates = {p.name: p for module in clocked for p in module.BLOCK.outputs}
     return gates | dict(fluxproof.OBSERVED) | _BESIDE_THE_CORE
@@ -189,7 +189,7 @@ def _read_only() -> list[Register]:
         word("position_bits", 0x00C, Kind.GENERIC, "bits of a position code"),
         word("carrier_half", 0x010, Kind.GENERIC, "half a PWM period in clocks"),
         word("clock_hz", 0x014, Kind.GENERIC, "frequency of the clock, Hz"),
-        Register("flags", 0x080, Kind.STATUS, flags, "what the core says about itself, in one word"),
+        Register("flags", 0x080, Kind.STATUS, flags, "status flags of the core, read together"),
         *(
             Register(name, address, Kind.STATUS, (Field(name, shown[name]),), shown[name].doc)
             for name, address in STATUS.items()
@@ -198,13 +198,13 @@ def _read_only() -> list[Register]:
 
 
 def _writable(settings: Mapping[str, Port]) -> list[Register]:
-    """Commands and the core's registers; ValueError where one has no address, or an address no register."""
+    """Commands and the core's registers; ValueError if one has no address, or an address has no register."""
     given = inputs()
     for what, ports, table in (("register", settings, SETTINGS), ("command", given, _COMMANDS)):
         if missing := sorted(set(ports) - set(table)):
             raise ValueError(f"register map: {what} {', '.join(missing)} of the core has no address")
         if unknown := sorted(set(table) - set(ports)):
-            raise ValueError(f"register map: {', '.join(unknown)} has an address, but the core has none such")
+            raise ValueError(f"register map: {', '.join(unknown)} has an address, but is not a port of the core")
     found = [(name, address, kind, given[name]) for name, (address, kind) in _COMMANDS.items()]
     found += [(name, SETTINGS[name], Kind.SETTING, port) for name, port in settings.items()]
     return [
@@ -214,9 +214,9 @@ def _writable(settings: Mapping[str, Port]) -> list[Register]:
 
 
 def registers(settings: Mapping[str, Port] = fluxproof.REGISTERS) -> dict[str, Register]:
-    """The map by name, in the order of the addresses; ValueError says what contradicts itself.
+    """The map by name, in the order of the addresses; ValueError describes a contradiction.
 
-    A register's reset value is zero, or what is legal next to it: no gain, no limit, gates off.
+    The reset value of a register is zero, or the legal value closest to zero: gains zero, gates off.
     """
     ordered = sorted(_read_only() + _writable(settings), key=lambda r: r.address)
     for before, after in zip(ordered, ordered[1:]):
@@ -235,7 +235,7 @@ def registers(settings: Mapping[str, Port] = fluxproof.REGISTERS) -> dict[str, R
 def _check(register: Register) -> None:
     if register.address % 4 or not 0 <= register.address < 4 * WORDS:
         raise ValueError(
-            f"register map: {register.name} at {register.address:#x}: wanted is a multiple of 4 below {4 * WORDS:#x}"
+            f"register map: {register.name} at {register.address:#x}: expected a multiple of 4 below {4 * WORDS:#x}"
         )
     taken = 0
     for f in register.fields:

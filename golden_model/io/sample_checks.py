@@ -1,19 +1,19 @@
-"""What a raw sample says that no healthy drive can say: one bit each, judged anew with every sample.
+"""Plausibility checks of a raw sample, one bit each, evaluated with every sample.
 
     0  overcurrent    |i_x| >= i_trip in any phase
     1  current sum    |i_a + i_b + i_c| >= sum_trip: a sensor is lost, stuck or wrong
-    2  at the rail    a code at its end, in ``rail_samples`` samples one after another
+    2  at the rail    a code at its end in ``rail_samples`` consecutive samples
     3  bus low        u_dc < u_dc_min
     4  bus high       u_dc >= u_dc_max
-    5  position       |code - (2*code' - code'')| >= jump_max: the shaft cannot change its speed that much in a sample
+    5  position       |code - (2*code' - code'')| >= jump_max: more than the shaft can accelerate within a sample
 
-Check 5 sees a jump of the code, and a code that freezes while the shaft turns by ``jump_max`` a sample or more; a
-slower shaft whose code freezes it cannot tell from one at rest.  It waits for three samples after a reset.
-``sample_trip``: any of them that ``fault_ignore`` does not name.
+Check 5 detects a jump of the code, and a code that freezes while the shaft turns by ``jump_max`` per sample or more.  A
+frozen code at lower speed cannot be distinguished from a shaft at rest.  The check starts three samples after a reset.
+``sample_trip``: at least one fault that ``fault_ignore`` does not mask.
 
 Formats: currents and voltage are cut (floor) to U(1,8), |x| is the one's complement where x is negative: a negative
 current trips one LSB (16 bits) later than a positive one, the sum at most 3/256 per unit later or earlier.
-Codes in 1/2**18 turn, their difference is the shorter way round, cut to U(-1,13).  The rail counter stays at its end.
+Codes in 1/2**18 turn; their difference is the shorter angle, floored to U(-1,13).  The rail counter saturates.
 """
 
 from typing import NamedTuple
@@ -27,10 +27,10 @@ from fluxproof.golden_model.kernel import kernel
 JUMP = Format(0, -1, 13)
 SAMPLES = Format(0, 4, 0)
 CHECKS = Format(0, 6, 0)
-IGNORE = Format(0, 7, 0)  # those of fault_latch that are not always to trip
+IGNORE = Format(0, 7, 0)  # the faults of fault_latch that can be ignored
 DROP_LIMIT = PU.frac_bits - LIMIT.frac_bits
 DROP_JUMP = TURN_W - JUMP.frac_bits
-WARM = 2  # samples before the next code can be foretold
+WARM = 2  # samples before the next code can be extrapolated
 SAMPLES_HI = SAMPLES.hi
 
 
@@ -38,7 +38,7 @@ class State(NamedTuple):
     code: int = 0  # of the last sample, in 1/2**18 turn
     expected: int = 0  # of the coming sample, if the speed stays
     seen: int = 0  # samples since the reset, WARM at most
-    railed: int = 0  # samples at the rail one after another, 15 at most
+    railed: int = 0  # consecutive samples at the rail, 15 at most
 
 
 @kernel
@@ -112,11 +112,11 @@ def stimuli(rng, config):
 BLOCK = Block(
     name="sample_checks",
     folder="io",
-    paper="none: what a drive needs besides",
+    paper="none: protection and diagnosis of the drive",
     step=step,
     inputs=tuple(Port(f"i_{x}", PU, doc=f"current, phase {x}") for x in "abc")
     + (
-        Port("current_at_rail", Format(0, 3, 0), doc="bit x: code of phase x at its end"),
+        Port("current_at_rail", Format(0, 3, 0), doc="bit x: ADC code of phase x at either end"),
         Port("u_dc", U_DC, doc="bus voltage"),
         Port("u_dc_at_rail", BIT, doc="bus code at either end"),
         Port("code_theta", Format(0, 0, 16), doc="position code, one mechanical turn"),
@@ -124,15 +124,15 @@ BLOCK = Block(
     registers=(
         Port("i_trip", LIMIT, doc="phase current that trips"),
         Port("sum_trip", LIMIT, doc="sum of the phase currents that trips"),
-        Port("rail_samples", SAMPLES, doc="samples at the rail that trip"),
+        Port("rail_samples", SAMPLES, doc="consecutive samples at the rail that trip"),
         Port("u_dc_min", LIMIT, doc="bus voltage below which it trips"),
         Port("u_dc_max", LIMIT, doc="bus voltage that trips"),
-        Port("jump_max", JUMP, doc="change of the turn a sample that trips"),
-        Port("fault_ignore", IGNORE, doc="bit x: fault x is told and does not trip"),
+        Port("jump_max", JUMP, doc="deviation from the extrapolated position that trips, turns"),
+        Port("fault_ignore", IGNORE, doc="bit x: fault x is reported and does not trip"),
     ),
     outputs=(
-        Port("sample_faults", CHECKS, doc="what is wrong with this sample, see sample_checks"),
-        Port("sample_trip", BIT, doc="any of them trips"),
+        Port("sample_faults", CHECKS, doc="faults of this sample, see sample_checks"),
+        Port("sample_trip", BIT, doc="1: at least one of them trips"),
     ),
     state=State(),
     latency=4,

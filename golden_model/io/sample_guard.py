@@ -1,13 +1,13 @@
-"""Lets raw samples in no closer than the core can work on them, and tells when they stay away; every clock.
+"""Rejects raw samples that come too early, and reports missing ones; runs at every clock.
 
-* A strobe closer than ``INTERVAL`` clocks to the last one that entered is not let in (``sample_busy``): the sample in
-  flight is never disturbed.  It is told (``sample_early``) and counted in ``early_samples``, which stays at its end.
-* ``sample_late`` is up ``watchdog`` clocks after the last sample, or after the reset, until the next one enters; a
-  sample that comes fewer clocks after the last is in time.  ``watchdog`` = 0 is always late: the watchdog is switched
-  off where faults are ignored (fault_latch), never by a number.
+* A strobe less than ``INTERVAL`` clocks after the last accepted one is rejected (``sample_busy``): the sample in flight
+  is never disturbed.  It is reported (``sample_early``) and counted in ``early_samples``, which saturates.
+* ``sample_late`` is 1 from ``watchdog`` clocks after the last sample, or after the reset, until the next one enters; a
+  sample that comes earlier is in time.  ``watchdog`` = 0 is always late: the watchdog is switched off by fault_ignore
+  (fault_latch), never by a number.
 
-No wrap: the age is counted up to ``watchdog`` and no further, so that any new value of it acts at once.
-Formats: clocks.  The age starts anew with the reset.
+The age is counted up to ``watchdog`` only, so that it cannot wrap and a new value takes effect at once.
+Formats: clocks.  The reset clears the age.
 """
 
 from typing import NamedTuple
@@ -20,7 +20,7 @@ from fluxproof.golden_model.kernel import kernel
 AGE = Format(0, 20, 0)
 COUNT = Format(0, 8, 0)
 MOST = COUNT.hi
-AHEAD = 2  # the age enters one register and is judged into another
+AHEAD = 2  # registers from the age to sample_late
 
 
 class State(NamedTuple):
@@ -74,18 +74,18 @@ def stimuli(rng, config):
 BLOCK = Block(
     name="sample_guard",
     folder="io",
-    paper="none: what a drive needs besides",
+    paper="none: protection and diagnosis of the drive",
     step=step,
     inputs=(
-        Port("sample_valid", BIT, doc="the raw sample is there"),
-        Port("clear_trip", BIT, doc="1: forget the early samples"),
+        Port("sample_valid", BIT, doc="1: the raw sample is valid"),
+        Port("clear_trip", BIT, doc="1: clear early_samples"),
     ),
     registers=(Port("watchdog", AGE, doc="longest time without a sample, clocks"),),
     outputs=(
         Port("sample_busy", BIT, doc="1: no sample may enter"),
-        Port("sample_early", BIT, doc="a sample was not let in"),
-        Port("sample_late", BIT, doc="the last sample is older than the watchdog allows"),
-        Port("early_samples", COUNT, doc="samples that were not let in"),
+        Port("sample_early", BIT, doc="1: a sample came too early and was rejected"),
+        Port("sample_late", BIT, doc="1: the last sample is older than watchdog clocks"),
+        Port("early_samples", COUNT, doc="samples rejected because they came too early"),
     ),
     state=State(),
     latency=1,

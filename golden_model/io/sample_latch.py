@@ -1,8 +1,8 @@
-"""Holds one raw sample, the references and the run state, so that nothing moves while it is worked on.
+"""Latches one raw sample, the references and the run state, so that they are constant while it is processed.
 
 Everything that may change at any clock (converter codes, position, references, the gates' running
-state) enters the core here; the blocks behind see constant inputs until the next sample.
-Formats: all as they come; nothing is computed.
+state) enters the core here; the blocks after it have constant inputs until the next sample.
+Formats: unchanged; nothing is computed.
 """
 
 from fluxproof.golden_model.block import Block, Port
@@ -69,14 +69,14 @@ _REFERENCES = {
     "speed_mode": Port("speed_mode", BIT, doc="1: speed control, 0: torque control"),
     "temp_winding": winding_resistance.BLOCK.inputs[0],
     "temp_valid": winding_resistance.BLOCK.inputs[1],
-    "clear_faults": Port("clear_faults", BIT, doc="1: forget what is over"),
+    "clear_faults": Port("clear_faults", BIT, doc="1: clear the flags whose cause is gone"),
     "run": Port("run", BIT, doc="1: the gates are switching"),
 }
 _PORTS = _CODES | _REFERENCES
 
 
 def sized(name):
-    """The format function of a code port, which a generic decides, or None."""
+    """The function config -> Format of a code port, whose width is a generic, or None."""
     width = {
         **current_conditioning.BLOCK.width_from,
         **u_dc_conditioning.BLOCK.width_from,

@@ -3,13 +3,13 @@
     raw(k)      = k_speed * wrap(code(k) - code(k-1))
     omega_me(k) = omega_me(k-1) + k_filter * (raw(k) - omega_me(k-1))
 
-Formats: the difference is the shorter way round, S(-1,18) of a mechanical turn, so speeds up to half
-a turn a sample are told apart.  raw is rounded half up to PU; the filter's state has 12 bits more, so
-that it comes to rest within one PU LSB of its input, and holds half an LSB of PU more, so that its upper
-bits are omega_me rounded.  k_filter = 1 is no filter.
+Formats: the difference is the shorter angle, S(-1,18) of a mechanical turn, so speeds up to half a turn per
+sample are unambiguous.  raw is rounded half up to PU; the filter's state has 12 bits more, so that it settles
+within one PU LSB of its input, and is stored with a bias of half an LSB of PU, so that truncation rounds
+omega_me.  k_filter = 1: no filter.
 The first sample after reset has no predecessor: its difference is zero.
-Saturation: raw saturates at 2 per unit; the state moves from its upper bits towards raw by no more than their
-distance, as k_filter <= 1, keeps what is below them, and so cannot leave its range.
+Saturation: raw saturates at 2 per unit; with k_filter <= 1 the state moves from its upper bits towards raw by at
+most their distance and keeps its lower bits, so it cannot leave its range.
 """
 
 from typing import NamedTuple
@@ -55,12 +55,12 @@ def reference(v, state):
 
 
 def bound(v, _state):
-    """Rounding of raw and of the fed-back output (each weighted by k_filter), of the move, of the output."""
+    """Rounding of raw and of the fed-back output (each weighted by k_filter), of the increment, of the output."""
     return {"omega_me": v["k_filter"] * PU.lsb + INTEGRAL.lsb / 2 + PU.lsb}
 
 
 def stimuli(rng, config):
-    """Standstill, steady turning both ways through the wrap, a reversal, jumps of half a turn."""
+    """Standstill, constant speed in both directions through the wrap, a reversal, jumps of half a turn."""
     size = 1 << config["POSITION_BITS"]
     rows, code = [], 0
     for speed in (0, 1, -1, size // 200, -size // 200, size // 2 - 1, size // 2, size // 2 + 1, 0):
@@ -78,7 +78,7 @@ BLOCK = Block(
     step=step,
     inputs=(Port("code_theta", Format(0, 0, 16), doc="position code, one mechanical turn"),),
     registers=(
-        Port("reverse", BIT, doc="1: code counts against the phase order"),
+        Port("reverse", BIT, doc="1: code counts opposite to the phase order"),
         Port("k_speed", K_SPEED, doc="speed per turn and sample"),
         Port("k_filter", K_FILTER, hi=1 << 16, doc="filter weight of the new sample, 1 = no filter"),
     ),

@@ -1,14 +1,14 @@
-"""An AXI4-Stream packet for every sample: what the core took in, what it answered, and the sample's number.
+"""An AXI4-Stream packet for every sample: inputs of the core, its results, and the sample number.
 
-A packet's words (telemetry_words) are taken from the core's live values, one a clock from TELEMETRY_WORDS_START clocks
-after the sample on, as they were a clock before, into a queue (packet_fifo) that the sink empties at its pace.
+The words of a packet (telemetry_words) are read from the core's live values, delayed by one clock: one word per clock,
+from TELEMETRY_WORDS_START clocks after the sample on, into a queue (packet_fifo) that the sink empties at its rate.
 
-* The controller never waits.  A sample whose packet does not fit into the queue has none: ``dropped`` counts it, up to
-  65535, and the reader sees the gap in the samples' numbers, which run on, modulo 2**32, from 0 after a reset.
-* ``enable`` is looked at before the first word: a packet once begun comes out whole.
-* As in the core a sample that comes less than SAMPLE_INTERVAL clocks after the last one is none; it is not counted.
+* The controller never waits.  If the packet of a sample does not fit into the queue, it is dropped: ``dropped`` counts
+  it, up to 65535, and the reader sees a gap in the sample numbers, which count from 0 after a reset, modulo 2**32.
+* ``enable`` is checked before the first word: a packet that has begun is completed.
+* As in the core, a sample less than SAMPLE_INTERVAL clocks after the last one is ignored and not counted.
 
-Formats: all as they come, see telemetry_words.
+Formats: unchanged, see telemetry_words.
 """
 
 from typing import NamedTuple
@@ -33,7 +33,7 @@ class State(NamedTuple):
     index: int = 0
     dropped: int = 0
     sample: tuple = (0,) * len(INPUTS)
-    shown: tuple = (0,) * len(SHOWN)  # the core's values a clock before
+    shown: tuple = (0,) * len(SHOWN)  # the core's values of the previous clock
     valid_1: int = 0
     word_1: int = 0
     last_1: int = 0
@@ -44,7 +44,7 @@ class State(NamedTuple):
 
 
 def step(state, enable, sample_valid, m_axis_tready, *values):
-    """One clock; ``values``: the raw sample, the core's values in the order of SHOWN, generics behind them."""
+    """One clock; ``values``: the raw sample, the core's values in the order of SHOWN, then the generics."""
     s, depth_bits = state, values[-1]
     raw, shown = values[: len(INPUTS)], values[len(INPUTS) : len(INPUTS) + len(SHOWN)]
 
@@ -82,7 +82,7 @@ def step(state, enable, sample_valid, m_axis_tready, *values):
 
 def stimuli(rng, config):
     """Samples at the shortest distance and too early ones, every value changing at every clock; a slow sink, a fast
-    one, one that stops; switched off and on."""
+    sink, a stalled sink; switched off and on."""
     ports = BLOCK.ports(config)
     rows, wait = [], 0
     for clock in range(6000):
@@ -106,20 +106,20 @@ _RAW = {p.name: p for p in sample_latch.BLOCK.inputs}
 BLOCK = Block(
     name="telemetry",
     folder="io",
-    paper="none: what a recording needs",
+    paper="none: recording of samples",
     step=step,
     inputs=(
         Port("enable", BIT, doc="1: send packets"),
-        Port("sample_valid", BIT, doc="the raw sample below is there"),
-        Port("m_axis_tready", BIT, doc="the sink takes the word"),
+        Port("sample_valid", BIT, doc="1: the raw sample below is valid"),
+        Port("m_axis_tready", BIT, doc="1: the sink accepts the word"),
         *(Port("running" if name == "run_in" else name, p.fmt, doc=p.doc) for name, p in _RAW.items()),
         *(PORTS[name] for name in SHOWN),
     ),
     outputs=(
         Port("m_axis_tdata", WORD, doc="a word of the packet"),
-        Port("m_axis_tvalid", BIT, doc="it is there"),
-        Port("m_axis_tlast", BIT, doc="it is the packet's last"),
-        Port("dropped", DROPPED, doc="samples without a packet for want of room"),
+        Port("m_axis_tvalid", BIT, doc="1: the word is valid"),
+        Port("m_axis_tlast", BIT, doc="1: last word of the packet"),
+        Port("dropped", DROPPED, doc="samples without a packet because the queue was full"),
     ),
     state=State(),
     latency=1,

@@ -1,16 +1,16 @@
-"""The telemetry packet: which field stands where in its words; one word a clock out of the core's live values.
+"""The telemetry packet: the layout of its words; one word per clock, read from the core's live values.
 
-``WORDS`` is the one place that says what a packet holds.  The VHDL twin is generated from it, the reader of a
-capture and ``fluxproof diagnose`` take it from here.  A word holds
+``WORDS`` is the only definition of the packet.  The VHDL twin is generated from it; the reader of a capture and
+``fluxproof diagnose`` import it.  A word contains
 
 * one field, extended to 32 bits by its sign or with zeros, or
 * two of at most 16 bits, each extended to 16, the first in the low half, or
-* several, one behind the other from bit 0 on, zeros above (a signed one has its sign in its own top bit).
+* several, packed from bit 0 on, zeros above (a signed one has its sign in its own top bit).
 
-No packet is copied before it is sent: the values of a sample stay until the next one's replace them, and the packet
-takes each between the two (``window``), the core's as they were a clock before: they come from all over the chip and
-go through a register first.  The order of the words and ``START`` follow from that; a latency that no longer fits
-ends the import with the word's name.
+The packet is not copied before it is sent: the values of a sample stay until those of the next one replace them, and
+each word is read in between (``window``).  The core's values are delayed by one clock, because they pass a register on
+their way across the chip.  The order of the words and ``START`` follow from that; if a changed latency no longer fits,
+the import fails with the name of the word.
 """
 
 from typing import NamedTuple
@@ -57,7 +57,7 @@ INDEX = Format(0, (COUNT - 1).bit_length(), 0)
 
 
 class Field(NamedTuple):
-    """Where a field stands: ``width`` bits of word ``word`` from bit ``lsb`` on; ``port`` says what they mean."""
+    """The place of a field: ``width`` bits of word ``word`` from bit ``lsb`` on; ``port`` has format and meaning."""
 
     word: int
     lsb: int
@@ -69,7 +69,7 @@ class Field(NamedTuple):
         return bool(self.port.fmt.signed)
 
 
-# A code's port has the width that the generics give it; the packet has room for the widest.
+# The width of a code is a generic; the packet has space for the widest.
 _WIDEST = {"code_theta": Format(0, 0, 18)}
 INPUTS = {
     name: Port(name, _WIDEST.get(port.name, port.fmt), doc=port.doc)
@@ -79,7 +79,7 @@ PORTS = INPUTS | fluxproof.OBSERVED
 
 
 def _layout() -> dict[str, Field]:
-    """{field: Field} of WORDS, in their order; ValueError where a word cannot hold its fields."""
+    """{field: Field} of WORDS, in their order; ValueError if the fields do not fit into their word."""
     layout = {}
     for number, names in enumerate(WORDS):
         widths = [WORD.width if n in (HEADER, COUNTER) else PORTS[n].fmt.width for n in names]
@@ -100,7 +100,7 @@ def _layout() -> dict[str, Field]:
 
 LAYOUT = _layout()
 FIELDS = tuple(name for name in LAYOUT if name not in (HEADER, COUNTER))
-PACKET = tuple(name for name in FIELDS if name not in INPUTS)  # what the core answered
+PACKET = tuple(name for name in FIELDS if name not in INPUTS)  # results of the core
 _MISSING = set(INPUTS) - set(FIELDS)
 if _MISSING:
     raise ValueError(
@@ -109,7 +109,7 @@ if _MISSING:
 
 
 def owner(name: str) -> str:
-    """The instance of the top that makes a field; two Park transforms' outputs have the names of their use."""
+    """The instance of the top that calculates a field; the outputs of two Park transforms are renamed at the top."""
     used = {"u_comp_d": "compensation_dq", "u_comp_q": "compensation_dq"}
     used |= {"d_d": "direction_functions", "d_q": "direction_functions"}
     if name in INPUTS:
@@ -120,10 +120,10 @@ def owner(name: str) -> str:
 
 
 def window(names) -> tuple[int, int]:
-    """(first, last) clock edge since the raw sample's at which all these fields are this sample's.
+    """(first, last) clock edge after the raw sample at which all these fields belong to this sample.
 
-    From the last result on; up to the edge at which the next sample, as close as it may come, reaches the first of
-    their blocks: outputs change behind that edge at the earliest.  What the core answered is taken a clock old.
+    First: the last of the results is valid.  Last: the next sample, at the shortest distance, enters the first of the
+    blocks; outputs change after that edge at the earliest.  Results of the core are read one clock late.
     """
     starts, ends = [], []
     for name in names:
@@ -135,14 +135,14 @@ def window(names) -> tuple[int, int]:
 
 
 def _start() -> int:
-    """The earliest edge for word 0, one edge a word, so that every word lies in its window."""
+    """The earliest edge for word 0, with one word per edge, such that every word is inside its window."""
     windows = [window(names) if names[0] in LAYOUT and names[0] in PORTS else (1, 10**6) for names in WORDS]
     start = max(first - number for number, (first, _) in enumerate(windows))
     for number, (first, last) in enumerate(windows):
         if not first <= start + number <= last:
             raise ValueError(
-                f"telemetry: word {number} ({', '.join(WORDS[number])}) would be taken {start + number} clocks after "
-                f"the sample, its fields are there from {first} to {last}: move the word"
+                f"telemetry: word {number} ({', '.join(WORDS[number])}) would be read {start + number} clocks after "
+                f"the sample, its fields are valid from {first} to {last}: move the word"
             )
     if COUNT > fluxproof.SAMPLE_INTERVAL:
         raise ValueError(f"telemetry: {COUNT} words do not fit between two samples")
@@ -153,7 +153,7 @@ START = _start()
 
 
 def pack(counter: int, values) -> tuple[int, ...]:
-    """The words of one packet; values {field: integer}, more are ignored."""
+    """The words of one packet from {field: integer}; unknown names are ignored."""
     known = {HEADER: HEADER_WORD, COUNTER: counter, **values}
     words = [0] * COUNT
     for name, field in LAYOUT.items():
@@ -162,12 +162,12 @@ def pack(counter: int, values) -> tuple[int, ...]:
 
 
 def step(index, counter, *values):
-    """Word ``index`` of the packet; ``values`` in the order of FIELDS, generics behind them."""
+    """Word ``index`` of the packet; ``values`` in the order of FIELDS, then the generics."""
     return (pack(counter, dict(zip(FIELDS, values, strict=False)))[index],)
 
 
 def stimuli(rng, config):
-    """Every word with all fields at their one end, at the other, and at random."""
+    """Every word with all fields at their minimum, at their maximum, and random."""
     ports = [p for p in BLOCK.ports(config) if p.name != "index"]
     rows = []
     for index in range(COUNT):
@@ -177,7 +177,7 @@ def stimuli(rng, config):
 
 
 def sized(name):
-    """The format function of a code's port, which a generic decides, or None."""
+    """The function config -> Format of a code port, whose width is a generic, or None."""
     return sample_latch.sized(
         dict(zip(INPUTS, (p.name for p in sample_latch.BLOCK.outputs), strict=True))[name]
     )
@@ -187,7 +187,7 @@ BLOCK = Block(
     name="telemetry_words",
     folder="io",
     generated=True,
-    paper="none: what a recording needs",
+    paper="none: recording of samples",
     step=step,
     inputs=(
         Port("index", INDEX, hi=COUNT - 1, doc="which word"),

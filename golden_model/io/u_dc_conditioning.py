@@ -3,9 +3,9 @@
     u_dc  = u_dc_gain * (code_u_dc - u_dc_offset)        not below zero
     u_max = k_u_max * u_dc                               k_u_max = 1/sqrt(3), or less to keep a reserve
 
-Rounding: u_dc half up; u_max floor, so that the circle is never drawn larger than the bus allows.
+Rounding: u_dc half up; u_max floor, so that the circle is never larger than the bus allows.
 Saturation: u_dc at 0 and 2 per unit, u_max at 1 per unit: choose the voltage base so that the bus
-stays below sqrt(3).  ``u_dc_at_rail`` tells that the code was at either end.
+stays below sqrt(3).  ``u_dc_at_rail`` = 1: the code was at either end.
 """
 
 from fluxproof.golden_model.block import Block, Port
@@ -63,7 +63,7 @@ BLOCK = Block(
     registers=(
         Port("u_dc_offset", CODE, doc="code at zero bus voltage, left-aligned"),
         Port("u_dc_gain", GAIN, doc="bus voltage per code"),
-        Port("k_u_max", K_U_MAX, doc="voltage circle over bus voltage"),
+        Port("k_u_max", K_U_MAX, doc="radius of the voltage circle / bus voltage"),
     ),
     outputs=(
         Port("u_dc", U_DC, doc="bus voltage"),

@@ -1,12 +1,12 @@
-"""U_dc as 2**n / m, so that the modulator multiplies where it would divide.
+"""U_dc as 2**n / m, so that the modulator multiplies instead of dividing.
 
     inverse      = 1 / u_dc = m * 2**n * 2**-17            m and n: see common/reciprocal
-    inverse_beta = m_beta * 2**n * 2**-17,  m_beta = m * sqrt(3)/2    what the beta axis needs in the modulator
+    inverse_beta = m_beta * 2**n * 2**-17,  m_beta = m * sqrt(3)/2    for the beta axis of the modulator
 
-Both are made beside the data path and are ready before the modulator asks.
+Both are calculated in parallel to the data path and are ready before the modulator starts.
 Error bound: |inverse * u_dc - 1| <= 2**-17 over the whole range.
-Range: below 1/32 per unit the bus is taken for 1/32 and ``u_dc_low`` is raised: the duties then come
-out smaller than asked, never larger.
+Range: a bus voltage below 1/32 per unit is replaced by 1/32 and ``u_dc_low`` is 1: the duties are then
+too small, never too large.
 Formats: m, m_beta U(0,17); inverse, inverse_beta U(5,17).
 Rounding: m_beta half up; it is below m, so it fits.  The shift by n loses nothing.
 """
@@ -22,7 +22,7 @@ from fluxproof.golden_model.kernel import kernel
 N_MAX = 5
 INVERSE = Format(0, N_MAX, RECIPROCAL.frac_bits)
 INVERSE_W = INVERSE.width
-SHIFT_CLOCKS = (N_MAX + 1) // 2  # two bits a clock
+SHIFT_CLOCKS = (N_MAX + 1) // 2  # two bits per clock
 U_DC_MIN = 1 << (U_DC.frac_bits - N_MAX)
 SQRT3_2 = Const(math.sqrt(3) / 2, Format(0, 0, 17))
 K_SQRT3_2 = SQRT3_2.value

@@ -1,17 +1,17 @@
 """Up-down carrier, six gate signals with dead time, enable and latched trip; one step is one clock.
 
-The carrier counts 0 .. CARRIER_HALF-1 and back, each value once a direction: 2*CARRIER_HALF clocks.
-A leg wants to be high while carrier >= CARRIER_HALF - compare, for 2*compare clocks around the peak.
-Compare values, dead time and minimum pulse are taken over at the valley only, when carrier is 0 again.
+The carrier counts 0 .. CARRIER_HALF-1 and back, each value once per direction: 2*CARRIER_HALF clocks.
+A leg is commanded high while carrier >= CARRIER_HALF - compare, for 2*compare clocks around the peak.
+Compare values, dead time and minimum pulse are updated at the valley only, when the carrier is 0 again.
 
-* Dead time: when a leg changes its mind both gates go off, the other one on ``dead_time`` clocks later; a new
-  setting counts for a dead time that has begun.
+* Dead time: when the command of a leg changes, both gates go off, the other one on ``dead_time`` clocks later; a new
+  setting also applies to a dead time that has begun.
 * ``dead_time`` = 0 or >= ``min_pulse``, or ``min_pulse`` above half a period, contradict each other: the
-  setting is refused (``setting_refused``), the last good one stays, and before the first good one the
+  setting is refused (``setting_refused``) and the last valid one is kept; before the first valid one the
   gates stay off.
-* ``enable`` switches on at the valley, off at once.  ``trip`` switches off at once and is remembered
-  until ``clear_trip`` is given while ``trip`` is gone; ``enable`` is then still needed.
-* ``sample`` marks the middle of the zero vector as the gates show it, one register behind the carrier.
+* ``enable`` switches on at the valley, off at once.  ``trip`` switches off at once and is latched
+  until ``clear_trip`` comes while ``trip`` is 0; then ``enable`` is still needed.
+* ``sample`` marks the middle of the zero vector at the gates, one register after the carrier.
 """
 
 from typing import NamedTuple
@@ -120,7 +120,7 @@ def step(
 
 
 def stimuli(rng, config):
-    """Every duty from 0 to 100 %, dead times and pulses that fit and that do not, trips at every phase."""
+    """Every duty from 0 to 100 %, valid and contradicting dead times and pulses, trips at every phase."""
     half = config["CARRIER_HALF"]
     rows = []
     good = {"dead_time": 3, "min_pulse": 8}
@@ -156,8 +156,8 @@ BLOCK = Block(
     inputs=tuple(Port(f"compare_{k}", COUNT, doc=f"compare value, leg {k}") for k in "abc")
     + (
         Port("enable", BIT, doc="1: gates may switch"),
-        Port("trip", BIT, doc="1: gates off, remembered"),
-        Port("clear_trip", BIT, doc="1: forget the trip"),
+        Port("trip", BIT, doc="1: gates off, latched"),
+        Port("clear_trip", BIT, doc="1: clear the latched trip"),
     ),
     registers=(
         Port("dead_time", CLOCKS, doc="both gates of a leg off, clocks"),
@@ -168,8 +168,8 @@ BLOCK = Block(
         Port("gate_low", LEGS, doc="lower gates, bit 0 is leg a"),
         Port("sample", BIT, doc="middle of the zero vector: take a sample"),
         Port("running", BIT, doc="gates are switching"),
-        Port("tripped", BIT, doc="a trip is remembered"),
-        Port("setting_refused", BIT, doc="dead_time and min_pulse contradict each other"),
+        Port("tripped", BIT, doc="1: a trip is latched"),
+        Port("setting_refused", BIT, doc="1: dead_time and min_pulse contradict each other, refused"),
         Port("min_pulse_used", CLOCKS, doc="minimum pulse in force"),
         Port("carrier", COUNT, doc="carrier, for observation"),
     ),

@@ -1,7 +1,7 @@
 """Duties to compare values of the carrier: compare = duty * CARRIER_HALF, short pulses dropped.
 
 A leg is high for 2*compare clocks in the middle of a period and low for CARRIER_HALF - compare at either
-end.  A high pulse shorter than ``min_pulse`` clocks is left out: compare becomes 0.  A low end shorter
+end.  A high pulse shorter than ``min_pulse`` clocks is dropped: compare becomes 0.  A low end shorter
 than ``min_pulse`` is closed: compare becomes CARRIER_HALF; each end counts alone, because the period
 before or after may be high throughout.
 
@@ -38,7 +38,7 @@ def step(duty_a, duty_b, duty_c, min_pulse, carrier_half):
 
 
 def reference(v, _state):
-    """Without the minimum pulse, which is not an approximation of anything."""
+    """The exact product, without the minimum pulse, which has no real-number counterpart."""
     if v["min_pulse"] > 0:
         return {}
     return {f"compare_{k}": v[f"duty_{k}"] * v["CARRIER_HALF"] for k in "abc"}

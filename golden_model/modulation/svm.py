@@ -7,8 +7,8 @@
 a + b + c = 0, so the zero-sequence voltage -(max + min)/2 of the symmetrical pattern is half the middle
 leg.  Formats: products 33 fraction bits, rounded half up to S(1,17); legs and sum exact; duty rounded half up, then
 clamped to 0..1 (over-modulation).
-Range: the voltage comes below two bus voltages, so x and y need no limit.  voltage_limit grants less than one: k_u_max
-is below 1, and the circle's radius and the inverses are made of the same sample's u_dc.
+Range: the voltage is below two bus voltages, so x and y need no limiter.  voltage_limit allows less than one: k_u_max
+is below 1, and the circle's radius and the inverses come from the same sample's u_dc.
 """
 
 import math
@@ -65,7 +65,7 @@ def bound(_v, _state):
 
 
 def below_two(v):
-    """``v`` with a voltage below two bus voltages, the next smaller where it is not."""
+    """``v`` with the voltage limited to less than two bus voltages."""
     out = dict(v)
     for u, inverse in (("u_alpha", "inverse"), ("u_beta", "inverse_beta")):
         most = ((SCALED.hi << DROP_SCALED) - 1) // max(v[inverse], 1)

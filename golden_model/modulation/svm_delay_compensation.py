@@ -1,8 +1,8 @@
 """Angle at which the voltage will act: theta_out = theta_me + k_delay*omega_me, modulo one turn.
 
 A duty computed from the samples of one period acts during the next, on average 1.5 sample times after
-the sampling instant: k_delay = 1.5*T_s*omega_base/(2*pi) turns.  Turning the angle of the inverse
-Park transform turns the voltage vector.
+the sampling instant: k_delay = 1.5*T_s*omega_base/(2*pi) turns.  Advancing the angle of the inverse
+Park transform rotates the voltage vector.
 
 Formats: product 33 fraction bits, rounded half up to TURN; the sum wraps, it is an angle.
 """
@@ -36,7 +36,7 @@ BLOCK = Block(
     paper="001, section 5.2, SVM delay compensation",
     step=step,
     inputs=(Port("theta_me", TURN, doc="electrical angle"), Port("omega_me", PU, doc="electrical speed")),
-    registers=(Port("k_delay", K_DELAY, doc="turns per unit of speed"),),
+    registers=(Port("k_delay", K_DELAY, doc="angle of the delay in turns, per unit of speed"),),
     outputs=(Port("theta_out", TURN, doc="electrical angle when the voltage acts"),),
     latency=1,
     constants={"DROP": DROP},

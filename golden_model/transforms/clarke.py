@@ -4,8 +4,8 @@
     i_beta  = (i_b - i_c) / sqrt(3)
 
 Formats: sums exact; times 1/3 as S(0,-1,18) and 1/sqrt(3) as S(0,0,17), relative error 4e-6 each;
-rounded half up to PU.  Limit: +-1.375 per unit (VECTOR), so that park need not limit what it turns; the base is
-what the sensor can measure, and currents that sum to zero give no component beyond the largest of them.
+rounded half up to PU.  Limit: +-1.375 per unit (VECTOR), so that park needs no limiter; the base is the
+measuring range of the sensor, and currents that sum to zero give no component beyond the largest of them.
 """
 
 import math

@@ -1,11 +1,11 @@
-"""Turns a flux linkage by the angle whose sine and cosine are given, two multipliers in two clocks.
+"""Rotates a flux linkage by the angle whose sine and cosine are given, with two multipliers in two clocks.
 
     out_x = x*cos_theta - y*sin_theta
     out_y = x*sin_theta + y*cos_theta
 
 Formats: x and y FLUX, the wide port of a multiplier; products exact, 16 fraction bits more; sums rounded half up to
 FLUX.
-Saturation: a flux with both components near 2 per unit turned by 45 degrees reaches 2.83.
+Saturation: a flux with both components near 2 per unit rotated by 45 degrees reaches 2.83.
 """
 
 from fluxproof.golden_model.block import Block, Port
@@ -33,7 +33,7 @@ def bound(_v, _state):
 
 
 def unit_vectors(x, y):
-    """Those of rotate, with fluxes of full length."""
+    """Stimuli of rotate, with fluxes of full magnitude."""
     return rotate.unit_vectors(x, y, FLUX.lo, FLUX.hi)
 
 
@@ -48,8 +48,8 @@ BLOCK = Block(
         *rotate.TRIG_PORTS,
     ),
     outputs=(
-        Port("out_x", FLUX, doc="first component, turned"),
-        Port("out_y", FLUX, doc="second component, turned"),
+        Port("out_x", FLUX, doc="first component, rotated"),
+        Port("out_y", FLUX, doc="second component, rotated"),
     ),
     latency=6,
     interval=3,

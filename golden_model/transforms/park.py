@@ -3,8 +3,8 @@
     i_d =  i_alpha*cos_theta + i_beta*sin_theta
     i_q = -i_alpha*sin_theta + i_beta*cos_theta
 
-Formats, rounding and range: those of rotate.  A rotation forwards of the swapped axes is
-the rotation back.
+Formats, rounding and range: those of rotate.  Rotating the swapped axes forwards
+is the backward rotation.
 """
 
 from dataclasses import replace

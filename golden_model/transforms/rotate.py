@@ -1,11 +1,11 @@
-"""Turns a vector by the angle whose sine and cosine are given, two multipliers in two clocks.
+"""Rotates a vector by the angle whose sine and cosine are given, with two multipliers in two clocks.
 
     out_x = x*cos_theta - y*sin_theta
     out_y = x*sin_theta + y*cos_theta
 
 Formats: x and y PU; products exact, 16 fraction bits more; sums rounded half up to PU.
-Range: currents and voltages come limited to VECTOR, 1.375 per unit, so they are shorter than 1.95, however turned, and
-need no limit behind the adder.
+Range: the components of currents and voltages are limited to VECTOR, 1.375 per unit, so the vector is shorter than
+1.95 at every angle and needs no limiter after the adder.
 """
 
 import math
@@ -35,13 +35,13 @@ def bound(_v, _state):
 
 
 def on_circle(v):
-    """``v`` with a sine and a cosine of one angle: of the angle that the two point to, 0 where they point nowhere."""
+    """``v`` with sine and cosine replaced by those of the angle atan2(sin_theta, cos_theta)."""
     angle = math.atan2(v["sin_theta"], v["cos_theta"])
     return v | {"cos_theta": round(TRIG_ONE * math.cos(angle)), "sin_theta": round(TRIG_ONE * math.sin(angle))}
 
 
 def unit_vectors(x, y, lo=-VECTOR, hi=VECTOR - 1):
-    """Stimuli shared by the rotations: the axes, the diagonals, and vectors of full length, lo to hi."""
+    """Stimuli shared by the rotations: the axes, the diagonals, and vectors of full magnitude, lo to hi."""
 
     def stimuli(_rng, _config):
         rows = []
@@ -70,8 +70,8 @@ BLOCK = Block(
         *TRIG_PORTS,
     ),
     outputs=(
-        Port("out_x", PU, doc="first component, turned"),
-        Port("out_y", PU, doc="second component, turned"),
+        Port("out_x", PU, doc="first component, rotated"),
+        Port("out_y", PU, doc="second component, rotated"),
     ),
     latency=5,
     interval=4,

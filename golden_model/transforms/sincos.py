@@ -1,4 +1,4 @@
-"""Sine and cosine of two angles, one after the other: a quarter-wave table of 1024 entries, all outputs interpolated.
+"""Sine and cosine of two angles, one after the other, from an interpolated quarter-wave table of 1024 entries.
 
     theta = quadrant + (address + 1/2)/4096 + delta          turns, |delta| < 2**-13
     sin   = S + delta*C,  cos = C - delta*S                  S, C from the table at both ends
@@ -80,7 +80,7 @@ def bound(_v, _state):
 
 
 def stimuli(_rng, _config):
-    """Either side of every quadrant and of 64 table borders, the other angle half a turn and a few away."""
+    """Both sides of every quadrant border and of 64 table borders; the second angle is about half a turn away."""
     size = 1 << TURN_W
     return [
         {"theta_me": (k * size // 64 + d) % size, "theta_out": (k * size // 64 + size // 2 - 3 * d) % size}
@@ -90,8 +90,8 @@ def stimuli(_rng, _config):
 
 
 OUT = {"lo": -TRIG_ONE, "hi": TRIG_ONE}
-PASS = 6  # clocks that one angle takes; the second one comes when the first is through
-AHEAD = PASS + 1  # clocks that the first angle's values come before those of the second, which have a register more
+PASS = 6  # clocks for one angle; the second angle enters after the first
+AHEAD = PASS + 1  # clocks from the first angle's values to the second's, which pass one register more
 
 BLOCK = Block(
     name="sincos",

@@ -453,7 +453,7 @@ package fluxproof_pkg is
   constant TORQUE_LATENCY : positive := 7;
   constant TORQUE_DROP : natural := 16;
 
-  -- flux_monitor: none: what a drive needs besides
+  -- flux_monitor: none: protection and diagnosis of the drive
   constant FLUX_MONITOR_LATENCY : positive := 1;
 
   -- current_directions: 000, eq. (6)
@@ -468,7 +468,7 @@ package fluxproof_pkg is
   constant DEAD_TIME_COMPENSATION_LATENCY : positive := 4;
   constant DEAD_TIME_COMPENSATION_DROP : natural := 18;
 
-  -- clean_voltage: 000, eq. (4); 001, eq. (5): the voltage cleaned of the inverter's distortion
+  -- clean_voltage: 000, eq. (4); 001, eq. (5): the voltage without the inverter's distortion
   constant CLEAN_VOLTAGE_LATENCY : positive := 5;
   constant CLEAN_VOLTAGE_DROP : natural := 11;
 
@@ -498,30 +498,30 @@ package fluxproof_pkg is
   constant PSI_ADALINE_TO_FLUX : natural := 11;
   constant PSI_ADALINE_TO_PU : natural := 18;
 
-  -- packet_fifo: none: what a recording needs
+  -- packet_fifo: none: recording of samples
   constant PACKET_FIFO_LATENCY : positive := 1;
 
-  -- telemetry_words: none: what a recording needs
+  -- telemetry_words: none: recording of samples
   constant TELEMETRY_WORDS_LATENCY : positive := 2;
   constant TELEMETRY_WORDS_COUNT : natural := 24;
   constant TELEMETRY_WORDS_START : natural := 41;
   constant TELEMETRY_WORDS_INDEX_W : natural := 5;
 
-  -- telemetry: none: what a recording needs
+  -- telemetry: none: recording of samples
   constant TELEMETRY_LATENCY : positive := 1;
   constant TELEMETRY_AGE_W : natural := 6;
 
-  -- sample_guard: none: what a drive needs besides
+  -- sample_guard: none: protection and diagnosis of the drive
   constant SAMPLE_GUARD_LATENCY : positive := 1;
   constant SAMPLE_GUARD_AHEAD : natural := 2;
 
-  -- sample_checks: none: what a drive needs besides
+  -- sample_checks: none: protection and diagnosis of the drive
   constant SAMPLE_CHECKS_LATENCY : positive := 4;
   constant SAMPLE_CHECKS_DROP_LIMIT : natural := 8;
   constant SAMPLE_CHECKS_DROP_JUMP : natural := 5;
   constant SAMPLE_CHECKS_WARM : natural := 2;
 
-  -- fault_latch: none: what a drive needs besides
+  -- fault_latch: none: protection and diagnosis of the drive
   constant FAULT_LATCH_LATENCY : positive := 1;
   constant FAULT_LATCH_LATE : natural := 6;
   constant FAULT_LATCH_TRIP : natural := 7;

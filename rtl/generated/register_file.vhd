@@ -45,15 +45,15 @@ entity register_file is
     s_axi_rready      : in  std_logic;
     sample_busy       : in  std_logic;  -- a sample is in flight
     enable            : out std_logic;  -- 040 1: gates may switch
-    clear_trip        : out std_logic;  -- 044 1: forget the trip
-    clear_faults_in   : out std_logic;  -- 048 1: forget what is over
+    clear_trip        : out std_logic;  -- 044 1: clear the latched trip
+    clear_faults_in   : out std_logic;  -- 048 1: clear the flags whose cause is gone
     telemetry_enable  : out std_logic;  -- 04c 1: send a packet for each sample
     omega_ref_in      : out signed(17 downto 0);  -- 050 speed reference
     i_d_ref_in        : out signed(17 downto 0);  -- 054 current reference, d axis
     i_q_ext_in        : out signed(17 downto 0);  -- 058 current reference of torque mode, q axis
     speed_mode_in     : out std_logic;  -- 05c 1: speed control, 0: torque control
     temp_winding_in   : out signed(15 downto 0);  -- 060 winding temperature, degrees Celsius
-    temp_valid_in     : out std_logic;  -- 064 1: the temperature is a reading
+    temp_valid_in     : out std_logic;  -- 064 1: temp_winding is valid
     offset_a          : out unsigned(15 downto 0);  -- 100 code at zero current, phase a, left-aligned
     offset_b          : out unsigned(15 downto 0);  -- 104 code at zero current, phase b, left-aligned
     offset_c          : out unsigned(15 downto 0);  -- 108 code at zero current, phase c, left-aligned
@@ -62,14 +62,14 @@ entity register_file is
     gain_c            : out signed(17 downto 0);  -- 114 current per code, phase c
     u_dc_offset       : out unsigned(15 downto 0);  -- 118 code at zero bus voltage, left-aligned
     u_dc_gain         : out signed(17 downto 0);  -- 11c bus voltage per code
-    k_u_max           : out unsigned(16 downto 0);  -- 120 voltage circle over bus voltage
+    k_u_max           : out unsigned(16 downto 0);  -- 120 radius of the voltage circle / bus voltage
     pole_pairs        : out unsigned(5 downto 0);  -- 124 pole pairs
-    reverse           : out std_logic;  -- 128 1: code counts against the phase order
+    reverse           : out std_logic;  -- 128 1: code counts opposite to the phase order
     theta_offset      : out unsigned(17 downto 0);  -- 12c electrical angle at code zero
     k_speed           : out unsigned(23 downto 0);  -- 130 speed per turn and sample
     k_filter          : out unsigned(16 downto 0);  -- 134 filter weight of the new sample, 1 = no filter
-    rail_samples      : out unsigned(3 downto 0);  -- 138 samples at the rail that trip
-    jump_max          : out unsigned(11 downto 0);  -- 13c change of the turn a sample that trips
+    rail_samples      : out unsigned(3 downto 0);  -- 138 consecutive samples at the rail that trip
+    jump_max          : out unsigned(11 downto 0);  -- 13c deviation from the extrapolated position that trips, turns
     speed_kp          : out unsigned(23 downto 0);  -- 140 proportional gain
     speed_ki          : out unsigned(23 downto 0);  -- 144 integral gain times sample time
     i_max             : out signed(17 downto 0);  -- 148 limit of the current reference
@@ -80,11 +80,11 @@ entity register_file is
     l_d               : out unsigned(23 downto 0);  -- 160 inductance, d axis
     l_q               : out unsigned(23 downto 0);  -- 164 inductance, q axis
     lambda_mg         : out signed(17 downto 0);  -- 168 magnet flux linkage
-    k_delay           : out unsigned(16 downto 0);  -- 16c turns per unit of speed
+    k_delay           : out unsigned(16 downto 0);  -- 16c angle of the delay in turns, per unit of speed
     dead_time         : out unsigned(11 downto 0);  -- 170 both gates of a leg off, clocks
     min_pulse         : out unsigned(11 downto 0);  -- 174 shortest pulse of a leg, clocks
     watchdog          : out unsigned(19 downto 0);  -- 178 longest time without a sample, clocks
-    fault_ignore      : out unsigned(6 downto 0);  -- 17c bit x: fault x is told and does not trip
+    fault_ignore      : out unsigned(6 downto 0);  -- 17c bit x: fault x is reported and does not trip
     flux_mode         : out unsigned(1 downto 0);  -- 180 0: eq. (6), 1: eq. (11), 2: eq. (16), 3: eq. (17)
     r_s               : out unsigned(23 downto 0);  -- 184 winding resistance at t_0
     t_s               : out unsigned(16 downto 0);  -- 188 sample time, per unit
@@ -95,39 +95,39 @@ entity register_file is
     flux_kp           : out unsigned(16 downto 0);  -- 19c proportional gain of the compensation
     flux_ki           : out unsigned(16 downto 0);  -- 1a0 integral gain of the compensation times the sample time
     delta_max         : out unsigned(15 downto 0);  -- 1a4 limit of the compensation
-    k_chord           : out unsigned(16 downto 0);  -- 1a8 square of the sample time over 24, per unit
-    tcr               : out unsigned(23 downto 0);  -- 1b0 resistance per kelvin
+    k_chord           : out unsigned(16 downto 0);  -- 1a8 (sample time)**2 / 24, per unit
+    tcr               : out unsigned(23 downto 0);  -- 1b0 change of r_s per kelvin
     t_0               : out signed(15 downto 0);  -- 1b4 temperature of r_s
-    t_min             : out signed(15 downto 0);  -- 1b8 coldest reading that is believed
-    t_max             : out signed(15 downto 0);  -- 1bc hottest reading that is believed
+    t_min             : out signed(15 downto 0);  -- 1b8 lowest valid temperature
+    t_max             : out signed(15 downto 0);  -- 1bc highest valid temperature
     compensate        : out std_logic;  -- 1c0 1: compensate dead time and drops
     k_lp              : out unsigned(19 downto 0);  -- 1c4 weight of a new sample in the low-pass of Fig. 3
     eta_v             : out unsigned(20 downto 0);  -- 1c8 step of the V_dead Adaline, 18*eta
     gamma             : out unsigned(16 downto 0);  -- 1cc proportional part of the compensation
-    zeta              : out unsigned(16 downto 0);  -- 1d0 what the minimisation adds in a sample
-    v_thr             : out unsigned(16 downto 0);  -- 1d4 no minimisation below this leg voltage
+    zeta              : out unsigned(16 downto 0);  -- 1d0 gain of the minimisation per sample
+    v_thr             : out unsigned(16 downto 0);  -- 1d4 no minimisation below this |v_dead|
     v_comp_max        : out unsigned(16 downto 0);  -- 1d8 largest leg voltage that is compensated
-    i_learn           : out unsigned(16 downto 0);  -- 1dc nothing is learnt below this |i_d| + |i_q|
+    i_learn           : out unsigned(16 downto 0);  -- 1dc the V_dead Adaline is held below this |i_d| + |i_q|
     eta_psi           : out unsigned(16 downto 0);  -- 1e0 step of the psi_m Adaline, 2*eta per unit
     omega_psi_min     : out unsigned(16 downto 0);  -- 1e4 psi_m is held below this speed
-    k_ahead           : out unsigned(16 downto 0);  -- 1e8 radians turned in 2.5 samples, per unit of speed
-    k_sign            : out unsigned(23 downto 0);  -- 1ec one over the current from which a direction is full
+    k_ahead           : out unsigned(16 downto 0);  -- 1e8 angle of 2.5 sample times in radians, per unit of speed
+    k_sign            : out unsigned(23 downto 0);  -- 1ec 1 / (current above which a direction is +-1)
     i_trip            : out unsigned(8 downto 0);  -- 1f0 phase current that trips
     sum_trip          : out unsigned(8 downto 0);  -- 1f4 sum of the phase currents that trips
     u_dc_min          : out unsigned(8 downto 0);  -- 1f8 bus voltage below which it trips
     u_dc_max          : out unsigned(8 downto 0);  -- 1fc bus voltage that trips
     running           : in  std_logic;  -- 080 gates are switching
-    tripped           : in  std_logic;  -- 080 a trip is remembered
-    setting_refused   : in  std_logic;  -- 080 dead_time and min_pulse contradict each other
-    current_at_rail   : in  unsigned(2 downto 0);  -- 080 bit x: code of phase x at its end
+    tripped           : in  std_logic;  -- 080 1: a trip is latched
+    setting_refused   : in  std_logic;  -- 080 1: dead_time and min_pulse contradict each other, refused
+    current_at_rail   : in  unsigned(2 downto 0);  -- 080 bit x: ADC code of phase x at either end
     u_dc_at_rail      : in  std_logic;  -- 080 code at either end
     u_dc_low          : in  std_logic;  -- 080 bus below 1/32 per unit
-    speed_limited     : in  std_logic;  -- 080 output at its limit
+    speed_limited     : in  std_logic;  -- 080 1: output at its limit
     v_comp_limited    : in  std_logic;  -- 080 the compensation reached its limit
     psi_held          : in  std_logic;  -- 080 1: psi_m is held
-    temp_lost         : in  std_logic;  -- 080 1: no believable temperature, r is r_s
-    merge_known       : in  std_logic;  -- 080 the flux will be good at the next sample
-    delta_held        : in  std_logic;  -- 080 1: the integrals mean something else
+    temp_lost         : in  std_logic;  -- 080 1: no valid temperature, r = r_s
+    merge_known       : in  std_logic;  -- 080 1: the merged flux is valid at the next sample
+    delta_held        : in  std_logic;  -- 080 1: held, the integrals do not show the flux error
     flux_faults       : in  unsigned(6 downto 0);  -- 084 what has disturbed the flux estimate, see flux_monitor
     min_pulse_used    : in  unsigned(11 downto 0);  -- 088 minimum pulse in force
     omega_me          : in  signed(17 downto 0);  -- 08c electrical speed
@@ -142,12 +142,12 @@ entity register_file is
     lambda_d          : in  signed(17 downto 0);  -- 0b0 flux linkage, d axis
     lambda_q          : in  signed(17 downto 0);  -- 0b4 flux linkage, q axis
     psi_m             : in  signed(17 downto 0);  -- 0b8 flux linkage of the magnets
-    v_dead            : in  signed(17 downto 0);  -- 0bc leg voltage lost and not compensated
+    v_dead            : in  signed(17 downto 0);  -- 0bc leg voltage loss that is not compensated
     v_comp            : in  signed(17 downto 0);  -- 0c0 leg voltage that is compensated
     telemetry_dropped : in  unsigned(15 downto 0);  -- 0c8 samples without a packet, up to 65535
-    fault_flags       : in  unsigned(8 downto 0);  -- 0cc what has happened, see fault_latch
-    first_fault       : in  unsigned(7 downto 0);  -- 0d0 which of them came first
-    early_samples     : in  unsigned(7 downto 0)  -- 0d4 samples that were not let in
+    fault_flags       : in  unsigned(8 downto 0);  -- 0cc faults since the last clear_trip, see fault_latch
+    first_fault       : in  unsigned(7 downto 0);  -- 0d0 faults that tripped first
+    early_samples     : in  unsigned(7 downto 0)  -- 0d4 samples rejected because they came too early
   );
 end entity register_file;
 

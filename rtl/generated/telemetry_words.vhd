@@ -45,15 +45,15 @@ entity telemetry_words is
     psi_m           : in  signed(PU_W - 1 downto 0);  -- flux linkage of the magnets
     run             : in  std_logic;  -- 1: the gates are switching
     speed_mode      : in  std_logic;  -- 1: speed control, 0: torque control
-    temp_valid      : in  std_logic;  -- 1: the temperature is a reading
-    clear_faults    : in  std_logic;  -- 1: forget what is over
-    current_at_rail : in  unsigned(2 downto 0);  -- bit x: code of phase x at its end
-    temp_lost       : in  std_logic;  -- 1: no believable temperature, r is r_s
-    sat_d           : in  signed(1 downto 0);  -- limit that holds the d axis
-    sat_q           : in  signed(1 downto 0);  -- limit that holds the q axis
+    temp_valid      : in  std_logic;  -- 1: temp_winding is valid
+    clear_faults    : in  std_logic;  -- 1: clear the flags whose cause is gone
+    current_at_rail : in  unsigned(2 downto 0);  -- bit x: ADC code of phase x at either end
+    temp_lost       : in  std_logic;  -- 1: no valid temperature, r = r_s
+    sat_d           : in  signed(1 downto 0);  -- active limit, d axis: 1 upper, -1 lower, 0 none
+    sat_q           : in  signed(1 downto 0);  -- active limit, q axis: 1 upper, -1 lower, 0 none
     psi_held        : in  std_logic;  -- 1: psi_m is held
     flux_faults     : in  unsigned(6 downto 0);  -- what has disturbed the flux estimate, see flux_monitor
-    v_dead          : in  signed(V_LEG_W - 1 downto 0);  -- leg voltage lost and not compensated
+    v_dead          : in  signed(V_LEG_W - 1 downto 0);  -- leg voltage loss that is not compensated
     v_comp          : in  signed(V_LEG_W - 1 downto 0);  -- leg voltage that is compensated
     out_valid       : out std_logic;
     word            : out unsigned(31 downto 0)  -- the packet's word
