@@ -125,9 +125,9 @@ foreach name [array names known] {
 }
 
 set files {}
-set part ""
+set project_part ""
 proc do_create_project {options args} {
-  set ::part [dict get $options -part]
+  set ::project_part [dict get $options -part]
 }
 proc do_version {options} {
   return [expr {[dict exists $options -short] ? "2023.2" : "Vivado v2023.2 (64-bit)"}]
@@ -174,13 +174,13 @@ proc do_set_property {options args} {
 }
 proc do_get_property {options property object} {
   set of [dict create get_parts [list SPEED] impl_1 [list PROGRESS STATS.WNS] current_project [list PART]]
-  set kind [expr {$object eq $::part ? "get_parts" : $object}]
+  set kind [expr {$object eq $::project_part ? "get_parts" : $object}]
   if {![dict exists $of $kind] || $property ni [dict get $of $kind]} {
     error "get_property: $object has no property $property"
   }
   # A part's name ends with its speed grade.
-  set speed [regexp -inline {\-\d\w*$} $::part]
-  return [dict get [list PROGRESS 100% STATS.WNS 0.5 PART $::part SPEED $speed] $property]
+  set speed [regexp -inline {\-\d\w*$} $::project_part]
+  return [dict get [list PROGRESS 100% STATS.WNS 0.5 PART $::project_part SPEED $speed] $property]
 }
 proc do_ipx::package_project {options} {
   set ::packaged [dict get $options -root_dir]
