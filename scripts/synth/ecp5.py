@@ -1,4 +1,4 @@
-"""Routed timing on an ECP5 by stock tools: `synth_ecp5`, then nextpnr-ecp5 without a constraint.
+"""Routed timing on an ECP5 by stock tools: `synth_ecp5`, then nextpnr-ecp5 with its defaults, without a constraint.
 
 Xilinx parts have no open place and route with timing in the registries that this project installs from; ECP5 has.
 """

@@ -12,14 +12,15 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from scripts.sources import RTL
-from scripts.synth.yosys import SYNTH, version, yosys
+from scripts.synth.yosys import SYNTH, part_of, version, yosys
 from scripts.verilated import CACHE, VerilatedCore, compiled
 from scripts.verilog import TOP, conversion_key, convert
 
 
 def map_xc7(work: Path, modules: Sequence[str]) -> dict[str, str]:
     """Each of ``modules`` of ``work``/fluxproof.v after mapping, in Verilog without cells."""
-    script = [f"read_verilog {TOP}.v", "design -save converted"]
+    (work / "mapping.v").write_text(part_of((work / f"{TOP}.v").read_text(), modules))
+    script = ["read_verilog mapping.v", "design -save converted"]
     for name in modules:
         script += ["design -load converted", SYNTH.format(family="xc7", top=name) + " -nobram"]
         script += ["write_verilog -noattr netlist.v", "design -reset"]
