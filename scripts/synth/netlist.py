@@ -1,4 +1,4 @@
-"""A netlist that yosys mapped for 7 series (its JSON), as structure.py and levels.py read it."""
+"""A netlist that yosys mapped for 7 series (its JSON), as multipliers.py and levels.py read it."""
 
 from __future__ import annotations
 
