@@ -27,8 +27,8 @@ OUT = BUILD / "synth"
 
 
 def figures(groups: Mapping[str, Count | None], whole: Count) -> dict[str, dict | None]:
-    """The rows of resources.json; null for a row whose blocks are not there."""
-    rows = {name: groups[name].kept() if groups[name] else None for name in ROWS}
+    """The rows of resources.json; null for a row whose blocks are not there, none where ``groups`` is empty."""
+    rows = {name: groups[name].kept() if groups[name] else None for name in ROWS if groups}
     return {**rows, "total": whole.kept()}
 
 
@@ -37,31 +37,37 @@ def count_blocks(design: Design, names: list[str], families: list[str]) -> None:
         print(f"{family}, each alone\n{report.table(design.blocks(names, family))}", flush=True)
 
 
-def report_counts(design: Design, work: Work) -> dict[str, dict]:
+def rows_of(groups: Mapping[str, Count | None], whole: Count) -> dict[str, Count | None]:
+    """The lines of a family's table: groups and their sums where they were counted, the whole."""
+    rows = {name: row for name, row in groups.items() if name != BETWEEN or row != Count()}
+    if groups:
+        total = report.sums(groups)
+        rows |= {"sum": total["sum"], "FOC, SVM, gates": total["foc"]}
+    return {**rows, "total, in one piece": whole}
+
+
+def report_counts(design: Design, work: Work, families: list[str]) -> dict[str, dict]:
     """Prints each family's table, writes resources.json and its like; the figures to keep."""
     counted, to_keep, details = {}, {}, {}
-    for family, future in work.groups.items():
-        groups, whole = future.result(), work.count_of(family)
-        total = report.sums(groups)
-        rows = {
-            **{name: row for name, row in groups.items() if name != BETWEEN or row != Count()},
-            "sum": total["sum"],
-            "total, in one piece": whole,
-            "FOC, SVM, gates: sum": total["foc"],
-        }
-        if family == STRUCTURE_FAMILY:
-            rows["the same in one piece"] = work.plain.result()
+    for family in families:
+        groups = work.groups[family].result() if family in work.groups else {}
+        whole = work.count_of(family)
+        rows = rows_of(groups, whole)
         print(f"\n{family}\n{report.table(rows)}", flush=True)
         if family == STRUCTURE_FAMILY:
             print("\n".join(report.against_targets(groups)), flush=True)
         latches = [name for name, row in rows.items() if row and row.latches]
         if latches:
             raise SynthesisFailed(f"{family}: latches in {', '.join(latches)}")
-        counted[family], to_keep[family] = groups, figures(groups, whole)
+        to_keep[family] = figures(groups, whole)
+        if groups:
+            counted[family] = groups
         details[family] = {name: asdict(row) if row else None for name, row in rows.items()}
     write_json(OUT / "resources.json", to_keep)
     write_json(OUT / "details.json", {"top": design.top, "tool": version(), "families": details})
-    print(f"\n{os.path.relpath(report.draw(counted, OUT / 'resources.svg'))}, resources.json, details.json")
+    if counted:
+        report.draw(counted, OUT / "resources.svg")
+    print(f"\nwritten to {os.path.relpath(OUT)}: resources.json, details.json{', resources.svg' if counted else ''}")
     small = {name: row.kept() for name, row in work.small.result().items()}
     return {**to_keep, f"{STRUCTURE_FAMILY}, block alone": small}
 
@@ -133,7 +139,7 @@ def main() -> int:
         families = arguments.family or list(FAMILIES)
         with started(design, families, parts, range(1, arguments.seeds + 1)) as work:
             if "counts" in parts:
-                status = check_counts(report_counts(design, work), arguments.update)
+                status = check_counts(report_counts(design, work, families), arguments.update)
             if "structure" in parts:
                 report_structure(work)
             if "ecp5" in parts:

@@ -14,7 +14,8 @@ from pathlib import Path
 
 from scripts.files import ROOT
 from scripts.synth import ecp5
-from scripts.synth.yosys import Design, SynthesisFailed
+from scripts.synth.count import Count
+from scripts.synth.yosys import GROUPED, Design, SynthesisFailed
 
 PARTS = ("counts", "structure", "ecp5", "netlist")
 STRUCTURE_FAMILY = "xc7"
@@ -44,7 +45,6 @@ class Work:
         self.whole: dict[str, Future] = {}
         self.groups: dict[str, Future] = {}
         self.small: Future | None = None
-        self.plain: Future | None = None
         self.netlist: Future | None = None
         self.structure: Future | None = None
         # The longest first, so that the cores finish at about the same time.
@@ -57,14 +57,12 @@ class Work:
         if "ecp5" in parts:
             self.seeds = [pool.submit(_route, mapped, folder, seed) for seed in seeds]
         if "counts" in parts:
-            self.groups = {family: pool.submit(design.groups, family) for family in families}
+            self.groups = {family: pool.submit(design.groups, family) for family in families if family in GROUPED}
             alone = [f for f in families if f != STRUCTURE_FAMILY or self.structure is None]
             self.whole = {family: pool.submit(design.whole, family) for family in alone}
             self.small = pool.submit(design.blocks, SMALL, STRUCTURE_FAMILY)
-            if STRUCTURE_FAMILY in families:
-                self.plain = pool.submit(design.plain_foc, STRUCTURE_FAMILY)
 
-    def count_of(self, family: str):
+    def count_of(self, family: str) -> Count:
         """The whole core's count; for the family of the structure it comes with the netlist."""
         return self.whole[family].result() if family in self.whole else self.structure.result()[0]
 

@@ -1,4 +1,4 @@
-"""Running yosys on the converted core: a block, the groups, the whole, plain field-oriented control."""
+"""Running yosys on the converted core: a block, the groups, the whole."""
 
 from __future__ import annotations
 
@@ -13,11 +13,12 @@ from pathlib import Path
 
 from scripts.sources import RTL, rtl_sources
 from scripts.synth.count import Count, count, read_cells
-from scripts.synth.groups import BETWEEN, CORE, GROUPS, OUTSIDE, PLAIN_FOC, check, instances, top_of
+from scripts.synth.groups import BETWEEN, CORE, GROUPS, OUTSIDE, check, instances, top_of
 from scripts.synth.netlist import Netlist, marks, read
 from scripts.verilog import synthesize
 
 FAMILIES = ("xc7", "xc6v", "xcup")
+GROUPED = ("xc7", "xcup")  # counted by group too; Yosys maps xc6v cell for cell like xc7
 # Out of context: no pads, no clock buffer.  The rest as yosys' users have it, peers' figures included.
 SYNTH = "synth_xilinx -family {family} -noiopad -noclkbuf -flatten -top {top}"
 NO_OUTPUT = "(no output)"
@@ -196,18 +197,3 @@ class Design:
         if left:
             raise SynthesisFailed(f"modules in no group: {sorted(left)}")
         return result
-
-    def plain_foc(self, family: str) -> Count:
-        """A check of the sum: the core without the other groups, what they would say being inputs."""
-        core = CORE if self.top == CORE else self.module(CORE)
-        removed = [label for group in GROUPS if group not in PLAIN_FOC for label in GROUPS[group]]
-        script = [
-            f"hierarchy -top {core}",
-            "proc",
-            "delete " + " ".join(f"{core}/c:{label}" for label in removed),
-            f"setundef -undriven -expose {core}",
-            SYNTH.format(family=family, top=core),
-            "tee -q -o stat.json stat -json",
-        ]
-        (cells,) = self._run(f"{family}: without estimators", script, ["stat.json"])
-        return count(cells[core])
