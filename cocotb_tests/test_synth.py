@@ -9,6 +9,7 @@ import pytest
 from scripts import verilog
 from scripts.sources import RTL
 from scripts.synth import ecp5, kept, report
+from scripts.synth.__main__ import figures, rows_of
 from scripts.synth.count import Count, count, read_cells
 from scripts.synth.groups import CORE, GROUPS, check, instances
 from scripts.synth.parts import SMALL
@@ -178,6 +179,15 @@ def test_sums_and_targets():
     groups["io_svm"] = Count(lut=1001, dsp=14)
     assert [line.rsplit(": ", 1)[1] for line in report.against_targets(groups)][:2] == ["missed by 1"] * 2
     assert "not there" in report.table(groups)
+
+
+def test_a_family_without_groups_has_its_total_only():
+    assert figures({}, Count(lut=7)) == {"total": {"lut": 7, "ff": 0, "dsp": 0, "bram": 0}}
+    assert list(rows_of({}, Count(lut=7))) == ["total, in one piece"]
+    groups = {name: Count(lut=1) for name in GROUPS} | {"registers_telemetry": None, "between_blocks": Count()}
+    assert figures(groups, Count())["registers_telemetry"] is None and len(figures(groups, Count())) == len(GROUPS) + 2
+    rows = rows_of(groups, Count(lut=9))
+    assert (rows["FOC, SVM, gates"].lut, rows["sum"].lut) == (2, len(GROUPS)) and "between_blocks" not in rows
 
 
 # The routed path
