@@ -15,7 +15,7 @@ from pathlib import Path
 from scripts.synth.yosys import run, yosys
 
 # The package is named because the default one has fewer pins than the AXI top has port bits.
-DEVICE = ("--85k", "--package", "CABGA756", "--speed", "6")
+DEVICE = ("--85k", "--package", "CABGA756", "--speed", "6", "--out-of-context")
 SEEDS = (1, 2, 3)
 
 
