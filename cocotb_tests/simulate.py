@@ -33,9 +33,14 @@ def run(
     ``rtl`` may be another tree (a mutant's), ``extra`` files beside it (a test's own top).  Raises BuildError with
     GHDL's words where the VHDL does not build.
     """
-    sources = [*sorted(rtl.rglob("*.vhd")), *extra]
     folder = run_folder(toplevel, generics, rtl, key)
-    (folder / "results.xml").unlink(missing_ok=True)
+    build(toplevel, folder, rtl, extra)
+    return execute(toplevel, module, generics, environment, folder)
+
+
+def build(toplevel: str, folder: Path, rtl: Path = RTL, extra=()) -> None:
+    """Analyse and elaborate in ``folder``, for any generics; BuildError with GHDL's words where it does not build."""
+    sources = [*sorted(rtl.rglob("*.vhd")), *extra]
     runner = get_runner("ghdl")
     try:
         runner.build(
@@ -50,9 +55,15 @@ def run(
         words = (folder / "build.log").read_text().splitlines() if (folder / "build.log").exists() else []
         told = [line for line in words if "error" in line or ".vhd:" in line] or words
         raise BuildError(f"{toplevel} does not build: " + "\n".join(told[-12:] or [str(error)])) from error
+
+
+def execute(toplevel: str, module: str, generics: dict, environment: dict, folder: Path) -> Path:
+    """Simulate what ``build`` has left in ``folder`` with these generics; returns ``folder``, see failure()."""
+    (folder / "results.xml").unlink(missing_ok=True)
     # GHDL's warnings about metavalues at time zero say nothing; the bench checks for metavalues itself.
     command = dict(
         hdl_toplevel=toplevel,
+        hdl_toplevel_lang="vhdl",
         test_module=module,
         parameters=generics,
         build_dir=folder,
@@ -64,7 +75,7 @@ def run(
         results_xml=str(folder / "results.xml"),
     )
     with contextlib.suppress(SystemExit):  # how the runner says that a test failed: the caller asks failure()
-        runner.test(**command)
+        get_runner("ghdl").test(**command)
     return folder
 
 
