@@ -5,13 +5,18 @@
 // for each port of the top, and defines CORE_CLOCK, the name of its clock, and CORE_SHOWS_VALIDS where it has
 // duty_valid and values_valid.  Functions name a port by its line number, from 0.
 //
+// Where it defines CORE_RESTING_CLOCK, the top has that second clock and CORE_RESTING_INPUTS (scripts/idle_clock.py), and
+// state.inc has a line STATE(name) for each variable that tells whether the part behind this clock has changed.
+//
 // A tick is one rising edge of the clock: inputs set before it are seen by it, outputs read after it are what the
 // registers hold from this edge on.
 
 #include <cstdint>
+#include <cstring>
 #include <memory>
 
 #include "Vcore.h"
+#include "Vcore___024root.h"
 #include "verilated.h"
 
 namespace {
@@ -53,6 +58,7 @@ struct Core {
     VerilatedContext context;
     Vcore top{&context, "core"};
     int64_t clock = 0;       // ticks since construction
+    int64_t rested = 0;      // those without the resting part
     uint8_t reported = 0;    // gate word that the last run_period ended with
     const Port ports[sizeof(
 #define PORT(name, width, is_signed) "x"
@@ -71,12 +77,59 @@ struct Core {
 
     ~Core() { top.final(); }
 
+#ifdef CORE_RESTING_CLOCK
+    // A tick of the resting part that changed nothing would change nothing again while its inputs stay.
+    struct State {
+#define STATE(name) decltype(Vcore___024root::name) name;
+#include "state.inc"
+#undef STATE
+    };
+    State before;
+    bool changing = true;      // at its last tick, or an input of the top was set since
+    uint64_t inputs_then = 0;  // CORE_RESTING_INPUTS before its last tick
+
+    void keep() {
+#define STATE(name) std::memcpy(&before.name, &top.rootp->name, sizeof(before.name));
+#include "state.inc"
+#undef STATE
+    }
+
+    bool has_changed() const {
+#define STATE(name) if (std::memcmp(&before.name, &top.rootp->name, sizeof(before.name)) != 0) return true;
+#include "state.inc"
+#undef STATE
+        return false;
+    }
+
+    void tick() {
+        const uint64_t inputs = top.CORE_RESTING_INPUTS;
+        const bool needed = changing || inputs != inputs_then;
+        if (needed) keep();
+        rested += !needed;
+        inputs_then = inputs;
+        top.CORE_CLOCK = 1;
+        top.CORE_RESTING_CLOCK = needed;
+        top.eval();
+        if (needed) changing = has_changed();
+        top.CORE_CLOCK = top.CORE_RESTING_CLOCK = 0;
+        top.eval();
+        ++clock;
+    }
+#else
+    bool changing = true;  // read by none
+
     void tick() {
         top.CORE_CLOCK = 1;
         top.eval();
         top.CORE_CLOCK = 0;
         top.eval();
         ++clock;
+    }
+#endif
+
+    void set(int port, int64_t value) {
+        ports[port].set(value);
+        changing = true;
     }
 
     // Bits 0..2: upper gates of legs a, b, c; bits 3..5: lower gates.
@@ -93,7 +146,9 @@ void core_delete(Core* core) { delete core; }
 
 int64_t core_clock(const Core* core) { return core->clock; }
 
-void core_set(Core* core, int port, int64_t value) { core->ports[port].set(value); }
+int64_t core_rested(const Core* core) { return core->rested; }
+
+void core_set(Core* core, int port, int64_t value) { core->set(port, value); }
 
 int64_t core_get(const Core* core, int port) { return core->ports[port].get(); }
 
@@ -145,7 +200,11 @@ int64_t core_run_period(Core* core, int64_t most, int64_t sample_at, int32_t* cl
     facts[1] = facts[2] = 0;
     while (k < most) {
         ++k;
-        top.sample_valid = k == sample_at;
+        const bool strobe = k == sample_at;
+        if (top.sample_valid != strobe) {
+            top.sample_valid = strobe;
+            core->changing = true;
+        }
         core->tick();
         look(k);
 #ifdef CORE_SHOWS_VALIDS
@@ -154,6 +213,7 @@ int64_t core_run_period(Core* core, int64_t most, int64_t sample_at, int32_t* cl
 #endif
         if (top.sample_trigger) break;
     }
+    if (top.sample_valid) core->changing = true;
     top.sample_valid = 0;
     facts[0] = found;
     return k;

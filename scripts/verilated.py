@@ -27,6 +27,7 @@ from pathlib import Path
 
 import numpy as np
 
+from scripts import idle_clock
 from scripts.sources import ROOT, RTL
 from scripts.verilog import TOP, VerilogPort, conversion_key, convert, top_ports
 
@@ -42,8 +43,9 @@ DEFINES = ["VERILATOR=1", "VL_IGNORE_UNKNOWN_ARCH"]
 DEFINES += [f"VM_{x}=0" for x in "COVERAGE SC TIMING TRACE TRACE_FST TRACE_VCD TRACE_SAIF".split()]
 COMPILE = ["-std=gnu++17", "-fPIC", "-fno-semantic-interposition", "-w", *(f"-D{name}" for name in DEFINES)]
 # What runs every clock; what fills the tables, once; the run-time library, which has a little of both.
-# Measured: -O3 is no faster; -O0 for the library costs a third; more than -O0 for the tables only takes time.
-HOT, SLOW, LIBRARY_LEVEL = "-O2", "-O0", "-O1"
+# Measured: -O2 and -O3 are no faster and take twice as long; -O0 for the library costs a third; more than -O0 for the
+# tables only takes time.
+HOT, SLOW, LIBRARY_LEVEL = "-O1", "-O0", "-O1"
 
 
 class BuildError(RuntimeError):
@@ -96,48 +98,79 @@ def _clock(names: Iterable[str]) -> str:
     return "clk" if "clk" in names else "aclk"
 
 
-def compile_library(folder: Path, top: str, ports: tuple[VerilogPort, ...]) -> None:
-    """Turns ``folder``/``top``.v into ``folder``/libcore.so."""
+def compile_library(folder: Path, top: str, ports: tuple[VerilogPort, ...], rests: bool = True) -> None:
+    """Turns ``folder``/``top``.v into ``folder``/libcore.so; ``rests`` as in ``build``."""
     verilator, _, root = find_verilator()
-    compiler = _compiler()
+    compiler, source = _compiler(), folder / f"{top}.v"
     defines = _defines([p.name for p in ports])
+    verilog = idle_clock.split(source.read_text(), top) if rests else None
+    if verilog:
+        source.write_text(verilog)
+        defines += [f"-DCORE_RESTING_CLOCK={idle_clock.RESTING}", f"-DCORE_RESTING_INPUTS={idle_clock.WATCHED}"]
     (folder / "ports.inc").write_text("".join(f"PORT({p.name}, {p.width}, {int(p.signed)})\n" for p in ports))
     _run([verilator, *VERILATOR_FLAGS, "--Mdir", "obj", "--prefix", "Vcore", "--top-module", top, f"{top}.v"], folder)
+    if verilog:
+        variables = idle_clock.state((folder / "obj" / "Vcore___024root.h").read_text(), verilog, top)
+        (folder / "state.inc").write_text("".join(f"STATE({name})\n" for name in variables))
     model = sorted(folder.glob("obj/*.cpp"))
     parts = {
-        HOT: [WRAPPER, *(path for path in model if "Slow" not in path.name)],
-        SLOW: [path for path in model if "Slow" in path.name],
-        LIBRARY_LEVEL: [root / "include" / name for name in ("verilated.cpp", "verilated_threads.cpp")],
+        ("hot", HOT): [WRAPPER, *(path for path in model if "Slow" not in path.name)],
+        ("slow", SLOW): [path for path in model if "Slow" in path.name],
     }
     headers = (folder, folder / "obj", root / "include", root / "include" / "vltstd")
     includes = [f"-I{path}" for path in headers]
     objects = []
-    for level, sources in parts.items():
-        # A folder each: the compiler names an object after its source, and two are called verilated.cpp.
-        (folder / level).mkdir()
-        _run([compiler, *COMPILE, *defines, level, *includes, "-c", *map(str, sources)], folder / level)
-        objects += sorted(str(path) for path in (folder / level).glob("*.o"))
-    # The hot objects stay first: of an inline function compiled in several, the linker keeps the first.
-    _run([compiler, "-shared", "-pthread", "-o", LIBRARY, *objects], folder)
+    # The hot object stays first: of an inline function compiled in several, the linker keeps the first.
+    for (name, level), sources in parts.items():  # each one text for the compiler, which reads the headers once
+        (folder / f"{name}.cpp").write_text("".join(f'#include "{path}"\n' for path in sources))
+        _run([compiler, *COMPILE, *defines, level, *includes, "-c", f"{name}.cpp"], folder)
+        objects.append(f"{name}.o")
+    _run([compiler, "-shared", "-pthread", "-o", LIBRARY, *objects, *runtime_objects()], folder)
 
 
-def build(generics: Mapping[str, int], rtl: Path = RTL, top: str = TOP) -> Path:
-    """The folder with libcore.so and ``top``.v for these generics, made if it is not there yet."""
+def runtime_objects() -> list[str]:
+    """Verilator's run-time library, compiled once for all cores."""
+    include = find_verilator()[2] / "include"
+    names = ("verilated", "verilated_threads")
+    key = repr((find_verilator()[1], _compiler(), COMPILE, LIBRARY_LEVEL)).encode()
+    folder = CACHE / f"runtime-{hashlib.sha256(key).hexdigest()[:16]}"
+    with locked(folder.with_suffix(".lock")):
+        if not folder.exists():
+            with tempfile.TemporaryDirectory(prefix=f"{folder.name}.", dir=CACHE) as scratch:
+                work = Path(scratch) / "finished"
+                work.mkdir()
+                flags = [*COMPILE, LIBRARY_LEVEL, f"-I{include}", f"-I{include / 'vltstd'}"]
+                _run([_compiler(), *flags, "-c", *(str(include / f"{name}.cpp") for name in names)], work)
+                os.replace(work, folder)
+    return [str(folder / f"{name}.o") for name in names]
+
+
+def build(generics: Mapping[str, int], rtl: Path = RTL, top: str = TOP, rests: bool = True) -> Path:
+    """The folder with libcore.so and ``top``.v for these generics, made if it is not there yet.
+
+    ``rests``: clocks that cannot change what works on a sample are not computed for it (scripts/idle_clock.py).
+    """
     verilog = convert(generics, ROOT / "build" / "verilog" / conversion_key(generics, rtl, top), rtl, top)
     # The text, not the VHDL, is what gets compiled: someone may be editing the VHDL just now.
-    return compiled(verilog.read_bytes(), rtl, top)
+    return compiled(verilog.read_bytes(), rtl, top, rests=rests)
 
 
 def compiled(
-    text: bytes, rtl: Path, top: str, key: object = None, change: Callable[[Path], None] = lambda work: None
+    text: bytes,
+    rtl: Path,
+    top: str,
+    key: object = None,
+    change: Callable[[Path], None] = lambda work: None,
+    rests: bool = True,
 ) -> Path:
     """The folder with libcore.so and ``top``.v, which holds ``text``, made if it is not there yet.
 
     change(work): puts what is to be compiled in its place in work/top.v; key: all that this depends on.
     Processes that want the same one wait for the first; a folder appears under its name only when complete.
     """
-    tools = (find_verilator()[1], _compiler(), VERILATOR_FLAGS, COMPILE, HOT, SLOW, LIBRARY_LEVEL, key)
-    folder = CACHE / hashlib.sha256(repr(tools).encode() + WRAPPER.read_bytes() + text).hexdigest()[:16]
+    tools = (find_verilator()[1], _compiler(), VERILATOR_FLAGS, COMPILE, HOT, SLOW, LIBRARY_LEVEL, key, rests)
+    sources = b"".join(path.read_bytes() for path in (WRAPPER, Path(idle_clock.__file__)))
+    folder = CACHE / hashlib.sha256(repr(tools).encode() + sources + text).hexdigest()[:16]
     if folder.exists():
         return folder
     with locked(folder.with_suffix(".lock")):
@@ -147,7 +180,7 @@ def compiled(
                 (work / f"{top}.v").write_bytes(text)
                 ports = top_ports(work / f"{top}.v", rtl, top)
                 change(work)
-                compile_library(work, top, ports)
+                compile_library(work, top, ports, rests)
                 finished = work / "finished"
                 finished.mkdir()
                 os.replace(work / LIBRARY, finished / LIBRARY)
@@ -164,6 +197,7 @@ _FUNCTIONS = {  # name: (result, arguments), as in verilated.cpp
     "core_new": (_CORE, []),
     "core_delete": (None, [_CORE]),
     "core_clock": (_LONG, [_CORE]),
+    "core_rested": (_LONG, [_CORE]),
     "core_set": (None, [_CORE, _INT, _LONG]),
     "core_get": (_LONG, [_CORE, _INT]),
     "core_eval": (None, [_CORE]),
@@ -219,6 +253,11 @@ class VerilatedCore:
     def clock(self) -> int:
         """Ticks since the core was made."""
         return self._library.core_clock(self._handle)
+
+    @property
+    def rested(self) -> int:
+        """How many of the ticks what works on a sample was left out of (scripts/idle_clock.py)."""
+        return self._library.core_rested(self._handle)
 
     @property
     def gate_word(self) -> int:

@@ -1,15 +1,16 @@
-"""The key experiments of paper 001 through the VHDL in GHDL, every bit compared with the golden model beside it."""
+"""The key experiments through the core, every bit compared with the golden model beside it.
+
+In Verilator the RTL, converted to Verilog, runs all of each; the VHDL itself runs the first periods in GHDL.
+"""
 
 from __future__ import annotations
 
 import dataclasses
-import json
-from types import SimpleNamespace
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
-from cocotb_tests import simulate
 from golden_model import drive as drives
 from golden_model.registers import RegisterSet, registers
 from golden_model.units import from_si
@@ -28,14 +29,17 @@ from scripts.papers.flux_bench import (
     trace,
     window,
 )
+from scripts.rtl_runs import ClosedLoop, InGhdl, InVerilator, Named
 from scripts.scenarios import RPM, scenario
 
 OF_VSI = ("inverter",)  # runs that belong to paper 000
-RTL_CARRIER = 1000  # clocks in half a PWM period: GHDL pays by the clock
+# Clocks in half a PWM period: a run takes its time by the clock, in GHDL a thousand times that in Verilator.
+RTL_CARRIER, GHDL_CARRIER = 1000, 100
+GHDL_PERIODS = 125
 
 
 class RtlRun(NamedTuple):
-    """A key experiment for the VHDL: shorter, on the same plant, with the golden model beside it."""
+    """A key experiment for the core: shorter, on the same plant, with the golden model beside it."""
 
     title: str
     scenario: Scenario
@@ -78,42 +82,49 @@ def runs(drive) -> dict[str, RtlRun]:
     }
 
 
-def in_ghdl(name: str) -> tuple[str, Experiment]:
-    """One key experiment through the VHDL: (its name, what it found)."""
-    drive = drives.with_carrier(DRIVE, RTL_CARRIER)
+def rtl_run(name: str, carrier_half: int, periods: int | None = None) -> ClosedLoop:
+    """A key experiment, or its first ``periods``, as scripts/rtl_runs.py carries it out."""
+    drive = drives.with_carrier(DRIVE, carrier_half)
     run = runs(drive)[name]
-    environment = {
-        "FLUXPROOF_CARRIER_HALF": str(RTL_CARRIER),
-        "FLUXPROOF_EXPERIMENT": name,
-    }
-    generics = {key.upper(): value for key, value in run.registers.config._asdict().items()}
-    folder = simulate.run_folder("fluxproof", generics, key=f"papers-{name}")
-    for file in ("result.npz", "summary.json"):  # nothing old may pass for new
-        (folder / file).unlink(missing_ok=True)
-    simulate.run("fluxproof", "cocotb_tests.dut_papers", generics, environment, key=f"papers-{name}")
-    problem = simulate.failure(folder)
-    title = f"In the VHDL: {run.title}"
-    if problem and not (folder / "summary.json").exists():
-        return name, Experiment(title, [Finding(title, None, problem.partition("\n")[0], "", False)])
-    summary, arrays = json.loads((folder / "summary.json").read_text()), np.load(folder / "result.npz")
-    part = {
-        kind: {k[len(kind) + 1 :]: arrays[k] for k in arrays if k.startswith(kind)}
-        for kind in ("observed", "plant")
-    }
-    view = trace(SimpleNamespace(**part), run.scenario, drive)
-    equal = summary["differences"] == 0
-    found = [
-        Finding(
-            f"{title}: periods compared with the golden model",
-            None,
-            summary["periods_compared"],
-            "periods",
-            True,
-        ),
-        Finding(f"{title}: differences", None, summary["differences"], "bits or edges", equal),
-        Finding(f"{title}: raw sample to duties", None, summary["sample_to_duty_clocks"], "clocks", True),
-    ]
-    if run.end:
-        left = mean_error(view, window(*run.end))
-        found.append(Finding(f"{title}: steady error", 0.0, left, "% of lambda_n", left < 0.2))
-    return name, Experiment(title, found, {"estimate": view})
+    return ClosedLoop(drive, run.registers, run.scenario.first(periods), run.machine, run.end is not None)
+
+
+class KeyExperiment:
+    """A key experiment in both engines and what it found."""
+
+    def __init__(self, name: str):
+        function = f"{__name__}:rtl_run"
+        self.name = name
+        self.rtl = runs(drives.with_carrier(DRIVE, RTL_CARRIER))[name]
+        self.verilator = InVerilator(f"papers {name} in Verilator", Named(function, (name, RTL_CARRIER)))
+        short = Named(function, (name, GHDL_CARRIER, GHDL_PERIODS))
+        self.ghdl = InGhdl(f"papers {name} in GHDL", short)
+
+    def carry_out(self, say: Callable[[str], None] = print) -> None:
+        """Both runs, one after the other; a line of each."""
+        for job in (self.verilator, self.ghdl):
+            job.carry_out()
+            counts = job.summary()
+            found = "{periods_compared:,} periods, {differences:,} differences, {seconds:.0f} s"
+            say(f"{job.name}: {found.format(**counts) if counts else job.problem}")
+
+    def found(self) -> Experiment:
+        """Its findings; where a run came to no end, the one finding that says so."""
+        title = f"In the VHDL: {self.rtl.title}"
+        for job in (self.verilator, self.ghdl):
+            if not job.summary():
+                return Experiment(title, [Finding(f"{title}, {job.name}", None, job.problem, "", False)])
+        compiled, simulated = self.verilator.summary(), self.ghdl.summary()
+        differences = compiled["differences"] + simulated["differences"]
+        view = trace(self.verilator.result(), self.rtl.scenario, drives.with_carrier(DRIVE, RTL_CARRIER))
+        clocks = compiled["sample_to_duty_clocks"]
+        found = [
+            Finding(f"{title}: periods compared with the golden model", None, compiled["periods_compared"], "periods", True),
+            Finding(f"{title}: differences", None, differences, "bits or edges", differences == 0),
+            Finding(f"{title}: raw sample to duties", None, clocks, "clocks", clocks == simulated["sample_to_duty_clocks"]),
+        ]
+        if self.rtl.end:
+            left = mean_error(view, window(*self.rtl.end))
+            found.append(Finding(f"{title}: steady error", 0.0, left, "% of lambda_n", left < 0.2))
+        engines = f"{compiled['periods_compared']:,} periods in Verilator, {simulated['periods_compared']:,} in GHDL"
+        return Experiment(f"{title} ({engines})", found, {"estimate": view})
