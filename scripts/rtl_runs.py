@@ -190,8 +190,8 @@ class InVerilator(Job):
         (self.folder / "run.log").write_text(done.stdout + done.stderr)
         if done.returncode == 0:
             return None
-        last = [*done.stderr.splitlines(), "it failed without a word"]
-        return next(line for line in reversed(last[-2:]) if line)
+        lines = [line for line in done.stderr.splitlines() if line.strip()]
+        return f"{lines[-1] if lines else 'it failed'}; see {os.path.relpath(self.folder, ROOT)}/run.log"
 
 
 class InGhdl(Job):
