@@ -6,7 +6,6 @@ import base64
 import io
 import re
 from collections import namedtuple
-from types import SimpleNamespace
 
 import numpy as np
 import pytest

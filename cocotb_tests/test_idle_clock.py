@@ -1,4 +1,4 @@
-"""Clocks left out for the part that rests: every port at every clock is as without that, whatever is done to the core."""
+"""Clocks left out for the part that rests: every port at every clock is the same, whatever is done to the core."""
 
 from __future__ import annotations
 
@@ -76,12 +76,14 @@ def test_what_the_resting_part_sees(source):
     text = idle_clock.split(source, "fluxproof")
     watched = text.split(f"assign {idle_clock.WATCHED} = {{")[1].split("}")[0].split(", ")
     assert watched == ["gates_min_pulse_used", "gates_running", "guard_sample_busy"]
-    assert text.count(f".clk({idle_clock.RESTING})") + len(idle_clock.COUNTING) == source.split(
-        "module fluxproof\n"
-    )[1].count(".clk(clk)")
+    assert text.count(f".clk({idle_clock.RESTING})") + len(idle_clock.COUNTING) == source.split("module fluxproof\n")[
+        1
+    ].count(".clk(clk)")
 
 
-@pytest.mark.parametrize("old, new", [(" guard (", " other ("), ("endmodule\n", "  always @(posedge clk);\nendmodule\n")])
+@pytest.mark.parametrize(
+    "old, new", [(" guard (", " other ("), ("endmodule\n", "  always @(posedge clk);\nendmodule\n")]
+)
 def test_other_tops_stay_whole(source, old, new):
     head, body = source.split("module fluxproof\n")
     assert idle_clock.split(f"{head}module fluxproof\n{body.replace(old, new)}", "fluxproof") is None

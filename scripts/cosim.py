@@ -36,14 +36,10 @@ class Scenario:
     speed_mode: np.ndarray  # 0 or 1
     enable: np.ndarray  # 0 or 1
     brake: np.ndarray | None = None  # [Nm] most that a brake on the shaft can hold, see ``load_torque``
-    changes: Mapping[int, Mapping[str, int]] = field(
-        default_factory=dict
-    )  # period -> registers from there on
+    changes: Mapping[int, Mapping[str, int]] = field(default_factory=dict)  # period -> registers from there on
     omega_m: float = 0.0  # mechanical speed at the start [rad/s]
     clear_faults: np.ndarray | None = None  # 0 or 1; None: never
-    temp_winding: np.ndarray | None = (
-        None  # what the thermocouple says [degC]; NaN: lost; None: there is none
-    )
+    temp_winding: np.ndarray | None = None  # what the thermocouple says [degC]; NaN: lost; None: there is none
 
     def __len__(self) -> int:
         return len(self.load)
@@ -242,9 +238,7 @@ class Beside:
 class PlantPeriods:
     """A scenario's plant period by period: its sensors' codes for the core, gate edges back."""
 
-    def __init__(
-        self, drive, scenario: Scenario, sensors: Sensors | None = None, machine: Machine | None = None
-    ):
+    def __init__(self, drive, scenario: Scenario, sensors: Sensors | None = None, machine: Machine | None = None):
         self.scenario, self.period_s = scenario, 1.0 / drive.inverter.pwm_frequency_hz
         self.plant, described = build_plant(drive, sensors, machine, scenario.omega_m)
         self.codes, self.slow_inputs, self.rows = sensor_params(described), scenario.slow_inputs(), []

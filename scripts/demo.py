@@ -27,13 +27,13 @@ DEMO, DRIVES = BUILD / "demo", ROOT / "docs" / "drives"
 PAPER, EMRAX = DRIVES / "paper001.toml", DRIVES / "emrax228.toml"
 # Clocks in half a PWM period.  GHDL needs a thousand times as long for a clock as Verilator, and the recording has no
 # clock of its own: one sample in 200 clocks leaves the core idle for the time that it works.
-GHDL_CARRIER, REPLAY_CARRIER = 250, 100
-GHDL_PERIODS, GHDL_ROWS = 300, 300
+GHDL_CARRIER, REPLAY_CARRIER = 100, 100
+GHDL_PERIODS, GHDL_ROWS = 250, 200
 LEAST_PERIODS, LEAST_GHDL_PERIODS = 3000, 150
 
 
 class Lane(threading.Thread):
-    """Steps one after the other on one of the two cores; a run whose step has begun but shows no period is building."""
+    """Steps one after the other, beside those of the other lanes."""
 
     def __init__(self, *steps: Callable[[], object]):
         super().__init__(daemon=True)
@@ -181,6 +181,7 @@ def main(argv: list[str] | None = None) -> int:
     compiled, simulated = ([getattr(r, engine).carry_out for r in runs] for engine in ("verilator", "ghdl"))
     # Each lane compiles one half of what both need, while the other does the other half.
     lanes = [Lane(kernels("golden"), *compiled), Lane(kernels("plant"), InGhdl.analyse, *simulated)]
+    lanes += [Lane(replay.verilator.build)] if replay else []  # fills the cores while a lane waits
     watch(lanes, jobs)
     problems = [f"{job.name}: {job.problem}" for job in jobs if job.problem]
     sys.stderr.writelines(f"{problem}\n" for problem in problems)

@@ -20,7 +20,8 @@ _CONNECTION = re.compile(r"\.(\w+)\((.*?)\)(?:,\n|$)", re.DOTALL)
 _ASSIGN = re.compile(r"^  assign (\w+) = (.*?);", re.MULTILINE | re.DOTALL)
 _NAME = re.compile(r"[A-Za-z_]\w*")
 _VARIABLE = re.compile(
-    r"^\s+(?:VL_(?:IN|OUT)\w*\((\w+),|[CSIQ]Data/\*[\d:]+\*/ (\w+);|Vl(?:Unpacked|Wide)<.*> (?:/\*.*\*/ )?(\w+);)", re.MULTILINE
+    r"^\s+(?:VL_(?:IN|OUT)\w*\((\w+),|[CSIQ]Data/\*[\d:]+\*/ (\w+);|Vl(?:Unpacked|Wide)<.*> (?:/\*.*\*/ )?(\w+);)",
+    re.MULTILINE,
 )
 _EVENTS = ("__Vstl", "__Vico", "__Vact", "__Vnba", "__Vtrig")
 
@@ -99,6 +100,8 @@ def state(root: str, verilog: str, top: str) -> list[str]:
     body = {name: body for name, _, body in _MODULE.findall(verilog)}[top]
     assigned = dict(_ASSIGN.findall(body))
     own = tuple(f"{top}__DOT__{instance}__DOT__" for instance in COUNTING)
-    shown = {port for port in assigned if any(n.startswith(f"{i}_") for n in _sources({port}, assigned) for i in COUNTING)}
+    shown = {
+        port for port in assigned if any(n.startswith(f"{i}_") for n in _sources({port}, assigned) for i in COUNTING)
+    }
     names = ["".join(found) for found in _VARIABLE.findall(root)]
     return [name for name in names if not name.startswith((*own, *_EVENTS)) and name not in {"clk", RESTING, *shown}]

@@ -21,7 +21,8 @@ from scripts.scenarios import RPM
 
 TEMPLATES = Path(__file__).resolve().parent / "templates"
 SHOWN = (*("u_max", "u_alpha", "u_beta"), *("i_a", "i_b", "i_c"), *("duty_a", "duty_b", "duty_c"))
-LOGGED = "{differences:,} differences, currents within {current_error_a:.2f} A of the log, formats allow {current_bound_a:.2f} A"
+LOGGED = "{differences:,} differences, currents within {current_error_a:.2f} A of the log"
+LOGGED += ", formats allow {current_bound_a:.2f} A"
 LEG_A = 0b001001  # its two gates in a gate word
 SETTLED = 100  # samples before the next event (10 ms) that count as settled
 
@@ -169,10 +170,12 @@ def text(summary: dict, drive: Drive) -> str:
     s, rec, ns = summary, summary["recording"], summary["sample_to_duty_clocks"] / drive.core.clock_hz * 1e9
     ratio = f"{2 * s['carrier_half_clocks']:,} clocks a period"
     recording = "skipped: {skipped}" if "skipped" in rec else f"{{samples_compared:,}} samples, {LOGGED}"
-    return f"""Fig. 9: {s["periods_compared"]:,} periods of {ratio} in Verilator, the first {s["ghdl_periods"]:,} in GHDL too: \
+    return f"""Fig. 9: {s["periods_compared"]:,} periods of {ratio} in Verilator, the first \
+{s["ghdl_periods"]:,} in GHDL too: \
 {_count(s["differences"])} in {s["gate_edges"]:,} gate edges and all values
 control: duties {ns:.0f} ns after the sample, {s["speed_error_rpm"]["before_load_step"]:.1f} rpm off at 732 rpm, \
-{s["speed_dip_rpm"]:.0f} rpm dip under load, peak current {s["peak_current_a"]:.2f} A, dead time {s["shortest_dead_time_us"]:g} µs
+{s["speed_dip_rpm"]:.0f} rpm dip under load, peak current {s["peak_current_a"]:.2f} A, \
+dead time {s["shortest_dead_time_us"]:g} µs
 EMRAX 228 recording: {recording.format(**rec)}"""
 
 
@@ -194,5 +197,7 @@ def write(path: Path, figures: dict, summary: dict, **context) -> Path:
     environment = jinja2.Environment(loader=loader, autoescape=True, trim_blocks=True)
     svg = {name: plots.image(figure, "svg", metadata={"Date": None}) for name, figure in figures.items()}
     images = {name: base64.b64encode(data).decode() for name, data in svg.items()}
-    context |= dict(values=len(Observed._fields), summary=summary, verdict=verdict(summary), sections=described(context["real"]))
+    context |= dict(
+        values=len(Observed._fields), summary=summary, verdict=verdict(summary), sections=described(context["real"])
+    )
     return write_text(path, environment.get_template("report.html").render(images=images, **context))

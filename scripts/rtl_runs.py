@@ -184,9 +184,17 @@ class Job:
 class InVerilator(Job):
     """The RTL converted to Verilog and compiled."""
 
-    def work(self) -> str | None:
+    def build(self) -> None:
+        """Convert and compile ahead of the run; what does not build is reported by the run."""
+        self.start()
+
+    def start(self, *arguments: str) -> subprocess.CompletedProcess:
+        """This module in another process, on the same run."""
         command = [sys.executable, "-m", __spec__.name, self.named.function, json.dumps(self.named.arguments)]
-        done = subprocess.run([*command, str(self.folder)], cwd=ROOT, capture_output=True, text=True)
+        return subprocess.run([*command, *arguments], cwd=ROOT, capture_output=True, text=True)
+
+    def work(self) -> str | None:
+        done = self.start(str(self.folder))
         (self.folder / "run.log").write_text(done.stdout + done.stderr)
         if done.returncode == 0:
             return None
@@ -238,16 +246,18 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument("function", help="package.module:function that makes the run; or golden or plant")
     parser.add_argument("arguments", nargs="?", type=json.loads, help="its arguments, a JSON array")
-    parser.add_argument("folder", nargs="?", type=Path, help="where the result goes")
+    parser.add_argument("folder", nargs="?", type=Path, help="where the result goes; without: build only")
     options = parser.parse_args()
-    if options.folder is None:
+    if options.arguments is None:
         compile_kernels(options.function)
         return
     from scripts.verilated_device import VerilatedDevice
 
-    options.folder.mkdir(parents=True, exist_ok=True)
     run = Named(options.function, tuple(options.arguments)).make()
-    run_now(carry_out(run, VerilatedDevice(run.config), options.folder))
+    device = VerilatedDevice(run.config)
+    if options.folder:
+        options.folder.mkdir(parents=True, exist_ok=True)
+        run_now(carry_out(run, device, options.folder))
 
 
 if __name__ == "__main__":

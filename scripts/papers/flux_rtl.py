@@ -45,9 +45,7 @@ class RtlRun(NamedTuple):
     scenario: Scenario
     registers: RegisterSet
     machine: Machine | None
-    end: (
-        tuple[float, float] | None
-    )  # where the error must have settled [s]; None: the inverter has its dead time
+    end: tuple[float, float] | None  # where the error must have settled [s]; None: the inverter has its dead time
 
 
 def runs(drive) -> dict[str, RtlRun]:
@@ -57,12 +55,9 @@ def runs(drive) -> dict[str, RtlRun]:
     wrong = scaled(own, dict.fromkeys(MAGNETIC, 1.3))
     ramp = np.interp(np.arange(2600), [0, 500, 1700, 2600], [200, 200, -200, -200])
     reversal = scenario(drive, 0.26, rpm={0.0: 0.0}, load={0.0: 2.0}, start_rpm=200)
-    reversal.omega_ref[:] = [
-        from_si("omega_ref", rpm * RPM * drive.machine.pole_pairs, drive) for rpm in ramp
-    ]
+    reversal.omega_ref[:] = [from_si("omega_ref", rpm * RPM * drive.machine.pole_pairs, drive) for rpm in ramp]
     changes = {
-        t: {n: round(getattr(own.values, n) * f) for n in ("l_q", "lambda_mg")}
-        for t, f in ((0.05, 1.3), (0.15, 0.7))
+        t: {n: round(getattr(own.values, n) * f) for n in ("l_q", "lambda_mg")} for t, f in ((0.05, 1.3), (0.15, 0.7))
     }
     steps = scenario(drive, 0.25, rpm={0.0: 183}, load={0.0: 3.05}, changes=changes, start_rpm=183)
     loaded = scenario(drive, 0.25, rpm={0.0: 239}, load={0.08: TORQUE_N}, start_rpm=239)
@@ -72,13 +67,9 @@ def runs(drive) -> dict[str, RtlRun]:
     dead = dataclasses.replace(dead, temp_winding=np.linspace(20.0, 60.0, len(dead)))
     return {
         "fig_4": RtlRun("Fig. 4: 239 rpm, torque step, x 1.3", loaded, wrong, None, (0.23, 0.25)),
-        "figs_13_15": RtlRun(
-            "Figs. 13, 15: L_q and lambda_mg x 1.3, then x 0.7", steps, own, None, (0.23, 0.25)
-        ),
+        "figs_13_15": RtlRun("Figs. 13, 15: L_q and lambda_mg x 1.3, then x 0.7", steps, own, None, (0.23, 0.25)),
         "inverter": RtlRun("V_dead, psi_m, R(T): compensation off, on, off", dead, learning, None, None),
-        "reversal": RtlRun(
-            "A motor that saturates, through zero", reversal, own, saturating_machine(), (0.24, 0.26)
-        ),
+        "reversal": RtlRun("A motor that saturates, through zero", reversal, own, saturating_machine(), (0.24, 0.26)),
     }
 
 
@@ -119,9 +110,13 @@ class KeyExperiment:
         view = trace(self.verilator.result(), self.rtl.scenario, drives.with_carrier(DRIVE, RTL_CARRIER))
         clocks = compiled["sample_to_duty_clocks"]
         found = [
-            Finding(f"{title}: periods compared with the golden model", None, compiled["periods_compared"], "periods", True),
+            Finding(
+                f"{title}: periods compared with the golden model", None, compiled["periods_compared"], "periods", True
+            ),
             Finding(f"{title}: differences", None, differences, "bits or edges", differences == 0),
-            Finding(f"{title}: raw sample to duties", None, clocks, "clocks", clocks == simulated["sample_to_duty_clocks"]),
+            Finding(
+                f"{title}: raw sample to duties", None, clocks, "clocks", clocks == simulated["sample_to_duty_clocks"]
+            ),
         ]
         if self.rtl.end:
             left = mean_error(view, window(*self.rtl.end))
