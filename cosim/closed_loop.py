@@ -8,7 +8,7 @@ edge is compared with ``==``.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, replace
 from typing import Protocol
 
 import numpy as np
@@ -47,6 +47,13 @@ class Scenario:
 
     def __len__(self) -> int:
         return len(self.load)
+
+    def first(self, periods: int | None) -> Scenario:
+        """The scenario's first ``periods``; None: all of it."""
+        if periods is None:
+            return self
+        columns = {f.name: getattr(self, f.name) for f in fields(self)}
+        return replace(self, **{k: v[:periods] for k, v in columns.items() if isinstance(v, np.ndarray)})
 
     def slow_inputs(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """(temperature, whether it is valid, clear_faults) as inputs of the core."""
@@ -232,6 +239,35 @@ class Beside:
         return self.result
 
 
+class PlantPeriods:
+    """A scenario's plant period by period: its sensors' codes for the core, gate edges back."""
+
+    def __init__(self, drive, scenario: Scenario, sensors: Sensors | None = None, machine: Machine | None = None):
+        self.scenario, self.period_s = scenario, 1.0 / drive.inverter.pwm_frequency_hz
+        self.plant, described = build_plant(drive, sensors, machine, scenario.omega_m)
+        self.codes, self.slow_inputs, self.rows = sensor_params(described), scenario.slow_inputs(), []
+
+    def inputs(self, k: int) -> dict[str, int]:
+        """The raw sample's ports at the start of period ``k``; the plant's signals are recorded."""
+        plant, codes, scenario = self.plant, self.codes, self.scenario
+        self.rows.append([read(plant) for read in PLANT_SIGNALS.values()])
+        values = (
+            *(current_code(codes, n, plant.i_abc[n], k) for n in range(3)),
+            u_dc_code(codes, float(scenario.u_dc[k]), k),
+            position_code(codes, plant.theta_m, k),
+            *(scenario.omega_ref[k], scenario.i_d_ref[k], scenario.i_q_ext[k], scenario.speed_mode[k]),
+            *(column[k] for column in self.slow_inputs),
+        )
+        return dict(zip(INPUT_PORTS, map(int, values), strict=True))
+
+    def advance(self, k: int, times: np.ndarray, words: np.ndarray) -> None:
+        """Period ``k`` with these gate words from these times [s] on."""
+        scenario, plant = self.scenario, self.plant
+        brake = 0.0 if scenario.brake is None else scenario.brake[k]
+        load = load_torque(float(scenario.load[k]), float(brake), plant.omega_m)
+        plant.advance(times, words, float(scenario.u_dc[k]), load, self.period_s)
+
+
 async def cosimulate(
     device: Device,
     drive,
@@ -247,35 +283,21 @@ async def cosimulate(
     ``ideal_inverter``: the plant follows the compare values in force, as if its inverter had no dead time; the
     gates are still compared edge by edge.
     """
-    period_s = 1.0 / drive.inverter.pwm_frequency_hz
-    plant, described = build_plant(drive, sensors, machine, scenario.omega_m)
-    duties = np.zeros(3)
-    codes, plant_rows, slow_inputs = sensor_params(described), [], scenario.slow_inputs()
+    plant, duties = PlantPeriods(drive, scenario, sensors, machine), np.zeros(3)
     beside = Beside(device, register_set)
     await beside.start(int(scenario.enable[0]))
     for k in range(len(scenario)):
         if k in scenario.changes:
             beside.change(scenario.changes[k])
-        plant_rows.append([read(plant) for read in PLANT_SIGNALS.values()])
-        values = (
-            *(current_code(codes, n, plant.i_abc[n], k) for n in range(3)),
-            u_dc_code(codes, float(scenario.u_dc[k]), k),
-            position_code(codes, plant.theta_m, k),
-            *(scenario.omega_ref[k], scenario.i_d_ref[k], scenario.i_q_ext[k], scenario.speed_mode[k]),
-            *(column[k] for column in slow_inputs),
-        )
-        inputs = dict(zip(INPUT_PORTS, map(int, values), strict=True))
-        got = await beside.period(inputs, int(scenario.enable[k]))
-        times, words = got.edge_clocks * (period_s / got.clocks), got.gate_words
+        got = await beside.period(plant.inputs(k), int(scenario.enable[k]))
+        times, words = got.edge_clocks * (plant.period_s / got.clocks), got.gate_words
         if ideal_inverter:
-            times, words = centred_gates(duties, 0.0, period_s)
+            times, words = centred_gates(duties, 0.0, plant.period_s)
             duties = np.array(beside.observed[-1][-3:]) / beside.config.carrier_half
-        brake = 0.0 if scenario.brake is None else scenario.brake[k]
-        load = load_torque(float(scenario.load[k]), float(brake), plant.omega_m)
-        plant.advance(times, words, float(scenario.u_dc[k]), load, period_s)
+        plant.advance(k, times, words)
         progress(k + 1, len(scenario))
     result = beside.finish()
-    result.plant = dict(zip(PLANT_SIGNALS, np.array(plant_rows).T, strict=True))
+    result.plant = dict(zip(PLANT_SIGNALS, np.array(plant.rows).T, strict=True))
     return result
 
 

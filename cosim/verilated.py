@@ -42,8 +42,9 @@ DEFINES = ["VERILATOR=1", "VL_IGNORE_UNKNOWN_ARCH"]
 DEFINES += [f"VM_{x}=0" for x in "COVERAGE SC TIMING TRACE TRACE_FST TRACE_VCD TRACE_SAIF".split()]
 COMPILE = ["-std=gnu++17", "-fPIC", "-fno-semantic-interposition", "-w", *(f"-D{name}" for name in DEFINES)]
 # What runs every clock; what fills the tables, once; the run-time library, which has a little of both.
-# Measured: -O3 is no faster; -O0 for the library costs a third; more than -O0 for the tables only takes time.
-HOT, SLOW, LIBRARY_LEVEL = "-O2", "-O0", "-O1"
+# Measured: -O2 and -O3 are no faster and take twice as long; -O0 for the library costs a third; more than -O0 for the
+# tables only takes time.
+HOT, SLOW, LIBRARY_LEVEL = "-O1", "-O0", "-O1"
 
 
 class BuildError(RuntimeError):
@@ -105,20 +106,35 @@ def compile_library(folder: Path, top: str, ports: tuple[VerilogPort, ...]) -> N
     _run([verilator, *VERILATOR_FLAGS, "--Mdir", "obj", "--prefix", "Vcore", "--top-module", top, f"{top}.v"], folder)
     model = sorted(folder.glob("obj/*.cpp"))
     parts = {
-        HOT: [WRAPPER, *(path for path in model if "Slow" not in path.name)],
-        SLOW: [path for path in model if "Slow" in path.name],
-        LIBRARY_LEVEL: [root / "include" / name for name in ("verilated.cpp", "verilated_threads.cpp")],
+        ("hot", HOT): [WRAPPER, *(path for path in model if "Slow" not in path.name)],
+        ("slow", SLOW): [path for path in model if "Slow" in path.name],
     }
     headers = (folder, folder / "obj", root / "include", root / "include" / "vltstd")
     includes = [f"-I{path}" for path in headers]
     objects = []
-    for level, sources in parts.items():
-        # A folder each: the compiler names an object after its source, and two are called verilated.cpp.
-        (folder / level).mkdir()
-        _run([compiler, *COMPILE, *defines, level, *includes, "-c", *map(str, sources)], folder / level)
-        objects += sorted(str(path) for path in (folder / level).glob("*.o"))
-    # The hot objects stay first: of an inline function compiled in several, the linker keeps the first.
-    _run([compiler, "-shared", "-pthread", "-o", LIBRARY, *objects], folder)
+    # The hot object stays first: of an inline function compiled in several, the linker keeps the first.
+    for (name, level), sources in parts.items():  # each one text for the compiler, which reads the headers once
+        (folder / f"{name}.cpp").write_text("".join(f'#include "{path}"\n' for path in sources))
+        _run([compiler, *COMPILE, *defines, level, *includes, "-c", f"{name}.cpp"], folder)
+        objects.append(f"{name}.o")
+    _run([compiler, "-shared", "-pthread", "-o", LIBRARY, *objects, *runtime_objects()], folder)
+
+
+def runtime_objects() -> list[str]:
+    """Verilator's run-time library, compiled once for all cores."""
+    include = find_verilator()[2] / "include"
+    names = ("verilated", "verilated_threads")
+    key = repr((find_verilator()[1], _compiler(), COMPILE, LIBRARY_LEVEL)).encode()
+    folder = CACHE / f"runtime-{hashlib.sha256(key).hexdigest()[:16]}"
+    with locked(folder.with_suffix(".lock")):
+        if not folder.exists():
+            with tempfile.TemporaryDirectory(prefix=f"{folder.name}.", dir=CACHE) as scratch:
+                work = Path(scratch) / "finished"
+                work.mkdir()
+                flags = [*COMPILE, LIBRARY_LEVEL, f"-I{include}", f"-I{include / 'vltstd'}"]
+                _run([_compiler(), *flags, "-c", *(str(include / f"{name}.cpp") for name in names)], work)
+                os.replace(work, folder)
+    return [str(folder / f"{name}.o") for name in names]
 
 
 def build(generics: Mapping[str, int], rtl: Path = RTL, top: str = TOP) -> Path:
@@ -129,7 +145,11 @@ def build(generics: Mapping[str, int], rtl: Path = RTL, top: str = TOP) -> Path:
 
 
 def compiled(
-    text: bytes, rtl: Path, top: str, key: object = None, change: Callable[[Path], None] = lambda work: None
+    text: bytes,
+    rtl: Path,
+    top: str,
+    key: object = None,
+    change: Callable[[Path], None] = lambda work: None,
 ) -> Path:
     """The folder with libcore.so and ``top``.v, which holds ``text``, made if it is not there yet.
 

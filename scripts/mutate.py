@@ -26,7 +26,7 @@ FOLDER = BUILD / "mutate"
 REGISTERS = ["cocotb_tests/blocks/test_registers_axi.py::test_axi_slave_equals_its_twin"]
 TOP = [
     "cocotb_tests/core/test_faults.py::test_tour_in_ghdl",
-    "cocotb_tests/core/test_closed_loop.py::test_everything_at_once",
+    "cocotb_tests/core/test_closed_loop.py::test_every_event_in_ghdl",
 ]
 # File below rtl/, without its folder and suffix -> the tests that notice a defect in it; others: the block's bench.
 TESTS = {

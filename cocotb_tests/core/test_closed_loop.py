@@ -1,46 +1,48 @@
-"""The VHDL in closed loop in GHDL: equal to the golden model at every period; PWM timing on its own gate edges."""
+"""The RTL in closed loop: equal to the golden model at every period; PWM timing on its own gate edges.
+
+The long run is the converted RTL in Verilator; GHDL runs a shorter one on the VHDL itself with the same events.
+"""
 
 from __future__ import annotations
 
-import json
-
 import numpy as np
 
-from fluxproof.checkout import ROOT
-from fluxproof.cosim import ghdl
+from cocotb_tests.support.needs import skip_without_ghdl5
+from fluxproof.checkout import DRIVES
+from fluxproof.cosim.runs import InGhdl, InVerilator, Named
 from fluxproof.golden_model import drive as drives
 from fluxproof.golden_model import fluxproof
-from fluxproof.golden_model.registers import registers
 from studies import timeline
 
-PAPER = ROOT / "docs" / "drives" / "paper001.toml"
+PAPER = DRIVES / "paper001.toml"
 
 
-def close_loop(path, scenario: str, carrier_half: int, key: str = ""):
-    """(summary, arrays, registers, config) of one run; fails with the first difference."""
-    drive = drives.with_carrier(drives.load(path), carrier_half)
-    register_set = registers(drive)
-    config = register_set.config
-    generics = {name.upper(): value for name, value in config._asdict().items()}
-    environment = {
-        "FLUXPROOF_DRIVE": str(path),
-        "FLUXPROOF_CARRIER_HALF": str(carrier_half),
-        "FLUXPROOF_SCENARIO": scenario,
-    }
-    folder = ghdl.run("fluxproof", "fluxproof.cosim.dut_loop", generics, environment, key=f"{scenario}{key}")
-    problem = ghdl.failure(folder)
-    assert problem is None, problem
-    arrays = np.load(folder / "result.npz")
-    return json.loads((folder / "summary.json").read_text()), arrays, register_set
+def close_loop(engine, path, scenario: str, carrier_half: int, key: str = ""):
+    """(summary, arrays, registers) of one run; fails with the first difference."""
+    named = Named("fluxproof.cosim.runs:closed_loop", (str(path), carrier_half, scenario))
+    job = engine(f"test {scenario} {carrier_half}{key}", named)
+    job.carry_out()
+    assert job.problem is None, job.problem
+    return job.summary(), job.arrays(), job.run.registers
 
 
 def test_everything_at_once():
-    """One run of 2,500 periods, looked at from several sides (one test, so that it is simulated once)."""
-    summary, arrays, register_set = close_loop(PAPER, "everything", 128)
+    """One run of 2,500 periods of the converted RTL, looked at from several sides (one test: simulated once)."""
+    skip_without_ghdl5()
+    summary, arrays, register_set = close_loop(InVerilator, PAPER, "everything", 128)
     check_equal_at_every_period(summary, arrays)
     check_sensible_motion(arrays)
     for leg in range(3):
         check_pwm_timing(arrays, register_set, leg)
+
+
+def test_every_event_in_ghdl():
+    """500 periods of the VHDL itself: voltage limit, speed limit, torque mode, reversal, gates off and on."""
+    summary, arrays, _ = close_loop(InGhdl, PAPER, "compressed", 128)
+    assert summary["differences"] == 0 and summary["periods_compared"] == 500
+    assert summary["sample_to_duty_clocks"] == fluxproof.SAMPLE_TO_DUTY
+    assert arrays["observed_sat_q"].any() and arrays["observed_speed_limited"].any()
+    assert set(arrays["gate_edges"][:, 2] == 0) == {True, False}
 
 
 def check_equal_at_every_period(summary, arrays):
@@ -114,7 +116,7 @@ def test_smallest_converters(tmp_path):
     )
     path = tmp_path / "coarse.toml"
     path.write_text(text)
-    summary, _, register_set = close_loop(path, "short", 100, key="coarse")
+    summary, _, register_set = close_loop(InGhdl, path, "short", 100, key=" coarse")
     assert (register_set.config.adc_bits, register_set.config.position_bits) == (12, 12)
     assert summary["differences"] == 0 and summary["periods_compared"] == 300
 

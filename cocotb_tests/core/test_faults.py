@@ -8,8 +8,8 @@ import json
 import numpy as np
 import pytest
 
-from cocotb_tests.core.test_long_loop import ghdl5_missing
 from cocotb_tests.core.test_registers import PAPER, edited, row
+from cocotb_tests.support.needs import ghdl5_missing
 from fluxproof.checkout import ROOT
 from fluxproof.cosim import ghdl
 from fluxproof.cosim.closed_loop import INPUT_PORTS, gate_words

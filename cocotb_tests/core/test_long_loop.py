@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import shutil
-
 import numpy as np
 import pytest
 
+from cocotb_tests.support.needs import skip_without_ghdl5
 from fluxproof.checkout import ROOT
-from fluxproof.cosim import verilog
 from fluxproof.cosim.closed_loop import cosimulate, run_now
 from fluxproof.cosim.scenarios import SCENARIOS
 from fluxproof.golden_model import drive as drives
@@ -20,21 +18,10 @@ DRIVE = drives.load(ROOT / "docs" / "drives" / "paper001.toml")
 NO_TRIP = fluxproof.REGISTERS["fault_ignore"].high  # samples that no healthy drive gives shall not stop the gates
 
 
-def ghdl5_missing() -> str | None:
-    """Why the conversion cannot run here, or None."""
-    try:
-        verilog.find_ghdl()
-    except RuntimeError as error:
-        return str(error)
-    return None if shutil.which("g++") else "g++ is not installed"
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["fig9", "full_speed"])
 def test_full_ratio(name):
-    reason = ghdl5_missing()
-    if reason:
-        pytest.skip(reason)
+    skip_without_ghdl5()
     from fluxproof.cosim.verilated_device import VerilatedDevice
 
     register_set = registers(DRIVE)
@@ -55,9 +42,7 @@ def test_full_ratio(name):
 
 def test_samples_as_close_as_allowed():
     """Random raw samples FLUXPROOF_SAMPLE_INTERVAL clocks apart: each equals the golden model."""
-    reason = ghdl5_missing()
-    if reason:
-        pytest.skip(reason)
+    skip_without_ghdl5()
     from fluxproof.cosim.verilated import VerilatedCore
 
     register_set = registers(drives.with_carrier(DRIVE, 100))
@@ -88,9 +73,7 @@ def test_every_register_at_its_ends():
 
     The RTL computes in words of the declared widths, the model in 64 bits: a wrap-around anywhere would show here.
     """
-    reason = ghdl5_missing()
-    if reason:
-        pytest.skip(reason)
+    skip_without_ghdl5()
     from fluxproof.cosim.verilated import VerilatedCore
 
     register_set = registers(drives.with_carrier(DRIVE, 100))

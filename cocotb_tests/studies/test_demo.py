@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import base64
 import io
-import json
 import re
 from collections import namedtuple
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from fluxproof.cosim import dut_replay, ghdl
+from fluxproof.cosim import recording as recordings
+from fluxproof.cosim import runs, verilog
 from fluxproof.cosim.golden_loop import run_controller
 from fluxproof.cosim.scenarios import RPM, fig9
 from fluxproof.golden_model import drive as drives
@@ -79,16 +78,16 @@ def test_gate_view_finds_the_dead_time(made_up):
 
 def summary_of(run) -> dict:
     counts = dict(periods_compared=3000, differences=0, sample_to_duty_clocks=38, gate_edges=9)
-    counts |= dict(ghdl_seconds=1.0)
-    return {**counts, **report.metrics(run), "recording": {"skipped": "not here"}, "wall_time_s": 2.0}
+    counts |= dict(ghdl_seconds=1.0, verilator_seconds=3.0, ghdl_periods=200, ghdl_carrier_half_clocks=250)
+    return {**counts, **report.metrics(run), "recording": {"skipped": "not here"}, "seconds": 2.0}
 
 
 def test_report_is_self_contained(made_up, drive, tmp_path):
     figures = plots.draw(made_up, report.gate_view(made_up, 7))
-    loop = SimpleNamespace(drive=drive, drive_file="paper001.toml", registers=registers(drive))
-    context = dict(good=True, problems=[], loop=loop, replay=None, view=None, real=drive)
+    context = dict(good=True, problems=[], view=None, real=drive, emrax=None, drive_file="paper001.toml")
+    context |= dict(clock=drive, registers=registers(drive))
     page = report.write(tmp_path / "report.html", figures, summary_of(made_up), **context).read_text()
-    assert "3,000 periods, 0 differences" in page and "Skipped: not here" in page
+    assert "3,000 periods in Verilator and 200 in GHDL, 0 differences" in page and "Skipped: not here" in page
     images = re.findall(r'src="data:image/svg\+xml;base64,([A-Za-z0-9+/=]+)"', page)
     assert len(images) == page.count("src=") == len(figures) - 1  # all but the README's picture
     assert not re.search(r"href|url\(|@import|<script|<link", page)
@@ -99,62 +98,98 @@ def test_report_is_self_contained(made_up, drive, tmp_path):
 def test_verdict_and_exit_status(made_up):
     summary = summary_of(made_up)
     assert demo.passed(summary, []) and not demo.passed(summary, ["Fig. 9: a problem"])
-    assert not demo.passed({**summary, "periods_compared": 1999}, [])
+    assert not demo.passed({**summary, "periods_compared": 2999}, [])
+    assert not demo.passed({**summary, "ghdl_periods": 149}, [])
     assert not demo.passed({**summary, "recording": {"differences": 1}}, [])
     assert "1 difference," in report.verdict({**summary, "differences": 1})
+    assert len(report.text(summary, drives.load(demo.PAPER)).splitlines()) == 3
 
 
 def test_progress_lines():
     """Plain lines at every 10 %; on a terminal one line that fits, with the time left."""
-    kind = namedtuple("Simulation", "name total")
-    loop, replay = kind("Fig. 9", 3000), kind("recording", 14595)
-    plain = demo.Progress([loop, replay], io.StringIO())
-    plain.show({loop: 0, replay: 0}, 0.0)
-    plain.show({loop: 60, replay: 290}, 1.0)
-    plain.show({loop: 360, replay: 300}, 11.0)
-    assert plain.out.getvalue() == "Fig. 9: 10 %, 360 of 3000 periods, 30/s, 88 s left\n"
+    kind = namedtuple("Job", "name total begun")
+    loop, replay = kind("Fig. 9", 3000, True), kind("recording", 14595, True)
+    waiting = kind("recording in GHDL", 300, False)
+    plain = demo.Progress([loop, replay, waiting], io.StringIO())
+    plain.show({loop: 0, replay: 0, waiting: 0}, 0.0)
+    plain.show({loop: 60, replay: 290, waiting: 0}, 1.0)
+    plain.show({loop: 360, replay: 300, waiting: 0}, 11.0)
+    lines = plain.out.getvalue().splitlines()
+    assert lines[:2] == ["Fig. 9: building", "recording: building"]
+    assert lines[2:] == ["Fig. 9: 10 %, 360 of 3000 periods, 30/s, 88 s left"]
     for columns in (60, 79, 200):
-        line = plain.line({loop: 1500, replay: 14595}, 61.0, columns)
+        line = plain.line({loop: 1500, replay: 300, waiting: 0}, 61.0, columns)
         assert len(line) <= columns and "1500/3000" in line
         assert columns < 79 or line.endswith("s left")
 
 
-def test_replay_in_ghdl(tmp_path):
-    """A made-up log, through standstill and both directions, equal in every bit of every sample."""
-    columns = dict.fromkeys(dut_replay.COLUMNS.values(), np.zeros(60))
+@pytest.fixture
+def log(tmp_path):
+    """A made-up log, through standstill and both directions."""
+    columns = dict.fromkeys(recordings.COLUMNS.values(), np.zeros(60))
     columns |= {"iq_A": np.linspace(-330, 330, 60), "id_A": np.full(60, -20.0)}
     columns |= {"n_rpm": np.linspace(-2000, 2000, 60), "current_cmd": np.linspace(0, 1, 60)}
     columns["u_dc_V"] = np.full(60, 400.0)
-    log, table = tmp_path / "log.csv", np.column_stack(list(columns.values()))
-    np.savetxt(log, table, delimiter=",", header=",".join(columns), comments="")
-    where = {"FLUXPROOF_RECORDING": str(log)}
-    run = demo.Simulation("made up", "emrax228.toml", demo.REPLAY_CARRIER, "dut_replay", 60, **where)
-    module = "fluxproof.cosim.dut_replay"
-    folder = ghdl.run("fluxproof", module, run.generics, run.environment, key="test_demo")
-    problem = ghdl.failure(folder)
-    assert problem is None, problem
-    counted = json.loads((folder / "summary.json").read_text())
+    path, table = tmp_path / "log.csv", np.column_stack(list(columns.values()))
+    np.savetxt(path, table, delimiter=",", header=",".join(columns), comments="")
+    return path
+
+
+@pytest.mark.parametrize("engine", [runs.InVerilator, runs.InGhdl])
+def test_replay(log, engine, tmp_path, monkeypatch):
+    """A recording in both engines, equal in every bit of every sample, the demo's way."""
+    if engine is runs.InVerilator:
+        try:
+            verilog.find_ghdl()
+        except RuntimeError as reason:
+            pytest.skip(str(reason))
+    monkeypatch.setattr(runs, "BUILD", tmp_path)
+    named = runs.Named("fluxproof.cosim.recording:replay", (str(log), str(demo.EMRAX), demo.REPLAY_CARRIER))
+    job = engine("made up", named)
+    job.carry_out()
+    assert job.problem is None
+    counted = job.summary()
     assert (counted["periods_compared"], counted["differences"]) == (60, 0) and counted["gate_edges"] > 500
+    assert job.done() == job.total == 60 and len(job.result().observed["i_q"]) == 60
+
+
+def test_a_run_that_fails_says_why(tmp_path, monkeypatch):
+    """A recording that disappears between the two processes: a problem in words, no result, none of an earlier run."""
+    monkeypatch.setattr(runs, "BUILD", tmp_path)
+    named = runs.Named("fluxproof.cosim.runs:closed_loop", (str(demo.PAPER), 100, "short", 3))
+    (tmp_path / "runs" / "short").mkdir(parents=True)
+    (tmp_path / "runs" / "short" / "summary.json").write_text("{}")
+    job = runs.InVerilator("short", named)
+    job.named = named._replace(arguments=("/nonexistent.toml", 100, "short"))
+    job.carry_out()
+    assert "/nonexistent.toml" in job.problem and job.summary() == {}
+
+
+def test_first_periods(drive):
+    scenario = fig9(drive)
+    first = scenario.first(150)
+    assert len(first) == 150 and np.array_equal(first.omega_ref, scenario.omega_ref[:150])
+    assert scenario.first(None) is scenario
 
 
 @pytest.fixture(scope="module")
 def recording():
-    path, skipped = dut_replay.recording_path()
+    path, skipped = recordings.recording_path()
     if skipped:
         pytest.skip(skipped)
-    return dut_replay.load_recording(path)
+    return recordings.load_recording(path)
 
 
 def test_recording_survives_its_codes(recording):
     """What the golden model sees in the codes is the log, within what the formats of codes and core allow."""
     drive = drives.load(demo.DRIVES / "emrax228.toml")
     register_set = registers(drive)
-    rows = dut_replay.sample_inputs(recording, drive)
+    rows = recordings.sample_inputs(recording, drive)
     samples = np.column_stack([rows, np.ones(len(rows), np.int64)])
     observed = np.zeros((len(rows), len(Observed._fields)), np.int64)
     run_controller(fluxproof.State(), samples, register_set.values, register_set.config, observed)
     arrays = {f"observed_{name}": observed[:, k] for k, name in enumerate(Observed._fields)}
-    bound = dut_replay.current_bound(recording, drive)
+    bound = recordings.current_bound(recording, drive)
     view = report.recording_view(recording, bound, arrays, drive)
     assert np.all(view.current_error <= bound)
     assert bound.max() < 0.01 * view.top_current  # a bound that says something
@@ -163,11 +198,11 @@ def test_recording_survives_its_codes(recording):
 
 
 def test_replay_has_a_port_for_every_column():
-    assert len(dut_replay.INPUT_PORTS) + 1 == len(fluxproof.Sample._fields)
-    wanted = [name.removesuffix("_in") for name in dut_replay.INPUT_PORTS]
+    assert len(recordings.INPUT_PORTS) + 1 == len(fluxproof.Sample._fields)
+    wanted = [name.removesuffix("_in") for name in recordings.INPUT_PORTS]
     assert wanted == list(fluxproof.Sample._fields[:-1])
 
 
 def test_missing_recording_is_a_reason(monkeypatch):
     monkeypatch.setenv("FLUXPROOF_RECORDINGS", "/nonexistent")
-    assert "coastdown_run.csv is not there" in dut_replay.recording_path()[1]
+    assert "coastdown_run.csv is not there" in recordings.recording_path()[1]

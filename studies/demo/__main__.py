@@ -1,175 +1,192 @@
-"""`make demo`: Fig. 9 of paper 001 with the VHDL in the loop, and a real recording through the same core.
+"""`make demo`: Fig. 9 of paper 001 with the RTL in the loop, and a real recording through the same core.
 
-Two simulations run side by side in GHDL, the golden model beside each.  Writes build/demo/summary.json,
-the figures and report.html.  Exit status: 0 equal in every bit, 1 where anything differs or fails.
+In Verilator the RTL, converted to Verilog, runs Fig. 9 at the drive's own clock and the whole recording; beside it
+the VHDL itself runs the first periods of both in GHDL, at fewer clocks in a period.  The golden model goes along with
+each.  Writes build/demo/summary.json, the figures and report.html.  Exit status: 0 equal in every bit, 1 where anything
+differs or fails.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import sys
 import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
-import numpy as np
-
-from fluxproof.checkout import BUILD, ROOT
-from fluxproof.cosim import dut_replay, ghdl
-from fluxproof.cosim.scenarios import fig9
+from fluxproof.checkout import BUILD, DRIVES, ROOT
+from fluxproof.cosim import recording as recordings
+from fluxproof.cosim.runs import InGhdl, InVerilator, Job, Named, kernels
 from fluxproof.files import write_json
 from fluxproof.golden_model import drive as drives
-from fluxproof.golden_model.registers import registers
 from studies.demo import plots, report
 
-DEMO, DRIVES = BUILD / "demo", ROOT / "docs" / "drives"
-LOOP_CARRIER, REPLAY_CARRIER = 1000, 100  # clocks in half a PWM period: GHDL pays by the clock
-LEAST_PERIODS = 2000
+DEMO = BUILD / "demo"
+PAPER, EMRAX = DRIVES / "paper001.toml", DRIVES / "emrax228.toml"
+# Clocks in half a PWM period.  GHDL takes 30 times as long for a clock as Verilator, so a period has a tenth of them.
+# The recording has no clock of its own: one sample in 200 clocks is as much idle time as working time for the core.
+GHDL_CARRIER, REPLAY_CARRIER = 1000, 100
+GHDL_PERIODS, GHDL_ROWS = 300, 400
+LEAST_PERIODS, LEAST_GHDL_PERIODS = 3000, 150
 
 
-class Simulation(threading.Thread):
-    """One run of the core in GHDL: ``total`` periods of a drive under a cocotb module."""
+class Lane(threading.Thread):
+    """Steps one after the other, beside those of the other lanes."""
 
-    def __init__(self, name, drive_file: str, carrier_half: int, module: str, total: int, **environment: str):
-        super().__init__(name=name, daemon=True)
-        self.drive_file, self.module, self.total = drive_file, f"cocotb_tests.{module}", total
-        self.drive = drives.with_carrier(drives.load(DRIVES / drive_file), carrier_half)
-        self.registers = registers(self.drive)
-        self.generics = {key.upper(): value for key, value in self.registers.config._asdict().items()}
-        self.environment = environment | {"FLUXPROOF_DRIVE": str(DRIVES / drive_file)}
-        self.environment["FLUXPROOF_CARRIER_HALF"] = str(carrier_half)
-        self.folder = ghdl.run_folder("fluxproof", self.generics, key="demo")
-        self.problem: str | None = None
+    def __init__(self, *steps: Callable[[], object]):
+        super().__init__(daemon=True)
+        self.steps = steps
 
     def run(self) -> None:
-        for name in ("progress", "result.npz", "summary.json"):  # nothing old may pass for new
-            (self.folder / name).unlink(missing_ok=True)
-        try:
-            ghdl.run("fluxproof", self.module, self.generics, self.environment, key="demo")
-            problem = ghdl.failure(self.folder) or ("" if self.summary() else "no result")
-            self.problem = problem.partition("\n")[0] or None
-        except (SystemExit, ghdl.BuildError) as error:  # no GHDL, or VHDL that does not build
-            self.problem = f"{error}; see {self.folder.relative_to(ROOT)}/build.log"
-
-    def done(self) -> int:
-        """Periods simulated so far, as the simulation tells in its file."""
-        try:
-            return int((self.folder / "progress").read_text().split()[0])
-        except (OSError, ValueError, IndexError):  # not there yet, or just being written
-            return 0
-
-    def summary(self) -> dict:
-        """What the simulation counted; empty where it came to no end."""
-        path = self.folder / "summary.json"
-        counted = json.loads(path.read_text()) if path.exists() else {}
-        return {"ghdl_seconds" if k == "seconds" else k: value for k, value in counted.items()}
+        for step in self.steps:
+            step()
 
 
 class Progress:
-    """How far the simulations are: a live line on a terminal, else a line from each at every 10 %."""
+    """How far the jobs are: a live line on a terminal, else a line from each at every 10 %."""
 
-    def __init__(self, simulations: list[Simulation], out):
-        self.simulations, self.out = simulations, out
-        self.began: dict[Simulation, tuple[float, int]] = {}
-        self.told = dict.fromkeys(simulations, 0)
+    def __init__(self, jobs: list[Job], out):
+        self.jobs, self.out = jobs, out
+        self.began: dict[Job, tuple[float, int]] = {}
+        self.shown: dict[Job, int] = {}
 
-    def show(self, done: dict[Simulation, int], now: float) -> None:
-        for s in self.simulations:
+    def show(self, done: dict[Job, int], now: float) -> None:
+        for s in self.jobs:
             if done[s]:
                 self.began.setdefault(s, (now, done[s]))
         if self.out.isatty():
             columns = os.get_terminal_size(self.out.fileno()).columns
             print(f"\r{self.line(done, now, columns - 1)}\x1b[K", end="", file=self.out, flush=True)
             return
-        for s in self.simulations:
+        for s in self.jobs:
             tenth = 10 * done[s] // s.total
-            if tenth > self.told[s]:
-                self.told[s] = tenth
+            if s not in self.shown and s.begun:
+                self.shown[s] = 0
+                print(f"{s.name}: building", file=self.out, flush=True)
+            if tenth > self.shown.get(s, 0):
+                self.shown[s] = tenth
                 rate, left = self.speed(s, done[s], now)
                 state = f"{s.name}: {10 * tenth} %, {done[s]} of {s.total} periods"
                 print(f"{state}, {rate:.0f}/s, {left:.0f} s left", file=self.out, flush=True)
 
-    def speed(self, s: Simulation, done: int, now: float) -> tuple[float, float]:
+    def speed(self, s: Job, done: int, now: float) -> tuple[float, float]:
         """(periods per second, seconds left) since the first sign of life."""
         since, first = self.began.get(s, (now, done))
         rate = (done - first) / (now - since) if now > since else 0.0
         return rate, (s.total - done) / rate if rate else 0.0
 
-    def line(self, done: dict[Simulation, int], now: float, columns: int) -> str:
-        """All simulations in one line of at most ``columns`` characters."""
-        parts, width = [], min(20, max(4, (columns - 67) // 2))
-        for s in self.simulations:
+    def line(self, done: dict[Job, int], now: float, columns: int) -> str:
+        """What runs now, in one line of at most ``columns`` characters."""
+        parts, width = [], min(20, max(4, (columns - 97) // 2))
+        running = [s for s in self.jobs if s.begun and done[s] < s.total]
+        for s in running:
             bar = "#" * (width * done[s] // s.total)
             text = f"[{bar:.<{width}}] {done[s]}/{s.total} {self.speed(s, done[s], now)[0]:.0f}/s"
             parts.append(f"{s.name} {text if done[s] else 'building'}")
-        left = max(self.speed(s, done[s], now)[1] for s in self.simulations)
+        left = max([self.speed(s, done[s], now)[1] for s in running], default=0)
         return "  ".join([*parts, f"{left:.0f} s left" if left else ""])[:columns]
 
 
-def watch(simulations: list[Simulation], out=sys.stdout, pause: float = 0.5) -> None:
-    """Run all at once and show how far they are."""
-    progress = Progress(simulations, out)
-    for s in simulations:
-        s.start()
-    while any([s.is_alive() for s in simulations]):
+def watch(lanes: list[Lane], jobs: list[Job], out=sys.stdout, pause: float = 0.5) -> None:
+    """Run the lanes side by side and show how far their jobs are."""
+    progress = Progress(jobs, out)
+    for lane in lanes:
+        lane.start()
+    while any([lane.is_alive() for lane in lanes]):
+        progress.show({job: job.done() for job in jobs}, time.monotonic())
         time.sleep(pause)
-        progress.show({s: s.done() for s in simulations}, time.monotonic())
+    progress.show({job: job.done() for job in jobs}, time.monotonic())
     if out.isatty():
         print(file=out)
 
 
-def prepare(carrier_half: int):
+def both(name: str, function: str, verilator: tuple, ghdl: tuple) -> SimpleNamespace:
+    """The same run in both engines, each with the arguments of its own."""
+    return SimpleNamespace(
+        verilator=InVerilator(f"{name} in Verilator", Named(function, verilator)),
+        ghdl=InGhdl(f"{name} in GHDL", Named(function, ghdl)),
+    )
+
+
+def prepare(carrier_half: int, ghdl_periods: int):
     """(closed loop, replay, recording, why it is skipped); the last three may be None."""
-    total = len(fig9(drives.load(DRIVES / "paper001.toml")))
-    what = {"FLUXPROOF_SCENARIO": "fig9"}
-    loop = Simulation("Fig. 9", "paper001.toml", carrier_half, "dut_loop", total, **what)
-    path, skipped = dut_replay.recording_path()
+    function, paper = "fluxproof.cosim.runs:closed_loop", str(PAPER)
+    in_ghdl = (paper, GHDL_CARRIER, "fig9", ghdl_periods)
+    loop = both("Fig. 9", function, (paper, carrier_half, "fig9"), in_ghdl)
+    path, skipped = recordings.recording_path()
     if skipped:
         return loop, None, None, skipped
-    recording, what = dut_replay.load_recording(path), {"FLUXPROOF_RECORDING": str(path)}
-    total = len(recording.t)
-    replay = Simulation("recording", "emrax228.toml", REPLAY_CARRIER, "dut_replay", total, **what)
-    return loop, replay, recording, None
+    function, log = "fluxproof.cosim.recording:replay", (str(path), str(EMRAX), REPLAY_CARRIER)
+    replay = both("recording", function, log, (*log, GHDL_ROWS))
+    return loop, replay, recordings.load_recording(path), None
 
 
-def collect(loop: Simulation, replay: Simulation | None, recording, skipped: str | None):
-    """(summary, figures by name, view of the recording or None) from what the simulations left behind."""
-    scenario = fig9(loop.drive)
-    run = report.run_view(np.load(loop.folder / "result.npz"), loop.drive, scenario, loop.registers)
-    summary = {**loop.summary(), **report.metrics(run)}
-    gates = report.gate_view(run, len(scenario) - 50)
+def counted(runs: SimpleNamespace) -> dict:
+    """What both engines counted: Verilator's, with the differences of both and GHDL's periods and seconds."""
+    compiled, simulated = runs.verilator.summary(), runs.ghdl.summary()
+    return {
+        **compiled,
+        "differences": compiled["differences"] + simulated["differences"],
+        "first_difference": compiled["first_difference"] or simulated["first_difference"],
+        "seconds": compiled["seconds"],
+        "ghdl_periods": simulated["periods_compared"],
+        "ghdl_seconds": simulated["seconds"],
+        "ghdl_carrier_half_clocks": runs.ghdl.run.config.carrier_half,
+    }
+
+
+def collect(loop: SimpleNamespace, replay: SimpleNamespace | None, recording, skipped: str | None):
+    """(summary, figures by name, view of the recording or None) from what the runs left behind."""
+    made, numbers = loop.verilator.run, counted(loop)
+    run = report.run_view(loop.verilator.arrays(), made.drive, made.scenario, made.registers)
+    summary = {**numbers, "verilator_seconds": numbers["seconds"], **report.metrics(run)}
+    gates = report.gate_view(run, len(made) - 50)
     if replay is None:
         return {**summary, "recording": {"skipped": skipped}}, plots.draw(run, gates), None
-    bound = dut_replay.current_bound(recording, replay.drive)
-    view = report.recording_view(recording, bound, np.load(replay.folder / "result.npz"), replay.drive)
-    found = {"rows": replay.total, **report.recording_metrics(view, replay.summary())}
+    drive, numbers = drives.load(EMRAX), counted(replay)
+    bound = recordings.current_bound(recording, drive)
+    view = report.recording_view(recording, bound, replay.verilator.arrays(), drive)
+    found = {"rows": replay.verilator.total, **report.recording_metrics(view, numbers)}
     return {**summary, "recording": found}, plots.draw(run, gates, view), view
 
 
 def passed(summary: dict, problems: list[str]) -> bool:
     """Equal in every bit, and enough of it compared."""
     differences = summary["differences"] + summary["recording"].get("differences", 0)
-    return not problems and differences == 0 and summary["periods_compared"] >= LEAST_PERIODS
+    enough = summary["periods_compared"] >= LEAST_PERIODS and summary["ghdl_periods"] >= LEAST_GHDL_PERIODS
+    return not problems and differences == 0 and enough
 
 
 def main(argv: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="make demo", description=__doc__.splitlines()[0])
-    parser.add_argument("--carrier-half", type=int, default=LOOP_CARRIER, help="clocks in half a PWM period")
+    real = drives.load(PAPER)
+    own = round(real.core.clock_hz / real.inverter.pwm_frequency_hz / 2)
+    help = "clocks in half a PWM period of Fig. 9 in Verilator"
+    parser.add_argument("--carrier-half", type=int, default=own, help=help)
+    help = "periods of Fig. 9 in GHDL"
+    parser.add_argument("--ghdl-periods", type=int, default=GHDL_PERIODS, help=help)
     parser.add_argument("--picture", type=Path, metavar="FILE.png", help="write the README's picture here")
     options, began = parser.parse_args(argv), time.monotonic()
 
     for old in DEMO.glob("*.*"):  # a run that fails leaves nothing that looks like a result
         old.unlink()
-    loop, replay, recording, skipped = prepare(options.carrier_half)
-    simulations = [s for s in (loop, replay) if s]
-    print("VHDL in GHDL, golden model beside it, compared in every bit of every control period")
-    print(f"recording skipped: {skipped}" if skipped else f"recording: {replay.total} rows", flush=True)
-    watch(simulations)
-    problems = [f"{s.name}: {s.problem}" for s in simulations if s.problem]
+    print("RTL beside its golden model, compared in every value and gate edge of every control period", flush=True)
+    loop, replay, recording, skipped = prepare(options.carrier_half, options.ghdl_periods)
+    if skipped:
+        print(f"recording skipped: {skipped}", flush=True)
+    runs = [r for r in (loop, replay) if r]
+    jobs = [job for r in runs for job in (r.verilator, r.ghdl)]
+    compiled, simulated = ([getattr(r, engine).carry_out for r in runs] for engine in ("verilator", "ghdl"))
+    # Each lane compiles one half of what both need, while the other does the other half.
+    lanes = [Lane(kernels("golden"), *compiled), Lane(kernels("plant"), InGhdl.analyse, *simulated)]
+    lanes += [Lane(replay.verilator.build)] if replay else []  # fills the cores while a lane waits
+    watch(lanes, jobs)
+    problems = [f"{job.name}: {job.problem}" for job in jobs if job.problem]
     sys.stderr.writelines(f"{problem}\n" for problem in problems)
-    if not all(s.summary() for s in simulations):
+    if not all(job.summary() for job in jobs):
         return 1
 
     summary, figures, view = collect(loop, replay, recording, skipped)
@@ -177,12 +194,13 @@ def main(argv: list[str] | None = None) -> int:
         plots.write_png(figure, DEMO / f"{name}.png")
     if options.picture:
         plots.write_png(figures["overview"], options.picture)
-    summary["wall_time_s"] = round(time.monotonic() - began, 1)
-    good, real = passed(summary, problems), drives.load(DRIVES / loop.drive_file)
-    context = dict(good=good, problems=problems, loop=loop, replay=replay, view=view, real=real)
-    page = report.write(DEMO / "report.html", figures, summary, **context)
+    good = passed(summary, problems)
+    summary["seconds"] = summary["wall_time_s"] = round(time.monotonic() - began, 1)
+    context = dict(good=good, problems=problems, view=view, real=real, drive_file=PAPER.name)
+    context |= dict(clock=loop.verilator.run.drive, registers=loop.verilator.run.registers)
+    page = report.write(DEMO / "report.html", figures, summary, emrax=drives.load(EMRAX), **context)
     write_json(DEMO / "summary.json", summary)
-    print(f"\n{report.text(summary, real)}\n  report            {page.relative_to(ROOT)}")
+    print(f"\n{report.text(summary, real)}\nreport: {page.relative_to(ROOT)} ({summary['seconds']:.0f} s)")
     return 0 if good else 1
 
 

@@ -15,12 +15,14 @@ from fluxproof.cosim.scenarios import RPM
 from fluxproof.files import write_text
 from fluxproof.golden_model.drive import Drive
 from fluxproof.golden_model.drive_keys import key_of
+from fluxproof.golden_model.fluxproof import Observed
 from fluxproof.golden_model.units import to_si
 from studies.demo import plots
 
-TEMPLATES = Path(__file__).resolve().parents[1] / "templates"
+TEMPLATES = Path(__file__).resolve().parent / "templates"
 SHOWN = (*("u_max", "u_alpha", "u_beta"), *("i_a", "i_b", "i_c"), *("duty_a", "duty_b", "duty_c"))
-LOGGED = "currents within {current_error_a:.2f} A of the log, formats allow {current_bound_a:.2f} A"
+LOGGED = "{differences:,} differences, currents within {current_error_a:.2f} A of the log"
+LOGGED += ", formats allow {current_bound_a:.2f} A"
 LEG_A = 0b001001  # its two gates in a gate word
 SETTLED = 100  # samples before the next event (10 ms) that count as settled
 
@@ -150,12 +152,13 @@ def recording_metrics(view: SimpleNamespace, result: dict) -> dict:
 
 def verdict(summary: dict) -> str:
     """The whole result in one sentence."""
-    text = f"{summary['periods_compared']:,} periods, {_count(summary['differences'])}"
-    text += f", duties {summary['sample_to_duty_clocks']} clocks after the sample"
+    text = f"{summary['periods_compared']:,} periods in Verilator and {summary['ghdl_periods']:,} in GHDL, "
+    text += f"{_count(summary['differences'])}, duties {summary['sample_to_duty_clocks']} clocks after the sample"
     rec = summary["recording"]
     if "skipped" in rec:
         return f"{text}; recording skipped."
-    return f"{text}; a real recording: {rec['samples_compared']:,} samples, {_count(rec['differences'])}."
+    text += f"; a real recording: {rec['samples_compared']:,} samples in Verilator and {rec['ghdl_periods']:,} in GHDL"
+    return f"{text}, {_count(rec['differences'])}."
 
 
 def _count(differences: int) -> str:
@@ -163,19 +166,17 @@ def _count(differences: int) -> str:
 
 
 def text(summary: dict, drive: Drive) -> str:
-    """The result for the terminal: verdict and the numbers that matter most."""
+    """The result for the terminal in three lines: what was compared, how it controls, the recording."""
     s, rec, ns = summary, summary["recording"], summary["sample_to_duty_clocks"] / drive.core.clock_hz * 1e9
-    speed, i_d, i_q = s["speed_error_rpm"], s["i_d_tracking_a"], s["i_q_tracking_a"]
-    logged = "skipped: {skipped}" if "skipped" in rec else LOGGED
-    return f"""{verdict(s)}
-  sample to duties  {s["sample_to_duty_clocks"]} clocks, {ns:.0f} ns at {drive.core.clock_hz / 1e6:g} MHz
-  speed             error {speed["before_load_step"]:.1f} rpm at 732 rpm, {speed["at_end"]:.1f} rpm under load
-  load step         dip {s["speed_dip_rpm"]:.0f} rpm, lowest after {s["speed_dip_after_ms"]:.0f} ms
-  currents          i_d {i_d["rms"]:.3f} A rms from 0, i_q {i_q["settled_rms"]:.3f} A rms from its reference
-  peak current      {s["peak_current_a"]:.2f} A of {drive.current_limit_a:g} A
-  gates             {s["gate_edges"]:,} edges, shortest dead time {s["shortest_dead_time_us"]:g} µs
-  recording         {logged.format(**rec)}
-  time              {s["wall_time_s"]:.0f} s, GHDL {s["ghdl_seconds"]:.0f} s for Fig. 9"""
+    ratio = f"{2 * s['carrier_half_clocks']:,} clocks a period"
+    recording = "skipped: {skipped}" if "skipped" in rec else f"{{samples_compared:,}} samples, {LOGGED}"
+    return f"""Fig. 9: {s["periods_compared"]:,} periods of {ratio} in Verilator, the first \
+{s["ghdl_periods"]:,} in GHDL too: \
+{_count(s["differences"])} in {s["gate_edges"]:,} gate edges and all values
+control: duties {ns:.0f} ns after the sample, {s["speed_error_rpm"]["before_load_step"]:.1f} rpm off at 732 rpm, \
+{s["speed_dip_rpm"]:.0f} rpm dip under load, peak current {s["peak_current_a"]:.2f} A, \
+dead time {s["shortest_dead_time_us"]:g} µs
+EMRAX 228 recording: {recording.format(**rec)}"""
 
 
 def described(drive: Drive) -> list[SimpleNamespace]:
@@ -196,5 +197,7 @@ def write(path: Path, figures: dict, summary: dict, **context) -> Path:
     environment = jinja2.Environment(loader=loader, autoescape=True, trim_blocks=True)
     svg = {name: plots.image(figure, "svg", metadata={"Date": None}) for name, figure in figures.items()}
     images = {name: base64.b64encode(data).decode() for name, data in svg.items()}
-    context |= dict(summary=summary, verdict=verdict(summary), sections=described(context["real"]))
+    context |= dict(
+        values=len(Observed._fields), summary=summary, verdict=verdict(summary), sections=described(context["real"])
+    )
     return write_text(path, environment.get_template("report.html").render(images=images, **context))

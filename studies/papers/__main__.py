@@ -1,7 +1,7 @@
-"""`make papers`: the experiments of the papers on the golden model with the switching plant, the key ones in GHDL.
+"""`make papers`: the experiments of the papers on the golden model with the switching plant, the key ones on the RTL.
 
 Writes build/papers/flux.json and vsi.json, a picture of every figure and report.html.  Exit status 1 where a finding is
-not what it must be, or the VHDL differs from the golden model in any bit.
+not what it must be, or the RTL differs from the golden model in any bit, in Verilator or in GHDL.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import argparse
 import base64
 import sys
 import time
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 
 import jinja2
 import matplotlib as mpl
@@ -69,9 +69,9 @@ def section(name: str, experiment: Experiment, figures: dict) -> dict:
     }
 
 
-def tell(experiment: Experiment, seconds: float) -> None:
+def tell(experiment: Experiment, seconds: float | None = None) -> None:
     """An experiment on the terminal as soon as it is there."""
-    print(f"{experiment.title}  ({seconds:.1f} s)", flush=True)
+    print(experiment.title + ("" if seconds is None else f"  ({seconds:.1f} s)"), flush=True)
     for found in experiment.findings:
         row = found.row()
         paper = "" if row["paper"] is None else f"   paper: {row['paper']}"
@@ -83,13 +83,13 @@ def tell(experiment: Experiment, seconds: float) -> None:
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--no-rtl", action="store_true", help="golden model only, without GHDL")
+    parser.add_argument("--no-rtl", action="store_true", help="golden model only, without Verilator and GHDL")
     arguments = parser.parse_args()
     began, sections = time.monotonic(), []
     findings: dict[str, list[Finding]] = {"flux": [], "vsi": []}
-    names = [] if arguments.no_rtl else list(flux_rtl.runs(DRIVE))
-    with ProcessPoolExecutor(1) as pool:  # GHDL on one core, the golden model on the other
-        running = [pool.submit(flux_rtl.in_ghdl, name) for name in names]
+    keys = [] if arguments.no_rtl else [flux_rtl.KeyExperiment(name) for name in flux_rtl.runs(DRIVE)]
+    with ThreadPoolExecutor(1) as pool:  # the RTL, in processes of its own, on one core; the golden model on the other
+        running = [pool.submit(key.carry_out, lambda line: print(line, flush=True)) for key in keys]
         for paper, functions in (("flux", FLUX), ("vsi", VSI)):
             for function in functions:
                 start = time.monotonic()
@@ -97,19 +97,20 @@ def main() -> int:
                 tell(experiment, time.monotonic() - start)
                 findings[paper] += experiment.findings
                 sections.append(section(function.__name__, experiment, draw(function.__name__, experiment)))
-        for future in running:
-            start = time.monotonic()
-            name, experiment = future.result()
-            tell(experiment, time.monotonic() - start)
-            findings["vsi" if name in flux_rtl.OF_VSI else "flux"] += experiment.findings
-            sections.append(section(f"rtl_{name}", experiment, flux_plots.rtl(name, experiment)))
+        for key, future in zip(keys, running, strict=True):
+            future.result()
+            experiment = key.found()
+            tell(experiment)
+            findings["vsi" if key.name in flux_rtl.OF_VSI else "flux"] += experiment.findings
+            sections.append(section(f"rtl_{key.name}", experiment, flux_plots.rtl(key.name, experiment)))
     every = [*findings["flux"], *findings["vsi"]]
     for paper, rows in findings.items():
         write_json(FOLDER / f"{paper}.json", [f.row() for f in rows])
     write_text(FOLDER / "report.html", report(sections, every, time.monotonic() - began))
     good = sum(f.passed for f in every)
     written = "build/papers/flux.json, vsi.json, report.html"
-    print(f"{good} of {len(every)} findings as they must be; wrote {written}")
+    seconds = time.monotonic() - began
+    print(f"{good} of {len(every)} findings as they must be; wrote {written} ({seconds:.0f} s)")
     return 0 if good == len(every) else 1
 
 

@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from fluxproof.checkout import ROOT
-from fluxproof.cosim.dut_replay import recording_path
 from fluxproof.cosim.golden_loop import simulate
+from fluxproof.cosim.recording import recording_path
 from fluxproof.cosim.scenarios import RPM, scenario
 from fluxproof.golden_model import drive as drives
 from fluxproof.golden_model.registers import registers

@@ -1,4 +1,4 @@
-"""A recording of a real drive through the core inside GHDL: open loop, every sample equal to its model.
+"""A recording of a real drive as a run of the core: open loop, one row of the log in a PWM period.
 
 The log's dq currents, speed and bus voltage become the codes that the converters and the resolver of
 ``drive.toml`` would have given.  One row of the log is one sample of the core: from row to row the angle
@@ -7,25 +7,21 @@ moves by speed times the core's sample time, not times the log's 29 ms, in which
 
 from __future__ import annotations
 
-import os
-import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
-import cocotb
 import numpy as np
 
 from fluxproof.checkout import recordings
-from fluxproof.cosim.closed_loop import INPUT_PORTS, Beside, Result, build_plant
-from fluxproof.cosim.dut_loop import leave, progress
-from fluxproof.cosim.ghdl_device import GhdlDevice
+from fluxproof.cosim.closed_loop import INPUT_PORTS, Beside, Device, Result, build_plant
 from fluxproof.cosim.scenarios import RPM
 from fluxproof.golden_model import drive as drives
 from fluxproof.golden_model import fluxproof
 from fluxproof.golden_model.drive import Drive
 from fluxproof.golden_model.formats import PU
-from fluxproof.golden_model.registers import registers
+from fluxproof.golden_model.registers import RegisterSet, registers
 from fluxproof.golden_model.transforms import clarke, sincos
 from fluxproof.golden_model.units import from_si
 from fluxproof.plant import sensor_params
@@ -116,21 +112,31 @@ def current_bound(recording: Recording, drive: Drive) -> np.ndarray:
     return vector + rounded + length * (angle + coefficients + trig)
 
 
-async def replay(device, register_set, rows: np.ndarray, tell: Callable[[int, int], None]) -> Result:
-    """Feed the rows to the device, one per PWM period, and compare as the closed loop does."""
-    beside = Beside(device, register_set)
-    await beside.start(1)
-    for k, row in enumerate(rows.tolist()):
-        await beside.period(dict(zip(INPUT_PORTS, row, strict=True)), 1)
-        tell(k + 1, len(rows))
-    return beside.finish()
+@dataclass(frozen=True)
+class Replay:
+    """Rows of input ports, one in a PWM period: a run as cosim/runs.py has it."""
+
+    registers: RegisterSet
+    rows: np.ndarray
+
+    @property
+    def config(self) -> fluxproof.Config:
+        return self.registers.config
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    async def on(self, device: Device, progress: Callable[[int, int], None]) -> Result:
+        """Feed the rows to the device and compare as the closed loop does."""
+        beside = Beside(device, self.registers)
+        await beside.start(1)
+        for k, row in enumerate(self.rows.tolist()):
+            await beside.period(dict(zip(INPUT_PORTS, row, strict=True)), 1)
+            progress(k + 1, len(self.rows))
+        return beside.finish()
 
 
-@cocotb.test()
-async def recording_replay(dut):
-    drive = drives.load(os.environ["FLUXPROOF_DRIVE"])
-    drive = drives.with_carrier(drive, int(os.environ["FLUXPROOF_CARRIER_HALF"]))
-    rows = sample_inputs(load_recording(os.environ["FLUXPROOF_RECORDING"]), drive)
-    began = time.monotonic()
-    result = await replay(GhdlDevice(dut), registers(drive), rows, progress)
-    leave(result, time.monotonic() - began)
+def replay(recording: str, drive_file: str, carrier_half: int, rows: int | None = None) -> Replay:
+    """The recording of this file, or its first ``rows``, through the drive's converters."""
+    drive = drives.with_carrier(drives.load(Path(drive_file)), carrier_half)
+    return Replay(registers(drive), sample_inputs(load_recording(recording), drive)[:rows])
