@@ -148,16 +148,16 @@ def _differs(run, recording, state, start, stop, row, before, names, whole_state
     signal = first_in_flow(names)
     golden, instance = golden_value(run, before, row, signal), OWNER[signal]
     cause, first = find_cause(run, state, start, stop, row, names, whole_state)
-    told = None
+    shown = None
     if cause is not None:
-        told = _told(cause, stop)
+        shown = _cause_mapping(cause, stop)
         if cause.kind != "record":
             parted, instance = where_they_part(run, cause, run.state_at(state, start, first), first, row)
-            told["row"] = parted
-    return _result(run, recording, row, instance or OWNER[signal], signal, golden, told, names)
+            shown["row"] = parted
+    return _result(run, recording, row, instance or OWNER[signal], signal, golden, shown, names)
 
 
-def _told(cause: Cause, stop) -> dict:
+def _cause_mapping(cause: Cause, stop) -> dict:
     """A cause as a mapping for diagnosis.json."""
     words = {
         "found": f"{cause.found} ({hexadecimal(cause.found)})",

@@ -1,4 +1,4 @@
-"""The drive with every parameter that its maker could have got wrong, and what a recording of it would show.
+"""Model of the drive with all parameters that may be wrong, and its prediction of a recording.
 
     u_s = R_x i_s + d psi_s / dt + V_dead sgn(i_x),   psi = L i + psi_m + saturation + cross-saturation + harmonics
     i   = (i_measured - offset) / (1 + gain),  theta = theta_measured - offset - eccentricity
