@@ -143,7 +143,7 @@ class Ties(Refiner):
                 continue
             margin = TIE if self.most > 1 else LONE_TIE
             if self._other_scales(best.model, model):  # the free form is then required and not chosen by its score
-                margin += max(self.linear.price * (solution.count - best.count), 0.0)
+                margin += max(self.linear.penalty * (solution.count - best.count), 0.0)
             near = solution.score < best.score + margin or self.most == 1
             if near and model.names and self.as_good(best, solution, margin):
                 if all(s.model.names != model.names for s in out):

@@ -84,14 +84,14 @@ def test_two_scales_are_replaced_by_the_third_only_without_more_residual(view):
 
 
 def test_any_two_of_three_scales_are_equivalent(view):
-    """A drift keeps the magnets' constant in its free form: the price of that form is no evidence against them."""
+    """A drift keeps the magnets' constant in its free form: the penalty of that form is no evidence against them."""
     gain, scale, psi = {"gain": 0.009}, {"scale": -0.009}, {"delta_psi_m": 0.02 * MACHINE.magnet_flux_wb}
     best = solved("udc_gain", "current_scale", udc_gain=gain, current_scale=scale)
     other = solved("magnet_flux", "current_scale", score=145.0, magnet_flux=psi, current_scale=scale)
     other.count = best.count + 3
     beside = solved("magnet_flux", "delay", score=145.0, magnet_flux=psi, delay={"tau": 5e-5})
     beside.count = other.count
-    search = stub(view, best, other, beside, linear=SimpleNamespace(price=8.5))
+    search = stub(view, best, other, beside, linear=SimpleNamespace(penalty=8.5))
     search.as_good = lambda best, other, margin: other.score < best.score + margin
     assert search._tied(best, True) == [other]
 

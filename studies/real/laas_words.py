@@ -17,7 +17,7 @@ def cannot_tell(hold, side, line, free, wide, still, moving) -> list[str]:
         "The d axis is unknown: without i_d and u_d, so are L_d, cross-saturation and encoder offset.",
         "L_q: a sine of 2 Hz changes u_q by less than one digit; L_q is at most "
         f"{1e3 * bound(wide, 'inductance'):.2g} mH.",
-        f"Inverter loss: not significant; {1e3 * hold['v_loss']:.2g} mV at standstill, at most {loss:.2g} mV (in motion "
+        f"Inverter loss: insignificant; {1e3 * hold['v_loss']:.2g} mV at standstill, at most {loss:.2g} mV (in motion "
         f"at most {1e3 * bound(line, 'v_loss'):.2g} mV): compensated, or u_q is the command before compensation.",
         f"Offset of i_q: u_q at i_q = 0 is {1e3 * hold['u_0']:.2g} mV, at most {offset:.2g} mV, so it is at most "
         f"{offset / hold['resistance']:.2g} mA; an offset common to both channels is not visible.",
