@@ -43,8 +43,8 @@ def replay(recording: Recording) -> tuple[Digital, list[str]]:
     ``observed``, or the duty columns as the core's compare values; ``start``, ``first_state``, ``gaps``.
     ``first_difference`` has block, instance, sample (row), counter, signal, bit, recorded, golden (as hexadecimal
     and, with unit, in SI), differing (all signals of that row), hidden (blocks upstream without recorded outputs) and
-    cause (or None).  ``checked`` is False where no sample of the whole core could be compared, ``samples`` says how
-    many were.
+    cause (or None).  ``checked`` is False if no sample of the whole core could be compared; ``samples`` is the
+    number of compared ones.
     """
     meta = recording.meta
     missing = [name for name in ("registers", "config", "samples") if meta.get(name) is None]

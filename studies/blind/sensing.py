@@ -47,7 +47,7 @@ def wave(kind, x):
 
 @jit
 def measure_angle(s, theta_m, pole_pairs, offset, noise):
-    """Electrical angle [rad], not wrapped, of an encoder mounted off by ``offset`` [rad] electrical."""
+    """Electrical angle [rad], not wrapped, of an encoder with ``offset`` [rad] electrical."""
     error = offset + s.ecc_1 * wave(s.ecc_1_wave, theta_m + s.ecc_1_phase)
     error += s.ecc_2 * math.cos(2.0 * theta_m + s.ecc_2_phase) + s.ecc_n * math.cos(s.ecc_order * theta_m)
     return rounded(pole_pairs * theta_m + error + s.theta_noise * noise, s.theta_lsb)

@@ -1,8 +1,8 @@
 """The data of a case for every method: the nominal drive's misfit in steady blocks and the signals that may explain it.
 
     u      u_recorded - R mean(i) - [psi(i+, theta+) - psi(i, theta)] / T in dq, complex (b, m) [V]
-    sum    i_a + i_b + i_c, where three currents were measured, (b, m) [A]
-    torque shaft torque less that of the nominal drive, where a transducer was recorded, (b, m) [Nm]
+    sum    i_a + i_b + i_c, if three currents were measured, (b, m) [A]
+    torque shaft torque minus that of the nominal drive, if a transducer was recorded, (b, m) [Nm]
 
 Every fourth operating point is held out, the same ones for every method.  The measure of a model is the rms of its
 residual block means of u (200 rows each) over these held-out blocks.  The noise floor comes from consecutive blocks at

@@ -40,7 +40,7 @@ class Joint:
 
 
 def _stacked(channels, sigma, rows, known):
-    """One vector of the averaged channels where ``known``, each over its noise; complex ones as two."""
+    """One vector of the averaged channels at ``known`` rows, each over its noise; complex ones as two parts."""
     parts = []
     for name, x in channels.items():
         mean = averaged(x, rows).ravel() / sigma[name]

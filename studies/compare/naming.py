@@ -98,7 +98,7 @@ def effects(data: Data, models: list[tuple[Equation, np.ndarray]]) -> dict[str, 
 
 
 def _one_factor(data, plain, names):
-    """R, L_d, L_q (and psi_m) wrong by one factor are a scale, not three parameters."""
+    """R, L_d, L_q (and psi_m) wrong by one factor count as one scale instead of several parameters."""
     m, unit = data.view.machine, data.units["u"]
     top = float(np.abs(data.view.omega).max())
     nominal = {

@@ -27,7 +27,7 @@ from studies.real.outputs import NAMES_OF_AXES, write
 
 FILE = Path("brusa_flux_map") / "brusa_meas.csv"
 DRIVE = ROOT / "docs" / "drives" / "brusa_hsm1.toml"
-# The switching plant follows the compare values without dead time, and so must the plant that the drive file describes.
+# The switching plant follows the compare values without dead time; the drive file must describe the same plant.
 IDEAL = (
     "\n[plant.inverter]\ndead_time_s = 0.0 # the closed loop over the measured map has an ideal inverter\n"
 )
