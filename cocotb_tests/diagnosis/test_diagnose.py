@@ -16,8 +16,7 @@ import pytest
 from cocotb_tests.core.test_registers import PAPER
 from cocotb_tests.support.diagnosed_drives import DRIVE, GRID, MACHINE, POINT, columns, recorded
 from fluxproof.checkout import ROOT
-from fluxproof.diagnosis import catalogue, diagnose
-from fluxproof.diagnosis import run as running
+from fluxproof.diagnosis import catalogue, diagnose, physics
 from fluxproof.diagnosis.blocks import view_of
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.improved_plant import check_key, plain
@@ -219,15 +218,15 @@ def test_a_new_file_is_a_new_effect(tmp_path, monkeypatch):
     try:
         grown = catalogue._found()
         assert set(grown) == set(CATALOGUE) | {"second_harmonic"}
-        monkeypatch.setattr(running, "CATALOGUE", grown)
+        monkeypatch.setattr(physics, "CATALOGUE", grown)
         answer = diagnose(recorded(machine=SECOND), NOMINAL)
     finally:
-        sys.modules.pop("diagnosis.catalogue.second_harmonic", None)
+        sys.modules.pop(f"{catalogue.__name__}.second_harmonic", None)
         vars(catalogue).pop("second_harmonic", None)
     assert answer.verdict == "explained" and [e.name for e in answer.effects] == ["second_harmonic"], summary(
         answer
     )
-    # a_d cos and a_q sin of equal size are one wave that turns forward.
+    # Equal a_d cos and a_q sin are one forward-rotating harmonic.
     assert answer.effects[0].parameters["order_2"].value == pytest.approx(0.01, rel=0.1)
 
 
