@@ -184,7 +184,7 @@ def at_middle(x):
 
 
 def _cut(recording, nominal, run, i_s, omega, block_rows):
-    """(first rows, dwell numbers, rows of a block); long steady blocks where there are enough of them."""
+    """(first rows, dwell numbers, rows of a block); long steady blocks if there are enough of them."""
     machine, period = nominal.machine, nominal.sample_time_s
     margin = HALF_WIDTH + nominal.control.duty_applied_after_samples + 2
     slow = SLOW_SHARE * nominal.inverter.dc_bus_v / machine.magnet_flux_wb

@@ -25,7 +25,7 @@ PART = 0.03  # of L: least size of each of the two
 LEAST_GAIN = 30.0  # in chi^2 over the dispersion: least gain of a linear part in addition to any saturation
 
 
-def axes_told(view) -> str:
+def axes_with_current(view) -> str:
     """The axes, of "dq", with enough current in a view to determine their flux."""
     i = view.i.mean(axis=1) / view.machine.rated_current_a
     return "".join(axis for axis, part in zip("dq", (i.real, i.imag), strict=True) if np.abs(part).max() > LEAST)

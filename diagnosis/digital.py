@@ -43,8 +43,8 @@ def replay(recording: Recording) -> tuple[Digital, list[str]]:
     ``observed``, or the duty columns as the core's compare values; ``start``, ``first_state``, ``gaps``.
     ``first_difference`` has block, instance, sample (row), counter, signal, bit, recorded, golden (as hexadecimal
     and, with unit, in SI), differing (all signals of that row), hidden (blocks upstream without recorded outputs) and
-    cause (or None).  ``checked`` is False where no sample of the whole core could be compared, ``samples`` says how
-    many were.
+    cause (or None).  ``checked`` is False if no sample of the whole core could be compared; ``samples`` is the
+    number of compared ones.
     """
     meta = recording.meta
     missing = [name for name in ("registers", "config", "samples") if meta.get(name) is None]
@@ -148,16 +148,16 @@ def _differs(run, recording, state, start, stop, row, before, names, whole_state
     signal = first_in_flow(names)
     golden, instance = golden_value(run, before, row, signal), OWNER[signal]
     cause, first = find_cause(run, state, start, stop, row, names, whole_state)
-    told = None
+    shown = None
     if cause is not None:
-        told = _told(cause, stop)
+        shown = _cause_mapping(cause, stop)
         if cause.kind != "record":
             parted, instance = where_they_part(run, cause, run.state_at(state, start, first), first, row)
-            told["row"] = parted
-    return _result(run, recording, row, instance or OWNER[signal], signal, golden, told, names)
+            shown["row"] = parted
+    return _result(run, recording, row, instance or OWNER[signal], signal, golden, shown, names)
 
 
-def _told(cause: Cause, stop) -> dict:
+def _cause_mapping(cause: Cause, stop) -> dict:
     """A cause as a mapping for diagnosis.json."""
     words = {
         "found": f"{cause.found} ({hexadecimal(cause.found)})",

@@ -90,7 +90,7 @@ class Solution:
 class Fitter:
     """The weighted problem of one view; ``train``: (r,) bool, rows used for the fit."""
 
-    def __init__(self, cells, sigma, train, price=None):
+    def __init__(self, cells, sigma, train, penalty=None):
         self.cells, self.sigma = cells, sigma
         self.use = cells.ok & train
         self.names, self.owner, stack = [], [], []
@@ -105,7 +105,7 @@ class Fitter:
         self.scale[self.scale < 1e-9] = np.inf
         self.a = a / self.scale
         self.gram, self.right, self.power = self.a.T @ self.a, self.a.T @ self.y, float(self.y @ self.y)
-        self.price = float(np.log(max(len(self.y), 10))) if price is None else price
+        self.penalty = float(np.log(max(len(self.y), 10))) if penalty is None else penalty
         self.index = {effect: ([], []) for effect in cells.columns}  # includes effects without columns
         for k, (effect, key) in enumerate(zip(self.owner, self.names, strict=True)):
             core, free = self.index[effect]
@@ -137,7 +137,7 @@ class Fitter:
     def score(self, model, dispersion=1.0) -> float:
         """chi^2 over the dispersion plus the penalty of coefficients and effects."""
         chi2, count = self.chi2(model)
-        return chi2 / dispersion + self.price * count + PER_EFFECT * len(model)
+        return chi2 / dispersion + self.penalty * count + PER_EFFECT * len(model)
 
     def solve(self, model, dispersion=1.0) -> Solution:
         """Coefficients, covariance and residual of a model; coefficients that the data do not determine are zero."""

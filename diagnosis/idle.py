@@ -1,4 +1,4 @@
-"""Dead time at zero current: it acts, but no curve of the loss over the current can show it.
+"""Dead time at zero current, which no curve of the loss over the current can reveal.
 
 The ripple then decides which edge of a pulse is late.  The pulses are late by up to the dead time, which resembles late
 gates or a sampling skew; the loss at the current in the middle of the pulses resembles a smaller magnet flux.

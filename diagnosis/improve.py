@@ -35,10 +35,10 @@ def improved_toml(nominal: Nominal, effects: list[NamedEffect]) -> str:
     for change in changes:
         why = "; ".join(_words(by_name[name]) for name in change.why.split(" and "))
         _set(document.setdefault(change.section, tomlkit.table()), change.key, change.value, why)
-    told = {f"{change.section}.{change.key}" for change in changes}
+    changed = {f"{change.section}.{change.key}" for change in changes}
     for key, (value, names) in merged(effects).items():
         section, name = key.split(".", 1)
-        if key in told:
+        if key in changed:
             document.get("plant", {}).get(section, {}).pop(name, None)  # it would override the new value
         else:
             plant = document.setdefault("plant", tomlkit.table(is_super_table=True))

@@ -113,7 +113,7 @@ def beside_free_surface(view, names, train):
     """(remaining names, ambiguity sets): scales and inductances must improve the fit of a free flux map.
 
     If the operating points cover the dq current plane, a free flux map can be fitted.  A scale or inductance error
-    that no longer improves the fit then had only absorbed the residual of a rigid saturation curve.
+    that no longer improves the fit had only absorbed the residual of a rigid saturation curve.
     """
     curved = sorted({"saturation", "cross_saturation"} & set(names))
     suspects = sorted(ABSORBED & set(names))

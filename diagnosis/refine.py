@@ -133,7 +133,7 @@ class Refiner:
         cells = cells_of(view, effects, self.projector, free)
         cells.y = cells.y - self.adjust
         # Smaller currents have smaller noise: otherwise dividing all by a factor would look like a better fit.
-        return Fitter(cells, self.sigma * view.noise_gain, self.train, self.linear.price)
+        return Fitter(cells, self.sigma * view.noise_gain, self.train, self.linear.penalty)
 
     def take_raw(self, solutions) -> Solution | None:
         """Subtract the voltage that a solution's effects derive from the current ripple, and solve it again.
@@ -152,14 +152,14 @@ class Refiner:
             model, view = solution.model, solution.view
             cells = cells_of(view, [self.effects[n] for n in sorted(model.names)], self.projector, model.free)
             cells.y = cells.y - adjust
-            fitter = Fitter(cells, self.sigma * view.noise_gain, self.train, self.linear.price)
+            fitter = Fitter(cells, self.sigma * view.noise_gain, self.train, self.linear.penalty)
             tried.append((fitter.score(model, self.dispersion), adjust, model))
         _, adjust, model = min(tried, key=lambda entry: entry[0])
         if adjust is None:
             return None
         self.cells.y = self.cells.y + self.adjust - adjust
         self.adjust = adjust
-        self.linear = Fitter(self.cells, self.sigma, self.train, self.linear.price)
+        self.linear = Fitter(self.cells, self.sigma, self.train, self.linear.penalty)
         self.refined.clear()
         return self.refine(model)
 

@@ -46,8 +46,8 @@ def remains(search, found, held) -> Remains:
     # A curve that explains most of a large misfit may leave a small residual anywhere.
     share = CLAMPED_LEFT if "dead_time" in best.model.names else CURVE_LEFT
     floor = share * fit.train_before if best.model.names else 0.0
-    told = np.flatnonzero(search.doubt(best) <= CURVE_LEFT * fit.train_before)
-    stray = _stray(best, best.view.take(told), rows[told], floor) or stray_torque(
+    certain = np.flatnonzero(search.doubt(best) <= CURVE_LEFT * fit.train_before)
+    stray = _stray(best, best.view.take(certain), rows[certain], floor) or stray_torque(
         best.view, search.projector, cells, residual, found.sigma
     )
     least = _least(search.view)

@@ -150,15 +150,15 @@ def requests(search, solutions, noise_v, cold=False) -> list[Request]:
     own = np.hypot(noise_v, SYSTEM_U * voltage_level(made) + SYSTEM_DC * drive)[p.block] / np.sqrt(BLOCKS)
     sigma = np.where(p.ok & (p.channel == "u"), own, np.inf)
     of = {n: columns_at(p, made, effects[n]) for s in solutions for n in s.model.names}
-    told, knows = [], []
+    predictions, knows = [], []
     for s in solutions:
         parts = (v * of[n][k] for n, c in s.c.items() for k, v in c.items() if k in of[n])
-        told.append(sum(parts, np.zeros(len(p.ok))))
+        predictions.append(sum(parts, np.zeros(len(p.ok))))
         columns = {(n, k): column for n in sorted(s.model.names) for k, column in of[n].items() if column.any()}
         stack = np.array(list(columns.values())).reshape(len(columns), len(p.ok))
         knows.append((stack, known_of(search, s, columns)))
     pairs = list(itertools.permutations(range(len(solutions)), 2))
-    rivals = [rivalry(told[a], told[b], *knows[b], sigma, p.block, len(omega)) for a, b in pairs]
+    rivals = [rivalry(predictions[a], predictions[b], *knows[b], sigma, p.block, len(omega)) for a, b in pairs]
     effort = (omega / np.abs(omega).max()) ** 2 + np.abs(i / view.machine.rated_current_a) ** 2
     chosen = best_points(rivals, MOST, NEW_AXIS * new_axes(view, i), STRAIN * effort)
     out = []
@@ -172,7 +172,7 @@ def requests(search, solutions, noise_v, cold=False) -> list[Request]:
                 float(i[k].real),
                 float(i[k].imag),
                 names,
-                _why(p, k, told, worst, solutions) + (COLD if cooled[k] else ""),
+                _why(p, k, predictions, worst, solutions) + (COLD if cooled[k] else ""),
                 float(drive),
                 float(view.machine.temperature_ref_c) if cooled[k] else None,
             )
@@ -183,10 +183,10 @@ def requests(search, solutions, noise_v, cold=False) -> list[Request]:
 COLD = ", once the machine has cooled down (record temp_winding)"
 
 
-def _why(p, k, told, pair, solutions):
+def _why(p, k, predictions, pair, solutions):
     at = p.ok & (p.block == k) & (p.channel == "u")
     a, b = (" with ".join(sorted(solutions[n].model.names)) for n in pair)
-    difference = np.where(at, np.abs(told[pair[0]] - told[pair[1]]), 0.0)
+    difference = np.where(at, np.abs(predictions[pair[0]] - predictions[pair[1]]), 0.0)
     row = int(np.argmax(difference))
     where = f"u_{'dq'[p.part[row]]}" + (f" at order {abs(p.order[row]):g}" if p.order[row] else "")
     return f"{where} differs by {difference[row]:.3g} V between {a} and {b}"

@@ -35,7 +35,7 @@ def diagnose_slow(recordings, nominal, progress=lambda text: None) -> Diagnosis:
     if len(points) < LEAST_POINTS:
         raise RecordingError(
             f"{recordings[0].source}: {len(points)} steady operating points, {LEAST_POINTS} are needed: "
-            "hold more of them for longer, or log faster"
+            "record more and longer ones, or log faster"
         )
     held = np.isin(view.run, points[2::HOLDOUT_EVERY])
     search = SlowSearch(view, ~held, progress)

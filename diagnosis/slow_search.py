@@ -74,7 +74,7 @@ class SlowSearch(Search):
     def fitter(self, view, effects, free=None) -> Fitter:
         cells = super().fitter(view, effects, free).cells
         self.hide(cells)
-        return Fitter(cells, self.sigma, self.train, self.linear.price)
+        return Fitter(cells, self.sigma, self.train, self.linear.penalty)
 
     def plausible(self, solution) -> bool:
         """Whether all parameters are within LIMITS: a sum of absurd effects may fit as well as the true ones."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy import stats
 
-from fluxproof.diagnosis.curvature import FAMILY, axes_told
+from fluxproof.diagnosis.curvature import FAMILY, axes_with_current
 from fluxproof.diagnosis.curves import courses
 from fluxproof.diagnosis.effect import ALIKE, DOUBT, sigma
 from fluxproof.diagnosis.fit import Model, Solution
@@ -37,7 +37,7 @@ class Ties(Refiner):
         If an axis has no current, two coefficients suffice.
         """
         m, c = self.view.machine, solution.c
-        inductances = {f"inductance_{axis}" for axis in axes_told(self.view)}
+        inductances = {f"inductance_{axis}" for axis in axes_with_current(self.view)}
         if not inductances or solution.model.names != {"resistance"} | inductances:
             return False
         shares = [c["resistance"]["delta_r"] / m.resistance_ohm]
@@ -143,7 +143,7 @@ class Ties(Refiner):
                 continue
             margin = TIE if self.most > 1 else LONE_TIE
             if self._other_scales(best.model, model):  # the free form is then required and not chosen by its score
-                margin += max(self.linear.price * (solution.count - best.count), 0.0)
+                margin += max(self.linear.penalty * (solution.count - best.count), 0.0)
             near = solution.score < best.score + margin or self.most == 1
             if near and model.names and self.as_good(best, solution, margin):
                 if all(s.model.names != model.names for s in out):
@@ -161,7 +161,7 @@ class Ties(Refiner):
         """
         if self.most > 1:
             return []
-        straight = {f"inductance_{axis}" for axis in axes_told(self.view)}
+        straight = {f"inductance_{axis}" for axis in axes_with_current(self.view)}
         models = {Model(s.model.names - {"saturation"} | straight) for s in solutions if "saturation" in s.model.names}
         others = [self.refine(m) for m in models if all(s.model.names != m.names for s in solutions)]
         return [s for s in others if np.isfinite(s.score)]

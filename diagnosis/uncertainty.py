@@ -124,8 +124,8 @@ class Spread(Plain):
         base, found = at.solve(model), []
         for other in self._larger_models(at):
             chi2, count = at.chi2(other)
-            price = at.price * (count - base.count) + PER_EFFECT * (len(other) - len(model))
-            gain = (base.chi2 - chi2) / max(self.reduced, LEAST_DISPERSION) - price
+            penalty = at.penalty * (count - base.count) + PER_EFFECT * (len(other) - len(model))
+            gain = (base.chi2 - chi2) / max(self.reduced, LEAST_DISPERSION) - penalty
             if count > base.count and gain > 0.0:
                 found.append((gain, other))
         best = max((gain for gain, _ in found), default=0.0)

@@ -1,4 +1,4 @@
-"""Damaged and hostile files: every one ends in one clear line, or loads with what is wrong said; never otherwise."""
+"""Damaged and hostile files: each gives one clear error line, or loads with a finding that names the damage."""
 
 from __future__ import annotations
 

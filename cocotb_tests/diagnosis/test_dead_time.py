@@ -1,7 +1,7 @@
-"""Dead time: its loss follows the current in the middle of the pulses, and what its curve leaves is neither taken for
-physics that is not there nor hides what is.
+"""Dead time: its loss follows the current in the middle of the pulses; the residual of its curve neither causes false
+names nor hides other effects.
 
-Recordings are those of the blind benchmark's drives, whose inverter switches at instants and clamps near zero.
+The recordings are of the blind benchmark's drives, whose inverter model switches at instants and clamps near zero.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def drive_of(seed, number, folder, trace=False):
 
 @pytest.fixture(scope="module")
 def strong(tmp_path_factory):
-    """A drive that loses 6 % of its bus, what it loses as cells, and its view."""
+    """A drive with a loss of 6 % of its bus voltage, this loss as cells, and its view."""
     case, nominal, recording, held = drive_of(27182818, 130, tmp_path_factory.mktemp("strong"), trace=True)
     view = view_of(recording, nominal)
     refiner = Refiner(view, {"dead_time": CATALOGUE["dead_time"]}, np.ones(len(view), bool))
@@ -46,7 +46,7 @@ def strong(tmp_path_factory):
 
 
 def across(refiner, loss):
-    """rms [V] of what the dead time's curve leaves of a loss at order 0, across the current, of blocks with current."""
+    """Residual rms [V] of the dead-time curve at order 0, perpendicular to the current, in blocks with current."""
     refiner.cells.y = loss
     solution = Fitter(refiner.cells, refiner.sigma, refiner.train).solve(DEAD_TIME)
     left = solution.residual[(refiner.cells.order == 0) & (refiner.cells.channel == "u")].reshape(-1, 2)
@@ -56,7 +56,7 @@ def across(refiner, loss):
 
 
 def test_loss_follows_the_current_in_the_middle_of_the_pulses(strong):
-    """One edge of every pulse is late by the whole dead time, so that the converters sample before the middle."""
+    """One edge of every pulse is late by the dead time, so that the converters sample before its middle."""
     case, refiner, loss = strong
     before, solution = across(refiner, loss)
     late = half_dead_time(solution.c, refiner.view.nominal)
@@ -67,7 +67,7 @@ def test_loss_follows_the_current_in_the_middle_of_the_pulses(strong):
 
 
 def test_every_part_of_the_loss_curve_is_identified(strong):
-    """A column that counts as carried by others would be left out, and what a loss grows be wrong by the rest."""
+    """A column rejected as collinear would make the growth of the loss wrong."""
     _, refiner, loss = strong
     c = across(refiner, loss)[1].c["dead_time"]
     assert all(c.values())
@@ -86,12 +86,12 @@ def test_loss_is_uncertain_near_zero_current(strong):
 @pytest.mark.parametrize(
     ("seed", "number", "names"),
     [
-        (27182818, 130, ["dead_time"]),  # no inductance of the d axis for what the late pulses leave
-        (27182818, 229, ["dead_time", "phase_resistance_asymmetry"]),  # not one effect for being most of it
-        (27182818, 30, ["dead_time", "resistance"]),  # no drift and no inductance for what is lost at no current
-        # Ohms of a tenth of the loss, which itself has come to a stand.
+        (27182818, 130, ["dead_time"]),  # no d-axis inductance for the residual of late pulses
+        (27182818, 229, ["dead_time", "phase_resistance_asymmetry"]),  # a dominant effect does not replace both
+        (27182818, 30, ["dead_time", "resistance"]),  # no drift and no inductance for the loss at zero current
+        # A resistance of a tenth of the loss, which itself no longer grows.
         (14142135, 24, ["dead_time", "encoder_eccentricity", "resistance"]),
-        (14142135, 263, ["dead_time"]),  # ohms that a diode's logarithm looks like
+        (14142135, 263, ["dead_time"]),  # a diode's logarithm, which resembles a resistance
     ],
 )
 def test_effects_with_strong_dead_time(seed, number, names, tmp_path):

@@ -1,4 +1,4 @@
-"""The diagnosis on the project's own plant: effects that are put in are named, with their size, and nothing else is.
+"""The diagnosis on the project's own plant: injected effects are named with their size, and nothing else is.
 
 The recordings come from the golden core in closed loop on the switching plant (diagnosed_drives.py): the current
 controller hides every effect from the currents, as in a real drive.
@@ -16,8 +16,7 @@ import pytest
 from cocotb_tests.core.test_registers import PAPER
 from cocotb_tests.support.diagnosed_drives import DRIVE, GRID, MACHINE, POINT, columns, recorded
 from fluxproof.checkout import ROOT
-from fluxproof.diagnosis import catalogue, diagnose
-from fluxproof.diagnosis import run as running
+from fluxproof.diagnosis import catalogue, diagnose, physics
 from fluxproof.diagnosis.blocks import view_of
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.improved_plant import check_key, plain
@@ -35,12 +34,12 @@ NAMES = """
 
 
 def summary(answer) -> str:
-    """Everything that matters of an answer, for a failing test."""
+    """The main parts of an answer, for the message of a failing test."""
     return f"{answer.verdict}: {answer.sentence} {answer.ambiguity} {answer.fit}"
 
 
 def psi_change(**changes):
-    """(psi_d, psi_q) at rated i_q of a changed machine less those of the nominal one [Wb]."""
+    """(psi_d, psi_q) at rated i_q of a changed machine minus those of the nominal one [Wb]."""
     fluxes = []
     for machine in (dataclasses.replace(MACHINE, **changes), MACHINE):
         fluxes.append(
@@ -90,7 +89,7 @@ def test_an_effect_is_named_with_its_size(name):
     estimate = answer.effects[0].parameters[parameter]
     assert abs(estimate.value - value) < bound, (estimate, value)
     assert 0.0 < estimate.sigma < bound and answer.effects[0].explains > 0.9
-    # The fit never saw these operating points.
+    # These operating points were held out.
     assert answer.fit.holdout_after < 0.5 * answer.fit.holdout_before, summary(answer)
 
 
@@ -164,7 +163,7 @@ def test_columns_of_an_effect_are_finite_and_nonzero(name, view):
         assert column.keys() <= {"u", "sum", "torque"}, key
         assert all(np.isfinite(values).all() for values in column.values()), key
         assert any(np.abs(values).max() > 0.0 for values in column.values()), key
-    # What the coefficients mean: parameters the entry declares, and keys that the plant has.
+    # The coefficients give parameters that the entry declares, and keys of the plant.
     units = {p.name: p.unit for p in effect.parameters}
     for keys in (core, core | effect.free(view)):
         c = dict.fromkeys(keys, 1e-3)
@@ -203,50 +202,50 @@ class SecondHarmonic(FluxEffect):
         return one("order_2", "1", self.size(c, nominal), sigma(covariance))
 
 EFFECT = SecondHarmonic(
-    name="second_harmonic", title="the magnets' flux has a second harmonic",
-    equation="psi = psi_m (1 + a exp(2j theta))", signature="order 2 in dq, in proportion to the speed",
-    confounders=("current_gain",), separated_by="a spin without current",
-    parameters=(Parameter("order_2", "1", "amplitude relative to the magnets' flux"),),
+    name="second_harmonic", title="second harmonic of the magnet flux",
+    equation="psi = psi_m (1 + a exp(2j theta))", signature="order 2 in dq, proportional to speed",
+    confounders=("current_gain",), separated_by="rotation at zero current",
+    parameters=(Parameter("order_2", "1", "amplitude relative to the magnet flux"),),
 )
 """
 
 
 def test_a_new_file_is_a_new_effect(tmp_path, monkeypatch):
-    """What was unknown above has a name as soon as one file says what it is; nothing else is touched."""
+    """A misfit that was unknown above is named after one file is added; nothing else changes."""
     (tmp_path / "second_harmonic.py").write_text(NEW_EFFECT)
     monkeypatch.setattr(catalogue, "__path__", [*catalogue.__path__, str(tmp_path)])
     importlib.invalidate_caches()
     try:
         grown = catalogue._found()
         assert set(grown) == set(CATALOGUE) | {"second_harmonic"}
-        monkeypatch.setattr(running, "CATALOGUE", grown)
+        monkeypatch.setattr(physics, "CATALOGUE", grown)
         answer = diagnose(recorded(machine=SECOND), NOMINAL)
     finally:
-        sys.modules.pop("diagnosis.catalogue.second_harmonic", None)
+        sys.modules.pop(f"{catalogue.__name__}.second_harmonic", None)
         vars(catalogue).pop("second_harmonic", None)
     assert answer.verdict == "explained" and [e.name for e in answer.effects] == ["second_harmonic"], summary(
         answer
     )
-    # a_d cos and a_q sin of equal size are one wave that turns forward.
+    # Equal a_d cos and a_q sin are one forward-rotating harmonic.
     assert answer.effects[0].parameters["order_2"].value == pytest.approx(0.01, rel=0.1)
 
 
 def test_transducer_torque_is_not_mistaken_for_air_gap_torque():
-    """The inertia's share of a shaft's torque is noise at a steady speed; it must not decide what was recorded."""
+    """The inertial torque is noise at steady speed and must not decide which torque was recorded."""
     rng = np.random.default_rng(5)
     omega_m = np.repeat([-60.0, -20.0, 20.0, 60.0], 500)
     drag, gap = 0.009 * omega_m, rng.uniform(-50.0, 50.0, omega_m.size)
     noise = rng.normal(0.0, 0.05, omega_m.size)
     assert not is_airgap(gap - drag + noise, gap, drag)
     assert is_airgap(gap + noise, gap, drag)
-    # At one speed what is missing in the nominal torque may be as large as the drag.
+    # At one speed a torque missing in the model may equal the drag.
     one = omega_m == 60.0
     assert not is_airgap((gap - drag + noise + 0.5)[one], gap[one], drag[one])
 
 
 @pytest.mark.parametrize("order", [12, 54])  # 54: 27 slots and an odd number of pole pairs
 def test_torque_ripple_amplitude_is_independent_of_speed_and_direction(order):
-    """The transducer is read with the currents, the balance is made between two samples: 4 % at these speeds."""
+    """The transducer is sampled with the currents, the balance is made between samples: 4 % at these speeds."""
     table = dict(columns(GRID))
     theta, p = table["theta_e"], MACHINE.pole_pairs
     alpha = (2.0 * table["i_a"] - table["i_b"] - table["i_c"]) / 3.0
@@ -263,7 +262,7 @@ def test_torque_ripple_amplitude_is_independent_of_speed_and_direction(order):
 
 
 def test_rotation_at_zero_current_is_diagnosed():
-    """No effect that needs current has a column then; the search must not trip over it."""
+    """Effects that need current have no column then, and the search must handle this."""
     plan = tuple((speed, 0.0, 0.0) for speed in (160.0, -160.0, 80.0, -80.0, 40.0, -40.0, 120.0, -120.0))
     weak = 0.9 * MACHINE.magnet_flux_wb
     answer = diagnose(recorded(plan, machine={"magnet_flux_wb": weak}), PAPER)

@@ -1,4 +1,4 @@
-"""`fluxproof diagnose` from the outside: exit status, files, what is printed; the digital half end to end."""
+"""`fluxproof diagnose` as a command: exit status, files, printed text; the digital part end to end."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def write_dump(path, dump, values=bench.SET.values, rows=None):
 
 @pytest.fixture(scope="module")
 def explained(dump, tmp_path_factory):
-    """The folder of outputs of a telemetry dump that is clean, and what was printed."""
+    """The output folder of a correct telemetry dump, and the printed text."""
     folder = tmp_path_factory.mktemp("explained")
     path = write_dump(folder / "run.dump", dump)
     done = subprocess.run(
@@ -184,7 +184,7 @@ def test_a_bad_recording_is_a_verdict(tmp_path, capsys):
 
 
 def test_constant_currents_give_no_name(tmp_path):
-    """Three constant phase currents on a turning machine are a dead converter, whatever fits them."""
+    """Three constant phase currents of a rotating machine mean a dead converter, whatever fits them."""
     standing = np.full(len(bench.columns(SHORT)["t"]), 1.25)
     path = table_of(tmp_path / "stuck.csv", i_a=standing, i_b=standing, i_c=-2.0 * standing)
     assert diagnose(tmp_path / "out", path) == 0
@@ -281,7 +281,7 @@ def test_failing_overlay_adds_only_a_note(dump, tmp_path, monkeypatch):
 
 @pytest.mark.slow
 def test_files_with_flipped_bits_end_without_traceback_and_without_a_name(tmp_path):
-    """Bits flipped in files of every format: a reader may refuse them, the diagnosis must not believe them."""
+    """Bits flipped in files of every format: they may be rejected, but must not lead to a name."""
     nominal = nominal_of(tmp_path)
     files = {
         n: path

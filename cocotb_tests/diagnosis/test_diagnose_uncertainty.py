@@ -1,4 +1,4 @@
-"""How sure a diagnosis is of its parameters, and the corrections without which no interval could be right."""
+"""Uncertainty of the parameters, and the corrections on which correct intervals depend."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def test_error_common_to_an_operating_point_increases_sigma(view):
 
 
 def test_common_error_of_the_balance_does_not_average_out(view):
-    """However many blocks there are, the magnets' flux is not known better than the voltage is balanced."""
+    """With any number of blocks, the magnet flux is not known more accurately than the voltage balance."""
     refiner, solution = fitted(view, "magnet_flux")
     spread = Spread(refiner, solution, 1e-9)
     assert np.sqrt(spread._common()[0, 0]) == pytest.approx(2e-5 * MACHINE.magnet_flux_wb, rel=0.5)
@@ -67,7 +67,7 @@ def test_common_error_of_the_balance_does_not_average_out(view):
 
 
 def test_unnamed_small_effect_increases_sigma():
-    """Magnets 2 % weak, and resistance in error by less than a name: the flux may be off by what that moves it."""
+    """Magnets 2 % weak and a resistance error below its floor, which changes the flux estimate."""
     r = MACHINE.resistance_ohm
     view = view_of(recorded(machine={"resistance_ohm": 1.008 * r}), NOMINAL)
     effects = {n: CATALOGUE[n] for n in ("magnet_flux", "inductance_d", "resistance")}
@@ -84,7 +84,7 @@ def test_unnamed_small_effect_increases_sigma():
 
 
 def test_a_delay_of_a_whole_period_is_found_without_bias(view):
-    """The linear estimate lies past the whole period; the correction must let it come back."""
+    """The linear estimate exceeds the period; the iteration must be able to return."""
     early = view.u.copy()
     early[:, :-1] = view.u[:, 1:]  # recorded a row before it acts
     late = view.replace(u=early, theta=view.theta, memo={})
@@ -99,7 +99,7 @@ def test_a_delay_of_a_whole_period_is_found_without_bias(view):
 
 
 def test_iron_loss_current_follows_the_remaining_flux(view):
-    """i_fe = j omega g psi(i - i_fe), solved exactly for both axes, against what the iron loss takes off the flux."""
+    """i_fe = j omega g psi(i - i_fe), solved for both axes, against the flux reduction of the iron loss."""
     m, g = view.machine, 0.02 * view.machine.rated_current_a / (400.0 * view.machine.magnet_flux_wb)
     # psi_d = psi0_d + L_d w g psi_q, psi_q = psi0_q - L_q w g psi_d
     a, b = m.inductance_d_h * view.omega * g, m.inductance_q_h * view.omega * g
@@ -131,7 +131,7 @@ def test_skew_is_relative_to_the_angle():
 
 
 def test_resistance_asymmetry_is_relative_to_the_true_resistance():
-    """Phases 10 % apart in a winding of 1.3 times the nameplate's ohms: not 13 %, though that cannot be excluded."""
+    """10 % asymmetry in a winding with 1.3 times the nameplate resistance: not 13 %, though not excluded."""
     apart, names = (0.1, -0.05, -0.05), ("resistance", "phase_resistance_asymmetry")
     machine = {"resistance_ohm": 1.3 * MACHINE.resistance_ohm, "phase_resistance_asymmetry": apart}
     _, solution = fitted(view_of(recorded(machine=machine), NOMINAL), *names)
@@ -147,7 +147,7 @@ def test_resistance_asymmetry_is_relative_to_the_true_resistance():
 
 
 def test_coulomb_and_viscous_friction_are_collinear_at_one_speed():
-    """A drag of 0.3 Nm at one speed: any part of it may be the one or the other, their sum is known."""
+    """A drag of 0.3 Nm at one speed: the split is undetermined, the sum is known."""
     table, p = dict(columns(POINT)), MACHINE.pole_pairs
     turns = np.exp(1j * table["theta_e"])
     i = (2 / 3) * sum(table[f"i_{x}"] * np.exp(2j * np.pi / 3 * k) for k, x in enumerate("abc")) / turns
@@ -166,7 +166,7 @@ def test_coulomb_and_viscous_friction_are_collinear_at_one_speed():
 
 
 def test_undetermined_parameters_are_omitted():
-    """Without current on an axis, or without an order, nothing is known of its curve: it is not zero."""
+    """Without current on an axis, or without an order, its parameter is unknown and not zero."""
     of = lambda name, *c: CATALOGUE[name].estimates(dict(c), np.diag([(1e-3 * v) ** 2 for _, v in c]), NOMINAL)  # noqa: E731
     assert set(of("saturation", ("q_3", -0.1))) == {"psi_q_change_at_rated_wb"}
     assert set(of("saturation", ("q_3", -0.1), ("d_3", 0.1))) == {f"psi_{x}_change_at_rated_wb" for x in "dq"}
@@ -177,7 +177,7 @@ def test_undetermined_parameters_are_omitted():
 
 @pytest.mark.parametrize(("known", "stays"), [((3.0, 0.1), True), ((0.6, 0.1), True), ((0.4, 0.1), False)])
 def test_name_without_a_significant_parameter_is_dropped(known, stays):
-    """However well it fits: values beside standard deviations of one; friction's two parts may hold each other's."""
+    """Values with standard deviations of one; each sigma of friction may contain the other part."""
     spread = SimpleNamespace(
         solution=SimpleNamespace(c={"friction": {"viscous": 5.0, "coulomb": 5.0}}),
         covariance={"friction": np.eye(2)},

@@ -1,7 +1,7 @@
-"""report.html in headless Chromium: what a reader on a phone sees, in light and in dark.
+"""report.html in headless Chromium: the layout on a phone, in light and dark.
 
-The page stands in a frame of 400 px, unchanged and with its own Content-Security-Policy; a script outside the frame
-looks at it and leaves what it saw in the dumped DOM.
+The unchanged page is in a frame of 400 px with its own Content-Security-Policy; a script outside the frame inspects it
+and writes the result into the dumped DOM.
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ def seen(html: str, folder, *flags: str, width: int = 400) -> tuple[dict, str]:
 
 @pytest.mark.parametrize("verdict", result.VERDICTS)
 def test_in_a_browser(written, tmp_path, verdict):
-    """On a phone of 400 px: the sentence first, nothing wider than the screen, every picture there, nothing fetched."""
+    """On a phone of 400 px: the sentence first, nothing wider than the screen, all pictures, nothing loaded."""
     saw, log = seen(html_of(written[verdict]), tmp_path)
     assert log == ""
     assert saw["first"] == made_up()[verdict].sentence
@@ -94,7 +94,7 @@ def test_in_a_dark_browser(written, tmp_path):
 
 
 def test_probe_detects_defects_of_the_page(written, tmp_path):
-    """The same eyes on a page with a picture from elsewhere, a broken one, a script and a line that is too wide."""
+    """The same probe on a page with an external picture, a broken one, a script and a line that is too wide."""
     wrong = """<p style="width: 900px">wide</p><img src="http://127.0.0.1:9/x.png"><script>0</script>
     <img src="data:image/png;base64,AAAA">"""
     saw, log = seen(html_of(written["bad_recording"]).replace("<body>", "<body>" + wrong), tmp_path)

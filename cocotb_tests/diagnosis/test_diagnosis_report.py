@@ -1,4 +1,4 @@
-"""What `fluxproof diagnose` writes: diagnosis.json against its schema, and what report.html says."""
+"""Outputs of `fluxproof diagnose`: diagnosis.json against its schema, and the contents of report.html."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def schema() -> dict:
 
 
 def failures(data) -> list[str]:
-    """What the schema has against a diagnosis.json, as paths."""
+    """Paths of the schema violations of a diagnosis.json."""
     jsonschema = pytest.importorskip("jsonschema")
     return [error.json_path for error in jsonschema.Draft202012Validator(schema()).iter_errors(data)]
 

@@ -1,6 +1,6 @@
-"""Telemetry dumps and their replay: equal when nothing is wrong, and the right block and sample when one bit is.
+"""Telemetry dumps and their replay: equal without a fault, and the correct block and sample for one wrong bit.
 
-Where a flip must be seen is computed here from full replays of both variants, without the code that looks for it.
+The expected location is computed here from full replays of both variants, without the code under test.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ DRIVE = dataclasses.replace(
 SET = registers(DRIVE)
 FIELDS = fluxproof.Observed._fields
 LIMITS = ("t_max", "i_max", "v_comp_max", "delta_max", "v_thr", "i_learn")
-SILENT = ("dead_time", "t_min", "v_comp_max")  # nothing in this recording tells of them
+SILENT = ("dead_time", "t_min", "v_comp_max")  # without influence on the recorded signals
 SILENT += ("watchdog", "i_trip", "sum_trip", "rail_samples", "u_dc_min", "u_dc_max", "jump_max", "fault_ignore")
 OWNERS = {}  # register -> blocks that have it, from their declarations
 for _module, _ in fluxproof.WIRING.values():
@@ -42,7 +42,7 @@ for _module, _ in fluxproof.WIRING.values():
 
 @pytest.fixture(scope="module")
 def run():
-    """(samples, observed, last state) of the scenario in which everything happens, with a warming winding."""
+    """(samples, observed, last state) of a scenario with all functions, with a warming winding."""
     scenario = everything(DRIVE)
     warm = np.linspace(25.0, 90.0, len(scenario))
     warm[1000:1100] = np.nan
@@ -149,7 +149,7 @@ def test_a_flipped_register_names_its_block_and_sample(name, run, tmp_path):
     ("r_s", "winding_resistance"), ("eta_psi", "psi_adaline"), ("speed_ki", "speed_pi"),
 ])  # fmt: skip
 def test_registers_of_hidden_blocks(name, block, names, run, tmp_path):
-    """Bit 4: in the packet most of what these blocks make is hidden, and the name is still theirs."""
+    """Bit 4: most outputs of these blocks are not in the packet, and they are named nevertheless."""
     changed = SET.values._replace(**{name: getattr(SET.values, name) ^ 16})
     samples, observed, _ = run
     seen = {n: observed[n] for n in names}
@@ -200,7 +200,7 @@ def test_a_flipped_raw_value(field, bit, block, run, tmp_path):
         bit,
         2500,
     )
-    changed[row, 0] |= 1 << 20  # no converter has such a code
+    changed[row, 0] |= 1 << 20  # outside the converter's range
     found = digital.replay(recording(dump(tmp_path / "a.dump", (changed, observed, last))))[
         0
     ].first_difference
@@ -234,7 +234,7 @@ def test_a_flipped_start_state(part, field, bit, block, run, tmp_path):
 
 
 def test_two_wrong_registers_name_the_first_block_that_shows(run, tmp_path):
-    """No single bit explains it: the block where it shows, with those upstream that nobody saw."""
+    """No single bit explains it: the block where it appears is named, with the hidden ones upstream."""
     changed = SET.values._replace(kp_d=SET.values.kp_d ^ 24, kp_q=SET.values.kp_q ^ 24)
     path = telemetry.write_dump(tmp_path / "a.dump", DRIVE, SET._replace(values=changed), *run[:2])
     found = digital.replay(recording(path))[0].first_difference
@@ -283,7 +283,7 @@ def test_stateless_blocks_are_checked_without_a_start_state(signal, block, run, 
 
 
 def test_stateless_checks_equal_the_core(run):
-    """Every signal of the list, over all rows, from the recorded ones."""
+    """Every signal of the list, for all rows, from the recorded ones."""
     from fluxproof.diagnosis.digital_replay import run_of
 
     one = run_of(run[0], run[1], SET.values._asdict(), SET.config._asdict())
@@ -292,7 +292,7 @@ def test_stateless_checks_equal_the_core(run):
 
 
 def test_duties_alone_are_compared(run):
-    """A recording with raw samples, registers and duty columns, as a bench may have it."""
+    """A recording with raw samples, registers and duty columns, as from a test bench."""
     samples, observed, _ = run
     columns = {f"d_{x}": observed[f"compare_{x}"] / 10000 for x in "abc"} | {"t": np.arange(2500) * 1e-4}
     found = from_columns(columns, 1e-4)
@@ -334,7 +334,7 @@ def header_of(path):
 
 
 def test_a_bit_of_a_register_in_the_file_itself(run, tmp_path):
-    """Not refused by a checksum: told, and found by the replay."""
+    """Not rejected by the checksum but reported, and found by the replay."""
     path = dump(tmp_path / "a.dump", run)
     raw = bytearray(path.read_bytes())
     at = raw.index(b'"kp_d": ') + 8

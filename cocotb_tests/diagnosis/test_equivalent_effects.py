@@ -1,4 +1,4 @@
-"""Several causes at once are called by their plain names: scales, ohms beside an inverter, a saturating inductance."""
+"""Equivalent combinations get the simplest name: scales, resistance or inverter loss, inductance or saturation."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def solved(*names, chi2=100.0, score=120.0, free=(), **c) -> Solution:
 
 
 def stub(view, *solutions, **known):
-    """A search that knows nothing but the solutions, {model: solution}, and what is given."""
+    """A stub search that contains only the solutions, {model: solution}, and the given attributes."""
     out = object.__new__(Search)
     out.view, out.effects, out.dispersion, out.most = view, CATALOGUE, 1.0, 4
     out.refined = {s.model: s for s in solutions}
@@ -48,7 +48,7 @@ def stub(view, *solutions, **known):
 
 
 class Given:
-    """A search whose misfit is the given one, {channel: array}: all of its fits see it in place of the recorded one."""
+    """A search with a given misfit, {channel: array}, instead of the recorded one in all fits."""
 
     def __init__(self, search, misfit):
         self.search, self.effects, self.projector = search, search.effects, search.projector
@@ -61,7 +61,7 @@ class Given:
 
 
 def test_delay_must_significantly_exceed_half_the_dead_time(search):
-    """One edge of every pulse is late by the dead time: half of it is no delay, nor is what may be half of it."""
+    """One edge of every pulse is late by the dead time: a delay of half of it, within its sigma, is no delay."""
     dead = {"v_0.02": 0.04 * NOMINAL.inverter.dc_bus_v}
     half = half_dead_time({"dead_time": dead}, NOMINAL)
     for times, spread, small in ((1.05, 0.01, True), (1.2, 0.01, False), (1.2, 0.08, True), (1.5, 0.08, False)):
@@ -73,7 +73,7 @@ def test_delay_must_significantly_exceed_half_the_dead_time(search):
 
 
 def test_two_scales_are_replaced_by_the_third_only_without_more_residual(view):
-    """A bus and currents that are both wrong, by different factors, leave far more than noise to the magnets alone."""
+    """Bus and current errors with different factors leave a significant residual if replaced by a magnet flux error."""
     both = solved("udc_gain", "current_scale", chi2=2754.0, score=2800.0)
     nothing = solved(chi2=4e5, score=4e5)
     for left, wins in ((3000.0, True), (10161.0, False)):
@@ -84,20 +84,20 @@ def test_two_scales_are_replaced_by_the_third_only_without_more_residual(view):
 
 
 def test_any_two_of_three_scales_are_equivalent(view):
-    """A drift keeps the magnets' constant in its free form: the price of that form is no evidence against them."""
+    """A drift forces the free form of the magnet flux: the penalty of that form is no evidence against it."""
     gain, scale, psi = {"gain": 0.009}, {"scale": -0.009}, {"delta_psi_m": 0.02 * MACHINE.magnet_flux_wb}
     best = solved("udc_gain", "current_scale", udc_gain=gain, current_scale=scale)
     other = solved("magnet_flux", "current_scale", score=145.0, magnet_flux=psi, current_scale=scale)
     other.count = best.count + 3
     beside = solved("magnet_flux", "delay", score=145.0, magnet_flux=psi, delay={"tau": 5e-5})
     beside.count = other.count
-    search = stub(view, best, other, beside, linear=SimpleNamespace(price=8.5))
+    search = stub(view, best, other, beside, linear=SimpleNamespace(penalty=8.5))
     search.as_good = lambda best, other, margin: other.score < best.score + margin
     assert search._tied(best, True) == [other]
 
 
 def test_current_scale_with_one_inductance_equals_resistance_and_the_other_inductance(view):
-    """Currents of 0.94 with L_q of 0.94 leave L_q as it is: R is wrong, and L_d by another amount."""
+    """Currents of 0.94 with L_q of 0.94 mean a correct L_q, a wrong R, and a different error of L_d."""
     m, psi = view.machine, {"alpha": 0.007, "beta": -0.012}
     nothing = solved(chi2=4e5, score=4e5)
     plain = solved("current_gain", "inductance_d", "resistance", chi2=1500.0, free=["inductance_d"])
@@ -118,7 +118,7 @@ def test_current_scale_with_one_inductance_equals_resistance_and_the_other_induc
 
 
 def test_effects_hidden_by_a_removed_one_are_searched_again(view):
-    """A cross-saturation that did not earn its place had taken up unequal phases as well."""
+    """An insignificant cross-saturation had also absorbed a phase asymmetry."""
     found = solved("dead_time", "magnet_flux", score=400.0)
     more = solved("dead_time", "magnet_flux", "phase_resistance_asymmetry", score=300.0)
     idle = solved("dead_time", "magnet_flux", "delay", score=200.0)
@@ -130,7 +130,7 @@ def test_effects_hidden_by_a_removed_one_are_searched_again(view):
 
 
 def loss(view, **parts):
-    """Misfit of an inverter's loss with so many volts of each part: flat, log, fade, ohms."""
+    """Misfit of an inverter loss with the given volts of each part: flat, log, fade, ohms."""
     x = view.phases(view.with_raw_current().i_mid) / RATED
     above = np.maximum(np.abs(x) / 0.12, 1.0)
     shapes = {"log": np.sign(x) * np.log(above), "fade": np.sign(x) * (1.0 - 1.0 / above)}
@@ -141,7 +141,7 @@ def loss(view, **parts):
 
 
 def test_straight_ohms_exclude_device_drops(view, search):
-    """A drop in log(i) looks like ohms beside a curve that ends; beside its own it leaves none."""
+    """A drop in log(i) resembles a resistance with a truncated curve; with its own curve no resistance remains."""
     names = frozenset(["dead_time", "resistance"])
     both = search.refine(Model(names, frozenset(["dead_time"])))
 
@@ -158,7 +158,7 @@ def test_straight_ohms_exclude_device_drops(view, search):
 
 
 def test_unexplained_ohms_are_a_resistance(view):
-    """By the share alone 0.4 V of 5 V are the device's, and nobody knows of 0.8 V."""
+    """By the share alone, 0.4 V of 5 V belong to the device, and 0.8 V are undecided."""
     both = ["dead_time", "resistance"]
 
     def named(volts, straight, growth=0.0):
@@ -175,7 +175,7 @@ def test_unexplained_ohms_are_a_resistance(view):
 
 
 def test_saturation_has_no_linear_part(view, search):
-    """A curve in |i| i, as iron with a knee far out has it, is no wrong inductance; one with a straight part is."""
+    """A curve in |i| i, as of iron with a distant knee, is no wrong inductance; one with a linear part is."""
     best = search.refine(Model(frozenset(["saturation"]), frozenset(["saturation"])))
     straight, knee, cubic, _ = q_curves(view)
     for psi, both in ((-0.3 * knee, False), (-0.3 * cubic, False), (0.1 * straight - 0.3 * knee, True)):
@@ -186,7 +186,7 @@ def test_saturation_has_no_linear_part(view, search):
 
 
 def test_fast_falling_inductance_includes_saturation(view):
-    """From 0.4 to 0.85 of rated current the surplus falls by a quarter: from none to rated by nearly half."""
+    """From 0.4 to 0.85 of rated current the excess falls by a quarter: from zero to rated by nearly half."""
     level = np.where(np.arange(len(view)) % 2, 0.4, 0.85)[:, None] * RATED
     near = view.replace(i=1j * level * np.ones_like(view.i), memo={})
     l_q = NOMINAL.machine.inductance_q_h

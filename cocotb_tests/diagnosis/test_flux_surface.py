@@ -1,4 +1,4 @@
-"""The flux map from a recording: a made-up machine's co-energy is found, and nothing beyond what was recorded."""
+"""The flux map from a recording: the co-energy of a synthetic machine is identified within the recorded range only."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ SPREAD = np.arange(-120.0, 121.0, 30.0)
 
 
 def saturating(i, cross=1.0):
-    """A reciprocal flux [Wb] that is no formula of the catalogue: slopes of sums of log cosh."""
+    """A reciprocal flux [Wb] outside the catalogue's formulas: derivatives of sums of log cosh."""
     x, y = i.real + 40.0, i.imag
     mixed = (
         cross * 0.008 * np.exp(-((x / 90.0) ** 2) - (y / 70.0) ** 2)
-    )  # co-energy 0.36 J beside the axes' own
+    )  # mixed co-energy of 0.36 J
     psi_d = 0.0426 + 0.03 * (np.tanh(x / 110.0) - np.tanh(40.0 / 110.0)) - mixed * 2.0 * x / 90.0**2 * 50.0
     return psi_d + 1j * (0.085 * np.tanh(y / 90.0) - mixed * 2.0 * y / 70.0**2 * 50.0)
 

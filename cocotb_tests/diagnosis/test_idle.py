@@ -1,4 +1,4 @@
-"""Dead time at an operating point without current is called something else, and stands beside that."""
+"""Dead time at an operating point without current resembles other effects and is added as a rival."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def said(**c) -> Solution:
 
 
 def loss_of(view, *solutions) -> float:
-    """Loss [V] of the dead time that stands beside the solutions, 0 where none does."""
+    """Loss [V] of the dead time that is added to the solutions, 0 if none is."""
     beside = unseen_loss(view, CATALOGUE["dead_time"], solutions)
     return CATALOGUE["dead_time"].size(beside[0].c["dead_time"], NOMINAL) if beside else 0.0
 
@@ -37,8 +37,8 @@ def loss_of(view, *solutions) -> float:
 def test_late_pulses_may_be_due_to_dead_time(still):
     late = {"tau": 0.02 * PERIOD}
     assert loss_of(still, said(delay=late)) == loss_of(still, said(sampling_skew=late)) == pytest.approx(0.02 * BUS)
-    assert not loss_of(still, said(delay={"tau": -0.02 * PERIOD}))  # none makes them early
-    assert not loss_of(still, said(delay={"tau": PERIOD}))  # nor late by all of a period
+    assert not loss_of(still, said(delay={"tau": -0.02 * PERIOD}))  # dead time cannot make them early
+    assert not loss_of(still, said(delay={"tau": PERIOD}))  # nor late by a whole period
     assert not loss_of(still, said(delay=late), said(dead_time={"v_0.02": 1.0}))
 
 

@@ -1,4 +1,4 @@
-"""The improved drive file: read back as it was meant, still a drive of the core, trims that take the errors out."""
+"""The improved drive file: values survive a round trip, the core still reads it, trims cancel the sensor errors."""
 
 from __future__ import annotations
 
@@ -121,7 +121,7 @@ def test_the_rest_of_the_file_stays(path, tmp_path):
 
 @pytest.mark.parametrize("reverse", ["false", "true"])
 def test_trims_cancel_the_sensor_errors(reverse, tmp_path):
-    """Hardware of the improved file, read with its registers: what comes out is what went in."""
+    """The hardware of the improved file, read with its registers, gives the true values."""
     text = PAPER.read_text().replace(
         "\n[sensors]\n",
         "\n[sensors]\ncurrent_offset_code = [33000, 32000, 32768]\ncurrent_gain = [-1.1, 0.9, 1.0]\n"
@@ -165,7 +165,7 @@ def test_identified_dead_time_does_not_change_the_gates(tmp_path):
     before, after = (registers(drives.load(p)).values for p in (PAPER, path))
     assert after.dead_time == before.dead_time and after.min_pulse == before.min_pulse
     assert plant_of(path).inverter.dead_time_s == 1e-6
-    assert plant_of(path).inverter.v_switch_v == 0.0, "a negative drop is noise; the plant refuses it"
+    assert plant_of(path).inverter.v_switch_v == 0.0, "a negative drop is noise and rejected by the plant"
     loss = {v.key: v.value for v in core_values(nominal, found)}["V_dead"]
     assert loss == pytest.approx(1e-6 * 1e4 * 563)
     more = core_values(nominal, [effect({"inverter.dead_time_s": 4e-6}, "dead_time")])
@@ -310,7 +310,7 @@ EFFECTS = {
 
 @pytest.mark.parametrize("name", list(EFFECTS))
 def test_improved_drive_reproduces_the_recording(name, healthy, tmp_path):
-    """With the effect in it, the simulation is as close to the recording as the healthy one is to its own."""
+    """With the effect, the simulation is as close to the recording as that of the healthy drive to its own."""
     nominal, own = healthy
     machine, legs, sensors, plant = EFFECTS[name]
     made = recorded_drive(

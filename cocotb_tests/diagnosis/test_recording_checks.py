@@ -1,4 +1,4 @@
-"""Checks of a recording: each fault is found, named and worked round; physics to be diagnosed passes unsaid."""
+"""Checks of a recording: each fault is found, named and corrected; physical effects cause no findings."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def with_nan(values, *rows):
 
 
 def same(*names):
-    """The recording has these columns as they were."""
+    """The recording has these columns unchanged."""
     return lambda r, x: all(np.allclose(r[name], x[name], rtol=1e-3, atol=1e-9) for name in names)
 
 
@@ -91,7 +91,7 @@ FAULTS = {
         lambda x: {n: v[np.r_[0:100, 101, 100, 102 : len(v)]] for n, v in x.items()}, "time_order", "t", 101,
         lambda r, x: np.array_equal(r["theta_e"], x["theta_e"]) and not r.joined[99],
     ),
-    "time begins again": (
+    "clock restart": (
         lambda x: {n: np.concatenate([v, v]) for n, v in x.items()}, "time_order", "t", 4000,
         lambda r, x: len(r) == 8000 and not r.joined[3999] and (np.diff(r["t"]) > 0).all(),
     ),
@@ -155,7 +155,7 @@ FAULTS = {
     "speed of the shaft": (
         lambda x: edit(x, omega_e=x["omega_e"] / 4), "unit", "omega_e", 0, same("omega_e"),
     ),
-    "speed of another scale": (
+    "speed with a wrong scale": (
         lambda x: edit(x, omega_e=x["omega_e"] * 1.37), "angle_speed", "omega_e", 0,
         same("omega_e"),
     ),
@@ -229,7 +229,7 @@ def test_each_fault_is_found_and_corrected(tmp_path, nominal, name):
     assert "\n" not in problem.message
     assert afterwards(recording, table)
     assert len(recording.usable) == len(recording.joined) == len(recording)
-    # Nothing else is claimed but what follows from the fault.
+    # No other findings than those that follow from the fault.
     follows = {
         "not_a_number": {"missing"},
         "clipped": {"stuck"},

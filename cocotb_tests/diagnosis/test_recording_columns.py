@@ -1,4 +1,4 @@
-"""Columns of a recording: [columns] of drive.toml, ready-made maps, what is missing and what is derived."""
+"""Columns of a recording: [columns] of drive.toml, ready-made maps, missing and derived columns."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which recording a diagnosis asks for: the points that leave the least room to a rival that is fitted anew."""
+"""The requested recording: points that separate a rival best after it is refitted."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ NOMINAL = load_nominal(PAPER)
 RATED = NOMINAL.machine.rated_current_a
 NOISE_V = 0.005
 LOSSY = {"iron_conductance_s": 1 / 3000.0}
-STILL = tuple((w, 0.0, 0.0) for w in (160.0, -160.0, 80.0, -80.0, 40.0, -120.0)) * 2  # spun without current
+STILL = tuple((w, 0.0, 0.0) for w in (160.0, -160.0, 80.0, -80.0, 40.0, -120.0)) * 2  # rotated at zero current
 
 
 def search_of(**deviation):
@@ -34,13 +34,13 @@ def lossy():
 
 
 def on_a_line(known, sigma=0.2):
-    """A parabola taken for the truth, a straight line b x fitted against it at nine candidates from -1 to 1."""
+    """A parabola as truth, a line b x as rival, at nine candidates from -1 to 1."""
     x = np.linspace(-1.0, 1.0, 9)
     return rivalry(x**2, 0.0 * x, x[None, :], np.array([[known]]), np.full(9, sigma), np.arange(9), 9)
 
 
 def test_distance_excludes_what_a_refitted_rival_explains():
-    """At one point a line passes through the parabola; a point and its mirror image leave it nothing to gain."""
+    """At one point a line fits the parabola; a point and its mirror image separate them completely."""
     free, settled = on_a_line(1e-6), on_a_line(1e12)
     assert free.left([8]) < 1e-4 < 24.0 < settled.left([8])
     assert free.left([0, 8]) == pytest.approx(2.0 / 0.2**2, rel=1e-6)
@@ -50,12 +50,12 @@ def test_distance_excludes_what_a_refitted_rival_explains():
 
 
 def test_points_are_chosen_together():
-    """Of a rival that nothing settles yet each point alone is worth nothing, a point and its mirror image most."""
+    """With an undetermined rival a single point has no value, and a point with its mirror image the most."""
     assert sorted(best_points([on_a_line(1e-6)], 2)) == [0, 8]
 
 
 def test_points_differ():
-    """Where one point would do, others must bear it out: an explanation that is not tied yet may stand there too."""
+    """Even if one point suffices, the others differ: an explanation that is not tied may be true."""
     for sigma in (0.2, 0.01):
         assert sorted(best_points([on_a_line(1e12, sigma)], 3)) in ([0, 1, 8], [0, 7, 8])
 
@@ -85,7 +85,7 @@ def test_skew_and_iron_loss_are_separated_under_load():
 
 
 def test_new_axis_is_used_only_if_it_separates_better():
-    """Curves over i_q are told by i_q; what i_d brings with it would have to be told as well."""
+    """Curves over i_q are separated by i_q; i_d would add further unknowns."""
     view = view_of(recorded(machine={"inductance_q_h": 1.1 * MACHINE.inductance_q_h}), NOMINAL)
     only_q = view.take(np.abs(view.i.real.mean(axis=1)) < 0.05 * RATED)
     search = Refiner(only_q, CATALOGUE, np.ones(len(only_q), bool))
@@ -96,7 +96,7 @@ def test_new_axis_is_used_only_if_it_separates_better():
 
 
 def test_there_is_always_a_request(lossy):
-    """Where no point tells much, those that tell most are asked for."""
+    """If no point separates well, the best ones are requested."""
     same = lossy.refine(Model(frozenset(["sampling_skew"])))
     weak = lossy.refine(Model(frozenset(["sampling_skew", "udc_gain"])))
     assert 1 <= len(requests(lossy, [same, weak], 100.0)) <= 3
@@ -130,7 +130,7 @@ def test_points_are_within_the_recorded_range(lossy):
 
 
 def test_undetermined_part_of_a_curve_has_no_information(lossy):
-    """At one speed ohms and their growth with it are one thing: their sum is known, neither of them is."""
+    """At one speed a resistance and its growth with speed are collinear: only their sum is known."""
     view = lossy.view
     one = view.take(np.isclose(view.omega.mean(axis=1), view.omega.max(), rtol=0.05))
     search = Refiner(one, {"resistance": CATALOGUE["resistance"]}, np.ones(len(one), bool))
@@ -140,6 +140,6 @@ def test_undetermined_part_of_a_curve_has_no_information(lossy):
     known = known_of(search, solution, {("resistance", k): np.ones(9) for k in ("delta_r", "skin")})
     doubt = np.linalg.inv(known)
     assert at_rest @ doubt @ at_rest > 100.0 * (at_speed @ doubt @ at_speed)
-    # Candidates that are eight times as fast do not make it better known where it was recorded.
+    # Candidates at eight times the speed do not improve the knowledge at the recorded one.
     columns = {("resistance", k): n * np.ones(9) for k, n in (("delta_r", 1.0), ("skin", 64.0))}
     assert np.allclose(known_of(search, solution, columns), known)

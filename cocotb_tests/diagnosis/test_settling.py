@@ -1,4 +1,4 @@
-"""The start of a recording: what swings in is left out, what drifts is not."""
+"""The start of a recording: settling is excluded, drift is not."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from fluxproof.diagnosis.recording import from_columns
 from fluxproof.diagnosis.settling import MOST_DROPPED, settled, swings
 
 NOMINAL = load_nominal(PAPER)
-BEGIN = 2000  # row at which the drive stands at the point
+BEGIN = 2000  # row at which the operating point begins
 
 
 def started(share):
-    """A recording of one point whose duties are off by a share of themselves at first, as in a loop that swings in."""
+    """A recording of one point whose duties have a relative error at the start, as of a settling loop."""
     table = {name: values[BEGIN:].copy() for name, values in columns(POINT).items()}
     fading = share * np.exp(-np.arange(len(table["t"])) / 30.0)
     for name in ("d_a", "d_b", "d_c"):

@@ -1,4 +1,4 @@
-"""The rules that tell look-alikes apart: a drift from a constant, an inductance from saturation, ohms from a device."""
+"""Rules for similar effects: drift or constant, inductance or saturation, resistance or device drop."""
 
 from __future__ import annotations
 
@@ -39,18 +39,18 @@ def warm(view, temperature):
 def test_temperature_places_a_further_recording(view):
     course = lambda *parts: joined_views(list(parts)).course[len(view) :]  # noqa: E731
     heating = warm(view, np.linspace(COLD + 30.0, COLD + 80.0, len(view)))
-    assert np.all(course(heating, view) >= 0.5)  # nothing is known of it: the time runs on
+    assert np.all(course(heating, view) >= 0.5)  # unknown temperature: time continues
     assert np.all(course(heating, warm(view, COLD + 1.0)) == 0.0)
     middle = course(heating, warm(view, COLD + 55.0))
     assert np.ptp(middle) == 0.0 and middle[0] == pytest.approx(0.25, abs=0.03)  # half of the first half
     assert not started_cold(heating) and not started_cold(view)
     assert started_cold(joined_views([heating, warm(view, COLD + 1.0)]))
     assert wants_cold({"magnet_flux", "magnet_temperature"}, view) and not wants_cold({"delay", "sampling_skew"}, view)
-    assert not wants_cold({"magnet_temperature", "resistance_temperature"}, view)  # both would have gone
+    assert not wants_cold({"magnet_temperature", "resistance_temperature"}, view)  # both would vanish
 
 
 def test_cold_winding_does_not_place_a_drift(view):
-    """Magnets warm by their own losses: a further recording with a cold winding is not one of cold magnets."""
+    """Magnets warm by their own losses: a cold winding does not mean cold magnets."""
     cold = warm(view, COLD + 1.0)
     short = cold.take(view.run == 0).replace(span_s=0.1 * view.span_s)
     assert np.all(joined_views([cold, short]).course[len(view) :] == 1.0)
@@ -68,7 +68,7 @@ def test_a_short_further_recording_joins_a_long_one():
 
 
 def test_a_further_recording_of_one_point_is_fitted(view):
-    """Hold-out takes every fourth dwell of each recording: of the one that was asked for never all."""
+    """Every fourth dwell of each recording is held out, never the whole requested recording."""
     one = view.take(view.run == 0)
     for dwells in (8, 9, 10, 11):
         held = held_out([view.take(view.run < dwells), one])
@@ -93,12 +93,12 @@ def test_constant_and_drift_need_evidence_beyond_warming():
     assert of({}, magnet_flux=flux(-0.05), magnet_temperature=drift) == (both[1:], [both])
     assert of({"cold": True}, magnet_flux=flux(-0.05), magnet_temperature=drift) == (both, [])
     assert of({}, magnet_flux=flux(+0.05), magnet_temperature=drift) == (both, [])
-    # A course that lags leaves a little that seems to stand.
+    # A lagging course leaves a small apparent constant.
     assert of({"cold": True}, magnet_flux=flux(-0.004), magnet_temperature=drift) == (both[1:], [])
 
 
 def test_thermocouple_lag_is_small_relative_to_the_warming(view):
-    """The lag makes ohms that seem to stand; they grow with the rise of temperature, 100 K here and not 30 K."""
+    """The lag causes an apparent constant resistance proportional to the temperature rise, here 100 K and not 30 K."""
     ohms = MACHINE.resistance_ohm
     hot = warm(view, np.linspace(COLD, COLD + 100.0, len(view)))
     for share, names in (
@@ -121,7 +121,7 @@ def test_ohms_beyond_a_device_slope_are_a_resistance():
 
 
 def test_ohms_belong_to_a_device_only_if_its_loss_grows():
-    """A drop in log(i) has up to 4.7 times in ohms what the loss grows between 0.12 and 0.3 of rated current."""
+    """A drop in log(i) gives an ohmic part up to 4.7 times the growth of the loss from 0.12 to 0.3 of rated current."""
     i, both = NOMINAL.machine.rated_current_a, ["dead_time", "resistance"]
 
     def judged(growth, share, spread=0.0):
@@ -130,18 +130,18 @@ def test_ohms_belong_to_a_device_only_if_its_loss_grows():
         found.covariance["dead_time"][2, 2] = spread**2
         return groups(found, [], CATALOGUE, NOMINAL)
 
-    assert judged(0.6, 0.24) == (["dead_time"], [])  # 1.2 V of ohms, 0.6 V of growth
+    assert judged(0.6, 0.24) == (["dead_time"], [])  # 1.2 V ohmic, 0.6 V growth
     assert judged(0.3, 0.24) == (both, [])
     assert judged(0.3, 0.16) == (["dead_time"], [both])
     assert judged(0.1, 0.16) == (both, [])
-    assert judged(0.05, 0.08) == (both, [])  # 0.4 V: a small share, and no logarithm
-    assert judged(0.05, 0.08, spread=0.03) == (["dead_time"], [])  # nobody knows whether it stands still
-    assert judged(-0.1, 0.08) == (["dead_time"], [])  # a loss that shrinks was not described well
+    assert judged(0.05, 0.08) == (both, [])  # 0.4 V: a small share, but no growth
+    assert judged(0.05, 0.08, spread=0.03) == (["dead_time"], [])  # the growth is uncertain
+    assert judged(-0.1, 0.08) == (["dead_time"], [])  # a decreasing loss was not described well
     assert judged(0.1, 0.08) == (["dead_time"], [])
 
 
 def test_residual_at_other_orders_is_no_evidence(view):
-    """Ohms live at order 0; what a dead time's curve leaves at order 6 must not take their name, at order 0 it must."""
+    """A resistance acts at order 0: a dead-time residual at order 6 does not count against it, one at order 0 does."""
     effects = {n: CATALOGUE[n] for n in ("resistance", "dead_time")}
     refiner = Refiner(view, effects, np.ones(len(view), bool))
     cells, worth = refiner.cells, lambda s, name: 2000.0
@@ -152,7 +152,7 @@ def test_residual_at_other_orders_is_no_evidence(view):
         mine = (cells.channel == "u") & (cells.order == order) & cells.ok
         best.residual = np.where(mine, np.sqrt(5000.0 / mine.sum()) * refiner.sigma, 0.0)
         assert carried(["resistance"], found, cells, worth, CATALOGUE) == names
-    of_record = {"resistance": SimpleNamespace(corrects=True)}  # such an error acts everywhere
+    of_record = {"resistance": SimpleNamespace(corrects=True)}  # a measurement error acts on all orders
     best.residual = np.where((cells.order == 6) & cells.ok, refiner.sigma, 0.0) * 10.0
     assert carried(["resistance"], found, cells, worth, of_record) == []
 
@@ -174,7 +174,7 @@ def test_friction_cannot_drive_the_shaft():
 
 
 def test_cogging_order_is_not_its_harmonic(view):
-    """Order 8 is seen in more of the slow blocks than order 4, so that it locks better; it is still the harmonic."""
+    """More of the slow blocks resolve order 8 than order 4, so that it locks better; it is still the harmonic."""
     quiet = view.replace(torque=np.zeros(view.u_dc.shape), shaft=np.full(len(view), "torque"), memo={})
     nominal = -misfit(quiet)["torque"]
     for first, second, order in ((1.0, 0.4, 4), (0.0, 1.0, 8)):
@@ -187,7 +187,7 @@ def test_cogging_order_is_not_its_harmonic(view):
 
 
 def test_unbalanced_load_is_not_transducer_noise(view):
-    """It differs from one short block to the next, as noise does; of a shaft that turns freely that is noise."""
+    """It differs between short blocks like noise; with a free shaft it would be noise."""
     quiet = view.replace(torque=np.zeros(view.u_dc.shape), shaft=np.full(len(view), "torque"), memo={})
     swing = 0.15 * rated_torque(NOMINAL) * np.sin(view.theta_mid / MACHINE.pole_pairs)
     heavy = quiet.replace(torque=swing - misfit(quiet)["torque"], memo={})
@@ -201,12 +201,12 @@ def test_an_axis_without_current_has_no_curve(view):
     still = view.replace(i=1j * view.i.imag + 0.01 * view.machine.rated_current_a, memo={})
     assert set(CATALOGUE["inductance_d"].free(view)) == {"bend_2", "bend_3"}
     assert CATALOGUE["inductance_d"].free(still) == {} and CATALOGUE["inductance_q"].free(still)
-    later = view.replace(memo=still.memo)  # said once for all views of a recording
+    later = view.replace(memo=still.memo)  # decided once for all views of a recording
     assert CATALOGUE["inductance_d"].free(later) == {}
 
 
 def test_curve_over_an_erroneous_current_adds_no_tolerance(view):
-    """Freed of the record's errors the data carry a d current that they do not carry raw."""
+    """The corrected data have a d current that the raw data do not have."""
     still = view.replace(i=1j * view.i.imag + 0.01 * view.machine.rated_current_a, memo={})
     refiner = Refiner(still, {"saturation": CATALOGUE["saturation"]}, np.ones(len(view), bool))
     before = refiner.sigma.copy()
@@ -217,7 +217,7 @@ def test_curve_over_an_erroneous_current_adds_no_tolerance(view):
 
 
 def test_ripple_is_subtracted_only_if_the_fit_improves():
-    """A set whose ripple is absurd must not spoil the data for all others."""
+    """A set with an absurd ripple must not affect the data of the others."""
     view = view_of(recorded(machine={"inductance_q_h": 1.15 * MACHINE.inductance_q_h}), NOMINAL)
     effects = {n: CATALOGUE[n] for n in ("inductance_d", "inductance_q")}
     refiner = Refiner(view, effects, np.ones(len(view), bool))
@@ -240,7 +240,7 @@ def test_sign_change_needs_inductance_and_saturation(view):
 
 
 def test_flux_lost_from_the_start_is_no_drift():
-    """A demagnetised rotor of which a little comes back: the drift's free course could be a step and that."""
+    """A demagnetised rotor that recovers slightly: a free drift could imitate it by a step at the start."""
     possible, course = CATALOGUE["magnet_temperature"].possible, np.array([0.0, 0.08, 0.25, 0.55, 1.0])
 
     def drift(change):
@@ -256,9 +256,9 @@ def test_flux_lost_from_the_start_is_no_drift():
 
 
 def test_name_must_exceed_its_uncertainty_between_points():
-    """A wrong bus of a few blocks alone: a gain of 0.4 +- 0.8 that other blocks contradict."""
+    """A wrong bus voltage in a few blocks only: a gain of 0.4 +- 0.8 that other blocks contradict."""
     c = {"udc_gain": {"gain": 0.4}, "friction": {"viscous": 1.0, "coulomb": 1.0}}
-    either = np.array([[1.0, -1.0], [-1.0, 1.0]])  # dry or viscous at one speed, but friction
+    either = np.array([[1.0, -1.0], [-1.0, 1.0]])  # Coulomb or viscous at one speed, but friction
     spread = SimpleNamespace(solution=SimpleNamespace(c=c), covariance={"friction": 1e-4 * np.eye(2) + 9.0 * either})
     spread.others, spread.estimates = list, lambda name, others: {}
     for sigma, names in ((0.8, ["friction"]), (0.05, ["udc_gain", "friction"])):

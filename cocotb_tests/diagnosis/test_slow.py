@@ -1,4 +1,4 @@
-"""Slow logs: which stretches count, what a block stands for, and what is named, denied and left open."""
+"""Slow logs: selection of stretches, contents of a block, and which effects are named, excluded and ambiguous."""
 
 from __future__ import annotations
 

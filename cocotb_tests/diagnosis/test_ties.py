@@ -1,4 +1,4 @@
-"""When one explanation is another's equal, what is no explanation at all, and what must not be blamed on others."""
+"""Ties: equivalent explanations, combinations that are no explanation, and effects that must not absorb others."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def solved(*names, chi2=100.0, score=120.0, **c) -> Solution:
 
 
 def test_the_mean_current_of_a_period_is_that_of_the_stator_frame(view):
-    """The flux moves in a straight line while the rotor turns; the current is integrated here point by point."""
+    """The flux is linear in time while the rotor turns; here the current is integrated numerically."""
     m, omega, i = MACHINE, 900.0, -2.0 + 4.0j
     period = NOMINAL.sample_time_s
     theta = np.array([[-0.5, 0.5]]) * omega * period
@@ -80,7 +80,7 @@ def test_late_voltage_and_early_angle_are_a_current_filter():
 
 
 def test_equally_late_currents_and_angle_are_no_skew():
-    """Gates that are shifted against the converters are a delay; a skew takes up what the shift does to the ripple."""
+    """Gates shifted relative to the converters are a delay; a skew absorbs the effect on the ripple."""
     shadow = lambda **c: CATALOGUE["sampling_skew"].overshadowed({"sampling_skew": c}, NOMINAL)  # noqa: E731
     assert shadow(tau=1.02e-5, angle=1.05e-5) == np.inf
     assert shadow(tau=1e-6) == shadow(tau=1e-6, angle=0.0) == shadow(tau=6e-8, angle=2.57e-6) == 0.0
@@ -101,7 +101,7 @@ def test_exchange_frees_the_absorbing_effect(search):
 
 
 def test_chi2_difference_is_scaled_by_the_actual_errors(view, search):
-    """Five units of chi^2 are a tie where rows scatter as assumed, but not where they scatter by a third of it."""
+    """A chi^2 difference of 5 is a tie if rows scatter as assumed, but not with a third of that scatter."""
     use = search.cells.ok & search.train
     draw = np.random.default_rng(4).standard_normal((2, len(use)))
     apart = np.where(use, draw[0], 0.0)  # where the other one differs
@@ -136,16 +136,16 @@ def test_pruned_model_is_replaced_by_a_better_one_of_its_size():
     better, curved = solved("sampling_skew", score=90.0), solved("saturation", score=60.0)
     search.refined = {s.model: s for s in (large, remains, better, curved)}
     search._earning = lambda s: remains if s is large else s
-    assert search._pruned(large) is better  # not the curve, whose name is a matter of its shape
+    assert search._pruned(large) is better  # not the curve, which is named by its shape
     search._earning = lambda s: remains
-    assert search._pruned(large) is remains  # the better one's effect does not earn its place
+    assert search._pruned(large) is remains  # the better one's effect is insignificant
     nothing = solved(score=500.0)
     search._earning = lambda s: nothing if s is large else s
-    assert search._pruned(large) is better  # though of nothing there is nothing of its size
+    assert search._pruned(large) is better  # although an empty model has no other of its size
 
 
 def test_pruning_keeps_simplified_scales():
-    """Bus and sensors alike are the magnets: they must not come back when what was simplified has been pruned."""
+    """Equal bus and sensor errors are a magnet flux error, and must not return after pruning."""
     search = object.__new__(Search)
     magnets, remains = solved("magnet_flux", "current_gain", score=90.0), solved("magnet_flux", "delay", score=400.0)
     alike = solved("udc_gain", "current_gain", score=50.0)
@@ -178,13 +178,13 @@ def test_small_is_below_the_floor(search):
 
 
 def points_view(*points):
-    """What counting needs of a view whose blocks stand at (speed, i_q), per unit."""
+    """A stub view for counting points, with blocks at (speed, i_q) in per unit."""
     omega, i_q = 500.0 * np.array(points)[:, :1], NOMINAL.machine.rated_current_a * np.array(points)[:, 1:]
     return SimpleNamespace(machine=NOMINAL.machine, omega=np.repeat(omega, 3, axis=1), i=np.repeat(1j * i_q, 3, axis=1))
 
 
 def test_operating_point_is_not_split():
-    """Blocks scatter about their point wherever it stands; fixed bounds would make two of some."""
+    """Blocks scatter around their point; fixed bins would split some points."""
     for i_q in np.linspace(0.1, 0.9, 81):
         scattered = [(1.0, i_q + 0.004 * (-1) ** n) for n in range(6)]
         assert operating_points(points_view(*scattered)) == 1
@@ -192,7 +192,7 @@ def test_operating_point_is_not_split():
 
 
 def test_number_of_effects_is_limited_by_the_points(view):
-    """Four points are eight means: three effects with their curves would explain anything."""
+    """Four points give eight means: three effects with their curves would fit anything."""
     point = point_numbers(view)
     chosen = np.roll(np.unique(point), -point[np.argmax(np.abs(view.omega).max(axis=1))])  # the fastest one first
     firsts = [view.take(np.isin(point, chosen[:n])) for n in (1, 2, 3, 4, 7)]
@@ -209,7 +209,7 @@ def test_hysteresis_draws_nothing_from_the_noise_of_a_standstill(view):
 
 
 def test_every_effect_is_refined_at_one_operating_point(view):
-    """A delay taken off the data may score far better than its linear column says, and be tied."""
+    """After correction a delay may score far better than its linear column, and be tied."""
     one = view.take(view.run == 3)
     lone = Search(one, CATALOGUE, np.ones(len(one), bool))
     able = {n for n in CATALOGUE if lone.linear.index[n][0]}
@@ -228,7 +228,7 @@ def test_small_effect_may_be_another_one_at_one_operating_point(view):
 
 
 def test_name_replaceable_by_an_unnamed_effect_is_uncertain(view):
-    """A delay and a skew too small for a name fit as well as the delay and a bus gain: the gain need not be there."""
+    """A delay with an unnamed skew fits as well as the delay with a bus gain: the gain is uncertain."""
     few = object.__new__(Search)
     few.view, few.effects, few.most, few.as_good = view, CATALOGUE, 2, lambda *args: True
     late, gain = {"tau": 5e-5}, {"gain": 0.0033}
@@ -243,7 +243,7 @@ def test_name_replaceable_by_an_unnamed_effect_is_uncertain(view):
 
 
 def test_alternative_cause_is_no_superfluous_effect(view):
-    """A bus gain for two wrong inductances is an explanation; one of the two and something beside it is not."""
+    """A bus gain for two wrong inductances is an alternative; one of them with another effect is not."""
     lone = object.__new__(Search)
     lone.view, lone.effects, lone.most, lone.as_good = view, CATALOGUE, 1, lambda *args: True
     m = MACHINE
@@ -256,13 +256,13 @@ def test_alternative_cause_is_no_superfluous_effect(view):
 
 
 def shifted_gates(plan):
-    """A view of a recording whose gates are late by 30 us, so that its currents are taken 18 us off the valley."""
+    """A view of a recording with gates late by 30 us, so that its currents are sampled 18 us off the valley."""
     view = view_of(recorded(plan), NOMINAL)
     return CATALOGUE["delay"].corrected(unskewed(view, -18e-6), {"tau": -30e-6})
 
 
 def test_gates_that_are_late_sample_off_the_valley():
-    """At one operating point that is but another form of a delay; where there are more it is a skew beside it."""
+    """At one operating point this is a form of the delay; with more points it is a separate skew."""
     view = shifted_gates(((80.0, -2.0, 3.0),) * 20)
     search = Search(view, CATALOGUE, np.ones(len(view), bool))
     found = search.run()
@@ -282,7 +282,7 @@ def test_equal_gains_do_not_rotate_the_vector():
 
 
 def test_rotation_by_two_sensors_is_within_the_limit(view):
-    """The largest turn that two gains and i_c = -i_a - i_b can make, over what the unequal gains themselves make."""
+    """The largest rotation by two gains and i_c = -i_a - i_b, relative to the size of the unequal gains."""
     i_abc, effect = view.phases(view.i), CATALOGUE["current_gain"]
     error = i_abc * np.array([0.02, -0.02, 0.0])
     error[..., 2] = -error[..., 0] - error[..., 1]
@@ -311,7 +311,7 @@ def test_hysteresis_draws_its_current_at_a_low_speed_too(view):
 
 
 def test_a_constant_must_outlast_the_start_of_a_recording(view):
-    """A lagging thermocouple leaves a step within the first knot of a drift, which a constant would set right again."""
+    """A lagging thermocouple causes a step before the first knot of a drift, which a constant would cancel."""
     names = frozenset(["magnet_flux", "magnet_temperature"])
     psi = MACHINE.magnet_flux_wb
 

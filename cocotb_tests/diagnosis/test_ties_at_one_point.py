@@ -1,4 +1,4 @@
-"""Ties where one operating point, or one axis of current, is all there is, and what is asked for then."""
+"""Ties with one operating point or current on one axis only, and the resulting requests."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def solved(*names, chi2=100.0, score=120.0, **c) -> Solution:
 
 
 def test_less_scatter_is_no_evidence_at_one_operating_point(view):
-    """A delay that is none averages the voltages of two periods: its rows scatter less and tell nothing more."""
+    """A spurious delay averages the voltages of two periods: less scatter, but no more information."""
     one = view.take(np.resize(np.flatnonzero(view.run == 3), 60)).replace(course=np.linspace(0.0, 1.0, 60))
     lone = Search(one, {n: CATALOGUE[n] for n in ("resistance", "magnet_flux")}, np.ones(len(one), bool))
     use, noise = lone.cells.ok, np.random.default_rng(5).standard_normal(len(lone.cells.ok)) * lone.sigma
@@ -52,8 +52,8 @@ def test_less_scatter_is_no_evidence_at_one_operating_point(view):
         return lone.as_good(best, other, LONE_TIE)
 
     assert compared(1.0, 0.0)
-    assert not compared(0.94, 0.5)  # but what stands there does
-    assert not compared(1.4, 0.0)  # nor does a correction add so much
+    assert not compared(0.94, 0.5)  # but a mean does
+    assert not compared(1.4, 0.0)  # nor may a correction add so much
 
 
 def test_equal_bus_and_current_scales_are_a_magnet_flux_error():
@@ -62,7 +62,7 @@ def test_equal_bus_and_current_scales_are_a_magnet_flux_error():
 
 
 def test_equal_resistance_and_inductance_errors_are_a_current_scale():
-    """Without i_d nothing says that L_d is not off by the same."""
+    """Without i_d, the error of L_d is unknown and may be the same."""
     m = MACHINE
     more = {"resistance_ohm": 1.1 * m.resistance_ohm, "inductance_q_h": 1.1 * m.inductance_q_h}
     view = view_of(recorded(machine=more), NOMINAL)
@@ -76,7 +76,7 @@ def test_equal_resistance_and_inductance_errors_are_a_current_scale():
 
 
 def test_superfluous_effect_is_no_alternative(view):
-    """The best one holds a drift too small for a name; a skew in its place, no better than none, is not tied."""
+    """The best model contains an unnamed drift; a skew instead, no better than none, is not tied."""
     few = object.__new__(Search)
     few.view, few.effects, few.most, few.as_good = view, CATALOGUE, 2, lambda *args: True
     flux, tiny = {"delta_psi_m": 0.02 * MACHINE.magnet_flux_wb}, {"drift": 1e-5 * MACHINE.magnet_flux_wb}
@@ -90,7 +90,7 @@ def test_superfluous_effect_is_no_alternative(view):
 
 
 def test_saturation_has_inductance_rivals_at_one_current_level(view):
-    """A wrong inductance of each axis is one effect more and no tie, but only another level of current tells."""
+    """A wrong inductance of each axis is one more effect and no tie, but only another current level decides."""
     levels = view.i.mean(axis=1)
     both = np.abs(levels - (-2.5 + 2j)) < 0.05 * RATED
     lone = searched(view.take(both & (view.run == view.run[both][0])))

@@ -1,4 +1,4 @@
-"""The blind benchmark: its simulator obeys flux balance and energy, its seal holds."""
+"""The blind benchmark: its simulator satisfies flux balance and energy conservation, its seal detects changes."""
 
 from __future__ import annotations
 
@@ -135,7 +135,7 @@ def test_flux_is_reciprocal_and_inverts(kind, cross):
 
 
 def _misfit_of(effect, size=0.5):
-    """Mean misfit and +-2 lines of each segment, simulated without noise, and what design.py foresees [V]."""
+    """Mean misfit and +-2 lines of each segment, simulated without noise, and the prediction of design.py [V]."""
     rng = np.random.default_rng(4)
     n = random_nominal(rng)
     plan = plans.grid_plan(rng, n)
@@ -275,7 +275,7 @@ def test_request_is_limited_to_the_drive():
 
 
 def test_unreachable_point_is_approached(monkeypatch):
-    """Iron that has no current for its flux is met with less current."""
+    """A flux map without a current for the flux leads to a request with less current."""
     case, asked = cases.make(1, 1, "healthy", 0), {"omega_e": 50.0, "i_d": 0.0, "i_q": 1e5}
     rated = case.build.nominal.machine["rated_current_a"]
 
@@ -288,7 +288,7 @@ def test_unreachable_point_is_approached(monkeypatch):
     monkeypatch.setattr(Build, "record", record)
     assert further_recording(case, asked, 1, 0, 0)["i_q"] == pytest.approx(0.7 * rated)
     monkeypatch.setattr(Build, "record", lambda *args, **more: 1 / 0)
-    with pytest.raises(RuntimeError, match="does not stand"):
+    with pytest.raises(RuntimeError, match="does not reach"):
         further_recording(case, asked, 1, 0, 0)
 
 

@@ -1,4 +1,4 @@
-"""The blind benchmark's scorer on made-up answers: every figure can go right and wrong."""
+"""The blind benchmark's scorer on synthetic answers: every figure can be right and wrong."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The comparison with other methods: each names what a made-up recording holds, and its table can go wrong."""
+"""The comparison with other methods: each names the effect of a synthetic recording, and its figures can be wrong."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ EFFECTS = {
 
 
 def _recorded(r=1.53, l_d=0.016, l_q=0.024, psi=0.165, turn=0.0, v_dead=0.0, sixth=0.0):
-    """Columns of a drive whose current follows its reference exactly; voltages from its own flux balance."""
+    """Columns of a drive with exact current control; voltages from its flux balance."""
     dwell, rng = 450, np.random.default_rng(3)
     points = [(w, *i) for w in SPEEDS for i in POINTS]
     omega, d, q = (np.repeat([float(p[k]) for p in points], dwell) for k in range(3))
@@ -144,4 +144,4 @@ def test_rejects_the_tuning_seed(capsys):
     for package in PACKAGES.values():
         pytest.importorskip(package, reason=f"{package} is not installed (make setup)")
     assert command.main(["--seed", str(tuned()["seed"])]) == 2
-    assert "tuned on" in capsys.readouterr().err
+    assert "used to tune" in capsys.readouterr().err

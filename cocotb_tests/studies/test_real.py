@@ -1,4 +1,4 @@
-"""Real recordings: what they tell, what they do not, and both on rows that were never fitted.
+"""Real recordings: what they determine, what they do not, and both on held-out rows.
 
 Without the recordings, whose folder FLUXPROOF_RECORDINGS names (default ../shared/recordings), these tests skip.
 """
@@ -17,7 +17,7 @@ from studies.real.__main__ import main, recordings_folder
 def run(part, out):
     file = recordings_folder() / part.FILE
     if not file.exists():
-        pytest.skip(f"{part.FILE} is not there; FLUXPROOF_RECORDINGS names its folder")
+        pytest.skip(f"{part.FILE} is missing; FLUXPROOF_RECORDINGS names its folder")
     entry = part.run(recordings_folder(), out)
     folder = out / part.FILE.parts[0]
     data = json.loads((folder / "diagnosis.json").read_text())

@@ -110,7 +110,7 @@ class DeadTime(Effect):
 EFFECT = DeadTime(
     name="dead_time",
     title="inverter dead time and device drops",
-    equation="u_x = u_x,asked - v_dead s(i_x), s odd, s = 1 above a small current",
+    equation="u_x = u_x,ref - v_dead s(i_x), s odd, s = 1 above a small current",
     signature="order 0 in phase with the current, (4/pi) v_dead, and orders 6 and 12; independent of the speed",
     confounders=("resistance", "emf_harmonics"),
     separated_by="several currents, i_q reversed; another bus voltage or PWM frequency separates dead time from drops",

@@ -109,7 +109,7 @@ def misfit(rows: Rows, at_current: bool = False) -> float:
     return float(np.median(np.abs(left[large]))) / size if size > 0 else np.inf
 
 
-def tells(rows: Rows) -> bool:
+def discriminates(rows: Rows) -> bool:
     """Whether the balance can discriminate interpretations: the EMF is well above the resistive drop."""
     if rows.steady:
         u = rows.u_dq.imag

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from fluxproof.diagnosis.checks.agreement import angle_speed_ratio
-from fluxproof.diagnosis.checks.balance import BETTER, FIT, Rows, misfit, rows_of, tells
+from fluxproof.diagnosis.checks.balance import BETTER, FIT, Rows, discriminates, misfit, rows_of
 from fluxproof.diagnosis.recording import Problem
 
 STAGE = "geometry"
@@ -30,7 +30,7 @@ CURRENTS, DUTIES = ("i_a", "i_b", "i_c"), ("d_a", "d_b", "d_c")
 
 def check(recording, nominal) -> None:
     rows = rows_of(recording, nominal)
-    if rows is None or not tells(rows):
+    if rows is None or not discriminates(rows):
         return
     changes = _changes(rows)
     as_is = misfit(rows)

@@ -7,7 +7,7 @@ confirm the angle and the two rates differ widely, the recording is rejected.
 from __future__ import annotations
 
 from fluxproof.diagnosis.checks.agreement import angle_speed_ratio
-from fluxproof.diagnosis.checks.balance import FIT, misfit, rows_of, tells
+from fluxproof.diagnosis.checks.balance import FIT, discriminates, misfit, rows_of
 from fluxproof.diagnosis.recording import Problem
 
 STAGE = "geometry"
@@ -23,7 +23,7 @@ def check(recording, nominal) -> None:
         return
     n = len(recording)
     rows = rows_of(recording, nominal)
-    confirmed = rows is not None and not rows.steady and tells(rows) and misfit(rows) < 2 * FIT
+    confirmed = rows is not None and not rows.steady and discriminates(rows) and misfit(rows) < 2 * FIT
     if abs(ratio + 1.0) <= LARGE:
         message = "speed and angle have opposite signs"
         if (

@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from fluxproof.diagnosis.checks.agreement import angle_speed_ratio
-from fluxproof.diagnosis.checks.balance import BETTER, FIT, misfit, rows_of, tells
+from fluxproof.diagnosis.checks.balance import BETTER, FIT, discriminates, misfit, rows_of
 from fluxproof.diagnosis.recording import Problem
 
 STAGE = "units"
@@ -70,7 +70,7 @@ def _angle_unit(recording, nominal, p):
     if without_speed:
         del recording.columns["omega_e"]
     units = _angle_units(p)
-    if rows is not None and not rows.steady and tells(rows):
+    if rows is not None and not rows.steady and discriminates(rows):
         as_is = _best_direction(rows, 1.0)
         if as_is <= FIT:
             return None
@@ -121,7 +121,7 @@ def _speed_unit(recording, nominal, p):
     recording.columns["theta_e"] = np.zeros(len(recording))  # the steady balance does not use it
     rows = rows_of(recording, nominal)
     del recording.columns["theta_e"]
-    if rows is None or not rows.steady or not tells(rows):
+    if rows is None or not rows.steady or not discriminates(rows):
         return None
     as_is = _either_sign(rows, 1.0)
     tried = {unit: _either_sign(rows, factor) for unit, factor in units.items()}

@@ -6,12 +6,12 @@ A map has
     SIGNATURE  file columns (in the notation of ``key``) that identify this log
     COLUMNS    {file column: (canonical column, unit)}
     KEY        optional: function that simplifies a file column's name before the look-up
-    ASSUMED    optional: {canonical column: constant} for what the log leaves out
+    ASSUMED    optional: {canonical column: constant} for columns that the log lacks
     SAMPLE_TIME_S  optional: for logs without a time column
-    RUN        optional: file column whose change starts another run
-    NOTES      optional: what a reader of the diagnosis must know
+    RUN        optional: file column whose change starts a new run
+    NOTES      optional: notes for the reader of the diagnosis
 
-The docstring of a map says where its facts come from.
+The docstring of a map gives the source of its facts.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ import pkgutil
 
 
 def maps() -> list:
-    """Every ready-made map."""
+    """All maps of this folder."""
     return [importlib.import_module(f"{__name__}.{m.name}") for m in pkgutil.iter_modules(__path__)]
 
 
 def plain(name: str) -> str:
-    """The name in lower case; what most logs are looked up by."""
+    """The name in lower case, the default key of a look-up."""
     return name.strip().lower()
 
 

@@ -1,7 +1,7 @@
-"""Names that many people give to the canonical signals, dSPACE ControlDesk exports among them.
+"""Common names of the canonical signals, including dSPACE ControlDesk exports.
 
-ControlDesk names a variable by its path in the model ("Model Root/Current control/i_a"); the last part counts, and a
-last part such as Out1 does not.  Only names that can mean one thing are here.
+ControlDesk names a variable by its path in the model ("Model Root/Current control/i_a"); the last part is used unless
+it is generic, such as Out1.  Only unambiguous names are listed.
 """
 
 from fluxproof.diagnosis.column_maps import last_part as KEY  # noqa: F401

@@ -2,7 +2,7 @@
 
 Source: the data set's page (W. Kirchgässner, O. Wallscheid, J. Böcker, Paderborn University): u_d, u_q [V], i_d, i_q
 [A], motor_speed [1/min] of the shaft, torque [Nm], temperatures [degC]; profile_id numbers the sessions; no
-time column, two rows a second; no bus voltage.
+time column, two rows per second; no bus voltage.
 """
 
 NAME = "Kaggle electric motor temperature"

@@ -1,7 +1,7 @@
 """LAAS omodri driver logs (T-Motor MN4004): position, velocity, i_q, u_q at 1 kHz.
 
-Source: the recordings' own description: Position [rad] and Velocity [rad/s] are the shaft's, Vsupply is scaled (not
-volts, so it is left out).  The d axis is not logged: i_d is taken as its reference, zero.
+Source: the description of the recordings: Position [rad] and Velocity [rad/s] are those of the shaft, Vsupply is scaled
+(not in volts and therefore ignored).  The d axis is not logged: i_d is set to its reference, zero.
 """
 
 NAME = "LAAS omodri"
@@ -15,6 +15,6 @@ COLUMNS = {
 }
 ASSUMED = {"i_d": 0.0}
 NOTES = [
-    "i_d is not in the log and taken as zero; there is no d voltage, so nothing can be said of the d axis",
-    "the position's zero is not the magnet's: its angle serves for harmonic orders, not for an encoder offset",
+    "i_d is not in the log and is set to zero; without a d voltage the d axis cannot be diagnosed",
+    "the zero of the position is arbitrary: the angle is used for harmonic orders, not for an encoder offset",
 ]

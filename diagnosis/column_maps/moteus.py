@@ -2,7 +2,7 @@
 
 Source: github.com/mjbots/moteus, fw/bldc_servo_structs.h (BldcServoStatus: d_A, q_A, electrical_theta, velocity,
 bus_V, motor_temp_C; BldcServoControl: d_V, q_V) and docs/protocol/registers.  Position and velocity are turns of
-the output shaft: with a gear, give the motor's speed by [columns] instead.
+the output shaft: with a gear, give the motor's speed in [columns] instead.
 """
 
 from fluxproof.diagnosis.column_maps import last_part as KEY  # noqa: F401
@@ -26,4 +26,4 @@ COLUMNS = {
     "motor_temp_c": ("temp_winding", "degC"),
     "torque_nm": ("torque", "Nm"),
 }
-NOTES = ["moteus: velocity is the output shaft's; with a gear the electrical speed is that much higher"]
+NOTES = ["moteus: velocity is that of the output shaft; with a gear the electrical speed is higher by its ratio"]

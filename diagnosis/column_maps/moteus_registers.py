@@ -24,4 +24,4 @@ COLUMNS = {
     "motor_temperature": ("temp_winding", "degC"),
     "torque": ("torque", "Nm"),
 }
-NOTES = ["moteus: velocity is the output shaft's; with a gear the electrical speed is that much higher"]
+NOTES = ["moteus: velocity is that of the output shaft; with a gear the electrical speed is higher by its ratio"]

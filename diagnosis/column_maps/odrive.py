@@ -1,8 +1,8 @@
 """ODrive properties logged under their own names (firmware 0.5 and 0.6).
 
 Source: ODrive's motor.hpp and foc.hpp: Id_measured, Iq_measured [A]; v_current_control_integral_d and _q [V] are
-the integrators of the current controllers, equal to the voltage at steady operating points, which is all a
-log over USB can show.  vel_estimate and pos_vel_mapper.vel are turns of the shaft a second.
+the integrators of the current controllers, equal to the voltage at steady operating points; a log over USB is too slow
+for anything else.  vel_estimate and pos_vel_mapper.vel are shaft turns per second.
 """
 
 from fluxproof.diagnosis.column_maps import last_part as KEY  # noqa: F401
@@ -24,4 +24,4 @@ COLUMNS = {
     "vbus_voltage": ("u_dc", "V"),
     "torque_estimate": ("torque", "Nm"),
 }
-NOTES = ["ODrive: the voltages are the current controllers' integrators; only steady operating points count"]
+NOTES = ["ODrive: the voltages are the current controllers' integrators; only steady operating points are used"]

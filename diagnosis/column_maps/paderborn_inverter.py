@@ -1,10 +1,10 @@
 """Kaggle "Inverter Data Set": a two-level IGBT inverter with an induction motor, Paderborn University.
 
 Source: the data set's page and M. Stender, O. Wallscheid, J. Böcker, "Data set description: three-phase IGBT
-two-level inverter for electrical drives" (2020): each row holds samples k-3 ... k (i_a_k, u_dc_k-1, d_a_k-2, ...)
-and the measured mean phase voltages u_a_k-1; rows stand in no particular order, sampled at 10 kHz.  Without
-a rotor angle and with an induction motor there is no balance of a synchronous machine to make: the map names
-the columns, and the check for an angle refuses unless [columns] has one.
+two-level inverter for electrical drives" (2020): each row contains samples k-3 ... k (i_a_k, u_dc_k-1, d_a_k-2, ...)
+and the measured mean phase voltages u_a_k-1; the rows are in arbitrary order, sampled at 10 kHz.  Without a rotor
+angle and with an induction motor, the balance of a synchronous machine does not apply: the map names the columns, and
+the recording is rejected unless [columns] gives an angle.
 """
 
 NAME = "Paderborn inverter data set"

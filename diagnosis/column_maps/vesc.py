@@ -1,8 +1,8 @@
 """VESC Tool's realtime log (CSV, separated by semicolons).
 
-Source: the header that VESC Tool writes and loggers imitate, "ms_today;input_voltage;...;d_axis_voltage;
-q_axis_voltage;...".  Currents and voltages are peak values in an amplitude-invariant dq frame, averaged since
-the last message; erpm is electrical.  A log has 10 to 50 rows a second: operating points only.
+Source: the header of VESC Tool and compatible loggers, "ms_today;input_voltage;...;d_axis_voltage;
+q_axis_voltage;...".  Currents and voltages are peak values in an amplitude-invariant dq frame, averaged since the last
+message; erpm is electrical.  A log has 10 to 50 rows per second: operating points only.
 """
 
 NAME = "VESC Tool"

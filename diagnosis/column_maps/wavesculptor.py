@@ -1,8 +1,8 @@
 """WaveSculptor motor controller over CAN, as the EMRAX 228 coast-down recording names its columns.
 
 Source: the controller's CAN messages (vectors of current, voltage and back-EMF; peak values) and the recording's own
-description: n_rpm is the shaft's and negative forward; vd_V, vq_V are what the controller asked for.  Signs are
-consistent as they are: u_q / omega_e is the positive magnet flux.
+description: n_rpm is the shaft speed, negative forward; vd_V, vq_V are the commanded voltages.  The signs are
+consistent: u_q / omega_e is the positive magnet flux.
 """
 
 NAME = "WaveSculptor"

@@ -41,7 +41,7 @@ class Layout:
 
 
 def encoding_of(head: bytes) -> str:
-    """UTF-16 and UTF-8 by their marks, else UTF-8 where it decodes, else the Western European code page."""
+    """UTF-16 and UTF-8 by their byte-order marks, else UTF-8 if it decodes, else Windows-1252."""
     if head.startswith((b"\xff\xfe", b"\xfe\xff")):
         return "utf-16"
     if head.startswith(b"\xef\xbb\xbf"):
@@ -104,7 +104,7 @@ def split(line: str, separator: str) -> list[str]:
 
 
 def _header(lines, separator, width):
-    """(names, units) from the lines above the numbers; "1", "2", ... where there is no header."""
+    """(names, units) from the lines above the numbers; "1", "2", ... without a header."""
     rows = []
     for line in reversed(lines):
         fields = split(

@@ -1,8 +1,8 @@
 """`make bench`: time and memory of ``fluxproof diagnose`` against the rows of a recording.
 
-The recording is of a drive with 20 % more resistance than its drive file says: the core in closed loop over the
-averaged plant through operating points of 0.1 s, so a longer recording has more of them.  Every size and format is
-diagnosed by a process of its own; its peak memory is what the operating system counted.
+The recorded drive has 20 % more resistance than its drive file: the core in closed loop with the averaged plant, with
+operating points of 0.1 s, so that a longer recording has more of them.  Every size and format is diagnosed by a
+separate process; its peak memory is that reported by the operating system.
 Writes build/bench/diagnose.json.
 
     python -m studies.bench.diagnose [ROWS ...]
@@ -35,12 +35,12 @@ from fluxproof.plant import IMPOSED_SPEED, Machine
 DRIVE = ROOT / "docs" / "drives" / "paper001.toml"
 ROWS = (10_000, 100_000, 1_000_000)
 FORMATS = (".csv", ".parquet")
-DWELL, RAMP = 1000, 200  # rows at an operating point, and of them on the way to it
+DWELL, RAMP = 1000, 200  # rows per operating point, and the rows of the ramp to it among them
 TARGET_S = 60.0  # for a million rows on two cores
 
 
 def columns(rows: int) -> dict[str, np.ndarray]:
-    """Canonical columns (rows,) of the drive that is diagnosed."""
+    """Canonical columns (rows,) of the diagnosed drive."""
     drive = drives.load(DRIVE)
     register_set = registers(drive)
     points = -(-rows // DWELL)
@@ -71,7 +71,7 @@ def columns(rows: int) -> dict[str, np.ndarray]:
 
 
 def write(path: Path, table: dict[str, np.ndarray]) -> Path:
-    """The columns in the format of the suffix, text with as many digits as a logger would write."""
+    """Write the columns in the format of the suffix, text with the digits of a typical logger; returns the path."""
     frame = pd.DataFrame(table)
     if path.suffix == ".csv":
         frame.to_csv(path, index=False, float_format="%.9g")
@@ -112,7 +112,7 @@ def main(sizes=ROWS) -> list[dict]:
         folder = Path(folder)
         measured(
             write(folder / "warm.parquet", columns(5000)), folder / "warm"
-        )  # compiles what is compiled once
+        )  # fills the compile cache
         for rows in sizes:
             table = columns(rows)
             for suffix in FORMATS:

@@ -1,4 +1,4 @@
-"""`make bench`: how many control periods a second the compiled golden model makes.  Writes build/bench/golden.json."""
+"""`make bench`: control periods per second of the compiled golden model.  Writes build/bench/golden.json."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ CONTROLLER_PERIODS = 400_000
 
 
 def rates(periods: int, run) -> list[float]:
-    """Periods a second of RUNS runs, after one that compiles and warms up."""
+    """Periods per second of RUNS runs, after a first one that compiles."""
     run()
     results = []
     for _ in range(RUNS):
@@ -45,7 +45,7 @@ def controller_rate(register_set) -> list[float]:
 
 
 def closed_loop_rate(drive, register_set, repeat: int = 30) -> list[float]:
-    """Fig. 9 again and again, over the averaged plant with converters."""
+    """Fig. 9 repeated, with the averaged plant and converters."""
     scenario = fig9(drive)
     references = np.stack(
         [scenario.omega_ref, scenario.i_d_ref, scenario.i_q_ext, scenario.speed_mode], axis=1

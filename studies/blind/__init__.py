@@ -1,5 +1,4 @@
-"""Sealed blind benchmark of the diagnosis: generator, truth under seal, scorer.
+"""Sealed blind benchmark of the diagnosis: generator, sealed ground truth, scorer.
 
-The simulator in here shares no code with plant/ and none with diagnosis/, so that the benchmark is not the
-estimator's own model.
+The simulator shares no code with plant/ or diagnosis/, so that the benchmark does not use the estimator's own model.
 """

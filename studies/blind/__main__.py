@@ -11,12 +11,12 @@ from studies.blind.score import print_figures, score
 
 
 def main(arguments=None) -> int:
-    """The command line; 0 when it ran, whatever the figures."""
+    """The command line; returns 0 whatever the figures."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--count", type=int, default=300)
     parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument("--keep", action="store_true", help="use the cases that are there")
+    parser.add_argument("--keep", action="store_true", help="use the existing cases")
     options = parser.parse_args(arguments)
     folder = BUILD / "blind" / f"seed{options.seed}"
     if not options.keep or not (folder / "sealed.sha256").exists():

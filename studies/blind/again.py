@@ -1,4 +1,4 @@
-"""The recording that a diagnosis asks for, made with the same hidden drive, and whether it breaks the tie."""
+"""The recording that a diagnosis requests, simulated with the same hidden drive, and whether it resolves the tie."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from studies.blind.figures import named_right
 
 DWELL_S = 0.6
 MOST_REQUESTS = 3
-SHARES = (1.0, 0.85, 0.7, 0.5, 0.3)  # of a requested current: as near as the drive can be brought
+SHARES = (1.0, 0.85, 0.7, 0.5, 0.3)  # of a requested current, tried in order until the drive reaches the point
 
 
 def requested_plan(case: cases.Case, request: dict, share: float = 1.0) -> plans.Plan:
-    """A plan that stands at the requested point; what the drive cannot reach is brought within its limits.
+    """A plan at the requested point, limited to what the drive can reach.
 
     share: of the requested current.
     """
@@ -39,12 +39,12 @@ def requested_plan(case: cases.Case, request: dict, share: float = 1.0) -> plans
 def further_recording(case: cases.Case, request: dict, seed: int, attempt: int, number: int) -> dict:
     """Columns {name: (n,)} of the same drive at {"omega_e", "i_d", "i_q", "u_dc", "temp_winding"} [SI].
 
-    Slow changes stand where the case's recording ended, unless a winding temperature near the reference is
-    asked for: then the drive has cooled down.
+    Drifts keep their final values of the case's recording, unless a winding temperature near the reference is
+    requested: then the drive has cooled down.
     """
     build = copy.copy(case.build)
     wanted, reference = request.get("temp_winding"), build.nominal.machine["temperature_ref_c"]
-    build.with_temp = build.with_temp or wanted is not None  # who is asked for a temperature records it
+    build.with_temp = build.with_temp or wanted is not None  # a requested temperature is also recorded
     cold = wanted is not None and wanted < reference + 10.0
     if cold:
         build.on_course = [_frozen(change, 0.0) for change in case.build.on_course]
@@ -54,9 +54,9 @@ def further_recording(case: cases.Case, request: dict, seed: int, attempt: int, 
         plan = requested_plan(case, request, share)
         try:
             return build.record(cases.rng_of(seed, case.index, attempt, 2 + number), plan, x_start=1.0)[0]
-        except ZeroDivisionError:  # the hidden iron has no current for this flux
+        except ZeroDivisionError:  # the hidden flux map has no current for this flux
             continue
-    raise RuntimeError(f"{request}: the drive of case {case.index} does not stand there, nor near it")
+    raise RuntimeError(f"{request}: the drive of case {case.index} does not reach this point, nor one near it")
 
 
 def _frozen(change, at):
@@ -64,7 +64,7 @@ def _frozen(change, at):
 
 
 def resolve(truth: dict, answer: dict, seed: int, folder: Path, scratch: Path, diagnose) -> dict:
-    """Make the recordings that an ambiguous answer asks for and diagnose all of them together.
+    """Make the recordings that an ambiguous answer requests and diagnose all of them together.
 
     Returns {"case", "asked", "resolved", "verdict", "effects"}.
     """

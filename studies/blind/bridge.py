@@ -1,8 +1,8 @@
-"""Three legs between switching instants: commands, dead time, commutation by the current's direction, drops.
+"""Three inverter legs between switching instants: commands, dead time, commutation by current direction, drops.
 
-Centre-aligned PWM: the upper switch is commanded on from t1 = T(1 - d)/2 to t2 = T(1 + d)/2.  Each edge waits
-one dead time.  While both switches are off the diode that carries the current sets the voltage; within a
-zone around zero current the leg floats in between, which clamps the current softly.
+Centre-aligned PWM: the upper switch is commanded on from t1 = T(1 - d)/2 to t2 = T(1 + d)/2.  Each turn-on is delayed
+by the dead time.  While both switches are off, the conducting diode determines the voltage; within a zone around zero
+current the leg voltage lies in between, which clamps the current softly.
 """
 
 import math
@@ -17,7 +17,7 @@ LOW, HIGH, DEAD = 0, 1, 2
 
 @jit
 def direction(kind, i_zone, i):
-    """How much of the dead time is lost, -1 to 1, at a phase current [A]."""
+    """Share of the dead-time loss, -1 to 1, at a phase current [A]."""
     x = i / i_zone
     if kind == P.DIRECTION_CLIP:
         return min(max(x, -1.0), 1.0)
@@ -25,7 +25,7 @@ def direction(kind, i_zone, i):
         return math.tanh(x)
     if kind == P.DIRECTION_ATAN:
         return math.atan(1.5 * x) * 2.0 / math.pi
-    if abs(x) < 1.0:  # DIRECTION_CAPACITANCE: the current swings the leg's capacitance in 1/x dead times
+    if abs(x) < 1.0:  # DIRECTION_CAPACITANCE: the current charges the leg capacitance in 1/x dead times
         return 0.5 * x
     return math.copysign(1.0 - 0.5 / abs(x), x)
 

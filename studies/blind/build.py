@@ -1,4 +1,4 @@
-"""One drive under construction: forms.py changes it effect by effect, ``record`` simulates it."""
+"""Builder of one drive: forms.py adds effects one by one, ``record`` simulates it."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from studies.blind.simulator import simulate
 
 @dataclass
 class Build:
-    """Nominal drive, true drive and plan.  ``on_course``: changes of the outside courses, in order.
+    """Nominal drive, true drive and plan.  ``on_course``: changes of the external courses, in order.
 
-    Each takes (course, x, recording) with x (n + 1,) the share of the recording that has passed, and
+    Each takes (course, x, recording) with x (n + 1,) the elapsed share of the recording, and
     changes the arrays in place; ``columns`` may add recorded channels through ``channels``.
     """
 
@@ -28,16 +28,16 @@ class Build:
     with_temp: bool
     file_kind: str
     on_course: list[Callable] = field(default_factory=list)
-    temperature: Callable | None = None  # (x, rng) -> what the thermocouple reads [degC]
+    temperature: Callable | None = None  # (x, rng) -> thermocouple reading [degC]
 
     def change(self, part: str, **values):
         """Replace fields of drive.motor, .bridge, .shaft, .sensor or .control."""
         self.drive = self.drive._replace(**{part: getattr(self.drive, part)._replace(**values)})
 
     def record(self, rng, plan=None, trace=False, x_start=0.0):
-        """Columns of the recording that the plan (default: the case's own) gives, and the trace or None.
+        """(columns of the recording of a plan (default: the case's own), trace or None).
 
-        x_start: state of slow changes at the start, 0 (fresh) to 1 (as at the end of the case's recording).
+        x_start: progress of drifts at the start, 0 (cold) to 1 (as at the end of the case's recording).
         """
         plan = plan or self.plan
         course = plans.course(plan, self.nominal)
@@ -57,7 +57,7 @@ class Build:
 
 
 def fresh(rng, nominal: Nominal, plan: plans.Plan, with_torque: bool) -> Build:
-    """A healthy drive with everyday sensors and a randomly tuned controller."""
+    """A healthy drive with typical sensors and a randomly tuned controller."""
     control = random_control(rng, nominal, plan.free)
     drive = P.ideal(nominal.machine, nominal.machine["inertia_kgm2"], control, nominal.period_s)
     build = Build(

@@ -1,4 +1,4 @@
-"""Random cases of the benchmark: stratum, effects, forms and sizes, all from (seed, index, stratum)."""
+"""Random cases of the benchmark: stratum, effects, forms and sizes, determined by (seed, index, stratum)."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from studies.blind.machines import random_nominal
 from studies.blind.magnetics import flux
 from studies.blind.plans import grid_plan, masked_plan, one_point_plan
 
-# Shares of the strata; healthy is large because a false alarm must be rare.
+# Shares of the strata; "healthy" is large because false alarms must be rare.
 STRATA = {
     "healthy": 0.14,
     "single": 0.24,
@@ -24,7 +24,7 @@ STRATA = {
     "damaged": 0.08,
 }
 
-# The catalogue's own confounders: pairs in which one effect can pass for the other.
+# The catalogue's confounders: pairs in which one effect can imitate the other.
 CONFOUNDED = [
     ("resistance", "iron_loss"),
     ("resistance", "magnet_flux"),
@@ -73,19 +73,19 @@ class Case:
 
 
 def rng_of(seed: int, index: int, attempt: int = 0, purpose: int = 0):
-    """The generator of one case; purpose 0: its making, 1: its recording, 2 and up: further recordings."""
+    """The random generator of one case; purpose 0: its effects, 1: its recording, 2 and up: further recordings."""
     return np.random.default_rng([seed, index, attempt, purpose])
 
 
 def strata_counts(count: int) -> dict[str, int]:
-    """How many cases of each stratum make ``count``; the rounding goes to singles."""
+    """Number of cases of each stratum for a total of ``count``; singles take the rounding."""
     counts = {name: int(round(share * count)) for name, share in STRATA.items()}
     counts["single"] += count - sum(counts.values())
     return counts
 
 
 def _effects_of(rng, stratum: str, turn: int) -> list[str]:
-    """Names of the effects; ``turn`` counts the stratum's cases so that every effect has its share."""
+    """Names of the effects; ``turn`` counts the cases of the stratum, so that effects are equally frequent."""
     names = sorted(forms.EFFECTS)
     if stratum in ("single", "one_point"):
         return (
@@ -107,14 +107,14 @@ def _effects_of(rng, stratum: str, turn: int) -> list[str]:
 def _form_of(rng, name: str, chosen: list[str], stratum: str, turn: int) -> str:
     others = [f for f in forms.EFFECTS[name][1] if f != forms.CATALOGUE]
     plain = turn % 2 == 0 if stratum == "single" else rng.random() < 0.45
-    # A rounded inductance beside saturation would be saturation twice.
+    # A rounded inductance together with saturation would be saturation twice.
     if name.startswith("inductance") and "saturation" in chosen:
         plain = True
     return forms.CATALOGUE if plain else str(rng.choice(others))
 
 
 def _keep_convex(build: Build):
-    """Shrink cross-saturation until both fluxes can be inverted everywhere the currents go."""
+    """Reduce cross-saturation until the fluxes are invertible over the whole current range."""
     i_r = build.nominal.machine["rated_current_a"]
     grid = [(d, q) for d in np.linspace(-1.5, 1.5, 13) * i_r for q in np.linspace(-1.5, 1.5, 13) * i_r]
     for _ in range(40):
@@ -156,7 +156,7 @@ def make(seed: int, index: int, stratum: str, turn: int, attempt: int = 0) -> Ca
 
 
 def record(case: Case, seed: int, attempt: int = 0, trace=False):
-    """Columns of the case's recording, damage included, the codes of its problem, and the trace or None."""
+    """(columns of the recording including damage, codes of its problem, trace or None)."""
     rng = rng_of(seed, case.index, attempt, 1)
     columns, held = case.build.record(rng, trace=trace)
     codes = damage.KINDS[case.kind](columns, rng, case.build.nominal) if case.stratum == "damaged" else []
@@ -164,7 +164,7 @@ def record(case: Case, seed: int, attempt: int = 0, trace=False):
 
 
 def sound(case: Case, columns) -> bool:
-    """Whether the controller held its references: no runaway, no lasting voltage limit."""
+    """Whether the controller followed its references: no runaway, no permanent voltage limit."""
     i_r = case.build.nominal.machine["rated_current_a"]
     currents = np.nan_to_num(np.abs(np.stack([columns[k] for k in ("i_a", "i_b", "i_c")])))
     duties = np.stack([columns[k] for k in ("d_a", "d_b", "d_c")])

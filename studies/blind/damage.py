@@ -1,6 +1,6 @@
-"""Faults of a recording itself: what a logger, a cable or a wrong unit makes of healthy columns.
+"""Faults of a recording: effects of a logger, a cable or a wrong unit on healthy columns.
 
-Each function changes the columns {name: (n,)} and returns the problem codes of which any one is right.
+Each function changes the columns {name: (n,)} and returns the accepted problem codes.
 """
 
 from __future__ import annotations

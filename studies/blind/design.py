@@ -1,6 +1,6 @@
-"""What each effect would leave in a recording of a given plan, to first order: rows of a linear design.
+"""First-order signature of each effect in a recording of a given plan: rows of a linear design matrix.
 
-Used only to judge which effects a recording can tell apart whatever the estimator (identifiable.py).  At each
+Used only to decide which effects a recording can separate, independent of the estimator (identifiable.py).  At each
 operating point of the plan, with z = d + jq in the measured frame and misfit = recorded voltage less
 R i + j omega psi(i): its mean, its lines at electrical orders +-1/p, +-1, +-2, +-6, +-12, the shaft torque's
 mean and cogging line, and mean and first order of the sum of three measured currents.
@@ -19,7 +19,7 @@ from studies.blind.bridge import direction, drop
 from studies.blind.magnetics import flux
 
 LINES = ("mean", "+e", "-e", "+1", "-1", "+2", "-2", "+6", "-6", "+12", "-12", "torque", "cog", "sum", "sum1")
-FLOOR = 2e-4  # share of the largest phase voltage (or torque, current) below which nothing counts as told
+FLOOR = 2e-4  # of the largest phase voltage (or torque, current): smaller differences are not detectable
 
 
 @dataclass
@@ -30,11 +30,11 @@ class Points:
     i: np.ndarray
     x: np.ndarray
     rows: np.ndarray
-    at: np.ndarray  # row in the middle
+    at: np.ndarray  # middle row
 
 
 def points(case) -> Points:
-    """The plan's segments; under a speed loop i_q is what the load asks for."""
+    """The plan's segments; with a speed loop, i_q follows from the load."""
     plan, n = case.build.plan, case.build.nominal
     s = np.array([segment[:3] for segment in plan.segments], float)
     rows = np.array([segment[3] for segment in plan.segments])
@@ -85,7 +85,7 @@ class Design:
         return np.concatenate([full.real.ravel(), full.imag.ravel()])
 
     def _weights(self):
-        """1 / standard deviation of each line at each point, floor included; 0 where nothing is recorded."""
+        """1 / standard deviation of each line at each point, including the floor; 0 where not recorded."""
         s, p, b = self.case.build.drive.sensor, self.p, self.case.build
         psi_noise = math.hypot(
             self.l_q * math.hypot(s.noise_a, s.lsb_a / 3.5),
@@ -109,7 +109,7 @@ class Design:
             weight[12] = weight[11] / 2.0
         elif b.plan.free:
             weight[12] = 1.0 / (5e-3 * rated)
-        if len(b.drive.shaft.cogging):  # above the sampling's reach it folds onto other orders
+        if len(b.drive.shaft.cogging):  # above the Nyquist frequency it is aliased to other orders
             weight[12] *= np.abs(b.drive.shaft.cogging[0, 0] * p.omega / self.pairs) * self.T < 2.5
         if not s.two_sensors:
             weight[13] = 1.0 / np.hypot(s.noise_a / np.sqrt(p.rows), 3e-4 * self.i_r)
@@ -119,7 +119,7 @@ class Design:
     # -- effects ------------------------------------------------------------------------------------------
 
     def _flux(self, d_psi_d, d_psi_q):
-        """Further flux d_psi at the same current: voltage and torque."""
+        """Additional flux d_psi at the same current: voltage and torque."""
         z = d_psi_d + 1j * d_psi_q
         return self._rows(mean=1j * self.p.omega * z, torque=self._torque(z, self.p.i))
 
@@ -138,7 +138,7 @@ class Design:
         moved = -1j * self.p.omega * tau * self.psi + self.p.omega * tau * self._l(1j * self.p.i)
         turned = (
             -1j * self.p.omega * tau * self.psi_m / self.l_q
-        )  # ripple current that was measured in excess
+        )  # ripple current that is measured in addition
         return self._rows(mean=-1j * self.p.omega * moved, torque=-self._torque(self.psi, turned))
 
     def _turn(self, delta, line="mean"):
@@ -181,7 +181,7 @@ class Design:
         )
 
     def variants(self, name) -> list[list[np.ndarray]]:
-        """An effect's columns, of a typical size each; more than one set where it may take another course."""
+        """Columns of an effect at a typical size; several sets if its time course may vary."""
         p, i_d, i_q, one = self.p, self.p.i.real, self.p.i.imag, np.ones(len(self.p.i))
         ir, psi, l_d, l_q, rated = self.i_r, self.psi_m, self.l_d, self.l_q, self.rated
         share, both = 1.0 - np.exp(-3.5 * p.x), (1.0, 1j)
@@ -236,7 +236,7 @@ class Design:
         return self.case.build.nominal.torque_rated
 
     def truth(self) -> np.ndarray:
-        """The rows that the hidden drive leaves, all effects together."""
+        """The rows of the hidden drive with all effects."""
         b, p, drive = self.case.build, self.p, self.case.build.drive
         m, s, br, h = drive.motor, drive.sensor, drive.bridge, drive.shaft
         course = plans.course(b.plan, b.nominal)

@@ -1,7 +1,7 @@
 """The figures of the benchmark from pairs of truth and answer; pure functions without files.
 
 A truth is an entry of the sealed file (generate.py); an answer is ``Diagnosis.to_json()`` with ``seconds``,
-or {"error": text} where the tool broke down.  Rates come with Wilson's 95 % interval.
+or {"error": text} if the tool raised an exception.  Rates come with Wilson's 95 % interval.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ def rate(name: str, hits) -> dict:
 
 
 def true_names(truth) -> set[str]:
-    """Effects of the catalogue that are in the case; empty where it is healthy, damaged or unknown."""
+    """Catalogue effects of the case; empty if it is healthy, damaged or unknown."""
     return {effect["name"] for effect in truth["effects"]}
 
 
@@ -72,23 +72,23 @@ def tied(answer) -> set[str]:
 
 
 def named_right(truth, answer) -> bool:
-    """Explained, by exactly the effects that are there."""
+    """Explained, by exactly the true effects."""
     return answer.get("verdict") == "explained" and asserted(answer) == true_names(truth)
 
 
 def confidently_wrong(truth, answer) -> bool:
-    """Asserts an effect that is not there."""
+    """Asserts an absent effect."""
     return bool(asserted(answer) - true_names(truth))
 
 
 def inside_ambiguity(truth, answer) -> bool:
-    """Every true effect is asserted or stands in an ambiguity set; never so where there is none."""
+    """Whether every true effect is asserted or in an ambiguity set; False without ambiguity."""
     names = true_names(truth)
     return bool(names) and names <= asserted(answer) | tied(answer)
 
 
 def problem_found(truth, answer) -> bool:
-    """The damage was refused or named, and nothing was blamed on physics."""
+    """Whether the damage was rejected or named, and no effect was asserted."""
     if answer.get("verdict") == "bad_recording":
         return True
     problems = answer.get("recording", {}).get("problems", [])
@@ -107,7 +107,7 @@ def identifiable(truth) -> bool:
 
 # -- parameters -------------------------------------------------------------------------------------------
 
-# Relative to the largest of the three phases: one of them may well be zero.
+# Relative to the largest of the three phases, since one of them may be zero.
 PHASES = ("a", "b", "c")
 GROUPS = [
     [f"offset_{x}_a" for x in PHASES],
@@ -117,7 +117,7 @@ GROUPS = [
 
 
 def parameter_errors(truth, answer) -> list[dict]:
-    """Error of every estimated parameter whose truth is known, of effects that are there and asserted."""
+    """Error of every estimated parameter with a known true value, of effects that are present and asserted."""
     found = []
     estimates = {e["name"]: e.get("parameters", {}) for e in answer.get("effects", [])}
     for effect in truth["effects"]:
@@ -128,7 +128,7 @@ def parameter_errors(truth, answer) -> list[dict]:
             value, sigma, wanted = given[name]["value"], given[name]["sigma"], true[name]
             if name == "amplitude_rad":
                 value = abs(value)
-            if group is GROUPS[0]:  # what all phases share leaves no trace in dq
+            if group is GROUPS[0]:  # the common mode is not visible in dq
                 value -= np.mean([given[x]["value"] for x in group])
                 wanted -= np.mean([true[x] for x in group])
             error = value - wanted
@@ -218,7 +218,7 @@ def figures(cases, resolved=()) -> dict:
             "unknown_recognised", [a.get("verdict") == "unexplained" for t, a in by["unknown"]]
         ),
         "damage_found": rate("", [problem_found(t, a) for t, a in by["damaged"]]),
-        # Where the recording cannot tell by design: right, or at least nothing wrong asserted.
+        # If the effect is not identifiable: correct, or at least nothing wrong asserted.
         "not_identifiable_honest": rate("", [not confidently_wrong(t, a) for t, a in blind]),
         "not_identifiable_inside": rate("", [named_right(t, a) or inside_ambiguity(t, a) for t, a in blind]),
         "breakdowns": rate("", ["error" in a for t, a in cases]),

@@ -1,7 +1,7 @@
 """Float field-oriented control on measured signals: PI in dq with decoupling, voltage limit, modulation.
 
-Knows the nominal machine alone.  The voltage is turned to the middle of the period in which it will be in
-force, 1.5 periods after the sample.
+Uses the nominal machine only.  The voltage is rotated to the middle of the period in which it takes effect,
+1.5 periods after the sample.
 """
 
 import math
@@ -23,7 +23,7 @@ def to_dq(a, b, c, theta):
 
 @jit
 def control(c, memory, i_abc, theta, omega, u_dc, i_d_ref, i_q_ref, period_s, duties):
-    """One step; fills duties (3,), in force one period later.  memory (3,): integrals of d, q, speed."""
+    """One step; fills duties (3,), which take effect one period later.  memory (3,): integrators of d, q, speed."""
     i_d, i_q = to_dq(i_abc[0], i_abc[1], i_abc[2], theta)
     e_d, e_q = i_d_ref - i_d, i_q_ref - i_q
     u_d = c.kp_d * e_d + memory[0] - c.decouple * omega * c.l_q * i_q_ref

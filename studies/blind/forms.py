@@ -1,4 +1,4 @@
-"""All effects of the benchmark and how to put one into a drive."""
+"""All effects of the benchmark, and ``apply``, which adds one to a drive."""
 
 from __future__ import annotations
 
@@ -10,5 +10,5 @@ __all__ = ["CATALOGUE", "EFFECTS", "apply", "forms_machine", "forms_sensors"]
 
 
 def apply(name: str, build: Build, rng, size: float, form: str) -> dict[str, float]:
-    """Put one effect into the drive; returns the true parameters."""
+    """Add one effect to the drive; returns the true parameters {name: value}."""
     return {key: float(value) for key, value in EFFECTS[name][0](build, rng, size, form).items()}

@@ -1,4 +1,4 @@
-"""Effects of machine, inverter and shaft, as the catalogue would write them and otherwise (registry.py)."""
+"""Effects of machine, inverter and shaft, in the catalogue's form and in others (registry.py)."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def resistance(b, rng, size, form):
     """Typical: +20 %, seldom less than nominal."""
     r = b.nominal.machine["resistance_ohm"]
     rise = size * 0.2 if form == "in_bridge" or rng.random() < 0.75 else -min(size, 1.7) * 0.2
-    if form == "in_bridge":  # switches and cables: the same ohms at another place
+    if form == "in_bridge":  # switches and cables: the same resistance outside the winding
         b.change(
             "bridge",
             drop=P.DROP_CONSTANT if b.drive.bridge.drop == P.DROP_NONE else b.drive.bridge.drop,
@@ -63,7 +63,7 @@ def resistance(b, rng, size, form):
 
 
 def _rise(form, x, rate):
-    """Share of the temperature rise that has happened at the share x of the recording."""
+    """Relative temperature rise at the share x of the recording."""
     return x if form == CATALOGUE else (1.0 - np.exp(-rate * x)) / (1.0 - math.exp(-rate))
 
 
@@ -90,7 +90,7 @@ def magnet_flux(b, rng, size, form):
     """Typical: -5 %."""
     fall = 0.05 * size * sign(rng, 0.25)
     psi = b.nominal.machine["magnet_flux_wb"]
-    if form == "recovering":  # a part of the loss comes back while the recording runs
+    if form == "recovering":  # a part of the lost flux recovers during the recording
         b.on_course.append(lambda c, x: c.psi_scale.__imul__(1.0 + fall * (1.0 - 0.15 * x)))
         return {}
     b.on_course.append(lambda c, x: c.psi_scale.__imul__(1.0 + fall))
@@ -99,7 +99,7 @@ def magnet_flux(b, rng, size, form):
 
 @effect("exponential")
 def magnet_temperature(b, rng, size, form):
-    """NdFeB, -0.1 %/K; typical rise 40 K.  No sensor sees the magnets, so that only the drift is known."""
+    """NdFeB, -0.1 %/K; typical rise 40 K.  The magnet temperature is not measured, so that only the drift is known."""
     beta, span, rate = -0.001, min(40.0 * size, 120.0), rng.uniform(2.0, 5.0)
     b.on_course.append(lambda c, x: c.psi_scale.__imul__(1.0 + beta * span * _rise(form, x, rate)))
     return {}
@@ -110,7 +110,7 @@ def _inductance(b, rng, size, form, axis):
     change = max(change, -0.4)
     value = b.nominal.machine[f"inductance_{axis}_h"] * (1.0 + change)
     b.change("motor", **{f"l_{axis}": value})
-    if form == "rounded":  # the surplus itself levels off a little: 12 % of it at rated current
+    if form == "rounded":  # the excess inductance saturates slightly: by 12 % at rated current
         sat = rated(b) / math.sqrt(0.24 * abs(change))
         b.change("motor", **{f"self_{axis}": P.SELF_ROOT, f"sat_{axis}": sat})
         return {}
@@ -131,7 +131,7 @@ def inductance_q(b, rng, size, form):
 
 @effect("tanh", "rational", "langevin", "root", "shifted_d")
 def saturation(b, rng, size, form):
-    """Typical: q flux 15 % below the straight line at rated current, d flux a third of that."""
+    """Typical: q flux 15 % below the linear one at rated current, d flux a third of that."""
     i_r = rated(b)
     loss_q = min(0.15 * size, 0.38)
     loss_d = loss_q * rng.uniform(0.2, 0.6)
@@ -149,11 +149,11 @@ def saturation(b, rng, size, form):
 
 
 def _knee(kind, loss):
-    """Knee over rated current at which the flux at rated current is ``loss`` below the straight line."""
+    """Knee over rated current at which the flux at rated current is ``loss`` below the linear one."""
     low, high = 0.05, 1000.0
     for _ in range(60):
         middle = math.sqrt(low * high)
-        if kind == P.SELF_SHIFTED:  # towards positive current, where the magnet has gone before
+        if kind == P.SELF_SHIFTED:  # towards positive current, to which the magnet biases the iron
             flux = self_flux(kind, 1.0, middle, 0.4 * middle, 1.0)[0]
         else:
             flux = self_flux(kind, 1.0, middle, 0.0, 1.0)[0]
@@ -191,7 +191,7 @@ def emf_harmonics(b, rng, size, form):
     rows = []
     for k, order in enumerate((6.0, 12.0) if form == CATALOGUE else (6.0, 12.0, 18.0)):
         scale = a * (0.3**k)
-        if form == CATALOGUE:  # the 5th and 7th of a winding that mirrors about the d axis
+        if form == CATALOGUE:  # 5th and 7th harmonic of a winding that is symmetric about the d axis
             ratio = rng.uniform(-0.8, 0.8)
             rows.append((order, scale, 0.0, scale * ratio, -0.5 * math.pi))
         else:
@@ -202,7 +202,7 @@ def emf_harmonics(b, rng, size, form):
 
 @effect("whole", "half", "shift")
 def delay(b, rng, size, form):
-    """Typical: 10 us; other forms: one whole period, registers that load at the peak, shifted gates."""
+    """Typical: 10 us; other forms: one period, registers that load at the carrier peak, shifted gates."""
     T = b.nominal.period_s
     if form == "half":
         b.change("bridge", delay_kind=P.DELAY_HALF, delay=0.5)
@@ -217,9 +217,9 @@ def delay(b, rng, size, form):
 
 @effect("warming")
 def phase_resistance_asymmetry(b, rng, size, form):
-    """Typical: 10 % in the worst phase, mean resistance kept."""
+    """Typical: 10 % in the worst phase at constant mean resistance."""
     x = 0.1 * size * three(rng, form != CATALOGUE)
-    fade = 0.25 * (form != CATALOGUE)  # a bad contact heals as it warms
+    fade = 0.25 * (form != CATALOGUE)  # a bad contact improves as it warms
     b.on_course.append(lambda c, s: c.r_scale.__imul__(1.0 + x[:, None] * (1.0 - fade * s)))
     return {} if fade else dict(zip(("asymmetry_a", "asymmetry_b", "asymmetry_c"), x))
 
@@ -239,7 +239,7 @@ def cogging(b, rng, size, form):
 
 @effect("stribeck")
 def friction(b, rng, size, form):
-    """Typical: 5 % of the rated torque at rated speed, half of it dry."""
+    """Typical: 5 % of the rated torque at rated speed, half of it Coulomb friction."""
     t, share = 0.05 * size * b.nominal.torque_rated, rng.uniform(0.3, 0.7)
     omega_m = b.nominal.omega_rated / b.nominal.machine["pole_pairs"]
     viscous = b.drive.shaft.viscous + (1.0 - share) * t / omega_m

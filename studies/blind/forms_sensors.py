@@ -1,4 +1,4 @@
-"""Effects of sensors and sampling, each as the catalogue would write it and otherwise (registry.py).
+"""Effects of sensors and sampling, in the catalogue's form and in others (registry.py).
 
 Signs: measured = true (1 + gain) + offset, for angles measured = true + offset, for the bus measured =
 true (1 + gain).  Gains of the phases sum to zero; a common part would be current_scale.
@@ -27,7 +27,7 @@ def sampling_skew(b, rng, size, form):
 
 @effect("creeping")
 def encoder_offset(b, rng, size, form):
-    """Typical: 2 electrical degrees; the other form creeps by 15 % while the recording runs."""
+    """Typical: 2 electrical degrees; the other form drifts by 15 % during the recording."""
     offset, creep = math.radians(2.0) * size * sign(rng), 0.15 * (form != CATALOGUE)
     b.on_course.append(lambda c, x: c.theta_offset.__iadd__(offset * (1.0 - creep * x)))
     return {} if creep else {"offset_rad": offset}
@@ -53,7 +53,7 @@ def current_offset(b, rng, size, form):
     b.on_course.append(lambda c, x: c.offsets.__iadd__(offsets[:, None] * (1.0 - creep * x)))
     if creep:
         return {}
-    # A part that all three phases share leaves no trace in dq.
+    # A common-mode part is not visible in dq.
     return dict(zip(("offset_a_a", "offset_b_a", "offset_c_a"), offsets))
 
 
@@ -70,7 +70,7 @@ def current_gain(b, rng, size, form):
 
 @effect("drooping")
 def current_scale(b, rng, size, form):
-    """Typical: 3 %; the other form droops towards high currents."""
+    """Typical: 3 %; the other form saturates at high currents."""
     s = 0.03 * size * sign(rng)
     b.change("sensor", scale=s)
     if form == "drooping":
@@ -81,7 +81,7 @@ def current_scale(b, rng, size, form):
 
 @effect("offset")
 def udc_gain(b, rng, size, form):
-    """Typical: 2 %; the other form is in part an offset of the bus sensor."""
+    """Typical: 2 %; the other form is partly an offset of the bus sensor."""
     g = 0.02 * size * sign(rng)
     if form == "offset":
         bus = b.nominal.inverter["dc_bus_v"]

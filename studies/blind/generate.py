@@ -53,7 +53,7 @@ def generate_case(job) -> dict:
         case = cases.make(seed, number, stratum, turn, attempt)
         try:
             columns, codes, _ = cases.record(case, seed, attempt)
-        except ZeroDivisionError:  # a flux map without a unique current on the way: no drive
+        except ZeroDivisionError:  # the flux map has no unique current within the range: not a valid drive
             continue
         if stratum == "damaged" or cases.sound(case, columns):
             break
@@ -101,7 +101,7 @@ def generate(seed: int, out: Path, count: int, only: list[str] | None = None, jo
 
 
 def main(arguments=None) -> int:
-    """The command line; 0 when all cases are written."""
+    """The command line; returns 0 when all cases are written."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--out", type=Path)
@@ -112,7 +112,7 @@ def main(arguments=None) -> int:
     only = options.only.split(",") if options.only else None
     wrong = set(only or ()) - set(cases.STRATA)
     if wrong:
-        parser.error(f"--only: no stratum {', '.join(sorted(wrong))}; there are {', '.join(cases.STRATA)}")
+        parser.error(f"--only: no stratum {', '.join(sorted(wrong))}; known are {', '.join(cases.STRATA)}")
     out = options.out or BUILD / "blind" / f"seed{options.seed}"
     digest = generate(options.seed, out, options.count, only, options.jobs)
     print(f"{out}: sealed, SHA-256 {digest}")

@@ -1,8 +1,8 @@
-"""Which effects of a case its recording can tell by design, whatever the estimator.
+"""Which effects of a case are identifiable from its recording, independent of the estimator.
 
-An effect counts as identifiable unless another set of catalogue effects, no larger than the true one and
-without that effect, leaves the same rows within the noise and a floor (design.py).  First order, steady
-operating points only; so what is judged untellable may still show in a transient, but hardly the reverse.
+An effect counts as identifiable unless another set of catalogue effects, no larger than the true one and without that
+effect, gives the same rows within the noise and a floor (design.py).  The analysis is first-order and covers steady
+operating points only; an effect judged unidentifiable may still show in a transient, but hardly the reverse.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 from studies.blind import forms
 from studies.blind.design import Design
 
-ENOUGH = 100.0  # squared distance, in standard deviations, at which two explanations are told apart
+ENOUGH = 100.0  # squared distance, in standard deviations, at which two explanations are separable
 PRIOR = 6.0  # typical sizes beyond which an explanation is implausible
 
 

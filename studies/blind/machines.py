@@ -1,4 +1,4 @@
-"""Random drives with per-unit values that a real one could have, and the nominal drive.toml of each."""
+"""Random drives with realistic per-unit values, and the nominal drive.toml of each."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ class Nominal:
 
     @property
     def voltage_limit(self):
-        """Longest voltage vector [V] that the modulation makes linearly."""
+        """Largest voltage vector [V] of the linear modulation range."""
         return self.inverter["dc_bus_v"] * (1.0 / math.sqrt(3.0) if self.svm else 0.5)
 
     def voltage(self, omega, i_d, i_q):
-        """Length of the steady-state voltage [V] at electrical speed [rad/s] and currents [A]."""
+        """Magnitude of the steady-state voltage [V] at electrical speed [rad/s] and currents [A]."""
         m = self.machine
         u_d = m["resistance_ohm"] * i_d - omega * m["inductance_q_h"] * i_q
         u_q = m["resistance_ohm"] * i_q + omega * (m["inductance_d_h"] * i_d + m["magnet_flux_wb"])
@@ -93,7 +93,7 @@ def random_nominal(rng) -> Nominal:
 
 
 def random_control(rng, n: Nominal, speed_loop: bool) -> P.Control:
-    """Controller with random bandwidths, tuned on the nominal machine with some carelessness."""
+    """Controller with random bandwidths, tuned on the nominal machine with random errors."""
     m, T = n.machine, n.period_s
     w = 2.0 * math.pi * min(rng.uniform(150.0, 800.0), 0.06 / T)
     r = m["resistance_ohm"] * rng.uniform(0.7, 1.5)

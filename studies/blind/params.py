@@ -1,6 +1,6 @@
-"""What one simulated drive is made of: plain named tuples that compiled code takes, SI units, peak values.
+"""Parameters of a simulated drive: named tuples for compiled code, SI units, peak values.
 
-``ideal()`` gives a drive in which every effect is absent; an effect changes fields of it (forms.py).
+``ideal()`` is a drive without any effect; an effect changes fields of it (forms.py).
 """
 
 from __future__ import annotations
@@ -110,7 +110,7 @@ class Sensor(NamedTuple):
 
 
 class Control(NamedTuple):
-    """The float field-oriented controller, which knows the nominal machine alone."""
+    """The float field-oriented controller, which uses the nominal machine only."""
 
     kp_d: float
     ki_d: float
@@ -142,7 +142,7 @@ class Drive(NamedTuple):
 
 
 class Course(NamedTuple):
-    """What comes from outside, one value a row, shape (n + 1,) but the references, shape (n,).
+    """External inputs, one value per row, shape (n + 1,) except the references, shape (n,).
 
     u_dc [V] truly there; u_hidden [V] added to it and not seen by the sensor; omega [rad/s] mechanical,
     imposed or asked for by the speed loop; load [Nm] of a free shaft; r_scale (3, n + 1), psi_scale: factors

@@ -1,6 +1,6 @@
-"""Operating plans: which speeds and currents a recording visits, and the courses that they make.
+"""Operating plans: the speeds and currents of a recording, and the resulting courses.
 
-A plan is a list of segments; courses are arrays of one value a row (params.Course).
+A plan is a list of segments; courses are arrays with one value per row (params.Course).
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def _fits(n: Nominal, omega, i_d, i_q):
 
 
 def _top_speed(n: Nominal, points):
-    """Highest electrical speed at which every point keeps a reserve of voltage, at most the rated one."""
+    """Highest electrical speed at which every point has a voltage reserve, at most the rated one."""
     omega = n.omega_rated
     while omega > 0.05 * n.omega_rated and not all(
         _fits(n, s * omega, d, q) for d, q in points for s in (1, -1)
@@ -54,7 +54,7 @@ def current_points(rng, i_rated, with_d=True):
     extra = [(0.0, 0.0), (0.0, -low)]
     if with_d:
         must += [(negative, 0.0), (negative, side * rng.uniform(0.6, 1.0))]
-        must += [(0.5 * negative, -side * rng.uniform(0.3, 0.7))]  # another level, or L_d could be saturation
+        must += [(0.5 * negative, -side * rng.uniform(0.3, 0.7))]  # a second level separates L_d from saturation
         extra += [(negative, -side), (0.7 * negative, -low)]
     rng.shuffle(extra)
     points = must + extra[: rng.integers(1, min(4, len(extra) + 1))]
@@ -94,7 +94,7 @@ def one_point_plan(rng, n: Nominal) -> Plan:
 
 
 def masked_plan(rng, n: Nominal) -> Plan:
-    """Speed references and load steps on a free shaft; both loops hide what they can."""
+    """Speed references and load steps on a free shaft, so that both loops mask the effects."""
     i_rated = n.machine["rated_current_a"]
     points = [(0.0, i_rated), (0.0, -i_rated), (-0.4 * i_rated, 0.8 * i_rated)]
     top = _top_speed(n, points)
@@ -109,7 +109,7 @@ def masked_plan(rng, n: Nominal) -> Plan:
 
 
 def steps(plan: Plan, column: int):
-    """One value of the segments a row, shape (n,)."""
+    """A value of the segments for each row, shape (n,)."""
     return np.repeat(
         [segment[column] for segment in plan.segments], [segment[3] for segment in plan.segments]
     )

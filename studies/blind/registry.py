@@ -1,7 +1,7 @@
 """Registry of the benchmark's effects: name, function and functional forms.
 
 An effect is a function (build, rng, size, form) -> {parameter: true value}; ``size`` is a factor on a typical
-size, 0.3 to 3.  Parameters appear where the form leaves them well defined.
+size, 0.3 to 3.  Parameters are given only if the form defines them.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def rated(build):
 
 
 def three(rng, other):
-    """Three values that sum to zero, the largest 1: one phase off, or (other) all of them."""
+    """Three values with sum zero and largest value 1: one phase deviates, or (other) all of them."""
     if not other:
         return np.roll((1.0, -0.5, -0.5), rng.integers(3)) * sign(rng)
     x = rng.standard_normal(3)

@@ -1,4 +1,4 @@
-"""Diagnose every case of a sealed benchmark, then open the truth and score: `python -m studies.blind.score`.
+"""Diagnose every case of a sealed benchmark, then open the truth and score it: `python -m studies.blind.score`.
 
 Writes result.json (every figure with its Wilson interval) and report.html into the folder above the cases.
 The truth is read only after the last diagnosis; its hash must be the sealed one.
@@ -31,7 +31,7 @@ def answer_of(folder: Path) -> tuple[str, dict]:
     try:
         answer = diagnose(recording, folder / "drive.toml").to_json()
         answer["seconds"] = time.perf_counter() - began
-    except Exception as error:  # the benchmark counts breakdowns and goes on
+    except Exception as error:  # the benchmark counts exceptions and continues
         answer = {"error": f"{type(error).__name__}: {error}", "trace": traceback.format_exc(limit=-4)}
     return folder.name, json.loads(json.dumps(answer, default=float))
 
@@ -105,7 +105,7 @@ def score(folder: Path, jobs: int = 2, reuse: bool = False) -> dict:
 
 
 def summary(cases, resolved) -> dict:
-    """Everything that result.json holds about (truth, answer) pairs."""
+    """The contents of result.json for (truth, answer) pairs."""
     return {
         "schema": 1,
         "figures": figures.figures(cases, resolved),
@@ -121,7 +121,7 @@ def summary(cases, resolved) -> dict:
 
 
 def _line(t, a):
-    """One case in short, for whoever wants to know what went wrong."""
+    """Short record of one case, for the analysis of errors."""
     return {
         "case": t["case"],
         "stratum": t["stratum"],
@@ -138,7 +138,7 @@ def _line(t, a):
 
 
 def print_figures(result: dict):
-    """The table of figures, one a line."""
+    """Print the figures, one per line."""
     for name, f in result["figures"].items():
         if f.get("value") is None:
             print(f"{name:28s} no case")
@@ -151,11 +151,11 @@ def print_figures(result: dict):
 
 
 def main(arguments=None) -> int:
-    """The command line; 0 when scored, 2 when the truth is missing or was changed."""
+    """The command line; returns 0 when scored, 2 if the truth is missing or was changed."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", type=Path, nargs="?", default=BUILD / "blind" / "seed1")
     parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument("--reuse", action="store_true", help="score the answers of the last run again")
+    parser.add_argument("--reuse", action="store_true", help="score the answers of the previous run again")
     options = parser.parse_args(arguments)
     try:
         print_figures(score(options.folder, options.jobs, options.reuse))

@@ -1,4 +1,4 @@
-"""The truth under seal: one compressed file beside the case folders, its SHA-256 fixed before any run."""
+"""The sealed truth: one compressed file next to the case folders, whose SHA-256 is fixed before any run."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class SealError(ValueError):
 
 
 def truth_path(folder: Path) -> Path:
-    """Where the truth of the cases in ``folder`` lies: outside of it."""
+    """Path of the truth of the cases in ``folder``, outside of it."""
     return folder.parent / f"truth_{folder.name}.sealed"
 
 

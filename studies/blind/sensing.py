@@ -1,4 +1,4 @@
-"""Sensors: what the controller and the recording see of currents, angle, speed and bus voltage."""
+"""Sensors: measured currents, angle, speed and bus voltage for controller and recording."""
 
 import math
 
@@ -18,7 +18,7 @@ def rounded(x, lsb):
 
 @jit
 def phase_current(s, gain, offset, noise, i, neighbour):
-    """One sensor's reading [A]; neighbour: what reaches it of the other conductors [A]."""
+    """One sensor's reading [A]; neighbour: cross-talk from the other conductors [A]."""
     x = i + s.cross_talk * neighbour
     x = x * (1.0 + s.quadratic * x + s.cubic * x * x)
     x = x * (1.0 + s.scale) * (1.0 + gain) + offset + s.noise_a * noise
@@ -37,7 +37,7 @@ def measure_currents(s, i, offsets, noise, out):
 
 @jit
 def wave(kind, x):
-    """A period of 2 pi, amplitude 1: cosine, triangle, or a cosine that leans over."""
+    """Waveform of period 2 pi and amplitude 1: cosine, triangle, or a skewed cosine."""
     if kind == P.WAVE_COSINE:
         return math.cos(x)
     if kind == P.WAVE_TRIANGLE:
@@ -47,7 +47,7 @@ def wave(kind, x):
 
 @jit
 def measure_angle(s, theta_m, pole_pairs, offset, noise):
-    """Electrical angle [rad], not wrapped, of an encoder mounted off by ``offset`` [rad] electrical."""
+    """Electrical angle [rad], not wrapped, of an encoder with ``offset`` [rad] electrical."""
     error = offset + s.ecc_1 * wave(s.ecc_1_wave, theta_m + s.ecc_1_phase)
     error += s.ecc_2 * math.cos(2.0 * theta_m + s.ecc_2_phase) + s.ecc_n * math.cos(s.ecc_order * theta_m)
     return rounded(pole_pairs * theta_m + error + s.theta_noise * noise, s.theta_lsb)

@@ -1,4 +1,4 @@
-"""Switching-instant simulation of a drive under field-oriented control; the benchmark's own physics.
+"""Switching-level simulation of a drive with field-oriented control; the benchmark's own physics.
 
 State: stator flux linkage in the stator frame, speed, angle.  d psi/dt = C(v_leg - R_x i_x), with the legs'
 voltages constant in kind between switching instants; currents follow from the flux (magnetics.py).  Iron loss
@@ -227,13 +227,13 @@ def run(drive, course, noise, start, duty_start, substeps, rows, trace):
             if sen.skew_s != 0.0 and edges[e] == sample_at:
                 i_early[0], i_early[1] = s[IA], -0.5 * s[IA] + 0.5 * ROOT3 * s[IB]
                 i_early[2] = -i_early[0] - i_early[1]
-                if sen.skew_s > 0.0:  # this row's own sample; a negative skew took the next row's
+                if sen.skew_s > 0.0:  # this row's sample; a negative skew belongs to the next row
                     i_true[:] = i_early
         if k < trace.shape[0]:
             for x in range(4):
                 trace[k, 6 + x] = mean[x] / T
             trace[k, 11], trace[k, 12] = mean[4], mean[5]
-        # What the controller sees, and its answer.
+        # Measurement and control.
         measure_currents(sen, i_true, course.offsets[:, k], noise[k, :3], i_meas)
         angle = raw
         if sen.pll_rad_s > 0.0:
@@ -275,7 +275,7 @@ def simulate(drive, course, rng, theta_m=0.0, substeps=1, trace=False):
     h_d, h_q, _, _ = harmonics(m, m.pole_pairs * theta_m)
     psi = course.psi_scale[0] * (m.psi_m + h_d + 1j * h_q) * np.exp(1j * m.pole_pairs * theta_m)
     start[PA], start[PB], start[OM], start[TH] = psi.real, psi.imag, omega, theta_m
-    # The first duties hold the no-load voltage, so that the recording does not begin with a jolt.
+    # The first duties give the no-load voltage, so that the recording does not begin with a transient.
     emf = 1j * m.pole_pairs * omega * psi * np.exp(0.5j * m.pole_pairs * omega * drive.period_s)
     legs = (emf * np.exp(-2j * math.pi / 3.0 * np.arange(3))).real / course.u_dc[0]
     duties = np.clip(0.5 + legs - 0.5 * (legs.max() + legs.min()), 0.02, 0.98)

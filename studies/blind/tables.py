@@ -21,7 +21,7 @@ from studies.blind.figures import (
 
 
 def by_form(cases, resolved=()) -> dict:
-    """The figures of cases whose effects all have the catalogue's form, and of the others."""
+    """Figures of the cases whose effects all have the catalogue's form, and of the others."""
     split = {}
     for kind in ("catalogue", "other"):
         part = [(t, a) for t, a in cases if t["effects"] and form_class(t) == kind]
@@ -32,7 +32,7 @@ def by_form(cases, resolved=()) -> dict:
 
 
 def by_stratum(cases) -> dict:
-    """Cases, named right, ambiguous with the truth inside, wrongly asserted, verdicts, of each stratum."""
+    """For each stratum: cases, named right, ambiguous with the truth inside, wrongly asserted, verdicts."""
     table = {}
     for stratum in sorted({t["stratum"] for t, a in cases}):
         part = [(t, a) for t, a in cases if t["stratum"] == stratum]
@@ -50,7 +50,7 @@ def by_stratum(cases) -> dict:
 
 
 def by_effect(cases) -> dict:
-    """How each effect fared: asserted, tied or missed where it is, and asserted where it is not."""
+    """For each effect: asserted, tied or missed if present, and asserted if absent."""
     table = defaultdict(Counter)
     for t, a in cases:
         for effect in t["effects"]:
@@ -70,7 +70,7 @@ def by_effect(cases) -> dict:
 def confusion(cases) -> dict:
     """{truth: {asserted: count}}.
 
-    A true effect that was not asserted is set against what was wrongly asserted instead, or against (tied),
+    A true effect that was not asserted counts against the one wrongly asserted instead, or against (tied),
     (unexplained), (none).
     """
     table = defaultdict(Counter)
@@ -91,7 +91,7 @@ def confusion(cases) -> dict:
 
 
 def times(cases) -> dict:
-    """Seconds a case, and rows a second."""
+    """Seconds per case, and rows per second."""
     seconds = np.array([a["seconds"] for t, a in cases if "seconds" in a])
     if not len(seconds):
         return {}

@@ -1,4 +1,4 @@
-"""Effects that no catalogue entry describes: the right answer to them is "unknown"."""
+"""Effects that no catalogue entry describes; the correct answer is "unknown"."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def sensor_bend(b: Build, rng, size):
 
 
 def angle_lag(b: Build, rng, size):
-    """The angle comes from a slow tracking loop, which falls behind while the speed swings."""
+    """The angle comes from a slow tracking loop, which lags while the speed oscillates."""
     b.plan.swing = (0.15, float(rng.uniform(6.0, 12.0)))
     b.change("sensor", pll_rad_s=2.0 * math.pi * 40.0 / math.sqrt(size), omega_exact=0)
 
@@ -46,17 +46,17 @@ def load_unbalance(b: Build, rng, size):
 
 
 def leg_loss(b: Build, rng, size):
-    """One leg's driver cuts a share of the high time."""
+    """One leg's driver shortens the high time."""
     b.change("bridge", **{f"leg_{rng.choice(('a', 'b', 'c'))}": 0.01 * size})
 
 
 def cross_talk(b: Build, rng, size):
-    """Each current sensor sees the two other conductors, on either side of it: the currents seem turned."""
+    """Cross-talk of the two neighbouring conductors on each current sensor, which rotates the measured currents."""
     b.change("sensor", cross_talk=0.06 * size)
 
 
 def bus_interference(b: Build, rng, size):
-    """The bus swings at a fixed frequency that the bus sensor does not see."""
+    """The bus voltage oscillates at a fixed frequency that the bus sensor does not measure."""
     a, hertz, phase = 0.02 * size * b.nominal.inverter["dc_bus_v"], rng.uniform(35.0, 90.0), rng.uniform(0, 6)
 
     def swing(course, x):

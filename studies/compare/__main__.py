@@ -1,4 +1,4 @@
-"""The diagnosis against what one would use instead: `python -m studies.compare --seed 1`.
+"""Compare the diagnosis with alternative methods: `python -m studies.compare --seed 1`.
 
 Writes build/compare/result.json (every figure with its Wilson interval, every case), table.md and table.html.
 """
@@ -25,10 +25,10 @@ from studies.compare.table import html, markdown  # noqa: E402
 
 
 def compare(seed: int, count: int, jobs: int) -> dict:
-    """Run every method on every case of a seed; returns what result.json holds."""
+    """Run every method on every case of a seed; returns the contents of result.json."""
     settings = tuned()
     if seed == settings["seed"]:
-        raise ValueError(f"seed {seed} is the one the methods were tuned on: compare on another")
+        raise ValueError(f"seed {seed} was used to tune the methods: compare on another one")
     folder = folder_of(seed, count, jobs)
     truths = cases_of(folder)
     work = [(folder / truth["case"], settings["methods"]) for truth in truths]
@@ -71,7 +71,7 @@ def _line(truth, answers):
 
 
 def main(arguments=None) -> int:
-    """The command line; 0 when it ran, 2 where a package or the truth is missing."""
+    """The command line; returns 0, or 2 if a package or the truth is missing."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument(

@@ -1,8 +1,8 @@
 """The cases of a comparison: healthy drives, single effects and pairs of a sealed benchmark.
 
-Where the blind benchmark of the seed is there already (build/blind/seedN), its cases are taken; else cases of
-the same generator are made in build/compare.  The truth is opened here for the stratum of each case, which
-no method gets to see, and for the scores afterwards.
+If the blind benchmark of the seed exists (build/blind/seedN), its cases are used; otherwise the same generator makes
+cases in build/compare.  The truth is opened here for the stratum of each case, which no method receives, and for the
+scores afterwards.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ STRATA = ("single", "pair", "healthy")
 
 
 def folder_of(seed: int, count: int, jobs: int = 2) -> Path:
-    """Folder with the sealed cases of a seed, generated where there is none.
+    """Folder with the sealed cases of a seed, generated if it does not exist.
 
     count: size of the whole benchmark they are a part of (about half are of STRATA).
     """
@@ -31,5 +31,5 @@ def folder_of(seed: int, count: int, jobs: int = 2) -> Path:
 
 
 def cases_of(folder: Path) -> list[dict]:
-    """Truths of the cases that count; SealError where they were changed after sealing."""
+    """Truths of the cases that count; SealError if they were changed after sealing."""
     return [truth for truth in unseal(folder)["cases"] if truth["stratum"] in STRATA]

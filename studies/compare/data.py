@@ -1,12 +1,12 @@
-"""One case as every method gets it: the nominal drive's misfit in steady blocks and what may explain it.
+"""The data of a case for every method: the nominal drive's misfit in steady blocks and the signals that may explain it.
 
     u      u_recorded - R mean(i) - [psi(i+, theta+) - psi(i, theta)] / T in dq, complex (b, m) [V]
-    sum    i_a + i_b + i_c, where three currents were measured, (b, m) [A]
-    torque shaft torque less that of the nominal drive, where a transducer was recorded, (b, m) [Nm]
+    sum    i_a + i_b + i_c, if three currents were measured, (b, m) [A]
+    torque shaft torque minus that of the nominal drive, if a transducer was recorded, (b, m) [Nm]
 
-One in four operating points is never fitted, the same ones for every method.  The measure of what a model
-leaves is the rms over these held-out blocks of the block means of u (200 rows each).  The noise floor comes
-from neighbours: blocks that follow each other at one operating point share all physics.
+Every fourth operating point is held out, the same ones for every method.  The measure of a model is the rms of its
+residual block means of u (200 rows each) over these held-out blocks.  The noise floor comes from consecutive blocks at
+one operating point, which share all physics.
 """
 
 from __future__ import annotations
@@ -38,10 +38,10 @@ class Data:
         return np.flatnonzero(~self.held & np.isfinite(self.misfit[channel]).all(axis=1))
 
     def voltage_change(self) -> np.ndarray:
-        """What a whole sample of delay would change, dq (b, m) [V].
+        """Change of the voltage by one sample of delay, dq (b, m) [V].
 
-        From the voltage the nominal drive needs: the recorded one answers to the noise of the currents, which is
-        in the misfit, too.
+        It uses the nominal drive's voltage, since the recorded one depends on the current noise, which is also in the
+        misfit.
         """
         v = self.view
         needed = v.machine.resistance_ohm * v.i_mid + v.flux(v.nominal_psi)
@@ -61,7 +61,7 @@ def recording_of(folder: Path) -> Path:
 
 
 def load(folder: Path) -> Data:
-    """Read, check and balance the case in ``folder``; RecordingError where the recording is unusable."""
+    """Read, check and balance the case in ``folder``; RecordingError if the recording is unusable."""
     nominal = load_nominal(folder / "drive.toml")
     recording = load_recording(recording_of(folder), nominal)
     if recording.fatal:
@@ -71,7 +71,7 @@ def load(folder: Path) -> Data:
     view = view.take(whole)
     channels = misfit(view)
     if "torque" in channels and not (view.shaft == "torque").all():
-        del channels["torque"]  # without a transducer nobody knows the load
+        del channels["torque"]  # without a transducer the load is unknown
     return Data(view, channels, holdout_blocks(view))
 
 
@@ -85,7 +85,7 @@ def averaged(x: np.ndarray, rows: int) -> np.ndarray:
 
 
 def holdout_rms(left: np.ndarray, held: np.ndarray) -> float:
-    """Rms over held-out blocks of a model's remaining block means ``left``, complex (b,) [V]."""
+    """rms over held-out blocks of a model's residual block means ``left``, complex (b,) [V]."""
     return float(np.sqrt(np.mean(np.abs(left[held]) ** 2)))
 
 

@@ -1,10 +1,10 @@
 """The generic library from which pySINDy and SysIdentPy choose: candidate terms for each equation.
 
-In per unit: d, q the currents over the rated one, w the speed over its largest, t the share of the recording
-that has passed, T the winding's warming (t where no thermocouple moved), e the mechanical angle, 1, 2, 6, 12
-electrical orders.  Powers of current times powers of speed, then products with the harmonics that drives
-have, direction of the phase currents, change of the voltage vector from row to row.  More than a plain
-polynomial library offers; it lets both packages find every effect of the catalogue.
+In per unit: d, q the currents over the rated one, w the speed over its maximum, t the elapsed share of the recording,
+T the winding's temperature rise (t without a thermocouple signal), e the mechanical angle, 1, 2, 6, 12 electrical
+orders.  The library has powers of current times powers of speed, products with the usual harmonics of drives, the
+direction of the phase currents, and the change of the voltage vector between rows.  This is more than a plain
+polynomial library; both packages can find every effect of the catalogue with it.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 from studies.compare.data import Data, averaged
 
 TORQUE_ORDERS = (4, 6, 8, 12, 18, 24, 30, 36)
-SOFT = 0.05  # of rated current: where the direction of a phase current counts as settled
+SOFT = 0.05  # of rated current: above it the direction of a phase current is definite
 
 
 @dataclass

@@ -1,8 +1,7 @@
 """Joint least squares: all parameters of the drive model at once, scipy.optimize.least_squares.
 
-A name is given to a parameter (or the parameters of one effect together) whose 95 % interval excludes the
-nominal value and whose change exceeds a floor.  Intervals from the Jacobian and the residual's variance, as
-textbooks have it.
+An effect is named if the 95 % interval of its parameter (or region of its parameters) excludes the nominal value and
+the change exceeds a floor.  Intervals follow from the Jacobian and the variance of the residual, as usual.
 """
 
 from __future__ import annotations
@@ -17,7 +16,7 @@ from studies.compare.data import Data, averaged
 from studies.compare.joint_model import PARAMETERS, Model
 from studies.compare.naming import one_factor
 
-MOST_BLOCKS = 90  # evenly chosen; all of them would only take longer
+MOST_BLOCKS = 90  # evenly chosen; more would only take longer
 FIT_GRID = [{"rows": 20}]
 NAME_GRID = [
     {"floor": f, "share": s}
@@ -26,7 +25,7 @@ NAME_GRID = [
 ]
 STEP = 1e-3  # of a parameter's unit, for slopes
 FACTORS = {"resistance": "R", "inductance_d": "L_d", "inductance_q": "L_q", "magnet_flux": "psi_m"}
-SINGULAR = 1e-6  # share of the largest singular value below which a direction is not told at all
+SINGULAR = 1e-6  # of the largest singular value: directions below it are undetermined
 
 
 @dataclass
@@ -41,7 +40,7 @@ class Joint:
 
 
 def _stacked(channels, sigma, rows, known):
-    """One vector of the averaged channels where ``known``, each over its noise; complex ones as two."""
+    """One vector of the averaged channels at ``known`` rows, each over its noise; complex ones as two parts."""
     parts = []
     for name, x in channels.items():
         mean = averaged(x, rows).ravel() / sigma[name]

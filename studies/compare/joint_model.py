@@ -1,4 +1,4 @@
-"""The drive with every parameter that its maker could have got wrong, and what a recording of it would show.
+"""Model of the drive with all parameters that may be wrong, and its prediction of a recording.
 
     u_s = R_x i_s + d psi_s / dt + V_dead sgn(i_x),   psi = L i + psi_m + saturation + cross-saturation + harmonics
     i   = (i_measured - offset) / (1 + gain),  theta = theta_measured - offset - eccentricity
@@ -43,7 +43,7 @@ PARAMETERS = {
     "gain_b": ("current_gain", 0.01),
     "asym_a": ("phase_resistance_asymmetry", 0.05),  # of R
     "asym_b": ("phase_resistance_asymmetry", 0.05),
-    "k_t": ("", 0.01),  # of the torque: no effect, but what a wrong current scale or bus gain leaves there
+    "k_t": ("", 0.01),  # of the torque: not an effect, but the trace of a wrong current scale or bus gain
     "viscous": ("friction", 0.02),  # of the rated torque, at the largest speed
     "coulomb": ("friction", 0.02),  # of the rated torque
     **{f"cog{h}{part}": ("cogging", 0.02) for h in TORQUE_ORDERS for part in "cs"},  # of the rated torque
@@ -54,7 +54,7 @@ ALPHA, BETA = np.array([2, -1, -1]) / 3, np.array([0, 1, -1]) / np.sqrt(3)
 
 
 class Model:
-    """Prediction of a case's misfit for parameters (k,).  ``names``: those that its channels can carry."""
+    """Prediction of a case's misfit for parameters (k,).  ``names``: those that its channels determine."""
 
     def __init__(self, data: Data, blocks=slice(None)):
         self.v = data.view.take(np.arange(len(data.view))[blocks])

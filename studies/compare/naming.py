@@ -1,4 +1,4 @@
-"""From selected terms to names of effects: what an engineer would read off a sparse model of the misfit.
+"""Names of effects for selected terms: the interpretation of a sparse model of the misfit by an engineer.
 
     u_d: d, u_q: q                  resistance          (times T: resistance_temperature)
     u_q: w                          magnet_flux         (times t: magnet_temperature)
@@ -26,7 +26,7 @@ import numpy as np
 from studies.compare.data import Data
 from studies.compare.dictionary import TORQUE_ORDERS, Equation
 
-BESIDE = 0.4  # least share of the larger one at which inductance and saturation of an axis are two effects
+BESIDE = 0.4  # least ratio at which inductance and saturation of an axis count as two effects
 ALIKE = 2.0  # largest ratio of relative changes that still count as one factor
 
 
@@ -69,7 +69,7 @@ NAMES = _table()
 
 
 def effects(data: Data, models: list[tuple[Equation, np.ndarray]]) -> dict[str, float]:
-    """Names with their sizes: rms of what their terms add up to, in per mille of bus, rated current or torque.
+    """Names with their sizes: rms of the sum of their terms, in per mille of bus, rated current or torque.
 
     models: equations with their coefficients (k,) of the scaled columns.
     """
@@ -93,12 +93,12 @@ def effects(data: Data, models: list[tuple[Equation, np.ndarray]]) -> dict[str, 
     if "sampling_skew" in out and ("u_q", "w2 q") in plain:
         out["iron_loss"] = out.pop("sampling_skew")
     if "iron_loss" in out and "friction" in out:
-        del out["friction"]  # an iron loss drags the shaft
+        del out["friction"]  # an iron loss also causes a drag torque
     return _one_factor(data, plain, out)
 
 
 def _one_factor(data, plain, names):
-    """R, L_d, L_q (and psi_m) wrong by one factor are a scale, not three parameters."""
+    """R, L_d, L_q (and psi_m) wrong by one factor count as one scale instead of several parameters."""
     m, unit = data.view.machine, data.units["u"]
     top = float(np.abs(data.view.omega).max())
     nominal = {
@@ -116,7 +116,7 @@ def _one_factor(data, plain, names):
 
 
 def one_factor(names: list[str], change: dict[str, float]) -> list[str]:
-    """Names in which R, L_d, L_q and psi_m, changed by about the same share, have become one scale or gain."""
+    """Names with R, L_d, L_q and psi_m, if changed by about the same share, replaced by one scale or gain."""
     for name, needs in (
         ("udc_gain", ("inductance_d", "inductance_q", "magnet_flux")),
         ("current_scale", ("resistance", "inductance_d", "inductance_q")),

@@ -60,5 +60,5 @@ def fit(data: Data, rows: int) -> Sparse:
 
 
 def names(fitted: Sparse, least: float, share: float, mechanical: float) -> list[str]:
-    """Names of what dominates."""
+    """Names of the dominant effects."""
     return dominant(fitted.sizes, least, share, mechanical)

@@ -1,7 +1,7 @@
-"""Let every method answer a case, and make the figures of all answers.
+"""Run every method on a case, and compute the figures of all answers.
 
-An answer of any method has the form of diagnosis.json as far as it goes, so that the figures of the blind
-benchmark apply: named right means exactly the true effects and no other.
+The answer of every method has the form of diagnosis.json as far as applicable, so that the figures of the blind
+benchmark apply: "named right" means exactly the true effects.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from studies.compare.methods import METHODS, TITLES
 
 
 def answer_of_names(names) -> dict:
-    """The verdict of a method that gives names and nothing else."""
+    """The verdict of a method that only gives names."""
     return {"verdict": "explained" if names else "no_mismatch", "effects": [{"name": n} for n in names]}
 
 
@@ -40,9 +40,9 @@ def _other(name: str, settings: dict, folder: Path):
 
 
 def answers_of(job: tuple[Path, dict]) -> dict[str, dict]:
-    """{method: answer with seconds, holdout_v and noise_v} of one case; a breakdown is an answer, too.
+    """{method: answer with seconds, holdout_v and noise_v} of one case; an exception is an answer too.
 
-    The floor is common: the least that neighbouring blocks differ by under any of the models.
+    The noise floor is common: the smallest difference of neighbouring blocks under any of the models.
     """
     folder, settings = job
     answers, left = {}, {}
@@ -53,7 +53,7 @@ def answers_of(job: tuple[Path, dict]) -> dict[str, dict]:
                 _diagnose(folder) if name == "diagnose" else _other(name, settings[name], folder)
             )
             answers[name] = answer | {"seconds": time.perf_counter() - began}
-        except Exception as error:  # the comparison counts breakdowns and goes on
+        except Exception as error:  # the comparison counts exceptions and continues
             answers[name] = {"error": f"{type(error).__name__}: {error}"}
     try:
         _add_fit(answers, left, load(folder))

@@ -1,9 +1,9 @@
 """Sparse regression: pySINDy's STLSQ on the misfit of the nominal drive (a discrepancy model).
 
-The left-hand side is given (the balance needs no derivative of pySINDy's); averaged rows on both sides are its
-weak form.  Sequentially thresholded least squares drops terms whose rms contribution is below ``threshold``
-per mille of bus, rated current or torque, and fits again.  ``ridge`` (times the rows) steadies the first fits,
-in which all terms are there; the last fit is without.
+The left-hand side is given (the balance does not use pySINDy's derivatives); averaged rows on both sides are its weak
+form.  Sequentially thresholded least squares drops terms whose rms contribution is below ``threshold`` per mille of
+bus, rated current or torque, and fits again.  ``ridge`` (times the rows) regularises the first fits with all terms;
+the last fit is without it.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def fit(data: Data, rows: int, threshold: float, ridge: float) -> Sparse:
         optimizer = pysindy.STLSQ(threshold=threshold, alpha=ridge * len(e.y))
         model = pysindy.SINDy(optimizer=optimizer, feature_library=pysindy.IdentityLibrary())
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # it warns where nothing is left, which is an answer here
+            warnings.simplefilter("ignore")  # it warns if no term remains, which is a valid answer here
             model.fit(e.x, t=1.0, x_dot=e.y[:, None], feature_names=e.terms)
         c = model.coefficients()[0]
         models.append((e, c))
@@ -52,5 +52,5 @@ def fit(data: Data, rows: int, threshold: float, ridge: float) -> Sparse:
 
 
 def names(fitted: Sparse, least: float, share: float, mechanical: float) -> list[str]:
-    """Names of what dominates."""
+    """Names of the dominant effects."""
     return dominant(fitted.sizes, least, share, mechanical)

@@ -38,7 +38,7 @@ def _cell(name, figure):
 
 
 def rows(result: dict) -> list[list[str]]:
-    """Heading and one row a method, all text; intervals are Wilson's."""
+    """Heading and one row per method, as text; intervals are Wilson's."""
     out = [["method", *COLUMNS.values()]]
     for name, title in TITLES.items():
         f = result["methods"][name]
@@ -47,13 +47,13 @@ def rows(result: dict) -> list[list[str]]:
 
 
 def note(result: dict) -> str:
-    """What the table stands on, in one sentence."""
+    """The conditions of the table."""
     c, seed = result["cases"], result["tuned_on_seed"]
     return (
         f"Sealed cases of seed {result['seed']}: {c['single']} single effects, {c['pair']} pairs, "
-        f"{c['healthy']} healthy drives. The three other methods got the diagnosis' own preparation and balance, "
-        f"and thresholds tuned for most named right on seed {seed}. Named right counts effects that the "
-        "recording can tell; 95 % intervals in brackets."
+        f"{c['healthy']} healthy drives. The three other methods use the preparation and balance of the diagnosis, "
+        f"and thresholds tuned for the most correct names on seed {seed}. \"Named right\" counts identifiable effects; "
+        "95 % intervals in brackets."
     )
 
 

@@ -1,8 +1,8 @@
-"""Tune the methods on a seed of its own: `python -m studies.compare.tune --seed 951`.
+"""Tune the methods on a separate seed: `python -m studies.compare.tune --seed 951`.
 
-Every setting of a method's grid is tried on every case; the one that names most single effects and pairs
-exactly right wins, fewer confidently wrong cases deciding ties.  So the table shows each method at its best.
-Writes tuned.json beside this file, which the comparison reads; its seed must not be compared on.
+Every setting of a method's grid is tested on every case; the one that names the most single effects and pairs exactly
+right is chosen, and fewer confidently wrong cases decide ties.  The table thus shows each method at its best.
+Writes tuned.json next to this file, which the comparison reads; its seed must not be used for a comparison.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def outcomes(method, folder, truths) -> dict[tuple, list]:
 
 
 def score(names, truths) -> dict:
-    """What one setting reaches on the cases."""
+    """The result of one setting on the cases."""
     pairs = [(t, answer_of_names(found)) for t, found in zip(truths, names, strict=True)]
     fair = {s: [(t, a) for t, a in pairs if t["stratum"] == s and identifiable(t)] for s in STRATA}
     right = {s: sum(named_right(t, a) for t, a in fair[s]) for s in ("single", "pair")}
@@ -49,7 +49,7 @@ def score(names, truths) -> dict:
 
 
 def best(method, table, truths) -> dict:
-    """The winning settings with their score."""
+    """The best settings with their score."""
     scored = {key: score(names, truths) for key, names in table.items()}
 
     def rank(key):
@@ -61,7 +61,7 @@ def best(method, table, truths) -> dict:
 
 
 def main(arguments=None) -> int:
-    """The command line; 2 where a package is missing."""
+    """The command line; returns 2 if a package is missing."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seed", type=int, default=951)
     parser.add_argument("--count", type=int, default=175)

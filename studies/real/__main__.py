@@ -1,4 +1,4 @@
-"""``make real``: every real recording that is there, diagnosed; build/real/result.json and a folder for each.
+"""``make real``: diagnose every available real recording; writes build/real/result.json and a folder for each.
 
 The recordings are not part of the project: FLUXPROOF_RECORDINGS names their folder, ../shared/recordings without it.
 """
@@ -20,7 +20,7 @@ PARTS = {"brusa_flux_map": brusa, "emrax228": emrax, "laas_mn4004": laas}
 
 
 def recordings_folder() -> Path:
-    """Where the recordings should be."""
+    """Folder of the recordings."""
     return (ROOT / os.environ.get("FLUXPROOF_RECORDINGS", "../shared/recordings")).resolve()
 
 
@@ -32,14 +32,14 @@ def main(arguments=None) -> int:
     args = parser.parse_args(arguments)
     unknown = sorted(set(args.names) - set(PARTS))
     if unknown:
-        parser.error(f"{unknown[0]} is none of {', '.join(PARTS)}")
+        parser.error(f"{unknown[0]} is not one of {', '.join(PARTS)}")
     folder, result = recordings_folder(), {"schema": 1, "recordings": {}}
     for name in args.names or PARTS:
         part, started = PARTS[name], time.perf_counter()
         file = folder / part.FILE
         if not file.exists():
             result["recordings"][name] = {
-                "skipped": f"{part.FILE} is not there; FLUXPROOF_RECORDINGS names its folder"
+                "skipped": f"{part.FILE} is missing; FLUXPROOF_RECORDINGS names its folder"
             }
             continue
         with Progress(quiet=args.quiet) as progress:

@@ -1,7 +1,7 @@
-"""The measured Brusa map from the terminals: a linear nameplate, a closed loop, and the fluxes found again.
+"""Identification of the measured Brusa map from terminal quantities: closed loop with a linear nameplate.
 
-Two recordings at shuffled operating points and two speeds name what is missing; a third one covers the map's plane
-for the surface.  Dwells of the first two that were never fitted are predicted, and the map itself is the judge.
+Two recordings at shuffled operating points and two speeds identify the missing effects; a third one covers the current
+plane of the map for the surface.  The result is compared with held-out dwells of the first two and with the map itself.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ from studies.real.outputs import NAMES_OF_AXES, write
 
 FILE = Path("brusa_flux_map") / "brusa_meas.csv"
 DRIVE = ROOT / "docs" / "drives" / "brusa_hsm1.toml"
-# The switching plant follows the compare values without dead time, and so must the plant that the drive file describes.
+# The switching plant follows the compare values without dead time; the drive file must describe the same plant.
 IDEAL = (
     "\n[plant.inverter]\ndead_time_s = 0.0 # the closed loop over the measured map has an ideal inverter\n"
 )
 EDGE_A, NAMING_STEP_A, MAPPING_STEP_A = 140.0, 35.0, 20.0
-NAMING = ((1000.0, 1), (-1800.0, 2))  # rpm, seed of the order: a drift must not follow the current
+NAMING = ((1000.0, 1), (-1800.0, 2))  # rpm, seed of the order, which decorrelates drift and current
 MAPPING_RPM, DWELL_S = 1000.0, 0.046
 MAP_STEP_A = 10.0
 TARGET = 0.02  # of the map's range
@@ -40,7 +40,7 @@ EARNS = 30.0  # as in the search
 
 
 def run(folder: Path, out: Path, progress=lambda text: None) -> dict:
-    """Simulate, diagnose, fit the surface, write the outputs; the entry of result.json."""
+    """Simulate, diagnose, fit the surface and write the outputs; returns the entry of result.json."""
     started, truth = time.perf_counter(), measured_map(folder / FILE)
     nominal = load_nominal(write_text(out / FILE.parts[0] / "drive_nominal.toml", DRIVE.read_text() + IDEAL))
     progress("closed loop over the measured map")
@@ -122,7 +122,7 @@ def compare(surface: Surface, truth: FluxMap) -> dict:
 
 
 def held_out(surface: Surface, view, held) -> dict:
-    """Misfit of the dwells that were never fitted, each axis [V rms]."""
+    """Misfit of the held-out dwells, per axis [V rms]."""
     before, after = misfit(view)["u"].mean(axis=1)[held], surface.residual(view)[held]
     pick = {"d": np.real, "q": np.imag}
     return {
@@ -135,15 +135,15 @@ def cannot_tell(surface: Surface, truth: FluxMap) -> list[str]:
     inside = surface.covered(truth.i_d_a[:, None] + 1j * truth.i_q_a)
     r = surface.beside["resistance"]["delta_r"]
     return [
-        f"Beyond {EDGE_A:g} A nothing was recorded: {int((~inside).sum())} of {inside.size} points stay unclaimed.",
-        "A current scale or a bus gain multiplies the whole map and is part of it; an ammeter or a voltmeter tells.",
-        f"Resistance beside a free surface: nameplate {1e3 * r.value:+.2f} +- {1e3 * r.sigma:.2f} mohm.",
-        "A measured map is not reciprocal to the last microweber; what it is not, a co-energy cannot follow.",
+        f"Nothing was recorded beyond {EDGE_A:g} A: {int((~inside).sum())} of {inside.size} points are not covered.",
+        "A current scale or a bus gain scales the whole map; only an ammeter or a voltmeter can separate them.",
+        f"Resistance fitted with a free surface: nameplate {1e3 * r.value:+.2f} +- {1e3 * r.sigma:.2f} mohm.",
+        "A measured map is not exactly reciprocal; a co-energy cannot represent the difference.",
     ]
 
 
 def _tell(answer, surface, found, beside, view, held, noise_v) -> None:
-    """Put the surface into the answer: names that rest on it, the map as plant parameter, what is left."""
+    """Add the surface to the answer: the names that follow from it, the map as plant parameter, the residual."""
     chart, covered = surface.flux_map(MAP_STEP_A)
     edge = np.abs(surface.points.imag).max()
     on_axis = surface.psi(np.array([0.0, 1j * edge, -1j * edge]))
@@ -180,10 +180,10 @@ def _tell(answer, surface, found, beside, view, held, noise_v) -> None:
         answer.evidence.arrays |= {"after_d": left.real, "after_q": left.imag}
     what = " and ".join(NAMES_OF_AXES[n] for n in found)
     answer.sentence = (
-        f"{what[0].upper()}{what[1:]}: with the flux map found, the misfit on operating points not fitted falls from "
+        f"{what[0].upper()}{what[1:]}: with the flux map found, the misfit at held-out operating points falls from "
         f"{answer.fit.holdout_before:.3g} V to {answer.fit.holdout_after:.3g} V."
     )
     answer.notes.append(
         f"The flux map is a free reciprocal surface over {int(covered.sum())} of {covered.size} points of its grid; "
-        f"it expects an error of {1e3 * sigma:.2g} mWb rms of itself."
+        f"its estimated error is {1e3 * sigma:.2g} mWb rms."
     )

@@ -1,6 +1,6 @@
-"""The measured Brusa map in closed loop: the golden model with a linear nameplate, the switching plant with the map.
+"""The measured Brusa map in closed loop: the golden model uses a linear nameplate, the switching plant the map.
 
-The load machine imposes the speed, the core regulates dq currents over a grid; what it saw and answered becomes a
+The load machine imposes the speed, the core regulates dq currents over a grid; its inputs and outputs become a
 canonical recording in SI units.  Leg voltages follow the compare values through the plant's dead time.
 """
 
@@ -20,14 +20,14 @@ from fluxproof.golden_model.registers import registers
 from fluxproof.golden_model.units import from_si, si_per_lsb
 from fluxproof.plant import IMPOSED_SPEED, FluxMap, Machine
 
-LINEAR_CURRENT_MODEL = 0  # register flux_mode: the decoupling believes the nameplate
+LINEAR_CURRENT_MODEL = 0  # register flux_mode: the decoupling uses the nameplate
 RAMP_S = 0.02  # from one operating point to the next; a step would saturate the voltage
 SETTLE_S = 0.02
 
 
 @dataclass(frozen=True)
 class Course:
-    """Operating points that are held one after the other at one speed: rpm, (n,) i_d and i_q [A], seconds of each."""
+    """Consecutive operating points at one speed: rpm, (n,) i_d and i_q [A], seconds of each."""
 
     rpm: float
     i_d: np.ndarray
@@ -36,13 +36,13 @@ class Course:
 
 
 def measured_map(file: Path) -> FluxMap:
-    """The map of brusa_meas.csv, mended where noise folds it (see FluxMap.mended)."""
+    """The map of brusa_meas.csv, corrected where noise makes it non-monotonic (see FluxMap.mended)."""
     table = np.genfromtxt(file, delimiter=",", names=True)
     return FluxMap.from_points(table["id_A"], table["iq_A"], table["psid_Vs"], table["psiq_Vs"]).mended()
 
 
 def serpentine(levels_d, levels_q) -> tuple[np.ndarray, np.ndarray]:
-    """Every pair of the levels, each a small step from the one before: (i_d, i_q), both (n_d * n_q,)."""
+    """All pairs of the levels in small steps: (i_d, i_q), both (n_d * n_q,)."""
     i_q = np.concatenate([levels_q[:: 1 if k % 2 == 0 else -1] for k in range(len(levels_d))])
     return np.repeat(levels_d, len(levels_q)), i_q
 

@@ -1,7 +1,7 @@
 """The EMRAX 228 of a race motorcycle: 475 s of CAN messages, a few per second, against its data sheet.
 
-The controller's voltages are requests, so inverter and delay are in the misfit; there is no angle, no load machine
-and one direction.  Where that leaves several explanations, all of them are told.
+The recorded voltages are commanded ones, so that inverter loss and delay are part of the misfit; there is no angle, no
+load machine and only one direction.  If several explanations remain, all of them are reported.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ FLUXES = ("cross_saturation", "saturation", "inductance_q", "inductance_d", "mag
 
 
 def run(folder: Path, out: Path, progress=lambda text: None) -> dict:
-    """Diagnose, judge on other points and on a later time, write the outputs; the entry of result.json."""
+    """Diagnose, verify on other points and on a later part, write the outputs; returns the entry of result.json."""
     started, nominal = time.perf_counter(), load_nominal(DRIVE)
     recording = load_recording(folder / FILE, nominal)
     answer = diagnose_slow([recording], nominal, progress)
@@ -53,7 +53,7 @@ def run(folder: Path, out: Path, progress=lambda text: None) -> dict:
     answer.sentence = words.sentence(
         answer.verdict, answer.effects, answer.ambiguity, answer.fit, CATALOGUE, answer.location
     )
-    answer.notes.append("Standard deviations hold what parts of the log, fitted alone, differ by.")
+    answer.notes.append("Standard deviations include the differences between separately fitted parts of the log.")
     model = _with_map(model_effects(search, found), flux_map_of(search, found.best))
     for effect in model:
         _widen(effect, parts)
@@ -83,7 +83,7 @@ def run(folder: Path, out: Path, progress=lambda text: None) -> dict:
 
 
 def _with_map(effects, flux_map):
-    """The model's effects with one flux map in place of formulas that no plant has; the first carries it."""
+    """The model's effects with one flux map instead of formulas that the plant lacks; the first one contains it."""
     if flux_map is None:
         return effects
     first = True
@@ -95,7 +95,7 @@ def _with_map(effects, flux_map):
 
 
 def _widen(effect, parts) -> None:
-    """Let the standard deviations reach to what parts of the log say: a formula's error repeats, noise does not."""
+    """Increase the standard deviations to the differences between parts of the log, since formula errors repeat."""
     for name, estimate in effect.parameters.items():
         others = [part[name][0] for part in parts if name in part]
         estimate.sigma = float(max([estimate.sigma, *(abs(x - estimate.value) for x in others)]))
@@ -114,19 +114,19 @@ def _estimates(search, solution) -> dict:
 def _cannot_tell(view, nominal, found, ruled_out, alone, alone_solution, at_rest) -> list[str]:
     m, alone_values = nominal.machine, _estimates(alone, alone_solution)
     said = [
-        "The voltages are requests: what the inverter loses and how late it is are part of the misfit.  Without a "
-        "reversal of i_q, what it loses is told from other things in phase with the current by its size alone.",
-        "The angle's offset is what the d voltage shows at no load.  One direction only: a delay, late currents and an "
-        "iron loss turn the voltage too, and only their growth with the speed sets them apart.",
-        "i_d was never driven: no L_d, no saturation of the d axis, and cross-saturation on its q side alone.",
-        "No harmonics and no sampling instants: nothing of EMF harmonics, sensor offsets and gains, eccentricity.",
+        "The voltages are commanded ones: inverter loss and delay are part of the misfit.  Without a reversal of i_q, "
+        "the loss is separated from other voltages in phase with the current by its size only.",
+        "The encoder offset follows from the d voltage at no load.  One direction only: a delay, late currents and an "
+        "iron loss rotate the voltage too, and only their dependence on speed separates them.",
+        "i_d was never driven: L_d and saturation of the d axis are unknown, cross-saturation only from its q part.",
+        "No harmonics and no sampling instants: EMF harmonics, sensor offsets and gains, eccentricity are unknown.",
     ]
     if "magnet_flux" in found.best.model.names and "magnet_flux_wb" in alone_values:
         value, sigma, _ = alone_values["magnet_flux_wb"]
         own = m.magnet_flux_wb + found.best.c["magnet_flux"]["delta_psi_m"]
         said.append(
-            f"The magnet flux of {1e3 * own:.3g} mWb leans on stretches without current, where the controller may "
-            f"only have been following.  Loaded stretches alone say {1e3 * value:.3g} +- {1e3 * sigma:.2g} mWb and "
+            f"The magnet flux of {1e3 * own:.3g} mWb depends on stretches without current, in which the controller may "
+            f"have been passive.  Loaded stretches alone give {1e3 * value:.3g} +- {1e3 * sigma:.2g} mWb and "
             f"predict the unloaded ones to {at_rest['d']['after']:.2g} V (d) and {at_rest['q']['after']:.2g} V (q)."
         )
     for name, parameter in (
@@ -137,10 +137,10 @@ def _cannot_tell(view, nominal, found, ruled_out, alone, alone_solution, at_rest
         if "parameters" in ruled_out.get(name, {}):
             value, sigma, unit = ruled_out[name]["parameters"][parameter]
             said.append(
-                f"{name} beside the model would be {value:.3g} +- {sigma:.1g} {unit}: not measured, not ruled out."
+                f"{name} added to the model would be {value:.3g} +- {sigma:.1g} {unit}: not significant, not excluded."
             )
     said.append(
-        "A current scale or a bus gain beyond 15 % was not considered: with either, everything else is rescaled."
+        "A current scale or bus gain error above 15 % was not considered: either would rescale all other values."
     )
-    said.append("Winding and magnets warmed by 12 K only: no temperature coefficient can be had.")
+    said.append("Winding and magnets warmed by 12 K only: temperature coefficients cannot be determined.")
     return said

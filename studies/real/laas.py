@@ -1,4 +1,4 @@
-"""The LAAS logs of an MN4004: what a q axis at 1 kHz tells of a drive that samples at 40 kHz, and what it does not.
+"""The LAAS logs of an MN4004: what a q-axis log at 1 kHz reveals about a drive with 40 kHz sampling, and its limits.
 
 Three logs: held still at many angles, a torque sine of 2 Hz, speed control.  The first gives the resistance, cogging
 and the friction of a shaft that does not move; with it the second gives the EMF constant, how late the speed is, and
@@ -26,7 +26,7 @@ HOLD_ROWS = 25  # that a point of the pictures stands for
 
 
 def run(folder: Path, out: Path, progress=lambda text: None) -> dict:
-    """Fit both lines, write the outputs; the entry of result.json."""
+    """Fit both lines and write the outputs; returns the entry of result.json."""
     started, nominal = time.perf_counter(), load_nominal(DRIVE)
     progress("q axis at standstill")
     still, moving, control = (
@@ -101,7 +101,7 @@ def _pair(line, name) -> list[float]:
 
 
 def _misfit(log, nominal, hold, line):
-    """(nominal's, improved model's) misfit of u_q, (n,) [V]."""
+    """(misfit of u_q with the nominal model, with the improved one), each (n,) [V]."""
     m = nominal.machine
     before = log.u_q - m.resistance_ohm * log.i_q - m.pole_pairs * m.magnet_flux_wb * log.omega
     after = (
@@ -114,7 +114,7 @@ def _misfit(log, nominal, hold, line):
 
 
 def _answer(nominal, log, hold, side, cogging, line, torque, before, after) -> Diagnosis:
-    """The findings in the form of a diagnosis, so that report and drive file come out as of any other."""
+    """The results as a Diagnosis, so that report and drive file are written as for any other recording."""
     m = nominal.machine
     p, k_t = m.pole_pairs, 1.5 * line["k_e"]
     order = int(np.argmax(cogging)) + 1
@@ -147,12 +147,12 @@ def _answer(nominal, log, hold, side, cogging, line, torque, before, after) -> D
     answer.location.signal = "u_q"
     answer.sentence = (
         f"On the q axis, the only one recorded: resistance {resistance.value:.3g} ohm, magnet flux "
-        f"{1e3 * psi.value:.3g} mWb, friction and cogging of order {order}; the misfit on rows not fitted falls from "
+        f"{1e3 * psi.value:.3g} mWb, friction and cogging of order {order}; the misfit of held-out rows falls from "
         f"{1e3 * fit.holdout_before:.3g} mV to {1e3 * fit.holdout_after:.3g} mV."
     )
     answer.notes = [
-        "Torques are 1.5 k_e i_q: true for peak values and an amplitude-invariant transformation.",
-        "The resistance is measured against an assumed one; that they differ is no finding.",
+        "Torques are 1.5 k_e i_q, which assumes peak values and an amplitude-invariant transformation.",
+        "The nominal resistance is an assumed value; its difference from the measured one is no finding.",
     ]
     answer.evidence = _evidence(log, p, before, after)
     return answer

@@ -1,4 +1,4 @@
-"""What every real recording leaves behind: its folder of outputs and its entry of result.json."""
+"""Outputs of a real recording: its folder and its entry of result.json."""
 
 from __future__ import annotations
 
@@ -20,8 +20,7 @@ NAMES_OF_AXES = {
 def write(name: str, answer, nominal, recording, out: Path, more: dict, model=None) -> dict:
     """Write OUT/name/{diagnosis.json, report.html, drive_improved.toml} and return the entry of result.json.
 
-    model: effects of the improved drive, where they are more than what the answer asserts; more: what only this
-    recording has to say.
+    model: effects of the improved drive, if they are more than the asserted ones; more: further keys of the entry.
     """
     started, folder = time.perf_counter(), out / name
     folder.mkdir(parents=True, exist_ok=True)

@@ -1,9 +1,9 @@
-"""The quasi-steady q axis of a log that has no d axis: i_q, u_q and the shaft's speed, far slower than the control.
+"""Quasi-steady q-axis identification from a log without d axis: i_q, u_q and shaft speed, far slower than the control.
 
     u_q = R i_q + k_e (omega + tau_v d omega/dt) + v sgn(i_q) + L_q di_q/dt + u_0        electrical
     i_q = (J d omega/dt + B omega + T_c sgn(omega)) / k_t + i_0                           mechanical
 
-omega is the shaft's speed, tau_v how late the log's speed is.  With i_d = 0 the magnet's k_e = p psi_m, and for peak
+omega is the shaft speed, tau_v the delay of the logged speed.  With i_d = 0 the magnet's k_e = p psi_m, and for peak
 values and an amplitude-invariant transformation k_t = 1.5 k_e.  Both lines are linear; their uncertainty is that of a
 block bootstrap (Kuensch, Annals of Statistics 17, 1989): neighbouring rows of a log are not independent.
 """
@@ -16,9 +16,9 @@ import numpy as np
 from scipy.signal import savgol_filter
 
 DRAWS = 400
-SLOPE_ROWS = 41  # of the local cubic that slopes are taken from
-KNEE_A, KNEE_RAD_S = 0.02, 2.0  # where a sign has become one
-HELD_OUT = 0.4  # the last part of a log, never fitted
+SLOPE_ROWS = 41  # of the local cubic for slopes
+KNEE_A, KNEE_RAD_S = 0.02, 2.0  # width of the smoothed sign functions
+HELD_OUT = 0.4  # share at the end of a log that is not fitted
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class QAxisLog:
         return savgol_filter(values, SLOPE_ROWS, 3, deriv=1, delta=self.step_s)
 
     def smooth(self, values):
-        """A signal with its noise taken off by the same filter."""
+        """A signal smoothed by the same filter."""
         return savgol_filter(values, SLOPE_ROWS, 3)
 
 
@@ -51,7 +51,7 @@ class Line:
     parameters: dict[str, tuple[float, float]]
     train: float
     holdout: float
-    collinearity: float  # 1 / smallest singular value of the scaled columns: above 20 two of them are one
+    collinearity: float  # 1 / smallest singular value of the scaled columns; above 20 two of them are collinear
 
     def __getitem__(self, name):
         return self.parameters[name][0]
@@ -68,7 +68,7 @@ def evenly(columns, step_s=1e-3) -> QAxisLog:
 
 
 def electrical(log: QAxisLog, resistance=None, more=()) -> Line:
-    """The voltage line [V]; ``resistance`` [ohm]: known from elsewhere, as it looks like the speed's delay.
+    """The voltage line [V]; ``resistance`` [ohm]: known value, since it is collinear with the delay of the speed.
 
     more: further terms, of "inductance", "even_emf" (follows |omega|).
     """
@@ -98,7 +98,7 @@ def mechanical(log: QAxisLog) -> Line:
 
 
 def fit(y, columns: dict, step_s=None, block_s=0.5, groups=None) -> Line:
-    """Least squares on the first part of the rows, judged on the last, sigma by block bootstrap.
+    """Least squares on the first part of the rows, verified on the last one; sigma by block bootstrap.
 
     groups: (n,) number of the block of each row; default: pieces of block_s.
     """
@@ -128,15 +128,15 @@ def fit(y, columns: dict, step_s=None, block_s=0.5, groups=None) -> Line:
 
 
 def speed_delay(log: QAxisLog) -> Line:
-    """How late the recorded speed is against the recorded angle: the angle's slope is omega + tau d omega/dt."""
+    """Delay of the recorded speed relative to the recorded angle, whose slope is omega + tau d omega/dt."""
     chord = log.slope(log.angle) - log.smooth(log.omega)
     return fit(chord, {"tau": log.slope(log.omega), "offset": np.ones_like(chord)}, log.step_s)
 
 
 def orders(angle, values, rising, most=150, block_rows=400) -> tuple[Line, np.ndarray]:
-    """(constant part and half the gap between both directions, amplitudes (most,) of orders 1 .. most per turn).
+    """(constant and half the difference between both directions, amplitudes (most,) of orders 1 .. most per turn).
 
-    angle: (n,) rad at which the shaft was held; rising: (n,) bool, whether it was turned there upwards.
+    angle: (n,) rad at which the shaft was held; rising: (n,) bool, approached from below.
     """
     n = np.arange(1, most + 1)
     waves = np.concatenate([np.cos(np.outer(angle, n)), np.sin(np.outer(angle, n))], axis=1)
@@ -153,7 +153,7 @@ def orders(angle, values, rising, most=150, block_rows=400) -> tuple[Line, np.nd
 
 
 def mixed_blocks(n, rows):
-    """Blocks of neighbouring rows, numbered so that fitted and held-out ones alternate over the log."""
+    """Numbers of blocks of consecutive rows, such that fitted and held-out ones alternate over the log."""
     block = np.arange(n) // rows
     order = np.argsort(np.random.default_rng(1).permutation(block.max() + 1))
     return order[block]
