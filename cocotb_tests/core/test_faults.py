@@ -175,7 +175,7 @@ def test_a_wrong_outcome_is_a_problem():
     right = faults.row(case, outcome)
     assert right["clocks_to_off"] == 2 and right["first"] == ["current_sum"]
     for changed, word in (
-        ({"trips": None}, "wanted None"),
+        ({"trips": None}, "expected None"),
         ({"trips": "position"}, "first fault"),
         ({"rpm": 100.0}, "rpm"),
     ):
