@@ -20,7 +20,7 @@ from fluxproof.golden_model.drive_keys import DriveError
 from fluxproof.golden_model.io import sample_latch
 from fluxproof.golden_model.io.fault_latch import NAMES
 from fluxproof.golden_model.registers import registers
-from studies import faults
+from studies.faults import __main__ as faults
 from studies.faults.bench import named, run, setup
 from studies.faults.cases import cases, tour
 from studies.faults.cores import GoldenCore, VerilatedClock
