@@ -11,7 +11,7 @@ from fluxproof.cosim import ghdl
 from fluxproof.golden_model import drive as drives
 from fluxproof.golden_model import fluxproof
 from fluxproof.golden_model.registers import registers
-from studies import timeline
+from studies.timeline import __main__ as timeline
 
 PAPER = ROOT / "docs" / "drives" / "paper001.toml"
 
