@@ -30,8 +30,9 @@ PYTHON_RUN := .venv/bin/python
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
 
-setup: ## install what is missing: system packages, .venv, GHDL 5 (done by every other target too)
-	@bash scripts/setup.sh $(if $(filter setup,$(MAKECMDGOALS)),--retry)
+# Every other target runs this first, for what the targets on the command line use (scripts/setup/needs.sh).
+setup: ## install what every target uses: system packages, .venv, GHDL 5, Yosys (each target installs its own part)
+	@bash scripts/setup.sh $(if $(filter setup,$(MAKECMDGOALS)),--retry) $(filter-out help clean distclean lock,$(MAKECMDGOALS))
 
 generate: setup ## write what is generated: VHDL constants, registers, AXI top, C header, component.xml, fluxproof.core
 	$(PYTHON_RUN) -m scripts.generate $(ARGS)
@@ -86,10 +87,9 @@ lint: setup ## check the style of the Python (ruff) and, with a vsg.yaml, of the
 	.venv/bin/ruff check .
 	$(if $(wildcard vsg.yaml),.venv/bin/vsg -c vsg.yaml -f $$(find rtl tb -name '*.vhd' ! -name fluxproof_pkg.vhd | sort))
 
-lock: ## renew requirements.lock from requirements.in (newest versions that fit together)
-	rm -rf .cache/lock && python3 -m venv .cache/lock && .cache/lock/bin/pip install -q uv
-	.cache/lock/bin/uv pip compile --upgrade --universal --python-version 3.10 --generate-hashes \
-	    --no-header --no-annotate --no-emit-index-url --no-emit-find-links -q -o requirements.lock requirements.in
+lock: ## renew requirements.lock and requirements/ from pyproject.toml (newest versions that fit; ARGS=--keep: the same ones)
+	rm -rf .cache/lock && python3 -m venv .cache/lock && .cache/lock/bin/pip install -q uv 'tomli; python_version < "3.11"'
+	.cache/lock/bin/python scripts/setup/lock.py .cache/lock/bin/uv $(ARGS)
 	rm -rf .cache/lock
 
 clean: ## remove what the targets built (build/, caches of Python)

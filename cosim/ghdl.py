@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import hashlib
 import os
+import shutil
 import subprocess
+import time
 from pathlib import Path
 from xml.etree import ElementTree
 
 from cocotb_tools.runner import get_runner
 
 from fluxproof.checkout import BUILD, ROOT, RTL
+from fluxproof.cosim.sources import closure
+
+KEPT_S = 24 * 3600.0  # builds of older sources that were not used for so long are deleted
 
 
 class BuildError(RuntimeError):
@@ -24,46 +30,84 @@ def run_folder(toplevel: str, generics: dict, rtl: Path = RTL, key: str = "") ->
     return BUILD / "sim" / f"{toplevel}-{tag}"
 
 
+def build(toplevel: str, rtl: Path = RTL, extra=()) -> Path:
+    """Analyse and elaborate ``toplevel`` once per state of the sources it needs; the folder it is in.
+
+    Generics are set when the simulation starts, so all configurations share a build, and so do processes that run at
+    the same time.  Raises BuildError with GHDL's words where the VHDL does not build.
+    """
+    sources = closure(toplevel, rtl, extra)
+    state = hashlib.sha256(os.environ.get("GHDL_BACKEND", "").encode())
+    for path in sources:
+        state.update(f"{path}\n".encode() + path.read_bytes())
+    # A copy of the RTL, such as a planted defect's, keeps its builds and takes them along when it is deleted.
+    builds = BUILD / "ghdl" if rtl == ROOT / "rtl" else rtl / ".ghdl"
+    folder = builds / f"{toplevel}-{state.hexdigest()[:16]}"
+    builds.mkdir(parents=True, exist_ok=True)
+    with open(builds / f"{toplevel}.lock", "w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if (folder / "built").exists():
+            os.utime(folder)
+            return folder
+        for old in builds.glob(f"{toplevel}-{'?' * 16}"):
+            if old == folder or time.time() - old.stat().st_mtime > KEPT_S:
+                shutil.rmtree(old)
+        try:
+            get_runner("ghdl").build(
+                sources=sources,
+                hdl_library="top",
+                hdl_toplevel=toplevel,
+                build_args=["--std=08"],
+                build_dir=folder,
+                always=True,
+                log_file=_log(folder, "build.log"),
+            )
+        except (SystemExit, RuntimeError, subprocess.CalledProcessError) as error:
+            words = (folder / "build.log").read_text().splitlines() if (folder / "build.log").exists() else []
+            told = [line for line in words if "error" in line or ".vhd:" in line] or words
+            raise BuildError(f"{toplevel} does not build: " + "\n".join(told[-12:] or [str(error)])) from error
+        (folder / "built").touch()
+    return folder
+
+
 def run(
     toplevel: str, module: str, generics: dict, environment: dict, rtl: Path = RTL, key: str = "", extra=()
 ) -> Path:
     """Simulate ``toplevel`` under cocotb module ``module``; returns the folder of the run, see failure().
 
-    ``rtl`` may be another tree (a mutant's), ``extra`` files beside it (a test's own top).  Raises BuildError with
-    GHDL's words where the VHDL does not build.
+    ``rtl`` may be another tree (a mutant's), ``extra`` files beside it (a test's own top).  Raises BuildError, see
+    build().
     """
-    sources = [*sorted(rtl.rglob("*.vhd")), *extra]
     folder = run_folder(toplevel, generics, rtl, key)
+    folder.mkdir(parents=True, exist_ok=True)
     (folder / "results.xml").unlink(missing_ok=True)
-    runner = get_runner("ghdl")
-    try:
-        runner.build(
-            sources=sources,
-            hdl_toplevel=toplevel,
-            build_args=["--std=08"],
-            build_dir=folder,
-            always=True,
-            log_file=_log(folder, "build.log"),
-        )
-    except (SystemExit, RuntimeError, subprocess.CalledProcessError) as error:
-        words = (folder / "build.log").read_text().splitlines() if (folder / "build.log").exists() else []
-        told = [line for line in words if "error" in line or ".vhd:" in line] or words
-        raise BuildError(f"{toplevel} does not build: " + "\n".join(told[-12:] or [str(error)])) from error
+    built = build(toplevel, rtl, extra)
+    # `ghdl -r` starts the program of this name in the folder it runs in; mcode, which makes none, reads the library.
+    (folder / toplevel).unlink(missing_ok=True)
+    if (built / toplevel).exists():
+        (folder / toplevel).symlink_to(built / toplevel)
     # GHDL's warnings about metavalues at time zero say nothing; the bench checks for metavalues itself.
     command = dict(
         hdl_toplevel=toplevel,
+        hdl_toplevel_lang="vhdl",
+        hdl_toplevel_library="top",
         test_module=module,
         parameters=generics,
-        build_dir=folder,
+        build_dir=built,
         test_dir=folder,
-        test_args=["--std=08"],
+        test_args=["--std=08", f"--workdir={built}"],
         plusargs=["--ieee-asserts=disable"],
-        extra_env={**environment, "PYTHONPATH": f"{ROOT}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"},
+        extra_env={
+            **environment,
+            "PYTHONPATH": f"{ROOT}{os.pathsep}{os.environ.get('PYTHONPATH', '')}",
+            # Else pytest recompiles all that is imported (numba, scipy) to explain asserts: seconds in every run.
+            "COCOTB_REWRITE_ASSERTION_FILES": "dut_*.py",
+        },
         log_file=_log(folder, "test.log"),
         results_xml=str(folder / "results.xml"),
     )
     with contextlib.suppress(SystemExit):  # how the runner says that a test failed: the caller asks failure()
-        runner.test(**command)
+        get_runner("ghdl").test(**command)
     return folder
 
 

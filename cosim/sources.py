@@ -14,18 +14,12 @@ _UNIT = re.compile(r"^\s*(package|entity)\s+(\w+)\s+is\b", re.IGNORECASE | re.MU
 _USE = re.compile(r"\bwork\.(\w+)", re.IGNORECASE)
 
 
-def rtl_sources(rtl: Path = RTL, without: Collection[str] = ()) -> list[Path]:
-    """Every ``*.vhd`` under ``rtl``: packages first, then each entity behind those it instantiates.
+def _needs(paths: Collection[Path]) -> tuple[dict[Path, set[Path]], set[Path]]:
+    """({file: files it needs}, files that declare a package); ValueError where two files declare the same unit.
 
     Dependencies are all mentions of ``work.NAME``, which covers ``use work.P.all`` and ``entity work.E``.
-    The order is the same on every machine; ``without``: names of files that are left out.  Raises ValueError where
-    two files declare the same unit, and graphlib.CycleError where files need each other.
     """
-    texts = {
-        path: _COMMENT.sub("", path.read_text())
-        for path in sorted(rtl.rglob("*.vhd"))
-        if path.name not in without
-    }
+    texts = {path: _COMMENT.sub("", path.read_text()) for path in paths}
     declared_by: dict[str, Path] = {}
     packages = set()
     for path, text in texts.items():
@@ -35,9 +29,40 @@ def rtl_sources(rtl: Path = RTL, without: Collection[str] = ()) -> list[Path]:
                 raise ValueError(f"{name} is declared in both {other.name} and {path.name}")
             if kind.lower() == "package":
                 packages.add(path)
+    needs = {
+        path: {declared_by.get(name.lower()) for name in _USE.findall(text)} - {None, path}
+        for path, text in texts.items()
+    }
+    return needs, packages
+
+
+def rtl_sources(rtl: Path = RTL, without: Collection[str] = ()) -> list[Path]:
+    """Every ``*.vhd`` under ``rtl``: packages first, then each entity behind those it instantiates.
+
+    The order is the same on every machine; ``without``: names of files that are left out.  Raises ValueError where
+    two files declare the same unit, and graphlib.CycleError where files need each other.
+    """
+    needs, packages = _needs([path for path in sorted(rtl.rglob("*.vhd")) if path.name not in without])
     order = TopologicalSorter()
-    for path, text in texts.items():
-        needs = {declared_by.get(name.lower()) for name in _USE.findall(text)} - {None, path}
-        order.add(path, *sorted(needs))
+    for path, needed in needs.items():
+        order.add(path, *sorted(needed))
     # The sort is stable and no package needs an entity, so moving packages ahead keeps the order valid.
     return sorted(order.static_order(), key=lambda path: path not in packages)
+
+
+def closure(toplevel: str, rtl: Path = RTL, extra: Collection[Path] = ()) -> list[Path]:
+    """The files under ``rtl`` and in ``extra`` that the entity ``toplevel`` needs, sorted; its file bears its name.
+
+    Raises ValueError where there is no such file, or two files declare the same unit.
+    """
+    needs, _ = _needs([*sorted(rtl.rglob("*.vhd")), *extra])
+    waiting = [path for path in needs if path.stem == toplevel]
+    if not waiting:
+        raise ValueError(f"no {toplevel}.vhd under {rtl}")
+    found: set[Path] = set()
+    while waiting:
+        path = waiting.pop()
+        if path not in found:
+            found.add(path)
+            waiting += needs[path]
+    return sorted(found)

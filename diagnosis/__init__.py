@@ -1,4 +1,4 @@
-"""Why a real drive differs from its simulation: recordings in, explanation out."""
+"""Explains why recordings of a real drive differ from its simulation."""
 
 __all__ = ["diagnose"]
 

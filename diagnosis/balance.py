@@ -1,13 +1,13 @@
-"""The misfit of the nominal drive: the sampled flux balance and what else a recording allows to be balanced.
+"""The misfit of the nominal drive: the sampled flux balance, the current sum and the torque balance.
 
     u:      u_mean - R mean(i) - [psi_s(i+, theta+) - psi_s(i, theta)] / T, in dq at the middle angle
     sum:    i_a + i_b + i_c
     torque: T_shaft - (T_airgap - B omega_m - J d omega_m / dt)
 
-The difference of flux linkages over a period is exact; nothing is differentiated.  The mean current is the
-mean of both samples less a parabola: over a period the mean voltage stands still while the magnets turn on,
-so the flux grows in a straight line, the magnets' share does not, and the current takes the difference,
-(omega T)^2 psi_m / (12 L_d) on the d axis.
+The difference of flux linkages over a period is exact; nothing is differentiated.  The mean current is the mean of
+both samples minus a parabola: within a period the mean voltage is constant while the magnets rotate.  The total flux is
+linear in time, the magnet flux is not, and the current carries the difference, (omega T)^2 psi_m / (12 L_d) on the
+d axis.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from fluxproof.diagnosis.effect import torque_of
 
 
 def misfit(view) -> dict[str, np.ndarray]:
-    """What was recorded minus what the nominal drive would need, {channel: array} (see effect.py)."""
+    """Recorded minus nominal values, {channel: array} (see effect.py)."""
     m = view.machine
     exact = view.with_raw_current()
     r = np.full(len(view), m.resistance_ohm)
@@ -36,13 +36,13 @@ def misfit(view) -> dict[str, np.ndarray]:
 
 
 def bulge(view):
-    """Mean of both samples less the mean current of the interval, (b, m) on the d axis [A]."""
+    """Mean of both samples minus the mean current of the interval, (b, m) on the d axis [A]."""
     m = view.machine
     return (view.omega_mid * view.sample_time_s) ** 2 * m.magnet_flux_wb / (12.0 * m.inductance_d_h)
 
 
 def shaft_torque(view, exact):
-    """Torque that the nominal drive would deliver at the shaft, (b, m) [Nm]."""
+    """Shaft torque of the nominal drive, (b, m) [Nm]."""
     m = view.machine
     omega_m = view.omega_mid / m.pole_pairs
     coulomb = (m.coulomb_friction_nm or 0.0) * np.sign(omega_m)

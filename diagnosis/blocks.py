@@ -1,8 +1,8 @@
-"""Cuts a recording into blocks of equal length in which current and speed hardly change.
+"""Cuts a recording into blocks of equal length in which current and speed are steady.
 
-Angles are moving averages over 2 HALF_WIDTH + 1 samples, in the misfit too: an inertia turns smoothly, an
-encoder's code does not.  Currents are parabolas over a block.  Where dwells are short the blocks are shorter;
-where rows abound, evenly spread blocks are kept.
+Angles are moving averages over 2 HALF_WIDTH + 1 samples, in the misfit too: the rotor moves smoothly, unlike the codes
+of an encoder.  Currents are parabolas over a block.  Short dwells are cut into shorter blocks; of very long recordings,
+evenly spread blocks are kept.
 """
 
 from __future__ import annotations
@@ -15,25 +15,25 @@ from fluxproof.diagnosis.shaft import airgap, is_airgap, shaft_kind
 from fluxproof.diagnosis.view import View
 
 BLOCK_ROWS = 200
-SHORTER = (100, 50)  # where dwells are short
+SHORTER = (100, 50)  # for short dwells
 LEAST_BLOCKS = 12
 HALF_WIDTH = 8
-MOST_BLOCKS = 320  # more rows than these blocks hold add time, not knowledge
-RAMP_TORQUE = 0.02  # of rated torque: a change of inertial torque within a block beyond it is a ramp
-SLOPE_REACH = 60  # samples over which the shaft's acceleration is taken beside a transducer
-CURRENT_STEP = 0.08  # of rated current: a block with a larger change is a transient
+MOST_BLOCKS = 320  # more blocks increase the run time but hardly the accuracy
+RAMP_TORQUE = 0.02  # of rated torque: a larger change of inertial torque within a block means a ramp
+SLOPE_REACH = 60  # samples over which the shaft acceleration is computed with a transducer
+CURRENT_STEP = 0.08  # of rated current: a larger change within a block means a transient
 RIPPLE = 0.05  # of rated current, rms around the block's parabola
 SPEED_STEP = 0.06  # of the largest speed
-SLOW_SHARE = 0.01  # of the speed at which the EMF reaches the bus: standstill is steady too
-RESTLESS = 3.0  # how much more is let pass where nothing is steady
+SLOW_SHARE = 0.01  # of the speed at which the EMF reaches the bus voltage: tolerance at standstill
+RESTLESS = 3.0  # factor on the tolerances if no block is steady
 
 
 def smooth(values, joined_run, half=HALF_WIDTH):
-    """Moving average over 2 half + 1 samples, within runs of joined samples; nan where it does not fit in."""
+    """Moving average over 2 half + 1 samples, within runs of joined samples; nan at their ends."""
     width = 2 * half + 1
     sums = np.cumsum(
         np.concatenate([[0], np.nan_to_num(values)])
-    )  # a run ends at every row that is not a number
+    )  # a run ends at NaN
     out = np.full(len(values), np.nan, values.dtype)
     if len(values) >= width:
         out[half : len(values) - half] = (sums[width:] - sums[:-width]) / width
@@ -43,7 +43,7 @@ def smooth(values, joined_run, half=HALF_WIDTH):
 
 
 def parabola(values):
-    """Every row of (b, k) values as the parabola that fits it best."""
+    """Least-squares parabola of each row of (b, k) values."""
     x = np.linspace(-1.0, 1.0, values.shape[1])
     basis, _ = np.linalg.qr(np.stack([np.ones_like(x), x, x**2], axis=1))
     return (values @ basis) @ basis.T
@@ -56,11 +56,11 @@ def stator_current(recording: Recording, theta):
         third = r["i_c"] if r.has("i_c") else -r["i_a"] - r["i_b"]
         abc = np.stack([r["i_a"], r["i_b"], third], axis=1)
         return (2 / 3) * (abc @ np.exp(2j * np.pi / 3 * np.arange(3))), abc if r.has("i_c") else None
-    return (r["i_d"] + 1j * r["i_q"]) * np.exp(1j * theta), None  # a dq log was turned by the drive already
+    return (r["i_d"] + 1j * r["i_q"]) * np.exp(1j * theta), None  # a dq log was already rotated by the drive
 
 
 def _unwrapped(recording, run, sample_time_s):
-    """Angle without jumps (n,) [rad]; gaps are bridged with the recorded speed, so that the mechanical turn is kept."""
+    """Unwrapped angle (n,) [rad]; gaps are bridged with the recorded speed, to preserve the mechanical turn."""
     theta = np.unwrap(recording["theta_e"])
     breaks = np.flatnonzero(np.diff(run)) + 1
     if len(breaks) and recording.has("omega_e"):
@@ -74,7 +74,7 @@ def _unwrapped(recording, run, sample_time_s):
 def view_of(recording: Recording, nominal, block_rows=BLOCK_ROWS) -> View:
     """Cut a recording into steady blocks.
 
-    Raises RecordingError where no block is left.
+    Raises RecordingError if there is no steady block.
     """
     r, period, machine = recording, nominal.sample_time_s, nominal.machine
     n = len(r)
@@ -95,7 +95,7 @@ def view_of(recording: Recording, nominal, block_rows=BLOCK_ROWS) -> View:
     rows = starts[:, None] + np.arange(block_rows)
     around = starts[:, None] + np.arange(-1, block_rows + 1)
     torque, slope_m = torque[rows], slope_m[rows]
-    if kind == "torque":  # an acceleration taken over many samples is wrong where a ramp ends
+    if kind == "torque":  # an acceleration over many samples is wrong at the end of a ramp
         ends = np.array_split(slope_m, 4, axis=1)
         swing = (machine.inertia_kgm2 or 0.0) * np.ptp([e.mean(axis=1) for e in ends], axis=0)
         torque[swing > RAMP_TORQUE * airgap(nominal, np.array(1j * machine.rated_current_a))] = np.nan
@@ -125,7 +125,7 @@ def view_of(recording: Recording, nominal, block_rows=BLOCK_ROWS) -> View:
 
 
 def views_of(recordings, nominal) -> list[View]:
-    """Views of several recordings of a drive, all in blocks as short as the shortest that one of them needs."""
+    """Views of several recordings of a drive, all with the block length of the one that needs the shortest."""
     views = [view_of(r, nominal) for r in recordings]
     shortest = min(v.u_dc.shape[1] for v in views)
     return [
@@ -144,7 +144,7 @@ def _voltage(recording, nominal, theta_s):
         duties = np.stack([r["d_a"], r["d_b"], r["d_c"]], axis=1)
         asked[delay:] = ((2 / 3) * (duties @ np.exp(2j * np.pi / 3 * np.arange(3))))[: n - delay]
         return asked * u_dc_mid, u_dc_mid
-    # A controller that turns its reference by the delay's angle: it acts at the middle of its own period.
+    # The controller advances its reference by the delay angle, so that it is valid at the middle of its period.
     asked[delay:] = (r["u_d_ref"] + 1j * r["u_q_ref"])[: n - delay]
     middle = np.append(0.5 * (theta_s[1:] + theta_s[:-1]), np.nan)
     return asked * np.exp(1j * middle), u_dc_mid
@@ -156,11 +156,11 @@ def _mechanics(recording, nominal, i_s, theta, theta_s, linked):
     kind = shaft_kind(recording, nominal, i_s, theta_s, linked)
     slope = np.zeros(n)
     if kind == "torque":
-        # The transducer saw the ripple; what an inertia takes of it is slow.
+        # The transducer measures the ripple; the inertial torque is slow.
         far = SLOPE_REACH
         bend = theta_s[2 * far :] - 2 * theta_s[far:-far] + theta_s[: -2 * far]
         slope[far:-far] = bend / (far * period) ** 2
-    else:  # a free shaft shows its ripple in the angle alone
+    else:  # the ripple of a free shaft appears in the angle only
         slope[1:-2] = (theta[3:] - theta[2:-1] - theta[1:-2] + theta[:-3]) / (2 * period**2)
     slope_m = np.nan_to_num(slope) / nominal.machine.pole_pairs
     if kind == "torque":
@@ -173,9 +173,9 @@ def _mechanics(recording, nominal, i_s, theta, theta_s, linked):
 
 
 def at_middle(x):
-    """Samples (n,) moved to the middles of their intervals, where all else of the balance is taken.
+    """Samples (n,) interpolated to the middles of their intervals, to which the rest of the balance refers.
 
-    Of e^(jwt) four points leave (9 cos(wT/2) - cos(3wT/2)) / 8, less than 1 % short of one up to wT = 0.8.
+    The four-point interpolation has the gain (9 cos(wT/2) - cos(3wT/2)) / 8, within 1 % of one up to wT = 0.8.
     """
     out = np.array(x, float)
     out[:-1] = 0.5 * (x[1:] + x[:-1])
@@ -199,7 +199,7 @@ def _cut(recording, nominal, run, i_s, omega, block_rows):
         whole = length + 2 * margin
         raise RecordingError(
             f"{recording.source}: no stretch of {whole} rows ({whole * period * 1e3:.0f} ms) without gap in which "
-            "current and speed are steady: record operating points that last longer"
+            "current and speed are steady: record longer operating points"
         )
     dwell = _dwells(starts, run, i_s, omega, scale, length)
     if len(starts) > MOST_BLOCKS:
@@ -209,7 +209,7 @@ def _cut(recording, nominal, run, i_s, omega, block_rows):
 
 
 def _steady_starts(run, i, omega, scale, block_rows, margin, patience):
-    """First rows of the blocks that lie within a run and hold current and speed, ripple aside."""
+    """First rows of the blocks within a run in which current and speed are steady, apart from ripple."""
     n, length = len(run), block_rows + 2 * margin
     rated, top = scale
     starts, at = [], 0
@@ -236,7 +236,7 @@ def _steady_starts(run, i, omega, scale, block_rows, margin, patience):
 
 
 def _dwells(starts, run, i, omega, scale, block_rows):
-    """Number of the dwell each block belongs to: neighbours in time at the same operating point."""
+    """Dwell number of each block; consecutive blocks at the same operating point share a dwell."""
     rated, top = scale
     number, out = 0, []
     for k, start in enumerate(starts):

@@ -1,10 +1,10 @@
 """From rows to cells: the misfit and every effect's column as harmonics of a block.
 
-The same linear functional, mean(x exp(-j h theta)), is taken of the misfit and of every column, so the
-balance holds between them exactly, whole turns or not.  What was white in the current is a difference in
-the balance and all but vanishes in the mean, so a cell's weight comes from what repeats: neighbouring
-blocks of a dwell.  A second share of variance, in proportion to the voltage, stands for the balance itself:
-ripple, sampling of the bus, a trapezoid for a mean.
+The same linear functional, mean(x exp(-j h theta)), is applied to the misfit and to every column, so that the
+balance holds exactly between them, with or without whole turns.  White noise of the current enters the balance as a
+difference and nearly vanishes in the mean, so that the weight of a cell is estimated from the differences between
+neighbouring blocks of a dwell.  A second variance, proportional to the voltage squared, covers the error of the
+balance itself: ripple, sampling of the bus, the trapezoidal mean.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ from fluxproof.diagnosis.balance import misfit
 from fluxproof.diagnosis.torque_order import torque_orders
 
 ORDERS_SUM = (0.0, 1.0, 2.0)
-LEAST_TURNS = 0.8  # of a harmonic within a block, else it is no functional of its own
-TAPERED_TURNS = 3.0  # the same under a taper, whose neighbours leak
-SYSTEM_U = 2e-4  # of the block's voltage
-SYSTEM_DC = 1.5e-5  # of the bus
+LEAST_TURNS = 0.8  # periods of a harmonic within a block; with fewer it is not independent of order 0
+TAPERED_TURNS = 3.0  # the same with a taper, which has more leakage from neighbouring orders
+SYSTEM_U = 2e-4  # error of the balance, relative to the voltage of the block
+SYSTEM_DC = 1.5e-5  # the same relative to the bus voltage
 
 
 def orders_u(pole_pairs: int) -> tuple[float, ...]:
-    """Harmonic orders in dq that a misfit is looked at in."""
+    """Harmonic orders in dq at which a misfit is evaluated, per electrical turn."""
     mechanical = [n / pole_pairs for n in (1, 2, 3)]
     both = sorted({round(h, 9) for h in [*mechanical, 0.5, 1.0, 2.0, 3.0, 4.0, 6.0, 12.0, 18.0]})
     return (0.0, *both, *(-h for h in both))
@@ -34,9 +34,8 @@ def orders_u(pole_pairs: int) -> tuple[float, ...]:
 class Cells:
     """Rows of a weighted least-squares problem; every row is the real or imaginary part of one functional.
 
-    y: (r,) misfit; columns: {effect: {coefficient: (r,)}}; block, order, part: (r,) where a row comes from,
-    part 0 and 1 for d and q; channel: (r,) of "u", "sum", "torque"; ok: (r,) rows that count.
-    omega, level: (b,) speed and voltage of the blocks.
+    y: (r,) misfit; columns: {effect: {coefficient: (r,)}}; block, order, part: (r,) origin of a row, part 0 and 1
+    for d and q; channel: (r,) "u", "sum" or "torque"; ok: (r,) bool, rows that are used.
     """
 
     y: np.ndarray
@@ -49,10 +48,10 @@ class Cells:
 
 
 class Projector:
-    """Functionals of one view, computed once and used for the misfit and for every column.
+    """The functionals of one view, computed once and used for the misfit and for every column.
 
-    Views of the same blocks with other angles or currents share them: any functional will do, as long as
-    it is the same on both sides of the balance.
+    Views of the same blocks with corrected angles or currents share them: any functional is valid if it is the same
+    on both sides of the balance.
     """
 
     def __init__(self, view):
@@ -66,7 +65,7 @@ class Projector:
         span = np.abs(view.theta[:, -1] - view.theta[:, 0])
         seen = np.abs(self.orders)[None, :] * span[:, None] >= 2 * np.pi * LEAST_TURNS
         seen[:, 0] = True
-        # Two orders closer than a turn within the block would be one functional counted twice.
+        # Two orders closer than a turn within the block are one functional and must not count twice.
         kept = self._apart(span)
         ok = [np.repeat((seen & kept).ravel(), 2)]
         self.torque_seen = np.isfinite(view.torque).all(axis=1)
@@ -82,8 +81,8 @@ class Projector:
             order.append(np.tile(np.repeat(orders, 2), b))
             part.append(np.tile([0, 1], b * n))
             least = TAPERED_TURNS if channel == "torque" else LEAST_TURNS
-            told = np.array(orders)[None, :] * span[:, None] >= 2 * np.pi * least
-            both = np.stack([told, told], axis=2)
+            enough = np.array(orders)[None, :] * span[:, None] >= 2 * np.pi * least
+            both = np.stack([enough, enough], axis=2)
             both[:, 0] = [True, False]  # a mean is real
             if channel == "torque":
                 both &= self.torque_seen[:, None, None]
@@ -95,7 +94,7 @@ class Projector:
             channel: np.exp(-1j * np.array(orders)[None, None, :] * view.theta_mid[:, :, None])
             for channel, orders in self.real.items()
         }
-        if "torque" in self.waves:  # a taper: ends of a second difference are all noise
+        if "torque" in self.waves:  # a taper, since the ends of a second difference are mostly noise
             m = view.theta_mid.shape[1]
             self.waves["torque"] *= (1.0 - np.cos(2 * np.pi * (np.arange(m) + 0.5) / m))[None, :, None]
 
@@ -111,7 +110,7 @@ class Projector:
         return kept
 
     def rows(self, column) -> np.ndarray:
-        """One misfit or column, {channel: array}, as rows; a channel it does not name is zero."""
+        """A misfit or column, {channel: array}, as rows (r,); a missing channel is zero."""
         b = self.turns.shape[0]
         out = []
         u = column.get("u")
@@ -131,9 +130,9 @@ class Projector:
 
 
 def cells_of(view, effects, projector=None, free=None) -> Cells:
-    """Cells of a view with the columns of the effects, free ones marked by a leading '~'.
+    """Cells of a view with the columns of the effects; free columns have a leading '~'.
 
-    projector: of a view of the same blocks, where there is one.  free: names whose free columns are wanted, or all.
+    projector: that of a view of the same blocks, or None.  free: names of effects with free columns; None: all.
     """
     p = projector or Projector(view)
     columns = {}
@@ -145,25 +144,25 @@ def cells_of(view, effects, projector=None, free=None) -> Cells:
     return Cells(p.rows(misfit(view)), columns, p.block, p.order, p.part, p.channel, p.ok)
 
 
-def told(columns, key) -> str:
-    """Name of a coefficient's column, core or free; "" in a view where its axis carries too little current.
+def column_of(columns, key) -> str:
+    """Name of a coefficient's column, core or free; "" in a view in which its axis has too little current.
 
-    The data of a solution are freed of its errors of the record: a column may be there and not in the raw ones.
+    The data of a solution are corrected for measurement errors, so that a column may exist there but not in the raw
+    data.
     """
     return next((k for k in (key, f"~{key}") if k in columns), "")
 
 
 def voltage_level(view):
-    """Length of the mean voltage vector of each block, (b,) [V]."""
+    """Magnitude of the mean voltage vector of each block, (b,) [V]."""
     return np.abs(view.to_dq(view.u[:, 1:-1]).mean(axis=1))
 
 
 def noise(view, cells, residual) -> np.ndarray:
-    """Standard deviation of every row (r,), from how much ``residual`` differs between neighbours of a dwell.
+    """Standard deviation of every row (r,), from the differences of ``residual`` between neighbours in a dwell.
 
-    Neighbours share the operating point, so what differs between them is noise whatever the physics.  The
-    variance of each order and part is fitted as a + b omega^2, as the noise of a current enters with L / T
-    and with omega L.
+    Neighbours share the operating point, so that their difference is noise whatever the physics.  The variance of
+    each order and part is fitted as a + b omega^2, since current noise enters with L / T and with omega L.
     """
     omega = np.abs(view.omega.mean(axis=1))
     top = max(float(omega.max()), 1e-9)
@@ -172,7 +171,7 @@ def noise(view, cells, residual) -> np.ndarray:
     out = np.full(len(cells.y), np.nan)
     for channel in np.unique(cells.channel):
         mine = cells.channel == channel
-        # A second difference of the angle is in the torque of a free shaft: its noise grows with omega^2.
+        # The torque of a free shaft contains a second difference of the angle: its noise grows with omega^2.
         shape = np.stack([np.ones(len(view)), share ** (4 if channel == "torque" else 2)], axis=1)
         for order in np.unique(cells.order[mine]):
             for part in (0, 1):
@@ -183,7 +182,7 @@ def noise(view, cells, residual) -> np.ndarray:
 
 
 def _variance(e, ok, pair, shape):
-    """Variance a + b omega^2 of the blocks from the differences of neighbours (or from all where there are none)."""
+    """Variance a + b omega^2 of the blocks from differences of neighbours, or from all values if there are few."""
     both = pair[ok[pair] & ok[pair + 1]]
     if len(both) >= 8:
         squares, where = 0.5 * (e[both + 1] - e[both]) ** 2, 0.5 * (shape[both] + shape[both + 1])

@@ -1,4 +1,4 @@
-"""Which file column is which canonical one, in which unit: drive.toml first, then names that are known.
+"""Assigns file columns to canonical columns and units: by drive.toml first, then by known names.
 
 [columns] of drive.toml maps a name of the file to a canonical name, as a string or as a table:
 
@@ -7,11 +7,11 @@
     "I_V"             = {name = "i_b", unit = "mA"}
     "I_W"             = {name = "i_c", factor = 0.001, offset = 0.2}   # canonical = raw * factor + offset
     "n"               = {name = "omega_e", unit = "rpm"}          # of the shaft: times the pole pairs
-    "Spare"           = ""                                        # not to be used
+    "Spare"           = ""                                        # ignored
 
-A column without a header is called by its number, "1", "2", ...  What [columns] does not say is found by the exact
-canonical names, then by the ready-made maps in column_maps/.  Units are those of units.py; a shaft's angle is
-"rad mech", its speed "rpm" or "rad/s mech".
+A column without a header is called by its number, "1", "2", ...  Columns that [columns] does not name are found by the
+exact canonical names, then by the maps in column_maps/.  Units are those of units.py; a shaft angle is "rad mech", a
+shaft speed "rpm" or "rad/s mech".
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ KEYS = {"name", "unit", "factor", "offset"}
 
 @dataclass(frozen=True)
 class Source:
-    """Where a canonical column comes from: value = raw * factor + offset; ``stated``: someone named the unit."""
+    """Source of a canonical column: value = raw * factor + offset; ``stated``: the unit was given explicitly."""
 
     column: str
     factor: float = 1.0
@@ -44,7 +44,7 @@ class Source:
 
 @dataclass
 class Plan:
-    """{canonical name: Source}, constants for what a log leaves out, and what was assumed."""
+    """{canonical name: Source}, constants for columns that a log lacks, and notes on assumptions."""
 
     sources: dict[str, Source] = field(default_factory=dict)
     assumed: dict[str, float] = field(default_factory=dict)
@@ -60,7 +60,7 @@ class Plan:
 
 
 def plan_columns(names: dict[str, str], nominal, path) -> Plan:
-    """The plan for a file with columns ``names`` {name: unit or ""}; RecordingError says what is missing.
+    """The plan for a file with columns ``names`` {name: unit or ""}; RecordingError lists missing columns.
 
     nominal: Nominal; its ``columns`` and ``machine.pole_pairs`` are used.
     """
@@ -73,7 +73,7 @@ def plan_columns(names: dict[str, str], nominal, path) -> Plan:
 
 
 def canonical(table: Table, plan: Plan) -> dict[str, np.ndarray]:
-    """The canonical arrays (n,) of a table, converted; columns that held no numbers are left out."""
+    """The canonical arrays (n,) of a table, converted; columns without numbers are omitted."""
     arrays = {}
     for name, source in plan.sources.items():
         raw = table.columns.get(source.column)
@@ -85,7 +85,7 @@ def canonical(table: Table, plan: Plan) -> dict[str, np.ndarray]:
 
 
 def _explicit(names, nominal, path) -> tuple[Plan, set[str]]:
-    """What [columns] says, and the file columns that it disposes of."""
+    """The plan of [columns], and the file columns that it uses or ignores."""
     plan, taken = Plan(), set()
     entries = {key: _entry(key, value, nominal) for key, value in nominal.columns.items()}
     bare = {}
@@ -94,7 +94,7 @@ def _explicit(names, nominal, path) -> tuple[Plan, set[str]]:
     found = {key: key if key in names else bare.get(key) for key in entries}
     if not any(found.values()):
         if entries:
-            plan.notes.append("none of the columns that [columns] names is in the file; it was passed over")
+            plan.notes.append("none of the columns named in [columns] is in the file; [columns] was ignored")
         return plan, taken
     for key, entry in entries.items():
         where = f"{nominal.path}: [columns] {shown(key)!r}"
@@ -105,7 +105,7 @@ def _explicit(names, nominal, path) -> tuple[Plan, set[str]]:
             continue
         if entry["name"] in plan.sources:
             raise RecordingError(
-                f"{where}: {entry['name']} is named by {plan.sources[entry['name']].column!r} already"
+                f"{where}: {entry['name']} is already assigned to {plan.sources[entry['name']].column!r}"
             )
         unit = entry.get("unit", "")
         if "factor" in entry or "offset" in entry:
@@ -118,7 +118,7 @@ def _explicit(names, nominal, path) -> tuple[Plan, set[str]]:
 
 
 def _entry(key, value, nominal) -> dict:
-    """One line of [columns] as a checked table."""
+    """One line of [columns] as a validated table."""
     where = f"{nominal.path}: [columns] {shown(key)!r}"
     entry = {"name": value} if isinstance(value, str) else value
     if not isinstance(entry, dict) or not isinstance(entry.get("name"), str):
@@ -127,7 +127,7 @@ def _entry(key, value, nominal) -> dict:
         )
     if entry["name"] and entry["name"] not in COLUMNS:
         raise RecordingError(
-            f"{where}: {shown(entry['name'])!r} is no canonical name{_nearest(entry['name'], COLUMNS)}"
+            f"{where}: {shown(entry['name'])!r} is not a canonical name{_nearest(entry['name'], COLUMNS)}"
         )
     for name in entry:
         if name not in KEYS:
@@ -154,18 +154,18 @@ def _source(column, name, unit, nominal, where) -> Source:
     found = conversion(name, unit, nominal.machine.pole_pairs)
     if found is None:
         raise RecordingError(
-            f"{where}: unit {shown(unit)!r} is not known for {name}; known are {known_units(name)}"
+            f"{where}: unit {shown(unit)!r} is unknown for {name}; known are {known_units(name)}"
         )
     return Source(column, *found, unit, True)
 
 
 def _unit_of(column, names) -> str:
-    """The unit a file states for a column: in its header or in the format's own field."""
+    """The unit of a column in the file: from its header or from a field of the format."""
     return names.get(column, "").strip() or split_unit(column)[1]
 
 
 def _exact(plan, left, nominal, path) -> None:
-    """Canonical names as they stand, with or without a unit behind them."""
+    """Assign columns with canonical names, with or without a unit."""
     for column in left:
         name = split_unit(column)[0]
         if name in COLUMNS and name not in plan.sources:
@@ -174,7 +174,7 @@ def _exact(plan, left, nominal, path) -> None:
 
 
 def _ready_made(plan, left, nominal, path) -> None:
-    """The ready-made map that knows most of the file's columns fills what is still open."""
+    """Fill missing columns from the ready-made map that knows most of the file's columns."""
     best, hits = None, {}
     for known in maps():
         key = getattr(known, "KEY", plain)
@@ -205,14 +205,14 @@ def _ready_made(plan, left, nominal, path) -> None:
     if not best.SIGNATURE:
         return
     plan.used = f"{plan.used}, {best.NAME}" if plan.used == "[columns]" else best.NAME
-    plan.notes += [f"columns as {best.NAME} names them", *getattr(best, "NOTES", [])]
+    plan.notes += [f"column names as in {best.NAME}", *getattr(best, "NOTES", [])]
     plan.assumed |= {k: v for k, v in getattr(best, "ASSUMED", {}).items() if k not in plan.sources}
     plan.sample_time_s = getattr(best, "SAMPLE_TIME_S", None)
     plan.run = next((c for c in left if c == getattr(best, "RUN", None)), None)
 
 
 def _demand(plan, names, path) -> None:
-    """The least a balance needs; RecordingError lists what is missing and what was found."""
+    """Check the columns that a balance requires; RecordingError lists the missing and the present ones."""
     have = set(plan.sources) | set(plan.assumed)
     missing = []
     phases, dq = (
@@ -235,7 +235,7 @@ def _demand(plan, names, path) -> None:
 
 
 def _guesses(missing, names) -> str:
-    """What the missing ones might be called in the file."""
+    """File columns that may be the missing ones."""
     wanted = [w for w in COLUMNS if any(w in re.findall(r"\w+", text) for text in missing)]
     simple = {name.lower().replace("_", ""): name for name in names if split_unit(name)[0] not in COLUMNS}
     close = {w: difflib.get_close_matches(w.replace("_", ""), list(simple), n=1, cutoff=0.6) for w in wanted}

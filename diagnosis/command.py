@@ -1,8 +1,8 @@
 """``fluxproof diagnose``: why a recording differs from its simulation, as a command.
 
-Progress goes to stderr, the answer to stdout, the files to --out.  Exit status 0 whatever the verdict; input that
-cannot be used ends in one line and status 2 (fluxproof/command.py).  What takes long to import is imported when it
-runs, so that ``fluxproof --help`` stays quick.
+Progress goes to stderr, the answer to stdout, the files to --out.  The exit status is 0 whatever the verdict, and 2
+with one line on stderr for unusable input (fluxproof/command.py).  Slow imports are made inside the functions, so that
+``fluxproof --help`` stays quick.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def default_folder(recordings) -> Path:
 
 
 class Progress:
-    """What is being done, on stderr: one line that changes on a terminal, else a line for each new thing."""
+    """The current step on stderr: one line that is updated on a terminal, else one line per new step."""
 
     def __init__(self, quiet=False, stream=None):
         self.stream = stream or sys.stderr
@@ -72,7 +72,7 @@ class Progress:
 
 
 def printable(text: str, encoding: str | None) -> str:
-    """One line that a terminal can show: what a stranger's file put into it is not obeyed, foreign letters escaped."""
+    """One printable line: control characters from a file become spaces, letters outside the encoding are escaped."""
     one = "".join(c if c.isprintable() else " " for c in text)
     return one.encode(encoding or "utf-8", "backslashreplace").decode(encoding or "utf-8")
 
@@ -82,16 +82,16 @@ def answer_lines(answer, nominal, out: Path) -> list[str]:
     lines = [answer.sentence]
     if answer.effects:
         lines += ["", *effect_table(answer.effects)]
-    lines += [f"cannot tell apart: {', '.join(group)}" for group in answer.ambiguity]
+    lines += [f"not separable: {', '.join(group)}" for group in answer.ambiguity]
     if answer.next_recording:
         lines += ["", "record next, held until steady:", *map(_request(nominal), answer.next_recording)]
     if answer.unknown_term is not None:
         u = answer.unknown_term
-        lines.append(f"best short term: {u.formula} with c = {u.value:.4g} +- {u.sigma:.1g} {u.unit}")
+        lines.append(f"best single term: {u.formula} with c = {u.value:.4g} +- {u.sigma:.1g} {u.unit}")
     fit = answer.fit
     if answer.verdict not in ("bad_recording", "digital_mismatch"):
         lines.append(
-            f"misfit on operating points not fitted: {fit.holdout_before:.3g} {fit.unit} before, "
+            f"misfit at operating points that were not fitted: {fit.holdout_before:.3g} {fit.unit} before, "
             f"{fit.holdout_after:.3g} {fit.unit} after, noise floor {fit.noise_floor:.3g} {fit.unit}"
         )
     if answer.digital.checked and answer.digital.first_difference is None:
@@ -106,7 +106,7 @@ def _improved(out, answer) -> bool:
 
 
 def effect_table(effects) -> list[str]:
-    """The asserted effects, a line for each parameter, in aligned columns."""
+    """The asserted effects, one line per parameter, in aligned columns."""
     from fluxproof.diagnosis.report.words import measured, percent
 
     rows = [("effect", "parameter", "value", "confidence", "explains")]
@@ -122,7 +122,7 @@ def effect_table(effects) -> list[str]:
 
 
 def _request(nominal):
-    """A function that writes a Request as a line; speed of the shaft too."""
+    """A function that formats a Request as a line, with the shaft speed in rpm."""
     p = nominal.machine.pole_pairs
 
     def line(request) -> str:
@@ -133,7 +133,7 @@ def _request(nominal):
 
 
 def _problem_lines(problems) -> list[str]:
-    """The checks' findings, fatal ones first; the rest is in the report."""
+    """The first findings of the checks, fatal ones first; the rest is in the report."""
     shown = sorted(problems, key=lambda p: not p.fatal)
     lines = [f"recording: {p.message}{f' ({p.action})' if p.action else ''}" for p in shown[:MOST_PROBLEMS]]
     left = len(shown) - MOST_PROBLEMS

@@ -1,9 +1,9 @@
-"""Is a curve of flux over current a wrong inductance or saturation?  Both have the same free form.
+"""Separates a wrong inductance from saturation, which have the same free form.
 
-The surplus over the nominal flux, divided by the current, is constant for a wrong inductance and vanishes
-with the current for saturation.  Its ratio between the smallest and the largest recorded current decides;
-in between, or with one level of current, nobody can tell.  Where the surplus changes its sign, or is far larger at
-small currents, neither alone can make it: both are there.
+The excess over the nominal flux, divided by the current, is constant for a wrong inductance and vanishes with the
+current for saturation.  Its ratio between the smallest and the largest recorded current decides; intermediate values
+and recordings with one current level are ambiguous.  If the excess changes its sign or is far larger at small currents,
+both are present.
 """
 
 from __future__ import annotations
@@ -13,26 +13,26 @@ import numpy as np
 from fluxproof.diagnosis.catalogue.saturation import q_curves
 from fluxproof.diagnosis.effect import flux
 
-LEAST = 0.08  # of rated current: smaller currents say nothing of a surplus
-SPREAD = 1.35  # between smallest and largest level
-STRAIGHT, BENT = 0.68, 0.55  # ratio above which it is an inductance, below which saturation
+LEAST = 0.08  # of rated current: smaller currents do not determine an excess flux
+SPREAD = 1.35  # least ratio of the largest and the smallest current level
+STRAIGHT, BENT = 0.68, 0.55  # ratio above which it is a wrong inductance, below which saturation
 
 FAMILY = ("inductance_d", "inductance_q", "saturation")
 
 
-OVER, UNDER = 1.35, -0.2  # ratio beyond which both are there
-PART = 0.03  # of L: what each of the two must amount to
-LEAST_GAIN = 30.0  # of chi^2, over the dispersion, that a straight part must bring beside any saturation
+OVER, UNDER = 1.35, -0.2  # ratio beyond which both are present
+PART = 0.03  # of L: least size of each of the two
+LEAST_GAIN = 30.0  # in chi^2 over the dispersion: least gain of a linear part in addition to any saturation
 
 
 def axes_told(view) -> str:
-    """The axes, of "dq", that carry enough current in a view to say something of their flux."""
+    """The axes, of "dq", with enough current in a view to determine their flux."""
     i = view.i.mean(axis=1) / view.machine.rated_current_a
     return "".join(axis for axis, part in zip("dq", (i.real, i.imag), strict=True) if np.abs(part).max() > LEAST)
 
 
 def surplus(solution, axis, x):
-    """Flux beyond the nominal one at currents x (per unit of rated current), in units of H A per rated A."""
+    """Excess over the nominal flux at currents x (per unit of rated current), in Wb per rated A."""
     out = np.zeros_like(x)
     own = solution.c.get(f"inductance_{axis}", {})
     out += own.get(f"delta_l_{axis}", 0.0) * x
@@ -42,16 +42,16 @@ def surplus(solution, axis, x):
 
 
 def saturated(solution, axis, x, inductance):
-    """The same of a saturation's coefficients."""
+    """The same for the coefficients of a saturation."""
     c = solution.c.get("saturation", {})
     powers = {"1": x, "2": x * np.abs(x) if axis == "q" else x**2, "2s": x * np.abs(x), "3": x**3, "5": x**5}
     return inductance * sum((c.get(f"{axis}_{k}", 0.0) * p for k, p in powers.items()), np.zeros_like(x))
 
 
 def ratio(view, solution, axis) -> tuple[float, float]:
-    """(ratio of the surplus inductance at small and at large current, largest surplus relative to L).
+    """(ratio of the excess inductance at small and at large current, largest excess relative to L).
 
-    The ratio is nan where there is one level of current only.
+    The ratio is nan with only one current level.
     """
     x, shape, inductance = _ends(view, solution, axis)
     if not len(x):
@@ -63,7 +63,7 @@ def ratio(view, solution, axis) -> tuple[float, float]:
 
 
 def has_both(view, solution, axis) -> bool:
-    """Whether the curve of an axis needs a wrong inductance and saturation beside it."""
+    """Whether the curve of an axis needs both a wrong inductance and saturation."""
     value, _ = ratio(view, solution, axis)
     if not np.isfinite(value):
         return False
@@ -74,10 +74,9 @@ def has_both(view, solution, axis) -> bool:
 
 
 def _levels_off(x, shape) -> bool:
-    """Whether a surplus that falls from a smaller to a larger current would be far smaller yet at rated current.
+    """Whether an excess that falls from a smaller to a larger current would fall far up to rated current.
 
-    Between two currents near each other it has little room to fall: what counts is its fall from none to the rated one,
-    along a parabola.
+    Between two similar currents it can fall only little; the fall from zero to rated current along a parabola decides.
     """
     bend = (shape[1] - shape[0]) / (x[1] ** 2 - x[0] ** 2)
     straight = shape[0] - bend * x[0] ** 2
@@ -100,7 +99,7 @@ def _ends(view, solution, axis):
 
 
 def labels(view, solution, least=0.012) -> tuple[set[str], bool]:
-    """(names that the solution's curves deserve, whether that is beyond doubt)."""
+    """(names that follow from the solution's curves, whether they are certain)."""
     names, sure = set(), True
     for axis in "dq":
         value, size = ratio(view, solution, axis)
@@ -120,9 +119,9 @@ def labels(view, solution, least=0.012) -> tuple[set[str], bool]:
 
 
 def straight_beside_saturation(search, solution) -> bool:
-    """Whether the q axis has a wrong inductance beside its saturation, whatever the curve of that.
+    """Whether the q axis has a wrong inductance in addition to saturation of any curve.
 
-    Saturation vanishes at small currents faster than these do: |i| i, i^3 and i^5 together are any such curve.
+    The excess flux of saturation vanishes faster than the current; |i| i, i^3 and i^5 represent any such curve.
     """
     f = search.fitter(solution.view, [search.effects[n] for n in sorted(solution.model.names)])
     axis = {("inductance_q", key) for key in ("delta_l_q", "bend_2", "bend_3")}

@@ -1,4 +1,4 @@
-"""Shapes that free curves are built of."""
+"""Basis functions of the free curves."""
 
 import numpy as np
 
@@ -6,39 +6,39 @@ import numpy as np
 def hats(x, knots):
     """Piecewise-linear hat functions on the knots, one per knot but the first: (k - 1, *x.shape).
 
-    Together they make every broken line that is zero at the first knot.
+    Their linear combinations are all piecewise-linear functions that are zero at the first knot.
     """
     knots = np.asarray(knots, float)
     eye = np.eye(len(knots))
     return np.array([np.interp(x, knots, eye[k]) for k in range(1, len(knots))])
 
 
-# Denser at the start: what warms does so fastest there.
+# Denser at the start, where warming is fastest.
 COURSE_KNOTS = np.array([0.0, 0.08, 0.25, 0.55, 1.0])
 
 
 def courses(view):
-    """Slow courses of time (4, b), zero at the start of the recording and piecewise linear."""
+    """Slow drifts over time (4, b), piecewise linear and zero at the start of the recording."""
     return hats(view.course, COURSE_KNOTS)
 
 
 def step_at_start(c) -> float:
-    """By how much a free course differs at the start from where its next stretch comes from: c of ``courses``."""
+    """Step of a free drift at the start, relative to the extrapolation of its next segment; c: of ``courses``."""
     first, second = c.get("course_0", 0.0), c.get("course_1", 0.0)
     return first - (second - first) * COURSE_KNOTS[1] / (COURSE_KNOTS[2] - COURSE_KNOTS[1])
 
 
 def course(view):
-    """Time as a share of the recording, (b, 1)."""
+    """Time relative to the length of the recording, (b, 1)."""
     return view.course[:, None]
 
 
 def known_temperature(view, least_k=3.0):
-    """Whether a thermocouple was recorded and moved by ``least_k``."""
+    """Whether a winding temperature was recorded and changed by ``least_k`` [K]."""
     seen = view.temp[np.isfinite(view.temp)]
     return len(seen) == len(view.temp) and len(seen) > 0 and np.ptp(seen) >= least_k
 
 
 def reference_c(nominal) -> float:
-    """Temperature at which the nameplate holds [degC]."""
+    """Temperature of the nameplate values [degC]."""
     return float(nominal.machine.temperature_ref_c)

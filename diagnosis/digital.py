@@ -1,14 +1,14 @@
-"""The digital half first: did the core compute what its golden model computes?
+"""The digital part of a diagnosis: do the core's outputs equal those of its golden model?
 
-A telemetry dump holds what the core took in and what it answered.  The golden model is replayed over the samples and
-every recorded answer compared with ``==``.  Equal in every bit: the controller is acquitted, and the difference between
-recording and simulation is physics.  Not equal: the first sample, and in it the first block in the order of the data
-whose output differs, with the signal and the bit; where one wrong bit of a register, a raw sample or the start state
-explains the recording, that bit, and the block it acts in even if the core does not show that block's output.
+A telemetry dump contains the inputs and outputs of the core.  The golden model is replayed over the samples and every
+recorded output compared with ``==``.  If all bits are equal, the difference between recording and simulation is
+physical.  If not, the result is the first sample with a difference, and in it the first block in data-flow order, with
+signal and bit.  If one wrong bit of a register, a raw sample or the start state explains the recording, the result
+names that bit and the block it acts in, even if the core does not output that block's signals.
 
-A stretch whose state at the start is unknown (the recording begins while the drive runs, or samples were lost) is
-replayed from the state that is known best, and counts once everything agrees to its end.  Where it never does, only
-the blocks without memory are judged (digital_local.py): a regulator cannot be blamed for a state that nobody recorded.
+A stretch with an unknown start state (the recording begins while the drive runs, or samples were lost) is replayed from
+the best known state, and counts from the row after which everything agrees to its end.  If there is none, only
+the blocks without state are checked (digital_local.py), since the state of the regulators was not recorded.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from fluxproof.golden_model.io import sample_latch
 from fluxproof.golden_model.kernel import CACHE_DIR
 from fluxproof.golden_model.units import unit
 
-CONVERGED = 1000  # rows that must agree to the end before a run-in counts
+CONVERGED = 1000  # rows that must agree to the end before a run-in is accepted
 KINDS = {
     "register": "register {name} in the recording's header: the core behaved as with {acted} instead of {found}",
     "sample": "raw sample {name}: the core behaved as with {acted} instead of {found}",
@@ -37,12 +37,12 @@ KINDS = {
 
 
 def replay(recording: Recording) -> tuple[Digital, list[str]]:
-    """(result.Digital, sentences for people) of a recording that holds what the core saw and answered.
+    """(result.Digital, sentences for the report) of a recording with the core's inputs and outputs.
 
     Uses ``recording.meta`` as telemetry.read_dump makes it: ``registers``, ``config`` and ``samples`` at least;
     ``observed``, or the duty columns as the core's compare values; ``start``, ``first_state``, ``gaps``.
     ``first_difference`` has block, instance, sample (row), counter, signal, bit, recorded, golden (as hexadecimal
-    and, with unit, in SI), differing (all signals of that row), hidden (blocks upstream that nobody could see) and
+    and, with unit, in SI), differing (all signals of that row), hidden (blocks upstream without recorded outputs) and
     cause (or None).  ``checked`` is False where no sample of the whole core could be compared, ``samples`` says how
     many were.
     """
@@ -50,17 +50,17 @@ def replay(recording: Recording) -> tuple[Digital, list[str]]:
     missing = [name for name in ("registers", "config", "samples") if meta.get(name) is None]
     if missing:
         return Digital(), [
-            f"The digital half was not checked: the recording has no {', no '.join(missing)} of the core."
+            f"The digital part was not checked: the recording has no {', no '.join(missing)} of the core."
         ]
     lacking = [name for name in fluxproof.Registers._fields if name not in meta["registers"]]
     if lacking:
         return Digital(), [
-            f"The digital half was not checked: register {lacking[0]} is not in the recording."
+            f"The digital part was not checked: register {lacking[0]} is not in the recording."
         ]
     observed = meta.get("observed") or _duties(recording, meta["config"])
     if not observed:
         return Digital(), [
-            "The digital half was not checked: the recording has no answer of the core, not even duties."
+            "The digital part was not checked: the recording has no output of the core, not even duties."
         ]
     run = run_of(meta["samples"], observed, meta["registers"], meta["config"])
     notes = [
@@ -73,7 +73,7 @@ def replay(recording: Recording) -> tuple[Digital, list[str]]:
 
 
 def _duties(recording: Recording, config) -> dict:
-    """Compare values out of duty columns, where these are whole clocks."""
+    """Compare values from duty columns, if these are whole clock periods."""
     if not recording.has("d_a", "d_b", "d_c"):
         return {}
     clocks = {f"compare_{x}": recording[f"d_{x}"] * config["carrier_half"] for x in "abc"}
@@ -82,7 +82,7 @@ def _duties(recording: Recording, config) -> dict:
 
 
 def _not_of_its_format(run: Run):
-    """A raw value that its port cannot carry: (row, instance, signal, golden, cause, names) or None."""
+    """A raw value outside its port's format: (row, instance, signal, golden, cause, names) or None."""
     for k, port in enumerate(sample_latch.BLOCK.outputs):
         name = fluxproof.Sample._fields[k]
         size = sample_latch.BLOCK.width_from.get(port.name)
@@ -101,14 +101,14 @@ def _not_of_its_format(run: Run):
                 "latch",
                 name,
                 acted,
-                {"kind": "sample", "name": name, "says": f"{value} is no {fmt}"},
+                {"kind": "sample", "name": name, "says": f"{value} is not a value of {fmt}"},
                 [name],
             )
     return None
 
 
 def _stretches(run: Run, recording: Recording, notes: list[str]) -> tuple[Digital, list[str]]:
-    """Every stretch between lost samples, the first difference in time counts."""
+    """Check every stretch between lost samples; the first difference in time is the result."""
     meta, n = recording.meta, len(run.samples)
     gaps = meta.get("gaps", [])
     ends = [*(row for row, _ in gaps), n]
@@ -138,13 +138,13 @@ def _stretches(run: Run, recording: Recording, notes: list[str]) -> tuple[Digita
 
 
 def _agrees_from(run: Run, state, start, stop) -> int:
-    """The row from which a replay with a guessed state agrees to the end."""
+    """The row from which a replay with an assumed state agrees to the end."""
     _, last = run.differences(state, start, stop)
     return last + 1
 
 
 def _differs(run, recording, state, start, stop, row, before, names, whole_state) -> Digital:
-    """The first difference of a stretch whose start state is known."""
+    """The first difference of a stretch with a known start state."""
     signal = first_in_flow(names)
     golden, instance = golden_value(run, before, row, signal), OWNER[signal]
     cause, first = find_cause(run, state, start, stop, row, names, whole_state)
@@ -158,7 +158,7 @@ def _differs(run, recording, state, start, stop, row, before, names, whole_state
 
 
 def _told(cause: Cause, stop) -> dict:
-    """A cause for JSON."""
+    """A cause as a mapping for diagnosis.json."""
     words = {
         "found": f"{cause.found} ({hexadecimal(cause.found)})",
         "acted": f"{cause.acted} ({hexadecimal(cause.acted)})",
@@ -170,7 +170,7 @@ def _told(cause: Cause, stop) -> dict:
         "kind": cause.kind,
         "name": cause.name,
         "bit": cause.bit,
-        "bits": list(cause.bits or (cause.bit,)),  # any one of them explains as much
+        "bits": list(cause.bits or (cause.bit,)),  # any one of them explains equally many rows
         "recorded": cause.found,
         "behaved_as": cause.acted,
         "explains_rows_to": cause.rows,
@@ -179,7 +179,7 @@ def _told(cause: Cause, stop) -> dict:
 
 
 def _result(run, recording, row, instance, signal, golden, cause, names) -> Digital:
-    """A difference in the form that diagnosis.json has."""
+    """A difference in the form of diagnosis.json."""
     is_input = signal in fluxproof.Sample._fields
     found = int(
         run.samples[row, fluxproof.Sample._fields.index(signal)] if is_input else _recorded(run, row, signal)
@@ -217,29 +217,29 @@ def _recorded(run, row, signal):
 
 
 def hexadecimal(value: int) -> str:
-    """An integer as hexadecimal, in two's complement of 32 bits where it is negative."""
+    """An integer as hexadecimal, in 32-bit two's complement if negative."""
     return f"0x{value & 0xFFFFFFFF:x}"
 
 
 def _sentences(run, gaps, known, checked, run_in, local) -> list[str]:
-    """What was compared and what was not."""
+    """Sentences on what was compared and what was not."""
     said = []
     if gaps:
         lost = sum(count for _, count in gaps)
         said.append(f"{lost} samples are missing in {len(gaps)} places, the first before row {gaps[0][0]}.")
     if checked:
         said.append(
-            f"The golden model gives the same in every bit: {checked} samples, {len(run.names)} signals each."
+            f"The golden model agrees in every bit: {checked} samples with {len(run.names)} signals each."
         )
     if checked:
-        said.append("The gates, and with them the register dead_time, lie behind what the recording shows.")
+        said.append("The gate signals are not recorded: they and the register dead_time were not checked.")
     if run_in:
-        said.append(f"{run_in} samples served as run-in, as the core's state before them is not recorded.")
+        said.append(f"{run_in} samples were used as run-in, since the core's state before them is not recorded.")
     if local:
         signals = checkable(run.names)
         why = "its start state is not recorded" if known == "unknown" else "samples before it are missing"
         said.append(
-            f"{local} samples could not be replayed, {why}: in them only what needs no state was compared, "
-            f"and equal: {', '.join(signals)}. Regulators and estimators were not checked there."
+            f"{local} samples could not be replayed, {why}; only blocks without state were compared, "
+            f"and they are equal: {', '.join(signals)}. Regulators and estimators were not checked there."
         )
     return said

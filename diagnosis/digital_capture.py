@@ -1,6 +1,6 @@
-"""Dumps out of a simulation: the golden model in closed loop over the averaged plant, everything noted.
+"""Telemetry of a simulation: the golden model in closed loop with the averaged plant, all signals recorded.
 
-What a test bench gets from the core over AXI4-Stream, without the core.
+The same data as a test bench receives from the core over AXI4-Stream.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from fluxproof.plant import layout as L
 
 def capture(drive, register_set, scenario: Scenario, machine=None, inverter=None, sensors: Sensors | None = None,
             mode=0, state=None):  # fmt: skip
-    """(samples (n, 13) int64, {name of Observed: (n,) int64}, the core's last state) of a closed loop.
+    """(samples (n, 13) int64, {name of Observed: (n,) int64}, final state of the core) of a closed loop.
 
     ``scenario.load`` is a torque [Nm], with ``mode`` IMPOSED_SPEED the mechanical speed [rad/s].
     """
@@ -52,7 +52,7 @@ def capture(drive, register_set, scenario: Scenario, machine=None, inverter=None
 def _capture(
     state, samples, u_dc, load, registers, config, plant_state, params, sensors, period_s, observed
 ):  # fmt: skip
-    """Fills the codes of ``samples`` and ``observed``; the duties of a sample act in the next period."""
+    """Fill ``samples`` and ``observed`` with codes; the duties of a sample act in the next period."""
     duties = np.full(3, 0.5)
     for k in range(load.shape[0]):
         x = samples[k]

@@ -1,9 +1,9 @@
-"""Why a replay parts from the recording: one wrong bit (or digit of a register) somewhere, looked for one by one.
+"""The cause of a difference between replay and recording: a search over single wrong bits or register digits.
 
-The recorded values tell where the difference is seen; which block it comes from may be hidden, because the core does
-not show every signal.  A hypothesis makes it certain: with this bit of this register (raw sample, start state) the
-other way round, the golden model gives the recording again, bit for bit and beyond the first difference.  Then both
-runs can be traced through every hidden signal, and the block where they part first is known, not guessed.
+The recorded values show where the difference appears; its origin may be hidden, because the core does not output every
+signal.  A hypothesis confirms it: with this bit of this register (raw sample, start state) inverted, the golden model
+reproduces the recording bit for bit, beyond the first difference.  Both runs can then be traced through every hidden
+signal, and the block where they first differ is known.
 """
 
 from __future__ import annotations
@@ -25,18 +25,18 @@ from fluxproof.golden_model import fluxproof
 from fluxproof.golden_model.fluxproof import REGISTERS
 from fluxproof.golden_model.io import sample_latch
 
-REACH = 4000  # rows before the difference from which a hypothesis is replayed: states may have parted unseen
-BEYOND = 300  # rows behind it that a hypothesis must explain to be looked at further
+REACH = 4000  # rows before the difference from which a hypothesis is replayed: hidden states may differ earlier
+BEYOND = 300  # rows after it that a hypothesis must explain to be examined further
 STATE_BITS = 40  # widest state: V_STATE
 
 
 @dataclass(frozen=True)
 class Cause:
-    """A hypothesis that gives the recording again.
+    """A hypothesis that reproduces the recording.
 
-    kind: "register", "sample" (one raw value), "start_state", "record" (one recorded answer).  name, bit: what is
-    wrong; found: as recorded; acted: as the core behaved.  run, state: for the replay that behaves so.
-    rows: up to which row (exclusive) it explains everything.
+    kind: "register", "sample" (one raw value), "start_state", "record" (one recorded output).  name, bit: location of
+    the error; found: recorded value; acted: value with which the core behaved.  run, state: for the replay with it.
+    rows: end (exclusive) of the rows that it explains.
     """
 
     kind: str
@@ -47,11 +47,11 @@ class Cause:
     run: Run
     state: fluxproof.State
     rows: int = 0
-    bits: tuple = ()  # all bits of it that, alone, explain as much
+    bits: tuple = ()  # all bits that each explain equally many rows
 
 
 def find_cause(run: Run, state, start: int, stop: int, row: int, names: list[str], whole_state: bool):
-    """(the Cause of a first difference in ``row`` or None, row from which its two runs are to be compared).
+    """(the Cause of a first difference in ``row`` or None, row from which the two runs are to be compared).
 
     state: before ``start``, of a stretch start..stop-1 without gap.  names: signals that differ in ``row``.
     whole_state: ``state`` was read from the recording, so that it may be what is wrong.
@@ -78,12 +78,12 @@ def find_cause(run: Run, state, start: int, stop: int, row: int, names: list[str
                 break
     if best is not None and best.kind == "register":
         best = dataclasses.replace(best, bits=_as_good(run, best, base, begin))
-    # A bit that explains nothing but the row where the difference shows may do so by chance.
+    # A bit that explains only the row of the difference may do so by chance.
     return (None, row) if best is not None and best.rows == row + 1 < stop else (best, first)
 
 
 def _as_good(run: Run, cause: Cause, base, begin) -> tuple:
-    """Bits of the cause's register that explain as many rows as it does: the recording cannot tell them apart."""
+    """Bits of the cause's register that explain equally many rows: the recording cannot separate them."""
     bits, fmt = [], REGISTERS[cause.name].fmt
     for bit in range(fmt.width):
         changed = {cause.name: flipped(cause.found, bit, fmt)}
@@ -94,7 +94,7 @@ def _as_good(run: Run, cause: Cause, base, begin) -> tuple:
 
 
 def _hypotheses(run: Run, base, before, row, names, whole_state):
-    """Single bits the other way round, likely ones first; base: state from which they run, before: the row's."""
+    """Hypotheses with a single inverted bit, likely ones first; base: start state of their runs, before: the row's."""
     for k, port in enumerate(sample_latch.BLOCK.outputs):
         name, found = fluxproof.Sample._fields[k], int(run.samples[row, k])
         for bit in range(port.fmt.width):
@@ -112,7 +112,7 @@ def _hypotheses(run: Run, base, before, row, names, whole_state):
 
 
 def _slips(value, fmt) -> list[int]:
-    """The value with one decimal digit another: the header is text, and so a wrong bit or key strikes a digit."""
+    """The values with one decimal digit changed: the header is text, so that a wrong bit or key changes a digit."""
     text = str(abs(value))
     digits = [text[:k] + d + text[k + 1 :] for k in range(len(text)) for d in "0123456789" if d != text[k]]
     numbers = [int(t) * (-1 if value < 0 else 1) for t in digits]
@@ -120,7 +120,7 @@ def _slips(value, fmt) -> list[int]:
 
 
 def _registers_near(run, names):
-    """Registers by distance: those of the block that differs, of hidden ones before it, then all."""
+    """Registers by distance: of the block that differs, of hidden blocks upstream, then all."""
     near = [OWNER[first_in_flow(names)]]
     near += reversed(hidden_before(near[0], run.names))
     near += [name for name in ORDER if name not in near]
@@ -128,7 +128,7 @@ def _registers_near(run, names):
 
 
 def _states(base):
-    """Every bit of the state the other way round: (name, bit, value, changed value, changed state)."""
+    """Every inverted bit of the state: (name, bit, value, changed value, changed state)."""
     for name, part in base._asdict().items():
         for key, found in (part._asdict() if isinstance(part, tuple) else {"": part}).items():
             for bit in range(STATE_BITS):
@@ -138,9 +138,9 @@ def _states(base):
 
 
 def where_they_part(run: Run, cause: Cause, state, first: int, row: int) -> tuple[int, str]:
-    """(row, instance) where the replay and the cause's run part first, hidden signals included.
+    """(row, instance) of the first difference between the replay and the cause's run, including hidden signals.
 
-    state: the replay's before row ``first``, from which both run; ``row``: where the difference shows.
+    state: the replay's before row ``first``, from which both run; ``row``: the row of the visible difference.
     """
     low, high = first, row  # the first row after which the states differ, by bisection
     while low < high:
@@ -161,13 +161,13 @@ def where_they_part(run: Run, cause: Cause, state, first: int, row: int) -> tupl
 
 
 def golden_value(run: Run, state, row, name) -> int:
-    """What the golden model shows in a row; ``state`` is the one before it."""
+    """The golden model's value of a signal in a row; ``state`` is the one before the row."""
     said = trace(state, run.sample(row), run.registers, run.config)
     return said[OWNER[name]][outputs_of(OWNER[name]).index(name)]
 
 
 def flipped(value, bit, fmt) -> int:
-    """The integer with one bit of its format the other way round, two's complement where it has a sign."""
+    """The integer with one bit of its format inverted, in two's complement if the format is signed."""
     bits = (int(value) ^ (1 << bit)) & ((1 << fmt.width) - 1)
     return bits - (1 << fmt.width) if fmt.signed and bits >> (fmt.width - 1) else bits
 

@@ -1,7 +1,7 @@
-"""Which block makes which signal, in the order of the data, and what every block of the core said in one sample.
+"""Which block drives which signal, in data-flow order, and the outputs of every block of the core in one sample.
 
-All of it follows from fluxproof.WIRING, the blocks' declared ports and fluxproof.step itself; nothing is listed twice
-but the two Park transforms whose outputs the top gives other names.
+Everything is derived from fluxproof.WIRING, the declared ports of the blocks and fluxproof.step; only the two Park
+transforms whose outputs the top renames are listed here.
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ RENAMED = {"compensation_dq": ("u_comp_d", "u_comp_q"), "direction_functions": (
 
 
 def _outputs(instance):
-    """The top's names for an instance's outputs."""
+    """The names in the top of an instance's outputs."""
     block = fluxproof.WIRING[instance][0].BLOCK
     return RENAMED.get(instance, tuple(p.name for p in block.outputs))
 
 
 def _first_results(instance: str) -> int:
-    """Clock at which an instance tells its first results; its followers may start there."""
+    """Clock at which an instance has its first results; its followers may start there."""
     block = fluxproof.WIRING[instance][0].BLOCK
     return fluxproof.schedule()[instance][1] - (block.ahead if block.soon else 0)
 
@@ -42,16 +42,16 @@ def block_name(instance: str) -> str:
 
 
 def first_in_flow(signals) -> str:
-    """The signal whose block is ready first, ports in the order in which the top shows them."""
+    """The signal whose block is ready first; ports in the order of the top."""
     fields = fluxproof.Observed._fields
     return min(signals, key=lambda s: (ORDER.index(OWNER[s]), fields.index(s)))
 
 
 def _awaited(name: str, follower: str) -> list[str]:
-    """What an instance waits for until it has all that ``follower`` takes of it.
+    """The instances that an instance waits for before it has all outputs that ``follower`` uses.
 
-    A follower that starts earlier than it takes anything late takes only what comes with out_soon, and on that
-    nothing depends that the instance itself takes no sooner.
+    A follower that starts before the late outputs are ready uses only those that come with out_soon, which do not
+    depend on the late inputs of the instance.
     """
     block = fluxproof.WIRING[name][0].BLOCK
     taken_late = max(p.late for p in fluxproof.WIRING[follower][0].BLOCK.inputs)
@@ -64,9 +64,9 @@ def _awaited(name: str, follower: str) -> list[str]:
 
 
 def hidden_before(instance: str, shown) -> list[str]:
-    """Instances upstream of one whose results are not among the signals ``shown``, in the order of the data.
+    """Instances upstream of ``instance`` whose outputs are not among the signals ``shown``, in data-flow order.
 
-    A fault in one of them is seen first at ``instance``, as long as every signal between them is hidden.
+    A fault in one of them first appears at ``instance`` if every signal between them is hidden.
     """
     seen, waiting = set(), [(name, instance) for name in fluxproof.WIRING[instance][1]]
     while waiting:
@@ -81,7 +81,7 @@ def hidden_before(instance: str, shown) -> list[str]:
 
 
 class _Listener:
-    """Stands for a block's module inside fluxproof.step and notes what each call returns."""
+    """Replaces a block's module inside fluxproof.step and records the result of each call."""
 
     def __init__(self, module, notes):
         self._module, self._notes = module, notes
@@ -95,8 +95,8 @@ class _Listener:
 def trace(state, sample, registers, config) -> dict[str, tuple]:
     """{instance: its outputs} of one sample, hidden ones included; ``latch`` is the sample itself.
 
-    The top's step runs as plain Python with listeners in the place of the blocks.  Where one block is used several
-    times, its calls come in the order of WIRING.
+    The top's step runs as plain Python with listeners instead of the blocks.  The calls of a block that is used
+    several times are in the order of WIRING.
     """
     notes = defaultdict(list)
     modules = {module for module, _ in fluxproof.WIRING.values()}
@@ -113,10 +113,10 @@ def trace(state, sample, registers, config) -> dict[str, tuple]:
 
 
 def parted(a: dict[str, tuple], b: dict[str, tuple]) -> list[str]:
-    """Instances whose outputs differ between two traces, in the order of the data."""
+    """Instances whose outputs differ between two traces, in data-flow order."""
     return [name for name in ORDER if a[name] != b[name]]
 
 
 def outputs_of(instance: str) -> tuple[str, ...]:
-    """Names of an instance's outputs, as the top calls them where it shows them."""
+    """Names of an instance's outputs, with the top's name if it has one."""
     return _outputs(instance)

@@ -1,8 +1,8 @@
-"""What can be checked without knowing the core's state: blocks whose inputs are all in the recording.
+"""Checks without the core's state: blocks whose inputs are all in the recording.
 
-A recording that begins while the drive runs does not hold the regulators' integrals, so the whole core cannot be
-replayed.  Conditioning, transforms, decoupling, modulation and the applied voltage remember nothing, or only what the
-row before shows; fed with recorded signals they must give the recorded results, in every bit.
+A recording that begins while the drive runs does not contain the integrators of the regulators, so that the whole core
+cannot be replayed.  Conditioning, transforms, decoupling, modulation and the applied voltage have no state, or only one
+that the previous row contains; with recorded inputs they must give the recorded outputs in every bit.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from fluxproof.golden_model.modulation import pwm_compare, svm, svm_delay_compen
 from fluxproof.golden_model.transforms import clarke, flux_park, inverse_park, park, sincos
 
 AT_ONCE = 1 << 16
-# Signal -> recorded signals that it is made of, besides the raw sample; those of BEFORE from the row before.
+# Signal -> recorded signals that it depends on, besides the raw sample; the second tuple from the previous row.
 NEEDS = {
     **dict.fromkeys(
         "i_a i_b i_c current_at_rail u_dc u_max u_dc_at_rail u_dc_low theta_me i_d i_q temp_lost".split(), ()
@@ -48,7 +48,7 @@ BEFORE = {
 
 
 def checkable(names) -> dict[str, bool]:
-    """{signal that can be checked: whether the row before is needed} when ``names`` are recorded."""
+    """{signal that can be checked: whether the previous row is needed} if ``names`` are recorded."""
     found = {s: False for s, needs in NEEDS.items() if s in names and set(needs) <= set(names)}
     return found | {s: True for s, needs in BEFORE.items() if s in names and set(needs) <= set(names)}
 
@@ -57,7 +57,7 @@ def check_rows(run: Run, start: int, stop: int) -> tuple[int, list[str], dict[st
     """(first row in start..stop-1 with a difference or ``stop``, signals that differ there, their golden values)."""
     for begin in range(start, stop, AT_ONCE):
         end = min(begin + AT_ONCE, stop)
-        # One row more in front, for what comes from the row before; it has been checked already.
+        # One more row at the start, for signals of the previous row; it has already been checked.
         row, names, golden = _check(run, max(start, begin - 1), end)
         if row < end:
             return row, names, golden
@@ -65,7 +65,7 @@ def check_rows(run: Run, start: int, stop: int) -> tuple[int, list[str], dict[st
 
 
 def _check(run: Run, start, stop):
-    """check_rows for as many rows as fit the memory."""
+    """check_rows for a number of rows that fits the memory."""
     signals = checkable(run.names)
     wanted = np.array([signals.get(name, None) is not None for name in FIELDS])
     later = np.array([signals.get(name, False) for name in FIELDS])
@@ -105,7 +105,7 @@ _COUNT = len(MADE)
 
 @kernel
 def _make(samples, registers, config, now, before):
-    """Signals of MADE, (n, len(MADE)), out of raw samples, recorded signals of NOW, of EARLIER in the row before."""
+    """Signals of MADE, (n, len(MADE)), from raw samples, recorded signals NOW, and EARLIER of the previous row."""
     made = np.empty((samples.shape[0], _COUNT), np.int64)
     for k in range(samples.shape[0]):
         seen = _one(samples[k], registers, config, now[k], before[k])

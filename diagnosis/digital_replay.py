@@ -16,8 +16,8 @@ FIELDS = fluxproof.Observed._fields
 def run_until_different(state, samples, registers, config, recorded, column, start, stop, wrong):
     """Replay rows start..stop-1: (row of the first difference or stop, state before that row).
 
-    samples (n, 13), recorded (n, m) int64; column (57,) int64: where each of Observed stands in ``recorded``, -1
-    where it was not recorded.  wrong (m,) int64 receives 1 for the values that differ in that row.
+    samples (n, 13), recorded (n, m) int64; column (57,) int64: index in ``recorded`` of each of Observed, -1 if it
+    was not recorded.  wrong (m,) int64 receives 1 for the values that differ in that row.
     """
     for k in range(start, stop):
         x = samples[k]
@@ -38,7 +38,7 @@ def run_until_different(state, samples, registers, config, recorded, column, sta
 
 @kernel
 def count_differences(state, samples, registers, config, recorded, column, start, stop, last):
-    """Replay rows start..stop-1 whatever differs: how many values do; ``last`` (1,) receives the last such row."""
+    """Replay rows start..stop-1 and count the values that differ; ``last`` (1,) receives the last such row."""
     count = 0
     for k in range(start, stop):
         x = samples[k]
@@ -54,7 +54,7 @@ def count_differences(state, samples, registers, config, recorded, column, start
 
 
 class Run(NamedTuple):
-    """What a replay needs of a recording.  ``patch``: (row, column, value), one raw value to be read otherwise."""
+    """Data of a recording for a replay.  ``patch``: (row, column, value), one raw value to replace."""
 
     samples: np.ndarray  # (n, 13) int64
     recorded: np.ndarray  # (n, m) int64
@@ -71,12 +71,12 @@ class Run(NamedTuple):
         return int(row), plain_state(state), [n for n, bad in zip(self.names, wrong, strict=True) if bad]
 
     def differences(self, state, start, stop):
-        """(how many values differ in start..stop-1, last row in which one does or -1)."""
+        """(number of values that differ in start..stop-1, last row with a difference or -1)."""
         last = np.full(1, -1, np.int64)
         return int(self._run(count_differences, state, self.column, start, stop, last)), int(last[0])
 
     def state_at(self, state, start, row) -> fluxproof.State:
-        """The golden state before ``row`` of one that starts with ``state`` before ``start``."""
+        """The golden state before ``row`` of a run that starts with ``state`` before ``start``."""
         blind, wrong = np.full(len(FIELDS), -1, np.int64), np.zeros(len(self.names), np.int64)
         return plain_state(self._run(run_until_different, state, blind, start, row, wrong)[1])
 
@@ -94,7 +94,7 @@ class Run(NamedTuple):
             self.samples[row, field] = kept
 
     def sample(self, row) -> fluxproof.Sample:
-        """One row as the core takes it in."""
+        """One row as the core's input."""
         values = list(map(int, self.samples[row]))
         if self.patch is not None and self.patch[0] == row:
             values[self.patch[1]] = self.patch[2]
@@ -102,7 +102,7 @@ class Run(NamedTuple):
 
 
 def run_of(samples, observed: dict, registers: dict, config: dict) -> Run:
-    """A Run of what a dump's ``meta`` holds; ``observed`` {name: (n,)} may have any of the core's signals."""
+    """A Run from a dump's ``meta``; ``observed`` {name: (n,)} may contain any of the core's signals."""
     names = tuple(name for name in FIELDS if name in observed)
     column = np.array([names.index(name) if name in names else -1 for name in FIELDS], np.int64)
     recorded = np.ascontiguousarray(np.stack([observed[name] for name in names], axis=1), np.int64)
@@ -112,5 +112,5 @@ def run_of(samples, observed: dict, registers: dict, config: dict) -> Run:
 
 
 def plain_state(state) -> fluxproof.State:
-    """The state with Python's integers, so that every call has the types of the first."""
+    """The state with Python integers, so that every call has the same types and is compiled once."""
     return fluxproof.State(*(type(p)(*map(int, p)) if isinstance(p, tuple) else int(p) for p in state))

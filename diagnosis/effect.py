@@ -1,14 +1,14 @@
-"""What an effect of the catalogue is, and the four ways in which physics enters the balance.
+"""Base class of the catalogue's effects, and the four ways in which physics enters the voltage balance.
 
-The misfit of a channel is what was recorded minus what the nominal drive would need:
+The misfit of a channel is the recorded value minus the one that the nominal drive needs:
 
     u       mean stator voltage of an interval in dq, complex (b, m) [V]
     sum     i_a + i_b + i_c at the samples' middle, real (b, m) [A]
     torque  torque at the shaft, real (b, m) [Nm]
 
-An effect says which *columns* it adds to the misfit, per unit of its coefficients: a ``core`` that stands for
-its usual formula and a ``free`` set that bends that formula as far as its variables and symmetry allow.  A
-name rests on what an effect depends on; no formula of a real machine is the catalogue's.
+An effect defines the *columns* (regressors) that it adds to the misfit, per unit of its coefficients: ``core`` is
+its usual formula, ``free`` are further columns for any curve that its variables and symmetry allow.  An effect is
+identified by the variables it depends on, since no real machine follows the catalogue's formula exactly.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ import numpy as np
 from fluxproof.diagnosis.result import Estimate
 
 Column = dict  # channel -> array
-DOUBT = 2.0  # standard deviations that a value must be on the wrong side to be ruled out
-ALIKE = 0.1  # so near, relative, are two the same
+DOUBT = 2.0  # standard deviations by which a value must violate a limit to be rejected
+ALIKE = 0.1  # relative difference below which two values count as equal
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """A number that describes an effect."""
+    """A parameter of an effect in the report."""
 
     name: str
     unit: str
@@ -35,10 +35,10 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Effect:
-    """Base of the catalogue's entries; each lives in a file of its own and is found by being there.
+    """Base class of the catalogue's entries; each has its own file, which the catalogue imports automatically.
 
-    absorbs: effects that a freer curve of this one contains; they are asserted beside it on stronger evidence only.
-    confounders: effects that look alike, with ``separated_by`` in words.
+    absorbs: effects that a freer curve of this one contains; asserting them together with it needs stronger evidence.
+    confounders: effects with a similar signature; ``separated_by`` describes the experiment that separates them.
     """
 
     name: str
@@ -49,11 +49,11 @@ class Effect:
     separated_by: str
     parameters: tuple[Parameter, ...]
     absorbs: tuple[str, ...] = ()
-    positive: bool = False  # the leading coefficient cannot be below zero
+    positive: bool = False  # the leading coefficient cannot be negative
     corrects: bool = (
-        False  # an error of the record rather than a term of the machine: ``corrected`` takes it away
+        False  # a measurement error rather than a property of the machine: ``corrected`` removes it from the data
     )
-    smoothed: bool = False  # its terms stay on smoothed currents when the model is applied
+    smoothed: bool = False  # its columns use smoothed currents also when the model is applied
 
     def core(self, view) -> dict[str, Column]:
         """Columns of the usual formula, {coefficient: column}."""
@@ -64,56 +64,56 @@ class Effect:
         return {}
 
     def floor(self, nominal) -> float:
-        """Least size of the effect that is worth a name, in units of ``size``."""
+        """Smallest size at which the effect is reported, in units of ``size``."""
         raise NotImplementedError
 
     def overshadowed(self, c: dict[str, dict], nominal) -> float:
-        """Size up to which another effect of a model with coefficients c makes the same by itself."""
+        """Size up to which another effect of a model with coefficients c explains this one."""
         return 0.0
 
     def ceiling(self, nominal) -> float:
-        """Largest size that a drive which still runs can have, in units of ``size``."""
+        """Largest size at which a drive still runs, in units of ``size``."""
         return float("inf")
 
     def too_large(self, c: dict[str, float], view) -> bool:
-        """Whether no drive that still runs has coefficients c in a recording."""
+        """Whether coefficients c are impossible in a drive that runs."""
         return self.size(c, view.nominal) > self.ceiling(view.nominal)
 
     def size(self, c: dict[str, float], nominal) -> float:
-        """One number for how large the effect is."""
+        """Size of the effect as one number, in the unit of its ``floor``."""
         return abs(next(iter(c.values())))
 
     def doubt(self, c: dict[str, float], view) -> np.ndarray | float:
-        """Voltage (b,) [V] that no curve of the effect could tell, beside its share of what the curve says."""
+        """Voltage (b,) [V] by which any curve of the effect may be wrong, in addition to a share of its value."""
         return 0.0
 
     def moved(self, c: dict[str, float], view) -> float:
-        """How much the effect changed over a recording, in units of ``size``: a drift is its own change."""
+        """Change of the effect over a recording, in units of ``size``; of a drift, its size."""
         return self.size(c, view.nominal)
 
     def possible(self, c: dict[str, float], covariance: np.ndarray, nominal) -> bool:
-        """Whether the coefficients are not, beyond doubt, what physics rules out; covariance in their order."""
+        """Whether the coefficients are physically possible within their uncertainty; covariance in their order."""
         return not self.positive or sum(c.values()) >= -DOUBT * np.sqrt(max(covariance.sum(), 0.0))
 
     def corrected(self, view, c: dict[str, float]):
-        """The view without this error of the record (only where ``corrects``)."""
+        """The view without this measurement error (only if ``corrects``)."""
         raise NotImplementedError
 
     def estimates(self, c: dict[str, float], covariance: np.ndarray, nominal) -> dict[str, Estimate]:
-        """Parameters of the effect from its coefficients, whose order is that of the covariance."""
+        """Parameters of the effect, {name: Estimate}, from its coefficients in the order of the covariance."""
         raise NotImplementedError
 
     def relative(self, c: dict[str, dict], nominal) -> float:
-        """What the coefficients are multiplied by beside the other named effects, c of all of them."""
+        """Factor on the coefficients that follows from the other named effects; c: {effect: coefficients}."""
         return 1.0
 
     def plant(self, c: dict[str, float], nominal) -> dict:
-        """The effect as the plant is told it, {"machine.resistance_ohm": 1.7, ...}."""
+        """The effect as parameters of the plant, {"machine.resistance_ohm": 1.7, ...}."""
         return {}
 
 
 class FluxEffect(Effect):
-    """An effect that is a flux linkage of the machine: it says its shapes, per unit of its coefficients."""
+    """An effect that is a flux linkage of the machine, given as shapes per unit of its coefficients."""
 
     def core_psi(self, view) -> dict[str, np.ndarray]:
         """Flux shapes of the usual formula, {coefficient: (b, m+1) complex dq}."""
@@ -135,22 +135,22 @@ class FluxEffect(Effect):
         return sum(value * shapes[name] for name, value in c.items() if value)
 
     def delta_l(self, c) -> tuple[float, float]:
-        """What it adds to L_d and L_q [H]."""
+        """Its contribution to (L_d, L_q) [H]."""
         return 0.0, 0.0
 
 
 def voltage(u) -> Column:
-    """A voltage that the machine or the inverter needs beyond the nominal one, (b, m) complex dq."""
+    """Column of a voltage needed in addition to the nominal one, (b, m) complex dq."""
     return {"u": u}
 
 
 def flux(view, psi) -> Column:
-    """A flux linkage beyond the nominal one, (b, m+1) complex dq."""
+    """Column of a flux linkage in addition to the nominal one, (b, m+1) complex dq."""
     return {"u": view.flux(psi), "torque": torque_of(view, psi, view.i)}
 
 
 def current_error(view, error) -> Column:
-    """Measured minus true current, (b, m+1) complex dq: the balance was made with the measured one."""
+    """Column of an error of the measured current, measured minus true, (b, m+1) complex dq."""
     psi = view.inductances(error)
     return {
         "u": -view.machine.resistance_ohm * 0.5 * (error[:, 1:] + error[:, :-1]) - view.flux(psi),
@@ -159,7 +159,7 @@ def current_error(view, error) -> Column:
 
 
 def angle_error(view, delta) -> Column:
-    """Measured minus true electrical angle, (b, m+1): all that was turned to dq was turned too far."""
+    """Column of an error of the measured angle, measured minus true, (b, m+1): it rotates every dq quantity."""
     turned = -1j * view.i
     psi = view.inductances(turned)
     return {
@@ -169,7 +169,7 @@ def angle_error(view, delta) -> Column:
 
 
 def zero_vector_slope(view):
-    """Slope of the measured dq current in the zero vector, seen at the angle of the valley (b, m+1) [A/s]."""
+    """Slope of the measured current in the zero vector, in dq at the angle of the valley, (b, m+1) [A/s]."""
     m = view.machine
     emf = -m.resistance_ohm * view.i - 1j * view.omega * view.psi
     return emf.real / m.inductance_d_h + 1j * emf.imag / m.inductance_q_h + 1j * view.omega * view.i
@@ -182,17 +182,17 @@ def torque_of(view, psi, i):
 
 
 def full_loss(c) -> float:
-    """Full value [V] of a dead time with coefficients c: the bumps of its curve are those near zero current."""
+    """Full voltage loss [V] of a dead time with coefficients c; the bumps only shape the curve near zero current."""
     return float(sum(v for key, v in c.items() if not key.startswith("bump")))
 
 
 def within_dead_time(c, nominal) -> float:
-    """Up to which a delay or skew is nothing but the dead time of a model with coefficients c [s]."""
+    """Largest delay or skew [s] that the dead time of a model with coefficients c explains."""
     return (1.0 + ALIKE) * half_dead_time(c, nominal)
 
 
 def half_dead_time(c, nominal) -> float:
-    """By how much a model's dead time moves the middle of every pulse [s]: one of its edges is late by the whole.
+    """Shift of the middle of every pulse due to a model's dead time [s]: one edge is late by the whole dead time.
 
     c: {effect: {coefficient: value}}.
     """
@@ -201,13 +201,13 @@ def half_dead_time(c, nominal) -> float:
 
 
 def to_true_resistance(c, nominal) -> float:
-    """Nominal resistance over the one that named effects with coefficients c say: for shares of the resistance."""
+    """Nominal resistance over the resistance found, from coefficients c: for effects relative to the resistance."""
     r = nominal.machine.resistance_ohm
     return r / max(r + c.get("resistance", {}).get("delta_r", 0.0), 0.1 * r)
 
 
 def rated_torque(nominal) -> float:
-    """Torque of the magnets at rated current [Nm]."""
+    """Magnet torque at rated current [Nm]."""
     m = nominal.machine
     return 1.5 * m.pole_pairs * m.magnet_flux_wb * m.rated_current_a
 
@@ -218,5 +218,5 @@ def sigma(covariance, k=0) -> float:
 
 
 def one(name, unit, value, spread) -> dict[str, Estimate]:
-    """A single parameter."""
+    """{name: Estimate} of a single parameter."""
     return {name: Estimate(float(value), float(spread), unit)}

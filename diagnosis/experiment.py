@@ -1,13 +1,13 @@
-"""Which few operating points, recorded together, leave tied explanations the least room.
+"""Choice of a few operating points that together separate tied explanations best (optimal experiment design).
 
-The distance of two fixed predictions says too much: given the new points a rival is fitted anew, and takes up what it
-can.  What counts is the misfit that is left to it then, over the old rows and the new ones:
+The distance of two fixed predictions overestimates the separation, since a rival is refitted to the new points.  The
+criterion is the misfit that then remains for the rival, over the old rows and the new ones:
 
     D^2 = min over b of |d - X b|^2 + b' P b = d'd - g' (P + X'X)^-1 g,   g = X'd
 
-d: what the explanation taken for the truth adds at the new points beyond the rival, X: the rival's columns there, both
-in standard deviations; P: what the old rows know of the rival's coefficients.  d'd, g and X'X are sums over the points,
-so sets of points are tried fast: the best set is the one whose closest pair is the farthest apart.
+d: prediction of the explanation assumed true minus that of the rival at the new points; X: the rival's columns there,
+both in standard deviations; P: information of the old rows about the rival's coefficients.  d'd, g and X'X are sums
+over the points, so that many sets can be evaluated.  The best set maximises the D^2 of the closest pair.
 """
 
 from __future__ import annotations
@@ -16,15 +16,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-ENOUGH = 400.0  # D^2 beyond which more says nothing
-EQUALS = 0.05  # weight of all pairs' D^2 beside the closest one's
-ROUNDS = 4  # of exchanges
-BENDS = 1.0  # of an effect's own size: how far a part of its curve that no row has shown yet may go
+ENOUGH = 400.0  # D^2 above which more has no benefit
+EQUALS = 0.05  # weight of the mean over all pairs relative to the closest pair; it decides between equal sets
+ROUNDS = 4  # largest number of exchange rounds
+BENDS = 1.0  # of an effect's size: bound on a part of its curve that no row determines
 
 
 @dataclass
 class Rivalry:
-    """One explanation taken for the truth, another fitted against it; arrays over the candidates (n, ...)."""
+    """One explanation assumed true, another one fitted to it; arrays over the candidates (n, ...)."""
 
     power: np.ndarray  # (n,) d'd
     taken: np.ndarray  # (n, k) X'd
@@ -45,9 +45,9 @@ class Rivalry:
 
 
 def rivalry(truth, rival, columns, known, sigma, block, count) -> Rivalry:
-    """What `rival` cannot take up of `truth`, rows (r,) of both at the candidates.
+    """The Rivalry of the predictions `truth` and `rival`, both rows (r,) at the candidates.
 
-    columns: (k, r) of the rival; known: (k, k); sigma: (r,), inf where a row does not count; block: (r,) its candidate.
+    columns: (k, r) of the rival; known: (k, k) P; sigma: (r,), inf for unused rows; block: (r,) candidate of a row.
     """
     d, x = (truth - rival) / sigma, columns / sigma
     scale = np.sqrt(np.diag(known))
@@ -61,20 +61,20 @@ def rivalry(truth, rival, columns, known, sigma, block, count) -> Rivalry:
 
 
 def closest(left, enough=np.inf) -> np.ndarray:
-    """D^2 of the closest pair, as far as it says anything; left: (pairs, ...)."""
+    """D^2 of the closest pair, limited to ``enough``; left: (pairs, ...)."""
     return np.minimum(left, enough).min(axis=0)
 
 
-def told(rivalries, points) -> float:
+def closest_distance(rivalries, points) -> float:
     """D^2 of the closest pair at a set of candidates."""
     return float(closest(np.array([r.left(points) for r in rivalries]))) if points else 0.0
 
 
 def values(rivalries, rest, cost, enough=np.inf) -> np.ndarray:
-    """(n,) worth of a set of candidates with each further one: the closest pair's D^2; all pairs settle equals.
+    """(n,) value of a set of candidates with each further one: the closest pair's D^2, then the mean of all pairs.
 
-    cost: (n,) of a candidate, as a share of D^2 that another one may lack.  A candidate of the set is worth nothing a
-    second time: what the balance is off by at a point is the same again.
+    cost: (n,) penalty of a candidate, as a share of D^2.  Repeating a candidate of the set is excluded, since the error
+    of the balance at a point repeats too.
     """
     left = np.array([r.left_with(rest) for r in rivalries])
     worth = np.log1p(closest(left, enough)) + EQUALS * np.log1p(left).mean(axis=0) - cost
@@ -83,7 +83,7 @@ def values(rivalries, rest, cost, enough=np.inf) -> np.ndarray:
 
 
 def spare_values(rivalries, rest, cost) -> np.ndarray:
-    """(n,) the same where enough is enough and any other point may be lost: each bears out what the rest say."""
+    """(n,) the same with D^2 limited to ENOUGH, plus the value of each subset that lacks one other point."""
     worth = values(rivalries, rest, cost, ENOUGH)
     for k in rest:
         left = np.array([r.left_with([n for n in rest if n != k]) for r in rivalries])
@@ -92,22 +92,21 @@ def spare_values(rivalries, rest, cost) -> np.ndarray:
 
 
 def best_points(rivalries, most, doubt=0.0, strain=0.0) -> list[int]:
-    """`most` different candidates that leave the closest pair farthest apart, the least dispensable first.
+    """`most` different candidates that maximise the closest pair's D^2, the least dispensable first.
 
-    doubt, strain: (n,) of a candidate, as a share of D^2 that another one may lack.  The strain counts where there is
-    more than enough to be had.
+    doubt, strain: (n,) penalties of a candidate, as a share of D^2.  ``strain`` counts only if ENOUGH is reached.
     """
     chosen = []
     while len(chosen) < most:
         chosen.append(int(np.argmax(values(rivalries, chosen, doubt))))
     chosen = exchanged(rivalries, chosen, values, doubt)
-    if told(rivalries, chosen) >= ENOUGH:
+    if closest_distance(rivalries, chosen) >= ENOUGH:
         chosen = exchanged(rivalries, chosen, spare_values, doubt + strain)
-    return sorted(chosen, key=lambda k: told(rivalries, [n for n in chosen if n != k]))
+    return sorted(chosen, key=lambda k: closest_distance(rivalries, [n for n in chosen if n != k]))
 
 
 def exchanged(rivalries, chosen, worth_of, cost) -> list[int]:
-    """A set of candidates with each exchanged for a better one until none is."""
+    """A set of candidates, improved by exchanging one at a time until nothing improves."""
     chosen = list(chosen)
     for _ in range(ROUNDS):
         before = list(chosen)

@@ -1,7 +1,7 @@
-"""Weighted least squares over cells: how well a set of effects explains a misfit, and with what coefficients.
+"""Weighted least squares over cells: how well a set of effects explains a misfit, and with which coefficients.
 
-A model is a set of effects, each in its core or its free form.  Its score is chi^2 plus a price for every
-coefficient, as in Schwarz's criterion; lower is better.
+A model is a set of effects, each in its core or its free form.  Its score is chi^2 plus a penalty for every
+coefficient (Schwarz's criterion, BIC) and for every effect; lower is better.
 """
 
 from __future__ import annotations
@@ -14,15 +14,15 @@ import numpy as np
 from fluxproof.diagnosis.cells import SYSTEM_DC, SYSTEM_U, noise, voltage_level
 from fluxproof.diagnosis.effect import rated_torque
 
-FRESH = 0.06  # share of a column that must not be in the earlier ones, else the data do not carry it
-PER_EFFECT = 10.0  # price of an effect beside that of its coefficients: one in twenty is there by itself
+FRESH = 0.06  # least share of a column that is independent of the earlier ones; else it is rejected as collinear
+PER_EFFECT = 10.0  # penalty of an effect in addition to its coefficients: a prior probability of about one in twenty
 
 
 @numba.njit(cache=True)
 def _explained(gram, right, index, fresh2):
-    """Power that columns explain, taken one after the other, and which are kept: those that bring something fresh.
+    """Power explained by the columns in their order, and the columns that are kept (not collinear with earlier ones).
 
-    A Cholesky factorisation that leaves out a column whose pivot has shrunk below ``fresh2``.
+    A Cholesky factorisation that skips a column whose pivot falls below ``fresh2`` of its power.
     """
     n = len(index)
     factor, z = np.zeros((n, n)), np.zeros(n)
@@ -49,7 +49,7 @@ def _explained(gram, right, index, fresh2):
 
 @dataclass(frozen=True)
 class Model:
-    """Names of effects and which of them are in their free form."""
+    """Names of the effects, and those of them in their free form."""
 
     names: frozenset
     free: frozenset = frozenset()
@@ -79,8 +79,8 @@ class Solution:
     covariance: dict = field(default_factory=dict)  # {effect: (k, k)}
     score: float = np.inf
     residual: np.ndarray | None = None
-    view: object = None  # the corrected view this was solved on
-    total: dict = field(default_factory=dict)  # accumulated coefficients of effects that correct the record
+    view: object = None  # the corrected view on which it was solved
+    total: dict = field(default_factory=dict)  # accumulated coefficients of measurement errors
 
     @property
     def dispersion(self):
@@ -88,7 +88,7 @@ class Solution:
 
 
 class Fitter:
-    """The weighted problem of one view; ``train``: (r,) rows that take part in the fit."""
+    """The weighted problem of one view; ``train``: (r,) bool, rows used for the fit."""
 
     def __init__(self, cells, sigma, train, price=None):
         self.cells, self.sigma = cells, sigma
@@ -106,7 +106,7 @@ class Fitter:
         self.a = a / self.scale
         self.gram, self.right, self.power = self.a.T @ self.a, self.a.T @ self.y, float(self.y @ self.y)
         self.price = float(np.log(max(len(self.y), 10))) if price is None else price
-        self.index = {effect: ([], []) for effect in cells.columns}  # also one that the recording says nothing of
+        self.index = {effect: ([], []) for effect in cells.columns}  # includes effects without columns
         for k, (effect, key) in enumerate(zip(self.owner, self.names, strict=True)):
             core, free = self.index[effect]
             if np.isfinite(self.scale[k]):
@@ -121,10 +121,10 @@ class Fitter:
         )
 
     def carried(self, model) -> np.ndarray:
-        """Those of a model's columns that the data carry.
+        """Indices of a model's columns that the data determine.
 
-        Two levels of a current carry one coefficient of a curve; a second one would be fitted to the noise
-        of the current around the levels.
+        Two current levels determine one coefficient of a curve; a second one would be fitted to the noise of the
+        current around the levels.
         """
         index = self.columns_of(model)
         return index[_explained(self.gram, self.right, index, FRESH**2)[1]]
@@ -135,12 +135,12 @@ class Fitter:
         return max(self.power - gain, 0.0), int(kept.sum())
 
     def score(self, model, dispersion=1.0) -> float:
-        """chi^2 over the dispersion plus the price of the coefficients."""
+        """chi^2 over the dispersion plus the penalty of coefficients and effects."""
         chi2, count = self.chi2(model)
         return chi2 / dispersion + self.price * count + PER_EFFECT * len(model)
 
     def solve(self, model, dispersion=1.0) -> Solution:
-        """Coefficients, covariance and residual of a model; what the data do not carry is zero."""
+        """Coefficients, covariance and residual of a model; coefficients that the data do not determine are zero."""
         index, carried = self.columns_of(model), self.carried(model)
         inverse = np.linalg.inv(self.gram[np.ix_(carried, carried)])
         chi2, count = self.chi2(model)
@@ -167,7 +167,7 @@ def everything(cells) -> Model:
 
 
 def row_sigma(view, cells) -> tuple[np.ndarray, np.ndarray]:
-    """Standard deviation of every row with and without the balance's own share: (sigma, noise)."""
+    """Standard deviation of every row with and without the error of the balance: (sigma, noise)."""
     rough = Fitter(cells, np.ones(len(cells.y)), np.ones(len(cells.y), bool)).solve(everything(cells))
     pure = noise(view, cells, rough.residual)
     m = view.machine

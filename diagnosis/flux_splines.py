@@ -1,4 +1,4 @@
-"""Tensor splines over the plane of dq currents, and the EMF that the slopes of each of them make in a block.
+"""Tensor-product splines over the dq current plane, and the EMF of the derivatives of each of them in a block.
 
 A co-energy W = sum of w_jk B_j(i_d) B_k(i_q) has the flux dW/di_d + j dW/di_q; the splines are cubic, on equal steps.
 """
@@ -9,18 +9,18 @@ import numpy as np
 from scipy import sparse
 from scipy.interpolate import BSpline
 
-INTERVALS = 22  # along each axis: finer than a machine's curves, the damping does the rest
+INTERVALS = 22  # along each axis: finer than the curves of a machine; the penalty smooths them
 
 
 def knots_over(x) -> np.ndarray:
-    """Knots of cubic splines over the range of x, a little wider."""
+    """Knots of cubic splines over a range slightly wider than that of x."""
     low, high = x.min(), x.max()
     step = (high - low) * 1.02 / INTERVALS
     return 0.5 * (low + high) + step * (np.arange(-3, INTERVALS + 4) - 0.5 * INTERVALS)
 
 
 def powers(knots) -> np.ndarray:
-    """(3, n) weights of the splines that make 1, x and x^2 exactly (Marsden's identity)."""
+    """(3, n) spline weights that represent 1, x and x^2 exactly (Marsden's identity)."""
     inner = np.stack([knots[1 + k : len(knots) - 3 + k] for k in range(3)])
     pairs = (inner[0] * inner[1] + inner[0] * inner[2] + inner[1] * inner[2]) / 3.0
     return np.stack([np.ones(inner.shape[1]), inner.mean(axis=0), pairs])
@@ -32,7 +32,7 @@ def gradients(i, knots_d, knots_q):
     for x, knots in ((i.real, knots_d), (i.imag, knots_q)):
         x = np.clip(x, knots[3], knots[-4] - 1e-9)
         value = BSpline.design_matrix(x, knots, 3)
-        # The slope of a cubic B-spline on equal steps is the difference of two quadratic ones.
+        # The derivative of a cubic B-spline on equal steps is the difference of two quadratic ones.
         lower = BSpline.design_matrix(x, knots[1:-1], 2)
         n, step = value.shape[1], knots[1] - knots[0]
         difference = sparse.diags([-np.ones(n - 1), np.ones(n - 1)], [0, 1], shape=(n - 1, n))
@@ -42,7 +42,7 @@ def gradients(i, knots_d, knots_q):
 
 
 def _product(first, second):
-    """Row-wise Kronecker product of two sparse matrices with equally many rows."""
+    """Row-wise Kronecker product of two sparse matrices with the same number of rows."""
     p, n, m = first.shape[0], first.shape[1], second.shape[1]
     a, b = first.tocoo(), second.tocsr()
     counts = np.diff(b.indptr)[a.row]

@@ -1,14 +1,15 @@
-"""The flux map behind a recording: one free co-energy surface W(i_d, i_q) whose slopes are both fluxes.
+"""Flux map from a recording: one free co-energy surface W(i_d, i_q) whose partial derivatives are both fluxes.
 
     psi_d = L_d i_d + psi_m + dW/di_d        psi_q = L_q i_q + dW/di_q
 
-W is a tensor of cubic B-splines, so the two fluxes are reciprocal by construction and each axis learns from the
-other; no formula of saturation is assumed.  The balance of a block, mean over its rows, is linear in W:
+W is a tensor product of cubic B-splines, so that the two fluxes are reciprocal by construction and each axis is also
+determined by the other; no saturation formula is assumed.  The balance of a block, averaged over its rows, is linear
+in W:
 
-    mean(u - R i - flux(psi_nominal)) = mean(flux(grad W)) + columns of what else may be there
+    mean(u - R i - flux(psi_nominal)) = mean(flux(grad W)) + columns of other effects
 
-Third differences of the coefficients are damped (P-splines: Eilers and Marx, Statistical Science 11, 1996), as
-strongly as predicts operating points left out of the fit best.  Where nothing was recorded nothing is claimed.
+Third differences of the coefficients are penalised (P-splines: Eilers and Marx, Statistical Science 11, 1996); the
+strength is chosen by cross-validation over operating points.  The map is valid only where the recording has points.
 """
 
 from __future__ import annotations
@@ -29,24 +30,24 @@ STEPS = {"saturation": ("linear", "separable"), "cross_saturation": ("separable"
 BETTER = 1.3
 DAMPING = tuple(10.0**k for k in range(-9, 2))  # relative to the mean diagonal of the normal matrix
 FOLDS = 5
-LONGEST = 2.0  # times the usual triangle of recorded points: a longer one spans ground that nobody saw
-TINY = 1e-9  # damping of everything, so that what no row sees is zero: the constant of W among it
+LONGEST = 2.0  # times the median triangle of recorded points: a larger one spans an area without data
+TINY = 1e-9  # damping of all coefficients, so that undetermined ones, such as the constant of W, are zero
 SHAPES = (
     "linear",
     "separable",
     "full",
-)  # inductances and magnet; each axis its own curve; any reciprocal surface
-USUAL = ("resistance", "dead_time")  # what else may be there: neither is a flux, both follow the current
+)  # inductances and magnet flux; a separate curve per axis; any reciprocal surface
+USUAL = ("resistance", "dead_time")  # fitted together with the map: functions of the current that are no flux
 
 
 @dataclass
 class Surface:
-    """A fitted surplus co-energy and what was fitted beside it.
+    """A fitted excess co-energy and the effects fitted with it.
 
     knots_d, knots_q: knots of the cubic splines [A]; weights: (n_d, n_q) coefficients [J/1.5p: Wb A].
     points: (k,) complex operating points that were recorded, one per dwell [A].
-    beside: {effect: {coefficient: Estimate}} fitted along; damping: the chosen one.
-    error_wb: rms error of the flux that operating points left out of the fit show, noise included.
+    beside: {effect: {coefficient: Estimate}} fitted with it; damping: the chosen one.
+    error_wb: rms error of the flux at operating points left out of the fit, including noise.
     """
 
     machine: object
@@ -59,25 +60,25 @@ class Surface:
     error_wb: float = np.nan
 
     def surplus(self, i) -> np.ndarray:
-        """Flux beyond the nominal one, complex [Wb], of dq currents of any shape, complex [A]."""
+        """Excess over the nominal flux, complex [Wb], at dq currents of any shape, complex [A]."""
         flat = np.ravel(i)
         return (gradients(flat, self.knots_d, self.knots_q) @ self.weights.ravel()).reshape(np.shape(i))
 
     def psi(self, i) -> np.ndarray:
-        """Flux linkage, magnet included, complex [Wb], of dq currents of any shape, complex [A]."""
+        """Flux linkage including the magnet, complex [Wb], at dq currents of any shape, complex [A]."""
         m, i = self.machine, np.asarray(i)
         return m.inductance_d_h * i.real + m.magnet_flux_wb + 1j * m.inductance_q_h * i.imag + self.surplus(i)
 
     def covered(self, i) -> np.ndarray:
-        """Whether dq currents (any shape) lie between operating points that were recorded near each other."""
+        """Whether dq currents (any shape) lie between neighbouring recorded operating points, bool."""
         triangles = Delaunay(_plane(self.points))
         corners = self.points[triangles.simplices]
         longest = np.abs(corners - np.roll(corners, 1, axis=1)).max(axis=1)
-        small = np.append(longest <= LONGEST * np.median(longest), False)  # the last stands for "outside"
+        small = np.append(longest <= LONGEST * np.median(longest), False)  # the last entry means "outside"
         return small[triangles.find_simplex(_plane(np.ravel(i)))].reshape(np.shape(i))
 
     def residual(self, view) -> np.ndarray:
-        """What is left of each block's mean misfit, (b,) complex dq [V]."""
+        """Residual of each block's mean misfit, (b,) complex dq [V]."""
         left = (
             misfit(view)["u"].mean(axis=1)
             - emf_columns(view, self.knots_d, self.knots_q) @ self.weights.ravel()
@@ -88,7 +89,7 @@ class Surface:
         return left
 
     def flux_map(self, step_a: float) -> tuple[FluxMap, np.ndarray]:
-        """(FluxMap over the recorded rectangle in steps of about step_a, (n, m) bool of what is covered)."""
+        """(FluxMap over the recorded rectangle in steps of about step_a, (n, m) bool: covered by recorded points)."""
         axes = [
             np.linspace(x.min(), x.max(), max(4, round(np.ptp(x) / step_a) + 1))
             for x in (self.points.real, self.points.imag)
@@ -101,18 +102,18 @@ class Surface:
 def flux_map(view, beside=USUAL, train=None, shape="full") -> Surface:
     """Fit the surface to the balance of a view's blocks.
 
-    beside: names of effects whose usual columns are fitted along; train: (b,) blocks that take part;
-    shape: one of SHAPES.  Raises ValueError where the recording does not spread over both currents.
+    beside: names of effects whose core columns are fitted with it; train: (b,) bool, blocks to fit;
+    shape: one of SHAPES.  Raises ValueError if the recording does not cover a range of both currents.
     """
     return _Problem(view, beside, train, shape).surface()
 
 
 def ladder(view, train, beside=USUAL) -> dict[str, dict]:
-    """{shape: {"train", "holdout": rms misfit [V]}} of ever freer co-energies, the nominal one first.
+    """{shape: {"train", "holdout": rms misfit [V]}} of co-energies with increasing freedom, the nominal one first.
 
-    What separable predicts better than linear is saturation, what full predicts better than separable is
-    cross-saturation: names that rest on which currents the flux depends on, not on a formula.
-    train: (b,) blocks that are fitted, the others are held out.
+    If "separable" predicts better than "linear", the machine has saturation; if "full" predicts better than
+    "separable", it has cross-saturation.  The names depend on the variables of the flux and not on a formula.
+    train: (b,) bool, blocks to fit; the others are held out.
     """
     rows = {"nominal": misfit(view)["u"].mean(axis=1)}
     rows |= {shape: flux_map(view, beside, train, shape).residual(view) for shape in SHAPES}
@@ -122,7 +123,7 @@ def ladder(view, train, beside=USUAL) -> dict[str, dict]:
 
 
 def names(steps: dict[str, dict], noise_v: float) -> list[str]:
-    """Names that a ladder deserves: each step must predict BETTER times as well, and by more than the noise."""
+    """Names that follow from a ladder: each step must predict BETTER times better and by more than the noise."""
     found = []
     for name, (before, after) in STEPS.items():
         worse, better = steps[before]["holdout"], steps[after]["holdout"]
@@ -132,9 +133,9 @@ def names(steps: dict[str, dict], noise_v: float) -> list[str]:
 
 
 def earned(view, names, beside=USUAL, train=None) -> dict[str, float]:
-    """{effect: what it explains beside the free surface, chi^2 over the dispersion}, one by one.
+    """{effect: gain in chi^2 over the dispersion, in addition to the free surface}, each effect alone.
 
-    A name given to what a rigid curve of saturation left over explains nothing any more beside a free one.
+    An effect that only absorbed the residual of a rigid saturation curve gains nothing in addition to a free one.
     """
     plain = _Problem(view, beside, train)
     _, damping = plain.chosen()
@@ -147,14 +148,14 @@ def earned(view, names, beside=USUAL, train=None) -> dict[str, float]:
 
 
 class _Problem:
-    """The damped least-squares problem of one view.  ``basis`` (n, k): the splines' weights for each coefficient."""
+    """The damped least-squares problem of one view.  ``basis`` (n, k): spline weights of each coefficient."""
 
     def __init__(self, view, beside, train, shape="full"):
         self.view = view
         use = np.ones(len(view), bool) if train is None else np.asarray(train, bool)
         i = view.i.mean(axis=1)[use]
         if min(np.ptp(i.real), np.ptp(i.imag)) < 0.1 * view.machine.rated_current_a:
-            raise ValueError("a flux map needs operating points that spread over both i_d and i_q")
+            raise ValueError("a flux map needs operating points that cover a range of both i_d and i_q")
         self.points, self.run = i, view.run[use]
         self.omega = np.abs(view.omega.mean(axis=1))[use]
         self.knots = [knots_over(view.i[use].real), knots_over(view.i[use].imag)]
@@ -176,7 +177,7 @@ class _Problem:
         self.penalty = self._penalty()
 
     def _penalty(self):
-        """Third differences along both axes, (k, k)."""
+        """Penalty matrix (k, k) of the third differences along both axes."""
         n_d, n_q = self.sizes
         third = [np.diff(np.eye(n), 3, axis=0) for n in (n_d, n_q)]
         rough = np.kron(third[0].T @ third[0], np.eye(n_q)) + np.kron(np.eye(n_d), third[1].T @ third[1])
@@ -191,13 +192,13 @@ class _Problem:
         return usual * (damping * self.penalty + TINY * np.eye(len(self.penalty)))
 
     def solve(self, damping, rows=slice(None)):
-        """Coefficients for some of the rows."""
+        """Coefficients fitted to the given rows."""
         a = self.a[rows]
         normal = a.T @ a + self._scaled(damping)
         return linalg.solve(normal, a.T @ self.y[rows], assume_a="pos")
 
     def chi2(self, damping) -> float:
-        """Sum of squared residuals and penalty, which is what the solution makes least [V^2]."""
+        """Sum of squared residuals and penalty [V^2], which the solution minimises."""
         c = self.solve(damping)
         return float(np.sum((self.y - self.a @ c) ** 2) + c @ self._scaled(damping) @ c)
 
@@ -207,9 +208,9 @@ class _Problem:
         return float(np.trace(linalg.solve(gram + self._scaled(damping), gram, assume_a="pos")))
 
     def chosen(self) -> tuple[float, float]:
-        """(rms of what is left at points left out [Wb], the damping that makes it least).
+        """(rms error at the points left out [Wb], damping that minimises it), by cross-validation.
 
-        Folds are whole dwells: neighbours in time would give each other away.
+        Folds are whole dwells, since neighbouring blocks are not independent.
         """
         fold = np.unique(self.run, return_inverse=True)[1] * 7 % FOLDS
         fold, speed = np.tile(fold, 2), np.tile(np.maximum(self.omega, 1e-9), 2)
@@ -262,7 +263,7 @@ def _plane(i):
 
 
 def _apart(points, share=0.03) -> np.ndarray:
-    """One of all points that lie nearer to each other than a share of their range: a dwell is one point."""
+    """One point of each group closer than a share of the range, so that a dwell is one point."""
     tree, near = cKDTree(_plane(points)), share * max(np.ptp(points.real), np.ptp(points.imag))
     around = tree.query_ball_point(_plane(points), near)
     kept = np.ones(len(points), bool)

@@ -1,7 +1,7 @@
-"""Dead time where no current flows: it is there, but no curve of the loss over the current shows it.
+"""Dead time at zero current: it acts, but no curve of the loss over the current can show it.
 
-Which edge of a pulse is late is up to the ripple then: the pulses come late by up to twice half the dead time, as late
-gates or a skew would have them, and what is lost is that of the current in their middle, as less flux would have it.
+The ripple then decides which edge of a pulse is late.  The pulses are late by up to the dead time, which resembles late
+gates or a sampling skew; the loss at the current in the middle of the pulses resembles a smaller magnet flux.
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ from fluxproof.diagnosis.fit import Model, Solution
 
 
 def carries_none(view) -> bool:
-    """Whether the currents of all blocks are within their ripple."""
+    """Whether the currents of all blocks are within the ripple."""
     m, bus = view.machine, view.nominal.inverter.dc_bus_v
     reach = RIPPLE * view.sample_time_s * bus / min(m.inductance_d_h, m.inductance_q_h)
     return float(np.abs(view.i.mean(axis=1)).max()) < reach
 
 
 def unseen_loss(view, effect, solutions) -> list[Solution]:
-    """A dead time of the size that would do what solutions of one point without current say; none where none would.
+    """Solutions with a dead time that explains what the given solutions of a zero-current point explain; may be empty.
 
     effect: dead_time of the catalogue.
     """
@@ -36,15 +36,15 @@ def unseen_loss(view, effect, solutions) -> list[Solution]:
 
 
 def _of_timing(solution, nominal) -> float:
-    """Loss of a leg [V] whose dead time makes the pulses as late as a solution says; 0 where it does not."""
+    """Loss of a leg [V] whose dead time explains the late pulses of a solution; 0 if it cannot."""
     tau = max((solution.c[n]["tau"] for n in ("delay", "sampling_skew") if n in solution.c), default=0.0)
     return tau / nominal.sample_time_s * nominal.inverter.dc_bus_v
 
 
 def _of_flux(solution, view) -> float:
-    """Loss of a leg [V] that takes from the EMF what a solution says the magnets lack; 0 where they do not.
+    """Loss of a leg [V] that explains the missing magnet flux of a solution; 0 if no flux is missing.
 
-    In the middle of a pulse flows what the EMF drives in the half of the dead time by which that is late.
+    The current in the middle of a pulse is what the EMF drives during the half dead time by which the pulse is late.
     """
     m, bus = view.machine, view.nominal.inverter.dc_bus_v
     c, emf = solution.c, float(np.abs(view.omega).mean()) * m.magnet_flux_wb

@@ -1,9 +1,9 @@
-"""drive_improved.toml: the nominal drive file with the effects that were found in it.
+"""drive_improved.toml: the nominal drive file with the identified effects.
 
-The file keeps the original's text; a line that changes says what it was and which effect changed it.  What the core's
-own sections have a key for goes there, so that ``fluxproof registers`` makes the improved registers of it; the rest
-goes to [plant.*], which only the plant reads (diagnosis/improved_plant.py).  What a sensor is off by stands in
-[plant.sensors] as the hardware's own property, and in [sensors] as the trim that takes it out.
+The file keeps the text of the original; a changed line states the old value and the effect.  Values for which the
+core's own sections have a key go there, so that ``fluxproof registers`` computes the improved registers; the others go
+to [plant.*], which only the plant reads (diagnosis/improved_plant.py).  A sensor error appears in [plant.sensors] as a
+property of the hardware, and in [sensors] as the trim that cancels it.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ from fluxproof.plant import FluxMap, Harmonic
 
 __all__ = ["CoreValue", "Plant", "Timing", "core_values", "improved_toml", "plant_of", "write_improved"]
 
-DIGITS = 9  # significant ones written: finer than any estimate, coarse enough to read
+DIGITS = 9  # significant digits in the file: more than any estimate has, and still legible
 
 
 def improved_toml(nominal: Nominal, effects: list[NamedEffect]) -> str:
-    """The text of the improved drive file; ValueError names a plant key that does not exist."""
+    """The text of the improved drive file; ValueError for an unknown plant key."""
     by_name = {effect.name: effect for effect in effects}
     document = _original(nominal)
     changes = core_changes(nominal, effects)
@@ -39,7 +39,7 @@ def improved_toml(nominal: Nominal, effects: list[NamedEffect]) -> str:
     for key, (value, names) in merged(effects).items():
         section, name = key.split(".", 1)
         if key in told:
-            document.get("plant", {}).get(section, {}).pop(name, None)  # it would hide the new value
+            document.get("plant", {}).get(section, {}).pop(name, None)  # it would override the new value
         else:
             plant = document.setdefault("plant", tomlkit.table(is_super_table=True))
             table = plant.setdefault(section, tomlkit.table())
@@ -48,7 +48,7 @@ def improved_toml(nominal: Nominal, effects: list[NamedEffect]) -> str:
 
 
 def write_improved(nominal: Nominal, effects: list[NamedEffect], path) -> Path:
-    """Write ``improved_toml`` to ``path`` in one step; returns the path."""
+    """Write ``improved_toml`` atomically to ``path``; returns the path."""
     path = Path(path)
     temporary = path.with_name(f".{path.name}.{os.getpid()}")
     temporary.write_text(improved_toml(nominal, effects), encoding="utf-8")
@@ -57,7 +57,7 @@ def write_improved(nominal: Nominal, effects: list[NamedEffect], path) -> Path:
 
 
 def _original(nominal: Nominal):
-    """The nominal file as a document that keeps its comments; one of its values where there is no file."""
+    """The nominal file as a TOML document with its comments; a new document of its values if there is no file."""
     if nominal.path and Path(nominal.path).is_file():
         return tomlkit.parse(Path(nominal.path).read_text(encoding="utf-8"))
     document = tomlkit.document()
@@ -74,7 +74,7 @@ def _original(nominal: Nominal):
 
 
 def _set(table, key, value, why):
-    """One key with its comment: the value before, the effect, and what the line's author had noted."""
+    """Set one key with a comment: the old value, the effect, and the original comment."""
     old, note = table.get(key), ""
     if hasattr(old, "trivia"):
         note = old.trivia.comment.lstrip("# ")
@@ -82,7 +82,7 @@ def _set(table, key, value, why):
     item = tomlkit.item(_toml(value))
     for part in item.values() if isinstance(item, tomlkit.items.AbstractTable) else [item]:
         if isinstance(part, tomlkit.items.Array) and any(isinstance(row, list) for row in part.unwrap()):
-            part.multiline(True)  # a row of the matrix a line
+            part.multiline(True)  # one line per row of the matrix
     if not isinstance(item, tomlkit.items.AbstractTable):
         item.comment("; ".join([*words, *([note] if note else [])]))
     else:
@@ -96,7 +96,7 @@ def _shown(old) -> str:
 
 
 def _words(effect: NamedEffect) -> str:
-    """The effect with its parameters, in a comment's length."""
+    """The effect with its first parameters, short enough for a comment."""
     found = [f"{k} {e.value:.4g} +- {e.sigma:.1g} {e.unit}" for k, e in list(effect.parameters.items())[:3]]
     return f"{effect.name}: {', '.join(found)}" if found else effect.name
 
@@ -117,7 +117,7 @@ def _toml(value):
 
 
 def _absolute(nominal: Nominal, key: str, value):
-    """A sensor's error as the hardware's own: effects speak of readings that the nominal trims have gone through."""
+    """A sensor error as a property of the hardware: effects describe readings after the nominal trims."""
     section, name = key.split(".", 1)
     if section != "sensors":
         return value

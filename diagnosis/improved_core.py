@@ -1,13 +1,13 @@
-"""What the core can be told of a named effect: keys of drive.toml, and registers that follow from them.
+"""Changes in the core that follow from named effects: keys of drive.toml and the resulting registers.
 
-A sensor's error becomes the trim that takes it out again.  With a reading  i' = (1 + e) i + o  of which the trims in
-force are part, the new trims are
+A sensor error becomes the trim that cancels it.  With a reading  i' = (1 + e) i + o  that includes the trims in force,
+the new trims are
 
     current_gain' = current_gain / (1 + e)      current_offset_code' = current_offset_code + o / (current_gain * lsb)
     u_dc_gain'    = u_dc_gain / (1 + e)         theta_offset' = theta_offset - pole_pairs * position_offset
 
-The dead time is never written to [inverter]: there it is an order to the gates, and a shorter one could shoot
-through.  What the legs lose is told to the compensation instead, which limits itself to three times that.
+The dead time is never written to [inverter]: there it is a command to the gates, and a shorter one could cause a
+shoot-through.  The loss of the legs is given to the compensation instead, which is limited to three times that value.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ LOSSES = ("dead_time_s", "v_switch_v", "v_diode_v")
 
 
 class CoreValue(NamedTuple):
-    """One thing to tell the core: a key of drive.toml, a register or a start value."""
+    """A new value for the core: a key of drive.toml, a register or a start value."""
 
     key: str  # "[machine] resistance_ohm", "register r_s", ...
     value: float
@@ -38,7 +38,7 @@ class CoreValue(NamedTuple):
 
 
 class Change(NamedTuple):
-    """A key of a core's section with its new value and the effect behind it."""
+    """A key of one of the core's sections with its new value and the effect that changes it."""
 
     section: str
     key: str
@@ -47,7 +47,7 @@ class Change(NamedTuple):
 
 
 def core_changes(nominal: Nominal, effects: list[NamedEffect]) -> list[Change]:
-    """Keys of the core's sections that the effects change, those left out that contradict the rest of the drive."""
+    """Changes of keys in the core's sections, without those that contradict the rest of the drive file."""
     wanted = list(_wanted(nominal, merged(effects)))
     drive = core_drive(nominal)
     if drive is None:
@@ -64,7 +64,7 @@ def core_changes(nominal: Nominal, effects: list[NamedEffect]) -> list[Change]:
 
 
 def core_values(nominal: Nominal, effects: list[NamedEffect]) -> list[CoreValue]:
-    """What the core can be told; with the core's sections in the drive file the registers' integers as well."""
+    """New values for the core; also register integers if the drive file has the core's sections."""
     values, changes = [], core_changes(nominal, effects)
     for change in changes:
         fields = dataclasses.fields(drives.SECTIONS[change.section])
@@ -75,13 +75,13 @@ def core_values(nominal: Nominal, effects: list[NamedEffect]) -> list[CoreValue]
             values.append(CoreValue(f"[{change.section}] {change.key}{phase}", value, unit, change.why))
     loss = found_loss_v(nominal, merged(effects))
     if loss is not None:
-        why = "what a leg loses at the nominal bus voltage: where the core's own estimate should settle"
+        why = "voltage loss of a leg at the nominal bus voltage: the value to which the core's estimate should converge"
         values.append(CoreValue("V_dead", loss, "V", why))
     return values + _registers(core_drive(nominal), changes)
 
 
 def core_drive(nominal: Nominal):
-    """The nominal drive as the core's Drive, or None where the file does not describe the core."""
+    """The nominal drive as the core's Drive, or None if the file does not describe the core."""
     try:
         parts = [kind(**_given(getattr(nominal, name), kind)) for name, kind in drives.SECTIONS.items()]
         return drives.Drive(*parts)
@@ -90,7 +90,7 @@ def core_drive(nominal: Nominal):
 
 
 def _given(part, kind) -> dict:
-    """The section's values; a required one that is absent stays away, so that the dataclass refuses itself."""
+    """The section's values; a missing required one is omitted, so that the dataclass raises the error."""
     needed = {f.name for f in dataclasses.fields(kind) if f.default is dataclasses.MISSING}
     return {k: v for k, v in vars(part).items() if not (k in needed and v is None)}
 
@@ -102,7 +102,7 @@ def _with(drive, change: Change):
 
 
 def _registers(drive, changes) -> list[CoreValue]:
-    """The registers that come out otherwise, as integers; none without the core."""
+    """The registers that change, as integers; an empty list without the core."""
     if drive is None:
         return []
     before, changed = registers(drive).values, drive
@@ -117,7 +117,7 @@ def _registers(drive, changes) -> list[CoreValue]:
 
 
 def _wanted(nominal: Nominal, found: dict):
-    """The changes that the plant's keys ask for, in terms of the core's own keys."""
+    """The changes of the core's keys that follow from the plant's keys."""
     for name, (value, effects) in found.items():
         section, key = name.split(".", 1)
         fields = (
@@ -143,12 +143,12 @@ def _wanted(nominal: Nominal, found: dict):
 
 
 def _within(key, value):
-    """An estimate clipped to the key's range: a coefficient of nothing may come out slightly negative."""
+    """An estimate clipped to the key's range: the estimate of a zero coefficient may be slightly negative."""
     return min(max(float(value), key.lo), key.hi) if key.kind == "float" else value
 
 
 def _trims(nominal: Nominal, found: dict):
-    """Trims of the sensors; without their description in [sensors] there is nothing to trim."""
+    """Trims of the sensors; none if [sensors] does not describe them."""
     s = nominal.sensors
 
     def error(key):
@@ -177,18 +177,18 @@ def _trims(nominal: Nominal, found: dict):
 
 
 def nominal_loss_v(nominal: Nominal) -> float:
-    """What a leg loses as the nominal drive has it [V]."""
+    """Voltage loss of a leg of the nominal drive [V]."""
     return _loss_v(nominal, {})
 
 
 def found_loss_v(nominal: Nominal, found: dict) -> float | None:
-    """What a leg loses with the dead time and drops that were found [V]; None where nothing was."""
+    """Voltage loss of a leg with the identified dead time and drops [V]; None if none were identified."""
     values = {k: found[f"inverter.{k}"][0] for k in LOSSES if f"inverter.{k}" in found}
     return _loss_v(nominal, values) if values else None
 
 
 def _loss_v(nominal, values):
-    """scaling.leg_loss_v for a drive of which only parts are known."""
+    """scaling.leg_loss_v for a partly described drive."""
     i = nominal.inverter
     v = {k: getattr(i, k) or 0.0 for k in LOSSES} | values
     return v["dead_time_s"] * i.pwm_frequency_hz * i.dc_bus_v + (v["v_switch_v"] + v["v_diode_v"]) / 2.0

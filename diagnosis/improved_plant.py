@@ -1,9 +1,9 @@
-"""A drive file as a plant: what the hardware is, out of drive.toml and its [plant.*] sections.
+"""The plant that a drive file describes: drive.toml with its [plant.*] sections.
 
-The core's own sections describe the machine and the inverter; [sensors] says what the core takes its sensors for, so
-without [plant.sensors] they are exactly that: an offset code of 32800 is a sensor that is off by 32 codes.
-A key in [plant.machine], [plant.inverter] or [plant.sensors] replaces what follows from the core's sections; the
-names are those of plant.Machine, plant.Inverter and plant.Sensors.  Three of them have a form of their own in TOML:
+The core's own sections describe the machine and the inverter.  [sensors] describes the sensors as the core assumes
+them; without [plant.sensors] they are exactly that: an offset code of 32800 means a sensor offset of 32 codes.
+A key in [plant.machine], [plant.inverter] or [plant.sensors] replaces the value from the core's sections; the names are
+those of plant.Machine, plant.Inverter and plant.Sensors.  Three of them have a special form in TOML:
 
     emf_harmonics = [[order, amplitude_d, amplitude_q, phase_rad], ...]
     flux_map      = a table of i_d_a (n), i_q_a (m), psi_d_wb (n x m), psi_q_wb (n x m)
@@ -25,15 +25,15 @@ from fluxproof.diagnosis.result import NamedEffect
 from fluxproof.golden_model.drive_keys import DriveError
 from fluxproof.plant import FluxMap, Harmonic, Inverter, Machine, Sensors
 
-FINE_BITS = 24  # of sensors that nobody has described: finer than anything that could matter
+FINE_BITS = 24  # resolution of undescribed sensors: fine enough to be negligible
 
 
 @dataclass(frozen=True)
 class Timing:
-    """What comes at another instant than the nominal drive says.
+    """Deviations in time from the nominal drive [s].
 
-    delay_s: the voltage acts that much later than duty_applied_after_samples says.
-    sampling_skew_s: the currents are sampled that long after the PWM centre; negative: before it.
+    delay_s: the voltage acts this much later than duty_applied_after_samples says.
+    sampling_skew_s: the currents are sampled this long after the PWM centre; negative: before it.
     """
 
     delay_s: float = 0.0
@@ -41,7 +41,7 @@ class Timing:
 
 
 class Plant(NamedTuple):
-    """A drive's hardware, as the float plant takes it."""
+    """The hardware of a drive in the types of the float plant."""
 
     machine: Machine
     inverter: Inverter
@@ -51,7 +51,7 @@ class Plant(NamedTuple):
 
 SECTIONS = {"machine": Machine, "inverter": Inverter, "sensors": Sensors, "timing": Timing}
 KEYS = {f"{name}.{f.name}": f for name, kind in SECTIONS.items() for f in dataclasses.fields(kind)}
-# Keys of which the plant refuses a negative value, as a noisy estimate of nothing may well be one.
+# Keys for which the plant rejects negative values; a noisy estimate of zero may be negative and is clipped.
 NOT_NEGATIVE = {f"inverter.{f.name}" for f in dataclasses.fields(Inverter)} | {
     f"machine.{name}"
     for name in ("saturation_d_per_a2", "saturation_q_per_a2", "iron_conductance_s", "viscous_friction_nms",
@@ -60,16 +60,16 @@ NOT_NEGATIVE = {f"inverter.{f.name}" for f in dataclasses.fields(Inverter)} | {
 
 
 def check_key(key: str) -> None:
-    """Refuse a plant key that no plant has; ValueError names the nearest one."""
+    """Raise ValueError for an unknown plant key, with the nearest known one."""
     if key not in KEYS:
         near = difflib.get_close_matches(key, KEYS, n=1, cutoff=0.0)[0]
         raise ValueError(f"{key} is not a key of the plant; the nearest known one is {near}")
 
 
 def merged(effects: list[NamedEffect]) -> dict:
-    """{plant key: (value, names of the effects behind it)}; where several effects have a say in one key, gains
-    multiply, offsets add, harmonics stand side by side, and of anything else the last one counts: effects that were
-    estimated together agree on what they share."""
+    """{plant key: (value, names of the effects)}.  If several effects change one key, gains multiply, offsets add and
+    harmonics are concatenated; for other keys the last value is used, since effects that were estimated together agree.
+    """
     found: dict = {}
     for effect in effects:
         for key, value in effect.plant.items():
@@ -110,13 +110,13 @@ def plant_of(source) -> Plant:
 
 
 def _described(section, kind) -> dict:
-    """The section's values under the plant's names; None means that the plant's default holds."""
+    """The section's values under the plant's names; None selects the plant's default."""
     known = {f.name for f in dataclasses.fields(kind)}
     return {k: v for k, v in vars(section).items() if k in known and v is not None}
 
 
 def described_sensors(nominal: Nominal) -> dict:
-    """Fields of plant.Sensors as [sensors] takes the hardware for; fine and without limits where it says nothing."""
+    """Fields of plant.Sensors as [sensors] describes them; fine and unlimited if it does not."""
     s, reach = nominal.sensors, 10.0 * nominal.machine.rated_current_a
     bits, full = s.adc_bits or FINE_BITS, s.current_range_a or reach
     volts = s.u_dc_range_v or 4.0 * nominal.inverter.dc_bus_v
@@ -137,7 +137,7 @@ def described_sensors(nominal: Nominal) -> dict:
 
 
 def plain(key: str, value):
-    """A TOML value as the plant's field takes it; ValueError says what is wrong."""
+    """A TOML value in the type of the plant's field; ValueError for a wrong value."""
     check_key(key)
     if key == "machine.emf_harmonics":
         return tuple(h if isinstance(h, Harmonic) else Harmonic(*map(float, h)) for h in value)
@@ -156,7 +156,7 @@ def plain(key: str, value):
 
 
 def errors_beyond(sensors: Sensors, nominal: Nominal) -> dict:
-    """What the sensors' readings are off by once the core has applied its nominal trims.
+    """Errors of the readings after the core has applied its nominal trims.
 
     current_gain (3,), current_offset [A] (3,): reading = current * gain + offset; u_dc_gain;
     theta_offset [rad]: electrical angle read minus the true one.

@@ -1,11 +1,11 @@
-"""From a file to a checked canonical recording: read, map the columns, check.
+"""Load a file as a checked canonical recording: read, map the columns, check.
 
     recording = load_recording("log.csv", load_nominal("drive.toml"))
 
-RecordingError: nothing can be made of the file; the message is one line.  A recording that can be read but not be
-diagnosed comes back with a fatal problem.  ``meta`` of the recording holds "notes" (what was assumed or worked
-round without being wrong), "columns" (canonical name: file column) and "map" (which map was used).
-Rows of a ``slow`` recording are joined where they follow each other by the log's own step.
+RecordingError: the file is unusable; the message is one line.  A recording that can be read but not diagnosed has a
+fatal problem.  ``meta`` of the recording contains "notes" (assumptions and harmless corrections), "columns"
+(canonical name: file column) and "map" (the map that was used).  Rows of a ``slow`` recording are joined if they are
+one step of the log apart.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from fluxproof.diagnosis.recording import Recording, RecordingError
 
 
 def load_recording(path, nominal) -> Recording:
-    """The recording of a file in canonical form, checked; RecordingError for unusable input.
+    """The checked recording of a file in canonical form; RecordingError for unusable input.
 
     path: a file in any format of diagnosis/readers; nominal: Nominal, with its [columns].
     """
@@ -42,18 +42,18 @@ def load_recording(path, nominal) -> Recording:
 
 
 def _recording(path, table: Table, plan: Plan, nominal) -> Recording:
-    """Canonical columns with a time, every row usable, nothing checked."""
+    """Canonical columns with a time, all rows usable, not yet checked."""
     columns = canonical(table, plan)
     text = {name: s.column for name, s in plan.sources.items() if name not in columns}
     lost = [name for name in text if name not in OPTIONAL]
     if lost:
         name, column = lost[0], text[lost[0]]
         line = f":{table.lines[0]}" if table.lines is not None else ""
-        raise RecordingError(f"{path}{line}: column {shown(column)!r} ({name}) holds no numbers")
+        raise RecordingError(f"{path}{line}: column {shown(column)!r} ({name}) contains no numbers")
     n = len(next(iter(columns.values())))
     notes = [*table.notes, *plan.notes]
     notes += [
-        f"{name}: column {shown(column)!r} holds no numbers and is left out" for name, column in text.items()
+        f"{name}: column {shown(column)!r} contains no numbers and is ignored" for name, column in text.items()
     ]
     meta = table.meta | {
         "notes": notes,
@@ -64,7 +64,7 @@ def _recording(path, table: Table, plan: Plan, nominal) -> Recording:
     if "t" not in columns:
         step = table.meta.get("sample_time_s") or plan.sample_time_s or nominal.sample_time_s
         columns["t"] = step * np.arange(n)
-        notes.append(f"no time column: rows are taken to be {step:g} s apart")
+        notes.append(f"no time column: rows are assumed to be {step:g} s apart")
     for name, value in plan.assumed.items():
         columns[name] = np.full(n, value)
     if plan.run and plan.run in table.columns:

@@ -1,4 +1,4 @@
-"""Where the misfit lives: signal, harmonic orders, regions of speed, current, temperature, bus and time."""
+"""Location of the misfit: signal, harmonic orders, and regions of speed, current, temperature, bus and time."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ import numpy as np
 
 from fluxproof.diagnosis.result import Evidence, Location, OrderLine, Region
 
-REGION_FACTOR = 1.5  # a region is told when its misfit is this much larger than elsewhere
+REGION_FACTOR = 1.5  # least ratio of the misfit inside and outside of a reported region
 
 
 def _block_means(view):
-    """{variable: ((b,), unit)} that a region may be found in."""
+    """{variable: ((b,), unit)} that may bound a region."""
     i = view.i.mean(axis=1)
     return {
         "omega_e": (view.omega.mean(axis=1), "rad/s"),
@@ -23,7 +23,7 @@ def _block_means(view):
 
 
 def at_order(cells, values, order):
-    """Values (r,) of channel u at an order as complex (b,), nan where the block cannot tell it."""
+    """Values (r,) of channel u at an order as complex (b,), nan in blocks that do not resolve it."""
     rows = (cells.channel == "u") & (cells.order == order)
     out = np.full(cells.block.max() + 1, np.nan + 0j)
     d, q = rows & (cells.part == 0), rows & (cells.part == 1)
@@ -54,7 +54,7 @@ def locate(view, cells, pure) -> Location:
 
 
 def _regions(view, y0):
-    """For each variable the half in which the misfit is clearly larger, split at the best of its quartiles."""
+    """For each variable the side of its best quartile on which the misfit is clearly larger."""
     out, power = [], np.abs(y0) ** 2
     for variable, (x, unit) in _block_means(view).items():
         good = np.isfinite(x) & np.isfinite(power)

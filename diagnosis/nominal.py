@@ -1,10 +1,10 @@
-"""The nominal drive: what the simulation believed, read from drive.toml.
+"""The nominal drive: the parameters of the simulation, read from drive.toml.
 
-Every key of the core's own drive.toml is known here with its range, but only what a balance needs is
-required, so that a drive without the core can be described too; what is absent is None, and the effect it
-describes absent from the nominal model.  [columns] maps names of a recording's file to canonical ones.
-[plant.machine], [plant.inverter], [plant.sensors] and [plant.timing] hold physics that the core knows nothing of,
-such as an improved drive has it; diagnosis/improved_plant.py makes a plant of all of it.
+Every key of the core's drive.toml is accepted with its range, but only those that the balance needs are required, so
+that a drive without the core can be described too.  A missing key is None, and its effect is not part of the nominal
+model.  [columns] maps names of a recording's file to canonical ones.  [plant.machine], [plant.inverter],
+[plant.sensors] and [plant.timing] contain physics that the core does not use, as in an improved drive;
+diagnosis/improved_plant.py builds the plant.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ REQUIRED = {
 
 
 def _optional(section, kind):
-    """The section's dataclass with every key optional but the required ones."""
+    """The section's dataclass in which only the required keys are mandatory."""
     fields = []
     for f in dataclasses.fields(kind):
         needed = f.name in REQUIRED.get(section, ())
@@ -55,19 +55,19 @@ class Nominal:
 
     @property
     def sample_time_s(self) -> float:
-        """Time between two rows that follow each other."""
+        """Time between two consecutive rows [s]."""
         return self.control.sample_time_s or 1.0 / self.inverter.pwm_frequency_hz
 
 
 def load_nominal(path) -> Nominal:
-    """The nominal drive of a TOML file; DriveError names file, section and key, and what was expected."""
+    """The nominal drive of a TOML file; DriveError names file, section, key and what was expected."""
     sections = read_sections(path, SECTIONS)
     tables = read_tables(path)
     columns, plant = tables.get("columns", {}), tables.get("plant", {})
     if not isinstance(columns, dict):
         raise DriveError(f"{path}: columns must be a section [columns] with lines such as 'my name' = 'i_a'")
     if not isinstance(plant, dict) or not all(isinstance(table, dict) for table in plant.values()):
-        raise DriveError(f"{path}: plant must hold sections such as [plant.machine]")
+        raise DriveError(f"{path}: plant must contain sections such as [plant.machine]")
     m = sections["machine"]
     if m.magnet_flux_wb <= 0.0:
         raise DriveError(f"{path}: [machine] magnet_flux_wb = {m.magnet_flux_wb:g}: must be above 0 Wb to diagnose")

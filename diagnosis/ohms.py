@@ -1,8 +1,8 @@
-"""Ohms beside an inverter's loss that no device of the inverter makes: what is straight where its curve has a tail.
+"""Bounds the resistance that the inverter's voltage-drop curve does not explain.
 
-Beyond a tenth of the rated current a device has a drop in log(i), or a rest of its commutation that dies out with 1/i
-(the leg's capacitance), or both, and neither ever falls.  Which of them it is, the balance is seldom good enough to
-say; so the ohms beside each of them are a range.  A curve that is free everywhere would have taken the ohms up.
+Beyond a tenth of the rated current, a device has a drop in log(i), a commutation loss in 1/i (capacitance of the leg),
+or both, and neither decreases the loss.  The balance is seldom accurate enough to distinguish them, so that the
+resistances fitted with each of them form a range.  A curve that is free everywhere would absorb the resistance.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ LEAST_DISPERSION = 0.8
 
 
 def straight_ohms(search, solution) -> tuple[float, float]:
-    """Least and most voltage [V] at rated current that ohms take beside a solution's dead time, with its uncertainty.
+    """(least, most) ohmic voltage [V] at rated current in addition to a solution's dead time, with its uncertainty.
 
-    The solution has dead time and a resistance; (-inf, inf) where it carries no ohms.
+    The solution has dead time and a resistance; (-inf, inf) if the data do not determine the resistance.
     """
     f = search.fitter(solution.view, [search.effects[n] for n in sorted(solution.model.names)])
     kept = [k for k in f.carried(solution.model) if (f.owner[k], f.names[k]) != ("dead_time", "~growth")]
@@ -37,7 +37,7 @@ def straight_ohms(search, solution) -> tuple[float, float]:
 
 
 def _fit(f, kept, tails, ohms):
-    """(value, standard deviation) of column ``ohms`` beside a device's tails (r,); None where one of them falls."""
+    """(value, standard deviation) of column ``ohms`` fitted with the device terms (r,); None if one is negative."""
     a = np.column_stack([f.a[:, kept], *(row / np.linalg.norm(row) for row in tails)])
     c, *_ = np.linalg.lstsq(a, f.y, rcond=None)
     if len(tails) and c[len(kept) :].min() < 0.0:

@@ -1,8 +1,8 @@
-"""The closed-loop simulation laid over the recording, with the drive as described and with the improved one.
+"""Closed-loop simulations for comparison with the recording, of the drive as described and of the improved one.
 
-The controller hides an effect from the currents, and so does a simulation with the current loop closed: what has to
-lie on the recording is the voltage that the controller asks for.  Speed, bus voltage and references are the
-recording's; controller and plant are simulated (overlay_loop.py), at most 20,000 rows in stretches over the recording.
+The controller hides an effect from the currents, in the drive and in the simulation; the signal to compare is the
+commanded voltage.  Speed, bus voltage and references are those of the recording; controller and plant are simulated
+(overlay_loop.py) for at most 20,000 rows in stretches over the recording.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from fluxproof.plant import IMPOSED_SPEED, initial_state, plant_params
 
 MOST_POINTS = 4_000
 SIGNALS = ("u_d_ref", "u_q_ref", "i_d", "i_q")
-RUN_IN = 200  # rows at a stretch's start that are simulated and not shown
-USUAL_BANDWIDTH = 0.05  # of the sampling frequency, where the drive file names none
+RUN_IN = 200  # rows at the start of a stretch that are simulated but not shown
+USUAL_BANDWIDTH = 0.05  # of the sampling frequency, if the drive file gives no bandwidth
 
 
 def closed_loop(recording: Recording, nominal: Nominal, improved=None) -> dict:
@@ -32,7 +32,7 @@ def closed_loop(recording: Recording, nominal: Nominal, improved=None) -> dict:
     "rms_before", "rms_after": {the same: rms difference of the block means}, "rows": simulated rows, "block_rows":
     rows in a block}, m <= 4000; "simulated_after" and "rms_after" only with an improved drive.  Where the recording
     has duties, the recorded voltages are theirs, in the rotor frame of the middle of the period in which they act.
-    RecordingError says which column is missing.
+    RecordingError names a missing column.
     """
     parts = stretches(recording, nominal)
     recorded = _recorded(recording, nominal)
@@ -58,7 +58,7 @@ def closed_loop(recording: Recording, nominal: Nominal, improved=None) -> dict:
 
 
 def _shown(parts: list[Stretch], slow: bool):
-    """Which rows of each stretch are looked at, and how many make a point."""
+    """(rows of each stretch that are evaluated, rows per block)."""
     if slow:
         return [slice(2 * SETTLING_ROWS // 3, None)] * len(parts), SETTLING_ROWS - 2 * SETTLING_ROWS // 3
     total = sum(len(p.rows) - RUN_IN for p in parts)
@@ -66,7 +66,7 @@ def _shown(parts: list[Stretch], slow: bool):
 
 
 def _blocks(pieces, block):
-    """Block means of each piece, joined; a piece's last rows that fill no block are left out."""
+    """Block means of each piece, concatenated; an incomplete last block is omitted."""
     means = [p[: len(p) // block * block].reshape(-1, block).mean(axis=1) for p in pieces]
     return np.concatenate(means)
 
@@ -77,7 +77,7 @@ def _columns(pieces, block) -> dict:
 
 
 def _recorded(recording: Recording, nominal: Nominal) -> np.ndarray:
-    """(n, 4) in the order of SIGNALS; voltages from the duties where they are there."""
+    """(n, 4) in the order of SIGNALS; voltages from the duties if these are recorded."""
     currents = dq_currents(recording)
     if recording.has("d_a", "d_b", "d_c", "u_dc", "theta_e"):
         turned = recording["theta_e"] + _ahead(recording, nominal)
@@ -101,7 +101,7 @@ def _ahead(recording, nominal):
 
 
 def controller_of(nominal: Nominal) -> Controller:
-    """The recording's controller as the nominal drive has it; without a bandwidth a twentieth of the sampling's."""
+    """The controller of the nominal drive; without a bandwidth, 1/20 of the sampling frequency is used."""
     c, m = nominal.control, nominal.machine
     if c.current_bandwidth_hz is None:
         c = dataclasses.replace(c, current_bandwidth_hz=USUAL_BANDWIDTH / nominal.sample_time_s)
@@ -112,7 +112,7 @@ def controller_of(nominal: Nominal) -> Controller:
 
 
 def _errors(plant: Plant, nominal: Nominal) -> tuple[Errors, float]:
-    """(Errors of the hardware against what the nominal drive takes it for, offset of the angle [rad])."""
+    """(Errors of the hardware relative to the nominal drive, angle offset [rad])."""
     beyond, timing = errors_beyond(plant.sensors, nominal), plant.timing
     delay = nominal.control.duty_applied_after_samples + timing.delay_s / nominal.sample_time_s
     return Errors(
@@ -122,7 +122,7 @@ def _errors(plant: Plant, nominal: Nominal) -> tuple[Errors, float]:
 
 
 def _true_angle(theta, plant: Plant, offset):
-    """The angle behind the one that the sensor shows; both electrical and unwrapped [rad]."""
+    """The true angle for the angle that the sensor reads; both electrical, unwrapped [rad]."""
     s, p = plant.sensors, plant.machine.pole_pairs
     theta_m = (theta - offset) / p
     once = s.eccentricity_once_rad * np.sin(theta_m + s.eccentricity_once_phase_rad)
@@ -136,7 +136,7 @@ def _simulate(part: Stretch, plant: Plant, nominal: Nominal, recorded) -> np.nda
     controller, machine, inverter = controller_of(nominal), plant.machine, plant.inverter
     if machine.flux_map is not None and machine.flux_map.folds():
         machine = dataclasses.replace(machine, flux_map=machine.flux_map.mended())
-    # A pure sign would make currents near zero chatter by what half a dead time moves them.
+    # A sign function would make currents near zero chatter by the step of half a dead time.
     ripple = (
         0.5 * inverter.dead_time_s * part.u_dc.max() / min(machine.inductance_d_h, machine.inductance_q_h)
     )

@@ -1,4 +1,4 @@
-"""What the overlay takes from a recording: stretches of rows, and in each the signals that drive the simulation."""
+"""Inputs of the overlay simulation: stretches of a recording with the signals that drive the simulation."""
 
 from __future__ import annotations
 
@@ -11,26 +11,26 @@ from scipy.signal import savgol_filter
 from fluxproof.diagnosis.nominal import Nominal
 from fluxproof.diagnosis.recording import Recording, RecordingError
 
-MOST_ROWS = 20_000  # simulated ones
+MOST_ROWS = 20_000  # simulated rows
 WINDOW_ROWS = 2_000
-LEAST_ROWS = 400  # a shorter stretch is run-in and nothing else
-SETTLING_ROWS = 300  # of an operating point of a slow recording, the last third is looked at
-SMOOTH_ROWS = 41  # of angle and references: quantisation goes, what a shaft or a load does stays
+LEAST_ROWS = 400  # a shorter stretch would consist of the run-in only
+SETTLING_ROWS = 300  # per operating point of a slow recording; the last third is evaluated
+SMOOTH_ROWS = 41  # window for angle and references: removes quantisation and keeps the motion of shaft and load
 
 
 class Stretch(NamedTuple):
-    """n rows that are simulated in one go; ``rows`` (n,) are indices in the recording, all the same in a slow one."""
+    """n rows that are simulated together; ``rows`` (n,) are indices in the recording, all equal in a slow one."""
 
     rows: np.ndarray
     theta: np.ndarray  # (n + 1,) electrical, unwrapped [rad]
     omega: np.ndarray  # [rad/s]
     i_ref: np.ndarray  # (n, 2) [A]
     u_dc: np.ndarray  # [V]
-    temperature: np.ndarray  # [deg C], NaN where it is not known
+    temperature: np.ndarray  # [deg C], NaN where unknown
 
 
 def dq_currents(recording: Recording) -> np.ndarray:
-    """(n, 2) measured currents in dq [A]; RecordingError where the recording has none."""
+    """(n, 2) measured dq currents [A]; RecordingError if the recording has none."""
     if recording.has("i_d", "i_q"):
         return np.stack([recording["i_d"], recording["i_q"]], axis=1)
     if recording.has("i_a", "i_b", "i_c", "theta_e"):
@@ -41,13 +41,13 @@ def dq_currents(recording: Recording) -> np.ndarray:
 
 
 def dq(a, b, c, theta) -> np.ndarray:
-    """(n, 2) of three phases, Clarke amplitude-invariant, d axis at theta."""
+    """(n, 2) dq values of three phase values, amplitude-invariant Clarke, d axis at theta."""
     x = ((2.0 * a - b - c) + 1j * math.sqrt(3.0) * (b - c)) / 3.0 * np.exp(-1j * theta)
     return np.stack([x.real, x.imag], axis=1)
 
 
 def stretches(recording: Recording, nominal: Nominal) -> list[Stretch]:
-    """Representative rows, at most MOST_ROWS of them; RecordingError says what is missing."""
+    """At most MOST_ROWS representative rows; RecordingError names missing columns."""
     currents, t_s = dq_currents(recording), nominal.sample_time_s
     if not recording.has("omega_e") and not recording.has("theta_e"):
         raise RecordingError(f"{recording.source}: theta_e or omega_e is needed to simulate it")
@@ -63,12 +63,12 @@ def stretches(recording: Recording, nominal: Nominal) -> list[Stretch]:
         rows = np.arange(start, stop)
         found.append(Stretch(rows, theta, np.diff(theta) / t_s, i_ref, *_slow(recording, nominal, rows)))
     if not found:
-        raise RecordingError(f"{recording.source}: no {LEAST_ROWS} rows follow each other without a gap")
+        raise RecordingError(f"{recording.source}: no {LEAST_ROWS} consecutive rows without a gap")
     return found
 
 
 def _windows(recording):
-    """(start, stop) of stretches without gap, thinned evenly to MOST_ROWS rows."""
+    """(start, stop) of stretches without gaps, evenly reduced to MOST_ROWS rows."""
     ends = np.flatnonzero(~recording.joined) + 1
     runs = list(zip([0, *ends[:-1]], ends, strict=True))
     pieces = []
@@ -86,7 +86,7 @@ def _windows(recording):
 
 
 def _angle(recording, part, t_s):
-    """(n + 1,) angle of the rows and the one behind, smoothed; integrated where only the speed is recorded."""
+    """(n + 1,) smoothed angle of the rows and the following one; integrated if only the speed is recorded."""
     if recording.has("theta_e"):
         theta = smooth(filled(np.unwrap(filled(recording["theta_e"][part]))))
     else:
@@ -95,14 +95,13 @@ def _angle(recording, part, t_s):
 
 
 def _reference(recording, part, currents, k):
-    """Reference as recorded, or what the currents were without their noise."""
+    """The recorded current reference, or else the smoothed currents."""
     name = ("i_d_ref", "i_q_ref")[k]
     return filled(recording[name][part]) if recording.has(name) else smooth(filled(currents[part, k]))
 
 
 def filled(values):
-    """Values that are not finite replaced by the last one before them, as a controller that lost one would; a column
-    without any is zero."""
+    """Replace values that are not finite by the last finite one, as a controller would; zero if there is none."""
     good = np.isfinite(values)
     if good.all():
         return values
@@ -111,7 +110,7 @@ def filled(values):
 
 
 def smooth(values):
-    """A parabola through SMOOTH_ROWS rows around each row; shorter columns as they are."""
+    """Local parabola over SMOOTH_ROWS rows around each row; shorter columns are unchanged."""
     return savgol_filter(values, SMOOTH_ROWS, 2) if len(values) >= SMOOTH_ROWS else values
 
 
@@ -128,7 +127,7 @@ def _slow(recording, nominal, rows):
 
 
 def _points(recording, nominal, currents, t_s):
-    """Operating points of a slow recording: each held until the loop has settled."""
+    """Operating points of a slow recording, each held until the current loop has settled."""
     rows = np.flatnonzero(
         recording.usable & np.isfinite(currents).all(axis=1) & np.isfinite(recording["omega_e"])
     )

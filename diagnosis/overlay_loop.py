@@ -1,10 +1,10 @@
 """A float field-oriented controller in closed loop with the averaged plant, one row per control sample.
 
-    u = kp (i_ref - i) + int,  int += ki T (i_ref - i)          held while the voltage is at its circle
+    u = kp (i_ref - i) + int,  int += ki T (i_ref - i)          held while the voltage is at its limit
     u_d -= w L_q i_q,  u_q += w (L_d i_d + psi_m)               decoupling with the controller's own parameters
     duties by centred zero vectors for the angle theta + delay_samples w T, in force a whole number of periods later
 
-What the controller measures carries the sensors' errors; the plant turns as the recording did.
+The controller's measurements contain the sensor errors; the plant rotates as in the recording.
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ class Controller(NamedTuple):
     inductance_d: float
     inductance_q: float
     magnet_flux: float
-    delay_samples: float  # by which the output's angle is turned ahead
+    delay_samples: float  # by which the angle of the output is advanced
 
 
 class Errors(NamedTuple):
-    """How the sensors read and when things happen; without errors gain (1, 1, 1), offset (0, 0, 0), 1, 0, n."""
+    """Sensor errors and delay; without errors gain (1, 1, 1), offset (0, 0, 0), 1, 0, n."""
 
     current_gain: np.ndarray  # (3,)
     current_offset: np.ndarray  # (3,) [A]
@@ -47,10 +47,10 @@ class Errors(NamedTuple):
 def run_loop(
     state, params, c, e, theta_read, theta_true, omega, i_ref, u_dc, temperature, integral, period_s, out
 ):
-    """Simulate n rows; ``out`` (n, 4) receives i_d, i_q as measured [A] and u_d, u_q as asked for [V].
+    """Simulate n rows; ``out`` (n, 4) receives measured i_d, i_q [A] and commanded u_d, u_q [V].
 
     theta_read, theta_true (n + 1,): electrical angle, unwrapped [rad]; omega (n,) [rad/s]; i_ref (n, 2) [A];
-    u_dc (n,) as read [V]; temperature (n,) of the winding [deg C]; integral (2,) [V] of the regulators at the start.
+    u_dc (n,) measured [V]; temperature (n,) of the winding [deg C]; integral (2,) [V] of the regulators at the start.
     """
     poles = params.machine.pole_pairs
     whole = int(math.floor(e.delay_periods))
@@ -82,7 +82,7 @@ def run_loop(
             queue[j] = queue[j - 1]
         _duties(u_d, u_q, theta_read[k] + c.delay_samples * omega[k] * period_s, u_dc[k], queue[0])
         if k == 0:
-            for j in range(1, whole + 2):  # what came before the first row is taken for the same, turned back
+            for j in range(1, whole + 2):  # before the first row the same voltage vector is assumed, rotated back
                 back = (c.delay_samples - j) * omega[k] * period_s
                 _duties(u_d, u_q, theta_read[k] + back, u_dc[k], queue[j])
         out[k, 0], out[k, 1], out[k, 2], out[k, 3] = i_d, i_q, u_d, u_q
@@ -94,7 +94,7 @@ def run_loop(
 
 @njit
 def _duties(u_d, u_q, theta, u_dc, duties):
-    """Duties (3,) of a voltage at an angle, zero vectors shared equally."""
+    """Duties (3,) of a voltage at an angle, with equal zero vectors."""
     cosine, sine = math.cos(theta), math.sin(theta)
     a, b, c = inverse_clarke(cosine * u_d - sine * u_q, sine * u_d + cosine * u_q)
     middle = 0.5 * (max(a, b, c) + min(a, b, c))

@@ -1,4 +1,4 @@
-"""The physical half of a diagnosis: from loaded recordings to effects, ambiguities and what remains unexplained."""
+"""The physical part of a diagnosis: from loaded recordings to effects, ambiguities and the unexplained residual."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ from fluxproof.diagnosis.uncertainty import Spread
 from fluxproof.diagnosis.unknown import sparse_term
 from fluxproof.diagnosis.view import joined_views, started_cold
 
-HOLDOUT_EVERY = 4  # each fourth dwell is never fitted
-MAP_POINTS = 20  # different currents that make a flux map worth fitting
+HOLDOUT_EVERY = 4  # every fourth dwell is held out
+MAP_POINTS = 20  # least number of distinct currents for fitting a flux map
 ABSORBED = {"udc_gain", "current_scale", "inductance_d", "inductance_q"}
 
 
 def explain(loaded: list[Recording], nominal: Nominal, progress=lambda text: None) -> Diagnosis:
     """Explain one recording, or several of the same drive, against a nominal drive.
 
-    Raises RecordingError where the recordings hold no operating point that can be balanced.
+    Raises RecordingError if the recordings contain no operating point for which a voltage balance can be made.
     """
     problems = [p for r in loaded for p in r.problems]
     rows = sum(len(r) for r in loaded)
@@ -38,7 +38,7 @@ def explain(loaded: list[Recording], nominal: Nominal, progress=lambda text: Non
         return Diagnosis(
             "bad_recording", f"The recording cannot be used: {worst.message}", rows=rows, problems=problems
         )
-    if all(r.slow for r in loaded):  # sampled too slowly for a balance from row to row
+    if all(r.slow for r in loaded):  # sampled too slowly for a voltage balance between rows
         answer = diagnose_slow(loaded, nominal, progress)
     else:
         answer = _physics(loaded, nominal, progress)
@@ -47,7 +47,7 @@ def explain(loaded: list[Recording], nominal: Nominal, progress=lambda text: Non
 
 
 def holdout_blocks(view) -> np.ndarray:
-    """(b,) blocks whose operating points are not fitted: every fourth dwell, or blocks where there are few dwells."""
+    """(b,) bool: blocks held out of the fit: every fourth dwell, or every fourth block if there are few dwells."""
     dwells = np.unique(view.run)
     if len(dwells) >= 8:
         return np.isin(view.run, dwells[2::HOLDOUT_EVERY])
@@ -55,7 +55,7 @@ def holdout_blocks(view) -> np.ndarray:
 
 
 def held_out(views) -> np.ndarray:
-    """(b,) blocks of all recordings that are not fitted: a part of each, never all of one that was asked for."""
+    """(b,) bool: blocks held out of the fit, a part of each recording and never the whole of one."""
     return np.concatenate([holdout_blocks(v) for v in views])
 
 
@@ -84,11 +84,11 @@ def _physics(recordings, nominal, progress) -> Diagnosis:
             answer.effects = words.named(spread, names, found.empty)
         answer.ambiguity = ambiguity
     if kind == "ambiguous":
-        progress("the recording that would tell")
+        progress("choosing the next recording")
         noise_v = float(np.nanmedian(np.abs(at_order(search.cells, found.pure, 0.0))))
         rivals = [found.best, *found.tied]
         rivals += search.straightened(rivals)
-        for group in [] if found.tied else ambiguity:  # what would be there without one or the other
+        for group in [] if found.tied else ambiguity:  # the models without one of the alternatives
             rivals += [search.refine(found.best.model.without(n)) for n in group if n in found.best.model.names]
         open_names = sorted({n for group in ambiguity for n in group})
         answer.next_recording = requests(search, rivals, noise_v, wants_cold(open_names, view))
@@ -100,7 +100,7 @@ def _physics(recordings, nominal, progress) -> Diagnosis:
     answer.sentence = words.sentence(kind, answer.effects, ambiguity, left.fit, CATALOGUE, answer.location)
     rows = view.u_dc.shape[1]
     answer.notes.append(
-        f"{len(view)} steady blocks of {rows} rows were balanced, {int(held.sum())} of them never fitted."
+        f"The voltage balance was made on {len(view)} steady blocks of {rows} rows; {int(held.sum())} were not fitted."
     )
     share = left.fit.share_left
     answer.trace = (
@@ -110,10 +110,10 @@ def _physics(recordings, nominal, progress) -> Diagnosis:
 
 
 def beside_free_surface(view, names, train):
-    """(names that stay, ambiguity sets): scales and inductances must explain something beside a free flux map.
+    """(remaining names, ambiguity sets): scales and inductances must improve the fit of a free flux map.
 
-    Where the operating points cover the plane of currents, a map as free as they allow can be fitted; what a
-    rigid curve of saturation leaves over is then seen for what it is.
+    If the operating points cover the dq current plane, a free flux map can be fitted.  A scale or inductance error
+    that no longer improves the fit then had only absorbed the residual of a rigid saturation curve.
     """
     curved = sorted({"saturation", "cross_saturation"} & set(names))
     suspects = sorted(ABSORBED & set(names))
@@ -128,7 +128,7 @@ def beside_free_surface(view, names, train):
 
 
 def _lag(found, lag) -> UnknownTerm:
-    """Currents that are measured late, as a filter in front of the converters makes them."""
+    """The term for currents that are measured late, as a filter in front of the converters causes."""
     best, empty = found.best, found.empty
     spread = float(np.sqrt(best.covariance["delay"][0, 0]))
     share = (empty.chi2 - best.chi2) / max(empty.chi2 - empty.rows, 1e-9)
@@ -136,7 +136,7 @@ def _lag(found, lag) -> UnknownTerm:
 
 
 def _unknown(found, left) -> UnknownTerm | None:
-    """The best formula for what is left."""
+    """The formula that fits the residual best."""
     stray = left.stray
     if stray is None:
         return sparse_term(found.best.view, left.cells, left.residual, found.sigma, found.train)

@@ -1,6 +1,6 @@
 """A recording in canonical form: SI units, peak values, one row per control sample.
 
-Canonical columns (all optional but ``t``; see ``REQUIRED_SETS``):
+Canonical columns (only ``t`` is required here; columns.py checks what a balance needs):
 
     t                    s      sampling instant
     i_a i_b i_c          A      phase currents, or i_d i_q (dq, d axis at theta_e)
@@ -43,12 +43,12 @@ COLUMNS = {
 
 
 class RecordingError(ValueError):
-    """Unusable input, in one line that names the file, the line or column, and what was expected."""
+    """Unusable input; the message is one line with the file, the line or column, and what was expected."""
 
 
 @dataclass(frozen=True)
 class Problem:
-    """One finding of the checks.  ``fatal``: no diagnosis is possible; else ``action`` says how it was worked round."""
+    """One finding of the checks.  ``fatal``: no diagnosis is possible; else ``action`` states the correction."""
 
     code: str  # stable, lower_snake_case: gap, duplicate, clipped, stuck, unit, swapped_phases, current_sum, ...
     message: str
@@ -65,8 +65,8 @@ class Recording:
 
     ``usable``: bool (n,), False on rows that must not enter a balance (clipped, stuck, repaired).
     ``joined``: bool (n,), True where row k+1 follows row k after one sample time; the last is False.
-    ``slow``: sampled too slowly for a balance from sample to sample; only operating points count.
-    ``meta``: what else the file held, such as registers and raw codes of a telemetry dump.
+    ``slow``: sampled too slowly for a balance between samples; only steady operating points are used.
+    ``meta``: further contents of the file, such as registers and raw codes of a telemetry dump.
     """
 
     source: str
@@ -84,7 +84,7 @@ class Recording:
         return self.columns[name]
 
     def has(self, *names: str) -> bool:
-        """Whether every named column is there."""
+        """Whether all named columns are present."""
         return all(name in self.columns for name in names)
 
     @property
@@ -93,7 +93,7 @@ class Recording:
 
 
 def from_columns(columns: dict[str, np.ndarray], sample_time_s: float, source: str = "arrays") -> Recording:
-    """A recording of arrays taken on trust: nothing is checked but lengths and gaps in time."""
+    """A recording from arrays; only lengths and gaps in time are checked."""
     arrays = {name: np.ascontiguousarray(values, dtype=float) for name, values in columns.items()}
     n = {name: len(values) for name, values in arrays.items()}
     if "t" not in arrays or len(set(n.values())) != 1:

@@ -1,28 +1,28 @@
-"""A model solved on one view: errors of the record taken off the data, known flux made known, until it stands.
+"""Solves a model on one view, iterating until it converges.
 
-errors of the record (angle, currents, delay, bus) are corrected and the balance is made anew;
-terms that depend on the flux are told of the flux that the model's magnetic effects add.
+Measurement errors (angle, currents, delay, bus) are removed from the data and the balance is recomputed; terms that
+depend on the flux use the flux that the model's magnetic effects add.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from fluxproof.diagnosis.cells import Projector, cells_of, told
+from fluxproof.diagnosis.cells import Projector, cells_of, column_of
 from fluxproof.diagnosis.effect import FluxEffect, half_dead_time, rated_torque
 from fluxproof.diagnosis.fit import Fitter, Model, Solution, everything, row_sigma
 
 NOISY_TORQUE = 0.03  # of rated torque
-POINT = 0.08  # of top speed and rated current: closer operating points are one
-CURVE_SHARE = 0.01  # of what an effect contributes to a row: no curve of the catalogue fits a real one better
-MOST_EFFECTS = 4  # more at once is no explanation
+POINT = 0.08  # of top speed and rated current: closer operating points count as one
+CURVE_SHARE = 0.01  # relative error of any curve of the catalogue, as a share of its contribution to a row
+MOST_EFFECTS = 4  # larger models are not accepted as an explanation
 TIE = 10.0
 
 
 def point_numbers(view) -> np.ndarray:
-    """(b,) number of the steady point (speed, i_d, i_q) at which each block of a view stands.
+    """(b,) number of the operating point (speed, i_d, i_q) of each block of a view.
 
-    A point begins with the first block that is far from all points so far: fixed bounds would cut some in two.
+    The first block that is far from all known points starts a new one; fixed bins would split some points.
     """
     m, omega, i = view.machine, view.omega.mean(axis=1), view.i.mean(axis=1)
     top = max(float(np.abs(omega).max()), 1e-9)
@@ -36,16 +36,16 @@ def point_numbers(view) -> np.ndarray:
 
 
 def operating_points(view) -> int:
-    """Number of different steady points of a view.
+    """Number of different operating points of a view.
 
-    Each carries two means, and an effect has two or three coefficients: more effects than every second point pays for
-    would explain anything.
+    Each gives two means, and an effect has two or three coefficients: more than one effect per two points would be able
+    to explain anything.
     """
     return int(point_numbers(view).max()) + 1
 
 
 class Refiner:
-    """The linear problem of a view and the solutions that were refined on it."""
+    """The linear problem of a view and the solutions refined on it."""
 
     def __init__(self, view, effects, train_blocks, progress=lambda text: None):
         self.most = min(MOST_EFFECTS, (operating_points(view) + 1) // 2)
@@ -55,8 +55,8 @@ class Refiner:
         self.train = train_blocks[self.projector.block]
         self.adjust = np.zeros(len(self.train))
         self._weigh()
-        # The acceleration of a fast free shaft is all noise; what a transducer shows of an unbalanced load is not,
-        # though it differs from block to block.  The projector's rows are those of every fit.
+        # The acceleration of a fast free shaft is mostly noise.  A transducer's torque is kept although an unbalanced
+        # load differs from block to block.  The projector's rows are used in every fit.
         noisy = self.pure >= NOISY_TORQUE * rated_torque(view.nominal)
         measured = (view.shaft == "torque")[self.cells.block]
         self.projector.ok &= (self.cells.channel != "torque") | measured | ~noisy
@@ -64,20 +64,20 @@ class Refiner:
         self._pose()
 
     def _weigh(self):
-        """The view's cells, with what is known of raw currents taken off, and their standard deviations."""
+        """The view's cells, with the known ripple voltage subtracted, and their standard deviations."""
         self.cells = cells_of(self.view, self.effects.values(), self.projector)
         self.cells.y = self.cells.y - self.adjust
         self.sigma, self.pure = row_sigma(self.view, self.cells)
-        self.unwidened = self.sigma  # before it is widened for the curves of what is found
+        self.unwidened = self.sigma  # before it is increased by the curve tolerance of the effects found
 
     def _pose(self):
-        """The linear problem of the cells, and what is left of it when every effect is as free as can be."""
+        """The linear problem of the cells, and its residual with all effects in free form."""
         self.linear = Fitter(self.cells, self.sigma, self.train)
         chi2, count = self.linear.chi2(everything(self.cells))
         self.dispersion = max(1.0, chi2 / max(len(self.linear.y) - count, 1))
 
     def refine(self, model) -> Solution:
-        """The model solved with its errors of the record taken off the data, and with the flux that it says."""
+        """The model solved on data corrected for its measurement errors, with the flux of its magnetic effects."""
         if model in self.refined:
             return self.refined[model]
         record = [n for n in sorted(model.names) if self.effects[n].corrects]
@@ -117,7 +117,7 @@ class Refiner:
         return solution
 
     def with_flux(self, view, magnetic, solution):
-        """The view that knows of the flux which the magnetic effects of a solution add and the iron loss takes."""
+        """The view with the flux that a solution's magnetic effects add and its iron loss removes."""
         psi = sum((self.effects[n].psi(view, solution.c[n]) for n in magnetic), np.zeros_like(view.i))
         more = np.array([self.effects[n].delta_l(solution.c[n]) for n in magnetic] or [(0.0, 0.0)]).sum(
             axis=0
@@ -129,18 +129,18 @@ class Refiner:
         return view
 
     def fitter(self, view, effects, free=None) -> Fitter:
-        """The linear problem of a corrected view, with what is known of raw currents taken off."""
+        """The linear problem of a corrected view, with the known ripple voltage subtracted."""
         cells = cells_of(view, effects, self.projector, free)
         cells.y = cells.y - self.adjust
-        # Smaller currents have smaller noise: without this, dividing all by one factor would pass for a better fit.
+        # Smaller currents have smaller noise: otherwise dividing all by a factor would look like a better fit.
         return Fitter(cells, self.sigma * view.noise_gain, self.train, self.linear.price)
 
     def take_raw(self, solutions) -> Solution | None:
-        """Take off what a solution's terms make of the raw current beside its parabola, and solve it again.
+        """Subtract the voltage that a solution's effects derive from the current ripple, and solve it again.
 
-        Terms are regressed on parabolas of the current, but the machine saw its ripple too: an inductance that
-        is wrong by a tenth leaves a tenth of the ripple's voltage, which must not pass for a harmonic.  Of the
-        solutions that is done with the one which then scores best; None where no ripple matters or none gains.
+        Effects are regressed on parabolas of the current, but the ripple acts on the machine too: an inductance that is
+        wrong by a tenth leaves a tenth of the ripple voltage, which must not be taken for a harmonic.  The solution
+        that then scores best is used; None if the ripple does not matter or no solution improves.
         """
         tried = []
         for solution in solutions:
@@ -164,7 +164,7 @@ class Refiner:
         return self.refine(model)
 
     def _of_ripple(self, solution):
-        """Rows (r,) that a solution's terms make of the raw current less those of its parabola."""
+        """Rows (r,) of a solution's effects for the raw current minus those for its parabola."""
         adjust = np.zeros(len(self.cells.y))
         rough = solution.view.with_raw_current()
         for name, c in solution.c.items():
@@ -175,14 +175,14 @@ class Refiner:
                 cells_of(v, [effect], self.projector).columns[name] for v in (solution.view, rough)
             )
             for key, value in c.items():
-                if value and told(raw, key) and told(smooth, key):
-                    adjust += value * (raw[told(raw, key)] - smooth[told(smooth, key)])
+                if value and column_of(raw, key) and column_of(smooth, key):
+                    adjust += value * (raw[column_of(raw, key)] - smooth[column_of(smooth, key)])
         return adjust
 
     def allow_for_curves(self, best):
-        """Widen every row by what the best effects' curves may be off there, and start anew.
+        """Increase the sigma of every row by the curve tolerance of the best effects, and start again.
 
-        A second effect must explain more than a share of what a first one contributes.
+        A second effect must explain more than the possible curve error of a first one.
         """
         late = half_dead_time(best.c, self.view.nominal)
         if late:
@@ -192,7 +192,7 @@ class Refiner:
         variance = variance + np.where(self.cells.channel == "u", self.doubt(best)[self.cells.block], 0.0) ** 2
         for name, c in best.c.items():
             columns = self.cells.columns[name]
-            rows = sum(v * columns[told(columns, k)] for k, v in c.items() if told(columns, k))
+            rows = sum(v * columns[column_of(columns, k)] for k, v in c.items() if column_of(columns, k))
             variance = variance + (CURVE_SHARE * rows) ** 2
         self.sigma = np.sqrt(variance)
         self.refined.clear()
@@ -202,12 +202,12 @@ class Refiner:
             self.linear = Fitter(self.cells, self.sigma, self.train)
 
     def doubt(self, solution) -> np.ndarray:
-        """Voltage (b,) [V] in each block that no curve of a solution's effects could tell."""
+        """Voltage (b,) [V] of each block by which the curves of a solution's effects may be wrong."""
         parts = [self.effects[name].doubt(c, self.view) for name, c in solution.c.items()]
         return np.sqrt(sum((np.square(part) for part in parts), np.zeros(len(self.view))))
 
     def corrected(self, totals):
-        """The view without the errors of the record that the totals stand for; None where they make no sense."""
+        """The view without the measurement errors given by the totals; None if these are impossible."""
         view = self.view
         for name in sorted(totals, key=lambda n: n == "sampling_skew"):
             view = self.effects[name].corrected(view, totals[name])
@@ -216,7 +216,7 @@ class Refiner:
         return view
 
     def plausible(self, solution) -> bool:
-        """No effect has a size or, beyond doubt, a sign that its physics rules out."""
+        """Whether no effect has an impossible size or, beyond its uncertainty, an impossible sign."""
         for name in solution.model.names:
             effect = self.effects[name]
             if effect.too_large(solution.c[name], self.view):
@@ -226,5 +226,5 @@ class Refiner:
         return True
 
     def worth(self, solution, name) -> float:
-        """chi^2 that an effect of a solution takes away."""
+        """Reduction of chi^2 by an effect of a solution."""
         return self.refine(solution.model.without(name)).chi2 - solution.chi2

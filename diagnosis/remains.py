@@ -1,4 +1,4 @@
-"""What the best model leaves: its residual, the misfit before and after, and what stands out of the noise."""
+"""The residual of the best model: misfit before and after, and what is significant in it."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from fluxproof.diagnosis.result import Fit
 from fluxproof.diagnosis.scan import Stray, row_residual, stray_order, stray_swing, stray_torque
 
 GROUP_ROWS, GROUP_CHI2 = 12, 3.0
-CURVE_LEFT = 0.06  # of the misfit's rms
-CLAMPED_LEFT = 0.15  # the same of an inverter's loss, which near zero current follows the ripple
-GROUP_SHARE = 0.4  # of a group's misfit: an explanation leaves no group as it was
+CURVE_LEFT = 0.06  # of the misfit's rms: residual attributed to curve shapes
+CLAMPED_LEFT = 0.15  # the same with an inverter loss, which depends on the ripple near zero current
+GROUP_SHARE = 0.4  # of a group's misfit: largest accepted residual of one channel and order
 
 
 @dataclass
 class Remains:
-    """Residual (r,) of the best model with its cells, and what it says.
+    """Residual (r,) of the best model with its cells, and its evaluation.
 
-    reduced: chi^2 per degree of freedom on fitted rows.  group: a channel's order of which much is left, or ''.
+    reduced: chi^2 per degree of freedom on fitted rows.  group: channel and order with a large residual, or ''.
     stray: a misfit outside the cells' orders, or None.
     """
 
@@ -43,7 +43,7 @@ def remains(search, found, held) -> Remains:
     reduced = float(np.sum((residual[use] / found.sigma[use]) ** 2)) / max(use.sum() - best.count, 1)
     rows = row_residual(best.view, best, search.effects, misfit(best.view))
     fit = _fit(search, found, cells, residual, held)
-    # A curve that explained most of a large misfit may leave a little of it anywhere.
+    # A curve that explains most of a large misfit may leave a small residual anywhere.
     share = CLAMPED_LEFT if "dead_time" in best.model.names else CURVE_LEFT
     floor = share * fit.train_before if best.model.names else 0.0
     told = np.flatnonzero(search.doubt(best) <= CURVE_LEFT * fit.train_before)
@@ -57,14 +57,14 @@ def remains(search, found, held) -> Remains:
 
 
 def _stray(best, view, rows, floor) -> Stray | None:
-    """A misfit outside the cells' orders in the residual rows (b, m) of a view's blocks, none where there are none."""
+    """A misfit outside the cells' orders in the residual rows (b, m) of a view's blocks; None if there are none."""
     if not len(view):
         return None
     return stray_order(view, rows, floor, sorted(_known_orders(best, "u"))) or stray_swing(view, rows, floor)
 
 
 def _standing_out(search, found, cells, residual, use, floor) -> str:
-    """Channel and order of which the largest share is left, if that is neither noise nor a curve's imperfection."""
+    """Channel and order with the largest relative residual, if it exceeds the noise and the curve tolerance."""
     chi, worst = (residual / found.sigma) ** 2, (0.0, "")
     for channel in np.unique(cells.channel):
         for order in np.unique(cells.order[cells.channel == channel]):
@@ -87,7 +87,7 @@ def _known_orders(best, channel) -> set[float]:
 
 
 def _least(view) -> dict[str, float]:
-    """What is too little to be spoken of, per channel."""
+    """Smallest residual of practical interest, per channel."""
     m = view.machine
     torque = rated_torque(view.nominal)
     return {
@@ -100,7 +100,7 @@ def _least(view) -> dict[str, float]:
 def _fit(search, found, cells, residual, held) -> Fit:
     """Misfit before and after, rms over blocks of all its orders, on fitted and held-out blocks [V].
 
-    The floor is the noise together with the balance's own share, which no model can undercut.
+    The floor is the noise and the error of the balance, which no model can undercut.
     """
 
     def rms(values, blocks):

@@ -1,4 +1,4 @@
-"""Which recording would tell tied explanations apart: the operating points that leave a rival the least room."""
+"""The next recording: operating points that separate tied explanations best, also after a rival is refitted."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from fluxproof.diagnosis.result import Request
 from fluxproof.diagnosis.view import View, stayed_cold
 
 ROWS = 200
-BLOCKS = 20  # that a dwell of half a second is worth
+BLOCKS = 20  # independent blocks assumed in a dwell of half a second
 MOST = 3
-# Share of D^2 that a point may lack beside one on an axis without current so far, which has unknowns of its own, and
-# beside one at full speed and rated current: what nobody has thought of yet grows with both.
+# Share of D^2 that is given up to avoid an axis without current so far, whose parameters are unknown, and to avoid
+# full speed and rated current, since unmodelled effects grow with both.
 NEW_AXIS, STRAIN = 0.2, 0.2
 
 
 def steady_view(view, omega, i_dq, cold=False, rows=ROWS):
-    """A view of made-up steady operating points of the nominal drive: omega (b,) [rad/s], i_dq (b,) complex [A].
+    """A simulated view of steady operating points of the nominal drive: omega (b,) [rad/s], i_dq (b,) complex [A].
 
-    cold: (b,) those of a machine that has cooled down; at others slow changes stand where the recording ended.
+    cold: (b,) bool, points of a machine that has cooled down; at the others drifts keep their final values.
     """
     omega, i_dq = np.asarray(omega, float), np.asarray(i_dq, complex)
     period, b = view.sample_time_s, len(omega)
@@ -59,7 +59,7 @@ def steady_view(view, omega, i_dq, cold=False, rows=ROWS):
 
 
 def _temperature(view, cold):
-    """Winding temperature of a further recording [degC], nan where none was recorded."""
+    """Winding temperature of a further recording [degC], nan if none was recorded."""
     if not np.isfinite(view.temp).any():
         return np.nan
     return float(view.machine.temperature_ref_c if cold else view.temp[np.argmax(view.course)])
@@ -67,11 +67,11 @@ def _temperature(view, cold):
 
 SPEEDS = (0.0, *(s * x for x in (0.1, 0.3, 0.6, 1.0, 1.2) for s in (1.0, -1.0)))  # of the highest recorded one
 CURRENTS = (0.0, *(r * np.exp(1j * np.pi / 6 * n) for r in (0.25, 0.6, 1.0) for n in range(12)))  # of the rated one
-REACHED = 0.5  # of the speed at which the EMF takes the bus: any drive may run so fast
+REACHED = 0.5  # of the speed at which the EMF takes the available voltage: a speed that any drive can reach
 
 
 def grid(view):
-    """Operating points that the drive can run: (omega, i_dq), within its voltage and what was recorded."""
+    """Candidate operating points (omega, i_dq) within the drive's voltage and near the recorded range."""
     m = view.machine
     linear = view.nominal.inverter.dc_bus_v / np.sqrt(3)
     u_max = np.clip(float(voltage_level(view).max()), 0.74 * linear, 0.9 * linear)
@@ -79,12 +79,12 @@ def grid(view):
     omega, i = np.meshgrid(top * np.array(SPEEDS), m.rated_current_a * np.array(CURRENTS))
     omega, i = omega.ravel(), i.ravel()
     u = m.resistance_ohm * i + 1j * omega * (view.inductances(i) + m.magnet_flux_wb)
-    within = (np.abs(u) <= u_max) & ((omega != 0.0) | (i != 0.0))  # at rest without current there is nothing to see
+    within = (np.abs(u) <= u_max) & ((omega != 0.0) | (i != 0.0))  # standstill without current gives no information
     return omega[within], i[within]
 
 
 def new_axes(view, i) -> np.ndarray:
-    """(n,) number of axes that carried no current in the recording and carry some at currents i (n,) [A]."""
+    """(n,) number of axes without current in the recording that have current at i (n,) [A]."""
     least, seen = LEAST * view.machine.rated_current_a, view.i.mean(axis=1)
     quiet = [part for part in (np.real, np.imag) if np.abs(part(seen)).max() < least]
     return sum((np.abs(part(i)) >= least for part in quiet), np.zeros(len(i)))
@@ -97,10 +97,10 @@ def columns_at(p, view, effect) -> dict:
 
 
 def known_of(search, solution, columns) -> np.ndarray:
-    """What the recording knows (k, k) of a solution's coefficients, in its effects' freest form.
+    """Information matrix (k, k) of the recording about a solution's coefficients, in its effects' freest form.
 
-    columns: {(effect, coefficient): rows at the candidates}, which say how much a coefficient that the recording does
-    not show may yet amount to.
+    columns: {(effect, coefficient): rows at the candidates}, which bound coefficients that the recording does not
+    determine.
     """
     names = sorted(solution.model.names)
     f = search.fitter(solution.view, [search.effects[n] for n in names])
@@ -109,7 +109,7 @@ def known_of(search, solution, columns) -> np.ndarray:
     for a, key_a in enumerate(columns):
         mine = [key for key in columns if key[0] == key_a[0]]
         seen = {key: f.scale[place[key]] for key in mine if key in place}
-        # As large as the effect itself where it was recorded; beyond, a curve over speed may well be larger.
+        # Within the recorded range at most as large as the effect itself; beyond it a curve over speed may be larger.
         shown = seen.get(key_a, 0.0) > FRESH * max(seen.values(), default=0.0)
         size = seen if shown else {key: np.linalg.norm(columns[key]) for key in mine}
         own = sum(abs(solution.c[n].get(key, 0.0)) * length for (n, key), length in size.items())
@@ -125,23 +125,23 @@ DRIFTS = {"magnet_temperature", "resistance_temperature"}
 
 
 def wants_cold(names, view) -> bool:
-    """Whether a machine that has cooled down tells the names apart: a drift has gone then, all else has not.
+    """Whether a cold machine separates the names: a drift then vanishes, and the other effects do not.
 
-    Two drifts have then gone both: they are told apart while the machine is warm, by the load.  A winding that stayed
-    cold while something drifted cannot say of a further recording of the view that this has gone.
+    Two drifts would both vanish; they are separated by the load on the warm machine.  If the winding stayed cold while
+    something drifted, its temperature cannot show that the drift has vanished.
     """
     names = set(names)
     return bool(DRIFTS & names) and not names <= DRIFTS and not stayed_cold(view)
 
 
 def requests(search, solutions, noise_v, cold=False) -> list[Request]:
-    """Up to MOST operating points that separate the tied solutions best when all are recorded, the most telling first.
+    """Up to MOST operating points that together separate the tied solutions best, the most informative first.
 
-    cold: some of them may be those of a machine that has cooled down.
+    cold: points of a machine that has cooled down are candidates too.
     """
     view, effects = View(**{f.name: getattr(search.view, f.name) for f in fields(View)}), search.effects
     omega, i = grid(view)
-    if cold:  # each point may be asked for warm or cold
+    if cold:  # each point is a candidate warm and cold
         omega, i = np.tile(omega, 2), np.tile(i, 2)
     cooled = np.arange(len(omega)) >= len(omega) // 2 if cold else np.zeros(len(omega), bool)
     made = steady_view(view, omega, i, cooled)

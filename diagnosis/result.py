@@ -1,6 +1,6 @@
-"""What a diagnosis says: plain dataclasses, written to diagnosis.json by ``to_json``.
+"""The result of a diagnosis: plain dataclasses, converted for diagnosis.json by ``to_json``.
 
-The stable part follows docs/diagnosis.schema.json.  ``Evidence`` is for pictures only and never leaves for JSON.
+The stable part follows docs/diagnosis.schema.json.  ``Evidence`` serves the pictures only and is not in the JSON.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ class Estimate:
 class NamedEffect:
     """An effect that the tool asserts.
 
-    explains: share of the misfit's power above the noise floor that vanishes with it.
-    plant: what the plant is to be told, {"machine.resistance_ohm": 1.7, ...}; values may be lists and tables.
+    explains: share of the misfit's power above the noise floor that the effect removes.
+    plant: parameters of the plant that reproduce it, {"machine.resistance_ohm": 1.7, ...}; lists and tables occur.
     """
 
     name: str
@@ -41,7 +41,7 @@ class NamedEffect:
 
 @dataclass
 class Request:
-    """A recording to make next: the operating point that separates what is tied."""
+    """An operating point to record next, which separates tied explanations."""
 
     omega_e: float
     i_d: float
@@ -75,7 +75,7 @@ class Region:
 
 @dataclass
 class Location:
-    """Where the misfit lives."""
+    """Signal, harmonic orders and operating regions in which the misfit is largest."""
 
     signal: str = ""
     orders: list[OrderLine] = field(default_factory=list)
@@ -84,7 +84,7 @@ class Location:
 
 @dataclass
 class Fit:
-    """Misfit (rms) before and after on rows used and on operating points never fitted, beside the noise floor."""
+    """rms misfit before and after, on fitted rows and on held-out operating points, and the noise floor."""
 
     signal: str = "u_dq"
     unit: str = "V"
@@ -96,14 +96,14 @@ class Fit:
 
     @property
     def share_left(self) -> float:
-        """What is left above the noise floor on fitted rows, as a share of what was there."""
+        """Residual above the noise floor on fitted rows, relative to the misfit before."""
         excess = max(self.train_after**2 - self.noise_floor**2, 0.0) ** 0.5
         return excess / max(self.train_before, 1e-12)
 
 
 @dataclass
 class UnknownTerm:
-    """The best sparse term for what no effect explains."""
+    """The single term that fits the unexplained residual best."""
 
     signal: str
     formula: str
@@ -115,7 +115,7 @@ class UnknownTerm:
 
 @dataclass
 class Digital:
-    """Replay of the digital half.  first_difference: block, sample, signal, bit, recorded, golden."""
+    """Result of replaying the core.  first_difference: block, sample, signal, bit, recorded, golden."""
 
     checked: bool = False
     samples: int = 0
@@ -124,7 +124,7 @@ class Digital:
 
 @dataclass
 class Evidence:
-    """Block means of misfit and operating point for the pictures, all arrays of shape (n,) unless said.
+    """Block means of misfit and operating point for the pictures; all arrays have shape (n,) unless stated.
 
     before_d, before_q, after_d, after_q: misfit in dq [V]; noise: standard deviation of one block's mean [V].
     orders: (m,) electrical orders with spectrum_before, spectrum_after: (m,) amplitudes [V].
@@ -149,13 +149,13 @@ class Diagnosis:
     rows: int = 0
     problems: list[Problem] = field(default_factory=list)
     digital: Digital = field(default_factory=Digital)
-    notes: list[str] = field(default_factory=list)  # for people: what was assumed, what was not looked at
+    notes: list[str] = field(default_factory=list)  # for people: assumptions and omissions
     evidence: Evidence = field(default_factory=Evidence)
-    search: object = field(default=None, repr=False)  # search.Outcome, for those who want to look inside
-    trace: str = ""  # the figures on which the verdict rests
+    search: object = field(default=None, repr=False)  # search.Outcome, for inspection
+    trace: str = ""  # the figures that decided the verdict
 
     def to_json(self) -> dict:
-        """The stable mapping that diagnosis.json holds (schema 1)."""
+        """The mapping written to diagnosis.json (schema 1)."""
         plain = dataclasses.asdict(dataclasses.replace(self, evidence=Evidence(), search=None))
         problems = plain.pop("problems")
         for key in ("evidence", "rows", "search", "trace"):

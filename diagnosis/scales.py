@@ -1,7 +1,8 @@
-"""Effects that scale one thing, and what several of them together amount to: another scale, or nothing at all.
+"""Effects that scale one quantity, and combinations of them that are equivalent to another scale or to no change.
 
-The balance knows ratios only.  Bus, currents and magnets scaled alike are no change, and so are currents with R, L_d
-and L_q: any of such a set are the rest of it, and where what was found are alike the fewer and plainer names are right.
+The balance determines ratios only.  Bus, currents and magnets scaled by the same factor are no change, and neither are
+currents with R, L_d and L_q.  Any part of such a set is equivalent to its complement, and the model with fewer and
+simpler effects is preferred.
 """
 
 from __future__ import annotations
@@ -12,23 +13,24 @@ from fluxproof.diagnosis.effect import ALIKE
 from fluxproof.diagnosis.fit import Model, Solution
 from fluxproof.diagnosis.ties import SCALES, Ties
 
-EARNS = 30.0  # gain in chi^2 over dispersion that an effect must bring beside the freest form of the others
-SAME_SCALE = 0.03  # of what is explained: so much may be lost by one scale in place of two
-SAME_FIT = 1.25  # of chi^2: so much worse may one effect be in place of several
-BY_CURRENT = ("resistance", "inductance_d", "inductance_q")  # voltage or flux in proportion to the current
+EARNS = 30.0  # least gain of an effect in chi^2 over dispersion, in addition to the freest form of the others
+SAME_SCALE = 0.03  # of what is explained: largest loss if one scale replaces two
+SAME_FIT = 1.25  # largest ratio of chi^2 if one effect replaces several
+BY_CURRENT = ("resistance", "inductance_d", "inductance_q")  # voltage or flux proportional to current
 
 
 class Scales(Ties):
-    """Refined solutions with the scales among their effects called by their plainest names."""
+    """Refined solutions with equivalent scales replaced by the simplest ones."""
 
     def _simplified(self, best) -> Solution:
-        """The best model with two scales that amount to a third one taken for that.
+        """The best model with two scales replaced by the third one if they are equivalent to it.
 
-        All of (u_dc, current, magnets) scaled alike is no change at all, so any two of them alike are the third.
-        Ohms and the inductances of all axes with current, off alike, are the current's scale.
+        Scaling u_dc, currents and magnets by the same factor is no change, so that two of them with the same factor are
+        equivalent to the third.  R and the inductances of all axes with current, off by the same factor, are equivalent
+        to a current scale.
         """
         explained = self.refine(Model(frozenset())).chi2 - best.chi2
-        if len(best.model) >= 3:  # three that amount to one: scaled currents with R and L_q set right again are L_d
+        if len(best.model) >= 3:  # three that equal one: scaled currents with R and L_q scaled back are an error of L_d
             forms = [m for n in self.effects if self.linear.index[n][0] for m in self.forms([n])]
             alike = [s for m in forms if self._replaces(s := self.refine(m), best, explained)]
             if alike:
@@ -49,16 +51,16 @@ class Scales(Ties):
 
     @staticmethod
     def _as_complete(single, best, explained) -> bool:
-        """Whether one effect in place of several loses little of what they explain, and leaves hardly more than they.
+        """Whether one effect explains nearly as much as several do, with hardly more residual.
 
-        Of a large misfit even a small share is many times the noise: an effect of its own.
+        A small share of a large misfit may still be significant, that is, a separate effect.
         """
         return single.chi2 - best.chi2 < SAME_SCALE * explained and single.chi2 < SAME_FIT * best.chi2
 
     def _replaces(self, single, best, explained) -> bool:
-        """Whether one effect explains what three or more do: one of themselves only if the others do not earn a place.
+        """Whether one effect replaces three or more; one of them replaces the others only if these are insignificant.
 
-        Of a dominant one and two small ones the dominant one is always most of it.
+        Otherwise a dominant effect would always replace two small ones.
         """
         lost = single.chi2 - best.chi2
         if single.model.names < best.model.names and lost > EARNS * self.dispersion * (len(best.model) - 1):
@@ -66,10 +68,10 @@ class Scales(Ties):
         return self._as_complete(single, best, explained)
 
     def _unscaled(self, best):
-        """The best model without a scale of all currents where an inductance, or the ohms, are off by the same factor.
+        """The best model without a current scale if one of R, L_d, L_q is off by the same factor.
 
-        Such a one is right, and the others of R, L_d and L_q are wrong.  Each of the two leaves another ripple voltage
-        of the raw current: they are compared with what each of them makes of it.
+        That one is then correct, and the other two are wrong.  The alternatives differ in the ripple voltage of the raw
+        current, and each is compared with its own ripple voltage.
         """
         factor = best.c.get("current_gain", best.c.get("current_scale", {}))
         factor = factor.get("common", factor.get("scale", 0.0))
@@ -83,14 +85,14 @@ class Scales(Ties):
                 continue
             plain = self.refine(self.admitted(Model(names, best.model.free & names - {"current_gain"})))
             plain = self.take_raw([plain]) or plain
-            # What makes larger currents of the recorded ones makes larger noise of theirs; so does a larger inductance.
+            # A correction that enlarges the currents enlarges their noise, and so does a larger inductance.
             same_noise = replace(plain, chi2=plain.chi2 / best.view.noise_gain**2)
             if self._as_complete(same_noise, best, explained):
                 return self._climbed(plain)
         return self.take_raw([best]) or self.refine(best.model)
 
     def _share(self, solution, name) -> float:
-        """How far an effect of BY_CURRENT is off its nominal value, relative."""
+        """Relative deviation of an effect of BY_CURRENT from its nominal value."""
         m, c = self.view.machine, solution.c[name]
         nominal = {"resistance": m.resistance_ohm, "inductance_d": m.inductance_d_h, "inductance_q": m.inductance_q_h}
         return next(iter(c.values())) / nominal[name]

@@ -1,8 +1,8 @@
-"""Two searches for what the cells' orders do not hold: other orders of the mechanical turn, and other frequencies.
+"""Two searches for misfits outside the cells' orders: other orders of the mechanical turn, and other frequencies.
 
-A misfit locked to the rotor adds up over blocks with the same phase; noise does not.  The power of the sum
-over the sum of powers is one for noise and the number of blocks for a lock.  A misfit at a frequency of its
-own, which no angle explains, stands above the noise's rising spectrum at its low end.
+A misfit locked to the rotor adds up over blocks with the same phase; noise does not.  The power of the sum over the sum
+of powers is one for noise and the number of blocks for a locked misfit.  A misfit at a frequency that no angle
+explains exceeds the rising noise spectrum at its low end.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from fluxproof.diagnosis.cells import voltage_level
 from fluxproof.diagnosis.effect import rated_torque
 
 MOST_ORDER = 80  # per mechanical turn
-LOCKED = 30.0  # power of the sum over sum of powers: exp(-30) by chance
-LEAST_SHARE = 1.5e-3  # of the voltage: smaller ripples are the inverter's
+LOCKED = 30.0  # power of the sum over sum of powers; probability exp(-30) by chance
+LEAST_SHARE = 1.5e-3  # of the voltage: smaller ripple is attributed to the inverter
 TORQUE_SHARE = 0.01  # of rated torque
 SWING_SHARE = 4e-3
-SWING_RATIO = 8.0  # of the spectrum's low end over its neighbourhood
+SWING_RATIO = 8.0  # threshold of the spectrum's low end over its neighbourhood
 WEIGHTS = {
     "1": (lambda v: np.ones(len(v)), "V"),
     "omega": (lambda v: v.omega.mean(axis=1), "V s/rad"),
@@ -29,7 +29,7 @@ WEIGHTS = {
 
 @dataclass
 class Stray:
-    """A misfit that nothing explains: its formula with the value of c and that value's uncertainty."""
+    """An unexplained misfit: its formula, the value of c and the standard deviation of c."""
 
     kind: str  # "order", "frequency" or "torque"
     formula: str
@@ -40,7 +40,7 @@ class Stray:
 
 
 def row_residual(view, solution, effects, misfit):
-    """What a solution leaves of the voltage balance, (b, m) complex dq [V]."""
+    """Residual of the voltage balance after a solution, (b, m) complex dq [V]."""
     left = misfit["u"].copy()
     for name, c in solution.c.items():
         effect = effects[name]
@@ -55,7 +55,7 @@ def row_residual(view, solution, effects, misfit):
 
 
 def stray_torque(view, projector, cells, residual, sigma) -> Stray | None:
-    """A torque that repeats with the mechanical turn, once to four times: an unbalanced load, a bent shaft."""
+    """A torque of order one to four per mechanical turn, as of an unbalanced load or a bent shaft."""
     use = cells.ok & (cells.channel == "torque") & (cells.order == 0)
     if use.sum() < 12:
         return None
@@ -79,9 +79,9 @@ def stray_torque(view, projector, cells, residual, sigma) -> Stray | None:
 
 
 def stray_order(view, residual, floor, known=()) -> Stray | None:
-    """The strongest order per mechanical turn that is locked to the rotor; smaller ones than ``floor`` [V] pass.
+    """The strongest order per mechanical turn that is locked to the rotor; None below ``floor`` [V].
 
-    known: electrical orders that belong to an effect which is there, at multiples and fractions of its size.
+    known: electrical orders that belong to an effect of the model and are skipped.
     """
     p, m, level = view.machine.pole_pairs, residual.shape[1], voltage_level(view)
     turns = np.abs(view.theta[:, -1] - view.theta[:, 0]) / (2 * np.pi * p)
@@ -111,7 +111,7 @@ def stray_order(view, residual, floor, known=()) -> Stray | None:
 
 
 def stray_swing(view, residual, floor) -> Stray | None:
-    """A low frequency of the voltage's length that no angle of the rotor explains; below ``floor`` [V] it passes."""
+    """A low frequency in the voltage magnitude that no rotor angle explains; None below ``floor`` [V]."""
     m, level = residual.shape[1], voltage_level(view)
     if m < 100:
         return None
@@ -127,7 +127,7 @@ def stray_swing(view, residual, floor) -> Stray | None:
     if low < SWING_RATIO * around or share < SWING_SHARE or amplitude < floor:
         return None
     hertz = (1 + int(np.argmax(mean[1:5]))) / (m * view.sample_time_s)
-    formula = f"u in proportion to 1 + c * sin(2 pi f t), f about {hertz:.0f} Hz"
+    formula = f"u proportional to 1 + c * sin(2 pi f t), f about {hertz:.0f} Hz"
     return Stray(
         "frequency", formula, share, share * float(np.sqrt(around / low)), "1", float(1.0 - around / low)
     )

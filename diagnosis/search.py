@@ -1,12 +1,12 @@
-"""Which effects explain the misfit: every small set of them, solved exactly, against each other.
+"""Which effects explain the misfit: all small sets of effects are solved exactly and compared.
 
 1. All sets of up to three effects, each in core and free form, are scored on the linear problem.
-2. The best are refined: errors of the record (angle, currents, delay, bus) are taken off the data with the
-   estimate so far and the balance is made anew, until the estimate stands.
-3. Around the best refined set, effects are added, removed and exchanged until nothing scores better.
-4. An effect stays only if it earns its place beside the freest form of all others, is larger than an
-   engineer's floor and than its own uncertainty.
-5. What scores nearly as well is tied: what all tied sets share is asserted, the rest is an ambiguity.
+2. The best are refined: measurement errors (angle, currents, delay, bus) are removed from the data with the current
+   estimate and the balance is recomputed, until the estimate converges.
+3. Around the best refined set, effects are added, removed and exchanged until the score no longer improves.
+4. An effect stays only if it improves the fit significantly against the freest form of all others and exceeds its
+   uncertainty; it is named only above its floor of practical interest.
+5. Sets that score nearly as well are tied: their common effects are asserted, the others form an ambiguity.
 """
 
 from __future__ import annotations
@@ -24,32 +24,32 @@ from fluxproof.diagnosis.scales import EARNS, Scales
 MOST_AT_ONCE = 3
 REFINED = 14
 LEAST_SURPLUS = 0.012  # of L i
-BESIDE_CROSS = 0.025  # of L i: a co-energy's cross term bends the axes themselves a little
-NEIGHBOURS = 7  # refined around a best set
-SECOND_THOUGHTS = 4  # better models that are looked at when a large one has been pruned
-SURE = 4.0  # sizes of its own standard deviation
+BESIDE_CROSS = 0.025  # of L i: the cross term of a co-energy also adds some curvature to the axes themselves
+NEIGHBOURS = 7  # number of neighbours refined around the best set
+SECOND_THOUGHTS = 4  # better models that are examined after a large one has been pruned
+SURE = 4.0  # standard deviations above which an effect needs no further test of its gain
 
 
 @dataclass
 class Outcome:
-    """What the search found: the best solution, what is tied with it, and the problem it was solved on."""
+    """Result of a search: the best solution, the tied ones, and the problem they were solved on."""
 
     best: Solution
     tied: list[Solution]
     empty: Solution
     sigma: np.ndarray
-    pure: np.ndarray  # sigma without the balance's own share
+    pure: np.ndarray  # sigma without the error of the balance
     train: np.ndarray
     dispersion: float
     silent: frozenset = (
         frozenset()
-    )  # effects of the best solution that are too small to be named beside the others
+    )  # effects of the best solution that are too small to be named
 
 
 class Search(Scales):
-    """One search over one view."""
+    """The search over one view."""
 
-    together = frozenset()  # an inductance and the saturation beside it, told apart by their curve
+    together = frozenset()  # an inductance and a saturation that are both present and separated by their curve
 
     def run(self) -> Outcome:
         """The whole search."""
@@ -82,7 +82,7 @@ class Search(Scales):
     def _by_size(self) -> list[Solution]:
         """The best solution of each number of effects.
 
-        Ripple that a wrong inductance turns into voltage draws in effects which are not there.
+        A wrong inductance turns ripple into voltage, which attracts spurious effects.
         """
         leaders = {}
         for solution in self.refined.values():
@@ -92,7 +92,7 @@ class Search(Scales):
         return list(leaders.values())
 
     def _climbed(self, best) -> Solution:
-        """The best model that additions, removals and exchanges lead to."""
+        """The best model that is reached by additions, removals and exchanges."""
         for _ in range(4):
             self.progress(f"around {', '.join(sorted(best.model.names)) or 'no effect'}")
             self._neighbours(best)
@@ -103,19 +103,19 @@ class Search(Scales):
         return best
 
     def allowed(self, model) -> bool:
-        """Whether an absorbed effect stands only beside the free form of what absorbs it."""
+        """Whether every absorbed effect of the model is accompanied by the free form of the absorbing one."""
         return all(
             name in model.free or not (set(self.effects[name].absorbs) & model.names) for name in model.names
         )
 
     def admitted(self, model) -> Model:
-        """The model with those effects freed that absorb another one of it."""
+        """The model with those effects in free form that absorb another one of it."""
         return Model(
             model.names, model.free | {n for n in model.names if set(self.effects[n].absorbs) & model.names}
         )
 
     def forms(self, names):
-        """The forms in which a set is tried: all core, each one free, all free."""
+        """The tested forms of a set: all core, each one free, all free."""
         names = frozenset(names)
         bendable = frozenset(n for n in names if self.linear.index[n][1])
         free = {frozenset(), bendable, *(frozenset([n]) for n in bendable)}
@@ -130,7 +130,7 @@ class Search(Scales):
             for names in itertools.combinations(able, size):
                 level += [(self.linear.score(m, self.dispersion), m) for m in self.forms(names)]
             level.sort(key=lambda entry: entry[0])
-            # Where one effect is all there can be, each is another answer, and a correction may be worth much.
+            # If only one effect is possible, each is a different answer, and refinement may change its score much.
             count = len(level) if self.most == 1 else REFINED // 2 + 2 * (size == 1)
             scored.append([m for _, m in level[:count]])
             if size == 2 and level:  # only effects of good pairs go on to triples
@@ -148,7 +148,7 @@ class Search(Scales):
         )
 
     def _neighbours(self, best):
-        """Refine what lies one addition, removal, exchange or change of form away and promises something."""
+        """Refine the promising models that differ by one addition, removal, exchange or change of form."""
         at = self._fitter_at(best)
         tried = []
         names, free = best.model.names, best.model.free
@@ -174,7 +174,7 @@ class Search(Scales):
                 self.refine(model)
 
     def _labelled(self, best) -> tuple[Solution, bool]:
-        """The best model with its curves of flux over current called by their shape, and whether that is sure."""
+        """The best model with its flux curves named by their shape, and whether the names are certain."""
         mine = best.model.names & set(FAMILY)
         if not mine:
             return best, True
@@ -184,7 +184,7 @@ class Search(Scales):
         if wanted == mine:
             return best, sure
         names = (best.model.names - mine) | wanted
-        # The inductance is the straight part where both are there, the saturation's free curve all that bends.
+        # If both are present, the inductance is the linear part and the saturation's free curve the nonlinear part.
         self.together = wanted if "saturation" in wanted and len(wanted) > 1 else frozenset()
         bendable = {n for n in wanted - self.together if self.linear.index[n][1]}
         free = (best.model.free - mine) | bendable | (wanted & {"saturation"})
@@ -192,10 +192,10 @@ class Search(Scales):
         return (solution, sure) if np.isfinite(solution.score) else (best, False)
 
     def _pruned(self, best):
-        """The best model of effects that all earn their place.
+        """The best model in which every effect is significant.
 
-        What is left of a large model need not be the best of its size: one that was blamed for a part of several
-        others stays, when those have gone.
+        After pruning, a large model need not be the best of its size: an effect that had absorbed parts of the removed
+        ones remains.
         """
         best = self._earning(best)
         curved, tried = best.model.names & set(FAMILY), {best.model}
@@ -217,9 +217,9 @@ class Search(Scales):
         return best
 
     def _completed(self, best):
-        """The best model with what else earns its place once those have gone that did not.
+        """The best model with further effects that become significant after the insignificant ones were removed.
 
-        The search may have ended far from there: an effect that was blamed for several others hides those it left out.
+        The search may have stopped early: an effect that had absorbed several others hides them.
         """
         for _ in range(MOST_AT_ONCE):
             self._neighbours(best)
@@ -240,17 +240,17 @@ class Search(Scales):
         return best
 
     def _with_curve(self, best):
-        """The best model with a dead time's curve free beside ohms: what it grows says whose they are (verdict.py)."""
+        """The best model with a free dead-time curve if it has a resistance too; verdict.py separates them."""
         if not {"dead_time", "resistance"} <= best.model.names:
             return best
         freed = self.refine(best.model.with_("dead_time", True))
         return freed if np.isfinite(freed.score) else best
 
     def _earning(self, best):
-        """A model without effects that do not earn their place."""
+        """A model without its insignificant effects."""
         while best.model.names:
             at = self._fitter_at(best)
-            judged = sorted(best.model.names - self.together)  # those were judged by the shape of their curve
+            judged = sorted(best.model.names - self.together)  # the others were decided by the shape of their curve
             weak = {n: gain for n in judged if (gain := self.gain(best, n, at)) is not None}
             if not weak:
                 pair = self._idle_pair(best)
@@ -262,7 +262,7 @@ class Search(Scales):
         return best
 
     def _idle_pair(self, best):
-        """Two effects that all but cancel: each is needed beside the other, both together bring next to nothing."""
+        """Two effects that nearly cancel: each is significant with the other, but both together gain almost nothing."""
         for a, b in itertools.combinations(sorted(best.model.names - self.together), 2):
             less = self.refine(best.model.without(a).without(b))
             if less.chi2 - best.chi2 < 2.0 * EARNS * self.dispersion:
@@ -270,10 +270,10 @@ class Search(Scales):
         return None
 
     def gain(self, solution, name, at) -> float | None:
-        """What a weak effect brings to chi^2; None where it is sure and needed enough to stay.
+        """Gain in chi^2 of an insignificant effect; None if it is significant and stays.
 
-        One that is too small for a name stays as well, unnamed, or others would be blamed for what it does.
-        Needed: beside the freest form of the others, on data that are not freed of this effect's error.
+        A significant effect below its floor also stays, without a name; otherwise others would absorb it.  The gain is
+        computed against the freest form of the others, on data that are not corrected for this effect.
         """
         others = solution.model.without(name).freed()
         effect = self.effects[name]

@@ -1,14 +1,14 @@
-"""A whole diagnosis: digital half, physics, improved drive, closed-loop comparison, files written.
+"""A complete diagnosis: digital part, physics, improved drive, closed-loop comparison, output files.
 
     from fluxproof import diagnose
     answer = diagnose("recording.csv", "drive.toml")
 
-``diagnose`` answers and writes nothing (steps 1 and 2); ``run`` does what a user of the command gets:
+``diagnose`` does steps 1 and 2 and writes nothing; ``run`` does what the command does:
 
-1. Where the recording holds what the core saw and answered, the core is replayed.  It must be equal in every bit, else
-   that is the verdict and physics is not looked at.
+1. If the recording contains the core's inputs and outputs, the core is replayed.  A difference in any bit is the
+   verdict, and the physics is not diagnosed.
 2. The physics (physics.py).
-3. OUT/drive_improved.toml with what was asserted, and the closed loop of both drives laid over the recording.
+3. OUT/drive_improved.toml with the asserted values, and closed-loop simulations of both drives over the recording.
 4. OUT/diagnosis.json and OUT/report.html.
 """
 
@@ -31,23 +31,23 @@ from fluxproof.diagnosis.result import Diagnosis, Digital
 from fluxproof.golden_model.drive_keys import DriveError
 
 IMPROVED = "drive_improved.toml"
-OVERLAY_SIGNALS = ("u_d_ref", "u_q_ref")  # the currents are what a controller keeps right
+OVERLAY_SIGNALS = ("u_d_ref", "u_q_ref")  # not the currents: the controller regulates them to their references
 
 
 def diagnose(recordings, drive, progress=lambda text: None) -> Diagnosis:
     """Diagnose one recording, or several of the same drive, against a nominal drive; writes nothing.
 
     recordings: a path, a Recording, or a list of them; drive: a path to drive.toml or a Nominal; progress: called with
-    a line of text now and then.  Where the recordings hold the core's own answers, the core is replayed first.
-    Raises RecordingError and DriveError for input that cannot be used.
+    a line of text at each step.  If the recordings contain the core's outputs, the core is replayed first.
+    Raises RecordingError and DriveError for unusable input.
     """
     nominal = drive if isinstance(drive, Nominal) else load_nominal(drive)
-    with threadpool_limits(1):  # many small matrices: a second thread waits for the first
+    with threadpool_limits(1):  # many small matrices: more threads only wait
         return _diagnose(_loaded(recordings, nominal, progress), nominal, progress)
 
 
 def run(recordings, drive, out, progress=lambda text: None) -> Diagnosis:
-    """``diagnose``, and the outputs written to the folder ``out``; OSError where it cannot be written."""
+    """``diagnose`` and write the output files to the folder ``out``; raises OSError if it cannot be written."""
     nominal = drive if isinstance(drive, Nominal) else load_nominal(drive)
     with threadpool_limits(1):
         loaded = _loaded(recordings, nominal, progress)
@@ -76,7 +76,7 @@ def _loaded(recordings, nominal, progress) -> list[Recording]:
 
 
 def _diagnose(loaded, nominal, progress) -> Diagnosis:
-    """The digital half, then the physics where the controller computed what its golden model computes."""
+    """The digital part, then the physics if the controller's outputs equal those of its golden model."""
     digital, notes = _digital(loaded, progress)
     if digital.first_difference is not None:
         answer = Diagnosis("digital_mismatch", _mismatch_sentence(digital.first_difference))
@@ -90,18 +90,18 @@ def _diagnose(loaded, nominal, progress) -> Diagnosis:
 
 
 def _folder(out: Path, nominal: Nominal) -> Path:
-    """The folder, made before a minute of work is lost; it must not hold the drive that is diagnosed as its result."""
+    """Create the folder before the long computation; DriveError if the result would overwrite the drive file."""
     out.mkdir(parents=True, exist_ok=True)
     target = out / IMPROVED
     if nominal.path and target.exists() and Path(nominal.path).exists() and target.samefile(nominal.path):
         raise DriveError(
-            f"{target}: is the drive to diagnose and would be overwritten; choose another folder"
+            f"{target}: this is the drive to diagnose and would be overwritten; choose another folder"
         )
     return out
 
 
 def _physics(loaded, nominal, progress) -> Diagnosis:
-    """The verdict of physics.py; a recording that was read but carries no balance is a bad recording."""
+    """The verdict of physics.py; a recording without a usable operating point is a bad recording."""
     try:
         return explain(loaded, nominal, progress)
     except RecordingError as error:
@@ -113,7 +113,7 @@ def _physics(loaded, nominal, progress) -> Diagnosis:
 
 
 def _digital(loaded, progress) -> tuple[Digital, list[str]]:
-    """Replay of every recording that holds the core's answers; the first difference counts."""
+    """Replay every recording that contains the core's outputs, up to the first difference."""
     digital, notes = Digital(), []
     for recording in loaded:
         if not {"telemetry", "registers"} & set(recording.meta):
@@ -129,12 +129,12 @@ def _digital(loaded, progress) -> tuple[Digital, list[str]]:
                 digital.first_difference["recording"] = recording.source
             break
     if digital.checked and digital.first_difference is None:
-        notes.append("The controller is acquitted: what differs is physics.")
+        notes.append("The controller equals its golden model in every bit: the difference is physical.")
     return digital, notes
 
 
 def flat(difference: dict) -> dict:
-    """A first difference with numbers, texts and None only, as diagnosis.json has it: lists joined, cause unfolded."""
+    """A first difference as a flat mapping of numbers, texts and None for diagnosis.json: lists are joined."""
     out = {}
     for key, value in difference.items():
         if isinstance(value, dict):
@@ -149,22 +149,22 @@ def flat(difference: dict) -> dict:
 
 
 def _mismatch_sentence(d: dict) -> str:
-    """Block, sample, signal and bit of a first difference, and what explains it."""
+    """Sentence with block, sample, signal and bit of the first difference, and its cause if one was found."""
     text = (
-        f"The controller did not compute what its golden model computes: block {d['block']}, sample {d['sample']}, "
+        f"The controller's output differs from its golden model: block {d['block']}, sample {d['sample']}, "
         f"signal {d['signal']}, bit {d['bit']} (recorded {d['recorded']}, golden model {d['golden']})"
     )
     return f"{text}; {d['cause']}." if d.get("cause") else f"{text}."
 
 
 def _reading_notes(loaded) -> list[str]:
-    """What the reader assumed, each sentence once."""
+    """The notes of the readers without duplicates."""
     notes = [note for recording in loaded for note in recording.meta.get("notes", [])]
     return list(dict.fromkeys(notes))
 
 
 def _improved(nominal, answer, out) -> Path | None:
-    """The improved drive's file where effects were asserted; one of an earlier run is removed where not."""
+    """Write the improved drive if effects were asserted; otherwise remove the file of an earlier run."""
     path = out / IMPROVED
     if not answer.effects:
         path.unlink(missing_ok=True)
@@ -178,7 +178,7 @@ def _improved(nominal, answer, out) -> Path | None:
 
 
 def _overlay(recording, nominal, improved, answer) -> dict | None:
-    """The closed-loop simulation over the first recording; a drive that cannot be simulated costs a note only."""
+    """The closed-loop simulation of the first recording; a drive that cannot be simulated only adds a note."""
     try:
         laid_over = closed_loop(recording, nominal, improved)
     except (
@@ -194,8 +194,8 @@ def _overlay(recording, nominal, improved, answer) -> dict | None:
         before = laid_over["rms_before"].get(signal)
         after = laid_over.get("rms_after", {}).get(signal)
         if before is not None:
-            then = f", improved by {after:.3g} V" if after is not None else ""
+            then = f", and by {after:.3g} V with the improved drive" if after is not None else ""
             answer.notes.append(
-                f"Simulated in closed loop, {signal} is off by {before:.3g} V rms as described{then}."
+                f"Simulated in closed loop, {signal} differs by {before:.3g} V rms with the drive as described{then}."
             )
     return laid_over

@@ -1,7 +1,7 @@
-"""The start of a recording in which the drive still swings in.
+"""Excludes the start of a recording in which the drive is still settling.
 
-A recording often starts with the drive: the first block then holds what is left of a step from nothing.  The current
-is nearly there and changes by little within the block, but not along a parabola, and the voltage has far to go.
+A recording often starts with the drive, so that its first block contains the end of a step response.  The current is
+nearly settled and changes little within the block, but not along a parabola, and the voltage is not settled.
 """
 
 from __future__ import annotations
@@ -10,13 +10,13 @@ import numpy as np
 
 from fluxproof.diagnosis.balance import misfit
 
-LEAST_BLOCKS = 8  # of the first dwell: fewer do not say what the scatter is
+LEAST_BLOCKS = 8  # of the first dwell: fewer do not determine the scatter
 MOST_DROPPED = 3
 FAR = 8.0  # standard deviations
 
 
 def settled(view):
-    """The view without those first blocks that are not in line with the blocks after them."""
+    """The view without first blocks whose misfit is far from the line through the following blocks."""
     first = view.run == view.run[0]
     level = misfit(view)["u"].mean(axis=1)[first]
     start = 0
@@ -28,7 +28,7 @@ def settled(view):
 def swings(level) -> bool:
     """Whether the first of a dwell's mean misfits (n,), complex dq [V], is far from the line through the next four.
 
-    A line, as what drifts goes on drifting; the scatter is that of the later blocks.
+    A line allows for a steady drift; the scatter is that of the later blocks.
     """
     near, far = level[1:3].mean(), level[3:5].mean()
     scatter = np.median(np.abs(np.diff(level[1:]))) / np.sqrt(2.0 * 2.0 * np.log(2.0))

@@ -1,10 +1,10 @@
-"""What a recording knows of its shaft: a transducer, a shaft that turns freely without load, or nothing.
+"""What a recording contains about its shaft: a torque transducer, a freely rotating shaft, or nothing.
 
-Without a transducer the mechanical balance J d omega_m / dt = T - B omega_m - T_load holds only where nobody
-imposes the speed, which a recording does not say.  The shaft is taken as free when changes of the air-gap
-torque within a few milliseconds are, in the median, those of J d omega_m / dt: a load may step, but seldom.
-It is taken as unloaded when what remains is an odd function of the speed alone, in both directions: a load
-follows the speed only by chance, friction always does.
+Without a transducer, the mechanical balance J d omega_m / dt = T - B omega_m - T_load is valid only if the speed is not
+imposed, which a recording does not state.  The shaft counts as free if changes of the air-gap torque within a few
+milliseconds equal, in the median, those of J d omega_m / dt; occasional load steps do not matter.  It counts as
+unloaded if the remaining torque is an odd function of speed alone, in both directions: friction is one, a load only
+by chance.
 """
 
 from __future__ import annotations
@@ -12,14 +12,14 @@ from __future__ import annotations
 import numpy as np
 
 FREE_RATIO = (0.7, 1.35)  # median of torque change over inertial change
-REACH, LAG = 80, 200  # samples of the slope's half window and of a change
-ODD_SHARE = 0.96  # of the remaining torque's variance that an odd function of speed must explain
-ONE_SPEED = 0.8  # small over large drag, from which on there is but one speed
-SMALL = 0.01  # of rated torque: so little torque is no load in any case
+REACH, LAG = 80, 200  # samples: half window of the slope, and interval of a change
+ODD_SHARE = 0.96  # share of the remaining torque's variance that an odd function of speed must explain
+ONE_SPEED = 0.8  # ratio of small and large drag above which the recording has only one speed
+SMALL = 0.01  # of rated torque: a smaller torque is never a load
 
 
 def shaft_kind(recording, nominal, i_s, theta, linked) -> str:
-    """'torque', 'unloaded', 'free' (a load may be there) or ''; i_s, theta: smoothed dq current and angle (n,)."""
+    """'torque', 'unloaded', 'free' (with a possible load) or ''; i_s, theta: smoothed dq current and angle (n,)."""
     if recording.has("torque"):
         return "torque"
     m = nominal.machine
@@ -62,11 +62,11 @@ def airgap(nominal, i):
 
 
 def is_airgap(torque, nominal_airgap, drag) -> bool:
-    """Whether a recorded torque is the air gap's, as a simulation writes it, rather than the shaft's.
+    """Whether a recorded torque is the air-gap torque, as a simulation may write it, instead of the shaft torque.
 
-    torque, nominal_airgap, drag: (n,) [Nm], drag being what friction of the nameplate takes; the inertia's
-    share is all noise at a steady speed.  The shaft's is taken unless the other fits far better at several speeds: at
-    one, anything that is missing in the nominal torque may be as large as the drag.
+    torque, nominal_airgap, drag: (n,) [Nm]; drag is the nominal friction torque.  The inertial torque is neglected, as
+    it is mostly noise at steady speed.  The air-gap torque is assumed only if it fits far better at several speeds: at
+    one speed, any torque missing in the model may equal the drag.
     """
     low, high = np.nanquantile(drag, (0.05, 0.95))
     if min(abs(low), abs(high)) > ONE_SPEED * max(abs(low), abs(high)) and low * high > 0.0:

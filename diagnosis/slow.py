@@ -1,14 +1,14 @@
-"""A View of a slow log: every still stretch becomes one block that stands for an operating point.
+"""A View of a slow log: every steady stretch becomes one block, which represents an operating point.
 
-Rows of such a block are made up: constant current, voltage and speed over a few sampling periods, so that cells, fit
-and search work as on a fast recording.  The frame turns with the rotor, the angle within it stands still, and so no
-harmonic order but zero is ever seen: a slow log has none.  Three things differ from a View of real rows:
+The rows of such a block are synthetic: constant current, voltage and speed over a few sampling periods, so that cells,
+fit and search work as with a fast recording.  The frame rotates with the rotor and the angle within it is constant, so
+that only harmonic order zero exists, as in a slow log.  Three things differ from a View of real rows:
 
     flux     the mean EMF is exactly j omega psi, not a difference of flux linkages
-    to_dq    voltages are kept in a stator frame that turns on from row to row, so that a delay has its meaning
-    phases   phase currents are those of one whole electrical turn, as what an inverter loses is a mean over it
+    to_dq    voltages are kept in a stator frame that rotates from row to row, so that a delay is defined
+    phases   phase currents cover one whole electrical turn, since the inverter loss is a mean over it
 
-Stretches at the same operating point, however far apart in time, share a dwell: what differs between them is noise.
+Stretches at the same operating point share a dwell at any distance in time; their differences are noise.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from fluxproof.diagnosis.recording import Recording
 from fluxproof.diagnosis.slow_stretches import Stretches, stretches
 from fluxproof.diagnosis.view import View
 
-ROWS = 36  # a whole turn in steps of ten degrees: the mean of what an inverter loses is right to 0.1 %
+ROWS = 36  # one turn in steps of ten degrees: the mean inverter loss is accurate to 0.1 %
 BIN_CURRENT, BIN_SPEED = 0.05, 0.05  # of rated current and of the largest speed: the same operating point
-NO_CURRENT = 0.02  # of rated current: an axis that never carried more says nothing but noise
-MOST_ALIKE = 6  # stretches that an operating point is represented by
+NO_CURRENT = 0.02  # of rated current: an axis that never had more contains only noise
+MOST_ALIKE = 6  # largest number of stretches per operating point
 
-# Effects that live in harmonics or in the instants of sampling alone: a slow log says nothing of them.
+# Effects that are visible only in harmonics or sampling instants, which a slow log does not have.
 UNSEEN = (
     "cogging", "current_gain", "current_offset", "emf_harmonics", "encoder_eccentricity", "friction",
     "phase_resistance_asymmetry", "sampling_skew",
@@ -35,7 +35,7 @@ UNSEEN = (
 
 @dataclass
 class SlowView(View):
-    """Operating points as blocks; see the module's header.  ``theta`` holds only what a correction has turned.
+    """Operating points as blocks; see the module's header.  ``theta`` contains only the rotation of corrections.
 
     unsteady: (b,) change of the voltage around each stretch [V].
     """
@@ -67,15 +67,15 @@ class SlowView(View):
 
 
 def slow_view(recording: Recording, nominal) -> SlowView:
-    """The operating points of a slow recording as blocks, alike ones next to each other.
+    """The operating points of a slow recording as blocks, similar ones next to each other.
 
-    Raises RecordingError where signals are missing or nothing stands still.
+    Raises RecordingError if signals are missing or no stretch is steady.
     """
     return view_of_points(stretches(recording, nominal), recording, nominal)
 
 
 def view_of_points(found: Stretches, recording, nominal) -> SlowView:
-    """The same of stretches that have been found."""
+    """The same for given stretches."""
     order, dwell = alike(found, nominal)
     b, period = len(order), nominal.sample_time_s
     held = lambda x, n: np.repeat(np.asarray(x)[order, None], n, axis=1)  # noqa: E731
@@ -108,9 +108,9 @@ def view_of_points(found: Stretches, recording, nominal) -> SlowView:
 
 
 def alike(found: Stretches, nominal) -> tuple[np.ndarray, np.ndarray]:
-    """(indices of the stretches to use, number of the operating point of each): alike ones stand side by side.
+    """(indices of the stretches to use, number of the operating point of each), sorted by operating point.
 
-    An operating point where the drive rested for long is thinned out to MOST_ALIKE stretches spread over the time.
+    A long operating point is reduced to MOST_ALIKE stretches spread over time.
     """
     rated, top = nominal.machine.rated_current_a, max(float(np.abs(found.omega).max()), 1e-9)
     steps = (

@@ -1,9 +1,9 @@
-"""The diagnosis of slow logs: operating points, every set of effects, and what such a log cannot say.
+"""The diagnosis of slow logs: operating points, all sets of effects, and the limits of such a log.
 
     answer = diagnose_slow([recording], nominal)
 
-It answers as physics.explain does, which calls it where every recording is slow.  ``answer.search`` is the
-search, ``answer.found`` its outcome, ``answer.held`` the blocks that were not fitted.
+physics.explain calls it if every recording is slow; the result is of the same type.  ``answer.search`` is the
+search, ``answer.found`` its outcome, ``answer.held`` the blocks that were held out.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ HOLDOUT_EVERY = 4
 def diagnose_slow(recordings, nominal, progress=lambda text: None) -> Diagnosis:
     """Diagnose slow recordings of one drive.
 
-    Raises RecordingError where too little of them stands still.
+    Raises RecordingError if they contain too few steady operating points.
     """
     view = joined_views([slow_view(r, nominal) for r in recordings])
     points = np.unique(view.run)
     if len(points) < LEAST_POINTS:
         raise RecordingError(
-            f"{recordings[0].source}: {len(points)} operating points stand still, {LEAST_POINTS} are needed: "
+            f"{recordings[0].source}: {len(points)} steady operating points, {LEAST_POINTS} are needed: "
             "hold more of them for longer, or log faster"
         )
     held = np.isin(view.run, points[2::HOLDOUT_EVERY])
@@ -54,7 +54,7 @@ def diagnose_slow(recordings, nominal, progress=lambda text: None) -> Diagnosis:
         answer.effects = model_effects(search, found, names)
         answer.ambiguity = ambiguity
     if ambiguity:
-        progress("the recording that would tell")
+        progress("choosing the next recording")
         answer.next_recording = requests(search, [found.best, *found.tied], fit.noise_floor)
     cells, residual = search.residual(found.best)
     answer.evidence = evidence(view, (search.cells, search.cells.y), (cells, residual), found.pure, held)
@@ -63,7 +63,7 @@ def diagnose_slow(recordings, nominal, progress=lambda text: None) -> Diagnosis:
         "orders",
         "spectrum_before",
         "spectrum_after",
-    ):  # there is no angle and no harmonic
+    ):  # a slow log has no angle and no harmonics
         answer.evidence.arrays.pop(name, None)
     answer.sentence = words.sentence(verdict, answer.effects, ambiguity, fit, CATALOGUE, answer.location)
     answer.notes = _notes(view, held, ambiguity, weak, found)
@@ -72,7 +72,7 @@ def diagnose_slow(recordings, nominal, progress=lambda text: None) -> Diagnosis:
 
 
 def model_effects(search, found, names=None):
-    """NamedEffects of the best model: ``names``, or all of it for a model to simulate, tied or not."""
+    """NamedEffects of the best model: those in ``names``, or all of them (tied or not) for a simulation."""
     names = sorted(found.best.model.names) if names is None else names
     spread = Plain(found.best, CATALOGUE, search.view.nominal, found.dispersion)
     return words.named(spread, names, found.empty)
@@ -90,7 +90,7 @@ def axis_misfit(search, solution, blocks) -> dict:
 
 
 def _sorted_out(found):
-    """(asserted names, ambiguity sets, names that are too weak): from what is tied with the best model."""
+    """(asserted names, ambiguity sets, names that are too weak), from the best model and the tied ones."""
     best = found.best.model.names
     asserted, groups, weak = set(best), [], set()
     differences = [(best - other.model.names, other.model.names - best) for other in found.tied]
@@ -101,7 +101,7 @@ def _sorted_out(found):
             continue
         group = (gone | come) - weak
         if any(group <= g for g in groups) or group <= set().union(*groups):
-            continue  # two exchanges at once, each of which is known
+            continue  # a combination of two exchanges that are already known
         for g in [g for g in groups if g & group]:
             groups.remove(g)
             group = group | g
@@ -124,26 +124,26 @@ def _fit(search, found, held) -> Fit:
 def _notes(view, held, ambiguity, weak, found) -> list[str]:
     m = view.machine
     notes = [
-        f"A slow log: {len(view)} stretches at {len(np.unique(view.run))} operating points stand still and were "
-        f"balanced, {int(held.sum())} of the stretches never fitted.",
-        f"It has no harmonics and no sampling instants, so nothing is said of {', '.join(UNSEEN)}.",
+        f"Slow log: the voltage balance was made on {len(view)} steady stretches at {len(np.unique(view.run))} "
+        f"operating points; {int(held.sum())} of the stretches were not fitted.",
+        f"It has no harmonics and no sampling instants; these effects cannot be diagnosed: {', '.join(UNSEEN)}.",
     ]
     i = view.i.mean(axis=1)
     if not i.real.any():
         notes.append(
-            "The d axis never carried a current: nothing is said of L_d and the d axis' own saturation."
+            "The d axis never had a current: L_d and the saturation of the d axis cannot be diagnosed."
         )
     if len({x > 0 for x in np.sign(view.omega[:, 0]) if x}) < 2:
         notes.append(
-            "One direction only: load and speed alone tell an angle's offset and the inverter's loss from look-alikes."
+            "One direction only: encoder offset and inverter loss are separated from others by load and speed alone."
         )
     drops = m.resistance_ohm * np.abs(i).max()
     if drops < 0.1 * np.abs(view.u).max():
         notes.append(
-            f"The resistance drops at most {drops:.2g} V of {np.abs(view.u).max():.3g} V: it is not measured here."
+            f"The resistance drops at most {drops:.2g} V of {np.abs(view.u).max():.3g} V: it cannot be determined here."
         )
-    notes += [f"{name} explains a little more, but not enough to be asserted." for name in weak]
+    notes += [f"{name} improves the fit, but not significantly." for name in weak]
     for group in ambiguity:
         for name in group:
-            notes.append(f"{name} is told from its look-alikes by: {CATALOGUE[name].separated_by}.")
+            notes.append(f"{name} is separated from similar effects by: {CATALOGUE[name].separated_by}.")
     return notes

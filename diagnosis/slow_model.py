@@ -1,4 +1,4 @@
-"""What to do with the model of a slow log: a flux map for the plant, bounds on what was not found, other splits."""
+"""Uses of a slow log's model: a flux map for the plant, bounds on effects that were not found, other splits."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from fluxproof.diagnosis.slow_search import SlowSearch
 from fluxproof.plant import FluxMap
 
 STEPS = (9, 41)  # of the map along i_d and i_q
-ROUND = 0.15  # of rated current: what the map reaches to either side of an axis that was never driven
+ROUND = 0.15  # of rated current: half width of the map along an axis without current
 SIGMAS = 2.0
 
 
 def flux_map_of(search, solution) -> FluxMap | None:
-    """The flux linkages of a solution as a map for the plant; None where it holds no effect on the flux.
+    """The flux linkages of a solution as a map for the plant; None if no effect changes the flux.
 
-    It spans the recorded currents and their mirror images: the effects' formulas are odd or even in i_q.
+    It covers the recorded currents and their mirror images, since the effects' formulas are odd or even in i_q.
     """
     magnetic = [n for n in solution.model.names if isinstance(search.effects[n], FluxEffect)]
     if not magnetic:
@@ -37,10 +37,10 @@ def flux_map_of(search, solution) -> FluxMap | None:
 
 
 def bounds(search, found) -> dict[str, dict]:
-    """{effect that is not in the best model: what it would be beside it}.
+    """{effect that is not in the best model: its estimate if it is added}.
 
-    parameters: {name: [value, standard deviation, unit]}; score: change of the score, above 0 it is not worth its
-    price; refused: why it cannot stand beside the best model at all.
+    parameters: {name: [value, standard deviation, unit]}; score: change of the score, above 0 if the effect is not
+    significant; refused: the reason why it cannot be added to the best model.
     """
     out = {}
     for name, effect in search.effects.items():
@@ -48,7 +48,7 @@ def bounds(search, found) -> dict[str, dict]:
             continue
         solution = search.refine(Model(found.best.model.names | {name}, found.best.model.free))
         if not np.isfinite(solution.score):
-            out[name] = {"refused": "with a sign or a size that no drive has"}
+            out[name] = {"refused": "its sign or size is impossible"}
             continue
         e = effect.estimates(
             solution.c[name], solution.covariance[name] * found.dispersion, search.view.nominal
@@ -61,7 +61,7 @@ def bounds(search, found) -> dict[str, dict]:
 
 
 def on_other_rows(view, model, train) -> tuple[SlowSearch, object, dict]:
-    """(search, solution, misfit of the rows left out) of a model fitted to other rows, train (b,) bool."""
+    """(search, solution, misfit of the held-out rows) of a model fitted to the rows of ``train`` (b,) bool."""
     search = SlowSearch(view, train)
     solution = search.refine(model)
     return search, solution, axis_misfit(search, solution, ~train)

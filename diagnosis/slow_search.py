@@ -1,8 +1,8 @@
-"""The search over operating points of a slow log: few rows, so every set of effects is tried.
+"""The search over the operating points of a slow log: few rows, so that every set of effects is tested.
 
-A real drive differs from its data sheet in five things at once, and a slow log has no harmonics to tell them by.
-Adding one effect after the other then goes astray, as the first ones are blamed for the rest; with a hundred rows
-all sets of up to MOST_EFFECTS can be scored instead (a second's work), and the best refined.
+A real drive differs from its data sheet in several effects at once, and a slow log has no harmonics to separate them.
+Adding one effect after another then fails, because the first ones absorb the others.  With a hundred rows, all sets of
+up to MOST_EFFECTS can be scored instead, which takes a second, and the best are refined.
 """
 
 from __future__ import annotations
@@ -12,22 +12,22 @@ import itertools
 import numpy as np
 
 from fluxproof.diagnosis.catalogue import CATALOGUE
-from fluxproof.diagnosis.cells import told, voltage_level
+from fluxproof.diagnosis.cells import column_of, voltage_level
 from fluxproof.diagnosis.fit import Fitter, Model, everything
 from fluxproof.diagnosis.search import Outcome, Search
 from fluxproof.diagnosis.slow import UNSEEN
 
 MOST_EFFECTS = 6
 REFINED = 40
-TIE = 20.0  # messages are shared by neighbouring rows: a log of this kind knows less than its rows suggest
+TIE = 20.0  # margin of a tie: neighbouring rows share messages and contain less information than their number suggests
 OWN_V, OWN_SHARE = (
     2.5e-4,
     2e-3,
-)  # of the bus and of the voltage: digits and instants of messages, ripple, clamping
-UNSTEADY = 0.05  # of the voltage's change around a stretch: messages of different age are put together
+)  # of the bus and of the voltage: resolution and timing of messages, ripple, clamping
+UNSTEADY = 0.05  # of the voltage's change around a stretch: a row combines messages of different age
 LOADED = 0.02  # of rated current
 LEAST_PAIRS = 4
-LIMITS = {  # what a real drive may have, generously
+LIMITS = {  # generous limits for a real drive
     "resistance_ohm": lambda x, n: 0.5 < x / n.machine.resistance_ohm < 4.0,
     "inductance_d_h": lambda x, n: 0.4 < x / n.machine.inductance_d_h < 2.5,
     "inductance_q_h": lambda x, n: 0.4 < x / n.machine.inductance_q_h < 2.5,
@@ -44,7 +44,7 @@ class SlowSearch(Search):
     """Search over a SlowView; see Search for its arguments and for what ``run`` returns."""
 
     def __init__(self, view, train_blocks, progress=lambda text: None):
-        silent = not view.i.real.any()  # the d axis never carried a current
+        silent = not view.i.real.any()  # the d axis never had a current
         effects = {n: e for n, e in TELLING.items() if not (silent and n == "inductance_d")}
         super().__init__(view, effects, train_blocks, progress)
         self.hidden = ("saturation", "d_") if silent else None
@@ -55,7 +55,7 @@ class SlowSearch(Search):
         self.dispersion = max(1.0, chi2 / max(len(self.linear.y) - count, 1))
 
     def run(self) -> Outcome:
-        self.progress("every set of effects")
+        self.progress("all sets of effects")
         for model in self.every_set():
             self.refine(model)
         best = self.large(self._best())
@@ -65,7 +65,7 @@ class SlowSearch(Search):
         )
 
     def hide(self, cells):
-        """Take the columns off that only an angle's error gives a d current to: nobody could check them."""
+        """Remove columns whose d current results only from an angle error: the recording cannot verify them."""
         if self.hidden and self.hidden[0] in cells.columns:
             columns = cells.columns[self.hidden[0]]
             for key in [k for k in columns if k.lstrip("~").startswith(self.hidden[1])]:
@@ -77,7 +77,7 @@ class SlowSearch(Search):
         return Fitter(cells, self.sigma, self.train, self.linear.price)
 
     def plausible(self, solution) -> bool:
-        """No parameter that no drive has: a sum of absurd ones may fit as well as the truth."""
+        """Whether all parameters are within LIMITS: a sum of absurd effects may fit as well as the true ones."""
         nominal = self.view.nominal
         for name in solution.model.names:
             found = self.effects[name].estimates(solution.c[name], solution.covariance[name], nominal)
@@ -96,15 +96,15 @@ class SlowSearch(Search):
         return [m for _, m in scored[:REFINED]]
 
     def some_forms(self, names) -> list[Model]:
-        """All core, or one of them free: two free curves of so few rows would fit each other's noise."""
+        """All core, or one of them free: two free curves would overfit so few rows."""
         names = frozenset(names)
         free = [frozenset(), *(frozenset([n]) for n in names if self.linear.index[n][1])]
         return [m for f in free if self.allowed(m := Model(names, f))]
 
     def large(self, best):
-        """The best model without effects that are smaller than an engineer's floor.
+        """The best model without effects below their floor of practical interest.
 
-        What an effect explains has been weighed already: against every other set, this one without it included.
+        Their significance is already decided by the comparison with every other set, including the one without them.
         """
         small = [
             n for n in best.model.names if self.effects[n].size(best.c[n], self.view.nominal) < self.floor(n)
@@ -117,7 +117,7 @@ class SlowSearch(Search):
         return self.effects[name].floor(self.view.nominal)
 
     def tied(self, best):
-        """Other sets of no more effects that explain as much as the best one, each in its best form."""
+        """Other sets with no more effects that explain as much as the best one, each in its best form."""
         found: dict = {}
         for model, solution in self.refined.items():
             if model.names == best.model.names or len(model) > len(best.model) or not model.names:
@@ -128,21 +128,21 @@ class SlowSearch(Search):
         return [s for s in found.values() if not any(names < s.model.names for names in found)]
 
     def residual(self, solution):
-        """(cells, (r,) what a solution leaves) on its corrected data."""
+        """(cells, residual (r,)) of a solution on its corrected data."""
         fitter = self.fitter(solution.view, [self.effects[n] for n in sorted(solution.model.names)])
         values = np.zeros(len(fitter.cells.y))
         for name, c in solution.c.items():
             if not self.effects[name].corrects:
                 columns = fitter.cells.columns[name]
-                values += sum(v * columns[told(columns, k)] for k, v in c.items() if v and told(columns, k))
+                values += sum(v * columns[column_of(columns, k)] for k, v in c.items() if v and column_of(columns, k))
         return fitter.cells, fitter.cells.y - values
 
 
 def sigmas(view, cells) -> tuple[np.ndarray, np.ndarray]:
-    """Standard deviation of every row (r,) [V], and the part that repetitions of an operating point show.
+    """Standard deviation of every row (r,) [V], and the part of it seen between repetitions of an operating point.
 
-    Without load the voltage stands still; under load an error in proportion to it comes on top, and where things
-    still change one in proportion to the change.
+    Without load the voltage is constant; under load there is an additional error proportional to it, and around
+    changes one proportional to the change.
     """
     level, n = voltage_level(view), len(view)
     loaded = np.abs(view.i.mean(axis=1)) > LOADED * view.machine.rated_current_a

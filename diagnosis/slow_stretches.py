@@ -1,10 +1,10 @@
-"""Stretches of a slow log in which everything stands still: what can be balanced where samples are far apart.
+"""Steady stretches of a slow log, for which a voltage balance can be made although samples are far apart.
 
-A slow log, as of a CAN bus, holds every value until the next message or draws a line between two of them.  Its
-messages come at times of their own, so a row mixes values of different instants.  That does no harm where nothing
-changes: over two messages of the slowest signal, nominal and recorded voltage keep within a small share of the
-largest, every signal that is not at rest has been measured anew, and the rotor turns.  What still changes shortly
-before and behind says how far values of different age may lie apart: ``unsteady``.
+A slow log, such as that of a CAN bus, holds every value until the next message or interpolates between two messages.
+The messages are not synchronous, so that a row combines values of different instants.  This is harmless in a steady
+state: over two messages of the slowest signal, nominal and recorded voltage are constant within a small share of the
+largest voltage, every signal that is not at rest has been updated, and the rotor turns.  Changes shortly before and
+after a stretch bound the error due to values of different age: ``unsteady``.
 """
 
 from __future__ import annotations
@@ -16,21 +16,21 @@ import numpy as np
 from fluxproof.diagnosis.recording import Recording, RecordingError
 
 SIGNALS = ("i_d", "i_q", "u_d", "u_q", "omega")
-STILL = 0.015  # of the largest voltage: what nominal and recorded voltage may change by
+STILL = 0.015  # of the largest voltage: largest change of nominal and recorded voltage
 LEAST_S = 0.5
-MESSAGES = 2.0  # of the slowest signal that a stretch spans
-AROUND, LOOSE = 0.5, 8.0  # shares of a window before and behind it; how much more may change there
-REST = 1e-3  # of a signal's largest value: below it need not be measured anew
-TURNS = 4.0  # electrical, within a stretch: what an inverter loses depends on the angle, its mean over turns does not
-RESTED = 6.0  # times the median time between changes: longer, and the signal stood still
-USUAL = 0.9  # quantile of the others
+MESSAGES = 2.0  # number of messages of the slowest signal in a stretch
+AROUND, LOOSE = 0.5, 8.0  # margin before and after a window, as a share of it; factor of the change allowed there
+REST = 1e-3  # of a signal's largest value: a smaller signal is at rest and needs no update
+TURNS = 4.0  # electrical turns within a stretch: the inverter loss depends on the angle, its mean over turns does not
+RESTED = 6.0  # times the median time between changes: after a longer time the signal counts as constant
+USUAL = 0.9  # quantile of the other intervals
 
 
 @dataclass
 class Stretches:
     """Means over each stretch, all (b,): dq current and voltage complex [A], [V], electrical speed [rad/s],
-    bus [V], winding [degC] or nan, time of the middle since the first row [s], first row and row behind the last, and
-    the change of the voltage from a little before to a little behind [V]."""
+    bus [V], winding [degC] or nan, time of the middle since the first row [s], first row and end (exclusive), and the
+    change of the voltage from shortly before to shortly after the stretch [V]."""
 
     i: np.ndarray
     u: np.ndarray
@@ -48,9 +48,9 @@ class Stretches:
 
 
 def stretches(recording: Recording, nominal) -> Stretches:
-    """The still stretches of a slow recording, none overlapping another.
+    """The steady stretches of a slow recording, without overlap.
 
-    Raises RecordingError where signals are missing or nothing ever stands still.
+    Raises RecordingError if signals are missing or no stretch is steady.
     """
     r, m = recording, nominal.machine
     i, u, omega, u_dc = operating_columns(recording, nominal)
@@ -89,8 +89,8 @@ def stretches(recording: Recording, nominal) -> Stretches:
             k += 1
     if not found:
         raise RecordingError(
-            f"{r.source}: in no stretch of {window:.2g} s, two messages of the slowest signal, do current, speed and "
-            "voltage stand still: record operating points that last longer, or log faster"
+            f"{r.source}: in no stretch of {window:.2g} s, two messages of the slowest signal, are current, speed and "
+            "voltage steady: record longer operating points, or log faster"
         )
     mean = lambda x: np.array([np.mean(x[a:b]) for a, b, _ in found])  # noqa: E731
     temp = r["temp_winding"] if r.has("temp_winding") else np.full(len(t), np.nan)
@@ -109,7 +109,7 @@ def operating_columns(recording: Recording, nominal):
     r = recording
     if not r.has("omega_e"):
         raise RecordingError(
-            f"{r.source}: a slow recording needs the speed omega_e: an angle this rarely says nothing"
+            f"{r.source}: a slow recording needs the speed omega_e: its angle is sampled too rarely"
         )
     omega = r["omega_e"]
     u_dc = r["u_dc"] if r.has("u_dc") else np.full(len(r), float(nominal.inverter.dc_bus_v))
@@ -131,7 +131,7 @@ def operating_columns(recording: Recording, nominal):
 
 
 def message_period(t, x) -> float:
-    """Usual longest time between two messages of a signal [s], from its changes; lines between messages count once."""
+    """Typical longest time between two messages of a signal [s], from its changes; interpolation counts once."""
     apart = _between_changes(t, x)
     if len(apart) < 4:
         return float(np.median(np.diff(t)))
@@ -139,7 +139,7 @@ def message_period(t, x) -> float:
 
 
 def restless(t, x) -> bool:
-    """Whether a signal changes with nearly every message unless it is at rest, so that no change means no message."""
+    """Whether a signal changes with nearly every message unless at rest, so that no change means no message."""
     apart, period = _between_changes(t, x), message_period(t, x)
     active = np.abs(x) > REST * np.nanmax(np.abs(x))
     return float(apart[apart < 3.0 * period].sum()) > 0.5 * active.mean() * (t[-1] - t[0])

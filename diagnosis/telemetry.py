@@ -1,17 +1,18 @@
-"""The core's telemetry dump: what it saw and what it answered, sample by sample, bit for bit.
+"""The core's telemetry dump: its inputs and outputs, sample by sample, bit for bit.
 
     8 bytes   MAGIC
     u32       length of the header
     header    JSON, UTF-8: see ``_header``
     samples   u32 sample counter, then one i32 per field in the header's order
 
-All little-endian.  The fields are those of fluxproof.Sample (what the core took in), then any of fluxproof.Observed
-(what it answered); their names, formats and units come from the golden model, so they cannot drift.  A capture of the
-core's AXI4-Stream becomes a dump in telemetry_stream.py; it has the packet's fields, a simulation can give everything.
+All little-endian.  The fields are those of fluxproof.Sample (inputs of the core), then any of fluxproof.Observed
+(its outputs); their names, formats and units come from the golden model and are therefore consistent with it.
+telemetry_stream.py converts a capture of the core's AXI4-Stream to a dump with the fields of the packet; a simulation
+can record every field.
 
-``checksum`` guards what the replay cannot judge: scales, configuration, field list.  Registers and start state have a
-checksum of their own, and one that fails is told (``altered``) and not refused: a register that is not what the
-core had is exactly what the replay (digital.py) finds, names and places.  So it is with the samples.
+``checksum`` covers what the replay cannot verify: scales, configuration, field list.  Registers and start state have
+their own checksum.  If it fails, the dump is accepted and the change reported (``altered``), because the replay
+(digital.py) finds a wrong register and names it.  The same applies to the samples.
 """
 
 from __future__ import annotations
@@ -40,7 +41,7 @@ INPUTS = dict(zip(fluxproof.Sample._fields, sample_latch.BLOCK.outputs, strict=T
 OBSERVED = fluxproof.OBSERVED
 BASES = ("current_a", "voltage_v", "omega_me_rad_s", "flux_wb")
 CONFIG = {"adc_bits": (12, 16), "position_bits": (8, 18), "carrier_half": CARRIER_HALF_RANGE}
-JUDGED = ("registers", "first_state")  # by the replay
+JUDGED = ("registers", "first_state")  # verified by the replay
 REQUIRED = {
     "sample_time_s": float, "config": dict, "registers": dict, "bases": dict, "fields": list, "samples": int,
     "checksum": dict,
@@ -48,7 +49,7 @@ REQUIRED = {
 
 
 def is_dump(path) -> bool:
-    """Whether the file begins as a dump does."""
+    """Whether the file begins with MAGIC."""
     try:
         with open(path, "rb") as file:
             return file.read(len(MAGIC)) == MAGIC
@@ -57,13 +58,13 @@ def is_dump(path) -> bool:
 
 
 def write_dump(path, drive, register_set, samples, observed, first_state=None, counter=None) -> Path:
-    """Write a dump in one step; returns the path.
+    """Write a dump atomically; returns the path.
 
     drive: golden_model.drive.Drive.  register_set: its registers and generics.
     samples: (n, 13) integers in the order of fluxproof.Sample, or {field: (n,)}.
     observed: {name of fluxproof.Observed: (n,) integers}, any of them.
-    first_state: fluxproof.State before the first sample; None: the reset state where the counter starts at 0, else
-    unknown.  counter: (n,) samples since reset, default 0, 1, ...; a jump tells of samples that were lost.
+    first_state: fluxproof.State before the first sample; None means the reset state if the counter starts at 0, else
+    unknown.  counter: (n,) samples since reset, default 0, 1, ...; a jump means lost samples.
     """
     if isinstance(samples, dict):
         samples = np.stack([samples[name] for name in fluxproof.Sample._fields], axis=1)
@@ -86,12 +87,12 @@ def write_dump(path, drive, register_set, samples, observed, first_state=None, c
 
 
 def read_dump(path) -> tuple[dict[str, np.ndarray], dict]:
-    """(canonical columns in SI units, float64, (n,), meta); RecordingError says where a file is not a dump.
+    """(canonical columns in SI units, float64, (n,), meta); RecordingError names the defect of an invalid dump.
 
     meta: ``telemetry`` (the header), ``registers`` {name: integer}, ``config`` {generic: integer}, ``samples`` (n, 13)
     int64 in the order of fluxproof.Sample, ``observed`` {name: (n,) int64}, ``counter`` (n,) int64, ``start``
     ("reset", "state" or "unknown"), ``first_state`` (fluxproof.State or None), ``gaps`` [(row, samples lost before
-    it)], ``scales`` {field: SI per LSB}, ``altered`` [what was changed after writing], ``sample_time_s``.
+    it)], ``scales`` {field: SI per LSB}, ``altered`` [parts changed after writing], ``sample_time_s``.
     """
     path = Path(path)
     try:
@@ -104,8 +105,8 @@ def read_dump(path) -> tuple[dict[str, np.ndarray], dict]:
             if size != wanted:
                 whole = (size - start) // record.itemsize
                 raise RecordingError(
-                    f"{path}: {header['samples']} samples of {record.itemsize} bytes are announced, the file holds "
-                    f"{whole} and {(size - start) % record.itemsize} bytes: it was cut off or added to"
+                    f"{path}: {header['samples']} samples of {record.itemsize} bytes are announced, the file contains "
+                    f"{whole} and {(size - start) % record.itemsize} bytes: it was truncated or extended"
                 )
             rows = np.fromfile(file, record)
     except OSError as error:
@@ -115,12 +116,12 @@ def read_dump(path) -> tuple[dict[str, np.ndarray], dict]:
 
 
 def _record(names):
-    """One sample as a NumPy record."""
+    """NumPy record type of one sample."""
     return np.dtype([("counter", "<u4"), *((name, "<i4") for name in names)])
 
 
 def _header(drive, register_set, names, count, first_state) -> dict:
-    """Everything but the samples; ``si_per_lsb`` turns a field's integers into its unit."""
+    """The header without the samples; ``si_per_lsb`` converts a field's integers to its unit."""
     ports = INPUTS | OBSERVED
 
     def described(name):
@@ -154,7 +155,7 @@ def _header(drive, register_set, names, count, first_state) -> dict:
 
 
 def core_version() -> str:
-    """The package's version, or "unknown" where it was not installed."""
+    """The version of the package, or "unknown" if it is not installed."""
     try:
         return metadata.version("fluxproof")
     except metadata.PackageNotFoundError:
@@ -162,7 +163,7 @@ def core_version() -> str:
 
 
 def _checksums(header) -> dict:
-    """CRC-32 of the header's fixed part and of what the replay judges."""
+    """CRC-32 of the header's fixed part and of the parts that the replay verifies."""
     parts = {"fixed": {}, "judged": {}}
     for key, value in header.items():
         if key != "checksum":
@@ -174,7 +175,7 @@ def _checksums(header) -> dict:
 
 
 def _read_header(path, file, size) -> tuple[dict, int]:
-    """(header, where the samples start)."""
+    """(header, byte offset of the samples)."""
     head = file.read(len(MAGIC) + 4)
     if head[: len(MAGIC)] != MAGIC:
         raise RecordingError(f"{path}: not a telemetry dump: it does not begin with {MAGIC.decode()}")
@@ -192,7 +193,7 @@ def _read_header(path, file, size) -> tuple[dict, int]:
     except (ValueError, RecursionError) as error:
         raise RecordingError(f"{path}: the header is not JSON: {error}") from None
     if not isinstance(header, dict) or header.get("format") != "fluxproof telemetry":
-        raise RecordingError(f"{path}: the header does not say that this is fluxproof telemetry")
+        raise RecordingError(f"{path}: the header does not identify fluxproof telemetry")
     if header.get("version") != VERSION:
         raise RecordingError(
             f"{path}: dump version {header.get('version')!r}: this reader knows version {VERSION}"
@@ -201,13 +202,13 @@ def _read_header(path, file, size) -> tuple[dict, int]:
         if type(header.get(key)) is not kind:
             raise RecordingError(f"{path}: header: {key} is missing or not of type {kind.__name__}")
     if header["checksum"].get("fixed") != _checksums(header)["fixed"]:
-        raise RecordingError(f"{path}: the header's checksum does not fit: the file was damaged or edited")
+        raise RecordingError(f"{path}: the header's checksum is wrong: the file was damaged or edited")
     _check_names(path, header)
     return header, start
 
 
 def _check_names(path, header):
-    """The parts that no checksum or an own one guards, and a file of another core."""
+    """Check the parts outside the main checksum; RecordingError also for a dump of another core."""
     try:
         names = [entry["name"] for entry in header["fields"]]
         numbers = [entry["si_per_lsb"] for entry in header["fields"]]
@@ -215,7 +216,7 @@ def _check_names(path, header):
         legal = {name: lo <= header["config"][name] <= hi for name, (lo, hi) in CONFIG.items()}
         sane = all(isinstance(x, float) and math.isfinite(x) and x > 0.0 for x in numbers)
     except (KeyError, TypeError) as error:
-        raise RecordingError(f"{path}: header: bases, config or fields are not complete: {error}") from None
+        raise RecordingError(f"{path}: header: bases, config or fields are incomplete: {error}") from None
     if not sane or not all(legal.values()):
         raise RecordingError(f"{path}: header: a scale or a generic of the core is out of its range")
     known = set(fluxproof.Observed._fields)
@@ -237,15 +238,15 @@ def _check_names(path, header):
     if missing:
         raise RecordingError(f"{path}: header: register {missing[0]} is missing")
     if header["samples"] < 1:
-        raise RecordingError(f"{path}: the dump holds no samples")
+        raise RecordingError(f"{path}: the dump contains no samples")
     try:
         _state(header.get("first_state"))
     except (TypeError, ValueError):
-        raise RecordingError(f"{path}: header: first_state does not have the core's state in it") from None
+        raise RecordingError(f"{path}: header: first_state is not a state of the core") from None
 
 
 def _state(nested):
-    """fluxproof.State out of nested lists of integers; None stays None."""
+    """fluxproof.State from nested lists of integers; None stays None."""
     if nested is None:
         return None
     defaults = fluxproof.State()
@@ -253,7 +254,7 @@ def _state(nested):
     for value, default in zip(nested, defaults, strict=True):
         several = value if isinstance(default, tuple) else [value]
         if not all(type(v) is int and -(2**62) < v < 2**62 for v in several):
-            raise ValueError("a state is made of integers")
+            raise ValueError("a state consists of integers")
         if isinstance(default, tuple):
             if len(value) != len(default):
                 raise ValueError("wrong number of integers")
@@ -264,7 +265,7 @@ def _state(nested):
 
 
 def _meta(header, rows, names) -> dict:
-    """What the replay and the columns need."""
+    """The ``meta`` of read_dump."""
     counter = rows["counter"].astype(np.int64)
     step = (np.diff(counter) + 2**31) % 2**32 - 2**31  # the counter wraps after five days at 10 kHz
     counter = counter[0] + np.concatenate(([0], np.cumsum(step)))
@@ -282,6 +283,6 @@ def _meta(header, rows, names) -> dict:
         "first_state": first_state,
         "gaps": [(int(k) + 1, int(step[k]) - 1) for k in np.flatnonzero(step != 1)],
         "scales": {entry["name"]: entry["si_per_lsb"] for entry in header["fields"]},
-        "altered": [] if same else ["registers or start state do not fit their checksum"],
+        "altered": [] if same else ["the checksum of registers or start state is wrong"],
         "sample_time_s": header["sample_time_s"],
     }

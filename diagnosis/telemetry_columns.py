@@ -1,7 +1,7 @@
-"""Canonical columns of a telemetry dump: what the converters said, in SI units.
+"""Canonical columns of a telemetry dump: the converters' codes in SI units.
 
-Currents, bus voltage and angle come from the raw codes with the registers' offsets and gains, not rounded to the
-core's formats; the speed is the core's where it is recorded, else the chord of the angle.
+Currents, bus voltage and angle are computed from the raw codes with the registers' offsets and gains, without rounding
+to the core's formats.  The speed is that of the core if it is recorded, else the difference quotient of the angle.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from fluxproof.golden_model.units import TURN_RAD
 
 
 def columns_of(meta: dict) -> dict[str, np.ndarray]:
-    """Canonical columns, float64, (n,), of what read_dump puts into ``meta``; the winding temperature is NaN where the
-    core had none, and left out where it never had one."""
+    """Canonical columns, float64, (n,), of the ``meta`` of read_dump; the winding temperature is NaN in rows where the
+    core had none, and omitted if it never had one."""
     header, regs, config = meta["telemetry"], meta["registers"], meta["config"]
     bases, t_s, observed, scales = header["bases"], header["sample_time_s"], meta["observed"], meta["scales"]
     code = {name: meta["samples"][:, k] for k, name in enumerate(Sample._fields)}
-    left = 2 ** (16 - config["adc_bits"])  # codes are moved to the left edge of 16 bits
+    left = 2 ** (16 - config["adc_bits"])  # codes are left-aligned in 16 bits
 
     def read(raw, offset, gain, base):
         lsb = CODE.lsb * REGISTERS[gain].fmt.lsb * base
@@ -57,13 +57,13 @@ def columns_of(meta: dict) -> dict[str, np.ndarray]:
 
 
 def electrical_angle(code, regs, position_bits):
-    """Twin of io/position for whole columns: integers in the TURN format."""
+    """io/position for arrays: integers in the TURN format."""
     turn = (regs["pole_pairs"] * code) << (TURN.width - position_bits)
     return (regs["theta_offset"] + (-turn if regs["reverse"] else turn)) % 2**TURN.width
 
 
 def _chord(theta, t):
-    """Speed [rad/s] from the angle to the next row; the last row has that of the one before."""
+    """Speed [rad/s] from each row's angle to the next row's; the last row repeats the previous value."""
     if len(t) < 2:
         return np.zeros(len(t))
     turned = (np.diff(theta) + math.pi) % TURN_RAD - math.pi

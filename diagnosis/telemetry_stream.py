@@ -1,11 +1,11 @@
-"""A captured telemetry stream to a dump: the words of the core's AXI4-Stream packets as a DMA left them in memory.
+"""Converts a captured telemetry stream to a dump: the words of the core's AXI4-Stream packets as a DMA stores them.
 
     fluxproof dump capture.bin --drive drive.toml [--registers registers.json] [-o run.fluxdump]
 
-The capture may begin and end inside a packet, have pieces of packets inside (a reset cuts one short) and lack packets:
-the samples' numbers tell, across their wrap at 2**32 too.  Where the numbers go back (a reset, a ring buffer read
-across its end) the capture falls into pieces, and a dump is made of one of them.  A packet that is whole and says
-what no packet says is damage and refused.
+The capture may begin and end inside a packet, contain partial packets (a reset truncates one) and lack packets; the
+sample counters show this, also across their overflow at 2**32.  If the counter decreases (a reset, or a ring buffer
+read across its end), the capture is split into pieces, and a dump is made of one of them.  A complete packet with
+impossible content is damaged, and the capture is rejected.
 """
 
 from __future__ import annotations
@@ -24,16 +24,16 @@ from fluxproof.golden_model.io.telemetry_words import COUNT, COUNTER, FIELDS, HE
 
 SIZE = 4 * COUNT
 MARK = HEADER_WORD.to_bytes(4, "little")
-USED = np.zeros(COUNT, np.uint32)  # the bits of each word that fields stand in
+USED = np.zeros(COUNT, np.uint32)  # the bits of each word that belong to fields
 for _field in LAYOUT.values():
     USED[_field.word] |= np.uint32(((1 << _field.width) - 1) << _field.lsb)
 
 
 class Piece(NamedTuple):
-    """Packets whose numbers rise: where the first begins in the file, and what they say."""
+    """Consecutive packets with rising counters: byte offset of the first one, and their fields."""
 
     byte: int
-    counter: np.ndarray  # (n,) int64, unwrapped: it goes on beyond 2**32
+    counter: np.ndarray  # (n,) int64, unwrapped: continues beyond 2**32
     fields: dict[str, np.ndarray]  # {name: (n,) int64}
 
     def __len__(self) -> int:
@@ -41,19 +41,19 @@ class Piece(NamedTuple):
 
     @property
     def lost(self) -> int:
-        """Samples between the first and the last that have no packet here."""
+        """Samples between the first and the last without a packet."""
         return int(self.counter[-1] - self.counter[0]) + 1 - len(self)
 
 
 class Capture(NamedTuple):
-    """``left``: [(byte, how many)] that belong to no whole packet."""
+    """The pieces of a file; ``left``: [(byte offset, length)] of bytes outside complete packets."""
 
     pieces: list[Piece]
     left: list[tuple[int, int]]
 
 
 def read_capture(path) -> Capture:
-    """Read a file of little-endian words; RecordingError where it cannot be read, holds no packet or is damaged."""
+    """Read a file of little-endian words; RecordingError if it is unreadable, contains no packet or is damaged."""
     try:
         raw = Path(path).read_bytes()
     except OSError as error:
@@ -62,7 +62,7 @@ def read_capture(path) -> Capture:
 
 
 def parse(raw: bytes, name: str = "capture") -> Capture:
-    """The same of bytes in memory; ``name`` is what messages call them."""
+    """The same for bytes in memory; ``name`` is used in messages."""
     found, bytes_of, left, at = [], [], [], 0
     while (start := _find_start(raw, at)) >= 0:
         rows = _whole_packets(raw, start)
@@ -81,7 +81,7 @@ def parse(raw: bytes, name: str = "capture") -> Capture:
 
 
 def _find_start(raw: bytes, at: int) -> int:
-    """The first byte from ``at`` on where a packet begins, whole and sound, the next one behind it; or -1."""
+    """The first offset from ``at`` with a complete valid packet that is followed by another one; or -1."""
     while (at := raw.find(MARK, at)) >= 0:
         behind = raw[at + SIZE : at + SIZE + len(MARK)]
         if len(raw) - at >= SIZE and MARK.startswith(behind) and _sound(_rows(raw, at, 1))[0]:
@@ -95,7 +95,7 @@ def _rows(raw: bytes, at: int, count: int) -> np.ndarray:
 
 
 def _whole_packets(raw: bytes, at: int) -> np.ndarray:
-    """Words (n, COUNT) of the packets from ``at`` on, up to where none begins; without a last one cut short."""
+    """Words (n, COUNT) of the consecutive packets from ``at`` on, without a truncated last one."""
     rows = _rows(raw, at, (len(raw) - at) // SIZE)
     others = np.flatnonzero(rows[:, 0] != HEADER_WORD)
     broken = bool(len(others))
@@ -109,7 +109,7 @@ def _whole_packets(raw: bytes, at: int) -> np.ndarray:
 
 
 def _sound(rows: np.ndarray) -> np.ndarray:
-    """(n,) bool: every field is extended as its format asks for, all other bits are zero."""
+    """(n,) bool: every field is sign- or zero-extended as its format requires, and all other bits are zero."""
     good = ~(rows & ~USED).any(axis=1)
     for field in LAYOUT.values():
         value = _values(rows, field)
@@ -124,14 +124,14 @@ def _values(rows: np.ndarray, field) -> np.ndarray:
 
 
 def _check(rows: np.ndarray, places: np.ndarray, name: str) -> None:
-    """RecordingError names the first packet that is not sound."""
+    """Raise RecordingError for the first invalid packet."""
     wrong = np.flatnonzero(~_sound(rows))
     if len(wrong):
         raise RecordingError(f"{name}: {_what_is_wrong(rows[wrong[0]], int(places[wrong[0]]))}")
 
 
 def _pieces(rows: np.ndarray, places: np.ndarray) -> list[Piece]:
-    """Packets cut where their numbers go back or stand still."""
+    """Packets split where the counter does not increase."""
     numbers = _values(rows, LAYOUT[COUNTER])
     step = (np.diff(numbers) + 2**31) % 2**32 - 2**31
     cuts = [0, *(np.flatnonzero(step <= 0) + 1).tolist(), len(rows)]
@@ -144,7 +144,7 @@ def _pieces(rows: np.ndarray, places: np.ndarray) -> list[Piece]:
 
 
 def _what_is_wrong(row: np.ndarray, byte: int) -> str:
-    """The first word of a packet that says what it cannot."""
+    """Description of the first invalid word of a packet."""
     for field_name, field in LAYOUT.items():
         value = int(_values(row[None], field)[0])
         if not field.port.fmt.lo <= value <= field.port.fmt.hi:
@@ -160,9 +160,9 @@ def _what_is_wrong(row: np.ndarray, byte: int) -> str:
 
 
 def _why_nothing(raw: bytes) -> str:
-    """Why no packet was found."""
+    """The reason why no packet was found."""
     if len(raw) < SIZE:
-        return f"{len(raw)} bytes hold no telemetry packet, which has {SIZE}"
+        return f"{len(raw)} bytes are too few for a telemetry packet, which has {SIZE}"
     for found in re.finditer(rb"(?s)(?=(..)" + packet.MAGIC.to_bytes(2, "little") + b")", raw):
         at, (count, version) = found.start(), found.group(1)
         if (
@@ -174,7 +174,7 @@ def _why_nothing(raw: bytes) -> str:
                 f"byte {at}: telemetry packets of version {version} with {count} words: this reader knows version "
                 f"{packet.VERSION} with {COUNT}"
             )
-    return f"no telemetry packet: nowhere a word 0x{HEADER_WORD:08x} with a sound packet of {SIZE} bytes behind it"
+    return f"no telemetry packet: no word 0x{HEADER_WORD:08x} starts a valid packet of {SIZE} bytes"
 
 
 def write_piece(path, piece: Piece, drive, register_set) -> Path:

@@ -1,4 +1,4 @@
-"""What explains a recording as well as the best solution does, and what is no other explanation at all."""
+"""Models that explain a recording as well as the best solution, and combinations that are equivalent to another one."""
 
 from __future__ import annotations
 
@@ -12,18 +12,19 @@ from fluxproof.diagnosis.fit import Model, Solution
 from fluxproof.diagnosis.idle import unseen_loss
 from fluxproof.diagnosis.refine import TIE, Refiner, operating_points, point_numbers
 
-LEAST_POINTS, LEAST_SPREAD = 4.0, 0.2  # operating points that say how large errors really are; no smaller than that
-SCALES = frozenset({"udc_gain", "current_scale", "magnet_flux"})  # any two of them are any other two, but for torque
-LONE_TIE = 30.0  # margin of a tie where one operating point is all there is
-FILTERED = 0.2  # of the rows' scatter: so much a correction of the record may take or add and say nothing
+LEAST_POINTS, LEAST_SPREAD = 4.0, 0.2  # operating points needed to estimate the actual error, and its least variance
+# Any two of these are equivalent to any other two, except in torque.
+SCALES = frozenset({"udc_gain", "current_scale", "magnet_flux"})
+LONE_TIE = 30.0  # margin of a tie with a single operating point
+FILTERED = 0.2  # of the rows' scatter: a change by a correction that is not evidence
 
 
 class Ties(Refiner):
-    """Refined solutions against each other."""
+    """Comparison of refined solutions."""
 
     @staticmethod
     def scaled_alike(solution) -> bool:
-        """Whether the bus and all current sensors are off by one factor: then neither is, but the magnets are."""
+        """Whether bus and all current sensors are off by the same factor, equivalent to a magnet flux error."""
         c = solution.c
         if "udc_gain" not in c or "magnet_flux" in c or not {"current_gain", "current_scale"} & set(c):
             return False
@@ -31,9 +32,9 @@ class Ties(Refiner):
         return abs(bus - currents - c.get("current_scale", {}).get("scale", 0.0)) < ALIKE * abs(bus)
 
     def impedance_alike(self, solution) -> bool:
-        """Whether ohms and every inductance that a current shows are off by one factor: then the current sensors are.
+        """Whether R and the inductance of each axis with current are off by the same factor: a current scale error.
 
-        Where an axis carries no current, that takes two coefficients only.
+        If an axis has no current, two coefficients suffice.
         """
         m, c = self.view.machine, solution.c
         inductances = {f"inductance_{axis}" for axis in axes_told(self.view)}
@@ -44,13 +45,13 @@ class Ties(Refiner):
         return float(np.ptp(shares)) < ALIKE * max(np.abs(shares))
 
     def as_good(self, best, other, margin) -> bool:
-        """Whether a solution scores within a margin of the best where the rows' errors are as small as they turn out.
+        """Whether a solution scores within a margin of the best one, given the actual errors of the rows.
 
-        A row's standard deviation holds a share for the balance itself which is a bound: where two explanations differ,
-        the residuals at the operating points may be far smaller, and a difference in chi^2 then says more.
+        A row's standard deviation contains an upper bound for the error of the balance.  Where two explanations differ,
+        the residuals at the operating points may be far smaller, and a difference in chi^2 is then more significant.
 
-        At one operating point what stands there, or drifts, is two or three numbers, and the rows' scatter the rest of
-        chi^2: a delay that is no delay averages two voltages and leaves less noise.
+        At one operating point, means and drifts are two or three numbers, and the remaining chi^2 is scatter: a
+        spurious delay averages two voltages and reduces the scatter.
         """
         if self.most == 1:
             own, rival = self._scatter(best), self._scatter(other)
@@ -60,7 +61,7 @@ class Ties(Refiner):
         return other.score - best.score + gained * (1.0 / self._spread(best, other) - 1.0) < margin
 
     def _scatter(self, solution) -> float:
-        """chi^2 of a solution that is neither a mean nor a slow course of one functional over the blocks."""
+        """The part of a solution's chi^2 that is neither a mean nor a slow drift of a functional over the blocks."""
         points = np.eye(operating_points(self.view))[point_numbers(self.view)]
         slow = np.concatenate([points, courses(self.view).T], axis=1)
         use, cells, out = np.flatnonzero(self.cells.ok & self.train), self.cells, 0.0
@@ -76,9 +77,10 @@ class Ties(Refiner):
         return out
 
     def _spread(self, best, other) -> float:
-        """Variance of what the best solution leaves along where another one differs, over that of the rows.
+        """Variance of the best residual in the direction in which another solution differs, over that of the rows.
 
-        Summed by operating point first, as what the balance is off by is the same in all blocks of one; at most one.
+        Residuals are first summed per operating point, since the error of the balance is the same in all its blocks.
+        The result is at most one.
         """
         use = self.cells.ok & self.train
         own, rival = (s.residual[use] / (self.sigma * s.view.noise_gain)[use] for s in (best, other))
@@ -86,10 +88,10 @@ class Ties(Refiner):
         along, apart = (np.bincount(point, w * (rival - own)) for w in (own, rival - own))
         if not apart.sum() > 0.0:
             return 1.0
-        points = apart.sum() ** 2 / np.sum(apart**2)  # so many that count
+        points = apart.sum() ** 2 / np.sum(apart**2)  # effective number of points
         if points < LEAST_POINTS:
             return 1.0
-        # Few of them know their own scatter badly: the quantile of Student's distribution for the normal one.
+        # With few points the scatter is uncertain: Student's quantile replaces the normal one.
         wider = (stats.t.ppf(0.975, points - 1.0) / stats.norm.ppf(0.975)) ** 2
         return float(np.clip(wider * np.sum(along**2) / apart.sum(), LEAST_SPREAD, 1.0))
 
@@ -100,9 +102,9 @@ class Ties(Refiner):
         return len(pairs[0]) == len(pairs[1]) == 2 and model.names - SCALES == other.names - SCALES
 
     def small(self, solution, name) -> bool:
-        """Whether an effect of a solution is below what anybody would act on.
+        """Whether an effect of a solution is below its floor of practical interest.
 
-        What another effect makes by itself must be exceeded beyond doubt.
+        It must also exceed, beyond its uncertainty, what another effect of the solution explains.
         """
         effect, nominal = self.effects[name], self.view.nominal
         shadow = effect.overshadowed(solution.c, nominal)
@@ -115,16 +117,16 @@ class Ties(Refiner):
         return frozenset(n for n in solution.model.names if self.small(solution, n))
 
     def _tied(self, best, sure) -> list[Solution]:
-        """Other models that explain as much: other sets of no more effects, each large enough for a name.
+        """Other models that explain as much: sets with no more effects, each large enough for a name.
 
-        One with an effect that is not counts where it has only names of the best one: the others need not be there.
-        Where the shape of the flux's curve has settled its name (``sure``), that is no difference.
+        A rival containing a sub-threshold effect counts only if its named effects are a subset of the best model's.  If
+        the shape of the flux curve has determined its name (``sure``), inductance and saturation are no alternatives.
         """
         silent = self.nameless(best)
         if silent == best.model.names:
             if self.most > 1:
                 return []
-            silent = frozenset()  # at one operating point what is too small may be something else that is not
+            silent = frozenset()  # at one operating point a small effect may be a different one above its threshold
         curved = set(FAMILY) if best.model.names & set(FAMILY) else set()
         out, rest, plain = [], best.model.names - curved, []
         for model, solution in self.refined.items():
@@ -140,22 +142,22 @@ class Ties(Refiner):
             if same or passenger or model.names == best.model.names or len(model) > len(best.model):
                 continue
             margin = TIE if self.most > 1 else LONE_TIE
-            if self._other_scales(best.model, model):  # then a form is free because it must be, and not by its merit
+            if self._other_scales(best.model, model):  # the free form is then required and not chosen by its score
                 margin += max(self.linear.price * (solution.count - best.count), 0.0)
             near = solution.score < best.score + margin or self.most == 1
             if near and model.names and self.as_good(best, solution, margin):
                 if all(s.model.names != model.names for s in out):
                     out.append(solution)
-        # A model that holds a tied one, or what the best one says and scores no better, is that one with a passenger.
+        # A model that contains a tied one, or the best one without a better score, only adds a superfluous effect.
         enough = lambda s: [*out, *(p for p in plain if p.score <= s.score)]  # noqa: E731
         out = [s for s in out if not any(o.model.names < s.model.names for o in enough(s))]
         loss = self.effects.get("dead_time") if self.most == 1 else None
         return out + (unseen_loss(self.view, loss, [best, *out]) if loss else [])
 
     def straightened(self, solutions) -> list[Solution]:
-        """Solutions with a wrong inductance of each axis in place of a saturation, where they are not among these.
+        """Solutions with a wrong inductance of each axis instead of a saturation, if they are not among the given ones.
 
-        At one operating point that is one effect more and therefore not tied, but no other level of current was seen.
+        At one operating point this is one more effect and therefore not tied, but only one current level was recorded.
         """
         if self.most > 1:
             return []

@@ -1,7 +1,7 @@
-"""The order at which a torque repeats with the rotor's angle, and the orders in which torque is looked at.
+"""The order at which a torque repeats with the rotor angle, and the orders at which torque is evaluated.
 
-Cogging has as many periods in a turn as slots and poles have in common multiples, which nobody recorded: with 27 slots
-and ten poles 54 in an electrical turn, and more where slots are many.
+The number of cogging periods per mechanical turn is the least common multiple of slots and poles, which the drive file
+does not contain: with 27 slots and ten poles there are 54 per electrical turn.
 """
 
 from __future__ import annotations
@@ -10,22 +10,22 @@ import numpy as np
 
 from fluxproof.diagnosis.balance import misfit
 
-ORDERS = range(2, 110, 2)  # per electrical turn: cogging's are even
-ALWAYS = range(2, 38, 2)  # looked at in every recording
-MULTIPLES = (1, 2, 3)  # of the order that repeats
-LOCKS = 0.5  # of the best lock: so well an order must repeat to be one of the cogging's
+ORDERS = range(2, 110, 2)  # per electrical turn; cogging orders are even
+ALWAYS = range(2, 38, 2)  # evaluated in every recording
+MULTIPLES = (1, 2, 3)  # of the repeating order
+LOCKS = 0.5  # least phase lock, relative to the best one, of a cogging order
 
 
 def torque_orders(view) -> tuple[float, ...]:
-    """Orders per electrical turn, beside the mean's, at which a view's torque is compared."""
+    """Orders per electrical turn, besides order 0, at which a view's torque is evaluated."""
     even = sorted({*ALWAYS, *(n * repeating_order(view) for n in MULTIPLES)})
     return (1.0 / view.machine.pole_pairs, 1.0, *map(float, even))
 
 
 def repeating_order(view) -> int:
-    """The largest order of those whose torque repeats from block to block.
+    """The order whose torque repeats from block to block; of several, the one with the largest amplitude.
 
-    Harmonics of the cogging repeat as well as the cogging itself, so that the best lock alone may be a harmonic's.
+    Harmonics of the cogging repeat too, so that the order with the best phase lock may be a harmonic.
     """
     if "torque_order" not in view.memo:
         view.memo["torque_order"] = _searched(view)
@@ -44,7 +44,7 @@ def _searched(view) -> int:
     found = []
     for h in ORDERS:
         f = (torque * taper * np.exp(-1j * h * theta)).mean(axis=1)[h * turns > 2.0]
-        # A free shaft's acceleration is noisier the faster it turns.
+        # The acceleration of a free shaft is noisier at higher speed.
         weight = 1.0 / np.maximum(np.abs(f) ** 2, np.median(np.abs(f) ** 2)) if len(f) else np.zeros(0)
         lock = float(np.abs(np.sum(weight * f)) ** 2 / max(np.sum(weight**2 * np.abs(f) ** 2), 1e-300))
         found.append((lock, float(np.abs(np.sum(weight * f)) / max(np.sum(weight), 1e-300)), h))

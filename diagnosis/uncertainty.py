@@ -1,13 +1,13 @@
-"""How sure the parameters of a solution are, beyond what the scatter of its cells says.
+"""Standard deviations of a solution's parameters, beyond the scatter of its cells.
 
-The covariance of a least-squares fit takes every cell's error for its own.  Three kinds of error are not:
+The covariance of a least-squares fit assumes independent errors of the cells.  Three kinds of error are not:
 
-- what a curve leaves at an operating point is the same in all its blocks: the sandwich over operating points
-  (Liang and Zeger, Biometrika 73, 1986) counts each of them once;
-- what the balance itself is off by (ripple, sampling of the bus) follows the voltage in one and the same way: a
-  common share of it, along and across, is carried through to the coefficients;
-- another form moves them: where a freer curve, or an effect that is too small for a name, would score better, the
-  parameters may be wrong by as much as it moves them.
+- The residual of a curve at an operating point is the same in all its blocks.  The sandwich estimator over operating
+  points (Liang and Zeger, Biometrika 73, 1986) counts each point once.
+- The error of the balance (ripple, sampling of the bus) is proportional to the voltage everywhere.  A common share of
+  it, parallel and perpendicular, is propagated to the coefficients.
+- Another form changes the parameters.  If a freer curve, or an additional effect too small for a name, scores better,
+  the change it causes is part of the uncertainty.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from scipy import stats
 from fluxproof.diagnosis.fit import PER_EFFECT
 from fluxproof.diagnosis.refine import TIE, point_numbers
 
-# Of the voltage, and of the bus along the current: rms of what healthy recordings show of each.
+# Relative to the voltage, and to the bus voltage in the direction of the current: rms in healthy recordings.
 COMMON_U, COMMON_DC = 2e-5, 1e-5
-LEAST_POINTS = 6  # more operating points than coefficients, else their scatter says nothing
+LEAST_POINTS = 6  # least surplus of operating points over coefficients; with fewer their scatter is not significant
 LEAST_DISPERSION = 0.8
 
 
 class Plain:
-    """What a fit itself says: its covariances {effect: (k, k)}, by chi^2 per degree of freedom."""
+    """The fit's own covariances {effect: (k, k)}, scaled by chi^2 per degree of freedom."""
 
     def __init__(self, solution, effects, nominal, reduced):
         self.solution, self.effects, self.nominal, self.reduced = solution, effects, nominal, reduced
@@ -33,7 +33,7 @@ class Plain:
         self.covariance = {name: matrix * wider for name, matrix in solution.covariance.items()}
 
     def others(self) -> list[dict]:
-        """Coefficients {effect: {...}} that other admissible models give the solution's effects."""
+        """Coefficients {effect: {...}} of the solution's effects in other admissible models."""
         return []
 
     def estimates(self, name, others):
@@ -50,10 +50,10 @@ class Plain:
 
 
 class Spread(Plain):
-    """Covariances of a refined solution of a search, and the models that would move its parameters."""
+    """Covariances of a refined solution of a search, and the models that would change its parameters."""
 
     def __init__(self, search, solution, reduced):
-        """reduced: chi^2 per degree of freedom that the solution leaves."""
+        """reduced: chi^2 per degree of freedom of the solution's residual."""
         super().__init__(solution, search.effects, search.view.nominal, reduced)
         self.search = search
         view, model = solution.view, solution.model
@@ -70,18 +70,18 @@ class Spread(Plain):
                 self._hidden(name, k)
 
     def _between_points(self):
-        """Covariance (k, k) from how the operating points differ; zero where they are too few."""
+        """Covariance (k, k) from the differences between operating points; zero if there are too few."""
         group = point_numbers(self.solution.view)[self.fitter.cells.block[self.fitter.use]]
         names, k = np.unique(group), len(self.carried)
         if len(names) < k + LEAST_POINTS:
             return np.zeros((k, k))
         scores = np.array([self.columns[group == g].T @ self.error[group == g] for g in names])
-        # Few of them know their own scatter badly: the quantile of Student's distribution for the normal one.
+        # With few points the scatter is uncertain: Student's quantile replaces the normal one.
         wider = (stats.t.ppf(0.975, len(names) - k) / stats.norm.ppf(0.975)) ** 2
         return self.inverse @ (scores.T @ scores) @ self.inverse * wider * len(names) / (len(names) - k)
 
     def _common(self):
-        """Covariance (k, k) of what the balance is off by in common."""
+        """Covariance (k, k) due to the common error of the balance."""
         view, f = self.solution.view, self.fitter
         u, bus = view.to_dq(view.u[:, 1:-1]), view.nominal.inverter.dc_bus_v
         along = view.i_mid / np.abs(view.i_mid).clip(0.02 * view.machine.rated_current_a)
@@ -102,22 +102,22 @@ class Spread(Plain):
         return out
 
     def _hidden(self, name, k):
-        """Widen an effect's covariance by a coefficient of its formula, column k, that is others' in this recording.
+        """Increase an effect's covariance for a coefficient of its formula (column k) that is collinear with others.
 
-        At one speed dry friction is viscous: any part of what was found may be the one or the other.
+        At one speed, Coulomb and viscous friction are collinear: any split between them fits equally well.
         """
         f, c = self.fitter, self.solution.c[name]
         own, hidden = [n for n in f.columns_of(self.solution.model) if f.owner[n] == name], f.a[:, k]
-        taken = dict(zip(self.carried, self.inverse @ (self.columns.T @ hidden), strict=True))  # of true columns
+        taken = dict(zip(self.carried, self.inverse @ (self.columns.T @ hidden), strict=True))  # of kept columns
         found = sum(c.get(f.names[n].lstrip("~"), 0.0) * f.scale[n] * f.a[:, n] for n in own)
         along = np.array([1.0 / f.scale[k] if n == k else -taken.get(n, 0.0) for n in own])
         self.covariance[name] += (hidden @ found) ** 2 * np.outer(along, along)
 
     def others(self) -> list[dict]:
-        """Coefficients {effect: {...}} that the best of the larger models give the solution's effects.
+        """Coefficients {effect: {...}} of the solution's effects in the best larger models.
 
-        A larger model frees a curve or has one effect more, which was too small for a name.  Of those that score better
-        than the solution itself, the best and what is tied with it; none where the solution is the best there is.
+        A larger model has a freer curve or one more effect, which was too small for a name.  Returned are the best of
+        those that score better than the solution and the ones tied with it; an empty list if none scores better.
         """
         search, solution, model = self.search, self.solution, self.solution.model
         at = search.fitter(solution.view, search.effects.values())
@@ -147,7 +147,7 @@ class Spread(Plain):
 
 
 def larger(first, second):
-    """A covariance that is in no direction below either of two, the first of which is regular."""
+    """A covariance that is in no direction smaller than either of two; the first one must be regular."""
     root = np.linalg.cholesky(first)
     inverse = np.linalg.inv(root)
     values, vectors = np.linalg.eigh(inverse @ second @ inverse.T)

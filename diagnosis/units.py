@@ -1,8 +1,7 @@
-"""Units that recordings come in, as a factor and an offset to the canonical SI unit of a column.
+"""Units of recordings, as factor and offset to the canonical SI unit of a column.
 
 canonical = raw * factor + offset.  A shaft quantity ("mech", "rpm", turns per second of the shaft) is multiplied
-by the pole pairs on its way to the electrical one; "erpm" and "Hz" are electrical already.  Effective values
-("Arms") become peak values.
+by the number of pole pairs; "erpm" and "Hz" are electrical.  rms values ("Arms") become peak values.
 """
 
 from __future__ import annotations
@@ -17,7 +16,7 @@ DEGREE = math.pi / 180.0
 RPM = TURN / 60.0
 PEAK = math.sqrt(2.0)
 
-# quantity -> {unit: factor}; units marked SHAFT also take the pole pairs.
+# quantity -> {unit: factor}; units in SHAFT are also multiplied by the pole pairs.
 SHAFT = "mech"
 FACTORS = {
     "s": {
@@ -120,7 +119,7 @@ def conversion(column: str, unit: str, pole_pairs: int) -> tuple[float, float] |
     """(factor, offset) from ``unit`` to the canonical unit of ``column``; None for an unknown unit."""
     table = FACTORS[COLUMNS[column]]
     found = next((u for u in table if u == unit), None)
-    if found is None:  # mV is not MV, but RPM is rpm
+    if found is None:  # case matters for prefixes (mV, MV), not for words (RPM)
         alike = [u for u in table if u.lower() == unit.lower()]
         if len({table[u] for u in alike}) != 1:
             return None
@@ -130,12 +129,12 @@ def conversion(column: str, unit: str, pole_pairs: int) -> tuple[float, float] |
 
 
 def known_units(column: str) -> str:
-    """The units a column can come in, for messages."""
+    """The units that are known for a column, for messages."""
     return ", ".join(u for u in FACTORS[COLUMNS[column]] if u)
 
 
 def split_unit(name: str) -> tuple[str, str]:
-    """("i_a", "mA") of "i_a [mA]" or "i_a (mA)"; ("i_a", "") where there is none."""
+    """("i_a", "mA") of "i_a [mA]" or "i_a (mA)"; ("i_a", "") without a unit."""
     found = BRACKETS.match(name.strip())
     return (
         (found["name"].strip(), found["unit"].strip())

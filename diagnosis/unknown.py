@@ -1,7 +1,7 @@
-"""What nothing in the catalogue explains: where it lives and the best sparse term for it.
+"""The single term that describes best what no effect of the catalogue explains.
 
-A generic dictionary, order x dependence, is regressed on what the best model leaves; the term that explains
-most is offered with its formula.  It describes; it does not name.
+Each term of a generic dictionary (harmonic order times a function of the operating point) is regressed on the residual
+of the best model; the one that explains most is reported with its formula.  It describes and names no cause.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from fluxproof.diagnosis.result import UnknownTerm
 
 
 def _dependences(view):
-    """{text: (b,) factor} that a term may be in proportion to, and its unit below the volt."""
+    """{text: ((b,) factor, unit of the coefficient)} of the functions in the dictionary."""
     omega, i = view.omega.mean(axis=1), view.i.mean(axis=1)
     return {
         "1": (np.ones(len(view)), "V"),
@@ -39,7 +39,7 @@ def m_dc(view) -> float:
 
 
 def sparse_term(view, cells, residual, sigma, train) -> UnknownTerm | None:
-    """The generic term that explains most of a residual (r,), or None where there is nothing to explain."""
+    """The dictionary term that explains most of a residual (r,), or None if there is no residual."""
     use = cells.ok & train & (cells.channel == "u")
     total = float(np.sum((residual[use] / sigma[use]) ** 2))
     best = None
@@ -69,7 +69,7 @@ def _formula(order, text, part, signed):
 
 
 def _best_part(cells, residual, sigma, use, order, factor):
-    """Gain in chi^2 and amplitude of one order and dependence, the better of its two parts or directions."""
+    """(gain in chi^2, amplitude, sigma, part, direction) of one order and function, for the better part."""
     best = (-1.0, 0.0, 0.0, 0, 1)
     for signed in (1,) if order == 0 else (1, -1):
         gains, values, spreads = [], [], []

@@ -1,47 +1,50 @@
-"""From what the search found to a verdict, names, ambiguities and one sentence."""
+"""Verdict, asserted names, ambiguity sets and the sentence, from the result of the search."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from fluxproof.diagnosis.cells import told
+from fluxproof.diagnosis.cells import column_of
 from fluxproof.diagnosis.curves import step_at_start
 from fluxproof.diagnosis.effect import ALIKE, DOUBT, sigma
 from fluxproof.diagnosis.result import NamedEffect
 
-LEFTOVER = 2.0  # reduced chi^2 that an explanation may leave
-FLOOR_SHARE = 0.15  # of the misfit's rms: a leftover below it is the curve's, not another effect's
+LEFTOVER = 2.0  # largest reduced chi^2 of an accepted explanation
+FLOOR_SHARE = 0.15  # of the misfit's rms: a smaller residual is attributed to the curve shapes, not to another effect
 
 
 CONSTANTS = {"magnet_temperature": "magnet_flux", "resistance_temperature": "resistance"}
-# Drift over constant part: below the first it is the constant's, above 1 / second nobody knows.
+# Drift relative to the constant part: below DRIFTS it belongs to the constant; above 1 / STANDS it is undecided.
 DRIFTS, STANDS = 0.25, 1.5
-STEADY = 0.1  # constant over drift: a thermocouple lags, and so much of a drift may seem to stand
+STEADY = 0.1  # constant over drift: the lag of a thermocouple makes this share of a drift look constant
 
-HOLDS = 0.05
-LEAST_WEIGHT = 4.0  # of a name: two standard deviations
-LEAST_KNOWN = 0.5  # of a parameter's stated standard deviation: at one speed friction's two parts hold each other's
-WORSE = 1.05  # misfit on points not fitted, after over before
-# Ohmic drop at rated current over the inverter's loss: a device's own slope is seldom larger.
+HOLDS = 0.05  # least share of an effect's power in an order that counts as one of its orders
+LEAST_WEIGHT = 4.0  # threshold for a name: two standard deviations, squared
+# Least value of a parameter in its stated standard deviations.  At one speed, Coulomb and viscous friction are
+# collinear, and each sigma contains the other one's value.
+LEAST_KNOWN = 0.5
+WORSE = 1.05  # largest ratio of the held-out misfit, after over before
+# Ohmic drop at rated current over the inverter's loss: the slope of a device is seldom larger.
 SLOPE_DEVICE, SLOPE_UNCLEAR = 0.12, 0.2
-# The same over what the loss grows between 0.12 and 0.3 of rated current: a drop in log(i), fitted with ohms, has up to
-# 4.7, every curve that levels off less.  Below the first they are the device's, beyond the second they are not.
+# Ohmic drop over the growth of the loss between 0.12 and 0.3 of rated current.  A drop in log(i), fitted together with
+# a resistance, gives up to 4.7; a curve that levels off gives less.  Below the first value the slope belongs to the
+# device, beyond the second to a resistance.
 GROWS_ON, STANDS_STILL = 2.5, 5.0
-STRAIGHT = 0.03  # of the inverter's loss: fewer ohms than that may be what is wrong with its curve
+STRAIGHT = 0.03  # of the inverter's loss: a smaller ohmic drop may be an error of the loss curve
 
 
 def groups(best, tied, effects, nominal, silent=frozenset(), cold=False, straight=None):
-    """(asserted names, ambiguity sets): what all tied models share, and the rest in sets that exclude each other.
+    """(asserted names, ambiguity sets): the names that all tied models share, and the others as alternatives.
 
-    straight: (least, most) [V] of ohms at rated current that no device makes (ohms.py).  cold: whether the
-    recording is known to have begun cold, so that what stood at its start is not warmth.
+    straight: (least, most) [V] ohmic drop at rated current that no device explains (ohms.py).  cold: whether the
+    recording is known to have begun cold, so that a deviation at its start is not due to temperature.
     """
     models = [s.model.names - silent for s in (best, *tied)]
     shared = frozenset.intersection(*models)
     rest = frozenset().union(*models) - shared
     ambiguity = (
         [sorted(rest)] if len(rest) > 1 else []
-    )  # one alone is there or is not: too weak to be spoken of
+    )  # a single optional effect has no alternative: it is too weak to be reported
     for drift, constant in CONSTANTS.items():
         if {drift, constant} <= shared:
             moved = effects[drift].size(best.c[drift], nominal)
@@ -62,11 +65,11 @@ def groups(best, tied, effects, nominal, silent=frozenset(), cold=False, straigh
 
 
 def owner_of_ohms(solution, effects, nominal, straight=None) -> str:
-    """dead_time or resistance: whose the ohms beside an inverter's loss are; "" where nobody can tell.
+    """Cause of an ohmic drop next to an inverter's loss: "dead_time" (the devices) or "resistance"; "" if undecided.
 
-    A device's slope is ohms too, but never less than none, and one that grows up to rated current grows before as well.
-    straight: (least, most) of them [V] that are none's.  More than all that the loss grows are a winding's; where they
-    may be none, they are the device's.
+    The slope of a device is ohmic too, but never negative, and a device whose drop grows up to rated current also
+    grows below.  straight: (least, most) [V] of the drop that no device explains: if the least exceeds the growth of
+    the loss, it is a winding resistance; if the range contains zero, the drop belongs to the devices.
     """
     least, most = straight or (-np.inf, np.inf)
     loss = solution.c["dead_time"]
@@ -79,7 +82,7 @@ def owner_of_ohms(solution, effects, nominal, straight=None) -> str:
 
 
 def _owner_by_growth(solution, size, nominal) -> str:
-    """The same by what a loss of a full size [V] grows between 0.12 and 0.3 of rated current."""
+    """The same decision from the growth of the loss between 0.12 and 0.3 of rated current; size: full loss [V]."""
     (signed, *_), loss = solution.c["resistance"].values(), solution.c["dead_time"]
     ohms = abs(signed) * nominal.machine.rated_current_a
     if signed < 0.0:
@@ -97,9 +100,9 @@ def _owner_by_growth(solution, size, nominal) -> str:
 
 
 def _stays(constant, drift, solution, effects) -> float:
-    """Size of a constant, less what the drift's free course takes back of it as soon as the recording has begun.
+    """Size of a constant, minus the part that the drift's free course cancels at the start of the recording.
 
-    A thermocouple that lags leaves a step there which is in no other part of the recording.
+    A lagging thermocouple causes such a step at the start and nowhere else.
     """
     (value, *_), step = solution.c[constant].values(), step_at_start(solution.c[drift])
     if value * step < 0.0:
@@ -107,19 +110,19 @@ def _stays(constant, drift, solution, effects) -> float:
     return effects[constant].size({next(iter(solution.c[constant])): value}, solution.view.nominal)
 
 
-WARMTH = {"magnet_flux": -1.0, "resistance": 1.0}  # what a machine that was warm from the start does to it
+WARMTH = {"magnet_flux": -1.0, "resistance": 1.0}  # sign of the change in a machine that was warm from the start
 
 
 def _like_warmth(constant, solution, nominal) -> bool:
-    """Whether a wrong constant has the sign that warmth from the start would give it."""
+    """Whether the deviation of a constant has the sign that a warm start would cause."""
     return WARMTH[constant] * next(iter(solution.c[constant].values())) > 0.0
 
 
 def lag_of_currents(solution) -> float:
-    """By how much the measured currents alone are late [s], where a delay and a skew of a solution say that; else 0.
+    """Lag of the measured currents alone [s], if delay and skew of a solution are equal and opposite; else 0.
 
-    Voltage late and angle early by the same are nothing but currents that are late: a filter in front of the
-    converters.  No effect is that, and neither of the two names is.
+    Voltage late and angle early by the same time are equivalent to late currents, as a filter in front of the
+    converters causes.  The catalogue has no such effect, so that neither name may be asserted.
     """
     c = solution.c
     if not {"delay", "sampling_skew"} <= solution.model.names:
@@ -129,11 +132,11 @@ def lag_of_currents(solution) -> float:
 
 
 def verdict(names, ambiguity, left, lag=0.0) -> str:
-    """The verdict from the names, the ambiguity sets, what remains and a lag that no effect is."""
+    """The verdict from the names, the ambiguity sets, the residual and a lag of the currents [s]."""
     if left.stray or left.group or lag:
         return "unexplained"
     if names and left.fit.holdout_after > WORSE * left.fit.holdout_before:
-        return "unexplained"  # a fit that does not carry over explains nothing
+        return "unexplained"  # a fit that does not generalise explains nothing
     if not names and not ambiguity:
         return "no_mismatch" if left.reduced <= LEFTOVER else "unexplained"
     if left.reduced > LEFTOVER and left.fit.share_left > FLOOR_SHARE:
@@ -142,11 +145,11 @@ def verdict(names, ambiguity, left, lag=0.0) -> str:
 
 
 def carried(names, found, cells, worth, effects):
-    """Names that bring more than what is left where they live, where much is left; ``worth(solution, name)`` in chi^2.
+    """Names whose gain in chi^2, ``worth(solution, name)``, exceeds the residual in their own channels and orders.
 
-    A harmonic that a dead time's curve leaves says nothing against ohms: what counts are the orders of a channel that
-    hold the effect.  An error of the record acts on all of it, so that all that is left speaks against it.
-    cells: of the solution's view.
+    Applied only if the residual is significant.  Only orders in which the effect has power count: a residual harmonic
+    of a dead-time curve is no evidence against a resistance.  A measurement error acts on every order, so that the
+    whole residual counts against it.  cells: of the solution's view.
     """
     best = found.best
     if best.dispersion <= LEFTOVER:
@@ -162,9 +165,9 @@ def carried(names, found, cells, worth, effects):
 
 
 def lives(cells, name, c, sigma, use):
-    """(r,) rows of the channels' orders that hold an effect with coefficients c, each at least HOLDS of its power."""
+    """(r,) bool: rows of the channels and orders that contain at least HOLDS of the power of an effect with c."""
     columns = cells.columns[name]
-    own = sum(v * columns[told(columns, k)] for k, v in c.items() if told(columns, k))
+    own = sum(v * columns[column_of(columns, k)] for k, v in c.items() if column_of(columns, k))
     power, out = np.where(use, (own / sigma) ** 2, 0.0), np.zeros(len(use), bool)
     for channel in np.unique(cells.channel):
         for order in np.unique(cells.order[cells.channel == channel]):
@@ -174,9 +177,9 @@ def lives(cells, name, c, sigma, use):
 
 
 def beyond_doubt(spread, names) -> list[str]:
-    """Names whose coefficients are larger than their uncertainty where every operating point is counted once.
+    """Names whose coefficients exceed their uncertainty when every operating point counts once.
 
-    A name of which no parameter is known to twice its value says nothing either, whatever the fit makes of it.
+    A name is also dropped if the stated sigma of each of its parameters is more than twice its value.
     """
     others = spread.others()
     return [name for name in names if _weight(spread, name) >= LEAST_WEIGHT and _known(spread.estimates(name, others))]
@@ -187,7 +190,7 @@ def _known(estimates) -> bool:
 
 
 def _weight(spread, name) -> float:
-    """Square of an effect's coefficients in standard deviations, per coefficient."""
+    """Squared coefficients of an effect in standard deviations (Mahalanobis distance), per coefficient."""
     c, covariance = np.array(list(spread.solution.c[name].values())), spread.covariance[name]
     return float(c @ np.linalg.pinv(covariance) @ c) / max(len(c), 1)
 
@@ -201,7 +204,7 @@ def named(spread, names, empty) -> list[NamedEffect]:
         share = effect.relative({n: solution.c[n] for n in names}, spread.nominal)
         estimates = spread.estimates(name, others)
         for e in estimates.values() if share != 1.0 else ():
-            # Either may be what it is a share of: ohms beyond the nameplate's may stand outside the winding.
+            # The reference may be either resistance: ohms beyond the nameplate may lie outside the winding.
             e.value, e.sigma = share * e.value, float(np.hypot(share * e.sigma, (1.0 - share) * e.value))
         out.append(
             NamedEffect(
@@ -227,17 +230,17 @@ def size_text(effect, estimates) -> str:
 def sentence(verdict, effects_named, ambiguity, fit, effects, location) -> str:
     """The verdict in one sentence."""
     if verdict == "no_mismatch":
-        return f"Simulation and recording agree: the misfit of {fit.train_before:.3g} V is noise."
+        return f"Simulation and recording agree: the misfit of {fit.train_before:.3g} V is within the noise."
     what = " and ".join(
         f"{effects[e.name].title} ({size_text(effects[e.name], e.parameters)})" for e in effects_named
     )
     before, after = fit.holdout_before, fit.holdout_after
-    gain = f"the misfit on operating points not fitted falls from {before:.3g} V to {after:.3g} V"
+    gain = f"the misfit at operating points that were not fitted falls from {before:.3g} V to {after:.3g} V"
     if verdict == "explained":
         return f"{what[0].upper()}{what[1:]}: {gain}."
     if verdict == "ambiguous":
         sets = "; ".join(" or ".join(group) for group in ambiguity)
-        first = f"{what[0].upper()}{what[1:]} for certain; beyond it t" if what else "T"
-        return f"{first}his recording cannot tell {sets} apart."
+        first = f"{what[0].upper()}{what[1:]} for certain; beyond that, t" if what else "T"
+        return f"{first}his recording cannot separate {sets}."
     where = f" in {location.signal}" if location.signal else ""
-    return f"Unknown: nothing in the catalogue explains the misfit of {fit.train_before:.3g} V{where}."
+    return f"Unknown: no effect in the catalogue explains the misfit of {fit.train_before:.3g} V{where}."

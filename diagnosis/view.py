@@ -1,8 +1,8 @@
-"""Blocks of rows at steady operating points: what every effect computes its terms from.
+"""Blocks of rows at steady operating points, from which every effect computes its columns.
 
-Row k of a block is the interval from sample k to k+1.  Where a current enters a regressor it is a parabola
-over the block: the noise of a raw current is also in the misfit, and noise regressed on noise names an
-inductance on a healthy drive.  ``blocks.view_of`` cuts a recording.
+Row k of a block is the interval from sample k to k+1.  The current of a regressor is a parabola over the block: the
+noise of a raw current is also in the misfit, and this correlation would cause a false inductance error on a healthy
+drive.  ``blocks.view_of`` cuts a recording into blocks.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ class View:
 
     theta, omega, i: (b, m+1) smoothed angle [rad], speed [rad/s], current in dq, complex [A]
     i_raw: (b, m+1) measured current in the stator frame, complex [A]
-    i_abc: (b, m+1, 3) measured phase currents, or None where the recording has dq only [A]
+    i_abc: (b, m+1, 3) measured phase currents [A], or None if the recording has dq only
     u: (b, m+2) stator-frame voltage of the intervals -1 .. m, complex [V]; u_dc: (b, m) [V]
     t, temp, run: (b,) time since the first row [s], winding temperature [degC] or nan, number of the dwell
-    course: (b,) how far slow changes (warming, fading) have gone, from 0 at the start to 1 at the end
-    torque: (b, m) torque at the shaft [Nm], nan where nothing is known of it; slope_m: (b, m) d omega_m / dt
-    shaft: (b,) what is known of the shaft (see shaft.py)
-    psi_extra: (b, m+1) flux beyond the nominal one that is known by now, for terms that depend on the flux [Wb]
-    delta_l: what is known by now of L_d and L_q beyond the nominal [H]
-    late_s: by how much the dead time that is known by now moves the middle of every pulse [s]
+    course: (b,) progress of slow drifts (warming), from 0 at the start to 1 at the end
+    torque: (b, m) shaft torque [Nm], nan where unknown; slope_m: (b, m) d omega_m / dt
+    shaft: (b,) kind of shaft (see shaft.py)
+    psi_extra: (b, m+1) excess over the nominal flux found so far [Wb], for terms that depend on the flux
+    delta_l: errors of L_d and L_q found so far [H]
+    late_s: shift of the middle of every pulse [s] due to the dead time found so far
     """
 
     nominal: object
@@ -53,8 +53,8 @@ class View:
     psi_extra: np.ndarray | float = 0.0
     delta_l: tuple[float, float] = (0.0, 0.0)
     late_s: float = 0.0
-    noise_gain: float = 1.0  # what a correction of the currents did to their noise
-    memo: dict = dataclasses.field(default_factory=dict)  # of effects, the same for all views of a recording
+    noise_gain: float = 1.0  # factor of a current correction on the current noise
+    memo: dict = dataclasses.field(default_factory=dict)  # cache of the effects, shared by all views of a recording
 
     def __len__(self):
         return len(self.t)
@@ -67,8 +67,8 @@ class View:
     def i_mid(self):
         """Mean of an interval's two samples in the stator frame, in dq at its middle angle, (b, m) complex [A].
 
-        The mean in dq would be longer by (omega T)^2 / 8: half a per cent of R i passes for ohms that fade with the
-        speed, or beside an iron loss for a sampling skew.
+        The mean in dq would be longer by (omega T)^2 / 8.  An error of 0.5 % of R i resembles a resistance that falls
+        with speed, or, with an iron loss, a sampling skew.
         """
         half = np.exp(0.5j * np.diff(self.theta, axis=1))
         return 0.5 * (half * self.i[:, 1:] + np.conj(half) * self.i[:, :-1])
@@ -80,12 +80,12 @@ class View:
 
     @property
     def top_speed(self):
-        """Largest speed of the recording [rad/s], also of a view of points that were made up beside it."""
+        """Highest speed of the recording [rad/s]; a view of simulated points keeps that of the recording."""
         return self.memo.get("top_speed") or max(float(np.abs(self.omega).max()), 1e-9)
 
     @property
     def lone(self):
-        """Whether the recording has points for one effect only; so have points that were made up beside it."""
+        """Whether the recording has points for one effect only; simulated points keep that of the recording."""
         return self.memo.get("lone", False)
 
     @property
@@ -101,11 +101,11 @@ class View:
 
     @property
     def psi(self):
-        """Flux linkage of the current as far as it is known, (b, m+1) complex dq [Wb]."""
+        """Flux linkage including the excess found so far, (b, m+1) complex dq [Wb]."""
         return self.nominal_psi + self.psi_extra
 
     def inductances(self, i):
-        """L_d i_d + j L_q i_q of a dq current, inductances as far as they are known [Wb]."""
+        """L_d i_d + j L_q i_q [Wb] of a dq current, with the inductance errors found so far."""
         l_d, l_q = (
             self.machine.inductance_d_h + self.delta_l[0],
             self.machine.inductance_q_h + self.delta_l[1],
@@ -122,15 +122,15 @@ class View:
         return dq * np.exp(1j * self.theta)
 
     def turned(self, delta):
-        """The view with the measured angle less ``delta`` [rad], a number or (b, m+1)."""
+        """The view with ``delta`` [rad], a number or (b, m+1), subtracted from the measured angle."""
         return self.replace(
             theta=self.theta - delta, i=self.i * np.exp(1j * delta) * np.ones_like(self.theta)
         )
 
     def without_current(self, error, raw_gain=None, turn=0.0):
-        """The view with phase errors (b, m+1, 3) [A] taken off the smoothed current, and off the measured one.
+        """The view with phase errors (b, m+1, 3) [A] subtracted from the smoothed and the measured current.
 
-        raw_gain, turn: the measured currents are divided by the gains (3,) and turned back instead.
+        raw_gain, turn: the measured currents are instead divided by the gains (3,) and rotated back.
         """
         i = self.i - self.from_phases(error)
         if raw_gain is None:
@@ -144,11 +144,11 @@ class View:
         return self.replace(i=i, i_raw=i_raw, i_abc=None if self.i_abc is None else mended)
 
     def with_raw_current(self):
-        """The view with the measured current in place of the smoothed one."""
+        """The view with the measured current instead of the smoothed one."""
         return self.replace(i=self.i_raw * np.exp(-1j * self.theta))
 
     def to_dq(self, stator):
-        """(b, m) stator-frame quantity of the intervals, turned to dq at the middle angle."""
+        """(b, m) stator-frame quantity of the intervals, rotated to dq at the middle angle."""
         return stator * np.exp(-1j * self.theta_mid)
 
     def flux(self, psi):
@@ -185,10 +185,10 @@ class View:
 
 
 def joined_views(views: list[View]) -> View:
-    """Several recordings of one drive as one view; time runs on, dwells stay apart.
+    """Several recordings of one drive as one view; time continues, dwells stay separate.
 
-    Slow changes run on with the time as well, but for a recording that is short beside the first one, in which they
-    stand, and one whose winding temperature says where they stand: see ``_course_of``.
+    Slow drifts continue with time too, with two exceptions: they are constant in a recording shorter than the first
+    one, and a winding temperature determines their progress (``_course_of``).
     """
     first = views[0]
     if len(views) == 1:
@@ -210,30 +210,30 @@ def joined_views(views: list[View]) -> View:
     )
 
 
-COLD_K = 5.0  # this near to the nameplate's temperature a machine is cold
+COLD_K = 5.0  # a machine within this difference from the nameplate temperature is cold
 
 
 def is_cold(view) -> np.ndarray:
-    """(b,) whether the winding is known to be at the temperature for which the nameplate holds."""
+    """(b,) bool: whether the winding is known to be at the nameplate's temperature."""
     return np.abs(view.temp - view.machine.temperature_ref_c) < COLD_K
 
 
 def stayed_cold(view) -> bool:
-    """Whether the winding is known to have been cold throughout: what drifted then, it does not tell the time of."""
+    """Whether the winding is known to have been cold throughout, so that it does not indicate a drift's progress."""
     return bool(is_cold(view).all())
 
 
 def started_cold(view) -> bool:
-    """Whether it is known that slow changes began from the state for which the nameplate holds."""
+    """Whether drifts are known to have begun in the state of the nameplate."""
     return bool((is_cold(view) & (view.course < 0.05)).any())
 
 
 def _course_of(view, first, begin, end, total):
-    """(b,) course of one of several recordings: by its temperature where that tells, else from begin to end [s].
+    """(b,) progress of drifts in one of several recordings: by its temperature if possible, else begin to end [s].
 
-    A recording that is cold throughout stands where a cold machine starts, unless the first one was cold throughout
-    as well: magnets warm by their own losses.  One at a temperature that the first recording passed through stands
-    where that was.
+    A recording that is cold throughout has the progress of a cold start, unless the first one was cold throughout too,
+    since the magnets warm by their own losses.  A temperature that the first recording passed through has the progress
+    of that time.
     """
     by_time = np.minimum(view.t + begin, end) / max(total, 1e-9)
     if view is first or not np.isfinite(view.temp).all() or stayed_cold(first):

@@ -57,7 +57,7 @@ def compiled(folder: Path, drive, bus: Path) -> Path:
 
 @pytest.fixture(scope="module")
 def program(drive, tmp_path_factory):
-    return compiled(tmp_path_factory.mktemp("bring_up"), drive, ROOT / "cocotb_tests" / "bus_pipe.c")
+    return compiled(tmp_path_factory.mktemp("bring_up"), drive, ROOT / "cocotb_tests" / "support" / "bus_pipe.c")
 
 
 def test_compiles_for_linux_on_a_zynq(drive, tmp_path):

@@ -282,9 +282,9 @@ def test_what_is_no_capture(golden, tmp_path, capsys):
     other[:, 0] = telemetry_words.MAGIC << 16 | 2 << 8 | COUNT
     rng = np.random.default_rng(3)
     for content, wanted in (
-        (b"", "0 bytes hold no telemetry packet"),
-        (raw(words[0])[:-1], "95 bytes hold no telemetry packet"),
-        (rng.bytes(5000), f"nowhere a word 0x{HEADER_WORD:08x}"),
+        (b"", "0 bytes are too few for a telemetry packet"),
+        (raw(words[0])[:-1], "95 bytes are too few for a telemetry packet"),
+        (rng.bytes(5000), f"no word 0x{HEADER_WORD:08x}"),
         (
             b"\0" * 9 + raw(other),
             f"byte 9: telemetry packets of version 2 with {COUNT} words: this reader knows",

@@ -8,15 +8,12 @@ import pytest
 
 from fluxproof.checkout import RTL
 from fluxproof.cosim import verilog
-from scripts.synth import kept, report, timing
-from scripts.synth.__main__ import SMALL
+from scripts.synth import ecp5, kept, report
+from scripts.synth.__main__ import figures, rows_of
 from scripts.synth.count import Count, count, read_cells
-from scripts.synth.ecp5 import described
 from scripts.synth.groups import CORE, GROUPS, check, instances
-from scripts.synth.names import Names
-from scripts.synth.routed import Slowest
-from scripts.synth.wrapper import ports, wrap
-from scripts.synth.yosys import Design, modules_of, part_of, read_sta
+from scripts.synth.parts import SMALL
+from scripts.synth.yosys import Design, modules_of, part_of
 
 ROW = {"lut": 1000, "ff": 500, "dsp": 20, "bram": 2}
 
@@ -184,73 +181,49 @@ def test_sums_and_targets():
     assert "not there" in report.table(groups)
 
 
-# The wrapper and the routed path
+def test_a_family_without_groups_has_its_total_only():
+    assert figures({}, Count(lut=7)) == {"total": {"lut": 7, "ff": 0, "dsp": 0, "bram": 0}}
+    assert list(rows_of({}, Count(lut=7))) == ["total, in one piece"]
+    groups = {name: Count(lut=1) for name in GROUPS} | {"registers_telemetry": None, "between_blocks": Count()}
+    assert figures(groups, Count())["registers_telemetry"] is None and len(figures(groups, Count())) == len(GROUPS) + 2
+    rows = rows_of(groups, Count(lut=9))
+    assert (rows["FOC, SVM, gates"].lut, rows["sum"].lut) == (2, len(GROUPS)) and "between_blocks" not in rows
 
 
-MODULE = "module m\n  (input  clk,\n   input  [2:0] a,\n   input b,\n   output [1:0] c,\n   output d);\nendmodule\n"
+# The routed path
 
 
-def test_the_wrapper_reaches_every_bit():
-    assert ports(MODULE, "m")[1:3] == [("input", "a", 3), ("input", "b", 1)]
-    text = wrap(MODULE, "m")
-    assert "m dut (.clk(clk), .a(given[2:0]), .b(given[3:3]), .c(made[1:0]), .d(made[2:2]));" in text
-    assert "reg [3:0] given" in text and "reg [2:0] taken" in text
+def nextpnr_report() -> dict:
+    """What nextpnr 0.11 writes, cut down: one clock, its slowest path, and one from a port."""
+    steps = [("clk-to-q", 0.5), ("routing", 1.25), ("logic", 0.25), ("routing", 2.0), ("setup", 0.0)]
+    path = [{"type": kind, "delay": ns, "from": {"cell": "a", "port": "Q"}, "to": {"cell": "b", "port": "DI"}}
+            for kind, ns in steps]  # fmt: skip
+    path[0]["from"]["cell"], path[-1]["to"]["cell"] = "first", "last"
+    paths = [{"from": "posedge aclk", "to": "posedge aclk", "path": path}]
+    paths += [{"from": "<async>", "to": "posedge aclk", "path": path}]
+    return {"fmax": {"aclk": {"achieved": 250.0, "constraint": 12.0}}, "critical_paths": paths}
 
 
-def test_registers_have_the_names_of_the_vhdl(tmp_path):
-    verilog = """module m
-  (input  clk,
-   input [1:0] a,
-   output [1:0] c);
-  reg [1:0] n7_q;
-  assign prod_2 = n7_q; // (signal)
-  /* control/x.vhd:12:3  */
-  assign n6_o = $signed(a) * $signed(a); // smul
-  always @(posedge clk)
-    n7_q <= n6_o;
-endmodule
-"""
-    text = verilog + wrap(verilog, "m")
-    (tmp_path / "design.v").write_text(text)
-    chain = next(n for n, line in enumerate(text.splitlines(), 1) if "given <=" in line)
-
-    def cell(kind, line, bit=99):
-        return {
-            "type": kind,
-            "attributes": {"src": f"design.v:{line}.3-{line + 1}.9"},
-            "connections": {"Q": [bit]},
-        }
-
-    cells = {
-        "x_TRELLIS_FF_Q_1": cell("TRELLIS_FF", 9),
-        "x_MULT18X18D_P9": cell("MULT18X18D", 8),
-        "dut.a_TRELLIS_FF_Q": cell("TRELLIS_FF", chain, 31),
-        "taken_TRELLIS_FF_Q": cell("TRELLIS_FF", chain, 40),
-        "x_LUT4_Z": {"type": "LUT4", "attributes": {}},
-        "dut.n9.0.0": {"type": "DP16KD", "attributes": {}},
-    }
-    nets = {"given": {"bits": [30, 31]}, "taken": {"bits": [40, 41]}}
-    (tmp_path / "design.json").write_text(
-        json.dumps({"modules": {"shifted": {"cells": cells, "netnames": nets}}})
-    )
-    names = Names(tmp_path, "m")
-    assert [names.register(name) for name in cells] == [
-        "m.prod_2",
-        "multiplier of control/x.vhd:12",
-        "input a",
-        "output c",
-        "x",
-        "block RAM dut.n9.0.0",
-    ]
+def test_a_report_of_nextpnr_is_read():
+    one = ecp5.read_report(nextpnr_report(), 7)
+    assert one == ecp5.Routed(7, 250.0, "first", "last", 0.75, 3.25)
+    summary = ecp5.summary([one, ecp5.Routed(8, 240.04, "a", "b", 1.0, 3.0), ecp5.Routed(9, 245.0, "a", "b", 1.0, 3.0)])
+    assert (summary["median_mhz"], summary["fmax_mhz"]) == (245.0, [250.0, 240.0, 245.0])
+    assert "median 245.0 MHz, 240.0 to 250.0" in ecp5.verdict(summary)
 
 
-def test_a_path_in_words():
-    carry = ["n3_CCU2C_S0$CCU2_COMB0", "n3_CCU2C_S0$CCU2_COMB1"]
-    cells = ["n1_o_TRELLIS_FF_Q_3", "p_MULT18X18D_P9", *carry, "n4_o_LUT4_Z"]
-    path = described(Slowest([(cell, "F") for cell in cells], "n4_q_TRELLIS_FF_Q", 7.1, 5.1), str.upper)
-    assert (path.start, path.end) == (cells[0].upper(), "N4_Q_TRELLIS_FF_Q")
-    assert (path.delay, path.logic) == (7.1, 5.1)
-    assert path.cells == ("MULT18X18D", "carry of 2 bits", "LUT4")
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda report: report["fmax"].update(other={"achieved": 1.0}), "2 clocks"),
+        (lambda report: report["critical_paths"].pop(0), "0 slowest paths"),
+    ],
+)
+def test_a_report_without_one_clock_and_its_path_is_an_error(change, words):
+    report = nextpnr_report()
+    change(report)
+    with pytest.raises(ValueError, match=words):
+        ecp5.read_report(report, 1)
 
 
 # The real thing
@@ -266,20 +239,3 @@ def test_small_blocks_are_as_kept():
     kept_counts = {"xc7, block alone": kept.read()["counts"]["xc7, block alone"]}
     assert kept.changes(kept_counts, {"xc7, block alone": counted}) == [], "make synth ARGS='--update REASON'"
     assert all(row["lut"] > 0 for row in counted.values())
-
-
-def test_logic_delay_is_read(tmp_path):
-    text = "Warning: Module 'FDRE' has no timing arcs!\nLatest arrival time in 'fluxproof' is 2678:\n"
-    (tmp_path / "sta.txt").write_text(text)
-    assert read_sta(tmp_path / "sta.txt") == {"logic_ns": 2.678, "without_arcs": ["FDRE"]}
-    (tmp_path / "sta.txt").write_text("nothing")
-    with pytest.raises(ValueError, match="sta"):
-        read_sta(tmp_path / "sta.txt")
-
-
-def test_the_verdict_names_the_median():
-    def said(*fmax):
-        return timing.verdict({"fmax_mhz": list(fmax), "median": sorted(fmax)[len(fmax) // 2]})
-
-    assert "median 130.0 MHz, 120.0 to 140.0; target 130 MHz: met" in said(140.0, 120.0, 130.0)
-    assert said(129.0).endswith("missed by 1 MHz")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shutil
 import subprocess
@@ -46,7 +47,7 @@ def needs_tclsh() -> None:
 def stubbed(facts: Path, script: Path, *arguments: str) -> subprocess.CompletedProcess:
     """``script`` under vivado_stub.tcl."""
     needs_tclsh()
-    stub = ROOT / "cocotb_tests" / "vivado_stub.tcl"
+    stub = ROOT / "cocotb_tests" / "support" / "vivado_stub.tcl"
     return subprocess.run(
         ["tclsh", str(stub), str(facts), str(script), *arguments], capture_output=True, text=True
     )
@@ -67,6 +68,22 @@ def test_example_script(facts, tmp_path):
     assert "create_project -part xc7z045ffg900-2 -force 1 example" in done.stdout
     for report in ("utilization", "timing", "cdc", "drc"):
         assert f"-file {tmp_path}/reports/{report}.rpt" in done.stdout
+
+
+def test_example_fills_the_table(facts, tmp_path):
+    """The row that the routed example writes has the columns of docs/vivado.md, and the JSON says the same."""
+    done = stubbed(facts, VIVADO / "example.tcl", str(tmp_path), "xc7z045ffg900-2")
+    assert done.returncode == 0, done.stderr
+    row = [cell.strip() for cell in (tmp_path / "result.md").read_text().strip().strip("|").split("|")]
+    result = json.loads((tmp_path / "result.json").read_text())
+    assert row == [str(value) for value in result.values()]
+    assert re.fullmatch(r"20\d\d-\d\d-\d\d", result["date"]) and re.fullmatch(r"unknown|[0-9a-f]+\+?", result["commit"])
+    wanted = {"part": "xc7z045ffg900-2", "speed_grade": "-2", "clock_mhz": 100, "wns_ns": 0.5, "tool": "Vivado 2023.2"}
+    assert {name: result[name] for name in wanted} == wanted
+    page = (ROOT / "docs" / "vivado.md").read_text()
+    (header,) = re.findall(r"^\| (Date .*) \|$", page, re.MULTILINE)
+    columns = ["Date", "Part", "Speed grade", "Clock (MHz)", "WNS (ns)", "Commit", "Tool"]
+    assert [name.strip() for name in header.split("|")] == columns and len(row) == len(columns)
 
 
 @pytest.mark.parametrize("name", ["fluxproof.xdc", "fluxproof_clock.xdc", "example.xdc"])
@@ -99,6 +116,9 @@ def test_constraints_name_registers_that_exist():
         ("example.tcl", "adc_u_dc position_code trip", "position_code trip", "adc_u_dc is not connected"),
         ("example.tcl", "[file join $out ip]", "[file join $out ip2]", "does not hold"),
         ("example.tcl", "-dict [list CONFIG.NUM_SI 1 CONFIG.NUM_MI 2] $control", "-dict {A 1} $control", "property A"),
+        ("result.tcl", "STATS.WNS [get_runs", "PART [get_runs", "impl_1 has no property PART"),
+        ("result.tcl", "STATS.WNS [get_runs", "PROGRESS [get_runs", "impl_1 has no worst slack"),
+        ("result.tcl", "version -short", "version -brief", "no option -brief"),
     ],
 )  # fmt: skip
 def test_stub_notices_what_is_wrong(facts, tmp_path, script, old, new, told):
@@ -110,7 +130,8 @@ def test_stub_notices_what_is_wrong(facts, tmp_path, script, old, new, told):
     text = copy.read_text()
     assert old in text
     copy.write_text(text.replace(old, new))
-    done = stubbed(facts, copy, str(tmp_path / "out"))
+    run = copy if script == "package_ip.tcl" else copy.with_name("example.tcl")
+    done = stubbed(facts, run, str(tmp_path / "out"))
     assert done.returncode != 0 and told in done.stderr, done.stderr
 
 

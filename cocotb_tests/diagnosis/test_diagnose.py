@@ -34,7 +34,7 @@ NAMES = """
     current_gain current_scale udc_gain phase_resistance_asymmetry cogging friction""".split()
 
 
-def told(answer) -> str:
+def summary(answer) -> str:
     """Everything that matters of an answer, for a failing test."""
     return f"{answer.verdict}: {answer.sentence} {answer.ambiguity} {answer.fit}"
 
@@ -77,8 +77,8 @@ def view():
 
 def test_a_healthy_drive_has_no_mismatch():
     answer = diagnose(recorded(), NOMINAL)
-    assert answer.verdict == "no_mismatch" and not answer.effects and not answer.ambiguity, told(answer)
-    assert answer.fit.holdout_before < 0.2, told(answer)
+    assert answer.verdict == "no_mismatch" and not answer.effects and not answer.ambiguity, summary(answer)
+    assert answer.fit.holdout_before < 0.2, summary(answer)
     assert answer.rows == len(GRID) * 800 and answer.problems == []
 
 
@@ -86,30 +86,30 @@ def test_a_healthy_drive_has_no_mismatch():
 def test_an_effect_is_named_with_its_size(name):
     deviation, parameter, value, bound = CASES[name]
     answer = diagnose(recorded(**deviation), NOMINAL)
-    assert answer.verdict == "explained" and [e.name for e in answer.effects] == [name], told(answer)
+    assert answer.verdict == "explained" and [e.name for e in answer.effects] == [name], summary(answer)
     estimate = answer.effects[0].parameters[parameter]
     assert abs(estimate.value - value) < bound, (estimate, value)
     assert 0.0 < estimate.sigma < bound and answer.effects[0].explains > 0.9
     # The fit never saw these operating points.
-    assert answer.fit.holdout_after < 0.5 * answer.fit.holdout_before, told(answer)
+    assert answer.fit.holdout_after < 0.5 * answer.fit.holdout_before, summary(answer)
 
 
-def test_what_devices_drop_is_named_too():
+def test_device_drops_are_identified():
     answer = diagnose(recorded(inverter={"v_switch_v": 1.5, "v_diode_v": 1.5}), NOMINAL)
-    assert answer.verdict == "explained" and [e.name for e in answer.effects] == ["dead_time"], told(answer)
+    assert answer.verdict == "explained" and [e.name for e in answer.effects] == ["dead_time"], summary(answer)
     assert answer.effects[0].parameters["v_dead_v"].value == pytest.approx(1.5, rel=0.03)
 
 
-def test_the_noise_floor_is_that_of_noise():
+def test_noise_floor_equals_the_noise():
     """Whatever the effect, the same converters with the same noise made the recording."""
     healthy, saturated = (diagnose(recorded(machine=m), NOMINAL).fit.noise_floor for m in (None, SATURATED))
     assert 0.5 * healthy < saturated < 2.0 * healthy, (healthy, saturated)
 
 
-def test_two_effects_are_told_apart():
+def test_two_effects_are_separated():
     answer = diagnose(recorded(machine={"resistance_ohm": 1.836, "magnet_flux_wb": 0.15675}), NOMINAL)
     found = {e.name: e.parameters for e in answer.effects}
-    assert answer.verdict == "explained" and set(found) == {"resistance", "magnet_flux"}, told(answer)
+    assert answer.verdict == "explained" and set(found) == {"resistance", "magnet_flux"}, summary(answer)
     assert found["resistance"]["resistance_ohm"].value == pytest.approx(1.836, rel=0.01)
     assert found["magnet_flux"]["magnet_flux_wb"].value == pytest.approx(0.15675, rel=0.005)
 
@@ -118,11 +118,11 @@ def test_two_effects_are_told_apart():
 def test_one_operating_point_never_asserts_a_wrong_name(effect):
     answer = diagnose(recorded(POINT, **CASES[effect][0]), NOMINAL)
     asserted = {e.name for e in answer.effects}
-    assert asserted <= {effect}, told(answer)
-    assert answer.verdict in ("ambiguous", "explained", "unexplained"), told(answer)
+    assert asserted <= {effect}, summary(answer)
+    assert answer.verdict in ("ambiguous", "explained", "unexplained"), summary(answer)
     if answer.verdict == "ambiguous":
-        assert asserted or any(effect in group for group in answer.ambiguity), told(answer)
-        assert answer.next_recording, told(answer)
+        assert asserted or any(effect in group for group in answer.ambiguity), summary(answer)
+        assert answer.next_recording, summary(answer)
 
 
 SECOND = {"emf_harmonics": (Harmonic(2.0, 0.01, 0.01, 0.4),)}
@@ -130,7 +130,7 @@ SECOND = {"emf_harmonics": (Harmonic(2.0, 0.01, 0.01, 0.4),)}
 
 def test_an_effect_outside_the_catalogue_is_unknown():
     answer = diagnose(recorded(machine=SECOND), NOMINAL)
-    assert answer.verdict == "unexplained" and not answer.effects and not answer.ambiguity, told(answer)
+    assert answer.verdict == "unexplained" and not answer.effects and not answer.ambiguity, summary(answer)
     assert answer.location.orders[0].order == 2.0, answer.location
     term = answer.unknown_term
     assert "2 theta_e" in term.formula or "8 theta_m" in term.formula, term  # the same with four pole pairs
@@ -143,7 +143,7 @@ def test_an_effect_outside_the_catalogue_is_unknown():
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_an_entry_of_the_catalogue_says_what_it_is(name):
+def test_catalogue_entries_are_complete(name):
     effect = CATALOGUE[name]
     assert effect.name == name and effect.title and effect.signature and effect.separated_by
     assert "=" in effect.equation
@@ -156,7 +156,7 @@ def test_an_entry_of_the_catalogue_says_what_it_is(name):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_columns_of_an_effect_are_finite_and_not_nothing(name, view):
+def test_columns_of_an_effect_are_finite_and_nonzero(name, view):
     effect = CATALOGUE[name]
     core = effect.core(view)
     assert core
@@ -185,7 +185,7 @@ def test_every_effect_of_the_issue_has_a_file_of_its_own():
 
 NEW_EFFECT = """
 import numpy as np
-from diagnosis.effect import FluxEffect, Parameter, one, sigma
+from fluxproof.diagnosis.effect import FluxEffect, Parameter, one, sigma
 
 class SecondHarmonic(FluxEffect):
     def core_psi(self, view):
@@ -224,14 +224,14 @@ def test_a_new_file_is_a_new_effect(tmp_path, monkeypatch):
     finally:
         sys.modules.pop("diagnosis.catalogue.second_harmonic", None)
         vars(catalogue).pop("second_harmonic", None)
-    assert answer.verdict == "explained" and [e.name for e in answer.effects] == ["second_harmonic"], told(
+    assert answer.verdict == "explained" and [e.name for e in answer.effects] == ["second_harmonic"], summary(
         answer
     )
     # a_d cos and a_q sin of equal size are one wave that turns forward.
     assert answer.effects[0].parameters["order_2"].value == pytest.approx(0.01, rel=0.1)
 
 
-def test_a_transducer_is_not_taken_for_the_air_gap():
+def test_transducer_torque_is_not_mistaken_for_air_gap_torque():
     """The inertia's share of a shaft's torque is noise at a steady speed; it must not decide what was recorded."""
     rng = np.random.default_rng(5)
     omega_m = np.repeat([-60.0, -20.0, 20.0, 60.0], 500)
@@ -245,7 +245,7 @@ def test_a_transducer_is_not_taken_for_the_air_gap():
 
 
 @pytest.mark.parametrize("order", [12, 54])  # 54: 27 slots and an odd number of pole pairs
-def test_a_ripple_that_a_transducer_sees_keeps_its_size_at_any_speed_and_in_both_directions(order):
+def test_torque_ripple_amplitude_is_independent_of_speed_and_direction(order):
     """The transducer is read with the currents, the balance is made between two samples: 4 % at these speeds."""
     table = dict(columns(GRID))
     theta, p = table["theta_e"], MACHINE.pole_pairs
@@ -256,17 +256,17 @@ def test_a_ripple_that_a_transducer_sees_keeps_its_size_at_any_speed_and_in_both
     drag = MACHINE.viscous_friction_nms * table["omega_e"] / p
     table["torque"] = 1.5 * p * psi * i_q - drag + 0.4 * np.sin(order * theta + 0.7)
     answer = diagnose(from_columns(table, DRIVE.sample_time_s), PAPER)
-    assert [e.name for e in answer.effects] == ["cogging"], told(answer)
+    assert [e.name for e in answer.effects] == ["cogging"], summary(answer)
     found = answer.effects[0].parameters
     assert found["cogging_order"].value == order * p
     assert found["cogging_nm"].value == pytest.approx(0.4, rel=0.01)
 
 
-def test_a_spin_without_current_is_diagnosed():
+def test_rotation_at_zero_current_is_diagnosed():
     """No effect that needs current has a column then; the search must not trip over it."""
     plan = tuple((speed, 0.0, 0.0) for speed in (160.0, -160.0, 80.0, -80.0, 40.0, -40.0, 120.0, -120.0))
     weak = 0.9 * MACHINE.magnet_flux_wb
     answer = diagnose(recorded(plan, machine={"magnet_flux_wb": weak}), PAPER)
-    assert answer.verdict in ("explained", "ambiguous"), told(answer)
-    assert not {e.name for e in answer.effects} - {"magnet_flux"}, told(answer)
+    assert answer.verdict in ("explained", "ambiguous"), summary(answer)
+    assert not {e.name for e in answer.effects} - {"magnet_flux"}, summary(answer)
     assert "magnet_flux" in {e.name for e in answer.effects} | {n for group in answer.ambiguity for n in group}

@@ -34,7 +34,7 @@ def fitted(view, *names, effects=None):
     return refiner, refiner.refine(Model(frozenset(names)))
 
 
-def test_the_larger_of_two_covariances_is_below_neither():
+def test_larger_covariance_bounds_both():
     rng = np.random.default_rng(3)
     for _ in range(20):
         a, b = ((m := rng.standard_normal((4, 4))) @ m.T + 0.1 * np.eye(4) for _ in range(2))
@@ -43,7 +43,7 @@ def test_the_larger_of_two_covariances_is_below_neither():
         assert np.allclose(larger(a, 1e-3 * a), a)
 
 
-def test_an_error_that_an_operating_point_keeps_widens_the_interval(view):
+def test_error_common_to_an_operating_point_increases_sigma(view):
     refiner, calm = fitted(view, "magnet_flux")
     before = Spread(refiner, calm, 1.0).covariance["magnet_flux"][0, 0]
     dwell = view.run[refiner.cells.block]
@@ -57,7 +57,7 @@ def test_an_error_that_an_operating_point_keeps_widens_the_interval(view):
     assert pushed > 4.0 * before
 
 
-def test_what_the_balance_is_off_by_in_common_does_not_average_out(view):
+def test_common_error_of_the_balance_does_not_average_out(view):
     """However many blocks there are, the magnets' flux is not known better than the voltage is balanced."""
     refiner, solution = fitted(view, "magnet_flux")
     spread = Spread(refiner, solution, 1e-9)
@@ -66,7 +66,7 @@ def test_what_the_balance_is_off_by_in_common_does_not_average_out(view):
     assert 0.0 < without < spread.covariance["magnet_flux"][0, 0]
 
 
-def test_an_effect_too_small_for_a_name_widens_what_it_would_move():
+def test_unnamed_small_effect_increases_sigma():
     """Magnets 2 % weak, and resistance in error by less than a name: the flux may be off by what that moves it."""
     r = MACHINE.resistance_ohm
     view = view_of(recorded(machine={"resistance_ohm": 1.008 * r}), NOMINAL)
@@ -98,7 +98,7 @@ def test_a_delay_of_a_whole_period_is_found_without_bias(view):
     assert np.abs(further[:, 1:]).max() > 0.0
 
 
-def test_the_loss_current_follows_the_flux_that_it_leaves(view):
+def test_iron_loss_current_follows_the_remaining_flux(view):
     """i_fe = j omega g psi(i - i_fe), solved exactly for both axes, against what the iron loss takes off the flux."""
     m, g = view.machine, 0.02 * view.machine.rated_current_a / (400.0 * view.machine.magnet_flux_wb)
     # psi_d = psi0_d + L_d w g psi_q, psi_q = psi0_q - L_q w g psi_d
@@ -112,7 +112,7 @@ def test_the_loss_current_follows_the_flux_that_it_leaves(view):
     assert np.abs(taken - exact).max() < 0.1 * np.abs(first - exact).max()
 
 
-def test_an_iron_loss_has_its_size():
+def test_iron_loss_size():
     g = 0.04 * NOMINAL.machine.rated_current_a / (640.0 * MACHINE.magnet_flux_wb)
     view = view_of(recorded(machine={"iron_conductance_s": g}), NOMINAL)
     _, solution = fitted(view, "iron_loss")
@@ -122,7 +122,7 @@ def test_an_iron_loss_has_its_size():
     assert abs(found - g) < abs(first - g)
 
 
-def test_a_skew_is_that_of_the_currents_against_the_angle():
+def test_skew_is_relative_to_the_angle():
     estimates = CATALOGUE["sampling_skew"].estimates
     c, covariance = {"tau": 0.2e-6, "angle": -0.8e-6}, np.array([[4.0, 3.9], [3.9, 4.0]]) * 1e-14
     skew = estimates(c, covariance, NOMINAL)["skew_s"]
@@ -130,7 +130,7 @@ def test_a_skew_is_that_of_the_currents_against_the_angle():
     assert estimates({"tau": 0.3e-6}, covariance[:1, :1], NOMINAL)["skew_s"].value == pytest.approx(0.3e-6)
 
 
-def test_a_share_of_the_resistance_is_one_of_the_true_resistance():
+def test_resistance_asymmetry_is_relative_to_the_true_resistance():
     """Phases 10 % apart in a winding of 1.3 times the nameplate's ohms: not 13 %, though that cannot be excluded."""
     apart, names = (0.1, -0.05, -0.05), ("resistance", "phase_resistance_asymmetry")
     machine = {"resistance_ohm": 1.3 * MACHINE.resistance_ohm, "phase_resistance_asymmetry": apart}
@@ -146,7 +146,7 @@ def test_a_share_of_the_resistance_is_one_of_the_true_resistance():
     assert alone.value == pytest.approx(1.3 * values[0], rel=0.01) and alone.sigma < 0.01
 
 
-def test_at_one_speed_dry_friction_may_be_viscous():
+def test_coulomb_and_viscous_friction_are_collinear_at_one_speed():
     """A drag of 0.3 Nm at one speed: any part of it may be the one or the other, their sum is known."""
     table, p = dict(columns(POINT)), MACHINE.pole_pairs
     turns = np.exp(1j * table["theta_e"])
@@ -165,7 +165,7 @@ def test_at_one_speed_dry_friction_may_be_viscous():
     assert np.sqrt(both @ spread.covariance["friction"][:2, :2] @ both) < 0.03
 
 
-def test_what_no_row_has_shown_is_no_parameter():
+def test_undetermined_parameters_are_omitted():
     """Without current on an axis, or without an order, nothing is known of its curve: it is not zero."""
     of = lambda name, *c: CATALOGUE[name].estimates(dict(c), np.diag([(1e-3 * v) ** 2 for _, v in c]), NOMINAL)  # noqa: E731
     assert set(of("saturation", ("q_3", -0.1))) == {"psi_q_change_at_rated_wb"}
@@ -176,7 +176,7 @@ def test_what_no_row_has_shown_is_no_parameter():
 
 
 @pytest.mark.parametrize(("known", "stays"), [((3.0, 0.1), True), ((0.6, 0.1), True), ((0.4, 0.1), False)])
-def test_a_name_of_which_no_parameter_is_known_is_none(known, stays):
+def test_name_without_a_significant_parameter_is_dropped(known, stays):
     """However well it fits: values beside standard deviations of one; friction's two parts may hold each other's."""
     spread = SimpleNamespace(
         solution=SimpleNamespace(c={"friction": {"viscous": 5.0, "coulomb": 5.0}}),

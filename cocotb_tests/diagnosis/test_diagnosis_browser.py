@@ -17,7 +17,8 @@ import pytest
 from cocotb_tests.support.diagnosis_samples import html_of, made_up, write_all
 from fluxproof.diagnosis import result
 
-CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+BROWSERS = "chromium", "chromium-headless-shell", "chromium-browser", "google-chrome"
+CHROMIUM = next(filter(None, map(shutil.which, BROWSERS)), None)
 PROBE = """<body style="margin:0"><pre id="seen"></pre><iframe id="f" style="border:0;width:%dpx;height:800px"></iframe>
 <script>
 const frame = document.getElementById("f"), say = v => document.getElementById("seen").textContent = JSON.stringify(v);
@@ -92,7 +93,7 @@ def test_in_a_dark_browser(written, tmp_path):
     assert light["ink"] == "rgb(29, 33, 39)" and dark["ink"] == "rgb(230, 233, 237)" and log == ""
 
 
-def test_the_probe_sees_what_is_wrong(written, tmp_path):
+def test_probe_detects_defects_of_the_page(written, tmp_path):
     """The same eyes on a page with a picture from elsewhere, a broken one, a script and a line that is too wide."""
     wrong = """<p style="width: 900px">wide</p><img src="http://127.0.0.1:9/x.png"><script>0</script>
     <img src="data:image/png;base64,AAAA">"""

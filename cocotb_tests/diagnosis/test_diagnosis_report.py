@@ -81,7 +81,7 @@ def test_json_follows_the_schema(written, verdict):
         (("mood",), "good"),
     ],
 )
-def test_schema_refuses(written, path, value):
+def test_schema_rejects(written, path, value):
     data = json_of(written["explained"])
     place = data
     for key in path[:-1]:
@@ -90,7 +90,7 @@ def test_schema_refuses(written, path, value):
     assert failures(data) != []
 
 
-def test_what_is_not_finite_becomes_null_or_is_refused(written, tmp_path):
+def test_nonfinite_values_become_null_or_are_rejected(written, tmp_path):
     data = json_of(written["explained"])
     assert data["effects"][1]["parameters"]["knee_a"]["sigma"] is None
     assert data["location"]["regions"][1]["low"] is None
@@ -101,23 +101,23 @@ def test_what_is_not_finite_becomes_null_or_is_refused(written, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_page_says_all(written):
+def test_page_contains_the_result(written):
     page = html_of(written["explained"])
-    for said in ("0.901 ± 0.011 V", "&gt; 99 %", "−0.410 ± 0.020 mH", "= 2.01°", "10 times smaller",
+    for said in ("0.901 ± 0.011 V", "&gt; 99 %", "−0.410 ± 0.020 mH", "= 2.01°", "by a factor of 10",
                  "order 6 with 0.225 V", "0.01581", "drive_improved.toml", "equal in every bit",
                  "three samples are missing", "no torque"):  # fmt: skip
         assert said in page, said
     page = html_of(written["ambiguous"])
-    for said in ("Cannot tell", "314 rad/s (749.6 rpm)", "winding at 80 °C", "an offset stays on d"):
+    for said in ("Not separable", "314 rad/s (749.6 rpm)", "winding at 80 °C", "an offset stays on d"):
         assert said in page, said
     assert "c * omega_e * abs(i_q) * cos(2*theta_e)" in html_of(written["unexplained"])
     assert "1.02 times the noise floor" in html_of(written["no_mismatch"])
     assert re.search(r"<td[^>]*>golden</td><td><code>0x0124", html_of(written["digital_mismatch"]))
     page = html_of(written["bad_recording"])
-    assert page.index("current_sum") < page.index("clipped") and "How much better" not in page
+    assert page.index("current_sum") < page.index("clipped") and "Improvement" not in page
 
 
-def test_page_takes_nothing_from_a_file_for_markup(written, tmp_path):
+def test_page_escapes_text_from_files(written, tmp_path):
     page = html_of(written["explained"])
     assert "<script" not in page and "<img" not in page and "&lt;script&gt;" in page
     diagnosis = replace(
@@ -134,13 +134,13 @@ def test_page_takes_nothing_from_a_file_for_markup(written, tmp_path):
 @pytest.mark.parametrize(
     "without, picture, said",
     [
-        ({"theta_e"}, "angle_current", "misfit over angle and current: there is no theta_e"),
-        ({"orders"}, "orders", "harmonic orders: there is no orders"),
-        ({"t"}, "over_time", "misfit over time: there is no t"),
-        ({"angle_before_q"}, "over_angle", "misfit over the angle: there is no angle_before_q"),
+        ({"theta_e"}, "angle_current", "misfit over angle and current: theta_e is missing"),
+        ({"orders"}, "orders", "harmonic orders: orders is missing"),
+        ({"t"}, "over_time", "misfit over time: t is missing"),
+        ({"angle_before_q"}, "over_angle", "misfit over the angle: angle_before_q is missing"),
     ],
 )
-def test_picture_left_out_is_said(tmp_path, without, picture, said):
+def test_omitted_picture_is_reported(tmp_path, without, picture, said):
     arrays = evidence().arrays
     diagnosis = replace(
         made_up()["explained"], evidence=Evidence({k: v for k, v in arrays.items() if k not in without})
@@ -160,7 +160,7 @@ def test_one_operating_point_has_no_map(tmp_path):
     )
 
 
-def test_block_that_is_not_finite_spoils_nothing(tmp_path):
+def test_nonfinite_block_is_ignored(tmp_path):
     arrays = evidence().arrays
     arrays["before_d"][7] = np.nan
     page = html_of(
@@ -193,7 +193,7 @@ def test_measured(value, sigma, unit, expected):
     assert words.measured(value, sigma, unit) == expected
 
 
-def test_only_whole_files_are_left(written):
+def test_no_partial_files_remain(written):
     assert {p.name for folder in written.values() for p in folder.iterdir()} == {
         "diagnosis.json",
         "report.html",

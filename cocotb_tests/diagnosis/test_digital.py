@@ -79,13 +79,13 @@ def first_row(a, b):
 
 
 @pytest.mark.parametrize("names", [FIELDS, telemetry_words.PACKET], ids=["all signals", "packet"])
-def test_a_clean_dump_is_acquitted(names, run, tmp_path):
+def test_correct_dump_has_no_difference(names, run, tmp_path):
     got, notes = digital.replay(recording(dump(tmp_path / "a.dump", run, names=names)))
     assert got.checked and got.samples == len(run[0]) == 2500 and got.first_difference is None
     assert f"{len(names)} signals" in notes[0]
 
 
-def test_a_dump_of_the_middle_of_a_run_is_acquitted_with_its_state(run, tmp_path):
+def test_dump_from_the_middle_of_a_run_with_its_state_has_no_difference(run, tmp_path):
     samples, _, _ = run
     _, state = replayed(samples[:700])
     path = dump(tmp_path / "a.dump", run, slice(700, None), counter=np.arange(700, 2500), first_state=state)
@@ -93,7 +93,7 @@ def test_a_dump_of_the_middle_of_a_run_is_acquitted_with_its_state(run, tmp_path
     assert got.checked and got.samples == 1800 and got.first_difference is None
 
 
-def test_columns_are_what_the_converters_said(run, tmp_path):
+def test_columns_equal_the_converter_values(run, tmp_path):
     samples, observed, _ = run
     columns, meta = telemetry.read_dump(dump(tmp_path / "a.dump", run))
     assert (
@@ -148,7 +148,7 @@ def test_a_flipped_register_names_its_block_and_sample(name, run, tmp_path):
     ("omega_0", "flux_merge"), ("k_ramp", "speed_reciprocal"), ("k_ahead", "current_directions"),
     ("r_s", "winding_resistance"), ("eta_psi", "psi_adaline"), ("speed_ki", "speed_pi"),
 ])  # fmt: skip
-def test_registers_of_blocks_that_show_nothing(name, block, names, run, tmp_path):
+def test_registers_of_hidden_blocks(name, block, names, run, tmp_path):
     """Bit 4: in the packet most of what these blocks make is hidden, and the name is still theirs."""
     changed = SET.values._replace(**{name: getattr(SET.values, name) ^ 16})
     samples, observed, _ = run
@@ -165,7 +165,7 @@ def test_registers_of_blocks_that_show_nothing(name, block, names, run, tmp_path
     ("torque", 7, "torque"), ("flux_faults", 4, "flux_monitor"),
 ])  # fmt: skip
 @pytest.mark.parametrize("row", [0, 1234, 2499])
-def test_a_flipped_answer(signal, bit, block, row, run, tmp_path):
+def test_flipped_output(signal, bit, block, row, run, tmp_path):
     samples, observed, last = run
     changed = {name: values.copy() for name, values in observed.items()}
     changed[signal][row] ^= 1 << bit
@@ -249,7 +249,7 @@ def lost(run, path, start, count, names=FIELDS):
 
 
 @pytest.mark.parametrize("start", [0, 300, 1500, 2400])
-def test_lost_samples_accuse_nobody(start, run, tmp_path):
+def test_lost_samples_cause_no_difference(start, run, tmp_path):
     path, kept = lost(run, tmp_path / "a.dump", start, 7)
     found = recording(path)
     assert found.meta["gaps"] == ([(start, 7)] if start else [])
@@ -266,7 +266,7 @@ def test_lost_samples_accuse_nobody(start, run, tmp_path):
     ("u_beta", "inverse_park"), ("duty_a", "svm"), ("compare_b", "pwm_compare"), ("u_applied_beta", "applied_voltage"),
     ("torque", "torque"),
 ])  # fmt: skip
-def test_without_a_start_state_blocks_without_memory_are_judged(signal, block, run, tmp_path):
+def test_stateless_blocks_are_checked_without_a_start_state(signal, block, run, tmp_path):
     samples, observed, last = run
     part, changed = slice(900, 1700), {name: values.copy() for name, values in observed.items()}
     changed[signal][1300] ^= 2
@@ -282,7 +282,7 @@ def test_without_a_start_state_blocks_without_memory_are_judged(signal, block, r
             assert "not recorded" in notes[0] and signal in notes[0]
 
 
-def test_what_is_judged_without_state_is_what_the_core_computes(run):
+def test_stateless_checks_equal_the_core(run):
     """Every signal of the list, over all rows, from the recorded ones."""
     from fluxproof.diagnosis.digital_replay import run_of
 
@@ -371,7 +371,7 @@ def test_damaged_files_end_in_one_line(run, tmp_path):
         telemetry.read_dump(tmp_path / "none.dump")
 
 
-def test_no_flipped_bit_of_the_header_passes_unseen(run, tmp_path):
+def test_every_flipped_header_bit_is_detected(run, tmp_path):
     path = dump(tmp_path / "a.dump", run, slice(0, 3))
     raw, length, _ = header_of(path)
     columns, meta = telemetry.read_dump(path)

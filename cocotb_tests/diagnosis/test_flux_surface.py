@@ -84,7 +84,7 @@ def test_map_within_two_percent_of_its_range(found):
     assert np.abs(error.imag).max() < 0.02 * np.ptp(truth.imag)
 
 
-def test_error_it_expects_of_itself_is_about_right(found):
+def test_estimated_error_is_realistic(found):
     surface = found[1]
     i = np.linspace(-115, 115, 24)[:, None] + 1j * np.linspace(-115, 115, 24)
     rms = np.sqrt(np.mean(np.abs(surface.psi(i) - saturating(i)) ** 2) / 2)
@@ -99,7 +99,7 @@ def test_surface_is_reciprocal(found):
     assert np.abs(d_by_q - q_by_d).max() < 0.01 * np.abs(d_by_q).max()
 
 
-def test_nothing_is_claimed_beyond_what_was_recorded(found):
+def test_map_covers_only_the_recorded_points(found):
     surface = found[1]
     assert not surface.covered(np.array([135.0, -135.0, 135j, 200 + 200j])).any()
     chart, covered = surface.flux_map(10.0)
@@ -116,7 +116,7 @@ def test_a_hole_in_the_recording_stays_a_hole():
     )
 
 
-def test_resistance_beside_the_surface(found):
+def test_resistance_fitted_with_the_surface(found):
     seen = view(saturating, delta_r=3e-3)
     e = flux_map(seen).beside["resistance"]["delta_r"]
     assert abs(e.value - 3e-3) < max(4 * e.sigma, 3e-4)
@@ -129,22 +129,22 @@ def steps_of(seen):
     return ladder(seen, train)
 
 
-def test_names_rest_on_which_currents_count(found):
+def test_names_follow_from_the_currents_the_flux_depends_on(found):
     assert names(steps_of(found[0]), 0.05) == ["saturation", "cross_saturation"]
     assert names(steps_of(view(lambda i: saturating(i, cross=0.0))), 0.05) == ["saturation"]
     assert names(steps_of(view(straight)), 0.05) == []
 
 
-def test_a_name_for_what_a_rigid_curve_left_over_is_refuted(found):
+def test_name_for_the_residual_of_a_rigid_curve_is_rejected(found):
     assert max(earned(found[0], ["magnet_temperature", "iron_loss", "encoder_offset"]).values()) < 30.0
 
 
-def test_a_true_effect_beside_the_surface_is_earned():
+def test_true_effect_is_significant_with_the_free_surface():
     seen = view(saturating, delta_r=3e-3)
     assert earned(seen, ["resistance"], beside=())["resistance"] > 30.0
 
 
-def test_one_current_is_too_little_for_a_map():
+def test_map_needs_both_currents():
     line = record(saturating, 500.0)
     line.usable[np.abs(line["i_d"]) > 5.0] = False
     with pytest.raises(ValueError, match="both i_d and i_q"):

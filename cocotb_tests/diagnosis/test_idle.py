@@ -34,7 +34,7 @@ def loss_of(view, *solutions) -> float:
     return CATALOGUE["dead_time"].size(beside[0].c["dead_time"], NOMINAL) if beside else 0.0
 
 
-def test_late_pulses_may_be_those_of_a_dead_time(still):
+def test_late_pulses_may_be_due_to_dead_time(still):
     late = {"tau": 0.02 * PERIOD}
     assert loss_of(still, said(delay=late)) == loss_of(still, said(sampling_skew=late)) == pytest.approx(0.02 * BUS)
     assert not loss_of(still, said(delay={"tau": -0.02 * PERIOD}))  # none makes them early
@@ -42,20 +42,20 @@ def test_late_pulses_may_be_those_of_a_dead_time(still):
     assert not loss_of(still, said(delay=late), said(dead_time={"v_0.02": 1.0}))
 
 
-def test_less_flux_may_be_the_loss_of_a_dead_time(still):
+def test_missing_flux_may_be_due_to_dead_time(still):
     less, more = ({"delta_psi_m": share * MACHINE.magnet_flux_wb} for share in (-0.005, 0.005))
     lacking = loss_of(still, said(magnet_flux=less))
     assert 0.0 < lacking == pytest.approx(loss_of(still, said(udc_gain={"gain": -0.005})))
     assert not loss_of(still, said(magnet_flux=more))
 
 
-def test_a_current_shows_the_loss_itself(still):
+def test_with_current_the_loss_curve_is_visible(still):
     assert carries_none(still)
     loaded = still.replace(i=still.i + 0.5j * NOMINAL.machine.rated_current_a)
     assert not carries_none(loaded) and not loss_of(loaded, said(delay={"tau": 0.02 * PERIOD}))
 
 
-def test_without_current_less_flux_is_not_certain():
+def test_missing_flux_is_ambiguous_at_zero_current():
     answer = diagnose(recorded(STILL, machine={"magnet_flux_wb": 0.995 * MACHINE.magnet_flux_wb}), NOMINAL)
     assert answer.verdict == "ambiguous" and {"dead_time", "magnet_flux"} <= set().union(*answer.ambiguity)
     assert any(np.hypot(r.i_d, r.i_q) > 0.1 * NOMINAL.machine.rated_current_a for r in answer.next_recording)

@@ -115,12 +115,12 @@ def test_the_rest_of_the_file_stays(path, tmp_path):
     assert "resistance_ohm" in changed[0][0] and "was " in changed[0][1] and "0.001 ohm" in changed[0][1]
     improved = drives.load(write_improved(nominal, [found], tmp_path / "improved.toml"))
     assert improved.machine.resistance_ohm == pytest.approx(1.1 * r)
-    told = {v.key: v.value for v in core_values(nominal, [found])}
-    assert told["register r_s"] == registers(improved).values.r_s != registers(drives.load(path)).values.r_s
+    values = {v.key: v.value for v in core_values(nominal, [found])}
+    assert values["register r_s"] == registers(improved).values.r_s != registers(drives.load(path)).values.r_s
 
 
 @pytest.mark.parametrize("reverse", ["false", "true"])
-def test_trims_take_the_sensors_errors_out(reverse, tmp_path):
+def test_trims_cancel_the_sensor_errors(reverse, tmp_path):
     """Hardware of the improved file, read with its registers: what comes out is what went in."""
     text = PAPER.read_text().replace(
         "\n[sensors]\n",
@@ -158,7 +158,7 @@ def test_trims_take_the_sensors_errors_out(reverse, tmp_path):
             assert abs(wrap_s(angle - true, 18)) <= 10, (path, theta_m)
 
 
-def test_a_found_dead_time_is_no_order_to_the_gates(tmp_path):
+def test_identified_dead_time_does_not_change_the_gates(tmp_path):
     nominal = load_nominal(PAPER)
     found = [effect({"inverter.dead_time_s": 1e-6, "inverter.v_switch_v": -1e-3}, "dead_time")]
     path = write_improved(nominal, found, tmp_path / "improved.toml")
@@ -172,7 +172,7 @@ def test_a_found_dead_time_is_no_order_to_the_gates(tmp_path):
     assert {v.key: v.value for v in more}["[control] v_dead_limit_v"] == pytest.approx(3 * 4e-2 * 563 + 3)
 
 
-def test_what_the_core_cannot_take_goes_to_the_plant(tmp_path):
+def test_values_outside_the_core_formats_go_to_the_plant(tmp_path):
     """Ten times the inductance does not fit the core's flux format."""
     nominal = load_nominal(PAPER)
     found = [effect({"machine.inductance_q_h": 0.4, "machine.resistance_ohm": 1.6})]
@@ -206,9 +206,9 @@ def test_a_drive_without_the_core(tmp_path):
     assert plant.machine.resistance_ohm == 1.7 and plant.inverter.dead_time_s == 2e-6
     np.testing.assert_allclose(plant.sensors.current_gain_error, [1.01 * 1.02 - 1, 0.02, 0.02])
     assert [h.order for h in plant.machine.emf_harmonics] == [6.0, 12.0]
-    told = core_values(nominal, found)
-    assert not [v for v in told if v.key.startswith("register")]
-    assert {"[machine] resistance_ohm", "V_dead"} <= {v.key for v in told}
+    values = core_values(nominal, found)
+    assert not [v for v in values if v.key.startswith("register")]
+    assert {"[machine] resistance_ohm", "V_dead"} <= {v.key for v in values}
     # The same from arrays, without a file behind it.
     bare = dataclasses.replace(nominal, path="")
     again = tmp_path / "again.toml"
@@ -226,7 +226,7 @@ def test_an_improved_drive_can_be_improved(tmp_path):
     assert plant_of(second).machine.inductance_q_h == drives.load(second).machine.inductance_q_h == 0.017
 
 
-def test_a_flux_map_serves_the_plant(tmp_path):
+def test_flux_map_is_used_by_the_plant(tmp_path):
     path = write_improved(load_nominal(PAPER), [effect({"machine.flux_map": SPECIAL["machine.flux_map"]})],
                           tmp_path / "improved.toml")  # fmt: skip
     psi = flux_from_currents(machine_params(plant_of(path).machine), 0.165, 3.0, -3.0)
@@ -252,7 +252,7 @@ def test_a_wrong_plant_section_is_one_line(line, words, tmp_path):
     assert words in str(caught.value) and str(path) in str(caught.value) and "\n" not in str(caught.value)
 
 
-def test_an_effect_cannot_invent_a_key():
+def test_unknown_plant_key_is_rejected():
     with pytest.raises(ValueError, match="nearest known one is machine.resistance_ohm"):
         improved_toml(load_nominal(PAPER), [effect({"machine.resistanc_ohm": 2.0})])
 
@@ -309,7 +309,7 @@ EFFECTS = {
 
 
 @pytest.mark.parametrize("name", list(EFFECTS))
-def test_the_improved_drive_lies_on_the_recording(name, healthy, tmp_path):
+def test_improved_drive_reproduces_the_recording(name, healthy, tmp_path):
     """With the effect in it, the simulation is as close to the recording as the healthy one is to its own."""
     nominal, own = healthy
     machine, legs, sensors, plant = EFFECTS[name]
@@ -341,7 +341,7 @@ def typical(data):
     return np.median(np.abs(data["simulated_before"]["u_q_ref"] - data["recorded"]["u_q_ref"]))
 
 
-def test_the_overlay_takes_what_there_is(healthy):
+def test_overlay_with_missing_columns(healthy):
     """Without phases, references and angle, and as operating points of a slow log."""
     nominal, own = healthy
     whole = closed_loop(own, nominal)
@@ -370,5 +370,5 @@ def test_the_overlay_takes_what_there_is(healthy):
         holed[name][1000:1003] = np.nan
     holed = closed_loop(from_columns(holed, 1e-4), nominal)
     assert np.isfinite(holed["simulated_before"]["u_q_ref"]).all() and holed["rms_before"]["u_q_ref"] < 6.0
-    with pytest.raises(RecordingError, match="follow each other"):
+    with pytest.raises(RecordingError, match="consecutive rows"):
         closed_loop(from_columns(columns, 2e-4), nominal)

@@ -26,7 +26,7 @@ EFFECTS = {
 
 
 @pytest.mark.parametrize("effect", EFFECTS)
-def test_physics_is_no_problem(tmp_path, nominal, effect):
+def test_physical_effects_are_no_findings(tmp_path, nominal, effect):
     recording = load_recording(write(tmp_path / "r.parquet", made(**EFFECTS[effect])), nominal)
     assert codes(recording) == []
     assert recording.usable.all() and recording.joined[:-1].all()
@@ -216,7 +216,7 @@ FAULTS = {
 
 
 @pytest.mark.parametrize("name", FAULTS)
-def test_each_fault_is_found_named_and_worked_round(tmp_path, nominal, name):
+def test_each_fault_is_found_and_corrected(tmp_path, nominal, name):
     fault, code, column, row, afterwards = FAULTS[name]
     table = made()
     recording = load_recording(write(tmp_path / "r.csv", fault(table)), nominal)
@@ -260,7 +260,7 @@ FATAL = {
 
 
 @pytest.mark.parametrize("name", FATAL)
-def test_what_cannot_be_worked_round_is_fatal(tmp_path, nominal, name):
+def test_uncorrectable_faults_are_fatal(tmp_path, nominal, name):
     fault, code = FATAL[name]
     recording = load_recording(write(tmp_path / "r.csv", fault(made())), nominal)
     assert recording.fatal and [p.code for p in recording.problems if p.fatal] == [code]

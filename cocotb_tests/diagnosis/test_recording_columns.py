@@ -41,15 +41,15 @@ n = {name = "omega_e", unit = "rad/s mech"}
 
 
 WRONG_COLUMNS = {
-    'i_a = "i_z"': ("'i_a'", "'i_z' is no canonical name", "nearest"),
+    'i_a = "i_z"': ("'i_a'", "'i_z' is not a canonical name", "nearest"),
     "i_a = 4": ("'i_a'", "must be a canonical name or a table"),
-    'i_a = {name = "i_a", unit = "furlong"}': ("unit 'furlong' is not known for i_a", "mA"),
+    'i_a = {name = "i_a", unit = "furlong"}': ("unit 'furlong' is unknown for i_a", "mA"),
     'i_a = {name = "i_a", unit = "mA", factor = 2}': ("either unit",),
     'i_a = {name = "i_a", gain = 2}': ("unknown key 'gain'",),
     'i_a = {name = "i_a", factor = 0}': ("must not be 0",),
     'i_a = {name = "i_a", factor = nan}': ("finite number",),
     'i_a = "i_a"\ni_x = "i_b"': ("'i_x' is not a column of", "nearest"),
-    'i_a = "i_a"\ni_b = "i_a"': ("i_a is named by 'i_a' already",),
+    'i_a = "i_a"\ni_b = "i_a"': ("i_a is already assigned to 'i_a'",),
 }
 
 
@@ -72,7 +72,7 @@ def test_wrong_columns_name_the_entry(tmp_path, lines):
         (("i_a", "i_b", "d_a"), ("currents", "voltages")),
     ],
 )
-def test_a_missing_set_is_named_with_what_was_found(tmp_path, nominal, gone, words):
+def test_missing_columns_are_listed_with_those_found(tmp_path, nominal, gone, words):
     table = {name: v for name, v in made(500).items() if name not in gone}
     if gone == ("i_a",):
         del table["i_b"]
@@ -134,7 +134,7 @@ def test_known_logs_are_mapped(tmp_path, nominal, name):
     assert all(p.column in (*COLUMNS, "") for p in recording.problems)
 
 
-def test_every_map_is_tried_here():
+def test_every_map_is_tested():
     untried = {"Paderborn inverter data set", "common names"}
     assert {m.NAME for m in maps()} - untried == set(LOGS)
     for known in maps():
@@ -177,7 +177,7 @@ def test_paths_of_a_model_tree_count_by_their_last_part(tmp_path, nominal):
         load_recording(write(tmp_path / "r.csv", twice), nominal)
 
 
-def test_what_is_missing_is_derived_and_said(tmp_path, nominal):
+def test_missing_columns_are_derived_and_noted(tmp_path, nominal):
     table = made()
     lean = {name: v for name, v in table.items() if name not in ("t", "omega_e", "u_dc", "i_b")}
     recording = load_recording(write(tmp_path / "r.csv", lean), nominal)

@@ -147,7 +147,7 @@ def test_dspace_structures(tmp_path, nominal):
     np.testing.assert_allclose(recording["d_b"], table["d_b"])
 
 
-def test_a_name_that_claims_another_format_is_refused(tmp_path, nominal):
+def test_suffix_of_another_format_is_rejected(tmp_path, nominal):
     path = write(tmp_path / "r.parquet", made())
     path.rename(tmp_path / "r.csv")
     with pytest.raises(RecordingError, match="the name says text, the content is Parquet"):

@@ -9,7 +9,7 @@ from cocotb_tests.core.test_registers import PAPER
 from cocotb_tests.support.diagnosed_drives import MACHINE, recorded
 from fluxproof.diagnosis.blocks import view_of
 from fluxproof.diagnosis.catalogue import CATALOGUE
-from fluxproof.diagnosis.experiment import ENOUGH, best_points, rivalry, told
+from fluxproof.diagnosis.experiment import ENOUGH, best_points, closest_distance, rivalry
 from fluxproof.diagnosis.fit import Model
 from fluxproof.diagnosis.nominal import load_nominal
 from fluxproof.diagnosis.refine import Refiner
@@ -39,7 +39,7 @@ def on_a_line(known, sigma=0.2):
     return rivalry(x**2, 0.0 * x, x[None, :], np.array([[known]]), np.full(9, sigma), np.arange(9), 9)
 
 
-def test_what_a_rival_can_take_up_is_no_distance():
+def test_distance_excludes_what_a_refitted_rival_explains():
     """At one point a line passes through the parabola; a point and its mirror image leave it nothing to gain."""
     free, settled = on_a_line(1e-6), on_a_line(1e12)
     assert free.left([8]) < 1e-4 < 24.0 < settled.left([8])
@@ -54,24 +54,25 @@ def test_points_are_chosen_together():
     assert sorted(best_points([on_a_line(1e-6)], 2)) == [0, 8]
 
 
-def test_a_point_is_asked_for_once():
+def test_points_differ():
     """Where one point would do, others must bear it out: an explanation that is not tied yet may stand there too."""
     for sigma in (0.2, 0.01):
         assert sorted(best_points([on_a_line(1e12, sigma)], 3)) in ([0, 1, 8], [0, 7, 8])
 
 
-def test_what_is_told_anyway_is_asked_for_where_it_strains_the_drive_least():
+def test_sufficient_points_with_least_strain_are_chosen():
     strain = 0.2 * np.linspace(-1.0, 1.0, 9) ** 2
     faint, clear = on_a_line(1e12), on_a_line(1e12, 1e-4)
     assert set(best_points([faint], 2, 0.0, strain)) == {0, 8}
     mild = best_points([clear], 3, 0.0, strain)
     assert not {0, 8} & set(mild)
-    assert all(told([clear], [n for n in mild if n != k]) >= ENOUGH for k in mild)  # any of them may be lost
+    # Any single one of the points may be lost.
+    assert all(closest_distance([clear], [n for n in mild if n != k]) >= ENOUGH for k in mild)
     out = np.where(np.abs(np.linspace(-1.0, 1.0, 9)) < 0.6, 0.0, 10.0)
     assert sorted(best_points([on_a_line(1e-6)], 2, out)) == [2, 6]
 
 
-def test_a_skew_is_told_from_an_iron_loss_under_load():
+def test_skew_and_iron_loss_are_separated_under_load():
     """Without current both are omega^2 psi_m on the d axis; the loss follows the flux of the load as well."""
     still = view_of(recorded(STILL, machine=LOSSY), NOMINAL)
     search = Refiner(still, CATALOGUE, np.ones(len(still), bool))
@@ -83,7 +84,7 @@ def test_a_skew_is_told_from_an_iron_loss_under_load():
     assert set(asked[0].separates) == {"iron_loss", "sampling_skew"} and " V between " in asked[0].why
 
 
-def test_a_new_axis_is_asked_for_only_where_it_tells_more():
+def test_new_axis_is_used_only_if_it_separates_better():
     """Curves over i_q are told by i_q; what i_d brings with it would have to be told as well."""
     view = view_of(recorded(machine={"inductance_q_h": 1.1 * MACHINE.inductance_q_h}), NOMINAL)
     only_q = view.take(np.abs(view.i.real.mean(axis=1)) < 0.05 * RATED)
@@ -94,14 +95,14 @@ def test_a_new_axis_is_asked_for_only_where_it_tells_more():
     assert new_axes(only_q, on_d).tolist() == [1.0, 0.0, 0.0] and not new_axes(view, on_d).any()
 
 
-def test_there_is_always_something_to_ask_for(lossy):
+def test_there_is_always_a_request(lossy):
     """Where no point tells much, those that tell most are asked for."""
     same = lossy.refine(Model(frozenset(["sampling_skew"])))
     weak = lossy.refine(Model(frozenset(["sampling_skew", "udc_gain"])))
     assert 1 <= len(requests(lossy, [same, weak], 100.0)) <= 3
 
 
-def test_a_constant_is_told_from_a_drift_cold():
+def test_constant_and_drift_are_separated_on_a_cold_machine():
     search = search_of(machine={"magnet_flux_wb": 0.97 * MACHINE.magnet_flux_wb})
     solutions = [search.refine(Model(frozenset([n]))) for n in ("magnet_flux", "magnet_temperature")]
     for s in solutions:  # as one operating point would leave it: both the same at the end of the recording
@@ -111,13 +112,13 @@ def test_a_constant_is_told_from_a_drift_cold():
     assert cold[0].temp_winding == NOMINAL.machine.temperature_ref_c and "cooled down" in cold[0].why
 
 
-def test_warm_and_cold_points_stand_in_one_view(lossy):
+def test_warm_and_cold_points_in_one_view(lossy):
     made = steady_view(lossy.view, [100.0, 100.0], [1j, 1j], np.array([False, True]))
     assert made.course.tolist() == [1.0, 0.0]
     assert made.top_speed == lossy.view.top_speed > 100.0  # to which a curve over speed refers
 
 
-def test_points_are_within_what_the_drive_was_seen_to_reach(lossy):
+def test_points_are_within_the_recorded_range(lossy):
     view = lossy.view
     omega, i = grid(view)
     half = 0.5 * 0.9 * NOMINAL.inverter.dc_bus_v / np.sqrt(3) / NOMINAL.machine.magnet_flux_wb
@@ -128,7 +129,7 @@ def test_points_are_within_what_the_drive_was_seen_to_reach(lossy):
     assert {(np.sign(w), np.sign(x.imag.round(9))) for w, x in zip(omega, i, strict=True)} >= {(1, 1), (1, -1), (-1, 1)}
 
 
-def test_a_part_of_a_curve_that_was_not_seen_is_not_known(lossy):
+def test_undetermined_part_of_a_curve_has_no_information(lossy):
     """At one speed ohms and their growth with it are one thing: their sum is known, neither of them is."""
     view = lossy.view
     one = view.take(np.isclose(view.omega.mean(axis=1), view.omega.max(), rtol=0.05))

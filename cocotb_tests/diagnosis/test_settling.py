@@ -25,7 +25,7 @@ def started(share):
     return view_of(from_columns(table, NOMINAL.sample_time_s), NOMINAL)
 
 
-def test_what_swings_in_at_the_start_is_left_out():
+def test_settling_at_the_start_is_excluded():
     calm, swung = started(0.0), started(0.3)
     assert calm.rows[0] < 30 and len(swung) == len(calm) - 1 and np.array_equal(swung.rows, calm.rows[1:])
 
@@ -37,7 +37,7 @@ def line():
     return 0.05 * np.arange(20) + 0.01 * (rng.standard_normal(20) + 1j * rng.standard_normal(20))
 
 
-def test_a_drift_is_no_swing(line):
+def test_drift_is_not_settling(line):
     assert not swings(line) and swings(line + np.where(np.arange(20) == 0, 0.3j, 0.0))
     fading = 0.2 * np.exp(-np.arange(20) / 5.0)  # a drift that levels off over many blocks
     assert not swings(fading + (line - 0.05 * np.arange(20)))

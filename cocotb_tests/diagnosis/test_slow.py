@@ -41,7 +41,7 @@ def test_stretches_span_two_messages_of_the_slowest_signal():
     assert stretches(recording, NOMINAL).window_s >= 0.9
 
 
-def test_a_value_that_is_never_measured_anew_is_not_used():
+def test_value_without_update_is_not_used():
     recording = log()
     frozen = recording["t"] > 0.5 * recording["t"][-1]
     recording.columns["i_q"][frozen] = -111.0
@@ -52,13 +52,13 @@ def test_a_value_that_is_never_measured_anew_is_not_used():
 
 def test_ramps_alone_are_refused_in_one_line():
     recording = log(levels=[(-500.0, 0.0), (-1800.0, -300.0)] * 8, hold_s=0.01)
-    with pytest.raises(RecordingError, match="stand still") as refused:
+    with pytest.raises(RecordingError, match="steady") as refused:
         diagnose_slow([recording], NOMINAL)
     assert "\n" not in str(refused.value)
 
 
 def test_few_operating_points_are_refused():
-    with pytest.raises(RecordingError, match="operating points stand still"):
+    with pytest.raises(RecordingError, match="steady operating points"):
         diagnose_slow([log(levels=LEVELS[:3])], NOMINAL)
 
 
@@ -90,7 +90,7 @@ def test_a_delay_turns_the_voltage_by_its_angle():
     assert np.angle(turned) == pytest.approx(-view.omega[:, 0] * view.sample_time_s, abs=1e-9)
 
 
-def test_repetitions_share_a_dwell_and_stand_side_by_side():
+def test_repetitions_share_a_dwell():
     view = slow_view(log(), NOMINAL)
     same = np.diff(view.run) == 0
     assert same.any()
@@ -123,14 +123,14 @@ def test_parameters_are_those_of_the_log(several):
         assert abs(found[name].value - truth) < max(4.0 * found[name].sigma, 0.02 * truth), name
 
 
-def test_points_never_fitted_are_predicted(several):
+def test_held_out_points_are_predicted(several):
     held = axis_misfit(several.search, several.found.best, several.held)
     for axis in "dq":
         assert held[axis]["after"] < 0.1 * held[axis]["before"]
         assert held[axis]["after"] < 3.0 * several.fit.noise_floor
 
 
-def test_what_is_not_there_is_bounded(several):
+def test_absent_effects_are_bounded(several):
     ruled_out = bounds(several.search, several.found)
     value, sigma, unit = ruled_out["resistance"]["parameters"]["resistance_ohm"]
     assert unit == "ohm" and abs(value - NOMINAL.machine.resistance_ohm) < 4.0 * sigma

@@ -56,14 +56,14 @@ def test_the_mean_current_of_a_period_is_that_of_the_stator_frame(view):
     assert abs(made.i_mid[0, 0] - bulge(made)[0, 0] - mean) < 0.02 * abs(plain - mean)
 
 
-def test_ohms_do_not_fade_with_the_speed():
+def test_resistance_does_not_fall_with_speed():
     possible, sure = CATALOGUE["resistance"].possible, np.diag([1e-6, 1e-6])
     assert possible({"delta_r": -0.2}, sure[:1, :1], NOMINAL) and possible({"delta_r": 0.1, "skin": 0.1}, sure, NOMINAL)
     assert not possible({"delta_r": 0.1, "skin": -0.1}, sure, NOMINAL)
     assert possible({"delta_r": 0.1, "skin": -0.1}, np.diag([1e-6, 0.01]), NOMINAL)
 
 
-def test_a_wave_of_the_encoder_at_the_electrical_turn_is_no_current_offset():
+def test_encoder_error_at_the_electrical_order_is_no_current_offset():
     table = dict(columns(GRID))
     theta = np.unwrap(table["theta_e"])
     table["theta_e"] = theta + 0.03 * np.cos(theta / MACHINE.pole_pairs) + 0.002 * np.cos(theta + 0.4)
@@ -72,27 +72,27 @@ def test_a_wave_of_the_encoder_at_the_electrical_turn_is_no_current_offset():
     assert answer.effects[0].parameters["amplitude_rad"].value == pytest.approx(0.03, rel=0.02)
 
 
-def test_voltage_late_and_angle_early_alike_are_a_filter_of_the_currents():
+def test_late_voltage_and_early_angle_are_a_current_filter():
     lag = lambda delay, **c: lag_of_currents(solved("delay", "sampling_skew", delay={"tau": delay}, sampling_skew=c))  # noqa: E731
     assert lag(1e-5, tau=-1.03e-5) == lag(1e-5, tau=0.0, angle=0.97e-5) == 1e-5
     assert lag(1e-5, tau=-2e-6) == lag(1e-5, tau=1e-5) == lag(-1e-5, tau=1e-5) == 0.0
     assert lag_of_currents(solved("delay", delay={"tau": 1e-5})) == 0.0
 
 
-def test_currents_and_angle_late_alike_are_no_skew_between_them():
+def test_equally_late_currents_and_angle_are_no_skew():
     """Gates that are shifted against the converters are a delay; a skew takes up what the shift does to the ripple."""
     shadow = lambda **c: CATALOGUE["sampling_skew"].overshadowed({"sampling_skew": c}, NOMINAL)  # noqa: E731
     assert shadow(tau=1.02e-5, angle=1.05e-5) == np.inf
     assert shadow(tau=1e-6) == shadow(tau=1e-6, angle=0.0) == shadow(tau=6e-8, angle=2.57e-6) == 0.0
 
 
-def test_bus_and_sensors_off_alike_are_no_explanation():
+def test_equal_errors_of_bus_and_sensors_are_no_explanation():
     of = lambda bus, common: solved("udc_gain", "current_gain", udc_gain={"gain": bus}, current_gain={"common": common})  # noqa: E731
     assert Search.scaled_alike(of(-0.12, -0.121)) and not Search.scaled_alike(of(-0.12, 0.01))
     assert not Search.scaled_alike(solved("udc_gain", udc_gain={"gain": -0.12}))
 
 
-def test_an_exchange_frees_what_absorbs_the_newcomer(search):
+def test_exchange_frees_the_absorbing_effect(search):
     both = Model(frozenset(["magnet_flux", "magnet_temperature"]))
     assert not search.allowed(both) and search.allowed(search.admitted(both))
     assert search.admitted(both).free == {"magnet_temperature"}
@@ -100,7 +100,7 @@ def test_an_exchange_frees_what_absorbs_the_newcomer(search):
     assert search.admitted(alone) == alone
 
 
-def test_a_difference_counts_by_the_errors_that_the_operating_points_show(view, search):
+def test_chi2_difference_is_scaled_by_the_actual_errors(view, search):
     """Five units of chi^2 are a tie where rows scatter as assumed, but not where they scatter by a third of it."""
     use = search.cells.ok & search.train
     draw = np.random.default_rng(4).standard_normal((2, len(use)))
@@ -119,7 +119,7 @@ def test_a_difference_counts_by_the_errors_that_the_operating_points_show(view, 
     assert compared(1.0) and not compared(0.33)
 
 
-def test_one_operating_point_does_not_say_how_large_errors_are(view):
+def test_one_operating_point_does_not_determine_the_errors(view):
     one = view.take(view.run == 3)
     lone = Search(one, {n: CATALOGUE[n] for n in ("resistance", "magnet_flux")}, np.ones(len(one), bool))
     use = lone.cells.ok
@@ -129,7 +129,7 @@ def test_one_operating_point_does_not_say_how_large_errors_are(view):
     assert lone.as_good(best, other, 10.0)
 
 
-def test_what_remains_of_a_large_model_gives_way_to_a_better_one_of_its_size():
+def test_pruned_model_is_replaced_by_a_better_one_of_its_size():
     search = object.__new__(Search)
     search._simplified = lambda s: s
     large, remains = solved("delay", "iron_loss", score=50.0), solved("delay", score=400.0)
@@ -144,7 +144,7 @@ def test_what_remains_of_a_large_model_gives_way_to_a_better_one_of_its_size():
     assert search._pruned(large) is better  # though of nothing there is nothing of its size
 
 
-def test_second_thoughts_take_two_scales_for_the_third():
+def test_pruning_keeps_simplified_scales():
     """Bus and sensors alike are the magnets: they must not come back when what was simplified has been pruned."""
     search = object.__new__(Search)
     magnets, remains = solved("magnet_flux", "current_gain", score=90.0), solved("magnet_flux", "delay", score=400.0)
@@ -157,13 +157,13 @@ def test_second_thoughts_take_two_scales_for_the_third():
     assert search._pruned(magnets) is alike
 
 
-def test_what_is_too_small_for_a_name_stays_unnamed():
+def test_effects_below_their_floor_stay_unnamed():
     answer = diagnose(recorded(machine={"resistance_ohm": 1.007 * MACHINE.resistance_ohm}), NOMINAL)
     assert answer.verdict == "no_mismatch" and not answer.effects
     assert answer.search.silent == answer.search.best.model.names == {"resistance"} and not answer.search.tied
 
 
-def test_a_further_recording_that_is_short_has_no_slow_change_of_its_own(view):
+def test_short_further_recording_has_no_drift(view):
     short = view.take(view.run == 2).replace(span_s=0.1 * view.span_s)
     course = joined_views([view, short, short]).course
     assert np.all(course[len(view) :] == 1.0) and course[len(view) - 1] == pytest.approx(view.course[-1])
@@ -171,7 +171,7 @@ def test_a_further_recording_that_is_short_has_no_slow_change_of_its_own(view):
     assert as_long[len(view) - 1] == pytest.approx(0.5 * view.course[-1]) and as_long[-1] > 0.9
 
 
-def test_small_is_below_what_anybody_would_act_on(search):
+def test_small_is_below_the_floor(search):
     r = NOMINAL.machine.resistance_ohm
     of = lambda share: SimpleNamespace(c={"resistance": {"delta_r": share * r}})  # noqa: E731
     assert search.small(of(0.009), "resistance") and not search.small(of(0.011), "resistance")
@@ -183,7 +183,7 @@ def points_view(*points):
     return SimpleNamespace(machine=NOMINAL.machine, omega=np.repeat(omega, 3, axis=1), i=np.repeat(1j * i_q, 3, axis=1))
 
 
-def test_an_operating_point_is_not_cut_in_two():
+def test_operating_point_is_not_split():
     """Blocks scatter about their point wherever it stands; fixed bounds would make two of some."""
     for i_q in np.linspace(0.1, 0.9, 81):
         scattered = [(1.0, i_q + 0.004 * (-1) ** n) for n in range(6)]
@@ -191,7 +191,7 @@ def test_an_operating_point_is_not_cut_in_two():
     assert point_numbers(points_view((1.0, 0.2), (1.0, 0.6), (1.0, 0.21), (-1.0, 0.2))).tolist() == [0, 1, 0, 2]
 
 
-def test_more_effects_are_tried_where_more_points_pay_for_them(view):
+def test_number_of_effects_is_limited_by_the_points(view):
     """Four points are eight means: three effects with their curves would explain anything."""
     point = point_numbers(view)
     chosen = np.roll(np.unique(point), -point[np.argmax(np.abs(view.omega).max(axis=1))])  # the fastest one first
@@ -208,7 +208,7 @@ def test_hysteresis_draws_nothing_from_the_noise_of_a_standstill(view):
     assert np.abs(column).max() < 1e-9 * np.abs(CATALOGUE["iron_loss"].free(view)["g_hysteresis"]["u"]).max()
 
 
-def test_at_one_operating_point_every_effect_is_looked_at(view):
+def test_every_effect_is_refined_at_one_operating_point(view):
     """A delay taken off the data may score far better than its linear column says, and be tied."""
     one = view.take(view.run == 3)
     lone = Search(one, CATALOGUE, np.ones(len(one), bool))
@@ -216,7 +216,7 @@ def test_at_one_operating_point_every_effect_is_looked_at(view):
     assert lone.most == 1 and set().union(*(m.names for m in lone._linear_best())) == able
 
 
-def test_what_is_too_small_may_be_something_else_at_one_operating_point(view):
+def test_small_effect_may_be_another_one_at_one_operating_point(view):
     lone = object.__new__(Search)
     lone.view, lone.effects, lone.dispersion = view, CATALOGUE, 1.0
     tiny, other = ({"delta_psi_m": 1e-4 * MACHINE.magnet_flux_wb}, {"delta_r": 0.2 * MACHINE.resistance_ohm})
@@ -227,7 +227,7 @@ def test_what_is_too_small_may_be_something_else_at_one_operating_point(view):
         assert lone._tied(best, True) == tied
 
 
-def test_a_name_that_something_nameless_replaces_is_not_certain(view):
+def test_name_replaceable_by_an_unnamed_effect_is_uncertain(view):
     """A delay and a skew too small for a name fit as well as the delay and a bus gain: the gain need not be there."""
     few = object.__new__(Search)
     few.view, few.effects, few.most, few.as_good = view, CATALOGUE, 2, lambda *args: True
@@ -242,7 +242,7 @@ def test_a_name_that_something_nameless_replaces_is_not_certain(view):
     assert groups(best, [rival], CATALOGUE, NOMINAL, frozenset(["sampling_skew"])) == (["delay"], [])
 
 
-def test_another_cause_is_no_passenger_of_two_curves(view):
+def test_alternative_cause_is_no_superfluous_effect(view):
     """A bus gain for two wrong inductances is an explanation; one of the two and something beside it is not."""
     lone = object.__new__(Search)
     lone.view, lone.effects, lone.most, lone.as_good = view, CATALOGUE, 1, lambda *args: True
@@ -274,14 +274,14 @@ def test_gates_that_are_late_sample_off_the_valley():
     assert possible(c, sure, NOMINAL) and not possible({"tau": 1e-5, "off_valley": 2e-5}, sure, NOMINAL)
 
 
-def test_gains_that_do_not_differ_do_not_turn_the_vector():
+def test_equal_gains_do_not_rotate_the_vector():
     possible, sure = CATALOGUE["current_gain"].possible, 1e-12 * np.eye(4)
     of = lambda turn, alpha: {"alpha": alpha, "beta": 0.0, "common": 0.02, "turn": turn}  # noqa: E731
     assert not possible(of(0.04, 1e-5), sure, NOMINAL) and possible(of(0.04, 1e-5), 1e-3 * np.eye(4), NOMINAL)
     assert possible(of(0.02 / 6, 0.02), sure, NOMINAL) and possible({"alpha": 0.02, "beta": 0.0}, sure[:2, :2], NOMINAL)
 
 
-def test_two_sensors_turn_the_vector_by_no_more_than_is_allowed(view):
+def test_rotation_by_two_sensors_is_within_the_limit(view):
     """The largest turn that two gains and i_c = -i_a - i_b can make, over what the unequal gains themselves make."""
     i_abc, effect = view.phases(view.i), CATALOGUE["current_gain"]
     error = i_abc * np.array([0.02, -0.02, 0.0])

@@ -208,7 +208,7 @@ def test_no_effect_no_misfit():
         "dead_time",
     ],
 )
-def test_simulated_misfit_is_the_foreseen_one(effect):
+def test_simulated_misfit_equals_the_predicted_one(effect):
     found, foreseen, limit = _misfit_of(effect)
     assert np.abs(foreseen).max() > 2e-4 * limit
     assert np.vdot(foreseen, found).real / np.vdot(foreseen, foreseen).real == pytest.approx(1.0, abs=0.08)
@@ -231,19 +231,19 @@ def test_strata_fill_the_count_and_numbers_say_nothing():
     assert singles == set(forms.EFFECTS)
 
 
-def test_a_case_is_made_again_alike():
+def test_cases_are_reproducible():
     one, two = (cases.make(3, 8, "pair", 2) for _ in range(2))
     assert one.effects == two.effects and one.build.nominal == two.build.nominal
     assert cases.make(4, 8, "pair", 2).build.nominal != one.build.nominal
 
 
-def test_what_cannot_be_told_is_marked():
+def test_unidentifiable_cases_are_marked():
     for turn in range(80):
         case = cases.make(1, 500 + turn, "one_point", turn)
         if case.names == ["magnet_flux"]:
             break
-    told = identifiable.judge(case)
-    assert told["all"] is False and told["rivals"]
+    judged = identifiable.judge(case)
+    assert judged["all"] is False and judged["rivals"]
     grid = cases.make(1, 3, "single", 2 * sorted(forms.EFFECTS).index("magnet_flux"))
     assert grid.names == ["magnet_flux"] and identifiable.judge(grid)["all"]
 
@@ -265,7 +265,7 @@ def test_damage_changes_the_columns():
         ), name
 
 
-def test_request_beyond_the_drive_is_brought_within():
+def test_request_is_limited_to_the_drive():
     case = cases.make(1, 1, "healthy", 0)
     n = case.build.nominal
     plan = requested_plan(case, {"omega_e": 1e6, "i_d": 0.0, "i_q": 1e5})
@@ -274,7 +274,7 @@ def test_request_beyond_the_drive_is_brought_within():
     assert i_q == pytest.approx(n.machine["rated_current_a"])
 
 
-def test_a_point_at_which_the_drive_cannot_stand_is_approached(monkeypatch):
+def test_unreachable_point_is_approached(monkeypatch):
     """Iron that has no current for its flux is met with less current."""
     case, asked = cases.make(1, 1, "healthy", 0), {"omega_e": 50.0, "i_d": 0.0, "i_q": 1e5}
     rated = case.build.nominal.machine["rated_current_a"]

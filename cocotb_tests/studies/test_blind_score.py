@@ -11,7 +11,7 @@ from studies.blind.page import page
 from studies.blind.score import summary
 
 
-def _truth(stratum="single", names=("resistance",), told=True, form="catalogue", **more):
+def _truth(stratum="single", names=("resistance",), identifiable=True, form="catalogue", **more):
     effects = [{"name": n, "form": form, "size": 1.0, "parameters": {"resistance_ohm": 2.0}} for n in names]
     return {
         "case": "case_0001",
@@ -19,7 +19,7 @@ def _truth(stratum="single", names=("resistance",), told=True, form="catalogue",
         "effects": effects,
         "kind": "",
         "problem_codes": ["clip"],
-        "identifiable": {"all": told, "effects": dict.fromkeys(names, told)},
+        "identifiable": {"all": identifiable, "effects": dict.fromkeys(names, identifiable)},
         "rows": 1000,
         **more,
     }
@@ -84,8 +84,8 @@ def _figure(name, *pairs, resolved=()):
         ),
         (
             "not_identifiable_honest",
-            (_truth(told=False), _answer("no_mismatch", ())),
-            (_truth(told=False), _answer(names=("delay",))),
+            (_truth(identifiable=False), _answer("no_mismatch", ())),
+            (_truth(identifiable=False), _answer(names=("delay",))),
         ),
         ("coverage_95", (_truth(), _answer(value=2.015)), (_truth(), _answer(value=2.03))),
     ],
@@ -118,8 +118,8 @@ def test_a_fault_rate_is_zero_when_right_and_one_when_wrong(name, right, wrong):
     assert _figure(name, wrong) == 1.0
 
 
-def test_untellable_singles_do_not_count_as_identifiable():
-    assert _figure("single_named_right", (_truth(told=False), _answer("ambiguous", ()))) is None
+def test_unidentifiable_singles_are_not_counted():
+    assert _figure("single_named_right", (_truth(identifiable=False), _answer("ambiguous", ()))) is None
 
 
 def test_misfit_and_parameters_are_measured():

@@ -91,7 +91,7 @@ def test_names_one_effect_and_none(nominal, method):
     assert right >= len(EFFECTS) - 1, found
 
 
-def test_neighbours_tell_noise_from_misfit():
+def test_neighbours_separate_noise_from_misfit():
     rng, run = np.random.default_rng(1), np.repeat(np.arange(400), 3)
     left = 5.0 * run + 0.2 * (rng.standard_normal(len(run)) + 1j * rng.standard_normal(len(run)))
     assert neighbour_rms(left, run) == pytest.approx(0.2 * 2**0.5, rel=0.1)
@@ -140,7 +140,7 @@ def test_figures_and_table():
     assert html(result).count("<tr>") == len(TITLES) + 1
 
 
-def test_refuses_the_seed_it_was_tuned_on(capsys):
+def test_rejects_the_tuning_seed(capsys):
     for package in PACKAGES.values():
         pytest.importorskip(package, reason=f"{package} is not installed (make setup)")
     assert command.main(["--seed", str(tuned()["seed"])]) == 2

@@ -46,7 +46,7 @@ def test_emrax_improves_on_both_axes(emrax_entry, split):
         assert both["after"] < 0.4 * both["before"]
 
 
-def test_emrax_is_not_more_certain_than_its_log(emrax_entry):
+def test_emrax_reports_its_ambiguity(emrax_entry):
     assert emrax_entry["verdict"] == "ambiguous" and emrax_entry["next_recording"]
     assert {"dead_time", "encoder_offset", "cross_saturation"} <= set(emrax_entry["effects"])
     assert set(emrax_entry["ambiguity"][0]) == {"inductance_q", "saturation"}
@@ -59,7 +59,7 @@ def test_emrax_improved_drive_in_closed_loop(emrax_entry):
     assert all(after[u] < 0.4 * before[u] for u in ("u_d_ref", "u_q_ref"))
 
 
-def test_laas_says_what_is_there(laas_entry):
+def test_laas_identified_parameters(laas_entry):
     there = laas_entry["there"]
     assert 300 * 0.9 < 60 / (2 * 3.14159265 * 3**0.5 * there["emf_constant_vs_per_rad"][0]) < 300 * 1.1
     assert max(there["cogging_a_of_order"], key=there["cogging_a_of_order"].get) == "72"
@@ -68,7 +68,7 @@ def test_laas_says_what_is_there(laas_entry):
     assert laas_entry["held_out"]["q"]["after"] < 0.5 * laas_entry["held_out"]["q"]["before"]
 
 
-def test_laas_says_what_is_not(laas_entry):
+def test_laas_unidentifiable_parameters(laas_entry):
     assert not {"dead_time", "current_offset", "inductance_q", "encoder_offset"} & set(laas_entry["effects"])
     text = " ".join(laas_entry["cannot_tell"])
     assert all(
@@ -87,7 +87,7 @@ def test_brusa_map_within_two_percent(tmp_path):
         assert entry["held_out"][axis]["after"] < 0.2 * entry["held_out"][axis]["before"]
 
 
-def test_absent_recordings_are_told_and_nothing_fails(tmp_path, monkeypatch, capsys):
+def test_absent_recordings_are_reported_without_failure(tmp_path, monkeypatch, capsys):
     monkeypatch.setenv("FLUXPROOF_RECORDINGS", str(tmp_path / "none"))
     assert main(["--out", str(tmp_path), "--quiet"]) == 0
     result = json.loads((tmp_path / "result.json").read_text())

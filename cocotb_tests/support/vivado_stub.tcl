@@ -6,6 +6,8 @@
 # FACTS is a Tcl file that sets core_vlnv, core_pins, core_interfaces and core_parameters from component.xml.
 # Prints every call, one a line.
 
+clock format 0 -gmt true ;# Tcl loads `clock` at its first use, which needs its own `unknown`
+
 proc unknown {name args} {
   error "unknown command: $name"
 }
@@ -15,6 +17,8 @@ array set known {
   create_project        {{-force 0 -part 1} 1 2}
   close_project         {{} 0 0}
   current_project       {{} 0 0}
+  get_parts             {{} 1 1}
+  version               {{-short 0} 0 0}
   current_fileset       {{} 0 0}
   get_filesets          {{} 1 1}
   add_files             {{-norecurse 0 -fileset 1} 1 1}
@@ -121,6 +125,13 @@ foreach name [array names known] {
 }
 
 set files {}
+set project_part ""
+proc do_create_project {options args} {
+  set ::project_part [dict get $options -part]
+}
+proc do_version {options} {
+  return [expr {[dict exists $options -short] ? "2023.2" : "Vivado v2023.2 (64-bit)"}]
+}
 proc do_add_files {options names} {
   foreach name $names {
     if {![file exists $name] && ![string match made:* $name]} {
@@ -162,7 +173,14 @@ proc do_set_property {options args} {
   }
 }
 proc do_get_property {options property object} {
-  return [dict get {PROGRESS 100% STATS.WNS 0.5} $property]
+  set of [dict create get_parts [list SPEED] impl_1 [list PROGRESS STATS.WNS] current_project [list PART]]
+  set kind [expr {$object eq $::project_part ? "get_parts" : $object}]
+  if {![dict exists $of $kind] || $property ni [dict get $of $kind]} {
+    error "get_property: $object has no property $property"
+  }
+  # A part's name ends with its speed grade.
+  set speed [regexp -inline {\-\d\w*$} $::project_part]
+  return [dict get [list PROGRESS 100% STATS.WNS 0.5 PART $::project_part SPEED $speed] $property]
 }
 proc do_ipx::package_project {options} {
   set ::packaged [dict get $options -root_dir]

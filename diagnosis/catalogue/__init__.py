@@ -1,4 +1,4 @@
-"""The catalogue of effects: every module of this folder that holds an EFFECT is an entry."""
+"""The catalogue of effects: every module in this folder that defines EFFECT is an entry."""
 
 import importlib
 import pkgutil

@@ -1,4 +1,4 @@
-"""Cogging: a torque that depends on the rotor's angle alone, at multiples of the slots and poles."""
+"""Cogging torque: a function of the rotor angle alone, at multiples of the numbers of slots and poles."""
 
 import numpy as np
 
@@ -8,10 +8,10 @@ from fluxproof.diagnosis.torque_order import repeating_order
 
 
 def _seen(view, h):
-    """Share (b, 1) of a ripple e^(jwt) that is seen.
+    """Share (b, 1) of a torque ripple e^(jwt) that appears in the recorded torque.
 
-    A free shaft's acceleration is a difference over three samples, sin(wT)/(wT) sin(wT/2)/(wT/2); what a
-    transducer shows is moved to the middles of the intervals (blocks.at_middle).
+    The acceleration of a free shaft is a difference over three samples, with the gain sin(wT)/(wT) sin(wT/2)/(wT/2);
+    a transducer's torque is interpolated to the middles of the intervals (blocks.at_middle).
     """
     x = h * view.omega.mean(axis=1, keepdims=True) * view.sample_time_s
     moved = (9.0 * np.cos(0.5 * x) - np.cos(1.5 * x)) / 8.0
@@ -72,13 +72,13 @@ class Cogging(Effect):
 
 EFFECT = Cogging(
     name="cogging",
-    title="the rotor cogs",
+    title="cogging torque",
     equation="T = T_airgap + a sin(n theta_m + phi), n a multiple of slots and poles",
     signature="torque and speed at even orders per electrical turn, present without current",
     confounders=("emf_harmonics", "current_offset"),
     separated_by="a slow turn without current",
     parameters=(
         Parameter("cogging_nm", "Nm", "amplitude of the largest order"),
-        Parameter("cogging_order", "per turn", "of the largest"),
+        Parameter("cogging_order", "per turn", "the largest order, per mechanical turn"),
     ),
 )

@@ -1,4 +1,4 @@
-"""One axis saturates the other: both fluxes are slopes of one mixed co-energy, even in i_q (reciprocity)."""
+"""Cross-saturation: both fluxes are derivatives of one mixed co-energy, which is even in i_q (reciprocity)."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from fluxproof.diagnosis.result import Estimate
 
 
 def _mixed(view, slope_d, slope_q):
-    """Flux of a co-energy W(x, y) in per unit of rated current, from its two slopes."""
+    """Flux of a co-energy W(x, y), x and y in per unit of rated current, from its two partial derivatives."""
     m = view.machine
     scale = m.inductance_q_h * m.rated_current_a
     x, y = view.i.real / m.rated_current_a, view.i.imag / m.rated_current_a
@@ -63,6 +63,6 @@ EFFECT = CrossSaturation(
     equation="psi_d = L_d i_d + psi_m - c i_q^2, psi_q = L_q i_q - 2 c i_d i_q (one co-energy)",
     signature="order 0, in proportion to the speed: omega i_q^2 on the q axis, even in i_q; omega i_d i_q on d",
     confounders=("inductance_d", "magnet_flux", "current_scale", "saturation"),
-    separated_by="a grid of i_d and i_q with i_q = 0 in it",
+    separated_by="a grid of i_d and i_q that includes i_q = 0",
     parameters=(Parameter("cross_saturation_wb_per_a2", "Wb/A2", "c at rated i_q"),),
 )

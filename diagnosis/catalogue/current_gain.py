@@ -1,17 +1,17 @@
-"""The current sensors' gains differ from each other."""
+"""Unequal gains of the current sensors."""
 
 import numpy as np
 
 from fluxproof.diagnosis.effect import DOUBT, Effect, Parameter, current_error, sigma
 from fluxproof.diagnosis.result import Estimate
 
-# Two sensors that differ by g turn the vector by 0.29 g where they make a wave of 0.58 g; twice that for good measure.
+# Gains of two sensors that differ by g cause a harmonic of 0.58 g and a rotation of 0.29 g; twice that is allowed.
 MOST_TURN = 1 / 3
 PATTERNS = {"alpha": (2 / 3, -1 / 3, -1 / 3), "beta": (0.0, 3**-0.5, -(3**-0.5))}
 
 
 def gain_column(view, weights):
-    """Column of a pattern of relative gain errors over the three phases."""
+    """Column of relative gain errors with the given weights of the three phases."""
     i_abc = view.phases(view.i)
     error = i_abc * np.array(weights)
     column = current_error(view, view.from_phases(error))
@@ -26,7 +26,7 @@ class CurrentGain(Effect):
         return {name: gain_column(view, w) for name, w in PATTERNS.items()}
 
     def free(self, view):
-        # Two sensors and i_c = -i_a - i_b: the third phase then errs with both, which also turns the vector.
+        # With two sensors and i_c = -i_a - i_b the third phase has the errors of both, which also rotates the vector.
         return {"common": gain_column(view, (1.0, 1.0, 1.0)), "turn": current_error(view, 1j * view.i)}
 
     def floor(self, nominal):
@@ -39,7 +39,7 @@ class CurrentGain(Effect):
         return float(np.hypot(c["alpha"], c["beta"]))
 
     def possible(self, c, covariance, nominal):
-        """Gains that hardly differ do not turn the vector: a scale and a turn alone are other effects."""
+        """Nearly equal gains do not rotate the vector: a scale error or a rotation alone is another effect."""
         if not c.get("turn"):
             return True
         return abs(c["turn"]) <= MOST_TURN * self.size(c, nominal) + DOUBT * sigma(covariance, list(c).index("turn"))

@@ -1,4 +1,4 @@
-"""The current sensors have offsets."""
+"""Offsets of the current sensors."""
 
 import numpy as np
 
@@ -14,7 +14,7 @@ def _unit(view, k):
 
 
 def offset_column(view, weights, course=1.0):
-    """Column of a pattern of offsets over the three phases, times a course of time (b, 1) or one."""
+    """Column of offsets with the given weights of the three phases, times a course over time, (b, 1) or 1."""
     error = sum(w * _unit(view, k) for k, w in enumerate(weights)) * course
     column = current_error(view, error)
     if view.has_sum:
@@ -22,7 +22,7 @@ def offset_column(view, weights, course=1.0):
     return column
 
 
-# Common mode is seen in the sum alone; the other two turn with the rotor.
+# The common mode appears in the sum only; in dq the other two rotate at the electrical frequency.
 PATTERNS = {"alpha": (2 / 3, -1 / 3, -1 / 3), "beta": (0.0, 3**-0.5, -(3**-0.5)), "zero": (1.0, 1.0, 1.0)}
 
 
@@ -73,7 +73,7 @@ EFFECT = CurrentOffset(
     name="current_offset",
     title="the current sensors have offsets",
     equation="i_measured = i + o_abc",
-    signature="order 1 in dq (R o, standing still in the stator); phase currents that do not sum to zero",
+    signature="order 1 in dq (R o, constant in the stator frame); phase currents that do not sum to zero",
     confounders=("encoder_eccentricity", "phase_resistance_asymmetry"),
     separated_by="a log at zero current, gates off",
     parameters=tuple(Parameter(f"offset_{x}_a", "A", f"phase {x}, measured minus true") for x in PHASES),

@@ -1,4 +1,4 @@
-"""All current sensors are wrong by one factor."""
+"""A common gain error of all current sensors."""
 
 import numpy as np
 
@@ -38,9 +38,9 @@ class CurrentScale(Effect):
 
 EFFECT = CurrentScale(
     name="current_scale",
-    title="all current sensors are wrong by one factor",
+    title="all current sensors have the same gain error",
     equation="i_measured = (1 + s) i",
-    signature="R, L_d and L_q wrong by one and the same factor",
+    signature="R, L_d and L_q wrong by the same factor",
     confounders=("resistance", "inductance_d", "inductance_q", "cross_saturation"),
     separated_by="an external ammeter or a torque transducer",
     parameters=(Parameter("scale", "1", "relative error of all phases"),),

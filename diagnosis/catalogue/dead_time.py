@@ -1,38 +1,38 @@
-"""What the inverter loses: dead time, device drops and how both fade near zero current."""
+"""Voltage loss of the inverter: dead time and device drops, and how both vanish near zero current."""
 
 import numpy as np
 
 from fluxproof.diagnosis.effect import DOUBT, Effect, Parameter, full_loss, voltage, zero_vector_slope
 from fluxproof.diagnosis.result import Estimate
 
-# None is so wide that it would pass for a resistance over most of the current.
+# No width is so large that the curve would resemble a resistance over most of the current range.
 WIDTHS = (0.02, 0.12)  # of rated current: where the loss of the core has reached its full value
-KNOTS = (0.0, 0.005, 0.02, 0.05, 0.12)  # of rated current: between them the curve is free, each bump by itself
-STILL_GROWS = (0.12, 0.3)  # of rated current: beyond, what grows on is ohms
-RIPPLE = 1 / 32  # of what the bus drives through an inductance in a period: a quarter of the largest ripple
-CLAMPED = 0.1  # of the loss while a current is so near zero that ripple decides which diode conducts
+KNOTS = (0.0, 0.005, 0.02, 0.05, 0.12)  # of rated current: ends of the bumps of the free curve
+STILL_GROWS = (0.12, 0.3)  # of rated current: growth beyond this range counts as resistance
+RIPPLE = 1 / 32  # of u_dc T / L: a quarter of the largest current ripple
+CLAMPED = 0.1  # uncertainty, as a share of the loss, while ripple decides which diode conducts
 
 
 def _currents(view):
-    """Phase currents (b, m, 3) [A] in the middle of the pulses, which is where the edges of a leg have their mean.
+    """Phase currents (b, m, 3) [A] in the middle of the pulses: the mean over the two switching edges of a leg.
 
-    The measured current, for what counts is when it crosses zero; the mean of an interval's two samples
-    does not correlate with their difference, which is the misfit's noise.  One edge of every pulse is late by the
-    whole dead time, whatever the current's sign: the converters sample half of it before the middle of the zero
-    vector, and the current goes on with its slope there.
+    The measured current is used, since the instant of its zero crossing matters; the mean of an interval's two samples
+    is uncorrelated with their difference, which is the noise of the misfit.  One edge of every pulse is late by the
+    whole dead time, whatever the sign of the current: the converters sample half a dead time before the middle of the
+    zero vector, and the current continues with its slope there.
     """
     exact = view.with_raw_current()
     return view.phases(exact.replace(i=exact.i + view.late_s * zero_vector_slope(view)).i_mid)
 
 
 def _leg_losses(view, shapes):
-    """Losses {name: column} of the legs, each an odd function of the current over the rated one, in dq."""
+    """Losses {name: column} of the legs in dq, each an odd function of the phase current in per unit of rated."""
     x = _currents(view) / view.machine.rated_current_a
     return {name: voltage(view.from_phases(shape(x))) for name, shape in shapes.items()}
 
 
 def _following_bus(view, columns):
-    """The columns where the bus is another than the nominal one: dead time is a share of the period."""
+    """The columns at the recorded bus voltage: the loss due to dead time is proportional to it."""
     factor = view.u_dc / view.nominal.inverter.dc_bus_v
     return {name: voltage(column["u"] * factor) for name, column in columns.items()}
 
@@ -47,7 +47,7 @@ def _bump(x, knots):
 
 
 def device_tails(view):
-    """Columns of what a device still takes beyond the last knot: a drop in log(i), a commutation that fades in 1/i."""
+    """Columns of device losses beyond the last knot: a drop in log(i), a commutation loss in 1/i."""
     last = KNOTS[-1]
     shapes = {
         "log": lambda x: np.sign(x) * np.log(np.maximum(np.abs(x) / last, 1.0)),
@@ -62,13 +62,13 @@ class DeadTime(Effect):
         return _following_bus(view, _leg_losses(view, ramps))
 
     def free(self, view):
-        # Bumps rather than further ramps: a ramp between two others is nearly their mean, and would not count as told.
+        # Bumps instead of more ramps: a ramp between two others is nearly their mean and rejected as collinear.
         places = [k for k in range(1, len(KNOTS) - 1) if KNOTS[k] not in WIDTHS]
         shapes = {f"bump_{KNOTS[k]:g}": lambda x, k=k: _bump(x, KNOTS[k - 1 : k + 2]) for k in places}
         shapes["growth"] = lambda x: np.sign(x) * np.interp(np.abs(x), STILL_GROWS, (0.0, 1.0))
         out = _following_bus(view, _leg_losses(view, shapes))
         if np.ptp(view.u_dc.mean(axis=1)) > 0.04 * view.nominal.inverter.dc_bus_v:
-            # Device drops do not follow the bus.
+            # Device drops do not depend on the bus voltage.
             out |= _leg_losses(view, {"drop": lambda x: np.clip(x / 0.05, -1.0, 1.0)})
         return out
 
@@ -86,14 +86,14 @@ class DeadTime(Effect):
         return abs(full_loss(c))
 
     def doubt(self, c, view):
-        """What is lost is no function of the current while that is within its ripple or what the dead time moves it."""
+        """While the current is within its ripple or its shift by the dead time, the loss is no function of it."""
         m, period, loss = view.machine, view.sample_time_s, self.size(c, view.nominal)
         reach = period * (RIPPLE * view.u_dc.mean() + 0.5 * loss) / min(m.inductance_d_h, m.inductance_q_h)
         return CLAMPED * loss * np.mean(np.abs(_currents(view)) < reach, axis=(1, 2))
 
     def estimates(self, c, covariance, nominal):
         at_full = _at_full(c)
-        # A loss that still grows towards rated current has not shown its full value.
+        # A loss that still grows towards rated current has not reached its full value.
         spread = float(np.hypot(np.sqrt(max(at_full @ covariance @ at_full, 0.0)), c.get("growth", 0.0)))
         return {"v_dead_v": Estimate(full_loss(c), spread, "V")}
 
@@ -109,11 +109,11 @@ class DeadTime(Effect):
 
 EFFECT = DeadTime(
     name="dead_time",
-    title="dead time and device drops of the inverter",
-    equation="u_x = u_x,asked - v_dead s(i_x), s odd, one beyond a small current",
-    signature="order 0 along the current, (4/pi) v_dead, and orders 6 and 12; not in proportion to the speed",
+    title="inverter dead time and device drops",
+    equation="u_x = u_x,asked - v_dead s(i_x), s odd, s = 1 above a small current",
+    signature="order 0 in phase with the current, (4/pi) v_dead, and orders 6 and 12; independent of the speed",
     confounders=("resistance", "emf_harmonics"),
-    separated_by="several currents, i_q reversed; another bus voltage or PWM frequency splits dead time from drops",
-    parameters=(Parameter("v_dead_v", "V", "loss of a leg, full value"),),
+    separated_by="several currents, i_q reversed; another bus voltage or PWM frequency separates dead time from drops",
+    parameters=(Parameter("v_dead_v", "V", "voltage loss of a leg at full current"),),
     smoothed=True,
 )

@@ -1,11 +1,11 @@
-"""The duties act later than assumed: the voltage is that of an earlier row."""
+"""The duties take effect later than assumed: the voltage is that of an earlier row."""
 
 import numpy as np
 
 from fluxproof.diagnosis.catalogue.sampling_skew import skewed, unskewed
 from fluxproof.diagnosis.effect import DOUBT, Effect, Parameter, one, sigma, voltage, within_dead_time
 
-MOST = 1.2  # periods: past a whole one the mix goes on in a straight line, or an estimate there could not come back
+MOST = 1.2  # periods: beyond one period the interpolation continues linearly, so that the iteration can return
 
 
 class Delay(Effect):
@@ -13,12 +13,12 @@ class Delay(Effect):
         return {"tau": voltage(view.to_dq(view.u[:, 1:-1] - view.u[:, :-2]) / view.sample_time_s)}
 
     def free(self, view):
-        # Gates that are late as a whole let the converters sample off the valley too.  That is a skew beside the delay
-        # where there are points enough for two effects; where there are not it is but another form of the delay.
+        # If the gates are late as a whole, the converters also sample off the valley.  With enough operating points for
+        # two effects this is a separate skew; with fewer it is a free form of the delay.
         return {"off_valley": skewed(view)} if view.lone else {}
 
     def possible(self, c, covariance, nominal):
-        """The sampling is no farther off the valley than the gates are late."""
+        """The sampling is off the valley by no more than the gates are late."""
         off = abs(c.get("off_valley", 0.0))
         return not off or off <= abs(c["tau"]) + DOUBT * sigma(covariance, list(c).index("off_valley"))
 
@@ -49,9 +49,9 @@ class Delay(Effect):
 
 EFFECT = Delay(
     name="delay",
-    title="the voltage acts later than assumed",
+    title="the voltage takes effect later than assumed",
     equation="u(t) = u_recorded(t - tau)",
-    signature="order 0: the whole voltage turned by omega tau",
+    signature="order 0: the whole voltage vector rotated by omega tau",
     confounders=("encoder_offset", "sampling_skew", "iron_loss"),
     separated_by="two speeds, both directions; load at each; a step",
     parameters=(Parameter("delay_s", "s", "beyond duty_applied_after_samples"),),

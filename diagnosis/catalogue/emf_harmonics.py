@@ -1,4 +1,4 @@
-"""Harmonics of the magnets' flux: orders 6 and 12 in dq, in proportion to the speed, at zero current too."""
+"""Harmonics of the magnet flux: orders 6 and 12 in dq, proportional to speed, also at zero current."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from fluxproof.diagnosis.result import Estimate
 
 
 def _order(view, h):
-    """The four terms of an order: forward and backward, cosine and sine, per unit of the magnets' flux."""
+    """The four terms of an order: forward and backward, cosine and sine, per unit of the magnet flux."""
     psi_m = view.machine.magnet_flux_wb
     turn = np.exp(1j * h * view.theta)
     terms = {"fc": (turn, h), "fs": (1j * turn, h), "bc": (np.conj(turn), -h), "bs": (1j * np.conj(turn), -h)}
@@ -15,14 +15,14 @@ def _order(view, h):
 
 
 def _with_reluctance(view, psi, n):
-    """Flux that turns n times an electrical turn in dq: the torque also has its slope, n Im(conj(psi) i)."""
+    """Flux of order n in dq: its angle derivative also contributes to the torque, n Im(conj(psi) i)."""
     column = flux(view, psi)
     column["torque"] = column["torque"] + torque_of(view, n * psi, view.i)
     return column
 
 
 def _dq(c, h):
-    """Amplitudes (a_d, a_q) and phase as plant.Harmonic takes them: a_d cos(h theta + phi), a_q sin(h theta + phi)."""
+    """Amplitudes (a_d, a_q) and phase of plant.Harmonic: a_d cos(h theta + phi), a_q sin(h theta + phi)."""
     forward = c.get(f"h{h}_fc", 0.0) + 1j * c.get(f"h{h}_fs", 0.0)
     backward = c.get(f"h{h}_bc", 0.0) + 1j * c.get(f"h{h}_bs", 0.0)
     d, q = forward + np.conj(backward), forward - np.conj(backward)
@@ -54,7 +54,7 @@ class EmfHarmonics(Effect):
                 values = np.array(list(c.values()))[index]
                 size = float(np.sqrt(np.sum(values**2)))
                 spread = float(np.sqrt(np.trace(covariance[np.ix_(index, index)]) / len(index)))
-                if size or spread:  # an order that no row has shown is not known to be none
+                if size or spread:  # an order that no row determines is unknown, not zero
                     out[f"order_{h}"] = Estimate(size, spread, "1")
         return out
 
@@ -69,13 +69,13 @@ class EmfHarmonics(Effect):
 
 EFFECT = EmfHarmonics(
     name="emf_harmonics",
-    title="the magnets' flux has harmonics",
+    title="harmonics of the magnet flux",
     equation="psi_dq = ... + psi_m sum_h (a_d cos(h theta + phi) + j a_q sin(h theta + phi)), h = 6, 12, 18",
-    signature="orders 6 and 12 in dq, in proportion to the speed, present without current",
+    signature="orders 6 and 12 in dq, proportional to speed, also at zero current",
     confounders=("dead_time", "cogging"),
-    separated_by="two speeds; a spin without current",
+    separated_by="two speeds; rotation at zero current",
     parameters=(
-        Parameter("order_6", "1", "amplitude relative to the magnets' flux"),
-        Parameter("order_12", "1", "amplitude relative to the magnets' flux"),
+        Parameter("order_6", "1", "amplitude relative to the magnet flux"),
+        Parameter("order_12", "1", "amplitude relative to the magnet flux"),
     ),
 )

@@ -1,4 +1,4 @@
-"""The encoder sits off centre: an angle error that repeats with the mechanical turn."""
+"""Encoder eccentricity: an angle error that repeats with the mechanical turn."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from fluxproof.diagnosis.result import Estimate
 
 
 def _more(view):
-    """Orders per turn of a wave that is no cosine: where one falls onto the electrical turn it passes for an offset."""
+    """Further orders per turn of the error; one that equals the electrical order would resemble a current offset."""
     return sorted({2, 3, view.machine.pole_pairs} - {1})
 
 
@@ -17,7 +17,7 @@ def _turns(view, orders):
 
 
 def _acceleration(view, name, wave):
-    """d omega_m / dt that a wave of the angle's error pretends, (b, m) [rad/s^2]."""
+    """Apparent d omega_m / dt due to a harmonic of the angle error, (b, m) [rad/s^2]."""
     middle = 0.5 * (wave[:, 1:] + wave[:, :-1])
     return (
         -((int(name.split("_")[1]) * view.omega_mid / view.machine.pole_pairs) ** 2) * middle / view.machine.pole_pairs
@@ -72,7 +72,7 @@ class EncoderEccentricity(Effect):
 
 EFFECT = EncoderEccentricity(
     name="encoder_eccentricity",
-    title="the encoder sits off centre",
+    title="encoder eccentricity",
     equation="theta_measured = theta_e + a cos(theta_m) + b sin(theta_m) (+ orders 2, 3 and p per turn)",
     signature="order 1/p in dq: omega psi_m a on the d axis",
     confounders=("current_offset",),

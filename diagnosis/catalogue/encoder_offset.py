@@ -1,4 +1,4 @@
-"""The angle is measured with a constant offset."""
+"""Constant offset of the measured angle."""
 
 import numpy as np
 
@@ -31,11 +31,11 @@ class EncoderOffset(Effect):
 
 EFFECT = EncoderOffset(
     name="encoder_offset",
-    title="the angle's zero is off",
+    title="encoder offset",
     equation="theta_measured = theta_e + offset",
-    signature="order 0: omega psi_m offset on the d axis, at zero current too",
+    signature="order 0: omega psi_m offset on the d axis, also at zero current",
     confounders=("inductance_q", "delay", "sampling_skew", "saturation"),
-    separated_by="a spin without current, both directions, two speeds",
+    separated_by="rotation at zero current in both directions, two speeds",
     parameters=(Parameter("offset_rad", "rad", "electrical, measured minus true"),),
     corrects=True,
 )

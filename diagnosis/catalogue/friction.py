@@ -1,4 +1,4 @@
-"""The shaft drags: a torque against the motion that depends on the speed alone."""
+"""Friction: a torque against the motion that depends on the speed alone."""
 
 import numpy as np
 
@@ -37,7 +37,7 @@ class Friction(Effect):
         return rated_torque(nominal)
 
     def size(self, c, nominal):
-        """Drag at the speed where the EMF reaches the bus, about the highest."""
+        """Drag torque [Nm] at the speed where the EMF reaches the bus voltage, about the maximum speed."""
         m = nominal.machine
         top = nominal.inverter.dc_bus_v / np.sqrt(3) / m.magnet_flux_wb / m.pole_pairs
         return (
@@ -48,7 +48,7 @@ class Friction(Effect):
         )
 
     def possible(self, c, covariance, nominal):
-        """A shaft does not drive itself: the whole drag at the highest speed of ``size`` is not negative."""
+        """Friction cannot drive the shaft: the total drag at the speed of ``size`` is not negative."""
         m = nominal.machine
         top = nominal.inverter.dc_bus_v / np.sqrt(3) / m.magnet_flux_wb / m.pole_pairs
         weights = np.array([{"viscous": top, "coulomb": 1.0, "square": top}.get(name, 0.0) for name in c])
@@ -71,11 +71,11 @@ class Friction(Effect):
 
 EFFECT = Friction(
     name="friction",
-    title="the shaft has more friction than the nameplate says",
+    title="friction differs from the drive file",
     equation="T_shaft = T_airgap - B omega_m - T_c sign(omega_m)",
     signature="torque against the motion, odd in speed, at every load",
     confounders=("iron_loss",),
-    separated_by="a torque transducer, or a coast-down without load in both directions",
+    separated_by="a torque transducer, or a no-load coast-down in both directions",
     parameters=(
         Parameter("viscous_friction_nms", "Nm s", "per mechanical rad/s"),
         Parameter("coulomb_friction_nm", "Nm", "dry"),

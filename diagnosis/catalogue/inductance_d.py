@@ -1,10 +1,10 @@
-"""Inductance of the d axis other than the nameplate's: omega i_d on the q axis."""
+"""d-axis inductance that differs from the nameplate: omega i_d on the q axis."""
 
 import numpy as np
 
 from fluxproof.diagnosis.effect import FluxEffect, Parameter, one, sigma
 
-LEAST = 0.08  # of rated current: a smaller one says nothing of a curve
+LEAST = 0.08  # of rated current: smaller currents do not determine a curve
 
 
 class InductanceD(FluxEffect):
@@ -18,7 +18,7 @@ class InductanceD(FluxEffect):
 
     def free(self, view):
         carried = np.abs(view.i.real).max() > LEAST * view.machine.rated_current_a
-        # Said once for all views of a recording: corrected currents must not change what there is to fit.
+        # Decided once for all views of a recording: corrected currents must not change the set of coefficients.
         return super().free(view) if view.memo.setdefault("curve_d", bool(carried)) else {}
 
     def delta_l(self, c):
@@ -39,10 +39,10 @@ class InductanceD(FluxEffect):
 
 EFFECT = InductanceD(
     name="inductance_d",
-    title="inductance of the d axis differs from the nameplate",
+    title="d-axis inductance differs from the nameplate",
     equation="psi_d = (L_d + delta_l_d) i_d",
     signature="order 0, omega i_d on the q axis; and the slope of i_d",
     confounders=("magnet_flux", "current_gain", "cross_saturation", "saturation"),
-    separated_by="i_d other than zero, two values of it",
+    separated_by="two non-zero values of i_d",
     parameters=(Parameter("inductance_d_h", "H", "of the d axis"),),
 )

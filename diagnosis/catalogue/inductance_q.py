@@ -1,4 +1,4 @@
-"""Inductance of the q axis other than the nameplate's: -omega i_q on the d axis."""
+"""q-axis inductance that differs from the nameplate: -omega i_q on the d axis."""
 
 import numpy as np
 
@@ -17,7 +17,7 @@ class InductanceQ(FluxEffect):
 
     def free(self, view):
         carried = np.abs(view.i.imag).max() > LEAST * view.machine.rated_current_a
-        # Said once for all views of a recording: corrected currents must not change what there is to fit.
+        # Decided once for all views of a recording: corrected currents must not change the set of coefficients.
         return super().free(view) if view.memo.setdefault("curve_q", bool(carried)) else {}
 
     def delta_l(self, c):
@@ -38,10 +38,10 @@ class InductanceQ(FluxEffect):
 
 EFFECT = InductanceQ(
     name="inductance_q",
-    title="inductance of the q axis differs from the nameplate",
+    title="q-axis inductance differs from the nameplate",
     equation="psi_q = (L_q + delta_l_q) i_q",
     signature="order 0, -omega i_q on the d axis; and the slope of i_q",
     confounders=("encoder_offset", "saturation", "iron_loss", "sampling_skew"),
-    separated_by="several i_q of both signs; a spin without current",
+    separated_by="several i_q of both signs; rotation at zero current",
     parameters=(Parameter("inductance_q_h", "H", "of the q axis"),),
 )

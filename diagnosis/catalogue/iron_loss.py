@@ -1,4 +1,4 @@
-"""Iron loss: a current j omega psi / R_fe flows beside the magnetising one, more or less with frequency."""
+"""Iron loss: a current j omega psi / R_fe in parallel with the magnetising current; R_fe may depend on frequency."""
 
 import numpy as np
 
@@ -6,9 +6,9 @@ from fluxproof.diagnosis.effect import Effect, Parameter, one, torque_of
 
 
 def _speeds(view):
-    """Speeds (b, m+1) [rad/s] that the terms of the loss current follow: as they are, levelling off, squared."""
+    """Frequency functions (b, m+1) [rad/s] of the loss current: linear, saturating, squared."""
     top = max(view.top_speed, 1.0)
-    # At standstill the noise of the speed would be that of a full hysteresis, and its slope a voltage.
+    # A sign function would turn the noise of the speed at standstill into the full hysteresis current.
     steady = np.broadcast_to(view.omega.mean(axis=1, keepdims=True), view.omega.shape)
     return {
         "g_fe": view.omega,
@@ -34,9 +34,9 @@ class IronLoss(Effect):
 
     @staticmethod
     def psi(view, c):
-        """Flux linkage (b, m+1) complex dq [Wb] that is not there, as the loss current does not magnetise.
+        """Missing flux linkage (b, m+1) complex dq [Wb]: the loss current does not magnetise.
 
-        The loss current itself follows the flux that is left, so that this is more than the first order.
+        The loss current is proportional to the remaining flux, so that this includes terms beyond first order.
         """
         speeds = _speeds(view)
         conductance = 1j * sum(value * speeds[key] for key, value in c.items())
@@ -48,7 +48,7 @@ class IronLoss(Effect):
         return 0.002 * m.rated_current_a / self._rated_emf(nominal)
 
     def too_large(self, c, view):
-        """Hysteresis draws its current at every speed, so that no conductance is too large at a low one."""
+        """Whether the loss current at the highest recorded speed exceeds half the rated current."""
         emf = view.top_speed * view.machine.magnet_flux_wb
         return self.size(c, view.nominal) * emf > 0.5 * view.machine.rated_current_a
 
@@ -72,11 +72,11 @@ class IronLoss(Effect):
 
 EFFECT = IronLoss(
     name="iron_loss",
-    title="loss in the iron",
+    title="iron loss",
     equation="i = i_m + j omega psi / R_fe",
     signature="order 0: omega^2 L_q psi / R_fe on the d axis, even in speed, and a drag torque",
     confounders=("sampling_skew", "inductance_q", "resistance", "delay"),
-    separated_by="load: omega^2 i_q on the q axis; the trigger of the sampling moved; hysteresis at low speed",
-    parameters=(Parameter("iron_resistance_ohm", "ohm", "across the rotational EMF, at the largest speed"),),
+    separated_by="load: omega^2 i_q on the q axis; a shifted sampling trigger; low speed for hysteresis",
+    parameters=(Parameter("iron_resistance_ohm", "ohm", "in parallel with the rotational EMF, at the highest speed"),),
     positive=True,
 )

@@ -1,4 +1,4 @@
-"""Magnet flux linkage other than the nameplate's: omega psi_m on the q axis."""
+"""Magnet flux linkage that differs from the nameplate: omega psi_m on the q axis."""
 
 import numpy as np
 
@@ -26,10 +26,10 @@ class MagnetFlux(FluxEffect):
 
 EFFECT = MagnetFlux(
     name="magnet_flux",
-    title="flux linkage of the magnets differs from the nameplate",
+    title="magnet flux linkage differs from the nameplate",
     equation="psi_d = L_d i_d + psi_m + delta_psi_m",
-    signature="order 0, in proportion to the speed, on the q axis, at every current, zero included",
+    signature="order 0 on the q axis, proportional to speed, at every current including zero",
     confounders=("resistance", "cross_saturation", "magnet_temperature", "inductance_d"),
-    separated_by="three speeds; a spin without current",
+    separated_by="three speeds; rotation at zero current",
     parameters=(Parameter("magnet_flux_wb", "Wb", "peak, per phase"),),
 )

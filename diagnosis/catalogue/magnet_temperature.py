@@ -1,11 +1,11 @@
-"""The magnets warm: omega psi_m (1 + alpha_m (T_m - T_ref)), a slow course, as nobody measures a rotor."""
+"""Warming magnets: omega psi_m (1 + alpha_m (T_m - T_ref)), a slow drift, since the rotor temperature is unknown."""
 
 import numpy as np
 
 from fluxproof.diagnosis.curves import COURSE_KNOTS, course, courses, step_at_start
 from fluxproof.diagnosis.effect import FluxEffect, Parameter, one, sigma
 
-MOST_AT_ONCE = 4.0  # step at the start over all that changes later
+MOST_AT_ONCE = 4.0  # largest ratio of the step at the start to the later change
 
 
 class MagnetTemperature(FluxEffect):
@@ -33,7 +33,7 @@ class MagnetTemperature(FluxEffect):
         return float(np.max(np.abs(self._at_knots(c))))
 
     def possible(self, c, covariance, nominal):
-        """Nothing warms at once: what is there from the start, but for a little, is a wrong constant."""
+        """Warming takes time: a deviation present almost completely from the start is a wrong constant."""
         later = self._at_knots(c)[1:]
         return abs(step_at_start(c)) <= MOST_AT_ONCE * float(np.max(np.abs(later - later[0])))
 
@@ -41,20 +41,20 @@ class MagnetTemperature(FluxEffect):
         return one("magnet_flux_drift_wb", "Wb", c["drift"], sigma(covariance))
 
     def plant(self, c, nominal):
-        rise = 20.0  # the plant's magnets are told a temperature; a drift is that of 20 K
+        rise = 20.0  # the plant takes a magnet temperature; the drift is assigned to a rise of 20 K
         return {"machine.magnet_temp_coeff_per_k": c["drift"] / nominal.machine.magnet_flux_wb / rise}
 
 
 EFFECT = MagnetTemperature(
     name="magnet_temperature",
-    title="flux linkage of the magnets changes with temperature",
+    title="magnet flux linkage changes with temperature",
     equation="psi_d = L_d i_d + psi_m (1 + alpha_m (T_m - T_ref))",
-    signature="order 0 on the q axis, in proportion to the speed, drifting over time",
+    signature="order 0 on the q axis, proportional to speed, drifting over time",
     confounders=("magnet_flux", "resistance_temperature"),
-    separated_by="hot and cold, at two speeds and without current",
+    separated_by="hot and cold machine, at two speeds and at zero current",
     parameters=(
         Parameter(
-            "magnet_flux_drift_wb", "Wb", "from start to end; nobody measures the magnets' temperature"
+            "magnet_flux_drift_wb", "Wb", "from start to end; the magnet temperature is not measured"
         ),
     ),
     absorbs=("magnet_flux",),

@@ -1,4 +1,4 @@
-"""The three phases' resistances differ."""
+"""Unequal phase resistances."""
 
 import numpy as np
 
@@ -52,11 +52,11 @@ class PhaseResistanceAsymmetry(Effect):
 
 EFFECT = PhaseResistanceAsymmetry(
     name="phase_resistance_asymmetry",
-    title="the phases' resistances differ",
+    title="the phase resistances differ",
     equation="u_x = R (1 + a_x) i_x, sum of a_x = 0",
-    signature="order 2 in dq, in proportion to the current, not to the speed",
+    signature="order 2 in dq, proportional to current, independent of speed",
     confounders=("current_gain", "resistance"),
-    separated_by="standstill against speed: a sensor's error follows omega L i too; the sum of three measured currents",
+    separated_by="standstill and speed: a sensor error also follows omega L i; the sum of three measured currents",
     parameters=tuple(Parameter(f"asymmetry_{x}", "1", f"phase {x}, relative to the mean") for x in "abc"),
     absorbs=("resistance",),
 )

@@ -1,4 +1,4 @@
-"""Winding resistance other than the nameplate's: u = R i."""
+"""Winding resistance that differs from the nameplate: u = R i."""
 
 from fluxproof.diagnosis.effect import DOUBT, Effect, Parameter, one, sigma, voltage
 
@@ -8,11 +8,11 @@ class Resistance(Effect):
         return {"delta_r": voltage(view.i_mid)}
 
     def free(self, view):
-        # Skin effect: more ohms at speed.
+        # Skin effect: the resistance grows with frequency.
         return {"skin": voltage(view.i_mid * (view.omega_mid / view.top_speed) ** 2)}
 
     def possible(self, c, covariance, nominal):
-        # Ohms grow with the frequency, they do not fade.
+        # A resistance grows with the frequency and does not decrease.
         return c.get("skin", 0.0) >= -DOUBT * sigma(covariance, len(c) - 1)
 
     def floor(self, nominal):
@@ -32,8 +32,8 @@ EFFECT = Resistance(
     name="resistance",
     title="winding resistance differs from the nameplate",
     equation="u_dq = (R + delta_r) i_dq",
-    signature="order 0, in proportion to the current, at every speed, standstill included",
+    signature="order 0, proportional to current, at every speed including standstill",
     confounders=("iron_loss", "magnet_flux", "dead_time", "resistance_temperature"),
-    separated_by="low speed and three loads; a reversal of i_q against the magnets, several currents for the inverter",
-    parameters=(Parameter("resistance_ohm", "ohm", "per phase, at the recording's temperature"),),
+    separated_by="low speed and three loads; i_q reversed (against magnet_flux), several currents (against dead_time)",
+    parameters=(Parameter("resistance_ohm", "ohm", "per phase, at the temperature of the recording"),),
 )

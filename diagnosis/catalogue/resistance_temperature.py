@@ -1,4 +1,4 @@
-"""The winding warms: R (1 + alpha (T - T_ref)), after the thermocouple or, without one, a course of time."""
+"""Warming winding: R (1 + alpha (T - T_ref)) with the measured temperature, or a free drift over time without one."""
 
 import numpy as np
 
@@ -54,12 +54,12 @@ EFFECT = ResistanceTemperature(
     name="resistance_temperature",
     title="winding resistance changes with temperature",
     equation="u_dq = R (1 + alpha (T - T_ref)) i_dq",
-    signature="order 0, in proportion to the current times the rise of temperature over time",
+    signature="order 0, proportional to current times temperature rise",
     confounders=("resistance", "magnet_temperature"),
-    separated_by="a thermocouple; a load step while hot; standstill with current, cold and hot",
+    separated_by="a thermocouple; a load step while hot; standstill with current, cold and hot machine",
     parameters=(
         Parameter("resistance_temp_coeff_per_k", "1/K", "copper: 0.0039; needs temp_winding"),
-        Parameter("resistance_drift_ohm", "ohm", "from start to end, where no temperature was recorded"),
+        Parameter("resistance_drift_ohm", "ohm", "from start to end, if no temperature was recorded"),
     ),
     absorbs=("resistance",),
 )

@@ -1,4 +1,4 @@
-"""Currents are sampled tau after the middle of the zero vector, where they slope with the EMF."""
+"""Currents are sampled tau after the middle of the zero vector, in which the EMF gives them a slope."""
 
 import numpy as np
 
@@ -15,12 +15,12 @@ from fluxproof.diagnosis.effect import (
 
 
 def skewed(view):
-    """Column of currents that are sampled off the valley, per second."""
+    """Column of currents that are sampled off the valley, per second of skew."""
     return current_error(view, zero_vector_slope(view))
 
 
 def unskewed(view, tau):
-    """The view without what sampling off the valley by tau [s] adds to the currents."""
+    """The view with the currents corrected for sampling tau [s] after the valley."""
     error = tau * zero_vector_slope(view)
     return view.replace(i=view.i - error, i_raw=view.i_raw - view.stator(error)) if tau else view
 
@@ -30,7 +30,7 @@ class SamplingSkew(Effect):
         return {"tau": skewed(view)}
 
     def free(self, view):
-        # The angle latched at another instant than the currents.
+        # The angle is latched at another instant than the currents.
         return {"angle": angle_error(view, view.omega)}
 
     def size(self, c, nominal):
@@ -41,7 +41,7 @@ class SamplingSkew(Effect):
 
     def overshadowed(self, c, nominal):
         own = c.get("sampling_skew", {"tau": 0.0})
-        # Currents and angle that are late alike are no skew: the gates are early, and the voltage with them.
+        # Currents and angle late by the same time are no skew but early gates, that is, an early voltage.
         if abs(own["tau"] - own.get("angle", 0.0)) < ALIKE * abs(own["tau"]):
             return float("inf")
         return within_dead_time(c, nominal)
@@ -53,7 +53,7 @@ class SamplingSkew(Effect):
         return unskewed(view.turned(c.get("angle", 0.0) * view.omega), c["tau"])
 
     def estimates(self, c, covariance, nominal):
-        # Of the currents against the angle: whichever of the two is latched beside the valley.
+        # Currents relative to the angle, whichever of the two is latched off the valley.
         weights = np.array([{"tau": 1.0, "angle": -1.0}[name] for name in c])
         spread = np.sqrt(max(weights @ covariance @ weights, 0.0))
         return one("skew_s", "s", c["tau"] - c.get("angle", 0.0), spread)
@@ -64,11 +64,11 @@ class SamplingSkew(Effect):
 
 EFFECT = SamplingSkew(
     name="sampling_skew",
-    title="currents are sampled beside the middle of the zero vector",
+    title="currents are sampled off the middle of the zero vector",
     equation="i_measured = i(t + tau), di/dt = -(R i + j omega psi_m) / L",
-    signature="order 0: omega^2 psi_m tau on the d axis, as an iron loss of R_fe = -L_q / tau would make",
+    signature="order 0: omega^2 psi_m tau on the d axis, equivalent to an iron loss of R_fe = -L_q / tau",
     confounders=("iron_loss", "delay", "inductance_q"),
-    separated_by="load (an iron loss also follows omega^2 i_q); the trigger moved on purpose",
-    parameters=(Parameter("skew_s", "s", "of the currents against the angle; positive: too late"),),
+    separated_by="load (an iron loss also follows omega^2 i_q); a deliberately shifted sampling trigger",
+    parameters=(Parameter("skew_s", "s", "of the currents relative to the angle; positive: late"),),
     corrects=True,
 )

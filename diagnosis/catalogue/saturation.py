@@ -1,4 +1,4 @@
-"""Each axis saturates by its own current: psi_d = f(i_d), psi_q = g(i_q), g odd; any curve will do."""
+"""Self-saturation: psi_d = f(i_d), psi_q = g(i_q), g odd; the curves are free."""
 
 import numpy as np
 
@@ -17,18 +17,18 @@ def _d(view, shape):
 
 
 def q_curves(view):
-    """Fluxes (b, m+1) complex dq [Wb] over i_q, per L_q i at rated current: the straight one, then bent ones."""
+    """Flux terms (b, m+1) complex dq [Wb] over i_q, in units of L_q i_rated: linear, |y| y, y^3, y^5."""
     return [_q(view, shape) for shape in (lambda y: y, lambda y: y * np.abs(y), lambda y: y**3, lambda y: y**5)]
 
 
-LEAST = 0.08  # of rated current: an axis that carries less says nothing of its curve
+LEAST = 0.08  # of rated current: an axis with less current does not determine its curve
 
 
-def _told(view, columns):
-    """The columns of the axes that carry enough current."""
+def _with_current(view, columns):
+    """The columns of the axes with enough current."""
     i = view.i / view.machine.rated_current_a
-    told = {"d": np.abs(i.real).max() > LEAST, "q": np.abs(i.imag).max() > LEAST}
-    return {key: column for key, column in columns.items() if told[key[0]]}
+    enough = {"d": np.abs(i.real).max() > LEAST, "q": np.abs(i.imag).max() > LEAST}
+    return {key: column for key, column in columns.items() if enough[key[0]]}
 
 
 class Saturation(FluxEffect):
@@ -46,10 +46,10 @@ class Saturation(FluxEffect):
         }
 
     def core(self, view):
-        return _told(view, super().core(view))
+        return _with_current(view, super().core(view))
 
     def free(self, view):
-        return _told(view, super().free(view))
+        return _with_current(view, super().free(view))
 
     def floor(self, nominal):
         return 0.006
@@ -58,7 +58,7 @@ class Saturation(FluxEffect):
         return 1.0
 
     def size(self, c, nominal):
-        """Largest bend of either curve against its own chord, relative to L i at rated current."""
+        """Largest deviation of either curve from its chord, relative to L i at rated current."""
         x = np.linspace(0, 1, 21)
         bends = []
         for axis in "qd":
@@ -76,7 +76,7 @@ class Saturation(FluxEffect):
             mine = np.array([1.0 if name.startswith(axis) else 0.0 for name in names])
             spread = float(np.sqrt(max(mine @ covariance @ mine, 0.0)))
             value = float(sum(v for name, v in c.items() if name.startswith(axis)))
-            if value or spread:  # an axis without current says nothing of its curve
+            if value or spread:  # an axis without current does not determine its curve
                 out[f"psi_{axis}_change_at_rated_wb"] = Estimate(value * l_i, spread * l_i, "Wb")
         return out
 
@@ -91,14 +91,14 @@ class Saturation(FluxEffect):
 
 EFFECT = Saturation(
     name="saturation",
-    title="the iron saturates along its own axis",
+    title="saturation of an axis by its own current",
     equation="psi_q = g(i_q), odd; psi_d = psi_m + f(i_d)",
-    signature="order 0, in proportion to the speed, bending with the current: about -omega i_q^3 on the d axis",
+    signature="order 0, proportional to speed, nonlinear in the current: about -omega i_q^3 on the d axis",
     confounders=("inductance_q", "inductance_d", "cross_saturation", "encoder_offset"),
     separated_by="i_q up to the rated current in several steps, both signs",
     parameters=(
-        Parameter("psi_q_change_at_rated_wb", "Wb", "flux linkage at rated i_q against L_q i_q"),
-        Parameter("psi_d_change_at_rated_wb", "Wb", "flux linkage at i_d = rated against L_d i_d"),
+        Parameter("psi_q_change_at_rated_wb", "Wb", "flux linkage at rated i_q minus L_q i_q"),
+        Parameter("psi_d_change_at_rated_wb", "Wb", "flux linkage at rated i_d minus L_d i_d"),
     ),
     absorbs=("inductance_d", "inductance_q"),
 )

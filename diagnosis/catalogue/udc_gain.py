@@ -1,11 +1,11 @@
-"""The bus voltage is measured with a wrong gain: every voltage is scaled."""
+"""Gain error of the measured bus voltage: it scales every voltage."""
 
 from fluxproof.diagnosis.effect import Effect, Parameter, one, sigma, voltage
 
 
 class UdcGain(Effect):
     def core(self, view):
-        # The nominal drive's own voltage stands for the applied one, whose noise is that of the misfit.
+        # The nominal drive's voltage replaces the applied one, whose noise is that of the misfit.
         return {"gain": voltage(view.machine.resistance_ohm * view.i_mid + view.flux(view.psi))}
 
     def floor(self, nominal):
@@ -27,9 +27,9 @@ class UdcGain(Effect):
 
 EFFECT = UdcGain(
     name="udc_gain",
-    title="the bus voltage is measured with a wrong gain",
+    title="gain error of the measured bus voltage",
     equation="u_dc_measured = (1 + g) u_dc",
-    signature="R, L_d, L_q and psi_m wrong by one and the same factor",
+    signature="R, L_d, L_q and psi_m wrong by the same factor",
     confounders=("magnet_flux", "current_scale", "resistance", "inductance_d", "inductance_q"),
     separated_by="an external voltmeter, or the open-circuit EMF",
     parameters=(Parameter("udc_gain", "1", "relative error"),),

@@ -1,19 +1,19 @@
-"""Checks of a recording, one a file; a new file here is found by itself.
+"""Checks of a recording, one per file; every module in this folder with a ``check`` function is run.
 
 A check has a STAGE and ``check(recording, nominal)``, which edits the recording in place: it appends Problems, clears
-``usable`` or ``joined`` and mends what is unambiguous.  Notes, which are not findings, go to meta["notes"].
-Stages run in this order, since each believes what the ones before it made right:
+``usable`` or ``joined`` and corrects what is unambiguous.  Notes that are not findings go to meta["notes"].
+Stages run in this order, since each relies on the corrections of the earlier ones:
 
     values    missing and infinite numbers
     time      order of rows, sampling, gaps
-    units     degrees, percent, milliamps, shaft for electrical
-    complete  what is missing is derived from what is there
+    units     degrees, percent, milliamps, shaft instead of electrical quantities
+    complete  missing columns are derived from others
     geometry  phases, directions, angle against speed
     signals   clipped, stuck, repeated, sums
-    extent    whether enough is left
+    extent    whether enough rows remain
 
-Physics that the diagnosis is to find is no finding: offsets and gains of sensors, a turned encoder, dead time, noise.
-A fatal problem ends the checking.
+Effects that the diagnosis identifies are no findings: sensor offsets and gains, encoder offset, dead time, noise.
+A fatal problem ends the checks.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ STAGES = ("values", "time", "units", "complete", "geometry", "signals", "extent"
 
 
 def checks() -> list:
-    """Every check of this folder in the order it runs."""
+    """All check modules of this folder in their order of execution."""
     modules = [importlib.import_module(f"{__name__}.{m.name}") for m in pkgutil.iter_modules(__path__)]
     found = [m for m in modules if hasattr(m, "check")]
     return sorted(found, key=lambda m: (STAGES.index(m.STAGE), m.__name__))

@@ -1,8 +1,8 @@
-"""How far the angle advances against what the speed says: one number that tells units and signs (no check itself).
+"""Ratio of the angle's advance to that of the speed, which reveals wrong units and signs (not itself a check).
 
     ratio = sum(dtheta omega T) / sum((omega T)^2)
 
-over rows that follow each other, with the angle's steps taken into (-pi, pi].  It is 1 when angle and speed agree.
+over consecutive rows, with the steps of the angle wrapped into (-pi, pi].  It is 1 if angle and speed agree.
 """
 
 from __future__ import annotations
@@ -10,18 +10,18 @@ from __future__ import annotations
 import numpy as np
 
 MOST_ROWS = 100_000
-LEAST_TURN = 1.0  # rad in all: below it, noise of the angle decides
+LEAST_TURN = 1.0  # rad in total; below it the noise of the angle dominates
 
 
 def wrapped(angle):
-    """The angle in (-pi, pi]."""
+    """The angle [rad] wrapped into (-pi, pi]."""
     return angle - 2.0 * np.pi * np.round(angle / (2.0 * np.pi))
 
 
 def angle_speed_ratio(recording, period, theta_factor=1.0, omega_factor=1.0) -> float | None:
-    """The ratio for rows ``period`` [s] apart; None where angle, speed or movement is missing.
+    """The ratio for rows ``period`` [s] apart; None if angle, speed or rotation is missing.
 
-    None also where the angle turns by more than a third of a turn from row to row: it cannot be followed then.
+    None also if the angle advances by more than a third of a turn per row: it is then aliased.
     """
     if not recording.has("theta_e", "omega_e") or len(recording) < 3:
         return None
@@ -36,17 +36,17 @@ def angle_speed_ratio(recording, period, theta_factor=1.0, omega_factor=1.0) -> 
     if np.median(np.abs(turned)) > 2.0:
         return None
     keep = slice(None)
-    for _ in range(3):  # a stretch in which one of them is stuck must not count
+    for _ in range(3):  # rows in which one of the two is stuck must not count
         ratio = float(np.sum((turned * advance)[keep]) / np.sum((advance * advance)[keep]))
         off = np.abs(turned - ratio * advance)
         keep = off <= 4.0 * np.median(off) + 1e-12
     scatter = float(np.median(np.abs(turned - ratio * advance)))
-    # Angles that jump at random agree with nothing, not with a small ratio.
+    # Angles that jump at random have no ratio, not a small one.
     return ratio if scatter < 0.5 * float(np.median(np.abs(turned))) + 1e-12 else None
 
 
 def _rows(recording) -> np.ndarray:
-    """Rows whose step in time is the usual one, at most MOST_ROWS of them, from all over the recording."""
+    """At most MOST_ROWS rows with the usual time step, spread over the recording."""
     step = np.diff(recording["t"])
     usual = np.median(step[step > 0]) if np.any(step > 0) else 0.0
     rows = np.flatnonzero(

@@ -1,12 +1,12 @@
-"""Does the nominal machine fit a recording as it stands, or with one change to its columns?  (No check itself.)
+"""How well the nominal machine fits the recording, with or without a change to its columns (not itself a check).
 
-For rows that follow each other, with space vectors in the stator frame,
+For consecutive rows, with space vectors in the stator frame,
 
     r = u - R (i + i+) / 2 - [psi(i+, theta+) - psi(i, theta)] / T,    psi = (L_d i_d + j L_q i_q + psi_m) e^(j theta)
 
-is small against u for the right reading of the columns, whatever effect the drive has, and of u's size for swapped
-phases, an angle in degrees or a speed of the wrong sign.  Only fast rows are looked at: at standstill every
-reading fits.  Slow logs and logs of dq values alone use the steady dq balance instead.
+is small compared with u if the columns are interpreted correctly, whatever effect the drive has, and as large as u
+for swapped phases, an angle in degrees or a speed of the wrong sign.  Only fast rows are used: at standstill every
+interpretation fits.  Slow logs and logs with dq values only use the steady dq balance instead.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 MOST_ROWS = 5000
-FIT = 0.25  # misfit over voltage: what any real effect stays below at speed
-BETTER = 0.3  # a change must leave less than this share of the misfit
+FIT = 0.25  # misfit over voltage: any real effect is smaller at speed
+BETTER = 0.3  # a change is accepted if the misfit falls below this share
 TURNS = np.exp(2j * np.pi / 3 * np.arange(3))
 
 
@@ -26,7 +26,7 @@ class Rows:
     """Samples at both ends of m intervals of length ``period`` [s].
 
     i, d: (2, m, 3) phase currents [A] and (m, 3) duties in force, or None; dq: (2, m) complex dq current or None
-    u_dq: (m,) complex asked voltage or None; u_dc: (m,); theta, omega: (2, m)
+    u_dq: (m,) complex voltage reference or None; u_dc: (m,); theta, omega: (2, m)
     """
 
     machine: object
@@ -45,7 +45,7 @@ class Rows:
 
 
 def rows_of(recording, nominal) -> Rows | None:
-    """The intervals to judge by; None without the columns or without movement to judge by."""
+    """The intervals for the balance; None if columns or enough consecutive rows are missing."""
     columns, machine = recording.columns, nominal.machine
     delay = 0 if recording.slow else nominal.control.duty_applied_after_samples
     phases, duties = recording.has("i_a", "i_b"), recording.has("d_a", "d_b", "d_c", "u_dc")
@@ -84,9 +84,9 @@ def rows_of(recording, nominal) -> Rows | None:
 
 
 def misfit(rows: Rows, at_current: bool = False) -> float:
-    """Median misfit over median voltage, of the rows where the voltage is large; 0 is a perfect fit.
+    """Median misfit over median voltage of the rows with a large voltage; 0 is a perfect fit.
 
-    at_current: of the rows where the current is large instead, to judge the currents by.
+    at_current: use the rows with a large current instead, to check the current columns.
     """
     m = rows.machine
     if rows.steady:
@@ -110,7 +110,7 @@ def misfit(rows: Rows, at_current: bool = False) -> float:
 
 
 def tells(rows: Rows) -> bool:
-    """Whether the drive moves enough for the balance to tell readings apart: EMF well above the resistive drop."""
+    """Whether the balance can discriminate interpretations: the EMF is well above the resistive drop."""
     if rows.steady:
         u = rows.u_dq.imag
         u = np.abs(u)
@@ -121,7 +121,7 @@ def tells(rows: Rows) -> bool:
 
 
 def _intervals(recording, delay) -> np.ndarray:
-    """First rows of intervals that may be judged, at most MOST_ROWS, from all over the recording."""
+    """First rows of at most MOST_ROWS usable intervals, spread over the recording."""
     good = recording.usable[:-1] & recording.usable[1:] & recording.joined[:-1]
     for back in range(1, delay + 1):
         good[back:] &= recording.joined[: len(good) - back]

@@ -1,8 +1,7 @@
-"""Flat tops: runs at exactly the largest or smallest value, entered at a slope that would have gone on.
+"""Clipping: runs at exactly the largest or smallest value that the signal enters with a large slope.
 
-The natural top of a quantised sine is flat too, but the wave has all but stopped when it gets there: prolonged over
-half the flat at its mean slope over as many rows before, it would gain a few codes.  A clipped wave would have gained
-a good part of its amplitude.
+The top of a quantised sine is flat too, but its slope there is nearly zero: extrapolated over half the flat with the
+mean slope of as many rows before, it gains a few codes.  A clipped signal gains a large part of its amplitude.
 """
 
 from __future__ import annotations
@@ -38,7 +37,7 @@ def _check_one(recording, name) -> None:
         at_top = x[first] == top
         first, length = first[at_top], length[at_top]
         found = _clipped(x, first[:MOST_RUNS], length[:MOST_RUNS], least_gain)
-        if found:  # then its other flats are clipped too, whatever their flanks look like
+        if found:  # then the other flats at this value are clipped too, whatever their slopes
             tops += found
             starts.append(first)
             lengths.append(length)
@@ -52,8 +51,8 @@ def _check_one(recording, name) -> None:
 
 
 def _clipped(x, first, length, least_gain) -> int:
-    """How many of the flats were entered and left at a slope that would have gained more than ``least_gain``."""
-    # Both flanks: a current that steps up and stays has only one.
+    """Number of flats whose slopes at both ends would have gained more than ``least_gain``."""
+    # Both ends are required: a current that steps up and stays has only one slope.
     before, after = first - 1 - length, first + 2 * length
     inside = (before >= 0) & (after < len(x))
     first, length, before, after = first[inside], length[inside], before[inside], after[inside]

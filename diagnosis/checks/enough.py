@@ -1,4 +1,4 @@
-"""Whether enough rows are left for a diagnosis at all."""
+"""Whether enough usable rows remain for a diagnosis."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Values no inverter has: duties outside 0 to 1, a bus at or below zero or far from drive.toml's."""
+"""Impossible values: duties outside 0 to 1, a bus voltage at or below zero or far from drive.toml's."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ import numpy as np
 from fluxproof.diagnosis.recording import Problem
 
 STAGE = "signals"
-ROUNDING = 0.005  # duties of 12 bits and their rounding stay within
-FAR = 2.0  # times or part of the nominal bus voltage
+ROUNDING = 0.005  # tolerance for the rounding of 12-bit duties
+FAR = 2.0  # largest factor, up or down, from the nominal bus voltage
 
 
 def check(recording, nominal) -> None:
@@ -29,14 +29,14 @@ def check(recording, nominal) -> None:
             out,
             "u_dc_range",
             "u_dc",
-            f"bus voltages that {bus:g} V cannot become",
+            f"bus voltages are implausible for dc_bus_v = {bus:g} V",
             "rows not used",
         )
         middle = float(np.median(u_dc))
         if not bus / FAR <= middle <= bus * FAR:
-            message = f"u_dc is {middle:.4g} V in the middle, dc_bus_v = {bus:g} V"
+            message = f"the median of u_dc is {middle:.4g} V, but dc_bus_v = {bus:g} V"
             recording.problems.append(
-                Problem("u_dc_range", message, "u_dc", 0, len(u_dc), "the recording is believed")
+                Problem("u_dc_range", message, "u_dc", 0, len(u_dc), "the recorded value is used")
             )
 
 

@@ -1,6 +1,6 @@
-"""Missing, infinite and absurd numbers: interpolated, and their rows kept out of every balance.
+"""Missing, infinite and absurd numbers: interpolated, and their rows excluded from every balance.
 
-Slow channels of a log that was merged from several rates are mostly empty; their last value holds.
+Slow channels of a log merged from several rates are mostly empty; their last value is held.
 """
 
 from __future__ import annotations
@@ -10,11 +10,11 @@ import numpy as np
 from fluxproof.diagnosis.recording import Problem
 
 STAGE = "values"
-ABSURD = 1e9  # no canonical column comes near it; an overflow or a wrong format does
+ABSURD = 1e9  # larger values are due to an overflow or a wrong format
 SLOW = ("temp_winding", "torque", "u_dc", "i_d_ref", "i_q_ref", "u_d_ref", "u_q_ref")
 OPTIONAL = ("temp_winding", "torque", "i_d_ref", "i_q_ref")
 PHASES = ("i_a", "i_b", "i_c")
-MOST = 0.5  # a larger share missing in a column that is needed leaves no recording
+MOST = 0.5  # largest missing share of a required column
 
 
 def check(recording, nominal) -> None:
@@ -29,17 +29,17 @@ def check(recording, nominal) -> None:
         row = int(np.argmin(good))
         if bad == n:
             if name in OPTIONAL:
-                recording.meta["notes"].append(f"{name} holds no number and is left out")
+                recording.meta["notes"].append(f"{name} contains no number and is ignored")
                 del columns[name]
             elif name in PHASES and recording.has(*PHASES):
                 del columns[name]
-                action = "taken from the other two"
+                action = "computed from the other two"
                 recording.problems.append(
-                    Problem("missing", "holds no finite number", name, row, bad, action)
+                    Problem("missing", "contains no finite number", name, row, bad, action)
                 )
             else:
                 recording.problems.append(
-                    Problem("missing", "holds no finite number", name, row, bad, fatal=True)
+                    Problem("missing", "contains no finite number", name, row, bad, fatal=True)
                 )
             continue
         if name not in SLOW and bad > MOST * n:
@@ -50,7 +50,7 @@ def check(recording, nominal) -> None:
         filled = columns[name].copy()
         if name in SLOW and bad > 0.1 * n:
             filled = filled[where[np.maximum(np.searchsorted(where, np.arange(n), side="right") - 1, 0)]]
-            recording.meta["notes"].append(f"{name} has a value in {n - bad} of {n} rows; the last one holds")
+            recording.meta["notes"].append(f"{name} has a value in {n - bad} of {n} rows; the last value is held")
         else:
             lost = np.flatnonzero(~good)
             filled[lost] = _between(name, lost, where, columns[name][where])
@@ -69,7 +69,7 @@ def check(recording, nominal) -> None:
 
 
 def _between(name, lost, where, values):
-    """Values for lost rows; a wrapped angle must not be interpolated across its wrap, so it holds."""
+    """Values for missing rows; a wrapped angle is held, since interpolating across its wrap would be wrong."""
     if name == "theta_e":
         return values[np.maximum(np.searchsorted(where, lost) - 1, 0)]
     return np.interp(lost, where, values)
@@ -91,7 +91,7 @@ def _drop_rows_without_time(recording) -> None:
 
 
 def keep_rows(recording, rows) -> None:
-    """Keep these rows (indices, in this order) of every array; neighbours that were none are not joined."""
+    """Keep these rows (indices, in this order) of every array; rows that were not consecutive are not joined."""
     joined = recording.joined[rows]
     joined[:-1] &= np.diff(rows) == 1
     if len(joined):

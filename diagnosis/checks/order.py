@@ -1,4 +1,4 @@
-"""Time that runs backwards, rows that stand twice: sorted, joined end to end, or left out."""
+"""Time that runs backwards and duplicate rows: sorted, appended as a new run, or removed."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from fluxproof.diagnosis.checks.missing import keep_rows
 from fluxproof.diagnosis.recording import Problem
 
 STAGE = "time"
-RESTART_STEPS = 100  # a step back by more is a clock that began again, by less a row out of place
+RESTART_STEPS = 100  # a longer step back is a restart of the clock, a shorter one a misplaced row
 
 
 def check(recording, nominal) -> None:
@@ -30,7 +30,7 @@ def check(recording, nominal) -> None:
 
 
 def _mend(recording, step, back, usual) -> None:
-    """Clocks that began again are set on; rows out of place are sorted."""
+    """Shift the time after a restart of the clock; sort misplaced rows."""
     restarts = back[step[back] < -RESTART_STEPS * usual]
     shuffled = len(back) > max(20, len(step) // 1000)
     if len(restarts) and not shuffled:
@@ -42,8 +42,8 @@ def _mend(recording, step, back, usual) -> None:
         part[restarts + 1] = 1
         recording.meta["run"] = recording.meta.get("run", 0) + np.cumsum(part)
         recording.problems.append(
-            Problem("time_order", f"time begins again {len(restarts)} times", "t", int(restarts[0]) + 1, len(restarts),
-                    "each part is taken as a run of its own")
+            Problem("time_order", f"time restarts {len(restarts)} times", "t", int(restarts[0]) + 1, len(restarts),
+                    "each part is treated as a separate run")
         )  # fmt: skip
         back = np.flatnonzero(np.diff(t) < 0)
     if len(back):
@@ -62,7 +62,7 @@ def _mend(recording, step, back, usual) -> None:
 
 
 def _duplicates(recording) -> None:
-    """Rows that equal the one before in every column, time included, are left out."""
+    """Remove rows that equal the previous one in every column including time."""
     same = np.flatnonzero(np.diff(recording["t"]) == 0)
     if not len(same):
         return
@@ -75,17 +75,17 @@ def _duplicates(recording) -> None:
         recording.problems.append(
             Problem(
                 "duplicate",
-                f"{len(twice)} rows stand twice",
+                f"{len(twice)} duplicate rows",
                 "t",
                 int(twice[0]) + 1,
                 len(twice),
-                "left out once",
+                "one copy removed",
             )
         )
 
 
 def _equal_rows(recording, rows) -> np.ndarray:
-    """Whether row k+1 equals row k in every column but the time, for the rows k asked for."""
+    """(len(rows),) bool: whether row k+1 equals row k in every column except time, for k in ``rows``."""
     equal = np.ones(len(rows), bool)
     for name, values in recording.columns.items():
         if name != "t":

@@ -1,8 +1,8 @@
-"""Swapped phases, reversed sensors, wrong rotation direction: the reading that the nominal machine fits is taken.
+"""Swapped phases, reversed sensors, wrong rotation direction: the interpretation that the nominal machine fits is used.
 
-Every single change to the columns is tried on the nominal balance.  A change is made only where the recording as it
-stands does not fit at all, the changed one does, and no other change does nearly as well.  Mirrored readings (currents
-and duties both swapped, or the angle reversed) are one and the same machine; the angle is reversed then.
+Every single change to the columns is tested with the nominal balance.  A change is accepted only if the recording does
+not fit unchanged, fits with the change, and fits clearly worse with any other change.  Mirrored interpretations
+(currents and duties both swapped, or the angle reversed) are equivalent; the angle is then reversed.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from fluxproof.diagnosis.checks.balance import BETTER, FIT, Rows, misfit, rows_o
 from fluxproof.diagnosis.recording import Problem
 
 STAGE = "geometry"
-SMALL = 0.03  # of the voltage: less cannot be told from noise
-NOTHING = 0.8  # of the voltage: beyond any effect
-CLEAR = 1.6  # the second best change must be worse by this much
+SMALL = 0.03  # of the voltage: a smaller misfit is indistinguishable from noise
+NOTHING = 0.8  # of the voltage: larger than any effect
+CLEAR = 1.6  # least ratio of the misfits of the second best and the best change
 
 ORDERS = {
     "b and c": [0, 2, 1],
@@ -36,7 +36,7 @@ def check(recording, nominal) -> None:
     as_is = misfit(rows)
     at_current = (
         as_is < FIT
-    )  # the voltage fits: what is left to mistake are currents that it hardly depends on
+    )  # the voltage fits; it hardly depends on the currents, which may still be mistaken
     if at_current:
         as_is = misfit(rows, True)
         changes = {c: changed for c, changed in changes.items() if c[0] in ("currents", "sign")}
@@ -49,9 +49,9 @@ def check(recording, nominal) -> None:
     if tried[best] > BETTER * as_is or tried[best] > FIT:
         if as_is > NOTHING:
             message = (
-                f"the nominal machine leaves {as_is:.0%} of the voltage: check drive.toml and the columns"
+                f"the nominal machine leaves {as_is:.0%} of the voltage unexplained: check drive.toml and the columns"
             )
-            recording.problems.append(Problem("no_fit", message, "", 0, n, "the recording is believed"))
+            recording.problems.append(Problem("no_fit", message, "", 0, n, "the recording is used unchanged"))
         return
     second = next((name for name in ranked[1:] if tried[name] < CLEAR * tried[best]), None)
     numbers = f"misfit {as_is:.0%} of the voltage as recorded, {tried[best]:.0%} with it"
@@ -62,12 +62,12 @@ def check(recording, nominal) -> None:
     _apply(recording, best, nominal.sample_time_s)
     code = "rotation" if best[0] in ("angle", "speed") else "sign" if best[0] == "sign" else "swapped_phases"
     recording.problems.append(
-        Problem(code, f"{_words(best)}: {numbers}", _column(best), 0, n, "worked round")
+        Problem(code, f"{_words(best)}: {numbers}", _column(best), 0, n, "corrected")
     )
 
 
 def _changes(rows: Rows) -> dict[tuple, Rows]:
-    """Every change that is tried, as {what: changed rows}."""
+    """Every change that is tested, {change: changed rows}."""
     if rows.steady:
         return {
             ("speed", ""): rows.change(omega=-rows.omega),
@@ -94,9 +94,9 @@ def _words(change) -> str:
     """A change in words."""
     what, which = change
     if what == "angle":
-        return "the angle turns against the phase order of currents and duties"
+        return "the angle rotates against the phase sequence of currents and duties"
     if what == "speed":
-        return "the speed has the sign of the other direction"
+        return "the speed has the wrong sign"
     if what == "axes":
         return "the d and q axes are swapped"
     if what == "sign":
@@ -104,7 +104,7 @@ def _words(change) -> str:
             "the phase currents have the opposite sign" if which == "i" else f"{which} has the opposite sign"
         )
     who = {"currents": "phase currents", "duties": "duties", "both": "phase currents and duties"}[what]
-    return f"{who} {which} are swapped" if " and " in which else f"{who} stand in the order {which}"
+    return f"{who} {which} are swapped" if " and " in which else f"{who} are in the order {which}"
 
 
 def _column(change) -> str:
@@ -125,7 +125,7 @@ def _apply(recording, change, period) -> None:
     if what in ("angle", "speed"):
         ratio = angle_speed_ratio(recording, period) if what == "angle" else None
         columns["theta_e"] = -columns["theta_e"]
-        if ratio is None or ratio > 0.0:  # a speed of the other sign than the angle was right
+        if ratio is None or ratio > 0.0:  # a speed with the opposite sign of the angle was right
             columns["omega_e"] = -columns["omega_e"]
             if "torque" in columns:
                 columns["torque"] = -columns["torque"]

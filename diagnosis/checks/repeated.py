@@ -1,8 +1,8 @@
-"""Samples that were dropped or written twice although the time goes on evenly: the angle tells.
+"""Samples that were dropped or written twice although the time advances evenly, found from the angle.
 
-An angle advances evenly.  One row in which it advances twice as far as before and after, or not at all with every
-channel as it was, is a slip of the logger; rows are then not joined there.  A channel table that only changes every
-few rows was sampled slower than its time says.
+The angle advances evenly.  A row in which it advances twice as far as before and after, or not at all with all
+channels unchanged, is a fault of the logger, and the rows are not joined there.  A recording that changes only every
+few rows was sampled more slowly than its time says.
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ from fluxproof.diagnosis.checks.agreement import wrapped
 from fluxproof.diagnosis.recording import Problem
 
 STAGE = "signals"
-CLEAR = 10.0  # times the usual scatter of the angle's steps
+CLEAR = 10.0  # times the usual scatter of the angle steps
 RARE = 0.05
 CHANCE = 20.0
 INDEPENDENT = ("i_a", "i_b", "i_d", "i_q", "theta_e", "u_dc")
 HELD = 0.4
-LEAST_ADVANCE = 1e-3  # rad a row that an angle cannot miss
+LEAST_ADVANCE = 1e-3  # rad per row; a smaller advance is not significant
 
 
 def check(recording, nominal) -> None:
@@ -28,7 +28,7 @@ def check(recording, nominal) -> None:
     joined = recording.joined[:-1] & recording.usable[:-1] & recording.usable[1:]
     if _held(recording, advance, joined, nominal.sample_time_s):
         return
-    # What the steps before and after say; a recorded speed is filtered and lags behind.
+    # The advance expected from the neighbouring steps; a recorded speed is filtered and lags.
     expected = np.zeros_like(advance)
     expected[1:-1] = 0.5 * (advance[:-2] + advance[2:])
     even = np.zeros(len(advance), bool)
@@ -47,7 +47,7 @@ def check(recording, nominal) -> None:
 
 
 def _held(recording, advance, joined, period) -> bool:
-    """Deal with rows that repeat the one before; True when most do, and the recording is in truth a slow one."""
+    """Handle rows that repeat the previous one; True if most do, that is, the recording is a slow one."""
     turning = joined & (np.abs(recording["omega_e"][1:]) * period > LEAST_ADVANCE)
     still = np.flatnonzero(turning & (advance == 0.0))
     still = still[_same(recording, still)]
@@ -59,20 +59,20 @@ def _held(recording, advance, joined, period) -> bool:
     slow = count > HELD * np.count_nonzero(turning)
     if slow:
         recording.slow = True
-        message = f"{count} rows repeat the one before: sampled slower than the time says"
+        message = f"{count} rows repeat the previous one: sampled more slowly than the time says"
         action = "only steady operating points are used"
     else:
         recording.usable[still + 1] = False
         recording.joined[still] = False
-        message, action = f"{count} rows repeat the one before", "not used"
+        message, action = f"{count} rows repeat the previous one", "not used"
     recording.problems.append(Problem("repeated", message, "", row, count, action))
     return slow
 
 
 def _by_chance(recording) -> float:
-    """How many rows would equal the one before if coarse channels repeated their codes independently.
+    """Expected number of rows that equal the previous one by chance, if the channels repeat codes independently.
 
-    The rest follows from these: equal samples make equal duties.
+    The other channels follow from these: equal samples give equal duties.
     """
     share = 1.0
     for name in INDEPENDENT:
@@ -83,7 +83,7 @@ def _by_chance(recording) -> float:
 
 
 def _same(recording, rows) -> np.ndarray:
-    """Whether row k+1 equals row k in every channel, for the rows k asked for."""
+    """(len(rows),) bool: whether row k+1 equals row k in every channel, for k in ``rows``."""
     same = np.ones(len(rows), bool)
     for name, values in recording.columns.items():
         if name != "t":

@@ -1,4 +1,4 @@
-"""Runs of exactly equal values in a channel (no check itself)."""
+"""Runs of exactly equal values in a channel (not itself a check)."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def runs_of_equal(values, least) -> tuple[np.ndarray, np.ndarray]:
 
 
 def quantum(values) -> float:
-    """The smallest step between neighbouring values, 0 for a constant; looks at 20,000 of them."""
+    """The smallest step between distinct values, 0 for a constant; examines up to 20,000 values."""
     start = max(0, len(values) // 2 - 10_000)
     step = np.abs(np.diff(values[start : start + 20_000]))
     step = step[step > 1e-12 * max(1.0, float(np.max(np.abs(values))))]
@@ -23,7 +23,7 @@ def quantum(values) -> float:
 
 
 def mark(usable, first, length, before=0, after=0) -> int:
-    """Clear ``usable`` on the runs and some rows around; returns how many rows the runs hold."""
+    """Clear ``usable`` on the runs and rows around them; returns the number of rows in the runs."""
     edge = np.zeros(len(usable) + 1, int)
     np.add.at(edge, np.maximum(first - before, 0), 1)
     np.add.at(edge, np.minimum(first + length + after, len(usable)), -1)

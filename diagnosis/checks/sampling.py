@@ -1,8 +1,8 @@
-"""Sampling against drive.toml: a time in other units, too coarse a time, gaps, too slow a log, a wrong sample time.
+"""Sample time against drive.toml: wrong unit, too few digits, gaps, a slow log, a wrong sample time.
 
-A row is joined to the next when the step is the sample time.  A log that is slower than the control is marked
-slow, and its rows are joined by its own step; only operating points count then.  Whether a strange step is a
-wrong unit or a slow log is told by the angle, where it is recorded: theta must advance by omega times the step.
+A row is joined to the next if the step equals the sample time.  A log slower than the control is marked slow and its
+rows are joined by its own step; then only steady operating points are used.  If the angle is recorded, it decides
+whether an unexpected step is a wrong unit or a slow log: theta must advance by omega times the step.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from fluxproof.diagnosis.checks.agreement import angle_speed_ratio
 from fluxproof.diagnosis.recording import Problem
 
 STAGE = "time"
-TOLERANCE = 0.02  # of the sample time: the clock of a logger is better, another sample time is not
+TOLERANCE = 0.02  # of the sample time: the clock of a logger is more accurate
 JOINED = 0.25
 SLOW_FROM = 1.5
 UNITS = {"ms": 1e3, "us": 1e6, "ns": 1e9}
@@ -35,11 +35,11 @@ def check(recording, nominal) -> None:
         recording.problems.append(
             Problem(
                 "unit",
-                f"time advances by {usual / factor:g} a row",
+                f"time advances by {usual / factor:g} per row",
                 "t",
                 0,
                 len(recording),
-                f"taken as {unit}",
+                f"interpreted as {unit}",
             )
         )
     ratio = usual / period
@@ -48,7 +48,7 @@ def check(recording, nominal) -> None:
     elif ratio >= SLOW_FROM:
         recording.slow = True
         message = (
-            f"a row every {usual:g} s, the control samples every {period:g} s: too slow for a balance in time"
+            f"a row every {usual:g} s, the control samples every {period:g} s: too slow for a row-to-row balance"
         )
         recording.problems.append(
             Problem("slow_sampling", message, "t", 0, len(recording), "only steady operating points are used")
@@ -65,7 +65,7 @@ def check(recording, nominal) -> None:
 
 
 def _join(recording, step, usual) -> None:
-    """Set ``joined`` and report gaps; a change of run is no gap."""
+    """Set ``joined`` and report gaps; the start of a new run is no gap."""
     width = JOINED if not recording.slow else 0.5
     recording.joined[:-1] &= np.abs(step - usual) < width * usual
     recording.joined[-1] = False
@@ -73,12 +73,12 @@ def _join(recording, step, usual) -> None:
     if "run" in recording.meta:
         new_run = np.diff(recording.meta["run"]) != 0
         recording.joined[:-1] &= ~new_run
-        recording.meta["notes"].append(f"{int(new_run.sum()) + 1} runs, taken one by one")
+        recording.meta["notes"].append(f"{int(new_run.sum()) + 1} runs, treated separately")
     gaps = np.flatnonzero((step > 1.5 * usual) & ~new_run)
     together = np.flatnonzero((step < 0.5 * usual) & ~new_run)
     irregular = recording.slow and len(gaps) + len(together) > 0.2 * len(step)
     if irregular:
-        recording.meta["notes"].append("rows are irregular in time, as slow logs are")
+        recording.meta["notes"].append("the time steps are irregular, which is accepted in a slow log")
         return
     if len(gaps):
         lost = int(np.sum(np.round(step[gaps] / usual) - 1))
@@ -88,13 +88,13 @@ def _join(recording, step, usual) -> None:
         )  # fmt: skip
     if len(together):
         recording.problems.append(
-            Problem("duplicate", f"{len(together)} rows hardly later than the one before", "t", int(together[0]) + 1,
-                    len(together), "no balance is made across them")
+            Problem("duplicate", f"{len(together)} rows almost simultaneous with the previous one", "t",
+                    int(together[0]) + 1, len(together), "no balance is made across them")
         )  # fmt: skip
 
 
 def _unit(recording, usual, period) -> str:
-    """The unit of a time that is not in seconds, or "" where it may well be seconds."""
+    """The unit of a time that is not in seconds; "" if it may be seconds."""
     if "t" in recording.meta.get("stated_units", ()):
         return ""
     for unit, factor in UNITS.items():
@@ -103,13 +103,13 @@ def _unit(recording, usual, period) -> str:
         ratio = angle_speed_ratio(recording, period)
         if ratio is not None:
             return unit if abs(ratio - 1.0) < 0.1 else ""
-        if usual > 10.0:  # nobody logs a drive once in 10 s
+        if usual > 10.0:  # a drive is not logged every 10 s
             return unit
     return ""
 
 
 def _rebuild_coarse(recording, step, period) -> bool:
-    """A time with too few digits stands still and jumps; the mean step then tells what it was."""
+    """Rebuild a time with too few digits, which repeats and jumps, from its mean step; False if not needed."""
     still = np.count_nonzero(step == 0)
     if still < 0.01 * len(step):
         return False
@@ -130,7 +130,7 @@ def _rebuild_coarse(recording, step, period) -> bool:
 
 
 def _time_is_wrong(recording, ratio, period) -> bool:
-    """Whether the angle says that rows are one sample time apart after all; the time is then rebuilt."""
+    """Whether the angle shows that rows are one sample time apart; the time is then rebuilt."""
     found = angle_speed_ratio(recording, period)
     if found is None or abs(found - 1.0) > 0.01 or abs(ratio - 1.0) < 0.05:
         return False

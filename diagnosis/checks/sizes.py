@@ -1,7 +1,7 @@
-"""Units that the size of the numbers gives away: percent duties, milliamps, millivolts, kelvin.
+"""Wrong units that the magnitude of the values reveals: duties in percent, milliamps, millivolts, kelvin.
 
-A size is judged against drive.toml's rated values, with room for a factor of 20; what lies beyond and does not become
-right by one unit is refused, since a wrong guess would be a wrong diagnosis.
+Values are compared with the rated values of drive.toml, with a margin of a factor of 20.  If they exceed it and no
+single unit explains it, the recording is rejected, since a wrong guess would give a wrong diagnosis.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import numpy as np
 from fluxproof.diagnosis.recording import Problem
 
 STAGE = "units"
-MUCH = 20.0  # times the rated value: no overload
+MUCH = 20.0  # times the rated value: more than any overload
 PLAUSIBLE = 4.0  # times the rated value, after the conversion
 ROUNDING = 0.005
 CURRENTS = ("i_a", "i_b", "i_c", "i_d", "i_q", "i_d_ref", "i_q_ref")
@@ -28,7 +28,7 @@ def check(recording, nominal) -> None:
 
 
 def _size(values) -> float:
-    """What hardly any of the values exceeds, spikes aside; every 16th of many is enough."""
+    """A robust maximum of the magnitude, without spikes; of long arrays every 16th value is used."""
     return float(np.percentile(np.abs(values[:: max(1, len(values) // 65536)]), 99.5))
 
 
@@ -53,7 +53,7 @@ def _currents(recording, rated) -> None:
     if not large:
         return
     if max(large.values()) / 1000.0 <= PLAUSIBLE * rated:
-        # A unit belongs to a sensor board: all currents of a frame, unless the others are of another size.
+        # A unit applies to a sensor board: to all currents of a frame, unless the others differ in magnitude.
         _convert(recording, tuple(large), 1e-3, "mA")
         return
     name = max(large, key=large.get)
@@ -83,14 +83,14 @@ def _duties(recording) -> None:
         _refuse(
             recording,
             "d_a",
-            f"duties run from {low:.3g} to {high:.3g}: give their factor and offset in [columns]",
+            f"duties range from {low:.3g} to {high:.3g}: give their factor and offset in [columns]",
         )
     elif high > 1.5 or low < -0.5:
         worst = max(names, key=lambda name: float(np.max(np.abs(recording[name]))))
         out = (recording[worst] > 1.0 + ROUNDING) | (recording[worst] < -ROUNDING)
         if np.count_nonzero(out) > 0.01 * len(out):
             _refuse(
-                recording, worst, f"duties run from {low:.4g} to {high:.4g}; 0 to 1, or percent, is expected"
+                recording, worst, f"duties range from {low:.4g} to {high:.4g}; 0 to 1, or percent, is expected"
             )
 
 
@@ -103,7 +103,7 @@ def _bus(recording, nominal_v) -> None:
             _convert(recording, ("u_dc",), factor, unit)
             return
     if not 0.02 < ratio < MUCH:
-        message = f"u_dc is {ratio * nominal_v:.4g} V in the middle, dc_bus_v = {nominal_v:g} V"
+        message = f"the median of u_dc is {ratio * nominal_v:.4g} V, but dc_bus_v = {nominal_v:g} V"
         _refuse(recording, "u_dc", message)
 
 

@@ -1,7 +1,7 @@
-"""Angle and speed that disagree: a speed of another scale or sign beside an electrical angle.
+"""Inconsistent angle and speed: a speed with a wrong scale or sign next to an electrical angle.
 
-The angle is believed where the currents and duties turn with it, and the speed is then set by it.  An angle that the
-balance does not confirm and that turns at quite another rate than the speed leaves nothing to believe.
+If currents and duties rotate with the angle, the angle is used and the speed is corrected.  If the balance does not
+confirm the angle and the two rates differ widely, the recording is rejected.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from fluxproof.diagnosis.checks.balance import FIT, misfit, rows_of, tells
 from fluxproof.diagnosis.recording import Problem
 
 STAGE = "geometry"
-LARGE = 0.05  # a speed estimate may lag or be scaled; more is another quantity
+LARGE = 0.05  # largest deviation of a lagging or scaled speed estimate; beyond it the unit is wrong
 WRONG = 2.0
 
 
@@ -30,10 +30,10 @@ def check(recording, nominal) -> None:
             rows is not None and rows.steady
         ):  # dq values: the speed was checked against them, the angle cannot be
             recording.columns["theta_e"] = -recording["theta_e"]
-            action = "the speed is believed"
+            action = "the angle is reversed"
         else:
             recording.columns["omega_e"] = -recording["omega_e"]
-            action = "the angle is believed, the speed turned round"
+            action = "the speed is reversed"
         recording.problems.append(Problem("rotation", message, "omega_e", 0, n, action))
         return
     message = f"the angle advances {ratio:.3g} times as fast as the speed says"
@@ -41,6 +41,6 @@ def check(recording, nominal) -> None:
         recording.problems.append(Problem("angle_speed", message, "omega_e", 0, n, fatal=True))
         return
     recording.problems.append(
-        Problem("angle_speed", message, "omega_e", 0, n, "the speed is taken from the angle")
+        Problem("angle_speed", message, "omega_e", 0, n, "the speed is scaled to the angle")
     )
     recording.columns["omega_e"] = recording["omega_e"] * ratio

@@ -1,9 +1,9 @@
-"""Channels that stand still while the others say that they must move.
+"""Stuck channels: constant while other channels show that they must change.
 
-A constant is not wrong by itself: a supply is constant, and so is everything of a simulated drive at rest.  A phase
-current is stuck when the angle turns on and another current changes; an angle when the speed says that it turned; a
-speed when the angle's advance has changed; a dq current when its reference moves; a duty when the angle turns a
-whole turn and the other duties change.
+A constant value alone is no fault: a supply is constant, and so is every signal of a simulated drive at rest.  A phase
+current is stuck if the angle advances and another current changes; an angle if the speed shows rotation; a speed if
+the rate of the angle changes; a dq current if its reference changes; a duty if the angle advances by a whole turn and
+the other duties change.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ def _check_one(recording, name, moved) -> None:
     if not len(first):
         return
     longest = np.argsort(-length, kind="stable")[:MOST_RUNS]
-    # A clipped channel stands still too; its rows are out already.
+    # A clipped channel is constant too; its rows are already excluded.
     fresh = [k for k in longest if recording.usable[first[k] + length[k] // 2]]
     stuck = sorted(k for k in fresh if moved(first[k], first[k] + length[k] - 1))
     if not stuck:
@@ -63,25 +63,25 @@ def _check_one(recording, name, moved) -> None:
     fatal = rows > 0.9 * len(recording)
     value = recording[name][first[0]]
     recording.problems.append(
-        Problem("stuck", f"stands at {value:.6g} for {rows} rows while other channels move", name, int(first[0]), rows,
+        Problem("stuck", f"constant at {value:.6g} for {rows} rows while others change", name, int(first[0]), rows,
                 "" if fatal else "rows not used", fatal)
     )  # fmt: skip
 
 
 def _turned(recording, period) -> tuple[np.ndarray, np.ndarray]:
-    """(n,) angle turned since the first row, by the speed and by the angle; zeros where neither is recorded."""
+    """((n,), (n,)) rotation since the first row [rad], from the speed and from the angle; zeros without either."""
     n = len(recording)
     by_speed = recording["omega_e"] * period if "omega_e" in recording.columns else np.zeros(n)
     by_angle = by_speed
     if "theta_e" in recording.columns:
         theta = recording["theta_e"]
-        # Across a gap the angle's step says nothing.
+        # Across a gap the step of the angle is undefined.
         by_angle = np.where(recording.joined, wrapped(np.diff(theta, append=theta[-1])), by_speed)
     return np.cumsum(by_speed), np.cumsum(by_angle)
 
 
 def _speed_left(recording, by_angle, a, b, period) -> bool:
-    """Whether the angle's advance over the run's halves has changed by more than the speed did."""
+    """Whether the rate of the angle differs between the halves of the run and from the constant speed."""
     if "theta_e" not in recording.columns or b - a < LEAST:
         return False
     middle = (a + b) // 2
@@ -89,9 +89,9 @@ def _speed_left(recording, by_angle, a, b, period) -> bool:
         (by_angle[middle] - by_angle[a]) / (middle - a),
         (by_angle[b] - by_angle[middle]) / (b - middle),
     )
-    told = recording["omega_e"][a] * period
+    speed = recording["omega_e"][a] * period
     return bool(
-        max(abs(first - told), abs(second - told)) * (b - a) > 3.0 and abs(first - second) * (b - a) > 1.0
+        max(abs(first - speed), abs(second - speed)) * (b - a) > 3.0 and abs(first - second) * (b - a) > 1.0
     )
 
 

@@ -1,7 +1,7 @@
-"""Three phase currents that do not sum to zero: offsets and gains of the sensors, which the diagnosis is to find.
+"""Phase currents that do not sum to zero: sensor offsets and gains, which the diagnosis identifies.
 
-Small sums are noted, never repaired.  A sum as large as the currents themselves is no sensor error but a channel of
-something else.
+Small sums are noted and not corrected.  A sum as large as the currents is no sensor error: one of the channels is a
+different signal.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def check(recording, nominal) -> None:
                 "i_c",
                 row,
                 int(good.sum()),
-                "not mended; the diagnosis looks for sensor errors",
+                "not corrected; the diagnosis identifies sensor errors",
             )
         )
     elif max(abs(mean), spread) > NOTED * rated:

@@ -1,7 +1,8 @@
-"""Angles in degrees or turns, angles and speeds of the shaft, speeds in rpm: found by what fits, and converted.
+"""Angles in degrees or turns, angles and speeds of the shaft, speeds in rpm: recognised by the fit and converted.
 
-For the angle, each unit is tried on the nominal stator balance; for the speed, on the angle's advance, or without one
-on the steady dq balance.  A unit is taken only where the columns as they stand do not fit and exactly one does.
+Each unit of the angle is tested with the nominal stator balance; each unit of the speed with the advance of the angle,
+or without an angle with the steady dq balance.  A unit is accepted only if the unchanged columns do not fit and it
+fits best.
 """
 
 from __future__ import annotations
@@ -63,7 +64,7 @@ def _angle_unit(recording, nominal, p):
     if "theta_e" not in recording.columns or recording.slow:
         return None
     without_speed = "omega_e" not in recording.columns
-    if without_speed:  # the balance needs none, but its rows ask for the column
+    if without_speed:  # the balance does not use it, but rows_of requires the column
         recording.columns["omega_e"] = np.zeros(len(recording))
     rows = rows_of(recording, nominal)
     if without_speed:
@@ -80,7 +81,7 @@ def _angle_unit(recording, nominal, p):
         return None
     if "theta_e" in recording.meta.get("stated_units", ()):
         return None
-    # Without a balance only degrees show, by their range: wrapped angles reach 180 or 360.
+    # Without a balance only degrees can be recognised, since the ratio of angle and speed is then 180 / pi.
     ratio = angle_speed_ratio(recording, nominal.sample_time_s)
     if ratio is not None and abs(abs(ratio) - 1.0) < CLOSE:
         return None
@@ -92,7 +93,7 @@ def _angle_unit(recording, nominal, p):
 
 
 def _best_direction(rows, factor) -> float:
-    """Misfit with the angle times factor, in the direction and phase order that suit it better."""
+    """Misfit with the angle times factor, for the better direction and phase sequence."""
     theta = rows.theta * factor
     mirrored = rows.i[..., [0, 2, 1]]
     return min(misfit(rows.change(theta=s * theta, i=i)) for s in (1.0, -1.0) for i in (rows.i, mirrored))
@@ -117,7 +118,7 @@ def _speed_unit(recording, nominal, p):
         return None
     if "theta_e" in recording.columns:
         return None
-    recording.columns["theta_e"] = np.zeros(len(recording))  # the steady balance needs none
+    recording.columns["theta_e"] = np.zeros(len(recording))  # the steady balance does not use it
     rows = rows_of(recording, nominal)
     del recording.columns["theta_e"]
     if rows is None or not rows.steady or not tells(rows):

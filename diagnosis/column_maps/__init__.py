@@ -1,11 +1,11 @@
-"""Ready-made column maps for well-known logs, one file each; a new file here is found by itself.
+"""Column maps for well-known logs, one file each; every module in this folder is used.
 
 A map has
 
-    NAME       how messages call it
-    SIGNATURE  file columns (as ``key`` writes them) that tell this log from others
+    NAME       its name in messages
+    SIGNATURE  file columns (in the notation of ``key``) that identify this log
     COLUMNS    {file column: (canonical column, unit)}
-    KEY        optional: how a file column's name is simplified before it is looked up
+    KEY        optional: function that simplifies a file column's name before the look-up
     ASSUMED    optional: {canonical column: constant} for what the log leaves out
     SAMPLE_TIME_S  optional: for logs without a time column
     RUN        optional: file column whose change starts another run

@@ -1,8 +1,7 @@
-"""Reads a recording's file into a Table: the format is found by the content and must be what the name claims.
+"""Reads a recording's file into a Table; the format is recognised by content and must agree with the file name.
 
-Files are data of strangers: nothing in them is executed (no pickles), followed (no links to other files) or
-believed (sizes are limited before memory is taken).  Whatever a parsing library raises on a damaged file
-ends as RecordingError in one line.
+Files are untrusted: nothing in them is executed (no pickles), links to other files are not followed, and sizes are
+checked before memory is allocated.  Any exception of a parsing library becomes a RecordingError of one line.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ HEAD_BYTES = 4096
 
 
 def readers() -> list:
-    """Every module of this folder that reads a format; text last, since anything may look like text."""
+    """All reader modules of this folder; text last, since any file may look like text."""
     names = sorted(m.name for m in pkgutil.iter_modules(__path__))
     modules = [importlib.import_module(f"{__name__}.{name}") for name in names]
     return sorted((m for m in modules if hasattr(m, "read")), key=lambda m: m.FORMAT == "text")
@@ -37,7 +36,7 @@ def read_table(path, select: Select | None = None) -> Table:
     head = _head(path)
     reader = _reader_of(path, head)
     with warnings.catch_warnings(), limited_memory(), _quiet_finalizers():
-        warnings.simplefilter("ignore")  # a damaged file's warnings end as checks or errors of our own
+        warnings.simplefilter("ignore")  # a damaged file leads to findings or errors of this package instead
         try:
             return reader.read(path, select)
         except RecordingError as error:
@@ -45,7 +44,7 @@ def read_table(path, select: Select | None = None) -> Table:
                 raise
             failure = str(error)
         except MemoryError:
-            failure = "does not fit into memory"
+            failure = "too large for the memory limit"
         except (Exception, SystemExit) as error:  # parsing libraries raise anything on damaged content
             first = (str(error).strip().splitlines() or [type(error).__name__])[0]
             failure = f"not a readable {reader.FORMAT} file: {shown(first, 160)}"
@@ -55,7 +54,7 @@ def read_table(path, select: Select | None = None) -> Table:
 
 @contextlib.contextmanager
 def _quiet_finalizers():
-    """Half-made objects of a parsing library print tracebacks when they are thrown away; not within the block."""
+    """Suppress tracebacks that incomplete objects of a parsing library print when they are deleted."""
     hook = sys.unraisablehook
     sys.unraisablehook = lambda _: None
     try:
@@ -83,7 +82,7 @@ def _head(path: Path) -> bytes:
 
 
 def _reader_of(path: Path, head: bytes):
-    """The reader of the content; a name that claims another format is refused."""
+    """The reader for the content; RecordingError if the file name claims another format."""
     known = readers()
     found = next((m for m in known if m.matches(head, path)), None)
     suffix = path.suffix.lower()
@@ -91,7 +90,7 @@ def _reader_of(path: Path, head: bytes):
     if found is None:
         formats = ", ".join(m.FORMAT for m in known)
         claimed = f"not a {claims[0].FORMAT} file as its name says" if claims else "unknown format"
-        raise RecordingError(f"{path}: {claimed}; what can be read: {formats}")
+        raise RecordingError(f"{path}: {claimed}; readable formats: {formats}")
     if claims and found not in claims:
         raise RecordingError(
             f"{path}: the name says {claims[0].FORMAT}, the content is {found.FORMAT}; rename it if that is right"

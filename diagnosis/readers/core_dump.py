@@ -15,12 +15,12 @@ def matches(head: bytes, path) -> bool:
         return False
     try:
         return bool(telemetry.is_dump(path))
-    except Exception:  # whatever a stranger's file does to it, it is no dump
+    except Exception:  # any error means that the file is not a dump
         return False
 
 
 def read(path, select=None) -> Table:
-    """The canonical columns that the dump's words stand for; registers and raw codes in ``meta``."""
+    """The canonical columns of the dump; registers and raw codes in ``meta``."""
     from fluxproof.diagnosis import telemetry
 
     columns, meta = telemetry.read_dump(path)

@@ -1,8 +1,8 @@
-"""HDF5 files: every numeric data set of one length is a column, wherever it stands.
+"""HDF5 files: every numeric data set of the common length is a column, in any group.
 
-The last part of a data set's path is its name where that is unique.  Units come from an attribute "unit" or "units";
-tables of named fields (PyTables, pandas) give a column a field.  Links to other files and data kept in other files are
-refused: a recording must not make anyone read what it names.
+The last part of a data set's path is its name if that is unique.  Units come from an attribute "unit" or "units";
+tables of named fields (PyTables, pandas) give one column per field.  Links to other files and external data are
+rejected for security.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ def read(path, select=None) -> Table:
 
 
 def safe_datasets(file, path) -> dict:
-    """{path in the file: data set} of everything that is stored in this file and of a bearable size."""
+    """{path in the file: data set} of all data sets stored in this file; RecordingError for unreasonable sizes."""
     import h5py
 
     found = {}
@@ -57,7 +57,7 @@ def safe_datasets(file, path) -> dict:
             return
         where = f"{path}: data set {shown(name)}"
         if item.external or item.is_virtual:
-            raise RecordingError(f"{where} keeps its data in another file; such links are not followed")
+            raise RecordingError(f"{where} stores its data in another file; such links are not followed")
         chunk = item.chunks or (1,)
         if np.prod(chunk, dtype=float) * item.dtype.itemsize > MOST_CHUNK:
             raise RecordingError(f"{where} has chunks above 1 GB")
@@ -124,7 +124,7 @@ def _slice(dataset, pick, limit) -> np.ndarray:
 
 
 def declared_cells(datasets) -> int:
-    """How many numbers the data sets declare; above MAX_CELLS nobody should read them at once."""
+    """How many numbers the data sets declare; above MAX_CELLS they must not be read at once."""
     return int(
         min(sum(float(np.prod(d.shape or (1,), dtype=float)) for d in datasets.values()), 2.0 * MAX_CELLS)
     )

@@ -1,8 +1,8 @@
 """MATLAB .mat files of versions 5 to 7.3, read with pymatreader (scipy below 7.3, h5py for 7.3).
 
-Structures are taken apart: "run.i_a", and for a list of signals with their own names, as dSPACE ControlDesk
-(X, Y(k).Name, Y(k).Data) and Simulink ("structure with time": signals(k).label, .values) write them, the signal's name.
-Objects of classes (timeseries, table) hold no plain numbers; save arrays or a structure instead.
+Structures are flattened: "run.i_a".  Lists of named signals as in dSPACE ControlDesk (X, Y(k).Name, Y(k).Data) and
+Simulink ("structure with time": signals(k).label, .values) are read under the names of the signals.
+Objects of classes (timeseries, table) contain no plain numbers; save arrays or a structure instead.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ def matches(head: bytes, path) -> bool:
 
 
 def read(path, select=None) -> Table:
-    """The numeric arrays of one length, structures taken apart."""
+    """The numeric arrays of one length, with structures flattened."""
     from pymatreader import read_mat
 
     with open(path, "rb") as file:
@@ -62,7 +62,7 @@ def read(path, select=None) -> Table:
 
 
 def _collect(name, value, arrays, units, depth) -> None:
-    """Put every numeric array below ``value`` into ``arrays`` under a name of its own."""
+    """Put every numeric array below ``value`` into ``arrays`` under a unique name."""
     if depth > DEEP:
         return
     if isinstance(value, dict):
@@ -83,7 +83,7 @@ def _collect(name, value, arrays, units, depth) -> None:
                 _collect(name, {"Name": own, "Data": item, "Unit": u}, arrays, units, depth + 1)
             return
         for key, item in value.items():
-            # The outer structure is only the file's wrapping; inner names tell apart.
+            # The outer structure only wraps the file; the inner names are unique.
             _collect(key if depth == 0 else f"{name}.{key}", item, arrays, units, depth + 1)
     elif isinstance(value, list):
         for k, item in enumerate(value):
@@ -111,7 +111,7 @@ def _put(name, array, arrays) -> None:
 
 
 def _limit_inflated(path) -> None:
-    """Refuse a version 5 file whose compressed elements unpack to more than is read at most."""
+    """Reject a version 5 file whose compressed elements unpack to more than the limit."""
     left = 8 * MAX_CELLS
     with open(path, "rb") as file:
         head = file.read(128)

@@ -1,8 +1,8 @@
 """MDF measurement files (.mf4, .mdf), read with asammdf.
 
-Channels on several rasters are brought onto one: that of the wanted channel with the most samples, which in a drive's
-recording are the currents.  Others hold their last value there, and that is said.  The raster's time is a column
-"time" in seconds.
+Channels on several rasters are resampled to one: that of the requested channel with the most samples, which in a
+recording of a drive are the currents.  The others hold their last value, and a note reports it.  The time of the
+raster is a column "time" in seconds.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ def matches(head: bytes, path) -> bool:
 
 
 def read(path, select=None) -> Table:
-    """The wanted channels on one raster."""
+    """The requested channels on one raster."""
     import logging
 
     logging.getLogger("asammdf").setLevel(logging.CRITICAL)  # it reports a damaged file's blocks one by one
@@ -33,7 +33,7 @@ def read(path, select=None) -> Table:
         places, units = _channels(mdf)
         wanted = [name for name in chosen(units | {TIME: "s"}, select, path) if name != TIME]
         if not wanted:
-            raise RecordingError(f"{path}: holds no channel but the time")
+            raise RecordingError(f"{path}: contains no channel except the time")
         limit = row_limit(len(wanted) + 1)
         for group in {places[name][0] for name in wanted}:
             block = mdf.groups[group].channel_group
@@ -48,7 +48,7 @@ def read(path, select=None) -> Table:
 
 
 def _channels(mdf):
-    """({name: (group, channel)}, {name: unit}) of the value channels; names that come twice get their group."""
+    """({name: (group, channel)}, {name: unit}) of the value channels; duplicate names get their group."""
     places, units = {}, {}
     for g, group in enumerate(mdf.groups):
         master = mdf.masters_db.get(g)
@@ -71,7 +71,7 @@ def _table(path, wanted, signals, units, limit) -> Table:
     ]
     numeric = {name: s for name, s in zip(wanted, signals, strict=True) if name not in text and len(s)}
     if not numeric:
-        raise RecordingError(f"{path}: none of the wanted channels holds numbers")
+        raise RecordingError(f"{path}: none of the requested channels contains numbers")
     main = max(numeric, key=lambda name: len(numeric[name]))
     raster = np.asarray(numeric[main].timestamps, float)
     columns, other = {TIME: raster}, []
@@ -87,7 +87,7 @@ def _table(path, wanted, signals, units, limit) -> Table:
     if other:
         names = ", ".join(shown(name, 24) for name in other[:6]) + (", ..." if len(other) > 6 else "")
         table.notes.append(
-            f"{names} come on other rasters and hold their last value on that of {shown(main)}"
+            f"{names} are on other rasters; their last value is held on the raster of {shown(main)}"
         )
     if len(raster) >= limit:
         table.problems.append(too_long(limit))

@@ -1,7 +1,7 @@
-"""A bound on what reading one file may take of the machine's memory (no reader itself).
+"""A limit on the memory for reading one file (not itself a reader).
 
-Sizes that a file declares are checked where a reader can; this catches the rest, such as packed data that unpack
-to a thousand times their size: the allocation fails, and the file is refused.
+Readers check the sizes that a file declares where possible.  This limit catches the rest, such as compressed data that
+unpack to a thousand times their size: the allocation fails, and the file is rejected.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ LIMIT_BYTES = 8 << 30
 
 @contextlib.contextmanager
 def limited_memory(limit: int = LIMIT_BYTES):
-    """Within the block, allocations beyond ``limit`` more bytes fail; no bound on systems that offer none."""
+    """Within the block, allocations beyond ``limit`` more bytes fail; no limit on systems without this function."""
     try:
         import resource
     except ImportError:  # not a POSIX system

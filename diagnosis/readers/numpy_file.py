@@ -1,4 +1,4 @@
-"""NumPy files: .npz with one array a column, .npy with named fields or a plain matrix.
+"""NumPy files: .npz with one array per column, .npy with named fields or a plain matrix.
 
 Pickles are never loaded, since loading one runs its code.  A matrix without names has the columns "1", "2", ...
 """
@@ -34,7 +34,7 @@ def read(path, select=None) -> Table:
     with open(path, "rb") as file:
         single = file.read(len(NPY)) == NPY
     arrays = _single(path) if single else _archive(path)
-    # "meta" and other scalars or words of an archive are no columns.
+    # "meta" and other scalars or texts of an archive are not columns.
     arrays = {name: a for name, a in arrays.items() if a.ndim and a.size > 1}
     names = chosen(dict.fromkeys(arrays, ""), select, path)
     columns, text = as_columns({name: arrays[name] for name in names}, path)
@@ -46,7 +46,7 @@ def read(path, select=None) -> Table:
 
 
 def _single(path) -> dict[str, np.ndarray]:
-    """The columns of one array, mapped into memory and not read as a whole."""
+    """The columns of one array, memory-mapped instead of read as a whole."""
     array = np.load(path, mmap_mode="r", allow_pickle=False)
     if array.dtype.names:
         return {name: array[name] for name in array.dtype.names if array.ndim == 1 and array[name].ndim == 1}
@@ -60,7 +60,7 @@ def _single(path) -> dict[str, np.ndarray]:
 
 
 def _archive(path) -> dict[str, np.ndarray]:
-    """The arrays of an .npz, unpacked only if what it declares fits."""
+    """The arrays of an .npz, unpacked only if the declared size is within the limit."""
     with zipfile.ZipFile(path) as archive:
         size = sum(info.file_size for info in archive.infolist())
     if size > 8 * MAX_CELLS:
@@ -76,5 +76,5 @@ def _archive(path) -> dict[str, np.ndarray]:
                 if "pickle" not in str(error).lower():
                     raise RecordingError(f"{path}: array {shown(name)}: {shown(error, 120)}") from None
     if not arrays:
-        raise RecordingError(f"{path}: holds no plain array; pickled objects are not loaded")
+        raise RecordingError(f"{path}: contains no plain array; pickled objects are not loaded")
     return arrays

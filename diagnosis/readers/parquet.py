@@ -16,7 +16,7 @@ def matches(head: bytes, path) -> bool:
 
 
 def read(path, select=None) -> Table:
-    """The numeric columns; units from the field metadata key "unit", where a writer left one."""
+    """The numeric columns; units from the field metadata key "unit" if present."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -34,12 +34,12 @@ def read(path, select=None) -> Table:
     names = chosen(numeric, select, path)
     if len(set(schema.names)) != len(schema.names):
         twice = next(name for name in schema.names if schema.names.count(name) > 1)
-        raise RecordingError(f"{path}: column {twice} is there twice")
+        raise RecordingError(f"{path}: duplicate column {twice}")
     limit = row_limit(len(names))
     rows = file.metadata.num_rows
     if rows == 0:
         raise RecordingError(f"{path}: no rows")
-    # Row group by row group, so that what a broken or hostile footer declares is never allocated at once.
+    # Row group by row group, so that a size declared by a damaged or hostile footer is never allocated at once.
     parts: dict[str, list[np.ndarray]] = {name: [] for name in names}
     have = 0
     for batch in file.iter_batches(batch_size=1 << 18, columns=names):

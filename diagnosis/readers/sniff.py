@@ -1,8 +1,8 @@
 """The layout of a text table: separator, decimal mark, header, units, first line of numbers.
 
-Every pairing of separator and decimal mark is tried on the first lines; the one wins that makes the most
-numbers in lines of equally many fields.  "1,5;2,5" can only be two numbers with a decimal
-comma, "1,5,2,5" only four; nothing is guessed from a country's habits.
+Every pair of separator and decimal mark is tested on the first lines; the one that gives the most numbers in lines
+with the same number of fields is used.  "1,5;2,5" can only be two numbers with a decimal comma, "1,5,2,5" only four;
+the locale is not considered.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ UNIT_LINE = re.compile(
 
 @dataclass(frozen=True)
 class Layout:
-    """first: 0-based number of the first line with numbers; names, units: one entry a field."""
+    """first: 0-based number of the first line with numbers; names, units: one entry per field."""
 
     encoding: str
     separator: str
@@ -49,7 +49,7 @@ def encoding_of(head: bytes) -> str:
     try:
         head.decode("utf-8")
     except UnicodeDecodeError as error:
-        if error.start < len(head) - 4:  # a character cut by the end of the head is none
+        if error.start < len(head) - 4:  # a character that is cut at the end of the head is no error
             return "cp1252"
     return "utf-8"
 

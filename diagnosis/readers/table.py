@@ -1,4 +1,4 @@
-"""What every reader returns: named numeric columns of one length, with units and where they stood in the file.
+"""The result of every reader: named numeric columns of one length, with units and line numbers.
 
 A reader is one file in this folder with
 
@@ -7,8 +7,8 @@ A reader is one file in this folder with
     matches(head, path)  whether the content (first bytes) is this format
     read(path, select)   -> Table
 
-``select`` is handed {column name: unit or ""} and returns the names to read, so that a file of hundreds of
-channels costs no more memory than the ones that count; None reads all.
+``select`` receives {column name: unit or ""} and returns the names to read, so that only the required channels of a
+large file use memory; None reads all.
 """
 
 from __future__ import annotations
@@ -22,18 +22,18 @@ from fluxproof.diagnosis.recording import Problem, RecordingError
 
 MAX_ROWS = 20_000_000
 MAX_COLUMNS = 4096
-MAX_CELLS = 200_000_000  # 1.6 GB as float64: what a reader takes into memory at most
+MAX_CELLS = 200_000_000  # 1.6 GB as float64: limit of a reader
 
 Select = Callable[[dict[str, str]], list[str]]
 
 
 @dataclass
 class Table:
-    """Columns as they stood in the file: float64, shape (n,), nothing converted.
+    """Columns of a file: float64, shape (n,), without unit conversion.
 
     lines: (n,) line number of each row in a text file, or None.
-    text: names of columns that hold no numbers.
-    meta: what else the file held; "sample_time_s" when it states one.
+    text: names of columns without numbers.
+    meta: further contents of the file; "sample_time_s" if it states one.
     """
 
     columns: dict[str, np.ndarray]
@@ -51,20 +51,20 @@ def chosen(names: dict[str, str], select: Select | None, path) -> list[str]:
     if len(wanted) > MAX_COLUMNS:
         raise RecordingError(f"{path}: {len(wanted)} columns; at most {MAX_COLUMNS} are read")
     if not wanted:
-        raise RecordingError(f"{path}: holds no numeric column")
+        raise RecordingError(f"{path}: contains no numeric column")
     return wanted
 
 
 def row_limit(n_columns: int) -> int:
-    """How many rows of so many columns are read at most."""
+    """Largest number of rows that are read of ``n_columns`` columns."""
     return min(MAX_ROWS, MAX_CELLS // max(1, n_columns))
 
 
 def too_long(limit: int, rows: int | None = None) -> Problem:
-    """The finding that says that a file was cut at ``limit`` rows."""
+    """The finding that a file was truncated at ``limit`` rows."""
     of = f" of {rows}" if rows else ""
     return Problem(
-        "too_long", f"only the first {limit} rows{of} are read", row=limit, action="the rest is not looked at"
+        "too_long", f"only the first {limit} rows{of} are read", row=limit, action="the other rows are ignored"
     )
 
 
@@ -72,7 +72,7 @@ def as_columns(arrays: dict[str, object], path) -> tuple[dict[str, np.ndarray], 
     """(numeric columns as float64, names of the others) from arrays of one length; RecordingError if ragged.
 
     Arrays of shape (n, 1) and (1, n) count as (n,); (n, m) and (m, n) with small m become columns name[0] ...
-    Constants of one value are taken over the whole length.
+    Scalars are repeated over the whole length.
     """
     flat: dict[str, np.ndarray] = {}
     text = []
@@ -92,7 +92,7 @@ def as_columns(arrays: dict[str, object], path) -> tuple[dict[str, np.ndarray], 
     flat = dict(list(flat.items())[:MAX_COLUMNS])
     n = max((len(a) for a in flat.values()), default=0)
     if n == 0:
-        raise RecordingError(f"{path}: holds no numeric array")
+        raise RecordingError(f"{path}: contains no numeric array")
     wrong = {name: len(a) for name, a in flat.items() if len(a) not in (1, n)}
     if wrong:
         name, length = next(iter(wrong.items()))
@@ -108,7 +108,7 @@ def as_columns(arrays: dict[str, object], path) -> tuple[dict[str, np.ndarray], 
 
 
 def shown(name: object, most: int = 60) -> str:
-    """A name from a file as text that fits a line and does no harm to a terminal."""
+    """A name from a file as short printable text, safe for a terminal."""
     text = str(name)
     text = text if text.isprintable() else repr(text)[1:-1]
     return text if len(text) <= most else f"{text[: most - 3]}..."

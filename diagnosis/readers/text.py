@@ -16,7 +16,7 @@ from fluxproof.diagnosis.recording import Problem, RecordingError
 
 FORMAT = "text"
 SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".asc", ".log")
-MOSTLY_TEXT = 0.5  # a column with a larger share of words is no column of numbers
+MOSTLY_TEXT = 0.5  # a column with a larger share of words is not numeric
 
 
 def matches(head: bytes, path) -> bool:
@@ -36,7 +36,7 @@ def read(path, select=None) -> Table:
     wanted = chosen(units, select, path)
     for name in wanted:
         if layout.names.count(name) > 1:
-            raise RecordingError(f"{path}:{layout.first}: column {shown(name)} is there twice")
+            raise RecordingError(f"{path}:{layout.first}: duplicate column {shown(name)}")
     index = [layout.names.index(name) for name in wanted]
     limit = row_limit(len(layout.names))
     try:
@@ -52,7 +52,7 @@ def read(path, select=None) -> Table:
             skiprows=layout.first,
             nrows=limit + 1,
             comment="#",
-            skip_blank_lines=False,  # keeps rows and lines in step
+            skip_blank_lines=False,  # keeps row and line numbers consistent
             skipinitialspace=True,
             low_memory=False,
             compression=None,
@@ -75,7 +75,7 @@ def read(path, select=None) -> Table:
         table.problems.append(too_long(limit))
     elif len(frame) > 1 and not _ends_with_line_end(path):
         frame, lines = frame.iloc[:-1], lines[:-1]
-        table.notes.append("the file does not end with a line end; the last row may be cut and is left out")
+        table.notes.append("the file does not end with a line end; the last row may be truncated and is ignored")
     if not len(frame):
         raise RecordingError(f"{path}: a header but no rows")
     table.lines = lines
@@ -87,7 +87,7 @@ def read(path, select=None) -> Table:
 
 
 def _take(table: Table, name: str, values, pd) -> None:
-    """One column into the table: numbers as they are, words among them as NaN and a finding."""
+    """Add one column to the table; words among numbers become NaN and a finding."""
     if values.dtype.kind in "biuf":
         table.columns[name] = values.to_numpy(float)
         return
@@ -106,7 +106,7 @@ def _take(table: Table, name: str, values, pd) -> None:
                 name,
                 row,
                 len(words),
-                "counts as missing",
+                "treated as missing",
             )
         )
 

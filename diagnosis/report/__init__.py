@@ -1,4 +1,4 @@
-"""What a diagnosis leaves behind: diagnosis.json for machines, report.html for people."""
+"""The output files of a diagnosis: diagnosis.json for programs, report.html for people."""
 
 from fluxproof.diagnosis.report.write import write_outputs
 

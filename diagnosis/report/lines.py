@@ -1,6 +1,6 @@
-"""Pictures with lines and bars: misfit over time and over the angle, harmonic orders, the fit before and after.
+"""Line and bar charts: misfit over time and over the angle, harmonic orders, the fit before and after.
 
-The arrays are those of diagnosis.result.Evidence; the drawing functions raise KeyError for a missing one.
+The arrays are those of diagnosis.result.Evidence; a drawing function raises KeyError if one is missing.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ WHEN = {"before": theme.BEFORE, "after": theme.AFTER}
 
 
 def over_time(e) -> theme.Picture:
-    """rms of the misfit's length in equal parts of time, the noise as a band, held-out parts shaded."""
+    """rms magnitude of the misfit in equal intervals of time, the noise as a band, held-out intervals shaded."""
     t = e["t"]
     edges = np.linspace(t[0], t[-1], min(POINTS, len(t)) + 1)
     part = np.clip(np.searchsorted(edges, t, side="right") - 1, 0, len(edges) - 2)
@@ -43,13 +43,13 @@ def over_time(e) -> theme.Picture:
     )
     theme.key(axis, *names)
     caption = (
-        "Length of the misfit's vector over time. Shaded upright: parts held out, which no fit has seen."
+        "Magnitude of the misfit vector over time. Vertical shading: intervals held out of every fit."
     )
     return theme.picture("over_time", figure, caption)
 
 
 def over_angle(e) -> theme.Picture:
-    """Mean misfit over the electrical angle, d above and q below, on one scale."""
+    """Mean misfit over the electrical angle, d above q, on a common scale."""
     _same_length(e, "angle", "angle_{}_d", "angle_{}_q")
     angle = np.degrees(e["angle"]) % 360.0
     order = np.argsort(angle)
@@ -62,13 +62,13 @@ def over_angle(e) -> theme.Picture:
         theme.key(axis, *((_called(e, when), WHEN[when]) for when in given))
     panels[-1].set_xlabel("electrical angle [°]")
     caption = (
-        "Mean misfit over the electrical angle. Six waves in a turn point to the inverter or the magnets."
+        "Mean misfit over the electrical angle. Six periods per turn indicate the inverter or the magnets."
     )
     return theme.picture("over_angle", figure, caption)
 
 
 def orders(e) -> theme.Picture:
-    """Amplitude of each harmonic order, before and after, on a logarithmic scale."""
+    """Amplitude of each harmonic order, before and after, on a logarithmic axis."""
     _same_length(e, "orders", "spectrum_{}")
     values = {when: e[f"spectrum_{when}"] for when in _given(e, "spectrum_{}")}
     positive = np.concatenate(list(values.values()))
@@ -99,12 +99,12 @@ def orders(e) -> theme.Picture:
         ylim=(bottom, top),
     )
     theme.key(axis, *((_called(e, when), WHEN[when]) for when in values))
-    caption = "Amplitude of the misfit's harmonics. Order 0 is what stays the same all round the turn."
+    caption = "Amplitude of the misfit's harmonics. Order 0 is the part that does not depend on the angle."
     return theme.picture("orders", figure, caption)
 
 
 def fit_bars(fit) -> theme.Picture:
-    """rms misfit before and after, on what was fitted and on what was not, beside the noise floor."""
+    """rms misfit before and after, on fitted and on held-out points, with the noise floor."""
     rows = [
         ("held out, before", fit.holdout_before, theme.BEFORE),
         ("held out, after", fit.holdout_after, theme.AFTER),
@@ -137,12 +137,12 @@ def fit_bars(fit) -> theme.Picture:
 
 
 def _called(e, when: str) -> str:
-    """Before is plainly the misfit where there is no after."""
+    """Label of a curve: "before" or "after", or "misfit" if there is no "after"."""
     return when if any("after" in name for name in e) else "misfit"
 
 
 def _line(axis, x, y, color) -> None:
-    """A line that breaks where there is nothing, and a dot where a point stands alone."""
+    """A line that is interrupted at NaN; an isolated point is drawn as a dot."""
     axis.plot(x, y, color=color)
     known = np.isfinite(np.pad(y, 1, constant_values=np.nan))
     alone = known[1:-1] & ~known[:-2] & ~known[2:]
@@ -157,7 +157,7 @@ def _same_length(e, base: str, *patterns: str) -> None:
 
 
 def _given(e, *patterns: str) -> list[str]:
-    """Which of before and after have all their arrays; before must."""
+    """Which of "before" and "after" have all their arrays; KeyError if "before" has not."""
     given = [when for when in WHEN if all(pattern.format(when) in e for pattern in patterns)]
     if "before" not in given:
         raise KeyError(patterns[0].format("before"))

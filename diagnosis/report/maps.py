@@ -1,7 +1,7 @@
 """Heat maps of the misfit: over electrical angle and current, and over the speed-current plane.
 
-A cell's colour is the rms over its rows k of sqrt(e_d(k)^2 + e_q(k)^2), the length of the misfit's vector in dq;
-before and after share one scale.  The arrays are those of diagnosis.result.Evidence.
+The colour of a cell is the rms over its rows k of sqrt(e_d(k)^2 + e_q(k)^2), the magnitude of the dq misfit;
+before and after share one colour scale.  The arrays are those of diagnosis.result.Evidence.
 """
 
 from __future__ import annotations
@@ -13,20 +13,20 @@ from scipy.stats import binned_statistic_2d
 from fluxproof.diagnosis.report import theme
 
 CELLS = (28, 24, 20, 16, 13, 10)  # along each axis, finest first; with 28 a cell is 4 pixels wide on a phone
-FILLED = 0.9  # of what the coarsest cells fill: finer ones would show stripes between the operating points
+FILLED = 0.9  # least filled share relative to the coarsest grid: finer cells leave empty stripes between points
 SPARSE = (
-    0.35  # with fewer even of the coarsest filled, a map would be specks: a square for each fine cell instead
+    0.35  # least filled share of the coarsest grid for a map; below it each fine cell is drawn as a square
 )
-QUIET = 3.0  # times the noise: the scale's least upper end, so that noise alone does not look like a finding
+QUIET = 3.0  # times the noise: least upper end of the colour scale, so that noise alone does not look significant
 NOTHING = 1e-9
 
 
 class LeftOut(Exception):
-    """Why a picture cannot be drawn, in words for the reader."""
+    """A picture cannot be drawn; the message gives the reason in the report."""
 
 
 def length(e, when: str) -> np.ndarray:
-    """Length of the misfit's dq vector [V], shape (n,); ``when``: "before" or "after"."""
+    """Magnitude of the dq misfit [V], shape (n,); ``when``: "before" or "after"."""
     return np.hypot(e[f"{when}_d"], e[f"{when}_q"])
 
 
@@ -41,7 +41,7 @@ def angle_current(e) -> theme.Picture:
     current, label = along_current(e)
     angle = np.degrees(e["theta_e"]) % 360.0
     caption = (
-        "Misfit over electrical angle and current. Level bands follow the current, upright ones the angle."
+        "Misfit over electrical angle and current. Horizontal bands depend on the current, vertical ones on the angle."
     )
     figure = _before_after(e, angle, current, "electrical angle [°]", label, range_x=(0.0, 360.0))
     return theme.picture("angle_current", figure, caption + _scale(e))
@@ -51,16 +51,16 @@ def speed_current(e) -> theme.Picture:
     """Misfit over electrical speed and the current that varies most."""
     current, label = along_current(e)
     figure = _before_after(e, e["omega_e"], current, "electrical speed [rad/s]", label)
-    caption = "Misfit over speed and current. Brighter to the sides: grows with speed; brighter up and down: with load."
+    caption = "Misfit over speed and current. Brighter to the sides: grows with speed; to top and bottom: with load."
     return theme.picture("speed_current", figure, caption + _scale(e))
 
 
 def _scale(e) -> str:
-    return " The line on the scale is the noise." if "noise" in e else ""
+    return " The line on the colour scale is the noise." if "noise" in e else ""
 
 
 def _before_after(e, x, y, x_label: str, y_label: str, range_x=None):
-    """Two maps side by side with one scale; the after map is left away where there is none."""
+    """One or two maps (before, after) side by side with a common colour scale."""
     spans = [range_x or (x.min(), x.max()), (y.min(), y.max())]
     if any(high - low < NOTHING * max(abs(high), 1.0) for low, high in spans):
         raise LeftOut("speed or current does not vary in this recording")
@@ -88,14 +88,14 @@ def _before_after(e, x, y, x_label: str, y_label: str, range_x=None):
 
 
 def _count(x, y, spans) -> int:
-    """The finest number of cells along an axis that the operating points fill; the finest of all for a few points."""
+    """Number of cells per axis: the finest grid that the operating points fill; the finest of all for sparse points."""
     filled = {n: np.count_nonzero(np.histogram2d(x, y, n, spans)[0]) / n**2 for n in CELLS}
     coarsest = filled[CELLS[-1]]
     return next(n for n in CELLS if filled[n] >= FILLED * coarsest) if coarsest >= SPARSE else CELLS[0]
 
 
 def _cells(x, y, values, spans, count: int):
-    """rms per cell, (count, count), NaN where no row fell; and the edges."""
+    """rms per cell, (count, count), NaN in empty cells; and the cell edges."""
     mean, edges_x, edges_y, _ = binned_statistic_2d(x, y, values**2, "mean", bins=count, range=spans)
     return np.sqrt(mean), edges_x, edges_y
 

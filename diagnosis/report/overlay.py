@@ -8,7 +8,7 @@ from fluxproof.diagnosis.recording import COLUMNS
 from fluxproof.diagnosis.report import theme
 from fluxproof.diagnosis.report.maps import LeftOut
 
-POINTS = 300  # rows of the close-up, and about the pixels of a phone
+POINTS = 300  # rows of the close-up; about the horizontal pixels of a phone
 MOST_COLUMNS = 6
 # colour and width, in the order of drawing
 RUNS = {
@@ -21,12 +21,12 @@ RUNS = {
 def overlay(data: dict) -> theme.Picture:
     """The closed-loop simulation laid over the recording; ``data`` as in write.write_outputs.
 
-    A long one is shown whole at the left, and at the right close up, where the drive as described was furthest off.
+    A long recording has a second column: a close-up of the rows where the drive as described differs most.
     """
     t, runs = np.asarray(data["t"], float), _runs(data)
     names = list(data["recorded"])[:MOST_COLUMNS]
     if not names or len(t) < 2:
-        raise LeftOut("the overlay holds no samples")
+        raise LeftOut("the overlay contains no samples")
     if any(len(values) != len(t) for columns in runs.values() for values in columns.values()):
         raise LeftOut("the overlay's columns differ in length")
     parts = [slice(None)] + ([_furthest_off(runs, names)] if len(t) > 2 * POINTS else [])
@@ -45,7 +45,7 @@ def overlay(data: dict) -> theme.Picture:
     words = {"recorded": "recorded", "simulated_before": "before", "simulated_after": "after"}
     theme.key(panels[0, -1], *((words[run], RUNS[run][0]) for run in RUNS if runs[run]))
     caption = "The closed-loop simulation of the drive as described (before) and improved (after), over the recording"
-    caption += "; at the right close up, where before is furthest off." if len(parts) > 1 else "."
+    caption += "; right: a close-up of the rows where before differs most." if len(parts) > 1 else "."
     return theme.picture("overlay", figure, caption)
 
 
@@ -54,7 +54,7 @@ def _runs(data: dict) -> dict[str, dict[str, np.ndarray]]:
 
 
 def _furthest_off(runs, names) -> slice:
-    """The POINTS rows in which recorded and simulated_before differ most, each column by its own range."""
+    """The POINTS rows in which recorded and simulated_before differ most, each column relative to its range."""
     off = np.zeros(len(runs["recorded"][names[0]]))
     for name in names:
         recorded = runs["recorded"][name]
@@ -66,7 +66,7 @@ def _furthest_off(runs, names) -> slice:
 
 
 def thinned(t: np.ndarray, values: np.ndarray, most: int = 2 * POINTS) -> tuple[np.ndarray, np.ndarray]:
-    """At most about ``most`` points that keep every peak: least and greatest of equal stretches of rows."""
+    """About ``most`` points at most, with every peak preserved: minimum and maximum of equal groups of rows."""
     if len(t) <= most:
         return t, values
     starts = np.linspace(0, len(t), most // 2, endpoint=False).astype(int)

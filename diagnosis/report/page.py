@@ -1,6 +1,6 @@
-"""The report for people: what report.html is told, from a Diagnosis.
+"""The HTML report: the context of the template report.html, made from a Diagnosis.
 
-The page needs no script and fetches nothing; Jinja escapes every text, so that names out of a file stay text.
+The page contains no script and loads nothing; Jinja escapes every text, so that names from a file remain text.
 """
 
 from __future__ import annotations
@@ -50,11 +50,11 @@ def render(diagnosis, nominal=None, overlay: dict | None = None) -> str:
         loader=loader, autoescape=True, trim_blocks=True, undefined=jinja2.StrictUndefined
     )
     html = environment.get_template("report.html").render(context)
-    return html.lstrip().encode("utf-8", "replace").decode()  # a path may hold bytes that are no text
+    return html.lstrip().encode("utf-8", "replace").decode()  # a path may contain bytes that are not UTF-8
 
 
 def fit_view(fit) -> SimpleNamespace:
-    """How many times smaller the misfit became, and how far it is from the noise; None where it was not measured."""
+    """Ratios of the misfit before, after and of the noise floor on held-out points; None where one is unknown."""
 
     def ratio(above, below):
         return above / below if above > 0.0 and below > 0.0 else None
@@ -81,7 +81,7 @@ def region_view(region) -> SimpleNamespace:
 
 
 def request_view(request, nominal) -> SimpleNamespace:
-    """A row of the table of recordings to make; speed in revolutions a minute too where the pole pairs are known."""
+    """A row of the table of requested recordings; speed also in rpm if the pole pairs are known."""
     speed = f"{words.number(request.omega_e)} rad/s"
     if nominal is not None:
         speed += f" ({words.number(request.omega_e * RPM / nominal.machine.pole_pairs)} rpm)"
@@ -101,11 +101,11 @@ def request_view(request, nominal) -> SimpleNamespace:
 
 
 def plant_rows(effects, nominal) -> list[SimpleNamespace]:
-    """What the plant is told: a row for each key with its value so far, the new one, its unit and the effects."""
+    """One row per plant parameter that changes: key, value before and after, unit, effects."""
     plant, rows = plant_of(nominal) if nominal is not None else None, []
     for key, (value, names) in merged(effects).items():
         section, _, name = key.partition(".")
-        # A sensor's error counts from the trims in force: there is no such value in the file so far.
+        # A sensor error is relative to the trims in force; the drive file has no value for it.
         before = getattr(getattr(plant, section, None), name, None) if section != "sensors" else None
         cells = dict(before=words.brief(before), after=words.brief(value), unit=_unit(section, name))
         rows.append(SimpleNamespace(key=key, effects=names, **cells))
@@ -113,7 +113,7 @@ def plant_rows(effects, nominal) -> list[SimpleNamespace]:
 
 
 def _unit(section: str, name: str) -> str:
-    """The unit of a key of drive.toml; empty for one that the nominal drive does not know."""
+    """The unit of a key of drive.toml; empty if the nominal drive has no such key."""
     field = getattr(SECTIONS.get(section), "__dataclass_fields__", {}).get(name)
     return (
         words.unit_text(field.metadata["key"].unit) if field is not None and "key" in field.metadata else ""

@@ -1,4 +1,4 @@
-"""Every picture that a diagnosis can be given, and for each that cannot be drawn the reason."""
+"""All pictures of a report, and the reason for each one that cannot be drawn."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from fluxproof.diagnosis.report import lines, maps, overlay, theme
 from fluxproof.diagnosis.report.maps import LeftOut
 
-# name: (function of the block means, arrays it cannot do without, what the reader knows it by)
+# name: (drawing function, required arrays, title)
 BLOCKS = ("before_d", "before_q")
 DRAWN = {
     "speed_current": (
@@ -42,7 +42,7 @@ BLOCK_ARRAYS = (
 
 
 def draw(diagnosis, laid_over: dict | None) -> tuple[dict[str, theme.Picture], list[str]]:
-    """(pictures by name, one line for each picture left out with the reason)."""
+    """(pictures by name, one line with the reason for each picture that is left out)."""
     drawn, left_out = {}, []
     arrays = {name: np.asarray(values) for name, values in diagnosis.evidence.arrays.items()}
     try:
@@ -59,9 +59,9 @@ def draw(diagnosis, laid_over: dict | None) -> tuple[dict[str, theme.Picture], l
         missing = [need for need in needs if need not in data]
         try:
             if missing:
-                raise LeftOut(f"there is no {', '.join(missing)}")
+                raise LeftOut(f"{', '.join(missing)} is missing")
             with mpl.rc_context(theme.STYLE), warnings.catch_warnings():
-                warnings.simplefilter("ignore")  # empty slices of a map are meant; a font may lack a letter
+                warnings.simplefilter("ignore")  # empty map cells are intended; a font may lack a glyph
                 drawn[name] = function(data)
         except LeftOut as reason:
             left_out.append(f"{title}: {reason}")
@@ -69,7 +69,7 @@ def draw(diagnosis, laid_over: dict | None) -> tuple[dict[str, theme.Picture], l
 
 
 def _clean(arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """The arrays without blocks that hold NaN or infinity; LeftOut where lengths disagree or nothing is left."""
+    """The arrays without blocks that contain NaN or infinity; LeftOut if lengths differ or fewer than two remain."""
     blocks = {name: arrays[name] for name in BLOCK_ARRAYS if name in arrays}
     sizes = {name: values.shape for name, values in blocks.items()}
     if len(set(sizes.values())) > 1:
@@ -81,5 +81,5 @@ def _clean(arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         return rest
     good = np.all([np.isfinite(values.astype(float)) for values in blocks.values()], axis=0)
     if good.sum() < 2:
-        raise LeftOut("fewer than two blocks of the recording hold finite numbers")
+        raise LeftOut("fewer than two blocks of the recording contain finite numbers")
     return rest | {name: values[good] for name, values in blocks.items()}

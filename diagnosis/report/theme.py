@@ -1,8 +1,8 @@
-"""One look for every picture, in light and in dark: colours are roles, which the page's style sheet fills in.
+"""Common style of all pictures, light and dark: colours are roles, which the page's style sheet defines.
 
 A figure is drawn with the light colours; in its SVG each becomes a CSS variable, so that the same picture
-follows the reader's colour scheme.  Letters are outlines, no font is needed.  Before is vermilion and after is
-blue, a pair that survives colour-blindness; lines are named where they are, not in a legend.
+follows the reader's colour scheme.  Text is drawn as outlines and needs no font.  Before is vermilion, after is
+blue, a pair that colour-blind readers can distinguish; labels above the axes replace a legend.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ LIGHT = {
     "--empty": "#eceef1",
 }
 INK, SOFT, AXIS, GRID, BEFORE, AFTER, RECORDED, BAND, HELD, EMPTY = LIGHT.values()
-WIDTH = 4.7  # inches; narrow, so that 10-point letters are still read on a phone of 400 px
+WIDTH = 4.7  # inches; narrow, so that 10-point text is legible on a phone of 400 px
 STYLE = {k: v for k, v in mpl.rcParamsDefault.items() if not k.startswith("backend")} | {
     **{"font.size": 10.0, "text.color": INK, "axes.labelcolor": SOFT},
     **{
@@ -50,20 +50,20 @@ NO_METADATA = dict.fromkeys(("Creator", "Date", "Format", "Type"))
 
 @dataclass(frozen=True)
 class Picture:
-    """An SVG element that can stand in the page as it is, and what it shows in a sentence."""
+    """An inline SVG element and its caption."""
 
     svg: Markup
     caption: str
 
 
 def axes(*shape: int, height: float, **kwargs):
-    """(figure, axes) of the width every picture has."""
+    """(figure, axes) with the common width of all pictures."""
     figure = Figure(figsize=(WIDTH, height), layout="constrained")
     return figure, figure.subplots(*shape, **kwargs)
 
 
 def key(axis, *words: tuple[str, str]) -> None:
-    """Names of the lines in their own colours, above the axes at the right."""
+    """Labels of the lines in their own colours, above the axes at the right."""
     place, at = axis.transAxes, (1.0, 1.0)
     for text, color in reversed(words):
         offset = dict(xytext=(0, 4) if place is axis.transAxes else (-9, 0), textcoords="offset points")
@@ -74,13 +74,13 @@ def key(axis, *words: tuple[str, str]) -> None:
 
 
 def plain(text: str) -> str:
-    """Text of a file as a label: never read as a formula, cut to what fits."""
+    """Text from a file as a label: never parsed as a formula, cut to the available length."""
     printable = "".join(c if c.isprintable() else "?" for c in str(text)).replace("$", r"\$")
     return printable if len(printable) <= 40 else printable[:39] + "…"
 
 
 def picture(name: str, figure: Figure, caption: str) -> Picture:
-    """The figure as an inline SVG element whose colours follow the page; ``name`` keeps its ids apart."""
+    """The figure as an inline SVG element whose colours follow the page; ``name`` makes its ids unique."""
     with mpl.rc_context(STYLE), io.BytesIO() as stream:
         figure.savefig(stream, format="svg", dpi=144, metadata=NO_METADATA)
         svg = stream.getvalue().decode()

@@ -1,4 +1,4 @@
-"""The report's words: what a verdict means, numbers as one writes them, an effect in plain language."""
+"""Texts of the report: the meaning of a verdict, formatted numbers and units, the description of an effect."""
 
 from __future__ import annotations
 
@@ -8,20 +8,20 @@ from types import SimpleNamespace
 
 from fluxproof.diagnosis.catalogue import CATALOGUE
 
-# verdict: (mood, what it means); the mood is the colour, and the word beside it says the same.
+# verdict: (mood, meaning); the mood selects the colour of the badge.
 VERDICTS = {
     "explained": (
         "good",
-        "Known physics accounts for the difference, on operating points that were not fitted too.",
+        "Known physics accounts for the difference, also at operating points that were not fitted.",
     ),
     "ambiguous": ("open", "Several causes fit this recording equally well."),
-    "unexplained": ("open", "What is left is more than noise, and nothing in the catalogue explains it."),
+    "unexplained": ("open", "The residual exceeds the noise, and no effect of the catalogue explains it."),
     "no_mismatch": ("good", "Recording and simulation agree to within the noise floor."),
     "digital_mismatch": (
         "bad",
-        "The controller did not compute what its golden model computes. Mend that first.",
+        "The controller's outputs differ from those of its golden model. Correct that first.",
     ),
-    "bad_recording": ("bad", "The recording cannot carry a diagnosis. Nothing was compared."),
+    "bad_recording": ("bad", "The recording cannot be diagnosed. Nothing was compared."),
 }
 VARIABLES = {
     "t": ("time", "s"),
@@ -38,7 +38,7 @@ PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 
 
 def number(value, digits: int = 4) -> str:
-    """A number with ``digits`` significant digits and a real minus sign; a dash for what is not known."""
+    """A number with ``digits`` significant digits and a typographic minus sign; a dash for None or NaN."""
     if value is None or (isinstance(value, float) and math.isnan(value)):
         return "–"
     if math.isinf(value):
@@ -51,13 +51,13 @@ def unit_text(unit: str) -> str:
 
 
 def quantity(value, unit: str, digits: int = 4) -> str:
-    """A number with its unit, 0.01607 H as 16.07 mH."""
+    """A number with its unit and SI prefix: 0.01607 H is written 16.07 mH."""
     factor, unit = _prefix(value, unit_text(unit))
     return f"{number(value / factor if factor != 1.0 else value, digits)} {unit}".rstrip()
 
 
 def measured(value: float, sigma: float | None, unit: str) -> str:
-    """value ± sigma with two digits of sigma, and the unit; angles in degrees too."""
+    """value ± sigma with two significant digits of sigma, and the unit; angles also in degrees."""
     factor, name = _prefix(value, unit_text(unit))
     if sigma is None or not math.isfinite(sigma) or sigma <= 0.0:
         text = f"{quantity(value, unit)} (uncertainty unknown)"
@@ -77,14 +77,14 @@ def _prefix(value, unit: str) -> tuple[float, str]:
 
 
 def percent(share: float) -> str:
-    """A share of 1 in percent; nothing short of it is called 100 %."""
+    """A fraction in percent; values from 0.995 to below 1 are written "> 99 %"."""
     if share is None or not math.isfinite(share):
         return "–"
     return "> 99 %" if 0.995 <= share < 1.0 else f"{100 * share:.0f} %".replace("-", "−")
 
 
 def span(low, high, unit: str) -> str:
-    """From low to high, either end open."""
+    """The range from low to high as text; None or infinity is an open end."""
     low_open, high_open = low is None or not math.isfinite(low), high is None or not math.isfinite(high)
     if low_open and high_open:
         return "everywhere"
@@ -94,7 +94,7 @@ def span(low, high, unit: str) -> str:
 
 
 def brief(value) -> str:
-    """A value of drive.toml as one types it there; a table by its size and range."""
+    """A value in the notation of drive.toml; a long array by its shape and range."""
     if dataclasses.is_dataclass(value):
         value = dataclasses.asdict(value)
     if hasattr(value, "tolist"):
@@ -119,9 +119,9 @@ def brief(value) -> str:
 
 
 def effect_text(name: str) -> SimpleNamespace:
-    """title, equation, signature, separated_by and meanings {parameter: words} of the catalogue.
+    """title, equation, signature, separated_by and meanings {parameter: text} of a catalogue entry.
 
-    A name that the catalogue does not have stands for itself.
+    A name without an entry is its own title; the other texts are then empty.
     """
     entry = CATALOGUE.get(name)
 

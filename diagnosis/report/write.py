@@ -1,6 +1,6 @@
-"""Writing a diagnosis: diagnosis.json (docs/diagnosis.schema.json) and report.html, both or neither begun.
+"""Write diagnosis.json (docs/diagnosis.schema.json) and report.html.
 
-Both texts are made before the first is written, and each is written to a temporary name and renamed.
+Both texts are complete before the first file is written; each file is written to a temporary name and renamed.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 from fluxproof.diagnosis.report import page
 from fluxproof.files import write_json, write_text
 
-# Keys whose number may be unknown or open-ended; null in the schema too.  Elsewhere NaN is a fault of ours.
+# Keys whose number may be unknown or unbounded (null in the schema).  NaN under any other key is a defect of the tool.
 MAY_BE_NULL = frozenset(
     ("sigma", "amplitude", "low", "high", "rms", "rms_elsewhere")
     + ("train_before", "train_after", "holdout_before", "holdout_after", "noise_floor")
@@ -25,12 +25,12 @@ def write_outputs(diagnosis, out_dir, nominal=None, overlay: dict | None = None)
     """Write ``out_dir``/diagnosis.json and ``out_dir``/report.html; returns their paths.
 
     diagnosis: diagnosis.result.Diagnosis.
-    nominal: diagnosis.nominal.Nominal, for the values before beside the values after, and for rpm; or None.
+    nominal: diagnosis.nominal.Nominal or None; it gives the nominal values and the speed in rpm.
     overlay: the closed-loop simulation laid over the recording, or None: {"t": (n,) s, "recorded": {column: (n,)},
         "simulated_before": {column: (n,)}, "simulated_after": {column: (n,)}} with canonical columns, SI units;
         each of the simulated ones may be absent.
 
-    Raises ValueError where the diagnosis holds a number that is not finite and must be, OSError where the folder
+    Raises ValueError if a number that must be finite is not, OSError if the folder
     cannot be written.
     """
     data = json_ready(diagnosis.to_json())
@@ -40,9 +40,9 @@ def write_outputs(diagnosis, out_dir, nominal=None, overlay: dict | None = None)
 
 
 def json_ready(value, path: str = "diagnosis"):
-    """``value`` with NumPy turned into plain Python, and NaN or infinity into None where ``MAY_BE_NULL`` has the key.
+    """``value`` with NumPy types converted to Python types; NaN and infinity become None for keys in ``MAY_BE_NULL``.
 
-    Raises ValueError that names the place of any other number that is not finite.
+    Raises ValueError with the path of any other number that is not finite.
     """
     if isinstance(value, dict):
         return {str(key): json_ready(item, f"{path}.{key}") for key, item in value.items()}

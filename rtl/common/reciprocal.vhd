@@ -38,7 +38,8 @@ architecture rtl of reciprocal is
   signal fours_1   : natural range 0 to FOURS;
   signal shifted_1 : unsigned(U_DC_W - 1 downto 0);
   signal shifted_0 : unsigned(U_DC_W - 1 downto 0);
-  signal low_1     : std_logic_vector(1 downto 0);  -- below the least number, by halves
+  signal low_0     : std_logic_vector(1 downto 0);  -- below the least number, by halves
+  signal low_1     : std_logic_vector(1 downto 0);
   signal low_2     : std_logic;
   signal mantissa  : unsigned(U_DC_W - 1 downto 0);
   signal shift     : natural range 0 to N_MAX;
@@ -47,7 +48,8 @@ architecture rtl of reciprocal is
   signal rest      : unsigned(U_DC_W downto 0);
   signal quotient  : unsigned(BITS - 1 downto 0);
   signal dividing  : std_logic;
-  signal one       : std_logic;  -- the mantissa is one: m would be 2**17
+  signal whole     : std_logic;  -- the mantissa is one: m would be 2**17
+  signal one       : std_logic;
 
   -- Groups of so many bits, at most so many, that are zero at the top.
   function leading_zeros (v : unsigned; group_w : positive; most : natural) return natural is
@@ -63,6 +65,9 @@ architecture rtl of reciprocal is
 begin
   valid(0) <= in_valid;
   fours_0  <= leading_zeros(x, 4, FOURS);
+  low_0(1) <= not (or x(U_DC_W - 1 downto U_DC_W - 1 - N_MAX / 2));
+  low_0(0) <= not (or x(U_DC_W - 2 - N_MAX / 2 downto U_DC_W - 1 - N_MAX));
+  whole    <= '1' when mantissa(U_DC_W - 2 downto 0) = 0 else '0';
 
   trial <= remainder & '0';
   rest  <= trial - mantissa;
@@ -85,8 +90,7 @@ begin
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
       -- Stage 1: shifted = x * 2**(4*fours); x stays, so no enable has to wait for the shift
-      low_1(1)  <= not (or x(U_DC_W - 1 downto U_DC_W - 1 - N_MAX / 2));
-      low_1(0)  <= not (or x(U_DC_W - 2 - N_MAX / 2 downto U_DC_W - 1 - N_MAX));
+      low_1     <= low_0;
       fours_1   <= fours_0;
       shifted_1 <= shifted_0;
 
@@ -102,7 +106,7 @@ begin
       end if;
 
       -- Stages 3 to 20: one bit of quotient = 2**34 / mantissa
-      one <= '1' when mantissa(U_DC_W - 2 downto 0) = 0 else '0';
+      one <= whole;
       if valid(0) = '1' then
         dividing <= '1';
       elsif valid(BITS + 1) = '1' then

@@ -55,11 +55,15 @@ architecture rtl of current_directions is
   signal on_sign    : std_logic;                          -- half an LSB of a direction
   signal s_moves    : std_logic;
   signal current_a  : signed(PU_W - 1 downto 0);
+  signal constant_0 : signed(WIDE_W - 1 downto 0);        -- what constant_a becomes
   signal constant_a : signed(WIDE_W - 1 downto 0);
   signal factor_a   : signed(WIDE_W - 1 downto 0);
   signal factor_b   : signed(PU_W - 1 downto 0);
   signal mul_a      : signed(WIDE_W - 1 downto 0);
   signal mul_b      : signed(PU_W - 1 downto 0);
+  signal product    : signed(SUM_W - 1 downto 0);         -- what prod, sum and past become
+  signal total      : signed(SUM_W - 1 downto 0);
+  signal past_0     : std_logic;
   signal prod       : signed(SUM_W - 1 downto 0);
   signal base       : signed(SUM_W - 1 downto 0);
   signal addend     : signed(SUM_W - 1 downto 0);
@@ -106,6 +110,14 @@ begin
           or when_set(rounding_base("0", TURN_BY, SUM_W), valid(1))
           or when_set(rounding_base("0", DROP, SUM_W), on_sign);
 
+  -- Outside the clocked process, so that a simulator computes them only when an operand changes.
+  product    <= mul_a * mul_b;
+  total      <= addend + prod;
+  past_0     <= exceeds(sum(SUM_W - 1 downto TURN_BY), PU_W);
+  constant_0 <= when_set(ROOT, valid(10)) or when_set(-ROOT, valid(11)) or when_set(-THIRD, by_third)
+                or when_set(BY_BETA, valid(23)) or when_set(-BY_BETA, valid(25))
+                or when_set(shift_left(THIRD, 1), valid(26));
+
   process (clk)
   begin
     if rising_edge(clk) then
@@ -120,9 +132,7 @@ begin
       on_sign    <= by_sign;
       s_moves    <= valid(19) or valid(20) or valid(21) or valid(23) or valid(25);
       current_a  <= i_beta when valid(4) = '1' else i_alpha;
-      constant_a <= when_set(ROOT, valid(10)) or when_set(-ROOT, valid(11)) or when_set(-THIRD, by_third)
-                    or when_set(BY_BETA, valid(23)) or when_set(-BY_BETA, valid(25))
-                    or when_set(shift_left(THIRD, 1), valid(26));
+      constant_a <= constant_0;
 
       -- Stages 1, 6, 7, 12, 13, 17 to 19, 24 to 28: the factors
       mul_a <= factor_a;
@@ -131,16 +141,16 @@ begin
       -- Stages 2, 7, 8, 13, 14, 18 to 20: prod = omega_me*k_ahead, turn*i_beta, turn*i_alpha, sqrt(3)*y, -sqrt(3)*y,
       -- then k_sign times twice the currents of b, c, a;  stages 25 to 29: -1/3*s_b, s_b/sqrt(3), -1/3*s_c,
       -- -s_c/sqrt(3), 2/3*s_a; and what it is added to
-      prod   <= mul_a * mul_b;
+      prod   <= product;
       addend <= base;
 
       -- Stages 3, 8, 9, 14, 15, 19 to 21, 26 to 30: sum = turn, not x, y, twice b, twice c, s_b, s_c, s_a, s_alpha and
       -- s_beta by turns
-      sum <= addend + prod;
+      sum <= total;
 
       -- Stages 4, 5, 9 to 11, 15 to 17: narrow = sum, narrowed
       cut  <= sum(SUM_W - 1 downto TURN_BY);
-      past <= exceeds(sum(SUM_W - 1 downto TURN_BY), PU_W);
+      past <= past_0;
       if (valid(4) or valid(9) or valid(10) or valid(15) or valid(16)) = '1' then
         narrow <= narrowed(cut, past, PU_W);
       end if;

@@ -64,10 +64,13 @@ architecture rtl of delta_lambda is
   signal u_int_2    : signed(INTEGRAL_W - 1 downto 0);
   signal sum_3      : signed(REST_W + DROP_R downto 0);
   signal rest_3     : signed(REST_W - 1 downto 0);
+  signal coarse_3   : signed(FIT_W - 1 downto 0);
+  signal over_3     : std_logic_vector(2 downto 0);
   signal coarse_4   : signed(FIT_W - 1 downto 0);
   signal over_4     : std_logic_vector(2 downto 0);
   signal more_4     : std_logic;
   signal sign_4     : std_logic;
+  signal fine_4     : signed(FIT_W - 1 downto 0);
   signal shifted_5  : signed(FIT_W downto 0);
   signal over_5     : std_logic;
   signal rounded_6  : signed(FLUX_W downto 0);
@@ -106,6 +109,17 @@ begin
     end loop;
   end process;
 
+  -- Shifted by fours, then by the remainder: outside the clocked process, so that a simulator shifts only what changes.
+  coarse_3 <= shift_left(rest_3(FIT_W - 1 downto 0), to_integer(n_omega(3 downto 2) & "00"));
+  fine_4   <= shift_left(coarse_4, to_integer(n_omega(1 downto 0)));
+
+  process (all)
+  begin
+    for k in over_3'range loop
+      over_3(k) <= or (rest_3(FIT_W - 1 - 4 * k downto FIT_W - 4 - 4 * k) xor rest_3(REST_W - 1));
+    end loop;
+  end process;
+
   rounded_5 <= round_half_up(shifted_5, DELTA_LAMBDA_DROP_SHIFTED);
 
   -- Half up of prod for d, of -prod for q: the complement of prod less half an LSB and one is -prod and half an LSB.
@@ -140,14 +154,11 @@ begin
       end if;
 
       -- Stages 4, 5: shifted = rest * 2**n_omega, by fours, then the remainder
-      coarse_4 <= shift_left(rest_3(FIT_W - 1 downto 0), to_integer(n_omega(3 downto 2) & "00"));
-      for k in over_4'range loop
-        over_4(k) <= or (rest_3(FIT_W - 1 - 4 * k downto FIT_W - 4 - 4 * k) xor rest_3(REST_W - 1));
-      end loop;
-      sign_4           <= rest_3(REST_W - 1);
-      shifted_5        <= '0' & shift_left(coarse_4, to_integer(n_omega(1 downto 0)));
-      shifted_5(FIT_W) <= sign_4;
-      over_5           <= more_4;
+      coarse_4  <= coarse_3;
+      over_4    <= over_3;
+      sign_4    <= rest_3(REST_W - 1);
+      shifted_5 <= sign_4 & fine_4;
+      over_5    <= more_4;
 
       -- Stages 6, 7: value = shifted, narrowed; rounding may take a negative one's sign, not the one before it
       rounded_6 <= shifted_5(FIT_W) & rounded_5(FLUX_W - 1 downto 0);

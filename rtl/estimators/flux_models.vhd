@@ -61,6 +61,10 @@ architecture rtl of flux_models is
   signal l_d_2         : unsigned(INDUCTANCE_W - 1 downto 0);
   signal l_q_2         : unsigned(INDUCTANCE_W - 1 downto 0);
   signal minus_rho_2   : signed(MINUS_RHO_W - 1 downto 0);
+  signal times_l_d     : signed(PROD_W - 1 downto 0);
+  signal times_l_q     : signed(PROD_W - 1 downto 0);
+  signal times_rho_d   : signed(PU_W + MINUS_RHO_W - 1 downto 0);
+  signal times_rho_q   : signed(PU_W + MINUS_RHO_W - 1 downto 0);
   signal prod_model_d  : signed(PROD_W - 1 downto 0);
   signal prod_model_q  : signed(PROD_W - 1 downto 0);
   signal prod_merged_d : signed(PU_W + MINUS_RHO_W - 1 downto 0);
@@ -94,6 +98,12 @@ architecture rtl of flux_models is
 begin
   valid(0) <= in_valid;
 
+  -- Outside the clocked process, so that a simulator computes them only when an operand changes.
+  times_l_d   <= i_d_2 * signed('0' & l_d_2);
+  times_l_q   <= i_q_2 * signed('0' & l_q_2);
+  times_rho_d <= i_d_2 * minus_rho_2;
+  times_rho_q <= i_q_2 * minus_rho_2;
+
   process (clk)
   begin
     if rising_edge(clk) then
@@ -112,10 +122,10 @@ begin
       end if;
 
       -- Stage 3: prod_model = l*i;  prod_merged = -rho*i;  base: all that does not wait for the current
-      prod_model_d  <= i_d_2 * signed('0' & l_d_2);
-      prod_model_q  <= i_q_2 * signed('0' & l_q_2);
-      prod_merged_d <= i_d_2 * minus_rho_2;
-      prod_merged_q <= i_q_2 * minus_rho_2;
+      prod_model_d  <= times_l_d;
+      prod_model_q  <= times_l_q;
+      prod_merged_d <= times_rho_d;
+      prod_merged_q <= times_rho_q;
       if valid(2) = '1' then
         base_model_d  <= shift_left(resize(lambda_mg, BASE_W), PU_TO_FLUX) + raised_d;
         base_merged_d <= resize(lambda_m_d, BASE_W) + raised_d;

@@ -68,8 +68,11 @@ architecture rtl of psi_adaline is
   signal omega_1  : signed(PU_W - 1 downto 0);
   signal room_2   : signed(PU_W - 1 downto 0);
   signal slow_2   : std_logic;
+  signal own_1    : signed(PROD_W - 1 downto 0);
+  signal own_2    : signed(PROD_W downto 0);
   signal prod_own : signed(PROD_W - 1 downto 0);
   signal sum_own  : signed(PROD_W downto 0);
+  signal past_2   : std_logic;
   signal past_3   : std_logic;
   signal own_3    : signed(FLUX_W - 1 downto 0);
   signal end_3    : std_logic_vector(1 downto 0);
@@ -81,10 +84,15 @@ architecture rtl of psi_adaline is
   signal factor_b : signed(PU_W - 1 downto 0);
   signal mul_a    : signed(FLUX_W - 1 downto 0);
   signal mul_b    : signed(PU_W - 1 downto 0);
+  signal product  : signed(PROD_W - 1 downto 0);            -- what prod, sum and narrow become
+  signal total    : signed(SUM_W - 1 downto 0);
+  signal limited  : signed(FLUX_W - 1 downto 0);
   signal prod     : signed(PROD_W - 1 downto 0);
   signal base     : signed(SUM_W - 1 downto 0);
   signal addend   : signed(SUM_W - 1 downto 0);
   signal sum      : signed(SUM_W - 1 downto 0);
+  signal step_14  : signed(FLUX_W + eta_psi'length downto 0);
+  signal moved_15 : signed(SUM_P_W - 1 downto 0);
   signal prod_psi : signed(FLUX_W + eta_psi'length downto 0);
   signal sum_psi  : signed(SUM_P_W - 1 downto 0);
   signal end_17   : std_logic_vector(1 downto 0);
@@ -123,13 +131,22 @@ begin
           rounding_base(sum(SUM_W - 1 downto DROP_R), DROP_OMEGA, SUM_W) when valid(6) = '1' else
           rounding_base("0", DROP_OMEGA, SUM_W);
 
+  -- Outside the clocked process, so that a simulator computes them only when an operand changes.
+  own_1    <= signed('0' & l_d) * i_d;
+  own_2    <= rounding_base("0", DROP_L, PROD_W + 1) + prod_own;
+  past_2   <= exceeds(sum_own(PROD_W downto DROP_L), FLUX_W);
+  product  <= mul_a * mul_b;
+  total    <= addend + prod;
+  limited  <= saturate(sum(SUM_W - 1 downto DROP_OMEGA), FLUX_W);
+  step_14  <= narrow * signed('0' & eta_psi);
+  moved_15 <= rounding_base(psi, DROP_ETA, SUM_P_W) + prod_psi;
+
   process (clk)
   begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stage 1: what comes from all over the chip, in registers that can stand here; with an enable, as without one
-      -- they would be v_dead_adaline's, which stand there
+      -- Stage 1: the sample's inputs, which come from other blocks
       if valid(0) = '1' then
         u_q_1   <= u_q;
         d_q_1   <= d_q;
@@ -145,10 +162,10 @@ begin
       end if;
 
       -- Stages 1 to 4: flux = l_d*i_d + psi, each narrowed.  From here to sum_psi nothing needs an enable: every factor
-      -- stays, and prod_own is flux_models' prod_model_d as long as both are always written.
-      prod_own <= signed('0' & l_d) * i_d;
-      sum_own  <= rounding_base("0", DROP_L, PROD_W + 1) + prod_own;
-      past_3   <= exceeds(sum_own(PROD_W downto DROP_L), FLUX_W);
+      -- stays.
+      prod_own <= own_1;
+      sum_own  <= own_2;
+      past_3   <= past_2;
       end_3    <= at_end(psi, FLUX_W);
       flux_4   <= sum_flux(FLUX_W + 1 downto 1);
 
@@ -157,12 +174,12 @@ begin
       mul_b <= factor_b;
 
       -- Stages 3, 5, 7, 11: prod = r*i_q, v_leg*d_q, flux*omega_chord, e*omega_chord, and what it is added to
-      prod   <= mul_a * mul_b;
+      prod   <= product;
       addend <= base;
 
       -- Stages 4, 6, 8, 12: sum = e = u_q - prod, e -= prod, e -= prod, pull;  stages 9, 13: narrowed
-      sum    <= addend + prod;
-      narrow <= saturate(sum(SUM_W - 1 downto DROP_OMEGA), FLUX_W);
+      sum    <= total;
+      narrow <= limited;
 
       -- Stages 14 to 16: psi += eta_psi*pull, narrowed, unless it is held
       free     <= '1' when sat_d = 0 and sat_q = 0 else '0';
@@ -171,8 +188,8 @@ begin
       if valid(12) = '1' then
         psi_held <= slow_2 or not learning;
       end if;
-      prod_psi <= narrow * signed('0' & eta_psi);
-      sum_psi  <= rounding_base(psi, DROP_ETA, SUM_P_W) + prod_psi;
+      prod_psi <= step_14;
+      sum_psi  <= moved_15;
       if valid(15) = '1' and psi_held = '0' then
         psi <= saturate(sum_psi(SUM_P_W - 1 downto DROP_ETA), STATE_W);
       end if;

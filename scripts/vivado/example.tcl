@@ -4,7 +4,7 @@
 #
 # The processor loads the registers over AXI (GP0), a DMA writes the telemetry into its memory (HP0), a remembered
 # trip interrupts it.  Converters, encoder, trip and gates go to pins; give them numbers in example.xdc before you
-# write a bitstream.  Reports: OUT_DIR/reports.
+# write a bitstream.  Reports: OUT_DIR/reports; OUT_DIR/result.md is a row for the table of docs/vivado.md.
 
 set here [file dirname [file normalize [info script]]]
 set root [file normalize [file join $here .. ..]]
@@ -19,6 +19,7 @@ if {$argc > 1} {
 set argc 1
 set argv [list $out]
 source [file join $here package_ip.tcl]
+source [file join $here result.tcl]
 
 set clock_mhz 100
 set carrier_half 5000 ;# 10 kHz PWM
@@ -115,5 +116,5 @@ report_utilization -hierarchical -file [file join $reports utilization.rpt]
 report_timing_summary -file [file join $reports timing.rpt]
 report_cdc -file [file join $reports cdc.rpt]
 report_drc -file [file join $reports drc.rpt]
-set slack [get_property STATS.WNS [get_runs impl_1]]
-puts "worst slack at $clock_mhz MHz: $slack ns; reports: $reports"
+set slack [write_result $out $root impl_1 $clock_mhz]
+puts "worst slack at $clock_mhz MHz: $slack ns; reports: $reports; row for docs/vivado.md: [file join $out result.md]"

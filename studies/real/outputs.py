@@ -12,7 +12,7 @@ from fluxproof.diagnosis.report.write import json_ready, write_outputs
 from fluxproof.golden_model.drive_keys import DriveError
 
 NAMES_OF_AXES = {
-    "saturation": "the iron saturates along its own axis",
+    "saturation": "saturation of an axis by its own current",
     "cross_saturation": "the current of one axis saturates the other",
 }
 

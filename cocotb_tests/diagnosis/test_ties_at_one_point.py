@@ -36,7 +36,7 @@ def solved(*names, chi2=100.0, score=120.0, **c) -> Solution:
     return Solution(Model(frozenset(names)), chi2, 1, 1000, c=c, score=score)
 
 
-def test_less_noise_is_no_better_explanation_of_one_operating_point(view):
+def test_less_scatter_is_no_evidence_at_one_operating_point(view):
     """A delay that is none averages the voltages of two periods: its rows scatter less and tell nothing more."""
     one = view.take(np.resize(np.flatnonzero(view.run == 3), 60)).replace(course=np.linspace(0.0, 1.0, 60))
     lone = Search(one, {n: CATALOGUE[n] for n in ("resistance", "magnet_flux")}, np.ones(len(one), bool))
@@ -56,12 +56,12 @@ def test_less_noise_is_no_better_explanation_of_one_operating_point(view):
     assert not compared(1.4, 0.0)  # nor does a correction add so much
 
 
-def test_bus_and_scale_of_the_currents_off_alike_are_the_magnets():
+def test_equal_bus_and_current_scales_are_a_magnet_flux_error():
     of = lambda bus, scale: solved("udc_gain", "current_scale", udc_gain={"gain": bus}, current_scale={"scale": scale})  # noqa: E731
     assert Search.scaled_alike(of(-0.0134, -0.0138)) and not Search.scaled_alike(of(-0.0134, 0.0138))
 
 
-def test_ohms_and_the_only_inductance_off_alike_are_the_scale_of_the_currents():
+def test_equal_resistance_and_inductance_errors_are_a_current_scale():
     """Without i_d nothing says that L_d is not off by the same."""
     m = MACHINE
     more = {"resistance_ohm": 1.1 * m.resistance_ohm, "inductance_q_h": 1.1 * m.inductance_q_h}
@@ -75,7 +75,7 @@ def test_ohms_and_the_only_inductance_off_alike_are_the_scale_of_the_currents():
     assert not searched(on_q_only(view)).impedance_alike(pair)
 
 
-def test_what_earns_nothing_beside_the_answer_is_no_other_answer(view):
+def test_superfluous_effect_is_no_alternative(view):
     """The best one holds a drift too small for a name; a skew in its place, no better than none, is not tied."""
     few = object.__new__(Search)
     few.view, few.effects, few.most, few.as_good = view, CATALOGUE, 2, lambda *args: True
@@ -89,7 +89,7 @@ def test_what_earns_nothing_beside_the_answer_is_no_other_answer(view):
     assert groups(best, [], CATALOGUE, NOMINAL, frozenset(["magnet_temperature"])) == (["magnet_flux"], [])
 
 
-def test_at_one_level_of_current_saturation_has_straight_rivals(view):
+def test_saturation_has_inductance_rivals_at_one_current_level(view):
     """A wrong inductance of each axis is one effect more and no tie, but only another level of current tells."""
     levels = view.i.mean(axis=1)
     both = np.abs(levels - (-2.5 + 2j)) < 0.05 * RATED

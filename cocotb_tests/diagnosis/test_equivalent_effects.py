@@ -60,7 +60,7 @@ class Given:
         return f
 
 
-def test_a_delay_is_larger_than_what_dead_time_makes_only_beyond_doubt(search):
+def test_delay_must_significantly_exceed_half_the_dead_time(search):
     """One edge of every pulse is late by the dead time: half of it is no delay, nor is what may be half of it."""
     dead = {"v_0.02": 0.04 * NOMINAL.inverter.dc_bus_v}
     half = half_dead_time({"dead_time": dead}, NOMINAL)
@@ -72,7 +72,7 @@ def test_a_delay_is_larger_than_what_dead_time_makes_only_beyond_doubt(search):
     assert not search.small(alone, "delay")
 
 
-def test_two_scales_are_the_third_only_where_that_leaves_no_more(view):
+def test_two_scales_are_replaced_by_the_third_only_without_more_residual(view):
     """A bus and currents that are both wrong, by different factors, leave far more than noise to the magnets alone."""
     both = solved("udc_gain", "current_scale", chi2=2754.0, score=2800.0)
     nothing = solved(chi2=4e5, score=4e5)
@@ -83,7 +83,7 @@ def test_two_scales_are_the_third_only_where_that_leaves_no_more(view):
         assert found is (magnets if wins else both)
 
 
-def test_any_two_of_three_scales_are_any_other_two(view):
+def test_any_two_of_three_scales_are_equivalent(view):
     """A drift keeps the magnets' constant in its free form: the price of that form is no evidence against them."""
     gain, scale, psi = {"gain": 0.009}, {"scale": -0.009}, {"delta_psi_m": 0.02 * MACHINE.magnet_flux_wb}
     best = solved("udc_gain", "current_scale", udc_gain=gain, current_scale=scale)
@@ -96,7 +96,7 @@ def test_any_two_of_three_scales_are_any_other_two(view):
     assert search._tied(best, True) == [other]
 
 
-def test_currents_and_one_inductance_off_alike_are_the_ohms_and_the_other_inductance(view):
+def test_current_scale_with_one_inductance_equals_resistance_and_the_other_inductance(view):
     """Currents of 0.94 with L_q of 0.94 leave L_q as it is: R is wrong, and L_d by another amount."""
     m, psi = view.machine, {"alpha": 0.007, "beta": -0.012}
     nothing = solved(chi2=4e5, score=4e5)
@@ -117,7 +117,7 @@ def test_currents_and_one_inductance_off_alike_are_the_ohms_and_the_other_induct
     assert called(-0.02).names == called(0.058).names == {"current_gain", "inductance_d", "inductance_q"}
 
 
-def test_what_was_hidden_by_an_effect_that_has_gone_is_looked_for_again(view):
+def test_effects_hidden_by_a_removed_one_are_searched_again(view):
     """A cross-saturation that did not earn its place had taken up unequal phases as well."""
     found = solved("dead_time", "magnet_flux", score=400.0)
     more = solved("dead_time", "magnet_flux", "phase_resistance_asymmetry", score=300.0)
@@ -140,7 +140,7 @@ def loss(view, **parts):
     return {"u": sum(volts * columns[name]["u"] for name, volts in parts.items())}
 
 
-def test_straight_ohms_are_those_that_no_device_makes(view, search):
+def test_straight_ohms_exclude_device_drops(view, search):
     """A drop in log(i) looks like ohms beside a curve that ends; beside its own it leaves none."""
     names = frozenset(["dead_time", "resistance"])
     both = search.refine(Model(names, frozenset(["dead_time"])))
@@ -157,7 +157,7 @@ def test_straight_ohms_are_those_that_no_device_makes(view, search):
     assert judged(flat=5.0, log=0.5, ohms=1.0)[0] > 0.3
 
 
-def test_ohms_that_no_device_makes_are_the_windings(view):
+def test_unexplained_ohms_are_a_resistance(view):
     """By the share alone 0.4 V of 5 V are the device's, and nobody knows of 0.8 V."""
     both = ["dead_time", "resistance"]
 
@@ -174,7 +174,7 @@ def test_ohms_that_no_device_makes_are_the_windings(view):
     assert named(0.8, (0.1, 0.9)) == (["dead_time"], [])
 
 
-def test_saturation_has_no_straight_part(view, search):
+def test_saturation_has_no_linear_part(view, search):
     """A curve in |i| i, as iron with a knee far out has it, is no wrong inductance; one with a straight part is."""
     best = search.refine(Model(frozenset(["saturation"]), frozenset(["saturation"])))
     straight, knee, cubic, _ = q_curves(view)
@@ -185,7 +185,7 @@ def test_saturation_has_no_straight_part(view, search):
     assert not straight_beside_saturation(small, best)
 
 
-def test_an_inductance_that_falls_fast_between_two_near_currents_saturates_as_well(view):
+def test_fast_falling_inductance_includes_saturation(view):
     """From 0.4 to 0.85 of rated current the surplus falls by a quarter: from none to rated by nearly half."""
     level = np.where(np.arange(len(view)) % 2, 0.4, 0.85)[:, None] * RATED
     near = view.replace(i=1j * level * np.ones_like(view.i), memo={})

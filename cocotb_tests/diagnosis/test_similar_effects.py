@@ -36,7 +36,7 @@ def warm(view, temperature):
     return view.replace(temp=np.broadcast_to(np.asarray(temperature, float), view.t.shape).copy())
 
 
-def test_a_further_recording_stands_where_its_temperature_says(view):
+def test_temperature_places_a_further_recording(view):
     course = lambda *parts: joined_views(list(parts)).course[len(view) :]  # noqa: E731
     heating = warm(view, np.linspace(COLD + 30.0, COLD + 80.0, len(view)))
     assert np.all(course(heating, view) >= 0.5)  # nothing is known of it: the time runs on
@@ -49,7 +49,7 @@ def test_a_further_recording_stands_where_its_temperature_says(view):
     assert not wants_cold({"magnet_temperature", "resistance_temperature"}, view)  # both would have gone
 
 
-def test_a_winding_that_stayed_cold_does_not_say_where_a_drift_stands(view):
+def test_cold_winding_does_not_place_a_drift(view):
     """Magnets warm by their own losses: a further recording with a cold winding is not one of cold magnets."""
     cold = warm(view, COLD + 1.0)
     short = cold.take(view.run == 0).replace(span_s=0.1 * view.span_s)
@@ -86,7 +86,7 @@ def of(known, **c):
     return groups(solution(**c), [], CATALOGUE, NOMINAL, **known)
 
 
-def test_a_constant_beside_a_drift_is_both_only_where_warmth_cannot_be_it():
+def test_constant_and_drift_need_evidence_beyond_warming():
     both, psi = ["magnet_flux", "magnet_temperature"], MACHINE.magnet_flux_wb
     flux = lambda share: {"delta_psi_m": share * psi}  # noqa: E731
     drift = {"drift": -0.05 * psi}
@@ -97,7 +97,7 @@ def test_a_constant_beside_a_drift_is_both_only_where_warmth_cannot_be_it():
     assert of({"cold": True}, magnet_flux=flux(-0.004), magnet_temperature=drift) == (both[1:], [])
 
 
-def test_what_a_thermocouple_lags_is_small_beside_all_that_the_winding_warmed(view):
+def test_thermocouple_lag_is_small_relative_to_the_warming(view):
     """The lag makes ohms that seem to stand; they grow with the rise of temperature, 100 K here and not 30 K."""
     ohms = MACHINE.resistance_ohm
     hot = warm(view, np.linspace(COLD, COLD + 100.0, len(view)))
@@ -110,7 +110,7 @@ def test_what_a_thermocouple_lags_is_small_beside_all_that_the_winding_warmed(vi
         assert groups(found, [], CATALOGUE, NOMINAL, cold=True) == (names, [])
 
 
-def test_ohms_beside_dead_time_are_a_resistance_where_no_device_has_them():
+def test_ohms_beyond_a_device_slope_are_a_resistance():
     i, dead = NOMINAL.machine.rated_current_a, {"v_0.02": 4.0, "v_0.12": 1.0}
     share = lambda x: {"delta_r": x * 5.0 / i}  # noqa: E731
     assert of({}, dead_time=dead, resistance=share(0.1))[0] == ["dead_time"]
@@ -120,7 +120,7 @@ def test_ohms_beside_dead_time_are_a_resistance_where_no_device_has_them():
         assert of({}, dead_time=dead, resistance=share(negative)) == (["dead_time", "resistance"], [])
 
 
-def test_ohms_are_those_of_a_device_that_goes_on_growing_but_not_of_one_that_stands_still():
+def test_ohms_belong_to_a_device_only_if_its_loss_grows():
     """A drop in log(i) has up to 4.7 times in ohms what the loss grows between 0.12 and 0.3 of rated current."""
     i, both = NOMINAL.machine.rated_current_a, ["dead_time", "resistance"]
 
@@ -140,7 +140,7 @@ def test_ohms_are_those_of_a_device_that_goes_on_growing_but_not_of_one_that_sta
     assert judged(0.1, 0.08) == (["dead_time"], [])
 
 
-def test_what_is_left_elsewhere_says_nothing_against_an_effect(view):
+def test_residual_at_other_orders_is_no_evidence(view):
     """Ohms live at order 0; what a dead time's curve leaves at order 6 must not take their name, at order 0 it must."""
     effects = {n: CATALOGUE[n] for n in ("resistance", "dead_time")}
     refiner = Refiner(view, effects, np.ones(len(view), bool))
@@ -165,7 +165,7 @@ def test_a_delay_within_half_a_dead_time_is_the_dead_time():
         assert CATALOGUE[name].overshadowed({"delay": c["delay"]}, NOMINAL) == 0.0
 
 
-def test_a_shaft_does_not_drive_itself():
+def test_friction_cannot_drive_the_shaft():
     possible, sure = CATALOGUE["friction"].possible, np.diag([1e-12, 1e-12])
     viscous = NOMINAL.machine.viscous_friction_nms
     assert possible({"viscous": -0.9 * viscous, "coulomb": 0.0}, sure, NOMINAL)
@@ -173,7 +173,7 @@ def test_a_shaft_does_not_drive_itself():
     assert possible({"viscous": -1.5 * viscous, "coulomb": 0.0}, np.diag([viscous**2, 0.0]), NOMINAL)
 
 
-def test_a_harmonic_that_repeats_better_is_not_the_order_of_the_cogging(view):
+def test_cogging_order_is_not_its_harmonic(view):
     """Order 8 is seen in more of the slow blocks than order 4, so that it locks better; it is still the harmonic."""
     quiet = view.replace(torque=np.zeros(view.u_dc.shape), shaft=np.full(len(view), "torque"), memo={})
     nominal = -misfit(quiet)["torque"]
@@ -186,7 +186,7 @@ def test_a_harmonic_that_repeats_better_is_not_the_order_of_the_cogging(view):
         }
 
 
-def test_a_load_out_of_balance_is_not_the_noise_of_a_transducer(view):
+def test_unbalanced_load_is_not_transducer_noise(view):
     """It differs from one short block to the next, as noise does; of a shaft that turns freely that is noise."""
     quiet = view.replace(torque=np.zeros(view.u_dc.shape), shaft=np.full(len(view), "torque"), memo={})
     swing = 0.15 * rated_torque(NOMINAL) * np.sin(view.theta_mid / MACHINE.pole_pairs)
@@ -205,7 +205,7 @@ def test_an_axis_without_current_has_no_curve(view):
     assert CATALOGUE["inductance_d"].free(later) == {}
 
 
-def test_a_curve_over_a_current_that_is_an_error_of_the_record_widens_nothing(view):
+def test_curve_over_an_erroneous_current_adds_no_tolerance(view):
     """Freed of the record's errors the data carry a d current that they do not carry raw."""
     still = view.replace(i=1j * view.i.imag + 0.01 * view.machine.rated_current_a, memo={})
     refiner = Refiner(still, {"saturation": CATALOGUE["saturation"]}, np.ones(len(view), bool))
@@ -216,7 +216,7 @@ def test_a_curve_over_a_current_that_is_an_error_of_the_record_widens_nothing(vi
     assert (refiner.sigma >= before).all() and (refiner.sigma > before).any()
 
 
-def test_ripple_is_taken_off_only_where_that_explains_more():
+def test_ripple_is_subtracted_only_if_the_fit_improves():
     """A set whose ripple is absurd must not spoil the data for all others."""
     view = view_of(recorded(machine={"inductance_q_h": 1.15 * MACHINE.inductance_q_h}), NOMINAL)
     effects = {n: CATALOGUE[n] for n in ("inductance_d", "inductance_q")}
@@ -229,7 +229,7 @@ def test_ripple_is_taken_off_only_where_that_explains_more():
     assert refiner.refine(right.model).dispersion < 1.5 * right.dispersion
 
 
-def test_a_curve_that_turns_its_sign_needs_an_inductance_and_saturation(view):
+def test_sign_change_needs_inductance_and_saturation(view):
     l_q = MACHINE.inductance_q_h
     straight = solution(inductance_q={"delta_l_q": 0.2 * l_q})
     bent = solution(saturation={"q_3": -0.3})
@@ -239,7 +239,7 @@ def test_a_curve_that_turns_its_sign_needs_an_inductance_and_saturation(view):
     assert has_both(view, turning, "q") and labels(view, turning)[0] == {"inductance_q", "saturation"}
 
 
-def test_a_flux_that_is_lost_from_the_start_is_no_drift():
+def test_flux_lost_from_the_start_is_no_drift():
     """A demagnetised rotor of which a little comes back: the drift's free course could be a step and that."""
     possible, course = CATALOGUE["magnet_temperature"].possible, np.array([0.0, 0.08, 0.25, 0.55, 1.0])
 
@@ -255,7 +255,7 @@ def test_a_flux_that_is_lost_from_the_start_is_no_drift():
     assert possible({"drift": -1e-3}, np.zeros((1, 1)), NOMINAL)
 
 
-def test_a_name_is_larger_than_what_the_operating_points_leave_open():
+def test_name_must_exceed_its_uncertainty_between_points():
     """A wrong bus of a few blocks alone: a gain of 0.4 +- 0.8 that other blocks contradict."""
     c = {"udc_gain": {"gain": 0.4}, "friction": {"viscous": 1.0, "coulomb": 1.0}}
     either = np.array([[1.0, -1.0], [-1.0, 1.0]])  # dry or viscous at one speed, but friction

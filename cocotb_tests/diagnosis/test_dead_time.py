@@ -55,7 +55,7 @@ def across(refiner, loss):
     return float(np.sqrt(np.mean(((left @ [1, 1j]) / (i / np.abs(i))).imag[loaded] ** 2))), solution
 
 
-def test_the_loss_follows_the_current_in_the_middle_of_the_pulses(strong):
+def test_loss_follows_the_current_in_the_middle_of_the_pulses(strong):
     """One edge of every pulse is late by the whole dead time, so that the converters sample before the middle."""
     case, refiner, loss = strong
     before, solution = across(refiner, loss)
@@ -66,7 +66,7 @@ def test_the_loss_follows_the_current_in_the_middle_of_the_pulses(strong):
     assert across(refiner, loss)[0] < before / 3.0
 
 
-def test_every_part_of_the_curve_is_told(strong):
+def test_every_part_of_the_loss_curve_is_identified(strong):
     """A column that counts as carried by others would be left out, and what a loss grows be wrong by the rest."""
     _, refiner, loss = strong
     c = across(refiner, loss)[1].c["dead_time"]
@@ -74,7 +74,7 @@ def test_every_part_of_the_curve_is_told(strong):
     assert 0.0 < c["growth"] < 0.08 * full_loss(c)  # a diode's logarithm in a loss that is mostly dead time
 
 
-def test_where_currents_are_near_zero_a_loss_is_in_doubt(strong):
+def test_loss_is_uncertain_near_zero_current(strong):
     _, refiner, _ = strong
     view, effect, c = refiner.view, CATALOGUE["dead_time"], {"v_0.02": 3.0, "v_0.12": 0.5, "bump_0.05": 0.3}
     assert full_loss(c) == 3.5
@@ -94,7 +94,7 @@ def test_where_currents_are_near_zero_a_loss_is_in_doubt(strong):
         (14142135, 263, ["dead_time"]),  # ohms that a diode's logarithm looks like
     ],
 )
-def test_beside_strong_dead_time(seed, number, names, tmp_path):
+def test_effects_with_strong_dead_time(seed, number, names, tmp_path):
     _, nominal, recording, _ = drive_of(seed, number, tmp_path)
     answer = diagnose(recording, nominal)
     assert (answer.verdict, [e.name for e in answer.effects]) == ("explained", names)

