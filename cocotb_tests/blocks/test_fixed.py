@@ -1,4 +1,4 @@
-"""fixed.py and fixed_pkg.vhd: equal for every value of every small format, and at random for wide ones."""
+"""fixed.py and fixed_pkg.vhd: equal for every value of every small format, and for random values of wide ones."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ def test_format_arithmetic():
 
 
 def test_generated_package_is_fresh(monkeypatch, tmp_path, capsys):
-    """The committed VHDL package equals what the blocks declare now; a stale one is noticed."""
+    """The committed VHDL package matches the declarations of the blocks; a stale one is detected."""
     assert generate.PACKAGE.read_text() == generate.render(), "run `make generate` and commit the result"
     stale = tmp_path / "fluxproof_pkg.vhd"
     stale.write_text(

@@ -35,7 +35,7 @@ def close_loop(path, scenario: str, carrier_half: int, key: str = ""):
 
 
 def test_everything_at_once():
-    """One run of 2,500 periods, looked at from several sides (one test, so that it is simulated once)."""
+    """One run of 2,500 periods with several checks (one test, so that it is simulated once)."""
     summary, arrays, register_set = close_loop(PAPER, "everything", 128)
     check_equal_at_every_period(summary, arrays)
     check_sensible_motion(arrays)
@@ -56,7 +56,7 @@ def check_equal_at_every_period(summary, arrays):
 
 
 def check_sensible_motion(arrays):
-    """Speed and current follow their references where nothing is at a limit: a bit-exact model of nonsense fails."""
+    """Speed and current follow their references if nothing is at a limit: bit-exactness alone does not show it."""
     drive = drives.load(PAPER)
     i_q = arrays["observed_i_q"] * drive.bases.current_a / 2**16
     i_q_ref = arrays["observed_i_q_ref"] * drive.bases.current_a / 2**16
@@ -106,7 +106,7 @@ def check_pwm_timing(arrays, register_set, leg: int):
 
 
 def test_smallest_converters(tmp_path):
-    """12-bit currents and a 12-bit resolver: the other end of the generics."""
+    """12-bit currents and a 12-bit resolver: the lower end of the generics."""
     text = (
         PAPER.read_text()
         .replace("adc_bits = 16", "adc_bits = 12")
@@ -120,7 +120,7 @@ def test_smallest_converters(tmp_path):
 
 
 def test_timeline():
-    """Every block starts when its last input is there and takes its declared latency, measured in the RTL."""
+    """Every block starts when its last input is valid and has its declared latency, measured in the RTL."""
     measured = timeline.measure()
     assert {row["instance"]: (row["first"], row["last"]) for row in measured["blocks"]} == fluxproof.schedule()
     assert measured["sample_to_duty_clocks"] == fluxproof.SAMPLE_TO_DUTY <= 40

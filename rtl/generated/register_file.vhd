@@ -643,7 +643,7 @@ begin
 
   -- What was stored is read from a RAM with the data of the registers, which costs far less than multiplexing
   -- them; until its first write since reset a register reads its reset value.  It is written a clock after store: word
-  -- and data stand still until the next request is taken, two clocks after the answer
+  -- and data are constant until the next request is accepted, two clocks after the response
   process (clk)
   begin
     if rising_edge(clk) then

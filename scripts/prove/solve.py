@@ -54,7 +54,7 @@ def plant(fault: Fault, tree: Path) -> Path:
     text = (tree / fault.file).read_text()
     if text.count(fault.old) != 1:
         raise BrokenProof(
-            f"fault '{fault.says}': its text stands {text.count(fault.old)} times in rtl/{fault.file}, expected once: "
+            f"fault '{fault.says}': its text occurs {text.count(fault.old)} times in rtl/{fault.file}, expected once: "
             f"{fault.old.strip()!r}"
         )
     (tree / fault.file).write_text(text.replace(fault.old, fault.new))
