@@ -168,7 +168,7 @@ def test_case_in_the_converted_rtl(name):
     assert found["samples_compared"] > 1000
 
 
-def test_a_wrong_outcome_is_a_problem():
+def test_unexpected_response_is_reported():
     """The check itself: a case with a missing trip or a difference is reported as a problem."""
     case = dataclasses.replace(tour(), clears=(18,))
     outcome = run(case, GoldenCore(SET), DRIVE, SET)
@@ -186,13 +186,13 @@ def test_a_wrong_outcome_is_a_problem():
     )
 
 
-def test_every_case_stands_in_the_docs():
+def test_every_case_is_in_the_docs():
     table = (ROOT / "docs" / "faults.md").read_text()
     for case in cases(2 * faults.CARRIER_HALF):
         assert f"| {case.name}: {case.text} |" in table, f"{case.name}: run `make faults ARGS=--docs`"
 
 
-def test_register_storm_leaves_the_gates_in_hand():
+def test_random_register_writes_keep_the_gates_safe():
     """Any value of any register at any clock, strobes and stops: never both gates on, off after a trip."""
     reason = ghdl5_missing()
     if reason:

@@ -38,7 +38,7 @@ def test_committed_files_are_fresh():
     assert not stale, f"{stale}: run `make generate` and commit"
 
 
-def test_same_files_whether_the_top_is_there_or_not(tmp_path):
+def test_same_files_with_and_without_the_top(tmp_path):
     """The first run, without the top, gives the same files as the second."""
     shutil.copytree(RTL, tmp_path / "rtl")
     (tmp_path / axi_top.PATH.relative_to(RTL.parent)).unlink()

@@ -20,7 +20,7 @@ HEADER = """\
 // The registers of Fluxproof behind their AXI4-Lite slave (rtl/generated/register_file.vhd).  What a register's kind
 // means, and which writes are refused, is given in the description of the address map below.
 
-property kind { type = string; component = reg; };  // when a write counts, see below
+property kind { type = string; component = reg; };  // when a write takes effect, see below
 property unit { type = string; component = field; };  // SI unit, "1" for none
 property format { type = string; component = field; };  // S or U(integer bits, fraction bits), per unit of a base
 property port { type = string; component = field; };  // the core's port
@@ -33,10 +33,10 @@ property high { type = longint unsigned; component = field; };  // largest legal
 
 ABOUT = (
     "A register is one word of 32 bits; negative values are sign-extended. Kinds: "
-    "setting: counts between two samples, the write is answered when it does. command: counts at the next clock. "
-    "pulse: takes a one and falls back at the next clock. sample pulse: falls back when a sample has taken it. "
+    "setting: takes effect between two samples, then the write is answered. command: takes effect at the next clock. "
+    "pulse: set by a one, zero again after one clock. sample pulse: set by a one, zero again after the next sample. "
     "status, constant, generic: read only. A write is a whole word, all four strobes set. SLVERR: value outside low to "
-    "high, read-only register, other strobes, or samples left no gap. DECERR: no register at the address. "
+    "high, read-only register, other strobes, or no gap between samples. DECERR: no register at the address. "
     "A write that is refused changes nothing."
 )
 
