@@ -343,7 +343,7 @@ def test_a_latency_that_does_not_fit_ends_the_import(monkeypatch):
     words = telemetry_words.WORDS
     late = (*words[:3], *words[4:], words[3])  # raw codes in the last word: replaced by the next sample by then
     monkeypatch.setattr(telemetry_words, "WORDS", late)
-    with pytest.raises(ValueError, match=r"telemetry: word 23 \(adc_c, adc_u_dc\) would be taken"):
+    with pytest.raises(ValueError, match=r"telemetry: word 23 \(adc_c, adc_u_dc\) would be read"):
         telemetry_words._start()
     monkeypatch.setattr(telemetry_words, "WORDS", (("theta_me", "i_d"),))
     with pytest.raises(ValueError, match="theta_me and i_d do not fit into word 0"):
