@@ -1,6 +1,6 @@
-"""Writes what is generated: formats and constants, the telemetry's words, the register map, the packaging.
+"""Writes the generated files: formats and constants, the telemetry words, the register map, the packaging.
 
-Formats, constants, tables, latencies and addresses stand in Python and nowhere else.  ``--check`` only compares.
+Formats, constants, tables, latencies and addresses are defined only in Python.  ``--check`` only compares.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def shared_formats() -> list[str]:
 
 
 def constant(name: str, value: int | Const) -> str:
-    """A plain number, or a real one rounded into a signed vector a multiplier can take."""
+    """A natural constant, or a real one rounded to a signed vector for a multiplier."""
     if isinstance(value, Const):
         width = value.fmt.width + 1 - value.fmt.signed
         note = f"{value.real:.9f} as {value.fmt}, signed for the multiplier"
@@ -55,7 +55,7 @@ def constant(name: str, value: int | Const) -> str:
 
 
 def table(name: str, fmt: Format, values: list[int]) -> list[str]:
-    """A ROM as an array constant, eight entries a line."""
+    """A ROM as an array constant, eight entries per line."""
     kind = "signed" if fmt.signed else "unsigned"
     digits = -(-fmt.width // 4)
     lines = [
@@ -71,7 +71,7 @@ def table(name: str, fmt: Format, values: list[int]) -> list[str]:
 def render() -> str:
     """The whole package as text."""
     lines = shared_formats()
-    lines += ["", "  -- fluxproof: clocks from the raw sample to the duties, least distance of two samples"]
+    lines += ["", "  -- fluxproof: clocks from the raw sample to the duties, shortest distance of two samples"]
     lines.append(f"  constant FLUXPROOF_SAMPLE_TO_DUTY : positive := {fluxproof.SAMPLE_TO_DUTY};")
     lines.append(f"  constant FLUXPROOF_SAMPLE_INTERVAL : positive := {fluxproof.SAMPLE_INTERVAL};")
     lines += ["", "  -- register_access: clocks that a write waits for the end of a sample"]
@@ -87,8 +87,8 @@ def render() -> str:
 
 
 def outputs() -> dict[Path, str]:
-    """{path: text} of every file that comes from Python alone."""
-    from scripts.registers import generated  # needs systemrdl-compiler and peakrdl, which nothing above does
+    """{path: text} of every file generated from Python only."""
+    from scripts.registers import generated  # only this needs systemrdl-compiler and peakrdl
 
     return {
         PACKAGE: render(),
@@ -99,7 +99,7 @@ def outputs() -> dict[Path, str]:
 
 
 def packaging() -> dict[Path, str]:
-    """{path: text} of the files that come from generated ones: the AXI top from the entities, and what describes it."""
+    """{path: text} of files generated from generated ones: the AXI top from the entities, and its packaging."""
     from scripts.package import packaged
 
     return packaged.files()

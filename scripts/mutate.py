@@ -1,8 +1,8 @@
-"""`make mutate`: plants the defects of scripts/mutants.py in copies of the RTL, one by one; the tests must notice.
+"""`make mutate`: plants the defects of scripts/mutants.py in copies of the RTL, one by one; the tests must fail.
 
-Each copy is named to the tests by $FLUXPROOF_RTL.  A block's defect is judged by that block's bench with every
-configuration; TESTS lists who judges the files that have no bench of that kind.
-Writes build/mutate/result.json.  Exit status 1 when a defect is not noticed.
+$FLUXPROOF_RTL selects the copy for the tests.  A defect of a block is checked by the bench of the block with every
+configuration; TESTS lists the tests of files without such a bench.
+Writes build/mutate/result.json.  Exit status 1 if a defect is not detected.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ TOP = [
     "cocotb_tests/core/test_faults.py::test_tour_in_ghdl",
     "cocotb_tests/core/test_closed_loop.py::test_every_event_in_ghdl",
 ]
-# File below rtl/, without its folder and suffix -> the tests that notice a defect in it; others: the block's bench.
+# File below rtl/, without its folder and suffix -> the tests that detect a defect in it; others: the block's bench.
 TESTS = {
     **dict.fromkeys(("axi_lite_slave", "register_access", "register_file", "register_map_pkg"), REGISTERS),
     "fluxproof": TOP,
@@ -39,7 +39,7 @@ WHY = re.compile(r"^E\s+(?:AssertionError: )?(.*\S)", re.MULTILINE)
 
 
 def plant(number: int) -> Path:
-    """A copy of the RTL with one defect; ValueError where its text is not there exactly once."""
+    """A copy of the RTL with one defect; ValueError unless its text occurs exactly once."""
     name, file, old, new = MUTANTS[number]
     tree = FOLDER / f"{number:03d}"
     shutil.rmtree(tree, ignore_errors=True)
@@ -52,7 +52,7 @@ def plant(number: int) -> Path:
 
 
 def tests_of(file: str) -> list[str]:
-    """What pytest runs to judge a defect in this file of rtl/."""
+    """The tests that pytest runs for a defect in this file of rtl/."""
     name = Path(file).stem
     if name in TESTS:
         return TESTS[name]
@@ -61,7 +61,7 @@ def tests_of(file: str) -> list[str]:
 
 
 def judge(number: int) -> dict:
-    """Run the tests against one mutant; ``killed`` and what noticed it."""
+    """Run the tests against one mutant; ``killed`` and the tests that failed."""
     name, file, _old, _new = MUTANTS[number]
     tree = plant(number)
     command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", *tests_of(file)]
@@ -74,7 +74,7 @@ def judge(number: int) -> dict:
     if verdict["killed"]:
         found = WHY.search(done.stdout)
         verdict["by"] = found[1][:200] if found else "a test failed"
-        if "BuildError" in done.stdout:  # a defect that does not even compile says nothing about the tests
+        if "BuildError" in done.stdout:  # a defect that does not compile is no check of the tests
             verdict |= {"killed": False, "invalid": True}
     shutil.rmtree(tree, ignore_errors=True)
     return verdict
@@ -82,7 +82,7 @@ def judge(number: int) -> dict:
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--only", help="run only mutants whose name or file holds this text")
+    parser.add_argument("--only", help="run only mutants whose name or file contains this text")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
     arguments = parser.parse_args()
     chosen = [n for n, m in enumerate(MUTANTS) if not arguments.only or arguments.only in m[0] + m[1]]

@@ -63,7 +63,7 @@ def _is_quantity(port) -> bool:
 
 
 def test_every_entity_has_a_model():
-    """An arithmetic entity without a registered model cannot slip in; nor one whose file has another name."""
+    """Every arithmetic entity has a registered model, and its file has the name of the entity."""
     for path in sorted(RTL.rglob("*.vhd")):
         entities = re.findall(r"^entity (\w+) is", path.read_text(), re.MULTILINE)
         if path.stem.endswith("_pkg"):
@@ -83,7 +83,7 @@ def test_models_mirror_the_rtl():
 
 
 def test_sincos_at_every_angle():
-    """The error bound holds at all 2**18 angles, and the vector's length is one within twice the bound."""
+    """The error is within its bound at all 2**18 angles, and the magnitude is 1 within twice the bound."""
     from fluxproof.golden_model.transforms import sincos
 
     bound = sincos.bound(None, None)["cos_theta"]

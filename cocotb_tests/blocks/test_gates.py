@@ -1,4 +1,4 @@
-"""Properties of the gates that hold whatever the inputs do, checked on the model without its own words.
+"""Properties of the gates that are true for any inputs, checked on the model by independent code.
 
 The bench shows that the RTL equals the model at every clock; this shows that the model is safe.
 """
@@ -15,7 +15,7 @@ CLOCKS = 60_000
 
 
 def random_clocks(seed: int):
-    """Inputs clock by clock: mostly calm, with trips, stops, and settings that change at any moment."""
+    """Inputs clock by clock: mostly constant, with trips, stops, and settings that change at any clock."""
     rng = np.random.default_rng(seed)
     row = {"compare_a": 10, "compare_b": 20, "compare_c": 30, "enable": 1, "trip": 0, "clear_trip": 0}
     row |= {"dead_time": 3, "min_pulse": 8}
@@ -71,7 +71,7 @@ def test_safe_whatever_happens(seed):
 
 
 def test_trip_needs_an_explicit_clear():
-    """After a trip the gates stay off for ever; clear while the trip lasts does not help; clear then enables."""
+    """After a trip the gates stay off; clear_trip has no effect while the trip is present, afterwards it enables."""
     state = BLOCK.state
     calm = {"compare_a": 20, "compare_b": 20, "compare_c": 20, "enable": 1, "trip": 0, "clear_trip": 0}
     calm |= {"dead_time": 3, "min_pulse": 8}

@@ -1,4 +1,4 @@
-"""The trip pin and the gates' last registers, as no model with a clock can tell it: any time, any length, no clock."""
+"""The asynchronous path from the trip pin to the gates: any time, any pulse length, with and without a clock."""
 
 from fluxproof.cosim import ghdl
 

@@ -1,4 +1,4 @@
-"""What a block takes for granted about its inputs, held by the blocks before it: over every value that decides it."""
+"""Assumptions of a block on its inputs, checked against the blocks before it for every relevant value."""
 
 from __future__ import annotations
 

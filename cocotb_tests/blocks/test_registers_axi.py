@@ -1,4 +1,4 @@
-"""The registers on the bus: the VHDL against its twin, and all that comes from the SystemRDL against the map."""
+"""The registers on the bus: the VHDL against its twin, and everything generated from the SystemRDL against the map."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def test_axi_slave_equals_its_twin():
 
 
 def test_generated_files_are_fresh(monkeypatch, tmp_path, capsys):
-    """Each committed file equals what the map gives now; a stale one is named."""
+    """Each committed file matches the current map; a stale one is named."""
     for path, text in generated.files().items():
         assert path.read_text() == text, f"{path.name} is stale: run `make generate` and commit it"
     for name in ("RDL", "MAP_PACKAGE", "REGISTER_FILE", "C_HEADER", "NAMES"):
@@ -60,7 +60,7 @@ def test_generated_files_are_fresh(monkeypatch, tmp_path, capsys):
 
 
 def test_every_register_of_the_core_has_an_address_that_stays(monkeypatch):
-    """A new register without an address is named; with one, no other moves; two at one place are refused."""
+    """A new register without an address is named; with one, no other moves; duplicate addresses are refused."""
     novel = {**REGISTERS, "novel": Port("novel", Format(1, 7, 8), doc="something new")}
     with pytest.raises(ValueError, match="register novel of the core has no address"):
         register_map.registers(novel)
@@ -68,7 +68,7 @@ def test_every_register_of_the_core_has_an_address_that_stays(monkeypatch):
     grown = register_map.registers(novel)
     assert {n: r.address for n, r in grown.items() if n != "novel"} == {n: r.address for n, r in MAP.items()}
     assert grown["novel"].address == 0x200 and grown["novel"].port.low == -32768
-    with pytest.raises(ValueError, match="novel has an address, but the core has none such"):
+    with pytest.raises(ValueError, match="novel has an address, but is not a port of the core"):
         register_map.registers()
     for place, words_of_it in (
         (0x150, "share address 0x150"),
@@ -189,7 +189,7 @@ def test_pages_and_ipxact_hold_every_register(top, tmp_path):
 
 
 def test_twin_refuses_and_changes_nothing():
-    """The model on its own: a drive's registers go in and come out; what is refused leaves all as it was."""
+    """The model alone: a drive's registers are written and read back; a refused write changes nothing."""
     bus = RegisterFile({"adc_bits": 16, "position_bits": 16, "carrier_half": 10000, "clock_hz": 200_000_000})
     values = drive_registers.registers(load(PAPER)).values
     for name, value in values._asdict().items():
@@ -203,5 +203,5 @@ def test_twin_refuses_and_changes_nothing():
     assert bus.values == before
     bus.reset()
     assert all(bus.values[r.name] == r.reset for r in MAP.values() if r.kind is Kind.SETTING)
-    with pytest.raises(ValueError, match="wanted adc_bits"):
+    with pytest.raises(ValueError, match="expected adc_bits"):
         RegisterFile({"adc_bits": 16})

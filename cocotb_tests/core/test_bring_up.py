@@ -1,4 +1,4 @@
-"""docs/software/bring_up.c on the golden model and on the RTL behind AXI: the motor turns, what is wrong is told."""
+"""docs/software/bring_up.c on the golden model and on the RTL behind AXI: the motor turns, errors are reported."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ RPM = 30 / math.pi
 
 @pytest.fixture(scope="module")
 def drive():
-    """The paper's drive with fewer clocks a period: the same machine and registers, faster."""
+    """The paper's drive with fewer clocks per period: the same machine and registers, faster."""
     return drives.with_carrier(drives.load(PAPER), 200)
 
 

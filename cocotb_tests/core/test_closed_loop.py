@@ -12,7 +12,7 @@ from fluxproof.checkout import DRIVES
 from fluxproof.cosim.runs import InGhdl, InVerilator, Named
 from fluxproof.golden_model import drive as drives
 from fluxproof.golden_model import fluxproof
-from studies import timeline
+from studies.timeline import __main__ as timeline
 
 PAPER = DRIVES / "paper001.toml"
 
@@ -58,7 +58,7 @@ def check_equal_at_every_period(summary, arrays):
 
 
 def check_sensible_motion(arrays):
-    """Speed and current follow their references where nothing is at a limit: a bit-exact model of nonsense fails."""
+    """Speed and current follow their references if nothing is at a limit: bit-exactness alone does not show it."""
     drive = drives.load(PAPER)
     i_q = arrays["observed_i_q"] * drive.bases.current_a / 2**16
     i_q_ref = arrays["observed_i_q_ref"] * drive.bases.current_a / 2**16
@@ -108,7 +108,7 @@ def check_pwm_timing(arrays, register_set, leg: int):
 
 
 def test_smallest_converters(tmp_path):
-    """12-bit currents and a 12-bit resolver: the other end of the generics."""
+    """12-bit currents and a 12-bit resolver: the lower end of the generics."""
     text = (
         PAPER.read_text()
         .replace("adc_bits = 16", "adc_bits = 12")
@@ -122,7 +122,7 @@ def test_smallest_converters(tmp_path):
 
 
 def test_timeline():
-    """Every block starts when its last input is there and takes its declared latency, measured in the RTL."""
+    """Every block starts when its last input is valid and has its declared latency, measured in the RTL."""
     measured = timeline.measure()
     assert {row["instance"]: (row["first"], row["last"]) for row in measured["blocks"]} == fluxproof.schedule()
     assert measured["sample_to_duty_clocks"] == fluxproof.SAMPLE_TO_DUTY <= 40

@@ -67,7 +67,7 @@ def simulate_drive(
 
 @pytest.mark.parametrize("sign", [1, -1])
 def test_speed_recovers_from_seconds_of_saturation(sign):
-    """Three seconds at a bus too low for the speed asked; after its return no more overshoot than a plain step."""
+    """Three seconds with a bus too low for the speed reference; then no more overshoot than after a speed step."""
     target = 1500.0
     time, out = simulate_drive(5.0, lambda t: np.full_like(t, sign * target), u_dc=sag(0.5, 3.5, 90.0))
     speed = sign * out[:, 4] / RPM
@@ -83,7 +83,7 @@ def test_speed_recovers_from_seconds_of_saturation(sign):
 
 @pytest.mark.parametrize("sign", [1, -1])
 def test_current_recovers_from_seconds_of_saturation(sign):
-    """The q current regulator against a bus too low for two seconds, at imposed torque; then as a plain step."""
+    """The q current regulator with a bus too low for two seconds, in torque mode; then the response of a step."""
     hold = lambda t: np.full_like(t, 0.0)  # noqa: E731
     time, out = simulate_drive(
         2.6,
@@ -120,7 +120,7 @@ def test_delay_compensation_in_both_directions(sign):
 
 
 def test_standstill_is_exactly_quiet():
-    """No reference, no speed: all duties one half at every period, to the bit."""
+    """Zero reference, zero speed: all duties are exactly one half in every period."""
     values = registers(DRIVE)
     state, mid = fluxproof.State(), 1 << 15
     u_dc = round(563 / 1000 * 65536)
@@ -135,7 +135,7 @@ def test_standstill_is_exactly_quiet():
 @pytest.mark.parametrize("i_q_ref", [3.0, -3.0])
 @pytest.mark.parametrize("omega_e", [1500.0, 1800.0, 1850.0])
 def test_no_second_stable_point_at_high_speed(omega_e, i_q_ref, sign):
-    """Kicked to minus ten ampere in both axes near the speed limit: the drive comes back and stays.
+    """Disturbed to minus ten ampere in both axes near the speed limit: the drive recovers and stays stable.
 
     With d first and no room for the EMF it would stay at i_q = -11 A for ever (see control/voltage_limit.py);
     braking, it would not even need the kick.
@@ -162,7 +162,7 @@ def test_no_second_stable_point_at_high_speed(omega_e, i_q_ref, sign):
 
 @pytest.mark.parametrize("sign", [1, -1])
 def test_above_the_voltage_limit_the_current_stays_within_the_rated(sign):
-    """EMF 12 % above the circle, no field weakening: the references cannot hold, the current must."""
+    """EMF 12 % above the circle, no field weakening: the references are not reached, but the current stays bounded."""
     speed = sign * 2200.0 / DRIVE.machine.pole_pairs
     _, out = simulate_drive(
         0.4,

@@ -1,4 +1,4 @@
-"""Every mistake in drive.toml or on the command line ends in one clear line; the table and the JSON file."""
+"""Every error in drive.toml or on the command line gives one clear line; the table and the JSON file."""
 
 import dataclasses
 import json

@@ -1,4 +1,4 @@
-"""Faults: what must hold of the protection, on the golden core, the VHDL in GHDL and the converted RTL."""
+"""Faults: requirements of the protection, on the golden core, the VHDL in GHDL and the converted RTL."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from fluxproof.golden_model.drive_keys import DriveError
 from fluxproof.golden_model.io import sample_latch
 from fluxproof.golden_model.io.fault_latch import NAMES
 from fluxproof.golden_model.registers import registers
-from studies import faults
+from studies.faults import __main__ as faults
 from studies.faults.bench import named, run, setup
 from studies.faults.cases import cases, tour
 from studies.faults.cores import GoldenCore, VerilatedClock
@@ -51,7 +51,7 @@ def running_core(**changes):
 
 @pytest.mark.parametrize("seed", range(3))
 def test_no_strobe_disturbs_a_sample(seed):
-    """Strobes at any time: what enters is never closer than the core's interval; the rest is counted."""
+    """Strobes at any time: accepted samples are at least the core's interval apart; the others are counted."""
     rng, core, strobes = np.random.default_rng(seed), running_core(fault_ignore=127), 0
     near, before, entered = fluxproof.SAMPLE_INTERVAL, len(core.samples), []
     for _ in range(400):
@@ -68,7 +68,7 @@ def test_no_strobe_disturbs_a_sample(seed):
 
 @pytest.mark.parametrize("watchdog", [130, 200, 1000])
 def test_watchdog_in_clocks(watchdog):
-    """Gates off two clocks after the watchdog's time, counted from the last sample; a sample in time resets it."""
+    """Gates off two clocks after the watchdog time since the last sample; a sample in time restarts it."""
     core = running_core(watchdog=watchdog)
     core.advance(4)
     rows = core.advance(watchdog - 1, MIDDLE)
@@ -81,7 +81,7 @@ def test_watchdog_in_clocks(watchdog):
 
 @pytest.mark.parametrize("bit", range(7))
 def test_each_fault_alone(bit):
-    """Stops the gates, is named, is not forgotten while its cause lasts, and only told where it is ignored."""
+    """A fault stops the gates, is reported, cannot be cleared while present, and is only reported if ignored."""
     bad = [
         {"adc_a": 62000},
         {"adc_b": 36000},
@@ -118,7 +118,7 @@ def test_each_fault_alone(bit):
 
 
 def test_registers_are_written_in_peace():
-    """All registers zero, as after a reset of the bus: every fault is there, none is remembered before enable."""
+    """All registers zero, as after a reset: every fault is present, none is latched before enable."""
     core = GoldenClock(fluxproof.Registers(*([0] * len(fluxproof.Registers._fields))), SET.config)
     for _ in range(4):
         rows = core.advance(2 * HALF, MIDDLE)
@@ -168,14 +168,14 @@ def test_case_in_the_converted_rtl(name):
     assert found["samples_compared"] > 1000
 
 
-def test_a_wrong_outcome_is_a_problem():
-    """The judgement itself: a case that does not trip where it should, and one that differs, are told."""
+def test_unexpected_response_is_reported():
+    """The check itself: a case with a missing trip or a difference is reported as a problem."""
     case = dataclasses.replace(tour(), clears=(18,))
     outcome = run(case, GoldenCore(SET), DRIVE, SET)
     right = faults.row(case, outcome)
     assert right["clocks_to_off"] == 2 and right["first"] == ["current_sum"]
     for changed, word in (
-        ({"trips": None}, "wanted None"),
+        ({"trips": None}, "expected None"),
         ({"trips": "position"}, "first fault"),
         ({"rpm": 100.0}, "rpm"),
     ):
@@ -186,14 +186,14 @@ def test_a_wrong_outcome_is_a_problem():
     )
 
 
-def test_every_case_stands_in_the_docs():
+def test_every_case_is_in_the_docs():
     table = (ROOT / "docs" / "faults.md").read_text()
     for case in cases(2 * faults.CARRIER_HALF):
         assert f"| {case.name}: {case.text} |" in table, f"{case.name}: run `make faults ARGS=--docs`"
 
 
-def test_register_storm_leaves_the_gates_in_hand():
-    """Any value of any register at any clock, strobes and stops at any clock: never both gates, off is off, no hang."""
+def test_random_register_writes_keep_the_gates_safe():
+    """Any value of any register at any clock, strobes and stops: never both gates on, off after a trip."""
     reason = ghdl5_missing()
     if reason:
         pytest.skip(reason)
@@ -231,7 +231,7 @@ def test_register_storm_leaves_the_gates_in_hand():
 
 
 def test_defaults_of_the_drive_file():
-    """Counted by hand: limit 5.23 A, range 12.5 A, bus 563 V of 500 V base, 16 bits, 20,000 clocks a period."""
+    """Calculated by hand: limit 5.23 A, range 12.5 A, bus 563 V of 500 V base, 16 bits, 20,000 clocks a period."""
     values = registers(drives.load(PAPER)).values
     assert values.i_trip == round(256 * 2 * 5.23 / 12.5) and values.sum_trip == round(256 * 0.2 * 5.23 / 12.5)
     assert (values.u_dc_min, values.u_dc_max) == (round(256 * 56.3 / 500), round(256 * 1.3 * 563 / 500))

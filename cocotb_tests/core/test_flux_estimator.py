@@ -39,7 +39,7 @@ CURRENT, BUS, MODEL, MERGE, DELTA, COMPENSATION, ESTIMATE = (1 << k for k in ran
 
 @pytest.mark.parametrize("experiment", EXPERIMENTS, ids=[f.__name__ for f in EXPERIMENTS])
 def test_papers(experiment):
-    """Every finding of `make papers` on the golden model is as it must be."""
+    """Every result of `make papers` on the golden model is within its limits."""
     found = experiment().findings
     wrong = [f"{f.experiment}: {f.ours} {f.unit}" for f in found if not f.passed]
     assert found and not wrong, "\n".join(wrong)
@@ -100,7 +100,7 @@ def test_current_model_mode_is_eq_6():
 
 
 def test_restart_on_the_fly_keeps_what_was_learnt():
-    """Gates off and on below the crossover, nameplate x 1.3: the second start errs by what is left, not by 30 %."""
+    """Gates off and on below the crossover, nameplate x 1.3: the second start has the remaining error, not 30 %."""
     scene = scenario(DRIVE, 0.7, rpm={0.0: 0.0}, torque_mode=((0.0, 0.7),), off=((0.6, 0.65),), start_rpm=150)
     scene.load[:] = 150 * RPM
     view = run(scene, wrong_by(1.3), mode=IMPOSED_SPEED)
@@ -129,7 +129,7 @@ def faults_of(view, start: float, end: float) -> int:
 
 
 def test_lost_bus_reading_is_told_and_survived():
-    """U_dc reads zero for 30 ms: flag, current model meanwhile, right again after; forgotten when told."""
+    """U_dc reads zero for 30 ms: flag, current model meanwhile, correct afterwards; the flag can be cleared."""
     gain = NOMINAL.values.u_dc_gain
     scene = scenario(
         DRIVE,
@@ -150,7 +150,7 @@ def test_lost_bus_reading_is_told_and_survived():
 
 
 def test_saturated_current_converter_is_told_and_survived():
-    """A load beyond the converters' range for 0.3 s: flag, bounded, right again when the current is back."""
+    """A load beyond the converters' range for 0.3 s: flag, bounded, correct again when the current is back in range."""
     small = NOMINAL.values._replace(**{f"gain_{x}": round(65536 * 3.0 / 12.5) for x in "abc"})
     sensors = Sensors(
         current_bits=16, current_full_scale_a=3.0, u_dc_bits=16, u_dc_full_scale_v=1000, position_bits=16
@@ -167,7 +167,7 @@ def test_saturated_current_converter_is_told_and_survived():
 
 
 def test_absurd_parameters_are_told_and_survived():
-    """Inductances at the end of their registers for 0.1 s: limits, flags, no wrap, right again afterwards."""
+    """Inductances at the end of their registers for 0.1 s: limits, flags, no wrap, correct afterwards."""
     values = NOMINAL.values
     absurd = {"l_d": (1 << 24) - 1, "l_q": (1 << 24) - 1, "lambda_mg": 131071}
     scene = scenario(
@@ -204,7 +204,7 @@ def test_flux_bandwidth_between_the_loops():
 
 
 def test_estimator_stays_beside_the_control_path():
-    """The estimate is there before the current regulators' output; all of it before the next sample may enter."""
+    """The estimate is ready before the current regulators' output, all results before the next sample may enter."""
     times = fluxproof.schedule()
     assert times["flux"][1] + 3 <= times["current_regulators"][1]
     assert fluxproof.SAMPLE_TO_DUTY <= 40 and fluxproof.SAMPLE_INTERVAL <= 64

@@ -69,7 +69,7 @@ def test_samples_as_close_as_allowed():
 
 
 def test_every_register_at_its_ends():
-    """Samples at the ends of their codes, registers at the ends of their ranges, in every mixture: no bit differs.
+    """Samples at the ends of their codes, registers at the ends of their ranges, in every combination: no bit differs.
 
     The RTL computes in words of the declared widths, the model in 64 bits: a wrap-around anywhere would show here.
     """
@@ -96,7 +96,7 @@ def test_every_register_at_its_ends():
                 if rng.integers(8) == 0:
                     inside = run % 2 and port.name.startswith(
                         "adc"
-                    )  # at its very ends a code is told, and holds
+                    )  # a code at its very ends sets a flag and holds
                     ends = (port.low + inside, port.high - inside, int(rng.integers(port.low, port.high + 1)))
                     row[port.name] = int(rng.choice(ends))
             core.apply_sample(**row)

@@ -52,7 +52,7 @@ def test_every_register_is_in_range_and_within_half_an_lsb(path):
 
 
 def test_the_papers_drive_in_numbers():
-    """Counted by hand from Table 2 and the bases 12.5 A, 500 V, 1256 rad/s."""
+    """Calculated by hand from Table 2 and the bases 12.5 A, 500 V, 1256 rad/s."""
     drive = load(PAPER)
     values, config, _ = registers(drive)
     assert (config.adc_bits, config.position_bits, config.carrier_half) == (16, 16, 10000)

@@ -1,4 +1,4 @@
-"""The registers' integers mean what the SI values say: one sample through the blocks themselves."""
+"""The registers' integers correspond to the SI values: one sample through the blocks."""
 
 import math
 

@@ -40,7 +40,7 @@ SET = registers(DRIVE)
 
 @pytest.fixture(scope="module")
 def folder():
-    """Where a run of all of dut_telemetry left its capture.bin and observed.npz."""
+    """Folder with capture.bin and observed.npz of a run of dut_telemetry."""
     generics = {name.upper(): value for name, value in SET.config._asdict().items()}
     generics |= {"CARRIER_HALF": CARRIER_HALF, "DEPTH_BITS": DEPTH_BITS}
     environment = {
@@ -167,7 +167,7 @@ def test_every_end_of_every_field_comes_back():
 
 @pytest.mark.parametrize("cut", [1, 3, 4, 50, 95, 96, 97, 191])
 def test_begins_and_ends_anywhere(cut, golden, tmp_path):
-    """Bytes of incomplete packets at both ends are left out; a run-in or the blocks without memory, nobody accused."""
+    """Bytes of incomplete packets at both ends are skipped; no false difference is reported."""
     words, _, _ = golden
     data = raw(words)[cut:-cut]
     capture = parse(data)
@@ -184,7 +184,7 @@ def test_begins_and_ends_anywhere(cut, golden, tmp_path):
     ("start", "whole"), [(1, True), (400, True), (499, True), (530, False), (1500, False)]
 )
 def test_begins_before_or_while_the_drive_runs(start, whole, tmp_path, capsys):
-    """Gates off since the reset: replayed whole. Begun in mid-run: what has no memory, and that is said."""
+    """Gates off since the reset: replayed completely. Begun in mid-run: only blocks without state, and reported."""
     scenario = everything(DRIVE)
     first = {f.name: getattr(scenario, f.name) for f in dataclasses.fields(scenario)}
     first = {name: v for name, v in first.items() if isinstance(v, np.ndarray)}
@@ -223,7 +223,7 @@ def test_lost_packets_and_the_wrap(golden, tmp_path):
 
 
 def test_numbers_that_go_back_make_pieces(golden, tmp_path, capsys):
-    """A reset, after a packet and inside one; a ring buffer: pieces, the longest unless another one is asked for."""
+    """A reset, after a packet and inside one; a ring buffer: pieces, the longest unless another one is requested."""
     words, _, _ = golden
     data = raw(words[:40]) + raw(words[40])[:20] + raw(words[:30]) + raw(words[:1])[:93] + raw(words[:50])
     capture = parse(data, "x")
@@ -243,7 +243,7 @@ def test_numbers_that_go_back_make_pieces(golden, tmp_path, capsys):
 
 @pytest.mark.parametrize("word", range(COUNT))
 def test_a_wrong_bit_is_refused_or_found(word, golden, tmp_path):
-    """One bit anywhere: told at once, a packet less, or a difference that the replay places there."""
+    """One bit anywhere: an error, a missing packet, or a difference that the replay locates there."""
     words, _, _ = golden
     rng = np.random.default_rng(word)
     for bit in rng.choice(32, 3, replace=False):
@@ -320,7 +320,7 @@ def test_bad_registers_end_in_one_line(text, wanted, golden, tmp_path, capsys):
 
 
 def test_registers_as_the_command_writes_them(golden, tmp_path, capsys):
-    """What ``fluxproof registers --json`` writes is taken; bare integers change only what they name."""
+    """The output of ``fluxproof registers --json`` is accepted; bare integers change only the named registers."""
     assert main(["registers", str(PAPER), "--json", str(tmp_path / "r.json")]) == 0
     capsys.readouterr()
     assert dump_capture.with_registers(SET, tmp_path / "r.json")[:2] == SET[:2]
@@ -339,11 +339,11 @@ def test_generated_files_are_fresh():
 
 
 def test_a_latency_that_does_not_fit_ends_the_import(monkeypatch):
-    """A field moved behind what the next sample replaces it with is refused with the word's name."""
+    """A field read after the next sample may replace it is refused with the word's name."""
     words = telemetry_words.WORDS
-    late = (*words[:3], *words[4:], words[3])  # raw codes at the very end: the next sample is there by then
+    late = (*words[:3], *words[4:], words[3])  # raw codes in the last word: replaced by the next sample by then
     monkeypatch.setattr(telemetry_words, "WORDS", late)
-    with pytest.raises(ValueError, match=r"telemetry: word 23 \(adc_c, adc_u_dc\) would be taken"):
+    with pytest.raises(ValueError, match=r"telemetry: word 23 \(adc_c, adc_u_dc\) would be read"):
         telemetry_words._start()
     monkeypatch.setattr(telemetry_words, "WORDS", (("theta_me", "i_d"),))
     with pytest.raises(ValueError, match="theta_me and i_d do not fit into word 0"):

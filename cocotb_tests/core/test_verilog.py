@@ -42,7 +42,7 @@ MODERATE = {  # registers of the size a drive has, with which little saturates
 
 @pytest.fixture(scope="module")
 def ghdl5():
-    """Skips where nothing here can convert rightly."""
+    """Skip if no suitable converter is installed."""
     try:
         return verilog.find_ghdl()
     except verilog.NoUsableGhdl as reason:
@@ -69,13 +69,13 @@ def registers(rng: np.random.Generator, moderate: bool) -> dict[str, int]:
 
 
 def protection(rng: np.random.Generator, moderate: bool) -> dict[str, int]:
-    """Its registers anywhere in their ranges; with the moderate samples every fault is told and none trips."""
+    """Registers anywhere in their ranges; with the moderate samples every fault is reported and none trips."""
     values = {name: random_value(rng, REGISTERS[name]) for name in PROTECTION}
     return values | ({"fault_ignore": 127} if moderate else {})
 
 
 def raw_sample(rng: np.random.Generator, generics: dict[str, int], moderate: bool = False) -> dict[str, int]:
-    """What the converters and the references may say; ``moderate``: small currents, a bus, torque mode."""
+    """Codes of the converters and references; ``moderate``: small currents, a valid bus, torque mode."""
     ports = [p for p in sample_latch.BLOCK.ports(generics) if p.name != LATCHED]
     values = {p.name: random_value(rng, p) for p in ports}
     if moderate:
@@ -152,7 +152,7 @@ def trace_of_verilog(writes: list[dict], core: VerilatedCore) -> list[list[int]]
 
 
 def differences(names, wanted, got) -> list[str]:
-    """Every output that differs at any clock, in words; what the VHDL leaves undefined is no difference."""
+    """Every output that differs at any clock, as text; values that are undefined in the VHDL are no difference."""
     return [
         f"clock {k}: {name} is {b} in Verilog, {a} in VHDL"
         for k, rows in enumerate(zip(wanted, got, strict=True))
@@ -180,7 +180,7 @@ def test_equals_vhdl_clock_by_clock(ghdl5, generics, tmp_path, capsys):
     again = f"rerun: FLUXPROOF_SEED={seed} make test ARGS='-k equals_vhdl'"
     assert not wrong, "\n".join([f"{len(wrong)} differences", *wrong[:12], again])
 
-    # The comparison is worth something only if everything moved.
+    # The comparison is significant only if every output changed.
     still = [name for j, name in enumerate(names) if len({row[j] for row in wanted} - {None}) < 2]
     assert not still, f"the stimulus never moves {still}"
     with capsys.disabled():
@@ -189,7 +189,7 @@ def test_equals_vhdl_clock_by_clock(ghdl5, generics, tmp_path, capsys):
 
 
 def test_constant_wider_than_the_vector(ghdl5, tmp_path):
-    """min_pulse has 12 bits, CARRIER_HALF more: GHDL 5 would compare with what 12 bits leave of it."""
+    """min_pulse has 12 bits, CARRIER_HALF more: GHDL 5 would compare with its lower 12 bits."""
     generics = GENERICS | {"CARRIER_HALF": 5000}
     core = VerilatedCore(generics)
     settings = [{"dead_time": 3, "min_pulse": pulse} for pulse in (900, 1000, 4095, 2, 904, 905)]

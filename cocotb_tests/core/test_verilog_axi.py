@@ -31,7 +31,7 @@ def word(rng, register) -> int:
 
 
 def transfers(rng, writes) -> None:
-    """A write or a read every 16 clocks, both now and then; mostly as a master must, sometimes taken back early."""
+    """A write or a read every 16 clocks, both now and then; mostly by the protocol, sometimes withdrawn early."""
     registers = list(register_map.registers().values())
     first = [(register_map.registers()[name], value) for name, value in SETTLED.items()]
     for number, at in enumerate(range(20, CLOCKS - 20, 16)):

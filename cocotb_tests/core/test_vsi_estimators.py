@@ -20,7 +20,7 @@ from studies.papers.vsi_bench import DRIVE, FAST, I_Q, NOMINAL, held_at, last, l
 
 @pytest.mark.parametrize("experiment", VSI, ids=[f.__name__ for f in VSI])
 def test_papers(experiment):
-    """Every finding of `make papers` on the golden model is as it must be."""
+    """Every result of `make papers` on the golden model is within its limits."""
     found = experiment().findings
     wrong = [f"{f.experiment}: {f.ours} {f.unit}" for f in found if not f.passed]
     assert found and not wrong, "\n".join(wrong)
@@ -95,7 +95,7 @@ def test_one_lsb_of_psi():
 
 
 def test_thermocouple_lost_or_absurd():
-    """R falls back to R_0 with a flag; a believable reading takes effect; nothing negative comes out."""
+    """R falls back to R_0 with a flag; a valid reading takes effect; the result is never negative."""
     v = NOMINAL.values
     regs = (v.r_s, v.tcr, v.t_0, v.t_min, v.t_max, v.t_s)
     for celsius, valid, lost in ((90, 1, 0), (90, 0, 1), (250, 1, 1), (-60, 1, 1), (200, 1, 0), (-40, 1, 0)):
@@ -114,7 +114,7 @@ def test_psi_is_held_and_says_so_at_low_speed():
 
 
 def test_nothing_is_learnt_at_zero_current():
-    """Ringing around zero current must not teach a negative loss; what was learnt stays, and calms the ringing."""
+    """Oscillation around zero current gives no negative loss; the estimate is held and damps the oscillation."""
     learnt = run(held_at(300, 0.0, I_Q, 4.0), scaled(NOMINAL, FAST))
     idle = run(held_at(300, 0.0, 0.0, 1.5), scaled(NOMINAL, FAST), state=learnt.result.state)
     raw = run(held_at(300, 0.0, 0.0, 1.5), without(NOMINAL))
@@ -124,7 +124,7 @@ def test_nothing_is_learnt_at_zero_current():
 
 
 def test_an_ideal_inverter_is_left_alone():
-    """No dead time, no drops: nothing is found, nothing compensated beyond the ripple's worth."""
+    """No dead time, no drops: estimate and compensation stay within the effect of the ripple."""
     view = run(held_at(300, 0.0, I_Q, 4.0), scaled(NOMINAL, FAST), dead_time_s=0.0, inverter=Inverter())
     assert np.abs(view.v_comp[last(1.0)]).max() < 0.03 and np.abs(view.i_d[last(1.0)]).max() < 0.02
 

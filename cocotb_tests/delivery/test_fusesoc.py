@@ -1,4 +1,4 @@
-"""fluxproof.core in FuseSoC: lint and simulation run, the projects for yosys and Vivado are what they should be."""
+"""fluxproof.core in FuseSoC: lint and simulation run, the projects for yosys and Vivado are complete."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from scripts.package.entity import read_entity
 
 
 def fusesoc(folder: Path, target: str, *options: str, path: str = "") -> subprocess.CompletedProcess:
-    """`fusesoc run` as the head of fluxproof.core tells it."""
+    """`fusesoc run` as described in the header of fluxproof.core."""
     command = [
         "fusesoc",
         f"--cores-root={ROOT}",
@@ -62,7 +62,7 @@ def test_fusesoc_vivado_setup(tmp_path):
 
 
 def test_fusesoc_synth_setup(tmp_path):
-    """As far as edalize's script: the Verilog is there, and yosys' commands are those wanted."""
+    """Up to edalize's script: the Verilog exists, and the yosys commands are as expected."""
     if shutil.which("tclsh") is None:
         pytest.skip("there is no tclsh here")
     try:

@@ -1,4 +1,4 @@
-"""Imports point one way: the contract of pyproject.toml holds, and a broken arrow is noticed."""
+"""Directions of imports: the contract of pyproject.toml is fulfilled, and a violation is detected."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ BESIDE = ("studies", "scripts", "cocotb_tests")
 
 
 def lay_out(folder: Path) -> Path:
-    """A copy of all Python files, the rooms inside the package as in an installed one."""
+    """A copy of all Python files, the folders inside the package as in an installed one."""
     only_python = shutil.ignore_patterns("__pycache__", "*.vhd", "*.png", "*.toml", "*.json")
     for name in ("fluxproof", *BESIDE):
         shutil.copytree(ROOT / name, folder / name, ignore=only_python)
@@ -28,7 +28,7 @@ def lay_out(folder: Path) -> Path:
 
 
 def contract(folder: Path) -> subprocess.CompletedProcess:
-    """What import-linter says of the copy."""
+    """Run import-linter on the copy."""
     code = "import sys; from importlinter.cli import lint_imports; sys.exit(lint_imports(no_cache=True))"
     environment = {**os.environ, "PYTHONPATH": str(folder)}
     return subprocess.run([sys.executable, "-c", code], cwd=folder, env=environment, capture_output=True, text=True)

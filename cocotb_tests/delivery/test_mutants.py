@@ -1,4 +1,4 @@
-"""Every planted defect still stands in the RTL once and changes it; whether the tests notice it, `make mutate` says."""
+"""Every planted defect occurs once in the RTL and changes it; `make mutate` checks that the tests detect it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The AXI top and component.xml: fresh, valid by the schema, and what the VHDL and the register map say."""
+"""The AXI top and component.xml: up to date, valid by the schema, consistent with VHDL and register map."""
 
 from __future__ import annotations
 
@@ -38,8 +38,8 @@ def test_committed_files_are_fresh():
     assert not stale, f"{stale}: run `make generate` and commit"
 
 
-def test_same_files_whether_the_top_is_there_or_not(tmp_path):
-    """The first run must write what the second finds right."""
+def test_same_files_with_and_without_the_top(tmp_path):
+    """The first run, without the top, gives the same files as the second."""
     shutil.copytree(RTL, tmp_path / "rtl")
     (tmp_path / axi_top.PATH.relative_to(RTL.parent)).unlink()
     assert packaged.files(tmp_path / "rtl") == packaged.files()
@@ -148,7 +148,7 @@ def test_files_of_the_component_exist_in_compile_order(component):
 
 
 def test_zip_is_an_ip_repository(component, tmp_path, monkeypatch, capsys):
-    """Whatever component.xml names is inside; a stale or invalid one is not packed."""
+    """All files that component.xml names are inside; a stale or invalid component is not packed."""
     assert package_command.problems() == []
     path = package_command.pack(tmp_path / "core.zip")
     first = path.read_bytes()

@@ -1,4 +1,4 @@
-"""`make prove` in small: two properties with their planted faults; what does not hold is told apart."""
+"""`make prove` on two properties with their planted faults; false properties are reported as such."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def tools():
 
 @pytest.fixture
 def own_folder(monkeypatch, tmp_path):
-    """Jobs beside those of a `make prove` that may run at the same time."""
+    """A separate job folder, because a `make prove` may run at the same time."""
     for module in ("judge", "solve"):
         monkeypatch.setattr(f"scripts.prove.{module}.FOLDER", tmp_path)
     return tmp_path
@@ -43,7 +43,7 @@ def test_proved_and_faults_noticed(name, own_folder):
 
 
 def test_what_does_not_hold_is_not_proved(own_folder):
-    """A block that claims one clock less than it takes; and a fault that is none is not caught."""
+    """A wrong latency is not proved; a planted change without effect is not detected."""
     from scripts.prove import pipeline
 
     block = BLOCKS["position"]
@@ -56,14 +56,14 @@ def test_what_does_not_hold_is_not_proved(own_folder):
 
 
 def test_every_block_and_fault_is_there(tmp_path):
-    """Every sampled block has its proof, every proof a fault, and every fault's text stands where it should."""
+    """Every sampled block has its proof, every proof a fault, and the text of every fault occurs once."""
     sampled = {name for name, block in BLOCKS.items() if not block.clocked}
     assert sampled <= {name.removeprefix("pipeline_") for name in PROOFS}
     for proof in PROOFS.values():
         assert proof.faults, f"{proof.name} has no planted fault"
         for fault in proof.faults:
             plant(fault, tmp_path / "rtl")
-    with pytest.raises(BrokenProof, match="stands 0 times"):
+    with pytest.raises(BrokenProof, match="occurs 0 times"):
         plant(Fault("nothing", "fluxproof.vhd", "no such text", ""), tmp_path / "rtl")
 
 

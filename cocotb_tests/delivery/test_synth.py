@@ -1,4 +1,4 @@
-"""`make synth`: what is counted, what is kept, and that the blocks still are as small as the file says."""
+"""`make synth`: counts, kept values, and the size of the blocks against the kept values."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ def test_a_part_has_what_it_instantiates():
 @pytest.mark.parametrize("name", kept.FIGURES)
 @pytest.mark.parametrize("before", range(0, 120, 7))
 def test_changes_at_the_limit(name, before):
-    """Every count near every kept one: a change is told exactly where it is above 3 %, both ways."""
+    """Every count near every kept one: a change is reported exactly if it is above 3 %, in both directions."""
     for after in range(0, 130):
         off = 100 * abs(after - before) > 3 * before
         assert bool(kept.changes(one(**{name: before}), one(**{name: after}))) == off, (before, after)
@@ -162,7 +162,7 @@ def test_a_broken_file_is_named(tmp_path, text, words):
 
 
 def test_small_changes_do_not_add_up():
-    """Two steps of 2 % without an update are told at the second, for the kept figure has not moved."""
+    """Two steps of 2 % without an update are reported at the second, because the kept figure has not changed."""
     assert kept.changes(one(), one(lut=1020)) == []
     assert kept.changes(one(), one(lut=1040)) != []
 

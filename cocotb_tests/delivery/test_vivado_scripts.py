@@ -122,7 +122,7 @@ def test_constraints_name_registers_that_exist():
     ],
 )  # fmt: skip
 def test_stub_notices_what_is_wrong(facts, tmp_path, script, old, new, told):
-    """A stub that lets everything through would prove nothing."""
+    """The stub rejects wrong scripts; a stub that accepts everything would prove nothing."""
     for path in ("scripts/vivado", "rtl"):
         shutil.copytree(ROOT / path, tmp_path / path)
     shutil.copy(ipxact.PATH, tmp_path)

@@ -1,4 +1,4 @@
-"""The AXI top in GHDL as a device of the closed loop (cosim/closed_loop.py): whatever software can do goes over AXI."""
+"""The AXI top in GHDL as a device of the closed loop (cosim/closed_loop.py): software actions go over AXI."""
 
 from __future__ import annotations
 
@@ -46,13 +46,13 @@ class AxiDevice:
         assert answer.resp == AxiResp.OKAY, f"{name} = {value} was answered with {answer.resp.name}"
 
     async def read(self, name: str) -> int:
-        """A word over the bus, as it is there: 32 bits without sign."""
+        """A word over the bus: 32 bits, unsigned."""
         answer = await self.bus.read(ADDRESSES[name], 4)
         assert answer.resp == AxiResp.OKAY, f"reading {name} was answered with {answer.resp.name}"
         return int.from_bytes(answer.data, "little")
 
     async def read_signed(self, name: str) -> int:
-        """The same as a signed number."""
+        """A word over the bus as a signed number."""
         return from_word(await self.read(name))
 
     async def _watch_gates(self):
@@ -119,7 +119,7 @@ class AxiDevice:
         return await self._finish(observed, duty_clocks, running)
 
     async def after_sample(self) -> None:
-        """What a test does when the values of a sample are there."""
+        """Hook for tests when the values of a sample are valid."""
 
     def change(self, registers: Mapping[str, int]) -> None:
         """Already written in the last period, see _references."""

@@ -29,11 +29,11 @@ class Board:
         self.gate_word = 0
 
     def write(self, address: int, word: int) -> int:
-        """A write on the bus; AXI's answer."""
+        """A write on the bus; returns the AXI response."""
         raise NotImplementedError
 
     def read(self, address: int) -> tuple[int, int]:
-        """A read on the bus: (answer, word)."""
+        """A read on the bus: (response, word)."""
         raise NotImplementedError
 
     def period(self, codes: dict[str, int], tripping: bool) -> None:
@@ -41,7 +41,7 @@ class Board:
         raise NotImplementedError
 
     def raw_sample(self) -> dict[str, int]:
-        """What the converters say now, by the names of the pins."""
+        """The present codes of the converters, by the names of the pins."""
         return {
             **{
                 f"adc_{x}": int(current_code(self.codes, n, self.plant.i_abc[n], self.number))

@@ -1,4 +1,4 @@
-"""Makes several hundred damaged and hostile recordings of every format, with what may become of each."""
+"""Makes several hundred damaged and hostile recordings of every format, with the allowed outcomes of each."""
 
 from __future__ import annotations
 
@@ -191,7 +191,7 @@ def _npy(header: str) -> bytes:
 
 
 def _hostile(add, folder, files) -> None:
-    """Files that would run code, follow links or fill the memory of who believes them."""
+    """Files that would run code, follow links or fill the memory of a careless reader."""
     import h5py
 
     canary = Canary(folder / "canary")

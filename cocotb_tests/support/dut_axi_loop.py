@@ -64,7 +64,7 @@ def read_core(dut, name: str) -> int:
 
 
 async def check_identity(device: AxiDevice, config, clock_hz: int) -> None:
-    """What software reads before it trusts the core."""
+    """The registers that software checks first."""
     assert (await device.read("identification")).to_bytes(4, "big") == b"FLUX"
     version = await device.read("version")
     assert version == version_word(), f"version {version:#x}"
@@ -73,7 +73,7 @@ async def check_identity(device: AxiDevice, config, clock_hz: int) -> None:
 
 
 def packets(device: AxiDevice) -> list[list[int]]:
-    """What came out of the stream, words of whole packets."""
+    """The words of complete packets from the stream."""
     found = []
     while not device.stream.empty():
         frame = device.stream.recv_nowait()
@@ -99,7 +99,7 @@ def check_stream(device: Watched, observed, dropped: int) -> int:
 
 
 async def check_trip(device: AxiDevice) -> dict[str, int]:
-    """A pulse of a nanosecond on the pin: gates off without a clock, remembered, told, and back only by clear_trip."""
+    """A pulse of a nanosecond on the pin: gates off without a clock, latched, reported, on again only by clear_trip."""
     dut = device.dut
     while not read(dut.gate_low, False) and not read(dut.gate_high, False):
         await ClockCycles(dut.aclk, 1)

@@ -1,4 +1,4 @@
-"""The fault tour inside GHDL: what the golden core was told and showed, clock by clock, now told to the VHDL."""
+"""The fault sequence inside GHDL: the VHDL gets the inputs of the golden core clock by clock; outputs are compared."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Inside the simulator: pulses of every length on the trip pin at any time, also while the clock stands still."""
+"""Inside the simulator: pulses of every length on the trip pin at any time, also while the clock is stopped."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ async def no_pulse_is_lost(dut):
             assert trip == (edge >= 2) or edge > 2, f"trip after {edge} edges"
             if gates(dut):
                 # Told after edge 2, the core acts at edge 3, and edge 4 takes what it says then.
-                assert edge >= 4, "gates on before the core was told"
+                assert edge >= 4, "gates on before the core has registered the trip"
                 assert read(dut.trip_pin, False) == 0
             if edge > 2 and not trip:
                 break
@@ -95,4 +95,4 @@ async def works_without_a_clock(dut):
     assert gates(dut) == 0
     dut.trip_pin.value = 0
     await Timer(1000, "ns")
-    assert gates(dut) == 0, "gates on again although nobody was told"
+    assert gates(dut) == 0, "gates on again without clear_trip"

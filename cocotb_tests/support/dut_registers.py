@@ -150,7 +150,7 @@ async def neither_direction_starves(dut):
 
 
 async def steady_reads(bench: Bench) -> None:
-    """Reads beside the writes, of words that never change: the two directions share one engine."""
+    """Reads in parallel to the writes, of constant words: the two directions share one state machine."""
     while True:
         name = bench.rng.choice(("identification", "version", "clock_hz", "carrier_half"))
         assert await bench.fetch(MAP[name].address) == bench.twin.read(MAP[name].address)
@@ -232,7 +232,7 @@ async def the_last_clock_of_patience(dut):
 
 @cocotb.test(timeout_time=500, timeout_unit="us")  # a bus that hangs
 async def pulses_fall_back(dut):
-    """clear_trip is one clock long; clear_faults is there when the next sample is taken, and gone after it."""
+    """clear_trip is one clock long; clear_faults is 1 when the next sample is taken, and 0 after it."""
     bench = await Bench(dut, SEED).start()
     for value in (1, 0):
         high = 0

@@ -62,7 +62,7 @@ class Sink:
             self.stalls += int(now is not None and not ready)
 
     def packets(self) -> list[tuple[int, ...]]:
-        """The words so far as packets; the marks of the last word must stand where they do."""
+        """The words so far as packets; checks the position of the last-word marks."""
         assert self.lasts == [int((k + 1) % COUNT == 0) for k in range(len(self.words))]
         return [tuple(self.words[k : k + COUNT]) for k in range(0, len(self.words), COUNT)]
 
@@ -113,7 +113,7 @@ class Bench:
         self.dut.sample_valid.value = 0
         self.state, seen = fluxproof.step(self.state, sample, self.registers.values, self.registers.config)
         self.wanted.append(pack(len(self.wanted), {**sample._asdict(), **seen._asdict()}))
-        for name in INPUT_PORTS:  # what nobody has to hold is gone
+        for name in INPUT_PORTS:  # inputs need not stay constant
             getattr(self.dut, name).value = random_value(self.rng, sized[name])
         for clock in range(1, clocks):
             self.busy = clock < INTERVAL - 2  # a strobe in the next two clocks would still be too early

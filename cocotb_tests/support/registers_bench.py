@@ -61,7 +61,7 @@ class Bench:
             part.log.setLevel("ERROR")
 
     def hold_back(self, share: float) -> None:
-        """Each channel stalls by itself for a share of the clocks."""
+        """Each channel stalls independently for a fraction of the clocks."""
         write, fetch = self.master.write_if, self.master.read_if
         for channel in (
             write.aw_channel,

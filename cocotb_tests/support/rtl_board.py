@@ -26,7 +26,7 @@ class RtlBoard(Board):
         self.began = self.core.clock
 
     def _transfer(self, requests: dict[str, dict[str, int]], answer: str) -> dict[str, int]:
-        """Valids up until each is ready, then until the answer is there; the answer's channel."""
+        """Keep each valid until its ready, then wait for the response; returns the response channel."""
         core = self.core
         for channel, payload in requests.items():
             core.set_many({f"s_axi_{name}": value for name, value in payload.items()})

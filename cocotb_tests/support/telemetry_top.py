@@ -1,4 +1,4 @@
-"""A top for the tests: the core with the telemetry beside it, written from the two entities' ports."""
+"""A top for the tests: core and telemetry, generated from the ports of the two entities."""
 
 from __future__ import annotations
 

@@ -7,8 +7,8 @@
  */
 
 #include "fluxproof_bus.h"
-#include "fluxproof_registers.h" /* generated with the core: where each register is */
-#include "drive_registers.h"     /* generated from your drive.toml: what goes into it */
+#include "fluxproof_registers.h" /* generated with the core: addresses of the registers */
+#include "drive_registers.h"     /* generated from your drive.toml: their values */
 
 #include <math.h>
 #include <stdarg.h>
@@ -25,7 +25,7 @@ static const double PI = 3.14159265358979;
 
 /* ------------------------------------------------------------------ small helpers */
 
-/* Off first, words later. */
+/* Turn the gates off before printing the message. */
 static void fail(const char *format, ...)
 {
     bus_write(AT(enable), 0);
@@ -74,7 +74,7 @@ static void identify(void)
     printf("core %u.%u.%u, %u Hz\n", version >> 16 & 255, version >> 8 & 255, version & 255, get(AT(clock_hz)));
 }
 
-/* The register values were worked out for these widths and this carrier. */
+/* The register values were calculated for these widths and this carrier. */
 static void check_generics(void)
 {
     const struct {
@@ -110,7 +110,7 @@ static void load_drive(void)
     printf("%u registers loaded and read back\n", (unsigned)COUNT(fluxproof_settings));
 }
 
-/* With the gates off: settings taken, sensors sane, old faults forgotten. */
+/* With the gates off: check settings and sensors, clear old faults. */
 static void check_at_rest(void)
 {
     wait_us(1000);

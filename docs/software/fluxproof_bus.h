@@ -1,4 +1,4 @@
-/* What bring_up.c needs from the board: two accesses to the core's 4 KiB window, and time.
+/* The functions of the board for bring_up.c: two accesses to the core's 4 KiB window, and time.
  * bus_uio.c has them for Linux on a Zynq; write your own for anything else. */
 
 #ifndef FLUXPROOF_BUS_H
@@ -7,7 +7,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-/* Both return false where the bus answered with an error (SLVERR, DECERR), if the board can tell. */
+/* Both return false if the bus answered with an error (SLVERR, DECERR) and the board can detect it. */
 bool bus_write(uint32_t offset, uint32_t value);
 bool bus_read(uint32_t offset, uint32_t *value);
 

@@ -6,7 +6,7 @@
 -- signals through registers of aclk, sample_valid one clock long when the codes are stable.  trip is the one
 -- asynchronous input; io/power_stage takes it in.
 -- Reset: aresetn, synchronous to aclk, for at least 4 clocks; inside, two clocks later, it is rst, active high, out of
--- a flip-flop that tools can copy; the one before it stands by the pin.  While it lasts all gates are off; afterwards
+-- a flip-flop that tools can copy; the one before it is near the pin.  While it lasts all gates are off; afterwards
 -- enable, every register and the memory of trips are at their reset values (all off).
 -- Formats: codes as the converters give them; registers as `fluxproof registers drive.toml` prints them.
 -- Latency: sample_valid to duties FLUXPROOF_SAMPLE_TO_DUTY clocks; trip to gates off 0 clocks.

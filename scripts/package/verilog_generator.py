@@ -1,6 +1,6 @@
 """A generator for FuseSoC: converts the top of fluxproof.core to Verilog with GHDL 5 (cosim/verilog.py).
 
-FuseSoC starts it in an empty folder with the name of a YAML file; it leaves NAME.v and a core that holds it.
+FuseSoC starts it in an empty folder with the name of a YAML file; it writes NAME.v and a core file for it.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ def main(configuration: Path) -> None:
     import yaml
 
     given = yaml.safe_load(configuration.read_text())
-    sys.path.insert(0, given["files_root"])  # FuseSoC starts this file from anywhere
+    sys.path.insert(0, given["files_root"])  # FuseSoC may start this file in any folder
     from fluxproof.cosim.sources import rtl_sources
     from fluxproof.cosim.verilog import NoUsableGhdl, synthesize
 

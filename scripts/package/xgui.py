@@ -1,4 +1,4 @@
-"""Writes xgui/fluxproof_axi.tcl: the customisation dialog that component.xml names; Vivado hands generics on by it."""
+"""Writes xgui/fluxproof_axi.tcl: the customisation dialog that component.xml names; Vivado passes generics by it."""
 
 from __future__ import annotations
 

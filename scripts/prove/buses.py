@@ -1,4 +1,4 @@
-"""AXI4-Lite and AXI4-Stream: the rules of the handshakes, for every master and every sink that keeps its own."""
+"""AXI4-Lite and AXI4-Stream: the handshake rules, for every master and every sink that follows the protocol."""
 
 from __future__ import annotations
 

@@ -14,12 +14,12 @@ def every_proof() -> tuple[Proof, ...]:
 
 
 def catalogue() -> tuple[Proof, ...]:
-    """The proofs whose entity stands in rtl/ or is made for them."""
+    """The proofs whose entity is in rtl/ or generated."""
     entities = {path.stem for path in RTL.rglob("*.vhd")}
     return tuple(proof for proof in every_proof() if proof.vhdl is not None or proof.entity in entities)
 
 
 def left_out() -> tuple[str, ...]:
-    """The entities that proofs are written for and that do not stand in rtl/."""
+    """The entities of proofs that are missing in rtl/."""
     here = {proof.name for proof in catalogue()}
     return tuple(dict.fromkeys(proof.entity for proof in every_proof() if proof.name not in here))

@@ -1,6 +1,6 @@
-"""The gates at the pins of the whole core: that its wiring keeps what gate_generation promises.
+"""Properties of the gates at the pins of the whole core, including its wiring.
 
-Every other block is cut off and may say anything at any clock, which only makes the claim stronger.
+Every other block is cut off and its outputs may have any value at any clock, which makes the proof stronger.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ from scripts.prove.proof import HARNESSES, Fault, Proof
 
 CORE = "fluxproof"
 OUTPUTS = ("gate_high", "gate_low", "tripped")
-KEPT = ("gate_generation", "fault_latch")  # what stands between trip and the gates
+KEPT = ("gate_generation", "fault_latch")  # the blocks between trip and the gates
 
 
 def harness(verilog: str) -> str:
-    """``formal_top``: the core with every input free, the gates looked at, the promises of tb/formal/core.sv."""
+    """``formal_top``: the core with free inputs, its gates, and the properties of tb/formal/core.sv."""
     found = ports(verilog, CORE)
     inputs = [(width, name) for direction, width, name in found if direction == "input"]
     looked_at = [(width, name) for direction, width, name in found if name in OUTPUTS]

@@ -1,4 +1,4 @@
-"""The table of docs/proofs.md, from the last whole run: ``python -m scripts.prove --document``."""
+"""The table of docs/proofs.md, from the last complete run: ``python -m scripts.prove --document``."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ BEGIN, END = "<!-- table: python -m scripts.prove --document -->", "<!-- end of 
 
 
 def method_of(entry: dict) -> str:
-    """In a few words how a property was proved."""
+    """The method of a proof in a few words."""
     if entry["method"] == "pdr":
         return "pdr, unbounded"
     if entry["method"] == "induction":
@@ -56,7 +56,7 @@ def table(entries: list[dict], day: str) -> str:
 
 
 def write(result: Path = FOLDER / "result.json", document: Path = DOCUMENT) -> Path:
-    """Puts the table of ``result`` between the marks of ``document``; ValueError where a mark is missing."""
+    """Puts the table of ``result`` between the marks of ``document``; ValueError if a mark is missing."""
     text = document.read_text()
     if text.count(BEGIN) != 1 or text.count(END) != 1:
         raise ValueError(f"{document.name}: expected one line {BEGIN!r} and one line {END!r}")

@@ -1,4 +1,4 @@
-"""The gates: what may never happen to a leg, whatever the inputs do at whatever clock."""
+"""Properties of the gates, for any inputs at any clock."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def compare_proof(name: str, says: str, macro: str, *faults: Fault, method: str 
         depth=block.latency + 2,
         generics=FULL,
         macros=(macro, f"LATENCY={block.latency}", f"INTERVAL={block.interval}"),
-        assumed="duties from 0 to 1, samples at their distance, min_pulse stays while a sample is on its way",
+        assumed="duties from 0 to 1, samples at their distance, min_pulse constant while a sample is in flight",
         search_depth=3 * block.latency,
     )
 
@@ -96,7 +96,7 @@ PROOFS = (
         "trip_held",
         "after a trip the gates stay off until clear_trip without trip, then enable at a valley",
         "TRIP_HELD",
-        Fault("trip not remembered", GATES, "trip or (tripped_now and not clear_trip)", "trip"),
+        Fault("trip not latched", GATES, "trip or (tripped_now and not clear_trip)", "trip"),
         Fault(
             "trip cleared while it lasts",
             GATES,
@@ -112,7 +112,7 @@ PROOFS = (
     ),
     gate_proof(
         "enable_off",
-        "every gate is off one clock after enable is taken away",
+        "every gate is off one clock after enable falls",
         "ENABLE_OFF",
         Fault(
             "enable drops at the valley",
@@ -155,14 +155,14 @@ PROOFS = (
     ),
     gate_proof(
         "stays_on",
-        "a gate that is on goes off only when its leg changes its mind, or for trip, enable or reset",
+        "a gate that is on goes off only when the command of its leg changes, or by trip, enable or reset",
         "STAYS_ON",
-        # Of the low gate: the high one is on at the valley only after half a period, beyond what a search sees of it.
+        # Low gate: the high gate is on at the valley only after half a period, beyond the depth of the search.
         Fault("gate off when the dead time grows", GATES, "gate_high(k) or gate_low(k) or", "gate_high(k) or"),
     ),
     gate_proof(
         "minimum_pulse",
-        "a gate that is on stays on for min_pulse - dead_time at least, unless trip, enable or reset cut it",
+        "a gate that is on stays on for at least min_pulse - dead_time, unless trip, enable or reset end it",
         "GATE_PULSE",
         Fault("dead time one too long", GATES, "resize(since(k), 18))", "resize(since(k) - 1, 18))"),
         Fault(
@@ -172,11 +172,11 @@ PROOFS = (
             "      if valley = '1' or top = '1' then\n        compare     <= (compare_a",
         ),
         patience=600,
-        assumed="the compare values taken over fit the minimum pulse taken over with them (see minimum_pulse_asked)",
+        assumed="the loaded compare values respect the minimum pulse loaded with them (see minimum_pulse_asked)",
     ),
     compare_proof(
         "minimum_pulse_asked",
-        "no compare value asks for a pulse or a low end of a period below min_pulse",
+        "no compare value commands a pulse or a low end of a period shorter than min_pulse",
         "MINIMUM",
         Fault(
             "minimum pulse one short",

@@ -1,4 +1,4 @@
-"""The verdict on one property: is it proved, is what it assumes possible, and does it notice its planted faults?"""
+"""The verdict on one property: is it proved, are its covers reachable, are its planted faults detected?"""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ RTL = ROOT / "rtl"
 
 
 def judge(proof: Proof, limit: int) -> dict:
-    """Every question about ``proof``, as an entry of result.json; ``reason`` says what did not come out."""
+    """Run all checks of ``proof``; returns an entry of result.json, ``reason`` names a failed check."""
     entry = {
         "property": proof.name,
         "mode": proof.mode,
@@ -59,7 +59,7 @@ def _prove(proof: Proof, entry: dict, limit: int) -> None:
 
 
 def _search(proof: Proof, entry: dict, limit: int) -> None:
-    """The faults; first that the property holds without one where they are searched, unless that is what was proved."""
+    """Check the faults, and first that the search setup without a fault passes, unless that was proved."""
     if proof.searched_with != proof.generics:
         answer = ask(proof, "faultless", proof.method, proof.depth, proof.searched_with, RTL, True, limit)
         entry["seconds"] += answer.seconds

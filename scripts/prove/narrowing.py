@@ -1,7 +1,7 @@
-"""fixed_pkg: no function wraps, for every input, in every combination of widths that the core really uses.
+"""fixed_pkg: no function wraps, for every input, in every combination of widths that the core uses.
 
-The widths are not listed by hand: a copy of the package in which each function reports its widths is elaborated with
-the whole core, and what it reports is what is proved.
+The widths are found automatically: a copy of the package in which each function reports its widths is elaborated with
+the whole core; the reported combinations are proved.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from scripts.prove.proof import Fault, Proof
 
 PACKAGE = "common/fixed_pkg.vhd"
 
-# Function -> what it reports: widths of its operands, bits dropped, width of its result, as VHDL sees them.
+# Function -> its report: widths of its operands, dropped bits, width of its result, as VHDL expressions.
 REPORTS = {
     "round_half_up": ("x'length", "drop"),
     "saturate": ("x'length", "width"),
@@ -32,7 +32,7 @@ REPORTS = {
     "minus_rounded": ("a'length", "v'length", "drop"),
 }
 
-# A function that the core has no use for at present stays proved, in one combination.
+# A function that the core does not use at present is proved in one combination.
 UNUSED = {
     "round_half_up": (20, 4),
     "saturate": (20, 12),
@@ -78,7 +78,7 @@ FAULTS = {
 
 @lru_cache(maxsize=1)
 def widths_in_use() -> dict[str, tuple[tuple[int, ...], ...]]:
-    """{function: sorted widths}, from an elaboration of the core; RuntimeError where GHDL reports nothing."""
+    """{function: sorted widths}, from an elaboration of the core; RuntimeError if GHDL reports nothing."""
     ghdl, _ = find_ghdl()
     with tempfile.TemporaryDirectory() as scratch:
         tree = Path(scratch) / "rtl"
@@ -158,7 +158,7 @@ end architecture rtl;
 
 
 def wanted(name: str, w: tuple[int, ...]) -> tuple[str, str]:
-    """(SystemVerilog expression of the right result over 64-bit integers, assumption on the operands or "")."""
+    """(SystemVerilog expression of the expected result over 64-bit integers, assumption on the operands or "")."""
 
     def cut(vector: str, width: int) -> str:
         return f"$signed({{{{{64 - width}{{{vector}[{width - 1}]}}}}, {vector}[{width - 1}:0]}})"
@@ -194,7 +194,7 @@ def wanted(name: str, w: tuple[int, ...]) -> tuple[str, str]:
 
 
 def harness(name: str, verilog: str) -> str:
-    """``formal_top``: every result, read as an integer, is the right one."""
+    """``formal_top``: every result, as an integer, equals the exact one."""
     wires, wiring, checks = [], [".x(x)", ".p(p)", ".q(q)"], []
     for k, widths in enumerate(widths_in_use()[name]):
         _, width, signed = call(name, widths)

@@ -1,6 +1,6 @@
 """Every block's out_valid: exactly LATENCY clocks after in_valid, never without a sample, none after a reset.
 
-The harness is made from what the block declares, so a block of the registry is proved without a line here.
+The harness is generated from the block's declaration, so a new block of the registry needs no code here.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ def harness(
 ) -> str:
     """``formal_top``: each strobe of ``ends`` is ``start`` that many clocks ago, samples ``interval`` clocks apart.
 
-    guarded: the entity has a sample_guard; that it lets every one of these samples in is shown too.
+    guarded: the entity has a sample_guard; the harness also shows that it accepts all these samples.
     """
     found = ports(verilog, entity)
     inputs = [
@@ -79,7 +79,7 @@ endmodule
 
 
 def fault_files(block: Block) -> list[str]:
-    """The block's file, then those of the entities it is made of."""
+    """The block's file, then those of its sub-entities."""
     own = block.vhdl
     inner = re.findall(r"entity work\.(\w+)", (ROOT / "rtl" / own).read_text())
     return [
@@ -88,7 +88,7 @@ def fault_files(block: Block) -> list[str]:
     ]
 
 
-# What blocks are written with, in the order of preference: (what it breaks, text, its replacement).
+# Code patterns of the blocks in the order of preference: (what the fault breaks, text, its replacement).
 PATTERNS = (
     ("valid a clock early", "out_valid <= valid(LATENCY);", "out_valid <= valid(LATENCY - 1);"),
     ("valid a clock early", "out_valid   <= valid(LATENCY);", "out_valid   <= valid(LATENCY - 1);"),
@@ -107,7 +107,7 @@ SOON = (
 
 
 def faults(block: Block) -> tuple[Fault, ...]:
-    """Up to two faults of the strobe and one of out_soon, in the block or in the entity that does its work."""
+    """Up to two faults of the strobe and one of out_soon, in the block or in the sub-entity that generates it."""
     made: dict[str, Fault] = {}
     for file in fault_files(block):
         text = (ROOT / "rtl" / file).read_text()
@@ -170,7 +170,7 @@ def core_proof() -> Proof:
                 "        null;\n",
             ),
         ),
-        depth=fluxproof.SAMPLE_INTERVAL + 4,  # a sample that was not let in is told a clock later
+        depth=fluxproof.SAMPLE_INTERVAL + 4,  # a rejected sample is reported one clock later
         generics={"CARRIER_HALF": 10000},
         assumed=f"samples at least {fluxproof.SAMPLE_INTERVAL} clocks apart",
         search_depth=2 * longest,

@@ -1,4 +1,4 @@
-"""What a proof is: an entity, a harness around it, a method, and the planted faults that it must notice."""
+"""A proof: an entity, a harness around it, a method, and the planted faults that it must detect."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ HARNESSES = Path(__file__).resolve().parents[2] / "tb" / "formal"
 
 @dataclass(frozen=True)
 class Fault:
-    """A planted fault: ``old`` stands exactly once in the file ``file`` of rtl/ and becomes ``new``."""
+    """A planted fault: ``old`` occurs exactly once in the file ``file`` of rtl/ and is replaced by ``new``."""
 
     says: str
     file: str
@@ -24,10 +24,10 @@ class Proof:
     """One property of one entity.
 
     ``harness`` makes the SystemVerilog module ``formal_top`` from the entity's Verilog; its asserts are the
-    property, its assumes what ``assumed`` says in words, its covers what must be reachable under the assumptions.
-    ``spies`` are signals of the entity that the harness sees as outputs spy_NAME where LEMMAS is defined: lemmas help
-    induction and are proved with the property.  The faults face the property alone, up to ``search_depth`` clocks
-    from reset, with ``search_generics``.
+    property, its assumes are described by ``assumed``, its covers must be reachable under the assumptions.  ``spies``
+    are signals of the entity that the harness gets as outputs spy_NAME if LEMMAS is defined: lemmas help induction and
+    are proved with the property.  The faults are searched without lemmas, up to ``search_depth`` clocks from reset,
+    with ``search_generics``.
     """
 
     name: str
@@ -45,7 +45,7 @@ class Proof:
     search_depth: int = 20
     covers: bool = True
     cut: Callable[[str], tuple[str, ...]] | None = None  # modules of the Verilog whose outputs become free
-    patience: int = 0  # seconds that this proof is known to need more than others
+    patience: int = 0  # additional seconds that this proof needs
     vhdl: Callable[[], str] | None = None  # a generated entity around the RTL under proof
 
     @property
@@ -59,5 +59,5 @@ class Proof:
 
 
 def committed(file: str) -> Callable[[str], str]:
-    """The harness tb/formal/``file``, which stands for itself."""
+    """The harness tb/formal/``file``, used unchanged."""
     return lambda verilog: (HARNESSES / file).read_text()

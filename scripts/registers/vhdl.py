@@ -62,7 +62,7 @@ def package(words: list[Word]) -> str:
         return names.get(word.kind, "REGISTER_READ_ONLY")
 
     stored, shown = [w for w in words if writable(w)], [w for w in words if w.kind == "status"]
-    # Those from zero last: what tells them from the others is then little
+    # Ranges from zero last: they need the smallest selection logic
     ranges = sorted({(w.parts[0].low, w.parts[0].high) for w in stored}, key=lambda r: (r[0] == 0, r))
     bits_of_range = (len(ranges) - 1).bit_length()
 
@@ -98,7 +98,7 @@ def package(words: list[Word]) -> str:
 
 
 def _arms(table: list[tuple[int, str]], default: str, size: int) -> list[tuple[str, str]]:
-    """(value, choices) of an aggregate: each value once, runs of neighbours as ranges, the keys between as told."""
+    """(value, choices) of an aggregate: each value once, runs of neighbours as ranges, the keys between as given."""
     of_value: dict[str, list[int]] = {}
     for key, value in (dict.fromkeys(range(size), default) | dict(table)).items():
         of_value.setdefault(value, []).append(key)
@@ -180,7 +180,7 @@ def _sign(words: list[Word]) -> int:
 
 
 def _reads(words: list[Word]) -> list[tuple[str, str]]:
-    """(index or range, what it reads) of every word and of the zeros between; stored words: their reset value."""
+    """(index or range, value) of every word and of the zeros between; stored words: their reset value."""
     rows: list[tuple[str, str]] = []
     following = 0
     for word in words:

@@ -1,7 +1,7 @@
-"""`make faults`: what the drive does when sensors, bus, strobes or software fail; converted RTL against golden core.
+"""`make faults`: response to faults of sensors, bus, strobes and software; converted RTL against golden core.
 
 Writes build/faults/result.json and the table build/faults/table.md; ``--docs`` puts the table into docs/faults.md.
-Exit status: 0 where every case ends as it must and nothing differs, 1 otherwise.
+Exit status: 0 if every case responds as expected without differences, 1 otherwise.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ MARKS = ("<!-- table: python -m studies.faults --docs -->", "<!-- end of table -
 
 
 def row(case: Case, outcome: Outcome) -> dict:
-    """What a case came to, times in ms."""
+    """The result of a case, times in ms."""
     o, clear = outcome, case.clears[0]
     trip, rpm = o.tripped_at, o.omega_m / RPM
     result = {
@@ -60,7 +60,7 @@ def row(case: Case, outcome: Outcome) -> dict:
 
 
 def problems(case: Case, outcome: Outcome, result: dict) -> list[str]:
-    """Everything that is not as it must be."""
+    """List of deviations from the expected response."""
     o, found, trip = outcome, [], outcome.tripped_at
     words, clear = gate_words(o.seen), o.begin(case.clears[0])
     if o.differences:
@@ -68,10 +68,10 @@ def problems(case: Case, outcome: Outcome, result: dict) -> list[str]:
     if not o.column("running")[o.begin(case.start) - 1]:
         found.append("the drive did not run before the fault")
     if (case.trips is None) != (trip is None):
-        found.append(f"tripped at clock {trip}, wanted {case.trips}")
+        found.append(f"tripped at clock {trip}, expected {case.trips}")
     if trip is not None and case.trips is not None:
         if case.trips not in result["first"]:
-            found.append(f"first fault {result['first']}, wanted {case.trips}")
+            found.append(f"first fault {result['first']}, expected {case.trips}")
         if not 0 < result["clocks_to_off"] <= MOST_CLOCKS:
             found.append(f"gates off after {result['clocks_to_off']} clocks")
         if words[trip - 1 : clear].any() or o.column("running")[trip - 1 : clear].any():
@@ -81,7 +81,7 @@ def problems(case: Case, outcome: Outcome, result: dict) -> list[str]:
     if not set(case.flags) <= set(result["flags"]) or (
         case.trips is None and set(case.flags) != set(result["flags"])
     ):
-        found.append(f"flags {result['flags']}, wanted {case.flags}")
+        found.append(f"flags {result['flags']}, expected {case.flags}")
     if not o.column("running")[-1] or abs(result["rpm_at_the_end"] - case.rpm) >= NEAR_RPM:
         found.append(f"not back at {case.rpm:g} rpm: {result['rpm_at_the_end']} rpm")
     return found
@@ -92,7 +92,7 @@ def cell(value, unit: str = "") -> str:
 
 
 def within(ms: float | None) -> str:
-    """A time whose resolution is the period."""
+    """A time with the resolution of one period, as text."""
     return "–" if ms is None else "within 0.1 ms" if ms < PERIOD_MS else f"{ms} ms"
 
 
@@ -116,7 +116,7 @@ def table(rows: list[dict]) -> str:
 
 
 def into_docs(text: str, path: Path = DOCS) -> None:
-    """Replace what stands between the marks."""
+    """Replace the text between the marks; SystemExit if a mark is missing."""
     old = path.read_text()
     pattern = re.escape(MARKS[0]) + ".*?" + re.escape(MARKS[1])
     if not re.search(pattern, old, re.DOTALL):

@@ -1,6 +1,6 @@
-"""Closed loop with faults: the core clock by clock in its plant, the golden core beside it, every clock compared.
+"""Closed loop with faults: core and plant clock by clock, the golden core in parallel, every clock compared.
 
-A case changes what a period would be: codes, bus voltage, strobes, pins, registers.  Both cores get the same; the
+A case changes codes, bus voltage, strobes, pins or registers of a period.  Both cores get the same inputs; the
 plant follows the gates of the device under test.
 """
 
@@ -27,14 +27,14 @@ from fluxproof.plant.sensors import current_code, position_code, u_dc_code
 DRIVE = ROOT / "docs" / "drives" / "paper001.toml"
 NEAR_RPM = 15.0  # of the reference: speed is reached again
 NO_CURRENT_A = 0.05  # all phases below: the current has decayed
-CLEAR_AT = 20  # clock of a period at which clear_trip is given
+CLEAR_AT = 20  # clock of a period with the pulse on clear_trip
 
 
 class Core(Protocol):
-    """What is under test: as GoldenClock, but for the samples' values."""
+    """Interface of the device under test: that of GoldenClock, without the values of the samples."""
 
     def advance(self, clocks: int, sample: Mapping[str, int] | None = None, **pins: int) -> np.ndarray:
-        """Rows of SEEN, one a clock."""
+        """Rows of SEEN, one per clock."""
 
     def change(self, values: Mapping[str, int]) -> None:
         """Set registers."""
@@ -45,7 +45,7 @@ class Core(Protocol):
 
 @dataclass
 class Plan:
-    """One period, to be changed by a case; clocks count from sample_trigger."""
+    """Inputs of one period, which a case may change; clocks count from sample_trigger."""
 
     k: int
     u_dc: float  # [V] at the inverter
@@ -62,14 +62,14 @@ class Plan:
 
 @dataclass(frozen=True)
 class Case:
-    """A fault from period ``start`` to ``stop``; the trip is cleared at ``clears``; ``trips``: what must come first."""
+    """A fault from period ``start`` to ``stop``; the trip is cleared at ``clears``; ``trips``: expected first fault."""
 
     name: str
     text: str
     hurt: Callable[[Plan], None] = lambda plan: None
     bus: Callable[[int], float] | None = None  # [V] by period
     trips: str | None = None
-    flags: tuple[str, ...] = ()  # all that must be remembered just before the first clear
+    flags: tuple[str, ...] = ()  # flags expected just before the first clear
     start: int = 400
     stop: int = 600
     clears: tuple[int, ...] = (650,)
@@ -80,10 +80,10 @@ class Case:
 
 @dataclass
 class Outcome:
-    """What happened; clocks and times of the first trip."""
+    """The recorded response, and the clocks of the first trip."""
 
     seen: np.ndarray  # (clocks, len(SEEN)) of the device
-    decided: int | None  # clock at which the first trip's cause could be known
+    decided: int | None  # clock of the first trip's cause
     strobed: int | None  # clock of the sample that tripped
     clocks: int
     samples: int
@@ -103,7 +103,7 @@ class Outcome:
 
     @property
     def tripped_at(self) -> int | None:
-        """The clock from which on the trip is seen."""
+        """The first clock at which the trip is visible."""
         found = np.flatnonzero(self.column("tripped"))
         return int(found[0]) + 1 if len(found) else None
 
@@ -125,7 +125,7 @@ class Pair:
         self.first_difference: str | None = None
 
     def advance(self, clocks: int, sample=None, **pins: int) -> np.ndarray:
-        """The same to both; every clock is compared."""
+        """Advance both with the same inputs and compare every clock."""
         golden = self.golden
         begin, count = golden.clock, len(golden.samples)
         wanted = golden.advance(clocks, sample, **pins)
@@ -137,7 +137,7 @@ class Pair:
         return got
 
     def _judge(self, begin: int, pins: Mapping[str, int], entered: bool) -> None:
-        """Notes when the first trip could be known: pin, value of a sample, or that a sample is missing."""
+        """Record the clock of the first trip's cause: pin, value of a sample, or missing sample."""
         late = self.entered[-1] + self.golden.registers.watchdog if self.entered else None
         if entered:
             self.entered.append(begin)
@@ -151,7 +151,7 @@ class Pair:
             self.decided = (begin + clocked.CHECKS_CLOCKS - 1, begin)
 
     def compare_values(self) -> None:
-        """``==`` on every value of the last sample, once they are there."""
+        """``==`` on every value of the last sample, once they are valid."""
         if not self.entered or self.golden.clock - self.entered[-1] < clocked.INTERVAL:
             return
         for name, got, wanted in zip(
@@ -172,13 +172,13 @@ class Pair:
 
 
 def setup(carrier_half: int):
-    """(drive, register set) of the drive that is hurt."""
+    """(drive, register set) of the drive under test."""
     drive = drives.with_carrier(drives.load(DRIVE), carrier_half)
     return drive, registers(drive)
 
 
 def run(case: Case, core: Core, drive, register_set) -> Outcome:
-    """The whole case; ``core`` has just had its reset and its registers."""
+    """Run a case; ``core`` has been reset and its registers are set."""
     period, pair = 2 * register_set.config.carrier_half, Pair(core, register_set)
     plant, described = build_plant(drive, omega_m=case.rpm * RPM)
     codes = sensor_params(described)
@@ -209,7 +209,7 @@ def run(case: Case, core: Core, drive, register_set) -> Outcome:
 
 
 def _play(plan: Plan, pair: Pair, references: Mapping[str, int], period: int) -> np.ndarray:
-    """One period of both cores; what the device showed at its clocks."""
+    """One period of both cores; returns the device's outputs per clock."""
     if plan.registers:
         pair.change(plan.registers)
     rows, cuts = [], sorted({0, *plan.strobes, *plan.pins, period})

@@ -1,4 +1,4 @@
-"""What a drive is put through at 732 rpm under load: sensors, bus, strobes and pins that fail, and what must follow."""
+"""The fault cases at 732 rpm under load: failing sensors, bus, strobes and pins, and the expected response."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ JUMP_CODES = 65536 // 12  # 30 degrees of the shaft
 
 
 def during(hurt: Callable[[Plan], None], start: int = START, stop: int = STOP) -> Callable[[Plan], None]:
-    """``hurt`` in the periods from ``start`` to ``stop`` only."""
+    """Apply ``hurt`` in the periods from ``start`` to ``stop`` only."""
 
     def only(plan: Plan) -> None:
         if start <= plan.k < stop:
@@ -26,12 +26,12 @@ def during(hurt: Callable[[Plan], None], start: int = START, stop: int = STOP) -
 
 
 def code(name: str, value: int) -> Callable[[Plan], None]:
-    """A converter that always says the same."""
+    """A converter with a constant code."""
     return lambda plan: plan.codes.update({name: value})
 
 
 def holding(name: str, start: int = START, stop: int = STOP) -> Callable[[Plan], None]:
-    """A code that stays what it was."""
+    """A code that is frozen at its value of period ``start``."""
     last: dict[str, int] = {}
 
     def hurt(plan: Plan) -> None:
@@ -65,14 +65,14 @@ def cases(period: int) -> list[Case]:
     too_late = SAMPLE_DELAY + int(0.6 * period)
     once = START + 1
     return [
-        Case("current sensor stuck", "code of phase a stays", holding("adc_a"), trips="current_sum"),
+        Case("current sensor stuck", "code of phase a frozen", holding("adc_a"), trips="current_sum"),
         Case("current sensor lost", "phase b reads zero", during(code("adc_b", 32768)), trips="current_sum"),
         Case("current sensor saturated", "phase c at its upper rail", during(code("adc_c", 65535)),
              trips="overcurrent", flags=("overcurrent", "current_sum", "at_rail")),
         Case("converter at its lower rail", "phase a reads code 0", during(code("adc_a", 0)),
              trips="overcurrent", flags=("overcurrent", "current_sum", "at_rail")),
-        Case("resolver frozen", "position code stays", holding("position_code"), trips="position"),
-        Case("resolver frozen, slow", "the same at 200 rpm for 20 ms: seen when the code returns",
+        Case("resolver frozen", "position code constant", holding("position_code"), trips="position"),
+        Case("resolver frozen, slow", "the same at 200 rpm for 20 ms: detected when the code returns",
              holding("position_code"), trips="position", rpm=200.0),
         Case("resolver jumps", "one code 30 degrees off", during(jump, START, once), trips="position"),
         Case("bus collapses", "563 V to 30 V and back", bus=sag(30.0), trips="u_dc_low"),
@@ -84,7 +84,7 @@ def cases(period: int) -> list[Case]:
              strobes(*range(SAMPLE_DELAY, SAMPLE_DELAY + 40), codes=NOISE)), trips=None, flags=("early",)),
         Case("strobe late", "once by 0.3 periods", during(strobes(late), START, once), trips=None),
         Case("strobe too late", "once by 0.6 periods", during(strobes(too_late), START, once), trips="watchdog"),
-        Case("strobe missing once", "one sample does not come", during(strobes(), START, once), trips="watchdog"),
+        Case("strobe missing once", "one sample missing", during(strobes(), START, once), trips="watchdog"),
         Case("strobe missing", "no samples for 20 ms", during(strobes()), trips="watchdog"),
         Case("strobe doubled", "the same sample again in mid-period",
              during(strobes(SAMPLE_DELAY, SAMPLE_DELAY + period // 2), START, once), trips="position"),
@@ -94,7 +94,7 @@ def cases(period: int) -> list[Case]:
 
 
 def tour() -> Case:
-    """Faults in a row in 90 periods, each cleared: short enough for GHDL."""
+    """A sequence of faults in 90 periods, each cleared: short enough for GHDL."""
     hurts = [
         during(code("adc_b", 60000), 10, 12),
         during(jump, 22, 23),
@@ -108,14 +108,14 @@ def tour() -> Case:
         for each in hurts:
             each(plan)
 
-    clears = (18, 28, 42, 50, 60, 68, 76)  # the one at 68 while the bus is still gone
-    text = "one fault after the other"
+    clears = (18, 28, 42, 50, 60, 68, 76)  # at 68 the bus fault is still present
+    text = "a sequence of faults"
     return Case("tour", text, hurt, trips="current_sum", start=10, stop=70, clears=clears, periods=90)
 
 
-# Register writes: each register at both ends of its range, in blocks of periods after a quiet start.
+# Register writes: each register at both ends of its range, in blocks of periods after a start without faults.
 QUIET, BLOCK, WRITE, STOPPED, RESTORED, CLEARED, JUDGED = 100, 24, 0, 4, 6, 8, 23
-STOP_AT = 100  # clock of period STOPPED at which the pin trip is given
+STOP_AT = 100  # clock of period STOPPED with a pulse on the pin trip
 ENDS = [(name, value) for name, port in REGISTERS.items() for value in (port.low, port.high)]
 
 
@@ -144,7 +144,7 @@ def extremes(register_set) -> Case:
 
 
 def extremes_verdict(outcome: Outcome, register_set) -> dict:
-    """Whether every write left the gates in hand and the drive running."""
+    """Check that after every write the trip works and the drive runs again."""
     o, words, found, tripped_alone = outcome, gate_words(outcome.seen), [], []
     if o.differences:
         found.append(f"RTL and golden core differ: {o.first_difference}")
@@ -171,7 +171,7 @@ def extremes_verdict(outcome: Outcome, register_set) -> dict:
         "differences": o.differences,
         "text": f"Register writes: each of {len(REGISTERS)} registers at both ends of its range for four periods at "
         f"speed, {len(ENDS)} writes. The pin `trip` turned the gates off in one clock in all of them, the drive ran "
-        f"again after the old value and `clear_trip` in all of them; {len(tripped_alone)} writes tripped by "
-        f"themselves; largest current {current:.1f} A.",
+        f"again after the old value and `clear_trip` in all of them; {len(tripped_alone)} writes caused "
+        f"a trip; largest current {current:.1f} A.",
         "problems": found,
     }

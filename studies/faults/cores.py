@@ -1,7 +1,7 @@
 """Cores for studies/faults/bench.py: the converted RTL in Verilator, and the golden core itself.
 
-Both note what they were told: ``writes`` holds the inputs that change before each clock, so that the same can be
-given to the VHDL in GHDL.
+Both record their inputs: ``writes`` contains the inputs that change before each clock, so that the VHDL in GHDL can
+get the same.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from fluxproof.golden_model.fluxproof import Observed
 
 
 class Noted:
-    """Keeps the inputs clock by clock; ``advance`` of both cores goes through here."""
+    """Records the inputs clock by clock; base of both cores' ``advance``."""
 
     def __init__(self, register_set):
         self.writes: list[dict[str, int]] = []
@@ -68,7 +68,7 @@ class VerilatedClock(Noted):
 
 
 class GoldenCore(Noted):
-    """The golden core in the place of the RTL: what it was told and what it said, without a simulator."""
+    """The golden core in place of the RTL, with recorded inputs and outputs, without a simulator."""
 
     def __init__(self, register_set):
         self.core = GoldenClock(register_set.values, register_set.config)

@@ -1,4 +1,4 @@
-"""`make timeline`: our Fig. 8, measured in the simulation: which block works from which clock to which.
+"""`make timeline`: our Fig. 8, measured in the simulation: first and last clock of each block's activity.
 
 Writes build/timeline.json and build/timeline.svg.
 """
@@ -45,7 +45,7 @@ def measure() -> dict:
 
 
 def draw(timeline: dict, path: Path) -> Path:
-    """A bar per block over the clocks; what waits for what can be read off the edges."""
+    """Draw one bar per block over the clocks; the edges show the dependencies."""
     rows = timeline["blocks"]
     figure, axes = plt.subplots(figsize=(10, 0.34 * len(rows) + 1.2))
     for k, row in enumerate(rows):

@@ -37,7 +37,7 @@ async def timeline(dut):
     duty = None
     dut.sample_valid.value = 1
     for clock in range(CLOCKS):
-        # What is high here is what the next rising edge, number `clock`, will see.
+        # Values sampled here are those at the next rising edge, number `clock`.
         await cocotb.triggers.Timer(1, "ns")
         for label, (begin, end) in strobes.items():
             if read(begin, False) == 1 and rows[label]["first"] is None:

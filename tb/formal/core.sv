@@ -6,7 +6,7 @@
   always @* if (!begun) assume (rst);
 
   reg was_trip, was_enable, was_on;
-  reg locked;  // by a trip, until told to forget it
+  reg locked;  // by a trip, until it is cleared
   wire on = gate_high != 0 || gate_low != 0;
   always @(posedge clk) begin
     was_trip   <= trip;

@@ -61,7 +61,7 @@ module formal_top (
 `endif
 
 `ifdef FIRST
-  // What stopped first is told until nothing stops any more.
+  // The first fault that stopped is reported until no fault stops any more.
   always @(posedge clk) if (begun && !rest) begin
     if (was_stop) assert (first_fault == was_first);
     if (fault_stop && !was_stop) assert (first_fault != 0);

@@ -104,7 +104,7 @@ module formal_top (
   reg [11:0] dead_in_force;
   reg [11:0] pulse_in_force;
   reg accepted;
-  reg locked;  // by a trip, until told to forget it
+  reg locked;  // by a trip, until it is cleared
   reg allowed;  // enabled at a valley, and nothing against it since
   wire wanted = carrier + {1'b0, compare} >= HALF;
 

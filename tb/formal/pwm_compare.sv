@@ -35,7 +35,7 @@ module formal_top (
   always @(posedge clk) begun <= 1;
   always @* if (!begun) assume (rst);
 
-  // Duties from 0 to 1; samples keep their distance; the minimum pulse is none that gate_generation refuses and stays
+  // Duties from 0 to 1; samples keep their distance; the minimum pulse is valid for gate_generation and constant
   // while a sample is on its way.
   reg [3:0] age;
   always @(posedge clk) age <= rst ? `LATENCY : in_valid ? 1 : age < `LATENCY ? age + 1 : age;

@@ -40,7 +40,7 @@ module formal_top (
   end
 
 `ifdef DISTANCE
-  // Whatever the strobes do, samples enter INTERVAL clocks apart; one that was not let in is told.
+  // For any strobes, samples enter at least INTERVAL clocks apart; a rejected one is reported.
   always @(posedge clk) if (begun) begin
     if (entered && seen) assert (since >= `INTERVAL);
     if (!rest) assert (sample_early == (was_valid && was_busy));
