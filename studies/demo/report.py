@@ -19,7 +19,7 @@ from fluxproof.golden_model.fluxproof import Observed
 from fluxproof.golden_model.units import to_si
 from studies.demo import plots
 
-TEMPLATES = Path(__file__).resolve().parent / "templates"
+TEMPLATES = Path(__file__).resolve().parents[1] / "templates"
 SHOWN = (*("u_max", "u_alpha", "u_beta"), *("i_a", "i_b", "i_c"), *("duty_a", "duty_b", "duty_c"))
 LOGGED = "{differences:,} differences, currents within {current_error_a:.2f} A of the log"
 LOGGED += ", formats allow {current_bound_a:.2f} A"
