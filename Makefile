@@ -25,7 +25,7 @@ unexport PYTHONHOME
 
 PYTHON_RUN := .venv/bin/python
 
-.PHONY: help setup generate test demo papers bench blind real compare timeline mutate verilog synth lint registers package prove faults lock clean distclean
+.PHONY: help setup generate test demo papers bench blind real compare timeline mutate verilog synth ecp5 lint registers package prove faults lock clean distclean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -47,7 +47,7 @@ test: setup ## run every test (golden model, plant, VHDL simulation)
 	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m pytest -q -n $(JOBS) --dist=worksteal $(ARGS)
 
 demo: setup ## run the demonstration
-	$(PYTHON_RUN) -m studies.demo $(ARGS)
+	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m studies.demo $(ARGS)
 
 papers: setup ## reproduce the papers' experiments: findings, figures, report
 	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m studies.papers $(ARGS)
@@ -55,12 +55,14 @@ papers: setup ## reproduce the papers' experiments: findings, figures, report
 bench: setup ## run the benchmarks
 	$(PYTHON_RUN) -m studies.bench.golden $(ARGS)
 	$(PYTHON_RUN) -m studies.bench.diagnose
+	$(PYTHON_RUN) -m pytest -q -m study cocotb_tests/diagnosis/test_recordings.py
 
 blind: setup ## run the sealed benchmark of the diagnosis
 	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m studies.blind $(ARGS)
 
 real: setup ## diagnose the recordings of real drives
 	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m studies.real $(ARGS)
+	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m pytest -q -m study cocotb_tests/studies/test_real.py
 
 compare: setup ## diagnose the same cases with what one would use instead
 	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m studies.compare $(ARGS)
@@ -80,8 +82,11 @@ prove: setup ## prove properties of the gates, the pipeline, the rounding, the b
 verilog: setup ## convert the VHDL to Verilog (GHDL 5)
 	$(PYTHON_RUN) -m fluxproof.cosim.verilog $(ARGS)
 
-synth: setup ## count LUT, FF, DSP, block RAM for three Xilinx families; routed timing on ECP5
+synth: setup ## count cells for three Xilinx families, longest paths and DSP registers, mapped netlist against the core
 	$(PYTHON_RUN) -m scripts.synth $(ARGS)
+
+ecp5: setup ## route on ECP5 by stock tools, three seeds: the clock rate, some minutes
+	$(PYTHON_RUN) -m scripts.synth --only ecp5 $(ARGS)
 
 lint: setup ## check the style of the Python (ruff) and, with a vsg.yaml, of the VHDL (vsg)
 	.venv/bin/ruff check .

@@ -13,7 +13,7 @@ from scripts.synth.mapped import MappedCore, with_mapped
 from scripts.synth.parts import WHOLE_NETLIST
 
 # A sum of products and a difference in front of a multiplier: yosys has packed both into a DSP48E1 wrongly before.
-QUICK = ("torque", "clarke")
+QUICK = ("torque",)
 QUICK_CLOCKS, CLOCKS = 6_000, 20_000
 
 

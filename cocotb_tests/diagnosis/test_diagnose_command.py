@@ -279,7 +279,6 @@ def test_failing_overlay_adds_only_a_note(dump, tmp_path, monkeypatch):
     answer(tmp_path / "out")
 
 
-@pytest.mark.slow
 def test_files_with_flipped_bits_end_without_traceback_and_without_a_name(tmp_path):
     """Bits flipped in files of every format: they may be rejected, but must not lead to a name."""
     nominal = nominal_of(tmp_path)

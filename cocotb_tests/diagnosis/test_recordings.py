@@ -169,6 +169,7 @@ def test_a_telemetry_dump_brings_its_registers(tmp_path):
     ) == len(recording)
 
 
+@pytest.mark.study
 def test_a_million_rows_in_time(tmp_path, nominal):
     table = made(1_000_000, speed=600.0)
     table |= {"i_d_ref": np.zeros(1_000_000), "temp_winding": np.full(1_000_000, 40.0)}

@@ -19,7 +19,7 @@ from fluxproof.golden_model import fluxproof
 from fluxproof.golden_model.fluxproof import Observed
 from fluxproof.golden_model.registers import registers
 from fluxproof.golden_model.units import from_si, to_si
-from studies import demo
+from studies.demo import __main__ as demo
 from studies.demo import plots, report
 
 

@@ -76,6 +76,7 @@ def test_laas_unidentifiable_parameters(laas_entry):
     )
 
 
+@pytest.mark.study
 @pytest.mark.timeout(600)
 def test_brusa_map_within_two_percent(tmp_path):
     entry = run(brusa, tmp_path)

@@ -11,11 +11,13 @@ needs_of() {
         demo | papers | faults) echo core report sim ghdl c++ ghdl5 ;;
         timeline) echo core report sim ghdl ;;
         generate | registers | package) echo core report package ;;
-        bench | blind | real) echo run ;;
+        blind) echo run ;;
+        bench | real) echo run test ;;
         compare) echo run compare ;;
         verilog) echo core ghdl5 ;;
         prove) echo core prove ghdl5 yosys ;;
-        synth) echo core report synth ghdl5 yosys nextpnr ;;
+        synth) echo core run report sim synth test ghdl c++ ghdl5 yosys ;;
+        ecp5) echo core report synth ghdl5 yosys nextpnr ;;
         lint) echo lint ;;
         mutate) echo core run report sim compare package prove test lint ghdl c++ tcl ghdl5 yosys ;;
         test) echo "$(needs_of mutate)" browser ;;
