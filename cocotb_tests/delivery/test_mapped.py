@@ -1,4 +1,4 @@
-"""The netlist that is counted computes what the core does: two blocks in the test run, the whole in `make synth`."""
+"""The netlist that is counted computes what the core does: one block in the test run, the whole in `make synth`."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from fluxproof.cosim.verilated import VerilatedCore
 from scripts.synth.mapped import MappedCore, with_mapped
 from scripts.synth.parts import WHOLE_NETLIST
 
-# A sum of products and a difference in front of a multiplier: yosys has packed both into a DSP48E1 wrongly before.
+# A sum of products, which yosys has packed into a DSP48E1 wrongly before.
 QUICK = ("torque",)
 QUICK_CLOCKS, CLOCKS = 6_000, 20_000
 
@@ -39,7 +39,7 @@ def compare(mapped: VerilatedCore, clocks: int) -> tuple[list[str], list[str]]:
     return wrong, [name for j, name in enumerate(core.outputs) if len({row[j] for row in wanted}) < 2]
 
 
-def test_netlists_of_two_blocks_equal_the_core():
+def test_netlist_of_a_block_equals_the_core():
     wrong, _ = compare(MappedCore(GENERICS, QUICK), QUICK_CLOCKS)
     assert not wrong, "\n".join([f"{len(wrong)} differences", *wrong[:12]])
 
