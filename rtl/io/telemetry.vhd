@@ -24,8 +24,8 @@ entity telemetry is
     clk             : in  std_logic;
     rst             : in  std_logic;  -- synchronous, active high
     enable          : in  std_logic;  -- 1: send packets
-    sample_valid    : in  std_logic;  -- the raw sample below is there
-    m_axis_tready   : in  std_logic;  -- the sink takes the word
+    sample_valid    : in  std_logic;  -- 1: the raw sample below is valid
+    m_axis_tready   : in  std_logic;  -- 1: the sink accepts the word
     adc_a           : in  unsigned(ADC_BITS - 1 downto 0);  -- ADC code, phase a
     adc_b           : in  unsigned(ADC_BITS - 1 downto 0);  -- ADC code, phase b
     adc_c           : in  unsigned(ADC_BITS - 1 downto 0);  -- ADC code, phase c
@@ -36,10 +36,10 @@ entity telemetry is
     i_q_ext_in      : in  signed(PU_W - 1 downto 0);  -- current reference of torque mode, q axis
     speed_mode_in   : in  std_logic;  -- 1: speed control, 0: torque control
     temp_winding_in : in  signed(15 downto 0);  -- winding temperature, degrees Celsius
-    temp_valid_in   : in  std_logic;  -- 1: the temperature is a reading
-    clear_faults_in : in  std_logic;  -- 1: forget what is over
+    temp_valid_in   : in  std_logic;  -- 1: temp_winding is valid
+    clear_faults_in : in  std_logic;  -- 1: clear the flags whose cause is gone
     running         : in  std_logic;  -- 1: the gates are switching
-    current_at_rail : in  unsigned(2 downto 0);  -- bit x: code of phase x at its end
+    current_at_rail : in  unsigned(2 downto 0);  -- bit x: ADC code of phase x at either end
     u_dc            : in  unsigned(DUTY_W - 1 downto 0);  -- bus voltage
     theta_me        : in  unsigned(TURN_W - 1 downto 0);  -- electrical angle
     omega_me        : in  signed(PU_W - 1 downto 0);  -- electrical speed
@@ -50,21 +50,21 @@ entity telemetry is
     lambda_q        : in  signed(PU_W - 1 downto 0);  -- flux linkage, q axis
     u_d             : in  signed(PU_W - 1 downto 0);  -- voltage, d axis
     u_q             : in  signed(PU_W - 1 downto 0);  -- voltage, q axis
-    sat_d           : in  signed(1 downto 0);  -- limit that holds the d axis
-    sat_q           : in  signed(1 downto 0);  -- limit that holds the q axis
+    sat_d           : in  signed(1 downto 0);  -- active limit, d axis: 1 upper, -1 lower, 0 none
+    sat_q           : in  signed(1 downto 0);  -- active limit, q axis: 1 upper, -1 lower, 0 none
     flux_faults     : in  unsigned(6 downto 0);  -- what has disturbed the flux estimate, see flux_monitor
-    v_dead          : in  signed(V_LEG_W - 1 downto 0);  -- leg voltage lost and not compensated
+    v_dead          : in  signed(V_LEG_W - 1 downto 0);  -- leg voltage loss that is not compensated
     v_comp          : in  signed(V_LEG_W - 1 downto 0);  -- leg voltage that is compensated
     psi_m           : in  signed(PU_W - 1 downto 0);  -- flux linkage of the magnets
     psi_held        : in  std_logic;  -- 1: psi_m is held
-    temp_lost       : in  std_logic;  -- 1: no believable temperature, r is r_s
+    temp_lost       : in  std_logic;  -- 1: no valid temperature, r = r_s
     compare_a       : in  unsigned(15 downto 0);  -- compare value, leg a
     compare_b       : in  unsigned(15 downto 0);  -- compare value, leg b
     compare_c       : in  unsigned(15 downto 0);  -- compare value, leg c
     m_axis_tdata    : out unsigned(31 downto 0);  -- a word of the packet
-    m_axis_tvalid   : out std_logic;  -- it is there
-    m_axis_tlast    : out std_logic;  -- it is the packet's last
-    dropped         : out unsigned(15 downto 0)  -- samples without a packet for want of room
+    m_axis_tvalid   : out std_logic;  -- 1: the word is valid
+    m_axis_tlast    : out std_logic;  -- 1: last word of the packet
+    dropped         : out unsigned(15 downto 0)  -- samples without a packet because the queue was full
   );
 end entity telemetry;
 
