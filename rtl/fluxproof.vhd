@@ -2,15 +2,16 @@
 --
 --   raw sample -> conditioning -> transforms -> control -> modulation -> gates
 --
--- Each block starts when its last input is there and runs in parallel with what does not depend on it; which of
--- its inputs is the last is known, because latencies are constants (a test holds the measured against them).
+-- Each block starts when its last input is valid and runs in parallel with the blocks that do not depend on it.  Which
+-- input is the last is known, because latencies are constants (a test compares them with the measured ones).
 -- Formats: per unit, see golden_model/formats.py; registers as `fluxproof registers drive.toml` prints them.
 -- Latency: sample_valid to duty_valid FLUXPROOF_SAMPLE_TO_DUTY clocks; samples at least
 -- FLUXPROOF_SAMPLE_INTERVAL apart.
--- Registers change only between samples, at the latest at the edge that takes a sample in (a setting then counts for
--- this sample, a reference for the next); dead_time and min_pulse at any time, they are taken over at the valley;
+-- Registers change only between samples, at the latest at the edge at which a sample enters (a setting then applies to
+-- this sample, a reference to the next); dead_time and min_pulse at any time, they take effect at the valley;
 -- watchdog and fault_ignore at any time.
--- Protection: a sample that comes too early is not let in; a bad sample, a missing one and trip turn the gates off.
+-- Protection: a sample that comes too early is rejected; a faulty sample, a missing one and trip switch the gates off.
+-- Rounding: see the blocks.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -1019,7 +1020,7 @@ begin
       gate_clear    => gate_clear
     );
 
-  -- A bad sample need not wait for the fault memory; without enable the gates are off, and nothing is remembered.
+  -- A faulty sample trips without waiting for the fault latch; without enable the gates are off and nothing is latched.
   gate_trip <= trip or fault_stop or (sample_trip and enable);
 
   gates : entity work.gate_generation
