@@ -73,7 +73,7 @@ architecture rtl of current_directions is
   signal narrow     : signed(PU_W - 1 downto 0);          -- turn at clock 5, not x at 10, y at 11, b at 16, c at 17
   signal minus_x_11 : signed(PU_W downto 0);
   signal twice_a_11 : signed(PU_W - 1 downto 0);
-  signal s          : signed(SUM_W - 1 - DROP downto 0);  -- a direction; any, all: OR and AND of its bits from that of 1 on
+  signal s          : signed(SUM_W - 1 - DROP downto 0);  -- a direction; any, all: OR, AND of its bits >= 1
   signal s_any      : std_logic;
   signal s_all      : std_logic;
   signal s_next     : signed(PU_W - 1 downto 0);          -- the directions as a shift register

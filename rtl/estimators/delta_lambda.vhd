@@ -132,7 +132,7 @@ begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stages 1, 2: held = run while the integrals contain other voltages; in two stages, because the flags are distant
+      -- Stages 1, 2: held = run while the integrals contain other voltages; in two stages, as the flags are distant
       free_1     <= not ((or sat_d) or (or sat_q));
       measured_1 <= voltage_known and not (or current_at_rail);
       held_2     <= run and not (free_1 and measured_1);

@@ -111,7 +111,7 @@ begin
   moved_11 <= sum_x_11(PROD_X_W downto DROP_X);
   total_12 <= plus_rounded(sum_u_12(TOTAL_W - 1 + DROP_U downto DROP_U), x_other, FLUX_MERGE_X_TO_STATE);
 
-  -- lambda_c - flux, rounded with one carry: the first bit of flux below the LSB.
+  -- lambda_c - rounded flux, with one carry: the first bit of flux below the LSB, unless flux is at its end.
   diff_5 <= (lambda_c_1(FLUX_W - 1) & lambda_c_1 & '0')
             - (resize(flux(FLUX_STATE_W - 1 downto FLUX_TO_STATE), FLUX_W + 1)
                & (flux(FLUX_TO_STATE - 1) and not (and top)));

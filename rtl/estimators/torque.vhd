@@ -60,8 +60,8 @@ begin
         i_2      <= i_d when valid(3) = '1' else i_q;
       end if;
 
-      -- Stages 3, 5: prod = lambda_d*i_q, then -lambda_q*i_d;  addend: half an LSB for the rounding, then the sum so far,
-      -- in a register of its own, because yosys maps a feedback into the DSP48 incorrectly
+      -- Stages 3, 5: prod = lambda_d*i_q, then -lambda_q*i_d;  addend: half an LSB, then the sum so far, in a
+      -- register of its own, because yosys maps a feedback into the DSP48 incorrectly
       if valid(2) = '1' or valid(4) = '1' then
         prod_3   <= lambda_2 * i_2;
         addend_3 <= sum_4;

@@ -144,8 +144,8 @@ begin
   -- lp - x - 1
   room <= (resize(lp_next(INTEGRAL_W - 1 downto PU_TO_INTEGRAL), PU_W + 1) & '0') - (resize(x_1, PU_W + 1) & '1');
 
-  -- A low-pass with k_lp < 1 exceeds the range of its input by at most half an LSB of PU.  At the upper end this fits in
-  -- INTEGRAL; at the lower end lp, with its bias of half an LSB, can be negative full scale: see lp_under.
+  -- A low-pass with k_lp < 1 exceeds the range of its input by at most half an LSB of PU.  At the upper end INTEGRAL
+  -- has the bits for it; at the lower end lp would lose its bias of half an LSB, which lp_under detects and restores.
   moved <= sum_lp(INTEGRAL_W - 1 + DROP_LP downto DROP_LP);
 
   e_9      <= saturate(not sum(SUM_W - 1 downto DROP_MODEL), FLUX_W);
