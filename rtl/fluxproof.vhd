@@ -39,7 +39,7 @@ entity fluxproof is
     speed_mode_in   : in  std_logic;  -- 1: speed control, 0: torque control
     temp_winding_in : in signed(15 downto 0);  -- winding temperature, degrees Celsius
     temp_valid_in   : in std_logic;  -- 1: temp_winding is valid
-    clear_faults_in : in  std_logic;  -- 1: forget the flux estimator's faults that are over
+    clear_faults_in : in  std_logic;  -- 1: clear the flags of flux_faults whose cause is gone
     enable          : in  std_logic;  -- 1: gates may switch
     trip            : in  std_logic;  -- 1: gates off, latched
     clear_trip      : in  std_logic;  -- 1: clear the latched trip
@@ -117,9 +117,9 @@ entity fluxproof is
     setting_refused : out std_logic;  -- 1: dead_time and min_pulse contradict each other, refused
     min_pulse_used  : out unsigned(11 downto 0);  -- minimum pulse in force
     carrier         : out unsigned(15 downto 0);  -- carrier, for observation
-    duty_valid      : out std_logic;  -- the duties of the sample are there
-    compare_valid   : out std_logic;  -- the compare values are there
-    values_valid    : out std_logic;  -- all of the sample's values below are there
+    duty_valid      : out std_logic;  -- 1: the duties of the sample are valid
+    compare_valid   : out std_logic;  -- 1: the compare values are valid
+    values_valid    : out std_logic;  -- 1: all of the sample's values below are valid
     i_a             : out signed(PU_W - 1 downto 0);  -- current, phase a
     i_b             : out signed(PU_W - 1 downto 0);  -- current, phase b
     i_c             : out signed(PU_W - 1 downto 0);  -- current, phase c
@@ -161,11 +161,11 @@ entity fluxproof is
     merge_known     : out std_logic;  -- 1: the merged flux is valid at the next sample
     delta_lambda_d  : out signed(FLUX_W - 1 downto 0);  -- flux linkage missing in the estimate, d axis
     delta_lambda_q  : out signed(FLUX_W - 1 downto 0);  -- flux linkage missing in the estimate, q axis
-    delta_held      : out std_logic;  -- 1: held, the integrals mean something else
+    delta_held      : out std_logic;  -- 1: held, as the integrals contain other voltages
     lambda_pi_d     : out signed(FLUX_W - 1 downto 0);  -- compensation, d axis
     lambda_pi_q     : out signed(FLUX_W - 1 downto 0);  -- compensation, q axis
     torque          : out signed(PU_W - 1 downto 0);  -- estimated torque
-    flux_faults     : out unsigned(6 downto 0);  -- what has disturbed the flux estimate, see flux_monitor
+    flux_faults     : out unsigned(6 downto 0);  -- conditions that disturbed the flux estimate, see flux_monitor
     d_d             : out signed(PU_W - 1 downto 0);  -- direction function D_d / 3
     d_q             : out signed(PU_W - 1 downto 0);  -- direction function D_q / 3
     v_dead          : out signed(V_LEG_W - 1 downto 0);  -- leg voltage loss that is not compensated
@@ -174,7 +174,7 @@ entity fluxproof is
     psi_m           : out signed(PU_W - 1 downto 0);  -- flux linkage of the magnets
     psi_held        : out std_logic;  -- 1: psi_m is held
     temp_lost       : out std_logic;  -- 1: no valid temperature, r = r_s
-    sample_faults   : out unsigned(5 downto 0);  -- what is wrong with this sample, see sample_checks
+    sample_faults   : out unsigned(5 downto 0);  -- faults of this sample, see sample_checks
     sample_trip     : out std_logic;  -- 1: at least one of them trips
     compare_a       : out unsigned(15 downto 0);  -- compare value, leg a
     compare_b       : out unsigned(15 downto 0);  -- compare value, leg b
