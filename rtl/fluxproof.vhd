@@ -2,15 +2,16 @@
 --
 --   raw sample -> conditioning -> transforms -> control -> modulation -> gates
 --
--- Each block starts when its last input is there and runs in parallel with what does not depend on it; which of
--- its inputs is the last is known, because latencies are constants (a test holds the measured against them).
+-- Each block starts when its last input is valid and runs in parallel with the blocks that do not depend on it.  Which
+-- input is the last is known, because latencies are constants (a test compares them with the measured ones).
 -- Formats: per unit, see golden_model/formats.py; registers as `fluxproof registers drive.toml` prints them.
 -- Latency: sample_valid to duty_valid FLUXPROOF_SAMPLE_TO_DUTY clocks; samples at least
 -- FLUXPROOF_SAMPLE_INTERVAL apart.
--- Registers change only between samples, at the latest at the edge that takes a sample in (a setting then counts for
--- this sample, a reference for the next); dead_time and min_pulse at any time, they are taken over at the valley;
+-- Registers change only between samples, at the latest at the edge at which a sample enters (a setting then applies to
+-- this sample, a reference to the next); dead_time and min_pulse at any time, they take effect at the valley;
 -- watchdog and fault_ignore at any time.
--- Protection: a sample that comes too early is not let in; a bad sample, a missing one and trip turn the gates off.
+-- Protection: a sample that comes too early is rejected; a faulty sample, a missing one and trip switch the gates off.
+-- Rounding: see the blocks.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -26,7 +27,7 @@ entity fluxproof is
   port (
     clk             : in  std_logic;
     rst             : in  std_logic;  -- synchronous, active high
-    sample_valid    : in  std_logic;  -- the raw sample below is there
+    sample_valid    : in  std_logic;  -- 1: the raw sample below is valid
     adc_a           : in  unsigned(ADC_BITS - 1 downto 0);  -- ADC code, phase a
     adc_b           : in  unsigned(ADC_BITS - 1 downto 0);  -- ADC code, phase b
     adc_c           : in  unsigned(ADC_BITS - 1 downto 0);  -- ADC code, phase c
@@ -37,25 +38,25 @@ entity fluxproof is
     i_q_ext_in      : in  signed(PU_W - 1 downto 0);  -- current reference of torque mode, q axis
     speed_mode_in   : in  std_logic;  -- 1: speed control, 0: torque control
     temp_winding_in : in signed(15 downto 0);  -- winding temperature, degrees Celsius
-    temp_valid_in   : in std_logic;  -- 1: the temperature is a reading
-    clear_faults_in : in  std_logic;  -- 1: forget the flux estimator's faults that are over
+    temp_valid_in   : in std_logic;  -- 1: temp_winding is valid
+    clear_faults_in : in  std_logic;  -- 1: clear the flags of flux_faults whose cause is gone
     enable          : in  std_logic;  -- 1: gates may switch
-    trip            : in  std_logic;  -- 1: gates off, remembered
-    clear_trip      : in  std_logic;  -- 1: forget the trip
+    trip            : in  std_logic;  -- 1: gates off, latched
+    clear_trip      : in  std_logic;  -- 1: clear the latched trip
     offset_a        : in  unsigned(CODE_W - 1 downto 0);  -- code at zero current, phase a, left-aligned
     offset_b        : in  unsigned(CODE_W - 1 downto 0);  -- code at zero current, phase b, left-aligned
     offset_c        : in  unsigned(CODE_W - 1 downto 0);  -- code at zero current, phase c, left-aligned
     gain_a          : in  signed(PU_W - 1 downto 0);  -- current per code, phase a
     gain_b          : in  signed(PU_W - 1 downto 0);  -- current per code, phase b
     gain_c          : in  signed(PU_W - 1 downto 0);  -- current per code, phase c
-    reverse         : in  std_logic;  -- 1: code counts against the phase order
+    reverse         : in  std_logic;  -- 1: code counts opposite to the phase order
     pole_pairs      : in  unsigned(5 downto 0);  -- pole pairs
     theta_offset    : in  unsigned(TURN_W - 1 downto 0);  -- electrical angle at code zero
     k_speed         : in  unsigned(23 downto 0);  -- speed per turn and sample
     k_filter        : in  unsigned(16 downto 0);  -- filter weight of the new sample, 1 = no filter
     u_dc_offset     : in  unsigned(CODE_W - 1 downto 0);  -- code at zero bus voltage, left-aligned
     u_dc_gain       : in  signed(PU_W - 1 downto 0);  -- bus voltage per code
-    k_u_max         : in  unsigned(16 downto 0);  -- voltage circle over bus voltage
+    k_u_max         : in  unsigned(16 downto 0);  -- radius of the voltage circle / bus voltage
     speed_kp        : in  unsigned(KP_W - 1 downto 0);  -- proportional gain
     speed_ki        : in  unsigned(KI_W - 1 downto 0);  -- integral gain times sample time
     i_max           : in  signed(PU_W - 1 downto 0);  -- limit of the current reference
@@ -76,53 +77,53 @@ entity fluxproof is
     flux_ki         : in  unsigned(16 downto 0);  -- integral gain of the compensation times the sample time
     delta_max       : in  unsigned(15 downto 0);  -- limit of the compensation
     flux_mode       : in  unsigned(1 downto 0);  -- 0: eq. (6), 1: eq. (11), 2: eq. (16), 3: eq. (17)
-    k_chord         : in  unsigned(16 downto 0);  -- square of the sample time over 24, per unit
-    tcr             : in unsigned(23 downto 0);  -- resistance per kelvin
+    k_chord         : in  unsigned(16 downto 0);  -- (sample time)**2 / 24, per unit
+    tcr             : in unsigned(23 downto 0);  -- change of r_s per kelvin
     t_0             : in signed(15 downto 0);  -- temperature of r_s
-    t_min           : in signed(15 downto 0);  -- coldest reading that is believed
-    t_max           : in signed(15 downto 0);  -- hottest reading that is believed
+    t_min           : in signed(15 downto 0);  -- lowest valid temperature
+    t_max           : in signed(15 downto 0);  -- highest valid temperature
     k_lp            : in unsigned(19 downto 0);  -- weight of a new sample in the low-pass of Fig. 3
     eta_v           : in unsigned(20 downto 0);  -- step of the V_dead Adaline, 18*eta
     gamma           : in unsigned(16 downto 0);  -- proportional part of the compensation
-    zeta            : in unsigned(16 downto 0);  -- what the minimisation adds in a sample
-    v_thr           : in unsigned(SAMPLE_TIME_W - 1 downto 0);  -- no minimisation below this leg voltage
+    zeta            : in unsigned(16 downto 0);  -- gain of the minimisation per sample
+    v_thr           : in unsigned(SAMPLE_TIME_W - 1 downto 0);  -- no minimisation below this |v_dead|
     v_comp_max      : in unsigned(SAMPLE_TIME_W - 1 downto 0);  -- largest leg voltage that is compensated
-    i_learn         : in unsigned(PU_W - 2 downto 0);  -- nothing is learnt below this |i_d| + |i_q|
+    i_learn         : in unsigned(PU_W - 2 downto 0);  -- the V_dead Adaline is held below this |i_d| + |i_q|
     compensate      : in std_logic;  -- 1: compensate dead time and drops
     eta_psi         : in unsigned(16 downto 0);  -- step of the psi_m Adaline, 2*eta per unit
     omega_psi_min   : in unsigned(DUTY_W - 1 downto 0);  -- psi_m is held below this speed
-    k_ahead         : in unsigned(DUTY_W - 1 downto 0);  -- radians turned in 2.5 samples, per unit of speed
-    k_sign          : in unsigned(23 downto 0);  -- one over the current from which a direction is full
-    k_delay         : in  unsigned(16 downto 0);  -- turns per unit of speed
+    k_ahead         : in unsigned(DUTY_W - 1 downto 0);  -- angle of 2.5 sample times in radians, per unit of speed
+    k_sign          : in unsigned(23 downto 0);  -- 1 / (current above which a direction is +-1)
+    k_delay         : in  unsigned(16 downto 0);  -- angle of the delay in turns, per unit of speed
     min_pulse       : in  unsigned(11 downto 0);  -- shortest pulse of a leg, clocks
     dead_time       : in  unsigned(11 downto 0);  -- both gates of a leg off, clocks
     watchdog        : in  unsigned(19 downto 0);  -- longest time without a sample, clocks
     i_trip          : in  unsigned(LIMIT_W - 1 downto 0);  -- phase current that trips
     sum_trip        : in  unsigned(LIMIT_W - 1 downto 0);  -- sum of the phase currents that trips
-    rail_samples    : in  unsigned(3 downto 0);  -- samples at the rail that trip
+    rail_samples    : in  unsigned(3 downto 0);  -- consecutive samples at the rail that trip
     u_dc_min        : in  unsigned(LIMIT_W - 1 downto 0);  -- bus voltage below which it trips
     u_dc_max        : in  unsigned(LIMIT_W - 1 downto 0);  -- bus voltage that trips
-    jump_max        : in  unsigned(11 downto 0);  -- change of the turn a sample that trips
-    fault_ignore    : in  unsigned(6 downto 0);  -- bit x: fault x is told and does not trip
+    jump_max        : in  unsigned(11 downto 0);  -- deviation from the extrapolated position that trips, turns
+    fault_ignore    : in  unsigned(6 downto 0);  -- bit x: fault x is reported and does not trip
     gate_high       : out unsigned(2 downto 0);  -- upper gates, bit 0 is leg a
     gate_low        : out unsigned(2 downto 0);  -- lower gates, bit 0 is leg a
     sample_trigger  : out std_logic;  -- middle of the zero vector: take a sample
     running         : out std_logic;  -- gates are switching
-    tripped         : out std_logic;  -- a trip is remembered
+    tripped         : out std_logic;  -- 1: a trip is latched
     sample_busy     : out std_logic;  -- a sample is in flight: registers must not change
-    fault_flags     : out unsigned(8 downto 0);  -- what has happened, see fault_latch
-    first_fault     : out unsigned(7 downto 0);  -- which of them came first
-    early_samples   : out unsigned(7 downto 0);  -- samples that were not let in
-    setting_refused : out std_logic;  -- dead_time and min_pulse contradict each other
+    fault_flags     : out unsigned(8 downto 0);  -- faults since the last clear_trip, see fault_latch
+    first_fault     : out unsigned(7 downto 0);  -- faults that tripped first
+    early_samples   : out unsigned(7 downto 0);  -- samples rejected because they came too early
+    setting_refused : out std_logic;  -- 1: dead_time and min_pulse contradict each other, refused
     min_pulse_used  : out unsigned(11 downto 0);  -- minimum pulse in force
     carrier         : out unsigned(15 downto 0);  -- carrier, for observation
-    duty_valid      : out std_logic;  -- the duties of the sample are there
-    compare_valid   : out std_logic;  -- the compare values are there
-    values_valid    : out std_logic;  -- all of the sample's values below are there
+    duty_valid      : out std_logic;  -- 1: the duties of the sample are valid
+    compare_valid   : out std_logic;  -- 1: the compare values are valid
+    values_valid    : out std_logic;  -- 1: all of the sample's values below are valid
     i_a             : out signed(PU_W - 1 downto 0);  -- current, phase a
     i_b             : out signed(PU_W - 1 downto 0);  -- current, phase b
     i_c             : out signed(PU_W - 1 downto 0);  -- current, phase c
-    current_at_rail : out unsigned(2 downto 0);  -- bit x: code of phase x at its end
+    current_at_rail : out unsigned(2 downto 0);  -- bit x: ADC code of phase x at either end
     u_dc            : out unsigned(DUTY_W - 1 downto 0);  -- bus voltage
     u_max           : out unsigned(U_MAX_W - 1 downto 0);  -- radius of the voltage circle
     u_dc_at_rail    : out std_logic;  -- code at either end
@@ -132,20 +133,20 @@ entity fluxproof is
     i_d             : out signed(PU_W - 1 downto 0);  -- current, d axis
     i_q             : out signed(PU_W - 1 downto 0);  -- current, q axis
     i_q_ref         : out signed(PU_W - 1 downto 0);  -- current reference, q axis
-    speed_limited   : out std_logic;  -- output at its limit
+    speed_limited   : out std_logic;  -- 1: output at its limit
     lambda_d        : out signed(PU_W - 1 downto 0);  -- flux linkage, d axis
     lambda_q        : out signed(PU_W - 1 downto 0);  -- flux linkage, q axis
     omega_chord     : out signed(PU_W - 1 downto 0);  -- electrical speed along the chord of a sample
     u_dec_d         : out signed(PU_W - 1 downto 0);  -- rotational voltage, d axis
     u_dec_q         : out signed(PU_W - 1 downto 0);  -- rotational voltage, q axis
-    u_comp_d        : out signed(PU_W - 1 downto 0);  -- compensating voltage, d axis
-    u_comp_q        : out signed(PU_W - 1 downto 0);  -- compensating voltage, q axis
+    u_comp_d        : out signed(PU_W - 1 downto 0);  -- compensation voltage, d axis
+    u_comp_q        : out signed(PU_W - 1 downto 0);  -- compensation voltage, q axis
     u_int_d         : out signed(INTEGRAL_W - 1 downto 0);  -- its integral part, d axis
     u_int_q         : out signed(INTEGRAL_W - 1 downto 0);  -- its integral part, q axis
     u_d             : out signed(PU_W - 1 downto 0);  -- voltage, d axis
     u_q             : out signed(PU_W - 1 downto 0);  -- voltage, q axis
-    sat_d           : out signed(1 downto 0);  -- limit that holds the d axis
-    sat_q           : out signed(1 downto 0);  -- limit that holds the q axis
+    sat_d           : out signed(1 downto 0);  -- active limit, d axis: 1 upper, -1 lower, 0 none
+    sat_q           : out signed(1 downto 0);  -- active limit, q axis: 1 upper, -1 lower, 0 none
     u_alpha         : out signed(PU_W - 1 downto 0);  -- voltage, alpha
     u_beta          : out signed(PU_W - 1 downto 0);  -- voltage, beta
     duty_a          : out unsigned(DUTY_W - 1 downto 0);  -- duty, leg a
@@ -157,24 +158,24 @@ entity fluxproof is
     lambda_c_q      : out signed(FLUX_W - 1 downto 0);  -- flux linkage of the current model, q axis
     lambda_m_alpha  : out signed(FLUX_W - 1 downto 0);  -- merged flux before the sample's resistive drop, alpha
     lambda_m_beta   : out signed(FLUX_W - 1 downto 0);  -- merged flux before the sample's resistive drop, beta
-    merge_known     : out std_logic;  -- the flux will be good at the next sample
-    delta_lambda_d  : out signed(FLUX_W - 1 downto 0);  -- flux the estimate lacks, d axis
-    delta_lambda_q  : out signed(FLUX_W - 1 downto 0);  -- flux the estimate lacks, q axis
-    delta_held      : out std_logic;  -- 1: held, the integrals mean something else
+    merge_known     : out std_logic;  -- 1: the merged flux is valid at the next sample
+    delta_lambda_d  : out signed(FLUX_W - 1 downto 0);  -- flux linkage missing in the estimate, d axis
+    delta_lambda_q  : out signed(FLUX_W - 1 downto 0);  -- flux linkage missing in the estimate, q axis
+    delta_held      : out std_logic;  -- 1: held, as the integrals contain other voltages
     lambda_pi_d     : out signed(FLUX_W - 1 downto 0);  -- compensation, d axis
     lambda_pi_q     : out signed(FLUX_W - 1 downto 0);  -- compensation, q axis
     torque          : out signed(PU_W - 1 downto 0);  -- estimated torque
-    flux_faults     : out unsigned(6 downto 0);  -- what has disturbed the flux estimate, see flux_monitor
-    d_d             : out signed(PU_W - 1 downto 0);  -- direction function D_d over three
-    d_q             : out signed(PU_W - 1 downto 0);  -- direction function D_q over three
-    v_dead          : out signed(V_LEG_W - 1 downto 0);  -- leg voltage lost and not compensated
+    flux_faults     : out unsigned(6 downto 0);  -- conditions that disturbed the flux estimate, see flux_monitor
+    d_d             : out signed(PU_W - 1 downto 0);  -- direction function D_d / 3
+    d_q             : out signed(PU_W - 1 downto 0);  -- direction function D_q / 3
+    v_dead          : out signed(V_LEG_W - 1 downto 0);  -- leg voltage loss that is not compensated
     v_comp          : out signed(V_LEG_W - 1 downto 0);  -- leg voltage that is compensated
     v_comp_limited  : out std_logic;  -- the compensation reached its limit
     psi_m           : out signed(PU_W - 1 downto 0);  -- flux linkage of the magnets
     psi_held        : out std_logic;  -- 1: psi_m is held
-    temp_lost       : out std_logic;  -- 1: no believable temperature, r is r_s
-    sample_faults   : out unsigned(5 downto 0);  -- what is wrong with this sample, see sample_checks
-    sample_trip     : out std_logic;  -- any of them trips
+    temp_lost       : out std_logic;  -- 1: no valid temperature, r = r_s
+    sample_faults   : out unsigned(5 downto 0);  -- faults of this sample, see sample_checks
+    sample_trip     : out std_logic;  -- 1: at least one of them trips
     compare_a       : out unsigned(15 downto 0);  -- compare value, leg a
     compare_b       : out unsigned(15 downto 0);  -- compare value, leg b
     compare_c       : out unsigned(15 downto 0)  -- compare value, leg c
@@ -1019,7 +1020,7 @@ begin
       gate_clear    => gate_clear
     );
 
-  -- A bad sample need not wait for the fault memory; without enable the gates are off, and nothing is remembered.
+  -- A faulty sample trips without waiting for the fault latch; without enable the gates are off and nothing is latched.
   gate_trip <= trip or fault_stop or (sample_trip and enable);
 
   gates : entity work.gate_generation

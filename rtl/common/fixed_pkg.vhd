@@ -1,6 +1,6 @@
 -- Purpose: the two narrowing operations of the core, twin of golden_model/fixed.py.
 -- Rounding: half up (add half an output LSB, then floor).  Overflow: saturation.
--- A floor is written as a plain shift_right, a modulo as a slice, and both are named where they stand.
+-- A block that floors uses shift_right or a slice, a block that computes modulo a slice; its comments say so.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -8,20 +8,20 @@ use ieee.numeric_std.all;
 
 package fixed_pkg is
 
-  -- x / 2**drop, halves towards plus infinity; one bit wider than x cut by drop, so it cannot overflow.
+  -- x / 2**drop, rounded half up.  The result is one bit wider than the bits kept, so it cannot overflow.
   function round_half_up (x : signed; drop : natural) return signed;
 
-  -- Half an LSB of what stays when drop bits go: added to a product in the multiplier's own adder, it makes the
-  -- cut a rounding half up.  A product of two signed numbers has room for it.
+  -- Half an LSB of the result when drop bits are cut.  Added to a product in the adder of the multiplier, it turns
+  -- the cut into a rounding half up.  A product of two signed numbers has headroom for it.
   function half (drop : positive; width : positive) return signed;
 
   -- x limited to the range of a signed number of width bits.
   function saturate (x : signed; width : positive) return signed;
 
-  -- '1' where saturating x to width signed bits changes it.
+  -- '1' if saturating x to width signed bits changes it.
   function exceeds (x : signed; width : positive) return std_logic;
 
-  -- saturate in the clock after: x limited to width signed bits, past telling whether it exceeds them.
+  -- saturate in two clocks: x limited to width signed bits; past = '1' means that x exceeds them.
   function narrowed (x : signed; past : std_logic; width : positive) return signed;
 
   -- x limited to the range of an unsigned number of width bits.
@@ -33,21 +33,21 @@ package fixed_pkg is
   -- x limited to [lo, hi]; lo and hi must fit the width of x.
   function clamp (x : signed; lo : signed; hi : signed) return signed;
 
-  -- a + 1 where carry = '1', which a must have room for: by the carry of one sum, from the bit below.
+  -- a + 1 if carry = '1', with one sum whose carry comes from the bit below; the result must fit the width of a.
   function plus_carry (a : signed; carry : std_logic) return signed;
 
-  -- a + round_half_up(v, drop) by one carry; as wide as a, which must have room for the sum.
+  -- a + round_half_up(v, drop) with one carry chain; the sum must fit the width of a.
   function plus_rounded (a : signed; v : signed; drop : positive) return signed;
 
-  -- a - round_half_up(v, drop) by one carry; as wide as a, which must have room for the difference.
+  -- a - round_half_up(v, drop) with one carry chain; the difference must fit the width of a.
   function minus_rounded (a : signed; v : signed; drop : positive) return signed;
 
-  -- a at the scale of a product that drops bits, with the half that rounds it, for the adder behind a multiplier:
-  -- (rounding_base(a, drop, width) + v) / 2**drop = a + round_half_up(v, drop), floored by a slice.  With the
-  -- complement of a the complement of a - round_half_up(v, drop) comes out: that adder only adds.
+  -- a at the scale of a product that is cut by drop bits, plus the half that rounds it, for the adder of a multiplier:
+  -- (rounding_base(a, drop, width) + v) / 2**drop = a + round_half_up(v, drop); a slice floors it.
+  -- With not a instead of a the result is not (a - round_half_up(v, drop)), because that adder can only add.
   function rounding_base (a : signed; drop : positive; width : positive) return signed;
 
-  -- '1' where x > limit*2**shift or x < -limit*2**shift, by one comparison; the sign of x tells which.
+  -- '1' if x > limit*2**shift or x < -limit*2**shift, with one comparison; the sign of x selects the side.
   function beyond (x : signed; limit : unsigned; shift : positive) return std_logic;
 
 end package fixed_pkg;
@@ -89,7 +89,7 @@ package body fixed_pkg is
     if width >= x'length then
       return '0';
     end if;
-    -- In range when every bit above the result's sign repeats it.
+    -- In range if all bits above the sign of the result are equal to it.
     return or (v(v'high downto width) xor v(v'high - 1 downto width - 1));
   end function;
 
@@ -147,7 +147,7 @@ package body fixed_pkg is
   function plus_rounded (a : signed; v : signed; drop : positive) return signed is
     variable sum : signed(a'length downto 0);
   begin
-    -- Bits below the half, which stands under a, cannot reach it.
+    -- The lowest bit of the sum is half an LSB of a; bits of v below it cannot affect the result.
     sum := (a & '1') + resize(v(v'high downto drop - 1), a'length + 1);
     return sum(a'length downto 1);
   end function;
@@ -155,7 +155,7 @@ package body fixed_pkg is
   function minus_rounded (a : signed; v : signed; drop : positive) return signed is
     variable difference : signed(a'length downto 0);
   begin
-    -- What is rounded up is subtracted, so the floor needs no half.
+    -- Subtracting the rounded value needs no added half: the floor of the difference does it.
     difference := (a & '0') - resize(v(v'high downto drop - 1), a'length + 1);
     return difference(a'length downto 1);
   end function;
@@ -174,9 +174,9 @@ package body fixed_pkg is
     variable more  : unsigned(PARTS - 1 downto 0);
     variable room  : signed(maximum(size'length, limit'length) + PARTS downto 0);
   begin
-    -- The complement of a negative x is one less than -x: so where it reaches the limit, -x is past it.
+    -- The complement of a negative x is -x - 1: if it reaches the limit, -x is above the limit.
     size := unsigned(v(v'high - 1 downto shift) xor v(v'high));
-    -- What is below the limit's LSB, in parts that the carry of the comparison joins.
+    -- The bits below the LSB of the limit, ORed in groups of four; the comparison's carry chain combines the groups.
     for k in more'range loop
       more(k) := or v(minimum(4 * k + 3, shift - 1) downto 4 * k);
     end loop;

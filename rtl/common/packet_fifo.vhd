@@ -1,9 +1,10 @@
--- Purpose: a queue of words in block RAM for an AXI4-Stream: takes a word a clock, gives one when the sink is ready.
--- room says whether a whole packet of PACKET words fits: who asks before the first word never has to wait nor to
--- break off.  A word that finds the queue full is ignored.  out_data and out_last stay until out_ready.
--- Formats: as they come.  The RAM holds 2**DEPTH_BITS words, its own and the output register one more each: a RAM's
--- output is slow, and what leaves the core starts at a register.
--- Latency: a word is shown three clocks after it came where the queue was empty.  Rounding: none.
+-- Purpose: a FIFO in block RAM for an AXI4-Stream: accepts one word per clock, outputs one when the sink is ready.
+-- room = 1: the FIFO has space for a whole packet of PACKET words.  A writer that checks it before the first word
+-- never waits and never breaks off a packet.  A word written to a full FIFO is ignored.  out_data and out_last
+-- stay until out_ready.
+-- Formats: unchanged.  The RAM holds 2**DEPTH_BITS words, its read register and the output register one more each:
+-- a RAM's output is slow, and every output of the core comes from a register.
+-- Latency: a word appears three clocks after it was written to an empty FIFO.  Rounding: none.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -36,14 +37,14 @@ architecture rtl of packet_fifo is
 
   signal ram : ram_t;
 
-  -- yosys: no word is read in the clock that writes it, so nothing need be built for that case
+  -- yosys: a word is never read in the clock that writes it, so no bypass logic is needed
   attribute no_rw_check : boolean;
   attribute no_rw_check of ram : signal is true;
 
   -- State
   signal used       : unsigned(DEPTH_BITS downto 0);  -- words in the RAM
-  signal some       : std_logic;  -- used /= 0; a register, as all that leaves the RAM hangs on it
-  signal fits       : std_logic;  -- used <= DEPTH - PACKET, likewise
+  signal some       : std_logic;  -- used /= 0; registered, because the RAM's whole output path depends on it
+  signal fits       : std_logic;  -- used <= DEPTH - PACKET; registered for the same reason
   signal write_at   : unsigned(DEPTH_BITS - 1 downto 0);
   signal read_at    : unsigned(DEPTH_BITS - 1 downto 0);
   signal read_valid : std_logic;
@@ -62,7 +63,7 @@ begin
   process (clk)
   begin
     if rising_edge(clk) then
-      -- The RAM's write port and, with its own register, its read port; never the same word in the same clock
+      -- The RAM's write port, and its read port with its own register; never the same word in the same clock
       if take = '1' then
         ram(to_integer(write_at)) <= in_last & in_data;
         write_at                  <= write_at + 1;
@@ -79,7 +80,7 @@ begin
       end if;
       shown <= move or (shown and not out_ready);
 
-      -- One more or, all ones, one less
+      -- +1, or -1 as all ones
       if take /= fetch then
         used <= used + unsigned(signed'(DEPTH_BITS - 1 downto 0 => fetch) & '1');
       end if;

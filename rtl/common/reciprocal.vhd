@@ -1,10 +1,9 @@
--- Purpose: 1/x as m * 2**n, the division that no data path contains.
+-- Purpose: 1/x as m * 2**n, one quotient bit per clock, outside the data path.
 --   1/x = m * 2**n * 2**-17, m in (2**16, 2**17), n in 0..N_MAX
--- Method: x is brought to [1, 2) by n shifts, by fours, then by the rest; its reciprocal is made one quotient bit a
--- clock.
+-- Method: n shifts bring x into [1, 2), first by multiples of four, then by the remainder; m is the quotient.
 -- Formats: x U(1,16); m U(0,17).  Latency: 21.  Interval: 21.
 -- Rounding: quotient half up; 2**17 is stored as 2**17 - 1.  Relative error of m <= 2**-17.
--- Below 2**-N_MAX x is taken for 2**-N_MAX and low is raised.
+-- An x below 2**-N_MAX is replaced by 2**-N_MAX and low is 1.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -38,7 +37,7 @@ architecture rtl of reciprocal is
   signal fours_1   : natural range 0 to FOURS;
   signal shifted_1 : unsigned(U_DC_W - 1 downto 0);
   signal shifted_0 : unsigned(U_DC_W - 1 downto 0);
-  signal low_0     : std_logic_vector(1 downto 0);  -- below the least number, by halves
+  signal low_0     : std_logic_vector(1 downto 0);  -- x < 2**-N_MAX, one bit for each half of its bits
   signal low_1     : std_logic_vector(1 downto 0);
   signal low_2     : std_logic;
   signal mantissa  : unsigned(U_DC_W - 1 downto 0);
@@ -48,10 +47,10 @@ architecture rtl of reciprocal is
   signal rest      : unsigned(U_DC_W downto 0);
   signal quotient  : unsigned(BITS - 1 downto 0);
   signal dividing  : std_logic;
-  signal whole     : std_logic;  -- the mantissa is one: m would be 2**17
+  signal whole     : std_logic;  -- the mantissa is 1, so m would be 2**17
   signal one       : std_logic;
 
-  -- Groups of so many bits, at most so many, that are zero at the top.
+  -- Number of leading groups of group_w zero bits, at most most.
   function leading_zeros (v : unsigned; group_w : positive; most : natural) return natural is
     alias u : unsigned(v'length - 1 downto 0) is v;
   begin
@@ -72,7 +71,7 @@ begin
   trial <= remainder & '0';
   rest  <= trial - mantissa;
 
-  -- The first group with a one chooses, without waiting for the number of zeros.
+  -- The first group that contains a one selects the shift directly, without encoding the number of zeros first.
   process (all)
   begin
     shifted_0 <= shift_left(x, 4 * FOURS);
@@ -89,12 +88,12 @@ begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stage 1: shifted = x * 2**(4*fours); x stays, so no enable has to wait for the shift
+      -- Stage 1: shifted = x * 2**(4*fours); x is constant during the interval, so no enable is needed
       low_1     <= low_0;
       fours_1   <= fours_0;
       shifted_1 <= shifted_0;
 
-      -- Stage 2: mantissa = x * 2**shift, in [1, 2); the least x gives one
+      -- Stage 2: mantissa = x * 2**shift, in [1, 2); 1 for an x below the range
       if valid(1) = '1' then
         low_2    <= and low_1;
         shift    <= N_MAX;
@@ -105,7 +104,7 @@ begin
         end if;
       end if;
 
-      -- Stages 3 to 20: one bit of quotient = 2**34 / mantissa
+      -- Stages 3 to 20: one bit per clock of quotient = 2**34 / mantissa
       one <= whole;
       if valid(0) = '1' then
         dividing <= '1';

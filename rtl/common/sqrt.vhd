@@ -1,7 +1,8 @@
 -- Purpose: square root by table and chord, never above the true root.
 --   x = mantissa * 4**-shift, mantissa in [1/4, 1);  root = (BASE + SLOPE*rest) * 2**-shift
 -- Formats: x U(0,32); mantissa cut to 20 bits, 8 of address and 12 of rest; base, slope U(0,18); root U(0,16).
--- Both stand in one word of a block RAM, doubled where shift is even: what is left to shift is odd.
+-- Base and slope share one word of a block RAM.  The table contains both doubled as well, for an even shift, so that
+-- the shift behind it is always odd.
 -- Latency: 5.  Rounding: every step floors, so the result errs downwards only; no saturation is reachable.
 
 library ieee;
@@ -48,7 +49,7 @@ architecture rtl of sqrt is
   signal root_5     : unsigned(U_MAX_W - 1 downto 0);
   signal shift_5    : std_logic;
 
-  -- How many pairs of zeros a byte begins with, 3 where it is empty.
+  -- The number of leading pairs of zeros of a byte, 3 if the byte is zero.
   function zero_pairs (byte : unsigned) return unsigned is
     alias b : unsigned(7 downto 0) is byte;
   begin
@@ -69,8 +70,8 @@ begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stage 1: 16 zeros shifted out where it begins with them;  is the first byte left empty, the zero pairs of it
-      -- and of the next
+      -- Stage 1: shift by 16 if the upper half is zero;  then whether the first byte is zero, and the leading zero
+      -- pairs of this byte and of the next
       if valid(0) = '1' then
         x_1     <= x;
         small_1 <= small_0;
@@ -92,7 +93,7 @@ begin
         shift_2 <= small_1 & byte_1 & pairs_1(1);
       end if;
 
-      -- Stage 3: base, slope wait, for a block RAM's output comes late in its clock
+      -- Stage 3: a register for base and slope, because a block RAM's output arrives late in its clock
       if valid(2) = '1' then
         base_3  <= chord_2(chord_2'high downto SQRT_SLOPE_BITS);
         slope_3 <= chord_2(SQRT_SLOPE_BITS - 1 downto 0);
@@ -107,7 +108,7 @@ begin
         shift_4 <= shift_3;
       end if;
 
-      -- Stage 5: root = fine * 2**-shift, floored: fine = base + prod, shifted by whole nibbles, here
+      -- Stage 5: root = fine * 2**-shift, floored, with fine = base + prod; here the shift by multiples of four bits
       if valid(4) = '1' then
         root_5  <= resize(shift_right(unsigned(fine_4(fine_4'high - 1 downto SQRT_REST_BITS + SQRT_DROP_OUT + 1)),
                                       to_integer(shift_4(2 downto 1) & "00")), U_MAX_W);
@@ -120,7 +121,7 @@ begin
     end if;
   end process;
 
-  -- The rest of the shift, behind the register
+  -- The rest of the shift, after the register
   root      <= shift_right(root_5, 2) when shift_5 = '1' else root_5;
   out_valid <= valid(LATENCY);
 

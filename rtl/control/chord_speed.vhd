@@ -1,4 +1,4 @@
--- Purpose: the speed at which a flux seems to turn when its voltage stands still for a sample.
+-- Purpose: the speed that belongs to the chord of the flux, because the voltage vector is constant during a sample.
 --   omega_chord = omega_me - k_chord*omega_me**3
 -- Three products one after the other, through one multiplier.
 -- Formats: PU in and out; omega_me**2 U(3,14), k_chord U(-6,23), their product U(-3,20).
@@ -68,7 +68,7 @@ begin
         part_6 <= resize(round_half_up(prod, CHORD_SPEED_DROP_PART), PU_W);
       end if;
 
-      -- Stage 8: omega_me once more, from the factor beside the multiplier: the speed itself may stand far away
+      -- Stage 8: a local copy of omega_me from the multiplier's operand register, because the source may be far away
       if valid(7) = '1' then
         omega_8 <= mul_b;
       end if;

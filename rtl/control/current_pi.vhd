@@ -1,13 +1,13 @@
 -- Purpose: current regulators of both axes, d first, through one pair of multipliers.
 --   err = i_ref - i;  u_pi = kp*err + int
 --   int += ki*err unless the voltage was at its limit and err pushes further
--- sat_d, sat_q (-1, 0, +1): the limit that held the axis in the sample before.  run = 0: all zero.
+-- sat_d, sat_q (-1, 0, +1): the limits that were active in the previous sample.  run = 0: all zero.
 -- Formats: err PU, proportional part 28 fraction bits, integral S(1,28), output PU.
--- Latency: 8 (d, q follow each other: i_q and i_q_ref are needed a clock after i_d, u_pi_d comes with out_soon).
+-- Latency: 8 (d, then q: i_q and i_q_ref are needed a clock after i_d, u_pi_d is valid with out_soon).
 -- Interval: 3.
--- Rounding: half up.  err, integral and output saturate at 2 per unit, twice what the limiter grants; the
--- proportional part needs no limit of its own, as what it asks for beyond 2 is cut anyway, and the increment none,
--- as ki < 1.
+-- Rounding: half up.  err, integral and output saturate at 2 per unit, twice the limiter's voltage.  The
+-- proportional part needs no limit of its own, because the output saturates anyway; nor does the increment, as
+-- ki < 1.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -44,7 +44,7 @@ architecture rtl of current_pi is
   constant LATENCY : positive := CURRENT_PI_LATENCY;
   constant SUM_W   : positive := PU_W + KP_W + 2;
 
-  -- State: the integrals of both axes take turns; before the d axis' beat integral_5 is that of q
+  -- State: the two integrals share this register alternately; while the d axis is processed, integral_5 is that of q
   signal integral_3 : signed(INTEGRAL_W - 1 downto 0);
   signal integral_5 : signed(INTEGRAL_W - 1 downto 0);
 
@@ -76,7 +76,7 @@ architecture rtl of current_pi is
 begin
   valid(0) <= in_valid;
 
-  -- The axis of the beat: d while in_valid, then q.
+  -- The axis of this clock: d while in_valid, then q.
   i_0     <= i_q when valid(1) = '1' else i_d;
   i_ref_0 <= i_q_ref when valid(1) = '1' else i_d_ref;
 
@@ -102,7 +102,7 @@ begin
         end if;
       end if;
 
-      -- Stage 2: err = diff, limited
+      -- Stage 2: err = diff, saturated
       if valid(1) = '1' or valid(2) = '1' then
         err_2  <= saturate(diff_1, PU_W);
         ki_2   <= ki_1;
@@ -118,7 +118,7 @@ begin
         run_3    <= run_2;
       end if;
 
-      -- Stage 4: int + prod_i, with half an LSB to round with;  kp, or zero while not running, as the integral then is
+      -- Stage 4: int + prod_i plus half an LSB for the rounding;  kp, or zero while not running
       if valid(3) = '1' or valid(4) = '1' then
         sum_i_4 <= prod_i_3 + (integral_3 & half(CURRENT_PI_DROP_I, CURRENT_PI_DROP_I));
         hold_4  <= hold_3;
@@ -133,7 +133,7 @@ begin
         end if;
       end if;
 
-      -- Stage 5: int, narrowed, or the old one where held;  prod_p = kp*err;  half an LSB of the output to round with
+      -- Stage 5: int, narrowed, or the old one while held;  prod_p = kp*err;  int plus half an LSB of the output
       if valid(4) = '1' or valid(5) = '1' then
         integral := old_4;
         if hold_4 = '0' then
@@ -144,8 +144,8 @@ begin
         prod_p_5   <= err_4 * signed('0' & kp_4);
       end if;
 
-      -- The turn of the integrals: to that of q once the d axis has taken its own, and back for the next sample;
-      -- both start from zero while not running
+      -- The integral register switches to q after the d axis has been read, and back for the next sample; both start
+      -- from zero while not running
       if valid(3) = '1' or valid(5) = '1' then
         integral_3 <= integral_5;
       end if;

@@ -1,7 +1,7 @@
--- Purpose: what is added against dead time and device drops, stator frame, paper 000 section V.B; alpha, then beta.
+-- Purpose: compensation voltage for dead time and device drops, stator frame, paper 000 section V.B; alpha, then beta.
 --   u_comp_alpha = v_comp*s_alpha;  u_comp_beta = v_comp*s_beta
 -- Formats: v_comp V_LEG, the rest PU; products exact.
--- Latency: 4 (alpha, beta follow each other).  Interval: 4.
+-- Latency: 4 (alpha, then beta).  Interval: 4.
 -- Rounding: half up.  No saturation: |s| <= 4/3 and v_comp < 1/2.
 
 library ieee;

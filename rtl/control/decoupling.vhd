@@ -1,8 +1,8 @@
--- Purpose: rotational voltages, the last term of paper 001 eq. (2).
+-- Purpose: rotational voltages, the last term of paper 001 eq. (2), added to the current regulators' outputs.
 --   u_dec_d = -omega_chord*lambda_q;  u_dec_q = omega_chord*lambda_d
 -- Formats: PU in and out; products exact.
--- Latency: 2.  Rounding: half up, saturated at 2 per unit, twice the largest voltage that the limiter grants.
--- -v is not v and a carry, so that -v rounded half up is not (v - half - 1) floored, and -half - 1 is not half.
+-- Latency: 2.  Rounding: half up, saturated at 2 per unit, twice the largest voltage of the limiter.
+-- -v rounded half up is the floor of not (v - half - 1), because -v = not v + 1; the constant -half - 1 is not half.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -35,7 +35,7 @@ architecture rtl of decoupling is
 begin
   valid(0) <= in_valid;
 
-  -- Half an LSB to round with
+  -- Half an LSB for the rounding
   sum_d_1 <= prod_d_1 + not half(DECOUPLING_DROP, 2 * PU_W);
   sum_q_1 <= prod_q_1 + half(DECOUPLING_DROP, 2 * PU_W);
 

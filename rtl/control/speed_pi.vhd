@@ -3,11 +3,11 @@
 --   integral += speed_ki*err unless u is beyond the limit and err pushes further
 -- Torque mode (speed_mode = 0): i_q_ref is i_q_ext, limited, and the integral follows it.
 -- run = 0: output and integral are zero.
--- Two beats through one comparison with i_max: what is asked for, then the integral.  |v| = (v xor s) + s, s its sign.
+-- One comparison with i_max serves the reference first, then the integral.  |v| = (v xor s) + s, s its sign.
 -- Formats: err PU, proportional part 28 fraction bits, integral S(1,28), output PU.
--- Latency: 7; the integral follows a clock later.  Interval: 7.
--- Rounding: half up; err saturates; the proportional part needs no limit of its own, as what it asks for beyond i_max
--- is cut anyway, and the increment none, as speed_ki < 1; the integral is kept within +-i_max.
+-- Latency: 7; the integral is updated one clock later.  Interval: 7.
+-- Rounding: half up; err saturates.  The proportional part needs no limit of its own, because i_q_ref is limited to
+-- i_max anyway; nor does the increment, as speed_ki < 1; the integral is kept within +-i_max.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -72,15 +72,15 @@ begin
   total_4 <= sum_p_4(SUM_W - 1 downto SUM_W - TOTAL_W);
   moved_4 <= sum_i_4(SPEED_PI_DROP_I + INTEGRAL_W downto SPEED_PI_DROP_I);
 
-  -- The beat's value in PU, one bit more where it may be beyond: the current asked for, then the integral; far: bits
-  -- above those say that the current is beyond any limit, and only its sign counts
+  -- The value to be limited, in PU with one more bit: the current reference, then the integral.  far: the bits above
+  -- show that the reference is beyond any limit, so that only its sign matters
   v_4   <= resize(i_q_ext, PU_W + 1) when speed_mode = '0' else
            moved_4(INTEGRAL_W downto PU_TO_INTEGRAL) when valid(5) = '1' else
            total_4(TOTAL_W - 1) & total_4(PU_W - 1 downto 0);
   far_4 <= exceeds(total_4, PU_W + 1) and speed_mode and not valid(5);
 
-  -- room = i_max - |v|, less one for an integral above zero, whose bits below v count too; nothing of v where it is far
-  -- beyond but a one that makes it so, nothing at all while not running
+  -- room = i_max - |v|, minus one for a positive integral, whose bits below v count too.  If v is far beyond, it is
+  -- replaced by a constant that makes room negative; while not running by zero
   process (all)
     variable minus : signed(PU_W downto 0);
     variable carry : std_logic;
@@ -117,14 +117,14 @@ begin
         diff_1 <= resize(omega_ref, PU_W + 1) - resize(omega_me, PU_W + 1);
       end if;
 
-      -- Stage 2: err = diff, limited;  gains come from afar
+      -- Stage 2: err = diff, saturated;  local copies of the gains, whose registers are far away
       kp_2 <= speed_kp;
       ki_2 <= speed_ki;
       if valid(1) = '1' then
         err_2 <= saturate(diff_1, PU_W);
       end if;
 
-      -- Stage 3: prod_p = speed_kp*err, prod_i = speed_ki*err;  the integral and half an LSB of the output
+      -- Stage 3: prod_p = speed_kp*err, prod_i = speed_ki*err;  the integral plus half an LSB of the output
       if valid(2) = '1' then
         prod_p_3   <= err_2 * signed('0' & kp_2);
         prod_i_3   <= err_2 * signed('0' & ki_2);
@@ -133,19 +133,19 @@ begin
         falls_3    <= err_2(err_2'high);
       end if;
 
-      -- Stage 4: total = proportional + integral;  moved = integral + increment;  both with half an LSB to round with
+      -- Stage 4: total = proportional + integral;  moved = integral + increment;  each plus half an LSB to round
       if valid(3) = '1' then
         sum_p_4 <= resize(prod_p_3, SUM_W) + (integral_3 & half(SPEED_PI_DROP_P, SPEED_PI_DROP_P));
         sum_i_4 <= prod_i_3 + (integral & half(SPEED_PI_DROP_I, SPEED_PI_DROP_I));
       end if;
 
-      -- Stages 5, 6: what is asked for, then the integral
+      -- Stages 5, 6: the current reference, then the integral
       if valid(4) = '1' or valid(5) = '1' then
         v_5   <= v_4;
         far_5 <= far_4;
       end if;
 
-      -- Stages 6, 7: v against i_max
+      -- Stages 6, 7: comparison of v with i_max
       if valid(5) = '1' or valid(6) = '1' then
         v_6      <= v_5 and (v_5'range => run);
         beyond_6 <= room_5(room_5'high);

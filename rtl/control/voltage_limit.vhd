@@ -2,16 +2,16 @@
 --   limit = min(u_max, room),  u_d = limit(u_pi_d + u_dec_d + u_comp_d, +-limit)
 --   u_q = limit(u_pi_q + u_dec_q + u_comp_q, +-sqrt(u_max**2 - u_d**2))
 --   room = sqrt(u_max**2 - min(|u_dec_q|, u_max)**2), for the next sample
---   sat = -1, 0, +1: the limit that holds the axis
--- Room: d comes first in what the EMF of the last sample leaves, so that the q axis can always hold its EMF;
--- without it the drive has a second stable point at high speed, see the model.
+--   sat = -1, 0, +1: the active limit of the axis
+-- Room: the d axis has priority, but only within the voltage that remains beside the EMF of the last sample, so that
+-- the q axis can always balance its EMF.  Without it the drive has a second stable point at high speed, see the model.
 -- Formats: sums exact; radicands (u_max - u)*(u_max + u) exact, U(0,32); PU out.
--- Latency: 11; u_d is there with out_soon.  Interval: 12 (room is ready one clock after the output).
+-- Latency: 11; u_d is valid with out_soon.  Interval: 12 (room is ready one clock after the output).
 -- The q axis' inputs are needed a clock after the d axis'.
--- One adder, one comparison, one multiplier and one root: sum_d against limit, the EMF against u_max, and sum_q, which
--- grows out of the EMF in two more beats and waits for its limit, the root.
--- Signs are taken off by inversion: |v| = (v xor s) + s, s the sign.
--- Rounding: none but the root's, which errs inwards: the circle is never left.
+-- One adder, one comparison, one multiplier and one root are shared: they process sum_d against limit, the EMF against
+-- u_max, then sum_q, which is the EMF plus two more terms and waits for the root, its limit.
+-- Absolute values by inversion: |v| = (v xor s) + s, s the sign.
+-- Rounding: that of the root only, which is never above the true one: the circle is never left.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -54,12 +54,12 @@ architecture rtl of voltage_limit is
   signal next_0     : signed(SUM_W - 1 downto 0);
   signal v_1        : signed(SUM_W - 1 downto 0);
   signal limit_1    : unsigned(U_MAX_W - 1 downto 0);
-  signal bound_1    : unsigned(U_MAX_W - 1 downto 0);  -- limit_1; at clocks 9 and 10 the root
+  signal bound_1    : unsigned(U_MAX_W - 1 downto 0);  -- limit_1; the root at clocks 9 and 10
   signal v_2        : signed(SUM_W - 1 downto 0);
   signal limit_2    : unsigned(U_MAX_W - 1 downto 0);
   signal beyond_2   : std_logic;
   signal limited_2  : signed(PU_W - 1 downto 0);
-  signal side_2     : signed(1 downto 0);  -- -1, 0, +1: the limit that holds v
+  signal side_2     : signed(1 downto 0);  -- -1, 0, +1: the active limit
   signal part_2     : unsigned(U_MAX_W - 1 downto 0);
   signal carry_2    : std_logic;
   signal lo_3       : unsigned(PART_W - 1 downto 0);
@@ -68,7 +68,7 @@ architecture rtl of voltage_limit is
   signal root_start : std_logic;
   signal root_9     : unsigned(U_MAX_W - 1 downto 0);
 
-  -- '1' where |v| > limit: limit - |v| is below zero.
+  -- '1' if |v| > limit: limit - |v| is negative.
   function beyond (v : signed; limit : unsigned) return std_logic is
     constant MINUS : signed(v'length - 1 downto 0) := (others => not v(v'high));
     variable rest  : signed(v'length downto 0);
@@ -91,8 +91,8 @@ begin
 
   root_start <= valid(4) or valid(5);
 
-  -- The beat's voltages: the three of the d axis while in_valid, as sums and carries of their bits, then the EMF alone,
-  -- then the rest of the q axis
+  -- The terms of this clock: all three of the d axis while in_valid, as carry-save sum and carry, then the EMF, then
+  -- the other two of the q axis
   with beat select so_far_0 <=
     resize(u_pi_d xor u_dec_d xor u_comp_d, SUM_W) when "00",
     (others => '0') when "01",
@@ -122,7 +122,7 @@ begin
 
   side_2 <= (v_2(v_2'high) and beyond_2) & beyond_2;
 
-  -- |v| or, beyond it, the limit, but for a carry where |v| is that of a negative number
+  -- |v|, or the limit if v is beyond it; for a negative v the complement, with carry_2 as the missing one
   part_2  <= limit_2 when beyond_2 = '1' else
              unsigned(v_2(U_MAX_W - 1 downto 0)) xor (U_MAX_W - 1 downto 0 => v_2(v_2'high));
   carry_2 <= v_2(v_2'high) and not beyond_2;
@@ -145,7 +145,7 @@ begin
         end if;
       end if;
 
-      -- Stages 2, 3, 10: is it beyond its limit, and 11, where limit is the root that room becomes
+      -- Stages 2, 3, 10: comparison of |v| with its limit; stage 11: limit is the root that becomes room
       if valid(1) = '1' or valid(2) = '1' or valid(9) = '1' or valid(10) = '1' then
         v_2      <= v_1;
         limit_2  <= bound_1;

@@ -1,11 +1,11 @@
--- Purpose: the voltage that the inverter is asked for in the coming period, stator frame; alpha first, then beta.
+-- Purpose: the voltage commanded to the inverter for the coming period, in the stator frame; alpha first, then beta.
 --   u_applied_alpha = (2*compare_a - compare_b - compare_c) * u_dc/CARRIER_HALF * 1/3
 --   u_applied_beta  = (compare_b - compare_c)               * u_dc/CARRIER_HALF * 1/sqrt(3)
 -- voltage_known = 0: the gates are off, or the bus reading is at its end or below 1/32 per unit.
--- Formats: compare values in clocks; u_dc*2**SHIFT/CARRIER_HALF U(2,22), with SHIFT so that the constant is in
+-- Formats: compare values in clocks; u_dc*2**SHIFT/CARRIER_HALF U(2,22), with SHIFT such that the constant is in
 -- [1, 2); out FLUX.
--- Latency: 11 (alpha, beta follow each other).  Interval: 11.
--- Rounding: half up after each product.  Saturated, which no compare value up to CARRIER_HALF needs.
+-- Latency: 11 (alpha, then beta).  Interval: 11.
+-- Rounding: half up after each product.  Saturated; compare values up to CARRIER_HALF do not reach the limit.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -52,7 +52,7 @@ architecture rtl of applied_voltage is
   constant SHIFT   : positive := carrier_shift;
   constant SUM_W   : positive := 18;
 
-  -- 2**SHIFT/CARRIER_HALF, half up: divided bit by bit, because 2**(K_FRAC + SHIFT) may not be an integer's value.
+  -- 2**SHIFT/CARRIER_HALF, half up; divided bit by bit, because 2**(K_FRAC + SHIFT) may exceed an integer.
   function carrier_constant return natural is
     variable remainder : natural := 2 ** SHIFT;
     variable quotient  : natural := 0;
@@ -73,7 +73,7 @@ architecture rtl of applied_voltage is
 
   constant K_CARRIER : signed(17 downto 0) := to_signed(carrier_constant, 18);
 
-  -- What rounds each product, in the adder behind its multiplier
+  -- Half an LSB for each product, added in the adder behind its multiplier
   constant PROD_1_W   : positive                      := U_DC_W + K_CARRIER'length + 1;
   constant PROD_8_W   : positive                      := SCALE_W + SUM_W + 1;
   constant HALF_SCALE : signed(PROD_1_W - 1 downto 0) := half(APPLIED_VOLTAGE_DROP_SCALE, PROD_1_W);
@@ -96,7 +96,7 @@ architecture rtl of applied_voltage is
   signal sum_9    : signed(PROD_8_W - 1 downto 0);
   signal u_9      : signed(FLUX_W - 1 downto 0);
 
-  -- A compare value where differences of compare values are formed.
+  -- A compare value, widened for the differences of compare values.
   function wide (compare : unsigned) return signed is
   begin
     return signed(resize(compare, SUM_W));
@@ -104,10 +104,10 @@ architecture rtl of applied_voltage is
 begin
   valid(0) <= in_valid;
 
-  -- u_dc and the constant are below 2, so it fits.
+  -- u_dc and the constant are below 2, so the product fits.
   scale_2 <= resize(sum_2(sum_2'high downto APPLIED_VOLTAGE_DROP_SCALE), SCALE_W + 1);
 
-  -- The axis of the beat: alpha first, then beta, whose sum is that of alpha with b in the place of a.
+  -- The axis of this clock: alpha first, then beta, whose sum is that of alpha with b in the place of a.
   half_4  <= half(APPLIED_VOLTAGE_DROP_INV_SQRT3, SCALE_W + COEFF_W + 1) when valid(5) = '1' else
              half(APPLIED_VOLTAGE_DROP_THIRD, SCALE_W + COEFF_W + 1);
   first_5 <= compare_b when valid(6) = '1' else compare_a;
@@ -156,7 +156,7 @@ begin
         sum_9 <= prod_8 + HALF_U;
       end if;
 
-      -- Stage 10: u_applied = u, narrowed; alpha at clock 10, from where it moves on, beta at 11
+      -- Stage 10: u_applied = u, narrowed; alpha at clock 10, shifted on from beta's register, beta at 11
       if valid(9) = '1' or valid(10) = '1' then
         u_applied_beta  <= u_9;
         u_applied_alpha <= u_applied_beta;

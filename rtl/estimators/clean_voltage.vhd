@@ -1,8 +1,8 @@
--- Purpose: the voltage at the motor's terminals, asked for less what the legs take; alpha first, then beta.
+-- Purpose: the voltage at the motor's terminals: the commanded voltage minus the loss of the legs; alpha, then beta.
 --   u_clean = u_applied - v_leg*s(k-1)
--- s(k-1): the directions of the sample before, whose voltage fills the coming period.
+-- s(k-1): the directions of the previous sample, whose voltage acts in the coming period.
 -- Formats: u FLUX, s PU, v_leg V_LEG; products exact.
--- Latency: 5 (alpha, beta follow each other).  Interval: 5.
+-- Latency: 5 (alpha, then beta).  Interval: 5.
 -- Rounding: half up, each product.  The difference saturates.
 
 library ieee;
@@ -32,13 +32,13 @@ architecture rtl of clean_voltage is
   constant DROP    : positive := CLEAN_VOLTAGE_DROP;
   constant SUM_W   : positive := FLUX_W + 1 + DROP;
 
-  -- State: the directions of the sample before
+  -- State: the directions of the previous sample
   signal last_alpha : signed(PU_W - 1 downto 0);
   signal last_beta  : signed(PU_W - 1 downto 0);
 
   signal valid  : std_logic_vector(0 to LATENCY);
   signal s_1    : signed(PU_W - 1 downto 0);
-  signal v_1    : signed(V_LEG_W - 1 downto 0);  -- v_leg, in the multiplier's own register: it comes from afar
+  signal v_1    : signed(V_LEG_W - 1 downto 0);  -- v_leg in the multiplier's operand register, as its source is distant
   signal prod_2 : signed(V_LEG_W + PU_W - 1 downto 0);
   signal u_2    : signed(FLUX_W - 1 downto 0);
   signal sum_3  : signed(SUM_W - 1 downto 0);
@@ -48,7 +48,7 @@ begin
 
   u_2 <= u_applied_beta when valid(3) = '1' else u_applied_alpha;
 
-  -- sum is the complement of u_applied - prod: the adder behind the multiplier only adds.
+  -- sum is the complement of u_applied - prod, because the adder behind the multiplier can only add.
   diff_3 <= not sum_3(FLUX_W + DROP downto DROP);
 
   process (clk)

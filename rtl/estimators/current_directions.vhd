@@ -1,11 +1,11 @@
--- Purpose: directions that the phase currents will have when the next sample's voltage acts, paper 000 eq. (6).
+-- Purpose: predicted directions of the phase currents when the next sample's voltage acts, paper 000 eq. (6).
 --   turn = k_ahead*omega_me;  x = i_alpha - turn*i_beta;  y = i_beta + turn*i_alpha
 --   s_a = limit(k_sign*x, +-1)
 --   s_b = limit(k_sign*(-x + sqrt(3)*y)/2, +-1);  s_c = limit(k_sign*(-x - sqrt(3)*y)/2, +-1)
 --   s_alpha, s_beta: their Clarke transform
 -- Thirteen products one after the other, through one multiplier and the adder behind it: sum = addend + mul_a*mul_b.
--- The last five are transforms/clarke, which cannot saturate here, alpha's and beta's by turns.  The outputs are state:
--- the next sample starts with them.
+-- The last five are the Clarke transform of transforms/clarke, alternating between alpha and beta; it cannot saturate
+-- here.  The outputs are state: the next sample starts with them.
 -- Formats: PU in and out; k_ahead U(1,16), sqrt(3) U(1,16), k_sign U(12,12); products exact.
 -- Latency: 31.  Interval: 31.
 -- Rounding: every product half up.  turn, x, y and twice each phase current saturate.
@@ -43,44 +43,44 @@ architecture rtl of current_directions is
   constant THIRD   : signed(WIDE_W - 1 downto 0) := resize(CLARKE_THIRD, WIDE_W);
   constant BY_BETA : signed(WIDE_W - 1 downto 0) := resize(CLARKE_INV_SQRT3, WIDE_W);
 
-  -- An LSB less than half: what is rounded half up and then negated is half down.
+  -- One LSB less than half: a value that is negated after rounding half up is rounded half down before.
   constant HALF_DOWN : signed(TURN_BY - 1 downto 0) := (TURN_BY - 1 => '0', others => '1');
 
   signal valid      : std_logic_vector(0 to LATENCY);
   signal by_sign    : std_logic;                          -- the factor is k_sign
   signal by_current : std_logic;                          -- the factor is a current
-  signal by_third   : std_logic;                          -- the factor will be -1/3
+  signal by_third   : std_logic;                          -- the factor is -1/3 in the next clock
   signal by_phase   : std_logic;                          -- the other factor is a direction
-  signal on_sum     : std_logic;                          -- the sum goes on
+  signal on_sum     : std_logic;                          -- the sum is accumulated
   signal on_sign    : std_logic;                          -- half an LSB of a direction
   signal s_moves    : std_logic;
   signal current_a  : signed(PU_W - 1 downto 0);
-  signal constant_0 : signed(WIDE_W - 1 downto 0);        -- what constant_a becomes
+  signal constant_0 : signed(WIDE_W - 1 downto 0);        -- next value of constant_a
   signal constant_a : signed(WIDE_W - 1 downto 0);
   signal factor_a   : signed(WIDE_W - 1 downto 0);
   signal factor_b   : signed(PU_W - 1 downto 0);
   signal mul_a      : signed(WIDE_W - 1 downto 0);
   signal mul_b      : signed(PU_W - 1 downto 0);
-  signal product    : signed(SUM_W - 1 downto 0);         -- what prod, sum and past become
+  signal product    : signed(SUM_W - 1 downto 0);         -- next values of prod, sum and past
   signal total      : signed(SUM_W - 1 downto 0);
   signal past_0     : std_logic;
   signal prod       : signed(SUM_W - 1 downto 0);
   signal base       : signed(SUM_W - 1 downto 0);
   signal addend     : signed(SUM_W - 1 downto 0);
   signal sum        : signed(SUM_W - 1 downto 0);
-  signal cut        : signed(SUM_W - 1 - TURN_BY downto 0);  -- the sum a clock ago, and whether it exceeds PU
+  signal cut        : signed(SUM_W - 1 - TURN_BY downto 0);  -- the sum a clock ago; past: it exceeds PU
   signal past       : std_logic;
   signal narrow     : signed(PU_W - 1 downto 0);          -- turn at clock 5, not x at 10, y at 11, b at 16, c at 17
   signal minus_x_11 : signed(PU_W downto 0);
   signal twice_a_11 : signed(PU_W - 1 downto 0);
-  signal s          : signed(SUM_W - 1 - DROP downto 0);  -- a direction; the bits from that of one on: any, all
+  signal s          : signed(SUM_W - 1 - DROP downto 0);  -- a direction; any, all: OR, AND of its bits >= 1
   signal s_any      : std_logic;
   signal s_all      : std_logic;
-  signal s_next     : signed(PU_W - 1 downto 0);          -- the phases: the one that comes next, the others
+  signal s_next     : signed(PU_W - 1 downto 0);          -- the directions as a shift register
   signal s_then     : signed(PU_W - 1 downto 0);
   signal s_last     : signed(PU_W - 1 downto 0);
 
-  -- v where sel is '1', else zero
+  -- v if sel is '1', else zero
   function when_set (v : signed; sel : std_logic) return signed is
     alias u : signed(v'length - 1 downto 0) is v;
   begin
@@ -89,7 +89,7 @@ architecture rtl of current_directions is
 begin
   valid(0) <= in_valid;
 
-  -- Each is chosen by one bit, so that no choice waits for another.
+  -- An AND-OR selection with one select bit per operand, without priority, which keeps the path short.
   factor_a <= when_set(signed(resize(k_ahead, WIDE_W)), valid(0))
               or when_set(resize(current_a, WIDE_W), by_current)
               or when_set(signed('0' & k_sign), by_sign)
@@ -99,7 +99,7 @@ begin
               s_next when by_phase = '1' else
               narrow;
 
-  -- x comes as its complement: the adder behind the multiplier only adds.
+  -- x is calculated as its complement, because the adder behind the multiplier can only add.
   base <= when_set(rounding_base(not i_alpha, TURN_BY, SUM_W), valid(6))
           or when_set(rounding_base(i_beta, TURN_BY, SUM_W), valid(7))
           or when_set(rounding_base(minus_x_11, TURN_BY, SUM_W), valid(12))
@@ -123,7 +123,7 @@ begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- What is chosen by more than one clock is known a clock before.
+      -- Select bits that depend on several clocks are registered one clock before their use.
       by_sign    <= or valid(15 to 17);
       by_current <= valid(4) or valid(5);
       by_third   <= valid(21) or valid(23);
@@ -140,12 +140,12 @@ begin
 
       -- Stages 2, 7, 8, 13, 14, 18 to 20: prod = omega_me*k_ahead, turn*i_beta, turn*i_alpha, sqrt(3)*y, -sqrt(3)*y,
       -- then k_sign times twice the currents of b, c, a;  stages 25 to 29: -1/3*s_b, s_b/sqrt(3), -1/3*s_c,
-      -- -s_c/sqrt(3), 2/3*s_a; and what it is added to
+      -- -s_c/sqrt(3), 2/3*s_a;  addend: the other operand of the sum
       prod   <= product;
       addend <= base;
 
-      -- Stages 3, 8, 9, 14, 15, 19 to 21, 26 to 30: sum = turn, not x, y, twice b, twice c, s_b, s_c, s_a, s_alpha and
-      -- s_beta by turns
+      -- Stages 3, 8, 9, 14, 15, 19 to 21, 26 to 30: sum = turn, not x, y, twice b, twice c, s_b, s_c, s_a, then s_alpha
+      -- and s_beta alternately
       sum <= total;
 
       -- Stages 4, 5, 9 to 11, 15 to 17: narrow = sum, narrowed
@@ -161,7 +161,7 @@ begin
         twice_a_11 <= saturate((not narrow) & '0', PU_W);
       end if;
 
-      -- Stages 20 to 23: s = sum, narrowed and limited: past one where its bits from that of one on are not all alike;
+      -- Stages 20 to 23: s = sum, narrowed and limited: beyond +-1 if its bits from that of 1 on are not all equal;
       -- stages 25, 27: the next phase
       s     <= sum(SUM_W - 1 downto DROP);
       s_any <= or sum(SUM_W - 1 downto DROP + PU_W - 2);

@@ -1,12 +1,11 @@
 -- Purpose: flux linkages from currents by the linear magnetic model, paper 001 eq. (6); d first, then q.
 --   lambda_c_d = l_d*i_d + lambda_mg + lambda_add_d = model_d + (lambda_add_d - raised_d)
 --   lambda_c_q = l_q*i_q             + lambda_add_q = model_q + (lambda_add_q - raised_q)
--- model is that of flux_models, which has the estimate's compensation in it; here that goes again, as there is time for
--- it here and not there.  lambda_add is the correction of eq. (16), zero in every other mode.
+-- model comes from flux_models and includes the compensation of the estimate, which is subtracted again here, where
+-- there is time for it.  lambda_add is the correction of eq. (16), zero in every other mode.
 -- Formats: model S(6,24), raised S(2,23); lambda_add and results FLUX; sums exact.
--- Latency: 5 (d, q follow each other).  Interval: 4.
--- Rounding: half up, saturated at 2 per unit, twice the flux that full voltage makes at base speed; model_limited
--- tells it.
+-- Latency: 5 (d, then q).  Interval: 4.
+-- Rounding: half up, saturated at 2 per unit, twice the flux of full voltage at base speed; reported by model_limited.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -47,7 +46,7 @@ architecture rtl of current_model is
 begin
   valid(0) <= in_valid;
 
-  -- The axis of the beat
+  -- The axis of this clock: d, then q
   add_0    <= resize(lambda_add_q, REST_W) when valid(1) = '1' else resize(lambda_add_d, REST_W);
   raised_0 <= resize(raised_q, REST_W) when valid(1) = '1' else resize(raised_d, REST_W);
   model_1  <= model_q when valid(2) = '1' else model_d;
@@ -72,7 +71,7 @@ begin
         rounded_3 <= resize(round_half_up(sum_2, 1), SUM_W - 1);
       end if;
 
-      -- Stage 4: lambda_c = sum, narrowed; d at clock 4, from where it moves on, q at 5
+      -- Stage 4: lambda_c = sum, narrowed; d at clock 4, shifted on from q's register, q at 5
       if valid(3) = '1' or valid(4) = '1' then
         lambda_c_q    <= saturate(rounded_3, FLUX_W);
         lambda_c_d    <= lambda_c_q;

@@ -1,12 +1,12 @@
--- Purpose: what the current regulators' integrals say about the flux, paper 001 eq. (15); d first, then q.
+-- Purpose: error of the flux estimate, from the current regulators' integrals, paper 001 eq. (15); d first, then q.
 --   delta_lambda_d =  (u_int_q - r*i_q) * factor * 2**n_omega
 --   delta_lambda_q = -(u_int_d - r*i_d) * factor * 2**n_omega
--- u_int is that of two samples before.  While the integrals mean something else (a limit, a current converter at its
--- end, voltage not known) delta_lambda fades by a sixteenth a sample; zero while the gates are off.
+-- u_int is that of two samples before.  While the integrals contain other voltages (voltage at its limit, a current
+-- converter at its end, voltage not known) delta_lambda decays by a sixteenth per sample; zero while the gates are off.
 -- Formats: r U(0,24), u_int and the difference 28 fraction bits, factor S(0,17), out FLUX.
--- Latency: 12 (d, q follow each other).  Interval: 12.
--- Rounding: half up after r*i, the shift and the factor.  The shifted difference and the result saturate; the former
--- is told unless the factor is zero.
+-- Latency: 12 (d, then q).  Interval: 12.
+-- Rounding: half up after r*i, the shift and the factor.  The shifted difference and the result saturate; saturation of
+-- the difference is reported unless the factor is zero.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -47,18 +47,18 @@ architecture rtl of delta_lambda is
   constant DROP_R  : positive := DELTA_LAMBDA_DROP_R;
   constant DROP    : positive := DELTA_LAMBDA_DROP_FACTOR;
 
-  -- State, with delta_lambda_d and delta_lambda_q; 1 and 2: of how many samples before
+  -- State, with delta_lambda_d and delta_lambda_q; suffix 1: previous sample, 2: the one before
   signal u_int_d_1 : signed(INTEGRAL_W - 1 downto 0);
   signal u_int_q_1 : signed(INTEGRAL_W - 1 downto 0);
   signal u_int_d_2 : signed(INTEGRAL_W - 1 downto 0);
   signal u_int_q_2 : signed(INTEGRAL_W - 1 downto 0);
 
   signal valid      : std_logic_vector(0 to LATENCY);
-  signal free_1     : std_logic;                     -- no limit holds the voltage
+  signal free_1     : std_logic;                     -- the voltage is not at its limit
   signal measured_1 : std_logic;
   signal held_2     : std_logic;
-  signal moving_1   : std_logic_vector(1 downto 0);  -- whether the factor is not zero, by halves
-  signal limited    : std_logic;  -- in either axis
+  signal moving_1   : std_logic_vector(1 downto 0);  -- factor /= 0, one bit for each half of its bits
+  signal limited    : std_logic;  -- of either axis
   signal i_1        : signed(PU_W - 1 downto 0);
   signal prod_2     : signed(PU_W + RESISTANCE_W downto 0);
   signal u_int_2    : signed(INTEGRAL_W - 1 downto 0);
@@ -88,14 +88,14 @@ architecture rtl of delta_lambda is
 begin
   valid(0) <= in_valid;
 
-  -- The axis of the beat: d, made of the quantities of q, then q, made of those of d.
+  -- The axis of this clock: d, from the quantities of q, then q, from those of d.
   u_int_2 <= u_int_d_2 when valid(3) = '1' else u_int_q_2;
   old_9   <= delta_lambda_q when valid(10) = '1' else delta_lambda_d;
 
-  -- sum is the complement of u_int - prod: the adder behind the multiplier only adds.
+  -- sum is the complement of u_int - prod, because the adder behind the multiplier can only add.
   rest_3 <= not sum_3(REST_W - 1 + DROP_R downto DROP_R);
 
-  -- Whether a bit unlike the sign is shifted into the sign or past it: by fours, by the remainder.
+  -- Whether the shift loses a bit that differs from the sign: first by multiples of four, then by the remainder.
   process (all)
   begin
     more_4 <= '0';
@@ -109,7 +109,7 @@ begin
     end loop;
   end process;
 
-  -- Shifted by fours, then by the remainder: outside the clocked process, so that a simulator shifts only what changes.
+  -- Shift by multiples of four, then by the remainder; outside the clocked process for fast simulation.
   coarse_3 <= shift_left(rest_3(FIT_W - 1 downto 0), to_integer(n_omega(3 downto 2) & "00"));
   fine_4   <= shift_left(coarse_4, to_integer(n_omega(1 downto 0)));
 
@@ -122,7 +122,7 @@ begin
 
   rounded_5 <= round_half_up(shifted_5, DELTA_LAMBDA_DROP_SHIFTED);
 
-  -- Half up of prod for d, of -prod for q: the complement of prod less half an LSB and one is -prod and half an LSB.
+  -- prod is rounded half up for d, -prod for q: not (prod - half - 1) = -prod + half.
   half_8   <= rounding_base("0", DROP, PROD_W + 1) xor valid(9);
   delta_10 <= faded_10 when held_2 = '1' else
               narrowed(sum_10, past_10, FLUX_W) xor valid(11);
@@ -132,12 +132,12 @@ begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stages 1, 2: held = run where the integrals mean something else; by halves, as the flags come from afar
+      -- Stages 1, 2: held = run while the integrals contain other voltages; in two stages, as the flags are distant
       free_1     <= not ((or sat_d) or (or sat_q));
       measured_1 <= voltage_known and not (or current_at_rail);
       held_2     <= run and not (free_1 and measured_1);
 
-      -- Stage 1: whether there is a factor
+      -- Stage 1: whether the factor is not zero
       moving_1 <= (or factor(RECIPROCAL_W downto RECIPROCAL_W / 2)) & (or factor(RECIPROCAL_W / 2 - 1 downto 0));
 
       -- Stages 1, 2: prod = r*i
@@ -153,14 +153,14 @@ begin
         sum_3 <= rounding_base(not u_int_2, DROP_R, REST_W + DROP_R + 1) + prod_2;
       end if;
 
-      -- Stages 4, 5: shifted = rest * 2**n_omega, by fours, then the remainder
+      -- Stages 4, 5: shifted = rest * 2**n_omega, by multiples of four, then by the remainder
       coarse_4  <= coarse_3;
       over_4    <= over_3;
       sign_4    <= rest_3(REST_W - 1);
       shifted_5 <= sign_4 & fine_4;
       over_5    <= more_4;
 
-      -- Stages 6, 7: value = shifted, narrowed; rounding may take a negative one's sign, not the one before it
+      -- Stages 6, 7: value = shifted, narrowed; the sign is taken before the rounding, which may change it
       rounded_6 <= shifted_5(FIT_W) & rounded_5(FLUX_W - 1 downto 0);
       past_6    <= over_5 or exceeds(rounded_5, FLUX_W);
       if valid(6) = '1' or valid(7) = '1' then
@@ -168,7 +168,7 @@ begin
         limited <= past_6 or (limited and valid(7));
       end if;
 
-      -- Stages 8, 9: sum = value * factor and its half
+      -- Stages 8, 9: sum = value * factor, plus half an LSB for the rounding
       if valid(7) = '1' or valid(8) = '1' then
         prod_8 <= value_7 * factor;
       end if;
@@ -176,14 +176,14 @@ begin
         sum_9 <= half_8 + prod_8;
       end if;
 
-      -- Stage 10: whether the sum fits, and what is left of delta_lambda where it is held
+      -- Stage 10: whether the sum fits, and the decayed delta_lambda for held samples
       if valid(9) = '1' or valid(10) = '1' then
         sum_10   <= sum_9(PROD_W downto DROP);
         past_10  <= exceeds(sum_9(PROD_W downto DROP), FLUX_W);
         faded_10 <= minus_rounded(old_9, old_9, DELTA_LAMBDA_FADE);
       end if;
 
-      -- Stage 11: delta_lambda = sum for d, -sum for q, narrowed, or what is left of it; d at clock 11, q at 12
+      -- Stage 11: delta_lambda = sum for d, -sum for q, narrowed, or the decayed value; d at clock 11, q at 12
       if valid(10) = '1' then
         delta_lambda_d <= delta_10;
       end if;

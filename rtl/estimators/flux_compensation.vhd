@@ -1,9 +1,9 @@
 -- Purpose: the PI of paper 001 eq. (17) on delta_lambda, or the plain addition of eq. (16); d first, then q.
 --   integral = limit(integral + flux_ki*delta_lambda)                                     flux_mode 3
---   integral = integral - integral/2**8 while delta_lambda is held: what cannot be verified is forgotten
+--   integral = integral - integral/2**8 while delta_lambda is held: an unverified compensation decays
 --   lambda_pi = limit(flux_kp*delta_lambda + integral)                                    flux_mode 3
 --   lambda_add = limit(delta_lambda)                                                      flux_mode 2
--- limit: to +-delta_max, and told.  The addition is the PI with a gain of one and no integral.
+-- limit: to +-delta_max, reported.  The addition is the PI with a gain of one and no integral.
 -- Formats: flux_kp U(7,10), flux_ki U(0,17), products and integral S(1,30), delta_max U(0,16), out FLUX.
 -- Latency: 12 (d, then q).  Interval: 12.  Rounding: half up; the limit is a multiple of FLUX's LSB.
 
@@ -44,14 +44,14 @@ architecture rtl of flux_compensation is
   constant PROPOSED    : natural               := FLUX_MODELS_PROPOSED;
   constant KP_ONE      : unsigned(16 downto 0) := to_unsigned(2 ** (DROP_P + FLUX_TO_STATE), 17);
   constant SUM_W       : positive              := FLUX_W + flux_kp'length + 2;
-  constant TURN        : positive              := 4;  -- clocks that q comes behind d
+  constant TURN        : positive              := 4;  -- delay of q behind d, clocks
 
-  -- State: the axes take turns: the one that comes next, and the other
+  -- State: a shift register of the two axes' integrals, the next one first
   signal integral       : signed(FLUX_STATE_W - 1 downto 0);
   signal integral_other : signed(FLUX_STATE_W - 1 downto 0);
 
   signal valid     : std_logic_vector(0 to LATENCY);
-  signal step      : std_logic_vector(0 to LATENCY - TURN);  -- of either axis
+  signal step      : std_logic_vector(0 to LATENCY - TURN);  -- valid bits of both axes
   signal upper     : signed(FLUX_STATE_W - 1 downto 0);
   signal lower     : signed(FLUX_STATE_W - 1 downto 0);
   signal kp        : unsigned(flux_kp'range);
@@ -82,10 +82,10 @@ begin
   moved_3  <= sum_i_3(SUM_W - 1 downto DROP_I);
   total_6  <= sum_p_6(SUM_W - 1 downto DROP_P);
 
-  -- -integral/2**FORGET, half up: the complement of the upper bits, one more unless the lower are past the half.
+  -- -integral/2**FORGET, half up: the complement of the upper bits, plus one unless the lower bits exceed half.
   down_0 <= integral(FORGET - 1) and (or integral(FORGET - 2 downto 0));
 
-  -- The limited total; the limit is put in behind the rounding, which cannot move anything past it.
+  -- The limited total; the limit is applied after the rounding, which cannot move a value beyond it.
   lambda_7 <= rounded_7 when past_7 = '0' else
               lower(FLUX_STATE_W - 1 downto FLUX_TO_STATE) when under_7 = '1' else
               upper(FLUX_STATE_W - 1 downto FLUX_TO_STATE);
@@ -96,7 +96,7 @@ begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stage 1: the factors of flux_ki*delta_lambda, or of what is forgotten while it is held
+      -- Stage 1: the factors of flux_ki*delta_lambda, or of the decay while delta_lambda is held
       if step(0) = '1' then
         delta_1 <= delta_0;
         mul_a_1 <= delta_0;
@@ -115,7 +115,7 @@ begin
         sum_i_3 <= rounding_base(integral, DROP_I, SUM_W) + prod_i_2;
       end if;
 
-      -- Stage 4: prod_p = kp*delta_lambda, kp a setting;  stages 4, 5: integral = sum_i, limited
+      -- Stage 4: prod_p = kp*delta_lambda, kp selected by flux_mode;  stages 4, 5: integral = sum_i, limited
       kp <= flux_kp when flux_mode = PROPOSED else KP_ONE;
       if step(3) = '1' then
         prod_p_4       <= delta_1 * signed('0' & kp);

@@ -1,10 +1,10 @@
 -- Purpose: the estimated flux linkages, paper 001 eq. (17): merged models plus the compensation, narrowed.
---   lambda_d = merged_d      where merged
---   lambda_d = model_d       else; q alike
--- Formats: model S(6,24), merged S(3,23), both with the compensation and half an LSB of PU in them; out PU.
+--   lambda_d = merged_d      if merged = 1
+--   lambda_d = model_d       otherwise; likewise for q
+-- Formats: model S(6,24), merged S(3,23), both including the compensation and half an LSB of PU; out PU.
 -- Latency: 1.
--- Rounding: half up to PU, by a cut.  Saturated and told; a merged flux at its end is told too.
--- Whoever takes lambda multiplies at once: no adder stands before its register.
+-- Rounding: half up to PU by truncation.  Saturated, reported by estimate_limited, as is a saturated merged flux.
+-- lambda comes directly from a register, because the following blocks multiply by it at once.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -54,7 +54,7 @@ begin
   cut_cd <= model_d(model_d'high downto PU_TO_FLUX + 1);
   cut_cq <= model_q(model_q'high downto PU_TO_FLUX + 1);
 
-  -- Whether it is past the end is found of either, beside the choice and not behind it.
+  -- Overflow is determined for both fluxes in parallel to the selection, not after it.
   cut_d  <= resize(cut_md, CUT_W) when merged = '1' else cut_cd;
   cut_q  <= resize(cut_mq, CUT_W) when merged = '1' else cut_cq;
   past_d <= exceeds(cut_md, PU_W) when merged = '1' else exceeds(cut_cd, PU_W);
@@ -65,7 +65,7 @@ begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stage 1: lambda = what was chosen, narrowed
+      -- Stage 1: lambda = the selected flux, narrowed
       if valid(0) = '1' then
         lambda_d <= narrowed(cut_d, past_d, PU_W);
         lambda_q <= narrowed(cut_q, past_q, PU_W);

@@ -1,12 +1,12 @@
 -- Purpose: merge of voltage and current models in the stator frame, paper 001 eq. (7); alpha first, then beta.
 --   lambda = carried - rho*i;  eps = lambda_c - lambda;  y = omega_0*eps;  x += omega_0*y
 --   carried = lambda_m = lambda + 2*xi*y + x + t_s*u_applied - rho*i
--- Where the voltage of the last period is not known or the gates are off: lambda = lambda_c, x = 0.
+-- If the voltage of the last period is not known or the gates are off: lambda = lambda_c, x = 0.
 -- Formats: carried S(1,30), eps and u FLUX, y S(-1,25), x S(-3,36); products exact.
 -- Latency: 31 (alpha, then beta).  Interval: 31.
--- Each sum with a product is formed by the adder behind the multiplier.  One register holds the axis' flux all the way:
--- carried, lambda, the total, what is carried on.
--- Rounding: half up, each product and x by itself.  lambda, eps, x and the carried flux saturate and tell.
+-- Each sum with a product is formed by the adder behind the multiplier.  One register per axis contains the flux in all
+-- steps: carried, lambda, the total, the new carried.
+-- Rounding: half up, each product and x separately.  lambda, eps, x and the carried flux saturate, which is reported.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -52,31 +52,31 @@ architecture rtl of flux_merge is
   constant PROD_Y_W : positive := FLUX_W + omega_0'length + 1;
   constant PROD_X_W : positive := FLUX_MERGE_Y_W + omega_0'length + 1;
   constant SUM_U_W  : positive := TOTAL_W + DROP_U + 1;
-  constant TURN     : positive := 14;  -- clocks that beta comes behind alpha
+  constant TURN     : positive := 14;  -- delay of beta behind alpha, clocks
 
-  -- An LSB less than half: -rho*i is half down where rho*i is half up.
+  -- One LSB less than half: -rho*i is rounded half down, because rho*i is rounded half up.
   constant HALF_DOWN : signed(DROP_RHO - 1 downto 0) := (DROP_RHO - 1 => '0', others => '1');
 
-  -- Where flux comes from
+  -- Sources of the register flux
   constant LESS_DROP : std_logic_vector(1 downto 0) := "00";
   constant MODEL     : std_logic_vector(1 downto 0) := "01";
   constant TOTAL     : std_logic_vector(1 downto 0) := "10";
   constant OTHER     : std_logic_vector(1 downto 0) := "11";
 
-  -- State, with merge_known; the axes take turns: the one that comes next, and the other
+  -- State, with merge_known; the two axes share the registers: the next axis, and the other
   signal flux       : signed(TOTAL_W - 1 downto 0);
   signal flux_other : signed(TOTAL_W - 1 downto 0);
   signal x          : signed(X_W - 1 downto 0);
   signal x_other    : signed(X_W - 1 downto 0);
 
   signal valid      : std_logic_vector(0 to LATENCY);
-  signal step       : std_logic_vector(0 to LATENCY - TURN);  -- of either axis
+  signal step       : std_logic_vector(0 to LATENCY - TURN);  -- valid bits of both axes
   signal beta       : std_logic;
   signal trusted    : std_logic;
   signal limited    : std_logic;  -- by any stage of either axis
-  signal limits     : std_logic_vector(2 downto 0);  -- a stage does: lambda, eps, x
-  signal moves      : std_logic;  -- flux does
-  signal source     : std_logic_vector(1 downto 0);  -- of flux, when it moves next
+  signal limits     : std_logic_vector(2 downto 0);  -- limit reached: lambda, eps, x
+  signal moves      : std_logic;  -- flux is loaded
+  signal source     : std_logic_vector(1 downto 0);  -- source of flux at its next load
   signal i_1        : signed(PU_W - 1 downto 0);
   signal lambda_c_1 : signed(FLUX_W - 1 downto 0);
   signal u_1        : signed(FLUX_W - 1 downto 0);
@@ -86,7 +86,7 @@ architecture rtl of flux_merge is
   signal prod_u_2   : signed(FLUX_W + SAMPLE_TIME_W downto 0);
   signal sum_r      : signed(SUM_R_W - 1 downto 0);  -- at clock 3, then at clock 14
   signal less_r     : signed(TOTAL_W downto 0);
-  signal top        : std_logic_vector(1 downto 0);  -- flux a clock ago: would be rounded past its end, by halves
+  signal top        : std_logic_vector(1 downto 0);  -- flux a clock ago is at the end of its range, by halves
   signal rounded    : signed(FLUX_STATE_W downto FLUX_TO_STATE);
   signal diff_5     : signed(FLUX_W + 1 downto 0);
   signal eps_6      : signed(FLUX_W downto 0);
@@ -111,7 +111,7 @@ begin
   moved_11 <= sum_x_11(PROD_X_W downto DROP_X);
   total_12 <= plus_rounded(sum_u_12(TOTAL_W - 1 + DROP_U downto DROP_U), x_other, FLUX_MERGE_X_TO_STATE);
 
-  -- lambda_c - flux, rounded by one carry, which is the half of flux below its end.
+  -- lambda_c - rounded flux, with one carry: the first bit of flux below the LSB, unless flux is at its end.
   diff_5 <= (lambda_c_1(FLUX_W - 1) & lambda_c_1 & '0')
             - (resize(flux(FLUX_STATE_W - 1 downto FLUX_TO_STATE), FLUX_W + 1)
                & (flux(FLUX_TO_STATE - 1) and not (and top)));
@@ -121,7 +121,7 @@ begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Which axis enters: alpha at clock 0, beta at clock TURN
+      -- The axis that enters: alpha at clock 0, beta at clock TURN
       if valid(TURN - 1) = '1' then
         beta <= '1';
       end if;
@@ -129,7 +129,7 @@ begin
         beta <= '0';
       end if;
 
-      -- Stage 1: the axis' inputs;  settings come from afar
+      -- Stage 1: the inputs of the axis;  local copies of settings, whose registers are far away
       t_s_1     <= t_s;
       omega_0_1 <= omega_0;
       if step(0) = '1' then
@@ -150,7 +150,7 @@ begin
       end if;
 
       -- Stage 4: flux = lambda: sum_r, narrowed, or lambda_c;  stage 13: the total;  stage 15: sum_r, narrowed;
-      -- stage 16: the other axis'
+      -- stage 16: the flux of the other axis
       source <= LESS_DROP;
       if step(2) = '1' and trusted = '0' then
         source <= MODEL;
@@ -180,7 +180,7 @@ begin
       end if;
       limits(0) <= ((step(3) and trusted) or step(14)) and exceeds(less_r, FLUX_STATE_W);
 
-      -- Stages 5, 16: next to the end of the range the flux would be rounded past it: saturated before it is rounded.
+      -- Stages 5, 16: at the end of the range rounding would overflow, so it is suppressed there.
       top(1) <= not flux(FLUX_STATE_W - 1) and (and flux(FLUX_STATE_W - 2 downto FLUX_STATE_W / 2));
       top(0) <= and flux(FLUX_STATE_W / 2 - 1 downto FLUX_TO_STATE - 1);
 
@@ -213,7 +213,7 @@ begin
         sum_xi_11 <= rounding_base(flux(FLUX_STATE_W - 1 downto 0), DROP_XI, PROD_X_W + 1) + prod_xi_10;
       end if;
 
-      -- Stage 12: x = sum_x, narrowed;  sum_u = sum_xi + prod_u;  stage 1: x = 0 where lambda is not known
+      -- Stage 12: x = sum_x, narrowed;  sum_u = sum_xi + prod_u;  stage 1: x = 0 if lambda is not known
       if step(11) = '1' then
         x        <= x_other;
         x_other  <= saturate(moved_11, X_W);
@@ -226,7 +226,7 @@ begin
         x_other <= (others => '0');
       end if;
 
-      -- Stage 17: lambda_m = what is carried on, narrowed; alpha at clock 17, beta at 31
+      -- Stage 17: lambda_m = the carried flux, narrowed; alpha at clock 17, beta at 31
       if valid(16) = '1' then
         lambda_m_alpha <= rounded(FLUX_STATE_W - 1 downto FLUX_TO_STATE);
       end if;

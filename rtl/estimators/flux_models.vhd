@@ -1,12 +1,12 @@
--- Purpose: what both models say about this sample's flux linkages, for flux_estimate and current_model.
+-- Purpose: the flux linkages of this sample by both models, for flux_estimate and current_model.
 --   model_d  = l_d*i_d + lambda_mg + raised_d,  model_q = l_q*i_q + raised_q      paper 001 eq. (6)
---   merged_d = lambda_m_d - rho*i_d + raised_d;  q alike                          eq. (11)
--- raised: lambda_pi and half an LSB of PU.  It is in both, so that nothing is left to add behind them.
--- merged: the merged flux counts (voltage known, a merge wanted), else the current model's; ended: it is at its end,
--- where the rotation before has saturated.
+--   merged_d = lambda_m_d - rho*i_d + raised_d;  likewise for q                    eq. (11)
+-- raised: lambda_pi plus half an LSB of PU.  Both models include it, so that nothing must be added after them.
+-- merged selects the merged flux (voltage known and a merge selected by flux_mode), otherwise the current model.
+-- ended: the selected merged flux is at the end of its range, because the rotation before has saturated.
 -- Formats: currents and lambda_mg PU, fluxes FLUX; products exact; model S(6,24), merged S(3,23), raised S(2,23).
 -- Latency: 4; i_q is needed a clock after in_valid, lambda_m two.  Interval: 3.
--- Rounding: floored, which rounding half up to PU does not see; with raised that is a cut.
+-- Rounding: floor, which does not change the rounding half up to PU; with raised, that rounding is a truncation.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -80,7 +80,7 @@ architecture rtl of flux_models is
   signal sum_merged_d  : signed(SUM_W - 1 downto 0);
   signal sum_merged_q  : signed(SUM_W - 1 downto 0);
 
-  -- Whether x is the first or the last number of its format: no bit is like the sign.  By parts, for the clock after.
+  -- '1' if x is the largest or the smallest number: all bits differ from the sign.  In parts, combined a clock later.
   function at_end (x : signed) return std_logic_vector is
     alias v         : signed(x'length - 1 downto 0) is x;
     variable result : std_logic_vector(PARTS - 1 downto 0);
@@ -109,8 +109,8 @@ begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stage 2: the operands, in registers of the multipliers: the currents come from afar, i_q a clock after i_d;
-      -- raised = lambda_pi + half
+      -- Stage 2: operands in the registers of the multipliers, as the currents' sources are distant; i_q comes a clock
+      -- after i_d;  raised = lambda_pi + half
       i_d_2       <= i_d;
       i_q_2       <= i_q;
       l_d_2       <= l_d;
@@ -121,7 +121,7 @@ begin
         raised_q <= raised(lambda_pi_q);
       end if;
 
-      -- Stage 3: prod_model = l*i;  prod_merged = -rho*i;  base: all that does not wait for the current
+      -- Stage 3: prod_model = l*i;  prod_merged = -rho*i;  base: all terms that do not depend on the current
       prod_model_d  <= times_l_d;
       prod_model_q  <= times_l_q;
       prod_merged_d <= times_rho_d;
@@ -138,7 +138,7 @@ begin
         end if;
       end if;
 
-      -- Stage 4: model = base + prod_model, where base is raised alone in q;  merged = base + prod_merged
+      -- Stage 4: model = base + prod_model, with base = raised for q;  merged = base + prod_merged
       if valid(3) = '1' then
         sum_model_d  <= shift_left(resize(base_model_d, SUM_W), SHIFT_MODEL) + prod_model_d;
         sum_model_q  <= shift_left(resize(raised_q, SUM_W), SHIFT_MODEL) + prod_model_q;

@@ -1,4 +1,4 @@
--- Purpose: remembers what made the flux estimate untrustworthy, until it is told to forget.
+-- Purpose: latches the conditions that disturb the flux estimate, until they are cleared.
 --   flux_faults = now or (flux_faults and not clear_faults)
 --   0  a current converter at its end            4  delta_lambda at its range
 --   1  bus reading at its end or below 1/32      5  compensation at delta_max

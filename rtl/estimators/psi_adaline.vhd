@@ -1,7 +1,7 @@
--- Purpose: Adaline of the magnets' flux, paper 000 eq. (13), with the reluctance term of eq. (7b).
+-- Purpose: Adaline of the magnet flux, paper 000 eq. (13), with the reluctance term of eq. (7b).
 --   e = u_q - v_leg*d_q - r*i_q - omega_chord*(l_d*i_d + psi_m);  psi_m += eta_psi*omega_chord*e
--- Held, and told, below omega_psi_min, while the voltage is at its limit, a converter at its end, the voltage not
--- known or the gates off.
+-- Held, and reported by psi_held, below omega_psi_min, while the voltage is at its limit, a converter at its end, the
+-- voltage not known or the gates off.
 -- r*i_q, v_leg*d_q, flux*omega_chord and e*omega_chord share a multiplier and the adder behind it.
 -- Formats: products and e FLUX, psi_m inside S(1,34), out PU.
 -- Latency: 18.  Interval: 18.
@@ -48,7 +48,7 @@ architecture rtl of psi_adaline is
   constant DROP_ETA   : positive := PSI_ADALINE_DROP_ETA;
   constant TO_FLUX    : positive := PSI_ADALINE_TO_FLUX;
   constant TO_PU      : positive := PSI_ADALINE_TO_PU;
-  constant TO_R       : positive := DROP_R - PSI_ADALINE_DROP_V;  -- v_leg*2**TO_R drops what r drops
+  constant TO_R       : positive := DROP_R - PSI_ADALINE_DROP_V;  -- v_leg*2**TO_R: cut by as many bits as r
   constant PROD_W     : positive := FLUX_W + PU_W;
   constant SUM_W      : positive := PROD_W + 2;
   constant SUM_P_W    : positive := STATE_W + DROP_ETA + 1;
@@ -57,7 +57,7 @@ architecture rtl of psi_adaline is
   signal psi : signed(STATE_W - 1 downto 0);
 
   signal valid    : std_logic_vector(0 to LATENCY);
-  signal free     : std_logic;                              -- no limit holds the voltage
+  signal free     : std_logic;                              -- the voltage is not at its limit
   signal measured : std_logic;
   signal learning : std_logic;
   signal u_q_1    : signed(PU_W - 1 downto 0);
@@ -84,7 +84,7 @@ architecture rtl of psi_adaline is
   signal factor_b : signed(PU_W - 1 downto 0);
   signal mul_a    : signed(FLUX_W - 1 downto 0);
   signal mul_b    : signed(PU_W - 1 downto 0);
-  signal product  : signed(PROD_W - 1 downto 0);            -- what prod, sum and narrow become
+  signal product  : signed(PROD_W - 1 downto 0);            -- next values of prod, sum and narrow
   signal total    : signed(SUM_W - 1 downto 0);
   signal limited  : signed(FLUX_W - 1 downto 0);
   signal prod     : signed(PROD_W - 1 downto 0);
@@ -98,7 +98,7 @@ architecture rtl of psi_adaline is
   signal end_17   : std_logic_vector(1 downto 0);
   signal half_17  : std_logic;
 
-  -- Whether x, cut to width bits, is the last number: a half would round it past the end of its range.  By halves.
+  -- '1' if x, cut to width bits, is the largest number: rounding up would overflow.  One bit for each half.
   function at_end (x : signed; width : positive) return std_logic_vector is
     alias v : signed(x'length - 1 downto 0) is x;
   begin
@@ -108,10 +108,10 @@ architecture rtl of psi_adaline is
 begin
   valid(0) <= in_valid;
 
-  -- |omega_chord| < omega_psi_min; the complement of a negative speed is one less than its size.
+  -- |omega_chord| < omega_psi_min; the complement of a negative speed is its magnitude minus one.
   slow_2 <= not room_2(PU_W - 1) and ((or room_2(PU_W - 2 downto 1)) or (room_2(0) and not omega_1(PU_W - 1)));
 
-  -- own + psi rounded, by one carry: what the complement of own lacks and the half.
+  -- own + rounded psi, with one carry for the one missing in the complement of own and one for the half.
   own_3    <= narrowed(sum_own(PROD_W downto DROP_L), past_3, FLUX_W);
   half_3   <= psi(TO_FLUX - 1) and not (and end_3);
   half_17  <= psi(TO_PU - 1) and not (and end_17);
@@ -125,7 +125,7 @@ begin
               d_q_1 when valid(3) = '1' else
               omega_1;
 
-  -- e grows as its complement: the adder behind the multiplier only adds.
+  -- e is accumulated as its complement, because the adder behind the multiplier can only add.
   base <= rounding_base(not shift_left(resize(u_q_1, FLUX_W), PU_TO_FLUX), DROP_R, SUM_W) when valid(2) = '1' else
           rounding_base(sum(SUM_W - 1 downto DROP_R), DROP_R, SUM_W) when valid(4) = '1' else
           rounding_base(sum(SUM_W - 1 downto DROP_R), DROP_OMEGA, SUM_W) when valid(6) = '1' else
@@ -146,7 +146,7 @@ begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stage 1: the sample's inputs, which come from other blocks
+      -- Stage 1: the inputs of the sample, which come from other blocks
       if valid(0) = '1' then
         u_q_1   <= u_q;
         d_q_1   <= d_q;
@@ -161,8 +161,8 @@ begin
         room_2 <= signed('0' & omega_psi_min) - (omega_1 xor omega_1(PU_W - 1));
       end if;
 
-      -- Stages 1 to 4: flux = l_d*i_d + psi, each narrowed.  From here to sum_psi nothing needs an enable: every factor
-      -- stays.
+      -- Stages 1 to 4: flux = l_d*i_d + psi, each narrowed.  From here to sum_psi nothing needs an enable: the factors
+      -- are constant while they are used.
       prod_own <= own_1;
       sum_own  <= own_2;
       past_3   <= past_2;
@@ -173,7 +173,7 @@ begin
       mul_a <= factor_a;
       mul_b <= factor_b;
 
-      -- Stages 3, 5, 7, 11: prod = r*i_q, v_leg*d_q, flux*omega_chord, e*omega_chord, and what it is added to
+      -- Stages 3, 5, 7, 11: prod = r*i_q, v_leg*d_q, flux*omega_chord, e*omega_chord;  addend: the other operand of sum
       prod   <= product;
       addend <= base;
 
@@ -181,7 +181,7 @@ begin
       sum    <= total;
       narrow <= limited;
 
-      -- Stages 14 to 16: psi += eta_psi*pull, narrowed, unless it is held
+      -- Stages 14 to 16: psi += eta_psi*pull, narrowed, unless held
       free     <= '1' when sat_d = 0 and sat_q = 0 else '0';
       measured <= voltage_known when current_at_rail = 0 else '0';
       learning <= run and free and measured;

@@ -1,8 +1,8 @@
 -- Purpose: 1/omega_me for delta_lambda, fading out towards standstill.
 --   factor * 2**n_omega = weight/omega_me;  weight = limit((|omega_me| - omega_min)*k_ramp, 0, 1)
--- Formats: |omega_me| U(1,16), taken for 2**-12 below it; k_ramp U(12,4), weight U(1,16), factor S(0,17).
--- Latency: 24.  Interval: 24, the reciprocal's quotient comes bit by bit.
--- Rounding: weight and |factor| half up.  |omega_me| = 2 is the next number below; the factor cannot overflow.
+-- Formats: |omega_me| U(1,16), at least 2**-12 in the reciprocal; k_ramp U(12,4), weight U(1,16), factor S(0,17).
+-- Latency: 24.  Interval: 24, as the quotient of the reciprocal needs one clock per bit.
+-- Rounding: weight and |factor| half up.  |omega_me| = 2 is replaced by the next smaller number; factor fits.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -63,7 +63,7 @@ begin
   above_1 <= signed('0' & magnitude_1) - signed('0' & omega_min);
   ramp_4  <= sum_4(sum_4'high downto SPEED_RECIPROCAL_DROP_WEIGHT);
 
-  -- The complement turns half up into half down, which is what the negative of a number rounded half up needs.
+  -- The complement turns rounding half up into half down, as the negative of a number rounded half up requires.
   turned_23 <= not prod_23(prod_23'high downto SPEED_RECIPROCAL_DROP_FACTOR - 1) when omega_me < 0 else
                prod_23(prod_23'high downto SPEED_RECIPROCAL_DROP_FACTOR - 1);
 
@@ -72,12 +72,12 @@ begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stage 1: magnitude = min(|omega_me|, the last number below 2)
+      -- Stage 1: magnitude = min(|omega_me|, the largest number below 2)
       if valid(0) = '1' then
         magnitude_1 <= saturate_u(size_0, U_DC_W);
       end if;
 
-      -- Stage 2: above = max(magnitude - omega_min, 0); meanwhile 2 to 22: the reciprocal
+      -- Stage 2: above = max(magnitude - omega_min, 0); in parallel, 2 to 22: the reciprocal
       if valid(1) = '1' then
         above_2 <= above_1;
         if above_1 < 0 then

@@ -1,7 +1,7 @@
 -- Purpose: estimated torque, paper 001 eq. (4), both products through one multiplier.
 --   torque = lambda_d*i_q - lambda_q*i_d        per unit of 3/2*p*lambda_base*I_base
 -- Formats: PU in and out; products and difference exact.
--- Latency: 7.  Interval: 4.  Rounding: half up, saturated at 2 per unit; flux and current at their bases make one.
+-- Latency: 7.  Interval: 4.  Rounding: half up, saturated at 2 per unit; flux and current both at their bases give 1.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -40,8 +40,8 @@ architecture rtl of torque is
 begin
   valid(0) <= in_valid;
 
-  -- lambda_d, then not lambda_q and a carry from one bit below: a plain sum before the multiplier yosys takes for the
-  -- DSP48's pre-adder and forgets the operands' signs
+  -- lambda_d, then not lambda_q plus a carry from the bit below: yosys would map a plain sum in front of the
+  -- multiplier to the DSP48's pre-adder and lose the signs of the operands
   lambda_1 <= not resize(lambda_q_1, PU_W + 1) when valid(3) = '1' else resize(lambda_d_1, PU_W + 1);
   factor_1 <= (lambda_1 & '1') + signed'('0' & valid(3));
 
@@ -50,7 +50,7 @@ begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stage 1: the flux, next to the multiplier
+      -- Stage 1: the flux, registered close to the multiplier
       lambda_d_1 <= lambda_d;
       lambda_q_1 <= lambda_q;
 
@@ -60,8 +60,8 @@ begin
         i_2      <= i_d when valid(3) = '1' else i_q;
       end if;
 
-      -- Stages 3, 5: prod = lambda_d*i_q, then -lambda_q*i_d;  what it is added to: half an LSB to round with, then
-      -- the sum so far, from a register of its own, for yosys would put feedback into the DSP48, wrongly
+      -- Stages 3, 5: prod = lambda_d*i_q, then -lambda_q*i_d;  addend: half an LSB, then the sum so far, in a
+      -- register of its own, because yosys maps a feedback into the DSP48 incorrectly
       if valid(2) = '1' or valid(4) = '1' then
         prod_3   <= lambda_2 * i_2;
         addend_3 <= sum_4;

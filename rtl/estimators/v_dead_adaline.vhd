@@ -1,9 +1,10 @@
--- Purpose: Adaline of the voltage that dead time and drops take from a leg, paper 000 eq. (10) and Fig. 4(a).
+-- Purpose: Adaline of the voltage loss of a leg by dead time and drops, paper 000 eq. (10) and Fig. 4(a).
 --   lp_u += k_lp*(u_pi_d - lp_u), u_h = u_pi_d - lp_u;  lp_d += k_lp*(d_d - lp_d), d_h = d_d - lp_d
 --   e = u_h - v_dead*d_h;  v_dead += eta_v*d_h*e;  v_sum += zeta*v_dead while |v_dead| > v_thr
 --   v_comp = limit(gamma*v_dead + v_sum);  v_leg = v_comp + v_dead
--- v_dead within +-v_comp_max; v_sum and v_comp from zero to v_comp_max, which is told.  Nothing learns while the
--- voltage is at its limit, a converter at its end, the voltage not known, the gates off or |i_d| + |i_q| < i_learn.
+-- v_dead is within +-v_comp_max; v_sum and v_comp from zero to v_comp_max, reported by v_comp_limited.  Everything is
+-- held while the voltage is at its limit, a converter at its end, the voltage not known, the gates off or
+-- |i_d| + |i_q| < i_learn.
 -- The filters share a multiplier, fine*d_h, d_h*e and eta_v*pull another, each with the adder behind it.
 -- Formats: lp S(1,28), u_h and d_h PU, e FLUX, d_h*e S(-4,21), v_dead and v_sum S(-1,38), v_comp and v_leg V_LEG.
 -- Latency: 29.  Interval: 29.
@@ -63,8 +64,8 @@ architecture rtl of v_dead_adaline is
   constant SUM_Z_W     : positive                        := STATE_W + 1 + DROP_ZETA;
   constant LP_ZERO     : signed(INTEGRAL_W - 1 downto 0) := to_signed(2 ** (PU_TO_INTEGRAL - 1), INTEGRAL_W);
 
-  -- State; lp_u and lp_d take turns and hold half an LSB of PU more, so that their upper bits are lp rounded.  Fine:
-  -- v_state rounded, as the next sample's model takes it too.
+  -- State.  lp_u and lp_d share the registers and have a bias of half an LSB of PU, so that truncation rounds lp.
+  -- fine is v_state rounded; the model of the next sample uses it.
   signal lp_next : signed(INTEGRAL_W - 1 downto 0);
   signal lp_last : signed(INTEGRAL_W - 1 downto 0);
   signal v_state : signed(STATE_W - 1 downto 0);
@@ -73,7 +74,7 @@ architecture rtl of v_dead_adaline is
 
   signal valid     : std_logic_vector(0 to LATENCY);
   signal learning  : std_logic;
-  signal free      : std_logic;                             -- no limit holds the voltage
+  signal free      : std_logic;                             -- the voltage is not at its limit
   signal measured  : std_logic;
   signal u_1       : signed(PU_W - 1 downto 0);
   signal d_1       : signed(PU_W - 1 downto 0);
@@ -84,13 +85,13 @@ architecture rtl of v_dead_adaline is
   signal strong_5  : std_logic;
   signal x_1       : signed(PU_W - 1 downto 0);
   signal room      : signed(PU_W + 1 downto 0);
-  signal diff      : signed(PU_W downto 0);                 -- complement of d_d - lp_d, of u_pi_d - lp_u
+  signal diff      : signed(PU_W downto 0);                 -- complement of d_d - lp_d, then of u_pi_d - lp_u
   signal h         : signed(PU_W - 1 downto 0);             -- d_h at clock 3, u_h from clock 7 on
   signal k_lp_1    : unsigned(k_lp'range);
   signal prod_lp   : signed(k_lp'length + PU_W downto 0);
   signal sum_lp    : signed(k_lp'length + PU_W + 1 downto 0);
   signal moved     : signed(INTEGRAL_W - 1 downto 0);       -- lp_d at clock 5, lp_u at clock 9
-  signal lp_under  : std_logic_vector(1 downto 0);          -- by halves of what is above half an LSB of PU
+  signal lp_under  : std_logic_vector(1 downto 0);          -- lp below the range of PU, one bit per half
   signal mul_a     : signed(FLUX_W - 1 downto 0);           -- fine at clock 7, e at clock 10, eta_v at clock 14
   signal mul_b     : signed(PU_W - 1 downto 0);             -- d_h at clock 7, pull at clock 14
   signal prod      : signed(PROD_W - 1 downto 0);
@@ -116,7 +117,7 @@ architecture rtl of v_dead_adaline is
   signal past_27   : std_logic;
   signal under_27  : std_logic;
 
-  -- so_far + |x|, as so_far - x for a negative x, else as so_far less the complement of x and one more.
+  -- so_far + |x|: so_far - x for a negative x, otherwise so_far - not x - 1.
   function longer (so_far : unsigned; x : signed) return unsigned is
     variable less : signed(so_far'length - 1 downto 0);
     variable both : signed(so_far'length downto 0);
@@ -126,7 +127,7 @@ architecture rtl of v_dead_adaline is
     return unsigned(both(so_far'length downto 1));
   end function;
 
-  -- Whether a positive v is at v_comp_max or past it; where it is at it, to put it there does not move it.
+  -- '1' if a positive v >= v_comp_max; if equal, setting it to v_comp_max changes nothing.
   function at_limit (v : signed; v_comp_max : unsigned) return std_logic is
     alias u       : signed(v'length - 1 downto 0) is v;
     variable room : signed(v'length - TO_LEG + 1 downto 0);
@@ -143,8 +144,8 @@ begin
   -- lp - x - 1
   room <= (resize(lp_next(INTEGRAL_W - 1 downto PU_TO_INTEGRAL), PU_W + 1) & '0') - (resize(x_1, PU_W + 1) & '1');
 
-  -- A low-pass with k_lp < 1 leaves the range of what it filters by half an LSB of PU at most: that is within
-  -- INTEGRAL at the upper end of PU, and below its lower end where lp, which is half an LSB more, has no such bit.
+  -- A low-pass with k_lp < 1 exceeds the range of its input by at most half an LSB of PU.  At the upper end INTEGRAL
+  -- has the bits for it; at the lower end lp would lose its bias of half an LSB, which lp_under detects and restores.
   moved <= sum_lp(INTEGRAL_W - 1 + DROP_LP downto DROP_LP);
 
   e_9      <= saturate(not sum(SUM_W - 1 downto DROP_MODEL), FLUX_W);
@@ -167,7 +168,7 @@ begin
       free     <= '1' when sat_d = 0 and sat_q = 0 else '0';
       measured <= voltage_known when current_at_rail = 0 else '0';
 
-      -- Clock 6 on: whether a sample is learned from
+      -- Clock 6 on: whether the Adaline learns from this sample
       learning <= run and free and measured and strong_5;
 
       -- Stages 2 to 5: size = |i_d| + |i_q|;  strong = size >= i_learn
@@ -183,7 +184,7 @@ begin
         end if;
       end if;
 
-      -- Stages 2, 3: d_h = d_d - lp_d;  stages 6, 7: u_h = u_pi_d - lp_u, which is needed last
+      -- Stages 2, 3: d_h = d_d - lp_d;  stages 6, 7: u_h = u_pi_d - lp_u, which is needed later
       if valid(1) = '1' or valid(5) = '1' then
         diff <= room(PU_W + 1 downto 1);
       end if;
@@ -265,7 +266,7 @@ begin
         fine <= resize(round_half_up(v_state, V_DEAD_ADALINE_DROP_FINE), FINE_W);
       end if;
 
-      -- Stages 20, 21: zeta where |fine| > v_thr;  stages 22, 23: sum_z = v_sum + zeta*fine
+      -- Stages 20, 21: zeta if |fine| > v_thr;  stages 22, 23: sum_z = v_sum + zeta*fine
       if valid(19) = '1' then
         adding_20 <= beyond(fine, v_thr, FINE_TO_LEG);
       end if;
@@ -303,7 +304,7 @@ begin
         sum_g <= rounding_base(v_sum, DROP_GAMMA, sum_g'length) + prod_g;
       end if;
 
-      -- Stages 27, 28: v_comp = sum_g, narrowed and limited; the rounding moves nothing past the limit
+      -- Stages 27, 28: v_comp = sum_g, narrowed and limited; the rounding cannot move a value beyond the limit
       if valid(26) = '1' then
         past_27        <= beyond(v_26, v_comp_max, TO_LEG);
         under_27       <= v_26(v_26'high) or not compensate;

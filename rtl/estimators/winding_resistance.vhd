@@ -1,6 +1,6 @@
--- Purpose: the winding's resistance from its temperature, paper 000 eq. (12), and the flux it takes in half a sample.
+-- Purpose: winding resistance from its temperature, paper 000 eq. (12), and the resistive flux drop of half a sample.
 --   r = r_s + tcr*(temp_winding - t_0);  minus_rho = -r*t_s/2
--- Without a reading, or with one outside t_min to t_max, r = r_s and temp_lost is raised.  Both products go through
+-- Without a valid reading (temp_valid = 0, or outside t_min to t_max) r = r_s and temp_lost is 1.  Both products share
 -- one multiplier and the adder behind it.
 -- Formats: temperatures S(9,6), tcr U(-6,30), t_s U(-1,18), r_s, r U(0,24), minus_rho S(-2,24); products exact.
 -- Latency: 8.  Interval: 8.
@@ -40,11 +40,11 @@ architecture rtl of winding_resistance is
   constant DROP_TCR : positive := WINDING_RESISTANCE_DROP_TCR;
   constant DROP_RHO : positive := WINDING_RESISTANCE_DROP_RHO;
 
-  -- An LSB less than half: what is rounded half up and then negated is half down.
+  -- One LSB less than half: a value that is negated after rounding half up is rounded half down.
   constant HALF_DOWN : signed(PROD_W - 1 downto 0) := (DROP_RHO - 2 downto 0 => '1', others => '0');
 
   signal valid  : std_logic_vector(0 to LATENCY);
-  signal lost_1 : std_logic_vector(2 downto 0);         -- no reading, too cold, too hot
+  signal lost_1 : std_logic_vector(2 downto 0);         -- invalid, below t_min, above t_max
   signal from_0 : signed(SLIM_W - 1 downto 0);
   signal less_0 : signed(SLIM_W - 1 downto 0);
   signal slim   : signed(SLIM_W - 1 downto 0);          -- temp_winding - t_0 at clock 1, -t_s at clock 5
@@ -53,7 +53,7 @@ architecture rtl of winding_resistance is
   signal addend : signed(PROD_W - 1 downto 0);
   signal sum    : signed(PROD_W - 1 downto 0);
 
-  -- Whether a < b, by one carry: comparisons with settings that are constants would become a tree of LUTs.
+  -- a < b with one carry chain: a comparison with a constant setting would otherwise become a tree of LUTs.
   function below (a : signed; b : signed) return std_logic is
     variable room : signed(a'length downto 0);
   begin
@@ -71,7 +71,7 @@ begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stage 1: warmer = temp_winding - t_0 and tcr;  lost = no reading to believe;  stage 2: warmer = 0 where lost
+      -- Stage 1: warmer = temp_winding - t_0, and tcr;  lost = no valid reading;  stage 2: warmer = 0 if lost
       if valid(0) = '1' or valid(4) = '1' then
         slim <= from_0 - less_0;
       end if;
@@ -94,7 +94,7 @@ begin
         sum <= addend + prod;
       end if;
 
-      -- Stage 5: r = sum, limited;  nothing but what rounds goes with the next product
+      -- Stage 5: r = sum, limited;  the addend of the next product is its rounding constant only
       if valid(4) = '1' then
         wide   <= saturate_u(sum(PROD_W - 1 downto DROP_TCR), RESISTANCE_W);
         addend <= HALF_DOWN;

@@ -1,12 +1,12 @@
--- Purpose: the handshake of an AXI4-Lite slave, one request at a time; what a request does is decided behind it.
+-- Purpose: the handshake of an AXI4-Lite slave, one request at a time; the logic behind it decides about the request.
 --
---   address (and data) -> request, held until answer -> response, held until the master takes it
+--   address (and data) -> request, held until answer -> response, held until the master accepts it
 --
--- A write is taken when its address and its data are both there.  A response stops requests of its own direction
--- until the master has taken it, so that reads and writes that both wait take turns: neither starves the other.
--- Every output to the bus leaves through a register; valid and payload stay until ready.
--- answer may come in any clock with request = '1' but must come: it decides how long the bus waits.
--- Formats: as AXI4-Lite has them, 32 bits of data.  Who refuses a read gives zero as its data.
+-- A write is accepted when both its address and its data are valid.  A pending response blocks requests of its own
+-- direction, so that pending reads and writes alternate: neither starves the other.
+-- Every output to the bus comes from a register; valid and payload stay until ready.
+-- answer may come in any clock with request = '1', but it must come: the bus waits until then.
+-- Formats: those of AXI4-Lite, 32 bits of data.  The read data of a refused read are zero, given by the logic behind.
 -- Latency: request one clock after the handshake, response one clock after answer.  Rounding: none.
 
 library ieee;
@@ -37,19 +37,19 @@ entity axi_lite_slave is
     s_axi_rresp   : out std_logic_vector(1 downto 0);
     s_axi_rvalid  : out std_logic;
     s_axi_rready  : in  std_logic;
-    request       : out std_logic;  -- the four below are a request, until answer
+    request       : out std_logic;  -- 1: a request; the four signals below are valid until answer
     write         : out std_logic;  -- 1: write, 0: read
     address       : out unsigned(ADDRESS_BITS - 1 downto 0);
     write_data    : out std_logic_vector(31 downto 0);
     strobe        : out std_logic_vector(3 downto 0);
-    answer        : in  std_logic;  -- the request is done, the two below belong to it
+    answer        : in  std_logic;  -- 1: the request is done; the two signals below are valid
     response      : in  std_logic_vector(1 downto 0);
     read_data     : in  std_logic_vector(31 downto 0)
   );
 end entity axi_lite_slave;
 
 architecture rtl of axi_lite_slave is
-  -- State, one of four at a time, each a register of its own as all else hangs on it
+  -- State, one-hot: exactly one of four registers is 1, because all other logic depends on it
   signal idle       : std_logic;
   signal take_write : std_logic;
   signal take_read  : std_logic;
@@ -69,7 +69,7 @@ begin
   process (clk)
   begin
     if rising_edge(clk) then
-      -- Ready is given for the one clock in which the master's valid already waits
+      -- Ready is 1 only in the single clock in which the master's valid is already 1
       take_write <= idle and want_write;
       take_read  <= idle and want_read and not want_write;
       answering  <= take_write or take_read or (answering and not answer);
@@ -89,8 +89,8 @@ begin
       b_valid <= (answered and writing) or (b_valid and not s_axi_bready);
       r_valid <= (answered and not writing) or (r_valid and not s_axi_rready);
 
-      -- The response register is free, or the request would not have been taken; it takes what there is until the
-      -- answer, as that comes late
+      -- The response register is free, because otherwise the request would not have been accepted.  It is loaded in
+      -- every clock until the answer, because answer arrives late and must not be in its enable
       if answering = '1' and writing = '1' then
         s_axi_bresp <= response;
       end if;

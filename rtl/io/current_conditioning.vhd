@@ -1,8 +1,8 @@
 -- Purpose: ADC codes to phase currents, i_x = gain_x * (code_x - offset_x), one multiplier for three channels.
--- Formats: code of ADC_BITS, moved to the left edge of CODE U(1,15); gain S(1,16); current PU.
--- Latency: 5 (channels b, c, a follow each other; b and c are there with out_soon).  Interval: 3.
--- Rounding: 31 fraction bits half up to 16, saturated: more than 2 per unit is no sensor scaled to its base.
--- A product is below 4 per unit, so two bits say whether it fits.
+-- Formats: code of ADC_BITS, left-aligned in CODE U(1,15); gain S(1,16); current PU.
+-- Latency: 5 (channels b, c, a one after the other; b and c are valid with out_soon).  Interval: 3.
+-- Rounding: 31 fraction bits half up to 16, saturated at 2 per unit; a sensor scaled to its base does not reach it.
+-- A product is below 4 per unit, so two bits show whether it fits.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -57,7 +57,7 @@ architecture rtl of current_conditioning is
     return shift_left(resize(code, CODE_W), CODE_W - code'length);
   end function;
 
-  -- '1' for the lowest and the highest code: the converter cannot tell how far beyond the input is.
+  -- '1' for the lowest and the highest code: the input may be beyond the range of the converter.
   function at_rail (code : unsigned) return std_logic is
   begin
     return (and code) or (nor code);
@@ -65,7 +65,7 @@ architecture rtl of current_conditioning is
 begin
   valid(0) <= in_valid;
 
-  -- The channel of the beat: b while in_valid, then c, then a
+  -- The channel of this clock: b while in_valid, then c, then a
   code_0   <= code_c when valid(1) = '1' else code_a when valid(2) = '1' else code_b;
   offset_0 <= offset_c when valid(1) = '1' else offset_a when valid(2) = '1' else offset_b;
   gain_0   <= gain_c when valid(1) = '1' else gain_a when valid(2) = '1' else gain_b;
@@ -85,13 +85,13 @@ begin
         code_1 <= code_0;
       end if;
 
-      -- Stage 2: prod = diff * gain;  rail: the channel's, behind those before it
+      -- Stage 2: prod = diff * gain;  rail: a shift register of the channels' flags
       if valid(1) = '1' or valid(2) = '1' or valid(3) = '1' then
         prod_2 <= diff_1 * gain_1;
         rail_2 <= at_rail(code_1) & rail_2(2 downto 1);
       end if;
 
-      -- Stage 3: i = prod, narrowed; b at clock 3, c at 4, a at 5.  b comes over c: the limit has a reader less.
+      -- Stage 3: i = prod, narrowed; b at clock 3, c at 4, a at 5.  b comes through c: less fan-out of the limiter.
       if valid(2) = '1' or valid(3) = '1' then
         i_c <= i_2;
         i_b <= i_c;

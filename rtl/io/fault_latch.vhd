@@ -1,13 +1,13 @@
--- Purpose: remembers which faults there were and which came first, keeps the gates off until told to forget.
---   0 to 5  what is wrong with a sample, see sample_checks
+-- Purpose: latches the faults and the first fault, and keeps the gates off until clear_trip.
+--   0 to 5  faults of a sample, see sample_checks
 --   6       no sample for watchdog clocks
 --   7       input trip
---   8       a sample came too early and was not let in: told, never a trip
--- A fault is remembered from enable on (trip always); clear_trip forgets the faults whose cause is gone.
--- first_fault holds all that tripped in the first clock with any, until nothing trips any more.
--- fault_ignore: bit x of 0 to 6 is told in the flags and does not trip; trip always does.
--- gate_clear is clear_trip one clock later, when the flags have gone, for the trip memory of the gates.
--- Formats: bits.  Latency: 1 (every clock is a sample).
+--   8       a sample came too early and was rejected: reported, never a trip
+-- Faults are latched while enable is 1 (trip always); clear_trip clears the faults whose cause is gone.
+-- first_fault contains all faults of the first clock that tripped, until nothing trips any more.
+-- fault_ignore: fault x of 0 to 6 is reported in the flags and does not trip; trip always trips.
+-- gate_clear is clear_trip one clock later, when the flags are cleared, for the trip latch of the gates.
+-- Formats: bits.  Latency: 1 (every clock is a sample).  Rounding: none.
 
 library ieee;
 use ieee.std_logic_1164.all;

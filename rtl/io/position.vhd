@@ -1,6 +1,6 @@
--- Purpose: resolver or encoder code to electrical angle, theta_me = pole_pairs*code + theta_offset.
--- Formats: code of POSITION_BITS, moved to the left edge of TURN U(0,18); reverse = 1 counts backwards.
--- Latency: 2.  Rounding: none; every operation is modulo one turn by meaning (slices drop whole turns).
+-- Purpose: resolver or encoder code to electrical angle, theta_me = pole_pairs*code + theta_offset, modulo one turn.
+-- Formats: code of POSITION_BITS, left-aligned in TURN U(0,18); reverse = 1 inverts the sense of rotation.
+-- Latency: 2.  Rounding: none; every operation is modulo one turn, because angles wrap (slices drop whole turns).
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -48,7 +48,7 @@ begin
 
       -- Stage 2: theta_me = theta_offset +- prod, modulo one turn
       if valid(1) = '1' then
-        -- -turn_1 is not turn_1 and a carry
+        -- -turn_1 = not turn_1 + 1
         sum      := (theta_offset & reverse) + ((turn_1 xor (turn_1'range => reverse)) & reverse);
         theta_me <= sum(TURN_W downto 1);
       end if;

@@ -1,10 +1,10 @@
--- Purpose: the power stage's side of the AXI top: the trip pin comes in, the six gates leave through registers.
--- trip_pin may change at any time and be as short as a flip-flop notices.  It sets `caught` without a clock, and
--- `caught` clears the gates' registers without a clock: the gates go off even if clk has stopped.  Two registers
--- (ASYNC_REG) bring it to clk as `trip`.  When the core has been told and the pin is low, `caught` lets go: always
--- just after an edge of clk, when the core's own gates are already off, and its memory keeps them off.
--- This is the one place with an asynchronous set or clear; scripts/vivado/fluxproof.xdc holds its exception.
--- The gates and sample_trigger leave together, one register behind gate_generation, so that they fit IO cells.
+-- Purpose: the power stage's side of the AXI top: the trip pin enters here, the six gates leave through registers.
+-- trip_pin may change at any time; a pulse as short as a flip-flop can detect is enough.  It sets caught without a
+-- clock, and caught clears the gate registers without a clock: the gates go off even if clk has stopped.  Two registers
+-- (ASYNC_REG) synchronise it to clk as trip.  When trip has reached the core and the pin is low, caught is cleared: on
+-- an edge of clk, when the core's own gates are already off; the core's trip latch keeps them off.
+-- This is the only asynchronous set or clear; scripts/vivado/fluxproof.xdc contains its timing exception.
+-- Gates and sample_trigger leave together, one register behind gate_generation, so that the registers fit in IO cells.
 -- Latency: gates 1; trip_pin to gates off 0, to trip 2.  Formats: bits.  Rounding: none.
 
 library ieee;
@@ -29,7 +29,7 @@ end entity power_stage;
 architecture rtl of power_stage is
   attribute async_reg : string;
 
-  -- An FPGA starts a register with a set at 1 and the others at 0: gates off before the first clock.
+  -- An FPGA initialises a register with a set to 1 and the others to 0: the gates are off before the first clock.
   signal caught : std_logic;
   signal sync_1 : std_logic;
   signal sync_2 : std_logic;

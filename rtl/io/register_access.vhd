@@ -1,16 +1,16 @@
--- Purpose: decides what a request to the registers may do, and when.
+-- Purpose: decides whether a request to the registers is allowed, and when a write takes effect.
 --
---   allowed = a register stands at the address, may be written, all strobes are set, low <= data <= high
---   store   = write and allowed and (the register counts at once or no sample is in flight)
+--   allowed = the address has a register, it is writable, all strobes are set, low <= data <= high
+--   store   = write and allowed and (the register takes effect at once or no sample is in flight)
 --
--- A write that must wait for the end of a sample waits, at most REGISTER_PATIENCE clocks: samples that leave no
--- gap at all end in SLVERR instead of a bus that hangs.  A read, a refusal and a write that counts at once never wait
--- for a sample, though AXI4-Lite answers in order: behind a write that waits they come after it.
--- Answers: OKAY; DECERR where no register stands at the address; SLVERR for a write that is not allowed or came late.
--- One comparator serves every register: its ends come from tables in register_map_pkg.
--- Formats: data as signed 32 bits; no register holds 2**31 or more.  Latency: 5 clocks without waiting; store is in
--- the clock before the edge at which the register changes.  arming comes a clock before store can: behind a register it
--- and sample_busy are all that a register needs to know, so that no long path tells it.  Rounding: none.
+-- A write that must wait for the end of a sample waits at most REGISTER_PATIENCE clocks: if samples follow each other
+-- without a gap, it ends in SLVERR instead of blocking the bus.  A read, a refusal and a write that takes effect at
+-- once never wait for a sample; but AXI4-Lite answers in order, so they wait behind a waiting write.
+-- Answers: OKAY; DECERR if no register has the address; SLVERR for a write that is not allowed or timed out.
+-- One comparator serves every register: its limits come from tables in register_map_pkg.
+-- Formats: data as signed 32 bits; no register reaches 2**31.  Latency: 5 clocks without waiting; store is valid in the
+-- clock before the edge at which the register changes.  arming comes a clock earlier: a register's enable needs only
+-- arming, registered, and sample_busy, so that no long path leads to it.  Rounding: none.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -22,17 +22,17 @@ entity register_access is
   port (
     clk         : in  std_logic;
     rst         : in  std_logic;
-    request     : in  std_logic;  -- held until answer, then low for a clock; what it carries stays two longer
+    request     : in  std_logic;  -- held until answer, then low for a clock; its payload stays two clocks longer
     write       : in  std_logic;
     address     : in  unsigned(REGISTER_ADDRESS_W - 1 downto 0);
     data        : in  std_logic_vector(31 downto 0);
     strobe      : in  std_logic_vector(3 downto 0);
-    sample_busy : in  std_logic;  -- a sample is in flight: nothing it uses may change at this edge
-    arming      : out std_logic;  -- in the next clock the register takes the data, if it may
-    store       : out std_logic;  -- the register takes the data at this edge
+    sample_busy : in  std_logic;  -- a sample is in flight: no value it uses may change at this edge
+    arming      : out std_logic;  -- 1: store is possible in the next clock
+    store       : out std_logic;  -- 1: the register is loaded at this edge
     answer      : out std_logic;
     response    : out std_logic_vector(1 downto 0);
-    found       : out std_logic  -- a register stands at the address; there three clocks after the request
+    found       : out std_logic  -- a register has this address; valid three clocks after the request
   );
 end entity register_access;
 
@@ -71,7 +71,7 @@ architecture rtl of register_access is
   signal may_stay   : std_logic;
   signal in_time    : std_logic;
 
-  -- a < b as a sign alone: a carry chain with nothing before and behind it
+  -- a < b, only the sign of the difference: nothing precedes or follows the carry chain
   function below (a, b : signed(REGISTER_LIMIT_W - 1 downto 0)) return std_logic is
     variable difference : signed(REGISTER_LIMIT_W downto 0);
   begin
@@ -89,14 +89,14 @@ begin
   process (clk)
   begin
     if rising_edge(clk) then
-      -- What a stage says of the request stays true as long as that stands; valid says since when
+      -- The results of a stage stay valid as long as the request; valid marks the clock from which they are
       begun         <= request;
       valid(1)      <= request and not begun;
       valid(2 to 4) <= valid(1 to 3);
       judged_5      <= valid(4) or waits_5;
 
-      -- Stage 1: what the tables say about the word of each sixteen;  inside = the address is aligned and in the map;
-      -- fits = a whole word, in the bits of the limits
+      -- Stage 1: the table entry of each group of 16 words;  inside = the address is aligned and within the map;
+      -- fits = all strobes set, and data within the width of the limits
       for k in ranges_t'range loop
         accesses_1(k) <= register_access_of(to_unsigned(k, REGISTER_WORD_W - 4) & word(3 downto 0));
         ranges_1(k)   <= register_range_of(to_unsigned(k, REGISTER_WORD_W - 4) & word(3 downto 0));
@@ -110,11 +110,11 @@ begin
         fits_1 <= '1';
       end if;
 
-      -- Stage 2: which of them
+      -- Stage 2: selection of the group
       access_2 <= accesses_1(to_integer(word(REGISTER_WORD_W - 1 downto 4)));
       range_2  <= ranges_1(to_integer(word(REGISTER_WORD_W - 1 downto 4)));
 
-      -- Stage 3: found = a register at the address; writable = one that software writes, and the data fit
+      -- Stage 3: found = a register at the address; writable = software may write it, and the data fit
       found      <= '0';
       writable_3 <= '0';
       between_3  <= '0';
@@ -134,7 +134,7 @@ begin
       under_4 <= below(number, low_3);
       over_4  <= below(high_3, number);
 
-      -- Stage 5: armed = allowed and not taken yet; patient where a sample can be in its way
+      -- Stage 5: armed = allowed and not stored yet; patient if a sample may delay it
       armed_5   <= allowed_4 or waits_5;
       patient_5 <= (allowed_4 and between_3) or waits_5;
 
@@ -159,8 +159,8 @@ begin
     end if;
   end process;
 
-  -- It says nothing of sample_busy, which comes late: a register that may take the data is told so for a clock more,
-  -- takes the same again or nothing, but is told no more in the clock that refuses
+  -- arming does not depend on sample_busy, which arrives late.  It therefore stays 1 for one clock after the store, in
+  -- which the register is loaded with the same data or not at all; it is 0 in the clock that refuses the write
   arming   <= allowed_4 or (patient_5 and may_stay and in_time);
   store    <= granted_5;
   answer   <= judged_5 and not waits_5;

@@ -1,15 +1,15 @@
--- Purpose: what a raw sample says that no healthy drive can say, one bit each, judged anew with every sample.
+-- Purpose: plausibility checks of a raw sample, one bit each, evaluated with every sample.
 --   0  overcurrent    |i_x| >= i_trip in any phase
 --   1  current sum    |i_a + i_b + i_c| >= sum_trip
---   2  at the rail    a code at its end, in rail_samples samples one after another
+--   2  at the rail    a code at its end in rail_samples consecutive samples
 --   3  bus low        u_dc < u_dc_min
 --   4  bus high       u_dc >= u_dc_max
 --   5  position       |code - (2*code' - code'')| >= jump_max, from the third sample after a reset on
--- sample_trip: any of them that fault_ignore does not name.
--- Formats: limits U(1,8), jump_max U(-1,13), codes in 1/2**18 turn, differences the shorter way round.
--- Latency: 4.  Interval: 3.  Rounding: values are cut (floor) to the limits' formats, |x| is the one's complement where x is
--- negative: a negative current trips one LSB later, the sum up to 3/256 later or earlier.  No overflow: the sum has
--- two bits more than its terms, the rail counter stays at its end.
+-- sample_trip: at least one fault that fault_ignore does not mask.
+-- Formats: limits U(1,8), jump_max U(-1,13), codes in 1/2**18 turn, differences as the shorter angle.
+-- Latency: 4.  Interval: 3.  Rounding: values are cut (floor) to the limits' formats; |x| is the one's complement where
+-- x is negative: a negative current trips one LSB later, the sum up to 3/256 later or earlier.  No overflow: the sum
+-- has two bits more than its terms, the rail counter saturates.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -86,7 +86,7 @@ architecture rtl of sample_checks is
     return '0';
   end function;
 
-  -- The same as a sign alone, for wide numbers: a carry chain with nothing behind it
+  -- The same for wide numbers, only the sign of the difference: nothing follows the carry chain
   function reaches_wide (x : signed; limit : unsigned) return std_logic is
     variable magnitude : signed(x'length downto 0);
     variable beyond    : signed(x'length downto 0);
@@ -125,7 +125,7 @@ begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stage 1: how far the code is from the expected one; expected = 2*code - code' for the next;  i_a + i_b
+      -- Stage 1: deviation of the code from the expected one; expected = 2*code - code' for the next sample;  i_a + i_b
       if valid(0) = '1' then
         pair_1    <= resize(a_0, LIMIT_W + 3) + b_0;
         away_1    <= signed(code_0 - expected);
@@ -138,7 +138,7 @@ begin
         end if;
       end if;
 
-      -- Stage 2: i_a + i_b + i_c;  samples at the rail
+      -- Stage 2: i_a + i_b + i_c;  consecutive samples at the rail
       if valid(1) = '1' then
         sum_2  <= pair_1 + c_0;
         railed <= (others => '0');
@@ -147,7 +147,7 @@ begin
         end if;
       end if;
 
-      -- Stage 3: each against its limit
+      -- Stage 3: comparisons with the limits
       if valid(2) = '1' then
         over_3(0)   <= reaches(a_0, i_trip);
         over_3(1)   <= reaches(b_0, i_trip);

@@ -1,9 +1,9 @@
--- Purpose: lets raw samples in no closer than the core can work on them, and tells when they stay away.
--- A strobe closer than INTERVAL clocks to the last one that entered is not let in (sample_busy), is told
--- (sample_early) and counted in early_samples, which stays at its end.
--- sample_late is up watchdog clocks after the last sample until the next one enters; watchdog = 0 is always late.
--- Formats: clocks.  Latency: 1 (every clock is a sample).
--- No wrap: the age is counted up to watchdog and no further, so that any new value of it acts at once.
+-- Purpose: rejects raw samples that come too early, and reports missing ones.
+-- A strobe less than INTERVAL clocks after the last accepted one is rejected (sample_busy), reported (sample_early) and
+-- counted in early_samples, which saturates.
+-- sample_late is 1 from watchdog clocks after the last sample until the next one enters; watchdog = 0 is always late.
+-- Formats: clocks.  Latency: 1 (every clock is a sample).  Rounding: none.
+-- The age is counted up to watchdog only, so that it cannot wrap and a new value takes effect at once.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -31,7 +31,7 @@ end entity sample_guard;
 architecture rtl of sample_guard is
   -- State
   signal hold    : unsigned(7 downto 0);
-  signal busy    : std_logic;  -- hold /= 0; a register, as what waits for the end of a sample hangs on it
+  signal busy    : std_logic;  -- hold /= 0; registered, because every write between samples depends on it
   signal last    : std_logic;  -- hold = 1
   signal age     : unsigned(19 downto 0);
   signal counted : unsigned(7 downto 0);
@@ -48,7 +48,7 @@ begin
     variable counted_v : unsigned(7 downto 0);
   begin
     if rising_edge(clk) then
-      -- Clocks until the next sample may enter, and since the last one did
+      -- Clocks until the next sample may enter, and clocks since the last one
       if entered = '1' then
         hold <= to_unsigned(INTERVAL - 1, 8);
         busy <= '1';
@@ -65,7 +65,7 @@ begin
         end if;
       end if;
 
-      -- What is told
+      -- Outputs
       counted_v := counted;
       if clear_trip = '1' then
         counted_v := (others => '0');

@@ -1,6 +1,6 @@
--- Purpose: holds one raw sample, the references and the run state, so that nothing moves while it is worked on.
+-- Purpose: latches one raw sample, the references and the run state, so that they are constant while it is processed.
 -- Everything that may change at any clock enters the core here.
--- Formats: all as they come.  Latency: 1.  Rounding: none.
+-- Formats: unchanged.  Latency: 1.  Rounding: none.
 
 library ieee;
 use ieee.std_logic_1164.all;

@@ -3,10 +3,10 @@
 --   omega_me(k) = omega_me(k-1) + k_filter*(raw(k) - omega_me(k-1))
 -- Formats: difference S(-1,18) of a turn, k_speed U(12,12), k_filter U(1,16) up to 1, state S(1,28), output PU.
 -- Latency: 6.  Interval: 4 (the state is read from stage 3 on and written at stage 6).
--- Rounding: half up; raw saturates at 2 per unit.  The state holds half an LSB of PU more than omega_me, so that its
--- upper bits are omega_me rounded; it moves between values in range by no more than their distance and needs no limit.
+-- Rounding: half up; raw saturates at 2 per unit.  The state is stored with a bias of half an LSB of PU, so that
+-- truncation rounds omega_me.  It moves towards raw by at most their distance, so it cannot leave its range.
 -- The first sample after reset has no predecessor: its difference is zero.
--- The difference is one sum: code, turned where the sensor counts backwards, and minus the last one, made beside it.
+-- The difference is one sum of the code, inverted if reverse = 1, and minus the previous code, which is stored negated.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -36,8 +36,8 @@ architecture rtl of speed is
   constant SUM_W   : positive := INTEGRAL_W + SPEED_DROP_STATE;
   constant REST_W  : positive := PU_TO_INTEGRAL + SPEED_DROP_STATE;
 
-  -- State, with minus_last and seen: omega and what is below it in the sum.  Two registers, as a DSP48's own resets to
-  -- zero and yosys takes it nevertheless for one that does not
+  -- State, with minus_last and seen: omega_me and the bits below it in the sum.  Two registers, because the register of
+  -- a DSP48 resets to zero only and yosys would use it for a state with another reset value
   signal omega_6 : signed(PU_W - 1 downto 0);
   signal rest_6  : signed(REST_W - 1 downto 0);
 
@@ -49,11 +49,11 @@ architecture rtl of speed is
   signal sum_raw_3  : signed(TURN_W + 24 downto 0);
   signal falls_2    : std_logic;
   signal raw_3      : signed(TURN_W + 24 - SPEED_DROP_RAW downto 0);
-  signal err_end_3  : signed(PU_W downto 0);  -- err of a raw beyond its range
+  signal err_end_3  : signed(PU_W downto 0);  -- err if raw is beyond its range
   signal err_4      : signed(PU_W downto 0);
   signal prod_err_5 : signed(PU_W + 18 downto 0);
 
-  -- The code, or its complement with the one that it lacks in the bit below.
+  -- The code, or its complement; the bit below the LSB adds the one that the complement lacks.
   function turned (code : unsigned; minus : std_logic) return unsigned is
   begin
     return (code xor (code'range => minus)) & minus;
@@ -72,7 +72,7 @@ begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stage 1: delta = code - last code, the shorter way round
+      -- Stage 1: delta = code - last code, the shorter angle
       if valid(0) = '1' then
         code       := turned(code_theta, reverse);
         minus      := turned(code_theta, not reverse) + 1;
@@ -88,7 +88,7 @@ begin
         falls_2    <= delta_1(delta_1'high);
       end if;
 
-      -- Stage 3: half an LSB of raw to round with;  err if raw is cut, to the end that delta points to
+      -- Stage 3: raw plus half an LSB for the rounding;  err for a saturated raw, with the sign of delta
       if valid(2) = '1' then
         sum_raw_3 <= prod_raw_2 + half(SPEED_DROP_RAW, prod_raw_2'length);
         err_end_3 <= resize(signed'(falls_2 & (PU_W - 2 downto 0 => not falls_2)), PU_W + 1) - omega_6;
@@ -107,7 +107,7 @@ begin
         prod_err_5 <= err_4 * signed('0' & k_filter);
       end if;
 
-      -- Stage 6: omega + prod_err, with half an LSB to round with
+      -- Stage 6: omega + prod_err plus half an LSB for the rounding
       if valid(5) = '1' then
         state   := omega_6 & rest_6(REST_W - 1 downto SPEED_DROP_STATE);
         sum     := prod_err_5(SUM_W - 1 downto 0) + (state & half(SPEED_DROP_STATE, SPEED_DROP_STATE));

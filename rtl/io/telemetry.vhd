@@ -1,13 +1,13 @@
--- Purpose: an AXI4-Stream packet for every sample: what the core took in, what it answered, and the sample's number.
--- A packet's words (telemetry_words) are taken from the core's live values, one a clock from TELEMETRY_WORDS_START
--- clocks after the sample on, as they were a clock before: when they are there and before the next sample's replace
--- them.  They go into a queue (packet_fifo) that the sink empties at its pace.
--- The controller never waits: a sample whose packet does not fit into the queue has none, and dropped counts it up to
--- 65535.  The samples' numbers run on, modulo 2**32, from 0 after a reset.  enable is looked at before the first word:
--- a packet once begun comes out whole.  A sample that comes less than FLUXPROOF_SAMPLE_INTERVAL clocks after the last
--- one is none.
--- Formats: all as they come, see telemetry_words.  The queue holds 2**DEPTH_BITS words.
--- Latency: the first word is shown TELEMETRY_WORDS_START + 5 clocks after sample_valid.  Rounding: none.
+-- Purpose: an AXI4-Stream packet for every sample: inputs of the core, its results, and the sample number.
+-- The words of a packet (telemetry_words) are read from the core's live values, delayed by one clock: one word per
+-- clock, from TELEMETRY_WORDS_START clocks after the sample on, when the values are valid and before the next sample
+-- replaces them.  They enter a queue (packet_fifo) that the sink empties at its rate.
+-- The controller never waits: if the packet of a sample does not fit into the queue, it is dropped; dropped counts it,
+-- up to 65535.  The sample numbers count from 0 after a reset, modulo 2**32.  enable is checked before the first word:
+-- a packet that has begun is completed.  A sample less than FLUXPROOF_SAMPLE_INTERVAL clocks after the last one is
+-- ignored and not counted.
+-- Formats: unchanged, see telemetry_words.  The queue holds 2**DEPTH_BITS words.
+-- Latency: the first word is valid TELEMETRY_WORDS_START + 5 clocks after sample_valid.  Rounding: none.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -24,8 +24,8 @@ entity telemetry is
     clk             : in  std_logic;
     rst             : in  std_logic;  -- synchronous, active high
     enable          : in  std_logic;  -- 1: send packets
-    sample_valid    : in  std_logic;  -- the raw sample below is there
-    m_axis_tready   : in  std_logic;  -- the sink takes the word
+    sample_valid    : in  std_logic;  -- 1: the raw sample below is valid
+    m_axis_tready   : in  std_logic;  -- 1: the sink accepts the word
     adc_a           : in  unsigned(ADC_BITS - 1 downto 0);  -- ADC code, phase a
     adc_b           : in  unsigned(ADC_BITS - 1 downto 0);  -- ADC code, phase b
     adc_c           : in  unsigned(ADC_BITS - 1 downto 0);  -- ADC code, phase c
@@ -36,10 +36,10 @@ entity telemetry is
     i_q_ext_in      : in  signed(PU_W - 1 downto 0);  -- current reference of torque mode, q axis
     speed_mode_in   : in  std_logic;  -- 1: speed control, 0: torque control
     temp_winding_in : in  signed(15 downto 0);  -- winding temperature, degrees Celsius
-    temp_valid_in   : in  std_logic;  -- 1: the temperature is a reading
-    clear_faults_in : in  std_logic;  -- 1: forget what is over
+    temp_valid_in   : in  std_logic;  -- 1: temp_winding is valid
+    clear_faults_in : in  std_logic;  -- 1: clear the flags whose cause is gone
     running         : in  std_logic;  -- 1: the gates are switching
-    current_at_rail : in  unsigned(2 downto 0);  -- bit x: code of phase x at its end
+    current_at_rail : in  unsigned(2 downto 0);  -- bit x: ADC code of phase x at either end
     u_dc            : in  unsigned(DUTY_W - 1 downto 0);  -- bus voltage
     theta_me        : in  unsigned(TURN_W - 1 downto 0);  -- electrical angle
     omega_me        : in  signed(PU_W - 1 downto 0);  -- electrical speed
@@ -50,21 +50,21 @@ entity telemetry is
     lambda_q        : in  signed(PU_W - 1 downto 0);  -- flux linkage, q axis
     u_d             : in  signed(PU_W - 1 downto 0);  -- voltage, d axis
     u_q             : in  signed(PU_W - 1 downto 0);  -- voltage, q axis
-    sat_d           : in  signed(1 downto 0);  -- limit that holds the d axis
-    sat_q           : in  signed(1 downto 0);  -- limit that holds the q axis
-    flux_faults     : in  unsigned(6 downto 0);  -- what has disturbed the flux estimate, see flux_monitor
-    v_dead          : in  signed(V_LEG_W - 1 downto 0);  -- leg voltage lost and not compensated
+    sat_d           : in  signed(1 downto 0);  -- active limit, d axis: 1 upper, -1 lower, 0 none
+    sat_q           : in  signed(1 downto 0);  -- active limit, q axis: 1 upper, -1 lower, 0 none
+    flux_faults     : in  unsigned(6 downto 0);  -- conditions that have disturbed the flux estimate, see flux_monitor
+    v_dead          : in  signed(V_LEG_W - 1 downto 0);  -- leg voltage loss that is not compensated
     v_comp          : in  signed(V_LEG_W - 1 downto 0);  -- leg voltage that is compensated
     psi_m           : in  signed(PU_W - 1 downto 0);  -- flux linkage of the magnets
     psi_held        : in  std_logic;  -- 1: psi_m is held
-    temp_lost       : in  std_logic;  -- 1: no believable temperature, r is r_s
+    temp_lost       : in  std_logic;  -- 1: no valid temperature, r = r_s
     compare_a       : in  unsigned(15 downto 0);  -- compare value, leg a
     compare_b       : in  unsigned(15 downto 0);  -- compare value, leg b
     compare_c       : in  unsigned(15 downto 0);  -- compare value, leg c
     m_axis_tdata    : out unsigned(31 downto 0);  -- a word of the packet
-    m_axis_tvalid   : out std_logic;  -- it is there
-    m_axis_tlast    : out std_logic;  -- it is the packet's last
-    dropped         : out unsigned(15 downto 0)  -- samples without a packet for want of room
+    m_axis_tvalid   : out std_logic;  -- 1: the word is valid
+    m_axis_tlast    : out std_logic;  -- 1: last word of the packet
+    dropped         : out unsigned(15 downto 0)  -- samples without a packet because the queue was full
   );
 end entity telemetry;
 
@@ -74,9 +74,9 @@ architecture rtl of telemetry is
   constant AGE_W   : positive := TELEMETRY_AGE_W;
 
   constant AGE_END : unsigned(AGE_W - 1 downto 0) := to_unsigned(FLUXPROOF_SAMPLE_INTERVAL, AGE_W);
-  constant NONE    : unsigned(31 downto 0)        := (others => '1');  -- the first sample is number 0
+  constant NONE    : unsigned(31 downto 0)        := (others => '1');  -- so that the first sample is number 0
 
-  -- The sample as the core holds it
+  -- The raw sample and the references, latched as in the core
   signal code_a       : unsigned(ADC_BITS - 1 downto 0);
   signal code_b       : unsigned(ADC_BITS - 1 downto 0);
   signal code_c       : unsigned(ADC_BITS - 1 downto 0);
@@ -91,7 +91,7 @@ architecture rtl of telemetry is
   signal clear_faults : std_logic;
   signal run          : std_logic;
 
-  -- What the core shows, a clock old
+  -- The core's outputs, delayed by one clock
   signal current_at_rail_1 : unsigned(2 downto 0);
   signal u_dc_1            : unsigned(DUTY_W - 1 downto 0);
   signal theta_me_1        : unsigned(TURN_W - 1 downto 0);
@@ -117,9 +117,9 @@ architecture rtl of telemetry is
 
   -- State
   signal age     : unsigned(AGE_W - 1 downto 0);  -- clocks since the sample, up to FLUXPROOF_SAMPLE_INTERVAL
-  signal free    : std_logic;  -- age is there
+  signal free    : std_logic;  -- 1: age = FLUXPROOF_SAMPLE_INTERVAL
   signal ready   : std_logic;  -- age = TELEMETRY_WORDS_START - 1
-  signal full    : std_logic;  -- drops is at its end; it counts once a sample, so that this may be a clock behind
+  signal full    : std_logic;  -- drops = 65535, a clock late: drops counts at most once per sample
   signal counter : unsigned(31 downto 0);  -- number of the sample
   signal active  : std_logic;
   signal index   : unsigned(INDEX_W - 1 downto 0);
@@ -142,7 +142,7 @@ begin
   process (clk)
   begin
     if rising_edge(clk) then
-      -- What the core shows comes from all over the chip
+      -- A register for the core's outputs, which come from distant parts of the chip
       current_at_rail_1 <= current_at_rail;
       u_dc_1            <= u_dc;
       theta_me_1        <= theta_me;
@@ -166,7 +166,7 @@ begin
       compare_b_1       <= compare_b;
       compare_c_1       <= compare_c;
 
-      -- The sample's age and number
+      -- Age and number of the sample
       if taken = '1' then
         age     <= to_unsigned(1, AGE_W);
         free    <= '0';
@@ -177,7 +177,7 @@ begin
       end if;
       ready <= '1' when age = TELEMETRY_WORDS_START - 2 else '0';
 
-      -- The packet: begun only where all of it fits
+      -- The packet begins only if all of it fits into the queue
       if active = '1' then
         index  <= index + 1;
         active <= not final;
@@ -191,7 +191,7 @@ begin
       end if;
       full <= '1' when drops = 65535 else '0';
 
-      -- Stages 1 and 2: beside the word, whether it is the last
+      -- Stages 1 and 2: the flag of the last word, delayed like the word
       valid_1 <= active;
       if active = '1' then
         last_1 <= final;

@@ -1,10 +1,10 @@
 -- Purpose: ADC code to bus voltage and to the radius of the voltage circle.
 --   u_dc  = u_dc_gain * (code_u_dc - u_dc_offset), not below zero
 --   u_max = k_u_max * u_dc
--- Formats: code of ADC_BITS, moved to the left edge of CODE U(1,15); gain S(1,16); k_u_max U(0,17).
+-- Formats: code of ADC_BITS, left-aligned in CODE U(1,15); gain S(1,16); k_u_max U(0,17).
 -- Latency: 6.  Interval: 4 (both products share a multiplier, three clocks apart).
--- Rounding: u_dc half up, saturated at 0 and 2; u_max floor, so that the circle is never drawn larger
--- than the bus allows, saturated at 1.
+-- Rounding: u_dc half up, saturated at 0 and 2; u_max floor, so that the circle is never larger than the bus allows,
+-- saturated at 1.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -49,7 +49,7 @@ begin
 
   diff_0 <= signed('0' & shift_left(resize(code_u_dc, CODE_W), CODE_W - ADC_BITS)) - signed('0' & u_dc_offset);
 
-  -- Half an LSB of u_dc to round with, in the multiplier's adder; u_max is floored
+  -- Half an LSB of u_dc for the rounding, added in the multiplier's adder; u_max is floored
   half_1 <= half(U_DC_CONDITIONING_DROP_U_DC, 36) when valid(2) = '1' else (others => '0');
   sum    <= prod + half_1;
 

@@ -1,9 +1,9 @@
--- Purpose: U_dc as 2**n / m, so that the modulator multiplies where it would divide.
+-- Purpose: U_dc as 2**n / m, so that the modulator multiplies instead of dividing.
 --   inverse = 1/u_dc = m * 2**n * 2**-17, see reciprocal
 --   inverse_beta = m_beta * 2**n * 2**-17,  m_beta = m * sqrt(3)/2
 -- Formats: u_dc U(1,16); m, m_beta U(0,17); inverse, inverse_beta U(5,17).  Latency: 27.  Interval: 27.
--- Rounding: m as reciprocal makes it, m_beta half up; the shift by n, two bits a clock, loses nothing.
--- Below 1/32 per unit the bus is taken for 1/32 and u_dc_low is raised.
+-- Rounding: m as in reciprocal, m_beta half up; the shift by n, two bits per clock, loses nothing.
+-- A bus voltage below 1/32 per unit is replaced by 1/32 and u_dc_low is 1.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -65,12 +65,12 @@ begin
         prod_22 <= signed('0' & m_21) * U_DC_PROCESSING_SQRT3_2;
       end if;
 
-      -- Stage 23: half an LSB of m_beta to round with
+      -- Stage 23: prod plus half an LSB of m_beta for the rounding
       if valid(22) = '1' then
         prod_23 <= prod_22 + half(U_DC_PROCESSING_DROP_BETA, prod_22'length);
       end if;
 
-      -- Stage 24: m, m_beta = prod, narrowed; it is below m, so it fits.  Stages 25 to 27: inverse = m * 2**n
+      -- Stage 24: m, m_beta = prod, narrowed; m_beta is below m, so it fits.  Stages 25 to 27: inverse = m * 2**n
       if valid(23) = '1' then
         inverse      <= resize(m_21, INVERSE_W);
         inverse_beta <= resize(unsigned(shift_right(prod_23, U_DC_PROCESSING_DROP_BETA)), INVERSE_W);
@@ -83,7 +83,7 @@ begin
         inverse_beta <= shift_left(inverse_beta, 1);
       end if;
 
-      -- n, at most 5, as two twos and a one; which of them is known a clock before
+      -- Shift by n, at most 5: twice by two, once by one; each selection is registered a clock before its use
       by_two <= (valid(23) and n_21(2)) or (valid(24) and (n_21(2) or n_21(1)));
       by_one <= valid(25) and n_21(0);
 

@@ -1,13 +1,13 @@
 -- Purpose: up-down carrier, six gate signals with dead time, enable and latched trip.
--- The carrier counts 0 .. CARRIER_HALF-1 and back, each value once a direction.  A leg wants to be high while
--- carrier >= CARRIER_HALF - compare.  Compare values, dead time and minimum pulse are taken over at the valley
--- only, when carrier is 0 again; sample marks the middle of the zero vector as the gates show it.
--- Dead time: a leg that changes its mind turns both gates off, the other one on dead_time clocks later; a new
--- setting counts for a dead time that has begun.
--- A dead time that is zero or not below min_pulse, or a min_pulse above half a period, is refused: the last good
--- setting stays, and before the first good one the gates stay off.
--- enable switches on at the valley and off at once; trip switches off at once and is remembered until clear_trip.
--- Latency: 1 (every clock is a sample; trip or enable to gates off in one clock).
+-- The carrier counts 0 .. CARRIER_HALF-1 and back, each value once per direction.  A leg is commanded high while
+-- carrier >= CARRIER_HALF - compare.  Compare values, dead time and minimum pulse are updated at the valley only,
+-- when the carrier is 0 again; sample marks the middle of the zero vector at the gates.
+-- Dead time: when the command of a leg changes, both gates go off, the other one on dead_time clocks later; a new
+-- setting also applies to a dead time that has begun.
+-- A dead time of zero or not below min_pulse, or a min_pulse above half a period, is refused: the last valid
+-- setting is kept; before the first valid one the gates stay off.
+-- enable switches on at the valley, off at once; trip switches off at once and is latched until clear_trip.
+-- Formats: clocks.  Latency: 1 (every clock is a sample; trip or enable to gates off in one clock).  Rounding: none.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -49,13 +49,13 @@ architecture rtl of gate_generation is
 
   constant TO_COUNT : signed(15 downto 0) := to_signed(CARRIER_HALF, 16);
 
-  -- State.  Where the carrier is and what a dead time begun needs to know is seen a clock ahead and kept in
-  -- registers, so that little stands between two of them
-  signal below       : signed(15 downto 0);  -- the carrier less CARRIER_HALF, never above -1
+  -- State.  The carrier's position and the state of a running dead time are computed one clock ahead and registered,
+  -- which keeps the logic between two registers short
+  signal below       : signed(15 downto 0);  -- carrier - CARRIER_HALF, never above -1
   signal down        : std_logic;
-  signal top         : std_logic;  -- the last clock of the way up
-  signal valley      : std_logic;  -- the last clock of the way down
-  signal middle      : std_logic;  -- the first clock of the way up
+  signal top         : std_logic;  -- last clock of the up-count
+  signal valley      : std_logic;  -- last clock of the down-count
+  signal middle      : std_logic;  -- first clock of the up-count
   signal compare     : compare_t;
   signal dead_used   : unsigned(11 downto 0);
   signal dead_is_one : std_logic;
@@ -65,9 +65,9 @@ architecture rtl of gate_generation is
   signal tripped_now : std_logic;
   signal level       : unsigned(2 downto 0);
   signal was_off     : std_logic;
-  signal changed     : unsigned(2 downto 0);  -- the leg changed its mind in the clock before
-  signal same        : unsigned(2 downto 0);  -- it was on and did not
-  signal since       : since_t;  -- clocks since then, from the second on, as long as both gates are off
+  signal changed     : unsigned(2 downto 0);  -- the leg's command changed in the previous clock
+  signal same        : unsigned(2 downto 0);  -- the leg was enabled and its command did not change
+  signal since       : since_t;  -- clocks since the change, counted from 2 while both gates are off
 
   signal count    : unsigned(15 downto 0);
   signal nothing  : signed(12 downto 0);
@@ -75,12 +75,12 @@ architecture rtl of gate_generation is
   signal good     : std_logic;
   signal on_now   : std_logic;
   signal tripping : std_logic;
-  signal lead     : lead_t;  -- by how much the carrier has passed the leg's edge
-  signal missing  : missing_t;  -- by how much the dead time is not over
+  signal lead     : lead_t;  -- carrier minus the switching edge of the leg; >= 0: high
+  signal missing  : missing_t;  -- clocks since the change minus dead time; < 0: not over yet
   signal wanted   : unsigned(2 downto 0);
   signal over     : unsigned(2 downto 0);
 begin
-  -- In good: GHDL 5 cuts a number down to the width it is compared with, so the pulse gets the number's width.
+  -- min_pulse in good is resized, because GHDL 5 truncates a number to the width of the other operand.
   count    <= unsigned(below + TO_COUNT);
   shorter  <= signed('0' & dead_time) - signed('0' & min_pulse);
   nothing  <= signed('0' & dead_time) - 1;
@@ -98,7 +98,7 @@ begin
   process (clk)
   begin
     if rising_edge(clk) then
-      -- Carrier: up, twice the top value, down, twice zero
+      -- Carrier: up, the top value twice, down, zero twice
       top    <= '1' when down = '0' and below = -2 else '0';
       valley <= '1' when down = '1' and below = 1 - CARRIER_HALF else '0';
       middle <= valley;
@@ -107,14 +107,14 @@ begin
       elsif valley = '1' then
         down <= '0';
       else
-        -- One up or, all ones, one down
+        -- +1, or -1 as all ones
         below <= below + (signed'(14 downto 0 => down) & '1');
       end if;
 
-      -- The gates leave one register behind the carrier, and so does the mark of the zero vector's middle
+      -- The gates are one register behind the carrier, and so is the mark of the zero vector's middle
       sample <= middle;
 
-      -- At the valley: what the next period works with
+      -- At the valley: compare values and settings of the next period
       running_now <= on_now;
       tripped_now <= tripping;
       if valley = '1' then
@@ -129,8 +129,8 @@ begin
       end if;
       setting_refused <= not good;
 
-      -- Legs: both gates off from the change of mind for the dead time; a gate that is on stays on when the dead
-      -- time grows
+      -- Legs: both gates are off during the dead time after a change of the command; a gate that is on stays on if the
+      -- dead time is increased
       was_off <= not on_now;
       for k in 0 to 2 loop
         level(k)     <= wanted(k);

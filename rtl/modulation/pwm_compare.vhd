@@ -1,8 +1,8 @@
 -- Purpose: duties to compare values of the carrier, compare = duty * CARRIER_HALF, short pulses dropped.
 --   2*compare < min_pulse: 0;  CARRIER_HALF - compare < min_pulse: CARRIER_HALF
--- A low end of a period counts alone, because the period before or after may be high throughout.
+-- Each low end of a period counts alone, because the period before or after may be high throughout.
 -- Formats: duty U(1,16), 0 to 1; compare 0 to CARRIER_HALF; min_pulse in clocks.
--- Latency: 7 (legs a, b, c follow each other).  Interval: 3.  The three values change together.
+-- Latency: 7 (legs a, b, c one after the other).  Interval: 3.  The three values change together.
 -- Rounding: half up to whole clocks; no overflow, duty <= 1.
 
 library ieee;
@@ -54,7 +54,7 @@ begin
   valid(0) <= in_valid;
 
   duty_0 <= duty_b when valid(1) = '1' else duty_c when valid(2) = '1' else duty_a;
-  -- Below zero where the low end is too short: a sign, for a carry chain with nothing behind it
+  -- Negative if the low end is too short; only the sign is used, so that nothing follows the carry chain
   high_end_3 <= longest_3 - signed(resize(compare_3, 18));
 
   dropped_4 <= to_unsigned(0, 16) when short_4 = '1' else HALF when long_4 = '1' else compare_4;
@@ -64,7 +64,7 @@ begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stage 1: leg by leg
+      -- Stage 1: selection of the leg
       if valid(0) = '1' or valid(1) = '1' or valid(2) = '1' then
         duty_1      <= duty_0;
         min_pulse_1 <= min_pulse;
@@ -83,7 +83,7 @@ begin
         longest_3   <= signed(resize(HALF, 18)) - signed(resize(min_pulse_2, 18));
       end if;
 
-      -- Stage 4: is a pulse of the low or of the high end too short
+      -- Stage 4: whether a low or a high pulse is too short
       if valid(3) = '1' or valid(4) = '1' or valid(5) = '1' then
         compare_4 <= compare_3;
         short_4   <= '1' when (compare_3 & '0') < min_pulse_3 else '0';

@@ -1,11 +1,11 @@
 -- Purpose: symmetrical space-vector modulation, stator voltage to three duties, without a divider.
 --   x = u_alpha/u_dc,  y = sqrt(3)/2*u_beta/u_dc,  by inverse and inverse_beta of u_dc_processing
 --   legs a = x, b = -x/2 + y, c = -x/2 - y;  duty = 1/2 + leg + mid(a,b,c)/2
--- The middle leg is a while |3x| <= |2y|; else b where x and y have one sign, c where they have not: the near one.
+-- The middle leg is a if |3x| <= |2y|; otherwise b if x and y have the same sign, c if not.
 -- Formats: products 33 fraction bits; x, y S(1,17); legs S(3,18), exact; duty U(1,16), 0 to 1.
--- Latency: 5.  Rounding: half up.  x, y come below two bus voltages: voltage_limit grants less
--- than one, as k_u_max is below 1.
--- The legs sum to zero, so leg + mid/2 is at most half the distance of two legs: below 4, two bits above a duty's sign.
+-- Latency: 5.  Rounding: half up.  x and y need no limiter: voltage_limit allows less than one bus voltage, because
+-- k_u_max is below 1.
+-- The legs sum to zero, so |leg + mid/2| is at most half the distance of two legs: below 4, two bits more than a duty.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -43,7 +43,7 @@ architecture rtl of svm is
   signal y_2       : signed(SVM_SCALED_W - 1 downto 0);
   signal alike_2   : std_logic;
   signal triple_2  : signed(LEG_W - 1 downto 0);
-  signal double_2  : signed(LEG_W - 1 downto 0);  -- 2y, or its complement where y has the sign of x
+  signal double_2  : signed(LEG_W - 1 downto 0);  -- 2y, or not 2y if x and y have the same sign
   signal apart_2   : signed(LEG_W + 1 downto 0);
   signal leg_a_3   : signed(LEG_W - 1 downto 0);
   signal leg_b_3   : signed(LEG_W - 1 downto 0);
@@ -57,7 +57,7 @@ architecture rtl of svm is
   signal minus_c_4 : signed(LEG_W - 1 downto 0);
   signal mid_4     : signed(LEG_W - 1 downto 0);
 
-  -- 1/2 + sum/4, sum being leg + mid/2 with the half LSB in it, clamped to 0..1.
+  -- 1/2 + sum/4, limited to 0..1; sum = leg + mid/2 includes half an LSB for the rounding.
   function to_duty (sum : signed) return unsigned is
     constant FLOORED : signed(sum'length - 3 downto 0) := sum(sum'high downto 2);
     variable duty    : unsigned(DUTY_W - 1 downto 0)   := (others => '0');
@@ -75,8 +75,8 @@ begin
   x_2 <= prod_x_2(SVM_DROP_SCALED + SVM_SCALED_W - 1 downto SVM_DROP_SCALED);
   y_2 <= prod_y_2(SVM_DROP_SCALED + SVM_SCALED_W - 1 downto SVM_DROP_SCALED);
 
-  -- 3x less 2y, both taken as positive, with the sign of x; a bit above the sum's, where 3x lacks that sign: there
-  -- 1 says that 2y is the larger
+  -- |3x| - |2y|, multiplied by the sign of x.  The bit above the sum's replaces the missing sign of 3x: it is 1 if
+  -- |2y| is the larger
   alike_2  <= x_2(x_2'high) xnor y_2(y_2'high);
   triple_2 <= shift_left(resize(x_2, LEG_W), 1) + x_2;
   double_2 <= shift_left(resize(y_2, LEG_W), 1) xor (LEG_W - 1 downto 0 => alike_2);
@@ -98,13 +98,13 @@ begin
         prod_y_1 <= u_beta * signed('0' & inverse_beta);
       end if;
 
-      -- Stage 2: half an LSB of x and y to round with
+      -- Stage 2: x and y plus half an LSB, which rounds them
       if valid(1) = '1' then
         prod_x_2 <= prod_x_1 + half(SVM_DROP_SCALED, PROD_W);
         prod_y_2 <= prod_y_1 + half(SVM_DROP_SCALED, PROD_W);
       end if;
 
-      -- Stage 3: legs with one more fraction bit, c as its negative; which of them is in the middle
+      -- Stage 3: legs with one more fraction bit, -c instead of c; selection of the middle leg
       if valid(2) = '1' then
         leg_a_3   <= shift_left(resize(x_2, LEG_W), 1);
         leg_b_3   <= shift_left(resize(y_2, LEG_W), 1) - x_2;
@@ -113,7 +113,7 @@ begin
         a_mid_3   <= apart_2(LEG_W + 1);
       end if;
 
-      -- Stage 4: the middle leg, with half an LSB of the duty to round with
+      -- Stage 4: the middle leg, plus half an LSB of the duty for the rounding
       if valid(3) = '1' then
         leg_a_4   <= leg_a_3;
         leg_b_4   <= leg_b_3;
@@ -121,7 +121,7 @@ begin
         mid_4     <= mid_3 + (to_signed(2 ** (SVM_DROP_DUTY - 1), LEG_W) or resize(carry_3, LEG_W));
       end if;
 
-      -- Stage 5: duty = 1/2 + leg + mid/2, narrowed and clamped to 0..1
+      -- Stage 5: duty = 1/2 + leg + mid/2, rounded and limited to 0..1
       if valid(4) = '1' then
         duty_a <= to_duty(leg_a_4 + mid_4(LEG_W - 1 downto 1));
         duty_b <= to_duty(leg_b_4 + mid_4(LEG_W - 1 downto 1));

@@ -1,7 +1,7 @@
 -- Purpose: angle at which the voltage will act, theta_out = theta_me + k_delay*omega_me, modulo one turn.
 -- k_delay = 1.5*T_s*omega_base/(2*pi): a duty acts on average 1.5 sample times after the sampling instant.
 -- Formats: theta TURN U(0,18), omega_me PU, k_delay U(0,17).
--- Latency: 1 (the sum is made behind the register of the product).
+-- Latency: 1 (the sum follows the register of the product).
 -- Rounding: product half up to TURN; the sum wraps, it is an angle.
 
 library ieee;
@@ -33,7 +33,7 @@ architecture rtl of svm_delay_compensation is
 begin
   valid(0) <= in_valid;
 
-  -- theta_me + prod, with half an LSB to round with; the slice below is the angle modulo one turn
+  -- theta_me + prod plus half an LSB for the rounding; the slice below is the angle modulo one turn
   sum_1 <= prod_1 + (signed(theta_1) & half(SVM_DELAY_COMPENSATION_DROP, SVM_DELAY_COMPENSATION_DROP));
 
   process (clk)

@@ -2,10 +2,10 @@
 --   i_alpha = (2*i_a - i_b - i_c) / 3
 --   i_beta  = (i_b - i_c) / sqrt(3)
 -- Formats: sums exact; 1/3 as S(0,-1,18), 1/sqrt(3) as S(0,0,17); PU out.
--- Latency: 5 (beta and alpha follow each other through one multiplier).  Interval: 2.
--- i_a is needed a clock after i_b and i_c; i_beta comes a clock before i_alpha, with out_soon.
--- Rounding: half up, limited to +-1.375 per unit, so that park need not limit what it turns: the base is what the
--- sensor can measure.  A product is below 4 per unit.
+-- Latency: 5 (beta, then alpha through one multiplier).  Interval: 2.
+-- i_a is needed a clock after i_b and i_c; i_beta is valid a clock before i_alpha, with out_soon.
+-- Rounding: half up, limited to +-1.375 per unit, so that park needs no limiter; the base is the measuring range of
+-- the sensor.  A product is below 4 per unit.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -47,7 +47,7 @@ architecture rtl of clarke is
   signal wide_3   : signed(PU_W downto 0);
   signal i_3      : signed(PU_W - 1 downto 0);
 
-  -- The limits are whole eighths, so those say whether x is beyond.
+  -- The limits are multiples of 1/8, so the bits from 1/8 up show whether x is beyond them.
   function limited (x : signed(PU_W downto 0)) return signed is
     constant HIGHEST : signed(PU_W - 1 downto 0)    := to_signed(CLARKE_VECTOR - 1, PU_W);
     constant EIGHTHS : signed(PU_W downto PU_W - 5) := x(PU_W downto PU_W - 5);
@@ -63,12 +63,12 @@ architecture rtl of clarke is
 begin
   valid(0) <= in_valid;
 
-  -- The component of the beat: beta while in_valid, then alpha
+  -- The component of this clock: beta while in_valid, then alpha
   first_0  <= shift_left(resize(i_a, SUM_W), 1) when valid(1) = '1' else resize(i_b, SUM_W);
   second_0 <= both_1 when valid(1) = '1' else resize(i_c, SUM_W);
 
-  -- first - second by a carry in: as a plain difference before the multiplier yosys takes it for the DSP48's
-  -- pre-adder and forgets the operands' signs
+  -- first - second with a carry input: yosys would map a plain difference in front of the multiplier to the DSP48's
+  -- pre-adder and lose the signs of the operands
   sum_0 <= (first_0 & '1') + ((not second_0) & '1');
 
   half_2 <= half(CLARKE_DROP_ALPHA, half_2'length) when valid(3) = '1' else half(CLARKE_DROP_BETA, half_2'length);
@@ -98,7 +98,7 @@ begin
         prod_2 <= sum_1 * factor_1;
       end if;
 
-      -- Stages 3, 4: half an LSB to round with
+      -- Stages 3, 4: prod plus half an LSB for the rounding
       if valid(2) = '1' or valid(3) = '1' then
         sum_3 <= prod_2(sum_3'range) + half_2;
       end if;

@@ -27,7 +27,7 @@ end entity flux_park;
 architecture rtl of flux_park is
 begin
 
-  -- A rotation forwards of the swapped axes is the rotation back.
+  -- Rotating the swapped axes forwards is the backward rotation.
   rotation : entity work.flux_rotate
     port map (
       clk       => clk,

@@ -1,11 +1,11 @@
--- Purpose: turns a flux linkage by the angle whose sine and cosine are given, two multipliers in two clocks.
+-- Purpose: rotates a flux linkage by the angle whose sine and cosine are given, with two multipliers in two clocks.
 --   out_x = x*cos_theta - y*sin_theta
 --   out_y = x*sin_theta + y*cos_theta
 -- Formats: x, y FLUX; TRIG S(1,16) within +-1; products and sums exact.
--- As rotate, but 25 bits wide: operands have two registers, of which the second may be moved behind the partial
--- products where a multiplier takes only 18 bits.  No enables: inputs stay for the interval.
--- Latency: 6.  Interval: 3.  Rounding: half up.  Saturation: a sum is at most 4 per unit, so its three top bits say
--- whether it fits; out_y comes over out_x, half as many readers of the limit.
+-- Like rotate, but 25 bits wide: operands have two registers; if a multiplier takes only 18 bits, synthesis can move
+-- the second one behind the partial products.  No enables: the inputs are constant during the interval.
+-- Latency: 6.  Interval: 3.  Rounding: half up.  Saturation: a sum is at most 4 per unit, so its three top bits show
+-- whether it fits; out_y reaches its register through out_x, which halves the fan-out of the limiter.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -37,18 +37,18 @@ architecture rtl of flux_rotate is
   signal sin_2      : signed(TRIG_W - 1 downto 0);
   signal cos_2      : signed(TRIG_W - 1 downto 0);
   signal cos_3      : signed(TRIG_W - 1 downto 0);
-  signal factor_s_1 : signed(FLUX_W - 1 downto 0);  -- at clock 1 x, at clock 2 not y
+  signal factor_s_1 : signed(FLUX_W - 1 downto 0);  -- x at clock 1, not y at clock 2
   signal factor_s_2 : signed(FLUX_W - 1 downto 0);
-  signal factor_c_2 : signed(FLUX_W - 1 downto 0);  -- at clock 2 y, at clock 3 x
+  signal factor_c_2 : signed(FLUX_W - 1 downto 0);  -- y at clock 2, x at clock 3
   signal factor_c_3 : signed(FLUX_W - 1 downto 0);
   signal prod_s_2   : signed(PROD_W - 1 downto 0);
-  signal prod_s_3   : signed(PROD_W - 1 downto 0);  -- at clock 3 of x, at clock 4 of not y
+  signal prod_s_3   : signed(PROD_W - 1 downto 0);  -- x*sin_theta at clock 3, (not y)*sin_theta at clock 4
   signal rest_2     : signed(TRIG_W - 1 downto 0);
   signal rest_3     : signed(TRIG_W - 1 downto 0);
   signal sum_s_3    : signed(PROD_W - 1 downto 0);
-  signal sum_s_4    : signed(PROD_W - 1 downto 0);  -- at clock 4 x*sin_theta, at clock 5 -y*sin_theta
+  signal sum_s_4    : signed(PROD_W - 1 downto 0);  -- x*sin_theta at clock 4, -y*sin_theta at clock 5
   signal prod_c_3   : signed(PROD_W - 1 downto 0);
-  signal prod_c_4   : signed(PROD_W - 1 downto 0);  -- at clock 4 of y, at clock 5 of x
+  signal prod_c_4   : signed(PROD_W - 1 downto 0);  -- y*cos_theta at clock 4, x*cos_theta at clock 5
   signal sum_4      : signed(PROD_W - 1 downto 0);
 begin
   valid(0) <= in_valid;
@@ -59,7 +59,7 @@ begin
   prod_c_3 <= factor_c_3 * cos_3;
   sum_4    <= prod_c_4 + sum_s_4;
 
-  -- Half an LSB to round with, then sin_theta too
+  -- Half an LSB for the rounding, in the second clock plus sin_theta
   process (all)
   begin
     rest_2 <= half(FLUX_ROTATE_DROP, TRIG_W);
@@ -73,8 +73,8 @@ begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stages 1, 2: x, then not y;  -y*sin_theta is made of not y, which is -y - 1, and the missing sin_theta: no
-      -- carry before the multiplier
+      -- Stages 1, 2: x, then not y.  -y*sin_theta = (not y)*sin_theta + sin_theta, so no carry chain precedes the
+      -- multiplier
       sin_1      <= sin_theta;
       factor_s_1 <= x;
       if valid(1) = '1' then
@@ -90,7 +90,7 @@ begin
         factor_c_2 <= y;
       end if;
 
-      -- Stages 3, 4: prod_s = x*sin_theta, then (not y)*sin_theta;  rest: half an LSB to round with, then sin_theta too
+      -- Stages 3, 4: prod_s = x*sin_theta, then (not y)*sin_theta;  rest: half an LSB, then half an LSB + sin_theta
       cos_3      <= cos_2;
       factor_c_3 <= factor_c_2;
       prod_s_3   <= prod_s_2;

@@ -28,7 +28,7 @@ end entity park;
 architecture rtl of park is
 begin
 
-  -- A rotation forwards of the swapped axes is the rotation back.
+  -- Rotating the swapped axes forwards is the backward rotation.
   rotation : entity work.rotate
     port map (
       clk       => clk,

@@ -1,11 +1,11 @@
--- Purpose: turns a vector by the angle whose sine and cosine are given, two multipliers in two clocks.
+-- Purpose: rotates a vector by the angle whose sine and cosine are given, with two multipliers in two clocks.
 --   out_x = x*cos_theta - y*sin_theta
 --   out_y = x*sin_theta + y*cos_theta
 -- Formats: x, y PU; TRIG S(1,16) within +-1; products and sums exact.
--- One multiplier for sin_theta, a clock ahead of the one for cos_theta, which adds; y is needed a clock after x, and
--- out_y comes a clock before out_x, with out_soon.  Sine and cosine serve several rotations: each holds its own.
--- Latency: 5.  Interval: 4.  Rounding: half up.  Currents and voltages come within 1.375 per unit, so they are shorter
--- than 2, however turned: no saturation.
+-- The multiplier for sin_theta works a clock ahead of the one for cos_theta, whose adder forms the sum.  y is needed
+-- a clock after x, out_y is valid a clock before out_x, with out_soon.  Each instance registers its sine and cosine.
+-- Latency: 5.  Interval: 4.  Rounding: half up.  No saturation: the components of currents and voltages are within
+-- 1.375 per unit, so the vector is shorter than 2 at every angle.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -37,19 +37,19 @@ architecture rtl of rotate is
   signal cos_1      : signed(TRIG_W - 1 downto 0);
   signal sin_1      : signed(TRIG_W - 1 downto 0);
   signal factor_s_0 : signed(PU_W - 1 downto 0);
-  signal factor_s   : signed(PU_W - 1 downto 0);    -- at clock 1 x, at clock 2 not y
+  signal factor_s   : signed(PU_W - 1 downto 0);    -- x at clock 1, not y at clock 2
   signal factor_c_1 : signed(PU_W - 1 downto 0);
-  signal factor_c   : signed(PU_W - 1 downto 0);    -- at clock 2 y, at clock 3 x
-  signal prod_s     : signed(PROD_W - 1 downto 0);  -- at clock 2 of x, at clock 3 of not y
+  signal factor_c   : signed(PU_W - 1 downto 0);    -- y at clock 2, x at clock 3
+  signal prod_s     : signed(PROD_W - 1 downto 0);  -- x*sin_theta at clock 2, (not y)*sin_theta at clock 3
   signal rest       : signed(TRIG_W - 1 downto 0);
-  signal sum_s      : signed(PROD_W - 1 downto 0);  -- at clock 3 x*sin_theta, at clock 4 -y*sin_theta
-  signal prod_c     : signed(PROD_W - 1 downto 0);  -- at clock 3 of y, at clock 4 of x
+  signal sum_s      : signed(PROD_W - 1 downto 0);  -- x*sin_theta at clock 3, -y*sin_theta at clock 4
+  signal prod_c     : signed(PROD_W - 1 downto 0);  -- y*cos_theta at clock 3, x*cos_theta at clock 4
   signal sum        : signed(PROD_W - 1 downto 0);
   signal out_3      : signed(PU_W - 1 downto 0);
 begin
   valid(0) <= in_valid;
 
-  -- -y*sin_theta is made of not y, which is -y - 1, and the missing sin_theta: no carry before the multiplier
+  -- -y*sin_theta = (not y)*sin_theta + sin_theta, so no carry chain precedes the multiplier
   factor_s_0 <= not y when valid(1) = '1' else x;
   factor_c_1 <= x when valid(2) = '1' else y;
 
@@ -73,7 +73,7 @@ begin
         factor_c <= factor_c_1;
       end if;
 
-      -- Stages 2, 3: prod_s = x*sin_theta, then (not y)*sin_theta;  rest: half an LSB to round with, then sin_theta too
+      -- Stages 2, 3: prod_s = x*sin_theta, then (not y)*sin_theta;  rest: half an LSB, then half an LSB + sin_theta
       if valid(1) = '1' or valid(2) = '1' then
         prod_s <= factor_s * sin_1;
         rest   <= half(ROTATE_DROP, TRIG_W);

@@ -1,8 +1,8 @@
--- Purpose: sine and cosine of two angles by one quarter-wave table, all outputs interpolated.
+-- Purpose: sine and cosine of two angles, one after the other, from an interpolated quarter-wave table.
 --   theta = quadrant + (address + 1/2)/4096 + delta;  sin = S + delta*C,  cos = C - delta*S
 -- Formats: table U(0,18), delta S(-10,22) radians, interpolated value 22 fraction bits, TRIG out.
--- Latency: 13, 6 for each angle: theta_out is needed when theta_me is through, whose outputs come with out_soon; its
--- own stand in a register more, as they go far and there is time.
+-- Latency: 13, 6 for each angle.  The first angle is theta_me, whose outputs are valid with out_soon; theta_out is read
+-- after it, and its outputs have one more register because they drive distant logic.
 -- Interval: 9 (one read port and one multiplier: C, S and C again are read, delta*C comes first).
 -- Rounding: product floored to 22 fraction bits, output half up; 1.0 is reached and fits, no saturation.
 
@@ -34,7 +34,7 @@ architecture rtl of sincos is
   constant FINE_W     : positive := 24;  -- S(1,22)
 
   signal valid      : std_logic_vector(0 to LATENCY);
-  signal beat       : std_logic_vector(0 to SINCOS_PASS - 1);  -- valid of either angle
+  signal beat       : std_logic_vector(0 to SINCOS_PASS - 1);  -- valid bits of both angles
   signal second     : std_logic;
   signal theta      : unsigned(TURN_W - 1 downto 0);
   signal address_0  : unsigned(SINCOS_ADDRESS_BITS - 1 downto 0);
@@ -46,7 +46,7 @@ architecture rtl of sincos is
   signal prod_3     : signed(31 downto 0);
   signal base_3     : signed(FINE_W + SINCOS_DROP_PROD - 1 downto 0);
   signal quadrant_4 : unsigned(1 downto 0);
-  signal sum_4      : signed(FINE_W + SINCOS_DROP_PROD - 1 downto 0);  -- for the sine at clock 4, the cosine at 5
+  signal sum_4      : signed(FINE_W + SINCOS_DROP_PROD - 1 downto 0);  -- sine at clock 4, cosine at 5
   signal fine_4     : signed(FINE_W - 1 downto 0);
   signal fine_s_5   : signed(FINE_W - 1 downto 0);
   signal sin_5      : signed(TRIG_W - 1 downto 0);
@@ -54,8 +54,8 @@ architecture rtl of sincos is
   signal sin_6      : signed(TRIG_W - 1 downto 0);
   signal cos_6      : signed(TRIG_W - 1 downto 0);
 
-  -- A quarter turn swaps sine and cosine and turns the sign of one, a half turn those of both.  Rounded half up: the
-  -- complement lacks one, which comes from the bit below the last together with that of the sum.
+  -- A quarter turn swaps sine and cosine and inverts the sign of one, a half turn inverts both.  Rounded half up: the
+  -- one missing in the complement comes from the bit below the LSB, together with the carry of the sum.
   function turned (own, other : signed; swap, minus : std_logic) return signed is
     constant ONE_MORE : unsigned(SINCOS_DROP_OUT downto 0) := (SINCOS_DROP_OUT => '1', 0 => minus, others => '0');
     variable v        : signed(FINE_W - 1 downto 0)        := own;
@@ -75,7 +75,7 @@ begin
   theta     <= theta_out when second = '1' else theta_me;
   address_0 <= theta(TURN_W - 3 downto DELTA_BITS) xor (SINCOS_ADDRESS_BITS - 1 downto 0 => beat(1));
 
-  -- The cosine's product is subtracted: delta has turned its sign, and what is below the cut is rounded up.
+  -- The cosine's product is subtracted: delta is already negated, so that cutting the bits below rounds the product up.
   base_3 <= signed(shift_left(resize(table_2, base_3'length), SINCOS_TABLE_SHIFT + SINCOS_DROP_PROD)) or
             signed(resize(unsigned'(SINCOS_DROP_PROD - 1 downto 0 => beat(4)), base_3'length));
   fine_4 <= sum_4(sum_4'high downto SINCOS_DROP_PROD);
@@ -89,7 +89,7 @@ begin
       valid(1 to LATENCY)        <= valid(0 to LATENCY - 1);
       beat(1 to SINCOS_PASS - 1) <= beat(0 to SINCOS_PASS - 2);
 
-      -- The second angle's turn: the three clocks in which it is read
+      -- The second angle is selected during the three clocks in which it is read
       second <= valid(SINCOS_PASS - 1) or valid(SINCOS_PASS) or valid(SINCOS_PASS + 1);
 
       -- Stages 1, 2, 3: theta = quadrant, address, low bits of delta;  c, s, c from both ends of the table
@@ -102,7 +102,7 @@ begin
         table_1 <= SINCOS_SINE(to_integer(not address_0));
       end if;
 
-      -- Stages 2, 3, 4: c, s, c wait, for a block RAM's output comes late in its clock;  delta in radians, then -delta
+      -- Stages 2, 3, 4: a register for c, s, c, as a block RAM's output arrives late;  delta in radians, then -delta
       if beat(1) = '1' or beat(2) = '1' or beat(3) = '1' then
         table_2 <= table_1;
       end if;
@@ -129,7 +129,7 @@ begin
         fine_s_5 <= fine_4;
       end if;
 
-      -- Stages 6, 12: into the quadrant, narrowed;  stage 13: the second angle's, for all that is to act then
+      -- Stages 6, 12: into the quadrant, narrowed;  stage 13: all outputs of the second angle together
       if valid(SINCOS_PASS - 1) = '1' then
         sin_theta <= sin_5;
         cos_theta <= cos_5;
