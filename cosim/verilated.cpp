@@ -1,6 +1,6 @@
 // The converted core behind a C interface, so that Python can run millions of clocks per second.
 //
-// One source for every set of generics: cosim/verilated.py writes ports.inc with a line
+// One source for every set of generics: cosim/verilator.py writes ports.inc with a line
 //     PORT(name, width, is_signed)
 // for each port of the top, and defines CORE_CLOCK, the name of its clock, and CORE_SHOWS_VALIDS where it has
 // duty_valid and values_valid.  Functions name a port by its line number, from 0.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 import zipfile
@@ -19,6 +20,7 @@ from fluxproof.golden_model.io import telemetry_words
 
 UV = Path(sys.executable).with_name("uv")
 PAPER = DRIVES / "paper001.toml"
+ROOMS = ("fluxproof", "golden_model", "plant", "cosim", "diagnosis")
 
 
 def index_settings() -> dict[str, str]:
@@ -42,7 +44,12 @@ def wheel(tmp_path_factory):
     if not UV.exists():
         pytest.skip("uv is not installed; the set-up fell back to pip")
     folder = tmp_path_factory.mktemp("wheel")
-    uv("build", "--wheel", "--quiet", "--out-dir", folder, ROOT)
+    source = folder / "source"  # a copy: setuptools leaves its build in the folder, and packs what an earlier one left
+    for name in ROOMS:
+        shutil.copytree(ROOT / name, source / name, ignore=shutil.ignore_patterns("__pycache__"))
+    for name in ("pyproject.toml", "LICENSE"):
+        shutil.copy(ROOT / name, source)
+    uv("build", "--wheel", "--quiet", "--out-dir", folder, source)
     return next(folder.glob("fluxproof-*.whl"))
 
 
@@ -71,8 +78,8 @@ def run(environment, command: str, *arguments, cwd) -> str:
 def test_wheel_holds_one_package_with_all_its_files(wheel):
     names = zipfile.ZipFile(wheel).namelist()
     assert {name.split("/")[0] for name in names if ".dist-info/" not in name} == {"fluxproof"}
-    rooms = {"fluxproof": "fluxproof", **{r: f"fluxproof/{r}" for r in ("golden_model", "plant", "cosim", "diagnosis")}}
-    for source, target in rooms.items():
+    for source in ROOMS:
+        target = source if source == "fluxproof" else f"fluxproof/{source}"
         files = [p for p in (ROOT / source).rglob("*") if p.suffix in (".py", ".html", ".css", ".cpp")]
         missing = {f"{target}/{p.relative_to(ROOT / source).as_posix()}" for p in files} - set(names)
         assert not missing, f"pyproject.toml lacks the package or data of {sorted(missing)}"

@@ -12,7 +12,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from fluxproof.checkout import RTL
-from fluxproof.cosim.verilated import CACHE, VerilatedCore, compiled
+from fluxproof.cosim.verilated import VerilatedCore
+from fluxproof.cosim.verilator import CACHE, compiled
 from fluxproof.cosim.verilog import TOP, conversion_key, convert
 from scripts.synth.yosys import SYNTH, part_of, version, yosys
 
