@@ -75,7 +75,7 @@ def run(
 ) -> Path:
     """Simulate ``toplevel`` under cocotb module ``module``; returns the folder of the run, see failure().
 
-    ``rtl`` may be another tree (a mutant's), ``extra`` files beside it (a test's own top).  Raises BuildError, see
+    ``rtl`` may be another tree (a mutant's), ``extra`` additional files (a test's own top).  Raises BuildError, see
     build().
     """
     folder = run_folder(toplevel, generics, rtl, key)

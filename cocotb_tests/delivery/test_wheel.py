@@ -68,7 +68,7 @@ def run(environment, command: str, *arguments, cwd) -> str:
     return done.stdout
 
 
-def test_wheel_holds_one_package_with_all_its_files(wheel):
+def test_wheel_contains_one_package_with_all_its_files(wheel):
     names = zipfile.ZipFile(wheel).namelist()
     assert {name.split("/")[0] for name in names if ".dist-info/" not in name} == {"fluxproof"}
     rooms = {"fluxproof": "fluxproof", **{r: f"fluxproof/{r}" for r in ("golden_model", "plant", "cosim", "diagnosis")}}
@@ -78,7 +78,7 @@ def test_wheel_holds_one_package_with_all_its_files(wheel):
         assert not missing, f"pyproject.toml lacks the package or data of {sorted(missing)}"
 
 
-def test_environment_has_nothing_of_tests_and_studies(environment):
+def test_environment_has_no_tests_or_studies(environment):
     (site,) = environment.glob("lib/python3*/site-packages")
     names = {path.name.split("-")[0].lower() for path in site.iterdir()}
     assert "fluxproof" in names
