@@ -71,8 +71,8 @@ def run(environment, command: str, *arguments, cwd) -> str:
 def test_wheel_contains_one_package_with_all_its_files(wheel):
     names = zipfile.ZipFile(wheel).namelist()
     assert {name.split("/")[0] for name in names if ".dist-info/" not in name} == {"fluxproof"}
-    folders = {"fluxproof": "fluxproof", **{r: f"fluxproof/{r}" for r in ("golden_model", "plant", "cosim", "diagnosis")}}
-    for source, target in folders.items():
+    parts = {"fluxproof": "fluxproof", **{r: f"fluxproof/{r}" for r in ("golden_model", "plant", "cosim", "diagnosis")}}
+    for source, target in parts.items():
         files = [p for p in (ROOT / source).rglob("*") if p.suffix in (".py", ".html", ".css", ".cpp")]
         missing = {f"{target}/{p.relative_to(ROOT / source).as_posix()}" for p in files} - set(names)
         assert not missing, f"pyproject.toml lacks the package or data of {sorted(missing)}"
