@@ -31,10 +31,10 @@ help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
 
 # Every other target runs this first, for what the targets on the command line use (scripts/setup/needs.sh).
-setup: ## install what every target uses: system packages, .venv, GHDL 5, Yosys (each target installs its own part)
+setup: ## install the tools that the targets use: system packages, .venv, GHDL 5, Yosys (each target installs its own part)
 	@bash scripts/setup.sh $(if $(filter setup,$(MAKECMDGOALS)),--retry) $(filter-out help clean distclean lock,$(MAKECMDGOALS))
 
-generate: setup ## write what is generated: VHDL constants, registers, AXI top, C header, component.xml, fluxproof.core
+generate: setup ## write the generated files: VHDL constants, registers, AXI top, C header, component.xml, fluxproof.core
 	$(PYTHON_RUN) -m scripts.generate $(ARGS)
 
 registers: setup ## write the registers' HTML pages and IP-XACT memory map to build/registers
@@ -64,16 +64,16 @@ real: setup ## diagnose the recordings of real drives
 	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m studies.real $(ARGS)
 	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m pytest -q -m study cocotb_tests/studies/test_real.py
 
-compare: setup ## diagnose the same cases with what one would use instead
+compare: setup ## diagnose the same cases with alternative methods
 	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m studies.compare $(ARGS)
 
 timeline: setup ## draw the timeline of one control period
 	$(PYTHON_RUN) -m studies.timeline $(ARGS)
 
-faults: setup ## hurt the drive: sensors, bus, strobes, registers; RTL against golden core
+faults: setup ## inject faults: sensors, bus, strobes, registers; RTL against golden core
 	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m studies.faults $(ARGS)
 
-mutate: setup ## plant faults in the VHDL and count those the tests catch
+mutate: setup ## plant faults in the VHDL and count those that the tests detect
 	$(PYTHON_RUN) -m scripts.mutate $(ARGS)
 
 prove: setup ## prove properties of the gates, the pipeline, the rounding, the buses, and show each a planted fault
@@ -97,9 +97,9 @@ lock: ## renew requirements.lock and requirements/ from pyproject.toml (newest v
 	.cache/lock/bin/python scripts/setup/lock.py .cache/lock/bin/uv $(ARGS)
 	rm -rf .cache/lock
 
-clean: ## remove what the targets built (build/, caches of Python)
+clean: ## remove the results of the targets (build/, caches of Python)
 	rm -rf build .pytest_cache .ruff_cache
 	find . -name __pycache__ -type d -not -path './.venv*' -not -path './.cache/*' -prune -exec rm -rf {} +
 
-distclean: clean ## remove the set-up too (.venv, .cache)
+distclean: clean ## remove the installed tools too (.venv, .cache)
 	rm -rf .venv .venv.new .venv.old .cache

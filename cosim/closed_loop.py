@@ -181,7 +181,7 @@ def build_plant(
     return SwitchingPlant(machine, Inverter(), omega_m=omega_m), sensors or described_sensors(drive)
 
 
-class Beside:
+class Comparison:
     """A device and the golden model in parallel: both get the same samples, every period is compared."""
 
     def __init__(self, device: Device, register_set):
@@ -284,19 +284,19 @@ async def cosimulate(
     gates are still compared edge by edge.
     """
     plant, duties = PlantPeriods(drive, scenario, sensors, machine), np.zeros(3)
-    beside = Beside(device, register_set)
-    await beside.start(int(scenario.enable[0]))
+    comparison = Comparison(device, register_set)
+    await comparison.start(int(scenario.enable[0]))
     for k in range(len(scenario)):
         if k in scenario.changes:
-            beside.change(scenario.changes[k])
-        got = await beside.period(plant.inputs(k), int(scenario.enable[k]))
+            comparison.change(scenario.changes[k])
+        got = await comparison.period(plant.inputs(k), int(scenario.enable[k]))
         times, words = got.edge_clocks * (plant.period_s / got.clocks), got.gate_words
         if ideal_inverter:
             times, words = centred_gates(duties, 0.0, plant.period_s)
-            duties = np.array(beside.observed[-1][-3:]) / beside.config.carrier_half
+            duties = np.array(comparison.observed[-1][-3:]) / comparison.config.carrier_half
         plant.advance(k, times, words)
         progress(k + 1, len(scenario))
-    result = beside.finish()
+    result = comparison.finish()
     result.plant = dict(zip(PLANT_SIGNALS, np.array(plant.rows).T, strict=True))
     return result
 

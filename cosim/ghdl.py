@@ -64,8 +64,8 @@ def build(toplevel: str, rtl: Path = RTL, extra=()) -> Path:
             )
         except (SystemExit, RuntimeError, subprocess.CalledProcessError) as error:
             words = (folder / "build.log").read_text().splitlines() if (folder / "build.log").exists() else []
-            told = [line for line in words if "error" in line or ".vhd:" in line] or words
-            raise BuildError(f"{toplevel} does not build: " + "\n".join(told[-12:] or [str(error)])) from error
+            errors = [line for line in words if "error" in line or ".vhd:" in line] or words
+            raise BuildError(f"{toplevel} does not build: " + "\n".join(errors[-12:] or [str(error)])) from error
         (folder / "built").touch()
     return folder
 
@@ -75,7 +75,7 @@ def run(
 ) -> Path:
     """Simulate ``toplevel`` under cocotb module ``module``; returns the folder of the run, see failure().
 
-    ``rtl`` may be another tree (a mutant's), ``extra`` files beside it (a test's own top).  Raises BuildError, see
+    ``rtl`` may be another tree (a mutant's), ``extra`` additional files (a test's own top).  Raises BuildError, see
     build().
     """
     folder = run_folder(toplevel, generics, rtl, key)

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fluxproof.checkout import recordings
-from fluxproof.cosim.closed_loop import INPUT_PORTS, Beside, Device, Result, build_plant
+from fluxproof.cosim.closed_loop import INPUT_PORTS, Comparison, Device, Result, build_plant
 from fluxproof.cosim.scenarios import RPM
 from fluxproof.golden_model import drive as drives
 from fluxproof.golden_model import fluxproof
@@ -128,12 +128,12 @@ class Replay:
 
     async def on(self, device: Device, progress: Callable[[int, int], None]) -> Result:
         """Feed the rows to the device and compare as the closed loop does."""
-        beside = Beside(device, self.registers)
-        await beside.start(1)
+        comparison = Comparison(device, self.registers)
+        await comparison.start(1)
         for k, row in enumerate(self.rows.tolist()):
-            await beside.period(dict(zip(INPUT_PORTS, row, strict=True)), 1)
+            await comparison.period(dict(zip(INPUT_PORTS, row, strict=True)), 1)
             progress(k + 1, len(self.rows))
-        return beside.finish()
+        return comparison.finish()
 
 
 def replay(recording: str, drive_file: str, carrier_half: int, rows: int | None = None) -> Replay:

@@ -1,4 +1,4 @@
-"""Runs of the core beside the golden model: the same run in Verilator and in GHDL, each in a process of its own.
+"""Runs of the core in parallel with the golden model: the same run in Verilator and in GHDL, each in its own process.
 
 A run is named by the function that makes it (see Named), so that the process that carries it out, a simulator's among
 them, can make the same one.  It leaves three files in its folder: progress, result.npz and summary.json.
@@ -47,7 +47,7 @@ Progress = Callable[[int, int], None]
 
 
 class Run(Protocol):
-    """What a device is put through, with the golden model beside it."""
+    """A run of a device, compared with the golden model."""
 
     config: Config
 

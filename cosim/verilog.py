@@ -107,7 +107,7 @@ def conversion_key(generics: Mapping[str, int], rtl: Path = RTL, top: str = TOP)
 def convert(generics: Mapping[str, int], out_dir: Path | str, rtl: Path = RTL, top: str = TOP) -> Path:
     """Writes ``out_dir``/``top``.v with these generics (the VHDL's defaults for the others) if it is stale.
 
-    Safe beside another process that writes the same file: it appears complete or not at all.
+    Safe if another process writes the same file: it appears complete or not at all.
     """
     path = Path(out_dir) / f"{top}.v"
     key = conversion_key(generics, rtl, top)

@@ -30,7 +30,7 @@ class Command(NamedTuple):
 COMMANDS = {
     "diagnose": Command("why a recording differs from its simulation", diagnose.arguments, diagnose.run),
     "dump": Command(
-        "a captured telemetry stream to what diagnose takes", dump_capture.arguments, dump_capture.run
+        "convert a captured telemetry stream to the input of diagnose", dump_capture.arguments, dump_capture.run
     ),
     "registers": Command("the registers for a drive", print_registers.arguments, print_registers.run),
 }

@@ -80,7 +80,7 @@ def test_rounding_is_half_up(drop):
         assert fixed.round_half_up(x, drop) == floor(Fraction(x, 2**drop) + Fraction(1, 2))
 
 
-def test_wraps_are_moduli():
+def test_wrap_is_modulo():
     for x in range(-70, 70):
         assert fixed.wrap(x, 4) == x % 16
         assert fixed.wrap_s(x, 4) == (x + 8) % 16 - 8

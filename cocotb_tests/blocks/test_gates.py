@@ -34,7 +34,7 @@ def random_clocks(seed: int):
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_safe_whatever_happens(seed):
+def test_gates_are_safe_under_random_inputs(seed):
     state, previous_trip, tripped_seen, switched = BLOCK.state, 0, 0, 0
     off_since = {(leg, side): 10**6 for leg in range(3) for side in ("high", "low")}
     before, in_force, accepted = (0, 0), 0, False

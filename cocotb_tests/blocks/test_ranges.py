@@ -10,7 +10,7 @@ from fluxproof.golden_model.modulation import svm
 ROUNDING = 2  # LSB that the rotation back may add to what the circle grants
 
 
-def test_modulator_is_asked_for_less_than_two_bus_voltages():
+def test_modulator_input_is_below_two_bus_voltages():
     """At every bus voltage, with the widest circle that k_u_max allows."""
     widest = u_dc_conditioning.K_U_MAX.hi
     largest = 0

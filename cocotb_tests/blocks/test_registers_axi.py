@@ -59,7 +59,7 @@ def test_generated_files_are_fresh(monkeypatch, tmp_path, capsys):
         assert f"{path.name} is stale" in capsys.readouterr().err
 
 
-def test_every_register_of_the_core_has_an_address_that_stays(monkeypatch):
+def test_register_addresses_are_fixed(monkeypatch):
     """A new register without an address is named; with one, no other moves; duplicate addresses are refused."""
     novel = {**REGISTERS, "novel": Port("novel", Format(1, 7, 8), doc="something new")}
     with pytest.raises(ValueError, match="register novel of the core has no address"):
@@ -86,7 +86,7 @@ def test_every_register_of_the_core_has_an_address_that_stays(monkeypatch):
         register_map._table("100 a 104 b 108 a")
 
 
-def test_systemrdl_says_what_the_map_says(top):
+def test_systemrdl_matches_the_register_map(top):
     """Read back by its own compiler: addresses, kinds, ranges, formats, reset values, ports."""
     read = {w.name: w for w in words(top)}
     assert list(read) == list(MAP)
@@ -124,7 +124,7 @@ def entity_ports(path: Path) -> dict[str, tuple[str, str]]:
     return ports
 
 
-def test_ports_fit_the_core():
+def test_ports_match_the_core():
     """Each input of the core but pins comes from the register file, in the same type; each status likewise."""
     core = entity_ports(RTL / "fluxproof.vhd")
     registers = entity_ports(generated.REGISTER_FILE)
@@ -162,15 +162,15 @@ def test_c_header_and_settings_compile_and_agree(tmp_path, capsys):
     command = ["gcc", "-std=c11", "-Wall", "-Wextra", "-Werror", "main.c", "-o", "main"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
-    told = subprocess.run([tmp_path / "main"], capture_output=True, text=True, check=True).stdout.splitlines()
-    assert told[: len(MAP)] == [f"{name} {register.address}" for name, register in MAP.items()]
+    printed = subprocess.run([tmp_path / "main"], capture_output=True, text=True, check=True).stdout.splitlines()
+    assert printed[: len(MAP)] == [f"{name} {register.address}" for name, register in MAP.items()]
     values = drive_registers.registers(load(PAPER)).values._asdict()
-    assert told[len(MAP) : -1] == [f"= {MAP[name].address} {value}" for name, value in values.items()]
-    assert told[-1] == "ident " + b"FLUX".hex()
+    assert printed[len(MAP) : -1] == [f"= {MAP[name].address} {value}" for name, value in values.items()]
+    assert printed[-1] == "ident " + b"FLUX".hex()
     assert listed == [{"name": n, "address": MAP[n].address, "value": v} for n, v in values.items()]
 
 
-def test_pages_and_ipxact_hold_every_register(top, tmp_path):
+def test_html_and_ipxact_contain_every_register(top, tmp_path):
     """IP-XACT is valid by the schema of IEEE 1685-2009 and has each register at its address; HTML is written."""
     page = export.html(top, tmp_path / "html")
     assert page.stat().st_size > 1000 and "V/A" in "".join(
@@ -188,7 +188,7 @@ def test_pages_and_ipxact_hold_every_register(top, tmp_path):
     etree.XMLSchema(etree.parse(schema)).assertValid(tree)
 
 
-def test_twin_refuses_and_changes_nothing():
+def test_model_refuses_without_changing_registers():
     """The model alone: a drive's registers are written and read back; a refused write changes nothing."""
     bus = RegisterFile({"adc_bits": 16, "position_bits": 16, "carrier_half": 10000, "clock_hz": 200_000_000})
     values = drive_registers.registers(load(PAPER)).values

@@ -89,7 +89,7 @@ def test_brings_the_motor_to_speed_and_stops_it(board, drive, program):
     assert f"bus {drive.inverter.dc_bus_v:.1f} V" in done.stdout
 
 
-def test_a_trip_on_the_way_ends_it(board, program):
+def test_trip_during_bring_up_stops_it(board, program):
     board = board(trip_at=0.3)
     done = board.run(program, "300")
     assert done.returncode == 1
@@ -105,8 +105,8 @@ def test_no_bus_voltage_no_gates(board, program):
     assert board.gate_word == 0
 
 
-def test_another_core_is_left_alone(drive, program):
-    for change, told in (
+def test_another_core_is_refused(drive, program):
+    for change, message in (
         (lambda b: b.registers._constant.update(identification=1), "no Fluxproof core here"),
         (lambda b: b.registers._constant.update(version=0x990000), "core version 0x990000"),
         (
@@ -117,11 +117,11 @@ def test_another_core_is_left_alone(drive, program):
         board = GoldenBoard(drive, version_word())
         change(board)
         done = board.run(program)
-        assert done.returncode == 1 and told in done.stderr, done.stderr
+        assert done.returncode == 1 and message in done.stderr, done.stderr
         assert board.number == 0 and board.registers.values["enable"] == 0
 
 
-def test_a_register_that_does_not_hold_is_noticed(drive, program):
+def test_failed_register_readback_is_reported(drive, program):
     board = GoldenBoard(drive, version_word())
     write = board.write
 

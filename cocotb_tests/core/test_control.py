@@ -119,7 +119,7 @@ def test_delay_compensation_in_both_directions(sign):
     assert settle({}) < 0.35 * settle({"k_delay": 0})
 
 
-def test_standstill_is_exactly_quiet():
+def test_duties_at_standstill_are_exactly_one_half():
     """Zero reference, zero speed: all duties are exactly one half in every period."""
     values = registers(DRIVE)
     state, mid = fluxproof.State(), 1 << 15

@@ -84,7 +84,7 @@ def check_message(capsys, path, words):
 
 
 @pytest.mark.parametrize("case", WRONG)
-def test_wrong_values_are_one_clear_line(tmp_path, capsys, case):
+def test_wrong_values_give_a_one_line_error(tmp_path, capsys, case):
     section, line, *words = WRONG[case]
     check_message(capsys, edited(tmp_path, section, line), words)
 
@@ -107,7 +107,7 @@ TEXTS = {
 
 
 @pytest.mark.parametrize("case", TEXTS)
-def test_wrong_files_are_one_clear_line(tmp_path, capsys, case):
+def test_wrong_files_give_a_one_line_error(tmp_path, capsys, case):
     text, *words = TEXTS[case]
     check_message(capsys, edited(tmp_path, None, text=text), words)
 
@@ -158,7 +158,7 @@ def test_command_line_mistakes_exit_with_2(capsys, tmp_path):
     assert capsys.readouterr().err.splitlines()[-1].startswith("fluxproof: ")
 
 
-def test_command_as_a_process_closes_its_pipe_quietly():
+def test_command_exits_quietly_on_a_closed_pipe():
     command = [sys.executable, "-m", "fluxproof.command", "registers", str(PAPER)]
     with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
         process.stdout.close()

@@ -117,7 +117,7 @@ def test_each_fault_alone(bit):
         assert gate_words(rows).any() and not column(rows, "fault_flags").any()
 
 
-def test_registers_are_written_in_peace():
+def test_faults_are_not_latched_before_enable():
     """All registers zero, as after a reset: every fault is present, none is latched before enable."""
     core = GoldenClock(fluxproof.Registers(*([0] * len(fluxproof.Registers._fields))), SET.config)
     for _ in range(4):
@@ -131,7 +131,7 @@ def test_registers_are_written_in_peace():
     assert gate_words(rows).any()
 
 
-def test_enable_does_not_help_against_a_fault():
+def test_enable_has_no_effect_during_a_fault():
     core = GoldenClock(SET.values, SET.config)
     core.advance(4)
     bad = MIDDLE | {"adc_u_dc": 0}
@@ -150,8 +150,8 @@ def test_tour_in_ghdl():
     problem = ghdl.failure(folder)
     assert problem is None, problem
     summary = json.loads((folder / "summary.json").read_text())
-    told = np.bitwise_or.reduce(summary["faults"])
-    assert set(named(int(told))) >= {"current_sum", "position", "watchdog", "trip", "early", "u_dc_low"}
+    flags = np.bitwise_or.reduce(summary["faults"])
+    assert set(named(int(flags))) >= {"current_sum", "position", "watchdog", "trip", "early", "u_dc_low"}
 
 
 @pytest.mark.parametrize(
@@ -179,8 +179,8 @@ def test_unexpected_response_is_reported():
         ({"trips": "position"}, "first fault"),
         ({"rpm": 100.0}, "rpm"),
     ):
-        told = faults.row(dataclasses.replace(case, **changed), outcome)["problems"]
-        assert any(word in line for line in told), told
+        problems = faults.row(dataclasses.replace(case, **changed), outcome)["problems"]
+        assert any(word in line for line in problems), problems
     assert any(
         "differ" in line for line in faults.row(case, dataclasses.replace(outcome, differences=1))["problems"]
     )

@@ -103,7 +103,7 @@ def test_current_model_mode_is_eq_6():
     assert view.estimate["d"][end] == pytest.approx(wanted, abs=5e-5)
 
 
-def test_restart_on_the_fly_keeps_what_was_learnt():
+def test_restart_on_the_fly_keeps_the_compensation():
     """Gates off and on below the crossover, nameplate x 1.3: the second start has the remaining error, not 30 %."""
     scene = scenario(DRIVE, 0.7, rpm={0.0: 0.0}, torque_mode=((0.0, 0.7),), off=((0.6, 0.65),), start_rpm=150)
     scene.load[:] = 150 * RPM
@@ -132,7 +132,7 @@ def faults_of(view, start: float, end: float) -> int:
     return int(np.bitwise_or.reduce(view.faults[window(start, end)]))
 
 
-def test_lost_bus_reading_is_told_and_survived():
+def test_lost_bus_reading_is_reported_and_survived():
     """U_dc reads zero for 30 ms: flag, current model meanwhile, correct afterwards; the flag can be cleared."""
     gain = NOMINAL.values.u_dc_gain
     scene = scenario(
@@ -153,7 +153,7 @@ def test_lost_bus_reading_is_told_and_survived():
     assert faults_of(view, 1.11, 1.2) == 0
 
 
-def test_saturated_current_converter_is_told_and_survived():
+def test_saturated_current_converter_is_reported_and_survived():
     """A load beyond the converters' range for 0.3 s: flag, bounded, correct again when the current is back in range."""
     small = NOMINAL.values._replace(**{f"gain_{x}": round(65536 * 3.0 / 12.5) for x in "abc"})
     sensors = Sensors(
@@ -170,7 +170,7 @@ def test_saturated_current_converter_is_told_and_survived():
     assert mean_error(view, window(1.4, 1.5)) < 0.2
 
 
-def test_absurd_parameters_are_told_and_survived():
+def test_wrong_parameters_are_reported_and_survived():
     """Inductances at the end of their registers for 0.1 s: limits, flags, no wrap, correct afterwards."""
     values = NOMINAL.values
     absurd = {"l_d": (1 << 24) - 1, "l_q": (1 << 24) - 1, "lambda_mg": 131071}
@@ -207,7 +207,7 @@ def test_flux_bandwidth_between_the_loops():
     assert rows["flux_kp"].si == pytest.approx(2 * np.pi * 100 * tau, rel=1e-3)
 
 
-def test_estimator_stays_beside_the_control_path():
+def test_estimator_runs_parallel_to_the_control_path():
     """The estimate is ready before the current regulators' output, all results before the next sample may enter."""
     times = fluxproof.schedule()
     assert times["flux"][1] + 3 <= times["current_regulators"][1]

@@ -46,7 +46,7 @@ def test_long_at_the_voltage_limit():
     assert np.count_nonzero(result.observed["sat_q"]) > 200, "the voltage circle was never reached"
 
 
-def test_samples_as_close_as_allowed():
+def test_samples_at_the_minimum_interval():
     """Random raw samples FLUXPROOF_SAMPLE_INTERVAL clocks apart: each equals the golden model."""
     skip_without_ghdl5()
     register_set = registers(drives.with_carrier(DRIVE, 100))
@@ -72,7 +72,7 @@ def test_samples_as_close_as_allowed():
         assert tuple(got.values()) == tuple(wanted)
 
 
-def test_every_register_at_its_ends():
+def test_every_register_at_its_limits():
     """Samples at the ends of their codes, registers at the ends of their ranges, in every combination: no bit differs.
 
     The RTL computes in words of the declared widths, the model in 64 bits: a wrap-around anywhere would show here.

@@ -51,7 +51,7 @@ def test_every_register_is_in_range_and_within_half_an_lsb(path):
             assert row.si == 0.0
 
 
-def test_the_papers_drive_in_numbers():
+def test_registers_of_the_papers_drive():
     """Calculated by hand from Table 2 and the bases 12.5 A, 500 V, 1256 rad/s."""
     drive = load(PAPER)
     values, config, _ = registers(drive)
@@ -83,7 +83,7 @@ def test_speed_gains_place_the_crossover(path):
 
 
 @each_drive
-def test_every_observed_signal_goes_to_si_and_back(path):
+def test_observed_signals_round_trip_through_si(path):
     drive = load(path)
     assert set(UNITS) <= set(SIGNALS) and set(OBSERVED) <= set(SIGNALS)
     for name, port in SIGNALS.items():
@@ -94,7 +94,7 @@ def test_every_observed_signal_goes_to_si_and_back(path):
     assert unit("duty_a") == "1" and to_si("duty_a", 32768, drive) == 0.5
 
 
-def test_from_si_refuses_and_angles_wrap():
+def test_from_si_refuses_out_of_range_and_wraps_angles():
     drive = load(PAPER)
     assert from_si("theta_me", -math.pi, drive) == 2**17
     with pytest.raises(ValueError, match=r"i_q_ext = 26 A is out of range: allowed is -25 to 24\.9998"):
@@ -106,7 +106,7 @@ def test_from_si_refuses_and_angles_wrap():
 
 
 @pytest.mark.parametrize("half", (8, 40, 100, 1000, 32767))
-def test_with_carrier_keeps_everything_but_the_clocks(half):
+def test_with_carrier_changes_clocks_only(half):
     drive = load(PAPER)
     scaled = with_carrier(drive, half)
     old, new = registers(drive).values, registers(scaled)

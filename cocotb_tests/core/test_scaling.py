@@ -15,7 +15,7 @@ from fluxproof.golden_model.units import from_si, si_per_lsb, to_si
 
 
 @each_drive
-def test_sensor_codes_come_out_as_amperes_and_volts(path):
+def test_sensor_codes_convert_to_amperes_and_volts(path):
     drive = load(path)
     v, config, _ = registers(drive)
     s, full = drive.sensors, 2**drive.sensors.adc_bits
@@ -81,7 +81,7 @@ def test_flux_and_rotational_voltage(path):
 
 
 @each_drive
-def test_position_steps_become_speed_and_advance(path):
+def test_position_steps_give_speed_and_angle_advance(path):
     """One code a sample, a settled filter; then the angle that this speed turns during the delay."""
     drive = load(path)
     v, config, _ = registers(drive)

@@ -145,7 +145,7 @@ def replayed_packet(samples, values, config):
     return observed[:, [fluxproof.Observed._fields.index(name) for name in PACKET]]
 
 
-def test_a_packet_comes_back(golden):
+def test_packet_round_trip(golden):
     words, samples, observed = golden
     (piece,) = parse(raw(words)).pieces
     assert len(piece) == 2500 and piece.lost == 0 and piece.byte == 0
@@ -156,7 +156,7 @@ def test_a_packet_comes_back(golden):
     assert min(piece.fields["sat_q"]) == -1 and max(piece.fields["flux_faults"]) >= 0
 
 
-def test_every_end_of_every_field_comes_back():
+def test_field_limits_round_trip():
     """Each field alone at its ends: it comes back, and no other field has moved."""
     for name in FIELDS:
         for value in {LAYOUT[name].port.fmt.lo, LAYOUT[name].port.fmt.hi}:
@@ -166,7 +166,7 @@ def test_every_end_of_every_field_comes_back():
 
 
 @pytest.mark.parametrize("cut", [1, 3, 4, 50, 95, 96, 97, 191])
-def test_begins_and_ends_anywhere(cut, golden, tmp_path):
+def test_capture_cut_at_any_byte(cut, golden, tmp_path):
     """Bytes of incomplete packets at both ends are skipped; no false difference is reported."""
     words, _, _ = golden
     data = raw(words)[cut:-cut]
@@ -183,7 +183,7 @@ def test_begins_and_ends_anywhere(cut, golden, tmp_path):
 @pytest.mark.parametrize(
     ("start", "whole"), [(1, True), (400, True), (499, True), (530, False), (1500, False)]
 )
-def test_begins_before_or_while_the_drive_runs(start, whole, tmp_path, capsys):
+def test_capture_started_before_or_during_the_run(start, whole, tmp_path, capsys):
     """Gates off since the reset: replayed completely. Begun in mid-run: only blocks without state, and reported."""
     scenario = everything(DRIVE)
     first = {f.name: getattr(scenario, f.name) for f in dataclasses.fields(scenario)}
@@ -205,7 +205,7 @@ def test_begins_before_or_while_the_drive_runs(start, whole, tmp_path, capsys):
     assert whole or "Regulators and estimators were not checked" in " ".join(notes)
 
 
-def test_lost_packets_and_the_wrap(golden, tmp_path):
+def test_lost_packets_and_number_wrap(golden, tmp_path):
     """Numbers across 2**32, packets missing before, at and after the wrap: gaps, not differences."""
     words, _, _ = golden
     kept = np.r_[0:90, 97:100, 101:2500]
@@ -222,7 +222,7 @@ def test_lost_packets_and_the_wrap(golden, tmp_path):
     )
 
 
-def test_numbers_that_go_back_make_pieces(golden, tmp_path, capsys):
+def test_decreasing_numbers_split_the_recording(golden, tmp_path, capsys):
     """A reset, after a packet and inside one; a ring buffer: pieces, the longest unless another one is requested."""
     words, _, _ = golden
     data = raw(words[:40]) + raw(words[40])[:20] + raw(words[:30]) + raw(words[:1])[:93] + raw(words[:50])
@@ -242,7 +242,7 @@ def test_numbers_that_go_back_make_pieces(golden, tmp_path, capsys):
 
 
 @pytest.mark.parametrize("word", range(COUNT))
-def test_a_wrong_bit_is_refused_or_found(word, golden, tmp_path):
+def test_wrong_bit_is_refused_or_detected(word, golden, tmp_path):
     """One bit anywhere: an error, a missing packet, or a difference that the replay locates there."""
     words, _, _ = golden
     rng = np.random.default_rng(word)
@@ -276,7 +276,7 @@ def test_a_wrong_bit_is_refused_or_found(word, golden, tmp_path):
             )
 
 
-def test_what_is_no_capture(golden, tmp_path, capsys):
+def test_files_that_are_no_capture_are_refused(golden, tmp_path, capsys):
     words, _, _ = golden
     other = renumbered(words[:5], 0)
     other[:, 0] = telemetry_words.MAGIC << 16 | 2 << 8 | COUNT
@@ -310,7 +310,7 @@ def test_what_is_no_capture(golden, tmp_path, capsys):
     ('{"registers": {}, "generics": {"adc_bits": 17}}', "generic adc_bits = 17: expected an integer from 12 to 16"),
     ('{"registers": {}, "generics": 3}', "generics: expected an object, found int"),
 ])  # fmt: skip
-def test_bad_registers_end_in_one_line(text, wanted, golden, tmp_path, capsys):
+def test_bad_registers_give_a_one_line_error(text, wanted, golden, tmp_path, capsys):
     capture, path = tmp_path / "capture.bin", tmp_path / "registers.json"
     capture.write_bytes(raw(golden[0][:3]))
     path.write_text(text)
@@ -338,7 +338,7 @@ def test_generated_files_are_fresh():
     assert int(default.group(1)) == generate_telemetry.DEPTH_BITS
 
 
-def test_a_latency_that_does_not_fit_ends_the_import(monkeypatch):
+def test_import_fails_if_a_latency_does_not_fit(monkeypatch):
     """A field read after the next sample may replace it is refused with the word's name."""
     words = telemetry_words.WORDS
     late = (*words[:3], *words[4:], words[3])  # raw codes in the last word: replaced by the next sample by then
@@ -350,7 +350,7 @@ def test_a_latency_that_does_not_fit_ends_the_import(monkeypatch):
         telemetry_words._layout()
 
 
-def test_the_documents_reader_in_c(golden, tmp_path):
+def test_c_reader_of_the_documentation(golden, tmp_path):
     """The C of docs/telemetry.md gives what the Python reader gives, for every field."""
     if shutil.which("gcc") is None:
         pytest.skip("gcc is not installed")

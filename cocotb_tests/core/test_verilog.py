@@ -229,7 +229,7 @@ def test_run_period_records_what_a_trace_shows(ghdl5):
     assert edges > 20 and fast.clock == slow.clock
 
 
-def test_set_refuses_what_does_not_fit(ghdl5):
+def test_set_refuses_values_out_of_range(ghdl5):
     core = VerilatedCore(GENERICS)
     core.set("omega_ref_in", -(1 << 17))
     assert core.get("omega_ref_in") == -(1 << 17)
@@ -259,7 +259,7 @@ def test_old_ghdl_is_refused(monkeypatch):
         verilog.find_ghdl.__wrapped__()
 
 
-def test_sources_come_in_compile_order(tmp_path):
+def test_sources_are_in_compile_order(tmp_path):
     (tmp_path / "sub").mkdir()
     (tmp_path / "a.vhd").write_text("use work.p.all; entity a is end; -- entity work.z\n x : entity work.b\n")
     (tmp_path / "sub" / "b.vhd").write_text("entity b is end entity;")

@@ -85,7 +85,7 @@ def test_one_lsb_of_psi():
     assert real * DRIVE.bases.flux_wb == pytest.approx(0.068, rel=0.02)
 
 
-def test_thermocouple_lost_or_absurd():
+def test_invalid_winding_temperature():
     """R falls back to R_0 with a flag; a valid reading takes effect; the result is never negative."""
     v = NOMINAL.values
     regs = (v.r_s, v.tcr, v.t_0, v.t_min, v.t_max, v.t_s)
@@ -97,14 +97,14 @@ def test_thermocouple_lost_or_absurd():
         assert minus_rho < 0
 
 
-def test_psi_is_held_and_says_so_at_low_speed():
+def test_psi_is_held_and_reported_at_low_speed():
     view = run(held_at(300, 0.0, I_Q, 2.0), scaled(NOMINAL, FAST))
     slow = run(held_at(30, 0.0, I_Q, 0.5), scaled(NOMINAL, FAST), state=view.result.state)
     assert slow.result.observed["psi_held"][200:].all()
     assert np.ptp(slow.psi_m[200:]) == 0 and slow.psi_m[-1] == pytest.approx(view.psi_m[-1], rel=0.05)
 
 
-def test_nothing_is_learnt_at_zero_current():
+def test_v_dead_is_held_at_zero_current():
     """Oscillation around zero current gives no negative loss; the estimate is held and damps the oscillation."""
     learnt = run(held_at(300, 0.0, I_Q, 4.0), scaled(NOMINAL, FAST))
     idle = run(held_at(300, 0.0, 0.0, 1.5), scaled(NOMINAL, FAST), state=learnt.result.state)
@@ -114,7 +114,7 @@ def test_nothing_is_learnt_at_zero_current():
     assert idle.i_q[z].std() < 0.3 * raw.i_q[z].std()
 
 
-def test_an_ideal_inverter_is_left_alone():
+def test_ideal_inverter_gets_no_compensation():
     """No dead time, no drops: estimate and compensation stay within the effect of the ripple."""
     view = run(held_at(300, 0.0, I_Q, 4.0), scaled(NOMINAL, FAST), dead_time_s=0.0, inverter=Inverter())
     assert np.abs(view.v_comp[last(1.0)]).max() < 0.03 and np.abs(view.i_d[last(1.0)]).max() < 0.02

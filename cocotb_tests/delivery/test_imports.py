@@ -34,7 +34,7 @@ def contract(folder: Path) -> subprocess.CompletedProcess:
     return subprocess.run([sys.executable, "-c", code], cwd=folder, env=environment, capture_output=True, text=True)
 
 
-def test_imports_point_one_way(tmp_path):
+def test_import_direction(tmp_path):
     done = contract(lay_out(tmp_path))
     assert done.returncode == 0, done.stdout + done.stderr
 
@@ -48,7 +48,7 @@ def test_imports_point_one_way(tmp_path):
         ("studies/blind/forms.py", "from cocotb_tests.support import board"),
     ],
 )
-def test_a_broken_arrow_is_noticed(tmp_path, file, line):
+def test_forbidden_import_is_detected(tmp_path, file, line):
     path = lay_out(tmp_path) / file
     path.write_text(path.read_text() + f"\n{line}\n")
     done = contract(tmp_path)

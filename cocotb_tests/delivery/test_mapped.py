@@ -54,7 +54,7 @@ def test_whole_netlist_equals_the_core(capsys):
         print(f"\n{CLOCKS:,} clocks x {len(mapped.outputs)} outputs of the xc7 netlist and the core are equal")
 
 
-def test_a_mapped_module_takes_the_place_of_its_own():
+def test_mapped_module_replaces_its_original():
     text = "/* head */\nmodule a\n  (input x);\n  b y (.x(x));\nendmodule\n\nmodule b\n  (input x);\nendmodule\n"
     changed = with_mapped(text, {"b": "module b(x);\n  input x;\n  wire z;\nendmodule"})
     assert changed.startswith("/* head */\nmodule a") and "  b y (.x(x));" in changed

@@ -9,7 +9,7 @@ from scripts.mutants import MUTANTS
 
 
 @pytest.mark.parametrize("mutant", MUTANTS, ids=lambda m: m[0].replace(" ", "_"))
-def test_text_of_a_planted_defect_stands(mutant):
+def test_text_of_a_planted_defect_occurs_once(mutant):
     _, file, old, new = mutant
     assert (RTL / file).read_text().count(old) == 1
     assert old != new

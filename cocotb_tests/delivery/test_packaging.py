@@ -45,7 +45,7 @@ def test_same_files_with_and_without_the_top(tmp_path):
     assert packaged.files(tmp_path / "rtl") == packaged.files()
 
 
-def test_top_says_what_is_not_connected(tmp_path):
+def test_top_reports_unconnected_ports(tmp_path):
     shutil.copytree(RTL, tmp_path / "rtl")
     path = tmp_path / "rtl" / "fluxproof.vhd"
     text = path.read_text()
@@ -62,7 +62,7 @@ def test_top_says_what_is_not_connected(tmp_path):
         axi_top.render(tmp_path / "rtl")
 
 
-def test_top_keeps_to_vhdl_93(tmp_path):
+def test_top_is_vhdl_93(tmp_path):
     """A block design takes no VHDL-2008 top as a module; what it instantiates is empty here, ports as they are."""
     widths = re.findall(
         r"^  constant \w+_W : positive := \d+;", (RTL / "generated" / "fluxproof_pkg.vhd").read_text(), re.M
@@ -96,7 +96,7 @@ def test_component_validates_and_a_damaged_one_does_not(component):
         assert not valid.validate(damaged), f"{path} may be missing"
 
 
-def test_component_tells_what_the_vhdl_has(component):
+def test_component_matches_the_vhdl(component):
     entity = read_entity(axi_top.PATH)
     ports = component.findall("s:model/s:ports/s:port", S)
     assert names(ports) == list(entity.pins)
@@ -118,7 +118,7 @@ def test_component_tells_what_the_vhdl_has(component):
         assert (int(parameters[name].text), *limits) == (generic.default, generic.low, generic.high)
 
 
-def test_interfaces_take_each_bus_pin_once(component):
+def test_interfaces_contain_each_bus_pin_once(component):
     taken = [
         e.text
         for e in component.iterfind("s:busInterfaces/s:busInterface/s:portMaps//s:physicalPort/s:name", S)

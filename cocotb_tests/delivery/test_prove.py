@@ -36,13 +36,13 @@ def own_folder(monkeypatch, tmp_path):
 
 
 @pytest.mark.parametrize("name", ["gates_trip_off", "axi_lite_stable"])
-def test_proved_and_faults_noticed(name, own_folder):
+def test_proved_and_faults_detected(name, own_folder):
     entry = judge(PROOFS[name], LIMIT)
     assert entry["pass"] and entry["mutant_caught"] and entry["covered"], entry["reason"]
     assert entry["mode"] == "prove" and len(entry["mutants"]) == len(PROOFS[name].faults) > 0
 
 
-def test_what_does_not_hold_is_not_proved(own_folder):
+def test_false_property_is_not_proved(own_folder):
     """A wrong latency is not proved; a planted change without effect is not detected."""
     from scripts.prove import pipeline
 
@@ -55,7 +55,7 @@ def test_what_does_not_hold_is_not_proved(own_folder):
     assert entry["pass"] and not entry["mutant_caught"] and "does not notice 'a comment'" in entry["reason"]
 
 
-def test_every_block_and_fault_is_there(tmp_path):
+def test_every_block_and_fault_exists(tmp_path):
     """Every sampled block has its proof, every proof a fault, and the text of every fault occurs once."""
     sampled = {name for name, block in BLOCKS.items() if not block.clocked}
     assert sampled <= {name.removeprefix("pipeline_") for name in PROOFS}

@@ -83,7 +83,7 @@ def test_modules_belong_to_the_longest_name():
     assert modules_of(text, "speed_pi", entities) == ["speed_pi", "speed_pi_3"]
 
 
-def test_a_part_has_what_it_instantiates():
+def test_part_includes_its_instances():
     text = "".join(
         f"module {name}\n  (input a);\n{body}endmodule\n"
         for name, body in (
@@ -118,7 +118,7 @@ def test_a_change_names_family_row_figure_and_both_values():
     assert len(kept.changes(one(), one(lut=900, ff=600, dsp=19, bram=0))) == 4
 
 
-def test_rows_that_come_and_go():
+def test_added_and_removed_rows():
     there, absent = one(lut=1000), {"xc7": {"svm": None}}
     assert kept.changes(absent, absent) == []
     assert kept.changes(absent, there) == ["xc7 svm: was not there"]
@@ -145,7 +145,7 @@ def test_update_keeps_the_rest_and_logs(tmp_path):
     assert now["log"][1]["changes"] == moved
 
 
-def test_update_wants_a_reason(tmp_path):
+def test_update_requires_a_reason(tmp_path):
     with pytest.raises(ValueError, match="reason"):
         kept.update(one(lut=1), "  ", "Yosys 1", tmp_path / "counts.json")
     assert not (tmp_path / "counts.json").exists()
@@ -229,7 +229,7 @@ def test_a_report_without_one_clock_and_its_path_is_an_error(change, words):
 # The real thing
 
 
-def test_small_blocks_are_as_kept():
+def test_small_blocks_match_the_stored_results():
     """Three blocks through GHDL 5 and yosys, against docs/synth/counts.json."""
     try:
         verilog.find_ghdl()

@@ -35,8 +35,8 @@ def dsp(a: list, b: list, p: list, c: list = (), pcin: list = (), block: str = "
 # Paths
 
 
-def test_the_longer_of_two_ways_is_taken():
-    """10 -> LUT -> LUT -> 21 beside 11 -> LUT -> 21."""
+def test_longest_path_is_selected():
+    """10 -> LUT -> LUT -> 21 and 11 -> LUT -> 21."""
     cells = [flip_flop("a", "0", 10), flip_flop("b", "0", 11), flip_flop("c", 21, 12)]
     cells += [lut("x", [10], 20), lut("y", [20, 11], 21)]
     path = only_path(cells, {10: ["b.first"], 12: ["b.last"]})

@@ -105,7 +105,7 @@ def test_constraints_name_registers_that_exist():
 
 
 @pytest.mark.parametrize(
-    ("script", "old", "new", "told"),
+    ("script", "old", "new", "message"),
     [
         ("package_ip.tcl", "update_compile_order", "update_compile_orders", "unknown command: update_compile_orders"),
         ("package_ip.tcl", "fluxproof.xdc", "fluxprof.xdc", "no file"),
@@ -121,7 +121,7 @@ def test_constraints_name_registers_that_exist():
         ("result.tcl", "version -short", "version -brief", "no option -brief"),
     ],
 )  # fmt: skip
-def test_stub_notices_what_is_wrong(facts, tmp_path, script, old, new, told):
+def test_stub_detects_errors(facts, tmp_path, script, old, new, message):
     """The stub rejects wrong scripts; a stub that accepts everything would prove nothing."""
     for path in ("scripts/vivado", "rtl"):
         shutil.copytree(ROOT / path, tmp_path / path)
@@ -132,10 +132,10 @@ def test_stub_notices_what_is_wrong(facts, tmp_path, script, old, new, told):
     copy.write_text(text.replace(old, new))
     run = copy if script == "package_ip.tcl" else copy.with_name("example.tcl")
     done = stubbed(facts, run, str(tmp_path / "out"))
-    assert done.returncode != 0 and told in done.stderr, done.stderr
+    assert done.returncode != 0 and message in done.stderr, done.stderr
 
 
-def test_dialog_hands_every_generic_on(facts, tmp_path):
+def test_dialog_passes_every_generic(facts, tmp_path):
     """xgui: every generic has its field, and its value reaches the model."""
     text = (ROOT / ipxact.XGUI).read_text()
     for name in axi_top.GENERICS:

@@ -296,7 +296,7 @@ def test_flux_map_of_a_linear_machine_is_the_linear_machine():
     assert mapped.omega_m == pytest.approx(plain.omega_m, abs=1e-9)
 
 
-def test_flux_map_goes_on_linearly_outside():
+def test_flux_map_extrapolates_linearly():
     machine = replace(MACHINE, flux_map=linear_map(limit=1.0))
     plant = AveragedPlant(machine, mode=IMPOSED_SPEED, i_d=5.0, i_q=-7.0)
     assert plant.i_dq == pytest.approx([5.0, -7.0], abs=1e-9)
@@ -509,7 +509,7 @@ def test_plants_agree_with_an_ideal_inverter():
     assert switched.omega_m == pytest.approx(averaged.omega_m, rel=1e-4)
 
 
-def test_zero_crossing_is_located_not_smeared():
+def test_zero_crossing_is_located():
     """All gates off: diodes drive the current to zero after t0 = L/R ln(1 + R i0 / u), then nothing."""
     inverter = Inverter(v_diode_v=0.8)
     u = 2.0 / 3.0 * (U_DC + 2 * 0.8)
@@ -544,7 +544,7 @@ def test_zero_current_clamping_weakens_the_dead_time_error():
     assert dead[3.0] > 2.0
 
 
-def test_a_floating_phase_carries_nothing_while_the_others_conduct():
+def test_floating_phase_carries_no_current():
     """Leg c's gates off, a high, b low: c floats at mid-bus plus its EMF; a and b are in series."""
     plant = SwitchingPlant(MACHINE, mode=IMPOSED_SPEED)
     word = 0b010_001
@@ -720,11 +720,11 @@ def short_run(machine, inverter=None, kind=AveragedPlant):
 
 @pytest.mark.parametrize("kind", [AveragedPlant, SwitchingPlant])
 @pytest.mark.parametrize("absent", ABSENT.values(), ids=ABSENT.keys())
-def test_a_zero_is_an_absence_to_the_bit(absent, kind):
+def test_zero_effect_equals_an_absent_one_bit_exactly(absent, kind):
     assert (short_run(replace(MACHINE, **absent), kind=kind) == short_run(MACHINE, kind=kind)).all()
 
 
-def test_a_zero_inverter_error_is_an_absence_to_the_bit():
+def test_zero_inverter_error_equals_an_absent_one_bit_exactly():
     for inverter in (Inverter(), Inverter(zero_current_a=0.3)):
         assert (short_run(MACHINE, inverter) == short_run(MACHINE)).all()
 

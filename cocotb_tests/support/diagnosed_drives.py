@@ -59,7 +59,7 @@ def scenario(plan) -> Scenario:
 
 @functools.lru_cache
 def columns(plan=GRID, machine=(), inverter=(), sensors=(), dead_time_s=0.0) -> dict[str, np.ndarray]:
-    """Canonical columns (n,) of a run; machine, inverter and sensors: ((key, value), ...) beside the nominal."""
+    """Canonical columns (n,) of a run; machine, inverter and sensors: ((key, value), ...) replace the nominal."""
     result = simulate(
         DRIVE, SET, scenario(plan), machine=dataclasses.replace(MACHINE, **dict(machine)),
         sensors=dataclasses.replace(SENSORS, **dict(sensors)), inverter=Inverter(**dict(inverter)),

@@ -1,4 +1,4 @@
-"""Made-up diagnoses, one for each verdict, with the misfit that a dead time makes; and their outputs, written."""
+"""Synthetic diagnoses, one per verdict, with the misfit of a dead time; and a function that writes their outputs."""
 
 from __future__ import annotations
 

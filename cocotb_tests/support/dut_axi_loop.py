@@ -115,7 +115,7 @@ async def check_trip(device: AxiDevice) -> dict[str, int]:
     assert read(dut.irq, False) == 1
     flags = await device.read("flags")
     assert flags & 3 == 2, f"flags {flags:#x}: running or not tripped"
-    told = {"first_fault": await device.read("first_fault")}
+    after_trip = {"first_fault": await device.read("first_fault")}
     # The watchdog has run out meanwhile: a sample first, then forget, then the gates may come again.
     dut.sample_valid.value = 1
     await ClockCycles(dut.aclk, 1)
@@ -128,7 +128,7 @@ async def check_trip(device: AxiDevice) -> dict[str, int]:
     for _ in range(4 * half):
         await ClockCycles(dut.aclk, 1)
         if read(dut.gate_high, False) or read(dut.gate_low, False):
-            return told
+            return after_trip
     raise AssertionError("no gate came on after clear_trip and enable")
 
 
@@ -146,14 +146,14 @@ async def over_the_registers(dut):
     rows = np.stack([result.observed[name] for name in Observed._fields], axis=1).tolist()
     dropped = await device.read("telemetry_dropped")
     sent = check_stream(device, rows, dropped)
-    told = await check_trip(device)
+    after_trip = await check_trip(device)
     summary = {
         "periods": result.periods_compared,
         "packets": sent,
         "dropped": dropped,
         "polled": device.polled,
         "gate_edges": len(result.gate_edges),
-        **told,
+        **after_trip,
     }
     with open("summary.json", "w") as stream:
         json.dump(summary, stream)

@@ -2,8 +2,8 @@
 --   lp_u += k_lp*(u_pi_d - lp_u), u_h = u_pi_d - lp_u;  lp_d += k_lp*(d_d - lp_d), d_h = d_d - lp_d
 --   e = u_h - v_dead*d_h;  v_dead += eta_v*d_h*e;  v_sum += zeta*v_dead while |v_dead| > v_thr
 --   v_comp = limit(gamma*v_dead + v_sum);  v_leg = v_comp + v_dead
--- v_dead is within +-v_comp_max; v_sum and v_comp from zero to v_comp_max, reported by v_comp_limited.  Everything is
--- held while the voltage is at its limit, a converter at its end, the voltage not known, the gates off or
+-- v_dead is within +-v_comp_max; v_sum and v_comp from zero to v_comp_max, reported by v_comp_limited.  v_dead and
+-- v_sum are held while the voltage is at its limit, a converter at its end, the voltage not known, the gates off or
 -- |i_d| + |i_q| < i_learn.
 -- The filters share a multiplier, fine*d_h, d_h*e and eta_v*pull another, each with the adder behind it.
 -- Formats: lp S(1,28), u_h and d_h PU, e FLUX, d_h*e S(-4,21), v_dead and v_sum S(-1,38), v_comp and v_leg V_LEG.

@@ -80,7 +80,7 @@ architecture rtl of gate_generation is
   signal wanted   : unsigned(2 downto 0);
   signal over     : unsigned(2 downto 0);
 begin
-  -- min_pulse in good is resized, because GHDL 5 truncates a number to the width of the other operand.
+  -- min_pulse in good is resized, because GHDL 5 truncates an integer to the width of the other operand.
   count    <= unsigned(below + TO_COUNT);
   shorter  <= signed('0' & dead_time) - signed('0' & min_pulse);
   nothing  <= signed('0' & dead_time) - 1;

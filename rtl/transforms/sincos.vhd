@@ -75,7 +75,7 @@ begin
   theta     <= theta_out when second = '1' else theta_me;
   address_0 <= theta(TURN_W - 3 downto DELTA_BITS) xor (SINCOS_ADDRESS_BITS - 1 downto 0 => beat(1));
 
-  -- The cosine's product is subtracted: delta is already negated, so that cutting the bits below rounds the product up.
+  -- The cosine needs -floor(delta*S) = ceil(-delta*S): delta is already negated, and the ones below the cut round up.
   base_3 <= signed(shift_left(resize(table_2, base_3'length), SINCOS_TABLE_SHIFT + SINCOS_DROP_PROD)) or
             signed(resize(unsigned'(SINCOS_DROP_PROD - 1 downto 0 => beat(4)), base_3'length));
   fine_4 <= sum_4(sum_4'high downto SINCOS_DROP_PROD);

@@ -101,6 +101,11 @@ def check(
         raise ValueError(f"{where} and GROUPS of scripts/synth/groups.py: " + "; ".join(problems))
 
 
+def file_of(entity: str, rtl: Path = RTL) -> Path | None:
+    """The entity's VHDL file, in whichever folder below ``rtl``; None where there is none."""
+    return next(rtl.rglob(f"{entity}.vhd"), None)
+
+
 def top_of(rtl: Path = RTL) -> str:
-    """fluxproof_axi where it is there, else the core."""
-    return AXI_TOP if (rtl / f"{AXI_TOP}.vhd").exists() else CORE
+    """fluxproof_axi if its file exists, else the core."""
+    return AXI_TOP if file_of(AXI_TOP, rtl) else CORE

@@ -15,7 +15,7 @@ from fluxproof.checkout import RTL
 from fluxproof.cosim.sources import rtl_sources
 from fluxproof.cosim.verilog import synthesize
 from scripts.synth.count import Count, count, read_cells
-from scripts.synth.groups import BETWEEN, CORE, GROUPS, OUTSIDE, check, instances, top_of
+from scripts.synth.groups import BETWEEN, CORE, GROUPS, OUTSIDE, check, file_of, instances, top_of
 from scripts.synth.netlist import Netlist, marks, read
 
 FAMILIES = ("xc7", "xc6v", "xcup")
@@ -105,7 +105,7 @@ class Design:
         """The blocks as flattened names begin: those of the core, and those beside it in the AXI top."""
         if self.top == CORE:
             return self.core_labels
-        labels = instances(self.rtl / f"{self.top}.vhd")
+        labels = instances(file_of(self.top, self.rtl))
         core = next(label for label, entity in labels.items() if entity == CORE)
         return [label for label in labels if label != core] + [f"{core}.{label}" for label in self.core_labels]
 

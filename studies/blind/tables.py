@@ -56,12 +56,12 @@ def by_effect(cases) -> dict:
         for effect in t["effects"]:
             name = effect["name"]
             row = table[name]
-            told = t["identifiable"]["effects"].get(name, False)
+            separable = t["identifiable"]["effects"].get(name, False)
             row["present"] += 1
-            row["identifiable"] += told
+            row["identifiable"] += separable
             where = "asserted" if name in asserted(a) else "tied" if name in tied(a) else "missed"
             row[where] += 1
-            row[f"identifiable_{where}"] += told
+            row[f"identifiable_{where}"] += separable
         for name in asserted(a) - true_names(t):
             table[name]["false"] += 1
     return {name: dict(table[name]) for name in sorted(table)}

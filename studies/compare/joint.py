@@ -82,8 +82,8 @@ def fit(data: Data, rows: int) -> Joint:
     found = least_squares(residual, np.zeros(len(model.names)), jacobian, method="trf", max_nfev=6)
     s2 = 2.0 * found.cost / max(len(y) - len(found.x), 1)
     _, s, vt = np.linalg.svd(found.jac, full_matrices=False)
-    told = s > SINGULAR * s[0]
-    spread = np.where(told, 1.0 / np.where(told, s, 1.0), 1e6)
+    determined = s > SINGULAR * s[0]
+    spread = np.where(determined, 1.0 / np.where(determined, s, 1.0), 1e6)
     covariance = s2 * (vt.T * spread**2) @ vt
     rms = np.sqrt(np.mean(found.jac**2, axis=0))
     values, covariances, impact = {}, {}, {}

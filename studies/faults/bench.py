@@ -66,7 +66,7 @@ class Case:
 
     name: str
     text: str
-    hurt: Callable[[Plan], None] = lambda plan: None
+    disturb: Callable[[Plan], None] = lambda plan: None
     bus: Callable[[int], float] | None = None  # [V] by period
     trips: str | None = None
     flags: tuple[str, ...] = ()  # flags expected just before the first clear
@@ -196,7 +196,7 @@ def run(case: Case, core: Core, drive, register_set) -> Outcome:
         plan.strobes = {SAMPLE_DELAY: {}}
         if k in case.clears:
             plan.pulse("clear_trip", CLEAR_AT)
-        case.hurt(plan)
+        case.disturb(plan)
         words = gate_words(_play(plan, pair, references, period))
         edges = np.flatnonzero(np.diff(words, prepend=-1))
         times = edges * (drive.sample_time_s / period)

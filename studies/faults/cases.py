@@ -15,12 +15,12 @@ NOISE = {"adc_a": 0, "adc_b": 65535, "adc_c": 12345, "adc_u_dc": 0, "position_co
 JUMP_CODES = 65536 // 12  # 30 degrees of the shaft
 
 
-def during(hurt: Callable[[Plan], None], start: int = START, stop: int = STOP) -> Callable[[Plan], None]:
-    """Apply ``hurt`` in the periods from ``start`` to ``stop`` only."""
+def during(disturb: Callable[[Plan], None], start: int = START, stop: int = STOP) -> Callable[[Plan], None]:
+    """Apply ``disturb`` in the periods from ``start`` to ``stop`` only."""
 
     def only(plan: Plan) -> None:
         if start <= plan.k < stop:
-            hurt(plan)
+            disturb(plan)
 
     return only
 
@@ -34,13 +34,13 @@ def holding(name: str, start: int = START, stop: int = STOP) -> Callable[[Plan],
     """A code that is frozen at its value of period ``start``."""
     last: dict[str, int] = {}
 
-    def hurt(plan: Plan) -> None:
+    def disturb(plan: Plan) -> None:
         if plan.k == start:
             last[name] = plan.codes[name]
         if start <= plan.k < stop:
             plan.codes[name] = last[name]
 
-    return hurt
+    return disturb
 
 
 def jump(plan: Plan) -> None:
@@ -104,13 +104,13 @@ def tour() -> Case:
         during(code("adc_u_dc", 0), 66, 70),
     ]
 
-    def hurt(plan: Plan) -> None:
+    def disturb(plan: Plan) -> None:
         for each in hurts:
             each(plan)
 
     clears = (18, 28, 42, 50, 60, 68, 76)  # at 68 the bus fault is still present
     text = "a sequence of faults"
-    return Case("tour", text, hurt, trips="current_sum", start=10, stop=70, clears=clears, periods=90)
+    return Case("tour", text, disturb, trips="current_sum", start=10, stop=70, clears=clears, periods=90)
 
 
 # Register writes: each register at both ends of its range, in blocks of periods after a start without faults.
@@ -123,7 +123,7 @@ def extremes(register_set) -> Case:
     """Every register at both ends while the drive runs: four periods, then trip, the old value, clear."""
     usual = register_set.values._asdict()
 
-    def hurt(plan: Plan) -> None:
+    def disturb(plan: Plan) -> None:
         number, phase = divmod(plan.k - QUIET, BLOCK)
         if not 0 <= number < len(ENDS):
             return
@@ -139,7 +139,7 @@ def extremes(register_set) -> Case:
 
     text = "each register at both ends of its range"
     return Case(
-        "register writes", text, hurt, clears=(), start=QUIET, periods=QUIET + BLOCK * len(ENDS) + 200
+        "register writes", text, disturb, clears=(), start=QUIET, periods=QUIET + BLOCK * len(ENDS) + 200
     )
 
 

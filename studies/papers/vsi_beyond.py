@@ -78,9 +78,9 @@ def both_papers() -> Experiment:
     found, rows = [], []
     for rpm in (60, 100, 183, 239, 400):
         errors = {}
-        for name, register_set, told in (("without", without(own), np.nan), ("with", faster, 80.0)):
+        for name, register_set, temperature in (("without", without(own), np.nan), ("with", faster, 80.0)):
             scene = held_at(rpm, 0.0, 3.7, 6.0, drive)
-            scene = dataclasses.replace(scene, temp_winding=np.full(len(scene), told))
+            scene = dataclasses.replace(scene, temp_winding=np.full(len(scene), temperature))
             options = {"dead_time_s": drive.inverter.dead_time_s, "mode": IMPOSED_SPEED}
             view = vsi_bench.trace(simulate(drive, register_set, scene, hot, **options), drive)
             z = last(0.5)
