@@ -28,7 +28,7 @@ PYTHON_RUN := .venv/bin/python
 .PHONY: help setup generate test demo papers bench blind real compare timeline mutate verilog synth ecp5 lint registers package prove faults lock clean distclean
 
 help: ## list the targets
-	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
+	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
 
 # Every other target runs this first, for what the targets on the command line use (scripts/setup/needs.sh).
 setup: ## install the tools that the targets use: system packages, .venv, GHDL 5, Yosys (each target installs its own part)
