@@ -71,9 +71,9 @@ class Ties(Refiner):
         _, kind = np.unique(kinds, axis=0, return_inverse=True)
         for k in range(kind.max() + 1):
             rows = np.flatnonzero(kind == k)
-            stands = slow[cells.block[use[rows]]] / self.sigma[use[rows], None]
-            stands = stands / np.linalg.norm(stands, axis=0).max()
-            out += float(np.sum((error[rows] - stands @ np.linalg.lstsq(stands, error[rows], rcond=None)[0]) ** 2))
+            pattern = slow[cells.block[use[rows]]] / self.sigma[use[rows], None]
+            pattern = pattern / np.linalg.norm(pattern, axis=0).max()
+            out += float(np.sum((error[rows] - pattern @ np.linalg.lstsq(pattern, error[rows], rcond=None)[0]) ** 2))
         return out
 
     def _spread(self, best, other) -> float:

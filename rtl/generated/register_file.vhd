@@ -186,7 +186,7 @@ architecture rtl of register_file is
   signal row_at : std_logic_vector(0 to 2**(REGISTER_WORD_W - 3) - 1);
   signal row    : std_logic_vector(0 to 2**(REGISTER_WORD_W - 3) - 1);
   signal column : std_logic_vector(0 to 7);
-  signal told   : std_logic_vector(31 downto 0);
+  signal held   : std_logic_vector(31 downto 0);
 
   -- Values of the previous clock
   signal was_busy            : std_logic;
@@ -269,289 +269,289 @@ begin
       end if;
 
       if (row(2) and column(0)) = '1' then
-        enable      <= told(0);
+        enable      <= held(0);
         written(16) <= '1';
       end if;
       if (row(2) and column(1)) = '1' then
-        clear_trip <= told(0);
+        clear_trip <= held(0);
       end if;
       if (row(2) and column(2) and not sample_busy) = '1' then
-        clear_faults_in <= told(0);
+        clear_faults_in <= held(0);
       end if;
       if (row(2) and column(3)) = '1' then
-        telemetry_enable <= told(0);
+        telemetry_enable <= held(0);
         written(19)      <= '1';
       end if;
       if (row(2) and column(4) and not sample_busy) = '1' then
-        omega_ref_in <= signed(told(17 downto 0));
+        omega_ref_in <= signed(held(17 downto 0));
         written(20)  <= '1';
       end if;
       if (row(2) and column(5) and not sample_busy) = '1' then
-        i_d_ref_in  <= signed(told(17 downto 0));
+        i_d_ref_in  <= signed(held(17 downto 0));
         written(21) <= '1';
       end if;
       if (row(2) and column(6) and not sample_busy) = '1' then
-        i_q_ext_in  <= signed(told(17 downto 0));
+        i_q_ext_in  <= signed(held(17 downto 0));
         written(22) <= '1';
       end if;
       if (row(2) and column(7) and not sample_busy) = '1' then
-        speed_mode_in <= told(0);
+        speed_mode_in <= held(0);
         written(23)   <= '1';
       end if;
       if (row(3) and column(0) and not sample_busy) = '1' then
-        temp_winding_in <= signed(told(15 downto 0));
+        temp_winding_in <= signed(held(15 downto 0));
         written(24)     <= '1';
       end if;
       if (row(3) and column(1) and not sample_busy) = '1' then
-        temp_valid_in <= told(0);
+        temp_valid_in <= held(0);
         written(25)   <= '1';
       end if;
       if (row(8) and column(0) and not sample_busy) = '1' then
-        offset_a    <= unsigned(told(15 downto 0));
+        offset_a    <= unsigned(held(15 downto 0));
         written(64) <= '1';
       end if;
       if (row(8) and column(1) and not sample_busy) = '1' then
-        offset_b    <= unsigned(told(15 downto 0));
+        offset_b    <= unsigned(held(15 downto 0));
         written(65) <= '1';
       end if;
       if (row(8) and column(2) and not sample_busy) = '1' then
-        offset_c    <= unsigned(told(15 downto 0));
+        offset_c    <= unsigned(held(15 downto 0));
         written(66) <= '1';
       end if;
       if (row(8) and column(3) and not sample_busy) = '1' then
-        gain_a      <= signed(told(17 downto 0));
+        gain_a      <= signed(held(17 downto 0));
         written(67) <= '1';
       end if;
       if (row(8) and column(4) and not sample_busy) = '1' then
-        gain_b      <= signed(told(17 downto 0));
+        gain_b      <= signed(held(17 downto 0));
         written(68) <= '1';
       end if;
       if (row(8) and column(5) and not sample_busy) = '1' then
-        gain_c      <= signed(told(17 downto 0));
+        gain_c      <= signed(held(17 downto 0));
         written(69) <= '1';
       end if;
       if (row(8) and column(6) and not sample_busy) = '1' then
-        u_dc_offset <= unsigned(told(15 downto 0));
+        u_dc_offset <= unsigned(held(15 downto 0));
         written(70) <= '1';
       end if;
       if (row(8) and column(7) and not sample_busy) = '1' then
-        u_dc_gain   <= signed(told(17 downto 0));
+        u_dc_gain   <= signed(held(17 downto 0));
         written(71) <= '1';
       end if;
       if (row(9) and column(0) and not sample_busy) = '1' then
-        k_u_max     <= unsigned(told(16 downto 0));
+        k_u_max     <= unsigned(held(16 downto 0));
         written(72) <= '1';
       end if;
       if (row(9) and column(1) and not sample_busy) = '1' then
-        pole_pairs  <= unsigned(told(5 downto 0));
+        pole_pairs  <= unsigned(held(5 downto 0));
         written(73) <= '1';
       end if;
       if (row(9) and column(2) and not sample_busy) = '1' then
-        reverse     <= told(0);
+        reverse     <= held(0);
         written(74) <= '1';
       end if;
       if (row(9) and column(3) and not sample_busy) = '1' then
-        theta_offset <= unsigned(told(17 downto 0));
+        theta_offset <= unsigned(held(17 downto 0));
         written(75)  <= '1';
       end if;
       if (row(9) and column(4) and not sample_busy) = '1' then
-        k_speed     <= unsigned(told(23 downto 0));
+        k_speed     <= unsigned(held(23 downto 0));
         written(76) <= '1';
       end if;
       if (row(9) and column(5) and not sample_busy) = '1' then
-        k_filter    <= unsigned(told(16 downto 0));
+        k_filter    <= unsigned(held(16 downto 0));
         written(77) <= '1';
       end if;
       if (row(9) and column(6) and not sample_busy) = '1' then
-        rail_samples <= unsigned(told(3 downto 0));
+        rail_samples <= unsigned(held(3 downto 0));
         written(78)  <= '1';
       end if;
       if (row(9) and column(7) and not sample_busy) = '1' then
-        jump_max    <= unsigned(told(11 downto 0));
+        jump_max    <= unsigned(held(11 downto 0));
         written(79) <= '1';
       end if;
       if (row(10) and column(0) and not sample_busy) = '1' then
-        speed_kp    <= unsigned(told(23 downto 0));
+        speed_kp    <= unsigned(held(23 downto 0));
         written(80) <= '1';
       end if;
       if (row(10) and column(1) and not sample_busy) = '1' then
-        speed_ki    <= unsigned(told(23 downto 0));
+        speed_ki    <= unsigned(held(23 downto 0));
         written(81) <= '1';
       end if;
       if (row(10) and column(2) and not sample_busy) = '1' then
-        i_max       <= signed(told(17 downto 0));
+        i_max       <= signed(held(17 downto 0));
         written(82) <= '1';
       end if;
       if (row(10) and column(4) and not sample_busy) = '1' then
-        kp_d        <= unsigned(told(23 downto 0));
+        kp_d        <= unsigned(held(23 downto 0));
         written(84) <= '1';
       end if;
       if (row(10) and column(5) and not sample_busy) = '1' then
-        ki_d        <= unsigned(told(23 downto 0));
+        ki_d        <= unsigned(held(23 downto 0));
         written(85) <= '1';
       end if;
       if (row(10) and column(6) and not sample_busy) = '1' then
-        kp_q        <= unsigned(told(23 downto 0));
+        kp_q        <= unsigned(held(23 downto 0));
         written(86) <= '1';
       end if;
       if (row(10) and column(7) and not sample_busy) = '1' then
-        ki_q        <= unsigned(told(23 downto 0));
+        ki_q        <= unsigned(held(23 downto 0));
         written(87) <= '1';
       end if;
       if (row(11) and column(0) and not sample_busy) = '1' then
-        l_d         <= unsigned(told(23 downto 0));
+        l_d         <= unsigned(held(23 downto 0));
         written(88) <= '1';
       end if;
       if (row(11) and column(1) and not sample_busy) = '1' then
-        l_q         <= unsigned(told(23 downto 0));
+        l_q         <= unsigned(held(23 downto 0));
         written(89) <= '1';
       end if;
       if (row(11) and column(2) and not sample_busy) = '1' then
-        lambda_mg   <= signed(told(17 downto 0));
+        lambda_mg   <= signed(held(17 downto 0));
         written(90) <= '1';
       end if;
       if (row(11) and column(3) and not sample_busy) = '1' then
-        k_delay     <= unsigned(told(16 downto 0));
+        k_delay     <= unsigned(held(16 downto 0));
         written(91) <= '1';
       end if;
       if (row(11) and column(4) and not sample_busy) = '1' then
-        dead_time   <= unsigned(told(11 downto 0));
+        dead_time   <= unsigned(held(11 downto 0));
         written(92) <= '1';
       end if;
       if (row(11) and column(5) and not sample_busy) = '1' then
-        min_pulse   <= unsigned(told(11 downto 0));
+        min_pulse   <= unsigned(held(11 downto 0));
         written(93) <= '1';
       end if;
       if (row(11) and column(6) and not sample_busy) = '1' then
-        watchdog    <= unsigned(told(19 downto 0));
+        watchdog    <= unsigned(held(19 downto 0));
         written(94) <= '1';
       end if;
       if (row(11) and column(7) and not sample_busy) = '1' then
-        fault_ignore <= unsigned(told(6 downto 0));
+        fault_ignore <= unsigned(held(6 downto 0));
         written(95)  <= '1';
       end if;
       if (row(12) and column(0) and not sample_busy) = '1' then
-        flux_mode   <= unsigned(told(1 downto 0));
+        flux_mode   <= unsigned(held(1 downto 0));
         written(96) <= '1';
       end if;
       if (row(12) and column(1) and not sample_busy) = '1' then
-        r_s         <= unsigned(told(23 downto 0));
+        r_s         <= unsigned(held(23 downto 0));
         written(97) <= '1';
       end if;
       if (row(12) and column(2) and not sample_busy) = '1' then
-        t_s         <= unsigned(told(16 downto 0));
+        t_s         <= unsigned(held(16 downto 0));
         written(98) <= '1';
       end if;
       if (row(12) and column(3) and not sample_busy) = '1' then
-        omega_0     <= unsigned(told(15 downto 0));
+        omega_0     <= unsigned(held(15 downto 0));
         written(99) <= '1';
       end if;
       if (row(12) and column(4) and not sample_busy) = '1' then
-        xi           <= unsigned(told(15 downto 0));
+        xi           <= unsigned(held(15 downto 0));
         written(100) <= '1';
       end if;
       if (row(12) and column(5) and not sample_busy) = '1' then
-        omega_min    <= unsigned(told(16 downto 0));
+        omega_min    <= unsigned(held(16 downto 0));
         written(101) <= '1';
       end if;
       if (row(12) and column(6) and not sample_busy) = '1' then
-        k_ramp       <= unsigned(told(15 downto 0));
+        k_ramp       <= unsigned(held(15 downto 0));
         written(102) <= '1';
       end if;
       if (row(12) and column(7) and not sample_busy) = '1' then
-        flux_kp      <= unsigned(told(16 downto 0));
+        flux_kp      <= unsigned(held(16 downto 0));
         written(103) <= '1';
       end if;
       if (row(13) and column(0) and not sample_busy) = '1' then
-        flux_ki      <= unsigned(told(16 downto 0));
+        flux_ki      <= unsigned(held(16 downto 0));
         written(104) <= '1';
       end if;
       if (row(13) and column(1) and not sample_busy) = '1' then
-        delta_max    <= unsigned(told(15 downto 0));
+        delta_max    <= unsigned(held(15 downto 0));
         written(105) <= '1';
       end if;
       if (row(13) and column(2) and not sample_busy) = '1' then
-        k_chord      <= unsigned(told(16 downto 0));
+        k_chord      <= unsigned(held(16 downto 0));
         written(106) <= '1';
       end if;
       if (row(13) and column(4) and not sample_busy) = '1' then
-        tcr          <= unsigned(told(23 downto 0));
+        tcr          <= unsigned(held(23 downto 0));
         written(108) <= '1';
       end if;
       if (row(13) and column(5) and not sample_busy) = '1' then
-        t_0          <= signed(told(15 downto 0));
+        t_0          <= signed(held(15 downto 0));
         written(109) <= '1';
       end if;
       if (row(13) and column(6) and not sample_busy) = '1' then
-        t_min        <= signed(told(15 downto 0));
+        t_min        <= signed(held(15 downto 0));
         written(110) <= '1';
       end if;
       if (row(13) and column(7) and not sample_busy) = '1' then
-        t_max        <= signed(told(15 downto 0));
+        t_max        <= signed(held(15 downto 0));
         written(111) <= '1';
       end if;
       if (row(14) and column(0) and not sample_busy) = '1' then
-        compensate   <= told(0);
+        compensate   <= held(0);
         written(112) <= '1';
       end if;
       if (row(14) and column(1) and not sample_busy) = '1' then
-        k_lp         <= unsigned(told(19 downto 0));
+        k_lp         <= unsigned(held(19 downto 0));
         written(113) <= '1';
       end if;
       if (row(14) and column(2) and not sample_busy) = '1' then
-        eta_v        <= unsigned(told(20 downto 0));
+        eta_v        <= unsigned(held(20 downto 0));
         written(114) <= '1';
       end if;
       if (row(14) and column(3) and not sample_busy) = '1' then
-        gamma        <= unsigned(told(16 downto 0));
+        gamma        <= unsigned(held(16 downto 0));
         written(115) <= '1';
       end if;
       if (row(14) and column(4) and not sample_busy) = '1' then
-        zeta         <= unsigned(told(16 downto 0));
+        zeta         <= unsigned(held(16 downto 0));
         written(116) <= '1';
       end if;
       if (row(14) and column(5) and not sample_busy) = '1' then
-        v_thr        <= unsigned(told(16 downto 0));
+        v_thr        <= unsigned(held(16 downto 0));
         written(117) <= '1';
       end if;
       if (row(14) and column(6) and not sample_busy) = '1' then
-        v_comp_max   <= unsigned(told(16 downto 0));
+        v_comp_max   <= unsigned(held(16 downto 0));
         written(118) <= '1';
       end if;
       if (row(14) and column(7) and not sample_busy) = '1' then
-        i_learn      <= unsigned(told(16 downto 0));
+        i_learn      <= unsigned(held(16 downto 0));
         written(119) <= '1';
       end if;
       if (row(15) and column(0) and not sample_busy) = '1' then
-        eta_psi      <= unsigned(told(16 downto 0));
+        eta_psi      <= unsigned(held(16 downto 0));
         written(120) <= '1';
       end if;
       if (row(15) and column(1) and not sample_busy) = '1' then
-        omega_psi_min <= unsigned(told(16 downto 0));
+        omega_psi_min <= unsigned(held(16 downto 0));
         written(121)  <= '1';
       end if;
       if (row(15) and column(2) and not sample_busy) = '1' then
-        k_ahead      <= unsigned(told(16 downto 0));
+        k_ahead      <= unsigned(held(16 downto 0));
         written(122) <= '1';
       end if;
       if (row(15) and column(3) and not sample_busy) = '1' then
-        k_sign       <= unsigned(told(23 downto 0));
+        k_sign       <= unsigned(held(23 downto 0));
         written(123) <= '1';
       end if;
       if (row(15) and column(4) and not sample_busy) = '1' then
-        i_trip       <= unsigned(told(8 downto 0));
+        i_trip       <= unsigned(held(8 downto 0));
         written(124) <= '1';
       end if;
       if (row(15) and column(5) and not sample_busy) = '1' then
-        sum_trip     <= unsigned(told(8 downto 0));
+        sum_trip     <= unsigned(held(8 downto 0));
         written(125) <= '1';
       end if;
       if (row(15) and column(6) and not sample_busy) = '1' then
-        u_dc_min     <= unsigned(told(8 downto 0));
+        u_dc_min     <= unsigned(held(8 downto 0));
         written(126) <= '1';
       end if;
       if (row(15) and column(7) and not sample_busy) = '1' then
-        u_dc_max     <= unsigned(told(8 downto 0));
+        u_dc_max     <= unsigned(held(8 downto 0));
         written(127) <= '1';
       end if;
 
@@ -661,7 +661,7 @@ begin
   process (clk)
   begin
     if rising_edge(clk) then
-      told               <= data;
+      held               <= data;
       row_at             <= (others => '0');
       row_at(word / 8)   <= '1';
       column             <= (others => '0');

@@ -97,9 +97,9 @@ PATTERNS = (
     ("valid survives reset", "out_valid <= '0';", "null;"),
 )
 SOON = (
-    ("first outputs told with the last", "out_soon  <= valid(LATENCY - 1);", "out_soon  <= valid(LATENCY);"),
+    ("first outputs reported with the last", "out_soon  <= valid(LATENCY - 1);", "out_soon  <= valid(LATENCY);"),
     (
-        "first outputs told late",
+        "first outputs reported late",
         "out_soon  <= valid(LATENCY - SINCOS_PASS);",
         "out_soon  <= valid(LATENCY - SINCOS_PASS + 1);",
     ),

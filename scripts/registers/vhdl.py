@@ -161,8 +161,8 @@ def _vector(width: int) -> str:
 
 def _from_word(part: Part) -> str:
     if part.vhdl_type == "std_logic":
-        return "told(0)"
-    return f"{'signed' if part.signed else 'unsigned'}(told({part.port_width - 1} downto 0))"
+        return "held(0)"
+    return f"{'signed' if part.signed else 'unsigned'}(held({part.port_width - 1} downto 0))"
 
 
 def _reset(word: Word, part: Part) -> str:
