@@ -9,16 +9,17 @@ import json
 
 import pytest
 
+from fluxproof.checkout import recordings
 from fluxproof.diagnosis.nominal import load_nominal
 from studies.real import brusa, emrax, laas
-from studies.real.__main__ import main, recordings_folder
+from studies.real.__main__ import main
 
 
 def run(part, out):
-    file = recordings_folder() / part.FILE
+    file = recordings() / part.FILE
     if not file.exists():
         pytest.skip(f"{part.FILE} is missing; FLUXPROOF_RECORDINGS names its folder")
-    entry = part.run(recordings_folder(), out)
+    entry = part.run(recordings(), out)
     folder = out / part.FILE.parts[0]
     data = json.loads((folder / "diagnosis.json").read_text())
     assert data["verdict"] == entry["verdict"]

@@ -5,7 +5,6 @@ Leaves the closed loop's stream in capture.bin and what the core answered in obs
 
 from __future__ import annotations
 
-import dataclasses
 import os
 
 import cocotb
@@ -26,13 +25,6 @@ from fluxproof.golden_model.registers import registers
 
 INTERVAL = fluxproof.SAMPLE_INTERVAL
 PERIODS = 600  # of the closed loop
-
-
-def beginning(scenario, periods: int):
-    """The first ``periods`` of a scenario."""
-    columns = {f.name: getattr(scenario, f.name) for f in dataclasses.fields(scenario)}
-    arrays = {name: v[:periods] for name, v in columns.items() if isinstance(v, np.ndarray)}
-    return dataclasses.replace(scenario, **arrays)
 
 
 class Sink:
@@ -249,7 +241,7 @@ async def closed_loop(dut):
     dut.telemetry_enable.value = 1
     bench.sink.pace = 0.5
     cocotb.start_soon(bench.sink.run())
-    scenario = beginning(SCENARIOS["everything"](bench.drive), PERIODS)
+    scenario = SCENARIOS["everything"](bench.drive).first(PERIODS)
     result = await cosimulate(GhdlDevice(dut), bench.drive, bench.registers, scenario)
     await bench.drain()
     assert result.differences == 0, result.first_difference

@@ -6,22 +6,16 @@ The recordings are not part of the project: FLUXPROOF_RECORDINGS names their fol
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 import time
 from pathlib import Path
 
-from fluxproof.checkout import BUILD, ROOT
+from fluxproof.checkout import BUILD, recordings
 from fluxproof.diagnosis.command import Progress
 from fluxproof.files import write_json
 from studies.real import brusa, emrax, laas
 
 PARTS = {"brusa_flux_map": brusa, "emrax228": emrax, "laas_mn4004": laas}
-
-
-def recordings_folder() -> Path:
-    """Folder of the recordings."""
-    return (ROOT / os.environ.get("FLUXPROOF_RECORDINGS", "../shared/recordings")).resolve()
 
 
 def main(arguments=None) -> int:
@@ -33,7 +27,7 @@ def main(arguments=None) -> int:
     unknown = sorted(set(args.names) - set(PARTS))
     if unknown:
         parser.error(f"{unknown[0]} is not one of {', '.join(PARTS)}")
-    folder, result = recordings_folder(), {"schema": 1, "recordings": {}}
+    folder, result = recordings(), {"schema": 1, "recordings": {}}
     for name in args.names or PARTS:
         part, started = PARTS[name], time.perf_counter()
         file = folder / part.FILE
