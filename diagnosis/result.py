@@ -1,6 +1,6 @@
 """The result of a diagnosis: plain dataclasses, converted for diagnosis.json by ``to_json``.
 
-The stable part follows docs/diagnosis.schema.json.  ``Evidence`` serves the pictures only and is not in the JSON.
+The stable part follows docs/diagnosis.schema.json (schema 2).  ``Evidence`` serves the pictures only and is not in the JSON.
 """
 
 from __future__ import annotations
@@ -12,7 +12,9 @@ import numpy as np
 
 from fluxproof.diagnosis.recording import Problem
 
-VERDICTS = ("explained", "ambiguous", "unexplained", "no_mismatch", "digital_mismatch", "bad_recording")
+VERDICTS = (
+    "explained", "partly_explained", "ambiguous", "unexplained", "no_mismatch", "digital_mismatch", "bad_recording",
+)  # fmt: skip
 
 
 @dataclass
@@ -102,6 +104,38 @@ class Fit:
 
 
 @dataclass
+class Remainder:
+    """A part of the misfit that no named effect explains: one harmonic order of one signal.
+
+    size: rms above the noise floor, at operating points that were not fitted.  share: of the power of the signal's
+    misfit above its noise floor, before anything was explained.
+    """
+
+    signal: str  # u_dq, current_sum or torque
+    order: float
+    size: float
+    unit: str
+    share: float
+
+
+@dataclass
+class Convention:
+    """A convention of the recording or the drive file that differs from the documented one, found by the balance.
+
+    code: stable, lower_snake_case (docs/diagnosis.md lists them); quantity: the columns or keys of drive.toml
+    concerned; factor: recorded value over the documented one, None if it is no scale; says: one clause in plain words,
+    such as "the currents are rms values: recorded values are 0.7071 of the peak values".
+    rivals: codes of other conventions that fit as well, so that nobody can tell from this recording.
+    """
+
+    code: str
+    quantity: str
+    factor: float | None
+    says: str
+    rivals: list[str] = field(default_factory=list)
+
+
+@dataclass
 class UnknownTerm:
     """The single term that fits the unexplained residual best."""
 
@@ -145,6 +179,9 @@ class Diagnosis:
     next_recording: list[Request] = field(default_factory=list)
     location: Location = field(default_factory=Location)
     fit: Fit = field(default_factory=Fit)
+    explained_share: float | None = None  # of the misfit's power above the noise floor, at held-out points; None: no misfit
+    remainder: list[Remainder] = field(default_factory=list)  # the largest first
+    conventions: list[Convention] = field(default_factory=list)
     unknown_term: UnknownTerm | None = None
     rows: int = 0
     problems: list[Problem] = field(default_factory=list)
@@ -155,9 +192,9 @@ class Diagnosis:
     trace: str = ""  # the figures that decided the verdict
 
     def to_json(self) -> dict:
-        """The mapping written to diagnosis.json (schema 1)."""
+        """The mapping written to diagnosis.json (schema 2)."""
         plain = dataclasses.asdict(dataclasses.replace(self, evidence=Evidence(), search=None))
         problems = plain.pop("problems")
         for key in ("evidence", "rows", "search", "trace"):
             plain.pop(key)
-        return {"schema": 1, **plain, "recording": {"rows": self.rows, "problems": problems}}
+        return {"schema": 2, **plain, "recording": {"rows": self.rows, "problems": problems}}

@@ -14,8 +14,12 @@ VERDICTS = {
         "good",
         "Known physics accounts for the difference, also at operating points that were not fitted.",
     ),
+    "partly_explained": (
+        "good",
+        "Known physics accounts for most of the difference; the rest is located, and its cause is not known.",
+    ),
     "ambiguous": ("open", "Several causes fit this recording equally well."),
-    "unexplained": ("open", "The residual exceeds the noise, and no effect of the catalogue explains it."),
+    "unexplained": ("open", "No effect of the catalogue explains half of the difference."),
     "no_mismatch": ("good", "Recording and simulation agree to within the noise floor."),
     "digital_mismatch": (
         "bad",
