@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from fluxproof.diagnosis.curves import parabola
 from fluxproof.diagnosis.recording import Recording, RecordingError
 from fluxproof.diagnosis.settling import settled
 from fluxproof.diagnosis.shaft import airgap, is_airgap, shaft_kind
@@ -40,13 +41,6 @@ def smooth(values, joined_run, half=HALF_WIDTH):
         same = joined_run[: len(values) - 2 * half] == joined_run[2 * half :]
         out[half : len(values) - half][~same] = np.nan
     return out
-
-
-def parabola(values):
-    """Least-squares parabola of each row of (b, k) values."""
-    x = np.linspace(-1.0, 1.0, values.shape[1])
-    basis, _ = np.linalg.qr(np.stack([np.ones_like(x), x, x**2], axis=1))
-    return (values @ basis) @ basis.T
 
 
 def stator_current(recording: Recording, theta):

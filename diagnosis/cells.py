@@ -19,6 +19,7 @@ from fluxproof.diagnosis.torque_order import torque_orders
 ORDERS_SUM = (0.0, 1.0, 2.0)
 LEAST_TURNS = 0.8  # periods of a harmonic within a block; with fewer it is not independent of order 0
 TAPERED_TURNS = 3.0  # the same with a taper, which has more leakage from neighbouring orders
+RESOLVED = 2.5  # rad per sampling period: a torque of a higher frequency appears at other orders
 SYSTEM_U = 2e-4  # error of the balance, relative to the voltage of the block
 SYSTEM_DC = 1.5e-5  # the same relative to the bus voltage
 
@@ -54,7 +55,8 @@ class Projector:
     on both sides of the balance.
     """
 
-    def __init__(self, view):
+    def __init__(self, view, loads=False):
+        """loads: whether the mean torque of a shaft with an unknown load is a row."""
         self.orders = np.array(orders_u(view.machine.pole_pairs))
         self.turns = np.exp(-1j * self.orders[None, None, :] * view.theta_mid[:, :, None])
         b, h = len(view), len(self.orders)
@@ -86,7 +88,9 @@ class Projector:
             both[:, 0] = [True, False]  # a mean is real
             if channel == "torque":
                 both &= self.torque_seen[:, None, None]
-                both[:, 0] &= (view.shaft != "free")[:, None]  # a load of unknown size
+                per_row = span / view.theta_mid.shape[1]
+                both &= (np.array(orders)[None, :] * per_row[:, None] < RESOLVED)[:, :, None]
+                both[:, 0] &= (view.shaft != "free")[:, None] | loads  # a load of unknown size
             ok.append(both.ravel())
         self.block, self.order, self.part = (np.concatenate(x) for x in (block, order, part))
         self.channel, self.ok = np.array(channels), np.concatenate(ok)
@@ -97,6 +101,11 @@ class Projector:
         if "torque" in self.waves:  # a taper, since the ends of a second difference are mostly noise
             m = view.theta_mid.shape[1]
             self.waves["torque"] *= (1.0 - np.cos(2 * np.pi * (np.arange(m) + 0.5) / m))[None, :, None]
+            # An unknown mean load leaks into other orders, also by aliasing: these see what is left of a line.
+            line = np.stack([np.ones(m), np.linspace(-1.0, 1.0, m)], axis=1)
+            line, _ = np.linalg.qr(line)
+            waves = self.waves["torque"][:, :, 1:]
+            self.waves["torque"][:, :, 1:] = waves - np.matmul(line, np.matmul(line.T, waves))
 
     def _apart(self, span):
         """(b, h) orders that differ from every kept smaller one by LEAST_TURNS within the block."""

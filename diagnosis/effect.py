@@ -53,6 +53,7 @@ class Effect:
     corrects: bool = (
         False  # a measurement error rather than a property of the machine: ``corrected`` removes it from the data
     )
+    curve: float = 0.3  # share of the formula by which the free curve may depart from it
     smoothed: bool = False  # its columns use smoothed currents also when the model is applied
 
     def core(self, view) -> dict[str, Column]:
@@ -183,7 +184,7 @@ def torque_of(view, psi, i):
 
 def full_loss(c) -> float:
     """Full voltage loss [V] of a dead time with coefficients c; the bumps only shape the curve near zero current."""
-    return float(sum(v for key, v in c.items() if not key.startswith("bump")))
+    return float(sum(v for key, v in c.items() if key.startswith(("v_", "growth", "drop"))))
 
 
 def within_dead_time(c, nominal) -> float:

@@ -67,6 +67,7 @@ class DeadTime(Effect):
         shapes = {f"bump_{KNOTS[k]:g}": lambda x, k=k: _bump(x, KNOTS[k - 1 : k + 2]) for k in places}
         shapes["growth"] = lambda x: np.sign(x) * np.interp(np.abs(x), STILL_GROWS, (0.0, 1.0))
         out = _following_bus(view, _leg_losses(view, shapes))
+        out |= device_tails(view)
         if np.ptp(view.u_dc.mean(axis=1)) > 0.04 * view.nominal.inverter.dc_bus_v:
             # Device drops do not depend on the bus voltage.
             out |= _leg_losses(view, {"drop": lambda x: np.clip(x / 0.05, -1.0, 1.0)})

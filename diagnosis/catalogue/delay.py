@@ -3,14 +3,37 @@
 import numpy as np
 
 from fluxproof.diagnosis.catalogue.sampling_skew import skewed, unskewed
+from fluxproof.diagnosis.curves import parabola
 from fluxproof.diagnosis.effect import DOUBT, Effect, Parameter, one, sigma, voltage, within_dead_time
 
 MOST = 1.2  # periods: beyond one period the interpolation continues linearly, so that the iteration can return
 
 
+def _smooth(view):
+    """Stator-frame voltage of the intervals -1 .. m without noise, (b, m+2) [V]: a parabola in dq over the block.
+
+    A current loop returns the converters' noise in the recorded voltage.  A column of the raw voltage would therefore
+    contain the noise of the misfit, and moving the raw voltage would filter it.
+    """
+    inner = view.theta_mid
+    middle = np.concatenate([2 * inner[:, :1] - inner[:, 1:2], inner, 2 * inner[:, -1:] - inner[:, -2:-1]], axis=1)
+    turn = np.exp(1j * middle)
+    return parabola(view.u * np.conj(turn)) * turn
+
+
+def _moved(view, share):
+    """Change of the voltage (b, m+2) [V] if it is taken ``share`` periods earlier."""
+    u, change = _smooth(view), np.zeros_like(view.u)
+    if share >= 0.0:
+        change[:, 1:] = share * (u[:, :-1] - u[:, 1:])
+    else:
+        change[:, :-1] = -share * (u[:, 1:] - u[:, :-1])
+    return change
+
+
 class Delay(Effect):
     def core(self, view):
-        return {"tau": voltage(view.to_dq(view.u[:, 1:-1] - view.u[:, :-2]) / view.sample_time_s)}
+        return {"tau": voltage(-view.to_dq(_moved(view, 1.0)[:, 1:-1]) / view.sample_time_s)}
 
     def free(self, view):
         # If the gates are late as a whole, the converters also sample off the valley.  With enough operating points for
@@ -33,12 +56,7 @@ class Delay(Effect):
 
     def corrected(self, view, c):
         share = float(np.clip(c["tau"] / view.sample_time_s, -MOST, MOST))
-        u = view.u.copy()
-        if share >= 0.0:
-            u[:, 1:] = (1.0 - share) * view.u[:, 1:] + share * view.u[:, :-1]
-        else:
-            u[:, :-1] = (1.0 + share) * view.u[:, :-1] - share * view.u[:, 1:]
-        return unskewed(view.replace(u=u), c.get("off_valley", 0.0))
+        return unskewed(view.replace(u=view.u + _moved(view, share)), c.get("off_valley", 0.0))
 
     def estimates(self, c, covariance, nominal):
         return one("delay_s", "s", c["tau"], sigma(covariance))

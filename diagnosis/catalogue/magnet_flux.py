@@ -2,12 +2,16 @@
 
 import numpy as np
 
+from fluxproof.diagnosis.curves import course
 from fluxproof.diagnosis.effect import FluxEffect, Parameter, one, sigma
 
 
 class MagnetFlux(FluxEffect):
     def core_psi(self, view):
         return {"delta_psi_m": np.ones_like(view.i)}
+
+    def free_psi(self, view):
+        return {"recovery": np.ones_like(view.i) * course(view)}
 
     def floor(self, nominal):
         return 0.003 * nominal.machine.magnet_flux_wb

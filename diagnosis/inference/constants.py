@@ -1,0 +1,21 @@
+"""Every number of the inference that is a choice, with its unit and its reason."""
+
+# Prior probability that a given effect of the catalogue is present: of some twenty effects one is expected.
+PRESENT = 0.05
+# Error of the balance that no parameter explains, relative to the voltage of an operating point: PWM ripple, the
+# trapezoidal mean of the current, the converters' timing.
+BALANCE_U = 2e-4
+# The same relative to the bus voltage: sampling of the bus, minimum pulses.
+BALANCE_DC = 1.5e-5
+# Error of the mean of three phase currents, relative to the rated current: matching of the converters' references.
+BALANCE_SUM = 2e-4
+# Error of the torque balance, relative to the rated torque: a transducer's linearity, slow friction.
+BALANCE_TORQUE = 3e-3
+# Scale of the discrepancy in units of the balance's error; its prior falls as the square beyond it.
+DISCREPANCY = 3.0
+# Largest discrepancy in units of the balance's error: the whole voltage.
+MOST_DISCREPANCY = 1e4
+# Share of its own contribution by which the formula of an effect is wrong at each operating point.
+FORMULA = 0.01
+# A posterior from which a name is asserted, and the mass that an ambiguity must hold.
+ASSERTED = 0.95

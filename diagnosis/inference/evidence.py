@@ -1,0 +1,152 @@
+"""The marginal likelihood of a set of effects, with the sizes of the effects and of the discrepancy learnt.
+
+    y = X c + d + e,   e ~ N(0, s^2),   d ~ N(0, (lambda_g l)^2),   c_k ~ N(0, (a_e p_k)^2)
+
+a_e is the size of effect e in units of its floor of practical interest, with a log-uniform prior from 1 to the size at
+which a drive no longer runs; p_k is the coefficient that makes column k as large as the floor (of a curve: the share of
+it by which the curve may depart from the formula).  lambda_g >= 1 is the discrepancy of group g, with the prior
+1 / (1 + (lambda / k)^2).  Both are found by expectation maximisation; the log evidence is exact for them.
+"""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+STEPS = 7
+ALWAYS_LOADED = 1e4  # odds against a load at every operating point of a recording
+FACTORS = np.array([0.1, 0.35, 0.7, 1.0, 1.4, 3.0, 10.0])  # of the discrepancy, tried in every step
+
+
+@numba.njit(cache=True)
+def evidence(x, y, s2, level, group, groups, loads, load, prior, owner, core, most, formula, scale, largest, start):
+    """(log evidence, coefficients (k,), covariance (k, k), sizes (effects,), lambdas (groups,)).
+
+    x: (n, k) columns of the set; prior: (k,) p_k; owner: (k,) effect of a column; core: (k,)
+    bool, a column of the formula and not of the free curve; most: (effects,) largest size.
+    loads, load: group whose rows may contain a load of the scale ``load`` each, -1: none.
+    start: torque, in multiples of the smallest one, above which a row is first taken as loaded.
+    formula: share of an effect's contribution that counts as discrepancy; scale, largest: prior of lambda.
+    """
+    n, k = x.shape
+    effects = len(most)
+    a = np.sqrt(most)
+    lam = np.full(groups, 3.0)
+    c = np.zeros(k)
+    cov = np.zeros((k, k))
+    v = np.zeros(n)
+    own = np.zeros(n)
+    loaded = np.zeros(n)
+    least = 1e300
+    for i in range(n):
+        if group[i] == loads:
+            least = min(least, abs(y[i]) + level[i])
+    for i in range(n):
+        if group[i] == loads and abs(y[i]) > start * least:
+            loaded[i] = load * load
+    value = 0.0
+    for step in range(STEPS):
+        for i in range(n):
+            v[i] = s2[i] + (lam[group[i]] * level[i]) ** 2 + own[i] + loaded[i]
+        precision = np.zeros((k, k))
+        right = np.zeros(k)
+        power = 0.0
+        logdet = 0.0
+        for i in range(n):
+            w = 1.0 / v[i]
+            power += y[i] * y[i] * w
+            logdet += np.log(v[i])
+            for p in range(k):
+                xw = x[i, p] * w
+                if xw != 0.0:
+                    right[p] += xw * y[i]
+                    for q in range(p + 1):
+                        precision[p, q] += xw * x[i, q]
+        for p in range(k):
+            for q in range(p + 1):
+                precision[q, p] = precision[p, q]
+        before = 0.0
+        sd = np.zeros(k)
+        for p in range(k):
+            sd[p] = a[owner[p]] * prior[p]
+        # in units of the prior's standard deviation
+        m = np.zeros((k, k))
+        b = np.zeros(k)
+        for p in range(k):
+            b[p] = right[p] * sd[p]
+            for q in range(k):
+                m[p, q] = precision[p, q] * sd[p] * sd[q]
+            m[p, p] += 1.0
+        if k:
+            factor = np.linalg.cholesky(m)
+            for p in range(k):
+                before += 2.0 * np.log(factor[p, p])
+            inverse = np.linalg.inv(m)
+            z = inverse @ b
+            gain = 0.0
+            for p in range(k):
+                gain += z[p] * b[p]
+                c[p] = z[p] * sd[p]
+                for q in range(k):
+                    cov[p, q] = inverse[p, q] * sd[p] * sd[q]
+        else:
+            gain = 0.0
+        value = -0.5 * (power - gain + before + logdet)
+        for g in range(groups):
+            value -= np.log(1.0 + (lam[g] / scale) ** 2)
+        if step == STEPS - 1:
+            break
+        # sizes of the effects
+        sums = np.zeros(effects)
+        counts = np.zeros(effects)
+        for p in range(k):
+            if core[p]:
+                sums[owner[p]] += (c[p] ** 2 + cov[p, p]) / prior[p] ** 2
+                counts[owner[p]] += 1.0
+        for e in range(effects):
+            if counts[e] > 0:
+                a[e] = min(max(np.sqrt(sums[e] / counts[e]), 1.0), most[e])
+        # discrepancy: expected squares of the remainder at several lambda; a row with a load is left out
+        score = np.zeros((groups, len(FACTORS)))
+        for i in range(n):
+            r = y[i]
+            for p in range(k):
+                r -= x[i, p] * c[p]
+            e2 = r * r
+            for p in range(k):
+                if x[i, p] != 0.0:
+                    for q in range(k):
+                        e2 += x[i, p] * cov[p, q] * x[i, q]
+            own[i] = 0.0
+            for e in range(effects):
+                part = 0.0
+                for p in range(k):
+                    if owner[p] == e:
+                        part += x[i, p] * c[p]
+                own[i] += (formula * part) ** 2
+            if group[i] == loads:
+                u = s2[i] + (3.0 * level[i]) ** 2 + own[i]
+                with_load = u + load * load
+                loaded[i] = load * load if e2 / with_load + np.log(with_load) < e2 / u + np.log(u) else 0.0
+                continue
+            for g in range(len(FACTORS)):
+                u = s2[i] + (min(max(lam[group[i]] * FACTORS[g], 1.0), largest) * level[i]) ** 2 + own[i]
+                score[group[i], g] -= 0.5 * (np.log(u) + e2 / u)
+        for g in range(groups):
+            best, chosen = -1e300, lam[g]
+            for h in range(len(FACTORS)):
+                tried = min(max(lam[g] * FACTORS[h], 1.0), largest)
+                total = score[g, h] - np.log(1.0 + (tried / scale) ** 2)
+                if total > best:
+                    best, chosen = total, tried
+            lam[g] = chosen if g != loads else 3.0
+    if loads >= 0:  # a drive is run without load at one of its operating points at least
+        free = 0
+        rows = 0
+        for i in range(n):
+            if group[i] == loads:
+                rows += 1
+                free += loaded[i] == 0.0
+        if rows and not free:
+            value -= np.log(ALWAYS_LOADED)
+    return value, c, cov, a, lam

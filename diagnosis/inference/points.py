@@ -1,0 +1,118 @@
+"""The rows of a balance, condensed: one mean per functional and operating point, and what differs between visits to it.
+
+A *functional* is one harmonic of one channel in one axis.  What no model has (the *discrepancy*) repeats in every block
+of an operating point, noise does not: a long dwell is one observation of the physics instead of hundreds.  The blocks of
+an operating point are therefore condensed to *visits*, stretches of neighbouring blocks, and these to one mean and to
+contrasts, each visit against the mean of the earlier ones.  Means and contrasts have independent noise and the variance
+
+    v = s^2 + (lambda l)^2
+
+with l the error of the balance at that point and lambda learnt, for means and contrasts of each channel and absolute
+order by itself.  The contrasts carry the drifts.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fluxproof.diagnosis.cells import voltage_level
+from fluxproof.diagnosis.effect import rated_torque
+from fluxproof.diagnosis.inference import constants as k
+
+VISITS = 16  # visits into which a recording of a single operating point is cut
+
+
+@dataclass
+class Points:
+    """y (n,), x (n, columns): means and contrasts; s2, level: (n,) noise variance and error of the balance.
+
+    group: (n,) int, index into ``groups``: [(channel, absolute order, whether contrasts)]; order, part, point: (n,).
+    loads: index of the group whose rows contain a load that nobody recorded, or -1; load: its scale [Nm].
+    """
+
+    y: np.ndarray
+    x: np.ndarray
+    s2: np.ndarray
+    level: np.ndarray
+    group: np.ndarray
+    groups: list
+    order: np.ndarray
+    part: np.ndarray
+    point: np.ndarray
+    loads: int
+    load: float
+
+
+def balance_level(view, cells):
+    """(r,) error of the balance in every row, in the unit of its channel."""
+    m = view.machine
+    volts = k.BALANCE_U * voltage_level(view) + k.BALANCE_DC * view.nominal.inverter.dc_bus_v
+    level = np.where(cells.order == 0, 1.0, 0.5) * volts[cells.block]
+    level = np.where(cells.channel == "sum", k.BALANCE_SUM * m.rated_current_a, level)
+    return np.where(cells.channel == "torque", k.BALANCE_TORQUE * rated_torque(view.nominal), level)
+
+
+def visits(view, points) -> np.ndarray:
+    """(b,) number of the visit of each block: neighbours in time at one operating point, of limited length."""
+    longest = max(1, -(-len(view) // VISITS))
+    out, number, length = np.zeros(len(view), int), 0, 0
+    for n in range(len(view)):
+        length += 1
+        if n and (view.run[n] != view.run[n - 1] or points[n] != points[n - 1] or length > longest):
+            number, length = number + 1, 1
+        out[n] = number
+    return out
+
+
+def condense(cells, y, x, sigma, level, point, visit, use, load=0.0) -> Points:
+    """Points of the rows ``use`` (r,) bool.
+
+    y: (r,); x: (r, columns); sigma, level: (r,), noise of a block and error of the balance; point, visit: (b,) numbers;
+    load: scale [Nm] of a load that nobody recorded, 0: none is possible.
+    """
+    rows = np.flatnonzero(use)
+    channels, channel = np.unique(cells.channel[rows], return_inverse=True)
+    order = np.round(cells.order[rows] * 1e6).astype(np.int64)
+    block = cells.block[rows]
+    keys = np.stack([channel, order, cells.part[rows], point[block], visit[block]], axis=1)
+    names, cell = np.unique(keys, axis=0, return_inverse=True)
+    cell = cell.ravel()
+    n = len(names)
+    w = 1.0 / sigma[rows] ** 2
+    total = np.bincount(cell, w, n)
+    sort = np.argsort(cell, kind="stable")
+    starts = np.searchsorted(cell[sort], np.arange(n))
+    z = np.column_stack([y[rows], level[rows], x[rows]])
+    mean = np.add.reduceat(w[sort, None] * z[sort], starts, axis=0) / total[:, None]
+    # Visits of the same functional and point are neighbours: each against the mean of the earlier ones.
+    first = np.ones(n, bool)
+    first[1:] = (names[1:, :4] != names[:-1, :4]).any(axis=1)
+    place = np.cumsum(first) - 1
+    begin = np.flatnonzero(first)
+    before_w = np.cumsum(total) - total
+    before_w -= before_w[begin][place]
+    before = np.cumsum(total[:, None] * mean, axis=0) - total[:, None] * mean
+    before -= before[begin][place]
+    contrast = ~first
+    out = np.zeros_like(mean)
+    out[contrast] = mean[contrast] - before[contrast] / before_w[contrast, None]
+    s2 = np.zeros(n)
+    s2[contrast] = 1.0 / total[contrast] + 1.0 / before_w[contrast]
+    widen = np.ones(n)
+    count = np.arange(n) - begin[place]
+    widen[contrast] = np.sqrt(1.0 + 1.0 / count[contrast])
+    sums = np.add.reduceat(total[:, None] * mean, begin, axis=0)
+    weights = np.add.reduceat(total, begin)
+    out[begin], s2[begin] = sums / weights[:, None], 1.0 / weights
+    lev = mean[:, 1] * widen
+    kinds, group = np.unique(np.stack([names[:, 0], np.abs(names[:, 1]), contrast], axis=1), axis=0, return_inverse=True)
+    groups = [(str(channels[c]), float(o) * 1e-6, bool(d)) for c, o, d in kinds]
+    group = group.ravel()
+    loads = groups.index(("torque", 0.0, False)) if load and ("torque", 0.0, False) in groups else -1
+    keep = np.ones(n, bool)
+    if load and ("torque", 0.0, True) in groups:  # a load may change between visits
+        keep = group != groups.index(("torque", 0.0, True))
+    return Points(out[keep, 0], out[keep, 2:], s2[keep], lev[keep], group[keep], groups, names[keep, 1] * 1e-6,
+                  names[keep, 2], names[keep, 3], loads, load)  # fmt: skip

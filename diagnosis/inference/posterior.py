@@ -1,0 +1,144 @@
+"""The posterior over sets of effects."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+
+from fluxproof.diagnosis.inference.problem import Problem, Setup, around
+
+ROUNDS = 3
+KEPT = 12  # sets of one size that are grown further
+CLOSE = 20.0  # log evidence below the best within which a set is linearised on its own
+MOST = 4
+
+
+class Posterior:
+    """All sets that were judged: {names: Fit}, the best linearisation of each."""
+
+    def __init__(self, setup: Setup, progress=lambda text: None):
+        self.setup, self.progress = setup, progress
+        self.fits = {}
+        self.own = set()  # sets judged on their own linearisation
+        self._search()
+
+    def _search(self):
+        first = Problem(self.setup)
+        able = first.able()
+        self._add(first, [()])
+        self._add(first, [(n,) for n in able])
+        for name in able:
+            if self.setup.effects[name].corrects:
+                self._linearise((name,))
+        self._grow(first, able)
+        known = None
+        for _ in range(ROUNDS):
+            best = self.best()
+            if best.names == known:
+                break
+            known = best.names
+            self.progress(f"around {', '.join(known) or 'no effect'}")
+            problem = around(self.setup, best)
+            if problem is None:
+                break
+            self._add(problem, [known], force=True)
+            self._neighbours(problem, known)
+            self._near(known)
+
+    def best(self):
+        return max(self.fits.values(), key=lambda f: f.value)
+
+    def _add(self, problem, sets, force=False):
+        for names in sets:
+            names = tuple(sorted(names))
+            if names in self.own and not force:
+                continue
+            fit = problem.fit(names)
+            if not possible(fit):
+                fit.value = -np.inf
+            if force:
+                self.own.add(names)
+            self.fits[names] = fit
+
+    def _linearise(self, names, steps=3):
+        """Judge a set on its own linearisation."""
+        fit = self.fits[names]
+        for _ in range(steps):
+            problem = around(self.setup, fit, names)
+            if problem is None:
+                fit.value = -np.inf
+                break
+            new = problem.fit(names)
+            moved = max((abs(new.c[n][k] - fit.c[n][k]) / (1e-12 + 0.01 * abs(new.c[n][k])) for n in names
+                         if self.setup.effects[n].corrects for k in new.c[n]), default=0.0)  # fmt: skip
+            fit = new
+            if not possible(fit):
+                fit.value = -np.inf
+            if moved < 1.0:
+                break
+        self.fits[names] = fit
+        self.own.add(names)
+
+    def _grow(self, problem, able):
+        for size in range(2, MOST):
+            leaders = sorted((f for f in self.fits.values() if len(f.names) == size - 1), key=lambda f: -f.value)
+            leaders = leaders[: len(able) if size == 2 else KEPT]
+            sets = {tuple(sorted({*f.names, n})) for f in leaders for n in able if n not in f.names}
+            self._add(problem, sets)
+
+    def _neighbours(self, problem, names):
+        able = [n for n in problem.able() if n not in names]
+        less = [tuple(n for n in names if n != out) for out in names]
+        more = [(*names, n) for n in able]
+        swapped = [(*rest, n) for rest in less for n in able]
+        two = [(*names, *pair) for pair in itertools.combinations(able, 2)] if len(names) <= 1 else []
+        self._add(problem, [*less, *(m for m in more if len(m) <= MOST), *swapped, *two])
+
+    def _near(self, known):
+        """Linearise close sets on their own if they correct other errors than the best one."""
+        effects = self.setup.effects
+        for _ in range(8):
+            best = self.best()
+            mine = {n for n in known if effects[n].corrects}
+            close = [
+                f for f in self.fits.values()
+                if f.names not in self.own and f.value > best.value - CLOSE
+                and {n for n in f.names if effects[n].corrects} != mine
+            ]  # fmt: skip
+            if not close:
+                return
+            self._linearise(max(close, key=lambda f: f.value).names)
+
+    def weights(self):
+        """[(probability, Fit)] of all sets, the most probable first."""
+        fits = sorted(self.fits.values(), key=lambda f: -f.value)
+        w = np.exp(np.array([f.value for f in fits]) - fits[0].value)
+        return list(zip(w / w.sum(), fits, strict=True))
+
+    def present(self):
+        """{effect: probability of being present}."""
+        out = {}
+        for p, fit in self.weights():
+            for n in fit.names:
+                out[n] = out.get(n, 0.0) + float(p)
+        return out
+
+
+def possible(fit) -> bool:
+    """Whether no effect of a set has an impossible size or, beyond its uncertainty, an impossible sign."""
+    problem = fit.problem
+    for name in fit.names:
+        effect, c = problem.setup.effects[name], fit.c[name]
+        if effect.too_large(c, problem.setup.view) or effect.size(c, problem.view.nominal) < effect.floor(problem.view.nominal):
+            return False
+        keys = list(c)
+        cov = np.zeros((len(keys), len(keys)))
+        place = {problem.keys[n][1].lstrip("~"): j for j, n in enumerate(fit.take) if problem.keys[n][0] == name}
+        for a, ka in enumerate(keys):
+            for b, kb in enumerate(keys):
+                if ka in place and kb in place:
+                    cov[a, b] = fit.cov[place[ka], place[kb]]
+        if not effect.possible(c, cov, problem.view.nominal):
+            return False
+    return True

@@ -1,0 +1,210 @@
+"""The linear problem of one view: columns of all effects as means of operating points, and their priors.
+
+A set of effects is first judged on the view as recorded.  Measurement errors (angle, currents, timing, bus) act on the
+data; around a solution the data are corrected for them, the columns are computed again, and what was corrected is added
+back to first order, so that the same problem serves every set.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fluxproof.diagnosis.balance import misfit
+from fluxproof.diagnosis.cells import Projector, cells_of, noise
+from fluxproof.diagnosis.curves import parabola
+from fluxproof.diagnosis.effect import FluxEffect, half_dead_time, rated_torque
+from fluxproof.diagnosis.fit import Fitter, everything
+from fluxproof.diagnosis.inference import constants as k
+from fluxproof.diagnosis.inference.evidence import evidence
+from fluxproof.diagnosis.inference.points import balance_level, condense, visits
+from fluxproof.diagnosis.refine import point_numbers
+
+
+class Setup:
+    """What all problems of a recording share: blocks, functionals, noise, operating points, rows of the fit."""
+
+    def __init__(self, view, effects, train_blocks):
+        self.view, self.effects = view, dict(effects)
+        self.projector = Projector(view, loads=True)
+        measured = bool((view.shaft == "torque").all())
+        self.load = 0.0 if measured else rated_torque(view.nominal)
+        self.train = train_blocks[self.projector.block]
+        cells = cells_of(view, self.effects.values(), self.projector)
+        rough = Fitter(cells, np.ones(len(cells.y)), np.ones(len(cells.y), bool)).solve(everything(cells))
+        self.noise = noise(view, cells, rough.residual)
+        self.level = balance_level(view, cells)
+        self.points = point_numbers(view)
+        self.visits = visits(view, self.points)
+        self.cells = cells
+        self.smooth = smooth(view)
+        self.smooth_rows = self.projector.rows(misfit(self.smooth))
+
+
+class Problem:
+    """Columns and misfit at one linearisation; totals: {effect: {coefficient: value}} of its measurement errors."""
+
+    def __init__(self, setup: Setup, view=None, totals=None, change=0.0, doubt=None, names=None):
+        self.setup, self.totals = setup, totals or {}
+        self.view = setup.view if view is None else view
+        chosen = [e for n, e in setup.effects.items() if names is None or n in names]
+        self.cells = cells = setup.cells if view is None else cells_of(self.view, chosen, setup.projector)
+        y = setup.cells.y + change
+        for name, c in self.totals.items():
+            columns = cells.columns[name]
+            for key, value in c.items():
+                column = columns.get(key, columns.get(f"~{key}"))
+                if value and column is not None:
+                    y = y + value * column
+        self.y = y
+        self.keys = [(name, key) for name, columns in cells.columns.items() for key in columns]
+        stack = [cells.columns[n][key] for n, key in self.keys]
+        x = np.array(stack).T if stack else np.zeros((len(y), 0))
+        sigma = setup.noise
+        if doubt is not None:
+            sigma = np.hypot(sigma, np.where(cells.channel == "u", doubt[cells.block], 0.0))
+        self.sigma = sigma
+        use = cells.ok & setup.train
+        self.p = condense(cells, y, x, sigma, setup.level, setup.points, setup.visits, use, setup.load)
+        self._priors()
+
+    def _priors(self):
+        p, nominal = self.p, self.view.nominal
+        length = np.sqrt(np.mean((p.x / p.level[:, None]) ** 2, axis=0)) if len(p.y) else np.zeros(p.x.shape[1])
+        self.prior, self.most = np.zeros(len(self.keys)), {}
+        self.index = {}
+        for name in self.cells.columns:
+            effect = self.setup.effects[name]
+            mine = [n for n, (owner, _) in enumerate(self.keys) if owner == name]
+            cores = [n for n in mine if not self.keys[n][1].startswith("~") and length[n] > 1e-9]
+            floor = effect.floor(nominal)
+            zero = {self.keys[n][1].lstrip("~"): 0.0 for n in mine}
+            for n in cores:
+                unit = effect.size({**zero, self.keys[n][1]: 1.0}, nominal)
+                self.prior[n] = floor / max(unit, 1e-30)
+            core_length = float(np.sqrt(np.sum((self.prior[cores] * length[cores]) ** 2)))
+            curves = [n for n in mine if self.keys[n][1].startswith("~") and length[n] > 1e-9]
+            for n in curves:
+                self.prior[n] = effect.curve * core_length / length[n]
+            ceiling = effect.ceiling(nominal)
+            self.most[name] = max(min(ceiling / floor, 1e3), 2.0) if np.isfinite(ceiling) else 300.0
+            self.index[name] = cores + [n for n in curves if self.prior[n] > 0.0] if cores else []
+
+    def able(self):
+        """Effects that have a column in this problem."""
+        return [n for n, mine in self.index.items() if mine]
+
+    def fit(self, names):
+        """(log evidence, {effect: {coefficient: value}}, covariance of the set's columns, their indices, ...)."""
+        names = sorted(names)
+        mine = [n for name in names for n in self.index[name]]
+        owner = np.array([names.index(self.keys[n][0]) for n in mine], np.int64)
+        most = np.array([self.most[n] for n in names], float)
+        p, take = self.p, np.array(mine, np.int64)
+        x = np.ascontiguousarray(p.x[:, take])
+        core = np.array([not self.keys[n][1].startswith("~") for n in mine], bool)
+        drags = p.loads >= 0 and bool(x[p.group == p.loads].any())
+        tried = [
+            evidence(
+                x, p.y, p.s2, p.level, p.group, len(p.groups), p.loads, p.load,
+                self.prior[take], owner, core, most,
+                k.FORMULA, k.DISCREPANCY, k.MOST_DISCREPANCY, start,
+            )
+            for start in ((np.inf, 1.5, 3.0) if drags else (np.inf,))
+        ]  # fmt: skip
+        value, c, cov, a, lam = max(tried, key=lambda found: found[0])
+        # log-uniform prior of every size, and prior odds of every effect
+        value += sum(np.log(k.PRESENT / (1 - k.PRESENT)) - np.log(max(np.log(m) / 1.2, 1.0)) for m in most)
+        return Fit(self, tuple(names), float(value), take, c, cov, a, lam)
+
+
+class Fit:
+    """A set of effects on a problem."""
+
+    def __init__(self, problem, names, value, take, c, cov, sizes, lam):
+        self.problem, self.names, self.value = problem, names, value
+        self.take, self.vector, self.cov, self.sizes, self.lam = take, c, cov, sizes, lam
+        self.c = {name: {} for name in names}
+        for n, v in zip(take, c, strict=True):
+            name, key = problem.keys[n]
+            self.c[name][key.lstrip("~")] = float(v)
+        for name in names:
+            for n, (owner, key) in enumerate(problem.keys):
+                if owner == name:
+                    self.c[name].setdefault(key.lstrip("~"), 0.0)
+
+    def rows(self):
+        """(r,) what the set adds to the misfit."""
+        out = np.zeros(len(self.problem.y))
+        for n, v in zip(self.take, self.vector, strict=True):
+            owner, key = self.problem.keys[n]
+            out += v * self.problem.cells.columns[owner][key]
+        return out
+
+    def left(self):
+        """(r,) remainder of the misfit."""
+        return self.problem.y - self.rows()
+
+
+def smooth(view):
+    """The view without noise: the parabolas of current and voltage over each block."""
+    turn = np.exp(1j * view.theta)
+    inner = view.theta_mid
+    middle = np.concatenate([2 * inner[:, :1] - inner[:, 1:2], inner, 2 * inner[:, -1:] - inner[:, -2:-1]], axis=1)
+    u = parabola(view.u * np.exp(-1j * middle)) * np.exp(1j * middle)
+    i_abc = None if view.i_abc is None else view.phases(view.i)
+    return view.replace(i_raw=view.i * turn, i_abc=i_abc, u=u)
+
+
+def around(setup, fit, names=None):
+    """The problem linearised at a fit; names: effects whose columns are needed (None: all).
+
+    The misfit keeps its noise: only what a correction changes in the smooth signals, and in ripple that repeats in every
+    block of an operating point, is applied.  Otherwise a correction that filters or scales noise would be rewarded.
+    """
+    effects = setup.effects
+    totals = {n: dict(fit.c[n]) for n in fit.names if effects[n].corrects}
+    order = sorted(totals, key=lambda n: n == "sampling_skew")
+    view, plain = setup.view, setup.smooth
+    for name in order:
+        view, plain = effects[name].corrected(view, totals[name]), effects[name].corrected(plain, totals[name])
+    if not (np.isfinite(view.u).all() and np.isfinite(view.i_raw).all()):
+        return None
+    magnetic = [n for n in fit.names if isinstance(effects[n], FluxEffect)]
+    psi = sum((effects[n].psi(view, fit.c[n]) for n in magnetic), np.zeros_like(view.i))
+    more = np.array([effects[n].delta_l(fit.c[n]) for n in magnetic] or [(0.0, 0.0)]).sum(axis=0)
+    least = -0.7 * np.array([view.machine.inductance_d_h, view.machine.inductance_q_h])
+    changed = {"psi_extra": psi, "delta_l": tuple(np.maximum(more, least)), "late_s": half_dead_time(fit.c, view.nominal)}
+    view = view.replace(**changed)
+    if "iron_loss" in fit.c:
+        view = view.replace(psi_extra=psi + effects["iron_loss"].psi(view, fit.c["iron_loss"]))
+    rows = setup.projector.rows
+    change = rows(misfit(plain)) - setup.smooth_rows
+    ripple = rows(misfit(view)) - setup.cells.y - change
+    rough = view.with_raw_current()
+    for name in fit.names:
+        effect = effects[name]
+        if effect.corrects or effect.smoothed or not any("u" in col for col in effect.core(view).values()):
+            continue
+        even, raw = (cells_of(v, [effect], setup.projector).columns[name] for v in (view, rough))
+        for key, value in fit.c[name].items():
+            key = key if key in even else f"~{key}"
+            if value and key in even and key in raw:
+                ripple -= value * (raw[key] - even[key])
+    doubts = [effects[n].doubt(fit.c[n], view) for n in fit.names]
+    doubt = np.sqrt(sum((np.square(d) for d in doubts), np.zeros(len(view)))) if doubts else None
+    return Problem(setup, view, totals, change + repeated(ripple, setup), doubt, names)
+
+
+def repeated(ripple, setup):
+    """(r,) the part of ripple rows that repeats in all blocks of an operating point, shrunk by what noise may be."""
+    cells = setup.cells
+    keys = np.stack([cells.order * 1e6, cells.part, setup.points[cells.block], cells.channel == "u",
+                     cells.channel == "sum"], axis=1).astype(np.int64)  # fmt: skip
+    _, cell = np.unique(keys, axis=0, return_inverse=True)
+    cell = cell.ravel()
+    w = np.where(cells.ok, 1.0, 0.0)
+    count = np.maximum(np.bincount(cell, w), 1.0)
+    mean = np.bincount(cell, w * ripple) / count
+    spread = np.bincount(cell, w * (ripple - mean[cell]) ** 2) / np.maximum(count - 1.0, 1.0) / count
+    kept = np.maximum(1.0 - 4.0 * spread / np.maximum(mean**2, 1e-300), 0.0) * (count > 2)
+    return (kept * mean)[cell]
