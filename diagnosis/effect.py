@@ -53,6 +53,9 @@ class Effect:
     corrects: bool = (
         False  # a measurement error rather than a property of the machine: ``corrected`` removes it from the data
     )
+    drift_of: str = ""  # the constant effect of which this one is a slow drift
+    trailing: tuple[float, ...] = ()  # further electrical orders at which the effect may have harmonics
+    mechanical: bool = False  # a torque of the shaft rather than a voltage of the machine
     curve: float = 0.3  # share of the formula by which the free curve may depart from it
     smoothed: bool = False  # its columns use smoothed currents also when the model is applied
 

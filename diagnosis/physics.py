@@ -4,26 +4,28 @@ from __future__ import annotations
 
 import numpy as np
 
-from fluxproof.diagnosis import verdict as words
+from fluxproof.diagnosis.answer import verdict as words
+from fluxproof.diagnosis.answer.estimates import named_effects
+from fluxproof.diagnosis.answer.names import names_of
+from fluxproof.diagnosis.answer.sizes import Sizes, fit_of
+from fluxproof.diagnosis.answer.verdict import kind_of
 from fluxproof.diagnosis.blocks import views_of
 from fluxproof.diagnosis.catalogue import CATALOGUE
-from fluxproof.diagnosis.flux_surface import USUAL, earned
+from fluxproof.diagnosis.inference.posterior import Posterior
+from fluxproof.diagnosis.inference.problem import Setup
 from fluxproof.diagnosis.locate import at_order, evidence, locate
 from fluxproof.diagnosis.nominal import Nominal
-from fluxproof.diagnosis.ohms import straight_ohms
 from fluxproof.diagnosis.recording import Recording
-from fluxproof.diagnosis.remains import remains
 from fluxproof.diagnosis.request import requests, wants_cold
-from fluxproof.diagnosis.result import Diagnosis, UnknownTerm
-from fluxproof.diagnosis.search import EARNS, Search
+from fluxproof.diagnosis.result import Diagnosis, Remainder, UnknownTerm
+from fluxproof.diagnosis.scan import Stray, row_residual, stray_order, stray_swing, stray_torque
 from fluxproof.diagnosis.slow_diagnosis import diagnose_slow
-from fluxproof.diagnosis.uncertainty import Spread
 from fluxproof.diagnosis.unknown import sparse_term
-from fluxproof.diagnosis.view import joined_views, started_cold
+from fluxproof.diagnosis.view import joined_views
 
+FORMS_LEFT = 0.06  # of the misfit's rms: ripple that the formulas of the named effects may leave
+MOST_RIVALS = 5
 HOLDOUT_EVERY = 4  # every fourth dwell is held out
-MAP_POINTS = 20  # least number of distinct currents for fitting a flux map
-ABSORBED = {"udc_gain", "current_scale", "inductance_d", "inductance_q"}
 
 
 def explain(loaded: list[Recording], nominal: Nominal, progress=lambda text: None) -> Diagnosis:
@@ -63,82 +65,105 @@ def _physics(recordings, nominal, progress) -> Diagnosis:
     views = views_of(recordings, nominal)
     view = joined_views(views)
     held = held_out(views)
-    search = Search(view, CATALOGUE, ~held, progress)
-    found = search.run()
-    left = remains(search, found, held)
-    both = {"dead_time", "resistance"} <= found.best.model.names
-    straight = straight_ohms(search, found.best) if both else None
-    names, ambiguity = words.groups(
-        found.best, found.tied, CATALOGUE, nominal, found.silent, started_cold(view), straight
-    )
-    names = words.carried(names, found, left.cells, search.worth, CATALOGUE)
-    names, absorbed = beside_free_surface(view, names, ~held)
-    ambiguity = ambiguity + absorbed
-    spread = Spread(search, found.best, left.reduced) if names else None
-    names = words.beyond_doubt(spread, names) if names else names
-    lag = words.lag_of_currents(found.best)
-    kind = words.verdict(names, ambiguity, left, lag)
-    answer = Diagnosis(kind, "", location=locate(view, search.cells, found.pure), fit=left.fit, search=found)
-    if kind in ("explained", "ambiguous"):
-        if names:
-            answer.effects = words.named(spread, names, found.empty)
-        answer.ambiguity = ambiguity
-    if kind == "ambiguous":
+    progress("sets of effects")
+    setup = Setup(view, CATALOGUE, ~held)
+    posterior = Posterior(setup, progress)
+    return conclude(posterior, held, progress)
+
+
+def conclude(posterior, held, progress=lambda text: None) -> Diagnosis:
+    """The answer to a posterior; held: (b,) blocks that were not fitted."""
+    setup, names, best = posterior.setup, names_of(posterior), posterior.best()
+    view, cells, before = setup.view, setup.cells, setup.cells.y
+    told = names.said | {n for group in names.open for n in group if n in best.names}
+    after = best.left(told)
+    measured = setup.load == 0.0 or any(setup.effects[n].mechanical for n in told)
+    train = Sizes(setup, before, after, ~held, measured)
+    unseen = Sizes(setup, before, after, held, measured)
+    channel = train.primary()
+    share = unseen.share(channel) if told else None
+    stray = _stray(best, train)
+    kind = kind_of(names, train, unseen, share, stray)
+    fit = fit_of(train, unseen)
+    answer = Diagnosis(kind, "", location=locate(view, cells, setup.noise), fit=fit, search=posterior)
+    answer.effects = named_effects(names, posterior, _shares(posterior, names, channel, held, measured))
+    answer.ambiguity = names.open
+    answer.explained_share = share
+    answer.remainder = unseen.remainder() if kind != "no_mismatch" else []
+    if stray:
+        answer.remainder.insert(0, Remainder("torque" if stray.kind == "torque" else "u_dq", stray.order,
+                                             stray.size, stray.size_unit, float(min(stray.explains, 1.0))))  # fmt: skip
+    if names.open:
         progress("choosing the next recording")
-        noise_v = float(np.nanmedian(np.abs(at_order(search.cells, found.pure, 0.0))))
-        rivals = [found.best, *found.tied]
-        rivals += search.straightened(rivals)
-        for group in [] if found.tied else ambiguity:  # the models without one of the alternatives
-            rivals += [search.refine(found.best.model.without(n)) for n in group if n in found.best.model.names]
-        open_names = sorted({n for group in ambiguity for n in group})
-        answer.next_recording = requests(search, rivals, noise_v, wants_cold(open_names, view))
-    if kind == "unexplained":
-        answer.unknown_term = _lag(found, lag) if lag else _unknown(found, left)
-    answer.evidence = evidence(
-        view, (search.cells, search.cells.y), (left.cells, left.residual), found.pure, held
-    )
-    answer.sentence = words.sentence(kind, answer.effects, ambiguity, left.fit, CATALOGUE, answer.location)
+        noise_v = float(np.nanmedian(np.abs(at_order(cells, setup.noise, 0.0))))
+        open_names = sorted({n for group in names.open for n in group})
+        answer.next_recording = requests(
+            setup, _rivals(names), noise_v, wants_cold(open_names, setup.effects, view)
+        )
+    if kind in ("unexplained", "partly_explained"):
+        answer.unknown_term = _unknown(best, after, stray)
+    answer.evidence = evidence(view, (cells, before), (cells, after), setup.noise, held)
+    answer.sentence = words.sentence(answer, CATALOGUE)
     rows = view.u_dc.shape[1]
     answer.notes.append(
         f"The voltage balance was made on {len(view)} steady blocks of {rows} rows; {int(held.sum())} were not fitted."
     )
-    share = left.fit.share_left
-    answer.trace = (
-        f"reduced chi2 {left.reduced:.2f}, share {share:.3f}, group {left.group!r}, stray {left.stray}"
-    )
+    for name, p in sorted(names.maybe.items(), key=lambda entry: -entry[1])[:3]:
+        answer.notes.append(f"{CATALOGUE[name].title}: possible (probability {p:.2f}), not asserted.")
+    answer.trace = "; ".join(f"{p:.3f} {'+'.join(f.names) or 'none'}" for p, f in names.fits[:4])
     return answer
 
 
-def beside_free_surface(view, names, train):
-    """(remaining names, ambiguity sets): scales and inductances must improve the fit of a free flux map.
-
-    If the operating points cover the dq current plane, a free flux map can be fitted.  A scale or inductance error
-    that no longer improves the fit had only absorbed the residual of a rigid saturation curve.
-    """
-    curved = sorted({"saturation", "cross_saturation"} & set(names))
-    suspects = sorted(ABSORBED & set(names))
-    i = view.i.mean(axis=1) / view.machine.rated_current_a
-    points = len(np.unique(np.round(np.stack([i.real, i.imag], axis=1) / 0.12), axis=0))
-    if not curved or not suspects or points < MAP_POINTS:
-        return names, []
-    others = tuple(n for n in names if n not in suspects and n not in curved and n not in USUAL)
-    gains = earned(view, suspects, (*USUAL, *others), train)
-    weak = [n for n in suspects if gains[n] < EARNS]
-    return [n for n in names if n not in weak], [[n, *curved] for n in weak]
+def _rivals(names) -> list:
+    """One set per alternative: the most probable one with each open effect."""
+    rivals, seen = [], set()
+    for _, fit in names.fits:
+        mine = frozenset(n for group in names.open for n in group if n in fit.names)
+        if mine and mine not in seen:
+            seen.add(mine)
+            rivals.append(fit)
+    return rivals[:MOST_RIVALS]
 
 
-def _lag(found, lag) -> UnknownTerm:
-    """The term for currents that are measured late, as a filter in front of the converters causes."""
-    best, empty = found.best, found.empty
-    spread = float(np.sqrt(best.covariance["delay"][0, 0]))
-    share = (empty.chi2 - best.chi2) / max(empty.chi2 - empty.rows, 1e-9)
-    return UnknownTerm("i_abc", "-lag di/dt", lag, spread, "s", float(np.clip(share, 0.0, 1.0)))
+def _shares(posterior, names, channel, held, measured) -> dict[str, float]:
+    """{effect: share of the misfit's power above the floor that is left without it}."""
+    best, setup = posterior.best(), posterior.setup
+    out = {}
+    for name in names.said:
+        fewer = best.problem.fit([n for n in best.names if n != name])
+        without = Sizes(setup, setup.cells.y, fewer.left(), held, measured)
+        with_it = Sizes(setup, setup.cells.y, best.left(), held, measured)
+        mine = [channel] if channel in without.channels else list(without.channels)
+        excess = sum(without.channels[c].excess for c in mine)
+        more = sum(without.channels[c].left - with_it.channels[c].left for c in mine)
+        out[name] = float(np.clip(more / excess, 0.0, 1.0)) if excess > 0.0 else 0.0
+    return out
 
 
-def _unknown(found, left) -> UnknownTerm | None:
-    """The formula that fits the residual best."""
-    stray = left.stray
+def _stray(best, train) -> Stray | None:
+    """A misfit outside the orders of the balance, after the best set."""
+    problem, setup = best.problem, best.problem.setup
+    effects = setup.effects
+    doubts = [effects[n].doubt(best.c[n], setup.view) for n in best.names]
+    doubt = np.sqrt(sum((np.square(d) for d in doubts), np.zeros(len(setup.view))))
+    before = train.channels["u"].before if "u" in train.channels else 0.0
+    floor = FORMS_LEFT * before if best.names else 0.0
+    certain = np.flatnonzero(doubt <= FORMS_LEFT * before) if best.names else np.arange(len(setup.view))
+    if not len(certain):
+        return None
+    known = sorted({h for n in best.names for h in effects[n].trailing})
+    view, rows = problem.view.take(certain), row_residual(best)[certain]
+    found = stray_order(view, rows, floor, known) or stray_swing(view, rows, floor)
+    if found is None and setup.load == 0.0:
+        found = stray_torque(setup.view, setup.projector, setup.cells, best.left(), np.hypot(setup.noise, setup.level))
+    return found
+
+
+def _unknown(best, after, stray) -> UnknownTerm | None:
+    """The formula that fits the remainder best."""
     if stray is None:
-        return sparse_term(found.best.view, left.cells, left.residual, found.sigma, found.train)
+        setup = best.problem.setup
+        sigma = np.hypot(setup.noise, setup.level)
+        return sparse_term(best.problem.view, setup.cells, after, sigma, setup.train)
     signal = "torque" if stray.kind == "torque" else "u_dq"
     return UnknownTerm(signal, stray.formula, stray.value, stray.sigma, stray.unit, min(stray.explains, 1.0))

@@ -8,13 +8,13 @@ from dataclasses import fields
 import numpy as np
 
 from fluxproof.diagnosis.cells import SYSTEM_DC, SYSTEM_U, Projector, voltage_level
-from fluxproof.diagnosis.curvature import LEAST
 from fluxproof.diagnosis.experiment import BENDS, best_points, rivalry
-from fluxproof.diagnosis.fit import FRESH
 from fluxproof.diagnosis.result import Request
 from fluxproof.diagnosis.view import View, stayed_cold
 
 ROWS = 200
+LEAST = 0.08  # of rated current: less current does not determine an axis
+FRESH = 0.06  # share of an effect's longest column below which the recording does not show a coefficient
 BLOCKS = 20  # independent blocks assumed in a dwell of half a second
 MOST = 3
 # Share of D^2 that is given up to avoid an axis without current so far, whose parameters are unknown, and to avoid
@@ -96,50 +96,50 @@ def columns_at(p, view, effect) -> dict:
     return {key: p.rows(column) for key, column in {**core, **free}.items()}
 
 
-def known_of(search, solution, columns) -> np.ndarray:
-    """Information matrix (k, k) of the recording about a solution's coefficients, in its effects' freest form.
+def known_of(fit, columns) -> np.ndarray:
+    """Information matrix (k, k) of the recording about a set's coefficients, in its effects' freest form.
 
     columns: {(effect, coefficient): rows at the candidates}, which bound coefficients that the recording does not
     determine.
     """
-    names = sorted(solution.model.names)
-    f = search.fitter(solution.view, [search.effects[n] for n in names])
-    place = {(f.owner[n], f.names[n].lstrip("~")): n for n in range(len(f.names)) if np.isfinite(f.scale[n])}
+    problem = fit.problem
+    p = problem.p
+    place = {(n, key.lstrip("~")): j for j, (n, key) in enumerate(problem.keys)}
+    weight = 1.0 / np.sqrt(p.s2 + (fit.lam[p.group] * p.level) ** 2)
+    x = p.x * weight[:, None]
+    length = np.linalg.norm(x, axis=0)
     out = np.zeros((len(columns),) * 2)
     for a, key_a in enumerate(columns):
         mine = [key for key in columns if key[0] == key_a[0]]
-        seen = {key: f.scale[place[key]] for key in mine if key in place}
+        seen = {key: length[place[key]] for key in mine if key in place and length[place[key]] > 1e-9}
         # Within the recorded range at most as large as the effect itself; beyond it a curve over speed may be larger.
         shown = seen.get(key_a, 0.0) > FRESH * max(seen.values(), default=0.0)
         size = seen if shown else {key: np.linalg.norm(columns[key]) for key in mine}
-        own = sum(abs(solution.c[n].get(key, 0.0)) * length for (n, key), length in size.items())
+        own = sum(abs(fit.c[n].get(key, 0.0)) * size[n, key] for n, key in size)
         out[a, a] += (size[key_a] / (BENDS * own + 1e-12 * size[key_a] + 1e-30)) ** 2
         for b, key_b in enumerate(columns):
             if key_a in place and key_b in place:
-                m, n = place[key_a], place[key_b]
-                out[a, b] += f.gram[m, n] * f.scale[m] * f.scale[n]
+                out[a, b] += x[:, place[key_a]] @ x[:, place[key_b]]
     return out
 
 
-DRIFTS = {"magnet_temperature", "resistance_temperature"}
-
-
-def wants_cold(names, view) -> bool:
+def wants_cold(names, effects, view) -> bool:
     """Whether a cold machine separates the names: a drift then vanishes, and the other effects do not.
 
     Two drifts would both vanish; they are separated by the load on the warm machine.  If the winding stayed cold while
     something drifted, its temperature cannot show that the drift has vanished.
     """
-    names = set(names)
-    return bool(DRIFTS & names) and not names <= DRIFTS and not stayed_cold(view)
+    drifting = [effects[n].drift_of != "" for n in names]
+    return any(drifting) and not all(drifting) and not stayed_cold(view)
 
 
-def requests(search, solutions, noise_v, cold=False) -> list[Request]:
-    """Up to MOST operating points that together separate the tied solutions best, the most informative first.
+def requests(setup, fits, noise_v, cold=False) -> list[Request]:
+    """Up to MOST operating points that together separate the sets of ``fits`` best, the most informative first.
 
     cold: points of a machine that has cooled down are candidates too.
     """
-    view, effects = View(**{f.name: getattr(search.view, f.name) for f in fields(View)}), search.effects
+    solutions, effects = fits, setup.effects
+    view = View(**{f.name: getattr(setup.view, f.name) for f in fields(View)})
     omega, i = grid(view)
     if cold:  # each point is a candidate warm and cold
         omega, i = np.tile(omega, 2), np.tile(i, 2)
@@ -149,14 +149,14 @@ def requests(search, solutions, noise_v, cold=False) -> list[Request]:
     drive = view.nominal.inverter.dc_bus_v
     own = np.hypot(noise_v, SYSTEM_U * voltage_level(made) + SYSTEM_DC * drive)[p.block] / np.sqrt(BLOCKS)
     sigma = np.where(p.ok & (p.channel == "u"), own, np.inf)
-    of = {n: columns_at(p, made, effects[n]) for s in solutions for n in s.model.names}
+    of = {n: columns_at(p, made, effects[n]) for s in solutions for n in s.names}
     predictions, knows = [], []
     for s in solutions:
         parts = (v * of[n][k] for n, c in s.c.items() for k, v in c.items() if k in of[n])
         predictions.append(sum(parts, np.zeros(len(p.ok))))
-        columns = {(n, k): column for n in sorted(s.model.names) for k, column in of[n].items() if column.any()}
+        columns = {(n, k): column for n in sorted(s.names) for k, column in of[n].items() if column.any()}
         stack = np.array(list(columns.values())).reshape(len(columns), len(p.ok))
-        knows.append((stack, known_of(search, s, columns)))
+        knows.append((stack, known_of(s, columns)))
     pairs = list(itertools.permutations(range(len(solutions)), 2))
     rivals = [rivalry(predictions[a], predictions[b], *knows[b], sigma, p.block, len(omega)) for a, b in pairs]
     effort = (omega / np.abs(omega).max()) ** 2 + np.abs(i / view.machine.rated_current_a) ** 2
@@ -165,7 +165,7 @@ def requests(search, solutions, noise_v, cold=False) -> list[Request]:
     for k in chosen:
         each = [r.left([k]) for r in rivals]
         worst = pairs[int(np.argmax(each))]
-        names = sorted({x for n in worst for x in solutions[n].model.names})
+        names = sorted({x for n in worst for x in solutions[n].names})
         out.append(
             Request(
                 float(omega[k]),
@@ -185,7 +185,7 @@ COLD = ", once the machine has cooled down (record temp_winding)"
 
 def _why(p, k, predictions, pair, solutions):
     at = p.ok & (p.block == k) & (p.channel == "u")
-    a, b = (" with ".join(sorted(solutions[n].model.names)) for n in pair)
+    a, b = (" with ".join(sorted(solutions[n].names)) for n in pair)
     difference = np.where(at, np.abs(predictions[pair[0]] - predictions[pair[1]]), 0.0)
     row = int(np.argmax(difference))
     where = f"u_{'dq'[p.part[row]]}" + (f" at order {abs(p.order[row]):g}" if p.order[row] else "")

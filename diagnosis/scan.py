@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fluxproof.diagnosis.balance import misfit
 from fluxproof.diagnosis.cells import voltage_level
 from fluxproof.diagnosis.effect import rated_torque
 
@@ -37,19 +38,23 @@ class Stray:
     sigma: float
     unit: str
     explains: float
+    order: float = 0.0  # per electrical turn
+    size: float = 0.0  # rms [size_unit]
+    size_unit: str = "V"
 
 
-def row_residual(view, solution, effects, misfit):
-    """Residual of the voltage balance after a solution, (b, m) complex dq [V]."""
-    left = misfit["u"].copy()
-    for name, c in solution.c.items():
+def row_residual(fit):
+    """Residual of the voltage balance after a fit, (b, m) complex dq [V]."""
+    view, effects = fit.problem.view, fit.problem.setup.effects
+    left = misfit(view)["u"].copy()
+    for name, c in fit.c.items():
         effect = effects[name]
         if effect.corrects:
             continue
         seen = view if effect.smoothed else view.with_raw_current()
         columns = {**effect.core(seen), **effect.free(seen)}
         for key, value in c.items():
-            if value and "u" in columns[key]:
+            if value and "u" in columns.get(key, {}):
                 left -= value * columns[key]["u"]
     return left
 
@@ -75,7 +80,8 @@ def stray_torque(view, projector, cells, residual, sigma) -> Stray | None:
     gain, amplitude, n = best
     total = float(np.sum((residual[use] / sigma[use]) ** 2))
     formula = f"torque = c * sin({n} theta_m + phi)"
-    return Stray("torque", formula, amplitude, amplitude / np.sqrt(gain), "Nm", gain / total)
+    spread = amplitude / np.sqrt(gain)
+    return Stray("torque", formula, amplitude, spread, "Nm", gain / total, n / m.pole_pairs, amplitude / 2**0.5, "Nm")
 
 
 def stray_order(view, residual, floor, known=()) -> Stray | None:
@@ -106,7 +112,7 @@ def stray_order(view, residual, floor, known=()) -> Stray | None:
                 formula = f"u_d + j u_q = c * {text} * exp(j {n} theta_m + j phi)"
                 explains = abs(total) ** 2 / float(np.sum(w**2) * np.sum(np.abs(f) ** 2))
                 spread = c * float(np.sqrt(max(1.0 - explains, 0.0) / use.sum()))
-                best, largest = Stray("order", formula, c, spread, unit, explains), volts
+                best, largest = Stray("order", formula, c, spread, unit, explains, n / p, volts), volts
     return best
 
 
@@ -128,6 +134,5 @@ def stray_swing(view, residual, floor) -> Stray | None:
         return None
     hertz = (1 + int(np.argmax(mean[1:5]))) / (m * view.sample_time_s)
     formula = f"u proportional to 1 + c * sin(2 pi f t), f about {hertz:.0f} Hz"
-    return Stray(
-        "frequency", formula, share, share * float(np.sqrt(around / low)), "1", float(1.0 - around / low)
-    )
+    spread, size = share * float(np.sqrt(around / low)), amplitude / 2**0.5
+    return Stray("frequency", formula, share, spread, "1", float(1.0 - around / low), 0.0, size)

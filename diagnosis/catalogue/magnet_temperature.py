@@ -58,4 +58,5 @@ EFFECT = MagnetTemperature(
         ),
     ),
     absorbs=("magnet_flux",),
+    drift_of="magnet_flux",
 )

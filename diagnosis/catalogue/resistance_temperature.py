@@ -62,4 +62,5 @@ EFFECT = ResistanceTemperature(
         Parameter("resistance_drift_ohm", "ohm", "from start to end, if no temperature was recorded"),
     ),
     absorbs=("resistance",),
+    drift_of="resistance",
 )

@@ -19,3 +19,10 @@ MOST_DISCREPANCY = 1e4
 FORMULA = 0.01
 # A posterior from which a name is asserted, and the mass that an ambiguity must hold.
 ASSERTED = 0.95
+# Discrepancy, in units of the balance's error, that every recording may have.
+USUAL = 1.5
+# A leftover imitates an effect up to this many times its own rms: smooth physics lies along a few directions only.
+IMITATION = 2.0
+# Share of an effect's power in an order from which it lives there; weight of what is left in its other orders.
+LIVES = 0.05
+ELSEWHERE = 0.1

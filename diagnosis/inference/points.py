@@ -43,6 +43,7 @@ class Points:
     point: np.ndarray
     loads: int
     load: float
+    condensed: object  # function of further rows (r,): their means and contrasts (n,)
 
 
 def balance_level(view, cells):
@@ -84,29 +85,30 @@ def condense(cells, y, x, sigma, level, point, visit, use, load=0.0) -> Points:
     total = np.bincount(cell, w, n)
     sort = np.argsort(cell, kind="stable")
     starts = np.searchsorted(cell[sort], np.arange(n))
-    z = np.column_stack([y[rows], level[rows], x[rows]])
-    mean = np.add.reduceat(w[sort, None] * z[sort], starts, axis=0) / total[:, None]
     # Visits of the same functional and point are neighbours: each against the mean of the earlier ones.
     first = np.ones(n, bool)
     first[1:] = (names[1:, :4] != names[:-1, :4]).any(axis=1)
-    place = np.cumsum(first) - 1
-    begin = np.flatnonzero(first)
-    before_w = np.cumsum(total) - total
-    before_w -= before_w[begin][place]
-    before = np.cumsum(total[:, None] * mean, axis=0) - total[:, None] * mean
-    before -= before[begin][place]
-    contrast = ~first
-    out = np.zeros_like(mean)
-    out[contrast] = mean[contrast] - before[contrast] / before_w[contrast, None]
-    s2 = np.zeros(n)
-    s2[contrast] = 1.0 / total[contrast] + 1.0 / before_w[contrast]
-    widen = np.ones(n)
-    count = np.arange(n) - begin[place]
-    widen[contrast] = np.sqrt(1.0 + 1.0 / count[contrast])
-    sums = np.add.reduceat(total[:, None] * mean, begin, axis=0)
-    weights = np.add.reduceat(total, begin)
-    out[begin], s2[begin] = sums / weights[:, None], 1.0 / weights
-    lev = mean[:, 1] * widen
+    place, begin, contrast = np.cumsum(first) - 1, np.flatnonzero(first), ~first
+    earlier = np.cumsum(total) - total
+    earlier -= earlier[begin][place]
+
+    def condensed(values):
+        """(n, k) means and contrasts of (r, k) values, and the visits' own means."""
+        mean = np.add.reduceat(w[sort, None] * values[rows][sort], starts, axis=0) / total[:, None]
+        before = np.cumsum(total[:, None] * mean, axis=0) - total[:, None] * mean
+        before -= before[begin][place]
+        out = np.zeros_like(mean)
+        out[contrast] = mean[contrast] - before[contrast] / earlier[contrast, None]
+        out[begin] = np.add.reduceat(total[:, None] * mean, begin, axis=0) / np.add.reduceat(total, begin)[:, None]
+        return out, mean
+
+    out, _ = condensed(np.column_stack([y, x]))
+    _, levels = condensed(level[:, None])
+    s2, widen = np.zeros(n), np.ones(n)
+    s2[contrast] = 1.0 / total[contrast] + 1.0 / earlier[contrast]
+    s2[begin] = 1.0 / np.add.reduceat(total, begin)
+    widen[contrast] = np.sqrt(1.0 + 1.0 / (np.arange(n) - begin[place])[contrast])
+    lev = levels[:, 0] * widen
     kinds, group = np.unique(np.stack([names[:, 0], np.abs(names[:, 1]), contrast], axis=1), axis=0, return_inverse=True)
     groups = [(str(channels[c]), float(o) * 1e-6, bool(d)) for c, o, d in kinds]
     group = group.ravel()
@@ -114,5 +116,5 @@ def condense(cells, y, x, sigma, level, point, visit, use, load=0.0) -> Points:
     keep = np.ones(n, bool)
     if load and ("torque", 0.0, True) in groups:  # a load may change between visits
         keep = group != groups.index(("torque", 0.0, True))
-    return Points(out[keep, 0], out[keep, 2:], s2[keep], lev[keep], group[keep], groups, names[keep, 1] * 1e-6,
-                  names[keep, 2], names[keep, 3], loads, load)  # fmt: skip
+    return Points(out[keep, 0], out[keep, 1:], s2[keep], lev[keep], group[keep], groups, names[keep, 1] * 1e-6,
+                  names[keep, 2], names[keep, 3], loads, load, lambda values: condensed(values[:, None])[0][keep, 0])  # fmt: skip

@@ -89,6 +89,10 @@ class Problem:
             self.most[name] = max(min(ceiling / floor, 1e3), 2.0) if np.isfinite(ceiling) else 300.0
             self.index[name] = cores + [n for n in curves if self.prior[n] > 0.0] if cores else []
 
+    def condensed(self, rows):
+        """(n,) means and contrasts of further rows (r,)."""
+        return self.p.condensed(rows)
+
     def able(self):
         """Effects that have a column in this problem."""
         return [n for n, mine in self.index.items() if mine]
@@ -132,17 +136,14 @@ class Fit:
                 if owner == name:
                     self.c[name].setdefault(key.lstrip("~"), 0.0)
 
-    def rows(self):
-        """(r,) what the set adds to the misfit."""
-        out = np.zeros(len(self.problem.y))
+    def left(self, names=None):
+        """(r,) remainder of the misfit if the effects ``names`` (None: all of the set) explain their part."""
+        out = self.problem.y.copy()
         for n, v in zip(self.take, self.vector, strict=True):
             owner, key = self.problem.keys[n]
-            out += v * self.problem.cells.columns[owner][key]
+            if names is None or owner in names:
+                out -= v * self.problem.cells.columns[owner][key]
         return out
-
-    def left(self):
-        """(r,) remainder of the misfit."""
-        return self.problem.y - self.rows()
 
 
 def smooth(view):

@@ -1,0 +1,1 @@
+"""From the posterior to the answer: names, ambiguities, sizes, verdict, sentence."""

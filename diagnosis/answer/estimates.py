@@ -1,0 +1,66 @@
+"""Parameters of the named effects with standard deviations.
+
+The posterior covariance of a set holds noise and discrepancy.  Two errors are added: the balance's common error, which
+is proportional to the voltage everywhere, and the differences between the sets that share the posterior's mass.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fluxproof.diagnosis.result import NamedEffect
+
+# Relative to the voltage, and to the bus voltage in the direction of the current: rms in healthy recordings.
+COMMON_U, COMMON_DC = 2e-5, 1e-5
+
+
+def common(fit) -> np.ndarray:
+    """Covariance (k, k) of a fit's coefficients due to the common error of the balance."""
+    problem = fit.problem
+    setup, view = problem.setup, problem.view
+    u, bus = view.to_dq(view.u[:, 1:-1]), view.nominal.inverter.dc_bus_v
+    along = view.i_mid / np.abs(view.i_mid).clip(0.02 * view.machine.rated_current_a)
+    patterns = (COMMON_U * u, 1j * COMMON_U * u, COMMON_DC * bus * along)
+    rows = np.array([problem.condensed(setup.projector.rows({"u": p})) for p in patterns]).T
+    p = problem.p
+    weight = 1.0 / (p.s2 + (fit.lam[p.group] * p.level) ** 2)
+    moved = fit.cov @ (p.x[:, fit.take].T @ (weight[:, None] * rows))
+    return moved @ moved.T
+
+
+def covariance_of(fit, name, full) -> np.ndarray:
+    """The covariance of one effect's coefficients in their order in ``fit.c``; full: (k, k) of the set's columns."""
+    keys = list(fit.c[name])
+    place = {fit.problem.keys[n][1].lstrip("~"): j for j, n in enumerate(fit.take) if fit.problem.keys[n][0] == name}
+    out = np.zeros((len(keys), len(keys)))
+    for a, first in enumerate(keys):
+        for b, second in enumerate(keys):
+            if first in place and second in place:
+                out[a, b] = full[place[first], place[second]]
+    return out
+
+
+def named_effects(names, posterior, explains, only=None) -> list[NamedEffect]:
+    """The named effects of the best set; explains: {effect: share}; only: names in place of the named ones."""
+    best = posterior.best()
+    effects, nominal = posterior.setup.effects, best.problem.view.nominal
+    full, out = best.cov + common(best), []
+    total = sum(p for p, _ in names.fits)
+    for name in sorted(names.confidence if only is None else only):
+        effect, c = effects[name], best.c[name]
+        share = effect.relative({n: best.c[n] for n in best.names}, nominal)
+        estimates = effect.estimates(c, covariance_of(best, name, full), nominal)
+        for p, fit in names.fits[1:]:
+            if name not in fit.names:
+                continue
+            other = effect.estimates(fit.c[name], covariance_of(fit, name, fit.cov), nominal)
+            for key, e in estimates.items():
+                if key in other:
+                    e.sigma = float(np.sqrt(e.sigma**2 + p / total * (other[key].value - e.value) ** 2))
+        for e in estimates.values() if share != 1.0 else ():
+            # The reference may be either resistance: ohms beyond the nameplate may lie outside the winding.
+            e.value, e.sigma = share * e.value, float(np.hypot(share * e.sigma, (1.0 - share) * e.value))
+        plant = effect.plant({key: share * v for key, v in c.items()}, nominal)
+        confidence = names.confidence.get(name, 0.0)
+        out.append(NamedEffect(name, float(min(confidence, 0.999)), estimates, explains.get(name, 0.0), plant))
+    return out

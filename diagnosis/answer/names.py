@@ -1,0 +1,103 @@
+"""Which effects are named, which stay open, and with what confidence.
+
+The posterior compares sets of effects.  Where much of the misfit is left, something unknown is at work, and a part of it
+may look like an effect: a leftover of the rms D, lying along the columns of an effect whose contribution has the rms A,
+would imitate it.  The confidence in a name is therefore the posterior of its presence times 1 - exp(-(A / D)^2 / 8), so
+that an effect twice as large as what is left may still be an imitation, and one five times as large is not.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from fluxproof.diagnosis.inference import constants as k
+
+
+@dataclass
+class Names:
+    """confidence: {effect: probability} of the named ones; open: groups of which one effect is present.
+
+    maybe: {effect: probability} of effects that are neither named nor an alternative.  fits: the sets that hold the
+    mass of the posterior, the most probable first, with their probabilities.
+    """
+
+    confidence: dict[str, float]
+    open: list[list[str]]
+    maybe: dict[str, float]
+    fits: list = field(default_factory=list)
+
+    @property
+    def said(self) -> set[str]:
+        return set(self.confidence)
+
+
+def names_of(posterior) -> Names:
+    """Names and ambiguities of a posterior."""
+    held, kept = 0.0, []
+    for p, fit in posterior.weights():
+        kept.append((p, fit))
+        held += p
+        if held >= k.ASSERTED:
+            break
+    best = posterior.best()
+    credit = {}
+    for _, fit in kept:
+        for name in fit.names:
+            credit[name] = max(credit.get(name, 0.0), credibility(fit, name))
+    present = {n: p * credit[n] for n, p in posterior.present().items() if n in credit}
+    named = {n: p for n, p in present.items() if p >= k.ASSERTED and n in best.names}
+    rest = [frozenset(fit.names) - set(named) for _, fit in kept]
+    groups = [sorted(g) for g in alternatives(rest) if sum(present[n] for n in g) >= 0.5]
+    grouped = {n for g in groups for n in g}
+    maybe = {n: p for n, p in present.items() if n not in named and n not in grouped and p >= k.PRESENT}
+    return Names(named, groups, maybe, kept)
+
+
+def alternatives(sets) -> list[set[str]]:
+    """Effects that take each other's place: connected groups of effects, each in a set in which the other is not."""
+    linked: dict[str, set[str]] = {}
+    for n, a in enumerate(sets):
+        for b in sets[n + 1 :]:
+            if a - b and b - a:
+                for x in a - b:
+                    linked.setdefault(x, set()).update(b - a)
+                for x in b - a:
+                    linked.setdefault(x, set()).update(a - b)
+    groups = []
+    while linked:
+        todo, group = [next(iter(linked))], set()
+        while todo:
+            name = todo.pop()
+            if name not in group:
+                group.add(name)
+                todo += linked.pop(name, ())
+        groups.append(group)
+    return groups
+
+
+def credibility(fit, name) -> float:
+    """Probability in (0, 1] that an effect of a fit is no imitation by what is left of the misfit."""
+    p = fit.problem.p
+    count = np.maximum(np.bincount(p.group, minlength=len(p.groups)), 1)
+    level2 = np.bincount(p.group, p.level**2, minlength=len(p.groups)) / count
+    functionals = np.array([2.0 if order == 0 else 4.0 for _, order, _ in p.groups])
+    # A discrepancy within the error of the balance is what every recording has.
+    left = np.where(fit.lam > k.USUAL, fit.lam**2 - 1.0, 0.0) * level2 * functionals
+    take = [j for j, n in enumerate(fit.take) if fit.problem.keys[n][0] == name]
+    rows = p.x[:, fit.take[take]] @ fit.vector[take]
+    power = np.bincount(p.group, rows**2, minlength=len(p.groups)) / count * functionals
+    best = (0.0, 1.0)
+    for part in {(channel, contrast) for channel, _, contrast in p.groups}:
+        mine = np.array([(channel, contrast) == part for channel, _, contrast in p.groups])
+        total = power[mine].sum()
+        if total <= 0.0:
+            continue
+        own = mine & (power >= k.LIVES * total)
+        elsewhere = 0.0 if part[0] == "torque" else k.ELSEWHERE  # an angle's quantisation is no physics of the shaft
+        remains = left[own].sum() + elsewhere * left[mine & ~own].sum()
+        strength = total / level2[mine].mean()
+        if strength > best[0]:
+            best = (strength, 1.0 - np.exp(-total / (2.0 * k.IMITATION**2 * remains)) if remains > 0.0 else 1.0)
+    return float(best[1])

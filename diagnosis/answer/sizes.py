@@ -1,0 +1,83 @@
+"""Sizes of the misfit before and after an explanation, per channel and order, on fitted and on held-out blocks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fluxproof.diagnosis.result import Fit, Remainder
+
+UNITS = {"u": ("u_dq", "V"), "sum": ("current_sum", "A"), "torque": ("torque", "Nm")}
+
+
+@dataclass
+class Size:
+    """rms over blocks of one channel and order, or of all orders: misfit before and after, and the noise floor."""
+
+    before: float
+    after: float
+    floor: float
+
+    @property
+    def excess(self) -> float:
+        return max(self.before**2 - self.floor**2, 0.0)
+
+    @property
+    def left(self) -> float:
+        return max(self.after**2 - self.floor**2, 0.0)
+
+
+class Sizes:
+    """Sizes of a setup's misfit ``before`` and ``after`` (r,) in the blocks (b,) bool."""
+
+    def __init__(self, setup, before, after, blocks, measured_torque):
+        cells = setup.cells
+        ok = cells.ok & blocks[cells.block]
+        loads = (cells.channel == "torque") & (cells.order == 0) & (setup.load > 0.0)
+        ok &= ~loads
+        self.channels, self.orders = {}, {}
+        count = max(int(blocks.sum()), 1)
+        floor2 = setup.noise**2 + setup.level**2
+        for channel in np.unique(cells.channel):
+            mine = ok & (cells.channel == channel)
+            if mine.any() and (channel != "torque" or measured_torque):
+                self.channels[str(channel)] = self._size(mine, before, after, floor2, count)
+            for order in np.unique(np.abs(cells.order[mine])):
+                self.orders[str(channel), float(order)] = self._size(
+                    mine & (np.abs(cells.order) == order), before, after, floor2, count
+                )
+
+    @staticmethod
+    def _size(rows, before, after, floor2, count):
+        rms = lambda x2: float(np.sqrt(x2[rows].sum() / count))  # noqa: E731
+        return Size(rms(before**2), rms(after**2), rms(floor2))
+
+    def primary(self) -> str:
+        """The channel whose misfit is largest over its floor."""
+        return max(self.channels, key=lambda c: self.channels[c].before / max(self.channels[c].floor, 1e-300), default="u")
+
+    def share(self, channel, orders=None) -> float | None:
+        """Share of a channel's power above the floor that was explained, in some or all of its orders."""
+        mine = [s for (c, h), s in self.orders.items() if c == channel and (orders is None or h in orders)]
+        excess, left = sum(s.excess for s in mine), sum(s.left for s in mine)
+        return float(1.0 - left / excess) if excess > 0.0 else None
+
+    def remainder(self, least=0.01) -> list[Remainder]:
+        """What is left above the floor, per channel and order, the largest share first."""
+        out = []
+        for (channel, order), size in self.orders.items():
+            if channel not in self.channels:
+                continue
+            whole = sum(s.excess for (c, _), s in self.orders.items() if c == channel)
+            share = size.left / whole if whole > 0.0 else 0.0
+            if size.after > 1.2 * size.floor and share >= least:
+                signal, unit = UNITS[channel]
+                out.append(Remainder(signal, round(order, 4), float(np.sqrt(size.left)), unit, float(share)))
+        return sorted(out, key=lambda r: -r.share)
+
+
+def fit_of(train: Sizes, held: Sizes) -> Fit:
+    """The voltage misfit on fitted and on held-out blocks."""
+    a, b = train.channels.get("u", Size(0, 0, 0)), held.channels.get("u", Size(0, 0, 0))
+    return Fit("u_dq", "V", a.before, a.after, b.before, b.after, a.floor)

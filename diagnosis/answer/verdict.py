@@ -1,0 +1,73 @@
+"""The verdict, from names and sizes, and its sentence."""
+
+from __future__ import annotations
+
+import numpy as np
+
+FLOOR = 2.0  # times the noise floor: a smaller misfit is noise
+SMALL = 0.03  # of the misfit's power above the floor: a smaller remainder is the formulas' own error
+HALF = 0.5  # of that power: names that explain less are no explanation
+
+
+def kind_of(names, train, held, share, stray) -> str:
+    """The verdict.  names: Names; train, held: Sizes; share: explained share; stray: a misfit outside the orders."""
+    if not names.confidence and not names.open:
+        quiet = all(s.before <= FLOOR * s.floor for s in train.channels.values())
+        return "no_mismatch" if quiet and not stray and not standing_out(train) else "unexplained"
+    sizes = [s for c, s in held.channels.items()]
+    at_floor = all(s.after <= FLOOR * s.floor for s in sizes) and not standing_out(train)
+    whole = at_floor or (share is not None and share >= 1.0 - SMALL)
+    if not whole or stray:
+        if share is not None and share < HALF:
+            return "unexplained"
+        return "partly_explained"
+    return "ambiguous" if names.open else "explained"
+
+
+def standing_out(sizes) -> list:
+    """[(channel, order)] whose remainder exceeds its noise floor and is a large part of what was there before."""
+    return [
+        key for key, s in sizes.orders.items()
+        if key[0] in sizes.channels and s.after > FLOOR * s.floor and s.left > 0.1 * max(s.excess, 1e-300)
+    ]  # fmt: skip
+
+
+def size_text(estimates) -> str:
+    """'v_dead_v = 5.1 +- 0.1 V' of an effect's first parameters."""
+    parts = []
+    for key, e in list(estimates.items())[:3]:
+        unit = "" if e.unit == "1" else f" {e.unit}"
+        parts.append(f"{key} = {e.value:.4g} +- {e.sigma:.1g}{unit}")
+    return ", ".join(parts)
+
+
+def sentence(answer, effects) -> str:
+    """The verdict of an answer in one or two sentences; effects: the catalogue."""
+    fit = answer.fit
+    what = " and ".join(f"{effects[e.name].title} ({size_text(e.parameters)})" for e in answer.effects)
+    what = what[:1].upper() + what[1:]
+    fall = f"the misfit at operating points that were not fitted falls from {fit.holdout_before:.3g} V to {fit.holdout_after:.3g} V"
+    sets = "; ".join(" or ".join(effects[n].title if n in effects else n for n in g) for g in answer.ambiguity)
+    if answer.verdict == "no_mismatch":
+        return f"Simulation and recording agree: the misfit of {fit.train_before:.3g} V is at the noise floor of {fit.noise_floor:.3g} V."
+    if answer.verdict == "explained":
+        return f"{what}: {fall}."
+    if answer.verdict == "ambiguous":
+        begin = f"{what} for certain; beyond that, t" if what else "T"
+        return f"{begin}his recording cannot separate {sets}: {fall}."
+    where = located(answer)
+    if answer.verdict == "partly_explained":
+        begin = what or f"One of {sets}"
+        share = 100.0 * (answer.explained_share if answer.explained_share is not None else 0.0)
+        return f"{begin} explains {min(share, 99.9):.0f} % of the misfit's power: {fall}; the rest is {where} and has no known cause."
+    found = f" {what} is part of it." if what else ""
+    return f"Unknown: no effect in the catalogue explains half of the misfit of {fit.train_before:.3g} V, {where}.{found}"
+
+
+def located(answer) -> str:
+    """'mostly in u_dq at order 6 (1.2 V)' of the largest remainder."""
+    if not answer.remainder:
+        return f"in {answer.location.signal}" if answer.location.signal else "not located"
+    r = max(answer.remainder, key=lambda x: x.share)
+    at = f" at order {r.order:g}" if r.order else ""
+    return f"mostly in {r.signal}{at} ({np.format_float_positional(r.size, 3, fractional=False, trim='-')} {r.unit})"
