@@ -55,6 +55,7 @@ class Effect:
     )
     drift_of: str = ""  # the constant effect of which this one is a slow drift
     trailing: tuple[float, ...] = ()  # further electrical orders at which the effect may have harmonics
+    fast: bool = False  # visible only in harmonics or sampling instants, which a slow log does not have
     mechanical: bool = False  # a torque of the shaft rather than a voltage of the machine
     curve: float = 0.3  # share of the formula by which the free curve may depart from it
     smoothed: bool = False  # its columns use smoothed currents also when the model is applied
@@ -66,6 +67,13 @@ class Effect:
     def free(self, view) -> dict[str, Column]:
         """Further columns, for a curve as free as the effect's variables and symmetry allow."""
         return {}
+
+    def curve_scale(self, key, cores: dict[str, float], nominal) -> float:
+        """Coefficient of the free column ``key`` that departs from the formula by as much as the formula itself.
+
+        cores: {coefficient of the formula: its value at the floor}; by default all have one unit.
+        """
+        return max(cores.values())
 
     def floor(self, nominal) -> float:
         """Smallest size at which the effect is reported, in units of ``size``."""
@@ -97,7 +105,7 @@ class Effect:
 
     def possible(self, c: dict[str, float], covariance: np.ndarray, nominal) -> bool:
         """Whether the coefficients are physically possible within their uncertainty; covariance in their order."""
-        return not self.positive or sum(c.values()) >= -DOUBT * np.sqrt(max(covariance.sum(), 0.0))
+        return not self.positive or sum(c.values()) >= 0.0
 
     def corrected(self, view, c: dict[str, float]):
         """The view without this measurement error (only if ``corrects``)."""

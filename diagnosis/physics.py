@@ -4,27 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from fluxproof.diagnosis.answer import verdict as words
-from fluxproof.diagnosis.answer.estimates import named_effects
-from fluxproof.diagnosis.answer.names import names_of
-from fluxproof.diagnosis.answer.sizes import Sizes, fit_of
-from fluxproof.diagnosis.answer.verdict import kind_of
 from fluxproof.diagnosis.blocks import views_of
 from fluxproof.diagnosis.catalogue import CATALOGUE
+from fluxproof.diagnosis.conclude import conclude
 from fluxproof.diagnosis.inference.posterior import Posterior
 from fluxproof.diagnosis.inference.problem import Setup
-from fluxproof.diagnosis.locate import at_order, evidence, locate
 from fluxproof.diagnosis.nominal import Nominal
 from fluxproof.diagnosis.recording import Recording
-from fluxproof.diagnosis.request import requests, wants_cold
-from fluxproof.diagnosis.result import Diagnosis, Remainder, UnknownTerm
-from fluxproof.diagnosis.scan import Stray, row_residual, stray_order, stray_swing, stray_torque
+from fluxproof.diagnosis.result import Diagnosis
 from fluxproof.diagnosis.slow_diagnosis import diagnose_slow
-from fluxproof.diagnosis.unknown import sparse_term
 from fluxproof.diagnosis.view import joined_views
 
-FORMS_LEFT = 0.06  # of the misfit's rms: ripple that the formulas of the named effects may leave
-MOST_RIVALS = 5
 HOLDOUT_EVERY = 4  # every fourth dwell is held out
 
 
@@ -69,101 +59,3 @@ def _physics(recordings, nominal, progress) -> Diagnosis:
     setup = Setup(view, CATALOGUE, ~held)
     posterior = Posterior(setup, progress)
     return conclude(posterior, held, progress)
-
-
-def conclude(posterior, held, progress=lambda text: None) -> Diagnosis:
-    """The answer to a posterior; held: (b,) blocks that were not fitted."""
-    setup, names, best = posterior.setup, names_of(posterior), posterior.best()
-    view, cells, before = setup.view, setup.cells, setup.cells.y
-    told = names.said | {n for group in names.open for n in group if n in best.names}
-    after = best.left(told)
-    measured = setup.load == 0.0 or any(setup.effects[n].mechanical for n in told)
-    train = Sizes(setup, before, after, ~held, measured)
-    unseen = Sizes(setup, before, after, held, measured)
-    channel = train.primary()
-    share = unseen.share(channel) if told else None
-    stray = _stray(best, train)
-    kind = kind_of(names, train, unseen, share, stray)
-    fit = fit_of(train, unseen)
-    answer = Diagnosis(kind, "", location=locate(view, cells, setup.noise), fit=fit, search=posterior)
-    answer.effects = named_effects(names, posterior, _shares(posterior, names, channel, held, measured))
-    answer.ambiguity = names.open
-    answer.explained_share = share
-    answer.remainder = unseen.remainder() if kind != "no_mismatch" else []
-    if stray:
-        answer.remainder.insert(0, Remainder("torque" if stray.kind == "torque" else "u_dq", stray.order,
-                                             stray.size, stray.size_unit, float(min(stray.explains, 1.0))))  # fmt: skip
-    if names.open:
-        progress("choosing the next recording")
-        noise_v = float(np.nanmedian(np.abs(at_order(cells, setup.noise, 0.0))))
-        open_names = sorted({n for group in names.open for n in group})
-        answer.next_recording = requests(
-            setup, _rivals(names), noise_v, wants_cold(open_names, setup.effects, view)
-        )
-    if kind in ("unexplained", "partly_explained"):
-        answer.unknown_term = _unknown(best, after, stray)
-    answer.evidence = evidence(view, (cells, before), (cells, after), setup.noise, held)
-    answer.sentence = words.sentence(answer, CATALOGUE)
-    rows = view.u_dc.shape[1]
-    answer.notes.append(
-        f"The voltage balance was made on {len(view)} steady blocks of {rows} rows; {int(held.sum())} were not fitted."
-    )
-    for name, p in sorted(names.maybe.items(), key=lambda entry: -entry[1])[:3]:
-        answer.notes.append(f"{CATALOGUE[name].title}: possible (probability {p:.2f}), not asserted.")
-    answer.trace = "; ".join(f"{p:.3f} {'+'.join(f.names) or 'none'}" for p, f in names.fits[:4])
-    return answer
-
-
-def _rivals(names) -> list:
-    """One set per alternative: the most probable one with each open effect."""
-    rivals, seen = [], set()
-    for _, fit in names.fits:
-        mine = frozenset(n for group in names.open for n in group if n in fit.names)
-        if mine and mine not in seen:
-            seen.add(mine)
-            rivals.append(fit)
-    return rivals[:MOST_RIVALS]
-
-
-def _shares(posterior, names, channel, held, measured) -> dict[str, float]:
-    """{effect: share of the misfit's power above the floor that is left without it}."""
-    best, setup = posterior.best(), posterior.setup
-    out = {}
-    for name in names.said:
-        fewer = best.problem.fit([n for n in best.names if n != name])
-        without = Sizes(setup, setup.cells.y, fewer.left(), held, measured)
-        with_it = Sizes(setup, setup.cells.y, best.left(), held, measured)
-        mine = [channel] if channel in without.channels else list(without.channels)
-        excess = sum(without.channels[c].excess for c in mine)
-        more = sum(without.channels[c].left - with_it.channels[c].left for c in mine)
-        out[name] = float(np.clip(more / excess, 0.0, 1.0)) if excess > 0.0 else 0.0
-    return out
-
-
-def _stray(best, train) -> Stray | None:
-    """A misfit outside the orders of the balance, after the best set."""
-    problem, setup = best.problem, best.problem.setup
-    effects = setup.effects
-    doubts = [effects[n].doubt(best.c[n], setup.view) for n in best.names]
-    doubt = np.sqrt(sum((np.square(d) for d in doubts), np.zeros(len(setup.view))))
-    before = train.channels["u"].before if "u" in train.channels else 0.0
-    floor = FORMS_LEFT * before if best.names else 0.0
-    certain = np.flatnonzero(doubt <= FORMS_LEFT * before) if best.names else np.arange(len(setup.view))
-    if not len(certain):
-        return None
-    known = sorted({h for n in best.names for h in effects[n].trailing})
-    view, rows = problem.view.take(certain), row_residual(best)[certain]
-    found = stray_order(view, rows, floor, known) or stray_swing(view, rows, floor)
-    if found is None and setup.load == 0.0:
-        found = stray_torque(setup.view, setup.projector, setup.cells, best.left(), np.hypot(setup.noise, setup.level))
-    return found
-
-
-def _unknown(best, after, stray) -> UnknownTerm | None:
-    """The formula that fits the remainder best."""
-    if stray is None:
-        setup = best.problem.setup
-        sigma = np.hypot(setup.noise, setup.level)
-        return sparse_term(best.problem.view, setup.cells, after, sigma, setup.train)
-    signal = "torque" if stray.kind == "torque" else "u_dq"
-    return UnknownTerm(signal, stray.formula, stray.value, stray.sigma, stray.unit, min(stray.explains, 1.0))

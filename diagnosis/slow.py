@@ -17,6 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fluxproof.diagnosis.inference import constants as k
 from fluxproof.diagnosis.recording import Recording
 from fluxproof.diagnosis.slow_stretches import Stretches, stretches
 from fluxproof.diagnosis.view import View
@@ -25,12 +26,6 @@ ROWS = 36  # one turn in steps of ten degrees: the mean inverter loss is accurat
 BIN_CURRENT, BIN_SPEED = 0.05, 0.05  # of rated current and of the largest speed: the same operating point
 NO_CURRENT = 0.02  # of rated current: an axis that never had more contains only noise
 MOST_ALIKE = 6  # largest number of stretches per operating point
-
-# Effects that are visible only in harmonics or sampling instants, which a slow log does not have.
-UNSEEN = (
-    "cogging", "current_gain", "current_offset", "emf_harmonics", "encoder_eccentricity", "friction",
-    "phase_resistance_asymmetry", "sampling_skew",
-)  # fmt: skip
 
 
 @dataclass
@@ -41,6 +36,11 @@ class SlowView(View):
     """
 
     unsteady: np.ndarray | float = 0.0
+
+    def balance_error(self):
+        level = np.abs(self.u).mean(axis=1)
+        own = k.SLOW_DC * self.nominal.inverter.dc_bus_v + k.SLOW_U * level
+        return np.hypot(own, k.SLOW_CHANGE * self.unsteady)
 
     def _advance(self, count, first=0.5):
         """Angle of the rotor at intervals counted from the first sample, (b, count) [rad]."""
@@ -121,10 +121,10 @@ def alike(found: Stretches, nominal) -> tuple[np.ndarray, np.ndarray]:
     bins = np.round(np.stack(steps, axis=1)).astype(int)
     _, point = np.unique(bins, axis=0, return_inverse=True)
     order, dwell = [], []
-    for k in np.unique(point):
-        mine = np.flatnonzero(point.ravel() == k)
+    for number in np.unique(point):
+        mine = np.flatnonzero(point.ravel() == number)
         if len(mine) > MOST_ALIKE:
             mine = mine[np.linspace(0, len(mine) - 1, MOST_ALIKE).round().astype(int)]
         order += mine.tolist()
-        dwell += [int(k)] * len(mine)
+        dwell += [int(number)] * len(mine)
     return np.array(order), np.array(dwell)

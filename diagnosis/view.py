@@ -12,6 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fluxproof.diagnosis.inference import constants as k
+
 STACKED = ("theta", "omega", "i", "i_raw", "u", "u_dc", "temp", "torque", "slope_m", "shaft", "rows")
 
 
@@ -116,6 +118,11 @@ class View:
     def has_sum(self):
         """Whether three phase currents were measured independently."""
         return self.i_abc is not None
+
+    def balance_error(self):
+        """(b,) error of the voltage balance that no parameter explains [V]."""
+        level = np.abs(self.to_dq(self.u[:, 1:-1]).mean(axis=1))
+        return k.BALANCE_U * level + k.BALANCE_DC * self.nominal.inverter.dc_bus_v
 
     def stator(self, dq):
         """A dq quantity of the samples in the stator frame."""

@@ -30,6 +30,9 @@ class Friction(Effect):
             "low": _drag(view, lambda w: np.sign(w) * np.exp(-np.abs(w) / (0.1 * top))),
         }
 
+    def curve_scale(self, key, cores, nominal):
+        return cores.get("viscous" if key == "square" else "coulomb", max(cores.values()))
+
     def floor(self, nominal):
         return 0.006 * rated_torque(nominal)
 
@@ -81,4 +84,5 @@ EFFECT = Friction(
         Parameter("coulomb_friction_nm", "Nm", "dry"),
     ),
     mechanical=True,
+    fast=True,
 )

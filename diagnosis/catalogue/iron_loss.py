@@ -26,11 +26,11 @@ def _loss(view, omega):
 
 class IronLoss(Effect):
     def core(self, view):
-        return {"g_fe": _loss(view, _speeds(view)["g_fe"])}
+        speeds = _speeds(view)
+        return {key: _loss(view, speeds[key]) for key in ("g_fe", "g_hysteresis")}
 
     def free(self, view):
-        speeds = _speeds(view)
-        return {key: _loss(view, speeds[key]) for key in ("g_hysteresis", "g_eddy")}
+        return {"g_eddy": _loss(view, _speeds(view)["g_eddy"])}
 
     @staticmethod
     def psi(view, c):

@@ -23,6 +23,9 @@ class ResistanceTemperature(Effect):
     def free(self, view):
         return {f"course_{k}": voltage(view.i_mid * c[:, None]) for k, c in enumerate(courses(view)[:-1])}
 
+    def curve_scale(self, key, cores, nominal):
+        return self.floor(nominal)  # of the course [ohm], also if the formula has a temperature coefficient
+
     def floor(self, nominal):
         return 0.015 * nominal.machine.resistance_ohm
 

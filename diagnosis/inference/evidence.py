@@ -14,6 +14,7 @@ import numba
 import numpy as np
 
 STEPS = 7
+LEAST = 1.0  # in units of the balance's error
 ALWAYS_LOADED = 1e4  # odds against a load at every operating point of a recording
 FACTORS = np.array([0.1, 0.35, 0.7, 1.0, 1.4, 3.0, 10.0])  # of the discrepancy, tried in every step
 
@@ -130,12 +131,12 @@ def evidence(x, y, s2, level, group, groups, loads, load, prior, owner, core, mo
                 loaded[i] = load * load if e2 / with_load + np.log(with_load) < e2 / u + np.log(u) else 0.0
                 continue
             for g in range(len(FACTORS)):
-                u = s2[i] + (min(max(lam[group[i]] * FACTORS[g], 1.0), largest) * level[i]) ** 2 + own[i]
+                u = s2[i] + (min(max(lam[group[i]] * FACTORS[g], LEAST), largest) * level[i]) ** 2 + own[i]
                 score[group[i], g] -= 0.5 * (np.log(u) + e2 / u)
         for g in range(groups):
             best, chosen = -1e300, lam[g]
             for h in range(len(FACTORS)):
-                tried = min(max(lam[g] * FACTORS[h], 1.0), largest)
+                tried = min(max(lam[g] * FACTORS[h], LEAST), largest)
                 total = score[g, h] - np.log(1.0 + (tried / scale) ** 2)
                 if total > best:
                     best, chosen = total, tried

@@ -17,7 +17,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fluxproof.diagnosis.cells import voltage_level
 from fluxproof.diagnosis.effect import rated_torque
 from fluxproof.diagnosis.inference import constants as k
 
@@ -49,7 +48,7 @@ class Points:
 def balance_level(view, cells):
     """(r,) error of the balance in every row, in the unit of its channel."""
     m = view.machine
-    volts = k.BALANCE_U * voltage_level(view) + k.BALANCE_DC * view.nominal.inverter.dc_bus_v
+    volts = view.balance_error()
     level = np.where(cells.order == 0, 1.0, 0.5) * volts[cells.block]
     level = np.where(cells.channel == "sum", k.BALANCE_SUM * m.rated_current_a, level)
     return np.where(cells.channel == "torque", k.BALANCE_TORQUE * rated_torque(view.nominal), level)

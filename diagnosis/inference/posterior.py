@@ -9,9 +9,13 @@ import numpy as np
 from fluxproof.diagnosis.inference.problem import Problem, Setup, around
 
 ROUNDS = 3
-KEPT = 12  # sets of one size that are grown further
+SETTLED = 8  # most linearisations of the final set
+STANDS = 0.1  # standard deviations: a smaller change of every coefficient ends the iteration
+KEPT = (12, 80)  # least and most sets of one size that are grown further
+EFFORT = 20000  # rows times sets of one size
 CLOSE = 20.0  # log evidence below the best within which a set is linearised on its own
-MOST = 4
+GROWN = 3  # effects up to which all good sets are grown
+MOST = 6
 
 
 class Posterior:
@@ -45,6 +49,8 @@ class Posterior:
             self._add(problem, [known], force=True)
             self._neighbours(problem, known)
             self._near(known)
+        if self.best().names:
+            self._linearise(self.best().names, SETTLED)
 
     def best(self):
         return max(self.fits.values(), key=lambda f: f.value)
@@ -70,20 +76,23 @@ class Posterior:
                 fit.value = -np.inf
                 break
             new = problem.fit(names)
-            moved = max((abs(new.c[n][k] - fit.c[n][k]) / (1e-12 + 0.01 * abs(new.c[n][k])) for n in names
-                         if self.setup.effects[n].corrects for k in new.c[n]), default=0.0)  # fmt: skip
+            moved = 0.0
+            if len(new.vector) == len(fit.vector):
+                own = np.sqrt(np.maximum(np.diag(new.cov), 0.0))
+                moved = float(np.max(np.abs(new.vector - fit.vector) / np.maximum(own, 1e-300), initial=0.0))
             fit = new
             if not possible(fit):
                 fit.value = -np.inf
-            if moved < 1.0:
+            if moved < STANDS:
                 break
         self.fits[names] = fit
         self.own.add(names)
 
     def _grow(self, problem, able):
-        for size in range(2, MOST):
+        wide = int(np.clip(EFFORT / max(len(problem.p.y), 1), *KEPT))
+        for size in range(2, (MOST if wide == KEPT[1] else GROWN) + 1):
             leaders = sorted((f for f in self.fits.values() if len(f.names) == size - 1), key=lambda f: -f.value)
-            leaders = leaders[: len(able) if size == 2 else KEPT]
+            leaders = leaders[: len(able) if size == 2 else wide]
             sets = {tuple(sorted({*f.names, n})) for f in leaders for n in able if n not in f.names}
             self._add(problem, sets)
 

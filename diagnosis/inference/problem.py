@@ -81,10 +81,10 @@ class Problem:
             for n in cores:
                 unit = effect.size({**zero, self.keys[n][1]: 1.0}, nominal)
                 self.prior[n] = floor / max(unit, 1e-30)
-            core_length = float(np.sqrt(np.sum((self.prior[cores] * length[cores]) ** 2)))
             curves = [n for n in mine if self.keys[n][1].startswith("~") and length[n] > 1e-9]
-            for n in curves:
-                self.prior[n] = effect.curve * core_length / length[n]
+            scales = {self.keys[n][1]: self.prior[n] for n in cores}
+            for n in curves if cores else []:
+                self.prior[n] = effect.curve * effect.curve_scale(self.keys[n][1][1:], scales, nominal)
             ceiling = effect.ceiling(nominal)
             self.most[name] = max(min(ceiling / floor, 1e3), 2.0) if np.isfinite(ceiling) else 300.0
             self.index[name] = cores + [n for n in curves if self.prior[n] > 0.0] if cores else []
