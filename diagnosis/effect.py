@@ -20,6 +20,14 @@ import numpy as np
 from fluxproof.diagnosis.result import Estimate
 
 Column = dict  # channel -> array
+NEEDS = {
+    "harmonics": "a row per control period",
+    "samples": "the instants of sampling, in a log of the control",
+    "time": "a time axis",
+    "angle": "an angle that was measured, not taken from the voltages",
+    "inverter": "an inverter that switches",
+    "current": "measured currents",
+}
 DOUBT = 2.0  # standard deviations by which a value must violate a limit to be rejected
 ALIKE = 0.1  # relative difference below which two values count as equal
 
@@ -49,6 +57,7 @@ class Effect:
     separated_by: str
     parameters: tuple[Parameter, ...]
     absorbs: tuple[str, ...] = ()
+    needs: tuple[str, ...] = ()  # of NEEDS: what a recording must show for the effect to be seen
     positive: bool = False  # the leading coefficient cannot be negative
     corrects: bool = (
         False  # a measurement error rather than a property of the machine: ``corrected`` removes it from the data

@@ -63,7 +63,7 @@ def _physics(recordings, nominal, progress) -> Diagnosis:
     views = views_of(recordings, nominal)
     view = joined_views(views)
     held = held_out(views)
-    search = Search(view, CATALOGUE, ~held, progress)
+    search = Search(view, view.visible(CATALOGUE), ~held, progress)
     found = search.run()
     left = remains(search, found, held)
     both = {"dead_time", "resistance"} <= found.best.model.names

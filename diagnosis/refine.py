@@ -210,7 +210,7 @@ class Refiner:
         """The view without the measurement errors given by the totals; None if these are impossible."""
         view = self.view
         for name in sorted(totals, key=lambda n: n == "sampling_skew"):
-            view = self.effects[name].corrected(view, totals[name])
+            view = view.kept_where(~view.shows(self.effects[name]), self.effects[name].corrected(view, totals[name]))
             if not (np.isfinite(view.u).all() and np.isfinite(view.i_raw).all()):
                 return None
         return view

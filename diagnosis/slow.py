@@ -6,7 +6,8 @@ that only harmonic order zero exists, as in a slow log.  Three things differ fro
 
     flux     the mean EMF is exactly j omega psi, not a difference of flux linkages
     to_dq    voltages are kept in a stator frame that rotates from row to row, so that a delay is defined
-    phases   phase currents cover one whole electrical turn, since the inverter loss is a mean over it
+    phases   phase currents cover one whole electrical turn, since the inverter loss is a mean over it; of a rotor at
+             rest they are those at its angle
 
 Stretches at the same operating point share a dwell at any distance in time; their differences are noise.
 """
@@ -17,20 +18,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.recording import Recording
+from fluxproof.diagnosis.point_rows import point_rows
 from fluxproof.diagnosis.slow_stretches import Stretches, stretches
-from fluxproof.diagnosis.view import View
+from fluxproof.diagnosis.view import STACKED, View, lacking
 
 ROWS = 36  # one turn in steps of ten degrees: the mean inverter loss is accurate to 0.1 %
 BIN_CURRENT, BIN_SPEED = 0.05, 0.05  # of rated current and of the largest speed: the same operating point
 NO_CURRENT = 0.02  # of rated current: an axis that never had more contains only noise
 MOST_ALIKE = 6  # largest number of stretches per operating point
 
-# Effects that are visible only in harmonics or sampling instants, which a slow log does not have.
-UNSEEN = (
-    "cogging", "current_gain", "current_offset", "emf_harmonics", "encoder_eccentricity", "friction",
-    "phase_resistance_asymmetry", "sampling_skew",
-)  # fmt: skip
+# What no operating point shows.
+LACKS = frozenset({"harmonics"})
+UNSEEN = tuple(name for name, effect in CATALOGUE.items() if LACKS & set(effect.needs))
 
 
 @dataclass
@@ -38,9 +39,15 @@ class SlowView(View):
     """Operating points as blocks; see the module's header.  ``theta`` contains only the rotation of corrections.
 
     unsteady: (b,) change of the voltage around each stretch [V].
+    rest: (b,) angle of a rotor at rest [rad], nan if it turns.
+    d_known: (b,) bool, whether the d voltage was recorded.
     """
 
     unsteady: np.ndarray | float = 0.0
+    rest: np.ndarray | float = np.nan
+    d_known: np.ndarray | bool = True
+
+    stacked = (*STACKED, "unsteady", "rest", "d_known")
 
     def _advance(self, count, first=0.5):
         """Angle of the rotor at intervals counted from the first sample, (b, count) [rad]."""
@@ -53,9 +60,11 @@ class SlowView(View):
         return 0.5j * self.omega_mid * (psi[:, 1:] + psi[:, :-1])
 
     def _turn(self, count):
-        """One whole electrical turn in ``count`` or, of samples, count - 1 steps, (count,) [rad]."""
+        """One whole electrical turn in ``count`` or, of samples, count - 1 steps; the angle at rest, (b, count) [rad]."""
         steps = self.theta.shape[1] - 1
-        return 2 * np.pi * (np.arange(count) + (0.5 if count == steps else 0.0)) / steps
+        turn = 2 * np.pi * (np.arange(count) + (0.5 if count == steps else 0.0)) / steps
+        rest = np.broadcast_to(self.rest, (len(self),))[:, None]
+        return np.where(np.isfinite(rest), rest, turn[None, :])
 
     def phases(self, i_dq):
         turns = np.exp(-2j * np.pi / 3 * np.arange(3))
@@ -71,13 +80,16 @@ def slow_view(recording: Recording, nominal) -> SlowView:
 
     Raises RecordingError if signals are missing or no stretch is steady.
     """
-    return view_of_points(stretches(recording, nominal), recording, nominal)
+    found = point_rows(recording, nominal) if recording.points else stretches(recording, nominal)
+    return view_of_points(found, recording, nominal)
 
 
 def view_of_points(found: Stretches, recording, nominal) -> SlowView:
     """The same for given stretches."""
     order, dwell = alike(found, nominal)
     b, period = len(order), nominal.sample_time_s
+    span = 0.0 if "time" in recording.lacks else float(recording["t"][-1] - recording["t"][0])
+    recording.meta.setdefault("notes", []).extend(found.notes)
     held = lambda x, n: np.repeat(np.asarray(x)[order, None], n, axis=1)  # noqa: E731
     i, omega = held(found.i, ROWS + 1), held(found.omega, ROWS + 1)
     least = NO_CURRENT * nominal.machine.rated_current_a
@@ -95,15 +107,18 @@ def view_of_points(found: Stretches, recording, nominal) -> SlowView:
         u=held(found.u, ROWS + 2) * np.exp(1j * turning),
         u_dc=held(found.u_dc, ROWS),
         t=found.t[order],
-        course=found.t[order] / max(float(recording["t"][-1] - recording["t"][0]), 1e-9),
+        course=found.t[order] / max(span, 1e-9),
         temp=found.temp[order],
         torque=np.full((b, ROWS), np.nan),
         slope_m=np.zeros((b, ROWS)),
         shaft=np.full(b, ""),
         run=dwell,
         rows=found.first[order],
-        span_s=float(recording["t"][-1] - recording["t"][0]),
+        span_s=span,
         unsteady=found.unsteady[order],
+        rest=found.rest[order],
+        d_known=np.full(b, found.both_axes),
+        lacks=lacking(LACKS | recording.lacks, b),
     )
 
 

@@ -15,7 +15,6 @@ from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.cells import column_of, voltage_level
 from fluxproof.diagnosis.fit import Fitter, Model, everything
 from fluxproof.diagnosis.search import Outcome, Search
-from fluxproof.diagnosis.slow import UNSEEN
 
 MOST_EFFECTS = 6
 REFINED = 40
@@ -37,7 +36,6 @@ LIMITS = {  # generous limits for a real drive
     "offset_rad": lambda x, n: abs(x) < 0.6,
     "delay_s": lambda x, n: abs(x) < 3.0 * n.sample_time_s,
 }
-TELLING = {name: effect for name, effect in CATALOGUE.items() if name not in UNSEEN}
 
 
 class SlowSearch(Search):
@@ -45,7 +43,7 @@ class SlowSearch(Search):
 
     def __init__(self, view, train_blocks, progress=lambda text: None):
         silent = not view.i.real.any()  # the d axis never had a current
-        effects = {n: e for n, e in TELLING.items() if not (silent and n == "inductance_d")}
+        effects = {n: e for n, e in view.visible(CATALOGUE).items() if not (silent and n == "inductance_d")}
         super().__init__(view, effects, train_blocks, progress)
         self.hidden = ("saturation", "d_") if silent else None
         self.hide(self.cells)
@@ -89,7 +87,7 @@ class SlowSearch(Search):
         """The most promising models of all sets of up to MOST_EFFECTS effects on the linear problem."""
         able = [n for n in self.effects if self.linear.index[n][0]]
         scored = []
-        for size in range(1, MOST_EFFECTS + 1):
+        for size in range(1, most_effects(len(np.unique(self.view.run))) + 1):
             for names in itertools.combinations(able, size):
                 scored += [(self.linear.score(m, self.dispersion), m) for m in self.some_forms(names)]
         scored.sort(key=lambda entry: entry[0])
@@ -136,6 +134,11 @@ class SlowSearch(Search):
                 columns = fitter.cells.columns[name]
                 values += sum(v * columns[column_of(columns, k)] for k, v in c.items() if v and column_of(columns, k))
         return fitter.cells, fitter.cells.y - values
+
+
+def most_effects(points: int) -> int:
+    """Largest number of effects: with few operating points, more would explain anything."""
+    return min(MOST_EFFECTS, max(1, points // 2))
 
 
 def sigmas(view, cells) -> tuple[np.ndarray, np.ndarray]:

@@ -5,6 +5,8 @@ The messages are not synchronous, so that a row combines values of different ins
 state: over two messages of the slowest signal, nominal and recorded voltage are constant within a small share of the
 largest voltage, every signal that is not at rest has been updated, and the rotor turns.  Changes shortly before and
 after a stretch bound the error due to values of different age: ``unsteady``.
+
+A rotor at rest is steady too, if its angle is known: the inverter loss depends on it.
 """
 
 from __future__ import annotations
@@ -17,20 +19,23 @@ from fluxproof.diagnosis.recording import Recording, RecordingError
 
 SIGNALS = ("i_d", "i_q", "u_d", "u_q", "omega")
 STILL = 0.015  # of the largest voltage: largest change of nominal and recorded voltage
-LEAST_S = 0.5
+LEAST_S = (0.5, 0.2, 0.1)  # the shorter ones only if the longer ones find too few operating points
+ENOUGH = 8  # operating points
 MESSAGES = 2.0  # number of messages of the slowest signal in a stretch
 AROUND, LOOSE = 0.5, 8.0  # margin before and after a window, as a share of it; factor of the change allowed there
 REST = 1e-3  # of a signal's largest value: a smaller signal is at rest and needs no update
 TURNS = 4.0  # electrical turns within a stretch: the inverter loss depends on the angle, its mean over turns does not
 RESTED = 6.0  # times the median time between changes: after a longer time the signal counts as constant
 USUAL = 0.9  # quantile of the other intervals
+AT_REST = 0.05  # rad within a stretch: the rotor does not turn
 
 
 @dataclass
 class Stretches:
     """Means over each stretch, all (b,): dq current and voltage complex [A], [V], electrical speed [rad/s],
     bus [V], winding [degC] or nan, time of the middle since the first row [s], first row and end (exclusive), and the
-    change of the voltage from shortly before to shortly after the stretch [V]."""
+    change of the voltage from shortly before to shortly after the stretch [V].  rest: angle of a rotor at rest [rad],
+    nan if it turns; both_axes: whether u_d is known, otherwise it is that of the nominal drive."""
 
     i: np.ndarray
     u: np.ndarray
@@ -41,7 +46,10 @@ class Stretches:
     first: np.ndarray
     end: np.ndarray
     unsteady: np.ndarray
+    rest: np.ndarray
     window_s: float
+    both_axes: bool = True
+    notes: tuple[str, ...] = ()
 
     def __len__(self):
         return len(self.t)
@@ -52,6 +60,27 @@ def stretches(recording: Recording, nominal) -> Stretches:
 
     Raises RecordingError if signals are missing or no stretch is steady.
     """
+    refused = None
+    for least_s in LEAST_S:
+        try:
+            found = stretches_of(recording, nominal, least_s)
+        except RecordingError as error:
+            refused = refused or error
+            continue
+        if least_s == LEAST_S[-1] or _operating_points(found, nominal) >= ENOUGH:
+            return found
+    raise refused
+
+
+def _operating_points(found, nominal) -> int:
+    """Number of clearly different operating points."""
+    top = max(float(np.abs(found.omega).max()), 1e-9)
+    steps = (found.i.real / nominal.machine.rated_current_a, found.i.imag / nominal.machine.rated_current_a)
+    return len(np.unique(np.round(np.stack([*steps, found.omega / top], axis=1) / 0.05), axis=0))
+
+
+def stretches_of(recording, nominal, least_s) -> Stretches:
+    """The stretches of at least ``least_s`` [s]."""
     r, m = recording, nominal.machine
     i, u, omega, u_dc = operating_columns(recording, nominal)
     t = r["t"] - r["t"][0]
@@ -62,9 +91,11 @@ def stretches(recording: Recording, nominal) -> Stretches:
         for x in parts.values()
         if restless(t, x)
     ]
-    window = max(LEAST_S, MESSAGES * max(periods.values()))
+    window = max(least_s, MESSAGES * max(periods.values()))
     psi = m.inductance_d_h * i.real + m.magnet_flux_wb + 1j * m.inductance_q_h * i.imag
     nominal_u = m.resistance_ohm * i + 1j * omega * psi
+    u, both_axes = known_voltage(u, nominal_u)
+    angle = known_angle(recording)
     limit = STILL * max(np.nanmax(np.abs(nominal_u)), np.nanmax(np.abs(u)), 1e-9)
     good = r.usable & np.isfinite(nominal_u) & np.isfinite(u)
     step = np.diff(t)
@@ -79,7 +110,8 @@ def stretches(recording: Recording, nominal) -> Stretches:
             gaps[before[k]] == gaps[behind[k] - 1] and bad[behind[k]] == bad[before[k]] and ends[k] - k >= 3
         )
         whole = whole and all(f[ends[k] - 1] > f[k] for f in fresh)
-        whole = whole and np.abs(omega[inner]).min() * window > 2 * np.pi * TURNS
+        resting = np.abs(omega[inner]).max() * window < AT_REST and np.isfinite(angle[k])
+        whole = whole and (resting or np.abs(omega[inner]).min() * window > 2 * np.pi * TURNS)
         if whole and all(
             _change(x[inner]) < limit and _change(x[outer]) < LOOSE * limit for x in (nominal_u, u)
         ):
@@ -91,13 +123,33 @@ def stretches(recording: Recording, nominal) -> Stretches:
         raise RecordingError(
             f"{r.source}: in no stretch of {window:.2g} s, two messages of the slowest signal, are current, speed and "
             "voltage steady: record longer operating points, or log faster"
+            + (STANDING if np.abs(omega).max() * window < AT_REST else "")
         )
     mean = lambda x: np.array([np.mean(x[a:b]) for a, b, _ in found])  # noqa: E731
     temp = r["temp_winding"] if r.has("temp_winding") else np.full(len(t), np.nan)
     first, end, unsteady = (np.array(x) for x in zip(*found, strict=True))
+    speed = mean(omega)
+    rest = np.where(np.abs(speed) * window < AT_REST, angle[first], np.nan)
     return Stretches(
-        mean(i), mean(u), mean(omega), mean(u_dc), mean(temp), mean(t), first, end, unsteady, float(window)
+        mean(i), mean(u), speed, mean(u_dc), mean(temp), mean(t), first, end, unsteady, rest, float(window), both_axes
     )
+
+
+STANDING = "; at standstill record theta_e, or add it to [constants]: the inverter loss depends on the angle"
+
+
+def known_voltage(u, nominal_u):
+    """(voltage (n,) complex [V], whether u_d is known): an unknown u_d is set to the nominal one, and its rows are not used."""
+    if np.isfinite(u.real).any():
+        return u, True
+    return nominal_u.real + 1j * u.imag, False
+
+
+def known_angle(recording) -> np.ndarray:
+    """(n,) recorded angle [rad], nan if it was integrated from the speed or is missing."""
+    if not recording.has("theta_e") or recording.meta.get("angle") == "integrated":
+        return np.full(len(recording), np.nan)
+    return recording["theta_e"]
 
 
 def _change(x) -> float:
@@ -121,6 +173,9 @@ def operating_columns(recording: Recording, nominal):
         i = (2 / 3) * (np.stack([r["i_a"], r["i_b"], third], axis=1) @ turns) * np.exp(-1j * r["theta_e"])
     else:
         raise RecordingError(f"{r.source}: i_d, i_q or i_a, i_b with theta_e are needed")
+    if r.has("u_q_ref") and not r.has("d_a", "d_b", "d_c", "theta_e"):
+        u_d = r["u_d_ref"] if r.has("u_d_ref") else np.full(len(r), np.nan)
+        return i, u_d + 1j * r["u_q_ref"], omega, u_dc
     if r.has("u_d_ref", "u_q_ref"):
         return i, r["u_d_ref"] + 1j * r["u_q_ref"], omega, u_dc
     if not r.has("d_a", "d_b", "d_c", "theta_e"):

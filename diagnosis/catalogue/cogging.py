@@ -81,4 +81,5 @@ EFFECT = Cogging(
         Parameter("cogging_nm", "Nm", "amplitude of the largest order"),
         Parameter("cogging_order", "per turn", "the largest order, per mechanical turn"),
     ),
+    needs=("harmonics",),
 )

@@ -116,4 +116,5 @@ EFFECT = DeadTime(
     separated_by="several currents, i_q reversed; another bus voltage or PWM frequency separates dead time from drops",
     parameters=(Parameter("v_dead_v", "V", "voltage loss of a leg at full current"),),
     smoothed=True,
+    needs=("inverter",),
 )

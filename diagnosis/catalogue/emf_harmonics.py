@@ -78,4 +78,5 @@ EFFECT = EmfHarmonics(
         Parameter("order_6", "1", "amplitude relative to the magnet flux"),
         Parameter("order_12", "1", "amplitude relative to the magnet flux"),
     ),
+    needs=("harmonics",),
 )

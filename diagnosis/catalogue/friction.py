@@ -80,4 +80,5 @@ EFFECT = Friction(
         Parameter("viscous_friction_nms", "Nm s", "per mechanical rad/s"),
         Parameter("coulomb_friction_nm", "Nm", "dry"),
     ),
+    needs=("harmonics",),
 )

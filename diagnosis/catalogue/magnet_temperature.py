@@ -58,4 +58,5 @@ EFFECT = MagnetTemperature(
         ),
     ),
     absorbs=("magnet_flux",),
+    needs=("time",),
 )

@@ -9,12 +9,14 @@ from fluxproof.diagnosis.recording import Problem
 STAGE = "extent"
 LEAST_ROWS = 400  # two blocks of a balance in time
 LEAST_SLOW_ROWS = 20
+LEAST_POINTS = 2  # one row has no scatter
 
 
 def check(recording, nominal) -> None:
     n = len(recording)
     good = recording.usable if recording.slow else recording.usable & recording.joined
     left, least = int(np.count_nonzero(good)), LEAST_SLOW_ROWS if recording.slow else LEAST_ROWS
+    least = LEAST_POINTS if recording.points else least
     if left >= least:
         return
     message = f"{left} of {n} rows can be used, at least {least} are needed"

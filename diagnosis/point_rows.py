@@ -1,0 +1,65 @@
+"""Rows that are operating points, as stretches; rows of a long operating point are averaged.
+
+At standstill the inverter loss depends on the angle of the rotor.  A row with current at an unknown angle is not used.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fluxproof.diagnosis.recording import RecordingError
+from fluxproof.diagnosis.slow_stretches import (
+    STANDING,
+    STILL,
+    Stretches,
+    known_angle,
+    known_voltage,
+    operating_columns,
+)
+
+MEANS = 64  # number of means of a long operating point, fine enough for its drift
+SAME_SPEED = 0.02  # relative
+NO_LOSS = 0.005  # of rated current: a smaller one has no loss that could be noticed
+STANDSTILL = 1e-3  # of the speed at which the EMF takes the bus voltage
+
+
+def point_rows(recording, nominal) -> Stretches:
+    """The operating points of a recording with one row each; adjacent rows at the same point are joined to means.
+
+    Raises RecordingError if no row can be used.
+    """
+    r, m = recording, nominal.machine
+    i, u, omega, u_dc = operating_columns(recording, nominal)
+    psi = m.inductance_d_h * i.real + m.magnet_flux_wb + 1j * m.inductance_q_h * i.imag
+    nominal_u = m.resistance_ohm * i + 1j * omega * psi
+    u, both_axes = known_voltage(u, nominal_u)
+    good = r.usable & np.isfinite(u) & np.isfinite(nominal_u)
+    at_rest = np.abs(omega) < STANDSTILL * nominal.inverter.dc_bus_v / m.magnet_flux_wb
+    rest = np.where(at_rest, known_angle(recording), np.nan)
+    lost = good & at_rest & ~np.isfinite(rest) & (np.abs(i) > NO_LOSS * m.rated_current_a)
+    good &= ~lost
+    if not good.any():
+        raise RecordingError(f"{r.source}: no row can be used{STANDING if lost.any() else ''}")
+    notes = (f"{int(lost.sum())} rows at standstill are not used{STANDING}",) if lost.any() else ()
+    t = np.zeros(len(r)) if "time" in r.lacks else r["t"] - r["t"][0]
+    temp = r["temp_winding"] if r.has("temp_winding") else np.full(len(t), np.nan)
+    groups = _groups(t, (omega, nominal_u, u), good, float(t[-1]) / MEANS)
+    first, end = np.array([g[0] for g in groups]), np.array([g[-1] + 1 for g in groups])
+    means = [np.array([np.mean(x[g]) for g in groups]) for x in (i, u, omega, u_dc, temp, t)]
+    return Stretches(*means, first, end, np.zeros(len(groups)), rest[first], 0.0, both_axes, notes)
+
+
+def _groups(t, signals, good, span) -> list[np.ndarray]:
+    """Consecutive rows at one operating point, within ``span`` [s], as arrays of row numbers."""
+    omega, nominal_u, u = signals
+    limit = STILL * max(np.nanmax(np.abs(nominal_u[good])), np.nanmax(np.abs(u[good])), 1e-9)
+    out, begin = [], None
+    for k in np.flatnonzero(good):
+        near = begin is not None and t[k] - t[begin] < span
+        near = near and abs(omega[k] - omega[begin]) <= SAME_SPEED * abs(omega[begin])
+        if near and max(abs(nominal_u[k] - nominal_u[begin]), abs(u[k] - u[begin])) < limit:
+            out[-1].append(k)
+        else:
+            out.append([k])
+            begin = k
+    return [np.array(g) for g in out]
