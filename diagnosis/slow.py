@@ -28,6 +28,7 @@ ROWS = 36  # one turn in steps of ten degrees: the mean inverter loss is accurat
 BIN_CURRENT, BIN_SPEED = 0.05, 0.05  # of rated current and of the largest speed: the same operating point
 NO_CURRENT = 0.02  # of rated current: an axis that never had more contains only noise
 MOST_ALIKE = 6  # largest number of stretches per operating point
+MOST_OF_ONE = 120  # the same of a recording with one operating point
 
 # What no operating point shows.
 LACKS = frozenset({"harmonics"})
@@ -125,7 +126,8 @@ def view_of_points(found: Stretches, recording, nominal) -> SlowView:
 def alike(found: Stretches, nominal) -> tuple[np.ndarray, np.ndarray]:
     """(indices of the stretches to use, number of the operating point of each), sorted by operating point.
 
-    A long operating point is reduced to MOST_ALIKE stretches spread over time.
+    A long operating point is reduced to MOST_ALIKE stretches spread over time; the only one of a recording to
+    MOST_OF_ONE, since all it can show is its drift.
     """
     rated, top = nominal.machine.rated_current_a, max(float(np.abs(found.omega).max()), 1e-9)
     steps = (
@@ -133,13 +135,16 @@ def alike(found: Stretches, nominal) -> tuple[np.ndarray, np.ndarray]:
         found.i.imag / rated / BIN_CURRENT,
         found.omega / top / BIN_SPEED,
     )
-    bins = np.round(np.stack(steps, axis=1)).astype(int)
+    steps = np.stack(steps, axis=1)
+    alone = bool((np.abs(steps - np.median(steps, axis=0)) < 1.0).all())  # fixed bins would split some points
+    bins = np.zeros((len(steps), 3), int) if alone else np.round(steps).astype(int)
+    most = MOST_OF_ONE if alone else MOST_ALIKE
     _, point = np.unique(bins, axis=0, return_inverse=True)
     order, dwell = [], []
     for k in np.unique(point):
         mine = np.flatnonzero(point.ravel() == k)
-        if len(mine) > MOST_ALIKE:
-            mine = mine[np.linspace(0, len(mine) - 1, MOST_ALIKE).round().astype(int)]
+        if len(mine) > most:
+            mine = mine[np.linspace(0, len(mine) - 1, most).round().astype(int)]
         order += mine.tolist()
         dwell += [int(k)] * len(mine)
     return np.array(order), np.array(dwell)

@@ -155,7 +155,8 @@ def sigmas(view, cells) -> tuple[np.ndarray, np.ndarray]:
     own = np.hypot(OWN_SHARE * level, OWN_V * view.nominal.inverter.dc_bus_v)
     own = np.hypot(own, UNSTEADY * view.unsteady)
     start = own[cells.block]
-    rough = Fitter(cells, start, np.ones(len(cells.y), bool)).solve(everything(cells)).residual[at]
+    rough = Fitter(cells, start, np.ones(len(cells.y), bool)).solve(everything(cells)).residual
+    rough = np.where(cells.ok, rough, np.nan)[at]  # a d voltage that was not recorded has no residual
     pairs = np.flatnonzero((np.diff(view.run) == 0) & (loaded[1:] == loaded[:-1]))
     change = (rough[pairs + 1] - rough[pairs]) / np.sqrt(2)
     under = loaded[pairs]
@@ -171,4 +172,5 @@ def sigmas(view, cells) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _rms(x) -> float:
+    x = x[np.isfinite(x)]
     return float(np.sqrt(np.mean(np.square(x)))) if x.size else 0.0

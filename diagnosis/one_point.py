@@ -1,0 +1,236 @@
+"""One operating point: what drifts while it is held, and what a single point cannot tell.
+
+At one point a constant misfit is two numbers, which every effect with two coefficients explains.  Only its change over
+time is evidence: the mean over time is subtracted from the misfit and from every column, after which an effect that
+does not drift has no columns left.  Magnets change the voltage along j omega, the winding along the current, which are
+the same direction without i_d; a recorded winding temperature separates them by its course.
+"""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+
+from fluxproof.diagnosis import verdict as words
+from fluxproof.diagnosis.catalogue import CATALOGUE
+from fluxproof.diagnosis.cells import SYSTEM_DC, SYSTEM_U, cells_of, voltage_level
+from fluxproof.diagnosis.fit import Fitter, Model
+from fluxproof.diagnosis.locate import at_order, evidence, locate
+from fluxproof.diagnosis.recording import RecordingError
+from fluxproof.diagnosis.result import Diagnosis, Fit, NamedEffect, Request
+
+LEAST_MEANS = 12  # over time; fewer do not determine a drift
+DRIFTS = 0.1  # least change of a column over time relative to its size
+TIE = 10.0  # difference of the score below which two sets of effects fit equally well
+HOLDOUT_EVERY = 4
+CONSTANT = (1e-3, 5e-3)  # of the bus and of the voltage: a smaller constant misfit may be ripple or resolution
+FITS = 3.0  # standard deviations within which a single effect explains the constant misfit
+OTHER_SPEED = 0.4  # of the recorded one, for a request
+
+
+def diagnose_one_point(view) -> Diagnosis:
+    """Diagnose the drift at the only operating point of a SlowView.
+
+    Raises RecordingError if the point has too few means over time to tell anything.
+    """
+    effects = view.visible(CATALOGUE)
+    cells = cells_of(view, effects.values())
+    raw = at_order(cells, cells.y, 0.0)
+    if len(view) < LEAST_MEANS or not view.span_s:
+        raise RecordingError(
+            f"one operating point with {len(view)} rows cannot tell one effect from another: record at least three "
+            f"points of different speed and current, or hold this one with a time column while the machine warms up "
+            f"({LEAST_MEANS} rows)"
+        )
+    centred = _centred(cells)
+    drifting = [n for n, effect in effects.items() if _drifts(cells, centred, n, effect)]
+    sigma = _sigma(view, cells, raw)
+    held = np.arange(len(view)) % HOLDOUT_EVERY == 2
+    fitter = Fitter(centred, sigma, (cells.order == 0) & (cells.channel == "u") & ~held[cells.block])
+    best, tied = _best(fitter, effects, drifting, view)
+    names, groups = _sorted_out(best, tied, effects, view)
+    left = best.residual
+    fit = _fit(cells, centred.y, left, sigma, held)
+    constant = complex(np.nanmean(raw - _fitted(cells, best)))
+    candidates = _explaining(view, cells, effects, drifting, constant)
+    if abs(constant) > _resolution(view):
+        groups = groups + ([candidates] if len(candidates) > 1 else [])
+    kind = "ambiguous" if groups else "explained" if names else _nothing(constant, view, fit)
+    answer = Diagnosis(kind, "", location=locate(view, cells, sigma), fit=fit, ambiguity=groups)
+    answer.effects = [_named(n, effects[n], best, fitter, view) for n in names]
+    answer.next_recording = _requests(view, groups)
+    answer.evidence = evidence(view, (cells, centred.y), (cells, left), sigma, held)
+    for name in ("theta_e", "orders", "spectrum_before", "spectrum_after"):
+        answer.evidence.arrays.pop(name, None)
+    answer.sentence = words.sentence(kind, answer.effects, groups, fit, CATALOGUE, answer.location)
+    answer.notes = _notes(view, constant, candidates, held)
+    return answer
+
+
+def _centred(cells):
+    """The cells with the mean over the blocks subtracted from the misfit and from all columns."""
+    b = int(cells.block.max()) + 1
+
+    def centre(x):
+        table = x.copy()
+        for order in np.unique(cells.order[cells.channel == "u"]):
+            for part in (0, 1):
+                rows = (cells.channel == "u") & (cells.order == order) & (cells.part == part)
+                table[rows] -= table[rows].sum() / b
+        return table
+
+    columns = {n: {k: centre(c) for k, c in own.items()} for n, own in cells.columns.items()}
+    return type(cells)(centre(cells.y), columns, cells.block, cells.order, cells.part, cells.channel, cells.ok)
+
+
+def _drifts(cells, centred, name, effect) -> bool:
+    """Whether the usual formula of an effect changes over time at a constant operating point."""
+    rows = (cells.channel == "u") & (cells.order == 0)
+    cores = [k for k in cells.columns[name] if not k.startswith("~")]
+    size = [(np.linalg.norm(centred.columns[name][k][rows]), np.linalg.norm(cells.columns[name][k][rows])) for k in cores]
+    return bool(size) and not effect.corrects and max(a / max(b, 1e-30) for a, b in size) > DRIFTS
+
+
+def _sigma(view, cells, raw):
+    """(r,) standard deviation [V]: of neighbouring means, and a share of the voltage for the balance itself."""
+    step = np.diff(raw)
+    each = [float(np.sqrt(np.nanmean(x**2) / 2.0)) for x in (step.real, step.imag)]
+    own = SYSTEM_U * voltage_level(view) + SYSTEM_DC * view.nominal.inverter.dc_bus_v
+    return np.hypot(np.array(each)[cells.part], own[cells.block])
+
+
+def _best(fitter, effects, drifting, view):
+    """(best solution, others within TIE) of all sets of drifting effects in core and free form."""
+    solved = []
+    for count in range(len(drifting) + 1):
+        for names in itertools.combinations(drifting, count):
+            bendable = [n for n in names if fitter.index[n][1]]
+            for k in range(len(bendable) + 1):
+                for free in itertools.combinations(bendable, k):
+                    solution = fitter.solve(Model(frozenset(names), frozenset(free)))
+                    fine = all(
+                        effects[n].possible(solution.c[n], solution.covariance[n], view.nominal)
+                        and not effects[n].too_large(solution.c[n], view)
+                        for n in names
+                    )
+                    if fine:
+                        solved.append(solution)
+    spread = max(1.0, min(s.chi2 / max(s.rows - s.count, 1) for s in solved))
+    for s in solved:
+        s.score += s.chi2 / spread - s.chi2
+    solved.sort(key=lambda s: s.score)
+    best = solved[0]
+    return best, [s for s in solved[1:] if s.score < best.score + TIE and s.model.names != best.model.names]
+
+
+def _sorted_out(best, tied, effects, view):
+    """(names, ambiguity sets): what all tied sets share is named."""
+    large = lambda s: {n for n in s.model.names if effects[n].moved(s.c[n], view) >= effects[n].floor(view.nominal)}  # noqa: E731
+    sets = [large(s) for s in (best, *tied) if len(s.model) <= max(len(best.model), 1)]
+    common, seen = set.intersection(*sets), set.union(*sets)
+    rest = sorted(seen - common)
+    return sorted(common), [rest] if len(rest) > 1 else []
+
+
+def _fitted(cells, solution):
+    """(b,) complex misfit of a solution's columns, not centred [V]."""
+    total = np.zeros(len(cells.y))
+    for name, c in solution.c.items():
+        for key, value in c.items():
+            column = cells.columns[name].get(key, cells.columns[name].get(f"~{key}"))
+            total = total + value * column
+    return at_order(cells, total, 0.0)
+
+
+def _fit(cells, before, after, sigma, held) -> Fit:
+    rows = (cells.channel == "u") & (cells.order == 0) & cells.ok
+    out = held[cells.block]
+    rms = lambda x, w: float(np.sqrt(2.0 * np.mean(x[rows & w] ** 2)))  # noqa: E731
+    parts = [rms(x, w) for w in (~out, out) for x in (before, after)]
+    return Fit("u_dq", "V", *parts, float(np.sqrt(2.0 * np.mean(sigma[rows] ** 2))))
+
+
+def _resolution(view) -> float:
+    """Size of a constant misfit [V] that may be due to ripple or resolution."""
+    bus, level = CONSTANT
+    return bus * view.nominal.inverter.dc_bus_v + level * float(voltage_level(view).mean())
+
+
+def _explaining(view, cells, effects, drifting, constant) -> list[str]:
+    """Effects that do not drift and explain the constant misfit alone, with a size that a drive can have."""
+    out, limit = [], _resolution(view)
+    for name, effect in effects.items():
+        cores = {k: v for k, v in cells.columns[name].items() if not k.startswith("~")}
+        if name in drifting or not cores:
+            continue
+        means = {k: complex(np.nanmean(at_order(cells, v, 0.0))) for k, v in cores.items()}
+        key = max(means, key=lambda k: abs(means[k]))
+        if abs(means[key]) < 1e-9:
+            continue
+        value = (np.conj(means[key]) * constant).real / abs(means[key]) ** 2
+        c = {k: value if k == key else 0.0 for k in cores}
+        close = abs(constant - value * means[key]) < FITS * limit
+        if close and effect.possible(c, np.zeros((len(c),) * 2), view.nominal) and not effect.too_large(c, view):
+            out.append(name)
+    return sorted(out)
+
+
+def _nothing(constant, view, fit) -> str:
+    """Verdict without a name: nothing drifts, and the constant misfit is within the resolution or not."""
+    quiet = fit.train_before < 2.0 * fit.noise_floor and abs(constant) <= _resolution(view)
+    return "no_mismatch" if quiet else "unexplained"
+
+
+def _named(name, effect, best, fitter, view) -> NamedEffect:
+    spread = max(1.0, best.chi2 / max(best.rows - best.count, 1))
+    rest = fitter.chi2(best.model.without(name))[0]
+    estimates = effect.estimates(best.c[name], best.covariance[name] * spread, view.nominal)
+    weight = max((rest - best.chi2) / spread, 0.0)
+    share = (fitter.power - best.chi2) / max(fitter.power - best.rows, 1e-9)
+    return NamedEffect(
+        name,
+        float(np.clip(1.0 - 1.0 / (1.0 + weight / 4.0), 0.5, 0.999)),
+        estimates,
+        float(np.clip(share, 0.0, 1.0)),
+        effect.plant(best.c[name], view.nominal),
+    )
+
+
+def _requests(view, groups) -> list[Request]:
+    """Points that separate what this one cannot: no current, a lower speed, and the other current."""
+    if not groups:
+        return []
+    omega, i = float(view.omega.mean()), complex(view.i.mean())
+    rated = view.machine.rated_current_a
+    other = -np.conj(i) if abs(i.real) > 0.2 * rated else i - 0.5 * rated
+    points = (
+        (omega, 0j, "without current only magnets, iron and angle remain"),
+        (OTHER_SPEED * omega, i, "at another speed and the same current fluxes change the voltage, resistances do not"),
+        (omega, complex(other), "with another i_d the winding and the magnets act on different axes"),
+    )
+    names, bus = sorted({n for g in groups for n in g}), float(view.nominal.inverter.dc_bus_v)
+    return [Request(w, x.real, x.imag, names, why, bus, None) for w, x, why in points]
+
+
+def _notes(view, constant, candidates, held) -> list[str]:
+    i, omega = view.i.mean(), view.omega.mean()
+    notes = [
+        f"One operating point (omega_e = {omega:.4g} rad/s, i_d = {i.real:.3g} A, i_q = {i.imag:.3g} A) in "
+        f"{len(view)} means over {view.span_s:.4g} s, of which {int(held.sum())} were not fitted: only changes over "
+        "time can be diagnosed."
+    ]
+    if np.isfinite(view.temp).all():
+        notes.append(f"The winding was recorded from {view.temp.min():.0f} to {view.temp.max():.0f} degC.")
+    if abs(constant) > _resolution(view):
+        what = f" ({', '.join(candidates)} each could)" if candidates else ""
+        notes.append(
+            f"At the start the voltage differs by {constant.real:.3g} V on the d axis and {constant.imag:.3g} V on the "
+            f"q axis; one point cannot tell why{what}: record more speeds and currents."
+        )
+    else:
+        notes.append(
+            "At the start the voltage agrees; errors of R, inductances, magnet flux, inverter loss and angle that "
+            "cancel at this point are not seen."
+        )
+    return notes
