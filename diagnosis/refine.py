@@ -219,6 +219,8 @@ class Refiner:
         """Whether no effect has an impossible size or, beyond its uncertainty, an impossible sign."""
         for name in solution.model.names:
             effect = self.effects[name]
+            if not solution.c[name]:  # without current an effect of the current has no column
+                return False
             if effect.too_large(solution.c[name], self.view):
                 return False
             if not effect.possible(solution.c[name], solution.covariance[name], self.view.nominal):
