@@ -9,6 +9,7 @@ the same direction without i_d; a recorded winding temperature separates them by
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 
@@ -26,6 +27,8 @@ TIE = 10.0  # difference of the score below which two sets of effects fit equall
 HOLDOUT_EVERY = 4
 CONSTANT = (1e-3, 5e-3)  # of the bus and of the voltage: a smaller constant misfit may be ripple or resolution
 FITS = 3.0  # standard deviations within which a single effect explains the constant misfit
+COPPER = 0.0039  # 1/K
+SAME_COLUMN = 0.999  # cosine
 OTHER_SPEED = 0.4  # of the recorded one, for a request
 
 
@@ -58,7 +61,8 @@ def diagnose_one_point(view) -> Diagnosis:
         groups = groups + ([candidates] if len(candidates) > 1 else [])
     kind = "ambiguous" if groups else "explained" if names else _nothing(constant, view, fit)
     answer = Diagnosis(kind, "", location=locate(view, cells, sigma), fit=fit, ambiguity=groups)
-    answer.effects = [_named(n, effects[n], best, fitter, view) for n in names]
+    fuller = _fuller(fitter, best, effects, drifting, view) + _with_copper(fitter, best, cells, view)
+    answer.effects = [_named(n, effects[n], best, fuller, fitter, view) for n in names]
     answer.next_recording = _requests(view, groups)
     answer.evidence = evidence(view, (cells, centred.y), (cells, left), sigma, held)
     for name in ("theta_e", "orders", "spectrum_before", "spectrum_after"):
@@ -182,10 +186,42 @@ def _nothing(constant, view, fit) -> str:
     return "no_mismatch" if quiet else "unexplained"
 
 
-def _named(name, effect, best, fitter, view) -> NamedEffect:
+def _fuller(fitter, best, effects, drifting, view) -> list:
+    """Solutions with one more drifting effect, which is always possible, although the fit does not need it."""
+    more = [best.model.with_(n, free) for n in drifting if n not in best.model.names for free in (False, True)]
+    solved = [fitter.solve(m) for m in more]
+    return [s for s in solved if not any(effects[n].too_large(s.c[n], view) for n in s.model.names)]
+
+
+def _with_copper(fitter, best, cells, view) -> list:
+    """The best model, solved on a winding that warms like copper: without i_d this resembles warming magnets.
+
+    Not if the model contains the winding's warming already.
+    """
+    if not np.isfinite(view.temp).all() or view.machine.resistance_temp_coeff_per_k:
+        return []
+    share = COPPER * (view.temp - view.temp.mean()) * view.machine.resistance_ohm
+    drop = np.stack([(view.i.mean(axis=1) * share).real, (view.i.mean(axis=1) * share).imag], axis=1)
+    rows = (cells.channel == "u") & (cells.order == 0)
+    copper = drop[cells.block[rows], cells.part[rows]]
+    own = [c[rows] for n in best.model.names for c in fitter.cells.columns[n].values()]
+    if any(np.linalg.norm(c) and c @ copper > SAME_COLUMN * np.linalg.norm(c) * np.linalg.norm(copper) for c in own):
+        return []
+    y = fitter.cells.y.copy()
+    y[rows] -= copper
+    changed = replace(fitter.cells, y=y)
+    return [Fitter(changed, fitter.sigma, fitter.use).solve(best.model)]
+
+
+def _named(name, effect, best, fuller, fitter, view) -> NamedEffect:
+    """The effect with its estimates; their sigma covers the change by a further drift."""
     spread = max(1.0, best.chi2 / max(best.rows - best.count, 1))
     rest = fitter.chi2(best.model.without(name))[0]
     estimates = effect.estimates(best.c[name], best.covariance[name] * spread, view.nominal)
+    for other in fuller:
+        changed = effect.estimates(other.c[name], other.covariance[name] * spread, view.nominal)
+        for key, e in estimates.items():
+            e.sigma = float(max(e.sigma, np.hypot(changed[key].sigma, changed[key].value - e.value)))
     weight = max((rest - best.chi2) / spread, 0.0)
     share = (fitter.power - best.chi2) / max(fitter.power - best.rows, 1e-9)
     return NamedEffect(

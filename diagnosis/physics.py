@@ -11,6 +11,7 @@ from fluxproof.diagnosis.flux_surface import USUAL, earned
 from fluxproof.diagnosis.locate import at_order, evidence, locate
 from fluxproof.diagnosis.nominal import Nominal
 from fluxproof.diagnosis.ohms import straight_ohms
+from fluxproof.diagnosis.parts import sound
 from fluxproof.diagnosis.recording import Recording
 from fluxproof.diagnosis.remains import remains
 from fluxproof.diagnosis.request import requests, wants_cold
@@ -31,6 +32,7 @@ def explain(loaded: list[Recording], nominal: Nominal, progress=lambda text: Non
 
     Raises RecordingError if the recordings contain no operating point for which a voltage balance can be made.
     """
+    loaded = sound(loaded, nominal)
     problems = [p for r in loaded for p in r.problems]
     rows = sum(len(r) for r in loaded)
     if any(r.fatal for r in loaded):
@@ -38,7 +40,7 @@ def explain(loaded: list[Recording], nominal: Nominal, progress=lambda text: Non
         return Diagnosis(
             "bad_recording", f"The recording cannot be used: {worst.message}", rows=rows, problems=problems
         )
-    if all(r.slow for r in loaded):  # sampled too slowly for a voltage balance between rows
+    if any(r.slow for r in loaded):  # sampled too slowly for a voltage balance between rows
         answer = diagnose_slow(loaded, nominal, progress)
     else:
         answer = _physics(loaded, nominal, progress)

@@ -7,8 +7,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from fluxproof.diagnosis.blocks import view_of
 from fluxproof.diagnosis.recording import RecordingError
 from fluxproof.diagnosis.slow_stretches import (
+    AT_REST,
     STANDING,
     STILL,
     Stretches,
@@ -38,8 +40,8 @@ def point_rows(recording, nominal) -> Stretches:
     rest = np.where(at_rest, known_angle(recording), np.nan)
     lost = good & at_rest & ~np.isfinite(rest) & (np.abs(i) > NO_LOSS * m.rated_current_a)
     good &= ~lost
-    if not good.any():
-        raise RecordingError(f"{r.source}: no row can be used{STANDING if lost.any() else ''}")
+    if not good.any() or (lost.any() and np.abs(i[good]).max() < NO_LOSS * m.rated_current_a):
+        raise RecordingError(f"{r.source}: no row with current can be used{STANDING if lost.any() else ''}")
     notes = (f"{int(lost.sum())} rows at standstill are not used{STANDING}",) if lost.any() else ()
     t = np.zeros(len(r)) if "time" in r.lacks else r["t"] - r["t"][0]
     temp = r["temp_winding"] if r.has("temp_winding") else np.full(len(t), np.nan)
@@ -47,6 +49,20 @@ def point_rows(recording, nominal) -> Stretches:
     first, end = np.array([g[0] for g in groups]), np.array([g[-1] + 1 for g in groups])
     means = [np.array([np.mean(x[g]) for g in groups]) for x in (i, u, omega, u_dc, temp, t)]
     return Stretches(*means, first, end, np.zeros(len(groups)), rest[first], 0.0, both_axes, notes)
+
+
+def block_points(recording, nominal) -> Stretches:
+    """The steady blocks of a recording with a row per control period, as operating points.
+
+    Raises RecordingError if there is no steady block.
+    """
+    view = view_of(recording, nominal)
+    u, i, omega = view.to_dq(view.u[:, 1:-1]).mean(axis=1), view.i.mean(axis=1), view.omega.mean(axis=1)
+    span = np.abs(view.theta[:, -1] - view.theta[:, 0])
+    rest = np.where(span < AT_REST, view.theta[:, 0], np.nan)
+    rows = view.u_dc.shape[1]
+    still = np.zeros(len(view))
+    return Stretches(i, u, omega, view.u_dc.mean(axis=1), view.temp, view.t, view.rows, view.rows + rows, still, rest, 0.0)
 
 
 def _groups(t, signals, good, span) -> list[np.ndarray]:

@@ -38,8 +38,8 @@ def as_table(path, columns: dict, meta: dict, problems) -> Recording:
     """The Recording of a table; ``t`` is the number of the row."""
     n = len(columns["i_q"])
     meta["notes"].append(
-        f"no time column, and the rows do not follow each other: {n} operating points; a drift over time and a "
-        "delay cannot be diagnosed from them"
+        f"no time column, and the rows do not follow each other: each of the {n} rows is one operating point; a drift "
+        "over time and a delay cannot be diagnosed from them"
     )
     lacks = frozenset({"harmonics", "samples", "time"})
     recording = Recording(str(path), columns | {"t": np.arange(n, dtype=float)}, np.ones(n, bool), np.zeros(n, bool),

@@ -20,7 +20,7 @@ import numpy as np
 
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.recording import Recording
-from fluxproof.diagnosis.point_rows import point_rows
+from fluxproof.diagnosis.point_rows import block_points, point_rows
 from fluxproof.diagnosis.slow_stretches import Stretches, stretches
 from fluxproof.diagnosis.view import STACKED, View, lacking
 
@@ -77,11 +77,14 @@ class SlowView(View):
 
 
 def slow_view(recording: Recording, nominal) -> SlowView:
-    """The operating points of a slow recording as blocks, similar ones next to each other.
+    """The operating points of a recording as blocks, similar ones next to each other.
 
     Raises RecordingError if signals are missing or no stretch is steady.
     """
-    found = point_rows(recording, nominal) if recording.points else stretches(recording, nominal)
+    if not recording.slow:
+        found = block_points(recording, nominal)
+    else:
+        found = point_rows(recording, nominal) if recording.points else stretches(recording, nominal)
     return view_of_points(found, recording, nominal)
 
 

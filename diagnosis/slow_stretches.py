@@ -27,6 +27,8 @@ REST = 1e-3  # of a signal's largest value: a smaller signal is at rest and need
 TURNS = 4.0  # electrical turns within a stretch: the inverter loss depends on the angle, its mean over turns does not
 RESTED = 6.0  # times the median time between changes: after a longer time the signal counts as constant
 USUAL = 0.9  # quantile of the other intervals
+MESSAGE_ROWS = 3.0  # rows; a signal that changes as often has no messages
+PARTS = 8  # of a stretch without messages
 AT_REST = 0.05  # rad within a stretch: the rotor does not turn
 
 
@@ -92,6 +94,7 @@ def stretches_of(recording, nominal, least_s) -> Stretches:
         if restless(t, x)
     ]
     window = max(least_s, MESSAGES * max(periods.values()))
+    change = _drift if max(periods.values()) < MESSAGE_ROWS * np.median(np.diff(t)) else _change
     psi = m.inductance_d_h * i.real + m.magnet_flux_wb + 1j * m.inductance_q_h * i.imag
     nominal_u = m.resistance_ohm * i + 1j * omega * psi
     u, both_axes = known_voltage(u, nominal_u)
@@ -110,20 +113,20 @@ def stretches_of(recording, nominal, least_s) -> Stretches:
             gaps[before[k]] == gaps[behind[k] - 1] and bad[behind[k]] == bad[before[k]] and ends[k] - k >= 3
         )
         whole = whole and all(f[ends[k] - 1] > f[k] for f in fresh)
-        resting = np.abs(omega[inner]).max() * window < AT_REST and np.isfinite(angle[k])
+        resting = np.isfinite(angle[k]) and abs(omega[inner].mean()) * window < AT_REST
         whole = whole and (resting or np.abs(omega[inner]).min() * window > 2 * np.pi * TURNS)
         if whole and all(
-            _change(x[inner]) < limit and _change(x[outer]) < LOOSE * limit for x in (nominal_u, u)
+            change(x[inner]) < limit and change(x[outer]) < LOOSE * limit for x in (nominal_u, u)
         ):
-            found.append((k, ends[k], max(_change(nominal_u[outer]), _change(u[outer]))))
+            found.append((k, ends[k], max(change(nominal_u[outer]), change(u[outer]))))
             k = ends[k]
         else:
             k += 1
     if not found:
+        why = ", two messages of the slowest signal," if window > least_s else ""
         raise RecordingError(
-            f"{r.source}: in no stretch of {window:.2g} s, two messages of the slowest signal, are current, speed and "
-            "voltage steady: record longer operating points, or log faster"
-            + (STANDING if np.abs(omega).max() * window < AT_REST else "")
+            f"{r.source}: in no stretch of {window:.2g} s{why} are current, speed and voltage steady"
+            f"{_unmet(omega, angle, window)}: record longer operating points, or log faster"
         )
     mean = lambda x: np.array([np.mean(x[a:b]) for a, b, _ in found])  # noqa: E731
     temp = r["temp_winding"] if r.has("temp_winding") else np.full(len(t), np.nan)
@@ -133,6 +136,16 @@ def stretches_of(recording, nominal, least_s) -> Stretches:
     return Stretches(
         mean(i), mean(u), speed, mean(u_dc), mean(temp), mean(t), first, end, unsteady, rest, float(window), both_axes
     )
+
+
+def _unmet(omega, angle, window) -> str:
+    """A condition other than steadiness that no row meets, as the end of a sentence; "" if there is none."""
+    speed = float(np.nanmedian(np.abs(omega)))
+    if speed * window < AT_REST and not np.isfinite(angle).any():
+        return STANDING
+    if speed * window >= AT_REST and np.nanmax(np.abs(omega)) * window <= 2 * np.pi * TURNS:
+        return f" over {TURNS:g} electrical turns (the fastest row makes {np.nanmax(np.abs(omega)) * window / 6.28:.2g})"
+    return ""
 
 
 STANDING = "; at standstill record theta_e, or add it to [constants]: the inverter loss depends on the angle"
@@ -154,6 +167,12 @@ def known_angle(recording) -> np.ndarray:
 
 def _change(x) -> float:
     return float(max(np.ptp(x.real), np.ptp(x.imag)))
+
+
+def _drift(x) -> float:
+    """The change of a signal without messages, of which every row has its own noise: of means over parts of it."""
+    parts = min(PARTS, len(x) // 4)
+    return _change(np.array([p.mean() for p in np.array_split(x, parts)]) if parts > 1 else x)
 
 
 def operating_columns(recording: Recording, nominal):
