@@ -92,8 +92,8 @@ def _drifts(cells, centred, name, effect) -> bool:
     """Whether the usual formula of an effect changes over time at a constant operating point."""
     rows = (cells.channel == "u") & (cells.order == 0)
     cores = [k for k in cells.columns[name] if not k.startswith("~")]
-    size = [(np.linalg.norm(centred.columns[name][k][rows]), np.linalg.norm(cells.columns[name][k][rows])) for k in cores]
-    return bool(size) and not effect.corrects and max(a / max(b, 1e-30) for a, b in size) > DRIFTS
+    size = lambda c, k: float(np.linalg.norm(c.columns[name][k][rows]))  # noqa: E731
+    return not effect.corrects and any(size(centred, k) > DRIFTS * max(size(cells, k), 1e-30) for k in cores)
 
 
 def _sigma(view, cells, raw):

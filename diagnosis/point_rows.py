@@ -60,9 +60,8 @@ def block_points(recording, nominal) -> Stretches:
     u, i, omega = view.to_dq(view.u[:, 1:-1]).mean(axis=1), view.i.mean(axis=1), view.omega.mean(axis=1)
     span = np.abs(view.theta[:, -1] - view.theta[:, 0])
     rest = np.where(span < AT_REST, view.theta[:, 0], np.nan)
-    rows = view.u_dc.shape[1]
-    still = np.zeros(len(view))
-    return Stretches(i, u, omega, view.u_dc.mean(axis=1), view.temp, view.t, view.rows, view.rows + rows, still, rest, 0.0)
+    first, end, unsteady = view.rows, view.rows + view.u_dc.shape[1], np.zeros(len(view))
+    return Stretches(i, u, omega, view.u_dc.mean(axis=1), view.temp, view.t, first, end, unsteady, rest, 0.0)
 
 
 def _groups(t, signals, good, span) -> list[np.ndarray]:

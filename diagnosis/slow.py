@@ -19,8 +19,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from fluxproof.diagnosis.catalogue import CATALOGUE
-from fluxproof.diagnosis.recording import Recording
 from fluxproof.diagnosis.point_rows import block_points, point_rows
+from fluxproof.diagnosis.recording import Recording
 from fluxproof.diagnosis.slow_stretches import Stretches, stretches
 from fluxproof.diagnosis.view import STACKED, View, lacking
 
@@ -61,7 +61,7 @@ class SlowView(View):
         return 0.5j * self.omega_mid * (psi[:, 1:] + psi[:, :-1])
 
     def _turn(self, count):
-        """One whole electrical turn in ``count`` or, of samples, count - 1 steps; the angle at rest, (b, count) [rad]."""
+        """One electrical turn in ``count`` or, of samples, count - 1 steps; the angle at rest, (b, count) [rad]."""
         steps = self.theta.shape[1] - 1
         turn = 2 * np.pi * (np.arange(count) + (0.5 if count == steps else 0.0)) / steps
         rest = np.broadcast_to(self.rest, (len(self),))[:, None]

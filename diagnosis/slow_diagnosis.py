@@ -14,10 +14,10 @@ from fluxproof.diagnosis import verdict as words
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.cells import voltage_level
 from fluxproof.diagnosis.locate import evidence, locate
+from fluxproof.diagnosis.one_point import diagnose_one_point
 from fluxproof.diagnosis.request import requests
 from fluxproof.diagnosis.result import Diagnosis, Fit
 from fluxproof.diagnosis.slow import slow_view
-from fluxproof.diagnosis.one_point import diagnose_one_point
 from fluxproof.diagnosis.slow_search import SlowSearch, most_effects
 from fluxproof.diagnosis.uncertainty import Plain
 from fluxproof.diagnosis.view import joined_views

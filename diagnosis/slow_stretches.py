@@ -140,11 +140,11 @@ def stretches_of(recording, nominal, least_s) -> Stretches:
 
 def _unmet(omega, angle, window) -> str:
     """A condition other than steadiness that no row meets, as the end of a sentence; "" if there is none."""
-    speed = float(np.nanmedian(np.abs(omega)))
-    if speed * window < AT_REST and not np.isfinite(angle).any():
+    usual, most = (float(f(np.abs(omega))) * window for f in (np.nanmedian, np.nanmax))
+    if usual < AT_REST and not np.isfinite(angle).any():
         return STANDING
-    if speed * window >= AT_REST and np.nanmax(np.abs(omega)) * window <= 2 * np.pi * TURNS:
-        return f" over {TURNS:g} electrical turns (the fastest row makes {np.nanmax(np.abs(omega)) * window / 6.28:.2g})"
+    if usual >= AT_REST and most <= 2 * np.pi * TURNS:
+        return f" over {TURNS:g} electrical turns (the fastest one makes {most / (2 * np.pi):.2g})"
     return ""
 
 
@@ -152,7 +152,7 @@ STANDING = "; at standstill record theta_e, or add it to [constants]: the invert
 
 
 def known_voltage(u, nominal_u):
-    """(voltage (n,) complex [V], whether u_d is known): an unknown u_d is set to the nominal one, and its rows are not used."""
+    """(voltage (n,) complex [V], whether u_d is known); an unknown u_d is set to the nominal one and not used."""
     if np.isfinite(u.real).any():
         return u, True
     return nominal_u.real + 1j * u.imag, False
@@ -206,7 +206,7 @@ def operating_columns(recording: Recording, nominal):
 
 def message_period(t, x) -> float:
     """Typical longest time between two messages of a signal [s], from its changes; interpolation counts once."""
-    apart = _between_changes(t, x)
+    apart = _between_changes(t, x) if np.isfinite(x).any() else ()
     if len(apart) < 4:
         return float(np.median(np.diff(t)))
     return float(np.quantile(apart[apart < RESTED * np.median(apart)], USUAL))
@@ -214,6 +214,8 @@ def message_period(t, x) -> float:
 
 def restless(t, x) -> bool:
     """Whether a signal changes with nearly every message unless at rest, so that no change means no message."""
+    if not np.isfinite(x).any():  # not recorded
+        return False
     apart, period = _between_changes(t, x), message_period(t, x)
     active = np.abs(x) > REST * np.nanmax(np.abs(x))
     return float(apart[apart < 3.0 * period].sum()) > 0.5 * active.mean() * (t[-1] - t[0])
