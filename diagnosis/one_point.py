@@ -18,7 +18,6 @@ from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.cells import SYSTEM_DC, SYSTEM_U, cells_of, voltage_level
 from fluxproof.diagnosis.fit import Fitter, Model
 from fluxproof.diagnosis.locate import at_order, evidence, locate
-from fluxproof.diagnosis.recording import RecordingError
 from fluxproof.diagnosis.result import Diagnosis, Fit, NamedEffect, Request
 
 LEAST_MEANS = 12  # over time; fewer do not determine a drift
@@ -33,29 +32,20 @@ OTHER_SPEED = 0.4  # of the recorded one, for a request
 
 
 def diagnose_one_point(view) -> Diagnosis:
-    """Diagnose the drift at the only operating point of a SlowView.
-
-    Raises RecordingError if the point has too few means over time to tell anything.
-    """
+    """Diagnose the drift at the only operating point of a SlowView; a constant misfit is an ambiguity."""
     effects = view.visible(CATALOGUE)
     cells = cells_of(view, effects.values())
     raw = at_order(cells, cells.y, 0.0)
-    if len(view) < LEAST_MEANS or not view.span_s:
-        raise RecordingError(
-            f"one operating point with {len(view)} rows cannot tell one effect from another: record at least three "
-            f"points of different speed and current, or hold this one with a time column while the machine warms up "
-            f"({LEAST_MEANS} rows)"
-        )
-    centred = _centred(cells)
-    drifting = [n for n, effect in effects.items() if _drifts(cells, centred, n, effect)]
+    centred, long = _centred(cells), len(view) >= LEAST_MEANS and view.span_s > 0.0
+    drifting = [n for n, effect in effects.items() if long and _drifts(cells, centred, n, effect)]
     sigma = _sigma(view, cells, raw)
-    held = np.arange(len(view)) % HOLDOUT_EVERY == 2
+    held = (np.arange(len(view)) % HOLDOUT_EVERY == 2) & long
     fitter = Fitter(centred, sigma, (cells.order == 0) & (cells.channel == "u") & ~held[cells.block])
     best, tied = _best(fitter, effects, drifting, view)
     names, groups = _sorted_out(best, tied, effects, view)
     left = best.residual
-    fit = _fit(cells, centred.y, left, sigma, held)
     constant = complex(np.nanmean(raw - _fitted(cells, best)))
+    fit = _fit(cells, centred.y, left, sigma, held) if long else _constant_fit(constant, sigma)
     candidates = _explaining(view, cells, effects, drifting, constant)
     if abs(constant) > _resolution(view):
         groups = groups + ([candidates] if len(candidates) > 1 else [])
@@ -68,7 +58,7 @@ def diagnose_one_point(view) -> Diagnosis:
     for name in ("theta_e", "orders", "spectrum_before", "spectrum_after"):
         answer.evidence.arrays.pop(name, None)
     answer.sentence = words.sentence(kind, answer.effects, groups, fit, CATALOGUE, answer.location)
-    answer.notes = _notes(view, constant, candidates, held)
+    answer.notes = _notes(view, constant, candidates, held, long)
     return answer
 
 
@@ -98,7 +88,7 @@ def _drifts(cells, centred, name, effect) -> bool:
 
 def _sigma(view, cells, raw):
     """(r,) standard deviation [V]: of neighbouring means, and a share of the voltage for the balance itself."""
-    step = np.diff(raw)
+    step = np.diff(raw) if len(raw) > 1 else np.zeros(1, complex)
     each = [float(np.sqrt(np.nanmean(x**2) / 2.0)) for x in (step.real, step.imag)]
     own = SYSTEM_U * voltage_level(view) + SYSTEM_DC * view.nominal.inverter.dc_bus_v
     return np.hypot(np.array(each)[cells.part], own[cells.block])
@@ -155,6 +145,12 @@ def _fit(cells, before, after, sigma, held) -> Fit:
     return Fit("u_dq", "V", *parts, float(np.sqrt(2.0 * np.mean(sigma[rows] ** 2))))
 
 
+def _constant_fit(constant, sigma) -> Fit:
+    """The fit of a point that was not held long enough for a drift: nothing is fitted."""
+    size = abs(constant)
+    return Fit("u_dq", "V", size, size, size, size, float(np.sqrt(2.0 * np.mean(sigma**2))))
+
+
 def _resolution(view) -> float:
     """Size of a constant misfit [V] that may be due to ripple or resolution."""
     bus, level = CONSTANT
@@ -182,7 +178,7 @@ def _explaining(view, cells, effects, drifting, constant) -> list[str]:
 
 def _nothing(constant, view, fit) -> str:
     """Verdict without a name: nothing drifts, and the constant misfit is within the resolution or not."""
-    quiet = fit.train_before < 2.0 * fit.noise_floor and abs(constant) <= _resolution(view)
+    quiet = fit.train_before < max(2.0 * fit.noise_floor, _resolution(view)) and abs(constant) <= _resolution(view)
     return "no_mismatch" if quiet else "unexplained"
 
 
@@ -249,12 +245,14 @@ def _requests(view, groups) -> list[Request]:
     return [Request(w, x.real, x.imag, names, why, bus, None) for w, x, why in points]
 
 
-def _notes(view, constant, candidates, held) -> list[str]:
+def _notes(view, constant, candidates, held, long) -> list[str]:
     i, omega = view.i.mean(), view.omega.mean()
+    point = f"One operating point (omega_e = {omega:.4g} rad/s, i_d = {i.real:.3g} A, i_q = {i.imag:.3g} A)"
     notes = [
-        f"One operating point (omega_e = {omega:.4g} rad/s, i_d = {i.real:.3g} A, i_q = {i.imag:.3g} A) in "
-        f"{len(view)} means over {view.span_s:.4g} s, of which {int(held.sum())} were not fitted: only changes over "
-        "time can be diagnosed."
+        f"{point} in {len(view)} means over {view.span_s:.4g} s, of which {int(held.sum())} were not fitted: only "
+        "changes over time can be diagnosed."
+        if long
+        else f"{point} with {len(view)} steady stretches, too few for a drift ({LEAST_MEANS} are needed, with a time)."
     ]
     if np.isfinite(view.temp).all():
         notes.append(f"The winding was recorded from {view.temp.min():.0f} to {view.temp.max():.0f} degC.")
