@@ -49,6 +49,8 @@ class Refiner:
 
     def __init__(self, view, effects, train_blocks, progress=lambda text: None):
         self.most = min(MOST_EFFECTS, (operating_points(view) + 1) // 2)
+        if not view.i_raw.any():  # an EMF run shows magnets only, each effect at its own harmonic orders
+            self.most = MOST_EFFECTS
         view = view.replace(memo={**view.memo, "lone": self.most == 1})
         self.view, self.effects, self.progress = view, dict(effects), progress
         self.projector = Projector(view)
