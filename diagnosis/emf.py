@@ -161,7 +161,7 @@ def _rows(at, u, columns, t, nominal) -> dict:
 
 
 def _known(rows: dict) -> dict:
-    """The rows without both ends, where the angle is not known."""
+    """The rows whose angle is known."""
     known = np.isfinite(rows["theta_e"])
     return {name: values[known] for name, values in rows.items()}
 
@@ -169,7 +169,7 @@ def _known(rows: dict) -> dict:
 def angle_of(u, period) -> np.ndarray:
     """Angle of the d axis (m,) [rad] at the beginning of each interval with the mean EMF u (m,) complex.
 
-    nan at both ends, where no whole turn is around.
+    nan at both ends and around a reversal, where no whole turn in one direction is around.
     """
     phase = np.unwrap(np.angle(u))
     speed = np.gradient(_over_turns(phase, np.full(len(phase), _rough_turn(phase))), period)
@@ -179,6 +179,7 @@ def angle_of(u, period) -> np.ndarray:
     speed = np.where(known, speed, np.interp(np.arange(len(u)), np.flatnonzero(known), speed[known]))
     turn = 2 * np.pi / np.maximum(np.abs(speed) * period, 2 * np.pi / len(u))
     middle = _over_turns(phase, turn) - 0.5 * np.pi * np.sign(speed)
+    middle[np.abs(_over_turns(np.sign(speed), turn)) < 1.0 - 1e-9] = np.nan
     return np.append(np.nan, 0.5 * (middle[1:] + middle[:-1]))
 
 

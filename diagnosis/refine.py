@@ -100,6 +100,9 @@ class Refiner:
         for step in range(4):
             fitter = self.linear if step == 0 else self.fitter(view, mine, model.free)
             solution = fitter.solve(model, self.dispersion)
+            if not all(solution.c[n] for n in record):  # without current an error of the current has no column
+                solution.score = np.inf
+                return solution
             small = True
             for n in record:
                 for key, value in solution.c[n].items():
