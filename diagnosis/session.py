@@ -74,6 +74,8 @@ def _loaded(recordings, nominal, progress) -> list[Recording]:
             try:
                 item = load_recording(Path(item), nominal)
             except RecordingError as error:
+                if not Path(item).is_file():  # a wrong name is not a bad part
+                    raise
                 refused.append((item, error))
                 continue
         loaded.append(item)
