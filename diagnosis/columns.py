@@ -27,7 +27,7 @@ import numpy as np
 
 from fluxproof.diagnosis.column_maps import maps, plain
 from fluxproof.diagnosis.constants import constants_of
-from fluxproof.diagnosis.demand import missing_columns
+from fluxproof.diagnosis.demand import LINE_VOLTAGES, PHASE_VOLTAGES, is_emf_run, missing_columns
 from fluxproof.diagnosis.readers.table import Table, shown
 from fluxproof.diagnosis.recording import COLUMNS, RecordingError
 from fluxproof.diagnosis.units import conversion, known_units, split_unit
@@ -82,6 +82,9 @@ def plan_columns(names: dict[str, str], nominal, path) -> Plan:
         del constants[name]
     plan.assumed |= constants
     plan.stated = list(constants)
+    if not is_emf_run(set(plan.sources) | set(plan.assumed)):  # the commanded voltages are used
+        for name in (*PHASE_VOLTAGES, *LINE_VOLTAGES):
+            plan.sources.pop(name, None)
     _demand(plan, names, path)
     return plan
 

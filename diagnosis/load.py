@@ -70,7 +70,7 @@ def _recording(path, table: Table, plan: Plan, nominal) -> Recording:
     notes += [f"{name} = {plan.assumed[name]:g} by [constants] of the drive file" for name in plan.stated]
     if is_emf_run(columns):
         return emf_rows(path, columns, nominal, meta)
-    if "t" not in columns and not table.meta.get("sample_time_s") and not plan.sample_time_s:
+    if ("t" not in columns or n == 1) and not table.meta.get("sample_time_s") and not plan.sample_time_s:
         if is_table(columns, nominal):
             return as_table(path, columns, meta, table.problems)
     if "t" not in columns:

@@ -1,5 +1,7 @@
 """Rows that are operating points, as stretches; rows of a long operating point are averaged.
 
+If most rows of a log resemble a neighbour, the others are transients and are left out.
+
 At standstill the inverter loss depends on the angle of the rotor.  A row with current at an unknown angle is not used.
 """
 
@@ -40,6 +42,8 @@ def point_rows(recording, nominal) -> Stretches:
     rest = np.where(at_rest, known_angle(recording), np.nan)
     lost = good & at_rest & ~np.isfinite(rest) & (np.abs(i) > NO_LOSS * m.rated_current_a)
     good &= ~lost
+    if "time" not in r.lacks:
+        good &= _verified(omega, nominal_u, u, good)
     if not good.any() or (lost.any() and np.abs(i[good]).max() < NO_LOSS * m.rated_current_a):
         raise RecordingError(f"{r.source}: no row with current can be used{STANDING if lost.any() else ''}")
     notes = (f"{int(lost.sum())} rows at standstill are not used{STANDING}",) if lost.any() else ()
@@ -64,10 +68,26 @@ def block_points(recording, nominal) -> Stretches:
     return Stretches(i, u, omega, view.u_dc.mean(axis=1), view.temp, view.t, first, end, unsteady, rest, 0.0)
 
 
+def _verified(omega, nominal_u, u, good) -> np.ndarray:
+    """(n,) bool: rows that resemble a neighbour, and are thus steady; all rows if most points have one row only."""
+    if np.count_nonzero(good) < 2:
+        return np.ones(len(good), bool)
+    limit = _limit(nominal_u, u, good)
+    step = np.maximum(np.abs(np.diff(nominal_u)), np.abs(np.diff(u)))
+    same = (step < limit) & (np.abs(np.diff(omega)) <= SAME_SPEED * np.abs(omega[1:])) & good[1:] & good[:-1]
+    beside = np.append(same, False) | np.append(False, same)
+    return beside if np.mean(beside[good]) > 0.5 else np.ones(len(good), bool)
+
+
+def _limit(nominal_u, u, good) -> float:
+    """Change of the voltage [V] up to which it is steady."""
+    return STILL * max(float(np.abs(nominal_u[good]).max()), float(np.abs(u[good]).max()), 1e-9)
+
+
 def _groups(t, signals, good, span) -> list[np.ndarray]:
     """Consecutive rows at one operating point, within ``span`` [s], as arrays of row numbers."""
     omega, nominal_u, u = signals
-    limit = STILL * max(np.nanmax(np.abs(nominal_u[good])), np.nanmax(np.abs(u[good])), 1e-9)
+    limit = _limit(nominal_u, u, good)
     out, begin = [], None
     for k in np.flatnonzero(good):
         near = begin is not None and t[k] - t[begin] < span

@@ -54,7 +54,7 @@ class SlowSearch(Search):
 
     def run(self) -> Outcome:
         self.progress("all sets of effects")
-        for model in self.every_set():
+        for model in [Model(frozenset()), *self.every_set()]:
             self.refine(model)
         best = self.large(self._best())
         tied = self.tied(best)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cocotb_tests.support.bench_logs import L_Q, PSI, R, Truth, sampled, table, warming
+from cocotb_tests.support.bench_logs import GRID, L_Q, PSI, R, Truth, sampled, table, warming
 from cocotb_tests.support.recordings_made import DRIVE, codes, made, nominal_of, write
 from fluxproof.diagnosis import diagnose
 from fluxproof.diagnosis.load import load_recording
@@ -67,9 +67,29 @@ def test_many_rows_without_time_are_a_table_only_if_they_jump(tmp_path):
     assert not load_recording(write(tmp_path / "s.csv", smooth), nominal).points
 
 
-def test_messages_that_are_held_are_no_operating_points(tmp_path):
+def test_messages_of_different_age_are_no_operating_points(tmp_path):
     columns = held({k: np.repeat(v, 4) for k, v in table().items()}, 1.0)
-    assert not load_recording(write(tmp_path / "r.csv", columns), nominal_of(tmp_path)).points
+    assert load_recording(write(tmp_path / "r.csv", columns), nominal_of(tmp_path)).points  # all at the same time
+    columns["u_q_ref"] = np.roll(columns["u_q_ref"], 2)
+    assert not load_recording(write(tmp_path / "s.csv", columns), nominal_of(tmp_path)).points
+
+
+def test_rounded_values_and_transients_of_a_slow_log(tmp_path):
+    points = [p for p in GRID for _ in range(30)]
+    columns = held(table(WEAK, points=points), 1.0)
+    columns |= {k: np.round(columns[k], 1) for k in ("i_d", "i_q", "u_d_ref", "u_q_ref")}
+    between = np.flatnonzero(np.arange(len(points)) % 30 == 0)[1:]  # a row in the middle of every change
+    for name in ("i_d", "i_q", "omega_e", "u_d_ref", "u_q_ref"):
+        columns[name][between] = 0.5 * (columns[name][between - 1] + columns[name][between + 1])
+    answer = answer_of(tmp_path, columns)
+    assert found(answer) == {"magnet_flux_wb": pytest.approx(0.95 * PSI, rel=0.005)}
+
+
+@pytest.mark.parametrize("rows", [1, 2, 3])
+def test_few_rows_of_a_healthy_drive_are_healthy(tmp_path, rows):
+    for first in (0, 4, 10, 20):
+        answer = answer_of(tmp_path, {k: v[first : first + rows] for k, v in table().items()})
+        assert answer.verdict == "no_mismatch" and not answer.effects and not answer.ambiguity
 
 
 def test_constants_replace_columns(tmp_path):

@@ -9,7 +9,7 @@ from fluxproof.diagnosis.recording import Problem
 STAGE = "extent"
 LEAST_ROWS = 400  # two blocks of a balance in time
 LEAST_SLOW_ROWS = 20
-LEAST_POINTS = 2  # one row has no scatter
+LEAST_POINTS = 1
 
 
 def _advice(recording) -> str:

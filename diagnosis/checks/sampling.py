@@ -46,7 +46,7 @@ def check(recording, nominal) -> None:
     ratio = usual / period
     if abs(ratio - 1.0) <= TOLERANCE:
         usual = period
-    elif held_one_after_another(recording, usual):
+    elif held_one_after_another(recording, usual, nominal):
         mark_points(recording, usual, period)
     elif ratio >= SLOW_FROM:
         recording.slow = True
