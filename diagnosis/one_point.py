@@ -8,26 +8,20 @@ the same direction without i_d; a recorded winding temperature separates them by
 
 from __future__ import annotations
 
-import itertools
-from dataclasses import replace
-
 import numpy as np
 
 from fluxproof.diagnosis import verdict as words
 from fluxproof.diagnosis.catalogue import CATALOGUE
-from fluxproof.diagnosis.cells import SYSTEM_DC, SYSTEM_U, cells_of, voltage_level
-from fluxproof.diagnosis.fit import Fitter, Model
+from fluxproof.diagnosis.cells import cells_of, voltage_level
+from fluxproof.diagnosis.drift_fit import best_sets, centred_cells, drifts, fitted, fuller, row_sigmas, with_copper
+from fluxproof.diagnosis.fit import Fitter
 from fluxproof.diagnosis.locate import at_order, evidence, locate
 from fluxproof.diagnosis.result import Diagnosis, Fit, NamedEffect, Request
 
 LEAST_MEANS = 12  # over time; fewer do not determine a drift
-DRIFTS = 0.1  # least change of a column over time relative to its size
-TIE = 10.0  # difference of the score below which two sets of effects fit equally well
 HOLDOUT_EVERY = 4
 CONSTANT = (1e-3, 5e-3)  # of the bus and of the voltage: a smaller constant misfit may be ripple or resolution
 FITS = 3.0  # standard deviations within which a single effect explains the constant misfit
-COPPER = 0.0039  # 1/K
-SAME_COLUMN = 0.999  # cosine
 OTHER_SPEED = 0.4  # of the recorded one, for a request
 
 
@@ -36,23 +30,27 @@ def diagnose_one_point(view) -> Diagnosis:
     effects = view.visible(CATALOGUE)
     cells = cells_of(view, effects.values())
     raw = at_order(cells, cells.y, 0.0)
-    centred, long = _centred(cells), len(view) >= LEAST_MEANS and view.span_s > 0.0
-    drifting = [n for n, effect in effects.items() if long and _drifts(cells, centred, n, effect)]
-    sigma = _sigma(view, cells, raw)
+    centred, long = centred_cells(cells), len(view) >= LEAST_MEANS and view.span_s > 0.0
+    drifting = [n for n, effect in effects.items() if long and drifts(cells, centred, n, effect)]
+    sigma = row_sigmas(view, cells, raw)
     held = (np.arange(len(view)) % HOLDOUT_EVERY == 2) & long
     fitter = Fitter(centred, sigma, (cells.order == 0) & (cells.channel == "u") & ~held[cells.block])
-    best, tied = _best(fitter, effects, drifting, view)
+    best, tied = best_sets(fitter, effects, drifting, view)
     names, groups = _sorted_out(best, tied, effects, view)
     left = best.residual
-    constant = complex(np.nanmean(raw - _fitted(cells, best)))
+    constant = complex(np.nanmean(raw - fitted(cells, best)))
     fit = _fit(cells, centred.y, left, sigma, held) if long else _constant_fit(constant, sigma)
     candidates = _explaining(view, cells, effects, drifting, constant)
     if abs(constant) > _resolution(view):
         groups = groups + ([candidates] if len(candidates) > 1 else [])
-    kind = "ambiguous" if groups else "explained" if names else _nothing(constant, view, fit)
+    left_over = best.chi2 > words.LEFTOVER * max(best.rows - best.count, 1) and fit.share_left > words.FLOOR_SHARE
+    if names and left_over:
+        names, groups, kind = [], [], "unexplained"
+    else:
+        kind = "ambiguous" if groups else "explained" if names else _nothing(constant, view, fit)
     answer = Diagnosis(kind, "", location=locate(view, cells, sigma), fit=fit, ambiguity=groups)
-    fuller = _fuller(fitter, best, effects, drifting, view) + _with_copper(fitter, best, cells, view)
-    answer.effects = [_named(n, effects[n], best, fuller, fitter, view) for n in names]
+    wider = fuller(fitter, best, effects, drifting, view) + with_copper(fitter, best, cells, view)
+    answer.effects = [_named(n, effects[n], best, wider, fitter, view) for n in names]
     answer.next_recording = _requests(view, groups)
     answer.evidence = evidence(view, (cells, centred.y), (cells, left), sigma, held)
     for name in ("theta_e", "orders", "spectrum_before", "spectrum_after"):
@@ -62,62 +60,6 @@ def diagnose_one_point(view) -> Diagnosis:
     return answer
 
 
-def _centred(cells):
-    """The cells with the mean over the blocks subtracted from the misfit and from all columns."""
-    b = int(cells.block.max()) + 1
-
-    def centre(x):
-        table = x.copy()
-        for order in np.unique(cells.order[cells.channel == "u"]):
-            for part in (0, 1):
-                rows = (cells.channel == "u") & (cells.order == order) & (cells.part == part)
-                table[rows] -= table[rows].sum() / b
-        return table
-
-    columns = {n: {k: centre(c) for k, c in own.items()} for n, own in cells.columns.items()}
-    return type(cells)(centre(cells.y), columns, cells.block, cells.order, cells.part, cells.channel, cells.ok)
-
-
-def _drifts(cells, centred, name, effect) -> bool:
-    """Whether the usual formula of an effect changes over time at a constant operating point."""
-    rows = (cells.channel == "u") & (cells.order == 0)
-    cores = [k for k in cells.columns[name] if not k.startswith("~")]
-    size = lambda c, k: float(np.linalg.norm(c.columns[name][k][rows]))  # noqa: E731
-    return not effect.corrects and any(size(centred, k) > DRIFTS * max(size(cells, k), 1e-30) for k in cores)
-
-
-def _sigma(view, cells, raw):
-    """(r,) standard deviation [V]: of neighbouring means, and a share of the voltage for the balance itself."""
-    step = np.diff(raw) if len(raw) > 1 else np.zeros(1, complex)
-    each = [float(np.sqrt(np.nanmean(x**2) / 2.0)) for x in (step.real, step.imag)]
-    own = SYSTEM_U * voltage_level(view) + SYSTEM_DC * view.nominal.inverter.dc_bus_v
-    return np.hypot(np.array(each)[cells.part], own[cells.block])
-
-
-def _best(fitter, effects, drifting, view):
-    """(best solution, others within TIE) of all sets of drifting effects in core and free form."""
-    solved = []
-    for count in range(len(drifting) + 1):
-        for names in itertools.combinations(drifting, count):
-            bendable = [n for n in names if fitter.index[n][1]]
-            for k in range(len(bendable) + 1):
-                for free in itertools.combinations(bendable, k):
-                    solution = fitter.solve(Model(frozenset(names), frozenset(free)))
-                    fine = all(
-                        effects[n].possible(solution.c[n], solution.covariance[n], view.nominal)
-                        and not effects[n].too_large(solution.c[n], view)
-                        for n in names
-                    )
-                    if fine:
-                        solved.append(solution)
-    spread = max(1.0, min(s.chi2 / max(s.rows - s.count, 1) for s in solved))
-    for s in solved:
-        s.score += s.chi2 / spread - s.chi2
-    solved.sort(key=lambda s: s.score)
-    best = solved[0]
-    return best, [s for s in solved[1:] if s.score < best.score + TIE and s.model.names != best.model.names]
-
-
 def _sorted_out(best, tied, effects, view):
     """(names, ambiguity sets): what all tied sets share is named."""
     large = lambda s: {n for n in s.model.names if effects[n].moved(s.c[n], view) >= effects[n].floor(view.nominal)}  # noqa: E731
@@ -125,16 +67,6 @@ def _sorted_out(best, tied, effects, view):
     common, seen = set.intersection(*sets), set.union(*sets)
     rest = sorted(seen - common)
     return sorted(common), [rest] if len(rest) > 1 else []
-
-
-def _fitted(cells, solution):
-    """(b,) complex misfit of a solution's columns, not centred [V]."""
-    total = np.zeros(len(cells.y))
-    for name, c in solution.c.items():
-        for key, value in c.items():
-            column = cells.columns[name].get(key, cells.columns[name].get(f"~{key}"))
-            total = total + value * column
-    return at_order(cells, total, 0.0)
 
 
 def _fit(cells, before, after, sigma, held) -> Fit:
@@ -182,39 +114,12 @@ def _nothing(constant, view, fit) -> str:
     return "no_mismatch" if quiet else "unexplained"
 
 
-def _fuller(fitter, best, effects, drifting, view) -> list:
-    """Solutions with one more drifting effect, which is always possible, although the fit does not need it."""
-    more = [best.model.with_(n, free) for n in drifting if n not in best.model.names for free in (False, True)]
-    solved = [fitter.solve(m) for m in more]
-    return [s for s in solved if not any(effects[n].too_large(s.c[n], view) for n in s.model.names)]
-
-
-def _with_copper(fitter, best, cells, view) -> list:
-    """The best model, solved on a winding that warms like copper: without i_d this resembles warming magnets.
-
-    Not if the model contains the winding's warming already.
-    """
-    if not np.isfinite(view.temp).all() or view.machine.resistance_temp_coeff_per_k:
-        return []
-    share = COPPER * (view.temp - view.temp.mean()) * view.machine.resistance_ohm
-    drop = np.stack([(view.i.mean(axis=1) * share).real, (view.i.mean(axis=1) * share).imag], axis=1)
-    rows = (cells.channel == "u") & (cells.order == 0)
-    copper = drop[cells.block[rows], cells.part[rows]]
-    own = [c[rows] for n in best.model.names for c in fitter.cells.columns[n].values()]
-    if any(np.linalg.norm(c) and c @ copper > SAME_COLUMN * np.linalg.norm(c) * np.linalg.norm(copper) for c in own):
-        return []
-    y = fitter.cells.y.copy()
-    y[rows] -= copper
-    changed = replace(fitter.cells, y=y)
-    return [Fitter(changed, fitter.sigma, fitter.use).solve(best.model)]
-
-
-def _named(name, effect, best, fuller, fitter, view) -> NamedEffect:
+def _named(name, effect, best, wider, fitter, view) -> NamedEffect:
     """The effect with its estimates; their sigma covers the change by a further drift."""
     spread = max(1.0, best.chi2 / max(best.rows - best.count, 1))
     rest = fitter.chi2(best.model.without(name))[0]
     estimates = effect.estimates(best.c[name], best.covariance[name] * spread, view.nominal)
-    for other in fuller:
+    for other in wider:
         changed = effect.estimates(other.c[name], other.covariance[name] * spread, view.nominal)
         for key, e in estimates.items():
             e.sigma = float(max(e.sigma, np.hypot(changed[key].sigma, changed[key].value - e.value)))
