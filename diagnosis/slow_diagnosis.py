@@ -23,6 +23,7 @@ from fluxproof.diagnosis.uncertainty import Plain
 from fluxproof.diagnosis.view import joined_views
 
 HOLDOUT_EVERY = 4
+AT_FLOOR = 2.0  # ratio of a misfit to the noise floor up to which it is noise
 
 
 def diagnose_slow(recordings, nominal, progress=lambda text: None) -> Diagnosis:
@@ -52,7 +53,8 @@ def diagnose_points(view, progress=lambda text: None) -> Diagnosis:
     fit = _fit(search, found, held)
     left = found.best.chi2 / max(found.best.rows - found.best.count, 1)
     if not found.best.model.names:
-        verdict = "no_mismatch" if left <= words.LEFTOVER else "unexplained"
+        at_floor = fit.train_before <= AT_FLOOR * fit.noise_floor
+        verdict = "no_mismatch" if left <= words.LEFTOVER or at_floor else "unexplained"
     elif left > words.LEFTOVER and fit.share_left > words.FLOOR_SHARE:
         verdict = "unexplained"
     else:

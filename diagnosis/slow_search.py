@@ -109,7 +109,14 @@ class SlowSearch(Search):
         ]
         for name in small:
             best = self.refine(best.model.without(name))
+        if small:  # another set may explain with large effects what the small one did with its free curve
+            rest = [s for s in self.refined.values() if np.isfinite(s.score) and self.all_large(s)]
+            best = min([best, *rest], key=lambda s: s.score)
         return best
+
+    def all_large(self, solution) -> bool:
+        """Whether every effect of a solution reaches its floor of practical interest."""
+        return all(self.effects[n].size(c, self.view.nominal) >= self.floor(n) for n, c in solution.c.items())
 
     def floor(self, name) -> float:
         return self.effects[name].floor(self.view.nominal)

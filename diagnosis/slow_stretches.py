@@ -19,16 +19,18 @@ from fluxproof.diagnosis.recording import Recording, RecordingError
 
 SIGNALS = ("i_d", "i_q", "u_d", "u_q", "omega")
 STILL = 0.015  # of the largest voltage: largest change of nominal and recorded voltage
-LEAST_S = (0.5, 0.2, 0.1)  # the shorter ones only if the longer ones find too few operating points
+LEAST_S = (0.5, 0.2, 0.1, 0.05)  # the shorter ones only if the longer ones find too few operating points
 ENOUGH = 8  # operating points
 MESSAGES = 2.0  # number of messages of the slowest signal in a stretch
 AROUND, LOOSE = 0.5, 8.0  # margin before and after a window, as a share of it; factor of the change allowed there
 REST = 1e-3  # of a signal's largest value: a smaller signal is at rest and needs no update
+FEW_TURNS = 1.5  # the same in a log without messages, whose stretches are shorter
 TURNS = 4.0  # electrical turns within a stretch: the inverter loss depends on the angle, its mean over turns does not
 RESTED = 6.0  # times the median time between changes: after a longer time the signal counts as constant
 USUAL = 0.9  # quantile of the other intervals
 MESSAGE_ROWS = 3.0  # rows; a signal that changes as often has no messages
-PARTS = 8  # of a stretch without messages
+PARTS = 4  # of a stretch without messages
+NOISE = 3.0  # standard deviations: usual range of PARTS means
 AT_REST = 0.05  # rad within a stretch: the rotor does not turn
 
 
@@ -62,16 +64,21 @@ def stretches(recording: Recording, nominal) -> Stretches:
 
     Raises RecordingError if signals are missing or no stretch is steady.
     """
-    refused = None
+    refused, best = None, None
     for least_s in LEAST_S:
         try:
             found = stretches_of(recording, nominal, least_s)
         except RecordingError as error:
             refused = refused or error
             continue
-        if least_s == LEAST_S[-1] or _operating_points(found, nominal) >= ENOUGH:
-            return found
-    raise refused
+        points = _operating_points(found, nominal)
+        if best is None or points > best[0]:
+            best = points, found
+        if points >= ENOUGH:
+            break
+    if best is None:
+        raise refused
+    return best[1]
 
 
 def _operating_points(found, nominal) -> int:
@@ -94,7 +101,9 @@ def stretches_of(recording, nominal, least_s) -> Stretches:
         if restless(t, x)
     ]
     window = max(least_s, MESSAGES * max(periods.values()))
-    change = _drift if max(periods.values()) < MESSAGE_ROWS * np.median(np.diff(t)) else _change
+    change, turns = _change, TURNS
+    if max(periods.values()) < MESSAGE_ROWS * np.median(np.diff(t)):  # no messages: every row has its own noise
+        change, turns = _drift, FEW_TURNS
     psi = m.inductance_d_h * i.real + m.magnet_flux_wb + 1j * m.inductance_q_h * i.imag
     nominal_u = m.resistance_ohm * i + 1j * omega * psi
     u, both_axes = known_voltage(u, nominal_u)
@@ -114,7 +123,7 @@ def stretches_of(recording, nominal, least_s) -> Stretches:
         )
         whole = whole and all(f[ends[k] - 1] > f[k] for f in fresh)
         resting = np.isfinite(angle[k]) and abs(omega[inner].mean()) * window < AT_REST
-        whole = whole and (resting or np.abs(omega[inner]).min() * window > 2 * np.pi * TURNS)
+        whole = whole and (resting or np.abs(omega[inner]).min() * window > 2 * np.pi * turns)
         if whole and all(
             change(x[inner]) < limit and change(x[outer]) < LOOSE * limit for x in (nominal_u, u)
         ):
@@ -126,7 +135,7 @@ def stretches_of(recording, nominal, least_s) -> Stretches:
         why = ", two messages of the slowest signal," if window > least_s else ""
         raise RecordingError(
             f"{r.source}: in no stretch of {window:.2g} s{why} are current, speed and voltage steady"
-            f"{_unmet(omega, angle, window)}: record longer operating points, or log faster"
+            f"{_unmet(omega, angle, window, turns)}: record longer operating points, or log faster"
         )
     mean = lambda x: np.array([np.mean(x[a:b]) for a, b, _ in found])  # noqa: E731
     temp = r["temp_winding"] if r.has("temp_winding") else np.full(len(t), np.nan)
@@ -138,13 +147,13 @@ def stretches_of(recording, nominal, least_s) -> Stretches:
     )
 
 
-def _unmet(omega, angle, window) -> str:
+def _unmet(omega, angle, window, turns) -> str:
     """A condition other than steadiness that no row meets, as the end of a sentence; "" if there is none."""
     usual, most = (float(f(np.abs(omega))) * window for f in (np.nanmedian, np.nanmax))
     if usual < AT_REST and not np.isfinite(angle).any():
         return STANDING
-    if usual >= AT_REST and most <= 2 * np.pi * TURNS:
-        return f" over {TURNS:g} electrical turns (the fastest one makes {most / (2 * np.pi):.2g})"
+    if usual >= AT_REST and most <= 2 * np.pi * turns:
+        return f" over {turns:g} electrical turns (the fastest one makes {most / (2 * np.pi):.2g})"
     return ""
 
 
@@ -170,9 +179,13 @@ def _change(x) -> float:
 
 
 def _drift(x) -> float:
-    """The change of a signal without messages, of which every row has its own noise: of means over parts of it."""
+    """The change of a signal of which every row has its own noise: of means over parts of it, beyond that noise."""
     parts = min(PARTS, len(x) // 4)
-    return _change(np.array([p.mean() for p in np.array_split(x, parts)]) if parts > 1 else x)
+    if parts < 2:
+        return _change(x)
+    means = np.array([p.mean() for p in np.array_split(x, parts)])
+    noise = np.sqrt(np.mean(np.abs(np.diff(x)) ** 2) / 2.0 * parts / len(x))
+    return max(_change(means) - NOISE * float(noise), 0.0)
 
 
 def operating_columns(recording: Recording, nominal):
