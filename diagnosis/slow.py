@@ -90,6 +90,8 @@ def slow_view(recording: Recording, nominal) -> SlowView:
 
 def view_of_points(found: Stretches, recording, nominal) -> SlowView:
     """The same for given stretches."""
+    if alone(found, nominal):  # all that it can show is its drift
+        found = found.averaged(MOST_OF_ONE)
     order, dwell = alike(found, nominal)
     b, period = len(order), nominal.sample_time_s
     span = 0.0 if "time" in recording.lacks else float(recording["t"][-1] - recording["t"][0])
@@ -129,25 +131,34 @@ def view_of_points(found: Stretches, recording, nominal) -> SlowView:
 def alike(found: Stretches, nominal) -> tuple[np.ndarray, np.ndarray]:
     """(indices of the stretches to use, number of the operating point of each), sorted by operating point.
 
-    A long operating point is reduced to MOST_ALIKE stretches spread over time; the only one of a recording to
-    MOST_OF_ONE, since all it can show is its drift.
+    A long operating point is reduced to MOST_ALIKE stretches spread over time, unless it is the only one.
     """
+    steps = _steps(found, nominal)
+    if alone(found, nominal):  # fixed bins would split some points
+        return np.arange(len(found)), np.zeros(len(found), int)
+    _, point = np.unique(np.round(steps).astype(int), axis=0, return_inverse=True)
+    order, dwell = [], []
+    for k in np.unique(point):
+        mine = np.flatnonzero(point.ravel() == k)
+        if len(mine) > MOST_ALIKE:
+            mine = mine[np.linspace(0, len(mine) - 1, MOST_ALIKE).round().astype(int)]
+        order += mine.tolist()
+        dwell += [int(k)] * len(mine)
+    return np.array(order), np.array(dwell)
+
+
+def alone(found: Stretches, nominal) -> bool:
+    """Whether all stretches are at the same operating point."""
+    steps = _steps(found, nominal)
+    return bool((np.abs(steps - np.median(steps, axis=0)) < 1.0).all())
+
+
+def _steps(found, nominal) -> np.ndarray:
+    """(b, 3) operating points in units of the distance below which two are the same."""
     rated, top = nominal.machine.rated_current_a, max(float(np.abs(found.omega).max()), 1e-9)
     steps = (
         found.i.real / rated / BIN_CURRENT,
         found.i.imag / rated / BIN_CURRENT,
         found.omega / top / BIN_SPEED,
     )
-    steps = np.stack(steps, axis=1)
-    alone = bool((np.abs(steps - np.median(steps, axis=0)) < 1.0).all())  # fixed bins would split some points
-    bins = np.zeros((len(steps), 3), int) if alone else np.round(steps).astype(int)
-    most = MOST_OF_ONE if alone else MOST_ALIKE
-    _, point = np.unique(bins, axis=0, return_inverse=True)
-    order, dwell = [], []
-    for k in np.unique(point):
-        mine = np.flatnonzero(point.ravel() == k)
-        if len(mine) > most:
-            mine = mine[np.linspace(0, len(mine) - 1, most).round().astype(int)]
-        order += mine.tolist()
-        dwell += [int(k)] * len(mine)
-    return np.array(order), np.array(dwell)
+    return np.stack(steps, axis=1)

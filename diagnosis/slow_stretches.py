@@ -11,7 +11,7 @@ A rotor at rest is steady too, if its angle is known: the inverter loss depends 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -57,6 +57,19 @@ class Stretches:
 
     def __len__(self):
         return len(self.t)
+
+    def averaged(self, most: int):
+        """At most ``most`` stretches: means over consecutive ones."""
+        if len(self) <= most:
+            return self
+        parts = np.array_split(np.arange(len(self)), most)
+        names = ("i", "u", "omega", "u_dc", "temp", "t")
+        mean = {name: np.array([getattr(self, name)[k].mean() for k in parts]) for name in names}
+        largest = np.array([self.unsteady[k].max() for k in parts])
+        begin, last = (np.array([k[edge] for k in parts]) for edge in (0, -1))
+        return replace(
+            self, **mean, first=self.first[begin], end=self.end[last], unsteady=largest, rest=self.rest[begin]
+        )
 
 
 def stretches(recording: Recording, nominal) -> Stretches:

@@ -199,6 +199,9 @@ def test_one_point_that_warms_up(tmp_path):
     assert values["resistance_temp_coeff_per_k"] == pytest.approx(0.0039, rel=0.1)
     assert answer.fit.holdout_after < answer.fit.noise_floor < 0.1 * answer.fit.holdout_before
     assert said(answer, "One operating point") and said(answer, "winding was recorded from")
+    faster = found(answer_of(tmp_path, warming(hours=0.2, step_s=0.1)))
+    assert faster["magnet_flux_drift_wb"] == pytest.approx(-0.05 * PSI, rel=0.03)
+    assert faster["resistance_temp_coeff_per_k"] == pytest.approx(0.0039, rel=0.1)
     steady = answer_of(tmp_path, warming(magnets=0.0, copper=0.0))
     assert steady.verdict == "no_mismatch" and not steady.effects
 
