@@ -13,7 +13,7 @@ from fluxproof.diagnosis.curves import parabola
 from fluxproof.diagnosis.recording import Recording, RecordingError
 from fluxproof.diagnosis.settling import settled
 from fluxproof.diagnosis.shaft import airgap, is_airgap, shaft_kind
-from fluxproof.diagnosis.view import View
+from fluxproof.diagnosis.view import View, lacking
 
 BLOCK_ROWS = 200
 SHORTER = (100, 50)  # for short dwells
@@ -114,6 +114,7 @@ def view_of(recording: Recording, nominal, block_rows=BLOCK_ROWS) -> View:
         run=dwell,
         rows=starts,
         span_s=float(r["t"][-1] - r["t"][0]),
+        lacks=lacking(r.lacks, len(starts)) if r.lacks else None,
     )
     return settled(view)
 
@@ -133,10 +134,13 @@ def _voltage(recording, nominal, theta_s):
     r, n, delay = recording, len(recording), nominal.control.duty_applied_after_samples
     u_dc = r["u_dc"] if r.has("u_dc") else np.full(n, float(nominal.inverter.dc_bus_v))
     u_dc_mid = np.append(0.5 * (u_dc[1:] + u_dc[:-1]), u_dc[-1])
+    turns = np.exp(2j * np.pi / 3 * np.arange(3))
+    if "inverter" in r.lacks:  # measured means of the interval after each sample (emf.py)
+        return (2 / 3) * (np.stack([r["u_a"], r["u_b"], r["u_c"]], axis=1) @ turns), u_dc_mid
     asked = np.full(n, np.nan + 0j)
     if r.has("d_a", "d_b", "d_c"):
         duties = np.stack([r["d_a"], r["d_b"], r["d_c"]], axis=1)
-        asked[delay:] = ((2 / 3) * (duties @ np.exp(2j * np.pi / 3 * np.arange(3))))[: n - delay]
+        asked[delay:] = ((2 / 3) * (duties @ turns))[: n - delay]
         return asked * u_dc_mid, u_dc_mid
     # The controller advances its reference by the delay angle, so that it is valid at the middle of its period.
     asked[delay:] = (r["u_d_ref"] + 1j * r["u_q_ref"])[: n - delay]

@@ -69,7 +69,9 @@ class Projector:
         seen[:, 0] = True
         # Two orders closer than a turn within the block are one functional and must not count twice.
         kept = self._apart(span)
-        ok = [np.repeat((seen & kept).ravel(), 2)]
+        both = np.repeat((seen & kept)[:, :, None], 2, axis=2)
+        both[:, :, 0] &= np.broadcast_to(getattr(view, "d_known", True), (b,))[:, None]
+        ok = [both.ravel()]
         self.torque_seen = np.isfinite(view.torque).all(axis=1)
         self.real = {}
         if view.has_sum:
@@ -146,9 +148,10 @@ def cells_of(view, effects, projector=None, free=None) -> Cells:
     p = projector or Projector(view)
     columns = {}
     for effect in effects:
-        mine = {key: p.rows(column) for key, column in effect.core(view).items()}
+        seen = view.shows(effect)[p.block]
+        mine = {key: p.rows(column) * seen for key, column in effect.core(view).items()}
         if free is None or effect.name in free:
-            mine |= {f"~{key}": p.rows(column) for key, column in effect.free(view).items()}
+            mine |= {f"~{key}": p.rows(column) * seen for key, column in effect.free(view).items()}
         columns[effect.name] = mine
     return Cells(p.rows(misfit(view)), columns, p.block, p.order, p.part, p.channel, p.ok)
 

@@ -1,5 +1,7 @@
 """Assigns file columns to canonical columns and units: by drive.toml first, then by known names.
 
+A column that the file lacks may be a constant of drive.toml (constants.py).
+
 [columns] of drive.toml maps a name of the file to a canonical name, as a string or as a table:
 
     [columns]
@@ -24,6 +26,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fluxproof.diagnosis.column_maps import maps, plain
+from fluxproof.diagnosis.constants import constants_of
+from fluxproof.diagnosis.demand import LINE_VOLTAGES, PHASE_VOLTAGES, is_emf_run, missing_columns
 from fluxproof.diagnosis.readers.table import Table, shown
 from fluxproof.diagnosis.recording import COLUMNS, RecordingError
 from fluxproof.diagnosis.units import conversion, known_units, split_unit
@@ -44,13 +48,17 @@ class Source:
 
 @dataclass
 class Plan:
-    """{canonical name: Source}, constants for columns that a log lacks, and notes on assumptions."""
+    """{canonical name: Source}, constants for columns that a log lacks, and notes on assumptions.
+
+    A constant of drive.toml replaces one that a ready-made map assumes.
+    """
 
     sources: dict[str, Source] = field(default_factory=dict)
     assumed: dict[str, float] = field(default_factory=dict)
     used: str = "canonical names"
     sample_time_s: float | None = None
     run: str | None = None
+    stated: list[str] = field(default_factory=list)  # names that [constants] gives
     notes: list[str] = field(default_factory=list)
 
     def wanted(self) -> list[str]:
@@ -68,6 +76,15 @@ def plan_columns(names: dict[str, str], nominal, path) -> Plan:
     left = {name: unit for name, unit in names.items() if name not in taken}
     _exact(plan, left, nominal, path)
     _ready_made(plan, left, nominal, path)
+    constants = constants_of(nominal)
+    for name in [name for name in constants if name in plan.sources]:
+        plan.notes.append(f"[constants] {name} is not used: the recording has this column")
+        del constants[name]
+    plan.assumed |= constants
+    plan.stated = list(constants)
+    if not is_emf_run(set(plan.sources) | set(plan.assumed)):  # the commanded voltages are used
+        for name in (*PHASE_VOLTAGES, *LINE_VOLTAGES):
+            plan.sources.pop(name, None)
     _demand(plan, names, path)
     return plan
 
@@ -213,24 +230,13 @@ def _ready_made(plan, left, nominal, path) -> None:
 
 def _demand(plan, names, path) -> None:
     """Check the columns that a balance requires; RecordingError lists the missing and the present ones."""
-    have = set(plan.sources) | set(plan.assumed)
-    missing = []
-    phases, dq = (
-        {"i_a", "i_b"} <= have or {"i_a", "i_c"} <= have or {"i_b", "i_c"} <= have,
-        {"i_d", "i_q"} <= have,
-    )
-    if not phases and not dq:
-        missing.append("currents (i_a, i_b or i_d, i_q)")
-    if not have & ({"theta_e"} if phases and not dq else {"theta_e", "omega_e"}):
-        missing.append("the angle theta_e" if phases and not dq else "theta_e or omega_e")
-    if not {"d_a", "d_b", "d_c"} <= have and "u_q_ref" not in have:
-        missing.append("voltages (d_a, d_b, d_c or u_d_ref, u_q_ref)")
+    missing = missing_columns(set(plan.sources) | set(plan.assumed))
     if missing:
         found = ", ".join(shown(name, 24) for name in list(names)[:16]) + (", ..." if len(names) > 16 else "")
         why = f" ({plan.notes[-1]})" if plan.notes else ""
         raise RecordingError(
             f"{path}: missing {' and '.join(missing)}; found columns {found or 'none'}{_guesses(missing, names)}; "
-            f"name them in [columns] of drive.toml{why}"
+            f"name them in [columns] of drive.toml, or give a value that was constant in [constants]{why}"
         )
 
 

@@ -20,6 +20,14 @@ import numpy as np
 from fluxproof.diagnosis.result import Estimate
 
 Column = dict  # channel -> array
+NEEDS = {
+    "harmonics": "a row per control period",
+    "samples": "the instants of sampling, in a log of the control",
+    "time": "a time axis",
+    "angle": "an angle that was measured, not taken from the voltages",
+    "inverter": "an inverter that switches",
+    "current": "measured currents",
+}
 DOUBT = 2.0  # standard deviations by which a value must violate a limit to be rejected
 ALIKE = 0.1  # relative difference below which two values count as equal
 
@@ -49,13 +57,13 @@ class Effect:
     separated_by: str
     parameters: tuple[Parameter, ...]
     absorbs: tuple[str, ...] = ()
+    needs: tuple[str, ...] = ()  # of NEEDS: what a recording must show for the effect to be seen
     positive: bool = False  # the leading coefficient cannot be negative
     corrects: bool = (
         False  # a measurement error rather than a property of the machine: ``corrected`` removes it from the data
     )
     drift_of: str = ""  # the constant effect of which this one is a slow drift
     trailing: tuple[float, ...] = ()  # further electrical orders at which the effect may have harmonics
-    fast: bool = False  # visible only in harmonics or sampling instants, which a slow log does not have
     mechanical: bool = False  # a torque of the shaft rather than a voltage of the machine
     curve: float = 0.3  # share of the formula by which the free curve may depart from it
     smoothed: bool = False  # its columns use smoothed currents also when the model is applied

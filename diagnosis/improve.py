@@ -67,7 +67,7 @@ def _original(nominal: Nominal):
         given = {k: v for k, v in given.items() if v != _toml(defaults[k])}
         if given:
             document[name] = given
-    for name in ("columns", "plant"):
+    for name in ("columns", "constants", "plant"):
         if getattr(nominal, name):
             document[name] = getattr(nominal, name)
     return document

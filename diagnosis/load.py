@@ -5,7 +5,8 @@
 RecordingError: the file is unusable; the message is one line.  A recording that can be read but not diagnosed has a
 fatal problem.  ``meta`` of the recording contains "notes" (assumptions and harmless corrections), "columns"
 (canonical name: file column) and "map" (the map that was used).  Rows of a ``slow`` recording are joined if they are
-one step of the log apart.
+one step of the log apart.  Rows without a time that cannot follow each other are operating points (points.py); the
+terminal voltages of a machine without current become rows of a control period (emf.py).
 """
 
 from __future__ import annotations
@@ -18,6 +19,9 @@ import numpy as np
 from fluxproof.diagnosis.checks import check_recording
 from fluxproof.diagnosis.checks.missing import OPTIONAL
 from fluxproof.diagnosis.columns import Plan, canonical, plan_columns
+from fluxproof.diagnosis.demand import is_emf_run
+from fluxproof.diagnosis.emf import emf_rows
+from fluxproof.diagnosis.points import as_table, is_table
 from fluxproof.diagnosis.readers import read_table
 from fluxproof.diagnosis.readers.table import Table, shown
 from fluxproof.diagnosis.recording import Recording, RecordingError
@@ -61,12 +65,18 @@ def _recording(path, table: Table, plan: Plan, nominal) -> Recording:
         "columns": {k: s.column for k, s in plan.sources.items()},
     }
     meta["stated_units"] = [name for name, s in plan.sources.items() if s.stated]
+    for name, value in plan.assumed.items():
+        columns[name] = np.full(n, value)
+    notes += [f"{name} = {plan.assumed[name]:g} by [constants] of the drive file" for name in plan.stated]
+    if is_emf_run(columns):
+        return emf_rows(path, columns, nominal, meta)
+    if ("t" not in columns or n == 1) and not table.meta.get("sample_time_s") and not plan.sample_time_s:
+        if is_table(columns, nominal):
+            return as_table(path, columns, meta, table.problems)
     if "t" not in columns:
         step = table.meta.get("sample_time_s") or plan.sample_time_s or nominal.sample_time_s
         columns["t"] = step * np.arange(n)
         notes.append(f"no time column: rows are assumed to be {step:g} s apart")
-    for name, value in plan.assumed.items():
-        columns[name] = np.full(n, value)
     if plan.run and plan.run in table.columns:
         meta["run"] = table.columns[plan.run]
     recording = Recording(

@@ -27,9 +27,9 @@ def at_order(cells, values, order):
     rows = (cells.channel == "u") & (cells.order == order)
     out = np.full(cells.block.max() + 1, np.nan + 0j)
     d, q = rows & (cells.part == 0), rows & (cells.part == 1)
-    out[cells.block[d]] = np.where(cells.ok[d], values[d], np.nan) + 1j * np.where(
-        cells.ok[q], values[q], np.nan
-    )
+    seen = cells.ok[d] | (cells.ok[q] if order == 0 else False)  # a d voltage that was not recorded is shown as zero
+    part = np.where(cells.ok[d], values[d], 0.0)
+    out[cells.block[d]] = np.where(seen, part, np.nan) + 1j * np.where(cells.ok[q], values[q], np.nan)
     return out
 
 

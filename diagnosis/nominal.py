@@ -2,7 +2,8 @@
 
 Every key of the core's drive.toml is accepted with its range, but only those that the balance needs are required, so
 that a drive without the core can be described too.  A missing key is None, and its effect is not part of the nominal
-model.  [columns] maps names of a recording's file to canonical ones.  [plant.machine], [plant.inverter],
+model.  [columns] maps names of a recording's file to canonical ones, [constants] gives values of columns that the file
+lacks.  [plant.machine], [plant.inverter],
 [plant.sensors] and [plant.timing] contain physics that the core does not use, as in an improved drive;
 diagnosis/improved_plant.py builds the plant.
 """
@@ -52,6 +53,7 @@ class Nominal:
     columns: dict = field(default_factory=dict)
     path: str = ""
     plant: dict = field(default_factory=dict)
+    constants: dict = field(default_factory=dict)
 
     @property
     def sample_time_s(self) -> float:
@@ -66,9 +68,12 @@ def load_nominal(path) -> Nominal:
     columns, plant = tables.get("columns", {}), tables.get("plant", {})
     if not isinstance(columns, dict):
         raise DriveError(f"{path}: columns must be a section [columns] with lines such as 'my name' = 'i_a'")
+    constants = tables.get("constants", {})
+    if not isinstance(constants, dict):
+        raise DriveError(f"{path}: constants must be a section [constants] with lines such as i_d = 0")
     if not isinstance(plant, dict) or not all(isinstance(table, dict) for table in plant.values()):
         raise DriveError(f"{path}: plant must contain sections such as [plant.machine]")
     m = sections["machine"]
     if m.magnet_flux_wb <= 0.0:
         raise DriveError(f"{path}: [machine] magnet_flux_wb = {m.magnet_flux_wb:g}: must be above 0 Wb to diagnose")
-    return Nominal(*sections.values(), columns=columns, path=str(path), plant=plant)
+    return Nominal(*sections.values(), columns=columns, path=str(path), plant=plant, constants=constants)

@@ -10,6 +10,7 @@ from fluxproof.diagnosis.conclude import conclude
 from fluxproof.diagnosis.inference.posterior import Posterior
 from fluxproof.diagnosis.inference.problem import Setup
 from fluxproof.diagnosis.nominal import Nominal
+from fluxproof.diagnosis.parts import sound
 from fluxproof.diagnosis.recording import Recording
 from fluxproof.diagnosis.result import Diagnosis
 from fluxproof.diagnosis.slow_diagnosis import diagnose_slow
@@ -23,6 +24,7 @@ def explain(loaded: list[Recording], nominal: Nominal, progress=lambda text: Non
 
     Raises RecordingError if the recordings contain no operating point for which a voltage balance can be made.
     """
+    loaded = sound(loaded, nominal)
     problems = [p for r in loaded for p in r.problems]
     rows = sum(len(r) for r in loaded)
     if any(r.fatal for r in loaded):
@@ -30,7 +32,7 @@ def explain(loaded: list[Recording], nominal: Nominal, progress=lambda text: Non
         return Diagnosis(
             "bad_recording", f"The recording cannot be used: {worst.message}", rows=rows, problems=problems
         )
-    if all(r.slow for r in loaded):  # sampled too slowly for a voltage balance between rows
+    if any(r.slow for r in loaded):  # sampled too slowly for a voltage balance between rows
         answer = diagnose_slow(loaded, nominal, progress)
     else:
         answer = _physics(loaded, nominal, progress)
@@ -56,6 +58,6 @@ def _physics(recordings, nominal, progress) -> Diagnosis:
     view = joined_views(views)
     held = held_out(views)
     progress("sets of effects")
-    setup = Setup(view, CATALOGUE, ~held)
+    setup = Setup(view, view.visible(CATALOGUE), ~held)
     posterior = Posterior(setup, progress)
     return conclude(posterior, held, progress)

@@ -1,4 +1,4 @@
-"""A recording in canonical form: SI units, peak values, one row per control sample.
+"""A recording in canonical form: SI units, peak values, one row per control sample or per operating point.
 
 Canonical columns (only ``t`` is required here; columns.py checks what a balance needs):
 
@@ -12,6 +12,7 @@ Canonical columns (only ``t`` is required here; columns.py checks what a balance
     i_d_ref i_q_ref      A
     temp_winding         degC
     torque               Nm     at the shaft, positive with positive speed when motoring
+    u_a u_b u_c          V      measured at the terminals of a machine without current (EMF run), or u_ab u_bc u_ca
 """
 
 from __future__ import annotations
@@ -39,6 +40,12 @@ COLUMNS = {
     "i_q_ref": "A",
     "temp_winding": "degC",
     "torque": "Nm",
+    "u_a": "V",
+    "u_b": "V",
+    "u_c": "V",
+    "u_ab": "V",
+    "u_bc": "V",
+    "u_ca": "V",
 }
 
 
@@ -66,6 +73,8 @@ class Recording:
     ``usable``: bool (n,), False on rows that must not enter a balance (clipped, stuck, repaired).
     ``joined``: bool (n,), True where row k+1 follows row k after one sample time; the last is False.
     ``slow``: sampled too slowly for a balance between samples; only steady operating points are used.
+    ``points``: every row is one operating point (``slow`` too); ``t`` is a row number if "time" is in ``lacks``.
+    ``lacks``: what the recording cannot show, of the words in effect.NEEDS.
     ``meta``: further contents of the file, such as registers and raw codes of a telemetry dump.
     """
 
@@ -74,6 +83,8 @@ class Recording:
     usable: np.ndarray
     joined: np.ndarray
     slow: bool = False
+    points: bool = False
+    lacks: frozenset = frozenset()
     problems: list[Problem] = field(default_factory=list)
     meta: dict = field(default_factory=dict)
 

@@ -49,6 +49,8 @@ class Refiner:
 
     def __init__(self, view, effects, train_blocks, progress=lambda text: None):
         self.most = min(MOST_EFFECTS, (operating_points(view) + 1) // 2)
+        if not view.i_raw.any():  # an EMF run shows magnets only, each effect at its own harmonic orders
+            self.most = MOST_EFFECTS
         view = view.replace(memo={**view.memo, "lone": self.most == 1})
         self.view, self.effects, self.progress = view, dict(effects), progress
         self.projector = Projector(view)
@@ -98,6 +100,9 @@ class Refiner:
         for step in range(4):
             fitter = self.linear if step == 0 else self.fitter(view, mine, model.free)
             solution = fitter.solve(model, self.dispersion)
+            if not all(solution.c[n] for n in record):  # without current an error of the current has no column
+                solution.score = np.inf
+                return solution
             small = True
             for n in record:
                 for key, value in solution.c[n].items():
@@ -210,7 +215,7 @@ class Refiner:
         """The view without the measurement errors given by the totals; None if these are impossible."""
         view = self.view
         for name in sorted(totals, key=lambda n: n == "sampling_skew"):
-            view = self.effects[name].corrected(view, totals[name])
+            view = view.kept_where(~view.shows(self.effects[name]), self.effects[name].corrected(view, totals[name]))
             if not (np.isfinite(view.u).all() and np.isfinite(view.i_raw).all()):
                 return None
         return view
@@ -219,6 +224,8 @@ class Refiner:
         """Whether no effect has an impossible size or, beyond its uncertainty, an impossible sign."""
         for name in solution.model.names:
             effect = self.effects[name]
+            if not solution.c[name]:  # without current an effect of the current has no column
+                return False
             if effect.too_large(solution.c[name], self.view):
                 return False
             if not effect.possible(solution.c[name], solution.covariance[name], self.view.nominal):

@@ -55,6 +55,7 @@ def steady_view(view, omega, i_dq, cold=False, rows=ROWS):
         memo={**view.memo, "top_speed": view.top_speed},
         run=np.arange(b),
         rows=np.zeros(b, int),
+        lacks=None,
     )
 
 

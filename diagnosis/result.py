@@ -1,6 +1,6 @@
 """The result of a diagnosis: plain dataclasses, converted for diagnosis.json by ``to_json``.
 
-The stable part follows docs/diagnosis.schema.json (schema 2).  ``Evidence`` serves the pictures only and is not in the JSON.
+The stable part follows docs/diagnosis.schema.json (schema 2).  ``Evidence`` serves the pictures only.
 """
 
 from __future__ import annotations
@@ -102,6 +102,12 @@ class Fit:
         excess = max(self.train_after**2 - self.noise_floor**2, 0.0) ** 0.5
         return excess / max(self.train_before, 1e-12)
 
+    @property
+    def explained_share(self) -> float:
+        """Share of the power above the noise floor that is explained at held-out points."""
+        before = max(self.holdout_before**2 - self.noise_floor**2, 1e-24)
+        return 1.0 - max(self.holdout_after**2 - self.noise_floor**2, 0.0) / before
+
 
 @dataclass
 class Remainder:
@@ -179,7 +185,7 @@ class Diagnosis:
     next_recording: list[Request] = field(default_factory=list)
     location: Location = field(default_factory=Location)
     fit: Fit = field(default_factory=Fit)
-    explained_share: float | None = None  # of the misfit's power above the noise floor, at held-out points; None: no misfit
+    explained_share: float | None = None  # of the misfit's power above its floor, at held-out points; None: no misfit
     remainder: list[Remainder] = field(default_factory=list)  # the largest first
     conventions: list[Convention] = field(default_factory=list)
     unknown_term: UnknownTerm | None = None

@@ -24,6 +24,7 @@ from fluxproof.diagnosis.improve import write_improved
 from fluxproof.diagnosis.load import load_recording
 from fluxproof.diagnosis.nominal import Nominal, load_nominal
 from fluxproof.diagnosis.overlay import closed_loop
+from fluxproof.diagnosis.parts import left_out
 from fluxproof.diagnosis.physics import explain
 from fluxproof.diagnosis.recording import Problem, Recording, RecordingError
 from fluxproof.diagnosis.report import write_outputs
@@ -66,12 +67,22 @@ def run(recordings, drive, out, progress=lambda text: None) -> Diagnosis:
 def _loaded(recordings, nominal, progress) -> list[Recording]:
     if isinstance(recordings, (str, os.PathLike, Recording)):
         recordings = [recordings]
-    loaded = []
+    loaded, refused = [], []
     for item in recordings:
         if not isinstance(item, Recording):
             progress(f"reading {item}")
-            item = load_recording(Path(item), nominal)
+            try:
+                item = load_recording(Path(item), nominal)
+            except RecordingError as error:
+                if not Path(item).is_file():  # a wrong name is not a bad part
+                    raise
+                refused.append((item, error))
+                continue
         loaded.append(item)
+    if not loaded:
+        raise refused[0][1]
+    for source, error in refused:  # a part that cannot be read costs only that part
+        left_out(loaded[0], source, str(error))
     return loaded
 
 

@@ -11,51 +11,69 @@ from __future__ import annotations
 import numpy as np
 
 from fluxproof.diagnosis import verdict as words
+from fluxproof.diagnosis.answer.verdict import HALF, sentence
 from fluxproof.diagnosis.catalogue import CATALOGUE
+from fluxproof.diagnosis.cells import voltage_level
+from fluxproof.diagnosis.inference.problem import Setup, fit_of_set
 from fluxproof.diagnosis.locate import evidence, locate
-from fluxproof.diagnosis.recording import RecordingError
+from fluxproof.diagnosis.one_point import diagnose_one_point
 from fluxproof.diagnosis.request import requests
-from fluxproof.diagnosis.result import Diagnosis, Fit
-from fluxproof.diagnosis.slow import UNSEEN, slow_view
-from fluxproof.diagnosis.slow_search import SlowSearch
+from fluxproof.diagnosis.result import Diagnosis, Fit, Remainder
+from fluxproof.diagnosis.slow import slow_view
+from fluxproof.diagnosis.slow_search import SlowSearch, most_effects
 from fluxproof.diagnosis.uncertainty import Plain
 from fluxproof.diagnosis.view import joined_views
 
-LEAST_POINTS = 8
 HOLDOUT_EVERY = 4
+AT_FLOOR = 2.0  # ratio of a misfit to the noise floor up to which it is noise
 
 
 def diagnose_slow(recordings, nominal, progress=lambda text: None) -> Diagnosis:
     """Diagnose slow recordings of one drive.
 
-    Raises RecordingError if they contain too few steady operating points.
+    Raises RecordingError if they contain no steady operating point.
     """
-    view = joined_views([slow_view(r, nominal) for r in recordings])
+    return diagnose_points(joined_views([slow_view(r, nominal) for r in recordings]), progress)
+
+
+def held_points(view) -> np.ndarray:
+    """(b,) bool: blocks held out of the fit: every fourth operating point, of few points every fourth block."""
     points = np.unique(view.run)
-    if len(points) < LEAST_POINTS:
-        raise RecordingError(
-            f"{recordings[0].source}: {len(points)} steady operating points, {LEAST_POINTS} are needed: "
-            "record more and longer ones, or log faster"
-        )
-    held = np.isin(view.run, points[2::HOLDOUT_EVERY])
+    if len(points) >= 2 * HOLDOUT_EVERY:
+        return np.isin(view.run, points[2::HOLDOUT_EVERY])
+    return np.arange(len(view)) % HOLDOUT_EVERY == 2
+
+
+def diagnose_points(view, progress=lambda text: None) -> Diagnosis:
+    """Diagnose the operating points of a SlowView."""
+    if len(np.unique(view.run)) == 1:
+        return diagnose_one_point(view)
+    held = held_points(view)
     search = SlowSearch(view, ~held, progress)
     found = search.run()
     names, ambiguity, weak = _sorted_out(found)
     fit = _fit(search, found, held)
     left = found.best.chi2 / max(found.best.rows - found.best.count, 1)
     if not found.best.model.names:
-        verdict = "no_mismatch" if left <= words.LEFTOVER else "unexplained"
+        at_floor = fit.train_before <= AT_FLOOR * fit.noise_floor
+        verdict = "no_mismatch" if left <= words.LEFTOVER or at_floor else "unexplained"
     elif left > words.LEFTOVER and fit.share_left > words.FLOOR_SHARE:
-        verdict = "unexplained"
+        verdict = "partly_explained" if fit.explained_share >= HALF else "unexplained"
     else:
         verdict = "ambiguous" if ambiguity else "explained" if names else "no_mismatch"
     answer = Diagnosis(verdict, "", location=locate(view, search.cells, found.pure), fit=fit)
-    if verdict in ("explained", "ambiguous"):
+    if verdict in ("explained", "partly_explained", "ambiguous"):
         answer.effects = model_effects(search, found, names)
         answer.ambiguity = ambiguity
+        answer.explained_share = fit.explained_share
+    if verdict in ("partly_explained", "unexplained"):
+        size = max(fit.holdout_after**2 - fit.noise_floor**2, 0.0) ** 0.5
+        answer.remainder = [Remainder("u_dq", 0.0, size, "V", 1.0 - fit.explained_share)]
     if ambiguity:
         progress("choosing the next recording")
-        answer.next_recording = requests(search, [found.best, *found.tied], fit.noise_floor)
+        setup = Setup(view, search.effects, ~held)
+        fits = [fit_of_set(setup, s.model.names) for s in (found.best, *found.tied)]
+        answer.next_recording = requests(setup, fits, fit.noise_floor)
     cells, residual = search.residual(found.best)
     answer.evidence = evidence(view, (search.cells, search.cells.y), (cells, residual), found.pure, held)
     for name in (
@@ -65,7 +83,7 @@ def diagnose_slow(recordings, nominal, progress=lambda text: None) -> Diagnosis:
         "spectrum_after",
     ):  # a slow log has no angle and no harmonics
         answer.evidence.arrays.pop(name, None)
-    answer.sentence = words.sentence(verdict, answer.effects, ambiguity, fit, CATALOGUE, answer.location)
+    answer.sentence = sentence(answer, CATALOGUE)
     answer.notes = _notes(view, held, ambiguity, weak, found)
     answer.search, answer.found, answer.held = search, found, held
     return answer
@@ -123,11 +141,21 @@ def _fit(search, found, held) -> Fit:
 
 def _notes(view, held, ambiguity, weak, found) -> list[str]:
     m = view.machine
+    points = len(np.unique(view.run))
+    unseen = [name for name, effect in CATALOGUE.items() if not view.shows(effect).any()]
     notes = [
-        f"Slow log: the voltage balance was made on {len(view)} steady stretches at {len(np.unique(view.run))} "
-        f"operating points; {int(held.sum())} of the stretches were not fitted.",
-        f"It has no harmonics and no sampling instants; these effects cannot be diagnosed: {', '.join(UNSEEN)}.",
+        f"The voltage balance was made on {len(view)} steady stretches at {points} operating points; "
+        f"{int(held.sum())} of the stretches were not fitted.",
+        f"Operating points have no harmonics and no sampling instants; these effects cannot be diagnosed: "
+        f"{', '.join(unseen)}.",
     ]
+    if not view.d_known.all():
+        notes.append("u_d is not recorded: only the q axis was balanced.")
+    if points < 2 * HOLDOUT_EVERY:
+        notes.append(
+            f"With {points} operating points at most {most_effects(points)} of the effects can be named at once, and "
+            "every fourth stretch instead of every fourth point was held out: record more points."
+        )
     i = view.i.mean(axis=1)
     if not i.real.any():
         notes.append(
@@ -137,11 +165,9 @@ def _notes(view, held, ambiguity, weak, found) -> list[str]:
         notes.append(
             "One direction only: encoder offset and inverter loss are separated from others by load and speed alone."
         )
-    drops = m.resistance_ohm * np.abs(i).max()
-    if drops < 0.1 * np.abs(view.u).max():
-        notes.append(
-            f"The resistance drops at most {drops:.2g} V of {np.abs(view.u).max():.3g} V: it cannot be determined here."
-        )
+    share = float((m.resistance_ohm * np.abs(i) / voltage_level(view).clip(1e-9)).max())
+    if share < 0.1:
+        notes.append(f"The resistance drops at most {share:.1%} of the voltage: it cannot be determined here.")
     notes += [f"{name} improves the fit, but not significantly." for name in weak]
     for group in ambiguity:
         for name in group:

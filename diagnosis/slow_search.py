@@ -15,7 +15,6 @@ from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.cells import column_of, voltage_level
 from fluxproof.diagnosis.fit import Fitter, Model, everything
 from fluxproof.diagnosis.search import Outcome, Search
-from fluxproof.diagnosis.slow import UNSEEN
 
 MOST_EFFECTS = 6
 REFINED = 40
@@ -37,7 +36,6 @@ LIMITS = {  # generous limits for a real drive
     "offset_rad": lambda x, n: abs(x) < 0.6,
     "delay_s": lambda x, n: abs(x) < 3.0 * n.sample_time_s,
 }
-TELLING = {name: effect for name, effect in CATALOGUE.items() if name not in UNSEEN}
 
 
 class SlowSearch(Search):
@@ -45,7 +43,7 @@ class SlowSearch(Search):
 
     def __init__(self, view, train_blocks, progress=lambda text: None):
         silent = not view.i.real.any()  # the d axis never had a current
-        effects = {n: e for n, e in TELLING.items() if not (silent and n == "inductance_d")}
+        effects = {n: e for n, e in view.visible(CATALOGUE).items() if not (silent and n == "inductance_d")}
         super().__init__(view, effects, train_blocks, progress)
         self.hidden = ("saturation", "d_") if silent else None
         self.hide(self.cells)
@@ -56,7 +54,7 @@ class SlowSearch(Search):
 
     def run(self) -> Outcome:
         self.progress("all sets of effects")
-        for model in self.every_set():
+        for model in [Model(frozenset()), *self.every_set()]:
             self.refine(model)
         best = self.large(self._best())
         tied = self.tied(best)
@@ -89,7 +87,7 @@ class SlowSearch(Search):
         """The most promising models of all sets of up to MOST_EFFECTS effects on the linear problem."""
         able = [n for n in self.effects if self.linear.index[n][0]]
         scored = []
-        for size in range(1, MOST_EFFECTS + 1):
+        for size in range(1, most_effects(len(np.unique(self.view.run))) + 1):
             for names in itertools.combinations(able, size):
                 scored += [(self.linear.score(m, self.dispersion), m) for m in self.some_forms(names)]
         scored.sort(key=lambda entry: entry[0])
@@ -111,7 +109,14 @@ class SlowSearch(Search):
         ]
         for name in small:
             best = self.refine(best.model.without(name))
+        if small:  # another set may explain with large effects what the small one did with its free curve
+            rest = [s for s in self.refined.values() if np.isfinite(s.score) and self.all_large(s)]
+            best = min([best, *rest], key=lambda s: s.score)
         return best
+
+    def all_large(self, solution) -> bool:
+        """Whether every effect of a solution reaches its floor of practical interest."""
+        return all(self.effects[n].size(c, self.view.nominal) >= self.floor(n) for n, c in solution.c.items())
 
     def floor(self, name) -> float:
         return self.effects[name].floor(self.view.nominal)
@@ -138,6 +143,11 @@ class SlowSearch(Search):
         return fitter.cells, fitter.cells.y - values
 
 
+def most_effects(points: int) -> int:
+    """Largest number of effects: with few operating points, more would explain anything."""
+    return min(MOST_EFFECTS, max(1, points // 2))
+
+
 def sigmas(view, cells) -> tuple[np.ndarray, np.ndarray]:
     """Standard deviation of every row (r,) [V], and the part of it seen between repetitions of an operating point.
 
@@ -152,7 +162,8 @@ def sigmas(view, cells) -> tuple[np.ndarray, np.ndarray]:
     own = np.hypot(OWN_SHARE * level, OWN_V * view.nominal.inverter.dc_bus_v)
     own = np.hypot(own, UNSTEADY * view.unsteady)
     start = own[cells.block]
-    rough = Fitter(cells, start, np.ones(len(cells.y), bool)).solve(everything(cells)).residual[at]
+    rough = Fitter(cells, start, np.ones(len(cells.y), bool)).solve(everything(cells)).residual
+    rough = np.where(cells.ok, rough, np.nan)[at]  # a d voltage that was not recorded has no residual
     pairs = np.flatnonzero((np.diff(view.run) == 0) & (loaded[1:] == loaded[:-1]))
     change = (rough[pairs + 1] - rough[pairs]) / np.sqrt(2)
     under = loaded[pairs]
@@ -168,4 +179,5 @@ def sigmas(view, cells) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _rms(x) -> float:
+    x = x[np.isfinite(x)]
     return float(np.sqrt(np.mean(np.square(x)))) if x.size else 0.0

@@ -5,11 +5,13 @@ The messages are not synchronous, so that a row combines values of different ins
 state: over two messages of the slowest signal, nominal and recorded voltage are constant within a small share of the
 largest voltage, every signal that is not at rest has been updated, and the rotor turns.  Changes shortly before and
 after a stretch bound the error due to values of different age: ``unsteady``.
+
+A rotor at rest is steady too, if its angle is known: the inverter loss depends on it.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,20 +19,27 @@ from fluxproof.diagnosis.recording import Recording, RecordingError
 
 SIGNALS = ("i_d", "i_q", "u_d", "u_q", "omega")
 STILL = 0.015  # of the largest voltage: largest change of nominal and recorded voltage
-LEAST_S = 0.5
+LEAST_S = (0.5, 0.2, 0.1, 0.05)  # the shorter ones only if the longer ones find too few operating points
+ENOUGH = 8  # operating points
 MESSAGES = 2.0  # number of messages of the slowest signal in a stretch
 AROUND, LOOSE = 0.5, 8.0  # margin before and after a window, as a share of it; factor of the change allowed there
 REST = 1e-3  # of a signal's largest value: a smaller signal is at rest and needs no update
+FEW_TURNS = 1.5  # the same in a log without messages, whose stretches are shorter
 TURNS = 4.0  # electrical turns within a stretch: the inverter loss depends on the angle, its mean over turns does not
 RESTED = 6.0  # times the median time between changes: after a longer time the signal counts as constant
 USUAL = 0.9  # quantile of the other intervals
+MESSAGE_ROWS = 3.0  # rows; a signal that changes as often has no messages
+PARTS = 4  # of a stretch without messages
+NOISE = 3.0  # standard deviations: usual range of PARTS means
+AT_REST = 0.05  # rad within a stretch: the rotor does not turn
 
 
 @dataclass
 class Stretches:
     """Means over each stretch, all (b,): dq current and voltage complex [A], [V], electrical speed [rad/s],
     bus [V], winding [degC] or nan, time of the middle since the first row [s], first row and end (exclusive), and the
-    change of the voltage from shortly before to shortly after the stretch [V]."""
+    change of the voltage from shortly before to shortly after the stretch [V].  rest: angle of a rotor at rest [rad],
+    nan if it turns; both_axes: whether u_d is known, otherwise it is that of the nominal drive."""
 
     i: np.ndarray
     u: np.ndarray
@@ -41,10 +50,26 @@ class Stretches:
     first: np.ndarray
     end: np.ndarray
     unsteady: np.ndarray
+    rest: np.ndarray
     window_s: float
+    both_axes: bool = True
+    notes: tuple[str, ...] = ()
 
     def __len__(self):
         return len(self.t)
+
+    def averaged(self, most: int):
+        """At most ``most`` stretches: means over consecutive ones."""
+        if len(self) <= most:
+            return self
+        parts = np.array_split(np.arange(len(self)), most)
+        names = ("i", "u", "omega", "u_dc", "temp", "t")
+        mean = {name: np.array([getattr(self, name)[k].mean() for k in parts]) for name in names}
+        largest = np.array([self.unsteady[k].max() for k in parts])
+        begin, last = (np.array([k[edge] for k in parts]) for edge in (0, -1))
+        return replace(
+            self, **mean, first=self.first[begin], end=self.end[last], unsteady=largest, rest=self.rest[begin]
+        )
 
 
 def stretches(recording: Recording, nominal) -> Stretches:
@@ -52,6 +77,32 @@ def stretches(recording: Recording, nominal) -> Stretches:
 
     Raises RecordingError if signals are missing or no stretch is steady.
     """
+    refused, best = None, None
+    for least_s in LEAST_S:
+        try:
+            found = stretches_of(recording, nominal, least_s)
+        except RecordingError as error:
+            refused = refused or error
+            continue
+        points = _operating_points(found, nominal)
+        if best is None or points > best[0]:
+            best = points, found
+        if points >= ENOUGH:
+            break
+    if best is None:
+        raise refused
+    return best[1]
+
+
+def _operating_points(found, nominal) -> int:
+    """Number of clearly different operating points."""
+    top = max(float(np.abs(found.omega).max()), 1e-9)
+    steps = (found.i.real / nominal.machine.rated_current_a, found.i.imag / nominal.machine.rated_current_a)
+    return len(np.unique(np.round(np.stack([*steps, found.omega / top], axis=1) / 0.05), axis=0))
+
+
+def stretches_of(recording, nominal, least_s) -> Stretches:
+    """The stretches of at least ``least_s`` [s]."""
     r, m = recording, nominal.machine
     i, u, omega, u_dc = operating_columns(recording, nominal)
     t = r["t"] - r["t"][0]
@@ -62,9 +113,14 @@ def stretches(recording: Recording, nominal) -> Stretches:
         for x in parts.values()
         if restless(t, x)
     ]
-    window = max(LEAST_S, MESSAGES * max(periods.values()))
+    window = max(least_s, MESSAGES * max(periods.values()))
+    change, turns = _change, TURNS
+    if max(periods.values()) < MESSAGE_ROWS * np.median(np.diff(t)):  # no messages: every row has its own noise
+        change, turns = _drift, FEW_TURNS
     psi = m.inductance_d_h * i.real + m.magnet_flux_wb + 1j * m.inductance_q_h * i.imag
     nominal_u = m.resistance_ohm * i + 1j * omega * psi
+    u, both_axes = known_voltage(u, nominal_u)
+    angle = known_angle(recording)
     limit = STILL * max(np.nanmax(np.abs(nominal_u)), np.nanmax(np.abs(u)), 1e-9)
     good = r.usable & np.isfinite(nominal_u) & np.isfinite(u)
     step = np.diff(t)
@@ -79,29 +135,70 @@ def stretches(recording: Recording, nominal) -> Stretches:
             gaps[before[k]] == gaps[behind[k] - 1] and bad[behind[k]] == bad[before[k]] and ends[k] - k >= 3
         )
         whole = whole and all(f[ends[k] - 1] > f[k] for f in fresh)
-        whole = whole and np.abs(omega[inner]).min() * window > 2 * np.pi * TURNS
+        resting = np.isfinite(angle[k]) and abs(omega[inner].mean()) * window < AT_REST
+        whole = whole and (resting or np.abs(omega[inner]).min() * window > 2 * np.pi * turns)
         if whole and all(
-            _change(x[inner]) < limit and _change(x[outer]) < LOOSE * limit for x in (nominal_u, u)
+            change(x[inner]) < limit and change(x[outer]) < LOOSE * limit for x in (nominal_u, u)
         ):
-            found.append((k, ends[k], max(_change(nominal_u[outer]), _change(u[outer]))))
+            found.append((k, ends[k], max(change(nominal_u[outer]), change(u[outer]))))
             k = ends[k]
         else:
             k += 1
     if not found:
+        why = ", two messages of the slowest signal," if window > least_s else ""
         raise RecordingError(
-            f"{r.source}: in no stretch of {window:.2g} s, two messages of the slowest signal, are current, speed and "
-            "voltage steady: record longer operating points, or log faster"
+            f"{r.source}: in no stretch of {window:.2g} s{why} are current, speed and voltage steady"
+            f"{_unmet(omega, angle, window, turns)}: record longer operating points, or log faster"
         )
     mean = lambda x: np.array([np.mean(x[a:b]) for a, b, _ in found])  # noqa: E731
     temp = r["temp_winding"] if r.has("temp_winding") else np.full(len(t), np.nan)
     first, end, unsteady = (np.array(x) for x in zip(*found, strict=True))
+    speed = mean(omega)
+    rest = np.where(np.abs(speed) * window < AT_REST, angle[first], np.nan)
     return Stretches(
-        mean(i), mean(u), mean(omega), mean(u_dc), mean(temp), mean(t), first, end, unsteady, float(window)
+        mean(i), mean(u), speed, mean(u_dc), mean(temp), mean(t), first, end, unsteady, rest, float(window), both_axes
     )
+
+
+def _unmet(omega, angle, window, turns) -> str:
+    """A condition other than steadiness that no row meets, as the end of a sentence; "" if there is none."""
+    usual, most = (float(f(np.abs(omega))) * window for f in (np.nanmedian, np.nanmax))
+    if usual < AT_REST and not np.isfinite(angle).any():
+        return STANDING
+    if usual >= AT_REST and most <= 2 * np.pi * turns:
+        return f" over {turns:g} electrical turns (the fastest one makes {most / (2 * np.pi):.2g})"
+    return ""
+
+
+STANDING = "; at standstill record theta_e, or add it to [constants]: the inverter loss depends on the angle"
+
+
+def known_voltage(u, nominal_u):
+    """(voltage (n,) complex [V], whether u_d is known); an unknown u_d is set to the nominal one and not used."""
+    if np.isfinite(u.real).any():
+        return u, True
+    return nominal_u.real + 1j * u.imag, False
+
+
+def known_angle(recording) -> np.ndarray:
+    """(n,) recorded angle [rad], nan if it was integrated from the speed or is missing."""
+    if not recording.has("theta_e") or recording.meta.get("angle") == "integrated":
+        return np.full(len(recording), np.nan)
+    return recording["theta_e"]
 
 
 def _change(x) -> float:
     return float(max(np.ptp(x.real), np.ptp(x.imag)))
+
+
+def _drift(x) -> float:
+    """The change of a signal of which every row has its own noise: of means over parts of it, beyond that noise."""
+    parts = min(PARTS, len(x) // 4)
+    if parts < 2:
+        return _change(x)
+    means = np.array([p.mean() for p in np.array_split(x, parts)])
+    noise = np.sqrt(np.mean(np.abs(np.diff(x)) ** 2) / 2.0 * parts / len(x))
+    return max(_change(means) - NOISE * float(noise), 0.0)
 
 
 def operating_columns(recording: Recording, nominal):
@@ -121,6 +218,9 @@ def operating_columns(recording: Recording, nominal):
         i = (2 / 3) * (np.stack([r["i_a"], r["i_b"], third], axis=1) @ turns) * np.exp(-1j * r["theta_e"])
     else:
         raise RecordingError(f"{r.source}: i_d, i_q or i_a, i_b with theta_e are needed")
+    if r.has("u_q_ref") and not r.has("d_a", "d_b", "d_c", "theta_e"):
+        u_d = r["u_d_ref"] if r.has("u_d_ref") else np.full(len(r), np.nan)
+        return i, u_d + 1j * r["u_q_ref"], omega, u_dc
     if r.has("u_d_ref", "u_q_ref"):
         return i, r["u_d_ref"] + 1j * r["u_q_ref"], omega, u_dc
     if not r.has("d_a", "d_b", "d_c", "theta_e"):
@@ -132,7 +232,7 @@ def operating_columns(recording: Recording, nominal):
 
 def message_period(t, x) -> float:
     """Typical longest time between two messages of a signal [s], from its changes; interpolation counts once."""
-    apart = _between_changes(t, x)
+    apart = _between_changes(t, x) if np.isfinite(x).any() else ()
     if len(apart) < 4:
         return float(np.median(np.diff(t)))
     return float(np.quantile(apart[apart < RESTED * np.median(apart)], USUAL))
@@ -140,6 +240,8 @@ def message_period(t, x) -> float:
 
 def restless(t, x) -> bool:
     """Whether a signal changes with nearly every message unless at rest, so that no change means no message."""
+    if not np.isfinite(x).any():  # not recorded
+        return False
     apart, period = _between_changes(t, x), message_period(t, x)
     active = np.abs(x) > REST * np.nanmax(np.abs(x))
     return float(apart[apart < 3.0 * period].sum()) > 0.5 * active.mean() * (t[-1] - t[0])

@@ -58,8 +58,30 @@ class View:
     noise_gain: float = 1.0  # factor of a current correction on the current noise
     memo: dict = dataclasses.field(default_factory=dict)  # cache of the effects, shared by all views of a recording
 
+    lacks: np.ndarray | None = None  # (b,) frozensets of words in effect.NEEDS that a block cannot show; None: nothing
+
+    stacked = STACKED  # arrays over blocks that several recordings simply append
+
     def __len__(self):
         return len(self.t)
+
+    def shows(self, effect) -> np.ndarray:
+        """(b,) bool: blocks in which an effect of the catalogue can be seen."""
+        if self.lacks is None:
+            return np.ones(len(self), bool)
+        return np.array([not lacking & set(effect.needs) for lacking in self.lacks])
+
+    def kept_where(self, blocks, changed):
+        """``changed``, a view of the same blocks, with the data of this view in ``blocks`` (b,) bool."""
+        if not blocks.any():
+            return changed
+        pick = lambda old, new: np.where(blocks.reshape(-1, *[1] * (np.ndim(new) - 1)), old, new)  # noqa: E731
+        names = ("theta", "omega", "i", "i_raw", "u", "u_dc")
+        return changed.replace(**{name: pick(getattr(self, name), getattr(changed, name)) for name in names})
+
+    def visible(self, effects: dict) -> dict:
+        """Those of the effects {name: Effect} that can be seen in any block."""
+        return {name: effect for name, effect in effects.items() if self.shows(effect).any()}
 
     @property
     def machine(self):
@@ -182,7 +204,7 @@ class View:
 
     def take(self, index):
         """The blocks of ``index`` only."""
-        per_block = (*STACKED, "i_abc", "t", "course", "run")
+        per_block = (*self.stacked, "i_abc", "lacks", "t", "course", "run")
         return self.replace(
             **{
                 name: None if getattr(self, name) is None else getattr(self, name)[index]
@@ -203,7 +225,9 @@ def joined_views(views: list[View]) -> View:
     offsets_t = np.cumsum([0.0, *(v.span_s for v in views)])
     slow = np.cumsum([0.0, first.span_s, *(v.span_s if v.span_s >= first.span_s else 0.0 for v in views[1:])])
     offsets_run = np.cumsum([0, *(v.run.max() + 1 for v in views)])
-    stack = {name: np.concatenate([getattr(v, name) for v in views]) for name in STACKED}
+    stack = {name: np.concatenate([getattr(v, name) for v in views]) for name in first.stacked}
+    if any(v.lacks is not None for v in views):
+        stack["lacks"] = np.concatenate([lacking((), len(v)) if v.lacks is None else v.lacks for v in views])
     phases = [v.i_abc for v in views]
     return first.replace(
         **stack,
@@ -215,6 +239,13 @@ def joined_views(views: list[View]) -> View:
         run=np.concatenate([v.run + o for v, o in zip(views, offsets_run[:-1], strict=True)]),
         span_s=float(offsets_t[-1]),
     )
+
+
+def lacking(words, count) -> np.ndarray:
+    """(count,) the same frozenset of words for every block."""
+    out = np.empty(count, object)
+    out[:] = [frozenset(words)] * count
+    return out
 
 
 COLD_K = 5.0  # a machine within this difference from the nameplate temperature is cold

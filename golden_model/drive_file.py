@@ -16,8 +16,8 @@ except ModuleNotFoundError:  # Python 3.10
 
 from fluxproof.golden_model.drive_keys import DriveError, key_of
 
-# Column names of recordings and physics beyond the core's model: both are read by diagnosis/.
-IGNORED = ("columns", "plant")
+# Columns and constants of recordings, and physics beyond the core's model: all are read by diagnosis/.
+IGNORED = ("columns", "constants", "plant")
 
 
 def read_sections(path, schema):

@@ -209,12 +209,22 @@ UNUSABLE = {
 def test_unusable_input_ends_in_one_line_and_status_2(name, tmp_path, capsys):
     path = tmp_path / name
     path.write_bytes(UNUSABLE[name])
+    assert diagnose(tmp_path / "out", path, more=["--quiet"]) == 2
+    printed = capsys.readouterr()
+    assert printed.out == "" and printed.err.count("\n") == 1 and printed.err.startswith("fluxproof: ")
+    assert str(path) in printed.err and "\x1b" not in printed.err and not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("name", UNUSABLE)
+def test_unusable_part_beside_a_good_one_is_named(name, tmp_path, capsys):
+    path = tmp_path / name
+    path.write_bytes(UNUSABLE[name])
     good = table_of(tmp_path / "good.csv", rows=900)
-    for recordings in ([path], [good, path]):
-        assert diagnose(tmp_path / "out", *recordings, more=["--quiet"]) == 2
-        printed = capsys.readouterr()
-        assert printed.out == "" and printed.err.count("\n") == 1 and printed.err.startswith("fluxproof: ")
-        assert str(path) in printed.err and "\x1b" not in printed.err and not (tmp_path / "out").exists()
+    assert diagnose(tmp_path / "out", good, path, more=["--quiet"]) == 0
+    printed = capsys.readouterr()
+    (line,) = [line for line in printed.out.splitlines() if f"({name} is not used)" in line]
+    assert line.startswith("recording: ") and str(path) in line and "\x1b" not in printed.out and not printed.err
+    assert diagnose(tmp_path / "out", good, tmp_path / "none.csv", more=["--quiet"]) == 2
 
 
 def test_missing_files_and_foreign_drives(tmp_path, capsys):

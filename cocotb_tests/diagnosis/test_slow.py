@@ -57,9 +57,12 @@ def test_ramps_alone_are_refused_in_one_line():
     assert "\n" not in str(refused.value)
 
 
-def test_few_operating_points_are_refused():
-    with pytest.raises(RecordingError, match="steady operating points"):
-        diagnose_slow([log(levels=LEVELS[:3])], NOMINAL)
+def test_few_operating_points_name_few_effects():
+    answer = diagnose_slow([log(Truth(psi_m=0.95 * PSI), levels=LEVELS[:3])], NOMINAL)
+    assert [e.name for e in answer.effects] == ["magnet_flux"] and not answer.ambiguity
+    assert any("With 3 operating points at most 1" in note for note in answer.notes)
+    several = diagnose_slow([log(SEVERAL, levels=LEVELS[:3])], NOMINAL)
+    assert several.verdict == "unexplained" and not several.effects
 
 
 def test_speed_is_needed():

@@ -82,5 +82,5 @@ EFFECT = Cogging(
         Parameter("cogging_order", "per turn", "the largest order, per mechanical turn"),
     ),
     mechanical=True,
-    fast=True,
+    needs=("harmonics",),
 )

@@ -37,7 +37,7 @@ class CrossSaturation(FluxEffect):
 
     def size(self, c, nominal):
         """Change of psi_d by rated i_q, relative to L_q i_rated."""
-        return abs(c["xy2"] + c.get("xy4", 0.0) + 0.9 * c.get("xy1", 0.0))
+        return abs(c.get("xy2", 0.0) + c.get("xy4", 0.0) + 0.9 * c.get("xy1", 0.0))
 
     def estimates(self, c, covariance, nominal):
         m = nominal.machine

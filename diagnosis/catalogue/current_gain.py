@@ -81,5 +81,5 @@ EFFECT = CurrentGain(
     parameters=tuple(Parameter(f"gain_{x}", "1", f"relative error of phase {x}") for x in "abc"),
     absorbs=("current_scale",),
     corrects=True,
-    fast=True,
+    needs=("harmonics", "current"),
 )

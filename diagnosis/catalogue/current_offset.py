@@ -78,5 +78,5 @@ EFFECT = CurrentOffset(
     separated_by="a log at zero current, gates off",
     parameters=tuple(Parameter(f"offset_{x}_a", "A", f"phase {x}, measured minus true") for x in PHASES),
     corrects=True,
-    fast=True,
+    needs=("harmonics", "current"),
 )

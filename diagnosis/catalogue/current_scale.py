@@ -45,4 +45,5 @@ EFFECT = CurrentScale(
     separated_by="an external ammeter or a torque transducer",
     parameters=(Parameter("scale", "1", "relative error of all phases"),),
     corrects=True,
+    needs=("current",),
 )

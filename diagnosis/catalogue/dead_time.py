@@ -118,4 +118,5 @@ EFFECT = DeadTime(
     parameters=(Parameter("v_dead_v", "V", "voltage loss of a leg at full current"),),
     smoothed=True,
     trailing=(12.0, 18.0, 24.0),
+    needs=("inverter",),
 )

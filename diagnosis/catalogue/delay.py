@@ -74,4 +74,5 @@ EFFECT = Delay(
     separated_by="two speeds, both directions; load at each; a step",
     parameters=(Parameter("delay_s", "s", "beyond duty_applied_after_samples"),),
     corrects=True,
+    needs=("samples", "inverter"),
 )

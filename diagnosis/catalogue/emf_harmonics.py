@@ -79,5 +79,5 @@ EFFECT = EmfHarmonics(
         Parameter("order_12", "1", "amplitude relative to the magnet flux"),
     ),
     trailing=(12.0, 18.0, 24.0),
-    fast=True,
+    needs=("harmonics",),
 )

@@ -79,5 +79,5 @@ EFFECT = EncoderEccentricity(
     separated_by="the mechanical index: orders per mechanical turn; more than one pole pair",
     parameters=(Parameter("amplitude_rad", "rad", "electrical, once per mechanical turn"),),
     corrects=True,
-    fast=True,
+    needs=("harmonics", "angle"),
 )

@@ -38,4 +38,5 @@ EFFECT = EncoderOffset(
     separated_by="rotation at zero current in both directions, two speeds",
     parameters=(Parameter("offset_rad", "rad", "electrical, measured minus true"),),
     corrects=True,
+    needs=("angle",),
 )

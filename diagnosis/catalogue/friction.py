@@ -84,5 +84,5 @@ EFFECT = Friction(
         Parameter("coulomb_friction_nm", "Nm", "dry"),
     ),
     mechanical=True,
-    fast=True,
+    needs=("harmonics",),
 )

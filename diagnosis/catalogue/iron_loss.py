@@ -79,4 +79,5 @@ EFFECT = IronLoss(
     separated_by="load: omega^2 i_q on the q axis; a shifted sampling trigger; low speed for hysteresis",
     parameters=(Parameter("iron_resistance_ohm", "ohm", "in parallel with the rotational EMF, at the highest speed"),),
     positive=True,
+    needs=("angle",),
 )

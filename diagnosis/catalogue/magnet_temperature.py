@@ -59,4 +59,5 @@ EFFECT = MagnetTemperature(
     ),
     absorbs=("magnet_flux",),
     drift_of="magnet_flux",
+    needs=("time",),
 )

@@ -59,5 +59,5 @@ EFFECT = PhaseResistanceAsymmetry(
     separated_by="standstill and speed: a sensor error also follows omega L i; the sum of three measured currents",
     parameters=tuple(Parameter(f"asymmetry_{x}", "1", f"phase {x}, relative to the mean") for x in "abc"),
     absorbs=("resistance",),
-    fast=True,
+    needs=("harmonics", "current"),
 )

@@ -71,5 +71,5 @@ EFFECT = SamplingSkew(
     separated_by="load (an iron loss also follows omega^2 i_q); a deliberately shifted sampling trigger",
     parameters=(Parameter("skew_s", "s", "of the currents relative to the angle; positive: late"),),
     corrects=True,
-    fast=True,
+    needs=("harmonics", "inverter"),
 )

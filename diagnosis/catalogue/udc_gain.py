@@ -34,4 +34,5 @@ EFFECT = UdcGain(
     separated_by="an external voltmeter, or the open-circuit EMF",
     parameters=(Parameter("udc_gain", "1", "relative error"),),
     corrects=True,
+    needs=("inverter",),
 )

@@ -35,10 +35,11 @@ def check(recording, nominal) -> None:
     if "omega_e" not in columns and "theta_e" in columns:
         columns["omega_e"] = speed_of(recording)
         notes.append(f"omega_e is not recorded and is computed from theta_e over {SPEED_ROWS} rows")
-    if "theta_e" not in columns and "omega_e" in columns:
+    if "theta_e" not in columns and "omega_e" in columns and not recording.points:
         step = np.diff(recording["t"], prepend=recording["t"][0])
         columns["theta_e"] = wrapped(np.cumsum(columns["omega_e"] * step))
         notes.append("theta_e is not recorded and is integrated from omega_e: its zero is arbitrary")
+        recording.meta["angle"] = "integrated"
 
 
 def _drop_dead(recording, name, rated) -> None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from fluxproof.diagnosis.checks.agreement import angle_speed_ratio
+from fluxproof.diagnosis.points import held_one_after_another, mark_points
 from fluxproof.diagnosis.recording import Problem
 
 STAGE = "time"
@@ -20,7 +21,7 @@ UNITS = {"ms": 1e3, "us": 1e6, "ns": 1e9}
 
 
 def check(recording, nominal) -> None:
-    if recording.fatal or len(recording) < 2:
+    if recording.fatal or recording.points or len(recording) < 2:
         return
     period = nominal.sample_time_s
     step = np.diff(recording["t"])
@@ -45,6 +46,8 @@ def check(recording, nominal) -> None:
     ratio = usual / period
     if abs(ratio - 1.0) <= TOLERANCE:
         usual = period
+    elif held_one_after_another(recording, usual, nominal):
+        mark_points(recording, usual, period)
     elif ratio >= SLOW_FROM:
         recording.slow = True
         message = (
@@ -61,7 +64,17 @@ def check(recording, nominal) -> None:
         return
     else:
         step, usual = np.diff(recording["t"]), period
+    if not recording.slow and "u_q_ref" in recording.columns and not _has_voltage(recording):
+        recording.slow = True
+        message = "u_d_ref is not recorded: no balance from row to row"
+        recording.problems.append(
+            Problem("one_axis", message, "u_d_ref", -1, 0, "only the q axis of steady operating points is used")
+        )
     _join(recording, step, usual)
+
+
+def _has_voltage(recording) -> bool:
+    return recording.has("d_a", "d_b", "d_c") or recording.has("u_d_ref", "u_q_ref")
 
 
 def _join(recording, step, usual) -> None:

@@ -38,6 +38,7 @@ def check(recording, nominal) -> None:
         return
     message = f"the angle advances {ratio:.3g} times as fast as the speed says"
     if not confirmed and not 1.0 / WRONG < ratio < WRONG:
+        message += ": omega_e is electrical; name its unit in [columns], or correct pole_pairs"
         recording.problems.append(Problem("angle_speed", message, "omega_e", 0, n, fatal=True))
         return
     recording.problems.append(

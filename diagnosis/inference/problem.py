@@ -167,7 +167,9 @@ def around(setup, fit, names=None):
     order = sorted(totals, key=lambda n: n == "sampling_skew")
     view, plain = setup.view, setup.smooth
     for name in order:
-        view, plain = effects[name].corrected(view, totals[name]), effects[name].corrected(plain, totals[name])
+        unseen = ~setup.view.shows(effects[name])
+        view = view.kept_where(unseen, effects[name].corrected(view, totals[name]))
+        plain = plain.kept_where(unseen, effects[name].corrected(plain, totals[name]))
     if not (np.isfinite(view.u).all() and np.isfinite(view.i_raw).all()):
         return None
     magnetic = [n for n in fit.names if isinstance(effects[n], FluxEffect)]
@@ -194,6 +196,18 @@ def around(setup, fit, names=None):
     doubts = [effects[n].doubt(fit.c[n], view) for n in fit.names]
     doubt = np.sqrt(sum((np.square(d) for d in doubts), np.zeros(len(view)))) if doubts else None
     return Problem(setup, view, totals, change + repeated(ripple, setup), doubt, names)
+
+
+def fit_of_set(setup, names, steps=3) -> Fit:
+    """A set of effects on its own linearisation."""
+    names = tuple(sorted(names))
+    fit = Problem(setup).fit(names)
+    for _ in range(steps):
+        problem = around(setup, fit, names)
+        if problem is None:
+            break
+        fit = problem.fit(names)
+    return fit
 
 
 def repeated(ripple, setup):

@@ -1,0 +1,279 @@
+"""Operating points as a recording: tables, constants, one axis, standstill, one point that warms up, logs of 500 Hz."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from cocotb_tests.support.bench_logs import GRID, L_Q, PSI, R, Truth, sampled, table, warming
+from cocotb_tests.support.recordings_made import DRIVE, codes, made, nominal_of, write
+from fluxproof.diagnosis import diagnose
+from fluxproof.diagnosis.load import load_recording
+from fluxproof.diagnosis.nominal import load_nominal
+from fluxproof.diagnosis.recording import RecordingError
+from fluxproof.diagnosis.slow import slow_view
+
+WEAK = Truth(psi=0.95 * PSI)
+AT_REST = [(0.0, d, 0.0) for d in (-5.0, -4.0, -3.0, -2.0, -1.0, 1.0, 2.0, 3.0, 4.0, 5.0)]
+
+
+def without(columns, *names):
+    return {name: values for name, values in columns.items() if name not in names}
+
+
+def held(columns, step_s=5.0):
+    n = len(next(iter(columns.values())))
+    return {"t": step_s * np.arange(n), **columns}
+
+
+def answer_of(folder, columns, more="", file="r.csv"):
+    drive = folder / "drive.toml"
+    drive.write_text(DRIVE + more)
+    return diagnose(write(folder / file, columns), drive)
+
+
+def found(answer):
+    return {k: e.value for effect in answer.effects for k, e in effect.parameters.items()}
+
+
+def said(answer, text) -> bool:
+    return any(text in note for note in answer.notes)
+
+
+@pytest.mark.parametrize("kind", [table, lambda truth: held(table(truth))], ids=["table", "held one after another"])
+def test_every_row_is_an_operating_point(tmp_path, kind):
+    answer = answer_of(tmp_path, kind(WEAK))
+    assert answer.verdict == "explained" and [e.name for e in answer.effects] == ["magnet_flux"]
+    assert found(answer)["magnet_flux_wb"] == pytest.approx(0.95 * PSI, rel=0.005)
+    assert any("delay" in note and "cannot be diagnosed" in note for note in answer.notes)
+    assert answer_of(tmp_path, kind(Truth())).verdict == "no_mismatch"
+
+
+def test_a_table_has_no_drift_and_no_delay(tmp_path):
+    recording = load_recording(write(tmp_path / "r.csv", table()), nominal_of(tmp_path))
+    view = slow_view(recording, nominal_of(tmp_path))
+    assert recording.points and not view.course.any() and view.span_s == 0.0
+    from fluxproof.diagnosis.catalogue import CATALOGUE
+
+    seen = set(view.visible(CATALOGUE))
+    assert not {"delay", "magnet_temperature", "emf_harmonics"} & seen and {"magnet_flux", "dead_time"} <= seen
+
+
+def test_many_rows_without_time_are_a_table_only_if_they_jump(tmp_path):
+    nominal = nominal_of(tmp_path)
+    assert load_recording(write(tmp_path / "r.csv", table(repeats=20)), nominal).points
+    smooth = {"i_d": np.zeros(2000), "i_q": 3.0 * np.sin(np.arange(2000) / 300), "omega_e": np.full(2000, 300.0)}
+    smooth |= {"u_d_ref": -300 * L_Q * smooth["i_q"], "u_q_ref": 300 * PSI + R * smooth["i_q"]}
+    assert not load_recording(write(tmp_path / "s.csv", smooth), nominal).points
+
+
+def test_messages_of_different_age_are_no_operating_points(tmp_path):
+    columns = held({k: np.repeat(v, 4) for k, v in table().items()}, 1.0)
+    assert load_recording(write(tmp_path / "r.csv", columns), nominal_of(tmp_path)).points  # all at the same time
+    columns["u_q_ref"] = np.roll(columns["u_q_ref"], 2)
+    assert not load_recording(write(tmp_path / "s.csv", columns), nominal_of(tmp_path)).points
+
+
+def test_rounded_values_and_transients_of_a_slow_log(tmp_path):
+    points = [p for p in GRID for _ in range(30)]
+    columns = held(table(WEAK, points=points), 1.0)
+    columns |= {k: np.round(columns[k], 1) for k in ("i_d", "i_q", "u_d_ref", "u_q_ref")}
+    between = np.flatnonzero(np.arange(len(points)) % 30 == 0)[1:]  # a row in the middle of every change
+    for name in ("i_d", "i_q", "omega_e", "u_d_ref", "u_q_ref"):
+        columns[name][between] = 0.5 * (columns[name][between - 1] + columns[name][between + 1])
+    answer = answer_of(tmp_path, columns)
+    assert found(answer) == {"magnet_flux_wb": pytest.approx(0.95 * PSI, rel=0.005)}
+
+
+@pytest.mark.parametrize("rows", [1, 2, 3])
+def test_few_rows_of_a_healthy_drive_are_healthy(tmp_path, rows):
+    for first in (0, 4, 10, 20):
+        answer = answer_of(tmp_path, {k: v[first : first + rows] for k, v in table().items()})
+        assert answer.verdict == "no_mismatch" and not answer.effects and not answer.ambiguity
+
+
+def test_constants_replace_columns(tmp_path):
+    points = [(250.0, 0.0, q) for q in np.linspace(-5.0, 5.0, 13)]
+    columns = without(table(Truth(r=1.9), points=points), "omega_e", "i_d")
+    rpm = 250.0 * 60 / (2 * np.pi) / 4
+    answer = answer_of(tmp_path, columns, f"[constants]\nomega_e = {{value = {rpm}, unit = 'rpm'}}\ni_d = 0\n")
+    assert found(answer) == {"resistance_ohm": pytest.approx(1.9, abs=0.03)}
+    assert said(answer, "omega_e = 250 by [constants]")
+    # A column of the file is preferred.
+    whole = answer_of(tmp_path, table(WEAK), "[constants]\nomega_e = 1\n")
+    assert said(whole, "[constants] omega_e is not used") and [e.name for e in whole.effects] == ["magnet_flux"]
+
+
+WRONG = {
+    "omega_m = 3": ("omega_m", "not a canonical name", "'omega_e'"),
+    "t = 3": ("not a canonical name that can be constant",),
+    'i_d = "0"': ("i_d", "must be a finite number"),
+    "i_d = nan": ("must be a finite number",),
+    "i_d = true": ("must be a finite number",),
+    'omega_e = {value = 3, unit = "knots"}': ("unit 'knots' is unknown for omega_e", "rpm"),
+    "omega_e = {rpm = 3}": ("must be a number or a table",),
+}
+
+
+@pytest.mark.parametrize("line", WRONG)
+def test_wrong_constants_name_the_entry(tmp_path, line):
+    with pytest.raises(RecordingError) as error:
+        answer_of(tmp_path, table(), f"[constants]\n{line}\n")
+    message = str(error.value)
+    assert "drive.toml: [constants]" in message and "\n" not in message
+    for word in WRONG[line]:
+        assert word in message
+
+
+def test_the_missing_column_and_what_would_do_are_named(tmp_path):
+    with pytest.raises(RecordingError, match=r"missing i_d; .*\[columns\] of drive.toml, or .*\[constants\]"):
+        answer_of(tmp_path, without(table(), "i_d"))
+
+
+def test_without_u_d_the_q_axis_is_balanced(tmp_path):
+    answer = answer_of(tmp_path, without(table(WEAK), "u_d_ref"))
+    assert [e.name for e in answer.effects] == ["magnet_flux"] and said(answer, "only the q axis")
+    assert found(answer)["magnet_flux_wb"] == pytest.approx(0.95 * PSI, rel=0.005)
+    assert np.all(answer.evidence.arrays["before_d"] == 0.0)
+    # The d axis has the whole effect of L_q: nothing can be said of it.
+    other = answer_of(tmp_path, without(table(Truth(l_q=1.2 * L_Q)), "u_d_ref"))
+    assert other.verdict == "no_mismatch" and not other.effects
+
+
+def test_without_u_d_a_fast_recording_becomes_operating_points(tmp_path):
+    points = [(w, 0.0, q) for w in (250.0, 500.0, -300.0) for q in (0.0, 2.0, 4.0, -3.0)]
+    columns = without(sampled(10000.0, WEAK, points=points, hold_s=0.3, ramp_s=0.02), "u_d_ref")
+    answer = answer_of(tmp_path, columns, file="r.parquet")
+    assert "one_axis" in [p.code for p in answer.problems]
+    named = {e.name for e in answer.effects} | set().union(*answer.ambiguity)
+    assert "magnet_flux" in named
+
+
+def test_standstill_shows_resistance_and_dead_time(tmp_path):
+    angle = np.full(len(AT_REST) * 3, 0.4)
+    columns = table(Truth(r=2.4), points=AT_REST, repeats=3, theta=angle)
+    ohms = answer_of(tmp_path, columns)
+    named = {e.name for e in ohms.effects} | set().union(*ohms.ambiguity)
+    assert "resistance" in named and "dead_time" not in {e.name for e in ohms.effects}
+    loss = answer_of(tmp_path, table(Truth(v_dead=4.0), points=AT_REST, repeats=3, theta=angle))
+    assert found(loss)["v_dead_v"] == pytest.approx(4.0, abs=0.3)
+
+
+def test_standstill_needs_the_angle(tmp_path):
+    columns = without(table(Truth(r=2.4), points=AT_REST, theta=np.zeros(len(AT_REST))), "theta_e")
+    answer = answer_of(tmp_path, columns)
+    assert answer.verdict == "bad_recording" and "record theta_e, or add it to [constants]" in answer.sentence
+    assert answer_of(tmp_path, columns, "[constants]\ntheta_e = 0\n").verdict in ("explained", "ambiguous")
+    mixed = answer_of(tmp_path, table(WEAK, points=[*AT_REST[:3], *[(w, 0.0, q) for w in (200.0, 400.0) for q in
+                                                                   (-4.0, -2.0, 0.0, 2.0, 4.0)]]))  # fmt: skip
+    assert said(mixed, "3 rows at standstill are not used") and found(mixed).keys() == {"magnet_flux_wb"}
+
+
+def test_standstill_counts_in_a_slow_log(tmp_path):
+    answer = answer_of(tmp_path, sampled(500.0, Truth(r=2.3), points=AT_REST, hold_s=0.8))
+    assert found(answer)["resistance_ohm"] == pytest.approx(2.3, abs=0.08)
+    nothing = answer_of(tmp_path, sampled(500.0, Truth(r=2.3), points=AT_REST, hold_s=0.8, angle=False))
+    assert nothing.verdict == "bad_recording" and "theta_e" in nothing.sentence
+
+
+def test_loss_at_rest_is_that_of_the_angle(tmp_path):
+    from fluxproof.diagnosis.catalogue import CATALOGUE
+
+    angle, nominal = np.linspace(0.05, 0.45, len(AT_REST)), nominal_of(tmp_path)
+    truth = Truth(v_dead=1.0)
+    recording = load_recording(
+        write(tmp_path / "r.csv", table(truth, points=AT_REST, theta=angle, noise_v=0.0)), nominal
+    )
+    view = slow_view(recording, nominal)
+    column = CATALOGUE["dead_time"].core(view)["v_0.02"]["u"].mean(axis=1)
+    i = np.array([d for _, d, _ in AT_REST])
+    left = (recording["u_d_ref"] + 1j * recording["u_q_ref"] - R * i)[view.rows]
+    assert np.abs(column - left).max() < 0.02
+
+
+def test_one_point_that_warms_up(tmp_path):
+    answer = answer_of(tmp_path, warming())
+    assert answer.verdict == "explained"
+    values = found(answer)
+    assert values["magnet_flux_drift_wb"] == pytest.approx(-0.05 * PSI, rel=0.06)
+    assert values["resistance_temp_coeff_per_k"] == pytest.approx(0.0039, rel=0.1)
+    assert answer.fit.holdout_after < answer.fit.noise_floor < 0.1 * answer.fit.holdout_before
+    assert said(answer, "One operating point") and said(answer, "winding was recorded from")
+    faster = found(answer_of(tmp_path, warming(hours=0.2, step_s=0.1)))
+    assert faster["magnet_flux_drift_wb"] == pytest.approx(-0.05 * PSI, rel=0.03)
+    assert faster["resistance_temp_coeff_per_k"] == pytest.approx(0.0039, rel=0.1)
+    steady = answer_of(tmp_path, warming(magnets=0.0, copper=0.0))
+    assert steady.verdict == "no_mismatch" and not steady.effects
+
+
+def test_one_point_without_i_d_cannot_separate_winding_and_magnets(tmp_path):
+    blind = answer_of(tmp_path, without(warming(i=4j), "temp_winding"))
+    assert blind.verdict == "ambiguous" and blind.ambiguity == [["magnet_temperature", "resistance_temperature"]]
+    assert len({(r.omega_e, r.i_d, r.i_q) for r in blind.next_recording}) == 3
+    known = answer_of(tmp_path, warming(i=4j))
+    (magnets,) = known.effects
+    drift = magnets.parameters["magnet_flux_drift_wb"]
+    assert abs(drift.value + 0.05 * PSI) < 2.0 * drift.sigma  # copper may hide a part of it
+
+
+def test_a_constant_misfit_at_one_point_is_an_ambiguity(tmp_path):
+    columns = warming(magnets=0.0, copper=0.0)
+    columns["u_q_ref"] = 1.04 * columns["u_q_ref"]
+    answer = answer_of(tmp_path, columns)
+    assert answer.verdict == "ambiguous" and not answer.effects
+    assert {"magnet_flux", "udc_gain"} <= set(answer.ambiguity[-1]) and said(answer, "one point cannot tell why")
+    two_rows = answer_of(tmp_path, table(WEAK, points=[(300.0, 0.0, 4.0)] * 2))
+    assert two_rows.verdict == "ambiguous" and "magnet_flux" in two_rows.ambiguity[0]
+
+
+@pytest.mark.parametrize("hertz, hold_s", [(500.0, 1.0), (200.0, 0.6), (1000.0, 0.3)])
+def test_logs_of_a_few_hundred_hertz_are_operating_points(tmp_path, hertz, hold_s):
+    answer = answer_of(tmp_path, sampled(hertz, WEAK, hold_s=hold_s))
+    assert "slow_sampling" in [p.code for p in answer.problems]
+    named = {e.name for e in answer.effects} | set().union(*answer.ambiguity)
+    assert "magnet_flux" in named and named <= {"magnet_flux", "magnet_temperature", "udc_gain"}
+    healthy = answer_of(tmp_path, sampled(hertz, hold_s=hold_s))
+    assert healthy.verdict == "no_mismatch" and not healthy.effects
+
+
+def test_a_bad_part_costs_only_that_part(tmp_path):
+    (tmp_path / "drive.toml").write_text(DRIVE)
+    good = write(tmp_path / "good.csv", table(WEAK))
+    no_current = write(tmp_path / "no_current.csv", without(table(), "i_q"))
+    too_short = write(tmp_path / "short.csv", {k: v[:30] for k, v in made(500).items()})
+    answer = diagnose([no_current, good, too_short], tmp_path / "drive.toml")
+    assert [e.name for e in answer.effects] == ["magnet_flux"]
+    findings = {p.action: p.message for p in answer.problems if p.code == "part_left_out"}
+    assert set(findings) == {"no_current.csv is not used", "short.csv is not used"}
+    assert "missing i_q" in findings["no_current.csv is not used"]
+    assert "at least 400 are needed" in findings["short.csv is not used"]
+    with pytest.raises(RecordingError, match="missing i_q"):
+        diagnose([no_current], tmp_path / "drive.toml")
+
+
+def test_fast_and_slow_recordings_together(tmp_path):
+    (tmp_path / "drive.toml").write_text(DRIVE)
+    fast = write(tmp_path / "fast.csv", made(6000, u_dc_gain=1.0))
+    answer = diagnose([fast, write(tmp_path / "points.csv", table())], tmp_path / "drive.toml")
+    assert answer.verdict == "no_mismatch" and said(answer, "for harmonics and instants of sampling diagnose fast.csv")
+
+
+def test_several_slow_recordings_are_joined(tmp_path):
+    (tmp_path / "drive.toml").write_text(DRIVE)
+    files = [write(tmp_path / "a.csv", held(table(WEAK))), write(tmp_path / "b.csv", sampled(500.0, WEAK, hold_s=0.6))]
+    answer = diagnose([*files, write(tmp_path / "c.csv", table(WEAK, seed=9))], tmp_path / "drive.toml")
+    assert [e.name for e in answer.effects] == ["magnet_flux"]
+
+
+def test_constants_survive_in_the_improved_drive(tmp_path):
+    from fluxproof.diagnosis.session import run
+
+    (tmp_path / "drive.toml").write_text(DRIVE + "[constants]\nu_dc = 563.0\n")
+    run(write(tmp_path / "r.csv", table(WEAK)), tmp_path / "drive.toml", tmp_path / "out")
+    improved = load_nominal(tmp_path / "out" / "drive_improved.toml")
+    assert improved.constants == {"u_dc": 563.0}
+    assert improved.machine.magnet_flux_wb == pytest.approx(0.95 * PSI, rel=0.005)
+
+
+def test_codes_of_a_table_are_clean(tmp_path):
+    assert codes(load_recording(write(tmp_path / "r.csv", table()), nominal_of(tmp_path))) == []

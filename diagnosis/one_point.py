@@ -1,0 +1,180 @@
+"""One operating point: what drifts while it is held, and what a single point cannot tell.
+
+At one point a constant misfit is two numbers, which every effect with two coefficients explains.  Only its change over
+time is evidence: the mean over time is subtracted from the misfit and from every column, after which an effect that
+does not drift has no columns left.  Magnets change the voltage along j omega, the winding along the current, which are
+the same direction without i_d; a recorded winding temperature separates them by its course.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fluxproof.diagnosis import verdict as words
+from fluxproof.diagnosis.answer.verdict import HALF, sentence
+from fluxproof.diagnosis.catalogue import CATALOGUE
+from fluxproof.diagnosis.cells import cells_of, voltage_level
+from fluxproof.diagnosis.drift_fit import best_sets, centred_cells, drifts, fitted, fuller, row_sigmas, with_copper
+from fluxproof.diagnosis.fit import Fitter
+from fluxproof.diagnosis.locate import at_order, evidence, locate
+from fluxproof.diagnosis.result import Diagnosis, Fit, NamedEffect, Remainder, Request
+
+LEAST_MEANS = 12  # over time; fewer do not determine a drift
+HOLDOUT_EVERY = 4
+CONSTANT = (1e-3, 5e-3)  # of the bus and of the voltage: a smaller constant misfit may be ripple or resolution
+FITS = 3.0  # standard deviations within which a single effect explains the constant misfit
+OTHER_SPEED = 0.4  # of the recorded one, for a request
+
+
+def diagnose_one_point(view) -> Diagnosis:
+    """Diagnose the drift at the only operating point of a SlowView; a constant misfit is an ambiguity."""
+    effects = view.visible(CATALOGUE)
+    cells = cells_of(view, effects.values())
+    raw = at_order(cells, cells.y, 0.0)
+    centred, long = centred_cells(cells), len(view) >= LEAST_MEANS and view.span_s > 0.0
+    drifting = [n for n, effect in effects.items() if long and drifts(cells, centred, n, effect)]
+    sigma = row_sigmas(view, cells, raw)
+    held = (np.arange(len(view)) % HOLDOUT_EVERY == 2) & long
+    fitter = Fitter(centred, sigma, (cells.order == 0) & (cells.channel == "u") & ~held[cells.block])
+    best, tied = best_sets(fitter, effects, drifting, view)
+    names, groups = _sorted_out(best, tied, effects, view)
+    left = best.residual
+    constant = complex(np.nanmean(raw - fitted(cells, best)))
+    fit = _fit(cells, centred.y, left, sigma, held) if long else _constant_fit(constant, sigma)
+    candidates = _explaining(view, cells, effects, drifting, constant)
+    if abs(constant) > _resolution(view):
+        groups = groups + ([candidates] if len(candidates) > 1 else [])
+    left_over = best.chi2 > words.LEFTOVER * max(best.rows - best.count, 1) and fit.share_left > words.FLOOR_SHARE
+    if names and left_over:
+        kind = "partly_explained" if fit.explained_share >= HALF else "unexplained"
+    else:
+        kind = "ambiguous" if groups else "explained" if names else _nothing(constant, view, fit)
+    answer = Diagnosis(kind, "", location=locate(view, cells, sigma), fit=fit, ambiguity=groups)
+    if kind == "partly_explained":
+        size = max(fit.holdout_after**2 - fit.noise_floor**2, 0.0) ** 0.5
+        answer.explained_share = fit.explained_share
+        answer.remainder = [Remainder("u_dq", 0.0, size, "V", 1.0 - fit.explained_share)]
+    wider = fuller(fitter, best, effects, drifting, view) + with_copper(fitter, best, cells, view)
+    answer.effects = [_named(n, effects[n], best, wider, fitter, view) for n in names]
+    answer.next_recording = _requests(view, groups)
+    answer.evidence = evidence(view, (cells, centred.y), (cells, left), sigma, held)
+    for name in ("theta_e", "orders", "spectrum_before", "spectrum_after"):
+        answer.evidence.arrays.pop(name, None)
+    answer.sentence = sentence(answer, CATALOGUE)
+    answer.notes = _notes(view, constant, candidates, held, long)
+    return answer
+
+
+def _sorted_out(best, tied, effects, view):
+    """(names, ambiguity sets): what all tied sets share is named."""
+    large = lambda s: {n for n in s.model.names if effects[n].moved(s.c[n], view) >= effects[n].floor(view.nominal)}  # noqa: E731
+    sets = [large(s) for s in (best, *tied) if len(s.model) <= max(len(best.model), 1)]
+    common, seen = set.intersection(*sets), set.union(*sets)
+    rest = sorted(seen - common)
+    return sorted(common), [rest] if len(rest) > 1 else []
+
+
+def _fit(cells, before, after, sigma, held) -> Fit:
+    rows = (cells.channel == "u") & (cells.order == 0) & cells.ok
+    out = held[cells.block]
+    rms = lambda x, w: float(np.sqrt(2.0 * np.mean(x[rows & w] ** 2)))  # noqa: E731
+    parts = [rms(x, w) for w in (~out, out) for x in (before, after)]
+    return Fit("u_dq", "V", *parts, float(np.sqrt(2.0 * np.mean(sigma[rows] ** 2))))
+
+
+def _constant_fit(constant, sigma) -> Fit:
+    """The fit of a point that was not held long enough for a drift: nothing is fitted."""
+    size = abs(constant)
+    return Fit("u_dq", "V", size, size, size, size, float(np.sqrt(2.0 * np.mean(sigma**2))))
+
+
+def _resolution(view) -> float:
+    """Size of a constant misfit [V] that may be due to ripple or resolution."""
+    bus, level = CONSTANT
+    return bus * view.nominal.inverter.dc_bus_v + level * float(voltage_level(view).mean())
+
+
+def _explaining(view, cells, effects, drifting, constant) -> list[str]:
+    """Effects that do not drift and explain the constant misfit alone, with a size that a drive can have."""
+    out, limit = [], _resolution(view)
+    for name, effect in effects.items():
+        cores = {k: v for k, v in cells.columns[name].items() if not k.startswith("~")}
+        if name in drifting or not cores:
+            continue
+        means = {k: complex(np.nanmean(at_order(cells, v, 0.0))) for k, v in cores.items()}
+        key = max(means, key=lambda k: abs(means[k]))
+        if abs(means[key]) < 1e-9:
+            continue
+        value = (np.conj(means[key]) * constant).real / abs(means[key]) ** 2
+        c = {k: value if k == key else 0.0 for k in cores}
+        close = abs(constant - value * means[key]) < FITS * limit
+        if close and effect.possible(c, np.zeros((len(c),) * 2), view.nominal) and not effect.too_large(c, view):
+            out.append(name)
+    return sorted(out)
+
+
+def _nothing(constant, view, fit) -> str:
+    """Verdict without a name: nothing drifts, and the constant misfit is within the resolution or not."""
+    quiet = fit.train_before < max(2.0 * fit.noise_floor, _resolution(view)) and abs(constant) <= _resolution(view)
+    return "no_mismatch" if quiet else "unexplained"
+
+
+def _named(name, effect, best, wider, fitter, view) -> NamedEffect:
+    """The effect with its estimates; their sigma covers the change by a further drift."""
+    spread = max(1.0, best.chi2 / max(best.rows - best.count, 1))
+    rest = fitter.chi2(best.model.without(name))[0]
+    estimates = effect.estimates(best.c[name], best.covariance[name] * spread, view.nominal)
+    for other in wider:
+        changed = effect.estimates(other.c[name], other.covariance[name] * spread, view.nominal)
+        for key, e in estimates.items():
+            e.sigma = float(max(e.sigma, np.hypot(changed[key].sigma, changed[key].value - e.value)))
+    weight = max((rest - best.chi2) / spread, 0.0)
+    share = (fitter.power - best.chi2) / max(fitter.power - best.rows, 1e-9)
+    return NamedEffect(
+        name,
+        float(np.clip(1.0 - 1.0 / (1.0 + weight / 4.0), 0.5, 0.999)),
+        estimates,
+        float(np.clip(share, 0.0, 1.0)),
+        effect.plant(best.c[name], view.nominal),
+    )
+
+
+def _requests(view, groups) -> list[Request]:
+    """Points that separate what this one cannot: no current, a lower speed, and the other current."""
+    if not groups:
+        return []
+    omega, i = float(view.omega.mean()), complex(view.i.mean())
+    rated = view.machine.rated_current_a
+    other = -np.conj(i) if abs(i.real) > 0.2 * rated else i - 0.5 * rated
+    points = (
+        (omega, 0j, "without current only magnets, iron and angle remain"),
+        (OTHER_SPEED * omega, i, "at another speed and the same current fluxes change the voltage, resistances do not"),
+        (omega, complex(other), "with another i_d the winding and the magnets act on different axes"),
+    )
+    names, bus = sorted({n for g in groups for n in g}), float(view.nominal.inverter.dc_bus_v)
+    return [Request(w, x.real, x.imag, names, why, bus, None) for w, x, why in points]
+
+
+def _notes(view, constant, candidates, held, long) -> list[str]:
+    i, omega = view.i.mean(), view.omega.mean()
+    point = f"One operating point (omega_e = {omega:.4g} rad/s, i_d = {i.real:.3g} A, i_q = {i.imag:.3g} A)"
+    notes = [
+        f"{point} in {len(view)} means over {view.span_s:.4g} s, of which {int(held.sum())} were not fitted: only "
+        "changes over time can be diagnosed."
+        if long
+        else f"{point} with {len(view)} steady stretches, too few for a drift ({LEAST_MEANS} are needed, with a time)."
+    ]
+    if np.isfinite(view.temp).all():
+        notes.append(f"The winding was recorded from {view.temp.min():.0f} to {view.temp.max():.0f} degC.")
+    if abs(constant) > _resolution(view):
+        what = f" ({', '.join(candidates)} each could)" if candidates else ""
+        notes.append(
+            f"At the start the voltage differs by {constant.real:.3g} V on the d axis and {constant.imag:.3g} V on the "
+            f"q axis; one point cannot tell why{what}: record more speeds and currents."
+        )
+    else:
+        notes.append(
+            "At the start the voltage agrees; errors of R, inductances, magnet flux, inverter loss and angle that "
+            "cancel at this point are not seen."
+        )
+    return notes
