@@ -62,6 +62,7 @@ class Effect:
     corrects: bool = (
         False  # a measurement error rather than a property of the machine: ``corrected`` removes it from the data
     )
+    bounded: tuple[str, ...] = ()  # free coefficients that only their prior keeps apart from other effects
     drift_of: str = ""  # the constant effect of which this one is a slow drift
     trailing: tuple[float, ...] = ()  # further electrical orders at which the effect may have harmonics
     mechanical: bool = False  # a torque of the shaft rather than a voltage of the machine

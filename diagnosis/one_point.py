@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from fluxproof.diagnosis import verdict as words
-from fluxproof.diagnosis.answer.verdict import HALF, sentence
+from fluxproof.diagnosis.answer.verdict import sentence
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.cells import cells_of, voltage_level
 from fluxproof.diagnosis.drift_fit import best_sets, centred_cells, drifts, fitted, fuller, row_sigmas, with_copper
@@ -46,7 +46,9 @@ def diagnose_one_point(view) -> Diagnosis:
         groups = groups + ([candidates] if len(candidates) > 1 else [])
     left_over = best.chi2 > words.LEFTOVER * max(best.rows - best.count, 1) and fit.share_left > words.FLOOR_SHARE
     if names and left_over:
-        kind = "partly_explained" if fit.explained_share >= HALF else "unexplained"
+        kind = "partly_explained" if fit.explained_share >= words.NAMED_SHARE else "unexplained"
+        if kind == "unexplained":
+            names, groups = [], []
     else:
         kind = "ambiguous" if groups else "explained" if names else _nothing(constant, view, fit)
     answer = Diagnosis(kind, "", location=locate(view, cells, sigma), fit=fit, ambiguity=groups)

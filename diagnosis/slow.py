@@ -60,6 +60,10 @@ class SlowView(View):
         """Angle of the rotor at intervals counted from the first sample, (b, count) [rad]."""
         return self.omega[:, :1] * self.sample_time_s * (np.arange(count) + first)
 
+    @property
+    def interval_angle(self):
+        return super().interval_angle + self._advance(self.u.shape[1], -0.5)
+
     def to_dq(self, stator):
         return stator * np.exp(-1j * (self.theta_mid + self._advance(stator.shape[1])))
 

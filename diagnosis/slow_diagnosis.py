@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from fluxproof.diagnosis import verdict as words
-from fluxproof.diagnosis.answer.verdict import HALF, sentence
+from fluxproof.diagnosis.answer.verdict import sentence
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.cells import voltage_level
 from fluxproof.diagnosis.inference.problem import Setup, fit_of_set
@@ -58,7 +58,7 @@ def diagnose_points(view, progress=lambda text: None) -> Diagnosis:
         at_floor = fit.train_before <= AT_FLOOR * fit.noise_floor
         verdict = "no_mismatch" if left <= words.LEFTOVER or at_floor else "unexplained"
     elif left > words.LEFTOVER and fit.share_left > words.FLOOR_SHARE:
-        verdict = "partly_explained" if fit.explained_share >= HALF else "unexplained"
+        verdict = "partly_explained" if fit.explained_share >= words.NAMED_SHARE else "unexplained"
     else:
         verdict = "ambiguous" if ambiguity else "explained" if names else "no_mismatch"
     answer = Diagnosis(verdict, "", location=locate(view, search.cells, found.pure), fit=fit)

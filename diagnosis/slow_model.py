@@ -30,7 +30,7 @@ def flux_map_of(search, solution) -> FluxMap | None:
     axes = [np.linspace(-e, e, n) for e, n in zip(edge, STEPS, strict=True)]
     i = axes[0][:, None] + 1j * axes[1]
     psi = m.inductance_d_h * i.real + m.magnet_flux_wb + 1j * m.inductance_q_h * i.imag
-    at = SimpleNamespace(i=i, machine=m, nominal=search.view.nominal)
+    at = SimpleNamespace(i=i, machine=m, nominal=search.view.nominal, course=np.zeros(len(i)))
     for name in magnetic:
         psi = psi + search.effects[name].psi(at, solution.c[name])
     return FluxMap(*axes, psi.real.copy(), psi.imag.copy())

@@ -64,6 +64,9 @@ class SlowSearch(Search):
 
     def hide(self, cells):
         """Remove columns whose d current results only from an angle error: the recording cannot verify them."""
+        for name, columns in cells.columns.items():
+            for key in self.effects[name].bounded:  # this search has no priors
+                columns.pop(f"~{key}", None)
         if self.hidden and self.hidden[0] in cells.columns:
             columns = cells.columns[self.hidden[0]]
             for key in [k for k in columns if k.lstrip("~").startswith(self.hidden[1])]:

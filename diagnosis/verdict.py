@@ -10,6 +10,9 @@ from fluxproof.diagnosis.effect import ALIKE, DOUBT, sigma
 from fluxproof.diagnosis.result import NamedEffect
 
 LEFTOVER = 2.0  # largest reduced chi^2 of an accepted explanation
+# Share of the misfit's power that names must explain beside a remainder: this search does not know how much of a
+# remainder may imitate an effect.
+NAMED_SHARE = 0.9
 FLOOR_SHARE = 0.15  # of the misfit's rms: a smaller residual is attributed to the curve shapes, not to another effect
 
 

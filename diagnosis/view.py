@@ -118,6 +118,12 @@ class View:
         return 0.5 * (self.theta[:, 1:] + self.theta[:, :-1])
 
     @property
+    def interval_angle(self):
+        """Angle in the middle of the intervals -1 .. m, (b, m+2) [rad]; the outer two are continued."""
+        inner = self.theta_mid
+        return np.concatenate([2 * inner[:, :1] - inner[:, 1:2], inner, 2 * inner[:, -1:] - inner[:, -2:-1]], axis=1)
+
+    @property
     def nominal_psi(self):
         """Nominal flux linkage of the current, (b, m+1) complex dq [Wb]."""
         m = self.machine

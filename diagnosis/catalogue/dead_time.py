@@ -119,4 +119,5 @@ EFFECT = DeadTime(
     smoothed=True,
     trailing=(12.0, 18.0, 24.0),
     needs=("inverter",),
+    bounded=("log", "fade"),
 )

@@ -15,9 +15,7 @@ def _smooth(view):
     A current loop returns the converters' noise in the recorded voltage.  A column of the raw voltage would therefore
     contain the noise of the misfit, and moving the raw voltage would filter it.
     """
-    inner = view.theta_mid
-    middle = np.concatenate([2 * inner[:, :1] - inner[:, 1:2], inner, 2 * inner[:, -1:] - inner[:, -2:-1]], axis=1)
-    turn = np.exp(1j * middle)
+    turn = np.exp(1j * view.interval_angle)
     return parabola(view.u * np.conj(turn)) * turn
 
 

@@ -37,4 +37,5 @@ EFFECT = MagnetFlux(
     separated_by="three speeds; rotation at zero current",
     parameters=(Parameter("magnet_flux_wb", "Wb", "peak, per phase"),),
     curve=0.1,  # a part of lost flux recovers; more is a drift
+    bounded=("recovery",),
 )

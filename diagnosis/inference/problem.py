@@ -148,12 +148,10 @@ class Fit:
 
 def smooth(view):
     """The view without noise: the parabolas of current and voltage over each block."""
-    turn = np.exp(1j * view.theta)
-    inner = view.theta_mid
-    middle = np.concatenate([2 * inner[:, :1] - inner[:, 1:2], inner, 2 * inner[:, -1:] - inner[:, -2:-1]], axis=1)
-    u = parabola(view.u * np.exp(-1j * middle)) * np.exp(1j * middle)
+    middle = np.exp(1j * view.interval_angle)
+    u = parabola(view.u * np.conj(middle)) * middle
     i_abc = None if view.i_abc is None else view.phases(view.i)
-    return view.replace(i_raw=view.i * turn, i_abc=i_abc, u=u)
+    return view.replace(i_raw=view.stator(view.i), i_abc=i_abc, u=u)
 
 
 def around(setup, fit, names=None):
