@@ -9,7 +9,6 @@ from fluxproof.diagnosis.answer.estimates import named_effects
 from fluxproof.diagnosis.answer.names import names_of
 from fluxproof.diagnosis.answer.sizes import Sizes, fit_of
 from fluxproof.diagnosis.answer.verdict import kind_of
-from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.locate import at_order, evidence, locate
 from fluxproof.diagnosis.request import requests, wants_cold
 from fluxproof.diagnosis.result import Diagnosis, Remainder, UnknownTerm
@@ -55,13 +54,13 @@ def conclude(posterior, held, progress=lambda text: None) -> Diagnosis:
     if kind in ("unexplained", "partly_explained"):
         answer.unknown_term = _unknown(best, after, stray)
     answer.evidence = evidence(view, (cells, before), (cells, after), setup.noise, held)
-    answer.sentence = words.sentence(answer, CATALOGUE)
+    answer.sentence = words.sentence(answer, setup.effects)
     rows = view.u_dc.shape[1]
     answer.notes.append(
         f"The voltage balance was made on {len(view)} steady blocks of {rows} rows; {int(held.sum())} were not fitted."
     )
     for name, p in sorted(names.maybe.items(), key=lambda entry: -entry[1])[:3]:
-        answer.notes.append(f"{CATALOGUE[name].title}: possible (probability {p:.2f}), not asserted.")
+        answer.notes.append(f"{setup.effects[name].title}: possible (probability {p:.2f}), not asserted.")
     answer.trace = "; ".join(f"{p:.3f} {'+'.join(f.names) or 'none'}" for p, f in names.fits[:4])
     return answer
 

@@ -49,7 +49,7 @@ def names_of(posterior) -> Names:
     present = {n: p * credit[n] for n, p in posterior.present().items() if n in credit}
     named = {n: p for n, p in present.items() if p >= k.ASSERTED and n in best.names}
     rest = [frozenset(fit.names) - set(named) for _, fit in kept]
-    groups = [sorted(n for n in g if present[n] >= k.PRESENT) for g in alternatives(rest)]
+    groups = [sorted(n for n in g if present[n] >= k.OPEN) for g in alternatives(rest)]
     groups = [g for g in groups if len(g) > 1 and sum(present[n] for n in g) >= 0.5]
     grouped = {n for g in groups for n in g}
     maybe = {n: p for n, p in present.items() if n not in named and n not in grouped and p >= k.PRESENT}

@@ -15,12 +15,10 @@ def kind_of(names, train, held, share, stray) -> str:
         quiet = all(s.before <= FLOOR * s.floor for s in train.channels.values())
         return "no_mismatch" if quiet and not stray and not standing_out(train) else "unexplained"
     sizes = [s for c, s in held.channels.items()]
-    at_floor = all(s.after <= FLOOR * s.floor for s in sizes) and not standing_out(train)
+    at_floor = all(s.after <= FLOOR * s.floor for s in sizes)
     whole = at_floor or (share is not None and share >= 1.0 - SMALL)
     if not whole or stray:
-        if share is not None and share < HALF:
-            return "unexplained"
-        return "partly_explained"
+        return "partly_explained" if share is not None and share >= HALF else "unexplained"
     return "ambiguous" if names.open else "explained"
 
 

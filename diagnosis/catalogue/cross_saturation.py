@@ -27,6 +27,9 @@ class CrossSaturation(FluxEffect):
             ),
             "x2y4": _mixed(view, lambda x, y: 2 * x * y**4, lambda x, y: 4 * x**2 * y**3),
             "x3y2": _mixed(view, lambda x, y: 3 * x**2 * y**2, lambda x, y: 2 * x**3 * y),
+            # The iron that couples the axes also bends each of them.
+            "y3": _mixed(view, lambda x, y: 0.0 * x, lambda x, y: y**3),
+            "x3": _mixed(view, lambda x, y: x**3, lambda x, y: 0.0 * y),
         }
 
     def floor(self, nominal):
@@ -65,4 +68,5 @@ EFFECT = CrossSaturation(
     confounders=("inductance_d", "magnet_flux", "current_scale", "saturation"),
     separated_by="a grid of i_d and i_q that includes i_q = 0",
     parameters=(Parameter("cross_saturation_wb_per_a2", "Wb/A2", "c at rated i_q"),),
+    bounded=("y3", "x3"),
 )

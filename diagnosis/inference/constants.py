@@ -19,6 +19,8 @@ MOST_DISCREPANCY = 1e4
 FORMULA = 0.01
 # A posterior from which a name is asserted, and the mass that an ambiguity must hold.
 ASSERTED = 0.95
+# Probability from which an effect is an alternative.
+OPEN = 0.02
 # Discrepancy, in units of the balance's error, that every recording may have.
 USUAL = 1.5
 # A leftover imitates an effect up to this many times its own rms: smooth physics lies along a few directions only.

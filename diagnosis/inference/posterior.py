@@ -16,6 +16,7 @@ EFFORT = 20000  # rows times sets of one size
 CLOSE = 20.0  # log evidence below the best within which a set is linearised on its own
 GROWN = 3  # effects up to which all good sets are grown
 MOST = 6
+LEADERS = 3  # best single effects that are linearised on their own
 
 
 class Posterior:
@@ -35,6 +36,9 @@ class Posterior:
         for name in able:
             if self.setup.effects[name].corrects:
                 self._linearise((name,))
+        for fit in sorted((f for f in self.fits.values() if len(f.names) == 1), key=lambda f: -f.value)[:LEADERS]:
+            if fit.names not in self.own:
+                self._linearise(fit.names)
         self._grow(first, able)
         known = None
         for _ in range(ROUNDS):
@@ -49,8 +53,7 @@ class Posterior:
             self._add(problem, [known], force=True)
             self._neighbours(problem, known)
             self._near(known)
-        if self.best().names:
-            self._linearise(self.best().names, SETTLED)
+        self._settle()
 
     def best(self):
         return max(self.fits.values(), key=lambda f: f.value)
@@ -118,6 +121,20 @@ class Posterior:
             if not close:
                 return
             self._linearise(max(close, key=lambda f: f.value).names)
+
+    def _settle(self):
+        """Judge the best set and its parts on their own linearisations until the best one stands."""
+        for _ in range(MOST):
+            best = self.best().names
+            if not best:
+                return
+            self._linearise(best, SETTLED)
+            for out in best:
+                part = tuple(n for n in best if n != out)
+                if part in self.fits and part not in self.own:
+                    self._linearise(part)
+            if self.best().names == best:
+                return
 
     def weights(self):
         """[(probability, Fit)] of all sets, the most probable first."""

@@ -116,8 +116,10 @@ class Problem:
             for start in ((np.inf, 1.5, 3.0) if drags else (np.inf,))
         ]  # fmt: skip
         value, c, cov, a, lam = max(tried, key=lambda found: found[0])
-        # log-uniform prior of every size, and prior odds of every effect
-        value += sum(np.log(k.PRESENT / (1 - k.PRESENT)) - np.log(max(np.log(m) / 1.2, 1.0)) for m in most)
+        # Prior odds of every effect, and the prior of its size: even in the logarithm up to a typical size, the
+        # geometric mean of the smallest of interest and the largest possible one, and falling beyond.
+        odds = np.log(k.PRESENT / (1 - k.PRESENT))
+        value += sum(odds - np.log(np.log(m)) - np.log1p(x**2 / m) for m, x in zip(most, a, strict=True))
         return Fit(self, tuple(names), float(value), take, c, cov, a, lam)
 
 
