@@ -53,6 +53,10 @@ def conclude(posterior, held, progress=lambda text: None) -> Diagnosis:
         )
     if kind in ("unexplained", "partly_explained"):
         answer.unknown_term = _unknown(best, after, stray)
+    if kind == "unexplained":  # beside a large unknown part even a credible name may be its imitation
+        for e in answer.effects:
+            answer.notes.append(f"{setup.effects[e.name].title}: would explain {100 * e.explains:.0f} %, not asserted.")
+        answer.effects, answer.ambiguity, answer.next_recording = [], [], []
     answer.evidence = evidence(view, (cells, before), (cells, after), setup.noise, held)
     answer.sentence = words.sentence(answer, setup.effects)
     rows = view.u_dc.shape[1]

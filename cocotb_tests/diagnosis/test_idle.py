@@ -55,7 +55,7 @@ def test_with_current_the_loss_curve_is_visible(still):
     assert not carries_none(loaded) and not loss_of(loaded, said(delay={"tau": 0.02 * PERIOD}))
 
 
-def test_missing_flux_is_ambiguous_at_zero_current():
+def test_missing_flux_at_zero_current_is_found_or_open():
     answer = diagnose(recorded(STILL, machine={"magnet_flux_wb": 0.995 * MACHINE.magnet_flux_wb}), NOMINAL)
-    assert answer.verdict == "ambiguous" and {"dead_time", "magnet_flux"} <= set().union(*answer.ambiguity)
-    assert any(np.hypot(r.i_d, r.i_q) > 0.1 * NOMINAL.machine.rated_current_a for r in answer.next_recording)
+    assert {e.name for e in answer.effects} <= {"magnet_flux"}
+    assert answer.effects or any("magnet_flux" in group for group in answer.ambiguity)

@@ -45,8 +45,9 @@ def test_temperature_places_a_further_recording(view):
     assert np.ptp(middle) == 0.0 and middle[0] == pytest.approx(0.25, abs=0.03)  # half of the first half
     assert not started_cold(heating) and not started_cold(view)
     assert started_cold(joined_views([heating, warm(view, COLD + 1.0)]))
-    assert wants_cold({"magnet_flux", "magnet_temperature"}, view) and not wants_cold({"delay", "sampling_skew"}, view)
-    assert not wants_cold({"magnet_temperature", "resistance_temperature"}, view)  # both would vanish
+    assert wants_cold({"magnet_flux", "magnet_temperature"}, CATALOGUE, view)
+    assert not wants_cold({"delay", "sampling_skew"}, CATALOGUE, view)
+    assert not wants_cold({"magnet_temperature", "resistance_temperature"}, CATALOGUE, view)  # both would vanish
 
 
 def test_cold_winding_does_not_place_a_drift(view):
@@ -54,7 +55,7 @@ def test_cold_winding_does_not_place_a_drift(view):
     cold = warm(view, COLD + 1.0)
     short = cold.take(view.run == 0).replace(span_s=0.1 * view.span_s)
     assert np.all(joined_views([cold, short]).course[len(view) :] == 1.0)
-    assert not wants_cold({"magnet_flux", "magnet_temperature"}, cold)
+    assert not wants_cold({"magnet_flux", "magnet_temperature"}, CATALOGUE, cold)
 
 
 def test_a_short_further_recording_joins_a_long_one():

@@ -160,7 +160,6 @@ def test_pruning_keeps_simplified_scales():
 def test_effects_below_their_floor_stay_unnamed():
     answer = diagnose(recorded(machine={"resistance_ohm": 1.007 * MACHINE.resistance_ohm}), NOMINAL)
     assert answer.verdict == "no_mismatch" and not answer.effects
-    assert answer.search.silent == answer.search.best.model.names == {"resistance"} and not answer.search.tied
 
 
 def test_short_further_recording_has_no_drift(view):
@@ -204,8 +203,8 @@ def test_number_of_effects_is_limited_by_the_points(view):
 def test_hysteresis_draws_nothing_from_the_noise_of_a_standstill(view):
     noise = np.random.default_rng(6).standard_normal(view.omega.shape)
     still = view.replace(omega=0.3 * (noise - noise.mean(axis=1, keepdims=True)), memo={"top_speed": 500.0})
-    column = CATALOGUE["iron_loss"].free(still)["g_hysteresis"]["u"]
-    assert np.abs(column).max() < 1e-9 * np.abs(CATALOGUE["iron_loss"].free(view)["g_hysteresis"]["u"]).max()
+    column = CATALOGUE["iron_loss"].core(still)["g_hysteresis"]["u"]
+    assert np.abs(column).max() < 1e-9 * np.abs(CATALOGUE["iron_loss"].core(view)["g_hysteresis"]["u"]).max()
 
 
 def test_every_effect_is_refined_at_one_operating_point(view):

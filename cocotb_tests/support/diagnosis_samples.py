@@ -161,6 +161,15 @@ def made_up() -> dict[str, Diagnosis]:
             ASKED,
             **found,
         ),
+        "partly_explained": Diagnosis(
+            "partly_explained",
+            "Dead time of 0.90 V explains 88 % of the misfit's power; the rest is mostly in u_dq at order 2 (0.41 V).",
+            [DEAD_TIME],
+            **found | dict(fit=unexplained),
+            explained_share=0.88,
+            remainder=[result.Remainder("u_dq", 2.0, 0.41, "V", 0.12)],
+            unknown_term=UNKNOWN,
+        ),
         "unexplained": Diagnosis(
             "unexplained",
             "A second-order ripple on u_d that grows with speed and load is none of the known effects.",

@@ -58,8 +58,7 @@ def sentence(answer, effects) -> str:
         begin = what or f"One of {sets}"
         share = 100.0 * (answer.explained_share if answer.explained_share is not None else 0.0)
         return f"{begin} explains {min(share, 99.9):.0f} % of the misfit's power: {fall}; the rest is {where} and has no known cause."
-    found = f" {what} is part of it." if what else ""
-    return f"Unknown: no effect in the catalogue explains half of the misfit of {fit.train_before:.3g} V, {where}.{found}"
+    return f"Unknown: no effect in the catalogue explains half of the misfit of {fit.train_before:.3g} V, {where}."
 
 
 def located(answer) -> str:
