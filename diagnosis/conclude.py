@@ -48,9 +48,7 @@ def conclude(posterior, held, progress=lambda text: None) -> Diagnosis:
         progress("choosing the next recording")
         noise_v = float(np.nanmedian(np.abs(at_order(cells, setup.noise, 0.0))))
         open_names = sorted({n for group in names.open for n in group})
-        answer.next_recording = requests(
-            setup, _rivals(names), noise_v, wants_cold(open_names, setup.effects, view)
-        )
+        answer.next_recording = requests(setup, _rivals(names), noise_v, wants_cold(open_names, setup.effects, view))
     if kind in ("unexplained", "partly_explained"):
         answer.unknown_term = _unknown(best, after, stray)
     if kind == "unexplained":  # beside a large unknown part even a credible name may be its imitation

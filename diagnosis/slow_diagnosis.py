@@ -133,9 +133,7 @@ def _fit(search, found, held) -> Fit:
         d, q = axis_misfit(search, found.best, blocks).values()
         return [float(np.hypot(d[k], q[k])) for k in ("before", "after")]
 
-    floor = float(
-        np.sqrt(2.0 * np.mean(found.sigma[(search.cells.order == 0) & (search.cells.channel == "u")] ** 2))
-    )
+    floor = float(np.sqrt(2.0 * np.mean(found.sigma[(search.cells.order == 0) & (search.cells.channel == "u")] ** 2)))
     return Fit("u_dq", "V", *both(~held), *both(held), floor)
 
 
@@ -158,9 +156,7 @@ def _notes(view, held, ambiguity, weak, found) -> list[str]:
         )
     i = view.i.mean(axis=1)
     if not i.real.any():
-        notes.append(
-            "The d axis never had a current: L_d and the saturation of the d axis cannot be diagnosed."
-        )
+        notes.append("The d axis never had a current: L_d and the saturation of the d axis cannot be diagnosed.")
     if len({x > 0 for x in np.sign(view.omega[:, 0]) if x}) < 2:
         notes.append(
             "One direction only: encoder offset and inverter loss are separated from others by load and speed alone."

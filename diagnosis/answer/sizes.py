@@ -56,7 +56,9 @@ class Sizes:
 
     def primary(self) -> str:
         """The channel whose misfit is largest over its floor."""
-        return max(self.channels, key=lambda c: self.channels[c].before / max(self.channels[c].floor, 1e-300), default="u")
+        return max(
+            self.channels, key=lambda c: self.channels[c].before / max(self.channels[c].floor, 1e-300), default="u"
+        )
 
     def share(self, channel, orders=None) -> float | None:
         """Share of a channel's power above the floor that was explained, in some or all of its orders."""

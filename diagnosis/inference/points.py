@@ -108,7 +108,9 @@ def condense(cells, y, x, sigma, level, point, visit, use, load=0.0) -> Points:
     s2[begin] = 1.0 / np.add.reduceat(total, begin)
     widen[contrast] = np.sqrt(1.0 + 1.0 / (np.arange(n) - begin[place])[contrast])
     lev = levels[:, 0] * widen
-    kinds, group = np.unique(np.stack([names[:, 0], np.abs(names[:, 1]), contrast], axis=1), axis=0, return_inverse=True)
+    kinds, group = np.unique(
+        np.stack([names[:, 0], np.abs(names[:, 1]), contrast], axis=1), axis=0, return_inverse=True
+    )
     groups = [(str(channels[c]), float(o) * 1e-6, bool(d)) for c, o, d in kinds]
     group = group.ravel()
     loads = groups.index(("torque", 0.0, False)) if load and ("torque", 0.0, False) in groups else -1

@@ -156,7 +156,9 @@ def possible(fit) -> bool:
     problem = fit.problem
     for name in fit.names:
         effect, c = problem.setup.effects[name], fit.c[name]
-        if effect.too_large(c, problem.setup.view) or effect.size(c, problem.view.nominal) < effect.floor(problem.view.nominal):
+        if effect.too_large(c, problem.setup.view) or effect.size(c, problem.view.nominal) < effect.floor(
+            problem.view.nominal
+        ):
             return False
         keys = list(c)
         cov = np.zeros((len(keys), len(keys)))

@@ -176,7 +176,11 @@ def around(setup, fit, names=None):
     psi = sum((effects[n].psi(view, fit.c[n]) for n in magnetic), np.zeros_like(view.i))
     more = np.array([effects[n].delta_l(fit.c[n]) for n in magnetic] or [(0.0, 0.0)]).sum(axis=0)
     least = -0.7 * np.array([view.machine.inductance_d_h, view.machine.inductance_q_h])
-    changed = {"psi_extra": psi, "delta_l": tuple(np.maximum(more, least)), "late_s": half_dead_time(fit.c, view.nominal)}
+    changed = {
+        "psi_extra": psi,
+        "delta_l": tuple(np.maximum(more, least)),
+        "late_s": half_dead_time(fit.c, view.nominal),
+    }
     view = view.replace(**changed)
     if "iron_loss" in fit.c:
         view = view.replace(psi_extra=psi + effects["iron_loss"].psi(view, fit.c["iron_loss"]))

@@ -111,12 +111,12 @@ if [ -r "$keyring" ]; then signed_by=$keyring; fi
 
 mkdir -p "$apt_dir"/{state/lists/partial,cache/archives/partial,sources,none,debs}
 apt_opts=(
+    -c "$root/scripts/setup/no_hooks.conf"
     -o Dir::Etc::sourcelist=/dev/null -o Dir::Etc::sourceparts="$apt_dir/sources"
     -o Dir::Etc::preferences=/dev/null -o Dir::Etc::preferencesparts="$apt_dir/none"
     -o Dir::State="$apt_dir/state" -o Dir::State::lists="$apt_dir/state/lists"
     -o Dir::Cache="$apt_dir/cache" -o Dir::Cache::archives="$apt_dir/cache/archives"
     -o Dir::Cache::pkgcache= -o Dir::Cache::srcpkgcache=
-    -o APT::Update::Post-Invoke::= -o APT::Update::Post-Invoke-Success::=
     -o Acquire::Languages=none -o Acquire::Retries=2 -o APT::Default-Release=
     -o Acquire::IndexTargets::deb::DEP-11::DefaultEnabled=false
     -o Acquire::IndexTargets::deb::Contents-deb::DefaultEnabled=false
