@@ -1,9 +1,9 @@
 """Which effects are named, which stay open, and with what confidence.
 
-The posterior compares sets of effects.  Where much of the misfit is left, something unknown is at work, and a part of it
-may look like an effect: a leftover of the rms D, lying along the columns of an effect whose contribution has the rms A,
-would imitate it.  The confidence in a name is therefore the posterior of its presence times 1 - exp(-(A / D)^2 / 8), so
-that an effect twice as large as what is left may still be an imitation, and one five times as large is not.
+The posterior compares sets of effects.  Where much of the misfit is left, something unknown is at work, and a part of
+it may look like an effect: a leftover of the rms D, lying along the columns of an effect whose contribution has the rms
+A, would imitate it.  The confidence in a name is therefore the posterior of its presence times 1 - exp(-(A / D)^2 / 8):
+an effect twice as large as what is left may still be an imitation, and one five times as large is not.
 """
 
 from __future__ import annotations

@@ -44,10 +44,14 @@ def sentence(answer, effects) -> str:
     fit = answer.fit
     what = " and ".join(f"{effects[e.name].title} ({size_text(e.parameters)})" for e in answer.effects)
     what = what[:1].upper() + what[1:]
-    fall = f"the misfit at operating points that were not fitted falls from {fit.holdout_before:.3g} V to {fit.holdout_after:.3g} V"
+    fall = (
+        "the misfit at operating points that were not fitted falls"
+        f" from {fit.holdout_before:.3g} V to {fit.holdout_after:.3g} V"
+    )
     sets = "; ".join(" or ".join(effects[n].title if n in effects else n for n in g) for g in answer.ambiguity)
     if answer.verdict == "no_mismatch":
-        return f"Simulation and recording agree: the misfit of {fit.train_before:.3g} V is at the noise floor of {fit.noise_floor:.3g} V."
+        floor = f"is at the noise floor of {fit.noise_floor:.3g} V"
+        return f"Simulation and recording agree: the misfit of {fit.train_before:.3g} V {floor}."
     if answer.verdict == "explained":
         return f"{what}: {fall}."
     if answer.verdict == "ambiguous":
@@ -57,7 +61,8 @@ def sentence(answer, effects) -> str:
     if answer.verdict == "partly_explained":
         begin = what or f"One of {sets}"
         share = 100.0 * (answer.explained_share if answer.explained_share is not None else 0.0)
-        return f"{begin} explains {min(share, 99.9):.0f} % of the misfit's power: {fall}; the rest is {where} and has no known cause."
+        explained = f"{begin} explains {min(share, 99.9):.0f} % of the misfit's power"
+        return f"{explained}: {fall}; the rest is {where} and has no known cause."
     return f"Unknown: no effect in the catalogue explains half of the misfit of {fit.train_before:.3g} V, {where}."
 
 

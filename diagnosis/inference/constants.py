@@ -28,6 +28,6 @@ IMITATION = 2.0
 # Share of an effect's power in an order from which it lives there; weight of what is left in its other orders.
 LIVES = 0.05
 ELSEWHERE = 0.1
-# Slow logs: resolution and timing of messages, ripple and clamping, relative to the bus and to the voltage; share of the
-# voltage's change around a stretch, as a row combines messages of different age.
+# Slow logs: resolution and timing of messages, ripple and clamping, relative to the bus and to the voltage; share of
+# the voltage's change around a stretch, as a row combines messages of different age.
 SLOW_DC, SLOW_U, SLOW_CHANGE = 2.5e-4, 2e-3, 0.05

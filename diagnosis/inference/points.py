@@ -1,9 +1,10 @@
 """The rows of a balance, condensed: one mean per functional and operating point, and what differs between visits to it.
 
-A *functional* is one harmonic of one channel in one axis.  What no model has (the *discrepancy*) repeats in every block
-of an operating point, noise does not: a long dwell is one observation of the physics instead of hundreds.  The blocks of
-an operating point are therefore condensed to *visits*, stretches of neighbouring blocks, and these to one mean and to
-contrasts, each visit against the mean of the earlier ones.  Means and contrasts have independent noise and the variance
+A *functional* is one harmonic of one channel in one axis.  What no model has (the *discrepancy*) repeats in every
+block of an operating point, noise does not: a long dwell is one observation of the physics instead of hundreds.  The
+blocks of an operating point are therefore condensed to *visits*, stretches of neighbouring blocks, and these to one
+mean and to contrasts, each visit against the mean of the earlier ones.  Means and contrasts have independent noise and
+the variance
 
     v = s^2 + (lambda l)^2
 
@@ -117,5 +118,17 @@ def condense(cells, y, x, sigma, level, point, visit, use, load=0.0) -> Points:
     keep = np.ones(n, bool)
     if load and ("torque", 0.0, True) in groups:  # a load may change between visits
         keep = group != groups.index(("torque", 0.0, True))
-    return Points(out[keep, 0], out[keep, 1:], s2[keep], lev[keep], group[keep], groups, names[keep, 1] * 1e-6,
-                  names[keep, 2], names[keep, 3], loads, load, lambda values: condensed(values[:, None])[0][keep, 0])  # fmt: skip
+    return Points(
+        out[keep, 0],
+        out[keep, 1:],
+        s2[keep],
+        lev[keep],
+        group[keep],
+        groups,
+        names[keep, 1] * 1e-6,
+        names[keep, 2],
+        names[keep, 3],
+        loads,
+        load,
+        lambda values: condensed(values[:, None])[0][keep, 0],
+    )

@@ -159,8 +159,9 @@ def smooth(view):
 def around(setup, fit, names=None):
     """The problem linearised at a fit; names: effects whose columns are needed (None: all).
 
-    The misfit keeps its noise: only what a correction changes in the smooth signals, and in ripple that repeats in every
-    block of an operating point, is applied.  Otherwise a correction that filters or scales noise would be rewarded.
+    The misfit keeps its noise: only what a correction changes in the smooth signals, and in ripple that repeats in
+    every block of an operating point, is applied.  Otherwise a correction that filters or scales noise would be
+    rewarded.
     """
     effects = setup.effects
     totals = {n: dict(fit.c[n]) for n in fit.names if effects[n].corrects}
