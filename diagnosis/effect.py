@@ -29,7 +29,6 @@ NEEDS = {
     "current": "measured currents",
 }
 DOUBT = 2.0  # standard deviations by which a value must violate a limit to be rejected
-ALIKE = 0.1  # relative difference below which two values count as equal
 
 
 @dataclass(frozen=True)
@@ -67,6 +66,9 @@ class Effect:
     trailing: tuple[float, ...] = ()  # further electrical orders at which the effect may have harmonics
     mechanical: bool = False  # a torque of the shaft rather than a voltage of the machine
     curve: float = 0.3  # share of the formula by which the free curve may depart from it
+    corrected_last: bool = False  # of several measurement errors: its correction uses the corrected currents
+    takes_flux: bool = False  # ``lost_flux``: its current does not magnetise
+    needs_d_current: tuple[str, ...] = ()  # beginnings of coefficients that only a current on the d axis determines
     smoothed: bool = False  # its columns use smoothed currents also when the model is applied
 
     def core(self, view) -> dict[str, Column]:
@@ -88,10 +90,6 @@ class Effect:
         """Smallest size at which the effect is reported, in units of ``size``."""
         raise NotImplementedError
 
-    def overshadowed(self, c: dict[str, dict], nominal) -> float:
-        """Size up to which another effect of a model with coefficients c explains this one."""
-        return 0.0
-
     def ceiling(self, nominal) -> float:
         """Largest size at which a drive still runs, in units of ``size``."""
         return float("inf")
@@ -107,6 +105,14 @@ class Effect:
     def doubt(self, c: dict[str, float], view) -> np.ndarray | float:
         """Voltage (b,) [V] by which any curve of the effect may be wrong, in addition to a share of its value."""
         return 0.0
+
+    def late_s(self, c: dict[str, float], nominal) -> float:
+        """Shift of the middle of every pulse [s] that the effect causes beside its own voltage."""
+        return 0.0
+
+    def lost_flux(self, view, c: dict[str, float]):
+        """Missing flux linkage (b, m+1) complex dq [Wb] of currents that do not magnetise (only if ``takes_flux``)."""
+        raise NotImplementedError
 
     def moved(self, c: dict[str, float], view) -> float:
         """Change of the effect over a recording, in units of ``size``; of a drift, its size."""
@@ -200,31 +206,6 @@ def torque_of(view, psi, i):
     """Air-gap torque of the intervals, (b, m) [Nm], from flux linkage and current at the samples."""
     torque = 1.5 * view.machine.pole_pairs * (np.conj(psi) * i).imag
     return 0.5 * (torque[:, 1:] + torque[:, :-1])
-
-
-def full_loss(c) -> float:
-    """Full voltage loss [V] of a dead time with coefficients c; the bumps only shape the curve near zero current."""
-    return float(sum(v for key, v in c.items() if key.startswith(("v_", "growth", "drop"))))
-
-
-def within_dead_time(c, nominal) -> float:
-    """Largest delay or skew [s] that the dead time of a model with coefficients c explains."""
-    return (1.0 + ALIKE) * half_dead_time(c, nominal)
-
-
-def half_dead_time(c, nominal) -> float:
-    """Shift of the middle of every pulse due to a model's dead time [s]: one edge is late by the whole dead time.
-
-    c: {effect: {coefficient: value}}.
-    """
-    share = abs(full_loss(c.get("dead_time", {}))) / nominal.inverter.dc_bus_v
-    return 0.5 * share * nominal.sample_time_s
-
-
-def to_true_resistance(c, nominal) -> float:
-    """Nominal resistance over the resistance found, from coefficients c: for effects relative to the resistance."""
-    r = nominal.machine.resistance_ohm
-    return r / max(r + c.get("resistance", {}).get("delta_r", 0.0), 0.1 * r)
 
 
 def rated_torque(nominal) -> float:

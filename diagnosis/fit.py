@@ -11,9 +11,6 @@ from dataclasses import dataclass, field
 import numba
 import numpy as np
 
-from fluxproof.diagnosis.cells import SYSTEM_DC, SYSTEM_U, noise, voltage_level
-from fluxproof.diagnosis.effect import rated_torque
-
 FRESH = 0.06  # least share of a column that is independent of the earlier ones; else it is rejected as collinear
 PER_EFFECT = 10.0  # penalty of an effect in addition to its coefficients: a prior probability of about one in twenty
 
@@ -164,15 +161,3 @@ class Fitter:
 def everything(cells) -> Model:
     """All effects in their free form."""
     return Model(frozenset(cells.columns), frozenset(cells.columns))
-
-
-def row_sigma(view, cells) -> tuple[np.ndarray, np.ndarray]:
-    """Standard deviation of every row with and without the error of the balance: (sigma, noise)."""
-    rough = Fitter(cells, np.ones(len(cells.y)), np.ones(len(cells.y), bool)).solve(everything(cells))
-    pure = noise(view, cells, rough.residual)
-    m = view.machine
-    level = SYSTEM_U * voltage_level(view) + SYSTEM_DC * view.nominal.inverter.dc_bus_v
-    own = np.where(cells.order == 0, 1.0, 0.5) * level[cells.block]
-    own = np.where(cells.channel == "sum", 2e-4 * m.rated_current_a, own)
-    own = np.where(cells.channel == "torque", 3e-3 * rated_torque(view.nominal), own)
-    return np.hypot(pure, own), pure

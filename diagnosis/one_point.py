@@ -10,12 +10,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from fluxproof.diagnosis import verdict as words
 from fluxproof.diagnosis.answer.verdict import sentence
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.cells import cells_of, voltage_level
 from fluxproof.diagnosis.drift_fit import best_sets, centred_cells, drifts, fitted, fuller, row_sigmas, with_copper
 from fluxproof.diagnosis.fit import Fitter
+from fluxproof.diagnosis.inference import constants as k
 from fluxproof.diagnosis.locate import at_order, evidence, locate
 from fluxproof.diagnosis.result import Diagnosis, Fit, NamedEffect, Remainder, Request
 
@@ -44,9 +44,9 @@ def diagnose_one_point(view) -> Diagnosis:
     candidates = _explaining(view, cells, effects, drifting, constant)
     if abs(constant) > _resolution(view):
         groups = groups + ([candidates] if len(candidates) > 1 else [])
-    left_over = best.chi2 > words.LEFTOVER * max(best.rows - best.count, 1) and fit.share_left > words.FLOOR_SHARE
+    left_over = best.chi2 > k.LEFTOVER * max(best.rows - best.count, 1) and fit.share_left > k.FLOOR_SHARE
     if names and left_over:
-        kind = "partly_explained" if fit.explained_share >= words.NAMED_SHARE else "unexplained"
+        kind = "partly_explained" if fit.explained_share >= k.NAMED_SHARE else "unexplained"
         if kind == "unexplained":
             names, groups = [], []
     else:

@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from fluxproof.diagnosis import verdict as words
 from fluxproof.diagnosis.answer.verdict import sentence
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.cells import voltage_level
+from fluxproof.diagnosis.inference import constants as k
 from fluxproof.diagnosis.inference.problem import Setup, fit_of_set
 from fluxproof.diagnosis.locate import evidence, locate
 from fluxproof.diagnosis.one_point import diagnose_one_point
@@ -21,7 +21,7 @@ from fluxproof.diagnosis.request import requests
 from fluxproof.diagnosis.result import Diagnosis, Fit, Remainder
 from fluxproof.diagnosis.slow import slow_view
 from fluxproof.diagnosis.slow_search import SlowSearch, most_effects
-from fluxproof.diagnosis.uncertainty import Plain
+from fluxproof.diagnosis.uncertainty import named
 from fluxproof.diagnosis.view import joined_views
 
 HOLDOUT_EVERY = 4
@@ -56,9 +56,9 @@ def diagnose_points(view, progress=lambda text: None) -> Diagnosis:
     left = found.best.chi2 / max(found.best.rows - found.best.count, 1)
     if not found.best.model.names:
         at_floor = fit.train_before <= AT_FLOOR * fit.noise_floor
-        verdict = "no_mismatch" if left <= words.LEFTOVER or at_floor else "unexplained"
-    elif left > words.LEFTOVER and fit.share_left > words.FLOOR_SHARE:
-        verdict = "partly_explained" if fit.explained_share >= words.NAMED_SHARE else "unexplained"
+        verdict = "no_mismatch" if left <= k.LEFTOVER or at_floor else "unexplained"
+    elif left > k.LEFTOVER and fit.share_left > k.FLOOR_SHARE:
+        verdict = "partly_explained" if fit.explained_share >= k.NAMED_SHARE else "unexplained"
     else:
         verdict = "ambiguous" if ambiguity else "explained" if names else "no_mismatch"
     answer = Diagnosis(verdict, "", location=locate(view, search.cells, found.pure), fit=fit)
@@ -92,8 +92,7 @@ def diagnose_points(view, progress=lambda text: None) -> Diagnosis:
 def model_effects(search, found, names=None):
     """NamedEffects of the best model: those in ``names``, or all of them (tied or not) for a simulation."""
     names = sorted(found.best.model.names) if names is None else names
-    spread = Plain(found.best, CATALOGUE, search.view.nominal, found.dispersion)
-    return words.named(spread, names, found.empty)
+    return named(found.best, CATALOGUE, search.view.nominal, names, found.empty, found.dispersion)
 
 
 def axis_misfit(search, solution, blocks) -> dict:

@@ -8,13 +8,14 @@ up to MOST_EFFECTS can be scored instead, which takes a second, and the best are
 from __future__ import annotations
 
 import itertools
+from dataclasses import dataclass
 
 import numpy as np
 
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.cells import column_of, voltage_level
-from fluxproof.diagnosis.fit import Fitter, Model, everything
-from fluxproof.diagnosis.search import Outcome, Search
+from fluxproof.diagnosis.fit import Fitter, Model, Solution, everything
+from fluxproof.diagnosis.refine import Refiner
 
 MOST_EFFECTS = 6
 REFINED = 40
@@ -38,53 +39,51 @@ LIMITS = {  # generous limits for a real drive
 }
 
 
-class SlowSearch(Search):
-    """Search over a SlowView; see Search for its arguments and for what ``run`` returns."""
+@dataclass
+class Outcome:
+    """Result of a search: the best solution, the tied ones, and the problem they were solved on.
+
+    sigma, pure: (r,) standard deviation of every row, and the part of it that is not the error of the balance.
+    """
+
+    best: Solution
+    tied: list[Solution]
+    empty: Solution
+    sigma: np.ndarray
+    pure: np.ndarray
+    train: np.ndarray
+    dispersion: float
+
+
+class SlowSearch:
+    """Search over a SlowView; ``problem`` solves the sets; train_blocks: (b,) bool, blocks of the fit."""
 
     def __init__(self, view, train_blocks, progress=lambda text: None):
-        silent = not view.i.real.any()  # the d axis never had a current
-        effects = {n: e for n, e in view.visible(CATALOGUE).items() if not (silent and n == "inductance_d")}
-        super().__init__(view, effects, train_blocks, progress)
-        self.hidden = ("saturation", "d_") if silent else None
-        self.hide(self.cells)
-        self.sigma, self.pure = sigmas(view, self.cells)
-        self.linear = Fitter(self.cells, self.sigma, self.train)
-        chi2, count = self.linear.chi2(everything(self.cells))
-        self.dispersion = max(1.0, chi2 / max(len(self.linear.y) - count, 1))
+        self.silent = not view.i.real.any()  # the d axis never had a current
+        self.effects = view.visible(CATALOGUE)
+        self.view, self.progress = view, progress
+        self.problem = Sets(view, self.effects, train_blocks, sigmas, self.hide)
+        self.cells, self.linear = self.problem.cells, self.problem.linear
 
     def run(self) -> Outcome:
         self.progress("all sets of effects")
         for model in [Model(frozenset()), *self.every_set()]:
             self.refine(model)
-        best = self.large(self._best())
-        tied = self.tied(best)
-        return Outcome(
-            best, tied, self.refine(Model(frozenset())), self.sigma, self.pure, self.train, self.dispersion
-        )
+        best = self.large(self.problem.best())
+        p = self.problem
+        return Outcome(best, self.tied(best), self.refine(Model(frozenset())), p.sigma, p.pure, p.train, p.dispersion)
+
+    def refine(self, model) -> Solution:
+        return self.problem.refine(model)
 
     def hide(self, cells):
         """Remove columns whose d current results only from an angle error: the recording cannot verify them."""
         for name, columns in cells.columns.items():
             for key in self.effects[name].bounded:  # this search has no priors
                 columns.pop(f"~{key}", None)
-        if self.hidden and self.hidden[0] in cells.columns:
-            columns = cells.columns[self.hidden[0]]
-            for key in [k for k in columns if k.lstrip("~").startswith(self.hidden[1])]:
-                del columns[key]
-
-    def fitter(self, view, effects, free=None) -> Fitter:
-        cells = super().fitter(view, effects, free).cells
-        self.hide(cells)
-        return Fitter(cells, self.sigma, self.train, self.linear.penalty)
-
-    def plausible(self, solution) -> bool:
-        """Whether all parameters are within LIMITS: a sum of absurd effects may fit as well as the true ones."""
-        nominal = self.view.nominal
-        for name in solution.model.names:
-            found = self.effects[name].estimates(solution.c[name], solution.covariance[name], nominal)
-            if any(key in LIMITS and not LIMITS[key](e.value, nominal) for key, e in found.items()):
-                return False
-        return super().plausible(solution)
+            if self.silent:
+                for key in [k for k in columns if k.lstrip("~").startswith(self.effects[name].needs_d_current)]:
+                    del columns[key]
 
     def every_set(self) -> list[Model]:
         """The most promising models of all sets of up to MOST_EFFECTS effects on the linear problem."""
@@ -92,7 +91,7 @@ class SlowSearch(Search):
         scored = []
         for size in range(1, most_effects(len(np.unique(self.view.run))) + 1):
             for names in itertools.combinations(able, size):
-                scored += [(self.linear.score(m, self.dispersion), m) for m in self.some_forms(names)]
+                scored += [(self.linear.score(m, self.problem.dispersion), m) for m in self.some_forms(names)]
         scored.sort(key=lambda entry: entry[0])
         return [m for _, m in scored[:REFINED]]
 
@@ -101,6 +100,10 @@ class SlowSearch(Search):
         names = frozenset(names)
         free = [frozenset(), *(frozenset([n]) for n in names if self.linear.index[n][1])]
         return [m for f in free if self.allowed(m := Model(names, f))]
+
+    def allowed(self, model) -> bool:
+        """Whether every absorbed effect of the model is accompanied by the free form of the absorbing one."""
+        return all(name in model.free or not (set(self.effects[name].absorbs) & model.names) for name in model.names)
 
     def large(self, best):
         """The best model without effects below their floor of practical interest.
@@ -113,7 +116,7 @@ class SlowSearch(Search):
         for name in small:
             best = self.refine(best.model.without(name))
         if small:  # another set may explain with large effects what the small one did with its free curve
-            rest = [s for s in self.refined.values() if np.isfinite(s.score) and self.all_large(s)]
+            rest = [s for s in self.problem.refined.values() if np.isfinite(s.score) and self.all_large(s)]
             best = min([best, *rest], key=lambda s: s.score)
         return best
 
@@ -127,7 +130,7 @@ class SlowSearch(Search):
     def tied(self, best):
         """Other sets with no more effects that explain as much as the best one, each in its best form."""
         found: dict = {}
-        for model, solution in self.refined.items():
+        for model, solution in self.problem.refined.items():
             if model.names == best.model.names or len(model) > len(best.model) or not model.names:
                 continue
             if solution.score < best.score + TIE:
@@ -137,13 +140,26 @@ class SlowSearch(Search):
 
     def residual(self, solution):
         """(cells, residual (r,)) of a solution on its corrected data."""
-        fitter = self.fitter(solution.view, [self.effects[n] for n in sorted(solution.model.names)])
+        fitter = self.problem.fitter(solution.view, [self.effects[n] for n in sorted(solution.model.names)])
         values = np.zeros(len(fitter.cells.y))
         for name, c in solution.c.items():
             if not self.effects[name].corrects:
                 columns = fitter.cells.columns[name]
                 values += sum(v * columns[column_of(columns, k)] for k, v in c.items() if v and column_of(columns, k))
         return fitter.cells, fitter.cells.y - values
+
+
+class Sets(Refiner):
+    """The refined sets of a slow log."""
+
+    def plausible(self, solution) -> bool:
+        """Whether all parameters are within LIMITS: a sum of absurd effects may fit as well as the true ones."""
+        nominal = self.view.nominal
+        for name in solution.model.names:
+            found = self.effects[name].estimates(solution.c[name], solution.covariance[name], nominal)
+            if any(key in LIMITS and not LIMITS[key](e.value, nominal) for key, e in found.items()):
+                return False
+        return super().plausible(solution)
 
 
 def most_effects(points: int) -> int:

@@ -108,11 +108,6 @@ class View:
         return self.memo.get("top_speed") or max(float(np.abs(self.omega).max()), 1e-9)
 
     @property
-    def lone(self):
-        """Whether the recording has points for one effect only; simulated points keep that of the recording."""
-        return self.memo.get("lone", False)
-
-    @property
     def theta_mid(self):
         """Angle in the middle of an interval, (b, m) [rad]."""
         return 0.5 * (self.theta[:, 1:] + self.theta[:, :-1])

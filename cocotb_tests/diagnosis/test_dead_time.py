@@ -11,16 +11,12 @@ import pytest
 
 from fluxproof.diagnosis import diagnose
 from fluxproof.diagnosis.blocks import view_of
-from fluxproof.diagnosis.catalogue import CATALOGUE
-from fluxproof.diagnosis.effect import full_loss, half_dead_time
-from fluxproof.diagnosis.fit import Fitter, Model
+from fluxproof.diagnosis.catalogue.dead_time import EFFECT, full_loss
+from fluxproof.diagnosis.inference.problem import Problem, Setup
 from fluxproof.diagnosis.nominal import load_nominal
 from fluxproof.diagnosis.recording import from_columns
-from fluxproof.diagnosis.refine import Refiner
 from studies.blind import cases
 from studies.blind.generate import listing
-
-DEAD_TIME = Model(frozenset({"dead_time"}), frozenset({"dead_time"}))
 
 
 def drive_of(seed, number, folder, trace=False):
@@ -36,51 +32,49 @@ def drive_of(seed, number, folder, trace=False):
 
 @pytest.fixture(scope="module")
 def strong(tmp_path_factory):
-    """A drive with a loss of 6 % of its bus voltage, this loss as cells, and its view."""
+    """A drive with a loss of 6 % of its bus voltage: its case, its set-up, and this loss as rows of the balance."""
     case, nominal, recording, held = drive_of(27182818, 130, tmp_path_factory.mktemp("strong"), trace=True)
     view = view_of(recording, nominal)
-    refiner = Refiner(view, {"dead_time": CATALOGUE["dead_time"]}, np.ones(len(view), bool))
+    setup = Setup(view, {"dead_time": EFFECT}, np.ones(len(view), bool))
     rows = view.rows[:, None] + np.arange(view.u_dc.shape[1])
     mean = (held["u_mean_alpha"] + 1j * held["u_mean_beta"])[rows]
-    return case, refiner, refiner.projector.rows({"u": view.to_dq(view.u[:, 1:-1] - mean)})
+    return case, setup, setup.projector.rows({"u": view.to_dq(view.u[:, 1:-1] - mean)})
 
 
-def across(refiner, loss):
+def across(setup, loss, late_s=0.0):
     """Residual rms [V] of the dead-time curve at order 0, perpendicular to the current, in blocks with current."""
-    refiner.cells.y = loss
-    solution = Fitter(refiner.cells, refiner.sigma, refiner.train).solve(DEAD_TIME)
-    left = solution.residual[(refiner.cells.order == 0) & (refiner.cells.channel == "u")].reshape(-1, 2)
-    i = refiner.view.i.mean(axis=1)
-    loaded = np.abs(i) > 0.1 * refiner.view.machine.rated_current_a
-    return float(np.sqrt(np.mean(((left @ [1, 1j]) / (i / np.abs(i))).imag[loaded] ** 2))), solution
+    problem = Problem(setup, setup.view.replace(late_s=late_s), change=loss - setup.cells.y)
+    fit = problem.fit(["dead_time"])
+    rows = (problem.cells.order == 0) & (problem.cells.channel == "u")
+    left = fit.left()[rows].reshape(-1, 2)
+    i = setup.view.i.mean(axis=1)
+    loaded = np.abs(i) > 0.1 * setup.view.machine.rated_current_a
+    return float(np.sqrt(np.mean(((left @ [1, 1j]) / (i / np.abs(i))).imag[loaded] ** 2))), fit
 
 
 def test_loss_follows_the_current_in_the_middle_of_the_pulses(strong):
     """One edge of every pulse is late by the dead time, so that the converters sample before its middle."""
-    case, refiner, loss = strong
-    before, solution = across(refiner, loss)
-    late = half_dead_time(solution.c, refiner.view.nominal)
+    case, setup, loss = strong
+    before, fit = across(setup, loss)
+    late = EFFECT.late_s(fit.c["dead_time"], setup.view.nominal)
     assert late == pytest.approx(0.5 * case.build.drive.bridge.dead_s, rel=0.15)
-    refiner.view = refiner.view.replace(late_s=late)
-    refiner._weigh()
-    assert across(refiner, loss)[0] < before / 3.0
+    assert across(setup, loss, late)[0] < before / 3.0
 
 
 def test_every_part_of_the_loss_curve_is_identified(strong):
     """A column rejected as collinear would make the growth of the loss wrong."""
-    _, refiner, loss = strong
-    c = across(refiner, loss)[1].c["dead_time"]
-    assert all(v for key, v in c.items() if key not in CATALOGUE["dead_time"].bounded)
+    _, setup, loss = strong
+    c = across(setup, loss)[1].c["dead_time"]
+    assert all(c.values())
     assert 0.0 < c["growth"] < 0.08 * full_loss(c)  # a diode's logarithm in a loss that is mostly dead time
 
 
 def test_loss_is_uncertain_near_zero_current(strong):
-    _, refiner, _ = strong
-    view, effect, c = refiner.view, CATALOGUE["dead_time"], {"v_0.02": 3.0, "v_0.12": 0.5, "bump_0.05": 0.3}
+    view, c = strong[1].view, {"v_0.02": 3.0, "v_0.12": 0.5, "bump_0.05": 0.3}
     assert full_loss(c) == 3.5
     idle = view.replace(i_raw=1e-3 * view.i_raw)
-    assert np.allclose(effect.doubt(c, idle), 0.35)
-    assert np.median(effect.doubt(c, view)) < 0.03
+    assert np.allclose(EFFECT.doubt(c, idle), 0.35)
+    assert np.median(EFFECT.doubt(c, view)) < 0.03
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fluxproof.diagnosis.effect import DOUBT, Effect, Parameter, full_loss, voltage, zero_vector_slope
+from fluxproof.diagnosis.effect import DOUBT, Effect, Parameter, voltage, zero_vector_slope
 from fluxproof.diagnosis.result import Estimate
 
 # No width is so large that the curve would resemble a resistance over most of the current range.
@@ -56,6 +56,11 @@ def device_tails(view):
     return _following_bus(view, _leg_losses(view, shapes))
 
 
+def full_loss(c) -> float:
+    """Full voltage loss [V] of coefficients c; the bumps only shape the curve near zero current."""
+    return float(sum(v for key, v in c.items() if key.startswith(("v_", "growth", "drop"))))
+
+
 class DeadTime(Effect):
     def core(self, view):
         ramps = {f"v_{w:g}": lambda x, w=w: np.clip(x / w, -1.0, 1.0) for w in WIDTHS}
@@ -76,6 +81,10 @@ class DeadTime(Effect):
     def possible(self, c, covariance, nominal):
         at_full = _at_full(c)
         return bool(at_full @ list(c.values()) >= -DOUBT * np.sqrt(max(at_full @ covariance @ at_full, 0.0)))
+
+    def late_s(self, c, nominal):
+        """One edge of every pulse is late by the whole dead time, its middle by half."""
+        return 0.5 * abs(full_loss(c)) / nominal.inverter.dc_bus_v * nominal.sample_time_s
 
     def floor(self, nominal):
         return 0.0002 * nominal.inverter.dc_bus_v

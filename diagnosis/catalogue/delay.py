@@ -2,9 +2,8 @@
 
 import numpy as np
 
-from fluxproof.diagnosis.catalogue.sampling_skew import skewed, unskewed
 from fluxproof.diagnosis.curves import parabola
-from fluxproof.diagnosis.effect import DOUBT, Effect, Parameter, one, sigma, voltage, within_dead_time
+from fluxproof.diagnosis.effect import Effect, Parameter, one, sigma, voltage
 
 MOST = 1.2  # periods: beyond one period the interpolation continues linearly, so that the iteration can return
 
@@ -33,28 +32,15 @@ class Delay(Effect):
     def core(self, view):
         return {"tau": voltage(-view.to_dq(_moved(view, 1.0)[:, 1:-1]) / view.sample_time_s)}
 
-    def free(self, view):
-        # If the gates are late as a whole, the converters also sample off the valley.  With enough operating points for
-        # two effects this is a separate skew; with fewer it is a free form of the delay.
-        return {"off_valley": skewed(view)} if view.lone else {}
-
-    def possible(self, c, covariance, nominal):
-        """The sampling is off the valley by no more than the gates are late."""
-        off = abs(c.get("off_valley", 0.0))
-        return not off or off <= abs(c["tau"]) + DOUBT * sigma(covariance, list(c).index("off_valley"))
-
     def floor(self, nominal):
         return 0.006 * nominal.sample_time_s
-
-    def overshadowed(self, c, nominal):
-        return within_dead_time(c, nominal)
 
     def ceiling(self, nominal):
         return 2.5 * nominal.sample_time_s
 
     def corrected(self, view, c):
         share = float(np.clip(c["tau"] / view.sample_time_s, -MOST, MOST))
-        return unskewed(view.replace(u=view.u + _moved(view, share)), c.get("off_valley", 0.0))
+        return view.replace(u=view.u + _moved(view, share))
 
     def estimates(self, c, covariance, nominal):
         return one("delay_s", "s", c["tau"], sigma(covariance))

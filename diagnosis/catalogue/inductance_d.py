@@ -45,4 +45,5 @@ EFFECT = InductanceD(
     confounders=("magnet_flux", "current_gain", "cross_saturation", "saturation"),
     separated_by="two non-zero values of i_d",
     parameters=(Parameter("inductance_d_h", "H", "of the d axis"),),
+    needs_d_current=("delta_l_d", "bend_"),
 )

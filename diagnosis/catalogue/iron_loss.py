@@ -32,8 +32,7 @@ class IronLoss(Effect):
     def free(self, view):
         return {"g_eddy": _loss(view, _speeds(view)["g_eddy"])}
 
-    @staticmethod
-    def psi(view, c):
+    def lost_flux(self, view, c):
         """Missing flux linkage (b, m+1) complex dq [Wb]: the loss current does not magnetise.
 
         The loss current is proportional to the remaining flux, so that this includes terms beyond first order.
@@ -79,5 +78,6 @@ EFFECT = IronLoss(
     separated_by="load: omega^2 i_q on the q axis; a shifted sampling trigger; low speed for hysteresis",
     parameters=(Parameter("iron_resistance_ohm", "ohm", "in parallel with the rotational EMF, at the highest speed"),),
     positive=True,
+    takes_flux=True,
     needs=("angle",),
 )

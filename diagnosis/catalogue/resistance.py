@@ -3,6 +3,12 @@
 from fluxproof.diagnosis.effect import DOUBT, Effect, Parameter, one, sigma, voltage
 
 
+def to_true_resistance(c, nominal) -> float:
+    """Nominal resistance over the resistance found, for effects relative to it; c: {effect: coefficients}."""
+    r = nominal.machine.resistance_ohm
+    return r / max(r + c.get("resistance", {}).get("delta_r", 0.0), 0.1 * r)
+
+
 class Resistance(Effect):
     def core(self, view):
         return {"delta_r": voltage(view.i_mid)}

@@ -2,8 +2,9 @@
 
 import numpy as np
 
+from fluxproof.diagnosis.catalogue.resistance import to_true_resistance
 from fluxproof.diagnosis.curves import COURSE_KNOTS, course, courses, known_temperature, reference_c
-from fluxproof.diagnosis.effect import Effect, Parameter, one, sigma, to_true_resistance, voltage
+from fluxproof.diagnosis.effect import Effect, Parameter, one, sigma, voltage
 
 
 def _change(c, by_alpha):

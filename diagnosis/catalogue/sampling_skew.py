@@ -2,16 +2,7 @@
 
 import numpy as np
 
-from fluxproof.diagnosis.effect import (
-    ALIKE,
-    Effect,
-    Parameter,
-    angle_error,
-    current_error,
-    one,
-    within_dead_time,
-    zero_vector_slope,
-)  # fmt: skip
+from fluxproof.diagnosis.effect import Effect, Parameter, angle_error, current_error, one, zero_vector_slope
 
 
 def skewed(view):
@@ -39,13 +30,6 @@ class SamplingSkew(Effect):
     def floor(self, nominal):
         return 0.0012 * nominal.sample_time_s
 
-    def overshadowed(self, c, nominal):
-        own = c.get("sampling_skew", {"tau": 0.0})
-        # Currents and angle late by the same time are no skew but early gates, that is, an early voltage.
-        if abs(own["tau"] - own.get("angle", 0.0)) < ALIKE * abs(own["tau"]):
-            return float("inf")
-        return within_dead_time(c, nominal)
-
     def ceiling(self, nominal):
         return 0.3 * nominal.sample_time_s
 
@@ -71,5 +55,6 @@ EFFECT = SamplingSkew(
     separated_by="load (an iron loss also follows omega^2 i_q); a deliberately shifted sampling trigger",
     parameters=(Parameter("skew_s", "s", "of the currents relative to the angle; positive: late"),),
     corrects=True,
+    corrected_last=True,
     needs=("harmonics", "inverter"),
 )

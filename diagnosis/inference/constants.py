@@ -31,3 +31,7 @@ ELSEWHERE = 0.1
 # Slow logs: resolution and timing of messages, ripple and clamping, relative to the bus and to the voltage; share of
 # the voltage's change around a stretch, as a row combines messages of different age.
 SLOW_DC, SLOW_U, SLOW_CHANGE = 2.5e-4, 2e-3, 0.05
+# Slow logs: largest reduced chi^2 of an accepted explanation; share of the misfit's rms that may be left to the shapes
+# of curves; share of its power that names must explain beside a remainder, as that search does not know how much may
+# imitate an effect.
+LEFTOVER, FLOOR_SHARE, NAMED_SHARE = 2.0, 0.15, 0.9

@@ -21,6 +21,7 @@ import numpy as np
 from fluxproof.diagnosis.effect import rated_torque
 from fluxproof.diagnosis.inference import constants as k
 
+POINT = 0.08  # of top speed and rated current: closer operating points count as one
 VISITS = 16  # visits into which a recording of a single operating point is cut
 
 
@@ -44,6 +45,22 @@ class Points:
     loads: int
     load: float
     condensed: object  # function of further rows (r,): their means and contrasts (n,)
+
+
+def point_numbers(view) -> np.ndarray:
+    """(b,) number of the operating point (speed, i_d, i_q) of each block of a view.
+
+    The first block that is far from all known points starts a new one; fixed bins would split some points.
+    """
+    m, omega, i = view.machine, view.omega.mean(axis=1), view.i.mean(axis=1)
+    top = max(float(np.abs(omega).max()), 1e-9)
+    points = np.stack([omega / top, i.real / m.rated_current_a, i.imag / m.rated_current_a], axis=1)
+    number, free = np.full(len(points), -1), 0
+    while (number < 0).any():
+        first = points[np.argmax(number < 0)]
+        number[(number < 0) & (np.abs(points - first).max(axis=1) < POINT)] = free
+        free += 1
+    return number
 
 
 def balance_level(view, cells):

@@ -11,13 +11,13 @@ import numpy as np
 
 from fluxproof.diagnosis.balance import misfit
 from fluxproof.diagnosis.cells import Projector, cells_of, noise
+from fluxproof.diagnosis.corrections import in_turn, with_flux
 from fluxproof.diagnosis.curves import parabola
-from fluxproof.diagnosis.effect import FluxEffect, half_dead_time, rated_torque
+from fluxproof.diagnosis.effect import rated_torque
 from fluxproof.diagnosis.fit import Fitter, everything
 from fluxproof.diagnosis.inference import constants as k
 from fluxproof.diagnosis.inference.evidence import evidence
-from fluxproof.diagnosis.inference.points import balance_level, condense, visits
-from fluxproof.diagnosis.refine import point_numbers
+from fluxproof.diagnosis.inference.points import balance_level, condense, point_numbers, visits
 
 
 class Setup:
@@ -165,26 +165,11 @@ def around(setup, fit, names=None):
     """
     effects = setup.effects
     totals = {n: dict(fit.c[n]) for n in fit.names if effects[n].corrects}
-    order = sorted(totals, key=lambda n: n == "sampling_skew")
-    view, plain = setup.view, setup.smooth
-    for name in order:
-        unseen = ~setup.view.shows(effects[name])
-        view = view.kept_where(unseen, effects[name].corrected(view, totals[name]))
-        plain = plain.kept_where(unseen, effects[name].corrected(plain, totals[name]))
+    view, plain = (in_turn(v, effects, totals, setup.view) for v in (setup.view, setup.smooth))
     if not (np.isfinite(view.u).all() and np.isfinite(view.i_raw).all()):
         return None
-    magnetic = [n for n in fit.names if isinstance(effects[n], FluxEffect)]
-    psi = sum((effects[n].psi(view, fit.c[n]) for n in magnetic), np.zeros_like(view.i))
-    more = np.array([effects[n].delta_l(fit.c[n]) for n in magnetic] or [(0.0, 0.0)]).sum(axis=0)
-    least = -0.7 * np.array([view.machine.inductance_d_h, view.machine.inductance_q_h])
-    changed = {
-        "psi_extra": psi,
-        "delta_l": tuple(np.maximum(more, least)),
-        "late_s": half_dead_time(fit.c, view.nominal),
-    }
-    view = view.replace(**changed)
-    if "iron_loss" in fit.c:
-        view = view.replace(psi_extra=psi + effects["iron_loss"].psi(view, fit.c["iron_loss"]))
+    late = sum(effects[n].late_s(fit.c[n], view.nominal) for n in fit.names)
+    view = with_flux(view, effects, fit.c, late_s=late)
     rows = setup.projector.rows
     change = rows(misfit(plain)) - setup.smooth_rows
     ripple = rows(misfit(view)) - setup.cells.y - change

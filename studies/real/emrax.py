@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from fluxproof.checkout import ROOT
-from fluxproof.diagnosis import verdict as words
+from fluxproof.diagnosis.answer.verdict import sentence
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.load import load_recording
 from fluxproof.diagnosis.nominal import load_nominal
@@ -50,9 +50,7 @@ def run(folder: Path, out: Path, progress=lambda text: None) -> dict:
     parts = [_estimates(alone, alone_solution), _estimates(later, later_solution)]
     for effect in answer.effects:
         _widen(effect, parts)
-    answer.sentence = words.sentence(
-        answer.verdict, answer.effects, answer.ambiguity, answer.fit, CATALOGUE, answer.location
-    )
+    answer.sentence = sentence(answer, CATALOGUE)
     answer.notes.append("Standard deviations include the differences between separately fitted parts of the log.")
     model = _with_map(model_effects(search, found), flux_map_of(search, found.best))
     for effect in model:
@@ -105,7 +103,7 @@ def _estimates(search, solution) -> dict:
     """{parameter: [value, standard deviation, unit]} of a solution."""
     out = {}
     for name in sorted(solution.model.names):
-        covariance = solution.covariance[name] * search.dispersion
+        covariance = solution.covariance[name] * search.problem.dispersion
         found = search.effects[name].estimates(solution.c[name], covariance, search.view.nominal)
         out |= {k: [e.value, e.sigma, e.unit] for k, e in found.items()}
     return out
