@@ -20,8 +20,6 @@ ORDERS_SUM = (0.0, 1.0, 2.0)
 LEAST_TURNS = 0.8  # periods of a harmonic within a block; with fewer it is not independent of order 0
 TAPERED_TURNS = 3.0  # the same with a taper, which has more leakage from neighbouring orders
 RESOLVED = 2.5  # rad per sampling period: a torque of a higher frequency appears at other orders
-SYSTEM_U = 2e-4  # error of the balance, relative to the voltage of the block
-SYSTEM_DC = 1.5e-5  # the same relative to the bus voltage
 
 
 def orders_u(pole_pairs: int) -> tuple[float, ...]:

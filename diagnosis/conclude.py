@@ -9,22 +9,21 @@ from fluxproof.diagnosis.answer.estimates import named_effects
 from fluxproof.diagnosis.answer.names import names_of
 from fluxproof.diagnosis.answer.sizes import Sizes, fit_of
 from fluxproof.diagnosis.answer.verdict import kind_of
+from fluxproof.diagnosis.inference import constants as k
 from fluxproof.diagnosis.locate import at_order, evidence, locate
 from fluxproof.diagnosis.request import requests, wants_cold
 from fluxproof.diagnosis.result import Diagnosis, Remainder, UnknownTerm
 from fluxproof.diagnosis.scan import Stray, row_residual, stray_order, stray_swing, stray_torque
 from fluxproof.diagnosis.unknown import sparse_term
 
-FORMS_LEFT = 0.06  # of the misfit's rms: ripple that the formulas of the named effects may leave
 MOST_RIVALS = 5
-LIKELY = 0.5  # probability from which an effect that is not asserted takes part in what is explained
 
 
 def conclude(posterior, held, progress=lambda text: None) -> Diagnosis:
     """The answer to a posterior; held: (b,) blocks that were not fitted."""
     setup, names, best = posterior.setup, names_of(posterior), posterior.best()
     view, cells, before = setup.view, setup.cells, setup.cells.y
-    likely = {n for n, p in names.maybe.items() if p >= LIKELY}
+    likely = {n for n, p in names.maybe.items() if p >= k.LIKELY}
     told = (names.said | {n for group in names.open for n in group} | likely) & set(best.names)
     after = best.left(told)
     measured = setup.load == 0.0  # otherwise the torque follows from the angle, whose resolution is not the shaft's
@@ -100,8 +99,8 @@ def _stray(best, train) -> Stray | None:
     doubts = [effects[n].doubt(best.c[n], setup.view) for n in best.names]
     doubt = np.sqrt(sum((np.square(d) for d in doubts), np.zeros(len(setup.view))))
     before = train.channels["u"].before if "u" in train.channels else 0.0
-    floor = FORMS_LEFT * before if best.names else 0.0
-    certain = np.flatnonzero(doubt <= FORMS_LEFT * before) if best.names else np.arange(len(setup.view))
+    floor = k.FORMS_LEFT * before if best.names else 0.0
+    certain = np.flatnonzero(doubt <= k.FORMS_LEFT * before) if best.names else np.arange(len(setup.view))
     if not len(certain):
         return None
     known = sorted({h for n in best.names for h in effects[n].trailing})

@@ -10,8 +10,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from fluxproof.diagnosis.cells import SYSTEM_DC, SYSTEM_U, voltage_level
+from fluxproof.diagnosis.cells import voltage_level
 from fluxproof.diagnosis.fit import Fitter, Model
+from fluxproof.diagnosis.inference.constants import BALANCE_DC, BALANCE_U
 from fluxproof.diagnosis.locate import at_order
 
 DRIFTS = 0.1  # least change of a column over time relative to its size
@@ -48,7 +49,7 @@ def row_sigmas(view, cells, raw):
     """(r,) standard deviation [V]: of neighbouring means, and a share of the voltage for the balance itself."""
     step = np.diff(raw) if len(raw) > 1 else np.zeros(1, complex)
     each = [float(np.sqrt(np.nanmean(x**2) / 2.0)) for x in (step.real, step.imag)]
-    own = SYSTEM_U * voltage_level(view) + SYSTEM_DC * view.nominal.inverter.dc_bus_v
+    own = BALANCE_U * voltage_level(view) + BALANCE_DC * view.nominal.inverter.dc_bus_v
     return np.hypot(np.array(each)[cells.part], own[cells.block])
 
 

@@ -53,11 +53,15 @@ def held_out(views) -> np.ndarray:
     return np.concatenate([holdout_blocks(v) for v in views])
 
 
-def _physics(recordings, nominal, progress) -> Diagnosis:
+def posterior_of(recordings, nominal, progress=lambda text: None):
+    """(posterior, (b,) held-out blocks) of fast recordings of one drive."""
     views = views_of(recordings, nominal)
     view = joined_views(views)
     held = held_out(views)
     progress("sets of effects")
-    setup = Setup(view, view.visible(CATALOGUE), ~held)
-    posterior = Posterior(setup, progress)
+    return Posterior(Setup(view, view.visible(CATALOGUE), ~held), progress), held
+
+
+def _physics(recordings, nominal, progress) -> Diagnosis:
+    posterior, held = posterior_of(recordings, nominal, progress)
     return conclude(posterior, held, progress)

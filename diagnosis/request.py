@@ -7,8 +7,9 @@ from dataclasses import fields
 
 import numpy as np
 
-from fluxproof.diagnosis.cells import SYSTEM_DC, SYSTEM_U, Projector, voltage_level
+from fluxproof.diagnosis.cells import Projector, voltage_level
 from fluxproof.diagnosis.experiment import BENDS, best_points, rivalry
+from fluxproof.diagnosis.inference.constants import BALANCE_DC, BALANCE_U
 from fluxproof.diagnosis.result import Request
 from fluxproof.diagnosis.view import View, stayed_cold
 
@@ -148,7 +149,7 @@ def requests(setup, fits, noise_v, cold=False) -> list[Request]:
     made = steady_view(view, omega, i, cooled)
     p = Projector(made)
     drive = view.nominal.inverter.dc_bus_v
-    own = np.hypot(noise_v, SYSTEM_U * voltage_level(made) + SYSTEM_DC * drive)[p.block] / np.sqrt(BLOCKS)
+    own = np.hypot(noise_v, BALANCE_U * voltage_level(made) + BALANCE_DC * drive)[p.block] / np.sqrt(BLOCKS)
     sigma = np.where(p.ok & (p.channel == "u"), own, np.inf)
     of = {n: columns_at(p, made, effects[n]) for s in solutions for n in s.names}
     predictions, knows = [], []

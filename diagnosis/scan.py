@@ -14,13 +14,9 @@ import numpy as np
 from fluxproof.diagnosis.balance import misfit
 from fluxproof.diagnosis.cells import voltage_level
 from fluxproof.diagnosis.effect import rated_torque
+from fluxproof.diagnosis.inference import constants as k
 
 MOST_ORDER = 80  # per mechanical turn
-LOCKED = 30.0  # power of the sum over sum of powers; probability exp(-30) by chance
-LEAST_SHARE = 1.5e-3  # of the voltage: smaller ripple is attributed to the inverter
-TORQUE_SHARE = 0.01  # of rated torque
-SWING_SHARE = 4e-3
-SWING_RATIO = 8.0  # threshold of the spectrum's low end over its neighbourhood
 WEIGHTS = {
     "1": (lambda v: np.ones(len(v)), "V"),
     "omega": (lambda v: v.omega.mean(axis=1), "V s/rad"),
@@ -73,7 +69,7 @@ def stray_torque(view, projector, cells, residual, sigma) -> Stray | None:
         c, *_ = np.linalg.lstsq(a, y, rcond=None)
         gain = float(y @ y - np.sum((y - a @ c) ** 2))
         amplitude = float(np.hypot(*c))
-        if gain > 2 * LOCKED and amplitude > TORQUE_SHARE * rated and (best is None or gain > best[0]):
+        if gain > 2 * k.LOCKED and amplitude > k.LEAST_TORQUE * rated and (best is None or gain > best[0]):
             best = (gain, amplitude, n)
     if best is None:
         return None
@@ -101,14 +97,14 @@ def stray_order(view, residual, floor, known=()) -> Stray | None:
         if use.sum() < 6:
             continue
         f = (residual[use] * taper * np.exp(-1j * n * theta_m[use])).mean(axis=1)
-        least = max(floor, LEAST_SHARE * float(np.sqrt(np.mean(level[use] ** 2))))
+        least = max(floor, k.LEAST_RIPPLE * float(np.sqrt(np.mean(level[use] ** 2))))
         for text, (weight, unit) in WEIGHTS.items():
             w = weight(view)[use]
             total = complex(np.sum(w * f))
             lock = abs(total) ** 2 / max(float(np.sum(w**2 * np.abs(f) ** 2)), 1e-300)
             c = abs(total) / max(float(np.sum(w**2)), 1e-300)
             volts = c * float(np.sqrt(np.mean(w**2)))
-            if lock > min(LOCKED, 0.7 * use.sum()) and volts > max(least, largest):
+            if lock > min(k.LOCKED, 0.7 * use.sum()) and volts > max(least, largest):
                 formula = f"u_d + j u_q = c * {text} * exp(j {n} theta_m + j phi)"
                 explains = abs(total) ** 2 / float(np.sum(w**2) * np.sum(np.abs(f) ** 2))
                 spread = c * float(np.sqrt(max(1.0 - explains, 0.0) / use.sum()))
@@ -130,7 +126,7 @@ def stray_swing(view, residual, floor) -> Stray | None:
     low, around = mean[1:5].max(), np.median(mean[8:20])
     amplitude = 2.0 * float(np.sqrt(mean[1:5].sum() / 1.5))
     share = amplitude / float(np.sqrt(np.mean(level[loud] ** 2)))
-    if low < SWING_RATIO * around or share < SWING_SHARE or amplitude < floor:
+    if low < k.SWING * around or share < k.LEAST_SWING or amplitude < floor:
         return None
     hertz = (1 + int(np.argmax(mean[1:5]))) / (m * view.sample_time_s)
     formula = f"u proportional to 1 + c * sin(2 pi f t), f about {hertz:.0f} Hz"

@@ -113,7 +113,7 @@ def test_coulomb_and_viscous_friction_are_collinear_at_one_speed():
     both = np.array([speed, 1.0])
     covariance = covariance_of(fit, "friction", fit.cov)
     assert list(fit.c["friction"])[:2] == ["viscous", "coulomb"]
-    assert np.sqrt(both @ covariance[:2, :2] @ both) < 0.3 * dry.sigma
+    assert np.sqrt(both @ covariance[:2, :2] @ both) < 0.1 * 0.3
 
 
 def test_undetermined_parameters_are_omitted():

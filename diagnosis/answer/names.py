@@ -39,7 +39,7 @@ def names_of(posterior) -> Names:
     for p, fit in posterior.weights():
         kept.append((p, fit))
         held += p
-        if held >= k.ASSERTED:
+        if held >= 1.0 - k.DOUBTED:
             break
     best = posterior.best()
     credit = {}
@@ -47,7 +47,7 @@ def names_of(posterior) -> Names:
         for name in fit.names:
             credit[name] = max(credit.get(name, 0.0), credibility(fit, name))
     present = {n: p * credit[n] for n, p in posterior.present().items() if n in credit}
-    named = {n: p for n, p in present.items() if p >= k.ASSERTED and n in best.names}
+    named = {n: p for n, p in present.items() if p >= 1.0 - k.DOUBTED and n in best.names}
     rest = [frozenset(fit.names) - set(named) for _, fit in kept]
     groups = [sorted(n for n in g if present[n] >= k.OPEN) for g in alternatives(rest)]
     groups = [g for g in groups if len(g) > 1 and sum(present[n] for n in g) >= 0.5]

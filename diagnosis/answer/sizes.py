@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fluxproof.diagnosis.inference import constants as k
 from fluxproof.diagnosis.result import Fit, Remainder
 
 UNITS = {"u": ("u_dq", "V"), "sum": ("current_sum", "A"), "torque": ("torque", "Nm")}
-VISIBLE = 1.2  # times the noise floor: a smaller misfit of one order is not evaluated
 
 
 @dataclass
@@ -63,7 +63,7 @@ class Sizes:
     def share(self, channel, orders=None) -> float | None:
         """Share of a channel's power above the floor that was explained, in some or all of its orders."""
         mine = [s for (c, h), s in self.orders.items() if c == channel and (orders is None or h in orders)]
-        mine = [s for s in mine if s.before > VISIBLE * s.floor or s.after > VISIBLE * s.floor]
+        mine = [s for s in mine if s.before > k.VISIBLE * s.floor or s.after > k.VISIBLE * s.floor]
         excess, left = sum(s.excess for s in mine), sum(s.left for s in mine)
         return float(1.0 - left / excess) if excess > 0.0 else None
 
@@ -75,7 +75,7 @@ class Sizes:
                 continue
             whole = sum(s.excess for (c, _), s in self.orders.items() if c == channel)
             share = size.left / whole if whole > 0.0 else 0.0
-            if size.after > VISIBLE * size.floor and share >= least:
+            if size.after > k.VISIBLE * size.floor and share >= least:
                 signal, unit = UNITS[channel]
                 out.append(Remainder(signal, round(order, 4), float(np.sqrt(size.left)), unit, float(share)))
         return sorted(out, key=lambda r: -r.share)

@@ -4,21 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 
-FLOOR = 2.0  # times the noise floor: a smaller misfit is noise
-SMALL = 0.03  # of the misfit's power above the floor: a smaller remainder is the formulas' own error
-HALF = 0.5  # of that power: names that explain less are no explanation
+from fluxproof.diagnosis.inference import constants as k
 
 
 def kind_of(names, train, held, share, stray) -> str:
     """The verdict.  names: Names; train, held: Sizes; share: explained share; stray: a misfit outside the orders."""
     if not names.confidence and not names.open:
-        quiet = all(s.before <= FLOOR * s.floor for s in train.channels.values())
+        quiet = all(s.before <= k.FLOOR * s.floor for s in train.channels.values())
         return "no_mismatch" if quiet and not stray and not standing_out(train) else "unexplained"
     sizes = [s for c, s in held.channels.items()]
-    at_floor = all(s.after <= FLOOR * s.floor for s in sizes)
-    whole = at_floor or (share is not None and share >= 1.0 - SMALL)
+    at_floor = all(s.after <= k.FLOOR * s.floor for s in sizes)
+    whole = at_floor or (share is not None and share >= 1.0 - k.SMALL)
     if not whole or stray:
-        return "partly_explained" if share is not None and share >= HALF else "unexplained"
+        return "partly_explained" if share is not None and share >= k.HALF else "unexplained"
     return "ambiguous" if names.open else "explained"
 
 
@@ -26,7 +24,7 @@ def standing_out(sizes) -> list:
     """[(channel, order)] whose remainder exceeds its noise floor and is a large part of what was there before."""
     return [
         key for key, s in sizes.orders.items()
-        if key[0] in sizes.channels and s.after > FLOOR * s.floor and s.left > 0.1 * max(s.excess, 1e-300)
+        if key[0] in sizes.channels and s.after > k.FLOOR * s.floor and s.left > 0.1 * max(s.excess, 1e-300)
     ]  # fmt: skip
 
 

@@ -1,5 +1,6 @@
-"""Every number of the inference that is a choice, with its unit and its reason."""
+"""Every number of the inference that is a choice, with its unit and its reason; `make sensitivity` varies each."""
 
+# ---- what a recording may contain
 # Prior probability that a given effect of the catalogue is present: of some twenty effects one is expected.
 PRESENT = 0.05
 # Error of the balance that no parameter explains, relative to the voltage of an operating point: PWM ripple, the
@@ -17,10 +18,18 @@ DISCREPANCY = 3.0
 MOST_DISCREPANCY = 1e4
 # Share of its own contribution by which the formula of an effect is wrong at each operating point.
 FORMULA = 0.01
-# A posterior from which a name is asserted, and the mass that an ambiguity must hold.
-ASSERTED = 0.95
+# Odds against a load that nobody recorded at every operating point: a drive is run without load at one of them.
+ALWAYS_LOADED = 1e4
+# Of the top speed and the rated current: closer blocks belong to one operating point, as a drive regulates them.
+POINT = 0.08
+
+# ---- what the answer says
+# Probability of not being there up to which an effect is named, and mass of the posterior that is not looked at.
+DOUBTED = 0.05
 # Probability from which an effect is an alternative.
 OPEN = 0.02
+# Probability from which an effect that is not named takes part in what is explained.
+LIKELY = 0.5
 # Discrepancy, in units of the balance's error, that every recording may have.
 USUAL = 1.5
 # A leftover imitates an effect up to this many times its own rms: smooth physics lies along a few directions only.
@@ -28,10 +37,33 @@ IMITATION = 2.0
 # Share of an effect's power in an order from which it lives there; weight of what is left in its other orders.
 LIVES = 0.05
 ELSEWHERE = 0.1
-# Slow logs: resolution and timing of messages, ripple and clamping, relative to the bus and to the voltage; share of
-# the voltage's change around a stretch, as a row combines messages of different age.
+# Times the noise floor: a smaller misfit is noise.
+FLOOR = 2.0
+# The same for a single order: a smaller misfit is not evaluated.
+VISIBLE = 1.2
+# Of the misfit's power above the floor: a smaller remainder is the formulas' own error.
+SMALL = 0.03
+# Of that power: names that explain less are no explanation.
+HALF = 0.5
+
+# ---- a misfit outside the orders of the balance
+# Of the misfit's rms: ripple that the formulas of the named effects may leave.
+FORMS_LEFT = 0.06
+# Power of the sum over the sum of powers of a misfit that is locked to the rotor; exp(-30) by chance.
+LOCKED = 30.0
+# Of the voltage: smaller ripple is attributed to the inverter; the same of a swing at a frequency of its own.
+LEAST_RIPPLE = 1.5e-3
+LEAST_SWING = 4e-3
+# Of the rated torque: a smaller ripple is not looked for.
+LEAST_TORQUE = 0.01
+# Low end of the rising noise spectrum over its neighbourhood, from which it is a swing.
+SWING = 8.0
+
+# ---- slow logs
+# Resolution and timing of messages, ripple and clamping, relative to the bus and to the voltage; share of the voltage's
+# change around a stretch, as a row combines messages of different age.
 SLOW_DC, SLOW_U, SLOW_CHANGE = 2.5e-4, 2e-3, 0.05
-# Slow logs: largest reduced chi^2 of an accepted explanation; share of the misfit's rms that may be left to the shapes
-# of curves; share of its power that names must explain beside a remainder, as that search does not know how much may
-# imitate an effect.
+# Largest reduced chi^2 of an accepted explanation; share of the misfit's rms that may be left to the shapes of curves;
+# share of its power that names must explain beside a remainder, as that search does not know how much may imitate an
+# effect.
 LEFTOVER, FLOOR_SHARE, NAMED_SHARE = 2.0, 0.15, 0.9

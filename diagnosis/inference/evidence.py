@@ -15,18 +15,20 @@ import numpy as np
 
 STEPS = 7
 LEAST = 1.0  # in units of the balance's error
-ALWAYS_LOADED = 1e4  # odds against a load at every operating point of a recording
 FACTORS = np.array([0.1, 0.35, 0.7, 1.0, 1.4, 3.0, 10.0])  # of the discrepancy, tried in every step
 
 
 @numba.njit(cache=True)
-def evidence(x, y, s2, level, group, groups, loads, load, prior, owner, core, most, formula, scale, largest, start):
+def evidence(
+    x, y, s2, level, group, groups, loads, load, prior, owner, core, most, formula, scale, largest, always, start
+):
     """(log evidence, coefficients (k,), covariance (k, k), sizes (effects,), lambdas (groups,)).
 
     x: (n, k) columns of the set; prior: (k,) p_k; owner: (k,) effect of a column; core: (k,)
     bool, a column of the formula and not of the free curve; most: (effects,) largest size.
     loads, load: group whose rows may contain a load of the scale ``load`` each, -1: none.
     start: torque, in multiples of the smallest one, above which a row is first taken as loaded.
+    always: odds against a load at every operating point.
     formula: share of an effect's contribution that counts as discrepancy; scale, largest: prior of lambda.
     """
     n, k = x.shape
@@ -149,5 +151,5 @@ def evidence(x, y, s2, level, group, groups, loads, load, prior, owner, core, mo
                 rows += 1
                 free += loaded[i] == 0.0
         if rows and not free:
-            value -= np.log(ALWAYS_LOADED)
+            value -= np.log(always)
     return value, c, cov, a, lam

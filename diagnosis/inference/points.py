@@ -21,7 +21,6 @@ import numpy as np
 from fluxproof.diagnosis.effect import rated_torque
 from fluxproof.diagnosis.inference import constants as k
 
-POINT = 0.08  # of top speed and rated current: closer operating points count as one
 VISITS = 16  # visits into which a recording of a single operating point is cut
 
 
@@ -58,7 +57,7 @@ def point_numbers(view) -> np.ndarray:
     number, free = np.full(len(points), -1), 0
     while (number < 0).any():
         first = points[np.argmax(number < 0)]
-        number[(number < 0) & (np.abs(points - first).max(axis=1) < POINT)] = free
+        number[(number < 0) & (np.abs(points - first).max(axis=1) < k.POINT)] = free
         free += 1
     return number
 

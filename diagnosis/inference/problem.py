@@ -111,7 +111,7 @@ class Problem:
             evidence(
                 x, p.y, p.s2, p.level, p.group, len(p.groups), p.loads, p.load,
                 self.prior[take], owner, core, most,
-                k.FORMULA, k.DISCREPANCY, k.MOST_DISCREPANCY, start,
+                k.FORMULA, k.DISCREPANCY, k.MOST_DISCREPANCY, k.ALWAYS_LOADED, start,
             )
             for start in ((np.inf, 1.5, 3.0) if drags else (np.inf,))
         ]  # fmt: skip

@@ -11,7 +11,7 @@ needs_of() {
         demo | papers | faults) echo core report sim ghdl c++ ghdl5 ;;
         timeline) echo core report sim ghdl ;;
         generate | registers | package) echo core report package ;;
-        blind) echo run ;;
+        blind | sensitivity) echo run ;;
         bench | real) echo run test ;;
         compare) echo run compare ;;
         verilog) echo core ghdl5 ;;
