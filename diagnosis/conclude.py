@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fluxproof.diagnosis.answer import verdict as words
-from fluxproof.diagnosis.answer.estimates import named_effects
+from fluxproof.diagnosis.answer.estimates import covariance_of, named_effects
 from fluxproof.diagnosis.answer.names import names_of
 from fluxproof.diagnosis.answer.sizes import Sizes, fit_of
 from fluxproof.diagnosis.answer.verdict import kind_of
@@ -24,7 +24,7 @@ def conclude(posterior, held, progress=lambda text: None) -> Diagnosis:
     setup, names, best = posterior.setup, names_of(posterior), posterior.best()
     view, cells, before = setup.view, setup.cells, setup.cells.y
     likely = {n for n, p in names.maybe.items() if p >= k.LIKELY}
-    told = (names.said | {n for group in names.open for n in group} | likely) & set(best.names)
+    told = (names.said | {n for group in names.open for n in group} | likely) & set(best.names) - set(names.suspects)
     after = best.left(told)
     measured = setup.load == 0.0  # otherwise the torque follows from the angle, whose resolution is not the shaft's
     train = Sizes(setup, before, after, ~held, measured)
@@ -41,15 +41,14 @@ def conclude(posterior, held, progress=lambda text: None) -> Diagnosis:
     answer.explained_share = share
     answer.remainder = unseen.remainder() if kind != "no_mismatch" else []
     if stray:
-        answer.remainder.insert(0, Remainder("torque" if stray.kind == "torque" else "u_dq", stray.order,
-                                             stray.size, stray.size_unit, float(min(stray.explains, 1.0))))  # fmt: skip
+        answer.remainder = _with_stray(answer.remainder, stray, train)
     if names.open:
         progress("choosing the next recording")
         noise_v = float(np.nanmedian(np.abs(at_order(cells, setup.noise, 0.0))))
         open_names = sorted({n for group in names.open for n in group})
         answer.next_recording = requests(setup, _rivals(names), noise_v, wants_cold(open_names, setup.effects, view))
     if kind in ("unexplained", "partly_explained"):
-        answer.unknown_term = _unknown(best, after, stray)
+        answer.unknown_term = _unknown(best, after, stray, names, held, unseen)
     if kind == "unexplained":  # beside a large unknown part even a credible name may be its imitation
         for e in answer.effects:
             answer.notes.append(f"{setup.effects[e.name].title}: would explain {100 * e.explains:.0f} %, not asserted.")
@@ -60,10 +59,24 @@ def conclude(posterior, held, progress=lambda text: None) -> Diagnosis:
     answer.notes.append(
         f"The voltage balance was made on {len(view)} steady blocks of {rows} rows; {int(held.sum())} were not fitted."
     )
+    for name in names.suspects:
+        if answer.unknown_term is None or answer.unknown_term.meaning != setup.effects[name].title:
+            answer.notes.append(f"Besides, it is {words.as_if(_described(best, name, held, unseen))}.")
     for name, p in sorted(names.maybe.items(), key=lambda entry: -entry[1])[:3]:
         answer.notes.append(f"{setup.effects[name].title}: possible (probability {p:.2f}), not asserted.")
     answer.trace = "; ".join(f"{p:.3f} {'+'.join(f.names) or 'none'}" for p, f in names.fits[:4])
     return answer
+
+
+def _with_stray(remainder, stray, train) -> list[Remainder]:
+    """The remainder with a misfit outside the orders of the balance, in place of a smaller one of its own order."""
+    channel, signal = ("torque", "torque") if stray.kind == "torque" else ("u", "u_dq")
+    whole = train.channels[channel].before if channel in train.channels else stray.size
+    share = float(min((stray.size / max(whole, 1e-12)) ** 2, 1.0))
+    found = Remainder(signal, stray.order, stray.size, stray.size_unit, share)
+    same = lambda r: r.signal == signal and abs(r.order) == abs(found.order) and stray.kind == "order"  # noqa: E731
+    rest = [r for r in remainder if not same(r)]
+    return sorted([found, *rest], key=lambda r: -r.share)
 
 
 def _rivals(names) -> list:
@@ -111,11 +124,26 @@ def _stray(best, train) -> Stray | None:
     return found
 
 
-def _unknown(best, after, stray) -> UnknownTerm | None:
-    """The formula that fits the remainder best."""
+def _unknown(best, after, stray, names, held, unseen) -> UnknownTerm | None:
+    """What fits the remainder best: a suspect, or a formula."""
+    suspect = max(names.suspects, key=lambda n: names.suspects[n] * best.sizes[best.names.index(n)], default=None)
+    if suspect:
+        return _described(best, suspect, held, unseen)
     if stray is None:
         setup = best.problem.setup
         sigma = np.hypot(setup.noise, setup.level)
         return sparse_term(best.problem.view, setup.cells, after, sigma, setup.train)
     signal = "torque" if stray.kind == "torque" else "u_dq"
     return UnknownTerm(signal, stray.formula, stray.value, stray.sigma, stray.unit, min(stray.explains, 1.0))
+
+
+def _described(best, name, held, unseen) -> UnknownTerm:
+    """A suspect with its parameter and the share of the remainder that it explains at points that were not fitted."""
+    setup, effect = best.problem.setup, best.problem.setup.effects[name]
+    channel = "u"
+    least = Sizes(setup, setup.cells.y, best.left(), held, True).channels[channel].left
+    before = unseen.channels[channel].left
+    share = float(np.clip(1.0 - least / before, 0.0, 1.0)) if before > 0.0 else 0.0
+    parameter, e = next(iter(effect.estimates(best.c[name], covariance_of(best, name, best.cov), None).items()))
+    formula = f"{parameter}, {effect.equation}"
+    return UnknownTerm("u_dq", formula, e.value, e.sigma, e.unit, share, effect.title)

@@ -57,6 +57,7 @@ class Effect:
     parameters: tuple[Parameter, ...]
     absorbs: tuple[str, ...] = ()
     needs: tuple[str, ...] = ()  # of NEEDS: what a recording must show for the effect to be seen
+    named: bool = True  # False: no parameter of the simulation carries it; it is described and not asserted
     positive: bool = False  # the leading coefficient cannot be negative
     corrects: bool = (
         False  # a measurement error rather than a property of the machine: ``corrected`` removes it from the data

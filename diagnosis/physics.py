@@ -14,6 +14,7 @@ from fluxproof.diagnosis.parts import sound
 from fluxproof.diagnosis.recording import Recording
 from fluxproof.diagnosis.result import Diagnosis
 from fluxproof.diagnosis.slow_diagnosis import diagnose_slow
+from fluxproof.diagnosis.suspects import SUSPECTS
 from fluxproof.diagnosis.view import joined_views
 
 HOLDOUT_EVERY = 4  # every fourth dwell is held out
@@ -59,7 +60,8 @@ def posterior_of(recordings, nominal, progress=lambda text: None):
     view = joined_views(views)
     held = held_out(views)
     progress("sets of effects")
-    return Posterior(Setup(view, view.visible(CATALOGUE), ~held), progress), held
+    effects = view.visible({**CATALOGUE, **SUSPECTS})
+    return Posterior(Setup(view, effects, ~held), progress), held
 
 
 def _physics(recordings, nominal, progress) -> Diagnosis:

@@ -143,7 +143,10 @@ class Convention:
 
 @dataclass
 class UnknownTerm:
-    """The single term that fits the unexplained residual best."""
+    """The single term that fits the unexplained residual best.
+
+    meaning: what it would be physically, as a clause that completes "as if ...", or '' if only its form is known.
+    """
 
     signal: str
     formula: str
@@ -151,6 +154,7 @@ class UnknownTerm:
     sigma: float
     unit: str
     explains: float
+    meaning: str = ""
 
 
 @dataclass

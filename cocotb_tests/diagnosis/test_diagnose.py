@@ -216,7 +216,7 @@ def test_a_new_file_is_a_new_effect(tmp_path, monkeypatch):
     monkeypatch.setattr(catalogue, "__path__", [*catalogue.__path__, str(tmp_path)])
     importlib.invalidate_caches()
     try:
-        grown = catalogue._found()
+        grown = catalogue.found_in(catalogue.__name__, catalogue.__path__)
         assert set(grown) == set(CATALOGUE) | {"second_harmonic"}
         monkeypatch.setattr(physics, "CATALOGUE", grown)
         answer = diagnose(recorded(machine=SECOND), NOMINAL)

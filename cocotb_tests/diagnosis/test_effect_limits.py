@@ -159,6 +159,14 @@ def test_an_axis_without_current_has_no_curve(view):
     assert CATALOGUE["inductance_d"].free(later) == {}
 
 
+def test_lost_flux_does_not_fall_further():
+    possible, sure = CATALOGUE["magnet_flux"].possible, np.diag([1e-10, 1e-10])
+    flux = lambda lost, recovery: {"delta_psi_m": lost, "recovery": recovery}  # noqa: E731
+    assert possible(flux(-3e-3, 3e-4), sure, NOMINAL) and possible({"delta_psi_m": -3e-3}, sure[:1, :1], NOMINAL)
+    assert not possible(flux(-3e-3, -3e-4), sure, NOMINAL)
+    assert possible(flux(-3e-3, -3e-4), np.diag([1e-10, 1e-6]), NOMINAL)
+
+
 def test_flux_lost_from_the_start_is_no_drift():
     """A demagnetised rotor that recovers slightly: a free drift could imitate it by a step at the start."""
     possible, course = CATALOGUE["magnet_temperature"].possible, np.array([0.0, 0.08, 0.25, 0.55, 1.0])

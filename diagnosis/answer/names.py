@@ -19,13 +19,15 @@ from fluxproof.diagnosis.inference import constants as k
 class Names:
     """confidence: {effect: probability} of the named ones; open: groups of which one effect is present.
 
-    maybe: {effect: probability} of effects that are neither named nor an alternative.  fits: the sets that hold the
+    maybe: {effect: probability} of effects that are neither named nor an alternative.  suspects: {effect: probability}
+    of causes that are as sure as a name but that no simulation carries.  fits: the sets that hold the
     mass of the posterior, the most probable first, with their probabilities.
     """
 
     confidence: dict[str, float]
     open: list[list[str]]
     maybe: dict[str, float]
+    suspects: dict[str, float] = field(default_factory=dict)
     fits: list = field(default_factory=list)
 
     @property
@@ -47,13 +49,17 @@ def names_of(posterior) -> Names:
         for name in fit.names:
             credit[name] = max(credit.get(name, 0.0), credibility(fit, name))
     present = {n: p * credit[n] for n, p in posterior.present().items() if n in credit}
-    named = {n: p for n, p in present.items() if p >= 1.0 - k.DOUBTED and n in best.names}
-    rest = [frozenset(fit.names) - set(named) for _, fit in kept]
+    effects = posterior.setup.effects
+    sure = {n: p for n, p in present.items() if p >= 1.0 - k.DOUBTED and n in best.names}
+    named = {n: p for n, p in sure.items() if effects[n].named}
+    suspects = {n: p for n, p in sure.items() if not effects[n].named}
+    rest = [frozenset(fit.names) - set(sure) for _, fit in kept]
     groups = [sorted(n for n in g if present[n] >= k.OPEN) for g in alternatives(rest)]
     groups = [g for g in groups if len(g) > 1 and sum(present[n] for n in g) >= 0.5]
+    groups = [g for g in groups if any(effects[n].named for n in g)]
     grouped = {n for g in groups for n in g}
-    maybe = {n: p for n, p in present.items() if n not in named and n not in grouped and p >= k.PRESENT}
-    return Names(named, groups, maybe, kept)
+    maybe = {n: p for n, p in present.items() if n not in sure and n not in grouped and p >= k.PRESENT}
+    return Names(named, groups, maybe, suspects, kept)
 
 
 def alternatives(sets) -> list[set[str]]:

@@ -10,6 +10,8 @@ from fluxproof.diagnosis.inference import constants as k
 def kind_of(names, train, held, share, stray) -> str:
     """The verdict.  names: Names; train, held: Sizes; share: explained share; stray: a misfit outside the orders."""
     if not names.confidence and not names.open:
+        if names.suspects:
+            return "unexplained"
         quiet = all(s.before <= k.FLOOR * s.floor for s in train.channels.values())
         return "no_mismatch" if quiet and not stray and not standing_out(train) else "unexplained"
     sizes = [s for c, s in held.channels.items()]
@@ -56,12 +58,25 @@ def sentence(answer, effects) -> str:
         begin = f"{what} for certain; beyond that, t" if what else "T"
         return f"{begin}his recording cannot separate {sets}: {fall}."
     where = located(answer)
+    meaning = answer.unknown_term.meaning if answer.unknown_term else ""
     if answer.verdict == "partly_explained":
         begin = what or f"One of {sets}"
         share = 100.0 * (answer.explained_share if answer.explained_share is not None else 0.0)
         explained = f"{begin} explains {min(share, 99.9):.0f} % of the misfit's power"
-        return f"{explained}: {fall}; the rest is {where} and has no known cause."
+        cause = f"is {as_if(answer.unknown_term)}" if meaning else "has no known cause"
+        return f"{explained}: {fall}; the rest is {where} and {cause}."
+    if meaning:
+        u = answer.unknown_term
+        return (
+            f"No parameter of the simulation explains the misfit of {fit.train_before:.3g} V, {where}: it is"
+            f" {as_if(answer.unknown_term)}, which would explain {100.0 * u.explains:.0f} % of it."
+        )
     return f"Unknown: no effect in the catalogue explains half of the misfit of {fit.train_before:.3g} V, {where}."
+
+
+def as_if(u) -> str:
+    """'as if the measured currents were late (2.7e-05 +- 3e-07 s)' of a term whose meaning is known."""
+    return f"as if {u.meaning} ({u.value:.3g} +- {u.sigma:.1g} {u.unit})"
 
 
 def located(answer) -> str:

@@ -6,13 +6,14 @@ import pkgutil
 from fluxproof.diagnosis.effect import Effect
 
 
-def _found() -> dict[str, Effect]:
+def found_in(package: str, path) -> dict[str, Effect]:
+    """{name: effect} of every module of a package that defines EFFECT."""
     effects = {}
-    for module in sorted(m.name for m in pkgutil.iter_modules(__path__)):
-        effect = getattr(importlib.import_module(f"{__name__}.{module}"), "EFFECT", None)
+    for module in sorted(m.name for m in pkgutil.iter_modules(path)):
+        effect = getattr(importlib.import_module(f"{package}.{module}"), "EFFECT", None)
         if effect is not None:
             effects[effect.name] = effect
     return effects
 
 
-CATALOGUE: dict[str, Effect] = _found()
+CATALOGUE: dict[str, Effect] = found_in(__name__, __path__)

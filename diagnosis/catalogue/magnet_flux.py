@@ -3,7 +3,7 @@
 import numpy as np
 
 from fluxproof.diagnosis.curves import course
-from fluxproof.diagnosis.effect import FluxEffect, Parameter, one, sigma
+from fluxproof.diagnosis.effect import DOUBT, FluxEffect, Parameter, one, sigma
 
 
 class MagnetFlux(FluxEffect):
@@ -12,6 +12,13 @@ class MagnetFlux(FluxEffect):
 
     def free_psi(self, view):
         return {"recovery": np.ones_like(view.i) * course(view)}
+
+    def possible(self, c, covariance, nominal):
+        """Lost flux may recover, but not fall further: that is a warming magnet."""
+        key, lost = "recovery", c["delta_psi_m"]
+        if not c.get(key):
+            return True
+        return c[key] * np.sign(lost) <= DOUBT * sigma(covariance, list(c).index(key))
 
     def floor(self, nominal):
         return 0.003 * nominal.machine.magnet_flux_wb

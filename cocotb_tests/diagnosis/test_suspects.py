@@ -1,0 +1,78 @@
+"""Causes that the simulation has no parameter for: described with their size, never named, beside what is named."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from cocotb_tests.core.test_registers import PAPER
+from cocotb_tests.support.diagnosed_drives import DRIVE, GRID, MACHINE, columns
+from fluxproof.diagnosis import diagnose
+from fluxproof.diagnosis.catalogue import CATALOGUE
+from fluxproof.diagnosis.recording import from_columns
+from fluxproof.diagnosis.suspects import SUSPECTS
+
+T = DRIVE.sample_time_s
+
+
+def late(table, tau):
+    """Phase currents behind a first-order filter of the time constant tau [s], exact for straight lines in between."""
+    keep = np.exp(-T / tau)
+    share = 1.0 - (1.0 - keep) * tau / T
+    out = dict(table)
+    for name in ("i_a", "i_b", "i_c"):
+        x, y = table[name], np.empty_like(table[name])
+        y[0] = x[0]
+        for k in range(1, len(x)):
+            y[k] = keep * y[k - 1] + (1.0 - keep - share) * x[k - 1] + share * x[k]
+        out[name] = y
+    return out
+
+
+def answer_of(table):
+    return diagnose(from_columns(table, T, "test bench"), PAPER)
+
+
+def test_late_currents_are_described():
+    tau = 0.2 * T
+    answer = answer_of(late(columns(GRID), tau))
+    assert answer.verdict == "unexplained" and not answer.effects and not answer.ambiguity
+    term = answer.unknown_term
+    assert "filter" in term.meaning and "filter" in answer.sentence and term.unit == "s"
+    assert term.value == pytest.approx(tau, rel=0.1) and term.explains > 0.8
+
+
+def test_what_is_known_is_named_beside_late_currents():
+    psi = 0.98 * MACHINE.magnet_flux_wb
+    answer = answer_of(late(columns(GRID, (("magnet_flux_wb", psi),)), 0.3 * T))
+    assert [e.name for e in answer.effects] == ["magnet_flux"] and answer.verdict == "partly_explained"
+    assert answer.effects[0].parameters["magnet_flux_wb"].value == pytest.approx(psi, rel=5e-3)
+    assert "filter" in answer.unknown_term.meaning and 0.5 < answer.explained_share < 0.97
+
+
+def test_a_small_lag_is_noted_beside_an_explanation():
+    answer = answer_of(late(columns(GRID, (("magnet_flux_wb", 0.9 * MACHINE.magnet_flux_wb),)), 0.1 * T))
+    assert [e.name for e in answer.effects] == ["magnet_flux"] and answer.verdict == "explained"
+    assert any("filter" in note for note in answer.notes)
+
+
+def test_a_leg_of_its_own_voltage_is_no_offset_of_a_sensor():
+    table = dict(columns(GRID))
+    table["d_b"] = table["d_b"] + 0.006
+    answer = answer_of(table)
+    assert answer.verdict == "unexplained" and not answer.effects
+    assert "legs" in answer.unknown_term.meaning
+    assert answer.unknown_term.value == pytest.approx(0.006 * DRIVE.inverter.dc_bus_v, rel=0.05)
+
+
+def test_offsets_of_the_sensors_are_named():
+    table = dict(columns(GRID))
+    table["i_a"] = table["i_a"] + 0.05 * DRIVE.machine.rated_current_a
+    answer = answer_of(table)
+    assert [e.name for e in answer.effects] == ["current_offset"] and answer.verdict == "explained"
+
+
+def test_suspects_are_not_in_the_catalogue():
+    assert SUSPECTS and not set(SUSPECTS) & set(CATALOGUE)
+    assert not any(e.named for e in SUSPECTS.values()) and all(e.named for e in CATALOGUE.values())
+    assert all(set(e.confounders) <= set(CATALOGUE) for e in SUSPECTS.values())

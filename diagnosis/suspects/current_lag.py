@@ -1,0 +1,42 @@
+"""Measured currents that are late against angle and voltage, as behind a filter in front of the converters."""
+
+import numpy as np
+
+from fluxproof.diagnosis.effect import Effect, Parameter, current_error, one, sigma
+
+
+def _slope(view):
+    """Slope of the measured current in the stator frame, in dq at the angle of the sample, (b, m+1) [A/s]."""
+    return np.gradient(view.i, axis=1) / view.sample_time_s + 1j * view.omega * view.i
+
+
+class CurrentLag(Effect):
+    def core(self, view):
+        return {"tau": current_error(view, -_slope(view))}
+
+    def floor(self, nominal):
+        return 0.006 * nominal.sample_time_s
+
+    def ceiling(self, nominal):
+        return 2.0 * nominal.sample_time_s
+
+    def corrected(self, view, c):
+        return view.without_current(view.phases(-c["tau"] * _slope(view)))
+
+    def estimates(self, c, covariance, nominal):
+        return one("tau_s", "s", c["tau"], sigma(covariance))
+
+
+EFFECT = CurrentLag(
+    name="current_lag",
+    title="the measured currents were late, as behind a filter in front of the converters",
+    equation="i_measured + tau di_measured/dt = i",
+    signature="order 0: the whole current vector rotated by omega tau, and smaller by its square",
+    confounders=("sampling_skew", "delay", "encoder_offset"),
+    separated_by="load at two speeds; a step of the current",
+    parameters=(Parameter("tau_s", "s", "time constant"),),
+    corrects=True,
+    positive=True,
+    named=False,
+    needs=("samples", "current"),
+)

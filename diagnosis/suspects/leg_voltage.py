@@ -1,0 +1,42 @@
+"""Voltage errors of single inverter legs, constant over the turn, as of drivers with different delays."""
+
+import numpy as np
+
+from fluxproof.diagnosis.catalogue.current_offset import PATTERNS
+from fluxproof.diagnosis.effect import Effect, Parameter, voltage
+from fluxproof.diagnosis.result import Estimate
+
+LEGS = {name: np.array(weights) for name, weights in PATTERNS.items() if name != "zero"}
+
+
+class LegVoltage(Effect):
+    def core(self, view):
+        share = view.u_dc / view.nominal.inverter.dc_bus_v
+        return {name: voltage(view.from_phases(share[..., None] * weights)) for name, weights in LEGS.items()}
+
+    def floor(self, nominal):
+        return 5e-4 * nominal.inverter.dc_bus_v
+
+    def ceiling(self, nominal):
+        return 0.1 * nominal.inverter.dc_bus_v
+
+    def size(self, c, nominal):
+        return float(np.hypot(c["alpha"], c["beta"]))
+
+    def estimates(self, c, covariance, nominal):
+        value = self.size(c, nominal)
+        toward = np.array([c["alpha"], c["beta"]]) / max(value, 1e-12)
+        return {"volts": Estimate(value, float(np.sqrt(max(toward @ covariance @ toward, 0.0))), "V")}
+
+
+EFFECT = LegVoltage(
+    name="leg_voltage",
+    title="the legs of the inverter had different voltage errors, as of drivers with different delays",
+    equation="u = u_recorded - e_abc, constant in the stator frame",
+    signature="order 1 in dq, the same at every speed and current",
+    confounders=("current_offset", "encoder_eccentricity"),
+    separated_by="two speeds: offsets of the sensors also appear proportional to the speed",
+    parameters=(Parameter("volts", "V", "difference of the legs"),),
+    named=False,
+    needs=("harmonics", "inverter"),
+)
