@@ -77,9 +77,9 @@ def rng_of(seed: int, index: int, attempt: int = 0, purpose: int = 0):
     return np.random.default_rng([seed, index, attempt, purpose])
 
 
-def strata_counts(count: int) -> dict[str, int]:
+def strata_counts(count: int, strata: dict[str, float] = STRATA) -> dict[str, int]:
     """Number of cases of each stratum for a total of ``count``; singles take the rounding."""
-    counts = {name: int(round(share * count)) for name, share in STRATA.items()}
+    counts = {name: int(round(share * count)) for name, share in strata.items()}
     counts["single"] += count - sum(counts.values())
     return counts
 

@@ -1,4 +1,4 @@
-"""Write a benchmark: `python -m studies.blind.generate --seed 1 --out build/blind/seed1 --count 300`.
+"""Write a benchmark: `python -m studies.blind.generate --generator motulator --seed 1 --count 60`.
 
 OUT/case_0001/recording.csv or .parquet and drive.toml, shuffled so that a number says nothing about the
 stratum; the truth of all cases in OUT/../truth_NAME.sealed, its SHA-256 in OUT/sealed.sha256.
@@ -19,18 +19,26 @@ from fluxproof.checkout import BUILD
 from fluxproof.files import write_text
 from studies.blind import cases, identifiable
 from studies.blind.seal import seal
+from studies.blind.strangers import cases as strangers
+from studies.blind.strangers.write import write_case
 
 ATTEMPTS = 12
+GENERATORS = ("own", *strangers.GENERATORS)
 
 
-def listing(seed: int, count: int, only: list[str] | None) -> list[tuple[int, str, int]]:
+def listing(seed: int, count: int, only: list[str] | None, generator="own") -> list[tuple[int, str, int]]:
     """(case number, stratum, turn within the stratum), shuffled by the seed."""
-    counts = cases.strata_counts(count)
+    counts = cases.strata_counts(count, strata_of(generator))
     if only:
         counts = {name: counts[name] for name in only}
     entries = [(name, turn) for name, n in counts.items() for turn in range(n)]
     np.random.default_rng([seed, 77]).shuffle(entries)
     return [(k + 1, str(name), int(turn)) for k, (name, turn) in enumerate(entries)]
+
+
+def strata_of(generator: str) -> dict[str, float]:
+    """Shares of a generator's strata."""
+    return cases.STRATA if generator == "own" else strangers.STRATA
 
 
 def write_recording(path: Path, columns: dict, kind: str) -> Path:
@@ -48,7 +56,9 @@ def write_recording(path: Path, columns: dict, kind: str) -> Path:
 
 def generate_case(job) -> dict:
     """Simulate and write one case; its entry of the truth."""
-    seed, number, stratum, turn, out = job
+    generator, seed, number, stratum, turn, out = job
+    if generator != "own":
+        return write_case(job, write_recording)
     for attempt in range(ATTEMPTS):
         case = cases.make(seed, number, stratum, turn, attempt)
         try:
@@ -71,6 +81,7 @@ def generate_case(job) -> dict:
         "index": number,
         "turn": turn,
         "attempt": attempt,
+        "generator": generator,
         "effects": case.effects,
         "kind": case.kind,
         "problem_codes": codes,
@@ -81,7 +92,9 @@ def generate_case(job) -> dict:
     }
 
 
-def generate(seed: int, out: Path, count: int, only: list[str] | None = None, jobs: int = 2) -> str:
+def generate(
+    seed: int, out: Path, count: int, only: list[str] | None = None, jobs: int = 2, generator: str = "own"
+) -> str:
     """All cases of a seed into ``out``; returns the truth's SHA-256."""
     out = Path(out).resolve()
     out.mkdir(parents=True, exist_ok=True)
@@ -89,20 +102,21 @@ def generate(seed: int, out: Path, count: int, only: list[str] | None = None, jo
         old.unlink(missing_ok=True)
     for old in out.glob("case_*"):
         old.rmdir()
-    work = [(seed, *entry, out) for entry in listing(seed, count, only)]
+    work = [(generator, seed, *entry, out) for entry in listing(seed, count, only, generator)]
     truth = []
     with multiprocessing.get_context("spawn").Pool(jobs) as pool:
         for entry in pool.imap_unordered(generate_case, work):
             truth.append(entry)
-            print(f"\r{len(truth)} of {len(work)} cases ", end="", file=sys.stderr, flush=True)
+            print(f"\r{generator}: {len(truth)} of {len(work)} cases ", end="", file=sys.stderr, flush=True)
     print(file=sys.stderr)
     truth.sort(key=lambda entry: entry["case"])
-    return seal(out, {"seed": seed, "cases": truth})
+    return seal(out, {"seed": seed, "generator": generator, "cases": truth})
 
 
 def main(arguments=None) -> int:
     """The command line; returns 0 when all cases are written."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--generator", choices=GENERATORS, default="own")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--out", type=Path)
     parser.add_argument("--count", type=int, default=300)
@@ -110,11 +124,12 @@ def main(arguments=None) -> int:
     parser.add_argument("--jobs", type=int, default=2)
     options = parser.parse_args(arguments)
     only = options.only.split(",") if options.only else None
-    wrong = set(only or ()) - set(cases.STRATA)
+    strata = strata_of(options.generator)
+    wrong = set(only or ()) - set(strata)
     if wrong:
-        parser.error(f"--only: no stratum {', '.join(sorted(wrong))}; known are {', '.join(cases.STRATA)}")
-    out = options.out or BUILD / "blind" / f"seed{options.seed}"
-    digest = generate(options.seed, out, options.count, only, options.jobs)
+        parser.error(f"--only: no stratum {', '.join(sorted(wrong))}; known are {', '.join(strata)}")
+    out = options.out or BUILD / "blind" / options.generator / f"seed{options.seed}"
+    digest = generate(options.seed, out, options.count, only, options.jobs, options.generator)
     print(f"{out}: sealed, SHA-256 {digest}")
     return 0
 

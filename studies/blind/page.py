@@ -4,6 +4,11 @@ from __future__ import annotations
 
 from jinja2 import Environment
 
+HEADS = (
+    "single_named_right", "pairs_exactly_right", "triples_exactly_right", "confidently_wrong", "false_alarm_healthy",
+    "truth_inside_ambiguity", "unknown_recognised", "median_time_s",
+)  # fmt: skip
+
 TEMPLATE = """<!doctype html><html lang="en"><meta charset="utf-8"><title>Blind benchmark</title>
 <style>body{font:15px/1.45 sans-serif;max-width:1200px;margin:2em auto;padding:0 1em;color:#222}
 table{border-collapse:collapse;margin:.6em 0 1.6em}td,th{border-bottom:1px solid #ddd;
@@ -23,6 +28,13 @@ SHA-256 <code>{{ r.sha256 }}</code>.
 <td>{% if f.met is defined %}
 <span class="{{ 'met' if f.met else 'missed' }}">{{ 'met' if f.met else 'missed' }}</span>
 {% endif %}</tr>{% endfor %}</table>
+{% if r.generators is defined %}<h2>Generators</h2><table><tr><th>generator<th>cases
+{% for name in heads %}<th>{{ name.replace('_', ' ') }}{% endfor %}</tr>
+{% for name, g in r.generators.items() %}<tr><td>{{ name }}, seed {{ g.seed }}<td>{{ g.cases_total }}
+{% for key in heads %}{% set f = g.figures[key] %}<td>{{ number(f.value) }}
+{% if f.k is defined %}({{ f.k }} of {{ f.n }}){% endif %}{% endfor %}</tr>{% endfor %}</table>
+{% for name, g in r.generators.items() %}{{ diagram(name, g.reliability) | safe }}{% endfor %}{% endif %}
+<h2>Reliability of the confidence</h2>{{ diagram(r.generator, r.reliability) | safe }}
 <h2>The catalogue's functional form and others</h2><table><tr><th>figure<th>catalogue<th>other</tr>
 {% for name in r.figures if name in r.by_form.catalogue or name in r.by_form.other %}<tr><td>{{ name }}
 {% for kind in ('catalogue', 'other') %}{% set f = r.by_form[kind][name] %}
@@ -58,10 +70,34 @@ def _number(x):
     return "" if x is None else f"{x:.4g}"
 
 
+def diagram(name: str, bins: list[dict]) -> str:
+    """A reliability diagram as SVG: share of names that are right against the confidence stated."""
+    low = 0.9  # the axes begin here; nothing is named below 0.95
+    at = lambda p: 30.0 + 260.0 * (max(p, low) - low) / (1.0 - low)  # noqa: E731
+    marks = []
+    for b in bins:
+        if b["n"]:
+            x, (bottom, top) = at(b["stated"]), b["interval"]
+            marks.append(f'<line x1="{x:.0f}" x2="{x:.0f}" y1="{320 - at(bottom):.0f}" y2="{320 - at(top):.0f}"/>')
+            title = f"{b['k']} of {b['n']} right, stated {b['stated']:.3f}"
+            marks.append(f'<circle cx="{x:.0f}" cy="{320 - at(b["value"]):.0f}" r="4"><title>{title}</title></circle>')
+    axes = "".join(
+        f'<text x="{at(p):.0f}" y="312">{p:g}</text><text x="2" y="{324 - at(p):.0f}">{p:g}</text>'
+        for p in (0.9, 0.95, 1.0)
+    )
+    return (
+        f'<svg width="320" height="330" font-size="11" stroke="none"><text x="40" y="14">{name}: names right'
+        f' against confidence</text><g stroke="#999"><line x1="30" y1="290" x2="290" y2="30"/></g>{axes}'
+        f'<g stroke="#0a5" fill="#0a5">{"".join(marks)}</g></svg>'
+    )
+
+
 def page(result: dict) -> str:
     """The whole report as one HTML text."""
     columns = list(result["confusion"])
     columns += sorted({c for row in result["confusion"].values() for c in row} - set(columns))
     columns = [c for c in columns if any(c in row for row in result["confusion"].values())]
     environment = Environment(autoescape=True, trim_blocks=True)
-    return environment.from_string(TEMPLATE).render(r=result, columns=columns, number=_number)
+    return environment.from_string(TEMPLATE).render(
+        r=result, columns=columns, number=_number, diagram=diagram, heads=HEADS
+    )

@@ -19,6 +19,7 @@ from fluxproof.files import write_json, write_text
 from studies.blind import figures, tables
 from studies.blind.again import resolve
 from studies.blind.page import page
+from studies.blind.reliability import reliability
 from studies.blind.seal import SealError, truth_path, unseal
 
 
@@ -89,11 +90,12 @@ def score(folder: Path, jobs: int = 2, reuse: bool = False) -> dict:
     ties = [
         (t, a, truth["seed"], folder, scratch)
         for t, a in cases
-        if a.get("verdict") == "ambiguous" and t["effects"]
+        if a.get("verdict") == "ambiguous" and t["effects"] and t.get("generator", "own") == "own"
     ]
     resolved = sorted(_in_parallel(_second_look, ties, jobs, "recorded again"), key=lambda r: r["case"])
     result = summary(cases, resolved)
     result.update(
+        generator=truth.get("generator", "own"),
         seed=truth["seed"],
         cases_total=len(cases),
         sealed=truth_path(folder).name,
@@ -109,6 +111,7 @@ def summary(cases, resolved) -> dict:
     return {
         "schema": 1,
         "figures": figures.figures(cases, resolved),
+        "reliability": reliability(cases),
         "by_form": tables.by_form(cases, resolved),
         "by_stratum": tables.by_stratum(cases),
         "by_effect": tables.by_effect(cases),
