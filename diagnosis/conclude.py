@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from fluxproof.diagnosis.answer import verdict as words
 from fluxproof.diagnosis.answer.estimates import covariance_of, named_effects
+from fluxproof.diagnosis.answer.headline import sentence
 from fluxproof.diagnosis.answer.names import names_of
+from fluxproof.diagnosis.answer.phrases import as_if, capital
 from fluxproof.diagnosis.answer.sizes import Sizes, fit_of
 from fluxproof.diagnosis.answer.verdict import kind_of
 from fluxproof.diagnosis.inference import constants as k
@@ -51,19 +52,20 @@ def conclude(posterior, held, progress=lambda text: None) -> Diagnosis:
         answer.unknown_term = _unknown(best, after, stray, names, held, unseen)
     if kind == "unexplained":  # beside a large unknown part even a credible name may be its imitation
         for e in answer.effects:
-            answer.notes.append(f"{setup.effects[e.name].title}: would explain {100 * e.explains:.0f} %, not asserted.")
+            title = capital(setup.effects[e.name].title)
+            answer.notes.append(f"{title}: would explain {100 * e.explains:.0f} %, not asserted.")
         answer.effects, answer.ambiguity, answer.next_recording = [], [], []
     answer.evidence = evidence(view, (cells, before), (cells, after), setup.noise, held)
-    answer.sentence = words.sentence(answer, setup.effects)
+    answer.sentence = sentence(answer, setup.effects)
     rows = view.u_dc.shape[1]
     answer.notes.append(
         f"The voltage balance was made on {len(view)} steady blocks of {rows} rows; {int(held.sum())} were not fitted."
     )
     for name in names.suspects:
         if answer.unknown_term is None or answer.unknown_term.meaning != setup.effects[name].title:
-            answer.notes.append(f"Besides, it is {words.as_if(_described(best, name, held, unseen))}.")
+            answer.notes.append(f"Besides, it is {as_if(_described(best, name, held, unseen))}.")
     for name, p in sorted(names.maybe.items(), key=lambda entry: -entry[1])[:3]:
-        answer.notes.append(f"{setup.effects[name].title}: possible (probability {p:.2f}), not asserted.")
+        answer.notes.append(f"{capital(setup.effects[name].title)}: possible (probability {p:.2f}), not asserted.")
     answer.trace = "; ".join(f"{p:.3f} {'+'.join(f.names) or 'none'}" for p, f in names.fits[:4])
     return answer
 

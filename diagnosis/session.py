@@ -19,13 +19,14 @@ from pathlib import Path
 
 from threadpoolctl import threadpool_limits
 
+from fluxproof.diagnosis.answer.advice import complete
 from fluxproof.diagnosis.digital import replay
 from fluxproof.diagnosis.improve import write_improved
 from fluxproof.diagnosis.load import load_recording
 from fluxproof.diagnosis.nominal import Nominal, load_nominal
 from fluxproof.diagnosis.overlay import closed_loop
 from fluxproof.diagnosis.parts import left_out
-from fluxproof.diagnosis.physics import explain
+from fluxproof.diagnosis.physics import explain, known_effects
 from fluxproof.diagnosis.recording import Problem, Recording, RecordingError
 from fluxproof.diagnosis.report import write_outputs
 from fluxproof.diagnosis.result import Diagnosis, Digital
@@ -97,6 +98,7 @@ def _diagnose(loaded, nominal, progress) -> Diagnosis:
         answer = _physics(loaded, nominal, progress)
     answer.digital = digital
     answer.notes = [*notes, *answer.notes, *_reading_notes(loaded)]
+    complete(answer, nominal, known_effects())
     return answer
 
 
@@ -105,9 +107,7 @@ def _folder(out: Path, nominal: Nominal) -> Path:
     out.mkdir(parents=True, exist_ok=True)
     target = out / IMPROVED
     if nominal.path and target.exists() and Path(nominal.path).exists() and target.samefile(nominal.path):
-        raise DriveError(
-            f"{target}: this is the drive to diagnose and would be overwritten; choose another folder"
-        )
+        raise DriveError(f"{target}: this is the drive to diagnose and would be overwritten; choose another folder")
     return out
 
 

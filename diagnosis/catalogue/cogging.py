@@ -78,9 +78,10 @@ EFFECT = Cogging(
     confounders=("emf_harmonics", "current_offset"),
     separated_by="a slow turn without current",
     parameters=(
-        Parameter("cogging_nm", "Nm", "amplitude of the largest order"),
-        Parameter("cogging_order", "per turn", "the largest order, per mechanical turn"),
+        Parameter("cogging_nm", "Nm", "amplitude of the largest order", "amplitude"),
+        Parameter("cogging_order", "per turn", "the largest order, per mechanical turn", "order"),
     ),
     mechanical=True,
+    shows_at=(),
     needs=("harmonics",),
 )

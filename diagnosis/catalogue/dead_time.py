@@ -119,14 +119,19 @@ class DeadTime(Effect):
 
 EFFECT = DeadTime(
     name="dead_time",
-    title="inverter dead time and device drops",
+    title="dead time of the inverter",
     equation="u_x = u_x,ref - v_dead s(i_x), s odd, s = 1 above a small current",
     signature="order 0 in phase with the current, (4/pi) v_dead, and orders 6 and 12; independent of the speed",
     confounders=("resistance", "emf_harmonics"),
     separated_by="several currents, i_q reversed; another bus voltage or PWM frequency separates dead time from drops",
-    parameters=(Parameter("v_dead_v", "V", "voltage loss of a leg at full current"),),
+    parameters=(
+        Parameter("v_dead_v", "V", "loss of a leg at full current, device drops included", "dead-time voltage"),
+    ),
     smoothed=True,
     trailing=(12.0, 18.0, 24.0),
+    shows_at=(0.0, 6.0, 12.0, 18.0),
+    plausible={"v_dead_v": (0.0, 0.06, "inverter.dc_bus_v")},
+    otherwise="the dead time is already compensated by the recorded duties, or the bus voltage is wrong",
     needs=("inverter",),
     bounded=("log", "fade"),
 )

@@ -75,9 +75,12 @@ EFFECT = EmfHarmonics(
     confounders=("dead_time", "cogging"),
     separated_by="two speeds; rotation at zero current",
     parameters=(
-        Parameter("order_6", "1", "amplitude relative to the magnet flux"),
-        Parameter("order_12", "1", "amplitude relative to the magnet flux"),
+        Parameter("order_6", "1", "amplitude relative to the magnet flux", "order 6"),
+        Parameter("order_12", "1", "amplitude relative to the magnet flux", "order 12"),
     ),
     trailing=(12.0, 18.0, 24.0),
+    shows_at=(6.0, 12.0, 18.0),
+    plausible={"order_6": (0.0, 0.2), "order_12": (0.0, 0.2)},
+    otherwise="a machine for block commutation, or an angle that is not linear over the turn",
     needs=("harmonics",),
 )

@@ -76,7 +76,9 @@ EFFECT = IronLoss(
     signature="order 0: omega^2 L_q psi / R_fe on the d axis, even in speed, and a drag torque",
     confounders=("sampling_skew", "inductance_q", "resistance", "delay"),
     separated_by="load: omega^2 i_q on the q axis; a shifted sampling trigger; low speed for hysteresis",
-    parameters=(Parameter("iron_resistance_ohm", "ohm", "in parallel with the rotational EMF, at the highest speed"),),
+    parameters=(
+        Parameter("iron_resistance_ohm", "ohm", "parallel to the EMF, at the highest speed", "loss resistance"),
+    ),
     positive=True,
     takes_flux=True,
     needs=("angle",),

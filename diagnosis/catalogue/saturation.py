@@ -62,9 +62,7 @@ class Saturation(FluxEffect):
         x = np.linspace(0, 1, 21)
         bends = []
         for axis in "qd":
-            curve = sum(
-                c.get(f"{axis}_{k}", 0.0) * x**p for k, p in (("2", 2), ("2s", 2), ("3", 3), ("5", 5))
-            )
+            curve = sum(c.get(f"{axis}_{k}", 0.0) * x**p for k, p in (("2", 2), ("2s", 2), ("3", 3), ("5", 5)))
             bends.append(np.max(np.abs(curve - x * curve[-1])))
         return float(max(bends))
 
@@ -83,8 +81,7 @@ class Saturation(FluxEffect):
     def plant(self, c, nominal):
         rated2 = nominal.machine.rated_current_a**2
         return {
-            f"machine.saturation_{axis}_per_a2": max(0.0, -sum(v for k, v in c.items() if k.startswith(axis)))
-            / rated2
+            f"machine.saturation_{axis}_per_a2": max(0.0, -sum(v for k, v in c.items() if k.startswith(axis))) / rated2
             for axis in "dq"
         }
 
@@ -97,8 +94,8 @@ EFFECT = Saturation(
     confounders=("inductance_q", "inductance_d", "cross_saturation", "encoder_offset"),
     separated_by="i_q up to the rated current in several steps, both signs",
     parameters=(
-        Parameter("psi_q_change_at_rated_wb", "Wb", "flux linkage at rated i_q minus L_q i_q"),
-        Parameter("psi_d_change_at_rated_wb", "Wb", "flux linkage at rated i_d minus L_d i_d"),
+        Parameter("psi_q_change_at_rated_wb", "Wb", "flux linkage at rated i_q minus L_q i_q", "psi_q at rated i_q"),
+        Parameter("psi_d_change_at_rated_wb", "Wb", "flux linkage at rated i_d minus L_d i_d", "psi_d at rated i_d"),
     ),
     absorbs=("inductance_d", "inductance_q"),
     needs_d_current=("d_",),
