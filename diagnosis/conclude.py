@@ -37,7 +37,7 @@ def conclude(posterior, held, progress=lambda text: None) -> Diagnosis:
     kind = kind_of(names, train, unseen, share, stray)
     fit = fit_of(train, unseen)
     answer = Diagnosis(kind, "", location=locate(view, cells, setup.noise), fit=fit, search=posterior)
-    answer.effects = named_effects(names, posterior, _shares(posterior, names, channel, held, measured))
+    answer.effects = named_effects(names, posterior, _shares(posterior, names, told, channel, held, measured))
     answer.ambiguity = names.open
     answer.explained_share = share
     answer.remainder = unseen.remainder() if kind != "no_mismatch" else []
@@ -55,6 +55,10 @@ def conclude(posterior, held, progress=lambda text: None) -> Diagnosis:
             title = capital(setup.effects[e.name].title)
             answer.notes.append(f"{title}: would explain {100 * e.explains:.0f} %, not asserted.")
         answer.effects, answer.ambiguity, answer.next_recording = [], [], []
+        if told:  # nothing is named, so nothing is explained and the whole misfit is left
+            after, answer.explained_share = before, 0.0
+            train, unseen = (Sizes(setup, before, before, blocks, measured) for blocks in (~held, held))
+            answer.fit = fit_of(train, unseen)
     answer.evidence = evidence(view, (cells, before), (cells, after), setup.noise, held)
     answer.sentence = sentence(answer, setup.effects)
     rows = view.u_dc.shape[1]
@@ -92,14 +96,14 @@ def _rivals(names) -> list:
     return rivals[:MOST_RIVALS]
 
 
-def _shares(posterior, names, channel, held, measured) -> dict[str, float]:
-    """{effect: share of the misfit's power above the floor that is left without it}."""
+def _shares(posterior, names, told, channel, held, measured) -> dict[str, float]:
+    """{effect: share of the misfit's power above the floor that is left without it}; told: what the rest is without."""
     best, setup = posterior.best(), posterior.setup
     out = {}
     for name in names.said:
         fewer = best.problem.fit([n for n in best.names if n != name])
-        without = Sizes(setup, setup.cells.y, fewer.left(), held, measured)
-        with_it = Sizes(setup, setup.cells.y, best.left(), held, measured)
+        without = Sizes(setup, setup.cells.y, fewer.left(told - {name}), held, measured)
+        with_it = Sizes(setup, setup.cells.y, best.left(told), held, measured)
         mine = [channel] if channel in without.channels else list(without.channels)
         excess = sum(without.channels[c].excess for c in mine)
         more = sum(without.channels[c].left - with_it.channels[c].left for c in mine)

@@ -23,12 +23,14 @@ def details(answer, effects) -> str:
     fit, parts = answer.fit, []
     if answer.verdict in ("bad_recording", "digital_mismatch"):
         return ""
-    if answer.effects:
-        parts.append(f"{capital('; '.join(said(e, effects) for e in answer.effects))}.")
+    full = f"{capital('; '.join(said(e, effects) for e in answer.effects))}."
+    if answer.effects and full != answer.sentence:
+        parts.append(full)
     volts = lambda x: ascii_of(quantity(x, fit.unit, 3))  # noqa: E731
     if fit.holdout_before > 0.0:
         both = f"falls from {volts(fit.holdout_before)} to {volts(fit.holdout_after)}"
-        fall = both if fit.holdout_after < fit.holdout_before else f"is {volts(fit.holdout_before)}"
+        told = bool(answer.effects or answer.ambiguity or answer.conventions)
+        fall = both if told and fit.holdout_after < fit.holdout_before else f"is {volts(fit.holdout_before)}"
         floor = f"the noise floor is {volts(fit.noise_floor)}"
         parts.append(f"The misfit at operating points that were not fitted {fall}; {floor}.")
     if answer.explained_share is not None and answer.effects:
