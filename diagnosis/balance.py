@@ -4,6 +4,8 @@
     sum:    i_a + i_b + i_c
     torque: T_shaft - (T_airgap - B omega_m - J d omega_m / dt)
 
+each less what the [plant] sections of the drive file describe (described.py).
+
 The difference of flux linkages over a period is exact; nothing is differentiated.  The mean current is the mean of
 both samples minus a parabola: within a period the mean voltage is constant while the magnets rotate.  The total flux is
 linear in time, the magnet flux is not, and the current carries the difference, (omega T)^2 psi_m / (12 L_d) on the
@@ -32,6 +34,12 @@ def misfit(view) -> dict[str, np.ndarray]:
         out["sum"] = 0.5 * (total[:, 1:] + total[:, :-1])
     if np.isfinite(view.torque).any():
         out["torque"] = view.torque - shaft_torque(view, exact)
+    if view.nominal.plant:
+        from fluxproof.diagnosis.described import described  # the catalogue needs this module
+
+        for channel, values in described(view).items():
+            if channel in out:
+                out[channel] = out[channel] - values
     return out
 
 

@@ -81,6 +81,7 @@ class Effect:
     # what it may be otherwise.
     plausible: dict = field(default_factory=dict, hash=False)
     otherwise: str = ""
+    stays: str = ""  # why a drive file cannot take the effect out of a recording that has it
     smoothed: bool = False  # its columns use smoothed currents also when the model is applied
 
     def core(self, view) -> dict[str, Column]:
@@ -145,6 +146,10 @@ class Effect:
     def relative(self, c: dict[str, dict], nominal) -> float:
         """Factor on the coefficients that follows from the other named effects; c: {effect: coefficients}."""
         return 1.0
+
+    def given(self, view, plant) -> Column:
+        """Column of this effect as the drive file's [plant] sections already describe it; plant: plant_of the file."""
+        return {}
 
     def plant(self, c: dict[str, float], nominal) -> dict:
         """The effect as parameters of the plant, {"machine.resistance_ohm": 1.7, ...}."""

@@ -82,5 +82,6 @@ EFFECT = CurrentGain(
     plausible={f"gain_{x}": (-0.1, 0.1) for x in "abc"},
     otherwise="a shunt of another value, a wrong scale of one column, or a converter that clips",
     corrects=True,
+    stays="an error of measurement is in the recording itself; the trims act from the next one on",
     needs=("harmonics", "current"),
 )

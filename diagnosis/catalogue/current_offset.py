@@ -78,6 +78,7 @@ EFFECT = CurrentOffset(
     separated_by="a log at zero current, gates off",
     parameters=tuple(Parameter(f"offset_{x}_a", "A", f"phase {x}, measured minus true", f"phase {x}") for x in PHASES),
     corrects=True,
+    stays="an error of measurement is in the recording itself; the trims act from the next one on",
     shows_at=(1.0,),
     plausible={f"offset_{x}_a": (-0.1, 0.1, "machine.rated_current_a") for x in PHASES},
     otherwise="a wrong offset code, or a magnetised current sensor",

@@ -45,6 +45,7 @@ EFFECT = CurrentScale(
     separated_by="an external ammeter or a torque transducer",
     parameters=(Parameter("scale", "1", "relative error of all phases", "error"),),
     corrects=True,
+    stays="an error of measurement is in the recording itself; the trims act from the next one on",
     plausible={"scale": (-0.1, 0.1)},
     otherwise="rms values in place of peak values, or the scale of another range of the sensors",
     needs=("current",),

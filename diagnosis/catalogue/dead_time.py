@@ -107,6 +107,15 @@ class DeadTime(Effect):
         spread = float(np.hypot(np.sqrt(max(at_full @ covariance @ at_full, 0.0)), c.get("growth", 0.0)))
         return {"v_dead_v": Estimate(full_loss(c), spread, "V")}
 
+    def given(self, view, plant):
+        loss = plant.inverter.dead_time_s * view.nominal.inverter.pwm_frequency_hz * view.nominal.inverter.dc_bus_v
+        if not view.nominal.plant.get("inverter", {}).get("dead_time_s"):
+            return {}  # in the core's own section it is a command to the gates, which the duties may contain
+        width = max(plant.inverter.zero_current_a / view.machine.rated_current_a, 1e-3)
+        late = view.replace(late_s=view.late_s + self.late_s({"v_": loss}, view.nominal))
+        ramp = {"all": lambda x: loss * np.clip(x / width, -1.0, 1.0)}
+        return _following_bus(late, _leg_losses(late, ramp))["all"]
+
     def plant(self, c, nominal):
         v_dead = max(0.0, full_loss(c))
         ramps = {float(k[2:]): abs(v) for k, v in c.items() if k.startswith("v_")}

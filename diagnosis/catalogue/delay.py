@@ -58,5 +58,6 @@ EFFECT = Delay(
     separated_by="two speeds, both directions; load at each; a step",
     parameters=(Parameter("delay_s", "s", "beyond duty_applied_after_samples", "later by"),),
     corrects=True,
+    stays="an error in time is in the recording itself",
     needs=("samples", "inverter"),
 )

@@ -58,6 +58,16 @@ class EmfHarmonics(Effect):
                     out[f"order_{h}"] = Estimate(size, spread, "1")
         return out
 
+    def given(self, view, plant):
+        out = {}
+        for harmonic in plant.machine.emf_harmonics:
+            wave = view.machine.magnet_flux_wb * np.exp(1j * (harmonic.order * view.theta + harmonic.phase_rad))
+            d, q = harmonic.amplitude_d, harmonic.amplitude_q
+            for psi, n in ((0.5 * (d + q) * wave, harmonic.order), (0.5 * (d - q) * np.conj(wave), -harmonic.order)):
+                for channel, values in _with_reluctance(view, psi, n).items():
+                    out[channel] = out.get(channel, 0.0) + values
+        return out
+
     def plant(self, c, nominal):
         rows = []
         for h in (6, 12, 18):

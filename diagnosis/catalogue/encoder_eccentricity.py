@@ -77,6 +77,7 @@ EFFECT = EncoderEccentricity(
     separated_by="the mechanical index: orders per mechanical turn; more than one pole pair",
     parameters=(Parameter("amplitude_rad", "rad", "electrical, once per mechanical turn", "amplitude"),),
     corrects=True,
+    stays="an error of measurement is in the recording itself; the trims act from the next one on",
     shows_at=(),
     shows_at_turns=(1.0, 2.0, 3.0),
     needs=("harmonics", "angle"),

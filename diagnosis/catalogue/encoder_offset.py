@@ -38,5 +38,6 @@ EFFECT = EncoderOffset(
     separated_by="rotation at zero current in both directions, two speeds",
     parameters=(Parameter("offset_rad", "rad", "electrical, measured minus true", "offset"),),
     corrects=True,
+    stays="an error of measurement is in the recording itself; the trims act from the next one on",
     needs=("angle",),
 )

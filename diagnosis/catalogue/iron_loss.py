@@ -65,6 +65,12 @@ class IronLoss(Effect):
         g = g if abs(g) > 1e-12 else 1e-12
         return one("iron_resistance_ohm", "ohm", 1.0 / g, spread / g**2)
 
+    def given(self, view, plant):
+        g = plant.machine.iron_conductance_s
+        if not g:
+            return {}
+        return {**_loss(view, g * view.omega), "u": view.flux(self.lost_flux(view, {"g_fe": g}))}
+
     def plant(self, c, nominal):
         return {"machine.iron_conductance_s": max(0.0, sum(c.values()))}
 

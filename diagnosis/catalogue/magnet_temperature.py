@@ -58,6 +58,7 @@ EFFECT = MagnetTemperature(
     absorbs=("magnet_flux",),
     plausible={"magnet_flux_drift_wb": (-0.25, 0.0, "machine.magnet_flux_wb")},
     otherwise="magnets lose 0.05 to 0.2 % of their flux per kelvin: a sensor drifts, or the machine cooled",
+    stays="the temperature of the magnets is not recorded, so that a coefficient cannot be applied",
     drift_of="magnet_flux",
     needs=("time",),
 )

@@ -44,6 +44,11 @@ class PhaseResistanceAsymmetry(Effect):
     def relative(self, c, nominal):
         return to_true_resistance(c, nominal)
 
+    def given(self, view, plant):
+        shares = np.array(plant.machine.phase_resistance_asymmetry)
+        r = view.machine.resistance_ohm
+        return voltage(view.from_phases(r * shares * view.phases(view.i_mid))) if shares.any() else {}
+
     def plant(self, c, nominal):
         return {"machine.phase_resistance_asymmetry": [float(v) for v in self._phases(c)]}
 

@@ -55,6 +55,7 @@ EFFECT = SamplingSkew(
     separated_by="load (an iron loss also follows omega^2 i_q); a deliberately shifted sampling trigger",
     parameters=(Parameter("skew_s", "s", "of the currents relative to the angle; positive: late", "late by"),),
     corrects=True,
+    stays="an error in time is in the recording itself",
     corrected_last=True,
     needs=("harmonics", "inverter"),
 )

@@ -34,6 +34,7 @@ EFFECT = UdcGain(
     separated_by="an external voltmeter, or the open-circuit EMF",
     parameters=(Parameter("udc_gain", "1", "relative error", "error"),),
     corrects=True,
+    stays="an error of measurement is in the recording itself; the trims act from the next one on",
     plausible={"udc_gain": (-0.1, 0.1)},
     otherwise="the bus voltage of another point of the circuit, or the wrong divider",
     needs=("inverter",),
