@@ -4,7 +4,7 @@
     sum:    i_a + i_b + i_c
     torque: T_shaft - (T_airgap - B omega_m - J d omega_m / dt)
 
-each less what the [plant] sections of the drive file describe (described.py).
+each less what the drive file describes beyond a linear machine (described.py).
 
 The difference of flux linkages over a period is exact; nothing is differentiated.  The mean current is the mean of
 both samples minus a parabola: within a period the mean voltage is constant while the magnets rotate.  The total flux is
@@ -34,12 +34,11 @@ def misfit(view) -> dict[str, np.ndarray]:
         out["sum"] = 0.5 * (total[:, 1:] + total[:, :-1])
     if np.isfinite(view.torque).any():
         out["torque"] = view.torque - shaft_torque(view, exact)
-    if view.nominal.plant:
-        from fluxproof.diagnosis.described import described  # the catalogue needs this module
+    from fluxproof.diagnosis.described import described  # here, since the catalogue needs this module
 
-        for channel, values in described(view).items():
-            if channel in out:
-                out[channel] = out[channel] - values
+    for channel, values in described(view).items():
+        if channel in out:
+            out[channel] = out[channel] - values
     return out
 
 
@@ -55,6 +54,4 @@ def shaft_torque(view, exact):
     omega_m = view.omega_mid / m.pole_pairs
     coulomb = (m.coulomb_friction_nm or 0.0) * np.sign(omega_m)
     airgap = torque_of(view, exact.nominal_psi, exact.i)
-    return (
-        airgap - (m.viscous_friction_nms or 0.0) * omega_m - coulomb - (m.inertia_kgm2 or 0.0) * view.slope_m
-    )
+    return airgap - (m.viscous_friction_nms or 0.0) * omega_m - coulomb - (m.inertia_kgm2 or 0.0) * view.slope_m

@@ -1,11 +1,13 @@
-"""What the [plant] sections of a drive file add to its nominal machine: an improved drive as the nominal one.
+"""What a drive file describes beyond a linear machine: an improved drive given back as the drive to diagnose.
 
-The core's own sections hold a linear machine; saturation, iron loss, dead time and the like stand in [plant.machine] and
-[plant.inverter].  They belong to the simulation, so that only what they leave is a misfit.  Each effect states its part
-(``Effect.given``); the flux linkage is that of the plant, which saturates both axes together.
+Saturation, iron loss, dead time and the like stand in [machine], [plant.machine] and [plant.inverter].  They belong to
+the simulation, so that only what they leave is a misfit.  Each effect states its part (``Effect.given``); the flux
+linkage is that of the plant, which saturates both axes together.
 """
 
 from __future__ import annotations
+
+import dataclasses
 
 import numpy as np
 
@@ -15,16 +17,17 @@ from fluxproof.diagnosis.improved_plant import plant_of
 from fluxproof.plant import flux_from_currents, machine_params
 from fluxproof.plant.jit import njit
 
+LOSSES = ("iron_conductance_s",)  # further keys of [machine] beyond a linear machine
 BENDS = ("saturation_d_per_a2", "saturation_q_per_a2", "cross_saturation_wb_per_a2", "flux_map")  # keys of a flux
 
 
 def described(view) -> dict[str, np.ndarray]:
-    """Values {channel: array} that the [plant] sections add to those of the nominal machine (see effect.py)."""
-    if not view.nominal.plant:
+    """Values {channel: array} that the drive file adds to those of its linear machine (see effect.py)."""
+    if not view.nominal.plant and not any(getattr(view.machine, key, None) for key in BENDS + LOSSES):
         return {}
     plant, out = plant_of(view.nominal), {}
     parts = [effect.given(view, plant) for effect in view.visible(CATALOGUE).values()]
-    if any(key in view.nominal.plant.get("machine", {}) for key in BENDS):
+    if any(getattr(plant.machine, key) for key in BENDS):
         parts.append(bent(view, plant.machine))
     for part in parts:
         for channel, values in part.items():
@@ -34,9 +37,16 @@ def described(view) -> dict[str, np.ndarray]:
 
 def bent(view, machine):
     """Column of the plant's flux linkage beyond the nominal inductances, at the measured current."""
-    exact = view.with_raw_current()
-    psi = _fluxes(machine_params(machine), machine.magnet_flux_wb, exact.i.real, exact.i.imag)
-    return flux(exact, psi - exact.nominal_psi - (machine.magnet_flux_wb - view.machine.magnet_flux_wb))
+    exact, m = view.with_raw_current(), view.machine
+    # Constants that [plant.machine] replaces are effects of their own, relative to [machine].
+    machine = dataclasses.replace(
+        machine,
+        inductance_d_h=m.inductance_d_h,
+        inductance_q_h=m.inductance_q_h,
+        magnet_flux_wb=m.magnet_flux_wb,
+    )
+    psi = _fluxes(machine_params(machine), m.magnet_flux_wb, exact.i.real, exact.i.imag)
+    return flux(exact, psi - exact.nominal_psi)
 
 
 @njit

@@ -73,6 +73,7 @@ class Effect:
     mechanical: bool = False  # a torque of the shaft rather than a voltage of the machine
     curve: float = 0.3  # share of the formula by which the free curve may depart from it
     corrected_last: bool = False  # of several measurement errors: its correction uses the corrected currents
+    bends: bool = False  # a flux linkage that is no line of the current: a flux map shows it
     takes_flux: bool = False  # ``lost_flux``: its current does not magnetise
     needs_d_current: tuple[str, ...] = ()  # beginnings of coefficients that only a current on the d axis determines
     shows_at: tuple[float, ...] = (0.0,)  # electrical orders at which its voltage, current sum or torque appears

@@ -21,6 +21,7 @@ from threadpoolctl import threadpool_limits
 
 from fluxproof.diagnosis.answer.advice import complete
 from fluxproof.diagnosis.digital import replay
+from fluxproof.diagnosis.flux_found import write_flux_map
 from fluxproof.diagnosis.improve import write_improved
 from fluxproof.diagnosis.load import load_recording
 from fluxproof.diagnosis.nominal import Nominal, load_nominal
@@ -33,6 +34,9 @@ from fluxproof.diagnosis.result import Diagnosis, Digital
 from fluxproof.golden_model.drive_keys import DriveError
 
 IMPROVED = "drive_improved.toml"
+FLUX_MAP_NOTE = (
+    'flux_map.csv holds the flux linkage over the recorded currents; [plant.machine] flux_map = "flux_map.csv" uses it.'
+)
 OVERLAY_SIGNALS = ("u_d_ref", "u_q_ref")  # not the currents: the controller regulates them to their references
 
 
@@ -56,6 +60,8 @@ def run(recordings, drive, out, progress=lambda text: None) -> Diagnosis:
         out = _folder(Path(out), nominal)
         answer = _diagnose(loaded, nominal, progress)
         improved = _improved(nominal, answer, out)
+        if write_flux_map(answer, out):
+            answer.notes.append(FLUX_MAP_NOTE)
         laid_over = None
         if answer.verdict not in ("bad_recording", "digital_mismatch"):
             progress("the closed loop over the recording")

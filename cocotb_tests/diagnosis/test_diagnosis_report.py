@@ -152,20 +152,14 @@ def test_omitted_picture_is_reported(tmp_path, without, picture, said):
 def test_one_operating_point_has_no_map(tmp_path):
     arrays = evidence().arrays
     arrays |= {name: np.full_like(arrays[name], 3.0) for name in ("omega_e", "i_d", "i_q")}
-    page = html_of(
-        write_outputs(replace(made_up()["explained"], evidence=Evidence(arrays)), tmp_path)[0].parent
-    )
-    assert (
-        "misfit over speed and current: speed or current does not vary" in page and 'id="over_time"' in page
-    )
+    page = html_of(write_outputs(replace(made_up()["explained"], evidence=Evidence(arrays)), tmp_path)[0].parent)
+    assert "misfit over speed and current: speed or current does not vary" in page and 'id="over_time"' in page
 
 
 def test_nonfinite_block_is_ignored(tmp_path):
     arrays = evidence().arrays
     arrays["before_d"][7] = np.nan
-    page = html_of(
-        write_outputs(replace(made_up()["explained"], evidence=Evidence(arrays)), tmp_path)[0].parent
-    )
+    page = html_of(write_outputs(replace(made_up()["explained"], evidence=Evidence(arrays)), tmp_path)[0].parent)
     assert 'id="over_time"' in page and "nan" not in page.lower()
 
 

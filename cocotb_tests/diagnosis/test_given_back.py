@@ -27,10 +27,10 @@ def test_the_improved_drive_leaves_no_misfit(name, tmp_path):
         pytest.skip(effect.stays)
     recording = with_effect(effect)
     answer = diagnose(recording, NOMINAL)
-    assert [e.name for e in answer.effects] == [name], (answer.sentence, answer.notes)
+    assert name in {e.name for e in answer.effects}, (answer.sentence, answer.notes)
     improved = write_improved(NOMINAL, answer.effects, tmp_path / "drive_improved.toml")
     again = diagnose(recording, improved)
     before, after = sizes(answer), sizes(again)
     channel = before.primary()
-    left = after.channels[channel].excess / before.channels[channel].excess
+    left = after.channels[channel].excess / max(before.channels[channel].excess, 1e-12)
     assert again.verdict == "no_mismatch" or left < MOST_LEFT, (left, again.sentence)

@@ -21,7 +21,7 @@ NOMINAL = load_nominal(PAPER)
 T = DRIVE.sample_time_s
 PLAN = GRID
 ROWS = 200  # of a block
-FLOORS, SHARE = 10.0, 0.3  # size of an effect: this many times its floor, at most this share of its ceiling
+FLOORS, SHARE = 16.0, 0.3  # size of an effect: this many times its floor, at most this share of its ceiling
 WARM_C = 60.0  # of the winding at the end
 NOISE_NM = 0.02
 TURNS = np.exp(-2j * np.pi / 3 * np.arange(3))
@@ -94,7 +94,9 @@ def with_effect(effect):
     table, count = dict(table), len(table["t"])
     c, columns_of = usual(effect, view), effect.core(view)
     total = {
-        channel: sum(c[key] * column.get(channel, 0.0) + np.zeros((len(view), ROWS)) for key, column in columns_of.items())
+        channel: sum(
+            c[key] * column.get(channel, 0.0) + np.zeros((len(view), ROWS)) for key, column in columns_of.items()
+        )
         for channel in ("u", "torque")
     }
     needed = (total["u"] * np.exp(1j * view.theta_mid)).ravel()
@@ -103,5 +105,9 @@ def with_effect(effect):
     duty[: len(needed) - delay] = needed[delay:]  # the duties of a row act this many periods later
     for k, x in enumerate("abc"):
         table[f"d_{x}"] = table[f"d_{x}"] + (duty * TURNS[k]).real / table["u_dc"]
-    table["torque"] = table["torque"] + at_samples(total["torque"], count)
+    if not effect.drift_of:  # only a drift needs a machine that warms up
+        del table["temp_winding"]
+    torque = table.pop("torque") + at_samples(total["torque"], count)
+    if effect.mechanical:
+        table["torque"] = torque
     return from_columns(table, T, effect.name)

@@ -79,11 +79,16 @@ class Saturation(FluxEffect):
         return out
 
     def plant(self, c, nominal):
-        rated2 = nominal.machine.rated_current_a**2
-        return {
-            f"machine.saturation_{axis}_per_a2": max(0.0, -sum(v for k, v in c.items() if k.startswith(axis))) / rated2
-            for axis in "dq"
-        }
+        """The plant's i = x (1 + s x^2), psi = L x, fitted to the curve within the rated current."""
+        i = np.linspace(-1.0, 1.0, 41)
+        shapes = {"1": i, "2": i**2, "2s": i * np.abs(i), "3": i**3, "5": i**5}
+        out = {}
+        for axis in "dq":
+            odd = {"2": i * np.abs(i)} if axis == "q" else {}  # on the q axis |y| y has this name
+            x = i + sum(v * {**shapes, **odd}[k[2:]] for k, v in c.items() if k.startswith(f"{axis}_"))
+            bend = float((i - x) @ x**3 / (x**3 @ x**3)) / nominal.machine.rated_current_a**2
+            out[f"machine.saturation_{axis}_per_a2"] = max(0.0, bend)
+        return out
 
 
 EFFECT = Saturation(
@@ -100,4 +105,5 @@ EFFECT = Saturation(
     absorbs=("inductance_d", "inductance_q"),
     needs_d_current=("d_",),
     curve=1.0,  # no formula of a saturation is preferred
+    bends=True,
 )
