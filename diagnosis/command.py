@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+import webbrowser
 from pathlib import Path
 
 FOLDER = Path("build") / "diagnosis"
@@ -43,8 +44,6 @@ def run(args: argparse.Namespace) -> int:
 
 def show(page: Path) -> bool:
     """Open a page in the browser; whether there is one."""
-    import webbrowser
-
     return webbrowser.open(page.resolve().as_uri())
 
 

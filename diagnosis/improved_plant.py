@@ -159,7 +159,7 @@ def described_sensors(nominal: Nominal) -> dict:
 
 
 def read_flux_map(path) -> FluxMap:
-    """A table with the columns i_d_a, i_q_a, psi_d_wb, psi_q_wb (flux_found.py); ValueError names the file if it is none."""
+    """A CSV with i_d_a, i_q_a, psi_d_wb, psi_q_wb (flux_found.py); ValueError names the file if it is none."""
     try:
         rows = np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2)
         return FluxMap.from_points(*rows.T)
