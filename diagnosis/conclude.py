@@ -8,12 +8,12 @@ from fluxproof.diagnosis.answer.estimates import covariance_of, named_effects
 from fluxproof.diagnosis.answer.headline import sentence
 from fluxproof.diagnosis.answer.names import names_of
 from fluxproof.diagnosis.answer.phrases import as_if, capital
-from fluxproof.diagnosis.answer.sizes import Sizes, fit_of
+from fluxproof.diagnosis.answer.sizes import Sizes, fit_of, with_stray
 from fluxproof.diagnosis.answer.verdict import kind_of
 from fluxproof.diagnosis.inference import constants as k
 from fluxproof.diagnosis.locate import at_order, evidence, locate
 from fluxproof.diagnosis.request import requests, wants_cold
-from fluxproof.diagnosis.result import Diagnosis, Remainder, UnknownTerm
+from fluxproof.diagnosis.result import Diagnosis, UnknownTerm
 from fluxproof.diagnosis.scan import Stray, row_residual, stray_order, stray_swing, stray_torque
 from fluxproof.diagnosis.unknown import sparse_term
 
@@ -42,7 +42,7 @@ def conclude(posterior, held, progress=lambda text: None) -> Diagnosis:
     answer.explained_share = share
     answer.remainder = unseen.remainder() if kind != "no_mismatch" else []
     if stray:
-        answer.remainder = _with_stray(answer.remainder, stray, train)
+        answer.remainder = with_stray(answer.remainder, stray, train)
     if names.open:
         progress("choosing the next recording")
         noise_v = float(np.nanmedian(np.abs(at_order(cells, setup.noise, 0.0))))
@@ -72,17 +72,6 @@ def conclude(posterior, held, progress=lambda text: None) -> Diagnosis:
         answer.notes.append(f"{capital(setup.effects[name].title)}: possible (probability {p:.2f}), not asserted.")
     answer.trace = "; ".join(f"{p:.3f} {'+'.join(f.names) or 'none'}" for p, f in names.fits[:4])
     return answer
-
-
-def _with_stray(remainder, stray, train) -> list[Remainder]:
-    """The remainder with a misfit outside the orders of the balance, in place of a smaller one of its own order."""
-    channel, signal = ("torque", "torque") if stray.kind == "torque" else ("u", "u_dq")
-    whole = train.channels[channel].before if channel in train.channels else stray.size
-    share = float(min((stray.size / max(whole, 1e-12)) ** 2, 1.0))
-    found = Remainder(signal, stray.order, stray.size, stray.size_unit, share)
-    same = lambda r: r.signal == signal and abs(r.order) == abs(found.order) and stray.kind == "order"  # noqa: E731
-    rest = [r for r in remainder if not same(r)]
-    return sorted([found, *rest], key=lambda r: -r.share)
 
 
 def _rivals(names) -> list:

@@ -52,12 +52,13 @@ class Plant(NamedTuple):
 
 
 # Keys that an effect gives in addition to those of the drive file; the others it gives as a whole.
+HARMONICS = "machine.emf_harmonics"
 ADDS = {
-    f"machine.{name}"
-    for name in ("saturation_d_per_a2", "saturation_q_per_a2", "cross_saturation_wb_per_a2", "iron_conductance_s",
-                 "phase_resistance_asymmetry", "emf_harmonics", "resistance_temp_coeff_per_k")
-} | {"inverter.dead_time_s"}  # fmt: skip
-ORDERED = ("dead_time_s",)
+    "machine.saturation_d_per_a2", "machine.saturation_q_per_a2", "machine.cross_saturation_wb_per_a2",
+    "machine.iron_conductance_s", "machine.phase_resistance_asymmetry", HARMONICS,
+    "machine.resistance_temp_coeff_per_k", "inverter.dead_time_s",
+}  # fmt: skip
+ORDERED = ("inverter.dead_time_s",)
 SECTIONS = {"machine": Machine, "inverter": Inverter, "sensors": Sensors, "timing": Timing}
 KEYS = {f"{name}.{f.name}": f for name, kind in SECTIONS.items() for f in dataclasses.fields(kind)}
 # Keys for which the plant rejects negative values; a noisy estimate of zero may be negative and is clipped.
@@ -89,7 +90,7 @@ def merged(effects: list[NamedEffect]) -> dict:
                 value = tuple((1.0 + a) * (1.0 + b) - 1.0 for a, b in zip(before, value, strict=True))
             elif before is not None and key == "sensors.current_offset_a":
                 value = tuple(a + b for a, b in zip(before, value, strict=True))
-            elif before is not None and key == "machine.emf_harmonics":
+            elif before is not None and key == HARMONICS:
                 value = before + value
             found[key] = (value, (*names, effect.name))
     return found
@@ -102,9 +103,9 @@ def in_addition(found: dict, nominal: Nominal) -> dict:
         plant = plant or plant_of(nominal)
         section, name = key.split(".", 1)
         given, value = getattr(getattr(plant, section), name), plain(key, found[key])
-        if name in ORDERED and name not in nominal.plant.get(section, {}):
+        if key in ORDERED and name not in nominal.plant.get(section, {}):
             continue  # in the core's own section it is a command to the gates
-        several = isinstance(value, tuple) and name != "emf_harmonics"
+        several = isinstance(value, tuple) and key != HARMONICS
         out[key] = [a + b for a, b in zip(given, value, strict=True)] if several else given + value
     return out
 
@@ -170,7 +171,7 @@ def read_flux_map(path) -> FluxMap:
 def plain(key: str, value):
     """A TOML value in the type of the plant's field; ValueError for a wrong value."""
     check_key(key)
-    if key == "machine.emf_harmonics":
+    if key == HARMONICS:
         return tuple(h if isinstance(h, Harmonic) else Harmonic(*map(float, h)) for h in value)
     if key == "machine.flux_map":
         if value is None or isinstance(value, FluxMap):

@@ -6,6 +6,8 @@ letters, it says less of each effect, then of fewer effects; the whole is in ``d
 
 from __future__ import annotations
 
+import itertools
+
 from fluxproof.diagnosis.answer.phrases import as_if, capital, joined, located, part_text, percent_below, said, title_of
 from fluxproof.diagnosis.quantities import ascii_of, quantity
 
@@ -54,10 +56,11 @@ def _variants(answer, effects) -> list[str]:
     if answer.verdict == "ambiguous":
         if not answer.effects:
             return [f"This recording cannot separate {group}." for group in sets]
-        return [f"{capital(a)}; beyond that, it is open whether {b}." for a, b in _both(named, sets)]
+        return [f"{capital(a)}; not separable: {b}." for a, b in _both(named, sets)]
     where, cause = located(answer), _cause(answer)
     if answer.verdict == "partly_explained":
-        share = f"explains {percent_below(answer.explained_share or 0.0)} of the misfit"
+        verb = "explain" if len(answer.effects) + len(answer.conventions) > 1 else "explains"
+        share = f"{verb} {percent_below(answer.explained_share or 0.0)} of the misfit"
         names = [capital(n) for n in named] if answer.effects else [f"One of {group}" for group in sets]
         return [f"{n} {share}; the rest is {where} and {c}." for n, c in _both(names, cause)]
     if answer.unknown_term is not None and answer.unknown_term.meaning:
@@ -66,10 +69,9 @@ def _variants(answer, effects) -> list[str]:
 
 
 def _both(first, second) -> list[tuple[str, str]]:
-    """Pairs of two texts that become shorter; the last ones repeat."""
-    count = max(len(first), len(second))
-    pick = lambda texts, n: texts[min(n, len(texts) - 1)]  # noqa: E731
-    return [(pick(first, n), pick(second, n)) for n in range(count)]
+    """Pairs of two texts that become shorter, those that say most first."""
+    places = sorted(itertools.product(range(len(first)), range(len(second))), key=lambda at: (sum(at), at[1]))
+    return [(first[m], second[n]) for m, n in places]
 
 
 def _named(answer, effects, brackets=False) -> list[str]:
@@ -86,8 +88,8 @@ def _sets(groups, effects) -> list[str]:
     """The ambiguities: all members of each set, the first two of each, and their number."""
     titles = [[title_of(n, effects) for n in group] for group in groups]
     short = [t if len(t) < 4 else [*t[:2], f"{len(t) - 2} other effects"] for t in titles]
-    texts = ["; or ".join(joined(t, "or") for t in each) for each in (titles, short)]
-    return [*texts, f"{joined(titles[0][:1])} or another of {sum(map(len, titles))} effects" if titles else ""]
+    texts = ["; and ".join(joined(t) for t in each) for each in (titles, short)]
+    return [*texts, f"{titles[0][0]} and {sum(map(len, titles)) - 1} other effects" if titles else ""]
 
 
 def _cause(answer) -> list[str]:
