@@ -4,6 +4,8 @@
     sum:    i_a + i_b + i_c
     torque: T_shaft - (T_airgap - B omega_m - J d omega_m / dt)
 
+each less what the drive file describes beyond a linear machine (described.py).
+
 The difference of flux linkages over a period is exact; nothing is differentiated.  The mean current is the mean of
 both samples minus a parabola: within a period the mean voltage is constant while the magnets rotate.  The total flux is
 linear in time, the magnet flux is not, and the current carries the difference, (omega T)^2 psi_m / (12 L_d) on the
@@ -32,6 +34,11 @@ def misfit(view) -> dict[str, np.ndarray]:
         out["sum"] = 0.5 * (total[:, 1:] + total[:, :-1])
     if np.isfinite(view.torque).any():
         out["torque"] = view.torque - shaft_torque(view, exact)
+    from fluxproof.diagnosis.described import described  # here, since the catalogue needs this module
+
+    for channel, values in described(view).items():
+        if channel in out:
+            out[channel] = out[channel] - values
     return out
 
 
@@ -47,6 +54,4 @@ def shaft_torque(view, exact):
     omega_m = view.omega_mid / m.pole_pairs
     coulomb = (m.coulomb_friction_nm or 0.0) * np.sign(omega_m)
     airgap = torque_of(view, exact.nominal_psi, exact.i)
-    return (
-        airgap - (m.viscous_friction_nms or 0.0) * omega_m - coulomb - (m.inertia_kgm2 or 0.0) * view.slope_m
-    )
+    return airgap - (m.viscous_friction_nms or 0.0) * omega_m - coulomb - (m.inertia_kgm2 or 0.0) * view.slope_m

@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import argparse
 import sys
+import webbrowser
 from pathlib import Path
 
 FOLDER = Path("build") / "diagnosis"
 MOST_PROBLEMS = 5
-RPM = 9.549296585513721  # rad/s to 1/min, 60/(2 pi)
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -21,9 +21,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     formats = "CSV, Parquet, MATLAB, MDF4, HDF5, NumPy or a telemetry dump; several of the same drive"
     parser.add_argument("recordings", metavar="RECORDING", nargs="+", help=formats)
     parser.add_argument("--drive", metavar="drive.toml", required=True, help="the nominal drive in SI units")
-    parser.add_argument(
-        "--out", metavar="DIR", help=f"folder for the results (default: {FOLDER}/NAME OF RECORDING)"
-    )
+    parser.add_argument("--out", metavar="DIR", help=f"folder for the results (default: {FOLDER}/NAME OF RECORDING)")
+    parser.add_argument("--open", action="store_true", help="show the report in the browser")
     parser.add_argument("--quiet", action="store_true", help="no progress on stderr")
 
 
@@ -38,7 +37,14 @@ def run(args: argparse.Namespace) -> int:
         answer = session(args.recordings, nominal, out, progress)
     for line in answer_lines(answer, nominal, out):
         print(printable(line, sys.stdout.encoding))
+    if args.open and not show(out / "report.html"):
+        print(f"fluxproof: no browser can be opened; the report is {out / 'report.html'}", file=sys.stderr)
     return 0
+
+
+def show(page: Path) -> bool:
+    """Open a page in the browser; whether there is one."""
+    return webbrowser.open(page.resolve().as_uri())
 
 
 def default_folder(recordings) -> Path:
@@ -78,8 +84,11 @@ def printable(text: str, encoding: str | None) -> str:
 
 
 def answer_lines(answer, nominal, out: Path) -> list[str]:
-    """The verdict, effects, ambiguities, next recordings, misfit, findings and the files, as lines of text."""
-    lines = [answer.sentence]
+    """Headline, advice, effects, ambiguities, next recordings, misfit, findings and the files, as lines of text."""
+    from fluxproof.diagnosis.answer.doubts import IMPLAUSIBLE
+    from fluxproof.diagnosis.quantities import measured
+
+    lines = [answer.sentence, *([answer.advice] if answer.advice else [])]
     if answer.effects:
         lines += ["", *effect_table(answer.effects)]
     lines += [f"not separable: {', '.join(group)}" for group in answer.ambiguity]
@@ -87,7 +96,9 @@ def answer_lines(answer, nominal, out: Path) -> list[str]:
         lines += ["", "record next, held until steady:", *map(_request(nominal), answer.next_recording)]
     if answer.unknown_term is not None:
         u = answer.unknown_term
-        lines.append(f"best single term: {u.formula} with c = {u.value:.4g} +- {u.sigma:.1g} {u.unit}")
+        said = f"as if {u.meaning}: {u.formula}" if u.meaning else f"best single term: {u.formula} with c"
+        lines.append(f"{said} = {measured(u.value, u.sigma, u.unit)}")
+    lines += [f"doubtful: {note}" for note in answer.notes if IMPLAUSIBLE in note]
     fit = answer.fit
     if answer.verdict not in ("bad_recording", "digital_mismatch"):
         lines.append(
@@ -116,20 +127,14 @@ def effect_table(effects) -> list[str]:
             rows.append((first[0], key, measured(e.value, e.sigma, e.unit), *first[1:]))
             first = ("", "", "")
     widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
-    return [
-        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows
-    ]
+    return ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
 
 
 def _request(nominal):
     """A function that formats a Request as a line, with the shaft speed in rpm."""
-    p = nominal.machine.pole_pairs
+    from fluxproof.diagnosis.answer.advice import point_text
 
-    def line(request) -> str:
-        at = f"omega_e = {request.omega_e:.4g} rad/s ({request.omega_e * RPM / p:.4g} rpm)"
-        return f"  {at}, i_d = {request.i_d:.3g} A, i_q = {request.i_q:.3g} A: {request.why}"
-
-    return line
+    return lambda request: f"  {point_text(request, nominal)}: {request.why}"
 
 
 def _problem_lines(problems) -> list[str]:

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from fluxproof.diagnosis.answer import verdict as words
 from fluxproof.diagnosis.answer.estimates import covariance_of, named_effects
+from fluxproof.diagnosis.answer.headline import sentence
 from fluxproof.diagnosis.answer.names import names_of
-from fluxproof.diagnosis.answer.sizes import Sizes, fit_of
+from fluxproof.diagnosis.answer.phrases import as_if, capital
+from fluxproof.diagnosis.answer.sizes import Sizes, fit_of, with_stray
 from fluxproof.diagnosis.answer.verdict import kind_of
 from fluxproof.diagnosis.inference import constants as k
 from fluxproof.diagnosis.locate import at_order, evidence, locate
 from fluxproof.diagnosis.request import requests, wants_cold
-from fluxproof.diagnosis.result import Diagnosis, Remainder, UnknownTerm
+from fluxproof.diagnosis.result import Diagnosis, UnknownTerm
 from fluxproof.diagnosis.scan import Stray, row_residual, stray_order, stray_swing, stray_torque
 from fluxproof.diagnosis.unknown import sparse_term
 
@@ -36,12 +37,12 @@ def conclude(posterior, held, progress=lambda text: None) -> Diagnosis:
     kind = kind_of(names, train, unseen, share, stray)
     fit = fit_of(train, unseen)
     answer = Diagnosis(kind, "", location=locate(view, cells, setup.noise), fit=fit, search=posterior)
-    answer.effects = named_effects(names, posterior, _shares(posterior, names, channel, held, measured))
+    answer.effects = named_effects(names, posterior, _shares(posterior, names, told, channel, held, measured))
     answer.ambiguity = names.open
     answer.explained_share = share
     answer.remainder = unseen.remainder() if kind != "no_mismatch" else []
     if stray:
-        answer.remainder = _with_stray(answer.remainder, stray, train)
+        answer.remainder = with_stray(answer.remainder, stray, train)
     if names.open:
         progress("choosing the next recording")
         noise_v = float(np.nanmedian(np.abs(at_order(cells, setup.noise, 0.0))))
@@ -51,32 +52,26 @@ def conclude(posterior, held, progress=lambda text: None) -> Diagnosis:
         answer.unknown_term = _unknown(best, after, stray, names, held, unseen)
     if kind == "unexplained":  # beside a large unknown part even a credible name may be its imitation
         for e in answer.effects:
-            answer.notes.append(f"{setup.effects[e.name].title}: would explain {100 * e.explains:.0f} %, not asserted.")
+            title = capital(setup.effects[e.name].title)
+            answer.notes.append(f"{title}: would explain {100 * e.explains:.0f} %, not asserted.")
         answer.effects, answer.ambiguity, answer.next_recording = [], [], []
+        if told:  # nothing is named, so nothing is explained and the whole misfit is left
+            after, answer.explained_share = before, 0.0
+            train, unseen = (Sizes(setup, before, before, blocks, measured) for blocks in (~held, held))
+            answer.fit = fit_of(train, unseen)
     answer.evidence = evidence(view, (cells, before), (cells, after), setup.noise, held)
-    answer.sentence = words.sentence(answer, setup.effects)
+    answer.sentence = sentence(answer, setup.effects)
     rows = view.u_dc.shape[1]
     answer.notes.append(
         f"The voltage balance was made on {len(view)} steady blocks of {rows} rows; {int(held.sum())} were not fitted."
     )
     for name in names.suspects:
         if answer.unknown_term is None or answer.unknown_term.meaning != setup.effects[name].title:
-            answer.notes.append(f"Besides, it is {words.as_if(_described(best, name, held, unseen))}.")
+            answer.notes.append(f"Besides, it is {as_if(_described(best, name, held, unseen))}.")
     for name, p in sorted(names.maybe.items(), key=lambda entry: -entry[1])[:3]:
-        answer.notes.append(f"{setup.effects[name].title}: possible (probability {p:.2f}), not asserted.")
+        answer.notes.append(f"{capital(setup.effects[name].title)}: possible (probability {p:.2f}), not asserted.")
     answer.trace = "; ".join(f"{p:.3f} {'+'.join(f.names) or 'none'}" for p, f in names.fits[:4])
     return answer
-
-
-def _with_stray(remainder, stray, train) -> list[Remainder]:
-    """The remainder with a misfit outside the orders of the balance, in place of a smaller one of its own order."""
-    channel, signal = ("torque", "torque") if stray.kind == "torque" else ("u", "u_dq")
-    whole = train.channels[channel].before if channel in train.channels else stray.size
-    share = float(min((stray.size / max(whole, 1e-12)) ** 2, 1.0))
-    found = Remainder(signal, stray.order, stray.size, stray.size_unit, share)
-    same = lambda r: r.signal == signal and abs(r.order) == abs(found.order) and stray.kind == "order"  # noqa: E731
-    rest = [r for r in remainder if not same(r)]
-    return sorted([found, *rest], key=lambda r: -r.share)
 
 
 def _rivals(names) -> list:
@@ -90,14 +85,14 @@ def _rivals(names) -> list:
     return rivals[:MOST_RIVALS]
 
 
-def _shares(posterior, names, channel, held, measured) -> dict[str, float]:
-    """{effect: share of the misfit's power above the floor that is left without it}."""
+def _shares(posterior, names, told, channel, held, measured) -> dict[str, float]:
+    """{effect: share of the misfit's power above the floor that is left without it}; told: what the rest is without."""
     best, setup = posterior.best(), posterior.setup
     out = {}
     for name in names.said:
         fewer = best.problem.fit([n for n in best.names if n != name])
-        without = Sizes(setup, setup.cells.y, fewer.left(), held, measured)
-        with_it = Sizes(setup, setup.cells.y, best.left(), held, measured)
+        without = Sizes(setup, setup.cells.y, fewer.left(told - {name}), held, measured)
+        with_it = Sizes(setup, setup.cells.y, best.left(told), held, measured)
         mine = [channel] if channel in without.channels else list(without.channels)
         excess = sum(without.channels[c].excess for c in mine)
         more = sum(without.channels[c].left - with_it.channels[c].left for c in mine)

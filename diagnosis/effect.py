@@ -13,7 +13,7 @@ identified by the variables it depends on, since no real machine follows the cat
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -38,6 +38,11 @@ class Parameter:
     name: str
     unit: str
     meaning: str
+    title: str = ""  # as a headline calls it, "dead-time voltage"; empty: the meaning
+
+    @property
+    def called(self) -> str:
+        return self.title or self.meaning
 
 
 @dataclass(frozen=True)
@@ -49,7 +54,7 @@ class Effect:
     """
 
     name: str
-    title: str
+    title: str  # a noun, as a headline calls it; of an effect that is not named: a clause that completes "as if ..."
     equation: str
     signature: str
     confounders: tuple[str, ...]
@@ -68,8 +73,16 @@ class Effect:
     mechanical: bool = False  # a torque of the shaft rather than a voltage of the machine
     curve: float = 0.3  # share of the formula by which the free curve may depart from it
     corrected_last: bool = False  # of several measurement errors: its correction uses the corrected currents
+    bends: bool = False  # a flux linkage that is no line of the current: a flux map shows it
     takes_flux: bool = False  # ``lost_flux``: its current does not magnetise
     needs_d_current: tuple[str, ...] = ()  # beginnings of coefficients that only a current on the d axis determines
+    shows_at: tuple[float, ...] = (0.0,)  # electrical orders at which its voltage, current sum or torque appears
+    shows_at_turns: tuple[float, ...] = ()  # the same per mechanical turn
+    # {parameter: (least, largest) or (least, largest, "machine.key" that they are relative to)} of a usual drive, and
+    # what it may be otherwise.
+    plausible: dict = field(default_factory=dict, hash=False)
+    otherwise: str = ""
+    stays: str = ""  # why a drive file cannot take the effect out of a recording that has it
     smoothed: bool = False  # its columns use smoothed currents also when the model is applied
 
     def core(self, view) -> dict[str, Column]:
@@ -134,6 +147,10 @@ class Effect:
     def relative(self, c: dict[str, dict], nominal) -> float:
         """Factor on the coefficients that follows from the other named effects; c: {effect: coefficients}."""
         return 1.0
+
+    def given(self, view, plant) -> Column:
+        """Column of this effect as the drive file's [plant] sections already describe it; plant: plant_of the file."""
+        return {}
 
     def plant(self, c: dict[str, float], nominal) -> dict:
         """The effect as parameters of the plant, {"machine.resistance_ohm": 1.7, ...}."""

@@ -6,7 +6,8 @@ A key in [plant.machine], [plant.inverter] or [plant.sensors] replaces the value
 those of plant.Machine, plant.Inverter and plant.Sensors.  Three of them have a special form in TOML:
 
     emf_harmonics = [[order, amplitude_d, amplitude_q, phase_rad], ...]
-    flux_map      = a table of i_d_a (n), i_q_a (m), psi_d_wb (n x m), psi_q_wb (n x m)
+    flux_map      = a table of i_d_a (n), i_q_a (m), psi_d_wb (n x m), psi_q_wb (n x m), or the name of a CSV file with
+                    these columns beside the drive file, such as flux_map.csv of a diagnosis
     lists of three for the phases a, b, c
 """
 
@@ -16,6 +17,7 @@ import dataclasses
 import difflib
 import math
 from dataclasses import dataclass
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -49,6 +51,14 @@ class Plant(NamedTuple):
     timing: Timing
 
 
+# Keys that an effect gives in addition to those of the drive file; the others it gives as a whole.
+HARMONICS = "machine.emf_harmonics"
+ADDS = {
+    "machine.saturation_d_per_a2", "machine.saturation_q_per_a2", "machine.cross_saturation_wb_per_a2",
+    "machine.iron_conductance_s", "machine.phase_resistance_asymmetry", HARMONICS,
+    "machine.resistance_temp_coeff_per_k", "inverter.dead_time_s",
+}  # fmt: skip
+ORDERED = ("inverter.dead_time_s",)
 SECTIONS = {"machine": Machine, "inverter": Inverter, "sensors": Sensors, "timing": Timing}
 KEYS = {f"{name}.{f.name}": f for name, kind in SECTIONS.items() for f in dataclasses.fields(kind)}
 # Keys for which the plant rejects negative values; a noisy estimate of zero may be negative and is clipped.
@@ -80,10 +90,24 @@ def merged(effects: list[NamedEffect]) -> dict:
                 value = tuple((1.0 + a) * (1.0 + b) - 1.0 for a, b in zip(before, value, strict=True))
             elif before is not None and key == "sensors.current_offset_a":
                 value = tuple(a + b for a, b in zip(before, value, strict=True))
-            elif before is not None and key == "machine.emf_harmonics":
+            elif before is not None and key == HARMONICS:
                 value = before + value
             found[key] = (value, (*names, effect.name))
     return found
+
+
+def in_addition(found: dict, nominal: Nominal) -> dict:
+    """The plant keys of an effect that was found beside what the drive file describes of it: both together."""
+    out, plant = dict(found), None
+    for key in ADDS & set(found):
+        plant = plant or plant_of(nominal)
+        section, name = key.split(".", 1)
+        given, value = getattr(getattr(plant, section), name), plain(key, found[key])
+        if key in ORDERED and name not in nominal.plant.get(section, {}):
+            continue  # in the core's own section it is a command to the gates
+        several = isinstance(value, tuple) and key != HARMONICS
+        out[key] = [a + b for a, b in zip(given, value, strict=True)] if several else given + value
+    return out
 
 
 def plant_of(source) -> Plant:
@@ -92,13 +116,12 @@ def plant_of(source) -> Plant:
     tables = {name: dict(nominal.plant.get(name, {})) for name in SECTIONS}
     unknown = set(nominal.plant) - set(SECTIONS)
     if unknown:
-        raise DriveError(
-            f"{nominal.path}: unknown section [plant.{unknown.pop()}]; known are {', '.join(SECTIONS)}"
-        )
+        raise DriveError(f"{nominal.path}: unknown section [plant.{unknown.pop()}]; known are {', '.join(SECTIONS)}")
+    chart = tables["machine"].get("flux_map")
     try:
-        given = {
-            name: {k: plain(f"{name}.{k}", v) for k, v in table.items()} for name, table in tables.items()
-        }
+        if isinstance(chart, str):
+            tables["machine"]["flux_map"] = read_flux_map(Path(nominal.path).parent / chart)
+        given = {name: {k: plain(f"{name}.{k}", v) for k, v in table.items()} for name, table in tables.items()}
         return Plant(
             Machine(**({"inertia_kgm2": 1e-3} | _described(nominal.machine, Machine) | given["machine"])),
             Inverter(**(_described(nominal.inverter, Inverter) | given["inverter"])),
@@ -136,10 +159,19 @@ def described_sensors(nominal: Nominal) -> dict:
     }
 
 
+def read_flux_map(path) -> FluxMap:
+    """A CSV with i_d_a, i_q_a, psi_d_wb, psi_q_wb (flux_found.py); ValueError names the file if it is none."""
+    try:
+        rows = np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2)
+        return FluxMap.from_points(*rows.T)
+    except (OSError, TypeError, ValueError) as error:
+        raise ValueError(f"flux_map {path}: {error}") from None
+
+
 def plain(key: str, value):
     """A TOML value in the type of the plant's field; ValueError for a wrong value."""
     check_key(key)
-    if key == "machine.emf_harmonics":
+    if key == HARMONICS:
         return tuple(h if isinstance(h, Harmonic) else Harmonic(*map(float, h)) for h in value)
     if key == "machine.flux_map":
         if value is None or isinstance(value, FluxMap):

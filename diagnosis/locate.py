@@ -6,6 +6,7 @@ import numpy as np
 
 from fluxproof.diagnosis.result import Evidence, Location, OrderLine, Region
 
+LEAST_ROOM = 0.2  # least 1 - |leakage|^2 of the constant into a harmonic: with less the block holds no whole wave
 REGION_FACTOR = 1.5  # least ratio of the misfit inside and outside of a reported region
 
 
@@ -33,6 +34,19 @@ def at_order(cells, values, order):
     return out
 
 
+def harmonic(view, cells, values, order):
+    """``at_order`` of a harmonic without the leakage of the constant, complex (b,): blocks are no whole turns.
+
+    The least-squares amplitude beside a constant in the block.
+    """
+    wave = at_order(cells, values, order)
+    if order == 0:
+        return wave
+    leak = np.exp(-1j * order * view.theta_mid).mean(axis=1)
+    constant = np.nan_to_num(at_order(cells, values, 0.0))
+    return (wave - constant * leak) / (1.0 - np.abs(leak) ** 2).clip(LEAST_ROOM)
+
+
 def _rms(x):
     x = x[np.isfinite(x)]
     return float(np.sqrt(np.mean(np.abs(x) ** 2))) if len(x) else 0.0
@@ -44,7 +58,7 @@ def locate(view, cells, pure) -> Location:
     signal = "u_q" if _rms(y0.imag) >= _rms(y0.real) else "u_d"
     orders = []
     for order in np.unique(np.abs(cells.order[cells.channel == "u"])):
-        both = [at_order(cells, cells.y, s * order) for s in ((1,) if order == 0 else (1, -1))]
+        both = [harmonic(view, cells, cells.y, s * order) for s in ((1,) if order == 0 else (1, -1))]
         quiet = [at_order(cells, pure, s * order) for s in ((1,) if order == 0 else (1, -1))]
         amplitude, floor = np.hypot(*map(_rms, both)) if order else _rms(both[0]), max(map(_rms, quiet))
         if amplitude > 3.0 * floor:
@@ -92,7 +106,7 @@ def evidence(view, before, after, pure, holdout_blocks) -> Evidence:
     def spectrum(c, values):
         return np.array(
             [
-                np.hypot(_rms(at_order(c, values, h)), _rms(at_order(c, values, -h)) if h else 0.0)
+                np.hypot(_rms(harmonic(view, c, values, h)), _rms(harmonic(view, c, values, -h)) if h else 0.0)
                 for h in orders
             ]
         )

@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from fluxproof.diagnosis.answer.verdict import sentence
+from fluxproof.diagnosis.answer.headline import sentence
+from fluxproof.diagnosis.bench_point import on_the_bench
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.cells import cells_of, voltage_level
 from fluxproof.diagnosis.drift_fit import best_sets, centred_cells, drifts, fitted, fuller, row_sigmas, with_copper
@@ -153,6 +154,7 @@ def _requests(view, groups) -> list[Request]:
         (OTHER_SPEED * omega, i, "at another speed and the same current fluxes change the voltage, resistances do not"),
         (omega, complex(other), "with another i_d the winding and the magnets act on different axes"),
     )
+    points = [(*on_the_bench(w, complex(x), view.machine), why) for w, x, why in points]
     names, bus = sorted({n for g in groups for n in g}), float(view.nominal.inverter.dc_bus_v)
     return [Request(w, x.real, x.imag, names, why, bus, None) for w, x, why in points]
 

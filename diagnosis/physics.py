@@ -41,6 +41,11 @@ def explain(loaded: list[Recording], nominal: Nominal, progress=lambda text: Non
     return answer
 
 
+def known_effects() -> dict:
+    """{name: Effect} of the catalogue and of the causes beyond it."""
+    return {**CATALOGUE, **SUSPECTS}
+
+
 def holdout_blocks(view) -> np.ndarray:
     """(b,) bool: blocks held out of the fit: every fourth dwell, or every fourth block if there are few dwells."""
     dwells = np.unique(view.run)
@@ -60,7 +65,7 @@ def posterior_of(recordings, nominal, progress=lambda text: None):
     view = joined_views(views)
     held = held_out(views)
     progress("sets of effects")
-    effects = view.visible({**CATALOGUE, **SUSPECTS})
+    effects = view.visible(known_effects())
     return Posterior(Setup(view, effects, ~held), progress), held
 
 

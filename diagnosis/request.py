@@ -7,9 +7,12 @@ from dataclasses import fields
 
 import numpy as np
 
+from fluxproof.diagnosis.answer.phrases import SIGNALS, joined, title_of
+from fluxproof.diagnosis.bench_point import on_the_bench
 from fluxproof.diagnosis.cells import Projector, voltage_level
 from fluxproof.diagnosis.experiment import BENDS, best_points, rivalry
 from fluxproof.diagnosis.inference.constants import BALANCE_DC, BALANCE_U
+from fluxproof.diagnosis.quantities import ascii_of, quantity
 from fluxproof.diagnosis.result import Request
 from fluxproof.diagnosis.view import View, stayed_cold
 
@@ -74,15 +77,31 @@ REACHED = 0.5  # of the speed at which the EMF takes the available voltage: a sp
 
 def grid(view):
     """Candidate operating points (omega, i_dq) within the drive's voltage and near the recorded range."""
-    m = view.machine
+    _, top = limits(view)
+    omega, i = np.meshgrid(top * np.array(SPEEDS), view.machine.rated_current_a * np.array(CURRENTS))
+    omega, i = omega.ravel(), i.ravel()
+    kept = within_limits(view)(omega, i)
+    return omega[kept], i[kept]
+
+
+def limits(view) -> tuple[float, float]:
+    """(largest voltage [V], speed to which SPEEDS refer [rad/s])."""
     linear = view.nominal.inverter.dc_bus_v / np.sqrt(3)
     u_max = np.clip(float(voltage_level(view).max()), 0.74 * linear, 0.9 * linear)
-    top = max(view.top_speed, REACHED * u_max / m.magnet_flux_wb)
-    omega, i = np.meshgrid(top * np.array(SPEEDS), m.rated_current_a * np.array(CURRENTS))
-    omega, i = omega.ravel(), i.ravel()
-    u = m.resistance_ohm * i + 1j * omega * (view.inductances(i) + m.magnet_flux_wb)
-    within = (np.abs(u) <= u_max) & ((omega != 0.0) | (i != 0.0))  # standstill without current gives no information
-    return omega[within], i[within]
+    return u_max, max(view.top_speed, REACHED * u_max / view.machine.magnet_flux_wb)
+
+
+def within_limits(view):
+    """A function of (omega, i_dq), numbers or arrays: whether such points are within voltage, speed and current."""
+    m, (u_max, top) = view.machine, limits(view)
+    top, rated = 1.000001 * max(SPEEDS) * top, 1.000001 * m.rated_current_a
+
+    def within(omega, i):
+        u = m.resistance_ohm * i + 1j * omega * (view.inductances(i) + m.magnet_flux_wb)
+        still = (omega == 0.0) & (i == 0.0)  # standstill without current gives no information
+        return (np.abs(u) <= u_max) & (np.abs(omega) <= top) & (np.abs(i) <= rated) & ~np.asarray(still)
+
+    return within
 
 
 def new_axes(view, i) -> np.ndarray:
@@ -163,18 +182,20 @@ def requests(setup, fits, noise_v, cold=False) -> list[Request]:
     rivals = [rivalry(predictions[a], predictions[b], *knows[b], sigma, p.block, len(omega)) for a, b in pairs]
     effort = (omega / np.abs(omega).max()) ** 2 + np.abs(i / view.machine.rated_current_a) ** 2
     chosen = best_points(rivals, MOST, NEW_AXIS * new_axes(view, i), STRAIN * effort)
-    out = []
+    out, within = [], within_limits(view)
     for k in chosen:
         each = [r.left([k]) for r in rivals]
         worst = pairs[int(np.argmax(each))]
-        names = sorted({x for n in worst for x in solutions[n].names})
+        first, second = (set(solutions[n].names) for n in worst)
+        names = sorted(first ^ second) or sorted(first | second)
+        speed, current = on_the_bench(float(omega[k]), complex(i[k]), view.machine, within)
         out.append(
             Request(
-                float(omega[k]),
-                float(i[k].real),
-                float(i[k].imag),
+                speed,
+                current.real,
+                current.imag,
                 names,
-                _why(p, k, predictions, worst, solutions) + (COLD if cooled[k] else ""),
+                _why(p, k, predictions, worst, solutions, effects) + (COLD if cooled[k] else ""),
                 float(drive),
                 float(view.machine.temperature_ref_c) if cooled[k] else None,
             )
@@ -185,10 +206,14 @@ def requests(setup, fits, noise_v, cold=False) -> list[Request]:
 COLD = ", once the machine has cooled down (record temp_winding)"
 
 
-def _why(p, k, predictions, pair, solutions):
+def _why(p, k, predictions, pair, solutions, effects):
+    """What differs at candidate k between what is open: the effects that only one of the two sets contains."""
     at = p.ok & (p.block == k) & (p.channel == "u")
-    a, b = (" with ".join(sorted(solutions[n].names)) for n in pair)
+    sets = [set(solutions[n].names) for n in pair]
+    only = [sorted(title_of(n, effects) for n in mine - other) for mine, other in (sets, sets[::-1])]
+    a, b = (f"'{joined(titles)}'" if titles else "nothing in its place" for titles in only)
     difference = np.where(at, np.abs(predictions[pair[0]] - predictions[pair[1]]), 0.0)
     row = int(np.argmax(difference))
-    where = f"u_{'dq'[p.part[row]]}" + (f" at order {abs(p.order[row]):g}" if p.order[row] else "")
-    return f"{where} differs by {difference[row]:.3g} V between {a} and {b}"
+    order = f"order {abs(p.order[row]):.4g} of the " if p.order[row] else ""
+    size = ascii_of(quantity(float(difference[row]), "V", 2))
+    return f"the {order}{SIGNALS['u_' + 'dq'[p.part[row]]]} differs by {size} between {a} and {b}"

@@ -196,6 +196,8 @@ class Diagnosis:
     rows: int = 0
     problems: list[Problem] = field(default_factory=list)
     digital: Digital = field(default_factory=Digital)
+    details: str = ""  # the figures behind the sentence
+    advice: str = ""  # what to do next
     notes: list[str] = field(default_factory=list)  # for people: assumptions and omissions
     evidence: Evidence = field(default_factory=Evidence)
     search: object = field(default=None, repr=False)  # search.Outcome, for inspection

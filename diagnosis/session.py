@@ -19,19 +19,24 @@ from pathlib import Path
 
 from threadpoolctl import threadpool_limits
 
+from fluxproof.diagnosis.answer.advice import complete
 from fluxproof.diagnosis.digital import replay
+from fluxproof.diagnosis.flux_found import write_flux_map
 from fluxproof.diagnosis.improve import write_improved
 from fluxproof.diagnosis.load import load_recording
 from fluxproof.diagnosis.nominal import Nominal, load_nominal
 from fluxproof.diagnosis.overlay import closed_loop
 from fluxproof.diagnosis.parts import left_out
-from fluxproof.diagnosis.physics import explain
+from fluxproof.diagnosis.physics import explain, known_effects
 from fluxproof.diagnosis.recording import Problem, Recording, RecordingError
 from fluxproof.diagnosis.report import write_outputs
 from fluxproof.diagnosis.result import Diagnosis, Digital
 from fluxproof.golden_model.drive_keys import DriveError
 
 IMPROVED = "drive_improved.toml"
+FLUX_MAP_NOTE = (
+    'flux_map.csv holds the flux linkage over the recorded currents; [plant.machine] flux_map = "flux_map.csv" uses it.'
+)
 OVERLAY_SIGNALS = ("u_d_ref", "u_q_ref")  # not the currents: the controller regulates them to their references
 
 
@@ -55,6 +60,8 @@ def run(recordings, drive, out, progress=lambda text: None) -> Diagnosis:
         out = _folder(Path(out), nominal)
         answer = _diagnose(loaded, nominal, progress)
         improved = _improved(nominal, answer, out)
+        if write_flux_map(answer, out):
+            answer.notes.append(FLUX_MAP_NOTE)
         laid_over = None
         if answer.verdict not in ("bad_recording", "digital_mismatch"):
             progress("the closed loop over the recording")
@@ -97,6 +104,7 @@ def _diagnose(loaded, nominal, progress) -> Diagnosis:
         answer = _physics(loaded, nominal, progress)
     answer.digital = digital
     answer.notes = [*notes, *answer.notes, *_reading_notes(loaded)]
+    complete(answer, nominal, known_effects())
     return answer
 
 
@@ -105,9 +113,7 @@ def _folder(out: Path, nominal: Nominal) -> Path:
     out.mkdir(parents=True, exist_ok=True)
     target = out / IMPROVED
     if nominal.path and target.exists() and Path(nominal.path).exists() and target.samefile(nominal.path):
-        raise DriveError(
-            f"{target}: this is the drive to diagnose and would be overwritten; choose another folder"
-        )
+        raise DriveError(f"{target}: this is the drive to diagnose and would be overwritten; choose another folder")
     return out
 
 

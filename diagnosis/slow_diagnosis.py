@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fluxproof.diagnosis.answer.verdict import sentence
+from fluxproof.diagnosis.answer.headline import sentence
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.cells import voltage_level
 from fluxproof.diagnosis.inference import constants as k

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from fluxproof.diagnosis.improved_plant import in_addition
 from fluxproof.diagnosis.result import NamedEffect
 
 LEAST_DISPERSION = 0.8
@@ -27,7 +28,7 @@ def named(solution, effects, nominal, names, empty, dispersion) -> list[NamedEff
             # The reference may be either resistance: ohms beyond the nameplate may lie outside the winding.
             e.value, e.sigma = share * e.value, float(np.hypot(share * e.sigma, (1.0 - share) * e.value))
         sure = 1.0 - 1.0 / (1.0 + weight(c, covariance) / 4.0)
-        plant = effect.plant({key: share * v for key, v in c.items()}, nominal)
+        plant = in_addition(effect.plant({key: share * v for key, v in c.items()}, nominal), nominal)
         out.append(NamedEffect(name, float(np.clip(sure, LEAST, MOST)), estimates, fall, plant))
     return out
 

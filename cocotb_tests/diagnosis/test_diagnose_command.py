@@ -32,9 +32,7 @@ FLUX = 0.95 * bench.MACHINE.magnet_flux_wb
 
 def diagnose(out, *recordings, drive=PAPER, more=()):
     """Exit status of the command."""
-    return fluxproof.main(
-        ["diagnose", *map(str, recordings), "--drive", str(drive), "--out", str(out), *more]
-    )
+    return fluxproof.main(["diagnose", *map(str, recordings), "--drive", str(drive), "--out", str(out), *more])
 
 
 def answer(out) -> dict:
@@ -91,15 +89,25 @@ def test_outputs_with_a_correct_controller(explained, dump):
     assert data["sentence"].split(" (")[0] in page and 'id="overlay"' in page
 
 
+def test_advice_is_printed_and_the_report_opened(dump, tmp_path, monkeypatch, capsys):
+    opened = []
+    monkeypatch.setattr(command.webbrowser, "open", lambda page: opened.append(page) or len(opened) < 2)
+    path = write_dump(tmp_path / "run.dump", dump, rows=150)
+    assert diagnose(tmp_path / "out", path, more=["--open", "--quiet"]) == 0
+    printed = capsys.readouterr()
+    assert printed.out.splitlines()[1] == answer(tmp_path / "out")["advice"] != ""
+    assert opened == [(tmp_path / "out" / "report.html").resolve().as_uri()] and printed.err == ""
+    assert diagnose(tmp_path / "out", path, more=["--open", "--quiet"]) == 0
+    assert "no browser" in capsys.readouterr().err
+
+
 def test_the_improved_drive_is_one_that_registers_takes(explained, capsys):
     out, _ = explained
     path = out / "drive_improved.toml"
     assert load_nominal(path).machine.magnet_flux_wb == pytest.approx(FLUX, rel=2e-3)
     before, after = registers(bench.DRIVE).values, registers(drives.load(path)).values
     changed = {name for name in before._fields if getattr(before, name) != getattr(after, name)}
-    assert "lambda_mg" in changed and not changed - {"lambda_mg", "delta_max", "speed_kp", "speed_ki"}, (
-        changed
-    )
+    assert "lambda_mg" in changed and not changed - {"lambda_mg", "delta_max", "speed_kp", "speed_ki"}, changed
     assert fluxproof.main(["registers", str(path)]) == 0 and "lambda_mg" in capsys.readouterr().out
 
 
@@ -168,9 +176,7 @@ def test_several_recordings_are_one_diagnosis(tmp_path, monkeypatch, capsys):
     assert fluxproof.main(["diagnose", *map(str, halves), "--drive", str(PAPER), "--quiet"]) == 0
     out = tmp_path / "build" / "diagnosis" / "part0_and_1_more"
     data = answer(out)
-    assert data["verdict"] == "no_mismatch" and data["recording"]["rows"] == 2 * len(
-        bench.columns(SHORT)["t"]
-    )
+    assert data["verdict"] == "no_mismatch" and data["recording"]["rows"] == 2 * len(bench.columns(SHORT)["t"])
     assert not data["digital"]["checked"]
 
 
@@ -292,11 +298,7 @@ def test_failing_overlay_adds_only_a_note(dump, tmp_path, monkeypatch):
 def test_files_with_flipped_bits_end_without_traceback_and_without_a_name(tmp_path):
     """Bits flipped in files of every format: they may be rejected, but no name comes without a finding."""
     nominal = nominal_of(tmp_path)
-    files = {
-        n: path
-        for n, (path, _) in damaged_files(tmp_path).items()
-        if n.startswith("flip") and n[4] in "02468"
-    }
+    files = {n: path for n, (path, _) in damaged_files(tmp_path).items() if n.startswith("flip") and n[4] in "02468"}
     named, refused = [], 0
     for name, path in files.items():
         try:

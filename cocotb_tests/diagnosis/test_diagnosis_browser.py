@@ -79,9 +79,11 @@ def test_in_a_browser(written, tmp_path, verdict):
     assert log == ""
     assert saw["first"] == made_up()[verdict].sentence
     assert saw["width"] == pytest.approx(400, abs=20) and saw["overflow"] <= 0 and saw["cut"] == 0
-    expected = {"explained": 7, "ambiguous": 6, "unexplained": 6, "no_mismatch": 6}.get(verdict, 0)
-    assert len(saw["pictures"]) == expected and all(size > 100 for size in saw["pictures"])
-    assert len(saw["rasters"]) == {7: 6, 6: 6}.get(expected, 0) - 2 * (verdict == "no_mismatch")
+    pictures = {"explained": 8, "partly_explained": 7, "ambiguous": 7, "unexplained": 6, "no_mismatch": 6}
+    assert len(saw["pictures"]) == pictures.get(verdict, 0) and all(size > 70 for size in saw["pictures"])
+    # Two maps and a colour scale in two pictures; without an explanation there is one map in each.
+    rasters = {"explained": 6, "partly_explained": 6, "ambiguous": 6, "unexplained": 4, "no_mismatch": 4}
+    assert len(saw["rasters"]) == rasters.get(verdict, 0)
     assert all(wide > 0 for wide in saw["rasters"])
     assert saw["links"] == saw["fetched"] == [] and saw["scripts"] == 0
     assert saw["title"] == f"Fluxproof diagnosis: {verdict.replace('_', ' ')}"

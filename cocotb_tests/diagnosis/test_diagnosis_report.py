@@ -152,20 +152,14 @@ def test_omitted_picture_is_reported(tmp_path, without, picture, said):
 def test_one_operating_point_has_no_map(tmp_path):
     arrays = evidence().arrays
     arrays |= {name: np.full_like(arrays[name], 3.0) for name in ("omega_e", "i_d", "i_q")}
-    page = html_of(
-        write_outputs(replace(made_up()["explained"], evidence=Evidence(arrays)), tmp_path)[0].parent
-    )
-    assert (
-        "misfit over speed and current: speed or current does not vary" in page and 'id="over_time"' in page
-    )
+    page = html_of(write_outputs(replace(made_up()["explained"], evidence=Evidence(arrays)), tmp_path)[0].parent)
+    assert "misfit over speed and current: speed or current does not vary" in page and 'id="over_time"' in page
 
 
 def test_nonfinite_block_is_ignored(tmp_path):
     arrays = evidence().arrays
     arrays["before_d"][7] = np.nan
-    page = html_of(
-        write_outputs(replace(made_up()["explained"], evidence=Evidence(arrays)), tmp_path)[0].parent
-    )
+    page = html_of(write_outputs(replace(made_up()["explained"], evidence=Evidence(arrays)), tmp_path)[0].parent)
     assert 'id="over_time"' in page and "nan" not in page.lower()
 
 
@@ -183,9 +177,9 @@ def test_thinning_keeps_peaks():
         (0.9, 0.01, "V", "0.900 ± 0.010 V"),
         (0.01607, 0.00012, "H", "16.07 ± 0.12 mH"),
         (-1.234567e-6, 2e-9, "s", "−1.2346 ± 0.0020 µs"),
-        (1234.0, 250.0, "ohm", "1234 ± 250 Ω"),
+        (1234.0, 250.0, "ohm", "1230 ± 250 Ω"),
         (0.0, 0.3, "A", "0.00 ± 0.30 A"),
-        (1.02, math.nan, "1", "1.02 (uncertainty unknown)"),
+        (1.02, math.nan, "1", "102 % (uncertainty unknown)"),
         (math.pi, 0.1, "rad", "3.14 ± 0.10 rad = 180°"),
     ],
 )

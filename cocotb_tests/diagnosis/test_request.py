@@ -12,7 +12,7 @@ from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.experiment import ENOUGH, best_points, closest_distance, rivalry
 from fluxproof.diagnosis.inference.problem import Setup, fit_of_set
 from fluxproof.diagnosis.nominal import load_nominal
-from fluxproof.diagnosis.request import grid, known_of, new_axes, requests, steady_view
+from fluxproof.diagnosis.request import grid, known_of, new_axes, requests, steady_view, within_limits
 
 NOMINAL = load_nominal(PAPER)
 RATED = NOMINAL.machine.rated_current_a
@@ -84,7 +84,19 @@ def test_skew_and_iron_loss_are_separated_under_load():
     top = np.abs(still.omega).max()
     assert asked and all(abs(r.omega_e) > 0.9 * top for r in asked)
     assert np.hypot(asked[0].i_d, asked[0].i_q) > 0.5 * RATED
-    assert set(asked[0].separates) == {"iron_loss", "sampling_skew"} and " V between " in asked[0].why
+    assert set(asked[0].separates) == {"iron_loss", "sampling_skew"} and "V between " in asked[0].why
+    titles = (CATALOGUE[n].title for n in asked[0].separates)
+    assert all(title in asked[0].why for title in titles) and "iron_loss" not in asked[0].why
+    within = within_limits(still)
+    for r in asked:
+        assert all(x == float(f"{x:.2g}") for x in (r.omega_e, r.i_d, r.i_q)) and within(r.omega_e, r.i_d + 1j * r.i_q)
+
+
+def test_a_request_is_about_what_is_open(lossy):
+    """What both explanations contain is certain and needs no point."""
+    solutions = [fit_of_set(lossy, [n, "resistance"]) for n in ("iron_loss", "sampling_skew")]
+    for r in requests(lossy, solutions, 0.05):
+        assert set(r.separates) == {"iron_loss", "sampling_skew"} and CATALOGUE["resistance"].title not in r.why
 
 
 def test_new_axis_is_used_only_if_it_separates_better():

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from fluxproof.diagnosis.improved_plant import in_addition
 from fluxproof.diagnosis.result import NamedEffect
 
 # Relative to the voltage, and to the bus voltage in the direction of the current: rms in healthy recordings.
@@ -60,7 +61,7 @@ def named_effects(names, posterior, explains, only=None) -> list[NamedEffect]:
         for e in estimates.values() if share != 1.0 else ():
             # The reference may be either resistance: ohms beyond the nameplate may lie outside the winding.
             e.value, e.sigma = share * e.value, float(np.hypot(share * e.sigma, (1.0 - share) * e.value))
-        plant = effect.plant({key: share * v for key, v in c.items()}, nominal)
+        plant = in_addition(effect.plant({key: share * v for key, v in c.items()}, nominal), nominal)
         confidence = names.confidence.get(name, 0.0)
         out.append(NamedEffect(name, float(min(confidence, 0.999)), estimates, explains.get(name, 0.0), plant))
     return out

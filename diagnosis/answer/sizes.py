@@ -85,3 +85,14 @@ def fit_of(train: Sizes, held: Sizes) -> Fit:
     """The voltage misfit on fitted and on held-out blocks."""
     a, b = train.channels.get("u", Size(0, 0, 0)), held.channels.get("u", Size(0, 0, 0))
     return Fit("u_dq", "V", a.before, a.after, b.before, b.after, a.floor)
+
+
+def with_stray(remainder, stray, train) -> list[Remainder]:
+    """The remainder with a misfit outside the orders of the balance, in place of a smaller one of its own order."""
+    channel, signal = ("torque", "torque") if stray.kind == "torque" else ("u", "u_dq")
+    whole = train.channels[channel].before if channel in train.channels else stray.size
+    share = float(min((stray.size / max(whole, 1e-12)) ** 2, 1.0))
+    found = Remainder(signal, stray.order, stray.size, stray.size_unit, share)
+    same = lambda r: r.signal == signal and abs(r.order) == abs(found.order) and stray.kind == "order"  # noqa: E731
+    rest = [r for r in remainder if not same(r)]
+    return sorted([found, *rest], key=lambda r: -r.share)

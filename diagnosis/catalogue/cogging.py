@@ -60,6 +60,14 @@ class Cogging(Effect):
         order = Estimate(float(h * nominal.machine.pole_pairs), 0.0, "per turn")
         return {"cogging_nm": Estimate(sizes[h][0], spread, "Nm"), "cogging_order": order}
 
+    def given(self, view, plant):
+        m = plant.machine
+        h = m.cogging_order / m.pole_pairs
+        if not m.cogging_amplitude_nm:
+            return {}
+        wave = np.sin(h * view.theta_mid + m.cogging_phase_rad)
+        return {"torque": m.cogging_amplitude_nm * _seen(view, h) * wave}
+
     def plant(self, c, nominal):
         sizes = self._orders(c)
         h = max(sizes, key=lambda k: sizes[k][0])
@@ -78,9 +86,10 @@ EFFECT = Cogging(
     confounders=("emf_harmonics", "current_offset"),
     separated_by="a slow turn without current",
     parameters=(
-        Parameter("cogging_nm", "Nm", "amplitude of the largest order"),
-        Parameter("cogging_order", "per turn", "the largest order, per mechanical turn"),
+        Parameter("cogging_nm", "Nm", "amplitude of the largest order", "amplitude"),
+        Parameter("cogging_order", "per turn", "the largest order, per mechanical turn", "order"),
     ),
     mechanical=True,
+    shows_at=(),
     needs=("harmonics",),
 )

@@ -22,9 +22,7 @@ class CrossSaturation(FluxEffect):
         return {
             "x2y2": _mixed(view, lambda x, y: 2 * x * y**2, lambda x, y: 2 * x**2 * y),
             "xy4": _mixed(view, lambda x, y: y**4, lambda x, y: 4 * x * y**3),
-            "xy1": _mixed(
-                view, lambda x, y: np.sqrt(y**2 + 0.01) - 0.1, lambda x, y: x * y / np.sqrt(y**2 + 0.01)
-            ),
+            "xy1": _mixed(view, lambda x, y: np.sqrt(y**2 + 0.01) - 0.1, lambda x, y: x * y / np.sqrt(y**2 + 0.01)),
             "x2y4": _mixed(view, lambda x, y: 2 * x * y**4, lambda x, y: 4 * x**2 * y**3),
             "x3y2": _mixed(view, lambda x, y: 3 * x**2 * y**2, lambda x, y: 2 * x**3 * y),
             # The iron that couples the axes also bends each of them.
@@ -44,9 +42,7 @@ class CrossSaturation(FluxEffect):
 
     def estimates(self, c, covariance, nominal):
         m = nominal.machine
-        weights = np.array(
-            [{"xy2": 1.0, "xy4": 1.0, "xy1": np.sqrt(1.01) - 0.1}.get(name, 0.0) for name in c]
-        )
+        weights = np.array([{"xy2": 1.0, "xy4": 1.0, "xy1": np.sqrt(1.01) - 0.1}.get(name, 0.0) for name in c])
         scale = m.inductance_q_h / m.rated_current_a
         value = float(weights @ np.array(list(c.values()))) * scale
         spread = float(np.sqrt(max(weights @ covariance @ weights, 0.0))) * scale
@@ -62,11 +58,12 @@ class CrossSaturation(FluxEffect):
 
 EFFECT = CrossSaturation(
     name="cross_saturation",
-    title="the current of one axis saturates the other",
+    title="cross-saturation of the axes",
     equation="psi_d = L_d i_d + psi_m - c i_q^2, psi_q = L_q i_q - 2 c i_d i_q (one co-energy)",
     signature="order 0, in proportion to the speed: omega i_q^2 on the q axis, even in i_q; omega i_d i_q on d",
     confounders=("inductance_d", "magnet_flux", "current_scale", "saturation"),
     separated_by="a grid of i_d and i_q that includes i_q = 0",
-    parameters=(Parameter("cross_saturation_wb_per_a2", "Wb/A2", "c at rated i_q"),),
+    parameters=(Parameter("cross_saturation_wb_per_a2", "Wb/A2", "c at rated i_q", "coefficient"),),
     bounded=("y3", "x3"),
+    bends=True,
 )

@@ -60,9 +60,7 @@ class CurrentGain(Effect):
         names = list(c)
         out = {}
         for k, phase in enumerate("abc"):
-            weights = np.array(
-                [PATTERNS[n][k] if n in PATTERNS else 1.0 if n == "common" else 0.0 for n in names]
-            )
+            weights = np.array([PATTERNS[n][k] if n in PATTERNS else 1.0 if n == "common" else 0.0 for n in names])
             spread = float(np.sqrt(max(weights @ covariance @ weights, 0.0)))
             out[f"gain_{phase}"] = Estimate(float(self._gains(c)[k]), spread, "1")
         return out
@@ -73,13 +71,17 @@ class CurrentGain(Effect):
 
 EFFECT = CurrentGain(
     name="current_gain",
-    title="the current sensors' gains differ from each other",
+    title="unequal gains of the current sensors",
     equation="i_measured = (1 + g_abc) i",
     signature="order 2 in dq, in proportion to the current; phase currents that do not sum to zero",
     confounders=("phase_resistance_asymmetry", "inductance_d", "current_scale"),
     separated_by="a sweep of the speed: the sensors' error also follows omega L i; the sum of three measured currents",
-    parameters=tuple(Parameter(f"gain_{x}", "1", f"relative error of phase {x}") for x in "abc"),
+    parameters=tuple(Parameter(f"gain_{x}", "1", f"relative error of phase {x}", f"phase {x}") for x in "abc"),
     absorbs=("current_scale",),
+    shows_at=(2.0,),
+    plausible={f"gain_{x}": (-0.1, 0.1) for x in "abc"},
+    otherwise="a shunt of another value, a wrong scale of one column, or a converter that clips",
     corrects=True,
+    stays="an error of measurement is in the recording itself; the trims act from the next one on",
     needs=("harmonics", "current"),
 )

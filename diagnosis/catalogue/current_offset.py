@@ -71,12 +71,16 @@ class CurrentOffset(Effect):
 
 EFFECT = CurrentOffset(
     name="current_offset",
-    title="the current sensors have offsets",
+    title="offsets of the current sensors",
     equation="i_measured = i + o_abc",
     signature="order 1 in dq (R o, constant in the stator frame); phase currents that do not sum to zero",
     confounders=("encoder_eccentricity", "phase_resistance_asymmetry"),
     separated_by="a log at zero current, gates off",
-    parameters=tuple(Parameter(f"offset_{x}_a", "A", f"phase {x}, measured minus true") for x in PHASES),
+    parameters=tuple(Parameter(f"offset_{x}_a", "A", f"phase {x}, measured minus true", f"phase {x}") for x in PHASES),
     corrects=True,
+    stays="an error of measurement is in the recording itself; the trims act from the next one on",
+    shows_at=(1.0,),
+    plausible={f"offset_{x}_a": (-0.1, 0.1, "machine.rated_current_a") for x in PHASES},
+    otherwise="a wrong offset code, or a magnetised current sensor",
     needs=("harmonics", "current"),
 )

@@ -38,12 +38,15 @@ class CurrentScale(Effect):
 
 EFFECT = CurrentScale(
     name="current_scale",
-    title="all current sensors have the same gain error",
+    title="common gain error of the current sensors",
     equation="i_measured = (1 + s) i",
     signature="R, L_d and L_q wrong by the same factor",
     confounders=("resistance", "inductance_d", "inductance_q", "cross_saturation"),
     separated_by="an external ammeter or a torque transducer",
-    parameters=(Parameter("scale", "1", "relative error of all phases"),),
+    parameters=(Parameter("scale", "1", "relative error of all phases", "error"),),
     corrects=True,
+    stays="an error of measurement is in the recording itself; the trims act from the next one on",
+    plausible={"scale": (-0.1, 0.1)},
+    otherwise="rms values in place of peak values, or the scale of another range of the sensors",
     needs=("current",),
 )

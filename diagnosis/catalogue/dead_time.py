@@ -107,6 +107,15 @@ class DeadTime(Effect):
         spread = float(np.hypot(np.sqrt(max(at_full @ covariance @ at_full, 0.0)), c.get("growth", 0.0)))
         return {"v_dead_v": Estimate(full_loss(c), spread, "V")}
 
+    def given(self, view, plant):
+        loss = plant.inverter.dead_time_s * view.nominal.inverter.pwm_frequency_hz * view.nominal.inverter.dc_bus_v
+        if not view.nominal.plant.get("inverter", {}).get("dead_time_s"):
+            return {}  # in the core's own section it is a command to the gates, which the duties may contain
+        width = max(plant.inverter.zero_current_a / view.machine.rated_current_a, 1e-3)
+        late = view.replace(late_s=view.late_s + self.late_s({"v_": loss}, view.nominal))
+        ramp = {"all": lambda x: loss * np.clip(x / width, -1.0, 1.0)}
+        return _following_bus(late, _leg_losses(late, ramp))["all"]
+
     def plant(self, c, nominal):
         v_dead = max(0.0, full_loss(c))
         ramps = {float(k[2:]): abs(v) for k, v in c.items() if k.startswith("v_")}
@@ -119,14 +128,19 @@ class DeadTime(Effect):
 
 EFFECT = DeadTime(
     name="dead_time",
-    title="inverter dead time and device drops",
+    title="dead time of the inverter",
     equation="u_x = u_x,ref - v_dead s(i_x), s odd, s = 1 above a small current",
     signature="order 0 in phase with the current, (4/pi) v_dead, and orders 6 and 12; independent of the speed",
     confounders=("resistance", "emf_harmonics"),
     separated_by="several currents, i_q reversed; another bus voltage or PWM frequency separates dead time from drops",
-    parameters=(Parameter("v_dead_v", "V", "voltage loss of a leg at full current"),),
+    parameters=(
+        Parameter("v_dead_v", "V", "loss of a leg at full current, device drops included", "dead-time voltage"),
+    ),
     smoothed=True,
     trailing=(12.0, 18.0, 24.0),
+    shows_at=(0.0, 6.0, 12.0, 18.0),
+    plausible={"v_dead_v": (0.0, 0.06, "inverter.dc_bus_v")},
+    otherwise="the dead time is already compensated by the recorded duties, or the bus voltage is wrong",
     needs=("inverter",),
     bounded=("log", "fade"),
 )

@@ -51,12 +51,13 @@ class Delay(Effect):
 
 EFFECT = Delay(
     name="delay",
-    title="the voltage takes effect later than assumed",
+    title="delay of the voltage",
     equation="u(t) = u_recorded(t - tau)",
     signature="order 0: the whole voltage vector rotated by omega tau",
     confounders=("encoder_offset", "sampling_skew", "iron_loss"),
     separated_by="two speeds, both directions; load at each; a step",
-    parameters=(Parameter("delay_s", "s", "beyond duty_applied_after_samples"),),
+    parameters=(Parameter("delay_s", "s", "beyond duty_applied_after_samples", "later by"),),
     corrects=True,
+    stays="an error in time is in the recording itself",
     needs=("samples", "inverter"),
 )

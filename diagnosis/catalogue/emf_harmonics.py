@@ -58,6 +58,16 @@ class EmfHarmonics(Effect):
                     out[f"order_{h}"] = Estimate(size, spread, "1")
         return out
 
+    def given(self, view, plant):
+        out = {}
+        for harmonic in plant.machine.emf_harmonics:
+            wave = view.machine.magnet_flux_wb * np.exp(1j * (harmonic.order * view.theta + harmonic.phase_rad))
+            d, q = harmonic.amplitude_d, harmonic.amplitude_q
+            for psi, n in ((0.5 * (d + q) * wave, harmonic.order), (0.5 * (d - q) * np.conj(wave), -harmonic.order)):
+                for channel, values in _with_reluctance(view, psi, n).items():
+                    out[channel] = out.get(channel, 0.0) + values
+        return out
+
     def plant(self, c, nominal):
         rows = []
         for h in (6, 12, 18):
@@ -75,9 +85,12 @@ EFFECT = EmfHarmonics(
     confounders=("dead_time", "cogging"),
     separated_by="two speeds; rotation at zero current",
     parameters=(
-        Parameter("order_6", "1", "amplitude relative to the magnet flux"),
-        Parameter("order_12", "1", "amplitude relative to the magnet flux"),
+        Parameter("order_6", "1", "amplitude relative to the magnet flux", "order 6"),
+        Parameter("order_12", "1", "amplitude relative to the magnet flux", "order 12"),
     ),
     trailing=(12.0, 18.0, 24.0),
+    shows_at=(6.0, 12.0, 18.0),
+    plausible={"order_6": (0.0, 0.2), "order_12": (0.0, 0.2)},
+    otherwise="a machine for block commutation, or an angle that is not linear over the turn",
     needs=("harmonics",),
 )

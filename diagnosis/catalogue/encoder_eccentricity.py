@@ -49,9 +49,7 @@ class EncoderEccentricity(Effect):
     def corrected(self, view, c):
         waves = _turns(view, (1, *_more(view)))
         false = sum(value * _acceleration(view, name, waves[name]) for name, value in c.items())
-        return view.turned(sum(value * waves[name] for name, value in c.items())).replace(
-            slope_m=view.slope_m - false
-        )
+        return view.turned(sum(value * waves[name] for name, value in c.items())).replace(slope_m=view.slope_m - false)
 
     def estimates(self, c, covariance, nominal):
         first = np.hypot(c["cos_1"], c["sin_1"])
@@ -77,7 +75,10 @@ EFFECT = EncoderEccentricity(
     signature="order 1/p in dq: omega psi_m a on the d axis",
     confounders=("current_offset",),
     separated_by="the mechanical index: orders per mechanical turn; more than one pole pair",
-    parameters=(Parameter("amplitude_rad", "rad", "electrical, once per mechanical turn"),),
+    parameters=(Parameter("amplitude_rad", "rad", "electrical, once per mechanical turn", "amplitude"),),
     corrects=True,
+    stays="an error of measurement is in the recording itself; the trims act from the next one on",
+    shows_at=(),
+    shows_at_turns=(1.0, 2.0, 3.0),
     needs=("harmonics", "angle"),
 )

@@ -36,7 +36,8 @@ EFFECT = EncoderOffset(
     signature="order 0: omega psi_m offset on the d axis, also at zero current",
     confounders=("inductance_q", "delay", "sampling_skew", "saturation"),
     separated_by="rotation at zero current in both directions, two speeds",
-    parameters=(Parameter("offset_rad", "rad", "electrical, measured minus true"),),
+    parameters=(Parameter("offset_rad", "rad", "electrical, measured minus true", "offset"),),
     corrects=True,
+    stays="an error of measurement is in the recording itself; the trims act from the next one on",
     needs=("angle",),
 )

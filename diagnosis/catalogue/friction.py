@@ -43,12 +43,7 @@ class Friction(Effect):
         """Drag torque [Nm] at the speed where the EMF reaches the bus voltage, about the maximum speed."""
         m = nominal.machine
         top = nominal.inverter.dc_bus_v / np.sqrt(3) / m.magnet_flux_wb / m.pole_pairs
-        return (
-            abs(c["viscous"]) * top
-            + abs(c["coulomb"])
-            + abs(c.get("square", 0.0)) * top
-            + abs(c.get("low", 0.0))
-        )
+        return abs(c["viscous"]) * top + abs(c["coulomb"]) + abs(c.get("square", 0.0)) * top + abs(c.get("low", 0.0))
 
     def possible(self, c, covariance, nominal):
         """Friction cannot drive the shaft: the total drag at the speed of ``size`` is not negative."""
@@ -74,14 +69,14 @@ class Friction(Effect):
 
 EFFECT = Friction(
     name="friction",
-    title="friction differs from the drive file",
+    title="friction off the drive file",
     equation="T_shaft = T_airgap - B omega_m - T_c sign(omega_m)",
     signature="torque against the motion, odd in speed, at every load",
     confounders=("iron_loss",),
     separated_by="a torque transducer, or a no-load coast-down in both directions",
     parameters=(
-        Parameter("viscous_friction_nms", "Nm s", "per mechanical rad/s"),
-        Parameter("coulomb_friction_nm", "Nm", "dry"),
+        Parameter("viscous_friction_nms", "Nm s", "per mechanical rad/s", "viscous"),
+        Parameter("coulomb_friction_nm", "Nm", "dry", "dry"),
     ),
     mechanical=True,
     needs=("harmonics",),

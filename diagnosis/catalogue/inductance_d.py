@@ -39,11 +39,13 @@ class InductanceD(FluxEffect):
 
 EFFECT = InductanceD(
     name="inductance_d",
-    title="d-axis inductance differs from the nameplate",
+    title="d-axis inductance off the nameplate",
     equation="psi_d = (L_d + delta_l_d) i_d",
     signature="order 0, omega i_d on the q axis; and the slope of i_d",
     confounders=("magnet_flux", "current_gain", "cross_saturation", "saturation"),
     separated_by="two non-zero values of i_d",
-    parameters=(Parameter("inductance_d_h", "H", "of the d axis"),),
+    parameters=(Parameter("inductance_d_h", "H", "of the d axis", "L_d"),),
     needs_d_current=("delta_l_d", "bend_"),
+    plausible={"inductance_d_h": (0.5, 1.9, "machine.inductance_d_h")},
+    otherwise="an inductance between two terminals is twice that of a phase; an incremental one is smaller",
 )

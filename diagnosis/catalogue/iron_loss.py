@@ -65,6 +65,12 @@ class IronLoss(Effect):
         g = g if abs(g) > 1e-12 else 1e-12
         return one("iron_resistance_ohm", "ohm", 1.0 / g, spread / g**2)
 
+    def given(self, view, plant):
+        g = plant.machine.iron_conductance_s
+        if not g:
+            return {}
+        return {**_loss(view, g * view.omega), "u": view.flux(self.lost_flux(view, {"g_fe": g}))}
+
     def plant(self, c, nominal):
         return {"machine.iron_conductance_s": max(0.0, sum(c.values()))}
 
@@ -76,7 +82,9 @@ EFFECT = IronLoss(
     signature="order 0: omega^2 L_q psi / R_fe on the d axis, even in speed, and a drag torque",
     confounders=("sampling_skew", "inductance_q", "resistance", "delay"),
     separated_by="load: omega^2 i_q on the q axis; a shifted sampling trigger; low speed for hysteresis",
-    parameters=(Parameter("iron_resistance_ohm", "ohm", "in parallel with the rotational EMF, at the highest speed"),),
+    parameters=(
+        Parameter("iron_resistance_ohm", "ohm", "parallel to the EMF, at the highest speed", "loss resistance"),
+    ),
     positive=True,
     takes_flux=True,
     needs=("angle",),

@@ -27,9 +27,7 @@ class MagnetFlux(FluxEffect):
         return 0.6 * nominal.machine.magnet_flux_wb
 
     def estimates(self, c, covariance, nominal):
-        return one(
-            "magnet_flux_wb", "Wb", nominal.machine.magnet_flux_wb + c["delta_psi_m"], sigma(covariance)
-        )
+        return one("magnet_flux_wb", "Wb", nominal.machine.magnet_flux_wb + c["delta_psi_m"], sigma(covariance))
 
     def plant(self, c, nominal):
         return {"machine.magnet_flux_wb": nominal.machine.magnet_flux_wb + c["delta_psi_m"]}
@@ -37,12 +35,14 @@ class MagnetFlux(FluxEffect):
 
 EFFECT = MagnetFlux(
     name="magnet_flux",
-    title="magnet flux linkage differs from the nameplate",
+    title="magnet flux off the nameplate",
     equation="psi_d = L_d i_d + psi_m + delta_psi_m",
     signature="order 0 on the q axis, proportional to speed, at every current including zero",
     confounders=("resistance", "cross_saturation", "magnet_temperature", "inductance_d"),
     separated_by="three speeds; rotation at zero current",
-    parameters=(Parameter("magnet_flux_wb", "Wb", "peak, per phase"),),
+    parameters=(Parameter("magnet_flux_wb", "Wb", "peak, per phase", "flux linkage"),),
     curve=0.1,  # a part of lost flux recovers; more is a drift
     bounded=("recovery",),
+    plausible={"magnet_flux_wb": (0.75, 1.25, "machine.magnet_flux_wb")},
+    otherwise="a drive file with the value between two terminals (1.73 times) or the rms value (0.71), or lost magnets",
 )

@@ -47,17 +47,18 @@ class MagnetTemperature(FluxEffect):
 
 EFFECT = MagnetTemperature(
     name="magnet_temperature",
-    title="magnet flux linkage changes with temperature",
+    title="temperature drift of the magnet flux",
     equation="psi_d = L_d i_d + psi_m (1 + alpha_m (T_m - T_ref))",
     signature="order 0 on the q axis, proportional to speed, drifting over time",
     confounders=("magnet_flux", "resistance_temperature"),
     separated_by="hot and cold machine, at two speeds and at zero current",
     parameters=(
-        Parameter(
-            "magnet_flux_drift_wb", "Wb", "from start to end; the magnet temperature is not measured"
-        ),
+        Parameter("magnet_flux_drift_wb", "Wb", "from start to end; the magnet temperature is not measured", "change"),
     ),
     absorbs=("magnet_flux",),
+    plausible={"magnet_flux_drift_wb": (-0.25, 0.0, "machine.magnet_flux_wb")},
+    otherwise="magnets lose 0.05 to 0.2 % of their flux per kelvin: a sensor drifts, or the machine cooled",
+    stays="the temperature of the magnets is not recorded, so that a coefficient cannot be applied",
     drift_of="magnet_flux",
     needs=("time",),
 )

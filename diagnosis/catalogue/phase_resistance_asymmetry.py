@@ -18,10 +18,7 @@ class PhaseResistanceAsymmetry(Effect):
     def free(self, view):
         fade = course(view)[:, :, None]
         i_abc, r = view.phases(view.i_mid), view.machine.resistance_ohm
-        return {
-            f"{k}_course": voltage(view.from_phases(fade * r * np.array(w) * i_abc))
-            for k, w in PATTERNS.items()
-        }
+        return {f"{k}_course": voltage(view.from_phases(fade * r * np.array(w) * i_abc)) for k, w in PATTERNS.items()}
 
     def floor(self, nominal):
         return 0.01
@@ -47,18 +44,26 @@ class PhaseResistanceAsymmetry(Effect):
     def relative(self, c, nominal):
         return to_true_resistance(c, nominal)
 
+    def given(self, view, plant):
+        shares = np.array(plant.machine.phase_resistance_asymmetry)
+        r = view.machine.resistance_ohm
+        return voltage(view.from_phases(r * shares * view.phases(view.i_mid))) if shares.any() else {}
+
     def plant(self, c, nominal):
         return {"machine.phase_resistance_asymmetry": [float(v) for v in self._phases(c)]}
 
 
 EFFECT = PhaseResistanceAsymmetry(
     name="phase_resistance_asymmetry",
-    title="the phase resistances differ",
+    title="unequal phase resistances",
     equation="u_x = R (1 + a_x) i_x, sum of a_x = 0",
     signature="order 2 in dq, proportional to current, independent of speed",
     confounders=("current_gain", "resistance"),
     separated_by="standstill and speed: a sensor error also follows omega L i; the sum of three measured currents",
-    parameters=tuple(Parameter(f"asymmetry_{x}", "1", f"phase {x}, relative to the mean") for x in "abc"),
+    parameters=tuple(Parameter(f"asymmetry_{x}", "1", f"phase {x}, relative to the mean", f"phase {x}") for x in "abc"),
     absorbs=("resistance",),
+    shows_at=(2.0,),
+    plausible={f"asymmetry_{x}": (-0.3, 0.3) for x in "abc"},
+    otherwise="a loose contact or a broken strand in the cable",
     needs=("harmonics", "current"),
 )

@@ -36,10 +36,12 @@ class Resistance(Effect):
 
 EFFECT = Resistance(
     name="resistance",
-    title="winding resistance differs from the nameplate",
+    title="winding resistance off the nameplate",
     equation="u_dq = (R + delta_r) i_dq",
     signature="order 0, proportional to current, at every speed including standstill",
     confounders=("iron_loss", "magnet_flux", "dead_time", "resistance_temperature"),
     separated_by="low speed and three loads; i_q reversed (against magnet_flux), several currents (against dead_time)",
-    parameters=(Parameter("resistance_ohm", "ohm", "per phase, at the temperature of the recording"),),
+    parameters=(Parameter("resistance_ohm", "ohm", "per phase, at the temperature of the recording", "resistance"),),
+    plausible={"resistance_ohm": (0.7, 2.0, "machine.resistance_ohm")},
+    otherwise="a resistance between two terminals is twice that of a phase; cables and contacts add to the winding",
 )

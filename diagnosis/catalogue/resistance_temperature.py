@@ -56,15 +56,17 @@ class ResistanceTemperature(Effect):
 
 EFFECT = ResistanceTemperature(
     name="resistance_temperature",
-    title="winding resistance changes with temperature",
+    title="temperature drift of the winding resistance",
     equation="u_dq = R (1 + alpha (T - T_ref)) i_dq",
     signature="order 0, proportional to current times temperature rise",
     confounders=("resistance", "magnet_temperature"),
     separated_by="a thermocouple; a load step while hot; standstill with current, cold and hot machine",
     parameters=(
-        Parameter("resistance_temp_coeff_per_k", "1/K", "copper: 0.0039; needs temp_winding"),
-        Parameter("resistance_drift_ohm", "ohm", "from start to end, if no temperature was recorded"),
+        Parameter("resistance_temp_coeff_per_k", "1/K", "copper: 0.0039; needs temp_winding", "coefficient"),
+        Parameter("resistance_drift_ohm", "ohm", "from start to end, if no temperature was recorded", "change"),
     ),
     absorbs=("resistance",),
+    plausible={"resistance_temp_coeff_per_k": (0.003, 0.005)},
+    otherwise="copper has 0.39 %/K: something else warms up, or the sensor is not at the winding",
     drift_of="resistance",
 )

@@ -48,13 +48,14 @@ class SamplingSkew(Effect):
 
 EFFECT = SamplingSkew(
     name="sampling_skew",
-    title="currents are sampled off the middle of the zero vector",
+    title="shifted sampling instant of the currents",
     equation="i_measured = i(t + tau), di/dt = -(R i + j omega psi_m) / L",
     signature="order 0: omega^2 psi_m tau on the d axis, equivalent to an iron loss of R_fe = -L_q / tau",
     confounders=("iron_loss", "delay", "inductance_q"),
     separated_by="load (an iron loss also follows omega^2 i_q); a deliberately shifted sampling trigger",
-    parameters=(Parameter("skew_s", "s", "of the currents relative to the angle; positive: late"),),
+    parameters=(Parameter("skew_s", "s", "of the currents relative to the angle; positive: late", "late by"),),
     corrects=True,
+    stays="an error in time is in the recording itself",
     corrected_last=True,
     needs=("harmonics", "inverter"),
 )

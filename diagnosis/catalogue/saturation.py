@@ -62,9 +62,7 @@ class Saturation(FluxEffect):
         x = np.linspace(0, 1, 21)
         bends = []
         for axis in "qd":
-            curve = sum(
-                c.get(f"{axis}_{k}", 0.0) * x**p for k, p in (("2", 2), ("2s", 2), ("3", 3), ("5", 5))
-            )
+            curve = sum(c.get(f"{axis}_{k}", 0.0) * x**p for k, p in (("2", 2), ("2s", 2), ("3", 3), ("5", 5)))
             bends.append(np.max(np.abs(curve - x * curve[-1])))
         return float(max(bends))
 
@@ -81,12 +79,16 @@ class Saturation(FluxEffect):
         return out
 
     def plant(self, c, nominal):
-        rated2 = nominal.machine.rated_current_a**2
-        return {
-            f"machine.saturation_{axis}_per_a2": max(0.0, -sum(v for k, v in c.items() if k.startswith(axis)))
-            / rated2
-            for axis in "dq"
-        }
+        """The plant's i = x (1 + s x^2), psi = L x, fitted to the curve within the rated current."""
+        i = np.linspace(-1.0, 1.0, 41)
+        shapes = {"1": i, "2": i**2, "2s": i * np.abs(i), "3": i**3, "5": i**5}
+        out = {}
+        for axis in "dq":
+            odd = {"2": i * np.abs(i)} if axis == "q" else {}  # on the q axis |y| y has this name
+            x = i + sum(v * {**shapes, **odd}[k[2:]] for k, v in c.items() if k.startswith(f"{axis}_"))
+            bend = float((i - x) @ x**3 / (x**3 @ x**3)) / nominal.machine.rated_current_a**2
+            out[f"machine.saturation_{axis}_per_a2"] = max(0.0, bend)
+        return out
 
 
 EFFECT = Saturation(
@@ -97,10 +99,11 @@ EFFECT = Saturation(
     confounders=("inductance_q", "inductance_d", "cross_saturation", "encoder_offset"),
     separated_by="i_q up to the rated current in several steps, both signs",
     parameters=(
-        Parameter("psi_q_change_at_rated_wb", "Wb", "flux linkage at rated i_q minus L_q i_q"),
-        Parameter("psi_d_change_at_rated_wb", "Wb", "flux linkage at rated i_d minus L_d i_d"),
+        Parameter("psi_q_change_at_rated_wb", "Wb", "flux linkage at rated i_q minus L_q i_q", "psi_q at rated i_q"),
+        Parameter("psi_d_change_at_rated_wb", "Wb", "flux linkage at rated i_d minus L_d i_d", "psi_d at rated i_d"),
     ),
     absorbs=("inductance_d", "inductance_q"),
     needs_d_current=("d_",),
     curve=1.0,  # no formula of a saturation is preferred
+    bends=True,
 )

@@ -27,12 +27,15 @@ class UdcGain(Effect):
 
 EFFECT = UdcGain(
     name="udc_gain",
-    title="gain error of the measured bus voltage",
+    title="gain error of the bus voltage sensor",
     equation="u_dc_measured = (1 + g) u_dc",
     signature="R, L_d, L_q and psi_m wrong by the same factor",
     confounders=("magnet_flux", "current_scale", "resistance", "inductance_d", "inductance_q"),
     separated_by="an external voltmeter, or the open-circuit EMF",
-    parameters=(Parameter("udc_gain", "1", "relative error"),),
+    parameters=(Parameter("udc_gain", "1", "relative error", "error"),),
     corrects=True,
+    stays="an error of measurement is in the recording itself; the trims act from the next one on",
+    plausible={"udc_gain": (-0.1, 0.1)},
+    otherwise="the bus voltage of another point of the circuit, or the wrong divider",
     needs=("inverter",),
 )

@@ -1,4 +1,4 @@
-"""Line and bar charts: misfit over time and over the angle, harmonic orders, the fit before and after.
+"""Line charts: misfit over time and over the angle, harmonic orders.
 
 The arrays are those of diagnosis.result.Evidence; a drawing function raises KeyError if one is missing.
 """
@@ -38,13 +38,9 @@ def over_time(e) -> theme.Picture:
         held = np.bincount(part, e["holdout"], len(rows)) > rows / 2
         upright = dict(transform=axis.get_xaxis_transform(), color=theme.HELD, linewidth=0, zorder=-1)
         axis.fill_between(np.repeat(edges, 2)[1:-1], 0, 1, where=np.repeat(held, 2), **upright)
-    axis.set(
-        title="Misfit", xlabel="time [s]", ylabel="V", xlim=(t[0], t[-1]), ylim=(0, 1.08 * max(tops) or 1.0)
-    )
+    axis.set(title="Misfit", xlabel="time [s]", ylabel="V", xlim=(t[0], t[-1]), ylim=(0, 1.08 * max(tops) or 1.0))
     theme.key(axis, *names)
-    caption = (
-        "Magnitude of the misfit vector over time. Vertical shading: intervals held out of every fit."
-    )
+    caption = "Magnitude of the misfit vector over time. Vertical shading: intervals held out of every fit."
     return theme.picture("over_time", figure, caption)
 
 
@@ -61,9 +57,7 @@ def over_angle(e) -> theme.Picture:
         axis.set(title=f"Misfit of $u_{name}$", ylabel="V", xlim=(0, 360), xticks=range(0, 361, 60))
         theme.key(axis, *((_called(e, when), WHEN[when]) for when in given))
     panels[-1].set_xlabel("electrical angle [°]")
-    caption = (
-        "Mean misfit over the electrical angle. Six periods per turn indicate the inverter or the magnets."
-    )
+    caption = "Mean misfit over the electrical angle. Six periods per turn indicate the inverter or the magnets."
     return theme.picture("over_angle", figure, caption)
 
 
@@ -99,46 +93,16 @@ def orders(e) -> theme.Picture:
         ylim=(bottom, top),
     )
     theme.key(axis, *((_called(e, when), WHEN[when]) for when in values))
-    caption = "Amplitude of the misfit's harmonics. Order 0 is the part that does not depend on the angle."
+    caption = (
+        "Amplitude of the misfit's harmonics. Order 0 is the part that does not depend on the angle; what it leaves"
+        " in the other orders of incomplete turns is subtracted."
+    )
     return theme.picture("orders", figure, caption)
 
 
-def fit_bars(fit) -> theme.Picture:
-    """rms misfit before and after, on fitted and on held-out points, with the noise floor."""
-    rows = [
-        ("held out, before", fit.holdout_before, theme.BEFORE),
-        ("held out, after", fit.holdout_after, theme.AFTER),
-        ("fitted, before", fit.train_before, theme.BEFORE),
-        ("fitted, after", fit.train_after, theme.AFTER),
-    ]
-    if not all(np.isfinite(value) for _, value, _ in rows) or not any(value for _, value, _ in rows):
-        raise LeftOut("the misfit was not measured")
-    figure, axis = theme.axes(height=2.3)
-    top = max(value for _, value, _ in rows)
-    for place, (_, value, color) in zip((0, 1, 2.5, 3.5), rows, strict=True):
-        axis.barh(place, value, 0.78, color=color)
-        axis.annotate(
-            f"{value:.3g} {fit.unit}", (value, place), (4, 0), textcoords="offset points", va="center"
-        )
-    if np.isfinite(fit.noise_floor) and fit.noise_floor > 0.0:
-        axis.axvline(fit.noise_floor, color=theme.INK, linewidth=1.1, linestyle=(0, (4, 2)))
-        at = dict(xycoords=("data", "axes fraction"), textcoords="offset points", va="bottom", fontsize=9)
-        axis.annotate(f"noise floor {fit.noise_floor:.3g} {fit.unit}", (fit.noise_floor, 1.0), (-2, 3), **at)
-    axis.set_yticks((0, 1, 2.5, 3.5), [name for name, _, _ in rows])
-    axis.set(xlabel=f"rms misfit of {theme.plain(fit.signal)} [{fit.unit}]", xlim=(0, 1.2 * top))
-    axis.tick_params(axis="y", length=0)
-    axis.grid(axis="y", visible=False)
-    axis.invert_yaxis()
-    return theme.picture(
-        "fit_bars",
-        figure,
-        "Misfit before and after, on operating points that were not fitted and on those that were.",
-    )
-
-
 def _called(e, when: str) -> str:
-    """Label of a curve: "before" or "after", or "misfit" if there is no "after"."""
-    return when if any("after" in name for name in e) else "misfit"
+    """Label of a curve: "before" and "after" or what the report calls them, or "misfit" if there is no "after"."""
+    return e.get("words", {}).get(when, when) if any("after" in name for name in e) else "misfit"
 
 
 def _line(axis, x, y, color) -> None:

@@ -14,9 +14,7 @@ from fluxproof.diagnosis.report import theme
 
 CELLS = (28, 24, 20, 16, 13, 10)  # along each axis, finest first; with 28 a cell is 4 pixels wide on a phone
 FILLED = 0.9  # least filled share relative to the coarsest grid: finer cells leave empty stripes between points
-SPARSE = (
-    0.35  # least filled share of the coarsest grid for a map; below it each fine cell is drawn as a square
-)
+SPARSE = 0.35  # least filled share of the coarsest grid for a map; below it each fine cell is drawn as a square
 QUIET = 3.0  # times the noise: least upper end of the colour scale, so that noise alone does not look significant
 NOTHING = 1e-9
 
@@ -73,7 +71,7 @@ def _before_after(e, x, y, x_label: str, y_label: str, range_x=None):
     figure, panels = theme.axes(1, len(shown), height=2.5, sharey=True, squeeze=False)
     for axis, when, (values, edges_x, edges_y) in zip(panels[0], shown, maps, strict=True):
         image = _draw(axis, values, edges_x, edges_y, scale)
-        axis.set(title=when if len(shown) > 1 else "misfit", ylim=_wider(spans[1]))
+        axis.set(title=e.get("words", {}).get(when, when) if len(shown) > 1 else "misfit", ylim=_wider(spans[1]))
         axis.set_xlim(range_x or _wider(spans[0]))
         if range_x:
             axis.set_xticks([90, 180, 270])

@@ -10,23 +10,22 @@ from types import SimpleNamespace
 
 import jinja2
 
+from fluxproof.diagnosis.answer.phrases import SIGNALS
 from fluxproof.diagnosis.improved_core import core_values
 from fluxproof.diagnosis.improved_plant import merged, plant_of
 from fluxproof.diagnosis.nominal import SECTIONS
+from fluxproof.diagnosis.quantities import RPM
 from fluxproof.diagnosis.report import pictures, words
 
 FOLDER = Path(__file__).resolve().parent
 MOST_PROBLEMS = 60
-RPM = 9.549296585513721  # rad/s to 1/min, 60/(2 pi)
 
 
 def render(diagnosis, nominal=None, overlay: dict | None = None) -> str:
     """The page as one string of HTML; arguments as in write.write_outputs."""
     drawn, left_out = pictures.draw(diagnosis, overlay)
     mood, meaning = words.VERDICTS[diagnosis.verdict]
-    compared = diagnosis.verdict not in ("bad_recording", "digital_mismatch") or bool(
-        diagnosis.evidence.arrays
-    )
+    compared = diagnosis.verdict not in ("bad_recording", "digital_mismatch") or bool(diagnosis.evidence.arrays)
     named = {name for group in diagnosis.ambiguity for name in group} | {e.name for e in diagnosis.effects}
     context = dict(
         d=diagnosis,
@@ -36,6 +35,9 @@ def render(diagnosis, nominal=None, overlay: dict | None = None) -> str:
         words=words,
         text={name: words.effect_text(name) for name in sorted(named)},
         fit=fit_view(diagnosis.fit),
+        signal=SIGNALS.get(diagnosis.location.signal, diagnosis.location.signal),
+        unknown_signal=SIGNALS.get(u.signal, u.signal) if (u := diagnosis.unknown_term) is not None else "",
+        rest=[rest_view(part) for part in diagnosis.remainder],
         regions=[region_view(region) for region in diagnosis.location.regions],
         requests=[request_view(request, nominal) for request in diagnosis.next_recording],
         plant=plant_rows(diagnosis.effects, nominal),
@@ -46,9 +48,7 @@ def render(diagnosis, nominal=None, overlay: dict | None = None) -> str:
         drive=nominal.path if nominal is not None else "",
     )
     loader = jinja2.FileSystemLoader(FOLDER)
-    environment = jinja2.Environment(
-        loader=loader, autoescape=True, trim_blocks=True, undefined=jinja2.StrictUndefined
-    )
+    environment = jinja2.Environment(loader=loader, autoescape=True, trim_blocks=True, undefined=jinja2.StrictUndefined)
     html = environment.get_template("report.html").render(context)
     return html.lstrip().encode("utf-8", "replace").decode()  # a path may contain bytes that are not UTF-8
 
@@ -63,6 +63,16 @@ def fit_view(fit) -> SimpleNamespace:
         smaller=ratio(fit.holdout_before, fit.holdout_after),
         over_noise=ratio(fit.holdout_after, fit.noise_floor),
         before_over_noise=ratio(fit.holdout_before, fit.noise_floor),
+    )
+
+
+def rest_view(part) -> SimpleNamespace:
+    """A row of the table of what nothing named explains: signal, order, size and share."""
+    return SimpleNamespace(
+        signal=SIGNALS.get(part.signal, part.signal),
+        order=words.number(part.order) if part.order else "0, the mean",
+        size=words.quantity(part.size, part.unit, 2),
+        share=words.percent(part.share),
     )
 
 
@@ -115,6 +125,4 @@ def plant_rows(effects, nominal) -> list[SimpleNamespace]:
 def _unit(section: str, name: str) -> str:
     """The unit of a key of drive.toml; empty if the nominal drive has no such key."""
     field = getattr(SECTIONS.get(section), "__dataclass_fields__", {}).get(name)
-    return (
-        words.unit_text(field.metadata["key"].unit) if field is not None and "key" in field.metadata else ""
-    )
+    return words.unit_text(field.metadata["key"].unit) if field is not None and "key" in field.metadata else ""

@@ -7,7 +7,7 @@ import warnings
 import matplotlib as mpl
 import numpy as np
 
-from fluxproof.diagnosis.report import lines, maps, overlay, theme
+from fluxproof.diagnosis.report import bars, lines, maps, overlay, theme
 from fluxproof.diagnosis.report.maps import LeftOut
 
 # name: (drawing function, required arrays, title)
@@ -45,18 +45,21 @@ def draw(diagnosis, laid_over: dict | None) -> tuple[dict[str, theme.Picture], l
     """(pictures by name, one line with the reason for each picture that is left out)."""
     drawn, left_out = {}, []
     arrays = {name: np.asarray(values) for name, values in diagnosis.evidence.arrays.items()}
+    if diagnosis.verdict == "unexplained" and not diagnosis.effects:  # nothing is named, so there is no "after"
+        arrays = {name: values for name, values in arrays.items() if "after" not in name}
     try:
         arrays = _clean(arrays)
     except LeftOut as reason:
         return {}, [f"every picture of the misfit: {reason}"] if arrays else []
+    if diagnosis.verdict == "partly_explained":
+        arrays["words"] = {"before": "before", "after": "the rest"}
     jobs = [(name, title, needs, function, arrays) for name, (function, needs, title) in DRAWN.items()]
-    jobs.append(("fit_bars", "misfit before and after", (), lines.fit_bars, diagnosis.fit))
+    jobs.append(("shares", "shares of the misfit", (), bars.shares, diagnosis))
+    jobs.append(("fit_bars", "misfit before and after", (), bars.fit_bars, diagnosis.fit))
     if laid_over is not None:
-        jobs.append(
-            ("overlay", "simulation over the recording", ("t", "recorded"), overlay.overlay, laid_over)
-        )
+        jobs.append(("overlay", "simulation over the recording", ("t", "recorded"), overlay.overlay, laid_over))
     for name, title, needs, function, data in jobs:
-        missing = [need for need in needs if need not in data]
+        missing = [need for need in needs if need not in data] if needs else []
         try:
             if missing:
                 raise LeftOut(f"{', '.join(missing)} is missing")

@@ -67,9 +67,7 @@ def key(axis, *words: tuple[str, str]) -> None:
     place, at = axis.transAxes, (1.0, 1.0)
     for text, color in reversed(words):
         offset = dict(xytext=(0, 4) if place is axis.transAxes else (-9, 0), textcoords="offset points")
-        at_words = dict(
-            xycoords=place, color=color, ha="right", va="bottom", fontsize=9, annotation_clip=False
-        )
+        at_words = dict(xycoords=place, color=color, ha="right", va="bottom", fontsize=9, annotation_clip=False)
         place, at = axis.annotate(text, at, **at_words, **offset), (0.0, 0.0)
 
 

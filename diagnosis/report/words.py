@@ -7,6 +7,9 @@ import math
 from types import SimpleNamespace
 
 from fluxproof.diagnosis.catalogue import CATALOGUE
+from fluxproof.diagnosis.quantities import measured, number, quantity, unit_text
+
+__all__ = ["brief", "effect_text", "measured", "number", "percent", "quantity", "span", "unit_text"]
 
 # verdict: (mood, meaning); the mood selects the colour of the badge.
 VERDICTS = {
@@ -36,48 +39,6 @@ VARIABLES = {
     "u_dc": ("bus voltage", "V"),
     "temp_winding": ("winding temperature", "°C"),
 }
-UNITS = {"ohm": "Ω", "degC": "°C", "1": "", "Nm": "N m", "Nms": "N m s", "kgm2": "kg m²"}
-PREFIXED = ("H", "Wb", "s", "Ω")
-PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
-
-
-def number(value, digits: int = 4) -> str:
-    """A number with ``digits`` significant digits and a typographic minus sign; a dash for None or NaN."""
-    if value is None or (isinstance(value, float) and math.isnan(value)):
-        return "–"
-    if math.isinf(value):
-        return "∞" if value > 0 else "−∞"
-    return f"{float(value):.{digits}g}".replace("-", "−")
-
-
-def unit_text(unit: str) -> str:
-    return UNITS.get(unit, unit)
-
-
-def quantity(value, unit: str, digits: int = 4) -> str:
-    """A number with its unit and SI prefix: 0.01607 H is written 16.07 mH."""
-    factor, unit = _prefix(value, unit_text(unit))
-    return f"{number(value / factor if factor != 1.0 else value, digits)} {unit}".rstrip()
-
-
-def measured(value: float, sigma: float | None, unit: str) -> str:
-    """value ± sigma with two significant digits of sigma, and the unit; angles also in degrees."""
-    factor, name = _prefix(value, unit_text(unit))
-    if sigma is None or not math.isfinite(sigma) or sigma <= 0.0:
-        text = f"{quantity(value, unit)} (uncertainty unknown)"
-    else:
-        decimals = min(max(1 - math.floor(math.log10(sigma / factor)), 0), 9)
-        text = f"{value / factor:.{decimals}f} ± {sigma / factor:.{decimals}f} {name}".replace(
-            "-", "−"
-        ).rstrip()
-    return f"{text} = {number(math.degrees(value), 3)}°" if unit == "rad" else text
-
-
-def _prefix(value, unit: str) -> tuple[float, str]:
-    if unit not in PREFIXED or value is None or not math.isfinite(value) or value == 0.0:
-        return 1.0, unit
-    factor, prefix = next(((f, p) for f, p in PREFIXES if abs(value) >= 0.1 * f), PREFIXES[-1])
-    return factor, prefix + unit
 
 
 def percent(share: float) -> str:

@@ -36,7 +36,8 @@ EFFECT = LegVoltage(
     signature="order 1 in dq, the same at every speed and current",
     confounders=("current_offset", "encoder_eccentricity"),
     separated_by="two speeds: offsets of the sensors also appear proportional to the speed",
-    parameters=(Parameter("volts", "V", "difference of the legs"),),
+    parameters=(Parameter("volts", "V", "difference of the legs", "difference"),),
     named=False,
+    shows_at=(1.0,),
     needs=("harmonics", "inverter"),
 )

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from fluxproof.checkout import ROOT
-from fluxproof.diagnosis.answer.verdict import sentence
+from fluxproof.diagnosis.answer.headline import sentence
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.load import load_recording
 from fluxproof.diagnosis.nominal import load_nominal

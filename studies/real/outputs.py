@@ -5,8 +5,10 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
+from fluxproof.diagnosis.answer.advice import complete
 from fluxproof.diagnosis.improve import write_improved
 from fluxproof.diagnosis.overlay import closed_loop
+from fluxproof.diagnosis.physics import known_effects
 from fluxproof.diagnosis.recording import RecordingError
 from fluxproof.diagnosis.report.write import json_ready, write_outputs
 from fluxproof.golden_model.drive_keys import DriveError
@@ -24,14 +26,14 @@ def write(name: str, answer, nominal, recording, out: Path, more: dict, model=No
     """
     started, folder = time.perf_counter(), out / name
     folder.mkdir(parents=True, exist_ok=True)
-    improved = write_improved(
-        nominal, answer.effects if model is None else model, folder / "drive_improved.toml"
-    )
+    improved = write_improved(nominal, answer.effects if model is None else model, folder / "drive_improved.toml")
     overlay, why = None, None
     try:
         overlay = closed_loop(recording, nominal, improved)
     except (RecordingError, DriveError, ValueError) as error:
         why = str(error).replace(recording.source, Path(recording.source).name)
+    if not answer.advice:
+        complete(answer, nominal, known_effects())
     write_outputs(answer, folder, nominal, overlay)
     entry = {
         "verdict": answer.verdict,

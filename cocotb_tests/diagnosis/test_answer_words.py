@@ -1,0 +1,160 @@
+"""Headline, details, advice and doubts: no raw keys, engineering units, and something to do under every verdict."""
+
+from __future__ import annotations
+
+import itertools
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cocotb_tests.core.test_registers import PAPER
+from cocotb_tests.support.diagnosis_samples import evidence, made_up
+from fluxproof.diagnosis.answer.advice import advice, complete, point_text
+from fluxproof.diagnosis.answer.doubts import IMPLAUSIBLE, doubts
+from fluxproof.diagnosis.answer.headline import MOST, details, sentence
+from fluxproof.diagnosis.bench_point import neighbours, on_the_bench
+from fluxproof.diagnosis.catalogue import CATALOGUE
+from fluxproof.diagnosis.effect import Parameter
+from fluxproof.diagnosis.nominal import load_nominal
+from fluxproof.diagnosis.physics import known_effects
+from fluxproof.diagnosis.quantities import ascii_of, measured
+from fluxproof.diagnosis.result import VERDICTS, Estimate, NamedEffect, Remainder, Request, UnknownTerm
+
+NOMINAL, KNOWN = load_nominal(PAPER), known_effects()
+KEYS = {p.name for e in KNOWN.values() for p in e.parameters if "_" in p.name}
+LATE = UnknownTerm("u_dq", "tau", 2.7e-5, 3e-7, "s", 0.9, "the measured currents were late")
+SIZES = {"ohm": 0.35, "H": 3e-3, "Wb": 0.16, "s": 2.7e-5, "V": 5.087, "1": 0.02, "1/K": 0.0039, "rad": 0.03}
+
+
+def named(name):
+    """A NamedEffect with a usual value for each declared parameter."""
+    values = {p.name: SIZES.get(p.unit, 0.5) for p in CATALOGUE[name].parameters}
+    units = {p.name: p.unit for p in CATALOGUE[name].parameters}
+    return NamedEffect(name, 0.99, {k: Estimate(v, 0.02 * v, units[k]) for k, v in values.items()}, 0.9, {})
+
+
+def samples():
+    """Answers of every verdict with one effect, with two, and with all of the catalogue."""
+    answers = made_up()
+    rest = [Remainder("u_dq", 6.0, 1.234, "V", 0.2), Remainder("torque", 0.0, 0.2, "Nm", 0.1)]
+    for verdict, names in itertools.product(("explained", "partly_explained", "ambiguous"), (1, 2, len(CATALOGUE))):
+        chosen = list(CATALOGUE)[:names]
+        for first in CATALOGUE if names == 1 else [None]:
+            effects = [named(n) for n in ([first] if first else chosen)]
+            groups = [sorted(CATALOGUE)[: names + 1]] if verdict == "ambiguous" else []
+            yield replace(answers[verdict], effects=effects, ambiguity=groups, remainder=rest, explained_share=0.8)
+    for term in (None, LATE):
+        yield replace(answers["unexplained"], unknown_term=term, remainder=rest)
+        yield replace(answers["partly_explained"], unknown_term=term, remainder=rest)
+    yield answers["no_mismatch"]
+
+
+@pytest.mark.parametrize("answer", list(samples()), ids=lambda a: f"{a.verdict}-{len(a.effects)}")
+def test_headline_is_short_and_has_no_raw_keys(answer):
+    text = sentence(answer, KNOWN)
+    assert 20 < len(text) <= MOST and text.endswith(".") and text.isascii(), text
+    words = set(re.findall(r"\w+", text + details(answer, KNOWN)))
+    assert not words & KEYS and "u_dq" not in words and not re.search(r"\de[-+]\d", text), text
+
+
+def test_a_headline_says_what_and_how_large():
+    dead = NamedEffect("dead_time", 0.99, {"v_dead_v": Estimate(5.0873, 0.23, "V")}, 0.9)
+    one = replace(made_up()["explained"], effects=[dead])
+    assert sentence(one, KNOWN) == "Dead time of the inverter: dead-time voltage 5.1 +- 0.2 V."
+    late = sentence(replace(made_up()["unexplained"], unknown_term=LATE), KNOWN)
+    assert "as if the measured currents were late (27.0 +- 0.3 us)" in late
+    rest = [Remainder("u_dq", 6.0, 1.234, "V", 0.2)]
+    part = sentence(replace(made_up()["partly_explained"], effects=[dead], remainder=rest, unknown_term=None), KNOWN)
+    assert "mostly at order 6 of the voltage (1.2 V)" in part and "(dead-time voltage 5.1 +- 0.2 V) explains" in part
+
+
+def test_an_effect_outside_the_catalogue_is_called_by_its_meaning():
+    assert Parameter("x_a", "A", "its amplitude").called == "its amplitude"
+    answer = replace(
+        made_up()["explained"], effects=[NamedEffect("odd_one", 0.99, {"x_a": Estimate(1, 0.1, "A")}, 0.9)]
+    )
+    assert sentence(answer, KNOWN) == "Odd one: x a 1.00 +- 0.10 A."
+
+
+def test_every_parameter_has_a_title():
+    assert all(p.title for e in KNOWN.values() if e.named for p in e.parameters)
+
+
+@pytest.mark.parametrize("verdict", VERDICTS)
+def test_every_verdict_has_advice(verdict):
+    answer = made_up()[verdict]
+    complete(answer, NOMINAL, KNOWN)
+    assert 20 < len(answer.advice) < 500 and answer.advice.endswith("."), answer.advice
+    said = {
+        "explained": "drive_improved.toml",
+        "ambiguous": "314 rad/s (750 rpm) with i_d = -2 A",
+        "partly_explained": "at order 2 of the voltage",
+        "no_mismatch": "-716 to 1432 rpm",
+    }
+    assert said.get(verdict, "") in answer.advice, answer.advice
+
+
+def test_advice_names_what_shows_at_an_order():
+    def at(order):
+        rest = [Remainder("u_dq", order, 1.0, "V", 0.5)]
+        return advice(replace(made_up()["unexplained"], remainder=rest, unknown_term=None), NOMINAL, KNOWN)
+
+    assert CATALOGUE["emf_harmonics"].title in at(6.0) and CATALOGUE["dead_time"].title in at(6.0)
+    assert CATALOGUE["encoder_eccentricity"].title in at(1.0 / NOMINAL.machine.pole_pairs)
+    assert "no known effect shows there" in at(5.0)
+
+
+def test_no_mismatch_says_what_was_covered():
+    answer = replace(made_up()["no_mismatch"], evidence=evidence(0.0, after=False))
+    assert "i_q of -5 to 5 A" in advice(answer, NOMINAL, KNOWN)
+
+
+@pytest.mark.parametrize(
+    "name, key, value, doubtful",
+    [
+        ("resistance_temperature", "resistance_temp_coeff_per_k", 0.0039, False),
+        ("resistance_temperature", "resistance_temp_coeff_per_k", 0.0078, True),
+        ("resistance", "resistance_ohm", 1.3 * NOMINAL.machine.resistance_ohm, False),
+        ("resistance", "resistance_ohm", 3.0 * NOMINAL.machine.resistance_ohm, True),
+        ("magnet_temperature", "magnet_flux_drift_wb", 0.01, True),
+    ],
+)
+def test_implausible_parameters_are_noted(name, key, value, doubtful):
+    unit = next(p.unit for p in CATALOGUE[name].parameters if p.name == key)
+    effect = NamedEffect(name, 0.99, {key: Estimate(value, 0.01 * abs(value), unit)}, 0.9)
+    notes = doubts(replace(made_up()["explained"], effects=[effect]), NOMINAL, KNOWN)
+    assert len(notes) == doubtful and all(IMPLAUSIBLE in n and CATALOGUE[name].otherwise in n for n in notes), notes
+
+
+def test_plausible_limits_are_of_declared_parameters():
+    for effect in KNOWN.values():
+        assert set(effect.plausible) <= {p.name for p in effect.parameters}
+        assert bool(effect.plausible) == bool(effect.otherwise)
+        assert all(low < high for low, high, *_ in effect.plausible.values())
+        assert effect.stays == "" or effect.corrects or effect.drift_of
+
+
+@pytest.mark.parametrize("sigma, text", [(0.1, "5.09 +- 0.10 V"), (0.23, "5.1 +- 0.2 V"), (0.0, "5.087 V")])
+def test_error_has_one_digit_or_two(sigma, text):
+    assert ascii_of(measured(5.0873, sigma, "V", digits=1)) == text
+
+
+def test_requested_points_are_round_and_within_the_limits():
+    rng, machine = np.random.default_rng(3), NOMINAL.machine
+    for omega, size, angle in zip(rng.uniform(-900, 900, 200), rng.uniform(0, 1, 200), rng.uniform(0, 6.3, 200)):
+        i = size * machine.rated_current_a * np.exp(1j * angle)
+        within = lambda w, x: abs(w) <= abs(omega) and abs(x) <= abs(i)  # noqa: E731
+        speed, current = on_the_bench(float(omega), complex(i), machine, within)
+        assert within(speed, current)
+        for x, exact in ((speed, omega), (current.real, i.real), (current.imag, i.imag)):
+            assert x == float(f"{x:.2g}") and abs(x - exact) <= 0.11 * abs(exact) + 1e-12
+    assert neighbours(0.0) == (0.0,) and neighbours(-304.7) == (-310.0, -300.0) and neighbours(25.0) == (25.0,)
+    large = replace(machine, rated_current_a=300.0)
+    assert on_the_bench(100.0, 0.234 + 120.0j, large) == (100.0, 0.2 + 120.0j)
+
+
+def test_a_point_is_given_in_rpm_too():
+    asked = Request(220.0, -1.1, 0.65, [], "", None, 20.0)
+    assert point_text(asked, NOMINAL) == "220 rad/s (525 rpm) at 20 degC with i_d = -1.1 A and i_q = 0.65 A"

@@ -1,0 +1,125 @@
+"""What to do next, in one or two sentences for each verdict.
+
+complete(answer, nominal, effects)  # sets details, advice, and adds notes
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fluxproof.diagnosis.answer.doubts import doubts
+from fluxproof.diagnosis.answer.headline import details
+from fluxproof.diagnosis.answer.phrases import SIGNALS, capital, joined
+from fluxproof.diagnosis.quantities import RPM, ascii_of, number
+
+MOST_TITLES = 4
+NEAR = 0.05  # of an order: closer ones are the same
+
+
+def complete(answer, nominal, effects) -> None:
+    """Add details, advice and doubts to an answer; effects: the catalogue with the causes beyond it."""
+    answer.details = details(answer, effects)
+    answer.advice = advice(answer, nominal, effects)
+    answer.notes += doubts(answer, nominal, effects)
+
+
+def advice(answer, nominal, effects) -> str:
+    """What to do after this answer; effects: the catalogue with the causes beyond it."""
+    if answer.verdict == "bad_recording":
+        return "Correct the findings of the checks, in the recording or in [columns] of the drive file; diagnose again."
+    if answer.verdict == "digital_mismatch":
+        return (
+            "Compare the registers and the build of the core with the drive file, and record again: the physics is "
+            "diagnosed when the controller computes what its golden model computes."
+        )
+    if answer.verdict == "no_mismatch":
+        return f"Nothing to change. {capital(covered(answer, nominal))}; beyond them the drive file is not confirmed."
+    if answer.verdict == "explained":
+        return _take(answer, effects)
+    if answer.verdict == "ambiguous":
+        return _record(answer, nominal) or _separated(answer, effects)
+    if answer.verdict == "partly_explained":
+        return f"{_take(answer, effects)} {_where(answer, nominal, effects)}"
+    return _where(answer, nominal, effects)
+
+
+def _take(answer, effects) -> str:
+    """Which values of an explanation go into the drive file, and which belong to the recording."""
+    if not any(e.plant for e in answer.effects):
+        return "Correct the recording as stated: the drive file has no key for what was found."
+    trims = any(e.name in effects and effects[e.name].corrects for e in answer.effects)
+    later = " Errors of measurement stay in this recording; the trims act from the next one on." if trims else ""
+    return f"Simulate with drive_improved.toml, which holds the values found.{later}"
+
+
+def _record(answer, nominal) -> str:
+    if not answer.next_recording:
+        return ""
+    points = "; ".join(point_text(r, nominal) for r in answer.next_recording)
+    return f"Record further points, each until steady, and diagnose both recordings together: {points}."
+
+
+def point_text(request, nominal) -> str:
+    """'310 rad/s (740 rpm) with i_d = -2 A and i_q = 0 A' of a Request."""
+    at = f"{request.omega_e:.4g} rad/s ({whole(request.omega_e * RPM / nominal.machine.pole_pairs)} rpm)"
+    cold = f" at {request.temp_winding:.0f} degC" if request.temp_winding is not None else ""
+    return f"{at}{cold} with i_d = {request.i_d:.3g} A and i_q = {request.i_q:.3g} A"
+
+
+def whole(rpm: float) -> str:
+    """A speed of at most four digits, without an exponent."""
+    return f"{rpm:.0f}" if abs(rpm) >= 100.0 else f"{rpm:.3g}"
+
+
+def _separated(answer, effects) -> str:
+    how = [effects[n].separated_by for group in answer.ambiguity for n in group if n in effects]
+    return f"To separate them: {'; '.join(list(dict.fromkeys(how))[:2])}."
+
+
+def _where(answer, nominal, effects) -> str:
+    """Where to look for what nothing explains: the physics that shows at the order of the largest remainder."""
+    u = answer.unknown_term
+    if u is not None and u.meaning:
+        how = [e.separated_by for e in effects.values() if e.title == u.meaning]
+        return f"Check in the hardware whether {u.meaning}{f'; what tells: {how[0]}' if how else ''}."
+    if not answer.remainder:
+        return "Record more speeds and currents of both signs, so that the misfit can be located."
+    r = max(answer.remainder, key=lambda part: part.share)
+    signal = SIGNALS.get(r.signal, r.signal)
+    if not r.order:
+        return f"Look for what changes the mean {signal} with {_varies(answer)}: no known effect has this course."
+    pairs = nominal.machine.pole_pairs
+    known = [e.title for e in effects.values() if shows(e, r.order, pairs)][:MOST_TITLES]
+    turns = r.order * pairs
+    place = f"at order {r.order:.4g} of the {signal}, {turns:.4g} per mechanical turn"
+    if known:
+        return f"Look {place}: {joined(known)} show there, but with another course over speed and current."
+    return f"Look {place}: no known effect shows there, so compare it with numbers of slots, poles, bearings and gears."
+
+
+def shows(effect, order, pole_pairs) -> bool:
+    """Whether an effect appears at an electrical order, by its declaration."""
+    orders = [*effect.shows_at, *(n / pole_pairs for n in effect.shows_at_turns)]
+    return any(abs(abs(order) - h) <= NEAR * h for h in orders if h)
+
+
+def _varies(answer) -> str:
+    """The variable that bounds the region with the largest misfit."""
+    words = {"omega_e": "the speed", "i_d": "i_d", "i_q": "i_q", "u_dc": "the bus voltage", "t": "time",
+             "temp_winding": "the winding's temperature"}  # fmt: skip
+    regions = answer.location.regions
+    return words.get(regions[0].variable, "the operating point") if regions else "the operating point"
+
+
+def covered(answer, nominal) -> str:
+    """'the recording covers -800 to 1200 rpm, i_d from -2 to 0 A and i_q from -5 to 5 A' from the steady blocks."""
+    arrays, spans = answer.evidence.arrays, []
+    shaft = RPM / nominal.machine.pole_pairs
+    for name, factor, unit in (("omega_e", shaft, "rpm"), ("i_d", 1.0, "A"), ("i_q", 1.0, "A")):
+        values = np.asarray(arrays.get(name, ()), float) * factor
+        if values.size:
+            show = whole if unit == "rpm" else lambda x: ascii_of(number(x, 2))
+            low, high = show(float(values.min())), show(float(values.max()))
+            span = f"{low} to {high} {unit}" if low != high else f"{low} {unit}"
+            spans.append(span if unit == "rpm" else f"{name} of {span}")
+    return f"the recording covers {joined(spans)}" if spans else "the recording covers few operating points"

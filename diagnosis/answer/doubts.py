@@ -1,0 +1,41 @@
+"""What of an answer is hard to believe: parameters outside of what their effects declare as plausible."""
+
+from __future__ import annotations
+
+import math
+
+from fluxproof.diagnosis.answer.phrases import capital, size_text, title_of
+from fluxproof.diagnosis.effect import DOUBT
+from fluxproof.diagnosis.quantities import ascii_of, quantity
+
+IMPLAUSIBLE = "is implausible"
+
+
+def doubts(answer, nominal, effects) -> list[str]:
+    """Notes on parameters of named effects outside of what the effects declare as plausible."""
+    notes = []
+    for e in answer.effects:
+        entry = effects.get(e.name)
+        for key, limits in entry.plausible.items() if entry else ():
+            estimate = e.parameters.get(key)
+            if estimate is None:
+                continue
+            low, high = (x * _reference(limits, nominal) for x in limits[:2])
+            doubt = DOUBT * estimate.sigma if math.isfinite(estimate.sigma) else 0.0
+            if low - doubt <= estimate.value <= high + doubt:
+                continue
+            called = next(p.called for p in entry.parameters if p.name == key)
+            usual = f"{ascii_of(quantity(low, estimate.unit, 3))} to {ascii_of(quantity(high, estimate.unit, 3))}"
+            notes.append(
+                f"{capital(title_of(e.name, effects))}: {called} {size_text(estimate)} {IMPLAUSIBLE} (usual: {usual}). "
+                f"Perhaps {entry.otherwise}."
+            )
+    return notes
+
+
+def _reference(limits, nominal) -> float:
+    """The value of the drive file to which limits are relative, 1 if they are absolute."""
+    if len(limits) < 3:
+        return 1.0
+    section, key = limits[2].split(".")
+    return float(getattr(getattr(nominal, section), key))

@@ -1,0 +1,100 @@
+"""The answer in words: a headline of at most two lines, and the figures below it.
+
+Titles of effects and parameters are those that the effects declare.  Where a headline would be longer than MOST
+letters, it says less of each effect, then of fewer effects; the whole is in ``details`` and in the table of effects.
+"""
+
+from __future__ import annotations
+
+import itertools
+
+from fluxproof.diagnosis.answer.phrases import as_if, capital, joined, located, part_text, percent_below, said, title_of
+from fluxproof.diagnosis.quantities import ascii_of, quantity
+
+MOST = 200  # letters of a headline: two lines of a terminal or of the report
+
+
+def sentence(answer, effects) -> str:
+    """The verdict of an answer as a headline; effects: the catalogue."""
+    variants = _variants(answer, effects)
+    return next((text for text in variants if len(text) <= MOST), variants[-1])
+
+
+def details(answer, effects) -> str:
+    """The figures behind the headline: every parameter, and the misfit at points that were not fitted."""
+    fit, parts = answer.fit, []
+    if answer.verdict in ("bad_recording", "digital_mismatch"):
+        return ""
+    full = f"{capital('; '.join(said(e, effects) for e in answer.effects))}."
+    if answer.effects and full != answer.sentence:
+        parts.append(full)
+    volts = lambda x: ascii_of(quantity(x, fit.unit, 3))  # noqa: E731
+    if fit.holdout_before > 0.0:
+        both = f"falls from {volts(fit.holdout_before)} to {volts(fit.holdout_after)}"
+        told = bool(answer.effects or answer.ambiguity or answer.conventions)
+        fall = both if told and fit.holdout_after < fit.holdout_before else f"is {volts(fit.holdout_before)}"
+        floor = f"the noise floor is {volts(fit.noise_floor)}"
+        parts.append(f"The misfit at operating points that were not fitted {fall}; {floor}.")
+    if answer.explained_share is not None and answer.effects:
+        parts.append(f"The effects explain {percent_below(answer.explained_share)} of its power.")
+    u = answer.unknown_term
+    if u is not None and u.meaning:
+        parts.append(f"That {as_if(u).removeprefix('as if ')} would explain {percent_below(u.explains)} of the rest.")
+    if len(answer.remainder) > 1:
+        parts.append(f"What is left is {', '.join(part_text(r) for r in answer.remainder[:3])}.")
+    return " ".join(parts)
+
+
+def _variants(answer, effects) -> list[str]:
+    """The headline from the most detailed one to the shortest."""
+    misfit = ascii_of(quantity(answer.fit.train_before, answer.fit.unit, 3))
+    if answer.verdict == "no_mismatch":
+        return [f"Simulation and recording agree: the misfit of {misfit} is at the noise floor."]
+    if answer.verdict == "explained":
+        return [f"{capital(what)}." for what in _named(answer, effects)]
+    named, sets = _named(answer, effects, brackets=True), _sets(answer.ambiguity, effects)
+    if answer.verdict == "ambiguous":
+        if not answer.effects:
+            return [f"This recording cannot separate {group}." for group in sets]
+        return [f"{capital(a)}; not separable: {b}." for a, b in _both(named, sets)]
+    where, cause = located(answer), _cause(answer)
+    if answer.verdict == "partly_explained":
+        verb = "explain" if len(answer.effects) + len(answer.conventions) > 1 else "explains"
+        share = f"{verb} {percent_below(answer.explained_share or 0.0)} of the misfit"
+        names = [capital(n) for n in named] if answer.effects else [f"One of {group}" for group in sets]
+        return [f"{n} {share}; the rest is {where} and {c}." for n, c in _both(names, cause)]
+    if answer.unknown_term is not None and answer.unknown_term.meaning:
+        return [f"No parameter of the simulation explains the misfit of {misfit}: it {c}." for c in cause]
+    return [f"Unknown: no effect of the catalogue explains half of the misfit of {misfit}, {where}."]
+
+
+def _both(first, second) -> list[tuple[str, str]]:
+    """Pairs of two texts that become shorter, those that say most first."""
+    places = sorted(itertools.product(range(len(first)), range(len(second))), key=lambda at: (sum(at), at[1]))
+    return [(first[m], second[n]) for m, n in places]
+
+
+def _named(answer, effects, brackets=False) -> list[str]:
+    """The named effects: with all parameters, with their main one, without any, and the first two of them."""
+    first = [c.says for c in answer.conventions]
+    listed = lambda texts: joined([*first, *texts]) if brackets else "; ".join([*first, *texts])  # noqa: E731
+    titles = [title_of(e.name, effects) for e in answer.effects]
+    few = [*titles[:2], f"{len(titles) - 2} more effects"] if len(titles) > 3 else titles
+    sized = [listed([said(e, effects, most, brackets) for e in answer.effects]) for most in (None, 1)]
+    return [*sized, joined([*first, *titles]), joined([*first, *few])]
+
+
+def _sets(groups, effects) -> list[str]:
+    """The ambiguities: all members of each set, the first two of each, and their number."""
+    titles = [[title_of(n, effects) for n in group] for group in groups]
+    short = [t if len(t) < 4 else [*t[:2], f"{len(t) - 2} other effects"] for t in titles]
+    texts = ["; and ".join(joined(t) for t in each) for each in (titles, short)]
+    return [*texts, f"{titles[0][0]} and {sum(map(len, titles)) - 1} other effects" if titles else ""]
+
+
+def _cause(answer) -> list[str]:
+    """What the rest looks like."""
+    u = answer.unknown_term
+    if u is not None and u.meaning:
+        return [f"is {as_if(u)}", f"is as if {u.meaning}", "looks like a cause without a parameter in the simulation"]
+    return ["its cause is not known"]
