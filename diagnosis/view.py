@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -87,17 +88,32 @@ class View:
     def machine(self):
         return self.nominal.machine
 
-    @property
+    @cached_property
+    def half_turn(self):
+        """Factor of half the rotation in an interval, (b, m)."""
+        return np.exp(0.5j * np.diff(self.theta, axis=1))
+
+    @cached_property
+    def mid_turn(self):
+        """Factor from dq to the stator frame at the middle of an interval, (b, m)."""
+        return np.exp(1j * self.theta_mid)
+
+    @cached_property
+    def turn(self):
+        """Factor from dq to the stator frame at the samples, (b, m+1)."""
+        return np.exp(1j * self.theta)
+
+    @cached_property
     def i_mid(self):
         """Mean of an interval's two samples in the stator frame, in dq at its middle angle, (b, m) complex [A].
 
         The mean in dq would be longer by (omega T)^2 / 8.  An error of 0.5 % of R i resembles a resistance that falls
         with speed, or, with an iron loss, a sampling skew.
         """
-        half = np.exp(0.5j * np.diff(self.theta, axis=1))
+        half = self.half_turn
         return 0.5 * (half * self.i[:, 1:] + np.conj(half) * self.i[:, :-1])
 
-    @property
+    @cached_property
     def omega_mid(self):
         """Speed of an interval, (b, m) [rad/s]."""
         return 0.5 * (self.omega[:, 1:] + self.omega[:, :-1])
@@ -107,18 +123,18 @@ class View:
         """Highest speed of the recording [rad/s]; a view of simulated points keeps that of the recording."""
         return self.memo.get("top_speed") or max(float(np.abs(self.omega).max()), 1e-9)
 
-    @property
+    @cached_property
     def theta_mid(self):
         """Angle in the middle of an interval, (b, m) [rad]."""
         return 0.5 * (self.theta[:, 1:] + self.theta[:, :-1])
 
-    @property
+    @cached_property
     def interval_angle(self):
         """Angle in the middle of the intervals -1 .. m, (b, m+2) [rad]; the outer two are continued."""
         inner = self.theta_mid
         return np.concatenate([2 * inner[:, :1] - inner[:, 1:2], inner, 2 * inner[:, -1:] - inner[:, -2:-1]], axis=1)
 
-    @property
+    @cached_property
     def nominal_psi(self):
         """Nominal flux linkage of the current, (b, m+1) complex dq [Wb]."""
         m = self.machine
@@ -149,7 +165,7 @@ class View:
 
     def stator(self, dq):
         """A dq quantity of the samples in the stator frame."""
-        return dq * np.exp(1j * self.theta)
+        return dq * self.turn
 
     def turned(self, delta):
         """The view with ``delta`` [rad], a number or (b, m+1), subtracted from the measured angle."""
@@ -175,29 +191,27 @@ class View:
 
     def with_raw_current(self):
         """The view with the measured current instead of the smoothed one."""
-        return self.replace(i=self.i_raw * np.exp(-1j * self.theta))
+        return self.replace(i=self.i_raw * np.conj(self.turn))
 
     def to_dq(self, stator):
         """(b, m) stator-frame quantity of the intervals, rotated to dq at the middle angle."""
-        return stator * np.exp(-1j * self.theta_mid)
+        return stator * np.conj(self.mid_turn)
 
     def flux(self, psi):
         """Mean EMF of a dq flux linkage given at the samples: (b, m+1) [Wb] to (b, m) complex dq [V]."""
-        half = np.exp(0.5j * np.diff(self.theta, axis=1))
+        half = self.half_turn
         return (half * psi[:, 1:] - np.conj(half) * psi[:, :-1]) / self.sample_time_s
 
     def phases(self, i_dq):
         """Phase values (b, k, 3) of a dq quantity at the samples (k = m+1) or the intervals (k = m)."""
-        theta = self.theta if i_dq.shape[1] == self.theta.shape[1] else self.theta_mid
-        stator = i_dq * np.exp(1j * theta)
+        stator = i_dq * (self.turn if i_dq.shape[1] == self.theta.shape[1] else self.mid_turn)
         turns = np.exp(-2j * np.pi / 3 * np.arange(3))
         return (stator[..., None] * turns).real
 
     def from_phases(self, abc):
         """dq value of phase values (b, k, 3), amplitude-invariant Clarke."""
-        theta = self.theta if abc.shape[1] == self.theta.shape[1] else self.theta_mid
         stator = (2 / 3) * (abc @ np.exp(2j * np.pi / 3 * np.arange(3)))
-        return stator * np.exp(-1j * theta)
+        return stator * np.conj(self.turn if abc.shape[1] == self.theta.shape[1] else self.mid_turn)
 
     def replace(self, **changes):
         """A copy with other arrays."""

@@ -29,7 +29,11 @@ def _answer(
     verdict="explained", names=("resistance",), ambiguity=(), value=2.0, sigma=0.01, ratio=1.0, problems=()
 ):
     effects = [
-        {"name": n, "parameters": {"resistance_ohm": {"value": value, "sigma": sigma, "unit": "ohm"}}}
+        {
+            "name": n,
+            "confidence": 0.996,
+            "parameters": {"resistance_ohm": {"value": value, "sigma": sigma, "unit": "ohm"}},
+        }
         for n in names
     ]
     return {

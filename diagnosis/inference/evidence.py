@@ -40,6 +40,7 @@ def evidence(
     v = np.zeros(n)
     own = np.zeros(n)
     loaded = np.zeros(n)
+    weighted = np.zeros((n, k))
     least = 1e300
     for i in range(n):
         if group[i] == loads:
@@ -51,23 +52,15 @@ def evidence(
     for step in range(STEPS):
         for i in range(n):
             v[i] = s2[i] + (lam[group[i]] * level[i]) ** 2 + own[i] + loaded[i]
-        precision = np.zeros((k, k))
-        right = np.zeros(k)
         power = 0.0
         logdet = 0.0
         for i in range(n):
-            w = 1.0 / v[i]
-            power += y[i] * y[i] * w
+            power += y[i] * y[i] / v[i]
             logdet += np.log(v[i])
             for p in range(k):
-                xw = x[i, p] * w
-                if xw != 0.0:
-                    right[p] += xw * y[i]
-                    for q in range(p + 1):
-                        precision[p, q] += xw * x[i, q]
-        for p in range(k):
-            for q in range(p + 1):
-                precision[q, p] = precision[p, q]
+                weighted[i, p] = x[i, p] / v[i]
+        precision = np.dot(x.T, weighted)
+        right = np.dot(weighted.T, y)
         before = 0.0
         sd = np.zeros(k)
         for p in range(k):
@@ -111,15 +104,12 @@ def evidence(
                 a[e] = min(max(np.sqrt(sums[e] / counts[e]), 1.0), most[e])
         # discrepancy: expected squares of the remainder at several lambda; a row with a load is left out
         score = np.zeros((groups, len(FACTORS)))
+        rest = y - np.dot(x, c)
+        spread = np.dot(x, cov)
         for i in range(n):
-            r = y[i]
+            e2 = rest[i] * rest[i]
             for p in range(k):
-                r -= x[i, p] * c[p]
-            e2 = r * r
-            for p in range(k):
-                if x[i, p] != 0.0:
-                    for q in range(k):
-                        e2 += x[i, p] * cov[p, q] * x[i, q]
+                e2 += spread[i, p] * x[i, p]
             own[i] = 0.0
             for e in range(effects):
                 part = 0.0

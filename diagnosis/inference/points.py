@@ -83,28 +83,41 @@ def visits(view, points) -> np.ndarray:
     return out
 
 
-def condense(cells, y, x, sigma, level, point, visit, use, load=0.0) -> Points:
-    """Points of the rows ``use`` (r,) bool.
+class Grouping:
+    """Which rows of the fit make which mean or contrast; the same for every linearisation of a recording."""
 
-    y: (r,); x: (r, columns); sigma, level: (r,), noise of a block and error of the balance; point, visit: (b,) numbers;
-    load: scale [Nm] of a load that nobody recorded, 0: none is possible.
+    def __init__(self, cells, point, visit, use):
+        """point, visit: (b,) numbers of the blocks; use: (r,) bool, rows of the fit."""
+        self.rows = rows = np.flatnonzero(use)
+        self.channels, channel = np.unique(cells.channel[rows], return_inverse=True)
+        order = np.round(cells.order[rows] * 1e6).astype(np.int64)
+        block = cells.block[rows]
+        keys = np.stack([channel, order, cells.part[rows], point[block], visit[block]], axis=1)
+        self.names, cell = np.unique(keys, axis=0, return_inverse=True)
+        self.cell = cell.ravel()
+        self.sort = np.argsort(self.cell, kind="stable")
+        self.starts = np.searchsorted(self.cell[self.sort], np.arange(len(self.names)))
+        # Visits of the same functional and point are neighbours: each against the mean of the earlier ones.
+        first = np.ones(len(self.names), bool)
+        first[1:] = (self.names[1:, :4] != self.names[:-1, :4]).any(axis=1)
+        self.place, self.begin, self.contrast = np.cumsum(first) - 1, np.flatnonzero(first), ~first
+        kinds = np.stack([self.names[:, 0], np.abs(self.names[:, 1]), self.contrast], axis=1)
+        kinds, group = np.unique(kinds, axis=0, return_inverse=True)
+        self.groups = [(str(self.channels[c]), float(o) * 1e-6, bool(d)) for c, o, d in kinds]
+        self.group = group.ravel()
+
+
+def condense(grouping, y, x, sigma, level, load=0.0) -> Points:
+    """Points of the rows of a grouping.
+
+    y: (r,); x: (r, columns); sigma, level: (r,), noise of a block and error of the balance; load: scale [Nm] of a load
+    that nobody recorded, 0: none is possible.
     """
-    rows = np.flatnonzero(use)
-    channels, channel = np.unique(cells.channel[rows], return_inverse=True)
-    order = np.round(cells.order[rows] * 1e6).astype(np.int64)
-    block = cells.block[rows]
-    keys = np.stack([channel, order, cells.part[rows], point[block], visit[block]], axis=1)
-    names, cell = np.unique(keys, axis=0, return_inverse=True)
-    cell = cell.ravel()
-    n = len(names)
+    g = grouping
+    rows, sort, starts, begin, place, contrast = g.rows, g.sort, g.starts, g.begin, g.place, g.contrast
+    n = len(g.names)
     w = 1.0 / sigma[rows] ** 2
-    total = np.bincount(cell, w, n)
-    sort = np.argsort(cell, kind="stable")
-    starts = np.searchsorted(cell[sort], np.arange(n))
-    # Visits of the same functional and point are neighbours: each against the mean of the earlier ones.
-    first = np.ones(n, bool)
-    first[1:] = (names[1:, :4] != names[:-1, :4]).any(axis=1)
-    place, begin, contrast = np.cumsum(first) - 1, np.flatnonzero(first), ~first
+    total = np.bincount(g.cell, w, n)
     earlier = np.cumsum(total) - total
     earlier -= earlier[begin][place]
 
@@ -125,11 +138,7 @@ def condense(cells, y, x, sigma, level, point, visit, use, load=0.0) -> Points:
     s2[begin] = 1.0 / np.add.reduceat(total, begin)
     widen[contrast] = np.sqrt(1.0 + 1.0 / (np.arange(n) - begin[place])[contrast])
     lev = levels[:, 0] * widen
-    kinds, group = np.unique(
-        np.stack([names[:, 0], np.abs(names[:, 1]), contrast], axis=1), axis=0, return_inverse=True
-    )
-    groups = [(str(channels[c]), float(o) * 1e-6, bool(d)) for c, o, d in kinds]
-    group = group.ravel()
+    groups, group = g.groups, g.group
     loads = groups.index(("torque", 0.0, False)) if load and ("torque", 0.0, False) in groups else -1
     keep = np.ones(n, bool)
     if load and ("torque", 0.0, True) in groups:  # a load may change between visits
@@ -141,9 +150,9 @@ def condense(cells, y, x, sigma, level, point, visit, use, load=0.0) -> Points:
         lev[keep],
         group[keep],
         groups,
-        names[keep, 1] * 1e-6,
-        names[keep, 2],
-        names[keep, 3],
+        g.names[keep, 1] * 1e-6,
+        g.names[keep, 2],
+        g.names[keep, 3],
         loads,
         load,
         lambda values: condensed(values[:, None])[0][keep, 0],

@@ -17,7 +17,7 @@ from fluxproof.diagnosis.effect import rated_torque
 from fluxproof.diagnosis.fit import Fitter, everything
 from fluxproof.diagnosis.inference import constants as k
 from fluxproof.diagnosis.inference.evidence import evidence
-from fluxproof.diagnosis.inference.points import balance_level, condense, point_numbers, visits
+from fluxproof.diagnosis.inference.points import Grouping, balance_level, condense, point_numbers, visits
 
 
 class Setup:
@@ -36,6 +36,8 @@ class Setup:
         self.points = point_numbers(view)
         self.visits = visits(view, self.points)
         self.cells = cells
+        self.grouping = Grouping(cells, self.points, self.visits, cells.ok & self.train)
+        self.repeats = _repeats(cells, self.points)
         self.smooth = smooth(view)
         self.smooth_rows = self.projector.rows(misfit(self.smooth))
 
@@ -63,8 +65,7 @@ class Problem:
         if doubt is not None:
             sigma = np.hypot(sigma, np.where(cells.channel == "u", doubt[cells.block], 0.0))
         self.sigma = sigma
-        use = cells.ok & setup.train
-        self.p = condense(cells, y, x, sigma, setup.level, setup.points, setup.visits, use, setup.load)
+        self.p = condense(setup.grouping, y, x, sigma, setup.level, setup.load)
         self._priors()
 
     def _priors(self):
@@ -200,13 +201,16 @@ def fit_of_set(setup, names, steps=3) -> Fit:
     return fit
 
 
+def _repeats(cells, points):
+    """(r,) number of the functional and operating point of every row."""
+    keys = np.stack([cells.order * 1e6, cells.part, points[cells.block], cells.channel == "u",
+                     cells.channel == "sum"], axis=1).astype(np.int64)  # fmt: skip
+    return np.unique(keys, axis=0, return_inverse=True)[1].ravel()
+
+
 def repeated(ripple, setup):
     """(r,) the part of ripple rows that repeats in all blocks of an operating point, shrunk by what noise may be."""
-    cells = setup.cells
-    keys = np.stack([cells.order * 1e6, cells.part, setup.points[cells.block], cells.channel == "u",
-                     cells.channel == "sum"], axis=1).astype(np.int64)  # fmt: skip
-    _, cell = np.unique(keys, axis=0, return_inverse=True)
-    cell = cell.ravel()
+    cells, cell = setup.cells, setup.repeats
     w = np.where(cells.ok, 1.0, 0.0)
     count = np.maximum(np.bincount(cell, w), 1.0)
     mean = np.bincount(cell, w * ripple) / count

@@ -11,7 +11,8 @@ needs_of() {
         demo | papers | faults) echo core report sim ghdl c++ ghdl5 ;;
         timeline) echo core report sim ghdl ;;
         generate | registers | package) echo core report package ;;
-        blind | sensitivity) echo run ;;
+        blind) echo run blind ;;
+        sensitivity) echo run ;;
         bench | real) echo run test ;;
         compare) echo run compare ;;
         verilog) echo core ghdl5 ;;
@@ -19,7 +20,7 @@ needs_of() {
         synth) echo core run report sim synth test ghdl c++ ghdl5 yosys ;;
         ecp5) echo core report synth ghdl5 yosys nextpnr ;;
         lint) echo lint ;;
-        mutate) echo core run report sim compare package prove test lint ghdl c++ tcl ghdl5 yosys ;;
+        mutate) echo core run report sim blind compare package prove test lint ghdl c++ tcl ghdl5 yosys ;;
         test) echo "$(needs_of mutate)" browser ;;
         setup) echo "$(needs_of test)" synth nextpnr ;;
         *) return 1 ;;

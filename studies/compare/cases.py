@@ -1,7 +1,7 @@
 """The cases of a comparison: healthy drives, single effects and pairs of a sealed benchmark.
 
-If the blind benchmark of the seed exists (build/blind/seedN), its cases are used; otherwise the same generator makes
-cases in build/compare.  The truth is opened here for the stratum of each case, which no method receives, and for the
+If the blind benchmark of the seed exists (build/blind/own/seedN), its cases are used; otherwise the same generator
+makes cases in build/compare.  The truth is opened here for the stratum of each case, which no method receives, and for the
 scores afterwards.
 """
 
@@ -21,7 +21,7 @@ def folder_of(seed: int, count: int, jobs: int = 2) -> Path:
 
     count: size of the whole benchmark they are a part of (about half are of STRATA).
     """
-    there = BUILD / "blind" / f"seed{seed}"
+    there = BUILD / "blind" / "own" / f"seed{seed}"
     if (there / "sealed.sha256").exists():
         return there
     made = BUILD / "compare" / f"seed{seed}_{count}"
