@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import tomlkit
 
+from fluxproof.diagnosis.conventions.apply import edit, read_drive
 from fluxproof.diagnosis.improved_core import CoreValue, core_changes, core_values
 from fluxproof.diagnosis.improved_plant import Plant, Timing, described_sensors, merged, plant_of
 from fluxproof.diagnosis.nominal import Nominal
@@ -27,10 +28,15 @@ __all__ = ["CoreValue", "Plant", "Timing", "core_values", "improved_toml", "plan
 DIGITS = 9  # significant digits in the file: more than any estimate has, and still legible
 
 
-def improved_toml(nominal: Nominal, effects: list[NamedEffect]) -> str:
-    """The text of the improved drive file; ValueError for an unknown plant key."""
+def improved_toml(nominal: Nominal, effects: list[NamedEffect], readings=(), recording=None) -> str:
+    """The text of the improved drive file; ValueError for an unknown plant key.
+
+    readings: how drive file and recording are to be read (conventions/); recording: whose columns are then described.
+    """
     by_name = {effect.name: effect for effect in effects}
     document = _original(nominal)
+    edit(document, nominal, readings, recording, _set)
+    nominal = read_drive(nominal, readings)
     changes = core_changes(nominal, effects)
     for change in changes:
         why = "; ".join(_words(by_name[name]) for name in change.why.split(" and "))
@@ -47,11 +53,11 @@ def improved_toml(nominal: Nominal, effects: list[NamedEffect]) -> str:
     return tomlkit.dumps(document)
 
 
-def write_improved(nominal: Nominal, effects: list[NamedEffect], path) -> Path:
+def write_improved(nominal: Nominal, effects: list[NamedEffect], path, readings=(), recording=None) -> Path:
     """Write ``improved_toml`` atomically to ``path``; returns the path."""
     path = Path(path)
     temporary = path.with_name(f".{path.name}.{os.getpid()}")
-    temporary.write_text(improved_toml(nominal, effects), encoding="utf-8")
+    temporary.write_text(improved_toml(nominal, effects, readings, recording), encoding="utf-8")
     os.replace(temporary, path)
     return path
 

@@ -19,6 +19,7 @@ import numpy as np
 from fluxproof.diagnosis.checks import check_recording
 from fluxproof.diagnosis.checks.missing import OPTIONAL
 from fluxproof.diagnosis.columns import Plan, canonical, plan_columns
+from fluxproof.diagnosis.conventions.drive_file import alternatives, doubtful, fits
 from fluxproof.diagnosis.demand import is_emf_run
 from fluxproof.diagnosis.emf import emf_rows
 from fluxproof.diagnosis.points import as_table, is_table
@@ -32,6 +33,18 @@ def load_recording(path, nominal) -> Recording:
 
     path: a file in any format of diagnosis/readers; nominal: Nominal, with its [columns].
     """
+    recording = _checked(Path(path), nominal)
+    if doubtful(recording):
+        for restated in alternatives(nominal):
+            other = _checked(Path(path), restated.of(nominal))
+            if fits(other, restated.of(nominal)):
+                other.meta["restated"] = restated
+                return other
+    return recording
+
+
+def _checked(path: Path, nominal) -> Recording:
+    """The recording of a file after all checks."""
     plans: list[Plan] = []
 
     def select(names: dict[str, str]) -> list[str]:
@@ -39,8 +52,7 @@ def load_recording(path, nominal) -> Recording:
         return plans[-1].wanted()
 
     table = read_table(path, select)
-    plan = plans[-1]
-    recording = _recording(Path(path), table, plan, nominal)
+    recording = _recording(path, table, plans[-1], nominal)
     check_recording(recording, nominal)
     return recording
 
@@ -64,6 +76,7 @@ def _recording(path, table: Table, plan: Plan, nominal) -> Recording:
         "map": plan.used,
         "columns": {k: s.column for k, s in plan.sources.items()},
     }
+    meta["scales"] = {k: (s.factor, s.offset) for k, s in plan.sources.items()}
     meta["stated_units"] = [name for name, s in plan.sources.items() if s.stated]
     for name, value in plan.assumed.items():
         columns[name] = np.full(n, value)

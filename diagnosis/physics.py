@@ -7,6 +7,9 @@ import numpy as np
 from fluxproof.diagnosis.blocks import views_of
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.conclude import conclude
+from fluxproof.diagnosis.conventions.drive_file import as_read
+from fluxproof.diagnosis.conventions.judge import preferred
+from fluxproof.diagnosis.conventions.tell import under
 from fluxproof.diagnosis.inference.posterior import Posterior
 from fluxproof.diagnosis.inference.problem import Setup
 from fluxproof.diagnosis.nominal import Nominal
@@ -25,6 +28,7 @@ def explain(loaded: list[Recording], nominal: Nominal, progress=lambda text: Non
 
     Raises RecordingError if the recordings contain no operating point for which a voltage balance can be made.
     """
+    nominal = as_read(loaded, nominal)
     loaded = sound(loaded, nominal)
     problems = [p for r in loaded for p in r.problems]
     rows = sum(len(r) for r in loaded)
@@ -71,4 +75,8 @@ def posterior_of(recordings, nominal, progress=lambda text: None):
 
 def _physics(recordings, nominal, progress) -> Diagnosis:
     posterior, held = posterior_of(recordings, nominal, progress)
-    return conclude(posterior, held, progress)
+    answer = conclude(posterior, held, progress)
+    if answer.verdict == "no_mismatch":
+        return answer
+    readings, rivals, read = preferred(recordings, posterior, answer.verdict != "unexplained", progress)
+    return under(readings, rivals, answer, conclude(read, held, progress)) if readings else answer

@@ -200,13 +200,14 @@ class Diagnosis:
     advice: str = ""  # what to do next
     notes: list[str] = field(default_factory=list)  # for people: assumptions and omissions
     evidence: Evidence = field(default_factory=Evidence)
+    readings: tuple = ()  # what ``conventions`` tells, as conventions/ applies it
     search: object = field(default=None, repr=False)  # search.Outcome, for inspection
     trace: str = ""  # the figures that decided the verdict
 
     def to_json(self) -> dict:
         """The mapping written to diagnosis.json (schema 2)."""
-        plain = dataclasses.asdict(dataclasses.replace(self, evidence=Evidence(), search=None))
+        plain = dataclasses.asdict(dataclasses.replace(self, evidence=Evidence(), search=None, readings=()))
         problems = plain.pop("problems")
-        for key in ("evidence", "rows", "search", "trace"):
+        for key in ("evidence", "readings", "rows", "search", "trace"):
             plain.pop(key)
         return {"schema": 2, **plain, "recording": {"rows": self.rows, "problems": problems}}

@@ -20,6 +20,8 @@ from pathlib import Path
 from threadpoolctl import threadpool_limits
 
 from fluxproof.diagnosis.answer.advice import complete
+from fluxproof.diagnosis.conventions.apply import read_drive, read_recording
+from fluxproof.diagnosis.conventions.tell import restate
 from fluxproof.diagnosis.digital import replay
 from fluxproof.diagnosis.flux_found import write_flux_map
 from fluxproof.diagnosis.improve import write_improved
@@ -59,13 +61,14 @@ def run(recordings, drive, out, progress=lambda text: None) -> Diagnosis:
         loaded = _loaded(recordings, nominal, progress)
         out = _folder(Path(out), nominal)
         answer = _diagnose(loaded, nominal, progress)
-        improved = _improved(nominal, answer, out)
+        improved = _improved(nominal, answer, out, loaded[0])
         if write_flux_map(answer, out):
             answer.notes.append(FLUX_MAP_NOTE)
         laid_over = None
         if answer.verdict not in ("bad_recording", "digital_mismatch"):
             progress("the closed loop over the recording")
-            laid_over = _overlay(loaded[0], nominal, improved, answer)
+            read = read_recording(loaded[0], answer.readings), read_drive(nominal, answer.readings)
+            laid_over = _overlay(*read, improved, answer)
         progress("writing the report")
         write_outputs(answer, out, nominal, laid_over)
     return answer
@@ -102,9 +105,10 @@ def _diagnose(loaded, nominal, progress) -> Diagnosis:
         answer.problems = [p for recording in loaded for p in recording.problems]
     else:
         answer = _physics(loaded, nominal, progress)
+        restate(answer, loaded)
     answer.digital = digital
     answer.notes = [*notes, *answer.notes, *_reading_notes(loaded)]
-    complete(answer, nominal, known_effects())
+    complete(answer, read_drive(nominal, answer.readings), known_effects())
     return answer
 
 
@@ -180,14 +184,14 @@ def _reading_notes(loaded) -> list[str]:
     return list(dict.fromkeys(notes))
 
 
-def _improved(nominal, answer, out) -> Path | None:
-    """Write the improved drive if effects were asserted; otherwise remove the file of an earlier run."""
+def _improved(nominal, answer, out, recording) -> Path | None:
+    """Write the improved drive if anything was found; otherwise remove the file of an earlier run."""
     path = out / IMPROVED
-    if not answer.effects:
+    if not answer.effects and not answer.readings:
         path.unlink(missing_ok=True)
         return None
     try:
-        return write_improved(nominal, answer.effects, path)
+        return write_improved(nominal, answer.effects, path, answer.readings, recording)
     except (DriveError, ValueError) as error:
         path.unlink(missing_ok=True)
         answer.notes.append(f"No {IMPROVED}: {error}.")

@@ -45,6 +45,10 @@ def advice(answer, nominal, effects) -> str:
 
 def _take(answer, effects) -> str:
     """Which values of an explanation go into the drive file, and which belong to the recording."""
+    if answer.conventions:
+        rivals = " If it is the other, correct that instead." if any(c.rivals for c in answer.conventions) else ""
+        found = ", and the values found" if answer.effects else ""
+        return f"Correct it as in drive_improved.toml, which reads both files so{found}; diagnose again.{rivals}"
     if not any(e.plant for e in answer.effects):
         return "Correct the recording as stated: the drive file has no key for what was found."
     trims = any(e.name in effects and effects[e.name].corrects for e in answer.effects)

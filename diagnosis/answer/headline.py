@@ -40,6 +40,9 @@ def details(answer, effects) -> str:
     u = answer.unknown_term
     if u is not None and u.meaning:
         parts.append(f"That {as_if(u).removeprefix('as if ')} would explain {percent_below(u.explains)} of the rest.")
+    read = [p.message for p in answer.problems if p.action in ("converted", "corrected")]
+    if read:
+        parts.append(f"Corrected while reading: {'; '.join(read)}.")
     if len(answer.remainder) > 1:
         parts.append(f"What is left is {', '.join(part_text(r) for r in answer.remainder[:3])}.")
     return " ".join(parts)

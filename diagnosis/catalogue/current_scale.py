@@ -42,6 +42,7 @@ EFFECT = CurrentScale(
     equation="i_measured = (1 + s) i",
     signature="R, L_d and L_q wrong by the same factor",
     confounders=("resistance", "inductance_d", "inductance_q", "cross_saturation"),
+    rescales=("i",),
     separated_by="an external ammeter or a torque transducer",
     parameters=(Parameter("scale", "1", "relative error of all phases", "error"),),
     corrects=True,

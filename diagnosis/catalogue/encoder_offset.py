@@ -35,6 +35,7 @@ EFFECT = EncoderOffset(
     equation="theta_measured = theta_e + offset",
     signature="order 0: omega psi_m offset on the d axis, also at zero current",
     confounders=("inductance_q", "delay", "sampling_skew", "saturation"),
+    rescales=("theta_e",),
     separated_by="rotation at zero current in both directions, two speeds",
     parameters=(Parameter("offset_rad", "rad", "electrical, measured minus true", "offset"),),
     corrects=True,

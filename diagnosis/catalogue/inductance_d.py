@@ -43,6 +43,7 @@ EFFECT = InductanceD(
     equation="psi_d = (L_d + delta_l_d) i_d",
     signature="order 0, omega i_d on the q axis; and the slope of i_d",
     confounders=("magnet_flux", "current_gain", "cross_saturation", "saturation"),
+    rescales=("inductance_d_h",),
     separated_by="two non-zero values of i_d",
     parameters=(Parameter("inductance_d_h", "H", "of the d axis", "L_d"),),
     needs_d_current=("delta_l_d", "bend_"),

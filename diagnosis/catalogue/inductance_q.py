@@ -42,6 +42,7 @@ EFFECT = InductanceQ(
     equation="psi_q = (L_q + delta_l_q) i_q",
     signature="order 0, -omega i_q on the d axis; and the slope of i_q",
     confounders=("encoder_offset", "saturation", "iron_loss", "sampling_skew"),
+    rescales=("inductance_q_h",),
     separated_by="several i_q of both signs; rotation at zero current",
     parameters=(Parameter("inductance_q_h", "H", "of the q axis", "L_q"),),
     plausible={"inductance_q_h": (0.5, 1.9, "machine.inductance_q_h")},

@@ -39,6 +39,7 @@ EFFECT = MagnetFlux(
     equation="psi_d = L_d i_d + psi_m + delta_psi_m",
     signature="order 0 on the q axis, proportional to speed, at every current including zero",
     confounders=("resistance", "cross_saturation", "magnet_temperature", "inductance_d"),
+    rescales=("magnet_flux_wb",),
     separated_by="three speeds; rotation at zero current",
     parameters=(Parameter("magnet_flux_wb", "Wb", "peak, per phase", "flux linkage"),),
     curve=0.1,  # a part of lost flux recovers; more is a drift

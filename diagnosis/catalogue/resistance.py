@@ -40,6 +40,7 @@ EFFECT = Resistance(
     equation="u_dq = (R + delta_r) i_dq",
     signature="order 0, proportional to current, at every speed including standstill",
     confounders=("iron_loss", "magnet_flux", "dead_time", "resistance_temperature"),
+    rescales=("resistance_ohm",),
     separated_by="low speed and three loads; i_q reversed (against magnet_flux), several currents (against dead_time)",
     parameters=(Parameter("resistance_ohm", "ohm", "per phase, at the temperature of the recording", "resistance"),),
     plausible={"resistance_ohm": (0.7, 2.0, "machine.resistance_ohm")},

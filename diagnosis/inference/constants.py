@@ -23,6 +23,10 @@ ALWAYS_LOADED = 1e4
 # Of the top speed and the rated current: closer blocks belong to one operating point, as a drive regulates them.
 POINT = 0.08
 
+# ---- how recording and drive file are to be read
+# Prior probability of each mistaken convention (conventions/table.py): with some forty, one recording in twelve has one.
+MISREAD = 2e-3
+
 # ---- what the answer says
 # Probability of not being there up to which an effect is named, and mass of the posterior that is not looked at.
 DOUBTED = 0.05

@@ -7,6 +7,9 @@ back to first order, so that the same problem serves every set.
 
 from __future__ import annotations
 
+import copy
+import dataclasses
+
 import numpy as np
 
 from fluxproof.diagnosis.balance import misfit
@@ -24,6 +27,7 @@ class Setup:
     """What all problems of a recording share: blocks, functionals, noise, operating points, rows of the fit."""
 
     def __init__(self, view, effects, train_blocks):
+        """train_blocks: (b,) bool, blocks of the fit."""
         self.view, self.effects = view, dict(effects)
         self.projector = Projector(view, loads=True)
         measured = bool((view.shaft == "torque").all())
@@ -40,6 +44,30 @@ class Setup:
         self.repeats = _repeats(cells, self.points)
         self.smooth = smooth(view)
         self.smooth_rows = self.projector.rows(misfit(self.smooth))
+        self.raw_rows = cells.y
+
+    def read_like(self, other, volts, amps):
+        """This reading of a recording with the operating points of ``other``, the same blocks as documented.
+
+        volts, amps: factors of voltages and currents between the two.
+        """
+        self.points, self.visits = other.points, other.visits
+        self.grouping, self.repeats = other.grouping, other.repeats
+        self.level = self.level * np.where(self.cells.channel == "sum", amps, 1.0)
+        return self
+
+    def smoothly(self, other, volts, amps):
+        """A copy in which the reading changes the smooth signals only, as a correction of a measurement does.
+
+        Noise stays that of ``other``, as noise of a current that is told twice as large would count against it.
+        """
+        channel = self.cells.channel
+        scale = np.where(channel == "u", volts, np.where(channel == "sum", amps, 1.0))
+        out = copy.copy(self)
+        out.noise = other.noise * scale
+        y = other.cells.y * scale + self.smooth_rows - other.smooth_rows * scale
+        out.cells = dataclasses.replace(self.cells, y=y)
+        return out
 
 
 class Problem:
@@ -173,7 +201,7 @@ def around(setup, fit, names=None):
     view = with_flux(view, effects, fit.c, late_s=late)
     rows = setup.projector.rows
     change = rows(misfit(plain)) - setup.smooth_rows
-    ripple = rows(misfit(view)) - setup.cells.y - change
+    ripple = rows(misfit(view)) - setup.raw_rows - change
     rough = view.with_raw_current()
     for name in fit.names:
         effect = effects[name]

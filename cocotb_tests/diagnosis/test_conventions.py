@@ -1,0 +1,85 @@
+"""Mistaken conventions are told in plain words, or said to be indistinguishable, and never answered by a wrong cause."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from cocotb_tests.core.test_registers import PAPER
+from cocotb_tests.support.diagnosed_drives import recorded
+from cocotb_tests.support.mistakes import MISTAKES, ROOT2, Mistake, scaled, written
+from fluxproof.diagnosis import diagnose
+from fluxproof.diagnosis.conventions.table import READINGS, readings_for
+from fluxproof.diagnosis.nominal import load_nominal
+from fluxproof.diagnosis.session import run
+
+GIVEN_BACK = (
+    "currents in rms", "dq voltages line to line", "angle of the q axis", "bus at half", "R, L and psi line to line",
+    "L in mH", "half the pole pairs, angle of the shaft", "sample time half", "R and L line to line, currents in rms",
+)  # fmt: skip
+
+
+def told(answer) -> set[str]:
+    """Codes of everything that was said about conventions, rivals included."""
+    return {code for c in answer.conventions for code in (c.code, *c.rivals)}
+
+
+def test_there_are_enough_mistakes():
+    assert len(MISTAKES) >= 25
+
+
+@pytest.mark.parametrize("name", MISTAKES)
+def test_a_mistake_is_told_and_nothing_else(name, tmp_path):
+    mistake = MISTAKES[name]
+    answer = diagnose(*written(mistake, tmp_path))
+    assert not answer.effects and not answer.ambiguity, answer.sentence
+    codes = {r.code for r in readings_for(load_nominal(tmp_path / "drive.toml"))} | {"pole_pairs", "sample_time_s"}
+    if set(mistake.found.split()) <= codes:
+        assert answer.verdict == "explained" and set(mistake.found.split()) <= told(answer), answer.sentence
+        assert len(answer.conventions) == len(mistake.found.split())
+        assert answer.fit.holdout_after <= 2.0 * answer.fit.noise_floor
+    else:  # corrected by a check
+        assert answer.verdict == "no_mismatch" and not answer.conventions
+        assert any(mistake.found in problem.message for problem in answer.problems), answer.problems
+        assert mistake.found in answer.details
+
+
+@pytest.mark.parametrize("name", GIVEN_BACK)
+def test_the_improved_drive_file_reads_the_recording_rightly(name, tmp_path):
+    recording, drive = written(MISTAKES[name], tmp_path)
+    first = run(recording, drive, tmp_path / "out")
+    assert first.conventions and "drive_improved.toml" in first.advice
+    again = diagnose(recording, tmp_path / "out" / "drive_improved.toml")
+    assert again.verdict == "no_mismatch" and not again.conventions, again.sentence
+
+
+@pytest.mark.parametrize("name", ["currents in rms", "R and L line to line", "angle 90 degrees behind", "bus at half"])
+def test_an_effect_behind_a_mistake_is_named_with_its_size(name, tmp_path):
+    """The magnets are 5 % weaker; under the right reading that is found too."""
+    deviations = {"machine": (("magnet_flux_wb", 0.15675),)}
+    answer = diagnose(*written(MISTAKES[name], tmp_path, deviations))
+    assert set(MISTAKES[name].found.split()) <= told(answer), answer.sentence
+    assert [e.name for e in answer.effects] == ["magnet_flux"], answer.sentence
+    found = answer.effects[0].parameters["magnet_flux_wb"]
+    assert found.value == pytest.approx(0.15675, rel=0.005)
+
+
+@pytest.mark.parametrize("gain", [0.9, 0.74, 0.68])
+def test_a_gain_error_near_a_convention_is_a_gain_error(gain, tmp_path):
+    answer = diagnose(*written(Mistake("", scaled(("i_a", "i_b", "i_c"), gain)), tmp_path))
+    assert not answer.conventions, answer.sentence
+    assert "current_scale" in {e.name for e in answer.effects} | {n for g in answer.ambiguity for n in g}
+
+
+def test_a_healthy_recording_has_no_convention():
+    answer = diagnose(recorded(), load_nominal(PAPER))
+    assert answer.verdict == "no_mismatch" and not answer.conventions
+
+
+def test_every_reading_has_a_code_of_its_own_and_an_inverse_factor():
+    codes = [r.code for r in READINGS]
+    assert len(set(codes)) == len(codes)
+    rms = next(r for r in READINGS if r.code == "currents_rms")
+    assert rms.factor == pytest.approx(1 / ROOT2) and rms.columns()["i_a"] == (pytest.approx(ROOT2), 0.0)
+    angle = next(r for r in READINGS if r.code == "angle_90")
+    assert angle.factor is None and angle.columns() == {"theta_e": (1.0, pytest.approx(-np.pi / 2))}

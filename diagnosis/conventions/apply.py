@@ -1,0 +1,58 @@
+"""Readings applied to a drive, a recording and a drive file."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import tomlkit
+
+from fluxproof.diagnosis.recording import Recording
+
+
+def read_drive(nominal, readings):
+    """The drive with the values that the readings restore."""
+    for reading in readings:
+        nominal = reading.of(nominal)
+    return nominal
+
+
+def read_recording(recording: Recording, readings) -> Recording:
+    """The recording with the columns that the readings restore."""
+    columns = dict(recording.columns)
+    for reading in readings:
+        for name, (factor, offset) in reading.columns().items():
+            if name in columns:
+                columns[name] = columns[name] * factor + offset
+    return dataclasses.replace(recording, columns=columns)
+
+
+def edit(document, nominal, readings, recording, put) -> None:
+    """Write what the readings restore to a drive file: keys, and factors in [columns].
+
+    document: tomlkit; recording: whose columns the file describes, or None; put: function (table, key, value, why).
+    A column whose unit a check has converted stays as it is, as the file does not state that unit.
+    """
+    for reading in readings:
+        for section, key, value in reading.keys(nominal):
+            put(document.setdefault(section, tomlkit.table()), key, value, reading.says)
+        nominal = reading.of(nominal)
+    if recording is None:
+        return
+    converted = {p.column for p in recording.problems if p.action in ("converted", "corrected")}
+    sources, scales = recording.meta.get("columns", {}), recording.meta.get("scales", {})
+    for name in sources:
+        factor, offset = scales.get(name, (1.0, 0.0))
+        why = []
+        for reading in readings:
+            if name in reading.columns():
+                f, o = reading.columns()[name]
+                factor, offset = factor * f, offset * f + o
+                why.append(reading.says)
+        if why and name not in converted:
+            entry = tomlkit.inline_table()
+            entry.update({"name": name} | {"factor": _digits(factor)} | ({"offset": _digits(offset)} if offset else {}))
+            put(document.setdefault("columns", tomlkit.table()), sources[name], entry, "; ".join(why))
+
+
+def _digits(value) -> float:
+    return float(f"{value:.9g}")

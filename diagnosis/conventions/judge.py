@@ -1,0 +1,206 @@
+"""Which reading of recording and drive file the data prefer.
+
+Readings are judged as effects are, by the evidence for the balance that they leave: first without any effect, which is
+cheap, as the balance is a sum of few terms that a reading scales,
+
+    y = f_u u - f_R R i - f_Ld d(L_d i_d) - f_Lq d(L_q i_q) - f_psi d(psi_m)
+
+then the best ones with the whole search of effects.  A reading has no free size, which the evidence rewards by itself:
+currents in rms are told from a gain error by how exactly the factor is met.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fluxproof.diagnosis.balance import bulge
+from fluxproof.diagnosis.conventions.reading import Reading
+from fluxproof.diagnosis.conventions.table import readings_for
+from fluxproof.diagnosis.effect import torque_of
+from fluxproof.diagnosis.inference import constants as k
+from fluxproof.diagnosis.inference.evidence import evidence
+from fluxproof.diagnosis.inference.points import condense
+from fluxproof.diagnosis.inference.posterior import Posterior
+from fluxproof.diagnosis.inference.problem import Problem, Setup
+
+WIDE = 6  # readings to which a second one is added
+SEARCHED = 2  # readings, or pairs of them, that are judged with the whole search
+ONE_EFFECT = 7.0  # log evidence that any effect costs: prior odds of 1 to 19, and the width of its prior
+SAME = 1e-6  # of the balance: readings that leave the same
+KEYS = ("resistance_ohm", "inductance_d_h", "inductance_q_h", "magnet_flux_wb")
+
+
+@dataclass(frozen=True)
+class Judged:
+    """Readings with their evidence without effects, prior included; y: (n,) what they leave, in recorded volts."""
+
+    readings: tuple[Reading, ...]
+    value: float
+    y: np.ndarray
+
+
+def preferred(recordings, posterior, explained, progress=lambda text: None):
+    """(readings, rivals, Posterior) that the data prefer; without readings if what is documented fits best.
+
+    A convention is met exactly, and it takes the place of an effect: a reading after which the same quantity still has
+    to be rescaled, or that leaves as many effects as there were without it, is chance.  rivals: readings that leave the same
+    balance; posterior: of the effects as documented; explained: whether these explain the misfit.
+    """
+    setup, known = posterior.setup, posterior.best().value
+    most = len(posterior.best().names) if explained else np.inf
+    able = [r for r in readings_for(setup.view.nominal) if r.possible(recordings)]
+    able = [r for r in able if all(getattr(setup.view.machine, key) for key in r.machine)]
+    terms = Terms(setup)
+    perfect = terms.perfect()
+    plain = terms.judged(())
+    good = sorted((j for j in map(terms.judged, ((r,) for r in able)) if j.value > plain.value), key=_rank)
+    two = [terms.judged((*j.readings, r)) for j in good[:WIDE] for r in able if _apart(j.readings, r)]
+    singles = {j.readings[0].code: j.value for j in good}
+    two = [j for j in two if j.value > max(singles.get(r.code, plain.value) for r in j.readings)]
+    ranked = _without_doubles(sorted([*good, *two], key=_rank))
+    best, found = None, posterior
+    for j in ranked[:SEARCHED]:
+        prior = len(j.readings) * np.log(k.MISREAD)
+        if max(j.value, perfect - ONE_EFFECT + prior) <= known:
+            continue
+        progress(f"as if {j.readings[0].says}")
+        other = Posterior(_read(setup, j.readings), progress)
+        value = other.best().value + prior + terms.jacobian(j.readings)
+        left = other.best().names
+        exact = not any(set(setup.effects[n].rescales) & r.touches for n in left for r in j.readings)
+        if value > known and exact and (not left or len(left) + len(j.readings) <= most):
+            best, known, found = j, value, other
+        if best is j and not other.best().names:
+            break  # nothing is left that another reading could explain
+    if best is None:
+        return (), [], posterior
+    rivals = [j.readings[0] for j in good if j.readings != best.readings and len(best.readings) == 1 and _same(j, best)]
+    return best.readings, rivals, found
+
+
+def _read(setup, readings) -> Setup:
+    """The setup under readings, with raw or with smooth signals changed, whichever leaves less.
+
+    Ripple of a current is a signal, which shows that a reading is right; its noise is not.
+    """
+    view = setup.view
+    for reading in readings:
+        view = reading.of_view(view)
+    train = np.zeros(len(view), bool)
+    train[setup.projector.block[setup.train]] = True
+    volts, amps = _product(r.volts for r in readings), _product(r.currents for r in readings)
+    raw = Setup(view, setup.effects, train).read_like(setup, volts, amps)
+    if any(r.turn for r in readings):
+        return raw
+    return max((raw, raw.smoothly(setup, volts, amps)), key=lambda s: Problem(s, names=()).fit(()).value)
+
+
+def _rank(judged):
+    return -round(judged.value, 3)  # of equals the first of the table
+
+
+def _apart(readings, more) -> bool:
+    """Whether a further reading concerns other quantities."""
+    return not more.touches & {quantity for r in readings for quantity in r.touches}
+
+
+def _same(a, b) -> bool:
+    return bool(np.linalg.norm(a.y - b.y) <= SAME * np.linalg.norm(a.y) + 1e-12)
+
+
+def _without_doubles(ranked) -> list[Judged]:
+    """The first of those that leave the same balance."""
+    out = []
+    for j in ranked:
+        if not any(_same(j, other) for other in out):
+            out.append(j)
+    return out
+
+
+class Terms:
+    """The terms of one recording's balance, condensed as in the search, for each angle that a reading assumes."""
+
+    def __init__(self, setup):
+        self.setup, self.known = setup, {}
+        # Measured torque and sum of the currents, and what the drive file describes beyond the terms.
+        self.rest = setup.cells.y - sum(self._terms(setup.view).values())
+
+    def _terms(self, view) -> dict[str, np.ndarray]:
+        """{term: rows (r,)} of the nominal machine; the functionals are those of the documented angle for all."""
+        exact, m = view.with_raw_current(), view.machine
+        i = exact.i
+        d, q = m.inductance_d_h * i.real + 0j, 1j * m.inductance_q_h * i.imag
+        psi = m.magnet_flux_wb + 0.0 * i
+        columns = {
+            "u": {"u": view.to_dq(view.u[:, 1:-1])},
+            "r": {"u": -m.resistance_ohm * (exact.i_mid - bulge(view))},
+            **{name: {"u": -view.flux(flux)} for name, flux in (("d", d), ("q", q), ("psi", psi))},
+        }
+        if np.isfinite(view.torque).any():
+            columns |= {f"t_{n}": {"torque": -torque_of(view, f, i)} for n, f in (("d", d), ("q", q), ("psi", psi))}
+        return {name: self.setup.projector.rows(column) for name, column in columns.items()}
+
+    def points(self, turn):
+        """(Points with the terms as columns, their names) with the angle turned by ``turn`` [rad]."""
+        if turn not in self.known:
+            s = self.setup
+            terms = self._terms(s.view.turned(-turn) if turn else s.view)
+            terms |= {f"rest_{c}": np.where(s.cells.channel == c, self.rest, 0.0) for c in ("u", "sum", "torque")}
+            points = condense(s.grouping, s.cells.y, np.array(list(terms.values())).T, s.noise, s.level, s.load)
+            self.known[turn] = points, list(terms)
+        return self.known[turn]
+
+    def judged(self, readings) -> Judged:
+        """The evidence of readings without effects."""
+        points, names = self.points(sum(r.turn for r in readings))
+        y = points.x @ np.array([_factor(name, readings) for name in names])
+        scale = np.where(self._is(points, "u"), _product(r.volts for r in readings), 1.0)
+        scale = np.where(self._is(points, "sum"), _product(r.currents for r in readings), scale)
+        value = self._evidence(points, y, scale) + len(readings) * np.log(k.MISREAD) + self.jacobian(readings)
+        return Judged(tuple(readings), value, y / scale)
+
+    def perfect(self) -> float:
+        """The evidence of a balance that is met exactly: no set of effects reaches more."""
+        points, _ = self.points(0.0)
+        return self._evidence(points, np.zeros(len(points.y)), np.ones(len(points.y)))
+
+    def jacobian(self, readings) -> float:
+        """Change of the log density as the recorded voltages and currents are multiplied by factors."""
+        points, _ = self.points(0.0)
+        volts, amps = _product(r.volts for r in readings), _product(r.currents for r in readings)
+        return self._is(points, "u").sum() * np.log(volts) + self._is(points, "sum").sum() * np.log(amps)
+
+    @staticmethod
+    def _is(points, channel) -> np.ndarray:
+        """(n,) bool: points of a channel."""
+        return np.array([name == channel for name, _, _ in points.groups])[points.group]
+
+    @staticmethod
+    def _evidence(p, y, scale) -> float:
+        none, nothing = np.zeros(0), np.zeros(0, np.int64)
+        return evidence(
+            np.zeros((len(y), 0)), y, p.s2 * scale**2, p.level * scale, p.group, len(p.groups), p.loads, p.load,
+            none, nothing, np.zeros(0, bool), none,
+            k.FORMULA, k.DISCREPANCY, k.MOST_DISCREPANCY, k.ALWAYS_LOADED, np.inf,
+        )[0]  # fmt: skip
+
+
+def _product(factors) -> float:
+    out = 1.0
+    for factor in factors:
+        out *= factor
+    return out
+
+
+def _factor(term, readings) -> float:
+    """Factor of a term of the balance under readings."""
+    amps = _product(r.currents for r in readings)
+    volts = _product(x.volts for x in readings)
+    r, d, q, psi = (_product(x.machine.get(key, 1.0) for x in readings) for key in KEYS)
+    return {
+        "u": volts, "r": r * amps, "d": d * amps, "q": q * amps, "psi": psi,
+        "t_psi": psi * amps, "t_d": d * amps**2, "t_q": q * amps**2,
+        "rest_u": volts, "rest_sum": amps, "rest_torque": 1.0,
+    }[term]  # fmt: skip

@@ -1,0 +1,97 @@
+"""One way to read a recording or a drive file otherwise than documented."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass, field
+
+from fluxproof.diagnosis.result import Convention
+
+CURRENTS = ("i_a", "i_b", "i_c", "i_d", "i_q")
+VOLTAGES = ("u_d_ref", "u_q_ref")
+
+
+@dataclass(frozen=True)
+class Reading:
+    """currents, voltages, bus: factors from recorded to true values; turn: rad added to the recorded angle.
+
+    machine: {key of [machine]: factor from the file's value to the true one}; quantity: for Convention; dq: whether
+    only logs in dq can have it; says: the finding as a clause.
+    """
+
+    code: str
+    quantity: str
+    says: str
+    currents: float = 1.0
+    voltages: float = 1.0
+    bus: float = 1.0
+    turn: float = 0.0
+    machine: dict = field(default_factory=dict)
+    dq: bool | None = None  # whether it is of logs in dq, of logs of phases and duties, or of both
+
+    def possible(self, recordings) -> bool:
+        """Whether the recordings contain what this reading changes."""
+        logs_dq = all(not r.has("d_a", "d_b", "d_c") for r in recordings)
+        if self.dq is not None and self.dq != logs_dq:
+            return False
+        if self.bus != 1.0 and not all(r.has("u_dc") for r in recordings):
+            return False
+        if self.turn and not all(r.has("theta_e") for r in recordings):
+            return False
+        return not any("inverter" in r.lacks for r in recordings)  # an EMF run measures voltages of its own
+
+    @property
+    def touches(self) -> set[str]:
+        """The quantities that it rescales, as effects name theirs: i, u, u_dc, theta_e, keys of [machine]."""
+        named = (("i", self.currents != 1.0), ("u", self.voltages != 1.0), ("u_dc", self.bus != 1.0),
+                 ("theta_e", self.turn != 0.0))  # fmt: skip
+        return {name for name, changed in named if changed} | set(self.machine)
+
+    @property
+    def volts(self) -> float:
+        """Factor by which the voltage of the balance is multiplied."""
+        return self.voltages * self.bus
+
+    @property
+    def factor(self) -> float | None:
+        """Recorded or stated value over the true one; None: an angle, or several factors."""
+        factors = {1.0 / f for f in (self.currents, self.voltages, self.bus, *self.machine.values()) if f != 1.0}
+        return factors.pop() if len(factors) == 1 else None
+
+    def keys(self, nominal) -> list[tuple[str, str, float]]:
+        """[(section, key, value)] of the drive file that it changes."""
+        return [("machine", key, getattr(nominal.machine, key) * f) for key, f in self.machine.items()]
+
+    def of(self, nominal):
+        """The drive read this way."""
+        changes = {key: value for _, key, value in self.keys(nominal)}
+        return dataclasses.replace(nominal, machine=dataclasses.replace(nominal.machine, **changes))
+
+    def of_view(self, view):
+        """The view read this way, with the same blocks."""
+        turned = view.turned(-self.turn) if self.turn else view
+        return turned.replace(
+            nominal=self.of(view.nominal),
+            i=turned.i * self.currents,
+            i_raw=turned.i_raw * self.currents,
+            i_abc=None if turned.i_abc is None else turned.i_abc * self.currents,
+            u=turned.u * self.volts,
+            u_dc=turned.u_dc * self.bus,
+        )
+
+    def columns(self) -> dict[str, tuple[float, float]]:
+        """{canonical column: (factor, offset)} of the columns that it changes."""
+        out = {name: (self.currents, 0.0) for name in CURRENTS if self.currents != 1.0}
+        out |= {name: (self.voltages, 0.0) for name in VOLTAGES if self.voltages != 1.0}
+        if self.bus != 1.0:
+            out["u_dc"] = (self.bus, 0.0)
+        if self.turn:
+            out["theta_e"] = (1.0, self.turn)
+        return out
+
+    def told(self, rivals=()) -> Convention:
+        """The finding; rivals: readings that fit as well."""
+        says = self.says
+        if rivals:
+            says = f"{says}, or {', or '.join(r.says for r in rivals)} (this recording cannot tell)"
+        return Convention(self.code, self.quantity, self.factor, says, [r.code for r in rivals])

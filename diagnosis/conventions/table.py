@@ -1,0 +1,112 @@
+"""The mistakes that people make with drive recordings and data sheets, one entry each.
+
+A new entry is a new line; of entries that leave the same balance the first is told first.  Units that only the numbers reveal (degrees, percent, mA, rpm) and exchanged phases are
+corrected by the checks.  Sources of the factors: amplitude-invariant against power-invariant Clarke, sqrt(3/2); peak
+against rms, sqrt(2); phase against line-to-line voltage, sqrt(3), and resistance or inductance between two terminals,
+2.
+"""
+
+from __future__ import annotations
+
+import math
+
+from fluxproof.diagnosis.conventions.reading import Reading
+
+ROOT2, ROOT3, POWER = math.sqrt(2.0), math.sqrt(3.0), math.sqrt(1.5)
+R, L, PSI = ("resistance_ohm",), ("inductance_d_h", "inductance_q_h"), ("magnet_flux_wb",)
+
+
+def _machine(code, names, factor, says, **more):
+    """A reading of the drive file: its values are ``factor`` times the true ones."""
+    keys = {key: 1.0 / factor for key in names}
+    return Reading(code, ", ".join((*names, *more)), says, machine=keys | {k: 1.0 / f for k, f in more.items()})
+
+
+def _angle(degrees, meaning):
+    sign, name = "ahead of" if degrees > 0 else "behind", abs(degrees)
+    code = f"angle_{'minus_' if degrees < 0 else ''}{name}"
+    return Reading(
+        code, "theta_e", f"the angle is {name} degrees {sign} the d axis{meaning}", turn=-math.radians(degrees)
+    )
+
+
+READINGS = (
+    # the drive file
+    _machine("machine_line_rl", (*R, *L), 2.0, "R, L_d and L_q are line-to-line values, twice the phase values"),
+    _machine("resistance_line", R, 2.0, "the resistance is a line-to-line value, twice the phase value"),
+    _machine("inductances_line", L, 2.0, "L_d and L_q are line-to-line values, twice the phase values"),
+    _machine("psi_line", PSI, ROOT3, "the magnet flux is a line-to-line value, 1.7321 of the phase value"),
+    _machine("psi_rms", PSI, 1 / ROOT2, "the magnet flux is an rms value, 0.7071 of the peak value"),
+    _machine("psi_line_rms", PSI, POWER, "the magnet flux is a line-to-line rms value, 1.2247 of the peak value"),
+    _machine(
+        "machine_line", (*R, *L), 2.0, "R, L_d, L_q (2 times) and the magnet flux (1.7321 times) are line-to-line values",
+        magnet_flux_wb=ROOT3,
+    ),
+    _machine(
+        "machine_line_rms", (*R, *L), 2.0,
+        "R, L_d, L_q (2 times) and the magnet flux (1.2247 times, rms) are line-to-line values", magnet_flux_wb=POWER,
+    ),
+    _machine("psi_milli", PSI, 1e3, "the magnet flux is in mWb"),
+    _machine("inductances_milli", L, 1e3, "L_d and L_q are in mH"),
+    _machine("inductances_micro", L, 1e6, "L_d and L_q are in uH"),
+    _machine("resistance_milli", R, 1e3, "the resistance is in milliohm"),
+    # scales of recorded columns
+    Reading("currents_rms", "i", "the currents are rms values, 0.7071 of the peak values", currents=ROOT2),
+    Reading("currents_double", "i", "the currents are recorded at twice, as from peak to peak", currents=0.5),
+    Reading("currents_half", "i", "the currents are recorded at half", currents=2.0),
+    Reading(
+        "currents_power_invariant", "i_d, i_q", "the dq currents are power-invariant, 1.2247 of the peak values",
+        currents=1 / POWER, dq=True,
+    ),
+    Reading(
+        "dq_power_invariant", "i_d, i_q, u_d_ref, u_q_ref",
+        "the dq currents and voltages are power-invariant, 1.2247 of the peak values",
+        currents=1 / POWER, voltages=1 / POWER, dq=True,
+    ),
+    Reading(
+        "dq_rms", "i_d, i_q, u_d_ref, u_q_ref", "the dq currents and voltages are rms values, 0.7071 of the peak values",
+        currents=ROOT2, voltages=ROOT2, dq=True,
+    ),
+    Reading(
+        "voltages_rms", "u_d_ref, u_q_ref", "the voltages are rms values, 0.7071 of the peak values", voltages=ROOT2,
+        dq=True,
+    ),
+    Reading(
+        "voltages_line", "u_d_ref, u_q_ref", "the voltages are line-to-line values, 1.7321 of the phase values",
+        voltages=1 / ROOT3, dq=True,
+    ),
+    Reading(
+        "voltages_line_rms", "u_d_ref, u_q_ref",
+        "the voltages are line-to-line rms values, 1.2247 of the phases' peak values", voltages=1 / POWER, dq=True,
+    ),
+    Reading(
+        "voltages_power_invariant", "u_d_ref, u_q_ref",
+        "the dq voltages are power-invariant, 1.2247 of the peak values", voltages=1 / POWER, dq=True,
+    ),
+    Reading("bus_half", "u_dc", "the bus voltage is recorded at half", bus=2.0, dq=False),
+    Reading("bus_double", "u_dc", "the bus voltage is recorded at twice", bus=0.5, dq=False),
+    # the angle
+    _angle(90, ": that of the q axis"),
+    _angle(-90, ": its d axis is our q axis"),
+    _angle(180, ": the magnet points the other way"),
+    _angle(60, ", one sector"),
+    _angle(-60, ", one sector"),
+    _angle(120, ", one phase"),
+    _angle(-120, ", one phase"),
+    _angle(30, ": counted from a line-to-line voltage"),
+    _angle(-30, ": counted from a line-to-line voltage"),
+)  # fmt: skip
+
+
+def readings_for(nominal) -> list[Reading]:
+    """All readings; those of the shaft depend on the pole pairs."""
+    pairs = nominal.machine.pole_pairs
+    if pairs == 1:
+        return list(READINGS)
+    return [
+        *READINGS,
+        _machine(
+            "psi_of_shaft", PSI, float(pairs), f"the magnet flux is per rad/s of the shaft, {pairs} times the flux linkage"
+        ),
+        _machine("psi_torque", PSI, 1.5 * pairs, f"the magnet flux is a torque constant, {1.5 * pairs:g} times the flux"),
+    ]  # fmt: skip

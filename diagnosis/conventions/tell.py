@@ -1,0 +1,59 @@
+"""The answer under the readings that the data prefer, with the misfit as it was documented."""
+
+from __future__ import annotations
+
+from fluxproof.diagnosis.answer.headline import sentence
+from fluxproof.diagnosis.conventions.reading import Reading
+from fluxproof.diagnosis.inference import constants as k
+from fluxproof.diagnosis.result import Diagnosis
+
+OF_THE_REST = ("after", "noise", "spectrum_after", "angle_after")  # arrays of the evidence in true volts
+
+
+def under(readings: tuple[Reading, ...], rivals: list[Reading], documented: Diagnosis, answer: Diagnosis) -> Diagnosis:
+    """``answer``, found with the readings, as an answer to the recording as it is.
+
+    Voltages are those of the recording: where the bus is recorded at half, the rest is told in recorded volts.
+    rivals: readings that fit as well as the only one.  documented: the answer without readings, for the misfit before.
+    """
+    effects = answer.search.setup.effects
+    volts = 1.0
+    for reading in readings:
+        volts *= reading.volts
+    fit, before = answer.fit, documented.fit
+    if fit.unit == "V":
+        for name in ("train_after", "holdout_after", "noise_floor"):
+            setattr(fit, name, getattr(fit, name) / volts)
+        for part in answer.remainder:
+            part.size /= volts if part.unit == "V" else 1.0
+    same = fit.unit == before.unit
+    fit.train_before = before.train_before if same else fit.train_before
+    fit.holdout_before = before.holdout_before if same else fit.holdout_before
+    answer.readings, answer.conventions = readings, [r.told(rivals) for r in readings]
+    answer.location = documented.location
+    arrays, old = answer.evidence.arrays, documented.evidence.arrays
+    for name in arrays:
+        if name.startswith(("before", "spectrum_before", "angle_before")) and name in old:
+            arrays[name] = old[name]
+        elif name.startswith(OF_THE_REST):
+            arrays[name] = arrays[name] / volts
+    answer.explained_share = fit.explained_share
+    if answer.verdict == "no_mismatch":
+        answer.verdict = "explained"
+    elif answer.verdict == "unexplained" and answer.remainder and answer.explained_share >= k.HALF:
+        answer.verdict = "partly_explained"
+    answer.sentence = sentence(answer, effects)
+    return answer
+
+
+def restate(answer: Diagnosis, loaded) -> None:
+    """Tell of a key of the drive file that had to be another one for the recording to be read at all."""
+    restated = loaded[0].meta.get("restated")
+    if restated is None or answer.verdict == "bad_recording":
+        return
+    effects = answer.search.setup.effects if answer.search is not None else {}
+    answer.readings = (restated, *answer.readings)
+    answer.conventions = [restated.told(), *answer.conventions]
+    if answer.verdict == "no_mismatch":
+        answer.verdict = "explained"
+    answer.sentence = sentence(answer, effects)
