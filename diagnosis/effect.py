@@ -61,7 +61,7 @@ class Effect:
     separated_by: str
     parameters: tuple[Parameter, ...]
     absorbs: tuple[str, ...] = ()
-    rescales: tuple[str, ...] = ()  # quantities of which it is a scale or an offset: i, u, u_dc, theta_e, keys of [machine]
+    rescales: tuple[str, ...] = ()  # of which it is a scale or an offset: i, u, u_dc, theta_e, keys of [machine]
     needs: tuple[str, ...] = ()  # of NEEDS: what a recording must show for the effect to be seen
     named: bool = True  # False: no parameter of the simulation carries it; it is described and not asserted
     positive: bool = False  # the leading coefficient cannot be negative

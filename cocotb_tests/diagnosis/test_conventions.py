@@ -1,4 +1,4 @@
-"""Mistaken conventions are told in plain words, or said to be indistinguishable, and never answered by a wrong cause."""
+"""Mistaken conventions are told in plain words or said to be indistinguishable, never answered by a wrong cause."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Recordings of a healthy drive with one mistake of convention each, in the recording or in the drive file.
 
-MISTAKES: {name: Mistake}.  A drive log has phase currents and duties, or, where the mistake is one of dq quantities, the
-currents and voltages of the drive's own dq frame.
+MISTAKES: {name: Mistake}.  A log has phase currents and duties, or, for mistakes of dq quantities, the currents and
+voltages of the drive's own dq frame.
 """
 
 from __future__ import annotations

@@ -44,9 +44,9 @@ class Judged:
 def preferred(recordings, posterior, explained, progress=lambda text: None):
     """(readings, rivals, Posterior) that the data prefer; without readings if what is documented fits best.
 
-    A convention is met exactly, and it takes the place of an effect: a reading after which the same quantity still has
-    to be rescaled, or that leaves as many effects as there were without it, is chance.  rivals: readings that leave the same
-    balance; posterior: of the effects as documented; explained: whether these explain the misfit.
+    A convention is met exactly and takes the place of an effect: a reading after which the same quantity still has to
+    be rescaled, or that leaves as many effects as there were without it, is chance.  rivals: readings that leave the
+    same balance; posterior: of the effects as documented; explained: whether these explain the misfit.
     """
     setup, known = posterior.setup, posterior.best().value
     most = len(posterior.best().names) if explained else np.inf

@@ -1,9 +1,10 @@
 """The mistakes that people make with drive recordings and data sheets, one entry each.
 
-A new entry is a new line; of entries that leave the same balance the first is told first.  Units that only the numbers reveal (degrees, percent, mA, rpm) and exchanged phases are
-corrected by the checks.  Sources of the factors: amplitude-invariant against power-invariant Clarke, sqrt(3/2); peak
-against rms, sqrt(2); phase against line-to-line voltage, sqrt(3), and resistance or inductance between two terminals,
-2.
+A new entry is a new line; of entries that leave the same balance the first is told first.  Units that only the
+numbers reveal (degrees, percent, mA, rpm) and exchanged phases are corrected by the checks.
+
+Sources of the factors: amplitude-invariant against power-invariant Clarke, sqrt(3/2); peak against rms, sqrt(2); phase
+against line-to-line voltage, sqrt(3), and resistance or inductance between two terminals, 2.
 """
 
 from __future__ import annotations
@@ -39,7 +40,8 @@ READINGS = (
     _machine("psi_rms", PSI, 1 / ROOT2, "the magnet flux is an rms value, 0.7071 of the peak value"),
     _machine("psi_line_rms", PSI, POWER, "the magnet flux is a line-to-line rms value, 1.2247 of the peak value"),
     _machine(
-        "machine_line", (*R, *L), 2.0, "R, L_d, L_q (2 times) and the magnet flux (1.7321 times) are line-to-line values",
+        "machine_line", (*R, *L), 2.0,
+        "R, L_d, L_q (2 times) and the magnet flux (1.7321 times) are line-to-line values",
         magnet_flux_wb=ROOT3,
     ),
     _machine(
@@ -64,7 +66,8 @@ READINGS = (
         currents=1 / POWER, voltages=1 / POWER, dq=True,
     ),
     Reading(
-        "dq_rms", "i_d, i_q, u_d_ref, u_q_ref", "the dq currents and voltages are rms values, 0.7071 of the peak values",
+        "dq_rms", "i_d, i_q, u_d_ref, u_q_ref",
+        "the dq currents and voltages are rms values, 0.7071 of the peak values",
         currents=ROOT2, voltages=ROOT2, dq=True,
     ),
     Reading(
@@ -106,7 +109,10 @@ def readings_for(nominal) -> list[Reading]:
     return [
         *READINGS,
         _machine(
-            "psi_of_shaft", PSI, float(pairs), f"the magnet flux is per rad/s of the shaft, {pairs} times the flux linkage"
+            "psi_of_shaft", PSI, float(pairs),
+            f"the magnet flux is per rad/s of the shaft, {pairs} times the flux linkage",
         ),
-        _machine("psi_torque", PSI, 1.5 * pairs, f"the magnet flux is a torque constant, {1.5 * pairs:g} times the flux"),
+        _machine(
+            "psi_torque", PSI, 1.5 * pairs, f"the magnet flux is a torque constant, {1.5 * pairs:g} times the flux"
+        ),
     ]  # fmt: skip

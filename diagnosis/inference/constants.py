@@ -24,7 +24,7 @@ ALWAYS_LOADED = 1e4
 POINT = 0.08
 
 # ---- how recording and drive file are to be read
-# Prior probability of each mistaken convention (conventions/table.py): with some forty, one recording in twelve has one.
+# Prior probability of each mistaken convention (conventions/table.py): of some forty, one recording in twelve has one.
 MISREAD = 2e-3
 
 # ---- what the answer says

@@ -1,8 +1,8 @@
 """The cases of a comparison: healthy drives, single effects and pairs of a sealed benchmark.
 
 If the blind benchmark of the seed exists (build/blind/own/seedN), its cases are used; otherwise the same generator
-makes cases in build/compare.  The truth is opened here for the stratum of each case, which no method receives, and for the
-scores afterwards.
+makes cases in build/compare.  The truth is opened here for the stratum of each case, which no method receives, and
+for the scores afterwards.
 """
 
 from __future__ import annotations
