@@ -10,14 +10,22 @@ from __future__ import annotations
 
 import numpy as np
 
+from fluxproof.diagnosis.answer.bench_point import on_the_bench
 from fluxproof.diagnosis.answer.headline import sentence
-from fluxproof.diagnosis.bench_point import on_the_bench
+from fluxproof.diagnosis.answer.locate import at_order, evidence, locate
+from fluxproof.diagnosis.balance.cells import cells_of, voltage_level
 from fluxproof.diagnosis.catalogue import CATALOGUE
-from fluxproof.diagnosis.cells import cells_of, voltage_level
-from fluxproof.diagnosis.drift_fit import best_sets, centred_cells, drifts, fitted, fuller, row_sigmas, with_copper
-from fluxproof.diagnosis.fit import Fitter
 from fluxproof.diagnosis.inference import constants as k
-from fluxproof.diagnosis.locate import at_order, evidence, locate
+from fluxproof.diagnosis.inference.drift_fit import (
+    best_sets,
+    centred_cells,
+    drifts,
+    fitted,
+    fuller,
+    row_sigmas,
+    with_copper,
+)
+from fluxproof.diagnosis.inference.fit import Fitter
 from fluxproof.diagnosis.result import Diagnosis, Fit, NamedEffect, Remainder, Request
 
 LEAST_MEANS = 12  # over time; fewer do not determine a drift

@@ -4,21 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from fluxproof.diagnosis.blocks import views_of
+from fluxproof.diagnosis.answer.conclude import conclude
+from fluxproof.diagnosis.balance.blocks import views_of
+from fluxproof.diagnosis.balance.parts import sound
+from fluxproof.diagnosis.balance.view import joined_views
 from fluxproof.diagnosis.catalogue import CATALOGUE
-from fluxproof.diagnosis.conclude import conclude
-from fluxproof.diagnosis.conventions.drive_file import as_read
 from fluxproof.diagnosis.conventions.judge import preferred
 from fluxproof.diagnosis.conventions.tell import under
 from fluxproof.diagnosis.inference.posterior import Posterior
 from fluxproof.diagnosis.inference.problem import Setup
+from fluxproof.diagnosis.ingest.restated import as_read
 from fluxproof.diagnosis.nominal import Nominal
-from fluxproof.diagnosis.parts import sound
 from fluxproof.diagnosis.recording import Recording
 from fluxproof.diagnosis.result import Diagnosis
 from fluxproof.diagnosis.slow_diagnosis import diagnose_slow
 from fluxproof.diagnosis.suspects import SUSPECTS
-from fluxproof.diagnosis.view import joined_views
 
 HOLDOUT_EVERY = 4  # every fourth dwell is held out
 

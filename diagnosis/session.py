@@ -20,17 +20,17 @@ from pathlib import Path
 from threadpoolctl import threadpool_limits
 
 from fluxproof.diagnosis.answer.advice import complete
+from fluxproof.diagnosis.answer.flux_found import write_flux_map
+from fluxproof.diagnosis.answer.improve import write_improved
+from fluxproof.diagnosis.balance.parts import left_out
 from fluxproof.diagnosis.conventions.apply import read_drive, read_recording
 from fluxproof.diagnosis.conventions.tell import restate
-from fluxproof.diagnosis.digital import replay
-from fluxproof.diagnosis.flux_found import write_flux_map
-from fluxproof.diagnosis.improve import write_improved
-from fluxproof.diagnosis.load import load_recording
+from fluxproof.diagnosis.ingest.load import load_recording
 from fluxproof.diagnosis.nominal import Nominal, load_nominal
-from fluxproof.diagnosis.overlay import closed_loop
-from fluxproof.diagnosis.parts import left_out
+from fluxproof.diagnosis.overlay.compare import closed_loop
 from fluxproof.diagnosis.physics import explain, known_effects
 from fluxproof.diagnosis.recording import Problem, Recording, RecordingError
+from fluxproof.diagnosis.replay.digital import replay
 from fluxproof.diagnosis.report import write_outputs
 from fluxproof.diagnosis.result import Diagnosis, Digital
 from fluxproof.golden_model.drive_keys import DriveError

@@ -11,18 +11,18 @@ from __future__ import annotations
 import numpy as np
 
 from fluxproof.diagnosis.answer.headline import sentence
+from fluxproof.diagnosis.answer.locate import evidence, locate
+from fluxproof.diagnosis.answer.request import requests
+from fluxproof.diagnosis.answer.uncertainty import named
+from fluxproof.diagnosis.balance.cells import voltage_level
+from fluxproof.diagnosis.balance.slow_view import slow_view
+from fluxproof.diagnosis.balance.view import joined_views
 from fluxproof.diagnosis.catalogue import CATALOGUE
-from fluxproof.diagnosis.cells import voltage_level
 from fluxproof.diagnosis.inference import constants as k
 from fluxproof.diagnosis.inference.problem import Setup, fit_of_set
-from fluxproof.diagnosis.locate import evidence, locate
+from fluxproof.diagnosis.inference.slow_search import SlowSearch, most_effects
 from fluxproof.diagnosis.one_point import diagnose_one_point
-from fluxproof.diagnosis.request import requests
 from fluxproof.diagnosis.result import Diagnosis, Fit, Remainder
-from fluxproof.diagnosis.slow import slow_view
-from fluxproof.diagnosis.slow_search import SlowSearch, most_effects
-from fluxproof.diagnosis.uncertainty import named
-from fluxproof.diagnosis.view import joined_views
 
 HOLDOUT_EVERY = 4
 AT_FLOOR = 2.0  # ratio of a misfit to the noise floor up to which it is noise

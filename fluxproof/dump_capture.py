@@ -44,7 +44,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write the dump and print its contents; returns 0."""
-    from fluxproof.diagnosis.telemetry_stream import read_capture, write_piece  # takes a second to import
+    from fluxproof.diagnosis.replay.telemetry_stream import read_capture, write_piece  # takes a second to import
 
     drive = load(args.drive)
     try:
@@ -92,7 +92,7 @@ def _numbers(piece) -> str:
 
 def with_registers(base: RegisterSet, path: Path) -> RegisterSet:
     """``base`` with the integers of a JSON file; DriveError names an unknown register or an invalid value."""
-    from fluxproof.diagnosis.telemetry import CONFIG
+    from fluxproof.diagnosis.replay.telemetry import CONFIG
 
     try:
         data = json.loads(path.read_text(encoding="utf-8"))

@@ -20,10 +20,10 @@ from fluxproof.command import main
 from fluxproof.cosim import ghdl
 from fluxproof.cosim.golden_loop import run_controller
 from fluxproof.cosim.scenarios import everything
-from fluxproof.diagnosis import digital
-from fluxproof.diagnosis.digital_capture import capture as golden_capture
 from fluxproof.diagnosis.recording import RecordingError
-from fluxproof.diagnosis.telemetry_stream import SIZE, parse, read_capture, write_piece
+from fluxproof.diagnosis.replay import digital
+from fluxproof.diagnosis.replay.capture import capture as golden_capture
+from fluxproof.diagnosis.replay.telemetry_stream import SIZE, parse, read_capture, write_piece
 from fluxproof.golden_model import drive as drives
 from fluxproof.golden_model import fluxproof
 from fluxproof.golden_model.io import telemetry_words

@@ -43,8 +43,8 @@ def test_import_direction(tmp_path):
     ("file", "line"),
     [
         ("fluxproof/golden_model/fixed.py", "import fluxproof.plant.pmsm"),
-        ("fluxproof/cosim/scenarios.py", "from fluxproof.diagnosis import fit"),
-        ("fluxproof/diagnosis/fit.py", "from scripts import generate"),
+        ("fluxproof/cosim/scenarios.py", "from fluxproof.diagnosis.inference import fit"),
+        ("fluxproof/diagnosis/inference/fit.py", "from scripts import generate"),
         ("studies/blind/forms.py", "from cocotb_tests.support import board"),
     ],
 )

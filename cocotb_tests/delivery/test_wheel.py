@@ -15,7 +15,7 @@ import pytest
 
 from cocotb_tests.support import diagnosed_drives as bench
 from fluxproof.checkout import DRIVES, ROOT
-from fluxproof.diagnosis import telemetry
+from fluxproof.diagnosis.replay import telemetry
 from fluxproof.golden_model.io import telemetry_words
 
 UV = Path(sys.executable).with_name("uv")

@@ -12,11 +12,11 @@ import pytest
 from cocotb_tests.core.test_registers import PAPER
 from cocotb_tests.support.diagnosis_samples import evidence, made_up
 from fluxproof.diagnosis.answer.advice import advice, complete, point_text
+from fluxproof.diagnosis.answer.bench_point import neighbours, on_the_bench
 from fluxproof.diagnosis.answer.doubts import IMPLAUSIBLE, doubts
 from fluxproof.diagnosis.answer.headline import MOST, details, sentence
-from fluxproof.diagnosis.bench_point import neighbours, on_the_bench
 from fluxproof.diagnosis.catalogue import CATALOGUE
-from fluxproof.diagnosis.effect import Parameter
+from fluxproof.diagnosis.effects.effect import Parameter
 from fluxproof.diagnosis.nominal import load_nominal
 from fluxproof.diagnosis.physics import known_effects
 from fluxproof.diagnosis.quantities import ascii_of, measured

@@ -9,7 +9,7 @@ import pytest
 
 from cocotb_tests.support.damaged_files import REFUSED, SUFFIXES, damaged_files
 from cocotb_tests.support.recordings_made import made, nominal_of, write
-from fluxproof.diagnosis.load import load_recording
+from fluxproof.diagnosis.ingest.load import load_recording
 from fluxproof.diagnosis.recording import RecordingError
 
 

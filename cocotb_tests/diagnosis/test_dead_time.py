@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from fluxproof.diagnosis import diagnose
-from fluxproof.diagnosis.blocks import view_of
+from fluxproof.diagnosis.balance.blocks import view_of
 from fluxproof.diagnosis.catalogue.dead_time import EFFECT, full_loss
 from fluxproof.diagnosis.inference.problem import Problem, Setup
 from fluxproof.diagnosis.nominal import load_nominal

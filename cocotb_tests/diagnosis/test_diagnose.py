@@ -6,6 +6,7 @@ controller hides every effect from the currents, as in a real drive.
 
 from __future__ import annotations
 
+import ast
 import dataclasses
 import importlib
 import sys
@@ -17,12 +18,13 @@ from cocotb_tests.core.test_registers import PAPER
 from cocotb_tests.support.diagnosed_drives import DRIVE, GRID, MACHINE, POINT, columns, recorded
 from fluxproof.checkout import ROOT
 from fluxproof.diagnosis import catalogue, diagnose, physics
-from fluxproof.diagnosis.blocks import view_of
+from fluxproof.diagnosis.answer.improved_plant import check_key, plain
+from fluxproof.diagnosis.balance.blocks import view_of
+from fluxproof.diagnosis.balance.shaft import is_airgap
 from fluxproof.diagnosis.catalogue import CATALOGUE
-from fluxproof.diagnosis.improved_plant import check_key, plain
 from fluxproof.diagnosis.nominal import load_nominal
+from fluxproof.diagnosis.physics import known_effects
 from fluxproof.diagnosis.recording import from_columns
-from fluxproof.diagnosis.shaft import is_airgap
 from fluxproof.plant import Harmonic, flux_from_currents, machine_params
 
 NOMINAL = load_nominal(PAPER)
@@ -184,7 +186,7 @@ def test_every_effect_of_the_issue_has_a_file_of_its_own():
 
 NEW_EFFECT = """
 import numpy as np
-from fluxproof.diagnosis.effect import FluxEffect, Parameter, one, sigma
+from fluxproof.diagnosis.effects.effect import FluxEffect, Parameter, one, sigma
 
 class SecondHarmonic(FluxEffect):
     def core_psi(self, view):
@@ -208,6 +210,15 @@ EFFECT = SecondHarmonic(
     parameters=(Parameter("order_2", "1", "amplitude relative to the magnet flux"),),
 )
 """
+
+
+def test_no_effect_is_named_outside_of_its_file():
+    """Rules for one effect are attributes of it, so that a new one is one file; keys of drive.toml may sound alike."""
+    names = (set(known_effects()) - set(vars(NOMINAL.sensors))) - {"udc_gain"}  # a parameter too
+    for path in sorted((ROOT / "diagnosis").rglob("*.py")):
+        if path.parent.name not in ("catalogue", "suspects"):
+            strings = {n.value for n in ast.walk(ast.parse(path.read_text())) if isinstance(n, ast.Constant)}
+            assert not {s for s in strings if isinstance(s, str)} & names, path
 
 
 def test_a_new_file_is_a_new_effect(tmp_path, monkeypatch):

@@ -18,10 +18,11 @@ from cocotb_tests.support.damaged_files import damaged_files
 from cocotb_tests.support.recordings_made import nominal_of
 from fluxproof import command as fluxproof
 from fluxproof.checkout import ROOT
-from fluxproof.diagnosis import command, session, telemetry
+from fluxproof.diagnosis import command, session
 from fluxproof.diagnosis import diagnose as run_diagnosis
 from fluxproof.diagnosis.nominal import load_nominal
 from fluxproof.diagnosis.recording import RecordingError
+from fluxproof.diagnosis.replay import telemetry
 from fluxproof.golden_model import drive as drives
 from fluxproof.golden_model.io import telemetry_words
 from fluxproof.golden_model.registers import registers

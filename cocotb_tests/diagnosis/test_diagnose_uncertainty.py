@@ -9,7 +9,7 @@ from cocotb_tests.core.test_registers import PAPER
 from cocotb_tests.support.diagnosed_drives import DRIVE, MACHINE, POINT, columns, recorded
 from fluxproof.diagnosis import diagnose
 from fluxproof.diagnosis.answer.estimates import common, covariance_of
-from fluxproof.diagnosis.blocks import view_of
+from fluxproof.diagnosis.balance.blocks import view_of
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.inference.problem import Problem, Setup, fit_of_set
 from fluxproof.diagnosis.nominal import load_nominal

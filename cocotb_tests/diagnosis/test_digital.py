@@ -15,9 +15,11 @@ import pytest
 from cocotb_tests.core.test_registers import PAPER
 from fluxproof.cosim.golden_loop import run_controller
 from fluxproof.cosim.scenarios import everything
-from fluxproof.diagnosis import digital, digital_flow, digital_local, telemetry
-from fluxproof.diagnosis.digital_capture import capture
 from fluxproof.diagnosis.recording import RecordingError, from_columns
+from fluxproof.diagnosis.replay import digital, telemetry
+from fluxproof.diagnosis.replay import flow as digital_flow
+from fluxproof.diagnosis.replay import local as digital_local
+from fluxproof.diagnosis.replay.capture import capture
 from fluxproof.golden_model import drive as drives
 from fluxproof.golden_model import fluxproof
 from fluxproof.golden_model.io import telemetry_words
@@ -284,7 +286,7 @@ def test_stateless_blocks_are_checked_without_a_start_state(signal, block, run, 
 
 def test_stateless_checks_equal_the_core(run):
     """Every signal of the list, for all rows, from the recorded ones."""
-    from fluxproof.diagnosis.digital_replay import run_of
+    from fluxproof.diagnosis.replay.chain import run_of
 
     one = run_of(run[0], run[1], SET.values._asdict(), SET.config._asdict())
     assert digital_local.check_rows(one, 0, 2500) == (2500, [], {})

@@ -10,14 +10,14 @@ import pytest
 from cocotb_tests.core.test_registers import PAPER
 from cocotb_tests.support.diagnosed_drives import GRID, MACHINE, columns, recorded
 from fluxproof.diagnosis import diagnose
-from fluxproof.diagnosis.balance import bulge, misfit
-from fluxproof.diagnosis.blocks import view_of
+from fluxproof.diagnosis.balance.blocks import view_of
+from fluxproof.diagnosis.balance.misfit import bulge, misfit
+from fluxproof.diagnosis.balance.view import joined_views
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.catalogue.current_gain import PATTERNS
 from fluxproof.diagnosis.inference.points import point_numbers
 from fluxproof.diagnosis.nominal import load_nominal
 from fluxproof.diagnosis.recording import from_columns
-from fluxproof.diagnosis.view import joined_views
 
 NOMINAL = load_nominal(PAPER)
 IDLE = ((160.0, 0.0, 0.0),) * 20

@@ -8,11 +8,11 @@ import pytest
 from cocotb_tests.support.bench_logs import PSI, emf
 from cocotb_tests.support.recordings_made import DRIVE, U_DC, T, made, nominal_of, write
 from fluxproof.diagnosis import diagnose
-from fluxproof.diagnosis.blocks import view_of
+from fluxproof.diagnosis.balance.blocks import view_of
 from fluxproof.diagnosis.catalogue import CATALOGUE
-from fluxproof.diagnosis.emf import angle_of
 from fluxproof.diagnosis.inference.problem import Problem, Setup, fit_of_set
-from fluxproof.diagnosis.load import load_recording
+from fluxproof.diagnosis.ingest.emf import angle_of
+from fluxproof.diagnosis.ingest.load import load_recording
 from fluxproof.diagnosis.recording import RecordingError, from_columns
 
 

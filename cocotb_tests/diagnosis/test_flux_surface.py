@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from fluxproof.checkout import ROOT
-from fluxproof.diagnosis.blocks import view_of
-from fluxproof.diagnosis.flux_splines import INTERVALS, gradients, knots_over, powers
-from fluxproof.diagnosis.flux_surface import earned, flux_map, ladder, names
+from fluxproof.diagnosis.balance.blocks import view_of
+from fluxproof.diagnosis.balance.view import joined_views
+from fluxproof.diagnosis.effects.flux_splines import INTERVALS, gradients, knots_over, powers
+from fluxproof.diagnosis.effects.flux_surface import earned, flux_map, ladder, names
 from fluxproof.diagnosis.nominal import load_nominal
 from fluxproof.diagnosis.recording import from_columns
-from fluxproof.diagnosis.view import joined_views
 
 NOMINAL = load_nominal(ROOT / "docs" / "drives" / "brusa_hsm1.toml")
 MACHINE, T = NOMINAL.machine, NOMINAL.sample_time_s

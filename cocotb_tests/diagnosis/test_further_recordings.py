@@ -7,13 +7,13 @@ import pytest
 
 from cocotb_tests.core.test_registers import PAPER
 from cocotb_tests.support.diagnosed_drives import GRID, columns, recorded
-from fluxproof.diagnosis.blocks import view_of, views_of
+from fluxproof.diagnosis.answer.request import wants_cold
+from fluxproof.diagnosis.balance.blocks import view_of, views_of
+from fluxproof.diagnosis.balance.view import joined_views, started_cold
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.nominal import load_nominal
 from fluxproof.diagnosis.physics import held_out
 from fluxproof.diagnosis.recording import from_columns
-from fluxproof.diagnosis.request import wants_cold
-from fluxproof.diagnosis.view import joined_views, started_cold
 
 NOMINAL = load_nominal(PAPER)
 COLD = NOMINAL.machine.temperature_ref_c

@@ -8,13 +8,13 @@ import pytest
 from cocotb_tests.core.test_registers import PAPER
 from cocotb_tests.support.effect_recordings import NOMINAL, T, healthy, usual, with_effect
 from fluxproof.diagnosis import diagnose
+from fluxproof.diagnosis.answer.improve import write_improved
+from fluxproof.diagnosis.answer.improved_plant import in_addition, read_flux_map
+from fluxproof.diagnosis.answer.locate import at_order, harmonic
 from fluxproof.diagnosis.answer.sizes import Sizes
-from fluxproof.diagnosis.blocks import view_of
+from fluxproof.diagnosis.balance.blocks import view_of
+from fluxproof.diagnosis.balance.cells import cells_of
 from fluxproof.diagnosis.catalogue import CATALOGUE
-from fluxproof.diagnosis.cells import cells_of
-from fluxproof.diagnosis.improve import write_improved
-from fluxproof.diagnosis.improved_plant import in_addition, read_flux_map
-from fluxproof.diagnosis.locate import at_order, harmonic
 from fluxproof.diagnosis.nominal import load_nominal
 from fluxproof.diagnosis.recording import from_columns
 from fluxproof.diagnosis.session import run

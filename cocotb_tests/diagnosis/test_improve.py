@@ -11,15 +11,15 @@ import pytest
 from cocotb_tests.core.test_registers import PAPER, each_drive, edited
 from fluxproof.cosim.closed_loop import described_sensors
 from fluxproof.cosim.scenarios import RPM, scenario, steps
-from fluxproof.diagnosis.digital_capture import capture
-from fluxproof.diagnosis.improve import core_values, improved_toml, plant_of, write_improved
-from fluxproof.diagnosis.improved_plant import KEYS
+from fluxproof.diagnosis.answer.improve import core_values, improved_toml, plant_of, write_improved
+from fluxproof.diagnosis.answer.improved_plant import KEYS
 from fluxproof.diagnosis.nominal import load_nominal
-from fluxproof.diagnosis.overlay import closed_loop
-from fluxproof.diagnosis.overlay_inputs import dq_currents
+from fluxproof.diagnosis.overlay.compare import closed_loop
+from fluxproof.diagnosis.overlay.inputs import dq_currents
 from fluxproof.diagnosis.recording import RecordingError, from_columns
+from fluxproof.diagnosis.replay.capture import capture
+from fluxproof.diagnosis.replay.telemetry import read_dump, write_dump
 from fluxproof.diagnosis.result import Estimate, NamedEffect
-from fluxproof.diagnosis.telemetry import read_dump, write_dump
 from fluxproof.golden_model import drive as drives
 from fluxproof.golden_model.drive_keys import DriveError
 from fluxproof.golden_model.fixed import wrap_s

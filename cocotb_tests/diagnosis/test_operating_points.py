@@ -8,10 +8,10 @@ import pytest
 from cocotb_tests.support.bench_logs import GRID, L_Q, PSI, R, Truth, sampled, table, warming
 from cocotb_tests.support.recordings_made import DRIVE, codes, made, nominal_of, write
 from fluxproof.diagnosis import diagnose
-from fluxproof.diagnosis.load import load_recording
+from fluxproof.diagnosis.balance.slow_view import slow_view
+from fluxproof.diagnosis.ingest.load import load_recording
 from fluxproof.diagnosis.nominal import load_nominal
 from fluxproof.diagnosis.recording import RecordingError
-from fluxproof.diagnosis.slow import slow_view
 
 WEAK = Truth(psi=0.95 * PSI)
 AT_REST = [(0.0, d, 0.0) for d in (-5.0, -4.0, -3.0, -2.0, -1.0, 1.0, 2.0, 3.0, 4.0, 5.0)]

@@ -7,7 +7,7 @@ import pytest
 
 from cocotb_tests.support.recordings_made import codes, dq_made, made, nominal_of, write
 from fluxproof.diagnosis.column_maps import maps
-from fluxproof.diagnosis.load import load_recording
+from fluxproof.diagnosis.ingest.load import load_recording
 from fluxproof.diagnosis.recording import COLUMNS, RecordingError
 
 

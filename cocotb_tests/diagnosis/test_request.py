@@ -7,12 +7,12 @@ import pytest
 
 from cocotb_tests.core.test_registers import PAPER
 from cocotb_tests.support.diagnosed_drives import MACHINE, recorded
-from fluxproof.diagnosis.blocks import view_of
+from fluxproof.diagnosis.answer.experiment import ENOUGH, best_points, closest_distance, rivalry
+from fluxproof.diagnosis.answer.request import grid, known_of, new_axes, requests, steady_view, within_limits
+from fluxproof.diagnosis.balance.blocks import view_of
 from fluxproof.diagnosis.catalogue import CATALOGUE
-from fluxproof.diagnosis.experiment import ENOUGH, best_points, closest_distance, rivalry
 from fluxproof.diagnosis.inference.problem import Setup, fit_of_set
 from fluxproof.diagnosis.nominal import load_nominal
-from fluxproof.diagnosis.request import grid, known_of, new_axes, requests, steady_view, within_limits
 
 NOMINAL = load_nominal(PAPER)
 RATED = NOMINAL.machine.rated_current_a

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from cocotb_tests.support.slow_logs import LEVELS, NOMINAL, Truth, log
-from fluxproof.diagnosis.balance import misfit
+from fluxproof.diagnosis.balance.misfit import misfit
+from fluxproof.diagnosis.balance.slow_stretches import message_period, stretches
+from fluxproof.diagnosis.balance.slow_view import slow_view
 from fluxproof.diagnosis.catalogue import CATALOGUE
+from fluxproof.diagnosis.inference.slow_model import bounds, flux_map_of
+from fluxproof.diagnosis.inference.slow_search import SlowSearch
 from fluxproof.diagnosis.recording import RecordingError
-from fluxproof.diagnosis.slow import slow_view
 from fluxproof.diagnosis.slow_diagnosis import axis_misfit, diagnose_slow, model_effects
-from fluxproof.diagnosis.slow_model import bounds, flux_map_of
-from fluxproof.diagnosis.slow_search import SlowSearch
-from fluxproof.diagnosis.slow_stretches import message_period, stretches
 
 PSI, L_Q = NOMINAL.machine.magnet_flux_wb, NOMINAL.machine.inductance_q_h
 SEVERAL = Truth(v_dead=7.0, psi_m=0.92 * PSI, l_q=1.25 * L_Q, offset=0.06)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fluxproof.diagnosis.balance import misfit
-from fluxproof.diagnosis.blocks import view_of
+from fluxproof.diagnosis.balance.blocks import view_of
+from fluxproof.diagnosis.balance.misfit import misfit
 from fluxproof.diagnosis.nominal import load_nominal
 from fluxproof.diagnosis.physics import holdout_blocks
 from fluxproof.diagnosis.recording import from_columns

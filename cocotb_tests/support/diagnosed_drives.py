@@ -14,8 +14,8 @@ import numpy as np
 from cocotb_tests.core.test_registers import PAPER
 from fluxproof.cosim.closed_loop import Scenario, described_sensors
 from fluxproof.cosim.golden_loop import simulate
-from fluxproof.diagnosis.digital_capture import capture
 from fluxproof.diagnosis.recording import Recording, from_columns
+from fluxproof.diagnosis.replay.capture import capture
 from fluxproof.golden_model import drive as drives
 from fluxproof.golden_model.registers import registers
 from fluxproof.golden_model.units import from_si, si_per_lsb

@@ -12,8 +12,8 @@ import numpy as np
 
 from cocotb_tests.core.test_registers import PAPER
 from cocotb_tests.support.diagnosed_drives import DRIVE, GRID, columns
-from fluxproof.diagnosis.balance import shaft_torque
-from fluxproof.diagnosis.blocks import view_of
+from fluxproof.diagnosis.balance.blocks import view_of
+from fluxproof.diagnosis.balance.misfit import shaft_torque
 from fluxproof.diagnosis.nominal import load_nominal
 from fluxproof.diagnosis.recording import from_columns
 

@@ -160,8 +160,8 @@ def dump(path):
     """A telemetry dump of the golden model's core; returns (path, drive.toml that belongs to it)."""
     from cocotb_tests.core.test_registers import PAPER
     from fluxproof.cosim.scenarios import everything
-    from fluxproof.diagnosis import telemetry
-    from fluxproof.diagnosis.digital_capture import capture
+    from fluxproof.diagnosis.replay import telemetry
+    from fluxproof.diagnosis.replay.capture import capture
     from fluxproof.golden_model import drive, fluxproof
     from fluxproof.golden_model.registers import registers
 

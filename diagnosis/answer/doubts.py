@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from fluxproof.diagnosis.answer.phrases import capital, size_text, title_of
-from fluxproof.diagnosis.effect import DOUBT
+from fluxproof.diagnosis.effects.effect import DOUBT
 from fluxproof.diagnosis.quantities import ascii_of, quantity
 
 IMPLAUSIBLE = "is implausible"

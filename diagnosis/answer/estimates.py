@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fluxproof.diagnosis.improved_plant import in_addition
+from fluxproof.diagnosis.answer.improved_plant import in_addition
 from fluxproof.diagnosis.result import NamedEffect
 
 # Relative to the voltage, and to the bus voltage in the direction of the current: rms in healthy recordings.

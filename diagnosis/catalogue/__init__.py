@@ -3,7 +3,7 @@
 import importlib
 import pkgutil
 
-from fluxproof.diagnosis.effect import Effect
+from fluxproof.diagnosis.effects.effect import Effect
 
 
 def found_in(package: str, path) -> dict[str, Effect]:

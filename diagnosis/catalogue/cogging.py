@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from fluxproof.diagnosis.effect import Effect, Parameter, rated_torque
+from fluxproof.diagnosis.balance.torque_order import repeating_order
+from fluxproof.diagnosis.effects.effect import Effect, Parameter, rated_torque
 from fluxproof.diagnosis.result import Estimate
-from fluxproof.diagnosis.torque_order import repeating_order
 
 
 def _seen(view, h):

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fluxproof.diagnosis.effect import FluxEffect, Parameter
+from fluxproof.diagnosis.effects.effect import FluxEffect, Parameter
 from fluxproof.diagnosis.result import Estimate
 
 
@@ -62,6 +62,7 @@ EFFECT = CrossSaturation(
     equation="psi_d = L_d i_d + psi_m - c i_q^2, psi_q = L_q i_q - 2 c i_d i_q (one co-energy)",
     signature="order 0, in proportion to the speed: omega i_q^2 on the q axis, even in i_q; omega i_d i_q on d",
     confounders=("inductance_d", "magnet_flux", "current_scale", "saturation"),
+    map_shapes=("separable", "full"),
     separated_by="a grid of i_d and i_q that includes i_q = 0",
     parameters=(Parameter("cross_saturation_wb_per_a2", "Wb/A2", "c at rated i_q", "coefficient"),),
     bounded=("y3", "x3"),

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fluxproof.diagnosis.effect import DOUBT, Effect, Parameter, current_error, sigma
+from fluxproof.diagnosis.effects.effect import DOUBT, Effect, Parameter, current_error, sigma
 from fluxproof.diagnosis.result import Estimate
 
 # Gains of two sensors that differ by g cause a harmonic of 0.58 g and a rotation of 0.29 g; twice that is allowed.

@@ -3,7 +3,7 @@
 import numpy as np
 
 from fluxproof.diagnosis.catalogue.current_gain import gain_column
-from fluxproof.diagnosis.effect import Effect, Parameter, current_error, one, sigma
+from fluxproof.diagnosis.effects.effect import Effect, Parameter, current_error, one, sigma
 
 
 class CurrentScale(Effect):

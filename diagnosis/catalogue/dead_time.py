@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fluxproof.diagnosis.effect import DOUBT, Effect, Parameter, voltage, zero_vector_slope
+from fluxproof.diagnosis.effects.effect import DOUBT, Effect, Parameter, voltage, zero_vector_slope
 from fluxproof.diagnosis.result import Estimate
 
 # No width is so large that the curve would resemble a resistance over most of the current range.
@@ -132,6 +132,7 @@ EFFECT = DeadTime(
     equation="u_x = u_x,ref - v_dead s(i_x), s odd, s = 1 above a small current",
     signature="order 0 in phase with the current, (4/pi) v_dead, and orders 6 and 12; independent of the speed",
     confounders=("resistance", "emf_harmonics"),
+    beside_map=True,
     separated_by="several currents, i_q reversed; another bus voltage or PWM frequency separates dead time from drops",
     parameters=(
         Parameter("v_dead_v", "V", "loss of a leg at full current, device drops included", "dead-time voltage"),

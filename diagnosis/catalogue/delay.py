@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from fluxproof.diagnosis.curves import parabola
-from fluxproof.diagnosis.effect import Effect, Parameter, one, sigma, voltage
+from fluxproof.diagnosis.balance.curves import parabola
+from fluxproof.diagnosis.effects.effect import Effect, Parameter, one, sigma, voltage
 
 MOST = 1.2  # periods: beyond one period the interpolation continues linearly, so that the iteration can return
 

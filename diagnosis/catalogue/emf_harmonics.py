@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fluxproof.diagnosis.effect import Effect, Parameter, flux, torque_of
+from fluxproof.diagnosis.effects.effect import Effect, Parameter, flux, torque_of
 from fluxproof.diagnosis.result import Estimate
 
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from fluxproof.diagnosis.curves import course
-from fluxproof.diagnosis.effect import Effect, Parameter, angle_error, one, sigma
+from fluxproof.diagnosis.balance.curves import course
+from fluxproof.diagnosis.effects.effect import Effect, Parameter, angle_error, one, sigma
 
 
 class EncoderOffset(Effect):

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fluxproof.diagnosis.effect import DOUBT, Effect, Parameter, rated_torque
+from fluxproof.diagnosis.effects.effect import DOUBT, Effect, Parameter, rated_torque
 from fluxproof.diagnosis.result import Estimate
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fluxproof.diagnosis.effect import FluxEffect, Parameter, one, sigma
+from fluxproof.diagnosis.effects.effect import FluxEffect, Parameter, one, sigma
 
 LEAST = 0.08  # of rated current: smaller currents do not determine a curve
 

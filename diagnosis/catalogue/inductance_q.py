@@ -3,7 +3,7 @@
 import numpy as np
 
 from fluxproof.diagnosis.catalogue.inductance_d import LEAST
-from fluxproof.diagnosis.effect import FluxEffect, Parameter, one, sigma
+from fluxproof.diagnosis.effects.effect import FluxEffect, Parameter, one, sigma
 
 
 class InductanceQ(FluxEffect):

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fluxproof.diagnosis.effect import Effect, Parameter, one, torque_of
+from fluxproof.diagnosis.effects.effect import Effect, Parameter, one, torque_of
 
 
 def _speeds(view):

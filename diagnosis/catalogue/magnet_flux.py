@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from fluxproof.diagnosis.curves import course
-from fluxproof.diagnosis.effect import DOUBT, FluxEffect, Parameter, one, sigma
+from fluxproof.diagnosis.balance.curves import course
+from fluxproof.diagnosis.effects.effect import DOUBT, FluxEffect, Parameter, one, sigma
 
 
 class MagnetFlux(FluxEffect):

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from fluxproof.diagnosis.curves import COURSE_KNOTS, course, courses, step_at_start
-from fluxproof.diagnosis.effect import FluxEffect, Parameter, one, sigma
+from fluxproof.diagnosis.balance.curves import COURSE_KNOTS, course, courses, step_at_start
+from fluxproof.diagnosis.effects.effect import FluxEffect, Parameter, one, sigma
 
 MOST_AT_ONCE = 4.0  # largest ratio of the step at the start to the later change
 

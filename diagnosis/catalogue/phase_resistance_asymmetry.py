@@ -2,10 +2,10 @@
 
 import numpy as np
 
+from fluxproof.diagnosis.balance.curves import course
 from fluxproof.diagnosis.catalogue.current_gain import PATTERNS
 from fluxproof.diagnosis.catalogue.resistance import to_true_resistance
-from fluxproof.diagnosis.curves import course
-from fluxproof.diagnosis.effect import Effect, Parameter, voltage
+from fluxproof.diagnosis.effects.effect import Effect, Parameter, voltage
 from fluxproof.diagnosis.result import Estimate
 
 

@@ -1,6 +1,6 @@
 """Winding resistance that differs from the nameplate: u = R i."""
 
-from fluxproof.diagnosis.effect import DOUBT, Effect, Parameter, one, sigma, voltage
+from fluxproof.diagnosis.effects.effect import DOUBT, Effect, Parameter, one, sigma, voltage
 
 
 def to_true_resistance(c, nominal) -> float:
@@ -41,6 +41,7 @@ EFFECT = Resistance(
     signature="order 0, proportional to current, at every speed including standstill",
     confounders=("iron_loss", "magnet_flux", "dead_time", "resistance_temperature"),
     rescales=("resistance_ohm",),
+    beside_map=True,
     separated_by="low speed and three loads; i_q reversed (against magnet_flux), several currents (against dead_time)",
     parameters=(Parameter("resistance_ohm", "ohm", "per phase, at the temperature of the recording", "resistance"),),
     plausible={"resistance_ohm": (0.7, 2.0, "machine.resistance_ohm")},

@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from fluxproof.diagnosis.balance.curves import COURSE_KNOTS, course, courses, known_temperature, reference_c
 from fluxproof.diagnosis.catalogue.resistance import to_true_resistance
-from fluxproof.diagnosis.curves import COURSE_KNOTS, course, courses, known_temperature, reference_c
-from fluxproof.diagnosis.effect import Effect, Parameter, one, sigma, voltage
+from fluxproof.diagnosis.effects.effect import Effect, Parameter, one, sigma, voltage
 
 
 def _change(c, by_alpha):

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fluxproof.diagnosis.effect import Effect, Parameter, angle_error, current_error, one, zero_vector_slope
+from fluxproof.diagnosis.effects.effect import Effect, Parameter, angle_error, current_error, one, zero_vector_slope
 
 
 def skewed(view):

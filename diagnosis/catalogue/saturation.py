@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fluxproof.diagnosis.effect import FluxEffect, Parameter
+from fluxproof.diagnosis.effects.effect import FluxEffect, Parameter
 from fluxproof.diagnosis.result import Estimate
 
 
@@ -97,6 +97,7 @@ EFFECT = Saturation(
     equation="psi_q = g(i_q), odd; psi_d = psi_m + f(i_d)",
     signature="order 0, proportional to speed, nonlinear in the current: about -omega i_q^3 on the d axis",
     confounders=("inductance_q", "inductance_d", "cross_saturation", "encoder_offset"),
+    map_shapes=("linear", "separable"),
     separated_by="i_q up to the rated current in several steps, both signs",
     parameters=(
         Parameter("psi_q_change_at_rated_wb", "Wb", "flux linkage at rated i_q minus L_q i_q", "psi_q at rated i_q"),

@@ -1,6 +1,6 @@
 """Gain error of the measured bus voltage: it scales every voltage."""
 
-from fluxproof.diagnosis.effect import Effect, Parameter, one, sigma, voltage
+from fluxproof.diagnosis.effects.effect import Effect, Parameter, one, sigma, voltage
 
 
 class UdcGain(Effect):

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from fluxproof.diagnosis.checks.agreement import angle_speed_ratio
-from fluxproof.diagnosis.points import held_one_after_another, mark_points
+from fluxproof.diagnosis.ingest.points import held_one_after_another, mark_points
 from fluxproof.diagnosis.recording import Problem
 
 STAGE = "time"

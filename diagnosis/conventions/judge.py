@@ -15,10 +15,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fluxproof.diagnosis.balance import bulge
+from fluxproof.diagnosis.balance.misfit import bulge
 from fluxproof.diagnosis.conventions.reading import Reading
 from fluxproof.diagnosis.conventions.table import readings_for
-from fluxproof.diagnosis.effect import torque_of
+from fluxproof.diagnosis.effects.effect import torque_of
 from fluxproof.diagnosis.inference import constants as k
 from fluxproof.diagnosis.inference.evidence import evidence
 from fluxproof.diagnosis.inference.points import condense

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fluxproof.diagnosis.effect import rated_torque
+from fluxproof.diagnosis.effects.effect import rated_torque
 from fluxproof.diagnosis.inference import constants as k
 
 VISITS = 16  # visits into which a recording of a single operating point is cut

@@ -12,14 +12,14 @@ import dataclasses
 
 import numpy as np
 
-from fluxproof.diagnosis.balance import misfit
-from fluxproof.diagnosis.cells import Projector, cells_of, noise
-from fluxproof.diagnosis.corrections import in_turn, with_flux
-from fluxproof.diagnosis.curves import parabola
-from fluxproof.diagnosis.effect import rated_torque
-from fluxproof.diagnosis.fit import Fitter, everything
+from fluxproof.diagnosis.balance.cells import Projector, cells_of, noise
+from fluxproof.diagnosis.balance.curves import parabola
+from fluxproof.diagnosis.balance.misfit import misfit
+from fluxproof.diagnosis.effects.corrections import in_turn, with_flux
+from fluxproof.diagnosis.effects.effect import rated_torque
 from fluxproof.diagnosis.inference import constants as k
 from fluxproof.diagnosis.inference.evidence import evidence
+from fluxproof.diagnosis.inference.fit import Fitter, everything
 from fluxproof.diagnosis.inference.points import Grouping, balance_level, condense, point_numbers, visits
 
 

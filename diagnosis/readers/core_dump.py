@@ -1,4 +1,4 @@
-"""The core's own telemetry dump, which diagnosis/telemetry.py decodes."""
+"""The core's own telemetry dump, which diagnosis/replay/telemetry.py decodes."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ SUFFIXES = (".dump",)
 
 def matches(head: bytes, path) -> bool:
     try:
-        from fluxproof.diagnosis import telemetry
+        from fluxproof.diagnosis.replay import telemetry
     except ImportError:
         return False
     try:
@@ -21,7 +21,7 @@ def matches(head: bytes, path) -> bool:
 
 def read(path, select=None) -> Table:
     """The canonical columns of the dump; registers and raw codes in ``meta``."""
-    from fluxproof.diagnosis import telemetry
+    from fluxproof.diagnosis.replay import telemetry
 
     columns, meta = telemetry.read_dump(path)
     names = chosen(dict.fromkeys(columns, ""), select, path)

@@ -10,9 +10,9 @@ from types import SimpleNamespace
 
 import jinja2
 
+from fluxproof.diagnosis.answer.improved_core import core_values
+from fluxproof.diagnosis.answer.improved_plant import merged, plant_of
 from fluxproof.diagnosis.answer.phrases import SIGNALS
-from fluxproof.diagnosis.improved_core import core_values
-from fluxproof.diagnosis.improved_plant import merged, plant_of
 from fluxproof.diagnosis.nominal import SECTIONS
 from fluxproof.diagnosis.quantities import RPM
 from fluxproof.diagnosis.report import pictures, words

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from fluxproof.diagnosis.curves import course, courses
-from fluxproof.diagnosis.effect import Effect, Parameter, current_error, one, sigma
+from fluxproof.diagnosis.balance.curves import course, courses
+from fluxproof.diagnosis.effects.effect import Effect, Parameter, current_error, one, sigma
 
 
 class CurrentGainDrift(Effect):

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fluxproof.diagnosis.effect import Effect, Parameter, current_error, one, sigma
+from fluxproof.diagnosis.effects.effect import Effect, Parameter, current_error, one, sigma
 
 
 def _slope(view):

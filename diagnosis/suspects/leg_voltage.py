@@ -3,7 +3,7 @@
 import numpy as np
 
 from fluxproof.diagnosis.catalogue.current_offset import PATTERNS
-from fluxproof.diagnosis.effect import Effect, Parameter, voltage
+from fluxproof.diagnosis.effects.effect import Effect, Parameter, voltage
 from fluxproof.diagnosis.result import Estimate
 
 LEGS = {name: np.array(weights) for name, weights in PATTERNS.items() if name != "zero"}

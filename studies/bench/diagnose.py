@@ -23,8 +23,8 @@ import pandas as pd
 
 from fluxproof.checkout import BUILD, ROOT
 from fluxproof.cosim.closed_loop import Scenario
-from fluxproof.diagnosis.digital_capture import capture
-from fluxproof.diagnosis.telemetry_columns import electrical_angle
+from fluxproof.diagnosis.replay.capture import capture
+from fluxproof.diagnosis.replay.telemetry_columns import electrical_angle
 from fluxproof.files import write_json
 from fluxproof.golden_model import drive as drives
 from fluxproof.golden_model.formats import TURN

@@ -14,10 +14,10 @@ import numpy as np
 from fluxproof.checkout import ROOT
 from fluxproof.diagnosis.answer.headline import sentence
 from fluxproof.diagnosis.catalogue import CATALOGUE
-from fluxproof.diagnosis.load import load_recording
+from fluxproof.diagnosis.inference.slow_model import bounds, flux_map_of, on_other_rows
+from fluxproof.diagnosis.ingest.load import load_recording
 from fluxproof.diagnosis.nominal import load_nominal
 from fluxproof.diagnosis.slow_diagnosis import axis_misfit, diagnose_slow, model_effects
-from fluxproof.diagnosis.slow_model import bounds, flux_map_of, on_other_rows
 from studies.real.outputs import write
 
 FILE = Path("emrax228") / "coastdown_run.csv"

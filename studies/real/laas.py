@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fluxproof.diagnosis.load import load_recording
+from fluxproof.diagnosis.ingest.load import load_recording
 from fluxproof.diagnosis.nominal import load_nominal
 from fluxproof.diagnosis.result import Diagnosis, Estimate, Evidence, Fit, NamedEffect
 from studies.real import q_axis

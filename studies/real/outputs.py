@@ -6,8 +6,8 @@ import time
 from pathlib import Path
 
 from fluxproof.diagnosis.answer.advice import complete
-from fluxproof.diagnosis.improve import write_improved
-from fluxproof.diagnosis.overlay import closed_loop
+from fluxproof.diagnosis.answer.improve import write_improved
+from fluxproof.diagnosis.overlay.compare import closed_loop
 from fluxproof.diagnosis.physics import known_effects
 from fluxproof.diagnosis.recording import RecordingError
 from fluxproof.diagnosis.report.write import json_ready, write_outputs

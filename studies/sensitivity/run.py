@@ -49,10 +49,10 @@ def variations(chosen) -> list[tuple[str, float]]:
 
 def answers_of(job) -> tuple[str, dict]:
     """(case, {"base": said, "NAME x2": said, ...}) of (folder, constants); {} if the case has no fast recording."""
-    from fluxproof.diagnosis.conclude import conclude
-    from fluxproof.diagnosis.load import load_recording
+    from fluxproof.diagnosis.answer.conclude import conclude
+    from fluxproof.diagnosis.balance.parts import sound
+    from fluxproof.diagnosis.ingest.load import load_recording
     from fluxproof.diagnosis.nominal import load_nominal
-    from fluxproof.diagnosis.parts import sound
     from fluxproof.diagnosis.physics import explain, posterior_of
 
     folder, chosen = Path(job[0]), job[1]

@@ -1,0 +1,144 @@
+"""From a posterior to the answer: names, sizes on held-out points, verdict, next recording, evidence."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fluxproof.diagnosis.answer.estimates import covariance_of, named_effects
+from fluxproof.diagnosis.answer.headline import sentence
+from fluxproof.diagnosis.answer.locate import at_order, evidence, locate
+from fluxproof.diagnosis.answer.names import names_of
+from fluxproof.diagnosis.answer.phrases import as_if, capital
+from fluxproof.diagnosis.answer.request import requests, wants_cold
+from fluxproof.diagnosis.answer.scan import Stray, row_residual, stray_order, stray_swing, stray_torque
+from fluxproof.diagnosis.answer.sizes import Sizes, fit_of, with_stray
+from fluxproof.diagnosis.answer.unknown import sparse_term
+from fluxproof.diagnosis.answer.verdict import kind_of
+from fluxproof.diagnosis.inference import constants as k
+from fluxproof.diagnosis.result import Diagnosis, UnknownTerm
+
+MOST_RIVALS = 5
+
+
+def conclude(posterior, held, progress=lambda text: None) -> Diagnosis:
+    """The answer to a posterior; held: (b,) blocks that were not fitted."""
+    setup, names, best = posterior.setup, names_of(posterior), posterior.best()
+    view, cells, before = setup.view, setup.cells, setup.cells.y
+    likely = {n for n, p in names.maybe.items() if p >= k.LIKELY}
+    told = (names.said | {n for group in names.open for n in group} | likely) & set(best.names) - set(names.suspects)
+    after = best.left(told)
+    measured = setup.load == 0.0  # otherwise the torque follows from the angle, whose resolution is not the shaft's
+    train = Sizes(setup, before, after, ~held, measured)
+    unseen = Sizes(setup, before, after, held, measured)
+    channel = train.primary()
+    electrical = [n for n in told if not setup.effects[n].mechanical]
+    share = unseen.share(channel) if electrical or (told and measured) else None
+    stray = _stray(best, train)
+    kind = kind_of(names, train, unseen, share, stray)
+    fit = fit_of(train, unseen)
+    answer = Diagnosis(kind, "", location=locate(view, cells, setup.noise), fit=fit, search=posterior)
+    answer.effects = named_effects(names, posterior, _shares(posterior, names, told, channel, held, measured))
+    answer.ambiguity = names.open
+    answer.explained_share = share
+    answer.remainder = unseen.remainder() if kind != "no_mismatch" else []
+    if stray:
+        answer.remainder = with_stray(answer.remainder, stray, train)
+    if names.open:
+        progress("choosing the next recording")
+        noise_v = float(np.nanmedian(np.abs(at_order(cells, setup.noise, 0.0))))
+        open_names = sorted({n for group in names.open for n in group})
+        answer.next_recording = requests(setup, _rivals(names), noise_v, wants_cold(open_names, setup.effects, view))
+    if kind in ("unexplained", "partly_explained"):
+        answer.unknown_term = _unknown(best, after, stray, names, held, unseen)
+    if kind == "unexplained":  # beside a large unknown part even a credible name may be its imitation
+        for e in answer.effects:
+            title = capital(setup.effects[e.name].title)
+            answer.notes.append(f"{title}: would explain {100 * e.explains:.0f} %, not asserted.")
+        answer.effects, answer.ambiguity, answer.next_recording = [], [], []
+        if told:  # nothing is named, so nothing is explained and the whole misfit is left
+            after, answer.explained_share = before, 0.0
+            train, unseen = (Sizes(setup, before, before, blocks, measured) for blocks in (~held, held))
+            answer.fit = fit_of(train, unseen)
+    answer.evidence = evidence(view, (cells, before), (cells, after), setup.noise, held)
+    answer.sentence = sentence(answer, setup.effects)
+    rows = view.u_dc.shape[1]
+    answer.notes.append(
+        f"The voltage balance was made on {len(view)} steady blocks of {rows} rows; {int(held.sum())} were not fitted."
+    )
+    for name in names.suspects:
+        if answer.unknown_term is None or answer.unknown_term.meaning != setup.effects[name].title:
+            answer.notes.append(f"Besides, it is {as_if(_described(best, name, held, unseen))}.")
+    for name, p in sorted(names.maybe.items(), key=lambda entry: -entry[1])[:3]:
+        answer.notes.append(f"{capital(setup.effects[name].title)}: possible (probability {p:.2f}), not asserted.")
+    answer.trace = "; ".join(f"{p:.3f} {'+'.join(f.names) or 'none'}" for p, f in names.fits[:4])
+    return answer
+
+
+def _rivals(names) -> list:
+    """One set per alternative: the most probable one with each open effect."""
+    rivals, seen = [], set()
+    for _, fit in names.fits:
+        mine = frozenset(n for group in names.open for n in group if n in fit.names)
+        if mine and mine not in seen:
+            seen.add(mine)
+            rivals.append(fit)
+    return rivals[:MOST_RIVALS]
+
+
+def _shares(posterior, names, told, channel, held, measured) -> dict[str, float]:
+    """{effect: share of the misfit's power above the floor that is left without it}; told: what the rest is without."""
+    best, setup = posterior.best(), posterior.setup
+    out = {}
+    for name in names.said:
+        fewer = best.problem.fit([n for n in best.names if n != name])
+        without = Sizes(setup, setup.cells.y, fewer.left(told - {name}), held, measured)
+        with_it = Sizes(setup, setup.cells.y, best.left(told), held, measured)
+        mine = [channel] if channel in without.channels else list(without.channels)
+        excess = sum(without.channels[c].excess for c in mine)
+        more = sum(without.channels[c].left - with_it.channels[c].left for c in mine)
+        out[name] = float(np.clip(more / excess, 0.0, 1.0)) if excess > 0.0 else 0.0
+    return out
+
+
+def _stray(best, train) -> Stray | None:
+    """A misfit outside the orders of the balance, after the best set."""
+    problem, setup = best.problem, best.problem.setup
+    effects = setup.effects
+    doubts = [effects[n].doubt(best.c[n], setup.view) for n in best.names]
+    doubt = np.sqrt(sum((np.square(d) for d in doubts), np.zeros(len(setup.view))))
+    before = train.channels["u"].before if "u" in train.channels else 0.0
+    floor = k.FORMS_LEFT * before if best.names else 0.0
+    certain = np.flatnonzero(doubt <= k.FORMS_LEFT * before) if best.names else np.arange(len(setup.view))
+    if not len(certain):
+        return None
+    known = sorted({h for n in best.names for h in effects[n].trailing})
+    view, rows = problem.view.take(certain), row_residual(best)[certain]
+    found = stray_order(view, rows, floor, known) or stray_swing(view, rows, floor)
+    if found is None and setup.load == 0.0:
+        found = stray_torque(setup.view, setup.projector, setup.cells, best.left(), np.hypot(setup.noise, setup.level))
+    return found
+
+
+def _unknown(best, after, stray, names, held, unseen) -> UnknownTerm | None:
+    """What fits the remainder best: a suspect, or a formula."""
+    suspect = max(names.suspects, key=lambda n: names.suspects[n] * best.sizes[best.names.index(n)], default=None)
+    if suspect:
+        return _described(best, suspect, held, unseen)
+    if stray is None:
+        setup = best.problem.setup
+        sigma = np.hypot(setup.noise, setup.level)
+        return sparse_term(best.problem.view, setup.cells, after, sigma, setup.train)
+    signal = "torque" if stray.kind == "torque" else "u_dq"
+    return UnknownTerm(signal, stray.formula, stray.value, stray.sigma, stray.unit, min(stray.explains, 1.0))
+
+
+def _described(best, name, held, unseen) -> UnknownTerm:
+    """A suspect with its parameter and the share of the remainder that it explains at points that were not fitted."""
+    setup, effect = best.problem.setup, best.problem.setup.effects[name]
+    channel = "u"
+    least = Sizes(setup, setup.cells.y, best.left(), held, True).channels[channel].left
+    before = unseen.channels[channel].left
+    share = float(np.clip(1.0 - least / before, 0.0, 1.0)) if before > 0.0 else 0.0
+    parameter, e = next(iter(effect.estimates(best.c[name], covariance_of(best, name, best.cov), None).items()))
+    formula = f"{parameter}, {effect.equation}"
+    return UnknownTerm("u_dq", formula, e.value, e.sigma, e.unit, share, effect.title)

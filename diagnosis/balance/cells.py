@@ -1,0 +1,215 @@
+"""From rows to cells: the misfit and every effect's column as harmonics of a block.
+
+The same linear functional, mean(x exp(-j h theta)), is applied to the misfit and to every column, so that the
+balance holds exactly between them, with or without whole turns.  White noise of the current enters the balance as a
+difference and nearly vanishes in the mean, so that the weight of a cell is estimated from the differences between
+neighbouring blocks of a dwell.  A second variance, proportional to the voltage squared, covers the error of the
+balance itself: ripple, sampling of the bus, the trapezoidal mean.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fluxproof.diagnosis.balance.misfit import misfit
+from fluxproof.diagnosis.balance.torque_order import torque_orders
+
+ORDERS_SUM = (0.0, 1.0, 2.0)
+LEAST_TURNS = 0.8  # periods of a harmonic within a block; with fewer it is not independent of order 0
+TAPERED_TURNS = 3.0  # the same with a taper, which has more leakage from neighbouring orders
+RESOLVED = 2.5  # rad per sampling period: a torque of a higher frequency appears at other orders
+
+
+def orders_u(pole_pairs: int) -> tuple[float, ...]:
+    """Harmonic orders in dq at which a misfit is evaluated, per electrical turn."""
+    mechanical = [n / pole_pairs for n in (1, 2, 3)]
+    both = sorted({round(h, 9) for h in [*mechanical, 0.5, 1.0, 2.0, 3.0, 4.0, 6.0, 12.0, 18.0]})
+    return (0.0, *both, *(-h for h in both))
+
+
+@dataclass
+class Cells:
+    """Rows of a weighted least-squares problem; every row is the real or imaginary part of one functional.
+
+    y: (r,) misfit; columns: {effect: {coefficient: (r,)}}; block, order, part: (r,) origin of a row, part 0 and 1
+    for d and q; channel: (r,) "u", "sum" or "torque"; ok: (r,) bool, rows that are used.
+    """
+
+    y: np.ndarray
+    columns: dict[str, dict[str, np.ndarray]]
+    block: np.ndarray
+    order: np.ndarray
+    part: np.ndarray
+    channel: np.ndarray
+    ok: np.ndarray
+
+
+class Projector:
+    """The functionals of one view, computed once and used for the misfit and for every column.
+
+    Views of the same blocks with corrected angles or currents share them: any functional is valid if it is the same
+    on both sides of the balance.
+    """
+
+    def __init__(self, view, loads=False):
+        """loads: whether the mean torque of a shaft with an unknown load is a row."""
+        self.orders = np.array(orders_u(view.machine.pole_pairs))
+        self.turns = np.exp(-1j * self.orders[None, None, :] * view.theta_mid[:, :, None])
+        b, h = len(view), len(self.orders)
+        channels = ["u"] * (b * h * 2)
+        block = [np.repeat(np.arange(b), h * 2)]
+        order = [np.tile(np.repeat(self.orders, 2), b)]
+        part = [np.tile([0, 1], b * h)]
+        span = np.abs(view.theta[:, -1] - view.theta[:, 0])
+        seen = np.abs(self.orders)[None, :] * span[:, None] >= 2 * np.pi * LEAST_TURNS
+        seen[:, 0] = True
+        # Two orders closer than a turn within the block are one functional and must not count twice.
+        kept = self._apart(span)
+        both = np.repeat((seen & kept)[:, :, None], 2, axis=2)
+        both[:, :, 0] &= np.broadcast_to(getattr(view, "d_known", True), (b,))[:, None]
+        ok = [both.ravel()]
+        self.torque_seen = np.isfinite(view.torque).all(axis=1)
+        self.real = {}
+        if view.has_sum:
+            self.real["sum"] = ORDERS_SUM
+        if self.torque_seen.any():
+            self.real["torque"] = (0.0, *torque_orders(view))
+        for channel, orders in self.real.items():
+            n = len(orders)
+            channels += [channel] * (b * n * 2)
+            block.append(np.repeat(np.arange(b), n * 2))
+            order.append(np.tile(np.repeat(orders, 2), b))
+            part.append(np.tile([0, 1], b * n))
+            least = TAPERED_TURNS if channel == "torque" else LEAST_TURNS
+            enough = np.array(orders)[None, :] * span[:, None] >= 2 * np.pi * least
+            both = np.stack([enough, enough], axis=2)
+            both[:, 0] = [True, False]  # a mean is real
+            if channel == "torque":
+                both &= self.torque_seen[:, None, None]
+                per_row = span / view.theta_mid.shape[1]
+                both &= (np.array(orders)[None, :] * per_row[:, None] < RESOLVED)[:, :, None]
+                both[:, 0] &= (view.shaft != "free")[:, None] | loads  # a load of unknown size
+            ok.append(both.ravel())
+        self.block, self.order, self.part = (np.concatenate(x) for x in (block, order, part))
+        self.channel, self.ok = np.array(channels), np.concatenate(ok)
+        self.waves = {
+            channel: np.exp(-1j * np.array(orders)[None, None, :] * view.theta_mid[:, :, None])
+            for channel, orders in self.real.items()
+        }
+        if "torque" in self.waves:  # a taper, since the ends of a second difference are mostly noise
+            m = view.theta_mid.shape[1]
+            self.waves["torque"] *= (1.0 - np.cos(2 * np.pi * (np.arange(m) + 0.5) / m))[None, :, None]
+            # An unknown mean load leaks into other orders, also by aliasing: these see what is left of a line.
+            line = np.stack([np.ones(m), np.linspace(-1.0, 1.0, m)], axis=1)
+            line, _ = np.linalg.qr(line)
+            waves = self.waves["torque"][:, :, 1:]
+            self.waves["torque"][:, :, 1:] = waves - np.matmul(line, np.matmul(line.T, waves))
+
+    def _apart(self, span):
+        """(b, h) orders that differ from every kept smaller one by LEAST_TURNS within the block."""
+        kept = np.zeros((len(span), len(self.orders)), bool)
+        for k, turns in enumerate(span / (2 * np.pi)):
+            chosen = []
+            for n in np.argsort(np.abs(self.orders), kind="stable"):
+                if all(abs(self.orders[n] - c) * turns >= LEAST_TURNS for c in chosen):
+                    chosen.append(self.orders[n])
+                    kept[k, n] = True
+        return kept
+
+    def rows(self, column) -> np.ndarray:
+        """A misfit or column, {channel: array}, as rows (r,); a missing channel is zero."""
+        b = self.turns.shape[0]
+        out = []
+        u = column.get("u")
+        if u is None:
+            out.append(np.zeros(b * len(self.orders) * 2))
+        else:
+            f = np.matmul(u[:, None, :], self.turns)[:, 0, :] / u.shape[1]
+            out.append(np.stack([f.real, f.imag], axis=2).ravel())
+        for channel, orders in self.real.items():
+            x = column.get(channel)
+            if x is None:
+                out.append(np.zeros(b * len(orders) * 2))
+            else:
+                f = np.matmul(x[:, None, :], self.waves[channel])[:, 0, :] / x.shape[1]
+                out.append(np.stack([f.real, f.imag], axis=2).ravel())
+        return np.nan_to_num(np.concatenate(out))
+
+
+def cells_of(view, effects, projector=None, free=None) -> Cells:
+    """Cells of a view with the columns of the effects; free columns have a leading '~'.
+
+    projector: that of a view of the same blocks, or None.  free: names of effects with free columns; None: all.
+    """
+    p = projector or Projector(view)
+    columns = {}
+    for effect in effects:
+        seen = view.shows(effect)[p.block]
+        mine = {key: p.rows(column) * seen for key, column in effect.core(view).items()}
+        if free is None or effect.name in free:
+            mine |= {f"~{key}": p.rows(column) * seen for key, column in effect.free(view).items()}
+        columns[effect.name] = mine
+    return Cells(p.rows(misfit(view)), columns, p.block, p.order, p.part, p.channel, p.ok)
+
+
+def column_of(columns, key) -> str:
+    """Name of a coefficient's column, core or free; "" in a view in which its axis has too little current.
+
+    The data of a solution are corrected for measurement errors, so that a column may exist there but not in the raw
+    data.
+    """
+    return next((k for k in (key, f"~{key}") if k in columns), "")
+
+
+def voltage_level(view):
+    """Magnitude of the mean voltage vector of each block, (b,) [V]."""
+    return np.abs(view.to_dq(view.u[:, 1:-1]).mean(axis=1))
+
+
+def noise(view, cells, residual) -> np.ndarray:
+    """Standard deviation of every row (r,), from the differences of ``residual`` between neighbours in a dwell.
+
+    Neighbours share the operating point, so that their difference is noise whatever the physics.  The variance of
+    each order and part is fitted as a + b omega^2, since current noise enters with L / T and with omega L.
+    """
+    omega = np.abs(view.omega.mean(axis=1))
+    top = max(float(omega.max()), 1e-9)
+    share = omega / top
+    pair = np.flatnonzero(np.diff(view.run) == 0)
+    out = np.full(len(cells.y), np.nan)
+    for channel in np.unique(cells.channel):
+        mine = cells.channel == channel
+        # The torque of a free shaft contains a second difference of the angle: its noise grows with omega^2.
+        shape = np.stack([np.ones(len(view)), share ** (4 if channel == "torque" else 2)], axis=1)
+        for order in np.unique(cells.order[mine]):
+            for part in (0, 1):
+                rows = np.flatnonzero(mine & (cells.order == order) & (cells.part == part))
+                if len(rows):
+                    out[rows] = np.sqrt(_variance(residual[rows], cells.ok[rows], pair, shape))
+    return out
+
+
+def _variance(e, ok, pair, shape):
+    """Variance a + b omega^2 of the blocks from differences of neighbours, or from all values if there are few."""
+    both = pair[ok[pair] & ok[pair + 1]]
+    if len(both) >= 8:
+        squares, where = 0.5 * (e[both + 1] - e[both]) ** 2, 0.5 * (shape[both] + shape[both + 1])
+    else:
+        squares, where = e[ok] ** 2, shape[ok]
+    if not len(squares):
+        return np.full(len(e), 1e-30)
+    squares = np.minimum(squares, 12.0 * np.median(squares) + 1e-30)
+    a, b = squares.mean(), 0.0
+    if len(squares) >= 24:
+        low = where[:, 1] <= np.median(where[:, 1])
+        x0, x1 = where[low, 1].mean(), where[~low, 1].mean() if (~low).any() else where[low, 1].mean()
+        if x1 > x0 + 0.1:
+            v0, v1 = squares[low].mean(), squares[~low].mean()
+            b = max((v1 - v0) / (x1 - x0), 0.0)
+            a = v0 - b * x0
+            if a < 0.05 * squares.mean():
+                a = 0.05 * squares.mean()
+                b = 0.95 * squares.mean() / where[:, 1].mean()
+    return np.maximum(a + b * shape[:, 1], 1e-30)

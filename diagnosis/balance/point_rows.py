@@ -1,0 +1,100 @@
+"""Rows that are operating points, as stretches; rows of a long operating point are averaged.
+
+If most rows of a log resemble a neighbour, the others are transients and are left out.
+
+At standstill the inverter loss depends on the angle of the rotor.  A row with current at an unknown angle is not used.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fluxproof.diagnosis.balance.blocks import view_of
+from fluxproof.diagnosis.balance.slow_stretches import (
+    AT_REST,
+    STANDING,
+    STILL,
+    Stretches,
+    known_angle,
+    known_voltage,
+    operating_columns,
+)
+from fluxproof.diagnosis.recording import RecordingError
+
+MEANS = 64  # number of means of a long operating point, fine enough for its drift
+SAME_SPEED = 0.02  # relative
+NO_LOSS = 0.005  # of rated current: a smaller one has no loss that could be noticed
+STANDSTILL = 1e-3  # of the speed at which the EMF takes the bus voltage
+
+
+def point_rows(recording, nominal) -> Stretches:
+    """The operating points of a recording with one row each; adjacent rows at the same point are joined to means.
+
+    Raises RecordingError if no row can be used.
+    """
+    r, m = recording, nominal.machine
+    i, u, omega, u_dc = operating_columns(recording, nominal)
+    psi = m.inductance_d_h * i.real + m.magnet_flux_wb + 1j * m.inductance_q_h * i.imag
+    nominal_u = m.resistance_ohm * i + 1j * omega * psi
+    u, both_axes = known_voltage(u, nominal_u)
+    good = r.usable & np.isfinite(u) & np.isfinite(nominal_u)
+    at_rest = np.abs(omega) < STANDSTILL * nominal.inverter.dc_bus_v / m.magnet_flux_wb
+    rest = np.where(at_rest, known_angle(recording), np.nan)
+    lost = good & at_rest & ~np.isfinite(rest) & (np.abs(i) > NO_LOSS * m.rated_current_a)
+    good &= ~lost
+    if "time" not in r.lacks:
+        good &= _verified(omega, nominal_u, u, good)
+    if not good.any() or (lost.any() and np.abs(i[good]).max() < NO_LOSS * m.rated_current_a):
+        raise RecordingError(f"{r.source}: no row with current can be used{STANDING if lost.any() else ''}")
+    notes = (f"{int(lost.sum())} rows at standstill are not used{STANDING}",) if lost.any() else ()
+    t = np.zeros(len(r)) if "time" in r.lacks else r["t"] - r["t"][0]
+    temp = r["temp_winding"] if r.has("temp_winding") else np.full(len(t), np.nan)
+    groups = _groups(t, (omega, nominal_u, u), good, float(t[-1]) / MEANS)
+    first, end = np.array([g[0] for g in groups]), np.array([g[-1] + 1 for g in groups])
+    means = [np.array([np.mean(x[g]) for g in groups]) for x in (i, u, omega, u_dc, temp, t)]
+    return Stretches(*means, first, end, np.zeros(len(groups)), rest[first], 0.0, both_axes, notes)
+
+
+def block_points(recording, nominal) -> Stretches:
+    """The steady blocks of a recording with a row per control period, as operating points.
+
+    Raises RecordingError if there is no steady block.
+    """
+    view = view_of(recording, nominal)
+    u, i, omega = view.to_dq(view.u[:, 1:-1]).mean(axis=1), view.i.mean(axis=1), view.omega.mean(axis=1)
+    span = np.abs(view.theta[:, -1] - view.theta[:, 0])
+    rest = np.where(span < AT_REST, view.theta[:, 0], np.nan)
+    first, end, unsteady = view.rows, view.rows + view.u_dc.shape[1], np.zeros(len(view))
+    return Stretches(i, u, omega, view.u_dc.mean(axis=1), view.temp, view.t, first, end, unsteady, rest, 0.0)
+
+
+def _verified(omega, nominal_u, u, good) -> np.ndarray:
+    """(n,) bool: rows that resemble a neighbour, and are thus steady; all rows if most points have one row only."""
+    if np.count_nonzero(good) < 2:
+        return np.ones(len(good), bool)
+    limit = _limit(nominal_u, u, good)
+    step = np.maximum(np.abs(np.diff(nominal_u)), np.abs(np.diff(u)))
+    same = (step < limit) & (np.abs(np.diff(omega)) <= SAME_SPEED * np.abs(omega[1:])) & good[1:] & good[:-1]
+    beside = np.append(same, False) | np.append(False, same)
+    return beside if np.mean(beside[good]) > 0.5 else np.ones(len(good), bool)
+
+
+def _limit(nominal_u, u, good) -> float:
+    """Change of the voltage [V] up to which it is steady."""
+    return STILL * max(float(np.abs(nominal_u[good]).max()), float(np.abs(u[good]).max()), 1e-9)
+
+
+def _groups(t, signals, good, span) -> list[np.ndarray]:
+    """Consecutive rows at one operating point, within ``span`` [s], as arrays of row numbers."""
+    omega, nominal_u, u = signals
+    limit = _limit(nominal_u, u, good)
+    out, begin = [], None
+    for k in np.flatnonzero(good):
+        near = begin is not None and t[k] - t[begin] < span
+        near = near and abs(omega[k] - omega[begin]) <= SAME_SPEED * abs(omega[begin])
+        if near and max(abs(nominal_u[k] - nominal_u[begin]), abs(u[k] - u[begin])) < limit:
+            out[-1].append(k)
+        else:
+            out.append([k])
+            begin = k
+    return [np.array(g) for g in out]

@@ -1,0 +1,29 @@
+"""What found effects change in the data: measurement errors are removed, the flux of the machine is added."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fluxproof.diagnosis.effects.effect import FluxEffect
+
+
+def in_turn(view, effects, totals, show=None):
+    """The view without measurement errors {effect: {coefficient: value}}, corrected one after the other.
+
+    show: the view that decides in which blocks an effect can be seen (default: the view itself).
+    """
+    show = view if show is None else show
+    for name in sorted(totals, key=lambda n: effects[n].corrected_last):
+        view = view.kept_where(~show.shows(effects[name]), effects[name].corrected(view, totals[name]))
+    return view
+
+
+def with_flux(view, effects, c, **changed):
+    """The view with the flux that magnetic effects of coefficients c add and that others, such as iron, remove."""
+    magnetic = [n for n in sorted(c) if isinstance(effects[n], FluxEffect)]
+    psi = sum((effects[n].psi(view, c[n]) for n in magnetic), np.zeros_like(view.i))
+    more = np.array([effects[n].delta_l(c[n]) for n in magnetic] or [(0.0, 0.0)]).sum(axis=0)
+    least = -0.7 * np.array([view.machine.inductance_d_h, view.machine.inductance_q_h])
+    view = view.replace(psi_extra=psi, delta_l=tuple(np.maximum(more, least)), **changed)
+    lost = [effects[n].lost_flux(view, c[n]) for n in sorted(c) if effects[n].takes_flux]
+    return view.replace(psi_extra=psi + sum(lost)) if lost else view

@@ -1,0 +1,254 @@
+"""Assigns file columns to canonical columns and units: by drive.toml first, then by known names.
+
+A column that the file lacks may be a constant of drive.toml (constants.py).
+
+[columns] of drive.toml maps a name of the file to a canonical name, as a string or as a table:
+
+    [columns]
+    "Motor current U" = "i_a"                                     # unit from the header, else SI
+    "I_V"             = {name = "i_b", unit = "mA"}
+    "I_W"             = {name = "i_c", factor = 0.001, offset = 0.2}   # canonical = raw * factor + offset
+    "n"               = {name = "omega_e", unit = "rpm"}          # of the shaft: times the pole pairs
+    "Spare"           = ""                                        # ignored
+
+A column without a header is called by its number, "1", "2", ...  Columns that [columns] does not name are found by the
+exact canonical names, then by the maps in column_maps/.  Units are those of units.py; a shaft angle is "rad mech", a
+shaft speed "rpm" or "rad/s mech".
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+import re
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from fluxproof.diagnosis.column_maps import maps, plain
+from fluxproof.diagnosis.ingest.demand import LINE_VOLTAGES, PHASE_VOLTAGES, is_emf_run, missing_columns
+from fluxproof.diagnosis.ingest.stated import constants_of
+from fluxproof.diagnosis.ingest.units import conversion, known_units, split_unit
+from fluxproof.diagnosis.readers.table import Table, shown
+from fluxproof.diagnosis.recording import COLUMNS, RecordingError
+
+KEYS = {"name", "unit", "factor", "offset"}
+
+
+@dataclass(frozen=True)
+class Source:
+    """Source of a canonical column: value = raw * factor + offset; ``stated``: the unit was given explicitly."""
+
+    column: str
+    factor: float = 1.0
+    offset: float = 0.0
+    unit: str = ""
+    stated: bool = False
+
+
+@dataclass
+class Plan:
+    """{canonical name: Source}, constants for columns that a log lacks, and notes on assumptions.
+
+    A constant of drive.toml replaces one that a ready-made map assumes.
+    """
+
+    sources: dict[str, Source] = field(default_factory=dict)
+    assumed: dict[str, float] = field(default_factory=dict)
+    used: str = "canonical names"
+    sample_time_s: float | None = None
+    run: str | None = None
+    stated: list[str] = field(default_factory=list)  # names that [constants] gives
+    notes: list[str] = field(default_factory=list)
+
+    def wanted(self) -> list[str]:
+        """The file columns to read."""
+        names = [s.column for s in self.sources.values()] + ([self.run] if self.run else [])
+        return list(dict.fromkeys(names))
+
+
+def plan_columns(names: dict[str, str], nominal, path) -> Plan:
+    """The plan for a file with columns ``names`` {name: unit or ""}; RecordingError lists missing columns.
+
+    nominal: Nominal; its ``columns`` and ``machine.pole_pairs`` are used.
+    """
+    plan, taken = _explicit(names, nominal, path)
+    left = {name: unit for name, unit in names.items() if name not in taken}
+    _exact(plan, left, nominal, path)
+    _ready_made(plan, left, nominal, path)
+    constants = constants_of(nominal)
+    for name in [name for name in constants if name in plan.sources]:
+        plan.notes.append(f"[constants] {name} is not used: the recording has this column")
+        del constants[name]
+    plan.assumed |= constants
+    plan.stated = list(constants)
+    if not is_emf_run(set(plan.sources) | set(plan.assumed)):  # the commanded voltages are used
+        for name in (*PHASE_VOLTAGES, *LINE_VOLTAGES):
+            plan.sources.pop(name, None)
+    _demand(plan, names, path)
+    return plan
+
+
+def canonical(table: Table, plan: Plan) -> dict[str, np.ndarray]:
+    """The canonical arrays (n,) of a table, converted; columns without numbers are omitted."""
+    arrays = {}
+    for name, source in plan.sources.items():
+        raw = table.columns.get(source.column)
+        if raw is not None:
+            arrays[name] = (
+                raw if source.factor == 1.0 and not source.offset else raw * source.factor + source.offset
+            )
+    return arrays
+
+
+def _explicit(names, nominal, path) -> tuple[Plan, set[str]]:
+    """The plan of [columns], and the file columns that it uses or ignores."""
+    plan, taken = Plan(), set()
+    entries = {key: _entry(key, value, nominal) for key, value in nominal.columns.items()}
+    bare = {}
+    for name in names:
+        bare.setdefault(split_unit(name)[0], name)
+    found = {key: key if key in names else bare.get(key) for key in entries}
+    if not any(found.values()):
+        if entries:
+            plan.notes.append("none of the columns named in [columns] is in the file; [columns] was ignored")
+        return plan, taken
+    for key, entry in entries.items():
+        where = f"{nominal.path}: [columns] {shown(key)!r}"
+        if found[key] is None:
+            raise RecordingError(f"{where} is not a column of {path}{_nearest(key, names)}")
+        taken.add(found[key])
+        if not entry["name"]:
+            continue
+        if entry["name"] in plan.sources:
+            raise RecordingError(
+                f"{where}: {entry['name']} is already assigned to {plan.sources[entry['name']].column!r}"
+            )
+        unit = entry.get("unit", "")
+        if "factor" in entry or "offset" in entry:
+            source = Source(found[key], entry.get("factor", 1.0), entry.get("offset", 0.0), "", True)
+        else:
+            source = _source(found[key], entry["name"], unit or _unit_of(found[key], names), nominal, where)
+        plan.sources[entry["name"]] = source
+        plan.used = "[columns]"
+    return plan, taken
+
+
+def _entry(key, value, nominal) -> dict:
+    """One line of [columns] as a validated table."""
+    where = f"{nominal.path}: [columns] {shown(key)!r}"
+    entry = {"name": value} if isinstance(value, str) else value
+    if not isinstance(entry, dict) or not isinstance(entry.get("name"), str):
+        raise RecordingError(
+            f"{where}: must be a canonical name or a table such as {{name = 'i_a', unit = 'mA'}}"
+        )
+    if entry["name"] and entry["name"] not in COLUMNS:
+        raise RecordingError(
+            f"{where}: {shown(entry['name'])!r} is not a canonical name{_nearest(entry['name'], COLUMNS)}"
+        )
+    for name in entry:
+        if name not in KEYS:
+            raise RecordingError(
+                f"{where}: unknown key {shown(name)!r}; known are name, unit, factor, offset"
+            )
+    for name in ("factor", "offset"):
+        number = entry.get(name, 1.0)
+        if isinstance(number, bool) or not isinstance(number, (int, float)) or not math.isfinite(number):
+            raise RecordingError(f"{where}: {name} must be a finite number")
+    if entry.get("factor") == 0:
+        raise RecordingError(f"{where}: factor must not be 0")
+    if not isinstance(entry.get("unit", ""), str) or (
+        "unit" in entry and ("factor" in entry or "offset" in entry)
+    ):
+        raise RecordingError(f"{where}: give either unit, as a string, or factor and offset")
+    return entry
+
+
+def _source(column, name, unit, nominal, where) -> Source:
+    """The source of a canonical column in a unit; no unit: SI."""
+    if not unit:
+        return Source(column)
+    found = conversion(name, unit, nominal.machine.pole_pairs)
+    if found is None:
+        raise RecordingError(
+            f"{where}: unit {shown(unit)!r} is unknown for {name}; known are {known_units(name)}"
+        )
+    return Source(column, *found, unit, True)
+
+
+def _unit_of(column, names) -> str:
+    """The unit of a column in the file: from its header or from a field of the format."""
+    return names.get(column, "").strip() or split_unit(column)[1]
+
+
+def _exact(plan, left, nominal, path) -> None:
+    """Assign columns with canonical names, with or without a unit."""
+    for column in left:
+        name = split_unit(column)[0]
+        if name in COLUMNS and name not in plan.sources:
+            unit = _unit_of(column, left)
+            plan.sources[name] = _source(column, name, unit, nominal, f"{path}: column {shown(column)!r}")
+
+
+def _ready_made(plan, left, nominal, path) -> None:
+    """Fill missing columns from the ready-made map that knows most of the file's columns."""
+    best, hits = None, {}
+    for known in maps():
+        key = getattr(known, "KEY", plain)
+        keys: dict[str, list[str]] = {}
+        for column in left:
+            keys.setdefault(key(split_unit(column)[0]), []).append(column)
+        if known.SIGNATURE <= set(keys):
+            fits = {
+                k: c
+                for k, c in keys.items()
+                if k in known.COLUMNS and known.COLUMNS[k][0] not in plan.sources
+            }
+            if (len(known.SIGNATURE), len(fits)) > (len(best.SIGNATURE), len(hits)) if best else fits:
+                best, hits = known, fits
+    if best is None or not hits:
+        return
+    for key, columns in hits.items():
+        name, unit = best.COLUMNS[key]
+        if len(columns) > 1:
+            raise RecordingError(
+                f"{path}: {shown(columns[0])!r} and {shown(columns[1])!r} could both be {name}; say which in [columns]"
+            )
+        if name not in plan.sources:
+            stated = _unit_of(columns[0], left) or unit
+            plan.sources[name] = _source(
+                columns[0], name, stated, nominal, f"{path}: column {shown(columns[0])!r}"
+            )
+    if not best.SIGNATURE:
+        return
+    plan.used = f"{plan.used}, {best.NAME}" if plan.used == "[columns]" else best.NAME
+    plan.notes += [f"column names as in {best.NAME}", *getattr(best, "NOTES", [])]
+    plan.assumed |= {k: v for k, v in getattr(best, "ASSUMED", {}).items() if k not in plan.sources}
+    plan.sample_time_s = getattr(best, "SAMPLE_TIME_S", None)
+    plan.run = next((c for c in left if c == getattr(best, "RUN", None)), None)
+
+
+def _demand(plan, names, path) -> None:
+    """Check the columns that a balance requires; RecordingError lists the missing and the present ones."""
+    missing = missing_columns(set(plan.sources) | set(plan.assumed))
+    if missing:
+        found = ", ".join(shown(name, 24) for name in list(names)[:16]) + (", ..." if len(names) > 16 else "")
+        why = f" ({plan.notes[-1]})" if plan.notes else ""
+        raise RecordingError(
+            f"{path}: missing {' and '.join(missing)}; found columns {found or 'none'}{_guesses(missing, names)}; "
+            f"name them in [columns] of drive.toml, or give a value that was constant in [constants]{why}"
+        )
+
+
+def _guesses(missing, names) -> str:
+    """File columns that may be the missing ones."""
+    wanted = [w for w in COLUMNS if any(w in re.findall(r"\w+", text) for text in missing)]
+    simple = {name.lower().replace("_", ""): name for name in names if split_unit(name)[0] not in COLUMNS}
+    close = {w: difflib.get_close_matches(w.replace("_", ""), list(simple), n=1, cutoff=0.6) for w in wanted}
+    pairs = [f"{shown(simple[match[0]], 24)!r} for {w}" for w, match in close.items() if match][:3]
+    return f"; perhaps {', '.join(pairs)}" if pairs else ""
+
+
+def _nearest(name, known) -> str:
+    close = difflib.get_close_matches(name, list(known), n=1, cutoff=0.0)
+    return f"; the nearest is {shown(close[0])!r}" if close else ""

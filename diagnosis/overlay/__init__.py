@@ -1,0 +1,1 @@
+"""The drive as described and the improved one, simulated in closed loop over the recording (compare.py)."""
