@@ -18,7 +18,10 @@ from fluxproof.diagnosis.balance.cells import voltage_level
 from fluxproof.diagnosis.balance.slow_view import slow_view
 from fluxproof.diagnosis.balance.view import joined_views
 from fluxproof.diagnosis.catalogue import CATALOGUE
+from fluxproof.diagnosis.conventions.judge import preferred
+from fluxproof.diagnosis.conventions.tell import under
 from fluxproof.diagnosis.inference import constants as k
+from fluxproof.diagnosis.inference.posterior import Posterior
 from fluxproof.diagnosis.inference.problem import Setup, fit_of_set
 from fluxproof.diagnosis.inference.slow_search import SlowSearch, most_effects
 from fluxproof.diagnosis.one_point import diagnose_one_point
@@ -33,7 +36,15 @@ def diagnose_slow(recordings, nominal, progress=lambda text: None) -> Diagnosis:
 
     Raises RecordingError if they contain no steady operating point.
     """
-    return diagnose_points(joined_views([slow_view(r, nominal) for r in recordings]), progress)
+    view = joined_views([slow_view(r, nominal) for r in recordings])
+    answer = diagnose_points(view, progress)
+    if answer.verdict == "no_mismatch" or len(np.unique(view.run)) == 1:
+        return answer
+    posterior = Posterior(Setup(view, view.visible(CATALOGUE), ~held_points(view)), progress)
+    readings, rivals, _ = preferred(recordings, posterior, answer.verdict != "unexplained", progress)
+    for reading in readings:
+        view = reading.of_view(view)
+    return under(readings, rivals, answer, diagnose_points(view, progress)) if readings else answer
 
 
 def held_points(view) -> np.ndarray:

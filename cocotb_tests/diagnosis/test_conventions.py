@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 
 from cocotb_tests.core.test_registers import PAPER
 from cocotb_tests.support.diagnosed_drives import recorded
-from cocotb_tests.support.mistakes import MISTAKES, ROOT2, Mistake, scaled, written
+from cocotb_tests.support.mistakes import MISTAKES, ROOT2, Mistake, scaled, table_of, written
 from fluxproof.diagnosis import diagnose
 from fluxproof.diagnosis.conventions.table import READINGS, readings_for
 from fluxproof.diagnosis.nominal import load_nominal
@@ -17,6 +19,8 @@ GIVEN_BACK = (
     "currents in rms", "dq voltages line to line", "angle of the q axis", "bus at half", "R, L and psi line to line",
     "L in mH", "half the pole pairs, angle of the shaft", "sample time half", "R and L line to line, currents in rms",
 )  # fmt: skip
+
+IN_TABLES = ("dq currents in rms", "dq voltages line to line", "R and L line to line", "psi in rms", "L in mH")
 
 
 def told(answer) -> set[str]:
@@ -62,6 +66,15 @@ def test_an_effect_behind_a_mistake_is_named_with_its_size(name, tmp_path):
     assert [e.name for e in answer.effects] == ["magnet_flux"], answer.sentence
     found = answer.effects[0].parameters["magnet_flux_wb"]
     assert found.value == pytest.approx(0.15675, rel=0.005)
+
+
+@pytest.mark.parametrize("name", IN_TABLES)
+def test_a_mistake_is_told_from_operating_points(name, tmp_path):
+    mistake = dataclasses.replace(MISTAKES[name], dq=True)
+    recording, drive = written(mistake, tmp_path)
+    answer = diagnose(table_of(recording, tmp_path / "points.csv"), drive)
+    assert answer.verdict == "explained" and mistake.found in told(answer), answer.sentence
+    assert not answer.effects and len(answer.conventions) == 1
 
 
 @pytest.mark.parametrize("gain", [0.9, 0.74, 0.68])

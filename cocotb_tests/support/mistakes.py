@@ -14,7 +14,7 @@ import pandas as pd
 import tomlkit
 
 from cocotb_tests.core.test_registers import PAPER
-from cocotb_tests.support.diagnosed_drives import DRIVE, GRID, columns
+from cocotb_tests.support.diagnosed_drives import DRIVE, DWELL, GRID, RAMP, columns
 
 PHASES = ("i_a", "i_b", "i_c")
 DUTIES = ("d_a", "d_b", "d_c")
@@ -153,3 +153,11 @@ def written(mistake, folder, deviations=None):
         document[section][key] = int(value) if key == "pole_pairs" else value
     drive.write_text(tomlkit.dumps(document))
     return recording, drive
+
+
+def table_of(recording, path):
+    """A table with one row for each operating point of a written dq log, without a time."""
+    log, rows = pd.read_parquet(recording), RAMP + DWELL
+    points = [log.iloc[k * rows + RAMP + 250 : (k + 1) * rows - 20].mean() for k in range(len(GRID))]
+    pd.DataFrame(points)[["i_d", "i_q", "u_d_ref", "u_q_ref", "omega_e", "u_dc"]].to_csv(path, index=False)
+    return path

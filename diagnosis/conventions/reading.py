@@ -36,7 +36,7 @@ class Reading:
             return False
         if self.bus != 1.0 and not all(r.has("u_dc") for r in recordings):
             return False
-        if self.turn and not all(r.has("theta_e") for r in recordings):
+        if self.turn and not (logs_dq or all(r.has("theta_e") for r in recordings)):
             return False
         return not any("inverter" in r.lacks for r in recordings)  # an EMF run measures voltages of its own
 

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from fluxproof.diagnosis.answer.headline import sentence
+from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.conventions.reading import Reading
 from fluxproof.diagnosis.inference import constants as k
 from fluxproof.diagnosis.result import Diagnosis
+from fluxproof.diagnosis.suspects import SUSPECTS
 
 OF_THE_REST = ("after", "noise", "spectrum_after", "angle_after")  # arrays of the evidence in true volts
 
@@ -16,7 +18,6 @@ def under(readings: tuple[Reading, ...], rivals: list[Reading], documented: Diag
     Voltages are those of the recording: where the bus is recorded at half, the rest is told in recorded volts.
     rivals: readings that fit as well as the only one.  documented: the answer without readings, for the misfit before.
     """
-    effects = answer.search.setup.effects
     volts = 1.0
     for reading in readings:
         volts *= reading.volts
@@ -42,7 +43,7 @@ def under(readings: tuple[Reading, ...], rivals: list[Reading], documented: Diag
         answer.verdict = "explained"
     elif answer.verdict == "unexplained" and answer.remainder and answer.explained_share >= k.HALF:
         answer.verdict = "partly_explained"
-    answer.sentence = sentence(answer, effects)
+    answer.sentence = sentence(answer, {**CATALOGUE, **SUSPECTS})
     return answer
 
 
@@ -51,9 +52,8 @@ def restate(answer: Diagnosis, loaded) -> None:
     restated = loaded[0].meta.get("restated")
     if restated is None or answer.verdict == "bad_recording":
         return
-    effects = answer.search.setup.effects if answer.search is not None else {}
     answer.readings = (restated, *answer.readings)
     answer.conventions = [restated.told(), *answer.conventions]
     if answer.verdict == "no_mismatch":
         answer.verdict = "explained"
-    answer.sentence = sentence(answer, effects)
+    answer.sentence = sentence(answer, {**CATALOGUE, **SUSPECTS})
