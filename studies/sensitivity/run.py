@@ -15,6 +15,8 @@ OF_THE_ANSWER = (
 )  # fmt: skip
 # Read by the search of slow logs alone, of which the cases contain none.
 OF_SLOW_LOGS = ("SLOW_DC", "SLOW_U", "SLOW_CHANGE", "LEFTOVER", "FLOOR_SHARE", "NAMED_SHARE")
+# Read for one channel of the balance alone: without it, the answer cannot change.
+OF_A_CHANNEL = {"BALANCE_SUM": "sum", "BALANCE_TORQUE": "torque", "ALWAYS_LOADED": "torque"}
 
 
 def names() -> list[str]:
@@ -50,10 +52,11 @@ def variations(chosen) -> list[tuple[str, float]]:
 def answers_of(job) -> tuple[str, dict]:
     """(case, {"base": said, "NAME x2": said, ...}) of (folder, constants); {} if the case has no fast recording."""
     from fluxproof.diagnosis.answer.conclude import conclude
+    from fluxproof.diagnosis.balance.blocks import views_of
     from fluxproof.diagnosis.balance.parts import sound
     from fluxproof.diagnosis.ingest.load import load_recording
     from fluxproof.diagnosis.nominal import load_nominal
-    from fluxproof.diagnosis.physics import explain, posterior_of
+    from fluxproof.diagnosis.physics import explain, held_out
 
     folder, chosen = Path(job[0]), job[1]
     nominal = load_nominal(folder / "drive.toml")
@@ -62,9 +65,13 @@ def answers_of(job) -> tuple[str, dict]:
     loaded = sound([recording], nominal)
     if any(r.slow or r.fatal for r in loaded):
         return folder.name, {}
-    posterior, held = posterior_of(loaded, nominal)
-    out = {"base": said(conclude(posterior, held))}
+    answer, held = explain(loaded, nominal), held_out(views_of(loaded, nominal))
+    posterior, out = answer.search, {"base": said(answer)}
+    channels = {channel for channel, _, _ in posterior.best().problem.p.groups}
     for name, factor in variations(chosen):
+        if OF_A_CHANNEL.get(name, "u") not in channels:
+            out[f"{name} x{factor:g}"] = out["base"]
+            continue
         with varied(name, factor):
             again = conclude(posterior, held) if name in OF_THE_ANSWER else explain(loaded, nominal)
         out[f"{name} x{factor:g}"] = said(again)
