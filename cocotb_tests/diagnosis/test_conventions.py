@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cocotb_tests.core.test_registers import PAPER
-from cocotb_tests.support.diagnosed_drives import recorded
+from cocotb_tests.support.diagnosed_drives import POINT, recorded
 from cocotb_tests.support.mistakes import MISTAKES, ROOT2, Mistake, scaled, table_of, written
 from fluxproof.diagnosis import diagnose
 from fluxproof.diagnosis.conventions.table import READINGS, readings_for
@@ -82,6 +82,12 @@ def test_a_gain_error_near_a_convention_is_a_gain_error(gain, tmp_path):
     answer = diagnose(*written(Mistake("", scaled(("i_a", "i_b", "i_c"), gain)), tmp_path))
     assert not answer.conventions, answer.sentence
     assert "current_scale" in {e.name for e in answer.effects} | {n for g in answer.ambiguity for n in g}
+
+
+def test_one_operating_point_tells_no_convention():
+    """A machine that is 40 % off is no line-to-line value: one point cannot know."""
+    answer = diagnose(recorded(POINT, machine={"resistance_ohm": 0.75, "magnet_flux_wb": 0.15}), load_nominal(PAPER))
+    assert not answer.conventions
 
 
 def test_a_healthy_recording_has_no_convention():

@@ -28,6 +28,7 @@ from fluxproof.diagnosis.inference.problem import Problem, Setup
 WIDE = 6  # readings to which a second one is added
 SEARCHED = 2  # readings, or pairs of them, that are judged with the whole search
 ONE_EFFECT = 7.0  # log evidence that any effect costs: prior odds of 1 to 19, and the width of its prior
+LEAST_POINTS = 3  # operating points: at fewer some reading meets any constant misfit
 SAME = 1e-6  # of the balance: readings that leave the same
 KEYS = ("resistance_ohm", "inductance_d_h", "inductance_q_h", "magnet_flux_wb")
 
@@ -49,6 +50,8 @@ def preferred(recordings, posterior, explained, progress=lambda text: None):
     same balance; posterior: of the effects as documented; explained: whether these explain the misfit.
     """
     setup, known = posterior.setup, posterior.best().value
+    if len(np.unique(setup.points)) < LEAST_POINTS:
+        return (), [], posterior
     most = len(posterior.best().names) if explained else np.inf
     able = [r for r in readings_for(setup.view.nominal) if r.possible(recordings)]
     able = [r for r in able if all(getattr(setup.view.machine, key) for key in r.machine)]
