@@ -10,6 +10,7 @@ WIDTHS = (0.02, 0.12)  # of rated current: where the loss of the core has reache
 KNOTS = (0.0, 0.005, 0.02, 0.05, 0.12)  # of rated current: ends of the bumps of the free curve
 STILL_GROWS = (0.12, 0.3)  # of rated current: growth beyond this range counts as resistance
 RIPPLE = 1 / 32  # of u_dc T / L: a quarter of the largest current ripple
+TAILS = {"log": -np.log(KNOTS[-1]), "fade": 1.0 - KNOTS[-1]}  # of device_tails at rated current
 CLAMPED = 0.1  # uncertainty, as a share of the loss, while ripple decides which diode conducts
 
 
@@ -57,8 +58,8 @@ def device_tails(view):
 
 
 def full_loss(c) -> float:
-    """Full voltage loss [V] of coefficients c; the bumps only shape the curve near zero current."""
-    return float(sum(v for key, v in c.items() if key.startswith(("v_", "growth", "drop"))))
+    """Voltage loss at rated current [V] of coefficients c; the bumps only shape the curve near zero current."""
+    return float(sum(v * TAILS.get(key, key.startswith(("v_", "growth", "drop"))) for key, v in c.items()))
 
 
 class DeadTime(Effect):
@@ -103,7 +104,7 @@ class DeadTime(Effect):
 
     def estimates(self, c, covariance, nominal):
         at_full = _at_full(c)
-        # A loss that still grows towards rated current has not reached its full value.
+        # A loss that still grows towards rated current may belong to a resistance.
         spread = float(np.hypot(np.sqrt(max(at_full @ covariance @ at_full, 0.0)), c.get("growth", 0.0)))
         return {"v_dead_v": Estimate(full_loss(c), spread, "V")}
 
