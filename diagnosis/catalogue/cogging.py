@@ -19,22 +19,23 @@ def _seen(view, h):
     return np.where((view.shaft == "torque")[:, None], moved, difference)
 
 
-def _waves(view, h):
+def _waves(view, n):
+    """Columns of order n per mechanical turn."""
+    h = n / view.machine.pole_pairs
     seen = _seen(view, h)
     return {
-        f"h{h}_cos": {"torque": seen * np.cos(h * view.theta_mid)},
-        f"h{h}_sin": {"torque": seen * np.sin(h * view.theta_mid)},
+        f"n{n}_cos": {"torque": seen * np.cos(h * view.theta_mid)},
+        f"n{n}_sin": {"torque": seen * np.sin(h * view.theta_mid)},
     }
 
 
 class Cogging(Effect):
     def core(self, view):
-        h = repeating_order(view)
-        return {**_waves(view, h), **_waves(view, 2 * h)}
+        n = repeating_order(view)
+        return {**_waves(view, n), **_waves(view, 2 * n)}
 
     def free(self, view):
-        h = repeating_order(view)
-        return _waves(view, 3 * h)
+        return _waves(view, 3 * repeating_order(view))
 
     def floor(self, nominal):
         return 0.006 * rated_torque(nominal)
@@ -47,18 +48,17 @@ class Cogging(Effect):
 
     @staticmethod
     def _orders(c):
-        """{order: (amplitude, phase)} per electrical turn, T = a sin(h theta + phi)."""
+        """{order: (amplitude, phase)} per mechanical turn, T = a sin(n theta_m + phi)."""
         orders = sorted({int(name[1 : name.index("_")]) for name in c})
-        pairs = {h: (c[f"h{h}_cos"], c[f"h{h}_sin"]) for h in orders}
-        return {h: (float(np.hypot(a, b)), float(np.arctan2(a, b))) for h, (a, b) in pairs.items()}
+        pairs = {n: (c[f"n{n}_cos"], c[f"n{n}_sin"]) for n in orders}
+        return {n: (float(np.hypot(a, b)), float(np.arctan2(a, b))) for n, (a, b) in pairs.items()}
 
     def estimates(self, c, covariance, nominal):
         sizes = self._orders(c)
-        h = max(sizes, key=lambda k: sizes[k][0])
-        k = list(c).index(f"h{h}_cos")
+        n = max(sizes, key=lambda n: sizes[n][0])
+        k = list(c).index(f"n{n}_cos")
         spread = float(np.sqrt(0.5 * (covariance[k, k] + covariance[k + 1, k + 1])))
-        order = Estimate(float(h * nominal.machine.pole_pairs), 0.0, "per turn")
-        return {"cogging_nm": Estimate(sizes[h][0], spread, "Nm"), "cogging_order": order}
+        return {"cogging_nm": Estimate(sizes[n][0], spread, "Nm"), "cogging_order": Estimate(float(n), 0.0, "per turn")}
 
     def given(self, view, plant):
         m = plant.machine
@@ -70,11 +70,11 @@ class Cogging(Effect):
 
     def plant(self, c, nominal):
         sizes = self._orders(c)
-        h = max(sizes, key=lambda k: sizes[k][0])
+        n = max(sizes, key=lambda n: sizes[n][0])
         return {
-            "machine.cogging_amplitude_nm": sizes[h][0],
-            "machine.cogging_order": int(h * nominal.machine.pole_pairs),
-            "machine.cogging_phase_rad": sizes[h][1],
+            "machine.cogging_amplitude_nm": sizes[n][0],
+            "machine.cogging_order": n,
+            "machine.cogging_phase_rad": sizes[n][1],
         }
 
 
@@ -82,7 +82,7 @@ EFFECT = Cogging(
     name="cogging",
     title="cogging torque",
     equation="T = T_airgap + a sin(n theta_m + phi), n a multiple of slots and poles",
-    signature="torque and speed at even orders per electrical turn, present without current",
+    signature="torque and speed at whole orders per mechanical turn, present without current",
     confounders=("emf_harmonics", "current_offset"),
     separated_by="a slow turn without current",
     parameters=(
