@@ -84,7 +84,8 @@ def _top_speed(drive, points):
 def _plan(rng, drive, names, stratum):
     points = _points(rng, drive)
     top = _top_speed(drive, points)
-    free = bool(rng.random() < 0.35) and not set(names) & NEED_D_CURRENT
+    # Of a free shaft the load is known, and its inertia hides a torque ripple.
+    free = bool(rng.random() < 0.35) and not set(names) & (NEED_D_CURRENT | {"cogging"})
     if free:
         rated = 1.5 * drive.pole_pairs * drive.psi * drive.current
         speeds = rng.permutation([0.12, -0.15, 0.45, -0.5, 0.85, -0.8, 0.65][: int(rng.integers(5, 8))])
