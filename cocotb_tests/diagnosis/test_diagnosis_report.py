@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import math
 import re
@@ -44,6 +45,15 @@ def written(tmp_path_factory):
 
 def json_of(folder) -> dict:
     return json.loads((folder / "diagnosis.json").read_text(), parse_constant=pytest.fail)
+
+
+def test_conventions_are_a_table_with_their_rivals(tmp_path):
+    told = result.Convention("currents_rms", "i", 0.7071, "the currents are <rms> values", ["currents_half"])
+    answer = dataclasses.replace(made_up()["explained"], conventions=[told])
+    write_outputs(answer, tmp_path)
+    html = html_of(tmp_path)
+    assert 'id="conventions"' in html and "&lt;rms&gt;" in html and "currents_half" in html and "0.7071" in html
+    assert json_of(tmp_path)["conventions"][0]["code"] == "currents_rms" and not failures(json_of(tmp_path))
 
 
 def test_schema_is_one_and_describes_every_field():

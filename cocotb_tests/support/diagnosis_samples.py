@@ -168,7 +168,6 @@ def made_up() -> dict[str, Diagnosis]:
             **found | dict(fit=unexplained),
             explained_share=0.88,
             remainder=[result.Remainder("u_dq", 2.0, 0.41, "V", 0.12)],
-            conventions=[result.Convention("currents_rms", "i", 0.7071, "the currents are rms values", ["other"])],
             unknown_term=UNKNOWN,
         ),
         "unexplained": Diagnosis(

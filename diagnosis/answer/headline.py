@@ -82,7 +82,8 @@ def _named(answer, effects, brackets=False) -> list[str]:
     first = [c.says for c in answer.conventions]
     listed = lambda texts: joined([*first, *texts]) if brackets else "; ".join([*first, *texts])  # noqa: E731
     titles = [title_of(e.name, effects) for e in answer.effects]
-    few = [*titles[:2], f"{len(titles) - 2} more effects"] if len(titles) > 3 else titles
+    shown = max(2 - len(first), 0)
+    few = [*titles[:shown], f"{len(titles) - shown} more effects"] if len(titles) > 3 else titles
     sized = [listed([said(e, effects, most, brackets) for e in answer.effects]) for most in (None, 1)]
     return [*sized, joined([*first, *titles]), joined([*first, *few])]
 
