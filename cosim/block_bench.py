@@ -92,19 +92,21 @@ async def equals_model(dut):
 
     for handle in inputs.values():
         handle.value = 0
-    dut.rst.value = 1
-    if not block.clocked:
+    if block.strobes:
+        dut.rst.value = 1
+    strobes = block.strobes and not block.clocked
+    if strobes:
         dut.in_valid.value = 0
     ClockDriver(dut.clk, CLOCK_NS, unit="ns").start()
     await FallingEdge(dut.clk)
     await FallingEdge(dut.clk)
 
-    announced = [] if block.clocked else [dut.out_valid, dut.out_soon] if block.soon else [dut.out_valid]
+    announced = ([dut.out_valid, dut.out_soon] if block.soon else [dut.out_valid]) if strobes else []
     silence, chosen = Silence(announced), eventful(block, clocks)
     compared, in_valid, rst, held = 0, 0, 1, None
     for number, following in zip(chosen, [*chosen[1:], len(clocks)], strict=True):
         clock = clocks[number]
-        if not block.clocked and number > 2:
+        if strobes and number > 2:
             valid = read(dut.out_valid, False)
             if valid != clock.out_valid:
                 wrong = [("out_valid", valid, clock.out_valid)]
@@ -133,10 +135,10 @@ async def equals_model(dut):
             compared += 1
         for name, value in clock.writes.items():
             inputs[name].value = value
-        if clock.rst != rst:
+        if clock.rst != rst and block.strobes:
             rst = clock.rst
             dut.rst.value = rst
-        if not block.clocked and clock.in_valid != in_valid:
+        if strobes and clock.in_valid != in_valid:
             in_valid = clock.in_valid
             dut.in_valid.value = in_valid
         if moved := await silence.keep(dut.clk, following - number):

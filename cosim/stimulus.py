@@ -116,7 +116,7 @@ def schedule(block: Block, config: dict[str, int], seed: int) -> list[Clock]:
         elif rng.integers(4) == 0:
             start += int(rng.integers(1, 2 * block.latency))
         pad_to(start)
-        if index and rng.integers(60) == 0:
+        if index and block.strobes and rng.integers(60) == 0:
             # A reset somewhere behind the last sample: what is in flight must never come out.
             pad_to(max(len(clocks), last + int(rng.integers(1, block.latency + 2))))
             # Half the time with a sample on the same edge, which must be lost.

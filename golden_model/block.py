@@ -13,6 +13,7 @@ The contract of every block, in the model and in the RTL:
 * ``rst`` is synchronous and active high.  It empties the pipeline and sets the state to ``state``;
   the outputs are undefined after it and must not be read without ``out_valid``.
 * A clocked block (``clocked=True``) has no strobes: each clock is a sample, the latency is one.
+* A cell (``strobes=False``) has neither strobes nor a reset: its pipeline never stops, each clock is a sample.
 
 ``reference`` and ``bound`` take the values as real numbers and the state as the integers before the
 sample.  The bound is therefore the error of one sample, derived from the formats alone.
@@ -87,6 +88,7 @@ class Block:
     state: Any = None
     interval: int = 1
     clocked: bool = False
+    strobes: bool = True  # False: a cell of common/, without reset
     atomic: bool = False  # outputs change with out_valid only
     soon: tuple[str, ...] = ()  # outputs that are valid with out_soon
     ahead: int = 1  # clocks that out_soon comes before out_valid

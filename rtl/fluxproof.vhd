@@ -251,7 +251,7 @@ architecture rtl of fluxproof is
   signal model_ab_valid       : std_logic;
   signal factor_valid         : std_logic;
   signal delta_valid          : std_logic;
-  signal loss_valid           : std_logic;
+  signal merge_valid          : std_logic;
   signal clear_faults         : std_logic;
   signal u_comp_alpha         : signed(PU_W - 1 downto 0);
   signal u_comp_beta          : signed(PU_W - 1 downto 0);
@@ -812,7 +812,7 @@ begin
       omega_0         => omega_0,
       xi              => xi,
       t_s             => t_s,
-      out_valid       => open,
+      out_valid       => merge_valid,
       lambda_m_alpha  => lambda_m_alpha,
       lambda_m_beta   => lambda_m_beta,
       merge_known     => merge_known,
@@ -911,7 +911,7 @@ begin
       v_comp_max      => v_comp_max,
       i_learn         => i_learn,
       compensate      => compensate,
-      out_valid       => loss_valid,
+      out_valid       => open,
       v_dead          => v_dead,
       v_comp          => v_comp,
       v_leg           => v_leg,
@@ -962,7 +962,7 @@ begin
     port map (
       clk                  => clk,
       rst                  => rst,
-      in_valid             => loss_valid,
+      in_valid             => merge_valid,
       current_at_rail      => current_at_rail,
       u_dc_at_rail         => u_dc_at_rail,
       u_dc_low             => u_dc_low,

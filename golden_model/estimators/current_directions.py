@@ -21,6 +21,7 @@ range; products with k_sign rounded half up.  All other operations are exact.
 import math
 
 from fluxproof.golden_model.block import Block, Const, Port
+from fluxproof.golden_model.common.multiply_add import multiply_add, multiply_subtract
 from fluxproof.golden_model.fixed import Format, clamp, round_half_up, round_sat, saturate
 from fluxproof.golden_model.formats import PU, PU_W
 from fluxproof.golden_model.kernel import kernel
@@ -45,8 +46,8 @@ def direction(twice, k_sign):
 @kernel
 def step(i_alpha, i_beta, omega_me, k_ahead, k_sign):
     turn = round_sat(omega_me * k_ahead, DROP_TURN, PU_W)
-    x = saturate(i_alpha - round_half_up(turn * i_beta, DROP_TURN), PU_W)
-    y = saturate(i_beta + round_half_up(turn * i_alpha, DROP_TURN), PU_W)
+    x, _ = multiply_subtract(turn, i_beta, i_alpha, DROP_TURN, PU_W)
+    y, _ = multiply_add(turn, i_alpha, i_beta, DROP_TURN, PU_W)
     across = round_half_up(y * K_SQRT3, DROP_SQRT3)
     return clarke.step(
         direction(2 * x, k_sign), direction(across - x, k_sign), direction(-across - x, k_sign)
@@ -113,8 +114,8 @@ BLOCK = Block(
         Port("s_alpha", PU, doc="directions of the currents, alpha"),
         Port("s_beta", PU, doc="directions of the currents, beta"),
     ),
-    latency=31,
-    interval=31,
+    latency=23,
+    interval=23,
     constants={"ONE": ONE, "SQRT3": SQRT3, "DROP_TURN": DROP_TURN, "DROP_SQRT3": DROP_SQRT3, "DROP": DROP},
     reference=reference,
     bound=bound,

@@ -24,7 +24,7 @@ from fluxproof.golden_model.block import Block, Port
 from fluxproof.golden_model.control.current_pi import SAT
 from fluxproof.golden_model.estimators import speed_reciprocal
 from fluxproof.golden_model.estimators.winding_resistance import R
-from fluxproof.golden_model.fixed import Format, exceeds, round_half_up, saturate
+from fluxproof.golden_model.fixed import Format, exceeds, round_half_up, round_sat, saturate
 from fluxproof.golden_model.formats import BIT, FLUX, FLUX_W, INTEGRAL, PU, RESISTANCE
 from fluxproof.golden_model.kernel import kernel
 
@@ -47,11 +47,11 @@ class State(NamedTuple):
 def axis(u_int, i, factor, n, r):
     """One axis: (delta, 1 if it was limited)."""
     rest = u_int - round_half_up(r * i, DROP_R)
-    shifted = round_half_up(rest << n, DROP_SHIFTED)
-    prod = saturate(shifted, FLUX_W) * factor
-    delta = round_half_up(prod, DROP_FACTOR)
-    limited = exceeds(shifted, FLUX_W) if factor != 0 else 0
-    return saturate(delta, FLUX_W), limited
+    shifted = rest << n
+    rounded = round_half_up(shifted, DROP_SHIFTED)
+    value, limited = saturate(rounded, FLUX_W), exceeds(rounded, FLUX_W)
+    delta = round_sat(value * factor, DROP_FACTOR, FLUX_W)
+    return delta, limited if factor != 0 else 0
 
 
 @kernel
@@ -144,7 +144,13 @@ BLOCK = Block(
     state=State(),
     latency=12,
     interval=12,
-    constants={"DROP_R": DROP_R, "DROP_SHIFTED": DROP_SHIFTED, "DROP_FACTOR": DROP_FACTOR, "FADE": FADE},
+    constants={
+        "DROP_R": DROP_R,
+        "DROP_SHIFTED": DROP_SHIFTED,
+        "DROP_FACTOR": DROP_FACTOR,
+        "FADE": FADE,
+        "N_MAX": speed_reciprocal.N_MAX,
+    },
     reference=reference,
     bound=bound,
     stimuli=stimuli,

@@ -39,17 +39,22 @@ class State(NamedTuple):
 
 @kernel
 def axis(integral, delta, held, mode, kp, ki, limit):
-    """One axis: (integral, lambda_pi, lambda_add, 1 if it was limited)."""
-    proportional = round_half_up(delta * kp, DROP_P)
-    increment = round_half_up(-integral, FORGET) if held else round_half_up(delta * ki, DROP_I)
-    moved = clamp(integral + increment, -limit, limit)
-    total = proportional + moved
-    lambda_pi = round_half_up(clamp(total, -limit, limit), FLUX_TO_STATE)
-    lambda_add = clamp(delta, -(limit >> FLUX_TO_STATE), limit >> FLUX_TO_STATE)
+    """One axis: (integral, lambda_pi, lambda_add, 1 if it was limited).
+
+    The earlier scheme has a gain of one and no integral.
+    """
+    proportional, moved = delta << FLUX_TO_STATE, 0
     if mode == PROPOSED:
-        return moved, lambda_pi, 0, (1 if abs(total) > limit else 0)
+        proportional = round_half_up(delta * kp, DROP_P)
+        increment = round_half_up(-integral, FORGET) if held else round_half_up(delta * ki, DROP_I)
+        moved = clamp(integral + increment, -limit, limit)
+    total = proportional + moved
+    result = round_half_up(clamp(total, -limit, limit), FLUX_TO_STATE)
+    limited = 1 if abs(total) > limit else 0
+    if mode == PROPOSED:
+        return moved, result, 0, limited
     if mode == EARLIER:
-        return 0, 0, lambda_add, (1 if lambda_add != delta else 0)
+        return 0, 0, result, limited
     return 0, 0, 0, 0
 
 
@@ -117,8 +122,8 @@ BLOCK = Block(
         Port("compensation_limited", BIT, doc="the compensation reached its limit"),
     ),
     state=State(),
-    latency=12,
-    interval=12,
+    latency=9,
+    interval=9,
     constants={"DROP_P": DROP_P, "DROP_I": DROP_I, "SHIFT_LIMIT": SHIFT_LIMIT, "FORGET": FORGET},
     reference=reference,
     bound=bound,

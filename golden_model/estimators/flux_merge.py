@@ -30,8 +30,9 @@ time constant.  y needs none: |eps| <= 2 and w < 1/4.
 from typing import NamedTuple
 
 from fluxproof.golden_model.block import Block, Port
+from fluxproof.golden_model.common.multiply_add import multiply_add
 from fluxproof.golden_model.estimators.winding_resistance import MINUS_RHO, T_S
-from fluxproof.golden_model.fixed import Format, exceeds, round_half_up, saturate
+from fluxproof.golden_model.fixed import Format, exceeds, round_half_up, round_sat, saturate
 from fluxproof.golden_model.formats import (
     BIT,
     FLUX,
@@ -68,26 +69,24 @@ class State(NamedTuple):
 
 
 @kernel
-def axis(carried, x, i, lambda_c, u, valid, minus_rho, omega_0, xi, t_s):
+def axis(carried, x, i, lambda_c, u, trusted, minus_rho, omega_0, xi, t_s):
     """One axis: (flux integrated to the next sample, x, 1 if anything was limited)."""
     drop = round_half_up(-minus_rho * i, DROP_RHO)
+    push = round_half_up(u * t_s, DROP_U) - drop
     now = carried - drop
     lambda_now = saturate(now, FLUX_STATE_W)
-    flux = round_half_up(lambda_now, FLUX_TO_STATE)
-    eps = lambda_c - saturate(flux, FLUX_W)
-    prod_y = saturate(eps, FLUX_W) * omega_0
-    y = round_half_up(prod_y, DROP_Y)
-    moved = x + round_half_up(y * omega_0, DROP_X)
-    x_next = saturate(moved, X_W)
-    correction = round_half_up(y * xi, DROP_XI)
-    push = round_half_up(u * t_s, DROP_U) - drop
-    base = lambda_now + correction + round_half_up(x_next, X_TO_STATE)
-    limited = exceeds(now, FLUX_STATE_W) | exceeds(eps, FLUX_W) | exceeds(moved, X_W)
-    if not valid:
-        base, x_next, limited = lambda_c << FLUX_TO_STATE, 0, 0
-    following = base + push
-    limited = limited | exceeds(following, FLUX_STATE_W)
-    return saturate(following, FLUX_STATE_W), x_next, limited
+    if not trusted:
+        lambda_now, x = lambda_c << FLUX_TO_STATE, 0
+    diff = lambda_c - round_sat(lambda_now, FLUX_TO_STATE, FLUX_W)
+    eps = saturate(diff, FLUX_W) if trusted else 0
+    y = round_half_up(eps * omega_0, DROP_Y)
+    x_next, x_limited = multiply_add(y, omega_0, x, DROP_X, X_W)
+    corrected = lambda_now + push + round_half_up(y * xi, DROP_XI)
+    total = corrected + round_half_up(x_next, X_TO_STATE)
+    limited = exceeds(total, FLUX_STATE_W)
+    if trusted:
+        limited = limited | exceeds(now, FLUX_STATE_W) | exceeds(diff, FLUX_W) | x_limited
+    return saturate(total, FLUX_STATE_W), x_next, limited
 
 
 @kernel
@@ -95,24 +94,15 @@ def step(
     state, i_alpha, i_beta, lambda_c_alpha, lambda_c_beta, u_applied_alpha, u_applied_beta, voltage_known, run,
     minus_rho, omega_0, xi, t_s,
 ):  # fmt: skip
-    valid = state.known & run
+    trusted, gains = state.known & run, (minus_rho, omega_0, xi, t_s)
     lambda_alpha, x_alpha, limited_alpha = axis(
-        state.lambda_alpha,
-        state.x_alpha,
-        i_alpha,
-        lambda_c_alpha,
-        u_applied_alpha,
-        valid,
-        minus_rho,
-        omega_0,
-        xi,
-        t_s,
+        state.lambda_alpha, state.x_alpha, i_alpha, lambda_c_alpha, u_applied_alpha, trusted, *gains
     )
     lambda_beta, x_beta, limited_beta = axis(
-        state.lambda_beta, state.x_beta, i_beta, lambda_c_beta, u_applied_beta, valid, minus_rho, omega_0, xi, t_s
+        state.lambda_beta, state.x_beta, i_beta, lambda_c_beta, u_applied_beta, trusted, *gains
     )
-    lambda_m_alpha = saturate(round_half_up(lambda_alpha, FLUX_TO_STATE), FLUX_W)
-    lambda_m_beta = saturate(round_half_up(lambda_beta, FLUX_TO_STATE), FLUX_W)
+    lambda_m_alpha = round_sat(lambda_alpha, FLUX_TO_STATE, FLUX_W)
+    lambda_m_beta = round_sat(lambda_beta, FLUX_TO_STATE, FLUX_W)
     state = State(lambda_alpha, lambda_beta, x_alpha, x_beta, voltage_known)
     return state, (lambda_m_alpha, lambda_m_beta, voltage_known, limited_alpha | limited_beta)
 
@@ -192,8 +182,8 @@ BLOCK = Block(
         Port("merge_limited", BIT, doc="the merge reached its range"),
     ),
     state=State(),
-    latency=31,
-    interval=31,
+    latency=30,
+    interval=30,
     constants={
         "Y_W": Y_W,
         "X_W": X_W,

@@ -15,6 +15,7 @@ omega*e FLUX; psi_m S(1,34), so that an eta of 1e-4 per unit still moves it by a
 from typing import NamedTuple
 
 from fluxproof.golden_model.block import Block, Port
+from fluxproof.golden_model.common.multiply_add import multiply_add, multiply_subtract
 from fluxproof.golden_model.control.current_pi import SAT
 from fluxproof.golden_model.control.dead_time_compensation import D_Q
 from fluxproof.golden_model.estimators.flux_models import L_D
@@ -55,19 +56,18 @@ def step(
     state, u_q, d_q, v_leg, i_d, i_q, r, omega_chord, sat_d, sat_q, current_at_rail, voltage_known, run,
     l_d, eta_psi, omega_psi_min,
 ):  # fmt: skip
-    lost = round_half_up(v_leg * d_q, DROP_V)
-    drop = round_half_up(r * i_q, DROP_R)
-    own = saturate(round_half_up(l_d * i_d, DROP_L), FLUX_W)
-    flux = saturate(own + saturate(round_half_up(state.psi_m, TO_FLUX), FLUX_W), FLUX_W)
-    emf = round_half_up(flux * omega_chord, DROP_OMEGA)
-    e = saturate((u_q << PU_TO_FLUX) - lost - drop - emf, FLUX_W)
+    own = round_sat(l_d * i_d, DROP_L, FLUX_W)
+    flux = saturate(own + round_sat(state.psi_m, TO_FLUX, FLUX_W), FLUX_W)
+    after_v = (u_q << PU_TO_FLUX) - round_half_up(v_leg * d_q, DROP_V)
+    rest = after_v - round_half_up(r * i_q, DROP_R)
+    e, _ = multiply_subtract(flux, omega_chord, rest, DROP_OMEGA, FLUX_W)
     pull = round_sat(e * omega_chord, DROP_OMEGA, FLUX_W)
     held = 1
     if run and voltage_known and sat_d == 0 and sat_q == 0 and current_at_rail == 0:
         held = 1 if abs(omega_chord) < omega_psi_min else 0
     psi = state.psi_m
     if not held:
-        psi = saturate(psi + round_half_up(pull * eta_psi, DROP_ETA), PSI_STATE_W)
+        psi, _ = multiply_add(pull, eta_psi, psi, DROP_ETA, PSI_STATE_W)
     return State(psi), (round_sat(psi, TO_PU, PU_W), held)
 
 
@@ -147,8 +147,8 @@ BLOCK = Block(
         Port("psi_held", BIT, doc="1: psi_m is held"),
     ),
     state=State(),
-    latency=18,
-    interval=18,
+    latency=16,
+    interval=16,
     constants={
         "PSI_STATE_W": PSI_STATE_W,
         "DROP_V": DROP_V,

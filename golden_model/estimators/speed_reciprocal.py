@@ -62,7 +62,7 @@ def stimuli(_rng, _config):
 
 
 OUTPUTS = (
-    Port("factor", FACTOR, doc="mantissa of weight/omega_me"),
+    Port("factor", FACTOR, lo=-FACTOR.hi, doc="mantissa of weight/omega_me"),
     Port("n_omega", reciprocal.SHIFT, hi=N_MAX, doc="exponent of 1/omega_me"),
 )
 

@@ -26,6 +26,7 @@ All rounded half up.  Limits: v_dead within +-v_comp_max, v_sum and v_comp from 
 from typing import NamedTuple
 
 from fluxproof.golden_model.block import Block, Port
+from fluxproof.golden_model.common.multiply_add import multiply_add, multiply_subtract
 from fluxproof.golden_model.control.current_pi import SAT
 from fluxproof.golden_model.control.dead_time_compensation import D_D
 from fluxproof.golden_model.fixed import Format, clamp, round_half_up, round_sat, saturate
@@ -76,7 +77,7 @@ class State(NamedTuple):
 def low_pass(lp, x, k_lp):
     """(next state, x minus the low-pass output), both from the state before."""
     err = saturate(x - round_sat(lp, PU_TO_INTEGRAL, PU_W), PU_W)
-    moved = saturate(lp + round_half_up(err * k_lp, DROP_LP), INTEGRAL_W)
+    moved, _ = multiply_add(err, k_lp, lp, DROP_LP, INTEGRAL_W)
     return moved, err
 
 
@@ -93,7 +94,7 @@ def step(
     if not run:
         lp_u, lp_d = 0, 0
     fine = round_half_up(state.v_dead, DROP_FINE)
-    e = saturate((u_h << PU_TO_FLUX) - round_half_up(fine * d_h, DROP_MODEL), FLUX_W)
+    e, _ = multiply_subtract(fine, d_h, u_h << PU_TO_FLUX, DROP_MODEL, FLUX_W)
     pull = round_sat(d_h * e, DROP_STEP, STEP_W)
     v_dead = state.v_dead
     if learning:
@@ -222,8 +223,8 @@ BLOCK = Block(
         Port("v_comp_limited", BIT, doc="the compensation reached its limit"),
     ),
     state=State(),
-    latency=29,
-    interval=29,
+    latency=22,
+    interval=22,
     constants={
         "V_STATE_W": V_STATE_W,
         "V_FINE_W": V_FINE.width,

@@ -33,6 +33,9 @@ package fixed_pkg is
   -- x limited to [lo, hi]; lo and hi must fit the width of x.
   function clamp (x : signed; lo : signed; hi : signed) return signed;
 
+  -- |x|, which is unsigned and so needs no bit more than x.
+  function magnitude (x : signed) return unsigned;
+
   -- a + 1 if carry = '1', with one sum whose carry comes from the bit below; the result must fit the width of a.
   function plus_carry (a : signed; carry : std_logic) return signed;
 
@@ -49,6 +52,12 @@ package fixed_pkg is
 
   -- '1' if x > limit*2**shift or x < -limit*2**shift, with one comparison; the sign of x selects the side.
   function beyond (x : signed; limit : unsigned; shift : positive) return std_logic;
+
+  -- x limited to +-limit*2**shift, with one comparison; the result must fit the width of x.
+  function within (x : signed; limit : unsigned; shift : positive) return signed;
+
+  -- x limited to [0, limit*2**shift], with one comparison.
+  function within_u (x : signed; limit : unsigned; shift : positive) return unsigned;
 
 end package fixed_pkg;
 
@@ -137,6 +146,12 @@ package body fixed_pkg is
     return x;
   end function;
 
+  function magnitude (x : signed) return unsigned is
+    variable wide : signed(x'length downto 0) := abs(resize(x, x'length + 1));
+  begin
+    return unsigned(wide(x'length - 1 downto 0));
+  end function;
+
   function plus_carry (a : signed; carry : std_logic) return signed is
     variable raised : signed(a'length downto 0);
   begin
@@ -184,6 +199,28 @@ package body fixed_pkg is
     room    := signed(resize(limit & (PARTS - 1 downto 0 => '0'), room'length))
                - signed(resize(size & more, room'length));
     return room(room'high);
+  end function;
+
+  function within (x : signed; limit : unsigned; shift : positive) return signed is
+    constant TOP : signed(x'length - 1 downto 0) := shift_left(signed(resize(limit, x'length)), shift);
+  begin
+    if beyond(x, limit, shift) = '0' then
+      return x;
+    elsif x < 0 then
+      return -TOP;
+    end if;
+    return TOP;
+  end function;
+
+  function within_u (x : signed; limit : unsigned; shift : positive) return unsigned is
+    constant WIDTH : positive := limit'length + shift;
+  begin
+    if x < 0 then
+      return to_unsigned(0, WIDTH);
+    elsif beyond(x, limit, shift) = '1' then
+      return shift_left(resize(limit, WIDTH), shift);
+    end if;
+    return resize(unsigned(x), WIDTH);
   end function;
 
 end package body fixed_pkg;

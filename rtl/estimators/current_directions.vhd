@@ -3,11 +3,10 @@
 --   s_a = limit(k_sign*x, +-1)
 --   s_b = limit(k_sign*(-x + sqrt(3)*y)/2, +-1);  s_c = limit(k_sign*(-x - sqrt(3)*y)/2, +-1)
 --   s_alpha, s_beta: their Clarke transform
--- Thirteen products one after the other, through one multiplier and the adder behind it: sum = addend + mul_a*mul_b.
--- The last five are the Clarke transform of transforms/clarke, alternating between alpha and beta; it cannot saturate
--- here.  The outputs are state: the next sample starts with them.
+-- The phases follow each other through one multiplier, a, b, c.  The outputs are state: the next sample starts with
+-- them.
 -- Formats: PU in and out; k_ahead U(1,16), sqrt(3) U(1,16), k_sign U(12,12); products exact.
--- Latency: 31.  Interval: 31.
+-- Latency: 23.  Interval: 23.
 -- Rounding: every product half up.  turn, x, y and twice each phase current saturate.
 
 library ieee;
@@ -33,154 +32,102 @@ entity current_directions is
 end entity current_directions;
 
 architecture rtl of current_directions is
-  constant LATENCY : positive                    := CURRENT_DIRECTIONS_LATENCY;
-  constant WIDE_W  : positive                    := k_sign'length + 1;
-  constant TURN_BY : positive                    := CURRENT_DIRECTIONS_DROP_TURN;
-  constant DROP    : positive                    := CURRENT_DIRECTIONS_DROP;
-  constant SUM_W   : positive                    := PU_W + WIDE_W;
-  constant ONE     : signed(PU_W - 1 downto 0)   := to_signed(CURRENT_DIRECTIONS_ONE, PU_W);
-  constant ROOT    : signed(WIDE_W - 1 downto 0) := resize(CURRENT_DIRECTIONS_SQRT3, WIDE_W);
-  constant THIRD   : signed(WIDE_W - 1 downto 0) := resize(CLARKE_THIRD, WIDE_W);
-  constant BY_BETA : signed(WIDE_W - 1 downto 0) := resize(CLARKE_INV_SQRT3, WIDE_W);
-
-  -- One LSB less than half: a value that is negated after rounding half up is rounded half down before.
-  constant HALF_DOWN : signed(TURN_BY - 1 downto 0) := (TURN_BY - 1 => '0', others => '1');
+  constant LATENCY : positive                  := CURRENT_DIRECTIONS_LATENCY;
+  constant BY_TURN : positive                  := CURRENT_DIRECTIONS_DROP_TURN;
+  constant ROOT    : signed(PU_W - 1 downto 0) := resize(CURRENT_DIRECTIONS_SQRT3, PU_W);
+  constant ONE     : signed(PU_W - 1 downto 0) := to_signed(CURRENT_DIRECTIONS_ONE, PU_W);
+  constant NOTHING : signed(0 downto 0)        := "0";
 
   signal valid      : std_logic_vector(0 to LATENCY);
-  signal by_sign    : std_logic;                          -- the factor is k_sign
-  signal by_current : std_logic;                          -- the factor is a current
-  signal by_third   : std_logic;                          -- the factor is -1/3 in the next clock
-  signal by_phase   : std_logic;                          -- the other factor is a direction
-  signal on_sum     : std_logic;                          -- the sum is accumulated
-  signal on_sign    : std_logic;                          -- half an LSB of a direction
-  signal s_moves    : std_logic;
-  signal current_a  : signed(PU_W - 1 downto 0);
-  signal constant_0 : signed(WIDE_W - 1 downto 0);        -- next value of constant_a
-  signal constant_a : signed(WIDE_W - 1 downto 0);
-  signal factor_a   : signed(WIDE_W - 1 downto 0);
-  signal factor_b   : signed(PU_W - 1 downto 0);
-  signal mul_a      : signed(WIDE_W - 1 downto 0);
-  signal mul_b      : signed(PU_W - 1 downto 0);
-  signal product    : signed(SUM_W - 1 downto 0);         -- next values of prod, sum and past
-  signal total      : signed(SUM_W - 1 downto 0);
-  signal past_0     : std_logic;
-  signal prod       : signed(SUM_W - 1 downto 0);
-  signal base       : signed(SUM_W - 1 downto 0);
-  signal addend     : signed(SUM_W - 1 downto 0);
-  signal sum        : signed(SUM_W - 1 downto 0);
-  signal cut        : signed(SUM_W - 1 - TURN_BY downto 0);  -- the sum a clock ago; past: it exceeds PU
-  signal past       : std_logic;
-  signal narrow     : signed(PU_W - 1 downto 0);          -- turn at clock 5, not x at 10, y at 11, b at 16, c at 17
-  signal minus_x_11 : signed(PU_W downto 0);
-  signal twice_a_11 : signed(PU_W - 1 downto 0);
-  signal s          : signed(SUM_W - 1 - DROP downto 0);  -- a direction; any, all: OR, AND of its bits >= 1
-  signal s_any      : std_logic;
-  signal s_all      : std_logic;
-  signal s_next     : signed(PU_W - 1 downto 0);          -- the directions as a shift register
-  signal s_then     : signed(PU_W - 1 downto 0);
-  signal s_last     : signed(PU_W - 1 downto 0);
-
-  -- v if sel is '1', else zero
-  function when_set (v : signed; sel : std_logic) return signed is
-    alias u : signed(v'length - 1 downto 0) is v;
-  begin
-    return u and (v'length - 1 downto 0 => sel);
-  end function;
+  signal by_k_ahead : signed(k_ahead'length downto 0);
+  signal by_k_sign  : signed(k_sign'length downto 0);
+  signal turn_3     : signed(PU_W - 1 downto 0);
+  signal x_6        : signed(PU_W - 1 downto 0);
+  signal y_6        : signed(PU_W - 1 downto 0);
+  signal across_9   : signed(PU_W downto 0);
+  signal twice_a_10 : signed(PU_W - 1 downto 0);
+  signal twice_b_10 : signed(PU_W - 1 downto 0);
+  signal twice_c_10 : signed(PU_W - 1 downto 0);
+  signal twice_11   : signed(PU_W - 1 downto 0);   -- of a, b, c
+  signal scaled_14  : signed(PU_W + 11 downto 0);  -- of a, b, c
+  signal s_a        : signed(PU_W - 1 downto 0);   -- the three at clock 17
+  signal s_b        : signed(PU_W - 1 downto 0);
+  signal s_c        : signed(PU_W - 1 downto 0);
+  signal alpha_22   : signed(PU_W - 1 downto 0);
+  signal beta_22    : signed(PU_W - 1 downto 0);
 begin
-  valid(0) <= in_valid;
+  valid(0)   <= in_valid;
+  by_k_ahead <= signed('0' & k_ahead);
+  by_k_sign  <= signed('0' & k_sign);
 
-  -- An AND-OR selection with one select bit per operand, without priority, which keeps the path short.
-  factor_a <= when_set(signed(resize(k_ahead, WIDE_W)), valid(0))
-              or when_set(resize(current_a, WIDE_W), by_current)
-              or when_set(signed('0' & k_sign), by_sign)
-              or constant_a;
-  factor_b <= omega_me when valid(0) = '1' else
-              twice_a_11 when valid(18) = '1' else
-              s_next when by_phase = '1' else
-              narrow;
+  -- Stages 1 to 3: turn = k_ahead*omega_me
+  prediction : entity work.multiply_add
+    generic map (DROP => BY_TURN)
+    port map (clk => clk, a => omega_me, b => by_k_ahead, c => NOTHING, y => turn_3, limited => open);
 
-  -- x is calculated as its complement, because the adder behind the multiplier can only add.
-  base <= when_set(rounding_base(not i_alpha, TURN_BY, SUM_W), valid(6))
-          or when_set(rounding_base(i_beta, TURN_BY, SUM_W), valid(7))
-          or when_set(rounding_base(minus_x_11, TURN_BY, SUM_W), valid(12))
-          or when_set(resize(minus_x_11 & HALF_DOWN, SUM_W), valid(13))
-          or when_set(sum, on_sum)
-          or when_set(rounding_base("0", CLARKE_DROP_ALPHA, SUM_W), valid(24))
-          or when_set(rounding_base("0", CLARKE_DROP_BETA, SUM_W), valid(25))
-          or when_set(rounding_base("0", TURN_BY, SUM_W), valid(1))
-          or when_set(rounding_base("0", DROP, SUM_W), on_sign);
+  -- Stages 4 to 6: x = i_alpha - turn*i_beta;  y = i_beta + turn*i_alpha
+  ahead_x : entity work.multiply_add
+    generic map (DROP => BY_TURN, MINUS => 1)
+    port map (clk => clk, a => turn_3, b => i_beta, c => i_alpha, y => x_6, limited => open);
 
-  -- Outside the clocked process, so that a simulator computes them only when an operand changes.
-  product    <= mul_a * mul_b;
-  total      <= addend + prod;
-  past_0     <= exceeds(sum(SUM_W - 1 downto TURN_BY), PU_W);
-  constant_0 <= when_set(ROOT, valid(10)) or when_set(-ROOT, valid(11)) or when_set(-THIRD, by_third)
-                or when_set(BY_BETA, valid(23)) or when_set(-BY_BETA, valid(25))
-                or when_set(shift_left(THIRD, 1), valid(26));
+  ahead_y : entity work.multiply_add
+    generic map (DROP => BY_TURN)
+    port map (clk => clk, a => turn_3, b => i_alpha, c => i_beta, y => y_6, limited => open);
+
+  -- Stages 7 to 9: across = sqrt(3)*y
+  crossing : entity work.multiply_add
+    generic map (DROP => CURRENT_DIRECTIONS_DROP_SQRT3)
+    port map (clk => clk, a => y_6, b => ROOT, c => NOTHING, y => across_9, limited => open);
+
+  -- Stages 12 to 14: scaled = k_sign*twice/2
+  slope : entity work.multiply_add
+    generic map (DROP => CURRENT_DIRECTIONS_DROP)
+    port map (clk => clk, a => by_k_sign, b => twice_11, c => NOTHING, y => scaled_14, limited => open);
+
+  -- Stages 18 to 22: the Clarke transform of the directions
+  directions : entity work.clarke
+    port map (
+      clk       => clk,
+      rst       => rst,
+      in_valid  => valid(17),
+      i_a       => s_a,
+      i_b       => s_b,
+      i_c       => s_c,
+      out_soon  => open,
+      out_valid => open,
+      i_alpha   => alpha_22,
+      i_beta    => beta_22
+    );
 
   process (clk)
   begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Select bits that depend on several clocks are registered one clock before their use.
-      by_sign    <= or valid(15 to 17);
-      by_current <= valid(4) or valid(5);
-      by_third   <= valid(21) or valid(23);
-      by_phase   <= or valid(22 to 26);
-      on_sum     <= or valid(25 to 27);
-      on_sign    <= by_sign;
-      s_moves    <= valid(19) or valid(20) or valid(21) or valid(23) or valid(25);
-      current_a  <= i_beta when valid(4) = '1' else i_alpha;
-      constant_a <= constant_0;
+      -- Stage 10: twice the phase currents, narrowed
+      twice_a_10 <= saturate(x_6 & '0', PU_W);
+      twice_b_10 <= saturate(resize(across_9, PU_W + 2) - x_6, PU_W);
+      twice_c_10 <= saturate(-resize(across_9, PU_W + 2) - x_6, PU_W);
 
-      -- Stages 1, 6, 7, 12, 13, 17 to 19, 24 to 28: the factors
-      mul_a <= factor_a;
-      mul_b <= factor_b;
-
-      -- Stages 2, 7, 8, 13, 14, 18 to 20: prod = omega_me*k_ahead, turn*i_beta, turn*i_alpha, sqrt(3)*y, -sqrt(3)*y,
-      -- then k_sign times twice the currents of b, c, a;  stages 25 to 29: -1/3*s_b, s_b/sqrt(3), -1/3*s_c,
-      -- -s_c/sqrt(3), 2/3*s_a;  addend: the other operand of the sum
-      prod   <= product;
-      addend <= base;
-
-      -- Stages 3, 8, 9, 14, 15, 19 to 21, 26 to 30: sum = turn, not x, y, twice b, twice c, s_b, s_c, s_a, then s_alpha
-      -- and s_beta alternately
-      sum <= total;
-
-      -- Stages 4, 5, 9 to 11, 15 to 17: narrow = sum, narrowed
-      cut  <= sum(SUM_W - 1 downto TURN_BY);
-      past <= past_0;
-      if (valid(4) or valid(9) or valid(10) or valid(15) or valid(16)) = '1' then
-        narrow <= narrowed(cut, past, PU_W);
+      -- Stages 11 to 13: a, b, c
+      twice_11 <= twice_a_10;
+      if valid(11) = '1' then
+        twice_11 <= twice_b_10;
+      elsif valid(12) = '1' then
+        twice_11 <= twice_c_10;
       end if;
 
-      -- Stage 11: minus_x = not_x + 1;  twice_a = 2*x, narrowed
-      if valid(10) = '1' then
-        minus_x_11 <= resize(narrow, PU_W + 1) + 1;
-        twice_a_11 <= saturate((not narrow) & '0', PU_W);
+      -- Stages 15 to 17: the directions of a, b, c, limited to +-1, shifted in
+      if valid(14) = '1' or valid(15) = '1' or valid(16) = '1' then
+        s_c <= resize(clamp(scaled_14, -ONE, ONE), PU_W);
+        s_b <= s_c;
+        s_a <= s_b;
       end if;
 
-      -- Stages 20 to 23: s = sum, narrowed and limited: beyond +-1 if its bits from that of 1 on are not all equal;
-      -- stages 25, 27: the next phase
-      s     <= sum(SUM_W - 1 downto DROP);
-      s_any <= or sum(SUM_W - 1 downto DROP + PU_W - 2);
-      s_all <= and sum(SUM_W - 1 downto DROP + PU_W - 2);
-      if s_moves = '1' then
-        s_next <= s_then;
-        s_then <= s_last;
-        s_last <= s(PU_W - 1 downto 0);
-        if s_any = '1' and s_all = '0' then
-          s_last <= -ONE when s < 0 else ONE;
-        end if;
-      end if;
-
-      -- Stages 30, 31: s_beta, s_alpha = sum, narrowed
-      if valid(29) = '1' then
-        s_beta <= sum(PU_W - 1 + CLARKE_DROP_BETA downto CLARKE_DROP_BETA);
-      end if;
-      if valid(30) = '1' then
-        s_alpha <= sum(PU_W - 1 + CLARKE_DROP_ALPHA downto CLARKE_DROP_ALPHA);
+      -- Stage 23: the directions of the next sample
+      if valid(LATENCY - 1) = '1' then
+        s_alpha <= alpha_22;
+        s_beta  <= beta_22;
       end if;
 
       if rst = '1' then

@@ -1,8 +1,9 @@
--- Purpose: error of the flux estimate, from the current regulators' integrals, paper 001 eq. (15); d first, then q.
+-- Purpose: error of the flux estimate, from the current regulators' integrals, paper 001 eq. (15).
 --   delta_lambda_d =  (u_int_q - r*i_q) * factor * 2**n_omega
 --   delta_lambda_q = -(u_int_d - r*i_d) * factor * 2**n_omega
 -- u_int is that of two samples before.  While the integrals contain other voltages (voltage at its limit, a current
 -- converter at its end, voltage not known) delta_lambda decays by a sixteenth per sample; zero while the gates are off.
+-- One pipeline for both results: d, then q a clock later.
 -- Formats: r U(0,24), u_int and the difference 28 fraction bits, factor S(0,17), out FLUX.
 -- Latency: 12 (d, then q).  Interval: 12.
 -- Rounding: half up after r*i, the shift and the factor.  The shifted difference and the result saturate; saturation of
@@ -42,181 +43,114 @@ end entity delta_lambda;
 architecture rtl of delta_lambda is
   constant LATENCY : positive := DELTA_LAMBDA_LATENCY;
   constant REST_W  : positive := INTEGRAL_W + 1;
-  constant FIT_W   : positive := FLUX_W + DELTA_LAMBDA_DROP_SHIFTED;
-  constant PROD_W  : positive := FLUX_W + RECIPROCAL_W + 1;
-  constant DROP_R  : positive := DELTA_LAMBDA_DROP_R;
-  constant DROP    : positive := DELTA_LAMBDA_DROP_FACTOR;
+  constant WIDE_W  : positive := REST_W + DELTA_LAMBDA_N_MAX;  -- room for the largest shift
+  constant DROP    : positive := DELTA_LAMBDA_DROP_SHIFTED;
 
-  -- State, with delta_lambda_d and delta_lambda_q; suffix 1: previous sample, 2: the one before
-  signal u_int_d_1 : signed(INTEGRAL_W - 1 downto 0);
-  signal u_int_q_1 : signed(INTEGRAL_W - 1 downto 0);
-  signal u_int_d_2 : signed(INTEGRAL_W - 1 downto 0);
-  signal u_int_q_2 : signed(INTEGRAL_W - 1 downto 0);
+  constant NOTHING : signed(0 downto 0) := "0";
+
+  type state_t is record
+    delta_d   : signed(FLUX_W - 1 downto 0);
+    delta_q   : signed(FLUX_W - 1 downto 0);
+    u_int_d_1 : signed(INTEGRAL_W - 1 downto 0);  -- of the last sample
+    u_int_q_1 : signed(INTEGRAL_W - 1 downto 0);
+    u_int_d_2 : signed(INTEGRAL_W - 1 downto 0);  -- of the sample before
+    u_int_q_2 : signed(INTEGRAL_W - 1 downto 0);
+  end record state_t;
+
+  signal state : state_t;
 
   signal valid      : std_logic_vector(0 to LATENCY);
-  signal free_1     : std_logic;                     -- the voltage is not at its limit
-  signal measured_1 : std_logic;
-  signal held_2     : std_logic;
-  signal moving_1   : std_logic_vector(1 downto 0);  -- factor /= 0, one bit for each half of its bits
-  signal limited    : std_logic;  -- of either axis
+  signal by_r       : signed(RESISTANCE_W downto 0);
+  signal held       : std_logic;  -- from clock 1 on
+  signal u_int_1    : signed(INTEGRAL_W - 1 downto 0);
   signal i_1        : signed(PU_W - 1 downto 0);
-  signal prod_2     : signed(PU_W + RESISTANCE_W downto 0);
-  signal u_int_2    : signed(INTEGRAL_W - 1 downto 0);
-  signal sum_3      : signed(REST_W + DROP_R downto 0);
-  signal rest_3     : signed(REST_W - 1 downto 0);
-  signal coarse_3   : signed(FIT_W - 1 downto 0);
-  signal over_3     : std_logic_vector(2 downto 0);
-  signal coarse_4   : signed(FIT_W - 1 downto 0);
-  signal over_4     : std_logic_vector(2 downto 0);
-  signal more_4     : std_logic;
-  signal sign_4     : std_logic;
-  signal fine_4     : signed(FIT_W - 1 downto 0);
-  signal shifted_5  : signed(FIT_W downto 0);
-  signal over_5     : std_logic;
-  signal rounded_6  : signed(FLUX_W downto 0);
-  signal past_6     : std_logic;
-  signal rounded_5  : signed(FLUX_W + 1 downto 0);
+  signal rest_4     : signed(REST_W - 1 downto 0);
+  signal coarse_5   : signed(WIDE_W - 1 downto 0);
+  signal shifted_6  : signed(WIDE_W - 1 downto 0);
   signal value_7    : signed(FLUX_W - 1 downto 0);
-  signal prod_8     : signed(PROD_W - 1 downto 0);
-  signal half_8     : signed(PROD_W downto 0);
-  signal sum_9      : signed(PROD_W downto 0);
-  signal old_9      : signed(FLUX_W - 1 downto 0);
-  signal sum_10     : signed(PROD_W - DROP downto 0);
-  signal past_10    : std_logic;
-  signal faded_10   : signed(FLUX_W - 1 downto 0);
+  signal past_7     : std_logic;
+  signal past_8     : std_logic;
+  signal limited    : std_logic;  -- of either result, from clock 9 on
+  signal factor_7   : signed(RECIPROCAL_W downto 0);
   signal delta_10   : signed(FLUX_W - 1 downto 0);
+  signal delta_11   : signed(FLUX_W - 1 downto 0);
+
+  -- delta, decayed by a sixteenth
+  function faded (delta : signed) return signed is
+  begin
+    return resize(delta - round_half_up(delta, DELTA_LAMBDA_FADE), FLUX_W);
+  end function;
 begin
   valid(0) <= in_valid;
+  by_r     <= signed('0' & r);
 
-  -- The axis of this clock: d, from the quantities of q, then q, from those of d.
-  u_int_2 <= u_int_d_2 when valid(3) = '1' else u_int_q_2;
-  old_9   <= delta_lambda_q when valid(10) = '1' else delta_lambda_d;
+  -- Stages 2 to 4: rest = u_int - r*i
+  resistive_drop : entity work.multiply_add
+    generic map (DROP => DELTA_LAMBDA_DROP_R, MINUS => 1)
+    port map (clk => clk, a => by_r, b => i_1, c => u_int_1, y => rest_4, limited => open);
 
-  -- sum is the complement of u_int - prod, because the adder behind the multiplier can only add.
-  rest_3 <= not sum_3(REST_W - 1 + DROP_R downto DROP_R);
-
-  -- Whether the shift loses a bit that differs from the sign: first by multiples of four, then by the remainder.
-  process (all)
-  begin
-    more_4 <= '0';
-    for k in 0 to 2 loop
-      if n_omega(3 downto 2) > k and over_4(k) = '1' then
-        more_4 <= '1';
-      end if;
-      if n_omega(1 downto 0) > k and coarse_4(FIT_W - 1 - k) /= sign_4 then
-        more_4 <= '1';
-      end if;
-    end loop;
-  end process;
-
-  -- Shift by multiples of four, then by the remainder; outside the clocked process for fast simulation.
-  coarse_3 <= shift_left(rest_3(FIT_W - 1 downto 0), to_integer(n_omega(3 downto 2) & "00"));
-  fine_4   <= shift_left(coarse_4, to_integer(n_omega(1 downto 0)));
-
-  process (all)
-  begin
-    for k in over_3'range loop
-      over_3(k) <= or (rest_3(FIT_W - 1 - 4 * k downto FIT_W - 4 - 4 * k) xor rest_3(REST_W - 1));
-    end loop;
-  end process;
-
-  rounded_5 <= round_half_up(shifted_5, DELTA_LAMBDA_DROP_SHIFTED);
-
-  -- prod is rounded half up for d, -prod for q: not (prod - half - 1) = -prod + half.
-  half_8   <= rounding_base("0", DROP, PROD_W + 1) xor valid(9);
-  delta_10 <= faded_10 when held_2 = '1' else
-              narrowed(sum_10, past_10, FLUX_W) xor valid(11);
+  -- Stages 8 to 10: delta = value*factor
+  scaling : entity work.multiply_add
+    generic map (DROP => DELTA_LAMBDA_DROP_FACTOR)
+    port map (clk => clk, a => value_7, b => factor_7, c => NOTHING, y => delta_10, limited => open);
 
   process (clk)
+    variable rounded_7 : signed(WIDE_W - DROP downto 0);
   begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stages 1, 2: held = run while the integrals contain other voltages; in two stages, as the flags are distant
-      free_1     <= not ((or sat_d) or (or sat_q));
-      measured_1 <= voltage_known and not (or current_at_rail);
-      held_2     <= run and not (free_1 and measured_1);
+      -- Stage 1: the quantities of q, for the result of d, then those of d
+      u_int_1 <= state.u_int_d_2 when valid(1) = '1' else state.u_int_q_2;
+      i_1     <= i_d when valid(1) = '1' else i_q;
+      held    <= '0' when sat_d = 0 and sat_q = 0 and current_at_rail = 0 and voltage_known = '1' else run;
 
-      -- Stage 1: whether the factor is not zero
-      moving_1 <= (or factor(RECIPROCAL_W downto RECIPROCAL_W / 2)) & (or factor(RECIPROCAL_W / 2 - 1 downto 0));
+      -- Stages 5, 6: shifted = rest * 2**n_omega, by multiples of four, then by the remainder
+      coarse_5  <= shift_left(resize(rest_4, WIDE_W), to_integer(n_omega(3 downto 2) & "00"));
+      shifted_6 <= shift_left(coarse_5, to_integer(n_omega(1 downto 0)));
 
-      -- Stages 1, 2: prod = r*i
-      if valid(0) = '1' or valid(1) = '1' then
-        i_1 <= i_d when valid(1) = '1' else i_q;
+      -- Stage 7: value = shifted, narrowed;  the factor, negative for q
+      rounded_7 := round_half_up(shifted_6, DROP);
+      value_7   <= saturate(rounded_7, FLUX_W);
+      past_7    <= exceeds(rounded_7, FLUX_W);
+      past_8    <= past_7;
+      if valid(8) = '1' then
+        limited <= past_7 or past_8;
       end if;
-      if valid(1) = '1' or valid(2) = '1' then
-        prod_2 <= i_1 * signed('0' & r);
-      end if;
+      factor_7  <= -factor when valid(7) = '1' else factor;
 
-      -- Stage 3: rest = u_int - prod
-      if valid(2) = '1' or valid(3) = '1' then
-        sum_3 <= rounding_base(not u_int_2, DROP_R, REST_W + DROP_R + 1) + prod_2;
-      end if;
-
-      -- Stages 4, 5: shifted = rest * 2**n_omega, by multiples of four, then by the remainder
-      coarse_4  <= coarse_3;
-      over_4    <= over_3;
-      sign_4    <= rest_3(REST_W - 1);
-      shifted_5 <= sign_4 & fine_4;
-      over_5    <= more_4;
-
-      -- Stages 6, 7: value = shifted, narrowed; the sign is taken before the rounding, which may change it
-      rounded_6 <= shifted_5(FIT_W) & rounded_5(FLUX_W - 1 downto 0);
-      past_6    <= over_5 or exceeds(rounded_5, FLUX_W);
-      if valid(6) = '1' or valid(7) = '1' then
-        value_7 <= narrowed(rounded_6, past_6, FLUX_W);
-        limited <= past_6 or (limited and valid(7));
-      end if;
-
-      -- Stages 8, 9: sum = value * factor, plus half an LSB for the rounding
-      if valid(7) = '1' or valid(8) = '1' then
-        prod_8 <= value_7 * factor;
-      end if;
-      if valid(8) = '1' or valid(9) = '1' then
-        sum_9 <= half_8 + prod_8;
-      end if;
-
-      -- Stage 10: whether the sum fits, and the decayed delta_lambda for held samples
-      if valid(9) = '1' or valid(10) = '1' then
-        sum_10   <= sum_9(PROD_W downto DROP);
-        past_10  <= exceeds(sum_9(PROD_W downto DROP), FLUX_W);
-        faded_10 <= minus_rounded(old_9, old_9, DELTA_LAMBDA_FADE);
-      end if;
-
-      -- Stage 11: delta_lambda = sum for d, -sum for q, narrowed, or the decayed value; d at clock 11, q at 12
-      if valid(10) = '1' then
-        delta_lambda_d <= delta_10;
-      end if;
-      if valid(10) = '1' and run = '0' then
-        delta_lambda_d <= (others => '0');
-      end if;
-      if valid(11) = '1' then
-        delta_lambda_q <= delta_10;
-        delta_held     <= held_2;
-        delta_limited  <= limited and (or moving_1) and run and not held_2;
-        u_int_d_1      <= u_int_d;
-        u_int_q_1      <= u_int_q;
-        u_int_d_2      <= u_int_d_1;
-        u_int_q_2      <= u_int_q_1;
-      end if;
-      if valid(11) = '1' and run = '0' then
-        delta_lambda_q <= (others => '0');
+      -- Stages 11, 12: delta of d waits for that of q;  the state of the next sample
+      delta_11 <= delta_10;
+      if valid(LATENCY - 1) = '1' then
+        state.delta_d   <= delta_11;
+        state.delta_q   <= delta_10;
+        state.u_int_d_1 <= u_int_d;
+        state.u_int_q_1 <= u_int_q;
+        state.u_int_d_2 <= state.u_int_d_1;
+        state.u_int_q_2 <= state.u_int_q_1;
+        if held = '1' then
+          state.delta_d <= faded(state.delta_d);
+          state.delta_q <= faded(state.delta_q);
+        end if;
+        if run = '0' then
+          state.delta_d <= (others => '0');
+          state.delta_q <= (others => '0');
+        end if;
+        delta_held    <= held;
+        delta_limited <= limited and run and not held when factor /= 0 else '0';
       end if;
 
       if rst = '1' then
         valid(1 to LATENCY) <= (others => '0');
-        u_int_d_1           <= (others => '0');
-        u_int_q_1           <= (others => '0');
-        u_int_d_2           <= (others => '0');
-        u_int_q_2           <= (others => '0');
-        delta_lambda_d      <= (others => '0');
-        delta_lambda_q      <= (others => '0');
+        state               <= (others => (others => '0'));
         delta_held          <= '0';
         delta_limited       <= '0';
       end if;
     end if;
   end process;
 
-  out_valid <= valid(LATENCY);
+  out_valid      <= valid(LATENCY);
+  delta_lambda_d <= state.delta_d;
+  delta_lambda_q <= state.delta_q;
 
 end architecture rtl;

@@ -1,11 +1,11 @@
--- Purpose: merge of voltage and current models in the stator frame, paper 001 eq. (7); alpha first, then beta.
---   lambda = carried - rho*i;  eps = lambda_c - lambda;  y = omega_0*eps;  x += omega_0*y
---   carried = lambda_m = lambda + 2*xi*y + x + t_s*u_applied - rho*i
--- If the voltage of the last period is not known or the gates are off: lambda = lambda_c, x = 0.
+-- Purpose: merge of voltage and current models in the stator frame, paper 001 eq. (7).
+--   drop = rho*i;  lambda = carried - drop;  eps = lambda_c - lambda;  y = omega_0*eps;  x += omega_0*y
+--   carried = lambda_m = lambda + 2*xi*y + x + t_s*u_applied - drop
+-- If the voltage of the last period is not known or the gates are off: lambda = lambda_c, eps = x = 0.
+-- One pipeline for both axes: alpha during the first half, beta during the second.  The inputs of an axis are constant
+-- meanwhile, so each value stays once it is there; the state of the axis changes in the last stage.
 -- Formats: carried S(1,30), eps and u FLUX, y S(-1,25), x S(-3,36); products exact.
--- Latency: 31 (alpha, then beta).  Interval: 31.
--- Each sum with a product is formed by the adder behind the multiplier.  One register per axis contains the flux in all
--- steps: carried, lambda, the total, the new carried.
+-- Latency: 30 (alpha 15, beta 30).  Interval: 30.
 -- Rounding: half up, each product and x separately.  lambda, eps, x and the carried flux saturate, which is reported.
 
 library ieee;
@@ -40,218 +40,159 @@ entity flux_merge is
 end entity flux_merge;
 
 architecture rtl of flux_merge is
-  constant LATENCY  : positive := FLUX_MERGE_LATENCY;
-  constant DROP_RHO : positive := FLUX_MERGE_DROP_RHO;
-  constant DROP_Y   : positive := FLUX_MERGE_DROP_Y;
-  constant DROP_X   : positive := FLUX_MERGE_DROP_X;
-  constant DROP_XI  : positive := FLUX_MERGE_DROP_XI;
-  constant DROP_U   : positive := FLUX_MERGE_DROP_U;
-  constant X_W      : positive := FLUX_MERGE_X_W;
-  constant TOTAL_W  : positive := FLUX_STATE_W + 3;
-  constant SUM_R_W  : positive := TOTAL_W + DROP_RHO + 1;
-  constant PROD_Y_W : positive := FLUX_W + omega_0'length + 1;
-  constant PROD_X_W : positive := FLUX_MERGE_Y_W + omega_0'length + 1;
-  constant SUM_U_W  : positive := TOTAL_W + DROP_U + 1;
-  constant TURN     : positive := 14;  -- delay of beta behind alpha, clocks
+  constant LATENCY : positive := FLUX_MERGE_LATENCY;
+  constant TURN    : positive := LATENCY / 2;  -- clocks of an axis
+  constant X_W     : positive := FLUX_MERGE_X_W;
+  constant TOTAL_W : positive := FLUX_STATE_W + 3;
 
-  -- One LSB less than half: -rho*i is rounded half down, because rho*i is rounded half up.
-  constant HALF_DOWN : signed(DROP_RHO - 1 downto 0) := (DROP_RHO - 1 => '0', others => '1');
+  constant NOTHING : signed(0 downto 0) := "0";
 
-  -- Sources of the register flux
-  constant LESS_DROP : std_logic_vector(1 downto 0) := "00";
-  constant MODEL     : std_logic_vector(1 downto 0) := "01";
-  constant TOTAL     : std_logic_vector(1 downto 0) := "10";
-  constant OTHER     : std_logic_vector(1 downto 0) := "11";
+  type state_t is record
+    lambda_alpha : signed(FLUX_STATE_W - 1 downto 0);
+    lambda_beta  : signed(FLUX_STATE_W - 1 downto 0);
+    x_alpha      : signed(X_W - 1 downto 0);
+    x_beta       : signed(X_W - 1 downto 0);
+    known        : std_logic;
+  end record state_t;
 
-  -- State, with merge_known; the two axes share the registers: the next axis, and the other
-  signal flux       : signed(TOTAL_W - 1 downto 0);
-  signal flux_other : signed(TOTAL_W - 1 downto 0);
-  signal x          : signed(X_W - 1 downto 0);
-  signal x_other    : signed(X_W - 1 downto 0);
+  signal state : state_t;
 
-  signal valid      : std_logic_vector(0 to LATENCY);
-  signal step       : std_logic_vector(0 to LATENCY - TURN);  -- valid bits of both axes
-  signal beta       : std_logic;
-  signal trusted    : std_logic;
-  signal limited    : std_logic;  -- by any stage of either axis
-  signal limits     : std_logic_vector(2 downto 0);  -- limit reached: lambda, eps, x
-  signal moves      : std_logic;  -- flux is loaded
-  signal source     : std_logic_vector(1 downto 0);  -- source of flux at its next load
-  signal i_1        : signed(PU_W - 1 downto 0);
-  signal lambda_c_1 : signed(FLUX_W - 1 downto 0);
-  signal u_1        : signed(FLUX_W - 1 downto 0);
-  signal t_s_1      : unsigned(t_s'range);
-  signal omega_0_1  : unsigned(omega_0'range);
-  signal prod_r_2   : signed(PU_W + MINUS_RHO_W - 1 downto 0);
-  signal prod_u_2   : signed(FLUX_W + SAMPLE_TIME_W downto 0);
-  signal sum_r      : signed(SUM_R_W - 1 downto 0);  -- at clock 3, then at clock 14
-  signal less_r     : signed(TOTAL_W downto 0);
-  signal top        : std_logic_vector(1 downto 0);  -- flux a clock ago is at the end of its range, by halves
-  signal rounded    : signed(FLUX_STATE_W downto FLUX_TO_STATE);
-  signal diff_5     : signed(FLUX_W + 1 downto 0);
-  signal eps_6      : signed(FLUX_W downto 0);
-  signal eps_7      : signed(FLUX_W - 1 downto 0);
-  signal prod_y_8   : signed(PROD_Y_W - 1 downto 0);
-  signal sum_y_9    : signed(PROD_Y_W - 1 downto 0);
-  signal y_9        : signed(FLUX_MERGE_Y_W - 1 downto 0);
-  signal prod_x_10  : signed(PROD_X_W - 1 downto 0);
-  signal prod_xi_10 : signed(PROD_X_W - 1 downto 0);
-  signal sum_x_11   : signed(PROD_X_W downto 0);
-  signal moved_11   : signed(PROD_X_W - DROP_X downto 0);
-  signal sum_xi_11  : signed(PROD_X_W downto 0);
-  signal sum_u_12   : signed(SUM_U_W - 1 downto 0);
-  signal total_12   : signed(TOTAL_W - 1 downto 0);
+  signal valid         : std_logic_vector(0 to LATENCY);
+  signal beta          : std_logic;  -- the axis that enters
+  signal trusted       : std_logic;
+  signal rho           : signed(MINUS_RHO_W downto 0);
+  signal by_t_s        : signed(t_s'length downto 0);
+  signal by_omega_0    : signed(omega_0'length downto 0);
+  signal by_xi         : signed(xi'length downto 0);
+  signal carried_1     : signed(FLUX_STATE_W - 1 downto 0);
+  signal x_1           : signed(X_W - 1 downto 0);
+  signal i_1           : signed(PU_W - 1 downto 0);
+  signal lambda_c_1    : signed(FLUX_W - 1 downto 0);
+  signal u_1           : signed(FLUX_W - 1 downto 0);
+  signal drop_4        : signed(FLUX_STATE_W - 1 downto 0);
+  signal gained_4      : signed(FLUX_STATE_W - 1 downto 0);
+  signal now_5         : signed(FLUX_STATE_W downto 0);
+  signal push_5        : signed(FLUX_STATE_W downto 0);
+  signal lambda_6      : signed(FLUX_STATE_W - 1 downto 0);
+  signal diff_7        : signed(FLUX_W downto 0);
+  signal start_7       : signed(TOTAL_W - 1 downto 0);
+  signal eps_7         : signed(FLUX_W - 1 downto 0);
+  signal y_10          : signed(FLUX_MERGE_Y_W - 1 downto 0);
+  signal x_13          : signed(X_W - 1 downto 0);
+  signal x_limited     : std_logic;
+  signal corrected_13  : signed(TOTAL_W - 1 downto 0);
+  signal total_14      : signed(TOTAL_W - 1 downto 0);
+  signal carried       : signed(FLUX_STATE_W - 1 downto 0);
+  signal lambda_m      : signed(FLUX_W - 1 downto 0);
+  signal limited       : std_logic;
+  signal limited_alpha : std_logic;
 begin
-  valid(0) <= in_valid;
-  step     <= valid(0 to LATENCY - TURN) or valid(TURN to LATENCY);
-  trusted  <= merge_known and run;
+  valid(0)   <= in_valid;
+  trusted    <= state.known and run;
+  rho        <= -resize(minus_rho, MINUS_RHO_W + 1);
+  by_t_s     <= signed('0' & t_s);
+  by_omega_0 <= signed('0' & omega_0);
+  by_xi      <= signed('0' & xi);
 
-  less_r   <= sum_r(SUM_R_W - 1 downto DROP_RHO);
-  y_9      <= sum_y_9(y_9'length - 1 + DROP_Y downto DROP_Y);
-  moved_11 <= sum_x_11(PROD_X_W downto DROP_X);
-  total_12 <= plus_rounded(sum_u_12(TOTAL_W - 1 + DROP_U downto DROP_U), x_other, FLUX_MERGE_X_TO_STATE);
+  -- Stages 2 to 4: drop = rho*i;  gained = t_s*u_applied
+  resistive_drop : entity work.multiply_add
+    generic map (DROP => FLUX_MERGE_DROP_RHO)
+    port map (clk => clk, a => i_1, b => rho, c => NOTHING, y => drop_4, limited => open);
 
-  -- lambda_c - rounded flux, with one carry: the first bit of flux below the LSB, unless flux is at its end.
-  diff_5 <= (lambda_c_1(FLUX_W - 1) & lambda_c_1 & '0')
-            - (resize(flux(FLUX_STATE_W - 1 downto FLUX_TO_STATE), FLUX_W + 1)
-               & (flux(FLUX_TO_STATE - 1) and not (and top)));
+  voltage_gain : entity work.multiply_add
+    generic map (DROP => FLUX_MERGE_DROP_U)
+    port map (clk => clk, a => u_1, b => by_t_s, c => NOTHING, y => gained_4, limited => open);
+
+  -- Stages 8 to 10: y = omega_0*eps; |eps| <= 2 and omega_0 < 1/4, so it fits
+  eps_7 <= saturate(diff_7, FLUX_W) when trusted = '1' else (others => '0');
+
+  crossover : entity work.multiply_add
+    generic map (DROP => FLUX_MERGE_DROP_Y)
+    port map (clk => clk, a => eps_7, b => by_omega_0, c => NOTHING, y => y_10, limited => open);
+
+  -- Stages 11 to 13: x += omega_0*y;  corrected = lambda + push + 2*xi*y
+  integral : entity work.multiply_add
+    generic map (DROP => FLUX_MERGE_DROP_X)
+    port map (clk => clk, a => y_10, b => by_omega_0, c => x_1, y => x_13, limited => x_limited);
+
+  damping : entity work.multiply_add
+    generic map (DROP => FLUX_MERGE_DROP_XI)
+    port map (clk => clk, a => y_10, b => by_xi, c => start_7, y => corrected_13, limited => open);
+
+  -- Stage 15: the carried flux, narrowed twice; any limit of the axis, of which all but the last count if trusted
+  carried  <= saturate(total_14, FLUX_STATE_W);
+  lambda_m <= round_sat(carried, FLUX_TO_STATE, FLUX_W);
+  limited  <= exceeds(total_14, FLUX_STATE_W)
+              or (trusted and (exceeds(now_5, FLUX_STATE_W) or exceeds(diff_7, FLUX_W) or x_limited));
 
   process (clk)
   begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- The axis that enters: alpha at clock 0, beta at clock TURN
+      -- Stage 1: the axis
+      if beta = '1' then
+        carried_1  <= state.lambda_beta;
+        x_1        <= state.x_beta;
+        i_1        <= i_beta;
+        lambda_c_1 <= lambda_c_beta;
+        u_1        <= u_applied_beta;
+      else
+        carried_1  <= state.lambda_alpha;
+        x_1        <= state.x_alpha;
+        i_1        <= i_alpha;
+        lambda_c_1 <= lambda_c_alpha;
+        u_1        <= u_applied_alpha;
+      end if;
+      if trusted = '0' then
+        x_1 <= (others => '0');
+      end if;
+
+      -- Stage 5: now = carried - drop;  push = gained - drop
+      now_5  <= resize(carried_1, FLUX_STATE_W + 1) - drop_4;
+      push_5 <= resize(gained_4, FLUX_STATE_W + 1) - drop_4;
+
+      -- Stage 6: lambda = now, narrowed, or lambda_c
+      lambda_6 <= saturate(now_5, FLUX_STATE_W);
+      if trusted = '0' then
+        lambda_6 <= shift_left(resize(lambda_c_1, FLUX_STATE_W), FLUX_TO_STATE);
+      end if;
+
+      -- Stage 7: diff = lambda_c - lambda;  start = lambda + push
+      diff_7  <= resize(lambda_c_1, FLUX_W + 1) - round_sat(lambda_6, FLUX_TO_STATE, FLUX_W);
+      start_7 <= resize(lambda_6, TOTAL_W) + push_5;
+
+      -- Stage 14: total = corrected + x
+      total_14 <= plus_rounded(corrected_13, x_13, FLUX_MERGE_X_TO_STATE);
+
+      -- Stage 15: the state of the axis and its flux, alpha's at clock 15, beta's at clock 30
       if valid(TURN - 1) = '1' then
-        beta <= '1';
-      end if;
-      if valid(TURN) = '1' then
-        beta <= '0';
-      end if;
-
-      -- Stage 1: the inputs of the axis;  local copies of settings, whose registers are far away
-      t_s_1     <= t_s;
-      omega_0_1 <= omega_0;
-      if step(0) = '1' then
-        i_1        <= i_beta when beta = '1' else i_alpha;
-        lambda_c_1 <= lambda_c_beta when beta = '1' else lambda_c_alpha;
-        u_1        <= u_applied_beta when beta = '1' else u_applied_alpha;
-      end if;
-
-      -- Stage 2: prod_r = -rho*i;  prod_u = t_s*u_applied
-      if step(1) = '1' then
-        prod_r_2 <= i_1 * minus_rho;
-        prod_u_2 <= u_1 * signed('0' & t_s_1);
-      end if;
-
-      -- Stages 3, 14: sum_r = flux + prod_r: carried - rho*i, total - rho*i
-      if step(2) = '1' or step(13) = '1' then
-        sum_r <= resize(flux & HALF_DOWN, SUM_R_W) + prod_r_2;
-      end if;
-
-      -- Stage 4: flux = lambda: sum_r, narrowed, or lambda_c;  stage 13: the total;  stage 15: sum_r, narrowed;
-      -- stage 16: the flux of the other axis
-      source <= LESS_DROP;
-      if step(2) = '1' and trusted = '0' then
-        source <= MODEL;
-      end if;
-      if step(11) = '1' then
-        source <= TOTAL;
-      end if;
-      if step(14) = '1' then
-        source <= OTHER;
-      end if;
-      moves <= step(2) or step(11) or step(13) or step(14);
-      if moves = '1' then
-        if source(1) = '0' then
-          flux <= resize(saturate(less_r, FLUX_STATE_W), TOTAL_W);
-          if source(0) = '1' then
-            flux <= shift_left(resize(lambda_c_1, TOTAL_W), FLUX_TO_STATE);
-          end if;
-        else
-          flux <= total_12;
-          if source(0) = '1' then
-            flux <= flux_other;
-          end if;
-        end if;
-      end if;
-      if step(15) = '1' then
-        flux_other <= flux;
-      end if;
-      limits(0) <= ((step(3) and trusted) or step(14)) and exceeds(less_r, FLUX_STATE_W);
-
-      -- Stages 5, 16: at the end of the range rounding would overflow, so it is suppressed there.
-      top(1) <= not flux(FLUX_STATE_W - 1) and (and flux(FLUX_STATE_W - 2 downto FLUX_STATE_W / 2));
-      top(0) <= and flux(FLUX_STATE_W / 2 - 1 downto FLUX_TO_STATE - 1);
-
-      -- Stages 6, 7: eps = lambda_c - lambda
-      if step(5) = '1' then
-        eps_6 <= diff_5(FLUX_W + 1 downto 1);
-      end if;
-      if step(6) = '1' then
-        eps_7 <= saturate(eps_6, FLUX_W);
-      end if;
-      limits(1) <= step(6) and exceeds(eps_6, FLUX_W);
-
-      -- Stages 8, 9: y = omega_0*eps; |eps| <= 2 and omega_0 < 1/4, so it fits
-      if step(7) = '1' then
-        prod_y_8 <= eps_7 * signed('0' & omega_0_1);
-      end if;
-      if step(8) = '1' then
-        sum_y_9 <= rounding_base("0", DROP_Y, PROD_Y_W) + prod_y_8;
-      end if;
-
-      -- Stage 10: prod_x = omega_0*y;  prod_xi = xi*y
-      if step(9) = '1' then
-        prod_x_10  <= y_9 * signed('0' & omega_0);
-        prod_xi_10 <= y_9 * signed('0' & xi);
-      end if;
-
-      -- Stage 11: sum_x = x + prod_x;  sum_xi = lambda + 2*prod_xi
-      if step(10) = '1' then
-        sum_x_11  <= rounding_base(x, DROP_X, PROD_X_W + 1) + prod_x_10;
-        sum_xi_11 <= rounding_base(flux(FLUX_STATE_W - 1 downto 0), DROP_XI, PROD_X_W + 1) + prod_xi_10;
-      end if;
-
-      -- Stage 12: x = sum_x, narrowed;  sum_u = sum_xi + prod_u;  stage 1: x = 0 if lambda is not known
-      if step(11) = '1' then
-        x        <= x_other;
-        x_other  <= saturate(moved_11, X_W);
-        sum_u_12 <= rounding_base(sum_xi_11(PROD_X_W downto DROP_XI), DROP_U, SUM_U_W) + prod_u_2;
-      end if;
-      limits(2) <= step(11) and exceeds(moved_11, X_W);
-      limited   <= (or limits) or (limited and not valid(0));
-      if valid(0) = '1' and trusted = '0' then
-        x       <= (others => '0');
-        x_other <= (others => '0');
-      end if;
-
-      -- Stage 17: lambda_m = the carried flux, narrowed; alpha at clock 17, beta at 31
-      if valid(16) = '1' then
-        lambda_m_alpha <= rounded(FLUX_STATE_W - 1 downto FLUX_TO_STATE);
+        beta               <= '1';
+        lambda_m_alpha     <= lambda_m;
+        limited_alpha      <= limited;
+        state.lambda_alpha <= carried;
+        state.x_alpha      <= x_13;
       end if;
       if valid(LATENCY - 1) = '1' then
-        lambda_m_beta <= rounded(FLUX_STATE_W - 1 downto FLUX_TO_STATE);
-        merge_known   <= voltage_known;
-        merge_limited <= limited;
+        beta              <= '0';
+        lambda_m_beta     <= lambda_m;
+        merge_known       <= voltage_known;
+        merge_limited     <= limited_alpha or limited;
+        state.lambda_beta <= carried;
+        state.x_beta      <= x_13;
+        state.known       <= voltage_known;
       end if;
 
       if rst = '1' then
         valid(1 to LATENCY) <= (others => '0');
         beta                <= '0';
-        flux                <= (others => '0');
-        flux_other          <= (others => '0');
-        x                   <= (others => '0');
-        x_other             <= (others => '0');
+        state               <= (known => '0', others => (others => '0'));
         lambda_m_alpha      <= (others => '0');
         lambda_m_beta       <= (others => '0');
         merge_known         <= '0';
       end if;
     end if;
   end process;
-
-  rounded <= signed'('0' & (flux_other(FLUX_TO_STATE - 1) and not (and top)))
-             + resize(flux_other(FLUX_STATE_W - 1 downto FLUX_TO_STATE), rounded'length);
 
   out_valid <= valid(LATENCY);
 

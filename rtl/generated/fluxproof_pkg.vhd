@@ -37,10 +37,13 @@ package fluxproof_pkg is
 
   -- fluxproof: clocks from the raw sample to the duties, shortest distance of two samples
   constant FLUXPROOF_SAMPLE_TO_DUTY : positive := 40;
-  constant FLUXPROOF_SAMPLE_INTERVAL : positive := 62;
+  constant FLUXPROOF_SAMPLE_INTERVAL : positive := 60;
 
   -- register_access: clocks that a write waits for the end of a sample
-  constant REGISTER_PATIENCE : positive := 78;
+  constant REGISTER_PATIENCE : positive := 76;
+
+  -- multiply_add: the sums of products in all equations
+  constant MULTIPLY_ADD_LATENCY : positive := 3;
 
   -- sqrt: 001, section 5.2: voltage limit of the current regulation
   constant SQRT_LATENCY : positive := 5;
@@ -399,7 +402,7 @@ package fluxproof_pkg is
   constant FLUX_INVERSE_PARK_LATENCY : positive := 6;
 
   -- flux_merge: 001, eq. (7); 'Merge of voltage and current models' of Fig. 8
-  constant FLUX_MERGE_LATENCY : positive := 31;
+  constant FLUX_MERGE_LATENCY : positive := 30;
   constant FLUX_MERGE_Y_W : natural := 25;
   constant FLUX_MERGE_X_W : natural := 34;
   constant FLUX_MERGE_DROP_RHO : natural := 10;
@@ -441,9 +444,10 @@ package fluxproof_pkg is
   constant DELTA_LAMBDA_DROP_SHIFTED : natural := 5;
   constant DELTA_LAMBDA_DROP_FACTOR : natural := 17;
   constant DELTA_LAMBDA_FADE : natural := 4;
+  constant DELTA_LAMBDA_N_MAX : natural := 12;
 
   -- flux_compensation: 001, eq. (17): (K_p + K_i/s)*delta_lambda; the last term of eq. (16)
-  constant FLUX_COMPENSATION_LATENCY : positive := 12;
+  constant FLUX_COMPENSATION_LATENCY : positive := 9;
   constant FLUX_COMPENSATION_DROP_P : natural := 3;
   constant FLUX_COMPENSATION_DROP_I : natural := 10;
   constant FLUX_COMPENSATION_SHIFT_LIMIT : natural := 14;
@@ -457,7 +461,7 @@ package fluxproof_pkg is
   constant FLUX_MONITOR_LATENCY : positive := 1;
 
   -- current_directions: 000, eq. (6)
-  constant CURRENT_DIRECTIONS_LATENCY : positive := 31;
+  constant CURRENT_DIRECTIONS_LATENCY : positive := 23;
   constant CURRENT_DIRECTIONS_ONE : natural := 65536;
   constant CURRENT_DIRECTIONS_SQRT3 : signed(17 downto 0) := to_signed(113512, 18);  -- 1.732050808 as U(1,16), signed for the multiplier
   constant CURRENT_DIRECTIONS_DROP_TURN : natural := 16;
@@ -473,7 +477,7 @@ package fluxproof_pkg is
   constant CLEAN_VOLTAGE_DROP : natural := 11;
 
   -- v_dead_adaline: 000, eq. (10) and Fig. 4(a)
-  constant V_DEAD_ADALINE_LATENCY : positive := 29;
+  constant V_DEAD_ADALINE_LATENCY : positive := 22;
   constant V_DEAD_ADALINE_V_STATE_W : natural := 38;
   constant V_DEAD_ADALINE_V_FINE_W : natural := 25;
   constant V_DEAD_ADALINE_STEP_W : natural := 18;
@@ -488,7 +492,7 @@ package fluxproof_pkg is
   constant V_DEAD_ADALINE_FINE_TO_LEG : natural := 7;
 
   -- psi_adaline: 000, eq. (13), with the reluctance term of eq. (7b)
-  constant PSI_ADALINE_LATENCY : positive := 18;
+  constant PSI_ADALINE_LATENCY : positive := 16;
   constant PSI_ADALINE_PSI_STATE_W : natural := 36;
   constant PSI_ADALINE_DROP_V : natural := 11;
   constant PSI_ADALINE_DROP_R : natural := 17;
@@ -504,7 +508,7 @@ package fluxproof_pkg is
   -- telemetry_words: none: recording of samples
   constant TELEMETRY_WORDS_LATENCY : positive := 2;
   constant TELEMETRY_WORDS_COUNT : natural := 24;
-  constant TELEMETRY_WORDS_START : natural := 41;
+  constant TELEMETRY_WORDS_START : natural := 39;
   constant TELEMETRY_WORDS_INDEX_W : natural := 5;
 
   -- telemetry: none: recording of samples

@@ -178,4 +178,4 @@ def core_proof() -> Proof:
 
 
 def proofs() -> tuple[Proof, ...]:
-    return (*(block_proof(b) for b in BLOCKS.values() if not b.clocked), core_proof())
+    return (*(block_proof(b) for b in BLOCKS.values() if b.strobes and not b.clocked), core_proof())
