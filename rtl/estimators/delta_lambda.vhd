@@ -59,21 +59,21 @@ architecture rtl of delta_lambda is
 
   signal state : state_t;
 
-  signal valid      : std_logic_vector(0 to LATENCY);
-  signal by_r       : signed(RESISTANCE_W downto 0);
-  signal held       : std_logic;  -- from clock 1 on
-  signal u_int_1    : signed(INTEGRAL_W - 1 downto 0);
-  signal i_1        : signed(PU_W - 1 downto 0);
-  signal rest_4     : signed(REST_W - 1 downto 0);
-  signal coarse_5   : signed(WIDE_W - 1 downto 0);
-  signal shifted_6  : signed(WIDE_W - 1 downto 0);
-  signal value_7    : signed(FLUX_W - 1 downto 0);
-  signal past_7     : std_logic;
-  signal past_8     : std_logic;
-  signal limited    : std_logic;  -- of either result, from clock 9 on
-  signal factor_7   : signed(RECIPROCAL_W downto 0);
-  signal delta_10   : signed(FLUX_W - 1 downto 0);
-  signal delta_11   : signed(FLUX_W - 1 downto 0);
+  signal valid     : std_logic_vector(0 to LATENCY);
+  signal by_r      : signed(RESISTANCE_W downto 0);
+  signal held      : std_logic;  -- from clock 1 on
+  signal u_int_1   : signed(INTEGRAL_W - 1 downto 0);
+  signal i_1       : signed(PU_W - 1 downto 0);
+  signal rest_4    : signed(REST_W - 1 downto 0);
+  signal coarse_5  : signed(WIDE_W - 1 downto 0);
+  signal shifted_6 : signed(WIDE_W - 1 downto 0);
+  signal value_7   : signed(FLUX_W - 1 downto 0);
+  signal past_7    : std_logic;
+  signal past_8    : std_logic;
+  signal limited   : std_logic;  -- of either result, from clock 9 on
+  signal factor_7  : signed(RECIPROCAL_W downto 0);
+  signal delta_10  : signed(FLUX_W - 1 downto 0);
+  signal delta_11  : signed(FLUX_W - 1 downto 0);
 
   -- delta, decayed by a sixteenth
   function faded (delta : signed) return signed is
@@ -117,7 +117,7 @@ begin
       if valid(8) = '1' then
         limited <= past_7 or past_8;
       end if;
-      factor_7  <= -factor when valid(7) = '1' else factor;
+      factor_7 <= -factor when valid(7) = '1' else factor;
 
       -- Stages 11, 12: delta of d waits for that of q;  the state of the next sample
       delta_11 <= delta_10;
