@@ -1,4 +1,4 @@
-"""Current regulators of both axes, d first, through one pair of multipliers.
+"""Current regulators of both axes.
 
     err   = i_ref - i
     int  += ki*err      unless the voltage was at its limit and err pushes further
@@ -8,20 +8,20 @@
 This delay of one sample keeps the block independent of the limiter; the integral winds up for at most
 that sample.  ``run`` = 0: outputs and integrals are zero.
 
-Formats: err saturated to PU; proportional part rounded half up to S(3,28), whose limit of 8 lies so far
-beyond the output's that saturating it changes nothing; increment rounded half up to S(1,28), where
-2**-16 * ki still counts; integral saturated to S(1,28), twice the largest voltage the limiter grants;
-sum exact, rounded half up to PU and saturated, again twice the limiter's.
+Formats: err saturated to PU; proportional part rounded half up to S(9,28), which holds every product; increment
+rounded half up to S(1,28), where 2**-16 * ki still counts; integral saturated to S(1,28), twice the largest voltage
+the limiter grants; sum exact, rounded half up to PU and saturated, again twice the limiter's.
 """
 
 from typing import NamedTuple
 
 from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.fixed import Format, round_sat, saturate
+from fluxproof.golden_model.common.multiply_add import multiply_add
+from fluxproof.golden_model.fixed import Format, round_half_up, round_sat, saturate
 from fluxproof.golden_model.formats import BIT, INTEGRAL, INTEGRAL_W, KI, KP, PU, PU_TO_INTEGRAL, PU_W
 from fluxproof.golden_model.kernel import kernel
 
-PROPORTIONAL = Format(1, 3, 28)
+PROPORTIONAL = Format(1, 9, 28)
 PROPORTIONAL_W = PROPORTIONAL.width
 DROP_P = PU.frac_bits + KP.frac_bits - PROPORTIONAL.frac_bits
 DROP_I = PU.frac_bits + KI.frac_bits - INTEGRAL.frac_bits
@@ -37,13 +37,11 @@ class State(NamedTuple):
 def axis(integral, i, i_ref, sat, run, kp, ki):
     """One axis: (next integral, u_pi)."""
     err = saturate(i_ref - i, PU_W)
-    prod_p = err * kp
-    prod_i = err * ki
-    proportional = round_sat(prod_p, DROP_P, PROPORTIONAL_W)
-    increment = round_sat(prod_i, DROP_I, INTEGRAL_W)
-    if (sat > 0 and err > 0) or (sat < 0 and err < 0):
-        increment = 0
-    integral = saturate(integral + increment, INTEGRAL_W)
+    proportional = round_half_up(kp * err, DROP_P)
+    moved, _ = multiply_add(ki, err, integral, DROP_I, INTEGRAL_W)
+    held = (sat > 0 and err > 0) or (sat < 0 and err < 0)
+    if not held:
+        integral = moved
     if not run:
         integral, proportional = 0, 0
     return integral, round_sat(proportional + integral, PU_TO_INTEGRAL, PU_W)
@@ -114,9 +112,9 @@ BLOCK = Block(
         Port("u_int_q", INTEGRAL, doc="its integral part, q axis"),
     ),
     state=State(),
-    latency=8,
+    latency=6,
     soon=("u_pi_d",),
-    interval=3,
+    interval=5,
     constants={"DROP_P": DROP_P, "DROP_I": DROP_I, "PROPORTIONAL_W": PROPORTIONAL_W},
     reference=reference,
     bound=bound,

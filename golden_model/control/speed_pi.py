@@ -8,21 +8,20 @@
 Torque mode (``speed_mode`` = 0): i_q_ref is ``i_q_ext``, limited, and the integral follows it, so that
 a change to speed mode is bumpless.  ``run`` = 0: output and integral are zero.
 
-Formats: err saturated to PU; proportional part rounded half up to S(3,28): its limit of 8 lies so far
-beyond that of the output that saturating it changes nothing; increment rounded half up to S(1,28), where
-2**-16 * ki still counts; the integral is kept within +-i_max; sum exact, rounded half up to PU.
+Formats: err saturated to PU; proportional part rounded half up to S(9,28), which holds every product; increment
+rounded half up to S(1,28), where 2**-16 * ki still counts; the integral is kept within +-i_max; sum exact, rounded
+half up to PU.
 """
 
 from typing import NamedTuple
 
 from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.fixed import Format, clamp, round_half_up, round_sat, saturate
+from fluxproof.golden_model.fixed import Format, clamp, round_half_up, saturate
 from fluxproof.golden_model.formats import BIT, INTEGRAL, KI, KP, PU, PU_TO_INTEGRAL, PU_W
 from fluxproof.golden_model.kernel import kernel
 
-PROPORTIONAL = Format(1, 3, 28)
+PROPORTIONAL = Format(1, 9, 28)
 PROPORTIONAL_W = PROPORTIONAL.width
-INCREMENT_W = INTEGRAL.width
 DROP_P = PU.frac_bits + KP.frac_bits - PROPORTIONAL.frac_bits
 DROP_I = PU.frac_bits + KI.frac_bits - INTEGRAL.frac_bits
 
@@ -34,20 +33,16 @@ class State(NamedTuple):
 @kernel
 def step(state, omega_ref, omega_me, i_q_ext, speed_mode, run, speed_kp, speed_ki, i_max):
     err = saturate(omega_ref - omega_me, PU_W)
-    prod_p = err * speed_kp
-    prod_i = err * speed_ki
-    proportional = round_sat(prod_p, DROP_P, PROPORTIONAL_W)
-    increment = round_sat(prod_i, DROP_I, INCREMENT_W)
-    total = round_half_up(proportional + state.integral, PU_TO_INTEGRAL)
-    asked = total if speed_mode else i_q_ext
-    limit = i_max << PU_TO_INTEGRAL
-    hold = (total > i_max and err > 0) or (total < -i_max and err < 0)
-    if speed_mode:
-        integral = state.integral if hold else clamp(state.integral + increment, -limit, limit)
-    else:
-        integral = clamp(i_q_ext, -i_max, i_max) << PU_TO_INTEGRAL
+    proportional = round_half_up(speed_kp * err, DROP_P)
+    moved = state.integral + round_half_up(speed_ki * err, DROP_I)
+    asked = round_half_up(proportional + state.integral, PU_TO_INTEGRAL) if speed_mode else i_q_ext
     i_q_ref = clamp(asked, -i_max, i_max)
     limited = 1 if asked != i_q_ref else 0
+    held = (asked > i_max and err > 0) or (asked < -i_max and err < 0)
+    limit = i_max << PU_TO_INTEGRAL
+    integral = i_q_ref << PU_TO_INTEGRAL
+    if speed_mode:
+        integral = state.integral if held else clamp(moved, -limit, limit)
     if not run:
         integral, i_q_ref, limited = 0, 0, 0
     return State(integral), (i_q_ref, limited)
@@ -107,8 +102,8 @@ BLOCK = Block(
         Port("speed_limited", BIT, doc="1: output at its limit"),
     ),
     state=State(),
-    latency=7,
-    interval=7,
+    latency=5,
+    interval=5,
     constants={"DROP_P": DROP_P, "DROP_I": DROP_I, "PROPORTIONAL_W": PROPORTIONAL_W},
     reference=reference,
     bound=bound,

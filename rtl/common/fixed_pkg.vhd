@@ -51,13 +51,13 @@ package fixed_pkg is
   function rounding_base (a : signed; drop : positive; width : positive) return signed;
 
   -- '1' if x > limit*2**shift or x < -limit*2**shift, with one comparison; the sign of x selects the side.
-  function beyond (x : signed; limit : unsigned; shift : positive) return std_logic;
+  function beyond (x : signed; limit : unsigned; shift : natural) return std_logic;
 
   -- x limited to +-limit*2**shift, with one comparison; the result must fit the width of x.
-  function within (x : signed; limit : unsigned; shift : positive) return signed;
+  function within (x : signed; limit : unsigned; shift : natural) return signed;
 
   -- x limited to [0, limit*2**shift], with one comparison.
-  function within_u (x : signed; limit : unsigned; shift : positive) return unsigned;
+  function within_u (x : signed; limit : unsigned; shift : natural) return unsigned;
 
 end package fixed_pkg;
 
@@ -182,8 +182,8 @@ package body fixed_pkg is
     return result;
   end function;
 
-  function beyond (x : signed; limit : unsigned; shift : positive) return std_logic is
-    constant PARTS : positive := (shift + 3) / 4;
+  function beyond (x : signed; limit : unsigned; shift : natural) return std_logic is
+    constant PARTS : positive := maximum(1, (shift + 3) / 4);
     alias v        : signed(x'length - 1 downto 0) is x;
     variable size  : unsigned(x'length - 2 - shift downto 0);
     variable more  : unsigned(PARTS - 1 downto 0);
@@ -192,16 +192,19 @@ package body fixed_pkg is
     -- The complement of a negative x is -x - 1: if it reaches the limit, -x is above the limit.
     size := unsigned(v(v'high - 1 downto shift) xor v(v'high));
     -- The bits below the LSB of the limit, ORed in groups of four; the comparison's carry chain combines the groups.
-    for k in more'range loop
-      more(k) := or v(minimum(4 * k + 3, shift - 1) downto 4 * k);
-    end loop;
+    more := (others => '0');
+    if shift > 0 then
+      for k in more'range loop
+        more(k) := or v(minimum(4 * k + 3, shift - 1) downto 4 * k);
+      end loop;
+    end if;
     more(0) := more(0) or v(v'high);
     room    := signed(resize(limit & (PARTS - 1 downto 0 => '0'), room'length))
                - signed(resize(size & more, room'length));
     return room(room'high);
   end function;
 
-  function within (x : signed; limit : unsigned; shift : positive) return signed is
+  function within (x : signed; limit : unsigned; shift : natural) return signed is
     constant TOP : signed(x'length - 1 downto 0) := shift_left(signed(resize(limit, x'length)), shift);
   begin
     if beyond(x, limit, shift) = '0' then
@@ -212,7 +215,7 @@ package body fixed_pkg is
     return TOP;
   end function;
 
-  function within_u (x : signed; limit : unsigned; shift : positive) return unsigned is
+  function within_u (x : signed; limit : unsigned; shift : natural) return unsigned is
     constant WIDTH : positive := limit'length + shift;
   begin
     if x < 0 then

@@ -330,16 +330,16 @@ package fluxproof_pkg is
   constant PARK_LATENCY : positive := 5;
 
   -- speed_pi: 001, section 5.3: speed regulator with limited current reference
-  constant SPEED_PI_LATENCY : positive := 7;
+  constant SPEED_PI_LATENCY : positive := 5;
   constant SPEED_PI_DROP_P : natural := 4;
   constant SPEED_PI_DROP_I : natural := 12;
-  constant SPEED_PI_PROPORTIONAL_W : natural := 32;
+  constant SPEED_PI_PROPORTIONAL_W : natural := 38;
 
   -- current_pi: 001, Fig. 8 and section 5.2: PI_idq
-  constant CURRENT_PI_LATENCY : positive := 8;
+  constant CURRENT_PI_LATENCY : positive := 6;
   constant CURRENT_PI_DROP_P : natural := 4;
   constant CURRENT_PI_DROP_I : natural := 12;
-  constant CURRENT_PI_PROPORTIONAL_W : natural := 32;
+  constant CURRENT_PI_PROPORTIONAL_W : natural := 38;
 
   -- chord_speed: 001, eq. (2), for a voltage that is held during a sample
   constant CHORD_SPEED_LATENCY : positive := 9;

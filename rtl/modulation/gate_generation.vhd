@@ -42,146 +42,118 @@ entity gate_generation is
 end entity gate_generation;
 
 architecture rtl of gate_generation is
+  constant SETTLED : unsigned(11 downto 0) := (others => '1');  -- elapsed of a gate that is on
+
   type compare_t is array (0 to 2) of unsigned(15 downto 0);
-  type since_t is array (0 to 2) of unsigned(11 downto 0);
-  type lead_t is array (0 to 2) of signed(16 downto 0);
-  type missing_t is array (0 to 2) of signed(17 downto 0);
+  type elapsed_t is array (0 to 2) of unsigned(11 downto 0);
 
-  constant TO_COUNT : signed(15 downto 0) := to_signed(CARRIER_HALF, 16);
+  type state_t is record
+    carrier    : unsigned(15 downto 0);
+    down       : std_logic;
+    compare    : compare_t;
+    dead_time  : unsigned(11 downto 0);
+    min_pulse  : unsigned(11 downto 0);
+    configured : std_logic;
+    running    : std_logic;
+    tripped    : std_logic;
+    level      : unsigned(2 downto 0);  -- command of the leg
+    elapsed    : elapsed_t;             -- clocks that both gates of the leg have been off
+  end record state_t;
 
-  -- State.  The carrier's position and the state of a running dead time are computed one clock ahead and registered,
-  -- which keeps the logic between two registers short
-  signal below       : signed(15 downto 0);  -- carrier - CARRIER_HALF, never above -1
-  signal down        : std_logic;
-  signal top         : std_logic;  -- last clock of the up-count
-  signal valley      : std_logic;  -- last clock of the down-count
-  signal middle      : std_logic;  -- first clock of the up-count
-  signal compare     : compare_t;
-  signal dead_used   : unsigned(11 downto 0);
-  signal dead_is_one : std_logic;
-  signal pulse_used  : unsigned(11 downto 0);
-  signal configured  : std_logic;
-  signal running_now : std_logic;
-  signal tripped_now : std_logic;
-  signal level       : unsigned(2 downto 0);
-  signal was_off     : std_logic;
-  signal changed     : unsigned(2 downto 0);  -- the leg's command changed in the previous clock
-  signal same        : unsigned(2 downto 0);  -- the leg was enabled and its command did not change
-  signal since       : since_t;  -- clocks since the change, counted from 2 while both gates are off
+  signal state : state_t;
 
-  signal count    : unsigned(15 downto 0);
-  signal nothing  : signed(12 downto 0);
-  signal shorter  : signed(12 downto 0);
-  signal good     : std_logic;
-  signal on_now   : std_logic;
-  signal tripping : std_logic;
-  signal lead     : lead_t;  -- carrier minus the switching edge of the leg; >= 0: high
-  signal missing  : missing_t;  -- clocks since the change minus dead time; < 0: not over yet
-  signal wanted   : unsigned(2 downto 0);
-  signal over     : unsigned(2 downto 0);
+  signal valley     : std_logic;  -- last clock of the down-count
+  signal good       : std_logic;
+  signal configured : std_logic;
+  signal tripped_0  : std_logic;
+  signal on_0       : std_logic;
+  signal wanted     : unsigned(2 downto 0);
 begin
-  -- min_pulse in good is resized, because GHDL 5 truncates an integer to the width of the other operand.
-  count    <= unsigned(below + TO_COUNT);
-  shorter  <= signed('0' & dead_time) - signed('0' & min_pulse);
-  nothing  <= signed('0' & dead_time) - 1;
-  good     <= '1' when nothing(12) = '0' and shorter(12) = '1' and resize(min_pulse, 16) <= CARRIER_HALF else '0';
-  on_now   <= running_now and enable and not trip;
-  tripping <= trip or (tripped_now and not clear_trip);
+  valley     <= state.down when state.carrier = 0 else '0';
+  configured <= state.configured or good;
+  tripped_0  <= trip or (state.tripped and not clear_trip);
+  on_0       <= state.running and enable and not trip;
+
+  -- min_pulse is resized, because GHDL 5 truncates an integer to the width of the other operand.
+  good <= '1' when dead_time > 0 and dead_time < min_pulse and resize(min_pulse, 16) <= CARRIER_HALF else '0';
 
   legs : for k in 0 to 2 generate
-    lead(k)    <= below + signed('0' & compare(k));
-    wanted(k)  <= not lead(k)(16);
-    missing(k) <= signed(resize(since(k), 18)) - signed(resize(dead_used, 18));
-    over(k)    <= gate_high(k) or gate_low(k) or (changed(k) and dead_is_one) or (same(k) and not missing(k)(17));
+    wanted(k) <= '1' when resize(state.carrier, 17) + state.compare(k) >= CARRIER_HALF else '0';
   end generate;
 
   process (clk)
   begin
     if rising_edge(clk) then
       -- Carrier: up, the top value twice, down, zero twice
-      top    <= '1' when down = '0' and below = -2 else '0';
-      valley <= '1' when down = '1' and below = 1 - CARRIER_HALF else '0';
-      middle <= valley;
-      if top = '1' then
-        down <= '1';
+      if state.down = '0' and state.carrier = CARRIER_HALF - 1 then
+        state.down <= '1';
       elsif valley = '1' then
-        down <= '0';
+        state.down <= '0';
+      elsif state.down = '1' then
+        state.carrier <= state.carrier - 1;
       else
-        -- +1, or -1 as all ones
-        below <= below + (signed'(14 downto 0 => down) & '1');
+        state.carrier <= state.carrier + 1;
       end if;
 
       -- The gates are one register behind the carrier, and so is the mark of the zero vector's middle
-      sample <= middle;
+      sample <= not state.down when state.carrier = 0 else '0';
 
       -- At the valley: compare values and settings of the next period
-      running_now <= on_now;
-      tripped_now <= tripping;
+      state.running   <= on_0;
+      state.tripped   <= tripped_0;
+      setting_refused <= not good;
       if valley = '1' then
-        compare     <= (compare_a, compare_b, compare_c);
-        running_now <= enable and (configured or good) and not tripping;
+        state.compare    <= (compare_a, compare_b, compare_c);
+        state.configured <= configured;
+        state.running    <= enable and configured and not tripped_0;
         if good = '1' then
-          dead_used   <= dead_time;
-          dead_is_one <= dead_time ?= 1;
-          pulse_used  <= min_pulse;
-          configured  <= '1';
+          state.dead_time <= dead_time;
+          state.min_pulse <= min_pulse;
         end if;
       end if;
-      setting_refused <= not good;
 
       -- Legs: both gates are off during the dead time after a change of the command; a gate that is on stays on if the
       -- dead time is increased
-      was_off <= not on_now;
       for k in 0 to 2 loop
-        level(k)     <= wanted(k);
-        changed(k)   <= wanted(k) xor level(k);
-        same(k)      <= wanted(k) xnor level(k);
-        gate_high(k) <= over(k) and wanted(k) and level(k);
-        gate_low(k)  <= over(k) and not (wanted(k) or level(k));
-        if on_now = '0' then
-          level(k)     <= '0';
-          changed(k)   <= '0';
-          same(k)      <= '0';
-          gate_high(k) <= '0';
-          gate_low(k)  <= '0';
-        end if;
-        if changed(k) = '1' then
-          since(k) <= to_unsigned(2, 12);
-        elsif was_off = '1' then
-          since(k) <= to_unsigned(1, 12);
-        elsif (gate_high(k) or gate_low(k)) = '0' then
-          since(k) <= since(k) + 1;
+        gate_high(k) <= '0';
+        gate_low(k)  <= '0';
+        if on_0 = '0' then
+          state.level(k)   <= '0';
+          state.elapsed(k) <= (others => '0');
+        elsif wanted(k) /= state.level(k) then
+          state.level(k)   <= wanted(k);
+          state.elapsed(k) <= to_unsigned(1, 12);
+        elsif state.elapsed(k) < state.dead_time then
+          state.elapsed(k) <= state.elapsed(k) + 1;
+        else
+          state.elapsed(k) <= SETTLED;
+          gate_high(k)     <= state.level(k);
+          gate_low(k)      <= not state.level(k);
         end if;
       end loop;
 
       if rst = '1' then
-        below           <= to_signed(-CARRIER_HALF, 16);
-        down            <= '0';
-        top             <= '0';
-        valley          <= '0';
-        middle          <= '1';
-        compare         <= (others => (others => '0'));
-        dead_used       <= (others => '0');
-        dead_is_one     <= '0';
-        pulse_used      <= (others => '0');
-        configured      <= '0';
-        running_now     <= '0';
-        tripped_now     <= '0';
-        level           <= (others => '0');
-        was_off         <= '1';
-        changed         <= (others => '0');
-        same            <= (others => '0');
-        gate_high       <= (others => '0');
-        gate_low        <= (others => '0');
-        sample          <= '0';
-        setting_refused <= '0';
+        state.carrier    <= (others => '0');
+        state.down       <= '0';
+        state.compare    <= (others => (others => '0'));
+        state.dead_time  <= (others => '0');
+        state.min_pulse  <= (others => '0');
+        state.configured <= '0';
+        state.running    <= '0';
+        state.tripped    <= '0';
+        state.level      <= (others => '0');
+        state.elapsed    <= (others => (others => '0'));
+        gate_high        <= (others => '0');
+        gate_low         <= (others => '0');
+        sample           <= '0';
+        setting_refused  <= '0';
       end if;
     end if;
   end process;
 
-  running        <= running_now;
-  tripped        <= tripped_now;
-  min_pulse_used <= pulse_used;
-  carrier        <= count;
+  running        <= state.running;
+  tripped        <= state.tripped;
+  min_pulse_used <= state.min_pulse;
+  carrier        <= state.carrier;
 
 end architecture rtl;

@@ -7,10 +7,7 @@ from scripts.prove.proof import Fault, Proof, committed
 
 GATES = "modulation/gate_generation.vhd"
 COMPARE = "modulation/pwm_compare.vhd"
-SPIES = (
-    *("count", "down", "top", "valley", "compare", "dead_used", "dead_is_one", "pulse_used", "configured"),
-    *("level", "was_off", "changed", "same", "since"),
-)
+SPIES = ("state",)
 FULL = {"CARRIER_HALF": 10000}  # 200 MHz, 10 kHz: the default of the core
 SMALL = {"CARRIER_HALF": 8}  # a period of 16 clocks, so that a search sees several
 SEVERAL_PERIODS = 48
@@ -55,10 +52,10 @@ PROOFS = (
         "both gates of a leg are never on",
         "NEVER_BOTH",
         Fault(
-            "low gate follows the carrier at once",
+            "low gate on with the high gate",
             GATES,
-            "and not (wanted(k) or level(k));",
-            "and not (wanted(k) xor level(k));",
+            "gate_low(k)      <= not state.level(k);",
+            "gate_low(k)      <= '1';",
         ),
     ),
     gate_proof(
@@ -68,18 +65,16 @@ PROOFS = (
         Fault(
             "dead time one short",
             GATES,
-            "resize(since(k), 18))",
-            "resize(since(k) + 1, 18))",
+            "state.elapsed(k) < state.dead_time",
+            "state.elapsed(k) + 1 < state.dead_time",
         ),
         Fault(
             "no dead time after enable",
             GATES,
-            "(same(k) and not missing(k)(17))",
-            "not missing(k)(17)",
+            "state.elapsed(k) <= (others => '0');",
+            "state.elapsed(k) <= SETTLED;",
         ),
-        Fault(
-            "dead time counted on", GATES, "since(k) <= to_unsigned(2, 12);", "since(k) <= since(k) + 1;"
-        ),
+        Fault("dead time counted from two", GATES, "to_unsigned(1, 12)", "to_unsigned(2, 12)"),
     ),
     gate_proof(
         "trip_off",
@@ -88,26 +83,26 @@ PROOFS = (
         Fault(
             "trip waits for the valley",
             GATES,
-            "running_now and enable and not trip;",
-            "running_now and enable;",
+            "state.running and enable and not trip;",
+            "state.running and enable;",
         ),
     ),
     gate_proof(
         "trip_held",
         "after a trip the gates stay off until clear_trip without trip, then enable at a valley",
         "TRIP_HELD",
-        Fault("trip not latched", GATES, "trip or (tripped_now and not clear_trip)", "trip"),
+        Fault("trip not latched", GATES, "trip or (state.tripped and not clear_trip)", "trip"),
         Fault(
             "trip cleared while it lasts",
             GATES,
-            "trip or (tripped_now and not clear_trip)",
-            "(trip or tripped_now) and not clear_trip",
+            "trip or (state.tripped and not clear_trip)",
+            "(trip or state.tripped) and not clear_trip",
         ),
         Fault(
             "on again before the valley",
             GATES,
-            "      running_now <= on_now;",
-            "      running_now <= running_now and not tripping;",
+            "      state.running   <= on_0;",
+            "      state.running   <= state.running and not tripped_0;",
         ),
     ),
     gate_proof(
@@ -117,20 +112,20 @@ PROOFS = (
         Fault(
             "enable drops at the valley",
             GATES,
-            "running_now and enable and not trip;",
-            "running_now and not trip;",
+            "state.running and enable and not trip;",
+            "state.running and not trip;",
         ),
     ),
     gate_proof(
         "duty_at_the_valley",
         "a gate follows the compare value of the last valley and no later one",
         "AT_THE_VALLEY",
-        Fault("duty taken at once", GATES, "& compare(k)", "& compare_a"),
+        Fault("duty taken at once", GATES, "+ state.compare(k)", "+ compare_a"),
         Fault(
             "duty taken at the peak too",
             GATES,
-            "      if valley = '1' then\n        compare     <= (compare_a",
-            "      if valley = '1' or top = '1' then\n        compare     <= (compare_a",
+            "      if valley = '1' then\n        state.compare    <= (compare_a",
+            "      if valley = '1' or state.carrier = CARRIER_HALF - 1 then\n        state.compare    <= (compare_a",
         ),
     ),
     gate_proof(
@@ -140,14 +135,14 @@ PROOFS = (
         Fault(
             "contradiction accepted",
             GATES,
-            "signed('0' & dead_time) - signed",
-            "signed('0' & dead_time) - 1 - signed",
+            "dead_time < min_pulse",
+            "dead_time <= min_pulse",
         ),
         Fault(
             "runs unconfigured",
             GATES,
-            "enable and (configured or good) and not tripping",
-            "enable and not tripping",
+            "enable and configured and not tripped_0",
+            "enable and not tripped_0",
         ),
         Fault(
             "long minimum pulse accepted", GATES, " and resize(min_pulse, 16) <= CARRIER_HALF else", " else"
@@ -158,18 +153,18 @@ PROOFS = (
         "a gate that is on goes off only when the command of its leg changes, or by trip, enable or reset",
         "STAYS_ON",
         # Low gate: the high gate is on at the valley only after half a period, beyond the depth of the search.
-        Fault("gate off when the dead time grows", GATES, "gate_high(k) or gate_low(k) or", "gate_high(k) or"),
+        Fault("gate off when the dead time grows", GATES, "state.elapsed(k) <= SETTLED;", "state.elapsed(k) <= state.dead_time;"),
     ),
     gate_proof(
         "minimum_pulse",
         "a gate that is on stays on for at least min_pulse - dead_time, unless trip, enable or reset end it",
         "GATE_PULSE",
-        Fault("dead time one too long", GATES, "resize(since(k), 18))", "resize(since(k) - 1, 18))"),
+        Fault("dead time one too long", GATES, "state.elapsed(k) < state.dead", "state.elapsed(k) <= state.dead"),
         Fault(
             "duty taken at the peak too",
             GATES,
-            "      if valley = '1' then\n        compare     <= (compare_a",
-            "      if valley = '1' or top = '1' then\n        compare     <= (compare_a",
+            "      if valley = '1' then\n        state.compare    <= (compare_a",
+            "      if valley = '1' or state.carrier = CARRIER_HALF - 1 then\n        state.compare    <= (compare_a",
         ),
         patience=600,
         assumed="the loaded compare values respect the minimum pulse loaded with them (see minimum_pulse_asked)",

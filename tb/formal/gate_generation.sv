@@ -32,18 +32,7 @@ module formal_top (
   wire [11:0] min_pulse_used;
   wire [15:0] carrier;
 `ifdef LEMMAS
-  wire [15:0] spy_count;
-  wire        spy_down, spy_top, spy_valley;
-  wire [47:0] spy_compare;  // leg a is the uppermost
-  wire [11:0] spy_dead_used;
-  wire        spy_dead_is_one;
-  wire [11:0] spy_pulse_used;
-  wire        spy_configured;
-  wire [ 2:0] spy_level;
-  wire        spy_was_off;
-  wire [ 2:0] spy_changed;
-  wire [ 2:0] spy_same;
-  wire [35:0] spy_since;  // leg a is the uppermost
+  wire [130:0] spy_state;
 `endif
 
   gate_generation dut (
@@ -67,20 +56,7 @@ module formal_top (
       .carrier(carrier)
 `ifdef LEMMAS
       ,
-      .spy_count(spy_count),
-      .spy_down(spy_down),
-      .spy_top(spy_top),
-      .spy_valley(spy_valley),
-      .spy_compare(spy_compare),
-      .spy_dead_used(spy_dead_used),
-      .spy_dead_is_one(spy_dead_is_one),
-      .spy_pulse_used(spy_pulse_used),
-      .spy_configured(spy_configured),
-      .spy_level(spy_level),
-      .spy_was_off(spy_was_off),
-      .spy_changed(spy_changed),
-      .spy_same(spy_same),
-      .spy_since(spy_since)
+      .spy_state(spy_state)
 `endif
   );
 
@@ -255,34 +231,36 @@ module formal_top (
 `endif
 
 `ifdef LEMMAS
+  // The record `state` of the entity, its last field first; within an array leg a is the uppermost.
+  wire [35:0] spy_elapsed;
+  wire [ 2:0] spy_level;
+  wire        spy_tripped, spy_running, spy_configured;
+  wire [11:0] spy_min_pulse, spy_dead_time;
+  wire [47:0] spy_compare;
+  wire        spy_down;
+  wire [15:0] spy_carrier;
+  assign {spy_elapsed, spy_level, spy_tripped, spy_running, spy_configured, spy_min_pulse, spy_dead_time, spy_compare,
+          spy_down, spy_carrier} = spy_state;
+
   wire [15:0] compare_of_leg = leg == 0 ? spy_compare[47:32] : leg == 1 ? spy_compare[31:16] : spy_compare[15:0];
-  wire [11:0] since = leg == 0 ? spy_since[35:24] : leg == 1 ? spy_since[23:12] : spy_since[11:0];
-  wire changed = leg == 0 ? spy_changed[0] : leg == 1 ? spy_changed[1] : spy_changed[2];
-  // Clocks of the dead time that have gone: the counter starts a clock late
-  wire [11:0] elapsed = changed ? 12'd1 : spy_was_off ? 12'd0 : since;
+  wire [11:0] elapsed = leg == 0 ? spy_elapsed[35:24] : leg == 1 ? spy_elapsed[23:12] : spy_elapsed[11:0];
   wire level = leg == 0 ? spy_level[0] : leg == 1 ? spy_level[1] : spy_level[2];
-  wire same = leg == 0 ? spy_same[0] : leg == 1 ? spy_same[1] : spy_same[2];
   wire settled = high || low;
 
   always @(posedge clk) if (begun) begin
     // The same valley, the same settings
-    assert (carrier == spy_count && spy_count < HALF);
-    if (spy_count == 0) assert (spy_down == was_one);
-    assert (spy_valley == (spy_count == 0 && spy_down));
-    assert (spy_top == (spy_count == HALF - 1 && !spy_down));
-    assert (spy_dead_is_one == (spy_dead_used == 1));
-    if (changed) assert (!spy_was_off && !settled);
-    assert (same == !(changed || spy_was_off));
-    if (spy_was_off) assert (!settled && !level && !high && !low);
-    if (running && !spy_was_off) assert (accepted);
+    assert (carrier == spy_carrier && spy_carrier < HALF);
+    if (spy_carrier == 0) assert (spy_down == was_one);
     assert (compare == compare_of_leg);
-    assert (dead_in_force == spy_dead_used && pulse_in_force == spy_pulse_used);
+    assert (dead_in_force == spy_dead_time && pulse_in_force == spy_min_pulse);
     assert (accepted == spy_configured);
-    assert (tripped == locked);
+    assert (running == spy_running);
+    assert (tripped == spy_tripped && tripped == locked);
     if (accepted) assert (dead_in_force > 0 && dead_in_force < pulse_in_force && pulse_in_force <= HALF);
     if (running) assert (accepted && allowed && !locked);
     if (high || low) assert (running);
     // A gate is on where the leg has settled, and only there
+    assert (settled == (&elapsed));
     assert (high == (settled && level) && low == (settled && !level));
     if (high || low) assert (level == was_wanted && accepted && allowed);
     if (!settled) assert (elapsed <= off_time + 13'd1);
@@ -290,7 +268,7 @@ module formal_top (
 
 `ifdef GATE_PULSE
   // Where the carrier is in its period, and for how many clocks the leg has wanted what it wants.
-  wire [16:0] at = spy_down ? {HALF[15:0], 1'b0} - 17'd1 - spy_count : {1'b0, spy_count};
+  wire [16:0] at = spy_down ? {HALF[15:0], 1'b0} - 17'd1 - spy_carrier : {1'b0, spy_carrier};
   wire on = running && was_running;
   reg [15:0] held;
   always @(posedge clk) held <= rst || wanted != was_wanted || !was_running ? 1 : &held ? held : held + 1;
