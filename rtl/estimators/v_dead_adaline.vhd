@@ -92,7 +92,6 @@ architecture rtl of v_dead_adaline is
   signal grown_17  : signed(STATE_W downto 0);
   signal v_sum_18  : signed(STATE_W - 1 downto 0);
   signal asked_21  : signed(ASKED_W - 1 downto 0);
-  signal v_dead_21 : signed(V_LEG_W - 1 downto 0);
 begin
   valid(0) <= in_valid;
   wide_u_h <= shift_left(resize(u_h_2, FLUX_W), PU_TO_FLUX);
@@ -135,6 +134,7 @@ begin
     port map (clk => clk, a => fine_13, b => by_gamma, c => v_sum_18, y => asked_21, limited => open);
 
   process (clk)
+    variable v_dead_22 : signed(V_LEG_W - 1 downto 0);
     variable v_comp_22 : signed(V_LEG_W - 1 downto 0);
   begin
     if rising_edge(clk) then
@@ -164,29 +164,19 @@ begin
       fine_13 <= resize(round_half_up(v_dead_12, DROP_FINE), FINE_W);
 
       -- Stage 14: zeta while learning and |fine| > v_thr
-      zeta_14 <= (others => '0');
-      if learning = '1' and beyond(fine_13, v_thr, FINE_TO_LEG) = '1' then
-        zeta_14 <= signed('0' & zeta);
-      end if;
+      zeta_14 <= signed('0' & zeta) and (learning and beyond(fine_13, v_thr, FINE_TO_LEG));
 
       -- Stage 18: v_sum = grown, limited
-      v_sum_18 <= (others => '0');
-      if compensate = '1' then
-        v_sum_18 <= signed('0' & within_u(grown_17, v_comp_max, TO_LEG));
-      end if;
-
-      -- Stages 14 to 21: v_dead as an output
-      v_dead_21 <= resize(round_half_up(fine_13, FINE_TO_LEG), V_LEG_W);
+      v_sum_18 <= signed('0' & within_u(grown_17, v_comp_max, TO_LEG)) and compensate;
 
       -- Stage 22: v_comp = asked, limited;  v_leg = v_comp + v_dead;  the state of the next sample
-      v_comp_22 := (others => '0');
-      if compensate = '1' then
-        v_comp_22 := resize(round_half_up(signed('0' & within_u(asked_21, v_comp_max, TO_LEG)), TO_LEG), V_LEG_W);
-      end if;
+      v_dead_22 := resize(round_half_up(fine_13, FINE_TO_LEG), V_LEG_W);
+      v_comp_22 := resize(round_half_up(signed('0' & within_u(asked_21, v_comp_max, TO_LEG)), TO_LEG), V_LEG_W)
+                   and compensate;
       if valid(LATENCY - 1) = '1' then
-        v_dead         <= v_dead_21;
+        v_dead         <= v_dead_22;
         v_comp         <= v_comp_22;
-        v_leg          <= saturate(resize(v_comp_22, V_LEG_W + 1) + v_dead_21, V_LEG_W);
+        v_leg          <= saturate(resize(v_comp_22, V_LEG_W + 1) + v_dead_22, V_LEG_W);
         v_comp_limited <= compensate and beyond(asked_21, v_comp_max, TO_LEG) and not asked_21(ASKED_W - 1);
         state          <= (lp_u => lp_u_5, lp_d => lp_d_5, v_dead => v_dead_12, v_sum => v_sum_18);
         if run = '0' then

@@ -36,7 +36,7 @@ package fluxproof_pkg is
   constant TRIG_ONE : natural := 65536;
 
   -- fluxproof: clocks from the raw sample to the duties, shortest distance of two samples
-  constant FLUXPROOF_SAMPLE_TO_DUTY : positive := 40;
+  constant FLUXPROOF_SAMPLE_TO_DUTY : positive := 39;
   constant FLUXPROOF_SAMPLE_INTERVAL : positive := 60;
 
   -- register_access: clocks that a write waits for the end of a sample
@@ -352,7 +352,7 @@ package fluxproof_pkg is
   constant DECOUPLING_DROP : natural := 16;
 
   -- voltage_limit: 001, Fig. 1: decoupling at the regulators' output; limit of the space-vector modulation
-  constant VOLTAGE_LIMIT_LATENCY : positive := 11;
+  constant VOLTAGE_LIMIT_LATENCY : positive := 10;
 
   -- svm_delay_compensation: 001, section 5.2, SVM delay compensation
   constant SVM_DELAY_COMPENSATION_LATENCY : positive := 1;
