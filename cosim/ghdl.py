@@ -15,6 +15,7 @@ from xml.etree import ElementTree
 from cocotb_tools.runner import get_runner
 
 from fluxproof.checkout import BUILD, ROOT, RTL
+from fluxproof.cosim.flat import flat_top
 from fluxproof.cosim.sources import closure
 
 KEPT_S = 24 * 3600.0  # builds of older sources that were not used for so long are deleted
@@ -33,10 +34,12 @@ def run_folder(toplevel: str, generics: dict, rtl: Path = RTL, key: str = "") ->
 def build(toplevel: str, rtl: Path = RTL, extra=()) -> Path:
     """Analyse and elaborate ``toplevel`` once per state of the sources it needs; the folder it is in.
 
-    Generics are set when the simulation starts, so all configurations share a build, and so do processes that run at
-    the same time.  Raises BuildError with GHDL's words where the VHDL does not build.
+    An entity with records as ports is built inside a flat top (cosim/flat.py).  Generics are set when the simulation
+    starts, so all configurations share a build, and so do processes that run at the same time.  Raises BuildError with
+    GHDL's words where the VHDL does not build.
     """
-    sources = closure(toplevel, rtl, extra)
+    toplevel, around = flat_top(toplevel, rtl, extra)
+    sources = closure(toplevel, rtl, [*extra, *around])
     state = hashlib.sha256(os.environ.get("GHDL_BACKEND", "").encode())
     for path in sources:
         state.update(f"{path}\n".encode() + path.read_bytes())
@@ -82,6 +85,7 @@ def run(
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "results.xml").unlink(missing_ok=True)
     built = build(toplevel, rtl, extra)
+    toplevel, _ = flat_top(toplevel, rtl, extra)
     # `ghdl -r` starts the program of this name in the folder it runs in; mcode, which makes none, reads the library.
     (folder / toplevel).unlink(missing_ok=True)
     if (built / toplevel).exists():

@@ -22,9 +22,10 @@ from functools import lru_cache
 from pathlib import Path
 
 from fluxproof.checkout import ROOT, RTL
+from fluxproof.cosim.flat import flat_top
 from fluxproof.cosim.sources import rtl_sources
 
-TOP = "fluxproof"
+TOP = "fluxproof_flat"
 OLDEST_GHDL = 5
 
 _ENTITY = re.compile(r"entity\s+(\w+)\s+is(.*?)end\s+entity", re.IGNORECASE | re.DOTALL)
@@ -96,11 +97,16 @@ def synthesize(sources: Sequence[Path], top: str, generics: Mapping[str, int]) -
     return done.stdout
 
 
+def sources_of(top: str, rtl: Path = RTL) -> list[Path]:
+    """The files of the core in compile order, then the flat top's where ``top`` is one."""
+    return [*rtl_sources(rtl), *flat_top(top, rtl)[1]]
+
+
 def conversion_key(generics: Mapping[str, int], rtl: Path = RTL, top: str = TOP) -> str:
     """16 hex digits that change with the sources, the generics and the version of GHDL."""
     digest = hashlib.sha256(repr((find_ghdl()[1], top, sorted(generics.items()))).encode())
-    for path in rtl_sources(rtl):
-        digest.update(str(path.relative_to(rtl)).encode() + b"\0" + path.read_bytes())
+    for path in sources_of(top, rtl):
+        digest.update(path.name.encode() + b"\0" + path.read_bytes())
     return digest.hexdigest()[:16]
 
 
@@ -116,7 +122,7 @@ def convert(generics: Mapping[str, int], out_dir: Path | str, rtl: Path = RTL, t
     text, converted = "", None
     while converted != key:  # once, unless someone saves a source meanwhile
         converted = key
-        text = synthesize(rtl_sources(rtl), top, generics)
+        text = synthesize(sources_of(top, rtl), top, generics)
         key = conversion_key(generics, rtl, top)
     setting = ", ".join(f"{name}={value}" for name, value in generics.items()) or "as in the VHDL"
     heading = f"// {top} {key}: converted from VHDL by GHDL {find_ghdl()[1]}; generics: {setting}\n"
@@ -139,7 +145,8 @@ def _key_of(path: Path, top: str) -> str | None:
 def top_ports(verilog: Path, rtl: Path = RTL, top: str = TOP) -> tuple[VerilogPort, ...]:
     """The ports of the converted top in order: widths from the Verilog, signs from the VHDL entity."""
     header = re.search(rf"^module {top}\s*\((.*?)\);", verilog.read_text(), re.MULTILINE | re.DOTALL)
-    entities = {name.lower(): body for name, body in _ENTITY.findall(next(rtl.rglob(f"{top}.vhd")).read_text())}
+    file = next(path for path in sources_of(top, rtl) if path.stem == top)
+    entities = {name.lower(): body for name, body in _ENTITY.findall(file.read_text())}
     if header is None or top not in entities:
         raise ValueError(f"no {top} in {verilog.name}, or none in {top}.vhd")
     kinds = {name.lower(): kind.lower() for name, kind in _VHDL_PORT.findall(entities[top])}

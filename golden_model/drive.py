@@ -144,6 +144,7 @@ class Core:
     """[core]"""
 
     clock_hz: float = positive("Hz", "of the core; a whole multiple of twice the PWM frequency")
+    estimators: bool = flag("false: field-oriented control alone; flux_mode and the compensation have no effect", True)
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ at every clock (sample guard, fault latch, gate generation) is in golden_model/c
 from collections import namedtuple
 from typing import NamedTuple
 
+from fluxproof.golden_model import estimation
 from fluxproof.golden_model.block import Port
 from fluxproof.golden_model.control import (
     chord_speed,
@@ -34,6 +35,7 @@ from fluxproof.golden_model.estimators import (
     v_dead_adaline,
     winding_resistance,
 )
+from fluxproof.golden_model.estimators.flux_models import CURRENT_MODEL
 from fluxproof.golden_model.formats import PU
 from fluxproof.golden_model.io import (
     current_conditioning,
@@ -124,6 +126,15 @@ def schedule() -> dict[str, tuple[int, int]]:
     return times
 
 
+# Two Park transforms whose outputs the top renames; the others' outputs already have the names of their use.
+RENAMED = {"compensation_dq": ("u_comp_d", "u_comp_q"), "direction_functions": ("d_d", "d_q")}
+
+
+def outputs_of(instance: str) -> tuple[str, ...]:
+    """The names at the top of an instance's outputs, in the order of its block's."""
+    return RENAMED.get(instance, tuple(p.name for p in WIRING[instance][0].BLOCK.outputs))
+
+
 SAMPLE_TO_DUTY = schedule()["modulator"][1]
 SAMPLE_INTERVAL = max(last for _, last in schedule().values()) + 1  # no sample enters while one is in flight
 
@@ -137,6 +148,7 @@ class Config(NamedTuple):
     adc_bits: int = 16
     position_bits: int = 16
     carrier_half: int = 10000
+    estimators: int = 1  # 0: field-oriented control alone
 
 
 class Sample(NamedTuple):
@@ -253,21 +265,15 @@ class Observed(NamedTuple):
     compare_c: int
 
 
+NOTHING_GIVEN, NOTHING_ESTIMATED = estimation.ForControl(), estimation.Estimated()
+
+
 @kernel
 def step(state, sample, regs, config):
     """One control period: (next state, Observed)."""
     x, r, c = sample, regs, config
     i_a, i_b, i_c, current_at_rail = current_conditioning.step(
-        x.adc_a,
-        x.adc_b,
-        x.adc_c,
-        r.offset_a,
-        r.offset_b,
-        r.offset_c,
-        r.gain_a,
-        r.gain_b,
-        r.gain_c,
-        c.adc_bits,
+        x.adc_a, x.adc_b, x.adc_c, r.offset_a, r.offset_b, r.offset_c, r.gain_a, r.gain_b, r.gain_c, c.adc_bits
     )
     (theta_me,) = position.step(x.position_code, r.reverse, r.pole_pairs, r.theta_offset, c.position_bits)
     speed_state, (omega_me,) = speed.step(
@@ -283,205 +289,63 @@ def step(state, sample, regs, config):
     cos_theta, sin_theta, cos_out, sin_out = sincos.step(theta_me, theta_out)
     i_d, i_q = park.step(i_alpha, i_beta, cos_theta, sin_theta)
 
+    given, flux_mode = NOTHING_GIVEN, CURRENT_MODEL
+    if c.estimators:
+        given = estimation.for_control(state, x, r, cos_theta, sin_theta, cos_out, sin_out)
+        flux_mode = r.flux_mode
     speed_pi_state, (i_q_ref, speed_limited) = speed_pi.step(
-        state.of_speed_pi,
-        x.omega_ref,
-        omega_me,
-        x.i_q_ext,
-        x.speed_mode,
-        x.run,
-        r.speed_kp,
-        r.speed_ki,
-        r.i_max,
+        state.of_speed_pi, x.omega_ref, omega_me, x.i_q_ext, x.speed_mode, x.run, r.speed_kp, r.speed_ki, r.i_max
     )
     current_pi_state, (u_pi_d, u_pi_q, u_int_d, u_int_q) = current_pi.step(
-        state.of_current_pi,
-        i_d,
-        i_q,
-        x.i_d_ref,
-        i_q_ref,
-        state.sat_d,
-        state.sat_q,
-        x.run,
-        r.kp_d,
-        r.ki_d,
-        r.kp_q,
+        state.of_current_pi, i_d, i_q, x.i_d_ref, i_q_ref, state.sat_d, state.sat_q, x.run, r.kp_d, r.ki_d, r.kp_q,
         r.ki_q,
-    )
-    winding_r, minus_rho, temp_lost = winding_resistance.step(
-        x.temp_winding, x.temp_valid, r.r_s, r.tcr, r.t_0, r.t_min, r.t_max, r.t_s
-    )
-    lambda_m_d, lambda_m_q = flux_park.step(state.lambda_m_alpha, state.lambda_m_beta, cos_theta, sin_theta)
+    )  # fmt: skip
     model_d, model_q, merged_d, merged_q, merged, ended, raised_d, raised_q = flux_models.step(
-        i_d,
-        i_q,
-        lambda_m_d,
-        lambda_m_q,
-        state.lambda_pi_d,
-        state.lambda_pi_q,
-        state.merge_known,
-        x.run,
-        minus_rho,
-        r.flux_mode,
-        r.l_d,
-        r.l_q,
-        r.lambda_mg,
-    )
+        i_d, i_q, given.lambda_m_d, given.lambda_m_q, state.lambda_pi_d, state.lambda_pi_q, state.merge_known,
+        x.run, given.minus_rho, flux_mode, r.l_d, r.l_q, r.lambda_mg,
+    )  # fmt: skip
     lambda_d, lambda_q, estimate_limited = flux_estimate.step(
         model_d, model_q, merged_d, merged_q, merged, ended
     )
     (omega_chord,) = chord_speed.step(omega_me, r.k_chord)
     u_dec_d, u_dec_q = decoupling.step(omega_chord, lambda_d, lambda_q)
-    u_comp_alpha, u_comp_beta = dead_time_compensation.step(state.v_comp, state.s_alpha, state.s_beta)
-    u_comp_d, u_comp_q = park.step(u_comp_alpha, u_comp_beta, cos_out, sin_out)
-    d_d, d_q = park.step(state.s_alpha, state.s_beta, cos_out, sin_out)
     voltage_limit_state, (u_d, u_q, sat_d, sat_q) = voltage_limit.step(
-        state.of_voltage_limit, u_pi_d, u_pi_q, u_dec_d, u_dec_q, u_comp_d, u_comp_q, u_max
+        state.of_voltage_limit, u_pi_d, u_pi_q, u_dec_d, u_dec_q, given.u_comp_d, given.u_comp_q, u_max
     )
 
     u_alpha, u_beta = inverse_park.step(u_d, u_q, cos_out, sin_out)
     duty_a, duty_b, duty_c = svm.step(u_alpha, u_beta, inverse, inverse_beta)
     compare_a, compare_b, compare_c = pwm_compare.step(duty_a, duty_b, duty_c, r.min_pulse, c.carrier_half)
 
-    u_applied_alpha, u_applied_beta, voltage_known = applied_voltage.step(
-        state.compare_a, state.compare_b, state.compare_c, u_dc, u_dc_at_rail, x.run, c.carrier_half
-    )
-    clean_state, (u_clean_alpha, u_clean_beta) = clean_voltage.step(
-        state.of_clean_voltage, u_applied_alpha, u_applied_beta, state.s_alpha, state.s_beta, state.v_leg
-    )
-    s_alpha, s_beta = current_directions.step(i_alpha, i_beta, omega_me, r.k_ahead, r.k_sign)
-    lambda_c_d, lambda_c_q, model_limited = current_model.step(
-        model_d, model_q, raised_d, raised_q, state.lambda_add_d, state.lambda_add_q
-    )
-    lambda_c_alpha, lambda_c_beta = flux_inverse_park.step(lambda_c_d, lambda_c_q, cos_theta, sin_theta)
-    merge_state, (lambda_m_alpha, lambda_m_beta, merge_known, merge_limited) = flux_merge.step(
-        state.of_flux_merge,
-        i_alpha,
-        i_beta,
-        lambda_c_alpha,
-        lambda_c_beta,
-        u_clean_alpha,
-        u_clean_beta,
-        voltage_known,
-        x.run,
-        minus_rho,
-        r.omega_0,
-        r.xi,
-        r.t_s,
-    )
-    factor, n_omega = speed_reciprocal.step(omega_me, r.omega_min, r.k_ramp)
-    delta_state, (delta_lambda_d, delta_lambda_q, delta_held, delta_limited) = delta_lambda.step(
-        state.of_delta_lambda,
-        u_int_d,
-        u_int_q,
-        i_d,
-        i_q,
-        sat_d,
-        sat_q,
-        current_at_rail,
-        voltage_known,
-        x.run,
-        factor,
-        n_omega,
-        winding_r,
-    )
-    compensation_state, compensated = flux_compensation.step(
-        state.of_flux_compensation,
-        delta_lambda_d,
-        delta_lambda_q,
-        delta_held,
-        r.flux_mode,
-        r.flux_kp,
-        r.flux_ki,
-        r.delta_max,
-    )
-    lambda_pi_d, lambda_pi_q, lambda_add_d, lambda_add_q, compensation_limited = compensated
-    (torque_me,) = torque.step(lambda_d, lambda_q, i_d, i_q)
-    monitor_state, (flux_faults,) = flux_monitor.step(
-        state.of_flux_monitor,
-        current_at_rail,
-        u_dc_at_rail,
-        u_dc_low,
-        model_limited,
-        merge_limited,
-        delta_limited,
-        compensation_limited,
-        estimate_limited,
-        x.clear_faults,
-    )
-
-    v_dead_state, (v_dead, v_comp, v_leg, v_comp_limited) = v_dead_adaline.step(
-        state.of_v_dead_adaline,
-        u_pi_d,
-        d_d,
-        i_d,
-        i_q,
-        sat_d,
-        sat_q,
-        current_at_rail,
-        voltage_known,
-        x.run,
-        r.k_lp,
-        r.eta_v,
-        r.gamma,
-        r.zeta,
-        r.v_thr,
-        r.v_comp_max,
-        r.i_learn,
-        r.compensate,
-    )
-    psi_state, (psi_m, psi_held) = psi_adaline.step(
-        state.of_psi_adaline,
-        u_q,
-        d_q,
-        state.v_leg,
-        i_d,
-        i_q,
-        winding_r,
-        omega_chord,
-        sat_d,
-        sat_q,
-        current_at_rail,
-        voltage_known,
-        x.run,
-        r.l_d,
-        r.eta_psi,
-        r.omega_psi_min,
-    )
+    after, e = estimation.kept(state), NOTHING_ESTIMATED
+    if c.estimators:
+        seen = estimation.Seen(
+            i_alpha, i_beta, i_d, i_q, current_at_rail, u_dc, u_dc_at_rail, u_dc_low, omega_me, omega_chord, cos_theta,
+            sin_theta, model_d, model_q, raised_d, raised_q, lambda_d, lambda_q, estimate_limited, u_pi_d, u_int_d,
+            u_int_q, u_q, sat_d, sat_q,
+        )  # fmt: skip
+        after, e = estimation.step(state, given, seen, x, r, c.carrier_half)
 
     checks_state, (sample_faults, sample_trip) = sample_checks.step(
-        state.of_sample_checks,
-        i_a,
-        i_b,
-        i_c,
-        current_at_rail,
-        u_dc,
-        u_dc_at_rail,
-        x.position_code,
-        r.i_trip,
-        r.sum_trip,
-        r.rail_samples,
-        r.u_dc_min,
-        r.u_dc_max,
-        r.jump_max,
-        r.fault_ignore,
-        c.position_bits,
-    )
+        state.of_sample_checks, i_a, i_b, i_c, current_at_rail, u_dc, u_dc_at_rail, x.position_code, r.i_trip,
+        r.sum_trip, r.rail_samples, r.u_dc_min, r.u_dc_max, r.jump_max, r.fault_ignore, c.position_bits,
+    )  # fmt: skip
 
     following = State(
-        speed_state, speed_pi_state, current_pi_state, voltage_limit_state, merge_state, delta_state,
-        compensation_state, monitor_state, v_dead_state, psi_state, clean_state, checks_state, sat_d, sat_q,
-        compare_a, compare_b, compare_c, lambda_m_alpha, lambda_m_beta, merge_known, lambda_pi_d, lambda_pi_q,
-        lambda_add_d, lambda_add_q, v_comp, v_leg, s_alpha, s_beta,
+        speed_state, speed_pi_state, current_pi_state, voltage_limit_state, after.of_flux_merge, after.of_delta_lambda,
+        after.of_flux_compensation, after.of_flux_monitor, after.of_v_dead_adaline, after.of_psi_adaline,
+        after.of_clean_voltage, checks_state, sat_d, sat_q, compare_a, compare_b, compare_c, after.lambda_m_alpha,
+        after.lambda_m_beta, after.merge_known, after.lambda_pi_d, after.lambda_pi_q, after.lambda_add_d,
+        after.lambda_add_q, after.v_comp, after.v_leg, after.s_alpha, after.s_beta,
     )  # fmt: skip
     return following, Observed(
         i_a, i_b, i_c, current_at_rail, u_dc, u_max, u_dc_at_rail, u_dc_low, theta_me, omega_me, i_d, i_q,
-        i_q_ref, speed_limited, lambda_d, lambda_q, omega_chord, u_dec_d, u_dec_q, u_comp_d, u_comp_q, u_int_d,
-        u_int_q, u_d, u_q, sat_d, sat_q, u_alpha, u_beta, duty_a, duty_b, duty_c, u_applied_alpha,
-        u_applied_beta, lambda_c_d, lambda_c_q, lambda_m_alpha, lambda_m_beta, merge_known, delta_lambda_d,
-        delta_lambda_q, delta_held, lambda_pi_d, lambda_pi_q, torque_me, flux_faults, d_d, d_q, v_dead, v_comp,
-        v_comp_limited, psi_m, psi_held, temp_lost, sample_faults, sample_trip, compare_a, compare_b,
-        compare_c,
+        i_q_ref, speed_limited, lambda_d, lambda_q, omega_chord, u_dec_d, u_dec_q, e.u_comp_d, e.u_comp_q, u_int_d,
+        u_int_q, u_d, u_q, sat_d, sat_q, u_alpha, u_beta, duty_a, duty_b, duty_c, e.u_applied_alpha,
+        e.u_applied_beta, e.lambda_c_d, e.lambda_c_q, e.lambda_m_alpha, e.lambda_m_beta, e.merge_known,
+        e.delta_lambda_d, e.delta_lambda_q, e.delta_held, e.lambda_pi_d, e.lambda_pi_q, e.torque, e.flux_faults, e.d_d,
+        e.d_q, e.v_dead, e.v_comp, e.v_comp_limited, e.psi_m, e.psi_held, e.temp_lost, sample_faults, sample_trip,
+        compare_a, compare_b, compare_c,
     )  # fmt: skip
 
 
@@ -491,6 +355,5 @@ OBSERVED = {
     for p in module.BLOCK.outputs
     if p.name in Observed._fields
 }
-# Two Park transforms whose outputs are renamed at the top; the others' outputs already have the names of their use.
 OBSERVED |= {p.name: p for p in (D_D, D_Q)}
 OBSERVED |= {f"u_comp_{x}": Port(f"u_comp_{x}", PU, doc=f"compensation voltage, {x} axis") for x in "dq"}

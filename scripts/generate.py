@@ -12,9 +12,10 @@ from pathlib import Path
 
 from fluxproof.files import write_text
 from fluxproof.golden_model import fluxproof, formats
-from fluxproof.golden_model.block import Const
+from fluxproof.golden_model.block import Const, Port
 from fluxproof.golden_model.fixed import Format
 from fluxproof.golden_model.io import register_map
+from fluxproof.golden_model.records import RECORDS, vhdl_type
 from fluxproof.golden_model.registry import BLOCKS
 from scripts import generate_telemetry
 
@@ -68,12 +69,29 @@ def table(name: str, fmt: Format, values: list[int]) -> list[str]:
     return [*lines, "  );"]
 
 
+def record(name: str, fields: dict[str, Port]) -> list[str]:
+    """A record type, a field a line."""
+    wide = max(map(len, fields))
+    body = [f"    {field.ljust(wide)} : {vhdl_type(port)};  -- {port.doc}" for field, port in fields.items()]
+    return ["", f"  type {name} is record", *body, f"  end record {name};"]
+
+
+def zeros(fields: dict[str, Port]) -> list[str]:
+    """The lines of an aggregate in which every field is zero."""
+    wide = max(map(len, fields))
+    rows = [f"    {name.ljust(wide)} => " + ("'0'" if p.is_bit else "(others => '0')") for name, p in fields.items()]
+    return [*(f"{row}," for row in rows[:-1]), rows[-1]]
+
+
 def render() -> str:
     """The whole package as text."""
     lines = shared_formats()
     lines += ["", "  -- fluxproof: clocks from the raw sample to the duties, shortest distance of two samples"]
     lines.append(f"  constant FLUXPROOF_SAMPLE_TO_DUTY : positive := {fluxproof.SAMPLE_TO_DUTY};")
     lines.append(f"  constant FLUXPROOF_SAMPLE_INTERVAL : positive := {fluxproof.SAMPLE_INTERVAL};")
+    for name, fields in RECORDS.items():
+        lines += record(name, fields)
+    lines += ["", "  constant NOTHING_ESTIMATED : estimated_t := (", *zeros(RECORDS["estimated_t"]), "  );"]
     lines += ["", "  -- register_access: clocks that a write waits for the end of a sample"]
     lines.append(f"  constant REGISTER_PATIENCE : positive := {register_map.PATIENCE};")
     for block in BLOCKS.values():

@@ -8,10 +8,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from fluxproof.golden_model import formats
-from fluxproof.golden_model.block import Port
-from fluxproof.golden_model.fixed import Format
 from fluxproof.golden_model.io import telemetry_words as packet
+from fluxproof.golden_model.records import generic_of, vhdl_type
 from fluxproof.golden_model.units import UNITS
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -42,19 +40,6 @@ CODES = dict.fromkeys(("adc_a", "adc_b", "adc_c", "adc_u_dc"), "`ADC_BITS`") | {
     "position_code": "`POSITION_BITS`"
 }
 DEPTH_BITS = 9  # the default of rtl/io/telemetry.vhd
-NAMED = {fmt: f"{name}_W - 1" for name, fmt in reversed(vars(formats).items()) if isinstance(fmt, Format)}
-
-
-def vhdl_type(name: str, port: Port) -> str:
-    """A port's VHDL type; codes have the width of a generic, shared formats use their named width."""
-    size = packet.BLOCK.width_from.get(name)
-    if size is not None:
-        generic = "ADC_BITS" if size({"ADC_BITS": 12, "POSITION_BITS": 18}).width == 12 else "POSITION_BITS"
-        return f"unsigned({generic} - 1 downto 0)"
-    if port.is_bit:
-        return "std_logic"
-    kind = "signed" if port.fmt.signed else "unsigned"
-    return f"{kind}({NAMED.get(port.fmt, port.fmt.width - 1)} downto 0)"
 
 
 def ports() -> list[str]:
@@ -65,9 +50,9 @@ def ports() -> list[str]:
         ("rst", "in ", "std_logic", ""),
         ("in_valid", "in ", "std_logic", ""),
     ]
-    rows += [(p.name, "in ", vhdl_type(p.name, p), p.doc) for p in block.inputs]
+    rows += [(p.name, "in ", vhdl_type(p, generic_of(p.name)), p.doc) for p in block.inputs]
     rows += [("out_valid", "out", "std_logic", "")]
-    rows += [(p.name, "out", vhdl_type(p.name, p), p.doc) for p in block.outputs]
+    rows += [(p.name, "out", vhdl_type(p, generic_of(p.name)), p.doc) for p in block.outputs]
     width = max(len(row[0]) for row in rows)
     lines = []
     for number, (name, mode, kind, doc) in enumerate(rows):

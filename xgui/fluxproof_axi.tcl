@@ -7,6 +7,7 @@ proc init_gui {IPINST} {
   ipgui::add_param $IPINST -name "ADC_BITS" -parent ${page}
   ipgui::add_param $IPINST -name "POSITION_BITS" -parent ${page}
   ipgui::add_param $IPINST -name "CARRIER_HALF" -parent ${page}
+  ipgui::add_param $IPINST -name "ESTIMATORS" -parent ${page}
 }
 
 proc update_PARAM_VALUE.CLOCK_HZ {PARAM_VALUE.CLOCK_HZ} {
@@ -51,4 +52,15 @@ proc validate_PARAM_VALUE.CARRIER_HALF {PARAM_VALUE.CARRIER_HALF} {
 
 proc update_MODELPARAM_VALUE.CARRIER_HALF {MODELPARAM_VALUE.CARRIER_HALF PARAM_VALUE.CARRIER_HALF} {
   set_property value [get_property value ${PARAM_VALUE.CARRIER_HALF}] ${MODELPARAM_VALUE.CARRIER_HALF}
+}
+
+proc update_PARAM_VALUE.ESTIMATORS {PARAM_VALUE.ESTIMATORS} {
+}
+
+proc validate_PARAM_VALUE.ESTIMATORS {PARAM_VALUE.ESTIMATORS} {
+  return true
+}
+
+proc update_MODELPARAM_VALUE.ESTIMATORS {MODELPARAM_VALUE.ESTIMATORS PARAM_VALUE.ESTIMATORS} {
+  set_property value [get_property value ${PARAM_VALUE.ESTIMATORS}] ${MODELPARAM_VALUE.ESTIMATORS}
 }

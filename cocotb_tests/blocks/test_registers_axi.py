@@ -14,7 +14,8 @@ from lxml import etree
 from cocotb_tests.support import dut_registers
 from fluxproof.checkout import ROOT, RTL
 from fluxproof.command import main
-from fluxproof.cosim import ghdl
+from fluxproof.cosim import flat, ghdl
+from fluxproof.cosim.entity import parse_entity, read_entity
 from fluxproof.golden_model import registers as drive_registers
 from fluxproof.golden_model.block import Port
 from fluxproof.golden_model.drive import load
@@ -107,27 +108,20 @@ def test_systemrdl_matches_the_register_map(top):
     assert {n: w.address for n, w in read.items()} == ADDRESSES
 
 
-def entity_ports(path: Path) -> dict[str, tuple[str, str]]:
-    """{port: (mode, type)} of an entity, the package's constants replaced by their numbers."""
+def flat_ports(path: Path) -> dict[str, tuple[str, str]]:
+    """{port: (mode, type)} of an entity, records as their fields, the package's widths replaced by their numbers."""
     package = (RTL / "generated" / "fluxproof_pkg.vhd").read_text()
-    constants = dict(re.findall(r"constant (\w+) : positive := (\d+);", package)) | {"ADC_BITS": "14"}
-    body = re.search(r"\n  port \((.*?)\n  \);", path.read_text(), re.DOTALL).group(1)
+    widths = dict(re.findall(r"constant (\w+) : positive := (\d+);", package)) | {"ADC_BITS": "14"}
     ports = {}
-    for name, mode, kind in re.findall(
-        r"^    (\w+)\s*: (in|out)\s+([\w]+(?:\([^)]*\))?)", body, re.MULTILINE
-    ):
-        width = re.search(r"\((.*) downto 0\)", kind)
-        if width:
-            high = eval(re.sub(r"[A-Z]\w+", lambda m: constants.get(m[0], "-1000"), width[1]))
-            kind = f"{kind.split('(')[0]}({high} downto 0)"
-        ports[name] = (mode, kind)
+    for name, pin in parse_entity(flat.render(read_entity(path)), path.name).pins.items():
+        top = eval(re.sub(r"[A-Z]\w+", lambda m: widths.get(m[0], "-1000"), pin.left or "0"))
+        ports[name] = (pin.mode, pin.kind if pin.left is None else f"{pin.kind}({top} downto 0)")
     return ports
 
 
 def test_ports_match_the_core():
     """Each input of the core but pins comes from the register file, in the same type; each status likewise."""
-    core = entity_ports(RTL / "fluxproof.vhd")
-    registers = entity_ports(generated.REGISTER_FILE)
+    core, registers = (flat_ports(path) for path in (RTL / "fluxproof.vhd", generated.REGISTER_FILE))
     own = {"clk", "rst", "sample_busy"} | {name for name, *_ in vhdl.BUS}
     written = {n: kind for n, (mode, kind) in registers.items() if mode == "out" and n not in own}
     shown = {n: kind for n, (mode, kind) in registers.items() if mode == "in" and n not in own}
@@ -190,7 +184,8 @@ def test_html_and_ipxact_contain_every_register(top, tmp_path):
 
 def test_model_refuses_without_changing_registers():
     """The model alone: a drive's registers are written and read back; a refused write changes nothing."""
-    bus = RegisterFile({"adc_bits": 16, "position_bits": 16, "carrier_half": 10000, "clock_hz": 200_000_000})
+    generics = {"adc_bits": 16, "position_bits": 16, "carrier_half": 10000, "clock_hz": 200_000_000}
+    bus = RegisterFile(generics | {"estimators": 1})
     values = drive_registers.registers(load(PAPER)).values
     for name, value in values._asdict().items():
         assert bus.write(ADDRESSES[name], to_word(value)) == OKAY

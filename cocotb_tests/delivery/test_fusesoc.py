@@ -12,9 +12,9 @@ import pytest
 
 from fluxproof.checkout import ROOT
 from fluxproof.cosim import verilog
+from fluxproof.cosim.entity import read_entity
 from fluxproof.cosim.sources import rtl_sources
 from scripts.package import axi_top, fusesoc_core, yosys_tcl
-from scripts.package.entity import read_entity
 
 
 def fusesoc(folder: Path, target: str, *options: str, path: str = "") -> subprocess.CompletedProcess:

@@ -11,10 +11,10 @@ import pytest
 from lxml import etree
 
 from fluxproof.checkout import ROOT, RTL
+from fluxproof.cosim.entity import read_entity
 from fluxproof.cosim.sources import rtl_sources
 from scripts.package import __main__ as package_command
 from scripts.package import axi_top, ipxact, packaged
-from scripts.package.entity import read_entity
 from scripts.registers.compiled import compile_file, words
 
 S = {"s": ipxact.SPIRIT}

@@ -13,6 +13,7 @@ from cocotbext.axi import AxiLiteBus, AxiLiteMaster, AxiResp, AxiStreamBus, AxiS
 from fluxproof.cosim.block_bench import read
 from fluxproof.cosim.closed_loop import FLAGS, SAMPLE_DELAY, Period, Scenario
 from fluxproof.cosim.ghdl_device import CLOCK_NS, now
+from fluxproof.cosim.inside import handle_of
 from fluxproof.golden_model.fluxproof import OBSERVED, Observed
 from fluxproof.golden_model.generated.register_names import ADDRESSES
 from fluxproof.golden_model.io.register_file import from_word, to_word
@@ -34,7 +35,7 @@ class AxiDevice:
         self.edges: list[tuple[int, int]] = []
         self.word, self.start_clock, self.number = 0, 0, 0
         self.written: dict[str, int] = {}
-        self.observed = [(n, getattr(dut.core, n), bool(OBSERVED[n].fmt.signed)) for n in Observed._fields]
+        self.observed = [(n, handle_of(dut.core, n), bool(OBSERVED[n].fmt.signed)) for n in Observed._fields]
         for name in (*PINS, "sample_valid", "trip", "aresetn", "s_axi_awprot", "s_axi_arprot"):
             getattr(dut, name).value = 0
         Clock(dut.aclk, CLOCK_NS, unit="ns").start()

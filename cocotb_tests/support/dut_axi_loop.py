@@ -12,6 +12,7 @@ from cocotb.triggers import ClockCycles, Timer
 from cocotb_tests.support.axi_device import AxiDevice
 from fluxproof.cosim.block_bench import read
 from fluxproof.cosim.closed_loop import cosimulate
+from fluxproof.cosim.inside import handle_of
 from fluxproof.cosim.scenarios import scenario
 from fluxproof.golden_model import drive as drives
 from fluxproof.golden_model.fluxproof import Observed, Sample
@@ -60,7 +61,7 @@ class Watched(AxiDevice):
 def read_core(dut, name: str) -> int:
     """A value of the core, past the bus."""
     fields = register_map.observables()
-    return read(getattr(dut.core, name), bool(fields[name].fmt.signed))
+    return read(handle_of(dut.core, name), bool(fields[name].fmt.signed))
 
 
 async def check_identity(device: AxiDevice, config, clock_hz: int) -> None:

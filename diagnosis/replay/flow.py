@@ -1,7 +1,6 @@
 """Which block drives which signal, in data-flow order, and the outputs of every block of the core in one sample.
 
-Everything is derived from fluxproof.WIRING, the declared ports of the blocks and fluxproof.step; only the two Park
-transforms whose outputs the top renames are listed here.
+Everything is derived from fluxproof.WIRING, the declared ports of the blocks and fluxproof.step.
 """
 
 from __future__ import annotations
@@ -9,15 +8,8 @@ from __future__ import annotations
 import types
 from collections import defaultdict
 
-from fluxproof.golden_model import fluxproof
-
-RENAMED = {"compensation_dq": ("u_comp_d", "u_comp_q"), "direction_functions": ("d_d", "d_q")}
-
-
-def _outputs(instance):
-    """The names in the top of an instance's outputs."""
-    block = fluxproof.WIRING[instance][0].BLOCK
-    return RENAMED.get(instance, tuple(p.name for p in block.outputs))
+from fluxproof.golden_model import estimation, fluxproof
+from fluxproof.golden_model.fluxproof import outputs_of
 
 
 def _first_results(instance: str) -> int:
@@ -31,7 +23,7 @@ ORDER = sorted(fluxproof.WIRING, key=lambda name: (_first_results(name), list(fl
 OWNER = {
     signal: instance
     for instance in fluxproof.WIRING
-    for signal in _outputs(instance)
+    for signal in outputs_of(instance)
     if signal in fluxproof.Observed._fields
 }
 
@@ -71,11 +63,11 @@ def hidden_before(instance: str, shown) -> list[str]:
     seen, waiting = set(), [(name, instance) for name in fluxproof.WIRING[instance][1]]
     while waiting:
         name, follower = waiting.pop()
-        hidden = [s for s in _outputs(name) if s not in shown]
+        hidden = [s for s in outputs_of(name) if s not in shown]
         if (name, follower) in seen or not hidden or name == "latch":
             continue
         seen.add((name, follower))
-        if len(hidden) == len(_outputs(name)):
+        if len(hidden) == len(outputs_of(name)):
             waiting += [(source, name) for source in _awaited(name, follower)]
     return sorted({name for name, _ in seen}, key=ORDER.index)
 
@@ -96,27 +88,30 @@ def trace(state, sample, registers, config) -> dict[str, tuple]:
     """{instance: its outputs} of one sample, hidden ones included; ``latch`` is the sample itself.
 
     The top's step runs as plain Python with listeners instead of the blocks.  The calls of a block that is used
-    several times are in the order of WIRING.
+    several times are in the order of WIRING.  An instance that the generics leave out has no outputs.
     """
     notes = defaultdict(list)
+    estimators = types.SimpleNamespace(**vars(estimation))
+    for name in ("for_control", "step"):
+        setattr(estimators, name, _overheard(getattr(estimation, name).py_func, notes))
+    _overheard(fluxproof.step.py_func, notes, estimation=estimators)(state, sample, registers, config)
+    said = {}
+    for instance, (module, _) in fluxproof.WIRING.items():
+        given = notes[module].pop(0) if notes[module] else ()
+        said[instance] = tuple(sample) if instance == "latch" else tuple(map(int, given))
+    return said
+
+
+def _overheard(function, notes, **others):
+    """The function as plain Python, with listeners instead of the blocks; ``others``: further names it sees."""
     modules = {module for module, _ in fluxproof.WIRING.values()}
-    step = fluxproof.step.py_func
-    names = dict(step.__globals__)
+    names = dict(function.__globals__) | others
     names |= {
         k: _Listener(v, notes) for k, v in names.items() if isinstance(v, types.ModuleType) and v in modules
     }
-    types.FunctionType(step.__code__, names)(state, sample, registers, config)
-    said = {}
-    for instance, (module, _) in fluxproof.WIRING.items():
-        said[instance] = tuple(sample) if instance == "latch" else tuple(map(int, notes[module].pop(0)))
-    return said
+    return types.FunctionType(function.__code__, names)
 
 
 def parted(a: dict[str, tuple], b: dict[str, tuple]) -> list[str]:
     """Instances whose outputs differ between two traces, in data-flow order."""
     return [name for name in ORDER if a[name] != b[name]]
-
-
-def outputs_of(instance: str) -> tuple[str, ...]:
-    """Names of an instance's outputs, with the top's name if it has one."""
-    return _outputs(instance)

@@ -133,8 +133,8 @@ def _one(x, r, c, now, before):
     _, minus_rho, lost = winding_resistance.step(x[9], x[10], r.r_s, r.tcr, r.t_0, r.t_min, r.t_max, r.t_s)
     flux_d, flux_q = flux_park.step(lambda_m_alpha, lambda_m_beta, cos_theta, sin_theta)
     model_d, model_q, merged_d, merged_q, merged, ended, _, _ = flux_models.step(
-        i_d, i_q, flux_d, flux_q, lambda_pi_d, lambda_pi_q, before[7], x[12], minus_rho, r.flux_mode, r.l_d, r.l_q,
-        r.lambda_mg,
+        i_d, i_q, flux_d, flux_q, lambda_pi_d, lambda_pi_q, before[7], x[12], minus_rho,
+        r.flux_mode * c.estimators, r.l_d, r.l_q, r.lambda_mg,
     )  # fmt: skip
     own_d, own_q, _ = flux_estimate.step(model_d, model_q, merged_d, merged_q, merged, ended)
     (chord,) = chord_speed.step(omega_me, r.k_chord)
@@ -146,6 +146,8 @@ def _one(x, r, c, now, before):
         compare_a, compare_b, compare_c, u_dc, u_rail, x[12], c.carrier_half
     )
     (torque_me,) = torque.step(lambda_d, lambda_q, i_d, i_q)
+    if not c.estimators:
+        lost = on_alpha = on_beta = torque_me = 0
     return (
         i_a, i_b, i_c, rail, u_dc, u_max, u_rail, u_low, theta_me, i_d, i_q, lost, own_d, own_q, chord, dec_d, dec_q,
         u_alpha, u_beta, duty_a, duty_b, duty_c, new_a, new_b, new_c, on_alpha, on_beta, torque_me,

@@ -42,6 +42,11 @@ extern "C" {
 #define FLUXPROOF__CLOCK_HZ__VALUE_bp 0
 #define FLUXPROOF__CLOCK_HZ__VALUE_bw 32
 
+// reg - fluxproof::estimators
+#define FLUXPROOF__ESTIMATORS__VALUE_bm 0xffffffff
+#define FLUXPROOF__ESTIMATORS__VALUE_bp 0
+#define FLUXPROOF__ESTIMATORS__VALUE_bw 32
+
 // reg - fluxproof::enable
 #define FLUXPROOF__ENABLE__VALUE_bm 0x1
 #define FLUXPROOF__ENABLE__VALUE_bp 0
@@ -620,7 +625,8 @@ typedef struct __attribute__ ((__packed__)) {
     uint32_t position_bits;
     uint32_t carrier_half;
     uint32_t clock_hz;
-    uint8_t RESERVED_18_3f[0x28];
+    uint32_t estimators;
+    uint8_t RESERVED_1c_3f[0x24];
     uint32_t enable;
     uint32_t clear_trip;
     uint32_t clear_faults;

@@ -10,6 +10,7 @@ ADDRESSES = {
     "position_bits": 0x00C,
     "carrier_half": 0x010,
     "clock_hz": 0x014,
+    "estimators": 0x018,
     "enable": 0x040,
     "clear_trip": 0x044,
     "clear_faults": 0x048,

@@ -33,7 +33,7 @@ PATIENCE = fluxproof.SAMPLE_INTERVAL + 16  # clocks that a write waits for the e
 IDENTIFICATION = int.from_bytes(b"FLUX", "big")
 
 WORD = Format(0, 32, 0)
-GENERICS = ("adc_bits", "position_bits", "carrier_half", "clock_hz")
+GENERICS = ("adc_bits", "position_bits", "carrier_half", "clock_hz", "estimators")
 
 
 class Kind(Enum):
@@ -189,6 +189,7 @@ def _read_only() -> list[Register]:
         word("position_bits", 0x00C, Kind.GENERIC, "bits of a position code"),
         word("carrier_half", 0x010, Kind.GENERIC, "half a PWM period in clocks"),
         word("clock_hz", 0x014, Kind.GENERIC, "frequency of the clock, Hz"),
+        word("estimators", 0x018, Kind.GENERIC, "1: with estimators, 0: field-oriented control alone"),
         Register("flags", 0x080, Kind.STATUS, flags, "status flags of the core, read together"),
         *(
             Register(name, address, Kind.STATUS, (Field(name, shown[name]),), shown[name].doc)

@@ -22,7 +22,8 @@ entity fluxproof_axi is
     CLOCK_HZ      : integer range 1 to 500000000 := 200000000;  -- rate of aclk; software reads it back
     ADC_BITS      : integer range 12 to 16       := 16;  -- width of the ADC codes
     POSITION_BITS : integer range 8 to 18        := 16;  -- width of the position code
-    CARRIER_HALF  : integer range 8 to 32767     := 10000  -- half a PWM period in clocks
+    CARRIER_HALF  : integer range 8 to 32767     := 10000;  -- half a PWM period in clocks
+    ESTIMATORS    : integer range 0 to 1         := 1  -- 0: field-oriented control alone
   );
   port (
     aclk           : in  std_logic;  -- the one clock
@@ -67,6 +68,7 @@ end entity fluxproof_axi;
 architecture rtl of fluxproof_axi is
   signal rst_1             : std_logic;
   signal rst               : std_logic;
+  signal settings          : settings_t;
   signal enable            : std_logic;
   signal clear_trip        : std_logic;
   signal clear_faults_in   : std_logic;
@@ -77,68 +79,6 @@ architecture rtl of fluxproof_axi is
   signal speed_mode_in     : std_logic;
   signal temp_winding_in   : signed(15 downto 0);
   signal temp_valid_in     : std_logic;
-  signal offset_a          : unsigned(15 downto 0);
-  signal offset_b          : unsigned(15 downto 0);
-  signal offset_c          : unsigned(15 downto 0);
-  signal gain_a            : signed(17 downto 0);
-  signal gain_b            : signed(17 downto 0);
-  signal gain_c            : signed(17 downto 0);
-  signal u_dc_offset       : unsigned(15 downto 0);
-  signal u_dc_gain         : signed(17 downto 0);
-  signal k_u_max           : unsigned(16 downto 0);
-  signal pole_pairs        : unsigned(5 downto 0);
-  signal reverse           : std_logic;
-  signal theta_offset      : unsigned(17 downto 0);
-  signal k_speed           : unsigned(23 downto 0);
-  signal k_filter          : unsigned(16 downto 0);
-  signal rail_samples      : unsigned(3 downto 0);
-  signal jump_max          : unsigned(11 downto 0);
-  signal speed_kp          : unsigned(23 downto 0);
-  signal speed_ki          : unsigned(23 downto 0);
-  signal i_max             : signed(17 downto 0);
-  signal kp_d              : unsigned(23 downto 0);
-  signal ki_d              : unsigned(23 downto 0);
-  signal kp_q              : unsigned(23 downto 0);
-  signal ki_q              : unsigned(23 downto 0);
-  signal l_d               : unsigned(23 downto 0);
-  signal l_q               : unsigned(23 downto 0);
-  signal lambda_mg         : signed(17 downto 0);
-  signal k_delay           : unsigned(16 downto 0);
-  signal dead_time         : unsigned(11 downto 0);
-  signal min_pulse         : unsigned(11 downto 0);
-  signal watchdog          : unsigned(19 downto 0);
-  signal fault_ignore      : unsigned(6 downto 0);
-  signal flux_mode         : unsigned(1 downto 0);
-  signal r_s               : unsigned(23 downto 0);
-  signal t_s               : unsigned(16 downto 0);
-  signal omega_0           : unsigned(15 downto 0);
-  signal xi                : unsigned(15 downto 0);
-  signal omega_min         : unsigned(16 downto 0);
-  signal k_ramp            : unsigned(15 downto 0);
-  signal flux_kp           : unsigned(16 downto 0);
-  signal flux_ki           : unsigned(16 downto 0);
-  signal delta_max         : unsigned(15 downto 0);
-  signal k_chord           : unsigned(16 downto 0);
-  signal tcr               : unsigned(23 downto 0);
-  signal t_0               : signed(15 downto 0);
-  signal t_min             : signed(15 downto 0);
-  signal t_max             : signed(15 downto 0);
-  signal compensate        : std_logic;
-  signal k_lp              : unsigned(19 downto 0);
-  signal eta_v             : unsigned(20 downto 0);
-  signal gamma             : unsigned(16 downto 0);
-  signal zeta              : unsigned(16 downto 0);
-  signal v_thr             : unsigned(16 downto 0);
-  signal v_comp_max        : unsigned(16 downto 0);
-  signal i_learn           : unsigned(16 downto 0);
-  signal eta_psi           : unsigned(16 downto 0);
-  signal omega_psi_min     : unsigned(16 downto 0);
-  signal k_ahead           : unsigned(16 downto 0);
-  signal k_sign            : unsigned(23 downto 0);
-  signal i_trip            : unsigned(8 downto 0);
-  signal sum_trip          : unsigned(8 downto 0);
-  signal u_dc_min          : unsigned(8 downto 0);
-  signal u_dc_max          : unsigned(8 downto 0);
   signal gate_high_next    : unsigned(2 downto 0);
   signal gate_low_next     : unsigned(2 downto 0);
   signal trigger_next      : std_logic;
@@ -150,38 +90,12 @@ architecture rtl of fluxproof_axi is
   signal early_samples     : unsigned(7 downto 0);
   signal setting_refused   : std_logic;
   signal min_pulse_used    : unsigned(11 downto 0);
-  signal current_at_rail   : unsigned(2 downto 0);
-  signal u_dc              : unsigned(DUTY_W - 1 downto 0);
-  signal u_dc_at_rail      : std_logic;
-  signal u_dc_low          : std_logic;
-  signal theta_me          : unsigned(TURN_W - 1 downto 0);
-  signal omega_me          : signed(PU_W - 1 downto 0);
-  signal i_d               : signed(PU_W - 1 downto 0);
-  signal i_q               : signed(PU_W - 1 downto 0);
-  signal i_q_ref           : signed(PU_W - 1 downto 0);
-  signal speed_limited     : std_logic;
-  signal lambda_d          : signed(PU_W - 1 downto 0);
-  signal lambda_q          : signed(PU_W - 1 downto 0);
-  signal u_d               : signed(PU_W - 1 downto 0);
-  signal u_q               : signed(PU_W - 1 downto 0);
-  signal sat_d             : signed(1 downto 0);
-  signal sat_q             : signed(1 downto 0);
-  signal merge_known       : std_logic;
-  signal delta_held        : std_logic;
-  signal torque            : signed(PU_W - 1 downto 0);
-  signal flux_faults       : unsigned(6 downto 0);
-  signal v_dead            : signed(V_LEG_W - 1 downto 0);
-  signal v_comp            : signed(V_LEG_W - 1 downto 0);
-  signal v_comp_limited    : std_logic;
-  signal psi_m             : signed(PU_W - 1 downto 0);
-  signal psi_held          : std_logic;
-  signal temp_lost         : std_logic;
-  signal compare_a         : unsigned(15 downto 0);
-  signal compare_b         : unsigned(15 downto 0);
-  signal compare_c         : unsigned(15 downto 0);
+  signal observed          : observed_t;
+  signal estimated         : estimated_t;
   signal m_axis_tdata_out  : unsigned(31 downto 0);
   signal telemetry_dropped : unsigned(15 downto 0);
   signal trip_now          : std_logic;
+  signal sample            : sample_t;
 begin
 
   process (aclk)
@@ -192,12 +106,26 @@ begin
     end if;
   end process;
 
+  sample.adc_a         <= resize(unsigned(adc_a), sample.adc_a'length);
+  sample.adc_b         <= resize(unsigned(adc_b), sample.adc_b'length);
+  sample.adc_c         <= resize(unsigned(adc_c), sample.adc_c'length);
+  sample.adc_u_dc      <= resize(unsigned(adc_u_dc), sample.adc_u_dc'length);
+  sample.position_code <= resize(unsigned(position_code), sample.position_code'length);
+  sample.omega_ref     <= omega_ref_in;
+  sample.i_d_ref       <= i_d_ref_in;
+  sample.i_q_ext       <= i_q_ext_in;
+  sample.speed_mode    <= speed_mode_in;
+  sample.temp_winding  <= temp_winding_in;
+  sample.temp_valid    <= temp_valid_in;
+  sample.clear_faults  <= clear_faults_in;
+
   registers : entity work.register_file
     generic map (
       ADC_BITS      => ADC_BITS,
       POSITION_BITS => POSITION_BITS,
       CARRIER_HALF  => CARRIER_HALF,
-      CLOCK_HZ      => CLOCK_HZ
+      CLOCK_HZ      => CLOCK_HZ,
+      ESTIMATORS    => ESTIMATORS
     )
     port map (
       clk               => aclk,
@@ -220,6 +148,9 @@ begin
       s_axi_rvalid      => s_axi_rvalid,
       s_axi_rready      => s_axi_rready,
       sample_busy       => sample_busy,
+      settings          => settings,
+      observed          => observed,
+      estimated         => estimated,
       enable            => enable,
       clear_trip        => clear_trip,
       clear_faults_in   => clear_faults_in,
@@ -230,96 +161,10 @@ begin
       speed_mode_in     => speed_mode_in,
       temp_winding_in   => temp_winding_in,
       temp_valid_in     => temp_valid_in,
-      offset_a          => offset_a,
-      offset_b          => offset_b,
-      offset_c          => offset_c,
-      gain_a            => gain_a,
-      gain_b            => gain_b,
-      gain_c            => gain_c,
-      u_dc_offset       => u_dc_offset,
-      u_dc_gain         => u_dc_gain,
-      k_u_max           => k_u_max,
-      pole_pairs        => pole_pairs,
-      reverse           => reverse,
-      theta_offset      => theta_offset,
-      k_speed           => k_speed,
-      k_filter          => k_filter,
-      rail_samples      => rail_samples,
-      jump_max          => jump_max,
-      speed_kp          => speed_kp,
-      speed_ki          => speed_ki,
-      i_max             => i_max,
-      kp_d              => kp_d,
-      ki_d              => ki_d,
-      kp_q              => kp_q,
-      ki_q              => ki_q,
-      l_d               => l_d,
-      l_q               => l_q,
-      lambda_mg         => lambda_mg,
-      k_delay           => k_delay,
-      dead_time         => dead_time,
-      min_pulse         => min_pulse,
-      watchdog          => watchdog,
-      fault_ignore      => fault_ignore,
-      flux_mode         => flux_mode,
-      r_s               => r_s,
-      t_s               => t_s,
-      omega_0           => omega_0,
-      xi                => xi,
-      omega_min         => omega_min,
-      k_ramp            => k_ramp,
-      flux_kp           => flux_kp,
-      flux_ki           => flux_ki,
-      delta_max         => delta_max,
-      k_chord           => k_chord,
-      tcr               => tcr,
-      t_0               => t_0,
-      t_min             => t_min,
-      t_max             => t_max,
-      compensate        => compensate,
-      k_lp              => k_lp,
-      eta_v             => eta_v,
-      gamma             => gamma,
-      zeta              => zeta,
-      v_thr             => v_thr,
-      v_comp_max        => v_comp_max,
-      i_learn           => i_learn,
-      eta_psi           => eta_psi,
-      omega_psi_min     => omega_psi_min,
-      k_ahead           => k_ahead,
-      k_sign            => k_sign,
-      i_trip            => i_trip,
-      sum_trip          => sum_trip,
-      u_dc_min          => u_dc_min,
-      u_dc_max          => u_dc_max,
       running           => running,
       tripped           => tripped,
       setting_refused   => setting_refused,
-      current_at_rail   => current_at_rail,
-      u_dc_at_rail      => u_dc_at_rail,
-      u_dc_low          => u_dc_low,
-      speed_limited     => speed_limited,
-      v_comp_limited    => v_comp_limited,
-      psi_held          => psi_held,
-      temp_lost         => temp_lost,
-      merge_known       => merge_known,
-      delta_held        => delta_held,
-      flux_faults       => flux_faults,
       min_pulse_used    => min_pulse_used,
-      omega_me          => omega_me,
-      theta_me          => theta_me,
-      i_d               => i_d,
-      i_q               => i_q,
-      i_q_ref           => i_q_ref,
-      u_dc              => u_dc,
-      u_d               => u_d,
-      u_q               => u_q,
-      torque            => torque,
-      lambda_d          => lambda_d,
-      lambda_q          => lambda_q,
-      psi_m             => psi_m,
-      v_dead            => v_dead,
-      v_comp            => v_comp,
       telemetry_dropped => telemetry_dropped,
       fault_flags       => fault_flags,
       first_fault       => first_fault,
@@ -330,89 +175,18 @@ begin
     generic map (
       ADC_BITS      => ADC_BITS,
       POSITION_BITS => POSITION_BITS,
-      CARRIER_HALF  => CARRIER_HALF
+      CARRIER_HALF  => CARRIER_HALF,
+      ESTIMATORS    => ESTIMATORS
     )
     port map (
       clk             => aclk,
       rst             => rst,
       sample_valid    => sample_valid,
-      adc_a           => unsigned(adc_a),
-      adc_b           => unsigned(adc_b),
-      adc_c           => unsigned(adc_c),
-      adc_u_dc        => unsigned(adc_u_dc),
-      position_code   => unsigned(position_code),
-      omega_ref_in    => omega_ref_in,
-      i_d_ref_in      => i_d_ref_in,
-      i_q_ext_in      => i_q_ext_in,
-      speed_mode_in   => speed_mode_in,
-      temp_winding_in => temp_winding_in,
-      temp_valid_in   => temp_valid_in,
-      clear_faults_in => clear_faults_in,
+      sample          => sample,
+      settings        => settings,
       enable          => enable,
       trip            => trip_now,
       clear_trip      => clear_trip,
-      offset_a        => offset_a,
-      offset_b        => offset_b,
-      offset_c        => offset_c,
-      gain_a          => gain_a,
-      gain_b          => gain_b,
-      gain_c          => gain_c,
-      reverse         => reverse,
-      pole_pairs      => pole_pairs,
-      theta_offset    => theta_offset,
-      k_speed         => k_speed,
-      k_filter        => k_filter,
-      u_dc_offset     => u_dc_offset,
-      u_dc_gain       => u_dc_gain,
-      k_u_max         => k_u_max,
-      speed_kp        => speed_kp,
-      speed_ki        => speed_ki,
-      i_max           => i_max,
-      kp_d            => kp_d,
-      ki_d            => ki_d,
-      kp_q            => kp_q,
-      ki_q            => ki_q,
-      l_d             => l_d,
-      l_q             => l_q,
-      lambda_mg       => lambda_mg,
-      r_s             => r_s,
-      t_s             => t_s,
-      omega_0         => omega_0,
-      xi              => xi,
-      omega_min       => omega_min,
-      k_ramp          => k_ramp,
-      flux_kp         => flux_kp,
-      flux_ki         => flux_ki,
-      delta_max       => delta_max,
-      flux_mode       => flux_mode,
-      k_chord         => k_chord,
-      tcr             => tcr,
-      t_0             => t_0,
-      t_min           => t_min,
-      t_max           => t_max,
-      k_lp            => k_lp,
-      eta_v           => eta_v,
-      gamma           => gamma,
-      zeta            => zeta,
-      v_thr           => v_thr,
-      v_comp_max      => v_comp_max,
-      i_learn         => i_learn,
-      compensate      => compensate,
-      eta_psi         => eta_psi,
-      omega_psi_min   => omega_psi_min,
-      k_ahead         => k_ahead,
-      k_sign          => k_sign,
-      k_delay         => k_delay,
-      min_pulse       => min_pulse,
-      dead_time       => dead_time,
-      watchdog        => watchdog,
-      i_trip          => i_trip,
-      sum_trip        => sum_trip,
-      rail_samples    => rail_samples,
-      u_dc_min        => u_dc_min,
-      u_dc_max        => u_dc_max,
-      jump_max        => jump_max,
-      fault_ignore    => fault_ignore,
       gate_high       => gate_high_next,
       gate_low        => gate_low_next,
       sample_trigger  => trigger_next,
@@ -428,65 +202,8 @@ begin
       duty_valid      => open,
       compare_valid   => open,
       values_valid    => open,
-      i_a             => open,
-      i_b             => open,
-      i_c             => open,
-      current_at_rail => current_at_rail,
-      u_dc            => u_dc,
-      u_max           => open,
-      u_dc_at_rail    => u_dc_at_rail,
-      u_dc_low        => u_dc_low,
-      theta_me        => theta_me,
-      omega_me        => omega_me,
-      i_d             => i_d,
-      i_q             => i_q,
-      i_q_ref         => i_q_ref,
-      speed_limited   => speed_limited,
-      lambda_d        => lambda_d,
-      lambda_q        => lambda_q,
-      omega_chord     => open,
-      u_dec_d         => open,
-      u_dec_q         => open,
-      u_comp_d        => open,
-      u_comp_q        => open,
-      u_int_d         => open,
-      u_int_q         => open,
-      u_d             => u_d,
-      u_q             => u_q,
-      sat_d           => sat_d,
-      sat_q           => sat_q,
-      u_alpha         => open,
-      u_beta          => open,
-      duty_a          => open,
-      duty_b          => open,
-      duty_c          => open,
-      u_applied_alpha => open,
-      u_applied_beta  => open,
-      lambda_c_d      => open,
-      lambda_c_q      => open,
-      lambda_m_alpha  => open,
-      lambda_m_beta   => open,
-      merge_known     => merge_known,
-      delta_lambda_d  => open,
-      delta_lambda_q  => open,
-      delta_held      => delta_held,
-      lambda_pi_d     => open,
-      lambda_pi_q     => open,
-      torque          => torque,
-      flux_faults     => flux_faults,
-      d_d             => open,
-      d_q             => open,
-      v_dead          => v_dead,
-      v_comp          => v_comp,
-      v_comp_limited  => v_comp_limited,
-      psi_m           => psi_m,
-      psi_held        => psi_held,
-      temp_lost       => temp_lost,
-      sample_faults   => open,
-      sample_trip     => open,
-      compare_a       => compare_a,
-      compare_b       => compare_b,
-      compare_c       => compare_c
+      observed        => observed,
+      estimated       => estimated
     );
 
   stream : entity work.telemetry
@@ -495,50 +212,19 @@ begin
       POSITION_BITS => POSITION_BITS
     )
     port map (
-      clk             => aclk,
-      rst             => rst,
-      enable          => telemetry_enable,
-      sample_valid    => sample_valid,
-      m_axis_tready   => m_axis_tready,
-      adc_a           => unsigned(adc_a),
-      adc_b           => unsigned(adc_b),
-      adc_c           => unsigned(adc_c),
-      adc_u_dc        => unsigned(adc_u_dc),
-      position_code   => unsigned(position_code),
-      omega_ref_in    => omega_ref_in,
-      i_d_ref_in      => i_d_ref_in,
-      i_q_ext_in      => i_q_ext_in,
-      speed_mode_in   => speed_mode_in,
-      temp_winding_in => temp_winding_in,
-      temp_valid_in   => temp_valid_in,
-      clear_faults_in => clear_faults_in,
-      running         => running,
-      current_at_rail => current_at_rail,
-      u_dc            => u_dc,
-      theta_me        => theta_me,
-      omega_me        => omega_me,
-      i_d             => i_d,
-      i_q             => i_q,
-      i_q_ref         => i_q_ref,
-      lambda_d        => lambda_d,
-      lambda_q        => lambda_q,
-      u_d             => u_d,
-      u_q             => u_q,
-      sat_d           => sat_d,
-      sat_q           => sat_q,
-      flux_faults     => flux_faults,
-      v_dead          => v_dead,
-      v_comp          => v_comp,
-      psi_m           => psi_m,
-      psi_held        => psi_held,
-      temp_lost       => temp_lost,
-      compare_a       => compare_a,
-      compare_b       => compare_b,
-      compare_c       => compare_c,
-      m_axis_tdata    => m_axis_tdata_out,
-      m_axis_tvalid   => m_axis_tvalid,
-      m_axis_tlast    => m_axis_tlast,
-      dropped         => telemetry_dropped
+      clk           => aclk,
+      rst           => rst,
+      enable        => telemetry_enable,
+      sample_valid  => sample_valid,
+      m_axis_tready => m_axis_tready,
+      sample        => sample,
+      running       => running,
+      observed      => observed,
+      estimated     => estimated,
+      m_axis_tdata  => m_axis_tdata_out,
+      m_axis_tvalid => m_axis_tvalid,
+      m_axis_tlast  => m_axis_tlast,
+      dropped       => telemetry_dropped
     );
 
   stage : entity work.power_stage

@@ -39,6 +39,178 @@ package fluxproof_pkg is
   constant FLUXPROOF_SAMPLE_TO_DUTY : positive := 39;
   constant FLUXPROOF_SAMPLE_INTERVAL : positive := 60;
 
+  type sample_t is record
+    adc_a         : unsigned(CODE_W - 1 downto 0);  -- ADC code, phase a
+    adc_b         : unsigned(CODE_W - 1 downto 0);  -- ADC code, phase b
+    adc_c         : unsigned(CODE_W - 1 downto 0);  -- ADC code, phase c
+    adc_u_dc      : unsigned(CODE_W - 1 downto 0);  -- ADC code, bus voltage
+    position_code : unsigned(TURN_W - 1 downto 0);  -- position code, one mechanical turn
+    omega_ref     : signed(PU_W - 1 downto 0);  -- speed reference
+    i_d_ref       : signed(PU_W - 1 downto 0);  -- current reference, d axis
+    i_q_ext       : signed(PU_W - 1 downto 0);  -- current reference of torque mode, q axis
+    speed_mode    : std_logic;  -- 1: speed control, 0: torque control
+    temp_winding  : signed(15 downto 0);  -- winding temperature, degrees Celsius
+    temp_valid    : std_logic;  -- 1: temp_winding is valid
+    clear_faults  : std_logic;  -- 1: clear the flags whose cause is gone
+  end record sample_t;
+
+  type settings_t is record
+    offset_a      : unsigned(CODE_W - 1 downto 0);  -- code at zero current, phase a, left-aligned
+    offset_b      : unsigned(CODE_W - 1 downto 0);  -- code at zero current, phase b, left-aligned
+    offset_c      : unsigned(CODE_W - 1 downto 0);  -- code at zero current, phase c, left-aligned
+    gain_a        : signed(PU_W - 1 downto 0);  -- current per code, phase a
+    gain_b        : signed(PU_W - 1 downto 0);  -- current per code, phase b
+    gain_c        : signed(PU_W - 1 downto 0);  -- current per code, phase c
+    reverse       : std_logic;  -- 1: code counts opposite to the phase order
+    pole_pairs    : unsigned(5 downto 0);  -- pole pairs
+    theta_offset  : unsigned(TURN_W - 1 downto 0);  -- electrical angle at code zero
+    k_speed       : unsigned(23 downto 0);  -- speed per turn and sample
+    k_filter      : unsigned(DUTY_W - 1 downto 0);  -- filter weight of the new sample, 1 = no filter
+    u_dc_offset   : unsigned(CODE_W - 1 downto 0);  -- code at zero bus voltage, left-aligned
+    u_dc_gain     : signed(PU_W - 1 downto 0);  -- bus voltage per code
+    k_u_max       : unsigned(RECIPROCAL_W - 1 downto 0);  -- radius of the voltage circle / bus voltage
+    k_delay       : unsigned(RECIPROCAL_W - 1 downto 0);  -- angle of the delay in turns, per unit of speed
+    speed_kp      : unsigned(KP_W - 1 downto 0);  -- proportional gain
+    speed_ki      : unsigned(KI_W - 1 downto 0);  -- integral gain times sample time
+    i_max         : signed(PU_W - 1 downto 0);  -- limit of the current reference
+    kp_d          : unsigned(KP_W - 1 downto 0);  -- proportional gain, d axis
+    ki_d          : unsigned(KI_W - 1 downto 0);  -- integral gain times sample time, d axis
+    kp_q          : unsigned(KP_W - 1 downto 0);  -- proportional gain, q axis
+    ki_q          : unsigned(KI_W - 1 downto 0);  -- integral gain times sample time, q axis
+    r_s           : unsigned(KI_W - 1 downto 0);  -- winding resistance at t_0
+    tcr           : unsigned(23 downto 0);  -- change of r_s per kelvin
+    t_0           : signed(15 downto 0);  -- temperature of r_s
+    t_min         : signed(15 downto 0);  -- lowest valid temperature
+    t_max         : signed(15 downto 0);  -- highest valid temperature
+    t_s           : unsigned(SAMPLE_TIME_W - 1 downto 0);  -- sample time, per unit
+    flux_mode     : unsigned(1 downto 0);  -- 0: eq. (6), 1: eq. (11), 2: eq. (16), 3: eq. (17)
+    l_d           : unsigned(INDUCTANCE_W - 1 downto 0);  -- inductance, d axis
+    l_q           : unsigned(INDUCTANCE_W - 1 downto 0);  -- inductance, q axis
+    lambda_mg     : signed(PU_W - 1 downto 0);  -- magnet flux linkage
+    k_chord       : unsigned(16 downto 0);  -- (sample time)**2 / 24, per unit
+    min_pulse     : unsigned(11 downto 0);  -- shortest pulse of a leg, clocks
+    omega_0       : unsigned(15 downto 0);  -- crossover of the two models, times the sample time
+    xi            : unsigned(15 downto 0);  -- damping of the merge
+    omega_min     : unsigned(DUTY_W - 1 downto 0);  -- no compensation up to this speed
+    k_ramp        : unsigned(15 downto 0);  -- compensation fades in over 1/k_ramp above omega_min
+    flux_kp       : unsigned(16 downto 0);  -- proportional gain of the compensation
+    flux_ki       : unsigned(RECIPROCAL_W - 1 downto 0);  -- integral gain of the compensation times the sample time
+    delta_max     : unsigned(U_MAX_W - 1 downto 0);  -- limit of the compensation
+    k_lp          : unsigned(19 downto 0);  -- weight of a new sample in the low-pass of Fig. 3
+    eta_v         : unsigned(20 downto 0);  -- step of the V_dead Adaline, 18*eta
+    gamma         : unsigned(16 downto 0);  -- proportional part of the compensation
+    zeta          : unsigned(16 downto 0);  -- gain of the minimisation per sample
+    v_thr         : unsigned(SAMPLE_TIME_W - 1 downto 0);  -- no minimisation below this |v_dead|
+    v_comp_max    : unsigned(SAMPLE_TIME_W - 1 downto 0);  -- largest leg voltage that is compensated
+    i_learn       : unsigned(DUTY_W - 1 downto 0);  -- the V_dead Adaline is held below this |i_d| + |i_q|
+    compensate    : std_logic;  -- 1: compensate dead time and drops
+    eta_psi       : unsigned(16 downto 0);  -- step of the psi_m Adaline, 2*eta per unit
+    omega_psi_min : unsigned(DUTY_W - 1 downto 0);  -- psi_m is held below this speed
+    k_ahead       : unsigned(DUTY_W - 1 downto 0);  -- angle of 2.5 sample times in radians, per unit of speed
+    k_sign        : unsigned(23 downto 0);  -- 1 / (current above which a direction is +-1)
+    i_trip        : unsigned(LIMIT_W - 1 downto 0);  -- phase current that trips
+    sum_trip      : unsigned(LIMIT_W - 1 downto 0);  -- sum of the phase currents that trips
+    rail_samples  : unsigned(3 downto 0);  -- consecutive samples at the rail that trip
+    u_dc_min      : unsigned(LIMIT_W - 1 downto 0);  -- bus voltage below which it trips
+    u_dc_max      : unsigned(LIMIT_W - 1 downto 0);  -- bus voltage that trips
+    jump_max      : unsigned(11 downto 0);  -- deviation from the extrapolated position that trips, turns
+    fault_ignore  : unsigned(6 downto 0);  -- bit x: fault x is reported and does not trip
+    watchdog      : unsigned(19 downto 0);  -- longest time without a sample, clocks
+    dead_time     : unsigned(11 downto 0);  -- both gates of a leg off, clocks
+  end record settings_t;
+
+  type observed_t is record
+    i_a             : signed(PU_W - 1 downto 0);  -- current, phase a
+    i_b             : signed(PU_W - 1 downto 0);  -- current, phase b
+    i_c             : signed(PU_W - 1 downto 0);  -- current, phase c
+    current_at_rail : unsigned(2 downto 0);  -- bit x: ADC code of phase x at either end
+    u_dc            : unsigned(DUTY_W - 1 downto 0);  -- bus voltage
+    u_max           : unsigned(U_MAX_W - 1 downto 0);  -- radius of the voltage circle
+    u_dc_at_rail    : std_logic;  -- code at either end
+    u_dc_low        : std_logic;  -- bus below 1/32 per unit
+    theta_me        : unsigned(TURN_W - 1 downto 0);  -- electrical angle
+    omega_me        : signed(PU_W - 1 downto 0);  -- electrical speed
+    i_d             : signed(PU_W - 1 downto 0);  -- current, d axis
+    i_q             : signed(PU_W - 1 downto 0);  -- current, q axis
+    i_q_ref         : signed(PU_W - 1 downto 0);  -- current reference, q axis
+    speed_limited   : std_logic;  -- 1: output at its limit
+    lambda_d        : signed(PU_W - 1 downto 0);  -- flux linkage, d axis
+    lambda_q        : signed(PU_W - 1 downto 0);  -- flux linkage, q axis
+    omega_chord     : signed(PU_W - 1 downto 0);  -- electrical speed along the chord of a sample
+    u_dec_d         : signed(PU_W - 1 downto 0);  -- rotational voltage, d axis
+    u_dec_q         : signed(PU_W - 1 downto 0);  -- rotational voltage, q axis
+    u_int_d         : signed(INTEGRAL_W - 1 downto 0);  -- its integral part, d axis
+    u_int_q         : signed(INTEGRAL_W - 1 downto 0);  -- its integral part, q axis
+    u_d             : signed(PU_W - 1 downto 0);  -- voltage, d axis
+    u_q             : signed(PU_W - 1 downto 0);  -- voltage, q axis
+    sat_d           : signed(1 downto 0);  -- active limit, d axis: 1 upper, -1 lower, 0 none
+    sat_q           : signed(1 downto 0);  -- active limit, q axis: 1 upper, -1 lower, 0 none
+    u_alpha         : signed(PU_W - 1 downto 0);  -- voltage, alpha
+    u_beta          : signed(PU_W - 1 downto 0);  -- voltage, beta
+    duty_a          : unsigned(DUTY_W - 1 downto 0);  -- duty, leg a
+    duty_b          : unsigned(DUTY_W - 1 downto 0);  -- duty, leg b
+    duty_c          : unsigned(DUTY_W - 1 downto 0);  -- duty, leg c
+    sample_faults   : unsigned(5 downto 0);  -- faults of this sample, see sample_checks
+    sample_trip     : std_logic;  -- 1: at least one of them trips
+    compare_a       : unsigned(15 downto 0);  -- compare value, leg a
+    compare_b       : unsigned(15 downto 0);  -- compare value, leg b
+    compare_c       : unsigned(15 downto 0);  -- compare value, leg c
+  end record observed_t;
+
+  type estimated_t is record
+    u_comp_d        : signed(PU_W - 1 downto 0);  -- compensation voltage, d axis
+    u_comp_q        : signed(PU_W - 1 downto 0);  -- compensation voltage, q axis
+    u_applied_alpha : signed(FLUX_W - 1 downto 0);  -- voltage of the coming period, alpha
+    u_applied_beta  : signed(FLUX_W - 1 downto 0);  -- voltage of the coming period, beta
+    lambda_c_d      : signed(FLUX_W - 1 downto 0);  -- flux linkage of the current model, d axis
+    lambda_c_q      : signed(FLUX_W - 1 downto 0);  -- flux linkage of the current model, q axis
+    lambda_m_alpha  : signed(FLUX_W - 1 downto 0);  -- merged flux before the sample's resistive drop, alpha
+    lambda_m_beta   : signed(FLUX_W - 1 downto 0);  -- merged flux before the sample's resistive drop, beta
+    merge_known     : std_logic;  -- 1: the merged flux is valid at the next sample
+    delta_lambda_d  : signed(FLUX_W - 1 downto 0);  -- flux linkage missing in the estimate, d axis
+    delta_lambda_q  : signed(FLUX_W - 1 downto 0);  -- flux linkage missing in the estimate, q axis
+    delta_held      : std_logic;  -- 1: held, the integrals do not show the flux error
+    lambda_pi_d     : signed(FLUX_W - 1 downto 0);  -- compensation, d axis
+    lambda_pi_q     : signed(FLUX_W - 1 downto 0);  -- compensation, q axis
+    torque          : signed(PU_W - 1 downto 0);  -- estimated torque
+    flux_faults     : unsigned(6 downto 0);  -- what has disturbed the flux estimate, see flux_monitor
+    d_d             : signed(PU_W - 1 downto 0);  -- direction function D_d / 3
+    d_q             : signed(PU_W - 1 downto 0);  -- direction function D_q / 3
+    v_dead          : signed(V_LEG_W - 1 downto 0);  -- leg voltage loss that is not compensated
+    v_comp          : signed(V_LEG_W - 1 downto 0);  -- leg voltage that is compensated
+    v_comp_limited  : std_logic;  -- the compensation reached its limit
+    psi_m           : signed(PU_W - 1 downto 0);  -- flux linkage of the magnets
+    psi_held        : std_logic;  -- 1: psi_m is held
+    temp_lost       : std_logic;  -- 1: no valid temperature, r = r_s
+  end record estimated_t;
+
+  constant NOTHING_ESTIMATED : estimated_t := (
+    u_comp_d        => (others => '0'),
+    u_comp_q        => (others => '0'),
+    u_applied_alpha => (others => '0'),
+    u_applied_beta  => (others => '0'),
+    lambda_c_d      => (others => '0'),
+    lambda_c_q      => (others => '0'),
+    lambda_m_alpha  => (others => '0'),
+    lambda_m_beta   => (others => '0'),
+    merge_known     => '0',
+    delta_lambda_d  => (others => '0'),
+    delta_lambda_q  => (others => '0'),
+    delta_held      => '0',
+    lambda_pi_d     => (others => '0'),
+    lambda_pi_q     => (others => '0'),
+    torque          => (others => '0'),
+    flux_faults     => (others => '0'),
+    d_d             => (others => '0'),
+    d_q             => (others => '0'),
+    v_dead          => (others => '0'),
+    v_comp          => (others => '0'),
+    v_comp_limited  => '0',
+    psi_m           => (others => '0'),
+    psi_held        => '0',
+    temp_lost       => '0'
+  );
+
   -- register_access: clocks that a write waits for the end of a sample
   constant REGISTER_PATIENCE : positive := 76;
 

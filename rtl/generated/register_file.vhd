@@ -14,6 +14,7 @@
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
+use work.fluxproof_pkg.all;
 use work.register_map_pkg.all;
 
 entity register_file is
@@ -21,7 +22,8 @@ entity register_file is
     ADC_BITS      : natural := 16;
     POSITION_BITS : natural := 16;
     CARRIER_HALF  : natural := 10000;
-    CLOCK_HZ      : natural := 200000000
+    CLOCK_HZ      : natural := 200000000;
+    ESTIMATORS    : natural := 1
   );
   port (
     clk               : in  std_logic;
@@ -44,6 +46,9 @@ entity register_file is
     s_axi_rvalid      : out std_logic;
     s_axi_rready      : in  std_logic;
     sample_busy       : in  std_logic;  -- a sample is in flight
+    settings          : out settings_t;  -- registers of the blocks
+    observed          : in  observed_t;
+    estimated         : in  estimated_t;
     enable            : out std_logic;  -- 040 1: gates may switch
     clear_trip        : out std_logic;  -- 044 1: clear the latched trip
     clear_faults_in   : out std_logic;  -- 048 1: clear the flags whose cause is gone
@@ -54,96 +59,10 @@ entity register_file is
     speed_mode_in     : out std_logic;  -- 05c 1: speed control, 0: torque control
     temp_winding_in   : out signed(15 downto 0);  -- 060 winding temperature, degrees Celsius
     temp_valid_in     : out std_logic;  -- 064 1: temp_winding is valid
-    offset_a          : out unsigned(15 downto 0);  -- 100 code at zero current, phase a, left-aligned
-    offset_b          : out unsigned(15 downto 0);  -- 104 code at zero current, phase b, left-aligned
-    offset_c          : out unsigned(15 downto 0);  -- 108 code at zero current, phase c, left-aligned
-    gain_a            : out signed(17 downto 0);  -- 10c current per code, phase a
-    gain_b            : out signed(17 downto 0);  -- 110 current per code, phase b
-    gain_c            : out signed(17 downto 0);  -- 114 current per code, phase c
-    u_dc_offset       : out unsigned(15 downto 0);  -- 118 code at zero bus voltage, left-aligned
-    u_dc_gain         : out signed(17 downto 0);  -- 11c bus voltage per code
-    k_u_max           : out unsigned(16 downto 0);  -- 120 radius of the voltage circle / bus voltage
-    pole_pairs        : out unsigned(5 downto 0);  -- 124 pole pairs
-    reverse           : out std_logic;  -- 128 1: code counts opposite to the phase order
-    theta_offset      : out unsigned(17 downto 0);  -- 12c electrical angle at code zero
-    k_speed           : out unsigned(23 downto 0);  -- 130 speed per turn and sample
-    k_filter          : out unsigned(16 downto 0);  -- 134 filter weight of the new sample, 1 = no filter
-    rail_samples      : out unsigned(3 downto 0);  -- 138 consecutive samples at the rail that trip
-    jump_max          : out unsigned(11 downto 0);  -- 13c deviation from the extrapolated position that trips, turns
-    speed_kp          : out unsigned(23 downto 0);  -- 140 proportional gain
-    speed_ki          : out unsigned(23 downto 0);  -- 144 integral gain times sample time
-    i_max             : out signed(17 downto 0);  -- 148 limit of the current reference
-    kp_d              : out unsigned(23 downto 0);  -- 150 proportional gain, d axis
-    ki_d              : out unsigned(23 downto 0);  -- 154 integral gain times sample time, d axis
-    kp_q              : out unsigned(23 downto 0);  -- 158 proportional gain, q axis
-    ki_q              : out unsigned(23 downto 0);  -- 15c integral gain times sample time, q axis
-    l_d               : out unsigned(23 downto 0);  -- 160 inductance, d axis
-    l_q               : out unsigned(23 downto 0);  -- 164 inductance, q axis
-    lambda_mg         : out signed(17 downto 0);  -- 168 magnet flux linkage
-    k_delay           : out unsigned(16 downto 0);  -- 16c angle of the delay in turns, per unit of speed
-    dead_time         : out unsigned(11 downto 0);  -- 170 both gates of a leg off, clocks
-    min_pulse         : out unsigned(11 downto 0);  -- 174 shortest pulse of a leg, clocks
-    watchdog          : out unsigned(19 downto 0);  -- 178 longest time without a sample, clocks
-    fault_ignore      : out unsigned(6 downto 0);  -- 17c bit x: fault x is reported and does not trip
-    flux_mode         : out unsigned(1 downto 0);  -- 180 0: eq. (6), 1: eq. (11), 2: eq. (16), 3: eq. (17)
-    r_s               : out unsigned(23 downto 0);  -- 184 winding resistance at t_0
-    t_s               : out unsigned(16 downto 0);  -- 188 sample time, per unit
-    omega_0           : out unsigned(15 downto 0);  -- 18c crossover of the two models, times the sample time
-    xi                : out unsigned(15 downto 0);  -- 190 damping of the merge
-    omega_min         : out unsigned(16 downto 0);  -- 194 no compensation up to this speed
-    k_ramp            : out unsigned(15 downto 0);  -- 198 compensation fades in over 1/k_ramp above omega_min
-    flux_kp           : out unsigned(16 downto 0);  -- 19c proportional gain of the compensation
-    flux_ki           : out unsigned(16 downto 0);  -- 1a0 integral gain of the compensation times the sample time
-    delta_max         : out unsigned(15 downto 0);  -- 1a4 limit of the compensation
-    k_chord           : out unsigned(16 downto 0);  -- 1a8 (sample time)**2 / 24, per unit
-    tcr               : out unsigned(23 downto 0);  -- 1b0 change of r_s per kelvin
-    t_0               : out signed(15 downto 0);  -- 1b4 temperature of r_s
-    t_min             : out signed(15 downto 0);  -- 1b8 lowest valid temperature
-    t_max             : out signed(15 downto 0);  -- 1bc highest valid temperature
-    compensate        : out std_logic;  -- 1c0 1: compensate dead time and drops
-    k_lp              : out unsigned(19 downto 0);  -- 1c4 weight of a new sample in the low-pass of Fig. 3
-    eta_v             : out unsigned(20 downto 0);  -- 1c8 step of the V_dead Adaline, 18*eta
-    gamma             : out unsigned(16 downto 0);  -- 1cc proportional part of the compensation
-    zeta              : out unsigned(16 downto 0);  -- 1d0 gain of the minimisation per sample
-    v_thr             : out unsigned(16 downto 0);  -- 1d4 no minimisation below this |v_dead|
-    v_comp_max        : out unsigned(16 downto 0);  -- 1d8 largest leg voltage that is compensated
-    i_learn           : out unsigned(16 downto 0);  -- 1dc the V_dead Adaline is held below this |i_d| + |i_q|
-    eta_psi           : out unsigned(16 downto 0);  -- 1e0 step of the psi_m Adaline, 2*eta per unit
-    omega_psi_min     : out unsigned(16 downto 0);  -- 1e4 psi_m is held below this speed
-    k_ahead           : out unsigned(16 downto 0);  -- 1e8 angle of 2.5 sample times in radians, per unit of speed
-    k_sign            : out unsigned(23 downto 0);  -- 1ec 1 / (current above which a direction is +-1)
-    i_trip            : out unsigned(8 downto 0);  -- 1f0 phase current that trips
-    sum_trip          : out unsigned(8 downto 0);  -- 1f4 sum of the phase currents that trips
-    u_dc_min          : out unsigned(8 downto 0);  -- 1f8 bus voltage below which it trips
-    u_dc_max          : out unsigned(8 downto 0);  -- 1fc bus voltage that trips
     running           : in  std_logic;  -- 080 gates are switching
     tripped           : in  std_logic;  -- 080 1: a trip is latched
     setting_refused   : in  std_logic;  -- 080 1: dead_time and min_pulse contradict each other, refused
-    current_at_rail   : in  unsigned(2 downto 0);  -- 080 bit x: ADC code of phase x at either end
-    u_dc_at_rail      : in  std_logic;  -- 080 code at either end
-    u_dc_low          : in  std_logic;  -- 080 bus below 1/32 per unit
-    speed_limited     : in  std_logic;  -- 080 1: output at its limit
-    v_comp_limited    : in  std_logic;  -- 080 the compensation reached its limit
-    psi_held          : in  std_logic;  -- 080 1: psi_m is held
-    temp_lost         : in  std_logic;  -- 080 1: no valid temperature, r = r_s
-    merge_known       : in  std_logic;  -- 080 1: the merged flux is valid at the next sample
-    delta_held        : in  std_logic;  -- 080 1: held, the integrals do not show the flux error
-    flux_faults       : in  unsigned(6 downto 0);  -- 084 what has disturbed the flux estimate, see flux_monitor
     min_pulse_used    : in  unsigned(11 downto 0);  -- 088 minimum pulse in force
-    omega_me          : in  signed(17 downto 0);  -- 08c electrical speed
-    theta_me          : in  unsigned(17 downto 0);  -- 090 electrical angle
-    i_d               : in  signed(17 downto 0);  -- 094 current, d axis
-    i_q               : in  signed(17 downto 0);  -- 098 current, q axis
-    i_q_ref           : in  signed(17 downto 0);  -- 09c current reference, q axis
-    u_dc              : in  unsigned(16 downto 0);  -- 0a0 bus voltage
-    u_d               : in  signed(17 downto 0);  -- 0a4 voltage, d axis
-    u_q               : in  signed(17 downto 0);  -- 0a8 voltage, q axis
-    torque            : in  signed(17 downto 0);  -- 0ac estimated torque
-    lambda_d          : in  signed(17 downto 0);  -- 0b0 flux linkage, d axis
-    lambda_q          : in  signed(17 downto 0);  -- 0b4 flux linkage, q axis
-    psi_m             : in  signed(17 downto 0);  -- 0b8 flux linkage of the magnets
-    v_dead            : in  signed(17 downto 0);  -- 0bc leg voltage loss that is not compensated
-    v_comp            : in  signed(17 downto 0);  -- 0c0 leg voltage that is compensated
     telemetry_dropped : in  unsigned(15 downto 0);  -- 0c8 samples without a packet, up to 65535
     fault_flags       : in  unsigned(8 downto 0);  -- 0cc faults since the last clear_trip, see fault_latch
     first_fault       : in  unsigned(7 downto 0);  -- 0d0 faults that tripped first
@@ -307,328 +226,328 @@ begin
         written(25)   <= '1';
       end if;
       if (row(8) and column(0) and not sample_busy) = '1' then
-        offset_a    <= unsigned(held(15 downto 0));
-        written(64) <= '1';
+        settings.offset_a <= unsigned(held(15 downto 0));
+        written(64)       <= '1';
       end if;
       if (row(8) and column(1) and not sample_busy) = '1' then
-        offset_b    <= unsigned(held(15 downto 0));
-        written(65) <= '1';
+        settings.offset_b <= unsigned(held(15 downto 0));
+        written(65)       <= '1';
       end if;
       if (row(8) and column(2) and not sample_busy) = '1' then
-        offset_c    <= unsigned(held(15 downto 0));
-        written(66) <= '1';
+        settings.offset_c <= unsigned(held(15 downto 0));
+        written(66)       <= '1';
       end if;
       if (row(8) and column(3) and not sample_busy) = '1' then
-        gain_a      <= signed(held(17 downto 0));
-        written(67) <= '1';
+        settings.gain_a <= signed(held(17 downto 0));
+        written(67)     <= '1';
       end if;
       if (row(8) and column(4) and not sample_busy) = '1' then
-        gain_b      <= signed(held(17 downto 0));
-        written(68) <= '1';
+        settings.gain_b <= signed(held(17 downto 0));
+        written(68)     <= '1';
       end if;
       if (row(8) and column(5) and not sample_busy) = '1' then
-        gain_c      <= signed(held(17 downto 0));
-        written(69) <= '1';
+        settings.gain_c <= signed(held(17 downto 0));
+        written(69)     <= '1';
       end if;
       if (row(8) and column(6) and not sample_busy) = '1' then
-        u_dc_offset <= unsigned(held(15 downto 0));
-        written(70) <= '1';
+        settings.u_dc_offset <= unsigned(held(15 downto 0));
+        written(70)          <= '1';
       end if;
       if (row(8) and column(7) and not sample_busy) = '1' then
-        u_dc_gain   <= signed(held(17 downto 0));
-        written(71) <= '1';
+        settings.u_dc_gain <= signed(held(17 downto 0));
+        written(71)        <= '1';
       end if;
       if (row(9) and column(0) and not sample_busy) = '1' then
-        k_u_max     <= unsigned(held(16 downto 0));
-        written(72) <= '1';
+        settings.k_u_max <= unsigned(held(16 downto 0));
+        written(72)      <= '1';
       end if;
       if (row(9) and column(1) and not sample_busy) = '1' then
-        pole_pairs  <= unsigned(held(5 downto 0));
-        written(73) <= '1';
+        settings.pole_pairs <= unsigned(held(5 downto 0));
+        written(73)         <= '1';
       end if;
       if (row(9) and column(2) and not sample_busy) = '1' then
-        reverse     <= held(0);
-        written(74) <= '1';
+        settings.reverse <= held(0);
+        written(74)      <= '1';
       end if;
       if (row(9) and column(3) and not sample_busy) = '1' then
-        theta_offset <= unsigned(held(17 downto 0));
-        written(75)  <= '1';
+        settings.theta_offset <= unsigned(held(17 downto 0));
+        written(75)           <= '1';
       end if;
       if (row(9) and column(4) and not sample_busy) = '1' then
-        k_speed     <= unsigned(held(23 downto 0));
-        written(76) <= '1';
+        settings.k_speed <= unsigned(held(23 downto 0));
+        written(76)      <= '1';
       end if;
       if (row(9) and column(5) and not sample_busy) = '1' then
-        k_filter    <= unsigned(held(16 downto 0));
-        written(77) <= '1';
+        settings.k_filter <= unsigned(held(16 downto 0));
+        written(77)       <= '1';
       end if;
       if (row(9) and column(6) and not sample_busy) = '1' then
-        rail_samples <= unsigned(held(3 downto 0));
-        written(78)  <= '1';
+        settings.rail_samples <= unsigned(held(3 downto 0));
+        written(78)           <= '1';
       end if;
       if (row(9) and column(7) and not sample_busy) = '1' then
-        jump_max    <= unsigned(held(11 downto 0));
-        written(79) <= '1';
+        settings.jump_max <= unsigned(held(11 downto 0));
+        written(79)       <= '1';
       end if;
       if (row(10) and column(0) and not sample_busy) = '1' then
-        speed_kp    <= unsigned(held(23 downto 0));
-        written(80) <= '1';
+        settings.speed_kp <= unsigned(held(23 downto 0));
+        written(80)       <= '1';
       end if;
       if (row(10) and column(1) and not sample_busy) = '1' then
-        speed_ki    <= unsigned(held(23 downto 0));
-        written(81) <= '1';
+        settings.speed_ki <= unsigned(held(23 downto 0));
+        written(81)       <= '1';
       end if;
       if (row(10) and column(2) and not sample_busy) = '1' then
-        i_max       <= signed(held(17 downto 0));
-        written(82) <= '1';
+        settings.i_max <= signed(held(17 downto 0));
+        written(82)    <= '1';
       end if;
       if (row(10) and column(4) and not sample_busy) = '1' then
-        kp_d        <= unsigned(held(23 downto 0));
-        written(84) <= '1';
+        settings.kp_d <= unsigned(held(23 downto 0));
+        written(84)   <= '1';
       end if;
       if (row(10) and column(5) and not sample_busy) = '1' then
-        ki_d        <= unsigned(held(23 downto 0));
-        written(85) <= '1';
+        settings.ki_d <= unsigned(held(23 downto 0));
+        written(85)   <= '1';
       end if;
       if (row(10) and column(6) and not sample_busy) = '1' then
-        kp_q        <= unsigned(held(23 downto 0));
-        written(86) <= '1';
+        settings.kp_q <= unsigned(held(23 downto 0));
+        written(86)   <= '1';
       end if;
       if (row(10) and column(7) and not sample_busy) = '1' then
-        ki_q        <= unsigned(held(23 downto 0));
-        written(87) <= '1';
+        settings.ki_q <= unsigned(held(23 downto 0));
+        written(87)   <= '1';
       end if;
       if (row(11) and column(0) and not sample_busy) = '1' then
-        l_d         <= unsigned(held(23 downto 0));
-        written(88) <= '1';
+        settings.l_d <= unsigned(held(23 downto 0));
+        written(88)  <= '1';
       end if;
       if (row(11) and column(1) and not sample_busy) = '1' then
-        l_q         <= unsigned(held(23 downto 0));
-        written(89) <= '1';
+        settings.l_q <= unsigned(held(23 downto 0));
+        written(89)  <= '1';
       end if;
       if (row(11) and column(2) and not sample_busy) = '1' then
-        lambda_mg   <= signed(held(17 downto 0));
-        written(90) <= '1';
+        settings.lambda_mg <= signed(held(17 downto 0));
+        written(90)        <= '1';
       end if;
       if (row(11) and column(3) and not sample_busy) = '1' then
-        k_delay     <= unsigned(held(16 downto 0));
-        written(91) <= '1';
+        settings.k_delay <= unsigned(held(16 downto 0));
+        written(91)      <= '1';
       end if;
       if (row(11) and column(4) and not sample_busy) = '1' then
-        dead_time   <= unsigned(held(11 downto 0));
-        written(92) <= '1';
+        settings.dead_time <= unsigned(held(11 downto 0));
+        written(92)        <= '1';
       end if;
       if (row(11) and column(5) and not sample_busy) = '1' then
-        min_pulse   <= unsigned(held(11 downto 0));
-        written(93) <= '1';
+        settings.min_pulse <= unsigned(held(11 downto 0));
+        written(93)        <= '1';
       end if;
       if (row(11) and column(6) and not sample_busy) = '1' then
-        watchdog    <= unsigned(held(19 downto 0));
-        written(94) <= '1';
+        settings.watchdog <= unsigned(held(19 downto 0));
+        written(94)       <= '1';
       end if;
       if (row(11) and column(7) and not sample_busy) = '1' then
-        fault_ignore <= unsigned(held(6 downto 0));
-        written(95)  <= '1';
+        settings.fault_ignore <= unsigned(held(6 downto 0));
+        written(95)           <= '1';
       end if;
       if (row(12) and column(0) and not sample_busy) = '1' then
-        flux_mode   <= unsigned(held(1 downto 0));
-        written(96) <= '1';
+        settings.flux_mode <= unsigned(held(1 downto 0));
+        written(96)        <= '1';
       end if;
       if (row(12) and column(1) and not sample_busy) = '1' then
-        r_s         <= unsigned(held(23 downto 0));
-        written(97) <= '1';
+        settings.r_s <= unsigned(held(23 downto 0));
+        written(97)  <= '1';
       end if;
       if (row(12) and column(2) and not sample_busy) = '1' then
-        t_s         <= unsigned(held(16 downto 0));
-        written(98) <= '1';
+        settings.t_s <= unsigned(held(16 downto 0));
+        written(98)  <= '1';
       end if;
       if (row(12) and column(3) and not sample_busy) = '1' then
-        omega_0     <= unsigned(held(15 downto 0));
-        written(99) <= '1';
+        settings.omega_0 <= unsigned(held(15 downto 0));
+        written(99)      <= '1';
       end if;
       if (row(12) and column(4) and not sample_busy) = '1' then
-        xi           <= unsigned(held(15 downto 0));
+        settings.xi  <= unsigned(held(15 downto 0));
         written(100) <= '1';
       end if;
       if (row(12) and column(5) and not sample_busy) = '1' then
-        omega_min    <= unsigned(held(16 downto 0));
-        written(101) <= '1';
+        settings.omega_min <= unsigned(held(16 downto 0));
+        written(101)       <= '1';
       end if;
       if (row(12) and column(6) and not sample_busy) = '1' then
-        k_ramp       <= unsigned(held(15 downto 0));
-        written(102) <= '1';
+        settings.k_ramp <= unsigned(held(15 downto 0));
+        written(102)    <= '1';
       end if;
       if (row(12) and column(7) and not sample_busy) = '1' then
-        flux_kp      <= unsigned(held(16 downto 0));
-        written(103) <= '1';
+        settings.flux_kp <= unsigned(held(16 downto 0));
+        written(103)     <= '1';
       end if;
       if (row(13) and column(0) and not sample_busy) = '1' then
-        flux_ki      <= unsigned(held(16 downto 0));
-        written(104) <= '1';
+        settings.flux_ki <= unsigned(held(16 downto 0));
+        written(104)     <= '1';
       end if;
       if (row(13) and column(1) and not sample_busy) = '1' then
-        delta_max    <= unsigned(held(15 downto 0));
-        written(105) <= '1';
+        settings.delta_max <= unsigned(held(15 downto 0));
+        written(105)       <= '1';
       end if;
       if (row(13) and column(2) and not sample_busy) = '1' then
-        k_chord      <= unsigned(held(16 downto 0));
-        written(106) <= '1';
+        settings.k_chord <= unsigned(held(16 downto 0));
+        written(106)     <= '1';
       end if;
       if (row(13) and column(4) and not sample_busy) = '1' then
-        tcr          <= unsigned(held(23 downto 0));
+        settings.tcr <= unsigned(held(23 downto 0));
         written(108) <= '1';
       end if;
       if (row(13) and column(5) and not sample_busy) = '1' then
-        t_0          <= signed(held(15 downto 0));
+        settings.t_0 <= signed(held(15 downto 0));
         written(109) <= '1';
       end if;
       if (row(13) and column(6) and not sample_busy) = '1' then
-        t_min        <= signed(held(15 downto 0));
-        written(110) <= '1';
+        settings.t_min <= signed(held(15 downto 0));
+        written(110)   <= '1';
       end if;
       if (row(13) and column(7) and not sample_busy) = '1' then
-        t_max        <= signed(held(15 downto 0));
-        written(111) <= '1';
+        settings.t_max <= signed(held(15 downto 0));
+        written(111)   <= '1';
       end if;
       if (row(14) and column(0) and not sample_busy) = '1' then
-        compensate   <= held(0);
-        written(112) <= '1';
+        settings.compensate <= held(0);
+        written(112)        <= '1';
       end if;
       if (row(14) and column(1) and not sample_busy) = '1' then
-        k_lp         <= unsigned(held(19 downto 0));
-        written(113) <= '1';
+        settings.k_lp <= unsigned(held(19 downto 0));
+        written(113)  <= '1';
       end if;
       if (row(14) and column(2) and not sample_busy) = '1' then
-        eta_v        <= unsigned(held(20 downto 0));
-        written(114) <= '1';
+        settings.eta_v <= unsigned(held(20 downto 0));
+        written(114)   <= '1';
       end if;
       if (row(14) and column(3) and not sample_busy) = '1' then
-        gamma        <= unsigned(held(16 downto 0));
-        written(115) <= '1';
+        settings.gamma <= unsigned(held(16 downto 0));
+        written(115)   <= '1';
       end if;
       if (row(14) and column(4) and not sample_busy) = '1' then
-        zeta         <= unsigned(held(16 downto 0));
-        written(116) <= '1';
+        settings.zeta <= unsigned(held(16 downto 0));
+        written(116)  <= '1';
       end if;
       if (row(14) and column(5) and not sample_busy) = '1' then
-        v_thr        <= unsigned(held(16 downto 0));
-        written(117) <= '1';
+        settings.v_thr <= unsigned(held(16 downto 0));
+        written(117)   <= '1';
       end if;
       if (row(14) and column(6) and not sample_busy) = '1' then
-        v_comp_max   <= unsigned(held(16 downto 0));
-        written(118) <= '1';
+        settings.v_comp_max <= unsigned(held(16 downto 0));
+        written(118)        <= '1';
       end if;
       if (row(14) and column(7) and not sample_busy) = '1' then
-        i_learn      <= unsigned(held(16 downto 0));
-        written(119) <= '1';
+        settings.i_learn <= unsigned(held(16 downto 0));
+        written(119)     <= '1';
       end if;
       if (row(15) and column(0) and not sample_busy) = '1' then
-        eta_psi      <= unsigned(held(16 downto 0));
-        written(120) <= '1';
+        settings.eta_psi <= unsigned(held(16 downto 0));
+        written(120)     <= '1';
       end if;
       if (row(15) and column(1) and not sample_busy) = '1' then
-        omega_psi_min <= unsigned(held(16 downto 0));
-        written(121)  <= '1';
+        settings.omega_psi_min <= unsigned(held(16 downto 0));
+        written(121)           <= '1';
       end if;
       if (row(15) and column(2) and not sample_busy) = '1' then
-        k_ahead      <= unsigned(held(16 downto 0));
-        written(122) <= '1';
+        settings.k_ahead <= unsigned(held(16 downto 0));
+        written(122)     <= '1';
       end if;
       if (row(15) and column(3) and not sample_busy) = '1' then
-        k_sign       <= unsigned(held(23 downto 0));
-        written(123) <= '1';
+        settings.k_sign <= unsigned(held(23 downto 0));
+        written(123)    <= '1';
       end if;
       if (row(15) and column(4) and not sample_busy) = '1' then
-        i_trip       <= unsigned(held(8 downto 0));
-        written(124) <= '1';
+        settings.i_trip <= unsigned(held(8 downto 0));
+        written(124)    <= '1';
       end if;
       if (row(15) and column(5) and not sample_busy) = '1' then
-        sum_trip     <= unsigned(held(8 downto 0));
-        written(125) <= '1';
+        settings.sum_trip <= unsigned(held(8 downto 0));
+        written(125)      <= '1';
       end if;
       if (row(15) and column(6) and not sample_busy) = '1' then
-        u_dc_min     <= unsigned(held(8 downto 0));
-        written(126) <= '1';
+        settings.u_dc_min <= unsigned(held(8 downto 0));
+        written(126)      <= '1';
       end if;
       if (row(15) and column(7) and not sample_busy) = '1' then
-        u_dc_max     <= unsigned(held(8 downto 0));
-        written(127) <= '1';
+        settings.u_dc_max <= unsigned(held(8 downto 0));
+        written(127)      <= '1';
       end if;
 
       if rst = '1' then
-        written          <= (others => '0');
-        enable           <= '0';
-        clear_trip       <= '0';
-        clear_faults_in  <= '0';
-        telemetry_enable <= '0';
-        omega_ref_in     <= (others => '0');
-        i_d_ref_in       <= (others => '0');
-        i_q_ext_in       <= (others => '0');
-        speed_mode_in    <= '0';
-        temp_winding_in  <= (others => '0');
-        temp_valid_in    <= '0';
-        offset_a         <= (others => '0');
-        offset_b         <= (others => '0');
-        offset_c         <= (others => '0');
-        gain_a           <= (others => '0');
-        gain_b           <= (others => '0');
-        gain_c           <= (others => '0');
-        u_dc_offset      <= (others => '0');
-        u_dc_gain        <= (others => '0');
-        k_u_max          <= (others => '0');
-        pole_pairs       <= to_unsigned(1, 6);
-        reverse          <= '0';
-        theta_offset     <= (others => '0');
-        k_speed          <= (others => '0');
-        k_filter         <= (others => '0');
-        rail_samples     <= (others => '0');
-        jump_max         <= (others => '0');
-        speed_kp         <= (others => '0');
-        speed_ki         <= (others => '0');
-        i_max            <= (others => '0');
-        kp_d             <= (others => '0');
-        ki_d             <= (others => '0');
-        kp_q             <= (others => '0');
-        ki_q             <= (others => '0');
-        l_d              <= (others => '0');
-        l_q              <= (others => '0');
-        lambda_mg        <= (others => '0');
-        k_delay          <= (others => '0');
-        dead_time        <= (others => '0');
-        min_pulse        <= (others => '0');
-        watchdog         <= (others => '0');
-        fault_ignore     <= (others => '0');
-        flux_mode        <= (others => '0');
-        r_s              <= (others => '0');
-        t_s              <= (others => '0');
-        omega_0          <= to_unsigned(256, 16);
-        xi               <= to_unsigned(4096, 16);
-        omega_min        <= (others => '0');
-        k_ramp           <= (others => '0');
-        flux_kp          <= (others => '0');
-        flux_ki          <= (others => '0');
-        delta_max        <= (others => '0');
-        k_chord          <= (others => '0');
-        tcr              <= (others => '0');
-        t_0              <= (others => '0');
-        t_min            <= (others => '0');
-        t_max            <= (others => '0');
-        compensate       <= '0';
-        k_lp             <= (others => '0');
-        eta_v            <= (others => '0');
-        gamma            <= (others => '0');
-        zeta             <= (others => '0');
-        v_thr            <= (others => '0');
-        v_comp_max       <= (others => '0');
-        i_learn          <= (others => '0');
-        eta_psi          <= (others => '0');
-        omega_psi_min    <= (others => '0');
-        k_ahead          <= (others => '0');
-        k_sign           <= (others => '0');
-        i_trip           <= (others => '0');
-        sum_trip         <= (others => '0');
-        u_dc_min         <= (others => '0');
-        u_dc_max         <= (others => '0');
+        written                <= (others => '0');
+        enable                 <= '0';
+        clear_trip             <= '0';
+        clear_faults_in        <= '0';
+        telemetry_enable       <= '0';
+        omega_ref_in           <= (others => '0');
+        i_d_ref_in             <= (others => '0');
+        i_q_ext_in             <= (others => '0');
+        speed_mode_in          <= '0';
+        temp_winding_in        <= (others => '0');
+        temp_valid_in          <= '0';
+        settings.offset_a      <= (others => '0');
+        settings.offset_b      <= (others => '0');
+        settings.offset_c      <= (others => '0');
+        settings.gain_a        <= (others => '0');
+        settings.gain_b        <= (others => '0');
+        settings.gain_c        <= (others => '0');
+        settings.u_dc_offset   <= (others => '0');
+        settings.u_dc_gain     <= (others => '0');
+        settings.k_u_max       <= (others => '0');
+        settings.pole_pairs    <= to_unsigned(1, 6);
+        settings.reverse       <= '0';
+        settings.theta_offset  <= (others => '0');
+        settings.k_speed       <= (others => '0');
+        settings.k_filter      <= (others => '0');
+        settings.rail_samples  <= (others => '0');
+        settings.jump_max      <= (others => '0');
+        settings.speed_kp      <= (others => '0');
+        settings.speed_ki      <= (others => '0');
+        settings.i_max         <= (others => '0');
+        settings.kp_d          <= (others => '0');
+        settings.ki_d          <= (others => '0');
+        settings.kp_q          <= (others => '0');
+        settings.ki_q          <= (others => '0');
+        settings.l_d           <= (others => '0');
+        settings.l_q           <= (others => '0');
+        settings.lambda_mg     <= (others => '0');
+        settings.k_delay       <= (others => '0');
+        settings.dead_time     <= (others => '0');
+        settings.min_pulse     <= (others => '0');
+        settings.watchdog      <= (others => '0');
+        settings.fault_ignore  <= (others => '0');
+        settings.flux_mode     <= (others => '0');
+        settings.r_s           <= (others => '0');
+        settings.t_s           <= (others => '0');
+        settings.omega_0       <= to_unsigned(256, 16);
+        settings.xi            <= to_unsigned(4096, 16);
+        settings.omega_min     <= (others => '0');
+        settings.k_ramp        <= (others => '0');
+        settings.flux_kp       <= (others => '0');
+        settings.flux_ki       <= (others => '0');
+        settings.delta_max     <= (others => '0');
+        settings.k_chord       <= (others => '0');
+        settings.tcr           <= (others => '0');
+        settings.t_0           <= (others => '0');
+        settings.t_min         <= (others => '0');
+        settings.t_max         <= (others => '0');
+        settings.compensate    <= '0';
+        settings.k_lp          <= (others => '0');
+        settings.eta_v         <= (others => '0');
+        settings.gamma         <= (others => '0');
+        settings.zeta          <= (others => '0');
+        settings.v_thr         <= (others => '0');
+        settings.v_comp_max    <= (others => '0');
+        settings.i_learn       <= (others => '0');
+        settings.eta_psi       <= (others => '0');
+        settings.omega_psi_min <= (others => '0');
+        settings.k_ahead       <= (others => '0');
+        settings.k_sign        <= (others => '0');
+        settings.i_trip        <= (others => '0');
+        settings.sum_trip      <= (others => '0');
+        settings.u_dc_min      <= (others => '0');
+        settings.u_dc_max      <= (others => '0');
       end if;
     end if;
   end process;
@@ -725,29 +644,31 @@ begin
   shown(3)          <= std_logic_vector(to_unsigned(POSITION_BITS, 32));
   shown(4)          <= std_logic_vector(to_unsigned(CARRIER_HALF, 32));
   shown(5)          <= std_logic_vector(to_unsigned(CLOCK_HZ, 32));
-  shown(6 to 16)    <= (others => (others => '0'));
+  shown(6)          <= std_logic_vector(to_unsigned(ESTIMATORS, 32));
+  shown(7 to 16)    <= (others => (others => '0'));
   shown(17)         <= "0000000000000000000000000000000" & clear_trip;
   shown(18)         <= "0000000000000000000000000000000" & clear_faults_in;
   shown(19 to 31)   <= (others => (others => '0'));
-  shown(32)         <= "000000000000000000" & delta_held & merge_known & temp_lost & psi_held & v_comp_limited &
-                       speed_limited & u_dc_low & u_dc_at_rail & std_logic_vector(current_at_rail) &
-                       setting_refused & tripped & running;
-  shown(33)         <= std_logic_vector(resize(flux_faults, 32));
+  shown(32)         <= "000000000000000000" & estimated.delta_held & estimated.merge_known & estimated.temp_lost &
+                       estimated.psi_held & estimated.v_comp_limited & observed.speed_limited & observed.u_dc_low &
+                       observed.u_dc_at_rail & std_logic_vector(observed.current_at_rail) & setting_refused &
+                       tripped & running;
+  shown(33)         <= std_logic_vector(resize(estimated.flux_faults, 32));
   shown(34)         <= std_logic_vector(resize(min_pulse_used, 32));
-  shown(35)         <= "00000000000000" & std_logic_vector(resize(omega_me, 18));
-  shown(36)         <= std_logic_vector(resize(theta_me, 32));
-  shown(37)         <= "00000000000000" & std_logic_vector(resize(i_d, 18));
-  shown(38)         <= "00000000000000" & std_logic_vector(resize(i_q, 18));
-  shown(39)         <= "00000000000000" & std_logic_vector(resize(i_q_ref, 18));
-  shown(40)         <= std_logic_vector(resize(u_dc, 32));
-  shown(41)         <= "00000000000000" & std_logic_vector(resize(u_d, 18));
-  shown(42)         <= "00000000000000" & std_logic_vector(resize(u_q, 18));
-  shown(43)         <= "00000000000000" & std_logic_vector(resize(torque, 18));
-  shown(44)         <= "00000000000000" & std_logic_vector(resize(lambda_d, 18));
-  shown(45)         <= "00000000000000" & std_logic_vector(resize(lambda_q, 18));
-  shown(46)         <= "00000000000000" & std_logic_vector(resize(psi_m, 18));
-  shown(47)         <= "00000000000000" & std_logic_vector(resize(v_dead, 18));
-  shown(48)         <= "00000000000000" & std_logic_vector(resize(v_comp, 18));
+  shown(35)         <= "00000000000000" & std_logic_vector(resize(observed.omega_me, 18));
+  shown(36)         <= std_logic_vector(resize(observed.theta_me, 32));
+  shown(37)         <= "00000000000000" & std_logic_vector(resize(observed.i_d, 18));
+  shown(38)         <= "00000000000000" & std_logic_vector(resize(observed.i_q, 18));
+  shown(39)         <= "00000000000000" & std_logic_vector(resize(observed.i_q_ref, 18));
+  shown(40)         <= std_logic_vector(resize(observed.u_dc, 32));
+  shown(41)         <= "00000000000000" & std_logic_vector(resize(observed.u_d, 18));
+  shown(42)         <= "00000000000000" & std_logic_vector(resize(observed.u_q, 18));
+  shown(43)         <= "00000000000000" & std_logic_vector(resize(estimated.torque, 18));
+  shown(44)         <= "00000000000000" & std_logic_vector(resize(observed.lambda_d, 18));
+  shown(45)         <= "00000000000000" & std_logic_vector(resize(observed.lambda_q, 18));
+  shown(46)         <= "00000000000000" & std_logic_vector(resize(estimated.psi_m, 18));
+  shown(47)         <= "00000000000000" & std_logic_vector(resize(estimated.v_dead, 18));
+  shown(48)         <= "00000000000000" & std_logic_vector(resize(estimated.v_comp, 18));
   shown(49 to 49)   <= (others => (others => '0'));
   shown(50)         <= std_logic_vector(resize(telemetry_dropped, 32));
   shown(51)         <= std_logic_vector(resize(fault_flags, 32));

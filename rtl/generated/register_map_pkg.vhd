@@ -41,8 +41,8 @@ package body register_map_pkg is
 
   constant ACCESS_OF : access_t :=
   (
-    0 to 5 | 32 to 48 | 50 to 53                      => REGISTER_READ_ONLY,
-    6 to 15 | 26 to 31 | 49 | 54 to 63 | 83 | 107     => REGISTER_NONE,
+    0 to 6 | 32 to 48 | 50 to 53                      => REGISTER_READ_ONLY,
+    7 to 15 | 26 to 31 | 49 | 54 to 63 | 83 | 107     => REGISTER_NONE,
     16 to 17 | 19                                     => REGISTER_AT_ONCE,
     18 | 20 to 25 | 64 to 82 | 84 to 106 | 108 to 127 => REGISTER_BETWEEN
   );

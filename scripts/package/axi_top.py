@@ -9,8 +9,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from fluxproof.checkout import RTL
+from fluxproof.cosim.entity import Entity, Pin, read_entity
 from fluxproof.cosim.sources import rtl_sources
-from scripts.package.entity import Entity, Pin, read_entity
+from fluxproof.golden_model.records import ENTERS_AS, generic_of
 
 TOP = "fluxproof_axi"
 PATH = RTL / "generated" / f"{TOP}.vhd"
@@ -38,6 +39,7 @@ GENERICS = {
     "ADC_BITS": ("integer range 12 to 16", 16, "width of the ADC codes"),
     "POSITION_BITS": ("integer range 8 to 18", 16, "width of the position code"),
     "CARRIER_HALF": ("integer range 8 to 32767", 10000, "half a PWM period in clocks"),
+    "ESTIMATORS": ("integer range 0 to 1", 1, "0: field-oriented control alone"),
 }
 LEFT_AT_DEFAULT = {"DEPTH_BITS"}  # the telemetry's queue: 512 words are one block RAM
 LITE, CODE, POSITION = "31 downto 0", "ADC_BITS - 1 downto 0", "POSITION_BITS - 1 downto 0"
@@ -80,6 +82,7 @@ PINS = (
     ("gate_low", "out", "2 downto 0", "lower gates, bit 0 is leg a"),
     ("irq", "out", None, "level: a trip is remembered"),
 )
+SAMPLE = "sample"  # the record of this name is put together here: codes from pins, references from registers
 NETS_OF_PINS = {"trip": "trip_pin", "aclk": "clk", "irq": "tripped"}  # pin -> net, if the names differ
 
 HEADER = """\
@@ -117,7 +120,7 @@ def net_of(label: str, port: str) -> str:
 def wire(entities: dict[str, Entity]) -> dict[str, Pin]:
     """{net: the instance's port that drives it}; ValueError for a port without driver, or with two."""
     pins = {NETS_OF_PINS.get(name, name): mode for name, mode, _, _ in PINS}
-    given = {net for net, mode in pins.items() if mode == "in"} | {"rst", "rst_1"}
+    given = {net for net, mode in pins.items() if mode == "in"} | {"rst", "rst_1", SAMPLE}
     driven: dict[str, Pin] = {}
     for label, entity in entities.items():
         for pin in entity.outputs.values():
@@ -132,6 +135,8 @@ def wire(entities: dict[str, Entity]) -> dict[str, Pin]:
         unknown = set(entity.generics) - set(GENERICS) - LEFT_AT_DEFAULT
         if unknown:
             raise ValueError(f"{TOP}: no value for generic {', '.join(sorted(unknown))} of {entity.name}")
+    if missing := [name for name in ENTERS_AS.values() if name not in given | set(driven)]:
+        raise ValueError(f"{TOP}: nothing drives {', '.join(missing)} of {SAMPLE}")
     undriven = [net for net, mode in pins.items() if mode == "out" and net not in driven]
     if undriven:
         raise ValueError(f"{TOP}: nothing drives {', '.join(undriven)}")
@@ -142,7 +147,7 @@ def render(rtl: Path = RTL) -> str:
     """The whole file."""
     entities = instances(rtl)
     driven = wire(entities)
-    read = {net_of(label, n) for label, e in entities.items() for n in e.inputs}
+    read = {net_of(label, n) for label, e in entities.items() for n in e.inputs} | set(ENTERS_AS.values())
     out_pins = {NETS_OF_PINS.get(name, name): name for name, mode, _, _ in PINS if mode == "out"}
     # An output pin is connected directly to its driver if nothing else reads it and the types agree.
     direct = {n for n in out_pins if n not in read and driven[n].kind in ("std_logic", "std_logic_vector")}
@@ -155,10 +160,12 @@ def render(rtl: Path = RTL) -> str:
     width = max(map(len, names.values()))
     lines += [f"  signal {name:{width}} : std_logic;" for name in ("rst_1", "rst")]
     lines += [f"  signal {names[net]:{width}} : {pin.vhdl_type};" for net, pin in signals.items()]
+    lines += [f"  signal {SAMPLE:{width}} : {SAMPLE}_t;"]
     lines += ["begin", "", "  process (aclk)", "  begin", "    if rising_edge(aclk) then"]
     lines += ["      rst_1 <= not aresetn;", "      rst   <= rst_1;", "    end if;", "  end process;"]
+    lines += ["", *_sample(names)]
     for label, entity in entities.items():
-        lines += ["", *_instance(label, entity, actuals)]
+        lines += ["", *_instance(label, entity, {**actuals, SAMPLE: SAMPLE})]
     lines.append("")
     copied = {net: pin for net, pin in out_pins.items() if net in signals}
     width = max(map(len, copied.values()))
@@ -184,6 +191,17 @@ def _entity() -> list[str]:
         end = ";" if k + 1 < len(PINS) else ""
         lines.append(f"    {name:{wide}} : {mode:3} {kind}{end}" + (f"  -- {doc}" if doc else ""))
     return [*lines, "  );", f"end entity {TOP};"]
+
+
+def _sample(names: dict[str, str]) -> list[str]:
+    """The fields of the sample: a code from its pin, right-aligned; a reference from its register."""
+    wide = max(map(len, ENTERS_AS))
+    lines = []
+    for field, name in ENTERS_AS.items():
+        target = f"{SAMPLE}.{field}"
+        value = f"resize(unsigned({name}), {target}'length)" if generic_of(name) else names[name]
+        lines.append(f"  {SAMPLE}.{field:{wide}} <= {value};")
+    return lines
 
 
 def _instance(label: str, entity: Entity, actuals: dict[str, str]) -> list[str]:

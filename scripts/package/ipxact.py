@@ -18,9 +18,9 @@ from peakrdl_ipxact.exporter import Standard
 from systemrdl import RDLCompiler
 
 from fluxproof.checkout import ROOT, RTL
+from fluxproof.cosim.entity import Entity, Generic, Pin, parse_entity
 from scripts.package.axi_top import PATH as TOP_PATH
 from scripts.package.axi_top import source_names
-from scripts.package.entity import Entity, Generic, Pin, parse_entity
 
 SPIRIT = "http://www.spiritconsortium.org/XMLSchema/SPIRIT/1685-2009"
 XILINX = "http://www.xilinx.com"

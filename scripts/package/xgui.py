@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from fluxproof.checkout import ROOT
+from fluxproof.cosim.entity import parse_entity
 from scripts.package.axi_top import PATH as TOP_PATH
-from scripts.package.entity import parse_entity
 from scripts.package.ipxact import XGUI
 
 PATH = ROOT / XGUI

@@ -153,7 +153,12 @@ PROOFS = (
         "a gate that is on goes off only when the command of its leg changes, or by trip, enable or reset",
         "STAYS_ON",
         # Low gate: the high gate is on at the valley only after half a period, beyond the depth of the search.
-        Fault("gate off when the dead time grows", GATES, "state.elapsed(k) <= SETTLED;", "state.elapsed(k) <= state.dead_time;"),
+        Fault(
+            "gate off when the dead time grows",
+            GATES,
+            "state.elapsed(k) <= SETTLED;",
+            "state.elapsed(k) <= state.dead_time;",
+        ),
     ),
     gate_proof(
         "minimum_pulse",

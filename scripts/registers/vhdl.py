@@ -7,6 +7,7 @@ from pathlib import Path
 
 import jinja2
 
+from fluxproof.golden_model.records import RECORDS
 from scripts.registers.compiled import Part, Word
 
 TEMPLATES = Path(__file__).resolve().parent
@@ -16,6 +17,7 @@ GENERICS = {
     "POSITION_BITS": 16,
     "CARRIER_HALF": 10000,
     "CLOCK_HZ": 200000000,
+    "ESTIMATORS": 1,
 }  # as in the core
 BETWEEN, AT_ONCE = ("setting", "sample pulse"), ("command", "pulse")
 BUS = (
@@ -37,6 +39,14 @@ BUS = (
     ("s_axi_rvalid", "out", 1),
     ("s_axi_rready", "in", 1),
 )
+
+
+def place(port: str) -> str:
+    """The VHDL name of a value: a field of one of the core's records, or a port of its own."""
+    for record in ("settings", "observed", "estimated"):
+        if port in RECORDS[f"{record}_t"]:
+            return f"{record}.{port}"
+    return port
 
 
 def writable(word: Word) -> bool:
@@ -125,12 +135,11 @@ def register_file(words: list[Word]) -> str:
     ports = [("clk", "in", "std_logic", ""), ("rst", "in", "std_logic", "synchronous, active high")]
     ports += [(name, mode, _vector(width), "") for name, mode, width in BUS]
     ports.append(("sample_busy", "in", "std_logic", "a sample is in flight"))
-    ports += [(p.port, "out", p.vhdl_type, f"{w.address:03x} {p.doc}") for w, p in stored]
+    ports.append(("settings", "out", "settings_t", "registers of the blocks"))
+    ports += [("observed", "in", "observed_t", ""), ("estimated", "in", "estimated_t", "")]
+    alone = [(w, p, "out") for w, p in stored] + [(w, p, "in") for w in words if w.kind == "status" for p in w.parts]
     ports += [
-        (p.port, "in", p.vhdl_type, f"{w.address:03x} {p.doc}")
-        for w in words
-        if w.kind == "status"
-        for p in w.parts
+        (p.port, mode, p.vhdl_type, f"{w.address:03x} {p.doc}") for w, p, mode in alone if place(p.port) == p.port
     ]
     names = [name for name, *_ in ports]
     if twice := sorted({name for name in names if names.count(name) > 1}):
@@ -144,9 +153,9 @@ def register_file(words: list[Word]) -> str:
         bus=[name for name, *_ in BUS],
         pulses=[p.port for w, p in stored if w.kind == "pulse"],
         sample_pulses=[p.port for w, p in stored if w.kind == "sample pulse"],
-        stores=[(w.index, p.port, _from_word(p)) for w, p in stored],
-        resets=[(p.port, _reset(w, p)) for w, p in stored],
-        output_width=max(len(part.port) for _, part in stored),
+        stores=[(w.index, place(p.port), _from_word(p)) for w, p in stored],
+        resets=[(place(p.port), _reset(w, p)) for w, p in stored],
+        output_width=max(len(place(part.port)) for _, part in stored),
         kept={w.index: "pulse" not in w.kind for w, _ in stored},
         at_once={w.index: w.kind in AT_ONCE for w, _ in stored},
         reads=[(choice, _wrapped(value, reads_width + len("   <= "))) for choice, value in reads],
@@ -202,15 +211,16 @@ def _read(word: Word, sign: int) -> str:
     if word.kind == "generic":
         return f"std_logic_vector(to_unsigned({word.name.upper()}, 32))"
     if word.parts[0].signed:
-        return f"{_zeros(31 - sign)} & std_logic_vector(resize({word.parts[0].port}, {sign + 1}))"
+        return f"{_zeros(31 - sign)} & std_logic_vector(resize({place(word.parts[0].port)}, {sign + 1}))"
     if len(word.parts) == 1 and word.parts[0].vhdl_type != "std_logic":
-        return f"std_logic_vector(resize({word.parts[0].port}, 32))"
+        return f"std_logic_vector(resize({place(word.parts[0].port)}, 32))"
     bits: list[str] = []  # from bit 31 down
     free = 32
     for part in sorted(word.parts, key=lambda p: -p.bit):
         top = part.bit + part.width
         bits += [_zeros(free - top)] if free > top else []
-        bits.append(part.port if part.vhdl_type == "std_logic" else f"std_logic_vector({part.port})")
+        name = place(part.port)
+        bits.append(name if part.vhdl_type == "std_logic" else f"std_logic_vector({name})")
         free = part.bit
     bits += [_zeros(free)] if free else []
     return " & ".join(bits)

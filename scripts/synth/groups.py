@@ -80,13 +80,27 @@ BETWEEN = "between_blocks"  # the core's own logic outside every block: a word f
 PLAIN_FOC = ("field_oriented_control", "io_svm")  # what every drive needs, with no estimator
 
 _COMMENT = re.compile(r"--[^\n]*")
+_GENERATE = re.compile(r"^\s*(\w+)\s*:\s*(?:if|for)\b.*\bgenerate\b")
 _INSTANCE = re.compile(r"^\s*(\w+)\s*:\s*entity\s+work\.(\w+)", re.IGNORECASE | re.MULTILINE)
 
 
 def instances(vhdl: Path) -> dict[str, str]:
-    """{label: entity} of a file's direct instances, in lower case, in order."""
+    """{label: entity} of a file's instances, in lower case, in order."""
     found = _INSTANCE.findall(_COMMENT.sub("", vhdl.read_text()))
     return {label.lower(): entity.lower() for label, entity in found}
+
+
+def netlist_names(vhdl: Path) -> dict[str, str]:
+    """{label: name in the converted Verilog}: a generate block's label comes before those of its instances."""
+    names, scope = {}, ""
+    for line in _COMMENT.sub("", vhdl.read_text()).lower().splitlines():
+        if begun := _GENERATE.match(line):
+            scope = f"{begun[1]}_"
+        elif re.match(r"\s*end\s+generate", line):
+            scope = ""
+        elif found := _INSTANCE.match(line):
+            names[found[1]] = scope + found[1]
+    return names
 
 
 def check(

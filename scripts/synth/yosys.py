@@ -15,7 +15,7 @@ from fluxproof.checkout import RTL
 from fluxproof.cosim.sources import rtl_sources
 from fluxproof.cosim.verilog import synthesize
 from scripts.synth.count import Count, count, read_cells
-from scripts.synth.groups import BETWEEN, CORE, GROUPS, OUTSIDE, check, file_of, instances, top_of
+from scripts.synth.groups import BETWEEN, CORE, GROUPS, OUTSIDE, check, file_of, instances, netlist_names, top_of
 from scripts.synth.netlist import Netlist, marks, read
 
 FAMILIES = ("xc7", "xc6v", "xcup")
@@ -96,18 +96,18 @@ class Design:
         self.rtl, self.quiet = rtl, quiet
         self.top = top_of(rtl)
         self.entities = entities_of(rtl)
-        self.core_labels = list(instances(rtl / f"{CORE}.vhd"))
-        check(self.core_labels)
+        self.core_names = netlist_names(rtl / f"{CORE}.vhd")
+        check(list(self.core_names))
         self.verilog = synthesize(rtl_sources(rtl), self.top, {})
 
     @property
     def instance_paths(self) -> list[str]:
         """The blocks as flattened names begin: those of the core, and those beside it in the AXI top."""
         if self.top == CORE:
-            return self.core_labels
+            return list(self.core_names.values())
         labels = instances(file_of(self.top, self.rtl))
         core = next(label for label, entity in labels.items() if entity == CORE)
-        return [label for label in labels if label != core] + [f"{core}.{label}" for label in self.core_labels]
+        return [label for label in labels if label != core] + [f"{core}.{name}" for name in self.core_names.values()]
 
     def _run(
         self,
@@ -183,7 +183,7 @@ class Design:
         core = CORE if self.top == CORE else self.module(CORE)
         script = [f"hierarchy -top {self.top}", "proc"]
         for group, labels in GROUPS.items():
-            script.append(f"submod -name {group} " + " ".join(f"{core}/c:{label}" for label in labels))
+            script.append(f"submod -name {group} " + " ".join(f"{core}/c:{self.core_names[label]}" for label in labels))
         script += [
             "setattr -mod -set keep_hierarchy 1 " + " ".join([core, *(f"*{group}" for group in GROUPS)]),
             SYNTH.format(family=family, top=self.top),

@@ -12,6 +12,7 @@ from cocotb.triggers import FallingEdge
 
 from fluxproof.cosim.block_bench import read
 from fluxproof.cosim.ghdl_device import prepare
+from fluxproof.cosim.inside import instance
 from fluxproof.golden_model import drive as drives
 from fluxproof.golden_model.registers import registers
 
@@ -29,7 +30,7 @@ async def timeline(dut):
     drive = drives.with_carrier(drives.load(os.environ["FLUXPROOF_DRIVE"]), 128)
     await prepare(dut, registers(drive).values)
     await FallingEdge(dut.clk)
-    strobes = {label: getattr(dut, label) for label in labels}
+    strobes = {label: instance(dut.inside, label) for label in labels}
     strobes = {label: (h.in_valid, h.out_valid) for label, h in strobes.items() if hasattr(h, "in_valid")}
     rows = {
         label: {"block": labels[label], "instance": label, "first": None, "last": None} for label in strobes

@@ -1,0 +1,202 @@
+"""The estimators beside the control: twin of ``estimation`` in rtl/fluxproof.vhd, which ESTIMATORS = 0 leaves out.
+
+``for_control`` gives what the control takes from the estimates of the sample before, ``step`` the new estimates.
+"""
+
+from typing import NamedTuple
+
+from fluxproof.golden_model.control import dead_time_compensation
+from fluxproof.golden_model.estimators import (
+    applied_voltage,
+    clean_voltage,
+    current_directions,
+    current_model,
+    delta_lambda,
+    flux_compensation,
+    flux_merge,
+    flux_monitor,
+    psi_adaline,
+    speed_reciprocal,
+    torque,
+    v_dead_adaline,
+    winding_resistance,
+)
+from fluxproof.golden_model.kernel import kernel
+from fluxproof.golden_model.transforms import flux_inverse_park, flux_park, park
+
+
+class State(NamedTuple):
+    """The estimators' part of fluxproof.State, under the same names."""
+
+    of_flux_merge: flux_merge.State = flux_merge.State()
+    of_delta_lambda: delta_lambda.State = delta_lambda.State()
+    of_flux_compensation: flux_compensation.State = flux_compensation.State()
+    of_flux_monitor: flux_monitor.State = flux_monitor.State()
+    of_v_dead_adaline: v_dead_adaline.State = v_dead_adaline.State()
+    of_psi_adaline: psi_adaline.State = psi_adaline.State()
+    of_clean_voltage: clean_voltage.State = clean_voltage.State()
+    # Outputs that the next sample reads: the feedback paths of the top entity.
+    lambda_m_alpha: int = 0
+    lambda_m_beta: int = 0
+    merge_known: int = 0
+    lambda_pi_d: int = 0
+    lambda_pi_q: int = 0
+    lambda_add_d: int = 0
+    lambda_add_q: int = 0
+    v_comp: int = 0
+    v_leg: int = 0
+    s_alpha: int = 0
+    s_beta: int = 0
+
+
+class ForControl(NamedTuple):
+    """What the control and the later estimators take: resistance, merged flux, compensation, direction functions."""
+
+    r: int = 0
+    minus_rho: int = 0
+    temp_lost: int = 0
+    lambda_m_d: int = 0
+    lambda_m_q: int = 0
+    u_comp_d: int = 0
+    u_comp_q: int = 0
+    d_d: int = 0
+    d_q: int = 0
+
+
+class Seen(NamedTuple):
+    """What the control knows of the sample when the estimators work; names as in fluxproof.step."""
+
+    i_alpha: int
+    i_beta: int
+    i_d: int
+    i_q: int
+    current_at_rail: int
+    u_dc: int
+    u_dc_at_rail: int
+    u_dc_low: int
+    omega_me: int
+    omega_chord: int
+    cos_theta: int
+    sin_theta: int
+    model_d: int
+    model_q: int
+    raised_d: int
+    raised_q: int
+    lambda_d: int
+    lambda_q: int
+    estimate_limited: int
+    u_pi_d: int
+    u_int_d: int
+    u_int_q: int
+    u_q: int
+    sat_d: int
+    sat_q: int
+
+
+class Estimated(NamedTuple):
+    """What the estimators show, in the order of the record estimated_t; zero without them."""
+
+    u_comp_d: int = 0
+    u_comp_q: int = 0
+    u_applied_alpha: int = 0
+    u_applied_beta: int = 0
+    lambda_c_d: int = 0
+    lambda_c_q: int = 0
+    lambda_m_alpha: int = 0
+    lambda_m_beta: int = 0
+    merge_known: int = 0
+    delta_lambda_d: int = 0
+    delta_lambda_q: int = 0
+    delta_held: int = 0
+    lambda_pi_d: int = 0
+    lambda_pi_q: int = 0
+    torque: int = 0
+    flux_faults: int = 0
+    d_d: int = 0
+    d_q: int = 0
+    v_dead: int = 0
+    v_comp: int = 0
+    v_comp_limited: int = 0
+    psi_m: int = 0
+    psi_held: int = 0
+    temp_lost: int = 0
+
+
+@kernel
+def kept(state):
+    """The estimators' part of fluxproof.State as it is."""
+    return State(
+        state.of_flux_merge, state.of_delta_lambda, state.of_flux_compensation, state.of_flux_monitor,
+        state.of_v_dead_adaline, state.of_psi_adaline, state.of_clean_voltage, state.lambda_m_alpha,
+        state.lambda_m_beta, state.merge_known, state.lambda_pi_d, state.lambda_pi_q, state.lambda_add_d,
+        state.lambda_add_q, state.v_comp, state.v_leg, state.s_alpha, state.s_beta,
+    )  # fmt: skip
+
+
+@kernel
+def for_control(state, sample, regs, cos_theta, sin_theta, cos_out, sin_out):
+    """ForControl of this sample; ``state``: fluxproof.State."""
+    x, r = sample, regs
+    winding_r, minus_rho, temp_lost = winding_resistance.step(
+        x.temp_winding, x.temp_valid, r.r_s, r.tcr, r.t_0, r.t_min, r.t_max, r.t_s
+    )
+    lambda_m_d, lambda_m_q = flux_park.step(state.lambda_m_alpha, state.lambda_m_beta, cos_theta, sin_theta)
+    u_comp_alpha, u_comp_beta = dead_time_compensation.step(state.v_comp, state.s_alpha, state.s_beta)
+    u_comp_d, u_comp_q = park.step(u_comp_alpha, u_comp_beta, cos_out, sin_out)
+    d_d, d_q = park.step(state.s_alpha, state.s_beta, cos_out, sin_out)
+    return ForControl(winding_r, minus_rho, temp_lost, lambda_m_d, lambda_m_q, u_comp_d, u_comp_q, d_d, d_q)
+
+
+@kernel
+def step(state, given, seen, sample, regs, carrier_half):
+    """One control period: (State, Estimated); ``state``: fluxproof.State, ``given``: ForControl, ``seen``: Seen."""
+    g, v, x, r = given, seen, sample, regs
+    u_applied_alpha, u_applied_beta, voltage_known = applied_voltage.step(
+        state.compare_a, state.compare_b, state.compare_c, v.u_dc, v.u_dc_at_rail, x.run, carrier_half
+    )
+    clean_state, (u_clean_alpha, u_clean_beta) = clean_voltage.step(
+        state.of_clean_voltage, u_applied_alpha, u_applied_beta, state.s_alpha, state.s_beta, state.v_leg
+    )
+    s_alpha, s_beta = current_directions.step(v.i_alpha, v.i_beta, v.omega_me, r.k_ahead, r.k_sign)
+    lambda_c_d, lambda_c_q, model_limited = current_model.step(
+        v.model_d, v.model_q, v.raised_d, v.raised_q, state.lambda_add_d, state.lambda_add_q
+    )
+    lambda_c_alpha, lambda_c_beta = flux_inverse_park.step(lambda_c_d, lambda_c_q, v.cos_theta, v.sin_theta)
+    merge_state, (lambda_m_alpha, lambda_m_beta, merge_known, merge_limited) = flux_merge.step(
+        state.of_flux_merge, v.i_alpha, v.i_beta, lambda_c_alpha, lambda_c_beta, u_clean_alpha, u_clean_beta,
+        voltage_known, x.run, g.minus_rho, r.omega_0, r.xi, r.t_s,
+    )  # fmt: skip
+    factor, n_omega = speed_reciprocal.step(v.omega_me, r.omega_min, r.k_ramp)
+    delta_state, (delta_lambda_d, delta_lambda_q, delta_held, delta_limited) = delta_lambda.step(
+        state.of_delta_lambda, v.u_int_d, v.u_int_q, v.i_d, v.i_q, v.sat_d, v.sat_q, v.current_at_rail,
+        voltage_known, x.run, factor, n_omega, g.r,
+    )  # fmt: skip
+    compensation_state, compensated = flux_compensation.step(
+        state.of_flux_compensation, delta_lambda_d, delta_lambda_q, delta_held, r.flux_mode, r.flux_kp, r.flux_ki,
+        r.delta_max,
+    )  # fmt: skip
+    lambda_pi_d, lambda_pi_q, lambda_add_d, lambda_add_q, compensation_limited = compensated
+    (torque_me,) = torque.step(v.lambda_d, v.lambda_q, v.i_d, v.i_q)
+    monitor_state, (flux_faults,) = flux_monitor.step(
+        state.of_flux_monitor, v.current_at_rail, v.u_dc_at_rail, v.u_dc_low, model_limited, merge_limited,
+        delta_limited, compensation_limited, v.estimate_limited, x.clear_faults,
+    )  # fmt: skip
+    v_dead_state, (v_dead, v_comp, v_leg, v_comp_limited) = v_dead_adaline.step(
+        state.of_v_dead_adaline, v.u_pi_d, g.d_d, v.i_d, v.i_q, v.sat_d, v.sat_q, v.current_at_rail, voltage_known,
+        x.run, r.k_lp, r.eta_v, r.gamma, r.zeta, r.v_thr, r.v_comp_max, r.i_learn, r.compensate,
+    )  # fmt: skip
+    psi_state, (psi_m, psi_held) = psi_adaline.step(
+        state.of_psi_adaline, v.u_q, g.d_q, state.v_leg, v.i_d, v.i_q, g.r, v.omega_chord, v.sat_d, v.sat_q,
+        v.current_at_rail, voltage_known, x.run, r.l_d, r.eta_psi, r.omega_psi_min,
+    )  # fmt: skip
+
+    following = State(
+        merge_state, delta_state, compensation_state, monitor_state, v_dead_state, psi_state, clean_state,
+        lambda_m_alpha, lambda_m_beta, merge_known, lambda_pi_d, lambda_pi_q, lambda_add_d, lambda_add_q, v_comp, v_leg,
+        s_alpha, s_beta,
+    )  # fmt: skip
+    return following, Estimated(
+        g.u_comp_d, g.u_comp_q, u_applied_alpha, u_applied_beta, lambda_c_d, lambda_c_q, lambda_m_alpha,
+        lambda_m_beta, merge_known, delta_lambda_d, delta_lambda_q, delta_held, lambda_pi_d, lambda_pi_q, torque_me,
+        flux_faults, g.d_d, g.d_q, v_dead, v_comp, v_comp_limited, psi_m, psi_held, g.temp_lost,
+    )  # fmt: skip
