@@ -69,8 +69,8 @@ PROOFS = (
         Fault(
             "clear while it is there",
             "modulation/gate_generation.vhd",
-            "trip or (tripped_now and not clear_trip)",
-            "(trip or tripped_now) and not clear_trip",
+            "trip or (state.tripped and not clear_trip)",
+            "(trip or state.tripped) and not clear_trip",
         ),
     ),
     core_proof(
