@@ -180,7 +180,7 @@ def current_scale(a, d, rng, s):
 
 
 def sampling_skew(a, d, rng, s):
-    a.set("sensors", skew=a.sensors.skew + _sign(rng) * 0.055 * s * d.period)
+    a.set("sensors", skew=a.sensors.skew + _sign(rng) * 0.085 * s * d.period)
     return {}
 
 

@@ -10,9 +10,7 @@ import numba as nb
 import numpy as np
 
 from studies.blind.sealed import inverter as inv
-from studies.blind.sealed.control import (
-    ANGLE, MEMORY, SPEED, current_regulator, modulate, speed_regulator, track_speed,
-)  # fmt: skip
+from studies.blind.sealed.control import ANGLE, MEMORY, SPEED, current_regulator, modulate, speed_regulator, track_speed
 from studies.blind.sealed.machine import drag, phases, substep, turn, vector
 from studies.blind.sealed.magnetics import torque
 from studies.blind.sealed.sensors import bus_code, current_codes, shaft_code, wrap
@@ -36,6 +34,7 @@ def run(m, v, s, c, goal, i_ref, load, fan, free, theta0, noise):
     up, down, times = np.zeros((2, 3)), np.zeros((2, 3)), np.zeros(v.steps + 40)
     queue = np.full((5, 3), 0.5)  # duties; row 0: the latest
     node, i_abc, seen, sampled, held = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3)
+    legs, share = np.zeros(3), np.zeros(3)
     measured, duties, memory, tracking = np.zeros(3), np.zeros(3), np.zeros(MEMORY), np.zeros(2)
     theta, omega, temp, i_fe, i_short, i_dq, pull = theta0, goal[0], 25.0, 0j, 0.0, 0j, 0.0
     psi = m.psi * turn(p * theta)
@@ -79,11 +78,10 @@ def run(m, v, s, c, goal, i_ref, load, fan, free, theta0, noise):
             if h < 1e-13:
                 continue
             middle = times[j] + 0.5 * h
-            drawn_dc, legs = 0.0, i_abc * 0.0
             for x in range(3):
                 what = inv.state(middle, up, down, v.dead, x)
                 mean, node[x] = inv.leg(v, what, node[x], bus, i_abc[x], h)
-                drawn_dc += mean / bus * i_abc[x]
+                share[x] = mean / bus
                 legs[x] = mean - inv.drop(v, i_abc[x])
             u = vector(legs[0], legs[1], legs[2])
             rotor = turn(p * (theta + 0.5 * h * omega)).conjugate()
@@ -99,6 +97,7 @@ def run(m, v, s, c, goal, i_ref, load, fan, free, theta0, noise):
                 for x in range(3):
                     seen[x] = i_abc[x] + (seen[x] - i_abc[x]) * keep
             copper = 1.5 * r * abs(total) ** 2
+            drawn_dc = share[0] * i_abc[0] + share[1] * i_abc[1] + share[2] * i_abc[2]
             for x in range(3):
                 copper += m.r_phase[x] * i_abc[x] ** 2
             bus_before = bus
