@@ -73,7 +73,7 @@ def test_it_shares_no_code_with_tool_plant_or_other_generators():
 
 @pytest.mark.parametrize("kind, faults", [("surface", ()), ("interior", IRON), ("reluctance", ("resistance",))])
 def test_mean_voltages_obey_the_stator_equation(kind, faults):
-    """u = R i + j omega psi over whole turns, within half a percent; without saturation psi is the linear one."""
+    """u = R i + j omega psi over whole turns, within a thousandth; without saturation psi is the linear one."""
     case = _case(kind, faults)
     _, inside, _ = cases.simulate(case, 1, 1)
     m = case.real.machine
@@ -81,7 +81,7 @@ def test_mean_voltages_obey_the_stator_equation(kind, faults):
         rows = _whole_turns(case, inside, point)
         u, i, psi = (np.mean(inside[f"{x}_d"][rows]) + 1j * np.mean(inside[f"{x}_q"][rows]) for x in ("u", "i", "psi"))
         omega = inside["omega_e"][rows].mean()
-        assert abs(u - m.r * i - 1j * omega * psi) < 5e-3 * abs(u)
+        assert abs(u - m.r * i - 1j * omega * psi) < 1e-3 * abs(u) and abs(m.r * i) > 2e-3 * abs(u)
         if not faults:
             assert abs(psi - m.psi - m.l_d * i.real - 1j * m.l_q * i.imag) < 1e-3 * abs(psi)
 
@@ -98,8 +98,8 @@ def test_energy_is_kept(kind):
     turnover = np.abs(np.diff(inside["e_shaft"][first:last])).sum() + given["e_copper"]
     assert given["e_copper"] > 0.0 and given["e_iron"] > 0.0
     left = given["e_in"] - given["e_copper"] - given["e_shaft"] - given["e_iron"]
-    assert abs(left) < 5e-3 * turnover
-    assert given["e_bus"] == pytest.approx(given["e_in"], abs=5e-3 * turnover)  # lossless switches
+    assert abs(left) < 1.5e-3 * turnover  # the two states differ by a little field energy
+    assert given["e_bus"] == pytest.approx(given["e_in"], abs=1e-6 * turnover)  # lossless switches
 
 
 def test_torque_and_flux_come_from_one_co_energy():
