@@ -11,6 +11,7 @@ import pandas as pd
 import pytest
 
 from fluxproof.checkout import ROOT
+from studies.blind import __main__ as blind
 from studies.blind import generate
 from studies.blind.sealed import cases, inverter, magnetics, params, plan, record
 from studies.blind.sealed.drives import KINDS, random_drive
@@ -235,3 +236,11 @@ def test_a_case_is_written_with_its_truth(tmp_path):
     assert (path.parent / "drive.toml").read_text().startswith("[machine]")
     assert entry["identifiable"]["all"] and len(entry["effects"]) == 1
     assert generate.strata_of("sealed") == cases.STRATA and sum(cases.STRATA.values()) == pytest.approx(1.0)
+
+
+def test_the_command_runs_before_the_own_generator_ever_has(tmp_path, monkeypatch):
+    monkeypatch.setattr(blind, "FOLDER", tmp_path)
+    monkeypatch.setattr(blind, "generate", lambda *a, **k: "digest")
+    monkeypatch.setattr(blind, "score", lambda folder, jobs: dict.fromkeys(blind.KEPT, {}))
+    assert blind.main(["--generator", "sealed", "--count", "1"]) == 0
+    assert '"sealed"' in (tmp_path / "result.json").read_text()
