@@ -244,3 +244,15 @@ def test_the_command_runs_before_the_own_generator_ever_has(tmp_path, monkeypatc
     monkeypatch.setattr(blind, "score", lambda folder, jobs: dict.fromkeys(blind.KEPT, {}))
     assert blind.main(["--generator", "sealed", "--count", "1"]) == 0
     assert '"sealed"' in (tmp_path / "result.json").read_text()
+
+
+@pytest.mark.parametrize("turn", [0, 1])
+def test_an_ambiguous_recording_holds_one_current_only(turn):
+    """Nothing of the start, in which the current still rises, is in it."""
+    case = cases.make(5, 2, "ambiguous", turn)
+    columns, _, kept = cases.simulate(case, 5, 2)
+    assert record.sound(columns, case.drive, case.plan)
+    seen = 2 / 3 * np.stack([kept[f"i_{x}"] for x in "abc"], axis=1) @ TURNS * np.exp(-1j * kept["theta_e"])
+    slow = np.convolve(seen, np.full(50, 0.02), "valid")
+    assert np.abs(slow - case.plan.i_ref[0]).max() < 0.12 * case.drive.current
+    assert np.abs(slow[:200].mean() - slow[-200:].mean()) < 0.01 * case.drive.current

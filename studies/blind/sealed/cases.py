@@ -117,5 +117,5 @@ def simulate(case: Case, seed: int, number: int, attempt: int = 0):
     """(all columns, inside, columns of the recording) of a case."""
     rng = np.random.default_rng([seed, number, attempt, 54])
     columns, inside = record.simulate(rng, case.drive, case.real, case.plan, case.control)
-    kept = record.recorded(rng, case.drive, columns, case.torque, case.temperature, case.references)
+    kept = record.recorded(rng, case.drive, columns, case.plan.first, case.torque, case.temperature, case.references)
     return columns, inside, kept

@@ -2,6 +2,8 @@
 
 In the period that begins at row k the duties of row k - 1 are in force.  Angle and bus belong to the beginning of
 the period, the currents too unless the converters are skewed.
+
+The compiled run() in __pycache__ does not see changes of the files that it calls: delete the folder after one.
 """
 
 import math

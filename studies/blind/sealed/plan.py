@@ -19,6 +19,7 @@ class Plan:
     load: np.ndarray
     held: tuple  # (first, last) rows in which a point is held
     fan: float = 0.0
+    first: int = 0  # row at which the logger starts
 
     @property
     def free(self) -> bool:
@@ -129,11 +130,16 @@ def speed(rng, drive, turns=0.0) -> Plan:
     return Plan("speed", goal, i_ref, load, held, fan)
 
 
+def _settled(drive) -> int:
+    """Rows until the current stands, which the logger leaves out: the start would tell what the points do not."""
+    return int(0.08 / drive.period)
+
+
 def one_point(rng, drive) -> Plan:
     """One imposed speed and one current, i_d = 0."""
     q = float(rng.choice((-1.0, 1.0))) * rng.uniform(0.5, 0.9) * drive.current
     omega = rng.uniform(0.35, 0.8) * top_speed(drive, [(0.0, q), (0.0, -q)])
-    return Plan("bench", *course(drive, [(omega, 0.0, q, 0.0)], 12000, 1.0, 0.0))
+    return Plan("bench", *course(drive, [(omega, 0.0, q, 0.0)], 14000, 1.0, 0.0), first=_settled(drive))
 
 
 def one_current(rng, drive) -> Plan:
@@ -141,4 +147,6 @@ def one_current(rng, drive) -> Plan:
     q = float(rng.choice((-1.0, 1.0))) * rng.uniform(0.6, 0.9) * drive.current
     top = top_speed(drive, [(0.0, q), (0.0, -q)])
     points = [(s * top, 0.0, q, 0.0) for s in rng.permutation([0.08, -0.1, 0.4, -0.5, 0.7, 0.95, -0.85])]
-    return Plan("bench", *course(drive, points, int(max(1500, 0.1 / drive.period)), top / 0.15, 0.0))
+    return Plan(
+        "bench", *course(drive, points, int(max(1500, 0.1 / drive.period)), top / 0.3, 0.0), first=_settled(drive)
+    )

@@ -62,8 +62,9 @@ def simulate(rng, drive, real, plan, control):
     return dict(zip(ROWS, rows.T)), dict(zip(INSIDE, inside.T))
 
 
-def recorded(rng, drive, columns, with_torque, with_temperature, with_references) -> dict:
-    """The columns that the drive's logger keeps."""
+def recorded(rng, drive, columns, first, with_torque, with_temperature, with_references) -> dict:
+    """The columns that the drive's logger keeps, from row ``first`` on."""
+    columns = {name: x[first:] for name, x in columns.items()}
     kept = {name: columns[name].copy() for name in ROWS[:10]}
     if with_references:
         kept |= {name: columns[name].copy() for name in ("i_d_ref", "i_q_ref")}
