@@ -16,6 +16,8 @@ from fluxproof.golden_model.converters import (
     spi_converter,
     spi_frame,
     spi_words,
+    third_current,
+    xadc_reader,
 )
 from fluxproof.golden_model.estimators import (
     applied_voltage,
@@ -116,5 +118,7 @@ BLOCKS = {
         modulator_input,
         sinc3,
         sinc_overcurrent,
+        third_current,
+        xadc_reader,
     )
 }

@@ -561,4 +561,11 @@ package fluxproof_pkg is
   constant SINC_OVERCURRENT_TOTAL_W : natural := 16;
   constant SINC_OVERCURRENT_WARM : natural := 3;
 
+  -- third_current: none: front end of a board
+  constant THIRD_CURRENT_LATENCY : positive := 1;
+
+  -- xadc_reader: none: front end of a board
+  constant XADC_READER_LATENCY : positive := 1;
+  constant XADC_READER_CONVST_CLOCKS : natural := 8;
+
 end package fluxproof_pkg;
