@@ -139,7 +139,9 @@ def centred(period_clocks, oversampling, bit_clocks, bit_delay=0):
     """
     clocks = round(period_clocks - 1.5 * (oversampling - 1) * bit_clocks - 2 + bit_delay - bit_clocks / 2)
     if not 0 <= clocks <= min(CLOCKS.hi, period_clocks - 1) or (3 * oversampling + 1) * bit_clocks > period_clocks:
-        raise ValueError(f"a window of 3*{oversampling} bits of {bit_clocks} clocks does not fit {period_clocks} clocks")
+        raise ValueError(
+            f"a window of 3*{oversampling} bits of {bit_clocks} clocks does not fit {period_clocks} clocks"
+        )
     return clocks
 
 

@@ -117,9 +117,16 @@ def stimuli(rng, config):
     """Every ratio, both starts, one and two words, all edges and delays; BUSY stuck; triggers too early; refusals."""
     room = 16 - config["ADC_BITS"]
     cases = [{"clock_ratio": r, "sample_delay": int(rng.integers(16)), "skip_bits": room} for r in range(3, 18)]
-    cases += [{"two_words": w, "clock_idle": i, "second_edge": e, "use_convst": u, "word_bits": 18}
-              for w in (0, 1) for i in (0, 1) for e in (0, 1) for u in (0, 1)]
-    cases += [{"word_bits": w, "skip_bits": int(rng.integers(24)), "two_words": w & 1} for w in (11, 12, 24, 31, 32, 33)]
+    cases += [
+        {"two_words": w, "clock_idle": i, "second_edge": e, "use_convst": u, "word_bits": 18}
+        for w in (0, 1)
+        for i in (0, 1)
+        for e in (0, 1)
+        for u in (0, 1)
+    ]
+    cases += [
+        {"word_bits": w, "skip_bits": int(rng.integers(24)), "two_words": w & 1} for w in (11, 12, 24, 31, 32, 33)
+    ]
     cases += [{"wait_clocks": w, "busy_timeout": t} for w in (0, 1, 2, 30) for t in (0, 1, 30, 60)]
     rows = []
     for number, changes in enumerate(cases):
@@ -128,8 +135,14 @@ def stimuli(rng, config):
         length = 40 + regs["clock_ratio"] * (regs["word_bits"] << regs["two_words"]) + regs["wait_clocks"] + 20
         for clock in range(min(length, 1400)):
             row = {"sample_trigger": int(clock == 1 or rng.integers(300) == 0)}
-            rows.append(row | {"busy": int(stuck or 4 < clock < 4 + number % 30),
-                        "words_complete": int(clock > length - 30 - 3 * number and rng.integers(9) == 0)} | regs)
+            rows.append(
+                row
+                | {
+                    "busy": int(stuck or 4 < clock < 4 + number % 30),
+                    "words_complete": int(clock > length - 30 - 3 * number and rng.integers(9) == 0),
+                }
+                | regs
+            )
     return rows
 
 

@@ -54,9 +54,7 @@ def offset_code(bits, signed_code, adc_bits):
 
 
 @kernel
-def step(
-    state, frame_start, bit_taken, miso, word_bits, skip_bits, two_words, signed_code, adc_bits, lines
-):
+def step(state, frame_start, bit_taken, miso, word_bits, skip_bits, two_words, signed_code, adc_bits, lines):
     s = state
     last_bit = s.place + 1 >= word_bits
     inside = skip_bits <= s.place < skip_bits + adc_bits

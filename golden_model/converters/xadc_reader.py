@@ -1,6 +1,6 @@
 """Reads channels of the XADC (or SYSMON) of a Xilinx FPGA through its DRP; one step is one clock, which is DCLK.
 
-    trigger -> ``conversions`` times (convst, end of conversion) -> ``channels`` reads (den with daddr, drdy with do) -> codes
+    trigger -> ``conversions`` times (convst, end of conversion) -> ``channels`` reads (den with daddr, drdy with drp_do) -> codes
 
 The XADC is set to event mode: ``convst`` holds the inputs at its rising edge.  In simultaneous sampling one conversion holds a
 pair of channels; each further conversion of a frame holds its inputs later, when the one before has ended.
@@ -8,7 +8,7 @@ pair of channels; each further conversion of a frame holds its inputs later, whe
 so is a trigger during a frame, which goes on, and one while ``busy`` shows that a conversion of a frame that was given up
 has not ended.  ``codes_valid`` or ``frame_error`` answers each trigger.
 ``drdy`` outside a read is ignored; a read answered after the time-out is over long before the conversion of the next frame.
-``do`` is left-aligned in 16 bits; the code is its upper ADC_BITS bits.  ``signed_code``: two's complement (bipolar channel), the sign
+``drp_do`` is left-aligned in 16 bits; the code is its upper ADC_BITS bits.  ``signed_code``: two's complement (bipolar channel), the sign
 is inverted, so that zero becomes the middle of the range.  A channel that is not read shows the code of the word 0.
 All codes change together, with ``codes_valid``.  Nothing is written: dwe and di are zero.
 Formats: clocks, codes; nothing is computed.
@@ -53,7 +53,7 @@ def offset_code(word, signed_code, adc_bits):
 
 @kernel
 def step(
-    state, sample_trigger, busy, eoc, drdy, do, conversions, channels, address_0, address_1, address_2, address_3,
+    state, sample_trigger, busy, eoc, drdy, drp_do, conversions, channels, address_0, address_1, address_2, address_3,
     timeout, signed_code, adc_bits,
 ):  # fmt: skip
     s = state
@@ -87,17 +87,15 @@ def step(
         phase, den = READING, 1
     elif drdy:
         done, phase = s.done + 1, ENDING if s.done + 1 >= channels else ASKING
-        read_0 = do if s.done == 0 else s.read_0
-        read_1 = do if s.done == 1 else s.read_1
-        read_2 = do if s.done == 2 else s.read_2
-        read_3 = do if s.done == 3 else s.read_3
+        read_0 = drp_do if s.done == 0 else s.read_0
+        read_1 = drp_do if s.done == 1 else s.read_1
+        read_2 = drp_do if s.done == 2 else s.read_2
+        read_3 = drp_do if s.done == 3 else s.read_3
     if sample_trigger and (s.phase != IDLE or busy):
         frame_error = 1
 
     daddr = address_0 if s.done == 0 else address_1 if s.done == 1 else address_2 if s.done == 2 else address_3
-    following = State(
-        phase, elapsed, pulse, done, read_0, read_1, read_2, read_3, code_0, code_1, code_2, code_3
-    )
+    following = State(phase, elapsed, pulse, done, read_0, read_1, read_2, read_3, code_0, code_1, code_2, code_3)
     return following, (1 if pulse else 0, den, daddr, codes_valid, frame_error, code_0, code_1, code_2, code_3)
 
 
@@ -119,7 +117,7 @@ def stimuli(rng, _config):
         for clock in range(160):
             row = {"sample_trigger": int(clock == 2 or rng.integers(90) == 0), "busy": int(rng.integers(20) == 0)}
             row |= {"eoc": int(rng.integers(often) == 0), "drdy": int(rng.integers(often) == 0)}
-            rows.append(row | {"do": int(rng.integers(WORD.hi + 1))} | regs)
+            rows.append(row | {"drp_do": int(rng.integers(WORD.hi + 1))} | regs)
     return rows
 
 
@@ -132,8 +130,8 @@ BLOCK = Block(
         Port("sample_trigger", BIT, doc="1 for a clock: take a sample"),
         Port("busy", BIT, doc="1: the XADC converts"),
         Port("eoc", BIT, doc="1 for a clock: end of a conversion"),
-        Port("drdy", BIT, doc="1 for a clock: do is valid"),
-        Port("do", WORD, doc="data of the DRP"),
+        Port("drdy", BIT, doc="1 for a clock: drp_do is valid"),
+        Port("drp_do", WORD, doc="data of the DRP"),
     ),
     registers=(
         Port("conversions", NUMBER, lo=1, hi=4, doc="conversions of a frame"),

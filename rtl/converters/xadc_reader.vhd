@@ -1,10 +1,10 @@
 -- Purpose: reads channels of the XADC (or SYSMON) of a Xilinx FPGA through its DRP; the clock is DCLK.
--- trigger -> conversions times (convst, end of conversion) -> channels reads (den with daddr, drdy with do) -> codes
+-- trigger -> conversions times (convst, end of conversion) -> channels reads (den with daddr, drdy with drp_do) -> codes
 -- The XADC is set to event mode: convst holds the inputs at its rising edge.  In simultaneous sampling one conversion
 -- holds a pair of channels; each further conversion of a frame holds its inputs later, when the one before has ended.
 -- A frame that has not ended timeout clocks after its trigger is a frame_error, and so is a trigger during a frame, which
 -- goes on, and one while busy shows that a conversion of a frame that was given up has not ended.
--- Code: the upper ADC_BITS bits of do; signed_code: two's complement, the sign is inverted, zero becomes mid code.
+-- Code: the upper ADC_BITS bits of drp_do; signed_code: two's complement, the sign is inverted, zero becomes mid code.
 -- All codes change together, with codes_valid.  Nothing is written: dwe and di of the DRP are zero.
 -- Formats: clocks, codes.  Latency: 1 (every clock is a sample; trigger to convst in one clock).  Rounding: none.
 
@@ -24,7 +24,7 @@ entity xadc_reader is
     busy           : in  std_logic;
     eoc            : in  std_logic;
     drdy           : in  std_logic;
-    do             : in  unsigned(15 downto 0);
+    drp_do         : in  unsigned(15 downto 0);
     conversions    : in  unsigned(2 downto 0);
     channels       : in  unsigned(2 downto 0);
     address_0      : in  unsigned(6 downto 0);
@@ -127,7 +127,7 @@ begin
         state.done  <= state.done + 1;
         for k in 0 to 3 loop
           if state.done = k then
-            state.read(k) <= do;
+            state.read(k) <= drp_do;
           end if;
         end loop;
       end if;
