@@ -153,7 +153,7 @@ class VerilatedCore:
         return values
 
     def play(self, given: Mapping[str, np.ndarray], names: Iterable[str]) -> np.ndarray:
-        """Drives inputs tick by tick: arrays of n integers; int64, shape (n, len(names)), row k as tick k left the ports.
+        """Drives inputs tick by tick, n of each: int64, shape (n, len(names)), row k as tick k left the ports.
 
         ValueError where a value does not fit its port.  The inputs keep their last value.
         """
@@ -167,9 +167,7 @@ class VerilatedCore:
                 raise ValueError(f"{name} from {column.min()} to {column.max()} does not fit {port.low} .. {port.high}")
         values = np.empty((len(rows), len(names)), np.int64)
         given_ports, seen = self._indices(inputs), self._indices(names)
-        self._library.core_play(
-            self._handle, len(rows), given_ports, len(inputs), rows, seen, len(names), values
-        )
+        self._library.core_play(self._handle, len(rows), given_ports, len(inputs), rows, seen, len(names), values)
         return values
 
     def apply_sample(self, **inputs: int) -> None:

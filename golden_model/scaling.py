@@ -17,12 +17,13 @@ latter, since K_p multiplies noise, but at most half of the former, or a tenth o
 The two models cross over at an eighth of the rated electrical speed, the range of the paper's experiments; the
 compensation fades in from omega_min to half of that, because below it delta_lambda amplifies small voltage errors.
 
-Sampling: currents and position are taken delay_s after the valley, the voltage acts at a fixed time after it, so the angles
-from the sample to the voltage (k_delay, k_ahead) shrink by omega_me*delay_s; nothing else changes, see docs/board.md.
+Sampling: currents and position are taken delay_s after the valley, the voltage acts at a fixed time after it, so the
+angles from the sample to the voltage (k_delay, k_ahead) shrink by omega_me*delay_s; nothing else changes, see
+docs/board.md.
 
-Protection: the default limits lie outside the range of a healthy drive: overcurrent at twice the current limit, the sum
-of the currents at a fifth of the rated current, the bus at a tenth and 1.3 times its nominal value, no sample for 1.5
-periods.  The position may deviate from its linear extrapolation by 5e-4 turn plus four codes: no shaft
+Protection: the default limits lie outside the range of a healthy drive: overcurrent at twice the current limit, the
+sum of the currents at a fifth of the rated current, the bus at a tenth and 1.3 times its nominal value, no sample
+for 1.5 periods.  The position may deviate from its linear extrapolation by 5e-4 turn plus four codes: no shaft
 accelerates that much within a sample, and a frozen code is detected from that rotation per sample on.
 """
 

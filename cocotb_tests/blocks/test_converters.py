@@ -1,6 +1,7 @@
 """Front ends against models of the converters that are not derived from the RTL, converted and in Verilator.
 
-In each run the RTL equals the golden model at every clock, and the codes are what the converter has held at its sampling instant.
+In each run the RTL equals the golden model at every clock, and the codes are what the converter has held at its
+sampling instant.
 """
 
 from __future__ import annotations
@@ -42,8 +43,8 @@ def delays(kind, ratio):
 def spi_settings(kind, ratio, sample_delay):
     (_, word, skip, words, start, signed, *_), idle, second = SPI_KINDS[kind]
     return spi_frame.settings(
-        clock_ratio=ratio, word_bits=word, skip_bits=skip, sample_delay=sample_delay, two_words=words - 1, wait_clocks=8,
-        use_convst=int(start == "convst"), clock_idle=idle, second_edge=second, busy_timeout=60,
+        clock_ratio=ratio, word_bits=word, skip_bits=skip, sample_delay=sample_delay, two_words=words - 1,
+        wait_clocks=8, use_convst=int(start == "convst"), clock_idle=idle, second_edge=second, busy_timeout=60,
     ) | {"signed_code": int(signed)}  # fmt: skip
 
 
@@ -105,7 +106,7 @@ def spi_cores():
 @pytest.mark.parametrize("share", [8, pytest.param(1, marks=pytest.mark.study)])
 @pytest.mark.parametrize("kind", SPI_KINDS)
 def test_spi_codes_are_those_held(kind, share, spi_cores):
-    """Clock ratios 4 to 16 with the least and the largest sample_delay; 10^4 conversions over the kinds, or an eighth."""
+    """Clock ratios 4 to 16 with both ends of sample_delay; 10^4 conversions over the kinds, or an eighth."""
     bits, total = SPI_KINDS[kind][0][0], 0
     for ratio in range(4, 17):
         possible = delays(kind, ratio)
@@ -126,14 +127,14 @@ def test_spi_line_taken_at_the_wrong_time_is_seen(spi_cores):
 
 def test_spi_busy_stuck(spi_cores):
     """BUSY that never falls: a frame_error at each trigger, no codes, no frame; codes again when BUSY falls."""
-    regs = spi_settings("AD7606", 4, 0)
+    regs = spi_settings("AD7606", 4, delays("AD7606", 4)[0])
     given, answers = convert(spi_cores[16], "AD7606", regs, 60, seed=4, stuck=range(20, 31))
     assert [k for k, a in enumerate(answers) if a is None] == list(range(19, 30))
     assert check_spi(spi_cores[16], 16, given, answers, regs) == 49
 
 
 def read_xadc(core, regs, pairs, frames, seed, mute=lambda frame: ""):
-    """Frames at random distances: (inputs clock by clock, for each answer {address: code held} or None for an error)."""
+    """Frames at random distances: (inputs by clock, for each answer {address: code held} or None for an error)."""
     rng = Random(seed)
     chip = Xadc(pairs)
     addresses = [a for pair in pairs for a in pair]
@@ -209,7 +210,7 @@ def sinc_core():
 
 
 def sinc_windows(core, bits, oversampling, every, seed):
-    """Codes of windows that follow each other; (codes, first bit of each), RTL and golden model equal at every clock."""
+    """Codes of windows that follow each other; (codes, first bit of each), RTL equal to golden at every clock."""
     rng = np.random.default_rng(seed)
     distance = 3 * oversampling + 9
     clocks = bits.size * every
@@ -257,8 +258,8 @@ def test_sinc3_is_the_filter(oversampling, sinc_core):
 def test_sinc3_loses_no_resolution(oversampling, sinc_core):
     """A sine through an ideal second-order modulator: effective bits within 0.3 of theory, 16 bits of code included.
 
-    Theory: the error of the modulator, white with a step of 2, is filtered by (1 - z**-R)**3 / (1 - z**-1) / R**3 once its own
-    (1 - z**-1)**2 has cancelled two of the three sums: variance 4/12 * (1 + 4 + 1)*R / R**6 = 2/R**5.
+    Theory: the error of the modulator, white with a step of 2, is filtered by (1 - z**-R)**3 / (1 - z**-1) / R**3
+    once its own (1 - z**-1)**2 has cancelled two of the three sums: variance 4/12 * (1 + 4 + 1)*R / R**6 = 2/R**5.
     """
     windows = 400
     n = np.arange((3 * oversampling + 9) * windows)

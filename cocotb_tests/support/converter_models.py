@@ -1,7 +1,7 @@
 """Converters as their data sheets describe them, not derived from the RTL: SPI converters, the XADC, a modulator.
 
-Time counts clocks of the core.  ``clock(...)`` takes the pins as the FPGA's registers left them after clock t and returns what
-the FPGA's pins show at clock t + 1.
+Time counts clocks of the core.  ``clock(...)`` takes the pins as the FPGA's registers left them after clock t and
+returns what the FPGA's pins show at clock t + 1.
 """
 
 from __future__ import annotations
@@ -17,10 +17,11 @@ import numpy as np
 class SpiConverter:
     """One SPI converter with ``words`` channels on its line.
 
-    ``start``: "convst" holds the input at the rising edge of CONVST and is busy for ``convert`` clocks, beginning ``to_busy`` clocks
-    after the edge; "cs" holds it at the falling edge of CS.  Each bit is shown with the edge ``launch`` of SCLK ("rise" or
-    "fall"), with ``first_with_cs`` the first bit already with CS.  A bit is on the line ``valid`` clocks later; the one before
-    stays for ``hold`` clocks, between the two the line is random, and so it is without CS.
+    ``start``: "convst" holds the input at the rising edge of CONVST and is busy for ``convert`` clocks, beginning
+    ``to_busy`` clocks after the edge; "cs" holds it at the falling edge of CS.  Each bit is shown with the edge
+    ``launch`` of SCLK ("rise" or "fall"), with ``first_with_cs`` the first bit already with CS.  A bit is on the
+    line ``valid`` clocks later; the one before stays for ``hold`` clocks, between the two the line is random, and so
+    it is without CS.
     """
 
     bits: int
@@ -31,7 +32,7 @@ class SpiConverter:
     signed: bool
     first_with_cs: bool
     launch: str
-    valid: int = 2
+    valid: int = 3
     hold: int = 1
     convert: int = 20
     to_busy: int = 5
@@ -82,9 +83,9 @@ class SpiConverter:
 class Xadc:
     """The XADC in event mode with a sequence of channel pairs that are sampled simultaneously (UG480).
 
-    A rising edge of CONVST holds the pair; BUSY is high from ``to_busy`` for ``convert`` clocks, then EOC for one clock, and the
-    status registers of the pair hold the codes, left-aligned with ``noise`` in the unused bits.  The DRP answers
-    ``wait`` clocks after DEN.  ``mute``: "eoc" or "drdy" never comes.
+    A rising edge of CONVST holds the pair; BUSY is high from ``to_busy`` for ``convert`` clocks, then EOC for one
+    clock, and the status registers of the pair hold the codes, left-aligned with ``noise`` in the unused bits.  The
+    DRP answers ``wait`` clocks after DEN.  ``mute``: "eoc" or "drdy" never comes.
     """
 
     pairs: tuple[tuple[int, int], ...]  # DRP addresses

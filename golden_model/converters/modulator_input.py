@@ -1,12 +1,12 @@
 """Bits of delta-sigma modulators: makes their clock, or follows one, and registers their data; one step is one clock.
 
-* ``follow_clock`` = 0: ``mod_clock`` has a period of ``mod_ratio`` clocks, high for the first half (rounded down).  A bit is the
-  level of its pin ``sample_delay`` clocks after the rising edge of ``mod_clock`` has left its register.
-* ``follow_clock`` = 1: the clock comes with the data, high and low for at least two clocks each.  A bit is the level of its pin
-  2 + ``sample_delay`` clocks after the clock at which the pin of the modulator's clock was first high.
+* ``follow_clock`` = 0: ``mod_clock`` has a period of ``mod_ratio`` clocks, high for the first half (rounded down).
+  A bit is the level of its pin ``sample_delay`` clocks after the rising edge of ``mod_clock`` has left its register.
+* ``follow_clock`` = 1: the clock comes with the data, high and low for at least two clocks each.  A bit is the level
+  of its pin 2 + ``sample_delay`` clocks after the clock at which the pin of the modulator's clock was first high.
 
-``mod_data`` and ``mod_clock_in`` are not synchronous and pass two registers.  ``sample_delay`` is chosen such that the data are
-stable when they are taken; the registers settle what moves at any other time.
+``mod_data`` and ``mod_clock_in`` are not synchronous and pass two registers.  ``sample_delay`` is chosen such that
+the data are stable when they are taken; the registers settle what moves at any other time.
 Formats: bits, clocks; nothing is computed.
 """
 

@@ -4,17 +4,20 @@
     total = third difference of acc_3 over four instants, ``oversampling`` bits apart
     code  = total * gain * 2**(ADC_BITS - 24)                      0 to 1 is the density of ones
 
-Window: the first instant is the first bit with ``bits_valid`` 2 + ``start_clocks`` clocks after the trigger or later.  The
-result weighs this bit and the following 3*(R - 1), R being ``oversampling``, symmetrically: their middle is 1.5*(R - 1) bits after
-the first.  ``start_clocks`` = one PWM period less this time puts the middle on the next trigger, see ``centred``.
+Window: the first instant is the first bit with ``bits_valid`` 2 + ``start_clocks`` clocks after the trigger or
+later.  The result weighs this bit and the following 3*(R - 1), R being ``oversampling``, symmetrically: their middle
+is 1.5*(R - 1) bits after the first.  ``start_clocks`` = one PWM period less this time puts the middle on the next
+trigger, see ``centred``.
 
-Scale without a division: ``weight`` is 1, 8, 64 or 512 for R of 129..256, 65..128, 33..64, 32, so that R**3 * weight is above 2**21
-and at most 2**24; ``gain`` is 2**24 over it, exactly 1 for a power of two.
-Wrap: the accumulators wrap modulo 2**25 by design.  Their difference over the window is at most 2**24, and differences
-modulo 2**25 of wrapped numbers are the same as of unwrapped ones; what was in them before the window cancels.
+Scale without a division: ``weight`` is 1, 8, 64 or 512 for R of 129..256, 65..128, 33..64, 32, so that R**3 * weight
+is above 2**21 and at most 2**24; ``gain`` is 2**24 over it, exactly 1 for a power of two.
+Wrap: the accumulators wrap modulo 2**25 by design.  Their difference over the window is at most 2**24, and
+differences modulo 2**25 of wrapped numbers are the same as of unwrapped ones; what was in them before the window
+cancels.
 
-``window_error``: a window ends without a result, because the next one starts before its last bit (bits are missing, or the
-window is longer than the distance of the triggers), or a trigger comes while ``start_clocks`` of the last one are counted.
+``window_error``: a window ends without a result, because the next one starts before its last bit (bits are missing,
+or the window is longer than the distance of the triggers), or a trigger comes while ``start_clocks`` of the last one
+are counted.
 Formats: code U(0,ADC_BITS); total loses its lowest bit, the product is rounded half up and saturated at all ones.
 ``oversampling`` from 32 to 256; a change has an effect from the next window on.
 """
@@ -134,8 +137,9 @@ def gain_of(oversampling):
 def centred(period_clocks, oversampling, bit_clocks, bit_delay=0):
     """Register ``start_clocks`` that puts the window's middle on the next trigger.
 
-    ``period_clocks``: distance of the triggers; ``bit_clocks``: of two bits; ``bit_delay``: from the middle of the time that a
-    bit stands for to its ``bits_valid``, all in clocks.  Raises ValueError where the window does not fit the period.
+    ``period_clocks``: distance of the triggers; ``bit_clocks``: of two bits; ``bit_delay``: from the middle of the
+    time that a bit stands for to its ``bits_valid``, all in clocks.  Raises ValueError where the window does not fit
+    the period.
     """
     clocks = round(period_clocks - 1.5 * (oversampling - 1) * bit_clocks - 2 + bit_delay - bit_clocks / 2)
     if not 0 <= clocks <= min(CLOCKS.hi, period_clocks - 1) or (3 * oversampling + 1) * bit_clocks > period_clocks:
@@ -146,7 +150,7 @@ def centred(period_clocks, oversampling, bit_clocks, bit_delay=0):
 
 
 def stimuli(rng, config):
-    """Every class of oversampling with dense, sparse, alternating and constant bits; windows broken off, bits missing."""
+    """Every weight with random and constant bits, close and far apart; a gain too large; windows broken off."""
     rows = []
     cases = [(32, 1), (33, 0), (64, 2), (65, 3), (100, 0), (128, 1), (129, 0), (256, 0), (40, 5)]
     for number, (oversampling, gap) in enumerate(cases):

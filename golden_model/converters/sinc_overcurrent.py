@@ -4,10 +4,11 @@
     total = third difference of acc_3 over ``oversampling`` bits, every ``oversampling`` bits: 0 to oversampling**3
     over  = total >= limit_high or total <= limit_low      until the next total
 
-It runs all the time, without a trigger.  A step of the current shows in full at the latest 4*oversampling bits and five clocks
-later, one far beyond the limit earlier.  ``over`` is for the pin trip of the core, which latches it.
-Wrap: the accumulators wrap modulo 2**16 by design; total is at most 2**15, and differences of wrapped numbers are the same
-modulo 2**16 as of unwrapped ones.  The first three totals after a reset see less than a whole window and never trip.
+It runs all the time, without a trigger.  A step of the current shows in full at the latest 4*oversampling bits and
+five clocks later, one far beyond the limit earlier.  ``over`` is for the pin trip of the core, which latches it.
+Wrap: the accumulators wrap modulo 2**16 by design; total is at most 2**15, and differences of wrapped numbers are
+the same modulo 2**16 as of unwrapped ones.  The first three totals after a reset see less than a whole window and
+never trip.
 Formats: counts; nothing is rounded.  ``oversampling`` from 8 to 32, changed only while the gates are off.
 """
 
@@ -77,8 +78,8 @@ def step(state, mod_bit, bits_valid, oversampling, limit_high, limit_low):
         else:
             seen = s.seen + 1
     following = State(
-        acc_1, acc_2, acc_3, last_1, last_2, last_3, bits_left, seen, 1 if due else 0, s.valid_1, s.valid_2, s.valid_3,
-        total, shown, over,
+        acc_1, acc_2, acc_3, last_1, last_2, last_3, bits_left, seen, 1 if due else 0, s.valid_1, s.valid_2,
+        s.valid_3, total, shown, over,
     )  # fmt: skip
     return following, (over, shown, s.valid_4)
 

@@ -1,9 +1,10 @@
 """Master for SPI converters: spi_frame clocks the frame, spi_words makes codes of its bits; one step is one clock.
 
-Each ``sample_trigger`` is answered by ``codes_valid`` with all codes, or by ``frame_error``.  See spi_frame for the start of
-the conversion, the edges, the time-out and refused settings, spi_words for the place and the sign of a code.
-The bit taken is the level of the pin ``sample_delay`` clocks after the edge of ``sclk`` has left its register, registered
-twice; ``sample_delay`` covers the round trip (output pad, isolator, converter, input pad), so that the line is stable then.
+Each ``sample_trigger`` is answered by ``codes_valid`` with all codes, or by ``frame_error``.  See spi_frame for the
+start of the conversion, the edges, the time-out and refused settings, spi_words for the place and the sign of a code.
+The bit taken is the level of the pin ``sample_delay`` clocks after the edge of ``sclk`` has left its register,
+registered twice; ``sample_delay`` covers the round trip (output pad, isolator, converter, input pad), so that the
+line is stable then.
 """
 
 from typing import NamedTuple

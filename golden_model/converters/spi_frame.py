@@ -1,19 +1,21 @@
-"""The frame of SPI converters: start of the conversion, chip select, clock, and when a bit is taken; one step is one clock.
+"""The frame of SPI converters: start, chip select, clock, and when a bit is taken; one step is one clock.
 
 A trigger starts a conversion and one frame; ``words_complete`` of spi_words or ``frame_error`` answers each trigger.
 
 * ``use_convst`` = 1: ``convst`` is high until ``wait_clocks`` have passed and BUSY is low, then the frame starts.
-  ``wait_clocks`` covers the delay from CONVST to BUSY and two clocks; without a BUSY pin (tied low) it is the time of a
-  conversion.  No frame until ``busy_timeout``: frame_error.
+  ``wait_clocks`` covers the delay from CONVST to BUSY and two clocks; without a BUSY pin (tied low) it is the time
+  of a conversion.  No frame until ``busy_timeout``: frame_error.
   ``use_convst`` = 0: the falling edge of ``cs_n`` starts the conversion, the frame follows at once.
-* Frame: ``cs_n`` low, a period of ``sclk`` later ``word_bits`` clocks (twice with ``two_words``) of ``clock_ratio`` clocks each.
+* Frame: ``cs_n`` low, a period of ``sclk`` later ``word_bits`` clocks (twice with ``two_words``) of ``clock_ratio``
+  clocks each.
   A bit is taken at the edge of ``sclk`` in its middle: the first of the bit, or with ``second_edge`` the second.
-* ``bit_taken`` comes ``sample_delay`` + 1 clocks after that edge leaves its register; ``sample_delay`` covers the round trip.
+* ``bit_taken`` comes ``sample_delay`` + 1 clocks after that edge leaves its register; ``sample_delay`` covers the
+  round trip.
 * The frame ends when spi_words has seen all its bits.
 
-A frame without room for the code (``skip_bits`` + ADC_BITS > ``word_bits``), or a ratio or word length out of its range, is
-refused (``setting_refused``): each trigger is a frame_error then.  So is a trigger during a frame, which goes on, and a
-frame whose bits do not all arrive, because a register changed meanwhile.
+A frame without room for the code (``skip_bits`` + ADC_BITS > ``word_bits``), or a ratio or word length out of its
+range, is refused (``setting_refused``): each trigger is a frame_error then.  So is a trigger during a frame, which
+goes on, and a frame whose bits do not all arrive, because a register changed meanwhile.
 BUSY is not synchronous and passes two registers.  Formats: clocks.
 """
 

@@ -1,12 +1,12 @@
 """Bits of SPI converters to codes, several data lines in parallel, one or two words on each; one step is one clock.
 
-``bit_taken`` takes a bit of every line: the level of its pin two clocks before.  The lines are not synchronous and pass two
-registers, which settle what moves at a clock at which nothing is taken; when a bit is taken they are stable by sample_delay
-of spi_frame.
+``bit_taken`` takes a bit of every line: the level of its pin two clocks before.  The lines are not synchronous and
+pass two registers, which settle what moves at a clock at which nothing is taken; when a bit is taken they are stable
+by sample_delay of spi_frame.
 
-Code: the ADC_BITS bits after ``skip_bits`` bits of a word, most significant first.  ``signed_code``: it is two's complement
-and its sign is inverted, so that zero becomes the middle of the range.  With ``two_words`` the second word of a line is
-another channel.  Codes of absent lines and absent second words are zero.
+Code: the ADC_BITS bits after ``skip_bits`` bits of a word, most significant first.  ``signed_code``: it is two's
+complement and its sign is inverted, so that zero becomes the middle of the range.  With ``two_words`` the second
+word of a line is another channel.  Codes of absent lines and absent second words are zero.
 All codes change together, with ``codes_valid``, after the last bit.  ``frame_start`` drops what has arrived before.
 Formats: codes; nothing is computed.
 """
@@ -96,7 +96,7 @@ def step(state, frame_start, bit_taken, miso, word_bits, skip_bits, two_words, s
 
 
 def stimuli(rng, config):
-    """Every word length and place of the code, one and two words, both signs; a frame broken off; a register changed."""
+    """Every word length and place of the code, one and two words, both signs; frames broken off."""
     top = (1 << config["LINES"]) - 1
     rows = []
     for number in range(96):

@@ -1,11 +1,14 @@
 """The third phase current where two phases have a sensor: i_missing = -(i_x + i_y); a sample block.
 
-``missing``: 0 all three phases have a sensor, 1, 2, 3: phase a, b, c has none.  It works on currents, after current_conditioning:
-raw codes have offsets and gains of their own.  The rail flag of the missing phase is cleared, since its code is no measurement.
+``missing``: 0 all three phases have a sensor, 1, 2, 3: phase a, b, c has none.  It works on currents, after
+current_conditioning:
+raw codes have offsets and gains of their own.  The rail flag of the missing phase is cleared, since its code is no
+measurement.
 
-Saturation: the sum of two currents below 2 per unit is below 4; beyond 2 the third current saturates.  That cannot hide
-an overcurrent: 2 per unit, floored to a 256th, is the largest i_trip, and a saturated current reaches it.
-With a missing phase the sum of the three currents is zero, or the third is saturated: the check of the sum says nothing.
+Saturation: the sum of two currents below 2 per unit is below 4; beyond 2 the third current saturates.  That cannot
+hide an overcurrent: 2 per unit, floored to a 256th, is the largest i_trip, and a saturated current reaches it.
+With a missing phase the sum of the three currents is zero, or the third is saturated: the check of the sum says
+nothing.
 Formats: PU, exact but for the saturation.
 """
 

@@ -1,15 +1,18 @@
 """Reads channels of the XADC (or SYSMON) of a Xilinx FPGA through its DRP; one step is one clock, which is DCLK.
 
-    trigger -> ``conversions`` times (convst, end of conversion) -> ``channels`` reads (den with daddr, drdy with drp_do) -> codes
+    trigger -> ``conversions`` times (convst, eoc) -> ``channels`` times (den with daddr, drdy with drp_do) -> codes
 
-The XADC is set to event mode: ``convst`` holds the inputs at its rising edge.  In simultaneous sampling one conversion holds a
-pair of channels; each further conversion of a frame holds its inputs later, when the one before has ended.
-``convst`` is high for CONVST_CLOCKS clocks.  A frame that has not ended ``timeout`` clocks after its trigger is a frame_error, and
-so is a trigger during a frame, which goes on, and one while ``busy`` shows that a conversion of a frame that was given up
-has not ended.  ``codes_valid`` or ``frame_error`` answers each trigger.
-``drdy`` outside a read is ignored; a read answered after the time-out is over long before the conversion of the next frame.
-``drp_do`` is left-aligned in 16 bits; the code is its upper ADC_BITS bits.  ``signed_code``: two's complement (bipolar channel), the sign
-is inverted, so that zero becomes the middle of the range.  A channel that is not read shows the code of the word 0.
+The XADC is set to event mode: ``convst`` holds the inputs at its rising edge.  In simultaneous sampling one
+conversion holds a pair of channels; each further conversion of a frame holds its inputs later, when the one before
+has ended.
+``convst`` is high for CONVST_CLOCKS clocks.  A frame that has not ended ``timeout`` clocks after its trigger is a
+frame_error, and so is a trigger during a frame, which goes on, and one while ``busy`` shows that a conversion of a
+frame that was given up has not ended.  ``codes_valid`` or ``frame_error`` answers each trigger.
+``drdy`` outside a read is ignored; a read answered after the time-out is over before
+the conversion of the next frame.
+``drp_do`` is left-aligned in 16 bits; the code is its upper ADC_BITS bits.  ``signed_code``: two's complement
+(bipolar channel), the sign is inverted, so that zero becomes the middle of the range.  A channel that is not read
+shows the code of the word 0.
 All codes change together, with ``codes_valid``.  Nothing is written: dwe and di are zero.
 Formats: clocks, codes; nothing is computed.
 """
@@ -108,7 +111,7 @@ def settings(**changes):
 
 
 def stimuli(rng, _config):
-    """Every number of conversions and channels; answers early, late and never; triggers during a frame and while busy."""
+    """Every number of conversions and channels; answers early, late, never; triggers while busy."""
     rows = []
     for number in range(64):
         regs = settings(conversions=1 + number % 4, channels=1 + number // 4 % 4, signed_code=number & 1)

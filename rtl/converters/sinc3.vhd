@@ -5,10 +5,10 @@
 -- Window: the first instant is the first bit with bits_valid 2 + start_clocks clocks after the trigger or later.  The
 -- result weighs this bit and the following 3*(oversampling - 1) symmetrically.
 -- weight: 1, 8, 64, 512 for an oversampling of 129..256, 65..128, 33..64, 32: total is at most 2**24.
--- Wrap: the accumulators wrap modulo 2**25 by design; their difference over the window is at most 2**24, and differences
--- of wrapped numbers are the same modulo 2**25 as of unwrapped ones.
--- window_error: a window ends without a result, because the next one starts or a trigger comes while the last one waits.
--- Formats: gain U(3,14), code U(0,ADC_BITS).  Latency: 1 (every clock is a sample; code six clocks after the last bit).
+-- Wrap: the accumulators wrap modulo 2**25 by design; their difference over the window is at most 2**24, and
+-- differences of wrapped numbers are the same modulo 2**25 as of unwrapped ones.
+-- window_error: a window ends without a result, because the next one starts, or a trigger comes too early.
+-- Formats: gain U(3,14), code U(0,ADC_BITS).  Latency: 1 (every clock is a sample; code six clocks after its last bit).
 -- Rounding: total loses its lowest bit, the product is rounded half up and saturated at all ones.
 
 library ieee;

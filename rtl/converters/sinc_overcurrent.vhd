@@ -3,8 +3,9 @@
 --   total = third difference of acc_3 over oversampling bits, every oversampling bits: 0 to oversampling**3
 --   over  = total >= limit_high or total <= limit_low  until the next total
 -- It runs all the time, without a trigger; over is for the pin trip of the core, which latches it.
--- Wrap: the accumulators wrap modulo 2**16 by design; total is at most 2**15, and differences of wrapped numbers are the
--- same modulo 2**16 as of unwrapped ones.  The first three totals after a reset see less than a window and never trip.
+-- Wrap: the accumulators wrap modulo 2**16 by design; total is at most 2**15, and differences of wrapped numbers are
+-- the same modulo 2**16 as of unwrapped ones.  The first three totals after a reset see less than a window and never
+-- trip.
 -- Formats: counts.  Latency: 1 (every clock is a sample; over five clocks after the last bit).  Rounding: none.
 
 library ieee;

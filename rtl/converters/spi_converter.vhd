@@ -1,10 +1,11 @@
 -- Purpose: master for SPI converters: spi_frame clocks the frame, spi_words makes codes of its bits.
--- Each sample_trigger is answered by codes_valid with all codes, or by frame_error.  See spi_frame for the start of the
--- conversion, the edges, the time-out and refused settings, spi_words for the place and the sign of a code.
+-- Each sample_trigger is answered by codes_valid with all codes, or by frame_error.  See spi_frame for the start of
+-- the conversion, the edges, the time-out and refused settings, spi_words for the place and the sign of a code.
 -- Timing: the bit taken is the level of the pin sample_delay clocks after the edge of sclk has left its register,
--- registered twice; sample_delay covers the round trip (output pad, isolator, converter, input pad), so that the line is
--- stable then.
--- Formats: clocks, codes.  Latency: 1 (every clock is a sample; trigger to convst or cs_n in one clock).  Rounding: none.
+-- registered twice; sample_delay covers the round trip (output pad, isolator, converter, input pad), so that the line
+-- is stable then.
+-- Formats: clocks, codes.  Latency: 1 (every clock is a sample; convst or cs_n a clock after the trigger).
+-- Rounding: none.
 
 library ieee;
 use ieee.std_logic_1164.all;

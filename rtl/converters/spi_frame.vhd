@@ -1,12 +1,12 @@
 -- Purpose: the frame of SPI converters: start of the conversion, chip select, clock, and when a bit is taken.
 -- A trigger starts a conversion and one frame; words_complete of spi_words or frame_error answers each trigger.
--- use_convst = 1: convst is high until wait_clocks have passed and BUSY is low, then the frame starts; wait_clocks covers
--- the delay from CONVST to BUSY and two clocks.  No frame until busy_timeout: frame_error.
+-- use_convst = 1: convst is high until wait_clocks have passed and BUSY is low, then the frame starts; wait_clocks
+-- covers the delay from CONVST to BUSY and two clocks.  No frame until busy_timeout: frame_error.
 -- use_convst = 0: the falling edge of cs_n starts the conversion, the frame follows at once.
--- Frame: cs_n low, a period of sclk later word_bits clocks (twice with two_words) of clock_ratio clocks each.  A bit is
--- taken at the edge of sclk in its middle: the first of the bit, or with second_edge the second.  bit_taken comes
+-- Frame: cs_n low, a period of sclk later word_bits clocks (twice with two_words) of clock_ratio clocks each.  A bit
+-- is taken at the edge of sclk in its middle: the first of the bit, or with second_edge the second.  bit_taken comes
 -- sample_delay + 1 clocks after that edge leaves its register; sample_delay covers the round trip.
--- A frame without room for the code, or a ratio or length out of range, is refused: each trigger is a frame_error then.
+-- A frame without room for the code, or a ratio or length out of range, is refused: each trigger an error then.
 -- So is a trigger during a frame, which goes on, and a frame whose bits do not all arrive because a register changed.
 -- BUSY is not synchronous and passes two registers.
 -- Formats: clocks.  Latency: 1 (every clock is a sample; trigger to convst or cs_n in one clock).  Rounding: none.
@@ -52,17 +52,24 @@ architecture rtl of spi_frame is
   type phase_t is (idle, converting, leading, reading, trailing);
 
   type state_t is record
-    phase     : phase_t;
-    elapsed   : unsigned(15 downto 0);           -- clocks that convst has been high
-    tick      : unsigned(4 downto 0);            -- clock within a period of sclk
-    sent      : unsigned(6 downto 0);            -- bits that sclk has clocked
-    strobes   : unsigned(STROBES - 1 downto 0);  -- edges that take a bit, of the last clocks, the newest at bit 0
-    complete  : std_logic;                       -- spi_words has all bits
-    busy_meta : std_logic;
-    busy_now  : std_logic;
+    phase    : phase_t;
+    elapsed  : unsigned(15 downto 0);           -- clocks that convst has been high
+    tick     : unsigned(4 downto 0);            -- clock within a period of sclk
+    sent     : unsigned(6 downto 0);            -- bits that sclk has clocked
+    strobes  : unsigned(STROBES - 1 downto 0);  -- edges that take a bit, of the last clocks, the newest at bit 0
+    complete : std_logic;                       -- spi_words has all bits
   end record state_t;
 
   signal state : state_t;
+
+  -- What comes from another clock
+  signal busy_meta : std_logic;
+  signal busy_now  : std_logic;
+
+  attribute async_reg : string;
+
+  attribute async_reg of busy_meta : signal is "TRUE";
+  attribute async_reg of busy_now  : signal is "TRUE";
 
   signal good      : std_logic;
   signal half      : unsigned(4 downto 0);
@@ -86,8 +93,8 @@ begin
   process (clk)
   begin
     if rising_edge(clk) then
-      state.busy_meta <= busy;
-      state.busy_now  <= state.busy_meta;
+      busy_meta <= busy;
+      busy_now  <= busy_meta;
 
       -- Conversion and frame
       state.tick     <= state.tick + 1;
@@ -116,7 +123,7 @@ begin
 
           state.elapsed <= state.elapsed + 1;
           state.tick    <= (others => '0');
-          if state.elapsed >= wait_clocks and state.busy_now = '0' then
+          if state.elapsed >= wait_clocks and busy_now = '0' then
             state.phase <= leading;
             convst      <= '0';
             cs_n        <= '0';
@@ -165,8 +172,8 @@ begin
       if rst = '1' then
         state.phase     <= idle;
         state.strobes   <= (others => '0');
-        state.busy_meta <= '0';
-        state.busy_now  <= '0';
+        busy_meta       <= '0';
+        busy_now        <= '0';
         convst          <= '0';
         cs_n            <= '1';
         sclk            <= '0';

@@ -1,8 +1,10 @@
 -- Purpose: bits of SPI converters to codes, several data lines in parallel, one or two words on each.
--- bit_taken takes a bit of every line: the level of its pin two clocks before.  The lines are not synchronous and pass two
--- registers, which settle what moves when nothing is taken; when a bit is taken they are stable, see spi_frame.
--- Code: the ADC_BITS bits after skip_bits bits of a word, most significant first.  signed_code: it is two's complement and
--- its sign is inverted, so that zero becomes the middle of the range.  two_words: the second word is another channel.
+-- bit_taken takes a bit of every line: the level of its pin two clocks before.  The lines are not synchronous and
+-- pass two registers, which settle what moves when nothing is taken; when a bit is taken they are stable, see
+-- spi_frame.
+-- Code: the ADC_BITS bits after skip_bits bits of a word, most significant first.  signed_code: it is two's
+-- complement and its sign is inverted, so that zero becomes the middle of the range.  two_words: the second word is
+-- another channel.
 -- Codes of absent lines and absent second words are zero.  All codes change together, with codes_valid, after the last
 -- bit.  frame_start drops what has arrived before.
 -- Formats: codes.  Latency: 1 (every clock is a sample; codes_valid two clocks after the last bit).  Rounding: none.
@@ -43,16 +45,23 @@ architecture rtl of spi_words is
   type codes_t is array (0 to 7) of unsigned(ADC_BITS - 1 downto 0);
 
   type state_t is record
-    miso_meta : unsigned(LINES - 1 downto 0);
-    miso_now  : unsigned(LINES - 1 downto 0);
-    place     : unsigned(5 downto 0);  -- of the next bit in its word
-    second    : std_logic;             -- the second word is arriving
-    complete  : std_logic;             -- all bits have arrived
-    shift     : shift_t;               -- bits of the codes of a line, the second word in the lower half
-    codes     : codes_t;
+    place    : unsigned(5 downto 0);  -- of the next bit in its word
+    second   : std_logic;             -- the second word is arriving
+    complete : std_logic;             -- all bits have arrived
+    shift    : shift_t;               -- bits of the codes of a line, the second word in the lower half
+    codes    : codes_t;
   end record state_t;
 
   signal state : state_t;
+
+  -- What comes from another clock
+  signal miso_meta : unsigned(LINES - 1 downto 0);
+  signal miso_now  : unsigned(LINES - 1 downto 0);
+
+  attribute async_reg : string;
+
+  attribute async_reg of miso_meta : signal is "TRUE";
+  attribute async_reg of miso_now  : signal is "TRUE";
 
   signal last_bit : std_logic;  -- of a word
   signal inside   : std_logic;  -- the bit belongs to the code
@@ -71,15 +80,15 @@ begin
   process (clk)
   begin
     if rising_edge(clk) then
-      state.miso_meta <= miso;
-      state.miso_now  <= state.miso_meta;
+      miso_meta <= miso;
+      miso_now  <= miso_meta;
 
       -- Bits that arrive
       state.complete <= '0';
       if bit_taken = '1' then
         if inside = '1' then
           for k in 0 to LINES - 1 loop
-            state.shift(k) <= state.shift(k)(2 * ADC_BITS - 2 downto 0) & state.miso_now(k);
+            state.shift(k) <= state.shift(k)(2 * ADC_BITS - 2 downto 0) & miso_now(k);
           end loop;
         end if;
         state.place <= state.place + 1;
@@ -108,14 +117,14 @@ begin
       end if;
 
       if rst = '1' then
-        state.miso_meta <= (others => '0');
-        state.miso_now  <= (others => '0');
-        state.place     <= (others => '0');
-        state.second    <= '0';
-        state.complete  <= '0';
-        state.shift     <= (others => (others => '0'));
-        state.codes     <= (others => (others => '0'));
-        codes_valid     <= '0';
+        miso_meta      <= (others => '0');
+        miso_now       <= (others => '0');
+        state.place    <= (others => '0');
+        state.second   <= '0';
+        state.complete <= '0';
+        state.shift    <= (others => (others => '0'));
+        state.codes    <= (others => (others => '0'));
+        codes_valid    <= '0';
       end if;
     end if;
   end process;

@@ -1,9 +1,10 @@
 -- Purpose: reads channels of the XADC (or SYSMON) of a Xilinx FPGA through its DRP; the clock is DCLK.
--- trigger -> conversions times (convst, end of conversion) -> channels reads (den with daddr, drdy with drp_do) -> codes
--- The XADC is set to event mode: convst holds the inputs at its rising edge.  In simultaneous sampling one conversion
--- holds a pair of channels; each further conversion of a frame holds its inputs later, when the one before has ended.
--- A frame that has not ended timeout clocks after its trigger is a frame_error, and so is a trigger during a frame, which
--- goes on, and one while busy shows that a conversion of a frame that was given up has not ended.
+-- trigger -> conversions times (convst, end of conversion) -> channels reads (den with daddr, drdy with drp_do) ->
+-- codes The XADC is set to event mode: convst holds the inputs at its rising edge.  In simultaneous sampling one
+-- conversion holds a pair of channels; each further conversion of a frame holds its inputs later, when the one before
+-- has ended.
+-- A frame that has not ended timeout clocks after its trigger is a frame_error, and so is a trigger during a frame,
+-- which goes on, and one while busy shows that a conversion of a frame that was given up has not ended.
 -- Code: the upper ADC_BITS bits of drp_do; signed_code: two's complement, the sign is inverted, zero becomes mid code.
 -- All codes change together, with codes_valid.  Nothing is written: dwe and di of the DRP are zero.
 -- Formats: clocks, codes.  Latency: 1 (every clock is a sample; trigger to convst in one clock).  Rounding: none.
