@@ -9,6 +9,16 @@ from fluxproof.golden_model.control import (
     speed_pi,
     voltage_limit,
 )
+from fluxproof.golden_model.converters import (
+    modulator_input,
+    sinc3,
+    sinc_overcurrent,
+    spi_converter,
+    spi_frame,
+    spi_words,
+    third_current,
+    xadc_reader,
+)
 from fluxproof.golden_model.estimators import (
     applied_voltage,
     clean_voltage,
@@ -102,5 +112,13 @@ BLOCKS = {
         sample_guard,
         sample_checks,
         fault_latch,
+        spi_frame,
+        spi_words,
+        spi_converter,
+        modulator_input,
+        sinc3,
+        sinc_overcurrent,
+        third_current,
+        xadc_reader,
     )
 }

@@ -703,4 +703,41 @@ package fluxproof_pkg is
   constant FAULT_LATCH_TRIP : natural := 7;
   constant FAULT_LATCH_EARLY : natural := 8;
 
+  -- spi_frame: none: front end of a board
+  constant SPI_FRAME_LATENCY : positive := 1;
+  constant SPI_FRAME_LEAST_RATIO : natural := 4;
+  constant SPI_FRAME_MOST_RATIO : natural := 16;
+  constant SPI_FRAME_LEAST_BITS : natural := 12;
+  constant SPI_FRAME_MOST_BITS : natural := 32;
+  constant SPI_FRAME_STROBES : natural := 16;
+  constant SPI_FRAME_TRAIL : natural := 20;
+
+  -- spi_words: none: front end of a board
+  constant SPI_WORDS_LATENCY : positive := 1;
+
+  -- spi_converter: none: front end of a board
+  constant SPI_CONVERTER_LATENCY : positive := 1;
+
+  -- modulator_input: none: front end of a board
+  constant MODULATOR_INPUT_LATENCY : positive := 1;
+  constant MODULATOR_INPUT_STROBES : natural := 16;
+
+  -- sinc3: none: front end of a board
+  constant SINC3_LATENCY : positive := 1;
+  constant SINC3_TOTAL_W : natural := 25;
+  constant SINC3_INSTANTS : natural := 3;
+  constant SINC3_PRODUCT : natural := 37;
+
+  -- sinc_overcurrent: none: front end of a board
+  constant SINC_OVERCURRENT_LATENCY : positive := 1;
+  constant SINC_OVERCURRENT_TOTAL_W : natural := 16;
+  constant SINC_OVERCURRENT_WARM : natural := 3;
+
+  -- third_current: none: front end of a board
+  constant THIRD_CURRENT_LATENCY : positive := 1;
+
+  -- xadc_reader: none: front end of a board
+  constant XADC_READER_LATENCY : positive := 1;
+  constant XADC_READER_CONVST_CLOCKS : natural := 8;
+
 end package fluxproof_pkg;
