@@ -1,7 +1,7 @@
-"""The contract of a block as a circuit: every input sequence that it allows, and a flag for what its bench would notice.
+"""The contract of a block as a circuit: every input sequence that it allows, and a flag for what its bench notices.
 
-The module `miter` holds the block twice, as it is (`gold`) and mutated (`gate`).  Its own inputs are free; `rst` is high
-in the first clock, samples keep their distance, inputs and registers are held as long as the contract says
+The module `miter` holds the block twice, as it is (`gold`) and mutated (`gate`).  Its own inputs are free; `rst` is
+high in the first clock, samples keep their distance, inputs and registers are held as long as the contract says
 (golden_model/block.py), numbers outside a port's range are replaced by the lowest.  What cosim/stimulus.py drives is
 one of these sequences.  `bad` is high where cosim.stimulus.due compares and the two differ.
 """
@@ -13,9 +13,7 @@ from collections.abc import Mapping, Sequence
 from fluxproof.golden_model.block import Block, Port
 
 
-def miter(
-    block: Block, config: Mapping[str, int], assumed: str, products: Sequence[tuple[int, int, int]]
-) -> str:
+def miter(block: Block, config: Mapping[str, int], assumed: str, products: Sequence[tuple[int, int, int]]) -> str:
     """Verilog of `miter`; ``products``: widths of the multipliers that were taken out of both.
 
     assumed: an expression in the block's inputs that holds for every sample; after a clock without it nothing counts.

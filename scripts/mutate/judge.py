@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import shutil
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
 from scripts.mutate import draw, equivalent, harness
 from scripts.mutate.contract import miter
-from scripts.mutate.subject import Subject
+from scripts.mutate.subject import Core, Subject
 
 PROOF_S = 10  # for one mutant
 KILLED = "killed"
@@ -43,11 +44,11 @@ class Watch:
         self.seconds[name], self.last = round(now - self.last, 2), now
 
 
-def judge(subject: Subject, seed: int, proving: bool = True, trial: harness.Trial | None = None) -> Verdicts:
+def judge(subject: Subject | Core, seed: int, trials: Sequence[harness.Trial] = ()) -> Verdicts:
     """Draws the subject's mutants with ``seed`` and judges them.
 
-    trial: what drives and compares, by default the schedule of the block's bench.  Raises WrongHarness where the
-    netlist without a mutation does not pass.
+    trials: what drives and compares, by default those of the subject's bench.  Raises WrongHarness where the netlist
+    without a mutation does not pass.
     """
     watch, folder = Watch(), subject.folder
     shutil.rmtree(folder, ignore_errors=True)
@@ -55,22 +56,22 @@ def judge(subject: Subject, seed: int, proving: bool = True, trial: harness.Tria
     cells = draw.prepare(folder, subject.verilog(), subject.top, subject.flat)
     drawn = draw.draw(folder, subject.top, cells, subject.count(cells), seed)
     watch("draw")
-    trial = trial or harness.block_trial(subject.block, subject.config, harness.BENCH_SEED)
+    trials = trials or subject.trials()
     watch("schedule")
-    bench = harness.Bench(harness.build(drawn, trial.ports), trial, seed)
+    library = harness.build(drawn, trials[0].ports)
+    benches = [harness.Bench(library, trial, seed) for trial in trials]
     watch("build")
-    clock = bench.first_difference(0)
-    if clock is not None:
-        raise WrongHarness(f"{subject.name}: the netlist without a mutation differs at clock {clock}")
+    for bench in benches:
+        if (clock := bench.first_difference(0)) is not None:
+            raise WrongHarness(f"{subject.name}: the netlist without a mutation differs at clock {clock}")
     mutants = range(1, len(drawn.mutations) + 1)
     outcome = dict.fromkeys(mutants, KILLED)
-    alive = [mutant for mutant in mutants if bench.first_difference(mutant) is None]
+    alive = [m for m in mutants if all(bench.first_difference(m) is None for bench in benches)]
     outcome |= dict.fromkeys(alive, equivalent.UNKNOWN)
     watch("run")
-    if alive and proving:
-        steps = subject.block.latency + 3
+    if alive and isinstance(subject, Subject):  # the whole core is too large for a proof
         circuit = partial(miter, subject.block, subject.config, "")
-        outcome |= equivalent.prove(drawn, alive, circuit, steps, PROOF_S)
+        outcome |= equivalent.prove(drawn, alive, circuit, PROOF_S)
     watch("prove")
     outcomes = [(drawn.mutations[mutant - 1], outcome[mutant]) for mutant in mutants]
     return Verdicts(subject.name, cells, outcomes, watch.seconds)

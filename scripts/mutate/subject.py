@@ -1,4 +1,4 @@
-"""What is mutated: each block of the registry with each of its configurations, and how many mutants are drawn of it."""
+"""What is mutated: each block of the registry with each of its configurations, and the wiring of the core."""
 
 from __future__ import annotations
 
@@ -8,9 +8,11 @@ from pathlib import Path
 
 from fluxproof.checkout import BUILD, ROOT
 from fluxproof.cosim.sources import rtl_sources
-from fluxproof.cosim.verilog import synthesize
+from fluxproof.cosim.verilog import TOP, synthesize, top_ports
 from fluxproof.golden_model.block import Block
 from fluxproof.golden_model.registry import BLOCKS
+from scripts.mutate import core
+from scripts.mutate.harness import BENCH_SEED, Trial, block_trial
 
 FOLDER = BUILD / "mutate"
 LEAST, MOST = 40, 160  # mutants of a block
@@ -57,10 +59,46 @@ class Subject:
             sources = [*sources, ROOT / "tb" / f"{self.top}.vhd"]
         return synthesize(sources, self.top, self.config)
 
+    def trials(self) -> list[Trial]:
+        """The schedule of the block's bench."""
+        return [block_trial(self.block, self.config, BENCH_SEED)]
+
     def count(self, cells: int) -> int:
         """Mutants to draw: as many as the block has cells, within limits, shared by its configurations."""
         configs = len(self.block.configs)
         return max(LEAST_OF_CONFIG, min(max(cells, LEAST), MOST) // configs)
+
+
+@dataclass(frozen=True)
+class Core:
+    """The core's own cells and connections."""
+
+    of: str = TOP
+    flat: bool = False
+
+    @property
+    def name(self) -> str:
+        return f"{self.of}-0"
+
+    @property
+    def top(self) -> str:
+        return self.of
+
+    @property
+    def folder(self) -> Path:
+        return FOLDER / self.name
+
+    def verilog(self) -> str:
+        """The converted VHDL."""
+        return synthesize(rtl_sources(), self.top, core.config())
+
+    def count(self, cells: int) -> int:
+        return core.MUTANTS
+
+    def trials(self) -> list[Trial]:
+        """Its closed loops."""
+        ports = top_ports(self.folder / "design.v")
+        return [recorder.trial(ports) for recorder in (core.every_event(), core.fault_tour(), core.any_settings())]
 
 
 def subjects(only: str = "") -> list[Subject]:
