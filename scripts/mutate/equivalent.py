@@ -1,8 +1,7 @@
 """Proves for mutants that the bench does not notice that no bench could: equal wherever one compares.
 
 Yosys makes an and-inverter graph of each miter (scripts/mutate/contract.py), with everything shared that the mutation
-does not reach; ABC merges signals that are equal in every clock and proves by property directed reachability that the
-miter's flag never rises.
+does not reach; its flag never rises by induction over a clock, or by ABC's property directed reachability.
 """
 
 from __future__ import annotations
@@ -20,7 +19,8 @@ from scripts.synth.yosys import tool
 
 FLAT = "flatten -noscopeinfo; memory_map; opt_clean; opt_expr; opt_clean"
 TO_GATES = "techmap; opt -fast; dffunmap; setundef -undriven -zero; aigmap; opt_clean"
-SEARCH = "strash\nscorr\nstrash\npdr -T {seconds}"
+# Without and with signals merged that are equal in every clock: what is left may have no register, which pdr refuses.
+SEARCHES = ("strash\npdr -T {seconds}", "strash\nscorr\nstrash\npdr -T {seconds}")
 # Two cells with the same inputs are one, registers too: what the mutation does not reach is there once.
 REDUCE = "proc; flatten -noscopeinfo; opt -share_all -noff"
 # Widths of the multipliers, operands and product -> the Verilog of `miter`.
@@ -73,21 +73,31 @@ def prove(drawn: Drawn, mutants: Sequence[int], miter: Miter, seconds: int) -> d
         without_products(folder / f"{mutant}.json", "gate", list(products))
     write_text(folder / "miter.v", miter(list(products.values())))
     write_text(folder / "carrier.v", CARRIER)
-    for path in (*folder.glob("*.status"), *folder.glob("*.aig")):
+    for path in folder.glob("*.aig"):
         path.unlink()
     left = list(mutants)
     while left:
         write_text(folder / "graphs.ys", "\n".join(line for mutant in left for line in graph(mutant)) + "\n")
         done = watched(folder, "script graphs.ys", left, "aig", seconds)
         left = left[len(done) + 1 :]  # the one after these took too long
-    proved = {m for m in mutants if STEP_PROVED in read(folder / f"{m}.step")}
-    left = [m for m in mutants if m not in proved and (folder / f"{m}.aig").exists()]
+    found = {m: EQUIVALENT if STEP_PROVED in read(folder / f"{m}.step") else UNKNOWN for m in mutants}
+    for search in SEARCHES:
+        left = [m for m in mutants if found[m] == UNKNOWN and (folder / f"{m}.aig").exists()]
+        found |= searched(folder, left, search.format(seconds=seconds), seconds)
+    return found
+
+
+def searched(folder: Path, mutants: Sequence[int], commands: str, seconds: int) -> dict[int, str]:
+    """ABC's verdicts."""
+    left = list(mutants)
+    for mutant in mutants:
+        (folder / f"{mutant}.status").unlink(missing_ok=True)
     while left:
-        search = [(f"read_aiger {m}.aig", SEARCH.format(seconds=seconds), f"write_status {m}.status") for m in left]
-        write_text(folder / "search.abc", "\n".join("\n".join(commands) for commands in search) + "\n")
+        lines = (f"read_aiger {m}.aig\n{commands}\nwrite_status {m}.status\n" for m in left)
+        write_text(folder / "search.abc", "".join(lines))
         done = watched(folder, CARRY, left, "status", 2 * seconds)
-        left = left[len(done) + 1 :]
-    return {m: EQUIVALENT if m in proved else verdict(read(folder / f"{m}.status")) for m in mutants}
+        left = left[len(done) + 1 :]  # the one after these took too long
+    return {m: verdict(read(folder / f"{m}.status")) for m in mutants}
 
 
 def graph(mutant: int) -> list[str]:
