@@ -21,6 +21,7 @@ from fluxproof.golden_model import clocked
 from fluxproof.golden_model.fluxproof import REGISTERS, Observed
 from fluxproof.golden_model.io import sample_latch
 from scripts.mutate.harness import Trial
+from scripts.prove.pipeline import core_ends
 
 CARRIER_HALF = 128
 IN_RESET = 4
@@ -38,6 +39,7 @@ class Recorder(GoldenClock):
         self.checks: list[tuple[int, str, int]] = []
         self.driven: dict[str, int] = {}
         self.entered: int | None = None  # clock of the last sample, until its values are compared
+        self.all_entered: set[int] = set()
 
     def drive(self, at: int, values: Mapping[str, int]) -> None:
         """Inputs from clock ``at`` on, where they differ from the last."""
@@ -58,6 +60,7 @@ class Recorder(GoldenClock):
         rows = super().advance(clocks, sample, until_trigger, **pins)
         if len(self.samples) > count:
             self.entered = begin
+            self.all_entered.add(begin)
         for at, row in enumerate(rows, begin + 1):
             self.checks += [(at, name, int(value)) for name, value in zip(SEEN, row, strict=True)]
         return rows
@@ -66,10 +69,15 @@ class Recorder(GoldenClock):
         """All that happened so far, for the ports of the converted core."""
         ports = tuple(ports)
         number = {p.name: k for k, p in enumerate(ports)}
+        strobes = [
+            (at, name, int(at - latency in self.all_entered))
+            for name, latency in core_ends()
+            for at in range(1, self.clock + 1)
+        ]
         reset = [(-IN_RESET, number["rst"], 1), (0, number["rst"], 0)]
         tables = [
             np.array(sorted([*first, *((at, number[name], value) for at, name, value in rows)]), np.int64)
-            for first, rows in ((reset, self.writes), ([], self.checks))
+            for first, rows in ((reset, self.writes), ([], self.checks + strobes))
         ]
         return Trial(ports, IN_RESET, self.clock, *tables, np.empty(0, np.int64), np.empty(0, np.int64))
 
