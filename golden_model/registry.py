@@ -1,6 +1,6 @@
 """Every block of the core, one line each: add yours here and the bench finds it."""
 
-from fluxproof.golden_model.common import multiply_add, packet_fifo, reciprocal, sqrt
+from fluxproof.golden_model.common import input_filter, multiply_add, packet_fifo, reciprocal, sqrt
 from fluxproof.golden_model.control import (
     chord_speed,
     current_pi,
@@ -8,6 +8,13 @@ from fluxproof.golden_model.control import (
     decoupling,
     speed_pi,
     voltage_limit,
+)
+from fluxproof.golden_model.encoders import (
+    edge_timer,
+    hall_decoder,
+    incremental_encoder,
+    quadrature_decoder,
+    turn_counter,
 )
 from fluxproof.golden_model.estimators import (
     applied_voltage,
@@ -102,5 +109,11 @@ BLOCKS = {
         sample_guard,
         sample_checks,
         fault_latch,
+        input_filter,
+        quadrature_decoder,
+        turn_counter,
+        edge_timer,
+        hall_decoder,
+        incremental_encoder,
     )
 }

@@ -531,4 +531,34 @@ package fluxproof_pkg is
   constant FAULT_LATCH_TRIP : natural := 7;
   constant FAULT_LATCH_EARLY : natural := 8;
 
+  -- input_filter: none: pins of a board
+  constant INPUT_FILTER_LATENCY : positive := 1;
+
+  -- quadrature_decoder: none: incremental encoder
+  constant QUADRATURE_DECODER_LATENCY : positive := 1;
+
+  -- turn_counter: none: incremental encoder
+  constant TURN_COUNTER_LATENCY : positive := 1;
+
+  -- edge_timer: none: speed by the time between edges
+  constant EDGE_TIMER_LATENCY : positive := 1;
+  constant EDGE_TIMER_TIME_W : natural := 24;
+  constant EDGE_TIMER_MOVED_W : natural := 16;
+  constant EDGE_TIMER_QUOTIENT_W : natural := 19;
+  constant EDGE_TIMER_DIVIDE_AT : natural := 17;
+  constant EDGE_TIMER_LIMIT_AT : natural := 37;
+  constant EDGE_TIMER_LAST : natural := 38;
+
+  -- hall_decoder: none: three Hall sensors, 120 degrees apart
+  constant HALL_DECODER_LATENCY : positive := 1;
+  constant HALL_DECODER_MIDDLE_0 : natural := 21845;
+  constant HALL_DECODER_MIDDLE_1 : natural := 65536;
+  constant HALL_DECODER_MIDDLE_2 : natural := 109227;
+  constant HALL_DECODER_MIDDLE_3 : natural := 152917;
+  constant HALL_DECODER_MIDDLE_4 : natural := 196608;
+  constant HALL_DECODER_MIDDLE_5 : natural := 240299;
+
+  -- incremental_encoder: none: incremental encoder
+  constant INCREMENTAL_ENCODER_LATENCY : positive := 1;
+
 end package fluxproof_pkg;
