@@ -13,6 +13,7 @@ from fluxproof.golden_model.encoders import (
     edge_timer,
     hall_decoder,
     incremental_encoder,
+    index_check,
     quadrature_decoder,
     turn_counter,
 )
@@ -112,6 +113,7 @@ BLOCKS = {
         input_filter,
         quadrature_decoder,
         turn_counter,
+        index_check,
         edge_timer,
         hall_decoder,
         incremental_encoder,

@@ -43,7 +43,7 @@ def step(state, pin, filter_clocks):
 
 
 def stimuli(rng, config):
-    """Pulses one clock below, at and above the limit, bounce, every time from none to the longest, high from the start."""
+    """Pulses one clock below, at and above the limit, bounce, times from none to the longest, high from the start."""
     rows = []
 
     def hold(pin, clocks, time):

@@ -1,9 +1,9 @@
-"""Three Hall sensors to the coarse electrical angle, to steps of a sixth turn and to the start of an incremental encoder.
+"""Three Hall sensors to the coarse electrical angle, to steps of a sixth turn and to the start of an encoder.
 
 Forward, (a, b, c) = 101, 100, 110, 010, 011, 001 are the sectors 0 to 5; ``hall_reverse`` = 1 counts them the other way
 round.  The angle is the middle of the sector, theta_hall = (sector + 1/2)/6 + hall_offset, so it is at most a twelfth
-of an electrical turn off.  000 and 111 are illegal: they are counted, the last sector stays and ``hall_valid`` is 0.  A change
-by more than one sector is no step and is counted as skipped.  Both counters saturate.
+of an electrical turn off.  000 and 111 are illegal: they are counted, the last sector stays and ``hall_valid`` is 0.
+A change by more than one sector is no step and is counted as skipped.  Both counters saturate.
 
     start_count = start_first + round(sector * sector_counts)
 
@@ -171,7 +171,7 @@ BLOCK = Block(
     state=State(),
     latency=1,
     clocked=True,
-    constants={f"MIDDLE_{k}": MIDDLE[k] for k in range(6)},
+    roms={"MIDDLE": (TURN, [*MIDDLE, 0, 0])},
     reference=None,
     bound=None,
     stimuli=stimuli,

@@ -1,4 +1,4 @@
-"""An incremental encoder from its pins to code and speed: three filters, decoder, counter and edge timer, wired.
+"""An incremental encoder from its pins to code and speed: three filters, decoder, counter, index and edge timer, wired.
 
 Nothing is computed here.  The blocks are one register apart, as in the VHDL: a step reaches the counter and the timer
 one clock after the decoder has seen it.  From a pin to the count: filter_clocks + 5 clocks.
@@ -8,13 +8,13 @@ from typing import NamedTuple
 
 from fluxproof.golden_model.block import Block, Port
 from fluxproof.golden_model.common import input_filter
-from fluxproof.golden_model.encoders import edge_timer, quadrature_decoder, turn_counter
+from fluxproof.golden_model.encoders import edge_timer, index_check, quadrature_decoder, turn_counter
 from fluxproof.golden_model.formats import BIT
 from fluxproof.golden_model.io.position import code_format
 from fluxproof.golden_model.kernel import kernel
 
 filter_step, decoder_step = input_filter.step, quadrature_decoder.step
-counter_step, timer_step = turn_counter.step, edge_timer.step
+counter_step, check_step, timer_step = turn_counter.step, index_check.step, edge_timer.step
 
 
 class State(NamedTuple):
@@ -23,11 +23,18 @@ class State(NamedTuple):
     of_filter_z: input_filter.State = input_filter.State()
     of_decoder: quadrature_decoder.State = quadrature_decoder.State()
     of_counter: turn_counter.State = turn_counter.State()
+    of_check: index_check.State = index_check.State()
     of_timer: edge_timer.State = edge_timer.State()
     # Outputs that the next clock reads
     step_up: int = 0
     step_down: int = 0
     index: int = 0
+    count: int = 0
+    pending: int = 0
+    restarted: int = 0
+    correct: int = 0
+    correction: int = 0
+    fast: int = 0
 
 
 @kernel
@@ -65,33 +72,50 @@ def step(
         clear_faults,
         index_phase,
     )
-    counter, (
-        code_theta,
-        count,
-        referenced,
-        moving,
-        index_count,
-        lost_counts,
-        index_lost,
-        index_wrong,
-        setting_refused,
-    ) = counter_step(
+    counter, (code_theta, count, pending, moving, restarted, setting_refused) = counter_step(
         s.of_counter,
         s.step_up,
         s.step_down,
-        s.index,
         sample,
-        start,
-        start_count,
-        clear_faults,
+        s.correct,
+        s.correction,
+        s.fast,
         counts,
         code_step,
         code_rest,
-        correct_max,
         position_bits,
     )
+    check, (correct, correction, fast, referenced, index_count, lost_counts, index_lost, index_wrong) = check_step(
+        s.of_check,
+        s.index,
+        s.count,
+        s.pending,
+        start,
+        start_count,
+        s.restarted,
+        clear_faults,
+        counts,
+        correct_max,
+    )
     timer, (omega_me, omega_valid) = timer_step(s.of_timer, s.step_up, s.step_down, sample, reverse, k_edge)
-    following = State(filter_a, filter_b, filter_z, decoder, counter, timer, step_up, step_down, index)
+    following = State(
+        filter_a,
+        filter_b,
+        filter_z,
+        decoder,
+        counter,
+        check,
+        timer,
+        step_up,
+        step_down,
+        index,
+        count,
+        pending,
+        restarted,
+        correct,
+        correction,
+        fast,
+    )
     return following, (
         code_theta,
         omega_me,
@@ -139,7 +163,7 @@ def stimuli(rng, config):
 
 _PORTS = {
     p.name: p
-    for module in (edge_timer, turn_counter, quadrature_decoder, input_filter)
+    for module in (edge_timer, turn_counter, index_check, quadrature_decoder, input_filter)
     for p in module.BLOCK.inputs + module.BLOCK.registers + module.BLOCK.outputs
 }
 

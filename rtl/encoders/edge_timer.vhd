@@ -34,9 +34,9 @@ architecture rtl of edge_timer is
   constant QUOTIENT_W : positive := EDGE_TIMER_QUOTIENT_W;
   constant WORK_W     : positive := MOVED_W + 32 + 1;  -- twice the product
 
-  constant TIME_MAX  : unsigned(TIME_W - 1 downto 0)  := (others => '1');
-  constant MOVED_MAX : signed(MOVED_W downto 0)       := '0' & (MOVED_W - 1 downto 0 => '1');
-  constant OMEGA_MAX : unsigned(QUOTIENT_W downto 0)  := to_unsigned(2 ** (PU_W - 1) - 1, QUOTIENT_W + 1);
+  constant TIME_MAX  : unsigned(TIME_W - 1 downto 0) := (others => '1');
+  constant MOVED_MAX : signed(MOVED_W downto 0)      := '0' & (MOVED_W - 1 downto 0 => '1');
+  constant OMEGA_MAX : unsigned(QUOTIENT_W downto 0) := to_unsigned(2 ** (PU_W - 1) - 1, QUOTIENT_W + 1);
 
   type state_t is record
     seen    : std_logic;

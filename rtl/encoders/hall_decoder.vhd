@@ -38,20 +38,8 @@ end entity hall_decoder;
 
 architecture rtl of hall_decoder is
   type sectors_t is array (0 to 7) of unsigned(2 downto 0);
-  type middle_t is array (0 to 7) of natural;
 
   constant SECTORS : sectors_t := ("000", "001", "011", "010", "101", "000", "100", "000");  -- of the code c, b, a
-  constant MIDDLE  : middle_t  := (
-    HALL_DECODER_MIDDLE_0,
-    HALL_DECODER_MIDDLE_1,
-    HALL_DECODER_MIDDLE_2,
-    HALL_DECODER_MIDDLE_3,
-    HALL_DECODER_MIDDLE_4,
-    HALL_DECODER_MIDDLE_5,
-    0,
-    0
-  );
-
   type state_t is record
     sector        : unsigned(2 downto 0);
     seen          : std_logic;
@@ -110,7 +98,7 @@ begin
       state.skipped_count <= counted(state.skipped_count, skipped, clear_faults);
       step_up             <= up;
       step_down           <= down;
-      theta_hall          <= to_unsigned(MIDDLE(to_integer(sector_0)), TURN_W) + hall_offset;
+      theta_hall          <= HALL_DECODER_MIDDLE(to_integer(sector_0)) + hall_offset;
 
       -- Stage 1: sector * sector_counts.  Stage 2: start_count, rounded
       product_1   <= state.sector * sector_counts;

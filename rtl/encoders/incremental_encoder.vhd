@@ -1,4 +1,4 @@
--- Purpose: an incremental encoder from its pins to code and speed: three filters, decoder, counter and edge timer, wired.
+-- Purpose: an incremental encoder from its pins to code and speed: three filters, decoder, counter, index, edge timer.
 -- Nothing is computed here.  From a pin to the count: filter_clocks + 5 clocks.
 -- Formats: those of the blocks.  Latency: 1 (every clock is a sample); sample to code_theta 1, to omega_valid that of
 -- edge_timer.  Rounding: none.
@@ -54,11 +54,20 @@ architecture rtl of incremental_encoder is
   signal step_up   : std_logic;
   signal step_down : std_logic;
   signal index     : std_logic;
+  signal count_now : unsigned(17 downto 0);
+  signal pending   : signed(19 downto 0);
+  signal restarted : std_logic;
+
+  signal correct    : std_logic;
+  signal correction : signed(19 downto 0);
+  signal fast       : std_logic;
 begin
   pins    <= (pin_a, pin_b, pin_z);
   settled <= and settleds;
+  count   <= count_now;
 
   filters : for k in 0 to 2 generate
+
     filter : entity work.input_filter
       port map (
         clk           => clk,
@@ -68,6 +77,7 @@ begin
         level         => levels(k),
         settled       => settleds(k)
       );
+
   end generate;
 
   decoder : entity work.quadrature_decoder
@@ -97,24 +107,42 @@ begin
       rst             => rst,
       step_up         => step_up,
       step_down       => step_down,
-      index           => index,
       sample          => sample,
-      start           => start,
-      start_count     => start_count,
-      clear_faults    => clear_faults,
+      correct         => correct,
+      correction      => correction,
+      fast            => fast,
       counts          => counts,
       code_step       => code_step,
       code_rest       => code_rest,
-      correct_max     => correct_max,
       code_theta      => code_theta,
-      count           => count,
-      referenced      => referenced,
+      count           => count_now,
+      pending         => pending,
       moving          => moving,
-      index_count     => index_count,
-      lost_counts     => lost_counts,
-      index_lost      => index_lost,
-      index_wrong     => index_wrong,
+      restarted       => restarted,
       setting_refused => setting_refused
+    );
+
+  check : entity work.index_check
+    port map (
+      clk          => clk,
+      rst          => rst,
+      index        => index,
+      count        => count_now,
+      pending      => pending,
+      start        => start,
+      start_count  => start_count,
+      restart      => restarted,
+      clear_faults => clear_faults,
+      counts       => counts,
+      correct_max  => correct_max,
+      correct      => correct,
+      correction   => correction,
+      fast         => fast,
+      referenced   => referenced,
+      index_count  => index_count,
+      lost_counts  => lost_counts,
+      index_lost   => index_lost,
+      index_wrong  => index_wrong
     );
 
   timer : entity work.edge_timer

@@ -540,6 +540,9 @@ package fluxproof_pkg is
   -- turn_counter: none: incremental encoder
   constant TURN_COUNTER_LATENCY : positive := 1;
 
+  -- index_check: none: incremental encoder
+  constant INDEX_CHECK_LATENCY : positive := 1;
+
   -- edge_timer: none: speed by the time between edges
   constant EDGE_TIMER_LATENCY : positive := 1;
   constant EDGE_TIMER_TIME_W : natural := 24;
@@ -551,12 +554,10 @@ package fluxproof_pkg is
 
   -- hall_decoder: none: three Hall sensors, 120 degrees apart
   constant HALL_DECODER_LATENCY : positive := 1;
-  constant HALL_DECODER_MIDDLE_0 : natural := 21845;
-  constant HALL_DECODER_MIDDLE_1 : natural := 65536;
-  constant HALL_DECODER_MIDDLE_2 : natural := 109227;
-  constant HALL_DECODER_MIDDLE_3 : natural := 152917;
-  constant HALL_DECODER_MIDDLE_4 : natural := 196608;
-  constant HALL_DECODER_MIDDLE_5 : natural := 240299;
+  type hall_decoder_middle_t is array (0 to 7) of unsigned(17 downto 0);
+  constant HALL_DECODER_MIDDLE : hall_decoder_middle_t := (  -- U(0,18)
+    18x"05555", 18x"10000", 18x"1aaab", 18x"25555", 18x"30000", 18x"3aaab", 18x"00000", 18x"00000"
+  );
 
   -- incremental_encoder: none: incremental encoder
   constant INCREMENTAL_ENCODER_LATENCY : positive := 1;
