@@ -3,7 +3,7 @@
 // One source for every set of generics: cosim/verilator.py writes ports.inc with a line
 //     PORT(name, width, is_signed)
 // for each port of the top, and defines CORE_CLOCK, the name of its clock, and CORE_SHOWS_VALIDS where it has
-// duty_valid and values_valid.  Functions name a port by its line number, from 0.
+// duty_valid and values_valid, CORE_HAS_GATES where it has gates.  Functions name a port by its line number, from 0.
 //
 // A tick is one rising edge of the clock: inputs set before it are seen by it, outputs read after it are what the
 // registers hold from this edge on.
@@ -80,7 +80,9 @@ struct Core {
     }
 
     // Bits 0..2: upper gates of legs a, b, c; bits 3..5: lower gates.
+#ifdef CORE_HAS_GATES
     uint8_t gate_word() const { return static_cast<uint8_t>(top.gate_high | top.gate_low << 3); }
+#endif
 };
 
 }  // namespace
@@ -124,6 +126,17 @@ void core_read(const Core* core, const int32_t* ports, int64_t count, int64_t* v
     for (int64_t j = 0; j < count; ++j) values[j] = core->ports[ports[j]].get();
 }
 
+// Sets inputs[k] of `count` ports, ticks, and stores `shown` ports, for each of `ticks` rows; row by row.
+void core_play(Core* core, int64_t ticks, const int32_t* inputs, int64_t count, const int64_t* set,
+               const int32_t* outputs, int64_t shown, int64_t* seen) {
+    for (int64_t k = 0; k < ticks; ++k) {
+        for (int64_t j = 0; j < count; ++j) core->ports[inputs[j]].set(*set++);
+        core->tick();
+        for (int64_t j = 0; j < shown; ++j) *seen++ = core->ports[outputs[j]].get();
+    }
+}
+
+#ifdef CORE_HAS_GATES
 // Ticks until sample_trigger is high again, at most `most` times; returns the ticks made.  The tick with number
 // `sample_at` sees sample_valid high (none does if that is never reached).  clocks[] and words[] take at
 // most `most` + 1 entries: the number of the tick after which the gate word was new, and that word; number 0
@@ -158,5 +171,6 @@ int64_t core_run_period(Core* core, int64_t most, int64_t sample_at, int32_t* cl
     facts[0] = found;
     return k;
 }
+#endif
 
 }  // extern "C"

@@ -38,6 +38,7 @@ _FUNCTIONS = {  # name: (result, arguments), as in verilated.cpp
     "core_until": (_LONG, [_CORE, _INT, _LONG]),
     "core_trace": (None, [_CORE, _LONG, _INTS, _LONG, _LONGS]),
     "core_read": (None, [_CORE, _INTS, _LONG, _LONGS]),
+    "core_play": (None, [_CORE, _LONG, _INTS, _LONG, _LONGS, _INTS, _LONG, _LONGS]),
     "core_run_period": (_LONG, [_CORE, _LONG, _LONG, _INTS, _BYTES, _LONGS]),
 }
 
@@ -45,7 +46,9 @@ _FUNCTIONS = {  # name: (result, arguments), as in verilated.cpp
 def _load(path: Path) -> ctypes.CDLL:
     library = ctypes.CDLL(str(path))
     for name, (result, arguments) in _FUNCTIONS.items():
-        function = getattr(library, name)
+        function = getattr(library, name, None)
+        if function is None:  # core_run_period of a top without gates
+            continue
         function.restype, function.argtypes = result, arguments
     return library
 
@@ -150,6 +153,26 @@ class VerilatedCore:
         values = np.empty((n, len(names)), np.int64)
         self._library.core_trace(self._handle, n, self._indices(names), len(names), values)
         return values
+
+    def play(self, values: Mapping[str, np.ndarray], names: Iterable[str]) -> np.ndarray:
+        """Ticks once for each row of ``values`` = {input: integers, shape (n,)}: int64, shape (n, len(names)).
+
+        Row k of the result is what tick k left on the ports ``names``.  ValueError where a value does not fit its port.
+        """
+        names, inputs = tuple(names), tuple(values)
+        for name in inputs:
+            port = self.ports[name]
+            if not port.is_input or name == self.clock_name:
+                raise ValueError(f"{name} is not an input to set")
+            if len(values[name]) and not port.low <= values[name].min() <= values[name].max() <= port.high:
+                raise ValueError(f"{name} does not fit {port.low} .. {port.high}")
+        rows = np.ascontiguousarray(np.stack([values[name] for name in inputs], axis=1), np.int64)
+        seen = np.empty((len(rows), len(names)), np.int64)
+        indices = self._indices(inputs), self._indices(names)
+        self._library.core_play(
+            self._handle, len(rows), indices[0], len(inputs), rows, indices[1], len(names), seen
+        )
+        return seen
 
     def apply_sample(self, **inputs: int) -> None:
         """One tick with these inputs and sample_valid high; sample_valid is low again afterwards."""

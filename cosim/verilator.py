@@ -77,7 +77,8 @@ def locked(path: Path) -> Iterator[None]:
 def _defines(names: Iterable[str]) -> list[str]:
     """What verilated.cpp must know of a top with these ports."""
     valids = ["-DCORE_SHOWS_VALIDS"] if {"duty_valid", "values_valid"} <= set(names) else []
-    return [f"-DCORE_CLOCK={clock_of(names)}", *valids]
+    gates = ["-DCORE_HAS_GATES"] if {"gate_high", "gate_low", "sample_trigger", "sample_valid"} <= set(names) else []
+    return [f"-DCORE_CLOCK={clock_of(names)}", *valids, *gates]
 
 
 def clock_of(names: Iterable[str]) -> str:

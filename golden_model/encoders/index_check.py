@@ -26,6 +26,7 @@ CORRECT = Format(0, 12, 0)
 class State(NamedTuple):
     wait: int = 0  # stage in work, 0: idle
     starting: int = 0  # it is a start, not an index
+    target: int = 0  # what the count should be: 0 at the index
     found: int = 0  # count as if the correction were complete
     off: int = 0  # the same, less what it should be
     correct: int = 0
@@ -45,14 +46,13 @@ def step(state, index, count, pending, start, start_count, restart, clear_faults
     take = s.wait == 0 and (index or (start and not s.referenced))
     wait = 1 if take else (s.wait + 1) % 5 if s.wait != 0 else 0
     starting = (0 if index else 1) if take else s.starting
+    target = (0 if index else start_count) if take else s.target
     # Stage 1: found
     found = count + pending
     index_count = count if s.wait == 1 and not s.starting else s.index_count
     # Stage 2: off
-    off = s.found
-    if s.starting:
-        off = s.found - start_count
-    elif 2 * s.found > counts:
+    off = s.found - s.target
+    if not s.starting and 2 * s.found > counts:
         off = s.found - counts
     # Stage 3: start, first index, count that is off, or none of them
     now = s.wait == 3
@@ -67,6 +67,7 @@ def step(state, index, count, pending, start, start_count, restart, clear_faults
     following = State(
         0 if restart else wait,
         starting,
+        target,
         found,
         off,
         1 if (fast or mend) and not restart else 0,
@@ -92,7 +93,7 @@ def step(state, index, count, pending, start, start_count, restart, clear_faults
 
 
 def stimuli(rng, config):
-    """First and later indices with every size of a loss, starts before and after, two at once, a loss that saturates."""
+    """First and later indices with losses of every size, starts before and after, two at once, until it saturates."""
     rows = []
     still = {p.name: 0 for p in BLOCK.inputs}
 
@@ -108,7 +109,7 @@ def stimuli(rng, config):
         for count in (0, 1, 59, 6, 54, 7, 53, 30, 31):
             for pending in (0, 3, -3):
                 run(1, index=1, count=count, pending=pending, start=int(rng.integers(2)))
-                run(int(rng.integers(1, 8)), count=count, pending=pending, index=int(rng.integers(2)))
+                run(int(rng.integers(1, 8)), start_count=9, count=count, pending=pending, index=int(rng.integers(2)))
                 run(6)
         run(2, clear_faults=1)
         run(1, index=1, count=33)

@@ -40,6 +40,7 @@ architecture rtl of hall_decoder is
   type sectors_t is array (0 to 7) of unsigned(2 downto 0);
 
   constant SECTORS : sectors_t := ("000", "001", "011", "010", "101", "000", "100", "000");  -- of the code c, b, a
+
   type state_t is record
     sector        : unsigned(2 downto 0);
     seen          : std_logic;

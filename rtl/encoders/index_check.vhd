@@ -48,6 +48,7 @@ architecture rtl of index_check is
 
   signal valid    : std_logic_vector(0 to 4);
   signal starting : std_logic;  -- it is a start, not an index
+  signal target   : unsigned(17 downto 0);  -- what the count should be: 0 at the index
   signal found_2  : signed(20 downto 0);  -- count as if the correction were complete
   signal off_3    : signed(21 downto 0);  -- the same, less what it should be
 
@@ -77,6 +78,7 @@ begin
       -- Stage 0: an index, which came with a step that the count has at stage 1, or a start
       if valid(0) = '1' then
         starting <= not index;
+        target   <= start_count and (17 downto 0 => not index);
       end if;
 
       -- Stage 1: found
@@ -86,10 +88,8 @@ begin
       end if;
 
       -- Stage 2: off
-      off_3 <= resize(found_2, 22);
-      if starting = '1' then
-        off_3 <= resize(found_2, 22) - signed(resize(start_count, 22));
-      elsif found_2 & '0' > signed(resize(counts, 22)) then
+      off_3 <= resize(found_2, 22) - signed(resize(target, 22));
+      if starting = '0' and found_2 & '0' > signed(resize(counts, 22)) then
         off_3 <= resize(found_2, 22) - signed(resize(counts, 22));
       end if;
 
@@ -117,6 +117,7 @@ begin
       end if;
       if rst = '1' then
         starting          <= '0';
+        target            <= (others => '0');
         found_2           <= (others => '0');
         off_3             <= (others => '0');
         correction        <= (others => '0');
