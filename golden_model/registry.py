@@ -10,11 +10,15 @@ from fluxproof.golden_model.control import (
     voltage_limit,
 )
 from fluxproof.golden_model.encoders import (
+    biss_master,
     edge_timer,
+    endat_master,
     hall_decoder,
     incremental_encoder,
     index_check,
+    position_bridge,
     quadrature_decoder,
+    ssi_master,
     turn_counter,
 )
 from fluxproof.golden_model.estimators import (
@@ -117,5 +121,9 @@ BLOCKS = {
         edge_timer,
         hall_decoder,
         incremental_encoder,
+        ssi_master,
+        biss_master,
+        endat_master,
+        position_bridge,
     )
 }

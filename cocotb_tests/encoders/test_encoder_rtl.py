@@ -44,7 +44,10 @@ def test_a_million_edges():
 @pytest.mark.parametrize("seed", [1])
 def test_a_ride_in_ghdl(seed):
     folder = ghdl.run(
-        "incremental_encoder", "cocotb_tests.support.dut_encoder", {"POSITION_BITS": BITS}, {"FLUXPROOF_SEED": str(seed)}
+        "incremental_encoder",
+        "cocotb_tests.support.dut_encoder",
+        {"POSITION_BITS": BITS},
+        {"FLUXPROOF_SEED": str(seed)},
     )
     problem = ghdl.failure(folder)
     assert problem is None, problem

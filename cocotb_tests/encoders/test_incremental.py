@@ -156,7 +156,7 @@ def test_speed_from_edges_has_no_step(sign):
     at = done - edge_timer.TAKES - DELAY
     true = speed_of(path, counts)[at]
     error = out["omega_me"][done] / true - 1
-    # The speed is the mean between two edges, so it lags by two counts and a sample at most; the rest is a clock of span
+    # The speed is the mean between two edges, so it lags by two counts and a sample at most, and is a clock of span off
     growth = np.log(ratio) / clocks
     lag = growth * (2 / pace[at] + every)
     assert (np.abs(error) < lag + 3 / every + 1 / np.abs(true)).all()

@@ -24,7 +24,7 @@ class Incremental:
     index_width: float = 1.0
     phase_error: float = 0.0  # A and B are not exactly a quarter apart
     duty_error: float = 0.0  # high for longer than half a line
-    jitter: float = 0.0  # standard deviation of an edge, drawn anew at every clock: bounce while the shaft is at an edge
+    jitter: float = 0.0  # standard deviation of an edge, drawn anew at every clock: bounce at an edge
 
     def pins(self, place: np.ndarray, rng: np.random.Generator) -> dict[str, np.ndarray]:
         """Levels of pin_a, pin_b and pin_z, int64, for each clock."""
@@ -41,7 +41,9 @@ class Incremental:
         }
 
 
-def glitches(pins: Mapping[str, np.ndarray], rng: np.random.Generator, every: int, longest: int) -> dict[str, np.ndarray]:
+def glitches(
+    pins: Mapping[str, np.ndarray], rng: np.random.Generator, every: int, longest: int
+) -> dict[str, np.ndarray]:
     """The pins with pulses of 1 to ``longest`` clocks, one in ``every`` clocks on the average, on one pin at a time."""
     out = {name: levels.copy() for name, levels in pins.items()}
     names = list(out)
@@ -51,7 +53,7 @@ def glitches(pins: Mapping[str, np.ndarray], rng: np.random.Generator, every: in
 
 
 def wandering(rng: np.random.Generator, clocks: int, fastest: float, start: float = 0.0) -> np.ndarray:
-    """A path: stretches of random length with constant acceleration, reversals among them; at most ``fastest`` counts/clock."""
+    """A path: stretches of constant acceleration, reversals among them; at most ``fastest`` counts a clock."""
     speed = np.empty(clocks)
     at, now = 0, 0.0
     while at < clocks:

@@ -4,8 +4,8 @@
 -- change-over.  Without an edge |omega_me| is at most k_edge / (clocks since the last edge).
 -- An edge after a reversal is the edge passed before, so it moves the shaft by no count.
 -- Formats: k_edge U(16,16), counts 16 bits and clocks 24 bits, both saturating, output PU.  A time beyond 24 bits is
--- standstill.  Latency: 1 (every clock is a sample); sample to omega_valid LAST + 1 clocks, one bit of the product or the
--- quotient a clock; a sample before that is ignored and its edges belong to the next.
+-- standstill.  Latency: 1 (every clock is a sample); sample to omega_valid LAST + 1 clocks, one bit of the product or
+-- of the quotient a clock; a sample before that is ignored and its edges belong to the next.
 -- Rounding: the size to nearest, halves away from zero; it saturates at 2 per unit.
 
 library ieee;

@@ -1,7 +1,7 @@
 -- Purpose: three Hall sensors to the coarse electrical angle, to steps of a sixth turn and to the start of an encoder.
 -- Forward, (a, b, c) = 101, 100, 110, 010, 011, 001 are the sectors 0 to 5; hall_reverse = 1 counts them the other way
--- round.  theta_hall = (sector + 1/2)/6 + hall_offset.  000 and 111 are illegal: they are counted, the last sector stays
--- and hall_valid is 0.  A change by more than one sector is no step and is counted as skipped.
+-- round.  theta_hall = (sector + 1/2)/6 + hall_offset.  000 and 111 are illegal: they are counted, the last sector is
+-- kept and hall_valid is 0.  A change by more than one sector is no step and is counted as skipped.
 --   start_count = start_first + round(sector * sector_counts)
 -- Formats: angles TURN, sector_counts U(16,4).  Latency: 1 (every clock is a sample), start_count 3.
 -- Rounding: the middle of the sector to nearest, the count half up; angle and count wrap, the counters saturate.

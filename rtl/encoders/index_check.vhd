@@ -1,9 +1,9 @@
 -- Purpose: the count at each index of an incremental encoder: the first one refers it, later ones mend lost counts.
 --   off = count + pending at the index, the shorter way round; it should be 0
 -- The first index corrects the count at once (fast) and sets referenced; before it, start moves the count to
--- start_count in the same way.  At a later index an off up to correct_max is counted in lost_counts (saturates), flagged
--- by index_lost and corrected by one count a sample.  A larger one is flagged by index_wrong and not corrected; clearing
--- it makes the next index a first one.  restart forgets the reference.
+-- start_count in the same way.  At a later index an off up to correct_max is counted in lost_counts (saturates),
+-- flagged by index_lost and corrected by one count a sample.  A larger one is flagged by index_wrong and not corrected;
+-- clearing it makes the next index a first one.  restart forgets the reference.
 -- An index or a start while one is in work, five clocks, is ignored.
 -- Formats: counts.  Latency: 1 (every clock is a sample), index to correct 4.  Rounding: none.
 

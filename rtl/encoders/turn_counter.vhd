@@ -1,7 +1,7 @@
 -- Purpose: steps to the count within a turn of counts and to the position code; corrections that do not jump.
 --   code = round((count + 1/2) * 2**POSITION_BITS / counts), modulo one turn
 -- Nothing is multiplied: code and rest are quotient and remainder of a division by 2*counts, and a step adds that of
--- 2*2**POSITION_BITS, which software writes as code_step = floor(2**POSITION_BITS / counts) and code_rest, its remainder.
+-- 2*2**POSITION_BITS; software writes code_step = floor(2**POSITION_BITS / counts) and its remainder, code_rest.
 -- code_theta is latched by sample.
 -- correct adds correction to pending; its counts are added one by one between the steps of the encoder, one at each
 -- sample, or with fast one at each clock until none is left (moving).

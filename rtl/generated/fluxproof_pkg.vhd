@@ -562,4 +562,20 @@ package fluxproof_pkg is
   -- incremental_encoder: none: incremental encoder
   constant INCREMENTAL_ENCODER_LATENCY : positive := 1;
 
+  -- ssi_master: none: SSI, synchronous serial interface
+  constant SSI_MASTER_LATENCY : positive := 1;
+
+  -- biss_master: none: BiSS interface, protocol C
+  constant BISS_MASTER_LATENCY : positive := 1;
+
+  -- endat_master: none: EnDat 2.2, bidirectional interface for position encoders
+  constant ENDAT_MASTER_LATENCY : positive := 1;
+  constant ENDAT_MASTER_FIRST : natural := 2;
+  constant ENDAT_MASTER_LET_GO : natural := 8;
+  constant ENDAT_MASTER_LISTEN : natural := 9;
+
+  -- position_bridge: none: absolute encoders
+  constant POSITION_BRIDGE_LATENCY : positive := 1;
+  constant POSITION_BRIDGE_DROP : natural := 16;
+
 end package fluxproof_pkg;
