@@ -1,12 +1,12 @@
 -- Purpose: master for an absolute encoder with BiSS-C: clock, acknowledge, start bit, word, status, CRC, position code.
 -- start begins a frame: serial_clock (MA) runs until the last bit has come.  The encoder answers on SLO: low as the
--- acknowledge, then the start bit 1, CDS 0, the word with the highest bit first, the error and the warning bit (both 0 when
--- active) and six bits of CRC, x^6 + x + 1 over word, error and warning, inverted.  The bits are taken in their middle,
--- counted from the rise of the start bit: so the line may be late by any time.
--- The lowest turn_bits of the word_bits are the place within a turn and become the code, left-aligned or cut.
--- frame_error comes instead of code_valid if the line is not 1 at the start, if the start bit has not come after start_max
--- clocks, if it or CDS or the CRC is wrong, if the encoder says error, or if turn_bits is 0 or above word_bits.
--- Half a period of the serial clock takes half_period + 1 clocks.
+-- acknowledge, then the start bit 1, CDS 0, the word with the highest bit first, the error and the warning bit (both 0
+-- when active) and six bits of CRC, x^6 + x + 1 over word, error and warning, inverted.  The bits are taken in their
+-- middle, counted from the rise of the start bit: so the line may be late by any time.  The lowest turn_bits of the
+-- word_bits are the place within a turn and become the code, left-aligned or cut.  frame_error comes instead of
+-- code_valid if the line is not 1 at the start, if the start bit has not come after start_max clocks, if it or CDS or
+-- the CRC is wrong, if the encoder says error, or if turn_bits is 0 or above word_bits.  Half a period of the serial
+-- clock takes half_period + 1 clocks.
 -- Formats: bits.  Latency: 1 (every clock is a sample).  Rounding: bits below the code are cut.
 
 library ieee;

@@ -1,13 +1,13 @@
 -- Purpose: master for an absolute encoder with EnDat 2.1 or 2.2: mode command, start bit, errors, word, CRC, code.
 -- start begins a frame: serial_clock falls and the encoder latches its position.  For two periods and the six of
--- mode_command (highest bit first, it changes with the falling edge) this side drives the line, then it lets go.  From a
--- period later on the line must be low and then rise: the start bit.  Bits are taken in their middle, counted from that:
--- error 1 (1 when active), with two_errors error 2 (0 when active), the word with the lowest bit first and five bits of
--- CRC, x^5 + x^3 + x + 1 from all ones over errors and word, inverted.
--- The lowest turn_bits of the word_bits are the place within a turn and become the code, left-aligned or cut.
--- frame_error comes instead of code_valid if the start bit is wrong or has not come after start_max clocks, if the CRC is
--- wrong, if the encoder says error, or if turn_bits is 0 or above word_bits.
--- Formats: bits; half a period takes half_period + 1 clocks.  Latency: 1 (every clock is a sample).  Rounding: code cut.
+-- mode_command (highest bit first, it changes with the falling edge) this side drives the line, then it lets go.  From
+-- a period later on the line must be low and then rise: the start bit.  Bits are taken in their middle, counted from
+-- that: error 1 (1 when active), with two_errors error 2 (0 when active), the word with the lowest bit first and five
+-- bits of CRC, x^5 + x^3 + x + 1 from all ones over errors and word, inverted.  The lowest turn_bits of the word_bits
+-- are the place within a turn and become the code, left-aligned or cut.  frame_error comes instead of code_valid if the
+-- start bit is wrong or has not come after start_max clocks, if the CRC is wrong, if the encoder says error, or if
+-- turn_bits is 0 or above word_bits.
+-- Half a period takes half_period + 1 clocks.  Formats: bits.  Latency: 1 (every clock is a sample).  Rounding: cut.
 
 library ieee;
 use ieee.std_logic_1164.all;

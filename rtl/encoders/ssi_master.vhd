@@ -1,11 +1,11 @@
 -- Purpose: master for an absolute encoder with SSI: clock burst, Gray or binary word, parity, position code.
 -- start begins a frame: the first falling edge of serial_clock latches the position in the encoder, each rising edge
--- puts out a bit, the highest first, and the next rising edge takes it.
--- The word has word_bits bits; its lowest turn_bits are the place within a turn and become the code, left-aligned or
--- cut; gray = 1 decodes the whole word.  parity_on = 1 expects one more bit, which makes the ones even.
--- The line must be 1 before a frame and 0 for a period after the last bit, else frame_error comes instead of code_valid;
--- so it does for a wrong parity and for a turn_bits of 0 or above word_bits.  A start during a frame is ignored.
--- Half a period of the serial clock takes half_period + 1 clocks.
+-- puts out a bit, the highest first, and the next rising edge takes it.  The word has word_bits bits; its lowest
+-- turn_bits are the place within a turn and become the code, left-aligned or cut; gray = 1 decodes the whole word.
+-- parity_on = 1 expects one more bit, which makes the ones even.  The line must be 1 before a frame and 0 for a period
+-- after the last bit, else frame_error comes instead of code_valid; so it does for a wrong parity and for a turn_bits
+-- of 0 or above word_bits.  A start during a frame is ignored.  Half a period of the serial clock takes half_period + 1
+-- clocks.
 -- Formats: bits.  Latency: 1 (every clock is a sample).  Rounding: bits below the code are cut.
 
 library ieee;
