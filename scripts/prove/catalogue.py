@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from fluxproof.checkout import RTL
-from scripts.prove import buses, core, gates, narrowing, pipeline, protection
+from scripts.prove import buses, core, encoders, gates, narrowing, pipeline, protection
 from scripts.prove.proof import Proof
 
 
 def every_proof() -> tuple[Proof, ...]:
     """The whole catalogue."""
-    written = (*gates.PROOFS, *core.PROOFS, *protection.PROOFS, *buses.PROOFS)
+    written = (*gates.PROOFS, *core.PROOFS, *protection.PROOFS, *encoders.PROOFS, *buses.PROOFS)
     return (*written, *narrowing.proofs(), *pipeline.proofs())
 
 
