@@ -14,7 +14,8 @@ from fluxproof.golden_model.encoders import edge_timer, incremental_encoder, tur
 
 BITS = 18
 FILTER = 2
-DELAY = FILTER + 5  # clocks from a pin to the count that a sample latches
+DELAY = FILTER + 5  # clocks from a pin to the count that a sample sees
+CODE_DELAY = DELAY + 1  # to the code that it latches
 SAMPLE = 1000  # clocks
 CLOCK_HZ, POLE_PAIRS, OMEGA_BASE = 100e6, 4, 2 * np.pi * 4 * 100.0
 
@@ -57,8 +58,8 @@ def test_angle_over_100_turns(counts, sign):
         sample = sampled(len(path))
         out = device.play({**encoder.pins(path, rng), "sample": sample})
         rows = np.flatnonzero(sample)
-        good = rows[(out["referenced"][rows] == 1) & (out["moving"][rows - 1] == 0) & (rows > DELAY)]
-        error = angle_error(out["code_theta"][good], path[good - DELAY], counts)
+        good = rows[(out["referenced"][rows] == 1) & (out["moving"][rows - 1] == 0) & (rows > CODE_DELAY)]
+        error = angle_error(out["code_theta"][good], path[good - CODE_DELAY], counts)
         worst, seen = max(worst, np.abs(error).max(initial=0.0)), seen + len(good)
         place = path[-1]
     assert abs(place - start) >= turns * counts
@@ -76,7 +77,7 @@ def test_code_at_every_count():
             n = counts + 10
             up = np.r_[np.zeros(2, np.int64), np.ones(n, np.int64), np.zeros(n, np.int64)]
             out = device.play({"step_up": up, "step_down": np.roll(up, n), "sample": np.ones(len(up), np.int64)})
-            count = out["count"][1:-1]  # code_theta is that of the clock before
+            count = out["count"][:-2]  # the code follows by a clock, code_theta by one more
             wanted = (2 * (2 * count + 1) * 2**bits + 2 * counts) // (4 * counts) % 2**bits
             assert (out["code_theta"][2:] == wanted).all()
             assert set(np.unique(count)) == set(range(counts))
@@ -121,7 +122,7 @@ def test_lost_counts_are_mended_without_a_jump(lost):
     # A step of one count by the correction, one by quantisation
     assert np.abs(travelled)[len(rows) // 5 :].max() <= abs(speed) * 500 + 2.01
     late = rows[rows > end + (1.2 * counts / abs(speed)) + abs(lost) * 500]
-    assert np.abs(angle_error(out["code_theta"][late], path[late - DELAY], counts)).max() <= 0.51
+    assert np.abs(angle_error(out["code_theta"][late], path[late - CODE_DELAY], counts)).max() <= 0.51
 
 
 def test_a_wrong_index_is_not_followed():

@@ -1,7 +1,7 @@
 """An incremental encoder from its pins to code and speed: three filters, decoder, counter, index and edge timer, wired.
 
 Nothing is computed here.  The blocks are one register apart, as in the VHDL: a step reaches the counter and the timer
-one clock after the decoder has seen it.  From a pin to the count: filter_clocks + 5 clocks.
+one clock after the decoder has seen it.  From a pin to the count: filter_clocks + 5 clocks, to the code one more.
 """
 
 from typing import NamedTuple

@@ -5,7 +5,7 @@
 The middle of a count is the code: the shaft is never more than half a count away.  Nothing is multiplied: code and
 ``rest`` are quotient and remainder of a division by 2*counts, and a step adds that of 2*2**POSITION_BITS, which
 software writes as ``code_step`` = floor(2**POSITION_BITS / counts) and ``code_rest``, its remainder.  The code is exact
-at every count.  ``code_theta`` is latched by ``sample``.
+at every count.  ``code_theta`` is latched by ``sample``; it follows the count by a clock.
 
 ``correct`` adds ``correction`` to ``pending``, the counts still to be added.  They are added one by one between the
 steps of the encoder: one at each sample, or with ``fast`` one at each clock until none is left (``moving``).
@@ -39,6 +39,8 @@ class State(NamedTuple):
     rest: int = 0
     pending: int = 0
     moving: int = 0
+    moved_1: int = 0  # the count's last move: 1, 0 or -1
+    past_1: int = 0  # 1: rest has passed its end
     restarted: int = 0
     refused: int = 0
     code_theta: int = 0
@@ -68,19 +70,21 @@ def step(
     up = step_up or (mend and s.pending > 0)
     down = not up and (step_down or mend)
 
-    count, code, rest = s.count, s.code, s.rest
-    if up:
-        count = 0 if s.count == s.counts - 1 else s.count + 1
-        rest = s.rest + 2 * s.code_rest
-        past = rest >= 2 * s.counts
-        code = wrap(s.code + s.code_step + (1 if past else 0), position_bits)
-        rest -= 2 * s.counts if past else 0
-    elif down:
-        count = s.counts - 1 if s.count == 0 else s.count - 1
-        rest = s.rest - 2 * s.code_rest
-        past = rest < 0
-        code = wrap(s.code - s.code_step - (1 if past else 0), position_bits)
-        rest += 2 * s.counts if past else 0
+    # Stage 1: count, rest and the carry to the code
+    sign = 1 if up else -1
+    moved_1 = sign if up or down else 0
+    total = s.rest + sign * 2 * s.code_rest
+    past_1 = 1 if (total >= 2 * s.counts if up else total < 0) else 0
+    count, rest = s.count, s.rest
+    if moved_1 != 0:
+        count = s.count + sign
+        if up and s.count == s.counts - 1:
+            count = 0
+        elif not up and s.count == 0:
+            count = s.counts - 1
+        rest = total - sign * 2 * s.counts if past_1 else total
+    # Stage 2: code
+    code = wrap(s.code + s.moved_1 * (s.code_step + s.past_1), position_bits)
 
     pending = s.pending
     if mend:
@@ -89,7 +93,7 @@ def step(
         pending = saturate(pending + correction, PENDING_W)
     moving = 1 if (correct and fast) or (s.moving and s.pending != 0) else 0
     if restart:
-        count, pending, moving = 0, 0, 0
+        count, pending, moving, moved_1 = 0, 0, 0, 0
         code = wrap((code_step + 1) >> 1, position_bits)
         rest = code_rest + (0 if code_step & 1 else counts)
     following = State(
@@ -101,6 +105,8 @@ def step(
         rest,
         pending,
         moving,
+        moved_1,
+        past_1,
         1 if restart else 0,
         0 if good else 1,
         s.code if sample else s.code_theta,

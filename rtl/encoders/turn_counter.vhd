@@ -2,7 +2,7 @@
 --   code = round((count + 1/2) * 2**POSITION_BITS / counts), modulo one turn
 -- Nothing is multiplied: code and rest are quotient and remainder of a division by 2*counts, and a step adds that of
 -- 2*2**POSITION_BITS; software writes code_step = floor(2**POSITION_BITS / counts) and its remainder, code_rest.
--- code_theta is latched by sample.
+-- code_theta is latched by sample; it follows the count by a clock.
 -- correct adds correction to pending; its counts are added one by one between the steps of the encoder, one at each
 -- sample, or with fast one at each clock until none is left (moving).
 -- A new setting starts again at count 0; an impossible one is refused and the count stays 0.
@@ -60,7 +60,22 @@ architecture rtl of turn_counter is
   signal mend       : std_logic;
   signal up         : std_logic;
   signal down       : std_logic;
+  signal total      : signed(21 downto 0);  -- rest after the step
+  signal mended     : signed(21 downto 0);  -- the same, a turn nearer
+  signal past       : std_logic;            -- 1: rest has passed its end
   signal code_first : unsigned(17 downto 0);
+
+  signal moved_1 : std_logic;
+  signal down_1  : std_logic;
+  signal past_1  : std_logic;
+
+  -- a + b + carry, or a - b - carry, with one carry chain
+  function plus_minus (a : signed; b : unsigned; minus : std_logic; carry : std_logic) return signed is
+    variable sum : signed(a'length downto 0);
+  begin
+    sum := (a & '1') + signed((b xor (b'range => minus)) & (minus xor carry));
+    return sum(a'length downto 1);
+  end function;
 begin
   good    <= '1' when counts >= 4 and counts <= 2 ** 18 and resize(code_rest, 19) < counts else '0';
   restart <= not (good and kept);
@@ -72,38 +87,38 @@ begin
   up      <= step_up or (mend and not state.pending(19));
   down    <= not up and (step_down or mend);
 
+  total  <= plus_minus(signed(resize(state.rest, 22)), resize(state.code_rest & '0', 22), down, '0');
+  mended <= plus_minus(total, resize(state.counts & '0', 22), up, '0');
+  past   <= total(21) when down = '1' else not mended(21);
+
   code_first <= shift_right(resize(code_step, 18) + 1, 1);
 
   process (clk)
-    variable rest : signed(21 downto 0);
-    variable past : std_logic;
+    variable code : signed(POSITION_BITS - 1 downto 0);
     variable owed : signed(20 downto 0);
   begin
     if rising_edge(clk) then
-      if up = '1' then
-        state.count <= state.count + 1;
-        if resize(state.count, 19) = state.counts - 1 then
+      -- Stage 1: count, rest and the carry to the code
+      moved_1 <= up or down;
+      down_1  <= down;
+      past_1  <= past;
+      if (up or down) = '1' then
+        state.count <= unsigned(plus_minus(signed(state.count), to_unsigned(1, 18), down, '0'));
+        if up = '1' and resize(state.count, 19) = state.counts - 1 then
           state.count <= (others => '0');
-        end if;
-        rest := signed(resize(state.rest, 22)) + signed(resize(state.code_rest & '0', 22));
-        past := '1' when rest >= signed(resize(state.counts & '0', 22)) else '0';
-        if past = '1' then
-          rest := rest - signed(resize(state.counts & '0', 22));
-        end if;
-        state.rest <= unsigned(rest(19 downto 0));
-        state.code <= resize(resize(state.code, 18) + state.code_step + unsigned'(0 => past), POSITION_BITS);
-      elsif down = '1' then
-        state.count <= state.count - 1;
-        if state.count = 0 then
+        elsif up = '0' and state.count = 0 then
           state.count <= resize(state.counts - 1, 18);
         end if;
-        rest := signed(resize(state.rest, 22)) - signed(resize(state.code_rest & '0', 22));
-        past := rest(21);
+        state.rest <= unsigned(total(19 downto 0));
         if past = '1' then
-          rest := rest + signed(resize(state.counts & '0', 22));
+          state.rest <= unsigned(mended(19 downto 0));
         end if;
-        state.rest <= unsigned(rest(19 downto 0));
-        state.code <= resize(resize(state.code, 18) - state.code_step - unsigned'(0 => past), POSITION_BITS);
+      end if;
+
+      -- Stage 2: code
+      if moved_1 = '1' then
+        code       := plus_minus(signed(state.code), resize(state.code_step, POSITION_BITS), down_1, past_1);
+        state.code <= unsigned(code);
       end if;
       if sample = '1' then
         code_theta <= state.code;
@@ -134,6 +149,7 @@ begin
         state.rest    <= resize(code_rest, 20);
         state.pending <= (others => '0');
         state.moving  <= '0';
+        moved_1       <= '0';
         if code_step(0) = '0' then
           state.rest <= resize(code_rest, 20) + counts;
         end if;
@@ -148,6 +164,7 @@ begin
         state.rest      <= (others => '0');
         state.pending   <= (others => '0');
         state.moving    <= '0';
+        moved_1         <= '0';
         code_theta      <= (others => '0');
         restarted       <= '0';
         setting_refused <= '0';
