@@ -146,11 +146,11 @@ def test_speed_from_edges_has_no_step(sign):
     """From far below one count a sample to fifty: the relative error stays small and no sample steps."""
     counts, rng, every = 4000, np.random.default_rng(2), 10_000
     device = player(counts)
-    clocks, slowest, ratio = 8_000_000, 1e-5, 700.0
+    clocks, slowest, ratio = 4_000_000, 1e-5, 700.0
     pace = slowest * ratio ** np.linspace(0, 1, clocks)  # 0.1 to 70 counts a sample
     path = 0.5 + np.cumsum(sign * pace)
     sample = sampled(clocks, every)
-    out = device.play({**Incremental(counts).pins(path, rng), "sample": sample})
+    out = device.play({**Incremental(counts).pins(path, rng), "sample": sample}, ("omega_me", "omega_valid"))
     done = np.flatnonzero(out["omega_valid"])
     assert (np.diff(done) == every).all() and done[0] == every - 1 + edge_timer.TAKES - 1
     done = done[done > 500_000]
@@ -163,7 +163,7 @@ def test_speed_from_edges_has_no_step(sign):
     assert (np.abs(error) < lag + 3 / every + 1 / np.abs(true)).all()
     steps = np.abs(np.diff(out["omega_me"][done])) / np.abs(true[1:])
     assert (steps < (2 * lag + 6 / every + 2 / np.abs(true))[1:]).all()
-    assert np.abs(error[pace[at] * every > 1]).max() < 0.02  # from one count a sample on
+    assert np.abs(error[pace[at] * every > 1]).max() < 0.04  # from one count a sample on
 
 
 def test_speed_falls_to_zero_after_a_stop_and_trembling_has_none():

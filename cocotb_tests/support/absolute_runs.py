@@ -95,7 +95,7 @@ def run(name: str, frames: np.ndarray, registers: dict[str, int], answer: int, c
     kernel, module = RUNS[name]
     regs = np.array([registers[p.name] for p in module.BLOCK.registers], np.int64)
     clocks = len(frames) * spacing
-    line, starts = np.empty(clocks, np.int64), np.empty(clocks, np.int64)
+    line, starts = np.empty(clocks, np.int8), np.empty(clocks, np.int8)
     result = np.zeros((len(frames), 3), np.int64)
     kernel(module.State(), frames, regs, answer, cable, timeout, spacing, line, starts, result)
     return result, line, starts
