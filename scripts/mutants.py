@@ -266,7 +266,7 @@ MUTANTS = (
     ("remainder not carried backward", "encoders/turn_counter.vhd", "total(21) when down = '1' else not mended(21)", "not mended(21) and not down"),
     ("code of an even quotient half a step low", "encoders/turn_counter.vhd", "resize(code_rest, 20) + counts", "resize(code_rest, 20)"),
     ("index the longer way round", "encoders/index_check.vhd", "found_2 & '0' > signed(resize(counts, 22))", "found_2 > signed(resize(counts, 22))"),
-    ("largest correction refused", "encoders/index_check.vhd", "lost <= correct_max", "lost < correct_max"),
+    ("largest correction refused", "encoders/index_check.vhd", "beyond(off_3, correct_max, 0)", "beyond(off_3, correct_max - 1, 0)"),
     ("trembling counts as movement", "encoders/edge_timer.vhd", "(edge and state.seen and (step_up xnor state.forward))", "(edge and state.seen)"),
     ("speed of a still shaft held", "encoders/edge_timer.vhd", "state.omega <= within(state.omega, quotient(PU_W - 2 downto 0), 0);", "null;"),
     ("speed rounded down", "encoders/edge_timer.vhd", "resize(quotient, QUOTIENT_W + 1) + 1, 1)", "resize(quotient, QUOTIENT_W + 1), 1)"),

@@ -66,7 +66,7 @@ def step(
 
     # A step of the encoder, else one count of the correction
     stepped = step_up or step_down
-    mend = s.pending != 0 and not stepped and (sample or s.moving)
+    mend = s.pending != 0 and not stepped and not correct and (sample or s.moving)
     up = step_up or (mend and s.pending > 0)
     down = not up and (step_down or mend)
 
@@ -90,7 +90,7 @@ def step(
     if mend:
         pending += -1 if up else 1
     if correct:
-        pending = saturate(pending + correction, PENDING_W)
+        pending = saturate(s.pending + correction, PENDING_W)
     moving = 1 if (correct and fast) or (s.moving and s.pending != 0) else 0
     if restart:
         count, pending, moving, moved_1 = 0, 0, 0, 0

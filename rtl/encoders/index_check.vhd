@@ -52,7 +52,6 @@ architecture rtl of index_check is
   signal found_2  : signed(20 downto 0);  -- count as if the correction were complete
   signal off_3    : signed(21 downto 0);  -- the same, less what it should be
 
-  signal lost  : unsigned(21 downto 0);
   signal later : std_logic;
   signal first : std_logic;
   signal off   : std_logic;
@@ -62,15 +61,15 @@ begin
   valid(0) <= (index or (start and not state.referenced)) and not (or valid(1 to 4));
 
   -- Stage 3: start, first index, count that is off, or none of them
-  lost  <= magnitude(off_3);
   first <= valid(3) and not starting and not state.referenced;
   later <= valid(3) and not starting and state.referenced;
   off   <= '0' when off_3 = 0 else later;
-  mend  <= off when lost <= correct_max else '0';
+  mend  <= off and not beyond(off_3, correct_max, 0);
   wrong <= off and not mend;
 
   process (clk)
-    variable counted : unsigned(21 downto 0);
+    variable counted : unsigned(12 downto 0);
+    variable sum     : unsigned(13 downto 0);
   begin
     if rising_edge(clk) then
       valid(1 to 4) <= valid(0 to 3);
@@ -99,14 +98,16 @@ begin
       correction       <= saturate(-off_3, 20);
       state.referenced <= first or (state.referenced and not (state.index_wrong and clear_faults));
 
-      counted := resize(state.lost_counts, 22);
+      -- |off| in 12 bits, which a mended off fits: inverted if negative, the bit below adds the one that is missing
+      counted := resize(state.lost_counts, 13);
       if clear_faults = '1' then
         counted := (others => '0');
       end if;
       if mend = '1' then
-        counted := counted + lost;
+        sum     := (counted & '1') + ((unsigned(off_3(11 downto 0)) xor (11 downto 0 => off_3(21))) & off_3(21));
+        counted := sum(13 downto 1);
       end if;
-      state.lost_counts <= saturate_u(signed(counted), 12);
+      state.lost_counts <= counted(11 downto 0) or (11 downto 0 => counted(12));
       state.index_lost  <= mend or (state.index_lost and not clear_faults);
       state.index_wrong <= wrong or (state.index_wrong and not clear_faults);
 

@@ -83,7 +83,7 @@ begin
 
   -- A step of the encoder, else one count of the correction
   stepped <= step_up or step_down;
-  mend    <= (sample or state.moving) and not stepped when state.pending /= 0 else '0';
+  mend    <= (sample or state.moving) and not stepped and not correct when state.pending /= 0 else '0';
   up      <= step_up or (mend and not state.pending(19));
   down    <= not up and (step_down or mend);
 
@@ -95,7 +95,7 @@ begin
 
   process (clk)
     variable code : signed(POSITION_BITS - 1 downto 0);
-    variable owed : signed(20 downto 0);
+    variable owed : signed(19 downto 0);
   begin
     if rising_edge(clk) then
       -- Stage 1: count, rest and the carry to the code
@@ -124,16 +124,12 @@ begin
         code_theta <= state.code;
       end if;
 
-      -- The correction; a new one and a count of the last one may come at the same clock
-      owed := resize(state.pending, 21);
-      if mend = '1' then
-        owed := owed + signed'(not state.pending(19) & '1');
+      -- The correction: a new one, or a count of the last one
+      owed := correction when correct = '1' else resize(signed'(not state.pending(19) & '1'), 20);
+      if (correct or mend) = '1' then
+        state.pending <= saturate(resize(state.pending, 21) + owed, 20);
       end if;
-      if correct = '1' then
-        owed := resize(saturate(resize(owed, 22) + correction, 20), 21);
-      end if;
-      state.pending <= owed(19 downto 0);
-      state.moving  <= (correct and fast) or (state.moving and (or state.pending));
+      state.moving <= (correct and fast) or (state.moving and (or state.pending));
 
       -- A new setting
       restarted       <= restart;

@@ -70,7 +70,7 @@ PROOFS = (
         "the count moves by one at most: by a step, which is never lost, or by a correction at a sample or on the way",
         "turn_counter",
         ("NO_JUMP",),
-        Fault("correction at every clock", COUNTER, "(sample or state.moving) and not stepped", "not stepped"),
+        Fault("correction at every clock", COUNTER, "(sample or state.moving) and not stepped and", "not stepped and"),
         Fault("sample hides a step", COUNTER, "up      <= step_up or (mend",
               "up      <= (step_up and not sample) or (mend"),
         assumed="counts, code_step and code_rest possible and constant",
