@@ -94,9 +94,9 @@ begin
         moved := (others => '0');
       end if;
       if (edge and state.seen and (step_up xnor state.forward)) = '1' then
-        if step_up = '1' and moved /= MOVED_MAX then
+        if step_up = '1' and (state.moved /= MOVED_MAX or take = '1') then
           moved := moved + 1;
-        elsif step_up = '0' and moved /= -MOVED_MAX then
+        elsif step_up = '0' and (state.moved /= -MOVED_MAX or take = '1') then
           moved := moved - 1;
         end if;
       end if;
