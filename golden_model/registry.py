@@ -1,6 +1,6 @@
 """Every block of the core, one line each: add yours here and the bench finds it."""
 
-from fluxproof.golden_model.common import multiply_add, packet_fifo, reciprocal, sqrt
+from fluxproof.golden_model.common import input_filter, multiply_add, packet_fifo, reciprocal, sqrt
 from fluxproof.golden_model.control import (
     chord_speed,
     current_pi,
@@ -18,6 +18,17 @@ from fluxproof.golden_model.converters import (
     spi_words,
     third_current,
     xadc_reader,
+from fluxproof.golden_model.encoders import (
+    biss_master,
+    edge_timer,
+    endat_master,
+    hall_decoder,
+    incremental_encoder,
+    index_check,
+    position_bridge,
+    quadrature_decoder,
+    ssi_master,
+    turn_counter,
 )
 from fluxproof.golden_model.estimators import (
     applied_voltage,
@@ -120,5 +131,16 @@ BLOCKS = {
         sinc_overcurrent,
         third_current,
         xadc_reader,
+        input_filter,
+        quadrature_decoder,
+        turn_counter,
+        index_check,
+        edge_timer,
+        hall_decoder,
+        incremental_encoder,
+        ssi_master,
+        biss_master,
+        endat_master,
+        position_bridge,
     )
 }
