@@ -18,6 +18,7 @@ from fluxproof.golden_model.converters import (
     spi_words,
     third_current,
     xadc_reader,
+)
 from fluxproof.golden_model.encoders import (
     biss_master,
     edge_timer,
