@@ -24,6 +24,7 @@ from scripts.mutate.table import reason
 
 SEED = 1
 ENOUGH = 0.995  # of those not proved equivalent
+COUNTED = ("mutants", "killed", "equivalent", "survivors", "without_reason")
 
 
 def block_of(verdicts: Verdicts) -> str:
@@ -32,17 +33,16 @@ def block_of(verdicts: Verdicts) -> str:
 
 
 def summary(found: Sequence[Verdicts], seed: int, seconds: float) -> dict:
-    """The content of result.json."""
+    """The content of result.json; ``seconds``: by the clock on the wall."""
     per_block: dict[str, dict[str, int]] = {}
     survivors = []
     for verdicts in sorted(found, key=lambda v: v.name):
         block = block_of(verdicts)
-        row = per_block.setdefault(block, dict.fromkeys(("mutants", "killed", "equivalent", "survivors"), 0))
+        row = per_block.setdefault(block, dict.fromkeys(COUNTED, 0))
         row["mutants"] += len(verdicts.outcomes)
         row["killed"] += verdicts.count(KILLED)
         row["equivalent"] += verdicts.count(EQUIVALENT)
-        row["survivors"] += verdicts.count(DIFFERENT) + verdicts.count(UNKNOWN)
-        survivors += [
+        left = [
             {
                 "block": block,
                 "mutation": mutation,
@@ -53,8 +53,13 @@ def summary(found: Sequence[Verdicts], seed: int, seconds: float) -> dict:
             for mutation, outcome in verdicts.outcomes
             if outcome in (DIFFERENT, UNKNOWN)
         ]
+        row["survivors"] += len(left)
+        row["without_reason"] += sum(not survivor["reason"] for survivor in left)
+        survivors += left
     totals = {name: sum(row[name] for row in per_block.values()) for name in ("mutants", "killed", "equivalent")}
-    return totals | {"survivors": survivors, "per_block": per_block, "seed": seed, "seconds": round(seconds, 1)}
+    spent = sum(sum(verdicts.seconds.values()) for verdicts in found)
+    totals |= {"seed": seed, "seconds": round(seconds, 1), "processor_seconds": round(spent, 1)}
+    return totals | {"survivors": survivors, "per_block": per_block}
 
 
 def share(result: dict) -> float:
@@ -71,23 +76,29 @@ def line_of(verdicts: Verdicts) -> str:
 
 def main() -> int:
     parser = argparse.ArgumentParser(prog="mutate", description=__doc__.splitlines()[0])
-    parser.add_argument("--only", default="", metavar="BLOCK", help="this block alone; fluxproof is the core's wiring")
+    parser.add_argument("--only", default="", metavar="BLOCKS", help="these blocks alone, with commas between; fluxproof is the core's wiring")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="subjects in parallel")
     parser.add_argument("--seed", type=int, default=SEED, help="of the draw")
     arguments = parser.parse_args()
-    chosen: list[Subject | Core] = [s for s in (Core(), *subjects()) if arguments.only in ("", s.of)]
-    if not chosen:
-        parser.error(f"--only {arguments.only}: no such block")
+    only = set(filter(None, arguments.only.split(",")))
+    chosen: list[Subject | Core] = [s for s in (Core(), *subjects()) if not only or s.of in only]
+    if wrong := only - {s.of for s in chosen}:
+        parser.error(f"--only: no block {', '.join(sorted(wrong))}")
     try:
         find_ghdl()
     except NoUsableGhdl as reason_why:
         parser.exit(1, f"mutate: {reason_why}\n")
-    began, found = time.monotonic(), []
+    began, found, failed = time.monotonic(), [], {}
     with ProcessPoolExecutor(arguments.jobs) as pool:
-        running = [pool.submit(judge, subject, arguments.seed) for subject in chosen]
+        running = {pool.submit(judge, subject, arguments.seed): subject.name for subject in chosen}
         for done, future in enumerate(as_completed(running), 1):
-            found.append(future.result())
-            print(f"{done:3d}/{len(running)} {line_of(found[-1])}", flush=True)
+            try:
+                found.append(future.result())
+                line = line_of(found[-1])
+            except Exception as why:  # the others are judged all the same; the run fails
+                failed[running[future]] = f"{type(why).__name__}: {str(why)[-1000:]}"
+                line = f"{running[future]}: FAILED, {failed[running[future]]}"
+            print(f"{done:3d}/{len(running)} {line}", flush=True)
     unnoticed = []
     if not arguments.only:
         with ThreadPoolExecutor(arguments.jobs) as pool:
@@ -95,16 +106,19 @@ def main() -> int:
                 print(f"{'noticed ' if by else 'SURVIVED'} rtl/{defect.file}: {defect.says}", flush=True)
                 unnoticed += [] if by else [defect.says]
     result = summary(found, arguments.seed, time.monotonic() - began)
+    result["failed"] = failed
     result["defects"] = {"planted": 0 if arguments.only else len(defects.DEFECTS), "unnoticed": unnoticed}
     write_json(FOLDER / ("some.json" if arguments.only else "result.json"), result)
     for survivor in result["survivors"]:
         print(f"left: {survivor['subject']}: {survivor['mutation']}: {survivor['reason'] or 'no reason: a hole'}")
     print(
         f"{result['killed']} of {result['mutants']} mutants noticed, {result['equivalent']} proved equivalent, "
-        f"{len(result['survivors'])} left: {100 * share(result):.2f} % of those that can matter, {result['seconds']} s"
+        f"{len(result['survivors'])} left: {100 * share(result):.2f} % of those that can matter; {result['seconds']} s, {result['processor_seconds']} s of processor time"
     )
+    for name, why in failed.items():
+        print(f"not judged: {name}: {why}")
     holes = [survivor for survivor in result["survivors"] if not survivor["reason"]]
-    return 1 if share(result) < ENOUGH or holes or unnoticed else 0
+    return 1 if share(result) < ENOUGH or holes or unnoticed or failed else 0
 
 
 if __name__ == "__main__":

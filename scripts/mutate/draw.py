@@ -24,6 +24,7 @@ PREPARE += "; opt_dff -nodffe -nosdff"
 _DETAIL = re.compile(r" -(?:wire|wirebit|src) \S+")
 # What a cell does not calculate with: a mutated clock is no fault of the logic.
 _PLACE = re.compile(r"mutate -mode (\w+) -module \S+ -cell (\S+) -port \\?(\S+) -portbit (\d+)")
+_WRAPPED = re.compile(r"^\s*(\w+) inside \(", re.MULTILINE)  # cosim/flat.py
 _CLOCKS = re.compile(r" -port (?:CLK|RD_CLK|WR_CLK) ")
 
 
@@ -50,6 +51,10 @@ def prepare(folder: Path, verilog: str, top: str, flat: bool = False) -> int:
     """
     write_text(folder / "design.v", verilog)
     lines = ["read_verilog design.v", f"hierarchy -top {top}", "proc", *["flatten -noscopeinfo"] * flat]
+    if inner := _WRAPPED.search(verilog):
+        # The top with plain ports is wires alone: the entity with record ports is dissolved in it, no other.
+        lines += ["setattr -mod -set keep_hierarchy 1 *", f"setattr -mod -unset keep_hierarchy {inner[1]}"]
+        lines += ["flatten -noscopeinfo", "setattr -mod -unset keep_hierarchy *"]
     lines += [PREPARE, "opt_clean", "write_rtlil prepared.il"]
     script(folder, "prepare.ys", [*lines, "write_json prepared.json"])
     return len(netlist(folder, top)["cells"])

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
+import resource
 import shutil
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
+from fluxproof.files import write_text
 from scripts.mutate import draw, equivalent, harness
 from scripts.mutate.contract import miter
 from scripts.mutate.subject import Core, Subject
@@ -22,7 +24,7 @@ class WrongHarness(RuntimeError):
 
 @dataclass
 class Verdicts:
-    """What became of each mutant of a subject, and the seconds of each step."""
+    """What became of each mutant of a subject, and the processor seconds of each step."""
 
     name: str
     cells: int = 0
@@ -33,14 +35,20 @@ class Verdicts:
         return sum(found == outcome for _, found in self.outcomes)
 
 
+def processor_s() -> float:
+    """Processor time of this process and of the tools that it has run, in seconds."""
+    spent = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+    return sum(usage.ru_utime + usage.ru_stime for usage in spent)
+
+
 class Watch:
-    """Seconds since the last call, by name."""
+    """Processor seconds since the last call, by name."""
 
     def __init__(self):
-        self.seconds, self.last = {}, time.monotonic()
+        self.seconds, self.last = {}, processor_s()
 
     def __call__(self, name: str) -> None:
-        now = time.monotonic()
+        now = processor_s()
         self.seconds[name], self.last = round(now - self.last, 2), now
 
 
@@ -69,9 +77,10 @@ def judge(subject: Subject | Core, seed: int, trials: Sequence[harness.Trial] = 
     alive = [m for m in mutants if all(bench.first_difference(m) is None for bench in benches)]
     outcome |= dict.fromkeys(alive, equivalent.UNKNOWN)
     watch("run")
-    if alive and isinstance(subject, Subject):  # the whole core is too large for a proof
+    if PROOF_S and alive and isinstance(subject, Subject):  # the whole core is too large for a proof
         circuit = partial(miter, subject.block, subject.config, "")
         outcome |= equivalent.prove(drawn, alive, circuit, PROOF_S)
     watch("prove")
     outcomes = [(drawn.mutations[mutant - 1], outcome[mutant]) for mutant in mutants]
+    write_text(folder / "outcomes.json", json.dumps({"outcomes": outcomes, "seconds": watch.seconds}, indent=1))
     return Verdicts(subject.name, cells, outcomes, watch.seconds)

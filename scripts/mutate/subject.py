@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fluxproof.checkout import BUILD, ROOT
+from fluxproof.cosim.flat import FLAT, flat_top
 from fluxproof.cosim.sources import rtl_sources
-from fluxproof.cosim.verilog import TOP, synthesize, top_ports
+from fluxproof.cosim.verilog import TOP, sources_of, synthesize, top_ports
 from fluxproof.golden_model.block import Block
 from fluxproof.golden_model.registry import BLOCKS
 from scripts.mutate import core
@@ -45,7 +46,7 @@ class Subject:
     @property
     def top(self) -> str:
         """The entity that is converted; the ports of a cell get their widths from a top in tb/."""
-        return self.block.name if self.block.strobes else f"{self.block.name}_tb"
+        return flat_top(self.block.name)[0] if self.block.strobes else f"{self.block.name}_tb"
 
     @property
     def flat(self) -> bool:
@@ -54,9 +55,10 @@ class Subject:
 
     def verilog(self) -> str:
         """The converted VHDL."""
-        sources = rtl_sources()
-        if not self.block.strobes:
-            sources = [*sources, ROOT / "tb" / f"{self.top}.vhd"]
+        if self.block.strobes:
+            sources = sources_of(self.top)
+        else:
+            sources = [*rtl_sources(), ROOT / "tb" / f"{self.top}.vhd"]
         return synthesize(sources, self.top, self.config)
 
     def trials(self) -> list[Trial]:
@@ -73,7 +75,7 @@ class Subject:
 class Core:
     """The core's own cells and connections."""
 
-    of: str = TOP
+    of: str = TOP.removesuffix(FLAT)
     flat: bool = False
 
     @property
@@ -82,7 +84,7 @@ class Core:
 
     @property
     def top(self) -> str:
-        return self.of
+        return TOP
 
     @property
     def folder(self) -> Path:
@@ -90,7 +92,7 @@ class Core:
 
     def verilog(self) -> str:
         """The converted VHDL."""
-        return synthesize(rtl_sources(), self.top, core.config())
+        return synthesize(sources_of(self.top), self.top, core.config())
 
     def count(self, cells: int) -> int:
         return core.MUTANTS
