@@ -19,7 +19,8 @@ from scripts.synth.yosys import run
 TOP = "mutants"  # the module with all mutations
 CONTROL = "mutant"  # the input that selects a mutation; 0: none
 # Memories become one cell each; cells are cut so that none has an output bit that nothing reads.
-PREPARE = "proc; memory_collect; opt_expr -fine; wreduce; opt_expr -fine; opt_clean; splitnets -driver; splitcells"
+# What the VHDL leaves open ('X') is not drawn.
+PREPARE = "proc; memory_collect; opt_expr -mux_undef -fine; wreduce; opt_expr -fine; opt_clean; splitnets -driver; splitcells"
 PREPARE += "; opt_dff -nodffe -nosdff"
 _DETAIL = re.compile(r" -(?:wire|wirebit|src) \S+")
 # What a cell does not calculate with: a mutated clock is no fault of the logic.

