@@ -76,7 +76,8 @@ def line_of(verdicts: Verdicts) -> str:
 
 def main() -> int:
     parser = argparse.ArgumentParser(prog="mutate", description=__doc__.splitlines()[0])
-    parser.add_argument("--only", default="", metavar="BLOCKS", help="these blocks alone, with commas between; fluxproof is the core's wiring")
+    only_says = "these blocks alone, with commas between; fluxproof is the core's wiring"
+    parser.add_argument("--only", default="", metavar="BLOCKS", help=only_says)
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="subjects in parallel")
     parser.add_argument("--seed", type=int, default=SEED, help="of the draw")
     arguments = parser.parse_args()
@@ -113,7 +114,8 @@ def main() -> int:
         print(f"left: {survivor['subject']}: {survivor['mutation']}: {survivor['reason'] or 'no reason: a hole'}")
     print(
         f"{result['killed']} of {result['mutants']} mutants noticed, {result['equivalent']} proved equivalent, "
-        f"{len(result['survivors'])} left: {100 * share(result):.2f} % of those that can matter; {result['seconds']} s, {result['processor_seconds']} s of processor time"
+        f"{len(result['survivors'])} left: {100 * share(result):.2f} % of those that can matter; "
+        f"{result['seconds']} s, {result['processor_seconds']} s of processor time"
     )
     for name, why in failed.items():
         print(f"not judged: {name}: {why}")

@@ -20,8 +20,8 @@ TOP = "mutants"  # the module with all mutations
 CONTROL = "mutant"  # the input that selects a mutation; 0: none
 # Memories become one cell each; cells are cut so that none has an output bit that nothing reads.
 # What the VHDL leaves open ('X') is not drawn.
-PREPARE = "proc; memory_collect; opt_expr -mux_undef -fine; wreduce; opt_expr -fine; opt_clean; splitnets -driver; splitcells"
-PREPARE += "; opt_dff -nodffe -nosdff"
+PREPARE = "proc; memory_collect; opt_expr -mux_undef -fine; wreduce; opt_expr -fine; opt_clean"
+PREPARE += "; splitnets -driver; splitcells; opt_dff -nodffe -nosdff"
 _DETAIL = re.compile(r" -(?:wire|wirebit|src) \S+")
 # What a cell does not calculate with: a mutated clock is no fault of the logic.
 _PLACE = re.compile(r"mutate -mode (\w+) -module \S+ -cell (\S+) -port \\?(\S+) -portbit (\d+)")

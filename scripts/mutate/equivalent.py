@@ -13,6 +13,7 @@ import os
 import subprocess
 import time
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 
 from fluxproof.files import write_text
@@ -77,7 +78,8 @@ def prove(drawn: Drawn, mutants: Sequence[int], miter: Miter, seconds: int) -> d
     graphs = each(folder, mutants, "aig", graph, "graphs.ys", "script graphs.ys", seconds)
     merged = each(folder, graphs, "less", merge, "merge.abc", CARRY.format("merge.abc"), seconds)
     open_still = [m for m in merged if not never_rises(folder / f"{m}.less")]
-    each(folder, open_still, "status", lambda m: search(folder, m, seconds), "search.abc", CARRY.format("search.abc"), seconds)
+    tried = partial(search, folder, seconds=seconds)
+    each(folder, open_still, "status", tried, "search.abc", CARRY.format("search.abc"), seconds)
     found = dict.fromkeys(mutants, UNKNOWN) | dict.fromkeys(merged, EQUIVALENT)
     return found | {m: verdict(read(folder / f"{m}.status")) for m in open_still}
 

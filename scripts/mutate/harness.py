@@ -57,7 +57,9 @@ def block_trial(block: Block, config, seed: int) -> Trial:
     checks, still = [], []
     for at, (clock, rule) in enumerate(zip(clocks, due(block, clocks), strict=True)):
         driven = dict(clock.writes)
-        driven |= {name: getattr(clock, name) for name in ("rst", "in_valid") if name in number}
+        # A clocked block may have an input of its own that is called in_valid.
+        driven |= {"rst": clock.rst} if block.strobes else {}
+        driven |= {"in_valid": clock.in_valid} if block.strobes and not block.clocked else {}
         writes += [(at, number[name], value) for name, value in driven.items()]
         checks += [(at, number[name], value) for name, value in (*rule.strobes.items(), *rule.outputs)]
         still += [at] * rule.still

@@ -14,7 +14,7 @@ from scripts.mutate import draw, equivalent, harness
 from scripts.mutate.contract import miter
 from scripts.mutate.subject import Core, Subject
 
-PROOF_S = 5  # of processor time for one step of the proof of one mutant
+PROOF_S = 2  # of processor time for one step of the proof of one mutant
 KILLED = "killed"
 
 
