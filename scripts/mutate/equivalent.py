@@ -29,6 +29,7 @@ REDUCE = "proc; flatten -noscopeinfo; opt -share_all -noff"
 Miter = Callable[[Sequence[tuple[int, int, int]]], str]
 EQUIVALENT, DIFFERENT, UNKNOWN = "equivalent", "different", "unknown"
 CARRY = "read_verilog carrier.v; prep -top m; techmap; abc -script {}"
+SEARCHED_S = 12  # processor time for the searches of one subject
 START = 5  # seconds more for the first of a run, in which Yosys starts
 TICKS = os.sysconf("SC_CLK_TCK")
 
@@ -77,10 +78,12 @@ def prove(drawn: Drawn, mutants: Sequence[int], miter: Miter, seconds: int) -> d
     write_text(folder / "carrier.v", CARRIER)
     graphs = each(folder, mutants, "aig", graph, "graphs.ys", "script graphs.ys", seconds)
     merged = each(folder, graphs, "less", merge, "merge.abc", CARRY.format("merge.abc"), seconds)
-    open_still = [m for m in merged if not never_rises(folder / f"{m}.less")]
+    equal = [m for m in merged if never_rises(folder / f"{m}.less")]
+    open_still = [m for m in merged if m not in equal]
     tried = partial(search, folder, seconds=seconds)
+    open_still = open_still[: SEARCHED_S // seconds]  # a block whose bench is blind would take an hour
     each(folder, open_still, "status", tried, "search.abc", CARRY.format("search.abc"), seconds)
-    found = dict.fromkeys(mutants, UNKNOWN) | dict.fromkeys(merged, EQUIVALENT)
+    found = dict.fromkeys(mutants, UNKNOWN) | dict.fromkeys(equal, EQUIVALENT)
     return found | {m: verdict(read(folder / f"{m}.status")) for m in open_still}
 
 
