@@ -90,7 +90,7 @@ def bound(_v, _state):
 
 
 def stimuli(rng, _config):
-    """Integrals driven into both limits and back, held, with gains at their ends; every mode in turn."""
+    """Integrals driven into both limits and back, held, with gains at their ends; every mode in turn; small errors."""
     base = {"flux_mode": PROPOSED, "delta_held": 0, "flux_kp": 8000, "flux_ki": 5000, "delta_max": 8000}
     rows = []
     for delta in (1 << 20, -(1 << 21), 3, -3, FLUX.hi, FLUX.lo, 0):
@@ -99,6 +99,11 @@ def stimuli(rng, _config):
         rows += [{**rows[k], **change} for k in (0, 8, 20)]
     for mode in (EARLIER, PROPOSED, 0, PROPOSED, 1, EARLIER):
         rows += [{**rows[int(rng.integers(20))], "flux_mode": mode} for _ in range(3)]
+    for k in range(12):  # between the limits, where every bit of the integrals counts
+        gains = {"flux_kp": int(rng.integers(3000)), "flux_ki": int(rng.integers(1, 1 << (k + 4))), "delta_max": 65535}
+        for _ in range(24):
+            errors = {f"delta_lambda_{x}": int(rng.integers(-(1 << 16), 1 << 16)) for x in "dq"}
+            rows.append({**base, **gains, **errors, "delta_held": int(rng.integers(4) == 0)})
     return rows
 
 

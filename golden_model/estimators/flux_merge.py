@@ -152,6 +152,14 @@ def stimuli(rng, _config):
         pushed = {f"{k}_{of}": end for k in ("lambda_c", "u_applied") for of in ("alpha", "beta")}
         rows += [{**nominal, **pushed, "omega_0": OMEGA_0.hi, "i_alpha": 0, "i_beta": 0} for _ in range(40)]
     rows += [{**rows[-1], "run": 0}, rows[-1], {**rows[-1], "voltage_known": 0}, rows[-1], rows[0]]
+    for _ in range(12):  # both axes between the limits, where every bit of the state counts
+        gains = {"omega_0": int(rng.integers(256, OMEGA_0.hi)), "xi": int(rng.integers(4096, 32769))}
+        for _ in range(24):
+            size = 1 << int(rng.integers(8, 23))
+            names = [f"{k}_{axis}" for k in ("lambda_c", "u_applied") for axis in ("alpha", "beta")]
+            signals = {name: int(rng.integers(-size, size)) for name in names}
+            signals |= {f"i_{axis}": int(rng.integers(-99999, 99999)) for axis in ("alpha", "beta")}
+            rows.append({**nominal, **gains, **signals})
     return rows
 
 

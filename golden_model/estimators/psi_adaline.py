@@ -115,6 +115,15 @@ def stimuli(rng, _config):
         for i_d in (0, 3000, -3000):  # to the end of psi_m, and back
             end = {**rows[0], "eta_psi": ETA_PSI.hi, "omega_chord": 32768, "i_d": i_d}
             rows += [{**end, "u_q": u_q}] * 25 + [{**end, "u_q": 0}]
+    for k in range(12):  # between the limits, where every bit of the state counts
+        settings = {"eta_psi": int(rng.integers(ETA_PSI.hi)), "omega_psi_min": int(rng.integers(1 << (k + 4)))}
+        settings |= {"l_d": int(rng.integers(1 << 20)), "r": int(rng.integers(1 << 20))}
+        for _ in range(24):
+            omega, load = int(rng.integers(-131072, 131072)), int(rng.integers(1, 20000))
+            signals = {"omega_chord": omega, "v_leg": int(rng.integers(9000)), "d_q": int(rng.integers(-80000, 80000))}
+            signals |= {"i_d": int(rng.integers(-load, load)), "i_q": int(rng.integers(-load, load))}
+            u_q = omega * 24000 // 65536 + int(rng.integers(-load, load))
+            rows.append({**rows[0], **settings, **signals, "u_q": min(max(u_q, PU.lo), PU.hi)})
     return rows
 
 

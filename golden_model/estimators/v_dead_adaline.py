@@ -183,6 +183,13 @@ def stimuli(rng, _config):
     for k_lp, u_pi_d, d_d, run in 3 * past_its_end:  # three times: a reset may occur between
         end = {**calm, **gains, "eta_v": ETA_V_MAX, "run": run}
         rows.append({**end, "k_lp": k_lp, "u_pi_d": u_pi_d, "d_d": d_d})  # shows one sample later
+    for k in range(12):  # between the limits, where every bit of the state counts
+        free = {"k_lp": int(rng.integers(1 << (k + 9))), "eta_v": int(rng.integers(ETA_V_MAX)), "gamma": GAMMA.hi}
+        free |= {"zeta": int(rng.integers(ZETA.hi)), "v_thr": int(rng.integers(1 << k)), "v_comp_max": V_LEVEL.hi}
+        for _ in range(24):
+            saw, size = int(rng.integers(-80000, 80000)), int(rng.integers(1, 1 << 15))
+            currents = {"i_d": int(rng.integers(-9000, 0)), "i_q": int(rng.integers(-9000, 20000))}
+            rows.append({**calm, **free, **currents, "d_d": saw, "u_pi_d": saw // 8 + int(rng.integers(-size, size))})
     return rows
 
 

@@ -22,7 +22,8 @@ from scripts.prove.abc_engine import CARRIER
 from scripts.synth.yosys import tool
 
 FLAT = "flatten -noscopeinfo; memory_map; opt_clean; opt_expr; opt_clean; setundef -zero"
-TO_GATES = "techmap; opt -fast; dffunmap; setundef -undriven -zero; aigmap; opt_clean"
+# Registers start at 0 in both; what they may hold when a sample comes is what a reset leaves there, at any time.
+TO_GATES = "setundef -init -zero; techmap; opt -fast; dffunmap; setundef -undriven -zero; aigmap; opt_clean"
 # Two cells with the same inputs are one, registers too: what the mutation does not reach is there once.
 REDUCE = "proc; flatten -noscopeinfo; opt -share_all -noff"
 # Widths of the multipliers, operands and product -> the Verilog of `miter`.
