@@ -99,6 +99,13 @@ def stimuli(rng, _config):
         rows += [{**rows[k], **change} for k in (0, 8, 20)]
     for mode in (EARLIER, PROPOSED, 0, PROPOSED, 1, EARLIER):
         rows += [{**rows[int(rng.integers(20))], "flux_mode": mode} for _ in range(3)]
+    limit = 1 << SHIFT_LIMIT
+    for off in (0, *(sign << k for k in range(SHIFT_LIMIT) for sign in (1, -1))):  # the sums at a limit and beside it
+        for end in (limit, -limit):
+            sums = {"delta_lambda_d": end + off, "delta_lambda_q": off - end, "delta_max": 1}
+            rows.append({**base, "delta_max": 0})  # clears the integrals
+            rows.append({**base, **sums, "flux_kp": 1 << DROP_P, "flux_ki": 0})
+            rows.append({**base, **sums, "flux_kp": 0, "flux_ki": 1 << DROP_I})
     for k in range(12):  # between the limits, where every bit of the integrals counts
         gains = {"flux_kp": int(rng.integers(3000)), "flux_ki": int(rng.integers(1, 1 << (k + 4))), "delta_max": 65535}
         for _ in range(24):
