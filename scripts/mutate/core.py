@@ -1,8 +1,9 @@
 """The wiring of the whole core: mutants of the top's own cells and connections, judged by the golden core.
 
-Three runs, each clock of them compared: every operating condition in 50 ms in closed loop (cosim/scenarios.py,
-`compressed`), the tour through the faults (studies/faults), and samples with any settings.  Inputs and expected outputs
-come from the golden core alone, by the names of the ports.
+Four runs, each clock of them compared: every operating condition in 50 ms in closed loop (cosim/scenarios.py,
+`compressed`), the same with bits of some settings inverted from time to time, the tour through the faults
+(studies/faults), and samples with any settings.  Inputs and expected outputs come from the golden core alone, by the
+names of the ports.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ CARRIER_HALF = 128
 IN_RESET = 4
 MUTANTS = 240
 SEED, SETTINGS = 3, 600  # of any_settings
+INVERTED = 12  # settings of which a bit is inverted at a time
 BITS = {"ADC_BITS": 16, "POSITION_BITS": 16}
 
 
@@ -38,6 +40,7 @@ class Recorder(GoldenClock):
         self.writes: list[tuple[int, str, int]] = []
         self.checks: list[tuple[int, str, int]] = []
         self.driven: dict[str, int] = {}
+        self.held: dict[str, int] = {}  # pins that stay as they are here
         self.entered: int | None = None  # clock of the last sample, until its values are compared
         self.all_entered: set[int] = set()
 
@@ -48,7 +51,7 @@ class Recorder(GoldenClock):
         self.writes += [(at, name, value) for name, value in new.items()]
 
     def advance(self, clocks, sample=None, until_trigger=False, **pins):
-        begin, count = self.clock, len(self.samples)
+        begin, count, pins = self.clock, len(self.samples), self.held | pins
         self.drive(begin, self.registers._asdict() | pins)
         due = self.entered is not None and begin - self.entered >= clocked.INTERVAL
         if due:
@@ -82,17 +85,34 @@ class Recorder(GoldenClock):
         return Trial(ports, IN_RESET, self.clock, *tables, np.empty(0, np.int64), np.empty(0, np.int64))
 
 
-def every_event() -> Recorder:
-    """The scenario `compressed` in closed loop."""
+def every_event(inverted: int = 0) -> Recorder:
+    """The scenario `compressed` in closed loop.
+
+    inverted: in every second period a bit is inverted in each of so many settings, where the range allows it.
+    """
     run = closed_loop(str(DRIVES / "paper001.toml"), CARRIER_HALF, "compressed")
     golden = GoldenPeriods(run.registers)
     golden.core = Recorder(run.registers.values, run.registers.config)
-    plant, scenario = PlantPeriods(run.drive, run.scenario), run.scenario
+    plant, scenario, settings = PlantPeriods(run.drive, run.scenario), run.scenario, golden.core.registers
+    rng = np.random.default_rng(SEED)
     golden.run(None, int(scenario.enable[0]))
     for k in range(len(scenario)):
+        if inverted:
+            golden.core.registers = beside(settings, inverted * (k % 2), rng)
+            golden.core.held = {"clear_trip": int(rng.integers(4) == 0)}
         period = golden.run(plant.inputs(k), int(scenario.enable[k]))
         plant.advance(k, period.edge_clocks * (plant.period_s / period.clocks), period.gate_words)
     return golden.core
+
+
+def beside(settings, count: int, rng: np.random.Generator):
+    """The settings with one bit inverted in ``count`` of them, drawn at random."""
+    changed = {}
+    for name in rng.choice(list(REGISTERS), count, replace=False):
+        port, value = REGISTERS[name], getattr(settings, name)
+        other = value ^ (1 << int(rng.integers(port.fmt.width - bool(port.fmt.signed))))
+        changed[name] = other if port.low <= other <= port.high else value
+    return settings._replace(**changed)
 
 
 def fault_tour() -> Recorder:

@@ -100,7 +100,8 @@ class Core:
     def trials(self) -> list[Trial]:
         """Its closed loops."""
         ports = top_ports(self.folder / "design.v")
-        return [recorder.trial(ports) for recorder in (core.every_event(), core.fault_tour(), core.any_settings())]
+        recorders = (core.every_event(), core.fault_tour(), core.any_settings(), core.every_event(core.INVERTED))
+        return [recorder.trial(ports) for recorder in recorders]
 
 
 def subjects(only: str = "") -> list[Subject]:

@@ -9,7 +9,11 @@ from __future__ import annotations
 import re
 
 # (block, pattern of the mutation, reason)
-REASONS: tuple[tuple[str, str, str], ...] = ()
+_HALF = "the judged core has a CARRIER_HALF of 128, so these bits of carrier and compare values are always 0"
+REASONS: tuple[tuple[str, str, str], ...] = (
+    ("fluxproof", r"-mode const0 .*-port (compare_[abc]|carrier) -portbit ([89]|1\d)$", _HALF),
+    ("fluxproof", r"-mode cnot1 .*-port (compare_[abc]|carrier) -portbit \d+ -ctrlbit ([89]|1\d)$", _HALF),
+)
 
 
 def reason(block: str, mutation: str) -> str:
