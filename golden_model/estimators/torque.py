@@ -41,7 +41,7 @@ BLOCK = Block(
         Port("i_q", PU, doc="current, q axis"),
     ),
     outputs=(Port("torque", PU, doc="estimated torque"),),
-    latency=7,
+    latency=6,
     interval=4,
     constants={"DROP": DROP},
     reference=reference,

@@ -44,12 +44,12 @@ architecture rtl of current_directions is
   signal turn_3     : signed(PU_W - 1 downto 0);
   signal x_6        : signed(PU_W - 1 downto 0);
   signal y_6        : signed(PU_W - 1 downto 0);
-  signal across_9   : signed(PU_W downto 0);
+  signal across_9   : signed(PU_W + 2 downto 0);
   signal twice_a_10 : signed(PU_W - 1 downto 0);
   signal twice_b_10 : signed(PU_W - 1 downto 0);
   signal twice_c_10 : signed(PU_W - 1 downto 0);
   signal twice_11   : signed(PU_W - 1 downto 0);   -- of a, b, c
-  signal scaled_14  : signed(PU_W + 11 downto 0);  -- of a, b, c
+  signal scaled_14  : signed(PU_W + 12 downto 0);  -- of a, b, c
   signal s_a        : signed(PU_W - 1 downto 0);   -- the three at clock 17
   signal s_b        : signed(PU_W - 1 downto 0);
   signal s_c        : signed(PU_W - 1 downto 0);
