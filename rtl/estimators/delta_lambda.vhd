@@ -117,7 +117,7 @@ begin
       if valid(8) = '1' then
         limited <= past_7 or past_8;
       end if;
-      factor_7 <= -factor when valid(7) = '1' else factor;
+      factor_7 <= negated(factor, valid(7));
 
       -- Stages 11, 12: delta of d waits for that of q;  the state of the next sample
       delta_11 <= delta_10;

@@ -96,10 +96,7 @@ begin
 
       -- Stage 24: factor = prod, rounded, with the sign of omega_me
       if valid(23) = '1' then
-        factor <= rounded_23;
-        if omega_me < 0 then
-          factor <= -rounded_23;
-        end if;
+        factor <= negated(rounded_23, omega_me(omega_me'high));
       end if;
 
       if rst = '1' then

@@ -625,7 +625,7 @@ package fluxproof_pkg is
   constant FLUX_COMPENSATION_FORGET : natural := 8;
 
   -- torque: 001, eq. (4)
-  constant TORQUE_LATENCY : positive := 6;
+  constant TORQUE_LATENCY : positive := 5;
   constant TORQUE_DROP : natural := 16;
 
   -- flux_monitor: none: protection and diagnosis of the drive
