@@ -7,7 +7,8 @@
 -- them.
 -- Formats: PU in and out; k_ahead U(1,16), sqrt(3) U(1,16), k_sign U(12,12); products exact.
 -- Latency: 23.  Interval: 23.
--- Rounding: every product half up.  turn, x, y and twice each phase current saturate.
+-- Rounding: every product half up.  turn, x, y and twice each phase current saturate; the other sums have the bits that
+-- they need.
 
 library ieee;
 use ieee.std_logic_1164.all;

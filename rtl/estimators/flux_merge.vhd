@@ -42,6 +42,7 @@ end entity flux_merge;
 architecture rtl of flux_merge is
   constant LATENCY : positive := FLUX_MERGE_LATENCY;
   constant TURN    : positive := LATENCY / 2;  -- clocks of an axis
+  constant Y_W     : positive := FLUX_MERGE_Y_W;
   constant X_W     : positive := FLUX_MERGE_X_W;
   constant TOTAL_W : positive := FLUX_STATE_W + 3;
 
@@ -77,8 +78,7 @@ architecture rtl of flux_merge is
   signal diff_7        : signed(FLUX_W downto 0);
   signal start_7       : signed(TOTAL_W - 2 downto 0);
   signal eps_7         : signed(FLUX_W - 1 downto 0);
-  signal scaled_10     : signed(FLUX_MERGE_Y_W + 1 downto 0);
-  signal y_10          : signed(FLUX_MERGE_Y_W - 1 downto 0);
+  signal y_10          : signed(Y_W + 1 downto 0);
   signal x_13          : signed(X_W - 1 downto 0);
   signal x_limited     : std_logic;
   signal corrected_13  : signed(TOTAL_W - 1 downto 0);
@@ -104,23 +104,21 @@ begin
     generic map (DROP => FLUX_MERGE_DROP_U)
     port map (clk => clk, a => u_1, b => by_t_s, c => NOTHING, y => gained_4, limited => open);
 
-  -- Stages 8 to 10: y = omega_0*eps; |eps| <= 2 and omega_0 < 1/4, so it fits without a saturation
+  -- Stages 8 to 10: y = omega_0*eps; |eps| <= 2 and omega_0 < 1/4, so it fits Y_W bits
   eps_7 <= saturate(diff_7, FLUX_W) when trusted = '1' else (others => '0');
 
   crossover : entity work.multiply_add
     generic map (DROP => FLUX_MERGE_DROP_Y)
-    port map (clk => clk, a => eps_7, b => by_omega_0, c => NOTHING, y => scaled_10, limited => open);
-
-  y_10 <= resize(scaled_10, FLUX_MERGE_Y_W);
+    port map (clk => clk, a => eps_7, b => by_omega_0, c => NOTHING, y => y_10, limited => open);
 
   -- Stages 11 to 13: x += omega_0*y;  corrected = lambda + push + 2*xi*y
   integral : entity work.multiply_add
     generic map (DROP => FLUX_MERGE_DROP_X)
-    port map (clk => clk, a => y_10, b => by_omega_0, c => x_1, y => x_13, limited => x_limited);
+    port map (clk => clk, a => y_10(Y_W - 1 downto 0), b => by_omega_0, c => x_1, y => x_13, limited => x_limited);
 
   damping : entity work.multiply_add
     generic map (DROP => FLUX_MERGE_DROP_XI)
-    port map (clk => clk, a => y_10, b => by_xi, c => start_7, y => corrected_13, limited => open);
+    port map (clk => clk, a => y_10(Y_W - 1 downto 0), b => by_xi, c => start_7, y => corrected_13, limited => open);
 
   -- Stage 15: the carried flux, narrowed twice; any limit of the axis, of which all but the last count if trusted
   carried  <= saturate(total_14, FLUX_STATE_W);
