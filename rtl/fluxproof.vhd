@@ -83,7 +83,6 @@ architecture rtl of fluxproof is
   signal model_d, model_q                       : signed(FLUX_MODELS_MODEL_FLUX_W - 1 downto 0);
   signal merged_d, merged_q                     : signed(FLUX_MODELS_MERGED_FLUX_W - 1 downto 0);
   signal merged, ended                          : std_logic;
-  signal raised_d, raised_q                     : signed(FLUX_MODELS_RAISED_W - 1 downto 0);
   signal estimate_limited                       : std_logic;
 
   -- From the estimators to the control
@@ -205,16 +204,15 @@ begin
   models : entity work.flux_models
     port map (clk => clk, rst => rst, in_valid => dq_soon,
               i_d => o.i_d, i_q => o.i_q, lambda_m_d => lambda_m_d, lambda_m_q => lambda_m_q,
-              lambda_pi_d => e.lambda_pi_d, lambda_pi_q => e.lambda_pi_q, merge_known => e.merge_known, run => run,
-              minus_rho => minus_rho,
+              merge_known => e.merge_known, run => run, minus_rho => minus_rho,
               flux_mode => flux_mode, l_d => settings.l_d, l_q => settings.l_q, lambda_mg => settings.lambda_mg,
               out_valid => models_valid, model_d => model_d, model_q => model_q, merged_d => merged_d,
-              merged_q => merged_q, merged => merged, ended => ended, raised_d => raised_d, raised_q => raised_q);
+              merged_q => merged_q, merged => merged, ended => ended);
 
   flux : entity work.flux_estimate
     port map (clk => clk, rst => rst, in_valid => models_valid,
               model_d => model_d, model_q => model_q, merged_d => merged_d, merged_q => merged_q, merged => merged,
-              ended => ended,
+              ended => ended, lambda_pi_d => e.lambda_pi_d, lambda_pi_q => e.lambda_pi_q,
               out_valid => lambda_valid, lambda_d => o.lambda_d, lambda_q => o.lambda_q,
               estimate_limited => estimate_limited);
 
@@ -262,6 +260,7 @@ begin
     signal factor_valid, delta_valid, merge_valid    : std_logic;
     signal comp_valid                                : std_logic;
     signal r                                         : unsigned(RESISTANCE_W - 1 downto 0);
+    signal rho                                       : unsigned(RHO_W - 1 downto 0);
     signal voltage_known                             : std_logic;
     signal u_clean_alpha, u_clean_beta               : signed(FLUX_W - 1 downto 0);
     signal lambda_c_alpha, lambda_c_beta             : signed(FLUX_W - 1 downto 0);
@@ -281,7 +280,7 @@ begin
                 temp_winding => temp_winding, temp_valid => temp_valid,
                 r_s => settings.r_s, tcr => settings.tcr, t_0 => settings.t_0, t_min => settings.t_min,
                 t_max => settings.t_max, t_s => settings.t_s,
-                out_valid => open, r => r, minus_rho => minus_rho, temp_lost => e.temp_lost);
+                out_valid => open, r => r, rho => rho, minus_rho => minus_rho, temp_lost => e.temp_lost);
 
     merged_flux : entity work.flux_park
       port map (clk => clk, rst => rst, in_valid => trig_soon,
@@ -326,8 +325,7 @@ begin
 
     magnetic_model : entity work.current_model
       port map (clk => clk, rst => rst, in_valid => models_valid,
-                model_d => model_d, model_q => model_q, raised_d => raised_d, raised_q => raised_q,
-                lambda_add_d => lambda_add_d, lambda_add_q => lambda_add_q,
+                model_d => model_d, model_q => model_q, lambda_add_d => lambda_add_d, lambda_add_q => lambda_add_q,
                 out_valid => model_valid, lambda_c_d => e.lambda_c_d, lambda_c_q => e.lambda_c_q,
                 model_limited => model_limited);
 
@@ -340,7 +338,7 @@ begin
       port map (clk => clk, rst => rst, in_valid => model_ab_valid,
                 i_alpha => i_alpha, i_beta => i_beta, lambda_c_alpha => lambda_c_alpha, lambda_c_beta => lambda_c_beta,
                 u_applied_alpha => u_clean_alpha, u_applied_beta => u_clean_beta, voltage_known => voltage_known,
-                run => run, minus_rho => minus_rho,
+                run => run, rho => rho,
                 omega_0 => settings.omega_0, xi => settings.xi, t_s => settings.t_s,
                 out_valid => merge_valid, lambda_m_alpha => e.lambda_m_alpha, lambda_m_beta => e.lambda_m_beta,
                 merge_known => e.merge_known, merge_limited => merge_limited);

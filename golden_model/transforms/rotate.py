@@ -34,7 +34,7 @@ def bound(_v, _state):
     return {"out_x": PU.lsb / 2, "out_y": PU.lsb / 2}
 
 
-def on_circle(v):
+def on_circle(v, _config):
     """``v`` with sine and cosine replaced by those of the angle atan2(sin_theta, cos_theta)."""
     angle = math.atan2(v["sin_theta"], v["cos_theta"])
     return v | {"cos_theta": round(TRIG_ONE * math.cos(angle)), "sin_theta": round(TRIG_ONE * math.sin(angle))}

@@ -36,6 +36,9 @@ package fixed_pkg is
   -- |x|, which is unsigned and so needs no bit more than x.
   function magnitude (x : signed) return unsigned;
 
+  -- -x if negative = '1', else x, with one sum; the result must fit the width of x.
+  function negated (x : signed; negative : std_logic) return signed;
+
   -- a + 1 if carry = '1', with one sum whose carry comes from the bit below; the result must fit the width of a.
   function plus_carry (a : signed; carry : std_logic) return signed;
 
@@ -150,6 +153,11 @@ package body fixed_pkg is
     variable wide : signed(x'length downto 0) := abs(resize(x, x'length + 1));
   begin
     return unsigned(wide(x'length - 1 downto 0));
+  end function;
+
+  function negated (x : signed; negative : std_logic) return signed is
+  begin
+    return plus_carry(x xor negative, negative);
   end function;
 
   function plus_carry (a : signed; carry : std_logic) return signed is

@@ -25,6 +25,7 @@ package fluxproof_pkg is
   constant FLUX_W : positive := 25;  -- S(1,23)
   constant FLUX_STATE_W : positive := 32;  -- S(1,30)
   constant RESISTANCE_W : positive := 24;  -- U(0,24)
+  constant RHO_W : positive := 22;  -- U(-2,24)
   constant MINUS_RHO_W : positive := 23;  -- S(-2,24)
   constant V_LEG_W : positive := 18;  -- S(-1,18)
   constant LIMIT_W : positive := 9;  -- U(1,8)
@@ -37,7 +38,7 @@ package fluxproof_pkg is
 
   -- fluxproof: clocks from the raw sample to the duties, shortest distance of two samples
   constant FLUXPROOF_SAMPLE_TO_DUTY : positive := 39;
-  constant FLUXPROOF_SAMPLE_INTERVAL : positive := 60;
+  constant FLUXPROOF_SAMPLE_INTERVAL : positive := 57;
 
   type sample_t is record
     adc_a         : unsigned(CODE_W - 1 downto 0);  -- ADC code, phase a
@@ -212,7 +213,7 @@ package fluxproof_pkg is
   );
 
   -- register_access: clocks that a write waits for the end of a sample
-  constant REGISTER_PATIENCE : positive := 76;
+  constant REGISTER_PATIENCE : positive := 73;
 
   -- multiply_add: the sums of products in all equations
   constant MULTIPLY_ADD_LATENCY : positive := 3;
@@ -564,7 +565,7 @@ package fluxproof_pkg is
   constant APPLIED_VOLTAGE_TO_FLUX : natural := 1;
 
   -- current_model: 001, eq. (6); with lambda_add the last term of eq. (16)
-  constant CURRENT_MODEL_LATENCY : positive := 5;
+  constant CURRENT_MODEL_LATENCY : positive := 2;
 
   -- flux_rotate: 001, eq. (9): T_dq/alphabeta
   constant FLUX_ROTATE_LATENCY : positive := 6;
@@ -589,13 +590,11 @@ package fluxproof_pkg is
 
   -- flux_models: 001, eq. (6) and (11)
   constant FLUX_MODELS_LATENCY : positive := 4;
-  constant FLUX_MODELS_MODEL_FLUX_W : natural := 31;
-  constant FLUX_MODELS_MERGED_FLUX_W : natural := 27;
-  constant FLUX_MODELS_RAISED_W : natural := 26;
-  constant FLUX_MODELS_SHIFT_MODEL : natural := 13;
-  constant FLUX_MODELS_DROP_MODEL : natural := 12;
+  constant FLUX_MODELS_MODEL_FLUX_W : natural := 43;
+  constant FLUX_MODELS_MERGED_FLUX_W : natural := 43;
+  constant FLUX_MODELS_SHIFT_MG : natural := 20;
+  constant FLUX_MODELS_DROP_MODEL : natural := 13;
   constant FLUX_MODELS_DROP_MERGED : natural := 17;
-  constant FLUX_MODELS_HALF_PU : natural := 64;
   constant FLUX_MODELS_CURRENT_MODEL : natural := 0;
   constant FLUX_MODELS_EARLIER : natural := 2;
   constant FLUX_MODELS_PROPOSED : natural := 3;
@@ -626,7 +625,7 @@ package fluxproof_pkg is
   constant FLUX_COMPENSATION_FORGET : natural := 8;
 
   -- torque: 001, eq. (4)
-  constant TORQUE_LATENCY : positive := 7;
+  constant TORQUE_LATENCY : positive := 5;
   constant TORQUE_DROP : natural := 16;
 
   -- flux_monitor: none: protection and diagnosis of the drive
@@ -680,7 +679,7 @@ package fluxproof_pkg is
   -- telemetry_words: none: recording of samples
   constant TELEMETRY_WORDS_LATENCY : positive := 2;
   constant TELEMETRY_WORDS_COUNT : natural := 24;
-  constant TELEMETRY_WORDS_START : natural := 39;
+  constant TELEMETRY_WORDS_START : natural := 36;
   constant TELEMETRY_WORDS_INDEX_W : natural := 5;
 
   -- telemetry: none: recording of samples
