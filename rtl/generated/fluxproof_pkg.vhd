@@ -328,9 +328,8 @@ package fluxproof_pkg is
   -- clarke: 001, eq. (1): stator frame
   constant CLARKE_LATENCY : positive := 5;
   constant CLARKE_THIRD : signed(17 downto 0) := to_signed(87381, 18);  -- 0.333333333 as U(-1,18), signed for the multiplier
-  constant CLARKE_INV_SQRT3 : signed(17 downto 0) := to_signed(75674, 18);  -- 0.577350269 as U(0,17), signed for the multiplier
-  constant CLARKE_DROP_ALPHA : natural := 18;
-  constant CLARKE_DROP_BETA : natural := 17;
+  constant CLARKE_INV_SQRT12 : signed(17 downto 0) := to_signed(75674, 18);  -- 0.288675135 as U(-1,18), signed for the multiplier
+  constant CLARKE_DROP : natural := 18;
   constant CLARKE_VECTOR : natural := 90112;
 
   -- sincos: 001, eq. (12)
