@@ -217,6 +217,9 @@ package fluxproof_pkg is
   -- multiply_add: the sums of products in all equations
   constant MULTIPLY_ADD_LATENCY : positive := 3;
 
+  -- sum_of_products: the rotations and cross products in all equations
+  constant SUM_OF_PRODUCTS_LATENCY : positive := 3;
+
   -- sqrt: 001, section 5.2: voltage limit of the current regulation
   constant SQRT_LATENCY : positive := 5;
   constant SQRT_DROP_X : natural := 12;
@@ -307,7 +310,9 @@ package fluxproof_pkg is
   constant POSITION_LATENCY : positive := 2;
 
   -- speed: 001, section 5.1, speed by differentiating two consecutive samples
-  constant SPEED_LATENCY : positive := 6;
+  constant SPEED_LATENCY : positive := 7;
+  constant SPEED_OMEGA_W : natural := 31;
+  constant SPEED_TO_PU : natural := 12;
   constant SPEED_DROP_RAW : natural := 14;
   constant SPEED_DROP_STATE : natural := 4;
 
