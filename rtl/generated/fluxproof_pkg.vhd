@@ -518,9 +518,9 @@ package fluxproof_pkg is
   constant CURRENT_PI_PROPORTIONAL_W : natural := 38;
 
   -- chord_speed: 001, eq. (2), for a voltage that is held during a sample
-  constant CHORD_SPEED_LATENCY : positive := 9;
-  constant CHORD_SPEED_DROP_SQUARE : natural := 18;
-  constant CHORD_SPEED_DROP_PART : natural := 17;
+  constant CHORD_SPEED_LATENCY : positive := 10;
+  constant CHORD_SPEED_RAISE_SQUARE : natural := 2;
+  constant CHORD_SPEED_RAISE_PART : natural := 3;
   constant CHORD_SPEED_DROP : natural := 20;
 
   -- decoupling: 001, eq. (2), 'dq decoupling term' of Fig. 8
@@ -645,7 +645,7 @@ package fluxproof_pkg is
   constant CURRENT_DIRECTIONS_DROP : natural := 13;
 
   -- dead_time_compensation: 000, section V.B, step d
-  constant DEAD_TIME_COMPENSATION_LATENCY : positive := 4;
+  constant DEAD_TIME_COMPENSATION_LATENCY : positive := 5;
   constant DEAD_TIME_COMPENSATION_DROP : natural := 18;
 
   -- clean_voltage: 000, eq. (4); 001, eq. (5): the voltage without the inverter's distortion
