@@ -317,7 +317,7 @@ package fluxproof_pkg is
   constant SPEED_DROP_STATE : natural := 4;
 
   -- u_dc_conditioning: 001, section 5.2, I/O conditioning
-  constant U_DC_CONDITIONING_LATENCY : positive := 6;
+  constant U_DC_CONDITIONING_LATENCY : positive := 7;
   constant U_DC_CONDITIONING_DROP_U_DC : natural := 15;
   constant U_DC_CONDITIONING_DROP_U_MAX : natural := 17;
 
@@ -339,7 +339,7 @@ package fluxproof_pkg is
 
   -- sincos: 001, eq. (12)
   constant SINCOS_LATENCY : positive := 13;
-  constant SINCOS_PASS : natural := 6;
+  constant SINCOS_SECOND : natural := 8;
   constant SINCOS_ADDRESS_BITS : natural := 10;
   constant SINCOS_DROP_PROD : natural := 18;
   constant SINCOS_TABLE_SHIFT : natural := 4;
@@ -486,17 +486,6 @@ package fluxproof_pkg is
     13x"0648", 13x"06ad", 13x"0712", 13x"0776", 13x"07db", 13x"083f", 13x"08a4", 13x"0908",
     13x"096d", 13x"09d1", 13x"0a36", 13x"0a9a", 13x"0aff", 13x"0b63", 13x"0bc8", 13x"0c2c"
   );
-  type sincos_minus_delta_t is array (0 to 63) of signed(12 downto 0);
-  constant SINCOS_MINUS_DELTA : sincos_minus_delta_t := (  -- S(-10,22)
-    13x"0c91", 13x"0c2c", 13x"0bc8", 13x"0b63", 13x"0aff", 13x"0a9a", 13x"0a36", 13x"09d1",
-    13x"096d", 13x"0908", 13x"08a4", 13x"083f", 13x"07db", 13x"0776", 13x"0712", 13x"06ad",
-    13x"0648", 13x"05e4", 13x"057f", 13x"051b", 13x"04b6", 13x"0452", 13x"03ed", 13x"0389",
-    13x"0324", 13x"02c0", 13x"025b", 13x"01f7", 13x"0192", 13x"012e", 13x"00c9", 13x"0065",
-    13x"0000", 13x"1f9b", 13x"1f37", 13x"1ed2", 13x"1e6e", 13x"1e09", 13x"1da5", 13x"1d40",
-    13x"1cdc", 13x"1c77", 13x"1c13", 13x"1bae", 13x"1b4a", 13x"1ae5", 13x"1a81", 13x"1a1c",
-    13x"19b8", 13x"1953", 13x"18ee", 13x"188a", 13x"1825", 13x"17c1", 13x"175c", 13x"16f8",
-    13x"1693", 13x"162f", 13x"15ca", 13x"1566", 13x"1501", 13x"149d", 13x"1438", 13x"13d4"
-  );
 
   -- rotate: 001, eq. (9): T_dq/alphabeta
   constant ROTATE_LATENCY : positive := 5;
@@ -531,7 +520,7 @@ package fluxproof_pkg is
   constant VOLTAGE_LIMIT_LATENCY : positive := 10;
 
   -- svm_delay_compensation: 001, section 5.2, SVM delay compensation
-  constant SVM_DELAY_COMPENSATION_LATENCY : positive := 1;
+  constant SVM_DELAY_COMPENSATION_LATENCY : positive := 3;
   constant SVM_DELAY_COMPENSATION_DROP : natural := 15;
 
   -- inverse_park: 001, eq. (9): T_dq/alphabeta
