@@ -322,13 +322,12 @@ package fluxproof_pkg is
   constant U_DC_CONDITIONING_DROP_U_MAX : natural := 17;
 
   -- u_dc_processing: 001, section 5.2, U_dc processing
-  constant U_DC_PROCESSING_LATENCY : positive := 27;
+  constant U_DC_PROCESSING_LATENCY : positive := 26;
   constant U_DC_PROCESSING_N_MAX : natural := 5;
   constant U_DC_PROCESSING_U_DC_MIN : natural := 2048;
   constant U_DC_PROCESSING_SQRT3_2 : signed(17 downto 0) := to_signed(113512, 18);  -- 0.866025404 as U(0,17), signed for the multiplier
   constant U_DC_PROCESSING_DROP_BETA : natural := 17;
   constant U_DC_PROCESSING_INVERSE_W : natural := 22;
-  constant U_DC_PROCESSING_SHIFT_CLOCKS : natural := 3;
 
   -- clarke: 001, eq. (1): stator frame
   constant CLARKE_LATENCY : positive := 5;
