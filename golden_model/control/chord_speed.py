@@ -10,7 +10,8 @@ The next term of the series is a**4/1920, 3e-5 at half a radian: neglected.
 
 Formats: omega_me**2 U(3,14), k_chord U(-6,23), their product U(-3,20), each half up; the last rounding is to
 PU.  A factor of the first two products is raised by 2 and 3 bits, so that all three are cut by the same 20 bits and
-pass through one multiplier one after the other.  No saturation: k_chord*omega_me**2 < 1/16, so the result is closer to zero than omega_me and keeps its sign.
+pass through one multiplier one after the other.
+No saturation: k_chord*omega_me**2 < 1/16, so the result is closer to zero than omega_me and keeps its sign.
 """
 
 from fluxproof.golden_model.block import Block, Port

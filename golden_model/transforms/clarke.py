@@ -3,9 +3,10 @@
     i_alpha = (2*i_a - i_b - i_c) / 3
     i_beta  = (i_b - i_c) / sqrt(3) = (2*i_b - 2*i_c) / sqrt(12)
 
-Both have the same form, so that one multiplier takes beta and then alpha.  Formats: sums exact; times 1/3 and
-1/sqrt(12) as S(0,-1,18), relative error 4e-6 each; rounded half up to PU.  Limit: +-1.375 per unit (VECTOR), so that park needs no limiter; the base is the
-measuring range of the sensor, and currents that sum to zero give no component beyond the largest of them.
+Both have the same form, so that one multiplier takes beta and then alpha.
+Formats: sums exact; times 1/3 and 1/sqrt(12) as S(0,-1,18), relative error 4e-6 each; rounded half up to PU.
+Limit: +-1.375 per unit (VECTOR), so that park needs no limiter; the base is the measuring range of the sensor, and
+currents that sum to zero give no component beyond the largest of them.
 """
 
 import math

@@ -318,6 +318,7 @@ package fluxproof_pkg is
 
   -- u_dc_conditioning: 001, section 5.2, I/O conditioning
   constant U_DC_CONDITIONING_LATENCY : positive := 7;
+  constant U_DC_CONDITIONING_AHEAD : natural := 3;
   constant U_DC_CONDITIONING_DROP_U_DC : natural := 15;
   constant U_DC_CONDITIONING_DROP_U_MAX : natural := 17;
 

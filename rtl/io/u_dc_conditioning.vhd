@@ -86,7 +86,7 @@ begin
     end if;
   end process;
 
-  out_soon  <= valid(4);
+  out_soon  <= valid(LATENCY - U_DC_CONDITIONING_AHEAD);
   out_valid <= valid(LATENCY);
 
 end architecture rtl;
