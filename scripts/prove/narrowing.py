@@ -72,7 +72,7 @@ FAULTS = {
     ),
     "clamp": Fault("no upper limit", PACKAGE, "return resize(hi, x'length);", "return x;"),
     "plus_rounded": Fault("half lost", PACKAGE, "sum := (a & '1')", "sum := (a & '0')"),
-    "minus_rounded": Fault("half added", PACKAGE, "difference := (a & '0')", "difference := (a & '1')"),
+    "minus_rounded": Fault("half added", PACKAGE, "rest := (a & '0')", "rest := (a & '1')"),
 }  # fmt: skip
 
 
