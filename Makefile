@@ -76,7 +76,7 @@ timeline: setup ## draw the timeline of one control period
 faults: setup ## inject faults: sensors, bus, strobes, registers; RTL against golden core
 	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m studies.faults $(ARGS)
 
-mutate: setup ## plant faults in the VHDL and count those that the tests detect
+mutate: setup ## draw faults at random in the netlist of every block and count those that its bench notices
 	$(PYTHON_RUN) -m scripts.mutate $(ARGS)
 
 prove: setup ## prove properties of the gates, the pipeline, the rounding, the buses, and show each a planted fault

@@ -9,7 +9,7 @@ import cocotb
 from cocotb.clock import Clock as ClockDriver
 from cocotb.triggers import FallingEdge, Timer, ValueChange
 
-from fluxproof.cosim.stimulus import schedule
+from fluxproof.cosim.stimulus import due, schedule
 from fluxproof.golden_model.registry import BLOCKS
 
 CLOCK_NS = 10
@@ -103,36 +103,24 @@ async def equals_model(dut):
 
     announced = ([dut.out_valid, dut.out_soon] if block.soon else [dut.out_valid]) if strobes else []
     silence, chosen = Silence(announced), eventful(block, clocks)
+    rules = due(block, clocks)
     compared, in_valid, rst, held = 0, 0, 1, None
     for number, following in zip(chosen, [*chosen[1:], len(clocks)], strict=True):
-        clock = clocks[number]
-        if strobes and number > 2:
-            valid = read(dut.out_valid, False)
-            if valid != clock.out_valid:
-                wrong = [("out_valid", valid, clock.out_valid)]
-                raise AssertionError(report(block, config, seed, number, clock.of_sample, rows, wrong))
-            if block.soon:
-                pairs = [("out_soon", read(dut.out_soon, False), int(bool(clock.soon)))]
-                pairs += [(n, read(h, s), clock.soon[n]) for n, h, s in outputs if n in clock.soon]
-                if wrong := [row for row in pairs if row[1] != row[2]]:
-                    raise AssertionError(report(block, config, seed, number, clock.of_sample, rows, wrong))
-        if block.atomic:
-            seen = [read(handle, signed) for _, handle, signed in outputs]
-            if held is not None and not clock.out_valid and seen != held:
-                wrong = [("outputs without out_valid", seen, held)]
-                raise AssertionError(report(block, config, seed, number, clock.of_sample, rows, wrong))
-            held = None if clock.rst else seen
-        if clock.expected:
-            got = [(name, read(handle, signed)) for name, handle, signed in outputs]
-            shown = {name for name in clock.expected if clock.expected.get(block.shown_with.get(name), 1)}
-            wrong = [
-                (name, value, clock.expected[name])
-                for name, value in got
-                if name in shown and value != clock.expected[name]
-            ]
-            if wrong:
-                raise AssertionError(report(block, config, seed, number, clock.of_sample, rows, wrong))
-            compared += 1
+        clock, rule = clocks[number], rules[number]
+        wrong = [
+            (name, value, wanted)
+            for name, wanted in rule.strobes.items()
+            if (value := read(getattr(dut, name), False)) != wanted
+        ]
+        if not wrong and (rule.outputs or block.atomic):
+            seen = {name: read(handle, signed) for name, handle, signed in outputs}
+            wrong = [(name, seen[name], wanted) for name, wanted in rule.outputs if seen[name] != wanted]
+            if rule.still and seen != held:
+                wrong += [("outputs without out_valid", seen, held)]
+            held = seen
+        if wrong:
+            raise AssertionError(report(block, config, seed, number, rule.of_sample, rows, wrong))
+        compared += bool(clock.expected)
         for name, value in clock.writes.items():
             inputs[name].value = value
         if clock.rst != rst and block.strobes:

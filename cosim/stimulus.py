@@ -19,6 +19,17 @@ CORNERS_AT_MOST = 1500
 RANDOM_SAMPLES = 1200
 CLOCKED_RANDOM = 6000  # clocks
 BURST = 40  # samples between two changes of the registers
+SETTLED = 2  # strobes are compared after this clock
+
+
+@dataclass
+class Due:
+    """What a bench compares before a clock's rising edge; the inputs are still those of the clock before."""
+
+    strobes: dict[str, int] = field(default_factory=dict)  # out_valid, out_soon
+    outputs: list[tuple[str, int]] = field(default_factory=list)
+    still: bool = False  # every output is as it was before the edge of the clock before
+    of_sample: int = -1
 
 
 @dataclass
@@ -143,6 +154,29 @@ def schedule(block: Block, config: dict[str, int], seed: int) -> list[Clock]:
     for when, index, outputs in due:
         clocks[when].out_valid, clocks[when].of_sample, clocks[when].expected = 1, index, outputs
     return clocks
+
+
+def due(block: Block, clocks: list[Clock]) -> list[Due]:
+    """The one rule of what is compared when, for every bench: an entry for each clock of the schedule.
+
+    Strobes are compared from the fourth clock on, in every one of them: the reset has two clocks to work.
+    """
+    strobes = block.strobes and not block.clocked
+    entries = []
+    for number, clock in enumerate(clocks):
+        entry = Due(of_sample=clock.of_sample)
+        if strobes and number > SETTLED:
+            entry.strobes["out_valid"] = clock.out_valid
+            if block.soon:
+                entry.strobes["out_soon"] = int(bool(clock.soon))
+                entry.outputs += clock.soon.items()
+        # Before the first clock nothing was seen, and a reset may leave anything behind.
+        entry.still = block.atomic and not clock.out_valid and number > 0 and not clocks[number - 1].rst
+        for name, value in clock.expected.items():
+            if clock.expected.get(block.shown_with.get(name), 1):
+                entry.outputs.append((name, value))
+        entries.append(entry)
+    return entries
 
 
 def _clocked_schedule(block: Block, config: dict[str, int], seed: int) -> list[Clock]:

@@ -2,8 +2,9 @@
 //
 // One source for every set of generics: cosim/verilator.py writes ports.inc with a line
 //     PORT(name, width, is_signed)
-// for each port of the top, and defines CORE_CLOCK, the name of its clock, and CORE_SHOWS_VALIDS where it has
-// duty_valid and values_valid.  Functions name a port by its line number, from 0.
+// for each port of the top, and defines CORE_CLOCK, the name of its clock, CORE_HAS_GATES where it has gates and samples
+// (a single block has neither), and CORE_SHOWS_VALIDS where it has duty_valid and values_valid.  Functions name a port
+// by its line number, from 0.
 //
 // A tick is one rising edge of the clock: inputs set before it are seen by it, outputs read after it are what the
 // registers hold from this edge on.
@@ -80,7 +81,9 @@ struct Core {
     }
 
     // Bits 0..2: upper gates of legs a, b, c; bits 3..5: lower gates.
+#ifdef CORE_HAS_GATES
     uint8_t gate_word() const { return static_cast<uint8_t>(top.gate_high | top.gate_low << 3); }
+#endif
 };
 
 }  // namespace
@@ -120,6 +123,16 @@ void core_trace(Core* core, int64_t ticks, const int32_t* ports, int64_t count, 
     }
 }
 
+// Before tick k, drives given[j] with inputs[k][j]; values[k][j] is seen[j] after it; `ticks` rows of each.
+void core_play(Core* core, int64_t ticks, const int32_t* given, int64_t inputs_count, const int64_t* inputs,
+               const int32_t* seen, int64_t count, int64_t* values) {
+    for (int64_t k = 0; k < ticks; ++k) {
+        for (int64_t j = 0; j < inputs_count; ++j) core->ports[given[j]].set(*inputs++);
+        core->tick();
+        for (int64_t j = 0; j < count; ++j) *values++ = core->ports[seen[j]].get();
+    }
+}
+
 void core_read(const Core* core, const int32_t* ports, int64_t count, int64_t* values) {
     for (int64_t j = 0; j < count; ++j) values[j] = core->ports[ports[j]].get();
 }
@@ -129,8 +142,12 @@ void core_read(const Core* core, const int32_t* ports, int64_t count, int64_t* v
 // most `most` + 1 entries: the number of the tick after which the gate word was new, and that word; number 0
 // means that it had changed before, since the last call.  facts: entries written; the tick after which
 // duty_valid was high, and values_valid (0: none).
+// A top without gates makes no period: -1.
 int64_t core_run_period(Core* core, int64_t most, int64_t sample_at, int32_t* clocks, uint8_t* words,
                         int64_t* facts) {
+#ifndef CORE_HAS_GATES
+    return -1;
+#else
     Vcore& top = core->top;
     int64_t found = 0;
     const auto look = [&](int64_t k) {
@@ -157,6 +174,7 @@ int64_t core_run_period(Core* core, int64_t most, int64_t sample_at, int32_t* cl
     top.sample_valid = 0;
     facts[0] = found;
     return k;
+#endif
 }
 
 }  // extern "C"

@@ -37,6 +37,7 @@ _FUNCTIONS = {  # name: (result, arguments), as in verilated.cpp
     "core_tick": (None, [_CORE, _LONG]),
     "core_until": (_LONG, [_CORE, _INT, _LONG]),
     "core_trace": (None, [_CORE, _LONG, _INTS, _LONG, _LONGS]),
+    "core_play": (None, [_CORE, _LONG, _INTS, _LONG, _LONGS, _INTS, _LONG, _LONGS]),
     "core_read": (None, [_CORE, _INTS, _LONG, _LONGS]),
     "core_run_period": (_LONG, [_CORE, _LONG, _LONG, _INTS, _BYTES, _LONGS]),
 }
@@ -149,6 +150,24 @@ class VerilatedCore:
         names = tuple(names)
         values = np.empty((n, len(names)), np.int64)
         self._library.core_trace(self._handle, n, self._indices(names), len(names), values)
+        return values
+
+    def play(self, given: Mapping[str, np.ndarray], names: Iterable[str]) -> np.ndarray:
+        """Drives inputs tick by tick, n of each: int64, shape (n, len(names)), row k as tick k left the ports.
+
+        ValueError where a value does not fit its port.  The inputs keep their last value.
+        """
+        names, inputs = tuple(names), tuple(given)
+        rows = np.ascontiguousarray(np.stack([np.asarray(given[name], np.int64) for name in inputs], axis=1))
+        for name, column in zip(inputs, rows.T, strict=True):
+            port = self.ports[name]
+            if not port.is_input or name == self.clock_name:
+                raise ValueError(f"{name} is not an input to set")
+            if len(column) and not port.low <= column.min() <= column.max() <= port.high:
+                raise ValueError(f"{name} from {column.min()} to {column.max()} does not fit {port.low} .. {port.high}")
+        values = np.empty((len(rows), len(names)), np.int64)
+        given_ports, seen = self._indices(inputs), self._indices(names)
+        self._library.core_play(self._handle, len(rows), given_ports, len(inputs), rows, seen, len(names), values)
         return values
 
     def apply_sample(self, **inputs: int) -> None:

@@ -77,7 +77,8 @@ def locked(path: Path) -> Iterator[None]:
 def _defines(names: Iterable[str]) -> list[str]:
     """What verilated.cpp must know of a top with these ports."""
     valids = ["-DCORE_SHOWS_VALIDS"] if {"duty_valid", "values_valid"} <= set(names) else []
-    return [f"-DCORE_CLOCK={clock_of(names)}", *valids]
+    gates = ["-DCORE_HAS_GATES"] if {"gate_high", "gate_low", "sample_valid", "sample_trigger"} <= set(names) else []
+    return [f"-DCORE_CLOCK={clock_of(names)}", *valids, *gates]
 
 
 def clock_of(names: Iterable[str]) -> str:
@@ -85,16 +86,27 @@ def clock_of(names: Iterable[str]) -> str:
     return "clk" if "clk" in names else "aclk"
 
 
-def compile_library(folder: Path, top: str, ports: tuple[VerilogPort, ...]) -> None:
-    """Turns ``folder``/``top``.v into ``folder``/libcore.so."""
+def compile_library(
+    folder: Path,
+    top: str,
+    ports: Iterable[VerilogPort],
+    wrapper: Path = WRAPPER,
+    hot: str = HOT,
+    options: Iterable[str] = (),
+) -> None:
+    """Turns ``folder``/``top``.v and the C++ of ``wrapper`` into ``folder``/libcore.so.
+
+    ``hot``: the compiler's effort for what runs every clock; ``options``: more of Verilator's, after the usual ones.
+    """
     verilator, _, root = find_verilator()
     compiler = _compiler()
     defines = _defines([p.name for p in ports])
     (folder / "ports.inc").write_text("".join(f"PORT({p.name}, {p.width}, {int(p.signed)})\n" for p in ports))
-    _run([verilator, *VERILATOR_FLAGS, "--Mdir", "obj", "--prefix", "Vcore", "--top-module", top, f"{top}.v"], folder)
+    names = ["--Mdir", "obj", "--prefix", "Vcore", "--top-module", top, f"{top}.v"]
+    _run([verilator, *VERILATOR_FLAGS, *options, *names], folder)
     model = sorted(folder.glob("obj/*.cpp"))
     parts = {
-        ("hot", HOT): [WRAPPER, *(path for path in model if "Slow" not in path.name)],
+        ("hot", hot): [wrapper, *(path for path in model if "Slow" not in path.name)],
         ("slow", SLOW): [path for path in model if "Slow" in path.name],
     }
     headers = (folder, folder / "obj", root / "include", root / "include" / "vltstd")

@@ -14,6 +14,7 @@ from fluxproof.golden_model.drive import Drive, load
 from fluxproof.golden_model.drive_keys import DriveError
 from fluxproof.golden_model.generated.register_names import ADDRESSES
 from fluxproof.golden_model.registers import RegisterSet, Row, registers
+from fluxproof.golden_model.units import SIGNALS, si_per_lsb
 
 HEAD = ("register", "address", "SI value", "unit", "integer", "represented", "error", "legal range")
 LEFT = (0, 3)  # columns of words; numbers are right-aligned
@@ -56,7 +57,10 @@ def load_list(result: RegisterSet) -> list[dict]:
 
 def c_lines(name: str, drive: Drive, result: RegisterSet) -> list[str]:
     """A C header: the bases, the generics the core must be built with, the values to load."""
-    bases = {**vars(drive.bases), "flux_wb": drive.bases.flux_wb, "sample_time_s": drive.sample_time_s}
+    torque = si_per_lsb("torque", drive) / SIGNALS["torque"].fmt.lsb
+    bases = {**vars(drive.bases), "flux_wb": drive.bases.flux_wb, "torque_nm": torque}
+    bases["sample_time_s"] = drive.sample_time_s
+    generics = {**result.config._asdict(), "clock_hz": round(drive.core.clock_hz)}
     rows = []
     for r in result.rows:
         unit = "" if r.unit == "1" else f" {r.unit}"
@@ -72,7 +76,7 @@ def c_lines(name: str, drive: Drive, result: RegisterSet) -> list[str]:
         "/* SI values of 1.0 per unit; peak values, electrical speed. */",
         *(f"#define FLUXPROOF_BASE_{key.upper()} {value!r}" for key, value in bases.items()),
         "/* What the core must have been built with. */",
-        *(f"#define FLUXPROOF_{key.upper()} {value}" for key, value in result.config._asdict().items()),
+        *(f"#define FLUXPROOF_{key.upper()} {value}" for key, value in generics.items()),
         "",
         "struct fluxproof_setting {",
         "    uint16_t offset;",

@@ -117,6 +117,13 @@ class Sensors:
 
 
 @dataclass(frozen=True)
+class Sampling:
+    """[sampling], optional: when currents and position are taken; see docs/board.md."""
+
+    delay_s: float = real("s", "real sampling instant after the valley, negative before it", 0.0)
+
+
+@dataclass(frozen=True)
 class Protection:
     """[protection], all optional: what turns the gates off; defaults in scaling.py.
 
@@ -180,6 +187,7 @@ class Drive:
     core: Core
     base_choice: BaseChoice = BaseChoice()
     protection: Protection = Protection()
+    sampling: Sampling = Sampling()
 
     def __post_init__(self):
         check(self)
@@ -197,6 +205,11 @@ class Drive:
     def sample_time_s(self):
         """One sample per PWM period, at the valley of the carrier."""
         return 1.0 / self.inverter.pwm_frequency_hz
+
+    @property
+    def sampling_to_voltage_s(self):
+        """From the real sampling instant to the middle of the period in which the voltage acts."""
+        return self.control.delay_samples * self.sample_time_s - self.sampling.delay_s
 
     @property
     def current_limit_a(self):
@@ -223,6 +236,7 @@ SECTIONS = {
     "core": Core,
     "bases": BaseChoice,
     "protection": Protection,
+    "sampling": Sampling,
 }
 
 

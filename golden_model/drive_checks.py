@@ -27,6 +27,16 @@ def _sample_time(drive):
         _refuse("[control] sample_time_s", given, f"{period:g} s, one PWM period, since {frequency}")
 
 
+def _sampling(drive):
+    """A sample belongs to the valley that it is nearest to, and its voltage acts later."""
+    delay, half = drive.sampling.delay_s, drive.sample_time_s / 2.0
+    if not abs(delay) < half:
+        _refuse("[sampling] delay_s", delay, f"between -{half:g} and {half:g} s, half a PWM period")
+    if drive.sampling_to_voltage_s < 0.0:
+        most = drive.control.delay_samples * drive.sample_time_s
+        _refuse("[sampling] delay_s", delay, f"up to {most:g} s, [control] delay_samples")
+
+
 def _carrier(drive):
     clock, pwm = drive.core.clock_hz, drive.inverter.pwm_frequency_hz
     exact = clock / (2.0 * pwm)
@@ -101,9 +111,10 @@ def _speed_loop(drive):
 def _current_loop(drive):
     """A delay of d samples shifts the phase of the loop by 90 degrees at 1/(4*d*T_s): unstable from there."""
     control = drive.control
-    asked, four_delays = control.current_bandwidth_hz, 4.0 * control.delay_samples * drive.sample_time_s
+    asked, delay = control.current_bandwidth_hz, drive.sampling_to_voltage_s
+    four_delays = 4.0 * delay
     if asked * four_delays >= 1.0:
-        reason = f"{control.delay_samples:g} samples of delay make the loop unstable from there"
+        reason = f"{delay / drive.sample_time_s:g} samples of delay make the loop unstable from there"
         limit = 1.0 / four_delays
         _refuse("[control] current_bandwidth_hz", asked, f"below {limit:g} Hz; {reason}")
 
@@ -152,6 +163,6 @@ def _protection(drive):
 
 
 RULES = (
-    _sample_time, _carrier, _pulses, _voltage, _current, _flux, _codes, _speed_loop, _current_loop, _flux_loop,
-    _adaline_steps, _protection,
+    _sample_time, _sampling, _carrier, _pulses, _voltage, _current, _flux, _codes, _speed_loop, _current_loop,
+    _flux_loop, _adaline_steps, _protection,
 )  # fmt: skip

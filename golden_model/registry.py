@@ -1,6 +1,6 @@
 """Every block of the core, one line each: add yours here and the bench finds it."""
 
-from fluxproof.golden_model.common import multiply_add, packet_fifo, reciprocal, sqrt, sum_of_products
+from fluxproof.golden_model.common import input_filter, multiply_add, packet_fifo, reciprocal, sqrt, sum_of_products
 from fluxproof.golden_model.control import (
     chord_speed,
     current_pi,
@@ -8,6 +8,28 @@ from fluxproof.golden_model.control import (
     decoupling,
     speed_pi,
     voltage_limit,
+)
+from fluxproof.golden_model.converters import (
+    modulator_input,
+    sinc3,
+    sinc_overcurrent,
+    spi_converter,
+    spi_frame,
+    spi_words,
+    third_current,
+    xadc_reader,
+)
+from fluxproof.golden_model.encoders import (
+    biss_master,
+    edge_timer,
+    endat_master,
+    hall_decoder,
+    incremental_encoder,
+    index_check,
+    position_bridge,
+    quadrature_decoder,
+    ssi_master,
+    turn_counter,
 )
 from fluxproof.golden_model.estimators import (
     applied_voltage,
@@ -103,5 +125,24 @@ BLOCKS = {
         sample_guard,
         sample_checks,
         fault_latch,
+        spi_frame,
+        spi_words,
+        spi_converter,
+        modulator_input,
+        sinc3,
+        sinc_overcurrent,
+        third_current,
+        xadc_reader,
+        input_filter,
+        quadrature_decoder,
+        turn_counter,
+        index_check,
+        edge_timer,
+        hall_decoder,
+        incremental_encoder,
+        ssi_master,
+        biss_master,
+        endat_master,
+        position_bridge,
     )
 }

@@ -17,9 +17,13 @@ latter, since K_p multiplies noise, but at most half of the former, or a tenth o
 The two models cross over at an eighth of the rated electrical speed, the range of the paper's experiments; the
 compensation fades in from omega_min to half of that, because below it delta_lambda amplifies small voltage errors.
 
-Protection: the default limits lie outside the range of a healthy drive: overcurrent at twice the current limit, the sum
-of the currents at a fifth of the rated current, the bus at a tenth and 1.3 times its nominal value, no sample for 1.5
-periods.  The position may deviate from its linear extrapolation by 5e-4 turn plus four codes: no shaft
+Sampling: currents and position are taken delay_s after the valley, the voltage acts at a fixed time after it, so the
+angles from the sample to the voltage (k_delay, k_ahead) shrink by omega_me*delay_s; nothing else changes, see
+docs/board.md.
+
+Protection: the default limits lie outside the range of a healthy drive: overcurrent at twice the current limit, the
+sum of the currents at a fifth of the rated current, the bus at a tenth and 1.3 times its nominal value, no sample
+for 1.5 periods.  The position may deviate from its linear extrapolation by 5e-4 turn plus four codes: no shaft
 accelerates that much within a sample, and a frozen code is detected from that rotation per sample on.
 """
 
@@ -147,8 +151,9 @@ def current_loop(drive):
         yield Entry(f"l_{axis}", henry, "H", b.flux_wb / b.current_a, keys)
     keys = f"[machine] magnet_flux_wb; {base_keys(drive, 'voltage_v', 'omega_me_rad_s')}"
     yield Entry("lambda_mg", m.magnet_flux_wb, "Wb", b.flux_wb, keys)
-    keys = f"[control] delay_samples; [inverter] pwm_frequency_hz; {base_keys(drive, 'omega_me_rad_s')}"
-    yield Entry("k_delay", c.delay_samples * t_s, "s", TURN_RAD / b.omega_me_rad_s, keys)
+    keys = "[control] delay_samples; [sampling] delay_s; [inverter] pwm_frequency_hz"
+    keys = f"{keys}; {base_keys(drive, 'omega_me_rad_s')}"
+    yield Entry("k_delay", drive.sampling_to_voltage_s, "s", TURN_RAD / b.omega_me_rad_s, keys)
 
 
 def current_gains(drive, axis):
@@ -229,9 +234,8 @@ def vsi_estimators(drive):
         zone = max(SIGN_OF_RATED * m.rated_current_a, SIGN_GAIN * leg_loss_v(drive) / kp)
         keys = "[machine] rated_current_a; [inverter] dead_time_s; [control] current_bandwidth_hz"
     yield Entry("k_sign", 1.0 / zone, "1/A", 1.0 / b.current_a, f"{keys}; {amperes}")
-    yield Entry(
-        "k_ahead", AHEAD_SAMPLES * t_s, "s", 1.0 / b.omega_me_rad_s, f"[inverter] pwm_frequency_hz; {speed}"
-    )
+    ahead, keys = AHEAD_SAMPLES * t_s - drive.sampling.delay_s, "[sampling] delay_s; [inverter] pwm_frequency_hz"
+    yield Entry("k_ahead", ahead, "s", 1.0 / b.omega_me_rad_s, f"{keys}; {speed}")
     k_lp = -math.expm1(-TURN_RAD * c.v_dead_filter_hz * t_s)
     yield Entry("k_lp", k_lp, "1", 1.0, "[control] v_dead_filter_hz; [inverter] pwm_frequency_hz")
     yield Entry("eta_v", 18.0 * c.v_dead_eta, "1", 1.0, "[control] v_dead_eta")

@@ -59,11 +59,11 @@ end entity fluxproof;
 
 architecture rtl of fluxproof is
   -- The sample that is processed
-  signal code_a, code_b, code_c, code_u_dc            : unsigned(ADC_BITS - 1 downto 0);
-  signal code_theta                                   : unsigned(POSITION_BITS - 1 downto 0);
-  signal omega_ref, i_d_ref, i_q_ext                  : signed(PU_W - 1 downto 0);
-  signal temp_winding                                 : signed(15 downto 0);
-  signal speed_mode, temp_valid, clear_faults, run    : std_logic;
+  signal code_a, code_b, code_c, code_u_dc         : unsigned(ADC_BITS - 1 downto 0);
+  signal code_theta                                : unsigned(POSITION_BITS - 1 downto 0);
+  signal omega_ref, i_d_ref, i_q_ext               : signed(PU_W - 1 downto 0);
+  signal temp_winding                              : signed(15 downto 0);
+  signal speed_mode, temp_valid, clear_faults, run : std_logic;
 
   -- Strobes
   signal sample_entered, latch_valid                  : std_logic;
@@ -76,25 +76,25 @@ architecture rtl of fluxproof is
   signal ab_voltage_valid, duty_ready, compare_ready  : std_logic;
 
   -- Values between the blocks of the control
-  signal inverse, inverse_beta                        : unsigned(U_DC_PROCESSING_INVERSE_W - 1 downto 0);
-  signal i_alpha, i_beta                              : signed(PU_W - 1 downto 0);
-  signal theta_out                                    : unsigned(TURN_W - 1 downto 0);
-  signal cos_theta, sin_theta, cos_out, sin_out       : signed(PU_W - 1 downto 0);
-  signal u_pi_d, u_pi_q                               : signed(PU_W - 1 downto 0);
-  signal model_d, model_q                             : signed(FLUX_MODELS_MODEL_FLUX_W - 1 downto 0);
-  signal merged_d, merged_q                           : signed(FLUX_MODELS_MERGED_FLUX_W - 1 downto 0);
-  signal merged, ended                                : std_logic;
-  signal raised_d, raised_q                           : signed(FLUX_MODELS_RAISED_W - 1 downto 0);
-  signal estimate_limited                             : std_logic;
+  signal inverse, inverse_beta                  : unsigned(U_DC_PROCESSING_INVERSE_W - 1 downto 0);
+  signal i_alpha, i_beta                        : signed(PU_W - 1 downto 0);
+  signal theta_out                              : unsigned(TURN_W - 1 downto 0);
+  signal cos_theta, sin_theta, cos_out, sin_out : signed(PU_W - 1 downto 0);
+  signal u_pi_d, u_pi_q                         : signed(PU_W - 1 downto 0);
+  signal model_d, model_q                       : signed(FLUX_MODELS_MODEL_FLUX_W - 1 downto 0);
+  signal merged_d, merged_q                     : signed(FLUX_MODELS_MERGED_FLUX_W - 1 downto 0);
+  signal merged, ended                          : std_logic;
+  signal raised_d, raised_q                     : signed(FLUX_MODELS_RAISED_W - 1 downto 0);
+  signal estimate_limited                       : std_logic;
 
   -- From the estimators to the control
-  signal flux_mode                                    : unsigned(1 downto 0);
-  signal lambda_m_d, lambda_m_q                       : signed(FLUX_W - 1 downto 0);
-  signal minus_rho                                    : signed(MINUS_RHO_W - 1 downto 0);
+  signal flux_mode              : unsigned(1 downto 0);
+  signal lambda_m_d, lambda_m_q : signed(FLUX_W - 1 downto 0);
+  signal minus_rho              : signed(MINUS_RHO_W - 1 downto 0);
 
   -- Protection
-  signal guard_busy, sample_early, sample_late        : std_logic;
-  signal fault_stop, gate_trip, gate_clear            : std_logic;
+  signal guard_busy, sample_early, sample_late : std_logic;
+  signal fault_stop, gate_trip, gate_clear     : std_logic;
 
   signal o : observed_t;
   signal e : estimated_t;
@@ -209,8 +209,7 @@ begin
               i_d => o.i_d, i_q => o.i_q, lambda_m_d => lambda_m_d, lambda_m_q => lambda_m_q,
               lambda_pi_d => e.lambda_pi_d, lambda_pi_q => e.lambda_pi_q, merge_known => e.merge_known, run => run,
               minus_rho => minus_rho,
-              flux_mode => flux_mode, l_d => settings.l_d, l_q => settings.l_q,
-              lambda_mg => settings.lambda_mg,
+              flux_mode => flux_mode, l_d => settings.l_d, l_q => settings.l_q, lambda_mg => settings.lambda_mg,
               out_valid => models_valid, model_d => model_d, model_q => model_q, merged_d => merged_d,
               merged_q => merged_q, merged => merged, ended => ended, raised_d => raised_d, raised_q => raised_q);
 

@@ -12,6 +12,7 @@ from fluxproof.checkout import DRIVES
 from fluxproof.cosim.runs import InGhdl, InVerilator, Named
 from fluxproof.golden_model import drive as drives
 from fluxproof.golden_model import fluxproof
+from fluxproof.golden_model.estimation import Estimated
 from studies.timeline import __main__ as timeline
 
 PAPER = DRIVES / "paper001.toml"
@@ -119,6 +120,17 @@ def test_smallest_converters(tmp_path):
     summary, _, register_set = close_loop(InGhdl, path, "short", 100, key=" coarse")
     assert (register_set.config.adc_bits, register_set.config.position_bits) == (12, 12)
     assert summary["differences"] == 0 and summary["periods_compared"] == 300
+
+
+def test_without_estimators(tmp_path):
+    """ESTIMATORS = 0: the same events, every value equal, what the estimators would show zero."""
+    skip_without_ghdl5()
+    path = tmp_path / "plain.toml"
+    path.write_text(PAPER.read_text().replace("[core]\n", "[core]\nestimators = false\n"))
+    summary, arrays, register_set = close_loop(InVerilator, path, "everything", 128, key=" no estimators")
+    assert register_set.config.estimators == 0 and register_set.values.flux_mode == 3
+    check_equal_at_every_period(summary, arrays)
+    assert not any(arrays[f"observed_{name}"].any() for name in Estimated._fields)
 
 
 def test_timeline():

@@ -1,12 +1,14 @@
 """The registers' integers correspond to the SI values: one sample through the blocks."""
 
+import dataclasses
 import math
 
 import pytest
 
-from cocotb_tests.core.test_registers import each_drive
+from cocotb_tests.core.test_registers import DRIVES, each_drive
 from fluxproof.golden_model.control import current_pi, decoupling, speed_pi
-from fluxproof.golden_model.drive import load
+from fluxproof.golden_model.drive import Sampling, load
+from fluxproof.golden_model.drive_keys import DriveError
 from fluxproof.golden_model.estimators import flux_estimate, flux_models
 from fluxproof.golden_model.io import current_conditioning, speed, u_dc_conditioning
 from fluxproof.golden_model.modulation import svm_delay_compensation
@@ -94,3 +96,37 @@ def test_position_steps_give_speed_and_angle_advance(path):
     (theta,) = svm_delay_compensation.step(0, omega_me, v.k_delay)
     advance = omega * 1.5 * drive.sample_time_s
     assert to_si("theta_me", theta, drive) == pytest.approx(advance, abs=2 * si_per_lsb("theta_me", drive))
+
+
+@pytest.mark.parametrize("delay_s", [0.0, 4e-6, -3e-6])
+@each_drive
+def test_voltage_acts_at_the_same_angle_wherever_the_sample_is(path, delay_s):
+    """Position and currents taken delay_s late: the output angle belongs to the middle of the next period."""
+    drive = load(path)
+    drive = dataclasses.replace(drive, sampling=Sampling(delay_s))
+    v, m = registers(drive).values, drive.machine
+    omega = 0.7 * m.pole_pairs * m.rated_speed_rad_s
+    omega_me, lsb = from_si("omega_me", omega, drive), si_per_lsb("theta_me", drive)
+    sampled = from_si("theta_me", 1.0 + omega * delay_s, drive)  # 1 rad at the valley
+    (theta_out,) = svm_delay_compensation.step(sampled, omega_me, v.k_delay)
+    middle = 1.0 + omega * 1.5 * drive.sample_time_s
+    error = (to_si("theta_me", theta_out, drive) - middle + math.pi) % (2 * math.pi) - math.pi
+    assert abs(error) <= 3 * lsb
+    # paper 000 eq. (6): directions of the currents at the middle of the voltage that the next sample commands
+    rows = {row.name: row for row in registers(drive).rows}
+    assert rows["k_ahead"].si == pytest.approx(2.5 * drive.sample_time_s - delay_s)
+    assert rows["k_ahead"].represented == pytest.approx(rows["k_ahead"].si, rel=1e-3)
+
+
+def test_sampling_delay_is_read_and_limited(tmp_path):
+    """The key of the drive file reaches the register; a sample nearer to another valley is refused."""
+    text = DRIVES[0].read_text()
+    path = tmp_path / "drive.toml"
+    path.write_text(f"{text}\n[sampling]\ndelay_s = 5e-6\n")
+    rows = {row.name: row for row in registers(load(path)).rows}
+    plain = {row.name: row for row in registers(load(DRIVES[0])).rows}
+    assert plain["k_delay"].si - rows["k_delay"].si == pytest.approx(5e-6)
+    assert {n for n in rows if rows[n].integer != plain[n].integer} == {"k_delay", "k_ahead"}
+    path.write_text(f"{text}\n[sampling]\ndelay_s = 1.0\n")
+    with pytest.raises(DriveError, match=r"\[sampling\] delay_s = 1 is out of range: allowed is between"):
+        load(path)

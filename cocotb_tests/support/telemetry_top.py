@@ -9,7 +9,7 @@ from fluxproof.cosim.entity import read_entity
 from fluxproof.files import write_text
 
 NAME = "core_with_telemetry"
-GENERICS = {"ADC_BITS": 16, "POSITION_BITS": 16, "CARRIER_HALF": 10000, "DEPTH_BITS": 9}
+GENERICS = {"ADC_BITS": 16, "POSITION_BITS": 16, "CARRIER_HALF": 10000, "ESTIMATORS": 1, "DEPTH_BITS": 9}
 
 
 def write_top(rtl: Path = RTL) -> Path:
@@ -19,7 +19,7 @@ def write_top(rtl: Path = RTL) -> Path:
     joined = {name: f"telemetry_{name}" if name == "enable" else name for name in telemetry}
     ports = [(name, pin) for name, pin in core.items()] + [(joined[name], pin) for name, pin in own.items()]
     listed = ";\n".join(f"    {name} : {pin.mode} {pin.vhdl_type}" for name, pin in ports)
-    generics = ";\n".join(f"    {name} : positive := {value}" for name, value in GENERICS.items())
+    generics = ";\n".join(f"    {name} : natural := {value}" for name, value in GENERICS.items())
     text = f"""\
 library ieee;
 use ieee.std_logic_1164.all;
@@ -38,7 +38,8 @@ end entity {NAME};
 architecture test of {NAME} is
 begin
   core : entity work.fluxproof
-    generic map (ADC_BITS => ADC_BITS, POSITION_BITS => POSITION_BITS, CARRIER_HALF => CARRIER_HALF)
+    generic map (ADC_BITS => ADC_BITS, POSITION_BITS => POSITION_BITS, CARRIER_HALF => CARRIER_HALF,
+                 ESTIMATORS => ESTIMATORS)
     port map ({", ".join(f"{name} => {name}" for name in core)});
   stream : entity work.telemetry
     generic map (ADC_BITS => ADC_BITS, POSITION_BITS => POSITION_BITS, DEPTH_BITS => DEPTH_BITS)

@@ -1,20 +1,27 @@
-/* Brings a drive up over its registers: is it the right core, load the drive, check, enable, ramp the speed up and
- * down, read back, stop.  The gates are off before it starts and, whatever goes wrong, when it ends.
+/* Brings a drive up over its registers: is it the right core, load the drive, check, enable, ramp the speed or the
+ * torque current up and down, read back, stop.  The gates are off before it starts and, whatever goes wrong, when it
+ * ends: Ctrl-C, SIGTERM and a bus error included.
  *
  *   fluxproof registers drive.toml --format c > drive_registers.h
- *   cc -Wall -Wextra -I docs/software -I . docs/software/bring_up.c docs/software/bus_uio.c -o bring_up
- *   ./bring_up 300          speed in rpm
+ *   cc -Wall -Wextra -I docs/software -I . docs/software/bring_up.c docs/software/bus_uio.c -lm -o bring_up
+ *   ./bring_up 300             speed mode: speed in rpm
+ *   ./bring_up 0.5 A 200       torque mode: current i_q in A, and the speed in rpm at which it gives up
  */
+
+#define _POSIX_C_SOURCE 200809L
 
 #include "fluxproof_bus.h"
 #include "fluxproof_registers.h" /* generated with the core: addresses of the registers */
 #include "drive_registers.h"     /* generated from your drive.toml: their values */
 
 #include <math.h>
+#include <signal.h>
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
 
 #define AT(name) ((uint32_t)offsetof(fluxproof_t, name))
 #define COUNT(list) (sizeof(list) / sizeof(list)[0])
@@ -22,6 +29,8 @@
 enum { STEPS = 20, STEP_US = 10000, SETTLE_STEPS = 20 };
 
 static const double PI = 3.14159265358979;
+
+static volatile sig_atomic_t asked_to_stop; /* the number of the signal */
 
 /* ------------------------------------------------------------------ small helpers */
 
@@ -38,8 +47,43 @@ static void fail(const char *format, ...)
     exit(1);
 }
 
+/* Ctrl-C or SIGTERM: noticed at the next access, so that none is cut in half. */
+static void note_signal(int number)
+{
+    asked_to_stop = number;
+}
+
+/* A bus error leaves no way back into the access: gates off here.  A second one ends the process. */
+static void on_bus_error(int number)
+{
+    static const char message[] = "bring_up: bus error, gates off\n";
+    (void)number;
+    bus_write(AT(enable), 0);
+    if (write(STDERR_FILENO, message, sizeof message - 1) < 0)
+        _exit(2);
+    _exit(1);
+}
+
+static void catch_signals(void)
+{
+    struct sigaction stop = {.sa_handler = note_signal}, error = {.sa_handler = on_bus_error};
+    stop.sa_flags = SA_RESTART;
+    error.sa_flags = SA_RESETHAND | SA_NODEFER;
+    sigaction(SIGINT, &stop, NULL);
+    sigaction(SIGTERM, &stop, NULL);
+    sigaction(SIGHUP, &stop, NULL);
+    sigaction(SIGBUS, &error, NULL);
+}
+
+static void heed_signals(void)
+{
+    if (asked_to_stop)
+        fail("stopped by signal %d, gates off", (int)asked_to_stop);
+}
+
 static void put(uint32_t offset, uint32_t value)
 {
+    heed_signals();
     if (!bus_write(offset, value))
         fail("the core refused 0x%08x at 0x%03x", (unsigned)value, (unsigned)offset);
 }
@@ -47,6 +91,7 @@ static void put(uint32_t offset, uint32_t value)
 static uint32_t get(uint32_t offset)
 {
     uint32_t value;
+    heed_signals();
     if (!bus_read(offset, &value))
         fail("nothing to read at 0x%03x", (unsigned)offset);
     return value;
@@ -74,7 +119,8 @@ static void identify(void)
     printf("core %u.%u.%u, %u Hz\n", version >> 16 & 255, version >> 8 & 255, version & 255, get(AT(clock_hz)));
 }
 
-/* The register values were calculated for these widths and this carrier. */
+/* The register values were calculated for these widths, this carrier and this clock: at another clock the PWM frequency
+ * and the dead time would be others. */
 static void check_generics(void)
 {
     const struct {
@@ -84,6 +130,8 @@ static void check_generics(void)
         {"ADC_BITS", AT(adc_bits), FLUXPROOF_ADC_BITS},
         {"POSITION_BITS", AT(position_bits), FLUXPROOF_POSITION_BITS},
         {"CARRIER_HALF", AT(carrier_half), FLUXPROOF_CARRIER_HALF},
+        {"CLOCK_HZ", AT(clock_hz), FLUXPROOF_CLOCK_HZ},
+        {"ESTIMATORS", AT(estimators), FLUXPROOF_ESTIMATORS},
     };
     for (size_t k = 0; k < COUNT(list); k++) {
         uint32_t got = get(list[k].offset);
@@ -93,12 +141,13 @@ static void check_generics(void)
     }
 }
 
-static void load_drive(void)
+static void load_drive(bool speed_mode)
 {
     put(AT(enable), 0);
     put(AT(omega_ref), 0);
     put(AT(i_d_ref), 0);
-    put(AT(speed_mode), 1);
+    put(AT(i_q_ext), 0);
+    put(AT(speed_mode), speed_mode);
     for (size_t k = 0; k < COUNT(fluxproof_settings); k++)
         put(fluxproof_settings[k].offset, (uint32_t)fluxproof_settings[k].value);
     for (size_t k = 0; k < COUNT(fluxproof_settings); k++) {
@@ -153,26 +202,50 @@ static double current_a(uint32_t offset)
     return get_signed(offset) / 65536.0 * FLUXPROOF_BASE_CURRENT_A;
 }
 
-static void check_running(void)
+static void check_running(double most_rpm)
 {
     if (flag(FLUXPROOF__FLAGS__TRIPPED_bm))
         fail("tripped at %.0f rpm: first_fault 0x%02x", speed_rpm(), (unsigned)get(AT(first_fault)));
+    if (fabs(speed_rpm()) > most_rpm)
+        fail("%.0f rpm, %.0f allowed", speed_rpm(), most_rpm);
 }
 
-static void ramp(double from, double to)
+/* A reference in steps from one value to another, then some time at it; lsb: value of one in the register. */
+static void ramp(uint32_t reference, double lsb, double from, double to, double most_rpm)
 {
     for (int k = 1; k <= STEPS; k++) {
-        double rpm = from + (to - from) * k / STEPS;
-        put(AT(omega_ref), (uint32_t)(int32_t)lround(rpm / rpm_per_unit()));
+        put(reference, (uint32_t)(int32_t)lround((from + (to - from) * k / STEPS) / lsb));
         wait_us(STEP_US);
-        check_running();
+        check_running(most_rpm);
     }
     for (int k = 0; k < SETTLE_STEPS; k++) {
         wait_us(STEP_US);
-        check_running();
+        check_running(most_rpm);
     }
-    printf("%.0f rpm wanted, %.1f rpm measured, i_d %.2f A, i_q %.2f A\n", to, speed_rpm(), current_a(AT(i_d)),
+}
+
+static void turn_at(double rpm)
+{
+    double lsb = rpm_per_unit();
+    ramp(AT(omega_ref), lsb, 0.0, rpm, HUGE_VAL);
+    double reached = speed_rpm();
+    printf("%.0f rpm wanted, %.1f rpm measured, i_d %.2f A, i_q %.2f A\n", rpm, reached, current_a(AT(i_d)),
            current_a(AT(i_q)));
+    if (fabs(reached - rpm) > 0.02 * fabs(rpm) + 5.0)
+        fail("%.1f rpm instead of %.0f", reached, rpm);
+    ramp(AT(omega_ref), lsb, rpm, 0.0, HUGE_VAL);
+}
+
+static void push_with(double current, double most_rpm)
+{
+    double lsb = FLUXPROOF_BASE_CURRENT_A / 65536.0;
+    ramp(AT(i_q_ext), lsb, 0.0, current, most_rpm);
+    double reached = current_a(AT(i_q));
+    printf("%.2f A wanted, i_q %.2f A measured, %.1f rpm, torque %.3f Nm\n", current, reached, speed_rpm(),
+           get_signed(AT(torque)) / 65536.0 * FLUXPROOF_BASE_TORQUE_NM);
+    if (fabs(reached - current) > 0.1 * fabs(current) + 0.01 * FLUXPROOF_BASE_CURRENT_A)
+        fail("i_q is %.2f A instead of %.2f", reached, current);
+    ramp(AT(i_q_ext), lsb, current, 0.0, most_rpm);
 }
 
 static void stop(void)
@@ -187,17 +260,21 @@ static void stop(void)
 int main(int argc, char **argv)
 {
     setvbuf(stdout, NULL, _IOLBF, 0);
-    double rpm = argc > 1 ? atof(argv[1]) : 300.0;
+    bool torque_mode = argc > 2 && strcmp(argv[2], "A") == 0;
+    if (argc > 2 && (!torque_mode || argc != 4)) {
+        fputs("usage: bring_up [RPM], or bring_up CURRENT A MOST_RPM\n", stderr);
+        return 2;
+    }
+    catch_signals();
     identify();
     check_generics();
-    load_drive();
+    load_drive(!torque_mode);
     check_at_rest();
     enable_gates();
-    ramp(0.0, rpm);
-    double reached = speed_rpm();
-    if (fabs(reached - rpm) > 0.02 * fabs(rpm) + 5.0)
-        fail("%.1f rpm instead of %.0f", reached, rpm);
-    ramp(rpm, 0.0);
+    if (torque_mode)
+        push_with(atof(argv[1]), atof(argv[3]));
+    else
+        turn_at(argc > 1 ? atof(argv[1]) : 300.0);
     stop();
     return 0;
 }

@@ -618,7 +618,7 @@ extern "C" {
 #define FLUXPROOF__U_DC_MAX__VALUE_reset 0x0
 
 // addrmap - fluxproof
-typedef struct __attribute__ ((__packed__)) {
+typedef struct {
     uint32_t identification;
     uint32_t version;
     uint32_t adc_bits;
@@ -728,7 +728,9 @@ typedef struct __attribute__ ((__packed__)) {
 } fluxproof_t;
 
 
+#if defined(__cplusplus) || __STDC_VERSION__ >= 201112L
 static_assert(sizeof(fluxproof_t) == 0x200, "Packing error");
+#endif
 
 #ifdef __cplusplus
 }

@@ -60,8 +60,8 @@ def bound(_v, _state):
     return {"i_q_ref": PROPORTIONAL.lsb / 2 + PU.lsb / 2}
 
 
-def stimuli(_rng, _config):
-    """Saturation in both directions with recovery, torque mode, stop and restart."""
+def stimuli(rng, _config):
+    """Saturation in both directions with recovery, torque mode, stop and restart; gains of every size in use."""
     regs = {
         "speed_kp": 5 << 16,
         "speed_ki": 1 << 20,
@@ -72,11 +72,16 @@ def stimuli(_rng, _config):
     }
     rows = []
     for target in (131071, 100, -131072, 0):
-        rows += [
-            {"omega_ref": target, "omega_me": w, **regs} for w in (0, 1000, target, target - 1, target + 1)
-        ]
+        rows += [{"omega_ref": target, "omega_me": w, **regs} for w in (0, 1000, target, target - 1, target + 1)]
     rows = [r for r in rows if -131072 <= r["omega_me"] <= 131071] * 2
     rows += [{**rows[0], "speed_mode": 0}, rows[0], {**rows[0], "run": 0}, rows[0]]
+    for _ in range(24):  # the integral moves inside its limits, reaches them and comes back
+        kp, ki, most = (int(2 ** rng.uniform(*span)) for span in ((4, 20), (4, 23), (6, 17)))
+        regs = {**regs, "speed_kp": kp, "speed_ki": ki, "i_max": most}
+        wide = 2 ** rng.uniform(2, 16)
+        for k in range(24):
+            err = int(rng.uniform(-1, 1) * wide) if k % 8 else int(rng.integers(-1, 2))
+            rows.append({"omega_ref": err + 77, "omega_me": 77, **regs, "speed_mode": int(k != 20)})
     return rows
 
 

@@ -73,7 +73,7 @@ def below_two(v):
     return out
 
 
-def stimuli(_rng, _config):
+def stimuli(rng, _config):
     """Zero vector at every bus voltage; every sector border and corner, inside and beyond the hexagon."""
     rows = [
         {"u_alpha": 0, "u_beta": 0, "inverse": m << n, "inverse_beta": (m * 7 // 8) << n}
@@ -88,7 +88,21 @@ def stimuli(_rng, _config):
                 for da in (-1, 0, 1)
                 if abs(round(a) + da) <= PU.hi
             ]
+    # The border of over-modulation to the LSB, at any angle.
+    for _ in range(60):
+        angle, low, high = rng.uniform(0, 2 * math.pi), 0, 60000
+        while high - low > 1:
+            middle = (low + high) // 2
+            duties = step(*at_radius(middle, angle).values())
+            low, high = (low, middle) if {0, DUTY_ONE} & set(duties) else (middle, high)
+        rows += [at_radius(low + more, angle) for more in (0, 1, 2, 3)]
     return rows
+
+
+def at_radius(radius, angle):
+    """A voltage at the lowest bus voltage."""
+    a, b = round(radius * math.cos(angle)), round(radius * math.sin(angle))
+    return {"u_alpha": a, "u_beta": b, "inverse": 131071, "inverse_beta": 113511}
 
 
 BLOCK = Block(

@@ -696,4 +696,88 @@ package fluxproof_pkg is
   constant FAULT_LATCH_TRIP : natural := 7;
   constant FAULT_LATCH_EARLY : natural := 8;
 
+  -- spi_frame: none: front end of a board
+  constant SPI_FRAME_LATENCY : positive := 1;
+  constant SPI_FRAME_LEAST_RATIO : natural := 4;
+  constant SPI_FRAME_MOST_RATIO : natural := 16;
+  constant SPI_FRAME_LEAST_BITS : natural := 12;
+  constant SPI_FRAME_MOST_BITS : natural := 32;
+  constant SPI_FRAME_STROBES : natural := 16;
+  constant SPI_FRAME_TRAIL : natural := 20;
+
+  -- spi_words: none: front end of a board
+  constant SPI_WORDS_LATENCY : positive := 1;
+
+  -- spi_converter: none: front end of a board
+  constant SPI_CONVERTER_LATENCY : positive := 1;
+
+  -- modulator_input: none: front end of a board
+  constant MODULATOR_INPUT_LATENCY : positive := 1;
+  constant MODULATOR_INPUT_STROBES : natural := 16;
+
+  -- sinc3: none: front end of a board
+  constant SINC3_LATENCY : positive := 1;
+  constant SINC3_TOTAL_W : natural := 25;
+  constant SINC3_INSTANTS : natural := 3;
+  constant SINC3_PRODUCT : natural := 37;
+
+  -- sinc_overcurrent: none: front end of a board
+  constant SINC_OVERCURRENT_LATENCY : positive := 1;
+  constant SINC_OVERCURRENT_TOTAL_W : natural := 16;
+  constant SINC_OVERCURRENT_WARM : natural := 3;
+
+  -- third_current: none: front end of a board
+  constant THIRD_CURRENT_LATENCY : positive := 1;
+
+  -- xadc_reader: none: front end of a board
+  constant XADC_READER_LATENCY : positive := 1;
+  constant XADC_READER_CONVST_CLOCKS : natural := 8;
+
+  -- input_filter: none: pins of a board
+  constant INPUT_FILTER_LATENCY : positive := 1;
+
+  -- quadrature_decoder: none: incremental encoder
+  constant QUADRATURE_DECODER_LATENCY : positive := 1;
+
+  -- turn_counter: none: incremental encoder
+  constant TURN_COUNTER_LATENCY : positive := 1;
+
+  -- index_check: none: incremental encoder
+  constant INDEX_CHECK_LATENCY : positive := 1;
+
+  -- edge_timer: none: speed by the time between edges
+  constant EDGE_TIMER_LATENCY : positive := 1;
+  constant EDGE_TIMER_TIME_W : natural := 24;
+  constant EDGE_TIMER_MOVED_W : natural := 16;
+  constant EDGE_TIMER_QUOTIENT_W : natural := 19;
+  constant EDGE_TIMER_DIVIDE_AT : natural := 17;
+  constant EDGE_TIMER_LIMIT_AT : natural := 37;
+  constant EDGE_TIMER_LAST : natural := 38;
+
+  -- hall_decoder: none: three Hall sensors, 120 degrees apart
+  constant HALL_DECODER_LATENCY : positive := 1;
+  type hall_decoder_middle_t is array (0 to 7) of unsigned(17 downto 0);
+  constant HALL_DECODER_MIDDLE : hall_decoder_middle_t := (  -- U(0,18)
+    18x"05555", 18x"10000", 18x"1aaab", 18x"25555", 18x"30000", 18x"3aaab", 18x"00000", 18x"00000"
+  );
+
+  -- incremental_encoder: none: incremental encoder
+  constant INCREMENTAL_ENCODER_LATENCY : positive := 1;
+
+  -- ssi_master: none: SSI, synchronous serial interface
+  constant SSI_MASTER_LATENCY : positive := 1;
+
+  -- biss_master: none: BiSS interface, protocol C
+  constant BISS_MASTER_LATENCY : positive := 1;
+
+  -- endat_master: none: EnDat 2.2, bidirectional interface for position encoders
+  constant ENDAT_MASTER_LATENCY : positive := 1;
+  constant ENDAT_MASTER_FIRST : natural := 2;
+  constant ENDAT_MASTER_LET_GO : natural := 8;
+  constant ENDAT_MASTER_LISTEN : natural := 9;
+
+  -- position_bridge: none: absolute encoders
+  constant POSITION_BRIDGE_LATENCY : positive := 1;
+  constant POSITION_BRIDGE_DROP : natural := 16;
+
 end package fluxproof_pkg;

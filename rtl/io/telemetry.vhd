@@ -21,19 +21,19 @@ entity telemetry is
     DEPTH_BITS    : positive range 5 to 16  := 9
   );
   port (
-    clk             : in  std_logic;
-    rst             : in  std_logic;  -- synchronous, active high
-    enable          : in  std_logic;  -- 1: send packets
-    sample_valid    : in  std_logic;  -- 1: the raw sample below is valid
-    m_axis_tready   : in  std_logic;  -- 1: the sink accepts the word
-    sample          : in  sample_t;  -- codes of converters and encoder, references
-    running         : in  std_logic;  -- 1: the gates are switching
-    observed        : in  observed_t;  -- values of the sample
-    estimated       : in  estimated_t;  -- values of the estimators
-    m_axis_tdata    : out unsigned(31 downto 0);  -- a word of the packet
-    m_axis_tvalid   : out std_logic;  -- 1: the word is valid
-    m_axis_tlast    : out std_logic;  -- 1: last word of the packet
-    dropped         : out unsigned(15 downto 0)  -- samples without a packet because the queue was full
+    clk           : in  std_logic;
+    rst           : in  std_logic;  -- synchronous, active high
+    enable        : in  std_logic;  -- 1: send packets
+    sample_valid  : in  std_logic;  -- 1: the raw sample below is valid
+    m_axis_tready : in  std_logic;  -- 1: the sink accepts the word
+    sample        : in  sample_t;  -- codes of converters and encoder, references
+    running       : in  std_logic;  -- 1: the gates are switching
+    observed      : in  observed_t;  -- values of the sample
+    estimated     : in  estimated_t;  -- values of the estimators
+    m_axis_tdata  : out unsigned(31 downto 0);  -- a word of the packet
+    m_axis_tvalid : out std_logic;  -- 1: the word is valid
+    m_axis_tlast  : out std_logic;  -- 1: last word of the packet
+    dropped       : out unsigned(15 downto 0)  -- samples without a packet because the queue was full
   );
 end entity telemetry;
 

@@ -113,11 +113,11 @@ begin
       end if;
 
       -- Legs: both gates are off during the dead time after a change of the command; a gate that is on stays on if the
-      -- dead time is increased
+      -- dead time is increased.  Undefined before the reset, on_0 turns no gate on in a simulation either
       for k in 0 to 2 loop
         gate_high(k) <= '0';
         gate_low(k)  <= '0';
-        if on_0 = '0' then
+        if on_0 /= '1' then
           state.level(k)   <= '0';
           state.elapsed(k) <= (others => '0');
         elsif wanted(k) /= state.level(k) then

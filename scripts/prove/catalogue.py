@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 from fluxproof.checkout import RTL
-from scripts.prove import buses, core, gates, narrowing, pipeline, protection
+from fluxproof.cosim.flat import FLAT
+from scripts.prove import buses, converters, core, encoders, gates, narrowing, pipeline, protection
 from scripts.prove.proof import Proof
 
 
 def every_proof() -> tuple[Proof, ...]:
     """The whole catalogue."""
-    written = (*gates.PROOFS, *core.PROOFS, *protection.PROOFS, *buses.PROOFS)
+    written = (*gates.PROOFS, *core.PROOFS, *protection.PROOFS, *buses.PROOFS, *converters.PROOFS, *encoders.PROOFS)
     return (*written, *narrowing.proofs(), *pipeline.proofs())
 
 
 def catalogue() -> tuple[Proof, ...]:
     """The proofs whose entity is in rtl/ or generated."""
     entities = {path.stem for path in RTL.rglob("*.vhd")}
-    return tuple(proof for proof in every_proof() if proof.vhdl is not None or proof.entity in entities)
+    return tuple(p for p in every_proof() if p.vhdl is not None or p.entity.removesuffix(FLAT) in entities)
 
 
 def left_out() -> tuple[str, ...]:

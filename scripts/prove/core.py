@@ -11,34 +11,34 @@ from scripts.prove.gates import SEVERAL_PERIODS, SMALL
 from scripts.prove.pipeline import ports
 from scripts.prove.proof import HARNESSES, Fault, Proof
 
-CORE = "fluxproof"
+CORE, TOP = "fluxproof", "fluxproof_flat"  # the entity, and the top around it with plain ports
 OUTPUTS = ("gate_high", "gate_low", "tripped")
 KEPT = ("gate_generation", "fault_latch")  # the blocks between trip and the gates
 
 
 def harness(verilog: str) -> str:
     """``formal_top``: the core with free inputs, its gates, and the properties of tb/formal/core.sv."""
-    found = ports(verilog, CORE)
+    found = ports(verilog, TOP)
     inputs = [(width, name) for direction, width, name in found if direction == "input"]
     looked_at = [(width, name) for direction, width, name in found if name in OUTPUTS]
     header = ",\n".join(f"    input {width} {name}" for width, name in inputs)
     wires = "\n".join(f"  wire {width} {name};" for width, name in looked_at)
     wiring = ", ".join(f".{name}({name})" for _, name in [*inputs, *looked_at])
     body = (HARNESSES / "core.sv").read_text()
-    return f"module formal_top (\n{header}\n);\n{wires}\n  {CORE} dut ({wiring});\n{body}endmodule\n"
+    return f"module formal_top (\n{header}\n);\n{wires}\n  {TOP} dut ({wiring});\n{body}endmodule\n"
 
 
 def cut(verilog: str) -> tuple[str, ...]:
     """The modules that are cut off: all but the top and those of KEPT."""
     modules = re.findall(r"^module (\w+)", verilog, re.MULTILINE)
-    return tuple(m for m in modules if m != CORE and not any(m.startswith(kept) for kept in KEPT))
+    return tuple(m for m in modules if not m.startswith((CORE, *KEPT)))
 
 
 def core_proof(name: str, says: str, macro: str, *faults: Fault) -> Proof:
     return Proof(
         name=f"core_{name}",
         says=says,
-        entity=CORE,
+        entity=TOP,
         harness=harness,
         faults=faults,
         method="pdr",
@@ -58,8 +58,8 @@ PROOFS = (
         Fault(
             "low gates not connected",
             f"{CORE}.vhd",
-            "      gate_low        => gate_low,\n",
-            "      gate_low        => open,\n",
+            "gate_high => gate_high, gate_low => gate_low,",
+            "gate_high => gate_high, gate_low => open,",
         ),
     ),
     core_proof(
@@ -69,8 +69,8 @@ PROOFS = (
         Fault(
             "clear while it is there",
             "modulation/gate_generation.vhd",
-            "trip or (tripped_now and not clear_trip)",
-            "(trip or tripped_now) and not clear_trip",
+            "trip or (state.tripped and not clear_trip)",
+            "(trip or state.tripped) and not clear_trip",
         ),
     ),
     core_proof(
@@ -80,8 +80,8 @@ PROOFS = (
         Fault(
             "enable held high",
             f"{CORE}.vhd",
-            "      enable          => enable,\n",
-            "      enable          => '1',\n",
+            "compare_c => o.compare_c, enable => enable,",
+            "compare_c => o.compare_c, enable => '1',",
         ),
     ),
 )

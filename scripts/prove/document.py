@@ -33,7 +33,7 @@ def _row(name: str, says: str, method: str, assumed: str, entries: list[dict]) -
 def table(entries: list[dict], day: str) -> str:
     """Markdown: a row for each property, one for all blocks' pipelines."""
     rows = ["| property | what | method | assumed | last result, faults caught |", "|---|---|---|---|---|"]
-    blocks = [e for e in entries if e["property"].startswith("pipeline_") and e["entity"] != "fluxproof"]
+    blocks = [e for e in entries if e["property"].startswith("pipeline_") and e["entity"] != "fluxproof_flat"]
     for entry in entries:
         if entry not in blocks:
             rows.append(_row(entry["property"], entry["says"], method_of(entry), entry["assumed"], [entry]))

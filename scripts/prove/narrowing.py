@@ -15,7 +15,7 @@ from pathlib import Path
 
 from fluxproof.checkout import ROOT
 from fluxproof.cosim.sources import rtl_sources
-from fluxproof.cosim.verilog import TOP, find_ghdl
+from fluxproof.cosim.verilog import find_ghdl
 from scripts.prove.proof import Fault, Proof
 
 PACKAGE = "common/fixed_pkg.vhd"
@@ -80,7 +80,9 @@ FAULTS = {
     "plus_rounded": Fault("half lost", PACKAGE, "sum := (a & '1')", "sum := (a & '0')"),
     "minus_rounded": Fault("half added", PACKAGE, "rest := (a & '0')", "rest := (a & '1')"),
     "minus_half_up": Fault("half missing", PACKAGE, "+ not half(drop, x'length + 1);", "- 1;"),
-    "turned_half_up": Fault("complement taken for the negative", PACKAGE, "one_more(0) := minus;", "one_more(0) := '0';"),
+    "turned_half_up": Fault(
+        "complement taken for the negative", PACKAGE, "one_more(0) := minus;", "one_more(0) := '0';"
+    ),
     "difference": Fault(
         "complement taken for the negative", PACKAGE, "((not resize(b, WIDTH)) & '1')", "((not resize(b, WIDTH)) & '0')"
     ),
@@ -107,7 +109,7 @@ def widths_in_use() -> dict[str, tuple[tuple[int, ...], ...]]:
                 )
         (tree / PACKAGE).write_text(f"{declaration}package body fixed_pkg is{REPORTER}{body}")
         command = [str(ghdl), "--synth", "--std=08", "--out=none", f"--workdir={scratch}"]
-        command += [*map(str, rtl_sources(tree)), "-e", TOP]
+        command += [*map(str, rtl_sources(tree)), "-e", "fluxproof"]
         done = subprocess.run(command, capture_output=True, text=True)
     seen: dict[str, set] = {name: set() for name in REPORTS}
     for name, widths in re.findall(r"\bused (\w+) ([\d ]+)", done.stdout + done.stderr):

@@ -158,14 +158,14 @@ def core_proof() -> Proof:
     return Proof(
         name="pipeline_fluxproof",
         says="duty_valid, compare_valid and values_valid of the core come at their declared clocks, never otherwise",
-        entity="fluxproof",
-        harness=partial(harness, "fluxproof", "sample_valid", ends, fluxproof.SAMPLE_INTERVAL, guarded=True),
+        entity="fluxproof_flat",
+        harness=partial(harness, "fluxproof_flat", "sample_valid", ends, fluxproof.SAMPLE_INTERVAL, guarded=True),
         faults=(
             Fault(
                 "compare starts with the voltage",
                 "fluxproof.vhd",
-                "      in_valid  => duty_ready,\n",
-                "      in_valid  => ab_voltage_valid,\n",
+                "in_valid => duty_ready,",
+                "in_valid => ab_voltage_valid,",
             ),
             Fault(
                 "angle does not wait for the reset",

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from fluxproof.checkout import BUILD, ROOT
 from fluxproof.cosim.sources import rtl_sources
-from fluxproof.cosim.verilog import synthesize
+from fluxproof.cosim.verilog import sources_of, synthesize
 from fluxproof.files import write_text
 from scripts.prove.proof import Fault, Proof
 
@@ -77,7 +77,7 @@ def with_spies(verilog: str, entity: str, spies: tuple[str, ...]) -> str:
 
 def convert(proof: Proof, generics: Mapping[str, int], rtl: Path, scratch: Path) -> str:
     """The Verilog of the proof's entity from the sources under ``rtl``."""
-    sources = rtl_sources(rtl)
+    sources = sources_of(proof.entity, rtl) if proof.vhdl is None else rtl_sources(rtl)
     if proof.vhdl is not None:
         sources = [*(path for path in sources if path.stem.endswith("_pkg")), scratch / f"{proof.entity}.vhd"]
         write_text(sources[-1], proof.vhdl())

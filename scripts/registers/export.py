@@ -32,7 +32,20 @@ def c_header(top: AddrmapNode, name: str) -> str:
     with tempfile.TemporaryDirectory() as scratch:
         path = Path(scratch) / name
         CHeaderExporter().export(top, str(path))
-        return path.read_text()
+        return _portable(path.read_text())
+
+
+def _portable(text: str) -> str:
+    """Without the attribute `packed`, which lets a compiler store bytes, and with the assertion only where C has it.
+
+    All members are words, so that nothing needs packing; the assertion holds that.
+    """
+    lines = []
+    for line in text.replace(" __attribute__ ((__packed__))", "").splitlines():
+        if line.startswith("static_assert"):
+            line = f"#if defined(__cplusplus) || __STDC_VERSION__ >= 201112L\n{line}\n#endif"
+        lines.append(line)
+    return "\n".join(lines) + "\n"
 
 
 def python_names(words: list[Word]) -> str:

@@ -20,8 +20,8 @@ needs_of() {
         synth) echo core run report sim synth test ghdl c++ ghdl5 yosys ;;
         ecp5) echo core report synth ghdl5 yosys nextpnr ;;
         lint) echo lint ;;
-        mutate) echo core run report sim blind compare package prove test lint ghdl c++ tcl ghdl5 yosys ;;
-        test) echo "$(needs_of mutate)" browser ;;
+        mutate) echo core run report sim package prove test ghdl c++ ghdl5 yosys ;;
+        test) echo "$(needs_of mutate)" blind compare lint tcl browser ;;
         setup) echo "$(needs_of test)" synth nextpnr ;;
         *) return 1 ;;
     esac

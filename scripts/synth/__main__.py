@@ -71,7 +71,13 @@ def report_counts(design: Design, work: Work, families: list[str]) -> dict[str, 
         report.draw(counted, OUT / "resources.svg")
     print(f"\nwritten to {os.path.relpath(OUT)}: resources.json, details.json{', resources.svg' if counted else ''}")
     small = {name: row.kept() for name, row in work.small.result().items()}
-    return {**to_keep, f"{STRUCTURE_FAMILY}, block alone": small}
+    plain = work.plain.result()
+    print(f"\n{STRUCTURE_FAMILY}, ESTIMATORS = 0\n{report.table({'the core, in one piece': plain})}", flush=True)
+    return {
+        **to_keep,
+        f"{STRUCTURE_FAMILY}, block alone": small,
+        f"{STRUCTURE_FAMILY}, ESTIMATORS = 0": {"total": plain.kept()},
+    }
 
 
 def report_structure(work: Work) -> None:

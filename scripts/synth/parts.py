@@ -45,6 +45,7 @@ class Work:
         self.whole: dict[str, Future] = {}
         self.groups: dict[str, Future] = {}
         self.small: Future | None = None
+        self.plain: Future | None = None
         self.netlist: Future | None = None
         self.structure: Future | None = None
         # The longest first, so that the cores finish at about the same time.
@@ -61,6 +62,7 @@ class Work:
             alone = [f for f in families if f != STRUCTURE_FAMILY or self.structure is None]
             self.whole = {family: pool.submit(design.whole, family) for family in alone}
             self.small = pool.submit(design.blocks, SMALL, STRUCTURE_FAMILY)
+            self.plain = pool.submit(design.without_estimators, STRUCTURE_FAMILY)
 
     def count_of(self, family: str) -> Count:
         """The whole core's count; for the family of the structure it comes with the netlist."""

@@ -163,6 +163,14 @@ class Design:
         (cells,) = self._run(f"{family}: the whole", script, ["stat.json"])
         return count(cells[self.top])
 
+    def without_estimators(self, family: str) -> Count:
+        """The core alone with ESTIMATORS = 0, in one piece."""
+        verilog = synthesize(rtl_sources(self.rtl), CORE, {"ESTIMATORS": 0})
+        top = re.search(rf"^module ({CORE}\w*)", verilog, re.MULTILINE)[1]
+        script = [SYNTH.format(family=family, top=top), "tee -q -o stat.json stat -json"]
+        (cells,) = self._run(f"{family}: without estimators", script, ["stat.json"], verilog)
+        return count(cells[top])
+
     def whole_with_netlist(self, family: str) -> tuple[Count, Netlist]:
         """``whole`` and its netlist, each cell with its block: the same passes, blocks noted after `flatten`."""
         synth = SYNTH.format(family=family, top=self.top)

@@ -50,7 +50,8 @@ def main(arguments=None) -> int:
     path = FOLDER / "result.json"
     result = together(results, json.loads(path.read_text()) if path.exists() else {})
     write_json(path, result)
-    write_text(FOLDER / "report.html", page(result))
+    if "figures" in result:  # the page of all is built around the own generator's; without it, each has its own page
+        write_text(FOLDER / "report.html", page(result))
     return 0
 
 

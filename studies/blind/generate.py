@@ -19,11 +19,13 @@ from fluxproof.checkout import BUILD
 from fluxproof.files import write_text
 from studies.blind import cases, identifiable
 from studies.blind.seal import seal
+from studies.blind.sealed import cases as sealed
+from studies.blind.sealed.write import write_case as write_sealed
 from studies.blind.strangers import cases as strangers
 from studies.blind.strangers.write import write_case
 
 ATTEMPTS = 12
-GENERATORS = ("own", *strangers.GENERATORS)
+GENERATORS = ("own", *strangers.GENERATORS, "sealed")
 
 
 def listing(seed: int, count: int, only: list[str] | None, generator="own") -> list[tuple[int, str, int]]:
@@ -38,7 +40,7 @@ def listing(seed: int, count: int, only: list[str] | None, generator="own") -> l
 
 def strata_of(generator: str) -> dict[str, float]:
     """Shares of a generator's strata."""
-    return cases.STRATA if generator == "own" else strangers.STRATA
+    return {"own": cases.STRATA, "sealed": sealed.STRATA}.get(generator, strangers.STRATA)
 
 
 def write_recording(path: Path, columns: dict, kind: str) -> Path:
@@ -57,6 +59,8 @@ def write_recording(path: Path, columns: dict, kind: str) -> Path:
 def generate_case(job) -> dict:
     """Simulate and write one case; its entry of the truth."""
     generator, seed, number, stratum, turn, out = job
+    if generator == "sealed":
+        return write_sealed(job, write_recording)
     if generator != "own":
         return write_case(job, write_recording)
     for attempt in range(ATTEMPTS):

@@ -1,0 +1,79 @@
+"""Master for SPI converters: spi_frame clocks the frame, spi_words makes codes of its bits; one step is one clock.
+
+Each ``sample_trigger`` is answered by ``codes_valid`` with all codes, or by ``frame_error``.  See spi_frame for the
+start of the conversion, the edges, the time-out and refused settings, spi_words for the place and the sign of a code.
+The bit taken is the level of the pin ``sample_delay`` clocks after the edge of ``sclk`` has left its register,
+registered twice; ``sample_delay`` covers the round trip (output pad, isolator, converter, input pad), so that the
+line is stable then.
+"""
+
+from typing import NamedTuple
+
+from fluxproof.golden_model.block import Block, Port
+from fluxproof.golden_model.converters import spi_frame, spi_words
+from fluxproof.golden_model.formats import BIT
+from fluxproof.golden_model.kernel import kernel
+
+
+class State(NamedTuple):
+    of_spi_frame: spi_frame.State = spi_frame.State()
+    of_spi_words: spi_words.State = spi_words.State()
+    frame_start: int = 0
+    bit_taken: int = 0
+    codes_valid: int = 0
+
+
+@kernel
+def step(
+    state, sample_trigger, miso, busy, clock_ratio, word_bits, skip_bits, sample_delay, wait_clocks, busy_timeout,
+    two_words, use_convst, clock_idle, second_edge, signed_code, adc_bits, lines,
+):  # fmt: skip
+    s = state
+    frame, (convst, cs_n, sclk, frame_start, bit_taken, frame_error, setting_refused) = spi_frame.step(
+        s.of_spi_frame, sample_trigger, busy, s.codes_valid, clock_ratio, word_bits, skip_bits, sample_delay,
+        wait_clocks, busy_timeout, two_words, use_convst, clock_idle, second_edge, adc_bits,
+    )  # fmt: skip
+    words, (codes_valid, code_0, code_1, code_2, code_3, code_4, code_5, code_6, code_7) = spi_words.step(
+        s.of_spi_words, s.frame_start, s.bit_taken, miso, word_bits, skip_bits, two_words, signed_code, adc_bits, lines
+    )
+    following = State(frame, words, frame_start, bit_taken, codes_valid)
+    outputs = (
+        convst, cs_n, sclk, codes_valid, frame_error, setting_refused,
+        code_0, code_1, code_2, code_3, code_4, code_5, code_6, code_7,
+    )  # fmt: skip
+    return following, outputs
+
+
+def stimuli(rng, config):
+    """The frames of spi_frame, with noise on the lines."""
+    top = (1 << config["LINES"]) - 1
+    rows = spi_frame.stimuli(rng, config)
+    for number, row in enumerate(rows):
+        del row["words_complete"]
+        row |= {"miso": int(rng.integers(top + 1)), "signed_code": number >> 10 & 1}
+    return rows
+
+
+BLOCK = Block(
+    name="spi_converter",
+    folder="converters",
+    paper="none: front end of a board",
+    step=step,
+    inputs=(spi_frame.BLOCK.inputs[0], spi_words.MISO, spi_frame.BLOCK.inputs[1]),
+    registers=spi_frame.BLOCK.registers + spi_words.REGISTERS[-1:],
+    outputs=(
+        *spi_frame.BLOCK.outputs[:3],
+        Port("codes_valid", BIT, doc="1 for a clock: the codes are new"),
+        *spi_frame.BLOCK.outputs[-2:],
+        *spi_words.CODES,
+    ),
+    state=State(),
+    latency=1,
+    clocked=True,
+    after_reset={"cs_n": 1},
+    configs=spi_words.BLOCK.configs,
+    width_from=spi_words.WIDTHS,
+    reference=None,
+    bound=None,
+    stimuli=stimuli,
+)

@@ -1,0 +1,198 @@
+"""The frame of SPI converters: start, chip select, clock, and when a bit is taken; one step is one clock.
+
+A trigger starts a conversion and one frame; ``words_complete`` of spi_words or ``frame_error`` answers each trigger.
+
+* ``use_convst`` = 1: ``convst`` is high until ``wait_clocks`` have passed and BUSY is low, then the frame starts.
+  ``wait_clocks`` covers the delay from CONVST to BUSY and two clocks; without a BUSY pin (tied low) it is the time
+  of a conversion.  No frame until ``busy_timeout``: frame_error.
+  ``use_convst`` = 0: the falling edge of ``cs_n`` starts the conversion, the frame follows at once.
+* Frame: ``cs_n`` low, a period of ``sclk`` later ``word_bits`` clocks (twice with ``two_words``) of ``clock_ratio``
+  clocks each.
+  A bit is taken at the edge of ``sclk`` in its middle: the first of the bit, or with ``second_edge`` the second.
+* ``bit_taken`` comes ``sample_delay`` + 1 clocks after that edge leaves its register; ``sample_delay`` covers the
+  round trip.
+* The frame ends when spi_words has seen all its bits.
+
+A frame without room for the code (``skip_bits`` + ADC_BITS > ``word_bits``), or a ratio or word length out of its
+range, is refused (``setting_refused``): each trigger is a frame_error then.  So is a trigger during a frame, which
+goes on, and a frame whose bits do not all arrive, because a register changed meanwhile.
+BUSY is not synchronous and passes two registers.  Formats: clocks.
+"""
+
+from typing import NamedTuple
+
+from fluxproof.golden_model.block import Block, Port
+from fluxproof.golden_model.fixed import Format
+from fluxproof.golden_model.formats import BIT
+from fluxproof.golden_model.kernel import kernel
+
+RATIO = Format(0, 5, 0)
+BITS = Format(0, 6, 0)
+SKIP = Format(0, 5, 0)
+DELAY = Format(0, 4, 0)
+CLOCKS = Format(0, 16, 0)
+LEAST_RATIO, MOST_RATIO = 4, 16
+LEAST_BITS, MOST_BITS = 12, 32
+STROBES = 16  # values of sample_delay
+TRAIL = 20  # clocks after sclk until the last bit must have arrived: the longest sample_delay and the registers
+IDLE, CONVERTING, LEADING, READING, TRAILING = range(5)
+
+
+class State(NamedTuple):
+    phase: int = IDLE
+    elapsed: int = 1  # clocks that convst has been high
+    tick: int = 0  # clock within a period of sclk
+    sent: int = 0  # bits that sclk has clocked
+    strobes: int = 0  # edges of the last clocks that take a bit, the newest at bit 0
+    complete: int = 0  # spi_words has all bits
+    busy_meta: int = 0
+    busy_now: int = 0
+
+
+@kernel
+def step(
+    state, sample_trigger, busy, words_complete, clock_ratio, word_bits, skip_bits, sample_delay, wait_clocks,
+    busy_timeout, two_words, use_convst, clock_idle, second_edge, adc_bits,
+):  # fmt: skip
+    s = state
+    good = LEAST_RATIO <= clock_ratio <= MOST_RATIO and LEAST_BITS <= word_bits <= MOST_BITS
+    good = good and skip_bits + adc_bits <= word_bits
+    half = clock_ratio >> 1
+    bits = word_bits << two_words
+    last_tick = s.tick + 1 >= clock_ratio
+    sampling = 1 if s.phase == READING and s.tick == half else 0
+    active = s.phase == READING and (s.tick < half if second_edge else s.tick >= half)
+    bit_taken = (s.strobes >> sample_delay) & 1
+    complete = 1 if s.complete or words_complete else 0
+
+    # Conversion and frame
+    phase, elapsed, tick, sent = s.phase, s.elapsed, s.tick + 1, s.sent
+    strobes = ((s.strobes << 1) | sampling) & ((1 << STROBES) - 1)
+    frame_start, frame_error = 0, 0
+    if s.phase == IDLE:
+        elapsed, tick, sent, strobes, complete = 1, 0, 0, 0, 0
+        if sample_trigger and good:
+            phase, frame_start = CONVERTING if use_convst else LEADING, 1
+    elif s.phase == CONVERTING:
+        elapsed, tick = s.elapsed + 1, 0
+        if s.elapsed >= wait_clocks and not s.busy_now:
+            phase = LEADING
+        elif s.elapsed >= busy_timeout:
+            phase, frame_error = IDLE, 1
+    elif s.phase == LEADING:
+        if last_tick:
+            phase, tick = READING, 0
+    elif s.phase == READING:
+        if last_tick:
+            tick, sent = 0, s.sent + 1
+            if s.sent + 1 >= bits:
+                phase = TRAILING
+    elif complete:
+        phase = IDLE
+    elif s.tick >= TRAIL:
+        phase, frame_error = IDLE, 1
+    if sample_trigger and (s.phase != IDLE or not good):
+        frame_error = 1
+
+    following = State(phase, elapsed, tick, sent, strobes, complete, busy, s.busy_meta)
+    outputs = (
+        1 if phase == CONVERTING else 0,
+        1 if phase == IDLE or phase == CONVERTING else 0,
+        1 - clock_idle if active else clock_idle,
+        frame_start,
+        bit_taken,
+        frame_error,
+        0 if good else 1,
+    )
+    return following, outputs
+
+
+def settings(**changes):
+    """Registers of a common converter: 16 bits, CONVST and BUSY, one word a line."""
+    return {
+        "clock_ratio": 4, "word_bits": 16, "skip_bits": 0, "sample_delay": 3, "wait_clocks": 8, "busy_timeout": 300,
+        "two_words": 0, "use_convst": 1, "clock_idle": 0, "second_edge": 0,
+    } | changes  # fmt: skip
+
+
+def stimuli(rng, config):
+    """Every ratio, both starts, one and two words, all edges and delays; BUSY stuck; triggers too early; refusals."""
+    room = 16 - config["ADC_BITS"]
+    cases = [{"clock_ratio": r, "sample_delay": int(rng.integers(16)), "skip_bits": room} for r in range(3, 18)]
+    cases += [
+        {"two_words": w, "clock_idle": i, "second_edge": e, "use_convst": u, "word_bits": 18}
+        for w in (0, 1)
+        for i in (0, 1)
+        for e in (0, 1)
+        for u in (0, 1)
+    ]
+    cases += [
+        {"word_bits": w, "skip_bits": int(rng.integers(24)), "two_words": w & 1} for w in (11, 12, 24, 31, 32, 33)
+    ]
+    cases += [{"wait_clocks": w, "busy_timeout": t} for w in (0, 1, 2, 30) for t in (0, 1, 30, 60)]
+    rows = []
+    for number, changes in enumerate(cases):
+        regs = settings(**changes)
+        stuck = number % 7 == 5
+        length = 40 + regs["clock_ratio"] * (regs["word_bits"] << regs["two_words"]) + regs["wait_clocks"] + 20
+        for clock in range(min(length, 1400)):
+            row = {"sample_trigger": int(clock == 1 or rng.integers(300) == 0)}
+            rows.append(
+                row
+                | {
+                    "busy": int(stuck or 4 < clock < 4 + number % 30),
+                    "words_complete": int(clock > length - 30 - 3 * number and rng.integers(9) == 0),
+                }
+                | regs
+            )
+    return rows
+
+
+BLOCK = Block(
+    name="spi_frame",
+    folder="converters",
+    paper="none: front end of a board",
+    step=step,
+    inputs=(
+        Port("sample_trigger", BIT, doc="1 for a clock: take a sample"),
+        Port("busy", BIT, doc="1: the converter converts, not synchronous"),
+        Port("words_complete", BIT, doc="1 for a clock: all bits have arrived"),
+    ),
+    registers=(
+        Port("clock_ratio", RATIO, doc="clocks of a period of sclk, 4 to 16"),
+        Port("word_bits", BITS, doc="bits of a word, 12 to 32"),
+        Port("skip_bits", SKIP, doc="bits of a word before the code"),
+        Port("sample_delay", DELAY, doc="clocks from the edge of sclk until the line is taken"),
+        Port("wait_clocks", CLOCKS, doc="least time of convst, clocks"),
+        Port("busy_timeout", CLOCKS, doc="longest time of convst, clocks"),
+        Port("two_words", BIT, doc="1: two words on each line"),
+        Port("use_convst", BIT, doc="1: started by convst, 0: by cs_n"),
+        Port("clock_idle", BIT, doc="level of sclk between frames"),
+        Port("second_edge", BIT, doc="1: the second edge of sclk in a bit takes the line, 0: the first"),
+    ),
+    outputs=(
+        Port("convst", BIT, doc="rising edge: start of the conversion"),
+        Port("cs_n", BIT, doc="0: a frame"),
+        Port("sclk", BIT, doc="clock of the frame"),
+        Port("frame_start", BIT, doc="1 for a clock: a trigger was accepted"),
+        Port("bit_taken", BIT, doc="1 for a clock: the lines show a bit"),
+        Port("frame_error", BIT, doc="1 for a clock: no codes for a trigger"),
+        Port("setting_refused", BIT, doc="1: the registers contradict each other"),
+    ),
+    state=State(),
+    latency=1,
+    clocked=True,
+    after_reset={"cs_n": 1},
+    constants={
+        "LEAST_RATIO": LEAST_RATIO,
+        "MOST_RATIO": MOST_RATIO,
+        "LEAST_BITS": LEAST_BITS,
+        "MOST_BITS": MOST_BITS,
+        "STROBES": STROBES,
+        "TRAIL": TRAIL,
+    },
+    configs=({"ADC_BITS": 16}, {"ADC_BITS": 12}),
+    reference=None,
+    bound=None,
+    stimuli=stimuli,
+)

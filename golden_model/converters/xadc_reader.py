@@ -1,0 +1,163 @@
+"""Reads channels of the XADC (or SYSMON) of a Xilinx FPGA through its DRP; one step is one clock, which is DCLK.
+
+    trigger -> ``conversions`` times (convst, eoc) -> ``channels`` times (den with daddr, drdy with drp_do) -> codes
+
+The XADC is set to event mode: ``convst`` holds the inputs at its rising edge.  In simultaneous sampling one
+conversion holds a pair of channels; each further conversion of a frame holds its inputs later, when the one before
+has ended.
+``convst`` is high for CONVST_CLOCKS clocks.  A frame that has not ended ``timeout`` clocks after its trigger is a
+frame_error, and so is a trigger during a frame, which goes on, and one while ``busy`` shows that a conversion of a
+frame that was given up has not ended.  ``codes_valid`` or ``frame_error`` answers each trigger.
+``drdy`` outside a read is ignored; a read answered after the time-out is over before
+the conversion of the next frame.
+``drp_do`` is left-aligned in 16 bits; the code is its upper ADC_BITS bits.  ``signed_code``: two's complement
+(bipolar channel), the sign is inverted, so that zero becomes the middle of the range.  A channel that is not read
+shows the code of the word 0.
+All codes change together, with ``codes_valid``.  Nothing is written: dwe and di are zero.
+Formats: clocks, codes; nothing is computed.
+"""
+
+from typing import NamedTuple
+
+from fluxproof.golden_model.block import Block, Port
+from fluxproof.golden_model.fixed import Format
+from fluxproof.golden_model.formats import BIT, CODE
+from fluxproof.golden_model.io.current_conditioning import code_format
+from fluxproof.golden_model.kernel import kernel
+
+ADDRESS = Format(0, 7, 0)
+WORD = Format(0, 16, 0)
+CLOCKS = Format(0, 16, 0)
+NUMBER = Format(0, 3, 0)
+CONVST_CLOCKS = 8
+IDLE, CONVERTING, ASKING, READING, ENDING = range(5)
+
+
+class State(NamedTuple):
+    phase: int = IDLE
+    elapsed: int = 1  # clocks since the trigger
+    pulse: int = 0  # clocks that convst stays high
+    done: int = 0  # conversions, then reads
+    read_0: int = 0
+    read_1: int = 0
+    read_2: int = 0
+    read_3: int = 0
+    code_0: int = 0
+    code_1: int = 0
+    code_2: int = 0
+    code_3: int = 0
+
+
+@kernel
+def offset_code(word, signed_code, adc_bits):
+    """The upper bits of a word; two's complement to a code whose middle is zero."""
+    return (word >> (16 - adc_bits)) ^ (signed_code << (adc_bits - 1))
+
+
+@kernel
+def step(
+    state, sample_trigger, busy, eoc, drdy, drp_do, conversions, channels, address_0, address_1, address_2, address_3,
+    timeout, signed_code, adc_bits,
+):  # fmt: skip
+    s = state
+    late = s.elapsed >= timeout
+    phase, elapsed, done = s.phase, s.elapsed + 1, s.done
+    pulse = s.pulse - 1 if s.pulse > 0 else 0
+    den, codes_valid, frame_error = 0, 0, 0
+    read_0, read_1, read_2, read_3 = s.read_0, s.read_1, s.read_2, s.read_3
+    code_0, code_1, code_2, code_3 = s.code_0, s.code_1, s.code_2, s.code_3
+
+    if s.phase == IDLE:
+        elapsed, done = 1, 0
+        if sample_trigger and not busy:
+            phase, pulse = CONVERTING, CONVST_CLOCKS
+    elif s.phase == ENDING:
+        phase, codes_valid = IDLE, 1
+        code_0 = offset_code(s.read_0, signed_code, adc_bits)
+        code_1 = offset_code(s.read_1, signed_code, adc_bits)
+        code_2 = offset_code(s.read_2, signed_code, adc_bits)
+        code_3 = offset_code(s.read_3, signed_code, adc_bits)
+    elif late:
+        phase, pulse, frame_error = IDLE, 0, 1
+    elif s.phase == CONVERTING:
+        if eoc and s.pulse == 0:
+            done = s.done + 1
+            if s.done + 1 >= conversions:
+                phase, done = ASKING, 0
+            else:
+                pulse = CONVST_CLOCKS
+    elif s.phase == ASKING:
+        phase, den = READING, 1
+    elif drdy:
+        done, phase = s.done + 1, ENDING if s.done + 1 >= channels else ASKING
+        read_0 = drp_do if s.done == 0 else s.read_0
+        read_1 = drp_do if s.done == 1 else s.read_1
+        read_2 = drp_do if s.done == 2 else s.read_2
+        read_3 = drp_do if s.done == 3 else s.read_3
+    if sample_trigger and (s.phase != IDLE or busy):
+        frame_error = 1
+
+    daddr = address_0 if s.done == 0 else address_1 if s.done == 1 else address_2 if s.done == 2 else address_3
+    following = State(phase, elapsed, pulse, done, read_0, read_1, read_2, read_3, code_0, code_1, code_2, code_3)
+    return following, (1 if pulse else 0, den, daddr, codes_valid, frame_error, code_0, code_1, code_2, code_3)
+
+
+def settings(**changes):
+    """Registers of a board with three currents and the bus voltage on two pairs of auxiliary inputs."""
+    return {
+        "conversions": 2, "channels": 4, "address_0": 0x10, "address_1": 0x18, "address_2": 0x11, "address_3": 0x19,
+        "timeout": 400, "signed_code": 0,
+    } | changes  # fmt: skip
+
+
+def stimuli(rng, _config):
+    """Every number of conversions and channels; answers early, late, never; triggers while busy."""
+    rows = []
+    for number in range(64):
+        regs = settings(conversions=1 + number % 4, channels=1 + number // 4 % 4, signed_code=number & 1)
+        regs["timeout"] = (400, 90, 9, 400, 0)[number % 5]
+        often = (6, 20, 60)[number % 3]
+        for clock in range(160):
+            row = {"sample_trigger": int(clock == 2 or rng.integers(90) == 0), "busy": int(rng.integers(20) == 0)}
+            row |= {"eoc": int(rng.integers(often) == 0), "drdy": int(rng.integers(often) == 0)}
+            rows.append(row | {"drp_do": int(rng.integers(WORD.hi + 1))} | regs)
+    return rows
+
+
+BLOCK = Block(
+    name="xadc_reader",
+    folder="converters",
+    paper="none: front end of a board",
+    step=step,
+    inputs=(
+        Port("sample_trigger", BIT, doc="1 for a clock: take a sample"),
+        Port("busy", BIT, doc="1: the XADC converts"),
+        Port("eoc", BIT, doc="1 for a clock: end of a conversion"),
+        Port("drdy", BIT, doc="1 for a clock: drp_do is valid"),
+        Port("drp_do", WORD, doc="data of the DRP"),
+    ),
+    registers=(
+        Port("conversions", NUMBER, lo=1, hi=4, doc="conversions of a frame"),
+        Port("channels", NUMBER, lo=1, hi=4, doc="channels that are read"),
+        *(Port(f"address_{k}", ADDRESS, doc=f"DRP address of channel {k}") for k in range(4)),
+        Port("timeout", CLOCKS, doc="longest time of a frame, clocks"),
+        Port("signed_code", BIT, doc="1: the codes are two's complement"),
+    ),
+    outputs=(
+        Port("convst", BIT, doc="rising edge: the inputs are held"),
+        Port("den", BIT, doc="1 for a clock: read daddr"),
+        Port("daddr", ADDRESS, doc="address of the DRP"),
+        Port("codes_valid", BIT, doc="1 for a clock: the codes are new"),
+        Port("frame_error", BIT, doc="1 for a clock: no codes for a trigger"),
+        *(Port(f"code_{k}", CODE, doc=f"code of channel {k}") for k in range(4)),
+    ),
+    state=State(),
+    latency=1,
+    clocked=True,
+    constants={"CONVST_CLOCKS": CONVST_CLOCKS},
+    configs=({"ADC_BITS": 12}, {"ADC_BITS": 16}),
+    width_from={f"code_{k}": code_format for k in range(4)},
+    reference=None,
+    bound=None,
+    stimuli=stimuli,
+)

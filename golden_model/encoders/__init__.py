@@ -1,0 +1,1 @@
+"""Position from a board's pins: incremental encoders, Hall sensors, serial absolute encoders; twins of rtl/encoders."""

@@ -1,0 +1,206 @@
+"""Speed of an incremental encoder from the time between its edges, at every speed by the same equation.
+
+    omega_me = k_edge * (counts between two edges) / (clocks between these edges)
+
+The edges are the last one of this sample and the last one of the latest sample that had an edge: many counts at high
+speed, one at low speed, so there is no change-over and no step.  Without an edge the shaft has moved less than a count
+since the last one, so |omega_me| is at most k_edge / (clocks since the last edge): it falls to zero with time.
+An edge after a reversal is the edge passed before, so it moves the shaft by no count: a shaft that trembles on an edge
+has no speed.  The first edge after a reset is where counting begins.
+
+``k_edge`` = 2*pi * pole_pairs * clock_hz / (counts * omega_base); see ``setting``.  ``reverse`` inverts the sense.
+Formats: k_edge U(16,16), counts 16 bits and clocks 24 bits, both saturating, output PU.  A time beyond 24 bits is
+standstill.  Rounding: the size to nearest, halves away from zero; it saturates at 2 per unit.
+A sample takes ``TAKES`` clocks from ``sample`` to ``omega_valid``, one bit of the product or the quotient a clock; a
+``sample`` before that is ignored and its edges belong to the next.
+"""
+
+import math
+from typing import NamedTuple
+
+from fluxproof.golden_model.block import Block, Port
+from fluxproof.golden_model.fixed import Format
+from fluxproof.golden_model.formats import BIT, PU
+from fluxproof.golden_model.kernel import kernel
+
+K_EDGE = Format(0, 16, 16)
+TIME_W, MOVED_W, QUOTIENT_W = 24, 16, 19
+TIME_MAX = (1 << TIME_W) - 1
+MOVED_MAX = (1 << MOVED_W) - 1
+OMEGA_MAX = PU.hi
+# Clocks of the engine: the product, a check for overflow, the quotient, its limit, the result
+DIVIDE_AT = MOVED_W + 1
+LIMIT_AT = DIVIDE_AT + QUOTIENT_W + 1
+LAST = LIMIT_AT + 1
+TAKES = LAST + 1
+
+
+class State(NamedTuple):
+    seen: int = 0
+    forward: int = 0  # direction of the last edge
+    elapsed: int = TIME_MAX  # clocks since the edge that the next speed starts from
+    since: int = TIME_MAX  # clocks since the last edge
+    edges: int = 0  # 1: this sample has an edge
+    span: int = 0  # clocks between the two edges
+    moved: int = 0  # counts between the two edges
+    clock: int = 0  # of the engine, 0: idle
+    measured: int = 0
+    negative: int = 0
+    factor: int = 0
+    divisor: int = 0
+    work: int = 0  # product, then remainder and bits still to be divided
+    quotient: int = 0
+    past: int = 0  # 1: the quotient is above its range
+    omega: int = 0
+    omega_valid: int = 0
+
+
+@kernel
+def step(state, step_up, step_down, sample, reverse, k_edge):
+    s = state
+    edge = step_up or step_down
+    take = sample and s.clock == 0
+    forward = 1 if step_up else 0
+
+    # The window between two samples; an edge at the sample's clock belongs to the next
+    base = s.since if take and s.edges else s.elapsed
+    moved = 0 if take else s.moved
+    if edge and s.seen and forward == s.forward:
+        moved = min(max(moved + (1 if step_up else -1), -MOVED_MAX), MOVED_MAX)
+
+    # The engine: clock 1 to 16 product, 17 overflow, 18 to 36 quotient, 37 its limit, 38 result
+    clock, measured, negative = s.clock, s.measured, s.negative
+    factor, divisor, work, quotient, past = s.factor, s.divisor, s.work, s.quotient, s.past
+    omega, omega_valid = s.omega, 0
+    if take:
+        clock = 1
+        measured = s.edges
+        divisor = s.span if s.edges else s.since
+        factor = abs(s.moved) if s.edges else 1
+        if divisor == TIME_MAX:
+            factor = 0
+        negative = 1 if (s.moved < 0) != (reverse == 1) else 0
+        work, quotient = 0, 0
+    elif s.clock != 0:
+        clock = 0 if s.clock == LAST else s.clock + 1
+        if s.clock < DIVIDE_AT:
+            bit = (s.factor >> (MOVED_W - 1)) & 1
+            factor = (s.factor << 1) & MOVED_MAX
+            work = 2 * s.work + (k_edge if bit else 0)
+        elif s.clock == DIVIDE_AT:
+            past = 1 if (s.work >> (QUOTIENT_W - 1)) >= s.divisor else 0
+            work = 0 if past else 2 * s.work
+        elif s.clock < LIMIT_AT:
+            top, low = 2 * s.work >> QUOTIENT_W, (2 * s.work) & ((1 << QUOTIENT_W) - 1)
+            enough = top >= s.divisor
+            work = ((top - s.divisor if enough else top) << QUOTIENT_W) | low
+            quotient = 2 * s.quotient + (1 if enough else 0)
+        elif s.clock == LIMIT_AT:
+            size = (s.quotient + 1) >> 1
+            quotient = OMEGA_MAX if s.past or size > OMEGA_MAX else size
+        else:
+            if s.measured:
+                omega = -s.quotient if s.negative else s.quotient
+            elif abs(s.omega) > s.quotient:
+                omega = -s.quotient if s.omega < 0 else s.quotient
+            omega_valid = 1
+    following = State(
+        1 if s.seen or edge else 0,
+        forward if edge else s.forward,
+        min(base + 1, TIME_MAX),
+        1 if edge else min(s.since + 1, TIME_MAX),
+        1 if edge or (s.edges and not take) else 0,
+        base if edge else s.span,
+        moved,
+        clock,
+        measured,
+        negative,
+        factor,
+        divisor,
+        work,
+        quotient,
+        past,
+        omega,
+        omega_valid,
+    )
+    return following, (omega, omega_valid)
+
+
+def setting(counts, pole_pairs, clock_hz, omega_base):
+    """k_edge of an encoder; omega_base in electrical rad/s.  ValueError where it does not fit the register."""
+    real = 2 * math.pi * pole_pairs * clock_hz / (counts * omega_base)
+    if not 1 <= real / K_EDGE.lsb <= K_EDGE.hi:
+        raise ValueError(f"k_edge = {real:g} of {counts} counts a turn does not fit {K_EDGE}")
+    return K_EDGE.to_int(real)
+
+
+def stimuli(rng, config):
+    """Steps from one a clock to none for long, reversals and trembling on an edge, samples too early, every corner."""
+    rows = []
+
+    def run(clocks, **writes):
+        base = {"step_up": 0, "step_down": 0, "sample": 0, "reverse": 0, "k_edge": 60 << 16}
+        rows.extend(base | writes for _ in range(clocks))
+
+    def sample(**writes):
+        run(1, sample=1, **writes)
+        run(TAKES + 2, **writes)
+
+    sample()
+    for k_edge in (60 << 16, 0, 1, K_EDGE.hi, 7 << 14):
+        for reverse in (0, 1):
+            regs = {"k_edge": k_edge, "reverse": reverse}
+            for name in ("step_up", "step_down"):
+                for gap in (0, 1, 7, 60, 300):
+                    for _ in range(max(2, 200 // (gap + 1))):
+                        run(1, **{name: 1}, **regs, sample=int(rng.integers(20) == 0))
+                        run(gap, **regs)
+                    sample(**regs)
+                sample(**regs)
+                run(400, **regs)
+                sample(**regs)
+            for k in range(40):
+                run(1, **{("step_up", "step_down")[k & 1]: 1}, **regs)
+                run(int(rng.integers(1, 20)), **regs)
+                if k % 8 == 0:
+                    sample(**regs)
+    run(1, step_up=1, sample=1)
+    run(30, sample=1)
+    run(3, step_up=1, step_down=1)
+    sample()
+    return rows
+
+
+BLOCK = Block(
+    name="edge_timer",
+    folder="encoders",
+    paper="none: speed by the time between edges",
+    step=step,
+    inputs=(
+        Port("step_up", BIT, doc="1: a count forward"),
+        Port("step_down", BIT, doc="1: a count backward"),
+        Port("sample", BIT, doc="1: compute the speed"),
+    ),
+    registers=(
+        Port("reverse", BIT, doc="1: code counts opposite to the phase order"),
+        Port("k_edge", K_EDGE, doc="speed of one count a clock"),
+    ),
+    outputs=(
+        Port("omega_me", PU, doc="electrical speed"),
+        Port("omega_valid", BIT, doc="1: omega_me is that of the last sample"),
+    ),
+    state=State(),
+    latency=1,
+    clocked=True,
+    constants={
+        "TIME_W": TIME_W,
+        "MOVED_W": MOVED_W,
+        "QUOTIENT_W": QUOTIENT_W,
+        "DIVIDE_AT": DIVIDE_AT,
+        "LIMIT_AT": LIMIT_AT,
+        "LAST": LAST,
+    },
+    reference=None,
+    bound=None,
+    stimuli=stimuli,
+)

@@ -1,0 +1,220 @@
+"""An incremental encoder from its pins to code and speed: three filters, decoder, counter, index and edge timer, wired.
+
+Nothing is computed here.  The blocks are one register apart, as in the VHDL: a step reaches the counter and the timer
+one clock after the decoder has seen it.  From a pin to the count: filter_clocks + 5 clocks, to the code one more.
+"""
+
+from typing import NamedTuple
+
+from fluxproof.golden_model.block import Block, Port
+from fluxproof.golden_model.common import input_filter
+from fluxproof.golden_model.encoders import edge_timer, index_check, quadrature_decoder, turn_counter
+from fluxproof.golden_model.formats import BIT
+from fluxproof.golden_model.io.position import code_format
+from fluxproof.golden_model.kernel import kernel
+
+filter_step, decoder_step = input_filter.step, quadrature_decoder.step
+counter_step, check_step, timer_step = turn_counter.step, index_check.step, edge_timer.step
+
+
+class State(NamedTuple):
+    of_filter_a: input_filter.State = input_filter.State()
+    of_filter_b: input_filter.State = input_filter.State()
+    of_filter_z: input_filter.State = input_filter.State()
+    of_decoder: quadrature_decoder.State = quadrature_decoder.State()
+    of_counter: turn_counter.State = turn_counter.State()
+    of_check: index_check.State = index_check.State()
+    of_timer: edge_timer.State = edge_timer.State()
+    # Outputs that the next clock reads
+    step_up: int = 0
+    step_down: int = 0
+    index: int = 0
+    count: int = 0
+    pending: int = 0
+    restarted: int = 0
+    correct: int = 0
+    correction: int = 0
+    fast: int = 0
+
+
+@kernel
+def step(
+    state,
+    pin_a,
+    pin_b,
+    pin_z,
+    sample,
+    start,
+    start_count,
+    clear_faults,
+    filter_clocks,
+    index_phase,
+    counts,
+    code_step,
+    code_rest,
+    correct_max,
+    reverse,
+    k_edge,
+    position_bits,
+):
+    s = state
+    filter_a, (_, _) = filter_step(s.of_filter_a, pin_a, filter_clocks)
+    filter_b, (_, _) = filter_step(s.of_filter_b, pin_b, filter_clocks)
+    filter_z, (_, _) = filter_step(s.of_filter_z, pin_z, filter_clocks)
+    settled = 1 if s.of_filter_a.settled and s.of_filter_b.settled and s.of_filter_z.settled else 0
+
+    decoder, (step_up, step_down, forward, index, _, illegal_count) = decoder_step(
+        s.of_decoder,
+        s.of_filter_a.level,
+        s.of_filter_b.level,
+        s.of_filter_z.level,
+        settled,
+        clear_faults,
+        index_phase,
+    )
+    counter, (code_theta, count, pending, moving, restarted, setting_refused) = counter_step(
+        s.of_counter,
+        s.step_up,
+        s.step_down,
+        sample,
+        s.correct,
+        s.correction,
+        s.fast,
+        counts,
+        code_step,
+        code_rest,
+        position_bits,
+    )
+    check, (correct, correction, fast, referenced, index_count, lost_counts, index_lost, index_wrong) = check_step(
+        s.of_check,
+        s.index,
+        s.count,
+        s.pending,
+        start,
+        start_count,
+        s.restarted,
+        clear_faults,
+        counts,
+        correct_max,
+    )
+    timer, (omega_me, omega_valid) = timer_step(s.of_timer, s.step_up, s.step_down, sample, reverse, k_edge)
+    following = State(
+        filter_a,
+        filter_b,
+        filter_z,
+        decoder,
+        counter,
+        check,
+        timer,
+        step_up,
+        step_down,
+        index,
+        count,
+        pending,
+        restarted,
+        correct,
+        correction,
+        fast,
+    )
+    return following, (
+        code_theta,
+        omega_me,
+        omega_valid,
+        count,
+        forward,
+        referenced,
+        moving,
+        index_count,
+        illegal_count,
+        lost_counts,
+        index_lost,
+        index_wrong,
+        setting_refused,
+    )
+
+
+def stimuli(rng, config):
+    """Turns in both directions with an index, bounce on every edge, a lost line, a start, samples all the while."""
+    rows = []
+    counts = 60
+    regs = {"filter_clocks": 2, "index_phase": 1, "correct_max": 9, "reverse": 0, "k_edge": 900 << 16}
+    regs |= turn_counter.setting(counts, config["POSITION_BITS"])
+    still = {p.name: 0 for p in BLOCK.inputs} | regs
+
+    def show(place, clocks, **more):
+        a, b = quadrature_decoder.lines(place)
+        z = int(place % counts in (0, 1, 2))
+        for k in range(clocks):
+            bounce = int(k == 1 and rng.integers(3) == 0)
+            row = {"pin_a": a ^ bounce, "pin_b": b, "pin_z": z, "sample": int(rng.integers(60) == 0)}
+            rows.append(still | row | more)
+
+    show(7, 12)
+    show(7, 1, start=1, start_count=20)
+    show(7, 30)
+    for place in [*range(7, 200), *range(200, -90, -1), *range(-90, 40)]:
+        show(place, int(rng.integers(5, 9)))
+    for place in [*range(40, 55), *range(59, 90), *range(90, 50, -1)]:
+        show(place, 6)
+    show(50, 1, clear_faults=1)
+    show(50, 60)
+    return rows
+
+
+_PORTS = {
+    p.name: p
+    for module in (edge_timer, turn_counter, index_check, quadrature_decoder, input_filter)
+    for p in module.BLOCK.inputs + module.BLOCK.registers + module.BLOCK.outputs
+}
+
+BLOCK = Block(
+    name="incremental_encoder",
+    folder="encoders",
+    paper="none: incremental encoder",
+    step=step,
+    inputs=(
+        Port("pin_a", BIT, doc="A, asynchronous pin"),
+        Port("pin_b", BIT, doc="B, asynchronous pin"),
+        Port("pin_z", BIT, doc="Z, asynchronous pin"),
+        *(_PORTS[name] for name in ("sample", "start", "start_count", "clear_faults")),
+    ),
+    registers=tuple(
+        _PORTS[name]
+        for name in (
+            "filter_clocks",
+            "index_phase",
+            "counts",
+            "code_step",
+            "code_rest",
+            "correct_max",
+            "reverse",
+            "k_edge",
+        )
+    ),
+    outputs=tuple(
+        _PORTS[name]
+        for name in (
+            "code_theta",
+            "omega_me",
+            "omega_valid",
+            "count",
+            "forward",
+            "referenced",
+            "moving",
+            "index_count",
+            "illegal_count",
+            "lost_counts",
+            "index_lost",
+            "index_wrong",
+            "setting_refused",
+        )
+    ),
+    state=State(),
+    latency=1,
+    clocked=True,
+    configs=({"POSITION_BITS": 16}, {"POSITION_BITS": 12}),
+    width_from={"code_theta": code_format},
+    reference=None,
+    bound=None,
+    stimuli=stimuli,
+)

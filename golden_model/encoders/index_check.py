@@ -1,0 +1,166 @@
+"""The count at each index of an incremental encoder: the first one refers it, later ones find and mend lost counts.
+
+    off = count + pending at the index, the shorter way round; it should be 0
+
+* The first index corrects the count at once (``fast``) and sets ``referenced``.  Before it, ``start`` moves the
+  count to ``start_count`` in the same way, for instance to that of a Hall sensor.
+* At a later index an ``off`` up to ``correct_max`` is counted in ``lost_counts`` (saturates), flagged by ``index_lost``
+  and corrected by one count a sample.  A larger one is flagged by ``index_wrong`` and not corrected; clearing it makes
+  the next index a first one.
+An index or a start that comes while one is in work, five clocks, is ignored.  ``restart`` forgets the reference.
+Formats: counts.  Rounding: none.
+"""
+
+from typing import NamedTuple
+
+from fluxproof.golden_model.block import Block, Port
+from fluxproof.golden_model.encoders.quadrature_decoder import EVENTS, EVENTS_MAX
+from fluxproof.golden_model.encoders.turn_counter import COUNT, COUNTS, PENDING, PENDING_W
+from fluxproof.golden_model.fixed import Format, saturate
+from fluxproof.golden_model.formats import BIT
+from fluxproof.golden_model.kernel import kernel
+
+CORRECT = Format(0, 12, 0)
+
+
+class State(NamedTuple):
+    wait: int = 0  # stage in work, 0: idle
+    starting: int = 0  # it is a start, not an index
+    target: int = 0  # what the count should be: 0 at the index
+    found: int = 0  # count as if the correction were complete
+    off: int = 0  # the same, less what it should be
+    correct: int = 0
+    correction: int = 0
+    fast: int = 0
+    referenced: int = 0
+    index_count: int = 0
+    lost_counts: int = 0
+    index_lost: int = 0
+    index_wrong: int = 0
+
+
+@kernel
+def step(state, index, count, pending, start, start_count, restart, clear_faults, counts, correct_max):
+    s = state
+    # Stage 0: an index, which came with a step that the count has at stage 1, or a start
+    take = s.wait == 0 and (index or (start and not s.referenced))
+    wait = 1 if take else (s.wait + 1) % 5 if s.wait != 0 else 0
+    starting = (0 if index else 1) if take else s.starting
+    target = (0 if index else start_count) if take else s.target
+    # Stage 1: found
+    found = count + pending
+    index_count = count if s.wait == 1 and not s.starting else s.index_count
+    # Stage 2: off
+    off = s.found - s.target
+    if not s.starting and 2 * s.found > counts:
+        off = s.found - counts
+    # Stage 3: start, first index, count that is off, or none of them
+    now = s.wait == 3
+    lost = abs(s.off)
+    first = now and not s.starting and not s.referenced
+    mend = now and not s.starting and s.referenced and 0 < lost <= correct_max
+    wrong = now and not s.starting and s.referenced and lost > correct_max
+    fast = first or (now and s.starting)
+
+    lost_counts = 0 if clear_faults else s.lost_counts
+    referenced = 1 if first or (s.referenced and not (s.index_wrong and clear_faults)) else 0
+    following = State(
+        0 if restart else wait,
+        starting,
+        target,
+        found,
+        off,
+        1 if (fast or mend) and not restart else 0,
+        saturate(-s.off, PENDING_W),
+        1 if fast else 0,
+        0 if restart else referenced,
+        index_count,
+        min(lost_counts + (lost if mend else 0), EVENTS_MAX),
+        1 if mend or (s.index_lost and not clear_faults) else 0,
+        1 if wrong or (s.index_wrong and not clear_faults) else 0,
+    )
+    f = following
+    return following, (
+        f.correct,
+        f.correction,
+        f.fast,
+        f.referenced,
+        f.index_count,
+        f.lost_counts,
+        f.index_lost,
+        f.index_wrong,
+    )
+
+
+def stimuli(rng, config):
+    """First and later indices with losses of every size, starts before and after, two at once, until it saturates."""
+    rows = []
+    still = {p.name: 0 for p in BLOCK.inputs}
+
+    def run(clocks, **writes):
+        rows.extend(still | {"counts": 60, "correct_max": 6} | writes for _ in range(clocks))
+
+    for _ in range(3):
+        for start_count in (0, 7, COUNT.hi):
+            run(1, start=1, start_count=start_count, count=5)
+            run(6, start_count=start_count, count=6)
+        run(1, index=1, start=1, count=9)
+        run(6, count=10, start=1)
+        for count in (0, 1, 59, 6, 54, 7, 53, 30, 31):
+            for pending in (0, 3, -3):
+                run(1, index=1, count=count, pending=pending, start=int(rng.integers(2)))
+                run(int(rng.integers(1, 8)), start_count=9, count=count, pending=pending, index=int(rng.integers(2)))
+                run(6)
+        run(2, clear_faults=1)
+        run(1, index=1, count=33)
+        run(5, count=33)
+        run(1, restart=1)
+    big = {"counts": 1 << 18, "correct_max": CORRECT.hi}
+    run(1, index=1, **big)
+    run(6, **big)
+    for lost in (CORRECT.hi - 3, 2, 2, CORRECT.hi):
+        run(1, index=1, count=lost, **big)
+        run(6, count=lost, **big)
+    for stage in range(6):
+        run(1, index=1, count=3)
+        run(stage, count=3)
+        run(1, count=3, restart=1)
+        run(3, count=3)
+    return rows
+
+
+BLOCK = Block(
+    name="index_check",
+    folder="encoders",
+    paper="none: incremental encoder",
+    step=step,
+    inputs=(
+        Port("index", BIT, doc="1: the index was entered with the step that is in the count at the next clock"),
+        Port("count", COUNT, doc="count now"),
+        Port("pending", PENDING, doc="counts of the correction still to be added"),
+        Port("start", BIT, doc="1: move to start_count, before the first index only"),
+        Port("start_count", COUNT, doc="count to start from"),
+        Port("restart", BIT, doc="1: the count began again"),
+        Port("clear_faults", BIT, doc="1: clear lost_counts and the flags"),
+    ),
+    registers=(
+        Port("counts", COUNTS, doc="counts a turn, four for each line"),
+        Port("correct_max", CORRECT, doc="largest correction at an index, counts"),
+    ),
+    outputs=(
+        Port("correct", BIT, doc="1: take the correction"),
+        Port("correction", PENDING, doc="counts to be added"),
+        Port("fast", BIT, doc="1: add them at once, a count a clock"),
+        Port("referenced", BIT, doc="1: the index has been found"),
+        Port("index_count", COUNT, doc="count found at the last index"),
+        Port("lost_counts", EVENTS, doc="counts found lost, saturates"),
+        Port("index_lost", BIT, doc="1: an index found lost counts"),
+        Port("index_wrong", BIT, doc="1: an index was off by more than correct_max"),
+    ),
+    state=State(),
+    latency=1,
+    clocked=True,
+    reference=None,
+    bound=None,
+    stimuli=stimuli,
+)

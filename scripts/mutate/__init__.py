@@ -1,0 +1,1 @@
+"""`make mutate`: faults drawn at random in the netlist of each block; its bench must notice all that can matter."""

@@ -1,0 +1,129 @@
+"""The wiring of the whole core: mutants of the top's own cells and connections, judged by the golden core.
+
+Three runs, each clock of them compared: every operating condition in 50 ms in closed loop (cosim/scenarios.py,
+`compressed`), the tour through the faults (studies/faults), and samples with any settings.  Inputs and expected outputs
+come from the golden core alone, by the names of the ports.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+
+from fluxproof.checkout import DRIVES
+from fluxproof.cosim.closed_loop import INPUT_PORTS, GoldenPeriods, PlantPeriods
+from fluxproof.cosim.golden_clock import SEEN, GoldenClock
+from fluxproof.cosim.runs import closed_loop, generics
+from fluxproof.cosim.stimulus import random_value
+from fluxproof.cosim.verilog import VerilogPort
+from fluxproof.golden_model import clocked
+from fluxproof.golden_model.fluxproof import REGISTERS, Observed
+from fluxproof.golden_model.io import sample_latch
+from scripts.mutate.harness import Trial
+from scripts.prove.pipeline import core_ends
+
+CARRIER_HALF = 128
+IN_RESET = 4
+MUTANTS = 240
+SEED, SETTINGS = 3, 600  # of any_settings
+BITS = {"ADC_BITS": 16, "POSITION_BITS": 16}
+
+
+class Recorder(GoldenClock):
+    """A golden core that writes down what it gets and shows, clock by clock."""
+
+    def __init__(self, registers, config):
+        super().__init__(registers, config)
+        self.writes: list[tuple[int, str, int]] = []
+        self.checks: list[tuple[int, str, int]] = []
+        self.driven: dict[str, int] = {}
+        self.entered: int | None = None  # clock of the last sample, until its values are compared
+        self.all_entered: set[int] = set()
+
+    def drive(self, at: int, values: Mapping[str, int]) -> None:
+        """Inputs from clock ``at`` on, where they differ from the last."""
+        new = {name: int(value) for name, value in values.items() if self.driven.get(name) != value}
+        self.driven |= new
+        self.writes += [(at, name, value) for name, value in new.items()]
+
+    def advance(self, clocks, sample=None, until_trigger=False, **pins):
+        begin, count = self.clock, len(self.samples)
+        self.drive(begin, self.registers._asdict() | pins)
+        due = self.entered is not None and begin - self.entered >= clocked.INTERVAL
+        if due:
+            self.checks += [(begin, name, int(v)) for name, v in zip(Observed._fields, self.observed, strict=True)]
+            self.entered = None
+        if sample is not None:
+            self.drive(begin, {**sample, "sample_valid": 1})
+            self.drive(begin + 1, {"sample_valid": 0})
+        rows = super().advance(clocks, sample, until_trigger, **pins)
+        if len(self.samples) > count:
+            self.entered = begin
+            self.all_entered.add(begin)
+        for at, row in enumerate(rows, begin + 1):
+            self.checks += [(at, name, int(value)) for name, value in zip(SEEN, row, strict=True)]
+        return rows
+
+    def trial(self, ports: Iterable[VerilogPort]) -> Trial:
+        """All that happened so far, for the ports of the converted core."""
+        ports = tuple(ports)
+        number = {p.name: k for k, p in enumerate(ports)}
+        strobes = [
+            (at, name, int(at - latency in self.all_entered))
+            for name, latency in core_ends()
+            for at in range(1, self.clock + 1)
+        ]
+        reset = [(-IN_RESET, number["rst"], 1), (0, number["rst"], 0)]
+        tables = [
+            np.array(sorted([*first, *((at, number[name], value) for at, name, value in rows)]), np.int64)
+            for first, rows in ((reset, self.writes), ([], self.checks + strobes))
+        ]
+        return Trial(ports, IN_RESET, self.clock, *tables, np.empty(0, np.int64), np.empty(0, np.int64))
+
+
+def every_event() -> Recorder:
+    """The scenario `compressed` in closed loop."""
+    run = closed_loop(str(DRIVES / "paper001.toml"), CARRIER_HALF, "compressed")
+    golden = GoldenPeriods(run.registers)
+    golden.core = Recorder(run.registers.values, run.registers.config)
+    plant, scenario = PlantPeriods(run.drive, run.scenario), run.scenario
+    golden.run(None, int(scenario.enable[0]))
+    for k in range(len(scenario)):
+        period = golden.run(plant.inputs(k), int(scenario.enable[k]))
+        plant.advance(k, period.edge_clocks * (plant.period_s / period.clocks), period.gate_words)
+    return golden.core
+
+
+def fault_tour() -> Recorder:
+    """The tour through the faults."""
+    from studies.faults.bench import run, setup
+    from studies.faults.cases import tour
+    from studies.faults.cores import GoldenCore
+
+    drive, register_set = setup(CARRIER_HALF)
+    golden = GoldenCore(register_set)
+    golden.core = Recorder(register_set.values, register_set.config)
+    run(tour(), golden, drive, register_set)
+    return golden.core
+
+
+def any_settings() -> Recorder:
+    """Samples of any codes, each with any registers: every bit of every setting reaches its block, both ways."""
+    run = closed_loop(str(DRIVES / "paper001.toml"), CARRIER_HALF, "compressed", 1)
+    golden, rng = Recorder(run.registers.values, run.registers.config), np.random.default_rng(SEED)
+    golden.advance(1, enable=1)
+    for _ in range(SETTINGS):
+        changed = {name: random_value(rng, port) for name, port in REGISTERS.items()}
+        golden.registers = golden.registers._replace(**changed)
+        golden.advance(4, clear_trip=int(rng.integers(4) == 0))
+        ports = {p.name: p for p in sample_latch.BLOCK.ports(BITS)}
+        sample = {name: random_value(rng, ports[name]) for name in INPUT_PORTS}
+        golden.advance(clocked.INTERVAL + int(rng.integers(1, 80)), sample, clear_trip=0)
+    golden.advance(4)
+    return golden
+
+
+def config() -> dict[str, int]:
+    """The generics of the core under test."""
+    return generics(closed_loop(str(DRIVES / "paper001.toml"), CARRIER_HALF, "compressed", 1).config)

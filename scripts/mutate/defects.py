@@ -1,0 +1,96 @@
+"""Defects planted by hand in copies of the VHDL, for what no netlist of one configuration shows, or no block's bench.
+
+They are in generics and functions that run at elaboration, in the register bus, in the asynchronous path of
+power_stage, and in the wiring of the AXI top; the tests of pytest judge them.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+from fluxproof.checkout import BUILD, ROOT
+from fluxproof.golden_model.registry import BLOCKS
+
+FOLDER = BUILD / "mutate" / "defects"
+
+
+class Defect(NamedTuple):
+    """A text that stands once in a file below rtl/, and its replacement."""
+
+    says: str
+    file: str
+    old: str
+    new: str
+
+
+# fmt: off
+# ruff: noqa: E501
+DEFECTS = (
+    Defect("carrier constant cut off", "estimators/applied_voltage.vhd",
+           "    if remainder >= CARRIER_HALF then\n      quotient := quotient + 1;", "    if remainder > 2 * CARRIER_HALF then\n      quotient := quotient + 1;"),
+    Defect("power of two scaled too far", "estimators/applied_voltage.vhd", "while 2 ** n < CARRIER_HALF loop", "while 2 ** n <= CARRIER_HALF loop"),
+    Defect("answer does not wait for the master", "io/axi_lite_slave.vhd", " or (b_valid and not s_axi_bready);", ";"),
+    Defect("read taken while an answer waits", "io/axi_lite_slave.vhd", "s_axi_arvalid and not r_valid", "s_axi_arvalid"),
+    Defect("read answer survives reset", "io/axi_lite_slave.vhd", "        r_valid    <= '0';\n", ""),
+    Defect("setting answered inside a sample", "io/register_access.vhd", " and not (between_3 and sample_busy);", ";"),
+    Defect("least value refused", "io/register_access.vhd", "below(number, low_3)", "not below(low_3, number)"),
+    Defect("unaligned address taken", "io/register_access.vhd", "address(1 downto 0) = 0 and ", ""),
+    Defect("setting counts inside a sample", "generated/register_file.vhd", "(row(2) and column(4) and not sample_busy)", "(row(2) and column(4))"),
+    Defect("old values read after reset", "generated/register_file.vhd", "        written          <= (others => '0');\n", ""),
+    Defect("short trip forgotten", "io/power_stage.vhd", "    if trip_pin = '1' then", "    if trip_pin = '1' and rising_edge(clk) then"),
+    Defect("gates let go before the core knows", "io/power_stage.vhd", "if sync_2 = '1' or rst = '1' then", "if sync_1 = '1' or rst = '1' then"),
+    Defect("trip kept for ever", "io/power_stage.vhd", "if sync_2 = '1' or rst = '1' then", "if rst = '1' then"),
+    Defect("one synchroniser stage", "io/power_stage.vhd", "trip <= sync_2;", "trip <= sync_1;"),
+    Defect("upper and lower gates swapped", "generated/fluxproof_axi.vhd", "gate_high_next => gate_high_next,", "gate_high_next => gate_low_next,"),
+    Defect("registers change in mid-sample", "generated/fluxproof_axi.vhd", "sample_busy       => sample_busy,", "sample_busy       => '0',"),
+)
+# fmt: on
+
+# File without its folder and suffix -> the tests that detect a defect in it; others: the block's bench.
+TESTS = {
+    **dict.fromkeys(
+        ("axi_lite_slave", "register_access", "register_file"),
+        ["cocotb_tests/blocks/test_registers_axi.py::test_axi_slave_equals_its_twin"],
+    ),
+    "power_stage": ["cocotb_tests/blocks/test_power_stage.py"],
+    "fluxproof_axi": ["cocotb_tests/core/test_axi_top.py"],
+}
+WHY = re.compile(r"^E\s+(?:AssertionError: )?(.*\S)", re.MULTILINE)
+
+
+def plant(defect: Defect) -> Path:
+    """A copy of the RTL with the defect; ValueError unless its text occurs exactly once."""
+    tree = FOLDER / re.sub(r"\W+", "_", defect.says)
+    shutil.rmtree(tree, ignore_errors=True)
+    shutil.copytree(ROOT / "rtl", tree)
+    text = (tree / defect.file).read_text()
+    if text.count(defect.old) != 1:
+        raise ValueError(f"defect '{defect.says}': its text occurs {text.count(defect.old)} times in rtl/{defect.file}")
+    (tree / defect.file).write_text(text.replace(defect.old, defect.new))
+    return tree
+
+
+def tests_of(file: str) -> list[str]:
+    """The tests that pytest runs for a defect in this file of rtl/."""
+    name = Path(file).stem
+    bench = "cocotb_tests/blocks/test_blocks.py::test_rtl_equals_model"
+    return TESTS.get(name) or [f"{bench}[{name}-{k}]" for k in range(len(BLOCKS[name].configs))]
+
+
+def noticed_by(defect: Defect) -> str:
+    """What a test says of the defect; empty if none fails.  RuntimeError where the tests cannot run or it does not build."""
+    tree = plant(defect)
+    command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "-p", "no:xdist"]
+    environment = {**os.environ, "FLUXPROOF_RTL": str(tree)}
+    done = subprocess.run([*command, *tests_of(defect.file)], cwd=ROOT, env=environment, capture_output=True, text=True)
+    shutil.rmtree(tree, ignore_errors=True)
+    if done.returncode not in (0, 1) or "BuildError" in done.stdout:
+        raise RuntimeError(f"defect '{defect.says}': its tests do not run:\n{done.stdout[-2000:]}{done.stderr[-500:]}")
+    found = WHY.search(done.stdout)
+    return "" if done.returncode == 0 else found[1][:200] if found else "a test failed"

@@ -1,0 +1,106 @@
+"""What is mutated: each block of the registry with each of its configurations, and the wiring of the core."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from fluxproof.checkout import BUILD, ROOT
+from fluxproof.cosim.sources import rtl_sources
+from fluxproof.cosim.verilog import TOP, synthesize, top_ports
+from fluxproof.golden_model.block import Block
+from fluxproof.golden_model.registry import BLOCKS
+from scripts.mutate import core
+from scripts.mutate.harness import BENCH_SEED, Trial, block_trial
+
+FOLDER = BUILD / "mutate"
+LEAST, MOST = 40, 160  # mutants of a block
+LEAST_OF_CONFIG = 16
+
+
+@dataclass(frozen=True)
+class Subject:
+    """A block with one of its configurations; names alone, for another process."""
+
+    of: str
+    index: int
+
+    @property
+    def block(self) -> Block:
+        return BLOCKS[self.of]
+
+    @property
+    def config(self) -> Mapping[str, int]:
+        return self.block.configs[self.index]
+
+    @property
+    def name(self) -> str:
+        return f"{self.of}-{self.index}"
+
+    @property
+    def folder(self) -> Path:
+        return FOLDER / self.name
+
+    @property
+    def top(self) -> str:
+        """The entity that is converted; the ports of a cell get their widths from a top in tb/."""
+        return self.block.name if self.block.strobes else f"{self.block.name}_tb"
+
+    @property
+    def flat(self) -> bool:
+        """Whether instances are mutated inside too: those of a block are blocks with a bench of their own."""
+        return not self.block.strobes
+
+    def verilog(self) -> str:
+        """The converted VHDL."""
+        sources = rtl_sources()
+        if not self.block.strobes:
+            sources = [*sources, ROOT / "tb" / f"{self.top}.vhd"]
+        return synthesize(sources, self.top, self.config)
+
+    def trials(self) -> list[Trial]:
+        """The schedule of the block's bench."""
+        return [block_trial(self.block, self.config, BENCH_SEED)]
+
+    def count(self, cells: int) -> int:
+        """Mutants to draw: as many as the block has cells, within limits, shared by its configurations."""
+        configs = len(self.block.configs)
+        return max(LEAST_OF_CONFIG, min(max(cells, LEAST), MOST) // configs)
+
+
+@dataclass(frozen=True)
+class Core:
+    """The core's own cells and connections."""
+
+    of: str = TOP
+    flat: bool = False
+
+    @property
+    def name(self) -> str:
+        return f"{self.of}-0"
+
+    @property
+    def top(self) -> str:
+        return self.of
+
+    @property
+    def folder(self) -> Path:
+        return FOLDER / self.name
+
+    def verilog(self) -> str:
+        """The converted VHDL."""
+        return synthesize(rtl_sources(), self.top, core.config())
+
+    def count(self, cells: int) -> int:
+        return core.MUTANTS
+
+    def trials(self) -> list[Trial]:
+        """Its closed loops."""
+        ports = top_ports(self.folder / "design.v")
+        return [recorder.trial(ports) for recorder in (core.every_event(), core.fault_tour(), core.any_settings())]
+
+
+def subjects(only: str = "") -> list[Subject]:
+    """All of them, or those of the blocks whose name is ``only``."""
+    return [Subject(b.name, k) for b in BLOCKS.values() for k in range(len(b.configs)) if only in ("", b.name)]
