@@ -67,8 +67,8 @@ architecture rtl of fluxproof is
 
   -- Strobes
   signal sample_entered, latch_valid, current_soon    : std_logic;
-  signal theta_valid, omega_valid, u_dc_valid         : std_logic;
-  signal alpha_beta_soon, dq_soon                     : std_logic;
+  signal current_valid, theta_valid, omega_valid      : std_logic;
+  signal dc_soon, alpha_beta_soon, dq_soon            : std_logic;
   signal trig_soon, trig_valid                        : std_logic;
   signal models_valid, lambda_valid, decoupling_valid : std_logic;
   signal dq_voltage_soon, dq_voltage_valid            : std_logic;
@@ -132,7 +132,7 @@ begin
               code_a => code_a, code_b => code_b, code_c => code_c,
               offset_a => settings.offset_a, offset_b => settings.offset_b, offset_c => settings.offset_c,
               gain_a => settings.gain_a, gain_b => settings.gain_b, gain_c => settings.gain_c,
-              out_soon => current_soon, out_valid => open, i_a => o.i_a, i_b => o.i_b, i_c => o.i_c,
+              out_soon => current_soon, out_valid => current_valid, i_a => o.i_a, i_b => o.i_b, i_c => o.i_c,
               current_at_rail => o.current_at_rail);
 
   angle : entity work.position
@@ -154,10 +154,10 @@ begin
     port map (clk => clk, rst => rst, in_valid => latch_valid,
               code_u_dc => code_u_dc,
               u_dc_offset => settings.u_dc_offset, u_dc_gain => settings.u_dc_gain, k_u_max => settings.k_u_max,
-              out_valid => u_dc_valid, u_dc => o.u_dc, u_max => o.u_max, u_dc_at_rail => o.u_dc_at_rail);
+              out_soon => dc_soon, out_valid => open, u_dc => o.u_dc, u_max => o.u_max, u_dc_at_rail => o.u_dc_at_rail);
 
   bus_reciprocal : entity work.u_dc_processing
-    port map (clk => clk, rst => rst, in_valid => u_dc_valid,
+    port map (clk => clk, rst => rst, in_valid => dc_soon,
               u_dc => o.u_dc,
               out_valid => open, inverse => inverse, inverse_beta => inverse_beta, u_dc_low => o.u_dc_low);
 
@@ -305,7 +305,7 @@ begin
 
     period_voltage : entity work.applied_voltage
       generic map (CARRIER_HALF => CARRIER_HALF)
-      port map (clk => clk, rst => rst, in_valid => u_dc_valid,
+      port map (clk => clk, rst => rst, in_valid => dc_soon,
                 compare_a => o.compare_a, compare_b => o.compare_b, compare_c => o.compare_c, u_dc => o.u_dc,
                 u_dc_at_rail => o.u_dc_at_rail, run => run,
                 out_valid => period_valid, u_applied_alpha => e.u_applied_alpha, u_applied_beta => e.u_applied_beta,
@@ -410,7 +410,7 @@ begin
 
   checks : entity work.sample_checks
     generic map (POSITION_BITS => POSITION_BITS)
-    port map (clk => clk, rst => rst, in_valid => u_dc_valid,
+    port map (clk => clk, rst => rst, in_valid => current_valid,
               i_a => o.i_a, i_b => o.i_b, i_c => o.i_c, current_at_rail => o.current_at_rail, u_dc => o.u_dc,
               u_dc_at_rail => o.u_dc_at_rail, code_theta => code_theta,
               i_trip => settings.i_trip, sum_trip => settings.sum_trip, rail_samples => settings.rail_samples,
