@@ -120,22 +120,20 @@ class Projector:
 
     def rows(self, column) -> np.ndarray:
         """A misfit or column, {channel: array}, as rows (r,); a missing channel is zero."""
-        b = self.turns.shape[0]
-        out = []
-        u = column.get("u")
-        if u is None:
-            out.append(np.zeros(b * len(self.orders) * 2))
-        else:
-            f = np.matmul(u[:, None, :], self.turns)[:, 0, :] / u.shape[1]
-            out.append(np.stack([f.real, f.imag], axis=2).ravel())
-        for channel, orders in self.real.items():
-            x = column.get(channel)
-            if x is None:
-                out.append(np.zeros(b * len(orders) * 2))
-            else:
-                f = np.matmul(x[:, None, :], self.waves[channel])[:, 0, :] / x.shape[1]
-                out.append(np.stack([f.real, f.imag], axis=2).ravel())
-        return np.nan_to_num(np.concatenate(out))
+        return self.all_rows([column])[0]
+
+    def all_rows(self, columns) -> np.ndarray:
+        """(k, r) rows of k columns; together, as the functionals of a block are then read from memory once."""
+        b, out = self.turns.shape[0], []
+        for channel, waves in {"u": self.turns, **self.waves}.items():
+            mine = [n for n, column in enumerate(columns) if column.get(channel) is not None]
+            rows = np.zeros((len(columns), b, waves.shape[2], 2))
+            if mine:
+                x = np.stack([columns[n][channel] for n in mine], axis=1)
+                f = np.matmul(x, waves) / x.shape[2]
+                rows[mine] = np.stack([f.real, f.imag], axis=3).swapaxes(0, 1)
+            out.append(rows.reshape(len(columns), -1))
+        return np.nan_to_num(np.concatenate(out, axis=1))
 
 
 def cells_of(view, effects, projector=None, free=None) -> Cells:
@@ -144,14 +142,17 @@ def cells_of(view, effects, projector=None, free=None) -> Cells:
     projector: that of a view of the same blocks, or None.  free: names of effects with free columns; None: all.
     """
     p = projector or Projector(view)
-    columns = {}
+    raw, shown = {}, {}
     for effect in effects:
-        seen = view.shows(effect)[p.block]
-        mine = {key: p.rows(column) * seen for key, column in effect.core(view).items()}
+        shown[effect.name] = view.shows(effect)[p.block]
+        raw |= {(effect.name, key): column for key, column in effect.core(view).items()}
         if free is None or effect.name in free:
-            mine |= {f"~{key}": p.rows(column) * seen for key, column in effect.free(view).items()}
-        columns[effect.name] = mine
-    return Cells(p.rows(misfit(view)), columns, p.block, p.order, p.part, p.channel, p.ok)
+            raw |= {(effect.name, f"~{key}"): column for key, column in effect.free(view).items()}
+    rows = p.all_rows([misfit(view), *raw.values()])
+    columns = {name: {} for name in shown}
+    for (name, key), column in zip(raw, rows[1:], strict=True):
+        columns[name][key] = column * shown[name]
+    return Cells(rows[0], columns, p.block, p.order, p.part, p.channel, p.ok)
 
 
 def column_of(columns, key) -> str:

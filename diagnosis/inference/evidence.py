@@ -15,6 +15,7 @@ import numpy as np
 
 STEPS = 7
 LEAST = 1.0  # in units of the balance's error
+SMALL, LARGE = 1e-200, 1e200  # range of a product of variances; each lies within 1e-100 and 1e100
 FACTORS = np.array([0.1, 0.35, 0.7, 1.0, 1.4, 3.0, 10.0])  # of the discrepancy, tried in every step
 
 
@@ -48,17 +49,23 @@ def evidence(
     for i in range(n):
         if group[i] == loads and abs(y[i]) > start * least:
             loaded[i] = load * load
+    squares = np.zeros((groups, len(FACTORS)))
     value = 0.0
     for step in range(STEPS):
         for i in range(n):
             v[i] = s2[i] + (lam[group[i]] * level[i]) ** 2 + own[i] + loaded[i]
         power = 0.0
         logdet = 0.0
+        product = 1.0  # a logarithm of many factors at once, before the product leaves the range of a float
         for i in range(n):
             power += y[i] * y[i] / v[i]
-            logdet += np.log(v[i])
+            product *= v[i]
+            if not SMALL < product < LARGE:
+                logdet += np.log(product)
+                product = 1.0
             for p in range(k):
                 weighted[i, p] = x[i, p] / v[i]
+        logdet += np.log(product)
         precision = np.dot(x.T, weighted)
         right = np.dot(weighted.T, y)
         before = 0.0
@@ -104,6 +111,10 @@ def evidence(
                 a[e] = min(max(np.sqrt(sums[e] / counts[e]), 1.0), most[e])
         # discrepancy: expected squares of the remainder at several lambda; a row with a load is left out
         score = np.zeros((groups, len(FACTORS)))
+        products = np.ones((groups, len(FACTORS)))
+        for g in range(groups):
+            for h in range(len(FACTORS)):
+                squares[g, h] = min(max(lam[g] * FACTORS[h], LEAST), largest) ** 2
         rest = y - np.dot(x, c)
         spread = np.dot(x, cov)
         for i in range(n):
@@ -122,14 +133,19 @@ def evidence(
                 with_load = u + load * load
                 loaded[i] = load * load if e2 / with_load + np.log(with_load) < e2 / u + np.log(u) else 0.0
                 continue
-            for g in range(len(FACTORS)):
-                u = s2[i] + (min(max(lam[group[i]] * FACTORS[g], LEAST), largest) * level[i]) ** 2 + own[i]
-                score[group[i], g] -= 0.5 * (np.log(u) + e2 / u)
+            g, level2 = group[i], level[i] ** 2
+            for h in range(len(FACTORS)):
+                u = s2[i] + squares[g, h] * level2 + own[i]
+                score[g, h] -= 0.5 * e2 / u
+                products[g, h] *= u
+                if not SMALL < products[g, h] < LARGE:
+                    score[g, h] -= 0.5 * np.log(products[g, h])
+                    products[g, h] = 1.0
         for g in range(groups):
             best, chosen = -1e300, lam[g]
             for h in range(len(FACTORS)):
                 tried = min(max(lam[g] * FACTORS[h], LEAST), largest)
-                total = score[g, h] - np.log(1.0 + (tried / scale) ** 2)
+                total = score[g, h] - 0.5 * np.log(products[g, h]) - np.log(1.0 + (tried / scale) ** 2)
                 if total > best:
                     best, chosen = total, tried
             lam[g] = chosen if g != loads else 3.0

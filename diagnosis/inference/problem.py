@@ -73,11 +73,13 @@ class Setup:
 class Problem:
     """Columns and misfit at one linearisation; totals: {effect: {coefficient: value}} of its measurement errors."""
 
-    def __init__(self, setup: Setup, view=None, totals=None, change=0.0, doubt=None, names=None):
+    def __init__(self, setup: Setup, view=None, cells=None, totals=None, change=0.0, doubt=None):
+        """view, cells: the linearisation and its columns (None: those of the setup); change: (r,), of the misfit."""
         self.setup, self.totals = setup, totals or {}
         self.view = setup.view if view is None else view
-        chosen = [e for n, e in setup.effects.items() if names is None or n in names]
-        self.cells = cells = setup.cells if view is None else cells_of(self.view, chosen, setup.projector)
+        if cells is None:
+            cells = setup.cells if view is None else cells_of(view, setup.effects.values(), setup.projector)
+        self.cells = cells
         y = setup.cells.y + change
         for name, c in self.totals.items():
             columns = cells.columns[name]
@@ -200,21 +202,22 @@ def around(setup, fit, names=None):
     late = sum(effects[n].late_s(fit.c[n], view.nominal) for n in fit.names)
     view = with_flux(view, effects, fit.c, late_s=late)
     rows = setup.projector.rows
-    change = rows(misfit(plain)) - setup.smooth_rows
-    ripple = rows(misfit(view)) - setup.raw_rows - change
+    cells = cells_of(view, [e for n, e in effects.items() if names is None or n in names], setup.projector)
+    change = rows(misfit(plain)) - setup.smooth_rows if totals else np.zeros(len(setup.cells.y))
+    ripple = cells.y - setup.raw_rows - change
     rough = view.with_raw_current()
     for name in fit.names:
         effect = effects[name]
         if effect.corrects or effect.smoothed or not any("u" in col for col in effect.core(view).values()):
             continue
-        even, raw = (cells_of(v, [effect], setup.projector).columns[name] for v in (view, rough))
+        even, raw = cells.columns[name], cells_of(rough, [effect], setup.projector).columns[name]
         for key, value in fit.c[name].items():
             key = key if key in even else f"~{key}"
             if value and key in even and key in raw:
                 ripple -= value * (raw[key] - even[key])
     doubts = [effects[n].doubt(fit.c[n], view) for n in fit.names]
     doubt = np.sqrt(sum((np.square(d) for d in doubts), np.zeros(len(view)))) if doubts else None
-    return Problem(setup, view, totals, change + repeated(ripple, setup), doubt, names)
+    return Problem(setup, view, cells, totals, change + repeated(ripple, setup), doubt)
 
 
 def fit_of_set(setup, names, steps=3) -> Fit:
