@@ -14,8 +14,6 @@ BALANCE_SUM = 2e-4
 BALANCE_TORQUE = 3e-3
 # Scale of the discrepancy in units of the balance's error; its prior falls as the square beyond it.
 DISCREPANCY = 3.0
-# Largest discrepancy in units of the balance's error: the whole voltage.
-MOST_DISCREPANCY = 1e4
 # Share of its own contribution by which the formula of an effect is wrong at each operating point.
 FORMULA = 0.01
 # Odds against a load that nobody recorded at every operating point: a drive is run without load at one of them.
