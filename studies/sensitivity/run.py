@@ -97,17 +97,17 @@ def variations(chosen) -> list[tuple[str, float]]:
 
 
 def answers_of(job) -> tuple[str, dict]:
-    """(case, {"base": said, "NAME x2": said, ...}) of (folder, constants); {} if the case has no fast recording."""
-    folder, chosen = Path(job[0]), job[1]
+    """(name, {"base": said, "NAME x2": said, ...}) of (name, folder, constants); {} without a fast recording."""
+    name, folder, chosen = job
     case = Case(folder)
     if not case.fast:
-        return job[0], {}
+        return name, {}
     with recorded():
         out = {"base": case.base()}
         read = case.steps.reads()
-        for name, factor in variations(chosen):
-            out[f"{name} x{factor:g}"] = case.varied(name, factor) if name in read else out["base"]
-    return job[0], out
+        for constant, factor in variations(chosen):
+            out[f"{constant} x{factor:g}"] = case.varied(constant, factor) if constant in read else out["base"]
+    return name, out
 
 
 def shares(cases: dict[str, dict], chosen) -> dict:
