@@ -22,7 +22,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: one core for
 from fluxproof.checkout import BUILD, ROOT
 from fluxproof.files import write_json  # noqa: E402
 from studies.blind.generate import GENERATORS, generate  # noqa: E402
-from studies.sensitivity.run import FACTORS, answers_of, names, shares  # noqa: E402
+from studies.sensitivity.run import FACTORS, answers_of, differences, names, shares  # noqa: E402
 
 LIMIT = 0.02  # of the verdicts: a constant that changes more is a tuned one
 MIX = "own:140,motulator:25,gem:15"
@@ -93,13 +93,24 @@ def summary(seed: int, known: dict, chosen) -> dict:
     }
 
 
+def check(cases, chosen) -> int:
+    """Print every variation whose answer depends on what was reused; returns their number."""
+    count = 0
+    for name, folder in cases:
+        wrong = differences(folder, chosen)
+        print(f"{name}: {', '.join(wrong) or 'reused and whole runs give the same answers'}", flush=True)
+        count += len(wrong)
+    return count
+
+
 def main(arguments=None) -> int:
-    """The command line; returns 0 whatever the figures."""
+    """The command line; returns 0 whatever the figures, or the number of differences found."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seed", type=int, default=7)
     parser.add_argument("--mix", default=MIX, help="GENERATOR:CASES, separated by commas")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--constants", default="", help="names, separated by commas (default: all)")
+    parser.add_argument("--check", type=int, default=0, help="compare reused with whole runs on so many cases instead")
     options = parser.parse_args(arguments)
     chosen = [n for n in options.constants.split(",") if n] or names()
     unknown = sorted(set(chosen) - set(names()))
@@ -108,6 +119,8 @@ def main(arguments=None) -> int:
     mix = {generator: int(count) for generator, count in (part.split(":") for part in options.mix.split(","))}
     if not set(mix) <= set(GENERATORS):
         parser.error(f"--mix: generators are {', '.join(GENERATORS)}")
+    if options.check:
+        return check(list(cases_of(options.seed, mix, options.jobs).items())[: options.check], chosen)
     result = measure(options.seed, mix, options.jobs, chosen)
     write_json(OUT / "result.json", result)
     for name, entry in sorted(result["each"].items(), key=lambda e: -e[1]["share"]):

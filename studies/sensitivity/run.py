@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
 
 from fluxproof.diagnosis.answer.conclude import conclude, judge
@@ -108,6 +109,20 @@ def answers_of(job) -> tuple[str, dict]:
         for constant, factor in variations(chosen):
             out[f"{constant} x{factor:g}"] = case.varied(constant, factor) if constant in read else out["base"]
     return name, out
+
+
+def differences(folder: Path, chosen) -> list[str]:
+    """Variations of a case whose answer is another one if nothing is reused; "base" among them."""
+    case, out = Case(folder), []
+    with recorded():
+        answers = {("base", 1.0): case.base()}
+        read = [name for name in chosen if name in case.steps.reads()]
+        answers |= {(name, factor): case.varied(name, factor) for name, factor in variations(read)}
+    for (name, factor), reused in answers.items():
+        with varied(name, factor) if name != "base" else contextlib.nullcontext():
+            if said_in_full(case.loaded, case.nominal) != reused:
+                out.append(f"{name} x{factor:g}")
+    return out
 
 
 def shares(cases: dict[str, dict], chosen) -> dict:
