@@ -52,6 +52,10 @@ package fixed_pkg is
   -- difference before a multiplier to the DSP48's pre-adder and lose the signs of the operands.
   function difference (a : signed; b : signed) return signed;
 
+  -- a if first = '1', else b.  Written without a multiplexer for an operand register of a DSP48: where some bits of a or b
+  -- are constant, yosys would give these bits a reset of their own and leave the register outside of the DSP48.
+  function chosen (a : signed; b : signed; first : std_logic) return signed;
+
   -- a + round_half_up(v, drop) with one carry chain; the sum must fit the width of a.
   function plus_rounded (a : signed; v : signed; drop : positive) return signed;
 
@@ -202,6 +206,11 @@ package body fixed_pkg is
     -- -b = not b + 1: the one is the carry of both bits below the LSB.
     sum := (resize(a, WIDTH) & '1') + ((not resize(b, WIDTH)) & '1');
     return sum(WIDTH downto 1);
+  end function;
+
+  function chosen (a : signed; b : signed; first : std_logic) return signed is
+  begin
+    return (a and first) or (b and not first);
   end function;
 
   function plus_rounded (a : signed; v : signed; drop : positive) return signed is

@@ -32,6 +32,8 @@ architecture rtl of chord_speed is
   constant NOTHING : signed(0 downto 0) := "0";
 
   signal valid     : std_logic_vector(0 to LATENCY);
+  signal raised_0  : signed(FACTOR_W - 1 downto 0);
+  signal raised_3  : signed(FACTOR_W - 1 downto 0);
   signal factor_0  : signed(FACTOR_W - 1 downto 0);
   signal by_0      : signed(PU_W - 1 downto 0);
   signal product_3 : signed(PRODUCT_W - 1 downto 0);
@@ -39,10 +41,10 @@ begin
   valid(0) <= in_valid;
 
   -- The product that enters: square, part with the square of three clocks before, shorter with the part
-  factor_0 <= shift_left(resize(omega_me, FACTOR_W), CHORD_SPEED_RAISE_SQUARE) when valid(0) = '1' else
-              shift_left(resize(product_3, FACTOR_W), CHORD_SPEED_RAISE_PART) when valid(3) = '1' else
-              resize(product_3, FACTOR_W);
-  by_0     <= signed('0' & k_chord) when valid(3) = '1' else omega_me;
+  raised_0 <= shift_left(resize(omega_me, FACTOR_W), CHORD_SPEED_RAISE_SQUARE);
+  raised_3 <= shift_left(resize(product_3, FACTOR_W), CHORD_SPEED_RAISE_PART);
+  factor_0 <= chosen(raised_0, chosen(raised_3, resize(product_3, FACTOR_W), valid(3)), valid(0));
+  by_0     <= chosen(signed('0' & k_chord), omega_me, valid(3));
 
   -- Stages 1 to 3: square;  4 to 6: part;  7 to 9: shorter
   product : entity work.multiply_add

@@ -52,8 +52,8 @@ begin
   diff_0 <= difference(signed('0' & code_0), signed('0' & u_dc_offset));
 
   -- The product that enters: diff*u_dc_gain and half an LSB of u_dc, then u_dc*k_u_max, which is floored
-  factor_0 <= signed('0' & u_dc_3) when valid(3) = '1' else diff_0;
-  by_0     <= signed('0' & k_u_max) when valid(3) = '1' else u_dc_gain;
+  factor_0 <= chosen(signed('0' & u_dc_3), diff_0, valid(3));
+  by_0     <= chosen(signed('0' & k_u_max), u_dc_gain, valid(3));
   added_0  <= (others => '0') when valid(3) = '1' else
               half(U_DC_CONDITIONING_DROP_U_DC, U_DC_CONDITIONING_DROP_U_DC + 1);
 

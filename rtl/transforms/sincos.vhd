@@ -42,9 +42,10 @@ architecture rtl of sincos is
   signal quadrant_2 : unsigned(1 downto 0);
   signal quadrant_3 : unsigned(1 downto 0);
   signal quadrant_4 : unsigned(1 downto 0);
-  signal low_1      : unsigned(DELTA_BITS - 1 downto 0);
+  signal low_0      : unsigned(DELTA_BITS - 1 downto 0);
   signal s_1        : unsigned(17 downto 0);
   signal c_1        : unsigned(17 downto 0);
+  signal delta_1    : signed(12 downto 0);
   signal delta_2    : signed(12 downto 0);
   signal s_2        : unsigned(17 downto 0);
   signal c_2        : unsigned(17 downto 0);
@@ -73,6 +74,7 @@ begin
   -- The angle that enters
   theta_0   <= theta_out when valid(SECOND) = '1' else theta_me;
   address_0 <= theta_0(TURN_W - 3 downto DELTA_BITS);
+  low_0     <= theta_0(DELTA_BITS - 1 downto 0);
 
   -- The cut of the sum floors the product, because the table's value has no bits below the cut
   fine_s_4 <= sum_s_4(SUM_W - 1 downto SINCOS_DROP_PROD);
@@ -90,17 +92,17 @@ begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stage 1: s and c from both ends of the table
+      -- Stage 1: s and c from both ends of the table;  delta in radians
       quadrant_1 <= theta_0(TURN_W - 1 downto TURN_W - 2);
-      low_1      <= theta_0(DELTA_BITS - 1 downto 0);
       s_1        <= SINCOS_SINE(to_integer(address_0));
       c_1        <= SINCOS_SINE(to_integer(not address_0));
+      delta_1    <= SINCOS_DELTA(to_integer(low_0));
 
-      -- Stage 2: delta in radians;  a register behind the table, as a block RAM's output arrives late
+      -- Stage 2: registers behind the tables, as a block RAM's output arrives late
       quadrant_2 <= quadrant_1;
-      delta_2    <= SINCOS_DELTA(to_integer(low_1));
       s_2        <= s_1;
       c_2        <= c_1;
+      delta_2    <= delta_1;
 
       -- Stage 3: prod_s = delta*c;  prod_c = delta*s
       quadrant_3 <= quadrant_2;
