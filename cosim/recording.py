@@ -106,7 +106,7 @@ def current_bound(recording: Recording, drive: Drive) -> np.ndarray:
     length = np.hypot(recording.i_d, recording.i_q) + vector
     angle = np.pi * machine.pole_pairs / 2.0**s.position_bits
     # Along alpha three times, along beta sqrt(3) times the vector meets its coefficient's rounding.
-    coefficients = np.hypot(3.0 * clarke.THIRD.fmt.lsb / 2.0, np.sqrt(3.0) * clarke.INV_SQRT3.fmt.lsb / 2.0)
+    coefficients = np.hypot(3.0 * clarke.THIRD.fmt.lsb / 2.0, np.sqrt(12.0) * clarke.INV_SQRT12.fmt.lsb / 2.0)
     trig = np.sqrt(2.0) * sincos.bound(None, None)["cos_theta"]
     rounded = 2.0 * np.sqrt(2.0) * base * PU.lsb / 2.0  # Clarke and Park, two components each
     return vector + rounded + length * (angle + coefficients + trig)

@@ -90,7 +90,7 @@ def samples(block: Block, config: dict[str, int], seed: int) -> list[dict[str, i
             registers = {p.name: row[p.name] for p in block.registers}
         rows.append(row | registers)
     if block.possible is not None:
-        rows = [block.possible(row) for row in rows]
+        rows = [block.possible(row, config) for row in rows]
     for row in rows:
         for p in ports:
             if not p.low <= row[p.name] <= p.high:

@@ -50,6 +50,7 @@ class Nominal:
     core: object
     bases: object
     protection: object
+    sampling: object
     columns: dict = field(default_factory=dict)
     path: str = ""
     plant: dict = field(default_factory=dict)

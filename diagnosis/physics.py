@@ -11,6 +11,7 @@ from fluxproof.diagnosis.balance.view import joined_views
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.conventions.judge import preferred
 from fluxproof.diagnosis.conventions.tell import under
+from fluxproof.diagnosis.inference.linearise import Rows
 from fluxproof.diagnosis.inference.posterior import Posterior
 from fluxproof.diagnosis.inference.problem import Setup
 from fluxproof.diagnosis.ingest.restated import as_read
@@ -63,14 +64,19 @@ def held_out(views) -> np.ndarray:
     return np.concatenate([holdout_blocks(v) for v in views])
 
 
-def posterior_of(recordings, nominal, progress=lambda text: None):
-    """(posterior, (b,) held-out blocks) of fast recordings of one drive."""
+def rows_of(recordings, nominal):
+    """(Rows, (b,) held-out blocks) of fast recordings of one drive."""
     views = views_of(recordings, nominal)
     view = joined_views(views)
     held = held_out(views)
+    return Rows(view, view.visible(known_effects()), ~held), held
+
+
+def posterior_of(recordings, nominal, progress=lambda text: None):
+    """(posterior, (b,) held-out blocks) of fast recordings of one drive."""
+    rows, held = rows_of(recordings, nominal)
     progress("sets of effects")
-    effects = view.visible(known_effects())
-    return Posterior(Setup(view, effects, ~held), progress), held
+    return Posterior(Setup.of(rows), progress), held
 
 
 def _physics(recordings, nominal, progress) -> Diagnosis:

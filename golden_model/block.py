@@ -98,7 +98,7 @@ class Block:
     roms: Mapping[str, tuple[Format, list[int]]] = field(default_factory=dict)
     configs: tuple[Mapping[str, int], ...] = ({},)  # generics to verify with
     stimuli: Callable | None = None  # (rng, config) -> list of {port: value}: corner cases of the block
-    possible: Callable | None = None  # {port: value} -> the nearest values that can occur
+    possible: Callable | None = None  # ({port: value}, config) -> the nearest values that can occur
     width_from: Mapping[str, Callable] = field(default_factory=dict)  # port -> config -> Format
     generated: bool = False  # the VHDL is written by `make generate`
 

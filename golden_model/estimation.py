@@ -53,6 +53,7 @@ class ForControl(NamedTuple):
     """What the control and the later estimators take: resistance, merged flux, compensation, direction functions."""
 
     r: int = 0
+    rho: int = 0
     minus_rho: int = 0
     temp_lost: int = 0
     lambda_m_d: int = 0
@@ -80,8 +81,6 @@ class Seen(NamedTuple):
     sin_theta: int
     model_d: int
     model_q: int
-    raised_d: int
-    raised_q: int
     lambda_d: int
     lambda_q: int
     estimate_limited: int
@@ -137,14 +136,14 @@ def kept(state):
 def for_control(state, sample, regs, cos_theta, sin_theta, cos_out, sin_out):
     """ForControl of this sample; ``state``: fluxproof.State."""
     x, r = sample, regs
-    winding_r, minus_rho, temp_lost = winding_resistance.step(
+    winding_r, rho, minus_rho, temp_lost = winding_resistance.step(
         x.temp_winding, x.temp_valid, r.r_s, r.tcr, r.t_0, r.t_min, r.t_max, r.t_s
     )
     lambda_m_d, lambda_m_q = flux_park.step(state.lambda_m_alpha, state.lambda_m_beta, cos_theta, sin_theta)
     u_comp_alpha, u_comp_beta = dead_time_compensation.step(state.v_comp, state.s_alpha, state.s_beta)
     u_comp_d, u_comp_q = park.step(u_comp_alpha, u_comp_beta, cos_out, sin_out)
     d_d, d_q = park.step(state.s_alpha, state.s_beta, cos_out, sin_out)
-    return ForControl(winding_r, minus_rho, temp_lost, lambda_m_d, lambda_m_q, u_comp_d, u_comp_q, d_d, d_q)
+    return ForControl(winding_r, rho, minus_rho, temp_lost, lambda_m_d, lambda_m_q, u_comp_d, u_comp_q, d_d, d_q)
 
 
 @kernel
@@ -159,12 +158,12 @@ def step(state, given, seen, sample, regs, carrier_half):
     )
     s_alpha, s_beta = current_directions.step(v.i_alpha, v.i_beta, v.omega_me, r.k_ahead, r.k_sign)
     lambda_c_d, lambda_c_q, model_limited = current_model.step(
-        v.model_d, v.model_q, v.raised_d, v.raised_q, state.lambda_add_d, state.lambda_add_q
+        v.model_d, v.model_q, state.lambda_add_d, state.lambda_add_q
     )
     lambda_c_alpha, lambda_c_beta = flux_inverse_park.step(lambda_c_d, lambda_c_q, v.cos_theta, v.sin_theta)
     merge_state, (lambda_m_alpha, lambda_m_beta, merge_known, merge_limited) = flux_merge.step(
         state.of_flux_merge, v.i_alpha, v.i_beta, lambda_c_alpha, lambda_c_beta, u_clean_alpha, u_clean_beta,
-        voltage_known, x.run, g.minus_rho, r.omega_0, r.xi, r.t_s,
+        voltage_known, x.run, g.rho, r.omega_0, r.xi, r.t_s,
     )  # fmt: skip
     factor, n_omega = speed_reciprocal.step(v.omega_me, r.omega_min, r.k_ramp)
     delta_state, (delta_lambda_d, delta_lambda_q, delta_held, delta_limited) = delta_lambda.step(

@@ -101,9 +101,12 @@ WIRING = {
 EARLY = {
     ("stator_frame", "conditioning"): 1,
     ("rotor_frame", "stator_frame"): 1,
-    ("trig", "delay"): sincos.PASS,
-    ("rotor_frame", "trig"): sincos.AHEAD,
-    ("merged_flux", "trig"): sincos.AHEAD,
+    ("bus_reciprocal", "bus_voltage"): u_dc_conditioning.AHEAD,
+    ("period_voltage", "bus_voltage"): u_dc_conditioning.AHEAD,
+    ("checks", "bus_voltage"): u_dc_conditioning.AHEAD,
+    ("trig", "delay"): sincos.SECOND,
+    ("rotor_frame", "trig"): sincos.SECOND,
+    ("merged_flux", "trig"): sincos.SECOND,
     ("current_regulators", "rotor_frame"): 1,
     ("current_regulators", "speed_regulator"): 1,
     ("models", "rotor_frame"): 1,
@@ -300,12 +303,12 @@ def step(state, sample, regs, config):
         state.of_current_pi, i_d, i_q, x.i_d_ref, i_q_ref, state.sat_d, state.sat_q, x.run, r.kp_d, r.ki_d, r.kp_q,
         r.ki_q,
     )  # fmt: skip
-    model_d, model_q, merged_d, merged_q, merged, ended, raised_d, raised_q = flux_models.step(
-        i_d, i_q, given.lambda_m_d, given.lambda_m_q, state.lambda_pi_d, state.lambda_pi_q, state.merge_known,
-        x.run, given.minus_rho, flux_mode, r.l_d, r.l_q, r.lambda_mg,
+    model_d, model_q, merged_d, merged_q, merged, ended = flux_models.step(
+        i_d, i_q, given.lambda_m_d, given.lambda_m_q, state.merge_known, x.run, given.minus_rho, flux_mode, r.l_d,
+        r.l_q, r.lambda_mg,
     )  # fmt: skip
     lambda_d, lambda_q, estimate_limited = flux_estimate.step(
-        model_d, model_q, merged_d, merged_q, merged, ended
+        model_d, model_q, merged_d, merged_q, merged, ended, state.lambda_pi_d, state.lambda_pi_q
     )
     (omega_chord,) = chord_speed.step(omega_me, r.k_chord)
     u_dec_d, u_dec_q = decoupling.step(omega_chord, lambda_d, lambda_q)
@@ -321,7 +324,7 @@ def step(state, sample, regs, config):
     if c.estimators:
         seen = estimation.Seen(
             i_alpha, i_beta, i_d, i_q, current_at_rail, u_dc, u_dc_at_rail, u_dc_low, omega_me, omega_chord, cos_theta,
-            sin_theta, model_d, model_q, raised_d, raised_q, lambda_d, lambda_q, estimate_limited, u_pi_d, u_int_d,
+            sin_theta, model_d, model_q, lambda_d, lambda_q, estimate_limited, u_pi_d, u_int_d,
             u_int_q, u_q, sat_d, sat_q,
         )  # fmt: skip
         after, e = estimation.step(state, given, seen, x, r, c.carrier_half)

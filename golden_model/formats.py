@@ -23,6 +23,7 @@ RECIPROCAL = Format(0, 0, 17)  # m of 1/x = m * 2**n * 2**-17
 FLUX = Format(1, 1, 23)  # fluxes and voltages inside the estimators: 25 bits, the multiplier's wide port
 FLUX_STATE = Format(1, 1, 30)  # flux that is integrated: 7 bits below FLUX, see docs/flux_estimator.md
 RESISTANCE = Format(0, 0, 24)  # winding resistance, per unit
+RHO = Format(0, -2, 24)  # resistive flux drop of half a sample, per unit of current: below 1/4
 MINUS_RHO = Format(1, -2, 24)  # minus the resistive flux drop of half a sample: -1/4 to 0, both included
 V_LEG = Format(1, -1, 18)  # leg voltage loss by dead time and device drops, below half a voltage base
 LIMIT = Format(0, 1, 8)  # trip levels: currents and bus voltage in steps of a 256th of their base

@@ -1,6 +1,6 @@
 """Every block of the core, one line each: add yours here and the bench finds it."""
 
-from fluxproof.golden_model.common import input_filter, multiply_add, packet_fifo, reciprocal, sqrt
+from fluxproof.golden_model.common import input_filter, multiply_add, packet_fifo, reciprocal, sqrt, sum_of_products
 from fluxproof.golden_model.control import (
     chord_speed,
     current_pi,
@@ -77,6 +77,7 @@ BLOCKS = {
     module.BLOCK.name: module.BLOCK
     for module in (
         multiply_add,
+        sum_of_products,
         sqrt,
         reciprocal,
         sample_latch,

@@ -67,8 +67,8 @@ architecture rtl of fluxproof is
 
   -- Strobes
   signal sample_entered, latch_valid, current_soon    : std_logic;
-  signal theta_valid, omega_valid, u_dc_valid         : std_logic;
-  signal alpha_beta_soon, dq_soon                     : std_logic;
+  signal current_valid, theta_valid, omega_valid      : std_logic;
+  signal dc_soon, alpha_beta_soon, dq_soon            : std_logic;
   signal trig_soon, trig_valid                        : std_logic;
   signal models_valid, lambda_valid, decoupling_valid : std_logic;
   signal dq_voltage_soon, dq_voltage_valid            : std_logic;
@@ -83,7 +83,6 @@ architecture rtl of fluxproof is
   signal model_d, model_q                       : signed(FLUX_MODELS_MODEL_FLUX_W - 1 downto 0);
   signal merged_d, merged_q                     : signed(FLUX_MODELS_MERGED_FLUX_W - 1 downto 0);
   signal merged, ended                          : std_logic;
-  signal raised_d, raised_q                     : signed(FLUX_MODELS_RAISED_W - 1 downto 0);
   signal estimate_limited                       : std_logic;
 
   -- From the estimators to the control
@@ -133,7 +132,7 @@ begin
               code_a => code_a, code_b => code_b, code_c => code_c,
               offset_a => settings.offset_a, offset_b => settings.offset_b, offset_c => settings.offset_c,
               gain_a => settings.gain_a, gain_b => settings.gain_b, gain_c => settings.gain_c,
-              out_soon => current_soon, out_valid => open, i_a => o.i_a, i_b => o.i_b, i_c => o.i_c,
+              out_soon => current_soon, out_valid => current_valid, i_a => o.i_a, i_b => o.i_b, i_c => o.i_c,
               current_at_rail => o.current_at_rail);
 
   angle : entity work.position
@@ -155,10 +154,10 @@ begin
     port map (clk => clk, rst => rst, in_valid => latch_valid,
               code_u_dc => code_u_dc,
               u_dc_offset => settings.u_dc_offset, u_dc_gain => settings.u_dc_gain, k_u_max => settings.k_u_max,
-              out_valid => u_dc_valid, u_dc => o.u_dc, u_max => o.u_max, u_dc_at_rail => o.u_dc_at_rail);
+              out_soon => dc_soon, out_valid => open, u_dc => o.u_dc, u_max => o.u_max, u_dc_at_rail => o.u_dc_at_rail);
 
   bus_reciprocal : entity work.u_dc_processing
-    port map (clk => clk, rst => rst, in_valid => u_dc_valid,
+    port map (clk => clk, rst => rst, in_valid => dc_soon,
               u_dc => o.u_dc,
               out_valid => open, inverse => inverse, inverse_beta => inverse_beta, u_dc_low => o.u_dc_low);
 
@@ -205,16 +204,15 @@ begin
   models : entity work.flux_models
     port map (clk => clk, rst => rst, in_valid => dq_soon,
               i_d => o.i_d, i_q => o.i_q, lambda_m_d => lambda_m_d, lambda_m_q => lambda_m_q,
-              lambda_pi_d => e.lambda_pi_d, lambda_pi_q => e.lambda_pi_q, merge_known => e.merge_known, run => run,
-              minus_rho => minus_rho,
+              merge_known => e.merge_known, run => run, minus_rho => minus_rho,
               flux_mode => flux_mode, l_d => settings.l_d, l_q => settings.l_q, lambda_mg => settings.lambda_mg,
               out_valid => models_valid, model_d => model_d, model_q => model_q, merged_d => merged_d,
-              merged_q => merged_q, merged => merged, ended => ended, raised_d => raised_d, raised_q => raised_q);
+              merged_q => merged_q, merged => merged, ended => ended);
 
   flux : entity work.flux_estimate
     port map (clk => clk, rst => rst, in_valid => models_valid,
               model_d => model_d, model_q => model_q, merged_d => merged_d, merged_q => merged_q, merged => merged,
-              ended => ended,
+              ended => ended, lambda_pi_d => e.lambda_pi_d, lambda_pi_q => e.lambda_pi_q,
               out_valid => lambda_valid, lambda_d => o.lambda_d, lambda_q => o.lambda_q,
               estimate_limited => estimate_limited);
 
@@ -262,6 +260,7 @@ begin
     signal factor_valid, delta_valid, merge_valid    : std_logic;
     signal comp_valid                                : std_logic;
     signal r                                         : unsigned(RESISTANCE_W - 1 downto 0);
+    signal rho                                       : unsigned(RHO_W - 1 downto 0);
     signal voltage_known                             : std_logic;
     signal u_clean_alpha, u_clean_beta               : signed(FLUX_W - 1 downto 0);
     signal lambda_c_alpha, lambda_c_beta             : signed(FLUX_W - 1 downto 0);
@@ -281,7 +280,7 @@ begin
                 temp_winding => temp_winding, temp_valid => temp_valid,
                 r_s => settings.r_s, tcr => settings.tcr, t_0 => settings.t_0, t_min => settings.t_min,
                 t_max => settings.t_max, t_s => settings.t_s,
-                out_valid => open, r => r, minus_rho => minus_rho, temp_lost => e.temp_lost);
+                out_valid => open, r => r, rho => rho, minus_rho => minus_rho, temp_lost => e.temp_lost);
 
     merged_flux : entity work.flux_park
       port map (clk => clk, rst => rst, in_valid => trig_soon,
@@ -306,7 +305,7 @@ begin
 
     period_voltage : entity work.applied_voltage
       generic map (CARRIER_HALF => CARRIER_HALF)
-      port map (clk => clk, rst => rst, in_valid => u_dc_valid,
+      port map (clk => clk, rst => rst, in_valid => dc_soon,
                 compare_a => o.compare_a, compare_b => o.compare_b, compare_c => o.compare_c, u_dc => o.u_dc,
                 u_dc_at_rail => o.u_dc_at_rail, run => run,
                 out_valid => period_valid, u_applied_alpha => e.u_applied_alpha, u_applied_beta => e.u_applied_beta,
@@ -326,8 +325,7 @@ begin
 
     magnetic_model : entity work.current_model
       port map (clk => clk, rst => rst, in_valid => models_valid,
-                model_d => model_d, model_q => model_q, raised_d => raised_d, raised_q => raised_q,
-                lambda_add_d => lambda_add_d, lambda_add_q => lambda_add_q,
+                model_d => model_d, model_q => model_q, lambda_add_d => lambda_add_d, lambda_add_q => lambda_add_q,
                 out_valid => model_valid, lambda_c_d => e.lambda_c_d, lambda_c_q => e.lambda_c_q,
                 model_limited => model_limited);
 
@@ -340,7 +338,7 @@ begin
       port map (clk => clk, rst => rst, in_valid => model_ab_valid,
                 i_alpha => i_alpha, i_beta => i_beta, lambda_c_alpha => lambda_c_alpha, lambda_c_beta => lambda_c_beta,
                 u_applied_alpha => u_clean_alpha, u_applied_beta => u_clean_beta, voltage_known => voltage_known,
-                run => run, minus_rho => minus_rho,
+                run => run, rho => rho,
                 omega_0 => settings.omega_0, xi => settings.xi, t_s => settings.t_s,
                 out_valid => merge_valid, lambda_m_alpha => e.lambda_m_alpha, lambda_m_beta => e.lambda_m_beta,
                 merge_known => e.merge_known, merge_limited => merge_limited);
@@ -412,7 +410,7 @@ begin
 
   checks : entity work.sample_checks
     generic map (POSITION_BITS => POSITION_BITS)
-    port map (clk => clk, rst => rst, in_valid => u_dc_valid,
+    port map (clk => clk, rst => rst, in_valid => current_valid,
               i_a => o.i_a, i_b => o.i_b, i_c => o.i_c, current_at_rail => o.current_at_rail, u_dc => o.u_dc,
               u_dc_at_rail => o.u_dc_at_rail, code_theta => code_theta,
               i_trip => settings.i_trip, sum_trip => settings.sum_trip, rail_samples => settings.rail_samples,

@@ -1,6 +1,7 @@
 -- Purpose: runs every function of fixed_pkg on the lines of a file and writes what comes out.
 -- A line holds drop, width and x as a bit string; so one run covers any number of formats.
--- Output line: round_half_up, saturate, exceeds, saturate_u, round_sat, clamp to +-2**(width-1), as bit strings.
+-- Output line: round_half_up, saturate, exceeds, saturate_u, round_sat, clamp to +-2**(width-1), the difference to its
+-- rounded value and, where drop > 0, minus_half_up and turned_half_up with both signs, as bit strings.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -37,7 +38,13 @@ begin
       write(line_out, to_string(exceeds(v, width)) & " ");
       write(line_out, to_string(std_logic_vector(saturate_u(v, width))) & " ");
       write(line_out, to_string(std_logic_vector(round_sat(v, drop, width))) & " ");
-      write(line_out, to_string(std_logic_vector(clamp(WIDE, -LIMIT, LIMIT))));
+      write(line_out, to_string(std_logic_vector(clamp(WIDE, -LIMIT, LIMIT))) & " ");
+      write(line_out, to_string(std_logic_vector(difference(v, round_half_up(v, drop)))));
+      if drop > 0 then
+        write(line_out, " " & to_string(std_logic_vector(minus_half_up(v, drop))));
+        write(line_out, " " & to_string(std_logic_vector(turned_half_up(v, '0', drop))));
+        write(line_out, " " & to_string(std_logic_vector(turned_half_up(v, '1', drop))));
+      end if;
       writeline(results_file, line_out);
     end procedure;
   begin

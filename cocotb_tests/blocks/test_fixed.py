@@ -56,7 +56,7 @@ def test_vhdl_equals_python(tmp_path):
     assert len(lines) == len(rows) > 10_000
     for (drop, width, bits, x), line in zip(rows, lines, strict=True):
         fields = line.split()
-        signs = (True, True, False, False, True, True)
+        signs = (True, True, False, False, True, True, True) + (True,) * (3 if drop else 0)
         got = [number(text, signed) for text, signed in zip(fields, signs, strict=True)]
         limit = 1 << (min(width, bits) - 1)
         wanted = [
@@ -66,7 +66,11 @@ def test_vhdl_equals_python(tmp_path):
             fixed.saturate_u(x, width),
             fixed.round_sat(x, drop, width),
             fixed.clamp(x, -limit, limit),
+            x - fixed.round_half_up(x, drop),
         ]
+        if drop:
+            minus = fixed.round_half_up(-x, drop)
+            wanted += [minus, fixed.round_half_up(x, drop), minus]
         assert got == wanted, f"drop {drop}, width {width}, {bits} bits, x = {x}: got {got}, wanted {wanted}"
 
 

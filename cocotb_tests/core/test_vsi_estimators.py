@@ -65,7 +65,7 @@ def test_one_lsb_of_psi():
     view = run(held_at(300, 0.0, I_Q, 3.0), scaled(NOMINAL, FAST))
     seen, values = view.result.observed, NOMINAL.values
     v_leg = np.concatenate([[0], (seen["v_dead"] + seen["v_comp"])[:-1]])
-    r, _minus_rho, _lost = winding_resistance.step(
+    r, _rho, _minus_rho, _lost = winding_resistance.step(
         0, 0, values.r_s, values.tcr, values.t_0, values.t_min, values.t_max, values.t_s
     )
     state, real, psi = psi_adaline.State(), 0.0, 0
@@ -90,11 +90,11 @@ def test_invalid_winding_temperature():
     v = NOMINAL.values
     regs = (v.r_s, v.tcr, v.t_0, v.t_min, v.t_max, v.t_s)
     for celsius, valid, lost in ((90, 1, 0), (90, 0, 1), (250, 1, 1), (-60, 1, 1), (200, 1, 0), (-40, 1, 0)):
-        r, minus_rho, flag = winding_resistance.step(celsius * 64, valid, *regs)
+        r, rho, minus_rho, flag = winding_resistance.step(celsius * 64, valid, *regs)
         assert flag == lost
         wanted = DRIVE.machine.resistance_ohm * (1 if lost else 1 + 0.0039 * (celsius - 25))
         assert r * 2.0**-24 * DRIVE.bases.voltage_v / DRIVE.bases.current_a == pytest.approx(wanted, rel=1e-4)
-        assert minus_rho < 0
+        assert rho > 0 and minus_rho == -rho
 
 
 def test_psi_is_held_and_reported_at_low_speed():

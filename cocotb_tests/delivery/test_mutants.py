@@ -1,4 +1,4 @@
-"""`make mutate` on one small block: drawn, noticed, proved equivalent; where nothing is compared, nothing is noticed."""
+"""`make mutate` on a small block: drawn, noticed, proved equivalent; where nothing is compared, nothing is noticed."""
 
 from __future__ import annotations
 

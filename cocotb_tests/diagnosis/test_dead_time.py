@@ -11,7 +11,9 @@ import pytest
 
 from fluxproof.diagnosis import diagnose
 from fluxproof.diagnosis.balance.blocks import view_of
+from fluxproof.diagnosis.balance.cells import cells_of
 from fluxproof.diagnosis.catalogue.dead_time import EFFECT, full_loss
+from fluxproof.diagnosis.inference.linearise import Linearisation
 from fluxproof.diagnosis.inference.problem import Problem, Setup
 from fluxproof.diagnosis.nominal import load_nominal
 from fluxproof.diagnosis.recording import from_columns
@@ -43,7 +45,9 @@ def strong(tmp_path_factory):
 
 def across(setup, loss, late_s=0.0):
     """Residual rms [V] of the dead-time curve at order 0, perpendicular to the current, in blocks with current."""
-    problem = Problem(setup, setup.view.replace(late_s=late_s), change=loss - setup.cells.y)
+    view = setup.view.replace(late_s=late_s)
+    cells = cells_of(view, [EFFECT], setup.projector)
+    problem = Problem(setup, Linearisation(view, cells, {}, loss - setup.cells.y, np.zeros(len(loss)), None))
     fit = problem.fit(["dead_time"])
     rows = (problem.cells.order == 0) & (problem.cells.channel == "u")
     left = fit.left()[rows].reshape(-1, 2)

@@ -10,23 +10,66 @@ import pytest
 from cocotb_tests.core.test_registers import PAPER
 from cocotb_tests.support.diagnosed_drives import GRID, MACHINE, columns
 from fluxproof.checkout import ROOT
-from fluxproof.diagnosis import diagnose
 from fluxproof.diagnosis.inference import constants
-from studies.sensitivity.run import OF_SLOW_LOGS, OF_THE_ANSWER, answers_of, names, said, shares, varied
+from studies.sensitivity.run import OF_SLOW_LOGS, Case, answers_of, names, said_in_full, shares
+from studies.sensitivity.steps import Steps, recorded, varied
 
 
 def test_every_constant_is_varied():
     declared = {t.id for node in ast.parse(open(constants.__file__).read()).body if isinstance(node, ast.Assign)
                 for target in node.targets for t in ast.walk(target) if isinstance(t, ast.Name)}  # fmt: skip
-    assert declared == set(names()) | set(OF_SLOW_LOGS) and set(OF_THE_ANSWER) <= set(names())
+    assert declared == set(names()) | set(OF_SLOW_LOGS)
 
 
-def test_constants_of_the_answer_are_not_read_by_the_search():
-    """Otherwise the posterior would have to be found again when one of them changes."""
-    for path in (ROOT / "diagnosis/inference").glob("*.py"):
-        used = {n.attr for n in ast.walk(ast.parse(path.read_text()))
-                if isinstance(n, ast.Attribute) and isinstance(n.value, ast.Name) and n.value.id == "k"}  # fmt: skip
-        assert not used & set(OF_THE_ANSWER), path.name
+def test_no_constant_is_imported_by_value():
+    """A value that is bound when a module is imported would not be varied."""
+    for path in (ROOT / "diagnosis").rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            assert not (isinstance(node, ast.ImportFrom) and (node.module or "").endswith("inference.constants")), path
+
+
+def _product(number):
+    return number * constants.HALF * (constants.OPEN if number > 1 else 1.0)
+
+
+def _twice(steps, number):
+    return 2.0 * steps(_product, number)
+
+
+def test_a_step_runs_again_only_if_a_constant_that_it_read_is_another_one():
+    with recorded():
+        steps = Steps()
+        first = steps(_twice, steps, 1)
+        assert first == 2.0 * constants.HALF and steps.ran == 2 and steps.reads() == {"HALF"}
+        with varied("OPEN", 2.0):  # not read for this number
+            assert steps(_twice, steps, 1) == first and steps.ran == 2
+        with varied("HALF", 2.0):  # read in the step within
+            assert steps(_twice, steps, 1) == 2.0 * first and steps.ran == 4
+        assert steps(_twice, steps, 1) == first and steps.ran == 4
+        steps(_twice, steps, 2)
+        with varied("OPEN", 2.0):
+            assert steps(_twice, steps, 2) == 4.0 * constants.HALF * constants.OPEN
+
+
+def test_a_step_that_is_reused_tells_the_outer_step_what_it_read():
+    with recorded():
+        steps = Steps()
+        steps(_product, 1)
+        first = steps(_twice, steps, 1)  # the inner step is reused here
+        with varied("HALF", 2.0):
+            assert steps(_twice, steps, 1) == 2.0 * first
+
+
+def test_what_one_variation_kept_is_forgotten():
+    with recorded():
+        steps = Steps()
+        steps(_product, 1)
+        steps.lasting = False
+        with varied("HALF", 2.0):
+            steps(_product, 1)
+        steps.forget()
+        assert [len(kept) for kept in steps.kept.values()] == [1]
+        assert steps(_product, 1) == constants.HALF
 
 
 def test_a_constant_is_restored():
@@ -47,14 +90,33 @@ def test_shares_count_cases_that_differ():
     assert entry["HALF"]["changed"] == {"half": ["b", "d"], "double": ["c"]}
 
 
-def test_a_case_under_variations(tmp_path):
-    """Neither the prior nor the threshold of a name changes a resistance that is wrong by a third."""
-    folder = tmp_path / "case_0001"
-    folder.mkdir()
+@pytest.fixture
+def folder(tmp_path):
+    """A recording of a drive whose resistance is wrong by a third."""
+    out = tmp_path / "case_0001"
+    out.mkdir()
     table = columns(GRID, (("resistance_ohm", 1.3 * MACHINE.resistance_ohm),))
-    pd.DataFrame(table).to_parquet(folder / "recording.parquet")
-    (folder / "drive.toml").write_text(PAPER.read_text())
-    case, out = answers_of((folder, ["PRESENT", "HALF"]))
-    assert case == "case_0001" and set(out) == {"base", "PRESENT x0.5", "PRESENT x2", "HALF x0.5", "HALF x2"}
-    assert out["base"] == said(diagnose(folder / "recording.parquet", PAPER))
+    pd.DataFrame(table).to_parquet(out / "recording.parquet")
+    (out / "drive.toml").write_text(PAPER.read_text())
+    return out
+
+
+def test_a_case_under_variations(folder):
+    """Neither the prior nor the threshold of a name changes a resistance that is wrong by a third."""
+    case, out = answers_of(("own/case_0001", folder, ["PRESENT", "HALF"]))
+    assert case == "own/case_0001" and set(out) == {"base", "PRESENT x0.5", "PRESENT x2", "HALF x0.5", "HALF x2"}
     assert out["base"]["names"] == ["resistance"] and all(value == out["base"] for value in out.values())
+
+
+@pytest.mark.parametrize("name, factor", [("BALANCE_U", 2.0), ("BALANCE_U", 1e4), ("FORMULA", 0.5), ("POINT", 2.0),
+                                          ("PRESENT", 0.5), ("DOUBTED", 0.5), ("MISREAD", 0.5)])  # fmt: skip
+def test_what_is_reused_changes_no_answer(folder, name, factor):
+    """A balance that is wrong by the whole voltage changes the answer, the other variations do not."""
+    case = Case(folder)
+    with recorded():
+        base = case.base()
+        reused = case.varied(name, factor)
+    assert base == said_in_full(case.loaded, case.nominal)
+    with varied(name, factor):
+        assert reused == said_in_full(case.loaded, case.nominal)
+    assert (reused != base) == (factor == 1e4)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from fluxproof.diagnosis.answer.estimates import covariance_of, named_effects
 from fluxproof.diagnosis.answer.headline import sentence
 from fluxproof.diagnosis.answer.locate import at_order, evidence, locate
-from fluxproof.diagnosis.answer.names import names_of
+from fluxproof.diagnosis.answer.names import Names, names_of
 from fluxproof.diagnosis.answer.phrases import as_if, capital
 from fluxproof.diagnosis.answer.request import requests, wants_cold
 from fluxproof.diagnosis.answer.scan import Stray, row_residual, stray_order, stray_swing, stray_torque
@@ -20,21 +22,54 @@ from fluxproof.diagnosis.result import Diagnosis, UnknownTerm
 MOST_RIVALS = 5
 
 
-def conclude(posterior, held, progress=lambda text: None) -> Diagnosis:
-    """The answer to a posterior; held: (b,) blocks that were not fitted."""
-    setup, names, best = posterior.setup, names_of(posterior), posterior.best()
-    view, cells, before = setup.view, setup.cells, setup.cells.y
+@dataclass(frozen=True)
+class Judgement:
+    """What a posterior says: the verdict, names, what is told of the set, sizes of the misfit, and what is beside them.
+
+    told: effects that explain a part; channel: in which the explained share is counted; stray: a misfit outside the
+    orders of the balance; train, unseen: sizes on fitted and on other blocks.
+    """
+
+    kind: str
+    names: Names
+    told: set[str]
+    channel: str
+    share: float | None
+    stray: Stray | None
+    train: Sizes
+    unseen: Sizes
+
+
+def judge(posterior, held) -> Judgement:
+    """The judgement on a posterior; held: (b,) blocks that were not fitted."""
+    setup, best = posterior.setup, posterior.best()
+    names = setup.call(names_of, posterior)
     likely = {n for n, p in names.maybe.items() if p >= k.LIKELY}
     told = (names.said | {n for group in names.open for n in group} | likely) & set(best.names) - set(names.suspects)
-    after = best.left(told)
-    measured = setup.load == 0.0  # otherwise the torque follows from the angle, whose resolution is not the shaft's
-    train = Sizes(setup, before, after, ~held, measured)
-    unseen = Sizes(setup, before, after, held, measured)
+    before, after = setup.cells.y, best.left(told)
+    train = Sizes(setup, before, after, ~held, measured_torque(setup))
+    unseen = Sizes(setup, before, after, held, measured_torque(setup))
     channel = train.primary()
     electrical = [n for n in told if not setup.effects[n].mechanical]
-    share = unseen.share(channel) if electrical or (told and measured) else None
-    stray = _stray(best, train)
+    share = unseen.share(channel) if electrical or (told and measured_torque(setup)) else None
+    stray = setup.call(stray_of, posterior, held)
     kind = kind_of(names, train, unseen, share, stray)
+    return Judgement(kind, names, told, channel, share, stray, train, unseen)
+
+
+def measured_torque(setup) -> bool:
+    """Whether a transducer measures it; otherwise it follows from the angle, whose resolution is not the shaft's."""
+    return setup.load == 0.0
+
+
+def conclude(posterior, held, progress=lambda text: None) -> Diagnosis:
+    """The answer to a posterior; held: (b,) blocks that were not fitted."""
+    setup, best, j = posterior.setup, posterior.best(), judge(posterior, held)
+    names, told, channel, share, stray, train, unseen = (
+        j.names, j.told, j.channel, j.share, j.stray, j.train, j.unseen
+    )  # fmt: skip
+    view, cells, before, measured = setup.view, setup.cells, setup.cells.y, measured_torque(setup)
+    kind, after = j.kind, best.left(told)
     fit = fit_of(train, unseen)
     answer = Diagnosis(kind, "", location=locate(view, cells, setup.noise), fit=fit, search=posterior)
     answer.effects = named_effects(names, posterior, _shares(posterior, names, told, channel, held, measured))
@@ -100,13 +135,15 @@ def _shares(posterior, names, told, channel, held, measured) -> dict[str, float]
     return out
 
 
-def _stray(best, train) -> Stray | None:
+def stray_of(posterior, held) -> Stray | None:
     """A misfit outside the orders of the balance, after the best set."""
-    problem, setup = best.problem, best.problem.setup
+    best = posterior.best()
+    problem, setup = best.problem, posterior.setup
     effects = setup.effects
     doubts = [effects[n].doubt(best.c[n], setup.view) for n in best.names]
     doubt = np.sqrt(sum((np.square(d) for d in doubts), np.zeros(len(setup.view))))
-    before = train.channels["u"].before if "u" in train.channels else 0.0
+    sizes = Sizes(setup, setup.cells.y, setup.cells.y, ~held, measured_torque(setup))
+    before = sizes.channels["u"].before if "u" in sizes.channels else 0.0
     floor = k.FORMS_LEFT * before if best.names else 0.0
     certain = np.flatnonzero(doubt <= k.FORMS_LEFT * before) if best.names else np.arange(len(setup.view))
     if not len(certain):

@@ -12,7 +12,7 @@ from fluxproof.diagnosis.answer.experiment import BENDS, best_points, rivalry
 from fluxproof.diagnosis.answer.phrases import SIGNALS, joined, title_of
 from fluxproof.diagnosis.balance.cells import Projector, voltage_level
 from fluxproof.diagnosis.balance.view import View, stayed_cold
-from fluxproof.diagnosis.inference.constants import BALANCE_DC, BALANCE_U
+from fluxproof.diagnosis.inference import constants
 from fluxproof.diagnosis.quantities import ascii_of, quantity
 from fluxproof.diagnosis.result import Request
 
@@ -168,7 +168,8 @@ def requests(setup, fits, noise_v, cold=False) -> list[Request]:
     made = steady_view(view, omega, i, cooled)
     p = Projector(made)
     drive = view.nominal.inverter.dc_bus_v
-    own = np.hypot(noise_v, BALANCE_U * voltage_level(made) + BALANCE_DC * drive)[p.block] / np.sqrt(BLOCKS)
+    balance = constants.BALANCE_U * voltage_level(made) + constants.BALANCE_DC * drive
+    own = np.hypot(noise_v, balance)[p.block] / np.sqrt(BLOCKS)
     sigma = np.where(p.ok & (p.channel == "u"), own, np.inf)
     of = {n: columns_at(p, made, effects[n]) for s in solutions for n in s.names}
     predictions, knows = [], []

@@ -87,8 +87,11 @@ def stray_order(view, residual, floor, known=()) -> Stray | None:
     """
     p, m, level = view.machine.pole_pairs, residual.shape[1], voltage_level(view)
     turns = np.abs(view.theta[:, -1] - view.theta[:, 0]) / (2 * np.pi * p)
-    theta_m = view.theta_mid / p
-    taper = 1.0 - np.cos(2 * np.pi * (np.arange(m) + 0.5) / m)
+    tapered = residual * (1.0 - np.cos(2 * np.pi * (np.arange(m) + 0.5) / m))
+    turn, wave, found = np.exp(-1j * view.theta_mid / p), 1.0, {}
+    for n in range(1, MOST_ORDER + 1):
+        wave = wave * turn
+        found[n], found[-n] = (tapered * wave).mean(axis=1), (tapered * np.conj(wave)).mean(axis=1)
     best, largest = None, 0.0
     for n in [*range(1, MOST_ORDER + 1), *range(-MOST_ORDER, 0)]:
         if any(abs(n) == h * p for h in known):
@@ -96,7 +99,7 @@ def stray_order(view, residual, floor, known=()) -> Stray | None:
         use = (abs(n) * turns >= 2.5) & (abs(n) * turns < m / 5)
         if use.sum() < 6:
             continue
-        f = (residual[use] * taper * np.exp(-1j * n * theta_m[use])).mean(axis=1)
+        f = found[n][use]
         least = max(floor, k.LEAST_RIPPLE * float(np.sqrt(np.mean(level[use] ** 2))))
         for text, (weight, unit) in WEIGHTS.items():
             w = weight(view)[use]

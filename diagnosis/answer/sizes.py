@@ -28,6 +28,10 @@ class Size:
     def left(self) -> float:
         return max(self.after**2 - self.floor**2, 0.0)
 
+    def above(self, power) -> float:
+        """The rms whose power exceeds that of the floor by ``power`` times the floor's."""
+        return self.floor * (1.0 + power) ** 0.5
+
 
 class Sizes:
     """Sizes of a setup's misfit ``before`` and ``after`` (r,) in the blocks (b,) bool."""
@@ -63,7 +67,7 @@ class Sizes:
     def share(self, channel, orders=None) -> float | None:
         """Share of a channel's power above the floor that was explained, in some or all of its orders."""
         mine = [s for (c, h), s in self.orders.items() if c == channel and (orders is None or h in orders)]
-        mine = [s for s in mine if s.before > k.VISIBLE * s.floor or s.after > k.VISIBLE * s.floor]
+        mine = [s for s in mine if max(s.before, s.after) > s.above(k.VISIBLE)]
         excess, left = sum(s.excess for s in mine), sum(s.left for s in mine)
         return float(1.0 - left / excess) if excess > 0.0 else None
 
@@ -75,7 +79,7 @@ class Sizes:
                 continue
             whole = sum(s.excess for (c, _), s in self.orders.items() if c == channel)
             share = size.left / whole if whole > 0.0 else 0.0
-            if size.after > k.VISIBLE * size.floor and share >= least:
+            if size.after > size.above(k.VISIBLE) and share >= least:
                 signal, unit = UNITS[channel]
                 out.append(Remainder(signal, round(order, 4), float(np.sqrt(size.left)), unit, float(share)))
         return sorted(out, key=lambda r: -r.share)

@@ -10,10 +10,10 @@ def kind_of(names, train, held, share, stray) -> str:
     if not names.confidence and not names.open:
         if names.suspects:
             return "unexplained"
-        quiet = all(s.before <= k.FLOOR * s.floor for s in train.channels.values())
+        quiet = all(s.before <= s.above(k.FLOOR) for s in train.channels.values())
         return "no_mismatch" if quiet and not stray and not standing_out(train) else "unexplained"
     sizes = [s for c, s in held.channels.items()]
-    at_floor = all(s.after <= k.FLOOR * s.floor for s in sizes)
+    at_floor = all(s.after <= s.above(k.FLOOR) for s in sizes)
     whole = at_floor or (share is not None and share >= 1.0 - k.SMALL)
     if not whole or stray:
         return "partly_explained" if share is not None and share >= k.HALF else "unexplained"
@@ -24,5 +24,5 @@ def standing_out(sizes) -> list:
     """[(channel, order)] whose remainder exceeds its noise floor and is a large part of what was there before."""
     return [
         key for key, s in sizes.orders.items()
-        if key[0] in sizes.channels and s.after > k.FLOOR * s.floor and s.left > 0.1 * max(s.excess, 1e-300)
+        if key[0] in sizes.channels and s.after > s.above(k.FLOOR) and s.left > 0.1 * max(s.excess, 1e-300)
     ]  # fmt: skip

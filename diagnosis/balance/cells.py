@@ -35,6 +35,7 @@ class Cells:
 
     y: (r,) misfit; columns: {effect: {coefficient: (r,)}}; block, order, part: (r,) origin of a row, part 0 and 1
     for d and q; channel: (r,) "u", "sum" or "torque"; ok: (r,) bool, rows that are used.
+    electrical: effects whose formula acts on the voltage.
     """
 
     y: np.ndarray
@@ -44,6 +45,7 @@ class Cells:
     part: np.ndarray
     channel: np.ndarray
     ok: np.ndarray
+    electrical: frozenset[str] = frozenset()
 
 
 class Projector:
@@ -120,22 +122,21 @@ class Projector:
 
     def rows(self, column) -> np.ndarray:
         """A misfit or column, {channel: array}, as rows (r,); a missing channel is zero."""
-        b = self.turns.shape[0]
-        out = []
-        u = column.get("u")
-        if u is None:
-            out.append(np.zeros(b * len(self.orders) * 2))
-        else:
-            f = np.matmul(u[:, None, :], self.turns)[:, 0, :] / u.shape[1]
-            out.append(np.stack([f.real, f.imag], axis=2).ravel())
-        for channel, orders in self.real.items():
-            x = column.get(channel)
-            if x is None:
-                out.append(np.zeros(b * len(orders) * 2))
-            else:
-                f = np.matmul(x[:, None, :], self.waves[channel])[:, 0, :] / x.shape[1]
-                out.append(np.stack([f.real, f.imag], axis=2).ravel())
-        return np.nan_to_num(np.concatenate(out))
+        return self.all_rows([column])[0]
+
+    def all_rows(self, columns) -> np.ndarray:
+        """(k, r) rows of k columns; together, as the functionals of a block are then read from memory once."""
+        b, out = self.turns.shape[0], [np.zeros((len(columns), 0))]
+        for channel, waves in {"u": self.turns, **self.waves}.items():
+            mine = [n for n, column in enumerate(columns) if column.get(channel) is not None]
+            rows = np.zeros((len(columns), b, waves.shape[2], 2))
+            if mine:
+                x = np.stack([columns[n][channel] for n in mine], axis=1)
+                # Of a real column, real and imaginary part of a wave are functionals of their own.
+                f = np.matmul(x, waves if np.iscomplexobj(x) else waves.view(float)) / x.shape[2]
+                rows[mine] = f.view(float).reshape(*f.shape[:2], -1, 2).swapaxes(0, 1)
+            out.append(rows.reshape(len(columns), 2 * b * waves.shape[2]))
+        return np.nan_to_num(np.concatenate(out, axis=1))
 
 
 def cells_of(view, effects, projector=None, free=None) -> Cells:
@@ -144,14 +145,25 @@ def cells_of(view, effects, projector=None, free=None) -> Cells:
     projector: that of a view of the same blocks, or None.  free: names of effects with free columns; None: all.
     """
     p = projector or Projector(view)
-    columns = {}
+    columns, electrical = columns_of(view, effects, p, free)
+    return Cells(p.rows(misfit(view)), columns, p.block, p.order, p.part, p.channel, p.ok, electrical)
+
+
+def columns_of(view, effects, projector, free=None) -> tuple[dict[str, dict[str, np.ndarray]], frozenset[str]]:
+    """Columns {effect: {coefficient: (r,)}} as in ``cells_of``, and the effects whose formula acts on the voltage."""
+    raw, shown, electrical = {}, {}, set()
     for effect in effects:
-        seen = view.shows(effect)[p.block]
-        mine = {key: p.rows(column) * seen for key, column in effect.core(view).items()}
+        shown[effect.name] = view.shows(effect)[projector.block]
+        core = effect.core(view)
+        if any("u" in column for column in core.values()):
+            electrical.add(effect.name)
+        raw |= {(effect.name, key): column for key, column in core.items()}
         if free is None or effect.name in free:
-            mine |= {f"~{key}": p.rows(column) * seen for key, column in effect.free(view).items()}
-        columns[effect.name] = mine
-    return Cells(p.rows(misfit(view)), columns, p.block, p.order, p.part, p.channel, p.ok)
+            raw |= {(effect.name, f"~{key}"): column for key, column in effect.free(view).items()}
+    columns = {name: {} for name in shown}
+    for (name, key), column in zip(raw, projector.all_rows(list(raw.values())), strict=True):
+        columns[name][key] = column * shown[name]
+    return columns, frozenset(electrical)
 
 
 def column_of(columns, key) -> str:

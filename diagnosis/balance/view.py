@@ -15,6 +15,8 @@ import numpy as np
 
 from fluxproof.diagnosis.inference import constants as k
 
+# What is computed from the angle alone stays known in a copy with the same angle.
+OF_THE_ANGLE = ("half_turn", "mid_turn", "turn", "theta_mid", "interval_angle")
 STACKED = ("theta", "omega", "i", "i_raw", "u", "u_dc", "temp", "torque", "slope_m", "shaft", "rows")
 
 
@@ -215,7 +217,10 @@ class View:
 
     def replace(self, **changes):
         """A copy with other arrays."""
-        return dataclasses.replace(self, **changes)
+        out = dataclasses.replace(self, **changes)
+        if out.theta is self.theta:
+            out.__dict__.update({name: self.__dict__[name] for name in OF_THE_ANGLE if name in self.__dict__})
+        return out
 
     def take(self, index):
         """The blocks of ``index`` only."""

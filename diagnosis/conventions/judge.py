@@ -21,6 +21,7 @@ from fluxproof.diagnosis.conventions.table import readings_for
 from fluxproof.diagnosis.effects.effect import torque_of
 from fluxproof.diagnosis.inference import constants as k
 from fluxproof.diagnosis.inference.evidence import evidence
+from fluxproof.diagnosis.inference.linearise import Rows
 from fluxproof.diagnosis.inference.points import condense
 from fluxproof.diagnosis.inference.posterior import Posterior
 from fluxproof.diagnosis.inference.problem import Problem, Setup
@@ -69,7 +70,8 @@ def preferred(recordings, posterior, explained, progress=lambda text: None):
         if max(j.value, perfect - ONE_EFFECT + prior) <= known:
             continue
         progress(f"as if {j.readings[0].says}")
-        other = Posterior(_read(setup, j.readings), progress)
+        read = setup.call(_read, setup, tuple(r.code for r in j.readings))
+        other = setup.call(Posterior, read, progress)
         value = other.best().value + prior + terms.jacobian(j.readings)
         left = other.best().names
         exact = not any(set(setup.effects[n].rescales) & r.touches for n in left for r in j.readings)
@@ -83,21 +85,33 @@ def preferred(recordings, posterior, explained, progress=lambda text: None):
     return best.readings, rivals, found
 
 
-def _read(setup, readings) -> Setup:
+def _read(setup, codes) -> Setup:
     """The setup under readings, with raw or with smooth signals changed, whichever leaves less.
 
     Ripple of a current is a signal, which shows that a reading is right; its noise is not.
     """
-    view = setup.view
-    for reading in readings:
-        view = reading.of_view(view)
-    train = np.zeros(len(view), bool)
-    train[setup.projector.block[setup.train]] = True
+    readings = _coded(setup, codes)
     volts, amps = _product(r.volts for r in readings), _product(r.currents for r in readings)
-    raw = Setup(view, setup.effects, train).read_like(setup, volts, amps)
+    raw = Setup.of(setup.call(_rows_as_read, setup.rows, codes), setup.call).read_like(setup, volts, amps)
     if any(r.turn for r in readings):
         return raw
-    return max((raw, raw.smoothly(setup, volts, amps)), key=lambda s: Problem(s, names=()).fit(()).value)
+    return max((raw, raw.smoothly(setup, volts, amps)), key=lambda s: Problem(s).fit(()).value)
+
+
+def _rows_as_read(rows, codes) -> Rows:
+    """The rows of a recording under readings."""
+    view = rows.view
+    for reading in _coded(rows, codes):
+        view = reading.of_view(view)
+    train = np.zeros(len(view), bool)
+    train[rows.projector.block[rows.train]] = True
+    return Rows(view, rows.effects, train)
+
+
+def _coded(rows, codes) -> list[Reading]:
+    """The readings of a recording with these codes."""
+    known = {r.code: r for r in readings_for(rows.view.nominal)}
+    return [known[code] for code in codes]
 
 
 def _rank(judged):
@@ -122,35 +136,40 @@ def _without_doubles(ranked) -> list[Judged]:
     return out
 
 
+def _terms(rows, turn) -> dict[str, np.ndarray]:
+    """{term: rows (r,)} of the nominal machine, the angle turned by ``turn`` [rad].
+
+    The functionals are those of the documented angle for all.
+    """
+    view = rows.view.turned(-turn) if turn else rows.view
+    exact, m = view.with_raw_current(), view.machine
+    i = exact.i
+    d, q = m.inductance_d_h * i.real + 0j, 1j * m.inductance_q_h * i.imag
+    psi = m.magnet_flux_wb + 0.0 * i
+    columns = {
+        "u": {"u": view.to_dq(view.u[:, 1:-1])},
+        "r": {"u": -m.resistance_ohm * (exact.i_mid - bulge(view))},
+        **{name: {"u": -view.flux(flux)} for name, flux in (("d", d), ("q", q), ("psi", psi))},
+    }
+    if np.isfinite(view.torque).any():
+        columns |= {f"t_{n}": {"torque": -torque_of(view, f, i)} for n, f in (("d", d), ("q", q), ("psi", psi))}
+    return {name: rows.projector.rows(column) for name, column in columns.items()}
+
+
 class Terms:
     """The terms of one recording's balance, condensed as in the search, for each angle that a reading assumes."""
 
     def __init__(self, setup):
         self.setup, self.known = setup, {}
         # Measured torque and sum of the currents, and what the drive file describes beyond the terms.
-        self.rest = setup.cells.y - sum(self._terms(setup.view).values())
-
-    def _terms(self, view) -> dict[str, np.ndarray]:
-        """{term: rows (r,)} of the nominal machine; the functionals are those of the documented angle for all."""
-        exact, m = view.with_raw_current(), view.machine
-        i = exact.i
-        d, q = m.inductance_d_h * i.real + 0j, 1j * m.inductance_q_h * i.imag
-        psi = m.magnet_flux_wb + 0.0 * i
-        columns = {
-            "u": {"u": view.to_dq(view.u[:, 1:-1])},
-            "r": {"u": -m.resistance_ohm * (exact.i_mid - bulge(view))},
-            **{name: {"u": -view.flux(flux)} for name, flux in (("d", d), ("q", q), ("psi", psi))},
-        }
-        if np.isfinite(view.torque).any():
-            columns |= {f"t_{n}": {"torque": -torque_of(view, f, i)} for n, f in (("d", d), ("q", q), ("psi", psi))}
-        return {name: self.setup.projector.rows(column) for name, column in columns.items()}
+        self.rest = setup.cells.y - sum(setup.call(_terms, setup.rows, 0.0).values())
 
     def points(self, turn):
         """(Points with the terms as columns, their names) with the angle turned by ``turn`` [rad]."""
         if turn not in self.known:
             s = self.setup
-            terms = self._terms(s.view.turned(-turn) if turn else s.view)
-            terms |= {f"rest_{c}": np.where(s.cells.channel == c, self.rest, 0.0) for c in ("u", "sum", "torque")}
+            rest = {f"rest_{c}": np.where(s.cells.channel == c, self.rest, 0.0) for c in ("u", "sum", "torque")}
+            terms = s.call(_terms, s.rows, turn) | rest
             points = condense(s.grouping, s.cells.y, np.array(list(terms.values())).T, s.noise, s.level, s.load)
             self.known[turn] = points, list(terms)
         return self.known[turn]
@@ -186,7 +205,7 @@ class Terms:
         return evidence(
             np.zeros((len(y), 0)), y, p.s2 * scale**2, p.level * scale, p.group, len(p.groups), p.loads, p.load,
             none, nothing, np.zeros(0, bool), none,
-            k.FORMULA, k.DISCREPANCY, k.MOST_DISCREPANCY, k.ALWAYS_LOADED, np.inf,
+            k.FORMULA, k.DISCREPANCY, k.ALWAYS_LOADED if p.loads >= 0 else 1.0, np.inf,
         )[0]  # fmt: skip
 
 

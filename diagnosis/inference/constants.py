@@ -14,8 +14,6 @@ BALANCE_SUM = 2e-4
 BALANCE_TORQUE = 3e-3
 # Scale of the discrepancy in units of the balance's error; its prior falls as the square beyond it.
 DISCREPANCY = 3.0
-# Largest discrepancy in units of the balance's error: the whole voltage.
-MOST_DISCREPANCY = 1e4
 # Share of its own contribution by which the formula of an effect is wrong at each operating point.
 FORMULA = 0.01
 # Odds against a load that nobody recorded at every operating point: a drive is run without load at one of them.
@@ -41,10 +39,10 @@ IMITATION = 2.0
 # Share of an effect's power in an order from which it lives there; weight of what is left in its other orders.
 LIVES = 0.05
 ELSEWHERE = 0.1
-# Times the noise floor: a smaller misfit is noise.
-FLOOR = 2.0
-# The same for a single order: a smaller misfit is not evaluated.
-VISIBLE = 1.2
+# Power of a misfit above the noise floor, in units of the floor's own power: less is noise.  3: twice the floor's rms.
+FLOOR = 3.0
+# The same for a single order: a smaller misfit is not evaluated.  0.44: 1.2 times the floor's rms.
+VISIBLE = 0.44
 # Of the misfit's power above the floor: a smaller remainder is the formulas' own error.
 SMALL = 0.03
 # Of that power: names that explain less are no explanation.

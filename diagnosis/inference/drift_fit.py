@@ -12,7 +12,7 @@ import numpy as np
 
 from fluxproof.diagnosis.answer.locate import at_order
 from fluxproof.diagnosis.balance.cells import voltage_level
-from fluxproof.diagnosis.inference.constants import BALANCE_DC, BALANCE_U
+from fluxproof.diagnosis.inference import constants
 from fluxproof.diagnosis.inference.fit import Fitter, Model
 
 DRIFTS = 0.1  # least change of a column over time relative to its size
@@ -49,7 +49,7 @@ def row_sigmas(view, cells, raw):
     """(r,) standard deviation [V]: of neighbouring means, and a share of the voltage for the balance itself."""
     step = np.diff(raw) if len(raw) > 1 else np.zeros(1, complex)
     each = [float(np.sqrt(np.nanmean(x**2) / 2.0)) for x in (step.real, step.imag)]
-    own = BALANCE_U * voltage_level(view) + BALANCE_DC * view.nominal.inverter.dc_bus_v
+    own = constants.BALANCE_U * voltage_level(view) + constants.BALANCE_DC * view.nominal.inverter.dc_bus_v
     return np.hypot(np.array(each)[cells.part], own[cells.block])
 
 

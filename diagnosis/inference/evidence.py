@@ -15,12 +15,13 @@ import numpy as np
 
 STEPS = 7
 LEAST = 1.0  # in units of the balance's error
+SMALL, LARGE = 1e-200, 1e200  # range of a product of variances, each of which lies within 1e-100 and 1e100
 FACTORS = np.array([0.1, 0.35, 0.7, 1.0, 1.4, 3.0, 10.0])  # of the discrepancy, tried in every step
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")  # no division here is by zero, which need not be checked in every row
 def evidence(
-    x, y, s2, level, group, groups, loads, load, prior, owner, core, most, formula, scale, largest, always, start
+    x, y, s2, level, group, groups, loads, load, prior, owner, core, most, formula, scale, always, start
 ):
     """(log evidence, coefficients (k,), covariance (k, k), sizes (effects,), lambdas (groups,)).
 
@@ -29,7 +30,7 @@ def evidence(
     loads, load: group whose rows may contain a load of the scale ``load`` each, -1: none.
     start: torque, in multiples of the smallest one, above which a row is first taken as loaded.
     always: odds against a load at every operating point.
-    formula: share of an effect's contribution that counts as discrepancy; scale, largest: prior of lambda.
+    formula: share of an effect's contribution that counts as discrepancy; scale: prior of lambda.
     """
     n, k = x.shape
     effects = len(most)
@@ -37,10 +38,15 @@ def evidence(
     lam = np.full(groups, 3.0)
     c = np.zeros(k)
     cov = np.zeros((k, k))
+    columns = np.ascontiguousarray(x.T)  # rows one after the other in memory, for every loop over them
     v = np.zeros(n)
     own = np.zeros(n)
     loaded = np.zeros(n)
-    weighted = np.zeros((n, k))
+    weighted = np.zeros((k, n))
+    level2 = level**2
+    e2 = np.zeros(n)
+    part = np.zeros(n)
+    squares = np.zeros((groups, len(FACTORS)))
     least = 1e300
     for i in range(n):
         if group[i] == loads:
@@ -50,17 +56,22 @@ def evidence(
             loaded[i] = load * load
     value = 0.0
     for step in range(STEPS):
-        for i in range(n):
-            v[i] = s2[i] + (lam[group[i]] * level[i]) ** 2 + own[i] + loaded[i]
         power = 0.0
         logdet = 0.0
+        product = 1.0  # a logarithm of many factors at once, before the product leaves the range of a float
         for i in range(n):
+            v[i] = s2[i] + lam[group[i]] ** 2 * level2[i] + own[i] + loaded[i]
             power += y[i] * y[i] / v[i]
-            logdet += np.log(v[i])
-            for p in range(k):
-                weighted[i, p] = x[i, p] / v[i]
-        precision = np.dot(x.T, weighted)
-        right = np.dot(weighted.T, y)
+            product *= v[i]
+            if not SMALL < product < LARGE:
+                logdet += np.log(product)
+                product = 1.0
+        logdet += np.log(product)
+        for p in range(k):
+            for i in range(n):
+                weighted[p, i] = columns[p, i] / v[i]
+        precision = np.dot(weighted, x)
+        right = np.dot(weighted, y)
         before = 0.0
         sd = np.zeros(k)
         for p in range(k):
@@ -73,20 +84,18 @@ def evidence(
             for q in range(k):
                 m[p, q] = precision[p, q] * sd[p] * sd[q]
             m[p, p] += 1.0
+        gain = 0.0
         if k:
             factor = np.linalg.cholesky(m)
             for p in range(k):
                 before += 2.0 * np.log(factor[p, p])
             inverse = np.linalg.inv(m)
             z = inverse @ b
-            gain = 0.0
             for p in range(k):
                 gain += z[p] * b[p]
                 c[p] = z[p] * sd[p]
                 for q in range(k):
                     cov[p, q] = inverse[p, q] * sd[p] * sd[q]
-        else:
-            gain = 0.0
         value = -0.5 * (power - gain + before + logdet)
         for g in range(groups):
             value -= np.log(1.0 + (lam[g] / scale) ** 2)
@@ -102,34 +111,52 @@ def evidence(
         for e in range(effects):
             if counts[e] > 0:
                 a[e] = min(max(np.sqrt(sums[e] / counts[e]), 1.0), most[e])
-        # discrepancy: expected squares of the remainder at several lambda; a row with a load is left out
-        score = np.zeros((groups, len(FACTORS)))
-        rest = y - np.dot(x, c)
-        spread = np.dot(x, cov)
+        # expected squares of the remainder, and the share of each effect's contribution
+        spread = np.dot(cov, columns)
         for i in range(n):
-            e2 = rest[i] * rest[i]
-            for p in range(k):
-                e2 += spread[i, p] * x[i, p]
+            e2[i] = y[i]
             own[i] = 0.0
-            for e in range(effects):
-                part = 0.0
-                for p in range(k):
-                    if owner[p] == e:
-                        part += x[i, p] * c[p]
-                own[i] += (formula * part) ** 2
-            if group[i] == loads:
-                u = s2[i] + (3.0 * level[i]) ** 2 + own[i]
+        for e in range(effects):
+            for i in range(n):
+                part[i] = 0.0
+            for p in range(k):
+                if owner[p] == e:
+                    for i in range(n):
+                        part[i] += columns[p, i] * c[p]
+            for i in range(n):
+                e2[i] -= part[i]
+                own[i] += (formula * part[i]) ** 2
+        for i in range(n):
+            e2[i] *= e2[i]
+        for p in range(k):
+            for i in range(n):
+                e2[i] += spread[p, i] * columns[p, i]
+        # discrepancy: the log density at several lambda; a row with a load is left out
+        score = np.zeros((groups, len(FACTORS)))
+        products = np.ones((groups, len(FACTORS)))
+        for g in range(groups):
+            for h in range(len(FACTORS)):
+                squares[g, h] = max(lam[g] * FACTORS[h], LEAST) ** 2
+        for i in range(n):
+            g, known = group[i], s2[i] + own[i]
+            if g == loads:
+                u = known + 9.0 * level2[i]
                 with_load = u + load * load
-                loaded[i] = load * load if e2 / with_load + np.log(with_load) < e2 / u + np.log(u) else 0.0
+                loaded[i] = load * load if e2[i] / with_load + np.log(with_load) < e2[i] / u + np.log(u) else 0.0
                 continue
-            for g in range(len(FACTORS)):
-                u = s2[i] + (min(max(lam[group[i]] * FACTORS[g], LEAST), largest) * level[i]) ** 2 + own[i]
-                score[group[i], g] -= 0.5 * (np.log(u) + e2 / u)
+            for h in range(len(FACTORS)):
+                u = known + squares[g, h] * level2[i]
+                score[g, h] -= 0.5 * e2[i] / u
+                products[g, h] *= u
+            if products[g, 0] < SMALL or products[g, -1] > LARGE:
+                for h in range(len(FACTORS)):
+                    score[g, h] -= 0.5 * np.log(products[g, h])
+                    products[g, h] = 1.0
         for g in range(groups):
             best, chosen = -1e300, lam[g]
             for h in range(len(FACTORS)):
-                tried = min(max(lam[g] * FACTORS[h], LEAST), largest)
-                total = score[g, h] - np.log(1.0 + (tried / scale) ** 2)
+                tried = max(lam[g] * FACTORS[h], LEAST)
+                total = score[g, h] - 0.5 * np.log(products[g, h]) - np.log(1.0 + (tried / scale) ** 2)
                 if total > best:
                     best, chosen = total, tried
             lam[g] = chosen if g != loads else 3.0

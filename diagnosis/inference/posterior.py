@@ -29,7 +29,7 @@ class Posterior:
         self._search()
 
     def _search(self):
-        first = Problem(self.setup)
+        first = self.setup.call(Problem, self.setup)
         able = first.able()
         self._add(first, [()])
         self._add(first, [(n,) for n in able])

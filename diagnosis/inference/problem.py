@@ -12,39 +12,39 @@ import dataclasses
 
 import numpy as np
 
-from fluxproof.diagnosis.balance.cells import Projector, cells_of, noise
-from fluxproof.diagnosis.balance.curves import parabola
-from fluxproof.diagnosis.balance.misfit import misfit
-from fluxproof.diagnosis.effects.corrections import in_turn, with_flux
-from fluxproof.diagnosis.effects.effect import rated_torque
 from fluxproof.diagnosis.inference import constants as k
 from fluxproof.diagnosis.inference.evidence import evidence
-from fluxproof.diagnosis.inference.fit import Fitter, everything
+from fluxproof.diagnosis.inference.linearise import Linearisation, Rows, at_once, frozen, linearised
 from fluxproof.diagnosis.inference.points import Grouping, balance_level, condense, point_numbers, visits
 
 
 class Setup:
-    """What all problems of a recording share: blocks, functionals, noise, operating points, rows of the fit."""
+    """What all problems of a recording share: its rows, the error of their balance, operating points.
 
-    def __init__(self, view, effects, train_blocks):
+    call: how the steps of the inference are run (see linearise.py).
+    """
+
+    def __init__(self, view, effects, train_blocks, call=at_once):
         """train_blocks: (b,) bool, blocks of the fit."""
-        self.view, self.effects = view, dict(effects)
-        self.projector = Projector(view, loads=True)
-        measured = bool((view.shaft == "torque").all())
-        self.load = 0.0 if measured else rated_torque(view.nominal)
-        self.train = train_blocks[self.projector.block]
-        cells = cells_of(view, self.effects.values(), self.projector)
-        rough = Fitter(cells, np.ones(len(cells.y)), np.ones(len(cells.y), bool)).solve(everything(cells))
-        self.noise = noise(view, cells, rough.residual)
-        self.level = balance_level(view, cells)
-        self.points = point_numbers(view)
-        self.visits = visits(view, self.points)
-        self.cells = cells
-        self.grouping = Grouping(cells, self.points, self.visits, cells.ok & self.train)
-        self.repeats = _repeats(cells, self.points)
-        self.smooth = smooth(view)
-        self.smooth_rows = self.projector.rows(misfit(self.smooth))
-        self.raw_rows = cells.y
+        self._share(Rows(view, effects, train_blocks), call)
+
+    @classmethod
+    def of(cls, rows: Rows, call=at_once) -> Setup:
+        """The setup of rows that are already known."""
+        out = cls.__new__(cls)
+        out._share(rows, call)
+        return out
+
+    def _share(self, rows, call):
+        self.rows, self.call = rows, call
+        self.view, self.effects, self.projector, self.load = rows.view, rows.effects, rows.projector, rows.load
+        self.train, self.cells, self.noise = rows.train, rows.cells, rows.noise
+        self.smooth_rows = rows.smooth_rows
+        self.level = balance_level(self.view, self.cells)
+        self.points = point_numbers(self.view)
+        self.visits = visits(self.view, self.points)
+        self.grouping = Grouping(self.cells, self.points, self.visits, self.cells.ok & self.train)
+        self.repeats = _repeats(self.cells, self.points)
 
     def read_like(self, other, volts, amps):
         """This reading of a recording with the operating points of ``other``, the same blocks as documented.
@@ -73,11 +73,14 @@ class Setup:
 class Problem:
     """Columns and misfit at one linearisation; totals: {effect: {coefficient: value}} of its measurement errors."""
 
-    def __init__(self, setup: Setup, view=None, totals=None, change=0.0, doubt=None, names=None):
-        self.setup, self.totals = setup, totals or {}
-        self.view = setup.view if view is None else view
-        chosen = [e for n, e in setup.effects.items() if names is None or n in names]
-        self.cells = cells = setup.cells if view is None else cells_of(self.view, chosen, setup.projector)
+    def __init__(self, setup: Setup, at: Linearisation | None = None):
+        """at: the linearisation (None: the recording as it is)."""
+        if at is None:
+            nothing = np.zeros(len(setup.cells.y))
+            at = Linearisation(setup.view, setup.cells, {}, nothing, nothing, None)
+        self.setup, self.view, self.totals, doubt = setup, at.view, at.totals, at.doubt
+        self.cells = cells = at.cells
+        change = at.change + repeated(at.ripple, setup)
         y = setup.cells.y + change
         for name, c in self.totals.items():
             columns = cells.columns[name]
@@ -126,9 +129,8 @@ class Problem:
         """Effects that have a column in this problem."""
         return [n for n, mine in self.index.items() if mine]
 
-    def fit(self, names):
-        """(log evidence, {effect: {coefficient: value}}, covariance of the set's columns, their indices, ...)."""
-        names = sorted(names)
+    def likelihood(self, names: tuple):
+        """(columns of a sorted set, log evidence without priors, coefficients, covariance, sizes, lambdas)."""
         mine = [n for name in names for n in self.index[name]]
         owner = np.array([names.index(self.keys[n][0]) for n in mine], np.int64)
         most = np.array([self.most[n] for n in names], float)
@@ -136,20 +138,26 @@ class Problem:
         x = np.ascontiguousarray(p.x[:, take])
         core = np.array([not self.keys[n][1].startswith("~") for n in mine], bool)
         drags = p.loads >= 0 and bool(x[p.group == p.loads].any())
+        always = k.ALWAYS_LOADED if p.loads >= 0 else 1.0
         tried = [
             evidence(
                 x, p.y, p.s2, p.level, p.group, len(p.groups), p.loads, p.load,
-                self.prior[take], owner, core, most,
-                k.FORMULA, k.DISCREPANCY, k.MOST_DISCREPANCY, k.ALWAYS_LOADED, start,
+                self.prior[take], owner, core, most, k.FORMULA, k.DISCREPANCY, always, start,
             )
             for start in ((np.inf, 1.5, 3.0) if drags else (np.inf,))
         ]  # fmt: skip
-        value, c, cov, a, lam = max(tried, key=lambda found: found[0])
+        return take, *max(tried, key=lambda found: found[0])
+
+    def fit(self, names):
+        """The Fit of a set of effects on this problem."""
+        names = tuple(sorted(names))
+        take, value, c, cov, a, lam = self.setup.call(Problem.likelihood, self, names)
         # Prior odds of every effect, and the prior of its size: even in the logarithm up to a typical size, the
         # geometric mean of the smallest of interest and the largest possible one, and falling beyond.
         odds = np.log(k.PRESENT / (1 - k.PRESENT))
+        most = [self.most[n] for n in names]
         value += sum(odds - np.log(np.log(m)) - np.log1p(x**2 / m) for m, x in zip(most, a, strict=True))
-        return Fit(self, tuple(names), float(value), take, c, cov, a, lam)
+        return Fit(self, names, float(value), take, c, cov, a, lam)
 
 
 class Fit:
@@ -177,44 +185,15 @@ class Fit:
         return out
 
 
-def smooth(view):
-    """The view without noise: the parabolas of current and voltage over each block."""
-    middle = np.exp(1j * view.interval_angle)
-    u = parabola(view.u * np.conj(middle)) * middle
-    i_abc = None if view.i_abc is None else view.phases(view.i)
-    return view.replace(i_raw=view.stator(view.i), i_abc=i_abc, u=u)
-
-
 def around(setup, fit, names=None):
-    """The problem linearised at a fit; names: effects whose columns are needed (None: all).
+    """The problem linearised at a fit, or None; names: effects whose columns are needed (None: all).
 
     The misfit keeps its noise: only what a correction changes in the smooth signals, and in ripple that repeats in
     every block of an operating point, is applied.  Otherwise a correction that filters or scales noise would be
     rewarded.
     """
-    effects = setup.effects
-    totals = {n: dict(fit.c[n]) for n in fit.names if effects[n].corrects}
-    view, plain = (in_turn(v, effects, totals, setup.view) for v in (setup.view, setup.smooth))
-    if not (np.isfinite(view.u).all() and np.isfinite(view.i_raw).all()):
-        return None
-    late = sum(effects[n].late_s(fit.c[n], view.nominal) for n in fit.names)
-    view = with_flux(view, effects, fit.c, late_s=late)
-    rows = setup.projector.rows
-    change = rows(misfit(plain)) - setup.smooth_rows
-    ripple = rows(misfit(view)) - setup.raw_rows - change
-    rough = view.with_raw_current()
-    for name in fit.names:
-        effect = effects[name]
-        if effect.corrects or effect.smoothed or not any("u" in col for col in effect.core(view).values()):
-            continue
-        even, raw = (cells_of(v, [effect], setup.projector).columns[name] for v in (view, rough))
-        for key, value in fit.c[name].items():
-            key = key if key in even else f"~{key}"
-            if value and key in even and key in raw:
-                ripple -= value * (raw[key] - even[key])
-    doubts = [effects[n].doubt(fit.c[n], view) for n in fit.names]
-    doubt = np.sqrt(sum((np.square(d) for d in doubts), np.zeros(len(view)))) if doubts else None
-    return Problem(setup, view, totals, change + repeated(ripple, setup), doubt, names)
+    at = setup.call(linearised, setup.rows, frozen(fit.c), names)
+    return None if at is None else setup.call(Problem, setup, at)
 
 
 def fit_of_set(setup, names, steps=3) -> Fit:

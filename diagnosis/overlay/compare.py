@@ -107,7 +107,8 @@ def controller_of(nominal: Nominal) -> Controller:
         c = dataclasses.replace(c, current_bandwidth_hz=USUAL_BANDWIDTH / nominal.sample_time_s)
     (kp_d, ki_d), (kp_q, ki_q) = (current_gains(dataclasses.replace(nominal, control=c), x) for x in "dq")
     return Controller(
-        kp_d, kp_q, ki_d, ki_q, m.inductance_d_h, m.inductance_q_h, m.magnet_flux_wb, float(c.delay_samples)
+        kp_d, kp_q, ki_d, ki_q, m.inductance_d_h, m.inductance_q_h, m.magnet_flux_wb,
+        float(c.delay_samples) - nominal.sampling.delay_s / nominal.sample_time_s,
     )
 
 

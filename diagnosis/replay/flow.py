@@ -18,8 +18,20 @@ def _first_results(instance: str) -> int:
     return fluxproof.schedule()[instance][1] - (block.ahead if block.soon else 0)
 
 
-# Instances in the order in which their first results are ready.
-ORDER = sorted(fluxproof.WIRING, key=lambda name: (_first_results(name), list(fluxproof.WIRING).index(name)))
+def _ordered() -> list[str]:
+    """The instances, each behind those that it waits for; of several that could come next, the one with results first.
+
+    A block may give its first results before its last input is there, so these alone are no order of cause and effect.
+    """
+    waiting, order = dict(fluxproof.WIRING), []
+    while waiting:
+        free = [name for name, (_, awaited) in waiting.items() if not set(awaited) & set(waiting)]
+        order.append(min(free, key=_first_results))
+        del waiting[order[-1]]
+    return order
+
+
+ORDER = _ordered()
 OWNER = {
     signal: instance
     for instance in fluxproof.WIRING

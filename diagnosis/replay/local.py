@@ -130,13 +130,14 @@ def _one(x, r, c, now, before):
     (theta_out,) = svm_delay_compensation.step(theta_me, omega_me, r.k_delay)
     cos_theta, sin_theta, cos_out, sin_out = sincos.step(theta_me, theta_out)
     i_d, i_q = park.step(i_alpha, i_beta, cos_theta, sin_theta)
-    _, minus_rho, lost = winding_resistance.step(x[9], x[10], r.r_s, r.tcr, r.t_0, r.t_min, r.t_max, r.t_s)
+    _, _, minus_rho, lost = winding_resistance.step(x[9], x[10], r.r_s, r.tcr, r.t_0, r.t_min, r.t_max, r.t_s)
     flux_d, flux_q = flux_park.step(lambda_m_alpha, lambda_m_beta, cos_theta, sin_theta)
-    model_d, model_q, merged_d, merged_q, merged, ended, _, _ = flux_models.step(
-        i_d, i_q, flux_d, flux_q, lambda_pi_d, lambda_pi_q, before[7], x[12], minus_rho,
-        r.flux_mode * c.estimators, r.l_d, r.l_q, r.lambda_mg,
+    model_d, model_q, merged_d, merged_q, merged, ended = flux_models.step(
+        i_d, i_q, flux_d, flux_q, before[7], x[12], minus_rho, r.flux_mode * c.estimators, r.l_d, r.l_q, r.lambda_mg
     )  # fmt: skip
-    own_d, own_q, _ = flux_estimate.step(model_d, model_q, merged_d, merged_q, merged, ended)
+    own_d, own_q, _ = flux_estimate.step(
+        model_d, model_q, merged_d, merged_q, merged, ended, lambda_pi_d, lambda_pi_q
+    )
     (chord,) = chord_speed.step(omega_me, r.k_chord)
     dec_d, dec_q = decoupling.step(omega_chord, lambda_d, lambda_q)
     u_alpha, u_beta = inverse_park.step(u_d, u_q, cos_out, sin_out)

@@ -9,7 +9,9 @@ flux at which the regulators' integrals vanish would be too small by a**2/24, 1 
 The next term of the series is a**4/1920, 3e-5 at half a radian: neglected.
 
 Formats: omega_me**2 U(3,14), k_chord U(-6,23), their product U(-3,20), each half up; the last rounding is to
-PU.  No saturation: k_chord*omega_me**2 < 1/16, so the result is closer to zero than omega_me and keeps its sign.
+PU.  A factor of the first two products is raised by 2 and 3 bits, so that all three are cut by the same 20 bits and
+pass through one multiplier one after the other.
+No saturation: k_chord*omega_me**2 < 1/16, so the result is closer to zero than omega_me and keeps its sign.
 """
 
 from fluxproof.golden_model.block import Block, Port
@@ -20,16 +22,17 @@ from fluxproof.golden_model.kernel import kernel
 SQUARE = Format(0, 3, 14)
 K_CHORD = Format(0, -6, 23)
 PART = Format(0, -3, 20)
-DROP_SQUARE = 2 * PU.frac_bits - SQUARE.frac_bits
-DROP_PART = SQUARE.frac_bits + K_CHORD.frac_bits - PART.frac_bits
 DROP = PART.frac_bits
+RAISE_SQUARE = DROP - (2 * PU.frac_bits - SQUARE.frac_bits)
+RAISE_PART = DROP - (SQUARE.frac_bits + K_CHORD.frac_bits - PART.frac_bits)
 
 
 @kernel
 def step(omega_me, k_chord):
-    square = round_half_up(omega_me * omega_me, DROP_SQUARE)
-    part = round_half_up(square * k_chord, DROP_PART)
-    return (omega_me - round_half_up(part * omega_me, DROP),)
+    square = round_half_up((omega_me << RAISE_SQUARE) * omega_me, DROP)
+    part = round_half_up((square << RAISE_PART) * k_chord, DROP)
+    shorter = round_half_up(part * omega_me, DROP)
+    return (omega_me - shorter,)
 
 
 def reference(v, _state):
@@ -49,9 +52,9 @@ BLOCK = Block(
     inputs=(Port("omega_me", PU, doc="electrical speed"),),
     registers=(Port("k_chord", K_CHORD, doc="(sample time)**2 / 24, per unit"),),
     outputs=(Port("omega_chord", PU, doc="electrical speed along the chord of a sample"),),
-    latency=9,
-    interval=8,
-    constants={"DROP_SQUARE": DROP_SQUARE, "DROP_PART": DROP_PART, "DROP": DROP},
+    latency=10,
+    interval=10,
+    constants={"RAISE_SQUARE": RAISE_SQUARE, "RAISE_PART": RAISE_PART, "DROP": DROP},
     reference=reference,
     bound=bound,
 )

@@ -20,7 +20,9 @@ DROP = V_LEG.frac_bits
 
 @kernel
 def step(v_comp, s_alpha, s_beta):
-    return round_half_up(v_comp * s_alpha, DROP), round_half_up(v_comp * s_beta, DROP)
+    u_comp_alpha = round_half_up(v_comp * s_alpha, DROP)
+    u_comp_beta = round_half_up(v_comp * s_beta, DROP)
+    return u_comp_alpha, u_comp_beta
 
 
 def reference(v, _state):
@@ -46,7 +48,7 @@ BLOCK = Block(
         Port("u_comp_alpha", PU, doc="compensation voltage, alpha"),
         Port("u_comp_beta", PU, doc="compensation voltage, beta"),
     ),
-    latency=4,
+    latency=5,
     interval=4,
     constants={"DROP": DROP},
     reference=reference,

@@ -17,9 +17,9 @@ DROP = PU.frac_bits
 
 @kernel
 def step(omega_chord, lambda_d, lambda_q):
-    prod_d = -(omega_chord * lambda_q)
+    prod_d = omega_chord * lambda_q
     prod_q = omega_chord * lambda_d
-    return round_sat(prod_d, DROP, PU_W), round_sat(prod_q, DROP, PU_W)
+    return round_sat(-prod_d, DROP, PU_W), round_sat(prod_q, DROP, PU_W)
 
 
 def reference(v, _state):

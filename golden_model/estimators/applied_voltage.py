@@ -10,14 +10,14 @@ clocks.  The bus voltage is the one measured now, not the one the compare values
 
 Formats: 2**SHIFT/CARRIER_HALF is a 17-bit constant in [1, 2) derived from the generic; u_dc times it U(2,22); the
 constants 1/3 and 1/sqrt(3) scale that, half up; the last product is shifted by SHIFT and rounded half up to FLUX.
-Saturation: none for compare values up to CARRIER_HALF, |u_applied| <= 2/3*u_dc < 1.34.
+Saturation: none.  Compare values are at most CARRIER_HALF, so |u_applied| <= 2/3*u_dc < 1.34.
 """
 
 import math
 
 from fluxproof.golden_model.block import Block, Const, Port
-from fluxproof.golden_model.fixed import Format, round_half_up, round_sat
-from fluxproof.golden_model.formats import BIT, FLUX, FLUX_W, U_DC
+from fluxproof.golden_model.fixed import Format, round_half_up
+from fluxproof.golden_model.formats import BIT, FLUX, U_DC
 from fluxproof.golden_model.io.u_dc_processing import U_DC_MIN
 from fluxproof.golden_model.kernel import kernel
 from fluxproof.golden_model.modulation.pwm_compare import COUNT
@@ -42,16 +42,21 @@ def carrier_shift(carrier_half):
 
 
 @kernel
+def axis(first, compare_b, compare_c, scale, coefficient, drop, drop_u):
+    """(2*first - compare_b - compare_c) clocks, times scale and coefficient; for beta, first is compare_b."""
+    scaled = round_half_up(scale * coefficient, drop)
+    clocks = 2 * first - compare_b - compare_c
+    return round_half_up(scaled * clocks, drop_u)
+
+
+@kernel
 def step(compare_a, compare_b, compare_c, u_dc, u_dc_at_rail, run, carrier_half):
     shift = carrier_shift(carrier_half)
     k_carrier = ((1 << (K_FRAC + shift)) + carrier_half // 2) // carrier_half
-    sum_alpha = 2 * compare_a - compare_b - compare_c
-    sum_beta = compare_b - compare_c
+    drop_u = shift - TO_FLUX
     scale = round_half_up(u_dc * k_carrier, DROP_SCALE)
-    scale_alpha = round_half_up(scale * K_THIRD, DROP_THIRD)
-    scale_beta = round_half_up(scale * K_INV_SQRT3, DROP_INV_SQRT3)
-    u_alpha = round_sat(sum_alpha * scale_alpha, shift - TO_FLUX, FLUX_W)
-    u_beta = round_sat(sum_beta * scale_beta, shift - TO_FLUX, FLUX_W)
+    u_alpha = axis(compare_a, compare_b, compare_c, scale, K_THIRD, DROP_THIRD, drop_u)
+    u_beta = axis(compare_b, compare_b, compare_c, scale, K_INV_SQRT3, DROP_INV_SQRT3, drop_u)
     known = 1 if run and not u_dc_at_rail and u_dc >= U_DC_MIN else 0
     return u_alpha, u_beta, known
 
@@ -79,6 +84,11 @@ def bound(v, _state):
         of_scaled = k * of_scale + scale * const.fmt.lsb / 2 + SCALE.lsb
         out[f"u_applied_{axis}"] = abs(clocks) / part * of_scaled + FLUX.lsb / 2
     return out
+
+
+def below_the_peak(v, config):
+    """``v`` with compare values of at most CARRIER_HALF, as pwm_compare gives them."""
+    return v | {k: min(v[k], config["CARRIER_HALF"]) for k in ("compare_a", "compare_b", "compare_c")}
 
 
 def stimuli(rng, config):
@@ -127,4 +137,5 @@ BLOCK = Block(
     reference=reference,
     bound=bound,
     stimuli=stimuli,
+    possible=below_the_peak,
 )

@@ -14,8 +14,8 @@ largest sum of voltage, 1.34, and leg voltage, 0.5*4/3.
 from typing import NamedTuple
 
 from fluxproof.golden_model.block import Block, Port
+from fluxproof.golden_model.common.multiply_add import multiply_subtract
 from fluxproof.golden_model.control.dead_time_compensation import S_ALPHA, S_BETA
-from fluxproof.golden_model.fixed import round_half_up, saturate
 from fluxproof.golden_model.formats import FLUX, FLUX_W, PU, V_LEG
 from fluxproof.golden_model.kernel import kernel
 
@@ -29,8 +29,8 @@ class State(NamedTuple):
 
 @kernel
 def step(state, u_applied_alpha, u_applied_beta, s_alpha, s_beta, v_leg):
-    u_clean_alpha = saturate(u_applied_alpha - round_half_up(v_leg * state.s_alpha, DROP), FLUX_W)
-    u_clean_beta = saturate(u_applied_beta - round_half_up(v_leg * state.s_beta, DROP), FLUX_W)
+    u_clean_alpha, _ = multiply_subtract(v_leg, state.s_alpha, u_applied_alpha, DROP, FLUX_W)
+    u_clean_beta, _ = multiply_subtract(v_leg, state.s_beta, u_applied_beta, DROP, FLUX_W)
     return State(s_alpha, s_beta), (u_clean_alpha, u_clean_beta)
 
 

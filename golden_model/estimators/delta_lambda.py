@@ -24,7 +24,7 @@ from fluxproof.golden_model.block import Block, Port
 from fluxproof.golden_model.control.current_pi import SAT
 from fluxproof.golden_model.estimators import speed_reciprocal
 from fluxproof.golden_model.estimators.winding_resistance import R
-from fluxproof.golden_model.fixed import Format, exceeds, round_half_up, round_sat, saturate
+from fluxproof.golden_model.fixed import Format, exceeds, round_half_up, saturate
 from fluxproof.golden_model.formats import BIT, FLUX, FLUX_W, INTEGRAL, PU, RESISTANCE
 from fluxproof.golden_model.kernel import kernel
 
@@ -50,7 +50,7 @@ def axis(u_int, i, factor, n, r):
     shifted = rest << n
     rounded = round_half_up(shifted, DROP_SHIFTED)
     value, limited = saturate(rounded, FLUX_W), exceeds(rounded, FLUX_W)
-    delta = round_sat(value * factor, DROP_FACTOR, FLUX_W)
+    delta = round_half_up(value * factor, DROP_FACTOR)  # |factor| < 1, so it fits
     return delta, limited if factor != 0 else 0
 
 

@@ -31,7 +31,7 @@ from typing import NamedTuple
 
 from fluxproof.golden_model.block import Block, Port
 from fluxproof.golden_model.common.multiply_add import multiply_add
-from fluxproof.golden_model.estimators.winding_resistance import MINUS_RHO, T_S
+from fluxproof.golden_model.estimators.winding_resistance import RHO, T_S
 from fluxproof.golden_model.fixed import Format, exceeds, round_half_up, round_sat, saturate
 from fluxproof.golden_model.formats import (
     BIT,
@@ -69,9 +69,9 @@ class State(NamedTuple):
 
 
 @kernel
-def axis(carried, x, i, lambda_c, u, trusted, minus_rho, omega_0, xi, t_s):
+def axis(carried, x, i, lambda_c, u, trusted, rho, omega_0, xi, t_s):
     """One axis: (flux integrated to the next sample, x, 1 if anything was limited)."""
-    drop = round_half_up(-minus_rho * i, DROP_RHO)
+    drop = round_half_up(rho * i, DROP_RHO)
     push = round_half_up(u * t_s, DROP_U) - drop
     now = carried - drop
     lambda_now = saturate(now, FLUX_STATE_W)
@@ -92,9 +92,9 @@ def axis(carried, x, i, lambda_c, u, trusted, minus_rho, omega_0, xi, t_s):
 @kernel
 def step(
     state, i_alpha, i_beta, lambda_c_alpha, lambda_c_beta, u_applied_alpha, u_applied_beta, voltage_known, run,
-    minus_rho, omega_0, xi, t_s,
+    rho, omega_0, xi, t_s,
 ):  # fmt: skip
-    trusted, gains = state.known & run, (minus_rho, omega_0, xi, t_s)
+    trusted, gains = state.known & run, (rho, omega_0, xi, t_s)
     lambda_alpha, x_alpha, limited_alpha = axis(
         state.lambda_alpha, state.x_alpha, i_alpha, lambda_c_alpha, u_applied_alpha, trusted, *gains
     )
@@ -111,7 +111,7 @@ def reference(v, state):
     out = {}
     for n, of in enumerate(("alpha", "beta")):
         carried, x = state[n] * FLUX_STATE.lsb, state[2 + n] * X.lsb
-        drop = -v["minus_rho"] * v[f"i_{of}"]
+        drop = v["rho"] * v[f"i_{of}"]
         now = FLUX_STATE.limit(carried - drop)
         eps = FLUX.limit(v[f"lambda_c_{of}"] - now)
         y = v["omega_0"] * eps
@@ -132,7 +132,7 @@ def bound(v, _state):
 
 def stimuli(rng, _config):
     """Random flux and voltage, gains at both ends of their ranges, into the limits and back; gates off."""
-    nominal = {"minus_rho": -40000, "omega_0": 4118, "xi": 11585, "t_s": 32925, "run": 1, "voltage_known": 1}
+    nominal = {"rho": 40000, "omega_0": 4118, "xi": 11585, "t_s": 32925, "run": 1, "voltage_known": 1}
     rows = []
     for change in (
         {},
@@ -177,7 +177,7 @@ BLOCK = Block(
         Port("u_applied_beta", FLUX, doc="voltage of the coming period, beta"),
         Port("voltage_known", BIT, doc="0: gates off or bus reading lost"),
         Port("run", BIT, doc="1: the gates are switching"),
-        MINUS_RHO,
+        RHO,
     ),
     registers=(
         Port("omega_0", OMEGA_0, lo=1 << 8, doc="crossover of the two models, times the sample time"),

@@ -30,7 +30,7 @@ MAGNITUDE_MAX = U_DC.hi
 def step(omega_me, omega_min, k_ramp):
     magnitude = min(abs(omega_me), MAGNITUDE_MAX)
     m, n, _low = reciprocal.step(magnitude, N_MAX)
-    above = max(magnitude - omega_min, 0)
+    above = magnitude - omega_min
     weight = clamp(round_half_up(above * k_ramp, DROP_WEIGHT), 0, WEIGHT_ONE)
     factor = round_half_up(m * weight, DROP_FACTOR)
     return (-factor if omega_me < 0 else factor), n

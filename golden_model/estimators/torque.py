@@ -18,7 +18,8 @@ DROP = PU.frac_bits
 def step(lambda_d, lambda_q, i_d, i_q):
     prod_d = lambda_d * i_q
     prod_q = lambda_q * i_d
-    return (round_sat(prod_d - prod_q, DROP, PU_W),)
+    diff = prod_d - prod_q
+    return (round_sat(diff, DROP, PU_W),)
 
 
 def reference(v, _state):
@@ -41,8 +42,7 @@ BLOCK = Block(
         Port("i_q", PU, doc="current, q axis"),
     ),
     outputs=(Port("torque", PU, doc="estimated torque"),),
-    latency=7,
-    interval=4,
+    latency=5,
     constants={"DROP": DROP},
     reference=reference,
     bound=bound,

@@ -1,12 +1,12 @@
 """The winding resistance from its temperature, paper 000 eq. (12), and the resistive flux drop of half a sample.
 
     r   = r_s + tcr*(temp_winding - t_0)        R = R_0 + TCR*(T_2 - T_0)
-    minus_rho = -r*t_s/2                        t_s: the sample time in per unit, T_s*omega_base
+    rho = r*t_s/2, minus_rho = -rho             t_s: the sample time in per unit, T_s*omega_base
 
 Without a valid reading (``temp_valid`` = 0, or outside t_min to t_max) r = r_s and ``temp_lost`` is 1.
-flux_merge and flux_models multiply minus_rho by a current: the resistive voltage drop integrated over half a sample.
+flux_merge multiplies rho by a current, flux_models minus_rho: the resistive voltage drop integrated over half a sample.
 Formats: temperatures S(9,6) in degrees, tcr U(-6,30); product 36 fraction bits, rounded half up to 24; r limited to
-0 .. 1; rho rounded half up to 24 fraction bits, then negated, within 1/4 since t_s < 1/2.
+0 .. 1; rho rounded half up to 24 fraction bits, below 1/4 since t_s < 1/2.
 """
 
 from fluxproof.golden_model import formats
@@ -25,20 +25,22 @@ DROP_RHO = SAMPLE_TIME.frac_bits + 1
 @kernel
 def step(temp_winding, temp_valid, r_s, tcr, t_0, t_min, t_max, t_s):
     lost = 0 if temp_valid and t_min <= temp_winding <= t_max else 1
-    warmer = round_half_up((temp_winding - t_0) * tcr, DROP_TCR)
-    r = r_s if lost else saturate_u(r_s + warmer, RESISTANCE_BITS)
-    return r, -round_half_up(r * t_s, DROP_RHO), lost
+    warmer = 0 if lost else temp_winding - t_0
+    r = saturate_u(r_s + round_half_up(tcr * warmer, DROP_TCR), RESISTANCE_BITS)
+    rho = round_half_up(r * t_s, DROP_RHO)
+    return r, rho, -rho, lost
 
 
 def reference(v, _state):
     trusted = v["temp_valid"] and v["t_min"] <= v["temp_winding"] <= v["t_max"]
     r = v["r_s"] + (v["tcr"] * (v["temp_winding"] - v["t_0"]) if trusted else 0.0)
     r = min(max(r, 0.0), RESISTANCE.hi * RESISTANCE.lsb)
-    return {"r": r, "minus_rho": -r * v["t_s"] / 2}
+    return {"r": r, "rho": r * v["t_s"] / 2, "minus_rho": -r * v["t_s"] / 2}
 
 
 def bound(v, _state):
-    return {"r": RESISTANCE.lsb / 2, "minus_rho": RESISTANCE.lsb / 2 * (1 + v["t_s"] / 2)}
+    of_rho = RESISTANCE.lsb / 2 * (1 + v["t_s"] / 2)
+    return {"r": RESISTANCE.lsb / 2, "rho": of_rho, "minus_rho": of_rho}
 
 
 def stimuli(_rng, _config):
@@ -65,6 +67,7 @@ def stimuli(_rng, _config):
 
 T_S = Port("t_s", SAMPLE_TIME, doc="sample time, per unit")
 R = Port("r", RESISTANCE, doc="winding resistance in use")
+RHO = Port("rho", formats.RHO, doc="resistive flux drop of half a sample, per unit of current")
 MINUS_RHO = Port(
     "minus_rho", formats.MINUS_RHO, hi=0, doc="minus the resistive flux drop of half a sample, per unit of current"
 )
@@ -86,7 +89,7 @@ BLOCK = Block(
         Port("t_max", CELSIUS, doc="highest valid temperature"),
         T_S,
     ),
-    outputs=(R, MINUS_RHO, Port("temp_lost", BIT, doc="1: no valid temperature, r = r_s")),
+    outputs=(R, RHO, MINUS_RHO, Port("temp_lost", BIT, doc="1: no valid temperature, r = r_s")),
     latency=8,
     interval=8,
     constants={"DROP_TCR": DROP_TCR, "DROP_RHO": DROP_RHO},

@@ -1,4 +1,4 @@
-"""ADC codes to phase currents: i_x = gain_x * (code_x - offset_x), one multiplier for three channels.
+"""ADC codes to phase currents: i_x = gain_x * (code_x - offset_x).
 
 Formats: codes of 12 to 16 bits are left-aligned in 16 bits, so that offset and gain do not depend on
 the converter's resolution.  Difference S(1,15) x gain S(1,16) = 31 fraction bits, rounded half up to PU.
@@ -34,8 +34,8 @@ def step(code_a, code_b, code_c, offset_a, offset_b, offset_c, gain_a, gain_b, g
     i_a = condition(code_a, offset_a, gain_a, shift)
     i_b = condition(code_b, offset_b, gain_b, shift)
     i_c = condition(code_c, offset_c, gain_c, shift)
-    flags = at_rail(code_a, adc_bits) + 2 * at_rail(code_b, adc_bits) + 4 * at_rail(code_c, adc_bits)
-    return i_a, i_b, i_c, flags
+    rail_a, rail_b, rail_c = at_rail(code_a, adc_bits), at_rail(code_b, adc_bits), at_rail(code_c, adc_bits)
+    return i_a, i_b, i_c, rail_a + 2 * rail_b + 4 * rail_c
 
 
 def reference(v, _state):

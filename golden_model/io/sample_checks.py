@@ -42,9 +42,9 @@ class State(NamedTuple):
 
 
 @kernel
-def magnitude(x):
-    """|x|, as one's complement where x is negative."""
-    return x if x >= 0 else -1 - x
+def reaches(x, limit):
+    """Whether |x| >= limit, |x| being the one's complement where x is negative."""
+    return (x if x >= 0 else -1 - x) >= limit
 
 
 @kernel
@@ -52,26 +52,28 @@ def step(
     state, i_a, i_b, i_c, current_at_rail, u_dc, u_dc_at_rail, code_theta, i_trip, sum_trip, rail_samples, u_dc_min,
     u_dc_max, jump_max, fault_ignore, position_bits,
 ):  # fmt: skip
-    s = state
     a, b, c = i_a >> DROP_LIMIT, i_b >> DROP_LIMIT, i_c >> DROP_LIMIT
-    over = 1 if magnitude(a) >= i_trip or magnitude(b) >= i_trip or magnitude(c) >= i_trip else 0
-    unbalanced = 1 if magnitude(a + b + c) >= sum_trip else 0
+    over = 1 if reaches(a, i_trip) or reaches(b, i_trip) or reaches(c, i_trip) else 0
+    unbalanced = 1 if reaches(a + b + c, sum_trip) else 0
 
     at_rail = current_at_rail != 0 or u_dc_at_rail != 0
-    railed = min(s.railed + 1, SAMPLES_HI) if at_rail else 0
-    stuck = 1 if at_rail and railed >= rail_samples else 0
+    railed = min(state.railed + 1, SAMPLES_HI) if at_rail else 0
+    stuck = 1 if railed > 0 and railed >= rail_samples else 0
 
     bus = u_dc >> DROP_LIMIT
     low = 1 if bus < u_dc_min else 0
     high = 1 if bus >= u_dc_max else 0
 
     code = code_theta << (TURN_W - position_bits)
-    off = magnitude(wrap_s(code - s.expected, TURN_W)) >> DROP_JUMP
-    jumped = 1 if s.seen == WARM and off >= jump_max else 0
+    away = wrap_s(code - state.expected, TURN_W)
+    off = away >> DROP_JUMP
+    known = state.seen == WARM
+    jumped = 1 if known and reaches(off, jump_max) else 0
+    expected = wrap(2 * code - state.code, TURN_W)
+    seen = min(state.seen + 1, WARM)
 
     faults = over + 2 * unbalanced + 4 * stuck + 8 * low + 16 * high + 32 * jumped
-    following = State(code, wrap(2 * code - s.code, TURN_W), min(s.seen + 1, WARM), railed)
-    return following, (faults, 1 if faults & ~fault_ignore else 0)
+    return State(code, expected, seen, railed), (faults, 1 if faults & ~fault_ignore else 0)
 
 
 def stimuli(rng, config):

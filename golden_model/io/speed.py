@@ -1,62 +1,63 @@
 """Speed from two consecutive position codes, then a first-order filter.
 
-    raw(k)      = k_speed * wrap(code(k) - code(k-1))
-    omega_me(k) = omega_me(k-1) + k_filter * (raw(k) - omega_me(k-1))
+    raw(k)   = k_speed * wrap(code(k) - code(k-1))
+    omega(k) = omega(k-1) + k_filter * (raw(k) - omega_me(k-1)),  omega_me = omega, rounded
 
 Formats: the difference is the shorter angle, S(-1,18) of a mechanical turn, so speeds up to half a turn per
-sample are unambiguous.  raw is rounded half up to PU; the filter's state has 12 bits more, so that it settles
-within one PU LSB of its input, and is stored with a bias of half an LSB of PU, so that truncation rounds
-omega_me.  k_filter = 1: no filter.
+sample are unambiguous.  raw is rounded half up to PU; the filter's state omega has 12 bits more, so that it settles
+within one PU LSB of its input, and is rounded half up to omega_me.  k_filter = 1: no filter.
 The first sample after reset has no predecessor: its difference is zero.
-Saturation: raw saturates at 2 per unit; with k_filter <= 1 the state moves from its upper bits towards raw by at
-most their distance and keeps its lower bits, so it cannot leave its range.
+Saturation: raw saturates at 2 per unit; with k_filter <= 1 the state moves towards raw by at most the distance
+from omega_me, so omega stays within half an LSB of PU of the range of raw, and omega_me within that range.
 """
 
 from typing import NamedTuple
 
 from fluxproof.golden_model.block import Block, Port
 from fluxproof.golden_model.fixed import Format, round_half_up, round_sat, wrap_s
-from fluxproof.golden_model.formats import BIT, INTEGRAL, PU, PU_TO_INTEGRAL, PU_W, TURN_W
+from fluxproof.golden_model.formats import BIT, PU, PU_W, TURN_W
 from fluxproof.golden_model.io.position import code_format
 from fluxproof.golden_model.kernel import kernel
 
 K_SPEED = Format(0, 12, 12)
 K_FILTER = Format(0, 1, 16)
+OMEGA = Format(1, 2, 28)
+OMEGA_W = OMEGA.width
+TO_PU = OMEGA.frac_bits - PU.frac_bits
 DROP_RAW = TURN_W + K_SPEED.frac_bits - PU.frac_bits
-DROP_STATE = PU.frac_bits + K_FILTER.frac_bits - INTEGRAL.frac_bits
-OMEGA_ZERO = 1 << (PU_TO_INTEGRAL - 1)
+DROP_STATE = PU.frac_bits + K_FILTER.frac_bits - OMEGA.frac_bits
 
 
 class State(NamedTuple):
     code: int = 0
     seen: int = 0
-    omega: int = OMEGA_ZERO  # INTEGRAL
+    omega: int = 0  # OMEGA
 
 
 @kernel
 def step(state, code_theta, reverse, k_speed, k_filter, position_bits):
     aligned = code_theta << (TURN_W - position_bits)
     mech = -aligned if reverse else aligned
-    delta = wrap_s(mech - state.code, TURN_W) if state.seen else 0
-    prod_raw = delta * k_speed
-    raw = round_sat(prod_raw, DROP_RAW, PU_W)
-    err = raw - (state.omega >> PU_TO_INTEGRAL)
-    prod_err = err * k_filter
-    omega = state.omega + round_half_up(prod_err, DROP_STATE)
-    return State(mech, 1, omega), (omega >> PU_TO_INTEGRAL,)
+    last = state.code if state.seen else mech
+    delta = wrap_s(mech - last, TURN_W)
+    raw = round_sat(delta * k_speed, DROP_RAW, PU_W)
+    err = raw - round_half_up(state.omega, TO_PU)
+    omega = state.omega + round_half_up(err * k_filter, DROP_STATE)
+    omega_me = round_half_up(omega, TO_PU)
+    return State(mech, 1, omega), (omega_me,)
 
 
 def reference(v, state):
     mech = -v["code_theta"] if v["reverse"] else v["code_theta"]
     delta = (mech - state.code / 2**TURN_W + 0.5) % 1.0 - 0.5 if state.seen else 0.0
     raw = PU.limit(v["k_speed"] * delta)
-    old = (state.omega - OMEGA_ZERO) * INTEGRAL.lsb
+    old = state.omega * OMEGA.lsb
     return {"omega_me": old + v["k_filter"] * (raw - old)}
 
 
 def bound(v, _state):
     """Rounding of raw and of the fed-back output (each weighted by k_filter), of the increment, of the output."""
-    return {"omega_me": v["k_filter"] * PU.lsb + INTEGRAL.lsb / 2 + PU.lsb}
+    return {"omega_me": v["k_filter"] * PU.lsb + OMEGA.lsb / 2 + PU.lsb}
 
 
 def stimuli(rng, config):
@@ -84,9 +85,9 @@ BLOCK = Block(
     ),
     outputs=(Port("omega_me", PU, doc="electrical speed"),),
     state=State(),
-    latency=6,
+    latency=7,
     interval=4,
-    constants={"DROP_RAW": DROP_RAW, "DROP_STATE": DROP_STATE},
+    constants={"OMEGA_W": OMEGA_W, "TO_PU": TO_PU, "DROP_RAW": DROP_RAW, "DROP_STATE": DROP_STATE},
     configs=({"POSITION_BITS": 16}, {"POSITION_BITS": 12}, {"POSITION_BITS": 18}),
     width_from={"code_theta": code_format},
     reference=reference,

@@ -17,16 +17,16 @@ from fluxproof.golden_model.kernel import kernel
 K_U_MAX = Format(0, 0, 17)
 DROP_U_DC = CODE.frac_bits + GAIN.frac_bits - U_DC.frac_bits
 DROP_U_MAX = U_DC.frac_bits + K_U_MAX.frac_bits - U_MAX.frac_bits
+AHEAD = 3  # clocks from the bus voltage to the radius
 U_DC_W, U_MAX_W = U_DC.width, U_MAX.width
 
 
 @kernel
 def step(code_u_dc, u_dc_offset, u_dc_gain, k_u_max, adc_bits):
-    diff = (code_u_dc << (16 - adc_bits)) - u_dc_offset
-    prod = diff * u_dc_gain
-    u_dc = saturate_u(round_half_up(prod, DROP_U_DC), U_DC_W)
-    prod_max = u_dc * k_u_max
-    u_max = saturate_u(prod_max >> DROP_U_MAX, U_MAX_W)
+    code = code_u_dc << (16 - adc_bits)
+    diff = code - u_dc_offset
+    u_dc = saturate_u(round_half_up(diff * u_dc_gain, DROP_U_DC), U_DC_W)
+    u_max = saturate_u((u_dc * k_u_max) >> DROP_U_MAX, U_MAX_W)
     return u_dc, u_max, at_rail(code_u_dc, adc_bits)
 
 
@@ -70,9 +70,11 @@ BLOCK = Block(
         Port("u_max", U_MAX, doc="radius of the voltage circle"),
         Port("u_dc_at_rail", BIT, doc="code at either end"),
     ),
-    latency=6,
+    latency=7,
     interval=4,
-    constants={"DROP_U_DC": DROP_U_DC, "DROP_U_MAX": DROP_U_MAX},
+    soon=("u_dc", "u_dc_at_rail"),
+    ahead=AHEAD,
+    constants={"AHEAD": AHEAD, "DROP_U_DC": DROP_U_DC, "DROP_U_MAX": DROP_U_MAX},
     configs=({"ADC_BITS": 16}, {"ADC_BITS": 12}),
     width_from={"code_u_dc": code_format},
     reference=reference,

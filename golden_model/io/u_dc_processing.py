@@ -22,7 +22,7 @@ from fluxproof.golden_model.kernel import kernel
 N_MAX = 5
 INVERSE = Format(0, N_MAX, RECIPROCAL.frac_bits)
 INVERSE_W = INVERSE.width
-SHIFT_CLOCKS = (N_MAX + 1) // 2  # two bits per clock
+AFTER = 5  # clocks from the reciprocal to the outputs
 U_DC_MIN = 1 << (U_DC.frac_bits - N_MAX)
 SQRT3_2 = Const(math.sqrt(3) / 2, Format(0, 0, 17))
 K_SQRT3_2 = SQRT3_2.value
@@ -33,7 +33,9 @@ DROP_BETA = SQRT3_2.fmt.frac_bits
 def step(u_dc):
     m, n, low = reciprocal.step(u_dc, N_MAX)
     m_beta = round_half_up(m * K_SQRT3_2, DROP_BETA)
-    return m << n, m_beta << n, low
+    part, part_beta = m << n % 4, m_beta << n % 4
+    inverse, inverse_beta = part << n - n % 4, part_beta << n - n % 4
+    return inverse, inverse_beta, low
 
 
 def reference(v, _state):
@@ -66,15 +68,14 @@ BLOCK = Block(
         Port("inverse_beta", INVERSE, doc="sqrt(3)/2/u_dc"),
         Port("u_dc_low", BIT, doc="bus below 1/32 per unit"),
     ),
-    latency=reciprocal.BLOCK.latency + 3 + SHIFT_CLOCKS,
-    interval=reciprocal.BLOCK.interval + 3 + SHIFT_CLOCKS,
+    latency=reciprocal.BLOCK.latency + AFTER,
+    interval=reciprocal.BLOCK.interval + AFTER,
     constants={
         "N_MAX": N_MAX,
         "U_DC_MIN": U_DC_MIN,
         "SQRT3_2": SQRT3_2,
         "DROP_BETA": DROP_BETA,
         "INVERSE_W": INVERSE_W,
-        "SHIFT_CLOCKS": SHIFT_CLOCKS,
     },
     reference=reference,
     bound=bound,

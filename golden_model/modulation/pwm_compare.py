@@ -24,7 +24,8 @@ def leg(duty, min_pulse, carrier_half):
     compare = round_half_up(duty * carrier_half, DROP)
     if 2 * compare < min_pulse:
         return 0
-    if carrier_half - compare < min_pulse:
+    longest = carrier_half - min_pulse
+    if compare > longest:
         return carrier_half
     return compare
 

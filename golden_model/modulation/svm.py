@@ -64,7 +64,7 @@ def bound(_v, _state):
     return {f"duty_{k}": 1.5 * SCALED.lsb + DUTY.lsb / 2 for k in "abc"}
 
 
-def below_two(v):
+def below_two(v, _config):
     """``v`` with the voltage limited to less than two bus voltages."""
     out = dict(v)
     for u, inverse in (("u_alpha", "inverse"), ("u_beta", "inverse_beta")):

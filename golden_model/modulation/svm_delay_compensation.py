@@ -19,7 +19,8 @@ DROP = PU.frac_bits + K_DELAY.frac_bits - TURN.frac_bits
 @kernel
 def step(theta_me, omega_me, k_delay):
     prod = omega_me * k_delay
-    return (wrap(theta_me + round_half_up(prod, DROP), TURN_W),)
+    theta_out = wrap(theta_me + round_half_up(prod, DROP), TURN_W)
+    return (theta_out,)
 
 
 def reference(v, _state):
@@ -38,7 +39,7 @@ BLOCK = Block(
     inputs=(Port("theta_me", TURN, doc="electrical angle"), Port("omega_me", PU, doc="electrical speed")),
     registers=(Port("k_delay", K_DELAY, doc="angle of the delay in turns, per unit of speed"),),
     outputs=(Port("theta_out", TURN, doc="electrical angle when the voltage acts"),),
-    latency=1,
+    latency=3,
     constants={"DROP": DROP},
     reference=reference,
     bound=bound,

@@ -1,11 +1,12 @@
 """Three phase currents to the stator frame, amplitude-invariant; no zero-sum is assumed.
 
     i_alpha = (2*i_a - i_b - i_c) / 3
-    i_beta  = (i_b - i_c) / sqrt(3)
+    i_beta  = (i_b - i_c) / sqrt(3) = (2*i_b - 2*i_c) / sqrt(12)
 
-Formats: sums exact; times 1/3 as S(0,-1,18) and 1/sqrt(3) as S(0,0,17), relative error 4e-6 each;
-rounded half up to PU.  Limit: +-1.375 per unit (VECTOR), so that park needs no limiter; the base is the
-measuring range of the sensor, and currents that sum to zero give no component beyond the largest of them.
+Both have the same form, so that one multiplier takes beta and then alpha.
+Formats: sums exact; times 1/3 and 1/sqrt(12) as S(0,-1,18), relative error 4e-6 each; rounded half up to PU.
+Limit: +-1.375 per unit (VECTOR), so that park needs no limiter; the base is the measuring range of the sensor, and
+currents that sum to zero give no component beyond the largest of them.
 """
 
 import math
@@ -16,9 +17,9 @@ from fluxproof.golden_model.formats import PU, VECTOR
 from fluxproof.golden_model.kernel import kernel
 
 THIRD = Const(1 / 3, Format(0, -1, 18))
-INV_SQRT3 = Const(1 / math.sqrt(3), Format(0, 0, 17))
-K_THIRD, K_INV_SQRT3 = THIRD.value, INV_SQRT3.value
-DROP_ALPHA, DROP_BETA = THIRD.fmt.frac_bits, INV_SQRT3.fmt.frac_bits
+INV_SQRT12 = Const(1 / math.sqrt(12), Format(0, -1, 18))
+K_THIRD, K_INV_SQRT12 = THIRD.value, INV_SQRT12.value
+DROP = THIRD.fmt.frac_bits
 
 
 @kernel
@@ -27,12 +28,16 @@ def limited(x):
 
 
 @kernel
+def component(sum_of_phases, factor):
+    return limited(round_half_up(sum_of_phases * factor, DROP))
+
+
+@kernel
 def step(i_a, i_b, i_c):
-    sum_alpha = 2 * i_a - i_b - i_c
-    sum_beta = i_b - i_c
-    prod_alpha = sum_alpha * K_THIRD
-    prod_beta = sum_beta * K_INV_SQRT3
-    return limited(round_half_up(prod_alpha, DROP_ALPHA)), limited(round_half_up(prod_beta, DROP_BETA))
+    both = i_b + i_c
+    i_beta = component(2 * i_b - 2 * i_c, K_INV_SQRT12)
+    i_alpha = component(2 * i_a - both, K_THIRD)
+    return i_alpha, i_beta
 
 
 def reference(v, _state):
@@ -45,7 +50,7 @@ def reference(v, _state):
 def bound(v, _state):
     """Half an LSB of the output plus the coefficient's rounding times the sum."""
     alpha = abs(2 * v["i_a"] - v["i_b"] - v["i_c"]) * THIRD.fmt.lsb / 2
-    beta = abs(v["i_b"] - v["i_c"]) * INV_SQRT3.fmt.lsb / 2
+    beta = abs(2 * v["i_b"] - 2 * v["i_c"]) * INV_SQRT12.fmt.lsb / 2
     return {"i_alpha": PU.lsb / 2 + alpha, "i_beta": PU.lsb / 2 + beta}
 
 
@@ -64,9 +69,8 @@ BLOCK = Block(
     interval=2,
     constants={
         "THIRD": THIRD,
-        "INV_SQRT3": INV_SQRT3,
-        "DROP_ALPHA": DROP_ALPHA,
-        "DROP_BETA": DROP_BETA,
+        "INV_SQRT12": INV_SQRT12,
+        "DROP": DROP,
         "VECTOR": VECTOR,
     },
     reference=reference,

@@ -1,7 +1,7 @@
 """Rotates a flux linkage by the angle whose sine and cosine are given, with two multipliers in two clocks.
 
-    out_x = x*cos_theta - y*sin_theta
     out_y = x*sin_theta + y*cos_theta
+    out_x = x*cos_theta - y*sin_theta
 
 Formats: x and y FLUX, the wide port of a multiplier; products exact, 16 fraction bits more; sums rounded half up to
 FLUX.
@@ -18,10 +18,16 @@ DROP = rotate.DROP
 
 
 @kernel
+def component(x, y, first, second):
+    """One component of the rotated flux."""
+    return round_sat(x * first + y * second, DROP, FLUX_W)
+
+
+@kernel
 def step(x, y, cos_theta, sin_theta):
-    sum_x = x * cos_theta - y * sin_theta
-    sum_y = x * sin_theta + y * cos_theta
-    return round_sat(sum_x, DROP, FLUX_W), round_sat(sum_y, DROP, FLUX_W)
+    out_y = component(x, y, sin_theta, cos_theta)
+    out_x = component(x, y, cos_theta, -sin_theta)
+    return out_x, out_y
 
 
 def reference(v, _state):

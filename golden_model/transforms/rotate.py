@@ -1,7 +1,7 @@
-"""Rotates a vector by the angle whose sine and cosine are given, with two multipliers in two clocks.
+"""Rotates a vector by the angle whose sine and cosine are given.
 
     out_x = x*cos_theta - y*sin_theta
-    out_y = x*sin_theta + y*cos_theta
+    out_y = y*cos_theta + x*sin_theta
 
 Formats: x and y PU; products exact, 16 fraction bits more; sums rounded half up to PU.
 Range: the components of currents and voltages are limited to VECTOR, 1.375 per unit, so the vector is shorter than
@@ -11,8 +11,8 @@ Range: the components of currents and voltages are limited to VECTOR, 1.375 per 
 import math
 
 from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.fixed import round_half_up
-from fluxproof.golden_model.formats import PU, TRIG, TRIG_ONE, VECTOR
+from fluxproof.golden_model.common.sum_of_products import difference_of_products, sum_of_products
+from fluxproof.golden_model.formats import PU, PU_W, TRIG, TRIG_ONE, VECTOR
 from fluxproof.golden_model.kernel import kernel
 
 DROP = TRIG.frac_bits
@@ -20,9 +20,9 @@ DROP = TRIG.frac_bits
 
 @kernel
 def step(x, y, cos_theta, sin_theta):
-    sum_x = x * cos_theta - y * sin_theta
-    sum_y = x * sin_theta + y * cos_theta
-    return round_half_up(sum_x, DROP), round_half_up(sum_y, DROP)
+    out_y = sum_of_products(x, sin_theta, y, cos_theta, DROP, PU_W)
+    out_x = difference_of_products(y, sin_theta, x, cos_theta, DROP, PU_W)
+    return out_x, out_y
 
 
 def reference(v, _state):
@@ -34,7 +34,7 @@ def bound(_v, _state):
     return {"out_x": PU.lsb / 2, "out_y": PU.lsb / 2}
 
 
-def on_circle(v):
+def on_circle(v, _config):
     """``v`` with sine and cosine replaced by those of the angle atan2(sin_theta, cos_theta)."""
     angle = math.atan2(v["sin_theta"], v["cos_theta"])
     return v | {"cos_theta": round(TRIG_ONE * math.cos(angle)), "sin_theta": round(TRIG_ONE * math.sin(angle))}

@@ -40,20 +40,23 @@ def turn(theta):
     """(cosine, sine) of one angle."""
     quadrant = theta >> (TURN_W - 2)
     address = (theta >> DELTA_BITS) & ((1 << ADDRESS_BITS) - 1)
-    delta = DELTAS[theta & ((1 << DELTA_BITS) - 1)]
+    low = theta & ((1 << DELTA_BITS) - 1)
     s = SINE[address]
     c = SINE[(1 << ADDRESS_BITS) - 1 - address]
-    fine_s = (s << TABLE_SHIFT) + ((delta * c) >> DROP_PROD)
-    fine_c = (c << TABLE_SHIFT) - ((delta * s) >> DROP_PROD)
+    delta = DELTAS[low]
+    prod_s = delta * c
+    prod_c = delta * s
+    fine_s = (s << TABLE_SHIFT) + (prod_s >> DROP_PROD)
+    fine_c = (c << TABLE_SHIFT) - (prod_c >> DROP_PROD)
     if quadrant == 0:
-        turned_s, turned_c = fine_s, fine_c
+        sin, cos = fine_s, fine_c
     elif quadrant == 1:
-        turned_s, turned_c = fine_c, -fine_s
+        sin, cos = fine_c, -fine_s
     elif quadrant == 2:
-        turned_s, turned_c = -fine_s, -fine_c
+        sin, cos = -fine_s, -fine_c
     else:
-        turned_s, turned_c = -fine_c, fine_s
-    return round_half_up(turned_c, DROP_OUT), round_half_up(turned_s, DROP_OUT)
+        sin, cos = -fine_c, fine_s
+    return round_half_up(cos, DROP_OUT), round_half_up(sin, DROP_OUT)
 
 
 @kernel
@@ -90,8 +93,8 @@ def stimuli(_rng, _config):
 
 
 OUT = {"lo": -TRIG_ONE, "hi": TRIG_ONE}
-PASS = 6  # clocks for one angle; the second angle enters after the first
-AHEAD = PASS + 1  # clocks from the first angle's values to the second's, which pass one register more
+PASS = 5  # clocks for one angle
+SECOND = 8  # clocks from the first angle to the second, which needs the speed of this sample
 
 BLOCK = Block(
     name="sincos",
@@ -100,7 +103,7 @@ BLOCK = Block(
     step=step,
     inputs=(
         Port("theta_me", TURN, doc="electrical angle of the sample"),
-        Port("theta_out", TURN, late=PASS, doc="angle at which the voltage will act"),
+        Port("theta_out", TURN, late=SECOND, doc="angle at which the voltage will act"),
     ),
     outputs=(
         Port("cos_theta", TRIG, doc="cosine of theta_me", **OUT),
@@ -108,12 +111,12 @@ BLOCK = Block(
         Port("cos_out", TRIG, doc="cosine of theta_out", **OUT),
         Port("sin_out", TRIG, doc="sine of theta_out", **OUT),
     ),
-    latency=PASS + AHEAD,
-    interval=PASS + 3,
+    latency=SECOND + PASS,
+    interval=SECOND + 1,
     soon=("cos_theta", "sin_theta"),
-    ahead=AHEAD,
+    ahead=SECOND,
     constants={
-        "PASS": PASS,
+        "SECOND": SECOND,
         "ADDRESS_BITS": ADDRESS_BITS,
         "DROP_PROD": DROP_PROD,
         "TABLE_SHIFT": TABLE_SHIFT,
@@ -122,7 +125,6 @@ BLOCK = Block(
     roms={
         "SINE": (TABLE, list(SINE_ROM)),
         "DELTA": (DELTA, list(DELTA_ROM)),
-        "MINUS_DELTA": (DELTA, [-delta for delta in DELTA_ROM]),
     },
     reference=reference,
     bound=bound,

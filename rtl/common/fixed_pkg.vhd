@@ -11,6 +11,12 @@ package fixed_pkg is
   -- x / 2**drop, rounded half up.  The result is one bit wider than the bits kept, so it cannot overflow.
   function round_half_up (x : signed; drop : natural) return signed;
 
+  -- -x / 2**drop, rounded half up, with the one sum that a multiplier's adder can take.
+  function minus_half_up (x : signed; drop : positive) return signed;
+
+  -- x / 2**drop or, if minus = '1', -x / 2**drop, rounded half up, with one carry chain.
+  function turned_half_up (x : signed; minus : std_logic; drop : positive) return signed;
+
   -- Half an LSB of the result when drop bits are cut.  Added to a product in the adder of the multiplier, it turns
   -- the cut into a rounding half up.  A product of two signed numbers has headroom for it.
   function half (drop : positive; width : positive) return signed;
@@ -36,8 +42,19 @@ package fixed_pkg is
   -- |x|, which is unsigned and so needs no bit more than x.
   function magnitude (x : signed) return unsigned;
 
+  -- -x if negative = '1', else x, with one sum; the result must fit the width of x.
+  function negated (x : signed; negative : std_logic) return signed;
+
   -- a + 1 if carry = '1', with one sum whose carry comes from the bit below; the result must fit the width of a.
   function plus_carry (a : signed; carry : std_logic) return signed;
+
+  -- a - b, one bit wider than the wider of both.  It is written as a sum with a carry, because yosys would map a plain
+  -- difference before a multiplier to the DSP48's pre-adder and lose the signs of the operands.
+  function difference (a : signed; b : signed) return signed;
+
+  -- a if first = '1', else b.  Written without a multiplexer for an operand register of a DSP48: where some bits of a or b
+  -- are constant, yosys would give these bits a reset of their own and leave the register outside of the DSP48.
+  function chosen (a : signed; b : signed; first : std_logic) return signed;
 
   -- a + round_half_up(v, drop) with one carry chain; the sum must fit the width of a.
   function plus_rounded (a : signed; v : signed; drop : positive) return signed;
@@ -70,6 +87,24 @@ package body fixed_pkg is
       wide := wide + shift_left(to_signed(1, x'length + 1), drop - 1);
     end if;
     return wide(x'length downto drop);
+  end function;
+
+  function minus_half_up (x : signed; drop : positive) return signed is
+    variable sum : signed(x'length downto 0);
+  begin
+    -- half - x = not (x - half - 1), and the cut of a complement is the complement of the cut.
+    sum := resize(x, x'length + 1) + not half(drop, x'length + 1);
+    return not sum(x'length downto drop);
+  end function;
+
+  function turned_half_up (x : signed; minus : std_logic; drop : positive) return signed is
+    variable one_more : signed(x'length + 1 downto 0) := half(drop + 1, x'length + 2);
+    variable sum      : signed(x'length + 1 downto 0) := resize((x xor minus) & '1', x'length + 2);
+  begin
+    -- -x = not x + 1: the one comes from the bit below the LSB, together with half an LSB of the result.
+    one_more(0) := minus;
+    sum         := sum + one_more;
+    return sum(x'length + 1 downto drop + 1);
   end function;
 
   function half (drop : positive; width : positive) return signed is
@@ -152,11 +187,30 @@ package body fixed_pkg is
     return unsigned(wide(x'length - 1 downto 0));
   end function;
 
+  function negated (x : signed; negative : std_logic) return signed is
+  begin
+    return plus_carry(x xor negative, negative);
+  end function;
+
   function plus_carry (a : signed; carry : std_logic) return signed is
     variable raised : signed(a'length downto 0);
   begin
     raised := (a & '1') + signed(resize(unsigned'(0 => carry), a'length + 1));
     return raised(a'length downto 1);
+  end function;
+
+  function difference (a : signed; b : signed) return signed is
+    constant WIDTH : positive := maximum(a'length, b'length) + 1;
+    variable sum   : signed(WIDTH downto 0);
+  begin
+    -- -b = not b + 1: the one is the carry of both bits below the LSB.
+    sum := (resize(a, WIDTH) & '1') + ((not resize(b, WIDTH)) & '1');
+    return sum(WIDTH downto 1);
+  end function;
+
+  function chosen (a : signed; b : signed; first : std_logic) return signed is
+  begin
+    return (a and first) or (b and not first);
   end function;
 
   function plus_rounded (a : signed; v : signed; drop : positive) return signed is
@@ -168,11 +222,11 @@ package body fixed_pkg is
   end function;
 
   function minus_rounded (a : signed; v : signed; drop : positive) return signed is
-    variable difference : signed(a'length downto 0);
+    variable rest : signed(a'length downto 0);
   begin
     -- Subtracting the rounded value needs no added half: the floor of the difference does it.
-    difference := (a & '0') - resize(v(v'high downto drop - 1), a'length + 1);
-    return difference(a'length downto 1);
+    rest := (a & '0') - resize(v(v'high downto drop - 1), a'length + 1);
+    return rest(a'length downto 1);
   end function;
 
   function rounding_base (a : signed; drop : positive; width : positive) return signed is

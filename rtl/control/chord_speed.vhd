@@ -1,8 +1,9 @@
 -- Purpose: the speed that belongs to the chord of the flux, because the voltage vector is constant during a sample.
 --   omega_chord = omega_me - k_chord*omega_me**3
--- Three products one after the other, through one multiplier.
+--   square = 4*omega_me*omega_me,  part = 8*square*k_chord,  shorter = part*omega_me,  each cut by the same 20 bits
+-- One pipeline for the three products, one after the other.
 -- Formats: PU in and out; omega_me**2 U(3,14), k_chord U(-6,23), their product U(-3,20).
--- Latency: 9.  Interval: 8.
+-- Latency: 10.  Interval: 10.
 -- Rounding: every product half up.  No saturation: k_chord*omega_me**2 < 1/16, so the result keeps its sign.
 
 library ieee;
@@ -24,58 +25,40 @@ entity chord_speed is
 end entity chord_speed;
 
 architecture rtl of chord_speed is
-  constant LATENCY : positive := CHORD_SPEED_LATENCY;
+  constant LATENCY   : positive := CHORD_SPEED_LATENCY;
+  constant FACTOR_W  : positive := PU_W + CHORD_SPEED_RAISE_PART;
+  constant PRODUCT_W : positive := FACTOR_W + PU_W + 2 - CHORD_SPEED_DROP;  -- nothing to saturate
 
-  signal valid    : std_logic_vector(0 to LATENCY);
-  signal mul_a    : signed(PU_W - 1 downto 0);
-  signal mul_b    : signed(PU_W - 1 downto 0);
-  signal prod     : signed(2 * PU_W - 1 downto 0);
-  signal square_3 : signed(PU_W - 1 downto 0);
-  signal part_6   : signed(PU_W - 1 downto 0);
-  signal omega_8  : signed(PU_W - 1 downto 0);
+  constant NOTHING : signed(0 downto 0) := "0";
+
+  signal valid     : std_logic_vector(0 to LATENCY);
+  signal raised_0  : signed(FACTOR_W - 1 downto 0);
+  signal raised_3  : signed(FACTOR_W - 1 downto 0);
+  signal factor_0  : signed(FACTOR_W - 1 downto 0);
+  signal by_0      : signed(PU_W - 1 downto 0);
+  signal product_3 : signed(PRODUCT_W - 1 downto 0);
 begin
   valid(0) <= in_valid;
+
+  -- The product that enters: square, part with the square of three clocks before, shorter with the part
+  raised_0 <= shift_left(resize(omega_me, FACTOR_W), CHORD_SPEED_RAISE_SQUARE);
+  raised_3 <= shift_left(resize(product_3, FACTOR_W), CHORD_SPEED_RAISE_PART);
+  factor_0 <= chosen(raised_0, chosen(raised_3, resize(product_3, FACTOR_W), valid(3)), valid(0));
+  by_0     <= chosen(signed('0' & k_chord), omega_me, valid(3));
+
+  -- Stages 1 to 3: square;  4 to 6: part;  7 to 9: shorter
+  product : entity work.multiply_add
+    generic map (DROP => CHORD_SPEED_DROP)
+    port map (clk => clk, a => factor_0, b => by_0, c => NOTHING, y => product_3, limited => open);
 
   process (clk)
   begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stages 1, 4, 7: the factors
-      if valid(0) = '1' or valid(3) = '1' or valid(6) = '1' then
-        mul_a <= omega_me;
-        mul_b <= omega_me;
-        if valid(3) = '1' then
-          mul_a <= square_3;
-          mul_b <= signed('0' & k_chord);
-        elsif valid(6) = '1' then
-          mul_a <= part_6;
-        end if;
-      end if;
-
-      -- Stages 2, 5, 8: prod = omega_me*omega_me, square*k_chord, part*omega_me
-      if valid(1) = '1' or valid(4) = '1' or valid(7) = '1' then
-        prod <= mul_a * mul_b;
-      end if;
-
-      -- Stage 3: square = prod, narrowed; at most 4, so it fits
-      if valid(2) = '1' then
-        square_3 <= resize(round_half_up(prod, CHORD_SPEED_DROP_SQUARE), PU_W);
-      end if;
-
-      -- Stage 6: part = prod, narrowed; at most 1/16, so it fits
-      if valid(5) = '1' then
-        part_6 <= resize(round_half_up(prod, CHORD_SPEED_DROP_PART), PU_W);
-      end if;
-
-      -- Stage 8: a local copy of omega_me from the multiplier's operand register, because the source may be far away
-      if valid(7) = '1' then
-        omega_8 <= mul_b;
-      end if;
-
-      -- Stage 9: omega_chord = omega - prod, narrowed
-      if valid(8) = '1' then
-        omega_chord <= minus_rounded(omega_8, prod, CHORD_SPEED_DROP);
+      -- Stage 10: omega_chord = omega_me - shorter
+      if valid(9) = '1' then
+        omega_chord <= omega_me - resize(product_3, PU_W);
       end if;
 
       if rst = '1' then

@@ -1,7 +1,8 @@
--- Purpose: compensation voltage for dead time and device drops, stator frame, paper 000 section V.B; alpha, then beta.
+-- Purpose: compensation voltage for dead time and device drops, stator frame, paper 000 section V.B.
 --   u_comp_alpha = v_comp*s_alpha;  u_comp_beta = v_comp*s_beta
+-- One pipeline for both components: alpha, then beta a clock later.
 -- Formats: v_comp V_LEG, the rest PU; products exact.
--- Latency: 4 (alpha, then beta).  Interval: 4.
+-- Latency: 5 (alpha, then beta).  Interval: 4.
 -- Rounding: half up.  No saturation: |s| <= 4/3 and v_comp < 1/2.
 
 library ieee;
@@ -25,37 +26,36 @@ entity dead_time_compensation is
 end entity dead_time_compensation;
 
 architecture rtl of dead_time_compensation is
-  constant LATENCY : positive := DEAD_TIME_COMPENSATION_LATENCY;
-  constant DROP    : positive := DEAD_TIME_COMPENSATION_DROP;
+  constant LATENCY  : positive := DEAD_TIME_COMPENSATION_LATENCY;
+  constant RESULT_W : positive := V_LEG_W + PU_W + 2 - DEAD_TIME_COMPENSATION_DROP;  -- nothing to saturate
 
-  signal valid     : std_logic_vector(0 to LATENCY);
-  signal s_1       : signed(PU_W - 1 downto 0);
-  signal prod_2    : signed(V_LEG_W + PU_W - 1 downto 0);
-  signal rounded_2 : signed(V_LEG_W + PU_W - DROP downto 0);
+  constant NOTHING : signed(0 downto 0) := "0";
+
+  signal valid    : std_logic_vector(0 to LATENCY);
+  signal s_0      : signed(PU_W - 1 downto 0);
+  signal u_comp_3 : signed(RESULT_W - 1 downto 0);
 begin
   valid(0) <= in_valid;
 
-  rounded_2 <= round_half_up(prod_2, DROP);
+  -- The component that enters: alpha, then beta
+  s_0 <= s_beta when valid(1) = '1' else s_alpha;
+
+  -- Stages 1 to 3: u_comp = v_comp*s
+  compensation : entity work.multiply_add
+    generic map (DROP => DEAD_TIME_COMPENSATION_DROP)
+    port map (clk => clk, a => v_comp, b => s_0, c => NOTHING, y => u_comp_3, limited => open);
 
   process (clk)
   begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stages 1, 2: prod = v_comp * s
-      if valid(0) = '1' or valid(1) = '1' then
-        s_1 <= s_beta when valid(1) = '1' else s_alpha;
-      end if;
-      if valid(1) = '1' or valid(2) = '1' then
-        prod_2 <= v_comp * s_1;
-      end if;
-
-      -- Stage 3: u_comp = prod, narrowed; alpha at clock 3, beta at 4
-      if valid(2) = '1' then
-        u_comp_alpha <= resize(rounded_2, PU_W);
-      end if;
+      -- Stages 4, 5: u_comp_alpha, then u_comp_beta
       if valid(3) = '1' then
-        u_comp_beta <= resize(rounded_2, PU_W);
+        u_comp_alpha <= resize(u_comp_3, PU_W);
+      end if;
+      if valid(4) = '1' then
+        u_comp_beta <= resize(u_comp_3, PU_W);
       end if;
 
       if rst = '1' then

@@ -2,7 +2,6 @@
 --   u_dec_d = -omega_chord*lambda_q;  u_dec_q = omega_chord*lambda_d
 -- Formats: PU in and out; products exact.
 -- Latency: 2.  Rounding: half up, saturated at 2 per unit, twice the largest voltage of the limiter.
--- -v rounded half up is the floor of not (v - half - 1), because -v = not v + 1; the constant -half - 1 is not half.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -30,14 +29,8 @@ architecture rtl of decoupling is
   signal valid    : std_logic_vector(0 to LATENCY);
   signal prod_d_1 : signed(2 * PU_W - 1 downto 0);
   signal prod_q_1 : signed(2 * PU_W - 1 downto 0);
-  signal sum_d_1  : signed(2 * PU_W - 1 downto 0);
-  signal sum_q_1  : signed(2 * PU_W - 1 downto 0);
 begin
   valid(0) <= in_valid;
-
-  -- Half an LSB for the rounding
-  sum_d_1 <= prod_d_1 + not half(DECOUPLING_DROP, 2 * PU_W);
-  sum_q_1 <= prod_q_1 + half(DECOUPLING_DROP, 2 * PU_W);
 
   process (clk)
   begin
@@ -50,10 +43,10 @@ begin
         prod_q_1 <= omega_chord * lambda_d;
       end if;
 
-      -- Stage 2: u_dec = -prod_d and prod_q, narrowed
+      -- Stage 2: u_dec_d = -prod_d,  u_dec_q = prod_q, narrowed
       if valid(1) = '1' then
-        u_dec_d <= saturate(shift_right(not sum_d_1, DECOUPLING_DROP), PU_W);
-        u_dec_q <= saturate(shift_right(sum_q_1, DECOUPLING_DROP), PU_W);
+        u_dec_d <= saturate(minus_half_up(prod_d_1, DECOUPLING_DROP), PU_W);
+        u_dec_q <= round_sat(prod_q_1, DECOUPLING_DROP, PU_W);
       end if;
 
       if rst = '1' then

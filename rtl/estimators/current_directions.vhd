@@ -7,7 +7,8 @@
 -- them.
 -- Formats: PU in and out; k_ahead U(1,16), sqrt(3) U(1,16), k_sign U(12,12); products exact.
 -- Latency: 23.  Interval: 23.
--- Rounding: every product half up.  turn, x, y and twice each phase current saturate.
+-- Rounding: every product half up.  turn, x, y and twice each phase current saturate; the other sums have the bits that
+-- they need.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -44,12 +45,12 @@ architecture rtl of current_directions is
   signal turn_3     : signed(PU_W - 1 downto 0);
   signal x_6        : signed(PU_W - 1 downto 0);
   signal y_6        : signed(PU_W - 1 downto 0);
-  signal across_9   : signed(PU_W downto 0);
+  signal across_9   : signed(PU_W + 2 downto 0);
   signal twice_a_10 : signed(PU_W - 1 downto 0);
   signal twice_b_10 : signed(PU_W - 1 downto 0);
   signal twice_c_10 : signed(PU_W - 1 downto 0);
   signal twice_11   : signed(PU_W - 1 downto 0);   -- of a, b, c
-  signal scaled_14  : signed(PU_W + 11 downto 0);  -- of a, b, c
+  signal scaled_14  : signed(PU_W + 12 downto 0);  -- of a, b, c
   signal s_a        : signed(PU_W - 1 downto 0);   -- the three at clock 17
   signal s_b        : signed(PU_W - 1 downto 0);
   signal s_c        : signed(PU_W - 1 downto 0);

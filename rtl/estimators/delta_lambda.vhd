@@ -6,8 +6,8 @@
 -- One pipeline for both results: d, then q a clock later.
 -- Formats: r U(0,24), u_int and the difference 28 fraction bits, factor S(0,17), out FLUX.
 -- Latency: 12 (d, then q).  Interval: 12.
--- Rounding: half up after r*i, the shift and the factor.  The shifted difference and the result saturate; saturation of
--- the difference is reported unless the factor is zero.
+-- Rounding: half up after r*i, the shift and the factor.  The shifted difference saturates, which is reported unless
+-- the factor is zero.  The other results fit: |r*i| < 2 and |factor| < 1.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -64,7 +64,7 @@ architecture rtl of delta_lambda is
   signal held      : std_logic;  -- from clock 1 on
   signal u_int_1   : signed(INTEGRAL_W - 1 downto 0);
   signal i_1       : signed(PU_W - 1 downto 0);
-  signal rest_4    : signed(REST_W - 1 downto 0);
+  signal rest_4    : signed(REST_W downto 0);
   signal coarse_5  : signed(WIDE_W - 1 downto 0);
   signal shifted_6 : signed(WIDE_W - 1 downto 0);
   signal value_7   : signed(FLUX_W - 1 downto 0);
@@ -72,8 +72,8 @@ architecture rtl of delta_lambda is
   signal past_8    : std_logic;
   signal limited   : std_logic;  -- of either result, from clock 9 on
   signal factor_7  : signed(RECIPROCAL_W downto 0);
-  signal delta_10  : signed(FLUX_W - 1 downto 0);
-  signal delta_11  : signed(FLUX_W - 1 downto 0);
+  signal delta_10  : signed(FLUX_W + 1 downto 0);
+  signal delta_11  : signed(FLUX_W + 1 downto 0);
 
   -- delta, decayed by a sixteenth
   function faded (delta : signed) return signed is
@@ -106,7 +106,7 @@ begin
       held    <= '0' when sat_d = 0 and sat_q = 0 and current_at_rail = 0 and voltage_known = '1' else run;
 
       -- Stages 5, 6: shifted = rest * 2**n_omega, by multiples of four, then by the remainder
-      coarse_5  <= shift_left(resize(rest_4, WIDE_W), to_integer(n_omega(3 downto 2) & "00"));
+      coarse_5  <= shift_left(resize(rest_4(REST_W - 1 downto 0), WIDE_W), to_integer(n_omega(3 downto 2) & "00"));
       shifted_6 <= shift_left(coarse_5, to_integer(n_omega(1 downto 0)));
 
       -- Stage 7: value = shifted, narrowed;  the factor, negative for q
@@ -117,13 +117,13 @@ begin
       if valid(8) = '1' then
         limited <= past_7 or past_8;
       end if;
-      factor_7 <= -factor when valid(7) = '1' else factor;
+      factor_7 <= negated(factor, valid(7));
 
       -- Stages 11, 12: delta of d waits for that of q;  the state of the next sample
       delta_11 <= delta_10;
       if valid(LATENCY - 1) = '1' then
-        state.delta_d   <= delta_11;
-        state.delta_q   <= delta_10;
+        state.delta_d   <= resize(delta_11, FLUX_W);
+        state.delta_q   <= resize(delta_10, FLUX_W);
         state.u_int_d_1 <= u_int_d;
         state.u_int_q_1 <= u_int_q;
         state.u_int_d_2 <= state.u_int_d_1;

@@ -59,8 +59,8 @@ architecture rtl of flux_compensation is
   signal by_kp          : signed(flux_kp'length downto 0);
   signal by_ki          : signed(flux_ki'length downto 0);
   signal delta_1        : signed(FLUX_W - 1 downto 0);
-  signal proportional_4 : signed(PART_W - 1 downto 0);
-  signal increment_4    : signed(FLUX_STATE_W - 1 downto 0);
+  signal proportional_4 : signed(PART_W + 1 downto 0);
+  signal increment_4    : signed(FLUX_STATE_W + 1 downto 0);
   signal integral_4     : signed(FLUX_STATE_W - 1 downto 0);
   signal delta_4        : signed(FLUX_W - 1 downto 0);
   signal moved_5        : signed(MOVED_W - 1 downto 0);
@@ -96,6 +96,7 @@ begin
   past_7   <= beyond(total_7, delta_max, SHIFT_LIMIT);
 
   process (clk)
+    variable increment : signed(FLUX_STATE_W - 1 downto 0);
   begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
@@ -103,12 +104,14 @@ begin
       -- Stage 1: the axis
       delta_1 <= delta_lambda_q when valid(1) = '1' else delta_lambda_d;
 
-      -- Stage 5: moved = integral + increment, or the decayed integral;  the earlier scheme has a gain of one
-      moved_5 <= resize(integral_4, MOVED_W) + increment_4;
+      -- Stage 5: moved = integral + increment, which lets the integral decay while held;  the earlier scheme has a
+      -- gain of one.  Both products fit: |delta| <= 2, flux_kp < 128, flux_ki < 1.
+      increment := resize(increment_4, FLUX_STATE_W);
       if delta_held = '1' then
-        moved_5 <= resize(integral_4, MOVED_W) + round_half_up(-resize(integral_4, MOVED_W), FORGET);
+        increment := resize(round_half_up(-resize(integral_4, MOVED_W), FORGET), FLUX_STATE_W);
       end if;
-      proportional_5 <= proportional_4;
+      moved_5        <= resize(integral_4, MOVED_W) + increment;
+      proportional_5 <= resize(proportional_4, PART_W);
       if flux_mode = EARLIER then
         proportional_5 <= shift_left(resize(delta_4, PART_W), FLUX_TO_STATE);
       end if;

@@ -27,7 +27,7 @@ entity flux_merge is
     u_applied_beta  : in  signed(FLUX_W - 1 downto 0);
     voltage_known   : in  std_logic;
     run             : in  std_logic;
-    minus_rho       : in  signed(MINUS_RHO_W - 1 downto 0);
+    rho             : in  unsigned(RHO_W - 1 downto 0);
     omega_0         : in  unsigned(15 downto 0);
     xi              : in  unsigned(15 downto 0);
     t_s             : in  unsigned(SAMPLE_TIME_W - 1 downto 0);
@@ -42,6 +42,7 @@ end entity flux_merge;
 architecture rtl of flux_merge is
   constant LATENCY : positive := FLUX_MERGE_LATENCY;
   constant TURN    : positive := LATENCY / 2;  -- clocks of an axis
+  constant Y_W     : positive := FLUX_MERGE_Y_W;
   constant X_W     : positive := FLUX_MERGE_X_W;
   constant TOTAL_W : positive := FLUX_STATE_W + 3;
 
@@ -60,7 +61,7 @@ architecture rtl of flux_merge is
   signal valid         : std_logic_vector(0 to LATENCY);
   signal beta          : std_logic;  -- the axis that enters
   signal trusted       : std_logic;
-  signal rho           : signed(MINUS_RHO_W downto 0);
+  signal by_rho        : signed(RHO_W downto 0);
   signal by_t_s        : signed(t_s'length downto 0);
   signal by_omega_0    : signed(omega_0'length downto 0);
   signal by_xi         : signed(xi'length downto 0);
@@ -70,14 +71,14 @@ architecture rtl of flux_merge is
   signal lambda_c_1    : signed(FLUX_W - 1 downto 0);
   signal u_1           : signed(FLUX_W - 1 downto 0);
   signal drop_4        : signed(FLUX_STATE_W - 1 downto 0);
-  signal gained_4      : signed(FLUX_STATE_W - 1 downto 0);
+  signal gained_4      : signed(FLUX_STATE_W downto 0);
   signal now_5         : signed(FLUX_STATE_W downto 0);
   signal push_5        : signed(FLUX_STATE_W downto 0);
   signal lambda_6      : signed(FLUX_STATE_W - 1 downto 0);
   signal diff_7        : signed(FLUX_W downto 0);
-  signal start_7       : signed(TOTAL_W - 1 downto 0);
+  signal start_7       : signed(TOTAL_W - 2 downto 0);
   signal eps_7         : signed(FLUX_W - 1 downto 0);
-  signal y_10          : signed(FLUX_MERGE_Y_W - 1 downto 0);
+  signal y_10          : signed(Y_W + 1 downto 0);
   signal x_13          : signed(X_W - 1 downto 0);
   signal x_limited     : std_logic;
   signal corrected_13  : signed(TOTAL_W - 1 downto 0);
@@ -89,7 +90,7 @@ architecture rtl of flux_merge is
 begin
   valid(0)   <= in_valid;
   trusted    <= state.known and run;
-  rho        <= -resize(minus_rho, MINUS_RHO_W + 1);
+  by_rho     <= signed('0' & rho);
   by_t_s     <= signed('0' & t_s);
   by_omega_0 <= signed('0' & omega_0);
   by_xi      <= signed('0' & xi);
@@ -97,13 +98,13 @@ begin
   -- Stages 2 to 4: drop = rho*i;  gained = t_s*u_applied
   resistive_drop : entity work.multiply_add
     generic map (DROP => FLUX_MERGE_DROP_RHO)
-    port map (clk => clk, a => i_1, b => rho, c => NOTHING, y => drop_4, limited => open);
+    port map (clk => clk, a => by_rho, b => i_1, c => NOTHING, y => drop_4, limited => open);
 
   voltage_gain : entity work.multiply_add
     generic map (DROP => FLUX_MERGE_DROP_U)
     port map (clk => clk, a => u_1, b => by_t_s, c => NOTHING, y => gained_4, limited => open);
 
-  -- Stages 8 to 10: y = omega_0*eps; |eps| <= 2 and omega_0 < 1/4, so it fits
+  -- Stages 8 to 10: y = omega_0*eps; |eps| <= 2 and omega_0 < 1/4, so it fits Y_W bits
   eps_7 <= saturate(diff_7, FLUX_W) when trusted = '1' else (others => '0');
 
   crossover : entity work.multiply_add
@@ -113,11 +114,11 @@ begin
   -- Stages 11 to 13: x += omega_0*y;  corrected = lambda + push + 2*xi*y
   integral : entity work.multiply_add
     generic map (DROP => FLUX_MERGE_DROP_X)
-    port map (clk => clk, a => y_10, b => by_omega_0, c => x_1, y => x_13, limited => x_limited);
+    port map (clk => clk, a => y_10(Y_W - 1 downto 0), b => by_omega_0, c => x_1, y => x_13, limited => x_limited);
 
   damping : entity work.multiply_add
     generic map (DROP => FLUX_MERGE_DROP_XI)
-    port map (clk => clk, a => y_10, b => by_xi, c => start_7, y => corrected_13, limited => open);
+    port map (clk => clk, a => y_10(Y_W - 1 downto 0), b => by_xi, c => start_7, y => corrected_13, limited => open);
 
   -- Stage 15: the carried flux, narrowed twice; any limit of the axis, of which all but the last count if trusted
   carried  <= saturate(total_14, FLUX_STATE_W);
@@ -160,7 +161,7 @@ begin
 
       -- Stage 7: diff = lambda_c - lambda;  start = lambda + push
       diff_7  <= resize(lambda_c_1, FLUX_W + 1) - round_sat(lambda_6, FLUX_TO_STATE, FLUX_W);
-      start_7 <= resize(lambda_6, TOTAL_W) + push_5;
+      start_7 <= resize(lambda_6, TOTAL_W - 1) + push_5;
 
       -- Stage 14: total = corrected + x
       total_14 <= plus_rounded(corrected_13, x_13, FLUX_MERGE_X_TO_STATE);

@@ -27,22 +27,23 @@ end entity speed_reciprocal;
 architecture rtl of speed_reciprocal is
   constant LATENCY  : positive := SPEED_RECIPROCAL_LATENCY;
   constant WEIGHT_W : positive := DUTY_W;
+  constant RAMP_W   : positive := U_DC_W + k_ramp'length + 3 - SPEED_RECIPROCAL_DROP_WEIGHT;
+
+  constant NOTHING : signed(0 downto 0) := "0";
 
   signal valid       : std_logic_vector(0 to LATENCY);
-  signal size_0      : signed(PU_W downto 0);
+  signal size_0      : unsigned(PU_W - 1 downto 0);
   signal magnitude_1 : unsigned(U_DC_W - 1 downto 0);
-  signal above_1     : signed(U_DC_W downto 0);
   signal above_2     : signed(U_DC_W downto 0);
-  signal prod_3      : signed(U_DC_W + k_ramp'length + 1 downto 0);
-  signal sum_4       : signed(U_DC_W + k_ramp'length + 2 downto 0);
-  signal ramp_4      : signed(U_DC_W + k_ramp'length + 2 - SPEED_RECIPROCAL_DROP_WEIGHT downto 0);
-  signal past_5      : std_logic;
+  signal by_k_ramp   : signed(k_ramp'length downto 0);
+  signal ramp_5      : signed(RAMP_W - 1 downto 0);
   signal weight_6    : unsigned(WEIGHT_W - 1 downto 0);
   signal m_22        : unsigned(RECIPROCAL_W - 1 downto 0);
-  signal prod_23     : signed(RECIPROCAL_W + WEIGHT_W + 1 downto 0);
-  signal turned_23   : signed(RECIPROCAL_W + WEIGHT_W + 2 - SPEED_RECIPROCAL_DROP_FACTOR downto 0);
+  signal prod_23     : unsigned(RECIPROCAL_W + WEIGHT_W - 1 downto 0);
+  signal rounded_23  : signed(RECIPROCAL_W downto 0);
 begin
-  valid(0) <= in_valid;
+  valid(0)  <= in_valid;
+  by_k_ramp <= signed('0' & k_ramp);
 
   inverse : entity work.reciprocal
     generic map (
@@ -59,13 +60,15 @@ begin
       low       => open
     );
 
-  size_0  <= abs(resize(omega_me, PU_W + 1));
-  above_1 <= signed('0' & magnitude_1) - signed('0' & omega_min);
-  ramp_4  <= sum_4(sum_4'high downto SPEED_RECIPROCAL_DROP_WEIGHT);
+  -- Stages 3 to 5: ramp = above*k_ramp
+  fading : entity work.multiply_add
+    generic map (DROP => SPEED_RECIPROCAL_DROP_WEIGHT)
+    port map (clk => clk, a => above_2, b => by_k_ramp, c => NOTHING, y => ramp_5, limited => open);
 
-  -- The complement turns rounding half up into half down, as the negative of a number rounded half up requires.
-  turned_23 <= not prod_23(prod_23'high downto SPEED_RECIPROCAL_DROP_FACTOR - 1) when omega_me < 0 else
-               prod_23(prod_23'high downto SPEED_RECIPROCAL_DROP_FACTOR - 1);
+  size_0 <= magnitude(omega_me);
+
+  -- m*weight < 1, so it fits.
+  rounded_23 <= resize(round_half_up(signed('0' & prod_23), SPEED_RECIPROCAL_DROP_FACTOR), RECIPROCAL_W + 1);
 
   process (clk)
   begin
@@ -74,47 +77,26 @@ begin
 
       -- Stage 1: magnitude = min(|omega_me|, the largest number below 2)
       if valid(0) = '1' then
-        magnitude_1 <= saturate_u(size_0, U_DC_W);
+        magnitude_1 <= saturate_u(signed('0' & size_0), U_DC_W);
       end if;
 
-      -- Stage 2: above = max(magnitude - omega_min, 0); in parallel, 2 to 22: the reciprocal
-      if valid(1) = '1' then
-        above_2 <= above_1;
-        if above_1 < 0 then
-          above_2 <= (others => '0');
-        end if;
+      -- Stage 2: above = magnitude - omega_min; in parallel, 2 to 22: the reciprocal
+      above_2 <= signed('0' & magnitude_1) - signed('0' & omega_min);
+
+      -- Stage 6: weight = ramp, limited to 0 and 1
+      weight_6 <= unsigned(ramp_5(WEIGHT_W - 1 downto 0));
+      if ramp_5 < 0 then
+        weight_6 <= (others => '0');
+      elsif ramp_5(RAMP_W - 2 downto WEIGHT_W - 1) /= 0 then
+        weight_6 <= to_unsigned(SPEED_RECIPROCAL_WEIGHT_ONE, WEIGHT_W);
       end if;
 
-      -- Stage 3: prod = above * k_ramp
-      if valid(2) = '1' then
-        prod_3 <= above_2 * signed('0' & k_ramp);
-      end if;
+      -- Stage 23: prod = m*weight
+      prod_23 <= m_22 * weight_6;
 
-      -- Stages 4 to 6: weight = prod, narrowed, at most 1
-      if valid(3) = '1' then
-        sum_4 <= rounding_base("0", SPEED_RECIPROCAL_DROP_WEIGHT, sum_4'length) + prod_3;
-      end if;
-      if valid(4) = '1' then
-        past_5 <= '0';
-        if ramp_4(ramp_4'high downto WEIGHT_W - 1) /= 0 then
-          past_5 <= '1';
-        end if;
-      end if;
-      if valid(5) = '1' then
-        weight_6 <= unsigned(ramp_4(WEIGHT_W - 1 downto 0));
-        if past_5 = '1' then
-          weight_6 <= to_unsigned(SPEED_RECIPROCAL_WEIGHT_ONE, WEIGHT_W);
-        end if;
-      end if;
-
-      -- Stage 23: prod = m * weight
-      if valid(22) = '1' then
-        prod_23 <= signed('0' & m_22) * signed('0' & weight_6);
-      end if;
-
-      -- Stage 24: factor = prod, narrowed, with the sign of omega_me; m*weight < 1, so it fits
+      -- Stage 24: factor = prod, rounded, with the sign of omega_me
       if valid(23) = '1' then
-        factor <= resize(round_half_up(turned_23, 1), RECIPROCAL_W + 1);
+        factor <= negated(rounded_23, omega_me(omega_me'high));
       end if;
 
       if rst = '1' then

@@ -1,10 +1,9 @@
 -- Purpose: winding resistance from its temperature, paper 000 eq. (12), and the resistive flux drop of half a sample.
---   r = r_s + tcr*(temp_winding - t_0);  minus_rho = -r*t_s/2
--- Without a valid reading (temp_valid = 0, or outside t_min to t_max) r = r_s and temp_lost is 1.  Both products share
--- one multiplier and the adder behind it.
--- Formats: temperatures S(9,6), tcr U(-6,30), t_s U(-1,18), r_s, r U(0,24), minus_rho S(-2,24); products exact.
+--   r = r_s + tcr*(temp_winding - t_0);  rho = r*t_s/2;  minus_rho = -rho
+-- Without a valid reading (temp_valid = 0, or outside t_min to t_max) r = r_s and temp_lost is 1.
+-- Formats: temperatures S(9,6), tcr U(-6,30), t_s U(-1,18), r_s, r U(0,24), rho U(-2,24); products exact.
 -- Latency: 8.  Interval: 8.
--- Rounding: each product half up, rho before it is negated.  r saturates, rho cannot: it is below 1/4.
+-- Rounding: each product half up.  r saturates, rho cannot: it is below 1/4.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -27,31 +26,27 @@ entity winding_resistance is
     t_s          : in  unsigned(SAMPLE_TIME_W - 1 downto 0);
     out_valid    : out std_logic;
     r            : out unsigned(RESISTANCE_W - 1 downto 0);
+    rho          : out unsigned(RHO_W - 1 downto 0);
     minus_rho    : out signed(MINUS_RHO_W - 1 downto 0);
     temp_lost    : out std_logic
   );
 end entity winding_resistance;
 
 architecture rtl of winding_resistance is
-  constant LATENCY  : positive := WINDING_RESISTANCE_LATENCY;
-  constant WIDE_W   : positive := RESISTANCE_W + 1;
-  constant SLIM_W   : positive := SAMPLE_TIME_W + 1;
-  constant PROD_W   : positive := WIDE_W + SLIM_W;
-  constant DROP_TCR : positive := WINDING_RESISTANCE_DROP_TCR;
-  constant DROP_RHO : positive := WINDING_RESISTANCE_DROP_RHO;
+  constant LATENCY : positive := WINDING_RESISTANCE_LATENCY;
 
-  -- One LSB less than half: a value that is negated after rounding half up is rounded half down.
-  constant HALF_DOWN : signed(PROD_W - 1 downto 0) := (DROP_RHO - 2 downto 0 => '1', others => '0');
+  constant NOTHING : signed(0 downto 0) := "0";
 
-  signal valid  : std_logic_vector(0 to LATENCY);
-  signal lost_1 : std_logic_vector(2 downto 0);         -- invalid, below t_min, above t_max
-  signal from_0 : signed(SLIM_W - 1 downto 0);
-  signal less_0 : signed(SLIM_W - 1 downto 0);
-  signal slim   : signed(SLIM_W - 1 downto 0);          -- temp_winding - t_0 at clock 1, -t_s at clock 5
-  signal wide   : unsigned(RESISTANCE_W - 1 downto 0);  -- tcr at clock 1, r at clock 5
-  signal prod   : signed(PROD_W - 1 downto 0);
-  signal addend : signed(PROD_W - 1 downto 0);
-  signal sum    : signed(PROD_W - 1 downto 0);
+  signal valid    : std_logic_vector(0 to LATENCY);
+  signal by_tcr   : signed(tcr'length downto 0);
+  signal by_t_s   : signed(SAMPLE_TIME_W downto 0);
+  signal wide_r_s : signed(RESISTANCE_W downto 0);
+  signal lost_0   : std_logic;
+  signal warmer_1 : signed(16 downto 0);
+  signal moved_4  : signed(RESISTANCE_W + 6 downto 0);
+  signal r_4      : unsigned(RESISTANCE_W - 1 downto 0);
+  signal by_r_4   : signed(RESISTANCE_W downto 0);
+  signal rho_7    : signed(RHO_W + 2 downto 0);
 
   -- a < b with one carry chain: a comparison with a constant setting would otherwise become a tree of LUTs.
   function below (a : signed; b : signed) return std_logic is
@@ -62,48 +57,46 @@ architecture rtl of winding_resistance is
   end function;
 begin
   valid(0) <= in_valid;
+  by_tcr   <= signed('0' & tcr);
+  by_t_s   <= signed('0' & t_s);
+  wide_r_s <= signed('0' & r_s);
+  by_r_4   <= signed('0' & r_4);
 
-  from_0 <= resize(temp_winding, SLIM_W) when valid(0) = '1' else (others => '0');
-  less_0 <= resize(t_0, SLIM_W) when valid(0) = '1' else signed('0' & t_s);
+  lost_0 <= (not temp_valid) or below(temp_winding, t_min) or below(t_max, temp_winding);
+
+  -- Stages 2 to 4: moved = r_s + tcr*warmer
+  heating : entity work.multiply_add
+    generic map (DROP => WINDING_RESISTANCE_DROP_TCR)
+    port map (clk => clk, a => by_tcr, b => warmer_1, c => wide_r_s, y => moved_4, limited => open);
+
+  r_4 <= saturate_u(moved_4, RESISTANCE_W);
+
+  -- Stages 5 to 7: rho = r*t_s/2
+  half_sample : entity work.multiply_add
+    generic map (DROP => WINDING_RESISTANCE_DROP_RHO)
+    port map (clk => clk, a => by_r_4, b => by_t_s, c => NOTHING, y => rho_7, limited => open);
 
   process (clk)
   begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stage 1: warmer = temp_winding - t_0, and tcr;  lost = no valid reading;  stage 2: warmer = 0 if lost
-      if valid(0) = '1' or valid(4) = '1' then
-        slim <= from_0 - less_0;
-      end if;
-      if valid(1) = '1' and lost_1 /= "000" then
-        slim <= (others => '0');
-      end if;
-      if valid(0) = '1' then
-        wide   <= tcr;
-        addend <= rounding_base(signed('0' & r_s), DROP_TCR, PROD_W);
-        lost_1 <= (not temp_valid) & below(temp_winding, t_min) & below(t_max, temp_winding);
+      -- Stage 1: warmer = temp_winding - t_0, zero without a valid reading
+      warmer_1 <= resize(temp_winding, 17) - t_0;
+      if lost_0 = '1' then
+        warmer_1 <= (others => '0');
       end if;
 
-      -- Stages 3, 6: prod = warmer*tcr, -t_s*r
-      if valid(2) = '1' or valid(5) = '1' then
-        prod <= slim * signed('0' & wide);
-      end if;
-
-      -- Stages 4, 7: sum = r_s + prod, prod
-      if valid(3) = '1' or valid(6) = '1' then
-        sum <= addend + prod;
-      end if;
-
-      -- Stage 5: r = sum, limited;  the addend of the next product is its rounding constant only
+      -- Stage 5: r = moved, limited
       if valid(4) = '1' then
-        wide   <= saturate_u(sum(PROD_W - 1 downto DROP_TCR), RESISTANCE_W);
-        addend <= HALF_DOWN;
+        r <= r_4;
       end if;
 
-      -- Stage 8: minus_rho = prod/2, narrowed
+      -- Stage 8: rho, below 1/4, and its negative
       if valid(7) = '1' then
-        minus_rho <= sum(MINUS_RHO_W - 1 + DROP_RHO downto DROP_RHO);
-        temp_lost <= or lost_1;
+        rho       <= unsigned(rho_7(RHO_W - 1 downto 0));
+        minus_rho <= resize(-rho_7, MINUS_RHO_W);
+        temp_lost <= lost_0;
       end if;
 
       if rst = '1' then
@@ -112,7 +105,6 @@ begin
     end if;
   end process;
 
-  r         <= wide;
   out_valid <= valid(LATENCY);
 
 end architecture rtl;

@@ -25,6 +25,7 @@ package fluxproof_pkg is
   constant FLUX_W : positive := 25;  -- S(1,23)
   constant FLUX_STATE_W : positive := 32;  -- S(1,30)
   constant RESISTANCE_W : positive := 24;  -- U(0,24)
+  constant RHO_W : positive := 22;  -- U(-2,24)
   constant MINUS_RHO_W : positive := 23;  -- S(-2,24)
   constant V_LEG_W : positive := 18;  -- S(-1,18)
   constant LIMIT_W : positive := 9;  -- U(1,8)
@@ -37,7 +38,7 @@ package fluxproof_pkg is
 
   -- fluxproof: clocks from the raw sample to the duties, shortest distance of two samples
   constant FLUXPROOF_SAMPLE_TO_DUTY : positive := 39;
-  constant FLUXPROOF_SAMPLE_INTERVAL : positive := 60;
+  constant FLUXPROOF_SAMPLE_INTERVAL : positive := 57;
 
   type sample_t is record
     adc_a         : unsigned(CODE_W - 1 downto 0);  -- ADC code, phase a
@@ -212,10 +213,13 @@ package fluxproof_pkg is
   );
 
   -- register_access: clocks that a write waits for the end of a sample
-  constant REGISTER_PATIENCE : positive := 76;
+  constant REGISTER_PATIENCE : positive := 73;
 
   -- multiply_add: the sums of products in all equations
   constant MULTIPLY_ADD_LATENCY : positive := 3;
+
+  -- sum_of_products: the rotations and cross products in all equations
+  constant SUM_OF_PRODUCTS_LATENCY : positive := 3;
 
   -- sqrt: 001, section 5.2: voltage limit of the current regulation
   constant SQRT_LATENCY : positive := 5;
@@ -307,35 +311,36 @@ package fluxproof_pkg is
   constant POSITION_LATENCY : positive := 2;
 
   -- speed: 001, section 5.1, speed by differentiating two consecutive samples
-  constant SPEED_LATENCY : positive := 6;
+  constant SPEED_LATENCY : positive := 7;
+  constant SPEED_OMEGA_W : natural := 31;
+  constant SPEED_TO_PU : natural := 12;
   constant SPEED_DROP_RAW : natural := 14;
   constant SPEED_DROP_STATE : natural := 4;
 
   -- u_dc_conditioning: 001, section 5.2, I/O conditioning
-  constant U_DC_CONDITIONING_LATENCY : positive := 6;
+  constant U_DC_CONDITIONING_LATENCY : positive := 7;
+  constant U_DC_CONDITIONING_AHEAD : natural := 3;
   constant U_DC_CONDITIONING_DROP_U_DC : natural := 15;
   constant U_DC_CONDITIONING_DROP_U_MAX : natural := 17;
 
   -- u_dc_processing: 001, section 5.2, U_dc processing
-  constant U_DC_PROCESSING_LATENCY : positive := 27;
+  constant U_DC_PROCESSING_LATENCY : positive := 26;
   constant U_DC_PROCESSING_N_MAX : natural := 5;
   constant U_DC_PROCESSING_U_DC_MIN : natural := 2048;
   constant U_DC_PROCESSING_SQRT3_2 : signed(17 downto 0) := to_signed(113512, 18);  -- 0.866025404 as U(0,17), signed for the multiplier
   constant U_DC_PROCESSING_DROP_BETA : natural := 17;
   constant U_DC_PROCESSING_INVERSE_W : natural := 22;
-  constant U_DC_PROCESSING_SHIFT_CLOCKS : natural := 3;
 
   -- clarke: 001, eq. (1): stator frame
   constant CLARKE_LATENCY : positive := 5;
   constant CLARKE_THIRD : signed(17 downto 0) := to_signed(87381, 18);  -- 0.333333333 as U(-1,18), signed for the multiplier
-  constant CLARKE_INV_SQRT3 : signed(17 downto 0) := to_signed(75674, 18);  -- 0.577350269 as U(0,17), signed for the multiplier
-  constant CLARKE_DROP_ALPHA : natural := 18;
-  constant CLARKE_DROP_BETA : natural := 17;
+  constant CLARKE_INV_SQRT12 : signed(17 downto 0) := to_signed(75674, 18);  -- 0.288675135 as U(-1,18), signed for the multiplier
+  constant CLARKE_DROP : natural := 18;
   constant CLARKE_VECTOR : natural := 90112;
 
   -- sincos: 001, eq. (12)
   constant SINCOS_LATENCY : positive := 13;
-  constant SINCOS_PASS : natural := 6;
+  constant SINCOS_SECOND : natural := 8;
   constant SINCOS_ADDRESS_BITS : natural := 10;
   constant SINCOS_DROP_PROD : natural := 18;
   constant SINCOS_TABLE_SHIFT : natural := 4;
@@ -482,17 +487,6 @@ package fluxproof_pkg is
     13x"0648", 13x"06ad", 13x"0712", 13x"0776", 13x"07db", 13x"083f", 13x"08a4", 13x"0908",
     13x"096d", 13x"09d1", 13x"0a36", 13x"0a9a", 13x"0aff", 13x"0b63", 13x"0bc8", 13x"0c2c"
   );
-  type sincos_minus_delta_t is array (0 to 63) of signed(12 downto 0);
-  constant SINCOS_MINUS_DELTA : sincos_minus_delta_t := (  -- S(-10,22)
-    13x"0c91", 13x"0c2c", 13x"0bc8", 13x"0b63", 13x"0aff", 13x"0a9a", 13x"0a36", 13x"09d1",
-    13x"096d", 13x"0908", 13x"08a4", 13x"083f", 13x"07db", 13x"0776", 13x"0712", 13x"06ad",
-    13x"0648", 13x"05e4", 13x"057f", 13x"051b", 13x"04b6", 13x"0452", 13x"03ed", 13x"0389",
-    13x"0324", 13x"02c0", 13x"025b", 13x"01f7", 13x"0192", 13x"012e", 13x"00c9", 13x"0065",
-    13x"0000", 13x"1f9b", 13x"1f37", 13x"1ed2", 13x"1e6e", 13x"1e09", 13x"1da5", 13x"1d40",
-    13x"1cdc", 13x"1c77", 13x"1c13", 13x"1bae", 13x"1b4a", 13x"1ae5", 13x"1a81", 13x"1a1c",
-    13x"19b8", 13x"1953", 13x"18ee", 13x"188a", 13x"1825", 13x"17c1", 13x"175c", 13x"16f8",
-    13x"1693", 13x"162f", 13x"15ca", 13x"1566", 13x"1501", 13x"149d", 13x"1438", 13x"13d4"
-  );
 
   -- rotate: 001, eq. (9): T_dq/alphabeta
   constant ROTATE_LATENCY : positive := 5;
@@ -514,9 +508,9 @@ package fluxproof_pkg is
   constant CURRENT_PI_PROPORTIONAL_W : natural := 38;
 
   -- chord_speed: 001, eq. (2), for a voltage that is held during a sample
-  constant CHORD_SPEED_LATENCY : positive := 9;
-  constant CHORD_SPEED_DROP_SQUARE : natural := 18;
-  constant CHORD_SPEED_DROP_PART : natural := 17;
+  constant CHORD_SPEED_LATENCY : positive := 10;
+  constant CHORD_SPEED_RAISE_SQUARE : natural := 2;
+  constant CHORD_SPEED_RAISE_PART : natural := 3;
   constant CHORD_SPEED_DROP : natural := 20;
 
   -- decoupling: 001, eq. (2), 'dq decoupling term' of Fig. 8
@@ -527,7 +521,7 @@ package fluxproof_pkg is
   constant VOLTAGE_LIMIT_LATENCY : positive := 10;
 
   -- svm_delay_compensation: 001, section 5.2, SVM delay compensation
-  constant SVM_DELAY_COMPENSATION_LATENCY : positive := 1;
+  constant SVM_DELAY_COMPENSATION_LATENCY : positive := 3;
   constant SVM_DELAY_COMPENSATION_DROP : natural := 15;
 
   -- inverse_park: 001, eq. (9): T_dq/alphabeta
@@ -564,7 +558,7 @@ package fluxproof_pkg is
   constant APPLIED_VOLTAGE_TO_FLUX : natural := 1;
 
   -- current_model: 001, eq. (6); with lambda_add the last term of eq. (16)
-  constant CURRENT_MODEL_LATENCY : positive := 5;
+  constant CURRENT_MODEL_LATENCY : positive := 2;
 
   -- flux_rotate: 001, eq. (9): T_dq/alphabeta
   constant FLUX_ROTATE_LATENCY : positive := 6;
@@ -589,13 +583,11 @@ package fluxproof_pkg is
 
   -- flux_models: 001, eq. (6) and (11)
   constant FLUX_MODELS_LATENCY : positive := 4;
-  constant FLUX_MODELS_MODEL_FLUX_W : natural := 31;
-  constant FLUX_MODELS_MERGED_FLUX_W : natural := 27;
-  constant FLUX_MODELS_RAISED_W : natural := 26;
-  constant FLUX_MODELS_SHIFT_MODEL : natural := 13;
-  constant FLUX_MODELS_DROP_MODEL : natural := 12;
+  constant FLUX_MODELS_MODEL_FLUX_W : natural := 43;
+  constant FLUX_MODELS_MERGED_FLUX_W : natural := 43;
+  constant FLUX_MODELS_SHIFT_MG : natural := 20;
+  constant FLUX_MODELS_DROP_MODEL : natural := 13;
   constant FLUX_MODELS_DROP_MERGED : natural := 17;
-  constant FLUX_MODELS_HALF_PU : natural := 64;
   constant FLUX_MODELS_CURRENT_MODEL : natural := 0;
   constant FLUX_MODELS_EARLIER : natural := 2;
   constant FLUX_MODELS_PROPOSED : natural := 3;
@@ -626,7 +618,7 @@ package fluxproof_pkg is
   constant FLUX_COMPENSATION_FORGET : natural := 8;
 
   -- torque: 001, eq. (4)
-  constant TORQUE_LATENCY : positive := 7;
+  constant TORQUE_LATENCY : positive := 5;
   constant TORQUE_DROP : natural := 16;
 
   -- flux_monitor: none: protection and diagnosis of the drive
@@ -641,7 +633,7 @@ package fluxproof_pkg is
   constant CURRENT_DIRECTIONS_DROP : natural := 13;
 
   -- dead_time_compensation: 000, section V.B, step d
-  constant DEAD_TIME_COMPENSATION_LATENCY : positive := 4;
+  constant DEAD_TIME_COMPENSATION_LATENCY : positive := 5;
   constant DEAD_TIME_COMPENSATION_DROP : natural := 18;
 
   -- clean_voltage: 000, eq. (4); 001, eq. (5): the voltage without the inverter's distortion
@@ -680,7 +672,7 @@ package fluxproof_pkg is
   -- telemetry_words: none: recording of samples
   constant TELEMETRY_WORDS_LATENCY : positive := 2;
   constant TELEMETRY_WORDS_COUNT : natural := 24;
-  constant TELEMETRY_WORDS_START : natural := 39;
+  constant TELEMETRY_WORDS_START : natural := 36;
   constant TELEMETRY_WORDS_INDEX_W : natural := 5;
 
   -- telemetry: none: recording of samples

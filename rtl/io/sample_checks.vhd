@@ -49,38 +49,44 @@ architecture rtl of sample_checks is
   constant LATENCY : positive := SAMPLE_CHECKS_LATENCY;
   constant DROP    : natural  := SAMPLE_CHECKS_DROP_LIMIT;
 
-  -- State
-  signal code     : unsigned(TURN_W - 1 downto 0);
-  signal expected : unsigned(TURN_W - 1 downto 0);
-  signal seen     : unsigned(1 downto 0);
-  signal railed   : unsigned(3 downto 0);
+  type state_t is record
+    code     : unsigned(TURN_W - 1 downto 0);
+    expected : unsigned(TURN_W - 1 downto 0);
+    seen     : unsigned(1 downto 0);
+    railed   : unsigned(3 downto 0);
+  end record state_t;
 
-  signal valid     : std_logic_vector(0 to LATENCY);
-  signal a_0       : signed(LIMIT_W downto 0);
-  signal b_0       : signed(LIMIT_W downto 0);
-  signal c_0       : signed(LIMIT_W downto 0);
-  signal bus_0     : unsigned(LIMIT_W - 1 downto 0);
-  signal code_0    : unsigned(TURN_W - 1 downto 0);
-  signal at_rail_0 : std_logic;
-  signal at_rail_1 : std_logic;
-  signal railed_1  : unsigned(3 downto 0);
-  signal pair_1    : signed(LIMIT_W + 2 downto 0);
-  signal away_1    : signed(TURN_W - 1 downto 0);
-  signal known_1   : std_logic;
-  signal sum_2     : signed(LIMIT_W + 2 downto 0);
-  signal off_2     : signed(TURN_W - 1 - SAMPLE_CHECKS_DROP_JUMP downto 0);
-  signal over_3    : unsigned(2 downto 0);
-  signal checks_3  : unsigned(5 downto 1);
-  signal faults_3  : unsigned(5 downto 0);
+  signal state : state_t;
 
+  signal valid        : std_logic_vector(0 to LATENCY);
+  signal a_0          : signed(LIMIT_W downto 0);
+  signal b_0          : signed(LIMIT_W downto 0);
+  signal c_0          : signed(LIMIT_W downto 0);
+  signal bus_0        : unsigned(LIMIT_W - 1 downto 0);
+  signal code_0       : unsigned(TURN_W - 1 downto 0);
+  signal at_rail_0    : std_logic;
+  signal pair_1       : signed(LIMIT_W + 2 downto 0);
+  signal at_rail_1    : std_logic;
+  signal away_1       : signed(TURN_W - 1 downto 0);
+  signal known_1      : std_logic;
+  signal sum_2        : signed(LIMIT_W + 2 downto 0);
+  signal off_2        : signed(TURN_W - 1 - SAMPLE_CHECKS_DROP_JUMP downto 0);
+  signal over_a_3     : std_logic;
+  signal over_b_3     : std_logic;
+  signal over_c_3     : std_logic;
+  signal unbalanced_3 : std_logic;
+  signal stuck_3      : std_logic;
+  signal low_3        : std_logic;
+  signal high_3       : std_logic;
+  signal jumped_3     : std_logic;
+  signal faults_3     : unsigned(5 downto 0);
+
+  -- '1' if |x| >= limit, |x| being the one's complement where x is negative
   function reaches (x : signed; limit : unsigned) return std_logic is
-    variable magnitude : signed(x'length - 1 downto 0);
+    variable size : signed(x'length - 1 downto 0);
   begin
-    magnitude := x;
-    if magnitude(magnitude'high) = '1' then
-      magnitude := not magnitude;
-    end if;
-    if limit <= unsigned(magnitude) then
+    size := x xor x(x'high);
+    if unsigned(size) >= limit then
       return '1';
     end if;
     return '0';
@@ -88,15 +94,10 @@ architecture rtl of sample_checks is
 
   -- The same for wide numbers, only the sign of the difference: nothing follows the carry chain
   function reaches_wide (x : signed; limit : unsigned) return std_logic is
-    variable magnitude : signed(x'length downto 0);
-    variable beyond    : signed(x'length downto 0);
+    variable room : signed(x'length downto 0);
   begin
-    magnitude := resize(x, x'length + 1);
-    if x(x'high) = '1' then
-      magnitude := not magnitude;
-    end if;
-    beyond := magnitude - signed(resize(limit, x'length + 1));
-    return not beyond(beyond'high);
+    room := resize(x xor x(x'high), x'length + 1) - signed(resize(limit, x'length + 1));
+    return not room(room'high);
   end function;
 
   function less (x : unsigned; limit : unsigned) return std_logic is
@@ -115,48 +116,48 @@ begin
   bus_0     <= u_dc(DUTY_W - 1 downto DROP);
   code_0    <= shift_left(resize(code_theta, TURN_W), TURN_W - POSITION_BITS);
   at_rail_0 <= (or current_at_rail) or u_dc_at_rail;
-  railed_1  <= railed when railed = 15 else railed + 1;
+  off_2     <= away_1(TURN_W - 1 downto SAMPLE_CHECKS_DROP_JUMP);
 
-  off_2    <= away_1(TURN_W - 1 downto SAMPLE_CHECKS_DROP_JUMP);
-  faults_3 <= checks_3 & (or over_3);
+  faults_3 <= jumped_3 & high_3 & low_3 & stuck_3 & unbalanced_3 & (over_a_3 or over_b_3 or over_c_3);
 
   process (clk)
   begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stage 1: deviation of the code from the expected one; expected = 2*code - code' for the next sample;  i_a + i_b
+      -- Stage 1: pair = a + b;  away = code - expected;  expected = 2*code - code' for the next sample
       if valid(0) = '1' then
-        pair_1    <= resize(a_0, LIMIT_W + 3) + b_0;
-        away_1    <= signed(code_0 - expected);
-        known_1   <= '1' when seen = SAMPLE_CHECKS_WARM else '0';
-        code      <= code_0;
-        expected  <= shift_left(code_0, 1) - code;
-        at_rail_1 <= at_rail_0;
-        if seen /= SAMPLE_CHECKS_WARM then
-          seen <= seen + 1;
+        pair_1         <= resize(a_0, LIMIT_W + 3) + b_0;
+        at_rail_1      <= at_rail_0;
+        away_1         <= signed(code_0 - state.expected);
+        known_1        <= '1' when state.seen = SAMPLE_CHECKS_WARM else '0';
+        state.code     <= code_0;
+        state.expected <= shift_left(code_0, 1) - state.code;
+        if state.seen /= SAMPLE_CHECKS_WARM then
+          state.seen <= state.seen + 1;
         end if;
       end if;
 
-      -- Stage 2: i_a + i_b + i_c;  consecutive samples at the rail
+      -- Stage 2: sum = a + b + c;  railed = consecutive samples at the rail, 15 at most
       if valid(1) = '1' then
-        sum_2  <= pair_1 + c_0;
-        railed <= (others => '0');
-        if at_rail_1 = '1' then
-          railed <= railed_1;
+        sum_2 <= pair_1 + c_0;
+        if at_rail_1 = '0' then
+          state.railed <= (others => '0');
+        elsif state.railed /= 15 then
+          state.railed <= state.railed + 1;
         end if;
       end if;
 
       -- Stage 3: comparisons with the limits
       if valid(2) = '1' then
-        over_3(0)   <= reaches(a_0, i_trip);
-        over_3(1)   <= reaches(b_0, i_trip);
-        over_3(2)   <= reaches(c_0, i_trip);
-        checks_3(1) <= reaches_wide(sum_2, sum_trip);
-        checks_3(2) <= '1' when railed > 0 and railed >= rail_samples else '0';
-        checks_3(3) <= less(bus_0, u_dc_min);
-        checks_3(4) <= not less(bus_0, u_dc_max);
-        checks_3(5) <= reaches_wide(off_2, jump_max) and known_1;
+        over_a_3     <= reaches(a_0, i_trip);
+        over_b_3     <= reaches(b_0, i_trip);
+        over_c_3     <= reaches(c_0, i_trip);
+        unbalanced_3 <= reaches_wide(sum_2, sum_trip);
+        stuck_3      <= '1' when state.railed > 0 and state.railed >= rail_samples else '0';
+        low_3        <= less(bus_0, u_dc_min);
+        high_3       <= not less(bus_0, u_dc_max);
+        jumped_3     <= reaches_wide(off_2, jump_max) and known_1;
       end if;
 
       -- Stage 4: faults of this sample
@@ -167,10 +168,7 @@ begin
 
       if rst = '1' then
         valid(1 to LATENCY) <= (others => '0');
-        code                <= (others => '0');
-        expected            <= (others => '0');
-        seen                <= (others => '0');
-        railed              <= (others => '0');
+        state               <= (others => (others => '0'));
         sample_faults       <= (others => '0');
         sample_trip         <= '0';
       end if;

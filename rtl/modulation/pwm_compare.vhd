@@ -1,8 +1,9 @@
 -- Purpose: duties to compare values of the carrier, compare = duty * CARRIER_HALF, short pulses dropped.
 --   2*compare < min_pulse: 0;  CARRIER_HALF - compare < min_pulse: CARRIER_HALF
 -- Each low end of a period counts alone, because the period before or after may be high throughout.
+-- One pipeline for the three legs: a, then b and c, each a clock later.
 -- Formats: duty U(1,16), 0 to 1; compare 0 to CARRIER_HALF; min_pulse in clocks.
--- Latency: 7 (legs a, b, c one after the other).  Interval: 3.  The three values change together.
+-- Latency: 7.  Interval: 3.  The three values change together.
 -- Rounding: half up to whole clocks; no overflow, duty <= 1.
 
 library ieee;
@@ -31,31 +32,42 @@ entity pwm_compare is
 end entity pwm_compare;
 
 architecture rtl of pwm_compare is
-  constant LATENCY : positive              := PWM_COMPARE_LATENCY;
-  constant HALF    : unsigned(15 downto 0) := to_unsigned(CARRIER_HALF, 16);
+  constant LATENCY  : positive              := PWM_COMPARE_LATENCY;
+  constant HALF     : unsigned(15 downto 0) := to_unsigned(CARRIER_HALF, 16);
+  constant RESULT_W : positive              := 19 + DUTY_W - PWM_COMPARE_DROP;  -- nothing to saturate
 
-  signal valid       : std_logic_vector(0 to LATENCY);
-  signal duty_0      : unsigned(DUTY_W - 1 downto 0);
-  signal duty_1      : unsigned(DUTY_W - 1 downto 0);
-  signal min_pulse_1 : unsigned(11 downto 0);
-  signal prod_2      : signed(DUTY_W + 17 downto 0);
-  signal min_pulse_2 : unsigned(11 downto 0);
-  signal compare_3   : unsigned(15 downto 0);
-  signal min_pulse_3 : unsigned(11 downto 0);
-  signal longest_3   : signed(17 downto 0);
-  signal high_end_3  : signed(17 downto 0);
-  signal compare_4   : unsigned(15 downto 0);
-  signal short_4     : std_logic;
-  signal long_4      : std_logic;
-  signal dropped_4   : unsigned(15 downto 0);
-  signal kept_a_5    : unsigned(15 downto 0);
-  signal kept_b_6    : unsigned(15 downto 0);
+  constant NOTHING : signed(0 downto 0) := "0";
+
+  signal valid     : std_logic_vector(0 to LATENCY);
+  signal duty_0    : signed(DUTY_W downto 0);
+  signal by_half   : signed(16 downto 0);
+  signal result_3  : signed(RESULT_W - 1 downto 0);
+  signal compare_3 : unsigned(15 downto 0);
+  signal longest   : signed(17 downto 0);  -- from clock 1 on
+  signal room_3    : signed(17 downto 0);
+  signal compare_4 : unsigned(15 downto 0);
+  signal short_4   : std_logic;
+  signal long_4    : std_logic;
+  signal dropped_4 : unsigned(15 downto 0);
+  signal kept_a_5  : unsigned(15 downto 0);
+  signal kept_b_6  : unsigned(15 downto 0);
 begin
   valid(0) <= in_valid;
 
-  duty_0 <= duty_b when valid(1) = '1' else duty_c when valid(2) = '1' else duty_a;
+  -- The leg that enters: a, then b, then c
+  duty_0  <= signed('0' & duty_b) when valid(1) = '1' else signed('0' & duty_c) when valid(2) = '1' else
+             signed('0' & duty_a);
+  by_half <= signed('0' & HALF);
+
+  -- Stages 1 to 3: compare = duty*CARRIER_HALF in clocks
+  compare_part : entity work.multiply_add
+    generic map (DROP => PWM_COMPARE_DROP)
+    port map (clk => clk, a => duty_0, b => by_half, c => NOTHING, y => result_3, limited => open);
+
+  compare_3 <= unsigned(result_3(15 downto 0));
+
   -- Negative if the low end is too short; only the sign is used, so that nothing follows the carry chain
-  high_end_3 <= longest_3 - signed(resize(compare_3, 18));
+  room_3 <= longest - signed(resize(compare_3, 18));
 
   dropped_4 <= to_unsigned(0, 16) when short_4 = '1' else HALF when long_4 = '1' else compare_4;
 
@@ -64,33 +76,15 @@ begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stage 1: selection of the leg
-      if valid(0) = '1' or valid(1) = '1' or valid(2) = '1' then
-        duty_1      <= duty_0;
-        min_pulse_1 <= min_pulse;
-      end if;
+      -- Stage 1: longest = CARRIER_HALF - min_pulse
+      longest <= signed(resize(HALF, 18)) - signed(resize(min_pulse, 18));
 
-      -- Stage 2: prod = duty * CARRIER_HALF
-      if valid(1) = '1' or valid(2) = '1' or valid(3) = '1' then
-        prod_2      <= signed('0' & duty_1) * signed('0' & HALF);
-        min_pulse_2 <= min_pulse_1;
-      end if;
+      -- Stage 4: whether the high pulse or a low end is too short
+      compare_4 <= compare_3;
+      short_4   <= '1' when (compare_3 & '0') < min_pulse else '0';
+      long_4    <= room_3(17);
 
-      -- Stage 3: compare = prod in clocks;  longest = CARRIER_HALF - min_pulse
-      if valid(2) = '1' or valid(3) = '1' or valid(4) = '1' then
-        compare_3   <= resize(unsigned(round_half_up(prod_2, PWM_COMPARE_DROP)), 16);
-        min_pulse_3 <= min_pulse_2;
-        longest_3   <= signed(resize(HALF, 18)) - signed(resize(min_pulse_2, 18));
-      end if;
-
-      -- Stage 4: whether a low or a high pulse is too short
-      if valid(3) = '1' or valid(4) = '1' or valid(5) = '1' then
-        compare_4 <= compare_3;
-        short_4   <= '1' when (compare_3 & '0') < min_pulse_3 else '0';
-        long_4    <= high_end_3(17);
-      end if;
-
-      -- Stage 5: short pulses dropped; a and b wait for c
+      -- Stages 5, 6, 7: short pulses dropped;  a and b wait for c
       if valid(4) = '1' then
         kept_a_5 <= dropped_4;
       end if;

@@ -1,7 +1,7 @@
 -- Purpose: angle at which the voltage will act, theta_out = theta_me + k_delay*omega_me, modulo one turn.
 -- k_delay = 1.5*T_s*omega_base/(2*pi): a duty acts on average 1.5 sample times after the sampling instant.
 -- Formats: theta TURN U(0,18), omega_me PU, k_delay U(0,17).
--- Latency: 1 (the sum follows the register of the product).
+-- Latency: 3.
 -- Rounding: product half up to TURN; the sum wraps, it is an angle.
 
 library ieee;
@@ -25,26 +25,31 @@ end entity svm_delay_compensation;
 
 architecture rtl of svm_delay_compensation is
   constant LATENCY : positive := SVM_DELAY_COMPENSATION_LATENCY;
+  constant SUM_W   : positive := PU_W + 19;
 
   signal valid   : std_logic_vector(0 to LATENCY);
-  signal prod_1  : signed(PU_W + 17 downto 0);
+  signal omega_1 : signed(PU_W - 1 downto 0);
   signal theta_1 : unsigned(TURN_W - 1 downto 0);
-  signal sum_1   : signed(PU_W + 17 downto 0);
+  signal prod_2  : signed(PU_W + 17 downto 0);
+  signal theta_2 : unsigned(TURN_W - 1 downto 0);
+  signal sum_3   : signed(SUM_W - 1 downto 0);
 begin
   valid(0) <= in_valid;
-
-  -- theta_me + prod plus half an LSB for the rounding; the slice below is the angle modulo one turn
-  sum_1 <= prod_1 + (signed(theta_1) & half(SVM_DELAY_COMPENSATION_DROP, SVM_DELAY_COMPENSATION_DROP));
 
   process (clk)
   begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stage 1: prod = omega_me * k_delay
-      if valid(0) = '1' then
-        prod_1  <= omega_me * signed('0' & k_delay);
-        theta_1 <= theta_me;
+      -- Stages 1, 2: prod = omega_me*k_delay
+      omega_1 <= omega_me;
+      theta_1 <= theta_me;
+      prod_2  <= omega_1 * signed('0' & k_delay);
+      theta_2 <= theta_1;
+
+      -- Stage 3: sum = theta_me + prod, at the scale of the product and with half an LSB of the angle
+      if valid(2) = '1' then
+        sum_3 <= rounding_base(signed('0' & theta_2), SVM_DELAY_COMPENSATION_DROP, SUM_W) + prod_2;
       end if;
 
       if rst = '1' then
@@ -54,6 +59,6 @@ begin
   end process;
 
   out_valid <= valid(LATENCY);
-  theta_out <= unsigned(sum_1(SVM_DELAY_COMPENSATION_DROP + TURN_W - 1 downto SVM_DELAY_COMPENSATION_DROP));
+  theta_out <= unsigned(sum_3(SVM_DELAY_COMPENSATION_DROP + TURN_W - 1 downto SVM_DELAY_COMPENSATION_DROP));
 
 end architecture rtl;

@@ -187,8 +187,8 @@ PROOFS = (
         Fault(
             "pulses dropped by half their length",
             COMPARE,
-            "(compare_3 & '0') < min_pulse_3",
-            "('0' & compare_3(15 downto 1)) + 1 < min_pulse_3(11 downto 3)",
+            "(compare_3 & '0') < min_pulse",
+            "('0' & compare_3(15 downto 1)) + 1 < min_pulse(11 downto 3)",
         ),
         method="induction",
     ),

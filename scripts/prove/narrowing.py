@@ -30,6 +30,9 @@ REPORTS = {
     "clamp": ("x'length", "lo'length", "hi'length"),
     "plus_rounded": ("a'length", "v'length", "drop"),
     "minus_rounded": ("a'length", "v'length", "drop"),
+    "minus_half_up": ("x'length", "drop"),
+    "turned_half_up": ("x'length", "drop"),
+    "difference": ("a'length", "b'length"),
 }
 
 # A function that the core does not use at present is proved in one combination.
@@ -42,6 +45,9 @@ UNUSED = {
     "clamp": (20, 20, 20),
     "plus_rounded": (24, 20, 4),
     "minus_rounded": (24, 20, 4),
+    "minus_half_up": (20, 4),
+    "turned_half_up": (20, 4),
+    "difference": (20, 18),
 }
 
 REPORTER = """
@@ -72,7 +78,14 @@ FAULTS = {
     ),
     "clamp": Fault("no upper limit", PACKAGE, "return resize(hi, x'length);", "return x;"),
     "plus_rounded": Fault("half lost", PACKAGE, "sum := (a & '1')", "sum := (a & '0')"),
-    "minus_rounded": Fault("half added", PACKAGE, "difference := (a & '0')", "difference := (a & '1')"),
+    "minus_rounded": Fault("half added", PACKAGE, "rest := (a & '0')", "rest := (a & '1')"),
+    "minus_half_up": Fault("half missing", PACKAGE, "+ not half(drop, x'length + 1);", "- 1;"),
+    "turned_half_up": Fault(
+        "complement taken for the negative", PACKAGE, "one_more(0) := minus;", "one_more(0) := '0';"
+    ),
+    "difference": Fault(
+        "complement taken for the negative", PACKAGE, "((not resize(b, WIDTH)) & '1')", "((not resize(b, WIDTH)) & '0')"
+    ),
 }  # fmt: skip
 
 
@@ -111,6 +124,12 @@ def call(name: str, w: tuple[int, ...]) -> tuple[str, int, bool]:
     x = f"x({w[0] - 1} downto 0)"
     if name == "round_half_up":
         return f"round_half_up({x}, {w[1]})", w[0] + 1 - w[1], True
+    if name == "minus_half_up":
+        return f"minus_half_up({x}, {w[1]})", w[0] + 1 - w[1], True
+    if name == "turned_half_up":
+        return f"turned_half_up({x}, p(0), {w[1]})", w[0] + 1 - w[1], True
+    if name == "difference":
+        return f"difference({x}, p({w[1] - 1} downto 0))", max(w) + 1, True
     if name == "exceeds":
         return f"exceeds({x}, {w[1]})", 1, False
     if name == "round_sat":
@@ -176,6 +195,12 @@ def wanted(name: str, w: tuple[int, ...]) -> tuple[str, str]:
     x = cut("x", w[0])
     if name == "round_half_up":
         return rounded(x, w[1]), ""
+    if name == "minus_half_up":
+        return rounded(f"(-{x})", w[1]), ""
+    if name == "turned_half_up":
+        return f"(p[0] ? {rounded(f'(-{x})', w[1])} : {rounded(x, w[1])})", ""
+    if name == "difference":
+        return f"({x} - {cut('p', w[1])})", ""
     if name == "saturate":
         return limited(x, *limits(w[1])), ""
     if name == "saturate_u":

@@ -93,15 +93,19 @@ PATTERNS = (
     ("valid a clock early", "out_valid <= valid(LATENCY);", "out_valid <= valid(LATENCY - 1);"),
     ("valid a clock early", "out_valid   <= valid(LATENCY);", "out_valid   <= valid(LATENCY - 1);"),
     ("valid survives reset", "        valid(1 to LATENCY) <= (others => '0');\n", "        null;\n"),
-    ("valid survives reset", "        valid(1 to LATENCY)        <= (others => '0');\n", "        null;\n"),
     ("valid survives reset", "out_valid <= '0';", "null;"),
 )
 SOON = (
     ("first outputs reported with the last", "out_soon  <= valid(LATENCY - 1);", "out_soon  <= valid(LATENCY);"),
     (
         "first outputs reported late",
-        "out_soon  <= valid(LATENCY - SINCOS_PASS);",
-        "out_soon  <= valid(LATENCY - SINCOS_PASS + 1);",
+        "out_soon  <= valid(LATENCY - SINCOS_SECOND);",
+        "out_soon  <= valid(LATENCY - SINCOS_SECOND + 1);",
+    ),
+    (
+        "first outputs reported late",
+        "out_soon  <= valid(LATENCY - U_DC_CONDITIONING_AHEAD);",
+        "out_soon  <= valid(LATENCY - U_DC_CONDITIONING_AHEAD + 1);",
     ),
 )
 
@@ -166,7 +170,7 @@ def core_proof() -> Proof:
             Fault(
                 "angle does not wait for the reset",
                 "transforms/sincos.vhd",
-                "        valid(1 to LATENCY)        <= (others => '0');\n",
+                "        valid(1 to LATENCY) <= (others => '0');\n",
                 "        null;\n",
             ),
         ),

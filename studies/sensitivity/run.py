@@ -5,18 +5,22 @@ from __future__ import annotations
 import contextlib
 from pathlib import Path
 
+from fluxproof.diagnosis.answer.conclude import conclude, judge
+from fluxproof.diagnosis.balance.parts import sound
+from fluxproof.diagnosis.conventions.judge import preferred
+from fluxproof.diagnosis.conventions.tell import under
 from fluxproof.diagnosis.inference import constants
+from fluxproof.diagnosis.inference.posterior import Posterior
+from fluxproof.diagnosis.inference.problem import Setup
+from fluxproof.diagnosis.ingest.load import load_recording
+from fluxproof.diagnosis.ingest.restated import as_read
+from fluxproof.diagnosis.nominal import load_nominal
+from fluxproof.diagnosis.physics import explain, rows_of
+from studies.sensitivity.steps import Steps, recorded, varied
 
 FACTORS = (0.5, 2.0)
-# Read after the posterior is known, so that it need not be found again.
-OF_THE_ANSWER = (
-    "DOUBTED", "OPEN", "LIKELY", "USUAL", "IMITATION", "LIVES", "ELSEWHERE", "FLOOR", "VISIBLE", "SMALL", "HALF",
-    "FORMS_LEFT", "LOCKED", "LEAST_RIPPLE", "LEAST_SWING", "LEAST_TORQUE", "SWING",
-)  # fmt: skip
 # Read by the search of slow logs alone, of which the cases contain none.
 OF_SLOW_LOGS = ("SLOW_DC", "SLOW_U", "SLOW_CHANGE", "LEFTOVER", "FLOOR_SHARE", "NAMED_SHARE")
-# Read for one channel of the balance alone: without it, the answer cannot change.
-OF_A_CHANNEL = {"BALANCE_SUM": "sum", "BALANCE_TORQUE": "torque", "ALWAYS_LOADED": "torque"}
 
 
 def names() -> list[str]:
@@ -24,24 +28,68 @@ def names() -> list[str]:
     return [n for n in vars(constants) if n.isupper() and n not in OF_SLOW_LOGS]
 
 
-@contextlib.contextmanager
-def varied(name: str, factor: float):
-    """A constant multiplied by a factor, inside the block."""
-    value = getattr(constants, name)
-    setattr(constants, name, value * factor)
-    try:
-        yield
-    finally:
-        setattr(constants, name, value)
-
-
-def said(answer) -> dict:
+def said(verdict, effects, ambiguity) -> dict:
     """What counts as the same verdict: its kind, the names and the ambiguities."""
-    return {
-        "verdict": answer.verdict,
-        "names": sorted(e.name for e in answer.effects),
-        "ambiguity": sorted(sorted(group) for group in answer.ambiguity),
-    }
+    if verdict == "unexplained":
+        effects, ambiguity = [], []
+    return {"verdict": verdict, "names": sorted(effects), "ambiguity": sorted(sorted(g) for g in ambiguity)}
+
+
+def said_in_full(loaded, nominal) -> dict:
+    """What the whole diagnosis says."""
+    answer = explain(loaded, nominal)
+    return said(answer.verdict, [e.name for e in answer.effects], answer.ambiguity)
+
+
+class Case:
+    """One recording, of which every variation repeats only what depends on the constant that is varied."""
+
+    def __init__(self, folder: Path):
+        self.nominal = load_nominal(folder / "drive.toml")
+        path = next(p for p in sorted(folder.iterdir()) if p.stem == "recording")
+        self.loaded = [load_recording(path, self.nominal)]
+        self.fast = not any(r.slow or r.fatal for r in self.loaded)
+        self.steps, self.recordings = Steps(), None
+
+    def base(self) -> dict:
+        """What is said with the constants as they are."""
+        nominal = as_read(self.loaded, self.nominal)
+        self.recordings = sound(self.loaded, nominal)
+        self.rows, self.held = self.steps(_rows_of, self.recordings, nominal)
+        if self.steps.reads():
+            raise AssertionError(f"rows depend on {', '.join(sorted(self.steps.reads()))}")
+        out = self.said()
+        self.steps.lasting = False
+        return out
+
+    def said(self) -> dict:
+        """What is said now, as the diagnosis of fast recordings does (physics.py)."""
+        steps = self.steps
+        posterior = steps(Posterior, steps(Setup.of, self.rows, steps))
+        j = steps(judge, posterior, self.held)
+        plain = said(j.kind, j.names.confidence, j.names.open)
+        if j.kind == "no_mismatch":
+            return plain
+        found = steps(preferred, self.recordings, posterior, j.kind != "unexplained")
+        return steps(_under, found, posterior, self.held) if found[0] else plain
+
+    def varied(self, name, factor) -> dict:
+        """What is said with one constant multiplied by a factor."""
+        try:
+            with varied(name, factor):
+                return self.said()
+        finally:
+            self.steps.forget()
+
+
+def _rows_of(recordings, nominal):
+    return rows_of(recordings, nominal)
+
+
+def _under(found, posterior, held) -> dict:
+    readings, rivals, read = found
+    answer = under(readings, rivals, conclude(posterior, held), conclude(read, held))
+    return said(answer.verdict, [e.name for e in answer.effects], answer.ambiguity)
 
 
 def variations(chosen) -> list[tuple[str, float]]:
@@ -50,32 +98,31 @@ def variations(chosen) -> list[tuple[str, float]]:
 
 
 def answers_of(job) -> tuple[str, dict]:
-    """(case, {"base": said, "NAME x2": said, ...}) of (folder, constants); {} if the case has no fast recording."""
-    from fluxproof.diagnosis.answer.conclude import conclude
-    from fluxproof.diagnosis.balance.blocks import views_of
-    from fluxproof.diagnosis.balance.parts import sound
-    from fluxproof.diagnosis.ingest.load import load_recording
-    from fluxproof.diagnosis.nominal import load_nominal
-    from fluxproof.diagnosis.physics import explain, held_out
+    """(name, {"base": said, "NAME x2": said, ...}) of (name, folder, constants); {} without a fast recording."""
+    name, folder, chosen = job
+    case = Case(folder)
+    if not case.fast:
+        return name, {}
+    with recorded():
+        out = {"base": case.base()}
+        read = case.steps.reads()
+        for constant, factor in variations(chosen):
+            out[f"{constant} x{factor:g}"] = case.varied(constant, factor) if constant in read else out["base"]
+    return name, out
 
-    folder, chosen = Path(job[0]), job[1]
-    nominal = load_nominal(folder / "drive.toml")
-    path = next(p for p in sorted(folder.iterdir()) if p.stem == "recording")
-    recording = load_recording(path, nominal)
-    loaded = sound([recording], nominal)
-    if any(r.slow or r.fatal for r in loaded):
-        return folder.name, {}
-    answer, held = explain(loaded, nominal), held_out(views_of(loaded, nominal))
-    posterior, out = answer.search, {"base": said(answer)}
-    channels = {channel for channel, _, _ in posterior.best().problem.p.groups}
-    for name, factor in variations(chosen):
-        if OF_A_CHANNEL.get(name, "u") not in channels:
-            out[f"{name} x{factor:g}"] = out["base"]
-            continue
-        with varied(name, factor):
-            again = conclude(posterior, held) if name in OF_THE_ANSWER else explain(loaded, nominal)
-        out[f"{name} x{factor:g}"] = said(again)
-    return folder.name, out
+
+def differences(folder: Path, chosen) -> list[str]:
+    """Variations of a case whose answer is another one if nothing is reused; "base" among them."""
+    case, out = Case(folder), []
+    with recorded():
+        answers = {("base", 1.0): case.base()}
+        read = [name for name in chosen if name in case.steps.reads()]
+        answers |= {(name, factor): case.varied(name, factor) for name, factor in variations(read)}
+    for (name, factor), reused in answers.items():
+        with varied(name, factor) if name != "base" else contextlib.nullcontext():
+            if said_in_full(case.loaded, case.nominal) != reused:
+                out.append(f"{name} x{factor:g}")
+    return out
 
 
 def shares(cases: dict[str, dict], chosen) -> dict:
