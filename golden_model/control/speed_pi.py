@@ -61,7 +61,7 @@ def bound(_v, _state):
 
 
 def stimuli(rng, _config):
-    """Saturation in both directions with recovery, torque mode, stop and restart; gains of every size in use."""
+    """Saturation in both directions with recovery, torque mode, stop and restart; gains of every size; limits."""
     regs = {
         "speed_kp": 5 << 16,
         "speed_ki": 1 << 20,
@@ -82,6 +82,14 @@ def stimuli(rng, _config):
         for k in range(24):
             err = int(rng.uniform(-1, 1) * wide) if k % 8 else int(rng.integers(-1, 2))
             rows.append({"omega_ref": err + 77, "omega_me": 77, **regs, "speed_mode": int(k != 20)})
+    still, one = {**regs, "speed_ki": 0, "speed_mode": 1}, 1 << KP.frac_bits
+    ends = [(PU.lo, PU.hi, PU.hi), (PU.hi, PU.lo, PU.hi)]  # the error at its own ends, shown by gains up to one
+    ends += [(end + off, 0, 999) for off in range(-4, 5) for end in (999, -999)]  # the output at its limit
+    for omega_ref, omega_me, i_max in ends:
+        error = {**still, "omega_ref": omega_ref, "omega_me": omega_me, "i_max": i_max}
+        for kp, ki in ((one, 0), (one // 2, 0), (one * 5 // 8, 0), (0, one), (0, 0)):
+            rows += [{**error, "run": 0}, {**error, "speed_kp": kp, "speed_ki": ki}]
+            rows += [{**error, "speed_kp": kp, "speed_ki": 0}] * 2
     return rows
 
 

@@ -11,10 +11,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from fluxproof.golden_model.block import Block, Port
+from scripts.mutate.product import Product, bounded
 
 
-def miter(block: Block, config: Mapping[str, int], assumed: str, products: Sequence[tuple[int, int, int]]) -> str:
-    """Verilog of `miter`; ``products``: widths of the multipliers that were taken out of both.
+def miter(block: Block, config: Mapping[str, int], assumed: str, products: Sequence[Product]) -> str:
+    """Verilog of `miter`; ``products``: the multipliers that were taken out of both.
 
     assumed: an expression in the block's inputs that holds for every sample; after a clock without it nothing counts.
     """
@@ -22,7 +23,7 @@ def miter(block: Block, config: Mapping[str, int], assumed: str, products: Seque
     strobes = block.strobes and not block.clocked
     free = ["clk"] + ["any_rst"] * block.strobes + ["any_in_valid"] * strobes
     header = [f"input {name}" for name in free]
-    header += [f"input [{y - 1}:0] any_{k}_{n}" for k, (_, _, y) in enumerate(products) for n in ("gold", "gate")]
+    header += [f"input [{p.y - 1}:0] any_{k}_{n}" for k, p in enumerate(products) for n in ("gold", "gate")]
     header += [f"input signed [{p.fmt.width - 1}:0] any_{p.name}" for p in ports]
     driven = ["clk"] + ["rst"] * block.strobes + ["in_valid"] * strobes + [p.name for p in ports]
     shown = [(p.name, p.fmt.width) for p in outputs]
@@ -31,12 +32,13 @@ def miter(block: Block, config: Mapping[str, int], assumed: str, products: Seque
     for suffix in ("gold", "gate"):
         lines += [f"  wire [{width - 1}:0] {name}_{suffix};" for name, width in shown]
         wiring = [f".{name}({name})" for name in driven] + [f".{n}({n}_{suffix})" for n, _ in shown]
-        for k, (a, b, y) in enumerate(products):
-            lines += [f"  wire [{a - 1}:0] a_{k}_{suffix}; wire [{b - 1}:0] b_{k}_{suffix};"]
-            product, same = f"any_{k}_{suffix}", f"a_{k}_gold == a_{k}_gate && b_{k}_gold == b_{k}_gate"
+        for k, p in enumerate(products):
+            lines += [f"  wire [{p.a - 1}:0] a_{k}_{suffix}; wire [{p.b - 1}:0] b_{k}_{suffix};"]
+            product, same = f"free_{k}_{suffix}", f"a_{k}_gold == a_{k}_gate && b_{k}_gold == b_{k}_gate"
+            lines += bounded(p, product, f"any_{k}_{suffix}", f"a_{k}_{suffix}", f"b_{k}_{suffix}")
             if suffix == "gate":
-                product = f"({same} ? any_{k}_gold : {product})"
-            lines += [f"  wire [{y - 1}:0] y_{k}_{suffix} = {product};"]
+                product = f"({same} ? y_{k}_gold : {product})"
+            lines += [f"  wire [{p.y - 1}:0] y_{k}_{suffix} = {product};"]
             wiring += [f".product_{k}_{port.upper()}({port}_{k}_{suffix})" for port in "aby"]
         lines += [f"  {suffix} {suffix}({', '.join(wiring)});"]
     lines += ["  reg legal = 1;", f"  wire allowed = legal & ({assumed or 1});"]

