@@ -103,9 +103,14 @@ def main() -> int:
     unnoticed = []
     if not arguments.only:
         with ThreadPoolExecutor(arguments.jobs) as pool:
-            for defect, by in zip(defects.DEFECTS, pool.map(defects.noticed_by, defects.DEFECTS), strict=True):
-                print(f"{'noticed ' if by else 'SURVIVED'} rtl/{defect.file}: {defect.says}", flush=True)
-                unnoticed += [] if by else [defect.says]
+            asked = [pool.submit(defects.noticed_by, defect) for defect in defects.DEFECTS]
+            for defect, future in zip(defects.DEFECTS, asked, strict=True):
+                try:
+                    said = "noticed " if future.result() else "SURVIVED"
+                except (RuntimeError, ValueError, OSError) as why:
+                    said, failed[defect.says] = "FAILED  ", str(why)[-1000:]
+                print(f"{said} rtl/{defect.file}: {defect.says}", flush=True)
+                unnoticed += [defect.says] * (said == "SURVIVED")
     result = summary(found, arguments.seed, time.monotonic() - began)
     result["failed"] = failed
     result["defects"] = {"planted": 0 if arguments.only else len(defects.DEFECTS), "unnoticed": unnoticed}
