@@ -183,6 +183,19 @@ def stimuli(rng, _config):
     for k_lp, u_pi_d, d_d, run in 3 * past_its_end:  # three times: a reset may occur between
         end = {**calm, **gains, "eta_v": ETA_V_MAX, "run": run}
         rows.append({**end, "k_lp": k_lp, "u_pi_d": u_pi_d, "d_d": d_d})  # shows one sample later
+    free = {**calm, **gains, "eta_v": ETA_V_MAX, "gamma": GAMMA.hi, "v_comp_max": V_LEVEL.hi}
+    for end, other in ((PU.lo, PU.hi), (PU.hi, PU.lo)):  # u_h or d_h at its own end, the rest small
+        for k in range(14):
+            for name, high in (("u_pi_d", PU.hi), ("d_d", D_D.high)):
+                far = {"u_pi_d": 0, "d_d": 0, name: min(max(end, -high), high)}
+                back = {"u_pi_d": 500, "d_d": 500, name: min(max(other, -high), high)}
+                rows += [{**free, **far, "k_lp": K_LP.hi, "v_comp_max": 0}] * 3
+                rows += [{**free, **back, "k_lp": 1 << k}] + [{**free, "k_lp": 1 << k, "d_d": 90 * k, "u_pi_d": 9}] * 2
+    for _ in range(80):  # at i_learn and beside it
+        i_d, i_q = (int(rng.integers(-size, size)) for size in (1 << rng.integers(1, 18, 2)))
+        off = int(rng.choice((0, 0, 1, -1, 1 << rng.integers(14))))
+        learn = min(max(abs(i_d) + abs(i_q) + off, 0), 131071)
+        rows.append({**free, "d_d": 30000 * (-1) ** len(rows), "u_pi_d": 900, "i_d": i_d, "i_q": i_q, "i_learn": learn})
     for k in range(12):  # between the limits, where every bit of the state counts
         free = {"k_lp": int(rng.integers(1 << (k + 9))), "eta_v": int(rng.integers(ETA_V_MAX)), "gamma": GAMMA.hi}
         free |= {"zeta": int(rng.integers(ZETA.hi)), "v_thr": int(rng.integers(1 << k)), "v_comp_max": V_LEVEL.hi}

@@ -18,7 +18,7 @@ from fluxproof.cosim.verilog import NoUsableGhdl, find_ghdl
 from fluxproof.files import write_json
 from scripts.mutate import defects
 from scripts.mutate.equivalent import DIFFERENT, EQUIVALENT, UNKNOWN
-from scripts.mutate.judge import KILLED, Verdicts, judge
+from scripts.mutate.judge import KILLED, Verdicts, judge, processor_s
 from scripts.mutate.subject import FOLDER, Core, Subject, subjects
 from scripts.mutate.table import reason
 
@@ -33,7 +33,7 @@ def block_of(verdicts: Verdicts) -> str:
 
 
 def summary(found: Sequence[Verdicts], seed: int, seconds: float) -> dict:
-    """The content of result.json; ``seconds``: by the clock on the wall."""
+    """The content of result.json; ``seconds``: by the clock on the wall; the processor's are those of all that ran."""
     per_block: dict[str, dict[str, int]] = {}
     survivors = []
     for verdicts in sorted(found, key=lambda v: v.name):
@@ -57,8 +57,7 @@ def summary(found: Sequence[Verdicts], seed: int, seconds: float) -> dict:
         row["without_reason"] += sum(not survivor["reason"] for survivor in left)
         survivors += left
     totals = {name: sum(row[name] for row in per_block.values()) for name in ("mutants", "killed", "equivalent")}
-    spent = sum(sum(verdicts.seconds.values()) for verdicts in found)
-    totals |= {"seed": seed, "seconds": round(seconds, 1), "processor_seconds": round(spent, 1)}
+    totals |= {"seed": seed, "seconds": round(seconds, 1), "processor_seconds": round(processor_s(), 1)}
     return totals | {"survivors": survivors, "per_block": per_block}
 
 
