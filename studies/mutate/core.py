@@ -21,8 +21,8 @@ from fluxproof.cosim.verilog import VerilogPort
 from fluxproof.golden_model import clocked
 from fluxproof.golden_model.fluxproof import REGISTERS, Observed
 from fluxproof.golden_model.io import sample_latch
-from scripts.mutate.harness import Trial
 from scripts.prove.pipeline import core_ends
+from studies.mutate.harness import Trial
 
 CARRIER_HALF = 128
 IN_RESET = 4
