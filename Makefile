@@ -77,7 +77,7 @@ faults: setup ## inject faults: sensors, bus, strobes, registers; RTL against go
 	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m studies.faults $(ARGS)
 
 mutate: setup ## draw faults at random in the netlist of every block and count those that its bench notices
-	$(PYTHON_RUN) -m studies.mutate $(ARGS)
+	$(PYTHON_RUN) -m scripts.mutate $(ARGS)
 
 prove: setup ## prove properties of the gates, the pipeline, the rounding, the buses, and show each a planted fault
 	$(PYTHON_RUN) -m scripts.prove $(ARGS)

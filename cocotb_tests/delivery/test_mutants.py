@@ -9,11 +9,11 @@ import pytest
 
 from cocotb_tests.support.needs import skip_without_ghdl5
 from fluxproof.checkout import RTL
-from studies.mutate import __main__ as command
-from studies.mutate import defects, table
-from studies.mutate.equivalent import DIFFERENT, EQUIVALENT, UNKNOWN
-from studies.mutate.judge import KILLED, WrongHarness, judge
-from studies.mutate.subject import Subject
+from scripts.mutate import __main__ as command
+from scripts.mutate import defects, table
+from scripts.mutate.equivalent import DIFFERENT, EQUIVALENT, UNKNOWN
+from scripts.mutate.judge import KILLED, WrongHarness, judge
+from scripts.mutate.subject import Subject
 
 SMALL = Subject("position", 2)
 
@@ -21,7 +21,7 @@ SMALL = Subject("position", 2)
 @pytest.fixture(autouse=True)
 def own_folder(monkeypatch, tmp_path):
     """A folder of its own, because a `make mutate` may run at the same time."""
-    monkeypatch.setattr("studies.mutate.subject.FOLDER", tmp_path)
+    monkeypatch.setattr("scripts.mutate.subject.FOLDER", tmp_path)
 
 
 @pytest.fixture

@@ -12,7 +12,7 @@ from fluxproof.cosim.stimulus import due, schedule
 from fluxproof.cosim.verilator import LIBRARY, compile_library
 from fluxproof.cosim.verilog import VerilogPort
 from fluxproof.golden_model.block import Block
-from studies.mutate.draw import TOP, Drawn, mutated
+from scripts.mutate.draw import TOP, Drawn, mutated
 
 WRAPPER = Path(__file__).with_name("judge.cpp")
 # Most mutants live for some hundred clocks: a quick build is worth more than a quick run.

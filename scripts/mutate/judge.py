@@ -10,9 +10,9 @@ from dataclasses import dataclass, field
 from functools import partial
 
 from fluxproof.files import write_text
-from studies.mutate import draw, equivalent, harness
-from studies.mutate.contract import miter
-from studies.mutate.subject import Core, Subject
+from scripts.mutate import draw, equivalent, harness
+from scripts.mutate.contract import miter
+from scripts.mutate.subject import Core, Subject
 
 PROOF_S = 2  # of processor time for one step of the proof of one mutant
 KILLED = "killed"

@@ -1,8 +1,8 @@
 """`make mutate`: draws mutants of every block and of the core's wiring; their benches must notice them.
 
 Writes build/mutate/result.json.  Exit status 1 if less than 99.5 % of the mutants that are not proved equivalent are
-noticed, or if one of the others has no reason (studies/mutate/table.py), or if a defect of the short list in the VHDL
-(studies/mutate/defects.py) is not noticed.
+noticed, or if one of the others has no reason (scripts/mutate/table.py), or if a defect of the short list in the VHDL
+(scripts/mutate/defects.py) is not noticed.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor, as_compl
 
 from fluxproof.cosim.verilog import NoUsableGhdl, find_ghdl
 from fluxproof.files import write_json
-from studies.mutate import defects
-from studies.mutate.equivalent import DIFFERENT, EQUIVALENT, UNKNOWN
-from studies.mutate.judge import KILLED, Verdicts, judge
-from studies.mutate.subject import FOLDER, Core, Subject, subjects
-from studies.mutate.table import reason
+from scripts.mutate import defects
+from scripts.mutate.equivalent import DIFFERENT, EQUIVALENT, UNKNOWN
+from scripts.mutate.judge import KILLED, Verdicts, judge
+from scripts.mutate.subject import FOLDER, Core, Subject, subjects
+from scripts.mutate.table import reason
 
 SEED = 1
 ENOUGH = 0.995  # of those not proved equivalent

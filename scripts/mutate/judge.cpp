@@ -1,6 +1,6 @@
 // Drives one mutated block with the schedule of its bench and looks for the first difference.
 //
-// studies/mutate/harness.py writes ports.inc with a line PORT(name, width, is_signed) for each port but the control
+// scripts/mutate/harness.py writes ports.inc with a line PORT(name, width, is_signed) for each port but the control
 // input, `mutant`, which selects one of the mutations in the netlist; 0 is none.  Rows are clock, port, value, sorted
 // by clock; a port is named by its line number, from 0.
 

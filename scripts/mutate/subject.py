@@ -12,8 +12,8 @@ from fluxproof.cosim.sources import rtl_sources
 from fluxproof.cosim.verilog import TOP, sources_of, synthesize, top_ports
 from fluxproof.golden_model.block import Block
 from fluxproof.golden_model.registry import BLOCKS
-from studies.mutate import core
-from studies.mutate.harness import BENCH_SEED, Trial, block_trial
+from scripts.mutate import core
+from scripts.mutate.harness import BENCH_SEED, Trial, block_trial
 
 FOLDER = BUILD / "mutate"
 LEAST, MOST = 40, 160  # mutants of a block

@@ -1,6 +1,6 @@
 """Proves for mutants that the bench does not notice that no bench could: equal wherever one compares.
 
-Yosys makes an and-inverter graph of each miter (studies/mutate/contract.py), with everything shared that the mutation
+Yosys makes an and-inverter graph of each miter (scripts/mutate/contract.py), with everything shared that the mutation
 does not reach.  Its flag never rises: ABC finds by induction over a clock what is equal in every clock (`scorr`), the
 flag and '0' among it, or searches for invariants by property directed reachability (`pdr`).
 """
@@ -17,9 +17,9 @@ from functools import partial
 from pathlib import Path
 
 from fluxproof.files import write_text
+from scripts.mutate.draw import Drawn, script
 from scripts.prove.abc_engine import CARRIER
 from scripts.synth.yosys import tool
-from studies.mutate.draw import Drawn, script
 
 FLAT = "flatten -noscopeinfo; memory_map; opt_clean; opt_expr; opt_clean; setundef -zero"
 # Registers start at 0 in both; what they may hold when a sample comes is what a reset leaves there, at any time.
