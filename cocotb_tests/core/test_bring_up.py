@@ -117,6 +117,7 @@ def test_torque_mode(board, drive, program):
     fast = board()
     done = fast.run(program, "0.5", "A", "10")
     assert done.returncode == 1 and re.search(r"1\d rpm, 10 allowed", done.stderr), done.stderr
+    fast.run_period()
     assert fast.gate_word == 0
 
 

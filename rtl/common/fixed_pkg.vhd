@@ -59,9 +59,6 @@ package fixed_pkg is
   -- a + round_half_up(v, drop) with one carry chain; the sum must fit the width of a.
   function plus_rounded (a : signed; v : signed; drop : positive) return signed;
 
-  -- a - round_half_up(v, drop) with one carry chain; the difference must fit the width of a.
-  function minus_rounded (a : signed; v : signed; drop : positive) return signed;
-
   -- a at the scale of a product that is cut by drop bits, plus the half that rounds it, for the adder of a multiplier:
   -- (rounding_base(a, drop, width) + v) / 2**drop = a + round_half_up(v, drop); a slice floors it.
   -- With not a instead of a the result is not (a - round_half_up(v, drop)), because that adder can only add.
@@ -219,14 +216,6 @@ package body fixed_pkg is
     -- The lowest bit of the sum is half an LSB of a; bits of v below it cannot affect the result.
     sum := (a & '1') + resize(v(v'high downto drop - 1), a'length + 1);
     return sum(a'length downto 1);
-  end function;
-
-  function minus_rounded (a : signed; v : signed; drop : positive) return signed is
-    variable rest : signed(a'length downto 0);
-  begin
-    -- Subtracting the rounded value needs no added half: the floor of the difference does it.
-    rest := (a & '0') - resize(v(v'high downto drop - 1), a'length + 1);
-    return rest(a'length downto 1);
   end function;
 
   function rounding_base (a : signed; drop : positive; width : positive) return signed is

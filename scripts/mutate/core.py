@@ -1,9 +1,8 @@
 """The wiring of the whole core: mutants of the top's own cells and connections, judged by the golden core.
 
-Four runs, each clock of them compared: every operating condition in 50 ms in closed loop (cosim/scenarios.py,
-`compressed`), the same with bits of some settings inverted from time to time, the tour through the faults
-(studies/faults), and samples with any settings.  Inputs and expected outputs come from the golden core alone, by the
-names of the ports.
+Three runs, each clock of them compared: every operating condition in 50 ms in closed loop (cosim/scenarios.py,
+`compressed`), the same with bits of some settings inverted from time to time, and samples with any settings.  Inputs
+and expected outputs come from the golden core alone, by the names of the ports.
 """
 
 from __future__ import annotations
@@ -113,19 +112,6 @@ def beside(settings, count: int, rng: np.random.Generator):
         other = value ^ (1 << int(rng.integers(port.fmt.width - bool(port.fmt.signed))))
         changed[name] = other if port.low <= other <= port.high else value
     return settings._replace(**changed)
-
-
-def fault_tour() -> Recorder:
-    """The tour through the faults."""
-    from studies.faults.bench import run, setup
-    from studies.faults.cases import tour
-    from studies.faults.cores import GoldenCore
-
-    drive, register_set = setup(CARRIER_HALF)
-    golden = GoldenCore(register_set)
-    golden.core = Recorder(register_set.values, register_set.config)
-    run(tour(), golden, drive, register_set)
-    return golden.core
 
 
 def any_settings() -> Recorder:

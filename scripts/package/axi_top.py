@@ -39,7 +39,7 @@ GENERICS = {
     "ADC_BITS": ("integer range 12 to 16", 16, "width of the ADC codes"),
     "POSITION_BITS": ("integer range 8 to 18", 16, "width of the position code"),
     "CARRIER_HALF": ("integer range 8 to 32767", 10000, "half a PWM period in clocks"),
-    "ESTIMATORS": ("integer range 0 to 1", 1, "0: field-oriented control alone"),
+    "ESTIMATORS": ("integer range 0 to 1", 1, "0 leaves the estimators out"),
 }
 LEFT_AT_DEFAULT = {"DEPTH_BITS"}  # the telemetry's queue: 512 words are one block RAM
 LITE, CODE, POSITION = "31 downto 0", "ADC_BITS - 1 downto 0", "POSITION_BITS - 1 downto 0"

@@ -29,7 +29,6 @@ REPORTS = {
     "round_sat": ("x'length", "drop", "width"),
     "clamp": ("x'length", "lo'length", "hi'length"),
     "plus_rounded": ("a'length", "v'length", "drop"),
-    "minus_rounded": ("a'length", "v'length", "drop"),
     "minus_half_up": ("x'length", "drop"),
     "turned_half_up": ("x'length", "drop"),
     "difference": ("a'length", "b'length"),
@@ -44,7 +43,6 @@ UNUSED = {
     "round_sat": (20, 4, 12),
     "clamp": (20, 20, 20),
     "plus_rounded": (24, 20, 4),
-    "minus_rounded": (24, 20, 4),
     "minus_half_up": (20, 4),
     "turned_half_up": (20, 4),
     "difference": (20, 18),
@@ -78,7 +76,6 @@ FAULTS = {
     ),
     "clamp": Fault("no upper limit", PACKAGE, "return resize(hi, x'length);", "return x;"),
     "plus_rounded": Fault("half lost", PACKAGE, "sum := (a & '1')", "sum := (a & '0')"),
-    "minus_rounded": Fault("half added", PACKAGE, "rest := (a & '0')", "rest := (a & '1')"),
     "minus_half_up": Fault("half missing", PACKAGE, "+ not half(drop, x'length + 1);", "- 1;"),
     "turned_half_up": Fault(
         "complement taken for the negative", PACKAGE, "one_more(0) := minus;", "one_more(0) := '0';"
@@ -136,7 +133,7 @@ def call(name: str, w: tuple[int, ...]) -> tuple[str, int, bool]:
         return f"round_sat({x}, {w[1]}, {w[2]})", w[2], True
     if name == "clamp":
         return f"clamp({x}, p({w[1] - 1} downto 0), q({w[2] - 1} downto 0))", w[0], True
-    if name in ("plus_rounded", "minus_rounded"):
+    if name == "plus_rounded":
         return f"{name}(p({w[0] - 1} downto 0), x({w[1] - 1} downto 0), {w[2]})", w[0], True
     return f"{name}({x}, {w[1]})", w[1], name == "saturate"
 
@@ -212,9 +209,8 @@ def wanted(name: str, w: tuple[int, ...]) -> tuple[str, str]:
     if name == "clamp":
         low, high = cut("p", w[1]), cut("q", w[2])
         return f"({x} < {low} ? {low} : {x} > {high} ? {high} : {x})", f"{low} <= {high}"
-    sign = "+" if name == "plus_rounded" else "-"
     low, high = limits(w[0])
-    total = f"({cut('p', w[0])} {sign} {rounded(cut('x', w[1]), w[2])})"
+    total = f"({cut('p', w[0])} + {rounded(cut('x', w[1]), w[2])})"
     return total, f"{total} >= -64'sd{-low} && {total} <= 64'sd{high}"
 
 
@@ -250,8 +246,7 @@ def proof(name: str) -> Proof:
     assumed = {
         "clamp": "the lower limit is not above the upper one",
         "plus_rounded": "the sum fits, which the caller sees to",
-        "minus_rounded": "the difference fits, which the caller sees to",
-    }
+        }
     return Proof(
         name=f"narrowing_{name}",
         says=f"{name} gives the exact result, limited and never wrapped, in every combination of widths in use",

@@ -79,7 +79,8 @@ def convert(proof: Proof, generics: Mapping[str, int], rtl: Path, scratch: Path)
     """The Verilog of the proof's entity from the sources under ``rtl``."""
     sources = sources_of(proof.entity, rtl) if proof.vhdl is None else rtl_sources(rtl)
     if proof.vhdl is not None:
-        sources = [*(path for path in sources if path.stem.endswith("_pkg")), scratch / f"{proof.entity}.vhd"]
+        used = (path for path in sources if path.stem.endswith("_pkg") or path.parent.name == "common")
+        sources = [*used, scratch / f"{proof.entity}.vhd"]
         write_text(sources[-1], proof.vhdl())
     return synthesize(sources, proof.entity, generics)
 
