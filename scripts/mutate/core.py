@@ -87,7 +87,8 @@ class Recorder(GoldenClock):
 def every_event(inverted: int = 0) -> Recorder:
     """The scenario `compressed` in closed loop.
 
-    inverted: in every second period a bit is inverted in each of so many settings, where the range allows it.
+    inverted: in every second period a bit is inverted in each of so many settings, where the range allows it; now and
+    then the power stage trips.
     """
     run = closed_loop(str(DRIVES / "paper001.toml"), CARRIER_HALF, "compressed")
     golden = GoldenPeriods(run.registers)
@@ -98,7 +99,7 @@ def every_event(inverted: int = 0) -> Recorder:
     for k in range(len(scenario)):
         if inverted:
             golden.core.registers = beside(settings, inverted * (k % 2), rng)
-            golden.core.held = {"clear_trip": int(rng.integers(4) == 0)}
+            golden.core.held = {"clear_trip": int(rng.integers(4) == 0), "trip": int(rng.integers(100) == 0)}
         period = golden.run(plant.inputs(k), int(scenario.enable[k]))
         plant.advance(k, period.edge_clocks * (plant.period_s / period.clocks), period.gate_words)
     return golden.core
