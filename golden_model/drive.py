@@ -261,4 +261,6 @@ def with_carrier(drive, carrier_half):
     time and minimum pulse keep their values in seconds, so their number of clocks changes.
     """
     core = dataclasses.replace(drive.core, clock_hz=2.0 * carrier_half * drive.inverter.pwm_frequency_hz)
-    return dataclasses.replace(drive, core=core)
+    # Front ends whose own clock comes from the core's are not part of such a simulation: it starts at the codes.
+    encoder = drive.encoder if drive.encoder.clock_hz is None else Encoder()
+    return dataclasses.replace(drive, core=core, encoder=encoder, converters=Converters())
