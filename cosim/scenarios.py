@@ -120,4 +120,11 @@ def short(drive: Drive) -> Scenario:
     return scenario(drive, 0.03, rpm={0.0: 400, 0.02: -400}, load={0.01: 2.0})
 
 
-SCENARIOS = {"fig9": fig9, "short": short, "everything": everything, "compressed": compressed, "full_speed": full_speed, "tour": tour}
+SCENARIOS = {
+    "fig9": fig9,
+    "short": short,
+    "everything": everything,
+    "compressed": compressed,
+    "full_speed": full_speed,
+    "tour": tour,
+}

@@ -13,12 +13,14 @@ import numpy as np
 from fluxproof.cosim.closed_loop import Scenario
 from fluxproof.cosim.scenarios import RPM, scenario
 from fluxproof.golden_model.drive import Drive
+from fluxproof.golden_model.drive_keys import DriveError
 from fluxproof.golden_model.scaling import speed_gains
 from fluxproof.golden_model.units import from_si
 
 LOW, TOP, LOADED = 0.3, 0.8, 0.5  # of the rated speed, twice, and of the current limit
 OF_REACH = 0.9  # of the speed at which the loaded drive fills the voltage circle
 LONGEST_S = 1.0  # an acceleration that takes longer is one to a lower speed
+MOST_PERIODS = 1_000_000  # about half a minute of computing
 SETTLE = 30.0  # over the crossover of the speed loop [rad/s]: six time constants of its integral
 STEP_SAMPLES = 300  # before and after the step of the current
 STEP_OF_LIMIT = 0.3
@@ -82,7 +84,10 @@ def main_scene(drive: Drive) -> Scene:
 
 
 def speed_scene(drive: Drive) -> Scene:
-    """The scene of a drive with a speed loop."""
+    """The scene of a drive with a speed loop; DriveError without an inertia or a flux, or if it would take too long."""
+    for key in ("inertia_kgm2", "magnet_flux_wb"):
+        if getattr(drive.machine, key) <= 0.0:
+            raise DriveError(f"[machine] {key} = 0 is out of range: allowed is above 0, to simulate a speed loop")
     m, i_load = drive.machine, LOADED * drive.current_limit_a
     top = min(TOP * m.rated_speed_rad_s, OF_REACH * reach(drive, i_load))
     per_s = torque_per_a(drive) * drive.current_limit_a / m.inertia_kgm2  # acceleration [rad/s2]
@@ -105,6 +110,10 @@ def speed_scene(drive: Drive) -> Scene:
         first = round(now / drive.sample_time_s)
         now += length
         stages.append(Stage(name, first, round(now / drive.sample_time_s), speed / RPM, torque))
+    if stages[-1].end > MOST_PERIODS:
+        asked = f"a speed loop that crosses over at {crossover(drive) / 2.0 / math.pi:.3g} Hz"
+        least = "faster: see [control] speed_bandwidth_hz, speed_kp_as_per_rad"
+        raise DriveError(f"{asked} needs {stages[-1].end} PWM periods, allowed is up to {MOST_PERIODS}; {least}")
     t_s = drive.sample_time_s
     rpm = {s.first * t_s: s.reference for s in stages}
     loads = {s.first * t_s: s.load for s in stages}
