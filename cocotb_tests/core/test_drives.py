@@ -7,8 +7,9 @@ import pytest
 
 from cocotb_tests.core.test_drive_file import check_message
 from cocotb_tests.core.test_registers import PAPER
+from cocotb_tests.support.needs import skip_without_ghdl5
 from fluxproof.checkout import DRIVES
-from fluxproof.cosim.runs import InGhdl, Named
+from fluxproof.cosim.runs import InVerilator, Named
 from fluxproof.golden_model.drive import load, with_carrier
 from fluxproof.golden_model.registers import registers
 from fluxproof.plant import Sensors, position_code, sensor_params
@@ -19,9 +20,10 @@ NAMES = ("servo_24v", "hub_36v", "spindle_400v", "drone_24v")
 @pytest.mark.study
 @pytest.mark.parametrize("name", NAMES)
 def test_rtl_equals_golden_in_closed_loop(name):
-    """400 periods of the VHDL in GHDL with the plant of the drive: start, load, bus sag, torque mode, reversal, off."""
+    """400 periods of the converted RTL with the drive's plant: start, load, bus sag, torque mode, reversal, off."""
+    skip_without_ghdl5()
     path = DRIVES / f"{name}.toml"
-    job = InGhdl(f"test drive {name}", Named("fluxproof.cosim.runs:closed_loop", (str(path), 100, "tour")))
+    job = InVerilator(f"test drive {name}", Named("fluxproof.cosim.runs:closed_loop", (str(path), 100, "tour")))
     job.carry_out()
     assert job.problem is None, job.problem
     summary, arrays = job.summary(), job.arrays()
