@@ -107,6 +107,24 @@ extern "C" {
 #define FLUXPROOF__TEMP_VALID__VALUE_bw 1
 #define FLUXPROOF__TEMP_VALID__VALUE_reset 0x0
 
+// reg - fluxproof::omega_given
+#define FLUXPROOF__OMEGA_GIVEN__VALUE_bm 0xffffffff
+#define FLUXPROOF__OMEGA_GIVEN__VALUE_bp 0
+#define FLUXPROOF__OMEGA_GIVEN__VALUE_bw 32
+#define FLUXPROOF__OMEGA_GIVEN__VALUE_reset 0x0
+
+// reg - fluxproof::speed_given
+#define FLUXPROOF__SPEED_GIVEN__VALUE_bm 0x1
+#define FLUXPROOF__SPEED_GIVEN__VALUE_bp 0
+#define FLUXPROOF__SPEED_GIVEN__VALUE_bw 1
+#define FLUXPROOF__SPEED_GIVEN__VALUE_reset 0x0
+
+// reg - fluxproof::position_restart
+#define FLUXPROOF__POSITION_RESTART__VALUE_bm 0x1
+#define FLUXPROOF__POSITION_RESTART__VALUE_bp 0
+#define FLUXPROOF__POSITION_RESTART__VALUE_bw 1
+#define FLUXPROOF__POSITION_RESTART__VALUE_reset 0x0
+
 // reg - fluxproof::flags
 #define FLUXPROOF__FLAGS__RUNNING_bm 0x1
 #define FLUXPROOF__FLAGS__RUNNING_bp 0
@@ -358,6 +376,12 @@ extern "C" {
 #define FLUXPROOF__I_MAX__VALUE_bp 0
 #define FLUXPROOF__I_MAX__VALUE_bw 32
 #define FLUXPROOF__I_MAX__VALUE_reset 0x0
+
+// reg - fluxproof::two_sensors
+#define FLUXPROOF__TWO_SENSORS__VALUE_bm 0x1
+#define FLUXPROOF__TWO_SENSORS__VALUE_bp 0
+#define FLUXPROOF__TWO_SENSORS__VALUE_bw 1
+#define FLUXPROOF__TWO_SENSORS__VALUE_reset 0x0
 
 // reg - fluxproof::kp_d
 #define FLUXPROOF__KP_D__VALUE_bm 0xffffff
@@ -637,7 +661,11 @@ typedef struct {
     uint32_t speed_mode;
     uint32_t temp_winding;
     uint32_t temp_valid;
-    uint8_t RESERVED_68_7f[0x18];
+    uint8_t RESERVED_68_6f[0x8];
+    uint32_t omega_given;
+    uint32_t speed_given;
+    uint32_t position_restart;
+    uint8_t RESERVED_7c_7f[0x4];
     uint32_t flags;
     uint32_t flux_faults;
     uint32_t min_pulse_used;
@@ -680,7 +708,7 @@ typedef struct {
     uint32_t speed_kp;
     uint32_t speed_ki;
     uint32_t i_max;
-    uint8_t RESERVED_14c_14f[0x4];
+    uint32_t two_sensors;
     uint32_t kp_d;
     uint32_t ki_d;
     uint32_t kp_q;

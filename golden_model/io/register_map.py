@@ -96,6 +96,7 @@ _SETTINGS = """
     150 kp_d          154 ki_d           158 kp_q         15c ki_q           160 l_d          164 l_q
     168 lambda_mg     16c k_delay        170 dead_time    174 min_pulse
     178 watchdog      17c fault_ignore
+    070 omega_given   074 speed_given    078 position_restart                14c two_sensors
     180 flux_mode     184 r_s            188 t_s          18c omega_0        190 xi           194 omega_min
     198 k_ramp        19c flux_kp        1a0 flux_ki      1a4 delta_max      1a8 k_chord
     1b0 tcr           1b4 t_0            1b8 t_min        1bc t_max
