@@ -109,7 +109,8 @@ def speed_loop(drive):
     k_filter = 1.0 if c.speed_filter_hz is None else -math.expm1(-TURN_RAD * c.speed_filter_hz * t_s)
     yield Entry("k_filter", k_filter, "1", 1.0, "[control] speed_filter_hz")
     yield Entry("speed_given", 0, "1", 1.0, "none: 1 takes the speed from omega_given")
-    yield Entry("omega_given", 0.0, "rad/s", b.omega_me_rad_s, f"none: a speed measured elsewhere; {base_keys(drive, 'omega_me_rad_s')}")
+    keys = f"none: a speed measured elsewhere; {base_keys(drive, 'omega_me_rad_s')}"
+    yield Entry("omega_given", 0.0, "rad/s", b.omega_me_rad_s, keys)
     yield Entry("position_restart", 0, "1", 1.0, "none: 1 for a sample whose code jumps")
     kp, ki = speed_gains(drive)
     keys = "[machine] inertia_kgm2, magnet_flux_wb, pole_pairs; [control] speed_bandwidth_hz"

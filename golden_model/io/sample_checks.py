@@ -8,8 +8,8 @@
     5  position       |code - (2*code' - code'')| >= jump_max: more than the shaft can accelerate within a sample
 
 Check 5 detects a jump of the code, and a code that freezes while the shaft turns by ``jump_max`` per sample or more.  A
-frozen code at lower speed looks like a shaft at rest.  Check 5 starts with the third sample after a reset; a sample with
-``position_restart`` is the first one again.
+frozen code at lower speed looks like a shaft at rest.  Check 5 starts with the third sample after a reset; a sample
+with ``position_restart`` is the first one again.
 ``sample_trip``: at least one fault that ``fault_ignore`` does not mask.
 
 Formats: currents and voltage are cut (floor) to U(1,8), |x| is the one's complement where x is negative: a negative

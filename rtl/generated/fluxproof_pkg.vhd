@@ -783,4 +783,30 @@ package fluxproof_pkg is
   constant POSITION_BRIDGE_LATENCY : positive := 1;
   constant POSITION_BRIDGE_DROP : natural := 16;
 
+  -- serial_encoder: none: absolute encoders
+  constant SERIAL_ENCODER_LATENCY : positive := 1;
+
+  -- hall_front: none: three Hall sensors, 120 degrees apart
+  constant HALL_FRONT_LATENCY : positive := 1;
+
+  -- position_front: none: front end of a board
+  constant POSITION_FRONT_LATENCY : positive := 1;
+
+  -- delta_sigma: none: front end of a board
+  constant DELTA_SIGMA_LATENCY : positive := 1;
+
+  -- current_front: none: front end of a board
+  constant CURRENT_FRONT_LATENCY : positive := 1;
+
+  -- forced_position: none: commissioning
+  constant FORCED_POSITION_LATENCY : positive := 1;
+  constant FORCED_POSITION_PLACE_W : natural := 32;
+  constant FORCED_POSITION_SHIFT : natural := 14;
+
+  -- sample_join: none: front end of a board
+  constant SAMPLE_JOIN_LATENCY : positive := 1;
+
+  -- board_faults: none: protection and diagnosis of the drive
+  constant BOARD_FAULTS_LATENCY : positive := 1;
+
 end package fluxproof_pkg;
