@@ -56,6 +56,7 @@ from fluxproof.golden_model.estimators import (
 )
 from fluxproof.golden_model.io import (
     board_faults,
+    board_snapshot,
     current_conditioning,
     fault_latch,
     position,
@@ -160,5 +161,6 @@ BLOCKS = {
         forced_position,
         sample_join,
         board_faults,
+        board_snapshot,
     )
 }

@@ -45,10 +45,10 @@ class State(NamedTuple):
 def step(
     state, miso, busy, eoc, drdy, drp_do, mod_data, mod_clock_in, code_a_in, code_b_in, code_c_in, code_u_dc_in,
     codes_valid_in, sample_trigger, clear_encoder, clock_ratio, spi_bits, spi_skip, spi_delay, wait_clocks,
-    busy_timeout, two_words, use_convst, clock_idle, second_edge, signed_code, channel_a, channel_b, channel_c, channel_u_dc,
-    conversions, xadc_channels, address_0, address_1, address_2, address_3, xadc_timeout, mod_ratio, mod_delay,
-    follow_clock, oversampling, sinc_gain, start_clocks, trip_oversampling, limit_high, limit_low, currents, adc_bits,
-    spi_lines,
+    busy_timeout, two_words, use_convst, clock_idle, second_edge, signed_code, channel_a, channel_b, channel_c,
+    channel_u_dc, conversions, xadc_channels, address_0, address_1, address_2, address_3, xadc_timeout, mod_ratio,
+    mod_delay, follow_clock, oversampling, sinc_gain, start_clocks, trip_oversampling, limit_high, limit_low, currents,
+    adc_bits, spi_lines,
 ):  # fmt: skip
     s = state
     spi, xadc, sigma = s.of_spi, s.of_xadc, s.of_sigma

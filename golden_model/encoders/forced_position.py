@@ -3,9 +3,9 @@
     place(k) = forced_angle + travelled(k);  travelled(k) = travelled(k-1) + forced_rate while position_source stays 1
 
 The source of a sample is that of its ``sample`` strobe, so it cannot change within a sample.  ``position_restart``
-tells the core that a code has nothing to do with the one before: the source has changed, the host has moved ``forced_angle``,
-or the encoder says so (``encoder_restart``).  With a forced position the speed is that of the code: ``speed_now`` is
-``speed_given`` of the encoder alone.
+tells the core that a code has nothing to do with the one before: the source has changed, the host has moved
+``forced_angle``, or the encoder says so (``encoder_restart``).  With a forced position the speed is that of the code:
+``speed_now`` is ``speed_given`` of the encoder alone.
 Formats: angles in turns of the shaft, as the encoder's code: place U(0,32), wraps; forced_rate in 2**-32 turn a sample.
 The code follows ``sample`` by two clocks, the encoder's code by one.  Rounding: the bits below the code are cut.
 """

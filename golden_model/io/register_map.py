@@ -227,17 +227,18 @@ def registers(settings: Mapping[str, Port] = fluxproof.REGISTERS) -> dict[str, R
                 f"register map: {before.name} and {after.name} share address {after.address:#05x}"
             )
     for register in ordered:
-        _check(register)
+        check(register)
     result = {r.name: r for r in ordered}
     if len(result) != len(ordered):
         raise ValueError("register map: two registers have the same name")
     return result
 
 
-def _check(register: Register) -> None:
-    if register.address % 4 or not 0 <= register.address < 4 * WORDS:
+def check(register: Register, base: int = 0, end: int = 4 * WORDS) -> None:
+    """ValueError where a register is not within its block of addresses, or its fields not within their word."""
+    if register.address % 4 or not base <= register.address < end:
         raise ValueError(
-            f"register map: {register.name} at {register.address:#x}: expected a multiple of 4 below {4 * WORDS:#x}"
+            f"register map: {register.name} at {register.address:#x}: expected a multiple of 4 below {end:#x}"
         )
     taken = 0
     for f in register.fields:

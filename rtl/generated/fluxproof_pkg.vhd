@@ -809,4 +809,7 @@ package fluxproof_pkg is
   -- board_faults: none: protection and diagnosis of the drive
   constant BOARD_FAULTS_LATENCY : positive := 1;
 
+  -- board_snapshot: none: commissioning
+  constant BOARD_SNAPSHOT_LATENCY : positive := 1;
+
 end package fluxproof_pkg;
