@@ -612,7 +612,7 @@ begin
       mod_clock         => mod_clock
     );
 
-  join : entity work.sample_join
+  joining : entity work.sample_join
     port map (
       clk            => aclk,
       rst            => rst,
