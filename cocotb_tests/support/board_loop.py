@@ -1,7 +1,8 @@
 """A motor on fluxproof_board, period by period: the golden board, an A/B/Z encoder and SPI converters, the plant.
 
-The encoder and converter models are those of encoder_models and converter_models.  What they answer depends on the golden
-board's pins; a device that gets the same inputs and gives the same outputs at every clock is therefore in the same loop.
+The encoder and converter models are those of encoder_models and converter_models.  What they answer depends on the
+golden board's pins; a device that gets the same inputs and gives the same outputs at every clock is therefore in the
+same loop.
 The shaft moves on within a period with the speed of its start.
 """
 

@@ -1,4 +1,4 @@
-"""The closed loop of a board as a run: start from standstill with a rotor that is off its index, speed up, a snapshot."""
+"""The closed loop of a board as a run: start from standstill, a rotor that is off its index, a snapshot."""
 
 from __future__ import annotations
 

@@ -3,9 +3,9 @@
     make board                              all of them, some minutes
     make board ARGS='-k closed_loop'        those that pytest selects
 
-A figure comes from a test with the marker `study` that calls the fixture `figure` (cocotb_tests/conftest.py); a new one is
-a file of its own below FOLDERS.  A test that fails is a line with ``pass`` false under its own name.  Exit status 1 where
-one fails.
+A figure comes from a test with the marker `study` that calls the fixture `figure` (cocotb_tests/conftest.py); a new
+one is a file of its own below FOLDERS.  A test that fails is a line with ``pass`` false under its own name.  Exit status
+1 where one fails.
 """
 
 from __future__ import annotations
