@@ -75,7 +75,7 @@ def angle_over_turns(counts: int, sign: int, turns: int) -> tuple[float, float]:
         rows = np.flatnonzero(sample)
         good = rows[(out["referenced"][rows] == 1) & (out["moving"][rows - 1] == 0) & (rows > CODE_DELAY)]
         error = angle_error(out["code_theta"][good], path[good - CODE_DELAY], counts)
-        off = out["count"][good] + 0.5 - path[good - CODE_DELAY + 1]
+        off = out["count"][good] + 0.5 - path[good - CODE_DELAY + 2]
         off = (off + counts / 2) % counts - counts / 2
         worst_count = max(worst_count, np.abs(off).max(initial=0.0))
         worst, seen = max(worst, np.abs(error).max(initial=0.0)), seen + len(good)

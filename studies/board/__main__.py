@@ -4,8 +4,8 @@
     make board ARGS='-k closed_loop'        those that pytest selects
 
 A figure comes from a test with the marker `study` that calls the fixture `figure` (cocotb_tests/conftest.py); a new
-one is a file of its own below FOLDERS.  A test that fails is a line with ``pass`` false under its own name.  Exit status
-1 where one fails.
+one is a file of its own below FOLDERS.  A test that fails is a line with ``pass`` false under its own name.  Exit
+status 1 where one fails.
 """
 
 from __future__ import annotations
