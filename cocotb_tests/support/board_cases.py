@@ -1,4 +1,4 @@
-"""Runs of the golden board that end in a fault or use a forced position; as a program it prints the facts of one as JSON.
+"""Runs of the golden board that end in a fault or use a forced position; as a program: the facts of one as JSON.
 
     NUMBA_DISABLE_JIT=1 python -m cocotb_tests.support.board_cases index_wrong
 
