@@ -79,7 +79,7 @@ def stimuli(rng, config):
             rows.append({"code_theta": code, **regs})
         rows.append({"code_theta": size // 3, **regs, "position_restart": 1})
         rows.append({"code_theta": code, **regs, "position_restart": 1})
-        rows.append({"code_theta": code, **regs, "speed_given": 1, "omega_given": -speed})
+        rows.append({"code_theta": code, **regs, "speed_given": 1, "omega_given": -speed % 1000})
     return rows
 
 
