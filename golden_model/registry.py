@@ -10,6 +10,8 @@ from fluxproof.golden_model.control import (
     voltage_limit,
 )
 from fluxproof.golden_model.converters import (
+    current_front,
+    delta_sigma,
     modulator_input,
     sinc3,
     sinc_overcurrent,
@@ -23,11 +25,15 @@ from fluxproof.golden_model.encoders import (
     biss_master,
     edge_timer,
     endat_master,
+    forced_position,
     hall_decoder,
+    hall_front,
     incremental_encoder,
     index_check,
     position_bridge,
+    position_front,
     quadrature_decoder,
+    serial_encoder,
     ssi_master,
     turn_counter,
 )
@@ -49,11 +55,14 @@ from fluxproof.golden_model.estimators import (
     winding_resistance,
 )
 from fluxproof.golden_model.io import (
+    board_faults,
+    board_snapshot,
     current_conditioning,
     fault_latch,
     position,
     sample_checks,
     sample_guard,
+    sample_join,
     sample_latch,
     speed,
     telemetry,
@@ -144,5 +153,14 @@ BLOCKS = {
         biss_master,
         endat_master,
         position_bridge,
+        serial_encoder,
+        hall_front,
+        position_front,
+        delta_sigma,
+        current_front,
+        forced_position,
+        sample_join,
+        board_faults,
+        board_snapshot,
     )
 }
