@@ -1,0 +1,195 @@
+"""What the steps share: registers in force, snapshots in SI units, the watch on the currents, the gates off at the end."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from fluxproof.commission.bus import Bus
+from fluxproof.golden_model.drive import Drive
+from fluxproof.golden_model.drive_keys import DriveError
+from fluxproof.golden_model.encoders import forced_position
+from fluxproof.golden_model.fluxproof import REGISTERS
+from fluxproof.golden_model.io.fault_latch import NAMES
+from fluxproof.golden_model.registers import registers
+from fluxproof.golden_model.units import TURN_RAD, from_si, to_si
+
+STOP_OF_LIMIT = 1.05  # of the current limit: a snapshot above ends the commissioning
+TRIPPED = 1 << 1  # of the register flags
+# Nothing that rests on the machine's data acts during commissioning, and no limit of a speed that is forced.
+QUIET = {"compensate": 0, "flux_mode": 0, "l_d": 0, "l_q": 0, "lambda_mg": 0}
+OPEN_WIDE = ("omega_trip", "omega_away", "offset_max")  # limits of the motion and of the sensors' zero, not yet known
+
+
+class Refusal(Exception):
+    """Commissioning ends here; one line: what was seen, what was expected, what to check."""
+
+
+@dataclass(frozen=True)
+class Value:
+    """A measured value with its standard uncertainty (1 sigma)."""
+
+    value: float
+    sigma: float
+    unit: str
+
+
+@dataclass
+class Step:
+    """What a step has found, for the line on the terminal and commission.json."""
+
+    name: str
+    values: dict[str, Value]
+    said: str
+    notes: dict = field(default_factory=dict)
+
+
+class Seen:
+    """Snapshots in sequence as arrays in SI units: ``t``, i_d, i_q, u_d, u_q, omega_me, u_dc, theta_me, adc_x, code.
+
+    ``code``: the encoder's place [mechanical turns], unwrapped from its first value within a turn.
+    """
+
+    def __init__(self, drive: Drive, rows: list[dict], times: list[float]):
+        columns = {name: np.array([row[name] for row in rows]) for name in rows[0]}
+        self.t = np.array(times)
+        for name in ("i_d", "i_q", "u_d", "u_q", "omega_me", "u_dc"):
+            setattr(self, name, to_si(name, columns[name], drive))
+        self.theta_me = np.unwrap(to_si("theta_me", columns["theta_me"], drive))
+        self.adc = np.array([columns[f"snap_adc_{x}"] for x in "abc"]).T
+        turns = 2.0**-drive.sensors.position_bits
+        self.code = np.unwrap(columns["snap_code"] * turns, period=1.0)
+        self.place = np.unwrap(columns["snap_position"] * turns, period=1.0)
+
+    @property
+    def current(self) -> np.ndarray:
+        return self.i_d + 1j * self.i_q
+
+    @property
+    def voltage(self) -> np.ndarray:
+        return self.u_d + 1j * self.u_q
+
+
+class Session:
+    """One commissioning on a bus; ``drive`` is what is known so far."""
+
+    def __init__(self, bus: Bus, drive: Drive, progress: Callable[[str], None] = lambda text: None):
+        self.bus, self.drive, self.progress = bus, drive, progress
+        self.limit, self.t_s = drive.current_limit_a, drive.sample_time_s
+        self.started = bus.now()
+
+    # ---------------------------------------------------------------- registers
+
+    def load(self, bandwidth_hz: float | None = None, integral_hz: float | None = None, **others: int) -> None:
+        """All registers of the drive with QUIET and ``others``; current gains of these bandwidths, if given."""
+        control = {}
+        if bandwidth_hz is not None:
+            w_c, m = TURN_RAD * bandwidth_hz, self.drive.machine
+            for axis in "dq":
+                henry = getattr(m, f"inductance_{axis}_h")
+                corner = m.resistance_ohm if integral_hz is None else TURN_RAD * integral_hz * henry
+                control[f"current_kp_{axis}_v_per_a"] = w_c * henry
+                control[f"current_ki_{axis}_v_per_as"] = w_c * corner
+        drive = replace(self.drive, control=replace(self.drive.control, **control))
+        values = registers(drive).values._asdict() | QUIET
+        values |= {name: REGISTERS[name].high for name in OPEN_WIDE if name in REGISTERS}
+        for name, value in (values | others).items():
+            if name != "position_restart" and not name.endswith("_given"):  # the board's own
+                self.bus.write(name, value)
+
+    def set(self, **si: float) -> None:
+        """References in SI units: i_d_ref, i_q_ext [A], omega_ref [electrical rad/s]."""
+        for name, value in si.items():
+            self.bus.write(name, from_si(name, value, self.drive))
+
+    def force(self, angle_rad: float = 0.0, speed_rad_s: float = 0.0) -> None:
+        """The electrical angle, and what it turns by [electrical rad/s], in place of the encoder's."""
+        pairs = self.drive.machine.pole_pairs
+        code = round(angle_rad / TURN_RAD / pairs * 2**forced_position.TURN_W) % 2**forced_position.TURN_W
+        self.bus.write("forced_angle", code)
+        self.bus.write("forced_rate", forced_position.setting(speed_rad_s / pairs, self.t_s))
+        self.bus.write("position_source", 1)
+
+    def release(self) -> None:
+        """The encoder's angle again."""
+        self.bus.write("position_source", 0)
+
+    def gates_off(self) -> None:
+        """References zero, gates off."""
+        self.bus.write("enable", 0)
+        self.set(i_d_ref=0.0, i_q_ext=0.0, omega_ref=0.0)
+        self.bus.write("speed_mode", 0)
+
+    def gates_on(self) -> None:
+        self.bus.write("clear_trip", 1)
+        self.bus.write("enable", 1)
+
+    # ---------------------------------------------------------------- what is seen
+
+    def look(self, samples: int, pause_s: float = 0.0, until: Callable[[dict], bool] | None = None) -> Seen:
+        """Snapshots, ``pause_s`` apart besides the time they take; Refusal at a trip or a current above the limit."""
+        rows, times = [], []
+        for _ in range(samples):
+            rows.append(self.snapshot())
+            times.append(self.bus.now())
+            if until is not None and until(rows[-1]):
+                break
+            if pause_s:
+                self.bus.wait(pause_s)
+        return Seen(self.drive, rows, times)
+
+    def snapshot(self) -> dict:
+        """One snapshot, after the watch."""
+        row = self.bus.snapshot()
+        if self.bus.read("flags") & TRIPPED:
+            self.bus.write("enable", 0)
+            told = [n for k, n in enumerate(NAMES) if self.bus.read("fault_flags") >> k & 1]
+            raise Refusal(f"the core has tripped: {', '.join(told)}; expected no fault: see docs/faults.md")
+        size = math.hypot(*(to_si(n, row[n], self.drive) for n in ("i_d", "i_q")))
+        if size > STOP_OF_LIMIT * self.limit:
+            self.bus.write("enable", 0)
+            raise Refusal(
+                f"a current of {size:.3g} A, expected at most {self.limit:.3g} A: check the sensors' gain and the "
+                "start values of R and L"
+            )
+        return row
+
+    def settle(self, seconds: float) -> None:
+        """Wait, with a look at the currents every few milliseconds."""
+        end = self.bus.now() + seconds
+        while self.bus.now() < end:
+            self.bus.wait(min(5e-3, max(end - self.bus.now(), self.t_s)))
+            self.snapshot()
+
+    def ramp(self, seconds: float, steps: int = 20, **to: tuple[float, float]) -> None:
+        """References from the first to the second value."""
+        for k in range(1, steps + 1):
+            self.set(**{name: a + (b - a) * k / steps for name, (a, b) in to.items()})
+            self.settle(seconds / steps)
+
+    def voltage(self) -> float:
+        """The largest voltage at the present bus voltage [V]."""
+        u_dc = to_si("u_dc", self.bus.snapshot()["u_dc"], self.drive)
+        return u_dc / math.sqrt(3.0) * (1.0 - self.drive.control.voltage_reserve)
+
+    def know(self, section: str, **values) -> None:
+        """Replace what the drive file says; Refusal where the file's other values forbid it."""
+        try:
+            self.drive = replace(self.drive, **{section: replace(getattr(self.drive, section), **values)})
+        except DriveError as error:
+            raise Refusal(f"measured values do not fit the drive file: {error}") from None
+
+
+def solve(matrix: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+    """Least squares: (solution, its standard uncertainties from the residuals, rms of the residuals)."""
+    solution, _, rank, _ = np.linalg.lstsq(matrix, values, rcond=None)
+    if rank < matrix.shape[1]:
+        raise Refusal("the measured points do not determine the model: too little current or motion")
+    rest = values - matrix @ solution
+    freedom = max(len(values) - matrix.shape[1], 1)
+    variance = float(np.vdot(rest, rest).real) / freedom
+    covariance = np.linalg.inv(matrix.T @ matrix) * variance
+    return solution, np.sqrt(np.diag(covariance)), math.sqrt(variance)

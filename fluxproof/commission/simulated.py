@@ -1,0 +1,208 @@
+"""The registers of fluxproof_board in front of the golden core, the switching plant and imperfect sensors.
+
+Period by period as in cosim/golden_loop.  A write of a setting acts from the next sample on, a snapshot is that of a
+sample some periods later, and what a host does takes time: snapshots are no consecutive samples.  A fault of a sample
+turns the gates off until ``clear_trip``.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from fluxproof.commission.bus import CODES, VALUES, checked
+from fluxproof.cosim.closed_loop import described_sensors
+from fluxproof.cosim.golden_loop import mixed_kernel
+from fluxproof.golden_model import fluxproof
+from fluxproof.golden_model.encoders import forced_position
+from fluxproof.golden_model.io import board_map
+from fluxproof.golden_model.io.fault_latch import NAMES
+from fluxproof.golden_model.registers import registers
+from fluxproof.plant import (
+    FREE,
+    IMPOSED_SPEED,
+    Inverter,
+    Machine,
+    Sensors,
+    advance_switching,
+    centred_gates,
+    initial_state,
+    plant_params,
+    sensor_params,
+)
+from fluxproof.plant import layout as L
+from fluxproof.plant.sensors import current_code, position_code, u_dc_code
+
+PLACES = 1 << forced_position.PLACE_W
+SHIFT, PLACE_W = forced_position.SHIFT, forced_position.PLACE_W
+SOURCE, ANGLE, RATE, TRAVELLED, LAST_SOURCE, LAST_ANGLE = range(6)  # of ``forced``
+INPUTS = ("omega_ref", "i_d_ref", "i_q_ext", "speed_mode", "temp_winding", "temp_valid")
+COMMANDS = ("enable", "position_source", "forced_angle", "forced_rate", "board_ignore", "telemetry_enable")
+I_THETA, I_TRIP, I_FAULTS = (fluxproof.Observed._fields.index(n) for n in ("theta_me", "sample_trip", "sample_faults"))
+
+
+@dataclass(frozen=True)
+class Board:
+    """What lies outside the core; ``legs``: the machine's phase at each leg, ``sensed``: the leg that sensor x sees."""
+
+    machine: Machine
+    inverter: Inverter = Inverter()
+    dead_time_s: float = 0.0
+    sensors: Sensors | None = None
+    u_dc: float | None = None  # V; nominal if none
+    legs: tuple[int, int, int] = (0, 1, 2)
+    sensed: tuple[int, int, int] = (0, 1, 2)
+    polarity: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    open_leg: int | None = None
+    locked: bool = False
+    theta_m: float = 0.0  # rad, at the start
+    seed: int = 0
+    host_periods: tuple[int, int] = (1, 4)  # a snapshot comes after so many, at random
+    registers: dict = field(default_factory=board_map.registers)
+
+
+@mixed_kernel
+def advance(
+    state, inputs, flags, forced, usual, restarted, config, plant_state, params, sensors, wires, polarity, dead_time_s,
+    period_s, u_dc, load, first, periods, peak, codes, observed,
+):  # fmt: skip
+    """``periods`` periods; the last sample's codes and values are in ``codes`` and ``observed``.
+
+    ``inputs``: INPUTS; ``flags``: enable, tripped, latched faults; ``wires``: legs, sensed, leg that is open or 3;
+    ``peak``: largest phase current [A] so far.
+    """
+    duties = np.zeros(3)
+    currents = np.zeros(3)
+    for k in range(first, first + periods):
+        for leg in range(3):
+            currents[leg] = plant_state[L.I_A + wires[leg]]
+            peak[0] = max(peak[0], abs(currents[leg]))
+        for x in range(3):
+            codes[2 + x] = current_code(sensors, x, polarity[x] * currents[wires[3 + x]], k)
+        codes[5] = u_dc_code(sensors, u_dc, k)
+        codes[0] = position_code(sensors, plant_state[L.THETA_M], k)
+        jumped = forced[SOURCE] != forced[LAST_SOURCE]
+        jumped = jumped or (forced[SOURCE] == 1 and forced[ANGLE] != forced[LAST_ANGLE])
+        if forced[SOURCE] == 1:
+            forced[TRAVELLED] = forced[TRAVELLED] + forced[RATE] if forced[LAST_SOURCE] == 1 else 0
+            place = ((forced[ANGLE] << SHIFT) + forced[TRAVELLED]) % PLACES
+            codes[1] = place >> (PLACE_W - config.position_bits)
+        else:
+            codes[1] = codes[0]
+        forced[LAST_SOURCE], forced[LAST_ANGLE] = forced[SOURCE], forced[ANGLE]
+        run = 1 if flags[0] == 1 and flags[1] == 0 else 0
+        sample = fluxproof.Sample(
+            codes[2], codes[3], codes[4], codes[5], codes[1], inputs[0], inputs[1], inputs[2], inputs[3], inputs[4],
+            inputs[5], 0, run,
+        )  # fmt: skip
+        duties[0] = state.compare_a / config.carrier_half
+        duties[1] = state.compare_b / config.carrier_half
+        duties[2] = state.compare_c / config.carrier_half
+        state, seen = fluxproof.step(state, sample, restarted if jumped else usual, config)
+        for n, value in enumerate(seen):
+            observed[n] = value
+        if flags[0] == 1:
+            flags[2] |= observed[I_FAULTS]
+            if observed[I_TRIP]:
+                flags[1] = 1
+        times, words = centred_gates(duties, dead_time_s, period_s)
+        for n in range(len(words)):
+            word = 0
+            for leg in range(3):
+                if run == 1 and leg != wires[6]:
+                    word |= ((words[n] >> leg) & 1) << wires[leg]
+                    word |= ((words[n] >> (leg + 3)) & 1) << (wires[leg] + 3)
+            words[n] = word
+        advance_switching(plant_state, params, times, words, u_dc, load, period_s, -1.0)
+    return state
+
+
+class SimulatedBus:
+    """A Bus; ``peak_a`` is the largest true phase current at a sample so far, ``seconds`` the drive's time."""
+
+    def __init__(self, drive, board: Board):
+        self.board, self.drive = board, drive
+        self._config = registers(drive).config
+        self._values = {name: register.reset for name, register in board.registers.items() if register.fields}
+        self._values |= {"clock_hz": round(drive.core.clock_hz), **self._config._asdict()}
+        mode = IMPOSED_SPEED if board.locked else FREE
+        self._params = plant_params(board.machine, board.inverter, mode=mode)
+        self._plant = initial_state(board.machine, self._params, omega_m=0.0)
+        self._plant[L.THETA_M] = board.theta_m
+        self._sensors = sensor_params(board.sensors or described_sensors(drive))
+        open_leg = 3 if board.open_leg is None else board.open_leg
+        self._wires = np.array([*board.legs, *board.sensed, open_leg], np.int64)
+        self._polarity = np.array(board.polarity, float)
+        self._u_dc = float(drive.inverter.dc_bus_v if board.u_dc is None else board.u_dc)
+        self._state, self._random = fluxproof.State(), np.random.default_rng(board.seed)
+        self._forced, self._flags = np.zeros(6, np.int64), np.zeros(3, np.int64)
+        self._codes = np.zeros(6, np.int64)
+        self._observed = np.zeros(len(fluxproof.Observed._fields), np.int64)
+        self._peak, self._done, self._due = np.zeros(1), 0, 0.0
+        self._settings = None
+
+    @property
+    def seconds(self) -> float:
+        return self._done * self.drive.sample_time_s
+
+    @property
+    def peak_a(self) -> float:
+        return float(self._peak[0])
+
+    @property
+    def true_theta_m(self) -> float:
+        return float(self._plant[L.THETA_M])
+
+    def read(self, name: str) -> int:
+        if name in fluxproof.Observed._fields:
+            return int(self._observed[fluxproof.Observed._fields.index(name)])
+        if name in ("fault_flags", "first_fault"):
+            return int(self._flags[2])
+        if name == "flags":
+            return int(self._flags[0] and not self._flags[1]) + 2 * int(self._flags[1])
+        if name in CODES:
+            return int(self._codes[CODES.index(name)])
+        return self._values[name]
+
+    def write(self, name: str, value: int) -> None:
+        checked(self.board.registers, name, value)
+        if name == "clear_trip":
+            self._flags[1:] = 0
+            return
+        self._values[name] = value
+        if name == "enable":
+            self._flags[0] = value
+        self._forced[:3] = [self._values[n] for n in ("position_source", "forced_angle", "forced_rate")]
+        self._settings = None
+
+    def snapshot(self) -> dict[str, int]:
+        self._run(int(self._random.integers(*self.board.host_periods)) + 1)
+        return {name: self.read(name) for name in (*CODES, *VALUES, "theta_me")}
+
+    def wait(self, seconds: float) -> None:
+        self._due += seconds / self.drive.sample_time_s
+        whole = math.floor(self._due)
+        self._due -= whole
+        self._run(whole)
+
+    def now(self) -> float:
+        return self.seconds
+
+    def _run(self, periods: int) -> None:
+        if self._settings is None:
+            usual = fluxproof.Registers(*(self._values[n] for n in fluxproof.Registers._fields))
+            self._settings = usual, usual._replace(position_restart=1)
+            self._inputs = np.array([self._values[n] for n in INPUTS], np.int64)
+        self._state = advance(
+            self._state, self._inputs, self._flags, self._forced, *self._settings, self._config, self._plant,
+            self._params, self._sensors, self._wires, self._polarity, float(self.board.dead_time_s),
+            self.drive.sample_time_s, self._u_dc, 0.0, self._done, periods, self._peak, self._codes, self._observed,
+        )  # fmt: skip
+        self._done += periods
+
+
+def faults(flags: int) -> str:
+    """The names of latched faults."""
+    return ", ".join(name for k, name in enumerate(NAMES) if flags >> k & 1)
