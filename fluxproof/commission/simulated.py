@@ -129,8 +129,7 @@ class SimulatedBus:
         self._values |= {"clock_hz": round(drive.core.clock_hz), **self._config._asdict()}
         mode = IMPOSED_SPEED if board.locked else FREE
         self._params = plant_params(board.machine, board.inverter, mode=mode)
-        self._plant = initial_state(board.machine, self._params, omega_m=0.0)
-        self._plant[L.THETA_M] = board.theta_m
+        self._plant = initial_state(board.machine, self._params, theta_m=board.theta_m)
         self._sensors = sensor_params(board.sensors or described_sensors(drive))
         open_leg = 3 if board.open_leg is None else board.open_leg
         self._wires = np.array([*board.legs, *board.sensed, open_leg], np.int64)

@@ -28,6 +28,7 @@ MOVING_TURNS = 2e-3  # the shaft stands within
 LOOKED_FOR = 0.2  # of the current limit
 ANGLES = (0.0, 120.0, 240.0, 90.0)
 RISE_S, PATIENCE = 0.4, 1.6  # to the expected voltage; how many times that voltage
+HOLD_S, GROWN = 0.25, 1.8  # after LOOKED_FOR; ended early above so many times of it
 OPEN_BELOW = 0.15  # of the largest current of any phase
 FITS = 0.9  # correlation of the answers with the true order
 LEAST_BUS = 0.7  # of the nominal voltage
@@ -146,6 +147,11 @@ def _answer(s: Session, angle: float) -> np.ndarray:
         last = [*last, sensed(row)][-4:]
         if ended(row):
             break
+        s.bus.wait(4.0 * s.t_s)
+    # In the true order the integrator now holds the current, and the rotor comes to rest; in a wrong one it grows on.
+    end = s.bus.now() + HOLD_S
+    while s.bus.now() < end and np.abs(last[-1]).max() < GROWN * target:
+        last = [*last, sensed(s.snapshot())][-20:]
         s.bus.wait(4.0 * s.t_s)
     s.bus.write("enable", 0)
     s.settle(0.02)
