@@ -81,7 +81,8 @@ def judge(s: Session, ways: list[Seen], reverse_given: bool | None) -> Step:
             "lines of the encoder are exchanged, or leave the key out to have it measured"
         )
     sign = -1.0 if reverse else 1.0
-    parts = [way.theta_me - sign * pairs * TURN_RAD * way.code for way in ways]
+    # The field is where the current is, which the dead time moves around the forced angle.
+    parts = [way.theta_me + np.angle(way.current) - sign * pairs * TURN_RAD * way.code for way in ways]
     means = [np.angle(np.mean(np.exp(1j * part))) for part in parts]
     lag = float(np.angle(np.exp(1j * (means[0] - means[1]))) / 2.0)
     offset = float(np.angle(sum(np.exp(1j * mean) for mean in means)))

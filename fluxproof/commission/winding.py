@@ -1,0 +1,168 @@
+"""R, L_d, L_q and the dead-time voltage from a current vector that rotates too fast for the rotor.
+
+The regulators hold a vector in the frame of the forced angle.  A snapshot k has the current i(k) at the angle phi of that
+frame against the rotor, and the voltage u(k), which acts as a constant vector in the stator's frame during the period
+after the next valley: in the rotating frame it is that of the angle phi + 1.5*w*T, and
+
+    w -> w_e = 2/T*sin(w*T/2),    R -> R*cos(w*T/2)            (a frame that turns during a held vector)
+
+With currents and voltages as sums of c_n*exp(j*n*phi) in the rotor's frame, n = 1, -1 (a salient rotor) and -5, 7 (dead
+time), the rotor's axes obey, with I_d = c_1 + conj(c_-1), I_q = -j*(c_1 - conj(c_-1)) and U likewise:
+
+    U_d = (R + j*w_e*L_d)*I_d + V_1;    U_q = (R + j*w_e*L_q + K/(j*w))*I_q - j*V_1
+    V_1 = 4/pi*V_dead*c_1/|c_1|;        K = 1.5*p^2*psi^2/J
+
+V_1 is the first harmonic of a voltage against each leg's current; K is the EMF of the rotor that the torque swings.
+Several amplitudes separate R from V_dead, both senses cancel what a slow turn of the rotor adds, two frequencies
+separate L_q from K.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from fluxproof.commission.session import Refusal, Seen, Session, Step, Value, solve
+from fluxproof.golden_model.encoders.forced_position import RATE
+from fluxproof.golden_model.scaling import leg_loss_v
+from fluxproof.golden_model.units import TURN_RAD
+
+PARTS = (0.3, 0.5, 0.75)  # of the current limit
+HIGHEST_HZ, OF_RATE, OF_BASE, LOWER = 300.0, 0.95, 1.7, 0.6  # frequencies: largest, of the ranges; second over first
+OF_VOLTAGE = 0.6  # of the voltage circle, with twice the start values
+LEAST_HZ = 15.0
+BANDWIDTH = 1.0 / 150.0  # of the sampling frequency, current regulators
+RAMP_S, SETTLE_S, SAMPLES = 0.1, 0.15, 250
+STOOD_DEG = 25.0  # electrical, largest turn of the rotor in a run
+MISFIT = 0.03  # of the voltages, rms
+LARGEST_SIGMA = 0.03  # of R and L
+ORDERS = (1, -1, -5, 7)
+
+
+class Point:
+    """The harmonics of one run: current and voltage at the frequency w [rad/s]."""
+
+    def __init__(self, seen: Seen, rotor: np.ndarray, w: float, t_s: float):
+        phi = seen.theta_me - rotor
+        orders = np.array(ORDERS) - 1
+        self.w = w
+        self.i = np.linalg.lstsq(np.exp(1j * np.outer(phi, orders)), seen.current, rcond=None)[0]
+        ahead = phi + 1.5 * w * t_s
+        basis = np.exp(1j * np.outer(ahead, orders))
+        self.u, *_ = np.linalg.lstsq(basis, seen.voltage, rcond=None)
+        self.axes_i, self.axes_u = _axes(self.i), _axes(self.u)
+        self.direction = self.i[0] / abs(self.i[0])
+
+
+def _axes(c: np.ndarray) -> tuple[complex, complex]:
+    """Phasors of the rotor's axes."""
+    return c[0] + np.conj(c[1]), -1j * (c[0] - np.conj(c[1]))
+
+
+def frequency(session: Session, current: float) -> float:
+    """The field's frequency [electrical Hz] for this current: within rate, speed range and voltage."""
+    m, t_s = session.drive.machine, session.t_s
+    hertz = [HIGHEST_HZ, OF_RATE * RATE.hi * RATE.lsb * m.pole_pairs / t_s, 0.05 / t_s]
+    hertz.append(OF_BASE * session.drive.bases.omega_me_rad_s / TURN_RAD)
+    room = OF_VOLTAGE * session.voltage() - 4.0 / math.pi * leg_loss_v(session.drive)
+    resistive = 2.0 * m.resistance_ohm * current
+    if room > resistive:
+        henry = 2.0 * max(m.inductance_d_h, m.inductance_q_h)
+        hertz.append(math.sqrt(room**2 - resistive**2) / (TURN_RAD * henry * current))
+    if room <= resistive or min(hertz) < LEAST_HZ:
+        raise Refusal(
+            f"too little voltage: {session.voltage():.3g} V do not drive {current:.3g} A at {LEAST_HZ:.0f} Hz through "
+            "the start values of R and L; check [machine], the bus and [control] current_limit_a"
+        )
+    return min(hertz)
+
+
+def measure(session: Session) -> Step:
+    """R, L_d, L_q, V_dead; the drive then has the first three."""
+    s = session
+    high = frequency(s, PARTS[-1] * s.limit)
+    plan = [(part, sign * high) for part in PARTS for sign in (1.0, -1.0)]
+    plan += [(PARTS[-1], sign * LOWER * high) for sign in (1.0, -1.0)]
+    points = []
+    for k, (part, hertz) in enumerate(plan):
+        s.progress(f"winding, {part * s.limit:.3g} A at {hertz:.0f} Hz ({k + 1} of {len(plan)})")
+        points.append(_run(s, part * s.limit, TURN_RAD * hertz))
+    return judge(s, points)
+
+
+def _run(s: Session, current: float, w: float) -> Point:
+    """One amplitude at one frequency; the current rises slowly, so that the rotor gets no push."""
+    m = s.drive.machine
+    bandwidth = BANDWIDTH / s.t_s
+    corner = m.resistance_ohm / (TURN_RAD * max(m.inductance_d_h, m.inductance_q_h))
+    s.gates_off()
+    s.load(bandwidth, max(corner, bandwidth / 4.0), reverse=0, theta_offset=0)
+    s.force(0.0, w)
+    s.settle(0.02)
+    s.gates_on()
+    s.ramp(RAMP_S, i_d_ref=(0.0, current))
+    s.settle(SETTLE_S)
+    seen = s.look(SAMPLES)
+    s.ramp(RAMP_S / 4, 5, i_d_ref=(current, 0.0))
+    s.gates_off()
+    if abs(float(seen.i_d.mean()) / current - 1.0) > 0.2:
+        raise Refusal(
+            f"the current reaches {seen.i_d.mean():.3g} A at {w / TURN_RAD:.0f} Hz, expected {current:.3g} A: too little "
+            "voltage for the inductance, or it does not settle; check the start values of R and L"
+        )
+    sensors, pairs = s.drive.sensors, m.pole_pairs
+    rotor = (-1.0 if sensors.position_reverse else 1.0) * pairs * TURN_RAD * seen.code + sensors.theta_offset_rad
+    line = np.polyval(np.polyfit(seen.t, rotor, 1), seen.t)
+    if math.degrees(np.ptp(line)) > STOOD_DEG:
+        raise Refusal(
+            f"the rotor turned by {math.degrees(np.ptp(line)):.0f} degrees in a field of {w / TURN_RAD:.0f} Hz, expected "
+            f"{STOOD_DEG:.0f} at most: something drives the shaft, or the inertia is too small"
+        )
+    return Point(seen, line, w, s.t_s)
+
+
+def judge(s: Session, points: list[Point]) -> Step:
+    """One regression over all runs; unknowns R, L_d, L_q, 4/pi*V_dead, K."""
+    rows, values, weights = [], [], []
+    for p in points:
+        w_e, cosine = 2.0 / s.t_s * math.sin(p.w * s.t_s / 2.0), math.cos(p.w * s.t_s / 2.0)
+        (i_d, i_q), (u_d, u_q) = p.axes_i, p.axes_u
+        for row, value in (
+            ((cosine * i_d, 1j * w_e * i_d, 0.0, p.direction, 0.0), u_d),
+            ((cosine * i_q, 0.0, 1j * w_e * i_q, -1j * p.direction, i_q / (1j * p.w)), u_q),
+        ):
+            rows += [np.real(row), np.imag(row)]
+            values += [value.real, value.imag]
+            weights += [abs(value)] * 2
+    matrix, values = np.array(rows, float), np.array(values)
+    scale = np.linalg.norm(matrix, axis=0)
+    found, sigma, rms = solve(matrix / scale, values)
+    found, sigma = found / scale, sigma / scale
+    (r, l_d, l_q, v_1, k), (s_r, s_d, s_q, s_v, s_k) = found, sigma
+    misfit = rms / math.sqrt(float(np.mean(np.square(weights))))
+    if misfit > MISFIT:
+        raise Refusal(
+            f"R and L explain the voltages within {100 * misfit:.1f} % only, expected {100 * MISFIT:.0f} %: saturation "
+            "at this current, a blocked phase or a poor current sensor"
+        )
+    for name, value, error in (("R", r, s_r), ("L_d", l_d, s_d), ("L_q", l_q, s_q)):
+        if not value > 0.0 or error > LARGEST_SIGMA * value:
+            raise Refusal(
+                f"{name} = {value:.4g} +-{error:.2g}: expected an uncertainty below {100 * LARGEST_SIGMA:.0f} %; raise "
+                "the current limit or check the noise of the current sensors"
+            )
+    s.know("machine", resistance_ohm=float(r), inductance_d_h=float(l_d), inductance_q_h=float(l_q))
+    v_dead = math.pi / 4.0 * v_1
+    quantities = {
+        "resistance": Value(float(r), float(s_r), "ohm"),
+        "inductance_d": Value(float(l_d), float(s_d), "H"),
+        "inductance_q": Value(float(l_q), float(s_q), "H"),
+        "v_dead": Value(float(v_dead), float(math.pi / 4.0 * s_v), "V"),
+    }
+    said = (
+        f"R {r:.4g} +-{s_r:.1g} ohm, L_d {1e3 * l_d:.4g} +-{1e3 * s_d:.1g} mH, L_q {1e3 * l_q:.4g} +-{1e3 * s_q:.1g} mH, "
+        f"V_dead {v_dead:.3g} +-{s_v:.1g} V, misfit {100 * misfit:.2f} %"
+    )
+    notes = {"misfit": misfit, "swing_k": [float(k), float(s_k)], "frequencies_hz": [p.w / TURN_RAD for p in points]}
+    return Step("winding", quantities, said, notes)
