@@ -3,8 +3,12 @@
     theta_me = +-pole_pairs * code + theta_offset
 
 The rotor lags behind the field by friction, to the same side as it turns: the mean of both ways has no lag.  The
-current regulators are slower than the rotor's swing in the field, so that its EMF drives a current and damps it.  Each
-way is fitted by a line, code over field: its slope is +-1 where pole pairs and counts are right.
+EMF of a rotor that swings in the field drives a current through R + kp, which damps it:
+
+    w_0^2 = 1.5*p^2*psi*I/J;    damping = psi*w_0/(2*I*(R + kp))
+
+kp gives a damping of a third with the start values, more of it where the dead time would bend the vector, and the
+integral is slower than the swing.  Each way is fitted by a line, code over field: its slope is +-1 where pole pairs and counts are right.
 """
 
 from __future__ import annotations
@@ -13,11 +17,15 @@ import math
 
 import numpy as np
 
+from fluxproof.commission import winding
 from fluxproof.commission.session import Refusal, Seen, Session, Step, Value
+from fluxproof.golden_model.scaling import leg_loss_v
 from fluxproof.golden_model.units import TURN_RAD
 
-CURRENT = 0.6  # of the limit
-SLOW_HZ = 5.0  # current regulators
+CURRENT, OF_MAGNET = 0.6, 0.3  # of the limit; (L_q - L_d)*I over psi
+DAMPING, SLOW_HZ, OF_SWING = 0.33, 4.0, 0.3  # of the swing; the integral's corner, and as part of the swing
+FASTEST = 1.0 / 60.0  # of the sampling frequency
+STIFF = 2.0  # kp*I over the dead time's voltage
 RAMP_S, FIELD_HZ, LEAST_S = 0.4, 6.0, 0.8  # the field's electrical frequency, at least so long a turn
 SAMPLES = 600  # a way
 MOVED = 0.02  # of a turn: less is a locked rotor
@@ -30,11 +38,13 @@ def align(session: Session, reverse_given: bool | None) -> Step:
     s, pairs = session, session.drive.machine.pole_pairs
     speed = TURN_RAD * min(FIELD_HZ, pairs / LEAST_S)
     s.gates_off()
-    s.load(SLOW_HZ, reverse=0, theta_offset=0)
+    kp, ki = gains(s)
+    s.load(kp, ki, reverse=0, theta_offset=0)
     s.force(0.0)
     s.gates_on()
-    s.ramp(RAMP_S, i_d_ref=(0.0, CURRENT * s.limit))
-    s.settle(0.2)
+    slow = (s.drive.machine.resistance_ohm + kp) / ki
+    s.ramp(max(RAMP_S, 4.0 * slow), i_d_ref=(0.0, held(s)))
+    s.settle(max(0.2, 4.0 * slow))
     ways = []
     for sign in (1.0, -1.0):
         s.progress(f"alignment, field turns {'forward' if sign > 0 else 'back'}")
@@ -45,14 +55,42 @@ def align(session: Session, reverse_given: bool | None) -> Step:
         end = s.bus.now() + seconds
         ways.append(s.look(10 * SAMPLES, pause, until=lambda _, end=end: s.bus.now() >= end))
         reached = float(np.hypot(ways[-1].i_d, ways[-1].i_q).mean())
-        if reached < 0.8 * CURRENT * s.limit:
+        if reached < 0.8 * held(s):
             raise Refusal(
-                f"too little voltage: {reached:.3g} A flow, expected {CURRENT * s.limit:.3g} A; check the bus voltage "
+                f"too little voltage: {reached:.3g} A flow, expected {held(s):.3g} A; check the bus voltage "
                 "and [machine] resistance_ohm"
             )
-    s.ramp(0.1, i_d_ref=(CURRENT * s.limit, 0.0))
+    s.ramp(0.1, i_d_ref=(held(s), 0.0))
     s.gates_off()
     return judge(s, ways, reverse_given)
+
+
+def _spread(ways: list[np.ndarray], pieces: int) -> float:
+    """Standard uncertainty of the mean of both ways, from the means of their pieces."""
+    found = []
+    for way in ways:
+        means = np.array([np.angle(np.mean(np.exp(1j * piece))) for piece in np.array_split(way, pieces)])
+        around = np.angle(np.exp(1j * (means - np.angle(np.mean(np.exp(1j * means))))))
+        found.append(float(np.var(around, ddof=1)) / pieces)
+    return math.sqrt(sum(found)) / len(found)
+
+
+def held(s: Session) -> float:
+    """The field's current [A]: less where reluctance would take the magnet's torque away (L_q above L_d)."""
+    m = s.drive.machine
+    saliency = max(m.inductance_q_h - m.inductance_d_h, 0.0)
+    return min(CURRENT * s.limit, OF_MAGNET * m.magnet_flux_wb / saliency if saliency else math.inf)
+
+
+def gains(s: Session) -> tuple[float, float]:
+    """(kp [V/A], ki [V/(A s)]) with the start values."""
+    m, current = s.drive.machine, held(s)
+    swing = winding.swing(s, current)
+    damped = m.magnet_flux_wb * swing / (2.0 * DAMPING * current) - m.resistance_ohm
+    stiff = STIFF * 4.0 / math.pi * leg_loss_v(s.drive) / current
+    henry = min(m.inductance_d_h, m.inductance_q_h)
+    kp = min(max(damped, stiff), TURN_RAD * henry * FASTEST / s.t_s)
+    return kp, (m.resistance_ohm + kp) * min(TURN_RAD * SLOW_HZ, OF_SWING * swing)
 
 
 def judge(s: Session, ways: list[Seen], reverse_given: bool | None) -> Step:
@@ -96,11 +134,13 @@ def judge(s: Session, ways: list[Seen], reverse_given: bool | None) -> Step:
             "current limit, or an edge of the encoder is lost"
         )
     resolution = TURN_RAD * pairs / min(2**s.drive.sensors.position_bits, s.drive.encoder.counts or 1 << 30)
-    sigma = math.hypot(ripple / math.sqrt(2.0 * pairs), resolution / math.sqrt(12.0 * 2.0 * pairs))
+    sigma = math.hypot(_spread(parts, max(pairs, 4)), resolution / math.sqrt(12.0 * 2.0 * pairs))
     s.know("sensors", position_reverse=reverse, theta_offset_rad=offset % TURN_RAD)
     said = (
         f"code {'falls' if reverse else 'rises'} with the field, offset {math.degrees(offset) % 360:.2f} degrees "
         f"+-{math.degrees(sigma):.2f}, lag {math.degrees(lag):.1f}, turns {abs(ratio):.4f}"
     )
     values = {"theta_offset": Value(offset % TURN_RAD, sigma, "rad"), "turns": Value(abs(ratio), abs(slopes[0] - slopes[1]) / 2, "1")}
-    return Step("alignment", values, said, {"position_reverse": reverse, "lag_deg": math.degrees(lag)})
+    taken = float(np.mean([np.abs(way.voltage).mean() / np.abs(way.current).mean() for way in ways]))
+    notes = {"position_reverse": reverse, "lag_deg": math.degrees(lag), "volts_per_a": taken}
+    return Step("alignment", values, said, notes)

@@ -83,16 +83,12 @@ class Session:
 
     # ---------------------------------------------------------------- registers
 
-    def load(self, bandwidth_hz: float | None = None, integral_hz: float | None = None, **others: int) -> None:
-        """All registers of the drive with QUIET and ``others``; current gains of these bandwidths, if given."""
+    def load(self, kp: float | None = None, ki: float | None = None, **others: int) -> None:
+        """All registers of the drive with QUIET and ``others``; current gains [V/A], [V/(A s)] if given."""
         control = {}
-        if bandwidth_hz is not None:
-            w_c, m = TURN_RAD * bandwidth_hz, self.drive.machine
-            for axis in "dq":
-                henry = getattr(m, f"inductance_{axis}_h")
-                corner = m.resistance_ohm if integral_hz is None else TURN_RAD * integral_hz * henry
-                control[f"current_kp_{axis}_v_per_a"] = w_c * henry
-                control[f"current_ki_{axis}_v_per_as"] = w_c * corner
+        if kp is not None:
+            control = {f"current_kp_{axis}_v_per_a": kp for axis in "dq"}
+            control |= {f"current_ki_{axis}_v_per_as": ki for axis in "dq"}
         drive = replace(self.drive, control=replace(self.drive.control, **control))
         values = registers(drive).values._asdict() | QUIET
         values |= {name: REGISTERS[name].high for name in OPEN_WIDE if name in REGISTERS}

@@ -14,7 +14,9 @@ time), the rotor's axes obey, with I_d = c_1 + conj(c_-1), I_q = -j*(c_1 - conj(
 
 V_1 is the first harmonic of a voltage against each leg's current; K is the EMF of the rotor that the torque swings.
 Several amplitudes separate R from V_dead, both senses cancel what a slow turn of the rotor adds, two frequencies
-separate L_q from K.
+separate L_q from K.  Each equation is turned into the direction of its current: the part along it has R and V_1, the part
+across it L and K; each kind counts by the rms of its own residuals.  The frequency is high, because at a low one the
+current stays at zero for a while whenever it changes sign, and V_1 is no longer what a sine would meet.
 """
 
 from __future__ import annotations
@@ -25,16 +27,18 @@ import numpy as np
 
 from fluxproof.commission.session import Refusal, Seen, Session, Step, Value, solve
 from fluxproof.golden_model.encoders.forced_position import RATE
-from fluxproof.golden_model.scaling import leg_loss_v
 from fluxproof.golden_model.units import TURN_RAD
 
-PARTS = (0.3, 0.5, 0.75)  # of the current limit
-HIGHEST_HZ, OF_RATE, OF_BASE, LOWER = 300.0, 0.95, 1.7, 0.6  # frequencies: largest, of the ranges; second over first
-OF_VOLTAGE = 0.6  # of the voltage circle, with twice the start values
+PARTS = (0.35, 0.55, 0.8)  # of the current limit
+HIGHEST_HZ, OF_RATE, OF_BASE = 240.0, 0.95, 1.7  # frequencies: largest, of the ranges
+LOWER = 0.6  # second frequency over the first
+OF_VOLTAGE = 0.8  # of the voltage circle, with twice the inductances of the file and what alignment took
+SMALLER = (1.0, 0.7, 0.5)  # of the amplitudes, where the voltage does not suffice
 LEAST_HZ = 15.0
 BANDWIDTH = 1.0 / 150.0  # of the sampling frequency, current regulators
 RAMP_S, SETTLE_S, SAMPLES = 0.1, 0.15, 250
 STOOD_DEG = 25.0  # electrical, largest turn of the rotor in a run
+UNKNOWN_SWING = 60.0  # rad/s, without an inertia in the file
 MISFIT = 0.03  # of the voltages, rms
 LARGEST_SIGMA = 0.03  # of R and L
 ORDERS = (1, -1, -5, 7)
@@ -60,30 +64,44 @@ def _axes(c: np.ndarray) -> tuple[complex, complex]:
     return c[0] + np.conj(c[1]), -1j * (c[0] - np.conj(c[1]))
 
 
-def frequency(session: Session, current: float) -> float:
-    """The field's frequency [electrical Hz] for this current: within rate, speed range and voltage."""
+def swing(session: Session, current: float) -> float:
+    """Frequency of the rotor in a standing field [rad/s], with the start values."""
+    m = session.drive.machine
+    if m.inertia_kgm2 <= 0.0:
+        return UNKNOWN_SWING
+    return math.sqrt(1.5 * m.pole_pairs**2 * m.magnet_flux_wb * current / m.inertia_kgm2)
+
+
+def frequency(session: Session, current: float, volts_per_a: float) -> float:
+    """The field's frequency [electrical Hz]: within rate, speed range and voltage; 0 where that is not enough.
+
+    ``volts_per_a``: of a standing or slow field, so R and the dead time's voltage together.
+    """
     m, t_s = session.drive.machine, session.t_s
     hertz = [HIGHEST_HZ, OF_RATE * RATE.hi * RATE.lsb * m.pole_pairs / t_s, 0.05 / t_s]
     hertz.append(OF_BASE * session.drive.bases.omega_me_rad_s / TURN_RAD)
-    room = OF_VOLTAGE * session.voltage() - 4.0 / math.pi * leg_loss_v(session.drive)
-    resistive = 2.0 * m.resistance_ohm * current
-    if room > resistive:
-        henry = 2.0 * max(m.inductance_d_h, m.inductance_q_h)
-        hertz.append(math.sqrt(room**2 - resistive**2) / (TURN_RAD * henry * current))
-    if room <= resistive or min(hertz) < LEAST_HZ:
-        raise Refusal(
-            f"too little voltage: {session.voltage():.3g} V do not drive {current:.3g} A at {LEAST_HZ:.0f} Hz through "
-            "the start values of R and L; check [machine], the bus and [control] current_limit_a"
-        )
-    return min(hertz)
+    room, resistive = OF_VOLTAGE * session.voltage(), volts_per_a * current
+    if room <= resistive:
+        return 0.0
+    henry = 2.0 * max(m.inductance_d_h, m.inductance_q_h)
+    return min(*hertz, math.sqrt(room**2 - resistive**2) / (TURN_RAD * henry * current))
 
 
-def measure(session: Session) -> Step:
+def measure(session: Session, volts_per_a: float) -> Step:
     """R, L_d, L_q, V_dead; the drive then has the first three."""
     s = session
-    high = frequency(s, PARTS[-1] * s.limit)
-    plan = [(part, sign * high) for part in PARTS for sign in (1.0, -1.0)]
-    plan += [(PARTS[-1], sign * LOWER * high) for sign in (1.0, -1.0)]
+    for size in SMALLER:
+        largest = size * PARTS[-1] * s.limit
+        high = frequency(s, largest, volts_per_a)
+        if high >= LEAST_HZ:
+            break
+    else:
+        raise Refusal(
+            f"too little voltage: {s.voltage():.3g} V do not drive {largest:.3g} A at {LEAST_HZ:.0f} Hz, the winding took "
+            f"{volts_per_a:.3g} V/A at standstill; check the bus, [machine] inductance_d_h and [control] current_limit_a"
+        )
+    plan = [(size * part, sign * high) for part in PARTS for sign in (1.0, -1.0)]
+    plan += [(size * PARTS[-1], sign * LOWER * high) for sign in (1.0, -1.0)]
     points = []
     for k, (part, hertz) in enumerate(plan):
         s.progress(f"winding, {part * s.limit:.3g} A at {hertz:.0f} Hz ({k + 1} of {len(plan)})")
@@ -94,10 +112,10 @@ def measure(session: Session) -> Step:
 def _run(s: Session, current: float, w: float) -> Point:
     """One amplitude at one frequency; the current rises slowly, so that the rotor gets no push."""
     m = s.drive.machine
-    bandwidth = BANDWIDTH / s.t_s
-    corner = m.resistance_ohm / (TURN_RAD * max(m.inductance_d_h, m.inductance_q_h))
+    w_c = TURN_RAD * BANDWIDTH / s.t_s
+    kp = w_c * min(m.inductance_d_h, m.inductance_q_h)
     s.gates_off()
-    s.load(bandwidth, max(corner, bandwidth / 4.0), reverse=0, theta_offset=0)
+    s.load(kp, max(w_c * m.resistance_ohm, kp * w_c / 4.0), reverse=0, theta_offset=0)
     s.force(0.0, w)
     s.settle(0.02)
     s.gates_on()
@@ -124,23 +142,30 @@ def _run(s: Session, current: float, w: float) -> Point:
 
 def judge(s: Session, points: list[Point]) -> Step:
     """One regression over all runs; unknowns R, L_d, L_q, 4/pi*V_dead, K."""
-    rows, values, weights = [], [], []
+    rows, values, sizes = [], [], []
     for p in points:
         w_e, cosine = 2.0 / s.t_s * math.sin(p.w * s.t_s / 2.0), math.cos(p.w * s.t_s / 2.0)
         (i_d, i_q), (u_d, u_q) = p.axes_i, p.axes_u
-        for row, value in (
-            ((cosine * i_d, 1j * w_e * i_d, 0.0, p.direction, 0.0), u_d),
-            ((cosine * i_q, 0.0, 1j * w_e * i_q, -1j * p.direction, i_q / (1j * p.w)), u_q),
+        for i, row, value in (
+            (i_d, (cosine * i_d, 1j * w_e * i_d, 0.0, p.direction, 0.0), u_d),
+            (i_q, (cosine * i_q, 0.0, 1j * w_e * i_q, -1j * p.direction, i_q / (1j * p.w)), u_q),
         ):
-            rows += [np.real(row), np.imag(row)]
-            values += [value.real, value.imag]
-            weights += [abs(value)] * 2
+            turned, along = np.array(row) * np.conj(i) / abs(i), value * np.conj(i) / abs(i)
+            rows += [np.real(turned), np.imag(turned)]
+            values += [along.real, along.imag]
+            sizes.append(abs(value))
     matrix, values = np.array(rows, float), np.array(values)
-    scale = np.linalg.norm(matrix, axis=0)
-    found, sigma, rms = solve(matrix / scale, values)
-    found, sigma = found / scale, sigma / scale
+    weights = np.ones(len(values))
+    for _ in range(3):  # each kind of equation by its own residuals
+        weighted = matrix * weights[:, None]
+        scale = np.linalg.norm(weighted, axis=0)
+        found, sigma, _ = solve(weighted / scale, values * weights)
+        found, sigma = found / scale, sigma / scale
+        rest = values - matrix @ found
+        for kind in (0, 1):
+            weights[kind::2] = 1.0 / max(math.sqrt(float(np.mean(rest[kind::2] ** 2))), 1e-9)
+    misfit = math.sqrt(float(np.mean(rest**2)) * 2.0 / float(np.mean(np.square(sizes))))
     (r, l_d, l_q, v_1, k), (s_r, s_d, s_q, s_v, s_k) = found, sigma
-    misfit = rms / math.sqrt(float(np.mean(np.square(weights))))
     if misfit > MISFIT:
         raise Refusal(
             f"R and L explain the voltages within {100 * misfit:.1f} % only, expected {100 * MISFIT:.0f} %: saturation "

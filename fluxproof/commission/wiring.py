@@ -11,7 +11,6 @@ those of every order and sign of the sensors; the true one must fit best and wel
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from itertools import permutations, product
 
 import numpy as np
@@ -111,22 +110,13 @@ def _answer(s: Session, angle: float) -> np.ndarray:
     most = PATIENCE * (2.0 * drive.machine.resistance_ohm * target + 1.5 * mid_loss + 0.01 * drive.inverter.dc_bus_v)
     most = min(most, 0.9 * s.voltage())
     rate = most / PATIENCE / RISE_S / target  # V/(A s): the voltage that a full error adds in a second
-    control = replace(
-        drive.control,
-        current_kp_d_v_per_a=0.0,
-        current_kp_q_v_per_a=0.0,
-        current_ki_d_v_per_as=rate,
-        current_ki_q_v_per_as=rate,
-    )
-    known, s.drive = s.drive, replace(drive, control=control)
     ignored = 1 << NAMES.index("current_sum") | 1 << NAMES.index("position")
     ignored |= 1 << NAMES.index("open_load") if "open_load" in NAMES else 0
-    s.load(reverse=0, theta_offset=0, fault_ignore=ignored & REGISTERS["fault_ignore"].high)
-    s.drive = known
+    s.load(0.0, rate, reverse=0, theta_offset=0, fault_ignore=ignored & REGISTERS["fault_ignore"].high)
     s.gates_off()
     s.force(angle)
     s.gates_on()
-    s.set(i_d_ref=target)
+    s.set(i_d_ref=1.2 * target)  # at 90 degrees a phase shows cos 30 of it
     offsets = np.array(drive.sensors.current_offset_code)
     per_code = drive.sensors.current_range_a / 2.0 ** (drive.sensors.adc_bits - 1)
 
