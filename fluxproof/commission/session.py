@@ -92,7 +92,20 @@ class Session:
         drive = replace(self.drive, control=replace(self.drive.control, **control))
         values = registers(drive).values._asdict() | QUIET
         values |= {name: REGISTERS[name].high for name in OPEN_WIDE if name in REGISTERS}
-        for name, value in (values | others).items():
+        self._write(values | others)
+
+    def load_final(self) -> None:
+        """All registers as the drive says, nothing left out."""
+        self._write(registers(self.drive).values._asdict())
+
+    def speed_gains(self, kp: float, ki: float) -> dict[str, int]:
+        """The registers of these gains [A s/rad], [A/rad] of the speed loop, per electrical speed and angle."""
+        control = replace(self.drive.control, speed_kp_as_per_rad=kp, speed_ki_a_per_rad=ki)
+        values = registers(replace(self.drive, control=control)).values
+        return {name: getattr(values, name) for name in ("speed_kp", "speed_ki")}
+
+    def _write(self, values: dict[str, int]) -> None:
+        for name, value in values.items():
             if name != "position_restart" and not name.endswith("_given"):  # the board's own
                 self.bus.write(name, value)
 
