@@ -81,6 +81,9 @@ def inertia(session: Session) -> Step:
     matrix, values = np.vstack(blocks), np.concatenate(values)
     scale = np.maximum(np.linalg.norm(matrix, axis=0), 1e-30)
     found, sigma, rms = solve(matrix / scale, values)
+    rest = values - matrix / scale @ found
+    like = float(np.clip(np.corrcoef(rest[1:], rest[:-1])[0, 1], 0.0, 0.99))
+    sigma = sigma * math.sqrt((1.0 + like) / (1.0 - like))  # residuals of neighbours resemble each other
     k, b, c = (found / scale)[-3:]
     s_k, s_b, s_c = (sigma / scale)[-3:]
     if k <= 0.0:
