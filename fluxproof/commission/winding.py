@@ -6,17 +6,17 @@ after the next valley: in the rotating frame it is that of the angle phi + 1.5*w
 
     w -> w_e = 2/T*sin(w*T/2),    R -> R*cos(w*T/2)            (a frame that turns during a held vector)
 
-With currents and voltages as sums of c_n*exp(j*n*phi) in the rotor's frame, n = 1, -1 (a salient rotor) and -5, 7 (dead
-time), the rotor's axes obey, with I_d = c_1 + conj(c_-1), I_q = -j*(c_1 - conj(c_-1)) and U likewise:
+With currents and voltages as sums of c_n*exp(j*n*phi) in the rotor's frame, n = 1, -1 (a salient rotor) and those of the
+dead time, the rotor's axes obey, with I_d = c_1 + conj(c_-1), I_q = -j*(c_1 - conj(c_-1)) and U, S likewise:
 
-    U_d = (R + j*w_e*L_d)*I_d + V_1;    U_q = (R + j*w_e*L_q + K/(j*w))*I_q - j*V_1
-    V_1 = 4/pi*V_dead*c_1/|c_1|;        K = 1.5*p^2*psi^2/J
+    U_d = (R + j*w_e*L_d)*I_d + V_dead*S_d;    U_q = (R + j*w_e*L_q + K/(j*w))*I_q + V_dead*S_q;    K = 1.5*p^2*psi^2/J
 
-V_1 is the first harmonic of a voltage against each leg's current; K is the EMF of the rotor that the torque swings.
+S is the vector of the signs of the three phase currents, which follow from the c_n: harmonics and a salient rotor move
+the instants at which a current changes its sign.  K is the EMF of the rotor that the torque swings.
 Several amplitudes separate R from V_dead, both senses cancel what a slow turn of the rotor adds, two frequencies
-separate L_q from K.  Each equation is turned into the direction of its current: the part along it has R and V_1, the part
+separate L_q from K.  Each equation is turned into the direction of its current: the part along it has R and V_dead, the part
 across it L and K; each kind counts by the rms of its own residuals.  The frequency is high, because at a low one the
-current stays at zero for a while whenever it changes sign, and V_1 is no longer what a sine would meet.
+current stays at zero for a while whenever it changes sign, and its sign is no longer all that counts.
 """
 
 from __future__ import annotations
@@ -41,7 +41,8 @@ STOOD_DEG = 25.0  # electrical, largest turn of the rotor in a run
 UNKNOWN_SWING = 60.0  # rad/s, without an inertia in the file
 MISFIT = 0.03  # of the voltages, rms
 LARGEST_SIGMA = 0.03  # of R and L
-ORDERS = (1, -1, -5, 7)
+ORDERS = (1, -1, -5, 7, 5, -7, -11, 13)
+GRID = TURN_RAD / 720 * np.arange(720)  # phi, to find the harmonics of the signs
 
 
 class Point:
@@ -56,7 +57,14 @@ class Point:
         basis = np.exp(1j * np.outer(ahead, orders))
         self.u, *_ = np.linalg.lstsq(basis, seen.voltage, rcond=None)
         self.axes_i, self.axes_u = _axes(self.i), _axes(self.u)
-        self.direction = self.i[0] / abs(self.i[0])
+        self.axes_s = _axes(self._signs(float(np.mean(rotor))))
+
+    def _signs(self, rotor: float) -> np.ndarray:
+        """c_1, c_-1 of the vector of the phase currents' signs."""
+        current = np.exp(1j * np.outer(GRID, ORDERS)) @ self.i
+        axes = np.exp(1j * (TURN_RAD / 3.0 * np.arange(3) - rotor))
+        vector = 2.0 / 3.0 * np.sign(np.real(np.outer(current, np.conj(axes)))) @ axes
+        return np.array([np.mean(vector * np.exp(-1j * n * GRID)) for n in (1, -1)])
 
 
 def _axes(c: np.ndarray) -> tuple[complex, complex]:
@@ -141,14 +149,14 @@ def _run(s: Session, current: float, w: float) -> Point:
 
 
 def judge(s: Session, points: list[Point]) -> Step:
-    """One regression over all runs; unknowns R, L_d, L_q, 4/pi*V_dead, K."""
+    """One regression over all runs; unknowns R, L_d, L_q, V_dead, K."""
     rows, values, sizes = [], [], []
     for p in points:
         w_e, cosine = 2.0 / s.t_s * math.sin(p.w * s.t_s / 2.0), math.cos(p.w * s.t_s / 2.0)
-        (i_d, i_q), (u_d, u_q) = p.axes_i, p.axes_u
+        (i_d, i_q), (u_d, u_q), (s_d, s_q) = p.axes_i, p.axes_u, p.axes_s
         for i, row, value in (
-            (i_d, (cosine * i_d, 1j * w_e * i_d, 0.0, p.direction, 0.0), u_d),
-            (i_q, (cosine * i_q, 0.0, 1j * w_e * i_q, -1j * p.direction, i_q / (1j * p.w)), u_q),
+            (i_d, (cosine * i_d, 1j * w_e * i_d, 0.0, s_d, 0.0), u_d),
+            (i_q, (cosine * i_q, 0.0, 1j * w_e * i_q, s_q, i_q / (1j * p.w)), u_q),
         ):
             turned, along = np.array(row) * np.conj(i) / abs(i), value * np.conj(i) / abs(i)
             rows += [np.real(turned), np.imag(turned)]
@@ -165,28 +173,27 @@ def judge(s: Session, points: list[Point]) -> Step:
         for kind in (0, 1):
             weights[kind::2] = 1.0 / max(math.sqrt(float(np.mean(rest[kind::2] ** 2))), 1e-9)
     misfit = math.sqrt(float(np.mean(rest**2)) * 2.0 / float(np.mean(np.square(sizes))))
-    (r, l_d, l_q, v_1, k), (s_r, s_d, s_q, s_v, s_k) = found, sigma
+    (r, l_d, l_q, v_dead, k), (s_r, s_l_d, s_l_q, s_v, s_k) = found, sigma
     if misfit > MISFIT:
         raise Refusal(
             f"R and L explain the voltages within {100 * misfit:.1f} % only, expected {100 * MISFIT:.0f} %: saturation "
             "at this current, a blocked phase or a poor current sensor"
         )
-    for name, value, error in (("R", r, s_r), ("L_d", l_d, s_d), ("L_q", l_q, s_q)):
+    for name, value, error in (("R", r, s_r), ("L_d", l_d, s_l_d), ("L_q", l_q, s_l_q)):
         if not value > 0.0 or error > LARGEST_SIGMA * value:
             raise Refusal(
                 f"{name} = {value:.4g} +-{error:.2g}: expected an uncertainty below {100 * LARGEST_SIGMA:.0f} %; raise "
                 "the current limit or check the noise of the current sensors"
             )
     s.know("machine", resistance_ohm=float(r), inductance_d_h=float(l_d), inductance_q_h=float(l_q))
-    v_dead = math.pi / 4.0 * v_1
     quantities = {
         "resistance": Value(float(r), float(s_r), "ohm"),
-        "inductance_d": Value(float(l_d), float(s_d), "H"),
-        "inductance_q": Value(float(l_q), float(s_q), "H"),
-        "v_dead": Value(float(v_dead), float(math.pi / 4.0 * s_v), "V"),
+        "inductance_d": Value(float(l_d), float(s_l_d), "H"),
+        "inductance_q": Value(float(l_q), float(s_l_q), "H"),
+        "v_dead": Value(float(v_dead), float(s_v), "V"),
     }
     said = (
-        f"R {r:.4g} +-{s_r:.1g} ohm, L_d {1e3 * l_d:.4g} +-{1e3 * s_d:.1g} mH, L_q {1e3 * l_q:.4g} +-{1e3 * s_q:.1g} mH, "
+        f"R {r:.4g} +-{s_r:.1g} ohm, L_d {1e3 * l_d:.4g} +-{1e3 * s_l_d:.1g} mH, L_q {1e3 * l_q:.4g} +-{1e3 * s_l_q:.1g} mH, "
         f"V_dead {v_dead:.3g} +-{s_v:.1g} V, misfit {100 * misfit:.2f} %"
     )
     notes = {"misfit": misfit, "swing_k": [float(k), float(s_k)], "frequencies_hz": [p.w / TURN_RAD for p in points]}
