@@ -14,6 +14,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from fluxproof import dump_capture, print_registers
+from fluxproof.commission import command as commission
 from fluxproof.diagnosis import command as diagnose
 from fluxproof.diagnosis.recording import RecordingError
 from fluxproof.golden_model.drive_keys import DriveError
@@ -30,6 +31,11 @@ class Command(NamedTuple):
 
 
 COMMANDS = {
+    "commission": Command(
+        "measure what a drive file cannot know, over the registers of a board",
+        commission.arguments,
+        commission.run_command,
+    ),
     "diagnose": Command("why a recording differs from its simulation", diagnose.arguments, diagnose.run),
     "dump": Command(
         "convert a captured telemetry stream to the input of diagnose", dump_capture.arguments, dump_capture.run

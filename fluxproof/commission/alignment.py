@@ -140,7 +140,10 @@ def judge(s: Session, ways: list[Seen], reverse_given: bool | None) -> Step:
         f"code {'falls' if reverse else 'rises'} with the field, offset {math.degrees(offset) % 360:.2f} degrees "
         f"+-{math.degrees(sigma):.2f}, lag {math.degrees(lag):.1f}, turns {abs(ratio):.4f}"
     )
-    values = {"theta_offset": Value(offset % TURN_RAD, sigma, "rad"), "turns": Value(abs(ratio), abs(slopes[0] - slopes[1]) / 2, "1")}
+    values = {
+        "theta_offset": Value(offset % TURN_RAD, sigma, "rad"),
+        "turns": Value(abs(ratio), abs(slopes[0] - slopes[1]) / 2, "1"),
+    }
     taken = float(np.mean([np.abs(way.voltage).mean() / np.abs(way.current).mean() for way in ways]))
     notes = {"position_reverse": reverse, "lag_deg": math.degrees(lag), "volts_per_a": taken}
     return Step("alignment", values, said, notes)

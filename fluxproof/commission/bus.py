@@ -101,9 +101,7 @@ class UioBus:
 
     def _angle(self, code: int) -> int:
         r = self.read
-        (theta,) = position.step.py_func(
-            code, r("reverse"), r("pole_pairs"), r("theta_offset"), r("position_bits")
-        )
+        (theta,) = position.step.py_func(code, r("reverse"), r("pole_pairs"), r("theta_offset"), r("position_bits"))
         return theta
 
     def wait(self, seconds: float) -> None:

@@ -8,7 +8,7 @@ turns the gates off until ``clear_trip``.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from fluxproof.commission.bus import CODES, VALUES, checked
 from fluxproof.cosim.closed_loop import described_sensors
 from fluxproof.cosim.golden_loop import mixed_kernel
 from fluxproof.golden_model import fluxproof
+from fluxproof.golden_model.drive_keys import DriveError
 from fluxproof.golden_model.encoders import forced_position
 from fluxproof.golden_model.io import board_map
 from fluxproof.golden_model.io.fault_latch import NAMES
@@ -61,6 +62,26 @@ class Board:
     seed: int = 0
     host_periods: tuple[int, int] = (1, 4)  # a snapshot comes after so many, at random
     registers: dict = field(default_factory=board_map.registers)
+
+
+def board_of(drive) -> Board:
+    """What a drive file describes, with sensors as they come: offsets, noise, an encoder mounted anyhow.
+
+    The encoder counts as [sensors] position_reverse says; offsets are 1, -2 and 0.5 % of the range, noise 0.03 %.
+    """
+    i, span = drive.inverter, drive.sensors.current_range_a
+    sensors = replace(
+        described_sensors(drive),
+        current_offset_a=(0.01 * span, -0.02 * span, 0.005 * span),
+        current_noise_a=3e-4 * span,
+        position_offset_rad=1.0,
+        position_direction=-1 if drive.sensors.position_reverse else 1,
+    )
+    machine = Machine.from_mapping(vars(drive.machine))
+    if machine.inertia_kgm2 <= 0.0:
+        raise DriveError("[machine] inertia_kgm2 is missing: the simulated shaft needs one")
+    drops = Inverter(0.0, i.v_switch_v, i.v_diode_v, i.r_switch_ohm, i.r_diode_ohm)
+    return Board(machine, drops, i.dead_time_s, sensors, theta_m=2.0)
 
 
 @mixed_kernel

@@ -53,5 +53,3 @@ def commission(
         bus.write("enable", 0)
         bus.write("position_source", 0)
     return session.drive, steps
-
-

@@ -1,6 +1,6 @@
 """Commissioning on random motors and on boards that are wired wrongly: what `make board` shows of it.
 
-    python -m studies.board.commissioning [COUNT]        a line a motor, then the figures
+python -m studies.board.commissioning [COUNT]        a line a motor, then the figures
 """
 
 from __future__ import annotations
@@ -144,7 +144,9 @@ def figures(count: int = COUNT, faults_of: int = 3, say: Callable[[str], None] =
         outcomes.append(run(case(seed)))
         say(f"motor {seed}: {_line(outcomes[-1])} ({time.monotonic() - began:.0f} s)")
     accepted = [o for o in outcomes if o.reason is None]
-    rows = [row("commissioning: motors accepted", len(accepted), f"{count} of {count}", "motors", len(accepted) == count)]
+    rows = [
+        row("commissioning: motors accepted", len(accepted), f"{count} of {count}", "motors", len(accepted) == count)
+    ]
     for name, (most, unit) in TARGETS.items():
         worst = max((o.errors[name] for o in accepted), default=math.nan)
         rows.append(row(f"commissioning: {name}, largest error", round(worst, 3), f"<= {most:g}", unit, worst <= most))
@@ -159,10 +161,14 @@ def figures(count: int = COUNT, faults_of: int = 3, say: Callable[[str], None] =
     for name in FAULTS:
         for seed in range(faults_of):
             ok, said, current = refused(name, case(1000 + seed))
-            say(f"{name}, motor {1000 + seed}: {'refused' if ok else 'MISSED'}: {said}; current {current:.2f} of the limit")
+            say(
+                f"{name}, motor {1000 + seed}: {'refused' if ok else 'MISSED'}: {said}; current {current:.2f} of the limit"
+            )
             right, told = right + ok, told + 1
             currents.append(current)
-    rows.append(row("commissioning: faults refused with their reason", right, f"{told} of {told}", "runs", right == told))
+    rows.append(
+        row("commissioning: faults refused with their reason", right, f"{told} of {told}", "runs", right == told)
+    )
     most = max(currents)
     rows.append(row("commissioning: largest current over the limit", round(most, 3), "<= 1", "1", most <= 1.0))
     return rows

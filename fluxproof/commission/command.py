@@ -1,0 +1,111 @@
+"""The subcommand ``fluxproof commission drive.toml [--bus sim|/dev/uioN] [--out DIR]``: drive.toml and commission.json.
+
+Exit status: 0 accepted, 1 refused or stopped, with the reason in one line on stderr, 2 bad input.  The gates are off at
+the end, Ctrl-C and SIGTERM included.
+"""
+
+from __future__ import annotations
+
+import argparse
+import signal
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+from fluxproof.files import write_json, write_text
+from fluxproof.golden_model.drive import load
+from fluxproof.golden_model.drive_file import read_tables
+from fluxproof.golden_model.drive_keys import DriveError
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the subcommand."""
+    parser.add_argument("drive", metavar="drive.toml", help="the drive with start values, see docs/commissioning.md")
+    parser.add_argument(
+        "--bus",
+        default="sim",
+        metavar="sim|/dev/uioN",
+        help="the board's registers; default sim: the golden core on the drive of the file",
+    )
+    parser.add_argument("--out", metavar="DIR", help="folder of the results; default build/commission/NAME")
+
+
+def run_command(args: argparse.Namespace) -> int:
+    """Measure, write both files, say each step."""
+    drive = load(args.drive)
+    if drive.machine.magnet_flux_wb <= 0.0:
+        raise DriveError(f"{args.drive}: [machine] magnet_flux_wb = 0: commissioning is for machines with magnets")
+    given = read_tables(args.drive).get("sensors", {})
+    reverse = given.get("position_reverse")
+    folder = Path(args.out) if args.out else Path("build") / "commission" / Path(args.drive).stem
+    if (folder / "drive.toml").resolve() == Path(args.drive).resolve():
+        raise DriveError(f"{args.drive}: --out {folder} would replace the input; give another folder")
+    _say("loading")
+    bus = open_bus(args.bus, drive)
+    return commission_file(bus, args.drive, drive, reverse, folder)
+
+
+def open_bus(name: str, drive):
+    """A bus by its name; DriveError where the device cannot be used."""
+    if name == "sim":
+        from fluxproof.commission.simulated import SimulatedBus, board_of  # takes seconds
+
+        return SimulatedBus(drive, board_of(drive))
+    from fluxproof.commission.bus import UioBus
+
+    return UioBus(name)
+
+
+def commission_file(bus, path: str, drive, reverse: bool | None, folder: Path) -> int:
+    """The whole of it on an open bus; the exit status."""
+    from fluxproof.commission import document
+    from fluxproof.commission.session import Refusal
+    from fluxproof.commission.steps import commission
+
+    steps, began = [], bus.now()
+    text = Path(path).read_text(encoding="utf-8")
+    drive = replace(drive, sensors=replace(drive.sensors, position_reverse=False, theta_offset_rad=0.0))
+
+    def done(step) -> None:
+        steps.append(step)
+        _clear()
+        print(f"{step.name}: {step.said}", flush=True)
+
+    def ended(status: str, reason: str) -> None:
+        _clear()
+        data = document.data(Path(path).name, status, reason, steps, bus.now() - began)
+        write_json(folder / "commission.json", data)
+
+    before = {number: signal.signal(number, _stop) for number in (signal.SIGTERM, signal.SIGHUP)}
+    try:
+        found, _ = commission(bus, drive, reverse, _say, done)
+    except Refusal as refusal:
+        ended("refused", str(refusal))
+        print(f"fluxproof: {path}: refused: {refusal}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        ended("stopped", "stopped by the user")
+        print(f"fluxproof: {path}: stopped, gates off", file=sys.stderr)
+        return 1
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+    ended("accepted", "")
+    written = write_text(folder / "drive.toml", document.document(text, found, steps))
+    load(written)  # what was written can be read
+    print(f"accepted: {written}, {folder / 'commission.json'} ({bus.now() - began:.1f} s of the drive)")
+    return 0
+
+
+def _stop(_number, _frame) -> None:
+    raise KeyboardInterrupt
+
+
+def _say(text: str) -> None:
+    if sys.stderr.isatty():
+        print(f"\rcommission: {text}\x1b[K", end="", file=sys.stderr, flush=True)
+
+
+def _clear() -> None:
+    if sys.stderr.isatty():
+        print("\r\x1b[K", end="", file=sys.stderr, flush=True)
