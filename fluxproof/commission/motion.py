@@ -5,8 +5,8 @@ Torque steps of i_q both ways, the place of the shaft [electrical rad] from the 
     theta = theta_0 + omega_0*t + K*(double integral of i_q) - b*(of sign(omega)) - c*(of omega)
     K = 1.5*p^2*psi/J;    b = p*T_coulomb/J;    c = B/J
 
-Each step has its own theta_0 and omega_0.  Held speeds of both senses, with a current in the d axis of both signs, so that
-the direction of the dead time's voltage V_1 is known:
+Each step has its own theta_0 and omega_0.  Held speeds of both senses, with a current in the d axis of both signs, so
+that the direction of the dead time's voltage V_1 is known:
 
     u_q = R*i_q + V_1*i_q/|i| + w_e*(psi + L_d*i_d)
     u_d = R*i_d + V_1*i_d/|i| - w_e*L_q*i_q + w_e*psi*sin(error)
@@ -243,8 +243,8 @@ def closed_loop(session: Session) -> Step:
     quiet = drive.control.speed_bandwidth_hz is None
     s.gates_off()
     s.release()
-    s.settle(0.05)
     s.load_final()
+    s.settle(0.1)  # the core looks at the sensors' zero again
     if quiet:
         return Step("closed loop", {}, "no speed loop in the drive file: not run", {})
     k = 1.5 * drive.machine.pole_pairs**2 * drive.machine.magnet_flux_wb / drive.machine.inertia_kgm2

@@ -41,7 +41,19 @@ SHIFT, PLACE_W = forced_position.SHIFT, forced_position.PLACE_W
 SOURCE, ANGLE, RATE, TRAVELLED, LAST_SOURCE, LAST_ANGLE = range(6)  # of ``forced``
 INPUTS = ("omega_ref", "i_d_ref", "i_q_ext", "speed_mode", "temp_winding", "temp_valid")
 COMMANDS = ("enable", "position_source", "forced_angle", "forced_rate", "board_ignore", "telemetry_enable")
-I_THETA, I_TRIP, I_FAULTS = (fluxproof.Observed._fields.index(n) for n in ("theta_me", "sample_trip", "sample_faults"))
+FIELDS = fluxproof.Observed._fields
+# (place in Observed, bit of the fault flags) of what a sample can trip by; later checks of the core have bits of their own
+FAULTS = [(FIELDS.index("sample_faults"), 0)]
+FAULTS += [
+    (FIELDS.index(field), NAMES.index(name))
+    for field, name in (
+        ("motion_faults", "overspeed"),
+        ("open_load", "open_load"),
+        ("current_offset", "current_offset"),
+    )
+    if field in FIELDS
+]
+FAULT_PLACES, FAULT_BITS = (np.array(column, np.int64) for column in zip(*FAULTS, strict=True))
 
 
 @dataclass(frozen=True)
@@ -125,8 +137,9 @@ def advance(
         for n, value in enumerate(seen):
             observed[n] = value
         if flags[0] == 1:
-            flags[2] |= observed[I_FAULTS]
-            if observed[I_TRIP]:
+            for n in range(len(FAULT_PLACES)):
+                flags[2] |= observed[FAULT_PLACES[n]] << FAULT_BITS[n]
+            if flags[2] & ~usual.fault_ignore:
                 flags[1] = 1
         times, words = centred_gates(duties, dead_time_s, period_s)
         for n in range(len(words)):
@@ -159,7 +172,7 @@ class SimulatedBus:
         self._state, self._random = fluxproof.State(), np.random.default_rng(board.seed)
         self._forced, self._flags = np.zeros(6, np.int64), np.zeros(3, np.int64)
         self._codes = np.zeros(6, np.int64)
-        self._observed = np.zeros(len(fluxproof.Observed._fields), np.int64)
+        self._observed = np.zeros(len(FIELDS), np.int64)
         self._peak, self._done, self._due = np.zeros(1), 0, 0.0
         self._settings = None
 
@@ -176,8 +189,8 @@ class SimulatedBus:
         return float(self._plant[L.THETA_M])
 
     def read(self, name: str) -> int:
-        if name in fluxproof.Observed._fields:
-            return int(self._observed[fluxproof.Observed._fields.index(name)])
+        if name in FIELDS:
+            return int(self._observed[FIELDS.index(name)])
         if name in ("fault_flags", "first_fault"):
             return int(self._flags[2])
         if name == "flags":
@@ -221,8 +234,3 @@ class SimulatedBus:
             self.drive.sample_time_s, self._u_dc, 0.0, self._done, periods, self._peak, self._codes, self._observed,
         )  # fmt: skip
         self._done += periods
-
-
-def faults(flags: int) -> str:
-    """The names of latched faults."""
-    return ", ".join(name for k, name in enumerate(NAMES) if flags >> k & 1)

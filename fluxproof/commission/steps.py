@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from fluxproof.commission import alignment, motion, wiring, winding
+from fluxproof.commission import alignment, motion, winding, wiring
 from fluxproof.commission.bus import Bus, BusError
 from fluxproof.commission.session import Refusal, Session, Step
 from fluxproof.golden_model.drive import Drive
