@@ -8,7 +8,8 @@ EMF of a rotor that swings in the field drives a current through R + kp, which d
     w_0^2 = 1.5*p^2*psi*I/J;    damping = psi*w_0/(2*I*(R + kp))
 
 kp gives a damping of a third with the start values, more of it where the dead time would bend the vector, and the
-integral is slower than the swing.  Each way is fitted by a line, code over field: its slope is +-1 where pole pairs and counts are right.
+integral is slower than the swing.  Each way is fitted by a line, code over field: its slope is +-1 where pole pairs and
+counts are right.
 """
 
 from __future__ import annotations
@@ -99,8 +100,8 @@ def judge(s: Session, ways: list[Seen], reverse_given: bool | None) -> Step:
     slopes, moved = [], [float(np.ptp(way.code)) for way in ways]
     if max(moved) < MOVED:
         raise Refusal(
-            f"locked rotor: the field turned by a turn of the shaft each way, the encoder by {max(moved):.3f}; free the "
-            "shaft, check that the encoder counts and that the current limit moves the load"
+            f"locked rotor: the field turned by a turn of the shaft each way, the encoder by {max(moved):.3f}; free "
+            "the shaft, check that the encoder counts and that the current limit moves the load"
         )
     for way in ways:
         slope, _ = np.polyfit(way.place, way.code, 1)
@@ -129,8 +130,8 @@ def judge(s: Session, ways: list[Seen], reverse_given: bool | None) -> Step:
     )
     if abs(math.degrees(lag)) > LAG_DEG or math.degrees(ripple) > RIPPLE_DEG:
         raise Refusal(
-            f"the rotor lags the field by {math.degrees(lag):.0f} degrees and swings by {math.degrees(ripple):.0f} rms, "
-            f"expected {LAG_DEG:.0f} and {RIPPLE_DEG:.0f} at most: friction, cogging or load is too large for the "
+            f"the rotor lags the field by {math.degrees(lag):.0f} degrees and swings by {math.degrees(ripple):.0f} "
+            f"rms, expected {LAG_DEG:.0f} and {RIPPLE_DEG:.0f} at most: friction, cogging or load is too large for the "
             "current limit, or an edge of the encoder is lost"
         )
     resolution = TURN_RAD * pairs / min(2**s.drive.sensors.position_bits, s.drive.encoder.counts or 1 << 30)

@@ -1,4 +1,4 @@
-"""What the steps share: registers in force, snapshots in SI units, the watch on the currents, the gates off at the end."""
+"""What the steps share: registers in force, snapshots in SI units, the watch on the currents, the gates."""
 
 from __future__ import annotations
 

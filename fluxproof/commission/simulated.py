@@ -42,7 +42,7 @@ SOURCE, ANGLE, RATE, TRAVELLED, LAST_SOURCE, LAST_ANGLE = range(6)  # of ``force
 INPUTS = ("omega_ref", "i_d_ref", "i_q_ext", "speed_mode", "temp_winding", "temp_valid")
 COMMANDS = ("enable", "position_source", "forced_angle", "forced_rate", "board_ignore", "telemetry_enable")
 FIELDS = fluxproof.Observed._fields
-# (place in Observed, bit of the fault flags) of what a sample can trip by; later checks of the core have bits of their own
+# (place in Observed, bit of the fault flags) of what a sample can trip by
 FAULTS = [(FIELDS.index("sample_faults"), 0)]
 FAULTS += [
     (FIELDS.index(field), NAMES.index(name))

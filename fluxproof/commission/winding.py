@@ -1,21 +1,21 @@
 """R, L_d, L_q and the dead-time voltage from a current vector that rotates too fast for the rotor.
 
-The regulators hold a vector in the frame of the forced angle.  A snapshot k has the current i(k) at the angle phi of that
-frame against the rotor, and the voltage u(k), which acts as a constant vector in the stator's frame during the period
+The regulators hold a vector in the frame of the forced angle.  A snapshot k has the current i(k) at the angle phi of
+that frame against the rotor, and the voltage u(k), which acts as a constant vector in the stator's frame during the period
 after the next valley: in the rotating frame it is that of the angle phi + 1.5*w*T, and
 
     w -> w_e = 2/T*sin(w*T/2),    R -> R*cos(w*T/2)            (a frame that turns during a held vector)
 
-With currents and voltages as sums of c_n*exp(j*n*phi) in the rotor's frame, n = 1, -1 (a salient rotor) and those of the
-dead time, the rotor's axes obey, with I_d = c_1 + conj(c_-1), I_q = -j*(c_1 - conj(c_-1)) and U, S likewise:
+With currents and voltages as sums of c_n*exp(j*n*phi) in the rotor's frame, n = 1, -1 (a salient rotor) and those of
+the dead time, the rotor's axes obey, with I_d = c_1 + conj(c_-1), I_q = -j*(c_1 - conj(c_-1)) and U, S likewise:
 
     U_d = (R + j*w_e*L_d)*I_d + V_dead*S_d;    U_q = (R + j*w_e*L_q + K/(j*w))*I_q + V_dead*S_q;    K = 1.5*p^2*psi^2/J
 
 S is the vector of the signs of the three phase currents, which follow from the c_n: harmonics and a salient rotor move
 the instants at which a current changes its sign.  K is the EMF of the rotor that the torque swings.
 Several amplitudes separate R from V_dead, both senses cancel what a slow turn of the rotor adds, two frequencies
-separate L_q from K.  Each equation is turned into the direction of its current: the part along it has R and V_dead, the part
-across it L and K; each kind counts by the rms of its own residuals.  The frequency is high, because at a low one the
+separate L_q from K.  Each equation is turned into the direction of its current: the part along it has R and V_dead, the
+part across it L and K; each kind counts by the rms of its own residuals.  The frequency is high, because at a low one the
 current stays at zero for a while whenever it changes sign, and its sign is no longer all that counts.
 """
 
@@ -105,8 +105,8 @@ def measure(session: Session, volts_per_a: float) -> Step:
             break
     else:
         raise Refusal(
-            f"too little voltage: {s.voltage():.3g} V do not drive {largest:.3g} A at {LEAST_HZ:.0f} Hz, the winding took "
-            f"{volts_per_a:.3g} V/A at standstill; check the bus, [machine] inductance_d_h and [control] current_limit_a"
+            f"too little voltage: {s.voltage():.3g} V do not drive {largest:.3g} A at {LEAST_HZ:.0f} Hz, the winding "
+            f"took {volts_per_a:.3g} V/A at standstill; check the bus, [machine] inductance_d_h, [control] current_limit_a"
         )
     plan = [(size * part, sign * high) for part in PARTS for sign in (1.0, -1.0)]
     plan += [(size * PARTS[-1], sign * LOWER * high) for sign in (1.0, -1.0)]
@@ -134,16 +134,16 @@ def _run(s: Session, current: float, w: float) -> Point:
     s.gates_off()
     if abs(float(seen.i_d.mean()) / current - 1.0) > 0.2:
         raise Refusal(
-            f"the current reaches {seen.i_d.mean():.3g} A at {w / TURN_RAD:.0f} Hz, expected {current:.3g} A: too little "
-            "voltage for the inductance, or it does not settle; check the start values of R and L"
+            f"the current reaches {seen.i_d.mean():.3g} A at {w / TURN_RAD:.0f} Hz, expected {current:.3g} A: too "
+            "little voltage for the inductance, or it does not settle; check the start values of R and L"
         )
     sensors, pairs = s.drive.sensors, m.pole_pairs
     rotor = (-1.0 if sensors.position_reverse else 1.0) * pairs * TURN_RAD * seen.code + sensors.theta_offset_rad
     line = np.polyval(np.polyfit(seen.t, rotor, 1), seen.t)
     if math.degrees(np.ptp(line)) > STOOD_DEG:
         raise Refusal(
-            f"the rotor turned by {math.degrees(np.ptp(line)):.0f} degrees in a field of {w / TURN_RAD:.0f} Hz, expected "
-            f"{STOOD_DEG:.0f} at most: something drives the shaft, or the inertia is too small"
+            f"the rotor turned by {math.degrees(np.ptp(line)):.0f} degrees in a field of {w / TURN_RAD:.0f} Hz, "
+            f"expected {STOOD_DEG:.0f} at most: something drives the shaft, or the inertia is too small"
         )
     return Point(seen, line, w, s.t_s)
 
@@ -193,7 +193,8 @@ def judge(s: Session, points: list[Point]) -> Step:
         "v_dead": Value(float(v_dead), float(s_v), "V"),
     }
     said = (
-        f"R {r:.4g} +-{s_r:.1g} ohm, L_d {1e3 * l_d:.4g} +-{1e3 * s_l_d:.1g} mH, L_q {1e3 * l_q:.4g} +-{1e3 * s_l_q:.1g} mH, "
+        f"R {r:.4g} +-{s_r:.1g} ohm, L_d {1e3 * l_d:.4g} +-{1e3 * s_l_d:.1g} mH, "
+        f"L_q {1e3 * l_q:.4g} +-{1e3 * s_l_q:.1g} mH, "
         f"V_dead {v_dead:.3g} +-{s_v:.1g} V, misfit {100 * misfit:.2f} %"
     )
     notes = {"misfit": misfit, "swing_k": [float(k), float(s_k)], "frequencies_hz": [p.w / TURN_RAD for p in points]}

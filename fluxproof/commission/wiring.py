@@ -82,13 +82,14 @@ def phases(session: Session) -> Step:
     answers = np.array(answers)
     if largest.max() < 0.5 * LOOKED_FOR * s.limit:
         raise Refusal(
-            f"no current: at most {largest.max():.2g} A, expected {LOOKED_FOR * s.limit:.2g} A; two phases are open, or "
-            "the power stage does not switch"
+            f"no current: at most {largest.max():.2g} A, expected {LOOKED_FOR * s.limit:.2g} A; two phases are "
+            "open, or the power stage does not switch"
         )
     for x, size in zip("abc", largest, strict=True):
         if size < OPEN_BELOW * largest.max():
             raise Refusal(
-                f"phase {x} is open: {size:.2g} A in it, {largest.max():.2g} A in the others; check its cable and sensor"
+                f"phase {x} is open: {size:.2g} A in it, {largest.max():.2g} A in the others; check its cable, its "
+                "sensor"
             )
     fits = _fits(answers, s.drive.sensors.current_sensors == 2)
     (order, signs), fit = max(fits.items(), key=lambda item: item[1])

@@ -30,7 +30,7 @@ TARGETS = {  # error of an accepted motor: (largest, unit)
 
 @dataclass
 class Outcome:
-    """One motor: errors by the names of TARGETS if accepted, the reason if refused; the largest current over the limit."""
+    """One motor: errors by the names of TARGETS if accepted, the reason if refused; largest current over limit."""
 
     seed: int
     errors: dict[str, float]
@@ -161,9 +161,8 @@ def figures(count: int = COUNT, faults_of: int = 3, say: Callable[[str], None] =
     for name in FAULTS:
         for seed in range(faults_of):
             ok, said, current = refused(name, case(1000 + seed))
-            say(
-                f"{name}, motor {1000 + seed}: {'refused' if ok else 'MISSED'}: {said}; current {current:.2f} of the limit"
-            )
+            verdict = "refused" if ok else "MISSED"
+            say(f"{name}, motor {1000 + seed}: {verdict}: {said}; current {current:.2f} of the limit")
             right, told = right + ok, told + 1
             currents.append(current)
     rows.append(
