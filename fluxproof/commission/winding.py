@@ -106,7 +106,7 @@ def measure(session: Session, volts_per_a: float) -> Step:
     else:
         raise Refusal(
             f"too little voltage: {s.voltage():.3g} V do not drive {largest:.3g} A at {LEAST_HZ:.0f} Hz, the winding "
-            f"took {volts_per_a:.3g} V/A at standstill; check the bus, [machine] inductance_d_h, [control] current_limit_a"
+            f"took {volts_per_a:.3g} V/A at standstill; check bus, [machine] inductance_d_h, [control] current_limit_a"
         )
     plan = [(size * part, sign * high) for part in PARTS for sign in (1.0, -1.0)]
     plan += [(size * PARTS[-1], sign * LOWER * high) for sign in (1.0, -1.0)]

@@ -21,7 +21,7 @@ from fluxproof.golden_model.io.fault_latch import NAMES
 from fluxproof.golden_model.scaling import leg_loss_v
 from fluxproof.golden_model.units import TURN_RAD, from_si
 
-SAMPLES = 400  # of an offset
+SAMPLES, MOST_SAMPLES, OFFSET_SIGMA = 400, 12000, 0.3  # of an offset; more until its uncertainty [codes] is this
 LARGEST_OFFSET = 0.06  # of the range: a sensor beyond is not there, or not at zero
 MOVING_TURNS = 2e-3  # the shaft stands within
 LOOKED_FOR = 0.2  # of the current limit
@@ -50,7 +50,12 @@ def offsets(session: Session) -> Step:
             f"too little voltage: {u_dc:.4g} V on the bus, expected {nominal:.4g} V; check the supply, "
             "[sensors] u_dc_range_v and [inverter] dc_bus_v"
         )
-    means, deviations = seen.adc.mean(axis=0), seen.adc.std(axis=0, ddof=1)
+    codes = seen.adc
+    more = int((float(codes.std(axis=0, ddof=1).max()) / OFFSET_SIGMA) ** 2) - SAMPLES
+    if more > 0:
+        s.progress(f"offsets, {min(more, MOST_SAMPLES)} samples more")
+        codes = np.vstack([codes, s.look(min(more, MOST_SAMPLES)).adc])
+    means, deviations = codes.mean(axis=0), codes.std(axis=0, ddof=1)
     mid = 2.0 ** (drive.sensors.adc_bits - 1)
     used = "bc" if drive.sensors.current_sensors == 2 else "abc"
     values = {}
@@ -61,7 +66,7 @@ def offsets(session: Session) -> Step:
             raise Refusal(
                 f"sensor {x} shows code {means[k]:.0f} without current, expected {mid:.0f}: check its supply and wiring"
             )
-        sigma = max(deviations[k], 1.0 / math.sqrt(12.0)) / math.sqrt(SAMPLES)
+        sigma = max(deviations[k], 1.0 / math.sqrt(12.0)) / math.sqrt(len(codes))
         values[f"offset_{x}"] = Value(float(means[k]), float(sigma), "codes")
     found = tuple(float(m) if x in used else mid for x, m in zip("abc", means, strict=True))
     s.know("sensors", current_offset_code=found)
