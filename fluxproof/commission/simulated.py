@@ -40,7 +40,6 @@ PLACES = 1 << forced_position.PLACE_W
 SHIFT, PLACE_W = forced_position.SHIFT, forced_position.PLACE_W
 SOURCE, ANGLE, RATE, TRAVELLED, LAST_SOURCE, LAST_ANGLE = range(6)  # of ``forced``
 INPUTS = ("omega_ref", "i_d_ref", "i_q_ext", "speed_mode", "temp_winding", "temp_valid")
-COMMANDS = ("enable", "position_source", "forced_angle", "forced_rate", "board_ignore", "telemetry_enable")
 FIELDS = fluxproof.Observed._fields
 # (place in Observed, bit of the fault flags) of what a sample can trip by
 FAULTS = [(FIELDS.index("sample_faults"), 0)]

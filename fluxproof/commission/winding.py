@@ -15,7 +15,7 @@ S is the vector of the signs of the three phase currents, which follow from the 
 the instants at which a current changes its sign.  K is the EMF of the rotor that the torque swings.
 Several amplitudes separate R from V_dead, both senses cancel what a slow turn of the rotor adds, two frequencies
 separate L_q from K.  Each equation is turned into the direction of its current: the part along it has R and V_dead, the
-part across it L and K; each kind counts by the rms of its own residuals.  The frequency is high, because at a low one the
+part across it L and K; each kind counts by the rms of its own residuals.  The frequency is high: at a low one the
 current stays at zero for a while whenever it changes sign, and its sign is no longer all that counts.
 """
 

@@ -1,0 +1,146 @@
+"""Commissioning on simulated boards: one motor, each fault once, the command, the window of a Zynq."""
+
+from __future__ import annotations
+
+import json
+import signal
+import tomllib
+
+import numpy as np
+import pytest
+
+from fluxproof import command
+from fluxproof.checkout import ROOT
+from fluxproof.commission import command as commissioning
+from fluxproof.commission.bus import CODES, VALUES, WINDOW, BusError, UioBus
+from fluxproof.commission.session import Refusal
+from fluxproof.commission.steps import commission
+from fluxproof.golden_model.drive import load
+from fluxproof.golden_model.drive_keys import DriveError
+from fluxproof.golden_model.io import board_map
+from fluxproof.golden_model.io.register_map import IDENTIFICATION
+from studies.board.commissioning import FAULTS, figures, refused, run
+from studies.board.motors import case
+
+DRIVE = ROOT / "docs" / "drives" / "spindle_400v.toml"
+
+
+def test_a_motor_with_a_wrong_file_is_measured():
+    outcome = run(case(2))
+    assert outcome.reason is None and outcome.right, outcome
+    assert outcome.current <= 1.0 and outcome.inertia < 5.0
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_each_fault_is_refused_for_its_reason(name):
+    right, said, current = refused(name, case(1002))
+    assert right, said
+    assert "expected" in said or "says otherwise" in said or "follow" in said
+    assert current <= 1.0
+
+
+def test_the_command_writes_what_it_measured(tmp_path, capsys):
+    assert command.main(["commission", str(DRIVE), "--out", str(tmp_path)]) == 0
+    told = capsys.readouterr().out
+    assert told.count("\n") == 8 and "accepted" in told
+    found, nominal = load(tmp_path / "drive.toml"), load(DRIVE)
+    for key in ("resistance_ohm", "inductance_d_h", "inductance_q_h", "magnet_flux_wb", "inertia_kgm2"):
+        assert getattr(found.machine, key) == pytest.approx(getattr(nominal.machine, key), rel=0.03), key
+    assert "(1 sigma)" in (tmp_path / "drive.toml").read_text()
+    data = json.loads((tmp_path / "commission.json").read_text())
+    assert data["status"] == "accepted" and [s["name"] for s in data["steps"]][-1] == "closed loop"
+    assert all(v["sigma"] >= 0.0 for s in data["steps"] for v in s["values"].values())
+    assert set(tomllib.loads((tmp_path / "drive.toml").read_text())) >= set(tomllib.loads(DRIVE.read_text()))
+
+
+def test_the_command_says_why_it_refuses(tmp_path, capsys, monkeypatch):
+    motor = case(1002)
+    monkeypatch.setattr(commissioning, "open_bus", lambda name, drive: motor_bus(drive, open_leg=1))
+    assert command.main(["commission", str(DRIVE), "--out", str(tmp_path)]) == 1
+    assert capsys.readouterr().err.count("\n") == 1
+    data = json.loads((tmp_path / "commission.json").read_text())
+    assert data["status"] == "refused" and "phase b is open" in data["reason"]
+    assert not (tmp_path / "drive.toml").exists() and motor.seed == 1002
+
+
+def motor_bus(drive, **changes):
+    from dataclasses import replace
+
+    from fluxproof.commission.simulated import SimulatedBus, board_of
+
+    return SimulatedBus(drive, replace(board_of(drive), **changes))
+
+
+def test_bad_input_is_status_two(tmp_path, capsys):
+    assert command.main(["commission", str(tmp_path / "none.toml")]) == 2
+    assert command.main(["commission", str(DRIVE), "--bus", str(tmp_path / "none")]) == 2
+    assert capsys.readouterr().err.count("\n") == 2
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_leaves_the_gates_off(tmp_path, monkeypatch, number):
+    bus = motor_bus(load(DRIVE))
+    written, original = [], bus.write
+
+    def write(name, value):
+        written.append((name, value))
+        original(name, value)
+        if (name, value) == ("enable", 1):
+            signal.raise_signal(number)
+
+    bus.write = write
+    monkeypatch.setattr(commissioning, "open_bus", lambda name, drive: bus)
+    assert command.main(["commission", str(DRIVE), "--out", str(tmp_path)]) == 1
+    assert ("enable", 1) in written and bus.read("enable") == 0
+    assert json.loads((tmp_path / "commission.json").read_text())["status"] == "stopped"
+
+
+def test_another_core_is_refused():
+    motor = case(1002)
+    bus = motor.bus()
+    bus._values["clock_hz"] += 1
+    with pytest.raises(Refusal, match="clock_hz"):
+        commission(bus, motor.file)
+    assert bus.read("enable") == 0
+
+
+def window(tmp_path, **values):
+    """A file like the window of a board with these integers in its registers."""
+    registers, words = board_map.registers(), np.zeros(WINDOW // 4, np.uint32)
+    for name, value in ({"identification": IDENTIFICATION, "snap_ready": 1, "pole_pairs": 3} | values).items():
+        words[registers[name].address // 4] = value & 0xFFFFFFFF
+    path = tmp_path / "uio"
+    words.tofile(path)
+    return path
+
+
+def test_the_window_of_a_zynq(tmp_path):
+    bits = {"position_bits": 16, "snap_position": 5, "theta_me": 3 * 5 << 2}
+    path = window(tmp_path, i_d=-7, u_q=9, **bits)
+    bus = UioBus(path)
+    seen = bus.snapshot()
+    assert set(seen) == {*CODES, *VALUES, "theta_me"} and (seen["i_d"], seen["u_q"]) == (-7, 9)
+    bus.write("i_d_ref", -3)
+    address = board_map.registers()["i_d_ref"].address
+    assert np.fromfile(path, np.int32)[address // 4] == -3
+    for name, value in (("i_d_ref", 1 << 20), ("theta_me", 0), ("nothing", 0)):
+        with pytest.raises(BusError):
+            bus.write(name, value)
+
+
+def test_values_of_two_samples_are_no_snapshot(tmp_path):
+    bus = UioBus(window(tmp_path, position_bits=16, snap_position=5, theta_me=1))
+    with pytest.raises(BusError, match="within one sample"):
+        bus.snapshot()
+    with pytest.raises(BusError, match="snap_ready"):
+        UioBus(window(tmp_path, snap_ready=0)).snapshot()
+    with pytest.raises(DriveError, match="no Fluxproof core"):
+        UioBus(window(tmp_path, identification=0))
+
+
+@pytest.mark.study
+def test_figures_of_100_motors(figure):
+    rows = figures(say=print)
+    for row in rows:
+        figure(*(row[key] for key in ("figure", "ours", "target", "unit", "pass")))
+    assert all(row["pass"] for row in rows), [row for row in rows if not row["pass"]]
