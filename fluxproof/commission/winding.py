@@ -1,8 +1,8 @@
 """R, L_d, L_q and the dead-time voltage from a current vector that rotates too fast for the rotor.
 
 The regulators hold a vector in the frame of the forced angle.  A snapshot k has the current i(k) at the angle phi of
-that frame against the rotor, and the voltage u(k), which acts as a constant vector in the stator's frame during the period
-after the next valley: in the rotating frame it is that of the angle phi + 1.5*w*T, and
+that frame against the rotor, and the voltage u(k), which acts as a constant vector in the stator's frame during the
+period after the next valley: in the rotating frame it is that of the angle phi + 1.5*w*T, and
 
     w -> w_e = 2/T*sin(w*T/2),    R -> R*cos(w*T/2)            (a frame that turns during a held vector)
 
