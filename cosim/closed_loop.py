@@ -77,7 +77,7 @@ def load_torque(load, brake, omega_m):
 
 @dataclass
 class Period:
-    """The outputs of a device from one sample_trigger to the next: in a PWM period, or half of one with double_update."""
+    """The outputs of a device from one sample_trigger to the next: a PWM period, half of one with double_update."""
 
     observed: dict[str, int] | None  # None if no sample was processed
     edge_clocks: np.ndarray

@@ -31,7 +31,7 @@ from fluxproof.plant import IMPOSED_SPEED
 from studies.demo.plots import D_AXIS, HEIGHT, Q_AXIS, QUIET, REFERENCE, SPEED, STYLE, WIDTH, write_png
 
 DRIVE = DRIVES / "paper001.toml"
-CHOSEN_HZ = {1: 800.0, 2: 1400.0}  # bandwidth asked of the regulators in the two cases shown
+CHOSEN_HZ = {1: 800.0, 2: 1250.0}  # bandwidth asked of the regulators in the two cases shown
 SWEEP_HZ = {1: (400, 600, 800, 1000, 1200), 2: (800, 1100, 1250, 1400, 1550, 1700)}
 TARGET_HZ, TARGET_DEG = 3000.0, 45.0
 REPEAT_S, LEAD_IN, REPEATS = 0.1, 2, 3  # one multi-sine; so many to settle, so many measured
@@ -109,9 +109,7 @@ def _run(drive, i_q) -> dict[str, np.ndarray]:
         enable=np.ones(n, np.int64),
         omega_m=speed,
     )
-    seen = simulate(
-        drive, registers(drive), scene, dead_time_s=drive.inverter.dead_time_s, mode=IMPOSED_SPEED
-    ).observed
+    seen = simulate(drive, registers(drive), scene, dead_time_s=drive.inverter.dead_time_s, mode=IMPOSED_SPEED).observed
     limited = seen["sat_d"][n // 4 :].any() or seen["sat_q"][n // 4 :].any()
     return {name: to_si(name, seen[name], drive) for name in ("i_q", "i_q_ref")} | {"limited": bool(limited)}
 
@@ -218,7 +216,9 @@ def draw(responses: dict[int, dict[float, Response]]) -> Figure:
     closed.axhline(-3.0, color=REFERENCE, linewidth=1.0, linestyle=(0, (4, 2)))
     closed.set(title="Closed current loop $|T|$ [dB]", ylim=(-20, 6))
     phase.axhline(TARGET_DEG - 180.0, color=REFERENCE, linewidth=1.0, linestyle=(0, (4, 2)))
-    phase.set(title="Phase of the open loop $L$ [degrees]; circle: $|L| = 1$", ylim=(-270, -80), xlabel="frequency [Hz]")
+    phase.set(
+        title="Phase of the open loop $L$ [degrees]; circle: $|L| = 1$", ylim=(-270, -80), xlabel="frequency [Hz]"
+    )
     trade.axhline(TARGET_HZ, color=QUIET, linewidth=1.0)
     trade.axvline(TARGET_DEG, color=QUIET, linewidth=1.0)
     trade.fill_between([TARGET_DEG, 75], TARGET_HZ, 5000, color=D_AXIS, alpha=0.08, linewidth=0)
