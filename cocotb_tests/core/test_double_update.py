@@ -55,10 +55,10 @@ def test_closed_loop_in_verilator(twice):
 
 
 def test_closed_loop_in_ghdl(twice):
-    """1,000 half periods of the VHDL itself, with gates off and on."""
-    summary, arrays, _ = close_loop(InGhdl, twice, "compressed", 128, key=" twice")
-    assert summary["differences"] == 0 and summary["periods_compared"] == 1000
-    assert set(arrays["gate_edges"][:, 2] == 0) == {True, False}
+    """300 half periods of the VHDL itself, at start and under load."""
+    summary, arrays, _ = close_loop(InGhdl, twice, "short", 100, key=" twice", periods=300)
+    assert summary["differences"] == 0 and summary["periods_compared"] == 300
+    assert len(arrays["gate_edges"]) > 1500
 
 
 def check_edges(arrays, register_set, leg: int):

@@ -51,17 +51,17 @@ architecture rtl of gate_generation is
   type elapsed_t is array (0 to 2) of unsigned(11 downto 0);
 
   type state_t is record
-    carrier    : unsigned(15 downto 0);
-    down       : std_logic;
-    compare    : compare_t;
-    dead_time  : unsigned(11 downto 0);
-    min_pulse  : unsigned(11 downto 0);
+    carrier       : unsigned(15 downto 0);
+    down          : std_logic;
+    compare       : compare_t;
+    dead_time     : unsigned(11 downto 0);
+    min_pulse     : unsigned(11 downto 0);
     double_update : std_logic;
-    configured : std_logic;
-    running    : std_logic;
-    tripped    : std_logic;
-    level      : unsigned(2 downto 0);  -- command of the leg
-    elapsed    : elapsed_t;             -- clocks that both gates of the leg have been off
+    configured    : std_logic;
+    running       : std_logic;
+    tripped       : std_logic;
+    level         : unsigned(2 downto 0);  -- command of the leg
+    elapsed       : elapsed_t;             -- clocks that both gates of the leg have been off
   end record state_t;
 
   signal state : state_t;
@@ -151,21 +151,21 @@ begin
       end loop;
 
       if rst = '1' then
-        state.carrier    <= (others => '0');
-        state.down       <= '0';
-        state.compare    <= (others => (others => '0'));
-        state.dead_time  <= (others => '0');
-        state.min_pulse  <= (others => '0');
-        state.double_update     <= '0';
-        state.configured <= '0';
-        state.running    <= '0';
-        state.tripped    <= '0';
-        state.level      <= (others => '0');
-        state.elapsed    <= (others => (others => '0'));
-        gate_high        <= (others => '0');
-        gate_low         <= (others => '0');
-        sample           <= '0';
-        setting_refused  <= '0';
+        state.carrier       <= (others => '0');
+        state.down          <= '0';
+        state.compare       <= (others => (others => '0'));
+        state.dead_time     <= (others => '0');
+        state.min_pulse     <= (others => '0');
+        state.double_update <= '0';
+        state.configured    <= '0';
+        state.running       <= '0';
+        state.tripped       <= '0';
+        state.level         <= (others => '0');
+        state.elapsed       <= (others => (others => '0'));
+        gate_high           <= (others => '0');
+        gate_low            <= (others => '0');
+        sample              <= '0';
+        setting_refused     <= '0';
       end if;
     end if;
   end process;
