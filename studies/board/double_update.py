@@ -180,7 +180,7 @@ def at_margin(responses: dict[float, Response], degrees: float = TARGET_DEG) -> 
 
 
 def closed_loop(carrier_half: int, scenario: str) -> ClosedLoop:
-    """A scenario of cosim/scenarios.py with two updates a period, for a device that is compared with the golden core."""
+    """A scenario with two updates a period, for a device that is compared with the golden core."""
     drive = drives.with_carrier(made(2, CHOSEN_HZ[2]), carrier_half)
     return ClosedLoop(drive, registers(drive), SCENARIOS[scenario](drive))
 
