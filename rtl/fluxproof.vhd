@@ -8,8 +8,7 @@
 -- ESTIMATORS = 0 leaves out the flux estimator and both Adalines: the decoupling then uses the current model alone, as
 -- with flux_mode 0, dead time is not compensated, and what they would show is zero.
 -- Formats: per unit, see golden_model/formats.py; settings as `fluxproof registers drive.toml` prints them.
--- Latency: sample_valid to duty_valid FLUXPROOF_SAMPLE_TO_DUTY clocks; samples at least
--- FLUXPROOF_SAMPLE_INTERVAL apart.
+-- Latency: sample_valid to duty_valid FLUXPROOF_SAMPLE_TO_DUTY clocks; samples FLUXPROOF_SAMPLE_INTERVAL or more apart.
 -- Settings change only between samples, at the latest at the edge at which a sample enters (a setting then applies to
 -- this sample, a reference to the next); dead_time and min_pulse at any time, they take effect at the valley;
 -- double_update while the gates are off; watchdog and fault_ignore at any time.

@@ -136,7 +136,7 @@ _FLAGS = {
     "temp_lost": 11,
     "merge_known": 12,
     "delta_held": 13,
-    "double_used": 14,
+    "double_used": 15,
 }
 
 # Pins of the core: inputs per sample or clock that do not come from software.

@@ -655,7 +655,7 @@ begin
   shown(17)         <= "0000000000000000000000000000000" & clear_trip;
   shown(18)         <= "0000000000000000000000000000000" & clear_faults_in;
   shown(19 to 31)   <= (others => (others => '0'));
-  shown(32)         <= "00000000000000000" & double_used & estimated.delta_held & estimated.merge_known &
+  shown(32)         <= "0000000000000000" & double_used & "0" & estimated.delta_held & estimated.merge_known &
                        estimated.temp_lost & estimated.psi_held & estimated.v_comp_limited & observed.speed_limited &
                        observed.u_dc_low & observed.u_dc_at_rail & std_logic_vector(observed.current_at_rail) &
                        setting_refused & tripped & running;
