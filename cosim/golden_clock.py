@@ -81,8 +81,10 @@ class GoldenClock:
     def _enter(self, sample: Mapping[str, int]) -> None:
         """The results of a sample that enters at this clock, and their clocks."""
         self.samples.append(fluxproof.Sample(*sample.values(), self.running))
-        # The duties use the minimum pulse in force, updated at a valley, not a setting that the gates refuse.
-        registers = self.registers._replace(min_pulse=self.state.of_gate_generation.min_pulse)
+        # The duties use what is in force: a minimum pulse that the gates refuse is not, nor double_update given while
+        # they are on.
+        gates = self.state.of_gate_generation
+        registers = self.registers._replace(min_pulse=gates.min_pulse, double_update=gates.double_update)
         self.of_samples, self.observed = fluxproof.step(
             self.of_samples, self.samples[-1], registers, self.config
         )

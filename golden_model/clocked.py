@@ -77,7 +77,7 @@ def step(state, inputs, regs, carrier_half):
     )
     gate_trip = 1 if x.trip or s.fault_stop or (x.sample_trip and x.enable) else 0
 
-    gate_state, (gate_high, gate_low, sample_trigger, running, tripped, setting_refused, _, _) = (
+    gate_state, (gate_high, gate_low, sample_trigger, running, tripped, setting_refused, _, _, _) = (
         gate_generation.step(
             s.of_gate_generation,
             x.compare_a,
@@ -88,6 +88,7 @@ def step(state, inputs, regs, carrier_half):
             s.gate_clear,
             r.dead_time,
             r.min_pulse,
+            r.double_update,
             carrier_half,
         )
     )

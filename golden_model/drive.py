@@ -66,7 +66,7 @@ class Control:
     """[control]; a gain given here overrides the one calculated from the bandwidths."""
 
     current_bandwidth_hz: float = positive("Hz", "current loop")
-    sample_time_s: float | None = positive("s", "1 / pwm_frequency_hz", None)
+    sample_time_s: float | None = positive("s", "1 / pwm_frequency_hz; half, if updated twice", None)
     duty_applied_after_samples: int = whole(0, 10, "whole samples between a duty and its period", 1)
     delay_samples: float = not_negative("samples", "from sampling to the mean of the voltage", 1.5, most=10.0)
     speed_bandwidth_hz: float | None = positive("Hz", "speed loop; none: no speed control", None)
@@ -121,7 +121,7 @@ class Sensors:
 class Sampling:
     """[sampling], optional: when currents and position are taken; see docs/board.md."""
 
-    delay_s: float = real("s", "real sampling instant after the valley, negative before it", 0.0)
+    delay_s: float = real("s", "real sampling instant after the valley or peak, negative before it", 0.0)
 
 
 @dataclass(frozen=True)
@@ -137,7 +137,7 @@ class Protection:
     u_dc_min_v: float | None = not_negative("V", "a tenth of the nominal bus if none", None)
     u_dc_max_v: float | None = positive("V", "1.3 times the nominal bus if none", None)
     position_jump_rad: float | None = positive("rad", "mechanical, deviation from the extrapolated position", None)
-    watchdog_periods: float = positive("1", "longest time without a sample, in PWM periods", 1.5)
+    watchdog_periods: float = positive("1", "longest time without a sample, in sample times", 1.5)
     trip_overcurrent: bool = flag("false: reported, no trip", True)
     trip_current_sum: bool = flag("false: reported, no trip; for a third current calculated from two", True)
     trip_at_rail: bool = flag("false: reported, no trip", True)
@@ -152,6 +152,7 @@ class Core:
     """[core]"""
 
     clock_hz: float = positive("Hz", "of the core; a whole multiple of twice the PWM frequency")
+    updates_per_period: int = whole(1, 2, "1: sampled and updated at the valley; 2: at the valley and the peak", 1)
     estimators: bool = flag("false: field-oriented control alone; flux_mode and the compensation have no effect", True)
 
 
@@ -206,12 +207,12 @@ class Drive:
 
     @property
     def sample_time_s(self):
-        """One sample per PWM period, at the valley of the carrier."""
-        return 1.0 / self.inverter.pwm_frequency_hz
+        """A PWM period, sampled at the valley of the carrier; half of one, if sampled at the peak too."""
+        return 1.0 / (self.core.updates_per_period * self.inverter.pwm_frequency_hz)
 
     @property
     def sampling_to_voltage_s(self):
-        """From the real sampling instant to the middle of the period in which the voltage acts."""
+        """From the real sampling instant to the middle of the period (or half) in which the voltage acts."""
         return self.control.delay_samples * self.sample_time_s - self.sampling.delay_s
 
     @property

@@ -318,7 +318,9 @@ def step(state, sample, regs, config):
 
     u_alpha, u_beta = inverse_park.step(u_d, u_q, cos_out, sin_out)
     duty_a, duty_b, duty_c = svm.step(u_alpha, u_beta, inverse, inverse_beta)
-    compare_a, compare_b, compare_c = pwm_compare.step(duty_a, duty_b, duty_c, r.min_pulse, c.carrier_half)
+    compare_a, compare_b, compare_c = pwm_compare.step(
+        duty_a, duty_b, duty_c, r.min_pulse, r.double_update, c.carrier_half
+    )
 
     after, e = estimation.kept(state), NOTHING_ESTIMATED
     if c.estimators:

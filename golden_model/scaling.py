@@ -271,10 +271,11 @@ def psi_eta(drive):
 
 
 def gates(drive):
-    """Times of the gate signals in clocks."""
+    """Times of the gate signals in clocks, and how often they are updated."""
     for name in ROUND_UP:
         keys = f"[inverter] {name}_s; [core] clock_hz"
         yield Entry(name, getattr(drive.inverter, f"{name}_s"), "s", 1.0 / drive.core.clock_hz, keys)
+    yield Entry("double_update", drive.core.updates_per_period - 1, "1", 1.0, "[core] updates_per_period")
 
 
 def protection(drive):

@@ -8,11 +8,10 @@
 -- ESTIMATORS = 0 leaves out the flux estimator and both Adalines: the decoupling then uses the current model alone, as
 -- with flux_mode 0, dead time is not compensated, and what they would show is zero.
 -- Formats: per unit, see golden_model/formats.py; settings as `fluxproof registers drive.toml` prints them.
--- Latency: sample_valid to duty_valid FLUXPROOF_SAMPLE_TO_DUTY clocks; samples at least
--- FLUXPROOF_SAMPLE_INTERVAL apart.
+-- Latency: sample_valid to duty_valid FLUXPROOF_SAMPLE_TO_DUTY clocks; samples FLUXPROOF_SAMPLE_INTERVAL or more apart.
 -- Settings change only between samples, at the latest at the edge at which a sample enters (a setting then applies to
 -- this sample, a reference to the next); dead_time and min_pulse at any time, they take effect at the valley;
--- watchdog and fault_ignore at any time.
+-- double_update while the gates are off; watchdog and fault_ignore at any time.
 -- Protection: a sample that comes too early is rejected; a faulty sample, a missing one and trip switch the gates off.
 -- Rounding: see the blocks.
 
@@ -39,7 +38,7 @@ entity fluxproof is
     clear_trip      : in  std_logic;  -- 1: clear the latched trip
     gate_high       : out unsigned(2 downto 0);  -- upper gates, bit 0 is leg a
     gate_low        : out unsigned(2 downto 0);  -- lower gates, bit 0 is leg a
-    sample_trigger  : out std_logic;  -- middle of the zero vector: take a sample
+    sample_trigger  : out std_logic;  -- middle of the zero vector (of both with double_update): take a sample
     running         : out std_logic;  -- gates are switching
     tripped         : out std_logic;  -- 1: a trip is latched
     sample_busy     : out std_logic;  -- a sample is in flight: settings must not change
@@ -48,6 +47,7 @@ entity fluxproof is
     early_samples   : out unsigned(7 downto 0);  -- samples rejected because they came too early
     setting_refused : out std_logic;  -- 1: dead_time and min_pulse contradict each other, refused
     min_pulse_used  : out unsigned(11 downto 0);  -- minimum pulse in force
+    double_used     : out std_logic;  -- double_update in force
     carrier         : out unsigned(15 downto 0);  -- carrier, for observation
     duty_valid      : out std_logic;  -- 1: the duties of the sample are valid
     compare_valid   : out std_logic;  -- 1: the compare values are valid
@@ -250,7 +250,7 @@ begin
     generic map (CARRIER_HALF => CARRIER_HALF)
     port map (clk => clk, rst => rst, in_valid => duty_ready,
               duty_a => o.duty_a, duty_b => o.duty_b, duty_c => o.duty_c,
-              min_pulse => min_pulse_used,
+              min_pulse => min_pulse_used, double_update => double_used,
               out_valid => compare_ready, compare_a => o.compare_a, compare_b => o.compare_b, compare_c => o.compare_c);
 
   -- Estimators
@@ -434,10 +434,10 @@ begin
     port map (clk => clk, rst => rst,
               compare_a => o.compare_a, compare_b => o.compare_b, compare_c => o.compare_c, enable => enable,
               trip => gate_trip, clear_trip => gate_clear,
-              dead_time => settings.dead_time, min_pulse => settings.min_pulse,
+              dead_time => settings.dead_time, min_pulse => settings.min_pulse, double_update => settings.double_update,
               gate_high => gate_high, gate_low => gate_low, sample => sample_trigger, running => running,
               tripped => tripped, setting_refused => setting_refused, min_pulse_used => min_pulse_used,
-              carrier => carrier);
+              double_used => double_used, carrier => carrier);
 
   sample_busy   <= guard_busy;
   duty_valid    <= duty_ready;

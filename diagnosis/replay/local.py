@@ -142,7 +142,7 @@ def _one(x, r, c, now, before):
     dec_d, dec_q = decoupling.step(omega_chord, lambda_d, lambda_q)
     u_alpha, u_beta = inverse_park.step(u_d, u_q, cos_out, sin_out)
     duty_a, duty_b, duty_c = svm.step(u_alpha, u_beta, inverse, inverse_beta)
-    new_a, new_b, new_c = pwm_compare.step(duty_a, duty_b, duty_c, r.min_pulse, c.carrier_half)
+    new_a, new_b, new_c = pwm_compare.step(duty_a, duty_b, duty_c, r.min_pulse, r.double_update, c.carrier_half)
     on_alpha, on_beta, _ = applied_voltage.step(
         compare_a, compare_b, compare_c, u_dc, u_rail, x[12], c.carrier_half
     )

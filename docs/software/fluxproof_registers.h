@@ -144,6 +144,9 @@ extern "C" {
 #define FLUXPROOF__FLAGS__DELTA_HELD_bm 0x2000
 #define FLUXPROOF__FLAGS__DELTA_HELD_bp 13
 #define FLUXPROOF__FLAGS__DELTA_HELD_bw 1
+#define FLUXPROOF__FLAGS__DOUBLE_USED_bm 0x8000
+#define FLUXPROOF__FLAGS__DOUBLE_USED_bp 15
+#define FLUXPROOF__FLAGS__DOUBLE_USED_bw 1
 
 // reg - fluxproof::flux_faults
 #define FLUXPROOF__FLUX_FAULTS__VALUE_bm 0x7f
@@ -617,6 +620,12 @@ extern "C" {
 #define FLUXPROOF__U_DC_MAX__VALUE_bw 9
 #define FLUXPROOF__U_DC_MAX__VALUE_reset 0x0
 
+// reg - fluxproof::double_update
+#define FLUXPROOF__DOUBLE_UPDATE__VALUE_bm 0x1
+#define FLUXPROOF__DOUBLE_UPDATE__VALUE_bp 0
+#define FLUXPROOF__DOUBLE_UPDATE__VALUE_bw 1
+#define FLUXPROOF__DOUBLE_UPDATE__VALUE_reset 0x0
+
 // addrmap - fluxproof
 typedef struct {
     uint32_t identification;
@@ -725,11 +734,13 @@ typedef struct {
     uint32_t sum_trip;
     uint32_t u_dc_min;
     uint32_t u_dc_max;
+    uint8_t RESERVED_200_23f[0x40];
+    uint32_t double_update;
 } fluxproof_t;
 
 
 #if defined(__cplusplus) || __STDC_VERSION__ >= 201112L
-static_assert(sizeof(fluxproof_t) == 0x200, "Packing error");
+static_assert(sizeof(fluxproof_t) == 0x244, "Packing error");
 #endif
 
 #ifdef __cplusplus

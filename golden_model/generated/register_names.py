@@ -104,4 +104,5 @@ ADDRESSES = {
     "sum_trip": 0x1F4,
     "u_dc_min": 0x1F8,
     "u_dc_max": 0x1FC,
+    "double_update": 0x240,
 }

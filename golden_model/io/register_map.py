@@ -102,7 +102,8 @@ _SETTINGS = """
     1c0 compensate    1c4 k_lp           1c8 eta_v        1cc gamma          1d0 zeta         1d4 v_thr
     1d8 v_comp_max    1dc i_learn        1e0 eta_psi      1e4 omega_psi_min  1e8 k_ahead      1ec k_sign
     1f0 i_trip        1f4 sum_trip       1f8 u_dc_min     1fc u_dc_max
-"""  # 200 to 3fc are free
+    240 double_update
+"""  # 200 to 23c and 244 to 3fc are free
 _COMMANDS = {
     "enable": (0x040, Kind.COMMAND),
     "clear_trip": (0x044, Kind.PULSE),
@@ -135,6 +136,7 @@ _FLAGS = {
     "temp_lost": 11,
     "merge_known": 12,
     "delta_held": 13,
+    "double_used": 15,
 }
 
 # Pins of the core: inputs per sample or clock that do not come from software.

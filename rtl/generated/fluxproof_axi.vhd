@@ -90,6 +90,7 @@ architecture rtl of fluxproof_axi is
   signal early_samples     : unsigned(7 downto 0);
   signal setting_refused   : std_logic;
   signal min_pulse_used    : unsigned(11 downto 0);
+  signal double_used       : std_logic;
   signal observed          : observed_t;
   signal estimated         : estimated_t;
   signal m_axis_tdata_out  : unsigned(31 downto 0);
@@ -164,6 +165,7 @@ begin
       running           => running,
       tripped           => tripped,
       setting_refused   => setting_refused,
+      double_used       => double_used,
       min_pulse_used    => min_pulse_used,
       telemetry_dropped => telemetry_dropped,
       fault_flags       => fault_flags,
@@ -198,6 +200,7 @@ begin
       early_samples   => early_samples,
       setting_refused => setting_refused,
       min_pulse_used  => min_pulse_used,
+      double_used     => double_used,
       carrier         => open,
       duty_valid      => open,
       compare_valid   => open,

@@ -90,6 +90,7 @@ package fluxproof_pkg is
     lambda_mg     : signed(PU_W - 1 downto 0);  -- magnet flux linkage
     k_chord       : unsigned(16 downto 0);  -- (sample time)**2 / 24, per unit
     min_pulse     : unsigned(11 downto 0);  -- shortest pulse of a leg, clocks
+    double_update : std_logic;  -- 1: sample and update at the peak too; taken while the gates are off
     omega_0       : unsigned(15 downto 0);  -- crossover of the two models, times the sample time
     xi            : unsigned(15 downto 0);  -- damping of the merge
     omega_min     : unsigned(DUTY_W - 1 downto 0);  -- no compensation up to this speed

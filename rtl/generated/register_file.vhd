@@ -62,6 +62,7 @@ entity register_file is
     running           : in  std_logic;  -- 080 gates are switching
     tripped           : in  std_logic;  -- 080 1: a trip is latched
     setting_refused   : in  std_logic;  -- 080 1: dead_time and min_pulse contradict each other, refused
+    double_used       : in  std_logic;  -- 080 double_update in force
     min_pulse_used    : in  unsigned(11 downto 0);  -- 088 minimum pulse in force
     telemetry_dropped : in  unsigned(15 downto 0);  -- 0c8 samples without a packet, up to 65535
     fault_flags       : in  unsigned(8 downto 0);  -- 0cc faults since the last clear_trip, see fault_latch
@@ -473,6 +474,10 @@ begin
         settings.u_dc_max <= unsigned(held(8 downto 0));
         written(127)      <= '1';
       end if;
+      if (row(18) and column(0) and not sample_busy) = '1' then
+        settings.double_update <= held(0);
+        written(144)           <= '1';
+      end if;
 
       if rst = '1' then
         written                <= (others => '0');
@@ -548,6 +553,7 @@ begin
         settings.sum_trip      <= (others => '0');
         settings.u_dc_min      <= (others => '0');
         settings.u_dc_max      <= (others => '0');
+        settings.double_update <= '0';
       end if;
     end if;
   end process;
@@ -649,10 +655,10 @@ begin
   shown(17)         <= "0000000000000000000000000000000" & clear_trip;
   shown(18)         <= "0000000000000000000000000000000" & clear_faults_in;
   shown(19 to 31)   <= (others => (others => '0'));
-  shown(32)         <= "000000000000000000" & estimated.delta_held & estimated.merge_known & estimated.temp_lost &
-                       estimated.psi_held & estimated.v_comp_limited & observed.speed_limited & observed.u_dc_low &
-                       observed.u_dc_at_rail & std_logic_vector(observed.current_at_rail) & setting_refused &
-                       tripped & running;
+  shown(32)         <= "0000000000000000" & double_used & "0" & estimated.delta_held & estimated.merge_known &
+                       estimated.temp_lost & estimated.psi_held & estimated.v_comp_limited & observed.speed_limited &
+                       observed.u_dc_low & observed.u_dc_at_rail & std_logic_vector(observed.current_at_rail) &
+                       setting_refused & tripped & running;
   shown(33)         <= std_logic_vector(resize(estimated.flux_faults, 32));
   shown(34)         <= std_logic_vector(resize(min_pulse_used, 32));
   shown(35)         <= "00000000000000" & std_logic_vector(resize(observed.omega_me, 18));
@@ -679,6 +685,6 @@ begin
   shown(74 to 98)   <= (others => (others => '0'));
   shown(99)         <= x"00000100";
   shown(100)        <= x"00001000";
-  shown(101 to 127) <= (others => (others => '0'));
+  shown(101 to 255) <= (others => (others => '0'));
 
 end architecture rtl;
