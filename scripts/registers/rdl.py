@@ -34,7 +34,7 @@ property high { type = longint unsigned; component = field; };  // largest legal
 ABOUT = (
     "A register is one word of 32 bits; negative values are sign-extended. Kinds: "
     "setting: takes effect between two samples, then the write is answered. command: takes effect at the next clock. "
-    "pulse: set by a one, zero again after one clock. sample pulse: set by a one, zero again after the next sample. "
+    "pulse: set by ones, zero again after one clock. sample pulse: set by a one, zero again after the next sample. "
     "status, constant, generic: read only. A write is a whole word, all four strobes set. SLVERR: value outside low to "
     "high, read-only register, other strobes, or no gap between samples. DECERR: no register at the address. "
     "A write that is refused changes nothing."
@@ -91,7 +91,7 @@ def _field(kind: Kind, field: Field, unit: str) -> list[str]:
         Kind.STATUS: "sw = r; hw = w;",
         Kind.CONSTANT: "sw = r; hw = na;",
         Kind.GENERIC: "sw = r; hw = w;",
-        Kind.PULSE: "sw = rw; hw = r; singlepulse;",
+        Kind.PULSE: "sw = rw; hw = r; singlepulse;" if port.is_bit else "sw = rw; hw = r;",  # a field of one bit
     }.get(kind, "sw = rw; hw = r;")
     lines = [access, f'unit = "{unit}"; format = "{port.fmt}";']
     signed = "true" if port.fmt.signed else "false"
