@@ -49,11 +49,9 @@ def step(state, i_a, i_b, i_c, i_q_ref, theta_me, run, motion_faults, i_open):
     open_load = 1 if asked and (open_phase or unconnected) else 0
 
     suspect = missing if turned else s.suspect
-    if not asked:
-        return State(), (open_load,)
-    if turned:
-        return State(0, 0, suspect), (open_load,)
-    return State(carried, visited, suspect), (open_load,)
+    if turned or not asked:
+        carried, visited = 0, 0
+    return State(carried, visited, suspect if asked else 0), (open_load,)
 
 
 def stimuli(_rng, _config):

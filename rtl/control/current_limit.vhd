@@ -67,8 +67,8 @@ begin
 
   -- Not restoring: rest = 4*rest + pair - (4*root + 1) where rest >= 0, + (4*root + 3) where it is negative
   shifted <= rest(REST_W - 3 downto 0) & signed(pair);
-  taken   <= shifted + signed('0' & state.i_q_max & "11") when rest(REST_W - 1) = '1' else
-             shifted - signed('0' & state.i_q_max & "01");
+  taken   <= shifted + signed(unsigned'('0' & state.i_q_max & "11")) when rest(REST_W - 1) = '1' else
+             shifted - signed(unsigned'('0' & state.i_q_max & "01"));
 
   process (clk)
     variable nearest : signed(WIDTH - 1 downto 0);
@@ -79,7 +79,7 @@ begin
       -- Stage 1: the pair of the last sample;  below = i_max - i_d_ref;  above = i_max + i_d_ref
       if in_valid = '1' then
         i_d_limited <= state.i_d;
-        i_q_max     <= signed('0' & state.i_q_max);
+        i_q_max     <= signed(resize(state.i_q_max, WIDTH));
         below_1     <= resize(i_max, WIDTH + 1) - i_d_ref;
         above_1     <= resize(i_max, WIDTH + 1) + i_d_ref;
         busy        <= '1';
@@ -121,7 +121,8 @@ begin
       if rst = '1' then
         valid <= '0';
         busy        <= '0';
-        state <= (others => (others => '0'));
+        state.i_d     <= (others => '0');
+        state.i_q_max <= (others => '0');
       end if;
     end if;
   end process;
