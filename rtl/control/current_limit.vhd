@@ -54,21 +54,22 @@ architecture rtl of current_limit is
   signal pair    : unsigned(1 downto 0);
   signal rest    : signed(REST_W - 1 downto 0);
   signal shifted : signed(REST_W - 1 downto 0);
+  signal turned  : signed(WIDTH - 1 downto 0);  -- root, or its complement
   signal taken   : signed(REST_W - 1 downto 0);
 begin
   -- Step k of the product: upper = (upper + above*bit k of below)/2, zero if i_d is limited
   factor <= below_1(count) and not below_1(WIDTH) and not above_1(WIDTH) when to_root = '0' else '0';
-  sum    <= resize(upper, WIDTH + 1) + unsigned(above_1(WIDTH - 1 downto 0)) when factor = '1' else
-            resize(upper, WIDTH + 1);
+  sum    <= resize(upper, WIDTH + 1) + (unsigned(above_1(WIDTH - 1 downto 0)) and factor);
 
   -- Step k of the root: the next pair of bits of the product, from the left; below 2**(2*WIDTH - 2)
   product <= upper & lower;
   pair    <= product(2 * (WIDTH - 2 - count) + 1 downto 2 * (WIDTH - 2 - count)) when to_root = '1' else "00";
 
-  -- Not restoring: rest = 4*rest + pair - (4*root + 1) where rest >= 0, + (4*root + 3) where it is negative
+  -- Not restoring: rest = 4*rest + pair - (4*root + 1) where rest >= 0, + (4*root + 3) where it is negative:
+  -- -(4*root + 1) is 4*(not root) + 3, so that one adder does both
   shifted <= rest(REST_W - 3 downto 0) & signed(pair);
-  taken   <= shifted + signed(unsigned'('0' & state.i_q_max & "11")) when rest(REST_W - 1) = '1' else
-             shifted - signed(unsigned'('0' & state.i_q_max & "01"));
+  turned  <= signed('0' & state.i_q_max) xor not rest(REST_W - 1);
+  taken   <= shifted + (turned & "11");
 
   process (clk)
     variable nearest : signed(WIDTH - 1 downto 0);
