@@ -224,6 +224,7 @@ begin
     wait for 8 * CARRIER_HALF * PERIOD;
     expect(gate_high = "000" and gate_low = "000" and irq = '1', "a trip is forgotten");
     write_word(16#044#, 1);
+    write_word(16#06C#, 15);
     wait for 8 * CARRIER_HALF * PERIOD;
     expect(irq = '0' and (gate_low'last_event < 4 * CARRIER_HALF * PERIOD), "no gate after clear_trip");
 

@@ -58,7 +58,7 @@ module formal_top (
       assert (more > most);
       assert (i_d_limited == (was_d > was_m ? was_m : was_d < -was_m ? -was_m : was_d));
     end
-    cover (twice && i_d_limited < 0 && i_q_max > 3);
+    cover (twice && i_d_limited < 0 && i_q_max > 1);
     cover (twice && was_d > was_m);
   end
 endmodule
