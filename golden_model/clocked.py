@@ -1,5 +1,6 @@
-"""The part of the core that runs at every clock: sample guard, host watch, fault latch and gates, wired as in rtl/fluxproof.vhd.
+"""The part of the core that runs at every clock, wired as in rtl/fluxproof.vhd and rtl/io/protection.vhd.
 
+Sample guard, host watch, fault latch, gates and the pin of the brake resistor.
 One step is one clock; ``State`` holds the blocks' states and the registers between them.  The values of a sample come
 from fluxproof.step.  They are valid as many clocks after the clock at which the sample entered as ``DUE`` says, from
 the following step on.

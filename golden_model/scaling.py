@@ -22,10 +22,11 @@ angles from the sample to the voltage (k_delay, k_ahead) shrink by omega_me*dela
 docs/board.md.
 
 Protection: the default limits lie outside the range of a healthy drive: overcurrent at twice the current limit, the
-sum of the currents at a fifth of the rated current, the bus at a tenth and 1.3 times its nominal value, no sample
-for 1.5 periods, 1.2 times the rated speed, a tenth of it against the reference for 20 ms without braking.  A stall and
-an open load are reported and do not trip: the current is within its limit.  The position may deviate from its linear extrapolation by 5e-4 turn plus four codes: no shaft
-accelerates that much within a sample, and a frozen code is detected from that rotation per sample on.
+sum of the currents at a fifth of the rated current, the bus at a tenth and 1.3 times its nominal value, no sample for
+1.5 periods, 1.2 times the rated speed, a tenth of it against the reference for 20 ms without braking, a sensor that
+shows 1 % of the rated current at rest. A stall and an open load are reported and do not trip: the current is within
+its limit. The position may deviate from its linear extrapolation by 5e-4 turn plus four codes: no shaft accelerates
+that much within a sample, and a frozen code is detected from that rotation per sample on.
 """
 
 import math
@@ -337,8 +338,8 @@ def motion_limits(drive):
     yield _limit("i_open", p.open_load_a, least, "A", b.current_a, "open_load_a", keys, amperes)
     most, key = p.current_offset_a, "[protection] current_offset_a"
     if most is None:
-        most, key = min(max(OFFSET_OF_RATED * m.rated_current_a / b.current_a, OFFSET.lsb), OFFSET.hi * OFFSET.lsb), keys
-        most *= b.current_a
+        step = OFFSET.lsb * b.current_a
+        most, key = min(max(OFFSET_OF_RATED * m.rated_current_a, step), OFFSET.hi * step), keys
     yield Entry("offset_max", most, "A", b.current_a, f"{key}; {amperes}")
     yield Entry("heartbeat", p.heartbeat_s, "s", t_s, f"[protection] heartbeat_s; {sample}")
 

@@ -201,7 +201,7 @@ begin
     write_word(16#170#, 4);
     write_word(16#174#, 10);
     write_word(16#11C#, 65536);
-    write_word(16#17C#, 16#7F#);
+    write_word(16#17C#, 16#7FFF#);
     write_word(16#04C#, 1);
     read_word(16#170#);
     expect(to_integer(unsigned(s_axi_rdata)) = 4, "dead_time cannot be read back");

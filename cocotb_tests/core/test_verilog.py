@@ -18,6 +18,7 @@ from fluxproof.cosim.stimulus import random_value
 from fluxproof.cosim.verilated import VerilatedCore
 from fluxproof.golden_model.fluxproof import REGISTERS, SAMPLE_INTERVAL
 from fluxproof.golden_model.io import fault_latch, sample_checks, sample_guard, sample_latch
+from fluxproof.golden_model.io.sample_checks import IGNORE
 
 GENERICS = {"ADC_BITS": 16, "POSITION_BITS": 16, "CARRIER_HALF": 100}
 OTHER = {"ADC_BITS": 12, "POSITION_BITS": 18, "CARRIER_HALF": 75}
@@ -71,7 +72,7 @@ def registers(rng: np.random.Generator, moderate: bool) -> dict[str, int]:
 def protection(rng: np.random.Generator, moderate: bool) -> dict[str, int]:
     """Registers anywhere in their ranges; with the moderate samples every fault is reported and none trips."""
     values = {name: random_value(rng, REGISTERS[name]) for name in PROTECTION}
-    return values | ({"fault_ignore": 127} if moderate else {})
+    return values | ({"fault_ignore": IGNORE.hi} if moderate else {})
 
 
 def raw_sample(rng: np.random.Generator, generics: dict[str, int], moderate: bool = False) -> dict[str, int]:
@@ -202,7 +203,8 @@ def test_constant_wider_than_the_vector(ghdl5, tmp_path):
 
 
 def test_run_period_records_what_a_trace_shows(ghdl5):
-    settings = {"enable": 1, "fault_ignore": 127, "dead_time": 3, "min_pulse": 8, "lambda_mg": 9000, "u_dc_gain": 60000}
+    settings = {"enable": 1, "fault_ignore": IGNORE.hi, "dead_time": 3, "min_pulse": 8}
+    settings |= {"lambda_mg": 9000, "u_dc_gain": 60000}
     sample, sample_at = {"adc_a": 40000, "adc_u_dc": 50000, "position_code": 777}, 5
     names = ("gate_high", "gate_low", "sample_trigger")
     fast, slow = VerilatedCore(GENERICS), VerilatedCore(GENERICS)

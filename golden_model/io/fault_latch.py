@@ -20,7 +20,6 @@ Formats: bits.
 from typing import NamedTuple
 
 from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.fixed import Format
 from fluxproof.golden_model.formats import BIT
 from fluxproof.golden_model.io.motion_checks import FAULTS as MOTION_FAULTS
 from fluxproof.golden_model.io.sample_checks import CHECKS, IGNORE

@@ -15,7 +15,6 @@ Formats: i_open U(1,8); currents are cut (floor) to it, |x| is the one's complem
 from typing import NamedTuple
 
 from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.fixed import Format
 from fluxproof.golden_model.formats import BIT, LIMIT, PU, TURN, TURN_W
 from fluxproof.golden_model.io.motion_checks import FAULTS
 from fluxproof.golden_model.io.sample_checks import DROP_LIMIT, reaches
@@ -56,7 +55,7 @@ def step(state, i_a, i_b, i_c, i_q_ref, theta_me, run, motion_faults, i_open):
 
 def stimuli(_rng, _config):
     """Turns in both directions with each set of phases carrying; dithering; asked and not; stalls with and without."""
-    usual = {"i_open": 10, "i_q_ref": 20 << 8, "run": 1, "motion_faults": 0, "i_a": 0, "i_b": 0, "i_c": 0, "theta_me": 0}
+    usual = dict.fromkeys((p.name for p in BLOCK.inputs), 0) | {"i_open": 10, "i_q_ref": 20 << 8, "run": 1}
     rows = []
     for carrying in (*range(8), 3, 3, 5, 6, 7):
         for turn in (1, -1, 1):

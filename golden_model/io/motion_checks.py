@@ -99,7 +99,7 @@ BLOCK = Block(
         Port("omega_away", LIMIT, doc="speed against the reference from which a runaway is looked for"),
         Port("runaway_samples", AWAY, doc="samples in sequence against the reference without braking that trip"),
         Port("omega_stall", LIMIT, doc="speed below which the shaft stands"),
-        Port("stall_samples", STALLED, doc="samples in sequence at the current's limit without motion that are a stall"),
+        Port("stall_samples", STALLED, doc="samples in sequence at the current limit at rest that are a stall"),
     ),
     outputs=(Port("motion_faults", FAULTS, doc="overspeed, runaway, stall, see motion_checks"),),
     state=State(),

@@ -2,8 +2,8 @@
 
     mean_x = sum of WINDOW samples of i_x / WINDOW;   current_offset = |mean_x| >= offset_max in any phase
 
-Evaluated after each WINDOW consecutive samples with run = 0 and |omega_me| < omega_stall: no current can flow then, what
-the sensors show is their error.  Between two windows, and while the drive runs, the last verdict stays.
+Evaluated after each WINDOW consecutive samples with run = 0 and |omega_me| < omega_stall: no current can flow then,
+what the sensors show is their error.  Between two windows, and while the drive runs, the last verdict stays.
 
 Formats: currents are cut (floor) to 12 fraction bits, the mean likewise: up to two steps, 2/4096 per unit, too low; |x|
 is the one's complement where x is negative.  The sum holds every window.

@@ -121,7 +121,7 @@ package fluxproof_pkg is
     omega_trip      : unsigned(LIMIT_W - 1 downto 0);  -- speed that trips, electrical
     omega_away      : unsigned(LIMIT_W - 1 downto 0);  -- speed against the reference from which a runaway is looked for
     runaway_samples : unsigned(11 downto 0);  -- samples in sequence against the reference without braking that trip
-    stall_samples   : unsigned(15 downto 0);  -- samples in sequence at the current's limit without motion that are a stall
+    stall_samples   : unsigned(15 downto 0);  -- samples in sequence at the current limit at rest that are a stall
     i_open          : unsigned(LIMIT_W - 1 downto 0);  -- current that a connected phase reaches when twice as much is asked for
     brake_on        : unsigned(LIMIT_W - 1 downto 0);  -- bus voltage from which the brake resistor is on; 0: none
     brake_off       : unsigned(LIMIT_W - 1 downto 0);  -- bus voltage below which it is off

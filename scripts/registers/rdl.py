@@ -38,8 +38,9 @@ ABOUT = (
     "status, constant, generic: read only. A write is a whole word, all four strobes set. SLVERR: value outside low to "
     "high, read-only register, other strobes, or no gap between samples. DECERR: no register at the address. "
     "A write that is refused changes nothing. Values are per unit: 1.0 of a field's format is what its unit says. "
-    "Bases: I_base current at the upper end of the code, U_base half the voltage at full bus code, omega_base pole pairs "
-    "times rated speed, unless the drive file gives others; T_s sample time; electrical angles and speeds, peak values."
+    "Bases: I_base current at the upper end of the code, U_base half the voltage at full bus code, omega_base pole "
+    "pairs times rated speed, unless the drive file gives others; T_s sample time; electrical angles and speeds, peak "
+    "values."
 )
 
 
