@@ -22,7 +22,6 @@ from fluxproof.golden_model.kernel import kernel
 
 STALL = 4  # of motion_faults
 ALL = 15  # quadrants
-TWO_OF_THREE = (0, 0, 0, 1, 0, 1, 1, 0)
 
 
 class State(NamedTuple):
@@ -42,7 +41,7 @@ def step(state, i_a, i_b, i_c, i_q_ref, theta_me, run, motion_faults, i_open):
     visited = s.visited | (1 << (theta_me >> (TURN_W - 2)))
 
     turned = visited == ALL
-    missing = TWO_OF_THREE[carried]
+    missing = 1 if carried == 3 or carried == 5 or carried == 6 else 0  # two phases of three
     open_phase = turned and missing and s.suspect
     unconnected = motion_faults & STALL and now == 0
     open_load = 1 if asked and (open_phase or unconnected) else 0
