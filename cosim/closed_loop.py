@@ -170,6 +170,7 @@ def described_sensors(drive) -> Sensors:
         u_dc_bits=s.adc_bits,
         u_dc_full_scale_v=s.u_dc_range_v,
         position_bits=s.position_bits,
+        position_counts=drive.encoder.counts or 0,
     )
 
 

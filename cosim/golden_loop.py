@@ -35,9 +35,7 @@ def run_controller(state, samples, registers, config, observed):
     """``samples`` (n, 13) in, ``observed`` (n, len(Observed)) out, both int64; returns the last state."""
     for k in range(samples.shape[0]):
         x = samples[k]
-        sample = fluxproof.Sample(
-            x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8], x[9], x[10], x[11], x[12]
-        )
+        sample = fluxproof.Sample(x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8], x[9], x[10], x[11], x[12])
         state, out = fluxproof.step(state, sample, registers, config)
         for n, value in enumerate(out):
             observed[k, n] = value
@@ -45,9 +43,7 @@ def run_controller(state, samples, registers, config, observed):
 
 
 @mixed_kernel
-def run_averaged(
-    state, references, u_dc, load, registers, config, plant_state, plant_params, sensors, period_s, out
-):
+def run_averaged(state, references, u_dc, load, registers, config, plant_state, plant_params, sensors, period_s, out):
     """Closed loop over the averaged plant; the duties of a sample act in the next period.
 
     ``references`` (n, 4) int64: omega_ref, i_d_ref, i_q_ext, speed_mode; ``u_dc`` [V], ``load`` [Nm] (n,).
@@ -83,6 +79,7 @@ def run_averaged(
     return state
 
 
+PROGRESS_PERIODS = 5000  # a tenth of a second
 PLANT = ("i_d", "i_q", "lambda_d", "lambda_q", "omega_m", "torque")
 
 
@@ -133,13 +130,14 @@ def run_switching(
 
 def simulate(
     drive, register_set, scenario: Scenario, machine=None, sensors=None, dead_time_s=0.0, mode=FREE, state=None,
-    inverter=None,
+    inverter=None, progress=None,
 ) -> Result:  # fmt: skip
     """``scenario`` with the golden model and the switching plant, compiled; as cosim.cosimulate, but faster.
 
     The inverter follows the compare values in force with a dead time of ``dead_time_s``; zero is the ideal inverter
     that paper 001 assumes; ``inverter`` adds device drops.  ``state`` is the controller's initial state; the result has
     the last one.  ``mode`` IMPOSED_SPEED: the scenario's load is the mechanical speed [rad/s].
+    ``progress``, if given, is called with the periods done and their number, every PROGRESS_PERIODS.
     """
     machine = machine or Machine.from_mapping(vars(drive.machine))
     params = plant_params(machine, inverter or Inverter(), mode=mode)
@@ -160,7 +158,8 @@ def simulate(
     brake = np.zeros(n) if scenario.brake is None else scenario.brake
     out, observed = np.zeros((n, len(PLANT))), np.zeros((n, len(fluxproof.Observed._fields)), np.int64)
     state, values = state or fluxproof.State(), register_set.values
-    ends = [*sorted(set(scenario.changes) - {0}), n]
+    shown = set() if progress is None else set(range(0, n, PROGRESS_PERIODS))
+    ends = [*sorted((set(scenario.changes) | shown) - {0}), n]
     for start, end in zip([0, *ends[:-1]], ends, strict=True):
         values = values._replace(**scenario.changes.get(start, {}))
         part = slice(start, end)
@@ -169,6 +168,8 @@ def simulate(
             plant_state, params, codes, float(dead_time_s), drive.sample_time_s, start, mode == FREE,
             out[part], observed[part],
         )  # fmt: skip
+        if progress is not None:
+            progress(end, n)
     names = fluxproof.Observed._fields
     return Result(
         observed=dict(zip(names, observed.T, strict=True)),

@@ -91,6 +91,25 @@ def compressed(drive: Drive) -> Scenario:
     )
 
 
+def tour(drive: Drive) -> Scenario:
+    """400 periods in sizes of the drive itself: every event of ``everything`` for any drive file."""
+    t, m = 400 * drive.sample_time_s, drive.machine
+    rated, current = m.rated_speed_rad_s / RPM, drive.current_limit_a
+    torque = 1.5 * m.pole_pairs * m.magnet_flux_wb * current
+    return scenario(
+        drive,
+        t,
+        rpm={0.0: 0.3 * rated, 0.2 * t: 0.8 * rated, 0.6 * t: -0.3 * rated},
+        load={0.3 * t: 0.4 * torque, 0.5 * t: 0.0},
+        u_dc={0.4 * t: 0.4 * drive.inverter.dc_bus_v, 0.5 * t: drive.inverter.dc_bus_v},
+        i_d={0.52 * t: -0.2 * current, 0.55 * t: 0.0},
+        i_q={0.56 * t: -0.5 * current},
+        torque_mode=((0.56 * t, 0.6 * t),),
+        off=((0.9 * t, 0.95 * t),),
+        start_rpm=0.3 * rated,
+    )
+
+
 def full_speed(drive: Drive) -> Scenario:
     """On a bus of 300 V towards the rated speed and back through zero: long periods at the voltage limit."""
     return scenario(drive, 0.4, rpm={0.0: 2900, 0.2: -2900}, u_dc={0.0: 300.0})
@@ -101,4 +120,11 @@ def short(drive: Drive) -> Scenario:
     return scenario(drive, 0.03, rpm={0.0: 400, 0.02: -400}, load={0.01: 2.0})
 
 
-SCENARIOS = {"fig9": fig9, "short": short, "everything": everything, "compressed": compressed, "full_speed": full_speed}
+SCENARIOS = {
+    "fig9": fig9,
+    "short": short,
+    "everything": everything,
+    "compressed": compressed,
+    "full_speed": full_speed,
+    "tour": tour,
+}

@@ -51,6 +51,8 @@ class Nominal:
     bases: object
     protection: object
     sampling: object
+    encoder: object
+    converters: object
     columns: dict = field(default_factory=dict)
     path: str = ""
     plant: dict = field(default_factory=dict)

@@ -17,6 +17,8 @@ from fluxproof import dump_capture, print_registers
 from fluxproof.diagnosis import command as diagnose
 from fluxproof.diagnosis.recording import RecordingError
 from fluxproof.golden_model.drive_keys import DriveError
+from fluxproof.project import command as project
+from fluxproof.simulate import command as simulate
 
 
 class Command(NamedTuple):
@@ -32,7 +34,11 @@ COMMANDS = {
     "dump": Command(
         "convert a captured telemetry stream to the input of diagnose", dump_capture.arguments, dump_capture.run
     ),
+    "project": Command("the files of a Vivado project for a drive", project.arguments, project.run),
     "registers": Command("the registers for a drive", print_registers.arguments, print_registers.run),
+    "simulate": Command(
+        "a drive in closed loop with the golden core: does it work", simulate.arguments, simulate.run_command
+    ),
 }
 
 

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from fluxproof.golden_model.drive_checks import check
 from fluxproof.golden_model.drive_file import read_sections
 from fluxproof.golden_model.drive_keys import DriveError, flag, not_negative, positive, real, whole
+from fluxproof.golden_model.front_ends import Converters, Encoder
 
 
 @dataclass(frozen=True)
@@ -204,6 +205,8 @@ class Drive:
     base_choice: BaseChoice = BaseChoice()
     protection: Protection = Protection()
     sampling: Sampling = Sampling()
+    encoder: Encoder = Encoder()
+    converters: Converters = Converters()
 
     def __post_init__(self):
         check(self)
@@ -253,6 +256,8 @@ SECTIONS = {
     "bases": BaseChoice,
     "protection": Protection,
     "sampling": Sampling,
+    "encoder": Encoder,
+    "converters": Converters,
 }
 
 
@@ -272,4 +277,6 @@ def with_carrier(drive, carrier_half):
     time and minimum pulse keep their values in seconds, so their number of clocks changes.
     """
     core = dataclasses.replace(drive.core, clock_hz=2.0 * carrier_half * drive.inverter.pwm_frequency_hz)
-    return dataclasses.replace(drive, core=core)
+    # Front ends whose own clock comes from the core's are not part of such a simulation: it starts at the codes.
+    encoder = drive.encoder if drive.encoder.clock_hz is None else Encoder()
+    return dataclasses.replace(drive, core=core, encoder=encoder, converters=Converters())

@@ -4,6 +4,7 @@ import math
 
 from fluxproof.golden_model.drive_keys import DriveError
 from fluxproof.golden_model.formats import PU, VECTOR
+from fluxproof.golden_model.front_ends import check_converters, check_encoder
 
 CARRIER_HALF_RANGE = (8, 32767)  # generic CARRIER_HALF of rtl/fluxproof.vhd
 WHOLE = 1e-6  # relative; a decimal fraction with seven digits counts as exact
@@ -171,5 +172,5 @@ def _protection(drive):
 
 RULES = (
     _sample_time, _sampling, _carrier, _pulses, _voltage, _current, _flux, _codes, _speed_loop, _current_loop,
-    _flux_loop, _adaline_steps, _protection,
+    _flux_loop, _adaline_steps, _protection, check_encoder, check_converters,
 )  # fmt: skip

@@ -104,6 +104,8 @@ def _single(where, key, value):
         raise DriveError(f": {where} = {_shown(value)} is a {_type_name(value)}: must be {_expected(key)}")
     if key.kind == "bool":
         return value
+    if not key.accepts(value) and key.kind == "word":
+        raise DriveError(f": {where} = {_shown(value)}: allowed is {key.allowed}; {_nearest(value, key.words)}")
     if not key.accepts(value):
         raise DriveError(f": {where} = {_shown(value)} is out of range: allowed is {key.allowed}")
     return float(value) if key.kind == "float" else value
@@ -113,6 +115,8 @@ def _type_fits(kind, value):
     """TOML's true is not a number, and a whole number is a real one."""
     if kind == "bool" or isinstance(value, bool):
         return kind == "bool" and isinstance(value, bool)
+    if kind == "word":
+        return isinstance(value, str)
     if kind == "int":
         return isinstance(value, int)
     return isinstance(value, float) or (isinstance(value, int) and abs(value) < 10**300)
@@ -122,6 +126,8 @@ def _expected(key):
     """What the key takes, in words."""
     if key.kind == "bool":
         return "true or false"
+    if key.kind == "word":
+        return f"a string, {key.allowed}"
     one = f"{'whole number' if key.kind == 'int' else 'number'}, {key.allowed}"
     doc = f" ({key.doc})" if key.doc else ""
     return f"a list of {key.count}, each a {one}{doc}" if key.count else f"a {one}{doc}"

@@ -17,22 +17,27 @@ class DriveError(ValueError):
 class Key:
     """Type and legal range of one key; ``open_lo``: the lower end itself is excluded."""
 
-    kind: str  # "float", "int", "bool"
+    kind: str  # "float", "int", "bool", "word"
     unit: str = "1"
     lo: float = -math.inf
     hi: float = math.inf
     open_lo: bool = False
     count: int = 0  # 0: a single value; n: a list of n values
     doc: str = ""
+    words: tuple = ()  # of a "word": the allowed ones
 
     def accepts(self, value):
-        """Whether one number is finite and within the range."""
+        """Whether one number is finite and within the range, or a word one of the allowed."""
+        if self.kind == "word":
+            return value in self.words
         above = value > self.lo if self.open_lo else value >= self.lo
         return above and value <= self.hi and math.isfinite(value)
 
     @property
     def allowed(self):
         """The range in words, unit included."""
+        if self.kind == "word":
+            return f"{', '.join(self.words[:-1])} or {self.words[-1]}"
         unit = "" if self.unit == "1" else f" {self.unit}"
         if math.isfinite(self.lo) and math.isfinite(self.hi):
             return f"{'above ' if self.open_lo else ''}{self.lo:g} up to {self.hi:g}{unit}"
@@ -68,6 +73,11 @@ def whole(lo, hi, doc, default=MISSING):
 def flag(doc, default=MISSING):
     """true or false."""
     return _field(Key("bool", doc=doc), default)
+
+
+def choice(words, doc, default=MISSING):
+    """One of several words."""
+    return _field(Key("word", doc=doc, words=words), default)
 
 
 def key_of(field):

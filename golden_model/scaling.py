@@ -25,8 +25,9 @@ Protection: the default limits lie outside the range of a healthy drive: overcur
 sum of the currents at a fifth of the rated current, the bus at a tenth and 1.3 times its nominal value, no sample for
 1.5 periods, 1.2 times the rated speed, a tenth of it against the reference for 20 ms without braking, a sensor that
 shows 1 % of the rated current at rest. A stall and an open load are reported and do not trip: the current is within
-its limit. The position may deviate from its linear extrapolation by 5e-4 turn plus four codes: no shaft accelerates
-that much within a sample, and a frozen code is detected from that rotation per sample on.
+its limit. The position may deviate from its linear extrapolation by 5e-4 turn plus four codes, or four counts of an
+incremental encoder: no shaft accelerates that much within a sample, and a frozen code is detected from that rotation
+per sample on.
 """
 
 import math
@@ -46,14 +47,8 @@ SIGN_OF_RATED, SIGN_GAIN = 0.005, 0.125  # |direction| = 1 from: part of rated c
 LEARN_OF_RATED = 0.1  # of the rated current: the V_dead Adaline is held below
 AHEAD_SAMPLES = 2.5  # from a sample to the middle of the next sample's voltage
 THRESHOLD_OF_BASE = 2e-5  # of the voltage base: five of the format's steps
-LOSS_MARGIN, LOSS_SPARE_V = (
-    3.0,
-    3.0,
-)  # largest compensation: factor on the leg loss of the data sheet, plus device drops
-PSI_STEP, PSI_FROM = (
-    0.01,
-    0.1,
-)  # 2*eta*omega**2 at rated speed; part of rated speed from which psi_m is estimated
+LOSS_MARGIN, LOSS_SPARE_V = (3.0, 3.0)  # largest compensation: factor on the leg loss by data sheet, device drops
+PSI_STEP, PSI_FROM = (0.01, 0.1)  # 2*eta*omega**2 at rated speed; part of rated speed from which psi_m is estimated
 TRIP_OF_LIMIT, TRIP_OF_RANGE = 2.0, 0.98  # overcurrent: of the current limit, at most of the sensors' range
 SUM_OF_RATED = 0.2  # of the rated current: a larger sum of the phase currents is a sensor fault
 BUS_LOW, BUS_HIGH = 0.1, 1.3  # of the nominal bus voltage
@@ -303,7 +298,10 @@ def protection(drive):
     yield _limit("u_dc_min", p.u_dc_min_v, BUS_LOW * bus, "V", b.voltage_v, "u_dc_min_v", keys, volts)
     most = max(bus, min(BUS_HIGH * bus, TRIP_OF_RANGE * s.u_dc_range_v))
     yield _limit("u_dc_max", p.u_dc_max_v, most, "V", b.voltage_v, "u_dc_max_v", keys, volts)
-    jump, keys = JUMP_CODES / 2.0**s.position_bits + JUMP_TURN, "[sensors] position_bits"
+    finest, keys = 2.0**s.position_bits, "[sensors] position_bits"
+    if drive.encoder.counts is not None:
+        finest, keys = float(drive.encoder.counts), "[encoder] counts"
+    jump = JUMP_CODES / finest + JUMP_TURN
     if p.position_jump_rad is not None:
         jump, keys = p.position_jump_rad / TURN_RAD, "[protection] position_jump_rad"
     yield Entry("jump_max", jump, "turn", 1.0, keys)

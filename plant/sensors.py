@@ -21,7 +21,8 @@ class Sensors:
     lsb = 2 full_scale / 2^bits, clipped to 0..2^bits - 1.
     Bus voltage: code = round((u (1 + gain_error) + offset + noise) / lsb), unsigned.
     Position: the sensed mechanical angle is direction theta_m + offset
-    + a1 sin(theta_m + p1) + a2 sin(2 theta_m + p2) + noise, rounded, modulo a turn.
+    + a1 sin(theta_m + p1) + a2 sin(2 theta_m + p2) + noise, rounded, modulo a turn; with
+    position_counts the code is that of the middle of the count the shaft is in.
     """
 
     current_bits: int = 12
@@ -43,6 +44,7 @@ class Sensors:
     eccentricity_twice_phase_rad: float = 0.0
     position_noise_rad: float = 0.0
     seed: int = 0
+    position_counts: int = 0  # of an incremental encoder a turn; 0: the code alone quantises
 
 
 class SensorParams(NamedTuple):
@@ -67,6 +69,7 @@ class SensorParams(NamedTuple):
     twice_phase: float
     position_noise: float
     seed: int
+    position_counts: int
 
 
 def sensor_params(sensors):
@@ -96,6 +99,7 @@ def sensor_params(sensors):
         float(s.eccentricity_twice_phase_rad),
         float(s.position_noise_rad),
         int(s.seed),
+        int(s.position_counts),
     )
 
 
@@ -156,4 +160,7 @@ def position_code(sensors, theta_m, sample):
     seen += _noise(sensors.position_noise, sensors.seed, 4, sample)
     turns = seen / (2.0 * math.pi)
     codes = 1 << sensors.position_bits
-    return math.floor((turns - math.floor(turns)) * codes + 0.5) % codes
+    part = turns - math.floor(turns)
+    if sensors.position_counts > 0:
+        part = (math.floor(part * sensors.position_counts) + 0.5) / sensors.position_counts
+    return math.floor(part * codes + 0.5) % codes

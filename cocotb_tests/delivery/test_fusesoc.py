@@ -57,8 +57,10 @@ def test_fusesoc_vivado_setup(tmp_path):
     read = re.findall(r"read_vhdl -vhdl2008 \{(\S+)\}", script.read_text())
     assert [name.split("/", 2)[2] for name in read] == axi_top.source_names()
     assert all((script.parent / name).exists() for name in read)
-    for text in ("CARRIER_HALF=10000", "fluxproof.xdc}", "fluxproof_clock.xdc}"):
+    for text in ("CARRIER_HALF=10000", "fluxproof.xdc}", "clock.tcl}"):
         assert text in script.read_text()
+    text = script.read_text()
+    assert text.index("CLOCK_HZ=200000000") < text.index("source {") and text.count("source {") == 1
 
 
 def test_fusesoc_synth_setup(tmp_path):

@@ -147,6 +147,19 @@ def test_files_of_the_component_exist_in_compile_order(component):
         assert set(vhdl) == {p.relative_to(ROOT).as_posix() for p in rtl_sources()}
 
 
+def test_clock_rate_follows_the_clock(component):
+    """The block design's script is named where Vivado looks for it, and sets a parameter that exists."""
+    view = {v.findtext("s:name", namespaces=S): v for v in component.findall("s:model/s:views/s:view", S)}
+    view = view["xilinx_blockdiagram"]
+    assert view.findtext("s:envIdentifier", namespaces=S) == ":vivado.xilinx.com:block.diagram"
+    fileset = view.findtext("s:fileSetRef/s:localName", namespaces=S)
+    files = {f.findtext("s:name", namespaces=S): f for f in component.findall("s:fileSets/s:fileSet", S)}
+    assert names(files[fileset].findall("s:file", S)) == [ipxact.BLOCK_DESIGN]
+    script = (ROOT / ipxact.BLOCK_DESIGN).read_text()
+    assert set(re.findall(r"CONFIG\.(\w+)", script)) == {"FREQ_HZ", "CLOCK_HZ"} and "CLOCK_HZ" in axi_top.GENERICS
+    assert "$cell_name/aclk" in script and "aclk" in ipxact.INTERFACES
+
+
 def test_zip_is_an_ip_repository(component, tmp_path, monkeypatch, capsys):
     """All files that component.xml names are inside; a stale or invalid component is not packed."""
     assert package_command.problems() == []

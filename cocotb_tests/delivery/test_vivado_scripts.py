@@ -44,12 +44,12 @@ def needs_tclsh() -> None:
         pytest.skip("there is no tclsh here")
 
 
-def stubbed(facts: Path, script: Path, *arguments: str) -> subprocess.CompletedProcess:
+def stubbed(facts: Path, script: Path, *arguments: str, cwd: Path | None = None) -> subprocess.CompletedProcess:
     """``script`` under vivado_stub.tcl."""
     needs_tclsh()
     stub = ROOT / "cocotb_tests" / "support" / "vivado_stub.tcl"
     return subprocess.run(
-        ["tclsh", str(stub), str(facts), str(script), *arguments], capture_output=True, text=True
+        ["tclsh", str(stub), str(facts), str(script), *arguments], cwd=cwd, capture_output=True, text=True
     )
 
 
@@ -59,6 +59,7 @@ def test_packaging_script(facts, tmp_path):
     added = re.search(r"^add_files -norecurse 1 \{(.*)\}", done.stdout, re.MULTILINE)[1].split()
     assert set(map(Path, added)) == set(rtl_sources())
     assert f"set_property  version {ipxact.version()} " in done.stdout
+    assert "type tclSource bd/bd.tcl" in done.stdout and (tmp_path / "ip" / "bd" / "bd.tcl").exists()
     assert "ipx::check_integrity" in done.stdout and f"-root_dir {tmp_path}/ip" in done.stdout
 
 
@@ -66,6 +67,8 @@ def test_example_script(facts, tmp_path):
     done = stubbed(facts, VIVADO / "example.tcl", str(tmp_path), "xc7z045ffg900-2")
     assert done.returncode == 0, done.stderr
     assert "create_project -part xc7z045ffg900-2 -force 1 example" in done.stdout
+    assert re.search(r"^set_property  CONFIG.CLOCK_HZ 100000000 drive$", done.stdout, re.MULTILINE)
+    assert "-offset 0x43C00000 -range 4K" in done.stdout
     for report in ("utilization", "timing", "cdc", "drc"):
         assert f"-file {tmp_path}/reports/{report}.rpt" in done.stdout
 
@@ -86,10 +89,38 @@ def test_example_fills_the_table(facts, tmp_path):
     assert [name.strip() for name in header.split("|")] == columns and len(row) == len(columns)
 
 
-@pytest.mark.parametrize("name", ["fluxproof.xdc", "fluxproof_clock.xdc", "example.xdc"])
+@pytest.mark.parametrize("name", ["fluxproof.xdc", "example.xdc"])
 def test_constraints(facts, name):
     done = stubbed(facts, VIVADO / name)
     assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize(("clock_hz", "period"), [(200000000, "5.000"), (100000000, "10.000"), (150000000, "6.666")])
+def test_clock_follows_the_generic(facts, tmp_path, clock_hz, period):
+    """What FuseSoC sources: the constraint is that of the project's own CLOCK_HZ."""
+    own = tmp_path / "facts.tcl"
+    own.write_text(facts.read_text() + f"set generics_of_project {{ADC_BITS=16 CLOCK_HZ={clock_hz} }}\n")
+    done = stubbed(own, VIVADO / "clock.tcl", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert f"add_files -fileset constrs_1 -norecurse 1 {tmp_path}/fluxproof_clock.xdc" in done.stdout
+    wanted = f"create_clock -name aclk -period {period} [get_ports aclk]\n"
+    assert (tmp_path / "fluxproof_clock.xdc").read_text() == wanted
+    own.write_text(facts.read_text() + "set generics_of_project {ADC_BITS=16}\n")
+    assert "no CLOCK_HZ" in stubbed(own, VIVADO / "clock.tcl", cwd=tmp_path).stderr
+
+
+def test_no_constraint_has_a_period_of_its_own():
+    """A period that is written down is wrong at every other clock."""
+    fixed = [path.name for path in VIVADO.glob("*.xdc") if re.search(r"^create_clock", path.read_text(), re.MULTILINE)]
+    assert not fixed
+
+
+def test_a_clock_that_the_processor_cannot_make_is_refused(facts, tmp_path):
+    own = tmp_path / "facts.tcl"
+    own.write_text(facts.read_text() + "set fclk_error 1000000\n")
+    done = stubbed(own, VIVADO / "example.tcl", str(tmp_path))
+    assert done.returncode != 0 and "makes 101000000 Hz out of clock_hz = 100000000" in done.stderr
+    assert re.search(r"^set_property  CONFIG.CLOCK_HZ 101000000 drive$", done.stdout, re.MULTILINE)
 
 
 def test_constraints_name_registers_that_exist():
@@ -116,6 +147,7 @@ def test_constraints_name_registers_that_exist():
         ("example.tcl", "adc_u_dc position_code trip", "position_code trip", "adc_u_dc is not connected"),
         ("example.tcl", "[file join $out ip]", "[file join $out ip2]", "does not hold"),
         ("example.tcl", "-dict [list CONFIG.NUM_SI 1 CONFIG.NUM_MI 2] $control", "-dict {A 1} $control", "property A"),
+        ("package_ip.tcl", "ipx::add_file bd/bd.tcl", "ipx::add_file bd.tcl", "no file bd.tcl"),
         ("result.tcl", "STATS.WNS [get_runs", "PART [get_runs", "impl_1 has no property PART"),
         ("result.tcl", "STATS.WNS [get_runs", "PROGRESS [get_runs", "impl_1 has no worst slack"),
         ("result.tcl", "version -short", "version -brief", "no option -brief"),
@@ -123,7 +155,7 @@ def test_constraints_name_registers_that_exist():
 )  # fmt: skip
 def test_stub_detects_errors(facts, tmp_path, script, old, new, message):
     """The stub rejects wrong scripts; a stub that accepts everything would prove nothing."""
-    for path in ("scripts/vivado", "rtl"):
+    for path in ("scripts/vivado", "rtl", "bd"):
         shutil.copytree(ROOT / path, tmp_path / path)
     shutil.copy(ipxact.PATH, tmp_path)
     copy = tmp_path / "scripts" / "vivado" / script

@@ -14,7 +14,7 @@ proc unknown {name args} {
 
 # command {option arguments ...} least most: how many arguments stand beside the options
 array set known {
-  create_project        {{-force 0 -part 1} 1 2}
+  create_project        {{-force 0 -in_memory 0 -part 1} 0 2}
   close_project         {{} 0 0}
   current_project       {{} 0 0}
   get_parts             {{} 1 1}
@@ -45,7 +45,17 @@ array set known {
   connect_bd_net        {{} 2 99}
   connect_bd_intf_net   {{} 2 2}
   make_bd_pins_external {{-name 1} 1 1}
-  assign_bd_address     {{} 0 0}
+  assign_bd_address     {{-offset 1 -range 1} 0 1}
+  get_bd_addr_segs      {{} 1 1}
+  get_bd_cells          {{} 1 1}
+  bd::mark_propagate_only {{} 2 2}
+  read_vhdl             {{-vhdl2008 0} 1 1}
+  read_xdc              {{-ref 1 -mode 1} 1 1}
+  synth_design          {{-top 1 -part 1 -mode 1 -generic 1} 0 0}
+  opt_design            {{} 0 0}
+  place_design          {{} 0 0}
+  route_design          {{} 0 0}
+  write_checkpoint      {{-force 0} 1 1}
   validate_bd_design    {{} 0 0}
   save_bd_design        {{} 0 0}
   ipx::package_project  {{-root_dir 1 -vendor 1 -library 1 -taxonomy 1 -import_files 0 -set_current 1 -force 0} 0 0}
@@ -55,6 +65,8 @@ array set known {
   ipx::create_xgui_files {{} 1 1}
   ipx::update_checksums {{} 1 1}
   ipx::check_integrity  {{} 1 1}
+  ipx::add_file_group   {{-type 1} 2 2}
+  ipx::add_file         {{} 2 2}
   ipx::save_core        {{} 1 1}
   ipx::archive_core     {{} 2 2}
   get_ports             {{-filter 1} 0 1}
@@ -67,6 +79,8 @@ array set known {
 }
 namespace eval ipx {}
 namespace eval do_ipx {}
+namespace eval bd {}
+namespace eval do_bd {}
 
 # Pins and interfaces of the vendor's cores, as far as the example uses them.
 array set vendor_pins {
@@ -85,7 +99,7 @@ array set vendor_interfaces {
 }
 set properties {
   file_type USED_IN top ip_repo_paths name version description display_name
-  IOB IOSTANDARD PULLUP PROGRESS STATS.WNS
+  IOB IOSTANDARD PULLUP PROGRESS STATS.WNS type
 }
 
 proc call {name arguments} {
@@ -159,6 +173,9 @@ proc do_set_property {options args} {
     error "set_property [lindex $pairs 0]: no object"
   }
   foreach {property value} $pairs {
+    if {$property eq "CONFIG.PCW_FPGA0_PERIPHERAL_FREQMHZ"} {
+      set ::fclk_hz [expr {round($value * 1e6) + $::fclk_error}]
+    }
     if {[string match CONFIG.* $property]} {
       set own [expr {$object eq [cell_of_core]}]
       if {$own && [string range $property 7 end] ni $::core_parameters} {
@@ -173,6 +190,15 @@ proc do_set_property {options args} {
   }
 }
 proc do_get_property {options property object} {
+  if {$property eq "CONFIG.FREQ_HZ"} {
+    return $::fclk_hz
+  }
+  if {$property eq "generic" && $object eq "sources_1"} {
+    return $::generics_of_project
+  }
+  if {$property eq "DIRECTORY"} {
+    return [pwd]
+  }
   set of [dict create get_parts [list SPEED] impl_1 [list PROGRESS STATS.WNS] current_project [list PART]]
   set kind [expr {$object eq $::project_part ? "get_parts" : $object}]
   if {![dict exists $of $kind] || $property ni [dict get $of $kind]} {
@@ -181,6 +207,35 @@ proc do_get_property {options property object} {
   # A part's name ends with its speed grade.
   set speed [regexp -inline {\-\d\w*$} $::project_part]
   return [dict get [list PROGRESS 100% STATS.WNS 0.5 PART $::project_part SPEED $speed] $property]
+}
+proc do_read_vhdl {options names} {
+  do_add_files {} $names
+}
+proc do_read_xdc {options name} {
+  do_add_files {} [list $name]
+  source $name
+}
+proc do_synth_design {options} {
+  foreach generic [dict get $options -generic] {
+    if {[lindex [split $generic =] 0] ni $::core_parameters} {
+      error "synth_design: the top has no generic $generic"
+    }
+  }
+}
+proc do_get_bd_addr_segs {options pattern} {
+  part_of [join [lrange [split $pattern /] 0 1] /] $::core_interfaces [array get ::vendor_interfaces]
+}
+proc do_get_bd_cells {options name} {
+  if {![info exists ::cells($name)]} {
+    error "no cell $name"
+  }
+  return $name
+}
+proc do_ipx::add_file {options name group} {
+  if {![file exists [file join $::packaged $name]]} {
+    error "ipx::add_file: no file $name"
+  }
+  return $name
 }
 proc do_ipx::package_project {options} {
   set ::packaged [dict get $options -root_dir]
@@ -267,6 +322,9 @@ proc do_make_bd_pins_external {options pin} {
 }
 proc do_validate_bd_design {options} {
   set cell [cell_of_core]
+  source [file join $::packaged bd bd.tcl]
+  init $cell {}
+  propagate $cell {}
   foreach pin [concat $::core_pins $::core_interfaces] {
     if {![regexp {^(s_axi|m_axis)_} $pin] && ![info exists ::connected($cell/$pin)]} {
       error "validate_bd_design: $cell/$pin is not connected"
@@ -275,6 +333,9 @@ proc do_validate_bd_design {options} {
 }
 
 set repository ""
+set fclk_hz 0
+set fclk_error 0
+set generics_of_project ""
 source [lindex $argv 0]
 set script [lindex $argv 1]
 set argv [lrange $argv 2 end]

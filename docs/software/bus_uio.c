@@ -1,5 +1,6 @@
 /* The core's window through Linux' userspace I/O: give the core's node in the device tree
- * compatible = "generic-uio", and its number to FLUXPROOF_UIO (0 for /dev/uio0, the default).
+ * compatible = "generic-uio" (`fluxproof project` writes it as fluxproof.dtsi), and its number to FLUXPROOF_UIO
+ * (0 for /dev/uio0, the default).
  * A refused access is a bus error there (SIGBUS): bring_up.c turns the gates off and ends. */
 
 #define _DEFAULT_SOURCE

@@ -34,8 +34,10 @@ architecture rtl of multiply_add is
   signal a_1    : signed(a'length - 1 downto 0);
   signal b_1    : signed(b'length - 1 downto 0);
   signal c_1    : signed(c'length - 1 downto 0);
+  signal prod_1 : signed(PROD_W - 1 downto 0);
   signal prod_2 : signed(PROD_W - 1 downto 0);
   signal base_2 : signed(SUM_W - 1 downto 0);
+  signal sum_2  : signed(SUM_W - 1 downto 0);
   signal sum_3  : signed(SUM_W - 1 downto 0);
   signal cut_3  : signed(SUM_W - 1 - DROP downto 0);
 
@@ -62,13 +64,17 @@ begin
       c_1 <= c xor FLIP;
 
       -- Stage 2: prod = a*b
-      prod_2 <= a_1 * b_1;
+      prod_2 <= prod_1;
       base_2 <= at_product(c_1);
 
       -- Stage 3: sum = c + prod
-      sum_3 <= base_2 + prod_2;
+      sum_3 <= sum_2;
     end if;
   end process;
+
+  -- Outside the process a simulator computes them only when an operand has changed, not at every clock.
+  prod_1 <= a_1 * b_1;
+  sum_2  <= base_2 + prod_2;
 
   cut_3   <= sum_3(SUM_W - 1 downto DROP) xor FLIP;
   y       <= saturate(cut_3, y'length);

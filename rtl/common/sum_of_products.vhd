@@ -34,11 +34,13 @@ architecture rtl of sum_of_products is
   signal a_1       : signed(a'length - 1 downto 0);
   signal b_1       : signed(b'length - 1 downto 0);
   signal minus_1   : std_logic;
+  signal prod_ab_1 : signed(a'length + b'length - 1 downto 0);
   signal prod_ab_2 : signed(a'length + b'length - 1 downto 0);
   signal rest_2    : signed(REST_W - 1 downto 0);
   signal c_2       : signed(c'length - 1 downto 0);
   signal d_2       : signed(d'length - 1 downto 0);
   signal sum_ab_3  : signed(SUM_W - 1 downto 0);
+  signal prod_cd_2 : signed(c'length + d'length - 1 downto 0);
   signal prod_cd_3 : signed(c'length + d'length - 1 downto 0);
   signal sum_3     : signed(SUM_W - 1 downto 0);
 begin
@@ -55,7 +57,7 @@ begin
       minus_1 <= minus;
 
       -- Stage 2: prod_ab = a*b;  rest: half an LSB of y, and b where a is complemented;  c, d
-      prod_ab_2 <= a_1 * b_1;
+      prod_ab_2 <= prod_ab_1;
       rest_2    <= half(DROP, REST_W);
       if minus_1 = '1' then
         rest_2 <= resize(b_1, REST_W) + half(DROP, REST_W);
@@ -65,9 +67,13 @@ begin
 
       -- Stage 3: sum_ab = +-a*b and half an LSB of y;  prod_cd = c*d
       sum_ab_3  <= resize(prod_ab_2, SUM_W) + rest_2;
-      prod_cd_3 <= c_2 * d_2;
+      prod_cd_3 <= prod_cd_2;
     end if;
   end process;
+
+  -- Outside the process a simulator multiplies only when an operand has changed, not at every clock.
+  prod_ab_1 <= a_1 * b_1;
+  prod_cd_2 <= c_2 * d_2;
 
   sum_3 <= sum_ab_3 + prod_cd_3;
   y     <= saturate(sum_3(SUM_W - 1 downto DROP), y'length);

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from fluxproof.checkout import ROOT, RTL
 from scripts.package.axi_top import GENERICS, TOP, source_names
-from scripts.package.ipxact import CLOCK_CONSTRAINT, CONSTRAINTS, LIBRARY, SUMMARY, VENDOR, project_version
+from scripts.package.ipxact import CLOCK_SCRIPT, CONSTRAINTS, LIBRARY, SUMMARY, VENDOR, project_version
 
 PATH = ROOT / "fluxproof.core"
 
@@ -36,6 +36,9 @@ filesets:
     file_type: xdc
     files:
       - {constraints}
+  clock:
+    file_type: tclSource
+    files:
       - {clock}
 
 generators:
@@ -82,7 +85,7 @@ targets:
       output_format: json
       yosys_synth_options: [-family, xc7, -flatten]
   vivado:
-    filesets: [rtl, constraints]
+    filesets: [rtl, constraints, clock]
     toplevel: {top}
     parameters: [{names}]
     flow: vivado
@@ -115,7 +118,7 @@ def render(rtl: Path = RTL) -> str:
         summary=SUMMARY,
         files="\n".join(files),
         constraints=CONSTRAINTS,
-        clock=CLOCK_CONSTRAINT,
+        clock=CLOCK_SCRIPT,
         parameters="\n".join(parameters),
         names=", ".join(GENERICS),
     )

@@ -29,7 +29,8 @@ XSI = "http://www.w3.org/2001/XMLSchema-instance"
 PATH = ROOT / "component.xml"
 RDL = "generated/fluxproof.rdl"  # below rtl/
 CONSTRAINTS = "scripts/vivado/fluxproof.xdc"
-CLOCK_CONSTRAINT = "scripts/vivado/fluxproof_clock.xdc"  # for the core alone: Vivado makes its own for an IP
+CLOCK_SCRIPT = "scripts/vivado/clock.tcl"  # for the core alone: Vivado makes a constraint of its own for an IP
+BLOCK_DESIGN = "bd/bd.tcl"  # lets CLOCK_HZ follow the clock that is connected; Vivado wants this name
 XGUI = "xgui/fluxproof_axi.tcl"
 VENDOR, LIBRARY = "fluxproof", "motor_control"
 TITLE = "Fluxproof PMSM drive"
@@ -101,6 +102,7 @@ def component(entity: Entity, rtl: Path = RTL) -> etree._Element:
                 _view(SYNTHESIS, "Synthesis", "synthesis", entity.name),
                 _view(SIMULATION, "Simulation", "simulation", entity.name),
                 _view("xilinx_xpgui", "UI Layout", "xgui.ui", None),
+                _view("xilinx_blockdiagram", "Block Diagram", "block.diagram", None),
             ),
             E.ports(*(_port(pin, entity) for pin in entity.pins.values())),
             E.modelParameters(*(_model_parameter(g) for g in entity.generics.values())),
@@ -109,6 +111,7 @@ def component(entity: Entity, rtl: Path = RTL) -> etree._Element:
             _file_set(SYNTHESIS, [*_vhdl_files(rtl), _constraints_file()]),
             _file_set(SIMULATION, _vhdl_files(rtl)),
             _file_set("xilinx_xpgui", [_file(XGUI, "tclSource", "XGUI_VERSION_2")]),
+            _file_set("xilinx_blockdiagram", [_file(BLOCK_DESIGN, "tclSource")]),
         ),
         E.description(SUMMARY),
         E.parameters(*(_parameter(g) for g in entity.generics.values()), _component_name(entity)),

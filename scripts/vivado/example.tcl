@@ -5,6 +5,7 @@
 # The processor loads the registers over AXI (GP0), a DMA writes the telemetry into its memory (HP0), a remembered
 # trip interrupts it.  Converters, encoder, trip and gates go to pins; give them numbers in example.xdc before you
 # write a bitstream.  Reports: OUT_DIR/reports; OUT_DIR/result.md is a row for the table of docs/vivado.md.
+# `fluxproof project drive.toml` writes a script that sets the drive's own values below and sources this one.
 
 set here [file dirname [file normalize [info script]]]
 set root [file normalize [file join $here .. ..]]
@@ -21,8 +22,15 @@ set argv [list $out]
 source [file join $here package_ip.tcl]
 source [file join $here result.tcl]
 
-set clock_mhz 100
-set carrier_half 5000 ;# 10 kHz PWM
+# Without a drive: 100 MHz and 10 kHz PWM.
+foreach {name value} {
+  clock_hz 100000000 adc_bits 16 position_bits 16 carrier_half 5000 estimators 1 base_address 0x43C00000
+} {
+  if {![info exists $name]} {
+    set $name $value
+  }
+}
+set clock_mhz [format %g [expr {$clock_hz / 1e6}]]
 
 create_project -force -part $part example [file join $out example]
 set_property ip_repo_paths [file join $out ip] [current_project]
@@ -43,8 +51,10 @@ set reset [create_bd_cell -type ip -vlnv xilinx.com:ip:proc_sys_reset reset]
 
 set drive [create_bd_cell -type ip -vlnv fluxproof:motor_control:fluxproof_axi drive]
 set_property -dict [list \
-  CONFIG.CLOCK_HZ [expr {$clock_mhz * 1000000}] \
-  CONFIG.CARRIER_HALF $carrier_half] $drive
+  CONFIG.ADC_BITS $adc_bits \
+  CONFIG.POSITION_BITS $position_bits \
+  CONFIG.CARRIER_HALF $carrier_half \
+  CONFIG.ESTIMATORS $estimators] $drive
 
 # Telemetry: packets of the stream into memory, one descriptor each, as docs/telemetry.md tells.
 set dma [create_bd_cell -type ip -vlnv xilinx.com:ip:axi_dma dma]
@@ -92,8 +102,14 @@ foreach pin {
   make_bd_pins_external -name $pin [get_bd_pins drive/$pin]
 }
 
+assign_bd_address -offset $base_address -range 4K [get_bd_addr_segs drive/s_axi/*]
 assign_bd_address
 validate_bd_design
+# The processor's clock has steps: PWM period and dead time are right only if it is the one asked for.
+set rate [get_property CONFIG.FREQ_HZ [get_bd_pins ps/FCLK_CLK0]]
+if {abs($rate / double($clock_hz) - 1) > 1e-4} {
+  error "the processor makes $rate Hz out of clock_hz = $clock_hz: put $rate into the drive file, or choose another"
+}
 save_bd_design
 
 set design [get_files example.bd]

@@ -48,6 +48,11 @@ ipx::infer_bus_interface irq xilinx.com:signal:interrupt_rtl:1.0 $core
 foreach interface {s_axi m_axis} {
   ipx::associate_bus_interfaces -busif $interface -clock aclk $core
 }
+# CLOCK_HZ follows the clock.
+file mkdir [file join $ip bd]
+file copy -force [file join $root bd bd.tcl] [file join $ip bd bd.tcl]
+set diagram [ipx::add_file_group -type xilinx_blockdiagram {} $core]
+set_property type tclSource [ipx::add_file bd/bd.tcl $diagram]
 ipx::create_xgui_files $core
 ipx::update_checksums $core
 ipx::check_integrity $core

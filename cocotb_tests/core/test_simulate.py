@@ -1,0 +1,188 @@
+"""`fluxproof simulate`: verdicts and exit status, margins against a simulation of the equations, the report."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import re
+
+import numpy as np
+import pytest
+
+from cocotb_tests.core.test_registers import PAPER
+from fluxproof.checkout import DRIVES
+from fluxproof.command import main
+from fluxproof.golden_model.drive import load
+from fluxproof.golden_model.drive_keys import DriveError
+from fluxproof.golden_model.registers import registers
+from fluxproof.simulate import scene
+from fluxproof.simulate.margins import current_loop, margins, speed_loop
+from fluxproof.simulate.session import simulate
+
+DRIVE = load(PAPER)
+
+
+def changed(section, **values):
+    """The paper's drive with other values in one section."""
+    return dataclasses.replace(DRIVE, **{section: dataclasses.replace(getattr(DRIVE, section), **values)})
+
+
+def run(tmp_path, capsys, path, *options):
+    """(exit status, simulation.json, stdout, stderr) of the command."""
+    status = main(["simulate", str(path), "--out", str(tmp_path / "out"), *options])
+    out, err = capsys.readouterr()
+    return status, json.loads((tmp_path / "out" / "simulation.json").read_text()), out, err
+
+
+def edited(tmp_path, **changes):
+    """The paper's drive file with other values of keys it has, or with keys put before one it has."""
+    text = PAPER.read_text()
+    for key, value in changes.items():
+        text, count = re.subn(rf"^{key} = \S+", f"{key} = {value}", text, flags=re.MULTILINE)
+        assert count == 1, key
+    path = tmp_path / "drive.toml"
+    path.write_text(text)
+    return path
+
+
+# ---------------------------------------------------------------- verdicts
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["servo_24v", "spindle_400v"]
+    + [pytest.param(name, marks=pytest.mark.study) for name in ("hub_36v", "drone_24v", "paper001", "emrax228")],
+)
+def test_drives_work(tmp_path, capsys, name):
+    """Exit status 0, no trip, margins of a sensible design; everything that is not modelled is said."""
+    status, data, out, err = run(tmp_path, capsys, DRIVES / f"{name}.toml")
+    assert status == 0 and err == "" and data["status"] == "ok" and out.startswith(f"{name}.toml: ok")
+    for margin in data["margins"].values():
+        assert margin["stable"] and margin["phase_margin_deg"] > 45 and margin["gain_margin_db"] > 6
+    speed, currents = data["figures"]["Speed"], data["figures"]["Currents"]
+    assert 0 <= speed["speed_overshoot"]["value"] < 30 and 0 <= currents["current_overshoot"]["value"] < 20
+    assert 0 < currents["ripple_peak_to_peak"]["value"] < load(DRIVES / f"{name}.toml").current_limit_a
+    text = " ".join(data["not_modelled"])
+    assert "heating" in text and "bus" in text and ("Hall" in text) == (name == "hub_36v")
+    html = (tmp_path / "out" / "report.html").read_text()
+    assert html.count("<svg") == 6 and "http-equiv" in html and "What is not modelled" in html
+    assert not re.search(r"<script|(?:src|href)=\"http", html)
+
+
+def test_unstable_loop(tmp_path, capsys):
+    """Three times the gain that the delay allows: a pole outside the circle, said in one line; status 1."""
+    text = PAPER.read_text().replace("[control]\n", "[control]\ncurrent_kp_q_v_per_a = 250\n")
+    path = tmp_path / "drive.toml"
+    path.write_text(text)
+    status, data, _, err = run(tmp_path, capsys, path)
+    assert status == 1 and data["status"] == "unstable" and err.count("\n") == 1
+    assert "current loop, q axis is unstable" in err and str(path) in err
+    assert data["margins"]["current loop, q axis"]["pole"] > 1.0
+    assert data["margins"]["current loop, d axis"]["stable"]
+
+
+def test_trip(tmp_path, capsys):
+    """A trip level that the accelerating drive reaches: named with its time, and the gates are off afterwards."""
+    text = PAPER.read_text() + "\n[protection]\ncurrent_trip_a = 5.3\n"
+    path = tmp_path / "drive.toml"
+    path.write_text(text)
+    status, data, _, err = run(tmp_path, capsys, path)
+    assert status == 1 and data["status"] == "tripped"
+    assert re.search(r"tripped by overcurrent at [\d.]+ ms, in the stage '", err)
+    assert data["figures"]["Currents"]["i_q_tracking_reversal"]["value"] == 0.0  # off: reference and current are zero
+
+
+def test_unsettled_speed():
+    """A speed loop that hunts: its filter is a hundred times too slow."""
+    data, _ = simulate(changed("control", speed_filter_hz=2.0, speed_bandwidth_hz=60.0), "hunting")
+    assert data["status"] in ("unstable", "not_settled") and "speed" in data["reason"]
+
+
+def test_torque_drive():
+    """Without a speed loop the shaft is driven: steps of torque, no figures of speed."""
+    data, pages = simulate(changed("control", speed_bandwidth_hz=None), "torque")
+    assert data["status"] == "ok" and "Speed" not in data["figures"] and "speed loop" not in data["margins"]
+    assert [s["name"] for s in data["scene"]][1] == "torque step" and data["reference_unit"] == "A"
+    assert "torque reversal" in pages()
+
+
+def test_mistakes(tmp_path, capsys):
+    """Bad input: one line, status 2, no folder."""
+    for path, words in (
+        (tmp_path / "none.toml", ["cannot be read"]),
+        (edited(tmp_path, speed_bandwidth_hz="0.05"), ["speed_bandwidth_hz", "PWM periods"]),
+    ):
+        assert main(["simulate", str(path), "--out", str(tmp_path / "out")]) == 2
+        out, err = capsys.readouterr()
+        assert out == "" and err.count("\n") == 1 and all(word in err for word in words)
+        assert not (tmp_path / "out").exists()
+
+
+# ---------------------------------------------------------------- margins
+
+
+def stepped(drive, gain: float, samples: int = 3000) -> np.ndarray:
+    """The error of a q current loop with ``gain`` times its gains, computed sample by sample without z."""
+    gains = {row.name: row.represented for row in registers(drive).rows}
+    kp, ki = gain * gains["kp_q"], gain * gains["ki_q"] * drive.sample_time_s
+    m, t_s = drive.machine, drive.sample_time_s
+    decay = np.exp(-m.resistance_ohm * t_s / m.inductance_q_h)
+    i = integral = waiting = 0.0
+    errors = []
+    for _ in range(samples):
+        error = 1.0 - i
+        integral += ki * error
+        u, waiting = waiting, kp * error + integral  # acts in the next period
+        i = decay * i + (1.0 - decay) / m.resistance_ohm * u
+        errors.append(error)
+    return np.abs(errors)
+
+
+def test_gain_margin_is_where_the_loop_becomes_unstable():
+    margin = 10.0 ** (margins(current_loop(DRIVE, registers(DRIVE), "q")).gain_margin_db / 20.0)
+    inside, outside = stepped(DRIVE, 0.99 * margin), stepped(DRIVE, 1.01 * margin)
+    assert inside[-50:].max() < 1e-3 < 1.0 < outside[-50:].max()
+
+
+def test_crossover_and_phase_are_those_of_the_continuous_loop():
+    """kp = w_c*L, ki = w_c*R cancel the pole: crossover near w_c, phase -90 degrees less 1.5 samples of delay."""
+    drive = changed("control", current_bandwidth_hz=200.0)
+    got = margins(current_loop(drive, registers(drive), "d"))
+    assert got.crossover_hz == pytest.approx(200.0, rel=0.01)
+    assert got.phase_margin_deg == pytest.approx(90.0 - 360.0 * 200.0 * 1.5e-4, abs=1.5)
+    speed = margins(speed_loop(drive, registers(drive)))
+    assert speed.crossover_hz == pytest.approx(30.0, rel=0.05) and 50 < speed.phase_margin_deg < 79
+
+
+def test_sampling_before_the_valley_costs_phase():
+    got = [
+        margins(current_loop(d, registers(d), "q")).phase_margin_deg
+        for d in (changed("sampling", delay_s=-10e-6), DRIVE)
+    ]
+    crossover = margins(current_loop(DRIVE, registers(DRIVE), "q")).crossover_hz
+    assert got[1] - got[0] == pytest.approx(360.0 * crossover * 10e-6, abs=0.05)
+
+
+# ---------------------------------------------------------------- scene
+
+
+def test_reach_fills_the_voltage_circle():
+    for i_q in (0.0, 5.23):
+        speed = scene.reach(DRIVE, i_q)
+        assert scene.voltage(DRIVE, speed, i_q) == pytest.approx(scene.voltage_limit(DRIVE), rel=1e-9)
+    assert scene.reach(changed("machine", resistance_ohm=1000.0), 5.23) == pytest.approx(0.0, abs=1e-6)
+
+
+def test_speed_loop_needs_an_inertia():
+    """Gains that are given need no inertia, the simulation does."""
+    drive = changed("control", speed_bandwidth_hz=None, speed_kp_as_per_rad=0.01)
+    drive = dataclasses.replace(drive, machine=dataclasses.replace(drive.machine, inertia_kgm2=0.0))
+    with pytest.raises(DriveError, match="inertia_kgm2 = 0 .* above 0"):
+        scene.main_scene(drive)
+
+
+def test_heavy_drive_stays_at_low_speeds():
+    """An inertia a hundred times as large: the scene says that it does not go to the top speed."""
+    heavy = scene.main_scene(changed("machine", inertia_kgm2=0.16))
+    assert heavy.shortened and not scene.main_scene(DRIVE).shortened
+    assert heavy.stage("speed step").reference < 0.2 * scene.main_scene(DRIVE).stage("speed step").reference

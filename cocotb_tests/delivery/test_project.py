@@ -1,0 +1,139 @@
+"""`fluxproof project`: every file follows the drive file, the clock most of all; the scripts run in the stub."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import subprocess
+
+import pytest
+
+from cocotb_tests.core.test_registers import PAPER
+from cocotb_tests.delivery.test_vivado_scripts import facts, stubbed  # noqa: F401 - facts is a fixture
+from fluxproof.checkout import ROOT
+from fluxproof.command import main
+from fluxproof.golden_model.drive import load
+from fluxproof.golden_model.registers import registers
+from scripts.package import axi_top
+
+ZYNQ, ARTIX, ULTRASCALE = "xc7z020clg484-1", "xc7a100tcsg324-1", "xczu3eg-sbva484-1-e"
+
+
+def made(tmp_path, name="drive", part=ZYNQ, *options, **changes):
+    """(folder, {file: text}, drive) of the paper's drive with changed values."""
+    text = PAPER.read_text()
+    for key, value in changes.items():
+        text = re.sub(rf"^{key} = \S+", f"{key} = {value}", text, flags=re.MULTILINE)
+    path = tmp_path / f"{name}.toml"
+    path.write_text(text)
+    folder = tmp_path / name
+    assert main(["project", str(path), "--part", part, "--out", str(folder), *options]) == 0
+    return folder, {p.name: p.read_text() for p in folder.iterdir()}, load(path)
+
+
+def clock_values(files: dict[str, str]) -> dict[str, float]:
+    """Every value that depends on the clock, read back from the files."""
+    header, found = files["drive_registers.h"], {}
+    for name in ("dead_time", "min_pulse", "watchdog"):
+        found[name] = int(re.search(rf"(-?\d+)\}}, /\* {name}:", header)[1])
+    found["header CLOCK_HZ"] = int(re.search(r"FLUXPROOF_CLOCK_HZ (\d+)", header)[1])
+    found["header CARRIER_HALF"] = int(re.search(r"FLUXPROOF_CARRIER_HALF (\d+)", header)[1])
+    for name in ("CLOCK_HZ", "CARRIER_HALF"):
+        found[f"VHDL {name}"] = int(re.search(rf"{name} +: natural := (\d+);", files["drive_pkg.vhd"])[1])
+        found[f"Tcl {name}"] = int(re.search(rf"set {name.lower()} (\d+)", files["project.tcl"])[1])
+    found["period"] = float(re.search(r"-period (\S+)", files["fluxproof_clock.xdc"])[1])
+    found["device tree"] = int(re.search(r"assigned-clock-rates = <(\d+)>", files["fluxproof.dtsi"])[1])
+    return found
+
+
+def test_every_value_follows_the_clock(tmp_path):
+    """Twice 200 MHz against 100 MHz: counts of clocks halve, the period doubles, rates halve; nothing stays."""
+    fast, slow = (
+        clock_values(made(tmp_path, name, clock_hz=clock)[1]) for name, clock in (("fast", "200e6"), ("slow", "100e6"))
+    )
+    assert fast["period"] == 5.0 and fast["device tree"] == 200_000_000
+    for name, value in fast.items():
+        assert slow[name] == (2 * value if name == "period" else value / 2), name
+
+
+def test_nothing_else_depends_on_the_clock(tmp_path):
+    """Lines that differ between two clocks are those whose values are read back above."""
+    _, fast, _ = made(tmp_path, "fast", clock_hz="200e6")
+    _, slow, _ = made(tmp_path, "slow", clock_hz="100e6")
+    differing = []
+    for name in fast:
+        pairs = zip(fast[name].replace("fast.toml", "").splitlines(), slow[name].replace("slow.toml", "").splitlines())
+        differing += [(name, a) for a, b in pairs if a != b]
+    assert len(differing) == len(clock_values(fast)) + 1, differing  # the comment of the constraint
+
+
+def test_generics_are_those_of_the_top(tmp_path):
+    folder, files, drive = made(tmp_path, adc_bits="12", position_bits="14")
+    config = registers(drive).config._asdict() | {"clock_hz": 200_000_000}
+    for name in axi_top.GENERICS:
+        assert f"set {name.lower()} {config[name.lower()]}\n" in files["project.tcl"]
+        assert re.search(rf"{name} +: natural := {config[name.lower()]};", files["drive_pkg.vhd"])
+    done = subprocess.run(["ghdl", "-a", "--std=93", folder / "drive_pkg.vhd"], cwd=tmp_path, capture_output=True)
+    assert done.returncode == 0, done.stderr
+
+
+def test_header_compiles_into_bring_up(tmp_path):
+    compiler = shutil.which("cc") or pytest.skip("there is no C compiler here")
+    folder, _, _ = made(tmp_path)
+    software = ROOT / "docs" / "software"
+    sources = [software / "bring_up.c", software / "bus_uio.c"]
+    command = [compiler, "-Wall", "-Wextra", "-Werror", "-I", software, "-I", folder, *sources, "-lm", "-o"]
+    done = subprocess.run([*command, tmp_path / "bring_up"], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
+def test_script_builds_the_system_of_a_zynq(facts, tmp_path):  # noqa: F811
+    folder, _, _ = made(tmp_path, "drive", ZYNQ, "--base", "0x43C10000", clock_hz="100e6", adc_bits="12")
+    done = stubbed(facts, folder / "project.tcl")
+    assert done.returncode == 0, done.stderr
+    for text in ("CONFIG.ADC_BITS 12", "CONFIG.CARRIER_HALF 5000", "-offset 0x43C10000", f"-part {ZYNQ}"):
+        assert text in done.stdout
+    assert "CONFIG.PCW_FPGA0_PERIPHERAL_FREQMHZ 100 " in done.stdout
+    assert re.search(r"^set_property  CONFIG.CLOCK_HZ 100000000 drive$", done.stdout, re.MULTILINE)
+    assert json.loads((folder / "vivado" / "result.json").read_text())["clock_mhz"] == 100
+
+
+@pytest.mark.parametrize("part", [ARTIX, ULTRASCALE])
+def test_script_builds_the_core_alone(facts, tmp_path, part):  # noqa: F811
+    folder, files, _ = made(tmp_path, "drive", part, clock_hz="100e6")
+    done = stubbed(facts, folder / "project.tcl")
+    assert done.returncode == 0, done.stderr
+    assert f"-part {part}" in done.stdout and "CLOCK_HZ=100000000" in done.stdout
+    assert re.search(r"^create_clock .*-period 10\.000", done.stdout, re.MULTILINE)
+    assert ("fluxproof.dtsi" in files) == (part == ULTRASCALE)
+
+
+def test_device_tree_of_both_families(tmp_path):
+    _, files, _ = made(tmp_path, "drive", ZYNQ, "--base", "0x43C10000")
+    assert "fluxproof@43c10000" in files["fluxproof.dtsi"] and "reg = <0x43c10000 0x1000>" in files["fluxproof.dtsi"]
+    _, files, _ = made(tmp_path, "wide", ULTRASCALE)
+    assert "reg = <0x0 0xa0000000 0x0 0x1000>" in files["fluxproof.dtsi"] and "<&gic>" in files["fluxproof.dtsi"]
+
+
+@pytest.mark.parametrize(
+    ("options", "change", "words"),
+    [
+        (["--part", "zynq"], {}, ["--part 'zynq'", "xc7z020clg484-1"]),
+        (["--part", ZYNQ, "--base", "0x43C00010"], {}, ["--base", "multiple of 0x1000"]),
+        (["--part", ZYNQ, "--base", "here"], {}, ["--base 'here'"]),
+        (["--part", ZYNQ], {"clock_hz": "300e6"}, ["clock_hz = 3e+08", "2.5e+08 Hz", "Zynq-7000"]),
+        (["--part", ZYNQ], {"clock_hz": "1"}, ["whole number from 8"]),
+    ],
+)  # fmt: skip
+def test_mistakes_write_nothing(tmp_path, capsys, options, change, words):
+    text = PAPER.read_text()
+    for key, value in change.items():
+        text = re.sub(rf"^{key} = \S+", f"{key} = {value}", text, flags=re.MULTILINE)
+    path = tmp_path / "drive.toml"
+    path.write_text(text)
+    assert main(["project", str(path), "--out", str(tmp_path / "out"), *options]) == 2
+    out, err = capsys.readouterr()
+    assert out == "" and err.count("\n") == 1 and not (tmp_path / "out").exists()
+    for word in words:
+        assert word in err

@@ -1,0 +1,67 @@
+"""The subcommand ``fluxproof project drive.toml --part PART --out DIR``."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from fluxproof.checkout import ROOT
+from fluxproof.files import write_text
+from fluxproof.golden_model.drive import load
+from fluxproof.golden_model.drive_keys import DriveError
+from fluxproof.golden_model.registers import registers
+from fluxproof.project import parts, render
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the subcommand."""
+    parser.add_argument("drive", metavar="drive.toml", help="the drive in SI units, see docs/drives/")
+    parser.add_argument("--part", required=True, help="the FPGA by its full name, e.g. xc7z020clg484-1")
+    parser.add_argument("--out", metavar="DIR", required=True, help="folder of the files")
+    parser.add_argument("--base", metavar="ADDRESS", help="address of the registers; default that of the family")
+    parser.add_argument("--core", metavar="DIR", help="checkout of Fluxproof; can be given to the script as well")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Write the files; an error in the drive or an argument writes nothing."""
+    drive = load(args.drive)
+    try:
+        register_set = registers(drive)
+    except DriveError as error:
+        raise DriveError(f"{args.drive}: {error}") from None
+    part = parts.checked(args.part)
+    processor = parts.processor_of(part)
+    clock = drive.core.clock_hz
+    if processor is not None and clock > processor.most_hz:
+        most = f"up to {processor.most_hz:g} Hz, the fabric clock of a {processor.name}"
+        raise DriveError(f"{args.drive}: [core] clock_hz = {clock:g} is out of range: allowed is {most}")
+    if abs(clock / round(clock) - 1.0) > 1e-12:
+        raise DriveError(f"{args.drive}: [core] clock_hz = {clock!r}: allowed is a whole number of Hz")
+    base = address(args.base) if args.base else processor.base if processor else 0
+    found = render.files(args.drive, drive, register_set, part, processor, base, core_folder(args.core))
+    folder = Path(args.out)
+    for name, text in found.items():
+        print(write_text(folder / name, text))
+    if processor is None:
+        print(f"no device tree: {part} has no processor; the script builds the core alone")
+    elif processor is not parts.ZYNQ:
+        print(f"the script builds the core alone: the block design around it is for {parts.ZYNQ.name}")
+    return 0
+
+
+def address(text: str) -> int:
+    """A multiple of the window, of 32 bits; DriveError otherwise."""
+    try:
+        value = int(text, 0)
+    except ValueError:
+        value = -1
+    if not 0 < value < 1 << 32 or value % render.WINDOW:
+        raise DriveError(f"--base {text!r}: allowed is a multiple of 0x{render.WINDOW:x} of 32 bits, like 0x43C00000")
+    return value
+
+
+def core_folder(given: str | None) -> str:
+    """The folder in the script: the one given, this checkout, or none for an installed package."""
+    if given:
+        return Path(given).resolve().as_posix()
+    return ROOT.as_posix() if (ROOT / "scripts" / "vivado").is_dir() else ""

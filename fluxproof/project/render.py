@@ -1,0 +1,144 @@
+"""The text of each file of a project, from a drive and its registers."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+from fluxproof.golden_model.drive import Drive
+from fluxproof.golden_model.registers import RegisterSet
+from fluxproof.print_registers import c_lines
+from fluxproof.project.parts import ZYNQ, Processor, processor_of
+
+BY = "by `fluxproof project`; change the drive file and run it again"
+WINDOW = 0x1000  # bytes of the registers' address range
+
+
+def generics(drive: Drive, register_set: RegisterSet) -> dict[str, int]:
+    """The generics of fluxproof_axi, by their names in the VHDL."""
+    return {
+        "CLOCK_HZ": round(drive.core.clock_hz),
+        **{name.upper(): value for name, value in register_set.config._asdict().items()},
+    }
+
+
+def clock_period_ns(drive: Drive) -> float:
+    """The clock's period cut to whole picoseconds [ns], as scripts/vivado/clock.tcl has it."""
+    return math.floor(1e12 / round(drive.core.clock_hz)) / 1e3
+
+
+def clock_xdc(name: str, drive: Drive) -> str:
+    """The clock constraint of the core alone; in a block design the clock comes from outside."""
+    return (
+        f"# {name} {BY}: [core] clock_hz = {drive.core.clock_hz:g}.\n"
+        "# Only where the core is the top: in a block design the clock comes from outside, with a constraint.\n"
+        f"create_clock -name aclk -period {clock_period_ns(drive):.3f} [get_ports aclk]\n"
+    )
+
+
+def vhdl_package(name: str, drive: Drive, register_set: RegisterSet) -> str:
+    """The generics as constants, for an instance by hand."""
+    values = generics(drive, register_set)
+    wide = max(map(len, values))
+    lines = [f"  constant {key:{wide}} : natural := {value};" for key, value in values.items()]
+    head = f"-- {name} {BY}.\n-- Generics of fluxproof_axi: generic map (CLOCK_HZ => drive_pkg.CLOCK_HZ, ...)\n\n"
+    return head + "\n".join(["package drive_pkg is", *lines, "end package drive_pkg;"]) + "\n"
+
+
+def tcl(name: str, drive: Drive, register_set: RegisterSet, part: str, base: int, core: str) -> str:
+    """The script for Vivado: a block design around the core on a Zynq-7000, the core alone on any other part."""
+    values = generics(drive, register_set)
+    whole = processor_of(part) is ZYNQ
+    head = [
+        f"# {name} {BY}.",
+        "#",
+        "#   vivado -mode batch -source project.tcl [-tclargs CORE_DIR]",
+        "#",
+        "# CORE_DIR: the folder of a checkout of Fluxproof.",
+        "",
+        "set here [file dirname [file normalize [info script]]]",
+        f"set core {{{core}}}",
+        "if {$argc > 0} {",
+        "  set core [file normalize [lindex $argv 0]]",
+        "}",
+        "if {![file exists [file join $core scripts vivado example.tcl]]} {",
+        '  error "$core is no checkout of Fluxproof: give its folder with -tclargs"',
+        "}",
+        f"set part {part}",
+        *(f"set {key.lower()} {value}" for key, value in values.items()),
+    ]
+    return "\n".join([*head, *(_system(base) if whole else _alone(values))]) + "\n"
+
+
+def _system(base: int) -> list[str]:
+    return [
+        f"set base_address 0x{base:08X}",
+        "# Processor, DMA and core, placed and routed, with reports, in the folder vivado beside this script.",
+        "set argc 2",
+        "set argv [list [file join $here vivado] $part]",
+        "source [file join $core scripts vivado example.tcl]",
+    ]
+
+
+def _alone(values: dict[str, int]) -> list[str]:
+    names = " ".join(f"{key}=${key.lower()}" for key in values)
+    return [
+        "# The core alone, out of context: no processor of this part is known to the example.",
+        "create_project -in_memory -part $part",
+        "set sources [concat [glob [file join $core rtl *.vhd]] [glob [file join $core rtl * *.vhd]]]",
+        "read_vhdl -vhdl2008 $sources",
+        "read_xdc -mode out_of_context [file join $here fluxproof_clock.xdc]",
+        f"synth_design -top fluxproof_axi -part $part -mode out_of_context -generic [list {names}]",
+        "read_xdc [file join $core scripts vivado fluxproof.xdc]",
+        "opt_design",
+        "place_design",
+        "route_design",
+        "file mkdir [file join $here vivado]",
+        "write_checkpoint -force [file join $here vivado fluxproof_axi.dcp]",
+        "report_utilization -hierarchical -file [file join $here vivado utilization.rpt]",
+        "report_timing_summary -file [file join $here vivado timing.rpt]",
+    ]
+
+
+def c_header(name: str, drive: Drive, register_set: RegisterSet) -> str:
+    """What bring_up.c includes: bases, generics, the registers' values."""
+    return "\n".join(c_lines(name, drive, register_set)) + "\n"
+
+
+def device_tree(name: str, drive: Drive, processor: Processor, base: int) -> str:
+    """The core as a UIO device of Linux, with the clock that its fabric clock must run at."""
+    wide = "0x0 " if processor.cells == 2 else ""
+    return f"""\
+/* {name} {BY}.
+ *
+ * Fragment for a {processor.name}: include it in the board's device tree.  The kernel needs uio_pdrv_genirq with
+ * uio_pdrv_genirq.of_id=generic-uio on its command line.
+ */
+/ {{
+    fluxproof: fluxproof@{base:x} {{
+        compatible = "generic-uio";
+        reg = <{wide}0x{base:08x} {wide}0x{WINDOW:x}>;
+        interrupt-parent = <{processor.controller}>;
+        interrupts = <0 {processor.interrupt} 4>; /* irq of the core on the first fabric interrupt, level high */
+        clocks = <{processor.clock}>;
+        assigned-clocks = <{processor.clock}>;
+        assigned-clock-rates = <{round(drive.core.clock_hz)}>;
+    }};
+}};
+"""
+
+
+def files(
+    path: str, drive: Drive, register_set: RegisterSet, part: str, processor: Processor | None, base: int, core: str
+) -> dict[str, str]:
+    """{file name: text} of the whole project."""
+    name = Path(path).name
+    made = {
+        "fluxproof_clock.xdc": clock_xdc(name, drive),
+        "drive_pkg.vhd": vhdl_package(name, drive, register_set),
+        "project.tcl": tcl(name, drive, register_set, part, base, core),
+        "drive_registers.h": c_header(path, drive, register_set),
+    }
+    if processor is not None:
+        made["fluxproof.dtsi"] = device_tree(name, drive, processor, base)
+    return made

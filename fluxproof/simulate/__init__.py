@@ -1,0 +1,10 @@
+"""``fluxproof simulate``: a drive as its drive.toml describes it, in closed loop with the golden core, and a report.
+
+scene      what happens when: start, speed step, load step, reversal
+run        the golden core on the switching plant; a trip turns the gates off
+margins    phase and gain margin of both loops, delay and sampling included
+ripple     the current inside PWM periods
+figures    what the runs and the data say, as numbers
+verdict    whether the drive is fit to be built, and why not
+pictures, page    the report
+"""

@@ -1,0 +1,81 @@
+"""The subcommand ``fluxproof simulate drive.toml [--out DIR]``: report.html and simulation.json.
+
+Exit status: 0 stable and settled without a trip, 1 otherwise, with the reason in one line on stderr.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from pathlib import Path
+
+from fluxproof.files import write_json, write_text
+from fluxproof.golden_model.drive import load
+from fluxproof.golden_model.drive_keys import DriveError
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the subcommand."""
+    parser.add_argument("drive", metavar="drive.toml", help="the drive in SI units, see docs/drives/")
+    parser.add_argument("--out", metavar="DIR", help="folder of the report; default build/simulate/NAME")
+
+
+def run_command(args: argparse.Namespace) -> int:
+    """Simulate, write both files, say the result."""
+    began = time.monotonic()
+    drive = load(args.drive)
+    _say("loading the model")
+    from fluxproof.simulate.session import simulate  # takes seconds, which a typing error should not wait for
+
+    try:
+        data, pages = simulate(drive, Path(args.drive).name, _say)
+    except DriveError as error:
+        _clear()
+        raise DriveError(f"{args.drive}: {error}") from None
+    folder = Path(args.out) if args.out else Path("build") / "simulate" / Path(args.drive).stem
+    write_json(folder / "simulation.json", data)
+    report = write_text(folder / "report.html", pages())
+    _clear()
+    for line in summary(data):
+        print(line)
+    print(f"{report} ({time.monotonic() - began:.1f} s)")
+    if data["status"] != "ok":
+        print(f"fluxproof: {args.drive}: {data['reason']}", file=sys.stderr)
+        return 1
+    return 0
+
+
+def summary(data: dict) -> list[str]:
+    """The result for the terminal."""
+    lines = [f"{data['drive']}: {data['status'].replace('_', ' ')}: {data['reason']}"]
+    for name, m in data["margins"].items():
+        parts = (("crossover_hz", "Hz"), ("phase_margin_deg", "degrees"), ("gain_margin_db", "dB"))
+        said = ", ".join("–" if m[key] is None else f"{m[key]:.4g} {unit}" for key, unit in parts)
+        lines.append(f"  {name}: crossover, phase and gain margin {said}")
+    told = {
+        "Speed": ("speed_overshoot", "load_dip", "load_recovery"),
+        "Currents": ("current_overshoot", "peak_current", "ripple_peak_to_peak"),
+        "Voltage and power": ("voltage_margin_at_rated_point", "power_fed_back_peak"),
+        "Heat": ("copper_loss_at_rated_current",),
+    }
+    for group, names in told.items():
+        if group in data["figures"]:
+            shown = ((name.replace("_", " "), data["figures"][group][name]) for name in names)
+            lines.append("  " + ", ".join(f"{name} {_value(f)}" for name, f in shown))
+    lines.append(f"  not modelled: {'; '.join(line.split(':')[0] for line in data['not_modelled'])}")
+    return lines
+
+
+def _value(figure: dict) -> str:
+    return "–" if figure["value"] is None else f"{figure['value']:.4g} {figure['unit']}"
+
+
+def _say(text: str) -> None:
+    if sys.stderr.isatty():
+        print(f"\rsimulate: {text}\x1b[K", end="", file=sys.stderr, flush=True)
+
+
+def _clear() -> None:
+    if sys.stderr.isatty():
+        print("\r\x1b[K", end="", file=sys.stderr, flush=True)

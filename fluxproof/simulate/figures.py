@@ -1,0 +1,139 @@
+"""The numbers of a simulation: what the runs show, and what follows from the drive's data alone.
+
+Every figure is {"value", "unit", "from"}: ``from`` says whether it was measured in the run or calculated.  None where
+a figure has no meaning.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from fluxproof.cosim.scenarios import RPM
+from fluxproof.golden_model.drive import Drive
+from fluxproof.simulate import scene as scenes
+from fluxproof.simulate.run import Run
+from fluxproof.simulate.scene import Stage
+
+TAIL = 0.15  # of a stage, at its end: what must have settled
+BAND = 0.02  # of the top speed: back within it after the load step
+
+
+def figure(value, unit: str, source: str = "simulated") -> dict:
+    """One figure, rounded to six digits."""
+    return {"value": None if value is None else float(f"{float(value):.6g}"), "unit": unit, "from": source}
+
+
+def tail(stage: Stage) -> slice:
+    """The samples at the end of a stage."""
+    return slice(stage.end - max(int(TAIL * (stage.end - stage.first)), 1), stage.end)
+
+
+def rpm(run: Run) -> np.ndarray:
+    """The true mechanical speed [rpm]."""
+    return run["true_omega_m"] / RPM
+
+
+def of_speed(run: Run) -> dict:
+    """Steps of speed and load of the scene of a speed loop."""
+    speed, found = rpm(run), {}
+    step, load = run.scene.stage("speed step"), run.scene.stage("load step")
+    before = run.scene.stages[run.scene.stages.index(step) - 1].reference
+    size = step.reference - before
+    over = (speed[step.first : step.end].max() - step.reference) / size
+    found["speed_overshoot"] = figure(100.0 * max(over, 0.0), "%")
+    reached = np.flatnonzero(speed[step.first : step.end] >= before + 0.9 * size)
+    period = run.t[1] - run.t[0]
+    found["speed_rise_to_90_percent"] = figure(reached[0] * period * 1e3 if len(reached) else None, "ms")
+    under = speed[load.first : load.end]
+    found["load_torque"] = figure(load.load, "Nm", "calculated")
+    found["load_dip"] = figure(load.reference - under.min(), "rpm")
+    outside = np.flatnonzero(np.abs(under - load.reference) > BAND * abs(load.reference))
+    found["load_recovery"] = figure((outside[-1] + 1) * period * 1e3 if len(outside) else 0.0, "ms")
+    for stage in run.scene.stages:
+        error = speed[tail(stage)] - stage.reference
+        found[f"speed_error_{_key(stage)}"] = figure(np.mean(error), "rpm")
+        found[f"speed_noise_{_key(stage)}"] = figure(np.std(error), "rpm rms")
+    return found
+
+
+def of_currents(run: Run) -> dict:
+    """Tracking, peak and the losses at the end of each stage."""
+    error = run["i_q"] - run["i_q_ref"]
+    found = {"peak_current": figure(np.hypot(run["true_i_d"], run["true_i_q"]).max(), "A")}
+    for stage in run.scene.stages:
+        found[f"i_q_tracking_{_key(stage)}"] = figure(_rms(error[tail(stage)]), "A rms")
+    return found
+
+
+def of_current_step(run: Run) -> dict:
+    """Overshoot and rise of the step of i_q on the driven shaft."""
+    stage = run.scene.stage("current step")
+    i_q, size = run["i_q"][stage.first : stage.end], stage.reference
+    before = run["i_q"][stage.first - 50 : stage.first].mean()
+    made = (i_q - before) / (size - before)
+    period = run.t[1] - run.t[0]
+    first = np.flatnonzero(made >= 0.9)
+    return {
+        "current_step": figure(size, "A", "calculated"),
+        "current_overshoot": figure(100.0 * max(made.max() - 1.0, 0.0), "%"),
+        "current_rise_to_90_percent": figure(first[0] * period * 1e6 if len(first) else None, "µs"),
+        "current_settled_noise": figure(np.std(i_q[-100:]), "A rms"),
+    }
+
+
+def of_voltage(drive: Drive, run: Run) -> dict:
+    """How much of the voltage circle is used, in the run and at the rated point."""
+    used = np.hypot(run["u_d"], run["u_q"]) / np.maximum(run["u_max"], 1e-9)
+    limited = (run["sat_d"] != 0) | (run["sat_q"] != 0)
+    m, limit = drive.machine, scenes.voltage_limit(drive)
+    rated, current = m.rated_speed_rad_s, min(m.rated_current_a, drive.current_limit_a)
+    found = {"voltage_limited_samples": figure(100.0 * limited.mean(), "%")}
+    for stage in run.scene.stages:
+        found[f"voltage_used_{_key(stage)}"] = figure(100.0 * used[tail(stage)].mean(), "%")
+    need = scenes.voltage(drive, rated, current)
+    found["voltage_margin_at_rated_point"] = figure(100.0 * (1.0 - need / limit), "%", "calculated")
+    found["speed_at_full_voltage_rated_current"] = figure(scenes.reach(drive, current) / RPM, "rpm", "calculated")
+    found["speed_at_full_voltage_no_load"] = figure(scenes.reach(drive, 0.0) / RPM, "rpm", "calculated")
+    power = 1.5 * (run["u_d"] * run["i_d"] + run["u_q"] * run["i_q"])
+    back = np.minimum(power, 0.0)
+    found["power_fed_back_peak"] = figure(-back.min(), "W")
+    found["energy_fed_back"] = figure(-back.sum() * (run.t[1] - run.t[0]), "J")
+    return found
+
+
+def of_heat(drive: Drive, run: Run) -> dict:
+    """Losses in the winding; temperatures are constant in the run."""
+    m = drive.machine
+    hot = 1.0 + m.resistance_temp_coeff_per_k * (m.temperature_winding_c - m.temperature_ref_c)
+    resistance = m.resistance_ohm * hot
+    squares = run["true_i_d"] ** 2 + run["true_i_q"] ** 2
+    copper = 1.5 * m.resistance_ohm * m.rated_current_a**2
+    found = {
+        "winding_temperature": figure(m.temperature_winding_c, "degC", "calculated"),
+        "magnet_temperature": figure(m.temperature_magnet_c, "degC", "calculated"),
+        "resistance_in_the_run": figure(resistance, "ohm", "calculated"),
+        "copper_loss_in_the_run": figure(1.5 * resistance * squares.mean(), "W"),
+        "copper_loss_at_rated_current": figure(copper, "W", "calculated"),
+    }
+    if m.resistance_temp_coeff_per_k:
+        at = 1.0 + m.resistance_temp_coeff_per_k * (100.0 - m.temperature_ref_c)
+        found["copper_loss_at_rated_current_and_100_degc"] = figure(copper * at, "W", "calculated")
+    return found
+
+
+def of_ripple(found: dict) -> dict:
+    """The ripple of the loaded drive."""
+    return {
+        "ripple_peak_to_peak": figure(found["peak_to_peak_a"], "A"),
+        "ripple_rms": figure(found["rms_a"], "A rms"),
+    }
+
+
+def _rms(values: np.ndarray) -> float:
+    return math.sqrt(float(np.mean(np.square(values))))
+
+
+def _key(stage: Stage) -> str:
+    return stage.name.replace(",", "").replace(" ", "_")

@@ -1,0 +1,80 @@
+"""One simulation from a drive to its data and its page."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from fluxproof.golden_model.drive import Drive
+from fluxproof.golden_model.registers import registers
+from fluxproof.simulate import figures, page, verdict
+from fluxproof.simulate.margins import current_loop, margins, speed_loop
+from fluxproof.simulate.ripple import ripple
+from fluxproof.simulate.run import Run, run
+from fluxproof.simulate.scene import current_step, main_scene
+
+
+def simulate(drive: Drive, name: str, say: Callable[[str], None] = lambda text: None) -> tuple[dict, Callable[[], str]]:
+    """(simulation.json as data, a function that renders the page); DriveError where the drive cannot be simulated.
+
+    ``say`` is told in a word or two what is being done.
+    """
+    register_set = registers(drive)
+    scene = main_scene(drive)
+    say("compiling")
+    step = run(drive, register_set, current_step(drive))
+    main = run(drive, register_set, scene, lambda done, total: say(f"{100 * done // total} %"))
+    loops = {f"current loop, {axis} axis": current_loop(drive, register_set, axis) for axis in "dq"}
+    outer = speed_loop(drive, register_set)
+    if outer is not None:
+        loops["speed loop"] = outer
+    found = {loop: margins(value) for loop, value in loops.items()}
+    say("ripple")
+    loaded = main.scene.stages[2]
+    rippled = ripple(drive, main, loaded.end, _turn(drive, main, loaded.end))
+    status, reason = verdict.judge(drive, found, [step, main])
+    data = {
+        "drive": name,
+        "status": status,
+        "reason": reason,
+        "reference_unit": "A" if scene.imposed else "rpm",
+        "scene": [_stage(drive, stage) for stage in scene.stages],
+        "margins": {loop: value.to_json() for loop, value in found.items()},
+        "figures": _figures(drive, main, step, rippled),
+        "modelled": verdict.modelled(drive, [main]),
+        "not_modelled": verdict.not_modelled(drive, [main]),
+    }
+
+    def pages() -> str:
+        from fluxproof.simulate import pictures  # matplotlib takes a second
+
+        say("report")
+        return page.render(data, drive, pictures.draw(drive, main, step, loops, rippled))
+
+    return data, pages
+
+
+def _figures(drive: Drive, main: Run, step: Run, rippled: dict) -> dict:
+    groups = {} if main.scene.imposed else {"Speed": figures.of_speed(main)}
+    groups["Currents"] = figures.of_current_step(step) | figures.of_currents(main) | figures.of_ripple(rippled)
+    groups["Voltage and power"] = figures.of_voltage(drive, main)
+    groups["Heat"] = figures.of_heat(drive, main)
+    return groups
+
+
+def _stage(drive: Drive, stage) -> dict:
+    t_s = drive.sample_time_s
+    return {
+        "name": stage.name,
+        "from_s": round(stage.first * t_s, 9),
+        "to_s": round(stage.end * t_s, 9),
+        "reference": stage.reference,
+        "load_nm": stage.load,
+    }
+
+
+def _turn(drive: Drive, main: Run, end: int) -> int:
+    """Samples of an electrical turn at the end of a stage, 200 at least: the ripple depends on the angle."""
+    omega = float(np.abs(main["true_omega_m"][end - 1])) * drive.machine.pole_pairs
+    return max(200, min(round(2.0 * np.pi / max(omega, 1.0) / drive.sample_time_s), end - 1))

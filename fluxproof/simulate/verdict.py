@@ -1,0 +1,106 @@
+"""Whether the drive may be built as described, in one line; and what the simulation does and does not contain."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from fluxproof.golden_model.drive import Drive
+from fluxproof.simulate.figures import rpm, tail
+from fluxproof.simulate.margins import Margins
+from fluxproof.simulate.run import Run
+
+OF_SPEED, OF_CURRENT = 0.03, 0.1  # largest error of a settled stage: of the rated speed, rms of the current limit
+
+
+def judge(drive: Drive, loops: dict[str, Margins], runs: list[Run]) -> tuple[str, str]:
+    """(status, reason): "ok", "unstable", "tripped" or "not_settled"; the first that applies, loops first."""
+    for name, margins in loops.items():
+        if not margins.stable:
+            size = f"a pole of the closed loop has the magnitude {margins.pole:.4f}"
+            return "unstable", f"the {name} is unstable: {size}"
+    for run in runs:
+        if run.tripped_at is not None:
+            stage = next(s for s in run.scene.stages if s.first <= run.tripped_at < s.end)
+            at = f"at {run.t[run.tripped_at] * 1e3:.1f} ms, in the stage {stage.name!r}"
+            return "tripped", f"tripped by {', '.join(run.faults)} {at}"
+    for run in runs:
+        reason = unsettled(drive, run)
+        if reason:
+            return "not_settled", reason
+    slow = min(loops, key=lambda name: _or(loops[name].phase_margin_deg))
+    margin = loops[slow].phase_margin_deg
+    least = "" if margin is None else f"; least phase margin {margin:.0f} degrees, {slow}"
+    return "ok", f"stable in every stage, no trip{least}"
+
+
+def unsettled(drive: Drive, run: Run) -> str:
+    """Why a stage's end counts as not settled; empty if all have settled."""
+    error = run["i_q"] - run["i_q_ref"]
+    for stage in run.scene.stages:
+        end = tail(stage)
+        rest = math.sqrt(float(np.mean(error[end] ** 2)))
+        most = OF_CURRENT * drive.current_limit_a
+        if rest > most:
+            return f"i_q is {rest:.3g} A rms from its reference at the end of {stage.name!r}: at most {most:.3g} A"
+        if run.scene.imposed:
+            continue
+        away = float(np.abs(rpm(run)[end].mean() - stage.reference))
+        most = OF_SPEED * drive.machine.rated_speed_rad_s * 30.0 / math.pi
+        spread = float(np.std(rpm(run)[end]))
+        if away > most or spread > most:
+            said = f"the speed is {away:.4g} rpm from {stage.reference:.4g} rpm, swinging by {spread:.3g} rpm rms,"
+            return f"{said} at the end of {stage.name!r}: at most {most:.3g} rpm"
+    return ""
+
+
+def _or(value: float | None) -> float:
+    return math.inf if value is None else value
+
+
+def modelled(drive: Drive, runs: list[Run]) -> list[str]:
+    """What the simulation contains."""
+    m, i = drive.machine, drive.inverter
+    lines = [
+        "the core bit for bit: golden model with all registers, formats, rounding, limits, estimators",
+        f"switching inverter with {i.dead_time_s * 1e6:g} µs dead time, diodes, and blanking of the current at zero",
+        f"currents and bus voltage in codes of {drive.sensors.adc_bits} bits, sampled in the valley",
+        f"friction {m.viscous_friction_nms:g} Nm s and {m.coulomb_friction_nm:g} Nm, inertia {m.inertia_kgm2:g} kg m2",
+    ]
+    drops = any((i.v_switch_v, i.v_diode_v, i.r_switch_ohm, i.r_diode_ohm))
+    lines.append("device drops as given" if drops else "devices without voltage drop: [inverter] gives none")
+    if drive.encoder.counts:
+        lines.append(f"position in counts: {drive.encoder.counts} a turn, from the start referenced")
+    else:
+        lines.append(f"position in codes of {drive.sensors.position_bits} bits")
+    saturates = any((m.saturation_d_per_a2, m.saturation_q_per_a2, m.cross_saturation_wb_per_a2))
+    lines.append("saturation as given" if saturates else "constant inductances: [machine] gives no saturation")
+    lines.append("protection: the checks of each sample; a trip turns the gates off")
+    return lines
+
+
+def not_modelled(drive: Drive, runs: list[Run]) -> list[str]:
+    """What the simulation does not contain, so that nobody takes it for shown."""
+    lines = [
+        "heating: winding and magnets keep their temperatures; losses are told, no temperature is computed from them",
+        "switching losses and the temperature of the inverter",
+        "the bus: an ideal source at the nominal voltage; what is fed back at braking raises no voltage here",
+        "noise, offset and gain errors of sensors; delays of drivers; the angle error of the encoder's mounting",
+        "cogging, harmonics of the magnets, elasticity and backlash of the shaft",
+        "watchdog and too early samples: every sample comes in time",
+    ]
+    kind = drive.encoder.kind
+    if kind == "hall":
+        lines.append("the 60 degree steps of the Hall sensors: the position is taken as interpolated by the board")
+    elif kind != "code":
+        lines.append(f"the {kind} interface itself: lost edges, bad frames, and the search for the index")
+    if drive.converters.kind != "codes":
+        lines.append(f"the {drive.converters.kind} converters themselves: conversion errors, bad frames, their noise")
+    if drive.sampling.delay_s:
+        lines.append(f"[sampling] delay_s = {drive.sampling.delay_s:g} s: the plant is sampled in the valley")
+    if any(run.scene.shortened for run in runs):
+        lines.append("the top speed: the inertia would take too long, so the scene stays at lower speeds")
+    if not drive.machine.iron_conductance_s:
+        lines.append("iron losses: [machine] iron_conductance_s gives none")
+    return lines

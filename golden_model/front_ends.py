@@ -1,0 +1,110 @@
+"""[encoder] and [converters] of drive.toml, both optional: what the board puts between its pins and the core.
+
+The front ends of docs/board.md are set from these keys; without a section the core gets ready-made codes.
+"""
+
+from dataclasses import dataclass
+
+from fluxproof.golden_model.drive_keys import DriveError, choice, flag, not_negative, positive, whole
+
+# kind -> (keys it needs, keys it may have besides)
+ENCODERS = {
+    "code": ((), ()),
+    "abz": (("counts",), ("filter_s", "index_phase")),
+    "hall": ((), ("filter_s",)),
+    "ssi": (("bits", "clock_hz"), ("turns_bits", "crc")),
+    "biss": (("bits", "clock_hz"), ("turns_bits", "crc")),
+    "endat": (("bits", "clock_hz"), ("turns_bits", "crc")),
+}
+CONVERTERS = {
+    "codes": ((), ("currents",)),
+    "spi": (("clock_hz",), ("currents", "bits", "conversion_s", "two_words")),
+    "xadc": ((), ("currents",)),
+    "delta_sigma": (("clock_hz", "oversampling"), ("currents",)),
+}
+SPI_RATIO = (4, 16)  # clocks of the core in one of the converter, see converters/spi_converter
+
+
+@dataclass(frozen=True)
+class Encoder:
+    """[encoder]; keys that do not belong to the kind are refused."""
+
+    kind: str = choice(tuple(ENCODERS), "code: a position code that is ready for the core", "code")
+    counts: int | None = whole(4, 1 << 18, "abz: counts a turn, four times the lines", None)
+    bits: int | None = whole(8, 32, "ssi, biss, endat: bits of the place within a turn", None)
+    turns_bits: int = whole(0, 24, "ssi, biss, endat: bits of whole turns, left out", 0)
+    clock_hz: float | None = positive("Hz", "ssi, biss, endat: clock of a frame", None, most=20e6)
+    crc: bool | None = flag("check bits of a frame: CRC of biss and endat, even parity of ssi; true if none", None)
+    filter_s: float | None = not_negative("s", "abz, hall: shorter pulses on a pin have no effect", None)
+    index_phase: int | None = whole(0, 3, "abz: quarter of a line in which Z counts; A, B = 00, 10, 11, 01", None)
+
+
+@dataclass(frozen=True)
+class Converters:
+    """[converters]; keys that do not belong to the kind are refused."""
+
+    kind: str = choice(tuple(CONVERTERS), "codes: codes that are ready for the core", "codes")
+    currents: int = whole(2, 3, "current sensors; with 2 the third current is computed", 3)
+    bits: int | None = whole(8, 16, "spi: bits of a word; adc_bits if none", None)
+    clock_hz: float | None = positive("Hz", "spi: clock of a frame; delta_sigma: clock of the bits", None)
+    conversion_s: float | None = not_negative("s", "spi: from the start of a conversion to its code", None)
+    two_words: bool = flag("spi: two channels on a line", False)
+    oversampling: int | None = whole(32, 256, "delta_sigma: bits of a sinc3 window's third", None)
+
+
+def check_encoder(drive):
+    """The keys belong to the kind, and the encoder suits the core's position code and the rated speed."""
+    e, bits = drive.encoder, drive.sensors.position_bits
+    _belong("encoder", e, ENCODERS)
+    if e.counts is not None and e.counts > 1 << bits:
+        _refuse("[encoder] counts", e.counts, f"up to {1 << bits}, codes of [sensors] position_bits = {bits}")
+    if e.kind == "abz" and e.filter_s:
+        # Two counts lie between two edges of one channel; a filter of half that time still lets every level through.
+        edge_s = 6.283185307179586 / drive.machine.rated_speed_rad_s * 2.0 / e.counts
+        if not e.filter_s < edge_s / 2.0:
+            allowed = f"below {edge_s / 2.0:.4g} s, half the time between two edges of a channel at rated speed"
+            _refuse("[encoder] filter_s", e.filter_s, allowed)
+    if e.kind in ("ssi", "biss", "endat"):
+        frame_s, period_s = (e.bits + e.turns_bits) / e.clock_hz, drive.sample_time_s
+        if not frame_s < period_s:
+            least = (e.bits + e.turns_bits) / period_s
+            _refuse("[encoder] clock_hz", e.clock_hz, f"above {least:.6g} Hz: a frame must end within a PWM period")
+        if not e.clock_hz <= drive.core.clock_hz / 4.0:
+            _refuse("[encoder] clock_hz", e.clock_hz, f"up to {drive.core.clock_hz / 4.0:g} Hz, a quarter of clock_hz")
+
+
+def check_converters(drive):
+    """The keys belong to the kind, and the conversion fits the clock and the PWM period."""
+    c, clock = drive.converters, drive.core.clock_hz
+    _belong("converters", c, CONVERTERS)
+    if c.kind == "spi":
+        ratio, (lo, hi) = clock / c.clock_hz, SPI_RATIO
+        if not lo <= ratio <= hi or abs(ratio / round(ratio) - 1.0) > 1e-6:
+            allowed = f"[core] clock_hz = {clock:g} Hz over a whole number from {lo} to {hi}"
+            _refuse("[converters] clock_hz", c.clock_hz, allowed)
+        if c.bits is not None and c.bits > drive.sensors.adc_bits:
+            allowed = f"up to [sensors] adc_bits = {drive.sensors.adc_bits}"
+            _refuse("[converters] bits", c.bits, allowed)
+    if c.kind == "delta_sigma":
+        window_s, period_s = (3 * c.oversampling + 1) / c.clock_hz, drive.sample_time_s
+        if not window_s <= period_s:
+            allowed = f"up to {int((period_s * c.clock_hz - 1) / 3)}: the window must fit a PWM period"
+            _refuse("[converters] oversampling", c.oversampling, allowed)
+
+
+def _belong(section, given, kinds):
+    """What the kind needs is there, and nothing else is given."""
+    needed, optional = kinds[given.kind]
+    for key in needed:
+        if getattr(given, key) is None:
+            kind = f'[{section}] kind = "{given.kind}"'
+            raise DriveError(f"[{section}] {key} is missing: {kind} needs {', '.join(needed)}")
+    for key, field in given.__dataclass_fields__.items():
+        if key != "kind" and key not in (*needed, *optional) and getattr(given, key) != field.default:
+            may = ", ".join((*needed, *optional)) or "no further key"
+            allowed = f'a key of another kind; kind = "{given.kind}" takes {may}'
+            raise DriveError(f"[{section}] {key} = {getattr(given, key)} is {allowed}")
+
+
+def _refuse(key, value, allowed):
+    raise DriveError(f"{key} = {value:g} is out of range: allowed is {allowed}")
