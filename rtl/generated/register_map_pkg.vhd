@@ -41,32 +41,33 @@ package body register_map_pkg is
 
   constant ACCESS_OF : access_t :=
   (
-    0 to 6 | 32 to 48 | 50 to 53                                            => REGISTER_READ_ONLY,
-    7 to 15 | 26 to 31 | 49 | 54 to 63 | 83 | 107 | 128 to 143 | 145 to 255 => REGISTER_NONE,
-    16 to 17 | 19                                                           => REGISTER_AT_ONCE,
-    18 | 20 to 25 | 64 to 82 | 84 to 106 | 108 to 127 | 144                 => REGISTER_BETWEEN
+    0 to 6 | 32 to 48 | 50 to 59                                            => REGISTER_READ_ONLY,
+    7 to 15 | 28 to 31 | 49 | 60 to 63 | 83 | 107 | 138 to 143 | 145 to 255 => REGISTER_NONE,
+    16 to 17 | 19 | 26 to 27                                                => REGISTER_AT_ONCE,
+    18 | 20 to 25 | 64 to 82 | 84 to 106 | 108 to 137 | 144                 => REGISTER_BETWEEN
   );
 
   constant RANGE_OF : range_t :=
   (
-    0 to 15 | 20 to 22 | 26 to 63 | 67 to 69 | 71 | 83 | 90 | 107 | 128 to 143 | 145 to 255 => to_unsigned(0, REGISTER_RANGE_W),
+    0 to 15 | 20 to 22 | 28 to 63 | 67 to 69 | 71 | 83 | 90 | 107 | 138 to 143 | 145 to 255 => to_unsigned(0, REGISTER_RANGE_W),
     16 to 19 | 23 | 25 | 74 | 112 | 144                                                     => to_unsigned(5, REGISTER_RANGE_W),
     24 | 109 to 111                                                                         => to_unsigned(1, REGISTER_RANGE_W),
-    64 to 66 | 70 | 102 | 105                                                               => to_unsigned(11, REGISTER_RANGE_W),
-    72 | 82 | 91 | 98 | 101 | 103 to 104 | 106 | 115 to 122                                 => to_unsigned(13, REGISTER_RANGE_W),
+    26 to 27 | 78                                                                           => to_unsigned(7, REGISTER_RANGE_W),
+    64 to 66 | 70 | 102 | 105 | 132 | 135                                                   => to_unsigned(12, REGISTER_RANGE_W),
+    72 | 82 | 91 | 98 | 101 | 103 to 104 | 106 | 115 to 122                                 => to_unsigned(14, REGISTER_RANGE_W),
     73                                                                                      => to_unsigned(2, REGISTER_RANGE_W),
-    75                                                                                      => to_unsigned(14, REGISTER_RANGE_W),
-    76 | 80 to 81 | 84 to 89 | 97 | 108 | 123                                               => to_unsigned(17, REGISTER_RANGE_W),
-    77                                                                                      => to_unsigned(12, REGISTER_RANGE_W),
-    78                                                                                      => to_unsigned(7, REGISTER_RANGE_W),
-    79 | 92 to 93                                                                           => to_unsigned(10, REGISTER_RANGE_W),
-    94 | 113                                                                                => to_unsigned(15, REGISTER_RANGE_W),
-    95                                                                                      => to_unsigned(8, REGISTER_RANGE_W),
+    75                                                                                      => to_unsigned(15, REGISTER_RANGE_W),
+    76 | 80 to 81 | 84 to 89 | 97 | 108 | 123                                               => to_unsigned(18, REGISTER_RANGE_W),
+    77                                                                                      => to_unsigned(13, REGISTER_RANGE_W),
+    79 | 92 to 93 | 130                                                                     => to_unsigned(10, REGISTER_RANGE_W),
+    94 | 113                                                                                => to_unsigned(16, REGISTER_RANGE_W),
+    95                                                                                      => to_unsigned(11, REGISTER_RANGE_W),
     96                                                                                      => to_unsigned(6, REGISTER_RANGE_W),
     99                                                                                      => to_unsigned(3, REGISTER_RANGE_W),
     100                                                                                     => to_unsigned(4, REGISTER_RANGE_W),
-    114                                                                                     => to_unsigned(16, REGISTER_RANGE_W),
-    124 to 127                                                                              => to_unsigned(9, REGISTER_RANGE_W)
+    114                                                                                     => to_unsigned(17, REGISTER_RANGE_W),
+    124 to 129 | 131 | 133 | 136 to 137                                                     => to_unsigned(8, REGISTER_RANGE_W),
+    134                                                                                     => to_unsigned(9, REGISTER_RANGE_W)
   );
 
   constant SIGNED_OF : signed_t :=
@@ -87,23 +88,23 @@ package body register_map_pkg is
 
   constant HIGH_OF : high_t :=
   (
-    0 | 13   => to_signed(131071, REGISTER_LIMIT_W),
-    1        => to_signed(32767, REGISTER_LIMIT_W),
+    0 | 14   => to_signed(131071, REGISTER_LIMIT_W),
+    1 | 11   => to_signed(32767, REGISTER_LIMIT_W),
     2        => to_signed(63, REGISTER_LIMIT_W),
-    3 | 11   => to_signed(65535, REGISTER_LIMIT_W),
+    3 | 12   => to_signed(65535, REGISTER_LIMIT_W),
     4        => to_signed(32768, REGISTER_LIMIT_W),
     5        => to_signed(1, REGISTER_LIMIT_W),
     6        => to_signed(3, REGISTER_LIMIT_W),
     7        => to_signed(15, REGISTER_LIMIT_W),
-    8        => to_signed(127, REGISTER_LIMIT_W),
-    9        => to_signed(511, REGISTER_LIMIT_W),
+    8        => to_signed(511, REGISTER_LIMIT_W),
+    9        => to_signed(1023, REGISTER_LIMIT_W),
     10       => to_signed(4095, REGISTER_LIMIT_W),
-    12       => to_signed(65536, REGISTER_LIMIT_W),
-    14       => to_signed(262143, REGISTER_LIMIT_W),
-    15       => to_signed(1048575, REGISTER_LIMIT_W),
-    16       => to_signed(1179647, REGISTER_LIMIT_W),
-    17       => to_signed(16777215, REGISTER_LIMIT_W),
-    18 to 31 => to_signed(0, REGISTER_LIMIT_W)
+    13       => to_signed(65536, REGISTER_LIMIT_W),
+    15       => to_signed(262143, REGISTER_LIMIT_W),
+    16       => to_signed(1048575, REGISTER_LIMIT_W),
+    17       => to_signed(1179647, REGISTER_LIMIT_W),
+    18       => to_signed(16777215, REGISTER_LIMIT_W),
+    19 to 31 => to_signed(0, REGISTER_LIMIT_W)
   );
 
   function register_access_of (word : unsigned(REGISTER_WORD_W - 1 downto 0)) return unsigned is

@@ -38,7 +38,7 @@ entity sample_checks is
     u_dc_min        : in  unsigned(LIMIT_W - 1 downto 0);
     u_dc_max        : in  unsigned(LIMIT_W - 1 downto 0);
     jump_max        : in  unsigned(11 downto 0);
-    fault_ignore    : in  unsigned(6 downto 0);
+    fault_ignore    : in  unsigned(14 downto 0);
     out_valid       : out std_logic;
     sample_faults   : out unsigned(5 downto 0);
     sample_trip     : out std_logic
