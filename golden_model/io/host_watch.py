@@ -1,10 +1,10 @@
-"""Whether the host still writes: no write for ``heartbeat`` PWM periods is a fault; runs at every clock.
+"""Whether the host still writes: no write for ``heartbeat`` sample times is a fault; runs at every clock.
 
-    age = PWM periods (``period``) since the last write, counted up to heartbeat
+    age = sample times (``period``) since the last write, counted up to heartbeat
     host_lost = 1 from heartbeat periods after the last write until the next one;  heartbeat = 0: never
 
 Any write that the registers accept counts.  The age is counted up to heartbeat only, so that it cannot wrap.
-Formats: PWM periods.
+Formats: sample times.
 """
 
 from typing import NamedTuple
@@ -51,7 +51,7 @@ BLOCK = Block(
         Port("host_write", BIT, doc="1: the host has written a register"),
         Port("period", BIT, doc="1: a PWM period begins"),
     ),
-    registers=(Port("heartbeat", PERIODS, doc="longest time without a write, PWM periods; 0: no limit"),),
+    registers=(Port("heartbeat", PERIODS, doc="longest time without a write, sample times; 0: no limit"),),
     outputs=(Port("host_lost", BIT, doc="1: the last write is older than heartbeat periods"),),
     state=State(),
     latency=1,

@@ -120,8 +120,8 @@ begin
       end if;
 
       if rst = '1' then
-        valid <= '0';
-        busy        <= '0';
+        valid         <= '0';
+        busy          <= '0';
         state.i_d     <= (others => '0');
         state.i_q_max <= (others => '0');
       end if;

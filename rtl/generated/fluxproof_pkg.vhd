@@ -127,7 +127,7 @@ package fluxproof_pkg is
     brake_on        : unsigned(LIMIT_W - 1 downto 0);  -- bus voltage from which the brake resistor is on; 0: none
     brake_off       : unsigned(LIMIT_W - 1 downto 0);  -- bus voltage below which it is off
     watchdog        : unsigned(19 downto 0);  -- longest time without a sample, clocks
-    heartbeat       : unsigned(15 downto 0);  -- longest time without a write, PWM periods; 0: no limit
+    heartbeat       : unsigned(15 downto 0);  -- longest time without a write, sample times; 0: no limit
     dead_time       : unsigned(11 downto 0);  -- both gates of a leg off, clocks
   end record settings_t;
 

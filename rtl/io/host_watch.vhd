@@ -1,7 +1,7 @@
--- Purpose: whether the host still writes: no write for heartbeat PWM periods is a fault.
+-- Purpose: whether the host still writes: no write for heartbeat sample times is a fault.
 --   host_lost = 1 from heartbeat periods after the last write until the next one;  heartbeat = 0: never
 -- Any write that the registers accept counts.
--- Formats: PWM periods.  Latency: 1 (every clock is a sample).  Rounding: none.
+-- Formats: sample times.  Latency: 1 (every clock is a sample).  Rounding: none.
 -- The age is counted up to heartbeat only, so that it cannot wrap and a new value takes effect at once.
 
 library ieee;

@@ -30,9 +30,9 @@ end entity interrupts;
 
 architecture rtl of interrupts is
   -- State
-  signal causes   : unsigned(3 downto 0);
-  signal flags    : unsigned(14 downto 0);
-  signal was_on   : std_logic;
+  signal causes : unsigned(3 downto 0);
+  signal flags  : unsigned(14 downto 0);
+  signal was_on : std_logic;
 
   signal now_0    : unsigned(3 downto 0);
   signal causes_0 : unsigned(3 downto 0);
