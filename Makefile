@@ -25,7 +25,7 @@ unexport PYTHONHOME
 
 PYTHON_RUN := .venv/bin/python
 
-.PHONY: help setup generate test demo papers bench blind sensitivity real compare timeline mutate verilog synth ecp5 lint registers package prove faults lock clean distclean
+.PHONY: help setup generate test demo papers bench blind sensitivity real compare timeline mutate verilog synth ecp5 lint registers package prove faults board lock clean distclean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -72,6 +72,9 @@ compare: setup ## diagnose the same cases with alternative methods
 
 timeline: setup ## draw the timeline of one control period
 	$(PYTHON_RUN) -m studies.timeline $(ARGS)
+
+board: setup ## measure the figures of encoders, converters and the closed loop of a board
+	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m studies.board $(ARGS)
 
 faults: setup ## inject faults: sensors, bus, strobes, registers; RTL against golden core
 	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m studies.faults $(ARGS)

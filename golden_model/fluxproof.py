@@ -302,12 +302,14 @@ def step(state, sample, regs, config):
     """One control period: (next state, Observed)."""
     x, r, c = sample, regs, config
     i_a, i_b, i_c, current_at_rail = current_conditioning.step(
-        x.adc_a, x.adc_b, x.adc_c, r.offset_a, r.offset_b, r.offset_c, r.gain_a, r.gain_b, r.gain_c, c.adc_bits
-    )
+        x.adc_a, x.adc_b, x.adc_c, r.offset_a, r.offset_b, r.offset_c, r.gain_a, r.gain_b, r.gain_c, r.two_sensors,
+        c.adc_bits,
+    )  # fmt: skip
     (theta_me,) = position.step(x.position_code, r.reverse, r.pole_pairs, r.theta_offset, c.position_bits)
     speed_state, (omega_me,) = speed.step(
-        state.of_speed, x.position_code, r.reverse, r.k_speed, r.k_filter, c.position_bits
-    )
+        state.of_speed, x.position_code, r.reverse, r.k_speed, r.k_filter, r.position_restart, r.speed_given,
+        r.omega_given, c.position_bits,
+    )  # fmt: skip
     u_dc, u_max, u_dc_at_rail = u_dc_conditioning.step(
         x.adc_u_dc, r.u_dc_offset, r.u_dc_gain, r.k_u_max, c.adc_bits
     )
@@ -360,7 +362,8 @@ def step(state, sample, regs, config):
 
     checks_state, (sample_faults, sample_trip) = sample_checks.step(
         state.of_sample_checks, i_a, i_b, i_c, current_at_rail, u_dc, u_dc_at_rail, x.position_code, r.i_trip,
-        r.sum_trip, r.rail_samples, r.u_dc_min, r.u_dc_max, r.jump_max, r.fault_ignore, c.position_bits,
+        r.sum_trip, r.rail_samples, r.u_dc_min, r.u_dc_max, r.jump_max, r.fault_ignore,
+        r.position_restart, c.position_bits,
     )  # fmt: skip
     offset_check_state, (current_offset,) = offset_check.step(
         state.of_offset_check, i_a, i_b, i_c, omega_me, x.run, r.omega_stall, r.offset_max

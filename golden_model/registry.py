@@ -11,6 +11,8 @@ from fluxproof.golden_model.control import (
     voltage_limit,
 )
 from fluxproof.golden_model.converters import (
+    current_front,
+    delta_sigma,
     modulator_input,
     sinc3,
     sinc_overcurrent,
@@ -24,11 +26,15 @@ from fluxproof.golden_model.encoders import (
     biss_master,
     edge_timer,
     endat_master,
+    forced_position,
     hall_decoder,
+    hall_front,
     incremental_encoder,
     index_check,
     position_bridge,
+    position_front,
     quadrature_decoder,
+    serial_encoder,
     ssi_master,
     turn_counter,
 )
@@ -50,6 +56,8 @@ from fluxproof.golden_model.estimators import (
     winding_resistance,
 )
 from fluxproof.golden_model.io import (
+    board_faults,
+    board_snapshot,
     brake_chopper,
     current_conditioning,
     fault_latch,
@@ -61,6 +69,7 @@ from fluxproof.golden_model.io import (
     position,
     sample_checks,
     sample_guard,
+    sample_join,
     sample_latch,
     speed,
     telemetry,
@@ -158,5 +167,14 @@ BLOCKS = {
         biss_master,
         endat_master,
         position_bridge,
+        serial_encoder,
+        hall_front,
+        position_front,
+        delta_sigma,
+        current_front,
+        forced_position,
+        sample_join,
+        board_faults,
+        board_snapshot,
     )
 }

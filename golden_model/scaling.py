@@ -89,6 +89,7 @@ def sensing(drive):
         yield Entry(f"offset_{phase}", code, "code", mid, "[sensors] adc_bits, current_offset_code")
         keys = f"[sensors] current_range_a, current_gain; {base_keys(drive, 'current_a')}"
         yield Entry(f"gain_{phase}", trim * s.current_range_a, "A", b.current_a, keys)
+    yield Entry("two_sensors", int(s.current_sensors == 2), "1", 1.0, "[sensors] current_sensors")
     yield Entry("u_dc_offset", s.u_dc_offset_code, "code", mid, "[sensors] adc_bits, u_dc_offset_code")
     keys = f"[sensors] u_dc_range_v, u_dc_gain; {base_keys(drive, 'voltage_v')}"
     yield Entry("u_dc_gain", s.u_dc_gain * s.u_dc_range_v / 2.0, "V", b.voltage_v, keys)
@@ -108,6 +109,10 @@ def speed_loop(drive):
     base = base_keys(drive, "current_a", "omega_me_rad_s")
     k_filter = 1.0 if c.speed_filter_hz is None else -math.expm1(-TURN_RAD * c.speed_filter_hz * t_s)
     yield Entry("k_filter", k_filter, "1", 1.0, "[control] speed_filter_hz")
+    yield Entry("speed_given", 0, "1", 1.0, "none: 1 takes the speed from omega_given")
+    keys = f"none: a speed measured elsewhere; {base_keys(drive, 'omega_me_rad_s')}"
+    yield Entry("omega_given", 0.0, "rad/s", b.omega_me_rad_s, keys)
+    yield Entry("position_restart", 0, "1", 1.0, "none: 1 for a sample whose code jumps")
     kp, ki = speed_gains(drive)
     keys = "[machine] inertia_kgm2, magnet_flux_wb, pole_pairs; [control] speed_bandwidth_hz"
     kp_keys = keys if c.speed_kp_as_per_rad is None else "[control] speed_kp_as_per_rad"

@@ -126,6 +126,7 @@ begin
               code_a => code_a, code_b => code_b, code_c => code_c,
               offset_a => settings.offset_a, offset_b => settings.offset_b, offset_c => settings.offset_c,
               gain_a => settings.gain_a, gain_b => settings.gain_b, gain_c => settings.gain_c,
+              two_sensors => settings.two_sensors,
               out_soon => current_soon, out_valid => current_valid, i_a => o.i_a, i_b => o.i_b, i_c => o.i_c,
               current_at_rail => o.current_at_rail);
 
@@ -141,6 +142,8 @@ begin
     port map (clk => clk, rst => rst, in_valid => latch_valid,
               code_theta => code_theta,
               reverse => settings.reverse, k_speed => settings.k_speed, k_filter => settings.k_filter,
+              position_restart => settings.position_restart, speed_given => settings.speed_given,
+              omega_given => settings.omega_given,
               out_valid => omega_valid, omega_me => o.omega_me);
 
   bus_voltage : entity work.u_dc_conditioning

@@ -22,7 +22,7 @@ from fluxproof.golden_model.drive import load
 from fluxproof.golden_model.fixed import Format
 from fluxproof.golden_model.fluxproof import REGISTERS
 from fluxproof.golden_model.generated.register_names import ADDRESSES
-from fluxproof.golden_model.io import register_map
+from fluxproof.golden_model.io import board_map, register_map
 from fluxproof.golden_model.io.register_file import RegisterFile, from_word, to_word
 from fluxproof.golden_model.io.register_map import DECERR, OKAY, SLVERR, Kind
 from scripts import generate
@@ -31,6 +31,7 @@ from scripts.registers.compiled import compile_file, words
 
 PAPER = ROOT / "docs" / "drives" / "paper001.toml"
 MAP = register_map.registers()
+WHOLE = board_map.registers()  # with the second block of addresses, that of a board
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +50,7 @@ def test_generated_files_are_fresh(monkeypatch, tmp_path, capsys):
     """Each committed file matches the current map; a stale one is named."""
     for path, text in generated.files().items():
         assert path.read_text() == text, f"{path.name} is stale: run `make generate` and commit it"
-    for name in ("RDL", "MAP_PACKAGE", "REGISTER_FILE", "C_HEADER", "NAMES"):
+    for name in ("RDL", "MAP_PACKAGE", "REGISTER_FILE", "BOARD_FILE", "C_HEADER", "NAMES"):
         path = getattr(generated, name)
         stale = tmp_path / path.name
         stale.write_text(path.read_text() + "\n")
@@ -90,8 +91,8 @@ def test_register_addresses_are_fixed(monkeypatch):
 def test_systemrdl_matches_the_register_map(top):
     """Read back by its own compiler: addresses, kinds, ranges, formats, reset values, ports."""
     read = {w.name: w for w in words(top)}
-    assert list(read) == list(MAP)
-    for name, register in MAP.items():
+    assert list(read) == list(WHOLE) and list(WHOLE)[: len(MAP)] == list(MAP)
+    for name, register in WHOLE.items():
         word = read[name]
         assert (word.address, word.kind, word.doc) == (register.address, register.kind.value, register.doc)
         assert len(word.parts) == len(register.fields)
@@ -144,7 +145,7 @@ def test_c_header_and_settings_compile_and_agree(tmp_path, capsys):
     assert main(["registers", str(PAPER), "--format", "json"]) == 0
     listed = json.loads(capsys.readouterr().out)
     shutil.copy(generated.C_HEADER, tmp_path)
-    lines = [f'    printf("{n} %zu\\n", offsetof(fluxproof_t, {n}));' for n in MAP]
+    lines = [f'    printf("{n} %zu\\n", offsetof(fluxproof_t, {n}));' for n in WHOLE]
     source = (
         '#include <stddef.h>\n#include <stdio.h>\n#include "fluxproof_registers.h"\n#include "settings.h"\n'
         "int main(void) {\n" + "\n".join(lines) + "\n"
@@ -157,9 +158,9 @@ def test_c_header_and_settings_compile_and_agree(tmp_path, capsys):
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     printed = subprocess.run([tmp_path / "main"], capture_output=True, text=True, check=True).stdout.splitlines()
-    assert printed[: len(MAP)] == [f"{name} {register.address}" for name, register in MAP.items()]
+    assert printed[: len(WHOLE)] == [f"{name} {register.address}" for name, register in WHOLE.items()]
     values = drive_registers.registers(load(PAPER)).values._asdict()
-    assert printed[len(MAP) : -1] == [f"= {MAP[name].address} {value}" for name, value in values.items()]
+    assert printed[len(WHOLE) : -1] == [f"= {MAP[name].address} {value}" for name, value in values.items()]
     assert printed[-1] == "ident " + b"FLUX".hex()
     assert listed == [{"name": n, "address": MAP[n].address, "value": v} for n, v in values.items()]
 

@@ -14,7 +14,8 @@ from fluxproof.checkout import ROOT, RTL
 from fluxproof.cosim.entity import read_entity
 from fluxproof.cosim.sources import rtl_sources
 from scripts.package import __main__ as package_command
-from scripts.package import axi_top, ipxact, packaged
+from scripts.package import axi_top, board_top, ipxact, packaged
+from scripts.registers import vhdl
 from scripts.registers.compiled import compile_file, words
 
 S = {"s": ipxact.SPIRIT}
@@ -62,20 +63,21 @@ def test_top_reports_unconnected_ports(tmp_path):
         axi_top.render(tmp_path / "rtl")
 
 
-def test_top_is_vhdl_93(tmp_path):
+@pytest.mark.parametrize("top", [axi_top.AXI, board_top.BOARD], ids=lambda top: top.name)
+def test_top_is_vhdl_93(tmp_path, top):
     """A block design takes no VHDL-2008 top as a module; what it instantiates is empty here, ports as they are."""
     package = (RTL / "generated" / "fluxproof_pkg.vhd").read_text()
     shared = re.findall(r"^  constant \w+_W : positive := \d+;", package, re.MULTILINE)
     shared += re.findall(r"^  type \w+ is record.*?end record \w+;", package, re.MULTILINE | re.DOTALL)
     context = "library ieee;\nuse ieee.std_logic_1164.all;\nuse ieee.numeric_std.all;\nuse work.fluxproof_pkg.all;\n"
     text = context.rsplit("use", 1)[0] + "package fluxproof_pkg is\n" + "\n".join(shared) + "\nend fluxproof_pkg;\n"
-    for name in axi_top.INSTANCES.values():
+    for name in top.instances.values():
         entity = re.search(
             r"^entity (\w+) is.*?^end entity", (RTL / name).read_text(), re.MULTILINE | re.DOTALL
         )
         text += f"{context}{entity[0]};\narchitecture none of {entity[1]} is begin end none;\n"
     (tmp_path / "around.vhd").write_text(text)
-    for path in ("around.vhd", str(axi_top.PATH)):
+    for path in ("around.vhd", str(top.path)):
         done = subprocess.run(["ghdl", "-a", "--std=93", path], cwd=tmp_path, capture_output=True, text=True)
         assert done.returncode == 0, done.stderr
 
@@ -135,7 +137,7 @@ def test_memory_map_is_the_registers(component):
         r.findtext("s:name", namespaces=S): int(r.findtext("s:addressOffset", namespaces=S), 0)
         for r in block.findall("s:register", S)
     }
-    assert got == {w.name: w.address for w in words(compile_file(RTL / ipxact.RDL))}
+    assert got == {w.name: w.address for w in vhdl.of_core(words(compile_file(RTL / ipxact.RDL)))}
 
 
 def test_files_of_the_component_exist_in_compile_order(component):

@@ -34,7 +34,7 @@ DRIVE = dataclasses.replace(
 SET = registers(DRIVE)
 FIELDS = fluxproof.Observed._fields
 LIMITS = ("t_max", "i_max", "v_comp_max", "delta_max", "v_thr", "i_learn")
-SILENT = ("dead_time", "t_min", "v_comp_max")  # without influence on the recorded signals
+SILENT = ("omega_given", "dead_time", "t_min", "v_comp_max")  # without influence on the recorded signals
 SILENT += ("watchdog", "i_trip", "sum_trip", "rail_samples", "u_dc_min", "u_dc_max", "jump_max", "fault_ignore")
 OWNERS = {}  # register -> blocks that have it, from their declarations
 for _module, _ in fluxproof.WIRING.values():

@@ -15,6 +15,8 @@ from fluxproof.golden_model.registry import BLOCKS
 
 FRAMES = 100_000
 IN_VERILATOR = 20_000  # frames
+FEWER = 20  # times fewer frames in the tests than in the study
+LAYOUTS = [(17, 17, 1, 0), (26, 13, 2, 5), (32, 20, 3, 20)]
 
 
 def setting(name: str, word: int, turn: int, half: int, answer: int, cable: int) -> tuple[dict[str, int], int, int]:
@@ -49,15 +51,27 @@ def code_of(words: np.ndarray, turn: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize("name", ["ssi_master", "biss_master", "endat_master"])
-@pytest.mark.parametrize(("word", "turn", "half", "cable"), [(17, 17, 1, 0), (26, 13, 2, 5), (32, 20, 3, 20)])
-def test_every_single_bit_error_is_caught(name, word, turn, half, cable):
-    """Of frames with one wrong bit none gives a code, of good ones each gives the right one."""
+@pytest.mark.parametrize(("word", "turn", "half", "cable"), LAYOUTS)
+def test_single_bit_errors_are_caught(name, word, turn, half, cable):
+    catch(name, word, turn, half, cable, FRAMES // FEWER, IN_VERILATOR // FEWER)
+
+
+@pytest.mark.study
+@pytest.mark.parametrize("name", ["ssi_master", "biss_master", "endat_master"])
+def test_every_single_bit_error_is_caught(name, figure):
+    wrong = sum(catch(name, *layout, FRAMES // 3 + 1, IN_VERILATOR) for layout in LAYOUTS)
+    what = f"{name}: frames with a wrong bit that gave a code, of {wrong} in {3 * (FRAMES // 3 + 1)}"
+    figure(what, 0, 0, "frames", True)
+
+
+def catch(name, word, turn, half, cable, frames_given, in_verilator) -> int:
+    """Of frames with one wrong bit none gives a code, of good ones each the right one: how many had one."""
     if name == "ssi_master":
         cable = min(cable, 2 * half - 1)  # SSI has no start bit: the line may be late by less than a period
     rng = np.random.default_rng(word)
     answer = 2
     registers, timeout, spacing = setting(name, word, turn, half, answer, cable)
-    words = rng.integers(1 << word, size=FRAMES // 3)
+    words = rng.integers(1 << word, size=frames_given)
     frames, wrong = models.frames_with_errors(rng, frames_of(name, words.tolist(), registers))
     result, line, starts = run(name, frames, registers, answer, cable, timeout, spacing)
     good = wrong < 0
@@ -71,7 +85,7 @@ def test_every_single_bit_error_is_caught(name, word, turn, half, cable):
     # The same line and the same starts into the RTL: all outputs, the serial clock among them
     if word == 17:
         skip_without_ghdl5()
-        clocks = IN_VERILATOR * spacing
+        clocks = in_verilator * spacing
         core = VerilatedCore({"POSITION_BITS": BITS}, top=name)
         core.set_many(registers)
         core.reset()
@@ -81,6 +95,7 @@ def test_every_single_bit_error_is_caught(name, word, turn, half, cable):
         got, wanted = core.play(inputs, names), GoldenPlayer(block, {"POSITION_BITS": BITS}, registers).play(inputs)
         for k, port in enumerate(names):
             assert (got[:, k] == wanted[port]).all(), f"{port} differs"
+    return int((~good).sum())
 
 
 def test_crcs_of_the_golden_model_are_those_of_long_division():

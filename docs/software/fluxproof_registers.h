@@ -119,6 +119,24 @@ extern "C" {
 #define FLUXPROOF__IRQ_CLEAR__VALUE_bw 4
 #define FLUXPROOF__IRQ_CLEAR__VALUE_reset 0x0
 
+// reg - fluxproof::omega_given
+#define FLUXPROOF__OMEGA_GIVEN__VALUE_bm 0xffffffff
+#define FLUXPROOF__OMEGA_GIVEN__VALUE_bp 0
+#define FLUXPROOF__OMEGA_GIVEN__VALUE_bw 32
+#define FLUXPROOF__OMEGA_GIVEN__VALUE_reset 0x0
+
+// reg - fluxproof::speed_given
+#define FLUXPROOF__SPEED_GIVEN__VALUE_bm 0x1
+#define FLUXPROOF__SPEED_GIVEN__VALUE_bp 0
+#define FLUXPROOF__SPEED_GIVEN__VALUE_bw 1
+#define FLUXPROOF__SPEED_GIVEN__VALUE_reset 0x0
+
+// reg - fluxproof::position_restart
+#define FLUXPROOF__POSITION_RESTART__VALUE_bm 0x1
+#define FLUXPROOF__POSITION_RESTART__VALUE_bp 0
+#define FLUXPROOF__POSITION_RESTART__VALUE_bw 1
+#define FLUXPROOF__POSITION_RESTART__VALUE_reset 0x0
+
 // reg - fluxproof::flags
 #define FLUXPROOF__FLAGS__RUNNING_bm 0x1
 #define FLUXPROOF__FLAGS__RUNNING_bp 0
@@ -406,6 +424,12 @@ extern "C" {
 #define FLUXPROOF__I_MAX__VALUE_bp 0
 #define FLUXPROOF__I_MAX__VALUE_bw 32
 #define FLUXPROOF__I_MAX__VALUE_reset 0x0
+
+// reg - fluxproof::two_sensors
+#define FLUXPROOF__TWO_SENSORS__VALUE_bm 0x1
+#define FLUXPROOF__TWO_SENSORS__VALUE_bp 0
+#define FLUXPROOF__TWO_SENSORS__VALUE_bw 1
+#define FLUXPROOF__TWO_SENSORS__VALUE_reset 0x0
 
 // reg - fluxproof::kp_d
 #define FLUXPROOF__KP_D__VALUE_bm 0xffffff
@@ -731,6 +755,475 @@ extern "C" {
 #define FLUXPROOF__DOUBLE_UPDATE__VALUE_bw 1
 #define FLUXPROOF__DOUBLE_UPDATE__VALUE_reset 0x0
 
+// reg - fluxproof::encoder
+#define FLUXPROOF__ENCODER__VALUE_bm 0xffffffff
+#define FLUXPROOF__ENCODER__VALUE_bp 0
+#define FLUXPROOF__ENCODER__VALUE_bw 32
+
+// reg - fluxproof::currents
+#define FLUXPROOF__CURRENTS__VALUE_bm 0xffffffff
+#define FLUXPROOF__CURRENTS__VALUE_bp 0
+#define FLUXPROOF__CURRENTS__VALUE_bw 32
+
+// reg - fluxproof::spi_lines
+#define FLUXPROOF__SPI_LINES__VALUE_bm 0xffffffff
+#define FLUXPROOF__SPI_LINES__VALUE_bp 0
+#define FLUXPROOF__SPI_LINES__VALUE_bw 32
+
+// reg - fluxproof::clear_encoder
+#define FLUXPROOF__CLEAR_ENCODER__VALUE_bm 0x1
+#define FLUXPROOF__CLEAR_ENCODER__VALUE_bp 0
+#define FLUXPROOF__CLEAR_ENCODER__VALUE_bw 1
+#define FLUXPROOF__CLEAR_ENCODER__VALUE_reset 0x0
+
+// reg - fluxproof::take_snapshot
+#define FLUXPROOF__TAKE_SNAPSHOT__VALUE_bm 0x1
+#define FLUXPROOF__TAKE_SNAPSHOT__VALUE_bp 0
+#define FLUXPROOF__TAKE_SNAPSHOT__VALUE_bw 1
+#define FLUXPROOF__TAKE_SNAPSHOT__VALUE_reset 0x0
+
+// reg - fluxproof::position_source
+#define FLUXPROOF__POSITION_SOURCE__VALUE_bm 0x1
+#define FLUXPROOF__POSITION_SOURCE__VALUE_bp 0
+#define FLUXPROOF__POSITION_SOURCE__VALUE_bw 1
+#define FLUXPROOF__POSITION_SOURCE__VALUE_reset 0x0
+
+// reg - fluxproof::forced_angle
+#define FLUXPROOF__FORCED_ANGLE__VALUE_bm 0x3ffff
+#define FLUXPROOF__FORCED_ANGLE__VALUE_bp 0
+#define FLUXPROOF__FORCED_ANGLE__VALUE_bw 18
+#define FLUXPROOF__FORCED_ANGLE__VALUE_reset 0x0
+
+// reg - fluxproof::forced_rate
+#define FLUXPROOF__FORCED_RATE__VALUE_bm 0xffffffff
+#define FLUXPROOF__FORCED_RATE__VALUE_bp 0
+#define FLUXPROOF__FORCED_RATE__VALUE_bw 32
+#define FLUXPROOF__FORCED_RATE__VALUE_reset 0x0
+
+// reg - fluxproof::board_ignore
+#define FLUXPROOF__BOARD_IGNORE__VALUE_bm 0x7
+#define FLUXPROOF__BOARD_IGNORE__VALUE_bp 0
+#define FLUXPROOF__BOARD_IGNORE__VALUE_bw 3
+#define FLUXPROOF__BOARD_IGNORE__VALUE_reset 0x0
+
+// reg - fluxproof::encoder_flags
+#define FLUXPROOF__ENCODER_FLAGS__VALUE_bm 0x7ff
+#define FLUXPROOF__ENCODER_FLAGS__VALUE_bp 0
+#define FLUXPROOF__ENCODER_FLAGS__VALUE_bw 11
+
+// reg - fluxproof::encoder_count
+#define FLUXPROOF__ENCODER_COUNT__VALUE_bm 0x3ffff
+#define FLUXPROOF__ENCODER_COUNT__VALUE_bp 0
+#define FLUXPROOF__ENCODER_COUNT__VALUE_bw 18
+
+// reg - fluxproof::index_count
+#define FLUXPROOF__INDEX_COUNT__VALUE_bm 0x3ffff
+#define FLUXPROOF__INDEX_COUNT__VALUE_bp 0
+#define FLUXPROOF__INDEX_COUNT__VALUE_bw 18
+
+// reg - fluxproof::illegal_count
+#define FLUXPROOF__ILLEGAL_COUNT__VALUE_bm 0xfff
+#define FLUXPROOF__ILLEGAL_COUNT__VALUE_bp 0
+#define FLUXPROOF__ILLEGAL_COUNT__VALUE_bw 12
+
+// reg - fluxproof::lost_counts
+#define FLUXPROOF__LOST_COUNTS__VALUE_bm 0xfff
+#define FLUXPROOF__LOST_COUNTS__VALUE_bp 0
+#define FLUXPROOF__LOST_COUNTS__VALUE_bw 12
+
+// reg - fluxproof::bridged_count
+#define FLUXPROOF__BRIDGED_COUNT__VALUE_bm 0xfff
+#define FLUXPROOF__BRIDGED_COUNT__VALUE_bp 0
+#define FLUXPROOF__BRIDGED_COUNT__VALUE_bw 12
+
+// reg - fluxproof::converter_errors
+#define FLUXPROOF__CONVERTER_ERRORS__VALUE_bm 0xfff
+#define FLUXPROOF__CONVERTER_ERRORS__VALUE_bp 0
+#define FLUXPROOF__CONVERTER_ERRORS__VALUE_bw 12
+
+// reg - fluxproof::converter_refused
+#define FLUXPROOF__CONVERTER_REFUSED__VALUE_bm 0x1
+#define FLUXPROOF__CONVERTER_REFUSED__VALUE_bp 0
+#define FLUXPROOF__CONVERTER_REFUSED__VALUE_bw 1
+
+// reg - fluxproof::forced
+#define FLUXPROOF__FORCED__VALUE_bm 0x1
+#define FLUXPROOF__FORCED__VALUE_bp 0
+#define FLUXPROOF__FORCED__VALUE_bw 1
+
+// reg - fluxproof::board_flags
+#define FLUXPROOF__BOARD_FLAGS__VALUE_bm 0x7
+#define FLUXPROOF__BOARD_FLAGS__VALUE_bp 0
+#define FLUXPROOF__BOARD_FLAGS__VALUE_bw 3
+
+// reg - fluxproof::board_first
+#define FLUXPROOF__BOARD_FIRST__VALUE_bm 0x7
+#define FLUXPROOF__BOARD_FIRST__VALUE_bp 0
+#define FLUXPROOF__BOARD_FIRST__VALUE_bw 3
+
+// reg - fluxproof::snap_ready
+#define FLUXPROOF__SNAP_READY__VALUE_bm 0x1
+#define FLUXPROOF__SNAP_READY__VALUE_bp 0
+#define FLUXPROOF__SNAP_READY__VALUE_bw 1
+
+// reg - fluxproof::snap_code
+#define FLUXPROOF__SNAP_CODE__VALUE_bm 0x3ffff
+#define FLUXPROOF__SNAP_CODE__VALUE_bp 0
+#define FLUXPROOF__SNAP_CODE__VALUE_bw 18
+
+// reg - fluxproof::snap_position
+#define FLUXPROOF__SNAP_POSITION__VALUE_bm 0x3ffff
+#define FLUXPROOF__SNAP_POSITION__VALUE_bp 0
+#define FLUXPROOF__SNAP_POSITION__VALUE_bw 18
+
+// reg - fluxproof::snap_count
+#define FLUXPROOF__SNAP_COUNT__VALUE_bm 0x3ffff
+#define FLUXPROOF__SNAP_COUNT__VALUE_bp 0
+#define FLUXPROOF__SNAP_COUNT__VALUE_bw 18
+
+// reg - fluxproof::snap_flags
+#define FLUXPROOF__SNAP_FLAGS__VALUE_bm 0x7ff
+#define FLUXPROOF__SNAP_FLAGS__VALUE_bp 0
+#define FLUXPROOF__SNAP_FLAGS__VALUE_bw 11
+
+// reg - fluxproof::snap_adc_a
+#define FLUXPROOF__SNAP_ADC_A__VALUE_bm 0xffff
+#define FLUXPROOF__SNAP_ADC_A__VALUE_bp 0
+#define FLUXPROOF__SNAP_ADC_A__VALUE_bw 16
+
+// reg - fluxproof::snap_adc_b
+#define FLUXPROOF__SNAP_ADC_B__VALUE_bm 0xffff
+#define FLUXPROOF__SNAP_ADC_B__VALUE_bp 0
+#define FLUXPROOF__SNAP_ADC_B__VALUE_bw 16
+
+// reg - fluxproof::snap_adc_c
+#define FLUXPROOF__SNAP_ADC_C__VALUE_bm 0xffff
+#define FLUXPROOF__SNAP_ADC_C__VALUE_bp 0
+#define FLUXPROOF__SNAP_ADC_C__VALUE_bw 16
+
+// reg - fluxproof::snap_adc_u_dc
+#define FLUXPROOF__SNAP_ADC_U_DC__VALUE_bm 0xffff
+#define FLUXPROOF__SNAP_ADC_U_DC__VALUE_bp 0
+#define FLUXPROOF__SNAP_ADC_U_DC__VALUE_bw 16
+
+// reg - fluxproof::filter_clocks
+#define FLUXPROOF__FILTER_CLOCKS__VALUE_bm 0x3ff
+#define FLUXPROOF__FILTER_CLOCKS__VALUE_bp 0
+#define FLUXPROOF__FILTER_CLOCKS__VALUE_bw 10
+#define FLUXPROOF__FILTER_CLOCKS__VALUE_reset 0x0
+
+// reg - fluxproof::index_phase
+#define FLUXPROOF__INDEX_PHASE__VALUE_bm 0x3
+#define FLUXPROOF__INDEX_PHASE__VALUE_bp 0
+#define FLUXPROOF__INDEX_PHASE__VALUE_bw 2
+#define FLUXPROOF__INDEX_PHASE__VALUE_reset 0x0
+
+// reg - fluxproof::counts
+#define FLUXPROOF__COUNTS__VALUE_bm 0x7ffff
+#define FLUXPROOF__COUNTS__VALUE_bp 0
+#define FLUXPROOF__COUNTS__VALUE_bw 19
+#define FLUXPROOF__COUNTS__VALUE_reset 0x0
+
+// reg - fluxproof::code_step
+#define FLUXPROOF__CODE_STEP__VALUE_bm 0x1ffff
+#define FLUXPROOF__CODE_STEP__VALUE_bp 0
+#define FLUXPROOF__CODE_STEP__VALUE_bw 17
+#define FLUXPROOF__CODE_STEP__VALUE_reset 0x0
+
+// reg - fluxproof::code_rest
+#define FLUXPROOF__CODE_REST__VALUE_bm 0x3ffff
+#define FLUXPROOF__CODE_REST__VALUE_bp 0
+#define FLUXPROOF__CODE_REST__VALUE_bw 18
+#define FLUXPROOF__CODE_REST__VALUE_reset 0x0
+
+// reg - fluxproof::correct_max
+#define FLUXPROOF__CORRECT_MAX__VALUE_bm 0xfff
+#define FLUXPROOF__CORRECT_MAX__VALUE_bp 0
+#define FLUXPROOF__CORRECT_MAX__VALUE_bw 12
+#define FLUXPROOF__CORRECT_MAX__VALUE_reset 0x0
+
+// reg - fluxproof::k_edge
+#define FLUXPROOF__K_EDGE__VALUE_bm 0xffffffff
+#define FLUXPROOF__K_EDGE__VALUE_bp 0
+#define FLUXPROOF__K_EDGE__VALUE_bw 32
+#define FLUXPROOF__K_EDGE__VALUE_reset 0x0
+
+// reg - fluxproof::hall_reverse
+#define FLUXPROOF__HALL_REVERSE__VALUE_bm 0x1
+#define FLUXPROOF__HALL_REVERSE__VALUE_bp 0
+#define FLUXPROOF__HALL_REVERSE__VALUE_bw 1
+#define FLUXPROOF__HALL_REVERSE__VALUE_reset 0x0
+
+// reg - fluxproof::hall_offset
+#define FLUXPROOF__HALL_OFFSET__VALUE_bm 0x3ffff
+#define FLUXPROOF__HALL_OFFSET__VALUE_bp 0
+#define FLUXPROOF__HALL_OFFSET__VALUE_bw 18
+#define FLUXPROOF__HALL_OFFSET__VALUE_reset 0x0
+
+// reg - fluxproof::start_first
+#define FLUXPROOF__START_FIRST__VALUE_bm 0x3ffff
+#define FLUXPROOF__START_FIRST__VALUE_bp 0
+#define FLUXPROOF__START_FIRST__VALUE_bw 18
+#define FLUXPROOF__START_FIRST__VALUE_reset 0x0
+
+// reg - fluxproof::sector_counts
+#define FLUXPROOF__SECTOR_COUNTS__VALUE_bm 0xfffff
+#define FLUXPROOF__SECTOR_COUNTS__VALUE_bp 0
+#define FLUXPROOF__SECTOR_COUNTS__VALUE_bw 20
+#define FLUXPROOF__SECTOR_COUNTS__VALUE_reset 0x0
+
+// reg - fluxproof::half_period
+#define FLUXPROOF__HALF_PERIOD__VALUE_bm 0x3ff
+#define FLUXPROOF__HALF_PERIOD__VALUE_bp 0
+#define FLUXPROOF__HALF_PERIOD__VALUE_bw 10
+#define FLUXPROOF__HALF_PERIOD__VALUE_reset 0x0
+
+// reg - fluxproof::encoder_bits
+#define FLUXPROOF__ENCODER_BITS__VALUE_bm 0x3f
+#define FLUXPROOF__ENCODER_BITS__VALUE_bp 0
+#define FLUXPROOF__ENCODER_BITS__VALUE_bw 6
+#define FLUXPROOF__ENCODER_BITS__VALUE_reset 0x0
+
+// reg - fluxproof::turn_bits
+#define FLUXPROOF__TURN_BITS__VALUE_bm 0x3f
+#define FLUXPROOF__TURN_BITS__VALUE_bp 0
+#define FLUXPROOF__TURN_BITS__VALUE_bw 6
+#define FLUXPROOF__TURN_BITS__VALUE_reset 0x0
+
+// reg - fluxproof::gray
+#define FLUXPROOF__GRAY__VALUE_bm 0x1
+#define FLUXPROOF__GRAY__VALUE_bp 0
+#define FLUXPROOF__GRAY__VALUE_bw 1
+#define FLUXPROOF__GRAY__VALUE_reset 0x0
+
+// reg - fluxproof::parity_on
+#define FLUXPROOF__PARITY_ON__VALUE_bm 0x1
+#define FLUXPROOF__PARITY_ON__VALUE_bp 0
+#define FLUXPROOF__PARITY_ON__VALUE_bw 1
+#define FLUXPROOF__PARITY_ON__VALUE_reset 0x0
+
+// reg - fluxproof::crc_on
+#define FLUXPROOF__CRC_ON__VALUE_bm 0x1
+#define FLUXPROOF__CRC_ON__VALUE_bp 0
+#define FLUXPROOF__CRC_ON__VALUE_bw 1
+#define FLUXPROOF__CRC_ON__VALUE_reset 0x0
+
+// reg - fluxproof::start_max
+#define FLUXPROOF__START_MAX__VALUE_bm 0xffff
+#define FLUXPROOF__START_MAX__VALUE_bp 0
+#define FLUXPROOF__START_MAX__VALUE_bw 16
+#define FLUXPROOF__START_MAX__VALUE_reset 0x0
+
+// reg - fluxproof::mode_command
+#define FLUXPROOF__MODE_COMMAND__VALUE_bm 0x3f
+#define FLUXPROOF__MODE_COMMAND__VALUE_bp 0
+#define FLUXPROOF__MODE_COMMAND__VALUE_bw 6
+#define FLUXPROOF__MODE_COMMAND__VALUE_reset 0x0
+
+// reg - fluxproof::two_errors
+#define FLUXPROOF__TWO_ERRORS__VALUE_bm 0x1
+#define FLUXPROOF__TWO_ERRORS__VALUE_bp 0
+#define FLUXPROOF__TWO_ERRORS__VALUE_bw 1
+#define FLUXPROOF__TWO_ERRORS__VALUE_reset 0x0
+
+// reg - fluxproof::position_delay
+#define FLUXPROOF__POSITION_DELAY__VALUE_bm 0x3ffff
+#define FLUXPROOF__POSITION_DELAY__VALUE_bp 0
+#define FLUXPROOF__POSITION_DELAY__VALUE_bw 18
+#define FLUXPROOF__POSITION_DELAY__VALUE_reset 0x0
+
+// reg - fluxproof::bridge_max
+#define FLUXPROOF__BRIDGE_MAX__VALUE_bm 0xff
+#define FLUXPROOF__BRIDGE_MAX__VALUE_bp 0
+#define FLUXPROOF__BRIDGE_MAX__VALUE_bw 8
+#define FLUXPROOF__BRIDGE_MAX__VALUE_reset 0x0
+
+// reg - fluxproof::clock_ratio
+#define FLUXPROOF__CLOCK_RATIO__VALUE_bm 0x1f
+#define FLUXPROOF__CLOCK_RATIO__VALUE_bp 0
+#define FLUXPROOF__CLOCK_RATIO__VALUE_bw 5
+#define FLUXPROOF__CLOCK_RATIO__VALUE_reset 0x0
+
+// reg - fluxproof::spi_bits
+#define FLUXPROOF__SPI_BITS__VALUE_bm 0x3f
+#define FLUXPROOF__SPI_BITS__VALUE_bp 0
+#define FLUXPROOF__SPI_BITS__VALUE_bw 6
+#define FLUXPROOF__SPI_BITS__VALUE_reset 0x0
+
+// reg - fluxproof::spi_skip
+#define FLUXPROOF__SPI_SKIP__VALUE_bm 0x1f
+#define FLUXPROOF__SPI_SKIP__VALUE_bp 0
+#define FLUXPROOF__SPI_SKIP__VALUE_bw 5
+#define FLUXPROOF__SPI_SKIP__VALUE_reset 0x0
+
+// reg - fluxproof::spi_delay
+#define FLUXPROOF__SPI_DELAY__VALUE_bm 0xf
+#define FLUXPROOF__SPI_DELAY__VALUE_bp 0
+#define FLUXPROOF__SPI_DELAY__VALUE_bw 4
+#define FLUXPROOF__SPI_DELAY__VALUE_reset 0x0
+
+// reg - fluxproof::wait_clocks
+#define FLUXPROOF__WAIT_CLOCKS__VALUE_bm 0xffff
+#define FLUXPROOF__WAIT_CLOCKS__VALUE_bp 0
+#define FLUXPROOF__WAIT_CLOCKS__VALUE_bw 16
+#define FLUXPROOF__WAIT_CLOCKS__VALUE_reset 0x0
+
+// reg - fluxproof::busy_timeout
+#define FLUXPROOF__BUSY_TIMEOUT__VALUE_bm 0xffff
+#define FLUXPROOF__BUSY_TIMEOUT__VALUE_bp 0
+#define FLUXPROOF__BUSY_TIMEOUT__VALUE_bw 16
+#define FLUXPROOF__BUSY_TIMEOUT__VALUE_reset 0x0
+
+// reg - fluxproof::two_words
+#define FLUXPROOF__TWO_WORDS__VALUE_bm 0x1
+#define FLUXPROOF__TWO_WORDS__VALUE_bp 0
+#define FLUXPROOF__TWO_WORDS__VALUE_bw 1
+#define FLUXPROOF__TWO_WORDS__VALUE_reset 0x0
+
+// reg - fluxproof::use_convst
+#define FLUXPROOF__USE_CONVST__VALUE_bm 0x1
+#define FLUXPROOF__USE_CONVST__VALUE_bp 0
+#define FLUXPROOF__USE_CONVST__VALUE_bw 1
+#define FLUXPROOF__USE_CONVST__VALUE_reset 0x0
+
+// reg - fluxproof::clock_idle
+#define FLUXPROOF__CLOCK_IDLE__VALUE_bm 0x1
+#define FLUXPROOF__CLOCK_IDLE__VALUE_bp 0
+#define FLUXPROOF__CLOCK_IDLE__VALUE_bw 1
+#define FLUXPROOF__CLOCK_IDLE__VALUE_reset 0x0
+
+// reg - fluxproof::second_edge
+#define FLUXPROOF__SECOND_EDGE__VALUE_bm 0x1
+#define FLUXPROOF__SECOND_EDGE__VALUE_bp 0
+#define FLUXPROOF__SECOND_EDGE__VALUE_bw 1
+#define FLUXPROOF__SECOND_EDGE__VALUE_reset 0x0
+
+// reg - fluxproof::signed_code
+#define FLUXPROOF__SIGNED_CODE__VALUE_bm 0x1
+#define FLUXPROOF__SIGNED_CODE__VALUE_bp 0
+#define FLUXPROOF__SIGNED_CODE__VALUE_bw 1
+#define FLUXPROOF__SIGNED_CODE__VALUE_reset 0x0
+
+// reg - fluxproof::channel_a
+#define FLUXPROOF__CHANNEL_A__VALUE_bm 0x7
+#define FLUXPROOF__CHANNEL_A__VALUE_bp 0
+#define FLUXPROOF__CHANNEL_A__VALUE_bw 3
+#define FLUXPROOF__CHANNEL_A__VALUE_reset 0x0
+
+// reg - fluxproof::channel_b
+#define FLUXPROOF__CHANNEL_B__VALUE_bm 0x7
+#define FLUXPROOF__CHANNEL_B__VALUE_bp 0
+#define FLUXPROOF__CHANNEL_B__VALUE_bw 3
+#define FLUXPROOF__CHANNEL_B__VALUE_reset 0x0
+
+// reg - fluxproof::channel_c
+#define FLUXPROOF__CHANNEL_C__VALUE_bm 0x7
+#define FLUXPROOF__CHANNEL_C__VALUE_bp 0
+#define FLUXPROOF__CHANNEL_C__VALUE_bw 3
+#define FLUXPROOF__CHANNEL_C__VALUE_reset 0x0
+
+// reg - fluxproof::channel_u_dc
+#define FLUXPROOF__CHANNEL_U_DC__VALUE_bm 0x7
+#define FLUXPROOF__CHANNEL_U_DC__VALUE_bp 0
+#define FLUXPROOF__CHANNEL_U_DC__VALUE_bw 3
+#define FLUXPROOF__CHANNEL_U_DC__VALUE_reset 0x0
+
+// reg - fluxproof::conversions
+#define FLUXPROOF__CONVERSIONS__VALUE_bm 0x7
+#define FLUXPROOF__CONVERSIONS__VALUE_bp 0
+#define FLUXPROOF__CONVERSIONS__VALUE_bw 3
+#define FLUXPROOF__CONVERSIONS__VALUE_reset 0x1
+
+// reg - fluxproof::xadc_channels
+#define FLUXPROOF__XADC_CHANNELS__VALUE_bm 0x7
+#define FLUXPROOF__XADC_CHANNELS__VALUE_bp 0
+#define FLUXPROOF__XADC_CHANNELS__VALUE_bw 3
+#define FLUXPROOF__XADC_CHANNELS__VALUE_reset 0x1
+
+// reg - fluxproof::address_0
+#define FLUXPROOF__ADDRESS_0__VALUE_bm 0x7f
+#define FLUXPROOF__ADDRESS_0__VALUE_bp 0
+#define FLUXPROOF__ADDRESS_0__VALUE_bw 7
+#define FLUXPROOF__ADDRESS_0__VALUE_reset 0x0
+
+// reg - fluxproof::address_1
+#define FLUXPROOF__ADDRESS_1__VALUE_bm 0x7f
+#define FLUXPROOF__ADDRESS_1__VALUE_bp 0
+#define FLUXPROOF__ADDRESS_1__VALUE_bw 7
+#define FLUXPROOF__ADDRESS_1__VALUE_reset 0x0
+
+// reg - fluxproof::address_2
+#define FLUXPROOF__ADDRESS_2__VALUE_bm 0x7f
+#define FLUXPROOF__ADDRESS_2__VALUE_bp 0
+#define FLUXPROOF__ADDRESS_2__VALUE_bw 7
+#define FLUXPROOF__ADDRESS_2__VALUE_reset 0x0
+
+// reg - fluxproof::address_3
+#define FLUXPROOF__ADDRESS_3__VALUE_bm 0x7f
+#define FLUXPROOF__ADDRESS_3__VALUE_bp 0
+#define FLUXPROOF__ADDRESS_3__VALUE_bw 7
+#define FLUXPROOF__ADDRESS_3__VALUE_reset 0x0
+
+// reg - fluxproof::xadc_timeout
+#define FLUXPROOF__XADC_TIMEOUT__VALUE_bm 0xffff
+#define FLUXPROOF__XADC_TIMEOUT__VALUE_bp 0
+#define FLUXPROOF__XADC_TIMEOUT__VALUE_bw 16
+#define FLUXPROOF__XADC_TIMEOUT__VALUE_reset 0x0
+
+// reg - fluxproof::mod_ratio
+#define FLUXPROOF__MOD_RATIO__VALUE_bm 0x3f
+#define FLUXPROOF__MOD_RATIO__VALUE_bp 0
+#define FLUXPROOF__MOD_RATIO__VALUE_bw 6
+#define FLUXPROOF__MOD_RATIO__VALUE_reset 0x4
+
+// reg - fluxproof::mod_delay
+#define FLUXPROOF__MOD_DELAY__VALUE_bm 0xf
+#define FLUXPROOF__MOD_DELAY__VALUE_bp 0
+#define FLUXPROOF__MOD_DELAY__VALUE_bw 4
+#define FLUXPROOF__MOD_DELAY__VALUE_reset 0x0
+
+// reg - fluxproof::follow_clock
+#define FLUXPROOF__FOLLOW_CLOCK__VALUE_bm 0x1
+#define FLUXPROOF__FOLLOW_CLOCK__VALUE_bp 0
+#define FLUXPROOF__FOLLOW_CLOCK__VALUE_bw 1
+#define FLUXPROOF__FOLLOW_CLOCK__VALUE_reset 0x0
+
+// reg - fluxproof::oversampling
+#define FLUXPROOF__OVERSAMPLING__VALUE_bm 0x1ff
+#define FLUXPROOF__OVERSAMPLING__VALUE_bp 0
+#define FLUXPROOF__OVERSAMPLING__VALUE_bw 9
+#define FLUXPROOF__OVERSAMPLING__VALUE_reset 0x20
+
+// reg - fluxproof::sinc_gain
+#define FLUXPROOF__SINC_GAIN__VALUE_bm 0x1ffff
+#define FLUXPROOF__SINC_GAIN__VALUE_bp 0
+#define FLUXPROOF__SINC_GAIN__VALUE_bw 17
+#define FLUXPROOF__SINC_GAIN__VALUE_reset 0x0
+
+// reg - fluxproof::start_clocks
+#define FLUXPROOF__START_CLOCKS__VALUE_bm 0xffff
+#define FLUXPROOF__START_CLOCKS__VALUE_bp 0
+#define FLUXPROOF__START_CLOCKS__VALUE_bw 16
+#define FLUXPROOF__START_CLOCKS__VALUE_reset 0x0
+
+// reg - fluxproof::trip_oversampling
+#define FLUXPROOF__TRIP_OVERSAMPLING__VALUE_bm 0x3f
+#define FLUXPROOF__TRIP_OVERSAMPLING__VALUE_bp 0
+#define FLUXPROOF__TRIP_OVERSAMPLING__VALUE_bw 6
+#define FLUXPROOF__TRIP_OVERSAMPLING__VALUE_reset 0x8
+
+// reg - fluxproof::limit_high
+#define FLUXPROOF__LIMIT_HIGH__VALUE_bm 0xffff
+#define FLUXPROOF__LIMIT_HIGH__VALUE_bp 0
+#define FLUXPROOF__LIMIT_HIGH__VALUE_bw 16
+#define FLUXPROOF__LIMIT_HIGH__VALUE_reset 0x0
+
+// reg - fluxproof::limit_low
+#define FLUXPROOF__LIMIT_LOW__VALUE_bm 0xffff
+#define FLUXPROOF__LIMIT_LOW__VALUE_bp 0
+#define FLUXPROOF__LIMIT_LOW__VALUE_bw 16
+#define FLUXPROOF__LIMIT_LOW__VALUE_reset 0x0
+
 // addrmap - fluxproof
 typedef struct {
     uint32_t identification;
@@ -753,7 +1246,10 @@ typedef struct {
     uint32_t temp_valid;
     uint32_t irq_mask;
     uint32_t irq_clear;
-    uint8_t RESERVED_70_7f[0x10];
+    uint32_t omega_given;
+    uint32_t speed_given;
+    uint32_t position_restart;
+    uint8_t RESERVED_7c_7f[0x4];
     uint32_t flags;
     uint32_t flux_faults;
     uint32_t min_pulse_used;
@@ -802,7 +1298,7 @@ typedef struct {
     uint32_t speed_kp;
     uint32_t speed_ki;
     uint32_t i_max;
-    uint8_t RESERVED_14c_14f[0x4];
+    uint32_t two_sensors;
     uint32_t kp_d;
     uint32_t ki_d;
     uint32_t kp_q;
@@ -859,11 +1355,99 @@ typedef struct {
     uint32_t brake_off;
     uint8_t RESERVED_228_23f[0x18];
     uint32_t double_update;
+    uint8_t RESERVED_244_3ff[0x1bc];
+    uint32_t encoder;
+    uint32_t currents;
+    uint32_t spi_lines;
+    uint8_t RESERVED_40c_40f[0x4];
+    uint32_t clear_encoder;
+    uint32_t take_snapshot;
+    uint32_t position_source;
+    uint32_t forced_angle;
+    uint32_t forced_rate;
+    uint32_t board_ignore;
+    uint8_t RESERVED_428_43f[0x18];
+    uint32_t encoder_flags;
+    uint32_t encoder_count;
+    uint32_t index_count;
+    uint32_t illegal_count;
+    uint32_t lost_counts;
+    uint32_t bridged_count;
+    uint32_t converter_errors;
+    uint32_t converter_refused;
+    uint32_t forced;
+    uint32_t board_flags;
+    uint32_t board_first;
+    uint8_t RESERVED_46c_46f[0x4];
+    uint32_t snap_ready;
+    uint32_t snap_code;
+    uint32_t snap_position;
+    uint32_t snap_count;
+    uint32_t snap_flags;
+    uint32_t snap_adc_a;
+    uint32_t snap_adc_b;
+    uint32_t snap_adc_c;
+    uint32_t snap_adc_u_dc;
+    uint8_t RESERVED_494_4ff[0x6c];
+    uint32_t filter_clocks;
+    uint32_t index_phase;
+    uint32_t counts;
+    uint32_t code_step;
+    uint32_t code_rest;
+    uint32_t correct_max;
+    uint32_t k_edge;
+    uint32_t hall_reverse;
+    uint32_t hall_offset;
+    uint32_t start_first;
+    uint32_t sector_counts;
+    uint32_t half_period;
+    uint32_t encoder_bits;
+    uint32_t turn_bits;
+    uint32_t gray;
+    uint32_t parity_on;
+    uint32_t crc_on;
+    uint32_t start_max;
+    uint32_t mode_command;
+    uint32_t two_errors;
+    uint32_t position_delay;
+    uint32_t bridge_max;
+    uint8_t RESERVED_558_55f[0x8];
+    uint32_t clock_ratio;
+    uint32_t spi_bits;
+    uint32_t spi_skip;
+    uint32_t spi_delay;
+    uint32_t wait_clocks;
+    uint32_t busy_timeout;
+    uint32_t two_words;
+    uint32_t use_convst;
+    uint32_t clock_idle;
+    uint32_t second_edge;
+    uint32_t signed_code;
+    uint32_t channel_a;
+    uint32_t channel_b;
+    uint32_t channel_c;
+    uint32_t channel_u_dc;
+    uint32_t conversions;
+    uint32_t xadc_channels;
+    uint32_t address_0;
+    uint32_t address_1;
+    uint32_t address_2;
+    uint32_t address_3;
+    uint32_t xadc_timeout;
+    uint32_t mod_ratio;
+    uint32_t mod_delay;
+    uint32_t follow_clock;
+    uint32_t oversampling;
+    uint32_t sinc_gain;
+    uint32_t start_clocks;
+    uint32_t trip_oversampling;
+    uint32_t limit_high;
+    uint32_t limit_low;
 } fluxproof_t;
 
 
 #if defined(__cplusplus) || __STDC_VERSION__ >= 201112L
-static_assert(sizeof(fluxproof_t) == 0x244, "Packing error");
+static_assert(sizeof(fluxproof_t) == 0x5dc, "Packing error");
 #endif
 
 #ifdef __cplusplus

@@ -96,6 +96,7 @@ _SETTINGS = """
     150 kp_d          154 ki_d           158 kp_q         15c ki_q           160 l_d          164 l_q
     168 lambda_mg     16c k_delay        170 dead_time    174 min_pulse
     178 watchdog      17c fault_ignore
+    070 omega_given   074 speed_given    078 position_restart                14c two_sensors
     180 flux_mode     184 r_s            188 t_s          18c omega_0        190 xi           194 omega_min
     198 k_ramp        19c flux_kp        1a0 flux_ki      1a4 delta_max      1a8 k_chord
     1b0 tcr           1b4 t_0            1b8 t_min        1bc t_max
@@ -237,17 +238,18 @@ def registers(settings: Mapping[str, Port] = fluxproof.REGISTERS) -> dict[str, R
                 f"register map: {before.name} and {after.name} share address {after.address:#05x}"
             )
     for register in ordered:
-        _check(register)
+        check(register)
     result = {r.name: r for r in ordered}
     if len(result) != len(ordered):
         raise ValueError("register map: two registers have the same name")
     return result
 
 
-def _check(register: Register) -> None:
-    if register.address % 4 or not 0 <= register.address < 4 * WORDS:
+def check(register: Register, base: int = 0, end: int = 4 * WORDS) -> None:
+    """ValueError where a register is not within its block of addresses, or its fields not within their word."""
+    if register.address % 4 or not base <= register.address < end:
         raise ValueError(
-            f"register map: {register.name} at {register.address:#x}: expected a multiple of 4 below {4 * WORDS:#x}"
+            f"register map: {register.name} at {register.address:#x}: expected a multiple of 4 below {end:#x}"
         )
     taken = 0
     for f in register.fields:

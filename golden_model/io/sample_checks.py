@@ -8,7 +8,8 @@
     5  position       |code - (2*code' - code'')| >= jump_max: more than the shaft can accelerate within a sample
 
 Check 5 detects a jump of the code, and a code that freezes while the shaft turns by ``jump_max`` per sample or more.  A
-frozen code at lower speed looks like a shaft at rest.  Check 5 starts with the third sample after a reset.
+frozen code at lower speed looks like a shaft at rest.  Check 5 starts with the third sample after a reset; a sample
+with ``position_restart`` is the first one again.
 ``sample_trip``: at least one fault that ``fault_ignore`` does not mask.
 
 Formats: currents and voltage are cut (floor) to U(1,8), |x| is the one's complement where x is negative: a negative
@@ -50,7 +51,7 @@ def reaches(x, limit):
 @kernel
 def step(
     state, i_a, i_b, i_c, current_at_rail, u_dc, u_dc_at_rail, code_theta, i_trip, sum_trip, rail_samples, u_dc_min,
-    u_dc_max, jump_max, fault_ignore, position_bits,
+    u_dc_max, jump_max, fault_ignore, position_restart, position_bits,
 ):  # fmt: skip
     a, b, c = i_a >> DROP_LIMIT, i_b >> DROP_LIMIT, i_c >> DROP_LIMIT
     over = 1 if reaches(a, i_trip) or reaches(b, i_trip) or reaches(c, i_trip) else 0
@@ -67,10 +68,10 @@ def step(
     code = code_theta << (TURN_W - position_bits)
     away = wrap_s(code - state.expected, TURN_W)
     off = away >> DROP_JUMP
-    known = state.seen == WARM
+    known = state.seen == WARM and not position_restart
     jumped = 1 if known and reaches(off, jump_max) else 0
     expected = wrap(2 * code - state.code, TURN_W)
-    seen = min(state.seen + 1, WARM)
+    seen = 1 if position_restart else min(state.seen + 1, WARM)
 
     faults = over + 2 * unbalanced + 4 * stuck + 8 * low + 16 * high + 32 * jumped
     return State(code, expected, seen, railed), (faults, 1 if faults & ~fault_ignore else 0)
@@ -108,6 +109,9 @@ def stimuli(rng, config):
             code = (code + turn) % size
             rows.append(calm | limits | {"code_theta": code})
         rows += [calm | limits | {"code_theta": code}] * 3
+        rows += [calm | limits | {"code_theta": size // 3, "position_restart": 1}]
+        rows += [calm | limits | {"code_theta": size // 3 + k * size // 100} for k in (1, 2, 3, 9)]
+        rows += [calm | limits | {"code_theta": code, "position_restart": 1}]
     return rows
 
 
@@ -131,6 +135,7 @@ BLOCK = Block(
         Port("u_dc_max", LIMIT, doc="bus voltage that trips"),
         Port("jump_max", JUMP, doc="deviation from the extrapolated position that trips, turns"),
         Port("fault_ignore", IGNORE, doc="bit x: fault x of fault_flags is reported and does not trip"),
+        Port("position_restart", BIT, doc="1: the code has nothing to do with the one of the sample before"),
     ),
     outputs=(
         Port("sample_faults", CHECKS, doc="faults of this sample, see sample_checks"),

@@ -6,7 +6,9 @@
 Formats: the difference is the shorter angle, S(-1,18) of a mechanical turn, so speeds up to half a turn per
 sample are unambiguous.  raw is rounded half up to PU; the filter's state omega has 12 bits more, so that it settles
 within one PU LSB of its input, and is rounded half up to omega_me.  k_filter = 1: no filter.
-The first sample after reset has no predecessor: its difference is zero.
+The first sample after reset has no predecessor: its difference is zero.  A sample with ``position_restart`` has none
+either, and the filter keeps its speed.  With ``speed_given`` the speed is ``omega_given``, measured elsewhere (by the
+time between the edges of an encoder); the filter goes on behind it.
 Saturation: raw saturates at 2 per unit; with k_filter <= 1 the state moves towards raw by at most the distance
 from omega_me, so omega stays within half an LSB of PU of the range of raw, and omega_me within that range.
 """
@@ -35,15 +37,17 @@ class State(NamedTuple):
 
 
 @kernel
-def step(state, code_theta, reverse, k_speed, k_filter, position_bits):
+def step(
+    state, code_theta, reverse, k_speed, k_filter, position_restart, speed_given, omega_given, position_bits
+):  # fmt: skip
     aligned = code_theta << (TURN_W - position_bits)
     mech = -aligned if reverse else aligned
     last = state.code if state.seen else mech
     delta = wrap_s(mech - last, TURN_W)
     raw = round_sat(delta * k_speed, DROP_RAW, PU_W)
-    err = raw - round_half_up(state.omega, TO_PU)
+    err = 0 if position_restart else raw - round_half_up(state.omega, TO_PU)
     omega = state.omega + round_half_up(err * k_filter, DROP_STATE)
-    omega_me = round_half_up(omega, TO_PU)
+    omega_me = omega_given if speed_given else round_half_up(omega, TO_PU)
     return State(mech, 1, omega), (omega_me,)
 
 
@@ -52,6 +56,10 @@ def reference(v, state):
     delta = (mech - state.code / 2**TURN_W + 0.5) % 1.0 - 0.5 if state.seen else 0.0
     raw = PU.limit(v["k_speed"] * delta)
     old = state.omega * OMEGA.lsb
+    if v["speed_given"]:
+        return {"omega_me": v["omega_given"]}
+    if v["position_restart"]:
+        return {"omega_me": old}
     return {"omega_me": old + v["k_filter"] * (raw - old)}
 
 
@@ -69,6 +77,9 @@ def stimuli(rng, config):
         for _ in range(12):
             code = (code + speed) % size
             rows.append({"code_theta": code, **regs})
+        rows.append({"code_theta": size // 3, **regs, "position_restart": 1})
+        rows.append({"code_theta": code, **regs, "position_restart": 1})
+        rows.append({"code_theta": code, **regs, "speed_given": 1, "omega_given": -speed % 1000})
     return rows
 
 
@@ -82,6 +93,9 @@ BLOCK = Block(
         Port("reverse", BIT, doc="1: code counts opposite to the phase order"),
         Port("k_speed", K_SPEED, doc="speed per turn and sample"),
         Port("k_filter", K_FILTER, hi=1 << 16, doc="filter weight of the new sample, 1 = no filter"),
+        Port("position_restart", BIT, doc="1: the code has nothing to do with the one of the sample before"),
+        Port("speed_given", BIT, doc="1: the speed is omega_given, not that of the code"),
+        Port("omega_given", PU, doc="electrical speed, measured elsewhere"),
     ),
     outputs=(Port("omega_me", PU, doc="electrical speed"),),
     state=State(),

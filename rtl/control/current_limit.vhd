@@ -39,8 +39,6 @@ architecture rtl of current_limit is
 
   signal state : state_t;
 
-  signal valid : std_logic;
-
   signal busy    : std_logic;
   signal to_root : std_logic;  -- 0: steps of the product, 1: of the root
   signal count   : natural range 0 to WIDTH - 1;
@@ -75,7 +73,7 @@ begin
     variable nearest : signed(WIDTH - 1 downto 0);
   begin
     if rising_edge(clk) then
-      valid <= in_valid;
+      out_valid <= in_valid;
 
       -- Stage 1: the pair of the last sample;  below = i_max - i_d_ref;  above = i_max + i_d_ref
       if in_valid = '1' then
@@ -120,14 +118,12 @@ begin
       end if;
 
       if rst = '1' then
-        valid         <= '0';
+        out_valid     <= '0';
         busy          <= '0';
         state.i_d     <= (others => '0');
         state.i_q_max <= (others => '0');
       end if;
     end if;
   end process;
-
-  out_valid <= valid;
 
 end architecture rtl;

@@ -56,79 +56,83 @@ package fluxproof_pkg is
   end record sample_t;
 
   type settings_t is record
-    offset_a        : unsigned(CODE_W - 1 downto 0);  -- code at zero current, phase a, left-aligned
-    offset_b        : unsigned(CODE_W - 1 downto 0);  -- code at zero current, phase b, left-aligned
-    offset_c        : unsigned(CODE_W - 1 downto 0);  -- code at zero current, phase c, left-aligned
-    gain_a          : signed(PU_W - 1 downto 0);  -- current per code, phase a
-    gain_b          : signed(PU_W - 1 downto 0);  -- current per code, phase b
-    gain_c          : signed(PU_W - 1 downto 0);  -- current per code, phase c
-    reverse         : std_logic;  -- 1: code counts opposite to the phase order
-    pole_pairs      : unsigned(5 downto 0);  -- pole pairs
-    theta_offset    : unsigned(TURN_W - 1 downto 0);  -- electrical angle at code zero
-    k_speed         : unsigned(23 downto 0);  -- speed per turn and sample
-    k_filter        : unsigned(DUTY_W - 1 downto 0);  -- filter weight of the new sample, 1 = no filter
-    u_dc_offset     : unsigned(CODE_W - 1 downto 0);  -- code at zero bus voltage, left-aligned
-    u_dc_gain       : signed(PU_W - 1 downto 0);  -- bus voltage per code
-    k_u_max         : unsigned(RECIPROCAL_W - 1 downto 0);  -- radius of the voltage circle / bus voltage
-    k_delay         : unsigned(RECIPROCAL_W - 1 downto 0);  -- angle of the delay in turns, per unit of speed
-    i_max           : signed(PU_W - 1 downto 0);  -- limit of the current: radius of the circle of i_d and i_q references
-    speed_kp        : unsigned(KP_W - 1 downto 0);  -- proportional gain
-    speed_ki        : unsigned(KI_W - 1 downto 0);  -- integral gain times sample time
-    kp_d            : unsigned(KP_W - 1 downto 0);  -- proportional gain, d axis
-    ki_d            : unsigned(KI_W - 1 downto 0);  -- integral gain times sample time, d axis
-    kp_q            : unsigned(KP_W - 1 downto 0);  -- proportional gain, q axis
-    ki_q            : unsigned(KI_W - 1 downto 0);  -- integral gain times sample time, q axis
-    r_s             : unsigned(KI_W - 1 downto 0);  -- winding resistance at t_0
-    tcr             : unsigned(23 downto 0);  -- change of r_s per kelvin
-    t_0             : signed(15 downto 0);  -- temperature of r_s
-    t_min           : signed(15 downto 0);  -- lowest valid temperature
-    t_max           : signed(15 downto 0);  -- highest valid temperature
-    t_s             : unsigned(SAMPLE_TIME_W - 1 downto 0);  -- sample time, per unit
-    flux_mode       : unsigned(1 downto 0);  -- 0: eq. (6), 1: eq. (11), 2: eq. (16), 3: eq. (17)
-    l_d             : unsigned(INDUCTANCE_W - 1 downto 0);  -- inductance, d axis
-    l_q             : unsigned(INDUCTANCE_W - 1 downto 0);  -- inductance, q axis
-    lambda_mg       : signed(PU_W - 1 downto 0);  -- magnet flux linkage
-    k_chord         : unsigned(16 downto 0);  -- (sample time)**2 / 24, per unit
-    min_pulse       : unsigned(11 downto 0);  -- shortest pulse of a leg, clocks
-    double_update   : std_logic;  -- 1: sample and update at the peak too; taken while the gates are off
-    omega_0         : unsigned(15 downto 0);  -- crossover of the two models, times the sample time
-    xi              : unsigned(15 downto 0);  -- damping of the merge
-    omega_min       : unsigned(DUTY_W - 1 downto 0);  -- no compensation up to this speed
-    k_ramp          : unsigned(15 downto 0);  -- compensation fades in over 1/k_ramp above omega_min
-    flux_kp         : unsigned(16 downto 0);  -- proportional gain of the compensation
-    flux_ki         : unsigned(RECIPROCAL_W - 1 downto 0);  -- integral gain of the compensation times the sample time
-    delta_max       : unsigned(U_MAX_W - 1 downto 0);  -- limit of the compensation
-    k_lp            : unsigned(19 downto 0);  -- weight of a new sample in the low-pass of Fig. 3
-    eta_v           : unsigned(20 downto 0);  -- step of the V_dead Adaline, 18*eta
-    gamma           : unsigned(16 downto 0);  -- proportional part of the compensation
-    zeta            : unsigned(16 downto 0);  -- gain of the minimisation per sample
-    v_thr           : unsigned(SAMPLE_TIME_W - 1 downto 0);  -- no minimisation below this |v_dead|
-    v_comp_max      : unsigned(SAMPLE_TIME_W - 1 downto 0);  -- largest leg voltage that is compensated
-    i_learn         : unsigned(DUTY_W - 1 downto 0);  -- the V_dead Adaline is held below this |i_d| + |i_q|
-    compensate      : std_logic;  -- 1: compensate dead time and drops
-    eta_psi         : unsigned(16 downto 0);  -- step of the psi_m Adaline, 2*eta per unit
-    omega_psi_min   : unsigned(DUTY_W - 1 downto 0);  -- psi_m is held below this speed
-    k_ahead         : unsigned(DUTY_W - 1 downto 0);  -- angle of 2.5 sample times in radians, per unit of speed
-    k_sign          : unsigned(23 downto 0);  -- 1 / (current above which a direction is +-1)
-    i_trip          : unsigned(LIMIT_W - 1 downto 0);  -- phase current that trips
-    sum_trip        : unsigned(LIMIT_W - 1 downto 0);  -- sum of the phase currents that trips
-    rail_samples    : unsigned(3 downto 0);  -- consecutive samples at the rail that trip
-    u_dc_min        : unsigned(LIMIT_W - 1 downto 0);  -- bus voltage below which it trips
-    u_dc_max        : unsigned(LIMIT_W - 1 downto 0);  -- bus voltage that trips
-    jump_max        : unsigned(11 downto 0);  -- deviation from the extrapolated position that trips, turns
-    fault_ignore    : unsigned(14 downto 0);  -- bit x: fault x of fault_flags is reported and does not trip
-    omega_stall     : unsigned(LIMIT_W - 1 downto 0);  -- speed below which the shaft stands
-    offset_max      : unsigned(9 downto 0);  -- mean current of a phase at rest that trips: the sensor's zero is wrong
-    omega_trip      : unsigned(LIMIT_W - 1 downto 0);  -- speed that trips, electrical
-    omega_away      : unsigned(LIMIT_W - 1 downto 0);  -- speed against the reference from which a runaway is looked for
-    runaway_samples : unsigned(11 downto 0);  -- samples in sequence against the reference without braking that trip
-    stall_samples   : unsigned(15 downto 0);  -- samples in sequence at the current limit at rest that are a stall
-    i_open          : unsigned(LIMIT_W - 1 downto 0);  -- current that a connected phase reaches when twice as much is asked for
-    brake_on        : unsigned(LIMIT_W - 1 downto 0);  -- bus voltage from which the brake resistor is on; 0: none
-    brake_off       : unsigned(LIMIT_W - 1 downto 0);  -- bus voltage below which it is off
-    watchdog        : unsigned(19 downto 0);  -- longest time without a sample, clocks
-    heartbeat       : unsigned(15 downto 0);  -- longest time without a write, sample times; 0: no limit
-    dead_time       : unsigned(11 downto 0);  -- both gates of a leg off, clocks
+    offset_a         : unsigned(CODE_W - 1 downto 0);  -- code at zero current, phase a, left-aligned
+    offset_b         : unsigned(CODE_W - 1 downto 0);  -- code at zero current, phase b, left-aligned
+    offset_c         : unsigned(CODE_W - 1 downto 0);  -- code at zero current, phase c, left-aligned
+    gain_a           : signed(PU_W - 1 downto 0);  -- current per code, phase a
+    gain_b           : signed(PU_W - 1 downto 0);  -- current per code, phase b
+    gain_c           : signed(PU_W - 1 downto 0);  -- current per code, phase c
+    two_sensors      : std_logic;  -- 1: phase a has no sensor, its current is minus the sum of the others
+    reverse          : std_logic;  -- 1: code counts opposite to the phase order
+    pole_pairs       : unsigned(5 downto 0);  -- pole pairs
+    theta_offset     : unsigned(TURN_W - 1 downto 0);  -- electrical angle at code zero
+    k_speed          : unsigned(23 downto 0);  -- speed per turn and sample
+    k_filter         : unsigned(DUTY_W - 1 downto 0);  -- filter weight of the new sample, 1 = no filter
+    position_restart : std_logic;  -- 1: the code has nothing to do with the one of the sample before
+    speed_given      : std_logic;  -- 1: the speed is omega_given, not that of the code
+    omega_given      : signed(PU_W - 1 downto 0);  -- electrical speed, measured elsewhere
+    u_dc_offset      : unsigned(CODE_W - 1 downto 0);  -- code at zero bus voltage, left-aligned
+    u_dc_gain        : signed(PU_W - 1 downto 0);  -- bus voltage per code
+    k_u_max          : unsigned(RECIPROCAL_W - 1 downto 0);  -- radius of the voltage circle / bus voltage
+    k_delay          : unsigned(RECIPROCAL_W - 1 downto 0);  -- angle of the delay in turns, per unit of speed
+    i_max            : signed(PU_W - 1 downto 0);  -- limit of the current: radius of the circle of i_d and i_q references
+    speed_kp         : unsigned(KP_W - 1 downto 0);  -- proportional gain
+    speed_ki         : unsigned(KI_W - 1 downto 0);  -- integral gain times sample time
+    kp_d             : unsigned(KP_W - 1 downto 0);  -- proportional gain, d axis
+    ki_d             : unsigned(KI_W - 1 downto 0);  -- integral gain times sample time, d axis
+    kp_q             : unsigned(KP_W - 1 downto 0);  -- proportional gain, q axis
+    ki_q             : unsigned(KI_W - 1 downto 0);  -- integral gain times sample time, q axis
+    r_s              : unsigned(KI_W - 1 downto 0);  -- winding resistance at t_0
+    tcr              : unsigned(23 downto 0);  -- change of r_s per kelvin
+    t_0              : signed(15 downto 0);  -- temperature of r_s
+    t_min            : signed(15 downto 0);  -- lowest valid temperature
+    t_max            : signed(15 downto 0);  -- highest valid temperature
+    t_s              : unsigned(SAMPLE_TIME_W - 1 downto 0);  -- sample time, per unit
+    flux_mode        : unsigned(1 downto 0);  -- 0: eq. (6), 1: eq. (11), 2: eq. (16), 3: eq. (17)
+    l_d              : unsigned(INDUCTANCE_W - 1 downto 0);  -- inductance, d axis
+    l_q              : unsigned(INDUCTANCE_W - 1 downto 0);  -- inductance, q axis
+    lambda_mg        : signed(PU_W - 1 downto 0);  -- magnet flux linkage
+    k_chord          : unsigned(16 downto 0);  -- (sample time)**2 / 24, per unit
+    min_pulse        : unsigned(11 downto 0);  -- shortest pulse of a leg, clocks
+    double_update    : std_logic;  -- 1: sample and update at the peak too; taken while the gates are off
+    omega_0          : unsigned(15 downto 0);  -- crossover of the two models, times the sample time
+    xi               : unsigned(15 downto 0);  -- damping of the merge
+    omega_min        : unsigned(DUTY_W - 1 downto 0);  -- no compensation up to this speed
+    k_ramp           : unsigned(15 downto 0);  -- compensation fades in over 1/k_ramp above omega_min
+    flux_kp          : unsigned(16 downto 0);  -- proportional gain of the compensation
+    flux_ki          : unsigned(RECIPROCAL_W - 1 downto 0);  -- integral gain of the compensation times the sample time
+    delta_max        : unsigned(U_MAX_W - 1 downto 0);  -- limit of the compensation
+    k_lp             : unsigned(19 downto 0);  -- weight of a new sample in the low-pass of Fig. 3
+    eta_v            : unsigned(20 downto 0);  -- step of the V_dead Adaline, 18*eta
+    gamma            : unsigned(16 downto 0);  -- proportional part of the compensation
+    zeta             : unsigned(16 downto 0);  -- gain of the minimisation per sample
+    v_thr            : unsigned(SAMPLE_TIME_W - 1 downto 0);  -- no minimisation below this |v_dead|
+    v_comp_max       : unsigned(SAMPLE_TIME_W - 1 downto 0);  -- largest leg voltage that is compensated
+    i_learn          : unsigned(DUTY_W - 1 downto 0);  -- the V_dead Adaline is held below this |i_d| + |i_q|
+    compensate       : std_logic;  -- 1: compensate dead time and drops
+    eta_psi          : unsigned(16 downto 0);  -- step of the psi_m Adaline, 2*eta per unit
+    omega_psi_min    : unsigned(DUTY_W - 1 downto 0);  -- psi_m is held below this speed
+    k_ahead          : unsigned(DUTY_W - 1 downto 0);  -- angle of 2.5 sample times in radians, per unit of speed
+    k_sign           : unsigned(23 downto 0);  -- 1 / (current above which a direction is +-1)
+    i_trip           : unsigned(LIMIT_W - 1 downto 0);  -- phase current that trips
+    sum_trip         : unsigned(LIMIT_W - 1 downto 0);  -- sum of the phase currents that trips
+    rail_samples     : unsigned(3 downto 0);  -- consecutive samples at the rail that trip
+    u_dc_min         : unsigned(LIMIT_W - 1 downto 0);  -- bus voltage below which it trips
+    u_dc_max         : unsigned(LIMIT_W - 1 downto 0);  -- bus voltage that trips
+    jump_max         : unsigned(11 downto 0);  -- deviation from the extrapolated position that trips, turns
+    fault_ignore     : unsigned(14 downto 0);  -- bit x: fault x of fault_flags is reported and does not trip
+    omega_stall      : unsigned(LIMIT_W - 1 downto 0);  -- speed below which the shaft stands
+    offset_max       : unsigned(9 downto 0);  -- mean current of a phase at rest that trips: the sensor's zero is wrong
+    omega_trip       : unsigned(LIMIT_W - 1 downto 0);  -- speed that trips, electrical
+    omega_away       : unsigned(LIMIT_W - 1 downto 0);  -- speed against the reference from which a runaway is looked for
+    runaway_samples  : unsigned(11 downto 0);  -- samples in sequence against the reference without braking that trip
+    stall_samples    : unsigned(15 downto 0);  -- samples in sequence at the current limit at rest that are a stall
+    i_open           : unsigned(LIMIT_W - 1 downto 0);  -- current that a connected phase reaches when twice as much is asked for
+    brake_on         : unsigned(LIMIT_W - 1 downto 0);  -- bus voltage from which the brake resistor is on; 0: none
+    brake_off        : unsigned(LIMIT_W - 1 downto 0);  -- bus voltage below which it is off
+    watchdog         : unsigned(19 downto 0);  -- longest time without a sample, clocks
+    heartbeat        : unsigned(15 downto 0);  -- longest time without a write, sample times; 0: no limit
+    dead_time        : unsigned(11 downto 0);  -- both gates of a leg off, clocks
   end record settings_t;
 
   type observed_t is record
@@ -821,5 +825,34 @@ package fluxproof_pkg is
   -- position_bridge: none: absolute encoders
   constant POSITION_BRIDGE_LATENCY : positive := 1;
   constant POSITION_BRIDGE_DROP : natural := 16;
+
+  -- serial_encoder: none: absolute encoders
+  constant SERIAL_ENCODER_LATENCY : positive := 1;
+
+  -- hall_front: none: three Hall sensors, 120 degrees apart
+  constant HALL_FRONT_LATENCY : positive := 1;
+
+  -- position_front: none: front end of a board
+  constant POSITION_FRONT_LATENCY : positive := 1;
+
+  -- delta_sigma: none: front end of a board
+  constant DELTA_SIGMA_LATENCY : positive := 1;
+
+  -- current_front: none: front end of a board
+  constant CURRENT_FRONT_LATENCY : positive := 1;
+
+  -- forced_position: none: commissioning
+  constant FORCED_POSITION_LATENCY : positive := 1;
+  constant FORCED_POSITION_PLACE_W : natural := 32;
+  constant FORCED_POSITION_SHIFT : natural := 14;
+
+  -- sample_join: none: front end of a board
+  constant SAMPLE_JOIN_LATENCY : positive := 1;
+
+  -- board_faults: none: protection and diagnosis of the drive
+  constant BOARD_FAULTS_LATENCY : positive := 1;
+
+  -- board_snapshot: none: commissioning
+  constant BOARD_SNAPSHOT_LATENCY : positive := 1;
 
 end package fluxproof_pkg;

@@ -76,12 +76,15 @@ entity register_file is
 end entity register_file;
 
 architecture rtl of register_file is
-  type words_t is array (0 to 2**REGISTER_WORD_W - 1) of std_logic_vector(31 downto 0);
-  type fours_t is array (0 to 2**(REGISTER_WORD_W - 2) - 1) of std_logic_vector(31 downto 0);
-  type sixteens_t is array (0 to 2**(REGISTER_WORD_W - 4) - 1) of std_logic_vector(31 downto 0);
-  type copy_t is array (0 to 2**(REGISTER_WORD_W - 1) - 1) of std_logic_vector(REGISTER_LIMIT_W - 1 downto 0);
+  constant WORD_W  : positive := 8;  -- registers are in the first 2**WORD_W words
+  constant LIMIT_W : positive := 25;  -- every register's range fits so many bits
 
-  constant HALF : positive := 2**(REGISTER_WORD_W - 1);
+  type words_t is array (0 to 2**WORD_W - 1) of std_logic_vector(31 downto 0);
+  type fours_t is array (0 to 2**(WORD_W - 2) - 1) of std_logic_vector(31 downto 0);
+  type sixteens_t is array (0 to 2**(WORD_W - 4) - 1) of std_logic_vector(31 downto 0);
+  type copy_t is array (0 to 2**(WORD_W - 1) - 1) of std_logic_vector(LIMIT_W - 1 downto 0);
+
+  constant HALF : positive := 2**(WORD_W - 1);
 
   signal request   : std_logic;
   signal write     : std_logic;
@@ -95,7 +98,7 @@ architecture rtl of register_file is
   signal response  : std_logic_vector(1 downto 0);
   signal found     : std_logic;
   signal read_data : std_logic_vector(31 downto 0);
-  signal word      : natural range 0 to 2**REGISTER_WORD_W - 1;
+  signal word      : natural range 0 to 2**WORD_W - 1;
   signal shown     : words_t;
   signal words     : words_t;
   signal copy_low  : copy_t;
@@ -104,11 +107,11 @@ architecture rtl of register_file is
   attribute ram_style of copy_low  : signal is "distributed";
   attribute ram_style of copy_high : signal is "distributed";
 
-  signal written : std_logic_vector(0 to 2**REGISTER_WORD_W - 1);
+  signal written : std_logic_vector(0 to 2**WORD_W - 1);
 
   -- The address of a write, partly decoded: a register is selected by its row and its column
-  signal row_at : std_logic_vector(0 to 2**(REGISTER_WORD_W - 3) - 1);
-  signal row    : std_logic_vector(0 to 2**(REGISTER_WORD_W - 3) - 1);
+  signal row_at : std_logic_vector(0 to 2**(WORD_W - 3) - 1);
+  signal row    : std_logic_vector(0 to 2**(WORD_W - 3) - 1);
   signal column : std_logic_vector(0 to 7);
   signal held   : std_logic_vector(31 downto 0);
 
@@ -116,15 +119,15 @@ architecture rtl of register_file is
   signal was_busy            : std_logic;
   signal was_clear_faults_in : std_logic;
 
-  signal word_1             : natural range 0 to 2**REGISTER_WORD_W - 1;
-  signal copied_low_1       : std_logic_vector(REGISTER_LIMIT_W - 1 downto 0);
-  signal copied_high_1      : std_logic_vector(REGISTER_LIMIT_W - 1 downto 0);
+  signal word_1             : natural range 0 to 2**WORD_W - 1;
+  signal copied_low_1       : std_logic_vector(LIMIT_W - 1 downto 0);
+  signal copied_high_1      : std_logic_vector(LIMIT_W - 1 downto 0);
   signal is_signed_1        : std_logic;
   signal picked_fours_1     : fours_t;
-  signal written_fours_1    : std_logic_vector(0 to 2**(REGISTER_WORD_W - 2) - 1);
+  signal written_fours_1    : std_logic_vector(0 to 2**(WORD_W - 2) - 1);
   signal picked_sixteens_2  : sixteens_t;
-  signal written_sixteens_2 : std_logic_vector(0 to 2**(REGISTER_WORD_W - 4) - 1);
-  signal copied_2           : std_logic_vector(REGISTER_LIMIT_W - 1 downto 0);
+  signal written_sixteens_2 : std_logic_vector(0 to 2**(WORD_W - 4) - 1);
+  signal copied_2           : std_logic_vector(LIMIT_W - 1 downto 0);
   signal picked_3           : std_logic_vector(31 downto 0);
   signal is_written_3       : std_logic;
 begin
@@ -164,6 +167,10 @@ begin
     );
 
   decision : entity work.register_access
+    generic map (
+      WORD_BITS  => WORD_W,
+      LIMIT_BITS => LIMIT_W
+    )
     port map (
       clk         => clk,
       rst         => rst,
@@ -182,7 +189,7 @@ begin
 
   host_write <= stored;
 
-  word <= to_integer(address(REGISTER_WORD_W + 1 downto 2));
+  word <= to_integer(address(WORD_W + 1 downto 2));
 
   process (clk)
   begin
@@ -239,6 +246,18 @@ begin
       end if;
       if (row(3) and column(3)) = '1' then
         irq_clear <= unsigned(held(3 downto 0));
+      end if;
+      if (row(3) and column(4) and not sample_busy) = '1' then
+        settings.omega_given <= signed(held(17 downto 0));
+        written(28)          <= '1';
+      end if;
+      if (row(3) and column(5) and not sample_busy) = '1' then
+        settings.speed_given <= held(0);
+        written(29)          <= '1';
+      end if;
+      if (row(3) and column(6) and not sample_busy) = '1' then
+        settings.position_restart <= held(0);
+        written(30)               <= '1';
       end if;
       if (row(8) and column(0) and not sample_busy) = '1' then
         settings.offset_a <= unsigned(held(15 downto 0));
@@ -315,6 +334,10 @@ begin
       if (row(10) and column(2) and not sample_busy) = '1' then
         settings.i_max <= signed(held(17 downto 0));
         written(82)    <= '1';
+      end if;
+      if (row(10) and column(3) and not sample_busy) = '1' then
+        settings.two_sensors <= held(0);
+        written(83)          <= '1';
       end if;
       if (row(10) and column(4) and not sample_busy) = '1' then
         settings.kp_d <= unsigned(held(23 downto 0));
@@ -534,92 +557,96 @@ begin
       end if;
 
       if rst = '1' then
-        written                  <= (others => '0');
-        enable                   <= '0';
-        clear_trip               <= '0';
-        clear_faults_in          <= '0';
-        telemetry_enable         <= '0';
-        omega_ref_in             <= (others => '0');
-        i_d_ref_in               <= (others => '0');
-        i_q_ext_in               <= (others => '0');
-        speed_mode_in            <= '0';
-        temp_winding_in          <= (others => '0');
-        temp_valid_in            <= '0';
-        irq_mask                 <= (others => '0');
-        irq_clear                <= (others => '0');
-        settings.offset_a        <= (others => '0');
-        settings.offset_b        <= (others => '0');
-        settings.offset_c        <= (others => '0');
-        settings.gain_a          <= (others => '0');
-        settings.gain_b          <= (others => '0');
-        settings.gain_c          <= (others => '0');
-        settings.u_dc_offset     <= (others => '0');
-        settings.u_dc_gain       <= (others => '0');
-        settings.k_u_max         <= (others => '0');
-        settings.pole_pairs      <= to_unsigned(1, 6);
-        settings.reverse         <= '0';
-        settings.theta_offset    <= (others => '0');
-        settings.k_speed         <= (others => '0');
-        settings.k_filter        <= (others => '0');
-        settings.rail_samples    <= (others => '0');
-        settings.jump_max        <= (others => '0');
-        settings.speed_kp        <= (others => '0');
-        settings.speed_ki        <= (others => '0');
-        settings.i_max           <= (others => '0');
-        settings.kp_d            <= (others => '0');
-        settings.ki_d            <= (others => '0');
-        settings.kp_q            <= (others => '0');
-        settings.ki_q            <= (others => '0');
-        settings.l_d             <= (others => '0');
-        settings.l_q             <= (others => '0');
-        settings.lambda_mg       <= (others => '0');
-        settings.k_delay         <= (others => '0');
-        settings.dead_time       <= (others => '0');
-        settings.min_pulse       <= (others => '0');
-        settings.watchdog        <= (others => '0');
-        settings.fault_ignore    <= (others => '0');
-        settings.flux_mode       <= (others => '0');
-        settings.r_s             <= (others => '0');
-        settings.t_s             <= (others => '0');
-        settings.omega_0         <= to_unsigned(256, 16);
-        settings.xi              <= to_unsigned(4096, 16);
-        settings.omega_min       <= (others => '0');
-        settings.k_ramp          <= (others => '0');
-        settings.flux_kp         <= (others => '0');
-        settings.flux_ki         <= (others => '0');
-        settings.delta_max       <= (others => '0');
-        settings.k_chord         <= (others => '0');
-        settings.tcr             <= (others => '0');
-        settings.t_0             <= (others => '0');
-        settings.t_min           <= (others => '0');
-        settings.t_max           <= (others => '0');
-        settings.compensate      <= '0';
-        settings.k_lp            <= (others => '0');
-        settings.eta_v           <= (others => '0');
-        settings.gamma           <= (others => '0');
-        settings.zeta            <= (others => '0');
-        settings.v_thr           <= (others => '0');
-        settings.v_comp_max      <= (others => '0');
-        settings.i_learn         <= (others => '0');
-        settings.eta_psi         <= (others => '0');
-        settings.omega_psi_min   <= (others => '0');
-        settings.k_ahead         <= (others => '0');
-        settings.k_sign          <= (others => '0');
-        settings.i_trip          <= (others => '0');
-        settings.sum_trip        <= (others => '0');
-        settings.u_dc_min        <= (others => '0');
-        settings.u_dc_max        <= (others => '0');
-        settings.omega_trip      <= (others => '0');
-        settings.omega_away      <= (others => '0');
-        settings.runaway_samples <= (others => '0');
-        settings.omega_stall     <= (others => '0');
-        settings.stall_samples   <= (others => '0');
-        settings.i_open          <= (others => '0');
-        settings.offset_max      <= (others => '0');
-        settings.heartbeat       <= (others => '0');
-        settings.brake_on        <= (others => '0');
-        settings.brake_off       <= (others => '0');
-        settings.double_update   <= '0';
+        written                   <= (others => '0');
+        enable                    <= '0';
+        clear_trip                <= '0';
+        clear_faults_in           <= '0';
+        telemetry_enable          <= '0';
+        omega_ref_in              <= (others => '0');
+        i_d_ref_in                <= (others => '0');
+        i_q_ext_in                <= (others => '0');
+        speed_mode_in             <= '0';
+        temp_winding_in           <= (others => '0');
+        temp_valid_in             <= '0';
+        irq_mask                  <= (others => '0');
+        irq_clear                 <= (others => '0');
+        settings.omega_given      <= (others => '0');
+        settings.speed_given      <= '0';
+        settings.position_restart <= '0';
+        settings.offset_a         <= (others => '0');
+        settings.offset_b         <= (others => '0');
+        settings.offset_c         <= (others => '0');
+        settings.gain_a           <= (others => '0');
+        settings.gain_b           <= (others => '0');
+        settings.gain_c           <= (others => '0');
+        settings.u_dc_offset      <= (others => '0');
+        settings.u_dc_gain        <= (others => '0');
+        settings.k_u_max          <= (others => '0');
+        settings.pole_pairs       <= to_unsigned(1, 6);
+        settings.reverse          <= '0';
+        settings.theta_offset     <= (others => '0');
+        settings.k_speed          <= (others => '0');
+        settings.k_filter         <= (others => '0');
+        settings.rail_samples     <= (others => '0');
+        settings.jump_max         <= (others => '0');
+        settings.speed_kp         <= (others => '0');
+        settings.speed_ki         <= (others => '0');
+        settings.i_max            <= (others => '0');
+        settings.two_sensors      <= '0';
+        settings.kp_d             <= (others => '0');
+        settings.ki_d             <= (others => '0');
+        settings.kp_q             <= (others => '0');
+        settings.ki_q             <= (others => '0');
+        settings.l_d              <= (others => '0');
+        settings.l_q              <= (others => '0');
+        settings.lambda_mg        <= (others => '0');
+        settings.k_delay          <= (others => '0');
+        settings.dead_time        <= (others => '0');
+        settings.min_pulse        <= (others => '0');
+        settings.watchdog         <= (others => '0');
+        settings.fault_ignore     <= (others => '0');
+        settings.flux_mode        <= (others => '0');
+        settings.r_s              <= (others => '0');
+        settings.t_s              <= (others => '0');
+        settings.omega_0          <= to_unsigned(256, 16);
+        settings.xi               <= to_unsigned(4096, 16);
+        settings.omega_min        <= (others => '0');
+        settings.k_ramp           <= (others => '0');
+        settings.flux_kp          <= (others => '0');
+        settings.flux_ki          <= (others => '0');
+        settings.delta_max        <= (others => '0');
+        settings.k_chord          <= (others => '0');
+        settings.tcr              <= (others => '0');
+        settings.t_0              <= (others => '0');
+        settings.t_min            <= (others => '0');
+        settings.t_max            <= (others => '0');
+        settings.compensate       <= '0';
+        settings.k_lp             <= (others => '0');
+        settings.eta_v            <= (others => '0');
+        settings.gamma            <= (others => '0');
+        settings.zeta             <= (others => '0');
+        settings.v_thr            <= (others => '0');
+        settings.v_comp_max       <= (others => '0');
+        settings.i_learn          <= (others => '0');
+        settings.eta_psi          <= (others => '0');
+        settings.omega_psi_min    <= (others => '0');
+        settings.k_ahead          <= (others => '0');
+        settings.k_sign           <= (others => '0');
+        settings.i_trip           <= (others => '0');
+        settings.sum_trip         <= (others => '0');
+        settings.u_dc_min         <= (others => '0');
+        settings.u_dc_max         <= (others => '0');
+        settings.omega_trip       <= (others => '0');
+        settings.omega_away       <= (others => '0');
+        settings.runaway_samples  <= (others => '0');
+        settings.omega_stall      <= (others => '0');
+        settings.stall_samples    <= (others => '0');
+        settings.i_open           <= (others => '0');
+        settings.offset_max       <= (others => '0');
+        settings.heartbeat        <= (others => '0');
+        settings.brake_on         <= (others => '0');
+        settings.brake_off        <= (others => '0');
+        settings.double_update    <= '0';
       end if;
     end if;
   end process;
@@ -640,10 +667,10 @@ begin
     if rising_edge(clk) then
       stored <= store;
       if stored = '1' and word_1 < HALF then
-        copy_low(word_1 mod HALF) <= data(REGISTER_LIMIT_W - 1 downto 0);
+        copy_low(word_1 mod HALF) <= data(LIMIT_W - 1 downto 0);
       end if;
       if stored = '1' and word_1 >= HALF then
-        copy_high(word_1 mod HALF) <= data(REGISTER_LIMIT_W - 1 downto 0);
+        copy_high(word_1 mod HALF) <= data(LIMIT_W - 1 downto 0);
       end if;
     end if;
   end process;
@@ -680,15 +707,39 @@ begin
       copied_high_1 <= copy_high(word mod HALF);
       is_signed_1   <= register_signed_of(to_unsigned(word, REGISTER_WORD_W));
       for k in fours_t'range loop
-        picked_fours_1(k)  <= words(4 * k + word mod 4);
-        written_fours_1(k) <= written(4 * k + word mod 4);
+        case word mod 4 is
+          when 0 =>
+            picked_fours_1(k)  <= words(4 * k + 0);
+            written_fours_1(k) <= written(4 * k + 0);
+          when 1 =>
+            picked_fours_1(k)  <= words(4 * k + 1);
+            written_fours_1(k) <= written(4 * k + 1);
+          when 2 =>
+            picked_fours_1(k)  <= words(4 * k + 2);
+            written_fours_1(k) <= written(4 * k + 2);
+          when others =>
+            picked_fours_1(k)  <= words(4 * k + 3);
+            written_fours_1(k) <= written(4 * k + 3);
+        end case;
       end loop;
 
       -- Stage 2: select one of each sixteen words
       copied_2 <= copied_high_1 when word_1 >= HALF else copied_low_1;
       for k in sixteens_t'range loop
-        picked_sixteens_2(k)  <= picked_fours_1(4 * k + word_1 / 4 mod 4);
-        written_sixteens_2(k) <= written_fours_1(4 * k + word_1 / 4 mod 4);
+        case word_1 / 4 mod 4 is
+          when 0 =>
+            picked_sixteens_2(k)  <= picked_fours_1(4 * k + 0);
+            written_sixteens_2(k) <= written_fours_1(4 * k + 0);
+          when 1 =>
+            picked_sixteens_2(k)  <= picked_fours_1(4 * k + 1);
+            written_sixteens_2(k) <= written_fours_1(4 * k + 1);
+          when 2 =>
+            picked_sixteens_2(k)  <= picked_fours_1(4 * k + 2);
+            written_sixteens_2(k) <= written_fours_1(4 * k + 2);
+          when others =>
+            picked_sixteens_2(k)  <= picked_fours_1(4 * k + 3);
+            written_sixteens_2(k) <= written_fours_1(4 * k + 3);
+        end case;
       end loop;
 
       -- Stage 3: select one of these

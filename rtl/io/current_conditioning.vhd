@@ -3,6 +3,7 @@
 -- Formats: code of ADC_BITS, left-aligned in CODE U(1,15); gain S(1,16); current PU.
 -- Latency: 5 (i_b and i_c are valid with out_soon).  Interval: 3.
 -- Rounding: 31 fraction bits half up to 16, saturated at 2 per unit; a sensor scaled to its base does not reach it.
+-- With two_sensors phase a has none: i_a = -(i_b + i_c), saturated at 2 per unit, and its rail flag is 0.
 -- A product is below 4 per unit, so two bits show whether it fits.
 
 library ieee;
@@ -28,6 +29,7 @@ entity current_conditioning is
     gain_a          : in  signed(GAIN_W - 1 downto 0);
     gain_b          : in  signed(GAIN_W - 1 downto 0);
     gain_c          : in  signed(GAIN_W - 1 downto 0);
+    two_sensors     : in  std_logic;
     out_soon        : out std_logic;
     out_valid       : out std_logic;
     i_a             : out signed(PU_W - 1 downto 0);
@@ -51,6 +53,7 @@ architecture rtl of current_conditioning is
   signal prod_2   : signed(CODE_W + GAIN_W downto 0);
   signal rail_2   : std_logic;
   signal i_2      : signed(PU_W - 1 downto 0);
+  signal third_4  : signed(PU_W - 1 downto 0);
 
   function left_aligned (code : unsigned) return unsigned is
   begin
@@ -72,6 +75,8 @@ begin
 
   i_2 <= round_sat(prod_2(SUM_W - 1 downto 0), CURRENT_CONDITIONING_DROP, PU_W);
 
+  third_4 <= saturate(difference(-resize(i_b, PU_W + 1), i_c), PU_W);
+
   process (clk)
   begin
     if rising_edge(clk) then
@@ -86,7 +91,7 @@ begin
       prod_2 <= diff_1 * gain_1;
       rail_2 <= rail_1;
 
-      -- Stages 3, 4, 5: i_b, i_c, i_a = prod, narrowed
+      -- Stages 3, 4, 5: i_b, i_c, i_a = prod, narrowed;  or i_a = -(i_b + i_c)
       if valid(2) = '1' then
         i_b                <= i_2;
         current_at_rail(1) <= rail_2;
@@ -96,8 +101,8 @@ begin
         current_at_rail(2) <= rail_2;
       end if;
       if valid(4) = '1' then
-        i_a                <= i_2;
-        current_at_rail(0) <= rail_2;
+        i_a                <= third_4 when two_sensors = '1' else i_2;
+        current_at_rail(0) <= rail_2 and not two_sensors;
       end if;
 
       if rst = '1' then

@@ -80,7 +80,7 @@ begin
               u_dc_at_rail => u_dc_at_rail, code_theta => code_theta,
               i_trip => settings.i_trip, sum_trip => settings.sum_trip, rail_samples => settings.rail_samples,
               u_dc_min => settings.u_dc_min, u_dc_max => settings.u_dc_max, jump_max => settings.jump_max,
-              fault_ignore => settings.fault_ignore,
+              fault_ignore => settings.fault_ignore, position_restart => settings.position_restart,
               out_valid => open, sample_faults => sample_faults, sample_trip => sample_trip);
 
   zero_check : entity work.offset_check

@@ -19,6 +19,10 @@ use work.fluxproof_pkg.all;
 use work.register_map_pkg.all;
 
 entity register_access is
+  generic (
+    WORD_BITS  : positive range 5 to REGISTER_WORD_W  := REGISTER_WORD_W;  -- registers in the first 2**WORD_BITS words
+    LIMIT_BITS : positive range 2 to REGISTER_LIMIT_W := REGISTER_LIMIT_W  -- their ranges fit so many bits
+  );
   port (
     clk         : in  std_logic;
     rst         : in  std_logic;
@@ -41,11 +45,11 @@ architecture rtl of register_access is
   constant SLVERR : std_logic_vector(1 downto 0) := "10";
   constant DECERR : std_logic_vector(1 downto 0) := "11";
 
-  signal word   : unsigned(REGISTER_WORD_W - 1 downto 0);
-  signal number : signed(REGISTER_LIMIT_W - 1 downto 0);
+  signal word   : unsigned(WORD_BITS - 1 downto 0);
+  signal number : signed(LIMIT_BITS - 1 downto 0);
 
-  type accesses_t is array (0 to 2**(REGISTER_WORD_W - 4) - 1) of unsigned(1 downto 0);
-  type ranges_t is array (0 to 2**(REGISTER_WORD_W - 4) - 1) of unsigned(REGISTER_RANGE_W - 1 downto 0);
+  type accesses_t is array (0 to 2**(WORD_BITS - 4) - 1) of unsigned(1 downto 0);
+  type ranges_t is array (0 to 2**(WORD_BITS - 4) - 1) of unsigned(REGISTER_RANGE_W - 1 downto 0);
 
   signal begun      : std_logic;
   signal valid      : std_logic_vector(1 to 4);
@@ -57,8 +61,8 @@ architecture rtl of register_access is
   signal range_2    : unsigned(REGISTER_RANGE_W - 1 downto 0);
   signal writable_3 : std_logic;
   signal between_3  : std_logic;
-  signal low_3      : signed(REGISTER_LIMIT_W - 1 downto 0);
-  signal high_3     : signed(REGISTER_LIMIT_W - 1 downto 0);
+  signal low_3      : signed(LIMIT_BITS - 1 downto 0);
+  signal high_3     : signed(LIMIT_BITS - 1 downto 0);
   signal over_4     : std_logic;
   signal under_4    : std_logic;
   signal allowed_4  : std_logic;
@@ -72,15 +76,15 @@ architecture rtl of register_access is
   signal in_time    : std_logic;
 
   -- a < b, only the sign of the difference: nothing precedes or follows the carry chain
-  function below (a, b : signed(REGISTER_LIMIT_W - 1 downto 0)) return std_logic is
-    variable difference : signed(REGISTER_LIMIT_W downto 0);
+  function below (a, b : signed(LIMIT_BITS - 1 downto 0)) return std_logic is
+    variable difference : signed(LIMIT_BITS downto 0);
   begin
-    difference := resize(a, REGISTER_LIMIT_W + 1) - resize(b, REGISTER_LIMIT_W + 1);
-    return difference(REGISTER_LIMIT_W);
+    difference := resize(a, LIMIT_BITS + 1) - resize(b, LIMIT_BITS + 1);
+    return difference(LIMIT_BITS);
   end function;
 begin
-  word   <= address(REGISTER_WORD_W + 1 downto 2);
-  number <= signed(data(REGISTER_LIMIT_W - 1 downto 0));
+  word   <= address(WORD_BITS + 1 downto 2);
+  number <= signed(data(LIMIT_BITS - 1 downto 0));
 
   allowed_4 <= valid(4) and writable_3 and not (over_4 or under_4);
   waits_5   <= patient_5 and sample_busy and in_time;
@@ -98,11 +102,11 @@ begin
       -- Stage 1: the table entry of each group of 16 words;  inside = the address is aligned and within the map;
       -- fits = all strobes set, and data within the width of the limits
       for k in ranges_t'range loop
-        accesses_1(k) <= register_access_of(to_unsigned(k, REGISTER_WORD_W - 4) & word(3 downto 0));
-        ranges_1(k)   <= register_range_of(to_unsigned(k, REGISTER_WORD_W - 4) & word(3 downto 0));
+        accesses_1(k) <= register_access_of(resize(to_unsigned(k, WORD_BITS - 4) & word(3 downto 0), REGISTER_WORD_W));
+        ranges_1(k)   <= register_range_of(resize(to_unsigned(k, WORD_BITS - 4) & word(3 downto 0), REGISTER_WORD_W));
       end loop;
       inside_1 <= '0';
-      if address(1 downto 0) = 0 and shift_right(address, REGISTER_WORD_W + 2) = 0 then
+      if address(1 downto 0) = 0 and shift_right(address, WORD_BITS + 2) = 0 then
         inside_1 <= '1';
       end if;
       fits_1 <= '0';
@@ -111,8 +115,8 @@ begin
       end if;
 
       -- Stage 2: selection of the group
-      access_2 <= accesses_1(to_integer(word(REGISTER_WORD_W - 1 downto 4)));
-      range_2  <= ranges_1(to_integer(word(REGISTER_WORD_W - 1 downto 4)));
+      access_2 <= accesses_1(to_integer(word(WORD_BITS - 1 downto 4)));
+      range_2  <= ranges_1(to_integer(word(WORD_BITS - 1 downto 4)));
 
       -- Stage 3: found = a register at the address; writable = software may write it, and the data fit
       found      <= '0';
@@ -127,8 +131,8 @@ begin
       if access_2 = REGISTER_BETWEEN then
         between_3 <= '1';
       end if;
-      low_3  <= register_low_of(range_2);
-      high_3 <= register_high_of(range_2);
+      low_3  <= resize(register_low_of(range_2), LIMIT_BITS);
+      high_3 <= resize(register_high_of(range_2), LIMIT_BITS);
 
       -- Stage 4: allowed = writable and low <= data <= high
       under_4 <= below(number, low_3);

@@ -4,7 +4,8 @@
 --   2  at the rail    a code at its end in rail_samples consecutive samples
 --   3  bus low        u_dc < u_dc_min
 --   4  bus high       u_dc >= u_dc_max
---   5  position       |code - (2*code' - code'')| >= jump_max, from the third sample after a reset on
+--   5  position       |code - (2*code' - code'')| >= jump_max, from the third sample after a reset on; a sample with
+--                     position_restart is the first one again
 -- sample_trip: at least one fault that fault_ignore does not mask.
 -- Formats: limits U(1,8), jump_max U(-1,13), codes in 1/2**18 turn, differences as the shorter angle.
 -- Latency: 4.  Interval: 3.  Rounding: values are cut (floor) to the limits' formats; |x| is the one's complement where
@@ -22,26 +23,27 @@ entity sample_checks is
     POSITION_BITS : positive range 8 to 18 := 16
   );
   port (
-    clk             : in  std_logic;
-    rst             : in  std_logic;
-    in_valid        : in  std_logic;
-    i_a             : in  signed(PU_W - 1 downto 0);
-    i_b             : in  signed(PU_W - 1 downto 0);
-    i_c             : in  signed(PU_W - 1 downto 0);
-    current_at_rail : in  unsigned(2 downto 0);
-    u_dc            : in  unsigned(DUTY_W - 1 downto 0);
-    u_dc_at_rail    : in  std_logic;
-    code_theta      : in  unsigned(POSITION_BITS - 1 downto 0);
-    i_trip          : in  unsigned(LIMIT_W - 1 downto 0);
-    sum_trip        : in  unsigned(LIMIT_W - 1 downto 0);
-    rail_samples    : in  unsigned(3 downto 0);
-    u_dc_min        : in  unsigned(LIMIT_W - 1 downto 0);
-    u_dc_max        : in  unsigned(LIMIT_W - 1 downto 0);
-    jump_max        : in  unsigned(11 downto 0);
-    fault_ignore    : in  unsigned(14 downto 0);
-    out_valid       : out std_logic;
-    sample_faults   : out unsigned(5 downto 0);
-    sample_trip     : out std_logic
+    clk              : in  std_logic;
+    rst              : in  std_logic;
+    in_valid         : in  std_logic;
+    i_a              : in  signed(PU_W - 1 downto 0);
+    i_b              : in  signed(PU_W - 1 downto 0);
+    i_c              : in  signed(PU_W - 1 downto 0);
+    current_at_rail  : in  unsigned(2 downto 0);
+    u_dc             : in  unsigned(DUTY_W - 1 downto 0);
+    u_dc_at_rail     : in  std_logic;
+    code_theta       : in  unsigned(POSITION_BITS - 1 downto 0);
+    i_trip           : in  unsigned(LIMIT_W - 1 downto 0);
+    sum_trip         : in  unsigned(LIMIT_W - 1 downto 0);
+    rail_samples     : in  unsigned(3 downto 0);
+    u_dc_min         : in  unsigned(LIMIT_W - 1 downto 0);
+    u_dc_max         : in  unsigned(LIMIT_W - 1 downto 0);
+    jump_max         : in  unsigned(11 downto 0);
+    fault_ignore     : in  unsigned(14 downto 0);
+    position_restart : in  std_logic;
+    out_valid        : out std_logic;
+    sample_faults    : out unsigned(5 downto 0);
+    sample_trip      : out std_logic
   );
 end entity sample_checks;
 
@@ -130,10 +132,12 @@ begin
         pair_1         <= resize(a_0, LIMIT_W + 3) + b_0;
         at_rail_1      <= at_rail_0;
         away_1         <= signed(code_0 - state.expected);
-        known_1        <= '1' when state.seen = SAMPLE_CHECKS_WARM else '0';
+        known_1        <= '1' when state.seen = SAMPLE_CHECKS_WARM and position_restart = '0' else '0';
         state.code     <= code_0;
         state.expected <= shift_left(code_0, 1) - state.code;
-        if state.seen /= SAMPLE_CHECKS_WARM then
+        if position_restart = '1' then
+          state.seen <= to_unsigned(1, 2);
+        elsif state.seen /= SAMPLE_CHECKS_WARM then
           state.seen <= state.seen + 1;
         end if;
       end if;

@@ -5,7 +5,9 @@
 -- Latency: 7.  Interval: 4 (the state is read from stage 3 on and written at stage 7).
 -- Rounding: half up; raw saturates at 2 per unit.  omega moves towards raw by at most their distance, so it stays within
 -- half an LSB of PU of the range of raw, and omega_me within that range.
--- The first sample after reset has no predecessor: its difference is zero.
+-- The first sample after reset has no predecessor: its difference is zero.  A sample with position_restart has none
+-- either, and the filter keeps its speed.  With speed_given the speed is omega_given, measured elsewhere; the filter
+-- goes on behind it.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -18,15 +20,18 @@ entity speed is
     POSITION_BITS : positive range 8 to 18 := 16
   );
   port (
-    clk        : in  std_logic;
-    rst        : in  std_logic;
-    in_valid   : in  std_logic;
-    code_theta : in  unsigned(POSITION_BITS - 1 downto 0);
-    reverse    : in  std_logic;
-    k_speed    : in  unsigned(23 downto 0);
-    k_filter   : in  unsigned(16 downto 0);
-    out_valid  : out std_logic;
-    omega_me   : out signed(PU_W - 1 downto 0)
+    clk              : in  std_logic;
+    rst              : in  std_logic;
+    in_valid         : in  std_logic;
+    code_theta       : in  unsigned(POSITION_BITS - 1 downto 0);
+    reverse          : in  std_logic;
+    k_speed          : in  unsigned(23 downto 0);
+    k_filter         : in  unsigned(16 downto 0);
+    position_restart : in  std_logic;
+    speed_given      : in  std_logic;
+    omega_given      : in  signed(PU_W - 1 downto 0);
+    out_valid        : out std_logic;
+    omega_me         : out signed(PU_W - 1 downto 0)
   );
 end entity speed;
 
@@ -55,6 +60,8 @@ architecture rtl of speed is
   signal err_3     : signed(PU_W downto 0);
   signal by_filter : signed(17 downto 0);
   signal moved_6   : signed(MOVED_W - 1 downto 0);
+  signal omega_6   : signed(PU_W - 1 downto 0);
+  signal omega_7   : signed(PU_W - 1 downto 0);  -- the state, rounded
 begin
   valid(0)  <= in_valid;
   by_speed  <= signed('0' & k_speed);
@@ -72,12 +79,14 @@ begin
     generic map (DROP => SPEED_DROP_RAW)
     port map (clk => clk, a => by_speed, b => delta_0, c => NOTHING, y => raw_3, limited => open);
 
-  err_3 <= difference(raw_3, omega_me);
+  err_3 <= (others => '0') when position_restart = '1' else difference(raw_3, omega_7);
 
   -- Stages 4 to 6: moved = omega + err*k_filter
   filter_part : entity work.multiply_add
     generic map (DROP => SPEED_DROP_STATE)
     port map (clk => clk, a => err_3, b => by_filter, c => state.omega, y => moved_6, limited => open);
+
+  omega_6 <= resize(round_half_up(moved_6, SPEED_TO_PU), PU_W);
 
   process (clk)
   begin
@@ -90,10 +99,11 @@ begin
         state.seen <= '1';
       end if;
 
-      -- Stage 7: omega = moved;  omega_me = omega, rounded
+      -- Stage 7: omega = moved;  omega_me = omega, rounded, or omega_given
       if valid(6) = '1' then
         state.omega <= resize(moved_6, SPEED_OMEGA_W);
-        omega_me    <= resize(round_half_up(moved_6, SPEED_TO_PU), PU_W);
+        omega_7     <= omega_6;
+        omega_me    <= omega_given when speed_given = '1' else omega_6;
       end if;
 
       if rst = '1' then
@@ -101,6 +111,7 @@ begin
         state.code          <= (others => '0');
         state.seen          <= '0';
         state.omega         <= (others => '0');
+        omega_7             <= (others => '0');
         omega_me            <= (others => '0');
       end if;
     end if;

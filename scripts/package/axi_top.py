@@ -1,11 +1,14 @@
 """Writes generated/fluxproof_axi.vhd: core, registers, telemetry and power-stage pins, wired by name.
 
 Ports of the same name are connected; RENAMED lists the exceptions.  A port without a driver is an error.  A register
-or status value added to the core needs no edit here.
+or status value added to the core needs no edit here.  A ``Top`` holds what is particular; board_top.py has that
+of a board.
 """
 
 from __future__ import annotations
 
+import dataclasses
+from dataclasses import dataclass
 from pathlib import Path
 
 from fluxproof.checkout import RTL
@@ -103,71 +106,97 @@ HEADER = """\
 -- The file keeps to VHDL-93 so that a block design can also take it as a module."""
 
 
-def instances(rtl: Path = RTL) -> dict[str, Entity]:
-    """The entities of INSTANCES, read from ``rtl``."""
-    return {label: read_entity(rtl / name) for label, name in INSTANCES.items()}
+@dataclass(frozen=True)
+class Top:
+    """A top that is written here; ``lines`` are statements of its own, which read and drive further nets."""
+
+    name: str
+    header: str
+    instances: dict[str, str]
+    renamed: dict[tuple[str, str], str]
+    generics: dict[str, tuple[str, int, str]]
+    pins: tuple[tuple[str, str, str | None, str], ...]
+    lines: tuple[str, ...] = ()
+    lines_read: frozenset[str] = frozenset()
+    lines_drive: dict[str, str] = dataclasses.field(default_factory=dict)  # net -> its type
+
+    @property
+    def path(self) -> Path:
+        return RTL / "generated" / f"{self.name}.vhd"
+
+
+AXI = Top(TOP, HEADER, INSTANCES, RENAMED, GENERICS, PINS)
+BOARD_NAME = "fluxproof_board"  # the other top, see board_top.py
+
+
+def instances(rtl: Path = RTL, top: Top = AXI) -> dict[str, Entity]:
+    """The entities of a top, read from ``rtl``."""
+    return {label: read_entity(rtl / name) for label, name in top.instances.items()}
 
 
 def source_names(rtl: Path = RTL) -> list[str]:
     """The VHDL files in compile order with this top at the end, relative to the repository's root."""
-    others = rtl_sources(rtl, without=(PATH.name,))
-    return [path.relative_to(rtl.parent).as_posix() for path in (*others, rtl / PATH.relative_to(RTL))]
+    others = rtl_sources(rtl, without=(PATH.name, f"{BOARD_NAME}.vhd"))
+    tops = (rtl / "generated" / f"{name}.vhd" for name in (BOARD_NAME, TOP))
+    return [path.relative_to(rtl.parent).as_posix() for path in (*others, *tops)]
 
 
-def net_of(label: str, port: str) -> str:
-    """The net that a port of an instance belongs to."""
-    return RENAMED.get((label, port), port)
+def net_of(top: Top, label: str, port: str) -> str:
+    """The net that a port of an instance belongs to; ``record.field`` is a field of a net."""
+    return top.renamed.get((label, port), port)
 
 
-def wire(entities: dict[str, Entity]) -> dict[str, Pin]:
+def wire(entities: dict[str, Entity], top: Top = AXI) -> dict[str, Pin]:
     """{net: the instance's port that drives it}; ValueError for a port without driver, or with two."""
-    pins = {NETS_OF_PINS.get(name, name): mode for name, mode, _, _ in PINS}
-    given = {net for net, mode in pins.items() if mode == "in"} | {"rst", "rst_1", SAMPLE}
+    pins = {NETS_OF_PINS.get(name, name): mode for name, mode, _, _ in top.pins}
+    given = {net for net, mode in pins.items() if mode == "in"} | {"rst", "rst_1", SAMPLE, *top.lines_drive}
     driven: dict[str, Pin] = {}
     for label, entity in entities.items():
         for pin in entity.outputs.values():
-            net = net_of(label, pin.name)
+            net = net_of(top, label, pin.name)
             if net in driven or net in given:
-                raise ValueError(f"{TOP}: {label}.{pin.name} drives {net}, which has a driver already")
+                raise ValueError(f"{top.name}: {label}.{pin.name} drives {net}, which has a driver already")
             driven[net] = pin
     for label, entity in entities.items():
-        missing = [n for n in entity.inputs if net_of(label, n) not in given | set(driven)]
+        missing = [n for n in entity.inputs if net_of(top, label, n).split(".")[0] not in given | set(driven)]
         if missing:
-            raise ValueError(f"{TOP}: nothing drives {', '.join(missing)} of {label} ({entity.name})")
-        unknown = set(entity.generics) - set(GENERICS) - LEFT_AT_DEFAULT
+            raise ValueError(f"{top.name}: nothing drives {', '.join(missing)} of {label} ({entity.name})")
+        unknown = set(entity.generics) - set(top.generics) - LEFT_AT_DEFAULT
         if unknown:
-            raise ValueError(f"{TOP}: no value for generic {', '.join(sorted(unknown))} of {entity.name}")
+            raise ValueError(f"{top.name}: no value for generic {', '.join(sorted(unknown))} of {entity.name}")
     if missing := [name for name in ENTERS_AS.values() if name not in given | set(driven)]:
-        raise ValueError(f"{TOP}: nothing drives {', '.join(missing)} of {SAMPLE}")
+        raise ValueError(f"{top.name}: nothing drives {', '.join(missing)} of {SAMPLE}")
     undriven = [net for net, mode in pins.items() if mode == "out" and net not in driven]
     if undriven:
-        raise ValueError(f"{TOP}: nothing drives {', '.join(undriven)}")
+        raise ValueError(f"{top.name}: nothing drives {', '.join(undriven)}")
     return driven
 
 
-def render(rtl: Path = RTL) -> str:
+def render(rtl: Path = RTL, top: Top = AXI) -> str:
     """The whole file."""
-    entities = instances(rtl)
-    driven = wire(entities)
-    read = {net_of(label, n) for label, e in entities.items() for n in e.inputs} | set(ENTERS_AS.values())
-    out_pins = {NETS_OF_PINS.get(name, name): name for name, mode, _, _ in PINS if mode == "out"}
+    entities = instances(rtl, top)
+    driven = wire(entities, top)
+    read = {net_of(top, label, n) for label, e in entities.items() for n in e.inputs} | set(ENTERS_AS.values())
+    read |= top.lines_read
+    out_pins = {NETS_OF_PINS.get(name, name): name for name, mode, _, _ in top.pins if mode == "out"}
     # An output pin is connected directly to its driver if nothing else reads it and the types agree.
     direct = {n for n in out_pins if n not in read and driven[n].kind in ("std_logic", "std_logic_vector")}
     signals = {n: pin for n, pin in driven.items() if n in read | set(out_pins) and n not in direct}
     names = {net: f"{net}_out" if net in out_pins.values() else net for net in signals}
     actuals = {net: out_pins[net] for net in direct} | names
 
-    lines = [HEADER, "", "library ieee;", "use ieee.std_logic_1164.all;", "use ieee.numeric_std.all;"]
-    lines += ["use work.fluxproof_pkg.all;", "", *_entity(), "", f"architecture rtl of {TOP} is"]
+    lines = [top.header, "", "library ieee;", "use ieee.std_logic_1164.all;", "use ieee.numeric_std.all;"]
+    lines += ["use work.fluxproof_pkg.all;", "", *_entity(top), "", f"architecture rtl of {top.name} is"]
     width = max(map(len, names.values()))
     lines += [f"  signal {name:{width}} : std_logic;" for name in ("rst_1", "rst")]
     lines += [f"  signal {names[net]:{width}} : {pin.vhdl_type};" for net, pin in signals.items()]
     lines += [f"  signal {SAMPLE:{width}} : {SAMPLE}_t;"]
+    lines += [f"  signal {net:{width}} : {kind};" for net, kind in top.lines_drive.items()]
     lines += ["begin", "", "  process (aclk)", "  begin", "    if rising_edge(aclk) then"]
     lines += ["      rst_1 <= not aresetn;", "      rst   <= rst_1;", "    end if;", "  end process;"]
-    lines += ["", *_sample(names)]
+    lines += ["", *_sample(names), *top.lines]
     for label, entity in entities.items():
-        lines += ["", *_instance(label, entity, {**actuals, SAMPLE: SAMPLE})]
+        lines += ["", *_instance(top, label, entity, {**actuals, SAMPLE: SAMPLE})]
     lines.append("")
     copied = {net: pin for net, pin in out_pins.items() if net in signals}
     width = max(map(len, copied.values()))
@@ -177,22 +206,22 @@ def render(rtl: Path = RTL) -> str:
     return "\n".join([*lines, "", "end architecture rtl;"]) + "\n"
 
 
-def _entity() -> list[str]:
+def _entity(top: Top) -> list[str]:
     """The entity's declaration: generics and pins with their comments."""
-    lines = [f"entity {TOP} is", "  generic ("]
-    wide, typed = max(map(len, GENERICS)), max(len(kind) for kind, _, _ in GENERICS.values())
-    last = list(GENERICS)[-1]
-    for name, (kind, default, doc) in GENERICS.items():
+    lines = [f"entity {top.name} is", "  generic ("]
+    wide, typed = max(map(len, top.generics)), max(len(kind) for kind, _, _ in top.generics.values())
+    last = list(top.generics)[-1]
+    for name, (kind, default, doc) in top.generics.items():
         lines.append(
             f"    {name:{wide}} : {kind:{typed}} := {default}{';' if name != last else ''}  -- {doc}"
         )
     lines += ["  );", "  port ("]
-    wide = max(len(name) for name, *_ in PINS)
-    for k, (name, mode, bits, doc) in enumerate(PINS):
+    wide = max(len(name) for name, *_ in top.pins)
+    for k, (name, mode, bits, doc) in enumerate(top.pins):
         kind = "std_logic" if bits is None else f"std_logic_vector({bits})"
-        end = ";" if k + 1 < len(PINS) else ""
+        end = ";" if k + 1 < len(top.pins) else ""
         lines.append(f"    {name:{wide}} : {mode:3} {kind}{end}" + (f"  -- {doc}" if doc else ""))
-    return [*lines, "  );", f"end entity {TOP};"]
+    return [*lines, "  );", f"end entity {top.name};"]
 
 
 def _sample(names: dict[str, str]) -> list[str]:
@@ -206,25 +235,25 @@ def _sample(names: dict[str, str]) -> list[str]:
     return lines
 
 
-def _instance(label: str, entity: Entity, actuals: dict[str, str]) -> list[str]:
+def _instance(top: Top, label: str, entity: Entity, actuals: dict[str, str]) -> list[str]:
     """One instantiation; unused outputs stay open."""
     lines = [f"  {label} : entity work.{entity.name}"]
-    given = [name for name in entity.generics if name in GENERICS]
+    given = [name for name in entity.generics if name in top.generics]
     if given:
         wide = max(map(len, given))
         maps = [f"      {name:{wide}} => {name}" for name in given]
         lines += ["    generic map (", *",\n".join(maps).split("\n"), "    )"]
     wide = max(map(len, entity.pins))
-    maps = [f"      {name:{wide}} => {_actual(label, pin, actuals)}" for name, pin in entity.pins.items()]
+    maps = [f"      {name:{wide}} => {_actual(top, label, pin, actuals)}" for name, pin in entity.pins.items()]
     return [*lines, "    port map (", *",\n".join(maps).split("\n"), "    );"]
 
 
-def _actual(label: str, pin: Pin, actuals: dict[str, str]) -> str:
+def _actual(top: Top, label: str, pin: Pin, actuals: dict[str, str]) -> str:
     """What a port is connected to: a signal, a pin (converted where the types differ), or open."""
-    net = net_of(label, pin.name)
-    if net in actuals:
-        return actuals[net]
+    net = net_of(top, label, pin.name)
+    if net in actuals or "." in net or net in top.lines_drive:
+        return actuals.get(net, net)
     if not pin.is_input:
         return "open"
-    name = next((n for n, _, _, _ in PINS if NETS_OF_PINS.get(n, n) == net), net)
+    name = next((n for n, _, _, _ in top.pins if NETS_OF_PINS.get(n, n) == net), net)
     return f"{pin.kind}({name})" if pin.kind in ("unsigned", "signed") else name

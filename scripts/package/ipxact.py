@@ -19,6 +19,7 @@ from systemrdl import RDLCompiler
 
 from fluxproof.checkout import ROOT, RTL
 from fluxproof.cosim.entity import Entity, Generic, Pin, parse_entity
+from fluxproof.golden_model.io import board_map
 from scripts.package.axi_top import PATH as TOP_PATH
 from scripts.package.axi_top import source_names
 
@@ -144,6 +145,9 @@ def memory_maps(rdl: Path) -> etree._Element:
     found.find(f"{{{SPIRIT}}}name").text = "s_axi"
     (block,) = found.findall(f"{{{SPIRIT}}}addressBlock")
     block.find(f"{{{SPIRIT}}}range").text = str(1 << ADDRESS_BITS)  # the whole address range
+    for register in block.findall(f"{{{SPIRIT}}}register"):  # the component has the core's alone
+        if int(register.findtext(f"{{{SPIRIT}}}addressOffset"), 0) >= board_map.BASE:
+            block.remove(register)
     return maps
 
 

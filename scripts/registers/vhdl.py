@@ -1,4 +1,4 @@
-"""The VHDL of the register map, from the compiled SystemRDL alone: register_map_pkg.vhd, register_file.vhd."""
+"""The VHDL of the register map, from the compiled SystemRDL alone: register_map_pkg.vhd and both register files."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from pathlib import Path
 
 import jinja2
 
+from fluxproof.golden_model.io import board_map
 from fluxproof.golden_model.records import RECORDS
 from scripts.registers.compiled import Part, Word
 
@@ -19,6 +20,7 @@ GENERICS = {
     "CLOCK_HZ": 200000000,
     "ESTIMATORS": 1,
 }  # as in the core
+BOARD_GENERICS = {"ENCODER": 1, "CURRENTS": 1, "SPI_LINES": 4}
 BETWEEN, AT_ONCE = ("setting", "sample pulse"), ("command", "pulse")
 BUS = (
     ("s_axi_awaddr", "in", 12),
@@ -61,8 +63,7 @@ def word_bits(words: list[Word]) -> int:
 
 def package(words: list[Word]) -> str:
     """rtl/generated/register_map_pkg.vhd."""
-    ends = [end for word in words if writable(word) for end in (word.parts[0].low, word.parts[0].high)]
-    bits = max((end if end >= 0 else ~end).bit_length() + 1 for end in ends)
+    bits = limit_bits(words)
 
     def limit(end: int) -> str:
         return f"to_signed({end}, REGISTER_LIMIT_W)"
@@ -127,8 +128,20 @@ def _choices(indices: list[int]) -> str:
     return " | ".join(str(a) if a == b else f"{a} to {b}" for a, b in runs)
 
 
-def register_file(words: list[Word]) -> str:
-    """rtl/generated/register_file.vhd."""
+def of_core(words: list[Word]) -> list[Word]:
+    """The registers of the core alone: those below the board's block of addresses."""
+    return [word for word in words if word.address < board_map.BASE]
+
+
+def limit_bits(words: list[Word]) -> int:
+    """Bits of a signed number that holds every range of the registers."""
+    ends = [end for word in words if writable(word) for end in (word.parts[0].low, word.parts[0].high)]
+    return max((end if end >= 0 else ~end).bit_length() + 1 for end in ends)
+
+
+def register_file(words: list[Word], name: str = "register_file") -> str:
+    """rtl/generated/register_file.vhd, or that of a board: the same with the second block of addresses."""
+    generics = {n: v for n, v in (GENERICS | BOARD_GENERICS).items() if n.lower() in {w.name for w in words}}
     stored = [(word, word.parts[0]) for word in words if writable(word)]
     reads = _reads(words)
     reads_width = max(len(f"shown({choice})") for choice, _ in reads)
@@ -147,8 +160,11 @@ def register_file(words: list[Word]) -> str:
         raise ValueError(f"register file: two registers with the port {', '.join(twice)}")
     return _render(
         "register_file.vhd.j2",
-        generics=GENERICS,
-        generic_width=max(map(len, GENERICS)),
+        name=name,
+        word_bits=word_bits(words),
+        limit_bits=limit_bits(words),
+        generics=generics,
+        generic_width=max(map(len, generics)),
         ports=ports,
         port_width=max(map(len, names)),
         bus=[name for name, *_ in BUS],

@@ -3,6 +3,7 @@
     make synth                                            counts, structure and netlist, into build/synth
     make ecp5                                             the routed clock rate on ECP5, some minutes a seed
     python -m scripts.synth --block current_pi speed_pi   count these blocks alone, some seconds each
+    python -m scripts.synth --board                       count each choice of a board's front ends
     python -m scripts.synth --only counts --update "svm shares its adder"    keep the new counts
 
 Exit status: 0; 1 where a count is more than 3 % off the kept one; 2 where a tool fails or a name does not exist.
@@ -19,7 +20,7 @@ from dataclasses import asdict
 
 from fluxproof.checkout import BUILD
 from fluxproof.files import write_json
-from scripts.synth import ecp5, kept, levels, multipliers, report
+from scripts.synth import board, ecp5, kept, levels, multipliers, report
 from scripts.synth.count import Count
 from scripts.synth.groups import BETWEEN, ROWS
 from scripts.synth.parts import PARTS, STRUCTURE_FAMILY, Work, started
@@ -105,6 +106,7 @@ def arguments_of() -> argparse.Namespace:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--block", nargs="+", metavar="ENTITY", help="count these entities alone, and stop")
+    parser.add_argument("--board", action="store_true", help="count each choice of a board's front ends, and stop")
     parser.add_argument(
         "--family", nargs="+", choices=FAMILIES, metavar="FAMILY", help=f"of {', '.join(FAMILIES)}"
     )
@@ -140,6 +142,10 @@ def main() -> int:
     parts = arguments.only or [part for part in PARTS if part != "ecp5"]
     status = 0
     try:
+        if arguments.board:
+            for family in arguments.family or ["xc7"]:
+                print(f"{family}, each alone\n{report.table(board.counts(family))}", flush=True)
+            return 0
         design = Design()
         if arguments.block:
             count_blocks(design, arguments.block, arguments.family or ["xc7"])

@@ -1,1 +1,1 @@
-"""The board: front ends, timing and limits of a drive from its pins, as figures with targets."""
+"""The figures of a board, from pins to a turning motor: `make board`."""

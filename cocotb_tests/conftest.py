@@ -1,0 +1,16 @@
+"""What all tests share: figures of a study, which `make board` collects."""
+
+import json
+
+import pytest
+
+
+@pytest.fixture
+def figure(record_property):
+    """figure(name, ours, target, unit, passed): a line of the study's table; the test itself still asserts."""
+
+    def record(name: str, ours, target, unit: str, passed: bool) -> None:
+        row = {"figure": name, "ours": ours, "target": target, "unit": unit, "pass": bool(passed)}
+        record_property("figure", json.dumps(row))
+
+    return record

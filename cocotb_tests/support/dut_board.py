@@ -1,0 +1,49 @@
+"""Inside the simulator: fluxproof_board in the closed loop of board_loop, every pin at every clock against golden."""
+
+from __future__ import annotations
+
+import json
+import os
+
+import cocotb
+from cocotb.clock import Clock
+from cocotb.triggers import FallingEdge
+
+from cocotb_tests.support.board_loop import AXI, CONSTANT
+from cocotb_tests.support.board_runs import start_from_standstill, status
+from fluxproof.cosim.block_bench import read
+from fluxproof.cosim.board_clock import PINS, SEEN
+
+
+@cocotb.test()
+async def equals_the_golden_board(dut):
+    loop = start_from_standstill()
+    for name in (*PINS, *AXI, "s_axi_arvalid", "s_axi_araddr", "s_axi_awprot", "s_axi_arprot", "trip"):
+        getattr(dut, name).value = 0
+    for name, value in CONSTANT.items():
+        getattr(dut, name).value = value
+    dut.aresetn.value = 0
+    Clock(dut.aclk, 10, unit="ns").start()
+    for _ in range(6):
+        await FallingEdge(dut.aclk)
+    dut.aresetn.value = 1
+    for _ in range(2):  # the reset inside is two clocks later
+        await FallingEdge(dut.aclk)
+    outputs = [getattr(dut, name) for name in SEEN]
+    clocks = 0
+    for chunk in loop.run(int(os.environ["FLUXPROOF_PERIODS"])):
+        changes = [(getattr(dut, name), column.tolist()) for name, column in chunk.inputs.items()]
+        driven = [None] * len(changes)
+        for k, wanted in enumerate(chunk.seen.tolist()):
+            for n, (handle, column) in enumerate(changes):
+                if column[k] != driven[n]:
+                    driven[n] = column[k]
+                    handle.value = column[k]
+            await FallingEdge(dut.aclk)
+            got = [read(handle, False) for handle in outputs]
+            if got != wanted:
+                raise AssertionError(f"period {chunk.number}, clock {k}: {dict(zip(SEEN, zip(got, wanted)))}")
+            clocks += 1
+    facts = {"clocks": clocks, "samples": loop.golden.samples, "rpm": chunk.omega_m * 9.549, **status(chunk)}
+    with open("board.json", "w") as file:
+        json.dump(facts, file)

@@ -1,0 +1,187 @@
+"""The converters of a board from their pins to the four codes of a sample, of the kind that is built.
+
+    currents  0  codes from elsewhere    1  SPI    2  XADC    3  delta-sigma
+
+``channel_x`` is the code of the converter that becomes ``adc_x``: 0 to 7 of SPI (line, and 4 more for the second word),
+0 to 3 of the XADC; modulators have their places.  A trigger is answered by ``codes_done`` with all four, or the answer
+is an error: it is counted, the sample stays away and the core's watchdog acts.
+Formats: codes.  The codes change a clock after those of the converter, with ``codes_done``.  The counter saturates.
+"""
+
+from typing import NamedTuple
+
+from fluxproof.golden_model.block import Block, Port
+from fluxproof.golden_model.converters import delta_sigma, spi_converter, xadc_reader
+from fluxproof.golden_model.converters.delta_sigma import renamed
+from fluxproof.golden_model.fixed import Format
+from fluxproof.golden_model.formats import BIT, CODE
+from fluxproof.golden_model.io.current_conditioning import code_format
+from fluxproof.golden_model.kernel import kernel
+
+EXTERNAL, SPI, XADC, DELTA_SIGMA = range(4)
+KINDS = ("external", "spi", "xadc", "delta_sigma")
+EVENTS = Format(0, 12, 0)
+EVENTS_MAX = EVENTS.hi
+spi_step, xadc_step, sigma_step = spi_converter.step, xadc_reader.step, delta_sigma.step
+
+
+class State(NamedTuple):
+    of_spi: spi_converter.State = spi_converter.State()
+    of_xadc: xadc_reader.State = xadc_reader.State()
+    of_sigma: delta_sigma.State = delta_sigma.State()
+    adc_a: int = 0
+    adc_b: int = 0
+    adc_c: int = 0
+    adc_u_dc: int = 0
+    done: int = 0
+    errors: int = 0
+    # Outputs that the next clock reads
+    codes: tuple[int, int, int, int, int, int, int, int] = (0, 0, 0, 0, 0, 0, 0, 0)
+    codes_valid: int = 0
+    error: int = 0
+
+
+@kernel
+def step(
+    state, miso, busy, eoc, drdy, drp_do, mod_data, mod_clock_in, code_a_in, code_b_in, code_c_in, code_u_dc_in,
+    codes_valid_in, sample_trigger, clear_encoder, clock_ratio, spi_bits, spi_skip, spi_delay, wait_clocks,
+    busy_timeout, two_words, use_convst, clock_idle, second_edge, signed_code, channel_a, channel_b, channel_c,
+    channel_u_dc, conversions, xadc_channels, address_0, address_1, address_2, address_3, xadc_timeout, mod_ratio,
+    mod_delay, follow_clock, oversampling, sinc_gain, start_clocks, trip_oversampling, limit_high, limit_low, currents,
+    adc_bits, spi_lines,
+):  # fmt: skip
+    s = state
+    spi, xadc, sigma = s.of_spi, s.of_xadc, s.of_sigma
+    c0, c1, c2, c3, c4, c5, c6, c7 = 0, 0, 0, 0, 0, 0, 0, 0
+    convst, cs_n, sclk, den, daddr, mod_clock, refused, over, valid, error = 0, 1, 0, 0, 0, 0, 0, 0, 0, 0
+    new, wrong = s.codes_valid, s.error
+    if currents == SPI:
+        spi, (convst, cs_n, sclk, valid, error, refused, c0, c1, c2, c3, c4, c5, c6, c7) = spi_step(
+            s.of_spi, sample_trigger, miso, busy, clock_ratio, spi_bits, spi_skip, spi_delay, wait_clocks, busy_timeout,
+            two_words, use_convst, clock_idle, second_edge, signed_code, adc_bits, spi_lines,
+        )  # fmt: skip
+    elif currents == XADC:
+        xadc, (convst, den, daddr, valid, error, c0, c1, c2, c3) = xadc_step(
+            s.of_xadc, sample_trigger, busy, eoc, drdy, drp_do, conversions, xadc_channels, address_0, address_1,
+            address_2, address_3, xadc_timeout, signed_code, adc_bits,
+        )  # fmt: skip
+    elif currents == DELTA_SIGMA:
+        sigma, (mod_clock, c0, c1, c2, c3, valid, error, over) = sigma_step(
+            s.of_sigma, mod_data, mod_clock_in, sample_trigger, mod_ratio, mod_delay, follow_clock, oversampling,
+            sinc_gain, start_clocks, trip_oversampling, limit_high, limit_low, adc_bits,
+        )  # fmt: skip
+
+    if currents == SPI:
+        a, b, c, u_dc = s.codes[channel_a], s.codes[channel_b], s.codes[channel_c], s.codes[channel_u_dc]
+    elif currents == XADC:
+        a, b, c, u_dc = (
+            s.codes[channel_a & 3], s.codes[channel_b & 3], s.codes[channel_c & 3], s.codes[channel_u_dc & 3]
+        )  # fmt: skip
+    elif currents == DELTA_SIGMA:
+        a, b, c, u_dc = s.codes[0], s.codes[1], s.codes[2], s.codes[3]
+    else:
+        a, b, c, u_dc, new = code_a_in, code_b_in, code_c_in, code_u_dc_in, codes_valid_in
+    errors = 0 if clear_encoder else s.errors
+    following = State(
+        spi, xadc, sigma,
+        a if new else s.adc_a,
+        b if new else s.adc_b,
+        c if new else s.adc_c,
+        u_dc if new else s.adc_u_dc,
+        new,
+        min(errors + (1 if wrong else 0), EVENTS_MAX),
+        (c0, c1, c2, c3, c4, c5, c6, c7), valid, error,
+    )  # fmt: skip
+    f = following
+    return following, (
+        f.adc_a, f.adc_b, f.adc_c, f.adc_u_dc, f.done, f.errors, refused, over, convst, cs_n, sclk, den, daddr,
+        mod_clock,
+    )  # fmt: skip
+
+
+SOURCES = {SPI: spi_converter, XADC: xadc_reader, DELTA_SIGMA: delta_sigma}
+ON_A_BOARD = {
+    "word_bits": "spi_bits",
+    "skip_bits": "spi_skip",
+    "sample_delay": "spi_delay",
+    "channels": "xadc_channels",
+    "timeout": "xadc_timeout",
+}
+
+
+def stimuli(rng, config):
+    """The stimuli of the converter that is built, with channels in every order."""
+    ports = {p.name: p for p in BLOCK.ports(config)}
+    still = {name: p.low for name, p in ports.items()}
+    if config["CURRENTS"] == EXTERNAL:
+        return [
+            still | {f"code_{x}_in": int(rng.integers(4096)) for x in ("a", "b", "c", "u_dc")}
+            | {"codes_valid_in": int(k % 3 == 0)}
+            for k in range(200)
+        ]  # fmt: skip
+    rows, channels = [], {}
+    given = SOURCES[config["CURRENTS"]].stimuli(rng, {"ADC_BITS": config["ADC_BITS"], "LINES": config["SPI_LINES"]})
+    for k, row in enumerate(given[:9000]):
+        if k % 500 == 0:
+            channels = {f"channel_{x}": int(rng.integers(8)) for x in ("a", "b", "c", "u_dc")}
+        row = {ON_A_BOARD.get(name, name): value for name, value in row.items()}
+        rows.append(still | row | channels | {"clear_encoder": int(k % 3000 == 2999)})
+    return rows
+
+
+_SPI = {p.name: p for p in spi_converter.BLOCK.inputs + spi_converter.BLOCK.registers + spi_converter.BLOCK.outputs}
+_XADC = {p.name: p for p in xadc_reader.BLOCK.inputs + xadc_reader.BLOCK.registers + xadc_reader.BLOCK.outputs}
+_SIGMA = {p.name: p for p in delta_sigma.BLOCK.inputs}
+CHANNEL = Format(0, 3, 0)
+CODES = ("a", "b", "c", "u_dc")
+
+BLOCK = Block(
+    name="current_front",
+    folder="converters",
+    paper="none: front end of a board",
+    step=step,
+    inputs=(
+        _SPI["miso"],
+        Port("busy", BIT, doc="1: the converter converts, not synchronous"),
+        *(_XADC[n] for n in ("eoc", "drdy", "drp_do")),
+        *(_SIGMA[n] for n in ("mod_data", "mod_clock_in")),
+        *(Port(f"code_{x}_in", CODE, doc=f"code from elsewhere, {x}") for x in CODES),
+        Port("codes_valid_in", BIT, doc="1: the codes from elsewhere are there"),
+        Port("sample_trigger", BIT, doc="1: take a sample"),
+        Port("clear_encoder", BIT, doc="1: clear the counter of errors"),
+    ),
+    registers=(
+        *(renamed(p, ON_A_BOARD.get(p.name, p.name)) for p in spi_converter.BLOCK.registers),
+        *(Port(f"channel_{x}", CHANNEL, doc=f"code of the converter that is {x}") for x in CODES),
+        *(renamed(p, ON_A_BOARD.get(p.name, p.name)) for p in xadc_reader.BLOCK.registers[:-1]),
+        *delta_sigma.REGISTERS,
+    ),
+    outputs=(
+        *(Port(f"adc_{x}", CODE, doc=f"ADC code, {x}") for x in CODES),
+        Port("codes_done", BIT, doc="1: the four codes are new"),
+        Port("converter_errors", EVENTS, doc="triggers without codes, saturates"),
+        Port("converter_refused", BIT, doc="1: the registers of the SPI converters contradict each other"),
+        Port("converter_over", BIT, doc="1: fast overcurrent of a modulator"),
+        *(_SPI[n] for n in ("convst", "cs_n", "sclk")),
+        *(_XADC[n] for n in ("den", "daddr")),
+        Port("mod_clock", BIT, doc="clock for the modulators"),
+    ),
+    state=State(),
+    latency=1,
+    clocked=True,
+    after_reset={"cs_n": 1},
+    configs=(
+        {"CURRENTS": 0, "ADC_BITS": 16, "SPI_LINES": 4},
+        {"CURRENTS": 1, "ADC_BITS": 16, "SPI_LINES": 4},
+        {"CURRENTS": 2, "ADC_BITS": 12, "SPI_LINES": 4},
+        {"CURRENTS": 3, "ADC_BITS": 16, "SPI_LINES": 4},
+    ),
+    width_from={
+        "miso": lambda config: Format(0, config["SPI_LINES"], 0),
+        **{f"code_{x}_in": code_format for x in CODES},
+        **{f"adc_{x}": code_format for x in CODES},
+    },
+    reference=None,
+    bound=None,
+    stimuli=stimuli,
+)

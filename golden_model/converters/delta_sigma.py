@@ -1,0 +1,123 @@
+"""Four delta-sigma modulators to codes: their bits, a sinc3 each, and fast overcurrent of the three phases, wired.
+
+Nothing is computed here.  Modulators 0 to 3 are a, b, c and the bus.  All filters see the same strobes, so the codes
+come together; one ``code_valid`` and one ``window_error`` stand for all.
+"""
+
+from typing import NamedTuple
+
+from fluxproof.golden_model.block import Block, Port
+from fluxproof.golden_model.converters import modulator_input, sinc3, sinc_overcurrent
+from fluxproof.golden_model.fixed import Format
+from fluxproof.golden_model.formats import BIT, CODE
+from fluxproof.golden_model.kernel import kernel
+
+LINES = 4
+input_step, sinc_step, over_step = modulator_input.step, sinc3.step, sinc_overcurrent.step
+
+
+class State(NamedTuple):
+    of_input: modulator_input.State = modulator_input.State()
+    of_sinc_a: sinc3.State = sinc3.State()
+    of_sinc_b: sinc3.State = sinc3.State()
+    of_sinc_c: sinc3.State = sinc3.State()
+    of_sinc_u_dc: sinc3.State = sinc3.State()
+    of_over_a: sinc_overcurrent.State = sinc_overcurrent.State()
+    of_over_b: sinc_overcurrent.State = sinc_overcurrent.State()
+    of_over_c: sinc_overcurrent.State = sinc_overcurrent.State()
+    # Outputs that the next clock reads
+    bits: int = 0
+    bits_valid: int = 0
+
+
+@kernel
+def step(
+    state, mod_data, mod_clock_in, sample_trigger, mod_ratio, mod_delay, follow_clock, oversampling, sinc_gain,
+    start_clocks, trip_oversampling, limit_high, limit_low, adc_bits,
+):  # fmt: skip
+    s = state
+    inputs, (mod_clock, bits, bits_valid) = input_step(
+        s.of_input, mod_data, mod_clock_in, mod_ratio, mod_delay, follow_clock, LINES
+    )
+    bit_a, bit_b, bit_c, bit_u_dc = s.bits & 1, s.bits >> 1 & 1, s.bits >> 2 & 1, s.bits >> 3 & 1
+    new = s.bits_valid
+    sinc_a, (code_a, code_valid, window_error) = sinc_step(
+        s.of_sinc_a, sample_trigger, bit_a, new, oversampling, sinc_gain, start_clocks, adc_bits
+    )
+    sinc_b, (code_b, _, _) = sinc_step(
+        s.of_sinc_b, sample_trigger, bit_b, new, oversampling, sinc_gain, start_clocks, adc_bits
+    )
+    sinc_c, (code_c, _, _) = sinc_step(
+        s.of_sinc_c, sample_trigger, bit_c, new, oversampling, sinc_gain, start_clocks, adc_bits
+    )
+    sinc_u_dc, (code_u_dc, _, _) = sinc_step(
+        s.of_sinc_u_dc, sample_trigger, bit_u_dc, new, oversampling, sinc_gain, start_clocks, adc_bits
+    )
+    over_a, (is_over_a, _, _) = over_step(s.of_over_a, bit_a, new, trip_oversampling, limit_high, limit_low)
+    over_b, (is_over_b, _, _) = over_step(s.of_over_b, bit_b, new, trip_oversampling, limit_high, limit_low)
+    over_c, (is_over_c, _, _) = over_step(s.of_over_c, bit_c, new, trip_oversampling, limit_high, limit_low)
+    following = State(inputs, sinc_a, sinc_b, sinc_c, sinc_u_dc, over_a, over_b, over_c, bits, bits_valid)
+    over = 1 if is_over_a or is_over_b or is_over_c else 0
+    return following, (mod_clock, code_a, code_b, code_c, code_u_dc, code_valid, window_error, over)
+
+
+def stimuli(rng, config):
+    """Bits of every density, windows that end, that do not, and that are short of bits."""
+    rows = []
+    row = {p.name: p.low for p in BLOCK.inputs + BLOCK.registers} | {"oversampling": 32, "trip_oversampling": 8}
+    row |= {"sinc_gain": 1 << 14, "limit_high": 500, "limit_low": 12, "mod_ratio": 4}
+    for spacing, density in ((500, 0.5), (450, 0.9), (420, 0.02), (300, 0.5)):
+        for k in range(1800):
+            word = int(sum((rng.random() < density) << x for x in range(LINES)))
+            rows.append(row | {"mod_data": word, "sample_trigger": int(k % spacing == 9)})
+    return rows
+
+
+_PORTS = {p.name: p for m in (sinc3, modulator_input) for p in m.BLOCK.inputs + m.BLOCK.registers + m.BLOCK.outputs}
+_OVER = {p.name: p for p in sinc_overcurrent.BLOCK.registers}
+
+
+def renamed(port, name, doc=None):
+    """The same port under a name that is its own on a board."""
+    return Port(name, port.fmt, port.lo, port.hi, doc or port.doc)
+
+
+REGISTERS = (
+    _PORTS["mod_ratio"],
+    renamed(_PORTS["sample_delay"], "mod_delay"),
+    _PORTS["follow_clock"],
+    _PORTS["oversampling"],
+    renamed(_PORTS["gain"], "sinc_gain"),
+    _PORTS["start_clocks"],
+    renamed(_OVER["oversampling"], "trip_oversampling", "bits from total to total of the fast overcurrent"),
+    _OVER["limit_high"],
+    _OVER["limit_low"],
+)
+
+BLOCK = Block(
+    name="delta_sigma",
+    folder="converters",
+    paper="none: front end of a board",
+    step=step,
+    inputs=(
+        Port("mod_data", Format(0, LINES, 0), doc="data of the modulators a, b, c, bus, not synchronous"),
+        _PORTS["mod_clock_in"],
+        _PORTS["sample_trigger"],
+    ),
+    registers=REGISTERS,
+    outputs=(
+        _PORTS["mod_clock"],
+        *(Port(f"code_{x}", CODE, doc=f"density of ones, {x}") for x in ("a", "b", "c", "u_dc")),
+        _PORTS["code_valid"],
+        _PORTS["window_error"],
+        Port("over", BIT, doc="1: the fast filter of a phase is beyond a limit"),
+    ),
+    state=State(),
+    latency=1,
+    clocked=True,
+    configs=({"ADC_BITS": 16},),
+    width_from={f"code_{x}": sinc3.BLOCK.width_from["code"] for x in ("a", "b", "c", "u_dc")},
+    reference=None,
+    bound=None,
+    stimuli=stimuli,
+)

@@ -1,0 +1,102 @@
+"""Three Hall sensors from their pins to a code and a speed: three filters, hall_decoder and edge_timer, wired.
+
+Nothing is computed here.  ``sample_trigger`` latches the upper bits of theta_hall as the code of a sensor alone, with
+``pole_pairs`` 1; the speed is that between two sectors, with ``k_edge`` for 6 counts a turn.
+"""
+
+from typing import NamedTuple
+
+from fluxproof.golden_model.block import Block, Port
+from fluxproof.golden_model.common import input_filter
+from fluxproof.golden_model.encoders import edge_timer, hall_decoder
+from fluxproof.golden_model.fixed import Format
+from fluxproof.golden_model.formats import BIT, TURN_W
+from fluxproof.golden_model.io.position import code_format
+from fluxproof.golden_model.kernel import kernel
+
+filter_step, hall_step, timer_step = input_filter.step, hall_decoder.step, edge_timer.step
+
+
+class State(NamedTuple):
+    of_filter_a: input_filter.State = input_filter.State()
+    of_filter_b: input_filter.State = input_filter.State()
+    of_filter_c: input_filter.State = input_filter.State()
+    of_decoder: hall_decoder.State = hall_decoder.State()
+    of_timer: edge_timer.State = edge_timer.State()
+    code: int = 0
+    # Outputs that the next clock reads
+    theta_hall: int = 0
+    step_up: int = 0
+    step_down: int = 0
+
+
+@kernel
+def step(
+    state, hall_a, hall_b, hall_c, sample_trigger, clear_encoder, filter_clocks, hall_reverse, hall_offset, start_first,
+    sector_counts, reverse, k_edge, position_bits,
+):  # fmt: skip
+    s = state
+    filter_a, (_, _) = filter_step(s.of_filter_a, hall_a, filter_clocks)
+    filter_b, (_, _) = filter_step(s.of_filter_b, hall_b, filter_clocks)
+    filter_c, (_, _) = filter_step(s.of_filter_c, hall_c, filter_clocks)
+    settled = 1 if s.of_filter_a.settled and s.of_filter_b.settled and s.of_filter_c.settled else 0
+    decoder, (
+        theta_hall, _, hall_valid, step_up, step_down, start_count, start_valid, illegal_count, skipped_count
+    ) = hall_step(
+        s.of_decoder, s.of_filter_a.level, s.of_filter_b.level, s.of_filter_c.level, settled, clear_encoder,
+        hall_reverse, hall_offset, start_first, sector_counts,
+    )  # fmt: skip
+    timer, (omega_me, omega_valid) = timer_step(s.of_timer, s.step_up, s.step_down, sample_trigger, reverse, k_edge)
+    code = s.theta_hall >> (TURN_W - position_bits) if sample_trigger else s.code
+    following = State(filter_a, filter_b, filter_c, decoder, timer, code, theta_hall, step_up, step_down)
+    return following, (
+        code, omega_me, omega_valid, hall_valid, start_count, start_valid, illegal_count, skipped_count,
+    )  # fmt: skip
+
+
+def stimuli(rng, config):
+    """Turns in both directions at three speeds, bounce, a wire that is lost."""
+    rows = []
+    still = {p.name: 0 for p in BLOCK.inputs + BLOCK.registers} | {"k_edge": 900 << 16, "hall_offset": 9999}
+    still |= {"filter_clocks": 1, "start_first": 77, "sector_counts": 160}
+    for k in range(4200):
+        sector = (k // 23 if k < 1000 else 43 - k // 40 if k < 2200 else k // 9) % 6
+        hall = dict(zip(("hall_a", "hall_b", "hall_c"), hall_decoder.lines(sector), strict=True))
+        hall["hall_a"] ^= int(rng.integers(40) == 0)
+        hall["hall_b"] &= int(not 3000 < k < 3300)
+        rows.append(still | hall | {"sample_trigger": int(k % 61 == 0), "clear_encoder": int(k == 3500)})
+    return rows
+
+
+_PORTS = {
+    p.name: p
+    for module in (edge_timer, hall_decoder, input_filter)
+    for p in module.BLOCK.inputs + module.BLOCK.registers + module.BLOCK.outputs
+}
+REGISTERS = tuple(
+    _PORTS[n] for n in ("filter_clocks", "hall_reverse", "hall_offset", "start_first", "sector_counts")
+)
+
+BLOCK = Block(
+    name="hall_front",
+    folder="encoders",
+    paper="none: three Hall sensors, 120 degrees apart",
+    step=step,
+    inputs=(
+        *(Port(f"hall_{x}", BIT, doc=f"Hall sensor {x}, asynchronous pin") for x in "abc"),
+        Port("sample_trigger", BIT, doc="1: a sample begins"),
+        Port("clear_encoder", BIT, doc="1: clear the encoder's faults and counters"),
+    ),
+    registers=REGISTERS + (_PORTS["reverse"], _PORTS["k_edge"]),
+    outputs=(Port("code_theta", Format(0, 0, 16), doc="angle of the sector, latched by the trigger"),)
+    + tuple(_PORTS[n] for n in ("omega_me", "omega_valid", "hall_valid", "start_count", "start_valid"))
+    + tuple(_PORTS[n] for n in ("illegal_count", "skipped_count")),
+    state=State(),
+    latency=1,
+    clocked=True,
+    configs=({"POSITION_BITS": 16},),
+    width_from={"code_theta": code_format},
+    reference=None,
+    bound=None,
+    stimuli=stimuli,
+)

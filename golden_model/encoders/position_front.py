@@ -1,0 +1,191 @@
+"""The position of a board from its pins: the front end of one kind of encoder, and what the core needs of it.
+
+    encoder   0  external code    1  A/B/Z    2  Hall    3  A/B/Z started by Hall    4  SSI    5  BiSS-C    6  EnDat
+
+``sample_trigger`` latches code and count, or starts a frame; ``position_done`` says that code and speed are there.  The
+speed is that between edges where there are edges, else ``omega_set``, the register.  ``encoder_restart``: the count has
+moved to the first index or to a start since the trigger before, so this code has nothing to do with the last one.
+Encoder 3: the count starts from the Hall sensors when they are valid and the settings are good, once, and again after
+``clear_encoder``; the first index refers it.
+``encoder_flags``: bit 0 referenced, 1 moving, 2 index_lost, 3 index_wrong, 4 setting_refused, 5 hall_valid,
+6 position_valid, 7 position_lost, 8 alarm, 9 warning, 10 forward.
+Formats: those of the blocks.
+"""
+
+from typing import NamedTuple
+
+from fluxproof.golden_model.block import Block, Port
+from fluxproof.golden_model.encoders import hall_decoder, hall_front, incremental_encoder, serial_encoder
+from fluxproof.golden_model.encoders.quadrature_decoder import EVENTS
+from fluxproof.golden_model.encoders.turn_counter import COUNT
+from fluxproof.golden_model.fixed import Format
+from fluxproof.golden_model.formats import BIT, PU
+from fluxproof.golden_model.io.position import code_format
+from fluxproof.golden_model.kernel import kernel
+
+EXTERNAL, ABZ, HALL, HALL_ABZ = range(4)
+KINDS = ("external", "abz", "hall", "hall_abz", "ssi", "biss", "endat")
+FLAGS = Format(0, 11, 0)
+abz_step, hall_step, serial_step = incremental_encoder.step, hall_front.step, serial_encoder.step
+
+
+class State(NamedTuple):
+    of_abz: incremental_encoder.State = incremental_encoder.State()
+    of_hall: hall_front.State = hall_front.State()
+    of_serial: serial_encoder.State = serial_encoder.State()
+    code: int = 0
+    count: int = 0  # latched
+    moved: int = 0  # 1: the count was on its way since the last trigger
+    restart: int = 0
+    started: int = 0  # 1: the start of the count has been given
+    # Outputs that the next clock reads
+    abz_count: int = 0
+    moving: int = 0
+    refused: int = 0
+    start_count: int = 0
+    start_valid: int = 0
+
+
+@kernel
+def step(
+    state, pin_a, pin_b, pin_z, hall_a, hall_b, hall_c, serial_data, position_in, sample_trigger, codes_valid,
+    clear_encoder, omega_set, reverse, filter_clocks, index_phase, counts, code_step, code_rest, correct_max, k_edge,
+    hall_reverse, hall_offset, start_first, sector_counts, half_period, encoder_bits, turn_bits, gray, parity_on,
+    crc_on, start_max, mode_command, two_errors, position_delay, bridge_max, encoder, position_bits,
+):  # fmt: skip
+    s = state
+    trigger = sample_trigger
+    abz, hall, serial = s.of_abz, s.of_hall, s.of_serial
+    code, omega, done, count, moving, refused = s.code, omega_set, 0, 0, 0, 0
+    forward, referenced, index_count, illegals, lost, index_lost, index_wrong = 0, 0, 0, 0, 0, 0, 0
+    hall_code, hall_omega, hall_done, hall_valid, start_count, start_valid, hall_illegals = 0, 0, 0, 0, 0, 0, 0
+    serial_clock, data_out, data_drive, position_valid, position_lost, bridged, alarm, warning = 1, 0, 0, 0, 0, 0, 0, 0
+    start = 1 if s.start_valid and not s.refused and not s.started else 0
+
+    if encoder == HALL or encoder == HALL_ABZ:
+        hall, (hall_code, hall_omega, hall_done, hall_valid, start_count, start_valid, hall_illegals, _) = hall_step(
+            s.of_hall, hall_a, hall_b, hall_c, trigger, clear_encoder, filter_clocks, hall_reverse, hall_offset,
+            start_first, sector_counts, reverse, k_edge, position_bits,
+        )  # fmt: skip
+    if encoder == ABZ or encoder == HALL_ABZ:
+        abz, (
+            code, omega, done, count, forward, referenced, moving, index_count, illegals, lost, index_lost, index_wrong,
+            refused,
+        ) = abz_step(
+            s.of_abz, pin_a, pin_b, pin_z, trigger, start, s.start_count, clear_encoder, filter_clocks, index_phase,
+            counts, code_step, code_rest, correct_max, reverse, k_edge, position_bits,
+        )  # fmt: skip
+    elif encoder == HALL:
+        code, omega, done, illegals = hall_code, hall_omega, hall_done, hall_illegals
+    elif encoder == EXTERNAL:
+        code, done = position_in if trigger else s.code, trigger
+    else:
+        serial, (
+            serial_clock, data_out, data_drive, code, done, position_valid, position_lost, bridged, alarm, warning,
+        ) = serial_step(
+            s.of_serial, serial_data, trigger, codes_valid, clear_encoder, half_period, encoder_bits, turn_bits, gray,
+            parity_on, crc_on, start_max, mode_command, two_errors, position_delay, bridge_max, encoder, position_bits,
+        )  # fmt: skip
+
+    on_the_way = 1 if s.moved or s.moving else 0
+    following = State(
+        abz,
+        hall,
+        serial,
+        code,
+        s.abz_count if trigger else s.count,
+        0 if trigger else on_the_way,
+        on_the_way if trigger else s.restart,
+        0 if s.refused or clear_encoder else (1 if s.started or start else 0),
+        count,
+        moving,
+        refused,
+        start_count,
+        start_valid,
+    )
+    flags = (
+        referenced + (moving << 1) + (index_lost << 2) + (index_wrong << 3) + (refused << 4) + (hall_valid << 5)
+        + (position_valid << 6) + (position_lost << 7) + (alarm << 8) + (warning << 9) + (forward << 10)
+    )  # fmt: skip
+    f = following
+    return following, (
+        code, f.restart, omega, done, f.count, flags, index_count, illegals, lost, bridged, index_wrong, position_lost,
+        serial_clock, data_out, data_drive,
+    )  # fmt: skip
+
+
+def stimuli(rng, config):
+    """The stimuli of the encoder that is built, each with its own settings."""
+    still = {p.name: 0 for p in BLOCK.inputs + BLOCK.registers}
+    encoder, rows = config["ENCODER"], []
+    if encoder in (ABZ, HALL_ABZ):
+        names = {"sample": "sample_trigger", "clear_faults": "clear_encoder"}
+        for k, row in enumerate(incremental_encoder.stimuli(rng, config)):
+            row = {names.get(name, name): value for name, value in row.items()}
+            sector = hall_decoder.lines(k // 97)
+            hall = dict(zip(("hall_a", "hall_b", "hall_c"), sector, strict=True)) | {"sector_counts": 160}
+            rows.append(still | {n: v for n, v in row.items() if n in still} | hall)
+    elif encoder == HALL:
+        rows = [still | row for row in hall_front.stimuli(rng, config)]
+    elif encoder == EXTERNAL:
+        rows = [still | {"position_in": int(rng.integers(256)), "sample_trigger": int(k % 5 == 0)} for k in range(300)]
+    else:
+        rows = [still | row for row in serial_encoder.stimuli(rng, config)]
+    return rows
+
+
+_PORTS = {
+    p.name: p
+    for module in (hall_front, serial_encoder, incremental_encoder)
+    for p in module.BLOCK.inputs + module.BLOCK.registers + module.BLOCK.outputs
+}
+
+BLOCK = Block(
+    name="position_front",
+    folder="encoders",
+    paper="none: front end of a board",
+    step=step,
+    inputs=(
+        *(_PORTS[n] for n in ("pin_a", "pin_b", "pin_z")),
+        *(Port(f"hall_{x}", BIT, doc=f"Hall sensor {x}, asynchronous pin") for x in "abc"),
+        _PORTS["serial_data"],
+        Port("position_in", Format(0, 0, 16), doc="position code from elsewhere, latched by the trigger"),
+        *(_PORTS[n] for n in ("sample_trigger", "codes_valid", "clear_encoder")),
+        Port("omega_set", PU, doc="electrical speed, where the encoder has no edges"),
+        _PORTS["reverse"],
+    ),
+    registers=tuple(
+        _PORTS[n]
+        for n in (
+            "filter_clocks", "index_phase", "counts", "code_step", "code_rest", "correct_max", "k_edge", "hall_reverse",
+            "hall_offset", "start_first", "sector_counts",
+        )
+    )
+    + serial_encoder.REGISTERS,
+    outputs=(
+        Port("encoder_code", Format(0, 0, 16), doc="position code of the encoder, latched by the trigger"),
+        Port("encoder_restart", BIT, doc="1: it has nothing to do with the one before"),
+        Port("omega_now", PU, doc="electrical speed between edges"),
+        Port("position_done", BIT, doc="1: position and speed are there"),
+        Port("encoder_count", COUNT, doc="count of the encoder, latched by the trigger"),
+        Port("encoder_flags", FLAGS, doc="flags of the encoder, see position_front"),
+        _PORTS["index_count"],
+        _PORTS["illegal_count"],
+        _PORTS["lost_counts"],
+        Port("bridged_count", EVENTS, doc="samples without a good frame, saturates"),
+        _PORTS["index_wrong"],
+        _PORTS["position_lost"],
+        Port("serial_clock", BIT, doc="clock line of a serial encoder, idle 1"),
+        Port("serial_out", BIT, doc="its data line as driven"),
+        Port("serial_drive", BIT, doc="1: drive its data line"),
+    ),
+    state=State(),
+    latency=1,
+    clocked=True,
+    after_reset={"serial_clock": 1},
+    configs=tuple({"ENCODER": encoder, "POSITION_BITS": 16} for encoder in range(len(KINDS))),
+    width_from={"position_in": code_format, "encoder_code": code_format},
+    reference=None,
+    bound=None,
+    stimuli=stimuli,
+)

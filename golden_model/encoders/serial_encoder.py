@@ -1,0 +1,112 @@
+"""An absolute encoder from its lines to a code for each sample: the master of its protocol and the bridge, wired.
+
+Nothing is computed here.  A frame starts with ``sample_trigger``; the bridge's sample is the strobe of the converters'
+codes, so a frame that has ended by then is this sample's.  ``encoder`` is 4 (SSI), 5 (BiSS-C) or 6 (EnDat).
+"""
+
+from typing import NamedTuple
+
+from fluxproof.golden_model.block import Block, Port
+from fluxproof.golden_model.encoders import biss_master, endat_master, position_bridge, ssi_master
+from fluxproof.golden_model.formats import BIT
+from fluxproof.golden_model.io.position import code_format
+from fluxproof.golden_model.kernel import kernel
+
+SSI, BISS, ENDAT = 4, 5, 6
+ssi_step, biss_step, endat_step = ssi_master.step, biss_master.step, endat_master.step
+bridge_step = position_bridge.step
+
+
+class State(NamedTuple):
+    of_ssi: ssi_master.State = ssi_master.State()
+    of_biss: biss_master.State = biss_master.State()
+    of_endat: endat_master.State = endat_master.State()
+    of_bridge: position_bridge.State = position_bridge.State()
+    # Outputs that the next clock reads
+    code: int = 0
+    code_valid: int = 0
+
+
+@kernel
+def step(
+    state, serial_data, sample_trigger, codes_valid, clear_encoder, half_period, encoder_bits, turn_bits, gray,
+    parity_on, crc_on, start_max, mode_command, two_errors, position_delay, bridge_max, encoder, position_bits,
+):  # fmt: skip
+    s = state
+    ssi, biss, endat = s.of_ssi, s.of_biss, s.of_endat
+    data_out, data_drive, alarm, warning = 0, 0, 0, 0
+    if encoder == SSI:
+        ssi, (serial_clock, code, code_valid, _, _) = ssi_step(
+            s.of_ssi, serial_data, sample_trigger, half_period, encoder_bits, turn_bits, gray, parity_on, position_bits
+        )
+    elif encoder == BISS:
+        biss, (serial_clock, code, code_valid, _, alarm, warning, _) = biss_step(
+            s.of_biss, serial_data, sample_trigger, half_period, encoder_bits, turn_bits, crc_on, start_max,
+            position_bits,
+        )  # fmt: skip
+    else:
+        endat, (serial_clock, data_out, data_drive, code, code_valid, _, alarm, _) = endat_step(
+            s.of_endat, serial_data, sample_trigger, half_period, mode_command, two_errors, encoder_bits, turn_bits,
+            crc_on, start_max, position_bits,
+        )  # fmt: skip
+    bridge, (code_theta, code_done, position_valid, position_lost, bridged_count) = bridge_step(
+        s.of_bridge, s.code, s.code_valid, codes_valid, clear_encoder, position_delay, bridge_max, position_bits
+    )
+    following = State(ssi, biss, endat, bridge, code, code_valid)
+    return following, (
+        serial_clock, data_out, data_drive, code_theta, code_done, position_valid, position_lost, bridged_count, alarm,
+        warning,
+    )  # fmt: skip
+
+
+def stimuli(rng, config):
+    """Frames of noise and of a line at rest, with samples after and before their end."""
+    rows = []
+    row = {p.name: 0 for p in BLOCK.inputs + BLOCK.registers} | {"serial_data": 1, "bridge_max": 3, "start_max": 60}
+    row |= {"half_period": 1, "encoder_bits": 12, "turn_bits": 10, "mode_command": 7, "position_delay": 1 << 15}
+    for turn in range(12):
+        for k in range(250):
+            noise = int(rng.integers(2)) if turn % 3 == 1 else int(k % 7 > turn % 5) if turn % 3 else 1
+            now = {"sample_trigger": int(k == 5), "codes_valid": int(k == 200), "serial_data": noise}
+            rows.append(row | now | {"clear_encoder": int(turn == 8 and k == 100)})
+    return rows
+
+
+_MASTERS = {p.name: p for m in (endat_master, biss_master, ssi_master) for p in m.BLOCK.registers + m.BLOCK.outputs}
+_BRIDGE = {p.name: p for p in position_bridge.BLOCK.registers + position_bridge.BLOCK.outputs}
+REGISTERS = (
+    _MASTERS["half_period"],
+    Port("encoder_bits", _MASTERS["word_bits"].fmt, doc="bits of the encoder's word"),
+    *(_MASTERS[n] for n in ("turn_bits", "gray", "parity_on", "crc_on", "start_max", "mode_command", "two_errors")),
+    Port("position_delay", _BRIDGE["delay"].fmt, doc="time from the encoder's latch to the currents', samples"),
+    _BRIDGE["bridge_max"],
+)
+
+BLOCK = Block(
+    name="serial_encoder",
+    folder="encoders",
+    paper="none: absolute encoders",
+    step=step,
+    inputs=(
+        Port("serial_data", BIT, doc="data line, asynchronous pin"),
+        Port("sample_trigger", BIT, doc="1: read the position"),
+        Port("codes_valid", BIT, doc="1: the codes of the converters are there"),
+        Port("clear_encoder", BIT, doc="1: clear the encoder's faults and counters"),
+    ),
+    registers=REGISTERS,
+    outputs=(
+        Port("serial_clock", BIT, doc="clock line, idle 1"),
+        *(_MASTERS[n] for n in ("data_out", "data_drive")),
+        *(_BRIDGE[n] for n in ("code_theta", "code_valid", "position_valid", "position_lost", "bridged_count")),
+        *({p.name: p for p in biss_master.BLOCK.outputs}[n] for n in ("alarm", "warning")),
+    ),
+    state=State(),
+    latency=1,
+    clocked=True,
+    after_reset={"serial_clock": 1},
+    configs=({"ENCODER": ENDAT, "POSITION_BITS": 16},),  # position_front has the others
+    width_from={"code_theta": code_format},
+    reference=None,
+    bound=None,
+    stimuli=stimuli,
+)
