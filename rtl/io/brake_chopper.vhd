@@ -30,7 +30,6 @@ architecture rtl of brake_chopper is
 
   signal state : state_t;
 
-  signal valid : std_logic;
   signal bus_0 : unsigned(LIMIT_W - 1 downto 0);
 begin
   bus_0 <= u_dc(DUTY_W - 1 downto DUTY_W - LIMIT_W);
@@ -38,7 +37,7 @@ begin
   process (clk)
   begin
     if rising_edge(clk) then
-      valid <= in_valid;
+      out_valid <= in_valid;
 
       -- Stage 1: on, off, or as before
       if in_valid = '1' then
@@ -50,13 +49,12 @@ begin
       end if;
 
       if rst = '1' then
-        valid       <= '0';
+        out_valid   <= '0';
         state.brake <= '0';
       end if;
     end if;
   end process;
 
   brake_asked <= state.brake;
-  out_valid   <= valid;
 
 end architecture rtl;
