@@ -17,7 +17,7 @@ from fluxproof.cosim.golden_clock import SEEN, GoldenClock
 from fluxproof.golden_model import fluxproof
 from fluxproof.golden_model.io import sample_latch
 from fluxproof.golden_model.kernel import kernel
-from fluxproof.plant import Inverter, Machine, Sensors, SwitchingPlant, centred_gates, sensor_params
+from fluxproof.plant import Inverter, Machine, Sensors, SwitchingPlant, centred_gates, half_gates, sensor_params
 from fluxproof.plant.sensors import current_code, position_code, u_dc_code
 
 INPUT_PORTS = tuple(p.name for p in sample_latch.BLOCK.inputs if p.name != "run_in")
@@ -26,7 +26,7 @@ SAMPLE_DELAY = 4  # clocks from sample_trigger to sample_valid: the conversion t
 
 @dataclass(frozen=True)
 class Scenario:
-    """References, load and bus voltage per period: arrays of equal length."""
+    """References, load and bus voltage per sample, a period of the loops here: arrays of equal length."""
 
     omega_ref: np.ndarray  # integers, per unit format
     load: np.ndarray  # [Nm]
@@ -77,7 +77,7 @@ def load_torque(load, brake, omega_m):
 
 @dataclass
 class Period:
-    """The outputs of a device in one period, from one sample_trigger to the next."""
+    """The outputs of a device from one sample_trigger to the next: a PWM period, half of one with double_update."""
 
     observed: dict[str, int] | None  # None if no sample was processed
     edge_clocks: np.ndarray
@@ -244,7 +244,7 @@ class PlantPeriods:
     """A scenario's plant period by period: its sensors' codes for the core, gate edges back."""
 
     def __init__(self, drive, scenario: Scenario, sensors: Sensors | None = None, machine: Machine | None = None):
-        self.scenario, self.period_s = scenario, 1.0 / drive.inverter.pwm_frequency_hz
+        self.scenario, self.period_s = scenario, drive.sample_time_s
         self.plant, described = build_plant(drive, sensors, machine, scenario.omega_m)
         self.codes, self.slow_inputs, self.rows = sensor_params(described), scenario.slow_inputs(), []
 
@@ -285,6 +285,7 @@ async def cosimulate(
     gates are still compared edge by edge.
     """
     plant, duties = PlantPeriods(drive, scenario, sensors, machine), np.zeros(3)
+    levels, waits = np.zeros(3), np.zeros(3)  # of half_gates
     comparison = Comparison(device, register_set)
     await comparison.start(int(scenario.enable[0]))
     for k in range(len(scenario)):
@@ -293,7 +294,10 @@ async def cosimulate(
         got = await comparison.period(plant.inputs(k), int(scenario.enable[k]))
         times, words = got.edge_clocks * (plant.period_s / got.clocks), got.gate_words
         if ideal_inverter:
-            times, words = centred_gates(duties, 0.0, plant.period_s)
+            if register_set.values.double_update:
+                times, words = half_gates(duties, 1 - 2 * (k & 1), levels, waits, 0.0, plant.period_s)
+            else:
+                times, words = centred_gates(duties, 0.0, plant.period_s)
             duties = np.array(comparison.observed[-1][-3:]) / comparison.config.carrier_half
         plant.advance(k, times, words)
         progress(k + 1, len(scenario))

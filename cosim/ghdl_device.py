@@ -26,7 +26,7 @@ def now() -> int:
 async def prepare(dut, registers, enable: int = 0) -> None:
     """Registers set, all other inputs zero, clock started, four clocks of reset; ends at a falling edge."""
     inputs = {p.name: 0 for p in sample_latch.BLOCK.inputs if p.name != "run_in"}
-    inputs |= {"sample_valid": 0, "trip": 0, "clear_trip": 0, "enable": enable, "rst": 1}
+    inputs |= {"sample_valid": 0, "trip": 0, "clear_trip": 0, "host_write": 0, "enable": enable, "rst": 1}
     for name, value in {**registers._asdict(), **inputs}.items():
         getattr(dut, name).value = int(value)
     Clock(dut.clk, CLOCK_NS, unit="ns").start()

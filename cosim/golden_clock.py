@@ -23,7 +23,7 @@ def run_clocks(state, inputs, regs, carrier_half, until_trigger, seen):
     for k in range(seen.shape[0]):
         state, entered, now = clocked.step(state, inputs, regs, carrier_half)
         row = seen[k]  # unpacked, because a loop compiles to a hundred times as much code
-        row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7], row[8] = now
+        row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7], row[8], row[9] = now
         if until_trigger and now.sample_trigger:
             return state, k + 1, entered
     return state, seen.shape[0], entered
@@ -48,7 +48,7 @@ class GoldenClock:
         """(clocks made, len(SEEN)) integers; fewer than ``clocks`` if ``until_trigger`` found sample_trigger.
 
         ``sample``: the raw sample's ports, applied with sample_valid at the first clock.  ``pins``: enable, trip,
-        clear_trip from now on.
+        clear_trip, host_write from now on.
         """
         self.inputs = self.inputs._replace(**pins)
         rows, left = [], clocks
@@ -81,13 +81,12 @@ class GoldenClock:
     def _enter(self, sample: Mapping[str, int]) -> None:
         """The results of a sample that enters at this clock, and their clocks."""
         self.samples.append(fluxproof.Sample(*sample.values(), self.running))
-        # The duties use the minimum pulse in force, updated at a valley, not a setting that the gates refuse.
-        registers = self.registers._replace(min_pulse=self.state.of_gate_generation.min_pulse)
+        # The duties use what is in force: a minimum pulse that the gates refuse is not, nor double_update given while
+        # they are on.
+        gates = self.state.of_gate_generation
+        registers = self.registers._replace(min_pulse=gates.min_pulse, double_update=gates.double_update)
         self.of_samples, self.observed = fluxproof.step(
             self.of_samples, self.samples[-1], registers, self.config
         )
-        for after, names in (
-            (clocked.CHECKS_CLOCKS, ("sample_faults", "sample_trip")),
-            (clocked.COMPARE_CLOCKS, ("compare_a", "compare_b", "compare_c")),
-        ):
+        for after, names in clocked.DUE.values():
             self._due.append((self.clock + after, {name: getattr(self.observed, name) for name in names}))

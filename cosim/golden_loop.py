@@ -14,6 +14,7 @@ from fluxproof.plant import (
     advance_averaged,
     advance_switching,
     centred_gates,
+    half_gates,
     initial_state,
     plant_params,
     sensor_params,
@@ -44,7 +45,8 @@ def run_controller(state, samples, registers, config, observed):
 
 @mixed_kernel
 def run_averaged(state, references, u_dc, load, registers, config, plant_state, plant_params, sensors, period_s, out):
-    """Closed loop over the averaged plant; the duties of a sample act in the next period.
+    """Closed loop over the averaged plant; the duties of a sample act in the next period of ``period_s``, which is half
+    a PWM period with double_update.
 
     ``references`` (n, 4) int64: omega_ref, i_d_ref, i_q_ext, speed_mode; ``u_dc`` [V], ``load`` [Nm] (n,).
     ``out`` (n, 8) float64 receives i_d, i_q [A], lambda_d, lambda_q [Wb], omega_m [rad/s], torque [Nm] before the
@@ -71,7 +73,8 @@ def run_averaged(state, references, u_dc, load, registers, config, plant_state, 
             1,
         )
         state, seen = fluxproof.step(state, sample, registers, config)
-        advance_averaged(plant_state, plant_params, duties, u_dc[k], load[k], period_s)
+        half = (1 - 2 * (k & 1)) * registers.double_update
+        advance_averaged(plant_state, plant_params, duties, u_dc[k], load[k], period_s, half)
         out[k, 6], out[k, 7] = plant_state[L.U_ALPHA], plant_state[L.U_BETA]
         duties[0] = seen.compare_a / config.carrier_half
         duties[1] = seen.compare_b / config.carrier_half
@@ -86,13 +89,14 @@ PLANT = ("i_d", "i_q", "lambda_d", "lambda_q", "omega_m", "torque")
 @mixed_kernel
 def run_switching(
     state, samples, u_dc, load, brake, registers, config, plant_state, plant_params, sensors, dead_time_s, period_s,
-    first, free, out, observed,
+    first, free, out, observed, levels, waits,
 ):  # fmt: skip
     """Closed loop over the switching plant; returns the controller's state.
 
     ``samples`` (n, 8) int64: the fields of fluxproof.Sample after the codes; ``u_dc`` [V], ``load``,
     ``brake`` [Nm] (n,), with an imposed speed ``load`` [rad/s].  ``first``: number of the first period, for the
-    sensors' noise.  ``out`` (n, 6) receives the signals of PLANT before each period, ``observed`` the core's.
+    sensors' noise, and with double_update for the half: even ones rise; ``levels``, ``waits`` are those of half_gates.
+    ``out`` (n, 6) receives the signals of PLANT before each period, ``observed`` the core's.
     """
     duties = np.zeros(3)
     for k in range(load.shape[0]):
@@ -120,9 +124,13 @@ def run_switching(
         state, seen = fluxproof.step(state, sample, registers, config)
         for n, value in enumerate(seen):
             observed[k, n] = value
-        times, words = centred_gates(duties, dead_time_s, period_s)
+        if registers.double_update:
+            half = 1 - 2 * ((first + k) & 1)
+            times, words = half_gates(duties, half, levels, waits, dead_time_s, period_s)
+        else:
+            times, words = centred_gates(duties, dead_time_s, period_s)
         if not samples[k, 7]:
-            words[:] = 0
+            words[:], levels[:], waits[:] = 0, 0.0, dead_time_s
         pull = load_torque(load[k], brake[k], plant_state[L.OMEGA_M]) if free else load[k]
         advance_switching(plant_state, plant_params, times, words, u_dc[k], pull, period_s, -1.0)
     return state
@@ -158,6 +166,7 @@ def simulate(
     brake = np.zeros(n) if scenario.brake is None else scenario.brake
     out, observed = np.zeros((n, len(PLANT))), np.zeros((n, len(fluxproof.Observed._fields)), np.int64)
     state, values = state or fluxproof.State(), register_set.values
+    levels, waits = np.zeros(3), np.full(3, float(dead_time_s))
     shown = set() if progress is None else set(range(0, n, PROGRESS_PERIODS))
     ends = [*sorted((set(scenario.changes) | shown) - {0}), n]
     for start, end in zip([0, *ends[:-1]], ends, strict=True):
@@ -166,7 +175,7 @@ def simulate(
         state = run_switching(
             state, inputs[part], scenario.u_dc[part], scenario.load[part], brake[part], values, register_set.config,
             plant_state, params, codes, float(dead_time_s), drive.sample_time_s, start, mode == FREE,
-            out[part], observed[part],
+            out[part], observed[part], levels, waits,
         )  # fmt: skip
         if progress is not None:
             progress(end, n)

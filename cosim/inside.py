@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fluxproof.golden_model import fluxproof
 
-ESTIMATION = "estimation"  # the generate block of the estimators
+INSIDE = ("estimation", "safety")  # the generate block of the estimators, the instance of protection
 # Value -> (instance that drives it, port of its block).
 DRIVER = {
     name: (label, port.name)
@@ -14,8 +14,11 @@ DRIVER = {
 
 
 def instance(core, label: str):
-    """The handle of an instance of fluxproof.vhd; ``core`` is the handle of the core itself."""
-    return getattr(core, label) if hasattr(core, label) else getattr(getattr(core, ESTIMATION), label)
+    """The handle of an instance of fluxproof.vhd or protection.vhd; ``core`` is the handle of the core itself."""
+    for scope in (core, *(getattr(core, name) for name in INSIDE if hasattr(core, name))):
+        if hasattr(scope, label):
+            return getattr(scope, label)
+    raise AttributeError(f"no instance {label} in the core")
 
 
 def handle_of(core, name: str):

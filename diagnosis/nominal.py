@@ -61,7 +61,8 @@ class Nominal:
     @property
     def sample_time_s(self) -> float:
         """Time between two consecutive rows [s]."""
-        return self.control.sample_time_s or 1.0 / self.inverter.pwm_frequency_hz
+        period = 1.0 / self.inverter.pwm_frequency_hz
+        return self.control.sample_time_s or period / self.core.updates_per_period
 
 
 def load_nominal(path) -> Nominal:

@@ -1,29 +1,38 @@
-"""The part of the core that runs at every clock: sample guard, fault latch and gates, wired as in rtl/fluxproof.vhd.
+"""The part of the core that runs at every clock, wired as in rtl/fluxproof.vhd and rtl/io/protection.vhd.
 
-One step is one clock; ``State`` holds the blocks' states and the registers between them.  ``compare_*``,
-``sample_faults`` and ``sample_trip`` come from fluxproof.step.  They are valid ``COMPARE_CLOCKS`` and
-``CHECKS_CLOCKS`` clocks after the clock at which the sample entered, from the following step on.
+Sample guard, host watch, fault latch, gates and the pin of the brake resistor.
+One step is one clock; ``State`` holds the blocks' states and the registers between them.  The values of a sample come
+from fluxproof.step.  They are valid as many clocks after the clock at which the sample entered as ``DUE`` says, from
+the following step on.
 """
 
 from typing import NamedTuple
 
 from fluxproof.golden_model import fluxproof
-from fluxproof.golden_model.io import fault_latch, sample_guard
+from fluxproof.golden_model.io import fault_latch, host_watch, sample_guard
 from fluxproof.golden_model.kernel import kernel
 from fluxproof.golden_model.modulation import gate_generation
 
 INTERVAL = fluxproof.SAMPLE_INTERVAL
-COMPARE_CLOCKS, CHECKS_CLOCKS = (fluxproof.schedule()[name][1] for name in ("compare", "checks"))
+# clocks after a sample entered -> its values that are valid then
+DUE = {
+    name: (fluxproof.schedule()[name][1], fluxproof.outputs_of(name))
+    for name in ("checks", "chopper", "zero_check", "motion", "load", "compare")
+}
+CHECKS_CLOCKS = DUE["checks"][0]
 
 
 class State(NamedTuple):
     of_sample_guard: sample_guard.State = sample_guard.State()
+    of_host_watch: host_watch.State = host_watch.State()
     of_fault_latch: fault_latch.State = fault_latch.State()
     of_gate_generation: gate_generation.State = gate_generation.State()
     # Outputs that the next clock reads
     sample_busy: int = 0
     sample_early: int = 0
     sample_late: int = 0
+    host_lost: int = 0
+    period: int = 0
     fault_stop: int = 0
     gate_clear: int = 0
 
@@ -35,8 +44,13 @@ class Inputs(NamedTuple):
     enable: int = 0
     trip: int = 0
     clear_trip: int = 0
+    host_write: int = 0
     sample_faults: int = 0
     sample_trip: int = 0
+    current_offset: int = 0
+    motion_faults: int = 0
+    open_load: int = 0
+    brake_asked: int = 0
     compare_a: int = 0
     compare_b: int = 0
     compare_c: int = 0
@@ -54,6 +68,7 @@ class Seen(NamedTuple):
     first_fault: int
     early_samples: int
     setting_refused: int
+    brake: int
 
 
 @kernel
@@ -65,19 +80,24 @@ def step(state, inputs, regs, carrier_half):
     )
     entered = 1 if x.sample_valid and not s.sample_busy else 0
 
+    host_state, (host_lost,) = host_watch.step(s.of_host_watch, x.host_write, s.period, r.heartbeat)
     latch_state, (fault_flags, first_fault, fault_stop, gate_clear) = fault_latch.step(
         s.of_fault_latch,
         x.trip,
         x.sample_faults,
         s.sample_late,
         s.sample_early,
+        x.motion_faults,
+        x.open_load,
+        x.current_offset,
+        s.host_lost,
         x.enable,
         x.clear_trip,
         r.fault_ignore,
     )
     gate_trip = 1 if x.trip or s.fault_stop or (x.sample_trip and x.enable) else 0
 
-    gate_state, (gate_high, gate_low, sample_trigger, running, tripped, setting_refused, _, _) = (
+    gate_state, (gate_high, gate_low, sample_trigger, running, tripped, setting_refused, _, _, _) = (
         gate_generation.step(
             s.of_gate_generation,
             x.compare_a,
@@ -88,12 +108,14 @@ def step(state, inputs, regs, carrier_half):
             s.gate_clear,
             r.dead_time,
             r.min_pulse,
+            r.double_update,
             carrier_half,
         )
     )
     following = State(
-        guard_state, latch_state, gate_state, sample_busy, sample_early, sample_late, fault_stop, gate_clear
-    )
+        guard_state, host_state, latch_state, gate_state, sample_busy, sample_early, sample_late, host_lost,
+        sample_trigger, fault_stop, gate_clear,
+    )  # fmt: skip
     seen = Seen(
         gate_high,
         gate_low,
@@ -104,5 +126,6 @@ def step(state, inputs, regs, carrier_half):
         first_fault,
         early_samples,
         setting_refused,
+        1 if x.brake_asked and not s.sample_late else 0,
     )
     return following, entered, seen

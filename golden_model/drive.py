@@ -66,12 +66,12 @@ class Control:
     """[control]; a gain given here overrides the one calculated from the bandwidths."""
 
     current_bandwidth_hz: float = positive("Hz", "current loop")
-    sample_time_s: float | None = positive("s", "1 / pwm_frequency_hz", None)
+    sample_time_s: float | None = positive("s", "1 / pwm_frequency_hz; half, if updated twice", None)
     duty_applied_after_samples: int = whole(0, 10, "whole samples between a duty and its period", 1)
     delay_samples: float = not_negative("samples", "from sampling to the mean of the voltage", 1.5, most=10.0)
     speed_bandwidth_hz: float | None = positive("Hz", "speed loop; none: no speed control", None)
     speed_filter_hz: float | None = positive("Hz", "filter of the measured speed; none: no filter", None)
-    current_limit_a: float | None = positive("A", "limit of the q reference, rated current if none", None)
+    current_limit_a: float | None = positive("A", "limit of the current, rated current if none", None)
     voltage_reserve: float = not_negative("1", "part of the voltage circle left unused", 0.0, most=0.99)
     current_kp_d_v_per_a: float | None = not_negative("V/A", "override", None)
     current_kp_q_v_per_a: float | None = not_negative("V/A", "override", None)
@@ -122,7 +122,7 @@ class Sensors:
 class Sampling:
     """[sampling], optional: when currents and position are taken; see docs/board.md."""
 
-    delay_s: float = real("s", "real sampling instant after the valley, negative before it", 0.0)
+    delay_s: float = real("s", "real sampling instant after the valley or peak, negative before it", 0.0)
 
 
 @dataclass(frozen=True)
@@ -138,7 +138,17 @@ class Protection:
     u_dc_min_v: float | None = not_negative("V", "a tenth of the nominal bus if none", None)
     u_dc_max_v: float | None = positive("V", "1.3 times the nominal bus if none", None)
     position_jump_rad: float | None = positive("rad", "mechanical, deviation from the extrapolated position", None)
-    watchdog_periods: float = positive("1", "longest time without a sample, in PWM periods", 1.5)
+    watchdog_periods: float = positive("1", "longest time without a sample, in sample times", 1.5)
+    overspeed_rad_s: float | None = positive("rad/s", "mechanical; 1.2 times the rated speed if none", None)
+    runaway_rad_s: float | None = positive("rad/s", "mechanical, against the reference; a tenth of rated if none", None)
+    runaway_s: float = positive("s", "longest time against the reference without braking", 0.02)
+    standstill_rad_s: float | None = positive("rad/s", "mechanical; the shaft stands below; 1 % of rated if none", None)
+    stall_s: float = positive("s", "time at the current limit at standstill that is a stall", 0.5)
+    open_load_a: float | None = positive("A", "current that a connected phase reaches; 2 % of rated if none", None)
+    current_offset_a: float | None = positive("A", "mean of a phase at rest; 1 % of the rated current if none", None)
+    heartbeat_s: float = not_negative("s", "longest time without a write of the host; 0: no limit", 0.0)
+    brake_on_v: float | None = positive("V", "brake resistor on from this bus voltage; none: no brake resistor", None)
+    brake_off_v: float | None = positive("V", "off below this one; 97 % of brake_on_v if none", None)
     trip_overcurrent: bool = flag("false: reported, no trip", True)
     trip_current_sum: bool = flag("false: reported, no trip; for a third current calculated from two", True)
     trip_at_rail: bool = flag("false: reported, no trip", True)
@@ -146,6 +156,12 @@ class Protection:
     trip_u_dc_high: bool = flag("false: reported, no trip", True)
     trip_position: bool = flag("false: reported, no trip", True)
     trip_watchdog: bool = flag("false: reported, no trip", True)
+    trip_overspeed: bool = flag("false: reported, no trip", True)
+    trip_runaway: bool = flag("false: reported, no trip", True)
+    trip_stall: bool = flag("true: a stall trips", False)
+    trip_open_load: bool = flag("true: an open load trips", False)
+    trip_current_offset: bool = flag("false: reported, no trip", True)
+    trip_host_lost: bool = flag("false: reported, no trip", True)
 
 
 @dataclass(frozen=True)
@@ -153,6 +169,7 @@ class Core:
     """[core]"""
 
     clock_hz: float = positive("Hz", "of the core; a whole multiple of twice the PWM frequency")
+    updates_per_period: int = whole(1, 2, "1: sampled and updated at the valley; 2: at the valley and the peak", 1)
     estimators: bool = flag("false: field-oriented control alone; flux_mode and the compensation have no effect", True)
 
 
@@ -207,12 +224,12 @@ class Drive:
 
     @property
     def sample_time_s(self):
-        """One sample per PWM period, at the valley of the carrier."""
-        return 1.0 / self.inverter.pwm_frequency_hz
+        """A PWM period, sampled at the valley of the carrier; half of one, if sampled at the peak too."""
+        return 1.0 / (self.core.updates_per_period * self.inverter.pwm_frequency_hz)
 
     @property
     def sampling_to_voltage_s(self):
-        """From the real sampling instant to the middle of the period in which the voltage acts."""
+        """From the real sampling instant to the middle of the period (or half) in which the voltage acts."""
         return self.control.delay_samples * self.sample_time_s - self.sampling.delay_s
 
     @property

@@ -3,6 +3,7 @@
 import math
 
 from fluxproof.golden_model.drive_keys import DriveError
+from fluxproof.golden_model.fluxproof import SAMPLE_INTERVAL
 from fluxproof.golden_model.formats import PU, VECTOR
 from fluxproof.golden_model.front_ends import check_converters, check_encoder
 
@@ -21,18 +22,19 @@ def _refuse(key, value, allowed):
 
 
 def _sample_time(drive):
-    """The duties are updated once a period, at the valley."""
+    """The duties are updated at the valley, or at valley and peak."""
     given, period = drive.control.sample_time_s, drive.sample_time_s
     if given is not None and abs(given / period - 1.0) > WHOLE:
         frequency = f"[inverter] pwm_frequency_hz = {drive.inverter.pwm_frequency_hz:g}"
-        _refuse("[control] sample_time_s", given, f"{period:g} s, one PWM period, since {frequency}")
+        part = "one PWM period" if drive.core.updates_per_period == 1 else "half a PWM period"
+        _refuse("[control] sample_time_s", given, f"{period:g} s, {part}, since {frequency}")
 
 
 def _sampling(drive):
-    """A sample belongs to the valley that it is nearest to, and its voltage acts later."""
+    """A sample belongs to the valley or peak that it is nearest to, and its voltage acts later."""
     delay, half = drive.sampling.delay_s, drive.sample_time_s / 2.0
     if not abs(delay) < half:
-        _refuse("[sampling] delay_s", delay, f"between -{half:g} and {half:g} s, half a PWM period")
+        _refuse("[sampling] delay_s", delay, f"between -{half:g} and {half:g} s, half a sample time")
     if drive.sampling_to_voltage_s < 0.0:
         most = drive.control.delay_samples * drive.sample_time_s
         _refuse("[sampling] delay_s", delay, f"up to {most:g} s, [control] delay_samples")
@@ -46,12 +48,17 @@ def _carrier(drive):
     if not lo <= exact <= hi or abs(exact / round(exact) - 1.0) > WHOLE:
         allowed = f"a whole number from {lo} to {hi}"
         raise DriveError(f"{keys} make {exact:.9g} clocks in half a PWM period: allowed is {allowed}")
+    if drive.core.updates_per_period == 2 and exact < SAMPLE_INTERVAL:
+        raise DriveError(
+            f"{keys} make {exact:.9g} clocks in half a PWM period: with [core] updates_per_period = 2 each half has a "
+            f"sample, which takes {SAMPLE_INTERVAL} clocks"
+        )
 
 
 def _pulses(drive):
     """gate_generation refuses anything but 0 < dead_time < min_pulse <= half a period."""
     inverter = drive.inverter
-    dead, pulse, half = inverter.dead_time_s, inverter.min_pulse_s, drive.sample_time_s / 2.0
+    dead, pulse, half = inverter.dead_time_s, inverter.min_pulse_s, 0.5 / inverter.pwm_frequency_hz
     if not dead < pulse:
         _refuse("[inverter] dead_time_s", dead, f"above 0 and below min_pulse_s = {pulse:g} s")
     if not pulse <= half:
@@ -159,6 +166,13 @@ def _protection(drive):
     if p.u_dc_max_v is not None and not bus < p.u_dc_max_v <= reach:
         allowed = f"above [inverter] dc_bus_v = {bus:g} V, up to [sensors] u_dc_range_v = {reach:g} V"
         _refuse("[protection] u_dc_max_v", p.u_dc_max_v, allowed)
+    if p.brake_off_v is not None and (p.brake_on_v is None or not p.brake_off_v < p.brake_on_v):
+        _refuse("[protection] brake_off_v", p.brake_off_v, f"below brake_on_v = {p.brake_on_v or 0.0:g} V")
+    if p.brake_on_v is not None and not bus < p.brake_on_v <= reach:
+        allowed = f"above [inverter] dc_bus_v = {bus:g} V, up to [sensors] u_dc_range_v = {reach:g} V"
+        _refuse("[protection] brake_on_v", p.brake_on_v, allowed)
+    if p.overspeed_rad_s is not None and not p.overspeed_rad_s > drive.machine.rated_speed_rad_s:
+        _refuse("[protection] overspeed_rad_s", p.overspeed_rad_s, "above [machine] rated_speed_rad_s")
     if not p.watchdog_periods > 1.0:
         _refuse("[protection] watchdog_periods", p.watchdog_periods, "above 1; trip_watchdog = false ignores it")
 

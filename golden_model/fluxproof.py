@@ -11,6 +11,7 @@ from fluxproof.golden_model import estimation
 from fluxproof.golden_model.block import Port
 from fluxproof.golden_model.control import (
     chord_speed,
+    current_limit,
     current_pi,
     dead_time_compensation,
     decoupling,
@@ -36,10 +37,16 @@ from fluxproof.golden_model.estimators import (
     winding_resistance,
 )
 from fluxproof.golden_model.estimators.flux_models import CURRENT_MODEL
+from fluxproof.golden_model.fixed import Format
 from fluxproof.golden_model.formats import PU
 from fluxproof.golden_model.io import (
+    brake_chopper,
     current_conditioning,
     fault_latch,
+    host_watch,
+    load_check,
+    motion_checks,
+    offset_check,
     position,
     sample_checks,
     sample_guard,
@@ -64,8 +71,9 @@ WIRING = {
     "delay": (svm_delay_compensation, ("angle", "speed_measurement")),
     "trig": (sincos, ("angle", "delay")),
     "rotor_frame": (park, ("stator_frame", "trig")),
-    "speed_regulator": (speed_pi, ("speed_measurement",)),
-    "current_regulators": (current_pi, ("rotor_frame", "speed_regulator")),
+    "current_circle": (current_limit, ("latch",)),
+    "speed_regulator": (speed_pi, ("speed_measurement", "current_circle")),
+    "current_regulators": (current_pi, ("rotor_frame", "speed_regulator", "current_circle")),
     "resistance": (winding_resistance, ("latch",)),
     "merged_flux": (flux_park, ("trig",)),
     "models": (flux_models, ("rotor_frame", "merged_flux", "resistance")),
@@ -93,6 +101,10 @@ WIRING = {
     "directions": (current_directions, ("compensation_dq", "stator_frame", "speed_measurement")),
     "monitor": (flux_monitor, ("inverter_loss", "compensation", "merge", "bus_reciprocal")),
     "checks": (sample_checks, ("conditioning", "bus_voltage")),
+    "zero_check": (offset_check, ("conditioning", "speed_measurement")),
+    "motion": (motion_checks, ("speed_regulator",)),
+    "load": (load_check, ("motion", "conditioning", "angle")),
+    "chopper": (brake_chopper, ("bus_voltage",)),
 }
 
 
@@ -116,7 +128,7 @@ EARLY = {
     ("stator_voltage", "circle"): 1,
 }
 
-AT_THE_CLOCK = (sample_guard, fault_latch, gate_generation)  # wired in golden_model/clocked.py
+AT_THE_CLOCK = (sample_guard, host_watch, fault_latch, gate_generation)  # wired in golden_model/clocked.py
 MODULES = (*dict.fromkeys(module for module, _ in WIRING.values()), *AT_THE_CLOCK)
 
 
@@ -174,6 +186,7 @@ class Sample(NamedTuple):
 
 class State(NamedTuple):
     of_speed: speed.State = speed.State()
+    of_current_limit: current_limit.State = current_limit.State()
     of_speed_pi: speed_pi.State = speed_pi.State()
     of_current_pi: current_pi.State = current_pi.State()
     of_voltage_limit: voltage_limit.State = voltage_limit.State()
@@ -185,6 +198,10 @@ class State(NamedTuple):
     of_psi_adaline: psi_adaline.State = psi_adaline.State()
     of_clean_voltage: clean_voltage.State = clean_voltage.State()
     of_sample_checks: sample_checks.State = sample_checks.State()
+    of_offset_check: offset_check.State = offset_check.State()
+    of_motion_checks: motion_checks.State = motion_checks.State()
+    of_load_check: load_check.State = load_check.State()
+    of_brake_chopper: brake_chopper.State = brake_chopper.State()
     # Outputs that the next sample reads: the feedback paths of the top entity.
     sat_d: int = 0
     sat_q: int = 0
@@ -263,6 +280,15 @@ class Observed(NamedTuple):
     temp_lost: int
     sample_faults: int
     sample_trip: int
+    current_offset: int
+    motion_faults: int
+    open_load: int
+    brake_asked: int
+    code_a: int
+    code_b: int
+    code_c: int
+    code_u_dc: int
+    code_theta: int
     compare_a: int
     compare_b: int
     compare_c: int
@@ -298,11 +324,12 @@ def step(state, sample, regs, config):
     if c.estimators:
         given = estimation.for_control(state, x, r, cos_theta, sin_theta, cos_out, sin_out)
         flux_mode = r.flux_mode
+    current_limit_state, (i_d_limited, i_q_max) = current_limit.step(state.of_current_limit, x.i_d_ref, r.i_max)
     speed_pi_state, (i_q_ref, speed_limited) = speed_pi.step(
-        state.of_speed_pi, x.omega_ref, omega_me, x.i_q_ext, x.speed_mode, x.run, r.speed_kp, r.speed_ki, r.i_max
+        state.of_speed_pi, x.omega_ref, omega_me, x.i_q_ext, i_q_max, x.speed_mode, x.run, r.speed_kp, r.speed_ki
     )
     current_pi_state, (u_pi_d, u_pi_q, u_int_d, u_int_q) = current_pi.step(
-        state.of_current_pi, i_d, i_q, x.i_d_ref, i_q_ref, state.sat_d, state.sat_q, x.run, r.kp_d, r.ki_d, r.kp_q,
+        state.of_current_pi, i_d, i_q, i_d_limited, i_q_ref, state.sat_d, state.sat_q, x.run, r.kp_d, r.ki_d, r.kp_q,
         r.ki_q,
     )  # fmt: skip
     model_d, model_q, merged_d, merged_q, merged, ended = flux_models.step(
@@ -320,7 +347,9 @@ def step(state, sample, regs, config):
 
     u_alpha, u_beta = inverse_park.step(u_d, u_q, cos_out, sin_out)
     duty_a, duty_b, duty_c = svm.step(u_alpha, u_beta, inverse, inverse_beta)
-    compare_a, compare_b, compare_c = pwm_compare.step(duty_a, duty_b, duty_c, r.min_pulse, c.carrier_half)
+    compare_a, compare_b, compare_c = pwm_compare.step(
+        duty_a, duty_b, duty_c, r.min_pulse, r.double_update, c.carrier_half
+    )
 
     after, e = estimation.kept(state), NOTHING_ESTIMATED
     if c.estimators:
@@ -336,11 +365,23 @@ def step(state, sample, regs, config):
         r.sum_trip, r.rail_samples, r.u_dc_min, r.u_dc_max, r.jump_max, r.fault_ignore,
         r.position_restart, c.position_bits,
     )  # fmt: skip
+    offset_check_state, (current_offset,) = offset_check.step(
+        state.of_offset_check, i_a, i_b, i_c, omega_me, x.run, r.omega_stall, r.offset_max
+    )
+    motion_checks_state, (motion_faults,) = motion_checks.step(
+        state.of_motion_checks, omega_me, x.omega_ref, x.speed_mode, speed_limited, x.run, r.omega_trip, r.omega_away,
+        r.runaway_samples, r.omega_stall, r.stall_samples,
+    )  # fmt: skip
+    load_check_state, (open_load,) = load_check.step(
+        state.of_load_check, i_a, i_b, i_c, i_q_ref, theta_me, x.run, motion_faults, r.i_open
+    )
+    brake_chopper_state, (brake_asked,) = brake_chopper.step(state.of_brake_chopper, u_dc, r.brake_on, r.brake_off)
 
     following = State(
-        speed_state, speed_pi_state, current_pi_state, voltage_limit_state, after.of_flux_merge, after.of_delta_lambda,
-        after.of_flux_compensation, after.of_flux_monitor, after.of_v_dead_adaline, after.of_psi_adaline,
-        after.of_clean_voltage, checks_state, sat_d, sat_q, compare_a, compare_b, compare_c, after.lambda_m_alpha,
+        speed_state, current_limit_state, speed_pi_state, current_pi_state, voltage_limit_state, after.of_flux_merge,
+        after.of_delta_lambda, after.of_flux_compensation, after.of_flux_monitor, after.of_v_dead_adaline,
+        after.of_psi_adaline, after.of_clean_voltage, checks_state, offset_check_state, motion_checks_state,
+        load_check_state, brake_chopper_state, sat_d, sat_q, compare_a, compare_b, compare_c, after.lambda_m_alpha,
         after.lambda_m_beta, after.merge_known, after.lambda_pi_d, after.lambda_pi_q, after.lambda_add_d,
         after.lambda_add_q, after.v_comp, after.v_leg, after.s_alpha, after.s_beta,
     )  # fmt: skip
@@ -351,6 +392,7 @@ def step(state, sample, regs, config):
         e.u_applied_beta, e.lambda_c_d, e.lambda_c_q, e.lambda_m_alpha, e.lambda_m_beta, e.merge_known,
         e.delta_lambda_d, e.delta_lambda_q, e.delta_held, e.lambda_pi_d, e.lambda_pi_q, e.torque, e.flux_faults, e.d_d,
         e.d_q, e.v_dead, e.v_comp, e.v_comp_limited, e.psi_m, e.psi_held, e.temp_lost, sample_faults, sample_trip,
+        current_offset, motion_faults, open_load, brake_asked, x.adc_a, x.adc_b, x.adc_c, x.adc_u_dc, x.position_code,
         compare_a, compare_b, compare_c,
     )  # fmt: skip
 
@@ -362,4 +404,5 @@ OBSERVED = {
     if p.name in Observed._fields
 }
 OBSERVED |= {p.name: p for p in (D_D, D_Q)}
+OBSERVED["code_theta"] = Port("code_theta", Format(0, 0, 18), doc="position code, one mechanical turn")
 OBSERVED |= {f"u_comp_{x}": Port(f"u_comp_{x}", PU, doc=f"compensation voltage, {x} axis") for x in "dq"}

@@ -25,6 +25,45 @@ _OF_UNIT = {
 UNITS = {name: unit for unit, names in _OF_UNIT.items() for name in names.split()}  # the rest: "1"
 
 
+# What 1.0 of a number in a register is: SI unit -> product of the bases (drive.py), the sample time T_s and the clock.
+ONE_IS = {
+    "1": "1",
+    "A": "I_base",
+    "V": "U_base",
+    "rad/s": "omega_base",
+    "Wb": "U_base/omega_base",
+    "Nm": "1.5*pole_pairs*I_base*U_base/omega_base",
+    "degC": "1 degC",
+    "rad": "2*pi rad",
+    "turn": "2*pi rad",
+    "code": "half the codes",
+    "ohm": "U_base/I_base",
+    "ohm/K": "U_base/I_base/K",
+    "H": "U_base/omega_base/I_base",
+    "V/A": "U_base/I_base",
+    "V/(A s)": "U_base/I_base/T_s",
+    "A s/rad": "I_base/omega_base",
+    "A/rad": "I_base/omega_base/T_s",
+    "1/A": "1/I_base",
+    "s": "1/omega_base",
+    "s2": "1/omega_base/omega_base",
+    "s/rad": "1/omega_base",
+    "s2/rad2": "1/omega_base/omega_base",
+    "1/s": "1/T_s",
+}
+_ONE_OF_REGISTER = {
+    "k_delay": "2*pi/omega_base",
+    "omega_0": "1/T_s",
+    **dict.fromkeys(("dead_time", "min_pulse", "watchdog"), "1/clock_hz"),
+    **dict.fromkeys(("runaway_samples", "stall_samples", "heartbeat"), "T_s"),
+}
+
+
+def one_is(name, si_unit):
+    """What 1.0 of a register or status value is, for software: electrical speed, peak values."""
+    return _ONE_OF_REGISTER.get(name) or ONE_IS[si_unit]
+
+
 def unit(name):
     """SI unit of a signal; electrical angles and speeds, peak values; "1" for duties, flags and counts."""
     return UNITS.get(name, "1")

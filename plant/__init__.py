@@ -13,7 +13,7 @@ from fluxproof.plant.inverter import Inverter, averaged_leg_voltage
 from fluxproof.plant.kernel import PlantParams, refresh
 from fluxproof.plant.layout import STATE_SIZE, empty_state, state_names
 from fluxproof.plant.mechanics import FREE, IMPOSED_SPEED, Profile, profile, profile_at
-from fluxproof.plant.modulation import centred_gates
+from fluxproof.plant.modulation import FALLING, RISING, centred_gates, half_gates
 from fluxproof.plant.pmsm import Harmonic, Machine, flux_from_currents, machine_params
 from fluxproof.plant.sensors import (
     Sensors,
@@ -26,8 +26,10 @@ from fluxproof.plant.sensors import (
 from fluxproof.plant.switching import advance_switching
 
 __all__ = [
+    "FALLING",
     "FREE",
     "IMPOSED_SPEED",
+    "RISING",
     "STATE_SIZE",
     "AveragedPlant",
     "FluxMap",
@@ -45,6 +47,7 @@ __all__ = [
     "current_code",
     "empty_state",
     "flux_from_currents",
+    "half_gates",
     "hash_normal",
     "initial_state",
     "layout",

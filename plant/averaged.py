@@ -10,12 +10,13 @@ _NONE = (0.0, 0.0, 0.0)
 
 
 @njit
-def advance_averaged(state, params, duties, u_dc, load, period_s):
-    """Advance the state in place by one PWM period.
+def advance_averaged(state, params, duties, u_dc, load, period_s, half=0):
+    """Advance the state in place by one PWM period, or by half of one.
 
     duties: three indexable values, high time of the legs / period, clipped to 0..1.
     u_dc: bus voltage [V].  load: load torque [Nm], or in IMPOSED_SPEED mode the
     mechanical speed [rad/s] at the period's end, reached along a ramp.
+    half: 0, or 1 and -1 if period_s is the rising or falling half of a PWM period (see `averaged_leg`).
     The voltage errors of the legs depend on the currents at the start of each sub-step.
     """
     inv = params.inverter
@@ -35,9 +36,9 @@ def advance_averaged(state, params, duties, u_dc, load, period_s):
         if inv.ideal:
             v, r = (d_a * u_dc, d_b * u_dc, d_c * u_dc), _NONE
         else:
-            v_a, r_a = averaged_leg(inv, d_a, u_dc, state[L.I_A], period_s)
-            v_b, r_b = averaged_leg(inv, d_b, u_dc, state[L.I_B], period_s)
-            v_c, r_c = averaged_leg(inv, d_c, u_dc, state[L.I_C], period_s)
+            v_a, r_a = averaged_leg(inv, d_a, u_dc, state[L.I_A], period_s, half)
+            v_b, r_b = averaged_leg(inv, d_b, u_dc, state[L.I_B], period_s, half)
+            v_c, r_c = averaged_leg(inv, d_c, u_dc, state[L.I_C], period_s, half)
             v, r = (v_a, v_b, v_c), (r_a, r_b, r_c)
         drive = sources(state, params, v, r, state[L.TORQUE], load_torque, acceleration)
         accept(state, drive, try_step(state, params, drive, step_s), step_s, period_s)

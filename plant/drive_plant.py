@@ -114,10 +114,10 @@ class _Plant:
 class AveragedPlant(_Plant):
     """Drive with the averaged plant: duties once per period."""
 
-    def advance(self, duties, u_dc, load, period_s):
+    def advance(self, duties, u_dc, load, period_s, half=0):
         """One period (see `advance_averaged`); returns the state vector."""
         duties = np.asarray(duties, float)
-        advance_averaged(self.state, self.params, duties, float(u_dc), float(load), period_s)
+        advance_averaged(self.state, self.params, duties, float(u_dc), float(load), period_s, half)
         return self.state
 
     def skewed_currents(self, skew_s):

@@ -57,8 +57,10 @@ def inverter_params(inverter):
 
 
 @njit
-def averaged_leg(inv, duty, u_dc, current, period_s):
+def averaged_leg(inv, duty, u_dc, current, period_s, half=0):
     """Mean Thevenin source (v [V], r [ohm]) of a leg over one period.
+
+    half: 0, period_s is a whole period; 1 or -1, it is the rising or falling half of one, with a duty of its own.
 
     Dead time delays every turn-on: with i > 0 the leg's high time shrinks by
     dead_time once per period (v lower by u_dc dead_time / period), with i < 0 it
@@ -71,7 +73,12 @@ def averaged_leg(inv, duty, u_dc, current, period_s):
         sign = 1.0 if current > 0.0 else (-1.0 if current < 0.0 else 0.0)
     share = inv.dead_time / period_s
     high = duty
-    if sign > 0.0 and duty < 1.0:
+    if half != 0:
+        # A rising half has the turn-on of the upper switch, which i > 0 waits for; a falling one that of the lower
+        if 0.0 < duty < 1.0:
+            lost = min(share, duty) if half > 0 else min(share, 1.0 - duty)
+            high -= half * 0.5 * (1.0 + half * sign) * lost
+    elif sign > 0.0 and duty < 1.0:
         high -= sign * min(share, duty)
     elif sign < 0.0 and duty > 0.0:
         high -= sign * min(share, 1.0 - duty)

@@ -8,12 +8,11 @@
 -- ESTIMATORS = 0 leaves out the flux estimator and both Adalines: the decoupling then uses the current model alone, as
 -- with flux_mode 0, dead time is not compensated, and what they would show is zero.
 -- Formats: per unit, see golden_model/formats.py; settings as `fluxproof registers drive.toml` prints them.
--- Latency: sample_valid to duty_valid FLUXPROOF_SAMPLE_TO_DUTY clocks; samples at least
--- FLUXPROOF_SAMPLE_INTERVAL apart.
+-- Latency: sample_valid to duty_valid FLUXPROOF_SAMPLE_TO_DUTY clocks; samples FLUXPROOF_SAMPLE_INTERVAL or more apart.
 -- Settings change only between samples, at the latest at the edge at which a sample enters (a setting then applies to
--- this sample, a reference to the next); dead_time and min_pulse at any time, they take effect at the valley;
--- watchdog and fault_ignore at any time.
--- Protection: a sample that comes too early is rejected; a faulty sample, a missing one and trip switch the gates off.
+-- this sample, a reference to the next; i_d_ref and i_max, a pair, one sample later); dead_time and min_pulse at any
+-- time, they take effect at the valley; double_update while the gates are off; watchdog and fault_ignore at any time.
+-- Protection: a sample that comes too early is rejected; what switches the gates off is in io/protection.vhd.
 -- Rounding: see the blocks.
 
 library ieee;
@@ -37,17 +36,20 @@ entity fluxproof is
     enable          : in  std_logic;  -- 1: gates may switch
     trip            : in  std_logic;  -- 1: gates off, latched
     clear_trip      : in  std_logic;  -- 1: clear the latched trip
+    host_write      : in  std_logic;  -- 1: the host has written a register, see host_watch
     gate_high       : out unsigned(2 downto 0);  -- upper gates, bit 0 is leg a
     gate_low        : out unsigned(2 downto 0);  -- lower gates, bit 0 is leg a
-    sample_trigger  : out std_logic;  -- middle of the zero vector: take a sample
+    sample_trigger  : out std_logic;  -- middle of the zero vector (of both with double_update): take a sample
     running         : out std_logic;  -- gates are switching
     tripped         : out std_logic;  -- 1: a trip is latched
     sample_busy     : out std_logic;  -- a sample is in flight: settings must not change
-    fault_flags     : out unsigned(8 downto 0);  -- faults since the last clear_trip, see fault_latch
-    first_fault     : out unsigned(7 downto 0);  -- faults that tripped first
+    brake           : out std_logic;  -- brake resistor on
+    fault_flags     : out unsigned(14 downto 0);  -- faults since the last clear_trip, see fault_latch
+    first_fault     : out unsigned(14 downto 0);  -- faults that tripped first
     early_samples   : out unsigned(7 downto 0);  -- samples rejected because they came too early
     setting_refused : out std_logic;  -- 1: dead_time and min_pulse contradict each other, refused
     min_pulse_used  : out unsigned(11 downto 0);  -- minimum pulse in force
+    double_used     : out std_logic;  -- double_update in force
     carrier         : out unsigned(15 downto 0);  -- carrier, for observation
     duty_valid      : out std_logic;  -- 1: the duties of the sample are valid
     compare_valid   : out std_logic;  -- 1: the compare values are valid
@@ -68,6 +70,7 @@ architecture rtl of fluxproof is
   -- Strobes
   signal sample_entered, latch_valid, current_soon    : std_logic;
   signal current_valid, theta_valid, omega_valid      : std_logic;
+  signal dc_valid, reference_valid                    : std_logic;
   signal dc_soon, alpha_beta_soon, dq_soon            : std_logic;
   signal trig_soon, trig_valid                        : std_logic;
   signal models_valid, lambda_valid, decoupling_valid : std_logic;
@@ -76,7 +79,7 @@ architecture rtl of fluxproof is
 
   -- Values between the blocks of the control
   signal inverse, inverse_beta                  : unsigned(U_DC_PROCESSING_INVERSE_W - 1 downto 0);
-  signal i_alpha, i_beta                        : signed(PU_W - 1 downto 0);
+  signal i_alpha, i_beta, i_d_limited, i_q_max  : signed(PU_W - 1 downto 0);
   signal theta_out                              : unsigned(TURN_W - 1 downto 0);
   signal cos_theta, sin_theta, cos_out, sin_out : signed(PU_W - 1 downto 0);
   signal u_pi_d, u_pi_q                         : signed(PU_W - 1 downto 0);
@@ -91,22 +94,13 @@ architecture rtl of fluxproof is
   signal minus_rho              : signed(MINUS_RHO_W - 1 downto 0);
 
   -- Protection
-  signal guard_busy, sample_early, sample_late : std_logic;
-  signal fault_stop, gate_trip, gate_clear     : std_logic;
+  signal guard_busy, gate_trip, gate_clear, period : std_logic;
 
   signal o : observed_t;
   signal e : estimated_t;
 begin
 
   -- Raw sample
-
-  guard : entity work.sample_guard
-    generic map (INTERVAL => FLUXPROOF_SAMPLE_INTERVAL)
-    port map (clk => clk, rst => rst,
-              sample_valid => sample_valid, clear_trip => clear_trip,
-              watchdog => settings.watchdog,
-              sample_busy => guard_busy, sample_early => sample_early, sample_late => sample_late,
-              early_samples => early_samples);
 
   sample_entered <= sample_valid and not guard_busy;
 
@@ -157,7 +151,7 @@ begin
     port map (clk => clk, rst => rst, in_valid => latch_valid,
               code_u_dc => code_u_dc,
               u_dc_offset => settings.u_dc_offset, u_dc_gain => settings.u_dc_gain, k_u_max => settings.k_u_max,
-              out_soon => dc_soon, out_valid => open, u_dc => o.u_dc, u_max => o.u_max, u_dc_at_rail => o.u_dc_at_rail);
+              out_soon => dc_soon, out_valid => dc_valid, u_dc => o.u_dc, u_max => o.u_max, u_dc_at_rail => o.u_dc_at_rail);
 
   bus_reciprocal : entity work.u_dc_processing
     port map (clk => clk, rst => rst, in_valid => dc_soon,
@@ -190,15 +184,22 @@ begin
 
   -- Control
 
+  current_circle : entity work.current_limit
+    port map (clk => clk, rst => rst, in_valid => latch_valid,
+              i_d_ref => i_d_ref,
+              i_max => settings.i_max,
+              out_valid => open, i_d_limited => i_d_limited, i_q_max => i_q_max);
+
   speed_regulator : entity work.speed_pi
     port map (clk => clk, rst => rst, in_valid => omega_valid,
-              omega_ref => omega_ref, omega_me => o.omega_me, i_q_ext => i_q_ext, speed_mode => speed_mode, run => run,
-              speed_kp => settings.speed_kp, speed_ki => settings.speed_ki, i_max => settings.i_max,
-              out_valid => open, i_q_ref => o.i_q_ref, speed_limited => o.speed_limited);
+              omega_ref => omega_ref, omega_me => o.omega_me, i_q_ext => i_q_ext, i_q_max => i_q_max,
+              speed_mode => speed_mode, run => run,
+              speed_kp => settings.speed_kp, speed_ki => settings.speed_ki,
+              out_valid => reference_valid, i_q_ref => o.i_q_ref, speed_limited => o.speed_limited);
 
   current_regulators : entity work.current_pi
     port map (clk => clk, rst => rst, in_valid => dq_soon,
-              i_d => o.i_d, i_q => o.i_q, i_d_ref => i_d_ref, i_q_ref => o.i_q_ref, sat_d => o.sat_d, sat_q => o.sat_q,
+              i_d => o.i_d, i_q => o.i_q, i_d_ref => i_d_limited, i_q_ref => o.i_q_ref, sat_d => o.sat_d, sat_q => o.sat_q,
               run => run,
               kp_d => settings.kp_d, ki_d => settings.ki_d, kp_q => settings.kp_q, ki_q => settings.ki_q,
               out_soon => open, out_valid => open, u_pi_d => u_pi_d, u_pi_q => u_pi_q, u_int_d => o.u_int_d,
@@ -253,7 +254,7 @@ begin
     generic map (CARRIER_HALF => CARRIER_HALF)
     port map (clk => clk, rst => rst, in_valid => duty_ready,
               duty_a => o.duty_a, duty_b => o.duty_b, duty_c => o.duty_c,
-              min_pulse => min_pulse_used,
+              min_pulse => min_pulse_used, double_update => double_used,
               out_valid => compare_ready, compare_a => o.compare_a, compare_b => o.compare_b, compare_c => o.compare_c);
 
   -- Estimators
@@ -411,41 +412,42 @@ begin
 
   -- Protection and gates
 
-  checks : entity work.sample_checks
+  safety : entity work.protection
     generic map (POSITION_BITS => POSITION_BITS)
-    port map (clk => clk, rst => rst, in_valid => current_valid,
+    port map (clk => clk, rst => rst, sample_valid => sample_valid, current_valid => current_valid,
+              dc_valid => dc_valid, omega_valid => omega_valid, reference_valid => reference_valid,
               i_a => o.i_a, i_b => o.i_b, i_c => o.i_c, current_at_rail => o.current_at_rail, u_dc => o.u_dc,
-              u_dc_at_rail => o.u_dc_at_rail, code_theta => code_theta,
-              i_trip => settings.i_trip, sum_trip => settings.sum_trip, rail_samples => settings.rail_samples,
-              u_dc_min => settings.u_dc_min, u_dc_max => settings.u_dc_max, jump_max => settings.jump_max,
-              fault_ignore => settings.fault_ignore, position_restart => settings.position_restart,
-              out_valid => open, sample_faults => o.sample_faults, sample_trip => o.sample_trip);
-
-  fault_memory : entity work.fault_latch
-    port map (clk => clk, rst => rst,
-              trip => trip, sample_faults => o.sample_faults, sample_late => sample_late, sample_early => sample_early,
-              enable => enable, clear_trip => clear_trip,
-              fault_ignore => settings.fault_ignore,
-              fault_flags => fault_flags, first_fault => first_fault, fault_stop => fault_stop,
-              gate_clear => gate_clear);
-
-  -- A faulty sample trips without waiting for the fault latch; without enable the gates are off and nothing is latched.
-  gate_trip <= trip or fault_stop or (o.sample_trip and enable);
+              u_dc_at_rail => o.u_dc_at_rail, code_theta => code_theta, theta_me => o.theta_me, omega_me => o.omega_me,
+              omega_ref => omega_ref, speed_mode => speed_mode, i_q_ref => o.i_q_ref, speed_limited => o.speed_limited,
+              run => run, trip => trip, enable => enable, clear_trip => clear_trip, host_write => host_write,
+              period => period,
+              settings => settings,
+              sample_busy => guard_busy, early_samples => early_samples, sample_faults => o.sample_faults,
+              sample_trip => o.sample_trip, motion_faults => o.motion_faults, open_load => o.open_load,
+              current_offset => o.current_offset, brake_asked => o.brake_asked, fault_flags => fault_flags,
+              first_fault => first_fault, gate_trip => gate_trip, gate_clear => gate_clear, brake => brake);
 
   gates : entity work.gate_generation
     generic map (CARRIER_HALF => CARRIER_HALF)
     port map (clk => clk, rst => rst,
               compare_a => o.compare_a, compare_b => o.compare_b, compare_c => o.compare_c, enable => enable,
               trip => gate_trip, clear_trip => gate_clear,
-              dead_time => settings.dead_time, min_pulse => settings.min_pulse,
-              gate_high => gate_high, gate_low => gate_low, sample => sample_trigger, running => running,
+              dead_time => settings.dead_time, min_pulse => settings.min_pulse, double_update => settings.double_update,
+              gate_high => gate_high, gate_low => gate_low, sample => period, running => running,
               tripped => tripped, setting_refused => setting_refused, min_pulse_used => min_pulse_used,
-              carrier => carrier);
+              double_used => double_used, carrier => carrier);
 
-  sample_busy   <= guard_busy;
-  duty_valid    <= duty_ready;
-  compare_valid <= compare_ready;
-  observed      <= o;
-  estimated     <= e;
+  o.code_a     <= resize(code_a, o.code_a'length);
+  o.code_b     <= resize(code_b, o.code_b'length);
+  o.code_c     <= resize(code_c, o.code_c'length);
+  o.code_u_dc  <= resize(code_u_dc, o.code_u_dc'length);
+  o.code_theta <= resize(code_theta, o.code_theta'length);
+
+  sample_trigger <= period;
+  sample_busy    <= guard_busy;
+  duty_valid     <= duty_ready;
+  compare_valid  <= compare_ready;
+  observed       <= o;
+  estimated      <= e;
 
 end architecture rtl;

@@ -201,7 +201,7 @@ begin
     write_word(16#170#, 4);
     write_word(16#174#, 10);
     write_word(16#11C#, 65536);
-    write_word(16#17C#, 16#7F#);
+    write_word(16#17C#, 16#7FFF#);
     write_word(16#04C#, 1);
     read_word(16#170#);
     expect(to_integer(unsigned(s_axi_rdata)) = 4, "dead_time cannot be read back");
@@ -224,6 +224,7 @@ begin
     wait for 8 * CARRIER_HALF * PERIOD;
     expect(gate_high = "000" and gate_low = "000" and irq = '1', "a trip is forgotten");
     write_word(16#044#, 1);
+    write_word(16#06C#, 15);
     wait for 8 * CARRIER_HALF * PERIOD;
     expect(irq = '0' and (gate_low'last_event < 4 * CARRIER_HALF * PERIOD), "no gate after clear_trip");
 

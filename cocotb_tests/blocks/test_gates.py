@@ -18,7 +18,7 @@ def random_clocks(seed: int):
     """Inputs clock by clock: mostly constant, with trips, stops, and settings that change at any clock."""
     rng = np.random.default_rng(seed)
     row = {"compare_a": 10, "compare_b": 20, "compare_c": 30, "enable": 1, "trip": 0, "clear_trip": 0}
-    row |= {"dead_time": 3, "min_pulse": 8}
+    row |= {"dead_time": 3, "min_pulse": 8, "double_update": 0}
     for _ in range(CLOCKS):
         if rng.integers(20) == 0:
             name = rng.choice(["compare_a", "compare_b", "compare_c"])
@@ -27,6 +27,7 @@ def random_clocks(seed: int):
             row["enable"] ^= 1
         if rng.integers(150) == 0:
             row |= {"dead_time": int(rng.integers(0, 14)), "min_pulse": int(rng.integers(0, 2 * HALF))}
+            row["double_update"] = int(rng.integers(2))
         row["trip"] = int(rng.integers(400) == 0)
         row["clear_trip"] = int(rng.integers(200) == 0)
         row["enable"] |= int(rng.integers(100) == 0)
@@ -74,7 +75,7 @@ def test_trip_needs_an_explicit_clear():
     """After a trip the gates stay off; clear_trip has no effect while the trip is present, afterwards it enables."""
     state = BLOCK.state
     calm = {"compare_a": 20, "compare_b": 20, "compare_c": 20, "enable": 1, "trip": 0, "clear_trip": 0}
-    calm |= {"dead_time": 3, "min_pulse": 8}
+    calm |= {"dead_time": 3, "min_pulse": 8, "double_update": 0}
 
     def run(clocks, **changes):
         nonlocal state
@@ -98,6 +99,6 @@ def test_duty_of_zero_and_of_one(compare):
     state = BLOCK.state
     words = []
     for _ in range(10 * HALF):
-        state, out = step(state, compare, compare, compare, 1, 0, 0, 3, 8, HALF)
+        state, out = step(state, compare, compare, compare, 1, 0, 0, 3, 8, 0, HALF)
         words.append((out[0], out[1]))
     assert set(words[6 * HALF :]) == {(7, 0) if compare else (0, 7)}

@@ -105,7 +105,7 @@ def test_systemrdl_matches_the_register_map(top):
             if register.kind.writable:
                 assert (part.low, part.high) == (port.low, port.high)
     assert read["version"].reset == rdl.version_word() > 0
-    assert read["kp_d"].parts[0].unit == "V/A" and read["omega_ref"].parts[0].unit == "rad/s"
+    assert read["kp_d"].parts[0].unit == "U_base/I_base" and read["omega_ref"].parts[0].unit == "omega_base"
     assert {n: w.address for n, w in read.items()} == ADDRESSES
 
 

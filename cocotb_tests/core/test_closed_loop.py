@@ -18,9 +18,9 @@ from studies.timeline import __main__ as timeline
 PAPER = DRIVES / "paper001.toml"
 
 
-def close_loop(engine, path, scenario: str, carrier_half: int, key: str = ""):
+def close_loop(engine, path, scenario: str, carrier_half: int, key: str = "", periods: int | None = None):
     """(summary, arrays, registers) of one run; fails with the first difference."""
-    named = Named("fluxproof.cosim.runs:closed_loop", (str(path), carrier_half, scenario))
+    named = Named("fluxproof.cosim.runs:closed_loop", (str(path), carrier_half, scenario, periods))
     job = engine(f"test {scenario} {carrier_half}{key}", named)
     job.carry_out()
     assert job.problem is None, job.problem

@@ -24,7 +24,7 @@ def test_sensor_codes_convert_to_amperes_and_volts(path):
     code = full // 2 + full // 5
     amperes = (code - full / 2) / (full / 2) * s.current_range_a
     scaling = (v.offset_a, v.offset_b, v.offset_c, v.gain_a, v.gain_b, v.gain_c)
-    i_a, i_b, i_c, _ = current_conditioning.step(code, full // 2, 0, *scaling, config.adc_bits)
+    i_a, i_b, i_c, _ = current_conditioning.step(code, full // 2, 0, *scaling, v.two_sensors, config.adc_bits)
     assert to_si("i_a", i_a, drive) == pytest.approx(amperes, abs=si_per_lsb("i_a", drive))
     assert (i_b, to_si("i_c", i_c, drive)) == (0, -s.current_range_a)
     code = round(full * drive.inverter.dc_bus_v / s.u_dc_range_v)
@@ -58,7 +58,7 @@ def test_speed_regulator_product_is_amperes(path):
     result = registers(drive)
     v, kp = result.values, next(row.si for row in result.rows if row.name == "speed_kp")
     err = from_si("omega_ref", 0.5 * drive.current_limit_a / kp, drive)
-    _, (i_q_ref, limited) = speed_pi.step(speed_pi.State(), err, 0, 0, 1, 1, v.speed_kp, v.speed_ki, v.i_max)
+    _, (i_q_ref, limited) = speed_pi.step(speed_pi.State(), err, 0, 0, v.i_max, 1, 1, v.speed_kp, v.speed_ki)
     expected = kp * to_si("omega_ref", err, drive)
     assert limited == 0
     assert to_si("i_q_ref", i_q_ref, drive) == pytest.approx(expected, rel=1e-4)
@@ -89,7 +89,9 @@ def test_position_steps_give_speed_and_angle_advance(path):
     v, config, _ = registers(drive)
     state, code = speed.State(), 0
     for code in range(0, 3000, 10):
-        state, (omega_me,) = speed.step(state, code, v.reverse, v.k_speed, v.k_filter, config.position_bits)
+        state, (omega_me,) = speed.step(
+            state, code, v.reverse, v.k_speed, v.k_filter, 0, 0, 0, config.position_bits
+        )
     turns = 10 / 2**drive.sensors.position_bits
     omega = turns * 2 * math.pi * drive.machine.pole_pairs / drive.sample_time_s
     assert to_si("omega_me", omega_me, drive) == pytest.approx(omega, abs=2 * si_per_lsb("omega_me", drive))

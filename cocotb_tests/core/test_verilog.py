@@ -17,15 +17,28 @@ from fluxproof.cosim.sources import rtl_sources
 from fluxproof.cosim.stimulus import random_value
 from fluxproof.cosim.verilated import VerilatedCore
 from fluxproof.golden_model.fluxproof import REGISTERS, SAMPLE_INTERVAL
-from fluxproof.golden_model.io import fault_latch, sample_checks, sample_guard, sample_latch
+from fluxproof.golden_model.io import (
+    brake_chopper,
+    fault_latch,
+    host_watch,
+    load_check,
+    motion_checks,
+    offset_check,
+    sample_checks,
+    sample_guard,
+    sample_latch,
+)
+from fluxproof.golden_model.io.sample_checks import IGNORE
 
 GENERICS = {"ADC_BITS": 16, "POSITION_BITS": 16, "CARRIER_HALF": 100}
 OTHER = {"ADC_BITS": 12, "POSITION_BITS": 18, "CARRIER_HALF": 75}
 CLOCKS = 10000
 GAP = (SAMPLE_INTERVAL, 80)  # clocks from sample to sample
+CHECKS = (sample_guard, sample_checks, fault_latch, motion_checks, load_check, offset_check, brake_chopper, host_watch)
 PROTECTION = tuple(
-    p.name for block in (sample_guard, sample_checks, fault_latch) for p in block.BLOCK.registers
+    p.name for block in CHECKS for p in block.BLOCK.registers
 )  # fmt: skip
+RARE = {"current_offset", "open_load"}  # need 64 samples at rest, turns of the rotor: test_blocks, test_limits
 LATCHED = "run_in"  # the latch's input that the core makes itself
 MODERATE = {  # registers of the size a drive has, with which little saturates
     **dict.fromkeys(("offset_a", "offset_b", "offset_c"), 32768),
@@ -71,7 +84,7 @@ def registers(rng: np.random.Generator, moderate: bool) -> dict[str, int]:
 def protection(rng: np.random.Generator, moderate: bool) -> dict[str, int]:
     """Registers anywhere in their ranges; with the moderate samples every fault is reported and none trips."""
     values = {name: random_value(rng, REGISTERS[name]) for name in PROTECTION}
-    return values | ({"fault_ignore": 127} if moderate else {})
+    return values | ({"fault_ignore": IGNORE.hi} if moderate else {})
 
 
 def raw_sample(rng: np.random.Generator, generics: dict[str, int], moderate: bool = False) -> dict[str, int]:
@@ -182,7 +195,7 @@ def test_equals_vhdl_clock_by_clock(ghdl5, generics, tmp_path, capsys):
 
     # The comparison is significant only if every output changed.
     still = [name for j, name in enumerate(names) if len({row[j] for row in wanted} - {None}) < 2]
-    assert not still, f"the stimulus never moves {still}"
+    assert not set(still) - RARE, f"the stimulus never moves {still}"
     with capsys.disabled():
         equal = f"{CLOCKS} clocks x {len(names)} outputs are equal"
         print(f"\nseed {seed}: {equal}; {len(undefined)} values undefined before clock {first}")
@@ -202,7 +215,8 @@ def test_constant_wider_than_the_vector(ghdl5, tmp_path):
 
 
 def test_run_period_records_what_a_trace_shows(ghdl5):
-    settings = {"enable": 1, "fault_ignore": 127, "dead_time": 3, "min_pulse": 8, "lambda_mg": 9000, "u_dc_gain": 60000}
+    settings = {"enable": 1, "fault_ignore": IGNORE.hi, "dead_time": 3, "min_pulse": 8}
+    settings |= {"lambda_mg": 9000, "u_dc_gain": 60000}
     sample, sample_at = {"adc_a": 40000, "adc_u_dc": 50000, "position_code": 777}, 5
     names = ("gate_high", "gate_low", "sample_trigger")
     fast, slow = VerilatedCore(GENERICS), VerilatedCore(GENERICS)

@@ -17,7 +17,7 @@ SETTLED = {
     "dead_time": 3,
     "min_pulse": 8,
     "u_dc_gain": 65536,
-    "fault_ignore": 127,
+    "fault_ignore": 32767,
     "enable": 1,
     "telemetry_enable": 1,
 }

@@ -141,7 +141,7 @@ def test_trims_cancel_the_sensor_errors(reverse, tmp_path):
         i = [2.0, -1.5, -0.5]
         seen = current_conditioning.step(
             *(current_code(codes, k, i[k], 0) for k in range(3)),
-            r.offset_a, r.offset_b, r.offset_c, r.gain_a, r.gain_b, r.gain_c, config.adc_bits,
+            r.offset_a, r.offset_b, r.offset_c, r.gain_a, r.gain_b, r.gain_c, 0, config.adc_bits,
         )  # fmt: skip
         wanted = [
             x * (1.0 + error * g) + error * o for x, g, o in zip(i, (0.02, 0, -0.03), (0.1, -0.05, 0.02))

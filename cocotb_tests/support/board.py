@@ -28,7 +28,7 @@ class Board:
         self.drive, self.trip_at = drive, trip_at
         self.plant, sensors = build_plant(drive)
         self.codes = sensor_params(sensors)
-        self.period_s = 1.0 / drive.inverter.pwm_frequency_hz
+        self.period_s = drive.sample_time_s  # from one sample_trigger to the next
         self.u_dc = drive.inverter.dc_bus_v
         self.time, self.number = 0.0, 0
         self.speeds: list[float] = []  # of the shaft, rad/s, before each period

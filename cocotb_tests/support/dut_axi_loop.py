@@ -124,6 +124,10 @@ async def check_trip(device: AxiDevice) -> dict[str, int]:
     await device.write("enable", 0)
     await device.write("clear_trip", 1)
     await ClockCycles(dut.aclk, 4)
+    assert read(dut.irq, False) == 1 and await device.read("irq_cause") & 9 == 9, "a trip, and the gates went off"
+    await device.write("irq_clear", 15)
+    await ClockCycles(dut.aclk, 4)
+    assert await device.read("irq_cause") == 0
     assert read(dut.irq, False) == 0 and await device.read("flags") & 2 == 0
     await device.write("enable", 1)
     for _ in range(4 * half):

@@ -25,7 +25,7 @@ async def fault_tour(dut):
     wanted = run(tour(), golden, drive, register_set).seen.tolist()
     handles = {name: getattr(dut, name) for name in SEEN}
     names = [p.name for p in sample_latch.BLOCK.inputs if p.name != "run_in"]
-    for name in (*names, "sample_valid", "enable", "trip", "clear_trip"):
+    for name in (*names, "sample_valid", "enable", "trip", "clear_trip", "host_write"):
         getattr(dut, name).value = 0
     for name, value in register_set.values._asdict().items():
         getattr(dut, name).value = value

@@ -67,7 +67,8 @@ def _capture(
         state, seen = fluxproof.step(state, sample, registers, config)
         for n, value in enumerate(seen):
             observed[k, n] = value
-        advance_averaged(plant_state, params, duties, u_dc[k], load[k], period_s)
+        half = (1 - 2 * (k & 1)) * registers.double_update
+        advance_averaged(plant_state, params, duties, u_dc[k], load[k], period_s, half)
         duties[0] = seen.compare_a / config.carrier_half
         duties[1] = seen.compare_b / config.carrier_half
         duties[2] = seen.compare_c / config.carrier_half

@@ -25,6 +25,7 @@ from fluxproof.golden_model import fluxproof
 from fluxproof.golden_model.fluxproof import REGISTERS
 from fluxproof.golden_model.io import sample_latch
 
+SHOWN_LATER = ("i_d_ref",)  # values of a sample that act on the next one, see control/current_limit
 REACH = 4000  # rows before the difference from which a hypothesis is replayed: hidden states may differ earlier
 BEYOND = 300  # rows after it that a hypothesis must explain to be examined further
 STATE_BITS = 40  # widest state: V_STATE
@@ -66,9 +67,8 @@ def find_cause(run: Run, state, start: int, stop: int, row: int, names: list[str
     base = run.state_at(state, start, begin)
     goal = min(stop, row + 1 + BEYOND)
     best, first = None, row
-    before = run.state_at(base, begin, row)
-    for cause in _hypotheses(run, base, before, row, names, whole_state and begin == start):
-        at = row if cause.kind == "sample" else begin
+    for cause in _hypotheses(run, base, begin, row, names, whole_state and begin == start):
+        at = cause.run.patch[0] if cause.kind == "sample" else begin
         reached, _, _ = cause.run.until_different(cause.state, at, goal)
         if reached == goal < stop:
             reached, _, _ = cause.run.until_different(cause.state, at, stop)
@@ -93,13 +93,16 @@ def _as_good(run: Run, cause: Cause, base, begin) -> tuple:
     return tuple(bits)
 
 
-def _hypotheses(run: Run, base, before, row, names, whole_state):
-    """Hypotheses with a single inverted bit, likely ones first; base: start state of their runs, before: the row's."""
-    for k, port in enumerate(sample_latch.BLOCK.outputs):
-        name, found = fluxproof.Sample._fields[k], int(run.samples[row, k])
-        for bit in range(port.fmt.width):
-            acted = flipped(found, bit, port.fmt)
-            yield Cause("sample", name, bit, found, acted, run._replace(patch=(row, k, acted)), before)
+def _hypotheses(run: Run, base, begin, row, names, whole_state):
+    """Hypotheses with a single inverted bit, likely ones first; base: start state of their runs, from ``begin`` on."""
+    for at, fields in ((row, fluxproof.Sample._fields), (row - 1, SHOWN_LATER)):
+        before = run.state_at(base, begin, at) if at >= begin else None
+        for name in fields if at >= begin else ():
+            k = fluxproof.Sample._fields.index(name)
+            fmt, found = sample_latch.BLOCK.outputs[k].fmt, int(run.samples[at, k])
+            for bit in range(fmt.width):
+                acted = flipped(found, bit, fmt)
+                yield Cause("sample", name, bit, found, acted, run._replace(patch=(at, k, acted)), before)
     for name in _registers_near(run, names):
         fmt, found = REGISTERS[name].fmt, getattr(run.registers, name)
         bits = [flipped(found, bit, fmt) for bit in range(fmt.width)]

@@ -177,8 +177,10 @@ static void check_at_rest(void)
     printf("bus %.1f V\n", get(AT(u_dc)) / 65536.0 * FLUXPROOF_BASE_VOLTAGE_V);
 }
 
+/* The zero of the current sensors is judged over 64 samples with the gates off. */
 static void enable_gates(void)
 {
+    wait_us((unsigned)(1 + 66 * 2e6 * get(AT(carrier_half)) / get(AT(clock_hz))));
     put(AT(enable), 1);
     wait_us(1000);
     if (!flag(FLUXPROOF__FLAGS__RUNNING_bm))

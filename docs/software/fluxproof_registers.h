@@ -107,6 +107,18 @@ extern "C" {
 #define FLUXPROOF__TEMP_VALID__VALUE_bw 1
 #define FLUXPROOF__TEMP_VALID__VALUE_reset 0x0
 
+// reg - fluxproof::irq_mask
+#define FLUXPROOF__IRQ_MASK__VALUE_bm 0xf
+#define FLUXPROOF__IRQ_MASK__VALUE_bp 0
+#define FLUXPROOF__IRQ_MASK__VALUE_bw 4
+#define FLUXPROOF__IRQ_MASK__VALUE_reset 0x0
+
+// reg - fluxproof::irq_clear
+#define FLUXPROOF__IRQ_CLEAR__VALUE_bm 0xf
+#define FLUXPROOF__IRQ_CLEAR__VALUE_bp 0
+#define FLUXPROOF__IRQ_CLEAR__VALUE_bw 4
+#define FLUXPROOF__IRQ_CLEAR__VALUE_reset 0x0
+
 // reg - fluxproof::omega_given
 #define FLUXPROOF__OMEGA_GIVEN__VALUE_bm 0xffffffff
 #define FLUXPROOF__OMEGA_GIVEN__VALUE_bp 0
@@ -162,6 +174,12 @@ extern "C" {
 #define FLUXPROOF__FLAGS__DELTA_HELD_bm 0x2000
 #define FLUXPROOF__FLAGS__DELTA_HELD_bp 13
 #define FLUXPROOF__FLAGS__DELTA_HELD_bw 1
+#define FLUXPROOF__FLAGS__BRAKE_ASKED_bm 0x4000
+#define FLUXPROOF__FLAGS__BRAKE_ASKED_bp 14
+#define FLUXPROOF__FLAGS__BRAKE_ASKED_bw 1
+#define FLUXPROOF__FLAGS__DOUBLE_USED_bm 0x8000
+#define FLUXPROOF__FLAGS__DOUBLE_USED_bp 15
+#define FLUXPROOF__FLAGS__DOUBLE_USED_bw 1
 
 // reg - fluxproof::flux_faults
 #define FLUXPROOF__FLUX_FAULTS__VALUE_bm 0x7f
@@ -249,19 +267,49 @@ extern "C" {
 #define FLUXPROOF__TELEMETRY_DROPPED__VALUE_bw 16
 
 // reg - fluxproof::fault_flags
-#define FLUXPROOF__FAULT_FLAGS__VALUE_bm 0x1ff
+#define FLUXPROOF__FAULT_FLAGS__VALUE_bm 0x7fff
 #define FLUXPROOF__FAULT_FLAGS__VALUE_bp 0
-#define FLUXPROOF__FAULT_FLAGS__VALUE_bw 9
+#define FLUXPROOF__FAULT_FLAGS__VALUE_bw 15
 
 // reg - fluxproof::first_fault
-#define FLUXPROOF__FIRST_FAULT__VALUE_bm 0xff
+#define FLUXPROOF__FIRST_FAULT__VALUE_bm 0x7fff
 #define FLUXPROOF__FIRST_FAULT__VALUE_bp 0
-#define FLUXPROOF__FIRST_FAULT__VALUE_bw 8
+#define FLUXPROOF__FIRST_FAULT__VALUE_bw 15
 
 // reg - fluxproof::early_samples
 #define FLUXPROOF__EARLY_SAMPLES__VALUE_bm 0xff
 #define FLUXPROOF__EARLY_SAMPLES__VALUE_bp 0
 #define FLUXPROOF__EARLY_SAMPLES__VALUE_bw 8
+
+// reg - fluxproof::irq_cause
+#define FLUXPROOF__IRQ_CAUSE__VALUE_bm 0xf
+#define FLUXPROOF__IRQ_CAUSE__VALUE_bp 0
+#define FLUXPROOF__IRQ_CAUSE__VALUE_bw 4
+
+// reg - fluxproof::code_a
+#define FLUXPROOF__CODE_A__VALUE_bm 0xffff
+#define FLUXPROOF__CODE_A__VALUE_bp 0
+#define FLUXPROOF__CODE_A__VALUE_bw 16
+
+// reg - fluxproof::code_b
+#define FLUXPROOF__CODE_B__VALUE_bm 0xffff
+#define FLUXPROOF__CODE_B__VALUE_bp 0
+#define FLUXPROOF__CODE_B__VALUE_bw 16
+
+// reg - fluxproof::code_c
+#define FLUXPROOF__CODE_C__VALUE_bm 0xffff
+#define FLUXPROOF__CODE_C__VALUE_bp 0
+#define FLUXPROOF__CODE_C__VALUE_bw 16
+
+// reg - fluxproof::code_u_dc
+#define FLUXPROOF__CODE_U_DC__VALUE_bm 0xffff
+#define FLUXPROOF__CODE_U_DC__VALUE_bp 0
+#define FLUXPROOF__CODE_U_DC__VALUE_bw 16
+
+// reg - fluxproof::code_theta
+#define FLUXPROOF__CODE_THETA__VALUE_bm 0x3ffff
+#define FLUXPROOF__CODE_THETA__VALUE_bp 0
+#define FLUXPROOF__CODE_THETA__VALUE_bw 18
 
 // reg - fluxproof::offset_a
 #define FLUXPROOF__OFFSET_A__VALUE_bm 0xffff
@@ -450,9 +498,9 @@ extern "C" {
 #define FLUXPROOF__WATCHDOG__VALUE_reset 0x0
 
 // reg - fluxproof::fault_ignore
-#define FLUXPROOF__FAULT_IGNORE__VALUE_bm 0x7f
+#define FLUXPROOF__FAULT_IGNORE__VALUE_bm 0x7fff
 #define FLUXPROOF__FAULT_IGNORE__VALUE_bp 0
-#define FLUXPROOF__FAULT_IGNORE__VALUE_bw 7
+#define FLUXPROOF__FAULT_IGNORE__VALUE_bw 15
 #define FLUXPROOF__FAULT_IGNORE__VALUE_reset 0x0
 
 // reg - fluxproof::flux_mode
@@ -640,6 +688,72 @@ extern "C" {
 #define FLUXPROOF__U_DC_MAX__VALUE_bp 0
 #define FLUXPROOF__U_DC_MAX__VALUE_bw 9
 #define FLUXPROOF__U_DC_MAX__VALUE_reset 0x0
+
+// reg - fluxproof::omega_trip
+#define FLUXPROOF__OMEGA_TRIP__VALUE_bm 0x1ff
+#define FLUXPROOF__OMEGA_TRIP__VALUE_bp 0
+#define FLUXPROOF__OMEGA_TRIP__VALUE_bw 9
+#define FLUXPROOF__OMEGA_TRIP__VALUE_reset 0x0
+
+// reg - fluxproof::omega_away
+#define FLUXPROOF__OMEGA_AWAY__VALUE_bm 0x1ff
+#define FLUXPROOF__OMEGA_AWAY__VALUE_bp 0
+#define FLUXPROOF__OMEGA_AWAY__VALUE_bw 9
+#define FLUXPROOF__OMEGA_AWAY__VALUE_reset 0x0
+
+// reg - fluxproof::runaway_samples
+#define FLUXPROOF__RUNAWAY_SAMPLES__VALUE_bm 0xfff
+#define FLUXPROOF__RUNAWAY_SAMPLES__VALUE_bp 0
+#define FLUXPROOF__RUNAWAY_SAMPLES__VALUE_bw 12
+#define FLUXPROOF__RUNAWAY_SAMPLES__VALUE_reset 0x0
+
+// reg - fluxproof::omega_stall
+#define FLUXPROOF__OMEGA_STALL__VALUE_bm 0x1ff
+#define FLUXPROOF__OMEGA_STALL__VALUE_bp 0
+#define FLUXPROOF__OMEGA_STALL__VALUE_bw 9
+#define FLUXPROOF__OMEGA_STALL__VALUE_reset 0x0
+
+// reg - fluxproof::stall_samples
+#define FLUXPROOF__STALL_SAMPLES__VALUE_bm 0xffff
+#define FLUXPROOF__STALL_SAMPLES__VALUE_bp 0
+#define FLUXPROOF__STALL_SAMPLES__VALUE_bw 16
+#define FLUXPROOF__STALL_SAMPLES__VALUE_reset 0x0
+
+// reg - fluxproof::i_open
+#define FLUXPROOF__I_OPEN__VALUE_bm 0x1ff
+#define FLUXPROOF__I_OPEN__VALUE_bp 0
+#define FLUXPROOF__I_OPEN__VALUE_bw 9
+#define FLUXPROOF__I_OPEN__VALUE_reset 0x0
+
+// reg - fluxproof::offset_max
+#define FLUXPROOF__OFFSET_MAX__VALUE_bm 0x3ff
+#define FLUXPROOF__OFFSET_MAX__VALUE_bp 0
+#define FLUXPROOF__OFFSET_MAX__VALUE_bw 10
+#define FLUXPROOF__OFFSET_MAX__VALUE_reset 0x0
+
+// reg - fluxproof::heartbeat
+#define FLUXPROOF__HEARTBEAT__VALUE_bm 0xffff
+#define FLUXPROOF__HEARTBEAT__VALUE_bp 0
+#define FLUXPROOF__HEARTBEAT__VALUE_bw 16
+#define FLUXPROOF__HEARTBEAT__VALUE_reset 0x0
+
+// reg - fluxproof::brake_on
+#define FLUXPROOF__BRAKE_ON__VALUE_bm 0x1ff
+#define FLUXPROOF__BRAKE_ON__VALUE_bp 0
+#define FLUXPROOF__BRAKE_ON__VALUE_bw 9
+#define FLUXPROOF__BRAKE_ON__VALUE_reset 0x0
+
+// reg - fluxproof::brake_off
+#define FLUXPROOF__BRAKE_OFF__VALUE_bm 0x1ff
+#define FLUXPROOF__BRAKE_OFF__VALUE_bp 0
+#define FLUXPROOF__BRAKE_OFF__VALUE_bw 9
+#define FLUXPROOF__BRAKE_OFF__VALUE_reset 0x0
+
+// reg - fluxproof::double_update
+#define FLUXPROOF__DOUBLE_UPDATE__VALUE_bm 0x1
+#define FLUXPROOF__DOUBLE_UPDATE__VALUE_bp 0
+#define FLUXPROOF__DOUBLE_UPDATE__VALUE_bw 1
+#define FLUXPROOF__DOUBLE_UPDATE__VALUE_reset 0x0
 
 // reg - fluxproof::encoder
 #define FLUXPROOF__ENCODER__VALUE_bm 0xffffffff
@@ -1130,7 +1244,8 @@ typedef struct {
     uint32_t speed_mode;
     uint32_t temp_winding;
     uint32_t temp_valid;
-    uint8_t RESERVED_68_6f[0x8];
+    uint32_t irq_mask;
+    uint32_t irq_clear;
     uint32_t omega_given;
     uint32_t speed_given;
     uint32_t position_restart;
@@ -1157,7 +1272,13 @@ typedef struct {
     uint32_t fault_flags;
     uint32_t first_fault;
     uint32_t early_samples;
-    uint8_t RESERVED_d8_ff[0x28];
+    uint32_t irq_cause;
+    uint32_t code_a;
+    uint32_t code_b;
+    uint32_t code_c;
+    uint32_t code_u_dc;
+    uint32_t code_theta;
+    uint8_t RESERVED_f0_ff[0x10];
     uint32_t offset_a;
     uint32_t offset_b;
     uint32_t offset_c;
@@ -1222,7 +1343,19 @@ typedef struct {
     uint32_t sum_trip;
     uint32_t u_dc_min;
     uint32_t u_dc_max;
-    uint8_t RESERVED_200_3ff[0x200];
+    uint32_t omega_trip;
+    uint32_t omega_away;
+    uint32_t runaway_samples;
+    uint32_t omega_stall;
+    uint32_t stall_samples;
+    uint32_t i_open;
+    uint32_t offset_max;
+    uint32_t heartbeat;
+    uint32_t brake_on;
+    uint32_t brake_off;
+    uint8_t RESERVED_228_23f[0x18];
+    uint32_t double_update;
+    uint8_t RESERVED_244_3ff[0x1bc];
     uint32_t encoder;
     uint32_t currents;
     uint32_t spi_lines;

@@ -2,14 +2,15 @@
 
     err     = omega_ref - omega_me
     u       = speed_kp*err + integral
-    i_q_ref = limit(u, +-i_max)
+    i_q_ref = limit(u, +-i_q_max)
     integral += speed_ki*err      unless u is beyond the limit and err pushes further
 
+The limit i_q_max is what current_limit leaves beside i_d, in both modes.
 Torque mode (``speed_mode`` = 0): i_q_ref is ``i_q_ext``, limited, and the integral follows it, so that
 a change to speed mode is bumpless.  ``run`` = 0: output and integral are zero.
 
 Formats: err saturated to PU; proportional part rounded half up to S(9,28), which holds every product; increment
-rounded half up to S(1,28), where 2**-16 * ki still counts; the integral is kept within +-i_max; sum exact, rounded
+rounded half up to S(1,28), where 2**-16 * ki still counts; the integral is kept within +-i_q_max; sum exact, rounded
 half up to PU.
 """
 
@@ -31,15 +32,15 @@ class State(NamedTuple):
 
 
 @kernel
-def step(state, omega_ref, omega_me, i_q_ext, speed_mode, run, speed_kp, speed_ki, i_max):
+def step(state, omega_ref, omega_me, i_q_ext, i_q_max, speed_mode, run, speed_kp, speed_ki):
     err = saturate(omega_ref - omega_me, PU_W)
     proportional = round_half_up(speed_kp * err, DROP_P)
     moved = state.integral + round_half_up(speed_ki * err, DROP_I)
     asked = round_half_up(proportional + state.integral, PU_TO_INTEGRAL) if speed_mode else i_q_ext
-    i_q_ref = clamp(asked, -i_max, i_max)
+    i_q_ref = clamp(asked, -i_q_max, i_q_max)
     limited = 1 if asked != i_q_ref else 0
-    held = (asked > i_max and err > 0) or (asked < -i_max and err < 0)
-    limit = i_max << PU_TO_INTEGRAL
+    held = (asked > i_q_max and err > 0) or (asked < -i_q_max and err < 0)
+    limit = i_q_max << PU_TO_INTEGRAL
     integral = i_q_ref << PU_TO_INTEGRAL
     if speed_mode:
         integral = state.integral if held else clamp(moved, -limit, limit)
@@ -53,7 +54,7 @@ def reference(v, state):
         return {"i_q_ref": 0.0}
     err = PU.limit(v["omega_ref"] - v["omega_me"])
     asked = v["speed_kp"] * err + state.integral * INTEGRAL.lsb if v["speed_mode"] else v["i_q_ext"]
-    return {"i_q_ref": min(max(asked, -v["i_max"]), v["i_max"])}
+    return {"i_q_ref": min(max(asked, -v["i_q_max"]), v["i_q_max"])}
 
 
 def bound(_v, _state):
@@ -65,7 +66,7 @@ def stimuli(rng, _config):
     regs = {
         "speed_kp": 5 << 16,
         "speed_ki": 1 << 20,
-        "i_max": 30000,
+        "i_q_max": 30000,
         "speed_mode": 1,
         "run": 1,
         "i_q_ext": 12345,
@@ -77,7 +78,7 @@ def stimuli(rng, _config):
     rows += [{**rows[0], "speed_mode": 0}, rows[0], {**rows[0], "run": 0}, rows[0]]
     for _ in range(24):  # the integral moves inside its limits, reaches them and comes back
         kp, ki, most = (int(2 ** rng.uniform(*span)) for span in ((4, 20), (4, 23), (6, 17)))
-        regs = {**regs, "speed_kp": kp, "speed_ki": ki, "i_max": most}
+        regs = {**regs, "speed_kp": kp, "speed_ki": ki, "i_q_max": most}
         wide = 2 ** rng.uniform(2, 16)
         for k in range(24):
             err = int(rng.uniform(-1, 1) * wide) if k % 8 else int(rng.integers(-1, 2))
@@ -85,8 +86,8 @@ def stimuli(rng, _config):
     still, one = {**regs, "speed_ki": 0, "speed_mode": 1}, 1 << KP.frac_bits
     ends = [(PU.lo, PU.hi, PU.hi), (PU.hi, PU.lo, PU.hi)]  # the error at its own ends, shown by gains up to one
     ends += [(end + off, 0, 999) for off in range(-4, 5) for end in (999, -999)]  # the output at its limit
-    for omega_ref, omega_me, i_max in ends:
-        error = {**still, "omega_ref": omega_ref, "omega_me": omega_me, "i_max": i_max}
+    for omega_ref, omega_me, i_q_max in ends:
+        error = {**still, "omega_ref": omega_ref, "omega_me": omega_me, "i_q_max": i_q_max}
         for kp, ki in ((one, 0), (one // 2, 0), (one * 5 // 8, 0), (0, one), (0, 0)):
             rows += [{**error, "run": 0}, {**error, "speed_kp": kp, "speed_ki": ki}]
             rows += [{**error, "speed_kp": kp, "speed_ki": 0}] * 2
@@ -102,13 +103,13 @@ BLOCK = Block(
         Port("omega_ref", PU, doc="speed reference"),
         Port("omega_me", PU, doc="electrical speed"),
         Port("i_q_ext", PU, doc="current reference of torque mode"),
+        Port("i_q_max", PU, lo=0, doc="limit of the q axis, see current_limit"),
         Port("speed_mode", BIT, doc="1: speed control, 0: torque control"),
         Port("run", BIT, doc="0: output and integral zero"),
     ),
     registers=(
         Port("speed_kp", KP, doc="proportional gain"),
         Port("speed_ki", KI, doc="integral gain times sample time"),
-        Port("i_max", PU, lo=0, doc="limit of the current reference"),
     ),
     outputs=(
         Port("i_q_ref", PU, doc="current reference, q axis"),

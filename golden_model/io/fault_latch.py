@@ -1,14 +1,18 @@
 """Latches the faults and the first fault, and keeps the gates off until ``clear_trip``; runs at every clock.
 
-    0 to 5  faults of a sample, see sample_checks
-    6       no sample for ``watchdog`` clocks
-    7       input ``trip``
-    8       a sample came too early and was rejected: reported, never a trip
+    0 to 5   faults of a sample, see sample_checks
+    6        no sample for ``watchdog`` clocks
+    7        input ``trip``
+    8        a sample came too early and was rejected: reported, never a trip
+    9 to 11  overspeed, runaway, stall, see motion_checks
+    12       a phase or the motor is not connected, see load_check
+    13       the zero of a current sensor is wrong, see offset_check
+    14       the host does not write any more, see host_watch
 
 Faults are latched while ``enable`` is 1 (``trip`` always), so that registers can be written before; while a fault is
 present ``enable`` has no effect.  ``clear_trip`` clears the faults whose cause is gone.
 ``first_fault`` contains all faults of the first clock that tripped, until nothing trips any more.
-``fault_ignore``: fault x of 0 to 6 is reported in the flags and does not trip; ``trip`` always trips.
+``fault_ignore``: fault x is reported in the flags and does not trip; ``trip`` always trips.
 ``gate_clear`` is ``clear_trip`` one clock later, when the flags are cleared, for the trip latch of the gates.
 Formats: bits.
 """
@@ -16,19 +20,19 @@ Formats: bits.
 from typing import NamedTuple
 
 from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.fixed import Format
 from fluxproof.golden_model.formats import BIT
+from fluxproof.golden_model.io.motion_checks import FAULTS as MOTION_FAULTS
 from fluxproof.golden_model.io.sample_checks import CHECKS, IGNORE
 from fluxproof.golden_model.kernel import kernel
 
-FLAGS = Format(0, 9, 0)
-FAULTS = Format(0, 8, 0)  # the faults that can trip
 NAMES = (
     "overcurrent", "current_sum", "at_rail", "u_dc_low", "u_dc_high", "position", "watchdog", "trip", "early",
+    "overspeed", "runaway", "stall", "open_load", "current_offset", "host_lost",
 )  # fmt: skip
-LATE, TRIP, EARLY = 6, 7, 8
+FLAGS = IGNORE
+LATE, TRIP, EARLY, MOTION, OPEN, OFFSET, HOST = 6, 7, 8, 9, 12, 13, 14
 ALWAYS = 1 << TRIP  # latched without enable, and cannot be ignored
-TRIPPING = FAULTS.hi  # all but EARLY
+TRIPPING = FLAGS.hi - (1 << EARLY)
 
 
 class State(NamedTuple):
@@ -38,9 +42,13 @@ class State(NamedTuple):
 
 
 @kernel
-def step(state, trip, sample_faults, sample_late, sample_early, enable, clear_trip, fault_ignore):
+def step(
+    state, trip, sample_faults, sample_late, sample_early, motion_faults, open_load, current_offset, host_lost, enable,
+    clear_trip, fault_ignore,
+):  # fmt: skip
     s = state
-    now = sample_faults + (sample_late << LATE) + (trip << TRIP) + (sample_early << EARLY)
+    now = sample_faults + (sample_late << LATE) + (trip << TRIP) + (sample_early << EARLY) + (motion_faults << MOTION)
+    now += (open_load << OPEN) + (current_offset << OFFSET) + (host_lost << HOST)
     new = now if enable else now & ALWAYS
     kept = s.flags & now if clear_trip else s.flags
     flags = new | kept
@@ -55,10 +63,12 @@ def stimuli(rng, config):
     calm = dict.fromkeys((p.name for p in BLOCK.inputs + BLOCK.registers), 0) | {"enable": 1}
     causes = [{"sample_faults": 1 << k} for k in range(6)]
     causes += [{"sample_late": 1}, {"trip": 1}, {"sample_early": 1}]
+    causes += [{"motion_faults": 1 << k} for k in range(3)]
+    causes += [{"open_load": 1}, {"current_offset": 1}, {"host_lost": 1}]
     rows = []
     for k, cause in enumerate(causes):
         other = causes[(k + 4) % len(causes)]
-        clear, ignore = {"clear_trip": 1}, {"fault_ignore": 1 << min(k, 6)}
+        clear, ignore = {"clear_trip": 1}, {"fault_ignore": 1 << k}
         rows += [calm, calm | cause, calm, calm | other, calm | other | clear, calm | clear, calm]
         rows += [calm | cause | other, calm | cause | clear, calm | clear, calm]
         rows += [calm | cause | {"enable": 0}, calm | cause | {"enable": 0}, calm | cause, calm | clear, calm]
@@ -82,13 +92,17 @@ BLOCK = Block(
         Port("sample_faults", CHECKS, doc="what is wrong with the last sample"),
         Port("sample_late", BIT, doc="1: the last sample is older than watchdog clocks"),
         Port("sample_early", BIT, doc="1: a sample came too early and was rejected"),
+        Port("motion_faults", MOTION_FAULTS, doc="overspeed, runaway, stall"),
+        Port("open_load", BIT, doc="1: a phase or the motor is not connected"),
+        Port("current_offset", BIT, doc="1: the zero of a current sensor is wrong"),
+        Port("host_lost", BIT, doc="1: the last write is older than heartbeat periods"),
         Port("enable", BIT, doc="1: gates may switch"),
         Port("clear_trip", BIT, doc="1: clear the flags whose cause is gone"),
     ),
-    registers=(Port("fault_ignore", IGNORE, doc="bit x: fault x is reported and does not trip"),),
+    registers=(Port("fault_ignore", IGNORE, doc="bit x: fault x of fault_flags is reported and does not trip"),),
     outputs=(
         Port("fault_flags", FLAGS, doc="faults since the last clear_trip, see fault_latch"),
-        Port("first_fault", FAULTS, doc="faults that tripped first"),
+        Port("first_fault", FLAGS, doc="faults that tripped first"),
         Port("fault_stop", BIT, doc="1: gates off"),
         Port("gate_clear", BIT, doc="clear_trip one clock later, when the flags are cleared"),
     ),

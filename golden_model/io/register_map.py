@@ -7,7 +7,7 @@ Formats, ranges and meanings come from the ports of the blocks; nothing is decla
 Words have 32 bits; negative values are sign-extended.  When a write takes effect (``Kind``):
 
 * SETTING: between two samples, never during one; the bus response comes when the write takes effect.
-* COMMAND, PULSE: at the next clock.  A pulse is set by a one and returns to zero after one clock.
+* COMMAND, PULSE: at the next clock.  A pulse is set by ones and returns to zero after one clock.
 * SAMPLE_PULSE: between two samples; returns to zero after the next sample.
 * STATUS, CONSTANT, GENERIC: read only; a constant is fixed here, a generic when the core is built.
 
@@ -24,7 +24,7 @@ from fluxproof.golden_model import fluxproof
 from fluxproof.golden_model.block import Port
 from fluxproof.golden_model.fixed import Format
 from fluxproof.golden_model.formats import BIT
-from fluxproof.golden_model.io import fault_latch, sample_guard, sample_latch, telemetry
+from fluxproof.golden_model.io import fault_latch, interrupts, sample_guard, sample_latch, telemetry
 from fluxproof.golden_model.modulation import gate_generation
 
 ADDRESS_BITS, WORDS = 12, 256  # the slave decodes 4 KiB; the registers are in the first WORDS words
@@ -103,7 +103,10 @@ _SETTINGS = """
     1c0 compensate    1c4 k_lp           1c8 eta_v        1cc gamma          1d0 zeta         1d4 v_thr
     1d8 v_comp_max    1dc i_learn        1e0 eta_psi      1e4 omega_psi_min  1e8 k_ahead      1ec k_sign
     1f0 i_trip        1f4 sum_trip       1f8 u_dc_min     1fc u_dc_max
-"""  # 200 to 3fc are free
+    200 omega_trip    204 omega_away     208 runaway_samples               20c omega_stall  210 stall_samples
+    214 i_open        218 offset_max     21c heartbeat    220 brake_on     224 brake_off
+    240 double_update
+"""  # 228 to 23c and 244 to 3fc are free
 _COMMANDS = {
     "enable": (0x040, Kind.COMMAND),
     "clear_trip": (0x044, Kind.PULSE),
@@ -115,12 +118,16 @@ _COMMANDS = {
     "speed_mode": (0x05C, Kind.SETTING),
     "temp_winding": (0x060, Kind.SETTING),
     "temp_valid": (0x064, Kind.SETTING),
+    "irq_mask": (0x068, Kind.COMMAND),
+    "irq_clear": (0x06C, Kind.PULSE),
 }
 _STATUS = """
     084 flux_faults   088 min_pulse_used  08c omega_me     090 theta_me       094 i_d          098 i_q
     09c i_q_ref       0a0 u_dc            0a4 u_d          0a8 u_q            0ac torque       0b0 lambda_d
     0b4 lambda_q      0b8 psi_m           0bc v_dead       0c0 v_comp
     0c8 telemetry_dropped                 0cc fault_flags      0d0 first_fault    0d4 early_samples
+    0d8 irq_cause     0dc code_a          0e0 code_b           0e4 code_c         0e8 code_u_dc
+    0ec code_theta
 """
 # Bits of the word "flags", read together: name -> lowest bit.
 _FLAGS = {
@@ -136,12 +143,15 @@ _FLAGS = {
     "temp_lost": 11,
     "merge_known": 12,
     "delta_held": 13,
+    "brake_asked": 14,
+    "double_used": 15,
 }
 
 # Pins of the core: inputs per sample or clock that do not come from software.
 PINS = ("adc_a", "adc_b", "adc_c", "adc_u_dc", "position_code", "trip")
 INTERNAL = ("run_in", "compare_a", "compare_b", "compare_c")  # between two blocks
-_BESIDE_THE_CORE = {
+_IRQ = {p.name: p for p in (*interrupts.BLOCK.inputs, *interrupts.BLOCK.outputs) if p.name.startswith("irq_")}
+_BESIDE_THE_CORE = _IRQ | {
     p.name: p
     for p in (
         Port("telemetry_enable", BIT, doc="1: send a packet for each sample"),
@@ -164,7 +174,8 @@ SETTINGS, STATUS = _table(_SETTINGS), _table(_STATUS)
 
 def inputs() -> dict[str, Port]:
     """The inputs of the core that are neither registers nor pins, by the name for software."""
-    ports = (*sample_latch.BLOCK.inputs, *gate_generation.BLOCK.inputs, _BESIDE_THE_CORE["telemetry_enable"])
+    beside = (_BESIDE_THE_CORE[name] for name in ("telemetry_enable", "irq_mask", "irq_clear"))
+    ports = (*sample_latch.BLOCK.inputs, *gate_generation.BLOCK.inputs, *beside)
     return {p.name.removesuffix("_in"): p for p in ports if p.name not in PINS + INTERNAL}
 
 

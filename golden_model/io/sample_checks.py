@@ -28,7 +28,7 @@ from fluxproof.golden_model.kernel import kernel
 JUMP = Format(0, -1, 13)
 SAMPLES = Format(0, 4, 0)
 CHECKS = Format(0, 6, 0)
-IGNORE = Format(0, 7, 0)  # the faults of fault_latch that can be ignored
+IGNORE = Format(0, 15, 0)  # the faults of fault_latch
 DROP_LIMIT = PU.frac_bits - LIMIT.frac_bits
 DROP_JUMP = TURN_W - JUMP.frac_bits
 WARM = 2  # samples before the next code can be extrapolated
@@ -134,7 +134,7 @@ BLOCK = Block(
         Port("u_dc_min", LIMIT, doc="bus voltage below which it trips"),
         Port("u_dc_max", LIMIT, doc="bus voltage that trips"),
         Port("jump_max", JUMP, doc="deviation from the extrapolated position that trips, turns"),
-        Port("fault_ignore", IGNORE, doc="bit x: fault x is reported and does not trip"),
+        Port("fault_ignore", IGNORE, doc="bit x: fault x of fault_flags is reported and does not trip"),
         Port("position_restart", BIT, doc="1: the code has nothing to do with the one of the sample before"),
     ),
     outputs=(

@@ -2,7 +2,8 @@
 
 The carrier counts 0 .. CARRIER_HALF-1 and back, each value once per direction: 2*CARRIER_HALF clocks.
 A leg is commanded high while carrier >= CARRIER_HALF - compare, for 2*compare clocks around the peak.
-Compare values, dead time and minimum pulse are updated at the valley only, when the carrier is 0 again.
+Compare values are updated at the valley, when the carrier is 0 again, and with ``double_update`` at the peak too;
+dead time and minimum pulse at the valley only.  A half period then has its own compare value and one edge per leg.
 
 * Dead time: when the command of a leg changes, both gates go off, the other one on ``dead_time`` clocks later; a new
   setting also applies to a dead time that has begun.
@@ -11,7 +12,10 @@ Compare values, dead time and minimum pulse are updated at the valley only, when
   gates stay off.
 * ``enable`` switches on at the valley, off at once.  ``trip`` switches off at once and is latched
   until ``clear_trip`` comes while ``trip`` is 0; then ``enable`` is still needed.
-* ``sample`` marks the middle of the zero vector at the gates, one register after the carrier.
+* ``sample`` marks the middle of the zero vector at the gates, one register after the carrier: wherever compare values
+  are updated.
+* ``double_update`` is taken while the gates are off (``double_used``): the gains of the regulators and the minimum
+  pulse of the compare values belong to it, so a change in between would mix two settings.
 """
 
 from typing import NamedTuple
@@ -33,6 +37,7 @@ class State(NamedTuple):
     compare_c: int = 0
     dead_time: int = 0
     min_pulse: int = 0
+    double_update: int = 0
     configured: int = 0
     running: int = 0
     tripped: int = 0
@@ -61,12 +66,15 @@ def leg(wanted, level, elapsed, dead_time, on):
 
 @kernel
 def step(
-    state, compare_a, compare_b, compare_c, enable, trip, clear_trip, dead_time, min_pulse, carrier_half
-):
+    state, compare_a, compare_b, compare_c, enable, trip, clear_trip, dead_time, min_pulse, double_update,
+    carrier_half,
+):  # fmt: skip
     s = state
     valley = s.carrier == 0 and s.down == 1
+    peak = s.carrier == carrier_half - 1 and s.down == 0
+    update = valley or (peak and s.double_update == 1)
     if s.down == 0:
-        carrier, down = (s.carrier, 1) if s.carrier == carrier_half - 1 else (s.carrier + 1, 0)
+        carrier, down = (s.carrier, 1) if peak else (s.carrier + 1, 0)
     else:
         carrier, down = (0, 0) if valley else (s.carrier - 1, 1)
 
@@ -86,14 +94,18 @@ def step(
         if good:
             configured = 1
         running = 1 if enable and configured and not tripped else 0
+    sample = 1 if s.carrier == 0 and s.down == 0 else 0
+    if s.carrier == carrier_half - 1 and s.down == 1:
+        sample = s.double_update
     following = State(
         carrier,
         down,
-        compare_a if valley else s.compare_a,
-        compare_b if valley else s.compare_b,
-        compare_c if valley else s.compare_c,
+        compare_a if update else s.compare_a,
+        compare_b if update else s.compare_b,
+        compare_c if update else s.compare_c,
         dead_time if valley and good else s.dead_time,
         min_pulse if valley and good else s.min_pulse,
+        s.double_update if s.running else double_update,
         configured,
         running,
         tripped,
@@ -109,11 +121,12 @@ def step(
     outputs = (
         gate_high,
         gate_low,
-        1 if s.carrier == 0 and s.down == 0 else 0,
+        sample,
         running,
         tripped,
         0 if good else 1,
         following.min_pulse,
+        following.double_update,
         carrier,
     )
     return following, outputs
@@ -140,11 +153,27 @@ def stimuli(rng, config):
         for clock in range(2 * half):
             row = dict(zip(("compare_a", "compare_b", "compare_c"), compare, strict=True), **settings)
             row |= {"enable": int(period != 12 or clock < half // 3), "trip": 0, "clear_trip": 0}
+            row["double_update"] = int(period == 15)  # while the gates are on: not taken
             if period in (6, 9):
                 row["trip"] = int(half // 2 + period <= clock < half // 2 + period + 1)
             if period in (8, 9, 11):
                 row["clear_trip"] = int(clock == half // 2 + period)
             rows.append(row)
+    return rows + _halves(rng, half)
+
+
+def _halves(rng, half):
+    """Update at both extremes: new compare values in every half, legs that change at an extreme, 0 %, 100 %."""
+    rows = []
+    corners = {6: [0, half, 0], 7: [half, 0, half], 8: [0, half, 8], 9: [half, 0, half - 8], 10: [0, half, 0]}
+    for part in range(28):
+        compare = corners.get(part, [int(rng.integers(0, half + 1)) for _ in range(3)])
+        for clock in range(half):
+            row = dict(zip(("compare_a", "compare_b", "compare_c"), compare, strict=True))
+            row |= {"dead_time": 3, "min_pulse": 8, "double_update": int(part not in (14, 22)), "trip": 0}
+            # Off while double_update is taken and given back, in the middle of a half
+            off = part in (0, 20, 21, 22) or (part == 19 and clock > half // 2)
+            rows.append(row | {"enable": int(not off), "clear_trip": 0})
     return rows
 
 
@@ -162,6 +191,7 @@ BLOCK = Block(
     registers=(
         Port("dead_time", CLOCKS, doc="both gates of a leg off, clocks"),
         Port("min_pulse", CLOCKS, doc="shortest pulse of a leg, clocks"),
+        Port("double_update", BIT, doc="1: sample and update at the peak too; taken while the gates are off"),
     ),
     outputs=(
         Port("gate_high", LEGS, doc="upper gates, bit 0 is leg a"),
@@ -171,6 +201,7 @@ BLOCK = Block(
         Port("tripped", BIT, doc="1: a trip is latched"),
         Port("setting_refused", BIT, doc="1: dead_time and min_pulse contradict each other, refused"),
         Port("min_pulse_used", CLOCKS, doc="minimum pulse in force"),
+        Port("double_used", BIT, doc="double_update in force"),
         Port("carrier", COUNT, doc="carrier, for observation"),
     ),
     state=State(),

@@ -3,7 +3,8 @@
 A leg is high for 2*compare clocks in the middle of a period and low for CARRIER_HALF - compare at either
 end.  A high pulse shorter than ``min_pulse`` clocks is dropped: compare becomes 0.  A low end shorter
 than ``min_pulse`` is closed: compare becomes CARRIER_HALF; each end counts alone, because the period
-before or after may be high throughout.
+before or after may be high throughout.  With ``double_update`` the halves of a period have compare values of their own,
+so each half of the high pulse counts alone too: compare < ``min_pulse`` becomes 0.
 
 Rounding: half up to whole clocks.  No overflow: duty <= 1, so compare <= CARRIER_HALF.
 The three values change together, so the carrier can never load a mixture of two samples.
@@ -11,7 +12,7 @@ The three values change together, so the carrier can never load a mixture of two
 
 from fluxproof.golden_model.block import Block, Port
 from fluxproof.golden_model.fixed import Format, round_half_up
-from fluxproof.golden_model.formats import DUTY, DUTY_ONE
+from fluxproof.golden_model.formats import BIT, DUTY, DUTY_ONE
 from fluxproof.golden_model.kernel import kernel
 
 COUNT = Format(0, 16, 0)
@@ -20,21 +21,22 @@ DROP = DUTY.frac_bits
 
 
 @kernel
-def leg(duty, min_pulse, carrier_half):
+def leg(duty, min_pulse, double_update, carrier_half):
     compare = round_half_up(duty * carrier_half, DROP)
-    if 2 * compare < min_pulse:
-        return 0
     longest = carrier_half - min_pulse
+    shortest = 2 * min_pulse if double_update else min_pulse
+    if 2 * compare < shortest:
+        return 0
     if compare > longest:
         return carrier_half
     return compare
 
 
 @kernel
-def step(duty_a, duty_b, duty_c, min_pulse, carrier_half):
-    compare_a = leg(duty_a, min_pulse, carrier_half)
-    compare_b = leg(duty_b, min_pulse, carrier_half)
-    compare_c = leg(duty_c, min_pulse, carrier_half)
+def step(duty_a, duty_b, duty_c, min_pulse, double_update, carrier_half):
+    compare_a = leg(duty_a, min_pulse, double_update, carrier_half)
+    compare_b = leg(duty_b, min_pulse, double_update, carrier_half)
+    compare_c = leg(duty_c, min_pulse, double_update, carrier_half)
     return compare_a, compare_b, compare_c
 
 
@@ -60,6 +62,8 @@ def stimuli(_rng, config):
             pulse // 2 - 1,
             pulse // 2,
             pulse // 2 + 1,
+            pulse - 1,
+            pulse + 1,
             half // 2,
             half - pulse - 1,
             half - pulse,
@@ -67,7 +71,8 @@ def stimuli(_rng, config):
             half,
         ):
             duty = min(max(clocks * DUTY_ONE // half, 0), DUTY_ONE)
-            rows.append({"duty_a": duty, "duty_b": DUTY_ONE - duty, "duty_c": duty, "min_pulse": pulse})
+            duties = {"duty_a": duty, "duty_b": DUTY_ONE - duty, "duty_c": duty}
+            rows += [duties | {"min_pulse": pulse, "double_update": double} for double in (0, 1)]
     return rows
 
 
@@ -77,7 +82,10 @@ BLOCK = Block(
     paper="001, section 5.2, IGBT pulse generation",
     step=step,
     inputs=tuple(Port(f"duty_{k}", DUTY, hi=DUTY_ONE, doc=f"duty, leg {k}") for k in "abc"),
-    registers=(Port("min_pulse", CLOCKS, doc="shortest pulse of a leg, clocks"),),
+    registers=(
+        Port("min_pulse", CLOCKS, doc="shortest pulse of a leg, clocks"),
+        Port("double_update", BIT, doc="1: sample and update at the peak too; taken while the gates are off"),
+    ),
     outputs=tuple(Port(f"compare_{k}", COUNT, doc=f"compare value, leg {k}") for k in "abc"),
     latency=7,
     interval=3,

@@ -1,11 +1,12 @@
 -- Purpose: speed regulator, from speed error to i_q reference, limited, with conditional integration.
---   err = omega_ref - omega_me;  u = speed_kp*err + integral;  i_q_ref = limit(u, +-i_max)
+--   i_q_max is what current_limit leaves beside i_d
+--   err = omega_ref - omega_me;  u = speed_kp*err + integral;  i_q_ref = limit(u, +-i_q_max)
 --   integral += speed_ki*err unless u is beyond the limit and err pushes further
 -- Torque mode (speed_mode = 0): i_q_ref is i_q_ext, limited, and the integral follows it.
 -- run = 0: output and integral are zero.
 -- Formats: err PU, proportional part 28 fraction bits, integral S(1,28), output PU.
 -- Latency: 5.  Interval: 5.
--- Rounding: half up; err saturates, i_q_ref and the integral are kept within +-i_max.
+-- Rounding: half up; err saturates, i_q_ref and the integral are kept within +-i_q_max.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -21,11 +22,11 @@ entity speed_pi is
     omega_ref     : in  signed(PU_W - 1 downto 0);
     omega_me      : in  signed(PU_W - 1 downto 0);
     i_q_ext       : in  signed(PU_W - 1 downto 0);
+    i_q_max       : in  signed(PU_W - 1 downto 0);
     speed_mode    : in  std_logic;
     run           : in  std_logic;
     speed_kp      : in  unsigned(KP_W - 1 downto 0);
     speed_ki      : in  unsigned(KI_W - 1 downto 0);
-    i_max         : in  signed(PU_W - 1 downto 0);
     out_valid     : out std_logic;
     i_q_ref       : out signed(PU_W - 1 downto 0);
     speed_limited : out std_logic
@@ -88,8 +89,8 @@ begin
       end if;
 
       -- Stage 5: i_q_ref = asked, limited;  integral = moved, limited, unless held, or i_q_ref in torque mode
-      wanted := resize(within(asked_4, unsigned(i_max), 0), PU_W);
-      past   := beyond(asked_4, unsigned(i_max), 0);
+      wanted := resize(within(asked_4, unsigned(i_q_max), 0), PU_W);
+      past   := beyond(asked_4, unsigned(i_q_max), 0);
       held   := past and ((rises and not asked_4(TOTAL_W - 1)) or (falls and asked_4(TOTAL_W - 1)));
       if valid(LATENCY - 1) = '1' then
         i_q_ref       <= wanted;
@@ -97,7 +98,7 @@ begin
         if speed_mode = '0' then
           state.integral <= shift_left(resize(wanted, INTEGRAL_W), PU_TO_INTEGRAL);
         elsif held = '0' then
-          state.integral <= resize(within(moved_3, unsigned(i_max), PU_TO_INTEGRAL), INTEGRAL_W);
+          state.integral <= resize(within(moved_3, unsigned(i_q_max), PU_TO_INTEGRAL), INTEGRAL_W);
         end if;
         if run = '0' then
           i_q_ref        <= (others => '0');

@@ -84,9 +84,9 @@ end entity current_front;
 architecture rtl of current_front is
   type codes_t is array (0 to 7) of unsigned(ADC_BITS - 1 downto 0);
 
-  signal codes              : codes_t;  -- of the converter
-  signal new_codes, failed  : std_logic;
-  signal errors             : unsigned(11 downto 0);
+  signal codes             : codes_t;  -- of the converter
+  signal new_codes, failed : std_logic;
+  signal errors            : unsigned(11 downto 0);
 begin
 
   elsewhere : if CURRENTS = 0 generate
@@ -96,6 +96,7 @@ begin
   end generate elsewhere;
 
   serial : if CURRENTS = 1 generate
+
     converter : entity work.spi_converter
       generic map (ADC_BITS => ADC_BITS, LINES => SPI_LINES)
       port map (clk => clk, rst => rst, sample_trigger => sample_trigger, miso => miso, busy => busy,
@@ -106,6 +107,7 @@ begin
                 convst => convst, cs_n => cs_n, sclk => sclk, codes_valid => new_codes, frame_error => failed,
                 setting_refused => converter_refused, code_0 => codes(0), code_1 => codes(1), code_2 => codes(2),
                 code_3 => codes(3), code_4 => codes(4), code_5 => codes(5), code_6 => codes(6), code_7 => codes(7));
+
   else generate
     cs_n              <= '1';
     sclk              <= '0';
@@ -113,6 +115,7 @@ begin
   end generate serial;
 
   internal : if CURRENTS = 2 generate
+
     converter : entity work.xadc_reader
       generic map (ADC_BITS => ADC_BITS)
       port map (clk => clk, rst => rst, sample_trigger => sample_trigger, busy => busy, eoc => eoc, drdy => drdy,
@@ -121,13 +124,15 @@ begin
                 signed_code => signed_code,
                 convst => convst, den => den, daddr => daddr, codes_valid => new_codes, frame_error => failed,
                 code_0 => codes(0), code_1 => codes(1), code_2 => codes(2), code_3 => codes(3));
+
     codes(4 to 7) <= codes(0 to 3);
   else generate
-    den   <= '0';
-    daddr <= (others => '0');
+    den           <= '0';
+    daddr         <= (others => '0');
   end generate internal;
 
   modulators : if CURRENTS = 3 generate
+
     converter : entity work.delta_sigma
       generic map (ADC_BITS => ADC_BITS)
       port map (clk => clk, rst => rst, mod_data => mod_data, mod_clock_in => mod_clock_in,
@@ -137,7 +142,8 @@ begin
                 limit_low => limit_low,
                 mod_clock => mod_clock, code_a => codes(0), code_b => codes(1), code_c => codes(2),
                 code_u_dc => codes(3), code_valid => new_codes, window_error => failed, over => converter_over);
-    codes(4 to 7) <= (others => (others => '0'));
+
+    codes(4 to 7)  <= (others => (others => '0'));
   else generate
     mod_clock      <= '0';
     converter_over <= '0';

@@ -55,19 +55,23 @@ begin
               mod_clock => mod_clock, bits => bits, bits_valid => bits_valid);
 
   filters : for k in 0 to 3 generate
+
     filter : entity work.sinc3
       generic map (ADC_BITS => ADC_BITS)
       port map (clk => clk, rst => rst, sample_trigger => sample_trigger, mod_bit => bits(k),
                 bits_valid => bits_valid, oversampling => oversampling, gain => sinc_gain,
                 start_clocks => start_clocks,
                 code => codes(k), code_valid => valids(k), window_error => errors(k));
+
   end generate;
 
   trips : for k in 0 to 2 generate
+
     fast : entity work.sinc_overcurrent
       port map (clk => clk, rst => rst, mod_bit => bits(k), bits_valid => bits_valid,
                 oversampling => trip_oversampling, limit_high => limit_high, limit_low => limit_low,
                 over => overs(k), total => open, total_valid => open);
+
   end generate;
 
   code_a       <= codes(0);

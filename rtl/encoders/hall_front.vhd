@@ -40,18 +40,20 @@ entity hall_front is
 end entity hall_front;
 
 architecture rtl of hall_front is
-  signal pins, levels, steady   : std_logic_vector(0 to 2);
-  signal settled                : std_logic;
-  signal theta_hall             : unsigned(TURN_W - 1 downto 0);
-  signal step_up, step_down     : std_logic;
+  signal pins, levels, steady : std_logic_vector(0 to 2);
+  signal settled              : std_logic;
+  signal theta_hall           : unsigned(TURN_W - 1 downto 0);
+  signal step_up, step_down   : std_logic;
 begin
   pins    <= hall_a & hall_b & hall_c;
   settled <= and steady;
 
   filters : for k in pins'range generate
+
     filter : entity work.input_filter
       port map (clk => clk, rst => rst, pin => pins(k), filter_clocks => filter_clocks, level => levels(k),
                 settled => steady(k));
+
   end generate;
 
   decoder : entity work.hall_decoder

@@ -79,17 +79,16 @@ architecture rtl of position_front is
   constant ABZ  : boolean := ENCODER = 1 or ENCODER = 3;
   constant HALL : boolean := ENCODER = 2 or ENCODER = 3;
 
-  -- What a front end that is left out says
-  signal count, start_count                         : unsigned(17 downto 0) := (others => '0');
-  signal referenced, moving, index_lost, refused    : std_logic := '0';
-  signal forward, hall_valid, start_valid           : std_logic := '0';
-  signal position_valid, alarm, warning             : std_logic := '0';
-  signal hall_code                                  : unsigned(POSITION_BITS - 1 downto 0);
-  signal hall_omega                                 : signed(PU_W - 1 downto 0);
-  signal hall_done                                  : std_logic;
-  signal hall_illegals                              : unsigned(11 downto 0);
+  signal count, start_count                      : unsigned(17 downto 0);
+  signal referenced, moving, index_lost, refused : std_logic;
+  signal forward, hall_valid, start_valid        : std_logic;
+  signal position_valid, alarm, warning          : std_logic;
+  signal hall_code                               : unsigned(POSITION_BITS - 1 downto 0);
+  signal hall_omega                              : signed(PU_W - 1 downto 0);
+  signal hall_done                               : std_logic;
+  signal hall_illegals                           : unsigned(11 downto 0);
   -- Start of the count; the count was on its way since the last trigger
-  signal start, started, moved, on_the_way          : std_logic;
+  signal start, started, moved, on_the_way : std_logic;
 begin
   start      <= start_valid and not refused and not started;
   on_the_way <= moved or moving;
@@ -98,6 +97,7 @@ begin
                    & index_lost & moving & referenced;
 
   incremental : if ABZ generate
+
     front : entity work.incremental_encoder
       generic map (POSITION_BITS => POSITION_BITS)
       port map (clk => clk, rst => rst, pin_a => pin_a, pin_b => pin_b, pin_z => pin_z, sample => sample_trigger,
@@ -108,13 +108,17 @@ begin
                 forward => forward, referenced => referenced, moving => moving, index_count => index_count,
                 illegal_count => illegal_count, lost_counts => lost_counts, index_lost => index_lost,
                 index_wrong => index_wrong, setting_refused => refused);
+
   else generate
     index_count <= (others => '0');
     lost_counts <= (others => '0');
-    index_wrong <= '0';
+    count       <= (others => '0');
+
+    (index_wrong, index_lost, referenced, moving, refused, forward) <= std_logic_vector'("000000");
   end generate incremental;
 
   sectors : if HALL generate
+
     front : entity work.hall_front
       generic map (POSITION_BITS => POSITION_BITS)
       port map (clk => clk, rst => rst, hall_a => hall_a, hall_b => hall_b, hall_c => hall_c,
@@ -124,6 +128,11 @@ begin
                 code_theta => hall_code, omega_me => hall_omega, omega_valid => hall_done, hall_valid => hall_valid,
                 start_count => start_count, start_valid => start_valid, illegal_count => hall_illegals,
                 skipped_count => open);
+
+  else generate
+    start_count <= (others => '0');
+    start_valid <= '0';
+    hall_valid  <= '0';
   end generate sectors;
 
   hall_alone : if ENCODER = 2 generate
@@ -134,6 +143,7 @@ begin
   end generate hall_alone;
 
   absolute : if ENCODER >= 4 generate
+
     front : entity work.serial_encoder
       generic map (ENCODER => ENCODER, POSITION_BITS => POSITION_BITS)
       port map (clk => clk, rst => rst, serial_data => serial_data, sample_trigger => sample_trigger,
@@ -144,12 +154,15 @@ begin
                 serial_clock => serial_clock, data_out => serial_out, data_drive => serial_drive,
                 code_theta => encoder_code, code_valid => position_done, position_valid => position_valid,
                 position_lost => position_lost, bridged_count => bridged_count, alarm => alarm, warning => warning);
+
   else generate
     serial_clock  <= '1';
     serial_out    <= '0';
     serial_drive  <= '0';
     position_lost <= '0';
     bridged_count <= (others => '0');
+
+    (position_valid, alarm, warning) <= std_logic_vector'("000");
   end generate absolute;
 
   no_edges : if not ABZ and not HALL generate
@@ -161,9 +174,11 @@ begin
         omega_now <= (others => '0') when rst = '1' else omega_set;
       end if;
     end process;
+
   end generate no_edges;
 
   elsewhere : if ENCODER = 0 generate
+
     process (clk)
     begin
       if rising_edge(clk) then
@@ -173,6 +188,7 @@ begin
         end if;
       end if;
     end process;
+
   end generate elsewhere;
 
   process (clk)

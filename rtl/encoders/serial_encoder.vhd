@@ -49,6 +49,7 @@ architecture rtl of serial_encoder is
 begin
 
   ssi : if ENCODER = 4 generate
+
     master : entity work.ssi_master
       generic map (POSITION_BITS => POSITION_BITS)
       port map (clk => clk, rst => rst, serial_data => serial_data, start => sample_trigger,
@@ -56,9 +57,11 @@ begin
                 parity_on => parity_on,
                 serial_clock => serial_clock, code_theta => frame_code, code_valid => frame_valid,
                 frame_error => open, busy => open);
+
   end generate ssi;
 
   biss : if ENCODER = 5 generate
+
     master : entity work.biss_master
       generic map (POSITION_BITS => POSITION_BITS)
       port map (clk => clk, rst => rst, serial_data => serial_data, start => sample_trigger,
@@ -66,9 +69,11 @@ begin
                 start_max => start_max,
                 serial_clock => serial_clock, code_theta => frame_code, code_valid => frame_valid,
                 frame_error => open, alarm => alarm, warning => warning, busy => open);
+
   end generate biss;
 
   endat : if ENCODER = 6 generate
+
     master : entity work.endat_master
       generic map (POSITION_BITS => POSITION_BITS)
       port map (clk => clk, rst => rst, serial_data => serial_data, start => sample_trigger,
@@ -77,6 +82,7 @@ begin
                 serial_clock => serial_clock, data_out => data_out, data_drive => data_drive,
                 code_theta => frame_code, code_valid => frame_valid, frame_error => open, alarm => alarm,
                 busy => open);
+
   end generate endat;
 
   no_drive : if ENCODER /= 6 generate

@@ -49,6 +49,7 @@ entity board_register_file is
     s_axi_rvalid      : out std_logic;
     s_axi_rready      : in  std_logic;
     sample_busy       : in  std_logic;  -- a sample is in flight
+    host_write        : out std_logic;  -- a write was accepted
     settings          : out settings_t;  -- registers of the blocks
     observed          : in  observed_t;
     estimated         : in  estimated_t;
@@ -62,6 +63,8 @@ entity board_register_file is
     speed_mode_in     : out std_logic;  -- 05c 1: speed control, 0: torque control
     temp_winding_in   : out signed(15 downto 0);  -- 060 winding temperature, degrees Celsius
     temp_valid_in     : out std_logic;  -- 064 1: temp_winding is valid
+    irq_mask          : out unsigned(3 downto 0);  -- 068 bit x: cause x of irq_cause does not raise irq
+    irq_clear         : out unsigned(3 downto 0);  -- 06c bit x: clear cause x of irq_cause
     clear_encoder     : out std_logic;  -- 410 1: clear faults and counters of encoder and converters
     take_snapshot     : out std_logic;  -- 414 1: keep what the next sample brings, see snap_ready
     position_source   : out std_logic;  -- 418 0: encoder, 1: forced_angle
@@ -124,11 +127,13 @@ entity board_register_file is
     running           : in  std_logic;  -- 080 gates are switching
     tripped           : in  std_logic;  -- 080 1: a trip is latched
     setting_refused   : in  std_logic;  -- 080 1: dead_time and min_pulse contradict each other, refused
+    double_used       : in  std_logic;  -- 080 double_update in force
     min_pulse_used    : in  unsigned(11 downto 0);  -- 088 minimum pulse in force
     telemetry_dropped : in  unsigned(15 downto 0);  -- 0c8 samples without a packet, up to 65535
-    fault_flags       : in  unsigned(8 downto 0);  -- 0cc faults since the last clear_trip, see fault_latch
-    first_fault       : in  unsigned(7 downto 0);  -- 0d0 faults that tripped first
+    fault_flags       : in  unsigned(14 downto 0);  -- 0cc faults since the last clear_trip, see fault_latch
+    first_fault       : in  unsigned(14 downto 0);  -- 0d0 faults that tripped first
     early_samples     : in  unsigned(7 downto 0);  -- 0d4 samples rejected because they came too early
+    irq_cause         : in  unsigned(3 downto 0);  -- 0d8 causes since they were cleared: trip, fault, setting refused, gates gone off
     encoder_flags     : in  unsigned(10 downto 0);  -- 440 flags of the encoder, see position_front
     encoder_count     : in  unsigned(17 downto 0);  -- 444 count of the encoder, latched by the trigger
     index_count       : in  unsigned(17 downto 0);  -- 448 count found at the last index
@@ -264,6 +269,8 @@ begin
       found       => found
     );
 
+  host_write <= stored;
+
   word <= to_integer(address(WORD_W + 1 downto 2));
 
   process (clk)
@@ -272,6 +279,7 @@ begin
       -- Pulses return to zero at the next clock, or after the next sample: not the one that
       -- came in at the edge at which they rose
       clear_trip <= '0';
+      irq_clear <= (others => '0');
       clear_encoder <= '0';
       take_snapshot <= '0';
       if (sample_busy and not was_busy and was_clear_faults_in) = '1' then
@@ -315,6 +323,13 @@ begin
       if (row(3) and column(1) and not sample_busy) = '1' then
         temp_valid_in <= held(0);
         written(25)   <= '1';
+      end if;
+      if (row(3) and column(2)) = '1' then
+        irq_mask    <= unsigned(held(3 downto 0));
+        written(26) <= '1';
+      end if;
+      if (row(3) and column(3)) = '1' then
+        irq_clear <= unsigned(held(3 downto 0));
       end if;
       if (row(3) and column(4) and not sample_busy) = '1' then
         settings.omega_given <= signed(held(17 downto 0));
@@ -453,7 +468,7 @@ begin
         written(94)       <= '1';
       end if;
       if (row(11) and column(7) and not sample_busy) = '1' then
-        settings.fault_ignore <= unsigned(held(6 downto 0));
+        settings.fault_ignore <= unsigned(held(14 downto 0));
         written(95)           <= '1';
       end if;
       if (row(12) and column(0) and not sample_busy) = '1' then
@@ -579,6 +594,50 @@ begin
       if (row(15) and column(7) and not sample_busy) = '1' then
         settings.u_dc_max <= unsigned(held(8 downto 0));
         written(127)      <= '1';
+      end if;
+      if (row(16) and column(0) and not sample_busy) = '1' then
+        settings.omega_trip <= unsigned(held(8 downto 0));
+        written(128)        <= '1';
+      end if;
+      if (row(16) and column(1) and not sample_busy) = '1' then
+        settings.omega_away <= unsigned(held(8 downto 0));
+        written(129)        <= '1';
+      end if;
+      if (row(16) and column(2) and not sample_busy) = '1' then
+        settings.runaway_samples <= unsigned(held(11 downto 0));
+        written(130)             <= '1';
+      end if;
+      if (row(16) and column(3) and not sample_busy) = '1' then
+        settings.omega_stall <= unsigned(held(8 downto 0));
+        written(131)         <= '1';
+      end if;
+      if (row(16) and column(4) and not sample_busy) = '1' then
+        settings.stall_samples <= unsigned(held(15 downto 0));
+        written(132)           <= '1';
+      end if;
+      if (row(16) and column(5) and not sample_busy) = '1' then
+        settings.i_open <= unsigned(held(8 downto 0));
+        written(133)    <= '1';
+      end if;
+      if (row(16) and column(6) and not sample_busy) = '1' then
+        settings.offset_max <= unsigned(held(9 downto 0));
+        written(134)        <= '1';
+      end if;
+      if (row(16) and column(7) and not sample_busy) = '1' then
+        settings.heartbeat <= unsigned(held(15 downto 0));
+        written(135)       <= '1';
+      end if;
+      if (row(17) and column(0) and not sample_busy) = '1' then
+        settings.brake_on <= unsigned(held(8 downto 0));
+        written(136)      <= '1';
+      end if;
+      if (row(17) and column(1) and not sample_busy) = '1' then
+        settings.brake_off <= unsigned(held(8 downto 0));
+        written(137)       <= '1';
+      end if;
+      if (row(18) and column(0) and not sample_busy) = '1' then
+        settings.double_update <= held(0);
+        written(144)           <= '1';
       end if;
       if (row(32) and column(4)) = '1' then
         clear_encoder <= held(0);
@@ -827,6 +886,8 @@ begin
         speed_mode_in             <= '0';
         temp_winding_in           <= (others => '0');
         temp_valid_in             <= '0';
+        irq_mask                  <= (others => '0');
+        irq_clear                 <= (others => '0');
         settings.omega_given      <= (others => '0');
         settings.speed_given      <= '0';
         settings.position_restart <= '0';
@@ -893,6 +954,17 @@ begin
         settings.sum_trip         <= (others => '0');
         settings.u_dc_min         <= (others => '0');
         settings.u_dc_max         <= (others => '0');
+        settings.omega_trip       <= (others => '0');
+        settings.omega_away       <= (others => '0');
+        settings.runaway_samples  <= (others => '0');
+        settings.omega_stall      <= (others => '0');
+        settings.stall_samples    <= (others => '0');
+        settings.i_open           <= (others => '0');
+        settings.offset_max       <= (others => '0');
+        settings.heartbeat        <= (others => '0');
+        settings.brake_on         <= (others => '0');
+        settings.brake_off        <= (others => '0');
+        settings.double_update    <= '0';
         clear_encoder             <= '0';
         take_snapshot             <= '0';
         position_source           <= '0';
@@ -1076,11 +1148,13 @@ begin
   shown(7 to 16)    <= (others => (others => '0'));
   shown(17)         <= "0000000000000000000000000000000" & clear_trip;
   shown(18)         <= "0000000000000000000000000000000" & clear_faults_in;
-  shown(19 to 31)   <= (others => (others => '0'));
-  shown(32)         <= "000000000000000000" & estimated.delta_held & estimated.merge_known & estimated.temp_lost &
-                       estimated.psi_held & estimated.v_comp_limited & observed.speed_limited & observed.u_dc_low &
-                       observed.u_dc_at_rail & std_logic_vector(observed.current_at_rail) & setting_refused &
-                       tripped & running;
+  shown(19 to 26)   <= (others => (others => '0'));
+  shown(27)         <= std_logic_vector(resize(irq_clear, 32));
+  shown(28 to 31)   <= (others => (others => '0'));
+  shown(32)         <= "0000000000000000" & double_used & observed.brake_asked & estimated.delta_held &
+                       estimated.merge_known & estimated.temp_lost & estimated.psi_held & estimated.v_comp_limited &
+                       observed.speed_limited & observed.u_dc_low & observed.u_dc_at_rail &
+                       std_logic_vector(observed.current_at_rail) & setting_refused & tripped & running;
   shown(33)         <= std_logic_vector(resize(estimated.flux_faults, 32));
   shown(34)         <= std_logic_vector(resize(min_pulse_used, 32));
   shown(35)         <= "000000" & std_logic_vector(resize(observed.omega_me, 26));
@@ -1102,7 +1176,13 @@ begin
   shown(51)         <= std_logic_vector(resize(fault_flags, 32));
   shown(52)         <= std_logic_vector(resize(first_fault, 32));
   shown(53)         <= std_logic_vector(resize(early_samples, 32));
-  shown(54 to 72)   <= (others => (others => '0'));
+  shown(54)         <= std_logic_vector(resize(irq_cause, 32));
+  shown(55)         <= std_logic_vector(resize(observed.code_a, 32));
+  shown(56)         <= std_logic_vector(resize(observed.code_b, 32));
+  shown(57)         <= std_logic_vector(resize(observed.code_c, 32));
+  shown(58)         <= std_logic_vector(resize(observed.code_u_dc, 32));
+  shown(59)         <= std_logic_vector(resize(observed.code_theta, 32));
+  shown(60 to 72)   <= (others => (others => '0'));
   shown(73)         <= x"00000001";
   shown(74 to 98)   <= (others => (others => '0'));
   shown(99)         <= x"00000100";

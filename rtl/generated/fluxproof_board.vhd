@@ -88,13 +88,15 @@ entity fluxproof_board is
     trip           : in  std_logic;  -- asynchronous, 1: gates off without a clock, remembered
     gate_high      : out std_logic_vector(2 downto 0);  -- upper gates, bit 0 is leg a
     gate_low       : out std_logic_vector(2 downto 0);  -- lower gates, bit 0 is leg a
-    irq            : out std_logic  -- level: a trip is remembered
+    brake          : out std_logic;  -- brake resistor on
+    irq            : out std_logic  -- level: a cause that irq_mask does not mask, see interrupts
   );
 end entity fluxproof_board;
 
 architecture rtl of fluxproof_board is
   signal rst_1             : std_logic;
   signal rst               : std_logic;
+  signal host_write        : std_logic;
   signal settings          : settings_t;
   signal enable            : std_logic;
   signal clear_trip        : std_logic;
@@ -106,6 +108,8 @@ architecture rtl of fluxproof_board is
   signal speed_mode_in     : std_logic;
   signal temp_winding_in   : signed(15 downto 0);
   signal temp_valid_in     : std_logic;
+  signal irq_mask          : unsigned(3 downto 0);
+  signal irq_clear         : unsigned(3 downto 0);
   signal clear_encoder     : std_logic;
   signal take_snapshot     : std_logic;
   signal position_source   : std_logic;
@@ -171,15 +175,17 @@ architecture rtl of fluxproof_board is
   signal running           : std_logic;
   signal tripped           : std_logic;
   signal sample_busy       : std_logic;
-  signal fault_flags       : unsigned(8 downto 0);
-  signal first_fault       : unsigned(7 downto 0);
+  signal fault_flags       : unsigned(14 downto 0);
+  signal first_fault       : unsigned(14 downto 0);
   signal early_samples     : unsigned(7 downto 0);
   signal setting_refused   : std_logic;
   signal min_pulse_used    : unsigned(11 downto 0);
+  signal double_used       : std_logic;
   signal observed          : observed_t;
   signal estimated         : estimated_t;
   signal m_axis_tdata_out  : unsigned(31 downto 0);
   signal telemetry_dropped : unsigned(15 downto 0);
+  signal irq_cause         : unsigned(3 downto 0);
   signal trip_now          : std_logic;
   signal encoder_code      : unsigned(POSITION_BITS - 1 downto 0);
   signal encoder_restart   : std_logic;
@@ -290,6 +296,7 @@ begin
       s_axi_rvalid      => s_axi_rvalid,
       s_axi_rready      => s_axi_rready,
       sample_busy       => sample_busy,
+      host_write        => host_write,
       settings          => settings,
       observed          => observed,
       estimated         => estimated,
@@ -303,6 +310,8 @@ begin
       speed_mode_in     => speed_mode_in,
       temp_winding_in   => temp_winding_in,
       temp_valid_in     => temp_valid_in,
+      irq_mask          => irq_mask,
+      irq_clear         => irq_clear,
       clear_encoder     => clear_encoder,
       take_snapshot     => take_snapshot,
       position_source   => position_source,
@@ -365,11 +374,13 @@ begin
       running           => running,
       tripped           => tripped,
       setting_refused   => setting_refused,
+      double_used       => double_used,
       min_pulse_used    => min_pulse_used,
       telemetry_dropped => telemetry_dropped,
       fault_flags       => fault_flags,
       first_fault       => first_fault,
       early_samples     => early_samples,
+      irq_cause         => irq_cause,
       encoder_flags     => encoder_flags,
       encoder_count     => encoder_count,
       index_count       => index_count,
@@ -408,17 +419,20 @@ begin
       enable          => enable,
       trip            => core_trip,
       clear_trip      => clear_trip,
+      host_write      => host_write,
       gate_high       => gate_high_next,
       gate_low        => gate_low_next,
       sample_trigger  => trigger_next,
       running         => running,
       tripped         => tripped,
       sample_busy     => sample_busy,
+      brake           => brake,
       fault_flags     => fault_flags,
       first_fault     => first_fault,
       early_samples   => early_samples,
       setting_refused => setting_refused,
       min_pulse_used  => min_pulse_used,
+      double_used     => double_used,
       carrier         => open,
       duty_valid      => open,
       compare_valid   => open,
@@ -446,6 +460,20 @@ begin
       m_axis_tvalid => m_axis_tvalid,
       m_axis_tlast  => m_axis_tlast,
       dropped       => telemetry_dropped
+    );
+
+  cause : entity work.interrupts
+    port map (
+      clk             => aclk,
+      rst             => rst,
+      tripped         => tripped,
+      fault_flags     => fault_flags,
+      setting_refused => setting_refused,
+      running         => running,
+      irq_mask        => irq_mask,
+      irq_clear       => irq_clear,
+      irq_cause       => irq_cause,
+      irq             => irq
     );
 
   stage : entity work.power_stage
@@ -668,6 +696,5 @@ begin
 
   m_axis_tdata <= std_logic_vector(m_axis_tdata_out);
   daddr        <= std_logic_vector(daddr_out);
-  irq          <= tripped;
 
 end architecture rtl;

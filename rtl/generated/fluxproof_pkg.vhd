@@ -75,9 +75,9 @@ package fluxproof_pkg is
     u_dc_gain        : signed(PU_W - 1 downto 0);  -- bus voltage per code
     k_u_max          : unsigned(RECIPROCAL_W - 1 downto 0);  -- radius of the voltage circle / bus voltage
     k_delay          : unsigned(RECIPROCAL_W - 1 downto 0);  -- angle of the delay in turns, per unit of speed
+    i_max            : signed(PU_W - 1 downto 0);  -- limit of the current: radius of the circle of i_d and i_q references
     speed_kp         : unsigned(KP_W - 1 downto 0);  -- proportional gain
     speed_ki         : unsigned(KI_W - 1 downto 0);  -- integral gain times sample time
-    i_max            : signed(PU_W - 1 downto 0);  -- limit of the current reference
     kp_d             : unsigned(KP_W - 1 downto 0);  -- proportional gain, d axis
     ki_d             : unsigned(KI_W - 1 downto 0);  -- integral gain times sample time, d axis
     kp_q             : unsigned(KP_W - 1 downto 0);  -- proportional gain, q axis
@@ -94,6 +94,7 @@ package fluxproof_pkg is
     lambda_mg        : signed(PU_W - 1 downto 0);  -- magnet flux linkage
     k_chord          : unsigned(16 downto 0);  -- (sample time)**2 / 24, per unit
     min_pulse        : unsigned(11 downto 0);  -- shortest pulse of a leg, clocks
+    double_update    : std_logic;  -- 1: sample and update at the peak too; taken while the gates are off
     omega_0          : unsigned(15 downto 0);  -- crossover of the two models, times the sample time
     xi               : unsigned(15 downto 0);  -- damping of the merge
     omega_min        : unsigned(DUTY_W - 1 downto 0);  -- no compensation up to this speed
@@ -119,8 +120,18 @@ package fluxproof_pkg is
     u_dc_min         : unsigned(LIMIT_W - 1 downto 0);  -- bus voltage below which it trips
     u_dc_max         : unsigned(LIMIT_W - 1 downto 0);  -- bus voltage that trips
     jump_max         : unsigned(11 downto 0);  -- deviation from the extrapolated position that trips, turns
-    fault_ignore     : unsigned(6 downto 0);  -- bit x: fault x is reported and does not trip
+    fault_ignore     : unsigned(14 downto 0);  -- bit x: fault x of fault_flags is reported and does not trip
+    omega_stall      : unsigned(LIMIT_W - 1 downto 0);  -- speed below which the shaft stands
+    offset_max       : unsigned(9 downto 0);  -- mean current of a phase at rest that trips: the sensor's zero is wrong
+    omega_trip       : unsigned(LIMIT_W - 1 downto 0);  -- speed that trips, electrical
+    omega_away       : unsigned(LIMIT_W - 1 downto 0);  -- speed against the reference from which a runaway is looked for
+    runaway_samples  : unsigned(11 downto 0);  -- samples in sequence against the reference without braking that trip
+    stall_samples    : unsigned(15 downto 0);  -- samples in sequence at the current limit at rest that are a stall
+    i_open           : unsigned(LIMIT_W - 1 downto 0);  -- current that a connected phase reaches when twice as much is asked for
+    brake_on         : unsigned(LIMIT_W - 1 downto 0);  -- bus voltage from which the brake resistor is on; 0: none
+    brake_off        : unsigned(LIMIT_W - 1 downto 0);  -- bus voltage below which it is off
     watchdog         : unsigned(19 downto 0);  -- longest time without a sample, clocks
+    heartbeat        : unsigned(15 downto 0);  -- longest time without a write, sample times; 0: no limit
     dead_time        : unsigned(11 downto 0);  -- both gates of a leg off, clocks
   end record settings_t;
 
@@ -157,6 +168,15 @@ package fluxproof_pkg is
     duty_c          : unsigned(DUTY_W - 1 downto 0);  -- duty, leg c
     sample_faults   : unsigned(5 downto 0);  -- faults of this sample, see sample_checks
     sample_trip     : std_logic;  -- 1: at least one of them trips
+    current_offset  : std_logic;  -- 1: the zero of a current sensor is wrong
+    motion_faults   : unsigned(2 downto 0);  -- overspeed, runaway, stall, see motion_checks
+    open_load       : std_logic;  -- 1: a phase or the motor is not connected
+    brake_asked     : std_logic;  -- 1: the bus asks for the brake resistor
+    code_a          : unsigned(CODE_W - 1 downto 0);  -- ADC code, phase a
+    code_b          : unsigned(CODE_W - 1 downto 0);  -- ADC code, phase b
+    code_c          : unsigned(CODE_W - 1 downto 0);  -- ADC code, phase c
+    code_u_dc       : unsigned(CODE_W - 1 downto 0);  -- ADC code, bus voltage
+    code_theta      : unsigned(TURN_W - 1 downto 0);  -- position code, one mechanical turn
     compare_a       : unsigned(15 downto 0);  -- compare value, leg a
     compare_b       : unsigned(15 downto 0);  -- compare value, leg b
     compare_c       : unsigned(15 downto 0);  -- compare value, leg c
@@ -499,6 +519,9 @@ package fluxproof_pkg is
   -- park: 001, eq. (9): T_alphabeta/dq
   constant PARK_LATENCY : positive := 5;
 
+  -- current_limit: none: limit of the current, as the voltage's in paper 001, section 5.2
+  constant CURRENT_LIMIT_LATENCY : positive := 1;
+
   -- speed_pi: 001, section 5.3: speed regulator with limited current reference
   constant SPEED_PI_LATENCY : positive := 5;
   constant SPEED_PI_DROP_P : natural := 4;
@@ -693,11 +716,31 @@ package fluxproof_pkg is
   constant SAMPLE_CHECKS_DROP_JUMP : natural := 5;
   constant SAMPLE_CHECKS_WARM : natural := 2;
 
+  -- motion_checks: none: protection and diagnosis of the drive
+  constant MOTION_CHECKS_LATENCY : positive := 4;
+
+  -- load_check: none: protection and diagnosis of the drive
+  constant LOAD_CHECK_LATENCY : positive := 3;
+
+  -- offset_check: none: protection and diagnosis of the drive
+  constant OFFSET_CHECK_LATENCY : positive := 4;
+  constant OFFSET_CHECK_WINDOW_BITS : natural := 6;
+  constant OFFSET_CHECK_DROP_FINE : natural := 4;
+
+  -- brake_chopper: none: protection of the drive
+  constant BRAKE_CHOPPER_LATENCY : positive := 1;
+
+  -- host_watch: none: protection of the drive
+  constant HOST_WATCH_LATENCY : positive := 1;
+
   -- fault_latch: none: protection and diagnosis of the drive
   constant FAULT_LATCH_LATENCY : positive := 1;
   constant FAULT_LATCH_LATE : natural := 6;
   constant FAULT_LATCH_TRIP : natural := 7;
   constant FAULT_LATCH_EARLY : natural := 8;
+
+  -- interrupts: none: interface to software
+  constant INTERRUPTS_LATENCY : positive := 1;
 
   -- spi_frame: none: front end of a board
   constant SPI_FRAME_LATENCY : positive := 1;

@@ -1,6 +1,7 @@
 -- Purpose: duties to compare values of the carrier, compare = duty * CARRIER_HALF, short pulses dropped.
 --   2*compare < min_pulse: 0;  CARRIER_HALF - compare < min_pulse: CARRIER_HALF
--- Each low end of a period counts alone, because the period before or after may be high throughout.
+-- Each low end of a period counts alone, because the period before or after may be high throughout.  With double_update
+-- each half of the high pulse counts alone for the same reason: compare < min_pulse: 0.
 -- One pipeline for the three legs: a, then b and c, each a clock later.
 -- Formats: duty U(1,16), 0 to 1; compare 0 to CARRIER_HALF; min_pulse in clocks.
 -- Latency: 7.  Interval: 3.  The three values change together.
@@ -17,17 +18,18 @@ entity pwm_compare is
     CARRIER_HALF : positive range 8 to 32767 := 10000
   );
   port (
-    clk       : in  std_logic;
-    rst       : in  std_logic;
-    in_valid  : in  std_logic;
-    duty_a    : in  unsigned(DUTY_W - 1 downto 0);
-    duty_b    : in  unsigned(DUTY_W - 1 downto 0);
-    duty_c    : in  unsigned(DUTY_W - 1 downto 0);
-    min_pulse : in  unsigned(11 downto 0);
-    out_valid : out std_logic;
-    compare_a : out unsigned(15 downto 0);
-    compare_b : out unsigned(15 downto 0);
-    compare_c : out unsigned(15 downto 0)
+    clk           : in  std_logic;
+    rst           : in  std_logic;
+    in_valid      : in  std_logic;
+    duty_a        : in  unsigned(DUTY_W - 1 downto 0);
+    duty_b        : in  unsigned(DUTY_W - 1 downto 0);
+    duty_c        : in  unsigned(DUTY_W - 1 downto 0);
+    min_pulse     : in  unsigned(11 downto 0);
+    double_update : in  std_logic;
+    out_valid     : out std_logic;
+    compare_a     : out unsigned(15 downto 0);
+    compare_b     : out unsigned(15 downto 0);
+    compare_c     : out unsigned(15 downto 0)
   );
 end entity pwm_compare;
 
@@ -44,6 +46,7 @@ architecture rtl of pwm_compare is
   signal result_3  : signed(RESULT_W - 1 downto 0);
   signal compare_3 : unsigned(15 downto 0);
   signal longest   : signed(17 downto 0);  -- from clock 1 on
+  signal shortest  : unsigned(12 downto 0);  -- of 2*compare, from clock 1 on
   signal room_3    : signed(17 downto 0);
   signal compare_4 : unsigned(15 downto 0);
   signal short_4   : std_logic;
@@ -76,12 +79,13 @@ begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
-      -- Stage 1: longest = CARRIER_HALF - min_pulse
-      longest <= signed(resize(HALF, 18)) - signed(resize(min_pulse, 18));
+      -- Stage 1: longest = CARRIER_HALF - min_pulse;  shortest = min_pulse, twice that with double_update
+      longest  <= signed(resize(HALF, 18)) - signed(resize(min_pulse, 18));
+      shortest <= min_pulse & '0' when double_update = '1' else '0' & min_pulse;
 
       -- Stage 4: whether the high pulse or a low end is too short
       compare_4 <= compare_3;
-      short_4   <= '1' when (compare_3 & '0') < min_pulse else '0';
+      short_4   <= '1' when (compare_3 & '0') < shortest else '0';
       long_4    <= room_3(17);
 
       -- Stages 5, 6, 7: short pulses dropped;  a and b wait for c

@@ -13,7 +13,7 @@ from scripts.prove.proof import HARNESSES, Fault, Proof
 
 CORE, TOP = "fluxproof", "fluxproof_flat"  # the entity, and the top around it with plain ports
 OUTPUTS = ("gate_high", "gate_low", "tripped")
-KEPT = ("gate_generation", "fault_latch")  # the blocks between trip and the gates
+KEPT = ("gate_generation", "protection", "fault_latch")  # the blocks between trip and the gates
 
 
 def harness(verilog: str) -> str:

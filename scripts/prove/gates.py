@@ -41,7 +41,7 @@ def compare_proof(name: str, says: str, macro: str, *faults: Fault, method: str 
         depth=block.latency + 2,
         generics=FULL,
         macros=(macro, f"LATENCY={block.latency}", f"INTERVAL={block.interval}"),
-        assumed="duties from 0 to 1, samples at their distance, min_pulse constant while a sample is in flight",
+        assumed="duties from 0 to 1, samples at their distance, settings constant while a sample is in flight",
         search_depth=3 * block.latency,
     )
 
@@ -118,19 +118,20 @@ PROOFS = (
     ),
     gate_proof(
         "duty_at_the_valley",
-        "a gate follows the compare value of the last valley and no later one",
+        "a gate follows the compare value of the last valley, with double_update of the last extreme, and no later one",
         "AT_THE_VALLEY",
         Fault("duty taken at once", GATES, "+ state.compare(k)", "+ compare_a"),
         Fault(
             "duty taken at the peak too",
             GATES,
-            "      if valley = '1' then\n        state.compare    <= (compare_a",
-            "      if valley = '1' or state.carrier = CARRIER_HALF - 1 then\n        state.compare    <= (compare_a",
+            "(peak and state.double_update)",
+            "peak",
         ),
     ),
     gate_proof(
         "settings",
-        "dead time and minimum pulse change at the valley, never to contradicting ones; no gate is on before",
+        "dead time and minimum pulse change at the valley, never to contradicting ones, double_update while the gates "
+        "are off; no gate is on before",
         "SETTINGS",
         Fault(
             "contradiction accepted",
@@ -144,9 +145,7 @@ PROOFS = (
             "enable and configured and not tripped_0",
             "enable and not tripped_0",
         ),
-        Fault(
-            "long minimum pulse accepted", GATES, " and resize(min_pulse, 16) <= CARRIER_HALF else", " else"
-        ),
+        Fault("long minimum pulse accepted", GATES, " and resize(min_pulse, 16) <= CARRIER_HALF else", " else"),
     ),
     gate_proof(
         "stays_on",
@@ -168,8 +167,8 @@ PROOFS = (
         Fault(
             "duty taken at the peak too",
             GATES,
-            "      if valley = '1' then\n        state.compare    <= (compare_a",
-            "      if valley = '1' or state.carrier = CARRIER_HALF - 1 then\n        state.compare    <= (compare_a",
+            "(peak and state.double_update)",
+            "peak",
         ),
         patience=600,
         assumed="the loaded compare values respect the minimum pulse loaded with them (see minimum_pulse_asked)",
@@ -187,9 +186,10 @@ PROOFS = (
         Fault(
             "pulses dropped by half their length",
             COMPARE,
-            "(compare_3 & '0') < min_pulse",
-            "('0' & compare_3(15 downto 1)) + 1 < min_pulse(11 downto 3)",
+            "(compare_3 & '0') < shortest",
+            "('0' & compare_3(15 downto 1)) + 1 < shortest(12 downto 3)",
         ),
+        Fault("half pulses as short as whole ones", COMPARE, "min_pulse & '0' when double_update = '1' else ", ""),
         method="induction",
     ),
     compare_proof(

@@ -22,7 +22,7 @@ HEADER = """\
 // register's kind means, and which writes are refused, is given in the description of the address map below.
 
 property kind { type = string; component = reg; };  // when a write takes effect, see below
-property unit { type = string; component = field; };  // SI unit, "1" for none
+property unit { type = string; component = field; };  // what 1.0 in the format is, "1" for a number; see the bases
 property format { type = string; component = field; };  // S or U(integer bits, fraction bits), per unit of a base
 property port { type = string; component = field; };  // the core's port
 property port_width { type = longint unsigned; component = field; };  // its bits; the word's others extend it
@@ -35,10 +35,13 @@ property high { type = longint unsigned; component = field; };  // largest legal
 ABOUT = (
     "A register is one word of 32 bits; negative values are sign-extended. Kinds: "
     "setting: takes effect between two samples, then the write is answered. command: takes effect at the next clock. "
-    "pulse: set by a one, zero again after one clock. sample pulse: set by a one, zero again after the next sample. "
+    "pulse: set by ones, zero again after one clock. sample pulse: set by a one, zero again after the next sample. "
     "status, constant, generic: read only. A write is a whole word, all four strobes set. SLVERR: value outside low to "
     "high, read-only register, other strobes, or no gap between samples. DECERR: no register at the address. "
-    "A write that is refused changes nothing."
+    "A write that is refused changes nothing. Values are per unit: 1.0 of a field's format is what its unit says. "
+    "Bases: I_base current at the upper end of the code, U_base half the voltage at full bus code, omega_base pole "
+    "pairs times rated speed, unless the drive file gives others; T_s sample time; electrical angles and speeds, peak "
+    "values."
 )
 
 
@@ -75,7 +78,8 @@ def _register(register: Register, of_setting: dict[str, str]) -> list[str]:
     reset = version_word() if register.name == "version" else register.reset
     lines = ["  reg {", f"    desc = {_quoted(register.doc)};", f'    kind = "{register.kind.value}";']
     for field in register.fields:
-        unit = of_setting.get(field.name) or units.unit(field.name.removesuffix("_in"))
+        si_unit = of_setting.get(field.name) or units.unit(field.name.removesuffix("_in"))
+        unit = units.one_is(field.name, si_unit)
         lines += ["    field {", *(f"      {line}" for line in _field(register.kind, field, unit))]
         if len(register.fields) > 1:
             lines.append(f"      desc = {_quoted(field.port.doc)};")
@@ -92,7 +96,7 @@ def _field(kind: Kind, field: Field, unit: str) -> list[str]:
         Kind.STATUS: "sw = r; hw = w;",
         Kind.CONSTANT: "sw = r; hw = na;",
         Kind.GENERIC: "sw = r; hw = w;",
-        Kind.PULSE: "sw = rw; hw = r; singlepulse;",
+        Kind.PULSE: "sw = rw; hw = r; singlepulse;" if port.is_bit else "sw = rw; hw = r;",  # a field of one bit
     }.get(kind, "sw = rw; hw = r;")
     lines = [access, f'unit = "{unit}"; format = "{port.fmt}";']
     signed = "true" if port.fmt.signed else "false"

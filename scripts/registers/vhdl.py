@@ -148,6 +148,7 @@ def register_file(words: list[Word], name: str = "register_file") -> str:
     ports = [("clk", "in", "std_logic", ""), ("rst", "in", "std_logic", "synchronous, active high")]
     ports += [(name, mode, _vector(width), "") for name, mode, width in BUS]
     ports.append(("sample_busy", "in", "std_logic", "a sample is in flight"))
+    ports.append(("host_write", "out", "std_logic", "a write was accepted"))
     ports.append(("settings", "out", "settings_t", "registers of the blocks"))
     ports += [("observed", "in", "observed_t", ""), ("estimated", "in", "estimated_t", "")]
     alone = [(w, p, "out") for w, p in stored] + [(w, p, "in") for w in words if w.kind == "status" for p in w.parts]
@@ -167,7 +168,7 @@ def register_file(words: list[Word], name: str = "register_file") -> str:
         ports=ports,
         port_width=max(map(len, names)),
         bus=[name for name, *_ in BUS],
-        pulses=[p.port for w, p in stored if w.kind == "pulse"],
+        pulses=[(p.port, _zero(p)) for w, p in stored if w.kind == "pulse"],
         sample_pulses=[p.port for w, p in stored if w.kind == "sample pulse"],
         stores=[(w.index, place(p.port), _from_word(p)) for w, p in stored],
         resets=[(place(p.port), _reset(w, p)) for w, p in stored],
@@ -188,6 +189,10 @@ def _from_word(part: Part) -> str:
     if part.vhdl_type == "std_logic":
         return "held(0)"
     return f"{'signed' if part.signed else 'unsigned'}(held({part.port_width - 1} downto 0))"
+
+
+def _zero(part: Part) -> str:
+    return "'0'" if part.vhdl_type == "std_logic" else "(others => '0')"
 
 
 def _reset(word: Word, part: Part) -> str:

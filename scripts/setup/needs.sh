@@ -13,6 +13,7 @@ needs_of() {
         generate | registers | package) echo core report package ;;
         blind) echo run blind ;;
         sensitivity) echo run ;;
+        board) echo core run report sim test ghdl c++ ghdl5 ;;
         bench | real) echo run test ;;
         compare) echo run compare ;;
         verilog) echo core ghdl5 ;;

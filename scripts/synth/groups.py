@@ -38,6 +38,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
         "stator_frame",
         "trig",
         "rotor_frame",
+        "current_circle",
         "speed_regulator",
         "current_regulators",
         "chord",
@@ -67,12 +68,8 @@ GROUPS: dict[str, tuple[str, ...]] = {
         "direction_functions",
         "motor_voltage",
     ),
-    # what no peer's figure has in it: limits of currents, bus and position, watchdog, memory of faults
-    "protection": (
-        "guard",
-        "checks",
-        "fault_memory",
-    ),
+    # what no peer's figure has in it: limits of currents, bus, position and speed, watchdogs, memory of faults
+    "protection": ("safety",),
 }
 OUTSIDE = "registers_telemetry"  # whatever fluxproof_axi holds beside the core
 ROWS = (*GROUPS, OUTSIDE)

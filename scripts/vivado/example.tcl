@@ -97,7 +97,7 @@ connect_bd_net [get_bd_pins dma/s2mm_introut] [get_bd_pins interrupts/In1]
 connect_bd_net [get_bd_pins interrupts/dout] [get_bd_pins ps/IRQ_F2P]
 
 foreach pin {
-  sample_trigger sample_valid adc_a adc_b adc_c adc_u_dc position_code trip gate_high gate_low
+  sample_trigger sample_valid adc_a adc_b adc_c adc_u_dc position_code trip gate_high gate_low brake
 } {
   make_bd_pins_external -name $pin [get_bd_pins drive/$pin]
 }

@@ -54,6 +54,11 @@ def strobes(*clocks: int, codes: dict[str, int] | None = None) -> Callable[[Plan
     )
 
 
+def registers(**values: int) -> Callable[[Plan], None]:
+    """Registers that get these values from a period on."""
+    return lambda plan: plan.registers.update(values)
+
+
 def sag(volts: float, nominal: float = 563.0) -> Callable[[int], float]:
     """The bus at ``volts`` from START to STOP."""
     return lambda k: volts if START <= k < STOP else nominal
@@ -94,7 +99,7 @@ def cases(period: int) -> list[Case]:
 
 
 def tour() -> Case:
-    """A sequence of faults in 90 periods, each cleared: short enough for GHDL."""
+    """A sequence of faults in 100 periods, each cleared: short enough for GHDL."""
     hurts = [
         during(code("adc_b", 60000), 10, 12),
         during(jump, 22, 23),
@@ -102,15 +107,20 @@ def tour() -> Case:
         during(strobes(SAMPLE_DELAY, SAMPLE_DELAY + 7, codes=NOISE), 46, 48),
         during(lambda plan: plan.pulse("trip", 33), 54, 55),
         during(code("adc_u_dc", 0), 66, 70),
+        during(registers(omega_trip=10), 80, 81),
+        during(registers(omega_trip=REGISTERS["omega_trip"].high), 82, 83),
+        during(registers(heartbeat=2), 88, 89),
+        during(registers(heartbeat=0), 92, 93),
+        during(registers(brake_on=200, brake_off=190), 95, 96),
     ]
 
     def disturb(plan: Plan) -> None:
         for each in hurts:
             each(plan)
 
-    clears = (18, 28, 42, 50, 60, 68, 76)  # at 68 the bus fault is still present
+    clears = (18, 28, 42, 50, 60, 68, 76, 84, 94)  # at 68 the bus fault is still present
     text = "a sequence of faults"
-    return Case("tour", text, disturb, trips="current_sum", start=10, stop=70, clears=clears, periods=90)
+    return Case("tour", text, disturb, trips="current_sum", start=10, stop=92, clears=clears, periods=100)
 
 
 # Register writes: each register at both ends of its range, in blocks of periods after a start without faults.

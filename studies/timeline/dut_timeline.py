@@ -20,8 +20,10 @@ CLOCKS = 80
 
 
 def instances(top: Path) -> dict[str, str]:
-    """{label: entity} of everything the top instantiates."""
-    return dict(re.findall(r"^\s+(\w+)\s*: entity work\.(\w+)", top.read_text(), re.MULTILINE))
+    """{label: entity} of everything the top and its protection instantiate."""
+    text = top.read_text() + (top.parent / "io" / "protection.vhd").read_text()
+    found = dict(re.findall(r"^\s+(\w+)\s*: entity work\.(\w+)", text, re.MULTILINE))
+    return {label: entity for label, entity in found.items() if entity != "protection"}
 
 
 @cocotb.test()

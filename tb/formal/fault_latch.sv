@@ -8,12 +8,15 @@ module formal_top (
     input [5:0] sample_faults,
     input       sample_late,
     input       sample_early,
+    input [2:0] motion_faults,
+    input       open_load,
+    input       current_offset,
+    input       host_lost,
     input       enable,
     input       clear_trip,
-    input [6:0] fault_ignore
+    input [14:0] fault_ignore
 );
-  wire [8:0] fault_flags;
-  wire [7:0] first_fault;
+  wire [14:0] fault_flags, first_fault;
   wire fault_stop, gate_clear;
 
   fault_latch dut (
@@ -23,6 +26,10 @@ module formal_top (
       .sample_faults(sample_faults),
       .sample_late(sample_late),
       .sample_early(sample_early),
+      .motion_faults(motion_faults),
+      .open_load(open_load),
+      .current_offset(current_offset),
+      .host_lost(host_lost),
       .enable(enable),
       .clear_trip(clear_trip),
       .fault_ignore(fault_ignore),
@@ -36,13 +43,14 @@ module formal_top (
   always @(posedge clk) begun <= 1;
   always @* if (!begun) assume (rst);
 
+  // Bit 7 is trip, which needs no enable and cannot be ignored; bit 8 is a rejected sample, which never trips.
+  localparam [14:0] CAUSES = 15'h7e7f;
+  wire [14:0] cause = {host_lost, current_offset, open_load, motion_faults, 2'b00, sample_late, sample_faults};
   reg rest, was_trip, was_enable, was_clear, was_stop;
-  reg [6:0] was_cause, was_ignore;
-  reg [8:0] was_flags;
-  reg [7:0] was_first;
+  reg [14:0] was_cause, was_ignore, was_flags, was_first;
   always @(posedge clk) begin
     {rest, was_trip, was_enable, was_clear, was_stop} <= {rst, trip, enable, clear_trip, fault_stop};
-    {was_cause, was_ignore} <= {sample_late, sample_faults, fault_ignore};
+    {was_cause, was_ignore} <= {cause, fault_ignore};
     {was_flags, was_first} <= {fault_flags, first_fault};
   end
 
@@ -51,10 +59,12 @@ module formal_top (
   always @(posedge clk) if (begun && !rest) begin
     if (was_trip) assert (fault_stop && fault_flags[7]);
     if (was_enable && (was_cause & ~was_ignore) != 0) assert (fault_stop);
-    if (was_enable) assert ((was_cause & ~fault_flags[6:0]) == 0);
+    if (was_enable) assert ((was_cause & ~fault_flags) == 0);
     if (!was_clear) assert ((was_flags & ~fault_flags) == 0);
-    if (!was_clear && was_stop && (was_ignore & fault_flags[6:0]) == 0 && fault_flags[6:0] != 0) assert (fault_stop);
+    if (!was_clear && was_stop && (was_ignore & fault_flags & CAUSES) == 0 && (fault_flags & CAUSES) != 0)
+      assert (fault_stop);
     if (was_clear && was_trip) assert (fault_stop);
+    if (fault_flags == 15'h0100) assert (!fault_stop);
     cover (fault_stop && !was_trip);
     cover (was_stop && !fault_stop);
   end
@@ -65,7 +75,7 @@ module formal_top (
   always @(posedge clk) if (begun && !rest) begin
     if (was_stop) assert (first_fault == was_first);
     if (fault_stop && !was_stop) assert (first_fault != 0);
-    cover (was_stop && first_fault != fault_flags[7:0]);
+    cover (was_stop && first_fault != fault_flags);
   end
 `endif
 endmodule

@@ -19,7 +19,8 @@ module formal_top (
     input        trip,
     input        clear_trip,
     input [11:0] dead_time,
-    input [11:0] min_pulse
+    input [11:0] min_pulse,
+    input        double_update
 );
   localparam [16:0] HALF = `CARRIER_HALF;  // sized: the solver's arithmetic is as wide as this
 
@@ -30,9 +31,10 @@ module formal_top (
   wire        tripped;
   wire        setting_refused;
   wire [11:0] min_pulse_used;
+  wire        double_used;
   wire [15:0] carrier;
 `ifdef LEMMAS
-  wire [130:0] spy_state;
+  wire [131:0] spy_state;
 `endif
 
   gate_generation dut (
@@ -46,6 +48,7 @@ module formal_top (
       .clear_trip(clear_trip),
       .dead_time(dead_time),
       .min_pulse(min_pulse),
+      .double_update(double_update),
       .gate_high(gate_high),
       .gate_low(gate_low),
       .sample(sample),
@@ -53,6 +56,7 @@ module formal_top (
       .tripped(tripped),
       .setting_refused(setting_refused),
       .min_pulse_used(min_pulse_used),
+      .double_used(double_used),
       .carrier(carrier)
 `ifdef LEMMAS
       ,
@@ -71,23 +75,28 @@ module formal_top (
   wire low = leg == 0 ? gate_low[0] : leg == 1 ? gate_low[1] : gate_low[2];
   wire [15:0] asked = leg == 0 ? compare_a : leg == 1 ? compare_b : compare_c;
 
-  // The valley: the carrier has come down to 0 and takes new values with the coming edge.
-  reg was_one;
+  // The valley: the carrier has come down to 0 and takes new values with the coming edge; the peak: it has come up.
+  reg was_one, was_below;
   wire valley = carrier == 0 && was_one;
+  wire peak = carrier == HALF - 1 && was_below;
   wire good = dead_time > 0 && dead_time < min_pulse && min_pulse <= HALF;
 
   reg [15:0] compare;
   reg [11:0] dead_in_force;
   reg [11:0] pulse_in_force;
+  reg double_in_force;  // taken while the gates are off
+  wire update = valley || (peak && double_in_force);
   reg accepted;
   reg locked;  // by a trip, until it is cleared
   reg allowed;  // enabled at a valley, and nothing against it since
   wire wanted = carrier + {1'b0, compare} >= HALF;
 
   always @(posedge clk) begin
-    was_one <= carrier == 1;
+    was_one   <= carrier == 1;
+    was_below <= carrier == HALF - 2;
+    if (update) compare <= asked;
+    if (!running) double_in_force <= double_update;
     if (valley) begin
-      compare <= asked;
       if (good) begin
         dead_in_force  <= dead_time;
         pulse_in_force <= min_pulse;
@@ -99,7 +108,9 @@ module formal_top (
     if (trip || !enable) allowed <= 0;
     if (rst) begin
       was_one        <= 0;
+      was_below      <= 0;
       compare        <= 0;
+      double_in_force <= 0;
       dead_in_force  <= 0;
       pulse_in_force <= 0;
       accepted       <= 0;
@@ -179,12 +190,14 @@ module formal_top (
     if (low) assert (!was_wanted);
     cover (high && asked != compare && compare < HALF);
     cover (low && asked != compare && compare > 0);
+    cover (high && double_in_force && !double_update);
+    cover (high && !double_in_force && double_update);
   end
 `endif
 
 `ifdef SETTINGS
   always @(posedge clk) if (begun) begin
-    assert (min_pulse_used == pulse_in_force);
+    assert (min_pulse_used == pulse_in_force && double_used == double_in_force);
     if (high || low) assert (accepted);
     cover (high && setting_refused);
     cover (high && pulse_in_force != min_pulse && !setting_refused);
@@ -205,9 +218,11 @@ module formal_top (
 
 `ifdef GATE_PULSE
   // What pwm_compare sees to: no duty asks for less than the minimum pulse that comes into force with it.
-  wire [11:0] pulse_next = good ? min_pulse : pulse_in_force;
-  wire fits = asked == 0 || asked == HALF || (asked < HALF && {asked, 1'b0} >= pulse_next && HALF - asked >= pulse_next);
-  always @* if (begun && valley) assume (fits);
+  wire [11:0] pulse_next = valley && good ? min_pulse : pulse_in_force;
+  wire double_next = running ? double_in_force : double_update;
+  wire [16:0] asked_high = double_next ? asked : {asked, 1'b0};  // with double_update half a pulse counts alone
+  wire fits = asked == 0 || asked == HALF || (asked < HALF && asked_high >= pulse_next && HALF - asked >= pulse_next);
+  always @* if (begun && update) assume (fits);
 
   // How long a gate has been on, and the settings when the leg made up its mind.
   reg [11:0] on_time, pulse_then, dead_then, room_before;
@@ -234,12 +249,12 @@ module formal_top (
   // The record `state` of the entity, its last field first; within an array leg a is the uppermost.
   wire [35:0] spy_elapsed;
   wire [ 2:0] spy_level;
-  wire        spy_tripped, spy_running, spy_configured;
+  wire        spy_tripped, spy_running, spy_configured, spy_double;
   wire [11:0] spy_min_pulse, spy_dead_time;
   wire [47:0] spy_compare;
   wire        spy_down;
   wire [15:0] spy_carrier;
-  assign {spy_elapsed, spy_level, spy_tripped, spy_running, spy_configured, spy_min_pulse, spy_dead_time, spy_compare,
+  assign {spy_elapsed, spy_level, spy_tripped, spy_running, spy_configured, spy_double, spy_min_pulse, spy_dead_time, spy_compare,
           spy_down, spy_carrier} = spy_state;
 
   wire [15:0] compare_of_leg = leg == 0 ? spy_compare[47:32] : leg == 1 ? spy_compare[31:16] : spy_compare[15:0];
@@ -251,6 +266,8 @@ module formal_top (
     // The same valley, the same settings
     assert (carrier == spy_carrier && spy_carrier < HALF);
     if (spy_carrier == 0) assert (spy_down == was_one);
+    if (spy_carrier == HALF - 1) assert (spy_down == !was_below);
+    assert (double_in_force == spy_double);
     assert (compare == compare_of_leg);
     assert (dead_in_force == spy_dead_time && pulse_in_force == spy_min_pulse);
     assert (accepted == spy_configured);
@@ -270,22 +287,26 @@ module formal_top (
   // Where the carrier is in its period, and for how many clocks the leg has wanted what it wants.
   wire [16:0] at = spy_down ? {HALF[15:0], 1'b0} - 17'd1 - spy_carrier : {1'b0, spy_carrier};
   wire on = running && was_running;
+  wire own_half = double_in_force && at >= HALF;  // the falling half has a compare value of its own
   reg [15:0] held;
   always @(posedge clk) held <= rst || wanted != was_wanted || !was_running ? 1 : &held ? held : held + 1;
 
   always @(posedge clk) if (begun) begin
-    assert (compare == 0 || compare == HALF
-            || (compare < HALF && {compare, 1'b0} >= pulse_in_force && HALF - compare >= pulse_in_force));
+    if (running)
+      assert (compare == 0 || compare == HALF
+              || (compare < HALF && (double_in_force ? compare : {compare, 1'b0}) >= pulse_in_force
+                  && HALF - compare >= pulse_in_force));
     if (running && !was_running) assert (at == 0);
     if (!was_running) assert (elapsed == 0 && !level);
     if (high || low) assert (was_running);
     if (on) begin
       assert (pulse_then > dead_then && dead_then > 0);
       // Since when the leg wants it: from the compare value and the carrier
-      if (at == 0) assert (settled && held >= pulse_then);
-      if (at > 0 && was_wanted) assert (held + HALF >= at + compare && at > HALF - compare && at <= HALF + compare);
+      if (at == 0 || (double_in_force && at == HALF)) assert (settled && held >= pulse_then);
+      if (own_half && was_wanted) assert (held + HALF >= at && (at == HALF || at <= HALF + compare));
+      if (at > 0 && was_wanted && !own_half) assert (held + HALF >= at + compare && at > HALF - compare && at <= HALF + compare);
       if (at > 0 && !was_wanted && at > HALF) assert (held + HALF + compare >= at && at > HALF + compare);
-      if (at > 0 && !was_wanted && at <= HALF) assert (held >= at && at <= HALF - compare);
+      if (at > 0 && !was_wanted && at <= HALF && !own_half) assert (held >= at && at <= HALF - compare);
       assert (held >= pulse_then || (pulse_then == pulse_in_force && dead_then == dead_in_force));
       // What it means for the gate
       assert (level == was_wanted);

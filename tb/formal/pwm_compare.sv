@@ -8,7 +8,8 @@ module formal_top (
     input [16:0] duty_a,
     input [16:0] duty_b,
     input [16:0] duty_c,
-    input [11:0] min_pulse
+    input [11:0] min_pulse,
+    input        double_update
 );
   localparam HALF = `CARRIER_HALF;
 
@@ -25,6 +26,7 @@ module formal_top (
       .duty_b(duty_b),
       .duty_c(duty_c),
       .min_pulse(min_pulse),
+      .double_update(double_update),
       .out_valid(out_valid),
       .compare_a(compare_a),
       .compare_b(compare_b),
@@ -44,29 +46,36 @@ module formal_top (
   always @* assume (min_pulse <= HALF);
 
   reg [11:0] was_min_pulse;
+  reg was_double;
   reg [15:0] was_a, was_b, was_c;
   reg rest;
   always @(posedge clk) begin
     rest          <= rst;
     was_min_pulse <= min_pulse;
+    was_double    <= double_update;
     was_a         <= compare_a;
     was_b         <= compare_b;
     was_c         <= compare_c;
   end
-  always @* if (begun && age < `LATENCY) assume (min_pulse == was_min_pulse);
+  always @* if (begun && age < `LATENCY) assume (min_pulse == was_min_pulse && double_update == was_double);
 
   (* anyconst *) wire [1:0] leg;
   always @* assume (leg < 3);
   wire [15:0] compare = leg == 0 ? compare_a : leg == 1 ? compare_b : compare_c;
 
 `ifdef MINIMUM
-  // No pulse and no low end of a period is shorter than the minimum pulse, but for those that are not there at all.
+  // No pulse and no low end of a period is shorter than the minimum pulse, but for those that are not there at all; with
+  // double_update no half of a pulse either.
   always @(posedge clk) if (begun && out_valid) begin
     assert (compare <= HALF);
-    if (compare != 0 && compare != HALF) assert (2 * compare >= was_min_pulse && HALF - compare >= was_min_pulse);
+    if (compare != 0 && compare != HALF) begin
+      assert ((was_double ? compare : 2 * compare) >= was_min_pulse);
+      assert (HALF - compare >= was_min_pulse);
+    end
     cover (compare == HALF);
     cover (was_min_pulse > 2 && HALF - compare == was_min_pulse);
-    cover (was_min_pulse > 3 && was_min_pulse[0] == 0 && 2 * compare == was_min_pulse);
+    cover (was_min_pulse > 3 && was_min_pulse[0] == 0 && 2 * compare == was_min_pulse && !was_double);
+    cover (was_min_pulse > 3 && compare == was_min_pulse && was_double);
   end
 `endif
 

@@ -1,0 +1,268 @@
+"""Limits that hold: what a drive described wrongly or asked for too much ends in, golden core on the switching plant.
+
+The same values go through the VHDL and the converted RTL in the tours of faults and the closed loops.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+from fluxproof.checkout import ROOT
+from fluxproof.cosim.closed_loop import GoldenPeriods, Scenario, cosimulate, run_now
+from fluxproof.cosim.golden_clock import GoldenClock
+from fluxproof.cosim.scenarios import RPM
+from fluxproof.golden_model import drive as drives
+from fluxproof.golden_model.control import current_limit
+from fluxproof.golden_model.io.fault_latch import NAMES
+from fluxproof.golden_model.registers import registers
+from fluxproof.golden_model.scaling import PARTS
+from fluxproof.golden_model.units import from_si, one_is
+
+DRIVE = drives.with_carrier(drives.load(ROOT / "docs" / "drives" / "paper001.toml"), 64)
+SET = registers(DRIVE)
+QUARTER = 1 << 16  # of an electrical turn
+
+
+class Golden:
+    """The golden core as the device: cosimulate compares it with another golden core and records the plant."""
+
+    def __init__(self, register_set):
+        self.periods = GoldenPeriods(register_set)
+        self.flags: list[tuple[int, ...]] = []
+        self.running: list[int] = []
+
+    async def start(self, registers, enable):
+        return self._seen(self.periods.run(None, enable))
+
+    async def period(self, inputs, enable):
+        return self._seen(self.periods.run(inputs, enable))
+
+    def change(self, registers):
+        core = self.periods.core
+        core.registers = core.registers._replace(**registers)
+
+    def _seen(self, period):
+        self.flags.append(period.flags)
+        self.running.append(period.running)
+        observed = self.periods.core.observed
+        return dataclasses.replace(period, observed=None if observed is None else observed._asdict())
+
+
+def play(periods, rpm=0.0, i_d=0.0, i_q=None, load=0.0, changes=None, start_rpm=0.0, off=0, sensors=None, events=None):
+    """(device, result); rpm, load and i_d numbers or arrays; i_q: torque mode; ``off``: periods before enable."""
+    ones = np.ones(periods)
+    omega = np.broadcast_to(rpm, periods) * RPM * DRIVE.machine.pole_pairs
+    enable = (np.arange(periods) >= off).astype(np.int64)
+    scenario = Scenario(
+        omega_ref=np.array([from_si("omega_ref", w, DRIVE) for w in omega]),
+        load=ones * load,
+        u_dc=ones * DRIVE.inverter.dc_bus_v,
+        i_d_ref=np.array([from_si("i_d_ref", i, DRIVE) for i in np.broadcast_to(i_d, periods)]),
+        i_q_ext=np.full(periods, from_si("i_q_ext", i_q or 0.0, DRIVE)),
+        speed_mode=np.full(periods, int(i_q is None)),
+        enable=enable,
+        omega_m=start_rpm * RPM,
+        changes=events or {},
+    )
+    used = SET._replace(values=SET.values._replace(**(changes or {})))
+    device = Golden(used)
+    result = run_now(cosimulate(device, DRIVE, used, scenario, sensors=sensors))
+    assert result.differences == 0
+    return device, result
+
+
+def first(device):
+    """Names of the faults that stopped first."""
+    word = device.flags[-1][1]
+    return [name for bit, name in enumerate(NAMES) if word >> bit & 1]
+
+
+def told(device):
+    word = device.flags[-1][0]
+    return [name for bit, name in enumerate(NAMES) if word >> bit & 1]
+
+
+@pytest.mark.parametrize("turned", [1.1, 2.0, 2.9])
+@pytest.mark.parametrize("rpm", [300.0, -300.0])
+def test_wrong_angle_is_a_runaway(rpm, turned):
+    """The rotor's angle 99, 180, 261 degrees off at 300 rpm: runaway is named below a third of the rated speed.
+
+    Exactly 90 degrees off there is no torque: the shaft stands, and after half a second a stall is told.
+    """
+    offset = SET.values.theta_offset + round(turned * QUARTER)
+    device, result = play(1300, rpm, changes={"theta_offset": offset % (4 * QUARTER)})
+    assert first(device) == ["runaway"] and not device.running[-1]
+    assert np.abs(result.plant["omega_m"]).max() < DRIVE.machine.rated_speed_rad_s / 3
+    assert np.abs(result.plant["i_a"]).max() < 2.0 * DRIVE.current_limit_a
+
+
+def test_right_angle_off_is_told_as_a_stall():
+    """90 degrees off: all current in the d axis, no torque."""
+    device, result = play(700, 300.0, changes={"theta_offset": QUARTER, "stall_samples": 500})
+    assert told(device) == ["stall"] and np.abs(result.plant["omega_m"]).max() < 1.0
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_torque_mode_without_load_ends_in_overspeed(sign):
+    device, result = play(2000, i_q=sign * 1.0, start_rpm=sign * 3500.0)
+    assert first(device) == ["overspeed"] and not device.running[-1]
+    rated = DRIVE.machine.rated_speed_rad_s
+    assert np.abs(result.plant["omega_m"]).max() < 1.25 * rated
+    limit, speed = SET.values.omega_trip << 8, np.abs(result.observed["omega_me"])
+    beyond = int(np.flatnonzero(speed >= limit + 1)[0])
+    assert device.running[beyond] and not any(device.running[beyond + 3 :])
+
+
+@pytest.mark.parametrize("i_d", [12.0, -12.0])
+@pytest.mark.parametrize("i_q", [None, 9.0])
+def test_current_stays_in_its_circle(i_d, i_q):
+    """i_d_ref of 12 A with a limit of 7.1 A, alone and with i_q_ref beside it."""
+    limit = from_si("i_d_ref", 7.1, DRIVE)
+    device, result = play(1000, 600.0, i_d=i_d, i_q=i_q, changes={"i_max": limit, "i_trip": 511})
+    o = result.observed
+    assert told(device) == []
+    settled = slice(300, None)
+    assert abs(np.hypot(o["i_d"], o["i_q"])[settled].mean() - limit) < 0.01 * limit
+    assert np.abs(np.hypot(result.plant["i_d"], result.plant["i_q"])[settled]).mean() < 7.1 * 1.01
+    assert np.abs(o["i_q_ref"])[settled].max() <= 1
+
+
+def test_references_never_leave_the_circle():
+    """Random references and limits: i_d**2 + i_q**2 <= i_max**2 of every pair, in both modes."""
+    rng, state = np.random.default_rng(3), current_limit.State()
+    for _ in range(3000):
+        i_max, i_d_ref = int(2 ** rng.uniform(0, 17)) - 1, int(rng.integers(-131072, 131072))
+        state, _ = current_limit.step(state, i_d_ref, i_max)
+        assert state.i_d**2 + state.i_q_max**2 <= i_max**2 < state.i_d**2 + (state.i_q_max + 1) ** 2
+        assert state.i_d == max(-i_max, min(i_max, i_d_ref)) and state.i_q_max == math.isqrt(i_max**2 - state.i_d**2)
+
+
+@pytest.mark.parametrize("phase", range(3))
+def test_offset_of_a_sensor_is_named_before_the_gates_switch(phase):
+    """0.1 A at rest, gates off: enable has no effect, current_offset is named; a right zero starts."""
+    name = f"offset_{'abc'[phase]}"
+    wrong = {name: getattr(SET.values, name) + round(0.1 / 12.5 * 32768)}
+    device, _ = play(120, 300.0, changes=wrong, off=80)
+    assert first(device) == ["current_offset"] and not any(device.running)
+    device, _ = play(120, 300.0, off=80)
+    assert device.running[-1] and told(device) == []
+
+
+def test_ordinary_operation_does_not_trip():
+    """Reversals at full torque, load steps at rest and at speed, a stop: nothing is told."""
+    rpm = np.repeat([0.0, 1500.0, -1500.0, 100.0, -100.0, 0.0], 900)
+    load = np.repeat([0.0, 0.0, 0.0, 3.7, -3.7, 3.7], 900)
+    device, result = play(len(rpm), rpm, load=load)
+    assert told(device) == [] and device.running[-1]
+    assert np.abs(result.plant["omega_m"]).max() > 1400 * RPM
+
+
+def test_a_load_that_drives_the_shaft_away_is_a_runaway():
+    """More load than the limit of the current holds: the shaft is driven against its reference."""
+    device, _ = play(1500, 300.0, load=9.0)
+    assert first(device) == ["runaway"]
+
+
+def test_stall_is_told_and_trips_only_if_asked():
+    changes = {"stall_samples": 300}
+    blocked = dict(rpm=1000.0, load=0.0, changes=changes)
+    scenario = dict(periods=900, **blocked)
+    device, _ = play_blocked(**scenario)
+    assert told(device) == ["stall"] and device.running[-1]
+    device, _ = play_blocked(**scenario | {"changes": changes | {"fault_ignore": 0}})
+    assert first(device) == ["stall"] and not device.running[-1]
+
+
+def play_blocked(periods, rpm, load, changes):
+    """The shaft held by a load that follows the torque: the machine's own torque at the limit."""
+    torque = 1.5 * DRIVE.machine.pole_pairs * DRIVE.machine.magnet_flux_wb * DRIVE.current_limit_a
+    ramp = np.minimum(1.0, np.arange(periods) / 10.0)
+    return play(periods, rpm, load=torque * 1.0 * ramp, changes=changes | {"omega_stall": 60, "omega_away": 511})
+
+
+def open_core(carrying, **changes):
+    """A golden core at 1500 rpm whose i_q_ref is given and whose currents are those of the ``carrying`` phases."""
+    core = GoldenClock(SET.values._replace(**changes), SET.config)
+    core.advance(1, enable=1)
+    code, step = 0, 65536 * 25 // 10000
+    amplitude = 2000
+    for k in range(500):
+        theta = 2 * math.pi * 4 * code / 65536
+        sample = {f"adc_{x}": 32768 for x in "abc"}
+        for n, x in enumerate("abc"):
+            if carrying >> n & 1:
+                sample[f"adc_{x}"] += round(amplitude * math.sin(theta - 2 * math.pi * n / 3))
+        sample |= {"adc_u_dc": round(563 / 1000 * 65536), "position_code": code, "omega_ref_in": 0, "i_d_ref_in": 0}
+        sample |= {"i_q_ext_in": 20000, "speed_mode_in": 0, "temp_winding_in": 0, "temp_valid_in": 0}
+        rows = core.advance(4)
+        rows = core.advance(124, sample | {"clear_faults_in": 0})
+        code = (code + step) % 65536
+    return int(rows[-1, 5])
+
+
+@pytest.mark.parametrize(("carrying", "expected"), [(7, False), (6, True), (5, True), (3, True), (0, False)])
+def test_open_phase_is_told(carrying, expected):
+    flags = open_core(carrying, sum_trip=511, fault_ignore=32767)
+    assert bool(flags >> NAMES.index("open_load") & 1) == expected
+
+
+def test_host_that_stops_writing_turns_the_gates_off():
+    core = GoldenClock(SET.values._replace(heartbeat=5), SET.config)
+    middle = {f"adc_{x}": 32768 for x in "abc"} | {"adc_u_dc": 36897, "position_code": 0}
+    middle |= dict.fromkeys(("omega_ref_in", "i_d_ref_in", "i_q_ext_in", "speed_mode_in"), 0)
+    middle |= dict.fromkeys(("temp_winding_in", "temp_valid_in", "clear_faults_in"), 0)
+    core.advance(1, enable=1, host_write=1)
+
+    def period(writes):
+        core.advance(4, host_write=int(writes))
+        return core.advance(124, middle, host_write=0)
+
+    for _ in range(20):
+        rows = period(True)
+    assert rows[-1, 3] and not rows[-1, 5]
+    for _ in range(4):
+        rows = period(False)
+    assert rows[-1, 3]
+    for _ in range(3):
+        rows = period(False)
+    assert not rows[-1, 3] and rows[-1, 6] == 1 << NAMES.index("host_lost") and not rows[-1, 0] and not rows[-1, 1]
+    core.advance(1, host_write=1)
+    core.advance(1, host_write=0, clear_trip=1)
+    core.advance(1, clear_trip=0)
+    for _ in range(3):
+        rows = period(True)
+    assert rows[-1, 3] and not rows[-1, 5]
+
+
+def test_brake_chopper_has_hysteresis_and_needs_samples():
+    values = SET.values._replace(brake_on=round(650 / 500 * 256), brake_off=round(620 / 500 * 256))
+    core = GoldenClock(values, SET.config)
+    seen = []
+    for volts in (600, 640, 660, 640, 625, 615, 640, 700):
+        sample = {f"adc_{x}": 32768 for x in "abc"} | {"adc_u_dc": round(volts / 1000 * 65536), "position_code": 0}
+        sample |= dict.fromkeys(("omega_ref_in", "i_d_ref_in", "i_q_ext_in", "speed_mode_in"), 0)
+        sample |= dict.fromkeys(("temp_winding_in", "temp_valid_in", "clear_faults_in"), 0)
+        core.advance(4)
+        seen.append(int(core.advance(124, sample)[-1, 9]))
+    assert seen == [0, 0, 1, 1, 1, 0, 0, 1]
+    assert core.advance(400)[-1, 9] == 0, "no samples: the resistor stays on"
+
+
+def test_units_of_the_registers_are_the_scales():
+    """What SystemRDL says 1.0 of a register is, evaluated with the bases, is the scale that the drive file uses."""
+    drive = drives.load(ROOT / "docs" / "drives" / "emrax228.toml")
+    b = drive.bases
+    known = {"I_base": b.current_a, "U_base": b.voltage_v, "omega_base": b.omega_me_rad_s, "T_s": drive.sample_time_s}
+    known |= {"clock_hz": drive.core.clock_hz, "pi": math.pi}
+    checked = 0
+    for entry in (e for part in PARTS for e in part(drive)):
+        says = one_is(entry.name, entry.unit).removesuffix("/K").removesuffix(" rad").removesuffix(" degC")
+        if entry.unit in ("code", "turn"):
+            continue
+        assert eval(says, {"__builtins__": {}}, known) == pytest.approx(entry.scale, rel=1e-12), entry.name  # noqa: S307
+        checked += 1
+    assert checked > 60 and one_is("torque", "Nm") == "1.5*pole_pairs*I_base*U_base/omega_base"

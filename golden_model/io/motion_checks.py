@@ -1,0 +1,111 @@
+"""Plausibility of the motion, one bit each, evaluated with every sample after the speed regulator.
+
+    0  overspeed   |omega_me| >= omega_trip
+    1  runaway     speed mode: the shaft turns against its reference, at omega_away or faster, and for
+                   ``runaway_samples`` samples in sequence not slower than at the slowest of them
+    2  stall       speed mode: i_q_ref at its limit and |omega_me| < omega_stall in ``stall_samples`` in sequence
+
+Check 1: a reversal, a stop and a load step turn against the reference as well, but the drive brakes: the speed falls
+below its own minimum again and again, and each time the count starts anew.  With an angle, a direction or a phase order
+that is wrong the regulator accelerates instead.  A reference of zero is against either direction.  In torque mode the
+load decides about the direction: there check 0 is the limit.
+
+Formats: limits U(1,8), |x| is the one's complement where x is negative, cut (floor) to their format; the minimum is
+compared in full.  Counters saturate.
+"""
+
+from typing import NamedTuple
+
+from fluxproof.golden_model.block import Block, Port
+from fluxproof.golden_model.fixed import Format
+from fluxproof.golden_model.formats import BIT, LIMIT, PU
+from fluxproof.golden_model.io.sample_checks import DROP_LIMIT
+from fluxproof.golden_model.kernel import kernel
+
+FAULTS = Format(0, 3, 0)
+AWAY, STALLED = Format(0, 12, 0), Format(0, 16, 0)  # counts of samples
+AWAY_HI, STALLED_HI = AWAY.hi, STALLED.hi
+
+
+class State(NamedTuple):
+    slowest: int = 0  # |omega_me| of the sample at which the count began
+    away: int = 0  # samples since then
+    stalled: int = 0  # samples at the limit without motion
+
+
+@kernel
+def step(
+    state, omega_me, omega_ref, speed_mode, speed_limited, run, omega_trip, omega_away, runaway_samples, omega_stall,
+    stall_samples,
+):  # fmt: skip
+    size = omega_me if omega_me >= 0 else -1 - omega_me
+    coarse = size >> DROP_LIMIT
+    over = 1 if coarse >= omega_trip else 0
+
+    against = (omega_me < 0) != (omega_ref < 0) or omega_ref == 0
+    leaving = run and speed_mode and against and coarse >= omega_away
+    begins = state.away == 0 or size < state.slowest
+    slowest = size if begins else state.slowest
+    away = (1 if begins else min(state.away + 1, AWAY_HI)) if leaving else 0
+    runaway = 1 if away > 0 and away >= runaway_samples else 0
+
+    held = run and speed_mode and speed_limited and coarse < omega_stall
+    stalled = min(state.stalled + 1, STALLED_HI) if held else 0
+    stall = 1 if stalled > 0 and stalled >= stall_samples else 0
+    return State(slowest, away, stalled), (over + 2 * runaway + 4 * stall,)
+
+
+def stimuli(rng, _config):
+    """Limits met and just missed with both signs; a runaway, a reversal, a wavering one; stalls; modes and stops."""
+    usual = {"speed_mode": 1, "speed_limited": 0, "run": 1, "omega_trip": 300, "omega_away": 20, "runaway_samples": 5}
+    usual |= {"omega_stall": 3, "stall_samples": 4, "omega_ref": 5000, "omega_me": 5000}
+    rows = []
+    for edge in (300 << 8, 20 << 8, 3 << 8):
+        for near in (-1, 0, 1):
+            for sign in (1, -1):
+                for ref in (sign, -sign, 0):
+                    rows += [usual | {"omega_me": sign * (edge + near), "omega_ref": ref, "speed_limited": 1}] * 6
+                    rows.append(usual)
+    for sign in (1, -1):
+        for slope in (30, 0, -1, -30, 7):
+            for k in range(12):
+                wave = 400 if slope == 7 and k % 4 == 3 else 0
+                rows.append(usual | {"omega_me": -sign * (7000 + slope * k - wave), "omega_ref": 300 * sign})
+            rows.append(usual)
+    for breaks in ({"run": 0}, {"speed_mode": 0}, {"omega_ref": -1}, {"speed_limited": 0}):
+        for row in ({"omega_me": -8000}, {"omega_me": 10, "speed_limited": 1}):
+            rows += [usual | row] * 4 + [usual | row | breaks] + [usual | row] * 6 + [usual]
+    for most in (0, 1, AWAY_HI):
+        row = {"omega_me": -9000, "runaway_samples": most}
+        rows += [usual | row] * 3 + [usual | {"omega_me": 1, "speed_limited": 1, "stall_samples": most}] * 3
+    rows += [usual | {"omega_me": -9000, "runaway_samples": AWAY_HI}] * (AWAY_HI + 3)
+    return rows
+
+
+BLOCK = Block(
+    name="motion_checks",
+    folder="io",
+    paper="none: protection and diagnosis of the drive",
+    step=step,
+    inputs=(
+        Port("omega_me", PU, doc="electrical speed"),
+        Port("omega_ref", PU, doc="speed reference"),
+        Port("speed_mode", BIT, doc="1: speed control"),
+        Port("speed_limited", BIT, doc="1: i_q_ref at its limit"),
+        Port("run", BIT, doc="1: gates are switching"),
+    ),
+    registers=(
+        Port("omega_trip", LIMIT, doc="speed that trips, electrical"),
+        Port("omega_away", LIMIT, doc="speed against the reference from which a runaway is looked for"),
+        Port("runaway_samples", AWAY, doc="samples in sequence against the reference without braking that trip"),
+        Port("omega_stall", LIMIT, doc="speed below which the shaft stands"),
+        Port("stall_samples", STALLED, doc="samples in sequence at the current limit at rest that are a stall"),
+    ),
+    outputs=(Port("motion_faults", FAULTS, doc="overspeed, runaway, stall, see motion_checks"),),
+    state=State(),
+    latency=4,
+    interval=4,
+    reference=None,
+    bound=None,
+    stimuli=stimuli,
+)
