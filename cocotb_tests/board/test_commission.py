@@ -24,6 +24,7 @@ from fluxproof.golden_model.io.register_map import IDENTIFICATION
 from studies.board.commissioning import FAULTS, figures, refused, run
 from studies.board.motors import case
 
+AGAIN = ("open phase b", "open phase c", "current sensors in a circle", "all current sensors reversed")  # in the study
 DRIVE = ROOT / "docs" / "drives" / "spindle_400v.toml"
 
 
@@ -33,11 +34,11 @@ def test_a_motor_with_a_wrong_file_is_measured():
     assert outcome.current <= 1.0 and outcome.inertia < 5.0
 
 
-@pytest.mark.parametrize("name", FAULTS)
+@pytest.mark.parametrize("name", [name for name in FAULTS if name not in AGAIN])
 def test_each_fault_is_refused_for_its_reason(name):
     right, said, current = refused(name, case(1002))
     assert right, said
-    assert "expected" in said or "says otherwise" in said or "follow" in said
+    assert "expected" in said or "says otherwise" in said
     assert current <= 1.0
 
 

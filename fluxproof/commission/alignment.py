@@ -100,8 +100,8 @@ def judge(s: Session, ways: list[Seen], reverse_given: bool | None) -> Step:
     slopes, moved = [], [float(np.ptp(way.code)) for way in ways]
     if max(moved) < MOVED:
         raise Refusal(
-            f"locked rotor: the field turned by a turn of the shaft each way, the encoder by {max(moved):.3f}; free "
-            "the shaft, check that the encoder counts and that the current limit moves the load"
+            f"locked rotor: the encoder moved by {max(moved):.3f} turns, expected 1, as the field each way; free the "
+            "shaft, check that the encoder counts and that the current limit moves the load"
         )
     for way in ways:
         slope, _ = np.polyfit(way.place, way.code, 1)

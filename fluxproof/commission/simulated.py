@@ -156,6 +156,7 @@ class SimulatedBus:
     """A Bus; ``peak_a`` is the largest true phase current at a sample so far, ``seconds`` the drive's time."""
 
     def __init__(self, drive, board: Board):
+        drive = replace(drive, core=replace(drive.core, updates_per_period=1))
         self.board, self.drive = board, drive
         self._config = registers(drive).config
         self._values = {name: register.reset for name, register in board.registers.items() if register.fields}

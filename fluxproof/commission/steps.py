@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from fluxproof.commission import alignment, motion, winding, wiring
 from fluxproof.commission.bus import Bus, BusError
@@ -31,7 +32,8 @@ def commission(
 
     ``reverse_given``: the encoder's direction where the drive file states it.  ``done`` is told each step.
     """
-    session, steps = Session(bus, drive, progress), []
+    # With one update a period: the equations of a snapshot are those of a voltage that stands a whole period.
+    session, steps = Session(bus, replace(drive, core=replace(drive.core, updates_per_period=1)), progress), []
 
     def add(step: Step) -> Step:
         steps.append(step)
@@ -52,4 +54,16 @@ def commission(
     finally:
         bus.write("enable", 0)
         bus.write("position_source", 0)
-    return session.drive, steps
+    return _finished(session.drive, drive), steps
+
+
+def _finished(found: Drive, given: Drive) -> Drive:
+    """The file's own update rate again; its slopes of the devices, which the measured R contains, taken off."""
+    i = given.inverter
+    ohm = found.machine.resistance_ohm - (i.r_switch_ohm + i.r_diode_ohm) / 2.0
+    if ohm <= 0.0:
+        raise Refusal(
+            f"R = {found.machine.resistance_ohm:.4g} ohm with the devices, expected more than [inverter] r_switch_ohm and "
+            "r_diode_ohm; check these keys"
+        )
+    return replace(found, core=given.core, machine=replace(found.machine, resistance_ohm=ohm))

@@ -93,8 +93,8 @@ def phases(session: Session) -> Step:
     for x, size in zip("abc", largest, strict=True):
         if size < OPEN_BELOW * largest.max():
             raise Refusal(
-                f"phase {x} is open: {size:.2g} A in it, {largest.max():.2g} A in the others; check its cable, its "
-                "sensor"
+                f"phase {x} is open: {size:.2g} A in it, expected {largest.max():.2g} A as in the others; check its "
+                "cable and its sensor"
             )
     fits = _fits(answers, s.drive.sensors.current_sensors == 2)
     (order, signs), fit = max(fits.items(), key=lambda item: item[1])
