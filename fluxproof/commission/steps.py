@@ -63,7 +63,7 @@ def _finished(found: Drive, given: Drive) -> Drive:
     ohm = found.machine.resistance_ohm - (i.r_switch_ohm + i.r_diode_ohm) / 2.0
     if ohm <= 0.0:
         raise Refusal(
-            f"R = {found.machine.resistance_ohm:.4g} ohm with the devices, expected more than [inverter] r_switch_ohm and "
-            "r_diode_ohm; check these keys"
+            f"R = {found.machine.resistance_ohm:.4g} ohm with the devices, expected more than [inverter] r_switch_ohm "
+            "and r_diode_ohm; check these keys"
         )
     return replace(found, core=given.core, machine=replace(found.machine, resistance_ohm=ohm))
