@@ -28,7 +28,7 @@ DAMPING, SLOW_HZ, OF_SWING = 0.33, 4.0, 0.3  # of the swing; the integral's corn
 FASTEST = 1.0 / 60.0  # of the sampling frequency
 STIFF = 2.0  # kp*I over the dead time's voltage
 RAMP_S, FIELD_HZ, LEAST_S = 0.4, 6.0, 0.8  # the field's electrical frequency, at least so long a turn
-SAMPLES = 600  # a way
+SAMPLES, INDEX_TURNS = 600, 1.15  # a way; turned to find an index
 MOVED = 0.02  # of a turn: less is a locked rotor
 SLOPE = 0.05  # largest error of the slope
 LAG_DEG, RIPPLE_DEG = 40.0, 15.0  # electrical, largest
@@ -46,6 +46,8 @@ def align(session: Session, reverse_given: bool | None) -> Step:
     slow = (s.drive.machine.resistance_ohm + kp) / ki
     s.ramp(max(RAMP_S, 4.0 * slow), i_d_ref=(0.0, held(s)))
     s.settle(max(0.2, 4.0 * slow))
+    if s.drive.encoder.kind == "abz":
+        _find_index(s, speed)
     ways = []
     for sign in (1.0, -1.0):
         s.progress(f"alignment, field turns {'forward' if sign > 0 else 'back'}")
@@ -92,6 +94,15 @@ def gains(s: Session) -> tuple[float, float]:
     henry = min(m.inductance_d_h, m.inductance_q_h)
     kp = min(max(damped, stiff), TURN_RAD * henry * FASTEST / s.t_s)
     return kp, (m.resistance_ohm + kp) * min(TURN_RAD * SLOW_HZ, OF_SWING * swing)
+
+
+def _find_index(s: Session, speed: float) -> None:
+    """A little more than a turn of the shaft, after which an incremental encoder must have passed its index."""
+    s.progress("alignment, looking for the index")
+    s.force(0.0, speed)
+    seen = s.look(40, INDEX_TURNS * TURN_RAD * s.drive.machine.pole_pairs / speed / 40)
+    if not s.bus.read("encoder_flags") & 1 and float(np.ptp(seen.code)) > 0.9:
+        raise Refusal("no index within a turn of the shaft, expected one; check the line Z and [encoder] index_phase")
 
 
 def judge(s: Session, ways: list[Seen], reverse_given: bool | None) -> Step:

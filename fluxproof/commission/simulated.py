@@ -39,6 +39,11 @@ from fluxproof.plant.sensors import current_code, position_code, u_dc_code
 PLACES = 1 << forced_position.PLACE_W
 SHIFT, PLACE_W = forced_position.SHIFT, forced_position.PLACE_W
 SOURCE, ANGLE, RATE, TRAVELLED, LAST_SOURCE, LAST_ANGLE = range(6)  # of ``forced``
+REFERENCED, ZERO, LAST_CODE = (
+    6,
+    7,
+    8,
+)  # count once at the index; true code at power-up, of the last sample
 INPUTS = ("omega_ref", "i_d_ref", "i_q_ext", "speed_mode", "temp_winding", "temp_valid")
 FIELDS = fluxproof.Observed._fields
 # (place in Observed, bit of the fault flags) of what a sample can trip by
@@ -69,6 +74,7 @@ class Board:
     polarity: tuple[float, float, float] = (1.0, 1.0, 1.0)
     open_leg: int | None = None
     locked: bool = False
+    has_index: bool = True  # an incremental encoder counts from anywhere until it has passed its index
     theta_m: float = 0.0  # rad, at the start
     seed: int = 0
     host_periods: tuple[int, int] = (1, 4)  # a snapshot comes after so many, at random
@@ -98,7 +104,7 @@ def board_of(drive) -> Board:
 @mixed_kernel
 def advance(
     state, inputs, flags, forced, usual, restarted, config, plant_state, params, sensors, wires, polarity, dead_time_s,
-    period_s, u_dc, load, first, periods, peak, codes, observed,
+    period_s, u_dc, load, has_index, first, periods, peak, codes, observed,
 ):  # fmt: skip
     """``periods`` periods; the last sample's codes and values are in ``codes`` and ``observed``.
 
@@ -114,8 +120,20 @@ def advance(
         for x in range(3):
             codes[2 + x] = current_code(sensors, x, polarity[x] * currents[wires[3 + x]], k)
         codes[5] = u_dc_code(sensors, u_dc, k)
-        codes[0] = position_code(sensors, plant_state[L.THETA_M], k)
-        jumped = forced[SOURCE] != forced[LAST_SOURCE]
+        code, found = position_code(sensors, plant_state[L.THETA_M], k), False
+        half = 1 << (config.position_bits - 1)
+        if forced[REFERENCED] == 0:
+            if forced[ZERO] < 0:
+                forced[ZERO], forced[LAST_CODE] = code, code
+            found = abs(code - forced[LAST_CODE]) > half  # past the index
+            forced[LAST_CODE] = code
+            if found and has_index:
+                forced[REFERENCED] = 1
+            else:
+                code, found = (code - forced[ZERO]) % (2 * half), False
+        codes[0] = code
+        jumped = found if forced[SOURCE] == 0 else False
+        jumped = jumped or forced[SOURCE] != forced[LAST_SOURCE]
         jumped = jumped or (forced[SOURCE] == 1 and forced[ANGLE] != forced[LAST_ANGLE])
         if forced[SOURCE] == 1:
             forced[TRAVELLED] = forced[TRAVELLED] + forced[RATE] if forced[LAST_SOURCE] == 1 else 0
@@ -170,7 +188,8 @@ class SimulatedBus:
         self._polarity = np.array(board.polarity, float)
         self._u_dc = float(drive.inverter.dc_bus_v if board.u_dc is None else board.u_dc)
         self._state, self._random = fluxproof.State(), np.random.default_rng(board.seed)
-        self._forced, self._flags = np.zeros(6, np.int64), np.zeros(3, np.int64)
+        self._forced, self._flags = np.zeros(9, np.int64), np.zeros(3, np.int64)
+        self._forced[REFERENCED:] = drive.encoder.kind != "abz", -1, 0
         self._codes = np.zeros(6, np.int64)
         self._observed = np.zeros(len(FIELDS), np.int64)
         self._peak, self._done, self._due = np.zeros(1), 0, 0.0
@@ -193,6 +212,8 @@ class SimulatedBus:
             return int(self._observed[FIELDS.index(name)])
         if name in ("fault_flags", "first_fault"):
             return int(self._flags[2])
+        if name == "encoder_flags":
+            return int(self._forced[REFERENCED])
         if name == "flags":
             return int(self._flags[0] and not self._flags[1]) + 2 * int(self._flags[1])
         if name in CODES:
@@ -231,6 +252,6 @@ class SimulatedBus:
         self._state = advance(
             self._state, self._inputs, self._flags, self._forced, *self._settings, self._config, self._plant,
             self._params, self._sensors, self._wires, self._polarity, float(self.board.dead_time_s),
-            self.drive.sample_time_s, self._u_dc, 0.0, self._done, periods, self._peak, self._codes, self._observed,
+            self.drive.sample_time_s, self._u_dc, 0.0, self.board.has_index, self._done, periods, self._peak, self._codes, self._observed,
         )  # fmt: skip
         self._done += periods

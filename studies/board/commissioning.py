@@ -15,7 +15,7 @@ import numpy as np
 
 from fluxproof.commission.session import Refusal, Step
 from fluxproof.commission.steps import commission
-from studies.board.motors import Case, case
+from studies.board.motors import CLASSES, Case, case
 
 COUNT = 100
 TARGETS = {  # error of an accepted motor: (largest, unit)
@@ -109,12 +109,15 @@ FAULTS = {
     "reversed encoder": ({}, "other direction", "reversed encoder"),
     "locked rotor": ({"locked": True}, None, "locked rotor"),
     "too little voltage": ({"u_dc": 0.5}, None, "too little voltage"),
+    "no index": ({"has_index": False}, None, "no index"),
     "wrong pole pairs": ({}, "pole pairs", "pole_pairs"),
 }
 
 
 def refused(name: str, motor: Case) -> tuple[bool, str, float]:
     """(refused for the right reason, what was said, largest current over the limit) of one fault."""
+    while name == "no index" and motor.true.encoder.kind != "abz":
+        motor = case(motor.seed + len(CLASSES))
     changes, file, said = FAULTS[name]
     changes = dict(changes)
     if "u_dc" in changes:
