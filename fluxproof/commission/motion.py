@@ -11,7 +11,8 @@ that the direction of the dead time's voltage V_1 is known:
     u_q = R*i_q + V_1*i_q/|i| + w_e*(psi + L_d*i_d)
     u_d = R*i_d + V_1*i_d/|i| - w_e*L_q*i_q + w_e*psi*sin(error)
 
-``error`` is what alignment has left of the encoder's offset.  w_e and R as in winding.
+``error`` is what alignment has left of the encoder's offset.  w_e and R as in winding.  Each
+speed is held with both signs of i_d: an error of V_1's direction changes its sign with the current and leaves psi alone.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ CYCLES, LONGEST_S, LEAST_ROWS, ROWS = 2, 4.0, 30, 400  # torque steps
 MOVES = 0.1  # of that speed: less is no motion
 LEFT_OUT = 0.08  # of a step, at its begin
 D_CURRENT, LARGEST_I_Q = 0.35, 0.7  # of the limit, held speeds
-SPEED_HZ, HELD_S, ROWS_HELD = 6.0, 0.35, 300
+SPEED_HZ, HELD_S, ROWS_HELD = 6.0, 0.25, 300
 SPREAD = 0.1  # largest rms of a held speed, of itself
 PREDICTED = 0.04  # largest error of the point that was not fitted, of its voltage
 LARGEST_ERROR_DEG = 15.0  # electrical, that alignment may have left
@@ -157,7 +158,9 @@ def magnet(session: Session, first: Step, v_dead: float) -> Step:
     s.bus.write("speed_mode", 1)
     s.gates_on()
     i_d = D_CURRENT * s.limit
-    plan = [(sign * top * part, j) for sign in (1, -1) for part, j in ((0.5, -i_d), (1.0, -i_d), (1.0, i_d))]
+    plan = [
+        (sign * top * part, j) for sign in (1, -1) for part, j in ((0.5, i_d), (0.5, -i_d), (1.0, -i_d), (1.0, i_d))
+    ]
     points, at, held = [], 0.0, 0.0
     for n, (speed, j) in enumerate([*plan, (-0.75 * top, 0.6 * i_d)]):
         s.progress(f"magnet flux, {speed / m.pole_pairs * 30 / math.pi:.0f} rpm ({n + 1} of {len(plan) + 1})")

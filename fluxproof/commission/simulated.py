@@ -252,6 +252,7 @@ class SimulatedBus:
         self._state = advance(
             self._state, self._inputs, self._flags, self._forced, *self._settings, self._config, self._plant,
             self._params, self._sensors, self._wires, self._polarity, float(self.board.dead_time_s),
-            self.drive.sample_time_s, self._u_dc, 0.0, self.board.has_index, self._done, periods, self._peak, self._codes, self._observed,
+            self.drive.sample_time_s, self._u_dc, 0.0, self.board.has_index, self._done, periods, self._peak,
+            self._codes, self._observed,
         )  # fmt: skip
         self._done += periods

@@ -29,7 +29,7 @@ from fluxproof.commission.session import Refusal, Seen, Session, Step, Value, so
 from fluxproof.golden_model.encoders.forced_position import RATE
 from fluxproof.golden_model.units import TURN_RAD
 
-PARTS = (0.35, 0.55, 0.8)  # of the current limit
+PARTS = (0.3, 0.5, 0.7)  # of the current limit; a salient rotor and the dead time add a third to the last
 HIGHEST_HZ, OF_RATE, OF_BASE = 240.0, 0.95, 1.7  # frequencies: largest, of the ranges
 LOWER = 0.6  # second frequency over the first
 OF_VOLTAGE = 0.8  # of the voltage circle, with twice the inductances of the file and what alignment took
