@@ -12,7 +12,7 @@ that the direction of the dead time's voltage V_1 is known:
     u_d = R*i_d + V_1*i_d/|i| - w_e*L_q*i_q + w_e*psi*sin(error)
 
 ``error`` is what alignment has left of the encoder's offset.  w_e and R as in winding.  Each
-speed is held with both signs of i_d: an error of V_1's direction changes its sign with the current and leaves psi alone.
+speed is held with both signs of i_d: an error of V_1's direction changes its sign with them and leaves psi alone.
 """
 
 from __future__ import annotations
