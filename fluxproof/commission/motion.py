@@ -31,6 +31,7 @@ MOVES = 0.1  # of that speed: less is no motion
 LEFT_OUT = 0.08  # of a step, at its begin
 D_CURRENT, LARGEST_I_Q = 0.35, 0.7  # of the limit, held speeds
 SPEED_HZ, HELD_S, ROWS_HELD = 6.0, 0.25, 300
+TURNS = 4.3  # electrical, of which the whole ones count
 SPREAD = 0.1  # largest rms of a held speed, of itself
 PREDICTED = 0.04  # largest error of the point that was not fitted, of its voltage
 LARGEST_ERROR_DEG = 15.0  # electrical, that alignment may have left
@@ -176,7 +177,8 @@ def magnet(session: Session, first: Step, v_dead: float) -> Step:
 
 def _held(s: Session, speed: float) -> np.ndarray:
     """Means of (omega, i_d, i_q, u_d, u_q) at a speed that is held."""
-    seen = s.look(ROWS_HELD)
+    turns_s = TURNS * TURN_RAD / abs(speed)
+    seen = s.look(ROWS_HELD, max(turns_s / ROWS_HELD - 3.0 * s.t_s, 0.0))
     omega, spread = float(seen.omega_me.mean()), float(seen.omega_me.std())
     if abs(omega - speed) > 0.05 * abs(speed) or spread > SPREAD * abs(speed):
         used = float(np.abs(seen.voltage).mean()) / s.voltage()
@@ -185,7 +187,9 @@ def _held(s: Session, speed: float) -> np.ndarray:
             f"the speed is {omega:.4g} +-{spread:.2g} electrical rad/s, expected {speed:.4g}: {why}, "
             f"{100 * used:.0f} % of the voltage are used"
         )
-    return np.array([omega, seen.i_d.mean(), seen.i_q.mean(), seen.u_d.mean(), seen.u_q.mean()])
+    turned = np.abs(seen.theta_me - seen.theta_me[0])
+    whole = turned <= max(math.floor(turned[-1] / TURN_RAD), 1) * TURN_RAD  # harmonics of the angle cancel
+    return np.array([float(getattr(seen, n)[whole].mean()) for n in ("omega_me", "i_d", "i_q", "u_d", "u_q")])
 
 
 def judge(s: Session, first: Step, points: list[np.ndarray], v_1: float) -> Step:
