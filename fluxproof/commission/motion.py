@@ -30,7 +30,7 @@ CYCLES, LONGEST_S, LEAST_ROWS, ROWS = 2, 4.0, 30, 400  # torque steps
 MOVES = 0.1  # of that speed: less is no motion
 LEFT_OUT = 0.08  # of a step, at its begin
 D_CURRENT, LARGEST_I_Q = 0.35, 0.7  # of the limit, held speeds
-SPEED_HZ, HELD_S, ROWS_HELD = 6.0, 0.25, 300
+SPEED_HZ, FILTER_HZ, HELD_S, ROWS_HELD = 4.0, 40.0, 0.3, 300
 TURNS = 4.3  # electrical, of which the whole ones count
 SPREAD = 0.1  # largest rms of a held speed, of itself
 PREDICTED = 0.04  # largest error of the point that was not fitted, of its voltage
@@ -154,7 +154,7 @@ def magnet(session: Session, first: Step, v_dead: float) -> Step:
     s.release()
     s.settle(0.05)
     i_max = from_si("i_q_ext", LARGEST_I_Q * s.limit, s.drive)
-    values = s.speed_gains(kp, kp * w_s / 5.0)
+    values = s.speed_gains(kp, kp * w_s / 5.0, FILTER_HZ)
     s.load(*current_gains(s), i_max=i_max, **values)
     s.bus.write("speed_mode", 1)
     s.gates_on()

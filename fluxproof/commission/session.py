@@ -98,11 +98,11 @@ class Session:
         """All registers as the drive says, nothing left out."""
         self._write(registers(self.drive).values._asdict())
 
-    def speed_gains(self, kp: float, ki: float) -> dict[str, int]:
+    def speed_gains(self, kp: float, ki: float, filter_hz: float) -> dict[str, int]:
         """The registers of these gains [A s/rad], [A/rad] of the speed loop, per electrical speed and angle."""
-        control = replace(self.drive.control, speed_kp_as_per_rad=kp, speed_ki_a_per_rad=ki)
+        control = replace(self.drive.control, speed_kp_as_per_rad=kp, speed_ki_a_per_rad=ki, speed_filter_hz=filter_hz)
         values = registers(replace(self.drive, control=control)).values
-        return {name: getattr(values, name) for name in ("speed_kp", "speed_ki")}
+        return {name: getattr(values, name) for name in ("speed_kp", "speed_ki", "k_filter")}
 
     def _write(self, values: dict[str, int]) -> None:
         for name, value in values.items():
