@@ -31,6 +31,7 @@ MOVES = 0.1  # of that speed: less is no motion
 LEFT_OUT = 0.08  # of a step, at its begin
 D_CURRENT, LARGEST_I_Q = 0.35, 0.7  # of the limit, held speeds
 SPEED_HZ, FILTER_HZ, HELD_S, ROWS_HELD = 4.0, 40.0, 0.3, 300
+NEAR, ARRIVE_S = 0.02, 3.0  # of the speed
 TURNS = 4.3  # electrical, of which the whole ones count
 SPREAD = 0.1  # largest rms of a held speed, of itself
 PREDICTED = 0.04  # largest error of the point that was not fitted, of its voltage
@@ -168,11 +169,19 @@ def magnet(session: Session, first: Step, v_dead: float) -> Step:
         seconds = max(0.1, 1.5 * abs(speed - at) / (LARGEST_I_Q * 0.5 * s.limit * k))
         s.ramp(seconds, omega_ref=(at, speed), i_d_ref=(held, j))
         at, held = speed, j
-        s.settle(HELD_S)
+        _arrive(s, speed)
         points.append(_held(s, speed))
     s.ramp(max(0.1, 1.5 * abs(at) / (LARGEST_I_Q * 0.5 * s.limit * k)), omega_ref=(at, 0.0), i_d_ref=(held, 0.0))
     s.gates_off()
     return judge(s, first, points, v_1)
+
+
+def _arrive(s: Session, speed: float) -> None:
+    """Until the mean speed of a tenth of a second is near the reference, or patience ends."""
+    s.settle(HELD_S)
+    end = s.bus.now() + ARRIVE_S
+    while s.bus.now() < end and abs(float(s.look(20, 5e-3).omega_me.mean()) - speed) > NEAR * abs(speed):
+        pass
 
 
 def _held(s: Session, speed: float) -> np.ndarray:
@@ -262,7 +271,7 @@ def closed_loop(session: Session) -> Step:
     for to in (speed, -speed):
         s.progress(f"closed loop, {to / drive.machine.pole_pairs * 30 / math.pi:.0f} rpm")
         s.ramp(seconds * (2.0 if at else 1.0), 40, omega_ref=(at, to))
-        s.settle(0.3)
+        _arrive(s, to)
         at = to
         found.append(abs(_held(s, to)[0] / to - 1.0))
     s.ramp(seconds, 40, omega_ref=(at, 0.0))
