@@ -12,8 +12,9 @@ import pytest
 from fluxproof import command
 from fluxproof.checkout import ROOT
 from fluxproof.commission import command as commissioning
+from fluxproof.commission import wiring
 from fluxproof.commission.bus import CODES, VALUES, WINDOW, BusError, UioBus
-from fluxproof.commission.session import Refusal
+from fluxproof.commission.session import Refusal, Session
 from fluxproof.commission.simulated import SimulatedBus, board_of
 from fluxproof.commission.steps import commission
 from fluxproof.golden_model.drive import load
@@ -40,6 +41,19 @@ def test_each_fault_is_refused_for_its_reason(name):
     assert right, said
     assert "expected" in said or "says otherwise" in said
     assert current <= 1.0
+
+
+def test_two_sensors_are_enough_to_find_a_swapped_one():
+    motor = case(1002)
+    drive = replace(motor.file, sensors=replace(motor.file.sensors, current_sensors=2))
+    for sensed in ((0, 1, 2), (0, 2, 1)):
+        session = Session(SimulatedBus(drive, replace(motor.board, sensed=sensed)), drive)
+        assert set(wiring.offsets(session).values) == {"offset_b", "offset_c"}
+        if sensed == (0, 1, 2):
+            assert wiring.phases(session).values["agreement"].value > 0.9
+        else:
+            with pytest.raises(Refusal, match="sensor b follows leg c"):
+                wiring.phases(session)
 
 
 def test_the_command_writes_what_it_measured(tmp_path, capsys):
