@@ -25,7 +25,10 @@ from fluxproof.golden_model.io.register_map import IDENTIFICATION
 from studies.board.commissioning import FAULTS, figures, refused, run
 from studies.board.motors import case
 
-AGAIN = ("open phase b", "open phase c", "current sensors in a circle", "all current sensors reversed")  # in the study
+AGAIN = (  # in the study alone
+    "open phase b", "open phase c", "current sensors in a circle", "all current sensors reversed", "motor phases swapped",
+    "no index",
+)  # fmt: skip
 DRIVE = ROOT / "docs" / "drives" / "spindle_400v.toml"
 
 
