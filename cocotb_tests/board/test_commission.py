@@ -26,8 +26,8 @@ from studies.board.commissioning import FAULTS, figures, refused, run
 from studies.board.motors import case
 
 AGAIN = (  # in the study alone
-    "open phase b", "open phase c", "current sensors in a circle", "all current sensors reversed", "motor phases swapped",
-    "no index",
+    "open phase b", "open phase c", "current sensors in a circle", "all current sensors reversed", "no index",
+    "motor phases swapped",
 )  # fmt: skip
 DRIVE = ROOT / "docs" / "drives" / "spindle_400v.toml"
 

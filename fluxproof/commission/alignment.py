@@ -28,10 +28,15 @@ DAMPING, SLOW_HZ, OF_SWING = 0.33, 4.0, 0.3  # of the swing; the integral's corn
 FASTEST = 1.0 / 60.0  # of the sampling frequency
 STIFF = 2.0  # kp*I over the dead time's voltage
 RAMP_S, FIELD_HZ, LEAST_S = 0.4, 6.0, 0.8  # the field's electrical frequency, at least so long a turn
+ATTEMPTS, SOFTER = 3, 0.4  # where the rotor swings: kp of the next attempt
 SAMPLES, INDEX_TURNS = 600, 1.15  # a way; turned to find an index
 MOVED = 0.02  # of a turn: less is a locked rotor
 SLOPE = 0.05  # largest error of the slope
 LAG_DEG, RIPPLE_DEG = 40.0, 15.0  # electrical, largest
+
+
+class Swinging(Refusal):
+    """The rotor has not come to rest in the field."""
 
 
 def align(session: Session, reverse_given: bool | None) -> Step:
@@ -48,7 +53,24 @@ def align(session: Session, reverse_given: bool | None) -> Step:
     s.settle(max(0.2, 4.0 * slow))
     if s.drive.encoder.kind == "abz":
         _find_index(s, speed)
-    ways = []
+    for attempt in range(ATTEMPTS):
+        ways = _turn_both_ways(s, speed)
+        try:
+            found = judge(s, ways, reverse_given)
+            break
+        except Swinging:
+            if attempt + 1 == ATTEMPTS:
+                raise
+            kp *= SOFTER  # the swing goes on dying away meanwhile, and softer regulators damp it more
+            s.load(kp, (s.drive.machine.resistance_ohm + kp) / slow, reverse=0, theta_offset=0)
+    s.ramp(0.1, i_d_ref=(held(s), 0.0))
+    s.gates_off()
+    return found
+
+
+def _turn_both_ways(s: Session, speed: float) -> list[Seen]:
+    """A turn of the shaft forward, and one back."""
+    ways, pairs = [], s.drive.machine.pole_pairs
     for sign in (1.0, -1.0):
         s.progress(f"alignment, field turns {'forward' if sign > 0 else 'back'}")
         s.force(0.0, sign * speed)
@@ -63,9 +85,7 @@ def align(session: Session, reverse_given: bool | None) -> Step:
                 f"too little voltage: {reached:.3g} A flow, expected {held(s):.3g} A; check the bus voltage "
                 "and [machine] resistance_ohm"
             )
-    s.ramp(0.1, i_d_ref=(held(s), 0.0))
-    s.gates_off()
-    return judge(s, ways, reverse_given)
+    return ways
 
 
 def _spread(ways: list[np.ndarray], pieces: int) -> float:
@@ -140,7 +160,7 @@ def judge(s: Session, ways: list[Seen], reverse_given: bool | None) -> Step:
         float(np.mean([np.angle(np.exp(1j * (p - m))) ** 2 for p, m in zip(parts, means, strict=True) for p in p]))
     )
     if abs(math.degrees(lag)) > LAG_DEG or math.degrees(ripple) > RIPPLE_DEG:
-        raise Refusal(
+        raise Swinging(
             f"the rotor lags the field by {math.degrees(lag):.0f} degrees and swings by {math.degrees(ripple):.0f} "
             f"rms, expected {LAG_DEG:.0f} and {RIPPLE_DEG:.0f} at most: friction, cogging or load is too large for the "
             "current limit, or an edge of the encoder is lost"
