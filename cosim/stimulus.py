@@ -83,7 +83,7 @@ def near(rng: np.random.Generator, ports: tuple[Port, ...], row: dict[str, int])
     if kind < 2 and rng.integers(2):
         value = -value
     if kind == 2:
-        value ^= 1 << int(rng.integers(port.fmt.width - bool(port.fmt.signed)))
+        value ^= 1 << int(rng.integers(port.fmt.width))
     else:
         value += int(rng.integers(-1, 2))
     return row | {port.name: min(max(value, port.low), port.high)}

@@ -156,18 +156,14 @@ class Graph:
                 value[node] = literal
                 wait[self.read_by[node]] = True
         at = self.gates
-        while True:
-            step = int(wait[at:].argmax())
-            if not wait[at + step]:
+        while at <= self.top:
+            at += int(wait[at:].argmax())
+            if not wait[at]:
                 return
-            at += step
-            wait[at] = False
             now = self._gate(at - self.gates, value)
             if now != value[at]:
                 value[at] = now
                 wait[self.read_by[at]] = True
-            if at == self.top:
-                return
             at += 1
 
     def mutant(self, number: int) -> list[int]:
