@@ -144,7 +144,7 @@ def schedule(block: Block, config: dict[str, int], seed: int) -> list[Clock]:
     rng = np.random.default_rng(seed + 1)
     noise_ports = tuple(p for p in block.ports(config) if p.name in {q.name for q in block.inputs})
     clocks: list[Clock] = [Clock({}, rst=1), Clock({}, rst=1)]
-    state, registers, last = block.state, None, -(10**9)
+    state, registers, last, resets = block.state, None, -(10**9), 0
 
     def pad_to(index: int) -> None:
         """Idle clocks; the inputs become noise once the last sample no longer needs them."""
@@ -165,17 +165,17 @@ def schedule(block: Block, config: dict[str, int], seed: int) -> list[Clock]:
             start = max(start, last + block.latency + 1)
         elif rng.integers(4) == 0:
             start += int(rng.integers(1, 2 * block.latency))
-        pad_to(start)
         if index and block.strobes and rng.integers(60) == 0:
-            # A reset somewhere behind the last sample: what is in flight must never come out.
-            pad_to(max(len(clocks), last + int(rng.integers(1, block.latency + 2))))
+            # A reset somewhere behind the last sample, in each clock in turn: what is in flight must never come out.
+            pad_to(max(len(clocks), last + 1 + resets % (block.latency + 1)))
+            resets += 1
             # Half the time with a sample on the same edge, which must be lost.
             clocks.append(Clock(dict(row), in_valid=int(rng.integers(2)), rst=1))
             registers = wanted_registers
             due = [d for d in due if d[0] < len(clocks)]
             soon = [d for d in soon if d[0] < len(clocks)]
             state = block.state
-        pad_to(max(len(clocks), last + block.interval))
+        pad_to(max(len(clocks), start))
         last = len(clocks)
         clocks.append(Clock(dict(row), in_valid=1, sample=index))
         registers = wanted_registers
