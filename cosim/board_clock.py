@@ -15,7 +15,7 @@ import numpy as np
 from fluxproof.golden_model import clocked, fluxproof
 from fluxproof.golden_model.converters import current_front
 from fluxproof.golden_model.encoders import forced_position, position_front
-from fluxproof.golden_model.io import board_faults, board_map, board_snapshot, sample_join
+from fluxproof.golden_model.io import board_faults, board_map, board_snapshot, interrupts, sample_join
 from fluxproof.golden_model.io.register_file import RegisterFile
 from fluxproof.golden_model.io.register_map import OKAY, Kind
 from fluxproof.golden_model.kernel import kernel
@@ -33,6 +33,7 @@ SEEN = (*GATES, "serial_clock", "serial_out", "serial_drive", "convst", "cs_n", 
 STATUS = tuple(board_map.STATUS)
 position_step, converter_step, forced_step = position_front.step, current_front.step, forced_position.step
 join_step, faults_step, snapshot_step = sample_join.step, board_faults.step, board_snapshot.step
+interrupts_step = interrupts.step
 
 
 class Wires(NamedTuple):
@@ -61,6 +62,10 @@ class Wires(NamedTuple):
     speed_now: int = 0
     board_stop: int = 0
     running: int = 0
+    tripped: int = 0
+    fault_flags: int = 0
+    setting_refused: int = 0
+    irq: int = 0
 
 
 class State(NamedTuple):
@@ -71,11 +76,14 @@ class State(NamedTuple):
     of_join: sample_join.State = sample_join.State()
     of_faults: board_faults.State = board_faults.State()
     of_snapshot: board_snapshot.State = board_snapshot.State()
+    of_interrupts: interrupts.State = interrupts.State()
     wires: Wires = Wires()
 
 
+# Registers of the core that the front ends and the interrupt read
+OF_THE_CORE = ("reverse", "omega_given", "speed_given", "irq_mask", "irq_clear")
 BoardRegisters = NamedTuple(
-    "BoardRegisters", [(name, int) for name in (*board_map.settings(), "reverse", "omega_given", "speed_given")]
+    "BoardRegisters", [(name, int) for name in (*board_map.settings(), *OF_THE_CORE)]
 )  # fmt: skip
 
 
@@ -113,18 +121,23 @@ def one_clock(state, inputs, regs, b, pins, carrier_half, config):
         w.encoder_flags, w.adc_a, w.adc_b, w.adc_c, w.adc_u_dc, adc_bits, position_bits,
     )  # fmt: skip
     now = clocked.Inputs(
-        w.sample_valid, inputs.enable, w.board_stop, inputs.clear_trip, inputs.sample_faults, inputs.sample_trip,
+        w.sample_valid, inputs.enable, w.board_stop, inputs.clear_trip, inputs.host_write, inputs.sample_faults,
+        inputs.sample_trip, inputs.current_offset, inputs.motion_faults, inputs.open_load, inputs.brake_asked,
         inputs.compare_a, inputs.compare_b, inputs.compare_c,
     )  # fmt: skip
     core, entered, seen_core = clocked.step(state.of_core, now, regs, carrier_half)
+    causes, (_, irq) = interrupts_step(
+        state.of_interrupts, w.tripped, w.fault_flags, w.setting_refused, w.running, b.irq_mask, b.irq_clear
+    )
     encoder_code, restart, omega_now, position_done, count, flags, _, _, _, _, wrong, lost, _, _, _ = seen_position
     adc_a, adc_b, adc_c, adc_u_dc, codes_done, _, _, over, _, _, _, _, _, _ = seen_converters
     wires = Wires(
         seen_core.sample_trigger, seen_core.gate_high, seen_core.gate_low, sample_valid, codes_done, adc_a, adc_b,
         adc_c, adc_u_dc, encoder_code, restart, omega_now, position_done, count, flags, wrong, lost, over,
-        position_code, position_restart, speed_now, board_stop, seen_core.running,
+        position_code, position_restart, speed_now, board_stop, seen_core.running, seen_core.tripped,
+        seen_core.fault_flags, seen_core.setting_refused, irq,
     )  # fmt: skip
-    following = State(core, position, converters, forcing, join, faults, snapshot, wires)
+    following = State(core, position, converters, forcing, join, faults, snapshot, causes, wires)
     board = (forced, board_flags, board_first)
     return following, entered, seen_core, seen_position, seen_converters, board, seen_snapshot
 
@@ -145,7 +158,7 @@ def run_clocks(state, inputs, regs, b, pins, carrier_half, config, until_idle, s
             state, inputs, regs, b, pins[k], carrier_half, config
         )
         x = seen[k]
-        x[0], x[1], x[2], x[3] = before.gate_high, before.gate_low, before.trigger, core.tripped
+        x[0], x[1], x[2], x[3] = before.gate_high, before.gate_low, before.trigger, state.wires.irq
         x[4], x[5], x[6] = position[12], position[13], position[14]
         x[7], x[8], x[9], x[10], x[11], x[12] = (
             converters[8], converters[9], converters[10], converters[11], converters[12], converters[13]
@@ -192,6 +205,7 @@ class BoardClock:
         self._due: list[tuple[int, dict[str, int]]] = []
         self._writes: list[tuple[int, str, int]] = []
         self._taken: list[tuple[int, str, int]] = []  # registers that change
+        self._stored = False  # a write was accepted: their registers change with the coming clock
 
     def write(self, name: str, value: int, at: int) -> None:
         """A write whose address and data are on the bus at clock ``at``; one at a time, in their order."""
@@ -209,8 +223,9 @@ class BoardClock:
             stops = [when - self.clock for when, *_ in (*self._due, *self._writes, *self._taken) if when > self.clock]
             length = min([len(pins) - at, *stops])
             part = slice(at, at + length)
+            inputs = self.inputs._replace(host_write=int(self._stored))
             self.state, made, entered, wires = run_clocks(
-                self.state, self.inputs, self._settings(), self._board(), pins[part], self.blocks.core.carrier_half,
+                self.state, inputs, self._settings(), self._board(), pins[part], self.blocks.core.carrier_half,
                 self.config, waits, seen[part], status[part],
             )  # fmt: skip
             references = [self.registers.values[name] for name in REFERENCES]
@@ -248,12 +263,14 @@ class BoardClock:
 
     def _take_writes(self) -> bool:
         """Accepts writes whose registers change at the coming clock; True where one waits for the end of a sample."""
+        self._stored = False
         while self._writes and self._writes[0][0] <= self.clock:
             _, name, value = self._writes[0]
             if self.registers.map[name].kind is Kind.SETTING and self.state.of_core.sample_busy:
                 return True
             self._taken.append((self.clock + 1, name, value))
             self._writes.pop(0)
+            self._stored = True
         return False
 
     def _enter(self, w: Wires, references: list[int]) -> None:
@@ -261,15 +278,14 @@ class BoardClock:
         self.samples += 1
         values = self.registers.values
         sample = fluxproof.Sample(w.adc_a, w.adc_b, w.adc_c, w.adc_u_dc, w.position_code, *references, w.running)
+        gates = self.state.of_core.of_gate_generation
         registers = self._settings()._replace(
-            min_pulse=self.state.of_core.of_gate_generation.min_pulse,
+            min_pulse=gates.min_pulse,
+            double_update=gates.double_update,
             omega_given=w.omega_now,
             speed_given=w.speed_now,
             position_restart=1 if values["position_restart"] or w.position_restart else 0,
         )
         self.of_samples, self.observed = fluxproof.step(self.of_samples, sample, registers, self.blocks.core)
-        for after, names in (
-            (clocked.CHECKS_CLOCKS, ("sample_faults", "sample_trip")),
-            (clocked.COMPARE_CLOCKS, ("compare_a", "compare_b", "compare_c")),
-        ):
+        for after, names in clocked.DUE.values():
             self._due.append((self.clock - 1 + after, {name: getattr(self.observed, name) for name in names}))

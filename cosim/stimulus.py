@@ -17,6 +17,7 @@ from fluxproof.golden_model.block import Block, Port
 
 CORNERS_AT_MOST = 1500
 RANDOM_SAMPLES = 1200
+NEAR_SAMPLES = 400
 CLOCKED_RANDOM = 6000  # clocks
 BURST = 40  # samples between two changes of the registers
 SETTLED = 2  # strobes are compared after this clock
@@ -62,6 +63,32 @@ def random_value(rng: np.random.Generator, port: Port) -> int:
     return min(max(value, port.low), port.high)
 
 
+def near(rng: np.random.Generator, ports: tuple[Port, ...], row: dict[str, int]) -> dict[str, int]:
+    """The row with one number beside another one, where a comparison changes or a difference is small.
+
+    It becomes another port's value, of the same weight, or a power of two, with either sign, or stays; then it moves by
+    at most one LSB, or a single bit of it is inverted.
+    """
+    words = [p for p in ports if not p.is_bit]
+    if not words:
+        return row
+    port, other = (words[int(rng.integers(len(words)))] for _ in range(2))
+    value = row[port.name]
+    kind = rng.integers(4)
+    if kind == 0:
+        shift = port.fmt.frac_bits - other.fmt.frac_bits
+        value = row[other.name] << shift if shift >= 0 else row[other.name] >> -shift
+    elif kind == 1:
+        value = 1 << int(rng.integers(port.fmt.width))
+    if kind < 2 and rng.integers(2):
+        value = -value
+    if kind == 2:
+        value ^= 1 << int(rng.integers(port.fmt.width))
+    else:
+        value += int(rng.integers(-1, 2))
+    return row | {port.name: min(max(value, port.low), port.high)}
+
+
 def corners(ports: tuple[Port, ...], rng: np.random.Generator) -> Iterator[dict[str, int]]:
     """Every combination of corner values; of both ends only, or a sample, where there are too many."""
     for choose in (corner_values, lambda p: sorted({p.low, p.high})):
@@ -83,6 +110,7 @@ def samples(block: Block, config: dict[str, int], seed: int) -> list[dict[str, i
     rows = list(corners(ports, rng))
     if block.stimuli is not None:
         rows += [{**{p.name: 0 for p in ports}, **row} for row in block.stimuli(rng, config)]
+    rows += _beside(block, ports, rng)
     registers = {p.name: 0 for p in block.registers}
     for k in range(RANDOM_SAMPLES):
         row = {p.name: random_value(rng, p) for p in ports}
@@ -98,6 +126,17 @@ def samples(block: Block, config: dict[str, int], seed: int) -> list[dict[str, i
     return rows
 
 
+def _beside(block: Block, ports: tuple[Port, ...], rng: np.random.Generator) -> list[dict[str, int]]:
+    """Rows that differ little from the one before, and ports that differ little from one another."""
+    rows, row = [], {}
+    for k in range(NEAR_SAMPLES):
+        if k % 4 == 0:
+            row = {p.name: random_value(rng, p) for p in ports}
+        row = near(rng, ports, row)
+        rows.append(row)
+    return rows
+
+
 def schedule(block: Block, config: dict[str, int], seed: int) -> list[Clock]:
     """Clock by clock, with what the model says must come out and when."""
     if block.clocked:
@@ -105,7 +144,7 @@ def schedule(block: Block, config: dict[str, int], seed: int) -> list[Clock]:
     rng = np.random.default_rng(seed + 1)
     noise_ports = tuple(p for p in block.ports(config) if p.name in {q.name for q in block.inputs})
     clocks: list[Clock] = [Clock({}, rst=1), Clock({}, rst=1)]
-    state, registers, last = block.state, None, -(10**9)
+    state, registers, last, resets = block.state, None, -(10**9), 0
 
     def pad_to(index: int) -> None:
         """Idle clocks; the inputs become noise once the last sample no longer needs them."""
@@ -126,17 +165,17 @@ def schedule(block: Block, config: dict[str, int], seed: int) -> list[Clock]:
             start = max(start, last + block.latency + 1)
         elif rng.integers(4) == 0:
             start += int(rng.integers(1, 2 * block.latency))
-        pad_to(start)
         if index and block.strobes and rng.integers(60) == 0:
-            # A reset somewhere behind the last sample: what is in flight must never come out.
-            pad_to(max(len(clocks), last + int(rng.integers(1, block.latency + 2))))
+            # A reset somewhere behind the last sample, in each clock in turn: what is in flight must never come out.
+            pad_to(max(len(clocks), last + 1 + resets % (block.latency + 1)))
+            resets += 1
             # Half the time with a sample on the same edge, which must be lost.
             clocks.append(Clock(dict(row), in_valid=int(rng.integers(2)), rst=1))
             registers = wanted_registers
             due = [d for d in due if d[0] < len(clocks)]
             soon = [d for d in soon if d[0] < len(clocks)]
             state = block.state
-        pad_to(max(len(clocks), last + block.interval))
+        pad_to(max(len(clocks), start))
         last = len(clocks)
         clocks.append(Clock(dict(row), in_valid=1, sample=index))
         registers = wanted_registers
@@ -211,7 +250,7 @@ def _held_random(block: Block, config: dict[str, int], rng, count: int) -> list[
     for _ in range(count):
         if rng.integers(30) == 0:
             port = ports[int(rng.integers(len(ports)))]
-            row = {**row, port.name: random_value(rng, port)}
+            row = {**row, port.name: random_value(rng, port)} if rng.integers(3) else near(rng, ports, row)
         if rng.integers(40) == 0:
             row = {**row, **calm}
             if "dead_time" in row:

@@ -16,7 +16,7 @@ from cocotb_tests.support.rtl_board import RtlBoard
 from fluxproof.checkout import ROOT
 from fluxproof.cosim import verilog
 from fluxproof.golden_model import drive as drives
-from fluxproof.golden_model.io import register_map
+from fluxproof.golden_model.io import board_map
 from fluxproof.golden_model.registers import registers
 from fluxproof.print_registers import c_lines
 from scripts.registers.rdl import version_word
@@ -143,7 +143,7 @@ def test_usage(board, program):
 def test_header_in_every_standard(tmp_path, standard):
     """The registers' header compiles by itself, and no member may be stored byte by byte."""
     compiler = shutil.which("gcc") or pytest.skip("there is no C compiler here")
-    size = 4 + max(register.address for register in register_map.registers().values())
+    size = 4 + max(register.address for register in board_map.registers().values())
     source = f'#include "fluxproof_registers.h"\nint main(void) {{ return sizeof(fluxproof_t) != {size}; }}\n'
     (tmp_path / "main.c").write_text(source)
     command = [compiler, f"-std={standard}", "-Wall", "-Wextra", "-Werror", "-pedantic", f"-I{SOFTWARE}"]

@@ -18,6 +18,7 @@ SETTLED = {
     "min_pulse": 8,
     "u_dc_gain": 65536,
     "fault_ignore": 32767,
+    "brake_on": 1,
     "enable": 1,
     "telemetry_enable": 1,
 }

@@ -115,6 +115,14 @@ def stimuli(rng, _config):
         for i_d in (0, 3000, -3000):  # to the end of psi_m, and back
             end = {**rows[0], "eta_psi": ETA_PSI.hi, "omega_chord": 32768, "i_d": i_d}
             rows += [{**end, "u_q": u_q}] * 25 + [{**end, "u_q": 0}]
+    for end in (1, -1):  # at either end of psi_m, or of the flux, a small error shows every bit of the flux
+        push = {**rows[0], "v_leg": 0, "r": 0, "i_d": 0, "eta_psi": ETA_PSI.hi, "omega_chord": 45000}
+        push |= {"u_q": PU.hi if end > 0 else PU.lo}
+        rows += [push] * 20
+        for k in range(60):
+            omega, off = int(rng.integers(20000, 65000)), int(rng.integers(400))
+            small = {"omega_chord": omega, "u_q": end * (2 * omega - off), "i_d": 3000 * end * (k % 2)}
+            rows += [{**push, **small}] + [push] * 3
     for k in range(12):  # between the limits, where every bit of the state counts
         settings = {"eta_psi": int(rng.integers(ETA_PSI.hi)), "omega_psi_min": int(rng.integers(1 << (k + 4)))}
         settings |= {"l_d": int(rng.integers(1 << 20)), "r": int(rng.integers(1 << 20))}

@@ -75,8 +75,11 @@ class State(NamedTuple):
 
 @kernel
 def low_pass(lp, x, k_lp):
-    """(next state, x minus the low-pass output), both from the state before."""
-    err = saturate(x - round_sat(lp, PU_TO_INTEGRAL, PU_W), PU_W)
+    """(next state, x minus the low-pass output), both from the state before.
+
+    lp moves by no more than the distance of two PU numbers, so it rounds to one: half an LSB beyond is the most.
+    """
+    err = saturate(x - round_half_up(lp, PU_TO_INTEGRAL), PU_W)
     moved, _ = multiply_add(err, k_lp, lp, DROP_LP, INTEGRAL_W)
     return moved, err
 

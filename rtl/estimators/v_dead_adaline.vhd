@@ -147,9 +147,10 @@ begin
       size_2   <= resize(size_d_1, PU_W + 1) + size_q_1;
       learning <= calm_1 when size_2 >= i_learn else '0';
 
-      -- Stage 1: the low-pass outputs and v_dead, narrowed for the multipliers
-      low_u_1 <= round_sat(state.lp_u, PU_TO_INTEGRAL, PU_W);
-      low_d_1 <= round_sat(state.lp_d, PU_TO_INTEGRAL, PU_W);
+      -- Stage 1: the low-pass outputs and v_dead, narrowed for the multipliers.  lp moves by no more than the distance
+      -- of two PU numbers, so it rounds to one: half an LSB beyond is the most.
+      low_u_1 <= resize(round_half_up(state.lp_u, PU_TO_INTEGRAL), PU_W);
+      low_d_1 <= resize(round_half_up(state.lp_d, PU_TO_INTEGRAL), PU_W);
       fine_1  <= resize(round_half_up(state.v_dead, DROP_FINE), FINE_W);
 
       -- Stage 2: u_h = u_pi_d - lp_u;  d_h = d_d - lp_d

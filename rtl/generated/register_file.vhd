@@ -197,7 +197,7 @@ begin
       -- Pulses return to zero at the next clock, or after the next sample: not the one that
       -- came in at the edge at which they rose
       clear_trip <= '0';
-      irq_clear <= (others => '0');
+      irq_clear  <= (others => '0');
       if (sample_busy and not was_busy and was_clear_faults_in) = '1' then
         clear_faults_in <= '0';
       end if;
@@ -707,39 +707,61 @@ begin
       copied_high_1 <= copy_high(word mod HALF);
       is_signed_1   <= register_signed_of(to_unsigned(word, REGISTER_WORD_W));
       for k in fours_t'range loop
+
         case word mod 4 is
+
           when 0 =>
+
             picked_fours_1(k)  <= words(4 * k + 0);
             written_fours_1(k) <= written(4 * k + 0);
+
           when 1 =>
+
             picked_fours_1(k)  <= words(4 * k + 1);
             written_fours_1(k) <= written(4 * k + 1);
+
           when 2 =>
+
             picked_fours_1(k)  <= words(4 * k + 2);
             written_fours_1(k) <= written(4 * k + 2);
+
           when others =>
+
             picked_fours_1(k)  <= words(4 * k + 3);
             written_fours_1(k) <= written(4 * k + 3);
+
         end case;
+
       end loop;
 
       -- Stage 2: select one of each sixteen words
       copied_2 <= copied_high_1 when word_1 >= HALF else copied_low_1;
       for k in sixteens_t'range loop
+
         case word_1 / 4 mod 4 is
+
           when 0 =>
+
             picked_sixteens_2(k)  <= picked_fours_1(4 * k + 0);
             written_sixteens_2(k) <= written_fours_1(4 * k + 0);
+
           when 1 =>
+
             picked_sixteens_2(k)  <= picked_fours_1(4 * k + 1);
             written_sixteens_2(k) <= written_fours_1(4 * k + 1);
+
           when 2 =>
+
             picked_sixteens_2(k)  <= picked_fours_1(4 * k + 2);
             written_sixteens_2(k) <= written_fours_1(4 * k + 2);
+
           when others =>
+
             picked_sixteens_2(k)  <= picked_fours_1(4 * k + 3);
             written_sixteens_2(k) <= written_fours_1(4 * k + 3);
+
         end case;
+
       end loop;
 
       -- Stage 3: select one of these

@@ -64,14 +64,20 @@ architecture rtl of telemetry_words is
   constant LATENCY : positive := TELEMETRY_WORDS_LATENCY;
   constant INDEX_W : positive := TELEMETRY_WORDS_INDEX_W;
 
-  type words_t is array (0 to 31) of unsigned(31 downto 0);
-  type parts_t is array (0 to 7) of unsigned(31 downto 0);
+  type words_t is array (natural range <>) of unsigned(31 downto 0);
 
   signal flags   : unsigned(31 downto 0);
-  signal words   : words_t;
+  signal words   : words_t(0 to 31);
   signal valid   : std_logic_vector(0 to LATENCY);
-  signal parts_1 : parts_t;
+  signal parts_1 : words_t(0 to 7);
   signal index_1 : unsigned(INDEX_W - 3 downto 0);
+
+  -- One of four words, and nothing that the other words could reach
+  function one_of (list : words_t; index : unsigned(1 downto 0)) return unsigned is
+    alias four : words_t(0 to 3) is list;
+  begin
+    return four(to_integer(index));
+  end function;
 begin
   valid(0) <= in_valid;
 
@@ -129,8 +135,8 @@ begin
       -- Stage 1: select one of each four words
       if valid(0) = '1' then
         index_1 <= index(INDEX_W - 1 downto 2);
-        for k in parts_t'range loop
-          parts_1(k) <= words(4 * k + to_integer(index(1 downto 0)));
+        for k in parts_1'range loop
+          parts_1(k) <= one_of(words(4 * k to 4 * k + 3), index(1 downto 0));
         end loop;
       end if;
 

@@ -1,6 +1,7 @@
 """The contract of a block as a circuit: every input sequence that it allows, and a flag for what its bench notices.
 
-The module `miter` holds the block twice, as it is (`gold`) and mutated (`gate`).  Its own inputs are free; `rst` is
+The module `miter` holds the block twice, as it is (`gold`) and mutated (`gate`): graph.py gives their inputs `mutant`
+the values.  Its other inputs are free; `rst` is
 high in the first clock, samples keep their distance, inputs and registers are held as long as the contract says
 (golden_model/block.py), numbers outside a port's range are replaced by the lowest.  What cosim/stimulus.py drives is
 one of these sequences.  `bad` is high where cosim.stimulus.due compares and the two differ.
@@ -14,8 +15,8 @@ from fluxproof.golden_model.block import Block, Port
 from scripts.mutate.product import Product, bounded
 
 
-def miter(block: Block, config: Mapping[str, int], assumed: str, products: Sequence[Product]) -> str:
-    """Verilog of `miter`; ``products``: the multipliers that were taken out of both.
+def miter(block: Block, config: Mapping[str, int], assumed: str, products: Sequence[Product], width: int) -> str:
+    """Verilog of `miter`; ``products``: the multipliers that were taken out of both; ``width``: of `mutant`.
 
     assumed: an expression in the block's inputs that holds for every sample; after a clock without it nothing counts.
     """
@@ -23,6 +24,7 @@ def miter(block: Block, config: Mapping[str, int], assumed: str, products: Seque
     strobes = block.strobes and not block.clocked
     free = ["clk"] + ["any_rst"] * block.strobes + ["any_in_valid"] * strobes
     header = [f"input {name}" for name in free]
+    header += [f"input [{width - 1}:0] mutant_{n}" for n in ("gold", "gate")]
     header += [f"input [{p.y - 1}:0] any_{k}_{n}" for k, p in enumerate(products) for n in ("gold", "gate")]
     header += [f"input signed [{p.fmt.width - 1}:0] any_{p.name}" for p in ports]
     driven = ["clk"] + ["rst"] * block.strobes + ["in_valid"] * strobes + [p.name for p in ports]
@@ -40,7 +42,7 @@ def miter(block: Block, config: Mapping[str, int], assumed: str, products: Seque
                 product = f"({same} ? y_{k}_gold : {product})"
             lines += [f"  wire [{p.y - 1}:0] y_{k}_{suffix} = {product};"]
             wiring += [f".product_{k}_{port.upper()}({port}_{k}_{suffix})" for port in "aby"]
-        lines += [f"  {suffix} {suffix}({', '.join(wiring)});"]
+        lines += [f"  both {suffix}(.mutant(mutant_{suffix}), {', '.join(wiring)});"]
     lines += ["  reg legal = 1;", f"  wire allowed = legal & ({assumed or 1});"]
     lines += ["  always @(posedge clk) legal <= allowed;"]
     lines += [f"  assign bad = allowed & begun & ({' | '.join(_differences(block, outputs, strobes))});", "endmodule"]

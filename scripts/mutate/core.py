@@ -18,7 +18,7 @@ from fluxproof.cosim.runs import closed_loop, generics
 from fluxproof.cosim.stimulus import random_value
 from fluxproof.cosim.verilog import VerilogPort
 from fluxproof.golden_model import clocked
-from fluxproof.golden_model.fluxproof import REGISTERS, Observed
+from fluxproof.golden_model.fluxproof import OBSERVED, REGISTERS, Observed
 from fluxproof.golden_model.io import sample_latch
 from scripts.mutate.harness import Trial
 from scripts.prove.pipeline import core_ends
@@ -26,7 +26,23 @@ from scripts.prove.pipeline import core_ends
 CARRIER_HALF = 128
 IN_RESET = 4
 MUTANTS = 240
-SEED, SETTINGS = 3, 600  # of any_settings
+SEED, SETTINGS = 3, 900  # of any_settings
+# Limits, and the value of the sample or of the core that is compared with them.
+LIMITS = {
+    "i_trip": "i_a",
+    "u_dc_min": "u_dc",
+    "u_dc_max": "u_dc",
+    "t_min": "temp_winding_in",
+    "t_max": "temp_winding_in",
+    "i_max": "i_q_ref",
+    "omega_0": "omega_me",
+    "omega_min": "omega_me",
+    "delta_max": "delta_lambda_d",
+    "v_thr": "v_dead",
+    "v_comp_max": "v_comp",
+    "i_learn": "i_q",
+    "omega_psi_min": "omega_chord",
+}
 INVERTED = 12  # settings of which a bit is inverted at a time
 BITS = {"ADC_BITS": 16, "POSITION_BITS": 16}
 
@@ -105,6 +121,20 @@ def every_event(inverted: int = 0) -> Recorder:
     return golden.core
 
 
+def beside_seen(seen: Mapping[str, int], rng: np.random.Generator) -> dict[str, int]:
+    """Limits at the size of what is compared with them, or one bit beside it: there every bit of both counts."""
+    found = {}
+    for name, of in LIMITS.items():
+        port = REGISTERS[name]
+        value = seen[of] if port.fmt.signed else abs(seen[of])
+        drop = OBSERVED[of].fmt.frac_bits - port.fmt.frac_bits if of in OBSERVED else 0
+        value = value >> drop if drop > 0 else value << -drop
+        if rng.integers(2):
+            value ^= 1 << int(rng.integers(port.fmt.width - bool(port.fmt.signed)))
+        found[name] = min(max(value, port.low), port.high)
+    return found
+
+
 def beside(settings, count: int, rng: np.random.Generator):
     """The settings with one bit inverted in ``count`` of them, drawn at random."""
     changed = {}
@@ -116,16 +146,20 @@ def beside(settings, count: int, rng: np.random.Generator):
 
 
 def any_settings() -> Recorder:
-    """Samples of any codes, each with any registers: every bit of every setting reaches its block, both ways."""
+    """Samples of any codes with any registers, each three times: every bit of every setting reaches its block."""
     run = closed_loop(str(DRIVES / "paper001.toml"), CARRIER_HALF, "compressed", 1)
     golden, rng = Recorder(run.registers.values, run.registers.config), np.random.default_rng(SEED)
     golden.advance(1, enable=1)
-    for _ in range(SETTINGS):
+    ports = {p.name: p for p in sample_latch.BLOCK.ports(BITS)}
+    sample: dict[str, int] = {}
+    for k in range(SETTINGS):
         changed = {name: random_value(rng, port) for name, port in REGISTERS.items()}
+        if k % 3:  # the same again, with limits that are just met or missed
+            changed = beside_seen(golden.observed._asdict() | sample, rng)
+        else:
+            sample = {name: random_value(rng, ports[name]) for name in INPUT_PORTS}
         golden.registers = golden.registers._replace(**changed)
         golden.advance(4, clear_trip=int(rng.integers(4) == 0))
-        ports = {p.name: p for p in sample_latch.BLOCK.ports(BITS)}
-        sample = {name: random_value(rng, ports[name]) for name in INPUT_PORTS}
         golden.advance(clocked.INTERVAL + int(rng.integers(1, 80)), sample, clear_trip=0)
     golden.advance(4)
     return golden

@@ -1,8 +1,12 @@
 """Proves for mutants that the bench does not notice that no bench could: equal wherever one compares.
 
-Yosys makes an and-inverter graph of each miter (scripts/mutate/contract.py), with everything shared that the mutation
-does not reach.  Its flag never rises: ABC finds by induction over a clock what is equal in every clock (`scorr`), the
-flag and '0' among it, or searches for invariants by property directed reachability (`pdr`).
+Yosys makes one and-inverter graph of the miter (scripts/mutate/contract.py) for all of them; what a mutant does not
+reach is there once (graph.py).  Then, as long as something is open:
+
+1. with any inputs and any values in the registers, one clock changes no register and raises no flag (z3);
+2. the same with the values that the block's registers can have (ABC: `scorr`, `pdr`);
+3. the flag never rises, registers may differ: ABC finds by induction over a clock what is equal in every clock
+   (`scorr`), the flag and '0' among it, or searches for invariants by property directed reachability (`pdr`).
 """
 
 from __future__ import annotations
@@ -17,8 +21,11 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
+import z3
+
 from fluxproof.files import write_text
-from scripts.mutate.draw import Drawn, script
+from scripts.mutate.draw import CONTROL, Drawn, script, width_of
+from scripts.mutate.graph import Cut, Graph
 from scripts.mutate.product import Product
 from scripts.prove.abc_engine import CARRIER
 from scripts.synth.yosys import tool
@@ -26,27 +33,31 @@ from scripts.synth.yosys import tool
 FLAT = "flatten -noscopeinfo; memory_map; opt_clean; opt_expr; opt_clean; setundef -zero"
 # Registers start at 0 in both; what they may hold when a sample comes is what a reset leaves there, at any time.
 TO_GATES = "setundef -init -zero; techmap; opt -fast; dffunmap; setundef -undriven -zero; aigmap; opt_clean"
-# Two cells with the same inputs are one, registers too: what the mutation does not reach is there once.
-REDUCE = "proc; flatten -noscopeinfo; opt -share_all -noff"
-# The multipliers that were taken out -> the Verilog of `miter`.
-Miter = Callable[[Sequence[Product]], str]
+BOTH = "both"  # the module that both halves of the miter are
+GRAPH = (
+    f"read_json {BOTH}.json; read_verilog -sv miter.v",
+    "hierarchy -top miter; proc; flatten -noscopeinfo; opt_clean",
+    TO_GATES,
+    "write_aiger -zinit -map graph.map graph.aig",
+)
+# The multipliers that were taken out, and the bits that choose the mutant -> the Verilog of `miter`.
+Miter = Callable[[Sequence[Product], int], str]
 EQUIVALENT, DIFFERENT, UNKNOWN = "equivalent", "different", "unknown"
-CARRY = "read_verilog carrier.v; prep -top m; techmap; abc -script {}"
-GRAPH_S = 20  # processor time to make and to reduce one graph, which is no search
-SUBJECT_S, SEARCHED_S = 40, 12  # the graphs of one subject; its searches
+CARRY = "read_verilog carrier.v; prep -top m; techmap; abc -script search.abc"
+EFFORT = 3_000_000  # of z3 for a mutant, by its own count: some seconds
+STEPS_S, SEARCHED_S = 8, 14  # processor time of a subject's searches
 START = 5  # seconds more for the first of a run, in which Yosys starts
 TICKS = os.sysconf("SC_CLK_TCK")
 
 
-def netlists(drawn: Drawn, mutants: Sequence[int]) -> None:
-    """Writes gold.json, the block without instances, and for each mutant NUMBER.json, its module named `gate`."""
-    lines = ["read_rtlil prepared.il", "design -save one", f"rename {drawn.top} gold", "hierarchy -top gold", FLAT]
-    lines += ["write_json gold.json"]
-    for mutant in mutants:
-        mutation = drawn.mutations[mutant - 1].replace(f"-module {drawn.top} ", "-module gate ")
-        lines += ["design -load one", f"rename {drawn.top} gate", mutation, "hierarchy -top gate", FLAT]
-        lines += [f"write_json {mutant}.json"]
-    script(drawn.folder, "netlists.ys", lines)
+def netlist(drawn: Drawn, mutants: Sequence[int]) -> dict[str, Product]:
+    """Writes both.json, the block without instances and with these mutants; the multipliers that were taken out."""
+    width = width_of(drawn)
+    lines = ["read_rtlil prepared.il"]
+    lines += [f"{drawn.mutations[m - 1]} -ctrl {CONTROL} {width} {m}" for m in mutants]
+    lines += [f"rename {drawn.top} {BOTH}", f"hierarchy -top {BOTH}", FLAT, f"write_json {BOTH}.json"]
+    script(drawn.folder, "both.ys", lines)
+    return without_products(drawn.folder / f"{BOTH}.json", BOTH)
 
 
 def without_products(path: Path, name: str, cells: Sequence[str] = ()) -> dict[str, Product]:
@@ -75,22 +86,41 @@ def prove(drawn: Drawn, mutants: Sequence[int], miter: Miter, seconds: int) -> d
     true of every multiplier, and a difference need not be one of the real one.
     """
     folder = drawn.folder
-    netlists(drawn, mutants)
-    products = without_products(folder / "gold.json", "gold")
-    for mutant in mutants:
-        without_products(folder / f"{mutant}.json", "gate", list(products))
-    write_text(folder / "miter.v", miter(list(products.values())))
+    products = netlist(drawn, mutants)
+    write_text(folder / "miter.v", miter(list(products.values()), width_of(drawn)))
     write_text(folder / "carrier.v", CARRIER)
-    began = children_s()
-    graphs = each(folder, mutants, "aig", graph, "graphs.ys", "script graphs.ys", GRAPH_S, began + SUBJECT_S / 2)
-    merged = each(folder, graphs, "less", merge, "merge.abc", CARRY.format("merge.abc"), GRAPH_S, began + SUBJECT_S)
-    equal = [m for m in merged if never_rises(folder / f"{m}.less")]
-    open_still = [m for m in merged if m not in equal]
-    tried = partial(search, folder, seconds=seconds)
-    until = children_s() + SEARCHED_S
-    each(folder, open_still, "status", tried, "search.abc", CARRY.format("search.abc"), seconds, until)
-    found = dict.fromkeys(mutants, UNKNOWN) | dict.fromkeys(equal, EQUIVALENT)
-    return found | {m: verdict(read(folder / f"{m}.status")) for m in open_still}
+    script(folder, "graph.ys", GRAPH)
+    graph = Graph(folder / "graph.aig", folder / "graph.map")
+    found = dict.fromkeys(mutants, UNKNOWN)
+    for mutant in mutants:
+        value = graph.mutant(mutant)
+        if never(graph.step(value, free=True), folder / "step.cnf"):
+            found[mutant] = EQUIVALENT
+            continue
+        graph.step(value, free=False).write(folder / f"{mutant}.step.aig")
+        graph.both(value).write(folder / f"{mutant}.both.aig")
+    for way, most in (("step", STEPS_S), ("both", SEARCHED_S)):
+        still = [m for m in mutants if found[m] == UNKNOWN]
+        tried = partial(search, folder, way, seconds=seconds)
+        each(folder, still, f"{way}.status", tried, "search.abc", CARRY, seconds, children_s() + most)
+        for mutant in still:
+            said = verdict(folder, f"{mutant}.{way}")
+            # A register that becomes different need not matter.
+            found[mutant] = said if way == "both" or said == EQUIVALENT else UNKNOWN
+    return found
+
+
+def never(cut: Cut, path: Path) -> bool:
+    """Whether no inputs and no values of the registers raise the flag, as far as some effort shows."""
+    if cut.flag < 2:
+        return cut.flag == 0
+    clauses = cut.clauses()
+    lines = [f"p cnf {1 + cut.top} {len(clauses)}", *(" ".join(map(str, (*clause, 0))) for clause in clauses)]
+    write_text(path, "\n".join(lines) + "\n")
+    solver = z3.Solver()
+    solver.set("rlimit", EFFORT)
+    solver.from_file(str(path))
+    return solver.check() == z3.unsat
 
 
 def each(
@@ -117,16 +147,13 @@ def each(
     return [m for m in mutants if (folder / f"{m}.{suffix}").exists()]
 
 
-def merge(mutant: int) -> str:
-    """ABC's commands that make one signal of those that are equal in every clock."""
-    return f"read_aiger {mutant}.aig\nstrash\nscorr\nwrite_aiger {mutant}.less\n"
-
-
-def search(folder: Path, mutant: int, seconds: int) -> str:
-    """ABC's commands that look for an invariant, or a way to the flag; pdr refuses a graph without registers."""
-    registers, _ = aiger(folder / f"{mutant}.less")
-    command = f"pdr -T {4 * seconds}" if registers else "iprove"
-    return f"read_aiger {mutant}.less\nstrash\n{command}\nwrite_status {mutant}.status\n"
+def search(folder: Path, way: str, mutant: int, seconds: int) -> str:
+    """ABC's commands that merge what is equal in every clock, then look for an invariant or a way to the flag."""
+    name = f"{mutant}.{way}"
+    registers, _ = aiger(folder / f"{name}.aig")
+    # Both refuse a graph without registers.
+    commands = f"scorr\nwrite_aiger {name}.less\npdr -T {2 * seconds}" if registers else "iprove"
+    return f"read_aiger {name}.aig\nstrash\n{commands}\nwrite_status {name}.status\n"
 
 
 def aiger(path: Path) -> tuple[int, str]:
@@ -134,23 +161,6 @@ def aiger(path: Path) -> tuple[int, str]:
     lines = path.read_bytes().split(b"\n")
     registers = int(lines[0].split()[3])
     return registers, lines[1 + registers].decode()
-
-
-def never_rises(path: Path) -> bool:
-    """Whether the flag has become the constant '0'."""
-    return aiger(path)[1] == "0"
-
-
-def graph(mutant: int) -> str:
-    """Yosys' commands that write the graph of one mutant's miter."""
-    commands = [
-        f"design -reset; read_json gold.json; read_json {mutant}.json; read_verilog -sv miter.v",
-        "hierarchy -top miter",
-        REDUCE,
-        TO_GATES,
-        f"write_aiger -zinit {mutant}.aig",
-    ]
-    return "\n".join(commands) + "\n"
 
 
 def watched(folder: Path, commands: str, mutants: Sequence[int], suffix: str, seconds: int, most: float) -> list[int]:
@@ -194,8 +204,12 @@ def read(path: Path) -> str:
     return path.read_text() if path.exists() else ""
 
 
-def verdict(said: str) -> str:
-    """What ABC's status file says."""
+def verdict(folder: Path, name: str) -> str:
+    """What ABC has found: the flag merged with '0', or the answer of its search."""
+    less = folder / f"{name}.less"
+    if less.exists() and aiger(less)[1] == "0":
+        return EQUIVALENT
+    said = read(folder / f"{name}.status")
     if said.startswith("snl_UNSAT"):
         return EQUIVALENT
     return DIFFERENT if said.startswith("snl_SAT") else UNKNOWN
