@@ -1,0 +1,13 @@
+"""Figures of the double update for `make board`: RTL against golden model, bandwidth and phase margin."""
+
+import pytest
+
+from studies.board import double_update
+
+
+@pytest.mark.study
+def test_figures_of_the_double_update(figure):
+    rows = double_update.rows()
+    for row in rows:
+        figure(*(row[key] for key in ("figure", "ours", "target", "unit", "pass")))
+    assert all(row["pass"] for row in rows), [row for row in rows if not row["pass"]]
