@@ -41,6 +41,8 @@ PROTECTION = tuple(
 RARE = {"current_offset", "open_load"}  # need 64 samples at rest, turns of the rotor: test_blocks, test_limits
 LATCHED = "run_in"  # the latch's input that the core makes itself
 MODERATE = {  # registers of the size a drive has, with which little saturates
+    "speed_given": 0,
+    "position_restart": 0,
     **dict.fromkeys(("offset_a", "offset_b", "offset_c"), 32768),
     **dict.fromkeys(("gain_a", "gain_b", "gain_c", "u_dc_gain", "i_max"), 65536),
     **dict.fromkeys(("kp_d", "kp_q", "k_filter", "k_delay", "lambda_mg"), 20000),
@@ -280,4 +282,4 @@ def test_sources_are_in_compile_order(tmp_path):
     (tmp_path / "z_pkg.vhd").write_text("package p is end package;")
     assert [path.stem for path in rtl_sources(tmp_path)] == ["z_pkg", "b", "a"]
     order = [path.stem for path in rtl_sources()]
-    assert order[-2:] == ["fluxproof", "fluxproof_axi"]
+    assert order[-2:] == ["fluxproof_axi", "fluxproof_board"] and order.index("fluxproof") < len(order) - 2

@@ -36,6 +36,8 @@ FIELDS = fluxproof.Observed._fields
 LIMITS = ("t_max", "i_max", "v_comp_max", "delta_max", "v_thr", "i_learn")
 SILENT = ("omega_given", "dead_time", "t_min", "v_comp_max")  # without influence on the recorded signals
 SILENT += ("watchdog", "i_trip", "sum_trip", "rail_samples", "u_dc_min", "u_dc_max", "jump_max", "fault_ignore")
+SILENT += ("omega_trip", "omega_away", "runaway_samples", "omega_stall", "stall_samples", "i_open", "offset_max")
+SILENT += ("heartbeat", "brake_off")
 OWNERS = {}  # register -> blocks that have it, from their declarations
 for _module, _ in fluxproof.WIRING.values():
     for _port in _module.BLOCK.registers:
