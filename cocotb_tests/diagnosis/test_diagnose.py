@@ -212,6 +212,16 @@ EFFECT = SecondHarmonic(
 """
 
 
+def test_at_the_noise_floor_nothing_is_named():
+    """A resistance that is 1 % off is seen in many blocks, but stands above the noise of none: possible, not asserted."""
+    off = {"resistance_ohm": 1.0105 * MACHINE.resistance_ohm}
+    answer = diagnose(recorded(machine=off), load_nominal(PAPER))
+    assert answer.fit.train_before < 1.2 * answer.fit.noise_floor
+    assert answer.verdict == "no_mismatch" and not answer.effects and not answer.ambiguity, answer.sentence
+    (note,) = [n for n in answer.notes if "not asserted as the misfit is at the noise floor" in n]
+    assert note.startswith("Winding resistance")
+
+
 def test_no_effect_is_named_outside_of_its_file():
     """Rules for one effect are attributes of it, so that a new one is one file; keys of drive.toml may sound alike."""
     names = (set(known_effects()) - set(vars(NOMINAL.sensors))) - {"udc_gain"}  # a parameter too

@@ -15,7 +15,7 @@ from fluxproof.diagnosis.answer.request import requests, wants_cold
 from fluxproof.diagnosis.answer.scan import Stray, row_residual, stray_order, stray_swing, stray_torque
 from fluxproof.diagnosis.answer.sizes import Sizes, fit_of, with_stray
 from fluxproof.diagnosis.answer.unknown import sparse_term
-from fluxproof.diagnosis.answer.verdict import kind_of
+from fluxproof.diagnosis.answer.verdict import at_floor, kind_of
 from fluxproof.diagnosis.inference import constants as k
 from fluxproof.diagnosis.result import Diagnosis, UnknownTerm
 
@@ -44,6 +44,9 @@ def judge(posterior, held) -> Judgement:
     """The judgement on a posterior; held: (b,) blocks that were not fitted."""
     setup, best = posterior.setup, posterior.best()
     names = setup.call(names_of, posterior)
+    stray = setup.call(stray_of, posterior, held)
+    if not stray and at_floor(Sizes(setup, setup.cells.y, setup.cells.y, ~held, measured_torque(setup))):
+        names = names.withheld()
     likely = {n for n, p in names.maybe.items() if p >= k.LIKELY}
     told = (names.said | {n for group in names.open for n in group} | likely) & set(best.names) - set(names.suspects)
     before, after = setup.cells.y, best.left(told)
@@ -52,7 +55,6 @@ def judge(posterior, held) -> Judgement:
     channel = train.primary()
     electrical = [n for n in told if not setup.effects[n].mechanical]
     share = unseen.share(channel) if electrical or (told and measured_torque(setup)) else None
-    stray = setup.call(stray_of, posterior, held)
     kind = kind_of(names, train, unseen, share, stray)
     return Judgement(kind, names, told, channel, share, stray, train, unseen)
 
@@ -103,8 +105,10 @@ def conclude(posterior, held, progress=lambda text: None) -> Diagnosis:
     for name in names.suspects:
         if answer.unknown_term is None or answer.unknown_term.meaning != setup.effects[name].title:
             answer.notes.append(f"Besides, it is {as_if(_described(best, name, held, unseen))}.")
+    why = " as the misfit is at the noise floor" if kind == "no_mismatch" else ""
     for name, p in sorted(names.maybe.items(), key=lambda entry: -entry[1])[:3]:
-        answer.notes.append(f"{capital(setup.effects[name].title)}: possible (probability {p:.2f}), not asserted.")
+        title = capital(setup.effects[name].title)
+        answer.notes.append(f"{title}: possible (probability {p:.2f}), not asserted{why}.")
     answer.trace = "; ".join(f"{p:.3f} {'+'.join(f.names) or 'none'}" for p, f in names.fits[:4])
     return answer
 

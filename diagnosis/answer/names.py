@@ -34,6 +34,10 @@ class Names:
     def said(self) -> set[str]:
         return set(self.confidence)
 
+    def withheld(self) -> Names:
+        """The same with nothing asserted: what was named is possible."""
+        return Names({}, [], self.maybe | self.confidence, {}, self.fits)
+
 
 def names_of(posterior) -> Names:
     """Names and ambiguities of a posterior."""

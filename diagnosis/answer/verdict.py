@@ -20,6 +20,12 @@ def kind_of(names, train, held, share, stray) -> str:
     return "ambiguous" if names.open else "explained"
 
 
+def at_floor(sizes) -> bool:
+    """Whether the misfit before any explanation is noise in every channel and order: nothing is named then."""
+    orders = [s for (channel, _), s in sizes.orders.items() if channel in sizes.channels]
+    return all(s.before <= s.above(k.FLOOR) for s in (*sizes.channels.values(), *orders))
+
+
 def standing_out(sizes) -> list:
     """[(channel, order)] whose remainder exceeds its noise floor and is a large part of what was there before."""
     return [
