@@ -9,6 +9,7 @@ from typing import NamedTuple
 from fluxproof.golden_model.block import Block, Port
 from fluxproof.golden_model.common import input_filter
 from fluxproof.golden_model.encoders import edge_timer, index_check, quadrature_decoder, turn_counter
+from fluxproof.golden_model.encoders.edge_timer import MOVED_W, TIME_W
 from fluxproof.golden_model.formats import BIT
 from fluxproof.golden_model.io.position import code_format
 from fluxproof.golden_model.kernel import kernel
@@ -97,7 +98,9 @@ def step(
         counts,
         correct_max,
     )
-    timer, (omega_me, omega_valid) = timer_step(s.of_timer, s.step_up, s.step_down, sample, reverse, k_edge)
+    timer, (omega_me, omega_valid) = timer_step(
+        s.of_timer, s.step_up, s.step_down, sample, reverse, k_edge, TIME_W, MOVED_W
+    )
     following = State(
         filter_a,
         filter_b,

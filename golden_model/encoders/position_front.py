@@ -134,6 +134,15 @@ def stimuli(rng, config):
     return rows
 
 
+def patient_stimuli(rng, config):
+    """All frames of a serial encoder, slow turns of Hall sensors."""
+    still = {p.name: 0 for p in BLOCK.inputs + BLOCK.registers}
+    if config["ENCODER"] == HALL:
+        return [still | row for row in hall_front.patient_stimuli(rng, config)]
+    serial = config["ENCODER"] in (serial_encoder.SSI, serial_encoder.BISS, serial_encoder.ENDAT)
+    return [still | row for row in serial_encoder.patient_stimuli(rng, config)] if serial else []
+
+
 _PORTS = {
     p.name: p
     for module in (hall_front, serial_encoder, incremental_encoder)
@@ -188,4 +197,5 @@ BLOCK = Block(
     reference=None,
     bound=None,
     stimuli=stimuli,
+    patient_stimuli=patient_stimuli,
 )
