@@ -17,7 +17,9 @@ import numpy as np
 from fluxproof.golden_model.block import Block, Port
 
 BURST = 40  # samples between two changes of the registers
-WINDOW = 20, 2000  # rows of a block's own hard cases that are played again
+SHORTEST = 10  # rows of a block's own hard cases that are played again
+SAMPLES, CLOCKS = 300, 2000  # the same at most
+FEW = 100  # varied samples at least
 OFTEN, SELDOM, NEVER = 60, 250, 0  # samples from one reset to the next
 
 
@@ -27,14 +29,14 @@ class Length:
 
     corners: int  # combinations of corner values at most
     near: int  # samples beside one another
-    varied: int  # samples of the block's own hard cases with something changed
+    varied: int  # clocks of the block's own hard cases with something changed
     random: int  # samples
-    clocked: int  # the same two of a block whose sample is the clock: clocks of each
+    clocked: int  # random clocks of a block whose sample is the clock
     patient: bool  # whether the cases come too that take long, such as a wide counter at its end
 
 
-SHORT = Length(500, 200, 100, 300, 1000, False)  # GHDL, some ten thousand clocks a second
-LONG = Length(1500, 500, 1200, 1500, 10000, True)  # the model alone, and Verilator
+SHORT = Length(500, 200, 1000, 300, 1000, False)  # GHDL, some ten thousand clocks a second
+LONG = Length(1500, 500, 30000, 1500, 10000, True)  # the model alone, and Verilator
 
 
 class Sample(NamedTuple):
@@ -73,8 +75,8 @@ def values_of(state) -> list[int]:
     return [int(state)]
 
 
-def near(rng: np.random.Generator, ports: tuple[Port, ...], row: dict[str, int], state=None) -> dict[str, int]:
-    """The row with one number beside another one, where a comparison changes or a difference is small.
+def near(rng: np.random.Generator, ports: tuple[Port, ...], row: dict[str, int], state=None, of=None) -> dict[str, int]:
+    """The row with one number (the port ``of``, or any) beside another, where a comparison changes or little is left.
 
     It becomes another port's value, of the same weight, one of ``state``, or a power of two, with either sign, or
     stays; then it moves by at most one LSB, or a single bit of it is inverted.
@@ -83,6 +85,7 @@ def near(rng: np.random.Generator, ports: tuple[Port, ...], row: dict[str, int],
     if not words:
         return row
     port, other = (words[int(rng.integers(len(words)))] for _ in range(2))
+    port = of or port
     value, inside = row[port.name], values_of(state)
     kind = rng.integers(4) if not inside else rng.integers(8)
     shift = port.fmt.frac_bits - other.fmt.frac_bits
@@ -157,7 +160,7 @@ def _strobed(block: Block, config: dict[str, int], rng, length: Length) -> Sampl
             row = {p.name: random_value(rng, p) for p in ports}
         row = near(rng, ports, row, state)
         state = yield Sample(row)
-    yield from _varied(ports, own, rng, length.varied)
+    yield from _varied(ports, own, rng, max(FEW, length.varied // block.interval), SAMPLES)
     registers = {p.name: 0 for p in block.registers}
     for k in range(length.random):
         row = {p.name: random_value(rng, p) for p in ports}
@@ -174,39 +177,55 @@ def _clocked(block: Block, config: dict[str, int], rng, length: Length) -> Sampl
         yield Sample(row, 3 * SELDOM)
     for row in patient:
         yield Sample(row, NEVER)
-    yield from _varied(ports, own + patient, rng, length.clocked)
+    yield from _varied(ports, own + patient, rng, length.varied, CLOCKS)
     yield from _held(ports, rng, length.clocked)
 
 
-def _varied(ports: tuple[Port, ...], own: list[dict[str, int]], rng: np.random.Generator, count: int) -> Samples:
+def _varied(
+    ports: tuple[Port, ...], own: list[dict[str, int]], rng: np.random.Generator, count: int, longest: int
+) -> Samples:
     """Stretches of a block's own hard cases with something changed: what it expects goes on, but not quite so.
 
-    Some ports keep another value all the while, or have a bit inverted; now and then a row is beside the block's
-    state, comes twice, or is left out.
+    Now and then a row is beside the block's state, comes twice, or is left out.
     """
     state, done = None, 0
     while own and done < count:
-        size = int(WINDOW[0] * (WINDOW[1] / WINDOW[0]) ** rng.random())
+        size = int(SHORTEST * (longest / SHORTEST) ** rng.random())
         begin = int(rng.integers(max(1, len(own) - size // 2)))
-        held, inverted = {}, {}
-        for port in rng.choice(len(ports), min(int(rng.integers(1, 4)), len(ports)), replace=False):
-            other = ports[port]
-            if rng.integers(4) == 0:
-                inverted[other] = 1 << int(rng.integers(other.fmt.width))
-            elif rng.integers(2) == 0:
-                held[other.name] = random_value(rng, other)
-            else:
-                held[other.name] = near(rng, (other,), own[begin], state)[other.name]
+        held, inverted = _change(ports, own[begin], rng, state)
         changes = int(rng.choice([10, 40, 10**9]))  # one row in so many
         for row in own[begin : begin + size]:
             row = row | held
-            row |= {p.name: min(max(row[p.name] ^ bit, p.low), p.high) for p, bit in inverted.items()}
+            row |= {p.name: min(max(row[p.name] ^ bit, p.low), p.high) for p, bit in inverted}
             change = int(rng.integers(3)) if rng.integers(changes) == 0 else -1
             if change == 0:
                 row = near(rng, ports, row, state)
             for _ in range((1, 2, 0)[max(change, 0)]):
                 state = yield Sample(row, 3 * SELDOM)
                 done += 1
+
+
+def _change(ports: tuple[Port, ...], row: dict[str, int], rng, state) -> tuple[dict[str, int], list[tuple[Port, int]]]:
+    """(values that some ports keep, bits that are inverted in others) for a stretch that begins with ``row``.
+
+    One time in three the inverted bits have the same weight in several ports: numbers that were beside one another, a
+    limit and what is compared with it, are so still, somewhere else.
+    """
+    if rng.integers(3) == 0:
+        of = ports[int(rng.integers(len(ports)))]
+        weight = int(rng.integers(of.fmt.width)) - of.fmt.frac_bits
+        places = [(p, weight + p.fmt.frac_bits) for p in ports if not p.is_bit and rng.integers(4)]
+        return {}, [(p, 1 << place) for p, place in places if 0 <= place < p.fmt.width - bool(p.fmt.signed)]
+    held, inverted = {}, []
+    for number in rng.choice(len(ports), min(int(rng.integers(1, 4)), len(ports)), replace=False):
+        port = ports[number]
+        if rng.integers(4) == 0:
+            inverted.append((port, 1 << int(rng.integers(port.fmt.width))))
+        elif rng.integers(2) == 0:
+            held[port.name] = random_value(rng, port)
+        else:
+            held[port.name] = near(rng, ports, row, state, port)[port.name]
+    return held, inverted
 
 
 def _held(ports: tuple[Port, ...], rng: np.random.Generator, count: int) -> Samples:
@@ -223,7 +242,7 @@ def _held(ports: tuple[Port, ...], rng: np.random.Generator, count: int) -> Samp
                 if p.is_bit:
                     row = row | {p.name: int(rng.random() < pace[p.name][1])}
                 else:
-                    row = row | {p.name: random_value(rng, p)} if rng.integers(3) else near(rng, (p,), row, state)
+                    row = row | {p.name: random_value(rng, p)} if rng.integers(3) else near(rng, ports, row, state, p)
         if rng.integers(40) == 0:
             row = {**row, **calm}
             if "dead_time" in row:

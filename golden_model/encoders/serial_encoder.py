@@ -78,7 +78,7 @@ def patient_stimuli(rng, config):
     rows, names = [], {"start": "sample_trigger", "word_bits": "encoder_bits"}
     master = {SSI: ssi_master, BISS: biss_master, ENDAT: endat_master}[config["ENCODER"]]
     regs = {"position_delay": 1 << 15, "bridge_max": 2}
-    for row in master.stimuli(rng, config):
+    for row in master.stimuli(rng, {"POSITION_BITS": config["POSITION_BITS"]}):
         if rng.integers(2000) == 0:
             regs = {"position_delay": int(rng.integers(_BRIDGE["delay"].fmt.hi)), "bridge_max": int(rng.integers(5))}
         now = {names.get(name, name): value for name, value in row.items()}

@@ -35,9 +35,10 @@ end entity edge_timer;
 architecture rtl of edge_timer is
   constant QUOTIENT_W : positive := EDGE_TIMER_QUOTIENT_W;
   constant WORK_W     : positive := MOVED_W + 32 + 1;  -- twice the product
+
   -- Clocks of the engine: the product, a check for overflow, the quotient, its limit, the result
-  constant DIVIDE_AT  : positive := MOVED_W + 1;
-  constant LIMIT_AT   : positive := DIVIDE_AT + QUOTIENT_W + 1;
+  constant DIVIDE_AT : positive := MOVED_W + 1;
+  constant LIMIT_AT  : positive := DIVIDE_AT + QUOTIENT_W + 1;
 
   constant TIME_MAX  : unsigned(TIME_W - 1 downto 0) := (others => '1');
   constant MOVED_MAX : signed(MOVED_W downto 0)      := '0' & (MOVED_W - 1 downto 0 => '1');
