@@ -36,7 +36,8 @@ class Length:
 
 
 SHORT = Length(500, 200, 1000, 300, 1000, False)  # GHDL, some ten thousand clocks a second
-LONG = Length(1500, 500, 30000, 1500, 10000, True)  # the model alone, and Verilator
+MEDIUM = Length(1500, 400, 2000, 1200, 0, False)  # the model against floating point, both in Python
+LONG = Length(1500, 500, 30000, 1500, 10000, True)  # Verilator
 
 
 class Sample(NamedTuple):

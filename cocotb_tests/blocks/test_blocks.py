@@ -10,7 +10,7 @@ import pytest
 
 from fluxproof.checkout import ROOT, RTL
 from fluxproof.cosim import bench_plan, ghdl
-from fluxproof.cosim.stimulus import samples
+from fluxproof.cosim.stimulus import MEDIUM, samples
 from fluxproof.golden_model.registry import BLOCKS
 
 SEED = int(os.environ.get("FLUXPROOF_SEED", "1"))
@@ -45,7 +45,7 @@ def test_model_within_bound(block, config):
     state, worst = block.state, {}
     formats = {p.name: p.fmt for p in block.ports(generics)}
     out_formats = {p.name: p.fmt for p in block.out_ports(generics)}
-    for row, _ in samples(block, generics, SEED):
+    for row, _ in samples(block, generics, SEED, MEDIUM):
         real = {name: formats[name].to_float(value) for name, value in row.items()} | dict(generics)
         wanted, allowed = block.reference(real, state), block.bound(real, state)
         state, got = block.run(state, row, generics)

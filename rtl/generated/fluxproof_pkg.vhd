@@ -709,6 +709,7 @@ package fluxproof_pkg is
   -- sample_guard: none: protection and diagnosis of the drive
   constant SAMPLE_GUARD_LATENCY : positive := 1;
   constant SAMPLE_GUARD_AHEAD : natural := 2;
+  constant SAMPLE_GUARD_AGE_W : natural := 20;
 
   -- sample_checks: none: protection and diagnosis of the drive
   constant SAMPLE_CHECKS_LATENCY : positive := 4;

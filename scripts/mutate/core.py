@@ -163,7 +163,10 @@ def any_settings() -> Recorder:
             kept = REGISTERS["fault_ignore"].high
             changed["fault_ignore"] = kept ^ (1 << int(rng.integers(kept.bit_length())) if k % 3 == 2 else 0)
         golden.registers = golden.registers._replace(**changed)
-        golden.advance(4, enable=int(not runs or k % 3 > 0), clear_trip=int(runs or rng.integers(4) == 0))
+        golden.advance(4, enable=int(k % 3 > 0), clear_trip=int(runs or rng.integers(4) == 0))
+        r = golden.registers
+        if k % 3 == 0 and 0 < r.dead_time < r.min_pulse <= CARRIER_HALF:
+            golden.advance(2 * CARRIER_HALF)  # the valley takes them before the sample, not while it is in flight
         golden.advance(clocked.INTERVAL + int(rng.integers(1, 80)), sample, enable=1, clear_trip=0)
     golden.advance(4)
     return golden
