@@ -138,10 +138,14 @@ def samples(block: Block, config: dict[str, int], seed: int, length: Length = LO
 
 
 def _own(block: Block, config: dict[str, int], rng, length: Length) -> tuple[list[dict[str, int]], list]:
-    """The block's own hard cases, and those for who has patience; a port that they leave out is 0."""
+    """The block's own hard cases, and those for who has patience; a port that they leave out is 0.
+
+    The patient see the own ones twice, without a reset too: a counter gets to its end in no other way.
+    """
     still = {p.name: 0 for p in block.ports(config)}
     own = block.stimuli(rng, config) if block.stimuli else []
     patient = block.patient_stimuli(rng, config) if block.patient_stimuli and length.patient else []
+    patient = own + patient if length.patient else []
     return [still | row for row in own], [still | row for row in patient]
 
 
@@ -178,7 +182,7 @@ def _clocked(block: Block, config: dict[str, int], rng, length: Length) -> Sampl
         yield Sample(row, 3 * SELDOM)
     for row in patient:
         yield Sample(row, NEVER)
-    yield from _varied(ports, own + patient, rng, length.varied, CLOCKS)
+    yield from _varied(ports, patient or own, rng, length.varied, CLOCKS)
     yield from _held(ports, rng, length.clocked)
 
 

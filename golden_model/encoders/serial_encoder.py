@@ -74,7 +74,10 @@ def stimuli(rng, config):
 
 
 def patient_stimuli(rng, config):
-    """All frames of the master, with samples at any time; the delay and the longest bridge change now and then."""
+    """All frames of the master, with samples at any time; the delay and the longest bridge change now and then.
+
+    Then an encoder that never answers, with longest times at which each of their lower bits counts.
+    """
     rows, names = [], {"start": "sample_trigger", "word_bits": "encoder_bits"}
     master = {SSI: ssi_master, BISS: biss_master, ENDAT: endat_master}[config["ENCODER"]]
     regs = {"position_delay": 1 << 15, "bridge_max": 2}
@@ -83,6 +86,9 @@ def patient_stimuli(rng, config):
             regs = {"position_delay": int(rng.integers(_BRIDGE["delay"].fmt.hi)), "bridge_max": int(rng.integers(5))}
         now = {names.get(name, name): value for name, value in row.items()}
         rows.append(now | regs | {"codes_valid": int(rng.integers(150) == 0), "clear_encoder": 0})
+    for longest in sorted({(3 << bit >> 1) + off for bit in range(1, 11) for off in (-1, 0, 1)}):
+        row = rows[0] | {"start_max": longest, "serial_data": 1, "half_period": 1}
+        rows += [row | {"sample_trigger": int(k % 40 == 5)} for k in range(longest + 150)]
     return rows
 
 
