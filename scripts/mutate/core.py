@@ -25,7 +25,7 @@ from scripts.prove.pipeline import core_ends
 
 CARRIER_HALF = 128
 IN_RESET = 4
-MUTANTS = 240
+MUTANTS = 160
 SEED, SETTINGS = 3, 900  # of any_settings
 # Limits, and the value of the sample or of the core that is compared with them.
 LIMITS = {

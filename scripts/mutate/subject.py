@@ -16,8 +16,8 @@ from scripts.mutate import core
 from scripts.mutate.harness import BENCH_SEED, Trial, block_trial
 
 FOLDER = BUILD / "mutate"
-LEAST, MOST = 40, 160  # mutants of a block
-LEAST_OF_CONFIG = 16
+LEAST, MOST = 32, 72  # mutants of a block
+LEAST_OF_CONFIG = 12
 
 
 @dataclass(frozen=True)
