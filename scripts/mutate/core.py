@@ -26,7 +26,7 @@ from scripts.prove.pipeline import core_ends
 CARRIER_HALF = 128
 IN_RESET = 4
 MUTANTS = 160
-SEED, SETTINGS = 3, 900  # of any_settings
+SEED, SETTINGS = 3, 2100  # of any_settings
 # Limits, and the value of the sample or of the core that is compared with them.
 LIMITS = {
     "i_trip": "i_a",
@@ -42,6 +42,14 @@ LIMITS = {
     "v_comp_max": "v_comp",
     "i_learn": "i_q",
     "omega_psi_min": "omega_chord",
+    "sum_trip": "i_c",
+    "i_open": "i_b",
+    "offset_max": "i_a",
+    "omega_trip": "omega_me",
+    "omega_away": "omega_me",
+    "omega_stall": "omega_me",
+    "brake_on": "u_dc",
+    "brake_off": "u_dc",
 }
 INVERTED = 12  # settings of which a bit is inverted at a time
 BITS = {"ADC_BITS": 16, "POSITION_BITS": 16}
