@@ -164,6 +164,25 @@ def stimuli(rng, config):
     return rows
 
 
+def patient_stimuli(rng, config):
+    """Back and forth over the index while the shaft slips: losses of every size, at correct_max or far from it."""
+    rows, slip = [], 0
+    still = {p.name: 0 for p in BLOCK.inputs} | {"filter_clocks": 1, "index_phase": 1, "k_edge": 900 << 16}
+    for turn in range(160):
+        if turn % 40 == 0:
+            counts = int(rng.integers(1000, 6000))
+            still |= turn_counter.setting(counts, config["POSITION_BITS"]) | {"reverse": turn // 40 & 1}
+        lost = int(2 ** rng.uniform(0, 11)) % (counts // 2)
+        slip += int(rng.choice([-1, 1])) * lost
+        still["correct_max"] = lost + int(rng.integers(-1, 2)) if rng.integers(2) else int(rng.integers(1 << 12))
+        still["correct_max"] = max(still["correct_max"], 0)
+        for place in range(-6, 9) if turn % 2 else range(8, -7, -1):
+            a, b = quadrature_decoder.lines(place + slip)
+            row = still | {"pin_a": a, "pin_b": b, "pin_z": int(place in (0, 1, 2))}
+            rows += [row | {"sample": int(rng.integers(60) == 0)} for _ in range(5)]
+    return rows
+
+
 _PORTS = {
     p.name: p
     for module in (edge_timer, turn_counter, index_check, quadrature_decoder, input_filter)
@@ -220,4 +239,5 @@ BLOCK = Block(
     reference=None,
     bound=None,
     stimuli=stimuli,
+    patient_stimuli=patient_stimuli,
 )
