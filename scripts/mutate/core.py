@@ -19,7 +19,7 @@ from fluxproof.cosim.stimulus import random_value
 from fluxproof.cosim.verilog import VerilogPort
 from fluxproof.golden_model import clocked
 from fluxproof.golden_model.fluxproof import OBSERVED, REGISTERS, Observed
-from fluxproof.golden_model.io import sample_latch
+from fluxproof.golden_model.io import fault_latch, offset_check, sample_latch
 from scripts.mutate.harness import Trial
 from scripts.prove.pipeline import core_ends
 
@@ -177,8 +177,19 @@ def any_settings() -> Recorder:
         if k % 3 == 0 and 0 < r.dead_time < r.min_pulse <= CARRIER_HALF:
             golden.advance(2 * CARRIER_HALF)  # the valley takes them before the sample, not while it is in flight
         golden.advance(clocked.INTERVAL + int(rng.integers(1, 80)), sample, enable=1, clear_trip=0)
-    golden.advance(4)
+    at_rest(golden, sample)
     return golden
+
+
+def at_rest(golden: Recorder, sample: Mapping[str, int]) -> None:
+    """As many samples with the gates off as the zero of the sensors takes to be found wrong, then it alone trips."""
+    alone = REGISTERS["fault_ignore"].high ^ (1 << fault_latch.OFFSET)
+    golden.registers = golden.registers._replace(omega_stall=REGISTERS["omega_stall"].high, offset_max=0)
+    golden.registers = golden.registers._replace(fault_ignore=alone, k_filter=REGISTERS["k_filter"].high)
+    golden.advance(4, enable=0, clear_trip=1)
+    for _ in range(offset_check.LAST + 4):
+        golden.advance(clocked.INTERVAL + 3, sample, enable=0, clear_trip=0)
+    golden.advance(40, enable=1)
 
 
 def config() -> dict[str, int]:
