@@ -1,4 +1,4 @@
-"""The one bench, the part that runs inside the simulator: drives a schedule and compares with ``==``."""
+"""The one bench, the part that runs inside the simulator: drives the rows of a file and compares with ``==``."""
 
 from __future__ import annotations
 
@@ -9,8 +9,7 @@ import cocotb
 from cocotb.clock import Clock as ClockDriver
 from cocotb.triggers import FallingEdge, Timer, ValueChange
 
-from fluxproof.cosim.stimulus import due, schedule
-from fluxproof.golden_model.registry import BLOCKS
+from fluxproof.cosim.bench_file import Bench, load
 
 CLOCK_NS = 10
 
@@ -25,33 +24,16 @@ def read(handle, signed: bool) -> int | str:
     return number - (1 << len(text)) if signed and text[0] == "1" and len(text) > 1 else number
 
 
-def report(block, config, seed, clock, sample, rows, wrong) -> str:
+def report(bench: Bench, clock: int, sample: int, wrong) -> str:
     """Everything needed to understand a difference, and the line that brings it back."""
-    inputs = ", ".join(f"{k}={v}" for k, v in rows.get(sample, {}).items())
+    driven = next((row.writes for row in bench.rows if row.sample == sample >= 0), {})
+    inputs = ", ".join(f"{k}={v}" for k, v in driven.items())
     got = "; ".join(f"{name}: got {a}, wanted {b}" for name, a, b in wrong)
-    index = block.configs.index(config)
     return (
-        f"{block.name} {dict(config)} differs from its model at sample {sample}, clock {clock}, seed {seed}\n"
+        f"{bench.title} differs from its model at sample {sample}, clock {clock}, seed {bench.seed}\n"
         f"  inputs: {inputs}\n  {got}\n"
-        f"  rerun:  FLUXPROOF_SEED={seed} make test ARGS='-k \"test_rtl and {block.name}-{index}\"'"
+        f"  rerun:  {bench.rerun}"
     )
-
-
-def eventful(block, clocks) -> list[int]:
-    """The clocks at which something is driven or compared; between two of them no output is due.
-
-    A block whose sample is the clock, or whose outputs must never move by themselves, is looked at in every clock.
-    """
-    if block.clocked or block.atomic:
-        return list(range(len(clocks)))
-    chosen = {0, 1, 2, 3, 4, len(clocks) - 1}
-    for number, (before, clock) in enumerate(zip(clocks, clocks[1:]), 1):
-        if clock.writes or clock.expected or (clock.rst, clock.in_valid) != (before.rst, before.in_valid):
-            chosen.add(number)
-        if clock.out_valid or clock.soon:
-            # It rises and falls at these clocks and at no other.
-            chosen |= {number - 1, number, min(number + 1, len(clocks) - 1)}
-    return sorted(chosen)
 
 
 class Silence:
@@ -81,56 +63,50 @@ class Silence:
 
 @cocotb.test()
 async def equals_model(dut):
-    block = BLOCKS[os.environ["FLUXPROOF_BLOCK"]]
-    config = block.configs[int(os.environ["FLUXPROOF_CONFIG"])]
-    seed = int(os.environ["FLUXPROOF_SEED"])
-    gc.disable()  # the schedule is large, lives as long as the run and would be searched again and again
-    clocks = schedule(block, config, seed)
-    rows = {c.sample: c.writes for c in clocks if c.sample >= 0}
-    inputs = {p.name: getattr(dut, p.name) for p in block.ports(config)}
-    outputs = [(p.name, getattr(dut, p.name), bool(p.fmt.signed)) for p in block.out_ports(config)]
+    gc.disable()  # the rows are many, live as long as the run and would be searched again and again
+    bench = load(os.environ["FLUXPROOF_BENCH"])
+    inputs = {name: getattr(dut, name) for name in bench.inputs}
+    outputs = [(name, getattr(dut, name), signed) for name, signed in bench.outputs]
+    announced = {name: getattr(dut, name) for name in bench.strobes}
 
     for handle in inputs.values():
         handle.value = 0
-    if block.strobes:
+    if bench.has_rst:
         dut.rst.value = 1
-    strobes = block.strobes and not block.clocked
-    if strobes:
+    if bench.strobes:
         dut.in_valid.value = 0
     ClockDriver(dut.clk, CLOCK_NS, unit="ns").start()
     await FallingEdge(dut.clk)
     await FallingEdge(dut.clk)
 
-    announced = ([dut.out_valid, dut.out_soon] if block.soon else [dut.out_valid]) if strobes else []
-    silence, chosen = Silence(announced), eventful(block, clocks)
-    rules = due(block, clocks)
+    silence = Silence(announced.values())
     compared, in_valid, rst, held = 0, 0, 1, None
-    for number, following in zip(chosen, [*chosen[1:], len(clocks)], strict=True):
-        clock, rule = clocks[number], rules[number]
+    following = [row.number for row in bench.rows[1:]] + [bench.clocks]
+    for row, following_number in zip(bench.rows, following, strict=True):
         wrong = [
             (name, value, wanted)
-            for name, wanted in rule.strobes.items()
-            if (value := read(getattr(dut, name), False)) != wanted
+            for name, wanted in row.strobes
+            if (value := read(announced[name], False)) != wanted
         ]
-        if not wrong and (rule.outputs or block.atomic):
+        if not wrong and (row.outputs or bench.atomic):
             seen = {name: read(handle, signed) for name, handle, signed in outputs}
-            wrong = [(name, seen[name], wanted) for name, wanted in rule.outputs if seen[name] != wanted]
-            if rule.still and seen != held:
+            wrong = [(name, seen[name], wanted) for name, wanted in row.outputs if seen[name] != wanted]
+            if row.still and seen != held:
                 wrong += [("outputs without out_valid", seen, held)]
             held = seen
         if wrong:
-            raise AssertionError(report(block, config, seed, number, rule.of_sample, rows, wrong))
-        compared += bool(clock.expected)
-        for name, value in clock.writes.items():
+            raise AssertionError(report(bench, row.number, row.of_sample, wrong))
+        compared += row.due
+        for name, value in row.writes.items():
             inputs[name].value = value
-        if clock.rst != rst and block.strobes:
-            rst = clock.rst
+        if row.rst != rst and bench.has_rst:
+            rst = row.rst
             dut.rst.value = rst
-        if strobes and clock.in_valid != in_valid:
-            in_valid = clock.in_valid
+        if bench.strobes and row.in_valid != in_valid:
+            in_valid = row.in_valid
             dut.in_valid.value = in_valid
-        if moved := await silence.keep(dut.clk, following - number):
-            wrong = [(name, "moved", f"still until clock {following}") for name in moved]
-            raise AssertionError(report(block, config, seed, number, clock.sample, rows, wrong))
-    cocotb.log.info("%d samples compared in %d clocks", compared, len(clocks))
+        if moved := await silence.keep(dut.clk, following_number - row.number):
+            wrong = [(name, "moved", f"still until clock {following_number}") for name in moved]
+            raise AssertionError(report(bench, row.number, row.sample, wrong))
+    cocotb.log.info("%d samples compared in %d clocks", compared, bench.clocks)
     assert compared > 100, "the schedule compared next to nothing"

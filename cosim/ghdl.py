@@ -102,10 +102,10 @@ def run(
         test_args=["--std=08", f"--workdir={built}"],
         plusargs=["--ieee-asserts=disable"],
         extra_env={
-            **environment,
             "PYTHONPATH": f"{ROOT}{os.pathsep}{os.environ.get('PYTHONPATH', '')}",
             # Else pytest recompiles all that is imported (numba, scipy) to explain asserts: seconds in every run.
             "COCOTB_REWRITE_ASSERTION_FILES": "dut_*.py",
+            **environment,
         },
         log_file=_log(folder, "test.log"),
         results_xml=str(folder / "results.xml"),

@@ -1,50 +1,54 @@
-"""What the one bench feeds a block: a schedule of clocks, made from the block's declaration and a seed.
+"""What the one bench feeds a block: samples, made from the block's declaration and a seed.
 
-Every registered block gets the same treatment: all corner combinations of its ports (sampled where there
-are too many), its own hard cases, seeded random values; samples back to back and with gaps; inputs that
-are noise before and after the contract wants them; resets in mid-stream, with samples in flight.
+Every registered block gets the same treatment: all corner combinations of its ports (sampled where there are too
+many), its own hard cases, the same with something changed, values beside one another and beside what the block holds,
+random values.  What is drawn may depend on the state before the sample: whoever plays the samples sends it.
 """
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Generator, Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from fluxproof.golden_model.block import Block, Port
 
-CORNERS_AT_MOST = 1500
-RANDOM_SAMPLES = 1200
-NEAR_SAMPLES = 400
-CLOCKED_RANDOM = 6000  # clocks
 BURST = 40  # samples between two changes of the registers
-SETTLED = 2  # strobes are compared after this clock
+SHORTEST = 10  # rows of a block's own hard cases that are played again
+SAMPLES, CLOCKS = 300, 2000  # the same at most
+FEW = 100  # varied samples at least
+OFTEN, SELDOM, NEVER = 60, 250, 0  # samples from one reset to the next
 
 
-@dataclass
-class Due:
-    """What a bench compares before a clock's rising edge; the inputs are still those of the clock before."""
+@dataclass(frozen=True)
+class Length:
+    """How much of what is drawn at random; a block's own hard cases always come in full."""
 
-    strobes: dict[str, int] = field(default_factory=dict)  # out_valid, out_soon
-    outputs: list[tuple[str, int]] = field(default_factory=list)
-    still: bool = False  # every output is as it was before the edge of the clock before
-    of_sample: int = -1
+    corners: int  # combinations of corner values at most
+    near: int  # samples beside one another
+    varied: int  # clocks of the block's own hard cases with something changed
+    random: int  # samples
+    clocked: int  # random clocks of a block whose sample is the clock
+    patient: bool  # whether the cases come too that take long, such as a wide counter at its end
 
 
-@dataclass
-class Clock:
-    """One clock: what is driven before its rising edge, and what must be seen before the next one."""
+SHORT = Length(500, 200, 1000, 300, 1000, False)  # GHDL, some ten thousand clocks a second
+MEDIUM = Length(1500, 400, 2000, 1200, 0, False)  # the model against floating point, both in Python
+LONG = Length(1500, 500, 30000, 1500, 10000, True)  # Verilator
 
-    writes: dict[str, int]
-    in_valid: int = 0
-    rst: int = 0
-    sample: int = -1  # index of the sample that enters here
-    out_valid: int = 0
-    of_sample: int = -1  # index of the sample whose outputs are due here
-    expected: dict[str, int] = field(default_factory=dict)
-    soon: dict[str, int] = field(default_factory=dict)  # outputs due with out_soon
+
+class Sample(NamedTuple):
+    """One sample and the distance of resets around it."""
+
+    row: dict[str, int]
+    resets: int = OFTEN  # one in so many samples; NEVER: none
+
+
+# Yields samples and is sent the state before the next one; None where nobody knows it.
+Samples = Generator[Sample, object, None]
 
 
 def corner_values(port: Port) -> list[int]:
@@ -63,197 +67,189 @@ def random_value(rng: np.random.Generator, port: Port) -> int:
     return min(max(value, port.low), port.high)
 
 
-def near(rng: np.random.Generator, ports: tuple[Port, ...], row: dict[str, int]) -> dict[str, int]:
-    """The row with one number beside another one, where a comparison changes or a difference is small.
+def values_of(state) -> list[int]:
+    """Every number in a state, which may hold other states."""
+    if state is None:
+        return []
+    if isinstance(state, tuple):
+        return [value for part in state for value in values_of(part)]
+    return [int(state)]
 
-    It becomes another port's value, of the same weight, or a power of two, with either sign, or stays; then it moves by
-    at most one LSB, or a single bit of it is inverted.
+
+def near(rng: np.random.Generator, ports: tuple[Port, ...], row: dict[str, int], state=None, of=None) -> dict[str, int]:
+    """The row with one number (the port ``of``, or any) beside another, where a comparison changes or little is left.
+
+    It becomes another port's value, of the same weight, one of ``state``, or a power of two, with either sign, or
+    stays; then it moves by at most one LSB, or a single bit of it is inverted.
     """
     words = [p for p in ports if not p.is_bit]
     if not words:
         return row
     port, other = (words[int(rng.integers(len(words)))] for _ in range(2))
-    value = row[port.name]
-    kind = rng.integers(4)
+    port = of or port
+    value, inside = row[port.name], values_of(state)
+    kind = rng.integers(4) if not inside else rng.integers(8)
+    shift = port.fmt.frac_bits - other.fmt.frac_bits
     if kind == 0:
-        shift = port.fmt.frac_bits - other.fmt.frac_bits
         value = row[other.name] << shift if shift >= 0 else row[other.name] >> -shift
     elif kind == 1:
         value = 1 << int(rng.integers(port.fmt.width))
-    if kind < 2 and rng.integers(2):
+    elif kind > 3:  # a number inside has no format here: as it is, or with another port's weight
+        value = inside[int(rng.integers(len(inside)))] >> (abs(shift) if kind == 4 else 0)
+    if kind in (0, 1, 4, 5) and rng.integers(2):
         value = -value
-    if kind == 2:
+    if kind == 2 or (kind > 3 and rng.integers(4) == 0):
         value ^= 1 << int(rng.integers(port.fmt.width))
     else:
         value += int(rng.integers(-1, 2))
     return row | {port.name: min(max(value, port.low), port.high)}
 
 
-def corners(ports: tuple[Port, ...], rng: np.random.Generator) -> Iterator[dict[str, int]]:
+def corners(ports: tuple[Port, ...], rng: np.random.Generator, most: int) -> Iterator[dict[str, int]]:
     """Every combination of corner values; of both ends only, or a sample, where there are too many."""
     for choose in (corner_values, lambda p: sorted({p.low, p.high})):
         choices = [choose(p) for p in ports]
-        if np.prod([float(len(c)) for c in choices]) <= CORNERS_AT_MOST:
+        if np.prod([float(len(c)) for c in choices]) <= most:
             break
     else:
-        for _ in range(CORNERS_AT_MOST):
+        for _ in range(most):
             yield {p.name: int(rng.choice(corner_values(p))) for p in ports}
         return
     for values in itertools.product(*choices):
         yield dict(zip((p.name for p in ports), values, strict=True))
 
 
-def samples(block: Block, config: dict[str, int], seed: int) -> list[dict[str, int]]:
-    """All samples, in order: corners, the block's own hard cases, random ones."""
+def samples(block: Block, config: dict[str, int], seed: int, length: Length = LONG) -> Samples:
+    """All samples, in order, each within the ranges of its ports.  Raises ValueError for an own case that is not."""
     rng = np.random.default_rng(seed)
     ports = block.ports(config)
-    rows = list(corners(ports, rng))
-    if block.stimuli is not None:
-        rows += [{**{p.name: 0 for p in ports}, **row} for row in block.stimuli(rng, config)]
-    rows += _beside(block, ports, rng)
-    registers = {p.name: 0 for p in block.registers}
-    for k in range(RANDOM_SAMPLES):
-        row = {p.name: random_value(rng, p) for p in ports}
-        if k % BURST == 0:
-            registers = {p.name: row[p.name] for p in block.registers}
-        rows.append(row | registers)
-    if block.possible is not None:
-        rows = [block.possible(row, config) for row in rows]
-    for row in rows:
+    draw = _clocked(block, config, rng, length) if block.clocked else _strobed(block, config, rng, length)
+    sample = next(draw, None)
+    while sample is not None:
+        row = block.possible(sample.row, config) if block.possible else sample.row
         for p in ports:
             if not p.low <= row[p.name] <= p.high:
                 raise ValueError(f"stimulus of {block.name}: {p.name}={row[p.name]} is outside its range")
-    return rows
+        state = yield Sample(row, sample.resets)
+        try:
+            sample = draw.send(state)
+        except StopIteration:
+            return
 
 
-def _beside(block: Block, ports: tuple[Port, ...], rng: np.random.Generator) -> list[dict[str, int]]:
-    """Rows that differ little from the one before, and ports that differ little from one another."""
-    rows, row = [], {}
-    for k in range(NEAR_SAMPLES):
+def _own(block: Block, config: dict[str, int], rng, length: Length) -> tuple[list[dict[str, int]], list]:
+    """The block's own hard cases, and those for who has patience; a port that they leave out is 0.
+
+    The patient see the own ones twice, without a reset too: a counter gets to its end in no other way.
+    """
+    still = {p.name: 0 for p in block.ports(config)}
+    own = block.stimuli(rng, config) if block.stimuli else []
+    patient = block.patient_stimuli(rng, config) if block.patient_stimuli and length.patient else []
+    patient = own + patient if length.patient else []
+    return [still | row for row in own], [still | row for row in patient]
+
+
+def _strobed(block: Block, config: dict[str, int], rng, length: Length) -> Samples:
+    """For a block that gets a sample now and then."""
+    ports = block.ports(config)
+    own, patient = _own(block, config, rng, length)
+    for row in corners(ports, rng, length.corners):
+        yield Sample(row)
+    for row in own:
+        yield Sample(row, SELDOM)
+    for row in patient:
+        yield Sample(row, NEVER)
+    row, state = {}, None
+    for k in range(length.near):  # differs little from the one before
         if k % 4 == 0:
             row = {p.name: random_value(rng, p) for p in ports}
-        row = near(rng, ports, row)
-        rows.append(row)
-    return rows
+        row = near(rng, ports, row, state)
+        state = yield Sample(row)
+    yield from _varied(ports, own, rng, max(FEW, length.varied // block.interval), SAMPLES)
+    registers = {p.name: 0 for p in block.registers}
+    for k in range(length.random):
+        row = {p.name: random_value(rng, p) for p in ports}
+        if k % BURST == 0:
+            registers = {p.name: row[p.name] for p in block.registers}
+        yield Sample(row | registers)
 
 
-def schedule(block: Block, config: dict[str, int], seed: int) -> list[Clock]:
-    """Clock by clock, with what the model says must come out and when."""
-    if block.clocked:
-        return _clocked_schedule(block, config, seed)
-    rng = np.random.default_rng(seed + 1)
-    noise_ports = tuple(p for p in block.ports(config) if p.name in {q.name for q in block.inputs})
-    clocks: list[Clock] = [Clock({}, rst=1), Clock({}, rst=1)]
-    state, registers, last, resets = block.state, None, -(10**9), 0
-
-    def pad_to(index: int) -> None:
-        """Idle clocks; the inputs become noise once the last sample no longer needs them."""
-        while len(clocks) < index:
-            writes = {}
-            if len(clocks) == last + block.interval:
-                writes = {p.name: random_value(rng, p) for p in noise_ports}
-            clocks.append(Clock(writes))
-
-    due: list[tuple[int, int, dict[str, int]]] = []
-    soon: list[tuple[int, int, dict[str, int]]] = []
-    late = [p for p in noise_ports if p.late]
-    arrivals: list[tuple[int, Port, int, int]] = []
-    for index, row in enumerate(samples(block, config, seed)):
-        wanted_registers = {p.name: row[p.name] for p in block.registers}
-        start = max(len(clocks), last + block.interval)
-        if wanted_registers != registers:
-            start = max(start, last + block.latency + 1)
-        elif rng.integers(4) == 0:
-            start += int(rng.integers(1, 2 * block.latency))
-        if index and block.strobes and rng.integers(60) == 0:
-            # A reset somewhere behind the last sample, in each clock in turn: what is in flight must never come out.
-            pad_to(max(len(clocks), last + 1 + resets % (block.latency + 1)))
-            resets += 1
-            # Half the time with a sample on the same edge, which must be lost.
-            clocks.append(Clock(dict(row), in_valid=int(rng.integers(2)), rst=1))
-            registers = wanted_registers
-            due = [d for d in due if d[0] < len(clocks)]
-            soon = [d for d in soon if d[0] < len(clocks)]
-            state = block.state
-        pad_to(max(len(clocks), start))
-        last = len(clocks)
-        clocks.append(Clock(dict(row), in_valid=1, sample=index))
-        registers = wanted_registers
-        state, outputs = block.run(state, row, config)
-        due.append((last + block.latency, index, outputs))
-        if block.soon:
-            soon.append((last + block.latency - block.ahead, index, {name: outputs[name] for name in block.soon}))
-        arrivals += [(last, p, row[p.name], random_value(rng, p)) for p in late]
-    pad_to(len(clocks) + 2 * block.latency + 2)
-    for start, port, value, noise in arrivals:
-        clocks[start].writes[port.name] = noise
-        clocks[start + port.late].writes[port.name] = value
-    for when, index, outputs in soon:
-        clocks[when].of_sample, clocks[when].soon = index, outputs
-    for when, index, outputs in due:
-        clocks[when].out_valid, clocks[when].of_sample, clocks[when].expected = 1, index, outputs
-    return clocks
-
-
-def due(block: Block, clocks: list[Clock]) -> list[Due]:
-    """The one rule of what is compared when, for every bench: an entry for each clock of the schedule.
-
-    Strobes are compared from the fourth clock on, in every one of them: the reset has two clocks to work.
-    """
-    strobes = block.strobes and not block.clocked
-    entries = []
-    for number, clock in enumerate(clocks):
-        entry = Due(of_sample=clock.of_sample)
-        if strobes and number > SETTLED:
-            entry.strobes["out_valid"] = clock.out_valid
-            if block.soon:
-                entry.strobes["out_soon"] = int(bool(clock.soon))
-                entry.outputs += clock.soon.items()
-        # Before the first clock nothing was seen, and a reset may leave anything behind.
-        entry.still = block.atomic and not clock.out_valid and number > 0 and not clocks[number - 1].rst
-        for name, value in clock.expected.items():
-            if clock.expected.get(block.shown_with.get(name), 1):
-                entry.outputs.append((name, value))
-        entries.append(entry)
-    return entries
-
-
-def _clocked_schedule(block: Block, config: dict[str, int], seed: int) -> list[Clock]:
-    """For a block whose sample is the clock: its own hard cases, then random ones, with resets.
-
-    Outputs are due before the edge that follows the sample's; in reset they are zero but for ``after_reset``.
-    """
-    rng = np.random.default_rng(seed)
-    rows = block.stimuli(rng, config) + _held_random(block, config, rng, CLOCKED_RANDOM)
-    clocks, state = [Clock({}, rst=1), Clock({}, rst=1)], block.state
-    at_rest = {p.name: 0 for p in block.outputs} | dict(block.after_reset)
-    outputs, of_sample = at_rest, -1
-    for index, row in enumerate(rows):
-        reset = int(rng.integers(700) == 0)
-        clocks.append(Clock(dict(row), rst=reset, sample=index, of_sample=of_sample, expected=outputs))
-        if reset:
-            state, outputs = block.state, at_rest
-        else:
-            state, outputs = block.run(state, row, config)
-        of_sample = index
-    clocks.append(Clock({}, of_sample=of_sample, expected=outputs))
-    return clocks
-
-
-def _held_random(block: Block, config: dict[str, int], rng, count: int) -> list[dict[str, int]]:
-    """Random values, each held for a random while, flags mostly at rest, so that something can happen."""
+def _clocked(block: Block, config: dict[str, int], rng, length: Length) -> Samples:
+    """For a block whose sample is the clock."""
     ports = block.ports(config)
-    names = {p.name for p in ports}
-    rows: list[dict[str, int]] = []
+    own, patient = _own(block, config, rng, length)
+    for row in own:
+        yield Sample(row, 3 * SELDOM)
+    for row in patient:
+        yield Sample(row, NEVER)
+    yield from _varied(ports, patient or own, rng, length.varied, CLOCKS)
+    yield from _held(ports, rng, length.clocked)
+
+
+def _varied(
+    ports: tuple[Port, ...], own: list[dict[str, int]], rng: np.random.Generator, count: int, longest: int
+) -> Samples:
+    """Stretches of a block's own hard cases with something changed: what it expects goes on, but not quite so.
+
+    Now and then a row is beside the block's state, comes twice, or is left out.
+    """
+    state, done = None, 0
+    while own and done < count:
+        size = int(SHORTEST * (longest / SHORTEST) ** rng.random())
+        begin = int(rng.integers(max(1, len(own) - size // 2)))
+        held, inverted = _change(ports, own[begin], rng, state)
+        changes = int(rng.choice([10, 40, 10**9]))  # one row in so many
+        for row in own[begin : begin + size]:
+            row = row | held
+            row |= {p.name: min(max(row[p.name] ^ bit, p.low), p.high) for p, bit in inverted}
+            change = int(rng.integers(3)) if rng.integers(changes) == 0 else -1
+            if change == 0:
+                row = near(rng, ports, row, state)
+            for _ in range((1, 2, 0)[max(change, 0)]):
+                state = yield Sample(row, 3 * SELDOM)
+                done += 1
+
+
+def _change(ports: tuple[Port, ...], row: dict[str, int], rng, state) -> tuple[dict[str, int], list[tuple[Port, int]]]:
+    """(values that some ports keep, bits that are inverted in others) for a stretch that begins with ``row``.
+
+    One time in three the inverted bits have the same weight in several ports: numbers that were beside one another, a
+    limit and what is compared with it, are so still, somewhere else.
+    """
+    if rng.integers(3) == 0:
+        of = ports[int(rng.integers(len(ports)))]
+        weight = int(rng.integers(of.fmt.width)) - of.fmt.frac_bits
+        places = [(p, weight + p.fmt.frac_bits) for p in ports if not p.is_bit and rng.integers(4)]
+        return {}, [(p, 1 << place) for p, place in places if 0 <= place < p.fmt.width - bool(p.fmt.signed)]
+    held, inverted = {}, []
+    for number in rng.choice(len(ports), min(int(rng.integers(1, 4)), len(ports)), replace=False):
+        port = ports[number]
+        if rng.integers(4) == 0:
+            inverted.append((port, 1 << int(rng.integers(port.fmt.width))))
+        elif rng.integers(2) == 0:
+            held[port.name] = random_value(rng, port)
+        else:
+            held[port.name] = near(rng, ports, row, state, port)[port.name]
+    return held, inverted
+
+
+def _held(ports: tuple[Port, ...], rng: np.random.Generator, count: int) -> Samples:
+    """Random values, each held for a random while of its own; flags mostly at rest, so that something happens."""
     calm = {"enable": 1, "trip": 0}
-    row = {p.name: random_value(rng, p) for p in ports} | calm
-    for _ in range(count):
-        if rng.integers(30) == 0:
-            port = ports[int(rng.integers(len(ports)))]
-            row = {**row, port.name: random_value(rng, port)} if rng.integers(3) else near(rng, ports, row)
+    row, state = {p.name: random_value(rng, p) for p in ports} | calm, None
+    names = {p.name for p in ports}
+    pace = {}
+    for k in range(count):
+        if k % 500 == 0:  # clocks from change to change, and how often a flag is up then
+            pace = {p.name: (float(rng.choice([2, 8, 60, 1000])), float(rng.choice([0.03, 0.5, 0.97]))) for p in ports}
+        for p in ports:
+            if rng.random() * pace[p.name][0] < 1:
+                if p.is_bit:
+                    row = row | {p.name: int(rng.random() < pace[p.name][1])}
+                else:
+                    row = row | {p.name: random_value(rng, p)} if rng.integers(3) else near(rng, ports, row, state, p)
         if rng.integers(40) == 0:
             row = {**row, **calm}
             if "dead_time" in row:
                 row = {**row, "dead_time": int(rng.integers(1, 9)), "min_pulse": 10}
-        rows.append({name: value for name, value in row.items() if name in names})
-    return rows
+        state = yield Sample({name: value for name, value in row.items() if name in names}, 3 * SELDOM)

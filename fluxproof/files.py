@@ -9,9 +9,14 @@ from pathlib import Path
 
 def write_text(path: Path, text: str) -> Path:
     """Write ``text`` to ``path`` in one step; makes the folder."""
+    return write_bytes(path, text.encode())
+
+
+def write_bytes(path: Path, data: bytes) -> Path:
+    """Write ``data`` to ``path`` in one step; makes the folder."""
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(f".{path.name}.{os.getpid()}")
-    temporary.write_text(text)
+    temporary.write_bytes(data)
     os.replace(temporary, path)
     return path
 

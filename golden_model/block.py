@@ -97,7 +97,9 @@ class Block:
     constants: Mapping[str, int | Const] = field(default_factory=dict)
     roms: Mapping[str, tuple[Format, list[int]]] = field(default_factory=dict)
     configs: tuple[Mapping[str, int], ...] = ({},)  # generics to verify with
+    too_wide: tuple[int, ...] = ()  # numbers of configs with counters that no bench can fill: no mutants of these
     stimuli: Callable | None = None  # (rng, config) -> list of {port: value}: corner cases of the block
+    patient_stimuli: Callable | None = None  # the same, cases that take too long for GHDL: a wide counter at its end
     possible: Callable | None = None  # ({port: value}, config) -> the nearest values that can occur
     width_from: Mapping[str, Callable] = field(default_factory=dict)  # port -> config -> Format
     generated: bool = False  # the VHDL is written by `make generate`

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from fluxproof.golden_model import fluxproof
 from fluxproof.golden_model.io import fault_latch, host_watch, sample_guard
+from fluxproof.golden_model.io.sample_guard import AGE_W
 from fluxproof.golden_model.kernel import kernel
 from fluxproof.golden_model.modulation import gate_generation
 
@@ -76,7 +77,7 @@ def step(state, inputs, regs, carrier_half):
     """One clock: (next state, whether a sample has entered at it, Seen)."""
     s, x, r = state, inputs, regs
     guard_state, (sample_busy, sample_early, sample_late, early_samples) = sample_guard.step(
-        s.of_sample_guard, x.sample_valid, x.clear_trip, r.watchdog, INTERVAL
+        s.of_sample_guard, x.sample_valid, x.clear_trip, r.watchdog, INTERVAL, AGE_W
     )
     entered = 1 if x.sample_valid and not s.sample_busy else 0
 

@@ -20,22 +20,12 @@ compensation fades in from omega_min to half of that, because below it delta_lam
 Sampling: currents and position are taken delay_s after the valley, the voltage acts at a fixed time after it, so the
 angles from the sample to the voltage (k_delay, k_ahead) shrink by omega_me*delay_s; nothing else changes, see
 docs/board.md.
-
-Protection: the default limits lie outside the range of a healthy drive: overcurrent at twice the current limit, the
-sum of the currents at a fifth of the rated current, the bus at a tenth and 1.3 times its nominal value, no sample for
-1.5 periods, 1.2 times the rated speed, a tenth of it against the reference for 20 ms without braking, a sensor that
-shows 1 % of the rated current at rest. A stall and an open load are reported and do not trip: the current is within
-its limit. The position may deviate from its linear extrapolation by 5e-4 turn plus four codes, or four counts of an
-incremental encoder: no shaft accelerates that much within a sample, and a frozen code is detected from that rotation
-per sample on.
 """
 
 import math
-from typing import NamedTuple
 
-from fluxproof.golden_model.formats import LIMIT
-from fluxproof.golden_model.io.fault_latch import NAMES
-from fluxproof.golden_model.io.offset_check import OFFSET
+from fluxproof.golden_model.protection_limits import protection
+from fluxproof.golden_model.scale_entry import Entry, base_keys
 from fluxproof.golden_model.units import TURN_RAD
 
 INTEGRAL_CORNER = 5.0  # speed crossover over the corner of the speed regulator's integral
@@ -49,36 +39,7 @@ AHEAD_SAMPLES = 2.5  # from a sample to the middle of the next sample's voltage
 THRESHOLD_OF_BASE = 2e-5  # of the voltage base: five of the format's steps
 LOSS_MARGIN, LOSS_SPARE_V = (3.0, 3.0)  # largest compensation: factor on the leg loss by data sheet, device drops
 PSI_STEP, PSI_FROM = (0.01, 0.1)  # 2*eta*omega**2 at rated speed; part of rated speed from which psi_m is estimated
-TRIP_OF_LIMIT, TRIP_OF_RANGE = 2.0, 0.98  # overcurrent: of the current limit, at most of the sensors' range
-SUM_OF_RATED = 0.2  # of the rated current: a larger sum of the phase currents is a sensor fault
-BUS_LOW, BUS_HIGH = 0.1, 1.3  # of the nominal bus voltage
-OVERSPEED, AWAY, STANDS = 1.2, 0.1, 0.01  # of the rated speed: trips; looked for a runaway; the shaft stands below
-OPEN_OF_RATED, OFFSET_OF_RATED = 0.02, 0.01  # of the rated current: of a connected phase; of a sensor at rest
-BRAKE_HYSTERESIS = 0.97  # of the voltage that switches the brake resistor on: off below
-JUMP_CODES, JUMP_TURN = 4, 5e-4  # of the position, per sample: quantisation of the code, and noise of the sensor
-ALWAYS_REPORTED = ("trip", "early")  # the pin always trips, a rejected sample never does
 ROUND_UP = ("dead_time", "min_pulse")  # times that must not be shorter than specified
-
-
-class Entry(NamedTuple):
-    """The value for one register: SI value, unit, SI value of 1.0 in its format, keys it is derived from."""
-
-    name: str
-    si: float
-    unit: str
-    scale: float
-    keys: str
-
-
-def base_keys(drive, *names):
-    """The keys that determine the bases: those of [bases], or the defaults of bases that are not given."""
-    origin = {
-        "current_a": "[sensors] current_range_a",
-        "voltage_v": "[sensors] u_dc_range_v",
-        "omega_me_rad_s": "[machine] pole_pairs, rated_speed_rad_s",
-    }
-    given = {name: f"[bases] {name}" for name in names if getattr(drive.base_choice, name) is not None}
-    return "; ".join({**origin, **given}[name] for name in names)
 
 
 def sensing(drive):
@@ -287,82 +248,6 @@ def gates(drive):
         keys = f"[inverter] {name}_s; [core] clock_hz"
         yield Entry(name, getattr(drive.inverter, f"{name}_s"), "s", 1.0 / drive.core.clock_hz, keys)
     yield Entry("double_update", drive.core.updates_per_period - 1, "1", 1.0, "[core] updates_per_period")
-
-
-def protection(drive):
-    """Trip levels and ignored faults: see golden_model/io."""
-    p, s, b, m = drive.protection, drive.sensors, drive.bases, drive.machine
-    amperes, volts = base_keys(drive, "current_a"), base_keys(drive, "voltage_v")
-    limit, bus = drive.current_limit_a, drive.inverter.dc_bus_v
-    keys = "[machine] rated_current_a" if drive.control.current_limit_a is None else "[control] current_limit_a"
-    most = max(limit, min(TRIP_OF_LIMIT * limit, TRIP_OF_RANGE * s.current_range_a))
-    yield _limit("i_trip", p.current_trip_a, most, "A", b.current_a, "current_trip_a", keys, amperes)
-    keys, most = "[machine] rated_current_a", SUM_OF_RATED * m.rated_current_a
-    yield _limit("sum_trip", p.current_sum_trip_a, most, "A", b.current_a, "current_sum_trip_a", keys, amperes)
-    yield Entry("rail_samples", p.rail_samples, "1", 1.0, "[protection] rail_samples")
-    keys = "[inverter] dc_bus_v"
-    yield _limit("u_dc_min", p.u_dc_min_v, BUS_LOW * bus, "V", b.voltage_v, "u_dc_min_v", keys, volts)
-    most = max(bus, min(BUS_HIGH * bus, TRIP_OF_RANGE * s.u_dc_range_v))
-    yield _limit("u_dc_max", p.u_dc_max_v, most, "V", b.voltage_v, "u_dc_max_v", keys, volts)
-    finest, keys = 2.0**s.position_bits, "[sensors] position_bits"
-    if drive.encoder.counts is not None:
-        finest, keys = float(drive.encoder.counts), "[encoder] counts"
-    jump = JUMP_CODES / finest + JUMP_TURN
-    if p.position_jump_rad is not None:
-        jump, keys = p.position_jump_rad / TURN_RAD, "[protection] position_jump_rad"
-    yield Entry("jump_max", jump, "turn", 1.0, keys)
-    trips = [name in ALWAYS_REPORTED or getattr(p, f"trip_{name}") for name in NAMES]
-    ignored = sum((not trip) << bit for bit, trip in enumerate(trips))
-    yield Entry("fault_ignore", ignored, "1", 1.0, "[protection] trip_...")
-    keys = "[protection] watchdog_periods; [inverter] pwm_frequency_hz; [core] clock_hz"
-    yield Entry("watchdog", p.watchdog_periods * drive.sample_time_s, "s", 1.0 / drive.core.clock_hz, keys)
-    yield from motion_limits(drive)
-    yield from brake_limits(drive)
-
-
-def motion_limits(drive):
-    """Overspeed, runaway, stall, open load, zero of the current sensors, heartbeat of the host."""
-    p, b, m, t_s = drive.protection, drive.bases, drive.machine, drive.sample_time_s
-    pairs, rated = m.pole_pairs, m.rated_speed_rad_s
-    speed, amperes = base_keys(drive, "omega_me_rad_s"), base_keys(drive, "current_a")
-    for name, key, part in (
-        ("omega_trip", "overspeed_rad_s", OVERSPEED),
-        ("omega_away", "runaway_rad_s", AWAY),
-        ("omega_stall", "standstill_rad_s", STANDS),
-    ):
-        given = getattr(p, key)
-        given = None if given is None else pairs * given
-        keys = "[machine] pole_pairs, rated_speed_rad_s"
-        yield _limit(name, given, part * rated * pairs, "rad/s", b.omega_me_rad_s, key, keys, speed)
-    sample = "[inverter] pwm_frequency_hz"
-    yield Entry("runaway_samples", p.runaway_s, "s", t_s, f"[protection] runaway_s; {sample}")
-    yield Entry("stall_samples", p.stall_s, "s", t_s, f"[protection] stall_s; {sample}")
-    keys = "[machine] rated_current_a"
-    least = OPEN_OF_RATED * m.rated_current_a
-    yield _limit("i_open", p.open_load_a, least, "A", b.current_a, "open_load_a", keys, amperes)
-    most, key = p.current_offset_a, "[protection] current_offset_a"
-    if most is None:
-        step = OFFSET.lsb * b.current_a
-        most, key = min(max(OFFSET_OF_RATED * m.rated_current_a, step), OFFSET.hi * step), keys
-    yield Entry("offset_max", most, "A", b.current_a, f"{key}; {amperes}")
-    yield Entry("heartbeat", p.heartbeat_s, "s", t_s, f"[protection] heartbeat_s; {sample}")
-
-
-def brake_limits(drive):
-    """Bus voltages that switch the brake resistor; zero without one."""
-    p, b, volts = drive.protection, drive.bases, base_keys(drive, "voltage_v")
-    on, off = p.brake_on_v or 0.0, p.brake_off_v
-    off, key = (BRAKE_HYSTERESIS * on, "brake_on_v") if off is None else (off, "brake_off_v")
-    yield Entry("brake_on", on, "V", b.voltage_v, f"[protection] brake_on_v; {volts}")
-    yield Entry("brake_off", off, "V", b.voltage_v, f"[protection] {key}; {volts}")
-
-
-def _limit(name, given, default, unit, base, key, default_keys, base_names):
-    """A limit in 1/256 of its base, as given, or the default clipped to the range of the format."""
-    if given is not None:
-        return Entry(name, given, unit, base, f"[protection] {key}; {base_names}")
-    default = min(max(default, LIMIT.lsb * base), LIMIT.hi * LIMIT.lsb * base)
-    return Entry(name, default, unit, base, f"{default_keys}; {base_names}")
 
 
 PARTS = (sensing, speed_loop, current_loop, flux_estimator, vsi_estimators, gates, protection)

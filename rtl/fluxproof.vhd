@@ -85,8 +85,7 @@ architecture rtl of fluxproof is
   signal u_pi_d, u_pi_q                         : signed(PU_W - 1 downto 0);
   signal model_d, model_q                       : signed(FLUX_MODELS_MODEL_FLUX_W - 1 downto 0);
   signal merged_d, merged_q                     : signed(FLUX_MODELS_MERGED_FLUX_W - 1 downto 0);
-  signal merged, ended                          : std_logic;
-  signal estimate_limited                       : std_logic;
+  signal merged, ended, estimate_limited        : std_logic;
 
   -- From the estimators to the control
   signal flux_mode              : unsigned(1 downto 0);
@@ -99,7 +98,6 @@ architecture rtl of fluxproof is
   signal o : observed_t;
   signal e : estimated_t;
 begin
-
   -- Raw sample
 
   sample_entered <= sample_valid and not guard_busy;
@@ -420,8 +418,7 @@ begin
               u_dc_at_rail => o.u_dc_at_rail, code_theta => code_theta, theta_me => o.theta_me, omega_me => o.omega_me,
               omega_ref => omega_ref, speed_mode => speed_mode, i_q_ref => o.i_q_ref, speed_limited => o.speed_limited,
               run => run, trip => trip, enable => enable, clear_trip => clear_trip, host_write => host_write,
-              period => period,
-              settings => settings,
+              period => period, settings => settings,
               sample_busy => guard_busy, early_samples => early_samples, sample_faults => o.sample_faults,
               sample_trip => o.sample_trip, motion_faults => o.motion_faults, open_load => o.open_load,
               current_offset => o.current_offset, brake_asked => o.brake_asked, fault_flags => fault_flags,

@@ -20,8 +20,9 @@ SMALL = Subject("position", 2)
 
 @pytest.fixture(autouse=True)
 def own_folder(monkeypatch, tmp_path):
-    """A folder of its own, because a `make mutate` may run at the same time."""
+    """A folder of its own, because a `make mutate` may run at the same time; a number that shows every outcome."""
     monkeypatch.setattr("scripts.mutate.subject.FOLDER", tmp_path)
+    monkeypatch.setattr("scripts.mutate.subject.LEAST_OF_CONFIG", 16)  # whatever a whole run draws of a configuration
 
 
 @pytest.fixture

@@ -148,6 +148,19 @@ def stimuli(rng, config):
     return rows
 
 
+def patient_stimuli(_rng, _config):
+    """Both times of convst as long as each of their bits makes them, or one clock less or more."""
+    rows = []
+    for bit in range(6, CLOCKS.width):
+        for name, busy in (("wait_clocks", 0), ("busy_timeout", 1)):
+            times = {"wait_clocks": 5, "busy_timeout": CLOCKS.hi, name: (1 << bit) + bit % 3 - 1}
+            row = settings(**times, use_convst=1)
+            row |= {"sample_trigger": 0, "busy": busy, "words_complete": 0}
+            rows += [row | {"sample_trigger": 1}] + [row] * ((1 << bit) + 20)
+            rows += [row | {"busy": 0}] * 40 + [row | {"busy": 0, "words_complete": 1}] * 900
+    return rows
+
+
 BLOCK = Block(
     name="spi_frame",
     folder="converters",
@@ -195,4 +208,5 @@ BLOCK = Block(
     reference=None,
     bound=None,
     stimuli=stimuli,
+    patient_stimuli=patient_stimuli,
 )

@@ -9,8 +9,8 @@ An edge after a reversal is the edge passed before, so it moves the shaft by no 
 has no speed.  The first edge after a reset is where counting begins.
 
 ``k_edge`` = 2*pi * pole_pairs * clock_hz / (counts * omega_base); see ``setting``.  ``reverse`` inverts the sense.
-Formats: k_edge U(16,16), counts 16 bits and clocks 24 bits, both saturating, output PU.  A time beyond 24 bits is
-standstill.  Rounding: the size to nearest, halves away from zero; it saturates at 2 per unit.
+Formats: k_edge U(16,16), counts MOVED_W (16) bits and clocks TIME_W (24) bits, both saturating, output PU.  A time
+beyond TIME_W bits is standstill.  Rounding: the size to nearest, halves away from zero; it saturates at 2 per unit.
 A sample takes ``TAKES`` clocks from ``sample`` to ``omega_valid``, one bit of the product or the quotient a clock; a
 ``sample`` before that is ignored and its edges belong to the next.
 """
@@ -25,21 +25,16 @@ from fluxproof.golden_model.kernel import kernel
 
 K_EDGE = Format(0, 16, 16)
 TIME_W, MOVED_W, QUOTIENT_W = 24, 16, 19
-TIME_MAX = (1 << TIME_W) - 1
-MOVED_MAX = (1 << MOVED_W) - 1
+EVER = (1 << TIME_W) - 1  # a reset leaves the longest time there is
 OMEGA_MAX = PU.hi
-# Clocks of the engine: the product, a check for overflow, the quotient, its limit, the result
-DIVIDE_AT = MOVED_W + 1
-LIMIT_AT = DIVIDE_AT + QUOTIENT_W + 1
-LAST = LIMIT_AT + 1
-TAKES = LAST + 1
+TAKES = MOVED_W + QUOTIENT_W + 4  # with MOVED_W as it is by default
 
 
 class State(NamedTuple):
     seen: int = 0
     forward: int = 0  # direction of the last edge
-    elapsed: int = TIME_MAX  # clocks since the edge that the next speed starts from
-    since: int = TIME_MAX  # clocks since the last edge
+    elapsed: int = EVER  # clocks since the edge that the next speed starts from
+    since: int = EVER  # clocks since the last edge
     edges: int = 0  # 1: this sample has an edge
     span: int = 0  # clocks between the two edges
     moved: int = 0  # counts between the two edges
@@ -56,46 +51,50 @@ class State(NamedTuple):
 
 
 @kernel
-def step(state, step_up, step_down, sample, reverse, k_edge):
+def step(state, step_up, step_down, sample, reverse, k_edge, time_w, moved_w):
     s = state
+    time_max, moved_max = (1 << time_w) - 1, (1 << moved_w) - 1
+    elapsed, since = min(s.elapsed, time_max), min(s.since, time_max)
+    # Clocks of the engine: the product, a check for overflow, the quotient, its limit, the result
+    divide_at = moved_w + 1
+    limit_at = divide_at + QUOTIENT_W + 1
     edge = step_up or step_down
     take = sample and s.clock == 0
     forward = 1 if step_up else 0
 
     # The window between two samples; an edge at the sample's clock belongs to the next
-    base = s.since if take and s.edges else s.elapsed
+    base = since if take and s.edges else elapsed
     moved = 0 if take else s.moved
     if edge and s.seen and forward == s.forward:
-        moved = min(max(moved + (1 if step_up else -1), -MOVED_MAX), MOVED_MAX)
+        moved = min(max(moved + (1 if step_up else -1), -moved_max), moved_max)
 
-    # The engine: clock 1 to 16 product, 17 overflow, 18 to 36 quotient, 37 its limit, 38 result
     clock, measured, negative = s.clock, s.measured, s.negative
     factor, divisor, work, quotient, past = s.factor, s.divisor, s.work, s.quotient, s.past
     omega, omega_valid = s.omega, 0
     if take:
         clock = 1
         measured = s.edges
-        divisor = s.span if s.edges else s.since
+        divisor = s.span if s.edges else since
         factor = abs(s.moved) if s.edges else 1
-        if divisor == TIME_MAX:
+        if divisor == time_max:
             factor = 0
         negative = 1 if (s.moved < 0) != (reverse == 1) else 0
         work, quotient = 0, 0
     elif s.clock != 0:
-        clock = 0 if s.clock == LAST else s.clock + 1
-        if s.clock < DIVIDE_AT:
-            bit = (s.factor >> (MOVED_W - 1)) & 1
-            factor = (s.factor << 1) & MOVED_MAX
+        clock = 0 if s.clock > limit_at else s.clock + 1
+        if s.clock < divide_at:
+            bit = (s.factor >> (moved_w - 1)) & 1
+            factor = (s.factor << 1) & moved_max
             work = 2 * s.work + (k_edge if bit else 0)
-        elif s.clock == DIVIDE_AT:
+        elif s.clock == divide_at:
             past = 1 if (s.work >> (QUOTIENT_W - 1)) >= s.divisor else 0
             work = 0 if past else 2 * s.work
-        elif s.clock < LIMIT_AT:
+        elif s.clock < limit_at:
             top, low = 2 * s.work >> QUOTIENT_W, (2 * s.work) & ((1 << QUOTIENT_W) - 1)
             enough = top >= s.divisor
             work = ((top - s.divisor if enough else top) << QUOTIENT_W) | low
             quotient = 2 * s.quotient + (1 if enough else 0)
-        elif s.clock == LIMIT_AT:
+        elif s.clock == limit_at:
             size = (s.quotient + 1) >> 1
             quotient = OMEGA_MAX if s.past or size > OMEGA_MAX else size
         else:
@@ -107,8 +106,8 @@ def step(state, step_up, step_down, sample, reverse, k_edge):
     following = State(
         1 if s.seen or edge else 0,
         forward if edge else s.forward,
-        min(base + 1, TIME_MAX),
-        1 if edge else min(s.since + 1, TIME_MAX),
+        min(base + 1, time_max),
+        1 if edge else min(since + 1, time_max),
         1 if edge or (s.edges and not take) else 0,
         base if edge else s.span,
         moved,
@@ -135,7 +134,24 @@ def setting(counts, pole_pairs, clock_hz, omega_base):
 
 
 def stimuli(rng, config):
-    """Steps from one a clock to none for long, reversals and trembling on an edge, samples too early, every corner."""
+    """Steps from one a clock to none for long, reversals and trembling on an edge, samples too early."""
+    return _motion(rng, (60 << 16,), 400)
+
+
+def patient_stimuli(rng, config):
+    """The same with every corner of k_edge, and rests that end beside the longest time, where a bench gets there."""
+    longest = (1 << config["TIME_W"]) - 1
+    rows = _motion(rng, (0, 1, K_EDGE.hi, 7 << 14, 60 << 16), longest if longest < 5000 else 400)
+    if longest < 5000:
+        still = {p.name: 0 for p in BLOCK.inputs} | {"k_edge": K_EDGE.hi, "reverse": 0}
+        for rest in range(longest - TAKES - 4, longest + 3):
+            rows += [still | {"step_up": 1}] * 2 + [still] * rest
+            rows += [still | {"sample": 1}] + [still] * (TAKES + 1)
+    return rows
+
+
+def _motion(rng, k_edges, rest):
+    """Every kind of motion for each of ``k_edges``, with a rest of that many clocks."""
     rows = []
 
     def run(clocks, **writes):
@@ -147,7 +163,7 @@ def stimuli(rng, config):
         run(TAKES + 2, **writes)
 
     sample()
-    for k_edge in (60 << 16, 0, 1, K_EDGE.hi, 7 << 14):
+    for k_edge in k_edges:
         for reverse in (0, 1):
             regs = {"k_edge": k_edge, "reverse": reverse}
             for name in ("step_up", "step_down"):
@@ -157,7 +173,7 @@ def stimuli(rng, config):
                         run(gap, **regs)
                     sample(**regs)
                 sample(**regs)
-                run(400, **regs)
+                run(rest, **regs)
                 sample(**regs)
             for k in range(40):
                 run(1, **{("step_up", "step_down")[k & 1]: 1}, **regs)
@@ -196,11 +212,11 @@ BLOCK = Block(
         "TIME_W": TIME_W,
         "MOVED_W": MOVED_W,
         "QUOTIENT_W": QUOTIENT_W,
-        "DIVIDE_AT": DIVIDE_AT,
-        "LIMIT_AT": LIMIT_AT,
-        "LAST": LAST,
     },
+    configs=({"TIME_W": TIME_W, "MOVED_W": MOVED_W}, {"TIME_W": 10, "MOVED_W": 4}, {"TIME_W": 12, "MOVED_W": 6}),
+    too_wide=(0,),
     reference=None,
     bound=None,
     stimuli=stimuli,
+    patient_stimuli=patient_stimuli,
 )

@@ -9,6 +9,7 @@ from typing import NamedTuple
 from fluxproof.golden_model.block import Block, Port
 from fluxproof.golden_model.common import input_filter
 from fluxproof.golden_model.encoders import edge_timer, hall_decoder
+from fluxproof.golden_model.encoders.edge_timer import MOVED_W, TIME_W
 from fluxproof.golden_model.fixed import Format
 from fluxproof.golden_model.formats import BIT, TURN_W
 from fluxproof.golden_model.io.position import code_format
@@ -46,7 +47,9 @@ def step(
         s.of_decoder, s.of_filter_a.level, s.of_filter_b.level, s.of_filter_c.level, settled, clear_encoder,
         hall_reverse, hall_offset, start_first, sector_counts,
     )  # fmt: skip
-    timer, (omega_me, omega_valid) = timer_step(s.of_timer, s.step_up, s.step_down, sample_trigger, reverse, k_edge)
+    timer, (omega_me, omega_valid) = timer_step(
+        s.of_timer, s.step_up, s.step_down, sample_trigger, reverse, k_edge, TIME_W, MOVED_W
+    )
     code = s.theta_hall >> (TURN_W - position_bits) if sample_trigger else s.code
     following = State(filter_a, filter_b, filter_c, decoder, timer, code, theta_hall, step_up, step_down)
     return following, (
@@ -54,17 +57,37 @@ def step(
     )  # fmt: skip
 
 
+def _still():
+    """Usual settings, pins at 0."""
+    still = {p.name: 0 for p in BLOCK.inputs + BLOCK.registers} | {"k_edge": 900 << 16, "hall_offset": 9999}
+    return still | {"filter_clocks": 1, "start_first": 77, "sector_counts": 160}
+
+
 def stimuli(rng, config):
     """Turns in both directions at three speeds, bounce, a wire that is lost."""
-    rows = []
-    still = {p.name: 0 for p in BLOCK.inputs + BLOCK.registers} | {"k_edge": 900 << 16, "hall_offset": 9999}
-    still |= {"filter_clocks": 1, "start_first": 77, "sector_counts": 160}
+    rows, still = [], _still()
     for k in range(4200):
         sector = (k // 23 if k < 1000 else 43 - k // 40 if k < 2200 else k // 9) % 6
         hall = dict(zip(("hall_a", "hall_b", "hall_c"), hall_decoder.lines(sector), strict=True))
         hall["hall_a"] ^= int(rng.integers(40) == 0)
         hall["hall_b"] &= int(not 3000 < k < 3300)
         rows.append(still | hall | {"sample_trigger": int(k % 61 == 0), "clear_encoder": int(k == 3500)})
+    return rows
+
+
+def patient_stimuli(rng, config):
+    """Turns that take long, with other settings in each, so that every bit of k_edge makes a speed; sectors skipped."""
+    rows, sector = [], 0
+    ports = {p.name: p for p in REGISTERS + (_PORTS["k_edge"],)}
+    for turn in range(16):
+        regs = {name: int(rng.integers(p.high >> int(rng.integers(p.fmt.width)), endpoint=True))
+                for name, p in ports.items()} | {"filter_clocks": turn % 4, "reverse": turn & 1}  # fmt: skip
+        pause = int(12 * 2 ** rng.uniform(0, 6))
+        for _ in range(max(8, 4000 // pause)):
+            sector = (sector + int(rng.choice([1, 1, 1, 5, 2, 3]) if turn % 3 == 2 else 1)) % 6
+            hall = dict(zip(("hall_a", "hall_b", "hall_c"), hall_decoder.lines(sector), strict=True))
+            row = _still() | regs | hall
+            rows += [row | {"sample_trigger": int(k % 50 == 20)} for k in range(pause)]
     return rows
 
 
@@ -99,4 +122,5 @@ BLOCK = Block(
     reference=None,
     bound=None,
     stimuli=stimuli,
+    patient_stimuli=patient_stimuli,
 )

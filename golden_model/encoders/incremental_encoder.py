@@ -9,6 +9,7 @@ from typing import NamedTuple
 from fluxproof.golden_model.block import Block, Port
 from fluxproof.golden_model.common import input_filter
 from fluxproof.golden_model.encoders import edge_timer, index_check, quadrature_decoder, turn_counter
+from fluxproof.golden_model.encoders.edge_timer import MOVED_W, TIME_W
 from fluxproof.golden_model.formats import BIT
 from fluxproof.golden_model.io.position import code_format
 from fluxproof.golden_model.kernel import kernel
@@ -97,7 +98,9 @@ def step(
         counts,
         correct_max,
     )
-    timer, (omega_me, omega_valid) = timer_step(s.of_timer, s.step_up, s.step_down, sample, reverse, k_edge)
+    timer, (omega_me, omega_valid) = timer_step(
+        s.of_timer, s.step_up, s.step_down, sample, reverse, k_edge, TIME_W, MOVED_W
+    )
     following = State(
         filter_a,
         filter_b,
@@ -161,6 +164,25 @@ def stimuli(rng, config):
     return rows
 
 
+def patient_stimuli(rng, config):
+    """Back and forth over the index while the shaft slips: losses of every size, at correct_max or far from it."""
+    rows, slip = [], 0
+    still = {p.name: 0 for p in BLOCK.inputs} | {"filter_clocks": 1, "index_phase": 1, "k_edge": 900 << 16}
+    for turn in range(160):
+        if turn % 40 == 0:
+            counts = int(rng.integers(1000, 6000))
+            still |= turn_counter.setting(counts, config["POSITION_BITS"]) | {"reverse": turn // 40 & 1}
+        lost = int(2 ** rng.uniform(0, 11)) % (counts // 2)
+        slip += int(rng.choice([-1, 1])) * lost
+        still["correct_max"] = lost + int(rng.integers(-1, 2)) if rng.integers(2) else int(rng.integers(1 << 12))
+        still["correct_max"] = max(still["correct_max"], 0)
+        for place in range(-6, 9) if turn % 2 else range(8, -7, -1):
+            a, b = quadrature_decoder.lines(place + slip)
+            row = still | {"pin_a": a, "pin_b": b, "pin_z": int(place in (0, 1, 2))}
+            rows += [row | {"sample": int(rng.integers(60) == 0)} for _ in range(5)]
+    return rows
+
+
 _PORTS = {
     p.name: p
     for module in (edge_timer, turn_counter, index_check, quadrature_decoder, input_filter)
@@ -217,4 +239,5 @@ BLOCK = Block(
     reference=None,
     bound=None,
     stimuli=stimuli,
+    patient_stimuli=patient_stimuli,
 )

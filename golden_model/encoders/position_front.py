@@ -119,12 +119,7 @@ def stimuli(rng, config):
     still = {p.name: 0 for p in BLOCK.inputs + BLOCK.registers}
     encoder, rows = config["ENCODER"], []
     if encoder in (ABZ, HALL_ABZ):
-        names = {"sample": "sample_trigger", "clear_faults": "clear_encoder"}
-        for k, row in enumerate(incremental_encoder.stimuli(rng, config)):
-            row = {names.get(name, name): value for name, value in row.items()}
-            sector = hall_decoder.lines(k // 97)
-            hall = dict(zip(("hall_a", "hall_b", "hall_c"), sector, strict=True)) | {"sector_counts": 160}
-            rows.append(still | {n: v for n, v in row.items() if n in still} | hall)
+        rows = _with_edges(incremental_encoder.stimuli(rng, config))
     elif encoder == HALL:
         rows = [still | row for row in hall_front.stimuli(rng, config)]
     elif encoder == EXTERNAL:
@@ -132,6 +127,28 @@ def stimuli(rng, config):
     else:
         rows = [still | row for row in serial_encoder.stimuli(rng, config)]
     return rows
+
+
+def _with_edges(given):
+    """Rows of incremental_encoder as rows of the front end, with Hall sensors that turn slowly."""
+    rows, names = [], {"sample": "sample_trigger", "clear_faults": "clear_encoder"}
+    still = {p.name: 0 for p in BLOCK.inputs + BLOCK.registers} | {"sector_counts": 160}
+    for k, row in enumerate(given):
+        row = {names.get(name, name): value for name, value in row.items()}
+        hall = dict(zip(("hall_a", "hall_b", "hall_c"), hall_decoder.lines(k // 97), strict=True))
+        rows.append(still | {n: v for n, v in row.items() if n in still} | hall)
+    return rows
+
+
+def patient_stimuli(rng, config):
+    """All frames of a serial encoder, slow turns of Hall sensors, a shaft that slips."""
+    if config["ENCODER"] in (ABZ, HALL_ABZ):
+        return _with_edges(incremental_encoder.patient_stimuli(rng, config))
+    still = {p.name: 0 for p in BLOCK.inputs + BLOCK.registers}
+    if config["ENCODER"] == HALL:
+        return [still | row for row in hall_front.patient_stimuli(rng, config)]
+    serial = config["ENCODER"] in (serial_encoder.SSI, serial_encoder.BISS, serial_encoder.ENDAT)
+    return [still | row for row in serial_encoder.patient_stimuli(rng, config)] if serial else []
 
 
 _PORTS = {
@@ -188,4 +205,5 @@ BLOCK = Block(
     reference=None,
     bound=None,
     stimuli=stimuli,
+    patient_stimuli=patient_stimuli,
 )

@@ -13,6 +13,7 @@ from fluxproof.golden_model.io.position import code_format
 from fluxproof.golden_model.kernel import kernel
 
 SSI, BISS, ENDAT = 4, 5, 6
+SOME = 2000  # clocks of the master's hard cases
 ssi_step, biss_step, endat_step = ssi_master.step, biss_master.step, endat_master.step
 bridge_step = position_bridge.step
 
@@ -60,7 +61,7 @@ def step(
 
 
 def stimuli(rng, config):
-    """Frames of noise and of a line at rest, with samples after and before their end."""
+    """Frames of noise and of a line at rest, with samples after and before their end; the first of the master's."""
     rows = []
     row = {p.name: 0 for p in BLOCK.inputs + BLOCK.registers} | {"serial_data": 1, "bridge_max": 3, "start_max": 60}
     row |= {"half_period": 1, "encoder_bits": 12, "turn_bits": 10, "mode_command": 7, "position_delay": 1 << 15}
@@ -69,6 +70,25 @@ def stimuli(rng, config):
             noise = int(rng.integers(2)) if turn % 3 == 1 else int(k % 7 > turn % 5) if turn % 3 else 1
             now = {"sample_trigger": int(k == 5), "codes_valid": int(k == 200), "serial_data": noise}
             rows.append(row | now | {"clear_encoder": int(turn == 8 and k == 100)})
+    return rows + patient_stimuli(rng, config)[:SOME]
+
+
+def patient_stimuli(rng, config):
+    """All frames of the master, with samples at any time; the delay and the longest bridge change now and then.
+
+    Then an encoder that never answers, with longest times at which each of their lower bits counts.
+    """
+    rows, names = [], {"start": "sample_trigger", "word_bits": "encoder_bits"}
+    master = {SSI: ssi_master, BISS: biss_master, ENDAT: endat_master}[config["ENCODER"]]
+    regs = {"position_delay": 1 << 15, "bridge_max": 2}
+    for row in master.stimuli(rng, {"POSITION_BITS": config["POSITION_BITS"]}):
+        if rng.integers(2000) == 0:
+            regs = {"position_delay": int(rng.integers(_BRIDGE["delay"].fmt.hi)), "bridge_max": int(rng.integers(5))}
+        now = {names.get(name, name): value for name, value in row.items()}
+        rows.append(now | regs | {"codes_valid": int(rng.integers(150) == 0), "clear_encoder": 0})
+    for longest in sorted({(3 << bit >> 1) + off for bit in range(1, 11) for off in (-1, 0, 1)}):
+        row = rows[0] | {"start_max": longest, "serial_data": 1, "half_period": 1}
+        rows += [row | {"sample_trigger": int(k % 40 == 5)} for k in range(longest + 150)]
     return rows
 
 
@@ -109,4 +129,5 @@ BLOCK = Block(
     reference=None,
     bound=None,
     stimuli=stimuli,
+    patient_stimuli=patient_stimuli,
 )

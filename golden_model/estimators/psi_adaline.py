@@ -135,6 +135,22 @@ def stimuli(rng, _config):
     return rows
 
 
+def patient_stimuli(rng, _config):
+    """A single small error at either end of psi_m or of the flux, then a slow walk on which less than an LSB shows."""
+    rows = []
+    row = {"sat_d": 0, "sat_q": 0, "current_at_rail": 0, "voltage_known": 1, "run": 1, "l_d": 529109, "r": 0}
+    row |= {"v_leg": 0, "d_q": 0, "i_q": 0, "eta_psi": ETA_PSI.hi, "omega_psi_min": 3000}
+    for k in range(24):
+        end = 1 if k % 2 else -1
+        push = row | {"omega_chord": 45000, "u_q": PU.hi if end > 0 else PU.lo, "i_d": 0}
+        omega, off = int(rng.integers(30000, 65000)), int(rng.integers(400))
+        small = {"omega_chord": omega, "u_q": end * (2 * omega - off), "i_d": end * (k // 2 % 2) * 3000}
+        rows += [push] * 20 + [row | small]
+        for _ in range(150):
+            rows.append(row | {"omega_chord": 6000, "u_q": end * 9000 + int(rng.integers(-2000, 2000)), "i_d": 0})
+    return rows
+
+
 BLOCK = Block(
     name="psi_adaline",
     folder="estimators",
@@ -179,4 +195,5 @@ BLOCK = Block(
     reference=reference,
     bound=bound,
     stimuli=stimuli,
+    patient_stimuli=patient_stimuli,
 )

@@ -42,6 +42,16 @@ def stimuli(_rng, _config):
     return rows
 
 
+def patient_stimuli(_rng, _config):
+    """The longest times that a bit of the age makes, met and missed by one, in a period each clock."""
+    rows = []
+    for bit in range(8, PERIODS.width + 1):
+        longest = (1 << bit) - 1
+        rows.append({"host_write": 1, "period": 0, "heartbeat": longest})
+        rows += [{"host_write": 0, "period": 1, "heartbeat": longest}] * (longest + 3)
+    return rows
+
+
 BLOCK = Block(
     name="host_watch",
     folder="io",
@@ -59,4 +69,5 @@ BLOCK = Block(
     reference=None,
     bound=None,
     stimuli=stimuli,
+    patient_stimuli=patient_stimuli,
 )

@@ -55,10 +55,13 @@ def step(
     return State(slowest, away, stalled), (over + 2 * runaway + 4 * stall,)
 
 
+USUAL = {"speed_mode": 1, "speed_limited": 0, "run": 1, "omega_trip": 300, "omega_away": 20, "runaway_samples": 5}
+USUAL |= {"omega_stall": 3, "stall_samples": 4, "omega_ref": 5000, "omega_me": 5000}
+
+
 def stimuli(rng, _config):
     """Limits met and just missed with both signs; a runaway, a reversal, a wavering one; stalls; modes and stops."""
-    usual = {"speed_mode": 1, "speed_limited": 0, "run": 1, "omega_trip": 300, "omega_away": 20, "runaway_samples": 5}
-    usual |= {"omega_stall": 3, "stall_samples": 4, "omega_ref": 5000, "omega_me": 5000}
+    usual = USUAL
     rows = []
     for edge in (300 << 8, 20 << 8, 3 << 8):
         for near in (-1, 0, 1):
@@ -78,7 +81,18 @@ def stimuli(rng, _config):
     for most in (0, 1, AWAY_HI):
         row = {"omega_me": -9000, "runaway_samples": most}
         rows += [usual | row] * 3 + [usual | {"omega_me": 1, "speed_limited": 1, "stall_samples": most}] * 3
-    rows += [usual | {"omega_me": -9000, "runaway_samples": AWAY_HI}] * (AWAY_HI + 3)
+    return rows
+
+
+def patient_stimuli(_rng, _config):
+    """Both counters to their ends; the shorter one by way of a limit at each of its bits."""
+    rows = []
+    for bit in range(3, AWAY.width + 1):
+        most = (1 << bit) - 1
+        rows += [USUAL] + [USUAL | {"omega_me": -9000, "runaway_samples": most}] * (most + 3)
+    for most in (63, STALLED_HI):
+        row = {"omega_me": 10, "speed_limited": 1, "stall_samples": most}
+        rows += [USUAL] + [USUAL | row] * (most + 3)
     return rows
 
 
@@ -108,4 +122,5 @@ BLOCK = Block(
     reference=None,
     bound=None,
     stimuli=stimuli,
+    patient_stimuli=patient_stimuli,
 )

@@ -7,7 +7,7 @@
   (fault_latch), never by a number.
 
 The age is counted up to ``watchdog`` only, so that it cannot wrap and a new value takes effect at once.
-Formats: clocks.  The reset clears the age.
+Formats: clocks; the age has AGE_W bits, which no age that stops at ``watchdog`` can exceed.  The reset clears the age.
 """
 
 from typing import NamedTuple
@@ -17,7 +17,8 @@ from fluxproof.golden_model.fixed import Format
 from fluxproof.golden_model.formats import BIT
 from fluxproof.golden_model.kernel import kernel
 
-AGE = Format(0, 20, 0)
+AGE_W = 20
+AGE = Format(0, AGE_W, 0)
 COUNT = Format(0, 8, 0)
 MOST = COUNT.hi
 AHEAD = 2  # registers from the age to sample_late
@@ -30,7 +31,7 @@ class State(NamedTuple):
 
 
 @kernel
-def step(state, sample_valid, clear_trip, watchdog, interval):
+def step(state, sample_valid, clear_trip, watchdog, interval, age_w):
     s = state
     entered = 1 if sample_valid and s.wait == 0 else 0
     early = 1 if sample_valid and s.wait != 0 else 0
@@ -46,7 +47,7 @@ def step(state, sample_valid, clear_trip, watchdog, interval):
 
 def stimuli(rng, config):
     """Strobes as close as allowed, one clock closer, held high, missing; the watchdog rewritten while it counts."""
-    interval = config["INTERVAL"]
+    interval, longest = config["INTERVAL"], (1 << config["AGE_W"]) - 1
     rows = []
 
     def wait(clocks, **writes):
@@ -61,13 +62,23 @@ def stimuli(rng, config):
     for distance in (3 * interval - 1, 3 * interval, 3 * interval + 1, 5 * interval):
         wait(1, sample_valid=1)
         wait(distance)
-    for writes in ({"watchdog": 0}, {"watchdog": AGE.hi}, {"watchdog": 1}, {"clear_trip": 1}):
+    for writes in ({"watchdog": 0}, {"watchdog": longest}, {"watchdog": 1}, {"clear_trip": 1}):
         wait(1, sample_valid=1)
         wait(2 * interval)
         wait(interval, **writes)
     wait(300 + 2 * interval, sample_valid=1)
     wait(1, clear_trip=1, sample_valid=1)
     wait(interval)
+    return rows
+
+
+def patient_stimuli(_rng, config):
+    """The longest times that a bit of the age makes, just missed and met, where a bench gets there."""
+    rows = []
+    for bit in range(3, config["AGE_W"] + 1 if config["AGE_W"] < 16 else 0):
+        still = {"sample_valid": 0, "clear_trip": 0, "watchdog": (1 << bit) - 1}
+        for wait in (still["watchdog"] - AHEAD, still["watchdog"] + 5):
+            rows += [still | {"sample_valid": 1}] + [still] * max(wait, config["INTERVAL"])
     return rows
 
 
@@ -90,9 +101,12 @@ BLOCK = Block(
     state=State(),
     latency=1,
     clocked=True,
-    constants={"AHEAD": AHEAD},
-    configs=({"INTERVAL": 48}, {"INTERVAL": 5}),
+    constants={"AHEAD": AHEAD, "AGE_W": AGE_W},
+    configs=({"INTERVAL": 48, "AGE_W": AGE_W}, {"INTERVAL": 48, "AGE_W": 9}, {"INTERVAL": 5, "AGE_W": 6}),
+    too_wide=(0,),
+    width_from={"watchdog": lambda config: Format(0, config["AGE_W"], 0)},
     reference=None,
     bound=None,
     stimuli=stimuli,
+    patient_stimuli=patient_stimuli,
 )

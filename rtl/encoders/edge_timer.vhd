@@ -3,9 +3,9 @@
 -- The edges are the last one of this sample and the last one of the latest sample that had an edge, so there is no
 -- change-over.  Without an edge |omega_me| is at most k_edge / (clocks since the last edge).
 -- An edge after a reversal is the edge passed before, so it moves the shaft by no count.
--- Formats: k_edge U(16,16), counts 16 bits and clocks 24 bits, both saturating, output PU.  A time beyond 24 bits is
--- standstill.  Latency: 1 (every clock is a sample); sample to omega_valid LAST + 1 clocks, one bit of the product or
--- of the quotient a clock; a sample before that is ignored and its edges belong to the next.
+-- Formats: k_edge U(16,16), counts MOVED_W bits and clocks TIME_W bits, both saturating, output PU.  A time beyond
+-- TIME_W bits is standstill.  Latency: 1 (every clock is a sample); sample to omega_valid LIMIT_AT + 2 clocks, one bit
+-- of the product or of the quotient a clock; a sample before that is ignored and its edges belong to the next.
 -- Rounding: the size to nearest, halves away from zero; it saturates at 2 per unit.
 
 library ieee;
@@ -15,6 +15,10 @@ use work.fixed_pkg.all;
 use work.fluxproof_pkg.all;
 
 entity edge_timer is
+  generic (
+    TIME_W  : positive range 4 to 24 := EDGE_TIMER_TIME_W;  -- at most MOVED_W + 13
+    MOVED_W : positive range 2 to 16 := EDGE_TIMER_MOVED_W
+  );
   port (
     clk         : in  std_logic;
     rst         : in  std_logic;
@@ -29,10 +33,12 @@ entity edge_timer is
 end entity edge_timer;
 
 architecture rtl of edge_timer is
-  constant TIME_W     : positive := EDGE_TIMER_TIME_W;
-  constant MOVED_W    : positive := EDGE_TIMER_MOVED_W;
   constant QUOTIENT_W : positive := EDGE_TIMER_QUOTIENT_W;
   constant WORK_W     : positive := MOVED_W + 32 + 1;  -- twice the product
+
+  -- Clocks of the engine: the product, a check for overflow, the quotient, its limit, the result
+  constant DIVIDE_AT : positive := MOVED_W + 1;
+  constant LIMIT_AT  : positive := DIVIDE_AT + QUOTIENT_W + 1;
 
   constant TIME_MAX  : unsigned(TIME_W - 1 downto 0) := (others => '1');
   constant MOVED_MAX : signed(MOVED_W downto 0)      := '0' & (MOVED_W - 1 downto 0 => '1');
@@ -77,6 +83,10 @@ architecture rtl of edge_timer is
     return clocks + 1;
   end function;
 begin
+  assert TIME_W <= MOVED_W + 13
+    report "edge_timer: TIME_W must be at most MOVED_W + 13, the remainder has no more bits"
+    severity failure;
+
   edge <= step_up or step_down;
   take <= sample when clock = 0 else '0';
   base <= state.since when (take and state.edges) = '1' else state.elapsed;
@@ -111,7 +121,6 @@ begin
         state.span    <= base;
       end if;
 
-      -- The engine: clock 1 to 16 product, 17 overflow, 18 to 36 quotient, 37 its limit, 38 result
       omega_valid <= '0';
       if take = '1' then
         clock    <= to_unsigned(1, 6);
@@ -130,26 +139,26 @@ begin
         quotient <= (others => '0');
       elsif clock /= 0 then
         clock <= clock + 1;
-        if clock < EDGE_TIMER_DIVIDE_AT then
+        if clock < DIVIDE_AT then
           factor  <= shift_left(factor, 1);
           product <= shift_left(product, 1);
           if factor(MOVED_W - 1) = '1' then
             product <= shift_left(product, 1) + k_edge;
           end if;
-        elsif clock = EDGE_TIMER_DIVIDE_AT then
+        elsif clock = DIVIDE_AT then
           past    <= '0';
           product <= shift_left(product, 1);
           if product(WORK_W - 1 downto QUOTIENT_W - 1) >= divisor then
             past    <= '1';
             product <= (others => '0');
           end if;
-        elsif clock < EDGE_TIMER_LIMIT_AT then
+        elsif clock < LIMIT_AT then
           quotient <= quotient(QUOTIENT_W - 2 downto 0) & not left(TIME_W + 1);
           product  <= resize(top & product(QUOTIENT_W - 2 downto 0) & '0', WORK_W);
           if left(TIME_W + 1) = '0' then
             product <= resize(unsigned(left(TIME_W downto 0)) & product(QUOTIENT_W - 2 downto 0) & '0', WORK_W);
           end if;
-        elsif clock = EDGE_TIMER_LIMIT_AT then
+        elsif clock = LIMIT_AT then
           quotient <= size(QUOTIENT_W - 1 downto 0);
           if past = '1' or size > OMEGA_MAX then
             quotient <= OMEGA_MAX(QUOTIENT_W - 1 downto 0);

@@ -6,8 +6,7 @@
 -- once, and again after clear_encoder.
 -- encoder_flags: 0 referenced, 1 moving, 2 index_lost, 3 index_wrong, 4 setting_refused, 5 hall_valid,
 -- 6 position_valid, 7 position_lost, 8 alarm, 9 warning, 10 forward.
--- Formats: those of the blocks.  Latency: 1 (every clock is a sample).
--- Rounding: none.
+-- Formats: those of the blocks.  Latency: 1 (every clock is a sample).  Rounding: none.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -79,16 +78,16 @@ architecture rtl of position_front is
   constant ABZ  : boolean := ENCODER = 1 or ENCODER = 3;
   constant HALL : boolean := ENCODER = 2 or ENCODER = 3;
 
-  signal count, start_count                      : unsigned(17 downto 0);
-  signal referenced, moving, index_lost, refused : std_logic;
-  signal forward, hall_valid, start_valid        : std_logic;
-  signal position_valid, alarm, warning          : std_logic;
-  signal hall_code                               : unsigned(POSITION_BITS - 1 downto 0);
-  signal hall_omega                              : signed(PU_W - 1 downto 0);
-  signal hall_done                               : std_logic;
-  signal hall_illegals                           : unsigned(11 downto 0);
-  -- Start of the count; the count was on its way since the last trigger
-  signal start, started, moved, on_the_way : std_logic;
+  signal count, start_count                          : unsigned(17 downto 0);
+  signal referenced, moving, index_lost, refused     : std_logic;
+  signal forward, hall_done, hall_valid, start_valid : std_logic;
+  signal position_valid, alarm, warning              : std_logic;
+  signal hall_code, code_held                        : unsigned(POSITION_BITS - 1 downto 0);
+  signal hall_omega, omega_held                      : signed(PU_W - 1 downto 0);
+  signal hall_illegals                               : unsigned(11 downto 0);
+  signal start, started                              : std_logic;  -- of the count
+  signal moved, on_the_way                           : std_logic;  -- the count, since the last trigger
+  signal triggered                                   : std_logic;
 begin
   start      <= start_valid and not refused and not started;
   on_the_way <= moved or moving;
@@ -122,12 +121,11 @@ begin
     front : entity work.hall_front
       generic map (POSITION_BITS => POSITION_BITS)
       port map (clk => clk, rst => rst, hall_a => hall_a, hall_b => hall_b, hall_c => hall_c,
-                sample_trigger => sample_trigger, clear_encoder => clear_encoder,
-                filter_clocks => filter_clocks, hall_reverse => hall_reverse, hall_offset => hall_offset,
-                start_first => start_first, sector_counts => sector_counts, reverse => reverse, k_edge => k_edge,
-                code_theta => hall_code, omega_me => hall_omega, omega_valid => hall_done, hall_valid => hall_valid,
-                start_count => start_count, start_valid => start_valid, illegal_count => hall_illegals,
-                skipped_count => open);
+                sample_trigger => sample_trigger, clear_encoder => clear_encoder, filter_clocks => filter_clocks,
+                hall_reverse => hall_reverse, hall_offset => hall_offset, start_first => start_first,
+                sector_counts => sector_counts, reverse => reverse, k_edge => k_edge, code_theta => hall_code,
+                omega_me => hall_omega, omega_valid => hall_done, hall_valid => hall_valid, start_count => start_count,
+                start_valid => start_valid, illegal_count => hall_illegals, skipped_count => open);
 
   else generate
     start_count <= (others => '0');
@@ -147,63 +145,50 @@ begin
     front : entity work.serial_encoder
       generic map (ENCODER => ENCODER, POSITION_BITS => POSITION_BITS)
       port map (clk => clk, rst => rst, serial_data => serial_data, sample_trigger => sample_trigger,
-                codes_valid => codes_valid, clear_encoder => clear_encoder,
-                half_period => half_period, encoder_bits => encoder_bits, turn_bits => turn_bits, gray => gray,
-                parity_on => parity_on, crc_on => crc_on, start_max => start_max, mode_command => mode_command,
-                two_errors => two_errors, position_delay => position_delay, bridge_max => bridge_max,
-                serial_clock => serial_clock, data_out => serial_out, data_drive => serial_drive,
-                code_theta => encoder_code, code_valid => position_done, position_valid => position_valid,
-                position_lost => position_lost, bridged_count => bridged_count, alarm => alarm, warning => warning);
+                codes_valid => codes_valid, clear_encoder => clear_encoder, half_period => half_period,
+                encoder_bits => encoder_bits, turn_bits => turn_bits, gray => gray, parity_on => parity_on,
+                crc_on => crc_on, start_max => start_max, mode_command => mode_command, two_errors => two_errors,
+                position_delay => position_delay, bridge_max => bridge_max, serial_clock => serial_clock,
+                data_out => serial_out, data_drive => serial_drive, code_theta => encoder_code,
+                code_valid => position_done, position_valid => position_valid, position_lost => position_lost,
+                bridged_count => bridged_count, alarm => alarm, warning => warning);
 
   else generate
-    serial_clock  <= '1';
-    serial_out    <= '0';
-    serial_drive  <= '0';
-    position_lost <= '0';
     bridged_count <= (others => '0');
 
-    (position_valid, alarm, warning) <= std_logic_vector'("000");
+    (serial_clock, serial_out, serial_drive)        <= std_logic_vector'("100");
+    (position_lost, position_valid, alarm, warning) <= std_logic_vector'("0000");
   end generate absolute;
 
   no_edges : if not ABZ and not HALL generate
     illegal_count <= (others => '0');
-
-    process (clk)
-    begin
-      if rising_edge(clk) then
-        omega_now <= (others => '0') when rst = '1' else omega_set;
-      end if;
-    end process;
-
+    omega_now     <= omega_held;
   end generate no_edges;
 
   elsewhere : if ENCODER = 0 generate
-
-    process (clk)
-    begin
-      if rising_edge(clk) then
-        position_done <= sample_trigger and not rst;
-        if (sample_trigger or rst) = '1' then
-          encoder_code <= (others => '0') when rst = '1' else position_in;
-        end if;
-      end if;
-    end process;
-
+    position_done <= triggered;
+    encoder_code  <= code_held;
   end generate elsewhere;
 
   process (clk)
   begin
     if rising_edge(clk) then
-      -- A trigger latches the count and whether it was on its way
-      moved   <= on_the_way;
-      started <= (started or start) and not refused and not clear_encoder;
+      -- A trigger latches the code from elsewhere, the count and whether it was on its way
+      omega_held <= omega_set;
+      triggered  <= sample_trigger;
+      moved      <= on_the_way;
+      started    <= (started or start) and not refused and not clear_encoder;
       if sample_trigger = '1' then
+        code_held       <= position_in;
         encoder_count   <= count;
         encoder_restart <= on_the_way;
         moved           <= '0';
       end if;
 
       if rst = '1' then
+        omega_held      <= (others => '0');
+        triggered       <= '0';
+        code_held       <= (others => '0');
         encoder_count   <= (others => '0');
         encoder_restart <= '0';
         moved           <= '0';

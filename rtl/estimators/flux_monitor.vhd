@@ -34,8 +34,11 @@ end entity flux_monitor;
 architecture rtl of flux_monitor is
   constant LATENCY : positive := FLUX_MONITOR_LATENCY;
 
-  -- State
-  signal faults : unsigned(6 downto 0);
+  type state_t is record
+    faults : unsigned(6 downto 0);
+  end record state_t;
+
+  signal state : state_t;
 
   signal valid : std_logic_vector(0 to LATENCY);
   signal now_0 : unsigned(6 downto 0);
@@ -57,20 +60,20 @@ begin
 
       -- Stage 1: faults = now or (faults and not clear_faults)
       if valid(0) = '1' then
-        faults <= now_0;
+        state.faults <= now_0;
         if clear_faults = '0' then
-          faults <= now_0 or faults;
+          state.faults <= now_0 or state.faults;
         end if;
       end if;
 
       if rst = '1' then
         valid(1 to LATENCY) <= (others => '0');
-        faults              <= (others => '0');
+        state.faults        <= (others => '0');
       end if;
     end if;
   end process;
 
   out_valid   <= valid(LATENCY);
-  flux_faults <= faults;
+  flux_faults <= state.faults;
 
 end architecture rtl;

@@ -709,6 +709,7 @@ package fluxproof_pkg is
   -- sample_guard: none: protection and diagnosis of the drive
   constant SAMPLE_GUARD_LATENCY : positive := 1;
   constant SAMPLE_GUARD_AHEAD : natural := 2;
+  constant SAMPLE_GUARD_AGE_W : natural := 20;
 
   -- sample_checks: none: protection and diagnosis of the drive
   constant SAMPLE_CHECKS_LATENCY : positive := 4;
@@ -796,9 +797,6 @@ package fluxproof_pkg is
   constant EDGE_TIMER_TIME_W : natural := 24;
   constant EDGE_TIMER_MOVED_W : natural := 16;
   constant EDGE_TIMER_QUOTIENT_W : natural := 19;
-  constant EDGE_TIMER_DIVIDE_AT : natural := 17;
-  constant EDGE_TIMER_LIMIT_AT : natural := 37;
-  constant EDGE_TIMER_LAST : natural := 38;
 
   -- hall_decoder: none: three Hall sensors, 120 degrees apart
   constant HALL_DECODER_LATENCY : positive := 1;

@@ -13,14 +13,15 @@ use work.fluxproof_pkg.all;
 
 entity sample_guard is
   generic (
-    INTERVAL : positive range 2 to 256 := 48
+    INTERVAL : positive range 2 to 256 := 48;
+    AGE_W    : positive range 4 to 20  := SAMPLE_GUARD_AGE_W
   );
   port (
     clk           : in  std_logic;
     rst           : in  std_logic;
     sample_valid  : in  std_logic;
     clear_trip    : in  std_logic;
-    watchdog      : in  unsigned(19 downto 0);
+    watchdog      : in  unsigned(AGE_W - 1 downto 0);
     sample_busy   : out std_logic;
     sample_early  : out std_logic;
     sample_late   : out std_logic;
@@ -33,7 +34,7 @@ architecture rtl of sample_guard is
   signal hold    : unsigned(7 downto 0);
   signal busy    : std_logic;  -- hold /= 0; registered, because every write between samples depends on it
   signal last    : std_logic;  -- hold = 1
-  signal age     : unsigned(19 downto 0);
+  signal age     : unsigned(AGE_W - 1 downto 0);
   signal counted : unsigned(7 downto 0);
 
   signal entered : std_logic;
@@ -53,7 +54,7 @@ begin
         hold <= to_unsigned(INTERVAL - 1, 8);
         busy <= '1';
         last <= '1' when INTERVAL = 2 else '0';
-        age  <= to_unsigned(SAMPLE_GUARD_AHEAD, 20);
+        age  <= to_unsigned(SAMPLE_GUARD_AHEAD, AGE_W);
       else
         if busy = '1' then
           hold <= hold - 1;

@@ -19,14 +19,14 @@ from fluxproof.cosim.stimulus import random_value
 from fluxproof.cosim.verilog import VerilogPort
 from fluxproof.golden_model import clocked
 from fluxproof.golden_model.fluxproof import OBSERVED, REGISTERS, Observed
-from fluxproof.golden_model.io import sample_latch
+from fluxproof.golden_model.io import fault_latch, offset_check, sample_latch
 from scripts.mutate.harness import Trial
 from scripts.prove.pipeline import core_ends
 
 CARRIER_HALF = 128
 IN_RESET = 4
-MUTANTS = 240
-SEED, SETTINGS = 3, 900  # of any_settings
+MUTANTS = 160
+SEED, SETTINGS = 3, 2100  # of any_settings
 # Limits, and the value of the sample or of the core that is compared with them.
 LIMITS = {
     "i_trip": "i_a",
@@ -42,6 +42,14 @@ LIMITS = {
     "v_comp_max": "v_comp",
     "i_learn": "i_q",
     "omega_psi_min": "omega_chord",
+    "sum_trip": "i_c",
+    "i_open": "i_b",
+    "offset_max": "i_a",
+    "omega_trip": "omega_me",
+    "omega_away": "omega_me",
+    "omega_stall": "omega_me",
+    "brake_on": "u_dc",
+    "brake_off": "u_dc",
 }
 INVERTED = 12  # settings of which a bit is inverted at a time
 BITS = {"ADC_BITS": 16, "POSITION_BITS": 16}
@@ -138,7 +146,8 @@ def beside_seen(seen: Mapping[str, int], rng: np.random.Generator) -> dict[str, 
 def beside(settings, count: int, rng: np.random.Generator):
     """The settings with one bit inverted in ``count`` of them, drawn at random."""
     changed = {}
-    for name in rng.choice(list(REGISTERS), count, replace=False):
+    # A changed double_update waits until the gates are off: a trip would take it while a sample is in flight.
+    for name in rng.choice([name for name in REGISTERS if name != "double_update"], count, replace=False):
         port, value = REGISTERS[name], getattr(settings, name)
         other = value ^ (1 << int(rng.integers(port.fmt.width - bool(port.fmt.signed))))
         changed[name] = other if port.low <= other <= port.high else value
@@ -154,15 +163,33 @@ def any_settings() -> Recorder:
     sample: dict[str, int] = {}
     for k in range(SETTINGS):
         changed = {name: random_value(rng, port) for name, port in REGISTERS.items()}
+        runs = k // 3 % 3 < 2  # nearly every one of these samples is a fault: only where none trips can the gates run
         if k % 3:  # the same again, with limits that are just met or missed
             changed = beside_seen(golden.observed._asdict() | sample, rng)
         else:
             sample = {name: random_value(rng, ports[name]) for name in INPUT_PORTS}
+        if runs:  # but one fault now and then
+            kept = REGISTERS["fault_ignore"].high
+            changed["fault_ignore"] = kept ^ (1 << int(rng.integers(kept.bit_length())) if k % 3 == 2 else 0)
         golden.registers = golden.registers._replace(**changed)
-        golden.advance(4, clear_trip=int(rng.integers(4) == 0))
-        golden.advance(clocked.INTERVAL + int(rng.integers(1, 80)), sample, clear_trip=0)
-    golden.advance(4)
+        golden.advance(4, enable=int(k % 3 > 0), clear_trip=int(runs or rng.integers(4) == 0))
+        r = golden.registers
+        if k % 3 == 0 and 0 < r.dead_time < r.min_pulse <= CARRIER_HALF:
+            golden.advance(2 * CARRIER_HALF)  # the valley takes them before the sample, not while it is in flight
+        golden.advance(clocked.INTERVAL + int(rng.integers(1, 80)), sample, enable=1, clear_trip=0)
+    at_rest(golden, sample)
     return golden
+
+
+def at_rest(golden: Recorder, sample: Mapping[str, int]) -> None:
+    """As many samples with the gates off as the zero of the sensors takes to be found wrong, then it alone trips."""
+    alone = REGISTERS["fault_ignore"].high ^ (1 << fault_latch.OFFSET)
+    golden.registers = golden.registers._replace(omega_stall=REGISTERS["omega_stall"].high, offset_max=0)
+    golden.registers = golden.registers._replace(fault_ignore=alone, k_filter=REGISTERS["k_filter"].high)
+    golden.advance(4, enable=0, clear_trip=1)
+    for _ in range(offset_check.LAST + 4):
+        golden.advance(clocked.INTERVAL + 3, sample, enable=0, clear_trip=0)
+    golden.advance(40, enable=1)
 
 
 def config() -> dict[str, int]:

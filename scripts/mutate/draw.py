@@ -62,17 +62,28 @@ def prepare(folder: Path, verilog: str, top: str, flat: bool = False) -> int:
 
 
 def netlist(folder: Path, top: str) -> dict:
-    """The prepared module as Yosys writes it in JSON."""
-    return json.loads((folder / "prepared.json").read_text())["modules"][top]
+    """The prepared module as Yosys writes it in JSON, with the bits that it reads, and the same of its instances."""
+    modules = json.loads((folder / "prepared.json").read_text())["modules"]
+    module = modules[top]
+    module["read"] = readers(module)
+    kinds = {cell["type"] for cell in module["cells"].values()} & set(modules)
+    module["inside"] = {kind: (modules[kind]["ports"], readers(modules[kind])) for kind in kinds}
+    return module
 
 
 def without_effect(module: dict, mutation: str) -> bool:
-    """Whether the mutation changes nothing that is read: a bit without a reader, a constant made the same constant."""
+    """Whether the mutation changes nothing that is read: a bit without a reader, a constant made the same constant.
+
+    An instance may have a record as a port of which it needs a part.
+    """
     mode, name, port, bit = _PLACE.match(mutation).groups()
     cell = module["cells"][name.removeprefix("\\")]
     value = cell["connections"][port][int(bit)]
     if cell["port_directions"][port] == "output":
         return value not in module["read"]
+    ports, read = module["inside"].get(cell["type"], ({}, set()))
+    if port in ports and ports[port]["bits"][int(bit)] not in read:
+        return True
     return value == "x" or f"const{value}" == mode
 
 
@@ -94,7 +105,6 @@ def draw(folder: Path, top: str, cells: int, count: int, seed: int) -> Drawn:
     command = f"mutate -list {2 * count} -seed {seed} -module {top} -o drawn.txt"
     script(folder, "draw.ys", ["read_rtlil prepared.il", command])
     module = netlist(folder, top)
-    module["read"] = readers(module)
     found = dict.fromkeys(_DETAIL.sub("", line) for line in (folder / "drawn.txt").read_text().splitlines())
     kept = [line for line in found if not _CLOCKS.search(line) and not without_effect(module, line)]
     return Drawn(folder, top, cells, tuple(kept[:count]))

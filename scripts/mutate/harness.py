@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fluxproof.cosim.stimulus import due, schedule
+from fluxproof.cosim.schedule import due, schedule
 from fluxproof.cosim.verilator import LIBRARY, compile_library
 from fluxproof.cosim.verilog import VerilogPort
 from fluxproof.golden_model.block import Block

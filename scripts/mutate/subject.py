@@ -16,8 +16,8 @@ from scripts.mutate import core
 from scripts.mutate.harness import BENCH_SEED, Trial, block_trial
 
 FOLDER = BUILD / "mutate"
-LEAST, MOST = 40, 160  # mutants of a block
-LEAST_OF_CONFIG = 16
+LEAST, MOST = 32, 72  # mutants of a block
+LEAST_OF_CONFIG = 12
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ class Subject:
 
     def count(self, cells: int) -> int:
         """Mutants to draw: as many as the block has cells, within limits, shared by its configurations."""
-        configs = len(self.block.configs)
+        configs = len(self.block.configs) - len(self.block.too_wide)
         return max(LEAST_OF_CONFIG, min(max(cells, LEAST), MOST) // configs)
 
 
@@ -106,4 +106,5 @@ class Core:
 
 def subjects(only: str = "") -> list[Subject]:
     """All of them, or those of the blocks whose name is ``only``."""
-    return [Subject(b.name, k) for b in BLOCKS.values() for k in range(len(b.configs)) if only in ("", b.name)]
+    chosen = [b for b in BLOCKS.values() if only in ("", b.name)]
+    return [Subject(b.name, k) for b in chosen for k in range(len(b.configs)) if k not in b.too_wide]
