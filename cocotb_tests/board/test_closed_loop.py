@@ -8,7 +8,15 @@ import numpy as np
 import pytest
 
 from cocotb_tests.support.board_loop import CONSTANT
-from cocotb_tests.support.board_runs import RPM, SNAP_AT, first_difference, start_from_standstill, status
+from cocotb_tests.support.board_runs import (
+    RPM,
+    RUNS,
+    SNAP_AT,
+    first_difference,
+    of_drive,
+    start_from_standstill,
+    status,
+)
 from cocotb_tests.support.needs import skip_without_ghdl5
 from fluxproof.cosim import ghdl
 from fluxproof.cosim.board_clock import SEEN
@@ -16,14 +24,15 @@ from fluxproof.cosim.verilated import VerilatedCore
 from fluxproof.golden_model.generated.register_names import ADDRESSES
 from fluxproof.plant.sensors import current_code
 
-GENERICS = {"CARRIER_HALF": 250, "CLOCK_HZ": 5_000_000}
 
+def in_ghdl(periods: int, run: str = "standstill", compiled: bool = False) -> dict[str, float]:
+    """Facts of the run; AssertionError with the first difference.
 
-def in_ghdl(periods: int) -> dict[str, float]:
-    """Facts of the run; AssertionError with the first difference."""
-    # Without numba: to compile the golden board takes as long as to run it so often.
-    environment = {"FLUXPROOF_PERIODS": str(periods), "NUMBA_DISABLE_JIT": "1"}
-    folder = ghdl.run("fluxproof_board", "cocotb_tests.support.dut_board", GENERICS, environment, key=str(periods))
+    ``compiled``: with numba, which takes as long to compile the golden board as to run some hundred periods without.
+    """
+    environment = {"FLUXPROOF_PERIODS": str(periods), "FLUXPROOF_RUN": run, "NUMBA_DISABLE_JIT": str(int(not compiled))}
+    generics, key = RUNS[run]().generics(), f"{run.split(',')[0]} {periods}"
+    folder = ghdl.run("fluxproof_board", "cocotb_tests.support.dut_board", generics, environment, key=key)
     problem = ghdl.failure(folder)
     assert problem is None, problem
     return json.loads((folder / "board.json").read_text())
@@ -43,6 +52,35 @@ def test_closed_loop_over_2000_periods(figure):
     facts = in_ghdl(2000)
     figure("closed loop, A/B/Z and SPI, GHDL against golden, 2,000 periods", 0, 0, "differences", True)
     assert facts["rpm"] < -0.9 * RPM and facts["samples"] > 1900
+
+
+def test_a_drive_file_with_hall_sensors_and_xadc_in_ghdl():
+    """40 periods: every register from the file; the shaft turns by its Hall sensors."""
+    facts = in_ghdl(40, "hub_36v, slow clock")
+    assert facts["samples"] > 12 and facts["encoder_flags"] >> 5 & 1 and facts["rpm"] > 0.1
+    assert facts["board_flags"] == facts["illegal_count"] == facts["fault_flags"] == 0
+
+
+@pytest.mark.study
+@pytest.mark.parametrize("name", ["servo_24v", "hub_36v", "spindle_400v", "drone_24v"])
+def test_drive_file_with_its_pins_in_verilator(name, figure):
+    """400 periods at the file's own clock, with the file's own encoder and converters: start and reversal."""
+    skip_without_ghdl5()
+    loop = of_drive(name)
+    core = VerilatedCore(loop.generics(), top="fluxproof_board")
+    core.set_many(CONSTANT)
+    core.reset()
+    core.tick(2)
+    speeds, different, told = [], 0, ""
+    for chunk in loop.run(400):
+        problem = first_difference(core.play(chunk.inputs, SEEN), chunk.seen, SEEN, chunk.number)
+        different, told = different + (problem is not None), told or problem or ""
+        speeds.append(chunk.omega_m)
+    figure(f"{name}: closed loop of its pins, 400 periods", different, 0, "periods that differ", different == 0)
+    assert different == 0, told
+    latch, rated = loop.golden.state.of_core.of_fault_latch, loop.drive.machine.rated_speed_rad_s
+    assert latch.flags == 0 and status(chunk)["board_flags"] == 0
+    assert max(speeds) > 0.02 * rated and speeds[-1] < max(speeds) and loop.golden.samples > 380
 
 
 @pytest.mark.study

@@ -1,23 +1,27 @@
-"""The closed loop of a board as a run: start from standstill, a rotor that is off its index, a snapshot."""
+"""The closed loop of a board as a run: a start from standstill off the index; drive files with their own pins."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
-from cocotb_tests.support.board_loop import BoardLoop
-from fluxproof.checkout import ROOT
+from cocotb_tests.support.board_loop import BoardLoop, with_abz_and_spi
+from fluxproof.checkout import DRIVES
 from fluxproof.cosim.board_clock import STATUS
 from fluxproof.golden_model.drive import load
 from fluxproof.golden_model.formats import PU, TURN
 
-DRIVE = ROOT / "docs" / "drives" / "paper001.toml"
+DRIVE = DRIVES / "paper001.toml"
 RPM, BEFORE_INDEX = 600.0, 0.05  # rad of the shaft from the start to the index
+CARRIER_HALF = 250
 SNAP_AT, TURNS_BACK = 110, 1200
+PART = 0.2  # of the rated speed
 
 
 def start_from_standstill() -> BoardLoop:
     """Enabled once the registers are written; 600 rpm; after 0.12 s to -600 rpm; a snapshot on the way."""
-    drive = load(DRIVE)
+    drive = with_abz_and_spi(load(DRIVE), CARRIER_HALF)
     reference = PU.to_int(RPM * 2 * np.pi / 60 * drive.machine.pole_pairs / drive.bases.omega_me_rad_s)
     offset = TURN.to_int(drive.machine.pole_pairs * BEFORE_INDEX / (2 * np.pi))
     writes = {
@@ -27,6 +31,32 @@ def start_from_standstill() -> BoardLoop:
         TURNS_BACK: {"omega_ref": -reference},
     }
     return BoardLoop(drive, writes, theta_m=-BEFORE_INDEX)
+
+
+def of_drive(name: str, clock_hz: float | None = None, periods: int = 400) -> BoardLoop:
+    """A drive file with its own front ends, all registers from the file: to PART of its rated speed, half-way back.
+
+    ``clock_hz``: another clock of the core, for a file whose front ends take it.
+    """
+    drive = load(DRIVES / f"{name}.toml")
+    if clock_hz is not None:
+        drive = replace(drive, core=replace(drive.core, clock_hz=clock_hz))
+    loop = BoardLoop(drive, {})
+    rated = drive.machine.rated_speed_rad_s * drive.machine.pole_pairs
+    reference, begin = PU.to_int(PART * rated / drive.bases.omega_me_rad_s), loop.settled
+    loop.writes |= {
+        begin + 1: {"clear_encoder": 1},
+        begin + 2: {"enable": 1},
+        begin + 3: {"speed_mode": 1, "omega_ref": reference},
+        (begin + periods) // 2: {"omega_ref": -reference},
+    }
+    return loop
+
+
+RUNS = {
+    "standstill": start_from_standstill,
+    "hub_36v, slow clock": lambda: of_drive("hub_36v", 8e6, 40),  # 500 clocks a period
+}
 
 
 def first_difference(got: np.ndarray, wanted: np.ndarray, names, number: int) -> str | None:

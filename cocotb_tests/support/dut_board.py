@@ -10,14 +10,14 @@ from cocotb.clock import Clock
 from cocotb.triggers import FallingEdge
 
 from cocotb_tests.support.board_loop import AXI, CONSTANT
-from cocotb_tests.support.board_runs import start_from_standstill, status
+from cocotb_tests.support.board_runs import RUNS, status
 from fluxproof.cosim.block_bench import read
 from fluxproof.cosim.board_clock import PINS, SEEN
 
 
 @cocotb.test()
 async def equals_the_golden_board(dut):
-    loop = start_from_standstill()
+    loop = RUNS[os.environ["FLUXPROOF_RUN"]]()
     for name in (*PINS, *AXI, "s_axi_arvalid", "s_axi_araddr", "s_axi_awprot", "s_axi_arprot", "trip"):
         getattr(dut, name).value = 0
     for name, value in CONSTANT.items():
@@ -45,5 +45,6 @@ async def equals_the_golden_board(dut):
                 raise AssertionError(f"period {chunk.number}, clock {k}: {dict(zip(SEEN, zip(got, wanted)))}")
             clocks += 1
     facts = {"clocks": clocks, "samples": loop.golden.samples, "rpm": chunk.omega_m * 9.549, **status(chunk)}
+    facts["fault_flags"] = loop.golden.state.of_core.of_fault_latch.flags
     with open("board.json", "w") as file:
         json.dump(facts, file)

@@ -9,8 +9,9 @@ An edge after a reversal is the edge passed before, so it moves the shaft by no 
 has no speed.  The first edge after a reset is where counting begins.
 
 ``k_edge`` = 2*pi * pole_pairs * clock_hz / (counts * omega_base); see ``setting``.  ``reverse`` inverts the sense.
-Formats: k_edge U(16,16), counts 16 bits and clocks 24 bits, both saturating, output PU.  A time beyond 24 bits is
-standstill.  Rounding: the size to nearest, halves away from zero; it saturates at 2 per unit.
+Formats: k_edge U(20,12), large for the few edges of Hall sensors; counts 16 bits and clocks 24 bits, both saturating;
+output PU.  A time beyond 24 bits is standstill.
+Rounding: the size to nearest, halves away from zero; it saturates at 2 per unit.
 A sample takes ``TAKES`` clocks from ``sample`` to ``omega_valid``, one bit of the product or the quotient a clock; a
 ``sample`` before that is ignored and its edges belong to the next.
 """
@@ -23,7 +24,8 @@ from fluxproof.golden_model.fixed import Format
 from fluxproof.golden_model.formats import BIT, PU
 from fluxproof.golden_model.kernel import kernel
 
-K_EDGE = Format(0, 16, 16)
+K_EDGE = Format(0, 20, 12)
+UP = PU.frac_bits - K_EDGE.frac_bits  # from the product's fraction bits to the quotient's, less the rounding bit
 TIME_W, MOVED_W, QUOTIENT_W = 24, 16, 19
 TIME_MAX = (1 << TIME_W) - 1
 MOVED_MAX = (1 << MOVED_W) - 1
@@ -88,8 +90,8 @@ def step(state, step_up, step_down, sample, reverse, k_edge):
             factor = (s.factor << 1) & MOVED_MAX
             work = 2 * s.work + (k_edge if bit else 0)
         elif s.clock == DIVIDE_AT:
-            past = 1 if (s.work >> (QUOTIENT_W - 1)) >= s.divisor else 0
-            work = 0 if past else 2 * s.work
+            past = 1 if (s.work >> (QUOTIENT_W - 1 - UP)) >= s.divisor else 0
+            work = 0 if past else s.work << (1 + UP)
         elif s.clock < LIMIT_AT:
             top, low = 2 * s.work >> QUOTIENT_W, (2 * s.work) & ((1 << QUOTIENT_W) - 1)
             enough = top >= s.divisor
@@ -139,7 +141,7 @@ def stimuli(rng, config):
     rows = []
 
     def run(clocks, **writes):
-        base = {"step_up": 0, "step_down": 0, "sample": 0, "reverse": 0, "k_edge": 60 << 16}
+        base = {"step_up": 0, "step_down": 0, "sample": 0, "reverse": 0, "k_edge": 60 << 12}
         rows.extend(base | writes for _ in range(clocks))
 
     def sample(**writes):
@@ -147,7 +149,7 @@ def stimuli(rng, config):
         run(TAKES + 2, **writes)
 
     sample()
-    for k_edge in (60 << 16, 0, 1, K_EDGE.hi, 7 << 14):
+    for k_edge in (60 << 12, 0, 1, K_EDGE.hi, 7 << 10):
         for reverse in (0, 1):
             regs = {"k_edge": k_edge, "reverse": reverse}
             for name in ("step_up", "step_down"):
@@ -196,6 +198,7 @@ BLOCK = Block(
         "TIME_W": TIME_W,
         "MOVED_W": MOVED_W,
         "QUOTIENT_W": QUOTIENT_W,
+        "UP": UP,
         "DIVIDE_AT": DIVIDE_AT,
         "LIMIT_AT": LIMIT_AT,
         "LAST": LAST,

@@ -57,7 +57,7 @@ def step(
 def stimuli(rng, config):
     """Turns in both directions at three speeds, bounce, a wire that is lost."""
     rows = []
-    still = {p.name: 0 for p in BLOCK.inputs + BLOCK.registers} | {"k_edge": 900 << 16, "hall_offset": 9999}
+    still = {p.name: 0 for p in BLOCK.inputs + BLOCK.registers} | {"k_edge": 900 << 12, "hall_offset": 9999}
     still |= {"filter_clocks": 1, "start_first": 77, "sector_counts": 160}
     for k in range(4200):
         sector = (k // 23 if k < 1000 else 43 - k // 40 if k < 2200 else k // 9) % 6

@@ -796,6 +796,7 @@ package fluxproof_pkg is
   constant EDGE_TIMER_TIME_W : natural := 24;
   constant EDGE_TIMER_MOVED_W : natural := 16;
   constant EDGE_TIMER_QUOTIENT_W : natural := 19;
+  constant EDGE_TIMER_UP : natural := 4;
   constant EDGE_TIMER_DIVIDE_AT : natural := 17;
   constant EDGE_TIMER_LIMIT_AT : natural := 37;
   constant EDGE_TIMER_LAST : natural := 38;
