@@ -202,6 +202,7 @@ class BoardClock:
         self.clock = 0
         self.observed: fluxproof.Observed | None = None
         self.samples = 0
+        self.history: list[tuple[fluxproof.Sample, fluxproof.Observed]] = []  # of the samples
         self._due: list[tuple[int, dict[str, int]]] = []
         self._writes: list[tuple[int, str, int]] = []
         self._taken: list[tuple[int, str, int]] = []  # registers that change
@@ -287,5 +288,7 @@ class BoardClock:
             position_restart=1 if values["position_restart"] or w.position_restart else 0,
         )
         self.of_samples, self.observed = fluxproof.step(self.of_samples, sample, registers, self.blocks.core)
+        del self.history[self.samples - 1 :]  # of a clock that is made again
+        self.history.append((sample, self.observed))
         for after, names in clocked.DUE.values():
             self._due.append((self.clock - 1 + after, {name: getattr(self.observed, name) for name in names}))

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from cocotb_tests.support.board_loop import CONSTANT
 from cocotb_tests.support.board_runs import (
+    HUB_PERIODS,
     RPM,
     RUNS,
     SNAP_AT,
@@ -18,10 +20,17 @@ from cocotb_tests.support.board_runs import (
     status,
 )
 from cocotb_tests.support.needs import skip_without_ghdl5
+from fluxproof.checkout import DRIVES
+from fluxproof.command import main
 from fluxproof.cosim import ghdl
 from fluxproof.cosim.board_clock import SEEN
 from fluxproof.cosim.verilated import VerilatedCore
+from fluxproof.diagnosis.recording import from_columns
+from fluxproof.diagnosis.replay import digital, telemetry
+from fluxproof.golden_model.board_registers import board_set
+from fluxproof.golden_model.fluxproof import Observed, Sample
 from fluxproof.golden_model.generated.register_names import ADDRESSES
+from fluxproof.golden_model.io.telemetry_words import COUNT, pack
 from fluxproof.plant.sensors import current_code
 
 
@@ -35,7 +44,7 @@ def in_ghdl(periods: int, run: str = "standstill", compiled: bool = False) -> di
     folder = ghdl.run("fluxproof_board", "cocotb_tests.support.dut_board", generics, environment, key=key)
     problem = ghdl.failure(folder)
     assert problem is None, problem
-    return json.loads((folder / "board.json").read_text())
+    return json.loads((folder / "board.json").read_text()) | {"folder": folder}
 
 
 def test_closed_loop_in_ghdl():
@@ -54,11 +63,36 @@ def test_closed_loop_over_2000_periods(figure):
     assert facts["rpm"] < -0.9 * RPM and facts["samples"] > 1900
 
 
-def test_a_drive_file_with_hall_sensors_and_xadc_in_ghdl():
-    """40 periods: every register from the file; the shaft turns by its Hall sensors."""
-    facts = in_ghdl(40, "hub_36v, slow clock")
-    assert facts["samples"] > 12 and facts["encoder_flags"] >> 5 & 1 and facts["rpm"] > 0.1
+def test_a_drive_file_with_hall_sensors_and_xadc_in_ghdl(tmp_path):
+    """Every register from the file; the shaft turns, the speed is that between its Hall edges; the stream replays."""
+    facts = in_ghdl(HUB_PERIODS, "hub_36v, slow clock")
+    assert facts["samples"] > 25 and facts["encoder_flags"] >> 5 & 1 and facts["rpm"] > 200
     assert facts["board_flags"] == facts["illegal_count"] == facts["fault_flags"] == 0
+    check_stream(facts, RUNS["hub_36v, slow clock"]().drive, tmp_path)
+
+
+def check_stream(facts: dict, drive, folder: Path) -> None:
+    """The stream is what the golden board has seen, and `fluxproof dump` makes a recording that replays equal.
+
+    The speed of every sample is that between edges, which no register has.
+    """
+    words = np.fromfile(facts["folder"] / "capture.bin", "<u4").reshape(-1, COUNT)
+    said = [dict(zip(Sample._fields, a)) | dict(zip(Observed._fields, b)) for a, b in facts["history"]]
+    wanted = [pack(k, values) for k, values in enumerate(said)]
+    assert len(words) > 10 and words.tolist() == [list(wanted[k]) for k in words[:, 1]]
+    assert all(values["speed_was_given"] for values in said[-len(words) :])
+    register_set, path = board_set(drive), folder / "run.fluxdump"
+    given = {"registers": register_set.values._asdict(), "generics": register_set.config._asdict()}
+    (folder / "registers.json").write_text(json.dumps(given))
+    command = ["dump", str(facts["folder"] / "capture.bin"), "--drive", str(DRIVES / "hub_36v.toml")]
+    assert main([*command, "--registers", str(folder / "registers.json"), "-o", str(path)]) == 0
+    columns, meta = telemetry.read_dump(path)
+    found = from_columns(columns, drive.sample_time_s, str(path))
+    found.meta = meta
+    got, _ = digital.replay(found)
+    assert got.checked and got.samples == len(words) and got.first_difference is None, got
+    meta["observed"]["speed_was_given"][:] = 0  # without it the replay takes the speed of the code
+    assert digital.replay(found)[0].samples != len(words)
 
 
 @pytest.mark.study

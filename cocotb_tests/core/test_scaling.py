@@ -89,7 +89,7 @@ def test_position_steps_give_speed_and_angle_advance(path):
     v, config, _ = registers(drive)
     state, code = speed.State(), 0
     for code in range(0, 3000, 10):
-        state, (omega_me,) = speed.step(
+        state, (omega_me, *_) = speed.step(
             state, code, v.reverse, v.k_speed, v.k_filter, 0, 0, 0, config.position_bits
         )
     turns = 10 / 2**drive.sensors.position_bits

@@ -25,7 +25,7 @@ from fluxproof.golden_model.registers import registers
 from fluxproof.plant import sensor_params
 
 COUNTS = 4000
-SLOT = 120  # clocks between two writes: more than a sample takes
+SLOT = 70  # clocks between two writes: a setting waits for the end of a sample
 AXI = ("s_axi_awaddr", "s_axi_wdata", "s_axi_awvalid", "s_axi_wvalid")
 CONSTANT = {"s_axi_wstrb": 15, "s_axi_bready": 1, "s_axi_rready": 1, "m_axis_tready": 1}
 ANSWERED = ("serial_clock", "serial_out", "serial_drive", "convst", "cs_n", "sclk", "den", "daddr", "mod_clock")
@@ -56,16 +56,16 @@ class Chunk:
 class BoardLoop:
     """``writes``: {period: {register: value}} after the settings, which take the first periods (``settled``).
 
-    ``theta_m``: what the encoder shows of the shaft's place at the start [mechanical rad].
+    ``theta_m``: what the encoder shows of the shaft's place at the start [mechanical rad]; ``omega_m``: speed [rad/s].
     """
 
-    def __init__(self, drive: Drive, writes: dict, seed: int = 1, theta_m: float = 0.0):
+    def __init__(self, drive: Drive, writes: dict, seed: int = 1, theta_m: float = 0.0, omega_m: float = 0.0):
         self.drive, self.start_angle, self.writes = drive, theta_m, writes
         self.clock_hz = round(drive.core.clock_hz)
         self.registers = registers(drive)
         self.blocks = GoldenBlocks(self.registers.config, **board_generics(drive))
         self.golden = BoardClock(self.blocks, self.clock_hz)
-        self.plant, sensors = build_plant(drive)
+        self.plant, sensors = build_plant(drive, omega_m=omega_m)
         self.codes = sensor_params(sensors)
         self.pins = Pins(drive, self.codes, seed)
         self.length = 2 * self.registers.config.carrier_half

@@ -16,6 +16,7 @@ DRIVE = DRIVES / "paper001.toml"
 RPM, BEFORE_INDEX = 600.0, 0.05  # rad of the shaft from the start to the index
 CARRIER_HALF = 250
 SNAP_AT, TURNS_BACK = 110, 1200
+HUB_PERIODS = 44
 PART = 0.2  # of the rated speed
 
 
@@ -33,29 +34,36 @@ def start_from_standstill() -> BoardLoop:
     return BoardLoop(drive, writes, theta_m=-BEFORE_INDEX)
 
 
-def of_drive(name: str, clock_hz: float | None = None, periods: int = 400) -> BoardLoop:
+def of_drive(
+    name: str, clock_hz: float | None = None, periods: int = 400, omega_m: float = 0.0, ahead: float = 0.0
+) -> BoardLoop:
     """A drive file with its own front ends, all registers from the file: to PART of its rated speed, half-way back.
 
-    ``clock_hz``: another clock of the core, for a file whose front ends take it.
+    ``clock_hz``: another clock of the core, for a file whose front ends take it.  ``omega_m`` [rad/s]: speed at the
+    start, where the encoder is ``ahead`` of the rotor [mechanical rad], which theta_offset knows.
     """
     drive = load(DRIVES / f"{name}.toml")
     if clock_hz is not None:
         drive = replace(drive, core=replace(drive.core, clock_hz=clock_hz))
-    loop = BoardLoop(drive, {})
+    offset = -drive.machine.pole_pairs * ahead % (2 * np.pi)
+    drive = replace(drive, sensors=replace(drive.sensors, theta_offset_rad=offset))
+    loop = BoardLoop(drive, {}, theta_m=ahead, omega_m=omega_m)
     rated = drive.machine.rated_speed_rad_s * drive.machine.pole_pairs
     reference, begin = PU.to_int(PART * rated / drive.bases.omega_me_rad_s), loop.settled
     loop.writes |= {
+        begin: {"telemetry_enable": 1},
         begin + 1: {"clear_encoder": 1},
         begin + 2: {"enable": 1},
         begin + 3: {"speed_mode": 1, "omega_ref": reference},
-        (begin + periods) // 2: {"omega_ref": -reference},
+        begin + (2 * (periods - begin)) // 3: {"omega_ref": -reference},
     }
     return loop
 
 
 RUNS = {
     "standstill": start_from_standstill,
-    "hub_36v, slow clock": lambda: of_drive("hub_36v", 8e6, 40),  # 500 clocks a period
+    # The shaft turns such that two edges of the Hall sensors come in time
+    "hub_36v, slow clock": lambda: of_drive("hub_36v", 8e6, HUB_PERIODS, 38.0, 0.052),
 }
 
 

@@ -6,6 +6,7 @@ import json
 import os
 
 import cocotb
+import numpy as np
 from cocotb.clock import Clock
 from cocotb.triggers import FallingEdge
 
@@ -30,7 +31,7 @@ async def equals_the_golden_board(dut):
     for _ in range(2):  # the reset inside is two clocks later
         await FallingEdge(dut.aclk)
     outputs = [getattr(dut, name) for name in SEEN]
-    clocks = 0
+    clocks, words = 0, []
     for chunk in loop.run(int(os.environ["FLUXPROOF_PERIODS"])):
         changes = [(getattr(dut, name), column.tolist()) for name, column in chunk.inputs.items()]
         driven = [None] * len(changes)
@@ -44,7 +45,12 @@ async def equals_the_golden_board(dut):
             if got != wanted:
                 raise AssertionError(f"period {chunk.number}, clock {k}: {dict(zip(SEEN, zip(got, wanted)))}")
             clocks += 1
+            if read(dut.m_axis_tvalid, False):
+                words.append(read(dut.m_axis_tdata, False))
     facts = {"clocks": clocks, "samples": loop.golden.samples, "rpm": chunk.omega_m * 9.549, **status(chunk)}
     facts["fault_flags"] = loop.golden.state.of_core.of_fault_latch.flags
+    np.array(words, "<u4").tofile("capture.bin")
+    history = [(list(sample), list(observed)) for sample, observed in loop.golden.history]
+    facts["history"] = [[list(map(int, row)) for row in pair] for pair in history]
     with open("board.json", "w") as file:
         json.dump(facts, file)
