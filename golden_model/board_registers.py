@@ -17,7 +17,7 @@ from fluxproof.golden_model.drive import Drive
 from fluxproof.golden_model.drive_keys import DriveError
 from fluxproof.golden_model.encoders import edge_timer, position_bridge, turn_counter
 from fluxproof.golden_model.front_ends import frame_s
-from fluxproof.golden_model.io import board_map
+from fluxproof.golden_model.io import board_map, speed
 from fluxproof.golden_model.io.sample_checks import JUMP
 from fluxproof.golden_model.registers import RegisterSet, Row, registers
 
@@ -63,7 +63,8 @@ def core_changes(drive: Drive) -> dict[str, int]:
     kind = drive.encoder.kind
     if kind == "hall":  # theta_hall is an electrical angle already
         jump = JUMP.to_int(HALL_JUMP) if drive.protection.position_jump_rad is None else None
-        changes = {"speed_given": 1, "pole_pairs": 1}
+        per_turn = 2.0 * math.pi / drive.sample_time_s / drive.bases.omega_me_rad_s
+        changes = {"speed_given": 1, "pole_pairs": 1, "k_speed": speed.K_SPEED.to_int(per_turn)}
         return changes if jump is None else changes | {"jump_max": jump}
     return {"speed_given": 1} if kind == "abz" else {}
 

@@ -42,7 +42,7 @@ def offsets(session: Session) -> Step:
     s.load()
     seen = s.look(SAMPLES)
     moved = np.ptp(seen.code)
-    if moved > MOVING_TURNS + 2.0 / min(2**drive.sensors.position_bits, drive.encoder.counts or 1 << 30):
+    if moved > MOVING_TURNS + 2.0 * s.code_step:
         raise Refusal(f"the shaft turned by {360 * moved:.2g} degrees with the gates off, expected standstill")
     u_dc, nominal = float(seen.u_dc.mean()), drive.inverter.dc_bus_v
     if u_dc < LEAST_BUS * nominal:
