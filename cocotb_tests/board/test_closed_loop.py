@@ -32,6 +32,7 @@ from fluxproof.diagnosis.replay import digital, telemetry
 from fluxproof.golden_model.board_registers import board_set
 from fluxproof.golden_model.fluxproof import Observed, Sample
 from fluxproof.golden_model.generated.register_names import ADDRESSES
+from fluxproof.golden_model.io.fault_latch import TRIP
 from fluxproof.golden_model.io.telemetry_words import COUNT, pack
 from fluxproof.plant.sensors import current_code
 
@@ -69,7 +70,8 @@ def test_a_drive_file_with_hall_sensors_and_xadc_in_ghdl(tmp_path):
     """Every register from the file; the shaft turns, the speed is that between its Hall edges; the stream replays."""
     facts = in_ghdl(HUB_PERIODS, "hub_36v, slow clock", tmp_path)
     assert facts["samples"] > 25 and facts["encoder_flags"] >> 5 & 1 and facts["rpm"] > 200
-    assert facts["board_flags"] == facts["illegal_count"] == facts["fault_flags"] == 0
+    assert facts["board_flags"] == facts["illegal_count"] == 0
+    assert facts["fault_flags"] == 1 << TRIP and facts["gates_after"] == 0, "the pulse at the trip pin alone"
     check_stream(facts, RUNS["hub_36v, slow clock"]().drive, tmp_path)
 
 

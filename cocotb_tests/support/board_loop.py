@@ -73,6 +73,7 @@ class BoardLoop:
         self.per_period = self.length // SLOT
         self.settled = -(-len(self.queue) // self.per_period) + 1
         self.before: np.ndarray | None = None  # SEEN of the period before
+        self.trips: dict[int, slice] = {}  # period -> clocks at which the trip pin is 1
 
     def generics(self) -> dict[str, int]:
         """Of the VHDL."""
@@ -99,6 +100,8 @@ class BoardLoop:
             if self.pins.waveform:
                 motor.waveform = self._driven(copy.deepcopy(self.plant), guess, PIECES)
             inputs = pins.drive({n: guess[:, SEEN.index(n)] for n in ANSWERED}, motor)
+            inputs["trip"] = np.zeros(length, np.int64)
+            inputs["trip"][self.trips.get(number, slice(0))] = 1
             rows = np.stack([inputs.get(n, np.zeros(length, np.int64)) for n in PINS], axis=1)
             self._restore(before)
             seen, status = self.golden.advance(rows)

@@ -200,6 +200,7 @@ def main(run: str, periods: int, folder: Path) -> int:
     )
     facts = {"clocks": clocks, "samples": loop.golden.samples, "rpm": chunks[-1].omega_m * 9.549, **status(chunks[-1])}
     facts["fault_flags"] = loop.golden.state.of_core.of_fault_latch.flags
+    facts["gates_after"] = int(chunks[-1].seen[-100:, :2].max())
     facts["history"] = [[list(map(int, row)) for row in pair] for pair in loop.golden.history]
     write_text(folder / "board.json", json.dumps(facts))
     return 0

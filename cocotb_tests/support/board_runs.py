@@ -43,12 +43,13 @@ def of_drive(
     omega_m: float = 0.0,
     ahead: float = 0.0,
     estimators: bool = True,
+    trip_at: int | None = None,
 ) -> BoardLoop:
     """A drive file with its own front ends, all registers from the file: to PART of its rated speed, half-way back.
 
     ``clock_hz``: another clock of the core, for a file whose front ends take it.  ``omega_m`` [rad/s]: speed at the
     start, where the encoder is ``ahead`` of the rotor [mechanical rad], which theta_offset knows.  GHDL is much faster
-    without ``estimators``.
+    without ``estimators``.  ``trip_at``: period with a pulse of a clock at the trip pin.
     """
     drive = load(DRIVES / f"{name}.toml")
     if clock_hz is not None:
@@ -67,6 +68,8 @@ def of_drive(
         begin + 3: {"speed_mode": 1, "omega_ref": reference},
         begin + (2 * (periods - begin)) // 3: {"omega_ref": -reference},
     }
+    if trip_at is not None:
+        loop.trips[trip_at] = slice(150, 151)
     return loop
 
 
@@ -74,7 +77,7 @@ RUNS = {
     "standstill": start_from_standstill,
     "standstill, short periods": lambda: start_from_standstill(SHORT_HALF),
     # The shaft turns such that two edges of the Hall sensors come in time
-    "hub_36v, slow clock": lambda: of_drive("hub_36v", 8e6, HUB_PERIODS, 38.0, 0.052, estimators=False),
+    "hub_36v, slow clock": lambda: of_drive("hub_36v", 8e6, HUB_PERIODS, 38.0, 0.052, False, HUB_PERIODS - 1),
 }
 
 
