@@ -3,7 +3,8 @@
 The front ends' twins (golden_model/encoders, converters, io) and the clocked part of the core are wired as in
 rtl/generated/fluxproof_board.vhd: what an instance reads from another is what that had registered before the clock.
 Registers are written by name; a write on the bus takes effect ``BUS`` clocks after its address and data were first
-valid, a setting then waits for the end of the sample in flight (io/register_access.vhd).  The trip pin is not modelled.
+valid, a setting then waits for the end of the sample in flight (io/register_access.vhd).  The trip pin, which acts
+without a clock, changes between two clocks here (io/power_stage.vhd).
 """
 
 from __future__ import annotations
@@ -25,8 +26,8 @@ REFERENCES = ("omega_ref", "i_d_ref", "i_q_ext", "speed_mode", "temp_winding", "
 # The pins in the order of the blocks' inputs; what is not a pin comes from another block or a register.
 POSITION_PINS = tuple(p.name for p in position_front.BLOCK.inputs[:8])
 CONVERTER_PINS = tuple(p.name for p in current_front.BLOCK.inputs[:12])
-PINS = POSITION_PINS + CONVERTER_PINS
-AT_CONVERTERS = len(POSITION_PINS)
+PINS = (*POSITION_PINS, *CONVERTER_PINS, "trip")
+AT_CONVERTERS, AT_TRIP = len(POSITION_PINS), len(PINS) - 1
 GATES = ("gate_high", "gate_low", "sample_trigger", "irq")
 SEEN = (*GATES, "serial_clock", "serial_out", "serial_drive", "convst", "cs_n", "sclk", "den", "daddr", "mod_clock")
 # What is not a pin, of the same rows
@@ -77,6 +78,9 @@ class State(NamedTuple):
     of_faults: board_faults.State = board_faults.State()
     of_snapshot: board_snapshot.State = board_snapshot.State()
     of_interrupts: interrupts.State = interrupts.State()
+    caught: int = 0  # of the trip pin
+    trip_1: int = 0
+    trip_2: int = 0
     wires: Wires = Wires()
 
 
@@ -89,7 +93,7 @@ BoardRegisters = NamedTuple(
 
 @kernel
 def one_clock(state, inputs, regs, b, pins, carrier_half, config):
-    """One clock: (next state, whether a sample has entered, core, position, converters, board, snapshot outputs)."""
+    """One clock: (next state, whether a sample has entered, core, position, converters, board, snapshot, gates off)."""
     w, p, c = state.wires, pins, AT_CONVERTERS
     encoder, currents, adc_bits, position_bits, lines = config
     position, seen_position = position_step(
@@ -121,9 +125,9 @@ def one_clock(state, inputs, regs, b, pins, carrier_half, config):
         w.encoder_flags, w.adc_a, w.adc_b, w.adc_c, w.adc_u_dc, adc_bits, position_bits,
     )  # fmt: skip
     now = clocked.Inputs(
-        w.sample_valid, inputs.enable, w.board_stop, inputs.clear_trip, inputs.host_write, inputs.sample_faults,
-        inputs.sample_trip, inputs.current_offset, inputs.motion_faults, inputs.open_load, inputs.brake_asked,
-        inputs.compare_a, inputs.compare_b, inputs.compare_c,
+        w.sample_valid, inputs.enable, 1 if w.board_stop or state.trip_2 else 0, inputs.clear_trip,
+        inputs.host_write, inputs.sample_faults, inputs.sample_trip, inputs.current_offset, inputs.motion_faults,
+        inputs.open_load, inputs.brake_asked, inputs.compare_a, inputs.compare_b, inputs.compare_c,
     )  # fmt: skip
     core, entered, seen_core = clocked.step(state.of_core, now, regs, carrier_half)
     causes, (_, irq) = interrupts_step(
@@ -137,9 +141,14 @@ def one_clock(state, inputs, regs, b, pins, carrier_half, config):
         position_code, position_restart, speed_now, board_stop, seen_core.running, seen_core.tripped,
         seen_core.fault_flags, seen_core.setting_refused, irq,
     )  # fmt: skip
-    following = State(core, position, converters, forcing, join, faults, snapshot, causes, wires)
+    # The power stage: a trip is caught without a clock, and let go when the core has it
+    caught = 1 if p[AT_TRIP] or state.caught else 0
+    kept = 1 if p[AT_TRIP] or (caught and not state.trip_2) else 0
+    following = State(
+        core, position, converters, forcing, join, faults, snapshot, causes, kept, caught, state.trip_1, wires
+    )
     board = (forced, board_flags, board_first)
-    return following, entered, seen_core, seen_position, seen_converters, board, seen_snapshot
+    return following, entered, seen_core, seen_position, seen_converters, board, seen_snapshot, caught
 
 
 @kernel
@@ -154,11 +163,12 @@ def run_clocks(state, inputs, regs, b, pins, carrier_half, config, until_idle, s
         if k > 0 and until_idle and not state.of_core.sample_busy:
             return state, k, 0, before
         before = state.wires
-        state, entered, core, position, converters, board, snapshot = one_clock(
+        state, entered, core, position, converters, board, snapshot, off = one_clock(
             state, inputs, regs, b, pins[k], carrier_half, config
         )
         x = seen[k]
-        x[0], x[1], x[2], x[3] = before.gate_high, before.gate_low, before.trigger, state.wires.irq
+        x[0], x[1] = 0 if off else before.gate_high, 0 if off else before.gate_low
+        x[2], x[3] = before.trigger, state.wires.irq
         x[4], x[5], x[6] = position[12], position[13], position[14]
         x[7], x[8], x[9], x[10], x[11], x[12] = (
             converters[8], converters[9], converters[10], converters[11], converters[12], converters[13]
@@ -202,6 +212,7 @@ class BoardClock:
         self.clock = 0
         self.observed: fluxproof.Observed | None = None
         self.samples = 0
+        self.history: list[tuple[fluxproof.Sample, fluxproof.Observed]] = []  # of the samples
         self._due: list[tuple[int, dict[str, int]]] = []
         self._writes: list[tuple[int, str, int]] = []
         self._taken: list[tuple[int, str, int]] = []  # registers that change
@@ -287,5 +298,7 @@ class BoardClock:
             position_restart=1 if values["position_restart"] or w.position_restart else 0,
         )
         self.of_samples, self.observed = fluxproof.step(self.of_samples, sample, registers, self.blocks.core)
+        del self.history[self.samples - 1 :]  # of a clock that is made again
+        self.history.append((sample, self.observed))
         for after, names in clocked.DUE.values():
             self._due.append((self.clock - 1 + after, {name: getattr(self.observed, name) for name in names}))

@@ -11,9 +11,10 @@ import json
 from pathlib import Path
 
 from fluxproof.golden_model import fluxproof
+from fluxproof.golden_model.board_registers import board_set
 from fluxproof.golden_model.drive import load
 from fluxproof.golden_model.drive_keys import DriveError
-from fluxproof.golden_model.registers import RegisterSet, registers
+from fluxproof.golden_model.registers import RegisterSet
 
 REPLAY = {
     "reset": "begins with the first sample after a reset: the golden model can replay all of it",
@@ -48,7 +49,7 @@ def run(args: argparse.Namespace) -> int:
 
     drive = load(args.drive)
     try:
-        register_set = registers(drive)
+        register_set = board_set(drive)
     except DriveError as error:
         raise DriveError(f"{args.drive}: {error}") from None
     if args.registers:

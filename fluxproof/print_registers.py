@@ -10,10 +10,11 @@ import json
 from pathlib import Path
 
 from fluxproof.files import write_json
+from fluxproof.golden_model.board_registers import board_generics, board_set, has_board
 from fluxproof.golden_model.drive import Drive, load
 from fluxproof.golden_model.drive_keys import DriveError
 from fluxproof.golden_model.generated.register_names import ADDRESSES
-from fluxproof.golden_model.registers import RegisterSet, Row, registers
+from fluxproof.golden_model.registers import RegisterSet, Row
 from fluxproof.golden_model.units import SIGNALS, si_per_lsb
 
 HEAD = ("register", "address", "SI value", "unit", "integer", "represented", "error", "legal range")
@@ -36,7 +37,7 @@ def run(args: argparse.Namespace) -> int:
     """Print the table and write the JSON file if one is asked for."""
     drive = load(args.drive)
     try:
-        result = registers(drive)
+        result = board_set(drive)
     except DriveError as error:
         raise DriveError(f"{args.drive}: {error}") from None
     if args.json:
@@ -61,6 +62,7 @@ def c_lines(name: str, drive: Drive, result: RegisterSet) -> list[str]:
     bases = {**vars(drive.bases), "flux_wb": drive.bases.flux_wb, "torque_nm": torque}
     bases["sample_time_s"] = drive.sample_time_s
     generics = {**result.config._asdict(), "clock_hz": round(drive.core.clock_hz)}
+    generics |= board_generics(drive) if has_board(drive) else {}
     rows = []
     for r in result.rows:
         unit = "" if r.unit == "1" else f" {r.unit}"
@@ -93,6 +95,7 @@ def c_lines(name: str, drive: Drive, result: RegisterSet) -> list[str]:
 def bases_lines(drive: Drive, result: RegisterSet) -> list[str]:
     """The SI values of 1.0 per unit, and the generics."""
     bases, config = drive.bases, result.config._asdict()
+    config |= board_generics(drive) if has_board(drive) else {}
     return [
         f"bases     {bases.current_a:g} A, {bases.voltage_v:g} V, {bases.omega_me_rad_s:g} rad/s electrical,"
         f" {bases.flux_wb:.6g} Wb; all peak; T_s = {drive.sample_time_s:g} s",

@@ -238,6 +238,11 @@ class Drive:
         return self.machine.rated_current_a if limit is None else limit
 
     @property
+    def current_sensors(self):
+        """2 where [sensors] or [converters] say so: the third current is computed then."""
+        return min(self.sensors.current_sensors, self.converters.currents)
+
+    @property
     def nominal_flux_wb(self):
         """Magnitude of the flux linkage at i_d = 0 and rated current."""
         m = self.machine
@@ -281,4 +286,5 @@ def with_carrier(drive, carrier_half):
     core = dataclasses.replace(drive.core, clock_hz=2.0 * carrier_half * drive.inverter.pwm_frequency_hz)
     # Front ends whose own clock comes from the core's are not part of such a simulation: it starts at the codes.
     encoder = drive.encoder if drive.encoder.clock_hz is None else Encoder()
-    return dataclasses.replace(drive, core=core, encoder=encoder, converters=Converters())
+    converters = Converters(currents=drive.converters.currents)
+    return dataclasses.replace(drive, core=core, encoder=encoder, converters=converters)

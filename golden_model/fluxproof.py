@@ -284,6 +284,8 @@ class Observed(NamedTuple):
     motion_faults: int
     open_load: int
     brake_asked: int
+    speed_was_given: int
+    position_restarted: int
     code_a: int
     code_b: int
     code_c: int
@@ -297,18 +299,33 @@ class Observed(NamedTuple):
 NOTHING_GIVEN, NOTHING_ESTIMATED = estimation.ForControl(), estimation.Estimated()
 
 
+class Given(NamedTuple):
+    """What the speed of one sample came from; registers, which the front ends of a board set for each sample."""
+
+    speed_given: int
+    omega_given: int
+    position_restart: int
+
+
 @kernel
 def step(state, sample, regs, config):
     """One control period: (next state, Observed)."""
+    given = Given(regs.speed_given, regs.omega_given, regs.position_restart)
+    return step_given(state, sample, regs, config, given)
+
+
+@kernel
+def step_given(state, sample, regs, config, of_speed):
+    """One control period with ``of_speed`` in place of the registers: (next state, Observed)."""
     x, r, c = sample, regs, config
     i_a, i_b, i_c, current_at_rail = current_conditioning.step(
         x.adc_a, x.adc_b, x.adc_c, r.offset_a, r.offset_b, r.offset_c, r.gain_a, r.gain_b, r.gain_c, r.two_sensors,
         c.adc_bits,
     )  # fmt: skip
     (theta_me,) = position.step(x.position_code, r.reverse, r.pole_pairs, r.theta_offset, c.position_bits)
-    speed_state, (omega_me,) = speed.step(
-        state.of_speed, x.position_code, r.reverse, r.k_speed, r.k_filter, r.position_restart, r.speed_given,
-        r.omega_given, c.position_bits,
+    speed_state, (omega_me, speed_was_given, position_restarted) = speed.step(
+        state.of_speed, x.position_code, r.reverse, r.k_speed, r.k_filter, of_speed.position_restart,
+        of_speed.speed_given, of_speed.omega_given, c.position_bits,
     )  # fmt: skip
     u_dc, u_max, u_dc_at_rail = u_dc_conditioning.step(
         x.adc_u_dc, r.u_dc_offset, r.u_dc_gain, r.k_u_max, c.adc_bits
@@ -363,7 +380,7 @@ def step(state, sample, regs, config):
     checks_state, (sample_faults, sample_trip) = sample_checks.step(
         state.of_sample_checks, i_a, i_b, i_c, current_at_rail, u_dc, u_dc_at_rail, x.position_code, r.i_trip,
         r.sum_trip, r.rail_samples, r.u_dc_min, r.u_dc_max, r.jump_max, r.fault_ignore,
-        r.position_restart, c.position_bits,
+        of_speed.position_restart, c.position_bits,
     )  # fmt: skip
     offset_check_state, (current_offset,) = offset_check.step(
         state.of_offset_check, i_a, i_b, i_c, omega_me, x.run, r.omega_stall, r.offset_max
@@ -392,8 +409,8 @@ def step(state, sample, regs, config):
         e.u_applied_beta, e.lambda_c_d, e.lambda_c_q, e.lambda_m_alpha, e.lambda_m_beta, e.merge_known,
         e.delta_lambda_d, e.delta_lambda_q, e.delta_held, e.lambda_pi_d, e.lambda_pi_q, e.torque, e.flux_faults, e.d_d,
         e.d_q, e.v_dead, e.v_comp, e.v_comp_limited, e.psi_m, e.psi_held, e.temp_lost, sample_faults, sample_trip,
-        current_offset, motion_faults, open_load, brake_asked, x.adc_a, x.adc_b, x.adc_c, x.adc_u_dc, x.position_code,
-        compare_a, compare_b, compare_c,
+        current_offset, motion_faults, open_load, brake_asked, speed_was_given, position_restarted, x.adc_a, x.adc_b,
+        x.adc_c, x.adc_u_dc, x.position_code, compare_a, compare_b, compare_c,
     )  # fmt: skip
 
 

@@ -12,16 +12,21 @@ ENCODERS = {
     "code": ((), ()),
     "abz": (("counts",), ("filter_s", "index_phase")),
     "hall": ((), ("filter_s",)),
-    "ssi": (("bits", "clock_hz"), ("turns_bits", "crc")),
-    "biss": (("bits", "clock_hz"), ("turns_bits", "crc")),
-    "endat": (("bits", "clock_hz"), ("turns_bits", "crc")),
+    "ssi": (("bits", "clock_hz"), ("turns_bits", "crc", "gray", "bridge_samples")),
+    "biss": (("bits", "clock_hz"), ("turns_bits", "crc", "start_s", "bridge_samples")),
+    "endat": (("bits", "clock_hz"), ("turns_bits", "crc", "version", "start_s", "bridge_samples")),
 }
 CONVERTERS = {
     "codes": ((), ("currents",)),
-    "spi": (("clock_hz",), ("currents", "bits", "conversion_s", "two_words")),
-    "xadc": ((), ("currents",)),
-    "delta_sigma": (("clock_hz", "oversampling"), ("currents",)),
+    "spi": (
+        ("clock_hz",),
+        ("currents", "bits", "skip_bits", "conversion_s", "two_words", "mode", "round_trip_s", "signed_codes"),
+    ),
+    "xadc": ((), ("currents", "signed_codes")),
+    "delta_sigma": (("clock_hz", "oversampling"), ("currents", "round_trip_s")),
 }
+# Periods of the serial clock in a frame beside the word, see docs/board.md; BiSS-C and EnDat need start_s besides
+FRAME_PERIODS = {"ssi": 3, "biss": 11, "endat": 18}
 SPI_RATIO = (4, 16)  # clocks of the core in one of the converter, see converters/spi_converter
 
 
@@ -35,6 +40,10 @@ class Encoder:
     turns_bits: int = whole(0, 24, "ssi, biss, endat: bits of whole turns, left out", 0)
     clock_hz: float | None = positive("Hz", "ssi, biss, endat: clock of a frame", None, most=20e6)
     crc: bool | None = flag("check bits of a frame: CRC of biss and endat, even parity of ssi; true if none", None)
+    gray: bool = flag("ssi: the word is in Gray code", False)
+    version: str = choice(("2.1", "2.2"), "endat: mode command of 2.1, or 2.2 with two error bits", "2.2")
+    start_s: float = positive("s", "biss, endat: longest time to the start bit", 5e-6)
+    bridge_samples: int = whole(0, 255, "ssi, biss, endat: samples without a good frame that are bridged", 3)
     filter_s: float | None = not_negative("s", "abz, hall: shorter pulses on a pin have no effect", None)
     index_phase: int | None = whole(0, 3, "abz: quarter of a line in which Z counts; A, B = 00, 10, 11, 01", None)
 
@@ -45,10 +54,14 @@ class Converters:
 
     kind: str = choice(tuple(CONVERTERS), "codes: codes that are ready for the core", "codes")
     currents: int = whole(2, 3, "current sensors; with 2 the third current is computed", 3)
-    bits: int | None = whole(8, 16, "spi: bits of a word; adc_bits if none", None)
+    bits: int | None = whole(12, 32, "spi: bits of a word; adc_bits if none", None)
+    skip_bits: int = whole(0, 20, "spi: bits before the code in a word", 0)
     clock_hz: float | None = positive("Hz", "spi: clock of a frame; delta_sigma: clock of the bits", None)
     conversion_s: float | None = not_negative("s", "spi: from the start of a conversion to its code", None)
     two_words: bool = flag("spi: two channels on a line", False)
+    mode: int | None = whole(0, 3, "spi: mode; none: 2 with chip select, 0 with conversion_s", None)
+    round_trip_s: float = not_negative("s", "spi, delta_sigma: from a clock's edge to stable data at the pin", 15e-9)
+    signed_codes: bool = flag("spi, xadc: two's complement, zero is the middle of the range", False)
     oversampling: int | None = whole(32, 256, "delta_sigma: bits of a sinc3 window's third", None)
 
 
@@ -65,12 +78,21 @@ def check_encoder(drive):
             allowed = f"below {edge_s / 2.0:.4g} s, half the time between two edges of a channel at rated speed"
             _refuse("[encoder] filter_s", e.filter_s, allowed)
     if e.kind in ("ssi", "biss", "endat"):
-        frame_s, period_s = (e.bits + e.turns_bits) / e.clock_hz, drive.sample_time_s
-        if not frame_s < period_s:
-            least = (e.bits + e.turns_bits) / period_s
+        waits = 0.0 if e.kind == "ssi" else e.start_s
+        if not frame_s(drive) < drive.sample_time_s:
+            left = drive.sample_time_s - waits
+            least = (frame_s(drive) - waits) * e.clock_hz / left if left > 0.0 else float("inf")
             _refuse("[encoder] clock_hz", e.clock_hz, f"above {least:.6g} Hz: a frame must end within a PWM period")
         if not e.clock_hz <= drive.core.clock_hz / 4.0:
             _refuse("[encoder] clock_hz", e.clock_hz, f"up to {drive.core.clock_hz / 4.0:g} Hz, a quarter of clock_hz")
+
+
+def frame_s(drive, period_s=None):
+    """Time of a frame of a serial encoder [s], check bits included; ``period_s``: of its clock, clock_hz if none."""
+    e = drive.encoder
+    period_s = 1.0 / e.clock_hz if period_s is None else period_s
+    waits = 0.0 if e.kind == "ssi" else e.start_s
+    return (e.bits + e.turns_bits + FRAME_PERIODS[e.kind]) * period_s + waits
 
 
 def check_converters(drive):
@@ -82,9 +104,10 @@ def check_converters(drive):
         if not lo <= ratio <= hi or abs(ratio / round(ratio) - 1.0) > 1e-6:
             allowed = f"[core] clock_hz = {clock:g} Hz over a whole number from {lo} to {hi}"
             _refuse("[converters] clock_hz", c.clock_hz, allowed)
-        if c.bits is not None and c.bits > drive.sensors.adc_bits:
-            allowed = f"up to [sensors] adc_bits = {drive.sensors.adc_bits}"
-            _refuse("[converters] bits", c.bits, allowed)
+        least = drive.sensors.adc_bits + c.skip_bits
+        if (c.bits or drive.sensors.adc_bits) < least:
+            allowed = f"at least {least}, [sensors] adc_bits and skip_bits: the word must hold the code"
+            _refuse("[converters] bits", c.bits or drive.sensors.adc_bits, allowed)
     if c.kind == "delta_sigma":
         window_s, period_s = (3 * c.oversampling + 1) / c.clock_hz, drive.sample_time_s
         if not window_s <= period_s:

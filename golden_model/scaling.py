@@ -50,7 +50,8 @@ def sensing(drive):
         yield Entry(f"offset_{phase}", code, "code", mid, "[sensors] adc_bits, current_offset_code")
         keys = f"[sensors] current_range_a, current_gain; {base_keys(drive, 'current_a')}"
         yield Entry(f"gain_{phase}", trim * s.current_range_a, "A", b.current_a, keys)
-    yield Entry("two_sensors", int(s.current_sensors == 2), "1", 1.0, "[sensors] current_sensors")
+    keys = "[sensors] current_sensors; [converters] currents"
+    yield Entry("two_sensors", int(drive.current_sensors == 2), "1", 1.0, keys)
     yield Entry("u_dc_offset", s.u_dc_offset_code, "code", mid, "[sensors] adc_bits, u_dc_offset_code")
     keys = f"[sensors] u_dc_range_v, u_dc_gain; {base_keys(drive, 'voltage_v')}"
     yield Entry("u_dc_gain", s.u_dc_gain * s.u_dc_range_v / 2.0, "V", b.voltage_v, keys)

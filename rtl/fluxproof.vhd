@@ -142,7 +142,8 @@ begin
               reverse => settings.reverse, k_speed => settings.k_speed, k_filter => settings.k_filter,
               position_restart => settings.position_restart, speed_given => settings.speed_given,
               omega_given => settings.omega_given,
-              out_valid => omega_valid, omega_me => o.omega_me);
+              out_valid => omega_valid, omega_me => o.omega_me, speed_was_given => o.speed_was_given,
+              position_restarted => o.position_restarted);
 
   bus_voltage : entity work.u_dc_conditioning
     generic map (ADC_BITS => ADC_BITS)

@@ -261,10 +261,29 @@ def test_sinc3_loses_no_resolution(oversampling, sinc_core):
     Theory: the error of the modulator, white with a step of 2, is filtered by (1 - z**-R)**3 / (1 - z**-1) / R**3
     once its own (1 - z**-1)**2 has cancelled two of the three sums: variance 4/12 * (1 + 4 + 1)*R / R**6 = 2/R**5.
     """
+    lost, phase = lost_bits(sinc_core, oversampling, 0.2)
+    assert lost < 0.3
+    # The middle of the window is where the phase says
+    assert abs(phase - 0.3) < 1e-3
+
+
+@pytest.mark.study
+@pytest.mark.parametrize("amplitude", [0.2, 0.5])
+@pytest.mark.parametrize("oversampling", [32, 64, 128, 256])
+def test_sinc3_against_theory(oversampling, amplitude, sinc_core, figure):
+    """At half of full scale the modulator overloads its quantiser, see docs/board.md: the target is missed there."""
+    lost, _ = lost_bits(sinc_core, oversampling, amplitude)
+    name = f"sinc3, {oversampling} bits, {amplitude} of full scale, bits below theory"
+    figure(name, round(lost, 2), "<= 0.3", "bit", lost <= 0.3)
+    assert lost < 0.7
+
+
+def lost_bits(sinc_core, oversampling: int, amplitude: float) -> tuple[float, float]:
+    """(bits below theory, phase [rad]) of a sine of this part of full scale."""
     windows = 400
     n = np.arange((3 * oversampling + 9) * windows)
     turn = 2 * np.pi * 17.0 / n.size
-    bits = modulate(0.2 * np.sin(turn * n + 0.3) + 0.013)
+    bits = modulate(amplitude * np.sin(turn * n + 0.3) + 0.013)
     codes, first = sinc_windows(sinc_core, bits, oversampling, 1, seed=2)
     middle = first + 1.5 * (oversampling - 1)
     basis = np.stack([np.sin(turn * middle), np.cos(turn * middle), np.ones(middle.size)], axis=1)
@@ -273,9 +292,7 @@ def test_sinc3_loses_no_resolution(oversampling, sinc_core):
     theory = np.sqrt(2.0 / oversampling**5 * 32768.0**2 + 1.0 / 12.0)
     lost = np.log2(noise / theory)
     print(f"oversampling {oversampling}: {16 - np.log2(noise * np.sqrt(12)):.2f} bits, {lost:.2f} below theory")
-    assert lost < 0.3
-    # The middle of the window is where the phase says
-    assert abs(np.arctan2(fit[1], fit[0]) - 0.3) < 1e-3
+    return float(lost), float(np.arctan2(fit[1], fit[0]))
 
 
 def test_sinc3_window_centred_on_the_trigger():

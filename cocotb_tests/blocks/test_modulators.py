@@ -94,3 +94,34 @@ def test_overcurrent_trips_in_time_and_not_by_noise(oversampling):
         if over and tripped is None:
             tripped = n
     assert tripped is not None and step_at < tripped <= step_at + 4 * oversampling
+
+
+def below_theory(amplitude: float, oversampling: int = 64) -> tuple[float, float, float]:
+    """Of a sine against a white error of variance 1/3: bits lost in all, variance of the error, part of overload.
+
+    e = v - w is the error of the one-bit quantiser; v - u = (1 - z**-1)**2 e gives it from the bits alone.
+    """
+    u = amplitude * np.sin(2.0 * np.pi * np.arange(1 << 17) * 7.13 / (oversampling * 997) + 0.3)
+    shaped = 2.0 * modulate(u) - 1.0 - u
+    e = np.cumsum(np.cumsum(shaped))
+    box = np.ones(oversampling) / oversampling
+    weights = np.convolve(np.convolve(box, box), box)
+    out = np.convolve(shaped, weights, "valid")[::oversampling]
+    white = np.sum(np.convolve(weights, [1.0, -2.0, 1.0]) ** 2)
+    return 0.5 * np.log2(out.var() / (white / 3.0)), e.var(), np.mean(np.abs(e) > 1.0)
+
+
+def test_the_modulator_and_not_the_filter_loses_bits_near_overload():
+    """The filter here is exact, and bits are missing all the same: the error grows and has colour."""
+    lost = {}
+    for amplitude in (0.2, 0.35, 0.5, 0.7):
+        in_all, variance, overload = below_theory(amplitude)
+        by_variance = 0.5 * np.log2(3.0 * variance)
+        print(
+            f"{amplitude}: |w| > 2 {100 * overload:.0f} %, variance {variance:.2f}, {in_all:.2f} bit below theory, "
+            f"{by_variance:.2f} by the variance, {in_all - by_variance:.2f} by colour"
+        )
+        lost[amplitude] = in_all, by_variance
+        assert 0.0 <= in_all - by_variance < 0.3
+    assert 0.05 < lost[0.2][0] < 0.3 < lost[0.5][0] < 0.65 < lost[0.7][0] < 1.0
+    assert lost[0.5][1] > 0.3

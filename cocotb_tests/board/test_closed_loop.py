@@ -3,46 +3,122 @@
 from __future__ import annotations
 
 import json
+import os
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from cocotb_tests.support.board_loop import CONSTANT
-from cocotb_tests.support.board_runs import RPM, SNAP_AT, first_difference, start_from_standstill, status
+from cocotb_tests.support.board_runs import (
+    HUB_PERIODS,
+    RPM,
+    RUNS,
+    SNAP_AT,
+    first_difference,
+    of_drive,
+    start_from_standstill,
+    status,
+)
 from cocotb_tests.support.needs import skip_without_ghdl5
-from fluxproof.cosim import ghdl
+from fluxproof.checkout import DRIVES, ROOT
+from fluxproof.command import main
 from fluxproof.cosim.board_clock import SEEN
 from fluxproof.cosim.verilated import VerilatedCore
+from fluxproof.diagnosis.recording import from_columns
+from fluxproof.diagnosis.replay import digital, telemetry
+from fluxproof.golden_model.board_registers import board_set
+from fluxproof.golden_model.fluxproof import Observed, Sample
 from fluxproof.golden_model.generated.register_names import ADDRESSES
+from fluxproof.golden_model.io.fault_latch import TRIP
+from fluxproof.golden_model.io.telemetry_words import COUNT, pack
 from fluxproof.plant.sensors import current_code
 
-GENERICS = {"CARRIER_HALF": 250, "CLOCK_HZ": 5_000_000}
+
+def in_ghdl(periods: int, run: str, folder: Path, compiled: bool = False) -> dict[str, float]:
+    """Facts of the run; AssertionError with the first difference.
+
+    ``compiled``: with numba, which takes as long to compile the golden board as to run some hundred periods without.
+    """
+    command = [sys.executable, "-m", "cocotb_tests.support.board_play", run, str(periods), str(folder)]
+    environment = {**os.environ, "NUMBA_DISABLE_JIT": str(int(not compiled))}
+    done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return json.loads((folder / "board.json").read_text()) | {"folder": folder}
 
 
-def in_ghdl(periods: int) -> dict[str, float]:
-    """Facts of the run; AssertionError with the first difference."""
-    # Without numba: to compile the golden board takes as long as to run it so often.
-    environment = {"FLUXPROOF_PERIODS": str(periods), "NUMBA_DISABLE_JIT": "1"}
-    folder = ghdl.run("fluxproof_board", "cocotb_tests.support.dut_board", GENERICS, environment, key=str(periods))
-    problem = ghdl.failure(folder)
-    assert problem is None, problem
-    return json.loads((folder / "board.json").read_text())
-
-
-def test_closed_loop_in_ghdl():
-    """120 periods of 500 clocks: every register over the bus, enabled, the motor turns, the index is found."""
-    facts = in_ghdl(120)
-    assert facts["clocks"] > 120 * 500 and facts["samples"] > 90 and facts["rpm"] > 50
+def test_closed_loop_in_ghdl(tmp_path):
+    """130 periods of 160 clocks: every register over the bus, enabled, the motor turns, the index is found."""
+    facts = in_ghdl(130, "standstill, short periods", tmp_path)
+    assert facts["clocks"] > 130 * 160 and facts["samples"] > 90 and facts["rpm"] > 50
     assert facts["encoder_flags"] & 1 and facts["index_count"] > 0 and facts["illegal_count"] == 0
     assert facts["board_flags"] == 0 and facts["snap_ready"] == 1
 
 
 @pytest.mark.study
 @pytest.mark.timeout(3600)
-def test_closed_loop_over_2000_periods(figure):
-    facts = in_ghdl(2000)
+def test_closed_loop_over_2000_periods(figure, tmp_path):
+    """160 clocks a period: GHDL makes about a thousand clocks a second of this design."""
+    facts = in_ghdl(2000, "standstill, short periods", tmp_path, compiled=True)
     figure("closed loop, A/B/Z and SPI, GHDL against golden, 2,000 periods", 0, 0, "differences", True)
     assert facts["rpm"] < -0.9 * RPM and facts["samples"] > 1900
+
+
+def test_a_drive_file_with_hall_sensors_and_xadc_in_ghdl(tmp_path):
+    """Every register from the file; the shaft turns, the speed is that between its Hall edges; the stream replays."""
+    facts = in_ghdl(HUB_PERIODS, "hub_36v, slow clock", tmp_path)
+    assert facts["samples"] > 25 and facts["encoder_flags"] >> 5 & 1 and facts["rpm"] > 200
+    assert facts["board_flags"] == facts["illegal_count"] == 0
+    assert facts["fault_flags"] == 1 << TRIP and facts["gates_after"] == 0, "the pulse at the trip pin alone"
+    check_stream(facts, RUNS["hub_36v, slow clock"]().drive, tmp_path)
+
+
+def check_stream(facts: dict, drive, folder: Path) -> None:
+    """The stream is what the golden board has seen, and `fluxproof dump` makes a recording that replays equal.
+
+    The speed of every sample is that between edges, which no register has.
+    """
+    words = np.fromfile(facts["folder"] / "capture.bin", "<u4").reshape(-1, COUNT)
+    said = [dict(zip(Sample._fields, a)) | dict(zip(Observed._fields, b)) for a, b in facts["history"]]
+    wanted = [pack(k, values) for k, values in enumerate(said)]
+    assert len(words) > 10 and words.tolist() == [list(wanted[k]) for k in words[:, 1]]
+    assert all(values["speed_was_given"] for values in said[-len(words) :])
+    register_set, path = board_set(drive), folder / "run.fluxdump"
+    given = {"registers": register_set.values._asdict(), "generics": register_set.config._asdict()}
+    (folder / "registers.json").write_text(json.dumps(given))
+    command = ["dump", str(facts["folder"] / "capture.bin"), "--drive", str(DRIVES / "hub_36v.toml")]
+    assert main([*command, "--registers", str(folder / "registers.json"), "-o", str(path)]) == 0
+    columns, meta = telemetry.read_dump(path)
+    found = from_columns(columns, drive.sample_time_s, str(path))
+    found.meta = meta
+    got, _ = digital.replay(found)
+    assert got.checked and got.samples == len(words) and got.first_difference is None, got
+    meta["observed"]["speed_was_given"][:] = 0  # without it the replay takes the speed of the code
+    assert digital.replay(found)[0].samples != len(words)
+
+
+@pytest.mark.study
+@pytest.mark.parametrize("name", ["servo_24v", "hub_36v", "spindle_400v", "drone_24v"])
+def test_drive_file_with_its_pins_in_verilator(name, figure):
+    """400 periods at the file's own clock, with the file's own encoder and converters: start and reversal."""
+    skip_without_ghdl5()
+    loop = of_drive(name)
+    core = VerilatedCore(loop.generics(), top="fluxproof_board")
+    core.set_many(CONSTANT)
+    core.reset()
+    core.tick(2)
+    speeds, different, told = [], 0, ""
+    for chunk in loop.run(400):
+        problem = first_difference(core.play(chunk.inputs, SEEN), chunk.seen, SEEN, chunk.number)
+        different, told = different + (problem is not None), told or problem or ""
+        speeds.append(chunk.omega_m)
+    figure(f"{name}: closed loop of its pins, 400 periods", different, 0, "periods that differ", different == 0)
+    assert different == 0, told
+    latch, rated = loop.golden.state.of_core.of_fault_latch, loop.drive.machine.rated_speed_rad_s
+    assert latch.flags == 0 and status(chunk)["board_flags"] == 0
+    assert max(speeds) > 0.02 * rated and speeds[-1] < max(speeds) and loop.golden.samples > 380
 
 
 @pytest.mark.study

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from fluxproof import command
-from fluxproof.checkout import ROOT
+from fluxproof.checkout import DRIVES
 from fluxproof.commission import command as commissioning
 from fluxproof.commission import wiring
 from fluxproof.commission.bus import CODES, VALUES, WINDOW, BusError, UioBus
@@ -29,7 +29,7 @@ AGAIN = (  # in the study alone
     "open phase b", "open phase c", "current sensors in a circle", "all current sensors reversed", "no index",
     "motor phases swapped",
 )  # fmt: skip
-DRIVE = ROOT / "docs" / "drives" / "spindle_400v.toml"
+DRIVE = DRIVES / "spindle_400v.toml"
 
 
 def test_a_motor_with_a_wrong_file_is_measured():
@@ -152,6 +152,24 @@ def test_values_of_two_samples_are_no_snapshot(tmp_path):
         UioBus(window(tmp_path, snap_ready=0)).snapshot()
     with pytest.raises(DriveError, match="no Fluxproof core"):
         UioBus(window(tmp_path, identification=0))
+
+
+@pytest.mark.study
+@pytest.mark.parametrize("name", ["servo_24v", "hub_36v", "spindle_400v", "drone_24v"])
+def test_drive_files_are_commissioned(name, figure):
+    """With the encoder of the file; Hall sensors alone tell psi less well, see docs/commissioning.md."""
+    drive = load(DRIVES / f"{name}.toml")
+    bus = SimulatedBus(drive, board_of(drive))
+    found, _ = commission(bus, drive)
+    windings = ("resistance_ohm", "inductance_d_h", "inductance_q_h")
+    errors = {
+        key: 100.0 * abs(getattr(found.machine, key) / getattr(drive.machine, key) - 1.0)
+        for key in (*windings, "magnet_flux_wb")
+    }
+    worst, psi = max(errors[key] for key in windings), errors["magnet_flux_wb"]
+    figure(f"{name}: commissioned, largest error of R and L", round(worst, 2), "<= 3", "%", worst <= 3.0)
+    figure(f"{name}: commissioned, error of psi", round(psi, 2), "<= 1", "%", psi <= 1.0)
+    assert worst < 3.0 and psi < (5.0 if drive.encoder.kind == "hall" else 1.0) and bus.peak_a < drive.current_limit_a
 
 
 @pytest.mark.study

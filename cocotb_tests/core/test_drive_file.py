@@ -9,10 +9,10 @@ import pytest
 
 from cocotb_tests.core.test_registers import PAPER, ROOT, each_drive, edited
 from fluxproof.command import main
+from fluxproof.golden_model.board_registers import board_set, has_board
 from fluxproof.golden_model.drive import Drive, load, with_carrier
 from fluxproof.golden_model.drive_keys import DriveError
-from fluxproof.golden_model.fluxproof import REGISTERS, Registers
-from fluxproof.golden_model.registers import registers
+from fluxproof.golden_model.fluxproof import REGISTERS
 
 WRONG = {  # section, line, what the message must contain besides the file's name
     "unknown key": (
@@ -135,14 +135,17 @@ def test_command_prints_an_aligned_table_and_the_same_as_json(tmp_path, capsys, 
     target = tmp_path / "registers.json"
     assert main(["registers", str(path), "--json", str(target)]) == 0
     lines = capsys.readouterr().out.splitlines()
-    drive, result = load(path), registers(load(path))
+    drive = load(path)
+    result = board_set(drive)
     assert lines[0].startswith("bases") and f"{drive.bases.current_a:g} A" in lines[0]
     assert f"CARRIER_HALF = {drive.carrier_half}" in lines[1]
     table = lines[5:]
-    assert len(table) == len(REGISTERS) and len({len(line) for line in table}) == 1
+    assert len(table) == len(result.rows) and len({len(line) for line in table}) == 1
+    assert (len(result.rows) > len(REGISTERS)) == has_board(drive)
     data = json.loads(target.read_text())
     assert data["generics"] == result.config._asdict() and data["bases"]["flux_wb"] == drive.bases.flux_wb
-    for line, name, value in zip(table, Registers._fields, result.values, strict=True):
+    for line, row in zip(table, result.rows, strict=True):
+        name, value = row.name, row.integer
         assert line.split()[0] == name and str(value) in line.split()
         assert data["registers"][name]["integer"] == value
     assert [p.name for p in tmp_path.iterdir()] == ["registers.json"]

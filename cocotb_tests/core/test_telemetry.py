@@ -279,7 +279,7 @@ def test_wrong_bit_is_refused_or_detected(word, golden, tmp_path):
 def test_files_that_are_no_capture_are_refused(golden, tmp_path, capsys):
     words, _, _ = golden
     other = renumbered(words[:5], 0)
-    other[:, 0] = telemetry_words.MAGIC << 16 | 2 << 8 | COUNT
+    other[:, 0] = telemetry_words.MAGIC << 16 | telemetry_words.VERSION + 1 << 8 | COUNT
     rng = np.random.default_rng(3)
     for content, wanted in (
         (b"", "0 bytes are too few for a telemetry packet"),
@@ -287,7 +287,7 @@ def test_files_that_are_no_capture_are_refused(golden, tmp_path, capsys):
         (rng.bytes(5000), f"no word 0x{HEADER_WORD:08x}"),
         (
             b"\0" * 9 + raw(other),
-            f"byte 9: telemetry packets of version 2 with {COUNT} words: this reader knows",
+            f"byte 9: telemetry packets of version {telemetry_words.VERSION + 1} with {COUNT} words: this reader knows",
         ),
     ):
         path = tmp_path / "capture.bin"

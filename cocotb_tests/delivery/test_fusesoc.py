@@ -45,6 +45,20 @@ def test_fusesoc_lint(tmp_path):
     assert "elaborate fluxproof_axi" in done.stdout + done.stderr
 
 
+def test_fusesoc_lint_of_the_board(tmp_path):
+    done = fusesoc(tmp_path, "lint_board")
+    assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
+    assert "elaborate fluxproof_board" in done.stdout + done.stderr
+
+
+def test_fusesoc_vivado_setup_of_the_board(tmp_path):
+    done = fusesoc(tmp_path, "vivado_board", "--setup")
+    assert done.returncode == 0, done.stderr[-2000:]
+    (script,) = tmp_path.glob("*/vivado_board/*0.tcl")
+    for text in ("ENCODER=1", "CURRENTS=1", "SPI_LINES=4", "fluxproof.xdc}", "fluxproof_board.xdc}", "fluxproof_board"):
+        assert text in script.read_text()
+
+
 def test_fusesoc_sim(tmp_path):
     done = fusesoc(tmp_path, "sim")
     assert done.returncode == 0 and "report note): passed" in done.stdout + done.stderr, done.stdout[-2000:]

@@ -12,8 +12,8 @@ import sys
 
 import numpy as np
 
-from cocotb_tests.support.board_loop import COUNTS, BoardLoop
-from cocotb_tests.support.board_runs import DRIVE, start_from_standstill, status
+from cocotb_tests.support.board_loop import COUNTS, BoardLoop, with_abz_and_spi
+from cocotb_tests.support.board_runs import CARRIER_HALF, DRIVE, start_from_standstill, status
 from cocotb_tests.support.encoder_models import Incremental
 from fluxproof.cosim.board_clock import SEEN
 from fluxproof.golden_model.drive import load
@@ -29,7 +29,7 @@ def index_wrong() -> dict:
     loop, moved, off_after = start_from_standstill(), False, 0
     for chunk in loop.run(220):
         if status(chunk)["encoder_flags"] & 1 and not moved:
-            loop.encoder, moved = Incremental(COUNTS, index_from=float(MOVED)), True
+            loop.pins.encoder.encoder, moved = Incremental(COUNTS, index_from=float(MOVED)), True
         if status(chunk)["board_first"]:
             break
     fault = chunk.status[:, 9].nonzero()[0][0]
@@ -42,7 +42,7 @@ def index_wrong() -> dict:
 
 def forced() -> dict:
     """A current along a position that the host turns: no fault at the change of source; the snapshot has both."""
-    drive = load(DRIVE)
+    drive = with_abz_and_spi(load(DRIVE), CARRIER_HALF)
     writes = {
         22: {"forced_angle": TURN.to_int(0.05), "forced_rate": RATE},
         23: {"position_source": 1},

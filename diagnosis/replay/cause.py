@@ -154,8 +154,8 @@ def where_they_part(run: Run, cause: Cause, state, first: int, row: int) -> tupl
             low = middle + 1
     ours, theirs = run.state_at(state, first, low), cause.run.state_at(cause.state, first, low)
     for k in range(low, row + 1):
-        a = trace(ours, run.sample(k), run.registers, run.config)
-        b = trace(theirs, cause.run.sample(k), cause.run.registers, run.config)
+        a = trace(ours, run.sample(k), run.registers, run.config, run.of_speed(k))
+        b = trace(theirs, cause.run.sample(k), cause.run.registers, run.config, cause.run.of_speed(k))
         apart = [name for name in parted(a, b) if name != "latch"]
         if apart:
             return k, apart[0]
@@ -165,7 +165,7 @@ def where_they_part(run: Run, cause: Cause, state, first: int, row: int) -> tupl
 
 def golden_value(run: Run, state, row, name) -> int:
     """The golden model's value of a signal in a row; ``state`` is the one before the row."""
-    said = trace(state, run.sample(row), run.registers, run.config)
+    said = trace(state, run.sample(row), run.registers, run.config, run.of_speed(row))
     return said[OWNER[name]][outputs_of(OWNER[name]).index(name)]
 
 

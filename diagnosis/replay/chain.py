@@ -13,10 +13,18 @@ FIELDS = fluxproof.Observed._fields
 
 
 @kernel
-def run_until_different(state, samples, registers, config, recorded, column, start, stop, wrong):
+def given_of(registers, given, k):
+    """What the speed of row ``k`` came from; ``given`` (n, 3) as fluxproof.Given, or of no row: the registers."""
+    if k < len(given):
+        return fluxproof.Given(given[k, 0], given[k, 1], given[k, 2])
+    return fluxproof.Given(registers.speed_given, registers.omega_given, registers.position_restart)
+
+
+@kernel
+def run_until_different(state, samples, given, registers, config, recorded, column, start, stop, wrong):
     """Replay rows start..stop-1: (row of the first difference or stop, state before that row).
 
-    samples (n, 13), recorded (n, m) int64; column (57,) int64: index in ``recorded`` of each of Observed, -1 if it
+    samples (n, 13), recorded (n, m) int64; column (m,) int64: index in ``recorded`` of each of Observed, -1 if it
     was not recorded.  wrong (m,) int64 receives 1 for the values that differ in that row.
     """
     for k in range(start, stop):
@@ -24,7 +32,8 @@ def run_until_different(state, samples, registers, config, recorded, column, sta
         sample = fluxproof.Sample(
             x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8], x[9], x[10], x[11], x[12]
         )
-        following, out = fluxproof.step(state, sample, registers, config)
+        of_speed = given_of(registers, given, k)
+        following, out = fluxproof.step_given(state, sample, registers, config, of_speed)
         different = False
         for n, value in enumerate(out):
             if column[n] >= 0 and recorded[k, column[n]] != value:
@@ -37,7 +46,7 @@ def run_until_different(state, samples, registers, config, recorded, column, sta
 
 
 @kernel
-def count_differences(state, samples, registers, config, recorded, column, start, stop, last):
+def count_differences(state, samples, given, registers, config, recorded, column, start, stop, last):
     """Replay rows start..stop-1 and count the values that differ; ``last`` (1,) receives the last such row."""
     count = 0
     for k in range(start, stop):
@@ -45,7 +54,7 @@ def count_differences(state, samples, registers, config, recorded, column, start
         sample = fluxproof.Sample(
             x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8], x[9], x[10], x[11], x[12]
         )
-        state, out = fluxproof.step(state, sample, registers, config)
+        state, out = fluxproof.step_given(state, sample, registers, config, given_of(registers, given, k))
         for n, value in enumerate(out):
             if column[n] >= 0 and recorded[k, column[n]] != value:
                 count += 1
@@ -59,9 +68,10 @@ class Run(NamedTuple):
     samples: np.ndarray  # (n, 13) int64
     recorded: np.ndarray  # (n, m) int64
     names: tuple  # of the m recorded signals
-    column: np.ndarray  # (57,) int64
+    column: np.ndarray  # int64, one of Observed each
     registers: fluxproof.Registers
     config: fluxproof.Config
+    given: np.ndarray  # (n, 3) int64, fluxproof.Given of each row where it was recorded, else (0, 3)
     patch: tuple | None = None
 
     def until_different(self, state, start, stop):
@@ -84,7 +94,7 @@ class Run(NamedTuple):
         """Call a kernel with the patch in place."""
         if self.patch is None:
             return function(
-                state, self.samples, self.registers, self.config, self.recorded, column, start, stop, out
+                state, self.samples, self.given, self.registers, self.config, self.recorded, column, start, stop, out
             )
         row, field, value = self.patch
         kept, self.samples[row, field] = self.samples[row, field], value
@@ -92,6 +102,10 @@ class Run(NamedTuple):
             return self._replace(patch=None)._run(function, state, column, start, stop, out)
         finally:
             self.samples[row, field] = kept
+
+    def of_speed(self, row) -> fluxproof.Given:
+        """What the speed of one row came from."""
+        return fluxproof.Given(*map(int, given_of.py_func(self.registers, self.given, row)))
 
     def sample(self, row) -> fluxproof.Sample:
         """One row as the core's input."""
@@ -108,7 +122,17 @@ def run_of(samples, observed: dict, registers: dict, config: dict) -> Run:
     recorded = np.ascontiguousarray(np.stack([observed[name] for name in names], axis=1), np.int64)
     values = fluxproof.Registers(**{name: int(registers[name]) for name in fluxproof.Registers._fields})
     generics = fluxproof.Config(**{name: int(config[name]) for name in fluxproof.Config._fields})
-    return Run(np.array(samples, np.int64, order="C"), recorded, names, column, values, generics)
+    given = _given(observed, values)
+    return Run(np.array(samples, np.int64, order="C"), recorded, names, column, values, generics, given)
+
+
+def _given(observed: dict, values: fluxproof.Registers) -> np.ndarray:
+    """fluxproof.Given of each row: where the speed was given it is the recorded one; (0, 3) where not recorded."""
+    if not {"speed_was_given", "position_restarted", "omega_me"} <= set(observed):
+        return np.zeros((0, 3), np.int64)
+    given = np.array(observed["speed_was_given"], np.int64)
+    omega = np.where(given == 1, observed["omega_me"], values.omega_given)
+    return np.ascontiguousarray(np.stack([given, omega, observed["position_restarted"]], axis=1), np.int64)
 
 
 def plain_state(state) -> fluxproof.State:

@@ -96,17 +96,21 @@ class _Listener:
         return result
 
 
-def trace(state, sample, registers, config) -> dict[str, tuple]:
+def trace(state, sample, registers, config, of_speed=None) -> dict[str, tuple]:
     """{instance: its outputs} of one sample, hidden ones included; ``latch`` is the sample itself.
 
     The top's step runs as plain Python with listeners instead of the blocks.  The calls of a block that is used
     several times are in the order of WIRING.  An instance that the generics leave out has no outputs.
+    ``of_speed``: fluxproof.Given of the sample; the registers' if none.
     """
     notes = defaultdict(list)
     estimators = types.SimpleNamespace(**vars(estimation))
     for name in ("for_control", "step"):
         setattr(estimators, name, _overheard(getattr(estimation, name).py_func, notes))
-    _overheard(fluxproof.step.py_func, notes, estimation=estimators)(state, sample, registers, config)
+    r = registers
+    of_speed = of_speed or fluxproof.Given(r.speed_given, r.omega_given, r.position_restart)
+    step = _overheard(fluxproof.step_given.py_func, notes, estimation=estimators)
+    step(state, sample, registers, config, of_speed)
     said = {}
     for instance, (module, _) in fluxproof.WIRING.items():
         given = notes[module].pop(0) if notes[module] else ()

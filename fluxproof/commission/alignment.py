@@ -127,7 +127,7 @@ def _find_index(s: Session, speed: float) -> None:
 
 def judge(s: Session, ways: list[Seen], reverse_given: bool | None) -> Step:
     """What both ways say; the drive then has direction and offset."""
-    pairs = s.drive.machine.pole_pairs
+    pairs = s.code_pairs
     slopes, moved = [], [float(np.ptp(way.code)) for way in ways]
     if max(moved) < MOVED:
         raise Refusal(
@@ -159,14 +159,16 @@ def judge(s: Session, ways: list[Seen], reverse_given: bool | None) -> Step:
     ripple = math.sqrt(
         float(np.mean([np.angle(np.exp(1j * (p - m))) ** 2 for p, m in zip(parts, means, strict=True) for p in p]))
     )
+    step = TURN_RAD * pairs * s.code_step
+    ripple = math.sqrt(max(ripple**2 - step**2 / 12.0, 0.0))  # without the rounding to the step of the code
     if abs(math.degrees(lag)) > LAG_DEG or math.degrees(ripple) > RIPPLE_DEG:
         raise Swinging(
             f"the rotor lags the field by {math.degrees(lag):.0f} degrees and swings by {math.degrees(ripple):.0f} "
             f"rms, expected {LAG_DEG:.0f} and {RIPPLE_DEG:.0f} at most: friction, cogging or load is too large for the "
             "current limit, or an edge of the encoder is lost"
         )
-    resolution = TURN_RAD * pairs / min(2**s.drive.sensors.position_bits, s.drive.encoder.counts or 1 << 30)
-    sigma = math.hypot(_spread(parts, max(pairs, 4)), resolution / math.sqrt(12.0 * 2.0 * pairs))
+    turned = s.drive.machine.pole_pairs  # electrical turns each way
+    sigma = math.hypot(_spread(parts, max(turned, 4)), step / math.sqrt(12.0 * 2.0 * turned))
     s.know("sensors", position_reverse=reverse, theta_offset_rad=offset % TURN_RAD)
     said = (
         f"code {'falls' if reverse else 'rises'} with the field, offset {math.degrees(offset) % 360:.2f} degrees "

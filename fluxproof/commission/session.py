@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from fluxproof.commission.bus import Bus
+from fluxproof.golden_model.board_registers import SECTORS, board_registers
 from fluxproof.golden_model.drive import Drive
 from fluxproof.golden_model.drive_keys import DriveError
 from fluxproof.golden_model.encoders import forced_position
@@ -81,6 +82,33 @@ class Session:
         self.limit, self.t_s = drive.current_limit_a, drive.sample_time_s
         self.started = bus.now()
 
+    # ---------------------------------------------------------------- the code
+
+    @property
+    def code_pairs(self) -> int:
+        """Electrical turns in a turn of the code: Hall sensors alone give an electrical code."""
+        return 1 if self.coarse else self.drive.machine.pole_pairs
+
+    @property
+    def coarse(self) -> bool:
+        """Hall sensors alone: the code stands within a sector of 60 degrees."""
+        return self.drive.encoder.kind == "hall"
+
+    @property
+    def code_step(self) -> float:
+        """Smallest step of the code, in its turns."""
+        if self.coarse:
+            return 1.0 / SECTORS
+        return 1.0 / min(2**self.drive.sensors.position_bits, self.drive.encoder.counts or 1 << 30)
+
+    @property
+    def turning_part(self) -> float:
+        """What a vector that stands in the frame of the code has in the rotor's, in the mean of a turn.
+
+        The rotor moves by +-30 degrees against the middle of a Hall sector: sin(30 deg)/(pi/6) = 3/pi.
+        """
+        return 3.0 / math.pi if self.coarse else 1.0
+
     # ---------------------------------------------------------------- registers
 
     def load(self, kp: float | None = None, ki: float | None = None, **others: int) -> None:
@@ -90,13 +118,13 @@ class Session:
             control = {f"current_kp_{axis}_v_per_a": kp for axis in "dq"}
             control |= {f"current_ki_{axis}_v_per_as": ki for axis in "dq"}
         drive = replace(self.drive, control=replace(self.drive.control, **control))
-        values = registers(drive).values._asdict() | QUIET
+        values = board_registers(drive) | QUIET
         values |= {name: REGISTERS[name].high for name in OPEN_WIDE if name in REGISTERS}
         self._write(values | others)
 
     def load_final(self) -> None:
         """All registers as the drive says, nothing left out."""
-        self._write(registers(self.drive).values._asdict())
+        self._write(board_registers(self.drive))
 
     def speed_gains(self, kp: float, ki: float, filter_hz: float) -> dict[str, int]:
         """The registers of these gains [A s/rad], [A/rad] of the speed loop, per electrical speed and angle."""
@@ -106,7 +134,7 @@ class Session:
 
     def _write(self, values: dict[str, int]) -> None:
         for name, value in values.items():
-            if name != "position_restart" and not name.endswith("_given"):  # the board's own
+            if name not in ("position_restart", "omega_given"):  # the board's own
                 self.bus.write(name, value)
 
     def set(self, **si: float) -> None:
@@ -116,7 +144,7 @@ class Session:
 
     def force(self, angle_rad: float = 0.0, speed_rad_s: float = 0.0) -> None:
         """The electrical angle, and what it turns by [electrical rad/s], in place of the encoder's."""
-        pairs = self.drive.machine.pole_pairs
+        pairs = self.code_pairs
         code = round(angle_rad / TURN_RAD / pairs * 2**forced_position.TURN_W) % 2**forced_position.TURN_W
         self.bus.write("forced_angle", code)
         self.bus.write("forced_rate", forced_position.setting(speed_rad_s / pairs, self.t_s))

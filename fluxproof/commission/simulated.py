@@ -13,14 +13,17 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from fluxproof.commission.bus import CODES, VALUES, checked
+from fluxproof.commission.simulated_edges import COUNTS, HALL, edge_speed, edges_of, hall_code
 from fluxproof.cosim.closed_loop import described_sensors
 from fluxproof.cosim.golden_loop import mixed_kernel
 from fluxproof.golden_model import fluxproof
+from fluxproof.golden_model.board_registers import board_generics
 from fluxproof.golden_model.drive_keys import DriveError
 from fluxproof.golden_model.encoders import forced_position
 from fluxproof.golden_model.io import board_map
 from fluxproof.golden_model.io.fault_latch import NAMES
 from fluxproof.golden_model.registers import registers
+from fluxproof.golden_model.units import TURN_RAD
 from fluxproof.plant import (
     FREE,
     IMPOSED_SPEED,
@@ -103,13 +106,13 @@ def board_of(drive) -> Board:
 
 @mixed_kernel
 def advance(
-    state, inputs, flags, forced, usual, restarted, config, plant_state, params, sensors, wires, polarity, dead_time_s,
-    period_s, u_dc, load, has_index, first, periods, peak, codes, observed,
+    state, inputs, flags, forced, usual, config, plant_state, params, sensors, wires, polarity, dead_time_s,
+    period_s, u_dc, load, has_index, first, periods, peak, codes, observed, edges,
 ):  # fmt: skip
     """``periods`` periods; the last sample's codes and values are in ``codes`` and ``observed``.
 
     ``inputs``: INPUTS; ``flags``: enable, tripped, latched faults; ``wires``: legs, sensed, leg that is open or 3;
-    ``peak``: largest phase current [A] so far.
+    ``peak``: largest phase current [A] so far; ``edges``: see simulated_edges.
     """
     duties = np.zeros(3)
     currents = np.zeros(3)
@@ -120,7 +123,15 @@ def advance(
         for x in range(3):
             codes[2 + x] = current_code(sensors, x, polarity[x] * currents[wires[3 + x]], k)
         codes[5] = u_dc_code(sensors, u_dc, k)
-        code, found = position_code(sensors, plant_state[L.THETA_M], k), False
+        code, found, omega = position_code(sensors, plant_state[L.THETA_M], k), False, usual.omega_given
+        turns = (sensors.direction * plant_state[L.THETA_M] + sensors.position_offset) / TURN_RAD
+        if edges[COUNTS] > 0.0:
+            sense = -1 if usual.reverse else 1
+            omega = sense * edge_speed(
+                edges, turns, sensors.direction * plant_state[L.OMEGA_M] / TURN_RAD, k * period_s
+            )
+        if edges[HALL] > 0.0:
+            code = hall_code(params.machine.pole_pairs, turns, config.position_bits)
         half = 1 << (config.position_bits - 1)
         if forced[REFERENCED] == 0:
             if forced[ZERO] < 0:
@@ -150,7 +161,9 @@ def advance(
         duties[0] = state.compare_a / config.carrier_half
         duties[1] = state.compare_b / config.carrier_half
         duties[2] = state.compare_c / config.carrier_half
-        state, seen = fluxproof.step(state, sample, restarted if jumped else usual, config)
+        given = 1 if usual.speed_given == 1 and forced[SOURCE] == 0 else 0
+        of_speed = fluxproof.Given(given, omega, 1 if jumped else usual.position_restart)
+        state, seen = fluxproof.step_given(state, sample, usual, config, of_speed)
         for n, value in enumerate(seen):
             observed[n] = value
         if flags[0] == 1:
@@ -178,7 +191,7 @@ class SimulatedBus:
         self.board, self.drive = board, drive
         self._config = registers(drive).config
         self._values = {name: register.reset for name, register in board.registers.items() if register.fields}
-        self._values |= {"clock_hz": round(drive.core.clock_hz), **self._config._asdict()}
+        self._values |= {"clock_hz": round(drive.core.clock_hz), **self._config._asdict(), **board_generics(drive)}
         mode = IMPOSED_SPEED if board.locked else FREE
         self._params = plant_params(board.machine, board.inverter, mode=mode)
         self._plant = initial_state(board.machine, self._params, theta_m=board.theta_m)
@@ -190,7 +203,7 @@ class SimulatedBus:
         self._state, self._random = fluxproof.State(), np.random.default_rng(board.seed)
         self._forced, self._flags = np.zeros(9, np.int64), np.zeros(3, np.int64)
         self._forced[REFERENCED:] = drive.encoder.kind != "abz", -1, 0
-        self._codes = np.zeros(6, np.int64)
+        self._codes, self._edges = np.zeros(6, np.int64), edges_of(drive)
         self._observed = np.zeros(len(FIELDS), np.int64)
         self._peak, self._done, self._due = np.zeros(1), 0, 0.0
         self._settings = None
@@ -247,12 +260,12 @@ class SimulatedBus:
     def _run(self, periods: int) -> None:
         if self._settings is None:
             usual = fluxproof.Registers(*(self._values[n] for n in fluxproof.Registers._fields))
-            self._settings = usual, usual._replace(position_restart=1)
+            self._settings = usual
             self._inputs = np.array([self._values[n] for n in INPUTS], np.int64)
         self._state = advance(
-            self._state, self._inputs, self._flags, self._forced, *self._settings, self._config, self._plant,
+            self._state, self._inputs, self._flags, self._forced, self._settings, self._config, self._plant,
             self._params, self._sensors, self._wires, self._polarity, float(self.board.dead_time_s),
             self.drive.sample_time_s, self._u_dc, 0.0, self.board.has_index, self._done, periods, self._peak,
-            self._codes, self._observed,
+            self._codes, self._observed, self._edges,
         )  # fmt: skip
         self._done += periods

@@ -8,17 +8,21 @@ from dataclasses import replace
 from fluxproof.commission import alignment, motion, winding, wiring
 from fluxproof.commission.bus import Bus, BusError
 from fluxproof.commission.session import Refusal, Session, Step
+from fluxproof.golden_model.board_registers import board_generics
 from fluxproof.golden_model.drive import Drive
 from fluxproof.golden_model.registers import registers
 
 
 def check_generics(bus: Bus, drive: Drive) -> None:
-    """The core is the one of the drive file; Refusal where it was built for other widths, carrier or clock."""
+    """The core is the one of the drive file; Refusal where it was built for other widths, clocks or pins."""
     config = registers(drive).config
-    wanted = config._asdict() | {"clock_hz": round(drive.core.clock_hz)}
+    wanted = config._asdict() | {"clock_hz": round(drive.core.clock_hz)} | board_generics(drive)
     for name, value in wanted.items():
         if (found := bus.read(name)) != value:
-            raise Refusal(f"the core has {name} = {found}, the drive file gives {value}: build it anew or check [core]")
+            raise Refusal(
+                f"the core has {name} = {found}, the drive file gives {value}: build it anew or check [core], "
+                "[encoder], [converters]"
+            )
 
 
 def commission(

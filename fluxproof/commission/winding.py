@@ -12,7 +12,13 @@ the dead time, the rotor's axes obey, with I_d = c_1 + conj(c_-1), I_q = -j*(c_1
     U_d = (R + j*w_e*L_d)*I_d + V_dead*S_d;    U_q = (R + j*w_e*L_q + K/(j*w))*I_q + V_dead*S_q;    K = 1.5*p^2*psi^2/J
 
 S is the vector of the signs of the three phase currents, which follow from the c_n: harmonics and a salient rotor move
-the instants at which a current changes its sign.  K is the EMF of the rotor that the torque swings.
+the instants at which a current changes its sign.  Within +-i_0 of zero, what a dead time moves the current by (about
+V_dead*T/L), the current stops before its fundamental does: the loss leads S by i_0/|I|, to first order
+
+    V_dead*S -> V_dead*S + j*sign(w)*V_dead*i_0*S/|I|
+
+The second term is across the current as w*L*I is; without it L is too large by V_dead*i_0/(w*I^2), 1 % at worst, and no
+residual tells.  Three amplitudes separate them.  K is the EMF of the rotor that the torque swings.
 Several amplitudes separate R from V_dead, both senses cancel what a slow turn of the rotor adds, two frequencies
 separate L_q from K.  Each equation is turned into the direction of its current: the part along it has R and V_dead, the
 part across it L and K; each kind counts by the rms of its own residuals.  The frequency is high: at a low one the
@@ -37,6 +43,7 @@ SMALLER = (1.0, 0.7, 0.5)  # of the amplitudes, where the voltage does not suffi
 LEAST_HZ = 15.0
 BANDWIDTH = 1.0 / 150.0  # of the sampling frequency, current regulators
 RAMP_S, SETTLE_S, SAMPLES = 0.1, 0.15, 250
+PARKED_S = 0.5  # each of raising, holding and lowering the field that moves the rotor to the middle of a sector
 STOOD_DEG = 25.0  # electrical, largest turn of the rotor in a run
 UNKNOWN_SWING = 60.0  # rad/s, without an inertia in the file
 MISFIT = 0.03  # of the voltages, rms
@@ -86,7 +93,7 @@ def frequency(session: Session, current: float, volts_per_a: float) -> float:
     ``volts_per_a``: of a standing or slow field, so R and the dead time's voltage together.
     """
     m, t_s = session.drive.machine, session.t_s
-    hertz = [HIGHEST_HZ, OF_RATE * RATE.hi * RATE.lsb * m.pole_pairs / t_s, 0.05 / t_s]
+    hertz = [HIGHEST_HZ, OF_RATE * RATE.hi * RATE.lsb * session.code_pairs / t_s, 0.05 / t_s]
     hertz.append(OF_BASE * session.drive.bases.omega_me_rad_s / TURN_RAD)
     room, resistive = OF_VOLTAGE * session.voltage(), volts_per_a * current
     if room <= resistive:
@@ -122,6 +129,8 @@ def _run(s: Session, current: float, w: float) -> Point:
     m = s.drive.machine
     w_c = TURN_RAD * BANDWIDTH / s.t_s
     kp = w_c * min(m.inductance_d_h, m.inductance_q_h)
+    if s.coarse:
+        _to_the_middle(s)
     s.gates_off()
     s.load(kp, max(w_c * m.resistance_ohm, kp * w_c / 4.0), reverse=0, theta_offset=0)
     s.force(0.0, w)
@@ -137,7 +146,7 @@ def _run(s: Session, current: float, w: float) -> Point:
             f"the current reaches {seen.i_d.mean():.3g} A at {w / TURN_RAD:.0f} Hz, expected {current:.3g} A: too "
             "little voltage for the inductance, or it does not settle; check the start values of R and L"
         )
-    sensors, pairs = s.drive.sensors, m.pole_pairs
+    sensors, pairs = s.drive.sensors, s.code_pairs
     rotor = (-1.0 if sensors.position_reverse else 1.0) * pairs * TURN_RAD * seen.code + sensors.theta_offset_rad
     line = np.polyval(np.polyfit(seen.t, rotor, 1), seen.t)
     if math.degrees(np.ptp(line)) > STOOD_DEG:
@@ -148,8 +157,21 @@ def _run(s: Session, current: float, w: float) -> Point:
     return Point(seen, line, w, s.t_s)
 
 
+def _to_the_middle(s: Session) -> None:
+    """The field turns the rotor to the middle of a Hall sector, which then tells its place best."""
+    sensors, kp = s.drive.sensors, TURN_RAD * BANDWIDTH / s.t_s * s.drive.machine.inductance_d_h
+    sign = -1.0 if sensors.position_reverse else 1.0
+    s.gates_off()
+    s.load(kp, kp * TURN_RAD * LEAST_HZ, reverse=0, theta_offset=0)
+    s.force(sign * TURN_RAD * s.code_step / 2.0 + sensors.theta_offset_rad)
+    s.gates_on()
+    s.ramp(PARKED_S, i_d_ref=(0.0, PARTS[-1] * s.limit))
+    s.settle(PARKED_S)
+    s.ramp(PARKED_S, i_d_ref=(PARTS[-1] * s.limit, 0.0))
+
+
 def judge(s: Session, points: list[Point]) -> Step:
-    """One regression over all runs; unknowns R, L_d, L_q, V_dead, K."""
+    """One regression over all runs; unknowns R, L_d, L_q, V_dead, K, V_dead*i_0."""
     rows, values, sizes = [], [], []
     for p in points:
         w_e, cosine = 2.0 / s.t_s * math.sin(p.w * s.t_s / 2.0), math.cos(p.w * s.t_s / 2.0)
@@ -158,6 +180,7 @@ def judge(s: Session, points: list[Point]) -> Step:
             (i_d, (cosine * i_d, 1j * w_e * i_d, 0.0, s_d, 0.0), u_d),
             (i_q, (cosine * i_q, 0.0, 1j * w_e * i_q, s_q, i_q / (1j * p.w)), u_q),
         ):
+            row = (*row, 1j * math.copysign(1.0, p.w) * row[3] / abs(i))
             turned, along = np.array(row) * np.conj(i) / abs(i), value * np.conj(i) / abs(i)
             rows += [np.real(turned), np.imag(turned)]
             values += [along.real, along.imag]
@@ -173,7 +196,7 @@ def judge(s: Session, points: list[Point]) -> Step:
         for kind in (0, 1):
             weights[kind::2] = 1.0 / max(math.sqrt(float(np.mean(rest[kind::2] ** 2))), 1e-9)
     misfit = math.sqrt(float(np.mean(rest**2)) * 2.0 / float(np.mean(np.square(sizes))))
-    (r, l_d, l_q, v_dead, k), (s_r, s_l_d, s_l_q, s_v, s_k) = found, sigma
+    (r, l_d, l_q, v_dead, k, lead), (s_r, s_l_d, s_l_q, s_v, s_k, _) = found, sigma
     if misfit > MISFIT:
         raise Refusal(
             f"R and L explain the voltages within {100 * misfit:.1f} % only, expected {100 * MISFIT:.0f} %: saturation "
@@ -198,4 +221,5 @@ def judge(s: Session, points: list[Point]) -> Step:
         f"V_dead {v_dead:.3g} +-{s_v:.1g} V, misfit {100 * misfit:.2f} %"
     )
     notes = {"misfit": misfit, "swing_k": [float(k), float(s_k)], "frequencies_hz": [p.w / TURN_RAD for p in points]}
+    notes["lead_v_a"] = float(lead)
     return Step("winding", quantities, said, notes)

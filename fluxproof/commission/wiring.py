@@ -42,7 +42,7 @@ def offsets(session: Session) -> Step:
     s.load()
     seen = s.look(SAMPLES)
     moved = np.ptp(seen.code)
-    if moved > MOVING_TURNS + 2.0 / min(2**drive.sensors.position_bits, drive.encoder.counts or 1 << 30):
+    if moved > MOVING_TURNS + 2.0 * s.code_step:
         raise Refusal(f"the shaft turned by {360 * moved:.2g} degrees with the gates off, expected standstill")
     u_dc, nominal = float(seen.u_dc.mean()), drive.inverter.dc_bus_v
     if u_dc < LEAST_BUS * nominal:
@@ -57,7 +57,7 @@ def offsets(session: Session) -> Step:
         codes = np.vstack([codes, s.look(min(more, MOST_SAMPLES)).adc])
     means, deviations = codes.mean(axis=0), codes.std(axis=0, ddof=1)
     mid = 2.0 ** (drive.sensors.adc_bits - 1)
-    used = "bc" if drive.sensors.current_sensors == 2 else "abc"
+    used = "bc" if drive.current_sensors == 2 else "abc"
     values = {}
     for k, x in enumerate("abc"):
         if x not in used:
@@ -96,7 +96,7 @@ def phases(session: Session) -> Step:
                 f"phase {x} is open: {size:.2g} A in it, expected {largest.max():.2g} A as in the others; check its "
                 "cable and its sensor"
             )
-    fits = _fits(answers, s.drive.sensors.current_sensors == 2)
+    fits = _fits(answers, s.drive.current_sensors == 2)
     (order, signs), fit = max(fits.items(), key=lambda item: item[1])
     true = fits[(0, 1, 2), (1, 1, 1)]
     if (order, signs) != ((0, 1, 2), (1, 1, 1)) and fit > true + 0.02:
@@ -128,7 +128,7 @@ def _answer(s: Session, angle: float) -> np.ndarray:
 
     def sensed(row):
         i = (np.array([row[f"snap_adc_{x}"] for x in "abc"]) - offsets) * per_code * drive.sensors.current_gain
-        if drive.sensors.current_sensors == 2:
+        if drive.current_sensors == 2:
             i[0] = -i[1] - i[2]
         return i
 

@@ -7,9 +7,9 @@ from pathlib import Path
 
 from fluxproof.checkout import ROOT
 from fluxproof.files import write_text
+from fluxproof.golden_model.board_registers import board_set, has_board
 from fluxproof.golden_model.drive import load
 from fluxproof.golden_model.drive_keys import DriveError
-from fluxproof.golden_model.registers import registers
 from fluxproof.project import parts, render
 
 
@@ -26,7 +26,7 @@ def run(args: argparse.Namespace) -> int:
     """Write the files; an error in the drive or an argument writes nothing."""
     drive = load(args.drive)
     try:
-        register_set = registers(drive)
+        register_set = board_set(drive)
     except DriveError as error:
         raise DriveError(f"{args.drive}: {error}") from None
     part = parts.checked(args.part)
@@ -44,6 +44,8 @@ def run(args: argparse.Namespace) -> int:
         print(write_text(folder / name, text))
     if processor is None:
         print(f"no device tree: {part} has no processor; the script builds the core alone")
+    elif has_board(drive):
+        print("the script builds fluxproof_board alone: its pins are those of your board")
     elif processor is not parts.ZYNQ:
         print(f"the script builds the core alone: the block design around it is for {parts.ZYNQ.name}")
     return 0

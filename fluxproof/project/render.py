@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
+from fluxproof.golden_model.board_registers import board_generics, has_board
 from fluxproof.golden_model.drive import Drive
 from fluxproof.golden_model.registers import RegisterSet
 from fluxproof.print_registers import c_lines
@@ -15,11 +16,15 @@ WINDOW = 0x1000  # bytes of the registers' address range
 
 
 def generics(drive: Drive, register_set: RegisterSet) -> dict[str, int]:
-    """The generics of fluxproof_axi, by their names in the VHDL."""
-    return {
-        "CLOCK_HZ": round(drive.core.clock_hz),
-        **{name.upper(): value for name, value in register_set.config._asdict().items()},
-    }
+    """The generics of the top, by their names in the VHDL."""
+    chosen = board_generics(drive) if has_board(drive) else {}
+    named = register_set.config._asdict() | chosen
+    return {"CLOCK_HZ": round(drive.core.clock_hz), **{name.upper(): value for name, value in named.items()}}
+
+
+def top(drive: Drive) -> str:
+    """fluxproof_board where the drive file describes front ends, else fluxproof_axi."""
+    return "fluxproof_board" if has_board(drive) else "fluxproof_axi"
 
 
 def clock_period_ns(drive: Drive) -> float:
@@ -41,14 +46,14 @@ def vhdl_package(name: str, drive: Drive, register_set: RegisterSet) -> str:
     values = generics(drive, register_set)
     wide = max(map(len, values))
     lines = [f"  constant {key:{wide}} : natural := {value};" for key, value in values.items()]
-    head = f"-- {name} {BY}.\n-- Generics of fluxproof_axi: generic map (CLOCK_HZ => drive_pkg.CLOCK_HZ, ...)\n\n"
+    head = f"-- {name} {BY}.\n-- Generics of {top(drive)}: generic map (CLOCK_HZ => drive_pkg.CLOCK_HZ, ...)\n\n"
     return head + "\n".join(["package drive_pkg is", *lines, "end package drive_pkg;"]) + "\n"
 
 
 def tcl(name: str, drive: Drive, register_set: RegisterSet, part: str, base: int, core: str) -> str:
-    """The script for Vivado: a block design around the core on a Zynq-7000, the core alone on any other part."""
+    """The script for Vivado: a block design around the core on a Zynq-7000, the core or the board's top alone else."""
     values = generics(drive, register_set)
-    whole = processor_of(part) is ZYNQ
+    whole = processor_of(part) is ZYNQ and not has_board(drive)
     head = [
         f"# {name} {BY}.",
         "#",
@@ -67,7 +72,7 @@ def tcl(name: str, drive: Drive, register_set: RegisterSet, part: str, base: int
         f"set part {part}",
         *(f"set {key.lower()} {value}" for key, value in values.items()),
     ]
-    return "\n".join([*head, *(_system(base) if whole else _alone(values))]) + "\n"
+    return "\n".join([*head, *(_system(base) if whole else _alone(values, top(drive)))]) + "\n"
 
 
 def _system(base: int) -> list[str]:
@@ -80,21 +85,22 @@ def _system(base: int) -> list[str]:
     ]
 
 
-def _alone(values: dict[str, int]) -> list[str]:
+def _alone(values: dict[str, int], name: str) -> list[str]:
     names = " ".join(f"{key}=${key.lower()}" for key in values)
     return [
-        "# The core alone, out of context: no processor of this part is known to the example.",
+        f"# {name} alone, out of context: the example's processor system is for fluxproof_axi on a Zynq-7000.",
         "create_project -in_memory -part $part",
         "set sources [concat [glob [file join $core rtl *.vhd]] [glob [file join $core rtl * *.vhd]]]",
         "read_vhdl -vhdl2008 $sources",
         "read_xdc -mode out_of_context [file join $here fluxproof_clock.xdc]",
-        f"synth_design -top fluxproof_axi -part $part -mode out_of_context -generic [list {names}]",
+        f"synth_design -top {name} -part $part -mode out_of_context -generic [list {names}]",
         "read_xdc [file join $core scripts vivado fluxproof.xdc]",
+        *(["read_xdc [file join $core scripts vivado fluxproof_board.xdc]"] if name == "fluxproof_board" else []),
         "opt_design",
         "place_design",
         "route_design",
         "file mkdir [file join $here vivado]",
-        "write_checkpoint -force [file join $here vivado fluxproof_axi.dcp]",
+        f"write_checkpoint -force [file join $here vivado {name}.dcp]",
         "report_utilization -hierarchical -file [file join $here vivado utilization.rpt]",
         "report_timing_summary -file [file join $here vivado timing.rpt]",
     ]

@@ -7,10 +7,12 @@ import math
 import numpy as np
 
 from fluxproof.golden_model.drive import Drive
+from fluxproof.golden_model.scaling import leg_loss_v
 from fluxproof.simulate.figures import rpm, tail
 from fluxproof.simulate.margins import Margins
 from fluxproof.simulate.run import Run
 
+LEARNT = 0.8  # of the loss of dead time and devices
 OF_SPEED, OF_CURRENT = 0.03, 0.1  # largest error of a settled stage: of the rated speed, rms of the current limit
 
 
@@ -43,7 +45,8 @@ def unsettled(drive: Drive, run: Run) -> str:
         rest = math.sqrt(float(np.mean(error[end] ** 2)))
         most = OF_CURRENT * drive.current_limit_a
         if rest > most:
-            return f"i_q is {rest:.3g} A rms from its reference at the end of {stage.name!r}: at most {most:.3g} A"
+            said = f"i_q is {rest:.3g} A rms from its reference at the end of {stage.name!r}: at most {most:.3g} A"
+            return said + _unlearnt(drive, run, end)
         if run.scene.imposed:
             continue
         away = float(np.abs(rpm(run)[end].mean() - stage.reference))
@@ -53,6 +56,15 @@ def unsettled(drive: Drive, run: Run) -> str:
             said = f"the speed is {away:.4g} rpm from {stage.reference:.4g} rpm, swinging by {spread:.3g} rpm rms,"
             return f"{said} at the end of {stage.name!r}: at most {most:.3g} rpm"
     return ""
+
+
+def _unlearnt(drive: Drive, run: Run, end: slice) -> str:
+    """What is still missing of the dead time's compensation, which distorts currents and flux estimate until then."""
+    loss, compensated = leg_loss_v(drive), float(np.abs(run["v_comp"][end]).mean())
+    if not drive.control.dead_time_compensation or compensated > LEARNT * loss:
+        return ""
+    missing = f"of the {loss:.2g} V that dead time and devices take {compensated:.2g} V are compensated so far"
+    return f"; {missing}: the rest is not learnt yet, and distorts currents and flux estimate"
 
 
 def _or(value: float | None) -> float:

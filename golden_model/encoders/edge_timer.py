@@ -9,8 +9,9 @@ An edge after a reversal is the edge passed before, so it moves the shaft by no 
 has no speed.  The first edge after a reset is where counting begins.
 
 ``k_edge`` = 2*pi * pole_pairs * clock_hz / (counts * omega_base); see ``setting``.  ``reverse`` inverts the sense.
-Formats: k_edge U(16,16), counts MOVED_W (16) bits and clocks TIME_W (24) bits, both saturating, output PU.  A time
-beyond TIME_W bits is standstill.  Rounding: the size to nearest, halves away from zero; it saturates at 2 per unit.
+Formats: k_edge U(20,12), large for the few edges of Hall sensors; counts MOVED_W (16) bits and clocks TIME_W (24)
+bits, both saturating, output PU.  A time beyond TIME_W bits is standstill.
+Rounding: the size to nearest, halves away from zero; it saturates at 2 per unit.
 A sample takes ``TAKES`` clocks from ``sample`` to ``omega_valid``, one bit of the product or the quotient a clock; a
 ``sample`` before that is ignored and its edges belong to the next.
 """
@@ -23,7 +24,8 @@ from fluxproof.golden_model.fixed import Format
 from fluxproof.golden_model.formats import BIT, PU
 from fluxproof.golden_model.kernel import kernel
 
-K_EDGE = Format(0, 16, 16)
+K_EDGE = Format(0, 20, 12)
+UP = PU.frac_bits - K_EDGE.frac_bits  # from the product's fraction bits to the quotient's, less the rounding bit
 TIME_W, MOVED_W, QUOTIENT_W = 24, 16, 19
 EVER = (1 << TIME_W) - 1  # a reset leaves the longest time there is
 OMEGA_MAX = PU.hi
@@ -87,8 +89,8 @@ def step(state, step_up, step_down, sample, reverse, k_edge, time_w, moved_w):
             factor = (s.factor << 1) & moved_max
             work = 2 * s.work + (k_edge if bit else 0)
         elif s.clock == divide_at:
-            past = 1 if (s.work >> (QUOTIENT_W - 1)) >= s.divisor else 0
-            work = 0 if past else 2 * s.work
+            past = 1 if (s.work >> (QUOTIENT_W - 1 - UP)) >= s.divisor else 0
+            work = 0 if past else s.work << (1 + UP)
         elif s.clock < limit_at:
             top, low = 2 * s.work >> QUOTIENT_W, (2 * s.work) & ((1 << QUOTIENT_W) - 1)
             enough = top >= s.divisor
@@ -135,13 +137,13 @@ def setting(counts, pole_pairs, clock_hz, omega_base):
 
 def stimuli(rng, config):
     """Steps from one a clock to none for long, reversals and trembling on an edge, samples too early."""
-    return _motion(rng, (60 << 16,), 400)
+    return _motion(rng, (60 << 12,), 400)
 
 
 def patient_stimuli(rng, config):
     """The same with every corner of k_edge, and rests that end beside the longest time, where a bench gets there."""
     longest = (1 << config["TIME_W"]) - 1
-    rows = _motion(rng, (0, 1, K_EDGE.hi, 7 << 14, 60 << 16), longest if longest < 5000 else 400)
+    rows = _motion(rng, (0, 1, K_EDGE.hi, 7 << 10, 60 << 12), longest if longest < 5000 else 400)
     if longest < 5000:
         still = {p.name: 0 for p in BLOCK.inputs} | {"k_edge": K_EDGE.hi, "reverse": 0}
         for rest in range(longest - TAKES - 4, longest + 3):
@@ -155,7 +157,7 @@ def _motion(rng, k_edges, rest):
     rows = []
 
     def run(clocks, **writes):
-        base = {"step_up": 0, "step_down": 0, "sample": 0, "reverse": 0, "k_edge": 60 << 16}
+        base = {"step_up": 0, "step_down": 0, "sample": 0, "reverse": 0, "k_edge": 60 << 12}
         rows.extend(base | writes for _ in range(clocks))
 
     def sample(**writes):
@@ -212,6 +214,7 @@ BLOCK = Block(
         "TIME_W": TIME_W,
         "MOVED_W": MOVED_W,
         "QUOTIENT_W": QUOTIENT_W,
+        "UP": UP,
     },
     configs=({"TIME_W": TIME_W, "MOVED_W": MOVED_W}, {"TIME_W": 10, "MOVED_W": 4}, {"TIME_W": 12, "MOVED_W": 6}),
     too_wide=(0,),

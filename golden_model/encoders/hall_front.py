@@ -59,7 +59,7 @@ def step(
 
 def _still():
     """Usual settings, pins at 0."""
-    still = {p.name: 0 for p in BLOCK.inputs + BLOCK.registers} | {"k_edge": 900 << 16, "hall_offset": 9999}
+    still = {p.name: 0 for p in BLOCK.inputs + BLOCK.registers} | {"k_edge": 900 << 12, "hall_offset": 9999}
     return still | {"filter_clocks": 1, "start_first": 77, "sector_counts": 160}
 
 

@@ -140,7 +140,7 @@ def stimuli(rng, config):
     """Turns in both directions with an index, bounce on every edge, a lost line, a start, samples all the while."""
     rows = []
     counts = 60
-    regs = {"filter_clocks": 2, "index_phase": 1, "correct_max": 9, "reverse": 0, "k_edge": 900 << 16}
+    regs = {"filter_clocks": 2, "index_phase": 1, "correct_max": 9, "reverse": 0, "k_edge": 900 << 12}
     regs |= turn_counter.setting(counts, config["POSITION_BITS"])
     still = {p.name: 0 for p in BLOCK.inputs} | regs
 

@@ -8,7 +8,8 @@ sample are unambiguous.  raw is rounded half up to PU; the filter's state omega 
 within one PU LSB of its input, and is rounded half up to omega_me.  k_filter = 1: no filter.
 The first sample after reset has no predecessor: its difference is zero.  A sample with ``position_restart`` has none
 either, and the filter keeps its speed.  With ``speed_given`` the speed is ``omega_given``, measured elsewhere (by the
-time between the edges of an encoder); the filter goes on behind it.
+time between the edges of an encoder); the filter goes on behind it.  On a board both may change from sample to sample,
+so the outputs say what this one had: a recording can be replayed.
 Saturation: raw saturates at 2 per unit; with k_filter <= 1 the state moves towards raw by at most the distance
 from omega_me, so omega stays within half an LSB of PU of the range of raw, and omega_me within that range.
 """
@@ -48,7 +49,7 @@ def step(
     err = 0 if position_restart else raw - round_half_up(state.omega, TO_PU)
     omega = state.omega + round_half_up(err * k_filter, DROP_STATE)
     omega_me = omega_given if speed_given else round_half_up(omega, TO_PU)
-    return State(mech, 1, omega), (omega_me,)
+    return State(mech, 1, omega), (omega_me, speed_given, position_restart)
 
 
 def reference(v, state):
@@ -56,16 +57,17 @@ def reference(v, state):
     delta = (mech - state.code / 2**TURN_W + 0.5) % 1.0 - 0.5 if state.seen else 0.0
     raw = PU.limit(v["k_speed"] * delta)
     old = state.omega * OMEGA.lsb
+    said = {"speed_was_given": v["speed_given"], "position_restarted": v["position_restart"]}
     if v["speed_given"]:
-        return {"omega_me": v["omega_given"]}
+        return said | {"omega_me": v["omega_given"]}
     if v["position_restart"]:
-        return {"omega_me": old}
-    return {"omega_me": old + v["k_filter"] * (raw - old)}
+        return said | {"omega_me": old}
+    return said | {"omega_me": old + v["k_filter"] * (raw - old)}
 
 
 def bound(v, _state):
     """Rounding of raw and of the fed-back output (each weighted by k_filter), of the increment, of the output."""
-    return {"omega_me": v["k_filter"] * PU.lsb + OMEGA.lsb / 2 + PU.lsb}
+    return {"speed_was_given": 0, "position_restarted": 0, "omega_me": v["k_filter"] * PU.lsb + OMEGA.lsb / 2 + PU.lsb}
 
 
 def stimuli(rng, config):
@@ -97,7 +99,11 @@ BLOCK = Block(
         Port("speed_given", BIT, doc="1: the speed is omega_given, not that of the code"),
         Port("omega_given", PU, doc="electrical speed, measured elsewhere"),
     ),
-    outputs=(Port("omega_me", PU, doc="electrical speed"),),
+    outputs=(
+        Port("omega_me", PU, doc="electrical speed"),
+        Port("speed_was_given", BIT, doc="1: omega_me of this sample was measured elsewhere"),
+        Port("position_restarted", BIT, doc="1: the code of this sample had nothing to do with the one before"),
+    ),
     state=State(),
     latency=7,
     interval=4,

@@ -20,7 +20,7 @@ from fluxproof.golden_model.block import Block, Port
 from fluxproof.golden_model.fixed import Format
 from fluxproof.golden_model.io import sample_latch
 
-VERSION = 1
+VERSION = 2
 MAGIC = 0x4650  # "FP"
 HEADER, COUNTER = "header", "counter"
 WORDS = (
@@ -46,7 +46,7 @@ WORDS = (
     ("compare_c", "temp_winding"),
     ("psi_m",),
     ("run", "speed_mode", "temp_valid", "clear_faults", "current_at_rail", "temp_lost", "sat_d", "sat_q",
-     "psi_held", "flux_faults"),
+     "psi_held", "flux_faults", "speed_was_given", "position_restarted"),
     ("v_dead",),
     ("v_comp",),
 )  # fmt: skip

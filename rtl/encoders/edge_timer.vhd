@@ -3,7 +3,7 @@
 -- The edges are the last one of this sample and the last one of the latest sample that had an edge, so there is no
 -- change-over.  Without an edge |omega_me| is at most k_edge / (clocks since the last edge).
 -- An edge after a reversal is the edge passed before, so it moves the shaft by no count.
--- Formats: k_edge U(16,16), counts MOVED_W bits and clocks TIME_W bits, both saturating, output PU.  A time beyond
+-- Formats: k_edge U(20,12), counts MOVED_W bits and clocks TIME_W bits, both saturating, output PU.  A time beyond
 -- TIME_W bits is standstill.  Latency: 1 (every clock is a sample); sample to omega_valid LIMIT_AT + 2 clocks, one bit
 -- of the product or of the quotient a clock; a sample before that is ignored and its edges belong to the next.
 -- Rounding: the size to nearest, halves away from zero; it saturates at 2 per unit.
@@ -147,8 +147,8 @@ begin
           end if;
         elsif clock = DIVIDE_AT then
           past    <= '0';
-          product <= shift_left(product, 1);
-          if product(WORK_W - 1 downto QUOTIENT_W - 1) >= divisor then
+          product <= shift_left(product, 1 + EDGE_TIMER_UP);
+          if product(WORK_W - 1 downto QUOTIENT_W - 1 - EDGE_TIMER_UP) >= divisor then
             past    <= '1';
             product <= (others => '0');
           end if;

@@ -136,50 +136,52 @@ package fluxproof_pkg is
   end record settings_t;
 
   type observed_t is record
-    i_a             : signed(PU_W - 1 downto 0);  -- current, phase a
-    i_b             : signed(PU_W - 1 downto 0);  -- current, phase b
-    i_c             : signed(PU_W - 1 downto 0);  -- current, phase c
-    current_at_rail : unsigned(2 downto 0);  -- bit x: ADC code of phase x at either end
-    u_dc            : unsigned(DUTY_W - 1 downto 0);  -- bus voltage
-    u_max           : unsigned(U_MAX_W - 1 downto 0);  -- radius of the voltage circle
-    u_dc_at_rail    : std_logic;  -- code at either end
-    u_dc_low        : std_logic;  -- bus below 1/32 per unit
-    theta_me        : unsigned(TURN_W - 1 downto 0);  -- electrical angle
-    omega_me        : signed(PU_W - 1 downto 0);  -- electrical speed
-    i_d             : signed(PU_W - 1 downto 0);  -- current, d axis
-    i_q             : signed(PU_W - 1 downto 0);  -- current, q axis
-    i_q_ref         : signed(PU_W - 1 downto 0);  -- current reference, q axis
-    speed_limited   : std_logic;  -- 1: output at its limit
-    lambda_d        : signed(PU_W - 1 downto 0);  -- flux linkage, d axis
-    lambda_q        : signed(PU_W - 1 downto 0);  -- flux linkage, q axis
-    omega_chord     : signed(PU_W - 1 downto 0);  -- electrical speed along the chord of a sample
-    u_dec_d         : signed(PU_W - 1 downto 0);  -- rotational voltage, d axis
-    u_dec_q         : signed(PU_W - 1 downto 0);  -- rotational voltage, q axis
-    u_int_d         : signed(INTEGRAL_W - 1 downto 0);  -- its integral part, d axis
-    u_int_q         : signed(INTEGRAL_W - 1 downto 0);  -- its integral part, q axis
-    u_d             : signed(PU_W - 1 downto 0);  -- voltage, d axis
-    u_q             : signed(PU_W - 1 downto 0);  -- voltage, q axis
-    sat_d           : signed(1 downto 0);  -- active limit, d axis: 1 upper, -1 lower, 0 none
-    sat_q           : signed(1 downto 0);  -- active limit, q axis: 1 upper, -1 lower, 0 none
-    u_alpha         : signed(PU_W - 1 downto 0);  -- voltage, alpha
-    u_beta          : signed(PU_W - 1 downto 0);  -- voltage, beta
-    duty_a          : unsigned(DUTY_W - 1 downto 0);  -- duty, leg a
-    duty_b          : unsigned(DUTY_W - 1 downto 0);  -- duty, leg b
-    duty_c          : unsigned(DUTY_W - 1 downto 0);  -- duty, leg c
-    sample_faults   : unsigned(5 downto 0);  -- faults of this sample, see sample_checks
-    sample_trip     : std_logic;  -- 1: at least one of them trips
-    current_offset  : std_logic;  -- 1: the zero of a current sensor is wrong
-    motion_faults   : unsigned(2 downto 0);  -- overspeed, runaway, stall, see motion_checks
-    open_load       : std_logic;  -- 1: a phase or the motor is not connected
-    brake_asked     : std_logic;  -- 1: the bus asks for the brake resistor
-    code_a          : unsigned(CODE_W - 1 downto 0);  -- ADC code, phase a
-    code_b          : unsigned(CODE_W - 1 downto 0);  -- ADC code, phase b
-    code_c          : unsigned(CODE_W - 1 downto 0);  -- ADC code, phase c
-    code_u_dc       : unsigned(CODE_W - 1 downto 0);  -- ADC code, bus voltage
-    code_theta      : unsigned(TURN_W - 1 downto 0);  -- position code, one mechanical turn
-    compare_a       : unsigned(15 downto 0);  -- compare value, leg a
-    compare_b       : unsigned(15 downto 0);  -- compare value, leg b
-    compare_c       : unsigned(15 downto 0);  -- compare value, leg c
+    i_a                : signed(PU_W - 1 downto 0);  -- current, phase a
+    i_b                : signed(PU_W - 1 downto 0);  -- current, phase b
+    i_c                : signed(PU_W - 1 downto 0);  -- current, phase c
+    current_at_rail    : unsigned(2 downto 0);  -- bit x: ADC code of phase x at either end
+    u_dc               : unsigned(DUTY_W - 1 downto 0);  -- bus voltage
+    u_max              : unsigned(U_MAX_W - 1 downto 0);  -- radius of the voltage circle
+    u_dc_at_rail       : std_logic;  -- code at either end
+    u_dc_low           : std_logic;  -- bus below 1/32 per unit
+    theta_me           : unsigned(TURN_W - 1 downto 0);  -- electrical angle
+    omega_me           : signed(PU_W - 1 downto 0);  -- electrical speed
+    i_d                : signed(PU_W - 1 downto 0);  -- current, d axis
+    i_q                : signed(PU_W - 1 downto 0);  -- current, q axis
+    i_q_ref            : signed(PU_W - 1 downto 0);  -- current reference, q axis
+    speed_limited      : std_logic;  -- 1: output at its limit
+    lambda_d           : signed(PU_W - 1 downto 0);  -- flux linkage, d axis
+    lambda_q           : signed(PU_W - 1 downto 0);  -- flux linkage, q axis
+    omega_chord        : signed(PU_W - 1 downto 0);  -- electrical speed along the chord of a sample
+    u_dec_d            : signed(PU_W - 1 downto 0);  -- rotational voltage, d axis
+    u_dec_q            : signed(PU_W - 1 downto 0);  -- rotational voltage, q axis
+    u_int_d            : signed(INTEGRAL_W - 1 downto 0);  -- its integral part, d axis
+    u_int_q            : signed(INTEGRAL_W - 1 downto 0);  -- its integral part, q axis
+    u_d                : signed(PU_W - 1 downto 0);  -- voltage, d axis
+    u_q                : signed(PU_W - 1 downto 0);  -- voltage, q axis
+    sat_d              : signed(1 downto 0);  -- active limit, d axis: 1 upper, -1 lower, 0 none
+    sat_q              : signed(1 downto 0);  -- active limit, q axis: 1 upper, -1 lower, 0 none
+    u_alpha            : signed(PU_W - 1 downto 0);  -- voltage, alpha
+    u_beta             : signed(PU_W - 1 downto 0);  -- voltage, beta
+    duty_a             : unsigned(DUTY_W - 1 downto 0);  -- duty, leg a
+    duty_b             : unsigned(DUTY_W - 1 downto 0);  -- duty, leg b
+    duty_c             : unsigned(DUTY_W - 1 downto 0);  -- duty, leg c
+    sample_faults      : unsigned(5 downto 0);  -- faults of this sample, see sample_checks
+    sample_trip        : std_logic;  -- 1: at least one of them trips
+    current_offset     : std_logic;  -- 1: the zero of a current sensor is wrong
+    motion_faults      : unsigned(2 downto 0);  -- overspeed, runaway, stall, see motion_checks
+    open_load          : std_logic;  -- 1: a phase or the motor is not connected
+    brake_asked        : std_logic;  -- 1: the bus asks for the brake resistor
+    speed_was_given    : std_logic;  -- 1: omega_me of this sample was measured elsewhere
+    position_restarted : std_logic;  -- 1: the code of this sample had nothing to do with the one before
+    code_a             : unsigned(CODE_W - 1 downto 0);  -- ADC code, phase a
+    code_b             : unsigned(CODE_W - 1 downto 0);  -- ADC code, phase b
+    code_c             : unsigned(CODE_W - 1 downto 0);  -- ADC code, phase c
+    code_u_dc          : unsigned(CODE_W - 1 downto 0);  -- ADC code, bus voltage
+    code_theta         : unsigned(TURN_W - 1 downto 0);  -- position code, one mechanical turn
+    compare_a          : unsigned(15 downto 0);  -- compare value, leg a
+    compare_b          : unsigned(15 downto 0);  -- compare value, leg b
+    compare_c          : unsigned(15 downto 0);  -- compare value, leg c
   end record observed_t;
 
   type estimated_t is record
@@ -797,6 +799,7 @@ package fluxproof_pkg is
   constant EDGE_TIMER_TIME_W : natural := 24;
   constant EDGE_TIMER_MOVED_W : natural := 16;
   constant EDGE_TIMER_QUOTIENT_W : natural := 19;
+  constant EDGE_TIMER_UP : natural := 4;
 
   -- hall_decoder: none: three Hall sensors, 120 degrees apart
   constant HALL_DECODER_LATENCY : positive := 1;

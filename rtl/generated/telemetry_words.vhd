@@ -15,48 +15,50 @@ entity telemetry_words is
     POSITION_BITS : positive range 8 to 18  := 16
   );
   port (
-    clk             : in  std_logic;
-    rst             : in  std_logic;
-    in_valid        : in  std_logic;
-    index           : in  unsigned(4 downto 0);  -- which word
-    counter         : in  unsigned(31 downto 0);  -- number of the sample
-    adc_a           : in  unsigned(ADC_BITS - 1 downto 0);  -- ADC code, phase a
-    adc_b           : in  unsigned(ADC_BITS - 1 downto 0);  -- ADC code, phase b
-    adc_c           : in  unsigned(ADC_BITS - 1 downto 0);  -- ADC code, phase c
-    adc_u_dc        : in  unsigned(ADC_BITS - 1 downto 0);  -- ADC code, bus voltage
-    position_code   : in  unsigned(POSITION_BITS - 1 downto 0);  -- position code, one mechanical turn
-    omega_ref       : in  signed(PU_W - 1 downto 0);  -- speed reference
-    i_d_ref         : in  signed(PU_W - 1 downto 0);  -- current reference, d axis
-    i_q_ext         : in  signed(PU_W - 1 downto 0);  -- current reference of torque mode, q axis
-    theta_me        : in  unsigned(TURN_W - 1 downto 0);  -- electrical angle
-    omega_me        : in  signed(PU_W - 1 downto 0);  -- electrical speed
-    u_dc            : in  unsigned(DUTY_W - 1 downto 0);  -- bus voltage
-    i_d             : in  signed(PU_W - 1 downto 0);  -- current, d axis
-    i_q             : in  signed(PU_W - 1 downto 0);  -- current, q axis
-    i_q_ref         : in  signed(PU_W - 1 downto 0);  -- current reference, q axis
-    lambda_d        : in  signed(PU_W - 1 downto 0);  -- flux linkage, d axis
-    lambda_q        : in  signed(PU_W - 1 downto 0);  -- flux linkage, q axis
-    u_d             : in  signed(PU_W - 1 downto 0);  -- voltage, d axis
-    u_q             : in  signed(PU_W - 1 downto 0);  -- voltage, q axis
-    compare_a       : in  unsigned(15 downto 0);  -- compare value, leg a
-    compare_b       : in  unsigned(15 downto 0);  -- compare value, leg b
-    compare_c       : in  unsigned(15 downto 0);  -- compare value, leg c
-    temp_winding    : in  signed(15 downto 0);  -- winding temperature, degrees Celsius
-    psi_m           : in  signed(PU_W - 1 downto 0);  -- flux linkage of the magnets
-    run             : in  std_logic;  -- 1: the gates are switching
-    speed_mode      : in  std_logic;  -- 1: speed control, 0: torque control
-    temp_valid      : in  std_logic;  -- 1: temp_winding is valid
-    clear_faults    : in  std_logic;  -- 1: clear the flags whose cause is gone
-    current_at_rail : in  unsigned(2 downto 0);  -- bit x: ADC code of phase x at either end
-    temp_lost       : in  std_logic;  -- 1: no valid temperature, r = r_s
-    sat_d           : in  signed(1 downto 0);  -- active limit, d axis: 1 upper, -1 lower, 0 none
-    sat_q           : in  signed(1 downto 0);  -- active limit, q axis: 1 upper, -1 lower, 0 none
-    psi_held        : in  std_logic;  -- 1: psi_m is held
-    flux_faults     : in  unsigned(6 downto 0);  -- what has disturbed the flux estimate, see flux_monitor
-    v_dead          : in  signed(V_LEG_W - 1 downto 0);  -- leg voltage loss that is not compensated
-    v_comp          : in  signed(V_LEG_W - 1 downto 0);  -- leg voltage that is compensated
-    out_valid       : out std_logic;
-    word            : out unsigned(31 downto 0)  -- the packet's word
+    clk                : in  std_logic;
+    rst                : in  std_logic;
+    in_valid           : in  std_logic;
+    index              : in  unsigned(4 downto 0);  -- which word
+    counter            : in  unsigned(31 downto 0);  -- number of the sample
+    adc_a              : in  unsigned(ADC_BITS - 1 downto 0);  -- ADC code, phase a
+    adc_b              : in  unsigned(ADC_BITS - 1 downto 0);  -- ADC code, phase b
+    adc_c              : in  unsigned(ADC_BITS - 1 downto 0);  -- ADC code, phase c
+    adc_u_dc           : in  unsigned(ADC_BITS - 1 downto 0);  -- ADC code, bus voltage
+    position_code      : in  unsigned(POSITION_BITS - 1 downto 0);  -- position code, one mechanical turn
+    omega_ref          : in  signed(PU_W - 1 downto 0);  -- speed reference
+    i_d_ref            : in  signed(PU_W - 1 downto 0);  -- current reference, d axis
+    i_q_ext            : in  signed(PU_W - 1 downto 0);  -- current reference of torque mode, q axis
+    theta_me           : in  unsigned(TURN_W - 1 downto 0);  -- electrical angle
+    omega_me           : in  signed(PU_W - 1 downto 0);  -- electrical speed
+    u_dc               : in  unsigned(DUTY_W - 1 downto 0);  -- bus voltage
+    i_d                : in  signed(PU_W - 1 downto 0);  -- current, d axis
+    i_q                : in  signed(PU_W - 1 downto 0);  -- current, q axis
+    i_q_ref            : in  signed(PU_W - 1 downto 0);  -- current reference, q axis
+    lambda_d           : in  signed(PU_W - 1 downto 0);  -- flux linkage, d axis
+    lambda_q           : in  signed(PU_W - 1 downto 0);  -- flux linkage, q axis
+    u_d                : in  signed(PU_W - 1 downto 0);  -- voltage, d axis
+    u_q                : in  signed(PU_W - 1 downto 0);  -- voltage, q axis
+    compare_a          : in  unsigned(15 downto 0);  -- compare value, leg a
+    compare_b          : in  unsigned(15 downto 0);  -- compare value, leg b
+    compare_c          : in  unsigned(15 downto 0);  -- compare value, leg c
+    temp_winding       : in  signed(15 downto 0);  -- winding temperature, degrees Celsius
+    psi_m              : in  signed(PU_W - 1 downto 0);  -- flux linkage of the magnets
+    run                : in  std_logic;  -- 1: the gates are switching
+    speed_mode         : in  std_logic;  -- 1: speed control, 0: torque control
+    temp_valid         : in  std_logic;  -- 1: temp_winding is valid
+    clear_faults       : in  std_logic;  -- 1: clear the flags whose cause is gone
+    current_at_rail    : in  unsigned(2 downto 0);  -- bit x: ADC code of phase x at either end
+    temp_lost          : in  std_logic;  -- 1: no valid temperature, r = r_s
+    sat_d              : in  signed(1 downto 0);  -- active limit, d axis: 1 upper, -1 lower, 0 none
+    sat_q              : in  signed(1 downto 0);  -- active limit, q axis: 1 upper, -1 lower, 0 none
+    psi_held           : in  std_logic;  -- 1: psi_m is held
+    flux_faults        : in  unsigned(6 downto 0);  -- what has disturbed the flux estimate, see flux_monitor
+    speed_was_given    : in  std_logic;  -- 1: omega_me of this sample was measured elsewhere
+    position_restarted : in  std_logic;  -- 1: the code of this sample had nothing to do with the one before
+    v_dead             : in  signed(V_LEG_W - 1 downto 0);  -- leg voltage loss that is not compensated
+    v_comp             : in  signed(V_LEG_W - 1 downto 0);  -- leg voltage that is compensated
+    out_valid          : out std_logic;
+    word               : out unsigned(31 downto 0)  -- the packet's word
   );
 end entity telemetry_words;
 
@@ -91,10 +93,12 @@ begin
   flags(11 downto 10) <= unsigned(sat_q);
   flags(12)           <= psi_held;
   flags(19 downto 13) <= flux_faults;
-  flags(31 downto 20) <= (others => '0');
+  flags(20)           <= speed_was_given;
+  flags(21)           <= position_restarted;
+  flags(31 downto 22) <= (others => '0');
 
   -- An index beyond the last word never occurs: don't care.
-  words(0)  <= x"46500118";
+  words(0)  <= x"46500218";
   words(1)  <= counter;
   words(2)  <= resize(adc_b, 16) & resize(adc_a, 16);
   words(3)  <= resize(adc_u_dc, 16) & resize(adc_c, 16);

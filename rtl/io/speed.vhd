@@ -20,18 +20,20 @@ entity speed is
     POSITION_BITS : positive range 8 to 18 := 16
   );
   port (
-    clk              : in  std_logic;
-    rst              : in  std_logic;
-    in_valid         : in  std_logic;
-    code_theta       : in  unsigned(POSITION_BITS - 1 downto 0);
-    reverse          : in  std_logic;
-    k_speed          : in  unsigned(23 downto 0);
-    k_filter         : in  unsigned(16 downto 0);
-    position_restart : in  std_logic;
-    speed_given      : in  std_logic;
-    omega_given      : in  signed(PU_W - 1 downto 0);
-    out_valid        : out std_logic;
-    omega_me         : out signed(PU_W - 1 downto 0)
+    clk                : in  std_logic;
+    rst                : in  std_logic;
+    in_valid           : in  std_logic;
+    code_theta         : in  unsigned(POSITION_BITS - 1 downto 0);
+    reverse            : in  std_logic;
+    k_speed            : in  unsigned(23 downto 0);
+    k_filter           : in  unsigned(16 downto 0);
+    position_restart   : in  std_logic;
+    speed_given        : in  std_logic;
+    omega_given        : in  signed(PU_W - 1 downto 0);
+    out_valid          : out std_logic;
+    omega_me           : out signed(PU_W - 1 downto 0);
+    speed_was_given    : out std_logic;  -- this and the next: what the sample had, for a recording
+    position_restarted : out std_logic
   );
 end entity speed;
 
@@ -101,9 +103,11 @@ begin
 
       -- Stage 7: omega = moved;  omega_me = omega, rounded, or omega_given
       if valid(6) = '1' then
-        state.omega <= resize(moved_6, SPEED_OMEGA_W);
-        omega_7     <= omega_6;
-        omega_me    <= omega_given when speed_given = '1' else omega_6;
+        state.omega        <= resize(moved_6, SPEED_OMEGA_W);
+        omega_7            <= omega_6;
+        omega_me           <= omega_given when speed_given = '1' else omega_6;
+        speed_was_given    <= speed_given;
+        position_restarted <= position_restart;
       end if;
 
       if rst = '1' then

@@ -148,7 +148,9 @@ begin
               speed_mode => latched.speed_mode, temp_valid => latched.temp_valid, clear_faults => latched.clear_faults,
               current_at_rail => observed_1.current_at_rail, temp_lost => estimated_1.temp_lost,
               sat_d => observed_1.sat_d, sat_q => observed_1.sat_q, psi_held => estimated_1.psi_held,
-              flux_faults => estimated_1.flux_faults, v_dead => estimated_1.v_dead, v_comp => estimated_1.v_comp,
+              flux_faults => estimated_1.flux_faults,
+              speed_was_given => observed_1.speed_was_given, position_restarted => observed_1.position_restarted,
+              v_dead => estimated_1.v_dead, v_comp => estimated_1.v_comp,
               out_valid => valid_2, word => word_2);
 
   queue : entity work.packet_fifo

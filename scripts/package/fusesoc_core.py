@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from fluxproof.checkout import ROOT, RTL
+from fluxproof.cosim.entity import read_entity
 from scripts.package.axi_top import GENERICS, TOP, source_names
 from scripts.package.ipxact import CLOCK_SCRIPT, CONSTRAINTS, LIBRARY, SUMMARY, VENDOR, project_version
 
@@ -18,6 +19,7 @@ CAPI=2:
 #   fusesoc --cores-root=. run --target=sim {vlnv}           tb/{top}_tb.vhd in GHDL: registers, gates, trip, telemetry
 #   fusesoc --cores-root=. run --target=synth {vlnv}         GHDL 5 to Verilog, then yosys for 7 series
 #   fusesoc --cores-root=. run --target=vivado --setup {vlnv}   a Vivado project; without --setup it runs Vivado too
+#   lint_board, vivado_board: the same for {board}, which has the front ends for converters and encoders
 
 name: {vlnv}
 description: {summary}
@@ -36,6 +38,10 @@ filesets:
     file_type: xdc
     files:
       - {constraints}
+  board_constraints:
+    file_type: xdc
+    files:
+      - {board_constraints}
   clock:
     file_type: tclSource
     files:
@@ -67,6 +73,14 @@ targets:
       # A port may have its entity's name; every other warning of GHDL is an error.
       analyze_options: [-Wunused, -Wno-hide, -Werror]
       sim_options: [--stop-time=0fs, --ieee-asserts=disable]
+  lint_board:
+    <<: *default
+    toplevel: {board}
+    flow: sim
+    flow_options:
+      tool: ghdl
+      analyze_options: [-Wunused, -Wno-hide, -Werror]
+      sim_options: [--stop-time=0fs, --ieee-asserts=disable]
   sim:
     filesets: [rtl, bench]
     toplevel: {top}_tb
@@ -92,7 +106,17 @@ targets:
     flow_options:
       part: xc7z020clg484-1
       pnr: none
+  vivado_board:
+    filesets: [rtl, constraints, board_constraints, clock]
+    toplevel: {board}
+    parameters: [{board_names}]
+    flow: vivado
+    flow_options:
+      part: xc7z020clg484-1
+      pnr: none
 """
+
+BOARD, BOARD_CONSTRAINTS = "fluxproof_board", "scripts/vivado/fluxproof_board.xdc"
 
 
 def vlnv() -> str:
@@ -104,7 +128,10 @@ def render(rtl: Path = RTL) -> str:
     """The whole file."""
     files = [f"      - {name}" for name in source_names(rtl)]
     parameters = []
-    for name, (_, default, doc) in GENERICS.items():
+    board = read_entity(rtl / "generated" / f"{BOARD}.vhd").generics
+    described = {name: (default, doc) for name, (_, default, doc) in GENERICS.items()}
+    described |= {name: (g.default, g.doc) for name, g in board.items() if name not in described}
+    for name, (default, doc) in described.items():
         parameters += [
             f"  {name}:",
             "    datatype: int",
@@ -121,4 +148,7 @@ def render(rtl: Path = RTL) -> str:
         clock=CLOCK_SCRIPT,
         parameters="\n".join(parameters),
         names=", ".join(GENERICS),
+        board=BOARD,
+        board_constraints=BOARD_CONSTRAINTS,
+        board_names=", ".join(board),
     )
