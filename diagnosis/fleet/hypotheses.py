@@ -45,7 +45,8 @@ class Estimated:
 class Hypothesis:
     """A set of extras: log evidence without the odds of the extras, {extra: credibility}, parameters of the set.
 
-    left: what it leaves of the misfit, per signal and order; left_share: of the voltage's power above the floor.
+    left: what it leaves of the misfit, per signal and order; left_share: of the power above the noise floor that is
+    there beside the spread of manufacture, in the signal of which most is left.
     """
 
     extras: tuple[str, ...]
@@ -130,10 +131,10 @@ class _Search:
         return out
 
     def _left(self, fit) -> tuple[tuple[Remainder, ...], float]:
-        """What a set leaves, above the noise floor, and its share of the power of voltage or torque."""
+        """What a set leaves above the noise floor, and its share of what there is beside the spread of manufacture."""
         setup = self.setup
         every = np.ones(len(setup.view), bool)
-        sizes = Sizes(setup, setup.cells.y, fit.left(), every, measured_torque(setup))
+        sizes = Sizes(setup, fit.left(self.base), fit.left(), every, measured_torque(setup))
         shares = [s.left / s.excess for s in sizes.channels.values() if s.after > s.above(k.FLOOR) and s.excess > 0.0]
         parts = tuple(dataclasses.replace(part, order=self._signed(part, fit.left())) for part in sizes.remainder())
         return parts, float(max(shares, default=0.0))

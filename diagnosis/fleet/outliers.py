@@ -3,7 +3,8 @@
 Two questions are asked of every drive.  Is a parameter outside of what the other drives predict (population.py)?  Of
 all these tests the Benjamini-Hochberg procedure keeps the share of false ones below FALSE.  Does it have an effect that
 few drives have?  The fleet's posterior (rates.py) says so with the probability of being wrong, and effects are told as
-long as the mean of these probabilities is below FALSE.
+long as the mean of these probabilities is below FALSE.  Where an effect and its companions leave more than half of what
+there is beside the spread of manufacture, something unknown is at work, which they may imitate: they are not told.
 """
 
 from __future__ import annotations
@@ -14,6 +15,8 @@ import numpy as np
 from scipy import stats
 
 from fluxproof.diagnosis.fleet.hypotheses import BASE
+from fluxproof.diagnosis.fleet.rates import Weighed
+from fluxproof.diagnosis.inference import constants as k
 
 FALSE = 0.05  # share of the told findings that may be false
 COMMON = 0.2  # share of the fleet from which an effect is a property of the design: then its size is compared
@@ -49,6 +52,11 @@ def outliers(populations, present: dict[str, dict[str, float]], values, rates) -
     for finding in sorted(found, key=lambda f: (f.doubt, -abs(np.nan_to_num(f.z)), f.serial, f.effect, f.parameter)):
         out.setdefault(finding.serial, []).append(finding)
     return out
+
+
+def explains(weighed: Weighed | None) -> bool:
+    """Whether the most probable set of a recording explains most of what there is beside the spread of manufacture."""
+    return weighed is not None and (weighed.best["left_share"] or 0.0) <= 1.0 - k.HALF
 
 
 def common(effect, rates) -> bool:

@@ -10,7 +10,7 @@ from fluxproof.diagnosis.fleet.population import pooled
 from fluxproof.diagnosis.fleet.rates import Weighed
 
 LEAST_SHARE = 1e-3  # of the probability: sets below it move no value
-USELESS = 10.0  # sigma over value: not determined by the recording
+USELESS = 10.0  # sigma over value, or over the least sigma of a set: not determined by the recording
 
 
 def values_of(weighed: Weighed | None) -> dict[tuple[str, str], tuple[float, float, str]]:
@@ -29,6 +29,8 @@ def values_of(weighed: Weighed | None) -> dict[tuple[str, str], tuple[float, flo
         p, x, s = (np.array(column) for column in list(zip(*entries, strict=True))[:3])
         if p.sum() < 0.5:  # of a set that is not believed
             continue
+        told = s <= USELESS * s.min()  # a set in which the parameter is not determined says nothing of it
+        p, x, s = p[told], x[told], s[told]
         p = p / p.sum()
         mean = float(p @ x)
         sigma = float(np.sqrt(p @ (s**2 + (x - mean) ** 2)))

@@ -18,7 +18,7 @@ from fluxproof.diagnosis.recording import RecordingError
 from fluxproof.diagnosis.session import diagnose
 from fluxproof.golden_model.drive_keys import DriveError
 
-ROOMS = ("diagnosis", "golden_model", "plant", "cosim", "fluxproof")
+ROOMS = ("diagnosis", "golden_model", "plant", "cosim")  # a row follows from these
 
 
 @dataclass(frozen=True)
@@ -115,8 +115,7 @@ def version() -> str:
     package = Path(__file__).resolve().parents[1]
     root = package.parent if (package.parent / "pyproject.toml").is_file() else package
     digest = hashlib.sha256()
-    for room in ROOMS:
-        folder = package if room == "fluxproof" else root / room
+    for folder in (root / room for room in ROOMS):
         for path in sorted(folder.rglob("*.py")):
             digest.update(path.relative_to(folder).as_posix().encode() + path.read_bytes())
     try:

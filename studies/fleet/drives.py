@@ -6,11 +6,13 @@ The simulator is that of the own generator of the blind study, which is not the 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
 from studies.blind import cases, forms, unknown
 from studies.blind.build import Build, fresh
+from studies.blind.generate import write_recording
 from studies.blind.machines import Nominal, random_nominal
 from studies.blind.plans import Plan
 
@@ -96,3 +98,55 @@ def with_unknown(drive: FleetDrive, seed: int, number: int, kind: str) -> FleetD
 def record(drive: FleetDrive, seed: int, number: int, attempt: int = 0) -> dict:
     """Columns of one recording."""
     return drive.build.record(np.random.default_rng([seed, number, attempt, 3]))[0]
+
+
+def recording_of(job) -> Path:
+    """The file of a job of ``written`` or ``ageing``."""
+    return job[-1] / (f"drive_{job[2]:05d}.parquet" if len(job) == 7 else f"age_{job[3]:05d}.parquet")
+
+
+def written(job) -> dict:
+    """Simulate and write one recording, unless it is there; {"serial", "recording", "role", "name"} of its truth.
+
+    job: (design, seed, number, role, name, rows, folder), role: healthy, fault or unknown; name: of fault or kind.
+    """
+    nominal, seed, number, role, name, rows, _ = job
+    path = recording_of(job)
+    truth = {"serial": f"S{number:05d}", "recording": path.name, "role": role, "name": name}
+    if path.exists():
+        return truth
+    for attempt in range(ATTEMPTS):
+        drive = healthy(nominal, seed, number, rows, attempt)
+        if role == "fault":
+            with_fault(drive, seed, number, name, attempt)
+        elif role == "unknown":
+            with_unknown(drive, seed, number, name)
+        try:
+            columns = record(drive, seed, number, attempt)
+        except ZeroDivisionError:  # the hidden flux map has no current for a flux
+            continue
+        if cases.sound(drive, columns):
+            write_recording(path, columns, "parquet")
+            return truth
+    raise RuntimeError(f"drive {number} ({role} {name}): no sound drive in {ATTEMPTS} attempts")
+
+
+def roles(seed: int, count: int, kind: str) -> list[tuple[str, str]]:
+    """(role, name) of each drive: 3 % have a fault, 2 % the unknown effect ``kind``; at least 3 and 4."""
+    rng = np.random.default_rng([seed, 99])
+    faulty, strange = max(3, round(0.03 * count)), max(4, round(0.02 * count))
+    names = [str(FAULTS[n]) for n in rng.permutation(len(FAULTS))]
+    out = [("fault", names[n % len(names)]) for n in range(faulty)]
+    out += [("unknown", kind)] * strange + [("healthy", "")] * (count - faulty - strange)
+    return [out[n] for n in rng.permutation(count)]
+
+
+def ageing(job) -> dict:
+    """One recording of a drive that loses flux; job: (design, seed, share of the flux, number, rows, folder)."""
+    nominal, seed, share, number, rows, _ = job
+    path = recording_of(job)
+    if not path.exists():
+        drive = healthy(nominal, seed, 0, rows)
+        drive.build.change("motor", psi_m=share * drive.build.drive.motor.psi_m)
+        write_recording(path, record(drive, seed, 1000 + number), "parquet")
+    return {"recording": path.name, "share": share}
