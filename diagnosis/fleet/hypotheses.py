@@ -152,8 +152,8 @@ class _Judged:
 
     def __init__(self, fit, base):
         self.fit = fit
-        odds = np.log(k.PRESENT / (1 - k.PRESENT))
-        self.value = float(fit.value - odds * len(fit.names)) if possible(fit, small=base) else -np.inf
+        odds = sum(fit.problem.setup.odds(n) for n in fit.names)
+        self.value = float(fit.value - odds) if possible(fit, small=base) else -np.inf
 
     def problem_of_all(self, setup):
         """The linearisation at this fit with the columns of every effect."""

@@ -61,17 +61,7 @@ def _digital(digital) -> str:
 def _hypotheses(answer) -> list[dict]:
     """The sets that a posterior leaves open; a slow log has no posterior: what is named is its only set."""
     if isinstance(answer.search, Posterior):
-        return [
-            {
-                "extras": list(h.extras),
-                "evidence": h.evidence,
-                "credible": [h.credible[n] for n in h.extras],
-                "estimates": [dataclasses.asdict(e) for e in h.estimates],
-                "left": [dataclasses.asdict(part) for part in h.left],
-                "left_share": h.left_share,
-            }
-            for h in hypotheses(answer.search)
-        ]
+        return hypothesis_rows(answer.search)
     if answer.verdict in ("digital_mismatch", "bad_recording"):
         return []
     extras = sorted(e.name for e in answer.effects if e.name not in BASE)
@@ -88,6 +78,21 @@ def _hypotheses(answer) -> list[dict]:
             "left": [dataclasses.asdict(part) for part in answer.remainder],
             "left_share": None if answer.explained_share is None else 1.0 - answer.explained_share,
         }
+    ]
+
+
+def hypothesis_rows(posterior) -> list[dict]:
+    """The sets that a posterior leaves open, as in fleet.parquet."""
+    return [
+        {
+            "extras": list(h.extras),
+            "evidence": h.evidence,
+            "credible": [h.credible[n] for n in h.extras],
+            "estimates": [dataclasses.asdict(e) for e in h.estimates],
+            "left": [dataclasses.asdict(part) for part in h.left],
+            "left_share": h.left_share,
+        }
+        for h in hypotheses(posterior)
     ]
 
 

@@ -87,11 +87,3 @@ def write_fleet(out: Path, rows: list[dict]) -> Path:
     path = Path(out) / FLEET
     write_table(path, pa.Table.from_pylist(rows, schema()))
     return path
-
-
-def read_fleet(path: Path) -> list[dict]:
-    """The rows of a fleet.parquet; ValueError if it is none."""
-    table = pq.read_table(path)
-    if "hypotheses" not in table.column_names:
-        raise ValueError(f"{path}: no fleet.parquet of `fluxproof fleet`: it has no column 'hypotheses'")
-    return table.to_pylist()

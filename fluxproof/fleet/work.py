@@ -12,6 +12,7 @@ from pathlib import Path
 
 import fsspec
 
+from fluxproof.diagnosis.fleet.prior import design_of
 from fluxproof.diagnosis.fleet.row import failed_row, one_line, row_of
 from fluxproof.diagnosis.nominal import load_nominal
 from fluxproof.diagnosis.recording import RecordingError
@@ -99,14 +100,15 @@ def content(recording: str) -> str:
     return _hash(Path(recording))
 
 
-@functools.cache
 def design(drive: str) -> str:
-    """Hash of a drive file and of the flux map that it names."""
-    digest = hashlib.sha256(Path(drive).read_bytes())
-    flux_map = load_nominal(drive).plant.get("machine", {}).get("flux_map")
-    if isinstance(flux_map, str):
-        digest.update((Path(drive).parent / flux_map).read_bytes())
-    return digest.hexdigest()[:16]
+    """Hash of a drive file, computed once for each of its states."""
+    state = Path(drive).stat()
+    return _design(drive, state.st_mtime_ns, state.st_size)
+
+
+@functools.lru_cache(1024)
+def _design(drive, *_) -> str:
+    return design_of(drive)
 
 
 @functools.cache
