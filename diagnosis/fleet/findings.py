@@ -67,11 +67,17 @@ def _design(name, rows, limits) -> Design:
             x, s, units = zip(*mine.values(), strict=True)
             pop = population(effect, parameter, units[0], mine, x, s)
             populations += [pop] if pop is not None else []
+    grouped = groups.groups(rows, weighed)
+    beside = defaultdict(set)
+    for group in grouped:
+        for serial in group.serials:
+            beside[serial] |= set(group.companions)
     present: dict[str, dict[str, float]] = defaultdict(dict)
     for serial, w in zip(serials, weighed, strict=True):
         mine = present[serial]
         for effect, p in (w.present if outliers.explains(w) else {}).items():
-            mine[effect] = max(mine.get(effect, 0.0), p)
+            if effect not in beside[serial]:
+                mine[effect] = max(mine.get(effect, 0.0), p)
     series = defaultdict(list)
     for row, mine in zip(rows, values, strict=True):
         for (effect, parameter), (value, sigma, unit) in mine.items():
@@ -80,5 +86,5 @@ def _design(name, rows, limits) -> Design:
     return Design(
         name, rows[0]["drive"], rows, weighed, rates, populations,
         outliers.outliers(populations, dict(present), drives, rates),
-        drift.drifts(series, limits), groups.groups(rows, weighed),
+        drift.drifts(series, limits), grouped,
     )  # fmt: skip

@@ -36,12 +36,17 @@ class Line:
 
 @dataclass(frozen=True)
 class Group:
-    """Drives whose remainder has one signature.  looks_like: causes or terms with the number of recordings."""
+    """Drives whose remainder has one signature.  looks_like: causes or terms with the number of recordings.
+
+    companions: effects that half of the recordings or more have beside it.  What comes with the same unknown remainder
+    again and again is a part of it, which the effect imitates, and no fault of its own.
+    """
 
     serials: tuple[str, ...]
     recordings: tuple[str, ...]
     lines: tuple[Line, ...]
     looks_like: tuple[tuple[str, int], ...]
+    companions: tuple[str, ...]
 
 
 def signature(weighed: Weighed | None) -> dict[tuple[str, float], float]:
@@ -75,7 +80,7 @@ def groups(rows: list[dict], weighed: list[Weighed | None]) -> list[Group]:
         serials = sorted({row["serial"] for row, _, _ in mine})
         if len(serials) >= FEWEST:
             recordings = tuple(sorted(row["recording"] for row, _, _ in mine))
-            out.append(Group(tuple(serials), recordings, tuple(_lines(mine)), _looks(mine)))
+            out.append(Group(tuple(serials), recordings, tuple(_lines(mine)), _looks(mine), _companions(mine)))
     return sorted(out, key=lambda g: (-len(g.serials), g.serials))
 
 
@@ -97,6 +102,11 @@ def _lines(mine) -> list[Line]:
             spread = (float(np.median(values)), float(size), float(low), float(high))
             out.append(Line(*place, *spread, units.get(place, "")))
     return sorted(out, key=lambda line: -line.share)
+
+
+def _companions(mine) -> tuple[str, ...]:
+    seen = Counter(e for _, weighed, _ in mine for e, p in weighed.present.items() if p > 0.5)
+    return tuple(sorted(e for e, count in seen.items() if 2 * count >= len(mine) and e not in SUSPECTS))
 
 
 def _looks(mine) -> tuple[tuple[str, int], ...]:

@@ -100,6 +100,19 @@ class Engine:
             yield item, result
 
 
+def in_parallel(function: Callable, items: list, workers: int | None, what: str) -> Iterator[tuple]:
+    """(item, result) of a function over items on cores of this machine, with progress; RuntimeError for a lost item."""
+    if not items:
+        return
+    progress = Progress(len(items), what)
+    with Engine(workers) as engine:
+        for item, result in engine.each(function, items):
+            if isinstance(result, Lost):
+                raise RuntimeError(f"{what}: {item}: {result.reason}")
+            yield item, result
+            progress.step()
+
+
 class Progress:
     """How many are done, the rate and the time left, on stderr: one line on a terminal, else one every ten seconds."""
 

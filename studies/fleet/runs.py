@@ -14,7 +14,7 @@ from pathlib import Path
 import psutil
 
 from fluxproof.files import write_json, write_text
-from fluxproof.fleet.engine import Engine, Lost, Progress
+from fluxproof.fleet.engine import Engine, in_parallel
 from fluxproof.fleet.manifest import entries
 from fluxproof.fleet.session import Outcome, run
 from studies.fleet import drives
@@ -26,13 +26,8 @@ WEEK = datetime.timedelta(days=7)
 def made(function, jobs, what, workers) -> list[dict]:
     """The truths of all recordings, in the order of the jobs; those that exist are not simulated again."""
     todo = [job for job in jobs if not drives.recording_of(job).exists()]
-    if todo:
-        progress = Progress(len(todo), what)
-        with Engine(workers) as engine:
-            for _, truth in engine.each(function, todo):
-                if isinstance(truth, Lost):
-                    raise RuntimeError(f"{what}: {truth.reason}")
-                progress.step()
+    for _ in in_parallel(function, todo, workers, what):
+        pass
     return [function(job) for job in jobs]
 
 
