@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator
@@ -10,11 +11,12 @@ import dask
 from distributed import Client, KilledWorker, LocalCluster, as_completed
 
 AHEAD = 4  # items per worker that wait at the scheduler; more would only take its memory
-DEATHS = 10  # workers that one item may take with it before it is given up
+DEATHS = 10  # workers that one item may take with it before it is suspected
 EVERY_S = 10.0  # between lines of progress where the line cannot be updated
 CONNECT_S = 15.0
 SETTINGS = {
     "distributed.scheduler.allowed-failures": DEATHS,
+    "distributed.scheduler.worker-saturation": 1.0,  # nothing waits at a worker, and dies with it
     "distributed.comm.timeouts.connect": f"{CONNECT_S:g}s",
     "distributed.admin.large-graph-warning-threshold": "1GB",
     "distributed.worker.memory.target": False,  # nothing is kept on workers that could be spilled
@@ -79,22 +81,32 @@ class Engine:
 
         An exception of the function is raised here.
         """
+        suspects = []
+        for item, result in self._ended(function, items):
+            if isinstance(result, Lost):
+                suspects.append(item)
+            else:
+                yield item, result
+        for item in suspects:  # alone, as a worker takes with it whatever waited beside the cause
+            yield from self._ended(function, [item])
+
+    def _ended(self, function, items) -> Iterator[tuple]:
         waiting, running = iter(items), {}
         ended = as_completed(with_results=False)
 
         def more(count):
-            for item in [x for _, x in zip(range(count), waiting, strict=False)]:
+            for item in itertools.islice(waiting, count):
                 future = self.client.submit(function, item, pure=False)
                 running[future.key] = item
                 ended.add(future)
 
-        more(max(AHEAD * self.cores(), 1))
+        more(AHEAD * self.cores())
         for future in ended:
             item = running.pop(future.key)
             try:
                 result = future.result()
             except KilledWorker:
-                result = Lost(f"its worker process ended {DEATHS + 1} times, such as for want of memory")
+                result = Lost("its worker process ended again and again, such as for want of memory")
             future.release()
             more(1)
             yield item, result

@@ -19,7 +19,11 @@ from fluxproof.diagnosis.recording import RecordingError
 from fluxproof.diagnosis.session import diagnose
 from fluxproof.golden_model.drive_keys import DriveError
 
-ROOMS = ("diagnosis", "golden_model", "plant", "cosim")  # a row follows from these
+ROOMS = ("diagnosis", "golden_model", "plant", "cosim")  # a row follows from these,
+BESIDE = ("diagnosis/report", "diagnosis/fleet")  # but not from how it is shown, or from what the fleet makes of it,
+ROW = ("row.py", "hypotheses.py", "schema.py")  # apart from these
+# What object stores call the state of a file's content.
+MARKS = ("ETag", "etag", "md5Hash", "crc32c", "generation", "content_md5", "CRC", "LastModified", "mtime")
 
 
 @dataclass(frozen=True)
@@ -93,11 +97,17 @@ class local:
 
 
 def content(recording: str) -> str:
-    """Hash of a recording: of its bytes; in an object store what that says of it, such as its ETag."""
-    if remote(recording):
-        system, path = fsspec.core.url_to_fs(recording)
-        return f"{system.ukey(path)}"
-    return _hash(Path(recording))
+    """Hash of a recording: of its bytes; in an object store of what that says of its content, such as an ETag."""
+    if not remote(recording):
+        with open(recording, "rb") as file:
+            return _hash(file)
+    system, path = fsspec.core.url_to_fs(recording)
+    info = system.info(path)
+    marks = {name: str(info[name]) for name in MARKS if info.get(name) is not None}
+    if marks:
+        return f"{sorted(marks.items())}, {info.get('size')} bytes"
+    with system.open(path, "rb") as file:
+        return _hash(file)
 
 
 def design(drive: str) -> str:
@@ -119,6 +129,8 @@ def version() -> str:
     digest = hashlib.sha256()
     for folder in (root / room for room in ROOMS):
         for path in sorted(folder.rglob("*.py")):
+            if path.parent.relative_to(folder.parent).as_posix() in BESIDE and path.name not in ROW:
+                continue
             digest.update(path.relative_to(folder).as_posix().encode() + path.read_bytes())
     try:
         number = metadata.version("fluxproof")
@@ -133,13 +145,7 @@ def key_of(recording: str, drive: str) -> str:
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:32]
 
 
-def _hash(path: Path) -> str:
-    with open(path, "rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest() if hasattr(hashlib, "file_digest") else _slow(file)
-
-
-def _slow(file) -> str:
-    """The same before Python 3.11."""
+def _hash(file) -> str:
     digest = hashlib.sha256()
     while block := file.read(1 << 20):
         digest.update(block)
