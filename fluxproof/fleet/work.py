@@ -48,10 +48,11 @@ class Result:
 
 def work(item: Item) -> Result:
     """Diagnose one recording; never raises: bad input and defects of the tool become a row with the reason."""
-    lasting = True
+    lasting, folder = True, Path(item.recording).parent
     try:
         nominal = load_nominal(item.drive)
         with local(item.recording) as path:
+            folder = path.parent
             row = row_of(diagnose(path, nominal))
     except (RecordingError, DriveError) as error:
         row = failed_row(str(error))
@@ -61,13 +62,9 @@ def work(item: Item) -> Result:
         where = traceback.extract_tb(error.__traceback__)[-1]
         place = f"{Path(where.filename).name}:{where.lineno}"
         row = failed_row(f"{type(error).__name__} in {place}: {one_line(error)}")
-    row["reason"] = _named(row.get("reason"), item)
+    for name in ("reason", "sentence"):  # without the folder: the same recording elsewhere has the same row
+        row[name] = row.get(name) and row[name].replace(f"{folder}/", "")
     return Result(item, {**row, "design": item.design, "version": item.version}, lasting)
-
-
-def _named(reason: str | None, item: Item) -> str | None:
-    """A reason without the folder, so that the same recording elsewhere has the same row."""
-    return reason and reason.replace(str(Path(item.recording).parent) + "/", "")
 
 
 def remote(recording: str) -> bool:

@@ -10,6 +10,7 @@ import json
 import os
 import sys
 import time
+from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: one core for each worker
 
@@ -17,6 +18,7 @@ from fluxproof.checkout import BUILD  # noqa: E402
 from fluxproof.files import write_json  # noqa: E402
 from studies.blind import unknown  # noqa: E402
 from studies.fleet.figures import FIGURES, Study  # noqa: E402
+from studies.fleet.picture import draw  # noqa: E402
 
 FOLDER = BUILD / "studies" / "fleet"
 RESULT = BUILD / "studies" / "fleet.json"
@@ -32,10 +34,14 @@ def main(arguments=None) -> int:
     parser.add_argument("--kind", choices=sorted(unknown.KINDS), default="inter_turn_short", help="unknown effect")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--only", choices=sorted(FIGURES), action="append", help="this figure alone; may be repeated")
+    parser.add_argument("--picture", type=Path, metavar="FILE", help="draw the README's picture instead")
     options = parser.parse_args(arguments)
     if options.count < 20 or options.rows < 4000:
         parser.error("--count must be at least 20 and --rows at least 4000: 20 operating points of 200 rows")
     study = Study(options.count, options.rows, options.seed, options.kind, options.workers, FOLDER)
+    if options.picture:
+        print(draw(study, options.picture))
+        return 0
     measured = _measured(study)
     for name in [n for n in ORDER if n in (options.only or ORDER)]:
         began = time.perf_counter()

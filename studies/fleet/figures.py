@@ -166,11 +166,16 @@ def speedup(study: Study) -> list[dict]:
     return [figure("speed-up from one to two workers", ours, ">= 1.8", ratio >= 1.8)]
 
 
+def ageing(study: Study):
+    """(truths, outcome) of the recordings of one drive over its life."""
+    folder = study.folder / f"life_{study.seed}_{study.rows}"
+    truths = runs.life(folder, study.seed, RECORDINGS, LOSS, study.rows, study.workers)
+    return truths, runs.diagnosed(folder / "manifest.csv", folder / "out", study.workers)
+
+
 def drift(study: Study) -> list[dict]:
     """A loss of magnet flux over the recordings of one drive."""
-    folder = study.folder / f"life_{study.seed}_{study.rows}"
-    runs.life(folder, study.seed, RECORDINGS, LOSS, study.rows, study.workers)
-    outcome = runs.diagnosed(folder / "manifest.csv", folder / "out", study.workers)
+    _, outcome = ageing(study)
     found = [d for design in outcome.findings.designs for d in design.drifts]
     mine = next((d for d in found if d.parameter == "magnet_flux_wb"), None)
     others = sorted({d.parameter for d in found} - {"magnet_flux_wb"})
