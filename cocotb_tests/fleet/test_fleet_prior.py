@@ -80,12 +80,14 @@ def test_a_fleet_of_faulty_drives_makes_no_faulty_one_of_a_healthy_drive(drive):
     assert r.z < -8.0 and r.shrunk == pytest.approx(r.value, rel=0.01)  # it is none of them, and is not made one
 
 
-def test_a_prior_without_the_cap_would_do_so(drive, monkeypatch):
-    """The check can fail: with odds as the fleet's rates have them and certain beyond, effects are named."""
-    folder, path, alone = drive
-    fleet = population_of(folder, alone, faulty, "faulty.parquet")
-    monkeypatch.setattr("fluxproof.diagnosis.fleet.prior.log_odds", lambda rate: 40.0 if rate >= 0.5 else -3.0)
-    assert diagnose(path, folder / "drive.toml", prior=fleet).effects
+def test_the_odds_of_a_name_are_at_most_its_bayes_factor(drive, monkeypatch):
+    """No prior odds above even ones: what a recording says by itself bounds each name.  Without the cap it does not."""
+    folder, _, alone = drive
+    prior = load_prior(population_of(folder, alone, faulty, "faulty.parquet"), folder / "drive.toml")
+    odds = lambda: [np.log(0.05 / 0.95) + shift for shift in prior.shifts().values()]  # noqa: E731
+    assert max(odds()) <= 1e-9
+    monkeypatch.setattr("fluxproof.diagnosis.fleet.prior.EVEN", 0.999)
+    assert max(odds()) > 2.0
 
 
 def test_the_command_says_that_there_was_a_prior(drive, tmp_path, capsys):
