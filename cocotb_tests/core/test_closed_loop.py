@@ -39,7 +39,7 @@ def test_everything_at_once():
 
 def test_every_event_in_ghdl():
     """500 periods of the VHDL itself: voltage limit, speed limit, torque mode, reversal, gates off and on."""
-    summary, arrays, _ = close_loop(InGhdl, PAPER, "compressed", 128)
+    summary, arrays, _ = close_loop(InGhdl, PAPER, "compressed", 72)
     assert summary["differences"] == 0 and summary["periods_compared"] == 500
     assert summary["sample_to_duty_clocks"] == fluxproof.SAMPLE_TO_DUTY
     assert arrays["observed_sat_q"].any() and arrays["observed_speed_limited"].any()
@@ -117,7 +117,7 @@ def test_smallest_converters(tmp_path):
     )
     path = tmp_path / "coarse.toml"
     path.write_text(text)
-    summary, _, register_set = close_loop(InGhdl, path, "short", 100, key=" coarse")
+    summary, _, register_set = close_loop(InGhdl, path, "short", 72, key=" coarse")
     assert (register_set.config.adc_bits, register_set.config.position_bits) == (12, 12)
     assert summary["differences"] == 0 and summary["periods_compared"] == 300
 

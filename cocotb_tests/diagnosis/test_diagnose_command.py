@@ -222,15 +222,18 @@ def test_unusable_input_ends_in_one_line_and_status_2(name, tmp_path, capsys):
     assert str(path) in printed.err and "\x1b" not in printed.err and not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize("name", UNUSABLE)
-def test_unusable_part_beside_a_good_one_is_named(name, tmp_path, capsys):
-    path = tmp_path / name
-    path.write_bytes(UNUSABLE[name])
+@pytest.mark.parametrize("half", [slice(4), slice(4, 8)])  # more than five findings are left to the report
+def test_unusable_parts_beside_a_good_one_are_named(half, tmp_path, capsys):
+    paths = [tmp_path / name for name in list(UNUSABLE)[half]]
+    for path in paths:
+        path.write_bytes(UNUSABLE[path.name])
     good = table_of(tmp_path / "good.csv", rows=900)
-    assert diagnose(tmp_path / "out", good, path, more=["--quiet"]) == 0
+    assert diagnose(tmp_path / "out", good, *paths, more=["--quiet"]) == 0
     printed = capsys.readouterr()
-    (line,) = [line for line in printed.out.splitlines() if f"({name} is not used)" in line]
-    assert line.startswith("recording: ") and str(path) in line and "\x1b" not in printed.out and not printed.err
+    for path in paths:
+        (line,) = [line for line in printed.out.splitlines() if f"({path.name} is not used)" in line]
+        assert line.startswith("recording: ") and str(path) in line
+    assert "\x1b" not in printed.out and not printed.err
     assert diagnose(tmp_path / "out", good, tmp_path / "none.csv", more=["--quiet"]) == 2
 
 
@@ -299,7 +302,7 @@ def test_failing_overlay_adds_only_a_note(dump, tmp_path, monkeypatch):
 def test_files_with_flipped_bits_end_without_traceback_and_without_a_name(tmp_path):
     """Bits flipped in files of every format: they may be rejected, but no name comes without a finding."""
     nominal = nominal_of(tmp_path)
-    files = {n: path for n, (path, _) in damaged_files(tmp_path).items() if n.startswith("flip") and n[4] in "02468"}
+    files = {n: path for n, (path, _) in damaged_files(tmp_path).items() if n.startswith("flip") and n[4] in "05"}
     named, refused = [], 0
     for name, path in files.items():
         try:
@@ -309,4 +312,4 @@ def test_files_with_flipped_bits_end_without_traceback_and_without_a_name(tmp_pa
             continue
         if (found.effects or found.ambiguity) and not found.problems:
             named.append(f"{name}: {found.sentence} {[p.message for p in found.problems]}")
-    assert len(files) > 40 and refused < len(files) and not named, "\n".join(named)
+    assert len(files) >= 20 and refused < len(files) and not named, "\n".join(named)

@@ -13,7 +13,7 @@ import pytest
 from fluxproof.checkout import ROOT
 from studies.blind import __main__ as blind
 from studies.blind import generate
-from studies.blind.sealed import cases, inverter, magnetics, params, plan, record
+from studies.blind.sealed import cases, inverter, magnetics, params, plan, record, sensors
 from studies.blind.sealed.drives import KINDS, random_drive
 from studies.blind.sealed.faults import FAULTS, UNKNOWN
 from studies.blind.sealed.write import write_case
@@ -192,6 +192,16 @@ def test_finer_steps_give_the_same_currents():
     other = cases.simulate(case, 5, 1)[1]
     for name in ("i_d", "i_q"):
         assert np.abs(one[name] - other[name]).max() < 5e-3 * case.drive.current
+
+
+@pytest.mark.parametrize("steps", [1, 7])
+def test_the_filter_delays_a_ramp_by_its_time_constant(steps):
+    """However long the steps are: the converters that sample later by as much see the current itself."""
+    tau, slope = 1e-6, np.array([3e5, -1e5, -2e5])
+    seen, ends = -tau * slope, np.linspace(0.0, 12 * tau, steps + 1)
+    for begin, end in zip(ends[:-1], ends[1:], strict=True):
+        sensors.anti_alias(tau, end - begin, begin * slope, end * slope, seen)
+    assert seen == pytest.approx((ends[-1] - tau) * slope, rel=1e-12)
 
 
 def test_every_fault_and_unknown_is_drawn():

@@ -15,7 +15,7 @@ from studies.blind.sealed import inverter as inv
 from studies.blind.sealed.control import ANGLE, MEMORY, SPEED, current_regulator, modulate, speed_regulator, track_speed
 from studies.blind.sealed.machine import drag, phases, substep, turn, vector
 from studies.blind.sealed.magnetics import torque
-from studies.blind.sealed.sensors import bus_code, current_codes, shaft_code, wrap
+from studies.blind.sealed.sensors import anti_alias, bus_code, current_codes, shaft_code, wrap
 
 jit = nb.njit(cache=True)
 ROWS = ("t", "i_a", "i_b", "i_c", "theta_e", "omega_e", "u_dc", "d_a", "d_b", "d_c", "i_d_ref", "i_q_ref",
@@ -36,6 +36,7 @@ def run(m, v, s, c, goal, i_ref, load, fan, free, theta0, noise):
     up, down, times = np.zeros((2, 3)), np.zeros((2, 3)), np.zeros(v.steps + 40)
     queue = np.full((5, 3), 0.5)  # duties; row 0: the latest
     node, i_abc, seen, sampled, held = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3)
+    i_end = np.zeros(3)
     legs, share = np.zeros(3), np.zeros(3)
     measured, duties, memory, tracking = np.zeros(3), np.zeros(3), np.zeros(MEMORY), np.zeros(2)
     theta, omega, temp, i_fe, i_short, i_dq, pull = theta0, goal[0], 25.0, 0j, 0.0, 0j, 0.0
@@ -91,13 +92,13 @@ def run(m, v, s, c, goal, i_ref, load, fan, free, theta0, noise):
             psi, i_fe, i_short, theta, omega, i_dq, pull = substep(
                 m, r, psi_m, u, h, slope, free, drawn, psi, i_fe, i_short, theta, omega, i_dq
             )
+            if s.tau > 0.0:
+                z = i_dq * turn(p * theta) + i_fe + 2.0 / 3.0 * m.short_share * i_short
+                phases(z, i_end)
+                anti_alias(s.tau, h, i_abc, i_end, seen)
             i_mid = 0.5 * (before + i_dq) * rotor.conjugate()
             total = i_mid + i_fe + 2.0 / 3.0 * m.short_share * i_short
             phases(total, i_abc)
-            if s.tau > 0.0:
-                keep = math.exp(-h / s.tau)
-                for x in range(3):
-                    seen[x] = i_abc[x] + (seen[x] - i_abc[x]) * keep
             copper = 1.5 * r * abs(total) ** 2
             drawn_dc = share[0] * i_abc[0] + share[1] * i_abc[1] + share[2] * i_abc[2]
             for x in range(3):

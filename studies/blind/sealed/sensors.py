@@ -16,6 +16,18 @@ def wrap(x):
 
 
 @jit
+def anti_alias(tau, h, start, end, seen):
+    """Low-passed currents ``seen`` (3,) after h seconds in which the currents went from ``start`` to ``end`` [A].
+
+    Exact for a current that is linear in time: a substep may be longer than tau.
+    """
+    keep = math.exp(-h / tau)
+    for x in range(3):
+        lag = (end[x] - start[x]) / h * tau
+        seen[x] = end[x] - lag + (seen[x] - start[x] + lag) * keep
+
+
+@jit
 def current_codes(s, seen, held, noise, out):
     """Write three measured currents [A].
 
