@@ -41,8 +41,8 @@ def _population(axis, pop, outlying):
     flagged = np.array([pop.serials[n] in outlying for n in order])
     axis.plot(at[~flagged], 1e3 * pop.shrunk[order][~flagged], "o", color=theme.AFTER, markersize=3)
     axis.plot(at[flagged], 1e3 * pop.x[order][flagged], "o", color=theme.BEFORE, markersize=6)
-    axis.set(xlabel="drives, sorted", ylabel="magnet flux [mWb]", title="Spread of drives, and drives that differ")
-    theme.key(axis, ("recording ± 2 σ", theme.RECORDED), ("drive", theme.AFTER), ("differs", theme.BEFORE))
+    axis.set(xlabel="drives, sorted", ylabel="magnet flux [mWb]", title=f"{len(order)} drives")
+    theme.key(axis, ("recording ± 2 σ", theme.RECORDED), ("drive", theme.AFTER), ("another fault", theme.BEFORE))
 
 
 def _drift(axis, found):
