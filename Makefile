@@ -25,7 +25,7 @@ unexport PYTHONHOME
 
 PYTHON_RUN := .venv/bin/python
 
-.PHONY: help setup generate test demo papers bench blind sensitivity real compare timeline mutate verilog synth ecp5 lint registers package prove faults board lock clean distclean
+.PHONY: help setup generate test demo papers bench blind fleet sensitivity real compare timeline mutate verilog synth ecp5 lint registers package prove faults board lock clean distclean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -59,6 +59,9 @@ bench: setup ## run the benchmarks
 
 blind: setup ## run the sealed benchmark of the diagnosis
 	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m studies.blind $(ARGS)
+
+fleet: setup ## measure the figures of `fluxproof fleet` on simulated fleets of 1,000 drives (ARGS='--count 60': fewer)
+	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m studies.fleet $(ARGS)
 
 sensitivity: setup ## halve and double every constant of the inference and count the verdicts that change
 	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m studies.sensitivity $(ARGS)

@@ -22,6 +22,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("recordings", metavar="RECORDING", nargs="+", help=formats)
     parser.add_argument("--drive", metavar="drive.toml", required=True, help="the nominal drive in SI units")
     parser.add_argument("--out", metavar="DIR", help=f"folder for the results (default: {FOLDER}/NAME OF RECORDING)")
+    prior = "a population of drives with the same drive file, of `fluxproof fleet`, as prior"
+    parser.add_argument("--prior", metavar="fleet.parquet", help=prior)
     parser.add_argument("--open", action="store_true", help="show the report in the browser")
     parser.add_argument("--quiet", action="store_true", help="no progress on stderr")
 
@@ -34,7 +36,7 @@ def run(args: argparse.Namespace) -> int:
     nominal = load_nominal(args.drive)
     out = Path(args.out) if args.out else default_folder(args.recordings)
     with Progress(quiet=args.quiet) as progress:
-        answer = session(args.recordings, nominal, out, progress)
+        answer = session(args.recordings, nominal, out, progress, args.prior)
     for line in answer_lines(answer, nominal, out):
         print(printable(line, sys.stdout.encoding))
     if args.open and not show(out / "report.html"):
@@ -105,6 +107,9 @@ def answer_lines(answer, nominal, out: Path) -> list[str]:
             f"misfit at operating points that were not fitted: {fit.holdout_before:.3g} {fit.unit} before, "
             f"{fit.holdout_after:.3g} {fit.unit} after, noise floor {fit.noise_floor:.3g} {fit.unit}"
         )
+    if answer.prior is not None:
+        lines += ["", f"prior: {answer.prior.drives} drives in {answer.prior.path}"]
+        lines += map(_among, answer.prior.parameters)
     if answer.digital.checked and answer.digital.first_difference is None:
         lines.append(f"controller: {answer.digital.samples} samples equal to the golden model in every bit")
     lines += _problem_lines(answer.problems)
@@ -128,6 +133,15 @@ def effect_table(effects) -> list[str]:
             first = ("", "", "")
     widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
     return ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
+
+
+def _among(p) -> str:
+    """Where a parameter stands among the other drives."""
+    from fluxproof.diagnosis.quantities import measured, quantity
+
+    others = f"the others {quantity(p.mean, p.unit)} ± {quantity(p.spread, p.unit, 2)}"
+    shrunk = measured(p.shrunk, p.shrunk_sigma, p.unit)
+    return f"  {p.parameter} {measured(p.value, p.sigma, p.unit)}, {others}; with them {shrunk}, {abs(p.z):.1f} σ off"
 
 
 def _request(nominal):

@@ -24,9 +24,10 @@ from fluxproof.diagnosis.suspects import SUSPECTS
 HOLDOUT_EVERY = 4  # every fourth dwell is held out
 
 
-def explain(loaded: list[Recording], nominal: Nominal, progress=lambda text: None) -> Diagnosis:
+def explain(loaded: list[Recording], nominal: Nominal, progress=lambda text: None, shifts=None) -> Diagnosis:
     """Explain one recording, or several of the same drive, against a nominal drive.
 
+    shifts: {effect: change of its log prior odds}, which slow logs, whose search has no prior, do not use.
     Raises RecordingError if the recordings contain no operating point for which a voltage balance can be made.
     """
     nominal = as_read(loaded, nominal)
@@ -41,7 +42,7 @@ def explain(loaded: list[Recording], nominal: Nominal, progress=lambda text: Non
     if any(r.slow for r in loaded):  # sampled too slowly for a voltage balance between rows
         answer = diagnose_slow(loaded, nominal, progress)
     else:
-        answer = _physics(loaded, nominal, progress)
+        answer = _physics(loaded, nominal, progress, shifts)
     answer.rows, answer.problems = rows, problems
     return answer
 
@@ -72,15 +73,17 @@ def rows_of(recordings, nominal):
     return Rows(view, view.visible(known_effects()), ~held), held
 
 
-def posterior_of(recordings, nominal, progress=lambda text: None):
-    """(posterior, (b,) held-out blocks) of fast recordings of one drive."""
+def posterior_of(recordings, nominal, progress=lambda text: None, shifts=None):
+    """(posterior, (b,) held-out blocks) of fast recordings of one drive; shifts: see ``explain``."""
     rows, held = rows_of(recordings, nominal)
     progress("sets of effects")
-    return Posterior(Setup.of(rows), progress), held
+    setup = Setup.of(rows)
+    setup.shifts = dict(shifts or {})
+    return Posterior(setup, progress), held
 
 
-def _physics(recordings, nominal, progress) -> Diagnosis:
-    posterior, held = posterior_of(recordings, nominal, progress)
+def _physics(recordings, nominal, progress, shifts) -> Diagnosis:
+    posterior, held = posterior_of(recordings, nominal, progress, shifts)
     answer = conclude(posterior, held, progress)
     if answer.verdict == "no_mismatch":
         return answer

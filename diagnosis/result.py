@@ -142,6 +142,36 @@ class Convention:
 
 
 @dataclass
+class InFleet:
+    """A parameter among those of the other drives: mean and spread, the value shrunk to them, and how far it is off.
+
+    z: distance from the mean in predictive standard deviations; p: probability of a drive of the fleet beyond it.
+    """
+
+    effect: str
+    parameter: str
+    unit: str
+    value: float
+    sigma: float
+    mean: float
+    spread: float
+    shrunk: float
+    shrunk_sigma: float
+    z: float
+    p: float
+
+
+@dataclass
+class Fleet:
+    """The population that was the prior of a diagnosis, and where the drive stands in it."""
+
+    path: str
+    drives: int
+    recordings: int
+    parameters: list[InFleet] = field(default_factory=list)
+
+
+@dataclass
 class UnknownTerm:
     """The single term that fits the unexplained residual best.
 
@@ -196,6 +226,7 @@ class Diagnosis:
     rows: int = 0
     problems: list[Problem] = field(default_factory=list)
     digital: Digital = field(default_factory=Digital)
+    prior: Fleet | None = None  # the fleet whose population was the prior
     details: str = ""  # the figures behind the sentence
     advice: str = ""  # what to do next
     notes: list[str] = field(default_factory=list)  # for people: assumptions and omissions

@@ -25,6 +25,8 @@ from fluxproof.diagnosis.answer.improve import write_improved
 from fluxproof.diagnosis.balance.parts import left_out
 from fluxproof.diagnosis.conventions.apply import read_drive, read_recording
 from fluxproof.diagnosis.conventions.tell import restate
+from fluxproof.diagnosis.fleet.prior import among, load_prior
+from fluxproof.diagnosis.inference.posterior import Posterior
 from fluxproof.diagnosis.ingest.load import load_recording
 from fluxproof.diagnosis.nominal import Nominal, load_nominal
 from fluxproof.diagnosis.overlay.compare import closed_loop
@@ -42,25 +44,26 @@ FLUX_MAP_NOTE = (
 OVERLAY_SIGNALS = ("u_d_ref", "u_q_ref")  # not the currents: the controller regulates them to their references
 
 
-def diagnose(recordings, drive, progress=lambda text: None) -> Diagnosis:
+def diagnose(recordings, drive, progress=lambda text: None, prior=None) -> Diagnosis:
     """Diagnose one recording, or several of the same drive, against a nominal drive; writes nothing.
 
     recordings: a path, a Recording, or a list of them; drive: a path to drive.toml or a Nominal; progress: called with
-    a line of text at each step.  If the recordings contain the core's outputs, the core is replayed first.
+    a line of text at each step; prior: path of a fleet.parquet of drives with the same drive file, or None.
+    If the recordings contain the core's outputs, the core is replayed first.
     Raises RecordingError and DriveError for unusable input.
     """
     nominal = drive if isinstance(drive, Nominal) else load_nominal(drive)
     with threadpool_limits(1):  # many small matrices: more threads only wait
-        return _diagnose(_loaded(recordings, nominal, progress), nominal, progress)
+        return _diagnose(_loaded(recordings, nominal, progress), nominal, progress, prior)
 
 
-def run(recordings, drive, out, progress=lambda text: None) -> Diagnosis:
+def run(recordings, drive, out, progress=lambda text: None, prior=None) -> Diagnosis:
     """``diagnose`` and write the output files to the folder ``out``; raises OSError if it cannot be written."""
     nominal = drive if isinstance(drive, Nominal) else load_nominal(drive)
     with threadpool_limits(1):
         loaded = _loaded(recordings, nominal, progress)
         out = _folder(Path(out), nominal)
-        answer = _diagnose(loaded, nominal, progress)
+        answer = _diagnose(loaded, nominal, progress, prior)
         improved = _improved(nominal, answer, out, loaded[0])
         if write_flux_map(answer, out):
             answer.notes.append(FLUX_MAP_NOTE)
@@ -96,17 +99,21 @@ def _loaded(recordings, nominal, progress) -> list[Recording]:
     return loaded
 
 
-def _diagnose(loaded, nominal, progress) -> Diagnosis:
+def _diagnose(loaded, nominal, progress, fleet=None) -> Diagnosis:
     """The digital part, then the physics if the controller's outputs equal those of its golden model."""
+    prior = load_prior(fleet, nominal.path) if fleet is not None else None
     digital, notes = _digital(loaded, progress)
     if digital.first_difference is not None:
         answer = Diagnosis("digital_mismatch", _mismatch_sentence(digital.first_difference))
         answer.rows = sum(len(recording) for recording in loaded)
         answer.problems = [p for recording in loaded for p in recording.problems]
     else:
-        answer = _physics(loaded, nominal, progress)
+        answer = _physics(loaded, nominal, progress, prior.shifts() if prior else None)
         restate(answer, loaded)
     answer.digital = digital
+    if prior is not None:
+        answer.prior = among(prior, answer)
+        notes.append(_prior_note(answer))
     answer.notes = [*notes, *answer.notes, *_reading_notes(loaded)]
     complete(answer, read_drive(nominal, answer.readings), known_effects())
     return answer
@@ -121,10 +128,22 @@ def _folder(out: Path, nominal: Nominal) -> Path:
     return out
 
 
-def _physics(loaded, nominal, progress) -> Diagnosis:
+def _prior_note(answer) -> str:
+    """That a fleet was the prior, and what it did."""
+    fleet = answer.prior
+    used = isinstance(answer.search, Posterior)
+    did = (
+        "it changed the prior odds of the effects, to even ones at most, so that no name rests on the fleet alone"
+        if used
+        else "it was not used, as only logs of the control are judged with a prior"
+    )
+    return f"The population of {fleet.drives} drives in {fleet.path} was the prior: {did}."
+
+
+def _physics(loaded, nominal, progress, shifts) -> Diagnosis:
     """The verdict of physics.py; a recording without a usable operating point is a bad recording."""
     try:
-        return explain(loaded, nominal, progress)
+        return explain(loaded, nominal, progress, shifts)
     except RecordingError as error:
         problem = Problem("no_balance", str(error), fatal=True)
         problems = [p for recording in loaded for p in recording.problems]

@@ -17,6 +17,7 @@ from fluxproof import dump_capture, print_registers
 from fluxproof.commission import command as commission
 from fluxproof.diagnosis import command as diagnose
 from fluxproof.diagnosis.recording import RecordingError
+from fluxproof.fleet import command as fleet
 from fluxproof.golden_model.drive_keys import DriveError
 from fluxproof.project import command as project
 from fluxproof.simulate import command as simulate
@@ -39,6 +40,9 @@ COMMANDS = {
     "diagnose": Command("why a recording differs from its simulation", diagnose.arguments, diagnose.run),
     "dump": Command(
         "convert a captured telemetry stream to the input of diagnose", dump_capture.arguments, dump_capture.run
+    ),
+    "fleet": Command(
+        "many recordings: which drives differ, what drifts, what is worth a look", fleet.arguments, fleet.run
     ),
     "project": Command("the files of a Vivado project for a drive", project.arguments, project.run),
     "registers": Command("the registers for a drive", print_registers.arguments, print_registers.run),

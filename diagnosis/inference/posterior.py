@@ -151,14 +151,18 @@ class Posterior:
         return out
 
 
-def possible(fit) -> bool:
-    """Whether no effect of a set has an impossible size or, beyond its uncertainty, an impossible sign."""
+def possible(fit, small=()) -> bool:
+    """Whether no effect of a set has an impossible size or, beyond its uncertainty, an impossible sign.
+
+    small: effects that may be smaller than what is of practical interest.
+    """
     problem = fit.problem
     for name in fit.names:
         effect, c = problem.setup.effects[name], fit.c[name]
-        if effect.too_large(c, problem.setup.view) or effect.size(c, problem.view.nominal) < effect.floor(
-            problem.view.nominal
-        ):
+        nominal = problem.view.nominal
+        if effect.too_large(c, problem.setup.view):
+            return False
+        if name not in small and effect.size(c, nominal) < effect.floor(nominal):
             return False
         keys = list(c)
         cov = np.zeros((len(keys), len(keys)))
@@ -167,6 +171,6 @@ def possible(fit) -> bool:
             for b, kb in enumerate(keys):
                 if ka in place and kb in place:
                     cov[a, b] = fit.cov[place[ka], place[kb]]
-        if not effect.possible(c, cov, problem.view.nominal):
+        if not effect.possible(c, cov, nominal):
             return False
     return True

@@ -45,13 +45,18 @@ class Setup:
         self.visits = visits(self.view, self.points)
         self.grouping = Grouping(self.cells, self.points, self.visits, self.cells.ok & self.train)
         self.repeats = _repeats(self.cells, self.points)
+        self.shifts = {}
+
+    def odds(self, name) -> float:
+        """Log prior odds of an effect; ``shifts`` {effect: change} holds what a fleet says of them."""
+        return float(np.log(k.PRESENT / (1 - k.PRESENT)) + self.shifts.get(name, 0.0))
 
     def read_like(self, other, volts, amps):
         """This reading of a recording with the operating points of ``other``, the same blocks as documented.
 
         volts, amps: factors of voltages and currents between the two.
         """
-        self.points, self.visits = other.points, other.visits
+        self.points, self.visits, self.shifts = other.points, other.visits, other.shifts
         self.grouping, self.repeats = other.grouping, other.repeats
         self.level = self.level * np.where(self.cells.channel == "sum", amps, 1.0)
         return self
@@ -154,9 +159,10 @@ class Problem:
         take, value, c, cov, a, lam = self.setup.call(Problem.likelihood, self, names)
         # Prior odds of every effect, and the prior of its size: even in the logarithm up to a typical size, the
         # geometric mean of the smallest of interest and the largest possible one, and falling beyond.
-        odds = np.log(k.PRESENT / (1 - k.PRESENT))
-        most = [self.most[n] for n in names]
-        value += sum(odds - np.log(np.log(m)) - np.log1p(x**2 / m) for m, x in zip(most, a, strict=True))
+        value += sum(
+            self.setup.odds(n) - np.log(np.log(self.most[n])) - np.log1p(x**2 / self.most[n])
+            for n, x in zip(names, a, strict=True)
+        )
         return Fit(self, names, float(value), take, c, cov, a, lam)
 
 

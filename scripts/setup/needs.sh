@@ -11,18 +11,20 @@ needs_of() {
         demo | papers | faults) echo core report sim ghdl c++ ghdl5 ;;
         timeline) echo core report sim ghdl ;;
         generate | registers | package) echo core report package ;;
-        blind) echo run blind ;;
-        sensitivity) echo run ;;
+        blind) echo run blind fleet ;;
+        fleet) echo run fleet ;;
+        sensitivity) echo run fleet ;;
         board) echo core run report sim test ghdl c++ ghdl5 ;;
-        bench | real) echo run test ;;
-        compare) echo run compare ;;
+        bench) echo run test ;;
+        real) echo run fleet test ;;
+        compare) echo run compare fleet ;;
         verilog) echo core ghdl5 ;;
         prove) echo core prove ghdl5 yosys ;;
         synth) echo core run report sim synth test ghdl c++ ghdl5 yosys ;;
         ecp5) echo core report synth ghdl5 yosys nextpnr ;;
         lint) echo lint ;;
         mutate) echo core run report sim package prove test ghdl c++ ghdl5 yosys ;;
-        test) echo "$(needs_of mutate)" blind compare lint tcl browser ;;
+        test) echo "$(needs_of mutate)" blind fleet compare lint tcl browser ;;
         setup) echo "$(needs_of test)" synth nextpnr ;;
         *) return 1 ;;
     esac

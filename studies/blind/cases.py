@@ -113,7 +113,7 @@ def _form_of(rng, name: str, chosen: list[str], stratum: str, turn: int) -> str:
     return forms.CATALOGUE if plain else str(rng.choice(others))
 
 
-def _keep_convex(build: Build):
+def keep_convex(build: Build):
     """Reduce cross-saturation until the fluxes are invertible over the whole current range."""
     i_r = build.nominal.machine["rated_current_a"]
     grid = [(d, q) for d in np.linspace(-1.5, 1.5, 13) * i_r for q in np.linspace(-1.5, 1.5, 13) * i_r]
@@ -144,7 +144,7 @@ def make(seed: int, index: int, stratum: str, turn: int, attempt: int = 0) -> Ca
         form = _form_of(rng, name, chosen, stratum, turn)
         parameters = forms.apply(name, build, rng, size, form)
         case.effects.append({"name": name, "form": form, "size": size, "parameters": parameters})
-    _keep_convex(build)
+    keep_convex(build)
     if stratum == "unknown":
         kinds = sorted(unknown.KINDS)
         case.kind = kinds[turn % len(kinds)]

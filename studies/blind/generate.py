@@ -7,7 +7,6 @@ stratum; the truth of all cases in OUT/../truth_NAME.sealed, its SHA-256 in OUT/
 from __future__ import annotations
 
 import argparse
-import multiprocessing
 import os
 import sys
 from pathlib import Path
@@ -17,6 +16,7 @@ import pandas as pd
 
 from fluxproof.checkout import BUILD
 from fluxproof.files import write_text
+from fluxproof.fleet.engine import in_parallel
 from studies.blind import cases, identifiable
 from studies.blind.seal import seal
 from studies.blind.sealed import cases as sealed
@@ -108,11 +108,8 @@ def generate(
         old.rmdir()
     work = [(generator, seed, *entry, out) for entry in listing(seed, count, only, generator)]
     truth = []
-    with multiprocessing.get_context("spawn").Pool(jobs) as pool:
-        for entry in pool.imap_unordered(generate_case, work):
-            truth.append(entry)
-            print(f"\r{generator}: {len(truth)} of {len(work)} cases ", end="", file=sys.stderr, flush=True)
-    print(file=sys.stderr)
+    for _, entry in in_parallel(generate_case, work, jobs, f"{generator}: cases"):
+        truth.append(entry)
     truth.sort(key=lambda entry: entry["case"])
     return seal(out, {"seed": seed, "generator": generator, "cases": truth})
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import multiprocessing
 import sys
 import time
 import traceback
@@ -16,6 +15,8 @@ from pathlib import Path
 
 from fluxproof.checkout import BUILD
 from fluxproof.files import write_json, write_text
+from fluxproof.fleet.engine import in_parallel
+from fluxproof.fleet.work import key_of
 from studies.blind import figures, tables
 from studies.blind.again import resolve
 from studies.blind.page import page
@@ -27,7 +28,7 @@ def answer_of(folder: Path) -> tuple[str, dict]:
     """(case, answer) of one case folder; a crash of the tool is an answer too, {"error": ...}."""
     from fluxproof.diagnosis import diagnose
 
-    recording = next(p for p in sorted(folder.iterdir()) if p.stem == "recording")
+    recording = recording_of(folder)
     began = time.perf_counter()
     try:
         answer = diagnose(recording, folder / "drive.toml").to_json()
@@ -53,23 +54,21 @@ def _second_look(job):
         }
 
 
-def _in_parallel(function, work, jobs, what):
-    """Results in any order, with a progress line."""
-    results, began = [], time.perf_counter()
-    if not work:
-        return results
-    with multiprocessing.get_context("spawn").Pool(jobs) as pool:
-        for result in pool.imap_unordered(function, work):
-            results.append(result)
-            spent = time.perf_counter() - began
-            print(
-                f"\r{what}: {len(results)} of {len(work)}, {spent:.0f} s ",
-                end="",
-                file=sys.stderr,
-                flush=True,
-            )
-    print(file=sys.stderr)
-    return results
+def _answers(work: list[Path], jobs: int, kept: Path) -> dict[str, dict]:
+    """{case: answer}; each is written as it comes, so that a run that was stopped goes on from there.
+
+    kept: folder of the answers, each under a hash of the case and of the code that judges it.
+    """
+    keys = {case: key_of(str(recording_of(case)), str(case / "drive.toml")) for case in work}
+    done = {case: path for case in work if (path := kept / f"{keys[case]}.json").exists()}
+    for case, (_, answer) in in_parallel(answer_of, [c for c in work if c not in done], jobs, "diagnosed"):
+        done[case] = write_json(kept / f"{keys[case]}.json", answer)
+    return {case.name: json.loads(done[case].read_text()) for case in work}
+
+
+def recording_of(folder: Path) -> Path:
+    """The recording of a case folder."""
+    return next(p for p in sorted(folder.iterdir()) if p.stem == "recording")
 
 
 def score(folder: Path, jobs: int = 2, reuse: bool = False) -> dict:
@@ -82,7 +81,7 @@ def score(folder: Path, jobs: int = 2, reuse: bool = False) -> dict:
         answers = json.loads(kept.read_text())
     else:
         work = sorted(p for p in folder.iterdir() if p.name.startswith("case_"))
-        answers = dict(_in_parallel(answer_of, work, jobs, "diagnosed"))
+        answers = _answers(work, jobs, kept.with_suffix(""))
         write_json(kept, answers)
     truth = unseal(folder)
     cases = [(entry, answers[entry["case"]]) for entry in truth["cases"]]
@@ -92,7 +91,8 @@ def score(folder: Path, jobs: int = 2, reuse: bool = False) -> dict:
         for t, a in cases
         if a.get("verdict") == "ambiguous" and t["effects"] and t.get("generator", "own") == "own"
     ]
-    resolved = sorted(_in_parallel(_second_look, ties, jobs, "recorded again"), key=lambda r: r["case"])
+    looks = [result for _, result in in_parallel(_second_look, ties, jobs, "recorded again")]
+    resolved = sorted(looks, key=lambda r: r["case"])
     result = summary(cases, resolved)
     result.update(
         generator=truth.get("generator", "own"),

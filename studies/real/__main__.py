@@ -6,16 +6,51 @@ The recordings are not part of the project: FLUXPROOF_RECORDINGS names their fol
 from __future__ import annotations
 
 import argparse
+import hashlib
+import json
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 from fluxproof.checkout import BUILD, recordings
 from fluxproof.diagnosis.command import Progress
 from fluxproof.files import write_json
+from fluxproof.fleet.engine import in_parallel
+from fluxproof.fleet.work import version
 from studies.real import brusa, emrax, laas
 
 PARTS = {"brusa_flux_map": brusa, "emrax228": emrax, "laas_mn4004": laas}
+
+
+def part(job) -> dict:
+    """The entry of one recording, written beside its outputs; job: (name, folder of recordings, out, quiet)."""
+    name, folder, out, quiet = job
+    module, started = PARTS[name], time.perf_counter()
+    with Progress(quiet=quiet) as progress:
+        entry = module.run(folder, out, progress)
+    entry["seconds"]["all"] = time.perf_counter() - started
+    write_json(entry_file(name, folder, out), entry)
+    return entry
+
+
+def entry_file(name: str, folder: Path, out: Path) -> Path:
+    """Where the entry of a recording is kept, for as long as recording and code are the same."""
+    file, code = folder / PARTS[name].FILE, hashlib.sha256(version().encode())
+    code.update(file.read_bytes())
+    for path in sorted(Path(__file__).parent.glob("*.py")):
+        code.update(path.read_bytes())
+    return out / "kept" / f"{name}_{code.hexdigest()[:16]}.json"
+
+
+def kept(chosen) -> Iterator[tuple[str, dict]]:
+    """(name, entry) of what is missing, and of what an earlier run, which was perhaps stopped, has finished."""
+    for name, folder, out, _ in chosen:
+        file = PARTS[name].FILE
+        if not (folder / file).exists():
+            yield name, {"skipped": f"{file} is missing; FLUXPROOF_RECORDINGS names its folder"}
+        elif (path := entry_file(name, folder, out)).exists():
+            yield name, json.loads(path.read_text())
 
 
 def main(arguments=None) -> int:
@@ -28,19 +63,14 @@ def main(arguments=None) -> int:
     if unknown:
         parser.error(f"{unknown[0]} is not one of {', '.join(PARTS)}")
     folder, result = recordings(), {"schema": 1, "recordings": {}}
-    for name in args.names or PARTS:
-        part, started = PARTS[name], time.perf_counter()
-        file = folder / part.FILE
-        if not file.exists():
-            result["recordings"][name] = {
-                "skipped": f"{part.FILE} is missing; FLUXPROOF_RECORDINGS names its folder"
-            }
-            continue
-        with Progress(quiet=args.quiet) as progress:
-            entry = part.run(folder, args.out, progress)
-        entry["seconds"]["all"] = time.perf_counter() - started
-        result["recordings"][name] = entry
-        print(f"{name}: {entry['verdict']}. {entry['sentence']}")
+    chosen = [(name, folder, args.out, args.quiet) for name in args.names or PARTS]
+    found = dict(kept(chosen))
+    for (name, *_), entry in in_parallel(part, [c for c in chosen if c[0] not in found], None, "recordings"):
+        found[name] = entry
+    for name, *_ in chosen:
+        entry = result["recordings"][name] = found[name]
+        if "skipped" not in entry:
+            print(f"{name}: {entry['verdict']}. {entry['sentence']}")
     print(write_json(args.out / "result.json", result))
     return 0
 

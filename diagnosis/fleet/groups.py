@@ -1,0 +1,119 @@
+"""Recordings with the same unexplained remainder: an unknown effect that is seen often is a discovery.
+
+The signature of a remainder is a vector with a place for each signal and signed electrical order, whose squares are the
+shares of the remainder's power, and a place for each cause beyond the catalogue that it looks like.  The cosine between
+two signatures is 1 for the same remainder of any size.  Clusters are those of average linkage at the distance APART.
+"""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.cluster.hierarchy import fcluster, linkage
+
+from fluxproof.diagnosis.fleet.rates import Weighed
+from fluxproof.diagnosis.inference import constants as k
+from fluxproof.diagnosis.suspects import SUSPECTS
+
+APART = 0.35
+FEWEST = 3  # drives of a group
+
+
+@dataclass(frozen=True)
+class Line:
+    """A place of a group's signature: share of the remainder's power, and median size with the middle half."""
+
+    signal: str
+    order: float
+    share: float
+    size: float
+    low: float
+    high: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Group:
+    """Drives whose remainder has one signature.  looks_like: causes or terms with the number of recordings.
+
+    companions: effects that half of the recordings or more have beside it.  What comes with the same unknown remainder
+    again and again is a part of it, which the effect imitates, and no fault of its own.
+    """
+
+    serials: tuple[str, ...]
+    recordings: tuple[str, ...]
+    lines: tuple[Line, ...]
+    looks_like: tuple[tuple[str, int], ...]
+    companions: tuple[str, ...]
+
+
+def signature(weighed: Weighed | None) -> dict[tuple[str, float], float]:
+    """The remainder of a recording, a vector of the length 1; empty if nothing is left."""
+    if weighed is None:
+        return {}
+    best = weighed.best
+    power = defaultdict(float)
+    if (best["left_share"] or 0.0) > k.SMALL:
+        for part in best["left"]:
+            if part["size"] is not None:
+                power[part["signal"], float(part["order"])] += max(part["share"] or 0.0, 0.0)
+    total = sum(power.values())
+    out = {place: np.sqrt(value / total) for place, value in power.items()} if total > 0.0 else {}
+    out |= {(f"as if {SUSPECTS[n].title}", 0.0): 1.0 for n, p in weighed.present.items() if n in SUSPECTS and p > 0.5}
+    length = np.sqrt(sum(v**2 for v in out.values()))
+    return {place: float(v / length) for place, v in out.items()} if length > 0.0 else {}
+
+
+def groups(rows: list[dict], weighed: list[Weighed | None]) -> list[Group]:
+    """The groups of at least FEWEST drives, the largest first."""
+    found = [(row, w, s) for row, w in zip(rows, weighed, strict=True) if (s := signature(w))]
+    if len(found) < FEWEST:
+        return []
+    places = sorted({place for _, _, s in found for place in s})
+    table = np.array([[s.get(place, 0.0) for place in places] for _, _, s in found])
+    labels = fcluster(linkage(table, "average", metric="cosine"), APART, "distance")
+    out = []
+    for label in np.unique(labels):
+        mine = [found[n] for n in np.flatnonzero(labels == label)]
+        serials = sorted({row["serial"] for row, _, _ in mine})
+        if len(serials) >= FEWEST:
+            recordings = tuple(sorted(row["recording"] for row, _, _ in mine))
+            out.append(Group(tuple(serials), recordings, tuple(_lines(mine)), _looks(mine), _companions(mine)))
+    return sorted(out, key=lambda g: (-len(g.serials), g.serials))
+
+
+def _lines(mine) -> list[Line]:
+    """Places of the signature that half of the recordings have, the largest first."""
+    shares, sizes, units = defaultdict(list), defaultdict(list), {}
+    for _, weighed, own in mine:
+        for place, value in own.items():
+            shares[place].append(value**2)
+        for part in weighed.best["left"]:
+            place = (part["signal"], float(part["order"]))
+            if place in own and part["size"] is not None:
+                sizes[place].append(part["size"])
+                units[place] = part["unit"]
+    out = []
+    for place, values in shares.items():
+        if len(values) * 2 >= len(mine):
+            low, size, high = np.quantile(sizes[place], (0.25, 0.5, 0.75)) if sizes[place] else (np.nan,) * 3
+            spread = (float(np.median(values)), float(size), float(low), float(high))
+            out.append(Line(*place, *spread, units.get(place, "")))
+    return sorted(out, key=lambda line: -line.share)
+
+
+def _companions(mine) -> tuple[str, ...]:
+    seen = Counter(e for _, weighed, _ in mine for e, p in weighed.present.items() if p > 0.5)
+    return tuple(sorted(e for e, count in seen.items() if 2 * count >= len(mine) and e not in SUSPECTS))
+
+
+def _looks(mine) -> tuple[tuple[str, int], ...]:
+    """What the recordings' own answers say of the remainder, the most frequent first."""
+    said = Counter()
+    for row, _, _ in mine:
+        unknown = row.get("unknown")
+        if unknown:
+            said[unknown["meaning"] or unknown["formula"]] += 1
+    return tuple(sorted(said.items(), key=lambda entry: (-entry[1], entry[0]))[:4])

@@ -1,0 +1,116 @@
+"""``fluxproof fleet``: many recordings, as a command.
+
+Progress goes to stderr, what is worth a look to stdout, the files to --out.  The exit status is 0 whatever was found,
+and 2 with one line on stderr for unusable input.  Slow imports are made inside the functions, so that
+``fluxproof --help`` stays quick, and dask is needed for this command alone.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+FOLDER = Path("build") / "fleet"
+MOST_LINES = 20
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the subcommand."""
+    kinds = "a recording, a folder, a pattern such as 'runs/*.csv', an address such as s3://…, a manifest"
+    parser.add_argument("recordings", metavar="RECORDINGS", nargs="+", help=kinds)
+    parser.add_argument("--drive", metavar="drive.toml", help="the nominal drive where a manifest names none")
+    parser.add_argument("--out", metavar="DIR", default=str(FOLDER), help=f"folder for the results (default: {FOLDER})")
+    parser.add_argument("--workers", type=int, help="processes on this machine (default: one for each core)")
+    parser.add_argument("--scheduler", metavar="ADDRESS", help="a running dask scheduler, such as tcp://host:8786")
+    limit = "where a drift is to end: in SI units, or such as 95%% of the first value; may be repeated"
+    parser.add_argument("--limit", metavar="PARAMETER=VALUE", action="append", default=[], help=limit)
+    parser.add_argument("--report", metavar="NAME", action="append", default=[], help="also write its report")
+    parser.add_argument("--serve", action="store_true", help="show it in the browser; a click makes a report")
+    parser.add_argument("--quiet", action="store_true", help="no progress on stderr")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Diagnose what is not done, write the outputs, print what is worth a look; returns 0, or 130 after Ctrl-C."""
+    from fluxproof.diagnosis.command import printable
+    from fluxproof.diagnosis.recording import RecordingError
+
+    try:
+        from fluxproof.fleet.engine import Engine, EngineError
+        from fluxproof.fleet.session import run as session
+    except ModuleNotFoundError as error:
+        if error.name not in ("dask", "distributed", "fsspec"):
+            raise
+        raise RecordingError(f"{error.name} is not installed: pip install 'fluxproof[fleet]'") from None
+    from fluxproof.fleet.manifest import entries
+    from fluxproof.fleet.reports import make, serve
+
+    if args.workers is not None and args.workers < 1:
+        raise RecordingError(f"--workers {args.workers}: expected 1 or more")
+    limits, listed, out = _limits(args.limit), entries(args.recordings, args.drive), Path(args.out)
+    try:
+        outcome = session(
+            listed, out, lambda: Engine(args.workers, args.scheduler), limits, args.quiet, _told(args.quiet)
+        )
+        for name in args.report:
+            print(f"wrote {make(listed, name, out)}")
+    except EngineError as error:
+        raise RecordingError(str(error)) from None
+    except KeyboardInterrupt:
+        print("fluxproof: stopped; the same command goes on from here", file=sys.stderr)
+        return 130
+    for line in lines(outcome):
+        print(printable(line, sys.stdout.encoding))
+    if args.serve:
+        serve(listed, out)
+    return 0
+
+
+def _told(quiet):
+    def told(engine):
+        if not quiet:
+            print(f"dask dashboard: {engine.dashboard}", file=sys.stderr)
+
+    return told
+
+
+def _limits(texts) -> dict[str, str]:
+    """{parameter: value} of the options; RecordingError says what was expected."""
+    from fluxproof.diagnosis.fleet.drift import limit_of
+    from fluxproof.diagnosis.recording import RecordingError
+
+    out = {}
+    for text in texts:
+        name, equals, value = text.partition("=")
+        try:
+            limit_of(value, 1.0)
+        except ValueError:
+            equals = ""
+        if not equals or not name:
+            expected = "expected PARAMETER=VALUE, such as magnet_flux_wb=0.095 or magnet_flux_wb=95%"
+            raise RecordingError(f"--limit {text}: {expected}")
+        out[name.strip()] = value
+    return out
+
+
+def lines(outcome) -> list[str]:
+    """What is worth a look, as lines of text."""
+    from fluxproof.fleet.page import cause, drift_view, headline
+
+    found = outcome.findings
+    out = [headline(found), f"diagnosed {outcome.diagnosed}, kept {outcome.kept} of earlier runs"]
+    for design in found.designs:
+        out += [
+            f"{serial}: {c['title']}: {c['why']}" for serial, fs in design.outliers.items() for c in map(cause, fs)
+        ][:MOST_LINES]
+        for d in map(drift_view, design.drifts[:MOST_LINES]):
+            out.append(f"{d['serial']}: {d['parameter']} {d['relative']} per year, limit reached: {d['reaches']}")
+        out += [f"{len(g.serials)} drives share a remainder: {_lines(g)}" for g in design.groups]
+    out += [f"{row['recording']}: {row['reason']}" for row in found.failed[:MOST_LINES]]
+    return [*out, "", f"wrote {outcome.page}", f"wrote {outcome.fleet}"]
+
+
+def _lines(group) -> str:
+    from fluxproof.fleet.pictures import place_text
+
+    return ", ".join(place_text(line) for line in group.lines[:4])

@@ -1,0 +1,159 @@
+"""Work on all cores of this machine or on a cluster: dask.distributed, with progress and with workers that may die."""
+
+from __future__ import annotations
+
+import itertools
+import sys
+import time
+from collections.abc import Callable, Iterable, Iterator
+
+import dask
+from distributed import Client, KilledWorker, LocalCluster, as_completed
+
+AHEAD = 4  # items per worker that wait at the scheduler; more would only take its memory
+DEATHS = 10  # workers that one item may take with it before it is suspected
+EVERY_S = 10.0  # between lines of progress where the line cannot be updated
+CONNECT_S = 15.0
+SETTINGS = {
+    "distributed.scheduler.allowed-failures": DEATHS,
+    "distributed.scheduler.worker-saturation": 1.0,  # nothing waits at a worker, and dies with it
+    "distributed.comm.timeouts.connect": f"{CONNECT_S:g}s",
+    "distributed.admin.large-graph-warning-threshold": "1GB",
+    "distributed.worker.memory.target": False,  # nothing is kept on workers that could be spilled
+    "distributed.worker.memory.spill": False,
+}
+
+
+class EngineError(ValueError):
+    """No engine: one line says why."""
+
+
+class Lost:
+    """In place of a result: the item took all its workers with it, or the cluster was lost."""
+
+    def __init__(self, reason: str):
+        self.reason = reason
+
+
+class Engine:
+    """Processes of one thread each, by default one for each core, or the workers of a scheduler.
+
+    with Engine(workers=2) as engine:
+        for item, result in engine.each(function, items):
+            ...
+    """
+
+    def __init__(self, workers: int | None = None, scheduler: str | None = None):
+        self.workers, self.scheduler = workers, scheduler
+        self.cluster = self.client = None
+
+    def __enter__(self) -> Engine:
+        self.settings = dask.config.set(SETTINGS)
+        try:
+            if self.scheduler is None:
+                self.cluster = LocalCluster(
+                    n_workers=self.workers, threads_per_worker=1, processes=True, memory_limit=0,
+                    dashboard_address="127.0.0.1:0", silence_logs=50,
+                )  # fmt: skip
+            self.client = Client(self.cluster or self.scheduler, timeout=CONNECT_S)
+        except (OSError, TimeoutError, ValueError) as error:
+            self.__exit__()
+            raise EngineError(f"--scheduler {self.scheduler}: no connection: {error}") from None
+        return self
+
+    def __exit__(self, *_):
+        for part in (self.client, self.cluster):
+            if part is not None:
+                part.close()
+        self.settings.__exit__(None, None, None)
+
+    @property
+    def dashboard(self) -> str:
+        """Address of the Dask dashboard."""
+        return self.client.dashboard_link or ""
+
+    def cores(self) -> int:
+        """Threads of all workers, at least 1."""
+        return max(sum(self.client.nthreads().values()), 1)
+
+    def each(self, function: Callable, items: Iterable) -> Iterator[tuple]:
+        """(item, result) in the order in which they end; an item that took its workers with it gives Lost.
+
+        An exception of the function is raised here.
+        """
+        suspects = []
+        for item, result in self._ended(function, items):
+            if isinstance(result, Lost):
+                suspects.append(item)
+            else:
+                yield item, result
+        for item in suspects:  # alone, as a worker takes with it whatever waited beside the cause
+            yield from self._ended(function, [item])
+
+    def _ended(self, function, items) -> Iterator[tuple]:
+        waiting, running = iter(items), {}
+        ended = as_completed(with_results=False)
+
+        def more(count):
+            for item in itertools.islice(waiting, count):
+                future = self.client.submit(function, item, pure=False)
+                running[future.key] = item
+                ended.add(future)
+
+        more(AHEAD * self.cores())
+        for future in ended:
+            item = running.pop(future.key)
+            try:
+                result = future.result()
+            except KilledWorker:
+                result = Lost("its worker process ended again and again, such as for want of memory")
+            future.release()
+            more(1)
+            yield item, result
+
+
+def in_parallel(function: Callable, items: list, workers: int | None, what: str) -> Iterator[tuple]:
+    """(item, result) of a function over items on cores of this machine, with progress; RuntimeError for a lost item."""
+    if not items:
+        return
+    progress = Progress(len(items), what)
+    with Engine(workers) as engine:
+        for item, result in engine.each(function, items):
+            if isinstance(result, Lost):
+                raise RuntimeError(f"{what}: {item}: {result.reason}")
+            yield item, result
+            progress.step()
+
+
+class Progress:
+    """How many are done, the rate and the time left, on stderr: one line on a terminal, else one every ten seconds."""
+
+    def __init__(self, total: int, what: str, quiet=False, stream=None):
+        self.total, self.what, self.quiet = total, what, quiet
+        self.stream = stream or sys.stderr
+        self.started = self.told = time.monotonic()
+        self.done = 0
+
+    def step(self) -> None:
+        self.done += 1
+        now, terminal = time.monotonic(), self.stream.isatty()
+        if self.quiet or (not terminal and now - self.told < EVERY_S and self.done < self.total):
+            return
+        self.told = now
+        self.stream.write(f"\r\x1b[K{self.line()}" if terminal else f"{self.line()}\n")
+        if terminal and self.done == self.total:
+            self.stream.write("\n")
+        self.stream.flush()
+
+    def line(self) -> str:
+        """'diagnosed 120 of 1000, 3.1 per second, 4 min 44 s left'"""
+        rate = self.done / max(time.monotonic() - self.started, 1e-9)
+        left = (self.total - self.done) / rate
+        return f"{self.what} {self.done} of {self.total}, {rate:.2g} per second, {duration(left)} left"
+
+
+def duration(seconds: float) -> str:
+    """A duration in the two largest units that it needs."""
+    minutes, s = divmod(round(seconds), 60)
+    hours, m = divmod(minutes, 60)
+    return f"{hours} h {m} min" if hours else f"{m} min {s} s" if m else f"{s} s"

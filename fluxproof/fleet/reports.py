@@ -1,0 +1,70 @@
+"""The report of one recording of a fleet, made when somebody asks for it."""
+
+from __future__ import annotations
+
+import functools
+import threading
+import webbrowser
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+from urllib.parse import unquote, urlsplit
+
+from fluxproof.diagnosis.nominal import load_nominal
+from fluxproof.diagnosis.recording import RecordingError
+from fluxproof.diagnosis.session import run as session
+from fluxproof.fleet.manifest import Entry
+from fluxproof.fleet.page import PAGE, REPORTS
+from fluxproof.fleet.work import key_of, local
+
+ONE_AT_A_TIME = threading.Lock()
+
+
+def make(entries: list[Entry], name: str, out: Path) -> Path:
+    """Write OUT/reports/KEY/report.html of a recording by its name; RecordingError if the fleet has none."""
+    entry = next((e for e in entries if e.name == name), None)
+    if entry is None:
+        raise RecordingError(f"--report {name}: no recording of this fleet; expected a name as in {PAGE}")
+    return _made(entry, key_of(entry.path, entry.drive), out)
+
+
+def _made(entry: Entry, key: str, out: Path) -> Path:
+    folder = Path(out) / REPORTS / key
+    report = folder / "report.html"
+    with ONE_AT_A_TIME:
+        if not report.exists():
+            with local(entry.path) as path:
+                session([path], load_nominal(entry.drive), folder)
+    return report
+
+
+def server(entries: list[Entry], out: Path) -> ThreadingHTTPServer:
+    """A server on this machine alone that shows OUT and makes reports as they are asked for."""
+    by_key = {key_of(e.path, e.drive): e for e in entries if Path(e.path).exists() or "://" in e.path}
+
+    class Handler(SimpleHTTPRequestHandler):
+        def do_GET(self):
+            parts = unquote(urlsplit(self.path).path).strip("/").split("/")
+            if len(parts) == 3 and parts[0] == REPORTS and parts[2] == "report.html" and parts[1] in by_key:
+                try:
+                    _made(by_key[parts[1]], parts[1], out)
+                except (OSError, ValueError) as error:  # RecordingError, DriveError too
+                    self.send_error(500, explain=str(error))
+                    return
+            super().do_GET()
+
+        def log_message(self, *_):
+            pass
+
+    return ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Handler, directory=str(out)))
+
+
+def serve(entries: list[Entry], out: Path) -> None:
+    """Show fleet.html in the browser until Ctrl-C."""
+    with server(entries, out) as running:
+        address = f"http://127.0.0.1:{running.server_port}/{PAGE}"
+        print(f"{address}  (Ctrl-C ends)", flush=True)
+        webbrowser.open(address)
+        try:
+            running.serve_forever()
+        except KeyboardInterrupt:
+            pass

@@ -1,0 +1,1 @@
+"""Simulated fleets and the figures of ``fluxproof fleet`` on them (``make fleet``)."""
