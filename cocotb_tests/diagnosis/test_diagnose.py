@@ -213,7 +213,7 @@ EFFECT = SecondHarmonic(
 
 
 def test_at_the_noise_floor_nothing_is_named():
-    """A resistance that is 1 % off is seen in many blocks, but stands above the noise of none: possible, not asserted."""
+    """A resistance that is 1 % off is seen in the mean of many blocks, but stands above the noise of none: possible."""
     off = {"resistance_ohm": 1.0105 * MACHINE.resistance_ohm}
     answer = diagnose(recorded(machine=off), load_nominal(PAPER))
     assert answer.fit.train_before < 1.2 * answer.fit.noise_floor

@@ -87,7 +87,7 @@ def test_speed_of_hall_steps():
     registers = {"k_edge": edge_timer.setting(6, 1, clock_hz, omega_base)}
     sample = (np.arange(len(turns)) % every == 0).astype(np.int64)
     inputs = {"step_up": steps["step_up"], "step_down": steps["step_down"], "sample": sample}
-    out = GoldenPlayer(edge_timer.BLOCK, {}, registers).play(inputs)
+    out = GoldenPlayer(edge_timer.BLOCK, edge_timer.BLOCK.configs[0], registers).play(inputs)
     wanted = 2 * np.pi * speed * clock_hz / omega_base
     omega = out["omega_me"][np.flatnonzero(out["omega_valid"])][5:] / 2**16
     assert np.abs(omega / wanted - 1).max() < 1e-3

@@ -45,6 +45,7 @@ EFFECT = InductanceQ(
     rescales=("inductance_q_h",),
     separated_by="several i_q of both signs; rotation at zero current",
     parameters=(Parameter("inductance_q_h", "H", "of the q axis", "L_q"),),
+    spreads=True,
     plausible={"inductance_q_h": (0.5, 1.9, "machine.inductance_q_h")},
     otherwise="an inductance between two terminals is twice that of a phase; an incremental one is smaller",
 )

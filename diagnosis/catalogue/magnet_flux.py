@@ -42,6 +42,7 @@ EFFECT = MagnetFlux(
     rescales=("magnet_flux_wb",),
     separated_by="three speeds; rotation at zero current",
     parameters=(Parameter("magnet_flux_wb", "Wb", "peak, per phase", "flux linkage"),),
+    spreads=True,
     curve=0.1,  # a part of lost flux recovers; more is a drift
     bounded=("recovery",),
     plausible={"magnet_flux_wb": (0.75, 1.25, "machine.magnet_flux_wb")},

@@ -74,6 +74,7 @@ class Effect:
     mechanical: bool = False  # a torque of the shaft rather than a voltage of the machine
     curve: float = 0.3  # share of the formula by which the free curve may depart from it
     corrected_last: bool = False  # of several measurement errors: its correction uses the corrected currents
+    spreads: bool = False  # between any two drives: in every set of effects of a fleet
     bends: bool = False  # a flux linkage that is no line of the current: a flux map shows it
     map_shapes: tuple[str, ...] = ()  # shapes of a flux map without and with it (flux_surface.SHAPES)
     beside_map: bool = False  # a function of the current that is no flux: fitted together with a flux map

@@ -16,12 +16,13 @@ from fluxproof.diagnosis.answer.conclude import measured_torque
 from fluxproof.diagnosis.answer.estimates import common, covariance_of
 from fluxproof.diagnosis.answer.names import credibility
 from fluxproof.diagnosis.answer.sizes import UNITS, Sizes
+from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.inference import constants as k
 from fluxproof.diagnosis.inference.posterior import possible
 from fluxproof.diagnosis.inference.problem import around
 from fluxproof.diagnosis.result import Remainder
 
-BASE = ("resistance", "inductance_d", "inductance_q", "magnet_flux")
+BASE = tuple(name for name, effect in CATALOGUE.items() if effect.spreads)
 CLOSE = 20.0  # log evidence below the best within which a set is kept: e^-20 is no alternative at any rate
 KEPT = 8  # sets of a recording that go into its row
 OWN = 6  # sets that are judged on their own linearisation in a round
