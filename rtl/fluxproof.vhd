@@ -137,13 +137,11 @@ begin
 
   speed_measurement : entity work.speed
     generic map (POSITION_BITS => POSITION_BITS)
-    port map (clk => clk, rst => rst, in_valid => latch_valid,
-              code_theta => code_theta,
+    port map (clk => clk, rst => rst, in_valid => latch_valid, code_theta => code_theta,
               reverse => settings.reverse, k_speed => settings.k_speed, k_filter => settings.k_filter,
               position_restart => settings.position_restart, speed_given => settings.speed_given,
-              omega_given => settings.omega_given,
-              out_valid => omega_valid, omega_me => o.omega_me, speed_was_given => o.speed_was_given,
-              position_restarted => o.position_restarted);
+              omega_given => settings.omega_given, out_valid => omega_valid, omega_me => o.omega_me,
+              speed_was_given => o.speed_was_given, position_restarted => o.position_restarted);
 
   bus_voltage : entity work.u_dc_conditioning
     generic map (ADC_BITS => ADC_BITS)
@@ -419,11 +417,11 @@ begin
               u_dc_at_rail => o.u_dc_at_rail, code_theta => code_theta, theta_me => o.theta_me, omega_me => o.omega_me,
               omega_ref => omega_ref, speed_mode => speed_mode, i_q_ref => o.i_q_ref, speed_limited => o.speed_limited,
               run => run, trip => trip, enable => enable, clear_trip => clear_trip, host_write => host_write,
-              period => period, settings => settings,
-              sample_busy => guard_busy, early_samples => early_samples, sample_faults => o.sample_faults,
-              sample_trip => o.sample_trip, motion_faults => o.motion_faults, open_load => o.open_load,
-              current_offset => o.current_offset, brake_asked => o.brake_asked, fault_flags => fault_flags,
-              first_fault => first_fault, gate_trip => gate_trip, gate_clear => gate_clear, brake => brake);
+              period => period, settings => settings, sample_busy => guard_busy, early_samples => early_samples,
+              sample_faults => o.sample_faults, sample_trip => o.sample_trip, motion_faults => o.motion_faults,
+              open_load => o.open_load, current_offset => o.current_offset, brake_asked => o.brake_asked,
+              fault_flags => fault_flags, first_fault => first_fault, gate_trip => gate_trip, gate_clear => gate_clear,
+              brake => brake);
 
   gates : entity work.gate_generation
     generic map (CARRIER_HALF => CARRIER_HALF)

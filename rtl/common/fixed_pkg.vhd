@@ -112,7 +112,6 @@ package body fixed_pkg is
   function saturate (x : signed; width : positive) return signed is
     alias v         : signed(x'length - 1 downto 0) is x;
     variable result : signed(width - 1 downto 0);
-    variable below  : std_logic;  -- every bit below the sign of either end
   begin
     if width >= x'length then
       return resize(x, width);
@@ -120,8 +119,7 @@ package body fixed_pkg is
     if exceeds(x, width) = '0' then
       return v(width - 1 downto 0);
     end if;
-    below             := not v(v'high);
-    result            := (others => below);
+    result            := (others => not v(v'high));
     result(width - 1) := v(v'high);
     return result;
   end function;
@@ -139,11 +137,9 @@ package body fixed_pkg is
   function narrowed (x : signed; past : std_logic; width : positive) return signed is
     alias v         : signed(x'length - 1 downto 0) is x;
     variable result : signed(width - 1 downto 0) := v(width - 1 downto 0);
-    variable below  : std_logic;  -- every bit below the sign of either end
   begin
     if past = '1' then
-      below             := not v(v'high);
-      result            := (others => below);
+      result            := (others => not v(v'high));
       result(width - 1) := v(v'high);
     end if;
     return result;

@@ -168,8 +168,8 @@ def core_proof() -> Proof:
                 "in_valid => ab_voltage_valid,",
             ),
             Fault(
-                "angle does not wait for the reset",
-                "transforms/sincos.vhd",
+                "currents in flight survive the reset",
+                "transforms/clarke.vhd",
                 "        valid(1 to LATENCY) <= (others => '0');\n",
                 "        null;\n",
             ),
