@@ -5,8 +5,8 @@ python -m studies.board.commissioning [COUNT]        a line a motor, then the fi
 
 from __future__ import annotations
 
+import argparse
 import math
-import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -184,5 +184,7 @@ def _line(o: Outcome) -> str:
 
 
 if __name__ == "__main__":
-    for line in figures(int(sys.argv[1]) if len(sys.argv) > 1 else COUNT, say=lambda text: print(text, flush=True)):
+    parser = argparse.ArgumentParser(prog="python -m studies.board.commissioning", description=__doc__)
+    parser.add_argument("count", type=int, nargs="?", default=COUNT, help="random motors")
+    for line in figures(parser.parse_args().count, say=lambda text: print(text, flush=True)):
         print(line)
