@@ -29,7 +29,7 @@ PAPER, EMRAX = DRIVES / "paper001.toml", DRIVES / "emrax228.toml"
 # Clocks in half a PWM period.  GHDL takes 30 times as long for a clock as Verilator, so a period has a tenth of them.
 # The recording has no clock of its own: one sample in 200 clocks is as much idle time as working time for the core.
 GHDL_CARRIER, REPLAY_CARRIER = 1000, 100
-GHDL_PERIODS, GHDL_ROWS = 300, 400
+GHDL_PERIODS, GHDL_ROWS = 150, 400
 LEAST_PERIODS, LEAST_GHDL_PERIODS = 3000, 150
 
 
