@@ -17,6 +17,7 @@ from fluxproof.golden_model.io.register_map import DECERR, OKAY, PATIENCE, SLVER
 
 RUN = ("register_file", "cocotb_tests.support.dut_registers", {k.upper(): v for k, v in GENERICS.items()}, {})
 SEED = int(os.environ.get("FLUXPROOF_SEED", "1"))
+EARLY = 12  # clocks before a sample at which a write counts before it
 
 
 @cocotb.test(timeout_time=500, timeout_unit="us")  # a bus that hangs
@@ -85,7 +86,7 @@ async def random_traffic(dut):
     bench = await Bench(dut, SEED).start()
     running = [cocotb.start_soon(bench.samples(1)), cocotb.start_soon(steady_reads(bench))]
     answers = []
-    for count in range(700):
+    for count in range(400):
         if count % 100 == 0:
             bench.hold_back((0.0, 0.2, 0.5, 0.8)[count // 100 % 4])
         register = bench.rng.choice(list(MAP.values()))
@@ -160,26 +161,42 @@ async def steady_reads(bench: Bench) -> None:
 async def a_setting_waits_for_the_sample(dut):
     """Written in every clock of a sample, or together with its start: it counts in the first clock after it."""
     bench = await Bench(dut, SEED).start()
-    kp = MAP["kp_d"]
-    for number, lead in enumerate(range(-8, SAMPLE_INTERVAL + 4)):
-        value = 1000 + number
-        writing = cocotb.start_soon(bench.write(kp.address, value))
-        for _ in range(max(lead, 0)):
+    held_up = []
+    for number, lead in enumerate(range(-EARLY, SAMPLE_INTERVAL + 4)):
+        held_up += [lead] * await written_around_a_sample(bench, MAP["kp_d"], 1000 + number, lead, SAMPLE_INTERVAL)
+    assert held_up[0] > -EARLY
+    # Each setting is held up by a gate of its own: in the clocks in which the write was under way as the sample came.
+    for register in (r for r in WRITABLE if r.kind is Kind.SETTING):
+        for lead in held_up[:2]:
+            low, high, now = register.port.low, register.port.high, bench.twin.values[register.name]
+            assert await written_around_a_sample(bench, register, high if now == low else low, lead, 12)
+
+
+async def written_around_a_sample(bench: Bench, register, value: int, lead: int, busy: int) -> bool:
+    """Write a setting ``lead`` clocks after sample_busy rises for ``busy`` clocks; whether the sample held it up."""
+    dut = bench.dut
+
+    async def write():
+        for _ in range(EARLY + lead):
             await FallingEdge(dut.clk)
-        for _ in range(max(-lead, 0)):
-            await FallingEdge(dut.clk)
-        dut.sample_busy.value = 1
-        before = bench.held()["kp_d"]
-        for _ in range(SAMPLE_INTERVAL):
-            await FallingEdge(dut.clk)
-            assert bench.held()["kp_d"] == before
-        dut.sample_busy.value = 0
+        return await bench.write(register.address, to_word(value))
+
+    writing = cocotb.start_soon(write())
+    for _ in range(EARLY):
         await FallingEdge(dut.clk)
-        assert await with_timeout(writing, 400, "ns") == OKAY
-        assert bench.twin.write(kp.address, value) == OKAY
-        bench.check_outputs()
-        for _ in range(3):
-            await FallingEdge(dut.clk)
+    dut.sample_busy.value = 1
+    before = bench.held()[register.name]
+    for _ in range(busy):
+        await FallingEdge(dut.clk)
+        assert bench.held()[register.name] == before, f"{register.name} changed inside a sample"
+    dut.sample_busy.value = 0
+    await FallingEdge(dut.clk)
+    assert await with_timeout(writing, 400, "ns") == OKAY
+    assert bench.twin.write(register.address, to_word(value)) == OKAY
+    bench.check_outputs()
+    for _ in range(3):
+        await FallingEdge(dut.clk)
+    return before != value
 
 
 @cocotb.test(timeout_time=500, timeout_unit="us")  # a bus that hangs

@@ -48,7 +48,7 @@ def read_table(path, select: Select | None = None) -> Table:
         except (Exception, SystemExit) as error:  # parsing libraries raise anything on damaged content
             first = (str(error).strip().splitlines() or [type(error).__name__])[0]
             failure = f"not a readable {reader.FORMAT} file: {shown(first, 160)}"
-        gc.collect()
+        gc.collect(1)  # what the library left half made is young; a search of everything would take a second
     raise RecordingError(f"{path}: {failure}")
 
 
