@@ -56,6 +56,7 @@ def schedule(block: Block, config: dict[str, int], seed: int, length: Length = L
     noise_ports = tuple(p for p in block.ports(config) if p.name in {q.name for q in block.inputs})
     clocks: list[Clock] = [Clock({}, rst=1), Clock({}, rst=1)]
     state, registers, last, resets = block.state, None, -(10**9), 0
+    run = block.runner(config)
 
     def pad_to(index: int) -> None:
         """Idle clocks; the inputs become noise once the last sample no longer needs them."""
@@ -93,7 +94,7 @@ def schedule(block: Block, config: dict[str, int], seed: int, length: Length = L
         last = len(clocks)
         clocks.append(Clock(dict(row), in_valid=1, sample=index))
         registers = wanted_registers
-        state, outputs = block.run(state, row, config)
+        state, outputs = run(state, row)
         due.append((last + block.latency, index, outputs))
         if block.soon:
             soon.append((last + block.latency - block.ahead, index, {name: outputs[name] for name in block.soon}))
@@ -141,14 +142,14 @@ def _clocked_schedule(block: Block, config: dict[str, int], seed: int, length: L
     rng, draw = np.random.default_rng(seed + 1), samples(block, config, seed, length)
     clocks, state = [Clock({}, rst=1), Clock({}, rst=1)], block.state
     at_rest = {p.name: 0 for p in block.outputs} | dict(block.after_reset)
-    outputs, index, sample = at_rest, -1, next(draw)
+    outputs, index, sample, run = at_rest, -1, next(draw), block.runner(config)
     while sample is not None:
         reset = int(sample.resets > 0 and rng.integers(sample.resets) == 0)
         clocks.append(Clock(dict(sample.row), rst=reset, sample=index + 1, of_sample=index, expected=outputs))
         if reset:
             state, outputs = block.state, at_rest
         else:
-            state, outputs = block.run(state, sample.row, config)
+            state, outputs = run(state, sample.row)
         index, sample = index + 1, following(draw, state)
     clocks.append(Clock({}, of_sample=index, expected=outputs))
     return clocks

@@ -122,14 +122,14 @@ def corners(ports: tuple[Port, ...], rng: np.random.Generator, most: int) -> Ite
 def samples(block: Block, config: dict[str, int], seed: int, length: Length = LONG) -> Samples:
     """All samples, in order, each within the ranges of its ports.  Raises ValueError for an own case that is not."""
     rng = np.random.default_rng(seed)
-    ports = block.ports(config)
+    ranges = [(p.name, p.low, p.high) for p in block.ports(config)]
     draw = _clocked(block, config, rng, length) if block.clocked else _strobed(block, config, rng, length)
     sample = next(draw, None)
     while sample is not None:
         row = block.possible(sample.row, config) if block.possible else sample.row
-        for p in ports:
-            if not p.low <= row[p.name] <= p.high:
-                raise ValueError(f"stimulus of {block.name}: {p.name}={row[p.name]} is outside its range")
+        for name, low, high in ranges:
+            if not low <= row[name] <= high:
+                raise ValueError(f"stimulus of {block.name}: {name}={row[name]} is outside its range")
         state = yield Sample(row, sample.resets)
         try:
             sample = draw.send(state)

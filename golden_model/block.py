@@ -26,6 +26,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 from fluxproof.golden_model.fixed import Format
@@ -43,11 +44,11 @@ class Port:
     doc: str = ""
     late: int = 0  # input only: clocks after in_valid, less than the block's interval
 
-    @property
+    @cached_property
     def low(self) -> int:
         return self.fmt.lo if self.lo is None else self.lo
 
-    @property
+    @cached_property
     def high(self) -> int:
         return self.fmt.hi if self.hi is None else self.hi
 
@@ -124,9 +125,19 @@ class Block:
 
     def run(self, state, values: Mapping[str, int], config: Mapping[str, int]):
         """One sample by name: returns (next state, {output: integer})."""
-        args = [values[p.name] for p in self.inputs + self.registers] + list(config.values())
-        if self.state is None:
-            result = self.step(*args)
-        else:
-            state, result = self.step(state, *args)
-        return state, {p.name: int(v) for p, v in zip(self.outputs, result, strict=True)}
+        return self.runner(config)(state, values)
+
+    def runner(self, config: Mapping[str, int]) -> Callable:
+        """``run`` with this configuration, for many samples: (state, {port: value}) -> (next state, outputs)."""
+        ports, outputs = [p.name for p in self.inputs + self.registers], [p.name for p in self.outputs]
+        generics, step, stateless = list(config.values()), self.step, self.state is None
+
+        def run(state, values):
+            args = [*[values[name] for name in ports], *generics]
+            if stateless:
+                result = step(*args)
+            else:
+                state, result = step(state, *args)
+            return state, dict(zip(outputs, map(int, result), strict=True))
+
+        return run

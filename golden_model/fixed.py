@@ -11,6 +11,7 @@ does anything else, floor or modulo, documents it there.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 from fluxproof.golden_model.kernel import kernel
 
@@ -26,15 +27,15 @@ class Format:
     int_bits: int
     frac_bits: int
 
-    @property
+    @cached_property
     def width(self) -> int:
         return self.signed + self.int_bits + self.frac_bits
 
-    @property
+    @cached_property
     def lo(self) -> int:
         return -(1 << (self.width - 1)) if self.signed else 0
 
-    @property
+    @cached_property
     def hi(self) -> int:
         return (1 << (self.width - self.signed)) - 1
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+from array import array
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -53,23 +54,28 @@ def block_trial(block: Block, config, seed: int) -> Trial:
     ports = block_ports(block, config)
     number = {p.name: k for k, p in enumerate(ports)}
     clocks = schedule(block, config, seed)
-    writes = [(-IN_RESET, number["rst"], 1)] if block.strobes else []
-    checks, still = [], []
+    # Flat lists of numbers, three to a row: a long schedule has millions of them.
+    writes, checks, still = array("q", [-IN_RESET, number["rst"], 1] if block.strobes else []), array("q"), []
+    held: dict[str, int] = {}
     for at, (clock, rule) in enumerate(zip(clocks, due(block, clocks), strict=True)):
         driven = dict(clock.writes)
         # A clocked block may have an input of its own that is called in_valid.
         driven |= {"rst": clock.rst} if block.strobes else {}
         driven |= {"in_valid": clock.in_valid} if block.strobes and not block.clocked else {}
-        writes += [(at, number[name], value) for name, value in driven.items()]
-        checks += [(at, number[name], value) for name, value in (*rule.strobes.items(), *rule.outputs)]
+        for name, value in driven.items():
+            if held.get(name) != value:
+                writes.extend((at, number[name], value))
+        held |= driven
+        for name, value in (*rule.strobes.items(), *rule.outputs):
+            checks.extend((at, number[name], value))
         still += [at] * rule.still
     kept = [number[p.name] for p in block.out_ports(config)]
     return Trial(
         ports,
         IN_RESET,
         len(clocks),
-        np.array(writes, np.int64).reshape(-1, 3),
-        np.array(checks, np.int64).reshape(-1, 3),
+        np.frombuffer(writes, np.int64).reshape(-1, 3),
+        np.frombuffer(checks, np.int64).reshape(-1, 3),
         np.array(still, np.int64),
         np.array(kept, np.int64),
     )
