@@ -52,7 +52,7 @@ class Port:
     def high(self) -> int:
         return self.fmt.hi if self.hi is None else self.hi
 
-    @property
+    @cached_property
     def is_bit(self) -> bool:
         return self.fmt == BIT
 

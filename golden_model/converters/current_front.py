@@ -119,10 +119,24 @@ def stimuli(rng, config):
             | {"codes_valid_in": int(k % 3 == 0)}
             for k in range(200)
         ]  # fmt: skip
-    rows, channels = [], {}
     given = SOURCES[config["CURRENTS"]].stimuli(rng, {"ADC_BITS": config["ADC_BITS"], "LINES": config["SPI_LINES"]})
-    for k, row in enumerate(given[:9000]):
-        if k % 500 == 0:
+    return _on_channels(given[:9000], rng, still, 500)
+
+
+def patient_stimuli(rng, config):
+    """More of the converter's frames, with other channels for every few of them."""
+    if config["CURRENTS"] == EXTERNAL:
+        return []
+    still = {p.name: p.low for p in BLOCK.ports(config)}
+    given = SOURCES[config["CURRENTS"]].stimuli(rng, {"ADC_BITS": config["ADC_BITS"], "LINES": config["SPI_LINES"]})
+    return _on_channels(given[-12000:], rng, still, 160)
+
+
+def _on_channels(given, rng, still, often):
+    """The converter's rows with the names that the board has, and other channels after so many of them."""
+    rows, channels = [], {}
+    for k, row in enumerate(given):
+        if k % often == 0:
             channels = {f"channel_{x}": int(rng.integers(8)) for x in ("a", "b", "c", "u_dc")}
         row = {ON_A_BOARD.get(name, name): value for name, value in row.items()}
         rows.append(still | row | channels | {"clear_encoder": int(k % 3000 == 2999)})
@@ -184,4 +198,5 @@ BLOCK = Block(
     reference=None,
     bound=None,
     stimuli=stimuli,
+    patient_stimuli=patient_stimuli,
 )

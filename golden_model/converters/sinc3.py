@@ -166,6 +166,29 @@ def stimuli(rng, config):
     return rows
 
 
+def patient_stimuli(rng, _config):
+    """Any ratio with any gain, nearly only ones or zeros; each bit of start_clocks; triggers while they are counted."""
+    rows = []
+
+    def window(regs, density, gap, again=0):
+        length = (3 * regs["oversampling"] + 4) * (gap + 1) + min(regs["start_clocks"], 5000) + 12
+        bits = rng.random(length) < density
+        for clock in range(length):
+            row = {"sample_trigger": int(clock in (1, again)), "mod_bit": int(bits[clock])}
+            rows.append(row | {"bits_valid": int(clock % (gap + 1) == 0)} | regs)
+
+    for number in range(60):
+        oversampling = (256, 255, 128, 32)[number % 4] if number < 16 else int(rng.integers(32, 257))
+        gain = gain_of(oversampling) if number % 3 else int(rng.integers(GAIN.hi + 1))
+        regs = {"oversampling": oversampling, "gain": gain, "start_clocks": int(rng.integers(4))}
+        window(regs, (1, 0, 0.99, 0.01, 0.3)[number % 5], number % 7 == 6)
+    for bit in range(CLOCKS.width):
+        for start_clocks in (1 << bit, 1 << bit | 5, (1 << bit) - 1):
+            regs = {"oversampling": 32, "gain": gain_of(32), "start_clocks": start_clocks}
+            window(regs, 0.5, 0, again=int(rng.integers(2, start_clocks + 40)) if start_clocks & 1 else 0)
+    return rows
+
+
 BLOCK = Block(
     name="sinc3",
     folder="converters",
@@ -195,4 +218,5 @@ BLOCK = Block(
     reference=None,
     bound=None,
     stimuli=stimuli,
+    patient_stimuli=patient_stimuli,
 )

@@ -46,8 +46,18 @@ def step(
 
 def stimuli(rng, config):
     """The frames of spi_frame, with noise on the lines."""
+    return _on_lines(spi_frame.stimuli(rng, config), rng, config)
+
+
+def patient_stimuli(rng, config):
+    """The longer times of convst, as far as a bench of the whole has the time."""
+    return _on_lines(spi_frame.long_times(10), rng, config)
+
+
+def _on_lines(rows, rng, config):
+    """Rows of spi_frame as rows of the converter, with noise on the lines."""
     top = (1 << config["LINES"]) - 1
-    rows = spi_frame.stimuli(rng, config)
+    rows = [dict(row) for row in rows]
     for number, row in enumerate(rows):
         del row["words_complete"]
         row |= {"miso": int(rng.integers(top + 1)), "signed_code": number >> 10 & 1}
@@ -76,4 +86,5 @@ BLOCK = Block(
     reference=None,
     bound=None,
     stimuli=stimuli,
+    patient_stimuli=patient_stimuli,
 )

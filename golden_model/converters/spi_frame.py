@@ -148,10 +148,37 @@ def stimuli(rng, config):
     return rows
 
 
-def patient_stimuli(_rng, _config):
-    """Both times of convst as long as each of their bits makes them, or one clock less or more."""
+def _any_settings(rng, config):
+    """Frames of any setting, the words complete or not before they end, triggers in every phase."""
     rows = []
-    for bit in range(6, CLOCKS.width):
+    for _ in range(250):
+        bits = int(rng.integers(max(LEAST_BITS - 1, 2), MOST_BITS + 2))
+        room = max(bits - config["ADC_BITS"], 0)
+        regs = {p.name: int(rng.integers(2)) for p in BLOCK.registers if p.is_bit}
+        regs |= {"word_bits": bits, "clock_ratio": int(rng.integers(LEAST_RATIO, 7))}
+        regs |= {"sample_delay": int(rng.integers(16))}
+        regs |= {"skip_bits": int(rng.integers(room + 1)), "wait_clocks": int(rng.integers(12)), "busy_timeout": 40}
+        often = int(rng.choice([2, 40, 400]))
+        for clock in range(min(400, (regs["clock_ratio"] * bits << regs["two_words"]) + 60)):
+            row = {"sample_trigger": int(clock == 3 or rng.integers(90) == 0), "busy": int(rng.integers(often) == 0)}
+            rows.append(row | {"words_complete": int(rng.integers(often) == 0)} | regs)
+    return rows
+
+
+def patient_stimuli(rng, config):
+    """Both times of convst as long as each of their bits makes them, or one clock less or more; any settings."""
+    return long_times(CLOCKS.width) + _any_settings(rng, config)
+
+
+def long_times(bits):
+    """Times of convst up to so many bits at their end; above, one that must not end as early as its lower bits say."""
+    rows = []
+    for bit in range(CLOCKS.width):
+        for low in (0, 5):
+            row = settings(use_convst=1, wait_clocks=3, busy_timeout=1 << bit | low)
+            row |= {"sample_trigger": 0, "busy": 1, "words_complete": 0}
+            rows += [row | {"sample_trigger": 1}] + [row] * 30 + [row | {"busy": 0, "words_complete": 1}] * 90
+    for bit in range(6, bits):
         for name, busy in (("wait_clocks", 0), ("busy_timeout", 1)):
             times = {"wait_clocks": 5, "busy_timeout": CLOCKS.hi, name: (1 << bit) + bit % 3 - 1}
             row = settings(**times, use_convst=1)

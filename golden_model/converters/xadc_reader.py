@@ -124,6 +124,27 @@ def stimuli(rng, _config):
     return rows
 
 
+def patient_stimuli(rng, _config):
+    """Each bit of the longest time, at its end as far as a bench gets; words of any size on any channel."""
+    rows = []
+    idle = {"sample_trigger": 0, "busy": 0, "eoc": 0, "drdy": 0, "drp_do": 0}
+    for bit in range(CLOCKS.width):
+        for timeout in (1 << bit, 1 << bit | 5, (1 << bit) - 1):
+            row = idle | settings(timeout=timeout)
+            rows += [row | {"sample_trigger": 1}] + [row] * (min(timeout, 2500) + 9)
+            rows += [row | {"eoc": 1, "drdy": 1}] * 60
+    row = idle | settings(timeout=CLOCKS.hi - 9)
+    rows += [row | {"sample_trigger": 1}] + [row] * (CLOCKS.hi + 9)
+    for number in range(300):
+        regs = settings(conversions=1 + number % 4, channels=1 + number // 4 % 4, signed_code=number & 1)
+        regs |= {f"address_{k}": int(rng.integers(1 << 7)) for k in range(4)} | {"timeout": 300}
+        for clock in range(70):
+            word = int(rng.integers(WORD.hi + 1)) >> int(rng.integers(16))
+            row = {"sample_trigger": int(clock == 2), "busy": 0, "eoc": int(clock % 9 == 8), "drdy": int(clock > 40)}
+            rows.append(row | {"drp_do": word if clock & 1 else WORD.hi - word} | regs)
+    return rows
+
+
 BLOCK = Block(
     name="xadc_reader",
     folder="converters",
@@ -160,4 +181,5 @@ BLOCK = Block(
     reference=None,
     bound=None,
     stimuli=stimuli,
+    patient_stimuli=patient_stimuli,
 )

@@ -143,7 +143,33 @@ def crc_of(bits):
     return [1 - (crc >> k & 1) for k in reversed(range(CRC_BITS))]
 
 
-def stimuli(rng, config):
+def any_settings(rng, flags):
+    """Half periods, words and turns of any length, and so many flags."""
+    for number in range(60):
+        word = int(rng.integers(1, BITS.hi + 1))
+        turn = word if number % 3 == 0 else int(rng.integers(1, word + 1))
+        half, word, turn = (int(rng.integers(2)), word, turn) if number < 57 else (1 << 2 * number - 111, 5, 3)
+        yield half, word, turn, *rng.integers(2, size=flags).tolist()
+
+
+def late_answers(frame, regs, line):
+    """An encoder that never answers, or just too late: each bit of the longest time, and each less one.
+
+    Above the bits that a bench can wait for, a time that must not end as early as its lower bits say.
+    """
+    for bit in range(START_MAX.width):
+        for start_max in {1 << bit, (1 << bit) - 1, 1 << bit | 40}:
+            quiet = min(start_max, 1100) + 150
+            frame(regs | {"start_max": start_max}, [line] * quiet)
+            frame(regs | {"start_max": START_MAX.hi}, [1 - line] * 250)
+
+
+def patient_stimuli(rng, config):
+    """Words and turns of any length, right and wrong; answers that are late by any time."""
+    return stimuli(rng, config, patient=True)
+
+
+def stimuli(rng, config, patient=False):
     """Frames with every setting and delay, a wrong bit at every place, a line that stays, encoders that are late."""
     rows = []
 
@@ -152,11 +178,13 @@ def stimuli(rng, config):
         for k, level in enumerate(levels):
             rows.append({"serial_data": level, "start": int(k == 4) | start_again, **regs})
 
-    for half, word, turn, crc_on in ((0, 12, 12, 1), (1, 26, 14, 1), (3, 18, 18, 0), (4, 32, 20, 1), (2, 63, 63, 1)):
+    settings = [(0, 12, 12, 1), (1, 26, 14, 1), (3, 18, 18, 0), (4, 32, 20, 1), (2, 63, 63, 1)]
+    for half, word, turn, crc_on in any_settings(rng, 1) if patient else settings:
         period = 2 * (half + 1)
         regs = {"half_period": half, "word_bits": word, "turn_bits": turn, "crc_on": crc_on, "start_max": 12 * period}
         length = 2 + word + 2 + CRC_BITS
-        for wrong in (None, None, "error", "warning", "high", "low", "late", *range(0, length, 7 if word > 20 else 1)):
+        wrongs = (None, None, "error", "warning", "high", "low", "late", *range(0, length, 7 if word > 20 else 1))
+        for wrong in ((None, "error", int(rng.integers(length))) if patient else wrongs):
             data = [int(b) for b in rng.integers(2, size=word)] + [int(wrong != "error"), int(wrong != "warning")]
             bits = [1, 0, *data, *crc_of(data)]
             if isinstance(wrong, int):
@@ -170,6 +198,8 @@ def stimuli(rng, config):
             frame(regs, levels, start_again=int(wrong == "warning"))
             frame(regs, [1] * (4 * period + 10))
             frame(regs, [1] * (15 * period))
+    if patient:
+        late_answers(frame, regs | {"half_period": 0}, 1)
     bad = {"half_period": 1, "word_bits": 12, "turn_bits": 13, "crc_on": 1, "start_max": 100}
     frame(bad, [1] * 20)
     frame(bad | {"turn_bits": 0}, [1] * 20)
@@ -210,4 +240,5 @@ BLOCK = Block(
     reference=None,
     bound=None,
     stimuli=stimuli,
+    patient_stimuli=patient_stimuli,
 )

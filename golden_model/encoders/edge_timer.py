@@ -149,7 +149,23 @@ def patient_stimuli(rng, config):
         for rest in range(longest - TAKES - 4, longest + 3):
             rows += [still | {"step_up": 1}] * 2 + [still] * rest
             rows += [still | {"sample": 1}] + [still] * (TAKES + 1)
+    for k_edge, gap in factors(rng):
+        if gap <= longest:
+            still = {p.name: 0 for p in BLOCK.inputs} | {"k_edge": k_edge, "reverse": int(rng.integers(2))}
+            turn = still | {("step_up", "step_down")[int(rng.integers(2))]: 1}
+            rows += [turn] + [still] * gap + [turn] * int(rng.integers(1, 9))
+            rows += [still | {"sample": 1}] + [still] * (TAKES + 1)
     return rows
+
+
+def factors(rng):
+    """(k_edge, clocks between edges): each bit of k_edge alone, and with any lower ones, at a speed that shows them."""
+    pairs = []
+    for bit in range(K_EDGE.width):
+        for k_edge in (1 << bit, 1 << bit | int(rng.integers(1 << bit)), int(rng.integers(1 << bit, 2 << bit))):
+            shows = 2 << max(bit - K_EDGE.frac_bits, 1)  # clocks at which this speed is within the range
+            pairs += [(k_edge, 5), (k_edge, int(rng.integers(shows, 2 * shows)))][: 1 + (shows < 3000)]
+    return pairs
 
 
 def _motion(rng, k_edges, rest):

@@ -20,7 +20,7 @@ Formats: code of POSITION_BITS.  Rounding: bits below the code are cut; the angl
 from typing import NamedTuple
 
 from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.encoders.biss_master import START_MAX
+from fluxproof.golden_model.encoders.biss_master import START_MAX, any_settings, late_answers
 from fluxproof.golden_model.encoders.ssi_master import BITS, HALF_PERIOD
 from fluxproof.golden_model.fixed import Format
 from fluxproof.golden_model.formats import BIT
@@ -179,7 +179,12 @@ def crc_of(bits):
     return [1 - (crc >> k & 1) for k in reversed(range(CRC_BITS))]
 
 
-def stimuli(rng, config):
+def patient_stimuli(rng, config):
+    """Words and turns of any length, right and wrong; answers that are late by any time."""
+    return stimuli(rng, config, patient=True)
+
+
+def stimuli(rng, config, patient=False):
     """Frames with every setting and delay, a wrong bit at every place, a line that stays, encoders that are late."""
     rows = []
 
@@ -188,18 +193,20 @@ def stimuli(rng, config):
         for k, level in enumerate(levels):
             rows.append({"serial_data": level, "start": int(k == 4) | start_again, **regs})
 
-    for half, word, turn, crc_on, two in (
+    settings = [
         (0, 13, 13, 1, 0),
         (1, 25, 13, 1, 1),
         (3, 17, 17, 0, 0),
         (4, 37, 25, 1, 1),
         (2, 63, 63, 1, 0),
-    ):
+    ]
+    for half, word, turn, crc_on, two in any_settings(rng, 2) if patient else settings:
         period = 2 * (half + 1)
         regs = {"half_period": half, "mode_command": 0b111000 if two else 0b000111, "two_errors": two}
         regs |= {"word_bits": word, "turn_bits": turn, "crc_on": crc_on, "start_max": 12 * period}
         length = 2 + two + word + CRC_BITS
-        for wrong in (None, None, "error", "high", "low", "late", *range(0, length, 7 if word > 20 else 1)):
+        wrongs = (None, None, "error", "high", "low", "late", *range(0, length, 7 if word > 20 else 1))
+        for wrong in ((None, "error", int(rng.integers(length))) if patient else wrongs):
             errors = [int(wrong == "error"), 1][: 1 + two]
             data = [*errors, *(int(b) for b in rng.integers(2, size=word))]
             bits = [1, *data, *crc_of(data)]
@@ -213,6 +220,8 @@ def stimuli(rng, config):
                 levels = [int(wrong == "high")] * (quiet + 25 * period)
             frame(regs, levels, start_again=int(wrong == "late"))
             rows.extend({"serial_data": 1, "start": 0, **regs} for _ in range(15 * period))
+    if patient:
+        late_answers(frame, regs | {"half_period": 0}, 0)
     bad = {"half_period": 1, "mode_command": 7, "two_errors": 0, "word_bits": 12, "turn_bits": 13, "crc_on": 1}
     frame(bad | {"start_max": 100}, [1] * 20)
     return rows
@@ -256,4 +265,5 @@ BLOCK = Block(
     reference=None,
     bound=None,
     stimuli=stimuli,
+    patient_stimuli=patient_stimuli,
 )

@@ -174,12 +174,35 @@ def patient_stimuli(rng, config):
             still |= turn_counter.setting(counts, config["POSITION_BITS"]) | {"reverse": turn // 40 & 1}
         lost = int(2 ** rng.uniform(0, 11)) % (counts // 2)
         slip += int(rng.choice([-1, 1])) * lost
-        still["correct_max"] = lost + int(rng.integers(-1, 2)) if rng.integers(2) else int(rng.integers(1 << 12))
+        still["correct_max"] = lost + int(rng.integers(-1, 2)) if rng.integers(2) else lost ^ 1 << int(rng.integers(12))
         still["correct_max"] = max(still["correct_max"], 0)
         for place in range(-6, 9) if turn % 2 else range(8, -7, -1):
             a, b = quadrature_decoder.lines(place + slip)
             row = still | {"pin_a": a, "pin_b": b, "pin_z": int(place in (0, 1, 2))}
             rows += [row | {"sample": int(rng.integers(60) == 0)} for _ in range(5)]
+    return rows + _speeds(rng, config)
+
+
+def _speeds(rng, config):
+    """Each bit of k_edge at a speed that shows it; then as many illegal steps as a counter's bits need."""
+    rows, place = [], 0
+    still = {p.name: 0 for p in BLOCK.inputs} | turn_counter.setting(4000, config["POSITION_BITS"])
+    still |= {"filter_clocks": 1, "index_phase": 1, "correct_max": 9, "reverse": 0}
+
+    def show(clocks, **more):
+        a, b = quadrature_decoder.lines(place)
+        rows.extend([still | {"pin_a": a, "pin_b": b} | more] * clocks)
+
+    for k_edge, gap in edge_timer.factors(rng):
+        still["k_edge"] = k_edge
+        for clocks in (gap, 6):
+            place += int(rng.integers(2)) or 1
+            show(clocks)
+        show(1, sample=1)
+        show(edge_timer.TAKES + 4)
+    for _ in range(1100):
+        place += 2
+        show(4)
     return rows
 
 

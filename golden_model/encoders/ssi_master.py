@@ -90,7 +90,12 @@ def step(state, serial_data, start, half_period, word_bits, turn_bits, gray, par
     return following, (serial_clock, code, code_valid, frame_error, busy)
 
 
-def stimuli(rng, config):
+def patient_stimuli(rng, config):
+    """Words and turns of any length, right and wrong."""
+    return stimuli(rng, config, patient=True)
+
+
+def stimuli(rng, config, patient=False):
     """Frames of a simple encoder: every setting, wrong parity, a line that stays low or high, starts while busy."""
     rows = []
     state = State()
@@ -103,25 +108,32 @@ def stimuli(rng, config):
             state, _ = step(state, *row.values(), *config.values())
 
     settings = ((13, 13, 1, 0), (25, 12, 0, 0), (17, 17, 0, 1), (32, 20, 1, 1), (63, 30, 1, 1))
-    for half in (0, 1, 3):
-        for word, turn, gray, parity in settings:
-            regs = {"half_period": half, "word_bits": word, "turn_bits": turn, "gray": gray, "parity_on": parity}
-            for fault in ("", "", "bit", "high", "low", "busy"):
-                bits = [int(b) for b in rng.integers(2, size=word)]
-                bits += [sum(bits) & 1] if parity else []
-                if fault == "bit":
-                    bits[int(rng.integers(len(bits)))] ^= 1
+    frames = [(half, *kind) for half in (0, 1, 3) for kind in settings]
+    if patient:
+        frames = []
+        for number in range(170):
+            word = int(rng.integers(1, BITS.hi + 1))
+            half = int(rng.integers(3)) if number < 160 else 1 << number - 160
+            turn = word if number % 3 == 0 else int(rng.integers(1, word + 1))
+            frames.append((half, word if half < 4 else 4, turn if half < 4 else 2, *rng.integers(2, size=2).tolist()))
+    for half, word, turn, gray, parity in frames:
+        regs = {"half_period": half, "word_bits": word, "turn_bits": turn, "gray": gray, "parity_on": parity}
+        for fault in ("", "bit") if patient else ("", "", "bit", "high", "low", "busy"):
+            bits = [int(b) for b in rng.integers(2, size=word)]
+            bits += [sum(bits) & 1] if parity else []
+            if fault == "bit":
+                bits[int(rng.integers(len(bits)))] ^= 1
 
-                def line(bits=bits, fault=fault):
-                    if fault in ("high", "low"):
-                        return int(fault == "high")
-                    if not state.busy:
-                        return 1
-                    return bits[state.slot - 1] if 0 < state.slot <= len(bits) else int(state.slot == 0)
+            def line(bits=bits, fault=fault):
+                if fault in ("high", "low"):
+                    return int(fault == "high")
+                if not state.busy:
+                    return 1
+                return bits[state.slot - 1] if 0 < state.slot <= len(bits) else int(state.slot == 0)
 
-                run(4, regs, line)
-                run(1, regs, line, start=1)
-                run((2 * len(bits) + 6) * (half + 1) + 4, regs, line, start=int(fault == "busy"))
+            run(4, regs, line)
+            run(1, regs, line, start=1)
+            run((2 * len(bits) + 6) * (half + 1) + 4, regs, line, start=int(fault == "busy"))
     for bad in ({"turn_bits": 0}, {"turn_bits": 14}):
         good = {"half_period": 1, "word_bits": 13, "turn_bits": 13, "gray": 0, "parity_on": 0}
         run(4, good | bad, lambda: 1, start=1)
@@ -160,4 +172,5 @@ BLOCK = Block(
     reference=None,
     bound=None,
     stimuli=stimuli,
+    patient_stimuli=patient_stimuli,
 )

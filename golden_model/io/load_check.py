@@ -75,6 +75,20 @@ def stimuli(_rng, _config):
     return rows
 
 
+def patient_stimuli(rng, _config):
+    """A limit of any bits, met exactly by two phases and by what is asked, missed by one LSB by the third."""
+    usual, rows = dict.fromkeys((p.name for p in BLOCK.inputs), 0) | {"run": 1}, []
+    limits = [1 << bit for bit in range(LIMIT.width)] + [int(rng.integers(1, LIMIT.hi)) for _ in range(30)]
+    for limit in limits:
+        for apart in range(3):
+            at = {f"i_{x}": limit - (n == apart) << DROP_LIMIT for n, x in enumerate("abc")}
+            at = {name: value if rng.integers(2) else -value - 1 for name, value in at.items()}
+            for ask in (limit << DROP_LIMIT + 1, (limit << DROP_LIMIT + 1) - 1):
+                now = usual | {p.name: max(min(at.get(p.name, ask), p.high), p.low) for p in BLOCK.inputs[:4]}
+                rows += [now | {"i_open": limit, "theta_me": k % 4 << (TURN_W - 2)} for k in range(9)]
+    return rows
+
+
 BLOCK = Block(
     name="load_check",
     folder="io",
@@ -95,4 +109,5 @@ BLOCK = Block(
     reference=None,
     bound=None,
     stimuli=stimuli,
+    patient_stimuli=patient_stimuli,
 )

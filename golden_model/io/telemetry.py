@@ -102,6 +102,14 @@ def stimuli(rng, config):
     return rows
 
 
+def patient_stimuli(rng, config):
+    """A sink that stalls for as many samples as some bits of the count of lost packets need."""
+    ports = BLOCK.ports(config)
+    row = {p.name: int(rng.integers(p.low, p.high + 1)) for p in ports} | {"m_axis_tready": 0, "enable": 1}
+    rows = [row | {"sample_valid": 1}] + [row | {"sample_valid": 0}] * (INTERVAL - 1)
+    return rows * (300 if config["DEPTH_BITS"] == 6 else 40) + [row | {"m_axis_tready": 1}] * 400
+
+
 _RAW = {p.name: p for p in sample_latch.BLOCK.inputs}
 BLOCK = Block(
     name="telemetry",
@@ -136,4 +144,5 @@ BLOCK = Block(
     reference=None,
     bound=None,
     stimuli=stimuli,
+    patient_stimuli=patient_stimuli,
 )

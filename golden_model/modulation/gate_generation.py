@@ -177,6 +177,33 @@ def _halves(rng, half):
     return rows
 
 
+def patient_stimuli(rng, config):
+    """A leg at rest for a power of two of clocks and a part of the dead time: each bit of its time has counted.
+
+    At the end any duty, dead time and pulse, also ones that the range allows and no carrier reaches.
+    """
+    half, rows = config["CARRIER_HALF"], []
+    good = {"dead_time": 12, "min_pulse": 20, "enable": 1, "trip": 0, "clear_trip": 0, "double_update": 0}
+
+    def period(compare, **more):
+        legs = dict.fromkeys(("compare_a", "compare_b", "compare_c"), compare)
+        rows.extend([good | legs | more] * (2 * half))
+
+    for bit in range(4, 15):
+        for past in (2, 8):
+            periods, missing = divmod(-(1 << bit) - past, 2 * half)
+            period(half)
+            period(half)
+            for compare in (missing // 2, *[0] * (-periods - 1), missing - missing // 2, half):
+                period(min(compare, half))
+    for _ in range(60):
+        dead_time, min_pulse, compare = (
+            int(rng.integers(1 << int(rng.integers(1, fmt.width + 1)))) for fmt in (CLOCKS, CLOCKS, COUNT)
+        )
+        period(compare, dead_time=dead_time, min_pulse=min_pulse)
+    return rows
+
+
 BLOCK = Block(
     name="gate_generation",
     folder="modulation",
@@ -211,4 +238,5 @@ BLOCK = Block(
     reference=None,
     bound=None,
     stimuli=stimuli,
+    patient_stimuli=patient_stimuli,
 )

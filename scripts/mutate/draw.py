@@ -119,6 +119,8 @@ def mutated(drawn: Drawn) -> str:
     """The Verilog of the netlist with every mutation in it, mutation k selected by ``mutant`` = k, from 1."""
     width = width_of(drawn)
     lines = [f"{text} -ctrl {CONTROL} {width} {k}" for k, text in enumerate(drawn.mutations, 1)]
+    # Two choices at once give the OR of both, as in the proof: in Verilog the first would win and hide a mutant.
+    lines += ["techmap t:$pmux"]
     # A word of which one bit is mutated would be a loop for Verilator: cut into what has one driver.
     lines = ["read_rtlil prepared.il", *lines, "opt_clean; splitnets -driver; opt_clean"]
     lines += [f"rename {drawn.top} {TOP}", "write_verilog -noattr mutated.v"]
