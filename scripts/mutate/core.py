@@ -51,6 +51,7 @@ LIMITS = {
     "brake_on": "u_dc",
     "brake_off": "u_dc",
 }
+HARMLESS = ("delta_max", "v_thr", "v_comp_max", "i_learn", "omega_psi_min")
 INVERTED = 12  # settings of which a bit is inverted at a time
 BITS = {"ADC_BITS": 16, "POSITION_BITS": 16}
 
@@ -123,17 +124,22 @@ def every_event(inverted: int = 0) -> Recorder:
     for k in range(len(scenario)):
         if inverted:
             golden.core.registers = beside(settings, inverted * (k % 2), rng)
+            if k % 4 == 3:  # limits of the estimators, which stop nothing
+                met = beside_seen(golden.core.observed._asdict(), rng, HARMLESS)
+                golden.core.registers = golden.core.registers._replace(**met)
             golden.core.held = {"clear_trip": int(rng.integers(4) == 0), "trip": int(rng.integers(100) == 0)}
         period = golden.run(plant.inputs(k), int(scenario.enable[k]))
         plant.advance(k, period.edge_clocks * (plant.period_s / period.clocks), period.gate_words)
     return golden.core
 
 
-def beside_seen(seen: Mapping[str, int], rng: np.random.Generator) -> dict[str, int]:
+def beside_seen(
+    seen: Mapping[str, int], rng: np.random.Generator, names: Iterable[str] = tuple(LIMITS)
+) -> dict[str, int]:
     """Limits at the size of what is compared with them, or one bit beside it: there every bit of both counts."""
     found = {}
-    for name, of in LIMITS.items():
-        port = REGISTERS[name]
+    for name in names:
+        port, of = REGISTERS[name], LIMITS[name]
         value = seen[of] if port.fmt.signed else abs(seen[of])
         drop = OBSERVED[of].fmt.frac_bits - port.fmt.frac_bits if of in OBSERVED else 0
         value = value >> drop if drop > 0 else value << -drop
@@ -144,12 +150,13 @@ def beside_seen(seen: Mapping[str, int], rng: np.random.Generator) -> dict[str, 
 
 
 def beside(settings, count: int, rng: np.random.Generator):
-    """The settings with one bit inverted in ``count`` of them, drawn at random."""
+    """The settings with one bit, or all from a bit down at random, inverted in ``count`` of them, drawn at random."""
     changed = {}
     # A changed double_update waits until the gates are off: a trip would take it while a sample is in flight.
     for name in rng.choice([name for name in REGISTERS if name != "double_update"], count, replace=False):
         port, value = REGISTERS[name], getattr(settings, name)
-        other = value ^ (1 << int(rng.integers(port.fmt.width - bool(port.fmt.signed))))
+        bit = 1 << int(rng.integers(port.fmt.width - bool(port.fmt.signed)))
+        other = value ^ (bit if rng.integers(2) else int(rng.integers(bit, 2 * bit)))
         changed[name] = other if port.low <= other <= port.high else value
     return settings._replace(**changed)
 
@@ -176,15 +183,26 @@ def any_settings() -> Recorder:
         r = golden.registers
         if k % 3 == 0 and 0 < r.dead_time < r.min_pulse <= CARRIER_HALF:
             golden.advance(2 * CARRIER_HALF)  # the valley takes them before the sample, not while it is in flight
-        golden.advance(clocked.INTERVAL + int(rng.integers(1, 80)), sample, enable=1, clear_trip=0)
-    at_rest(golden, sample)
+        clocks = clocked.INTERVAL + int(rng.integers(1, 80))
+        early = int(rng.integers(2, clocked.INTERVAL)) if k % 5 == 0 else clocks
+        golden.advance(early, sample, enable=1, clear_trip=0)
+        if early < clocks:  # one too early: counted, not taken
+            golden.advance(clocks - early, sample)
+    for bit in (None, None, *range(REGISTERS["offset_max"].fmt.width)):
+        at_rest(golden, sample, bit)
     return golden
 
 
-def at_rest(golden: Recorder, sample: Mapping[str, int]) -> None:
-    """As many samples with the gates off as the zero of the sensors takes to be found wrong, then it alone trips."""
+def at_rest(golden: Recorder, sample: Mapping[str, int], bit: int | None) -> None:
+    """As many samples with the gates off as the zero of the sensors takes to be found wrong, then it alone trips.
+
+    bit: of the limit, which is this far from the largest current; none: the limit is 0.
+    """
+    largest = max(abs(getattr(golden.observed, name)) for name in ("i_a", "i_b", "i_c"))
+    limit = 0 if bit is None else largest >> OBSERVED["i_a"].fmt.frac_bits - REGISTERS["offset_max"].fmt.frac_bits
+    limit = min(limit ^ 1 << bit if bit is not None else limit, REGISTERS["offset_max"].high)
     alone = REGISTERS["fault_ignore"].high ^ (1 << fault_latch.OFFSET)
-    golden.registers = golden.registers._replace(omega_stall=REGISTERS["omega_stall"].high, offset_max=0)
+    golden.registers = golden.registers._replace(omega_stall=REGISTERS["omega_stall"].high, offset_max=limit)
     golden.registers = golden.registers._replace(fault_ignore=alone, k_filter=REGISTERS["k_filter"].high)
     golden.advance(4, enable=0, clear_trip=1)
     for _ in range(offset_check.LAST + 4):
