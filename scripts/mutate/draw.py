@@ -97,16 +97,20 @@ def readers(module: dict) -> set:
     return bits
 
 
-def draw(folder: Path, top: str, cells: int, count: int, seed: int) -> Drawn:
+def draw(
+    folder: Path, top: str, cells: int, count: int, seed: int, no_change: re.Pattern[str] | None = None
+) -> Drawn:
     """``count`` mutations of the prepared netlist, each drawn once; fewer where there are no more.
 
-    Left out: the clocks of registers, which are no logic, and what is not read.
+    Left out: the clocks of registers, which are no logic, what is not read, and what ``no_change`` fits.
     """
     command = f"mutate -list {2 * count} -seed {seed} -module {top} -o drawn.txt"
     script(folder, "draw.ys", ["read_rtlil prepared.il", command])
     module = netlist(folder, top)
     found = dict.fromkeys(_DETAIL.sub("", line) for line in (folder / "drawn.txt").read_text().splitlines())
     kept = [line for line in found if not _CLOCKS.search(line) and not without_effect(module, line)]
+    if no_change:
+        kept = [line for line in kept if not no_change.search(line)]
     return Drawn(folder, top, cells, tuple(kept[:count]))
 
 

@@ -62,7 +62,7 @@ def judge(subject: Subject | Core, seed: int, trials: Sequence[harness.Trial] = 
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     cells = draw.prepare(folder, subject.verilog(), subject.top, subject.flat)
-    drawn = draw.draw(folder, subject.top, cells, subject.count(cells), seed)
+    drawn = draw.draw(folder, subject.top, cells, subject.count(cells), seed, subject.no_change)
     watch("draw")
     trials = trials or subject.trials()
     watch("schedule")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,8 +17,8 @@ from scripts.mutate import core
 from scripts.mutate.harness import BENCH_SEED, Trial, block_trial
 
 FOLDER = BUILD / "mutate"
-LEAST, MOST = 32, 72  # mutants of a block
-LEAST_OF_CONFIG = 12
+LEAST, MOST = 24, 40  # mutants of a block
+LEAST_OF_CONFIG = 8
 
 
 @dataclass(frozen=True)
@@ -26,6 +27,7 @@ class Subject:
 
     of: str
     index: int
+    no_change = None  # mutations that are known to change nothing
 
     @property
     def block(self) -> Block:
@@ -96,6 +98,11 @@ class Core:
 
     def count(self, cells: int) -> int:
         return core.MUTANTS
+
+    @property
+    def no_change(self) -> re.Pattern[str]:
+        """Mutations that change nothing with this configuration."""
+        return core.NO_CHANGE
 
     def trials(self) -> list[Trial]:
         """Its closed loops."""

@@ -9,11 +9,8 @@ from __future__ import annotations
 import re
 
 # (block, pattern of the mutation, reason)
-_HALF = "the judged core has a CARRIER_HALF of 128, so these bits of carrier and compare values are always 0"
 _LATE = "no run of the core waits 2**14 clocks for a sample: a watchdog with one of these bits never expires"
 REASONS: tuple[tuple[str, str, str], ...] = (
-    ("fluxproof", r"-mode const0 .*-port (compare_[abc]|carrier) -portbit ([89]|1\d)$", _HALF),
-    ("fluxproof", r"-mode cnot1 .*-port (compare_[abc]|carrier) -portbit \d+ -ctrlbit ([89]|1\d)$", _HALF),
     ("fluxproof", r"-mode cnot1 .*-port settings_watchdog -portbit \d+ -ctrlbit 1[4-9]$", _LATE),
 )
 
