@@ -133,6 +133,9 @@ def stimuli(rng, config, patient=False):
 
             run(4, regs, line)
             run(1, regs, line, start=1)
+            if patient and half < 3:  # a half period that changes within the frame: an odd number of clocks
+                run(int(rng.integers(1, 2 * len(bits) + 1)) * (half + 1), regs, line)
+                run(int(rng.integers(1, 4)), regs | {"half_period": 3}, line)
             run((2 * len(bits) + 6) * (half + 1) + 4, regs, line, start=int(fault == "busy"))
     for bad in ({"turn_bits": 0}, {"turn_bits": 14}):
         good = {"half_period": 1, "word_bits": 13, "turn_bits": 13, "gray": 0, "parity_on": 0}

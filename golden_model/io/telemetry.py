@@ -107,7 +107,7 @@ def patient_stimuli(rng, config):
     ports = BLOCK.ports(config)
     row = {p.name: int(rng.integers(p.low, p.high + 1)) for p in ports} | {"m_axis_tready": 0, "enable": 1}
     rows = [row | {"sample_valid": 1}] + [row | {"sample_valid": 0}] * (INTERVAL - 1)
-    return rows * (300 if config["DEPTH_BITS"] == 6 else 40) + [row | {"m_axis_tready": 1}] * 400
+    return rows * 300 + [row | {"m_axis_tready": 1}] * 400
 
 
 _RAW = {p.name: p for p in sample_latch.BLOCK.inputs}
