@@ -25,7 +25,7 @@ unexport PYTHONHOME
 
 PYTHON_RUN := .venv/bin/python
 
-.PHONY: help setup generate test demo papers bench blind fleet sensitivity real compare timeline mutate verilog synth ecp5 lint registers package prove faults board lock clean distclean
+.PHONY: help setup generate test slow demo papers bench blind fleet sensitivity real compare timeline mutate verilog synth ecp5 lint registers package prove faults board lock clean distclean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -45,6 +45,9 @@ package: setup ## write the core as a zip file for Vivado's IP repository to bui
 
 test: setup ## run every test (golden model, plant, VHDL simulation)
 	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m pytest -q -n $(JOBS) --dist=worksteal $(ARGS)
+
+slow: setup ## run the tests that `make test` leaves out: packages, mapped netlist, further cases of the same
+	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m pytest -q -n $(JOBS) --dist=worksteal -m slow $(ARGS)
 
 demo: setup ## run the demonstration
 	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m studies.demo $(ARGS)

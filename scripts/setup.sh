@@ -19,7 +19,10 @@ venv=$root/.venv
 stamp=$venv/.fluxproof-stamp
 export YOWASP_CACHE_DIR=${YOWASP_CACHE_DIR:-$cache/yowasp}
 # Not the interpreter of the environment that is about to be replaced.
-PATH=${PATH#"$venv/bin:"}
+PATH=:$PATH:
+PATH=${PATH//":$venv/bin:"/:}  # an activated .venv is there twice; the next one is not built with it
+PATH=${PATH//":$venv/bin:"/:}
+PATH=${PATH#:} PATH=${PATH%:}
 unset VIRTUAL_ENV PYTHONHOME PYTHONPATH
 
 say() { printf 'setup: %s\n' "$*" >&2; }

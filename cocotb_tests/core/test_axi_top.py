@@ -10,7 +10,7 @@ from fluxproof.checkout import ROOT
 from fluxproof.cosim import ghdl
 
 PAPER = ROOT / "docs" / "drives" / "paper001.toml"
-CARRIER_HALF, CLOCK_HZ = 128, 2_560_000
+CARRIER_HALF, CLOCK_HZ = 72, 1_440_000
 
 
 def test_motor_spins_over_the_registers():
@@ -24,9 +24,9 @@ def test_motor_spins_over_the_registers():
     problem = ghdl.failure(folder)
     assert problem is None, problem
     summary = json.loads((folder / "summary.json").read_text())
-    assert summary["periods"] == 300 and summary["gate_edges"] > 2000
-    assert summary["packets"] + summary["dropped"] == 300 and summary["packets"] > 250
-    assert summary["polled"] > 50
+    assert summary["periods"] == 200 and summary["gate_edges"] > 1500
+    assert summary["packets"] + summary["dropped"] == 200 and summary["packets"] > 150
+    assert summary["polled"] > 40
     # A model of nonsense could be bit-exact too: the motor must have turned.
     motion = np.load(folder / "result.npz")
-    assert motion["omega_m"].max() > 30 and motion["omega_m"][-1] < motion["omega_m"].max() - 20
+    assert motion["omega_m"].max() > 15 and motion["omega_m"][-1] < motion["omega_m"].max() - 10

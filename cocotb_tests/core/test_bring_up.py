@@ -30,7 +30,7 @@ RPM = 30 / math.pi
 @pytest.fixture(scope="module")
 def drive():
     """The paper's drive with fewer clocks per period: the same machine and registers, faster."""
-    return drives.with_carrier(drives.load(PAPER), 200)
+    return drives.with_carrier(drives.load(PAPER), 100)
 
 
 def compiled(folder: Path, drive, bus: Path) -> Path:
@@ -159,7 +159,7 @@ def test_another_core_is_refused(drive, program):
         (lambda b: b.registers._constant.update(version=0x990000), "core version 0x990000"),
         (
             lambda b: b.registers._constant.update(carrier_half=9),
-            "CARRIER_HALF = 9, drive_registers.h is for 200",
+            "CARRIER_HALF = 9, drive_registers.h is for 100",
         ),
         (lambda b: b.registers._constant.update(clock_hz=100_000_000), "CLOCK_HZ = 100000000, drive_registers.h"),
         (lambda b: b.registers._constant.update(estimators=0), "ESTIMATORS = 0, drive_registers.h is for 1"),

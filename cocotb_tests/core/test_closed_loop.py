@@ -30,7 +30,7 @@ def close_loop(engine, path, scenario: str, carrier_half: int, key: str = "", pe
 def test_everything_at_once():
     """One run of 2,500 periods of the converted RTL, looked at from several sides (one test: simulated once)."""
     skip_without_ghdl5()
-    summary, arrays, register_set = close_loop(InVerilator, PAPER, "everything", 128)
+    summary, arrays, register_set = close_loop(InVerilator, PAPER, "everything", 100)
     check_equal_at_every_period(summary, arrays)
     check_sensible_motion(arrays)
     for leg in range(3):
@@ -117,9 +117,9 @@ def test_smallest_converters(tmp_path):
     )
     path = tmp_path / "coarse.toml"
     path.write_text(text)
-    summary, _, register_set = close_loop(InGhdl, path, "short", 72, key=" coarse")
+    summary, _, register_set = close_loop(InGhdl, path, "short", 72, key=" coarse", periods=150)
     assert (register_set.config.adc_bits, register_set.config.position_bits) == (12, 12)
-    assert summary["differences"] == 0 and summary["periods_compared"] == 300
+    assert summary["differences"] == 0 and summary["periods_compared"] == 150
 
 
 def test_without_estimators(tmp_path):
@@ -127,7 +127,7 @@ def test_without_estimators(tmp_path):
     skip_without_ghdl5()
     path = tmp_path / "plain.toml"
     path.write_text(PAPER.read_text().replace("[core]\n", "[core]\nestimators = false\n"))
-    summary, arrays, register_set = close_loop(InVerilator, path, "everything", 128, key=" no estimators")
+    summary, arrays, register_set = close_loop(InVerilator, path, "everything", 100, key=" no estimators")
     assert register_set.config.estimators == 0 and register_set.values.flux_mode == 3
     check_equal_at_every_period(summary, arrays)
     assert not any(arrays[f"observed_{name}"].any() for name in Estimated._fields)

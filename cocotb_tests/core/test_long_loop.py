@@ -32,14 +32,14 @@ def test_full_ratio():
     """The start of Fig. 9 at 20,000 clocks a period; `make demo` runs all 3,000 periods."""
     skip_without_ghdl5()
     assert registers(DRIVE).config.carrier_half == 10_000
-    result = run_in_verilator(DRIVE, SCENARIOS["fig9"](DRIVE).first(300))
-    assert result.plant["omega_m"][-1] * 30 / np.pi > 50
+    result = run_in_verilator(DRIVE, SCENARIOS["fig9"](DRIVE).first(150))
+    assert result.plant["omega_m"][-1] * 30 / np.pi > 25
 
 
 def test_long_at_the_voltage_limit():
     """4,000 periods towards the rated speed, and back through zero, on a bus of 300 V."""
     skip_without_ghdl5()
-    drive = drives.with_carrier(DRIVE, 128)
+    drive = drives.with_carrier(DRIVE, 100)
     result = run_in_verilator(drive, SCENARIOS["full_speed"](drive))
     rpm = result.plant["omega_m"] * 30 / np.pi
     assert rpm.max() > 2000 and rpm.min() < -1000
@@ -58,7 +58,7 @@ def test_samples_at_the_minimum_interval():
     core.tick(3 * 2 * config.carrier_half)
     assert core.get("running") == 1
     rng, state = np.random.default_rng(1), fluxproof.State()
-    for _ in range(2000):
+    for _ in range(1000):
         codes, references = rng.integers(0, 1 << 16, 5), rng.integers(-90000, 90000, 3)
         sample = fluxproof.Sample(
             *codes, *references, rng.integers(2), rng.integers(-9999, 9999), *rng.integers(0, 2, 2), 1

@@ -32,7 +32,7 @@ from fluxproof.golden_model.registers import registers
 from scripts import generate, generate_telemetry
 
 PAPER = ROOT / "docs" / "drives" / "paper001.toml"
-CARRIER_HALF = 100
+CARRIER_HALF = 72
 DEPTH_BITS = 7
 DRIVE = drives.load(PAPER)
 SET = registers(DRIVE)
@@ -93,18 +93,18 @@ def test_stream_to_replay(folder, tmp_path, capsys):
     command = ["dump", str(folder / "capture.bin"), "--drive", str(PAPER)]
     command += ["--registers", str(tmp_path / "registers.json"), "-o", str(tmp_path / "run.fluxdump")]
     assert main(command) == 0
-    assert "300 samples, numbers 0 to 299, 0 lost" in capsys.readouterr().out
+    assert "160 samples, numbers 0 to 159, 0 lost" in capsys.readouterr().out
     found = recording(tmp_path / "run.fluxdump")
     observed = np.load(folder / "observed.npz")
     assert all(np.array_equal(found.meta["observed"][name], observed[name]) for name in PACKET)
     got, notes = digital.replay(found)
-    assert (got.checked, got.samples, got.first_difference) == (True, 300, None)
+    assert (got.checked, got.samples, got.first_difference) == (True, 160, None)
     assert f"{len(PACKET)} signals" in notes[0]
 
     assert (
         main(["diagnose", str(tmp_path / "run.fluxdump"), "--drive", str(PAPER), "--out", str(tmp_path)]) == 0
     )
-    assert "controller: 300 samples equal to the golden model in every bit" in capsys.readouterr().out
+    assert "controller: 160 samples equal to the golden model in every bit" in capsys.readouterr().out
 
     acting = 0
     for name in ("kp_q", "gain_a", "theta_offset", "k_delay", "r_s"):

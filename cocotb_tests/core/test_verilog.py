@@ -32,7 +32,7 @@ from fluxproof.golden_model.io.sample_checks import IGNORE
 
 GENERICS = {"ADC_BITS": 16, "POSITION_BITS": 16, "CARRIER_HALF": 100}
 OTHER = {"ADC_BITS": 12, "POSITION_BITS": 18, "CARRIER_HALF": 75}
-CLOCKS = 10000
+CLOCKS = 6000
 GAP = (SAMPLE_INTERVAL, 80)  # clocks from sample to sample
 CHECKS = (sample_guard, sample_checks, fault_latch, motion_checks, load_check, offset_check, brake_chopper, host_watch)
 PROTECTION = tuple(
@@ -205,9 +205,9 @@ def test_equals_vhdl_clock_by_clock(ghdl5, generics, tmp_path, capsys):
 
 def test_constant_wider_than_the_vector(ghdl5, tmp_path):
     """min_pulse has 12 bits, CARRIER_HALF more: GHDL 5 would compare with its lower 12 bits."""
-    generics = GENERICS | {"CARRIER_HALF": 5000}
+    generics = GENERICS | {"CARRIER_HALF": 10_000}
     core = VerilatedCore(generics)
-    settings = [{"dead_time": 3, "min_pulse": pulse} for pulse in (900, 1000, 4095, 2, 904, 905)]
+    settings = [{"dead_time": 3, "min_pulse": pulse} for pulse in (1800, 1900, 4095, 2, 1808, 1809)]
     writes = [{"rst": 1, "enable": 0}, {}, {"rst": 0}, *settings, {}]
     refused = core.outputs.index("setting_refused")
     got = [row[refused] for row in trace_of_verilog(writes, core)]

@@ -39,12 +39,14 @@ def test_core_file_lists_every_source():
     assert {ROOT / name for name in listed} == set(rtl_sources())
 
 
+@pytest.mark.slow
 def test_fusesoc_lint(tmp_path):
     done = fusesoc(tmp_path, "lint")
     assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
     assert "elaborate fluxproof_axi" in done.stdout + done.stderr
 
 
+@pytest.mark.slow
 def test_fusesoc_lint_of_the_board(tmp_path):
     done = fusesoc(tmp_path, "lint_board")
     assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
@@ -59,6 +61,7 @@ def test_fusesoc_vivado_setup_of_the_board(tmp_path):
         assert text in script.read_text()
 
 
+@pytest.mark.slow
 def test_fusesoc_sim(tmp_path):
     done = fusesoc(tmp_path, "sim")
     assert done.returncode == 0 and "report note): passed" in done.stdout + done.stderr, done.stdout[-2000:]

@@ -39,6 +39,7 @@ def compare(mapped: VerilatedCore, clocks: int) -> tuple[list[str], list[str]]:
     return wrong, [name for j, name in enumerate(core.outputs) if len({row[j] for row in wanted}) < 2]
 
 
+@pytest.mark.slow
 def test_netlist_of_a_block_equals_the_core():
     wrong, _ = compare(MappedCore(GENERICS, QUICK), QUICK_CLOCKS)
     assert not wrong, "\n".join([f"{len(wrong)} differences", *wrong[:12]])

@@ -41,6 +41,7 @@ def test_small_block(tools):
     assert result["per_block"]["position"]["mutants"] == result["mutants"] == len(found.outcomes)
 
 
+@pytest.mark.slow
 def test_bench_without_comparison_is_noticed(tools):
     """The same mutants with nothing compared: all survive, and none that the bench notices is proved equivalent."""
     noticed = {mutation for mutation, outcome in judge(SMALL, command.SEED).outcomes if outcome == KILLED}
@@ -53,6 +54,7 @@ def test_bench_without_comparison_is_noticed(tools):
     assert command.share(result) < command.ENOUGH and not all(row["reason"] for row in result["survivors"])
 
 
+@pytest.mark.slow
 def test_netlist_that_is_not_its_model_is_an_error(tools):
     """One expected value changed: the netlist without a mutation does not pass, which no mutant is blamed for."""
     (trial,) = SMALL.trials()

@@ -229,6 +229,7 @@ def test_a_report_without_one_clock_and_its_path_is_an_error(change, words):
 # The real thing
 
 
+@pytest.mark.slow
 def test_small_blocks_match_the_stored_results():
     """Three blocks through GHDL 5 and yosys, against docs/synth/counts.json."""
     try:

@@ -98,6 +98,7 @@ def test_registers(environment, tmp_path):
     assert "kp_q" in run(environment, "fluxproof", "registers", PAPER, cwd=tmp_path)
 
 
+@pytest.mark.slow
 def test_diagnose(environment, tmp_path):
     """A dump of a drive with 5 % less magnet flux: command and function replay the core and name the cause."""
     samples, observed = bench.dumped(bench.GRID[:18], {"magnet_flux_wb": 0.95 * bench.MACHINE.magnet_flux_wb})

@@ -32,7 +32,9 @@ def test_there_are_enough_mistakes():
     assert len(MISTAKES) >= 25
 
 
-@pytest.mark.parametrize("name", MISTAKES)
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=pytest.mark.slow) if k % 2 else n for k, n in enumerate(MISTAKES)]
+)
 def test_a_mistake_is_told_and_nothing_else(name, tmp_path):
     mistake = MISTAKES[name]
     recording, drive = written(mistake, tmp_path)

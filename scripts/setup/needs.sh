@@ -24,7 +24,7 @@ needs_of() {
         ecp5) echo core report synth ghdl5 yosys nextpnr ;;
         lint) echo lint ;;
         mutate) echo core run report sim package prove test ghdl c++ ghdl5 yosys ;;
-        test) echo "$(needs_of mutate)" blind fleet compare lint tcl browser ;;
+        test | slow) echo "$(needs_of mutate)" blind fleet compare lint tcl browser ;;
         setup) echo "$(needs_of test)" synth nextpnr ;;
         *) return 1 ;;
     esac
