@@ -1,8 +1,15 @@
 """What all tests share: figures of a study, which `make board` collects."""
 
 import json
+import signal
 
 import pytest
+
+
+def pytest_configure():
+    # Behind `&` in a script Ctrl-C is ignored, also by every program that the tests start and stop with it.
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture

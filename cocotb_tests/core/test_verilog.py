@@ -32,7 +32,7 @@ from fluxproof.golden_model.io.sample_checks import IGNORE
 
 GENERICS = {"ADC_BITS": 16, "POSITION_BITS": 16, "CARRIER_HALF": 100}
 OTHER = {"ADC_BITS": 12, "POSITION_BITS": 18, "CARRIER_HALF": 75}
-CLOCKS = 6000
+CLOCKS = 10000
 GAP = (SAMPLE_INTERVAL, 80)  # clocks from sample to sample
 CHECKS = (sample_guard, sample_checks, fault_latch, motion_checks, load_check, offset_check, brake_chopper, host_watch)
 PROTECTION = tuple(

@@ -86,7 +86,7 @@ async def random_traffic(dut):
     bench = await Bench(dut, SEED).start()
     running = [cocotb.start_soon(bench.samples(1)), cocotb.start_soon(steady_reads(bench))]
     answers = []
-    for count in range(400):
+    for count in range(300):
         if count % 100 == 0:
             bench.hold_back((0.0, 0.2, 0.5, 0.8)[count // 100 % 4])
         register = bench.rng.choice(list(MAP.values()))

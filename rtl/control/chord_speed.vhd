@@ -58,7 +58,7 @@ begin
 
       -- Stage 10: omega_chord = omega_me - shorter
       if valid(9) = '1' then
-        omega_chord <= omega_me - resize(product_3, PU_W);
+        omega_chord <= resize(difference(omega_me, resize(product_3, PU_W)), PU_W);
       end if;
 
       if rst = '1' then
