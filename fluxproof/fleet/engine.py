@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import sys
 import time
@@ -14,6 +15,7 @@ AHEAD = 4  # items per worker that wait at the scheduler; more would only take i
 DEATHS = 10  # workers that one item may take with it before it is suspected
 EVERY_S = 10.0  # between lines of progress where the line cannot be updated
 CONNECT_S = 15.0
+RESTART_S = 5.0  # of a worker that has died
 SETTINGS = {
     "distributed.scheduler.allowed-failures": DEATHS,
     "distributed.scheduler.worker-saturation": 1.0,  # nothing waits at a worker, and dies with it
@@ -61,7 +63,10 @@ class Engine:
             raise EngineError(f"--scheduler {self.scheduler}: no connection: {error}") from None
         return self
 
-    def __exit__(self, *_):
+    def __exit__(self, kind=None, *_):
+        if kind is None and self.client and self.cluster:  # distributed cannot end a worker that is just being started again
+            with contextlib.suppress(TimeoutError):
+                self.client.wait_for_workers(len(self.cluster.workers), timeout=RESTART_S)
         for part in (self.client, self.cluster):
             if part is not None:
                 part.close()
