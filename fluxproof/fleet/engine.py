@@ -64,7 +64,8 @@ class Engine:
         return self
 
     def __exit__(self, kind=None, *_):
-        if kind is None and self.client and self.cluster:  # distributed cannot end a worker that is just being started again
+        # distributed cannot end a worker that is just being started again.
+        if kind is None and self.client and self.cluster:
             with contextlib.suppress(TimeoutError):
                 self.client.wait_for_workers(len(self.cluster.workers), timeout=RESTART_S)
         for part in (self.client, self.cluster):
