@@ -107,7 +107,7 @@ begin
       emf_3   <= resize(minimum(size_2, resize(u_max, PU_W)), U_MAX_W);
 
       -- Stages 3, 4: lo = u_max - part;  hi = u_max + part
-      lo_3 <= resize(unsigned(signed(resize(u_max, PU_W)) - part), PU_W - 1);
+      lo_3 <= resize(unsigned(difference(signed(resize(u_max, PU_W)), part)), PU_W - 1);
       hi_3 <= resize(unsigned(signed(resize(u_max, PU_W)) + part), PU_W - 1);
 
       -- Stages 4, 5: radicand = lo*hi = u_max**2 - part**2, below one
