@@ -6,7 +6,7 @@ import os
 
 import pytest
 
-from cocotb_tests.core.test_verilog import GENERICS, differences, stimulus, trace_of_verilog
+from cocotb_tests.core.test_verilog import GENERICS, RARE, differences, stimulus, trace_of_verilog
 from fluxproof.cosim import verilog
 from fluxproof.cosim.verilated import VerilatedCore
 from scripts.synth.mapped import MappedCore, with_mapped
@@ -50,7 +50,7 @@ def test_whole_netlist_equals_the_core(capsys):
     mapped = MappedCore(GENERICS)
     wrong, still = compare(mapped, CLOCKS)
     assert not wrong, "\n".join([f"{len(wrong)} differences", *wrong[:12]])
-    assert not still, f"the stimulus never moves {still}"
+    assert not set(still) - RARE, f"the stimulus never moves {still}"
     with capsys.disabled():
         print(f"\n{CLOCKS:,} clocks x {len(mapped.outputs)} outputs of the xc7 netlist and the core are equal")
 
