@@ -46,7 +46,7 @@ package: setup ## write the core as a zip file for Vivado's IP repository to bui
 test: setup ## run every test (golden model, plant, VHDL simulation)
 	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m pytest -q -n $(JOBS) --dist=worksteal $(ARGS)
 
-slow: setup ## run the tests that `make test` leaves out: packages, mapped netlist, further cases of the same
+slow: setup ## run the tests that `make test` leaves out: packages, mapped netlists, further cases of the same tests
 	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m pytest -q -n $(JOBS) --dist=worksteal -m slow $(ARGS)
 
 demo: setup ## run the demonstration

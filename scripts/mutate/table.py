@@ -10,13 +10,10 @@ import re
 
 # (block, pattern of the mutation, reason)
 _SLOW = "with these bits of k_edge the speed is in its range only where edges are more than 8,000 clocks apart"
-_LONG = "no bench is long enough for 512 samples or lost packets, which these bits of their counters need"
 _LATE = "no run of the core waits 2**14 clocks for a sample: a watchdog with one of these bits never expires"
 REASONS: tuple[tuple[str, str, str], ...] = (
     ("fluxproof", r"-mode cnot1 .*-port settings_watchdog -portbit \d+ -ctrlbit 1[4-9]$", _LATE),
     ("incremental_encoder", r"-mode cnot1 .*-cell timer -port k_edge -portbit \d+ -ctrlbit (2[4-9]|3\d)$", _SLOW),
-    ("telemetry", r"-mode const0 .*\$add\S+ -port Y -portbit (9|[123]\d)$", _LONG),
-    ("telemetry", r"-mode cnot1 .*\$add\S+ -port Y -portbit \d+ -ctrlbit (9|[123]\d)$", _LONG),
 )
 
 
