@@ -36,9 +36,8 @@ def explain(loaded: list[Recording], nominal: Nominal, progress=lambda text: Non
     rows = sum(len(r) for r in loaded)
     if any(r.fatal for r in loaded):
         worst = next(p for p in problems if p.fatal)
-        return Diagnosis(
-            "bad_recording", f"The recording cannot be used: {worst.message}", rows=rows, problems=problems
-        )
+        why = f"The recording cannot be used: {worst.located()}"
+        return Diagnosis("bad_recording", why, rows=rows, problems=problems)
     if any(r.slow for r in loaded):  # sampled too slowly for a voltage balance between rows
         answer = diagnose_slow(loaded, nominal, progress)
     else:

@@ -65,6 +65,11 @@ class Problem:
     action: str = ""
     fatal: bool = False
 
+    def located(self) -> str:
+        """The message with its column and first row, as far as they are known and it does not name them itself."""
+        where = f"column {self.column}: " if self.column and self.column not in self.message else ""
+        return f"{where}{self.message}{f' (from row {self.row})' if self.row > 0 else ''}"
+
 
 @dataclass
 class Recording:
@@ -76,6 +81,7 @@ class Recording:
     ``points``: every row is one operating point (``slow`` too); ``t`` is a row number if "time" is in ``lacks``.
     ``lacks``: what the recording cannot show, of the words in effect.NEEDS.
     ``meta``: further contents of the file, such as registers and raw codes of a telemetry dump.
+    ``checked``: diagnosis/checks has judged it, as it does every file that is read.
     """
 
     source: str
@@ -87,6 +93,7 @@ class Recording:
     lacks: frozenset = frozenset()
     problems: list[Problem] = field(default_factory=list)
     meta: dict = field(default_factory=dict)
+    checked: bool = False
 
     def __len__(self) -> int:
         return len(self.columns["t"])
@@ -104,7 +111,10 @@ class Recording:
 
 
 def from_columns(columns: dict[str, np.ndarray], sample_time_s: float, source: str = "arrays") -> Recording:
-    """A recording from arrays; only lengths and gaps in time are checked."""
+    """A recording from arrays (n,) in canonical form; RecordingError where the lengths differ.
+
+    Here only lengths and gaps in time are checked; ``diagnose`` judges the values as it does those of a file.
+    """
     arrays = {name: np.ascontiguousarray(values, dtype=float) for name, values in columns.items()}
     n = {name: len(values) for name, values in arrays.items()}
     if "t" not in arrays or len(set(n.values())) != 1:

@@ -15,6 +15,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 
 from threadpoolctl import threadpool_limits
@@ -23,6 +24,7 @@ from fluxproof.diagnosis.answer.advice import complete
 from fluxproof.diagnosis.answer.flux_found import write_flux_map
 from fluxproof.diagnosis.answer.improve import write_improved
 from fluxproof.diagnosis.balance.parts import left_out
+from fluxproof.diagnosis.checks import check_recording
 from fluxproof.diagnosis.conventions.apply import read_drive, read_recording
 from fluxproof.diagnosis.conventions.tell import restate
 from fluxproof.diagnosis.fleet.prior import among, load_prior
@@ -91,12 +93,23 @@ def _loaded(recordings, nominal, progress) -> list[Recording]:
                     raise
                 refused.append((item, error))
                 continue
+        elif not item.checked:
+            item = _checked(item, nominal)
         loaded.append(item)
     if not loaded:
         raise refused[0][1]
     for source, error in refused:  # a part that cannot be read costs only that part
         left_out(loaded[0], source, str(error))
     return loaded
+
+
+def _checked(recording: Recording, nominal: Nominal) -> Recording:
+    """A copy of a recording that was made of arrays, after the checks that every file gets."""
+    columns, meta = dict(recording.columns), dict(recording.meta)
+    usable, joined = recording.usable.copy(), recording.joined.copy()
+    copy = replace(recording, columns=columns, meta=meta, usable=usable, joined=joined, problems=[*recording.problems])
+    check_recording(copy, nominal)
+    return copy
 
 
 def _diagnose(loaded, nominal, progress, fleet=None) -> Diagnosis:

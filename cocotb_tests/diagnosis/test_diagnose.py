@@ -291,3 +291,15 @@ def test_rotation_at_zero_current_is_diagnosed():
     assert answer.verdict in ("explained", "ambiguous"), summary(answer)
     assert not {e.name for e in answer.effects} - {"magnet_flux"}, summary(answer)
     assert "magnet_flux" in {e.name for e in answer.effects} | {n for group in answer.ambiguity for n in group}
+
+
+def test_arrays_are_checked_like_a_file():
+    """A simulation that diverged gave currents of 1e17 A; their balances had no finite noise, and the search failed."""
+    table = {name: values.copy() for name, values in columns(GRID).items()}
+    for name in ("i_a", "i_b", "i_c"):
+        table[name][10:] = -3e17
+    before = {name: values.copy() for name, values in table.items()}
+    answer = diagnose(from_columns(table, DRIVE.sample_time_s), PAPER)
+    assert answer.verdict == "bad_recording"
+    assert "column i_a:" in answer.sentence and "from row 10" in answer.sentence
+    assert all(np.array_equal(table[name], values) for name, values in before.items()), "the arrays were changed"

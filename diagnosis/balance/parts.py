@@ -45,9 +45,7 @@ def _reason(recording, nominal) -> str:
     """Why a recording cannot be used; "" if it can."""
     for problem in recording.problems:
         if problem.fatal:
-            where = f"column {problem.column}: " if problem.column else ""
-            row = f" (from row {problem.row})" if problem.row > 0 else ""
-            return f"{recording.source}: {where}{problem.message}{row}"
+            return f"{recording.source}: {problem.located()}"
     try:
         (slow_view if recording.slow else view_of)(recording, nominal)
     except RecordingError as error:

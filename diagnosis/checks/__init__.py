@@ -35,6 +35,8 @@ def checks() -> list:
 
 def check_recording(recording, nominal) -> None:
     """Run every check on the recording, in place; stops at a fatal problem."""
+    recording.checked = True
+    recording.meta.setdefault("notes", [])
     with np.errstate(all="ignore"):
         for module in checks():
             module.check(recording, nominal)
