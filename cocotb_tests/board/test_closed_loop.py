@@ -137,7 +137,9 @@ def test_start_from_standstill_in_verilator(figure):
         problem = first_difference(core.play(chunk.inputs, SEEN), chunk.seen, SEEN, chunk.number)
         assert problem is None, problem
         fastest = max(fastest, chunk.omega_m * 60 / (2 * np.pi))
-        assert chunk.seen[:, SEEN.index("irq")].max() == 0
+        # Without a dead time its setting is refused, which is a cause of interrupt until it is cleared.
+        if chunk.number > loop.settled + 1:
+            assert chunk.seen[:, SEEN.index("irq")].max() == 0
     seen = status(chunk)
     assert fastest == pytest.approx(RPM, rel=0.1) and chunk.omega_m < -0.9 * RPM * 2 * np.pi / 60
     assert seen["lost_counts"] == seen["illegal_count"] == seen["board_flags"] == 0 and seen["snap_ready"] == 1

@@ -22,12 +22,14 @@ PART = 0.2  # of the rated speed
 
 
 def start_from_standstill(carrier_half: int = CARRIER_HALF) -> BoardLoop:
-    """Enabled once the registers are written; 600 rpm; after 0.12 s to -600 rpm; a snapshot on the way."""
+    """Enabled once the registers are written and irq is cleared; 600 rpm; after 0.12 s to -600 rpm; a snapshot on the
+    way."""
     drive = with_abz_and_spi(load(DRIVE), carrier_half)
     loop = BoardLoop(drive, {}, theta_m=-BEFORE_INDEX)
     reference = PU.to_int(RPM * 2 * np.pi / 60 * drive.machine.pole_pairs / drive.bases.omega_me_rad_s)
     offset = TURN.to_int(drive.machine.pole_pairs * BEFORE_INDEX / (2 * np.pi))
     loop.writes |= {
+        loop.settled + 1: {"irq_clear": 15},
         loop.settled + 2: {"theta_offset": offset, "enable": 1},
         loop.settled + 4: {"speed_mode": 1, "omega_ref": reference},
         SNAP_AT: {"take_snapshot": 1},
