@@ -46,7 +46,9 @@ def judge(posterior, held) -> Judgement:
     names = setup.call(names_of, posterior)
     stray = setup.call(stray_of, posterior, held)
     if not stray and at_floor(Sizes(setup, setup.cells.y, setup.cells.y, ~held, measured_torque(setup))):
-        names = names.withheld()
+        # What only the shaft shows is in no size where nobody measured the torque: there the names decide.
+        shaft = {n for n, effect in setup.effects.items() if effect.mechanical}
+        names = names.withheld(frozenset() if measured_torque(setup) else frozenset(shaft))
     likely = {n for n, p in names.maybe.items() if p >= k.LIKELY}
     told = (names.said | {n for group in names.open for n in group} | likely) & set(best.names) - set(names.suspects)
     before, after = setup.cells.y, best.left(told)

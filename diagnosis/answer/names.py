@@ -34,9 +34,11 @@ class Names:
     def said(self) -> set[str]:
         return set(self.confidence)
 
-    def withheld(self) -> Names:
-        """The same with nothing asserted: what was named is possible."""
-        return Names({}, [], self.maybe | self.confidence, {}, self.fits)
+    def withheld(self, but=frozenset()) -> Names:
+        """The same with nothing asserted but the effects ``but``: what else was named is possible."""
+        kept = {n: p for n, p in self.confidence.items() if n in but}
+        possible = {n: p for n, p in self.confidence.items() if n not in but}
+        return Names(kept, [g for g in self.open if but.issuperset(g)], self.maybe | possible, {}, self.fits)
 
 
 def names_of(posterior) -> Names:
