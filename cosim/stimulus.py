@@ -21,7 +21,7 @@ BURST = 40  # samples between two changes of the registers
 SHORTEST = 10  # rows of a block's own hard cases that are played again
 SAMPLES, CLOCKS = 300, 2000  # the same at most
 FEW = 100  # varied samples at least
-OFTEN, SELDOM, NEVER = 60, 250, 0  # samples from one reset to the next
+ALWAYS, OFTEN, SELDOM, NEVER = 6, 60, 250, 0  # samples from one reset to the next
 
 
 @dataclass(frozen=True)
@@ -34,12 +34,13 @@ class Length:
     random: int  # samples
     alike: int  # samples whose numbers are all of one size
     clocked: int  # random clocks of a block whose sample is the clock
+    restless: int  # more of them, in which everything changes at every clock and a reset is never far
     patient: bool  # whether the cases come too that take long, such as a wide counter at its end
 
 
-SHORT = Length(500, 200, 1000, 300, 0, 1000, False)  # GHDL, some ten thousand clocks a second
-MEDIUM = Length(1500, 400, 2000, 1200, 0, 0, False)  # the model against floating point, both in Python
-LONG = Length(1500, 500, 30000, 1500, 2000, 10000, True)  # Verilator
+SHORT = Length(500, 200, 1000, 300, 0, 1000, 0, False)  # GHDL, some ten thousand clocks a second
+MEDIUM = Length(1500, 400, 2000, 1200, 0, 0, 0, False)  # the model against floating point, both in Python
+LONG = Length(1500, 500, 30000, 1500, 2000, 10000, 2000, True)  # Verilator
 
 
 class Sample(NamedTuple):
@@ -206,6 +207,8 @@ def _clocked(block: Block, config: dict[str, int], rng, length: Length) -> Sampl
         yield Sample(row, NEVER)
     yield from _varied(ports, patient or own, rng, length.varied, CLOCKS)
     yield from _held(ports, rng, length.clocked)
+    for _ in range(length.restless):  # what a reset leaves behind shows in the clock after it
+        yield Sample({p.name: random_value(rng, p) for p in ports}, ALWAYS)
 
 
 def _varied(

@@ -82,6 +82,11 @@ def stimuli(rng, _config):
         rows += [{**base, **values} for _ in range(8)]
     rows.append({**rows[-1], "run": 0})
     rows += [{**rows[0], "i_d": int(rng.integers(-99, 99))} for _ in range(4)]
+    still = {**base, "i_d": 0, "i_q": 0, "run": 0}
+    for n in range(PU_W - 1):  # an error of each bit alone, pushing against the limiter's word and with it
+        for sign, sat in ((1, 1), (-1, -1), (1, -1), (-1, 1)):
+            error = {"i_d_ref": sign << n, "i_q_ref": -sign << n, "sat_d": sat, "sat_q": -sat}
+            rows += [{**still, **error}, {**still, **error, "run": 1}]
     return rows
 
 

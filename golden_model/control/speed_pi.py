@@ -91,6 +91,12 @@ def stimuli(rng, _config):
         for kp, ki in ((one, 0), (one // 2, 0), (one * 5 // 8, 0), (0, one), (0, 0)):
             rows += [{**error, "run": 0}, {**error, "speed_kp": kp, "speed_ki": ki}]
             rows += [{**error, "speed_kp": kp, "speed_ki": 0}] * 2
+    for n in range(PU_TO_INTEGRAL):  # the integral at its limit, less than an LSB of the output beyond it: not there
+        beyond, half = {"speed_ki": 1 << n + DROP_I}, 1 << PU_TO_INTEGRAL - 1
+        for sign, shows in ((1, half + 1), (-1, half)):
+            at = {**regs, "omega_me": 0, "i_q_max": 999, "i_q_ext": sign * 999, "speed_kp": 0, "speed_ki": 0}
+            rows += [{**at, "omega_ref": 0, "speed_mode": 0}, {**at, **beyond, "omega_ref": sign, "speed_mode": 1}]
+            rows.append({**at, "omega_ref": -sign, "speed_kp": shows << DROP_P, "speed_mode": 1})
     return rows
 
 

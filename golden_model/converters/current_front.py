@@ -124,12 +124,16 @@ def stimuli(rng, config):
 
 
 def patient_stimuli(rng, config):
-    """More of the converter's frames, with other channels for every few of them."""
+    """More of the converter's frames, with other channels for every few of them; then one that fails at every clock."""
     if config["CURRENTS"] == EXTERNAL:
         return []
     still = {p.name: p.low for p in BLOCK.ports(config)}
     given = SOURCES[config["CURRENTS"]].stimuli(rng, {"ADC_BITS": config["ADC_BITS"], "LINES": config["SPI_LINES"]})
-    return _on_channels(given[-12000:], rng, still, 160)
+    rows = _on_channels(given[-12000:], rng, still, 160)
+    # A trigger that never goes away comes too early at every clock: the counter of errors gets to its end
+    rows += [rows[-1] | {"sample_trigger": 1, "clear_encoder": 0}] * (EVENTS_MAX + 99)
+    rows += [rows[-1] | {"clear_encoder": 1}] + [rows[-1]] * 5
+    return rows
 
 
 def _on_channels(given, rng, still, often):

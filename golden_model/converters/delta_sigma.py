@@ -73,6 +73,21 @@ def stimuli(rng, config):
     return rows
 
 
+def patient_stimuli(_rng, _config):
+    """Totals that stay, one phase at its end, the others in the middle, and limits each bit away from both."""
+    rows, oversampling, ratio = [], 8, 4
+    row = {p.name: p.low for p in BLOCK.inputs + BLOCK.registers} | {"oversampling": 32, "mod_ratio": ratio}
+    row |= {"trip_oversampling": oversampling, "sinc_gain": 1 << 14}
+    middle = oversampling**3 // 2  # of every second bit
+    for bit in range(sinc_overcurrent.TOTAL_W):
+        limits = {"limit_high": 2 * middle + (1 << bit), "limit_low": max(middle - (1 << bit), 0)}
+        for line in range(LINES - 1):
+            for clock in range(5 * oversampling * ratio):
+                word = (1 << LINES) - 1 if clock // ratio & 1 else 0
+                rows.append(row | limits | {"mod_data": word | 1 << line})
+    return rows
+
+
 _PORTS = {p.name: p for m in (sinc3, modulator_input) for p in m.BLOCK.inputs + m.BLOCK.registers + m.BLOCK.outputs}
 _OVER = {p.name: p for p in sinc_overcurrent.BLOCK.registers}
 
@@ -120,4 +135,5 @@ BLOCK = Block(
     reference=None,
     bound=None,
     stimuli=stimuli,
+    patient_stimuli=patient_stimuli,
 )

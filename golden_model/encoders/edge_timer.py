@@ -149,13 +149,17 @@ def patient_stimuli(rng, config):
         for rest in range(longest - TAKES - 4, longest + 3):
             rows += [still | {"step_up": 1}] * 2 + [still] * rest
             rows += [still | {"sample": 1}] + [still] * (TAKES + 1)
-    at_limit = [((OMEGA_MAX + off) * 48 >> UP, 47) for off in range(-6, 7)]  # 48 clocks from edge to edge
-    for k_edge, gap in factors(rng) + at_limit:
+    for k_edge, gap in factors(rng):
         if gap <= longest:
             still = {p.name: 0 for p in BLOCK.inputs} | {"k_edge": k_edge, "reverse": int(rng.integers(2))}
             turn = still | {("step_up", "step_down")[int(rng.integers(2))]: 1}
-            rows += [turn] + [still] * gap + [turn] * (1 if gap == 47 else int(rng.integers(1, 9)))
+            rows += [turn] + [still] * gap + [turn] * int(rng.integers(1, 9))
             rows += [still | {"sample": 1}] + [still] * (TAKES + 1)
+    between = 96  # clocks from edge to edge, a sample behind each: the speed is beside the end of its range
+    for off in range(-6, 7):
+        still = {p.name: 0 for p in BLOCK.inputs} | {"k_edge": (OMEGA_MAX + off) * between >> UP, "reverse": off & 1}
+        edge = [still | {"step_up": 1}, still | {"sample": 1}, *[still] * (between - 2)]
+        rows += edge * 3
     return rows
 
 

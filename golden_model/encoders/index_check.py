@@ -129,6 +129,18 @@ def stimuli(rng, config):
     return rows
 
 
+def patient_stimuli(rng, _config):
+    """An index beside half a turn, any counts a turn: there each bit decides which way round is shorter."""
+    rows, still = [], {p.name: 0 for p in BLOCK.inputs} | {"correct_max": CORRECT.hi}
+    for bit in range(COUNTS.width):
+        for _ in range(8):
+            counts = int(rng.integers(2, COUNTS.hi))
+            count = min((counts ^ (1 << bit) * int(rng.integers(2))) // 2 + int(rng.integers(2)), COUNT.hi)
+            row = still | {"counts": counts, "count": count}
+            rows += [row | {"index": 1}] + [row] * 6
+    return rows
+
+
 BLOCK = Block(
     name="index_check",
     folder="encoders",
@@ -163,4 +175,5 @@ BLOCK = Block(
     reference=None,
     bound=None,
     stimuli=stimuli,
+    patient_stimuli=patient_stimuli,
 )

@@ -6,7 +6,8 @@ reach is there once (graph.py).  Then, as long as something is open:
 1. with any inputs and any values in the registers, one clock changes no register and raises no flag (z3);
 2. the same with the values that the block's registers can have (ABC: `scorr`, `pdr`);
 3. the flag never rises, registers may differ: ABC finds by induction over a clock what is equal in every clock
-   (`scorr`), the flag and '0' among it, or searches for invariants by property directed reachability (`pdr`).
+   (`scorr`), the flag and '0' among it, or searches for invariants by property directed reachability (`pdr`);
+4. for a block with a strobe, what differs is forgotten before it counts (forgotten.py).
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ import z3
 
 from fluxproof.files import write_text
 from scripts.mutate.draw import CONTROL, Drawn, script, width_of
+from scripts.mutate.forgotten import Samples
 from scripts.mutate.graph import Cut, Graph
 from scripts.mutate.product import Product
 from scripts.prove.abc_engine import CARRIER
@@ -79,8 +81,12 @@ def without_products(path: Path, name: str, cells: Sequence[str] = ()) -> dict[s
     return widths
 
 
-def prove(drawn: Drawn, mutants: Sequence[int], miter: Miter, seconds: int) -> dict[int, str]:
+def prove(
+    drawn: Drawn, mutants: Sequence[int], miter: Miter, seconds: int, interval: int | None = None
+) -> dict[int, str]:
     """Mutant -> EQUIVALENT, DIFFERENT (an input sequence shows it) or UNKNOWN, within ``seconds`` each.
+
+    interval: clocks from sample to sample of a block with a strobe.
 
     A multiplier gives any product (product.py), the same in both where its operands are the same: what is proved so is
     true of every multiplier, and a difference need not be one of the real one.
@@ -107,6 +113,10 @@ def prove(drawn: Drawn, mutants: Sequence[int], miter: Miter, seconds: int) -> d
             said = verdict(folder, f"{mutant}.{way}")
             # A register that becomes different need not matter.
             found[mutant] = said if way == "both" or said == EQUIVALENT else UNKNOWN
+    if interval:
+        samples = Samples(graph, folder / "graph.map", interval)
+        still = [m for m in mutants if found[m] != EQUIVALENT]
+        found |= {m: EQUIVALENT for m in still if samples.forgets(m)}
     return found
 
 
