@@ -42,12 +42,13 @@ def test_small_block(tools):
 
 
 @pytest.mark.slow
-def test_bench_without_comparison_is_noticed(tools):
+@pytest.mark.parametrize("subject", [SMALL, Subject("current_limit", 0), Subject("current_directions", 0)])
+def test_bench_without_comparison_is_noticed(tools, subject):
     """The same mutants with nothing compared: all survive, and none that the bench notices is proved equivalent."""
-    noticed = {mutation for mutation, outcome in judge(SMALL, command.SEED).outcomes if outcome == KILLED}
-    (trial,) = SMALL.trials()
+    noticed = {mutation for mutation, outcome in judge(subject, command.SEED).outcomes if outcome == KILLED}
+    (trial,) = subject.trials()
     nothing = np.empty((0, 3), np.int64)
-    blind = judge(SMALL, command.SEED, [replace(trial, checks=nothing, still=np.empty(0, np.int64))])
+    blind = judge(subject, command.SEED, [replace(trial, checks=nothing, still=np.empty(0, np.int64))])
     assert blind.count(KILLED) == 0
     assert not noticed & {mutation for mutation, outcome in blind.outcomes if outcome == EQUIVALENT}
     result = command.summary([blind], command.SEED, 1.0)

@@ -116,6 +116,13 @@ def stimuli(rng, config):
         rows += [calm | limits | {"code_theta": size // 3, "position_restart": 1}]
         rows += [calm | limits | {"code_theta": size // 3 + k * size // 100} for k in (1, 2, 3, 9)]
         rows += [calm | limits | {"code_theta": code, "position_restart": 1}]
+    unit = TURN_W - config["POSITION_BITS"]  # jumps beside the limit: there the lowest bits of the code count
+    for beside in range(-9, 10):
+        jump = (limits["jump_max"] << DROP_JUMP >> unit) + beside
+        for sign in (1, -1):
+            codes = (7 * k + sign * jump * (k == 3) for k in range(4))
+            rows += [calm | limits | {"code_theta": code % size, "position_restart": int(k == 0)}
+                     for k, code in enumerate(codes)]  # fmt: skip
     return rows
 
 

@@ -201,6 +201,11 @@ def patient_stimuli(rng, config):
             int(rng.integers(1 << int(rng.integers(1, fmt.width + 1)))) for fmt in (CLOCKS, CLOCKS, COUNT)
         )
         period(compare, dead_time=dead_time, min_pulse=min_pulse)
+    for _ in range(20):  # dead times as long as the carrier allows
+        dead_time = int(rng.integers(half // 3, half))
+        min_pulse = int(rng.integers(dead_time + 1, half + 1))
+        for _ in range(2):
+            period(int(rng.integers(half // 4, 3 * half // 4)), dead_time=dead_time, min_pulse=min_pulse)
     return rows
 
 

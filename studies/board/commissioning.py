@@ -15,6 +15,7 @@ import numpy as np
 
 from fluxproof.commission.session import Refusal, Step
 from fluxproof.commission.steps import commission
+from fluxproof.fleet.engine import in_parallel
 from studies.board.motors import CLASSES, Case, case
 
 COUNT = 100
@@ -140,12 +141,22 @@ def row(figure: str, ours, target, unit: str, passed: bool) -> dict:
     return {"figure": figure, "ours": ours, "target": target, "unit": unit, "pass": bool(passed)}
 
 
+def _motor(seed: int) -> Outcome:
+    return run(case(seed))
+
+
+def _faulty(job: tuple[str, int]) -> tuple[bool, str, float]:
+    name, seed = job
+    return refused(name, case(seed))
+
+
 def figures(count: int = COUNT, faults_of: int = 3, say: Callable[[str], None] = lambda text: None) -> list[dict]:
     """[{figure, ours, target, unit, pass}]: ``count`` motors, every fault on ``faults_of`` of them."""
-    outcomes, began = [], time.monotonic()
-    for seed in range(count):
-        outcomes.append(run(case(seed)))
-        say(f"motor {seed}: {_line(outcomes[-1])} ({time.monotonic() - began:.0f} s)")
+    by_seed, began = {}, time.monotonic()
+    for seed, outcome in in_parallel(_motor, list(range(count)), None, "motors"):
+        by_seed[seed] = outcome
+        say(f"motor {seed}: {_line(outcome)} ({time.monotonic() - began:.0f} s)")
+    outcomes = [by_seed[seed] for seed in range(count)]
     accepted = [o for o in outcomes if o.reason is None]
     rows = [
         row("commissioning: motors accepted", len(accepted), f"{count} of {count}", "motors", len(accepted) == count)
@@ -161,13 +172,12 @@ def figures(count: int = COUNT, faults_of: int = 3, say: Callable[[str], None] =
     within = 100.0 * float(np.mean(np.array(ratios) <= 2.0)) if ratios else math.nan
     rows.append(row("commissioning: errors within two sigma", round(within, 1), "no target", "%", within == within))
     currents, right, told = [o.current for o in outcomes], 0, 0
-    for name in FAULTS:
-        for seed in range(faults_of):
-            ok, said, current = refused(name, case(1000 + seed))
-            verdict = "refused" if ok else "MISSED"
-            say(f"{name}, motor {1000 + seed}: {verdict}: {said}; current {current:.2f} of the limit")
-            right, told = right + ok, told + 1
-            currents.append(current)
+    wrong_boards = [(name, 1000 + n) for name in FAULTS for n in range(faults_of)]
+    for (name, seed), (ok, said, current) in in_parallel(_faulty, wrong_boards, None, "faults"):
+        verdict = "refused" if ok else "MISSED"
+        say(f"{name}, motor {seed}: {verdict}: {said}; current {current:.2f} of the limit")
+        right, told = right + ok, told + 1
+        currents.append(current)
     rows.append(
         row("commissioning: faults refused with their reason", right, f"{told} of {told}", "runs", right == told)
     )
