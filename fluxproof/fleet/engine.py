@@ -23,6 +23,7 @@ SETTINGS = {
     "distributed.admin.large-graph-warning-threshold": "1GB",
     "distributed.worker.memory.target": False,  # nothing is kept on workers that could be spilled
     "distributed.worker.memory.spill": False,
+    "distributed.worker.profile.enabled": False,  # it keeps every second of the last hour, a megabyte each
 }
 
 
