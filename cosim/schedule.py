@@ -10,7 +10,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from fluxproof.cosim.stimulus import LONG, Length, Sample, Samples, random_value, samples
+from fluxproof.cosim.stimulus import LONG, Length, Sample, Samples, samples
+from fluxproof.cosim.values import random_value
 from fluxproof.golden_model.block import Block, Port
 
 SETTLED = 2  # strobes are compared after this clock
@@ -115,7 +116,7 @@ def due(block: Block, clocks: list[Clock]) -> list[Due]:
     """The one rule of what is compared when, for every bench: an entry for each clock of the schedule.
 
     Strobes are compared from the fourth clock on, in every one of them: the reset has two clocks to work.  Outputs are
-    compared with ``out_valid``, and again before the next sample or a reset if nothing was in flight: they have to stay.
+    compared with ``out_valid``, and again before the next sample or a reset if nothing was in flight: they must stay.
     """
     strobes = block.strobes and not block.clocked
     entries, last, left = [], -1, {}

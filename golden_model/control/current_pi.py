@@ -85,6 +85,18 @@ def stimuli(rng, _config):
     return rows
 
 
+def patient_stimuli(_rng, _config):
+    """Errors of a single bit with every word of the limiter: the sign of each has to hold the integral."""
+    rows = []
+    for bit in range(PU.width - 1):
+        for err in (1 << bit, -1 << bit):
+            for sat in (1, -1, 0):
+                values = {f"i_{x}_ref": err for x in "dq"} | {f"sat_{x}": sat for x in "dq"}
+                gains = {"kp_d": 1 << 12, "ki_d": 1 << 20, "kp_q": 1 << 12, "ki_q": 1 << 20}
+                rows += [values | gains | {"run": 1}, gains | {"run": 0}]
+    return rows
+
+
 BLOCK = Block(
     name="current_pi",
     folder="control",
@@ -119,4 +131,5 @@ BLOCK = Block(
     reference=reference,
     bound=bound,
     stimuli=stimuli,
+    patient_stimuli=patient_stimuli,
 )

@@ -94,6 +94,22 @@ def stimuli(rng, _config):
     return rows
 
 
+def patient_stimuli(rng, _config):
+    """The integral one bit beyond or below its limit, then roundings of its sum at which each of its low bits shows."""
+    rows, one = [], 1 << DROP_I
+    for bit in range(PU_TO_INTEGRAL):
+        for sign in (1, -1):
+            still = {"i_q_max": int(rng.integers(1 << 12, 1 << 16)), "run": 1, "speed_mode": 1, "speed_kp": 0}
+            rows.append(still | {"speed_mode": 0, "i_q_ext": sign * PU.hi})
+            for err in (sign, -sign):  # beyond, then below
+                rows.append(still | {"omega_ref": err, "speed_ki": one << bit})
+                for off in (-1, 0, 1, -1 << bit, 1 << bit):
+                    size = max((1 << PU_TO_INTEGRAL - 1) + off, 0) << DROP_P
+                    for k in (1, -1):
+                        rows.append(still | {"omega_ref": k, "speed_kp": size, "speed_ki": 0})
+    return rows
+
+
 BLOCK = Block(
     name="speed_pi",
     folder="control",
@@ -122,4 +138,5 @@ BLOCK = Block(
     reference=reference,
     bound=bound,
     stimuli=stimuli,
+    patient_stimuli=patient_stimuli,
 )

@@ -29,6 +29,7 @@ UP = PU.frac_bits - K_EDGE.frac_bits  # from the product's fraction bits to the 
 TIME_W, MOVED_W, QUOTIENT_W = 24, 16, 19
 EVER = (1 << TIME_W) - 1  # a reset leaves the longest time there is
 OMEGA_MAX = PU.hi
+APART = 48  # clocks between two edges, for the bench
 TAKES = MOVED_W + QUOTIENT_W + 4  # with MOVED_W as it is by default
 
 
@@ -149,13 +150,24 @@ def patient_stimuli(rng, config):
         for rest in range(longest - TAKES - 4, longest + 3):
             rows += [still | {"step_up": 1}] * 2 + [still] * rest
             rows += [still | {"sample": 1}] + [still] * (TAKES + 1)
-    at_limit = [((OMEGA_MAX + off) * 48 >> UP, 47) for off in range(-6, 7)]  # 48 clocks from edge to edge
-    for k_edge, gap in factors(rng) + at_limit:
+    for k_edge, gap in factors(rng):
         if gap <= longest:
             still = {p.name: 0 for p in BLOCK.inputs} | {"k_edge": k_edge, "reverse": int(rng.integers(2))}
             turn = still | {("step_up", "step_down")[int(rng.integers(2))]: 1}
-            rows += [turn] + [still] * gap + [turn] * (1 if gap == 47 else int(rng.integers(1, 9)))
+            rows += [turn] + [still] * gap + [turn] * int(rng.integers(1, 9))
             rows += [still | {"sample": 1}] + [still] * (TAKES + 1)
+    return rows + (_at_limit(rng) if longest > APART else [])
+
+
+def _at_limit(rng):
+    """Two edges whose speed is at the end of its range, or below it by a bit, or beside these."""
+    rows, still = [], {p.name: 0 for p in BLOCK.inputs}
+    sizes = {OMEGA_MAX - (1 << bit) for bit in range(OMEGA_MAX.bit_length())} | {OMEGA_MAX, OMEGA_MAX + 1}
+    for size in sorted({size + off for size in sizes for off in (-1, 0, 1)}):
+        regs = still | {"k_edge": size * APART >> UP, "reverse": int(rng.integers(2))}
+        turn = regs | {("step_up", "step_down")[int(rng.integers(2))]: 1}
+        for rest in (APART - 2, TAKES + 1):
+            rows += [turn, regs | {"sample": 1}] + [regs] * rest
     return rows
 
 

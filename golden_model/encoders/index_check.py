@@ -129,6 +129,20 @@ def stimuli(rng, config):
     return rows
 
 
+def patient_stimuli(rng, config):
+    """A count at half a turn and beside it, with turns of any counts: which way round is shorter."""
+    rows = []
+    still = {p.name: 0 for p in BLOCK.inputs}
+    for bit in range(2, COUNTS.width):
+        for _ in range(8):
+            counts = int(rng.integers(1 << bit, 2 << bit))
+            regs = {"counts": counts, "correct_max": CORRECT.hi}
+            for count in (counts // 2, counts // 2 + 1, (counts + 1) // 2):
+                row = still | regs | {"count": count}
+                rows += [row | {"index": 1}] + [row] * 6 + [row | {"restart": 1}]
+    return rows
+
+
 BLOCK = Block(
     name="index_check",
     folder="encoders",
@@ -163,4 +177,5 @@ BLOCK = Block(
     reference=None,
     bound=None,
     stimuli=stimuli,
+    patient_stimuli=patient_stimuli,
 )
