@@ -174,9 +174,10 @@ def _varied(
     Now and then a row is beside the block's state, comes twice, or is left out.
     """
     state, done = None, 0
+    news = [k for k, row in enumerate(own) if row != own[k - 1]] or [0]  # a stretch begins where something happens
     while own and done < count:
         size = int(SHORTEST * (longest / SHORTEST) ** rng.random())
-        begin = int(rng.integers(max(1, len(own) - size // 2)))
+        begin = news[int(rng.integers(len(news)))]
         held, inverted = _change(ports, own[begin], rng, state)
         changes = int(rng.choice([10, 40, 10**9]))  # one row in so many
         for row in own[begin : begin + size]:

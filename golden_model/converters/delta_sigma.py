@@ -73,6 +73,22 @@ def stimuli(rng, config):
     return rows
 
 
+def patient_stimuli(_rng, _config):
+    """Each phase in turn at a limit of the fast filter, and beside it by each bit: no other phase is near."""
+    rows, short = [], 8
+    row = {p.name: p.low for p in BLOCK.inputs + BLOCK.registers} | {"oversampling": 32, "trip_oversampling": short}
+    row |= {"sinc_gain": 1 << 14, "mod_ratio": 4}
+    for phase in range(3):
+        for ones, at in ((6, "limit_high"), (2, "limit_low")):  # of ``short`` bits; the others have one half
+            total = ones * short**2
+            for limit in (total, *(total + sign * (1 << bit) for bit in range(10) for sign in (1, -1))):
+                limits = {"limit_high": short**3 + 1, "limit_low": 0, at: max(limit, 0)}
+                for bit in range(6 * short):
+                    word = sum((bit % short < (ones if line == phase else short // 2)) << line for line in range(LINES))
+                    rows += [row | limits | {"mod_data": word}] * row["mod_ratio"]
+    return rows
+
+
 _PORTS = {p.name: p for m in (sinc3, modulator_input) for p in m.BLOCK.inputs + m.BLOCK.registers + m.BLOCK.outputs}
 _OVER = {p.name: p for p in sinc_overcurrent.BLOCK.registers}
 
@@ -120,4 +136,5 @@ BLOCK = Block(
     reference=None,
     bound=None,
     stimuli=stimuli,
+    patient_stimuli=patient_stimuli,
 )

@@ -99,6 +99,12 @@ def stimuli(rng, _config):
     return rows
 
 
+def patient_stimuli(_rng, _config):
+    """Ones until each bit of the first integrator has counted."""
+    row = {"mod_bit": 1, "bits_valid": 1, "oversampling": 32, "limit_high": 1 << 15, "limit_low": 0}
+    return [row] * ((1 << TOTAL_W - 1) + 200)
+
+
 BLOCK = Block(
     name="sinc_overcurrent",
     folder="converters",
@@ -125,4 +131,5 @@ BLOCK = Block(
     reference=None,
     bound=None,
     stimuli=stimuli,
+    patient_stimuli=patient_stimuli,
 )

@@ -172,8 +172,11 @@ def patient_stimuli(rng, config):
         if turn % 40 == 0:
             counts = int(rng.integers(1000, 6000))
             still |= turn_counter.setting(counts, config["POSITION_BITS"]) | {"reverse": turn // 40 & 1}
-        lost = int(2 ** rng.uniform(0, 11)) % (counts // 2)
-        slip += int(rng.choice([-1, 1])) * lost
+        lost, way = int(2 ** rng.uniform(0, 10)) % (counts // 2), int(rng.choice([-1, 1]))
+        for _ in range(lost):  # the shaft turns, its index with it: the count is off when it comes again
+            slip += way
+            a, b = quadrature_decoder.lines(slip + (8 if turn % 2 == 0 else -6))
+            rows.append(still | {"pin_a": a, "pin_b": b})
         still["correct_max"] = lost + int(rng.integers(-1, 2)) if rng.integers(2) else lost ^ 1 << int(rng.integers(12))
         still["correct_max"] = max(still["correct_max"], 0)
         for place in range(-6, 9) if turn % 2 else range(8, -7, -1):
