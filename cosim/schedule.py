@@ -10,7 +10,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from fluxproof.cosim.stimulus import LONG, Length, Sample, Samples, random_value, samples
+from fluxproof.cosim.stimulus import LONG, Length, Sample, Samples, samples
+from fluxproof.cosim.values import random_value
 from fluxproof.golden_model.block import Block, Port
 
 SETTLED = 2  # strobes are compared after this clock
@@ -114,10 +115,11 @@ def schedule(block: Block, config: dict[str, int], seed: int, length: Length = L
 def due(block: Block, clocks: list[Clock]) -> list[Due]:
     """The one rule of what is compared when, for every bench: an entry for each clock of the schedule.
 
-    Strobes are compared from the fourth clock on, in every one of them: the reset has two clocks to work.
+    Strobes are compared from the fourth clock on, in every one of them: the reset has two clocks to work.  Outputs are
+    compared with ``out_valid``, and again before the next sample or a reset if nothing was in flight: they must stay.
     """
     strobes = block.strobes and not block.clocked
-    entries = []
+    entries, last, left = [], -1, {}
     for number, clock in enumerate(clocks):
         entry = Due(of_sample=clock.of_sample)
         if strobes and number > SETTLED:
@@ -127,6 +129,12 @@ def due(block: Block, clocks: list[Clock]) -> list[Due]:
                 entry.outputs += clock.soon.items()
         # Before the first clock nothing was seen, and a reset may leave anything behind.
         entry.still = block.atomic and not clock.out_valid and number > 0 and not clocks[number - 1].rst
+        if strobes and clock.out_valid and clock.of_sample == last:
+            left = clock.expected
+        elif clock.in_valid or clock.rst:
+            entry.outputs += left.items()
+        if clock.in_valid or clock.rst:
+            last, left = clock.sample, {}
         for name, value in clock.expected.items():
             if clock.expected.get(block.shown_with.get(name), 1):
                 entry.outputs.append((name, value))
@@ -145,7 +153,10 @@ def _clocked_schedule(block: Block, config: dict[str, int], seed: int, length: L
     outputs, index, sample, run = at_rest, -1, next(draw), block.runner(config)
     while sample is not None:
         reset = int(sample.resets > 0 and rng.integers(sample.resets) == 0)
-        clocks.append(Clock(dict(sample.row), rst=reset, sample=index + 1, of_sample=index, expected=outputs))
+        row = dict(sample.row)
+        if reset and rng.integers(2):  # what a register takes from an input must not get through a reset
+            row |= {p.name: random_value(rng, p) for p in block.ports(config)}
+        clocks.append(Clock(row, rst=reset, sample=index + 1, of_sample=index, expected=outputs))
         if reset:
             state, outputs = block.state, at_rest
         else:

@@ -10,18 +10,18 @@ from __future__ import annotations
 import itertools
 from collections.abc import Generator, Iterator
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
+from fluxproof.cosim.values import corner_values, edge, near, one_size, random_value
 from fluxproof.golden_model.block import Block, Port
 
 BURST = 40  # samples between two changes of the registers
 SHORTEST = 10  # rows of a block's own hard cases that are played again
 SAMPLES, CLOCKS = 300, 2000  # the same at most
 FEW = 100  # varied samples at least
-ALWAYS, OFTEN, SELDOM, NEVER = 6, 60, 250, 0  # samples from one reset to the next
+OFTEN, SELDOM, NEVER = 60, 250, 0  # samples from one reset to the next
 
 
 @dataclass(frozen=True)
@@ -33,14 +33,14 @@ class Length:
     varied: int  # clocks of the block's own hard cases with something changed
     random: int  # samples
     alike: int  # samples whose numbers are all of one size
+    edges: int  # places where a single LSB of an input changes an output
     clocked: int  # random clocks of a block whose sample is the clock
-    restless: int  # more of them, in which everything changes at every clock and a reset is never far
     patient: bool  # whether the cases come too that take long, such as a wide counter at its end
 
 
-SHORT = Length(500, 200, 1000, 300, 0, 1000, 0, False)  # GHDL, some ten thousand clocks a second
+SHORT = Length(500, 200, 1000, 300, 0, 0, 1000, False)  # GHDL, some ten thousand clocks a second
 MEDIUM = Length(1500, 400, 2000, 1200, 0, 0, 0, False)  # the model against floating point, both in Python
-LONG = Length(1500, 500, 30000, 1500, 2000, 10000, 2000, True)  # Verilator
+LONG = Length(1500, 500, 30000, 1500, 2000, 1000, 10000, True)  # Verilator
 
 
 class Sample(NamedTuple):
@@ -52,63 +52,6 @@ class Sample(NamedTuple):
 
 # Yields samples and is sent the state before the next one; None where nobody knows it.
 Samples = Generator[Sample, object, None]
-
-
-@lru_cache(maxsize=None)
-def corner_values(port: Port) -> list[int]:
-    """Both ends of the legal range, and around zero where it is signed."""
-    return sorted({v for v in (port.low, -1, 0, 1, port.high) if port.low <= v <= port.high})
-
-
-def random_value(rng: np.random.Generator, port: Port) -> int:
-    """Half the time uniform, else a corner or a number of random magnitude: small ones matter too."""
-    draw = rng.bit_generator.random_raw  # 64 bits: the fastest there is, and noise needs millions
-    choice, kind = divmod(draw(), 4)
-    if kind == 0:
-        values = corner_values(port)
-        return values[choice % len(values)]
-    value = port.low + (draw() * (port.high - port.low + 1) >> 64)
-    if kind == 1:
-        value >>= choice % port.fmt.width
-    return min(max(value, port.low), port.high)
-
-
-def values_of(state) -> list[int]:
-    """Every number in a state, which may hold other states."""
-    if state is None:
-        return []
-    if isinstance(state, tuple):
-        return [value for part in state for value in values_of(part)]
-    return [int(state)]
-
-
-def near(rng: np.random.Generator, ports: tuple[Port, ...], row: dict[str, int], state=None, of=None) -> dict[str, int]:
-    """The row with one number (the port ``of``, or any) beside another, where a comparison changes or little is left.
-
-    It becomes another port's value, of the same weight, one of ``state``, or a power of two, with either sign, or
-    stays; then it moves by at most one LSB, or a single bit of it is inverted.
-    """
-    words = [p for p in ports if not p.is_bit]
-    if not words:
-        return row
-    port, other = (words[int(rng.integers(len(words)))] for _ in range(2))
-    port = of or port
-    value, inside = row[port.name], values_of(state)
-    kind = rng.integers(4) if not inside else rng.integers(8)
-    shift = port.fmt.frac_bits - other.fmt.frac_bits
-    if kind == 0:
-        value = row[other.name] << shift if shift >= 0 else row[other.name] >> -shift
-    elif kind == 1:
-        value = 1 << int(rng.integers(port.fmt.width))
-    elif kind > 3:  # a number inside has no format here: as it is, or with another port's weight
-        value = inside[int(rng.integers(len(inside)))] >> (abs(shift) if kind == 4 else 0)
-    if kind in (0, 1, 4, 5) and rng.integers(2):
-        value = -value
-    if kind == 2 or (kind > 3 and rng.integers(4) == 0):
-        value ^= 1 << int(rng.integers(port.fmt.width))
-    else:
-        value += int(rng.integers(-1, 2))
-    return row | {port.name: min(max(value, port.low), port.high)}
 
 
 def corners(ports: tuple[Port, ...], rng: np.random.Generator, most: int) -> Iterator[dict[str, int]]:
@@ -179,22 +122,36 @@ def _strobed(block: Block, config: dict[str, int], rng, length: Length) -> Sampl
             registers = {p.name: row[p.name] for p in block.registers}
         yield Sample(row | registers)
     yield from _alike(block, ports, rng, length.alike)
+    yield from _edges(block, config, own, rng, length.edges)
 
 
 def _alike(block: Block, ports: tuple[Port, ...], rng: np.random.Generator, count: int) -> Samples:
-    """Numbers of about one size, from the full range to a few bits: products that cross a rounding edge, near zero too.
-
-    The size is of the whole sample, one port has another; settings keep theirs for a burst.
-    """
-    draw, held = rng.bit_generator.random_raw, {}
+    """Numbers of about one size: products that cross a rounding edge, near zero too; settings stay for a burst."""
+    held = {}
     for k in range(count):
-        size, other, row = rng.random() ** 2, draw() % len(ports), {}
-        for n, p in enumerate(ports):
-            drop = int((rng.random() if n == other else size) * p.fmt.width)
-            row[p.name] = min(max((p.low + (draw() * (p.high - p.low + 1) >> 64)) >> drop, p.low), p.high)
+        row = one_size(ports, rng)
         if k % BURST == 0:
             held = {p.name: row[p.name] for p in block.registers}
         yield Sample(row | held)
+
+
+def _edges(block: Block, config: dict[str, int], own: list[dict[str, int]], rng, count: int) -> Samples:
+    """Both sides of places where one LSB of an input matters: where a rounding turns, a comparison, or a limit begins.
+
+    They are found by halving what lies between two samples.  Some follow one another without other changes: what the
+    first one leaves in the block, right or not, shows at the edge of the next.
+    """
+    ports, run = block.ports(config), block.runner(config)
+    words = [p for p in ports if not p.is_bit]
+    row, state = {}, block.state
+    for k in range(count if words else 0):
+        if k % 4 == 0:
+            row = own[int(rng.integers(len(own)))] if own and rng.integers(2) else one_size(ports, rng)
+            row = block.possible(row, config) if block.possible else row
+        port = words[int(rng.integers(len(words)))]
+        ends = [row | {port.name: random_value(rng, port)} for _ in range(2)]
+        for row in edge(run, state, port.name, *ends, rng):
+            state = yield Sample(row, SELDOM)
 
 
 def _clocked(block: Block, config: dict[str, int], rng, length: Length) -> Samples:
@@ -207,8 +164,6 @@ def _clocked(block: Block, config: dict[str, int], rng, length: Length) -> Sampl
         yield Sample(row, NEVER)
     yield from _varied(ports, patient or own, rng, length.varied, CLOCKS)
     yield from _held(ports, rng, length.clocked)
-    for _ in range(length.restless):  # what a reset leaves behind shows in the clock after it
-        yield Sample({p.name: random_value(rng, p) for p in ports}, ALWAYS)
 
 
 def _varied(
@@ -219,9 +174,10 @@ def _varied(
     Now and then a row is beside the block's state, comes twice, or is left out.
     """
     state, done = None, 0
+    news = [k for k, row in enumerate(own) if row != own[k - 1]] or [0]  # a stretch begins where something happens
     while own and done < count:
         size = int(SHORTEST * (longest / SHORTEST) ** rng.random())
-        begin = int(rng.integers(max(1, len(own) - size // 2)))
+        begin = news[int(rng.integers(len(news)))]
         held, inverted = _change(ports, own[begin], rng, state)
         changes = int(rng.choice([10, 40, 10**9]))  # one row in so many
         for row in own[begin : begin + size]:

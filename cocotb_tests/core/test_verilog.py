@@ -14,7 +14,7 @@ import pytest
 
 from fluxproof.cosim import ghdl, verilog
 from fluxproof.cosim.sources import rtl_sources
-from fluxproof.cosim.stimulus import random_value
+from fluxproof.cosim.values import random_value
 from fluxproof.cosim.verilated import VerilatedCore
 from fluxproof.golden_model.fluxproof import REGISTERS, SAMPLE_INTERVAL
 from fluxproof.golden_model.io import (

@@ -15,7 +15,7 @@ from fluxproof.cosim.block_bench import read
 from fluxproof.cosim.closed_loop import INPUT_PORTS, cosimulate
 from fluxproof.cosim.ghdl_device import GhdlDevice, prepare
 from fluxproof.cosim.scenarios import SCENARIOS
-from fluxproof.cosim.stimulus import random_value
+from fluxproof.cosim.values import random_value
 from fluxproof.diagnosis.replay import telemetry_stream
 from fluxproof.golden_model import drive as drives
 from fluxproof.golden_model import fluxproof

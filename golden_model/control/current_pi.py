@@ -82,11 +82,18 @@ def stimuli(rng, _config):
         rows += [{**base, **values} for _ in range(8)]
     rows.append({**rows[-1], "run": 0})
     rows += [{**rows[0], "i_d": int(rng.integers(-99, 99))} for _ in range(4)]
-    still = {**base, "i_d": 0, "i_q": 0, "run": 0}
-    for n in range(PU_W - 1):  # an error of each bit alone, pushing against the limiter's word and with it
-        for sign, sat in ((1, 1), (-1, -1), (1, -1), (-1, 1)):
-            error = {"i_d_ref": sign << n, "i_q_ref": -sign << n, "sat_d": sat, "sat_q": -sat}
-            rows += [{**still, **error}, {**still, **error, "run": 1}]
+    return rows
+
+
+def patient_stimuli(_rng, _config):
+    """Errors of a single bit with every word of the limiter: the sign of each has to hold the integral."""
+    rows = []
+    for bit in range(PU.width - 1):
+        for err in (1 << bit, -1 << bit):
+            for sat in (1, -1, 0):
+                values = {f"i_{x}_ref": err for x in "dq"} | {f"sat_{x}": sat for x in "dq"}
+                gains = {"kp_d": 1 << 12, "ki_d": 1 << 20, "kp_q": 1 << 12, "ki_q": 1 << 20}
+                rows += [values | gains | {"run": 1}, gains | {"run": 0}]
     return rows
 
 
@@ -124,4 +131,5 @@ BLOCK = Block(
     reference=reference,
     bound=bound,
     stimuli=stimuli,
+    patient_stimuli=patient_stimuli,
 )

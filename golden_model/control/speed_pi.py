@@ -91,12 +91,22 @@ def stimuli(rng, _config):
         for kp, ki in ((one, 0), (one // 2, 0), (one * 5 // 8, 0), (0, one), (0, 0)):
             rows += [{**error, "run": 0}, {**error, "speed_kp": kp, "speed_ki": ki}]
             rows += [{**error, "speed_kp": kp, "speed_ki": 0}] * 2
-    for n in range(PU_TO_INTEGRAL):  # the integral at its limit, less than an LSB of the output beyond it: not there
-        beyond, half = {"speed_ki": 1 << n + DROP_I}, 1 << PU_TO_INTEGRAL - 1
-        for sign, shows in ((1, half + 1), (-1, half)):
-            at = {**regs, "omega_me": 0, "i_q_max": 999, "i_q_ext": sign * 999, "speed_kp": 0, "speed_ki": 0}
-            rows += [{**at, "omega_ref": 0, "speed_mode": 0}, {**at, **beyond, "omega_ref": sign, "speed_mode": 1}]
-            rows.append({**at, "omega_ref": -sign, "speed_kp": shows << DROP_P, "speed_mode": 1})
+    return rows
+
+
+def patient_stimuli(rng, _config):
+    """The integral one bit beyond or below its limit, then roundings of its sum at which each of its low bits shows."""
+    rows, one = [], 1 << DROP_I
+    for bit in range(PU_TO_INTEGRAL):
+        for sign in (1, -1):
+            still = {"i_q_max": int(rng.integers(1 << 12, 1 << 16)), "run": 1, "speed_mode": 1, "speed_kp": 0}
+            rows.append(still | {"speed_mode": 0, "i_q_ext": sign * PU.hi})
+            for err in (sign, -sign):  # beyond, then below
+                rows.append(still | {"omega_ref": err, "speed_ki": one << bit})
+                for off in (-1, 0, 1, -1 << bit, 1 << bit):
+                    size = max((1 << PU_TO_INTEGRAL - 1) + off, 0) << DROP_P
+                    for k in (1, -1):
+                        rows.append(still | {"omega_ref": k, "speed_kp": size, "speed_ki": 0})
     return rows
 
 
@@ -128,4 +138,5 @@ BLOCK = Block(
     reference=reference,
     bound=bound,
     stimuli=stimuli,
+    patient_stimuli=patient_stimuli,
 )

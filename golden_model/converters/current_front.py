@@ -124,16 +124,15 @@ def stimuli(rng, config):
 
 
 def patient_stimuli(rng, config):
-    """More of the converter's frames, with other channels for every few of them; then one that fails at every clock."""
+    """More of the converter's frames, with other channels for every few of them; errors until their counter is full."""
     if config["CURRENTS"] == EXTERNAL:
         return []
     still = {p.name: p.low for p in BLOCK.ports(config)}
     given = SOURCES[config["CURRENTS"]].stimuli(rng, {"ADC_BITS": config["ADC_BITS"], "LINES": config["SPI_LINES"]})
-    rows = _on_channels(given[-12000:], rng, still, 160)
-    # A trigger that never goes away comes too early at every clock: the counter of errors gets to its end
-    rows += [rows[-1] | {"sample_trigger": 1, "clear_encoder": 0}] * (EVENTS_MAX + 99)
-    rows += [rows[-1] | {"clear_encoder": 1}] + [rows[-1]] * 5
-    return rows
+    # A trigger in every clock: settings that are refused, a frame still in work, or a window that has not begun.
+    failing = still | {"sample_trigger": 1, "start_clocks": 9}
+    failing = [failing] * (2 * EVENTS.hi) + [still] * 9 + [still | {"clear_encoder": 1}] * 9
+    return _on_channels(given[-12000:], rng, still, 160) + failing
 
 
 def _on_channels(given, rng, still, often):

@@ -74,17 +74,18 @@ def stimuli(rng, config):
 
 
 def patient_stimuli(_rng, _config):
-    """Totals that stay, one phase at its end, the others in the middle, and limits each bit away from both."""
-    rows, oversampling, ratio = [], 8, 4
-    row = {p.name: p.low for p in BLOCK.inputs + BLOCK.registers} | {"oversampling": 32, "mod_ratio": ratio}
-    row |= {"trip_oversampling": oversampling, "sinc_gain": 1 << 14}
-    middle = oversampling**3 // 2  # of every second bit
-    for bit in range(sinc_overcurrent.TOTAL_W):
-        limits = {"limit_high": 2 * middle + (1 << bit), "limit_low": max(middle - (1 << bit), 0)}
-        for line in range(LINES - 1):
-            for clock in range(5 * oversampling * ratio):
-                word = (1 << LINES) - 1 if clock // ratio & 1 else 0
-                rows.append(row | limits | {"mod_data": word | 1 << line})
+    """Each phase in turn at a limit of the fast filter, and beside it by each bit: no other phase is near."""
+    rows, short = [], 8
+    row = {p.name: p.low for p in BLOCK.inputs + BLOCK.registers} | {"oversampling": 32, "trip_oversampling": short}
+    row |= {"sinc_gain": 1 << 14, "mod_ratio": 4}
+    for phase in range(3):
+        for ones, at in ((6, "limit_high"), (2, "limit_low")):  # of ``short`` bits; the others have one half
+            total = ones * short**2
+            for limit in (total, *(total + sign * (1 << bit) for bit in range(10) for sign in (1, -1))):
+                limits = {"limit_high": short**3 + 1, "limit_low": 0, at: max(limit, 0)}
+                for bit in range(6 * short):
+                    word = sum((bit % short < (ones if line == phase else short // 2)) << line for line in range(LINES))
+                    rows += [row | limits | {"mod_data": word}] * row["mod_ratio"]
     return rows
 
 

@@ -149,7 +149,10 @@ def stimuli(rng, config):
 
 
 def _any_settings(rng, config):
-    """Frames of any setting, the words complete or not before they end, triggers in every phase."""
+    """Frames of any setting, the words complete or not before they end, triggers in every phase.
+
+    In some a register changes meanwhile.
+    """
     rows = []
     for _ in range(250):
         bits = int(rng.integers(max(LEAST_BITS - 1, 2), MOST_BITS + 2))
@@ -159,9 +162,12 @@ def _any_settings(rng, config):
         regs |= {"sample_delay": int(rng.integers(16))}
         regs |= {"skip_bits": int(rng.integers(room + 1)), "wait_clocks": int(rng.integers(12)), "busy_timeout": 40}
         often = int(rng.choice([2, 40, 400]))
+        port = BLOCK.registers[int(rng.integers(len(BLOCK.registers)))] if rng.integers(2) else BLOCK.registers[0]
+        change, at = {port.name: int(rng.integers(port.low, port.high + 1))}, int(rng.integers(4, 400))
         for clock in range(min(400, (regs["clock_ratio"] * bits << regs["two_words"]) + 60)):
             row = {"sample_trigger": int(clock == 3 or rng.integers(90) == 0), "busy": int(rng.integers(often) == 0)}
-            rows.append(row | {"words_complete": int(rng.integers(often) == 0)} | regs)
+            row |= {"words_complete": int(rng.integers(often) == 0)}
+            rows.append(row | regs | (change if clock >= at else {}))
     return rows
 
 

@@ -29,6 +29,7 @@ UP = PU.frac_bits - K_EDGE.frac_bits  # from the product's fraction bits to the 
 TIME_W, MOVED_W, QUOTIENT_W = 24, 16, 19
 EVER = (1 << TIME_W) - 1  # a reset leaves the longest time there is
 OMEGA_MAX = PU.hi
+APART = 48  # clocks between two edges, for the bench
 TAKES = MOVED_W + QUOTIENT_W + 4  # with MOVED_W as it is by default
 
 
@@ -155,11 +156,18 @@ def patient_stimuli(rng, config):
             turn = still | {("step_up", "step_down")[int(rng.integers(2))]: 1}
             rows += [turn] + [still] * gap + [turn] * int(rng.integers(1, 9))
             rows += [still | {"sample": 1}] + [still] * (TAKES + 1)
-    between = 96  # clocks from edge to edge, a sample behind each: the speed is beside the end of its range
-    for off in range(-6, 7):
-        still = {p.name: 0 for p in BLOCK.inputs} | {"k_edge": (OMEGA_MAX + off) * between >> UP, "reverse": off & 1}
-        edge = [still | {"step_up": 1}, still | {"sample": 1}, *[still] * (between - 2)]
-        rows += edge * 3
+    return rows + (_at_limit(rng) if longest > APART else [])
+
+
+def _at_limit(rng):
+    """Two edges whose speed is at the end of its range, or below it by a bit, or beside these."""
+    rows, still = [], {p.name: 0 for p in BLOCK.inputs}
+    sizes = {OMEGA_MAX - (1 << bit) for bit in range(OMEGA_MAX.bit_length())} | {OMEGA_MAX, OMEGA_MAX + 1}
+    for size in sorted({size + off for size in sizes for off in (-1, 0, 1)}):
+        regs = still | {"k_edge": size * APART >> UP, "reverse": int(rng.integers(2))}
+        turn = regs | {("step_up", "step_down")[int(rng.integers(2))]: 1}
+        for rest in (APART - 2, TAKES + 1):
+            rows += [turn, regs | {"sample": 1}] + [regs] * rest
     return rows
 
 

@@ -165,25 +165,20 @@ def stimuli(rng, config):
 
 
 def patient_stimuli(rng, config):
-    """Back and forth over the index while the shaft slips: losses of every size, at correct_max or far from it.
-
-    One turn in three mends whatever is lost by then, so that losses add up.
-    """
+    """Back and forth over the index while the shaft slips: losses of every size, at correct_max or far from it."""
     rows, slip = [], 0
     still = {p.name: 0 for p in BLOCK.inputs} | {"filter_clocks": 1, "index_phase": 1, "k_edge": 900 << 16}
     for turn in range(160):
         if turn % 40 == 0:
             counts = int(rng.integers(1000, 6000))
             still |= turn_counter.setting(counts, config["POSITION_BITS"]) | {"reverse": turn // 40 & 1}
-        lost = int(2 ** rng.uniform(0, 11)) % (counts // 2)
-        slip += int(rng.choice([-1, 1])) * lost
+        lost, way = int(2 ** rng.uniform(0, 10)) % (counts // 2), int(rng.choice([-1, 1]))
+        for _ in range(lost):  # the shaft turns, its index with it: the count is off when it comes again
+            slip += way
+            a, b = quadrature_decoder.lines(slip + (8 if turn % 2 == 0 else -6))
+            rows.append(still | {"pin_a": a, "pin_b": b})
         still["correct_max"] = lost + int(rng.integers(-1, 2)) if rng.integers(2) else lost ^ 1 << int(rng.integers(12))
-        still["correct_max"] = index_check.CORRECT.hi if turn % 3 == 0 else max(still["correct_max"], 0)
-        if turn % 8 == 3:  # counted, and not seen by the index: many more than a slip, which the lines show modulo 4
-            for _ in range(int(2 ** rng.uniform(0, 11))):
-                slip += 1
-                a, b = quadrature_decoder.lines(slip)
-                rows += [still | {"pin_a": a, "pin_b": b, "sample": int(rng.integers(60) == 0)}] * 4
+        still["correct_max"] = max(still["correct_max"], 0)
         for place in range(-6, 9) if turn % 2 else range(8, -7, -1):
             a, b = quadrature_decoder.lines(place + slip)
             row = still | {"pin_a": a, "pin_b": b, "pin_z": int(place in (0, 1, 2))}

@@ -129,15 +129,17 @@ def stimuli(rng, config):
     return rows
 
 
-def patient_stimuli(rng, _config):
-    """An index beside half a turn, any counts a turn: there each bit decides which way round is shorter."""
-    rows, still = [], {p.name: 0 for p in BLOCK.inputs} | {"correct_max": CORRECT.hi}
-    for bit in range(COUNTS.width):
+def patient_stimuli(rng, config):
+    """A count at half a turn and beside it, with turns of any counts: which way round is shorter."""
+    rows = []
+    still = {p.name: 0 for p in BLOCK.inputs}
+    for bit in range(2, COUNTS.width):
         for _ in range(8):
-            counts = int(rng.integers(2, COUNTS.hi))
-            count = min((counts ^ (1 << bit) * int(rng.integers(2))) // 2 + int(rng.integers(2)), COUNT.hi)
-            row = still | {"counts": counts, "count": count}
-            rows += [row | {"index": 1}] + [row] * 6
+            counts = int(rng.integers(1 << bit, 2 << bit))
+            regs = {"counts": counts, "correct_max": CORRECT.hi}
+            for count in (counts // 2, counts // 2 + 1, (counts + 1) // 2):
+                row = still | regs | {"count": count}
+                rows += [row | {"index": 1}] + [row] * 6 + [row | {"restart": 1}]
     return rows
 
 

@@ -180,7 +180,8 @@ def _halves(rng, half):
 def patient_stimuli(rng, config):
     """A leg at rest for a power of two of clocks and a part of the dead time: each bit of its time has counted.
 
-    At the end any duty, dead time and pulse, also ones that the range allows and no carrier reaches.
+    Then dead times of all sizes that the carrier allows; at the end any duty, dead time and pulse, also ones that the
+    range allows and no carrier reaches.
     """
     half, rows = config["CARRIER_HALF"], []
     good = {"dead_time": 12, "min_pulse": 20, "enable": 1, "trip": 0, "clear_trip": 0, "double_update": 0}
@@ -196,16 +197,15 @@ def patient_stimuli(rng, config):
             period(half)
             for compare in (missing // 2, *[0] * (-periods - 1), missing - missing // 2, half):
                 period(min(compare, half))
+    for bit in range(half.bit_length()):
+        for dead_time in (1 << bit, (1 << bit) + 1, int(rng.integers(1 << bit, 2 << bit)), (2 << bit) - 1):
+            for _ in range(2 if dead_time < half else 0):
+                period(half // 2, dead_time=dead_time, min_pulse=int(rng.integers(dead_time + 1, half + 1)))
     for _ in range(60):
         dead_time, min_pulse, compare = (
             int(rng.integers(1 << int(rng.integers(1, fmt.width + 1)))) for fmt in (CLOCKS, CLOCKS, COUNT)
         )
         period(compare, dead_time=dead_time, min_pulse=min_pulse)
-    for _ in range(20):  # dead times as long as the carrier allows
-        dead_time = int(rng.integers(half // 3, half))
-        min_pulse = int(rng.integers(dead_time + 1, half + 1))
-        for _ in range(2):
-            period(int(rng.integers(half // 4, 3 * half // 4)), dead_time=dead_time, min_pulse=min_pulse)
     return rows
 
 

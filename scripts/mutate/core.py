@@ -16,7 +16,7 @@ from fluxproof.checkout import DRIVES
 from fluxproof.cosim.closed_loop import INPUT_PORTS, GoldenPeriods, PlantPeriods
 from fluxproof.cosim.golden_clock import SEEN, GoldenClock
 from fluxproof.cosim.runs import closed_loop, generics
-from fluxproof.cosim.stimulus import random_value
+from fluxproof.cosim.values import random_value
 from fluxproof.cosim.verilog import VerilogPort
 from fluxproof.golden_model import clocked
 from fluxproof.golden_model.fluxproof import OBSERVED, REGISTERS, Observed
