@@ -173,6 +173,7 @@ def test_drive_files_are_commissioned(name, figure):
 
 
 @pytest.mark.study
+@pytest.mark.timeout(7200)
 def test_figures_of_100_motors(figure):
     rows = figures(say=print)
     for row in rows:
