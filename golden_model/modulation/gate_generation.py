@@ -201,6 +201,8 @@ def patient_stimuli(rng, config):
         for dead_time in (1 << bit, (1 << bit) + 1, int(rng.integers(1 << bit, 2 << bit)), (2 << bit) - 1):
             for _ in range(2 if dead_time < half else 0):
                 period(half // 2, dead_time=dead_time, min_pulse=int(rng.integers(dead_time + 1, half + 1)))
+    for bit in range(COUNT.width):
+        period(1 << bit | int(rng.integers(half // 4)))
     for _ in range(60):
         dead_time, min_pulse, compare = (
             int(rng.integers(1 << int(rng.integers(1, fmt.width + 1)))) for fmt in (CLOCKS, CLOCKS, COUNT)
