@@ -142,7 +142,7 @@ class Phases:
         return True
 
     def _wrong(self, path: list[Move], can: dict, same: dict, wanted: Collection[int]) -> set[int]:
-        """Of the ``wanted`` pairs, those that these clocks do not make equal; the flag where it can rise in the last."""
+        """Of the ``wanted`` pairs, those that these clocks do not make equal; the flag where it rises in the last."""
         self._in_time()
         g, registers, words = self.graph, None, None
         g.forget()
