@@ -4,7 +4,8 @@ The words of a packet (telemetry_words) are read from the core's live values, de
 from TELEMETRY_WORDS_START clocks after the sample on, into a queue (packet_fifo) that the sink empties at its rate.
 
 * The controller never waits.  If the packet of a sample does not fit into the queue, it is dropped: ``dropped`` counts
-  it, up to 65535, and the reader sees a gap in the sample numbers, which count from 0 after a reset, modulo 2**32.
+  it, up to 2**DROPPED_W - 1, and the reader sees a gap in the sample numbers, which count from 0 after a reset, modulo
+  2**NUMBER_W.  These widths, 16 and 32 on a chip, are generics so that a bench can fill the counters.
 * ``enable`` is checked before the first word: a packet that has begun is completed.
 * As in the core, a sample less than SAMPLE_INTERVAL clocks after the last one is ignored and not counted.
 
@@ -45,13 +46,13 @@ class State(NamedTuple):
 
 def step(state, enable, sample_valid, m_axis_tready, *values):
     """One clock; ``values``: the raw sample, the core's values in the order of SHOWN, then the generics."""
-    s, depth_bits = state, values[-1]
+    s, (depth_bits, number_w, dropped_w) = state, values[-3:]
     raw, shown = values[: len(INPUTS)], values[len(INPUTS) : len(INPUTS) + len(SHOWN)]
 
     taken = sample_valid and s.age == INTERVAL
     sample = sample_latch.step.py_func(*raw) if taken else s.sample
     age = 1 if taken else min(s.age + 1, INTERVAL)
-    counter = (s.counter + 1) & WORD.hi if taken else s.counter
+    counter = (s.counter + 1) & ((1 << number_w) - 1) if taken else s.counter
 
     active, index, dropped = s.active, s.index, s.dropped
     if s.active:
@@ -61,7 +62,7 @@ def step(state, enable, sample_valid, m_axis_tready, *values):
         if packet_fifo.room(s.queue, depth_bits, COUNT):
             active, index = 1, 0
         else:
-            dropped = min(s.dropped + 1, DROPPED.hi)
+            dropped = min(s.dropped + 1, (1 << dropped_w) - 1)
 
     word_1, last_1, word_2, last_2 = s.word_1, s.last_1, s.word_2, s.last_2
     if s.active:
@@ -103,7 +104,7 @@ def stimuli(rng, config):
 
 
 def patient_stimuli(rng, config):
-    """A sink that stalls for as many samples as some bits of the count of lost packets need."""
+    """A sink that stalls until the count of lost packets and the samples' number are full."""
     ports = BLOCK.ports(config)
     row = {p.name: int(rng.integers(p.low, p.high + 1)) for p in ports} | {"m_axis_tready": 0, "enable": 1}
     rows = [row | {"sample_valid": 1}] + [row | {"sample_valid": 0}] * (INTERVAL - 1)
@@ -135,12 +136,14 @@ BLOCK = Block(
     shown_with={"m_axis_tdata": "m_axis_tvalid", "m_axis_tlast": "m_axis_tvalid"},
     constants={"AGE_W": INTERVAL.bit_length()},
     configs=(
-        {"ADC_BITS": 16, "POSITION_BITS": 16, "DEPTH_BITS": 6},
-        {"ADC_BITS": 12, "POSITION_BITS": 18, "DEPTH_BITS": 5},
+        {"ADC_BITS": 16, "POSITION_BITS": 16, "DEPTH_BITS": 6, "NUMBER_W": WORD.width, "DROPPED_W": DROPPED.width},
+        {"ADC_BITS": 12, "POSITION_BITS": 18, "DEPTH_BITS": 5, "NUMBER_W": 7, "DROPPED_W": 5},
     ),
+    too_wide=(0,),
     width_from={
         name: sample_latch.sized(out) for name, out in sample_latch.NAMES.items() if sample_latch.sized(out)
-    },
+    }
+    | {"dropped": lambda config: Format(0, config["DROPPED_W"], 0)},
     reference=None,
     bound=None,
     stimuli=stimuli,

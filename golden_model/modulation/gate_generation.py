@@ -198,9 +198,12 @@ def patient_stimuli(rng, config):
             for compare in (missing // 2, *[0] * (-periods - 1), missing - missing // 2, half):
                 period(min(compare, half))
     for bit in range(half.bit_length()):
-        for dead_time in (1 << bit, (1 << bit) + 1, int(rng.integers(1 << bit, 2 << bit)), (2 << bit) - 1):
+        least, past = 1 << bit, min(2 << bit, half)
+        for dead_time in sorted({least, least + 1, (least + past) // 2, past - 1}):
             for _ in range(2 if dead_time < half else 0):
                 period(half // 2, dead_time=dead_time, min_pulse=int(rng.integers(dead_time + 1, half + 1)))
+    for bit in range(COUNT.width):
+        period(1 << bit | int(rng.integers(half // 4)))
     for _ in range(60):
         dead_time, min_pulse, compare = (
             int(rng.integers(1 << int(rng.integers(1, fmt.width + 1)))) for fmt in (CLOCKS, CLOCKS, COUNT)

@@ -3,9 +3,9 @@
 -- clock, from TELEMETRY_WORDS_START clocks after the sample on, when the values are valid and before the next sample
 -- replaces them.  They enter a queue (packet_fifo) that the sink empties at its rate.
 -- The controller never waits: if the packet of a sample does not fit into the queue, it is dropped; dropped counts it,
--- up to 65535.  The sample numbers count from 0 after a reset, modulo 2**32.  enable is checked before the first word:
--- a packet that has begun is completed.  A sample less than FLUXPROOF_SAMPLE_INTERVAL clocks after the last one is
--- ignored and not counted.
+-- up to 2**DROPPED_W - 1.  The sample numbers count from 0 after a reset, modulo 2**NUMBER_W.  enable is checked before
+-- the first word: a packet that has begun is completed.  A sample less than FLUXPROOF_SAMPLE_INTERVAL clocks after the
+-- last one is ignored and not counted.
 -- Formats: unchanged, see telemetry_words.  The queue holds 2**DEPTH_BITS words.
 -- Latency: the first word is valid TELEMETRY_WORDS_START + 5 clocks after sample_valid.  Rounding: none.
 
@@ -18,7 +18,9 @@ entity telemetry is
   generic (
     ADC_BITS      : positive range 12 to 16 := 16;
     POSITION_BITS : positive range 8 to 18  := 16;
-    DEPTH_BITS    : positive range 5 to 16  := 9
+    DEPTH_BITS    : positive range 5 to 16  := 9;
+    NUMBER_W      : positive range 2 to 32  := 32;  -- bits of the sample's number; fewer for a bench that fills it
+    DROPPED_W     : positive range 2 to 16  := 16
   );
   port (
     clk           : in  std_logic;
@@ -33,7 +35,7 @@ entity telemetry is
     m_axis_tdata  : out unsigned(31 downto 0);  -- a word of the packet
     m_axis_tvalid : out std_logic;  -- 1: the word is valid
     m_axis_tlast  : out std_logic;  -- 1: last word of the packet
-    dropped       : out unsigned(15 downto 0)  -- samples without a packet because the queue was full
+    dropped       : out unsigned(DROPPED_W - 1 downto 0)  -- samples without a packet because the queue was full
   );
 end entity telemetry;
 
@@ -42,8 +44,9 @@ architecture rtl of telemetry is
   constant INDEX_W : positive := TELEMETRY_WORDS_INDEX_W;
   constant AGE_W   : positive := TELEMETRY_AGE_W;
 
-  constant AGE_END : unsigned(AGE_W - 1 downto 0) := to_unsigned(FLUXPROOF_SAMPLE_INTERVAL, AGE_W);
-  constant NONE    : unsigned(31 downto 0)        := (others => '1');  -- so that the first sample is number 0
+  constant AGE_END  : unsigned(AGE_W - 1 downto 0)     := to_unsigned(FLUXPROOF_SAMPLE_INTERVAL, AGE_W);
+  constant NONE     : unsigned(NUMBER_W - 1 downto 0)  := (others => '1');  -- so that the first sample is number 0
+  constant DROP_END : unsigned(DROPPED_W - 1 downto 0) := (others => '1');
 
   -- What enters with the sample, latched as in the core
   signal latched : sample_t;
@@ -57,11 +60,11 @@ architecture rtl of telemetry is
   signal age     : unsigned(AGE_W - 1 downto 0);  -- clocks since the sample, up to FLUXPROOF_SAMPLE_INTERVAL
   signal free    : std_logic;  -- 1: age = FLUXPROOF_SAMPLE_INTERVAL
   signal ready   : std_logic;  -- age = TELEMETRY_WORDS_START - 1
-  signal full    : std_logic;  -- drops = 65535, a clock late: drops counts at most once per sample
-  signal counter : unsigned(31 downto 0);  -- number of the sample
+  signal full    : std_logic;  -- drops = DROP_END, a clock late: drops counts at most once per sample
+  signal counter : unsigned(NUMBER_W - 1 downto 0);  -- number of the sample
   signal active  : std_logic;
   signal index   : unsigned(INDEX_W - 1 downto 0);
-  signal drops   : unsigned(15 downto 0);
+  signal drops   : unsigned(DROPPED_W - 1 downto 0);
 
   signal taken   : std_logic;
   signal start   : std_logic;
@@ -109,7 +112,7 @@ begin
       if start = '1' and room = '0' and full = '0' then
         drops <= drops + 1;
       end if;
-      full <= '1' when drops = 65535 else '0';
+      full <= '1' when drops = DROP_END else '0';
 
       -- Stages 1 and 2: the flag of the last word, delayed like the word
       valid_1 <= active;
@@ -135,7 +138,8 @@ begin
 
   words : entity work.telemetry_words
     generic map (ADC_BITS => ADC_BITS, POSITION_BITS => POSITION_BITS)
-    port map (clk => clk, rst => rst, in_valid => active, index => index, counter => counter,
+    port map (clk => clk, rst => rst, in_valid => active, index => index,
+              counter => resize(counter, 32),
               adc_a => latched.adc_a(ADC_BITS - 1 downto 0), adc_b => latched.adc_b(ADC_BITS - 1 downto 0),
               adc_c => latched.adc_c(ADC_BITS - 1 downto 0), adc_u_dc => latched.adc_u_dc(ADC_BITS - 1 downto 0),
               position_code => latched.position_code(POSITION_BITS - 1 downto 0), omega_ref => latched.omega_ref,

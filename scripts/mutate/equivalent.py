@@ -5,9 +5,9 @@ reach is there once (graph.py).  Then, as long as something is open:
 
 1. with any inputs and any values in the registers, one clock changes no register and raises no flag (z3);
 2. the same with the values that the block's registers can have (ABC: `scorr`, `pdr`);
-3. the flag never rises, registers may differ: ABC finds by induction over a clock what is equal in every clock
-   (`scorr`), the flag and '0' among it, or searches for invariants by property directed reachability (`pdr`);
-4. for a block with a strobe, what differs is forgotten before it counts (forgotten.py).
+3. the same with what is equal in each clock of a sample, registers may differ in others (phases.py);
+4. the flag never rises, registers may differ: ABC finds by induction over a clock what is equal in every clock
+   (`scorr`), the flag and '0' among it, or searches for invariants by property directed reachability (`pdr`).
 """
 
 from __future__ import annotations
@@ -26,14 +26,16 @@ import z3
 
 from fluxproof.files import write_text
 from scripts.mutate.draw import CONTROL, Drawn, script, width_of
-from scripts.mutate.forgotten import Samples
 from scripts.mutate.graph import Cut, Graph
+from scripts.mutate.phases import Phases
 from scripts.mutate.product import Product
 from scripts.prove.abc_engine import CARRIER
 from scripts.synth.yosys import tool
 
 FLAT = "flatten -noscopeinfo; memory_map; opt_clean; opt_expr; opt_clean; setundef -zero"
 # Registers start at 0 in both; what they may hold when a sample comes is what a reset leaves there, at any time.
+# Registers whose output is mutated have lost their name: both halves give them the same one.
+NAMED = "rename -enumerate -pattern register_% t:*dff* %co1:+[Q]"
 TO_GATES = "setundef -init -zero; techmap; opt -fast; dffunmap; setundef -undriven -zero; aigmap; opt_clean"
 BOTH = "both"  # the module that both halves of the miter are
 GRAPH = (
@@ -47,7 +49,7 @@ Miter = Callable[[Sequence[Product], int], str]
 EQUIVALENT, DIFFERENT, UNKNOWN = "equivalent", "different", "unknown"
 CARRY = "read_verilog carrier.v; prep -top m; techmap; abc -script search.abc"
 EFFORT = 3_000_000  # of z3 for a mutant, by its own count: some seconds
-STEPS_S, SEARCHED_S = 8, 14  # processor time of a subject's searches
+STEPS_S, SEARCHED_S, PHASES_S = 8, 14, 20  # processor time of a subject's searches
 START = 5  # seconds more for the first of a run, in which Yosys starts
 TICKS = os.sysconf("SC_CLK_TCK")
 
@@ -57,7 +59,7 @@ def netlist(drawn: Drawn, mutants: Sequence[int]) -> dict[str, Product]:
     width = width_of(drawn)
     lines = ["read_rtlil prepared.il"]
     lines += [f"{drawn.mutations[m - 1]} -ctrl {CONTROL} {width} {m}" for m in mutants]
-    lines += [f"rename {drawn.top} {BOTH}", f"hierarchy -top {BOTH}", FLAT, f"write_json {BOTH}.json"]
+    lines += [f"rename {drawn.top} {BOTH}", f"hierarchy -top {BOTH}", FLAT, NAMED, f"write_json {BOTH}.json"]
     script(drawn.folder, "both.ys", lines)
     return without_products(drawn.folder / f"{BOTH}.json", BOTH)
 
@@ -81,12 +83,8 @@ def without_products(path: Path, name: str, cells: Sequence[str] = ()) -> dict[s
     return widths
 
 
-def prove(
-    drawn: Drawn, mutants: Sequence[int], miter: Miter, seconds: int, interval: int | None = None
-) -> dict[int, str]:
+def prove(drawn: Drawn, mutants: Sequence[int], miter: Miter, seconds: int) -> dict[int, str]:
     """Mutant -> EQUIVALENT, DIFFERENT (an input sequence shows it) or UNKNOWN, within ``seconds`` each.
-
-    interval: clocks from sample to sample of a block with a strobe.
 
     A multiplier gives any product (product.py), the same in both where its operands are the same: what is proved so is
     true of every multiplier, and a difference need not be one of the real one.
@@ -105,19 +103,29 @@ def prove(
             continue
         graph.step(value, free=False).write(folder / f"{mutant}.step.aig")
         graph.both(value).write(folder / f"{mutant}.both.aig")
-    for way, most in (("step", STEPS_S), ("both", SEARCHED_S)):
-        still = [m for m in mutants if found[m] == UNKNOWN]
-        tried = partial(search, folder, way, seconds=seconds)
-        each(folder, still, f"{way}.status", tried, "search.abc", CARRY, seconds, children_s() + most)
-        for mutant in still:
-            said = verdict(folder, f"{mutant}.{way}")
-            # A register that becomes different need not matter.
-            found[mutant] = said if way == "both" or said == EQUIVALENT else UNKNOWN
-    if interval:
-        samples = Samples(graph, folder / "graph.map", interval)
-        still = [m for m in mutants if found[m] != EQUIVALENT]
-        found |= {m: EQUIVALENT for m in still if samples.forgets(m)}
+    searched(folder, "step", found, seconds, STEPS_S)
+    by_phases(Phases(graph, folder / "graph.map"), found, folder / "phase.cnf")
+    searched(folder, "both", found, seconds, SEARCHED_S)
     return found
+
+
+def searched(folder: Path, way: str, found: dict[int, str], seconds: int, most: float) -> None:
+    """What ABC says of the open mutants, ``seconds`` each, ``most`` for all."""
+    still = [mutant for mutant, outcome in found.items() if outcome == UNKNOWN]
+    tried = partial(search, folder, way, seconds=seconds)
+    each(folder, still, f"{way}.status", tried, "search.abc", CARRY, seconds, children_s() + most)
+    for mutant in still:
+        said = verdict(folder, f"{mutant}.{way}")
+        # A register that becomes different need not matter.
+        found[mutant] = said if way == "both" or said == EQUIVALENT else UNKNOWN
+
+
+def by_phases(phases: Phases, found: dict[int, str], path: Path) -> None:
+    """What the phases of a sample prove of the open mutants of a block with strobes; ``path``: a file for z3."""
+    until = time.process_time() + PHASES_S
+    for mutant in [m for m, outcome in found.items() if outcome == UNKNOWN and phases.control]:
+        if phases.equivalent(mutant, partial(never, path=path), until - time.process_time()):
+            found[mutant] = EQUIVALENT
 
 
 def never(cut: Cut, path: Path) -> bool:

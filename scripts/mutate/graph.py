@@ -145,6 +145,10 @@ class Graph:
             found = self.both_of(found ^ 1, literal ^ 1) ^ 1
         return found
 
+    def forget(self) -> None:
+        """Drops all gates that were made, and with them what `mutant` gives."""
+        self.made, self.made_of = {}, [None] * self.gates
+
     def differ(self, a: int, b: int) -> int:
         return self.either([self.both_of(a, b ^ 1), self.both_of(a ^ 1, b)])
 
@@ -199,6 +203,10 @@ class Graph:
             own = (self.first + self.pairs[k][1] for k in found)
             self._again(value, {node: 2 * node for node in own})
         return self._cut(value, self._of(self.flag, value), free=False)
+
+    def cut(self, flag: int) -> Cut:
+        """What the flag depends on, with any values in the registers."""
+        return self._cut([], flag, free=True)
 
     def _cut(self, value: list[int], flag: int, free: bool) -> Cut:
         """What the flag depends on."""

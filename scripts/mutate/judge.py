@@ -79,8 +79,7 @@ def judge(subject: Subject | Core, seed: int, trials: Sequence[harness.Trial] = 
     watch("run")
     if PROOF_S and alive and isinstance(subject, Subject):  # the whole core is too large for a proof
         circuit = partial(miter, subject.block, subject.config, "")
-        interval = subject.block.interval if subject.block.strobes and not subject.block.clocked else None
-        outcome |= equivalent.prove(drawn, alive, circuit, PROOF_S, interval)
+        outcome |= equivalent.prove(drawn, alive, circuit, PROOF_S)
     watch("prove")
     outcomes = [(drawn.mutations[mutant - 1], outcome[mutant]) for mutant in mutants]
     write_text(folder / "outcomes.json", json.dumps({"outcomes": outcomes, "seconds": watch.seconds}, indent=1))

@@ -45,7 +45,8 @@ GENERICS = {
     "CARRIER_HALF": ("integer range 8 to 32767", 10000, "half a PWM period in clocks"),
     "ESTIMATORS": ("integer range 0 to 1", 1, "0 leaves the estimators out"),
 }
-LEFT_AT_DEFAULT = {"DEPTH_BITS"}  # the telemetry's queue: 512 words are one block RAM
+# The telemetry's queue, of which 512 words are one block RAM; its counters, which only a bench makes smaller
+LEFT_AT_DEFAULT = {"DEPTH_BITS", "NUMBER_W", "DROPPED_W"}
 LITE, CODE, POSITION = "31 downto 0", "ADC_BITS - 1 downto 0", "POSITION_BITS - 1 downto 0"
 # pins of the top: name, mode, range of its bits (None: one), comment
 PINS = (
