@@ -9,8 +9,7 @@ from fluxproof.cosim.entity import read_entity
 from fluxproof.files import write_text
 
 NAME = "core_with_telemetry"
-CORE = {"ADC_BITS": 16, "POSITION_BITS": 16, "CARRIER_HALF": 10000, "ESTIMATORS": 1}
-GENERICS = {**CORE, "DEPTH_BITS": 9, "DROPPED_W": 16}
+GENERICS = {"ADC_BITS": 16, "POSITION_BITS": 16, "CARRIER_HALF": 10000, "ESTIMATORS": 1, "DEPTH_BITS": 9}
 
 
 def write_top(rtl: Path = RTL) -> Path:
@@ -43,8 +42,7 @@ begin
                  ESTIMATORS => ESTIMATORS)
     port map ({", ".join(f"{name} => {name}" for name in core)});
   stream : entity work.telemetry
-    generic map (ADC_BITS => ADC_BITS, POSITION_BITS => POSITION_BITS, DEPTH_BITS => DEPTH_BITS,
-                 DROPPED_W => DROPPED_W)
+    generic map (ADC_BITS => ADC_BITS, POSITION_BITS => POSITION_BITS, DEPTH_BITS => DEPTH_BITS)
     port map ({", ".join(f"{name} => {signal}" for name, signal in joined.items())});
 end architecture test;
 """

@@ -142,8 +142,7 @@ BLOCK = Block(
     too_wide=(0,),
     width_from={
         name: sample_latch.sized(out) for name, out in sample_latch.NAMES.items() if sample_latch.sized(out)
-    }
-    | {"dropped": lambda config: Format(0, config["DROPPED_W"], 0)},
+    },
     reference=None,
     bound=None,
     stimuli=stimuli,

@@ -184,7 +184,7 @@ architecture rtl of fluxproof_board is
   signal observed          : observed_t;
   signal estimated         : estimated_t;
   signal m_axis_tdata_out  : unsigned(31 downto 0);
-  signal telemetry_dropped : unsigned(DROPPED_W - 1 downto 0);
+  signal telemetry_dropped : unsigned(15 downto 0);
   signal irq_cause         : unsigned(3 downto 0);
   signal trip_now          : std_logic;
   signal encoder_code      : unsigned(POSITION_BITS - 1 downto 0);

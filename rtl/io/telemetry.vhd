@@ -35,7 +35,7 @@ entity telemetry is
     m_axis_tdata  : out unsigned(31 downto 0);  -- a word of the packet
     m_axis_tvalid : out std_logic;  -- 1: the word is valid
     m_axis_tlast  : out std_logic;  -- 1: last word of the packet
-    dropped       : out unsigned(DROPPED_W - 1 downto 0)  -- samples without a packet because the queue was full
+    dropped       : out unsigned(15 downto 0)  -- samples without a packet because the queue was full
   );
 end entity telemetry;
 
@@ -163,6 +163,6 @@ begin
               out_ready => m_axis_tready,
               out_valid => m_axis_tvalid, out_data => m_axis_tdata, out_last => m_axis_tlast, room => room);
 
-  dropped <= drops;
+  dropped <= resize(drops, 16);
 
 end architecture rtl;
