@@ -156,18 +156,44 @@ def patient_stimuli(rng, config):
             turn = still | {("step_up", "step_down")[int(rng.integers(2))]: 1}
             rows += [turn] + [still] * gap + [turn] * int(rng.integers(1, 9))
             rows += [still | {"sample": 1}] + [still] * (TAKES + 1)
-    return rows + (_at_limit(rng) if longest > APART else [])
+    return rows + (_at_limit(rng) + _divisions(rng) + _falling(rng) if longest > 2 * APART else [])
+
+
+def _two_edges(rng, k_edge, apart, after=TAKES + 1):
+    """A speed from two edges, in any direction, and clocks after its sample."""
+    regs = {p.name: 0 for p in BLOCK.inputs} | {"k_edge": k_edge, "reverse": int(rng.integers(2))}
+    turn = regs | {("step_up", "step_down")[int(rng.integers(2))]: 1}
+    return [row for rest in (apart - 2, after) for row in [turn, regs | {"sample": 1}, *[regs] * rest]]
 
 
 def _at_limit(rng):
-    """Two edges whose speed is at the end of its range, or below it by a bit, or beside these."""
-    rows, still = [], {p.name: 0 for p in BLOCK.inputs}
+    """Speeds at the end of their range, or below it by a bit, or beside these."""
     sizes = {OMEGA_MAX - (1 << bit) for bit in range(OMEGA_MAX.bit_length())} | {OMEGA_MAX, OMEGA_MAX + 1}
-    for size in sorted({size + off for size in sizes for off in (-1, 0, 1)}):
-        regs = still | {"k_edge": size * APART >> UP, "reverse": int(rng.integers(2))}
-        turn = regs | {("step_up", "step_down")[int(rng.integers(2))]: 1}
-        for rest in (APART - 2, TAKES + 1):
-            rows += [turn, regs | {"sample": 1}] + [regs] * rest
+    sizes = sorted({size + off for size in sizes for off in (-1, 0, 1)})
+    return [row for size in sizes for row in _two_edges(rng, size * APART >> UP, APART)]
+
+
+def _divisions(rng):
+    """Quotients of every size that just come out, or miss it by one: there the lowest bit of the dividend counts."""
+    rows, by = [], APART + 1  # odd: any remainder occurs
+    for bit in range(4, K_EDGE.width - 10):
+        for remainder in (0, 1, by - 1):
+            k_edge = int(rng.integers(1 << bit, 2 << bit))
+            while (k_edge << UP + 1) % by != remainder:
+                k_edge += 1
+            rows += _two_edges(rng, k_edge, by)
+    return rows
+
+
+def _falling(rng):
+    """A speed of every size, then a sample without an edge whose bound is this size or beside it."""
+    rows = []
+    for bit in range(1, PU.width - 1):
+        for off in (-1, 0, 1):
+            size = int(rng.integers(1 << bit, min(2 << bit, OMEGA_MAX)))
+            rows += _two_edges(rng, size * APART >> UP, APART, 2 * APART - 2)
+            regs = rows[-1] | {"k_edge": 2 * (size + off) * APART >> UP}
+            rows += [regs | {"sample": 1}] + [regs] * (TAKES + 1)
     return rows
 
 

@@ -58,6 +58,7 @@ LIMITS = {
     "brake_off": "u_dc",
 }
 HARMLESS = ("delta_max", "v_thr", "v_comp_max", "i_learn", "omega_psi_min")
+FAST = ("eta_v", "eta_psi", "gamma", "zeta", "v_comp_max")  # gains of the estimators
 INVERTED = 12  # settings of which a bit is inverted at a time
 BITS = {"ADC_BITS": 16, "POSITION_BITS": 16}
 
@@ -127,6 +128,8 @@ def every_event(inverted: int = 0) -> Recorder:
     golden.core = Recorder(run.registers.values, run.registers.config)
     plant, scenario, settings = PlantPeriods(run.drive, run.scenario), run.scenario, golden.core.registers
     rng = np.random.default_rng(SEED)
+    if inverted:  # what the estimators learn from a sample shows at once, down to its low bits
+        settings = settings._replace(**{name: REGISTERS[name].high for name in FAST})
     golden.run(None, int(scenario.enable[0]))
     for k in range(len(scenario)):
         if inverted:
