@@ -10,6 +10,7 @@ from fluxproof.golden_model.block import Block, Port
 from fluxproof.golden_model.common import input_filter
 from fluxproof.golden_model.encoders import edge_timer, hall_decoder
 from fluxproof.golden_model.encoders.edge_timer import MOVED_W, TIME_W
+from fluxproof.golden_model.encoders.quadrature_decoder import EVENTS
 from fluxproof.golden_model.fixed import Format
 from fluxproof.golden_model.formats import BIT, TURN_W
 from fluxproof.golden_model.io.position import code_format
@@ -76,7 +77,10 @@ def stimuli(rng, config):
 
 
 def patient_stimuli(rng, config):
-    """Turns that take long, with other settings in each, so that every bit of k_edge makes a speed; sectors skipped."""
+    """Turns that take long, with other settings in each, so that every bit of k_edge makes a speed; sectors skipped.
+
+    At the end illegal codes and skipped sectors until their counters are full.
+    """
     rows, sector = [], 0
     ports = {p.name: p for p in REGISTERS + (_PORTS["k_edge"],)}
     for turn in range(16):
@@ -88,6 +92,10 @@ def patient_stimuli(rng, config):
             hall = dict(zip(("hall_a", "hall_b", "hall_c"), hall_decoder.lines(sector), strict=True))
             row = _still() | regs | hall
             rows += [row | {"sample_trigger": int(k % 50 == 20)} for k in range(pause)]
+    for k in range(EVENTS.hi + 4):
+        for code in (7, (1, 2, 4)[k % 3]):
+            pins = {f"hall_{x}": code >> place & 1 for place, x in enumerate("abc")}
+            rows.append(_still() | pins | {"filter_clocks": 0})
     return rows
 
 

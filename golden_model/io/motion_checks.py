@@ -84,9 +84,14 @@ def stimuli(rng, _config):
     return rows
 
 
-def patient_stimuli(_rng, _config):
-    """Both counters to their ends; the shorter one by way of a limit at each of its bits."""
+def patient_stimuli(rng, _config):
+    """Both counters to their ends, the shorter by way of a limit at each of its bits; a shaft that brakes by an LSB."""
     rows = []
+    for bit in range(PU.width - 1):  # the slowest speed so far with this bit and without
+        for slowest in (int(rng.integers(PU.hi)) | 1 << bit, int(rng.integers(PU.hi)) & ~(1 << bit)):
+            row = USUAL | {"omega_away": 0, "runaway_samples": 2}
+            speeds = (max(PU.lo, -1 - slowest + off) for off in (0, -1, 0, 1, 1))
+            rows += [USUAL, *(row | {"omega_me": speed} for speed in speeds)]
     for bit in range(3, AWAY.width + 1):
         most = (1 << bit) - 1
         rows += [USUAL] + [USUAL | {"omega_me": -9000, "runaway_samples": most}] * (most + 3)
