@@ -93,8 +93,8 @@ def patient_stimuli(rng, _config):
             speeds = (max(PU.lo, -1 - slowest + off) for off in (0, -1, 0, 1, 1))
             rows += [USUAL, *(row | {"omega_me": speed} for speed in speeds)]
     for bit in range(3, AWAY.width + 1):
-        most = (1 << bit) - 1
-        rows += [USUAL] + [USUAL | {"omega_me": -9000, "runaway_samples": most}] * (most + 3)
+        for most in ((1 << bit) - 1, int(rng.integers(1 << bit - 1, 1 << bit))):
+            rows += [USUAL] + [USUAL | {"omega_me": -9000, "runaway_samples": most}] * (most + 3)
     for most in (63, STALLED_HI):
         row = {"omega_me": 10, "speed_limited": 1, "stall_samples": most}
         rows += [USUAL] + [USUAL | row] * (most + 3)

@@ -96,10 +96,6 @@ def stimuli(rng, config):
         for near in (-1, 0, 1):
             rows += [calm | limits | {f"i_{x}": edge + near} for x in "abc"]
             rows.append(calm | limits | {"i_a": 20000, "i_b": -20000, "i_c": edge + near})
-    for _ in range(40):  # any three currents whose sum is beside its limit
-        i_a, i_b = (int(rng.integers(-40000, 40000)) for _ in range(2))
-        total = int(rng.choice((-1, 1))) * (40 << DROP_LIMIT) + int(rng.integers(-8, 8))
-        rows.append(calm | limits | {"i_a": i_a, "i_b": i_b, "i_c": total - i_a - i_b, "i_trip": LIMIT.hi})
     for edge in (30 << 8, 300 << 8):
         rows += [calm | limits | {"u_dc": edge + near} for near in (-1, 0, 1)]
     for length in (1, 2, 3, 4, 20):
@@ -116,13 +112,6 @@ def stimuli(rng, config):
         rows += [calm | limits | {"code_theta": size // 3, "position_restart": 1}]
         rows += [calm | limits | {"code_theta": size // 3 + k * size // 100} for k in (1, 2, 3, 9)]
         rows += [calm | limits | {"code_theta": code, "position_restart": 1}]
-    unit = TURN_W - config["POSITION_BITS"]  # jumps beside the limit: there the lowest bits of the code count
-    for beside in range(-9, 10):
-        jump = (limits["jump_max"] << DROP_JUMP >> unit) + beside
-        for sign in (1, -1):
-            codes = (7 * k + sign * jump * (k == 3) for k in range(4))
-            rows += [calm | limits | {"code_theta": code % size, "position_restart": int(k == 0)}
-                     for k, code in enumerate(codes)]  # fmt: skip
     return rows
 
 

@@ -107,7 +107,9 @@ class Core:
     def trials(self) -> list[Trial]:
         """Its closed loops."""
         ports = top_ports(self.folder / "design.v")
-        recorders = (core.every_event(), core.any_settings(), core.every_event(core.INVERTED))
+        recorders = [core.every_event(), core.any_settings()]
+        for k, changed in enumerate((core.FAST, core.ADRIFT)):
+            recorders.append(core.every_event(core.INVERTED, changed, core.SEED + k))
         return [recorder.trial(ports) for recorder in recorders]
 
 

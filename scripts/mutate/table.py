@@ -13,13 +13,11 @@ _SLOW = "with these bits of k_edge the speed is in its range only where edges ar
 _ONE = "the mantissa is in [1, 2) and m from 2**16 to 2**17 - 1: the highest bit of either is 1"
 _SEEN = "seen: until a sample has met an edge its time is the longest there is, so the speed is 0 whatever was counted"
 _LATE = "no run of the core waits 2**14 clocks for a sample: a watchdog with one of these bits never expires"
-_CIC = "accumulators may start anywhere: the third difference takes what they start with out"
 REASONS: tuple[tuple[str, str, str], ...] = (
     ("fluxproof", r"-mode cnot1 .*-port settings_watchdog -portbit \d+ -ctrlbit 1[4-9]$", _LATE),
     ("reciprocal", r"-mode const1 .*-cell \$procdff\$\d+ -port [DQ] -portbit 16$", _ONE),
     ("edge_timer", r"-mode const1 .*-cell \$ternary\$design\.v:\d+\$\d+\[0\] -port [AY] -portbit 0$", _SEEN),
     ("incremental_encoder", r"-mode cnot1 .*-cell timer -port k_edge -portbit \d+ -ctrlbit (2[4-9]|3\d)$", _SLOW),
-    ("sinc3", r"-cell \$ternary\$design\.v:\d+\$\d+\[24:0\] -port B ", _CIC),
 )
 
 
