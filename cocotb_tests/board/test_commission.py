@@ -38,6 +38,10 @@ def test_a_motor_with_a_wrong_file_is_measured():
     assert outcome.current <= 1.0 and outcome.inertia < 5.0
 
 
+def test_a_rotor_in_resonance_with_the_field_is_aligned_at_a_slower_one():
+    assert run(case(30)).right
+
+
 @pytest.mark.parametrize("name", [name for name in FAULTS if name not in AGAIN])
 def test_each_fault_is_refused_for_its_reason(name):
     right, said, current = refused(name, case(1002))

@@ -28,7 +28,7 @@ DAMPING, SLOW_HZ, OF_SWING = 0.33, 4.0, 0.3  # of the swing; the integral's corn
 FASTEST = 1.0 / 60.0  # of the sampling frequency
 STIFF = 2.0  # kp*I over the dead time's voltage
 RAMP_S, FIELD_HZ, LEAST_S = 0.4, 6.0, 0.8  # the field's electrical frequency, at least so long a turn
-ATTEMPTS, SOFTER = 3, 0.4  # where the rotor swings: kp of the next attempt
+ATTEMPTS, SOFTER, SLOWER = 3, 0.4, 0.6  # where the rotor swings: kp and speed of the next attempt
 SAMPLES, INDEX_TURNS = 600, 1.15  # a way; turned to find an index
 MOVED = 0.02  # of a turn: less is a locked rotor
 SLOPE = 0.05  # largest error of the slope
@@ -61,7 +61,9 @@ def align(session: Session, reverse_given: bool | None) -> Step:
         except Swinging:
             if attempt + 1 == ATTEMPTS:
                 raise
-            kp *= SOFTER  # the swing goes on dying away meanwhile, and softer regulators damp it more
+            # The swing goes on dying away meanwhile, and softer regulators damp it more; a slower field leaves the
+            # resonance in which the sensors' offsets, once a turn of the field, may drive it.
+            kp, speed = kp * SOFTER, speed * SLOWER
             s.load(kp, (s.drive.machine.resistance_ohm + kp) / slow, reverse=0, theta_offset=0)
     s.ramp(0.1, i_d_ref=(held(s), 0.0))
     s.gates_off()
