@@ -3,5 +3,6 @@
 blocks.py, slow_view.py  steady blocks of fast and of slow recordings, as a view (view.py)
 misfit.py                recorded minus nominal; described.py, what the drive file has beyond a linear machine
 cells.py                 harmonics of the misfit and of every column, with their noise
+quantised_angle.py       the noise of an encoder's codes
 parts.py                 which of several recordings can be used
 """

@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from fluxproof.diagnosis.balance.curves import parabola
+from fluxproof.diagnosis.balance.quantised_angle import HALF_WIDTH, angle_step
 from fluxproof.diagnosis.balance.settling import settled
 from fluxproof.diagnosis.balance.shaft import airgap, is_airgap, shaft_kind
 from fluxproof.diagnosis.balance.view import View, lacking
@@ -18,7 +19,6 @@ from fluxproof.diagnosis.recording import Recording, RecordingError
 BLOCK_ROWS = 200
 SHORTER = (100, 50)  # for short dwells
 LEAST_BLOCKS = 12
-HALF_WIDTH = 8
 MOST_BLOCKS = 320  # more blocks increase the run time but hardly the accuracy
 RAMP_TORQUE = 0.02  # of rated torque: a larger change of inertial torque within a block means a ramp
 SLOPE_REACH = 60  # samples over which the shaft acceleration is computed with a transducer
@@ -115,6 +115,8 @@ def view_of(recording: Recording, nominal, block_rows=BLOCK_ROWS) -> View:
         rows=starts,
         span_s=float(r["t"][-1] - r["t"][0]),
         lacks=lacking(r.lacks, len(starts)) if r.lacks else None,
+        angle_step=angle_step(theta, linked),
+        dq_voltage=not r.has("d_a", "d_b", "d_c") and "inverter" not in r.lacks,
     )
     return settled(view)
 

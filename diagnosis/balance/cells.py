@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fluxproof.diagnosis.balance.misfit import misfit
+from fluxproof.diagnosis.balance.quantised_angle import beat_variance
 from fluxproof.diagnosis.balance.torque_order import torque_orders
 
 ORDERS_SUM = (0.0, 1.0, 2.0)
@@ -184,7 +185,8 @@ def noise(view, cells, residual) -> np.ndarray:
     """Standard deviation of every row (r,), from the differences of ``residual`` between neighbours in a dwell.
 
     Neighbours share the operating point, so that their difference is noise whatever the physics.  The variance of
-    each order and part is fitted as a + b omega^2, since current noise enters with L / T and with omega L.
+    each order and part is fitted as a + b omega^2, since current noise enters with L / T and with omega L.  Encoder
+    codes add noise at some speeds only (quantised_angle.py).
     """
     omega = np.abs(view.omega.mean(axis=1))
     top = max(float(omega.max()), 1e-9)
@@ -200,6 +202,10 @@ def noise(view, cells, residual) -> np.ndarray:
                 rows = np.flatnonzero(mine & (cells.order == order) & (cells.part == part))
                 if len(rows):
                     out[rows] = np.sqrt(_variance(residual[rows], cells.ok[rows], pair, shape))
+    for channel in {"u", "torque"} & set(cells.channel):
+        mine = cells.channel == channel
+        orders, which = np.unique(cells.order[mine], return_inverse=True)
+        out[mine] = np.sqrt(out[mine] ** 2 + beat_variance(view, channel, orders)[cells.block[mine], which])
     return out
 
 

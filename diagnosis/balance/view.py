@@ -61,6 +61,8 @@ class View:
     noise_gain: float = 1.0  # factor of a current correction on the current noise
     memo: dict = dataclasses.field(default_factory=dict)  # cache of the effects, shared by all views of a recording
 
+    angle_step: float = 0.0  # of the encoder's codes [rad]; 0: none is seen
+    dq_voltage: bool = False  # whether the drive turned the recorded voltage with the encoder's codes
     lacks: np.ndarray | None = None  # (b,) frozensets of words in effect.NEEDS that a block cannot show; None: nothing
 
     stacked = STACKED  # arrays over blocks that several recordings simply append
@@ -258,6 +260,7 @@ def joined_views(views: list[View]) -> View:
         ),
         run=np.concatenate([v.run + o for v, o in zip(views, offsets_run[:-1], strict=True)]),
         span_s=float(offsets_t[-1]),
+        angle_step=max(v.angle_step for v in views),
     )
 
 
