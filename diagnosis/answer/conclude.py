@@ -26,10 +26,11 @@ MOST_RIVALS = 5
 class Judgement:
     """What a posterior says: the verdict, names, what is told of the set, sizes of the misfit, and what is beside them.
 
-    told: effects that explain a part; channel: in which the explained share is counted; stray: a misfit outside the
-    orders of the balance; train, unseen: sizes on fitted and on other blocks.
+    posterior: over the sets that are possible; told: effects that explain a part; channel: in which the explained share
+    is counted; stray: a misfit outside the orders of the balance; train, unseen: sizes on fitted and on other blocks.
     """
 
+    posterior: object
     kind: str
     names: Names
     told: set[str]
@@ -42,8 +43,9 @@ class Judgement:
 
 def judge(posterior, held) -> Judgement:
     """The judgement on a posterior; held: (b,) blocks that were not fitted."""
-    setup, best = posterior.setup, posterior.best()
-    names = setup.call(names_of, posterior)
+    setup = posterior.setup
+    posterior = setup.call(shown, posterior, held)
+    names, best = setup.call(names_of, posterior), posterior.best()
     stray = setup.call(stray_of, posterior, held)
     if not stray and at_floor(Sizes(setup, setup.cells.y, setup.cells.y, ~held, measured_torque(setup))):
         # What only the shaft shows is in no size where nobody measured the torque: there the names decide.
@@ -58,7 +60,29 @@ def judge(posterior, held) -> Judgement:
     electrical = [n for n in told if not setup.effects[n].mechanical]
     share = unseen.share(channel) if electrical or (told and measured_torque(setup)) else None
     kind = kind_of(names, train, unseen, share, stray)
-    return Judgement(kind, names, told, channel, share, stray, train, unseen)
+    return Judgement(posterior, kind, names, told, channel, share, stray, train, unseen)
+
+
+def shown(posterior, held):
+    """The posterior without effects that would be named though the points that were not fitted fit better without."""
+    while True:
+        names = names_of(posterior)
+        told = names.said | {n for group in names.open for n in group}
+        idle = {n for n in names.said if not helps(posterior, n, told, held)}
+        if not idle:
+            return posterior
+        posterior = posterior.within({n for _, fit in names.fits for n in fit.names} - idle, idle)
+
+
+def helps(posterior, name, told, held) -> bool:
+    """Whether what ``told`` leaves of the held-out blocks, in units of the noise floor, grows without ``name``."""
+    best, setup = posterior.best(), posterior.setup
+    fewer = best.problem.fit([n for n in best.names if n != name])
+    left = []
+    for fit in (best, fewer):
+        sizes = Sizes(setup, setup.cells.y, fit.left(told & set(fit.names)), held, True)
+        left.append(sum((s.after / max(s.floor, 1e-300)) ** 2 for s in sizes.channels.values()))
+    return left[1] > left[0]
 
 
 def measured_torque(setup) -> bool:
@@ -68,7 +92,8 @@ def measured_torque(setup) -> bool:
 
 def conclude(posterior, held, progress=lambda text: None) -> Diagnosis:
     """The answer to a posterior; held: (b,) blocks that were not fitted."""
-    setup, best, j = posterior.setup, posterior.best(), judge(posterior, held)
+    j = judge(posterior, held)
+    posterior, setup, best = j.posterior, j.posterior.setup, j.posterior.best()
     names, told, channel, share, stray, train, unseen = (
         j.names, j.told, j.channel, j.share, j.stray, j.train, j.unseen
     )  # fmt: skip
@@ -107,6 +132,9 @@ def conclude(posterior, held, progress=lambda text: None) -> Diagnosis:
     for name in names.suspects:
         if answer.unknown_term is None or answer.unknown_term.meaning != setup.effects[name].title:
             answer.notes.append(f"Besides, it is {as_if(_described(best, name, held, unseen))}.")
+    for name in sorted(posterior.idle):
+        title = capital(setup.effects[name].title)
+        answer.notes.append(f"{title}: would fit, but points that were not fitted fit better without; not asserted.")
     why = " as the misfit is at the noise floor" if kind == "no_mismatch" else ""
     for name, p in sorted(names.maybe.items(), key=lambda entry: -entry[1])[:3]:
         title = capital(setup.effects[name].title)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import itertools
 
 import numpy as np
@@ -26,6 +27,8 @@ class Posterior:
         self.setup, self.progress = setup, progress
         self.fits = {}
         self.own = set()  # sets judged on their own linearisation
+        self.allowed = None  # effects that a set may contain; None: all
+        self.idle = frozenset()  # effects that were taken out (answer/conclude.py)
         self._search()
 
     def _search(self):
@@ -40,6 +43,10 @@ class Posterior:
             if fit.names not in self.own:
                 self._linearise(fit.names)
         self._grow(first, able)
+        self._refine()
+
+    def _refine(self):
+        """Search around the best set until it stands."""
         known = None
         for _ in range(ROUNDS):
             best = self.best()
@@ -55,13 +62,22 @@ class Posterior:
             self._near(known)
         self._settle()
 
+    def within(self, allowed, idle):
+        """The posterior over sets of the effects ``allowed``, without those ``idle``; this one stays as it is."""
+        out = copy.copy(self)
+        out.allowed, out.idle = frozenset(allowed), self.idle | frozenset(idle)
+        out.fits = {names: fit for names, fit in self.fits.items() if out.allowed.issuperset(names)}
+        out.own = self.own & set(out.fits)
+        out._refine()
+        return out
+
     def best(self):
         return max(self.fits.values(), key=lambda f: f.value)
 
     def _add(self, problem, sets, force=False):
         for names in sets:
             names = tuple(sorted(names))
-            if names in self.own and not force:
+            if (names in self.own and not force) or not (self.allowed is None or self.allowed.issuperset(names)):
                 continue
             fit = problem.fit(names)
             if not possible(fit):
