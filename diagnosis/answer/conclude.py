@@ -75,14 +75,14 @@ def shown(posterior, held):
 
 
 def helps(posterior, name, told, held) -> bool:
-    """Whether what ``told`` leaves of the held-out blocks, in units of the noise floor, grows without ``name``."""
+    """Whether ``told`` leaves no less of the held-out blocks, in units of the noise floor, without ``name``."""
     best, setup = posterior.best(), posterior.setup
     fewer = best.problem.fit([n for n in best.names if n != name])
     left = []
     for fit in (best, fewer):
         sizes = Sizes(setup, setup.cells.y, fit.left(told & set(fit.names)), held, True)
         left.append(sum((s.after / max(s.floor, 1e-300)) ** 2 for s in sizes.channels.values()))
-    return left[1] > left[0]
+    return left[1] >= left[0]
 
 
 def measured_torque(setup) -> bool:
