@@ -37,7 +37,8 @@ class Rows:
         self.cells = cells_of(view, self.effects.values(), self.projector)
         every = np.ones(len(self.cells.y), bool)
         rough = Fitter(self.cells, np.ones(len(every)), every).solve(everything(self.cells))
-        self.noise = noise(view, self.cells, rough.residual)
+        # Both bound the noise: the misfit also has what differs between neighbours, the rough fit what it fits wrongly.
+        self.noise = np.minimum(noise(view, self.cells, rough.residual), noise(view, self.cells, self.cells.y))
         self.smooth = smooth(view)
         self.smooth_rows = self.projector.rows(misfit(self.smooth))
 
