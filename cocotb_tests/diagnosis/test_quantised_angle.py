@@ -5,7 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fluxproof.diagnosis.balance.quantised_angle import HALF_WIDTH, angle_step, beat_variance
+from fluxproof.diagnosis.balance.quantised_angle import angle_step, beat_variance
+from fluxproof.diagnosis.balance.view import HALF_WIDTH
 
 PERIOD, PSI, ROWS, INERTIA, PAIRS = 1e-4, 0.1, 200, 2e-3, 3
 ORDERS = np.array([0.0, 1.0, -1.0, 2.0, 6.0])

@@ -17,6 +17,7 @@ from fluxproof.diagnosis.answer.sizes import Sizes, fit_of, with_stray
 from fluxproof.diagnosis.answer.unknown import sparse_term
 from fluxproof.diagnosis.answer.verdict import at_floor, kind_of
 from fluxproof.diagnosis.inference import constants as k
+from fluxproof.diagnosis.inference.posterior import Posterior
 from fluxproof.diagnosis.result import Diagnosis, UnknownTerm
 
 MOST_RIVALS = 5
@@ -30,7 +31,7 @@ class Judgement:
     is counted; stray: a misfit outside the orders of the balance; train, unseen: sizes on fitted and on other blocks.
     """
 
-    posterior: object
+    posterior: Posterior
     kind: str
     names: Names
     told: set[str]
@@ -80,7 +81,8 @@ def helps(posterior, name, told, held) -> bool:
     fewer = best.problem.fit([n for n in best.names if n != name])
     left = []
     for fit in (best, fewer):
-        sizes = Sizes(setup, setup.cells.y, fit.left(told & set(fit.names)), held, True)
+        # The torque counts without a transducer too: friction and cogging of a free shaft show nowhere else.
+        sizes = Sizes(setup, setup.cells.y, fit.left(told & set(fit.names)), held, measured_torque=True)
         left.append(sum((s.after / max(s.floor, 1e-300)) ** 2 for s in sizes.channels.values()))
     return left[1] >= left[0]
 

@@ -10,10 +10,10 @@ from __future__ import annotations
 import numpy as np
 
 from fluxproof.diagnosis.balance.curves import parabola
-from fluxproof.diagnosis.balance.quantised_angle import HALF_WIDTH, angle_step
+from fluxproof.diagnosis.balance.quantised_angle import angle_step
 from fluxproof.diagnosis.balance.settling import settled
 from fluxproof.diagnosis.balance.shaft import airgap, is_airgap, shaft_kind
-from fluxproof.diagnosis.balance.view import View, lacking
+from fluxproof.diagnosis.balance.view import HALF_WIDTH, View, lacking
 from fluxproof.diagnosis.recording import Recording, RecordingError
 
 BLOCK_ROWS = 200

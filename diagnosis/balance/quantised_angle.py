@@ -15,7 +15,8 @@ from __future__ import annotations
 
 import numpy as np
 
-HALF_WIDTH = 8  # of the moving average of the angle, over 2 HALF_WIDTH + 1 samples (blocks.py)
+from fluxproof.diagnosis.balance.view import HALF_WIDTH
+
 MOST = 50  # harmonics of the sawtooth; those above have less than 1 % of its power
 REGULAR, OF_A_STEP = 0.95, 0.1  # share of the second differences that are whole steps, within this part of one
 BLOCKS = 64  # at once, for the memory
