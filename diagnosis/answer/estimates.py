@@ -24,7 +24,7 @@ def common(fit) -> np.ndarray:
     patterns = (COMMON_U * u, 1j * COMMON_U * u, COMMON_DC * bus * along)
     rows = np.array([problem.condensed(setup.projector.rows({"u": p})) for p in patterns]).T
     p = problem.p
-    weight = 1.0 / (p.s2 + (fit.lam[p.group] * p.level) ** 2)
+    weight = 1.0 / fit.variance
     moved = fit.cov @ (p.x[:, fit.take].T @ (weight[:, None] * rows))
     return moved @ moved.T
 

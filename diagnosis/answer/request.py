@@ -126,7 +126,7 @@ def known_of(fit, columns) -> np.ndarray:
     problem = fit.problem
     p = problem.p
     place = {(n, key.lstrip("~")): j for j, (n, key) in enumerate(problem.keys)}
-    weight = 1.0 / np.sqrt(p.s2 + (fit.lam[p.group] * p.level) ** 2)
+    weight = 1.0 / np.sqrt(fit.variance)
     x = p.x * weight[:, None]
     length = np.linalg.norm(x, axis=0)
     out = np.zeros((len(columns),) * 2)

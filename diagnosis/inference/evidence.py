@@ -1,11 +1,13 @@
 """The marginal likelihood of a set of effects, with the sizes of the effects and of the discrepancy learnt.
 
-    y = X c + d + e,   e ~ N(0, s^2),   d ~ N(0, (lambda_g l)^2),   c_k ~ N(0, (a_e p_k)^2)
+    y = X c + d + q + e,   e ~ N(0, s^2),   d ~ N(0, (lambda_g l)^2),   q ~ N(0, (mu_g w)^2),   c_k ~ N(0, (a_e p_k)^2)
 
 a_e is the size of effect e in units of its floor of practical interest, with a log-uniform prior from 1 to the size at
 which a drive no longer runs; p_k is the coefficient that makes column k as large as the floor (of a curve: the share of
 it by which the curve may depart from the formula).  lambda_g >= 1 is the discrepancy of group g, with the prior
-1 / (1 + (lambda / k)^2).  Both are found by expectation maximisation; the log evidence is exact for them.
+1 / (1 + (lambda / k)^2).  w is the error that the curve of an effect may have at most, and mu_g <= 1 the share of it
+that is seen in group g: with all of it, a set would gain by a smaller effect with a smaller w.  All are found by
+expectation maximisation; the log evidence is exact for them.
 """
 
 from __future__ import annotations
@@ -17,15 +19,31 @@ STEPS = 7
 LEAST = 1.0  # in units of the balance's error
 SMALL, LARGE = 1e-200, 1e200  # range of a product of variances, each of which lies within 1e-100 and 1e100
 FACTORS = np.array([0.1, 0.35, 0.7, 1.0, 1.4, 3.0, 10.0])  # of the discrepancy, tried in every step
+SEEN = np.array([0.0, 0.03, 0.1, 0.2, 0.4, 0.7, 1.0])  # shares mu, tried in every step
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _share_seen(mu, lam, s2, level2, doubt2, own, e2, group, loads):
+    """Choose the share mu (groups,) of the curves' errors that is seen in each group, at the discrepancy lam."""
+    score = np.zeros((len(mu), len(SEEN)))
+    for i in range(len(s2)):
+        g = group[i]
+        if g != loads and doubt2[i] > 0.0:
+            known = s2[i] + own[i] + lam[g] ** 2 * level2[i]
+            for h in range(len(SEEN)):
+                u = known + SEEN[h] ** 2 * doubt2[i]
+                score[g, h] -= 0.5 * (e2[i] / u + np.log(u))
+    for g in range(len(mu)):
+        mu[g] = SEEN[np.argmax(score[g])]
 
 
 @numba.njit(cache=True, error_model="numpy")  # no division here is by zero, which need not be checked in every row
 def evidence(
-    x, y, s2, level, group, groups, loads, load, prior, owner, core, most, formula, scale, always, start
+    x, y, s2, level, doubt, group, groups, loads, load, prior, owner, core, most, formula, scale, always, start
 ):
-    """(log evidence, coefficients (k,), covariance (k, k), sizes (effects,), lambdas (groups,)).
+    """(log evidence, coefficients (k,), covariance (k, k), sizes (effects,), lambda and mu (groups,)).
 
-    x: (n, k) columns of the set; prior: (k,) p_k; owner: (k,) effect of a column; core: (k,)
+    x: (n, k) columns of the set; doubt: (n,) errors w of curves; prior: (k,) p_k; owner: (k,) effect of a column; core: (k,)
     bool, a column of the formula and not of the free curve; most: (effects,) largest size.
     loads, load: group whose rows may contain a load of the scale ``load`` each, -1: none.
     start: torque, in multiples of the smallest one, above which a row is first taken as loaded.
@@ -36,6 +54,7 @@ def evidence(
     effects = len(most)
     a = np.sqrt(most)
     lam = np.full(groups, 3.0)
+    mu = np.ones(groups)
     c = np.zeros(k)
     cov = np.zeros((k, k))
     columns = np.ascontiguousarray(x.T)  # rows one after the other in memory, for every loop over them
@@ -44,6 +63,8 @@ def evidence(
     loaded = np.zeros(n)
     weighted = np.zeros((k, n))
     level2 = level**2
+    doubt2 = doubt**2
+    doubtful = doubt2.max() > 0.0 if n else False
     e2 = np.zeros(n)
     part = np.zeros(n)
     squares = np.zeros((groups, len(FACTORS)))
@@ -60,7 +81,8 @@ def evidence(
         logdet = 0.0
         product = 1.0  # a logarithm of many factors at once, before the product leaves the range of a float
         for i in range(n):
-            v[i] = s2[i] + lam[group[i]] ** 2 * level2[i] + own[i] + loaded[i]
+            g = group[i]
+            v[i] = s2[i] + lam[g] ** 2 * level2[i] + mu[g] ** 2 * doubt2[i] + own[i] + loaded[i]
             power += y[i] * y[i] / v[i]
             product *= v[i]
             if not SMALL < product < LARGE:
@@ -138,7 +160,8 @@ def evidence(
             for h in range(len(FACTORS)):
                 squares[g, h] = max(lam[g] * FACTORS[h], LEAST) ** 2
         for i in range(n):
-            g, known = group[i], s2[i] + own[i]
+            g = group[i]
+            known = s2[i] + own[i] + mu[g] ** 2 * doubt2[i]
             if g == loads:
                 u = known + 9.0 * level2[i]
                 with_load = u + load * load
@@ -160,6 +183,8 @@ def evidence(
                 if total > best:
                     best, chosen = total, tried
             lam[g] = chosen if g != loads else 3.0
+        if doubtful:
+            _share_seen(mu, lam, s2, level2, doubt2, own, e2, group, loads)
     if loads >= 0:  # a drive is run without load at one of its operating points at least
         free = 0
         rows = 0
@@ -169,4 +194,4 @@ def evidence(
                 free += loaded[i] == 0.0
         if rows and not free:
             value -= np.log(always)
-    return value, c, cov, a, lam
+    return value, c, cov, a, lam, mu

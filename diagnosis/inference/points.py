@@ -26,7 +26,7 @@ VISITS = 16  # visits into which a recording of a single operating point is cut
 
 @dataclass
 class Points:
-    """y (n,), x (n, columns): means and contrasts; s2, level: (n,) noise variance and error of the balance.
+    """y (n,), x (n, columns): means and contrasts; s2, level, doubt: (n,) noise variance, error of the balance, of curves.
 
     group: (n,) int, index into ``groups``: [(channel, absolute order, whether contrasts)]; order, part, point: (n,).
     loads: index of the group whose rows contain a load that nobody recorded, or -1; load: its scale [Nm].
@@ -36,6 +36,7 @@ class Points:
     x: np.ndarray
     s2: np.ndarray
     level: np.ndarray
+    doubt: np.ndarray
     group: np.ndarray
     groups: list
     order: np.ndarray
@@ -107,11 +108,11 @@ class Grouping:
         self.group = group.ravel()
 
 
-def condense(grouping, y, x, sigma, level, load=0.0) -> Points:
+def condense(grouping, y, x, sigma, level, load=0.0, doubt=None) -> Points:
     """Points of the rows of a grouping.
 
     y: (r,); x: (r, columns); sigma, level: (r,), noise of a block and error of the balance; load: scale [Nm] of a load
-    that nobody recorded, 0: none is possible.
+    that nobody recorded, 0: none is possible; doubt: (r,) error of the effects' curves, None: none.
     """
     g = grouping
     rows, sort, starts, begin, place, contrast = g.rows, g.sort, g.starts, g.begin, g.place, g.contrast
@@ -132,12 +133,12 @@ def condense(grouping, y, x, sigma, level, load=0.0) -> Points:
         return out, mean
 
     out, _ = condensed(np.column_stack([y, x]))
-    _, levels = condensed(level[:, None])
+    _, levels = condensed(np.stack([level, np.zeros_like(level) if doubt is None else doubt], axis=1))
     s2, widen = np.zeros(n), np.ones(n)
     s2[contrast] = 1.0 / total[contrast] + 1.0 / earlier[contrast]
     s2[begin] = 1.0 / np.add.reduceat(total, begin)
     widen[contrast] = np.sqrt(1.0 + 1.0 / (np.arange(n) - begin[place])[contrast])
-    lev = levels[:, 0] * widen
+    levels *= widen[:, None]
     groups, group = g.groups, g.group
     loads = groups.index(("torque", 0.0, False)) if load and ("torque", 0.0, False) in groups else -1
     keep = np.ones(n, bool)
@@ -147,7 +148,8 @@ def condense(grouping, y, x, sigma, level, load=0.0) -> Points:
         out[keep, 0],
         out[keep, 1:],
         s2[keep],
-        lev[keep],
+        levels[keep, 0],
+        levels[keep, 1],
         group[keep],
         groups,
         g.names[keep, 1] * 1e-6,

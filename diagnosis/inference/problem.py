@@ -97,11 +97,9 @@ class Problem:
         self.keys = [(name, key) for name, columns in cells.columns.items() for key in columns]
         stack = [cells.columns[n][key] for n, key in self.keys]
         x = np.array(stack).T if stack else np.zeros((len(y), 0))
-        sigma = setup.noise
         if doubt is not None:
-            sigma = np.hypot(sigma, np.where(cells.channel == "u", doubt[cells.block], 0.0))
-        self.sigma = sigma
-        self.p = condense(setup.grouping, y, x, sigma, setup.level, setup.load)
+            doubt = np.where(cells.channel == "u", doubt[cells.block], 0.0)
+        self.p = condense(setup.grouping, y, x, setup.noise, setup.level, setup.load, doubt)
         self._priors()
 
     def _priors(self):
@@ -135,7 +133,7 @@ class Problem:
         return [n for n, mine in self.index.items() if mine]
 
     def likelihood(self, names: tuple):
-        """(columns of a sorted set, log evidence without priors, coefficients, covariance, sizes, lambdas)."""
+        """(columns of a sorted set, log evidence without priors, coefficients, covariance, sizes, lambda, mu)."""
         mine = [n for name in names for n in self.index[name]]
         owner = np.array([names.index(self.keys[n][0]) for n in mine], np.int64)
         most = np.array([self.most[n] for n in names], float)
@@ -146,7 +144,7 @@ class Problem:
         always = k.ALWAYS_LOADED if p.loads >= 0 else 1.0
         tried = [
             evidence(
-                x, p.y, p.s2, p.level, p.group, len(p.groups), p.loads, p.load,
+                x, p.y, p.s2, p.level, p.doubt, p.group, len(p.groups), p.loads, p.load,
                 self.prior[take], owner, core, most, k.FORMULA, k.DISCREPANCY, always, start,
             )
             for start in ((np.inf, 1.5, 3.0) if drags else (np.inf,))
@@ -156,22 +154,25 @@ class Problem:
     def fit(self, names):
         """The Fit of a set of effects on this problem."""
         names = tuple(sorted(names))
-        take, value, c, cov, a, lam = self.setup.call(Problem.likelihood, self, names)
+        take, value, c, cov, a, lam, mu = self.setup.call(Problem.likelihood, self, names)
         # Prior odds of every effect, and the prior of its size: even in the logarithm up to a typical size, the
         # geometric mean of the smallest of interest and the largest possible one, and falling beyond.
         value += sum(
             self.setup.odds(n) - np.log(np.log(self.most[n])) - np.log1p(x**2 / self.most[n])
             for n, x in zip(names, a, strict=True)
         )
-        return Fit(self, names, float(value), take, c, cov, a, lam)
+        return Fit(self, names, float(value), take, c, cov, a, lam, mu)
 
 
 class Fit:
     """A set of effects on a problem."""
 
-    def __init__(self, problem, names, value, take, c, cov, sizes, lam):
+    def __init__(self, problem, names, value, take, c, cov, sizes, lam, mu):
         self.problem, self.names, self.value = problem, names, value
         self.take, self.vector, self.cov, self.sizes, self.lam = take, c, cov, sizes, lam
+        p = problem.p
+        # (n,) of means and contrasts: noise, discrepancy and errors of the curves
+        self.variance = p.s2 + (lam[p.group] * p.level) ** 2 + (mu[p.group] * p.doubt) ** 2
         self.c = {name: {} for name in names}
         for n, v in zip(take, c, strict=True):
             name, key = problem.keys[n]
