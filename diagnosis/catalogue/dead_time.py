@@ -8,6 +8,7 @@ from fluxproof.diagnosis.result import Estimate
 # No width is so large that the curve would resemble a resistance over most of the current range.
 WIDTHS = (0.02, 0.12)  # of rated current: where the loss of the core has reached its full value
 KNOTS = (0.0, 0.005, 0.02, 0.05, 0.12)  # of rated current: ends of the bumps of the free curve
+DROP = 0.05  # of rated current: where device drops have reached their full value
 STILL_GROWS = (0.12, 0.3)  # of rated current: growth beyond this range counts as resistance
 RIPPLE = 1 / 32  # of u_dc T / L: a quarter of the largest current ripple
 TAILS = {"log": -np.log(KNOTS[-1]), "fade": 1.0 - KNOTS[-1]}  # of device_tails at rated current
@@ -43,6 +44,19 @@ def _at_full(c):
     return np.array([full_loss({key: 1.0}) for key in c])
 
 
+def _at(c, x):
+    """Weights of the coefficients in the loss at a current x up to the last knot, per unit of rated, in their order."""
+    shapes = {"v": lambda w: min(x / w, 1.0), "bump": lambda w: _bump(x, _around(w)), "drop": lambda w: min(x / DROP, 1)}
+    named = [key.partition("_") for key in c]
+    return np.array([shapes[kind](float(w or 0.0)) if kind in shapes else 0.0 for kind, _, w in named])
+
+
+def _around(knot):
+    """The knot with its neighbours."""
+    k = KNOTS.index(knot)
+    return KNOTS[k - 1 : k + 2]
+
+
 def _bump(x, knots):
     return np.sign(x) * np.interp(np.abs(x), knots, (0.0, 1.0, 0.0))
 
@@ -70,18 +84,22 @@ class DeadTime(Effect):
     def free(self, view):
         # Bumps instead of more ramps: a ramp between two others is nearly their mean and rejected as collinear.
         places = [k for k in range(1, len(KNOTS) - 1) if KNOTS[k] not in WIDTHS]
-        shapes = {f"bump_{KNOTS[k]:g}": lambda x, k=k: _bump(x, KNOTS[k - 1 : k + 2]) for k in places}
+        shapes = {f"bump_{KNOTS[k]:g}": lambda x, k=k: _bump(x, _around(KNOTS[k])) for k in places}
         shapes["growth"] = lambda x: np.sign(x) * np.interp(np.abs(x), STILL_GROWS, (0.0, 1.0))
         out = _following_bus(view, _leg_losses(view, shapes))
         out |= device_tails(view)
         if np.ptp(view.u_dc.mean(axis=1)) > 0.04 * view.nominal.inverter.dc_bus_v:
             # Device drops do not depend on the bus voltage.
-            out |= _leg_losses(view, {"drop": lambda x: np.clip(x / 0.05, -1.0, 1.0)})
+            out |= _leg_losses(view, {"drop": lambda x: np.clip(x / DROP, -1.0, 1.0)})
         return out
 
     def possible(self, c, covariance, nominal):
-        at_full = _at_full(c)
-        return bool(at_full @ list(c.values()) >= -DOUBT * np.sqrt(max(at_full @ covariance @ at_full, 0.0)))
+        """A leg loses voltage at every current: noise around zero current would also fit a gain there."""
+        values = np.array(list(c.values()))
+        for weights in (_at_full(c), *(_at(c, x) for x in KNOTS[1:])):
+            if weights @ values < -DOUBT * np.sqrt(max(weights @ covariance @ weights, 0.0)):
+                return False
+        return True
 
     def late_s(self, c, nominal):
         """One edge of every pulse is late by the whole dead time, its middle by half."""
