@@ -37,8 +37,6 @@ class Saturation(FluxEffect):
 
     def free_psi(self, view):
         return {
-            "q_1": _q(view, lambda y: y),
-            "d_1": _d(view, lambda x: x),
             "q_2": _q(view, lambda y: y * np.abs(y)),
             "q_5": _q(view, lambda y: y**5),
             "d_2": _d(view, lambda x: x**2),
