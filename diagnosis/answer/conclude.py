@@ -54,13 +54,13 @@ def judge(posterior, held) -> Judgement:
         names = names.withheld(frozenset() if measured_torque(setup) else frozenset(shaft))
     likely = {n for n, p in names.maybe.items() if p >= k.LIKELY}
     told = (names.said | {n for group in names.open for n in group} | likely) & set(best.names) - set(names.suspects)
-    before, after = setup.cells.y, best.left(told)
+    before, after = setup.cells.y, left_by(best, told)
     train = Sizes(setup, before, after, ~held, measured_torque(setup))
     unseen = Sizes(setup, before, after, held, measured_torque(setup))
     channel = train.primary()
     electrical = [n for n in told if not setup.effects[n].mechanical]
     share = unseen.share(channel) if electrical or (told and measured_torque(setup)) else None
-    kind = kind_of(names, train, unseen, share, stray)
+    kind = kind_of(names, train, unseen, channel, share, stray)
     return Judgement(posterior, kind, names, told, channel, share, stray, train, unseen)
 
 
@@ -87,6 +87,11 @@ def helps(posterior, name, told, held) -> bool:
     return left[1] >= left[0]
 
 
+def left_by(fit, told):
+    """(r,) the misfit without what the effects ``told`` explain; without any, as it was recorded."""
+    return fit.left(told) if told else fit.problem.setup.cells.y
+
+
 def measured_torque(setup) -> bool:
     """Whether a transducer measures it; otherwise it follows from the angle, whose resolution is not the shaft's."""
     return setup.load == 0.0
@@ -100,7 +105,7 @@ def conclude(posterior, held, progress=lambda text: None) -> Diagnosis:
         j.names, j.told, j.channel, j.share, j.stray, j.train, j.unseen
     )  # fmt: skip
     view, cells, before, measured = setup.view, setup.cells, setup.cells.y, measured_torque(setup)
-    kind, after = j.kind, best.left(told)
+    kind, after = j.kind, left_by(best, told)
     fit = fit_of(train, unseen)
     answer = Diagnosis(kind, "", location=locate(view, cells, setup.noise), fit=fit, search=posterior)
     answer.effects = named_effects(names, posterior, _shares(posterior, names, told, channel, held, measured))

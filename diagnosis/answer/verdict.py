@@ -5,16 +5,20 @@ from __future__ import annotations
 from fluxproof.diagnosis.inference import constants as k
 
 
-def kind_of(names, train, held, share, stray) -> str:
-    """The verdict.  names: Names; train, held: Sizes; share: explained share; stray: a misfit outside the orders."""
+def kind_of(names, train, held, channel, share, stray) -> str:
+    """The verdict.
+
+    names: Names; train, held: Sizes; channel, share: where the explained share is counted, and what it is; stray: a
+    misfit outside the orders.
+    """
     if not names.confidence and not names.open:
         if names.suspects:
             return "unexplained"
         quiet = all(s.before <= s.above(k.FLOOR) for s in train.channels.values())
         return "no_mismatch" if quiet and not stray and not standing_out(train) else "unexplained"
-    sizes = [s for c, s in held.channels.items()]
-    at_floor = all(s.after <= s.above(k.FLOOR) for s in sizes)
-    whole = at_floor or (share is not None and share >= 1.0 - k.SMALL)
+    shares = {c: held.share(c) for c in held.channels} | {channel: share}
+    left = [c for c, s in held.channels.items() if s.after > s.above(k.FLOOR)]
+    whole = all(shares[c] is not None and shares[c] >= 1.0 - k.SMALL for c in left)
     if not whole or stray:
         return "partly_explained" if share is not None and share >= k.HALF else "unexplained"
     return "ambiguous" if names.open else "explained"

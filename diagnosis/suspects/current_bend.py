@@ -1,0 +1,77 @@
+"""Current sensors that are no longer linear towards full scale, as behind a core or an amplifier that saturates."""
+
+import numpy as np
+
+from fluxproof.diagnosis.catalogue.current_gain import PATTERNS
+from fluxproof.diagnosis.effects.effect import Effect, Parameter, current_error
+from fluxproof.diagnosis.result import Estimate
+
+PHASES = {**PATTERNS, "common": (1.0, 1.0, 1.0)}
+
+
+def _errors(view):
+    """{key: (b, m+1, 3)} errors of the phase currents [A] per unit of the coefficients."""
+    x = view.phases(view.i) / view.machine.rated_current_a
+    shapes = {"cubic": x**3, "quintic": x**5}
+    return {
+        f"{shape}_{name}": view.machine.rated_current_a * values * np.array(weights)
+        for shape, values in shapes.items()
+        for name, weights in PHASES.items()
+    }
+
+
+class CurrentBend(Effect):
+    def _columns(self, view, shape):
+        out = {}
+        for key, error in _errors(view).items():
+            if key.startswith(shape):
+                out[key] = current_error(view, view.from_phases(error))
+                if view.has_sum:
+                    total = error.sum(axis=2)
+                    out[key]["sum"] = 0.5 * (total[:, 1:] + total[:, :-1])
+        return out
+
+    def core(self, view):
+        return self._columns(view, "cubic")
+
+    def free(self, view):
+        return self._columns(view, "quintic")
+
+    def floor(self, nominal):
+        return 0.005
+
+    def ceiling(self, nominal):
+        return 0.4
+
+    @staticmethod
+    def _phases(c):
+        """(3,) relative error of each phase at rated current."""
+        return sum(value * np.array(PHASES[key.partition("_")[2]]) for key, value in c.items())
+
+    def size(self, c, nominal):
+        return float(np.max(np.abs(self._phases(c))))
+
+    def corrected(self, view, c):
+        return view.without_current(sum(c.get(key, 0.0) * error for key, error in _errors(view).items()))
+
+    def estimates(self, c, covariance, nominal):
+        phases = self._phases(c)
+        worst = int(np.argmax(np.abs(phases)))
+        weights = np.array([PHASES[key.partition("_")[2]][worst] for key in c])
+        spread = float(np.sqrt(max(weights @ covariance @ weights, 0.0)))
+        return {"bend": Estimate(float(phases[worst]), spread, "1")}
+
+
+EFFECT = CurrentBend(
+    name="current_bend",
+    title="the current sensors bent towards full scale, as behind a core that saturates",
+    equation="i_measured = i + b i^3, b of each phase",
+    signature="phase currents whose sum follows the third power of the current; order 0 as of a saturation, and order 6",
+    confounders=("saturation", "current_scale", "current_gain"),
+    separated_by="a second current sensor at full scale; the sum of three measured currents",
+    parameters=(Parameter("bend", "1", "relative error at rated current of the worst phase", "bend"),),
+    corrects=True,
+    named=False,
+    shows_at=(0.0, 2.0, 6.0),
+    needs=("harmonics", "current"),
+)

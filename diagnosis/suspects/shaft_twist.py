@@ -1,0 +1,41 @@
+"""An angle sensor that turns against the rotor with the torque, as behind a soft shaft or coupling."""
+
+import numpy as np
+
+from fluxproof.diagnosis.effects.effect import Effect, Parameter, angle_error, one, rated_torque, sigma
+
+
+def _load(view):
+    """Air-gap torque at the samples over the rated one, (b, m+1)."""
+    return 1.5 * view.machine.pole_pairs * (np.conj(view.psi) * view.i).imag / rated_torque(view.nominal)
+
+
+class ShaftTwist(Effect):
+    def core(self, view):
+        return {"twist": angle_error(view, _load(view))}
+
+    def floor(self, nominal):
+        return 0.004
+
+    def ceiling(self, nominal):
+        return 0.5
+
+    def corrected(self, view, c):
+        return view.turned(c["twist"] * _load(view))
+
+    def estimates(self, c, covariance, nominal):
+        return one("twist_rad", "rad", c["twist"], sigma(covariance))
+
+
+EFFECT = ShaftTwist(
+    name="shaft_twist",
+    title="the angle sensor turned against the rotor with the torque, as behind a soft shaft",
+    equation="theta_measured = theta_e + k T",
+    signature="order 0: omega psi_m k T on the d axis, odd in i_q: as an error of L_q and a cross-saturation together",
+    confounders=("inductance_q", "cross_saturation", "encoder_offset"),
+    separated_by="i_d of both signs at one torque; the angle against a second sensor, loaded and unloaded",
+    parameters=(Parameter("twist_rad", "rad", "electrical, at rated torque", "twist"),),
+    corrects=True,
+    named=False,
+    needs=("angle",),
+)
