@@ -1,12 +1,17 @@
-"""Iron loss: a current j omega psi / R_fe in parallel with the magnetising current; R_fe may depend on frequency."""
+"""Iron loss: a current j omega psi / R_fe in parallel with the magnetising current; R_fe may depend on frequency.
+
+The loss current may also lag by a time, as eddy currents do, and then weakens the flux in proportion to omega^2.
+"""
 
 import numpy as np
 
-from fluxproof.diagnosis.effects.effect import Effect, Parameter, one, torque_of
+from fluxproof.diagnosis.effects.effect import DOUBT, Effect, Parameter, one, sigma, torque_of
+
+LAG_S = 1e-4  # time in which eddy currents build up in a lamination of 0.3 mm
 
 
 def _speeds(view):
-    """Frequency functions (b, m+1) [rad/s] of the loss current: linear, saturating, squared."""
+    """Frequency functions (b, m+1) [rad/s] of the loss current: linear, saturating, squared, its lag."""
     top = max(view.top_speed, 1.0)
     # A sign function would turn the noise of the speed at standstill into the full hysteresis current.
     steady = np.broadcast_to(view.omega.mean(axis=1, keepdims=True), view.omega.shape)
@@ -14,7 +19,13 @@ def _speeds(view):
         "g_fe": view.omega,
         "g_hysteresis": steady / np.sqrt((steady / top) ** 2 + 0.02**2),
         "g_eddy": view.omega * np.abs(view.omega) / top,
+        "g_lag": -1j * view.omega**2 * LAG_S,
     }
+
+
+def _conducting(c):
+    """(k,) 1 for the coefficients that are conductances, 0 for the lag, in their order."""
+    return np.array([float(key != "g_lag") for key in c])
 
 
 def _loss(view, omega):
@@ -30,7 +41,13 @@ class IronLoss(Effect):
         return {key: _loss(view, speeds[key]) for key in ("g_fe", "g_hysteresis")}
 
     def free(self, view):
-        return {"g_eddy": _loss(view, _speeds(view)["g_eddy"])}
+        speeds = _speeds(view)
+        return {key: _loss(view, speeds[key]) for key in ("g_eddy", "g_lag")}
+
+    def possible(self, c, covariance, nominal):
+        """Iron consumes power, and a current follows its cause."""
+        late = list(c).index("g_lag") if "g_lag" in c else None
+        return self._conductance(c) >= 0.0 and (late is None or c["g_lag"] >= -DOUBT * sigma(covariance, late))
 
     def lost_flux(self, view, c):
         """Missing flux linkage (b, m+1) complex dq [Wb]: the loss current does not magnetise.
@@ -55,13 +72,17 @@ class IronLoss(Effect):
     def _rated_emf(nominal):
         return nominal.inverter.dc_bus_v / np.sqrt(3)
 
+    @staticmethod
+    def _conductance(c):
+        """At the highest recorded speed [S]."""
+        return float(_conducting(c) @ list(c.values()))
+
     def size(self, c, nominal):
-        return abs(sum(c.values()))
+        return abs(self._conductance(c))
 
     def estimates(self, c, covariance, nominal):
-        g = sum(c.values())
-        every = np.ones(len(c))
-        spread = float(np.sqrt(max(every @ covariance @ every, 0.0)))
+        g, weights = self._conductance(c), _conducting(c)
+        spread = float(np.sqrt(max(weights @ covariance @ weights, 0.0)))
         g = g if abs(g) > 1e-12 else 1e-12
         return one("iron_resistance_ohm", "ohm", 1.0 / g, spread / g**2)
 
@@ -72,7 +93,7 @@ class IronLoss(Effect):
         return {**_loss(view, g * view.omega), "u": view.flux(self.lost_flux(view, {"g_fe": g}))}
 
     def plant(self, c, nominal):
-        return {"machine.iron_conductance_s": max(0.0, sum(c.values()))}
+        return {"machine.iron_conductance_s": max(0.0, self._conductance(c))}
 
 
 EFFECT = IronLoss(
