@@ -65,11 +65,11 @@ def judge(posterior, held) -> Judgement:
 
 
 def shown(posterior, held):
-    """The posterior without effects that would be named though the points that were not fitted fit better without."""
+    """The posterior without effects that would be told though the points that were not fitted fit better without."""
     while True:
         names = names_of(posterior)
         told = names.said | {n for group in names.open for n in group}
-        idle = {n for n in names.said if not helps(posterior, n, told, held)}
+        idle = {n for n in told & set(posterior.best().names) if not helps(posterior, n, told, held)}
         if not idle:
             return posterior
         posterior = posterior.within({n for _, fit in names.fits for n in fit.names} - idle, idle)

@@ -13,6 +13,7 @@ import numpy as np
 
 from fluxproof.diagnosis.balance.cells import voltage_level
 from fluxproof.diagnosis.balance.misfit import misfit
+from fluxproof.diagnosis.balance.quantised_angle import beat_spectrum
 from fluxproof.diagnosis.effects.effect import rated_torque
 from fluxproof.diagnosis.inference import constants as k
 
@@ -121,11 +122,15 @@ def stray_swing(view, residual, floor) -> Stray | None:
     if m < 100:
         return None
     taper = 1.0 - np.cos(2 * np.pi * (np.arange(m) + 0.5) / m)
-    loud = level > 0.4 * level.max()
     u = view.to_dq(view.u[:, 1:-1]).mean(axis=1, keepdims=True)
-    along = ((residual - residual.mean(axis=1, keepdims=True)) * np.conj(u / np.abs(u).clip(1e-9))).real[loud]
+    along = ((residual - residual.mean(axis=1, keepdims=True)) * np.conj(u / np.abs(u).clip(1e-9))).real
     spectrum = np.abs(np.fft.rfft(along * taper, axis=1) / m) ** 2
-    mean = spectrum.mean(axis=0)
+    # Where the codes of an encoder beat with the sampling at such a frequency, nothing else is seen.
+    beats = beat_spectrum(view, np.arange(1, 5)).max(axis=1) > np.median(spectrum[:, 8:20], axis=1)
+    loud = (level > 0.4 * level.max()) & ~beats
+    if not loud.any():
+        return None
+    mean = spectrum[loud].mean(axis=0)
     low, around = mean[1:5].max(), np.median(mean[8:20])
     amplitude = 2.0 * float(np.sqrt(mean[1:5].sum() / 1.5))
     share = amplitude / float(np.sqrt(np.mean(level[loud] ** 2)))

@@ -43,20 +43,35 @@ def beat_variance(view, channel, orders) -> np.ndarray:
 
     channel: "u" [V^2] or "torque" [(Nm)^2].
     """
-    out = np.zeros((len(view.omega), len(orders)))
+    places = _turn(view)[:, None] * orders / (2 * np.pi)
+    return _beats(view, {"u": _voltage, "torque": _torque}[channel], places, tapered=channel == "torque")
+
+
+def beat_spectrum(view, bins) -> np.ndarray:
+    """Variance [V^2] of the misfit in dq by the beat, in bins of a block's tapered spectrum, (b, k); bins: (k,)."""
+    places = np.tile(bins / view.u_dc.shape[1], (len(view.omega), 1))
+    return _beats(view, _voltage, places, tapered=True)
+
+
+def _turn(view):
+    """(b,) [rad per sample]."""
+    return view.omega.mean(axis=1) * view.sample_time_s
+
+
+def _beats(view, response, places, tapered):
+    """(b, h) variance by the beat at places (b, h), in cycles per sample."""
+    out = np.zeros(places.shape)
     if not view.angle_step:
         return out
-    response = {"u": _voltage, "torque": _torque}[channel]
-    m = np.arange(1, MOST + 1)
-    turn = view.omega.mean(axis=1) * view.sample_time_s  # rad per sample
+    m, turn = np.arange(1, MOST + 1), _turn(view)
     for at in range(0, len(out), BLOCKS):
         part = slice(at, at + BLOCKS)
         cycles = m * (turn[part, None] / view.angle_step)
         cycles -= np.round(cycles)
         for sign in (1.0, -1.0):
             size = response(view, part, turn[part, None], sign * cycles) * view.angle_step / (2 * np.pi * m)
-            away = sign * cycles[:, :, None] - turn[part, None, None] * orders / (2 * np.pi)
-            seen = _window(away, view.u_dc.shape[1], tapered=channel == "torque")
+            away = sign * cycles[:, :, None] - places[part, None, :]
+            seen = _window(away, view.u_dc.shape[1], tapered)
             out[part] += 0.5 * np.sum((size[:, :, None] * seen) ** 2, axis=1)
     return out
 
