@@ -6,6 +6,14 @@ from fluxproof.diagnosis.balance.curves import COURSE_KNOTS, course, courses, kn
 from fluxproof.diagnosis.catalogue.resistance import to_true_resistance
 from fluxproof.diagnosis.effects.effect import Effect, Parameter, one, sigma, voltage
 
+BEHIND = 0.05  # of the recording: by how much a sensor usually is behind the winding
+
+
+def _later(view):
+    """(b,) by how much the sensor reads more a little later [K]."""
+    order = np.argsort(view.course, kind="stable")
+    return np.interp(view.course + BEHIND, view.course[order], view.temp[order]) - view.temp
+
 
 def _change(c, by_alpha):
     """Largest change since the start [ohm]; by_alpha: that of a coefficient of 1/K [ohm K]."""
@@ -22,10 +30,14 @@ class ResistanceTemperature(Effect):
         return {"drift": voltage(view.i_mid * course(view))}
 
     def free(self, view):
-        return {f"course_{k}": voltage(view.i_mid * c[:, None]) for k, c in enumerate(courses(view)[:-1])}
+        out = {f"course_{k}": voltage(view.i_mid * c[:, None]) for k, c in enumerate(courses(view)[:-1])}
+        if known_temperature(view):
+            out["ahead"] = voltage(view.i_mid * view.machine.resistance_ohm * _later(view)[:, None])
+        return out
 
     def curve_scale(self, key, cores, nominal):
-        return self.floor(nominal)  # of the course [ohm], also if the formula has a temperature coefficient
+        # Of the course [ohm], also if the formula has a temperature coefficient.
+        return cores["alpha"] / self.curve if key == "ahead" else self.floor(nominal)
 
     def floor(self, nominal):
         return 0.015 * nominal.machine.resistance_ohm
