@@ -46,7 +46,11 @@ def _at_full(c):
 
 def _at(c, x):
     """Weights of the coefficients in the loss at a current x up to the last knot, per unit of rated, in their order."""
-    shapes = {"v": lambda w: min(x / w, 1.0), "bump": lambda w: _bump(x, _around(w)), "drop": lambda w: min(x / DROP, 1)}
+    shapes = {
+        "v": lambda w: min(x / w, 1.0),
+        "bump": lambda w: _bump(x, _around(w)),
+        "drop": lambda w: min(x / DROP, 1.0),
+    }
     named = [key.partition("_") for key in c]
     return np.array([shapes[kind](float(w or 0.0)) if kind in shapes else 0.0 for kind, _, w in named])
 

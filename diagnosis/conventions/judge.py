@@ -203,7 +203,8 @@ class Terms:
     def _evidence(p, y, scale) -> float:
         none, nothing = np.zeros(0), np.zeros(0, np.int64)
         return evidence(
-            np.zeros((len(y), 0)), y, p.s2 * scale**2, p.level * scale, p.doubt * scale, p.group, len(p.groups), p.loads, p.load,
+            np.zeros((len(y), 0)), y, p.s2 * scale**2, p.level * scale, p.doubt * scale,
+            p.group, len(p.groups), p.loads, p.load,
             none, nothing, np.zeros(0, bool), none,
             k.FORMULA, k.DISCREPANCY, k.ALWAYS_LOADED if p.loads >= 0 else 1.0, np.inf,
         )[0]  # fmt: skip

@@ -43,8 +43,8 @@ def evidence(
 ):
     """(log evidence, coefficients (k,), covariance (k, k), sizes (effects,), lambda and mu (groups,)).
 
-    x: (n, k) columns of the set; doubt: (n,) errors w of curves; prior: (k,) p_k; owner: (k,) effect of a column; core: (k,)
-    bool, a column of the formula and not of the free curve; most: (effects,) largest size.
+    x: (n, k) columns of the set; doubt: (n,) errors w of curves; prior: (k,) p_k; owner: (k,) effect of a column;
+    core: (k,) bool, a column of the formula and not of the free curve; most: (effects,) largest size.
     loads, load: group whose rows may contain a load of the scale ``load`` each, -1: none.
     start: torque, in multiples of the smallest one, above which a row is first taken as loaded.
     always: odds against a load at every operating point.

@@ -26,8 +26,9 @@ VISITS = 16  # visits into which a recording of a single operating point is cut
 
 @dataclass
 class Points:
-    """y (n,), x (n, columns): means and contrasts; s2, level, doubt: (n,) noise variance, error of the balance, of curves.
+    """y (n,), x (n, columns): means and contrasts.
 
+    s2, level, doubt: (n,) variance of the noise, error of the balance, error of curves.
     group: (n,) int, index into ``groups``: [(channel, absolute order, whether contrasts)]; order, part, point: (n,).
     loads: index of the group whose rows contain a load that nobody recorded, or -1; load: its scale [Nm].
     """

@@ -66,7 +66,7 @@ EFFECT = CurrentBend(
     name="current_bend",
     title="the current sensors bent towards full scale, as behind a core that saturates",
     equation="i_measured = i + b i^3, b of each phase",
-    signature="phase currents whose sum follows the third power of the current; order 0 as of a saturation, and order 6",
+    signature="a sum of the phase currents that follows their third power; order 0 as of a saturation, and order 6",
     confounders=("saturation", "current_scale", "current_gain"),
     separated_by="a second current sensor at full scale; the sum of three measured currents",
     parameters=(Parameter("bend", "1", "relative error at rated current of the worst phase", "bend"),),
