@@ -19,6 +19,7 @@ from fluxproof.diagnosis import result
 
 BROWSERS = "chromium", "chromium-headless-shell", "chromium-browser", "google-chrome"
 CHROMIUM = next(filter(None, map(shutil.which, BROWSERS)), None)
+ATTEMPTS = 3  # on a busy machine the virtual time may run out before a picture is decoded
 PROBE = """<body style="margin:0"><pre id="seen"></pre><iframe id="f" style="border:0;width:%dpx;height:800px"></iframe>
 <script>
 const frame = document.getElementById("f"), say = v => document.getElementById("seen").textContent = JSON.stringify(v);
@@ -64,10 +65,12 @@ def seen(html: str, folder, *flags: str, width: int = 400) -> tuple[dict, str]:
         "--enable-logging=stderr",
         "--virtual-time-budget=20000",
     ]
-    done = subprocess.run(
-        [*browser, "--dump-dom", page.as_uri()], capture_output=True, text=True, timeout=120, encoding="utf-8"
-    )
-    found = re.search(r'<pre id="seen">(.+?)</pre>', done.stdout, re.DOTALL)
+    for _ in range(ATTEMPTS):
+        done = subprocess.run(
+            [*browser, "--dump-dom", page.as_uri()], capture_output=True, text=True, timeout=120, encoding="utf-8"
+        )
+        if found := re.search(r'<pre id="seen">(.+?)</pre>', done.stdout, re.DOTALL):
+            break
     assert found, done.stderr[-2000:]
     return json.loads(unescape(found[1])), "\n".join(s for s in done.stderr.splitlines() if "CONSOLE" in s)
 

@@ -37,7 +37,7 @@ class ResistanceTemperature(Effect):
 
     def curve_scale(self, key, cores, nominal):
         # Of the course [ohm], also if the formula has a temperature coefficient.
-        return cores["alpha"] / self.curve if key == "ahead" else self.floor(nominal)
+        return cores["alpha"] if key == "ahead" else self.floor(nominal)
 
     def floor(self, nominal):
         return 0.015 * nominal.machine.resistance_ohm
