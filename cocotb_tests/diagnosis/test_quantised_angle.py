@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fluxproof.diagnosis.balance.quantised_angle import angle_step, beat_variance
+from fluxproof.diagnosis.balance.quantised_angle import angle_step, beat_spectrum, beat_variance
 from fluxproof.diagnosis.balance.view import HALF_WIDTH
 
 PERIOD, PSI, ROWS, INERTIA, PAIRS = 1e-4, 0.1, 200, 2e-3, 3
@@ -34,6 +34,16 @@ def error_of(turn, phase):
     return STEP * np.floor(true / STEP) - true + STEP / 2
 
 
+def smoothed(error):
+    """As the angle of a view is."""
+    return np.convolve(error, np.full(2 * HALF_WIDTH + 1, 1 / (2 * HALF_WIDTH + 1)), "valid")[1:-1]
+
+
+def left_in_voltage(turn, turned, smooth):
+    """(ROWS,) [V] what an error of the angle leaves: ``turned`` of the voltage's, ``smooth`` of the flux's."""
+    return PSI * (turn / PERIOD * 0.5 * (turned[1:] + turned[:-1]) - 1j * np.diff(smooth) / PERIOD)
+
+
 def waves(turn):
     return np.exp(-1j * ORDERS[:, None] * turn * np.arange(ROWS))
 
@@ -41,10 +51,9 @@ def waves(turn):
 def voltage(turn, phase, dq_voltage):
     """(h,) what the codes leave of the voltage balance."""
     error = error_of(turn, phase)
-    smooth = np.convolve(error, np.ones(2 * HALF_WIDTH + 1) / (2 * HALF_WIDTH + 1), "valid")[1:-1]
+    smooth = smoothed(error)
     turned = error[MARGIN:-MARGIN] if dq_voltage else smooth
-    middle, slope = 0.5 * (turned[1:] + turned[:-1]), np.diff(smooth) / PERIOD
-    return waves(turn) @ (PSI * (turn / PERIOD * middle - 1j * slope)) / ROWS
+    return waves(turn) @ left_in_voltage(turn, turned, smooth) / ROWS
 
 
 def torque(turn, phase):
@@ -68,6 +77,18 @@ def test_the_beat_in_the_voltage(dq_voltage, beat):
     simulated = variance([voltage(turn, phase, dq_voltage) for phase in phases])
     predicted = beat_variance(view_of(turn, dq_voltage), "u", ORDERS)[0]
     assert np.allclose(predicted, simulated, rtol=0.15, atol=0.02 * simulated.max())
+
+
+def test_the_beat_in_the_spectrum():
+    """Half a code per sample more than a whole number: the second harmonic of the sawtooth beats slowly."""
+    turn, taper = (1.5 + 0.0075) * STEP, 1.0 - np.cos(2 * np.pi * (np.arange(ROWS) + 0.5) / ROWS)
+    bins = np.arange(6)
+    wave = taper * np.exp(-2j * np.pi * bins[:, None] * np.arange(ROWS) / ROWS)
+    errors = [smoothed(error_of(turn, phase)) for phase in STEP * np.random.default_rng(8).random(500)]
+    simulated = variance([wave @ left_in_voltage(turn, e, e) / ROWS for e in errors])
+    predicted = beat_spectrum(view_of(turn), bins)[0]
+    assert np.argmax(predicted) == 3
+    assert np.allclose(predicted, simulated, rtol=0.15, atol=0.02 * predicted.max())
 
 
 @pytest.mark.parametrize("beat", [0.01, 0.11, 0.3])

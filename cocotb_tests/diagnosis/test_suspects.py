@@ -72,6 +72,25 @@ def test_offsets_of_the_sensors_are_named():
     assert [e.name for e in answer.effects] == ["current_offset"] and answer.verdict == "explained"
 
 
+def test_sensors_that_bend_are_no_scale_and_no_saturation():
+    table, rated = dict(columns(GRID)), DRIVE.machine.rated_current_a
+    for name in ("i_a", "i_b", "i_c"):
+        table[name] = table[name] * (1.0 - 0.05 * (table[name] / rated) ** 2)
+    answer = answer_of(table)
+    assert answer.verdict == "unexplained" and not answer.effects and "full scale" in answer.sentence
+    assert answer.unknown_term.value == pytest.approx(-0.05, abs=0.01)
+
+
+def test_a_soft_shaft_is_no_inductance():
+    table = dict(columns(GRID))
+    i_q = (table["i_a"] * -np.sin(table["theta_e"]) + (table["i_b"] - table["i_c"]) / 3**0.5 * np.cos(table["theta_e"]))
+    smooth = np.convolve(np.pad(i_q, 20, mode="edge"), np.full(41, 1 / 41), "valid")
+    table["theta_e"] = (table["theta_e"] + 0.05 * smooth / DRIVE.machine.rated_current_a) % (2 * np.pi)
+    answer = answer_of(table)
+    assert answer.verdict == "unexplained" and not answer.effects and "soft shaft" in answer.sentence
+    assert answer.unknown_term.value == pytest.approx(0.05, rel=0.1)
+
+
 def test_suspects_are_not_in_the_catalogue():
     assert SUSPECTS and not set(SUSPECTS) & set(CATALOGUE)
     assert not any(e.named for e in SUSPECTS.values()) and all(e.named for e in CATALOGUE.values())
