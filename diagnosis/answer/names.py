@@ -98,9 +98,13 @@ def credibility(fit, name) -> float:
     functionals = np.array([2.0 if order == 0 else 4.0 for _, order, _ in p.groups])
     # A discrepancy within the error of the balance is what every recording has.
     left = np.where(fit.lam > k.USUAL, fit.lam**2 - 1.0, 0.0) * level2 * functionals
-    take = [j for j, n in enumerate(fit.take) if fit.problem.keys[n][0] == name]
-    rows = p.x[:, fit.take[take]] @ fit.vector[take]
-    power = np.bincount(p.group, rows**2, minlength=len(p.groups)) / count * functionals
+    owned = np.array([fit.problem.keys[n][0] == name for n in fit.take], bool)
+    power, others = (
+        np.bincount(p.group, (p.x[:, fit.take[take]] @ fit.vector[take]) ** 2, minlength=len(p.groups)) / count
+        * functionals for take in (owned, ~owned)
+    )  # fmt: skip
+    # What is left where other effects explain much is rather an error of theirs.
+    beside = left * left / np.maximum(left + others, 1e-300)
     best = (0.0, 1.0)
     for part in {(channel, contrast) for channel, _, contrast in p.groups}:
         mine = np.array([(channel, contrast) == part for channel, _, contrast in p.groups])
@@ -109,7 +113,7 @@ def credibility(fit, name) -> float:
             continue
         own = mine & (power >= k.LIVES * total)
         elsewhere = 0.0 if part[0] == "torque" else k.ELSEWHERE  # an angle's quantisation is no physics of the shaft
-        remains = left[own].sum() + elsewhere * left[mine & ~own].sum()
+        remains = left[own].sum() + elsewhere * beside[mine & ~own].sum()
         strength = total / level2[mine].mean()
         if strength > best[0]:
             best = (strength, 1.0 - np.exp(-total / (2.0 * k.IMITATION**2 * remains)) if remains > 0.0 else 1.0)
