@@ -96,8 +96,9 @@ def credibility(fit, name) -> float:
     count = np.maximum(np.bincount(p.group, minlength=len(p.groups)), 1)
     level2 = np.bincount(p.group, p.level**2, minlength=len(p.groups)) / count
     functionals = np.array([2.0 if order == 0 else 4.0 for _, order, _ in p.groups])
-    # A discrepancy within the error of the balance is what every recording has.
-    left = np.where(fit.lam > k.USUAL, fit.lam**2 - 1.0, 0.0) * level2 * functionals
+    # A discrepancy within the error of the balance is what every recording has; errors of curves are seen as they are.
+    wrong2 = fit.mu**2 * np.bincount(p.group, p.doubt**2, minlength=len(p.groups)) / count
+    left = (np.where(fit.lam > k.USUAL, fit.lam**2 - 1.0, 0.0) * level2 + wrong2) * functionals
     owned = np.array([fit.problem.keys[n][0] == name for n in fit.take], bool)
     power, others = (
         np.bincount(p.group, (p.x[:, fit.take[take]] @ fit.vector[take]) ** 2, minlength=len(p.groups)) / count

@@ -209,6 +209,9 @@ def noise(view, cells, residual) -> np.ndarray:
     return out
 
 
+OUTLIER = 12.0  # times the median of the squares at a speed: a larger one is no noise
+
+
 def _variance(e, ok, pair, shape):
     """Variance a + b omega^2 of the blocks from differences of neighbours, or from all values if there are few."""
     both = pair[ok[pair] & ok[pair + 1]]
@@ -218,16 +221,17 @@ def _variance(e, ok, pair, shape):
         squares, where = e[ok] ** 2, shape[ok]
     if not len(squares):
         return np.full(len(e), 1e-30)
-    squares = np.minimum(squares, 12.0 * np.median(squares) + 1e-30)
-    a, b = squares.mean(), 0.0
-    if len(squares) >= 24:
-        low = where[:, 1] <= np.median(where[:, 1])
-        x0, x1 = where[low, 1].mean(), where[~low, 1].mean() if (~low).any() else where[low, 1].mean()
-        if x1 > x0 + 0.1:
-            v0, v1 = squares[low].mean(), squares[~low].mean()
-            b = max((v1 - v0) / (x1 - x0), 0.0)
-            a = v0 - b * x0
-            if a < 0.05 * squares.mean():
-                a = 0.05 * squares.mean()
-                b = 0.95 * squares.mean() / where[:, 1].mean()
+    low = where[:, 1] <= np.median(where[:, 1])
+    grows = len(squares) >= 24 and where[~low, 1].mean() > where[low, 1].mean() + 0.1 if (~low).any() else False
+    if not grows:
+        return np.full(len(e), max(np.minimum(squares, OUTLIER * np.median(squares)).mean(), 1e-30))
+    halves = [where[half, 1].mean() for half in (low, ~low)]
+    medians = [np.median(squares[half]) for half in (low, ~low)]
+    usual = medians[0] + np.diff(medians) / np.diff(halves) * (where[:, 1] - halves[0])
+    squares = np.minimum(squares, OUTLIER * np.maximum(usual, min(medians)))
+    v0, v1 = (squares[half].mean() for half in (low, ~low))
+    b = max((v1 - v0) / (halves[1] - halves[0]), 0.0)
+    a = v0 - b * halves[0]
+    if a < 0.05 * squares.mean():
+        a, b = 0.05 * squares.mean(), 0.95 * squares.mean() / where[:, 1].mean()
     return np.maximum(a + b * shape[:, 1], 1e-30)

@@ -169,7 +169,7 @@ class Fit:
 
     def __init__(self, problem, names, value, take, c, cov, sizes, lam, mu):
         self.problem, self.names, self.value = problem, names, value
-        self.take, self.vector, self.cov, self.sizes, self.lam = take, c, cov, sizes, lam
+        self.take, self.vector, self.cov, self.sizes, self.lam, self.mu = take, c, cov, sizes, lam, mu
         p = problem.p
         # (n,) of means and contrasts: noise, discrepancy and errors of the curves
         self.variance = p.s2 + (lam[p.group] * p.level) ** 2 + (mu[p.group] * p.doubt) ** 2
