@@ -15,10 +15,10 @@ class ShaftTwist(Effect):
         return {"twist": angle_error(view, _load(view))}
 
     def floor(self, nominal):
-        return 0.004
+        return 0.01
 
     def ceiling(self, nominal):
-        return 0.5
+        return 0.2  # beyond it, no drive would be regulated with such a sensor
 
     def corrected(self, view, c):
         return view.turned(c["twist"] * _load(view))
