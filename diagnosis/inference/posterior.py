@@ -17,6 +17,7 @@ EFFORT = 20000  # rows times sets of one size
 CLOSE = 20.0  # log evidence below the best within which a set is linearised on its own
 GROWN = 3  # effects up to which all good sets are grown
 MOST = 6
+ALIKE = 8  # best sets that are linearised on their own before the search around one of them
 LEADERS = 3  # best single effects that are linearised on their own
 
 
@@ -43,6 +44,11 @@ class Posterior:
             if fit.names not in self.own:
                 self._linearise(fit.names)
         self._grow(first, able)
+        # Sets that are alike before the data are corrected may differ much afterwards.
+        least = self.best().value - CLOSE
+        for fit in sorted(self.fits.values(), key=lambda f: -f.value)[:ALIKE]:
+            if fit.names not in self.own and fit.value > least:
+                self._linearise(fit.names)
         self._refine()
 
     def _refine(self):
@@ -120,8 +126,11 @@ class Posterior:
         less = [tuple(n for n in names if n != out) for out in names]
         more = [(*names, n) for n in able]
         swapped = [(*rest, n) for rest in less for n in able]
+        # Two effects may stand for one, and one for two.
+        rests = itertools.combinations(names, len(names) - 2) if len(names) > 1 else ()
+        fewer = [(*rest, n) for rest in rests for n in able]
         two = [(*names, *pair) for pair in itertools.combinations(able, 2)] if len(names) <= 1 else []
-        self._add(problem, [*less, *(m for m in more if len(m) <= MOST), *swapped, *two])
+        self._add(problem, [*less, *(m for m in more if len(m) <= MOST), *swapped, *fewer, *two])
 
     def _near(self, known):
         """Linearise close sets on their own if they correct other errors than the best one."""

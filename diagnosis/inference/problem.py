@@ -139,7 +139,9 @@ class Problem:
         most = np.array([self.most[n] for n in names], float)
         p, take = self.p, np.array(mine, np.int64)
         x = np.ascontiguousarray(p.x[:, take])
-        core = np.array([not self.keys[n][1].startswith("~") for n in mine], bool)
+        # Where no formula is preferred (a curve of 1), the free columns tell the size too.
+        tells = lambda name, key: not key.startswith("~") or self.setup.effects[name].curve >= 1.0  # noqa: E731
+        core = np.array([tells(*self.keys[n]) for n in mine], bool)
         drags = p.loads >= 0 and bool(x[p.group == p.loads].any())
         always = k.ALWAYS_LOADED if p.loads >= 0 else 1.0
         tried = [

@@ -4,6 +4,8 @@ import numpy as np
 
 from fluxproof.diagnosis.effects.effect import Effect, Parameter, angle_error, one, rated_torque, sigma
 
+SETTLED = 4  # steps until turn and torque agree
+
 
 def _load(view):
     """Air-gap torque at the samples over the rated one, (b, m+1)."""
@@ -21,7 +23,10 @@ class ShaftTwist(Effect):
         return 0.2  # beyond it, no drive would be regulated with such a sensor
 
     def corrected(self, view, c):
-        return view.turned(c["twist"] * _load(view))
+        turn = 0.0
+        for _ in range(SETTLED):  # the torque follows from currents at the true angle
+            turn = c["twist"] * _load(view.turned(turn))
+        return view.turned(turn)
 
     def estimates(self, c, covariance, nominal):
         return one("twist_rad", "rad", c["twist"], sigma(covariance))
