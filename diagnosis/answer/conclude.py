@@ -76,15 +76,31 @@ def shown(posterior, held):
 
 
 def helps(posterior, name, told, held) -> bool:
-    """Whether ``told`` leaves no less of the held-out blocks, in units of the noise floor, without ``name``."""
+    """Whether ``told`` leaves no less of the held-out blocks, in units of the noise floor, without ``name``.
+
+    Rows beyond the fitted operating points, of which the coefficients' own uncertainty exceeds the floor, do not count.
+    The torque counts without a transducer too: friction and cogging of a free shaft show nowhere else.
+    """
     best, setup = posterior.best(), posterior.setup
+    cells, floor2 = setup.cells, setup.noise**2 + setup.level**2
+    loads = (cells.channel == "torque") & (cells.order == 0) & (setup.load > 0.0)
+    rows = np.flatnonzero(cells.ok & held[cells.block] & ~loads)
+    rows = rows[_uncertain(best, told, rows) <= floor2[rows]]
     fewer = best.problem.fit([n for n in best.names if n != name])
-    left = []
-    for fit in (best, fewer):
-        # The torque counts without a transducer too: friction and cogging of a free shaft show nowhere else.
-        sizes = Sizes(setup, setup.cells.y, fit.left(told & set(fit.names)), held, measured_torque=True)
-        left.append(sum((s.after / max(s.floor, 1e-300)) ** 2 for s in sizes.channels.values()))
+    left2 = [fit.left(told & set(fit.names))[rows] ** 2 for fit in (best, fewer)]
+    left = np.zeros(2)
+    for channel in np.unique(cells.channel[rows]):
+        mine = cells.channel[rows] == channel
+        left += [x[mine].sum() / floor2[rows][mine].sum() for x in left2]
     return left[1] >= left[0]
+
+
+def _uncertain(fit, told, rows) -> np.ndarray:
+    """Variance of what the effects ``told`` of a fit explain of some rows, (k,)."""
+    mine = [j for j, n in enumerate(fit.take) if fit.problem.keys[n][0] in told]
+    keys = [fit.problem.keys[fit.take[j]] for j in mine]
+    x = np.array([fit.problem.cells.columns[name][key][rows] for name, key in keys]).reshape(len(mine), len(rows))
+    return np.sum(x * (fit.cov[np.ix_(mine, mine)] @ x), axis=0)
 
 
 def left_by(fit, told):

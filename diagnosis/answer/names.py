@@ -62,6 +62,8 @@ def names_of(posterior) -> Names:
     rest = [frozenset(fit.names) - set(sure) for _, fit in kept]
     groups = [sorted(n for n in g if present[n] >= k.OPEN) for g in alternatives(rest)]
     groups = [g for g in groups if len(g) > 1 and sum(present[n] for n in g) >= 0.5]
+    # Of an alternative one effect is there; where none may be, its members are only possible.
+    groups = [g for g in groups if sum(p for p, fit in kept if set(g) & set(fit.names)) >= (1.0 - k.DOUBTED) * held]
     groups = [g for g in groups if any(effects[n].named for n in g)]
     grouped = {n for g in groups for n in g}
     maybe = {n: p for n, p in present.items() if n not in sure and n not in grouped and p >= k.PRESENT}
