@@ -187,5 +187,17 @@ def test_drives_with_one_remainder_are_one_group():
     assert not design.outliers  # a companion of an unknown remainder is no fault of its own
 
 
+def test_a_faint_remainder_joins_the_group_that_its_effect_belongs_to():
+    """What is left of drive 30 is less than its noise; of 31 it is another order, and 32 has another effect."""
+    same, rows = [("u_dq", 2.0, 1.0, 0.3)], [row(n, [hypothesis()]) for n in range(40)]
+    for n in range(5):
+        rows[n] = row(n, [hypothesis(["iron_loss"], 30.0, left=same, share=0.4)])
+    rows[30] = row(30, [hypothesis(["iron_loss"], 30.0, left=same, share=0.0)])
+    rows[31] = row(31, [hypothesis(["iron_loss"], 30.0, left=[("u_dq", 6.0, 1.0, 0.3)], share=0.0)])
+    rows[32] = row(32, [hypothesis(["delay"], 30.0, left=same, share=0.0)])
+    (group,) = groups.groups(rows, rates.weigh(rows)[1])
+    assert group.serials == ("S0000", "S0001", "S0002", "S0003", "S0004", "S0030")
+
+
 def test_documentation_shows_the_columns():
     assert described() in (ROOT / "docs" / "fleet.md").read_text()

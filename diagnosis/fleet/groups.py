@@ -3,6 +3,8 @@
 The signature of a remainder is a vector with a place for each signal and signed electrical order, whose squares are the
 shares of the remainder's power, and a place for each cause beyond the catalogue that it looks like.  The cosine between
 two signatures is 1 for the same remainder of any size.  Clusters are those of average linkage at the distance APART.
+A recording that leaves next to nothing joins a group if its effects are what the group's cause looks like, and the
+little that is left is alike.
 """
 
 from __future__ import annotations
@@ -19,6 +21,7 @@ from fluxproof.diagnosis.suspects import SUSPECTS
 
 APART = 0.35
 FEWEST = 3  # drives of a group
+FAINT = -1.0  # any share left, also of less than the noise
 
 
 @dataclass(frozen=True)
@@ -49,13 +52,13 @@ class Group:
     companions: tuple[str, ...]
 
 
-def signature(weighed: Weighed | None) -> dict[tuple[str, float], float]:
-    """The remainder of a recording, a vector of the length 1; empty if nothing is left."""
+def signature(weighed: Weighed | None, least=k.SMALL) -> dict[tuple[str, float], float]:
+    """The remainder of a recording, a vector of the length 1; empty if no more than the share ``least`` is left."""
     if weighed is None:
         return {}
     best = weighed.best
     power = defaultdict(float)
-    if (best["left_share"] or 0.0) > k.SMALL:
+    if (best["left_share"] or 0.0) > least:
         for part in best["left"]:
             if part["size"] is not None:
                 power[part["signal"], float(part["order"])] += max(part["share"] or 0.0, 0.0)
@@ -74,14 +77,27 @@ def groups(rows: list[dict], weighed: list[Weighed | None]) -> list[Group]:
     places = sorted({place for _, _, s in found for place in s})
     table = np.array([[s.get(place, 0.0) for place in places] for _, _, s in found])
     labels = fcluster(linkage(table, "average", metric="cosine"), APART, "distance")
-    out = []
+    out, faint = [], [(row, w, s) for row, w in zip(rows, weighed, strict=True)
+                      if not signature(w) and (s := signature(w, FAINT))]  # fmt: skip
     for label in np.unique(labels):
         mine = [found[n] for n in np.flatnonzero(labels == label)]
+        if len({row["serial"] for row, _, _ in mine}) >= FEWEST:
+            mine += _joining(faint, mine)
         serials = sorted({row["serial"] for row, _, _ in mine})
         if len(serials) >= FEWEST:
             recordings = tuple(sorted(row["recording"] for row, _, _ in mine))
             out.append(Group(tuple(serials), recordings, tuple(_lines(mine)), _looks(mine), _companions(mine)))
     return sorted(out, key=lambda g: (-len(g.serials), g.serials))
+
+
+def _joining(faint, mine) -> list:
+    """Those of the recordings ``faint`` whose effects are all companions of a group and whose remainder is alike."""
+    companions, places = set(_companions(mine)), {place for _, _, s in mine for place in s}
+    mean = {place: np.mean([s.get(place, 0.0) for _, _, s in mine]) for place in places}
+    length = np.sqrt(sum(v**2 for v in mean.values()))
+    alike = lambda s: sum(v * mean.get(place, 0.0) for place, v in s.items()) >= (1.0 - APART) * length  # noqa: E731
+    present = lambda w: {e for e, p in w.present.items() if p > 0.5}  # noqa: E731
+    return [(row, w, s) for row, w, s in faint if present(w) and present(w) <= companions and alike(s)]
 
 
 def _lines(mine) -> list[Line]:
