@@ -182,8 +182,9 @@ def _shares(posterior, names, told, channel, held, measured) -> dict[str, float]
     best, setup = posterior.best(), posterior.setup
     out = {}
     for name in names.said:
-        fewer = best.problem.fit([n for n in best.names if n != name])
-        without = Sizes(setup, setup.cells.y, fewer.left(told - {name}), held, measured)
+        # What is only possible must not take over.
+        fewer = best.problem.fit([n for n in best.names if n != name and n not in names.maybe])
+        without = Sizes(setup, setup.cells.y, left_by(fewer, told & set(fewer.names)), held, measured)
         with_it = Sizes(setup, setup.cells.y, best.left(told), held, measured)
         mine = [channel] if channel in without.channels else list(without.channels)
         excess = sum(without.channels[c].excess for c in mine)
