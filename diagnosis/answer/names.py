@@ -102,10 +102,8 @@ def credibility(fit, name) -> float:
     wrong2 = fit.mu**2 * np.bincount(p.group, p.doubt**2, minlength=len(p.groups)) / count
     left = (np.where(fit.lam > k.USUAL, fit.lam**2 - 1.0, 0.0) * level2 + wrong2) * functionals
     owned = np.array([fit.problem.keys[n][0] == name for n in fit.take], bool)
-    power, others = (
-        np.bincount(p.group, (p.x[:, fit.take[take]] @ fit.vector[take]) ** 2, minlength=len(p.groups)) / count
-        * functionals for take in (owned, ~owned)
-    )  # fmt: skip
+    rows = [(p.x[:, fit.take[take]] @ fit.vector[take]) ** 2 for take in (owned, ~owned)]
+    power, others = (np.bincount(p.group, x, minlength=len(p.groups)) / count * functionals for x in rows)
     # What is left where other effects explain much is rather an error of theirs.
     beside = left * left / np.maximum(left + others, 1e-300)
     best = (0.0, 1.0)

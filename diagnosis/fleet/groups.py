@@ -77,16 +77,15 @@ def groups(rows: list[dict], weighed: list[Weighed | None]) -> list[Group]:
     places = sorted({place for _, _, s in found for place in s})
     table = np.array([[s.get(place, 0.0) for place in places] for _, _, s in found])
     labels = fcluster(linkage(table, "average", metric="cosine"), APART, "distance")
-    out, faint = [], [(row, w, s) for row, w in zip(rows, weighed, strict=True)
-                      if not signature(w) and (s := signature(w, FAINT))]  # fmt: skip
+    rest = [(row, w) for row, w in zip(rows, weighed, strict=True) if not signature(w)]
+    faint, out = [(row, w, s) for row, w in rest if (s := signature(w, FAINT))], []
     for label in np.unique(labels):
         mine = [found[n] for n in np.flatnonzero(labels == label)]
-        if len({row["serial"] for row, _, _ in mine}) >= FEWEST:
-            mine += _joining(faint, mine)
-        serials = sorted({row["serial"] for row, _, _ in mine})
-        if len(serials) >= FEWEST:
-            recordings = tuple(sorted(row["recording"] for row, _, _ in mine))
-            out.append(Group(tuple(serials), recordings, tuple(_lines(mine)), _looks(mine), _companions(mine)))
+        if len({row["serial"] for row, _, _ in mine}) < FEWEST:
+            continue
+        mine += _joining(faint, mine)
+        serials, recordings = (tuple(sorted({row[key] for row, _, _ in mine})) for key in ("serial", "recording"))
+        out.append(Group(serials, recordings, tuple(_lines(mine)), _looks(mine), _companions(mine)))
     return sorted(out, key=lambda g: (-len(g.serials), g.serials))
 
 
