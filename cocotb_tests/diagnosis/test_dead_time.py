@@ -81,7 +81,7 @@ def test_loss_is_uncertain_near_zero_current(strong):
     assert np.median(EFFECT.doubt(c, view)) < 0.03
 
 
-def test_a_leg_gains_voltage_at_no_current():
+def test_no_leg_gains_voltage():
     """Noise around zero current would also fit a gain there."""
     c, sure = {"v_0.02": -1.6, "v_0.12": 3.0, "bump_0.005": -0.5}, 1e-4 * np.eye(3)
     assert full_loss(c) > 0.0 and not EFFECT.possible(c, sure, None)

@@ -180,10 +180,10 @@ def _rivals(names) -> list:
 def _shares(posterior, names, told, channel, held, measured) -> dict[str, float]:
     """{effect: share of the misfit's power above the floor that is left without it}; told: what the rest is without."""
     best, setup = posterior.best(), posterior.setup
-    out = {}
+    possible, out = names.only_possible(best), {}
     for name in names.said:
         # What is only possible must not take over.
-        fewer = best.problem.fit([n for n in best.names if n != name and n not in names.maybe])
+        fewer = best.problem.fit([n for n in best.names if n != name and n not in possible])
         without = Sizes(setup, setup.cells.y, left_by(fewer, told & set(fewer.names)), held, measured)
         with_it = Sizes(setup, setup.cells.y, best.left(told), held, measured)
         mine = [channel] if channel in without.channels else list(without.channels)

@@ -41,16 +41,13 @@ def covariance_of(fit, name, full) -> np.ndarray:
     return out
 
 
-def without_maybes(names, best):
-    """(the best set without the effects that are only possible, the probability that one of them is not there).
-
-    (None, 0) if all of the set is told.
-    """
-    told = {*names.confidence, *names.suspects, *(n for group in names.open for n in group)}
-    maybe = [n for n in best.names if n not in told]
-    if not maybe:
-        return None, 0.0
-    return best.problem.fit([n for n in best.names if n in told]), 1.0 - min(names.maybe.get(n, 0.0) for n in maybe)
+def without_possible(names, best):
+    """(the best set without the effects that are only possible, the probability that one of them is not there)."""
+    possible = names.only_possible(best)
+    if not possible:
+        return best, 0.0
+    fewer = best.problem.fit([n for n in best.names if n not in possible])
+    return fewer, 1.0 - min(names.maybe.get(n, 0.0) for n in possible)
 
 
 def named_effects(names, posterior, explains, only=None) -> list[NamedEffect]:
@@ -59,19 +56,18 @@ def named_effects(names, posterior, explains, only=None) -> list[NamedEffect]:
     effects, nominal = posterior.setup.effects, best.problem.view.nominal
     full, out = best.cov + common(best), []
     total = sum(p for p, _ in names.fits)
-    fewer, absent = without_maybes(names, best)
+    fewer, absent = without_possible(names, best)
     for name in sorted(names.confidence if only is None else only):
         effect, c = effects[name], best.c[name]
-        if fewer is not None and name in fewer.c:
-            c = {key: (1.0 - absent) * v + absent * fewer.c[name].get(key, 0.0) for key, v in c.items()}
+        simpler = fewer.c.get(name, c)
+        c = {key: (1.0 - absent) * v + absent * simpler.get(key, 0.0) for key, v in c.items()}
         share = effect.relative({n: best.c[n] for n in best.names}, nominal)
         estimates = effect.estimates(c, covariance_of(best, name, full), nominal)
-        if fewer is not None and name in fewer.c:
-            nothing = np.zeros((len(c),) * 2)
-            ends = [effect.estimates(x, nothing, nominal) for x in (best.c[name], fewer.c[name])]
-            for key, e in estimates.items():
-                moved = ends[1][key].value - ends[0][key].value if key in ends[1] else 0.0
-                e.sigma = float(np.hypot(e.sigma, np.sqrt(absent * (1.0 - absent)) * moved))
+        exact = np.zeros((len(c),) * 2)
+        ends = [effect.estimates(x, exact, nominal) for x in (best.c[name], simpler)]
+        for key, e in estimates.items():
+            moved = ends[1][key].value - ends[0][key].value if key in ends[1] else 0.0
+            e.sigma = float(np.hypot(e.sigma, np.sqrt(absent * (1.0 - absent)) * moved))
         for p, fit in names.fits[1:]:
             if name not in fit.names:
                 continue

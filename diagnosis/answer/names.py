@@ -34,6 +34,10 @@ class Names:
     def said(self) -> set[str]:
         return set(self.confidence)
 
+    def only_possible(self, fit) -> set[str]:
+        """Effects of a fit that are neither named, nor an alternative, nor as sure as a name."""
+        return set(fit.names) - self.said - set(self.suspects) - {n for group in self.open for n in group}
+
     def withheld(self, but=frozenset()) -> Names:
         """The same with nothing asserted but the effects ``but``: what else was named is possible."""
         kept = {n: p for n, p in self.confidence.items() if n in but}

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fluxproof.diagnosis.effects.effect import DOUBT, Effect, Parameter, current_error, sigma
+from fluxproof.diagnosis.effects.effect import DOUBT, Effect, Parameter, current_error, phase_error, sigma
 from fluxproof.diagnosis.result import Estimate
 
 # Gains of two sensors that differ by g cause a harmonic of 0.58 g and a rotation of 0.29 g; twice that is allowed.
@@ -12,13 +12,7 @@ PATTERNS = {"alpha": (2 / 3, -1 / 3, -1 / 3), "beta": (0.0, 3**-0.5, -(3**-0.5))
 
 def gain_column(view, weights):
     """Column of relative gain errors with the given weights of the three phases."""
-    i_abc = view.phases(view.i)
-    error = i_abc * np.array(weights)
-    column = current_error(view, view.from_phases(error))
-    if view.has_sum:
-        total = error.sum(axis=2)
-        column["sum"] = 0.5 * (total[:, 1:] + total[:, :-1])
-    return column
+    return phase_error(view, view.phases(view.i) * np.array(weights))
 
 
 class CurrentGain(Effect):

@@ -207,6 +207,15 @@ def current_error(view, error) -> Column:
     }
 
 
+def phase_error(view, error) -> Column:
+    """Column of errors of the measured phase currents, (b, m+1, 3): also in their sum, where three are measured."""
+    column = current_error(view, view.from_phases(error))
+    if view.has_sum:
+        total = error.sum(axis=2)
+        column["sum"] = 0.5 * (total[:, 1:] + total[:, :-1])
+    return column
+
+
 def angle_error(view, delta) -> Column:
     """Column of an error of the measured angle, measured minus true, (b, m+1): it rotates every dq quantity."""
     turned = -1j * view.i

@@ -3,7 +3,7 @@
 import numpy as np
 
 from fluxproof.diagnosis.catalogue.current_gain import PATTERNS
-from fluxproof.diagnosis.effects.effect import Effect, Parameter, current_error
+from fluxproof.diagnosis.effects.effect import Effect, Parameter, phase_error
 from fluxproof.diagnosis.result import Estimate
 
 PHASES = {**PATTERNS, "common": (1.0, 1.0, 1.0)}
@@ -22,14 +22,7 @@ def _errors(view):
 
 class CurrentBend(Effect):
     def _columns(self, view, shape):
-        out = {}
-        for key, error in _errors(view).items():
-            if key.startswith(shape):
-                out[key] = current_error(view, view.from_phases(error))
-                if view.has_sum:
-                    total = error.sum(axis=2)
-                    out[key]["sum"] = 0.5 * (total[:, 1:] + total[:, :-1])
-        return out
+        return {key: phase_error(view, error) for key, error in _errors(view).items() if key.startswith(shape)}
 
     def core(self, view):
         return self._columns(view, "cubic")
