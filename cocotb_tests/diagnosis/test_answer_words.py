@@ -43,7 +43,7 @@ def samples():
         chosen = list(CATALOGUE)[:names]
         for first in CATALOGUE if names == 1 else [None]:
             effects = [named(n) for n in ([first] if first else chosen)]
-            groups = [sorted(CATALOGUE)[: names + 1]] if verdict == "ambiguous" else []
+            groups = [sorted(CATALOGUE)[: names + 1]] if verdict != "explained" else []
             yield replace(answers[verdict], effects=effects, ambiguity=groups, remainder=rest, explained_share=0.8)
     for term in (None, LATE):
         yield replace(answers["unexplained"], unknown_term=term, remainder=rest)
@@ -68,6 +68,17 @@ def test_a_headline_says_what_and_how_large():
     rest = [Remainder("u_dq", 6.0, 1.234, "V", 0.2)]
     part = sentence(replace(made_up()["partly_explained"], effects=[dead], remainder=rest, unknown_term=None), KNOWN)
     assert "mostly at order 6 of the voltage (1.2 V)" in part and "(dead-time voltage 5.1 +- 0.2 V) explains" in part
+
+
+def test_a_share_is_of_the_alternatives_too():
+    """Of a dead time and one of two other effects: the dead time alone explains less."""
+    dead = NamedEffect("dead_time", 0.99, {"v_dead_v": Estimate(5.0873, 0.23, "V")}, 0.2)
+    both = replace(made_up()["partly_explained"], effects=[dead], ambiguity=[["current_lag", "delay"]])
+    both.remainder, both.unknown_term = [Remainder("u_dq", 6.0, 1.234, "V", 0.2)], None
+    text = sentence(both, KNOWN)
+    assert ", with one of late currents behind a filter and 1 other effect, explain " in text, text
+    alone = sentence(replace(both, effects=[]), KNOWN)
+    assert alone.startswith("One of late currents behind a filter and delay of the voltage explains "), alone
 
 
 def test_an_effect_outside_the_catalogue_is_called_by_its_meaning():

@@ -136,6 +136,10 @@ def test_friction_cannot_drive_the_shaft():
     assert possible({"viscous": -0.9 * viscous, "coulomb": 0.0}, sure, NOMINAL)
     assert not possible({"viscous": -1.5 * viscous, "coulomb": 0.0}, sure, NOMINAL)
     assert possible({"viscous": -1.5 * viscous, "coulomb": 0.0}, np.diag([viscous**2, 0.0]), NOMINAL)
+    # Nor does it at a low speed only.
+    coulomb = NOMINAL.machine.coulomb_friction_nm or 0.0
+    assert possible({"viscous": viscous, "coulomb": 0.1 - coulomb}, sure, NOMINAL)
+    assert not possible({"viscous": viscous, "coulomb": -0.1 - coulomb}, sure, NOMINAL)
 
 
 def test_cogging_order_is_not_its_harmonic(view):

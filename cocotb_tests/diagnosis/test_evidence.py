@@ -3,7 +3,14 @@
 import numpy as np
 import pytest
 
+from cocotb_tests.core.test_registers import PAPER
+from cocotb_tests.support.diagnosed_drives import recorded
+from fluxproof.diagnosis.answer.scan import stray_swing
+from fluxproof.diagnosis.balance.blocks import view_of
 from fluxproof.diagnosis.inference.evidence import evidence
+from fluxproof.diagnosis.inference.problem import Problem, Setup
+from fluxproof.diagnosis.nominal import load_nominal
+from fluxproof.diagnosis.physics import known_effects
 
 ROWS, NOISE = 60, 0.01
 
@@ -41,3 +48,33 @@ def test_an_effect_is_found_beside_errors_of_a_curve():
     y = 5.0 * x + NOISE * rng.standard_normal(ROWS)
     found = value_of(y, doubt, x)
     assert found[0] > value_of(y, doubt)[0] + 50.0 and found[1][0] == pytest.approx(5.0, rel=0.01)
+
+
+def test_of_currents_and_angle_only_one_is_late():
+    """Both late are a voltage that is early: a delay and a skew could not be told apart otherwise."""
+    view = view_of(recorded(), load_nominal(PAPER))
+    problem = Problem(Setup(view, view.visible(known_effects()), np.ones(len(view), bool)))
+    late = {key: n for n, (name, key) in enumerate(problem.keys) if name == "sampling_skew"}
+    fits = {}
+    for key, other in (("tau", "angle"), ("angle", "tau")):
+        column = problem.p.x[:, late[key]]
+        problem.p.y = 20e-6 * column
+        fits[key] = problem.fit(["delay", "sampling_skew"])
+        assert late[key] in fits[key].take and late[other] not in fits[key].take
+        assert fits[key].c["sampling_skew"][key] == pytest.approx(20e-6, rel=0.05)
+        assert fits[key].c["sampling_skew"][other] == 0.0 and abs(fits[key].c["delay"]["tau"]) < 1e-6
+
+
+def test_a_swing_is_in_most_blocks():
+    """An event in three blocks, such as a step of the load, is no frequency of the voltage."""
+    view = view_of(recorded(), load_nominal(PAPER))
+    along = view.to_dq(view.u[:, 1:-1])
+    along = along / np.abs(along).mean(axis=1, keepdims=True).clip(1e-9)
+    wave = along * np.sin(4 * np.pi * np.arange(along.shape[1]) / along.shape[1])
+    loudest = np.argsort(-np.abs(view.u).mean(axis=1))
+    some = np.zeros(len(view), bool)
+    some[loudest[:3]] = True
+    noise = 0.1 * np.random.default_rng(4).standard_normal(wave.shape)
+    volts = 0.05 * np.abs(view.u).max()
+    assert stray_swing(view, volts * wave * some[:, None] + noise, 0.0) is None
+    assert stray_swing(view, volts * wave + noise, 0.0).kind == "frequency"

@@ -84,7 +84,7 @@ def _where(answer, nominal, effects) -> str:
     """Where to look for what nothing explains: the physics that shows at the order of the largest remainder."""
     u = answer.unknown_term
     if u is not None and u.meaning:
-        how = [e.separated_by for e in effects.values() if e.title == u.meaning]
+        how = [e.separated_by for e in effects.values() if e.clause == u.meaning]
         return f"Check in the hardware whether {u.meaning}{f'; what tells: {how[0]}' if how else ''}."
     if not answer.remainder:
         return "Record more speeds and currents of both signs, so that the misfit can be located."

@@ -153,7 +153,7 @@ def conclude(posterior, held, progress=lambda text: None) -> Diagnosis:
         f"The voltage balance was made on {len(view)} steady blocks of {rows} rows; {int(held.sum())} were not fitted."
     )
     for name in names.suspects:
-        if answer.unknown_term is None or answer.unknown_term.meaning != setup.effects[name].title:
+        if answer.unknown_term is None or answer.unknown_term.meaning != setup.effects[name].clause:
             answer.notes.append(f"Besides, it is {as_if(_described(best, name, held, unseen))}.")
     for name in sorted(posterior.idle):
         title = capital(setup.effects[name].title)
@@ -236,4 +236,4 @@ def _described(best, name, held, unseen) -> UnknownTerm:
     share = float(np.clip(1.0 - least / before, 0.0, 1.0)) if before > 0.0 else 0.0
     parameter, e = next(iter(effect.estimates(best.c[name], covariance_of(best, name, best.cov), None).items()))
     formula = f"{parameter}, {effect.equation}"
-    return UnknownTerm("u_dq", formula, e.value, e.sigma, e.unit, share, effect.title)
+    return UnknownTerm("u_dq", formula, e.value, e.sigma, e.unit, share, effect.clause)

@@ -62,9 +62,15 @@ def _variants(answer, effects) -> list[str]:
         return [f"{capital(a)}; not separable: {b}." for a, b in _both(named, sets)]
     where, cause = located(answer), _cause(answer)
     if answer.verdict == "partly_explained":
-        verb = "explain" if len(answer.effects) + len(answer.conventions) > 1 else "explains"
+        several = len(answer.effects) + len(answer.conventions) + len(answer.ambiguity) > 1
+        verb = "explain" if several else "explains"
         share = f"{verb} {percent_below(answer.explained_share or 0.0)} of the misfit"
-        names = [capital(n) for n in named] if answer.effects else [f"One of {group}" for group in sets]
+        if answer.ambiguity:
+            one_of = [f"one of {group}" for group in sets]
+            pairs = [f"{a}, with {b}," for a, b in _both(named, one_of)]
+            names = [capital(n) for n in ([*pairs, f"{named[-1]} and others"] if answer.effects else one_of)]
+        else:
+            names = [capital(n) for n in named]
         return [f"{n} {share}; the rest is {where} and {c}." for n, c in _both(names, cause)]
     if answer.unknown_term is not None and answer.unknown_term.meaning:
         return [f"No parameter of the simulation explains the misfit of {misfit}: it {c}." for c in cause]
@@ -93,7 +99,8 @@ def _sets(groups, effects) -> list[str]:
     titles = [[title_of(n, effects) for n in group] for group in groups]
     short = [t if len(t) < 4 else [*t[:2], f"{len(t) - 2} other effects"] for t in titles]
     texts = ["; and ".join(joined(t) for t in each) for each in (titles, short)]
-    return [*texts, f"{titles[0][0]} and {sum(map(len, titles)) - 1} other effects" if titles else ""]
+    others = sum(map(len, titles)) - 1
+    return [*texts, f"{titles[0][0]} and {others} other effect{'s' if others > 1 else ''}" if titles else ""]
 
 
 def _cause(answer) -> list[str]:

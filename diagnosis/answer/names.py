@@ -111,12 +111,15 @@ def credibility(fit, name) -> float:
     # What is left where other effects explain much is rather an error of theirs.
     beside = left * left / np.maximum(left + others, 1e-300)
     best = (0.0, 1.0)
+    whole = np.array([abs(order - round(order)) < 1e-6 for _, order, _ in p.groups])
     for part in {(channel, contrast) for channel, _, contrast in p.groups}:
         mine = np.array([(channel, contrast) == part for channel, _, contrast in p.groups])
         total = power[mine].sum()
         if total <= 0.0:
             continue
         own = mine & (power >= k.LIVES * total)
+        if whole[own].all():  # what repeats with the electrical angle leaves nothing between its orders
+            mine &= whole
         elsewhere = 0.0 if part[0] == "torque" else k.ELSEWHERE  # an angle's quantisation is no physics of the shaft
         remains = left[own].sum() + elsewhere * beside[mine & ~own].sum()
         strength = total / level2[mine].mean()

@@ -130,13 +130,13 @@ def stray_swing(view, residual, floor) -> Stray | None:
     loud = (level > 0.4 * level.max()) & ~beats
     if not loud.any():
         return None
-    mean = spectrum[loud].mean(axis=0)
-    low, around = mean[1:5].max(), np.median(mean[8:20])
-    amplitude = 2.0 * float(np.sqrt(mean[1:5].sum() / 1.5))
+    usual = np.median(spectrum[loud], axis=0)  # a swing is in most blocks, what is in few is an event
+    low, around = usual[1:5].max(), np.median(usual[8:20])
+    amplitude = 2.0 * float(np.sqrt(usual[1:5].sum() / 1.5))
     share = amplitude / float(np.sqrt(np.mean(level[loud] ** 2)))
     if low < k.SWING * around or share < k.LEAST_SWING or amplitude < floor:
         return None
-    hertz = (1 + int(np.argmax(mean[1:5]))) / (m * view.sample_time_s)
+    hertz = (1 + int(np.argmax(usual[1:5]))) / (m * view.sample_time_s)
     formula = f"u proportional to 1 + c * sin(2 pi f t), f about {hertz:.0f} Hz"
     spread, size = share * float(np.sqrt(around / low)), amplitude / 2**0.5
     return Stray("frequency", formula, share, spread, "1", float(1.0 - around / low), 0.0, size)

@@ -5,6 +5,9 @@ import numpy as np
 from fluxproof.diagnosis.effects.effect import DOUBT, Effect, Parameter, rated_torque
 from fluxproof.diagnosis.result import Estimate
 
+LOW = 0.1  # of top speed: where the friction of a shaft that begins to turn has fallen to 1 / e
+SPEEDS = (0.05, 0.3, 1.0)  # of top speed, at which a drag must not be negative
+
 
 def _drag(view, shape):
     omega_m = view.omega_mid / view.machine.pole_pairs
@@ -27,7 +30,7 @@ class Friction(Effect):
         top = _top(view)
         return {
             "square": _drag(view, lambda w: w * np.abs(w) / top),
-            "low": _drag(view, lambda w: np.sign(w) * np.exp(-np.abs(w) / (0.1 * top))),
+            "low": _drag(view, lambda w: np.sign(w) * np.exp(-np.abs(w) / (LOW * top))),
         }
 
     def curve_scale(self, key, cores, nominal):
@@ -46,13 +49,17 @@ class Friction(Effect):
         return abs(c["viscous"]) * top + abs(c["coulomb"]) + abs(c.get("square", 0.0)) * top + abs(c.get("low", 0.0))
 
     def possible(self, c, covariance, nominal):
-        """Friction cannot drive the shaft: the total drag at the speed of ``size`` is not negative."""
+        """Friction cannot drive the shaft: at no speed up to that of ``size`` the total drag is negative."""
         m = nominal.machine
         top = nominal.inverter.dc_bus_v / np.sqrt(3) / m.magnet_flux_wb / m.pole_pairs
-        weights = np.array([{"viscous": top, "coulomb": 1.0, "square": top}.get(name, 0.0) for name in c])
-        drag = (m.viscous_friction_nms or 0.0) * top + (m.coulomb_friction_nm or 0.0)
-        drag += float(weights @ np.array(list(c.values())))
-        return drag >= -DOUBT * np.sqrt(max(weights @ covariance @ weights, 0.0))
+        values = np.array(list(c.values()))
+        for x in SPEEDS:
+            grows = {"viscous": x * top, "coulomb": 1.0, "square": x**2 * top, "low": np.exp(-x / LOW)}
+            weights = np.array([grows[name] for name in c])
+            drag = (m.viscous_friction_nms or 0.0) * x * top + (m.coulomb_friction_nm or 0.0) + weights @ values
+            if drag < -DOUBT * np.sqrt(max(weights @ covariance @ weights, 0.0)):
+                return False
+        return True
 
     def estimates(self, c, covariance, nominal):
         m, spread = nominal.machine, np.sqrt(np.maximum(np.diag(covariance), 0.0))

@@ -18,11 +18,8 @@ def unskewed(view, tau):
 
 class SamplingSkew(Effect):
     def core(self, view):
-        return {"tau": skewed(view)}
-
-    def free(self, view):
-        # The angle is latched at another instant than the currents.
-        return {"angle": angle_error(view, view.omega)}
+        # Either of the two is latched off the valley: if both are, the voltage is early.
+        return {"tau": skewed(view), "angle": angle_error(view, view.omega)}
 
     def size(self, c, nominal):
         return max(abs(v) for v in c.values())
@@ -52,6 +49,7 @@ EFFECT = SamplingSkew(
     equation="i_measured = i(t + tau), di/dt = -(R i + j omega psi_m) / L",
     signature="order 0: omega^2 psi_m tau on the d axis, equivalent to an iron loss of R_fe = -L_q / tau",
     confounders=("iron_loss", "delay", "inductance_q"),
+    one_of=("tau", "angle"),
     separated_by="load (an iron loss also follows omega^2 i_q); a deliberately shifted sampling trigger",
     parameters=(Parameter("skew_s", "s", "of the currents relative to the angle; positive: late", "late by"),),
     corrects=True,

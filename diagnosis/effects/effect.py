@@ -54,7 +54,7 @@ class Effect:
     """
 
     name: str
-    title: str  # a noun, as a headline calls it; of an effect that is not named: a clause that completes "as if ..."
+    title: str  # a noun, as a headline calls it
     equation: str
     signature: str
     confounders: tuple[str, ...]
@@ -64,10 +64,12 @@ class Effect:
     rescales: tuple[str, ...] = ()  # of which it is a scale or an offset: i, u, u_dc, theta_e, keys of [machine]
     needs: tuple[str, ...] = ()  # of NEEDS: what a recording must show for the effect to be seen
     named: bool = True  # False: no parameter of the simulation carries it; it is described and not asserted
+    clause: str = ""  # of an effect that is not named: what it is described with, "as if ..."
     positive: bool = False  # the leading coefficient cannot be negative
     corrects: bool = (
         False  # a measurement error rather than a property of the machine: ``corrected`` removes it from the data
     )
+    one_of: tuple[str, ...] = ()  # coefficients of the formula that exclude each other
     bounded: tuple[str, ...] = ()  # free coefficients that only their prior keeps apart from other effects
     drift_of: str = ""  # the constant effect of which this one is a slow drift
     trailing: tuple[float, ...] = ()  # further electrical orders at which the effect may have harmonics

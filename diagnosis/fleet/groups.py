@@ -64,7 +64,7 @@ def signature(weighed: Weighed | None, least=k.SMALL) -> dict[tuple[str, float],
                 power[part["signal"], float(part["order"])] += max(part["share"] or 0.0, 0.0)
     total = sum(power.values())
     out = {place: np.sqrt(value / total) for place, value in power.items()} if total > 0.0 else {}
-    out |= {(f"as if {SUSPECTS[n].title}", 0.0): 1.0 for n, p in weighed.present.items() if n in SUSPECTS and p > 0.5}
+    out |= {(f"as if {SUSPECTS[n].clause}", 0.0): 1.0 for n, p in weighed.present.items() if n in SUSPECTS and p > 0.5}
     length = np.sqrt(sum(v**2 for v in out.values()))
     return {place: float(v / length) for place, v in out.items()} if length > 0.0 else {}
 

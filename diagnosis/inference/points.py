@@ -67,10 +67,10 @@ def point_numbers(view) -> np.ndarray:
 def balance_level(view, cells):
     """(r,) error of the balance in every row, in the unit of its channel."""
     m = view.machine
-    volts = view.balance_error()
-    level = np.where(cells.order == 0, 1.0, 0.5) * volts[cells.block]
-    level = np.where(cells.channel == "sum", k.BALANCE_SUM * m.rated_current_a, level)
-    return np.where(cells.channel == "torque", k.BALANCE_TORQUE * rated_torque(view.nominal), level)
+    ripple = np.where(cells.order == 0, 1.0, 0.5)  # a harmonic has half of the error of the mean
+    level = ripple * view.balance_error()[cells.block]
+    level = np.where(cells.channel == "torque", ripple * k.BALANCE_TORQUE * rated_torque(view.nominal), level)
+    return np.where(cells.channel == "sum", k.BALANCE_SUM * m.rated_current_a, level)
 
 
 def visits(view, points) -> np.ndarray:

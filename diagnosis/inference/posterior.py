@@ -102,7 +102,7 @@ class Posterior:
                 break
             new = problem.fit(names)
             moved = 0.0
-            if len(new.vector) == len(fit.vector):
+            if np.array_equal(new.take, fit.take):
                 own = np.sqrt(np.maximum(np.diag(new.cov), 0.0))
                 moved = float(np.max(np.abs(new.vector - fit.vector) / np.maximum(own, 1e-300), initial=0.0))
             fit = new

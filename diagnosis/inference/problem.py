@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import copy
 import dataclasses
+import itertools
 
 import numpy as np
 
@@ -133,8 +134,21 @@ class Problem:
         return [n for n, mine in self.index.items() if mine]
 
     def likelihood(self, names: tuple):
-        """(columns of a sorted set, log evidence without priors, coefficients, covariance, sizes, lambda, mu)."""
-        mine = [n for name in names for n in self.index[name]]
+        """(columns of a sorted set, log evidence without priors, coefficients, covariance, sizes, lambda, mu).
+
+        Of the coefficients that exclude each other, those of the highest evidence.
+        """
+        ways = itertools.product(*(self._ways(name) for name in names))
+        return max((self._likelihood(names, sum(way, [])) for way in ways), key=lambda found: found[1])
+
+    def _ways(self, name) -> list[list[int]]:
+        """The columns of an effect, once with each of those that exclude each other."""
+        one_of = self.setup.effects[name].one_of
+        rivals = [n for n in self.index[name] if self.keys[n][1] in one_of]
+        return [[n for n in self.index[name] if n == kept or n not in rivals] for kept in rivals or (None,)]
+
+    def _likelihood(self, names, mine):
+        """``likelihood`` with the columns ``mine``."""
         owner = np.array([names.index(self.keys[n][0]) for n in mine], np.int64)
         most = np.array([self.most[n] for n in names], float)
         p, take = self.p, np.array(mine, np.int64)

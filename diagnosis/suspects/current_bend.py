@@ -57,7 +57,8 @@ class CurrentBend(Effect):
 
 EFFECT = CurrentBend(
     name="current_bend",
-    title="the current sensors bent towards full scale, as behind a core that saturates",
+    title="current sensors that bend towards full scale",
+    clause="the current sensors bent towards full scale, as behind a core that saturates",
     equation="i_measured = i + b i^3, b of each phase",
     signature="a sum of the phase currents that follows their third power; order 0 as of a saturation, and order 6",
     confounders=("saturation", "current_scale", "current_gain"),

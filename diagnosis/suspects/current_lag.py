@@ -29,7 +29,8 @@ class CurrentLag(Effect):
 
 EFFECT = CurrentLag(
     name="current_lag",
-    title="the measured currents were late, as behind a filter in front of the converters",
+    title="late currents behind a filter",
+    clause="the measured currents were late, as behind a filter in front of the converters",
     equation="i_measured + tau di_measured/dt = i",
     signature="order 0: the whole current vector rotated by omega tau, and smaller by its square",
     confounders=("sampling_skew", "delay", "encoder_offset"),

@@ -34,7 +34,8 @@ class ShaftTwist(Effect):
 
 EFFECT = ShaftTwist(
     name="shaft_twist",
-    title="the angle sensor turned against the rotor with the torque, as behind a soft shaft",
+    title="a soft shaft between rotor and angle sensor",
+    clause="the angle sensor turned against the rotor with the torque, as behind a soft shaft",
     equation="theta_measured = theta_e + k T",
     signature="order 0: omega psi_m k T on the d axis, odd in i_q: as an error of L_q and a cross-saturation together",
     confounders=("inductance_q", "cross_saturation", "encoder_offset"),
