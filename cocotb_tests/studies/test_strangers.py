@@ -14,6 +14,7 @@ from studies.blind import __main__ as blind
 from studies.blind import reliability
 from studies.blind.strangers import cases
 from studies.blind.strangers.faults import FAULTS, UNKNOWN
+from studies.blind.strangers.motulator import MotulatorPlant
 
 GENERATORS = sorted(cases.GENERATORS)
 
@@ -68,6 +69,36 @@ def test_the_true_resistance_closes_the_voltage_balance(generator):
     seen = float((u.mean() / i.mean()).real)
     assert seen == pytest.approx(case.truth.r, rel=0.02)
     assert abs(seen / case.drive.r - 1.0) > 0.1
+
+
+def test_harmonics_give_the_torque_of_their_power():
+    """Voltage and torque of one flux: its slope in time at constant dq current, and that of its coenergy in angle."""
+    case = cases.make("motulator", 3, 1, "healthy", 0)
+    truth = dataclasses.replace(case.truth, emf={6: 0.02 + 0.01j, -6: 0.01j}, ripple_l=0.05)
+    plant = MotulatorPlant(case.drive, truth, imposed=lambda t: 30.0)
+    machine, i, angle = plant.model.machine, (0.3 + 0.8j) * case.drive.current, 0.7
+
+    def flux(theta, i_s):
+        """Stator flux linkage of the harmonics [Vs], of magnets and of slots, at a current in the stator frame."""
+        magnets = sum(truth.psi * a * np.exp(1j * (h + 1) * theta) for h, a in truth.emf.items())
+        return magnets, truth.ripple_l * truth.l_q * np.conj(i_s) * np.exp(-4j * theta)
+
+    def coenergy(theta, i_s):
+        magnets, slots = flux(theta, i_s)
+        return 1.5 * np.real(np.conj(i_s) * (magnets + 0.5 * slots))
+
+    step, turn, pairs = 1e-6, np.exp(1j * angle), case.drive.pole_pairs
+    machine.state.exp_j_theta_m, machine.inp.w_M = turn, 30.0
+    machine.state.psi_s = truth.psi + truth.l_d * i.real + 1j * truth.l_q * i.imag
+    machine.out.i_s = machine.i_s
+    assert machine.i_s == pytest.approx(i)
+    ends = [sum(flux(angle + x, i * np.exp(1j * (angle + x)))) for x in (step, -step)]
+    volts = pairs * 30.0 * (ends[0] - ends[1]) / (2 * step) / turn
+    assert machine.harmonics() == pytest.approx(volts, rel=1e-6)
+    fixed = i * turn
+    torque = pairs * (coenergy(angle + step, fixed) - coenergy(angle - step, fixed)) / (2 * step)
+    smooth = 1.5 * pairs * np.imag(i * np.conj(machine.state.psi_s))
+    assert machine.tau_M - smooth == pytest.approx(torque, rel=1e-6)
 
 
 def test_results_of_generators_are_kept_side_by_side():

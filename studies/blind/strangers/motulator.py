@@ -57,6 +57,15 @@ class Machine(model.SynchronousMachine):
         u = sum(1j * w * (h + 1) * self.par.psi_f * a * turn**h for h, a in t.emf.items())
         return u - 5j * w * t.ripple_l * t.l_q * np.conj(self.out.i_s) * np.conj(turn) ** 6
 
+    @property
+    def tau_M(self):
+        """Air-gap torque [Nm] with that of the EMF's harmonics, by their power, and of the slots, by 3/4 Re(i* psi)."""
+        t, p, i = self.plant.truth, self.par.n_p, self.i_s
+        turn = self.state.exp_j_theta_m
+        emf = sum(1j * (h + 1) * self.par.psi_f * a * turn**h for h, a in t.emf.items())
+        slots = -4j * t.ripple_l * t.l_q * np.conj(i) ** 2 * np.conj(turn) ** 6
+        return super().tau_M + 1.5 * p * np.real(emf * np.conj(i)) + 0.75 * p * np.real(slots)
+
     def lossy(self, w):
         """Current of the iron loss [A]."""
         t = self.plant.truth
@@ -116,8 +125,7 @@ class MotulatorPlant(Plant):
     def shaft(self):
         self._settle()
         machine, shaft = self.model.machine, self.model.mechanics
-        torque = 1.5 * self.par.n_p * np.imag(machine.out.i_s * np.conj(machine.state.psi_s))
-        return float(np.angle(shaft.state.exp_j_theta_M)), float(np.real(shaft.out.w_M)), float(torque)
+        return float(np.angle(shaft.state.exp_j_theta_M)), float(np.real(shaft.out.w_M)), float(machine.tau_M)
 
 
 class Planned:
