@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from cocotb_tests.support.needs import skip_without_ghdl5
 from fluxproof.checkout import ROOT
@@ -28,6 +29,7 @@ def run_in_verilator(drive, scene):
     return result
 
 
+@pytest.mark.slow
 def test_full_ratio():
     """The start of Fig. 9 at 20,000 clocks a period; `make demo` runs all 3,000 periods."""
     skip_without_ghdl5()

@@ -299,10 +299,11 @@ def test_failing_overlay_adds_only_a_note(dump, tmp_path, monkeypatch):
     answer(tmp_path / "out")
 
 
-def test_files_with_flipped_bits_end_without_traceback_and_without_a_name(tmp_path):
+@pytest.mark.parametrize("digit", ["0", pytest.param("5", marks=pytest.mark.slow)])
+def test_files_with_flipped_bits_end_without_traceback_and_without_a_name(digit, tmp_path):
     """Bits flipped in files of every format: they may be rejected, but no name comes without a finding."""
     nominal = nominal_of(tmp_path)
-    files = {n: path for n, (path, _) in damaged_files(tmp_path).items() if n.startswith("flip") and n[4] in "05"}
+    files = {n: path for n, (path, _) in damaged_files(tmp_path).items() if n.startswith("flip") and n[4] == digit}
     named, refused = [], 0
     for name, path in files.items():
         try:
@@ -312,4 +313,4 @@ def test_files_with_flipped_bits_end_without_traceback_and_without_a_name(tmp_pa
             continue
         if (found.effects or found.ambiguity) and not found.problems:
             named.append(f"{name}: {found.sentence} {[p.message for p in found.problems]}")
-    assert len(files) >= 18 and refused < len(files) and not named, "\n".join(named)
+    assert len(files) >= 9 and refused < len(files) and not named, "\n".join(named)

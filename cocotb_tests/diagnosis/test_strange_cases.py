@@ -13,6 +13,11 @@ from studies.blind.generate import generate_case, listing
 SEED, LATER, LAST, COUNT = 25112032, 26112026, 27112026, 60
 
 
+def slowly(*case):
+    """A case that `make slow` looks at."""
+    return pytest.param(*case, marks=pytest.mark.slow)
+
+
 def files_of(number, tmp_path, seed=SEED, generator="sealed", count=COUNT):
     """Recording and drive file of a case; count: cases of the run that it is of."""
     number, stratum, turn = listing(seed, count, None, generator)[number - 1]
@@ -25,14 +30,14 @@ def files_of(number, tmp_path, seed=SEED, generator="sealed", count=COUNT):
     ("seed", "number", "names"),
     [
         (SEED, 48, {"delay"}),  # a sampling skew beside it fitted better, but not the points that were not fitted
-        (SEED, 31, set()),  # healthy: the encoder's codes beat with the sampling near the first order
+        slowly(SEED, 31, set()),  # healthy: the encoder's codes beat with the sampling near the first order
         (LATER, 9, {"iron_loss", "resistance"}),  # eddy currents that lag looked like a delay
-        (LATER, 59, {"current_gain", "friction", "iron_loss"}),  # and like a sampling skew
-        (LATER, 54, {"inductance_d", "resistance_temperature"}),  # codes that beat looked like a swing of the voltage
+        slowly(LATER, 59, {"current_gain", "friction", "iron_loss"}),  # and like a sampling skew
+        slowly(LATER, 54, {"inductance_d", "resistance_temperature"}),  # codes that beat were a swing
         (SEED, 10, {"dead_time", "saturation"}),  # a twisting shaft as alternative, which does not help
         (LATER, 24, {"cross_saturation", "friction", "sampling_skew"}),  # both late: a delay instead
-        (SEED, 3, {"emf_harmonics", "iron_loss", "saturation"}),  # the same
-        (LAST, 1, {"cogging"}),  # a ripple was judged by the error of a mean torque
+        slowly(SEED, 3, {"emf_harmonics", "iron_loss", "saturation"}),  # the same
+        slowly(LAST, 1, {"cogging"}),  # a ripple was judged by the error of a mean torque
         (LAST, 10, {"phase_resistance_asymmetry"}),  # a ripple at a fifth of the order was taken for its cause
         # Without the saturation, held-out points beyond the fitted ones fitted better.
         (LAST, 40, {"cross_saturation", "iron_loss", "saturation"}),
@@ -54,11 +59,11 @@ def test_the_noise_is_at_most_that_of_the_misfit(tmp_path):
 @pytest.mark.parametrize(
     ("seed", "count", "number", "names"),
     [
-        (24112026, 100, 10, {"dead_time", "emf_harmonics"}),  # a resistance made its uncertain curve smaller
+        slowly(24112026, 100, 10, {"dead_time", "emf_harmonics"}),  # a resistance made its uncertain curve smaller
         (24112026, 100, 24, {"magnet_temperature", "resistance_temperature"}),  # the sensor lags: no wrong resistance
-        (LATER, 80, 1, {"current_offset", "sampling_skew"}),  # noise at full speed was cut as if it were outliers
+        slowly(LATER, 80, 1, {"current_offset", "sampling_skew"}),  # noise at full speed was cut as if it were outliers
         (LATER, 80, 15, {"inductance_q", "saturation"}),  # the saturation's curve took the inductance
-        (LAST, 100, 17, {"cross_saturation", "saturation"}),  # a curve without third power took an inductance to help
+        slowly(LAST, 100, 17, {"cross_saturation", "saturation"}),  # its curve took an inductance to help
         (LAST, 100, 51, {"encoder_offset", "inductance_q"}),  # a twisting shaft looked better before the correction
     ],
 )
@@ -71,8 +76,8 @@ def test_exactly_what_is_there_is_named_of_the_own_generator(seed, count, number
     ("seed", "number", "says"),
     [
         (SEED, 12, "bent towards full scale"),
-        (LATER, 28, "bent towards full scale"),
-        (LATER, 27, "soft shaft"),
+        slowly(LATER, 28, "bent towards full scale"),
+        slowly(LATER, 27, "soft shaft"),
         (LAST, 27, "soft shaft"),  # of a machine whose torque depends much on the angle
     ],
 )
