@@ -6,6 +6,7 @@ import json
 
 import pytest
 
+from cocotb_tests.support.slow import slowly
 from fluxproof import diagnose
 from fluxproof.checkout import recordings
 
@@ -17,7 +18,7 @@ OTHERS = (
 )  # fmt: skip
 
 
-@pytest.mark.parametrize("name", [*FIRST, *(pytest.param(n, marks=pytest.mark.slow) for n in OTHERS)])
+@pytest.mark.parametrize("name", [*FIRST, *map(slowly, OTHERS)])
 def test_closed_loop(name):
     folder = recordings() / "closed_loop"
     if not folder.is_dir():

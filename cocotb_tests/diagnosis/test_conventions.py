@@ -10,6 +10,7 @@ import pytest
 from cocotb_tests.core.test_registers import PAPER
 from cocotb_tests.support.diagnosed_drives import POINT, recorded
 from cocotb_tests.support.mistakes import MISTAKES, ROOT2, Mistake, scaled, table_of, written
+from cocotb_tests.support.slow import halved
 from fluxproof.diagnosis import diagnose
 from fluxproof.diagnosis.conventions.table import READINGS, readings_for
 from fluxproof.diagnosis.nominal import load_nominal
@@ -32,9 +33,7 @@ def test_there_are_enough_mistakes():
     assert len(MISTAKES) >= 25
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=pytest.mark.slow) if k % 2 else n for k, n in enumerate(MISTAKES)]
-)
+@pytest.mark.parametrize("name", halved(MISTAKES))
 def test_a_mistake_is_told_and_nothing_else(name, tmp_path):
     mistake = MISTAKES[name]
     recording, drive = written(mistake, tmp_path)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from cocotb_tests.support.slow import slowly
 from fluxproof.diagnosis import diagnose
 from fluxproof.diagnosis.balance.blocks import view_of
 from fluxproof.diagnosis.balance.cells import cells_of
@@ -92,9 +93,9 @@ def test_no_leg_gains_voltage():
     ("seed", "number", "names"),
     [
         (27182818, 130, ["dead_time"]),  # no d-axis inductance for the residual of late pulses
-        (27182818, 229, ["dead_time", "phase_resistance_asymmetry"]),  # a dominant effect does not replace both
+        slowly(27182818, 229, ["dead_time", "phase_resistance_asymmetry"]),  # a dominant effect does not replace both
         # A resistance of a tenth of the loss may be a device's: it is named or left out, and nothing else is.
-        (27182818, 30, ["dead_time", "resistance"]),
+        slowly(27182818, 30, ["dead_time", "resistance"]),
         (14142135, 24, ["dead_time", "encoder_eccentricity", "resistance"]),
         (14142135, 263, ["dead_time"]),  # a diode's logarithm, which resembles a resistance
     ],

@@ -7,6 +7,7 @@ import pytest
 
 from cocotb_tests.core.test_registers import PAPER
 from cocotb_tests.support.effect_recordings import NOMINAL, T, healthy, usual, with_effect
+from cocotb_tests.support.slow import halved
 from fluxproof.diagnosis import diagnose
 from fluxproof.diagnosis.answer.improve import write_improved
 from fluxproof.diagnosis.answer.improved_plant import in_addition, read_flux_map
@@ -28,7 +29,7 @@ def sizes(answer):
     return Sizes(setup, setup.cells.y, setup.cells.y, np.ones(len(setup.view), bool), True)
 
 
-@pytest.mark.parametrize("name", CATALOGUE)
+@pytest.mark.parametrize("name", halved(CATALOGUE))
 def test_the_improved_drive_leaves_no_misfit(name, tmp_path):
     effect = CATALOGUE[name]
     if effect.stays:

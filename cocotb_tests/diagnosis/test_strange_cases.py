@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from cocotb_tests.support.slow import slowly
 from fluxproof.diagnosis.balance.cells import noise
 from fluxproof.diagnosis.ingest.load import load_recording
 from fluxproof.diagnosis.nominal import load_nominal
@@ -11,11 +12,6 @@ from fluxproof.diagnosis.session import diagnose
 from studies.blind.generate import generate_case, listing
 
 SEED, LATER, LAST, COUNT = 25112032, 26112026, 27112026, 60
-
-
-def slowly(*case):
-    """A case that `make slow` looks at."""
-    return pytest.param(*case, marks=pytest.mark.slow)
 
 
 def files_of(number, tmp_path, seed=SEED, generator="sealed", count=COUNT):
