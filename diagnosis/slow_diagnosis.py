@@ -22,7 +22,8 @@ from fluxproof.diagnosis.conventions.judge import preferred
 from fluxproof.diagnosis.conventions.tell import under
 from fluxproof.diagnosis.inference import constants as k
 from fluxproof.diagnosis.inference.posterior import Posterior
-from fluxproof.diagnosis.inference.problem import Setup, fit_of_set
+from fluxproof.diagnosis.inference.problem import Setup
+from fluxproof.diagnosis.inference.settle import fit_of_set
 from fluxproof.diagnosis.inference.slow_search import SlowSearch, most_effects
 from fluxproof.diagnosis.one_point import diagnose_one_point
 from fluxproof.diagnosis.result import Diagnosis, Fit, Remainder

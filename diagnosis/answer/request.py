@@ -160,7 +160,7 @@ def requests(setup, fits, noise_v, cold=False) -> list[Request]:
     cold: points of a machine that has cooled down are candidates too.
     """
     solutions, effects = fits, setup.effects
-    view = View(**{f.name: getattr(setup.view, f.name) for f in fields(View)})
+    view = View(**{f.name: getattr(setup.view, f.name) for f in fields(View)}).replace(mean_duty=None)
     omega, i = grid(view)
     if cold:  # each point is a candidate warm and cold
         omega, i = np.tile(omega, 2), np.tile(i, 2)

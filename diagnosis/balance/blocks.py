@@ -83,6 +83,7 @@ def view_of(recording: Recording, nominal, block_rows=BLOCK_ROWS) -> View:
     omega = np.full(n, np.nan)
     omega[1:-1] = (theta_s[2:] - theta_s[:-2]) / (2 * period)
     u, u_dc_mid = _voltage(r, nominal, theta_s)
+    mean_duty = _mean_duty(r, nominal)
     kind, torque, slope_m = _mechanics(r, nominal, i_s, theta, theta_s, linked)
     starts, dwell, block_rows = _cut(r, nominal, run, i_s, omega, block_rows)
     samples = starts[:, None] + np.arange(block_rows + 1)
@@ -105,6 +106,7 @@ def view_of(recording: Recording, nominal, block_rows=BLOCK_ROWS) -> View:
         i_abc=None if i_abc is None else i_abc[samples],
         u=u[around],
         u_dc=u_dc_mid[rows],
+        mean_duty=mean_duty[around] if r.has("d_a", "d_b", "d_c") else None,
         t=passed,
         course=passed / max(float(r["t"][-1] - r["t"][0]), 1e-9),
         temp=r["temp_winding"][rows].mean(axis=1) if r.has("temp_winding") else missing,
@@ -148,6 +150,15 @@ def _voltage(recording, nominal, theta_s):
     asked[delay:] = (r["u_d_ref"] + 1j * r["u_q_ref"])[: n - delay]
     middle = np.append(0.5 * (theta_s[1:] + theta_s[:-1]), np.nan)
     return asked * np.exp(1j * middle), u_dc_mid
+
+
+def _mean_duty(recording, nominal):
+    """Mean (n,) of the three duties in force after each sample, nan where the recording has none."""
+    r, n, delay = recording, len(recording), nominal.control.duty_applied_after_samples
+    mean = np.full(n, np.nan)
+    if r.has("d_a", "d_b", "d_c"):
+        mean[delay:] = ((r["d_a"] + r["d_b"] + r["d_c"]) / 3.0)[: n - delay]
+    return mean
 
 
 def _mechanics(recording, nominal, i_s, theta, theta_s, linked):

@@ -13,6 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
+from fluxproof.diagnosis.balance.curves import parabola
 from fluxproof.diagnosis.inference import constants as k
 
 # What is computed from the angle alone stays known in a copy with the same angle.
@@ -29,6 +30,7 @@ class View:
     i_raw: (b, m+1) measured current in the stator frame, complex [A]
     i_abc: (b, m+1, 3) measured phase currents [A], or None if the recording has dq only
     u: (b, m+2) stator-frame voltage of the intervals -1 .. m, complex [V]; u_dc: (b, m) [V]
+    mean_duty: (b, m+2) mean of the three duties, or None if the recording has none: that of centred pulses
     t, temp, run: (b,) time since the first row [s], winding temperature [degC] or nan, number of the dwell
     course: (b,) progress of slow drifts (warming), from 0 at the start to 1 at the end
     torque: (b, m) shaft torque [Nm], nan where unknown; slope_m: (b, m) d omega_m / dt
@@ -59,6 +61,7 @@ class View:
     psi_extra: np.ndarray | float = 0.0
     delta_l: tuple[float, float] = (0.0, 0.0)
     late_s: float = 0.0
+    mean_duty: np.ndarray | None = None
     noise_gain: float = 1.0  # factor of a current correction on the current noise
     memo: dict = dataclasses.field(default_factory=dict)  # cache of the effects, shared by all views of a recording
 
@@ -158,6 +161,18 @@ class View:
         )
         return l_d * i.real + 1j * l_q * i.imag
 
+    @cached_property
+    def duties(self):
+        """Duties of the legs in the intervals -1 .. m, (b, m+2, 3), without noise."""
+        turn = np.exp(1j * self.interval_angle)
+        u = parabola(self.u * np.conj(turn)) * turn / self.u_dc.mean(axis=1)[:, None]
+        legs = (u[..., None] * np.exp(-2j * np.pi / 3 * np.arange(3))).real
+        if self.mean_duty is None:
+            mean = 0.5 - 0.5 * (legs.max(axis=2) + legs.min(axis=2))
+        else:
+            mean = self.mean_duty
+        return np.clip(legs + mean[..., None], 0.0, 1.0)
+
     @property
     def has_sum(self):
         """Whether three phase currents were measured independently."""
@@ -227,7 +242,7 @@ class View:
 
     def take(self, index):
         """The blocks of ``index`` only."""
-        per_block = (*self.stacked, "i_abc", "lacks", "t", "course", "run")
+        per_block = (*self.stacked, "i_abc", "mean_duty", "lacks", "t", "course", "run")
         return self.replace(
             **{
                 name: None if getattr(self, name) is None else getattr(self, name)[index]
@@ -251,10 +266,11 @@ def joined_views(views: list[View]) -> View:
     stack = {name: np.concatenate([getattr(v, name) for v in views]) for name in first.stacked}
     if any(v.lacks is not None for v in views):
         stack["lacks"] = np.concatenate([lacking((), len(v)) if v.lacks is None else v.lacks for v in views])
-    phases = [v.i_abc for v in views]
+    for name in ("i_abc", "mean_duty"):
+        parts = [getattr(v, name) for v in views]
+        stack[name] = None if any(p is None for p in parts) else np.concatenate(parts)
     return first.replace(
         **stack,
-        i_abc=None if any(p is None for p in phases) else np.concatenate(phases),
         t=np.concatenate([v.t + o for v, o in zip(views, offsets_t[:-1], strict=True)]),
         course=np.concatenate(
             [_course_of(v, first, a, b, slow[-1]) for v, a, b in zip(views, slow[:-1], slow[1:], strict=True)]

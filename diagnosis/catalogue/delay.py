@@ -1,11 +1,19 @@
-"""The duties take effect later than assumed: the voltage is that of an earlier row."""
+"""The duties take effect later than assumed: the voltage is that of an earlier row.
+
+Either the mean of a period is late, as with a modulator that interpolates, or all pulses are and the samples see
+their ripple.
+"""
 
 import numpy as np
 
 from fluxproof.diagnosis.balance.curves import parabola
-from fluxproof.diagnosis.effects.effect import Effect, Parameter, one, sigma, voltage
+from fluxproof.diagnosis.balance.late_pulses import instant, ripple
+from fluxproof.diagnosis.effects.effect import Effect, Parameter, current_error, one, torque_of, voltage
 
 MOST = 1.2  # periods: beyond one period the interpolation continues linearly, so that the iteration can return
+STEP = 0.005  # periods on both sides of a delay, over which the slope of the ripple is taken
+RIPPLE = 0.1  # share by which the ripple may be wrong: a filter of the currents rounds it
+TIMES = ("tau", "gates", "shift")  # coefficients whose sum is the delay
 
 
 def _smooth(view):
@@ -28,9 +36,54 @@ def _moved(view, share):
     return change
 
 
+def _ripples(view):
+    """Ripple (b, m+1) [A/s] per second of delay: the chord up to the delay of the recording, and the tangent there."""
+    late, period = instant(view, lambda error: current_error(view, error)["u"]), view.sample_time_s
+    a, b = max(late - STEP, 0.0), min(late + STEP, 1.0)
+    return {
+        "gates": ripple(view, late) / (late * period),
+        "shift": (ripple(view, b) - ripple(view, a)) / ((b - a) * period),
+    }
+
+
+def _sampled(view):
+    """(b, 1) whether the torque is measured: like the currents, it is a sample and has their ripple."""
+    return (view.shaft == "torque")[:, None]
+
+
+def _time(c):
+    """Delay [s] of coefficients."""
+    return sum(c.get(name, 0.0) for name in TIMES)
+
+
+def _error(view, c):
+    """Ripple (b, m+1) [A] that the samples see, or 0."""
+    if not c.get("gates"):
+        return np.zeros_like(view.i)
+    columns = _ripples(view)
+    return c.get("gates", 0.0) * columns["gates"] + (c.get("shift", 0.0) + c.get("filter", 0.0)) * columns["shift"]
+
+
 class Delay(Effect):
     def core(self, view):
-        return {"tau": voltage(-view.to_dq(_moved(view, 1.0)[:, 1:-1]) / view.sample_time_s)}
+        late = -view.to_dq(_moved(view, 1.0)[:, 1:-1]) / view.sample_time_s
+        return {"tau": voltage(late), "gates": self._pulses(view, late, "gates")}
+
+    def free(self, view):
+        late = -view.to_dq(_moved(view, 1.0)[:, 1:-1]) / view.sample_time_s
+        ripple = current_error(view, _ripples(view)["shift"])
+        out = {"shift": self._pulses(view, late, "shift")}
+        out["filter"] = {"u": ripple["u"], "torque": np.where(_sampled(view), 0.0, ripple["torque"])}
+        if _sampled(view).any():  # unless the transducer is too slow for the ripple
+            torque = current_error(view, _ripples(view)["gates"])["torque"]
+            out["torque"] = {"torque": np.where(_sampled(view), torque, 0.0)}
+        return out
+
+    @staticmethod
+    def _pulses(view, late, name):
+        """Column of late pulses per second; late: that of a mean voltage that is late."""
+        column = current_error(view, _ripples(view)[name])
+        return {"u": column["u"] + late, "torque": np.where(_sampled(view), 0.0, column["torque"])}
 
     def floor(self, nominal):
         return 0.006 * nominal.sample_time_s
@@ -38,25 +91,43 @@ class Delay(Effect):
     def ceiling(self, nominal):
         return 2.5 * nominal.sample_time_s
 
+    def size(self, c, nominal):
+        return abs(_time(c))
+
+    def doubt(self, c, view):
+        seen = current_error(view, _error(view, c))["u"]
+        return RIPPLE * np.sqrt(np.mean(np.abs(seen) ** 2, axis=1))
+
     def corrected(self, view, c):
-        share = float(np.clip(c["tau"] / view.sample_time_s, -MOST, MOST))
-        return view.replace(u=view.u + _moved(view, share))
+        late = float(np.clip(_time(c) / view.sample_time_s, -MOST, MOST))
+        moved, error = view.replace(u=view.u + _moved(view, late)), _error(view, c)
+        if not error.any():
+            return moved
+        torque = torque_of(view, view.inductances(error), view.i - error) + torque_of(view, view.psi, error)
+        seen = np.where(_sampled(view), 1.0 - c.get("torque", 0.0) / _time(c), 0.0)
+        return moved.replace(
+            i=view.i - parabola(error),
+            i_raw=view.i_raw - view.stator(error),
+            torque=view.torque - seen * torque,
+        )
 
     def estimates(self, c, covariance, nominal):
-        return one("delay_s", "s", c["tau"], sigma(covariance))
+        mine = [n for n, name in enumerate(c) if name in TIMES]
+        return one("delay_s", "s", _time(c), np.sqrt(max(covariance[np.ix_(mine, mine)].sum(), 0.0)))
 
     def plant(self, c, nominal):
-        return {"timing.delay_s": c["tau"]}
+        return {"timing.delay_s": _time(c)}
 
 
 EFFECT = Delay(
     name="delay",
     title="delay of the voltage",
     equation="u(t) = u_recorded(t - tau)",
-    signature="order 0: the whole voltage vector rotated by omega tau",
+    signature="order 0: the whole voltage vector rotated by omega tau; orders 3 and 6 of late gates",
     confounders=("encoder_offset", "sampling_skew", "iron_loss"),
     separated_by="two speeds, both directions; load at each; a step",
     parameters=(Parameter("delay_s", "s", "beyond duty_applied_after_samples", "later by"),),
+    one_of=(("tau",), ("gates", "shift", "filter", "torque")),
     corrects=True,
     stays="an error in time is in the recording itself",
     needs=("samples", "inverter"),

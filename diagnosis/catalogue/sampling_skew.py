@@ -49,7 +49,7 @@ EFFECT = SamplingSkew(
     equation="i_measured = i(t + tau), di/dt = -(R i + j omega psi_m) / L",
     signature="order 0: omega^2 psi_m tau on the d axis, equivalent to an iron loss of R_fe = -L_q / tau",
     confounders=("iron_loss", "delay", "inductance_q"),
-    one_of=("tau", "angle"),
+    one_of=(("tau",), ("angle",)),
     separated_by="load (an iron loss also follows omega^2 i_q); a deliberately shifted sampling trigger",
     parameters=(Parameter("skew_s", "s", "of the currents relative to the angle; positive: late", "late by"),),
     corrects=True,

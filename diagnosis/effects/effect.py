@@ -69,7 +69,7 @@ class Effect:
     corrects: bool = (
         False  # a measurement error rather than a property of the machine: ``corrected`` removes it from the data
     )
-    one_of: tuple[str, ...] = ()  # coefficients of the formula that exclude each other
+    one_of: tuple[tuple[str, ...], ...] = ()  # groups of coefficients that exclude each other
     bounded: tuple[str, ...] = ()  # free coefficients that only their prior keeps apart from other effects
     drift_of: str = ""  # the constant effect of which this one is a slow drift
     trailing: tuple[float, ...] = ()  # further electrical orders at which the effect may have harmonics

@@ -19,7 +19,7 @@ from fluxproof.diagnosis.answer.sizes import UNITS, Sizes
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.inference import constants as k
 from fluxproof.diagnosis.inference.posterior import possible
-from fluxproof.diagnosis.inference.problem import around
+from fluxproof.diagnosis.inference.settle import around, settled
 from fluxproof.diagnosis.result import Remainder
 
 BASE = tuple(name for name, effect in CATALOGUE.items() if effect.spreads)
@@ -111,14 +111,11 @@ class _Search:
         if extras in self.own:
             return
         self.own.add(extras)
-        judged = self.fits[extras]
-        for _ in range(STEPS):
-            problem = around(self.setup, judged.fit, judged.fit.names)
-            if problem is None:
-                judged.value = -np.inf
-                break
-            judged = _Judged(self._fit(problem, extras), self.base)
-        self.fits[extras] = judged
+        found = settled(self.setup, self.fits[extras].fit, STEPS)
+        if found is None:
+            self.fits[extras].value = -np.inf
+        else:
+            self.fits[extras] = _Judged(found, self.base)
 
     def found(self) -> list[Hypothesis]:
         out = []

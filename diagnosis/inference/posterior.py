@@ -7,11 +7,11 @@ import itertools
 
 import numpy as np
 
-from fluxproof.diagnosis.inference.problem import Problem, Setup, around
+from fluxproof.diagnosis.inference.problem import Problem, Setup
+from fluxproof.diagnosis.inference.settle import around, settled
 
 ROUNDS = 3
-SETTLED = 8  # most linearisations of the final set
-STANDS = 0.1  # standard deviations: a smaller change of every coefficient ends the iteration
+SETTLED = 12  # most linearisations of the final set
 KEPT = (12, 80)  # least and most sets of one size that are grown further
 EFFORT = 20000  # rows times sets of one size
 CLOSE = 20.0  # log evidence below the best within which a set is linearised on its own
@@ -94,23 +94,11 @@ class Posterior:
 
     def _linearise(self, names, steps=3):
         """Judge a set on its own linearisation."""
-        fit = self.fits[names]
-        for _ in range(steps):
-            problem = around(self.setup, fit, names)
-            if problem is None:
-                fit.value = -np.inf
-                break
-            new = problem.fit(names)
-            moved = 0.0
-            if np.array_equal(new.take, fit.take):
-                own = np.sqrt(np.maximum(np.diag(new.cov), 0.0))
-                moved = float(np.max(np.abs(new.vector - fit.vector) / np.maximum(own, 1e-300), initial=0.0))
-            fit = new
-            if not possible(fit):
-                fit.value = -np.inf
-            if moved < STANDS:
-                break
-        self.fits[names] = fit
+        found = settled(self.setup, self.fits[names], steps)
+        if found is not None:
+            self.fits[names] = found
+        if found is None or not possible(found):
+            self.fits[names].value = -np.inf
         self.own.add(names)
 
     def _grow(self, problem, able):
@@ -156,8 +144,8 @@ class Posterior:
             self._linearise(best, SETTLED)
             for out in best:
                 part = tuple(n for n in best if n != out)
-                if part in self.fits and part not in self.own:
-                    self._linearise(part)
+                if part in self.fits and not self.fits[part].stands and np.isfinite(self.fits[part].value):
+                    self._linearise(part, SETTLED)
             if self.best().names == best:
                 return
 

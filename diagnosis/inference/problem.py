@@ -15,7 +15,7 @@ import numpy as np
 
 from fluxproof.diagnosis.inference import constants as k
 from fluxproof.diagnosis.inference.evidence import evidence
-from fluxproof.diagnosis.inference.linearise import Linearisation, Rows, at_once, frozen, linearised
+from fluxproof.diagnosis.inference.linearise import Linearisation, Rows, at_once
 from fluxproof.diagnosis.inference.points import Grouping, balance_level, condense, point_numbers, visits
 
 
@@ -142,10 +142,11 @@ class Problem:
         return max((self._likelihood(names, sum(way, [])) for way in ways), key=lambda found: found[1])
 
     def _ways(self, name) -> list[list[int]]:
-        """The columns of an effect, once with each of those that exclude each other."""
+        """The columns of an effect, once with each group of those that exclude each other."""
         one_of = self.setup.effects[name].one_of
-        rivals = [n for n in self.index[name] if self.keys[n][1] in one_of]
-        return [[n for n in self.index[name] if n == kept or n not in rivals] for kept in rivals or (None,)]
+        group = {n: [g for g in one_of if self.keys[n][1].lstrip("~") in g] for n in self.index[name]}
+        seen = [g for g in one_of if [g] in group.values()]
+        return [[n for n, mine in group.items() if not mine or mine == [kept]] for kept in seen or (None,)]
 
     def _likelihood(self, names, mine):
         """``likelihood`` with the columns ``mine``."""
@@ -181,7 +182,9 @@ class Problem:
 
 
 class Fit:
-    """A set of effects on a problem."""
+    """A set of effects on a problem; stands: whether the problem is linearised at it."""
+
+    stands = False
 
     def __init__(self, problem, names, value, take, c, cov, sizes, lam, mu):
         self.problem, self.names, self.value = problem, names, value
@@ -206,29 +209,6 @@ class Fit:
             if names is None or owner in names:
                 out -= v * self.problem.cells.columns[owner][key]
         return out
-
-
-def around(setup, fit, names=None):
-    """The problem linearised at a fit, or None; names: effects whose columns are needed (None: all).
-
-    The misfit keeps its noise: only what a correction changes in the smooth signals, and in ripple that repeats in
-    every block of an operating point, is applied.  Otherwise a correction that filters or scales noise would be
-    rewarded.
-    """
-    at = setup.call(linearised, setup.rows, frozen(fit.c), names)
-    return None if at is None else setup.call(Problem, setup, at)
-
-
-def fit_of_set(setup, names, steps=3) -> Fit:
-    """A set of effects on its own linearisation."""
-    names = tuple(sorted(names))
-    fit = Problem(setup).fit(names)
-    for _ in range(steps):
-        problem = around(setup, fit, names)
-        if problem is None:
-            break
-        fit = problem.fit(names)
-    return fit
 
 
 def _repeats(cells, points):

@@ -1,0 +1,53 @@
+"""The iteration of a set of effects around its own solution."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from fluxproof.diagnosis.inference import settle
+
+
+def fit_at(x, key="a"):
+    return SimpleNamespace(
+        names=("offset",), c={"offset": {key: x}}, take=np.array([0]), vector=np.array([x]),
+        cov=np.array([[1e-4]]), stands=False,
+    )  # fmt: skip
+
+
+def swinging(slope, goal=1.0):
+    """Problems whose solution is ``slope`` times as far from the goal as the point of their linearisation."""
+    at = []
+
+    def problem(setup, c, names):
+        at.append(c["offset"]["a"])
+        return SimpleNamespace(fit=lambda names: fit_at(goal + slope * (at[-1] - goal)))
+
+    return problem, at
+
+
+@pytest.mark.parametrize("slope", [-1.4, -1.0, -0.3, 0.0, 0.5])
+def test_steps_that_swing_are_damped(monkeypatch, slope):
+    monkeypatch.setattr(settle, "_at", swinging(slope)[0])
+    found = settle.settled(None, fit_at(5.0), 14)
+    assert found.stands and found.vector[0] == pytest.approx(1.0, abs=0.01)
+
+
+def test_steps_that_shrink_are_not_damped(monkeypatch):
+    problem, at = swinging(0.01)
+    monkeypatch.setattr(settle, "_at", problem)
+    assert settle.settled(None, fit_at(5.0), 14).stands and len(at) <= 4
+
+
+def test_a_set_whose_columns_change_does_not_stand(monkeypatch):
+    """The first fit had other columns: without a second step nothing is known of their iteration."""
+    problem, at = swinging(0.0)
+    monkeypatch.setattr(settle, "_at", problem)
+    first = fit_at(1.0)
+    first.take = np.array([1])
+    assert settle.settled(None, first, 14).stands and len(at) == 2
+
+
+def test_an_impossible_linearisation_is_none(monkeypatch):
+    monkeypatch.setattr(settle, "_at", lambda *arguments: None)
+    assert settle.settled(None, fit_at(5.0), 3) is None

@@ -1,0 +1,65 @@
+"""A set of effects on its own linearisation: the columns around the solution, until both agree."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fluxproof.diagnosis.inference.linearise import frozen, linearised
+from fluxproof.diagnosis.inference.problem import Fit, Problem
+
+STANDS = 0.1  # standard deviations: a smaller change of every coefficient ends the iteration
+SHRINKS = 0.7  # of the last step: from a longer one on, all are damped
+
+
+def around(setup, fit, names=None):
+    """The problem linearised at a fit, or None; names: effects whose columns are needed (None: all).
+
+    The misfit keeps its noise: only what a correction changes in the smooth signals, and in ripple that repeats in
+    every block of an operating point, is applied.  Otherwise a correction that filters or scales noise would be
+    rewarded.
+    """
+    return _at(setup, fit.c, names)
+
+
+def _at(setup, c, names):
+    at = setup.call(linearised, setup.rows, frozen(c), names)
+    return None if at is None else setup.call(Problem, setup, at)
+
+
+def moved(fit, before) -> float:
+    """Largest change of a coefficient in standard deviations; infinite if the columns changed."""
+    if not np.array_equal(fit.take, before.take):
+        return np.inf
+    own = np.sqrt(np.maximum(np.diag(fit.cov), 0.0))
+    return float(np.max(np.abs(fit.vector - before.vector) / np.maximum(own, 1e-300), initial=0.0))
+
+
+def _halfway(one, other):
+    return {name: {key: 0.5 * (value + one[name][key]) for key, value in own.items()} for name, own in other.items()}
+
+
+def settled(setup, fit, steps) -> Fit | None:
+    """A set of effects on its own linearisation, or None; steps: at most so many.
+
+    Once a step is not shorter than the last one, as between two signs of a small current, all are halved.
+    """
+    at, last, damped = fit.c, np.inf, False
+    for _ in range(steps):
+        problem = _at(setup, at, fit.names)
+        if problem is None:
+            return None
+        new = problem.fit(fit.names)
+        step = moved(new, fit)
+        if step < STANDS:
+            new.stands = True
+            return new
+        damped |= SHRINKS * last < step < np.inf
+        at = _halfway(at, new.c) if damped else new.c
+        fit, last = new, step
+    return fit
+
+
+def fit_of_set(setup, names, steps=3) -> Fit:
+    """A set of effects on its own linearisation, from the recording as it is."""
+    fit = Problem(setup).fit(names)
+    return settled(setup, fit, steps) or fit
