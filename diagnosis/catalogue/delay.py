@@ -7,10 +7,12 @@ their ripple.
 import numpy as np
 
 from fluxproof.diagnosis.balance.curves import parabola
-from fluxproof.diagnosis.balance.late_pulses import instant, ripple
+from fluxproof.diagnosis.balance.late_pulses import instant, late_ripple
 from fluxproof.diagnosis.effects.effect import Effect, Parameter, current_error, one, torque_of, voltage
 
 MOST = 1.2  # periods: beyond one period the interpolation continues linearly, so that the iteration can return
+TRIED, FINE = np.arange(1, 50) / 50, 0.002  # periods, of late pulses
+NEAR = 0.15  # periods between a delay and that of its ripple: about a zero vector
 STEP = 0.005  # periods on both sides of a delay, over which the slope of the ripple is taken
 RIPPLE = 0.1  # share by which the ripple may be wrong: a filter of the currents rounds it
 TIMES = ("tau", "gates", "shift")  # coefficients whose sum is the delay
@@ -38,11 +40,12 @@ def _moved(view, share):
 
 def _ripples(view):
     """Ripple (b, m+1) [A/s] per second of delay: the chord up to the delay of the recording, and the tangent there."""
-    late, period = instant(view, lambda error: current_error(view, error)["u"]), view.sample_time_s
+    period = view.sample_time_s
+    late = instant(view, "late_pulses", TRIED, FINE, lambda late: current_error(view, late_ripple(view, late))["u"])
     a, b = max(late - STEP, 0.0), min(late + STEP, 1.0)
     return {
-        "gates": ripple(view, late) / (late * period),
-        "shift": (ripple(view, b) - ripple(view, a)) / ((b - a) * period),
+        "gates": late_ripple(view, late) / (late * period),
+        "shift": (late_ripple(view, b) - late_ripple(view, a)) / ((b - a) * period),
     }
 
 
@@ -93,6 +96,12 @@ class Delay(Effect):
 
     def size(self, c, nominal):
         return abs(_time(c))
+
+    def too_large(self, c, view):
+        """The ripple is that of another delay: its columns fit something else."""
+        late = _time(c) / view.sample_time_s
+        other = c.get("gates") and not (0.0 < late < 1.0 and abs(late - view.memo["late_pulses"]) < NEAR)
+        return bool(other) or super().too_large(c, view)
 
     def doubt(self, c, view):
         seen = current_error(view, _error(view, c))["u"]

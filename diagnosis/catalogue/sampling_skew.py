@@ -1,8 +1,16 @@
-"""Currents are sampled tau after the middle of the zero vector, in which the EMF gives them a slope."""
+"""Currents are sampled tau after the middle of the zero vector: the EMF gives them a slope, the pulses a ripple."""
 
 import numpy as np
 
+from fluxproof.diagnosis.balance.late_pulses import instant, off_valley
 from fluxproof.diagnosis.effects.effect import Effect, Parameter, angle_error, current_error, one, zero_vector_slope
+
+TRIED, FINE = np.arange(-12, 13) / 50, 0.001  # periods after the valley
+NEAR = 0.1  # periods between a skew and that of its ripple
+STEP = 0.002  # periods on both sides of an instant, over which the slope of the ripple is taken
+RIPPLE = 0.1  # share by which the ripple may be wrong: a filter of the currents rounds it
+# Weights of the coefficients in the time by which the currents are later than the angle.
+WEIGHTS = {"tau": 1.0, "pulses": 1.0, "shift": 1.0, "filter": 0.0, "angle": -1.0}
 
 
 def skewed(view):
@@ -12,17 +20,41 @@ def skewed(view):
 
 def unskewed(view, tau):
     """The view with the currents corrected for sampling tau [s] after the valley."""
-    error = tau * zero_vector_slope(view)
-    return view.replace(i=view.i - error, i_raw=view.i_raw - view.stator(error)) if tau else view
+    return _without(view, tau * zero_vector_slope(view)) if tau else view
+
+
+def _without(view, error):
+    return view.replace(i=view.i - error, i_raw=view.i_raw - view.stator(error))
+
+
+def _ripples(view):
+    """Current (b, m+1) of the pulses per second of skew: chord up to the instant of the recording, tangent there."""
+    period = view.sample_time_s
+    at = instant(view, "off_valley", TRIED, FINE, lambda x: current_error(view, off_valley(view, x))["u"])
+    step = off_valley(view, at + STEP) - off_valley(view, at - STEP)
+    return {"pulses": off_valley(view, at) / (at * period or 1.0), "shift": step / (2.0 * STEP * period)}
 
 
 class SamplingSkew(Effect):
     def core(self, view):
         # Either of the two is latched off the valley: if both are, the voltage is early.
-        return {"tau": skewed(view), "angle": angle_error(view, view.omega)}
+        out = {"tau": skewed(view), "angle": angle_error(view, view.omega)}
+        chord = _ripples(view)["pulses"]
+        if chord.any():
+            out["pulses"] = current_error(view, zero_vector_slope(view) + chord)
+        return out
+
+    def free(self, view):
+        columns = _ripples(view)
+        if not columns["pulses"].any():
+            return {}
+        return {
+            "shift": current_error(view, zero_vector_slope(view) + columns["shift"]),
+            "filter": current_error(view, columns["shift"]),  # in front of the converters: it delays the ripple
+        }
 
     def size(self, c, nominal):
-        return max(abs(v) for v in c.values())
+        return max(abs(c.get("tau", 0.0)), abs(c.get("angle", 0.0)), abs(c.get("pulses", 0.0) + c.get("shift", 0.0)))
 
     def floor(self, nominal):
         return 0.0012 * nominal.sample_time_s
@@ -30,17 +62,37 @@ class SamplingSkew(Effect):
     def ceiling(self, nominal):
         return 0.3 * nominal.sample_time_s
 
+    def too_large(self, c, view):
+        """The ripple is that of another instant: its columns fit something else."""
+        at = (c.get("pulses", 0.0) + c.get("shift", 0.0)) / view.sample_time_s
+        return bool(c.get("pulses") and abs(at - view.memo["off_valley"]) > NEAR) or super().too_large(c, view)
+
+    def doubt(self, c, view):
+        seen = current_error(view, self._pulses(c, view))["u"]
+        return RIPPLE * np.sqrt(np.mean(np.abs(seen) ** 2, axis=1))
+
+    @staticmethod
+    def _pulses(c, view):
+        """Current of the pulses (b, m+1) [A]."""
+        if not c.get("pulses"):
+            return np.zeros_like(view.i)
+        columns = _ripples(view)
+        return c["pulses"] * columns["pulses"] + (c.get("shift", 0.0) + c.get("filter", 0.0)) * columns["shift"]
+
     def corrected(self, view, c):
-        return unskewed(view.turned(c.get("angle", 0.0) * view.omega), c["tau"])
+        turned = view.turned(c.get("angle", 0.0) * view.omega)
+        late = c.get("tau", 0.0) + c.get("pulses", 0.0) + c.get("shift", 0.0)
+        pulses = self._pulses(c, turned)
+        return _without(turned, late * zero_vector_slope(turned) + pulses) if late else turned
 
     def estimates(self, c, covariance, nominal):
         # Currents relative to the angle, whichever of the two is latched off the valley.
-        weights = np.array([{"tau": 1.0, "angle": -1.0}[name] for name in c])
+        weights = np.array([WEIGHTS[name] for name in c])
         spread = np.sqrt(max(weights @ covariance @ weights, 0.0))
-        return one("skew_s", "s", c["tau"] - c.get("angle", 0.0), spread)
+        return one("skew_s", "s", sum(WEIGHTS[name] * value for name, value in c.items()), spread)
 
     def plant(self, c, nominal):
-        return {"timing.sampling_skew_s": c["tau"]}
+        return {"timing.sampling_skew_s": c.get("tau", 0.0) + c.get("pulses", 0.0) + c.get("shift", 0.0)}
 
 
 EFFECT = SamplingSkew(
@@ -49,7 +101,7 @@ EFFECT = SamplingSkew(
     equation="i_measured = i(t + tau), di/dt = -(R i + j omega psi_m) / L",
     signature="order 0: omega^2 psi_m tau on the d axis, equivalent to an iron loss of R_fe = -L_q / tau",
     confounders=("iron_loss", "delay", "inductance_q"),
-    one_of=(("tau",), ("angle",)),
+    one_of=(("tau",), ("angle",), ("pulses", "shift", "filter")),
     separated_by="load (an iron loss also follows omega^2 i_q); a deliberately shifted sampling trigger",
     parameters=(Parameter("skew_s", "s", "of the currents relative to the angle; positive: late", "late by"),),
     corrects=True,

@@ -136,10 +136,20 @@ class Problem:
     def likelihood(self, names: tuple):
         """(columns of a sorted set, log evidence without priors, coefficients, covariance, sizes, lambda, mu).
 
-        Of the coefficients that exclude each other, those of the highest evidence.
+        Of the coefficients that exclude each other, those of the highest evidence that are possible.
         """
         ways = itertools.product(*(self._ways(name) for name in names))
-        return max((self._likelihood(names, sum(way, [])) for way in ways), key=lambda found: found[1])
+        found = [self._likelihood(names, sum(way, [])) for way in ways]
+        return found[0] if len(found) == 1 else max(found, key=lambda f: (not self._too_large(f), f[1]))
+
+    def _too_large(self, found) -> bool:
+        """Whether a result of ``_likelihood`` has an impossible effect, of those whose forms exclude each other."""
+        c = {}
+        for n, value in zip(found[0], found[2], strict=True):
+            name, key = self.keys[n]
+            c.setdefault(name, {})[key.lstrip("~")] = float(value)
+        chosen = {name: self.setup.effects[name] for name in c if self.setup.effects[name].one_of}
+        return any(effect.too_large(c[name], self.setup.view) for name, effect in chosen.items())
 
     def _ways(self, name) -> list[list[int]]:
         """The columns of an effect, once with each group of those that exclude each other."""
