@@ -11,7 +11,7 @@ from fluxproof.diagnosis.physics import rows_of
 from fluxproof.diagnosis.session import diagnose
 from studies.blind.generate import generate_case, listing
 
-SEED, LATER, LAST, COUNT = 25112032, 26112026, 27112026, 60
+SEED, LATER, LAST, FOURTH, COUNT = 25112032, 26112026, 27112026, 29112026, 60
 
 
 def files_of(number, tmp_path, seed=SEED, generator="sealed", count=COUNT):
@@ -32,11 +32,14 @@ def files_of(number, tmp_path, seed=SEED, generator="sealed", count=COUNT):
         slowly(LATER, 54, {"inductance_d", "resistance_temperature"}),  # codes that beat were a swing
         (SEED, 10, {"dead_time", "saturation"}),  # a twisting shaft as alternative, which does not help
         (LATER, 24, {"cross_saturation", "friction", "sampling_skew"}),  # both late: a delay instead
-        slowly(SEED, 3, {"emf_harmonics", "iron_loss", "saturation"}),  # the same
         (LAST, 1, {"cogging"}),  # a ripple was judged by the error of a mean torque
         (LAST, 10, {"phase_resistance_asymmetry"}),  # a ripple at a fifth of the order was taken for its cause
         # Without the saturation, held-out points beyond the fitted ones fitted better.
         (LAST, 40, {"cross_saturation", "iron_loss", "saturation"}),
+        (FOURTH, 17, {"cogging", "delay"}),  # all pulses late: a sampling skew, or nothing
+        slowly(FOURTH, 7, {"current_scale", "delay", "resistance_temperature"}),  # the same
+        slowly(FOURTH, 49, {"current_scale", "delay", "magnet_temperature"}),  # the same
+        (SEED, 18, {"cogging", "sampling_skew"}),  # currents sampled while pulses begin: nothing
     ],
 )
 def test_exactly_what_is_there_is_named(seed, number, names, tmp_path):
@@ -60,6 +63,7 @@ def test_the_noise_is_at_most_that_of_the_misfit(tmp_path):
         slowly(LATER, 80, 1, {"current_offset", "sampling_skew"}),  # noise at full speed was cut as if it were outliers
         (LATER, 80, 15, {"inductance_q", "saturation"}),  # the saturation's curve took the inductance
         slowly(LAST, 100, 17, {"cross_saturation", "saturation"}),  # its curve took an inductance to help
+        slowly(FOURTH, 100, 29, {"delay"}),  # all pulses late: a friction, as the torque is a sample too
         (LAST, 100, 51, {"encoder_offset", "inductance_q"}),  # a twisting shaft looked better before the correction
     ],
 )
