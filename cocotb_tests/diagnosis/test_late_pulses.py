@@ -42,7 +42,7 @@ def test_the_ripple_tells_when_the_currents_were_sampled(after):
     view.memo["off_valley"] = after  # the chord ends there
     there = skew.corrected(view, {"tau": 0.0, "pulses": -after * view.sample_time_s})
     there.memo.pop("off_valley")
-    seen = lambda x: current_error(there, off_valley(there, x))["u"]  # noqa: E731
+    seen = lambda view, x: current_error(view, off_valley(view, x))["u"]  # noqa: E731
     assert instant(there, "off_valley", sampling_skew.TRIED, sampling_skew.FINE, seen) == pytest.approx(after, abs=4e-3)
 
 
@@ -61,7 +61,7 @@ def test_the_ripple_tells_how_late_pulses_are(late):
     seconds = late * view.sample_time_s
     there = CATALOGUE["delay"].corrected(view, {"gates": -seconds})  # earlier, so that the recording is late
     there.memo.pop("late_pulses")
-    seen = lambda x: current_error(there, late_ripple(there, x))["u"]  # noqa: E731
+    seen = lambda view, x: current_error(view, late_ripple(view, x))["u"]  # noqa: E731
     found = instant(there, "late_pulses", delay.TRIED, delay.FINE, seen)
     legs = [high(view.duties, 1.0 - x) for x in (late, 0.5 * (late + found), found)]
     bend = np.sqrt(np.mean((legs[1] - 0.5 * (legs[0] + legs[2])) ** 2))  # none within a zero vector

@@ -11,7 +11,7 @@ from fluxproof.diagnosis.inference import settle
 def fit_at(x, key="a"):
     return SimpleNamespace(
         names=("offset",), c={"offset": {key: x}}, take=np.array([0]), vector=np.array([x]),
-        cov=np.array([[1e-4]]), stands=False,
+        cov=np.array([[1e-4]]), stands=False, problem=SimpleNamespace(keys=[("offset", key), ("offset", "b")]),
     )  # fmt: skip
 
 

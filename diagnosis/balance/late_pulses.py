@@ -16,6 +16,7 @@ import numpy as np
 from fluxproof.diagnosis.balance.misfit import misfit
 
 ORDERS = (3.0, -3.0, 6.0, -6.0)  # electrical, at which the ripple differs from a mean voltage that is late
+ENOUGH = 40  # blocks that are looked at
 ALIKE = 1.1  # of the least remainder: instants within it are as good, as those that put the samples in one zero vector
 
 
@@ -48,19 +49,21 @@ def instant(view, name, tried, fine, seen) -> float:
     """Instant (periods) whose ripple leaves the least of the misfit, the same for all views of a recording.
 
     name: of the kind of instant; tried: instants (n,); fine: distance of those tried between two of them;
-    seen: function (instant) -> voltage (b, m) that the samples add to the misfit.
+    seen: function (view, instant) -> voltage (b, m) that the samples add to the misfit.
     """
     if name not in view.memo:
+        memo, step = view.memo, max(1, len(view) // ENOUGH)
+        view = view.take(np.arange(0, len(view), step))
         turns = np.abs(view.theta[:, -1] - view.theta[:, 0]) / (2 * np.pi)
         waves = np.exp(1j * np.array(ORDERS)[:, None, None] * view.theta_mid)
         clear = np.abs(ORDERS)[:, None] * turns > 1.0
         found = misfit(view)["u"]
 
         def left(x):  # absolute values, since a dead time may be there at order 6
-            return float(np.abs(((found - seen(x)) * waves).mean(axis=2))[clear].sum())
+            return float(np.abs(((found - seen(view, x)) * waves).mean(axis=2))[clear].sum())
 
         first, coarse = _middle(tried, left), tried[1] - tried[0]
-        view.memo[name] = _middle(first + np.arange(-coarse, coarse + fine, fine), left)
+        memo[name] = _middle(first + np.arange(-coarse, coarse + fine, fine), left)
     return view.memo[name]
 
 

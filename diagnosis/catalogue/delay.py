@@ -38,10 +38,15 @@ def _moved(view, share):
     return change
 
 
+def _seen(view, at):
+    """Voltage (b, m) [V] that the samples add to the misfit."""
+    return current_error(view, late_ripple(view, at))["u"]
+
+
 def _ripples(view):
     """Ripple (b, m+1) [A/s] per second of delay: the chord up to the delay of the recording, and the tangent there."""
     period = view.sample_time_s
-    late = instant(view, "late_pulses", TRIED, FINE, lambda late: current_error(view, late_ripple(view, late))["u"])
+    late = instant(view, "late_pulses", TRIED, FINE, _seen)
     a, b = max(late - STEP, 0.0), min(late + STEP, 1.0)
     return {
         "gates": late_ripple(view, late) / (late * period),

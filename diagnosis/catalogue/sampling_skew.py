@@ -27,10 +27,15 @@ def _without(view, error):
     return view.replace(i=view.i - error, i_raw=view.i_raw - view.stator(error))
 
 
+def _seen(view, at):
+    """Voltage (b, m) [V] that the samples add to the misfit."""
+    return current_error(view, off_valley(view, at))["u"]
+
+
 def _ripples(view):
     """Current (b, m+1) of the pulses per second of skew: chord up to the instant of the recording, tangent there."""
     period = view.sample_time_s
-    at = instant(view, "off_valley", TRIED, FINE, lambda x: current_error(view, off_valley(view, x))["u"])
+    at = instant(view, "off_valley", TRIED, FINE, _seen)
     step = off_valley(view, at + STEP) - off_valley(view, at - STEP)
     return {"pulses": off_valley(view, at) / (at * period or 1.0), "shift": step / (2.0 * STEP * period)}
 

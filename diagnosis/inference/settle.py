@@ -28,10 +28,14 @@ def _at(setup, c, names):
 
 def moved(fit, before) -> float:
     """Largest change of a coefficient in standard deviations; infinite if the columns changed."""
-    if not np.array_equal(fit.take, before.take):
+    if _columns(fit) != _columns(before):
         return np.inf
     own = np.sqrt(np.maximum(np.diag(fit.cov), 0.0))
     return float(np.max(np.abs(fit.vector - before.vector) / np.maximum(own, 1e-300), initial=0.0))
+
+
+def _columns(fit) -> list:
+    return [fit.problem.keys[n] for n in fit.take]
 
 
 def _halfway(one, other):
