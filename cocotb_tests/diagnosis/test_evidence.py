@@ -8,6 +8,7 @@ from cocotb_tests.support.diagnosed_drives import recorded
 from fluxproof.diagnosis.answer.scan import stray_swing
 from fluxproof.diagnosis.balance.blocks import view_of
 from fluxproof.diagnosis.inference.evidence import evidence
+from fluxproof.diagnosis.inference.points import repeated_dwells
 from fluxproof.diagnosis.inference.problem import Problem, Setup
 from fluxproof.diagnosis.nominal import load_nominal
 from fluxproof.diagnosis.physics import known_effects
@@ -63,6 +64,13 @@ def test_of_currents_and_angle_only_one_is_late():
         assert late[key] in fits[key].take and late[other] not in fits[key].take
         assert fits[key].c["sampling_skew"][key] == pytest.approx(20e-6, rel=0.05)
         assert fits[key].c["sampling_skew"][other] == 0.0 and abs(fits[key].c["delay"]["tau"]) < 1e-6
+
+
+def test_a_dwell_has_one_load():
+    """Two points of one dwell would be two witnesses of a friction that one coincidence explains."""
+    dwell = np.array([0, 0, 1, 1, 2, 3, 3, 3])
+    point = np.array([0, 0, 1, 2, 2, 3, 4, 4])
+    assert repeated_dwells(point, dwell).tolist() == [False, False, False, False, True]
 
 
 def test_a_swing_is_in_most_blocks():

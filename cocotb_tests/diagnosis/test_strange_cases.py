@@ -11,7 +11,7 @@ from fluxproof.diagnosis.physics import rows_of
 from fluxproof.diagnosis.session import diagnose
 from studies.blind.generate import generate_case, listing
 
-SEED, LATER, LAST, FOURTH, COUNT = 25112032, 26112026, 27112026, 29112026, 60
+SEED, LATER, LAST, FOURTH, FIFTH, COUNT = 25112032, 26112026, 27112026, 29112026, 30112026, 60
 
 
 def files_of(number, tmp_path, seed=SEED, generator="sealed", count=COUNT):
@@ -39,6 +39,7 @@ def files_of(number, tmp_path, seed=SEED, generator="sealed", count=COUNT):
         (FOURTH, 17, {"cogging", "delay"}),  # all pulses late: a sampling skew, or nothing
         slowly(FOURTH, 7, {"current_scale", "delay", "resistance_temperature"}),  # the same
         slowly(FOURTH, 49, {"current_scale", "delay", "magnet_temperature"}),  # the same
+        (FIFTH, 1, set()),  # a dry friction that explained the load of one dwell, which was counted twice
         (SEED, 18, {"cogging", "sampling_skew"}),  # currents sampled while pulses begin: nothing
     ],
 )

@@ -85,11 +85,21 @@ def visits(view, points) -> np.ndarray:
     return out
 
 
+def repeated_dwells(point, dwell) -> np.ndarray:
+    """(points,) whether all dwells of a point have an earlier point too; point, dwell: (b,) numbers of the blocks."""
+    out, seen = np.zeros(point.max(initial=-1) + 1, bool), set()
+    for p in range(len(out)):
+        mine = set(dwell[point == p].tolist())
+        out[p] = bool(mine) and mine <= seen
+        seen |= mine
+    return out
+
+
 class Grouping:
     """Which rows of the fit make which mean or contrast; the same for every linearisation of a recording."""
 
-    def __init__(self, cells, point, visit, use):
-        """point, visit: (b,) numbers of the blocks; use: (r,) bool, rows of the fit."""
+    def __init__(self, cells, point, visit, use, dwell):
+        """point, visit, dwell: (b,) numbers of the blocks; use: (r,) bool, rows of the fit."""
         self.rows = rows = np.flatnonzero(use)
         self.channels, channel = np.unique(cells.channel[rows], return_inverse=True)
         order = np.round(cells.order[rows] * 1e6).astype(np.int64)
@@ -105,6 +115,7 @@ class Grouping:
         self.place, self.begin, self.contrast = np.cumsum(first) - 1, np.flatnonzero(first), ~first
         kinds = np.stack([self.names[:, 0], np.abs(self.names[:, 1]), self.contrast], axis=1)
         kinds, group = np.unique(kinds, axis=0, return_inverse=True)
+        self.repeated = repeated_dwells(point, dwell)[self.names[:, 3]]
         self.groups = [(str(self.channels[c]), float(o) * 1e-6, bool(d)) for c, o, d in kinds]
         self.group = group.ravel()
 
@@ -143,8 +154,10 @@ def condense(grouping, y, x, sigma, level, load=0.0, doubt=None) -> Points:
     groups, group = g.groups, g.group
     loads = groups.index(("torque", 0.0, False)) if load and ("torque", 0.0, False) in groups else -1
     keep = np.ones(n, bool)
+    if loads >= 0:  # a dwell has one load, of which a second point would be a second witness
+        keep = ~(g.repeated & (group == loads))
     if load and ("torque", 0.0, True) in groups:  # a load may change between visits
-        keep = group != groups.index(("torque", 0.0, True))
+        keep &= group != groups.index(("torque", 0.0, True))
     return Points(
         out[keep, 0],
         out[keep, 1:],

@@ -44,7 +44,7 @@ class Setup:
         self.level = balance_level(self.view, self.cells)
         self.points = point_numbers(self.view)
         self.visits = visits(self.view, self.points)
-        self.grouping = Grouping(self.cells, self.points, self.visits, self.cells.ok & self.train)
+        self.grouping = Grouping(self.cells, self.points, self.visits, self.cells.ok & self.train, self.view.run)
         self.repeats = _repeats(self.cells, self.points)
         self.shifts = {}
 
