@@ -39,6 +39,7 @@ def files_of(number, tmp_path, seed=SEED, generator="sealed", count=COUNT):
         (FOURTH, 17, {"cogging", "delay"}),  # all pulses late: a sampling skew, or nothing
         slowly(FOURTH, 7, {"current_scale", "delay", "resistance_temperature"}),  # the same
         slowly(FOURTH, 49, {"current_scale", "delay", "magnet_temperature"}),  # the same
+        (FIFTH, 22, set()),  # healthy: at one speed the codes beat with the sampling at order 9.5
         (FIFTH, 1, set()),  # a dry friction that explained the load of one dwell, which was counted twice
         (SEED, 18, {"cogging", "sampling_skew"}),  # currents sampled while pulses begin: nothing
     ],

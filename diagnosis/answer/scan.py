@@ -13,11 +13,12 @@ import numpy as np
 
 from fluxproof.diagnosis.balance.cells import voltage_level
 from fluxproof.diagnosis.balance.misfit import misfit
-from fluxproof.diagnosis.balance.quantised_angle import beat_spectrum
+from fluxproof.diagnosis.balance.quantised_angle import beat_ripple, beat_spectrum
 from fluxproof.diagnosis.effects.effect import rated_torque
 from fluxproof.diagnosis.inference import constants as k
 
 MOST_ORDER = 80  # per mechanical turn
+LEAST_BLOCKS = 6  # in which an order is looked for
 WEIGHTS = {
     "1": (lambda v: np.ones(len(v)), "V"),
     "omega": (lambda v: v.omega.mean(axis=1), "V s/rad"),
@@ -93,26 +94,36 @@ def stray_order(view, residual, floor, known=()) -> Stray | None:
     for n in range(1, MOST_ORDER + 1):
         wave = wave * turn
         found[n], found[-n] = (tapered * wave).mean(axis=1), (tapered * np.conj(wave)).mean(axis=1)
-    best, largest = None, 0.0
-    for n in [*range(1, MOST_ORDER + 1), *range(-MOST_ORDER, 0)]:
-        if any(abs(n) == h * p for h in known):
-            continue
-        use = (abs(n) * turns >= 2.5) & (abs(n) * turns < m / 5)
-        if use.sum() < 6:
-            continue
-        f = found[n][use]
-        least = max(floor, k.LEAST_RIPPLE * float(np.sqrt(np.mean(level[use] ** 2))))
+    def locked(n, use, largest):
+        """The Stray of an order in the blocks ``use`` if it is larger than ``largest`` [V]."""
+        out, f = None, found[n][use]
         for text, (weight, unit) in WEIGHTS.items():
             w = weight(view)[use]
             total = complex(np.sum(w * f))
             lock = abs(total) ** 2 / max(float(np.sum(w**2 * np.abs(f) ** 2)), 1e-300)
             c = abs(total) / max(float(np.sum(w**2)), 1e-300)
             volts = c * float(np.sqrt(np.mean(w**2)))
-            if lock > min(k.LOCKED, 0.7 * use.sum()) and volts > max(least, largest):
+            if lock > min(k.LOCKED, 0.7 * use.sum()) and volts > max(least(use), largest):
                 formula = f"u_d + j u_q = c * {text} * exp(j {n} theta_m + j phi)"
                 explains = abs(total) ** 2 / float(np.sum(w**2) * np.sum(np.abs(f) ** 2))
                 spread = c * float(np.sqrt(max(1.0 - explains, 0.0) / use.sum()))
-                best, largest = Stray("order", formula, c, spread, unit, explains, n / p, volts), volts
+                out, largest = Stray("order", formula, c, spread, unit, explains, n / p, volts), volts
+        return out
+
+    def least(use):
+        return max(floor, k.LEAST_RIPPLE * float(np.sqrt(np.mean(level[use] ** 2))))
+
+    best = None
+    for n in [*range(1, MOST_ORDER + 1), *range(-MOST_ORDER, 0)]:
+        if any(abs(n) == h * p for h in known):
+            continue
+        use, largest = (abs(n) * turns >= 2.5) & (abs(n) * turns < m / 5), best.size if best else 0.0
+        if use.sum() < LEAST_BLOCKS or not locked(n, use, largest):
+            continue
+        # At one speed the codes of an encoder may beat with the sampling at just this order, with one phase.
+        use &= beat_ripple(view, n / p) < least(use) ** 2
+        if use.sum() >= LEAST_BLOCKS:
+            best = locked(n, use, largest) or best
     return best
 
 

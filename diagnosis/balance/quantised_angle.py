@@ -47,6 +47,12 @@ def beat_variance(view, channel, orders) -> np.ndarray:
     return _beats(view, {"u": _voltage, "torque": _torque}[channel], places, tapered=channel == "torque")
 
 
+def beat_ripple(view, order) -> np.ndarray:
+    """Power (b,) [V^2] of the misfit in dq by the beat at an order of a block's tapered spectrum."""
+    places = _turn(view)[:, None] * order / (2 * np.pi)
+    return 2.0 * _beats(view, _voltage, places, tapered=True)[:, 0]
+
+
 def beat_spectrum(view, bins) -> np.ndarray:
     """Variance [V^2] of the misfit in dq by the beat, in bins of a block's tapered spectrum, (b, k); bins: (k,)."""
     places = np.tile(bins / view.u_dc.shape[1], (len(view.omega), 1))
