@@ -51,3 +51,8 @@ def test_a_set_whose_columns_change_does_not_stand(monkeypatch):
 def test_an_impossible_linearisation_is_none(monkeypatch):
     monkeypatch.setattr(settle, "_at", lambda *arguments: None)
     assert settle.settled(None, fit_at(5.0), 3) is None
+
+
+def test_a_column_may_vanish_between_two_steps():
+    one, other = {"skew": {"tau": 2.0}}, {"skew": {"tau": 4.0, "pulses": 6.0}}
+    assert settle._halfway(one, other) == settle._halfway(other, one) == {"skew": {"tau": 3.0, "pulses": 3.0}}

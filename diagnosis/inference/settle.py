@@ -39,7 +39,11 @@ def _columns(fit) -> list:
 
 
 def _halfway(one, other):
-    return {name: {key: 0.5 * (value + one[name][key]) for key, value in own.items()} for name, own in other.items()}
+    """Coefficients in the middle of two; one that has no column at the other is zero there."""
+    return {
+        name: {key: 0.5 * (one[name].get(key, 0.0) + own.get(key, 0.0)) for key in {**one[name], **own}}
+        for name, own in other.items()
+    }
 
 
 def settled(setup, fit, steps) -> Fit | None:
