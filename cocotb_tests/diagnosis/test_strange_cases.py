@@ -30,18 +30,18 @@ def files_of(number, tmp_path, seed=SEED, generator="sealed", count=COUNT):
         (LATER, 9, {"iron_loss", "resistance"}),  # eddy currents that lag looked like a delay
         slowly(LATER, 59, {"current_gain", "friction", "iron_loss"}),  # and like a sampling skew
         slowly(LATER, 54, {"inductance_d", "resistance_temperature"}),  # codes that beat were a swing
-        (SEED, 10, {"dead_time", "saturation"}),  # a twisting shaft as alternative, which does not help
-        (LATER, 24, {"cross_saturation", "friction", "sampling_skew"}),  # both late: a delay instead
+        slowly(SEED, 10, {"dead_time", "saturation"}),  # a twisting shaft as alternative, which does not help
+        slowly(LATER, 24, {"cross_saturation", "friction", "sampling_skew"}),  # both late: a delay instead
         (LAST, 1, {"cogging"}),  # a ripple was judged by the error of a mean torque
         (LAST, 10, {"phase_resistance_asymmetry"}),  # a ripple at a fifth of the order was taken for its cause
         # Without the saturation, held-out points beyond the fitted ones fitted better.
-        (LAST, 40, {"cross_saturation", "iron_loss", "saturation"}),
+        slowly(LAST, 40, {"cross_saturation", "iron_loss", "saturation"}),
         (FOURTH, 17, {"cogging", "delay"}),  # all pulses late: a sampling skew, or nothing
         slowly(FOURTH, 7, {"current_scale", "delay", "resistance_temperature"}),  # the same
         slowly(FOURTH, 49, {"current_scale", "delay", "magnet_temperature"}),  # the same
-        (FIFTH, 22, set()),  # healthy: at one speed the codes beat with the sampling at order 9.5
+        slowly(FIFTH, 22, set()),  # healthy: at one speed the codes beat with the sampling at order 9.5
         (FIFTH, 1, set()),  # a dry friction that explained the load of one dwell, which was counted twice
-        (SEED, 18, {"cogging", "sampling_skew"}),  # currents sampled while pulses begin: nothing
+        slowly(SEED, 18, {"cogging", "sampling_skew"}),  # currents sampled while pulses begin: nothing
     ],
 )
 def test_exactly_what_is_there_is_named(seed, number, names, tmp_path):
@@ -66,7 +66,7 @@ def test_the_noise_is_at_most_that_of_the_misfit(tmp_path):
         (LATER, 80, 15, {"inductance_q", "saturation"}),  # the saturation's curve took the inductance
         slowly(LAST, 100, 17, {"cross_saturation", "saturation"}),  # its curve took an inductance to help
         slowly(FOURTH, 100, 29, {"delay"}),  # all pulses late: a friction, as the torque is a sample too
-        (LAST, 100, 51, {"encoder_offset", "inductance_q"}),  # a twisting shaft looked better before the correction
+        slowly(LAST, 100, 51, {"encoder_offset", "inductance_q"}),  # a twisting shaft looked better at first
     ],
 )
 def test_exactly_what_is_there_is_named_of_the_own_generator(seed, count, number, names, tmp_path):
