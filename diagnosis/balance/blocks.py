@@ -167,14 +167,14 @@ def _mechanics(recording, nominal, i_s, theta, theta_s, linked):
     kind = shaft_kind(recording, nominal, i_s, theta_s, linked)
     slope = np.zeros(n)
     if kind == "torque":
-        # The transducer measures the ripple; the inertial torque is slow.
+        # On an imposed speed the transducer measures the ripple; the inertial torque is slow.
         far = SLOPE_REACH
         bend = theta_s[2 * far :] - 2 * theta_s[far:-far] + theta_s[: -2 * far]
         slope[far:-far] = bend / (far * period) ** 2
     else:  # the ripple of a free shaft appears in the angle only
         slope[1:-2] = (theta[3:] - theta[2:-1] - theta[1:-2] + theta[:-3]) / (2 * period**2)
     slope_m = np.nan_to_num(slope) / nominal.machine.pole_pairs
-    if kind == "torque":
+    if recording.has("torque"):
         omega_m = np.gradient(theta_s, period) / nominal.machine.pole_pairs
         drag, torque = (nominal.machine.viscous_friction_nms or 0.0) * omega_m, recording["torque"]
         if is_airgap(torque, airgap(nominal, i_s), drag):

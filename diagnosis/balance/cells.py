@@ -15,6 +15,7 @@ import numpy as np
 
 from fluxproof.diagnosis.balance.misfit import misfit
 from fluxproof.diagnosis.balance.quantised_angle import beat_variance
+from fluxproof.diagnosis.balance.shaft import bend_gain
 from fluxproof.diagnosis.balance.torque_order import torque_orders
 
 ORDERS_SUM = (0.0, 1.0, 2.0)
@@ -185,8 +186,9 @@ def noise(view, cells, residual) -> np.ndarray:
     """Standard deviation of every row (r,), from the differences of ``residual`` between neighbours in a dwell.
 
     Neighbours share the operating point, so that their difference is noise whatever the physics.  The variance of
-    each order and part is fitted as a + b omega^2, since current noise enters with L / T and with omega L.  Encoder
-    codes add noise at some speeds only (quantised_angle.py).
+    each order and part is fitted as a + b omega^2, since current noise enters with L / T and with omega L; with an
+    acceleration from the codes, it is fitted as a + b g^2, g being the gain of their second difference.  Encoder codes
+    add noise at some speeds only (quantised_angle.py).
     """
     omega = np.abs(view.omega.mean(axis=1))
     top = max(float(omega.max()), 1e-9)
@@ -195,13 +197,15 @@ def noise(view, cells, residual) -> np.ndarray:
     out = np.full(len(cells.y), np.nan)
     for channel in np.unique(cells.channel):
         mine = cells.channel == channel
-        # The torque of a free shaft contains a second difference of the angle: its noise grows with omega^2.
-        shape = np.stack([np.ones(len(view)), share ** (4 if channel == "torque" else 2)], axis=1)
+        bends = channel == "torque" and view.turns_freely.any()
         for order in np.unique(cells.order[mine]):
+            grows = bend_gain(view, order) ** 2 if bends and order else share ** (4 if channel == "torque" else 2)
+            shape = np.stack([np.ones(len(view)), grows], axis=1)
             for part in (0, 1):
                 rows = np.flatnonzero(mine & (cells.order == order) & (cells.part == part))
                 if len(rows):
-                    out[rows] = np.sqrt(_variance(residual[rows], cells.ok[rows], pair, shape))
+                    variance = _steep_variance if bends and order else _variance
+                    out[rows] = np.sqrt(variance(residual[rows], cells.ok[rows], pair, shape))
     for channel in {"u", "torque"} & set(cells.channel):
         mine = cells.channel == channel
         orders, which = np.unique(cells.order[mine], return_inverse=True)
@@ -235,3 +239,21 @@ def _variance(e, ok, pair, shape):
     if a < 0.05 * squares.mean():
         a, b = 0.05 * squares.mean(), 0.95 * squares.mean() / where[:, 1].mean()
     return np.maximum(a + b * shape[:, 1], 1e-30)
+
+
+STEPS = 30  # of the iteration; it changes by less than 1 % before
+
+
+def _steep_variance(e, ok, pair, shape):
+    """The same where b may be all: the most likely a and b of squares that have an exponential distribution."""
+    both = pair[ok[pair] & ok[pair + 1]]
+    if len(both) < 8:
+        return _variance(e, ok, pair, shape)
+    squares, where = 0.5 * (e[both + 1] - e[both]) ** 2, 0.5 * (shape[both] + shape[both + 1])
+    share = np.maximum(squares.mean() / where.mean(axis=0), 1e-30) * 0.5
+    for _ in range(STEPS):  # each part takes its share of the squares (expectation-maximisation)
+        parts = where * share
+        v = parts.sum(axis=1)
+        usual = np.minimum(squares / v, OUTLIER * np.median(squares / v))
+        share = share * (where * (usual / v)[:, None]).sum(axis=0) / (where / v[:, None]).sum(axis=0)
+    return np.maximum(shape @ share, 1e-30)

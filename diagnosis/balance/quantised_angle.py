@@ -93,7 +93,7 @@ def _voltage(view, part, turn, cycles):
 def _torque(view, part, _turn, cycles):
     """Torque [Nm] per rad of the codes' error: the four-point second difference of blocks.py."""
     x = np.pi * cycles
-    inertia = np.where(view.shaft[part] == "torque", 0.0, view.machine.inertia_kgm2 or 0.0)[:, None]
+    inertia = np.where(view.turns_freely[part], view.machine.inertia_kgm2 or 0.0, 0.0)[:, None]
     return inertia / view.machine.pole_pairs * (np.cos(3 * x) - np.cos(x)) / view.sample_time_s**2
 
 

@@ -5,6 +5,8 @@ imposed, which a recording does not state.  The shaft counts as free if changes 
 milliseconds equal, in the median, those of J d omega_m / dt; occasional load steps do not matter.  It counts as
 unloaded if the remaining torque is an odd function of speed alone, in both directions: friction is one, a load only
 by chance.
+
+A transducer on a free shaft measures the load, so that the ripple of the air-gap torque appears in the acceleration.
 """
 
 from __future__ import annotations
@@ -13,18 +15,22 @@ import numpy as np
 
 FREE_RATIO = (0.7, 1.35)  # median of torque change over inertial change
 REACH, LAG = 80, 200  # samples: half window of the slope, and interval of a change
+FREE = ("loaded", "unloaded", "free")  # kinds whose acceleration is computed from the codes of the angle
+MEASURED = ("torque", "loaded")  # kinds with a transducer
 ODD_SHARE = 0.96  # share of the remaining torque's variance that an odd function of speed must explain
 ONE_SPEED = 0.8  # ratio of small and large drag above which the recording has only one speed
 SMALL = 0.01  # of rated torque: a smaller torque is never a load
 
 
 def shaft_kind(recording, nominal, i_s, theta, linked) -> str:
-    """'torque', 'unloaded', 'free' (with a possible load) or ''; i_s, theta: smoothed dq current and angle (n,)."""
-    if recording.has("torque"):
-        return "torque"
+    """'torque', 'loaded' (free, with a torque transducer), 'unloaded', 'free' (with a possible load) or ''.
+
+    i_s, theta: smoothed dq current and angle (n,).
+    """
     m = nominal.machine
+    imposed = "torque" if recording.has("torque") else ""
     if not m.inertia_kgm2:
-        return ""
+        return imposed
     period = nominal.sample_time_s
     torque = airgap(nominal, i_s)
     far = REACH * period
@@ -39,7 +45,9 @@ def shaft_kind(recording, nominal, i_s, theta, linked) -> str:
     x, y = inert[LAG:] - inert[:-LAG], torque[LAG:] - torque[:-LAG]
     moving = np.isfinite(x) & np.isfinite(y) & (np.abs(x) > 0.05 * rated)
     if moving.sum() < 200 or not FREE_RATIO[0] < np.median(y[moving] / x[moving]) < FREE_RATIO[1]:
-        return ""
+        return imposed
+    if imposed:
+        return "loaded"
     good = np.isfinite(inert) & np.isfinite(torque)
     good[:-1] &= linked
     left = (torque - inert - (m.viscous_friction_nms or 0.0) * omega_m)[good][::10]
@@ -75,3 +83,9 @@ def is_airgap(torque, nominal_airgap, drag) -> bool:
     left = (torque - nominal_airgap)[good]
     as_airgap, as_shaft = np.median(np.abs(left)), np.median(np.abs(left + drag[good]))
     return bool(as_airgap < 0.4 * as_shaft)
+
+
+def bend_gain(view, order) -> np.ndarray:
+    """(b,) share of the largest gain with which an angle of this order enters a shaft's acceleration (blocks.py)."""
+    x = order * np.abs(view.omega.mean(axis=1)) * view.sample_time_s
+    return np.where(view.turns_freely, np.abs(np.sin(x) * np.sin(0.5 * x)), 0.0)

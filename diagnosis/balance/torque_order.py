@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from fluxproof.diagnosis.balance.misfit import misfit
+from fluxproof.diagnosis.balance.shaft import bend_gain
 
 LEAST = 5  # per mechanical turn: an unbalanced load or a bent shaft has fewer
 EVERY = 36  # per electrical turn: up to here every order per mechanical turn is a candidate
@@ -58,9 +59,16 @@ def _searched(view) -> int:
         at = n
         use = (n * turns > 2.0) & (n * turns < rows / 2.5)
         f = np.einsum("ij,ij->i", torque[use], wave[use])
-        # The acceleration of a free shaft is noisier at higher speed.
-        weight = 1.0 / np.maximum(np.abs(f) ** 2, np.median(np.abs(f) ** 2)) if len(f) else np.zeros(0)
+        weight = _weights(np.abs(f) ** 2, bend_gain(view, n / pairs)[seen][use] ** 2)
         lock = float(np.abs(np.sum(weight * f)) ** 2 / max(np.sum(weight**2 * np.abs(f) ** 2), 1e-300))
         found.append((lock, float(np.abs(np.sum(weight * f)) / max(np.sum(weight), 1e-300)), n))
     least = LOCKS * max(lock for lock, _, _ in found)
     return max((size, n) for lock, size, n in found if lock >= least)[1] if least > 0.0 else 6 * pairs
+
+
+def _weights(power, gain):
+    """(k,) weights of blocks with these powers; gain: of the angle's noise, 0 with a transducer."""
+    if not len(power):
+        return np.zeros(0)
+    gain = np.where(gain > 0.0, gain, 1.0)
+    return 1.0 / np.maximum(power, gain * np.median(power / gain))

@@ -14,6 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from fluxproof.diagnosis.balance.curves import parabola
+from fluxproof.diagnosis.balance.shaft import FREE
 from fluxproof.diagnosis.inference import constants as k
 
 # What is computed from the angle alone stays known in a copy with the same angle.
@@ -91,6 +92,11 @@ class View:
     def visible(self, effects: dict) -> dict:
         """Those of the effects {name: Effect} that can be seen in any block."""
         return {name: effect for name, effect in effects.items() if self.shows(effect).any()}
+
+    @property
+    def turns_freely(self) -> np.ndarray:
+        """(b,) bool: blocks whose acceleration is a second difference of the angle (blocks.py)."""
+        return np.isin(self.shaft, FREE)
 
     @property
     def machine(self):

@@ -16,7 +16,7 @@ def _seen(view, h):
     x = h * view.omega.mean(axis=1, keepdims=True) * view.sample_time_s
     moved = (9.0 * np.cos(0.5 * x) - np.cos(1.5 * x)) / 8.0
     difference = np.sinc(x / np.pi) * np.sinc(0.5 * x / np.pi)
-    return np.where((view.shaft == "torque")[:, None], moved, difference)
+    return np.where(view.turns_freely[:, None], difference, moved)
 
 
 def _waves(view, n):

@@ -14,6 +14,7 @@ import numpy as np
 from fluxproof.diagnosis.balance.cells import Cells, Projector, cells_of, columns_of, noise
 from fluxproof.diagnosis.balance.curves import parabola
 from fluxproof.diagnosis.balance.misfit import misfit
+from fluxproof.diagnosis.balance.shaft import MEASURED
 from fluxproof.diagnosis.balance.view import View
 from fluxproof.diagnosis.effects.corrections import in_turn, with_flux
 from fluxproof.diagnosis.effects.effect import rated_torque
@@ -31,7 +32,7 @@ class Rows:
     def __init__(self, view, effects, train_blocks):
         self.view, self.effects = view, dict(effects)
         self.projector = Projector(view, loads=True)
-        measured = bool((view.shaft == "torque").all())
+        measured = bool(np.isin(view.shaft, MEASURED).all())
         self.load = 0.0 if measured else rated_torque(view.nominal)
         self.train = train_blocks[self.projector.block]
         self.cells = cells_of(view, self.effects.values(), self.projector)

@@ -1,0 +1,50 @@
+"""A free shaft: its acceleration is a second difference of the angle, whose noise is small at low speed only."""
+
+import numpy as np
+import pytest
+
+from cocotb_tests.diagnosis.test_strange_cases import files_of
+from fluxproof.diagnosis.balance.cells import _steep_variance
+from fluxproof.diagnosis.balance.shaft import bend_gain
+from fluxproof.diagnosis.ingest.load import load_recording
+from fluxproof.diagnosis.nominal import load_nominal
+from fluxproof.diagnosis.physics import rows_of
+from fluxproof.diagnosis.session import diagnose
+
+
+@pytest.mark.parametrize(
+    ("seed", "count", "number", "kind", "names"),
+    [
+        (26112026, 80, 6, "free", {"cogging"}),
+        (27112026, 100, 34, "loaded", {"cogging", "magnet_flux"}),  # the transducer measures the load only
+    ],
+)
+def test_cogging_that_the_speed_loop_conceals_is_named(seed, count, number, kind, names, tmp_path):
+    """Only slow blocks show it; they were given the noise of the fast ones."""
+    recording, drive = files_of(number, tmp_path, seed, "own", count)
+    answer = diagnose(recording, drive)
+    assert {e.name for e in answer.effects} == names and answer.verdict == "explained"
+    assert set(answer.search.setup.view.shaft) == {kind}
+
+
+def test_the_noise_of_an_acceleration_follows_the_gain_of_the_second_difference(tmp_path):
+    recording, drive = files_of(6, tmp_path, 26112026, "own", 80)
+    nominal = load_nominal(drive)
+    rows, _ = rows_of([load_recording(recording, nominal)], nominal)
+    cells, order = rows.cells, 36.0  # not of the cogging
+    mine = (cells.channel == "torque") & (cells.order == order) & cells.ok
+    gain = bend_gain(rows.view, order)[cells.block[mine]]
+    for part in np.array_split(np.argsort(gain), 6):
+        power = np.mean((cells.y[mine][part] / rows.noise[mine][part]) ** 2)
+        assert 0.5 < power < 1.8, (gain[part].min(), gain[part].max())
+
+
+@pytest.mark.parametrize(("constant", "growing"), [(0.0, 1.0), (1.0, 0.0), (1e-4, 1.0)])
+def test_the_variance_of_a_part_is_found_at_any_size(constant, growing):
+    rng, n = np.random.default_rng(5), 400
+    grows = np.linspace(0.0, 1.0, n) ** 4
+    shape = np.stack([np.ones(n), grows], axis=1)
+    true = constant + growing * grows
+    found = _steep_variance(rng.normal(size=n) * np.sqrt(true), np.ones(n, bool), np.arange(n - 1), shape)
+    seen = true > 1e-6
+    assert np.all(np.abs(np.log(found[seen] / true[seen])) < np.log(3.0))
