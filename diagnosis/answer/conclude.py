@@ -49,9 +49,10 @@ def judge(posterior, held) -> Judgement:
     names, best = setup.call(names_of, posterior), posterior.best()
     stray = setup.call(stray_of, posterior, held)
     if not stray and at_floor(Sizes(setup, setup.cells.y, setup.cells.y, ~held, measured_torque(setup))):
-        # What only the shaft shows is in no size where nobody measured the torque: there the names decide.
+        # What only the angle of a free shaft shows is in no size: there the names decide.
         shaft = {n for n, effect in setup.effects.items() if effect.mechanical}
-        names = names.withheld(frozenset() if measured_torque(setup) else frozenset(shaft))
+        hidden = setup.view.turns_freely.any() or not measured_torque(setup)
+        names = names.withheld(frozenset(shaft if hidden else ()))
     likely = {n for n, p in names.maybe.items() if p >= k.LIKELY}
     told = (names.said | {n for group in names.open for n in group} | likely) & set(best.names) - set(names.suspects)
     before, after = setup.cells.y, left_by(best, told)

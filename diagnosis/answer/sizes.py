@@ -40,7 +40,9 @@ class Sizes:
         cells = setup.cells
         ok = cells.ok & blocks[cells.block]
         loads = (cells.channel == "torque") & (cells.order == 0) & (setup.load > 0.0)
-        ok &= ~loads
+        # Where the acceleration is that of the angle's codes, their resolution is not the shaft's.
+        bends = (cells.channel == "torque") & (cells.order != 0) & setup.view.turns_freely[cells.block]
+        ok &= ~loads & ~(bends & measured_torque)
         self.channels, self.orders = {}, {}
         count = max(int(blocks.sum()), 1)
         floor2 = setup.noise**2 + setup.level**2

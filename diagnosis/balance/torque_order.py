@@ -37,6 +37,17 @@ def repeating_order(view) -> int:
     return view.memo["torque_order"]
 
 
+def log_prior(view) -> float:
+    """Log of the prior probability of the repeating order.
+
+    As probable as all others together are those that poles and equal slots can have, multiples of the number of poles.
+    """
+    pairs = view.machine.pole_pairs
+    candidates = np.array(_candidates(pairs))
+    alike = (candidates % (2 * pairs) == 0) == (repeating_order(view) % (2 * pairs) == 0)
+    return -float(np.log(2.0 * alike.sum()))
+
+
 def _candidates(pairs: int) -> list[int]:
     """Orders per mechanical turn that are tried."""
     even = range(2 * pairs, MOST * pairs + 1, 2 * pairs)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fluxproof.diagnosis.balance.torque_order import repeating_order
+from fluxproof.diagnosis.balance.torque_order import log_prior, repeating_order
 from fluxproof.diagnosis.effects.effect import Effect, Parameter, rated_torque
 from fluxproof.diagnosis.result import Estimate
 
@@ -36,6 +36,9 @@ class Cogging(Effect):
 
     def free(self, view):
         return _waves(view, 3 * repeating_order(view))
+
+    def log_choice(self, view):
+        return log_prior(view)
 
     def floor(self, nominal):
         return 0.006 * rated_torque(nominal)

@@ -1,14 +1,25 @@
-"""A common gain error of all current sensors."""
+"""A common gain error of all current sensors.
+
+The coefficient is the share a of the measured current that is not there, i = (1 - a) i_measured, since the balance is
+linear in it at any size; the scale is s = a / (1 - a).
+"""
 
 import numpy as np
 
 from fluxproof.diagnosis.catalogue.current_gain import gain_column
 from fluxproof.diagnosis.effects.effect import Effect, Parameter, current_error, one, sigma
 
+MOST, LEAST = 2.5, -0.75  # of the scale: sensors of a drive that runs measure the current within a factor of 3.5
+
+
+def _scale(c) -> float:
+    return c["share"] / (1.0 - c["share"])
+
 
 class CurrentScale(Effect):
     def core(self, view):
-        return {"scale": gain_column(view, (1.0, 1.0, 1.0)) if view.has_sum else current_error(view, view.i)}
+        column = gain_column(view, (1.0, 1.0, 1.0)) if view.has_sum else current_error(view, view.i)
+        return {"share": {channel: x / view.current_kept for channel, x in column.items()}}
 
     def free(self, view):
         return {"droop": current_error(view, view.i * np.abs(view.i / view.machine.rated_current_a) ** 2)}
@@ -17,23 +28,28 @@ class CurrentScale(Effect):
         return 0.004
 
     def ceiling(self, nominal):
-        return 0.6
+        return -LEAST / (1.0 + LEAST)
+
+    def too_large(self, c, view):
+        return c["share"] >= 1.0 or not LEAST < _scale(c) < MOST
 
     def corrected(self, view, c):
         rated = view.machine.rated_current_a
-        factor = 1.0 / (1.0 + c["scale"] + c.get("droop", 0.0) * np.abs(view.i / rated) ** 2)
+        kept = 1.0 - min(c["share"], MOST / (1.0 + MOST))
+        factor = kept / (1.0 + kept * c.get("droop", 0.0) * np.abs(view.i / rated) ** 2)
         return view.replace(
             i=view.i * factor,
             i_raw=view.i_raw * factor,
             i_abc=None if view.i_abc is None else view.i_abc * factor[..., None],
-            noise_gain=view.noise_gain / (1.0 + c["scale"]),
+            noise_gain=view.noise_gain * kept,
+            current_kept=view.current_kept * kept,
         )
 
     def estimates(self, c, covariance, nominal):
-        return one("scale", "1", c["scale"], sigma(covariance))
+        return one("scale", "1", _scale(c), sigma(covariance) / (1.0 - c["share"]) ** 2)
 
     def plant(self, c, nominal):
-        return {"sensors.current_gain_error": [c["scale"]] * 3}
+        return {"sensors.current_gain_error": [_scale(c)] * 3}
 
 
 EFFECT = CurrentScale(

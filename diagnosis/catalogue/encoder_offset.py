@@ -17,7 +17,7 @@ class EncoderOffset(Effect):
         return 0.004
 
     def ceiling(self, nominal):
-        return 0.8
+        return np.pi
 
     def corrected(self, view, c):
         return view.turned(c["offset"] + c.get("creep", 0.0) * course(view))
@@ -41,4 +41,5 @@ EFFECT = EncoderOffset(
     corrects=True,
     stays="an error of measurement is in the recording itself; the trims act from the next one on",
     needs=("angle",),
+    starts=tuple({"offset": n * np.pi / 4} for n in (-3, -2, -1, 1, 2, 3, 4)),
 )

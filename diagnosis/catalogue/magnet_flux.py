@@ -24,7 +24,7 @@ class MagnetFlux(FluxEffect):
         return 0.003 * nominal.machine.magnet_flux_wb
 
     def ceiling(self, nominal):
-        return 0.6 * nominal.machine.magnet_flux_wb
+        return 2.0 * nominal.machine.magnet_flux_wb
 
     def estimates(self, c, covariance, nominal):
         return one("magnet_flux_wb", "Wb", nominal.machine.magnet_flux_wb + c["delta_psi_m"], sigma(covariance))

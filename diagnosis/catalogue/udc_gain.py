@@ -2,6 +2,8 @@
 
 from fluxproof.diagnosis.effects.effect import Effect, Parameter, one, sigma, voltage
 
+MOST, LEAST = 2.5, -0.75  # of the gain: the sensor of a drive that runs measures its bus within a factor of 3.5
+
 
 class UdcGain(Effect):
     def core(self, view):
@@ -12,14 +14,17 @@ class UdcGain(Effect):
         return 0.003
 
     def ceiling(self, nominal):
-        return 0.5
+        return MOST
+
+    def too_large(self, c, view):
+        return not LEAST < c["gain"] < MOST
 
     def corrected(self, view, c):
-        factor = 1.0 / (1.0 + c["gain"])
+        factor = 1.0 / (1.0 + max(c["gain"], LEAST))
         return view.replace(u=view.u * factor, u_dc=view.u_dc * factor)
 
     def estimates(self, c, covariance, nominal):
-        return one("udc_gain", "1", c["gain"], sigma(covariance))
+        return one("udc_gain", "1", c["gain"], sigma(covariance) * (1.0 + c["gain"]))
 
     def plant(self, c, nominal):
         return {"sensors.u_dc_gain_error": c["gain"]}

@@ -28,6 +28,7 @@ NEEDS = {
     "inverter": "an inverter that switches",
     "current": "measured currents",
 }
+LEAST_LEFT = 0.1  # of a parameter of the machine: a smaller one is not this machine
 DOUBT = 2.0  # standard deviations by which a value must violate a limit to be rejected
 
 
@@ -69,6 +70,7 @@ class Effect:
     corrects: bool = (
         False  # a measurement error rather than a property of the machine: ``corrected`` removes it from the data
     )
+    starts: tuple[dict, ...] = ()  # coefficients from which a large misfit is also approached, far from a linear effect
     one_of: tuple[tuple[str, ...], ...] = ()  # groups of coefficients that exclude each other
     bounded: tuple[str, ...] = ()  # free coefficients that only their prior keeps apart from other effects
     drift_of: str = ""  # the constant effect of which this one is a slow drift
@@ -99,6 +101,10 @@ class Effect:
         """Further columns, for a curve as free as the effect's variables and symmetry allow."""
         return {}
 
+    def log_choice(self, view) -> float:
+        """Log of the prior probability of what was chosen for the columns, such as an order of a torque."""
+        return 0.0
+
     def curve_scale(self, key, cores: dict[str, float], nominal) -> float:
         """Coefficient of the free column ``key`` that departs from the formula by as much as the formula itself.
 
@@ -116,7 +122,12 @@ class Effect:
 
     def too_large(self, c: dict[str, float], view) -> bool:
         """Whether coefficients c are impossible in a drive that runs."""
-        return self.size(c, view.nominal) > self.ceiling(view.nominal)
+        return self.size(c, view.nominal) > self.ceiling(view.nominal) or self._leaves_nothing(c, view.machine)
+
+    def _leaves_nothing(self, c, machine) -> bool:
+        """Whether the first coefficient makes a parameter of the machine negative or nearly zero."""
+        values = [getattr(machine, key) for key in self.rescales if hasattr(machine, key)]
+        return any(value + next(iter(c.values())) < LEAST_LEFT * value for value in values)
 
     def size(self, c: dict[str, float], nominal) -> float:
         """Size of the effect as one number, in the unit of its ``floor``."""

@@ -37,11 +37,22 @@ class Rows:
         self.train = train_blocks[self.projector.block]
         self.cells = cells_of(view, self.effects.values(), self.projector)
         every = np.ones(len(self.cells.y), bool)
-        rough = Fitter(self.cells, np.ones(len(every)), every).solve(everything(self.cells))
+        plain = noise(view, self.cells, self.cells.y)
+        # The torque of a free shaft may be all noise at high orders: equal weights would fit that alone.
+        rough = Fitter(self.cells, _weighable(plain, self.cells), every).solve(everything(self.cells))
         # Both bound the noise: the misfit also has what differs between neighbours, the rough fit what it fits wrongly.
-        self.noise = np.minimum(noise(view, self.cells, rough.residual), noise(view, self.cells, self.cells.y))
+        self.noise = np.minimum(noise(view, self.cells, rough.residual), plain)
         self.smooth = smooth(view)
         self.smooth_rows = self.projector.rows(misfit(self.smooth))
+
+
+def _weighable(sigma, cells):
+    """(r,) noise for the weights of a fit: none is far below what is usual in its channel."""
+    out = sigma.copy()
+    for channel in np.unique(cells.channel):
+        mine = cells.channel == channel
+        out[mine] = np.maximum(sigma[mine], np.median(sigma[mine & cells.ok]) if (mine & cells.ok).any() else 1.0)
+    return out
 
 
 def smooth(view):

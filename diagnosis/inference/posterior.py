@@ -7,8 +7,9 @@ import itertools
 
 import numpy as np
 
+from fluxproof.diagnosis.balance.cells import voltage_level
 from fluxproof.diagnosis.inference.problem import Problem, Setup
-from fluxproof.diagnosis.inference.settle import around, settled
+from fluxproof.diagnosis.inference.settle import around, settled, settled_from
 
 ROUNDS = 3
 SETTLED = 12  # most linearisations of the final set
@@ -19,6 +20,7 @@ GROWN = 3  # effects up to which all good sets are grown
 MOST = 6
 ALIKE = 8  # best sets that are linearised on their own before the search around one of them
 LEADERS = 3  # best single effects that are linearised on their own
+FAR = 0.3  # of the voltage: only a larger misfit can be of an effect that is far from linear
 
 
 class Posterior:
@@ -40,10 +42,13 @@ class Posterior:
         for name in able:
             if self.setup.effects[name].corrects:
                 self._linearise((name,))
+        far = [n for n in able if self.setup.effects[n].starts and self._approach(n)]
         for fit in sorted((f for f in self.fits.values() if len(f.names) == 1), key=lambda f: -f.value)[:LEADERS]:
             if fit.names not in self.own:
                 self._linearise(fit.names)
         self._grow(first, able)
+        for name in far:
+            self._neighbours(around(self.setup, self.fits[(name,)]), (name,))
         # Sets that are alike before the data are corrected may differ much afterwards.
         least = self.best().value - CLOSE
         for fit in sorted(self.fits.values(), key=lambda f: -f.value)[:ALIKE]:
@@ -100,6 +105,18 @@ class Posterior:
         if found is None or not possible(found):
             self.fits[names].value = -np.inf
         self.own.add(names)
+
+    def _approach(self, name) -> bool:
+        """Whether an effect alone stands better where it was approached from one of its ``starts``."""
+        cells, plain = self.setup.cells, self.fits[(name,)]
+        means = (cells.channel == "u") & (cells.order == 0.0)
+        if np.sum(cells.y[means] ** 2) < FAR**2 * np.sum(voltage_level(self.setup.view) ** 2):
+            return False
+        for c in self.setup.effects[name].starts:
+            fit = settled_from(self.setup, {name: c}, SETTLED)
+            if fit is not None and possible(fit) and fit.value > self.fits[(name,)].value:
+                self.fits[(name,)] = fit
+        return self.fits[(name,)] is not plain
 
     def _grow(self, problem, able):
         wide = int(np.clip(EFFORT / max(len(problem.p.y), 1), *KEPT))

@@ -67,6 +67,12 @@ def settled(setup, fit, steps) -> Fit | None:
     return fit
 
 
+def settled_from(setup, c, steps) -> Fit | None:
+    """A set of effects on its own linearisation, approached from its coefficients c, or None."""
+    problem = _at(setup, c, tuple(c))
+    return None if problem is None else settled(setup, problem.fit(tuple(c)), steps)
+
+
 def fit_of_set(setup, names, steps=3) -> Fit:
     """A set of effects on its own linearisation, from the recording as it is."""
     fit = Problem(setup).fit(names)
