@@ -127,7 +127,7 @@ def test_hysteresis_draws_its_current_at_a_low_speed_too(view):
     assert not CATALOGUE["iron_loss"].too_large({"g_fe": g}, slow)
     assert CATALOGUE["iron_loss"].too_large({"g_fe": g}, view.replace(memo={}))
     bus = CATALOGUE["udc_gain"].too_large
-    assert bus({"gain": 0.6}, view) and not bus({"gain": 0.4}, view)
+    assert bus({"gain": 2.6}, view) and bus({"gain": -0.8}, view) and not bus({"gain": 2.0}, view)
 
 
 def test_friction_cannot_drive_the_shaft():
