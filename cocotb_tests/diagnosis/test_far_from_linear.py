@@ -1,0 +1,46 @@
+"""Errors of measurement so large that no line reaches them: scales of 0.3 to 3, angles over the whole turn."""
+
+import numpy as np
+import pytest
+
+from cocotb_tests.support.mistakes import PHASES, Mistake, scaled, turned, written
+from cocotb_tests.support.slow import slowly
+from fluxproof.diagnosis.session import diagnose
+
+
+def answer_to(mistake, tmp_path):
+    return diagnose(*written(mistake, tmp_path))
+
+
+@pytest.mark.parametrize("degrees", [100, slowly(48), slowly(-75), slowly(-150), slowly(165)])
+def test_an_angle_off_by_any_part_of_a_turn_is_found(degrees, tmp_path):
+    answer = answer_to(Mistake("", turned(np.radians(degrees))), tmp_path)
+    assert answer.verdict == "explained" and [e.name for e in answer.effects] == ["encoder_offset"]
+    offset = answer.effects[0].parameters["offset_rad"]
+    assert abs(np.degrees(offset.value) - degrees) < 1.0 and offset.sigma < 0.02
+
+
+@pytest.mark.parametrize(
+    ("columns", "factor", "name", "parameter"),
+    [
+        (PHASES, 0.3, "current_scale", "scale"),  # R, L_d and L_q, each by the same factor
+        slowly(PHASES, 1.6, "current_scale", "scale"),  # line-to-line values, and a scale beside them
+        slowly(PHASES, 3.0, "current_scale", "scale"),
+        (("u_dc",), 1.7, "udc_gain", "udc_gain"),  # two readings, and a gain beside them
+        slowly(("u_dc",), 0.4, "udc_gain", "udc_gain"),
+        slowly(("u_dc",), 3.0, "udc_gain", "udc_gain"),
+    ],
+)
+def test_a_scale_is_one_cause_at_any_size(columns, factor, name, parameter, tmp_path):
+    answer = answer_to(Mistake("", scaled(columns, factor)), tmp_path)
+    assert answer.verdict == "explained" and not answer.conventions
+    assert [e.name for e in answer.effects] == [name]
+    found = answer.effects[0].parameters[parameter]
+    assert abs(found.value - (factor - 1.0)) < 0.01 * factor + 2.0 * found.sigma
+
+
+def test_no_parameter_of_a_machine_is_negative(tmp_path):
+    """With the d axis mirrored, a resistance of -1.6 ohm fits best."""
+    answer = answer_to(Mistake("", scaled(("i_d", "u_d_ref"), -1.0), dq=True), tmp_path)
+    values = [p.value for e in answer.effects for n, p in e.parameters.items() if n.endswith(("_ohm", "_h", "_wb"))]
+    assert all(v > 0.0 for v in values)
