@@ -13,6 +13,7 @@ import numpy as np
 from fluxproof.diagnosis.answer.headline import sentence
 from fluxproof.diagnosis.answer.locate import evidence, locate
 from fluxproof.diagnosis.answer.request import requests
+from fluxproof.diagnosis.answer.slow_names import kind_of, sorted_out
 from fluxproof.diagnosis.answer.uncertainty import named
 from fluxproof.diagnosis.balance.cells import voltage_level
 from fluxproof.diagnosis.balance.slow_view import slow_view
@@ -20,7 +21,6 @@ from fluxproof.diagnosis.balance.view import joined_views
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.conventions.judge import preferred
 from fluxproof.diagnosis.conventions.tell import under
-from fluxproof.diagnosis.inference import constants as k
 from fluxproof.diagnosis.inference.posterior import Posterior
 from fluxproof.diagnosis.inference.problem import Setup
 from fluxproof.diagnosis.inference.settle import fit_of_set
@@ -29,7 +29,6 @@ from fluxproof.diagnosis.one_point import diagnose_one_point
 from fluxproof.diagnosis.result import Diagnosis, Fit, Remainder
 
 HOLDOUT_EVERY = 4
-AT_FLOOR = 2.0  # ratio of a misfit to the noise floor up to which it is noise
 
 
 def diagnose_slow(recordings, nominal, progress=lambda text: None) -> Diagnosis:
@@ -63,16 +62,9 @@ def diagnose_points(view, progress=lambda text: None) -> Diagnosis:
     held = held_points(view)
     search = SlowSearch(view, ~held, progress)
     found = search.run()
-    names, ambiguity, weak = _sorted_out(found)
+    names, ambiguity, weak = sorted_out(found)
     fit = _fit(search, found, held)
-    left = found.best.chi2 / max(found.best.rows - found.best.count, 1)
-    if not found.best.model.names:
-        at_floor = fit.train_before <= AT_FLOOR * fit.noise_floor
-        verdict = "no_mismatch" if left <= k.LEFTOVER or at_floor else "unexplained"
-    elif left > k.LEFTOVER and fit.share_left > k.FLOOR_SHARE:
-        verdict = "partly_explained" if fit.explained_share >= k.NAMED_SHARE else "unexplained"
-    else:
-        verdict = "ambiguous" if ambiguity else "explained" if names else "no_mismatch"
+    verdict = kind_of(fit, found, names, ambiguity)
     answer = Diagnosis(verdict, "", location=locate(view, search.cells, found.pure), fit=fit)
     if verdict in ("explained", "partly_explained", "ambiguous"):
         answer.effects = model_effects(search, found, names)
@@ -81,7 +73,7 @@ def diagnose_points(view, progress=lambda text: None) -> Diagnosis:
     if verdict in ("partly_explained", "unexplained"):
         size = max(fit.holdout_after**2 - fit.noise_floor**2, 0.0) ** 0.5
         answer.remainder = [Remainder("u_dq", 0.0, size, "V", 1.0 - fit.explained_share)]
-    if ambiguity:
+    if answer.ambiguity:
         progress("choosing the next recording")
         setup = Setup(view, search.effects, ~held)
         fits = [fit_of_set(setup, s.model.names) for s in (found.best, *found.tied)]
@@ -96,7 +88,7 @@ def diagnose_points(view, progress=lambda text: None) -> Diagnosis:
     ):  # a slow log has no angle and no harmonics
         answer.evidence.arrays.pop(name, None)
     answer.sentence = sentence(answer, CATALOGUE)
-    answer.notes = _notes(view, held, ambiguity, weak, found)
+    answer.notes = _notes(view, held, answer.ambiguity) + _doubts(found, verdict, weak)
     answer.search, answer.found, answer.held = search, found, held
     return answer
 
@@ -118,27 +110,6 @@ def axis_misfit(search, solution, blocks) -> dict:
     return out
 
 
-def _sorted_out(found):
-    """(asserted names, ambiguity sets, names that are too weak), from the best model and the tied ones."""
-    best = found.best.model.names
-    asserted, groups, weak = set(best), [], set()
-    differences = [(best - other.model.names, other.model.names - best) for other in found.tied]
-    for gone, come in sorted(differences, key=lambda d: len(d[0]) + len(d[1])):
-        asserted -= gone
-        if not come:
-            weak |= gone
-            continue
-        group = (gone | come) - weak
-        if any(group <= g for g in groups) or group <= set().union(*groups):
-            continue  # a combination of two exchanges that are already known
-        for g in [g for g in groups if g & group]:
-            groups.remove(g)
-            group = group | g
-        if len(group) > 1:
-            groups.append(group)
-    return sorted(asserted), [sorted(g) for g in groups], sorted(weak)
-
-
 def _fit(search, found, held) -> Fit:
     def both(blocks):
         d, q = axis_misfit(search, found.best, blocks).values()
@@ -148,7 +119,7 @@ def _fit(search, found, held) -> Fit:
     return Fit("u_dq", "V", *both(~held), *both(held), floor)
 
 
-def _notes(view, held, ambiguity, weak, found) -> list[str]:
+def _notes(view, held, ambiguity) -> list[str]:
     m = view.machine
     points = len(np.unique(view.run))
     unseen = [name for name, effect in CATALOGUE.items() if not view.shows(effect).any()]
@@ -175,8 +146,18 @@ def _notes(view, held, ambiguity, weak, found) -> list[str]:
     share = float((m.resistance_ohm * np.abs(i) / voltage_level(view).clip(1e-9)).max())
     if share < 0.1:
         notes.append(f"The resistance drops at most {share:.1%} of the voltage: it cannot be determined here.")
-    notes += [f"{name} improves the fit, but not significantly." for name in weak]
     for group in ambiguity:
         for name in group:
             notes.append(f"{name} is separated from similar effects by: {CATALOGUE[name].separated_by}.")
     return notes
+
+
+def _doubts(found, verdict, weak) -> list[str]:
+    """Effects of the best model that are not named, with the reason."""
+    if verdict == "no_mismatch":
+        names, why = sorted(found.best.model.names), "the misfit is at the noise floor"
+    elif verdict == "unexplained":
+        names, why = sorted(found.best.model.names), "too much is left for it to be asserted"
+    else:
+        names, why = weak, "not significantly"
+    return [f"{name} improves the fit, but {why}." for name in names]

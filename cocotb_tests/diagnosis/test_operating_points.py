@@ -85,6 +85,18 @@ def test_rounded_values_and_transients_of_a_slow_log(tmp_path):
     assert found(answer) == {"magnet_flux_wb": pytest.approx(0.95 * PSI, rel=0.005)}
 
 
+@pytest.mark.parametrize("size, verdict", [(0.5, "no_mismatch"), (4.0, "ambiguous")])
+def test_either_of_two_causes_is_not_agreement(tmp_path, size, verdict):
+    """Within so narrow a range of currents resistance and dead time imitate each other."""
+    points = [(w, 0.0, q) for w in (80.0, 200.0, 350.0, -300.0) for q in np.linspace(2.5, 4.5, 4)]
+    truth = Truth(r=R + 0.08 * size, v_dead=0.25 * size)
+    answer = answer_of(tmp_path, table(truth, points=points, noise_v=0.02))
+    assert answer.verdict == verdict and not answer.effects, answer.sentence
+    assert answer.ambiguity == ([["dead_time", "resistance"]] if verdict == "ambiguous" else [])
+    assert (answer.fit.train_before <= 2.0 * answer.fit.noise_floor) == (verdict == "no_mismatch")
+    assert verdict == "ambiguous" or said(answer, "improves the fit, but the misfit is at the noise floor")
+
+
 @pytest.mark.parametrize("rows", [1, 2, 3])
 def test_few_rows_of_a_healthy_drive_are_healthy(tmp_path, rows):
     for first in (0, 4, 10, 20):
