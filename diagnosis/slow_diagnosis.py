@@ -13,14 +13,15 @@ import numpy as np
 from fluxproof.diagnosis.answer.headline import sentence
 from fluxproof.diagnosis.answer.locate import evidence, locate
 from fluxproof.diagnosis.answer.request import requests
-from fluxproof.diagnosis.answer.slow_names import kind_of, sorted_out
+from fluxproof.diagnosis.answer.slow_names import bearable, kind_of, sorted_out
 from fluxproof.diagnosis.answer.uncertainty import named
 from fluxproof.diagnosis.balance.cells import voltage_level
 from fluxproof.diagnosis.balance.slow_view import slow_view
 from fluxproof.diagnosis.balance.view import joined_views
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.conventions.judge import preferred
-from fluxproof.diagnosis.conventions.tell import under
+from fluxproof.diagnosis.conventions.tell import not_told, under
+from fluxproof.diagnosis.inference import constants as k
 from fluxproof.diagnosis.inference.posterior import Posterior
 from fluxproof.diagnosis.inference.problem import Setup
 from fluxproof.diagnosis.inference.settle import fit_of_set
@@ -42,9 +43,14 @@ def diagnose_slow(recordings, nominal, progress=lambda text: None) -> Diagnosis:
         return answer
     posterior = Posterior(Setup(view, view.visible(CATALOGUE), ~held_points(view)), progress)
     readings, rivals, _ = preferred(recordings, posterior, answer.verdict != "unexplained", progress)
+    if not readings:
+        return answer
     for reading in readings:
         view = reading.of_view(view)
-    return under(readings, rivals, answer, diagnose_points(view, progress)) if readings else answer
+    read = diagnose_points(view, progress)
+    if not bearable(read.fit, _level(view)):
+        return not_told(readings, answer)
+    return under(readings, rivals, answer, read, k.NAMED_SHARE)
 
 
 def held_points(view) -> np.ndarray:
@@ -63,10 +69,13 @@ def diagnose_points(view, progress=lambda text: None) -> Diagnosis:
     search = SlowSearch(view, ~held, progress)
     found = search.run()
     names, ambiguity, weak = sorted_out(found)
-    fit = _fit(search, found, held)
-    verdict = kind_of(fit, found, names, ambiguity)
+    fit = _fit(search, found, found.best, held)
+    verdict = kind_of(fit, found, names, ambiguity, _level(view))
+    told = found.best if verdict in ("explained", "partly_explained", "ambiguous") else found.empty
+    if told is found.empty:  # nothing is named, so nothing is explained and the whole misfit is left
+        fit = _fit(search, found, told, held)
     answer = Diagnosis(verdict, "", location=locate(view, search.cells, found.pure), fit=fit)
-    if verdict in ("explained", "partly_explained", "ambiguous"):
+    if told is found.best:
         answer.effects = model_effects(search, found, names)
         answer.ambiguity = ambiguity
         answer.explained_share = fit.explained_share
@@ -78,7 +87,7 @@ def diagnose_points(view, progress=lambda text: None) -> Diagnosis:
         setup = Setup(view, search.effects, ~held)
         fits = [fit_of_set(setup, s.model.names) for s in (found.best, *found.tied)]
         answer.next_recording = requests(setup, fits, fit.noise_floor)
-    cells, residual = search.residual(found.best)
+    cells, residual = search.residual(told)
     answer.evidence = evidence(view, (search.cells, search.cells.y), (cells, residual), found.pure, held)
     for name in (
         "theta_e",
@@ -110,9 +119,14 @@ def axis_misfit(search, solution, blocks) -> dict:
     return out
 
 
-def _fit(search, found, held) -> Fit:
+def _level(view) -> float:
+    """rms of the voltage [V]."""
+    return float(np.sqrt(np.mean(voltage_level(view) ** 2)))
+
+
+def _fit(search, found, solution, held) -> Fit:
     def both(blocks):
-        d, q = axis_misfit(search, found.best, blocks).values()
+        d, q = axis_misfit(search, solution, blocks).values()
         return [float(np.hypot(d[k], q[k])) for k in ("before", "after")]
 
     floor = float(np.sqrt(2.0 * np.mean(found.sigma[(search.cells.order == 0) & (search.cells.channel == "u")] ** 2)))

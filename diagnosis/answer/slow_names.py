@@ -38,13 +38,18 @@ def at_floor(fit, found) -> bool:
     return fit.train_before <= AT_FLOOR * fit.noise_floor and (quiet or not found.best.model.names)
 
 
-def kind_of(fit, found, names, ambiguity) -> str:
-    """The verdict; names, ambiguity: of ``sorted_out``."""
+def bearable(fit, level) -> bool:
+    """Whether physics without a name could leave what is left; level: rms of the voltage [V]."""
+    return fit.holdout_after <= max(k.SLOW_REST * level, AT_FLOOR * fit.noise_floor)
+
+
+def kind_of(fit, found, names, ambiguity, level) -> str:
+    """The verdict; names, ambiguity: of ``sorted_out``; level: rms of the voltage [V]."""
     if at_floor(fit, found):
         return "no_mismatch"
     if not names and not ambiguity:
         return "unexplained"
     left = found.best.chi2 / max(found.best.rows - found.best.count, 1)
     if left > k.LEFTOVER and fit.share_left > k.FLOOR_SHARE:
-        return "partly_explained" if fit.explained_share >= k.NAMED_SHARE else "unexplained"
+        return "partly_explained" if fit.explained_share >= k.NAMED_SHARE and bearable(fit, level) else "unexplained"
     return "ambiguous" if ambiguity else "explained"
