@@ -13,13 +13,14 @@ import numpy as np
 from fluxproof.diagnosis.answer.headline import sentence
 from fluxproof.diagnosis.answer.locate import evidence, locate
 from fluxproof.diagnosis.answer.request import requests
+from fluxproof.diagnosis.answer.slow_names import bearable, kind_of, sorted_out
 from fluxproof.diagnosis.answer.uncertainty import named
 from fluxproof.diagnosis.balance.cells import voltage_level
 from fluxproof.diagnosis.balance.slow_view import slow_view
 from fluxproof.diagnosis.balance.view import joined_views
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.conventions.judge import preferred
-from fluxproof.diagnosis.conventions.tell import under
+from fluxproof.diagnosis.conventions.tell import not_told, under
 from fluxproof.diagnosis.inference import constants as k
 from fluxproof.diagnosis.inference.posterior import Posterior
 from fluxproof.diagnosis.inference.problem import Setup
@@ -29,7 +30,6 @@ from fluxproof.diagnosis.one_point import diagnose_one_point
 from fluxproof.diagnosis.result import Diagnosis, Fit, Remainder
 
 HOLDOUT_EVERY = 4
-AT_FLOOR = 2.0  # ratio of a misfit to the noise floor up to which it is noise
 
 
 def diagnose_slow(recordings, nominal, progress=lambda text: None) -> Diagnosis:
@@ -43,9 +43,14 @@ def diagnose_slow(recordings, nominal, progress=lambda text: None) -> Diagnosis:
         return answer
     posterior = Posterior(Setup(view, view.visible(CATALOGUE), ~held_points(view)), progress)
     readings, rivals, _ = preferred(recordings, posterior, answer.verdict != "unexplained", progress)
+    if not readings:
+        return answer
     for reading in readings:
         view = reading.of_view(view)
-    return under(readings, rivals, answer, diagnose_points(view, progress)) if readings else answer
+    read = diagnose_points(view, progress)
+    if not bearable(read.fit, _level(view)):
+        return not_told(readings, answer)
+    return under(readings, rivals, answer, read, k.NAMED_SHARE)
 
 
 def held_points(view) -> np.ndarray:
@@ -63,30 +68,26 @@ def diagnose_points(view, progress=lambda text: None) -> Diagnosis:
     held = held_points(view)
     search = SlowSearch(view, ~held, progress)
     found = search.run()
-    names, ambiguity, weak = _sorted_out(found)
-    fit = _fit(search, found, held)
-    left = found.best.chi2 / max(found.best.rows - found.best.count, 1)
-    if not found.best.model.names:
-        at_floor = fit.train_before <= AT_FLOOR * fit.noise_floor
-        verdict = "no_mismatch" if left <= k.LEFTOVER or at_floor else "unexplained"
-    elif left > k.LEFTOVER and fit.share_left > k.FLOOR_SHARE:
-        verdict = "partly_explained" if fit.explained_share >= k.NAMED_SHARE else "unexplained"
-    else:
-        verdict = "ambiguous" if ambiguity else "explained" if names else "no_mismatch"
+    names, ambiguity, weak = sorted_out(found)
+    fit = _fit(search, found, found.best, held)
+    verdict = kind_of(fit, found, names, ambiguity, _level(view))
+    told = found.best if verdict in ("explained", "partly_explained", "ambiguous") else found.empty
+    if told is found.empty:  # nothing is named, so nothing is explained and the whole misfit is left
+        fit = _fit(search, found, told, held)
     answer = Diagnosis(verdict, "", location=locate(view, search.cells, found.pure), fit=fit)
-    if verdict in ("explained", "partly_explained", "ambiguous"):
+    if told is found.best:
         answer.effects = model_effects(search, found, names)
         answer.ambiguity = ambiguity
         answer.explained_share = fit.explained_share
     if verdict in ("partly_explained", "unexplained"):
         size = max(fit.holdout_after**2 - fit.noise_floor**2, 0.0) ** 0.5
         answer.remainder = [Remainder("u_dq", 0.0, size, "V", 1.0 - fit.explained_share)]
-    if ambiguity:
+    if answer.ambiguity:
         progress("choosing the next recording")
         setup = Setup(view, search.effects, ~held)
         fits = [fit_of_set(setup, s.model.names) for s in (found.best, *found.tied)]
         answer.next_recording = requests(setup, fits, fit.noise_floor)
-    cells, residual = search.residual(found.best)
+    cells, residual = search.residual(told)
     answer.evidence = evidence(view, (search.cells, search.cells.y), (cells, residual), found.pure, held)
     for name in (
         "theta_e",
@@ -96,7 +97,7 @@ def diagnose_points(view, progress=lambda text: None) -> Diagnosis:
     ):  # a slow log has no angle and no harmonics
         answer.evidence.arrays.pop(name, None)
     answer.sentence = sentence(answer, CATALOGUE)
-    answer.notes = _notes(view, held, ambiguity, weak, found)
+    answer.notes = _notes(view, held, answer.ambiguity) + _doubts(found, verdict, weak)
     answer.search, answer.found, answer.held = search, found, held
     return answer
 
@@ -118,37 +119,21 @@ def axis_misfit(search, solution, blocks) -> dict:
     return out
 
 
-def _sorted_out(found):
-    """(asserted names, ambiguity sets, names that are too weak), from the best model and the tied ones."""
-    best = found.best.model.names
-    asserted, groups, weak = set(best), [], set()
-    differences = [(best - other.model.names, other.model.names - best) for other in found.tied]
-    for gone, come in sorted(differences, key=lambda d: len(d[0]) + len(d[1])):
-        asserted -= gone
-        if not come:
-            weak |= gone
-            continue
-        group = (gone | come) - weak
-        if any(group <= g for g in groups) or group <= set().union(*groups):
-            continue  # a combination of two exchanges that are already known
-        for g in [g for g in groups if g & group]:
-            groups.remove(g)
-            group = group | g
-        if len(group) > 1:
-            groups.append(group)
-    return sorted(asserted), [sorted(g) for g in groups], sorted(weak)
+def _level(view) -> float:
+    """rms of the voltage [V]."""
+    return float(np.sqrt(np.mean(voltage_level(view) ** 2)))
 
 
-def _fit(search, found, held) -> Fit:
+def _fit(search, found, solution, held) -> Fit:
     def both(blocks):
-        d, q = axis_misfit(search, found.best, blocks).values()
+        d, q = axis_misfit(search, solution, blocks).values()
         return [float(np.hypot(d[k], q[k])) for k in ("before", "after")]
 
     floor = float(np.sqrt(2.0 * np.mean(found.sigma[(search.cells.order == 0) & (search.cells.channel == "u")] ** 2)))
     return Fit("u_dq", "V", *both(~held), *both(held), floor)
 
 
-def _notes(view, held, ambiguity, weak, found) -> list[str]:
+def _notes(view, held, ambiguity) -> list[str]:
     m = view.machine
     points = len(np.unique(view.run))
     unseen = [name for name, effect in CATALOGUE.items() if not view.shows(effect).any()]
@@ -175,8 +160,18 @@ def _notes(view, held, ambiguity, weak, found) -> list[str]:
     share = float((m.resistance_ohm * np.abs(i) / voltage_level(view).clip(1e-9)).max())
     if share < 0.1:
         notes.append(f"The resistance drops at most {share:.1%} of the voltage: it cannot be determined here.")
-    notes += [f"{name} improves the fit, but not significantly." for name in weak]
     for group in ambiguity:
         for name in group:
             notes.append(f"{name} is separated from similar effects by: {CATALOGUE[name].separated_by}.")
     return notes
+
+
+def _doubts(found, verdict, weak) -> list[str]:
+    """Effects of the best model that are not named, with the reason."""
+    if verdict == "no_mismatch":
+        names, why = sorted(found.best.model.names), "the misfit is at the noise floor"
+    elif verdict == "unexplained":
+        names, why = sorted(found.best.model.names), "too much is left for it to be asserted"
+    else:
+        names, why = weak, "not significantly"
+    return [f"{name} improves the fit, but {why}." for name in names]

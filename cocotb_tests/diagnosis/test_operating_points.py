@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from cocotb_tests.support.bench_logs import GRID, L_Q, PSI, R, Truth, sampled, table, warming
+from cocotb_tests.support.mistakes import all_of, frame, moved, scaled
 from cocotb_tests.support.recordings_made import DRIVE, codes, made, nominal_of, write
 from fluxproof.diagnosis import diagnose
 from fluxproof.diagnosis.balance.slow_view import slow_view
@@ -83,6 +84,54 @@ def test_rounded_values_and_transients_of_a_slow_log(tmp_path):
         columns[name][between] = 0.5 * (columns[name][between - 1] + columns[name][between + 1])
     answer = answer_of(tmp_path, columns)
     assert found(answer) == {"magnet_flux_wb": pytest.approx(0.95 * PSI, rel=0.005)}
+
+
+@pytest.mark.parametrize("size, verdict", [(0.5, "no_mismatch"), (4.0, "ambiguous")])
+def test_either_of_two_causes_is_not_agreement(tmp_path, size, verdict):
+    """Within so narrow a range of currents resistance and dead time imitate each other."""
+    points = [(w, 0.0, q) for w in (80.0, 200.0, 350.0, -300.0) for q in np.linspace(2.5, 4.5, 4)]
+    truth = Truth(r=R + 0.08 * size, v_dead=0.25 * size)
+    answer = answer_of(tmp_path, table(truth, points=points, noise_v=0.02))
+    assert answer.verdict == verdict and not answer.effects, answer.sentence
+    assert answer.ambiguity == ([["dead_time", "resistance"]] if verdict == "ambiguous" else [])
+    assert (answer.fit.train_before <= 2.0 * answer.fit.noise_floor) == (verdict == "no_mismatch")
+    assert verdict == "ambiguous" or said(answer, "improves the fit, but the misfit is at the noise floor")
+
+
+CORRECTED = {  # what a check corrects before the magnets are found
+    "i_q has the opposite sign": scaled(("i_q",), -1.0),
+    "i_d and i_q are swapped": moved(("i_d", "i_q"), ("i_q", "i_d")),
+    "the speed has the wrong sign": scaled(("omega_e",), -1.0),
+    "rad/s of the shaft": scaled(("omega_e",), 1 / 4),
+}
+
+
+@pytest.mark.parametrize("found_by_check", CORRECTED)
+def test_an_effect_behind_a_mistaken_column_of_a_table_is_named(tmp_path, found_by_check):
+    answer = answer_of(tmp_path, CORRECTED[found_by_check](table(WEAK)))
+    assert [e.name for e in answer.effects] == ["magnet_flux"] and not answer.conventions, answer.sentence
+    assert any(found_by_check in p.message for p in answer.problems)
+
+
+# Mistakes that no reading describes, and that effects or readings would explain in part.
+UNKNOWN = {
+    "currents at 0.37": scaled(("i_d", "i_q"), 0.37),
+    "frame 45 degrees ahead": frame(np.pi / 4),
+    "voltages per unit": scaled(("u_d_ref", "u_q_ref"), 1 / 563.0),
+    "mirrored and turned": all_of(scaled(("i_d", "u_d_ref"), -1.0), frame(np.pi / 4)),
+}
+
+
+@pytest.mark.parametrize("name", UNKNOWN)
+def test_a_mistake_without_a_reading_is_not_explained_by_another(tmp_path, name):
+    from fluxproof.diagnosis.session import run
+
+    (tmp_path / "drive.toml").write_text(DRIVE)
+    recording = write(tmp_path / "r.csv", UNKNOWN[name](table(Truth(psi=0.95 * PSI, r=1.3 * R))))
+    answer = run(recording, tmp_path / "drive.toml", tmp_path / "out")
+    assert answer.verdict == "unexplained" and not answer.conventions and not answer.effects, answer.sentence
+    assert not (tmp_path / "out" / "drive_improved.toml").exists()
+    assert answer.fit.holdout_after == answer.fit.holdout_before
 
 
 @pytest.mark.parametrize("rows", [1, 2, 3])

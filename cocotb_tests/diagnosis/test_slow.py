@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from cocotb_tests.support.slow_logs import LEVELS, NOMINAL, Truth, log
+from fluxproof.diagnosis.answer.slow_names import sorted_out
 from fluxproof.diagnosis.balance.misfit import misfit
 from fluxproof.diagnosis.balance.slow_stretches import message_period, stretches
 from fluxproof.diagnosis.balance.slow_view import slow_view
 from fluxproof.diagnosis.catalogue import CATALOGUE
+from fluxproof.diagnosis.inference.fit import Model
 from fluxproof.diagnosis.inference.slow_model import bounds, flux_map_of
 from fluxproof.diagnosis.inference.slow_search import SlowSearch
 from fluxproof.diagnosis.recording import RecordingError
@@ -155,3 +159,23 @@ def test_absurd_sizes_are_implausible():
     search = SlowSearch(view, np.ones(len(view), bool))
     alone = next(m for m in search.every_set() if m.names == {"inductance_q"})
     assert not np.isfinite(search.refine(alone).score)
+
+
+SETS = {  # the best set and those that tie with it: what is named, what is ambiguous, what is weak
+    "AB": ("AB", [], []),
+    "AB A": ("A", [], ["B"]),
+    "AB A B": ("", ["AB"], []),
+    "AB AC": ("A", ["BC"], []),
+    "ABC AC BC": ("C", ["AB"], []),
+    "ABC AB AD": ("A", ["BD"], ["C"]),
+    "AB A BC": ("", ["ABC"], []),
+    "AB AC DB DC": ("", ["BC", "AD"], []),
+}
+
+
+@pytest.mark.parametrize("sets", SETS)
+def test_effects_that_replace_each_other_are_an_ambiguity(sets):
+    best, *tied = [SimpleNamespace(model=Model(frozenset(s)), score=k) for k, s in enumerate(sets.split())]
+    asserted, groups, weak = SETS[sets]
+    found = sorted_out(SimpleNamespace(best=best, tied=tied))
+    assert found == (list(asserted), [list(g) for g in groups], weak)

@@ -49,6 +49,17 @@ def turned(radians):
     return lambda c: {**c, "theta_e": np.mod(c["theta_e"] + radians, 2 * np.pi)}
 
 
+def frame(radians):
+    """Currents and voltages in a dq frame that is ahead of the rotor's."""
+    turn = np.exp(-1j * radians)
+
+    def change(c):
+        pairs = [(d, q, (c[d] + 1j * c[q]) * turn) for d, q in (CURRENTS_DQ, VOLTAGES_DQ)]
+        return {**c, **{d: z.real for d, _, z in pairs}, **{q: z.imag for _, q, z in pairs}}
+
+    return change
+
+
 def of_the_shaft(factor=1.0):
     """The mechanical angle [rad times factor], which passes through a turn once in pole_pairs electrical turns."""
     return lambda c: {**c, "theta_e": np.mod(np.unwrap(c["theta_e"]) / PAIRS, 2 * np.pi) * factor}
@@ -96,6 +107,22 @@ MISTAKES = {
         "axes", moved((*CURRENTS_DQ, *VOLTAGES_DQ), (*CURRENTS_DQ[::-1], *VOLTAGES_DQ[::-1])), dq=True
     ),
     "i_q with the opposite sign": Mistake("the speed has the wrong sign", scaled(("i_q", "u_q_ref"), -1.0), dq=True),
+    "speed with the opposite sign": Mistake("the speed has the wrong sign", scaled(("omega_e",), -1.0), dq=True),
+    "d axis with the opposite sign": Mistake(
+        "i_d and u_d_ref have the opposite sign", scaled(("i_d", "u_d_ref"), -1.0), dq=True
+    ),
+    "dq currents with the opposite sign": Mistake(
+        "i_d and i_q have the opposite sign", scaled(CURRENTS_DQ, -1.0), dq=True
+    ),
+    "i_d alone with the opposite sign": Mistake("i_d has the opposite sign", scaled(("i_d",), -1.0), dq=True),
+    "i_q alone with the opposite sign": Mistake("i_q has the opposite sign", scaled(("i_q",), -1.0), dq=True),
+    "u_q alone with the opposite sign": Mistake("u_q_ref has the opposite sign", scaled(("u_q_ref",), -1.0), dq=True),
+    "i_d and i_q swapped": Mistake("i_d and i_q are swapped", moved(CURRENTS_DQ, CURRENTS_DQ[::-1]), dq=True),
+    "u_d and u_q swapped": Mistake("u_d_ref and u_q_ref are swapped", moved(VOLTAGES_DQ, VOLTAGES_DQ[::-1]), dq=True),
+    "dq voltages at half": Mistake("voltages_half", scaled(VOLTAGES_DQ, 0.5), dq=True),
+    "dq currents in mA": Mistake("mA", scaled(CURRENTS_DQ, 1000.0), dq=True),
+    "frame of the q axis": Mistake("angle_90", frame(np.pi / 2), dq=True),
+    "frame 120 degrees behind": Mistake("angle_minus_120", frame(-2 * np.pi / 3), dq=True),
     "angle of the q axis": Mistake("angle_90", turned(np.pi / 2)),
     "angle 90 degrees behind": Mistake("angle_minus_90", turned(-np.pi / 2)),
     "angle 60 degrees ahead": Mistake("angle_60", turned(np.pi / 3)),

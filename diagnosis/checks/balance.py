@@ -6,7 +6,7 @@ For consecutive rows, with space vectors in the stator frame,
 
 is small compared with u if the columns are interpreted correctly, whatever effect the drive has, and as large as u
 for swapped phases, an angle in degrees or a speed of the wrong sign.  Only fast rows are used: at standstill every
-interpretation fits.  Slow logs and logs with dq values only use the steady dq balance instead.
+interpretation fits.  Slow logs, operating points and logs with dq values only use the steady dq balance instead.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ import numpy as np
 MOST_ROWS = 5000
 FIT = 0.25  # misfit over voltage: any real effect is smaller at speed
 BETTER = 0.3  # a change is accepted if the misfit falls below this share
+LEAST_ROWS, LEAST_POINTS = 20, 6  # of a log, and of a table: fewer fit by chance with some change
 TURNS = np.exp(2j * np.pi / 3 * np.arange(3))
 
 
@@ -50,12 +51,13 @@ def rows_of(recording, nominal) -> Rows | None:
     delay = 0 if recording.slow else nominal.control.duty_applied_after_samples
     phases, duties = recording.has("i_a", "i_b"), recording.has("d_a", "d_b", "d_c", "u_dc")
     dq_only = recording.slow or not (phases and duties)
-    if not recording.has("theta_e", "omega_e") or (dq_only and not recording.has("i_d", "i_q", "u_q_ref")):
+    needed = ("omega_e", "i_d", "i_q", "u_q_ref") if dq_only else ("omega_e", "theta_e")
+    if not recording.has(*needed) or not (recording.has("theta_e") or recording.slow):
         return None
-    k = _intervals(recording, delay)
-    if len(k) < 20:
+    k = np.flatnonzero(recording.usable) if recording.points else _intervals(recording, delay)
+    if len(k) < (LEAST_POINTS if recording.points else LEAST_ROWS):
         return None
-    ends = np.stack([k, k + 1])
+    ends = np.stack([k, k if recording.points else k + 1])
     i = d = dq = u_dq = None
     if phases:
         i_c = columns.get("i_c", -columns["i_a"] - columns["i_b"])
@@ -68,25 +70,16 @@ def rows_of(recording, nominal) -> Rows | None:
         u_d = columns["u_d_ref"][k - delay] if "u_d_ref" in columns else np.nan
         u_dq = u_d + 1j * columns["u_q_ref"][k - delay]
     u_dc = columns["u_dc"][k] if "u_dc" in columns else None
-    rows = Rows(
-        machine,
-        nominal.sample_time_s,
-        dq_only,
-        i,
-        dq,
-        d,
-        u_dq,
-        u_dc,
-        columns["theta_e"][ends],
-        columns["omega_e"][ends],
-    )
-    return rows if len(k) else None
+    # The steady balance does not use the angle.
+    theta = columns["theta_e"][ends] if "theta_e" in columns else np.zeros(ends.shape)
+    return Rows(machine, nominal.sample_time_s, dq_only, i, dq, d, u_dq, u_dc, theta, columns["omega_e"][ends])
 
 
-def misfit(rows: Rows, at_current: bool = False) -> float:
+def misfit(rows: Rows, at_current: bool = False, at_d_current: bool = False) -> float:
     """Median misfit over median voltage of the rows with a large voltage; 0 is a perfect fit.
 
-    at_current: use the rows with a large current instead, to check the current columns.
+    at_current: use the rows with a large current instead, to check the current columns; at_d_current: of steady rows,
+    those with a large d current.
     """
     m = rows.machine
     if rows.steady:
@@ -103,8 +96,8 @@ def misfit(rows: Rows, at_current: bool = False) -> float:
         psi = (m.inductance_d_h * i.real + 1j * m.inductance_q_h * i.imag + m.magnet_flux_wb) * turn
         u = rows.u_dc * ((2 / 3) * rows.d @ TURNS)
         left = u - m.resistance_ohm * i_s.mean(axis=0) - (psi[1] - psi[0]) / rows.period
-    by = np.abs(i if rows.steady else i_s[0]) if at_current else np.abs(u)
-    large = by >= np.percentile(by, 75 if at_current else 50)
+    by = np.abs(i if rows.steady else i_s[0]) if at_current else np.abs(i.real if at_d_current else u)
+    large = by >= np.percentile(by, 75 if at_current or at_d_current else 50)
     size = float(np.median(np.abs(u[large])))
     return float(np.median(np.abs(left[large]))) / size if size > 0 else np.inf
 
@@ -112,8 +105,7 @@ def misfit(rows: Rows, at_current: bool = False) -> float:
 def discriminates(rows: Rows) -> bool:
     """Whether the balance can discriminate interpretations: the EMF is well above the resistive drop."""
     if rows.steady:
-        u = rows.u_dq.imag
-        u = np.abs(u)
+        u = np.abs(np.where(np.isfinite(rows.u_dq), rows.u_dq, rows.u_dq.imag))
     else:
         u = np.abs(rows.u_dc * ((2 / 3) * rows.d @ TURNS))
     drop = rows.machine.resistance_ohm * rows.machine.rated_current_a

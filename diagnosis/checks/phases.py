@@ -2,7 +2,8 @@
 
 Every single change to the columns is tested with the nominal balance.  A change is accepted only if the recording does
 not fit unchanged, fits with the change, and fits clearly worse with any other change.  Mirrored interpretations
-(currents and duties both swapped, or the angle reversed) are equivalent; the angle is then reversed.
+(currents and duties both swapped, or the angle reversed) are equivalent; the angle is then reversed.  Of dq values a
+change must fit at large currents too, and better than any reading (conventions/).
 """
 
 from __future__ import annotations
@@ -11,12 +12,13 @@ import numpy as np
 
 from fluxproof.diagnosis.checks.agreement import angle_speed_ratio
 from fluxproof.diagnosis.checks.balance import BETTER, FIT, Rows, discriminates, misfit, rows_of
+from fluxproof.diagnosis.checks.rival_readings import CLEAR, best_reading, misfit_of
 from fluxproof.diagnosis.recording import Problem
 
 STAGE = "geometry"
 SMALL = 0.03  # of the voltage: a smaller misfit is indistinguishable from noise
 NOTHING = 0.8  # of the voltage: larger than any effect
-CLEAR = 1.6  # least ratio of the misfits of the second best and the best change
+D_CURRENT = 0.08  # of rated current: less does not tell the signs of single axes
 
 ORDERS = {
     "b and c": [0, 2, 1],
@@ -34,15 +36,13 @@ def check(recording, nominal) -> None:
         return
     changes = _changes(rows)
     as_is = misfit(rows)
-    at_current = (
-        as_is < FIT
-    )  # the voltage fits; it hardly depends on the currents, which may still be mistaken
+    at_current = as_is < FIT  # the voltage fits; it hardly depends on the currents, which may still be mistaken
     if at_current:
-        as_is = misfit(rows, True)
-        changes = {c: changed for c, changed in changes.items() if c[0] in ("currents", "sign")}
+        as_is = misfit_of(rows, True)
+        changes = {c: changed for c, changed in changes.items() if rows.steady or c[0] in ("currents", "sign")}
     if as_is < (SMALL if at_current else FIT):
         return
-    tried = {name: misfit(changed, at_current) for name, changed in changes.items()}
+    tried = {name: misfit_of(changed, at_current) for name, changed in changes.items()}
     ranked = sorted(tried, key=tried.get)
     best = ranked[0]
     n = len(recording)
@@ -53,27 +53,26 @@ def check(recording, nominal) -> None:
             )
             recording.problems.append(Problem("no_fit", message, "", 0, n, "the recording is used unchanged"))
         return
-    second = next((name for name in ranked[1:] if tried[name] < CLEAR * tried[best]), None)
+    second = next((_words(name) for name in ranked[1:] if tried[name] < CLEAR * tried[best]), None)
+    if rows.steady:
+        rival, reading = best_reading(rows, nominal, at_current)
+        if CLEAR * rival < tried[best]:  # conventions/ tells it
+            return
+        second = second or (reading.says if rival < CLEAR * tried[best] else None)
     numbers = f"misfit {as_is:.0%} of the voltage as recorded, {tried[best]:.0%} with it"
     if second:
-        message = f"{_words(best)} or {_words(second)}: {numbers}; correct [columns] in drive.toml"
+        message = f"{_words(best)} or {second}: {numbers}; correct [columns] in drive.toml"
         recording.problems.append(Problem("swapped_phases", message, _column(best), 0, n, fatal=True))
         return
     _apply(recording, best, nominal.sample_time_s)
-    code = "rotation" if best[0] in ("angle", "speed") else "sign" if best[0] == "sign" else "swapped_phases"
-    recording.problems.append(
-        Problem(code, f"{_words(best)}: {numbers}", _column(best), 0, n, "corrected")
-    )
+    code = {"angle": "rotation", "speed": "rotation", "sign": "sign"}.get(best[0], "swapped_phases")
+    recording.problems.append(Problem(code, f"{_words(best)}: {numbers}", _column(best), 0, n, "corrected"))
 
 
 def _changes(rows: Rows) -> dict[tuple, Rows]:
     """Every change that is tested, {change: changed rows}."""
     if rows.steady:
-        return {
-            ("speed", ""): rows.change(omega=-rows.omega),
-            ("sign", "i"): rows.change(dq=-rows.dq),
-            ("axes", ""): rows.change(dq=_swapped(rows.dq), u_dq=_swapped(rows.u_dq)),
-        }
+        return _dq_changes(rows)
     changes = {("angle", ""): rows.change(theta=-rows.theta), ("sign", "i"): rows.change(i=-rows.i)}
     for name, order in ORDERS.items():
         changes["currents", name] = rows.change(i=rows.i[..., order])
@@ -83,6 +82,26 @@ def _changes(rows: Rows) -> dict[tuple, Rows]:
     for phase in range(3):
         sign = np.where(np.arange(3) == phase, -1.0, 1.0)
         changes["sign", CURRENTS[phase]] = rows.change(i=rows.i * sign)
+    return changes
+
+
+def _dq_changes(rows: Rows) -> dict[tuple, Rows]:
+    """The changes to dq values.  Without a d current the sign of one axis is that of both."""
+    i, u = rows.dq, rows.u_dq
+    changes = {
+        ("speed", ""): rows.change(omega=-rows.omega),
+        ("axes", "i_d i_q u_d_ref u_q_ref"): rows.change(dq=_swapped(i), u_dq=_swapped(u)),
+        ("axes", "i_d i_q"): rows.change(dq=_swapped(i)),
+        ("axes", "u_d_ref u_q_ref"): rows.change(u_dq=_swapped(u)),
+        ("sign", "i_d i_q"): rows.change(dq=-i),
+        ("sign", "u_d_ref u_q_ref"): rows.change(u_dq=-u),
+        ("sign", "i_d u_d_ref"): rows.change(dq=-np.conj(i), u_dq=-np.conj(u)),
+        ("sign", "u_q_ref"): rows.change(u_dq=np.conj(u)),
+    }
+    if np.percentile(np.abs(i.real), 75) > D_CURRENT * rows.machine.rated_current_a:
+        changes["sign", "i_d"] = rows.change(dq=-np.conj(i))
+        changes["sign", "i_q"] = rows.change(dq=np.conj(i))
+        changes["sign", "u_d_ref"] = rows.change(u_dq=-np.conj(u))
     return changes
 
 
@@ -96,13 +115,14 @@ def _words(change) -> str:
     if what == "angle":
         return "the angle rotates against the phase sequence of currents and duties"
     if what == "speed":
-        return "the speed has the wrong sign"
+        return "the speed has the wrong sign, or i_q and u_q_ref have"
+    names = which.split()
     if what == "axes":
-        return "the d and q axes are swapped"
+        return "the d and q axes are swapped" if len(names) == 4 else f"{' and '.join(names)} are swapped"
     if what == "sign":
-        return (
-            "the phase currents have the opposite sign" if which == "i" else f"{which} has the opposite sign"
-        )
+        if which == "i":
+            return "the phase currents have the opposite sign"
+        return f"{' and '.join(names)} ha{'ve' if names[1:] else 's'} the opposite sign"
     who = {"currents": "phase currents", "duties": "duties", "both": "phase currents and duties"}[what]
     return f"{who} {which} are swapped" if " and " in which else f"{who} are in the order {which}"
 
@@ -115,7 +135,7 @@ def _column(change) -> str:
         return f"i_{letters[0]}"
     if what == "duties":
         return f"d_{letters[0]}"
-    return {"angle": "theta_e", "speed": "omega_e", "axes": "i_d"}.get(what, "i_a" if which == "i" else which)
+    return {"angle": "theta_e", "speed": "omega_e"}.get(what) or ("i_a" if which == "i" else which.split()[0])
 
 
 def _apply(recording, change, period) -> None:
@@ -124,17 +144,18 @@ def _apply(recording, change, period) -> None:
     columns = recording.columns
     if what in ("angle", "speed"):
         ratio = angle_speed_ratio(recording, period) if what == "angle" else None
-        columns["theta_e"] = -columns["theta_e"]
+        if "theta_e" in columns:
+            columns["theta_e"] = -columns["theta_e"]
         if ratio is None or ratio > 0.0:  # a speed with the opposite sign of the angle was right
             columns["omega_e"] = -columns["omega_e"]
             if "torque" in columns:
                 columns["torque"] = -columns["torque"]
     elif what == "axes":
-        for a, b in (("i_d", "i_q"), ("u_d_ref", "u_q_ref"), ("i_d_ref", "i_q_ref")):
+        for a, b in zip(*[iter(_with_references(which))] * 2, strict=True):
             if recording.has(a, b):
                 columns[a], columns[b] = columns[b], columns[a]
     elif what == "sign":
-        for name in [*CURRENTS, "i_d", "i_q"] if which == "i" else [which]:
+        for name in (*CURRENTS, "i_d", "i_q") if which == "i" else _with_references(which):
             if name in columns:
                 columns[name] = -columns[name]
     else:
@@ -145,3 +166,9 @@ def _apply(recording, change, period) -> None:
         ):
             values = [columns[names[k]] for k in ORDERS[which]]
             columns.update(zip(names, values, strict=True))
+
+
+def _with_references(which) -> list[str]:
+    """The columns of a change to dq values, with the references of its currents."""
+    names = which.split()
+    return names + [f"{name}_ref" for name in names if name in ("i_d", "i_q")]

@@ -13,6 +13,7 @@ import numpy as np
 
 from fluxproof.diagnosis.checks.agreement import angle_speed_ratio
 from fluxproof.diagnosis.checks.balance import BETTER, FIT, discriminates, misfit, rows_of
+from fluxproof.diagnosis.checks.rival_readings import CLEAR, best_reading, misfit_of
 from fluxproof.diagnosis.recording import Problem
 
 STAGE = "units"
@@ -29,7 +30,9 @@ def check(recording, nominal) -> None:
         recording.columns["theta_e"] = recording["theta_e"] * factor
         recording.problems.append(Problem("unit", f"the angle is in {unit}", "theta_e", 0, n, "converted"))
     speed = _speed_unit(recording, nominal, p)
-    if speed:
+    if isinstance(speed, Problem):
+        recording.problems.append(speed)
+    elif speed:
         unit, factor = speed
         recording.columns["omega_e"] = recording["omega_e"] * factor
         recording.problems.append(Problem("unit", f"the speed is in {unit}", "omega_e", 0, n, "converted"))
@@ -100,7 +103,7 @@ def _best_direction(rows, factor) -> float:
 
 
 def _speed_unit(recording, nominal, p):
-    """(unit, factor) of a speed that is not in electrical rad/s, else None."""
+    """(unit, factor) of a speed that is not in electrical rad/s, a Problem if nobody can tell, else None."""
     if "omega_e" not in recording.columns or "omega_e" in recording.meta.get("stated_units", ()):
         return None
     units = _speed_units(p)
@@ -116,21 +119,24 @@ def _speed_unit(recording, nominal, p):
         if nearest and off[nearest] < CLOSE:
             return nearest, units[nearest]
         return None
-    if "theta_e" in recording.columns:
-        return None
-    recording.columns["theta_e"] = np.zeros(len(recording))  # the steady balance does not use it
     rows = rows_of(recording, nominal)
-    del recording.columns["theta_e"]
     if rows is None or not rows.steady or not discriminates(rows):
         return None
     as_is = _either_sign(rows, 1.0)
     tried = {unit: _either_sign(rows, factor) for unit, factor in units.items()}
     ranked = sorted(tried, key=tried.get)
-    clear = len(ranked) < 2 or tried[ranked[1]] > 2 * tried[ranked[0]]
-    if as_is > 2 * FIT and tried[ranked[0]] < min(FIT, BETTER * as_is) and clear:
-        return ranked[0], units[ranked[0]]
-    return None
+    best = tried[ranked[0]]
+    clear = len(ranked) < 2 or tried[ranked[1]] > 2 * best
+    if not (as_is > 2 * FIT and best < min(FIT, BETTER * as_is) and clear):
+        return None
+    rival, reading = best_reading(rows, nominal)
+    if CLEAR * rival < best:  # conventions/ tells it
+        return None
+    if rival < CLEAR * best:
+        message = f"the speed is in {ranked[0]}, or {reading.says}: name the unit of omega_e in [columns]"
+        return Problem("unit", message, "omega_e", 0, len(recording), fatal=True)
+    return ranked[0], units[ranked[0]]
 
 
 def _either_sign(rows, factor) -> float:
-    return min(misfit(rows.change(omega=sign * factor * rows.omega)) for sign in (1.0, -1.0))
+    return min(misfit_of(rows.change(omega=sign * factor * rows.omega)) for sign in (1.0, -1.0))

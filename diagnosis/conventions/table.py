@@ -74,6 +74,8 @@ READINGS = (
         "voltages_rms", "u_d_ref, u_q_ref", "the voltages are rms values, 0.7071 of the peak values", voltages=ROOT2,
         dq=True,
     ),
+    Reading("voltages_half", "u_d_ref, u_q_ref", "the voltages are recorded at half", voltages=2.0, dq=True),
+    Reading("voltages_double", "u_d_ref, u_q_ref", "the voltages are recorded at twice", voltages=0.5, dq=True),
     Reading(
         "voltages_line", "u_d_ref, u_q_ref", "the voltages are line-to-line values, 1.7321 of the phase values",
         voltages=1 / ROOT3, dq=True,

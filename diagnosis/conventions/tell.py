@@ -12,11 +12,13 @@ from fluxproof.diagnosis.suspects import SUSPECTS
 OF_THE_REST = ("after", "noise", "spectrum_after", "angle_after")  # arrays of the evidence in true volts
 
 
-def under(readings: tuple[Reading, ...], rivals: list[Reading], documented: Diagnosis, answer: Diagnosis) -> Diagnosis:
+def under(readings, rivals, documented: Diagnosis, answer: Diagnosis, least: float = k.HALF) -> Diagnosis:
     """``answer``, found with the readings, as an answer to the recording as it is.
 
+    ``documented`` if nothing is explained with them: readings must then explain the share ``least`` of the misfit.
     Voltages are those of the recording: where the bus is recorded at half, the rest is told in recorded volts.
-    rivals: readings that fit as well as the only one.  documented: the answer without readings, for the misfit before.
+    readings: tuple of Reading; rivals: list of those that fit as well as the only one.  documented: the answer without
+    readings, for the misfit before.
     """
     volts = 1.0
     for reading in readings:
@@ -30,6 +32,13 @@ def under(readings: tuple[Reading, ...], rivals: list[Reading], documented: Diag
     same = fit.unit == before.unit
     fit.train_before = before.train_before if same else fit.train_before
     fit.holdout_before = before.holdout_before if same else fit.holdout_before
+    answer.explained_share = fit.explained_share
+    if answer.verdict == "no_mismatch":
+        answer.verdict = "explained"
+    elif answer.verdict == "unexplained" and answer.remainder and answer.explained_share >= least:
+        answer.verdict = "partly_explained"
+    if answer.verdict == "unexplained":
+        return not_told(readings, documented)
     answer.readings, answer.conventions = readings, [r.told(rivals) for r in readings]
     answer.location = documented.location
     arrays, old = answer.evidence.arrays, documented.evidence.arrays
@@ -38,13 +47,15 @@ def under(readings: tuple[Reading, ...], rivals: list[Reading], documented: Diag
             arrays[name] = old[name]
         elif name.startswith(OF_THE_REST):
             arrays[name] = arrays[name] / volts
-    answer.explained_share = fit.explained_share
-    if answer.verdict == "no_mismatch":
-        answer.verdict = "explained"
-    elif answer.verdict == "unexplained" and answer.remainder and answer.explained_share >= k.HALF:
-        answer.verdict = "partly_explained"
     answer.sentence = sentence(answer, {**CATALOGUE, **SUSPECTS})
     return answer
+
+
+def not_told(readings: tuple[Reading, ...], documented: Diagnosis) -> Diagnosis:
+    """The answer without readings, with a note that they would fit better and leave too much."""
+    says = "; ".join(r.says for r in readings)
+    documented.notes.append(f"It fits better as if {says}, but too much is left for that: not asserted.")
+    return documented
 
 
 def restate(answer: Diagnosis, loaded) -> None:

@@ -65,6 +65,10 @@ SWING = 8.0
 # Resolution and timing of messages, ripple and clamping, relative to the bus and to the voltage; share of the voltage's
 # change around a stretch, as a row combines messages of different age.
 SLOW_DC, SLOW_U, SLOW_CHANGE = 2.5e-4, 2e-3, 0.05
+# Of the voltage: largest noise that may be taken from what no effect explains; more has a cause that is not known.
+SLOW_NOISE = 0.03
+# Of the voltage: largest remainder beside names or readings, which physics without a name can leave.
+SLOW_REST = 0.1
 # Largest reduced chi^2 of an accepted explanation; share of the misfit's rms that may be left to the shapes of curves;
 # share of its power that names must explain beside a remainder, as that search does not know how much may imitate an
 # effect.
