@@ -232,7 +232,7 @@ class Diagnosis:
     notes: list[str] = field(default_factory=list)  # for people: assumptions and omissions
     evidence: Evidence = field(default_factory=Evidence)
     readings: tuple = ()  # what ``conventions`` tells, as conventions/ applies it
-    search: object = field(default=None, repr=False)  # search.Outcome, for inspection
+    search: object = field(default=None, repr=False)  # Posterior, or SlowSearch of slow logs
     trace: str = ""  # the figures that decided the verdict
 
     def to_json(self) -> dict:

@@ -22,7 +22,7 @@ ALWAYS_LOADED = 1e4
 POINT = 0.08
 
 # ---- how recording and drive file are to be read
-# Prior probability of each mistaken convention (conventions/table.py): of some forty, one recording in twelve has one.
+# Prior probability of each mistaken convention (conventions/table.py): of 35, one recording in fourteen has one.
 MISREAD = 2e-3
 
 # ---- what the answer says
