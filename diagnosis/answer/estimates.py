@@ -9,10 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from fluxproof.diagnosis.answer.improved_plant import in_addition
+from fluxproof.diagnosis.inference import constants as k
 from fluxproof.diagnosis.result import NamedEffect
-
-# Relative to the voltage, and to the bus voltage in the direction of the current: rms in healthy recordings.
-COMMON_U, COMMON_DC = 2e-5, 1e-5
 
 
 def common(fit) -> np.ndarray:
@@ -21,7 +19,7 @@ def common(fit) -> np.ndarray:
     setup, view = problem.setup, problem.view
     u, bus = view.to_dq(view.u[:, 1:-1]), view.nominal.inverter.dc_bus_v
     along = view.i_mid / np.abs(view.i_mid).clip(0.02 * view.machine.rated_current_a)
-    patterns = (COMMON_U * u, 1j * COMMON_U * u, COMMON_DC * bus * along)
+    patterns = (k.COMMON_U * u, 1j * k.COMMON_U * u, k.COMMON_DC * bus * along)
     rows = np.array([problem.condensed(setup.projector.rows({"u": p})) for p in patterns]).T
     p = problem.p
     weight = 1.0 / fit.variance

@@ -37,7 +37,7 @@ class Rows:
         self.train = train_blocks[self.projector.block]
         self.cells = cells_of(view, self.effects.values(), self.projector)
         every = np.ones(len(self.cells.y), bool)
-        rough = Fitter(self.cells, np.ones(len(every)), every).solve(everything(self.cells))
+        rough = Fitter(self.cells, np.ones(len(every)), every).unscored(everything(self.cells))
         # Both bound the noise: the misfit also has what differs between neighbours, the rough fit what it fits wrongly.
         self.noise = np.minimum(noise(view, self.cells, rough.residual), noise(view, self.cells, self.cells.y))
         self.smooth = smooth(view)

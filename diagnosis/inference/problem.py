@@ -122,7 +122,7 @@ class Problem:
             for n in curves if cores else []:
                 self.prior[n] = effect.curve * effect.curve_scale(self.keys[n][1][1:], scales, nominal)
             ceiling = effect.ceiling(nominal)
-            self.most[name] = max(min(ceiling / floor, 1e3), 2.0) if np.isfinite(ceiling) else 300.0
+            self.most[name] = max(min(ceiling / floor, k.WIDEST), 2.0) if np.isfinite(ceiling) else k.UNBOUNDED
             self.index[name] = cores + [n for n in curves if self.prior[n] > 0.0] if cores else []
 
     def condensed(self, rows):
@@ -235,5 +235,5 @@ def repeated(ripple, setup):
     count = np.maximum(np.bincount(cell, w), 1.0)
     mean = np.bincount(cell, w * ripple) / count
     spread = np.bincount(cell, w * (ripple - mean[cell]) ** 2) / np.maximum(count - 1.0, 1.0) / count
-    kept = np.maximum(1.0 - 4.0 * spread / np.maximum(mean**2, 1e-300), 0.0) * (count > 2)
+    kept = np.maximum(1.0 - k.RIPPLE * spread / np.maximum(mean**2, 1e-300), 0.0) * (count > 2)
     return (kept * mean)[cell]
