@@ -16,11 +16,6 @@ def _d(view, shape):
     return view.machine.inductance_d_h * view.machine.rated_current_a * shape(x) + 0j
 
 
-def q_curves(view):
-    """Flux terms (b, m+1) complex dq [Wb] over i_q, in units of L_q i_rated: linear, |y| y, y^3, y^5."""
-    return [_q(view, shape) for shape in (lambda y: y, lambda y: y * np.abs(y), lambda y: y**3, lambda y: y**5)]
-
-
 LEAST = 0.08  # of rated current: an axis with less current does not determine its curve
 
 

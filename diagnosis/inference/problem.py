@@ -52,10 +52,10 @@ class Setup:
         """Log prior odds of an effect; ``shifts`` {effect: change} holds what a fleet says of them."""
         return float(np.log(k.PRESENT / (1 - k.PRESENT)) + self.shifts.get(name, 0.0))
 
-    def read_like(self, other, volts, amps):
+    def read_like(self, other, amps):
         """This reading of a recording with the operating points of ``other``, the same blocks as documented.
 
-        volts, amps: factors of voltages and currents between the two.
+        amps: factor of the currents between the two.
         """
         self.points, self.visits, self.shifts = other.points, other.visits, other.shifts
         self.grouping, self.repeats = other.grouping, other.repeats
