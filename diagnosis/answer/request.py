@@ -11,7 +11,8 @@ from fluxproof.diagnosis.answer.bench_point import on_the_bench
 from fluxproof.diagnosis.answer.experiment import BENDS, best_points, rivalry
 from fluxproof.diagnosis.answer.phrases import SIGNALS, joined, title_of
 from fluxproof.diagnosis.balance.cells import Projector, voltage_level
-from fluxproof.diagnosis.balance.view import View, stayed_cold
+from fluxproof.diagnosis.balance.joined import stayed_cold
+from fluxproof.diagnosis.balance.view import View
 from fluxproof.diagnosis.inference import constants
 from fluxproof.diagnosis.quantities import ascii_of, quantity
 from fluxproof.diagnosis.result import Request

@@ -12,19 +12,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fluxproof.diagnosis.answer.locate import rms
 from fluxproof.diagnosis.balance.cells import column_of, voltage_level
 from fluxproof.diagnosis.catalogue import CATALOGUE
+from fluxproof.diagnosis.inference import constants
 from fluxproof.diagnosis.inference.fit import Fitter, Model, Solution, everything
 from fluxproof.diagnosis.inference.refine import Refiner
 
 MOST_EFFECTS = 6
 REFINED = 40
 TIE = 20.0  # margin of a tie: neighbouring rows share messages and contain less information than their number suggests
-OWN_V, OWN_SHARE = (
-    2.5e-4,
-    2e-3,
-)  # of the bus and of the voltage: resolution and timing of messages, ripple, clamping
-UNSTEADY = 0.05  # of the voltage's change around a stretch: a row combines messages of different age
 LOADED = 0.02  # of rated current
 LEAST_PAIRS = 4
 LIMITS = {  # generous limits for a real drive
@@ -110,9 +107,7 @@ class SlowSearch:
 
         Their significance is already decided by the comparison with every other set, including the one without them.
         """
-        small = [
-            n for n in best.model.names if self.effects[n].size(best.c[n], self.view.nominal) < self.floor(n)
-        ]
+        small = [n for n in best.model.names if self.effects[n].size(best.c[n], self.view.nominal) < self.floor(n)]
         for name in small:
             best = self.refine(best.model.without(name))
         if small:  # another set may explain with large effects what the small one did with its free curve
@@ -178,25 +173,17 @@ def sigmas(view, cells) -> tuple[np.ndarray, np.ndarray]:
     rows = (cells.channel == "u") & (cells.order == 0)
     at = np.full((n, 2), -1)
     at[cells.block[rows], cells.part[rows]] = np.flatnonzero(rows)
-    own = np.hypot(OWN_SHARE * level, OWN_V * view.nominal.inverter.dc_bus_v)
-    own = np.hypot(own, UNSTEADY * view.unsteady)
+    own = np.hypot(constants.SLOW_U * level, constants.SLOW_DC * view.nominal.inverter.dc_bus_v)
+    own = np.hypot(own, constants.SLOW_CHANGE * view.unsteady)
     start = own[cells.block]
     rough = Fitter(cells, start, np.ones(len(cells.y), bool)).solve(everything(cells)).residual
     rough = np.where(cells.ok, rough, np.nan)[at]  # a d voltage that was not recorded has no residual
     pairs = np.flatnonzero((np.diff(view.run) == 0) & (loaded[1:] == loaded[:-1]))
     change = (rough[pairs + 1] - rough[pairs]) / np.sqrt(2)
     under = loaded[pairs]
-    rest = _rms(change[~under]) if (~under).sum() >= LEAST_PAIRS else _rms(rough[~loaded])
+    rest = rms(change[~under]) if (~under).sum() >= LEAST_PAIRS else rms(rough[~loaded])
     relative = rough / level[:, None].clip(1e-9)
-    share = (
-        _rms(change[under] / level[pairs][under, None])
-        if under.sum() >= LEAST_PAIRS
-        else _rms(relative[loaded])
-    )
+    enough = under.sum() >= LEAST_PAIRS
+    share = rms(change[under] / level[pairs][under, None]) if enough else rms(relative[loaded])
     pure = np.hypot(rest, np.where(loaded, share * level, 0.0))
     return np.hypot(pure, own)[cells.block], pure[cells.block]
-
-
-def _rms(x) -> float:
-    x = x[np.isfinite(x)]
-    return float(np.sqrt(np.mean(np.square(x)))) if x.size else 0.0
