@@ -10,6 +10,7 @@ import numpy as np
 
 from fluxproof.diagnosis.answer.improved_plant import in_addition
 from fluxproof.diagnosis.inference import constants as k
+from fluxproof.diagnosis.inference.problem import covariance_of
 from fluxproof.diagnosis.result import NamedEffect
 
 
@@ -25,18 +26,6 @@ def common(fit) -> np.ndarray:
     weight = 1.0 / fit.variance
     moved = fit.cov @ (p.x[:, fit.take].T @ (weight[:, None] * rows))
     return moved @ moved.T
-
-
-def covariance_of(fit, name, full) -> np.ndarray:
-    """The covariance of one effect's coefficients in their order in ``fit.c``; full: (k, k) of the set's columns."""
-    keys = list(fit.c[name])
-    place = {fit.problem.keys[n][1].lstrip("~"): j for j, n in enumerate(fit.take) if fit.problem.keys[n][0] == name}
-    out = np.zeros((len(keys), len(keys)))
-    for a, first in enumerate(keys):
-        for b, second in enumerate(keys):
-            if first in place and second in place:
-                out[a, b] = full[place[first], place[second]]
-    return out
 
 
 def without_possible(names, best):

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fluxproof.diagnosis.effects.effect import FluxEffect, Parameter
+from fluxproof.diagnosis.effects.effect import LEAST_CURRENT, FluxEffect, Parameter
 from fluxproof.diagnosis.result import Estimate
 
 
@@ -16,13 +16,10 @@ def _d(view, shape):
     return view.machine.inductance_d_h * view.machine.rated_current_a * shape(x) + 0j
 
 
-LEAST = 0.08  # of rated current: an axis with less current does not determine its curve
-
-
 def _with_current(view, columns):
     """The columns of the axes with enough current."""
     i = view.i / view.machine.rated_current_a
-    enough = {"d": np.abs(i.real).max() > LEAST, "q": np.abs(i.imag).max() > LEAST}
+    enough = {"d": np.abs(i.real).max() > LEAST_CURRENT, "q": np.abs(i.imag).max() > LEAST_CURRENT}
     return {key: column for key, column in columns.items() if enough[key[0]]}
 
 

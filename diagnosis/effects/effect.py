@@ -28,6 +28,7 @@ NEEDS = {
     "inverter": "an inverter that switches",
     "current": "measured currents",
 }
+LEAST_CURRENT = 0.08  # of rated current: an axis with less current does not determine a curve over it
 DOUBT = 2.0  # standard deviations by which a value must violate a limit to be rejected
 
 

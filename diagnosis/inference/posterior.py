@@ -7,7 +7,7 @@ import itertools
 
 import numpy as np
 
-from fluxproof.diagnosis.inference.problem import Problem, Setup
+from fluxproof.diagnosis.inference.problem import Problem, Setup, covariance_of
 from fluxproof.diagnosis.inference.settle import around, settled
 
 ROUNDS = 3
@@ -177,13 +177,6 @@ def possible(fit, small=()) -> bool:
             return False
         if name not in small and effect.size(c, nominal) < effect.floor(nominal):
             return False
-        keys = list(c)
-        cov = np.zeros((len(keys), len(keys)))
-        place = {problem.keys[n][1].lstrip("~"): j for j, n in enumerate(fit.take) if problem.keys[n][0] == name}
-        for a, ka in enumerate(keys):
-            for b, kb in enumerate(keys):
-                if ka in place and kb in place:
-                    cov[a, b] = fit.cov[place[ka], place[kb]]
-        if not effect.possible(c, cov, nominal):
+        if not effect.possible(c, covariance_of(fit, name, fit.cov), nominal):
             return False
     return True

@@ -221,6 +221,18 @@ class Fit:
         return out
 
 
+def covariance_of(fit, name, full) -> np.ndarray:
+    """The covariance of one effect's coefficients in their order in ``fit.c``; full: (k, k) of the set's columns."""
+    keys = list(fit.c[name])
+    place = {fit.problem.keys[n][1].lstrip("~"): j for j, n in enumerate(fit.take) if fit.problem.keys[n][0] == name}
+    out = np.zeros((len(keys), len(keys)))
+    for a, first in enumerate(keys):
+        for b, second in enumerate(keys):
+            if first in place and second in place:
+                out[a, b] = full[place[first], place[second]]
+    return out
+
+
 def _repeats(cells, points):
     """(r,) number of the functional and operating point of every row."""
     keys = np.stack([cells.order * 1e6, cells.part, points[cells.block], cells.channel == "u",
