@@ -27,6 +27,7 @@ from fluxproof.diagnosis.replay import telemetry
 from fluxproof.golden_model import drive as drives
 from fluxproof.golden_model.io import telemetry_words
 from fluxproof.golden_model.registers import registers
+from fluxproof.golden_model.units import to_si
 
 SHORT = bench.GRID[:18]
 FLUX = 0.95 * bench.MACHINE.magnet_flux_wb
@@ -145,6 +146,8 @@ def test_a_flipped_register_bit_is_found_before_any_physics(register, bit, block
     found = data["digital"]["first_difference"]
     assert data["verdict"] == "digital_mismatch" and data["effects"] == [] and data["digital"]["checked"]
     assert (found["block"], found["cause_name"], found["cause_bit"]) == (block, register, bit)
+    recorded = int(dump[1][found["signal"]][found["sample"]])
+    assert found["recorded_si"] == pytest.approx(to_si(found["signal"], recorded, bench.DRIVE))
     first = capsys.readouterr().out.splitlines()[0]
     for word in (
         f"block {block}",

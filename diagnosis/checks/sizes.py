@@ -32,8 +32,14 @@ def _size(values) -> float:
 
 
 def _convert(recording, names, factor, unit, offset=0.0) -> None:
+    """Convert columns; meta "column_scales" tells it to a drive file that describes these columns."""
+    scales = dict(recording.meta.get("column_scales", {}))
     for name in names:
         recording.columns[name] = recording[name] * factor + offset
+        before, start = scales.get(name, (1.0, 0.0))
+        scales[name] = before * factor, start * factor + offset
+    recording.meta["column_scales"] = scales
+    recording.meta["rescaled"] = [*recording.meta.get("rescaled", ()), *names]
     recording.problems.append(
         Problem("unit", f"{', '.join(names)} in {unit}", names[0], 0, len(recording), "converted")
     )
