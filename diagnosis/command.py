@@ -13,6 +13,7 @@ import webbrowser
 from pathlib import Path
 
 FOLDER = Path("build") / "diagnosis"
+FILES = ("report.html", "diagnosis.json", "drive_improved.toml", "flux_map.csv")
 MOST_PROBLEMS = 5
 
 
@@ -113,12 +114,8 @@ def answer_lines(answer, nominal, out: Path) -> list[str]:
     if answer.digital.checked and answer.digital.first_difference is None:
         lines.append(f"controller: {answer.digital.samples} samples equal to the golden model in every bit")
     lines += _problem_lines(answer.problems)
-    names = ["report.html", "diagnosis.json", *(["drive_improved.toml"] if _improved(out, answer) else [])]
-    return [*lines, "", *(f"wrote {out / name}" for name in names)]
-
-
-def _improved(out, answer) -> bool:
-    return bool(answer.effects) and (out / "drive_improved.toml").exists()
+    # session.run removes what an earlier run left, so that a file that is there was written by this one.
+    return [*lines, "", *(f"wrote {out / name}" for name in FILES if (out / name).exists())]
 
 
 def effect_table(effects) -> list[str]:

@@ -14,6 +14,7 @@ from fluxproof.diagnosis.answer.bench_point import on_the_bench
 from fluxproof.diagnosis.answer.headline import sentence
 from fluxproof.diagnosis.answer.locate import at_order, evidence, locate
 from fluxproof.diagnosis.balance.cells import cells_of, voltage_level
+from fluxproof.diagnosis.balance.holdout import holdout_blocks
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.inference import constants as k
 from fluxproof.diagnosis.inference.drift_fit import (
@@ -29,7 +30,6 @@ from fluxproof.diagnosis.inference.fit import Fitter
 from fluxproof.diagnosis.result import Diagnosis, Fit, NamedEffect, Remainder, Request
 
 LEAST_MEANS = 12  # over time; fewer do not determine a drift
-HOLDOUT_EVERY = 4
 CONSTANT = (1e-3, 5e-3)  # of the bus and of the voltage: a smaller constant misfit may be ripple or resolution
 FITS = 3.0  # standard deviations within which a single effect explains the constant misfit
 OTHER_SPEED = 0.4  # of the recorded one, for a request
@@ -43,7 +43,7 @@ def diagnose_one_point(view) -> Diagnosis:
     centred, long = centred_cells(cells), len(view) >= LEAST_MEANS and view.span_s > 0.0
     drifting = [n for n, effect in effects.items() if long and drifts(cells, centred, n, effect)]
     sigma = row_sigmas(view, cells, raw)
-    held = (np.arange(len(view)) % HOLDOUT_EVERY == 2) & long
+    held = holdout_blocks(view) & long
     fitter = Fitter(centred, sigma, (cells.order == 0) & (cells.channel == "u") & ~held[cells.block])
     best, tied = best_sets(fitter, effects, drifting, view)
     names, groups = _sorted_out(best, tied, effects, view)
@@ -69,8 +69,6 @@ def diagnose_one_point(view) -> Diagnosis:
     answer.effects = [_named(n, effects[n], best, wider, fitter, view) for n in names]
     answer.next_recording = _requests(view, groups)
     answer.evidence = evidence(view, (cells, centred.y), (cells, left), sigma, held)
-    for name in ("theta_e", "orders", "spectrum_before", "spectrum_after"):
-        answer.evidence.arrays.pop(name, None)
     answer.sentence = sentence(answer, CATALOGUE)
     answer.notes = _notes(view, constant, candidates, held, long)
     return answer
@@ -109,16 +107,16 @@ def _explaining(view, cells, effects, drifting, constant) -> list[str]:
     """Effects that do not drift and explain the constant misfit alone, with a size that a drive can have."""
     out, limit = [], _resolution(view)
     for name, effect in effects.items():
-        cores = {k: v for k, v in cells.columns[name].items() if not k.startswith("~")}
+        cores = {key: v for key, v in cells.columns[name].items() if not key.startswith("~")}
         if name in drifting or not cores:
             continue
-        means = {k: complex(np.nanmean(at_order(cells, v, 0.0))) for k, v in cores.items()}
-        key = max(means, key=lambda k: abs(means[k]))
-        if abs(means[key]) < 1e-9:
+        means = {key: complex(np.nanmean(at_order(cells, v, 0.0))) for key, v in cores.items()}
+        most = max(means, key=lambda key: abs(means[key]))
+        if abs(means[most]) < 1e-9:
             continue
-        value = (np.conj(means[key]) * constant).real / abs(means[key]) ** 2
-        c = {k: value if k == key else 0.0 for k in cores}
-        close = abs(constant - value * means[key]) < FITS * limit
+        value = (np.conj(means[most]) * constant).real / abs(means[most]) ** 2
+        c = {key: value if key == most else 0.0 for key in cores}
+        close = abs(constant - value * means[most]) < FITS * limit
         if close and effect.possible(c, np.zeros((len(c),) * 2), view.nominal) and not effect.too_large(c, view):
             out.append(name)
     return sorted(out)

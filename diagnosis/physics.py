@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from fluxproof.diagnosis.answer.conclude import conclude
 from fluxproof.diagnosis.balance.blocks import views_of
+from fluxproof.diagnosis.balance.holdout import held_out
+from fluxproof.diagnosis.balance.joined import joined_views
 from fluxproof.diagnosis.balance.parts import sound
-from fluxproof.diagnosis.balance.view import joined_views
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.conventions.judge import preferred
 from fluxproof.diagnosis.conventions.tell import under
@@ -20,8 +19,6 @@ from fluxproof.diagnosis.recording import Recording
 from fluxproof.diagnosis.result import Diagnosis
 from fluxproof.diagnosis.slow_diagnosis import diagnose_slow
 from fluxproof.diagnosis.suspects import SUSPECTS
-
-HOLDOUT_EVERY = 4  # every fourth dwell is held out
 
 
 def explain(loaded: list[Recording], nominal: Nominal, progress=lambda text: None, shifts=None) -> Diagnosis:
@@ -49,19 +46,6 @@ def explain(loaded: list[Recording], nominal: Nominal, progress=lambda text: Non
 def known_effects() -> dict:
     """{name: Effect} of the catalogue and of the causes beyond it."""
     return {**CATALOGUE, **SUSPECTS}
-
-
-def holdout_blocks(view) -> np.ndarray:
-    """(b,) bool: blocks held out of the fit: every fourth dwell, or every fourth block if there are few dwells."""
-    dwells = np.unique(view.run)
-    if len(dwells) >= 8:
-        return np.isin(view.run, dwells[2::HOLDOUT_EVERY])
-    return np.arange(len(view)) % HOLDOUT_EVERY == 2
-
-
-def held_out(views) -> np.ndarray:
-    """(b,) bool: blocks held out of the fit, a part of each recording and never the whole of one."""
-    return np.concatenate([holdout_blocks(v) for v in views])
 
 
 def rows_of(recordings, nominal):

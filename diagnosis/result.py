@@ -232,13 +232,16 @@ class Diagnosis:
     notes: list[str] = field(default_factory=list)  # for people: assumptions and omissions
     evidence: Evidence = field(default_factory=Evidence)
     readings: tuple = ()  # what ``conventions`` tells, as conventions/ applies it
-    search: object = field(default=None, repr=False)  # search.Outcome, for inspection
+    search: object = field(default=None, repr=False)  # Posterior, or SlowSearch of slow logs
+    found: object = field(default=None, repr=False)  # slow_search.Outcome of a slow log
+    held: np.ndarray | None = field(default=None, repr=False, compare=False)  # (b,) bool, blocks not fitted
     trace: str = ""  # the figures that decided the verdict
 
     def to_json(self) -> dict:
         """The mapping written to diagnosis.json (schema 2)."""
-        plain = dataclasses.asdict(dataclasses.replace(self, evidence=Evidence(), search=None, readings=()))
+        inner = {"evidence": Evidence(), "readings": (), "search": None, "found": None, "held": None}
+        plain = dataclasses.asdict(dataclasses.replace(self, **inner))
         problems = plain.pop("problems")
-        for key in ("evidence", "readings", "rows", "search", "trace"):
+        for key in (*inner, "rows", "trace"):
             plain.pop(key)
         return {"schema": 2, **plain, "recording": {"rows": self.rows, "problems": problems}}

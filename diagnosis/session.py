@@ -234,13 +234,7 @@ def _overlay(recording, nominal, improved, answer) -> dict | None:
     """The closed-loop simulation of the first recording; a drive that cannot be simulated only adds a note."""
     try:
         laid_over = closed_loop(recording, nominal, improved)
-    except (
-        ArithmeticError,
-        IndexError,
-        KeyError,
-        TypeError,
-        ValueError,
-    ) as error:  # RecordingError, DriveError too
+    except (ArithmeticError, IndexError, KeyError, TypeError, ValueError) as error:  # RecordingError, DriveError too
         answer.notes.append(f"The closed loop was not simulated: {error}.")
         return None
     for signal in OVERLAY_SIGNALS:

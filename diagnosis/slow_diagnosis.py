@@ -16,8 +16,9 @@ from fluxproof.diagnosis.answer.request import requests
 from fluxproof.diagnosis.answer.slow_names import bearable, kind_of, sorted_out
 from fluxproof.diagnosis.answer.uncertainty import named
 from fluxproof.diagnosis.balance.cells import voltage_level
+from fluxproof.diagnosis.balance.holdout import FEW, holdout_blocks
+from fluxproof.diagnosis.balance.joined import joined_views
 from fluxproof.diagnosis.balance.slow_view import slow_view
-from fluxproof.diagnosis.balance.view import joined_views
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.conventions.judge import preferred
 from fluxproof.diagnosis.conventions.tell import not_told, under
@@ -29,8 +30,6 @@ from fluxproof.diagnosis.inference.slow_search import SlowSearch, most_effects
 from fluxproof.diagnosis.one_point import diagnose_one_point
 from fluxproof.diagnosis.result import Diagnosis, Fit, Remainder
 
-HOLDOUT_EVERY = 4
-
 
 def diagnose_slow(recordings, nominal, progress=lambda text: None) -> Diagnosis:
     """Diagnose slow recordings of one drive.
@@ -41,7 +40,7 @@ def diagnose_slow(recordings, nominal, progress=lambda text: None) -> Diagnosis:
     answer = diagnose_points(view, progress)
     if answer.verdict == "no_mismatch" or len(np.unique(view.run)) == 1:
         return answer
-    posterior = Posterior(Setup(view, view.visible(CATALOGUE), ~held_points(view)), progress)
+    posterior = Posterior(Setup(view, view.visible(CATALOGUE), ~holdout_blocks(view)), progress)
     readings, rivals, _ = preferred(recordings, posterior, answer.verdict != "unexplained", progress)
     if not readings:
         return answer
@@ -53,19 +52,11 @@ def diagnose_slow(recordings, nominal, progress=lambda text: None) -> Diagnosis:
     return under(readings, rivals, answer, read, k.NAMED_SHARE)
 
 
-def held_points(view) -> np.ndarray:
-    """(b,) bool: blocks held out of the fit: every fourth operating point, of few points every fourth block."""
-    points = np.unique(view.run)
-    if len(points) >= 2 * HOLDOUT_EVERY:
-        return np.isin(view.run, points[2::HOLDOUT_EVERY])
-    return np.arange(len(view)) % HOLDOUT_EVERY == 2
-
-
 def diagnose_points(view, progress=lambda text: None) -> Diagnosis:
     """Diagnose the operating points of a SlowView."""
     if len(np.unique(view.run)) == 1:
         return diagnose_one_point(view)
-    held = held_points(view)
+    held = holdout_blocks(view)
     search = SlowSearch(view, ~held, progress)
     found = search.run()
     names, ambiguity, weak = sorted_out(found)
@@ -89,13 +80,6 @@ def diagnose_points(view, progress=lambda text: None) -> Diagnosis:
         answer.next_recording = requests(setup, fits, fit.noise_floor)
     cells, residual = search.residual(told)
     answer.evidence = evidence(view, (search.cells, search.cells.y), (cells, residual), found.pure, held)
-    for name in (
-        "theta_e",
-        "orders",
-        "spectrum_before",
-        "spectrum_after",
-    ):  # a slow log has no angle and no harmonics
-        answer.evidence.arrays.pop(name, None)
     answer.sentence = sentence(answer, CATALOGUE)
     answer.notes = _notes(view, held, answer.ambiguity) + _doubts(found, verdict, weak)
     answer.search, answer.found, answer.held = search, found, held
@@ -145,7 +129,7 @@ def _notes(view, held, ambiguity) -> list[str]:
     ]
     if not view.d_known.all():
         notes.append("u_d is not recorded: only the q axis was balanced.")
-    if points < 2 * HOLDOUT_EVERY:
+    if points < FEW:
         notes.append(
             f"With {points} operating points at most {most_effects(points)} of the effects can be named at once, and "
             "every fourth stretch instead of every fourth point was held out: record more points."

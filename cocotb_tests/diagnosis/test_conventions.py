@@ -9,7 +9,7 @@ import pytest
 
 from cocotb_tests.core.test_registers import PAPER
 from cocotb_tests.support.diagnosed_drives import POINT, recorded
-from cocotb_tests.support.mistakes import MISTAKES, ROOT2, Mistake, scaled, table_of, written
+from cocotb_tests.support.mistakes import MISTAKES, PHASES, ROOT2, Mistake, scaled, table_of, written
 from cocotb_tests.support.slow import halved
 from fluxproof.diagnosis import diagnose
 from fluxproof.diagnosis.conventions.table import READINGS, readings_for
@@ -56,6 +56,17 @@ def test_a_mistake_is_told_and_nothing_else(name, tmp_path):
         assert answer.conventions and "drive_improved.toml" in answer.advice
         again = diagnose(recording, tmp_path / "out" / "drive_improved.toml")
         assert again.verdict == "no_mismatch" and not again.conventions, again.sentence
+
+
+def test_the_improved_drive_holds_the_unit_that_the_numbers_gave_away(tmp_path):
+    """Currents in mA are converted by a check, but not if [columns] has a factor: it has to be the whole one."""
+    recording, drive = written(Mistake("currents_rms", scaled(PHASES, 1e3 / ROOT2)), tmp_path)
+    assert "currents_rms" in told(run(recording, drive, tmp_path / "out"))
+    columns = load_nominal(tmp_path / "out" / "drive_improved.toml").columns
+    factors = {name: entry["factor"] for name, entry in columns.items()}
+    assert factors == pytest.approx(dict.fromkeys(PHASES, 1e-3 * ROOT2))
+    again = diagnose(recording, tmp_path / "out" / "drive_improved.toml")
+    assert again.verdict == "no_mismatch" and not again.problems
 
 
 @pytest.mark.parametrize("name", ["currents in rms", "R and L line to line", "angle 90 degrees behind", "bus at half"])

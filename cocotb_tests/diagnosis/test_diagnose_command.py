@@ -15,6 +15,7 @@ from cocotb_tests.core.test_registers import PAPER
 from cocotb_tests.diagnosis.test_diagnosis_report import failures
 from cocotb_tests.support import diagnosed_drives as bench
 from cocotb_tests.support.damaged_files import damaged_files
+from cocotb_tests.support.mistakes import MISTAKES, written
 from cocotb_tests.support.recordings_made import nominal_of
 from fluxproof import command as fluxproof
 from fluxproof.checkout import ROOT
@@ -26,6 +27,7 @@ from fluxproof.diagnosis.replay import telemetry
 from fluxproof.golden_model import drive as drives
 from fluxproof.golden_model.io import telemetry_words
 from fluxproof.golden_model.registers import registers
+from fluxproof.golden_model.units import to_si
 
 SHORT = bench.GRID[:18]
 FLUX = 0.95 * bench.MACHINE.magnet_flux_wb
@@ -144,6 +146,8 @@ def test_a_flipped_register_bit_is_found_before_any_physics(register, bit, block
     found = data["digital"]["first_difference"]
     assert data["verdict"] == "digital_mismatch" and data["effects"] == [] and data["digital"]["checked"]
     assert (found["block"], found["cause_name"], found["cause_bit"]) == (block, register, bit)
+    recorded = int(dump[1][found["signal"]][found["sample"]])
+    assert found["recorded_si"] == pytest.approx(to_si(found["signal"], recorded, bench.DRIVE))
     first = capsys.readouterr().out.splitlines()[0]
     for word in (
         f"block {block}",
@@ -179,6 +183,16 @@ def test_several_recordings_are_one_diagnosis(tmp_path, monkeypatch, capsys):
     data = answer(out)
     assert data["verdict"] == "no_mismatch" and data["recording"]["rows"] == 2 * len(bench.columns(SHORT)["t"])
     assert not data["digital"]["checked"]
+
+
+def test_every_file_that_was_written_is_listed(tmp_path, capsys):
+    """Also the drive file of an answer without an effect, which its advice recommends."""
+    recording, drive = written(MISTAKES["dq currents in rms"], tmp_path)
+    assert diagnose(tmp_path / "out", recording, drive=drive, more=["--quiet"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert "drive_improved.toml" in lines[1] and not answer(tmp_path / "out")["effects"]
+    files = {f"wrote {path}" for path in (tmp_path / "out").iterdir()}
+    assert files == {line for line in lines if line.startswith("wrote ")} and len(files) == 3
 
 
 def test_a_bad_recording_is_a_verdict(tmp_path, capsys):

@@ -8,10 +8,10 @@ import pytest
 from cocotb_tests.core.test_registers import PAPER
 from cocotb_tests.support.diagnosed_drives import DRIVE, MACHINE, POINT, columns, recorded
 from fluxproof.diagnosis import diagnose
-from fluxproof.diagnosis.answer.estimates import common, covariance_of
+from fluxproof.diagnosis.answer.estimates import common
 from fluxproof.diagnosis.balance.blocks import view_of
 from fluxproof.diagnosis.catalogue import CATALOGUE
-from fluxproof.diagnosis.inference.problem import Problem, Setup
+from fluxproof.diagnosis.inference.problem import Problem, Setup, covariance_of
 from fluxproof.diagnosis.inference.settle import fit_of_set
 from fluxproof.diagnosis.nominal import load_nominal
 from fluxproof.diagnosis.recording import from_columns

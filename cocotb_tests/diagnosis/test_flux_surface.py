@@ -7,7 +7,7 @@ import pytest
 
 from fluxproof.checkout import ROOT
 from fluxproof.diagnosis.balance.blocks import view_of
-from fluxproof.diagnosis.balance.view import joined_views
+from fluxproof.diagnosis.balance.joined import joined_views
 from fluxproof.diagnosis.effects.flux_splines import INTERVALS, gradients, knots_over, powers
 from fluxproof.diagnosis.effects.flux_surface import earned, flux_map, ladder, names
 from fluxproof.diagnosis.nominal import load_nominal

@@ -9,7 +9,7 @@ from cocotb_tests.core.test_registers import PAPER
 from cocotb_tests.support.diagnosed_drives import GRID, columns, recorded
 from fluxproof.diagnosis.answer.request import wants_cold
 from fluxproof.diagnosis.balance.blocks import view_of, views_of
-from fluxproof.diagnosis.balance.view import joined_views, started_cold
+from fluxproof.diagnosis.balance.joined import joined_views
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.nominal import load_nominal
 from fluxproof.diagnosis.physics import held_out
@@ -35,8 +35,6 @@ def test_temperature_places_a_further_recording(view):
     assert np.all(course(heating, warm(view, COLD + 1.0)) == 0.0)
     middle = course(heating, warm(view, COLD + 55.0))
     assert np.ptp(middle) == 0.0 and middle[0] == pytest.approx(0.25, abs=0.03)  # half of the first half
-    assert not started_cold(heating) and not started_cold(view)
-    assert started_cold(joined_views([heating, warm(view, COLD + 1.0)]))
     assert wants_cold({"magnet_flux", "magnet_temperature"}, CATALOGUE, view)
     assert not wants_cold({"delay", "sampling_skew"}, CATALOGUE, view)
     assert not wants_cold({"magnet_temperature", "resistance_temperature"}, CATALOGUE, view)  # both would vanish

@@ -16,6 +16,7 @@ from fluxproof.diagnosis.answer.sizes import Sizes
 from fluxproof.diagnosis.balance.blocks import view_of
 from fluxproof.diagnosis.balance.cells import cells_of
 from fluxproof.diagnosis.catalogue import CATALOGUE
+from fluxproof.diagnosis.command import answer_lines
 from fluxproof.diagnosis.nominal import load_nominal
 from fluxproof.diagnosis.recording import from_columns
 from fluxproof.diagnosis.session import run
@@ -51,6 +52,7 @@ def test_flux_map_is_written_and_read(tmp_path):
     answer = run(with_effect(effect), NOMINAL, tmp_path)
     chart = read_flux_map(tmp_path / "flux_map.csv")
     assert "saturation" in {e.name for e in answer.effects} and any("flux_map.csv" in n for n in answer.notes)
+    assert f"wrote {tmp_path / 'flux_map.csv'}" in answer_lines(answer, NOMINAL, tmp_path)
     m, y = NOMINAL.machine, chart.i_q_a / NOMINAL.machine.rated_current_a
     bend = usual(effect, healthy()[1])["q_3"]
     middle = np.argmin(np.abs(chart.i_d_a))

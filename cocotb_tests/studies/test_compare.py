@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from fluxproof.diagnosis.balance.blocks import view_of
+from fluxproof.diagnosis.balance.holdout import holdout_blocks
 from fluxproof.diagnosis.balance.misfit import misfit
 from fluxproof.diagnosis.nominal import load_nominal
-from fluxproof.diagnosis.physics import holdout_blocks
 from fluxproof.diagnosis.recording import from_columns
 from studies.compare import __main__ as command
 from studies.compare.data import Data, holdout_rms, neighbour_rms

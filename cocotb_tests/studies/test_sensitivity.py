@@ -19,6 +19,8 @@ def test_every_constant_is_varied():
     declared = {t.id for node in ast.parse(open(constants.__file__).read()).body if isinstance(node, ast.Assign)
                 for target in node.targets for t in ast.walk(target) if isinstance(t, ast.Name)}  # fmt: skip
     assert declared == set(names()) | set(OF_SLOW_LOGS)
+    text = (ROOT / "docs" / "diagnosis.md").read_text()
+    assert f"its reason: {len(names())}, and {len(OF_SLOW_LOGS)} more of slow logs" in text
 
 
 def test_no_constant_is_imported_by_value():

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fluxproof.diagnosis.answer.estimates import covariance_of, named_effects
+from fluxproof.diagnosis.answer.estimates import named_effects
 from fluxproof.diagnosis.answer.headline import sentence
 from fluxproof.diagnosis.answer.locate import at_order, evidence, locate
 from fluxproof.diagnosis.answer.names import Names, names_of
@@ -18,6 +18,7 @@ from fluxproof.diagnosis.answer.unknown import sparse_term
 from fluxproof.diagnosis.answer.verdict import at_floor, kind_of
 from fluxproof.diagnosis.inference import constants as k
 from fluxproof.diagnosis.inference.posterior import Posterior
+from fluxproof.diagnosis.inference.problem import covariance_of
 from fluxproof.diagnosis.result import Diagnosis, UnknownTerm
 
 MOST_RIVALS = 5

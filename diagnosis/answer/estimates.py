@@ -9,10 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from fluxproof.diagnosis.answer.improved_plant import in_addition
+from fluxproof.diagnosis.inference import constants as k
+from fluxproof.diagnosis.inference.problem import covariance_of
 from fluxproof.diagnosis.result import NamedEffect
-
-# Relative to the voltage, and to the bus voltage in the direction of the current: rms in healthy recordings.
-COMMON_U, COMMON_DC = 2e-5, 1e-5
 
 
 def common(fit) -> np.ndarray:
@@ -21,24 +20,12 @@ def common(fit) -> np.ndarray:
     setup, view = problem.setup, problem.view
     u, bus = view.to_dq(view.u[:, 1:-1]), view.nominal.inverter.dc_bus_v
     along = view.i_mid / np.abs(view.i_mid).clip(0.02 * view.machine.rated_current_a)
-    patterns = (COMMON_U * u, 1j * COMMON_U * u, COMMON_DC * bus * along)
+    patterns = (k.COMMON_U * u, 1j * k.COMMON_U * u, k.COMMON_DC * bus * along)
     rows = np.array([problem.condensed(setup.projector.rows({"u": p})) for p in patterns]).T
     p = problem.p
     weight = 1.0 / fit.variance
     moved = fit.cov @ (p.x[:, fit.take].T @ (weight[:, None] * rows))
     return moved @ moved.T
-
-
-def covariance_of(fit, name, full) -> np.ndarray:
-    """The covariance of one effect's coefficients in their order in ``fit.c``; full: (k, k) of the set's columns."""
-    keys = list(fit.c[name])
-    place = {fit.problem.keys[n][1].lstrip("~"): j for j, n in enumerate(fit.take) if fit.problem.keys[n][0] == name}
-    out = np.zeros((len(keys), len(keys)))
-    for a, first in enumerate(keys):
-        for b, second in enumerate(keys):
-            if first in place and second in place:
-                out[a, b] = full[place[first], place[second]]
-    return out
 
 
 def without_possible(names, best):

@@ -17,14 +17,13 @@ from pathlib import Path
 import numpy as np
 
 from fluxproof.diagnosis.answer.request import steady_view
-from fluxproof.diagnosis.effects.effect import FluxEffect
+from fluxproof.diagnosis.effects.effect import LEAST_CURRENT, FluxEffect
 from fluxproof.files import write_text
 from fluxproof.plant import FluxMap
 
 NAME = "flux_map.csv"
 HEADER = "i_d_a,i_q_a,psi_d_wb,psi_q_wb"
 POINTS = 13  # along each axis
-LEAST = 0.08  # of rated current: an axis with less current has no curve
 
 
 def flux_map_of(answer) -> FluxMap | None:
@@ -39,7 +38,7 @@ def flux_map_of(answer) -> FluxMap | None:
     view = posterior.setup.view
     seen, rated = view.i.mean(axis=1), view.machine.rated_current_a
     axes = [np.linspace(x.min(), x.max(), POINTS) for x in (seen.real, seen.imag)]
-    if min(np.ptp(axis) for axis in axes) < LEAST * rated:
+    if min(np.ptp(axis) for axis in axes) < LEAST_CURRENT * rated:
         return None
     i_d, i_q = (grid.ravel() for grid in np.meshgrid(*axes, indexing="ij"))
     at = steady_view(view, np.zeros(i_d.size), i_d + 1j * i_q, rows=1)

@@ -47,7 +47,8 @@ def harmonic(view, cells, values, order):
     return (wave - constant * leak) / (1.0 - np.abs(leak) ** 2).clip(LEAST_ROOM)
 
 
-def _rms(x):
+def rms(x):
+    """Root mean square of the finite ones of real or complex values; 0 without any."""
     x = x[np.isfinite(x)]
     return float(np.sqrt(np.mean(np.abs(x) ** 2))) if len(x) else 0.0
 
@@ -55,12 +56,12 @@ def _rms(x):
 def locate(view, cells, pure) -> Location:
     """Location of the nominal drive's misfit."""
     y0 = at_order(cells, cells.y, 0.0)
-    signal = "u_q" if _rms(y0.imag) >= _rms(y0.real) else "u_d"
+    signal = "u_q" if rms(y0.imag) >= rms(y0.real) else "u_d"
     orders = []
     for order in np.unique(np.abs(cells.order[cells.channel == "u"])):
         both = [harmonic(view, cells, cells.y, s * order) for s in ((1,) if order == 0 else (1, -1))]
         quiet = [at_order(cells, pure, s * order) for s in ((1,) if order == 0 else (1, -1))]
-        amplitude, floor = np.hypot(*map(_rms, both)) if order else _rms(both[0]), max(map(_rms, quiet))
+        amplitude, floor = np.hypot(*map(rms, both)) if order else rms(both[0]), max(map(rms, quiet))
         if amplitude > 3.0 * floor:
             orders.append(OrderLine(round(float(order), 4), float(amplitude), "V"))
     orders.sort(key=lambda line: -line.amplitude)
@@ -106,7 +107,7 @@ def evidence(view, before, after, pure, holdout_blocks) -> Evidence:
     def spectrum(c, values):
         return np.array(
             [
-                np.hypot(_rms(harmonic(view, c, values, h)), _rms(harmonic(view, c, values, -h)) if h else 0.0)
+                np.hypot(rms(harmonic(view, c, values, h)), rms(harmonic(view, c, values, -h)) if h else 0.0)
                 for h in orders
             ]
         )
@@ -119,9 +120,12 @@ def evidence(view, before, after, pure, holdout_blocks) -> Evidence:
         "after_d": r0.real,
         "after_q": r0.imag,
         "holdout": holdout_blocks,
-        "noise": np.array(_rms(at_order(cells, pure, 0.0)) / np.sqrt(2)),
+        "noise": np.array(rms(at_order(cells, pure, 0.0)) / np.sqrt(2)),
         "orders": orders,
         "spectrum_before": spectrum(cells, y),
         "spectrum_after": spectrum(cells_after, left),
     }
+    if view.lacks is not None and all("harmonics" in words for words in view.lacks):  # operating points of a slow log
+        for name in ("theta_e", "orders", "spectrum_before", "spectrum_after"):
+            arrays.pop(name)
     return Evidence(arrays)

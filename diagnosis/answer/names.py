@@ -51,7 +51,7 @@ def names_of(posterior) -> Names:
     for p, fit in posterior.weights():
         kept.append((p, fit))
         held += p
-        if held >= 1.0 - k.DOUBTED:
+        if held >= 1.0 - k.LEFT_OUT:
             break
     best = posterior.best()
     credit = {}
@@ -65,7 +65,7 @@ def names_of(posterior) -> Names:
     suspects = {n: p for n, p in sure.items() if not effects[n].named}
     rest = [frozenset(fit.names) - set(sure) for _, fit in kept]
     groups = [sorted(n for n in g if present[n] >= k.OPEN) for g in alternatives(rest)]
-    groups = [g for g in groups if len(g) > 1 and sum(present[n] for n in g) >= 0.5]
+    groups = [g for g in groups if len(g) > 1 and sum(present[n] for n in g) >= k.TOGETHER]
     # Of an alternative one effect is there; where none may be, its members are only possible.
     groups = [g for g in groups if sum(p for p, fit in kept if set(g) & set(fit.names)) >= (1.0 - k.DOUBTED) * held]
     groups = [g for g in groups if any(effects[n].named for n in g)]

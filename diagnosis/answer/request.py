@@ -11,14 +11,15 @@ from fluxproof.diagnosis.answer.bench_point import on_the_bench
 from fluxproof.diagnosis.answer.experiment import BENDS, best_points, rivalry
 from fluxproof.diagnosis.answer.phrases import SIGNALS, joined, title_of
 from fluxproof.diagnosis.balance.cells import Projector, voltage_level
-from fluxproof.diagnosis.balance.view import View, stayed_cold
+from fluxproof.diagnosis.balance.joined import stayed_cold
+from fluxproof.diagnosis.balance.view import View
+from fluxproof.diagnosis.effects.effect import LEAST_CURRENT
 from fluxproof.diagnosis.inference import constants
 from fluxproof.diagnosis.quantities import ascii_of, quantity
 from fluxproof.diagnosis.result import Request
 
 ROWS = 200
-LEAST = 0.08  # of rated current: less current does not determine an axis
-FRESH = 0.06  # share of an effect's longest column below which the recording does not show a coefficient
+SHOWN = 0.06  # share of an effect's longest column below which the recording does not show a coefficient
 BLOCKS = 20  # independent blocks assumed in a dwell of half a second
 MOST = 3
 # Share of D^2 that is given up to avoid an axis without current so far, whose parameters are unknown, and to avoid
@@ -106,7 +107,7 @@ def within_limits(view):
 
 def new_axes(view, i) -> np.ndarray:
     """(n,) number of axes without current in the recording that have current at i (n,) [A]."""
-    least, seen = LEAST * view.machine.rated_current_a, view.i.mean(axis=1)
+    least, seen = LEAST_CURRENT * view.machine.rated_current_a, view.i.mean(axis=1)
     quiet = [part for part in (np.real, np.imag) if np.abs(part(seen)).max() < least]
     return sum((np.abs(part(i)) >= least for part in quiet), np.zeros(len(i)))
 
@@ -134,7 +135,7 @@ def known_of(fit, columns) -> np.ndarray:
         mine = [key for key in columns if key[0] == key_a[0]]
         seen = {key: length[place[key]] for key in mine if key in place and length[place[key]] > 1e-9}
         # Within the recorded range at most as large as the effect itself; beyond it a curve over speed may be larger.
-        shown = seen.get(key_a, 0.0) > FRESH * max(seen.values(), default=0.0)
+        shown = seen.get(key_a, 0.0) > SHOWN * max(seen.values(), default=0.0)
         size = seen if shown else {key: np.linalg.norm(columns[key]) for key in mine}
         own = sum(abs(fit.c[n].get(key, 0.0)) * size[n, key] for n, key in size)
         out[a, a] += (size[key_a] / (BENDS * own + 1e-12 * size[key_a] + 1e-30)) ** 2

@@ -73,7 +73,7 @@ class Sizes:
         excess, left = sum(s.excess for s in mine), sum(s.left for s in mine)
         return float(1.0 - left / excess) if excess > 0.0 else None
 
-    def remainder(self, least=0.01) -> list[Remainder]:
+    def remainder(self) -> list[Remainder]:
         """What is left above the floor, per channel and order, the largest share first."""
         out = []
         for (channel, order), size in self.orders.items():
@@ -81,7 +81,7 @@ class Sizes:
                 continue
             whole = sum(s.excess for (c, _), s in self.orders.items() if c == channel)
             share = size.left / whole if whole > 0.0 else 0.0
-            if size.after > size.above(k.VISIBLE) and share >= least:
+            if size.after > size.above(k.VISIBLE) and share >= k.LISTED:
                 signal, unit = UNITS[channel]
                 out.append(Remainder(signal, round(order, 4), float(np.sqrt(size.left)), unit, float(share)))
         return sorted(out, key=lambda r: -r.share)

@@ -34,5 +34,5 @@ def standing_out(sizes) -> list:
     """[(channel, order)] whose remainder exceeds its noise floor and is a large part of what was there before."""
     return [
         key for key, s in sizes.orders.items()
-        if key[0] in sizes.channels and s.after > s.above(k.FLOOR) and s.left > 0.1 * max(s.excess, 1e-300)
+        if key[0] in sizes.channels and s.after > s.above(k.FLOOR) and s.left > k.STANDS_OUT * max(s.excess, 1e-300)
     ]  # fmt: skip

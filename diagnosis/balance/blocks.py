@@ -53,7 +53,7 @@ def stator_current(recording: Recording, theta):
     return (r["i_d"] + 1j * r["i_q"]) * np.exp(1j * theta), None  # a dq log was already rotated by the drive
 
 
-def _unwrapped(recording, run, sample_time_s):
+def _unwrapped(recording, run):
     """Unwrapped angle (n,) [rad]; gaps are bridged with the recorded speed, to preserve the mechanical turn."""
     theta = np.unwrap(recording["theta_e"])
     breaks = np.flatnonzero(np.diff(run)) + 1
@@ -74,7 +74,7 @@ def view_of(recording: Recording, nominal, block_rows=BLOCK_ROWS) -> View:
     n = len(r)
     linked = r.joined[:-1] & r.usable[:-1] & r.usable[1:]
     run = np.concatenate([[0], np.cumsum(~linked)])
-    theta = _unwrapped(r, run, period)
+    theta = _unwrapped(r, run)
     i_raw, i_abc = stator_current(r, theta)
     if i_abc is not None and np.nanmax(np.abs(i_abc.sum(axis=1))) < 1e-6 * machine.rated_current_a:
         i_abc = None  # the third current was computed from the other two

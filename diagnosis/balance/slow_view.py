@@ -21,7 +21,6 @@ import numpy as np
 from fluxproof.diagnosis.balance.point_rows import block_points, point_rows
 from fluxproof.diagnosis.balance.slow_stretches import Stretches, stretches
 from fluxproof.diagnosis.balance.view import STACKED, View, lacking
-from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.inference import constants as k
 from fluxproof.diagnosis.recording import Recording
 
@@ -33,7 +32,6 @@ MOST_OF_ONE = 120  # the same of a recording with one operating point
 
 # What no operating point shows.
 LACKS = frozenset({"harmonics"})
-UNSEEN = tuple(name for name, effect in CATALOGUE.items() if LACKS & set(effect.needs))
 
 
 @dataclass

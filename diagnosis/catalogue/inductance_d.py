@@ -2,9 +2,7 @@
 
 import numpy as np
 
-from fluxproof.diagnosis.effects.effect import FluxEffect, Parameter, one, sigma
-
-LEAST = 0.08  # of rated current: smaller currents do not determine a curve
+from fluxproof.diagnosis.effects.effect import LEAST_CURRENT, FluxEffect, Parameter, one, sigma
 
 
 class InductanceD(FluxEffect):
@@ -17,7 +15,7 @@ class InductanceD(FluxEffect):
         return {"bend_2": unit * x, "bend_3": unit * x**2}
 
     def free(self, view):
-        carried = np.abs(view.i.real).max() > LEAST * view.machine.rated_current_a
+        carried = np.abs(view.i.real).max() > LEAST_CURRENT * view.machine.rated_current_a
         # Decided once for all views of a recording: corrected currents must not change the set of coefficients.
         return super().free(view) if view.memo.setdefault("curve_d", bool(carried)) else {}
 

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from fluxproof.diagnosis.catalogue.inductance_d import LEAST
-from fluxproof.diagnosis.effects.effect import FluxEffect, Parameter, one, sigma
+from fluxproof.diagnosis.effects.effect import LEAST_CURRENT, FluxEffect, Parameter, one, sigma
 
 
 class InductanceQ(FluxEffect):
@@ -16,7 +15,7 @@ class InductanceQ(FluxEffect):
         return {"bend_2": unit * np.abs(y), "bend_3": unit * y**2}
 
     def free(self, view):
-        carried = np.abs(view.i.imag).max() > LEAST * view.machine.rated_current_a
+        carried = np.abs(view.i.imag).max() > LEAST_CURRENT * view.machine.rated_current_a
         # Decided once for all views of a recording: corrected currents must not change the set of coefficients.
         return super().free(view) if view.memo.setdefault("curve_q", bool(carried)) else {}
 

@@ -18,11 +18,6 @@ def skewed(view):
     return current_error(view, zero_vector_slope(view))
 
 
-def unskewed(view, tau):
-    """The view with the currents corrected for sampling tau [s] after the valley."""
-    return _without(view, tau * zero_vector_slope(view)) if tau else view
-
-
 def _without(view, error):
     return view.replace(i=view.i - error, i_raw=view.i_raw - view.stator(error))
 

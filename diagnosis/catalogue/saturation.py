@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fluxproof.diagnosis.effects.effect import FluxEffect, Parameter
+from fluxproof.diagnosis.effects.effect import LEAST_CURRENT, FluxEffect, Parameter
 from fluxproof.diagnosis.result import Estimate
 
 
@@ -16,18 +16,10 @@ def _d(view, shape):
     return view.machine.inductance_d_h * view.machine.rated_current_a * shape(x) + 0j
 
 
-def q_curves(view):
-    """Flux terms (b, m+1) complex dq [Wb] over i_q, in units of L_q i_rated: linear, |y| y, y^3, y^5."""
-    return [_q(view, shape) for shape in (lambda y: y, lambda y: y * np.abs(y), lambda y: y**3, lambda y: y**5)]
-
-
-LEAST = 0.08  # of rated current: an axis with less current does not determine its curve
-
-
 def _with_current(view, columns):
     """The columns of the axes with enough current."""
     i = view.i / view.machine.rated_current_a
-    enough = {"d": np.abs(i.real).max() > LEAST, "q": np.abs(i.imag).max() > LEAST}
+    enough = {"d": np.abs(i.real).max() > LEAST_CURRENT, "q": np.abs(i.imag).max() > LEAST_CURRENT}
     return {key: column for key, column in columns.items() if enough[key[0]]}
 
 

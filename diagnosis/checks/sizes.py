@@ -1,7 +1,8 @@
 """Wrong units that the magnitude of the values reveals: duties in percent, milliamps, millivolts, kelvin.
 
 Values are compared with the rated values of drive.toml, with a margin of a factor of 20.  If they exceed it and no
-single unit explains it, the recording is rejected, since a wrong guess would give a wrong diagnosis.
+single unit explains it, the recording is rejected, since a wrong guess would give a wrong diagnosis.  A column whose
+unit is documented (in the file, in [columns] or by the logger's map) is never converted, as the nameplate may be wrong.
 """
 
 from __future__ import annotations
@@ -22,9 +23,7 @@ def check(recording, nominal) -> None:
     _duties(recording)
     _bus(recording, nominal.inverter.dc_bus_v)
     _voltages(recording, nominal.inverter.dc_bus_v)
-    temp = recording.columns.get("temp_winding")
-    if temp is not None and 250.0 < np.median(temp) < 500.0:
-        _convert(recording, ("temp_winding",), 1.0, "kelvin", -273.15)
+    _winding(recording)
 
 
 def _size(values) -> float:
@@ -33,15 +32,42 @@ def _size(values) -> float:
 
 
 def _convert(recording, names, factor, unit, offset=0.0) -> None:
+    """Convert columns; meta "column_scales" tells it to a drive file that describes these columns."""
+    scales = dict(recording.meta.get("column_scales", {}))
     for name in names:
         recording.columns[name] = recording[name] * factor + offset
+        before, start = scales.get(name, (1.0, 0.0))
+        scales[name] = before * factor, start * factor + offset
+    recording.meta["column_scales"] = scales
+    recording.meta["rescaled"] = [*recording.meta.get("rescaled", ()), *names]
     recording.problems.append(
         Problem("unit", f"{', '.join(names)} in {unit}", names[0], 0, len(recording), "converted")
     )
 
 
-def _refuse(recording, name, message) -> None:
+def _documented(recording, *names) -> bool:
+    """Whether the unit of any of these columns is written down."""
+    return bool(set(names) & set(recording.meta.get("documented_units", ())))
+
+
+def _refuse(recording, name, message, names=()) -> None:
+    """Reject a recording because of a column; names: all columns that a conversion would have changed."""
+    if _documented(recording, name, *names):
+        message += "; its unit is documented and was kept: correct the unit in [columns], or the drive file"
     recording.problems.append(Problem("unit", message, name, 0, len(recording), fatal=True))
+
+
+def _winding(recording) -> None:
+    """Kelvin becomes degC; a documented temperature that no winding survives is not used."""
+    temp = recording.columns.get("temp_winding")
+    if temp is None or not 250.0 < np.median(temp) < 500.0:
+        return
+    if not _documented(recording, "temp_winding"):
+        _convert(recording, ("temp_winding",), 1.0, "kelvin", -273.15)
+        return
+    message = f"the median of temp_winding is {np.median(temp):.0f} degC as documented, which looks like kelvin"
+    recording.problems.append(Problem("unit", message, "temp_winding", 0, len(recording), "not used"))
+    del recording.columns["temp_winding"]
 
 
 def _currents(recording, rated) -> None:
@@ -52,16 +78,13 @@ def _currents(recording, rated) -> None:
     }
     if not large:
         return
-    if max(large.values()) / 1000.0 <= PLAUSIBLE * rated:
+    if max(large.values()) / 1000.0 <= PLAUSIBLE * rated and not _documented(recording, *large):
         # A unit applies to a sensor board: to all currents of a frame, unless the others differ in magnitude.
         _convert(recording, tuple(large), 1e-3, "mA")
         return
     name = max(large, key=large.get)
-    _refuse(
-        recording,
-        name,
-        f"reaches {large[name]:.4g} A, {large[name] / rated:.0f} times rated_current_a = {rated:g} A",
-    )
+    times = f"{large[name] / rated:.0f} times rated_current_a = {rated:g} A"
+    _refuse(recording, name, f"reaches {large[name]:.4g} A, {times}", large)
 
 
 def _duties(recording) -> None:
@@ -76,6 +99,7 @@ def _duties(recording) -> None:
             low >= -ROUNDING * factor
             and 0.1 * factor < high <= factor * (1 + ROUNDING)
             and 0.2 * factor < mean < 0.8 * factor
+            and not _documented(recording, *names)
         ):
             _convert(recording, names, 1.0 / factor, unit)
             return
@@ -89,9 +113,8 @@ def _duties(recording) -> None:
         worst = max(names, key=lambda name: float(np.max(np.abs(recording[name]))))
         out = (recording[worst] > 1.0 + ROUNDING) | (recording[worst] < -ROUNDING)
         if np.count_nonzero(out) > 0.01 * len(out):
-            _refuse(
-                recording, worst, f"duties range from {low:.4g} to {high:.4g}; 0 to 1, or percent, is expected"
-            )
+            message = f"duties range from {low:.4g} to {high:.4g}; 0 to 1, or percent, is expected"
+            _refuse(recording, worst, message, names)
 
 
 def _bus(recording, nominal_v) -> None:
@@ -99,7 +122,7 @@ def _bus(recording, nominal_v) -> None:
         return
     ratio = float(np.median(recording["u_dc"])) / nominal_v
     for factor, unit in ((1e-3, "mV"), (1e3, "kV")):
-        if abs(ratio * factor - 1.0) < 0.3:
+        if abs(ratio * factor - 1.0) < 0.3 and not _documented(recording, "u_dc"):
             _convert(recording, ("u_dc",), factor, unit)
             return
     if not 0.02 < ratio < MUCH:
@@ -111,7 +134,7 @@ def _voltages(recording, nominal_v) -> None:
     names = tuple(name for name in ("u_d_ref", "u_q_ref") if name in recording.columns)
     size = max((_size(recording[name]) for name in names), default=0.0)
     if size > MUCH * nominal_v:
-        if size / 1000.0 < nominal_v:
+        if size / 1000.0 < nominal_v and not _documented(recording, *names):
             _convert(recording, names, 1e-3, "mV")
         else:
-            _refuse(recording, names[0], f"voltages reach {size:.4g} V with a bus of {nominal_v:g} V")
+            _refuse(recording, names[0], f"voltages reach {size:.4g} V with a bus of {nominal_v:g} V", names)

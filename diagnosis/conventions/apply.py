@@ -30,7 +30,8 @@ def edit(document, nominal, readings, recording, put) -> None:
     """Write what the readings restore to a drive file: keys, and factors in [columns].
 
     document: tomlkit; recording: whose columns the file describes, or None; put: function (table, key, value, why).
-    A column whose unit a check has converted stays as it is, as the file does not state that unit.
+    A column whose unit a check has converted stays as it is, as the file does not state that unit; but where its values
+    gave the unit away (checks/sizes.py), the factor holds that unit too.
     """
     for reading in readings:
         for section, key, value in reading.keys(nominal):
@@ -39,7 +40,8 @@ def edit(document, nominal, readings, recording, put) -> None:
     if recording is None:
         return
     converted = {p.column for p in recording.problems if p.action in ("converted", "corrected")}
-    sources, scales = recording.meta.get("columns", {}), recording.meta.get("scales", {})
+    converted -= set(recording.meta.get("rescaled", ()))
+    sources, scales = recording.meta.get("columns", {}), recording.meta.get("column_scales", {})
     for name in sources:
         factor, offset = scales.get(name, (1.0, 0.0))
         why = []

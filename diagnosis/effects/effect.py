@@ -29,6 +29,7 @@ NEEDS = {
     "current": "measured currents",
 }
 LEAST_LEFT = 0.1  # of a parameter of the machine: a smaller one is not this machine
+LEAST_CURRENT = 0.08  # of rated current: an axis with less current does not determine a curve over it
 DOUBT = 2.0  # standard deviations by which a value must violate a limit to be rejected
 
 

@@ -13,12 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from fluxproof.diagnosis.answer.conclude import measured_torque
-from fluxproof.diagnosis.answer.estimates import common, covariance_of
+from fluxproof.diagnosis.answer.estimates import common
 from fluxproof.diagnosis.answer.names import credibility
 from fluxproof.diagnosis.answer.sizes import UNITS, Sizes
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.inference import constants as k
 from fluxproof.diagnosis.inference.posterior import possible
+from fluxproof.diagnosis.inference.problem import covariance_of
 from fluxproof.diagnosis.inference.settle import around, settled
 from fluxproof.diagnosis.result import Remainder
 

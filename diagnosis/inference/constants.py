@@ -1,4 +1,7 @@
-"""Every number of the inference that is a choice, with its unit and its reason; `make sensitivity` varies each."""
+"""Every number that decides what is said and is a choice, with its unit and its reason; `make sensitivity` varies each.
+
+What only limits effort (how many sets are tried), grids and tolerances of a numerical step stand where they are used.
+"""
 
 # ---- what a recording may contain
 # Prior probability that a given effect of the catalogue is present: of some twenty effects one is expected.
@@ -8,6 +11,11 @@ PRESENT = 0.05
 BALANCE_U = 2e-4
 # The same relative to the bus voltage: sampling of the bus, minimum pulses.
 BALANCE_DC = 1.5e-5
+# Of the error of a mean voltage or torque, what a harmonic has: less of the ripple and of the timing reaches it.
+BALANCE_ORDER = 0.5
+# The part of the balance's error that all operating points have in common and that moves a parameter, relative to the
+# voltage, and to the bus voltage in the direction of the current: rms in healthy recordings.
+COMMON_U, COMMON_DC = 2e-5, 1e-5
 # Error of the mean of three phase currents, relative to the rated current: matching of the converters' references.
 BALANCE_SUM = 2e-4
 # Error of the torque balance, relative to the rated torque: a transducer's linearity, slow friction.
@@ -16,20 +24,30 @@ BALANCE_TORQUE = 3e-3
 DISCREPANCY = 3.0
 # Share of its own contribution by which the formula of an effect is wrong at each operating point.
 FORMULA = 0.01
+# Largest size of an effect, in units of the smallest of interest, where a ceiling limits it, and where none does.
+WIDEST, UNBOUNDED = 1e3, 300.0
 # Odds against a load that nobody recorded at every operating point: a drive is run without load at one of them.
 ALWAYS_LOADED = 1e4
 # Of the top speed and the rated current: closer blocks belong to one operating point, as a drive regulates them.
 POINT = 0.08
+# Visits into which a recording of a single operating point is cut: enough to show a drift, each long enough for a mean.
+VISITS = 16
+# Power of a ripple that repeats at an operating point, in units of its variance, that is noise: 2 standard deviations.
+RIPPLE = 4.0
 
 # ---- how recording and drive file are to be read
-# Prior probability of each mistaken convention (conventions/table.py): of some forty, one recording in twelve has one.
+# Prior probability of each mistaken convention (conventions/table.py): of 35, one recording in fourteen has one.
 MISREAD = 2e-3
 
 # ---- what the answer says
-# Probability of not being there up to which an effect is named, and mass of the posterior that is not looked at.
+# Probability of not being there up to which an effect is named, or one of an alternative is taken to be there.
 DOUBTED = 0.05
+# Mass of the posterior that is not looked at: its sets are many, and each is improbable.
+LEFT_OUT = 0.05
 # Probability from which an effect is an alternative.
 OPEN = 0.02
+# Sum of the probabilities of an alternative's effects from which it is told.
+TOGETHER = 0.5
 # Probability from which an effect that is not named takes part in what is explained.
 LIKELY = 0.5
 # Discrepancy, in units of the balance's error, that every recording may have.
@@ -47,6 +65,10 @@ VISIBLE = 0.44
 SMALL = 0.03
 # Of that power: names that explain less are no explanation.
 HALF = 0.5
+# Of the power of one order: a remainder above its noise floor that is larger stands out, so that something is there.
+STANDS_OUT = 0.1
+# Of the power of all orders of a channel: a smaller part is not listed in the remainder.
+LISTED = 0.01
 
 # ---- a misfit outside the orders of the balance
 # Of the misfit's rms: ripple that the formulas of the named effects may leave.
@@ -73,3 +95,5 @@ SLOW_REST = 0.1
 # share of its power that names must explain beside a remainder, as that search does not know how much may imitate an
 # effect.
 LEFTOVER, FLOOR_SHARE, NAMED_SHARE = 2.0, 0.15, 0.9
+# Penalty of an effect in chi^2, in addition to that of its coefficients: a prior probability of about one in twenty.
+PER_EFFECT = 10.0

@@ -18,8 +18,8 @@ import numpy as np
 STEPS = 7
 LEAST = 1.0  # in units of the balance's error
 SMALL, LARGE = 1e-200, 1e200  # range of a product of variances, each of which lies within 1e-100 and 1e100
-FACTORS = np.array([0.1, 0.35, 0.7, 1.0, 1.4, 3.0, 10.0])  # of the discrepancy, tried in every step
-SEEN = np.array([0.0, 0.03, 0.1, 0.2, 0.4, 0.7, 1.0])  # shares mu, tried in every step
+FACTORS = np.array([0.1, 0.35, 0.7, 1.0, 1.4, 3.0, 10.0])  # of the discrepancy: the grid of every step
+SEEN = np.array([0.0, 0.03, 0.1, 0.2, 0.4, 0.7, 1.0])  # shares mu: the grid of every step
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -49,11 +49,12 @@ def evidence(
     start: torque, in multiples of the smallest one, above which a row is first taken as loaded.
     always: odds against a load at every operating point.
     formula: share of an effect's contribution that counts as discrepancy; scale: prior of lambda.
+    Where a load hides the discrepancy, lambda stays at this scale.
     """
     n, k = x.shape
     effects = len(most)
     a = np.sqrt(most)
-    lam = np.full(groups, 3.0)
+    lam = np.full(groups, scale)
     mu = np.ones(groups)
     c = np.zeros(k)
     cov = np.zeros((k, k))
@@ -163,7 +164,7 @@ def evidence(
             g = group[i]
             known = s2[i] + own[i] + mu[g] ** 2 * doubt2[i]
             if g == loads:
-                u = known + 9.0 * level2[i]
+                u = known + scale**2 * level2[i]
                 with_load = u + load * load
                 loaded[i] = load * load if e2[i] / with_load + np.log(with_load) < e2[i] / u + np.log(u) else 0.0
                 continue
@@ -182,7 +183,7 @@ def evidence(
                 total = score[g, h] - 0.5 * np.log(products[g, h]) - np.log(1.0 + (tried / scale) ** 2)
                 if total > best:
                     best, chosen = total, tried
-            lam[g] = chosen if g != loads else 3.0
+            lam[g] = chosen if g != loads else scale
         if doubtful:
             _share_seen(mu, lam, s2, level2, doubt2, own, e2, group, loads)
     if loads >= 0:  # a drive is run without load at one of its operating points at least

@@ -11,8 +11,9 @@ from dataclasses import dataclass, field
 import numba
 import numpy as np
 
+from fluxproof.diagnosis.inference import constants
+
 FRESH = 0.06  # least share of a column that is independent of the earlier ones; else it is rejected as collinear
-PER_EFFECT = 10.0  # penalty of an effect in addition to its coefficients: a prior probability of about one in twenty
 
 
 @numba.njit(cache=True)
@@ -134,14 +135,20 @@ class Fitter:
     def score(self, model, dispersion=1.0) -> float:
         """chi^2 over the dispersion plus the penalty of coefficients and effects."""
         chi2, count = self.chi2(model)
-        return chi2 / dispersion + self.penalty * count + PER_EFFECT * len(model)
+        return chi2 / dispersion + self.penalty * count + constants.PER_EFFECT * len(model)
 
     def solve(self, model, dispersion=1.0) -> Solution:
-        """Coefficients, covariance and residual of a model; coefficients that the data do not determine are zero."""
+        """Coefficients, covariance, residual and score of a model."""
+        out = self.unscored(model)
+        out.score = self.score(model, dispersion)
+        return out
+
+    def unscored(self, model) -> Solution:
+        """The solution without its score; coefficients that the data do not determine are zero."""
         index, carried = self.columns_of(model), self.carried(model)
         inverse = np.linalg.inv(self.gram[np.ix_(carried, carried)])
         chi2, count = self.chi2(model)
-        out = Solution(model, chi2, count, len(self.y), score=self.score(model, dispersion))
+        out = Solution(model, chi2, count, len(self.y))
         at = np.searchsorted(index, carried, sorter=np.argsort(index))
         at = np.argsort(index)[at]
         values, covariance = np.zeros(len(index)), np.zeros((len(index),) * 2)

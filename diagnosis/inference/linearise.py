@@ -39,7 +39,7 @@ class Rows:
         every = np.ones(len(self.cells.y), bool)
         plain = noise(view, self.cells, self.cells.y)
         # The torque of a free shaft may be all noise at high orders: equal weights would fit that alone.
-        rough = Fitter(self.cells, _weighable(plain, self.cells), every).solve(everything(self.cells))
+        rough = Fitter(self.cells, _weighable(plain, self.cells), every).unscored(everything(self.cells))
         # Both bound the noise: the misfit also has what differs between neighbours, the rough fit what it fits wrongly.
         self.noise = np.minimum(noise(view, self.cells, rough.residual), plain)
         self.smooth = smooth(view)

@@ -21,8 +21,6 @@ import numpy as np
 from fluxproof.diagnosis.effects.effect import rated_torque
 from fluxproof.diagnosis.inference import constants as k
 
-VISITS = 16  # visits into which a recording of a single operating point is cut
-
 
 @dataclass
 class Points:
@@ -67,7 +65,7 @@ def point_numbers(view) -> np.ndarray:
 def balance_level(view, cells):
     """(r,) error of the balance in every row, in the unit of its channel."""
     m = view.machine
-    ripple = np.where(cells.order == 0, 1.0, 0.5)  # a harmonic has half of the error of the mean
+    ripple = np.where(cells.order == 0, 1.0, k.BALANCE_ORDER)
     level = ripple * view.balance_error()[cells.block]
     level = np.where(cells.channel == "torque", ripple * k.BALANCE_TORQUE * rated_torque(view.nominal), level)
     return np.where(cells.channel == "sum", k.BALANCE_SUM * m.rated_current_a, level)
@@ -75,7 +73,7 @@ def balance_level(view, cells):
 
 def visits(view, points) -> np.ndarray:
     """(b,) number of the visit of each block: neighbours in time at one operating point, of limited length."""
-    longest = max(1, -(-len(view) // VISITS))
+    longest = max(1, -(-len(view) // k.VISITS))
     out, number, length = np.zeros(len(view), int), 0, 0
     for n in range(len(view)):
         length += 1

@@ -8,14 +8,14 @@ import itertools
 import numpy as np
 
 from fluxproof.diagnosis.balance.cells import voltage_level
-from fluxproof.diagnosis.inference.problem import Problem, Setup
+from fluxproof.diagnosis.inference.problem import Problem, Setup, covariance_of
 from fluxproof.diagnosis.inference.settle import around, settled, settled_from
 
 ROUNDS = 3
 SETTLED = 12  # most linearisations of the final set
 KEPT = (12, 80)  # least and most sets of one size that are grown further
 EFFORT = 20000  # rows times sets of one size
-CLOSE = 20.0  # log evidence below the best within which a set is linearised on its own
+CLOSE = 20.0  # log evidence below the best within which linearising a set on its own is worth the effort
 GROWN = 3  # effects up to which all good sets are grown
 MOST = 6
 ALIKE = 8  # best sets that are linearised on their own before the search around one of them
@@ -194,13 +194,6 @@ def possible(fit, small=()) -> bool:
             return False
         if name not in small and effect.size(c, nominal) < effect.floor(nominal):
             return False
-        keys = list(c)
-        cov = np.zeros((len(keys), len(keys)))
-        place = {problem.keys[n][1].lstrip("~"): j for j, n in enumerate(fit.take) if problem.keys[n][0] == name}
-        for a, ka in enumerate(keys):
-            for b, kb in enumerate(keys):
-                if ka in place and kb in place:
-                    cov[a, b] = fit.cov[place[ka], place[kb]]
-        if not effect.possible(c, cov, nominal):
+        if not effect.possible(c, covariance_of(fit, name, fit.cov), nominal):
             return False
     return True

@@ -52,10 +52,10 @@ class Setup:
         """Log prior odds of an effect; ``shifts`` {effect: change} holds what a fleet says of them."""
         return float(np.log(k.PRESENT / (1 - k.PRESENT)) + self.shifts.get(name, 0.0))
 
-    def read_like(self, other, volts, amps):
+    def read_like(self, other, amps):
         """This reading of a recording with the operating points of ``other``, the same blocks as documented.
 
-        volts, amps: factors of voltages and currents between the two.
+        amps: factor of the currents between the two.
         """
         self.points, self.visits, self.shifts = other.points, other.visits, other.shifts
         self.grouping, self.repeats = other.grouping, other.repeats
@@ -122,7 +122,7 @@ class Problem:
             for n in curves if cores else []:
                 self.prior[n] = effect.curve * effect.curve_scale(self.keys[n][1][1:], scales, nominal)
             ceiling = effect.ceiling(nominal)
-            self.most[name] = max(min(ceiling / floor, 1e3), 2.0) if np.isfinite(ceiling) else 300.0
+            self.most[name] = max(min(ceiling / floor, k.WIDEST), 2.0) if np.isfinite(ceiling) else k.UNBOUNDED
             self.index[name] = cores + [n for n in curves if self.prior[n] > 0.0] if cores else []
 
     def condensed(self, rows):
@@ -222,6 +222,18 @@ class Fit:
         return out
 
 
+def covariance_of(fit, name, full) -> np.ndarray:
+    """The covariance of one effect's coefficients in their order in ``fit.c``; full: (k, k) of the set's columns."""
+    keys = list(fit.c[name])
+    place = {fit.problem.keys[n][1].lstrip("~"): j for j, n in enumerate(fit.take) if fit.problem.keys[n][0] == name}
+    out = np.zeros((len(keys), len(keys)))
+    for a, first in enumerate(keys):
+        for b, second in enumerate(keys):
+            if first in place and second in place:
+                out[a, b] = full[place[first], place[second]]
+    return out
+
+
 def _repeats(cells, points):
     """(r,) number of the functional and operating point of every row."""
     keys = np.stack([cells.order * 1e6, cells.part, points[cells.block], cells.channel == "u",
@@ -236,5 +248,5 @@ def repeated(ripple, setup):
     count = np.maximum(np.bincount(cell, w), 1.0)
     mean = np.bincount(cell, w * ripple) / count
     spread = np.bincount(cell, w * (ripple - mean[cell]) ** 2) / np.maximum(count - 1.0, 1.0) / count
-    kept = np.maximum(1.0 - 4.0 * spread / np.maximum(mean**2, 1e-300), 0.0) * (count > 2)
+    kept = np.maximum(1.0 - k.RIPPLE * spread / np.maximum(mean**2, 1e-300), 0.0) * (count > 2)
     return (kept * mean)[cell]

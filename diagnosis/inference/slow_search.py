@@ -12,9 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fluxproof.diagnosis.answer.locate import rms
 from fluxproof.diagnosis.balance.cells import column_of, voltage_level
 from fluxproof.diagnosis.catalogue import CATALOGUE
-from fluxproof.diagnosis.inference import constants as k
+from fluxproof.diagnosis.inference import constants
 from fluxproof.diagnosis.inference.fit import Fitter, Model, Solution, everything
 from fluxproof.diagnosis.inference.refine import Refiner
 
@@ -106,9 +107,7 @@ class SlowSearch:
 
         Their significance is already decided by the comparison with every other set, including the one without them.
         """
-        small = [
-            n for n in best.model.names if self.effects[n].size(best.c[n], self.view.nominal) < self.floor(n)
-        ]
+        small = [n for n in best.model.names if self.effects[n].size(best.c[n], self.view.nominal) < self.floor(n)]
         for name in small:
             best = self.refine(best.model.without(name))
         if small:  # another set may explain with large effects what the small one did with its free curve
@@ -174,25 +173,20 @@ def sigmas(view, cells) -> tuple[np.ndarray, np.ndarray]:
     rows = (cells.channel == "u") & (cells.order == 0)
     at = np.full((n, 2), -1)
     at[cells.block[rows], cells.part[rows]] = np.flatnonzero(rows)
-    own = np.hypot(k.SLOW_U * level, k.SLOW_DC * view.nominal.inverter.dc_bus_v)
-    own = np.hypot(own, k.SLOW_CHANGE * view.unsteady)
+    own = np.hypot(constants.SLOW_U * level, constants.SLOW_DC * view.nominal.inverter.dc_bus_v)
+    own = np.hypot(own, constants.SLOW_CHANGE * view.unsteady)
     start = own[cells.block]
     rough = Fitter(cells, start, np.ones(len(cells.y), bool)).solve(everything(cells)).residual
     rough = np.where(cells.ok, rough, np.nan)[at]  # a d voltage that was not recorded has no residual
     pairs = np.flatnonzero((np.diff(view.run) == 0) & (loaded[1:] == loaded[:-1]))
     change = (rough[pairs + 1] - rough[pairs]) / np.sqrt(2)
     under = loaded[pairs]
-    rest = _rms(change[~under])
-    share = _rms(change[under] / level[pairs][under, None])
+    rest = rms(change[~under])
+    share = rms(change[under] / level[pairs][under, None])
     # Without repetitions what no effect explains is noise, unless it is too large for it.
     if (~under).sum() < LEAST_PAIRS:
-        rest = min(_rms(rough[~loaded]), k.SLOW_NOISE * _rms(level))
+        rest = min(rms(rough[~loaded]), constants.SLOW_NOISE * rms(level))
     if under.sum() < LEAST_PAIRS:
-        share = min(_rms((rough / level[:, None].clip(1e-9))[loaded]), k.SLOW_NOISE)
+        share = min(rms((rough / level[:, None].clip(1e-9))[loaded]), constants.SLOW_NOISE)
     pure = np.hypot(rest, np.where(loaded, share * level, 0.0))
     return np.hypot(pure, own)[cells.block], pure[cells.block]
-
-
-def _rms(x) -> float:
-    x = x[np.isfinite(x)]
-    return float(np.sqrt(np.mean(np.square(x)))) if x.size else 0.0

@@ -18,6 +18,7 @@ shaft speed "rpm" or "rad/s mech".
 
 from __future__ import annotations
 
+import dataclasses
 import difflib
 import math
 import re
@@ -37,13 +38,17 @@ KEYS = {"name", "unit", "factor", "offset"}
 
 @dataclass(frozen=True)
 class Source:
-    """Source of a canonical column: value = raw * factor + offset; ``stated``: the unit was given explicitly."""
+    """Source of a canonical column: value = raw * factor + offset.
+
+    stated: the unit was given explicitly; by_name: it is only what a common name ("ia") usually means.
+    """
 
     column: str
     factor: float = 1.0
     offset: float = 0.0
     unit: str = ""
     stated: bool = False
+    by_name: bool = False
 
 
 @dataclass
@@ -215,10 +220,10 @@ def _ready_made(plan, left, nominal, path) -> None:
                 f"{path}: {shown(columns[0])!r} and {shown(columns[1])!r} could both be {name}; say which in [columns]"
             )
         if name not in plan.sources:
-            stated = _unit_of(columns[0], left) or unit
-            plan.sources[name] = _source(
-                columns[0], name, stated, nominal, f"{path}: column {shown(columns[0])!r}"
-            )
+            written = _unit_of(columns[0], left)
+            where = f"{path}: column {shown(columns[0])!r}"
+            source = _source(columns[0], name, written or unit, nominal, where)
+            plan.sources[name] = dataclasses.replace(source, by_name=not (written or best.SIGNATURE))
     if not best.SIGNATURE:
         return
     plan.used = f"{plan.used}, {best.NAME}" if plan.used == "[columns]" else best.NAME

@@ -76,8 +76,9 @@ def _recording(path, table: Table, plan: Plan, nominal) -> Recording:
         "map": plan.used,
         "columns": {k: s.column for k, s in plan.sources.items()},
     }
-    meta["scales"] = {k: (s.factor, s.offset) for k, s in plan.sources.items()}
+    meta["column_scales"] = {k: (s.factor, s.offset) for k, s in plan.sources.items()}
     meta["stated_units"] = [name for name, s in plan.sources.items() if s.stated]
+    meta["documented_units"] = [name for name in meta["stated_units"] if not plan.sources[name].by_name]
     for name, value in plan.assumed.items():
         columns[name] = np.full(n, value)
     notes += [f"{name} = {plan.assumed[name]:g} by [constants] of the drive file" for name in plan.stated]

@@ -65,7 +65,6 @@ class Case:
     build: Build
     effects: list[dict] = field(default_factory=list)
     kind: str = ""
-    clashes: list[str] = field(default_factory=list)
 
     @property
     def names(self):

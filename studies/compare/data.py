@@ -17,10 +17,10 @@ from pathlib import Path
 import numpy as np
 
 from fluxproof.diagnosis.balance.blocks import view_of
+from fluxproof.diagnosis.balance.holdout import holdout_blocks
 from fluxproof.diagnosis.balance.misfit import misfit
 from fluxproof.diagnosis.ingest.load import load_recording
 from fluxproof.diagnosis.nominal import load_nominal
-from fluxproof.diagnosis.physics import holdout_blocks
 from fluxproof.diagnosis.recording import RecordingError
 
 

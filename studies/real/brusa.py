@@ -14,11 +14,11 @@ import numpy as np
 from fluxproof.checkout import ROOT
 from fluxproof.diagnosis import diagnose
 from fluxproof.diagnosis.balance.blocks import view_of
+from fluxproof.diagnosis.balance.holdout import holdout_blocks
+from fluxproof.diagnosis.balance.joined import joined_views
 from fluxproof.diagnosis.balance.misfit import misfit
-from fluxproof.diagnosis.balance.view import joined_views
 from fluxproof.diagnosis.effects.flux_surface import Surface, earned, flux_map, ladder, names
 from fluxproof.diagnosis.nominal import load_nominal
-from fluxproof.diagnosis.physics import holdout_blocks
 from fluxproof.diagnosis.result import Estimate, Fit, NamedEffect
 from fluxproof.files import write_text
 from fluxproof.plant import FluxMap

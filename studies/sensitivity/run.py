@@ -20,7 +20,10 @@ from studies.sensitivity.steps import Steps, recorded, varied
 
 FACTORS = (0.5, 2.0)
 # Read by the search of slow logs alone, of which the cases contain none.
-OF_SLOW_LOGS = ("SLOW_DC", "SLOW_U", "SLOW_CHANGE", "SLOW_NOISE", "SLOW_REST", "LEFTOVER", "FLOOR_SHARE", "NAMED_SHARE")
+OF_SLOW_LOGS = (
+    "SLOW_DC", "SLOW_U", "SLOW_CHANGE", "SLOW_NOISE", "SLOW_REST",
+    "LEFTOVER", "FLOOR_SHARE", "NAMED_SHARE", "PER_EFFECT",
+)  # fmt: skip
 
 
 def names() -> list[str]:

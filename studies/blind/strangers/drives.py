@@ -50,7 +50,6 @@ DRIVES = [
     Drive("12 V fan", 5, 0.046, 36e-6, 41e-6, 3.3e-3, 22.0, 12.0, 6e-5, 50e-6),
     Drive("race 400 V", 10, 18e-3, 177e-6, 183e-6, 54e-3, 250.0, 400.0, 0.04, 83.333e-6),
 ]
-RELUCTANCE = Drive("6.7 kW reluctance", 2, 0.54, 41.5e-3, 6.2e-3, 0.0, 21.0, 540.0, 0.015, 125e-6)
 
 
 def random_drive(rng) -> Drive:
