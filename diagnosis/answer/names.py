@@ -14,6 +14,8 @@ import numpy as np
 
 from fluxproof.diagnosis.inference import constants as k
 
+MEDIAN = 0.6745  # of the magnitude of normal noise, in standard deviations
+
 
 @dataclass
 class Names:
@@ -96,6 +98,16 @@ def alternatives(sets) -> list[set[str]]:
     return groups
 
 
+def _seen_discrepancy(fit) -> np.ndarray:
+    """Discrepancy of every group in units of the level: where a load hides it, that of half of the points, at most."""
+    p, lam = fit.problem.p, fit.lam.copy()
+    mine = p.group == p.loads
+    if mine.any():
+        left = (p.y[mine] - p.x[mine][:, fit.take] @ fit.vector) / p.level[mine]
+        lam[p.loads] = min(lam[p.loads], float(np.median(np.abs(left))) / MEDIAN)
+    return lam
+
+
 def credibility(fit, name) -> float:
     """Probability in (0, 1] that an effect of a fit is no imitation by what is left of the misfit."""
     p = fit.problem.p
@@ -104,7 +116,8 @@ def credibility(fit, name) -> float:
     functionals = np.array([2.0 if order == 0 else 4.0 for _, order, _ in p.groups])
     # A discrepancy within the error of the balance is what every recording has; errors of curves are seen as they are.
     wrong2 = fit.mu**2 * np.bincount(p.group, p.doubt**2, minlength=len(p.groups)) / count
-    left = (np.where(fit.lam > k.USUAL, fit.lam**2 - 1.0, 0.0) * level2 + wrong2) * functionals
+    lam = _seen_discrepancy(fit)
+    left = (np.where(lam > k.USUAL, lam**2 - 1.0, 0.0) * level2 + wrong2) * functionals
     owned = np.array([fit.problem.keys[n][0] == name for n in fit.take], bool)
     rows = [(p.x[:, fit.take[take]] @ fit.vector[take]) ** 2 for take in (owned, ~owned)]
     power, others = (np.bincount(p.group, x, minlength=len(p.groups)) / count * functionals for x in rows)

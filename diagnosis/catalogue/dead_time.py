@@ -107,9 +107,13 @@ class DeadTime(Effect):
         return whole * min(DEVICE_LOG / usual / self.curve, 1.0)
 
     def possible(self, c, covariance, nominal):
-        """A leg loses voltage at every current: noise around zero current would also fit a gain there."""
+        """A leg loses voltage at every current: noise around zero current would also fit a gain there.
+
+        Within the ripple of the current the loss is no function of its sample, so that a curve may have any sign there.
+        """
         values = np.array(list(c.values()))
-        for weights in (_at_full(c), *(_at(c, x) for x in KNOTS[1:])):
+        reach = self.reach(c, nominal) / nominal.machine.rated_current_a
+        for weights in (_at_full(c), *(_at(c, x) for x in KNOTS[1:] if x > reach)):
             if weights @ values < -DOUBT * np.sqrt(max(weights @ covariance @ weights, 0.0)):
                 return False
         return True
@@ -129,9 +133,13 @@ class DeadTime(Effect):
 
     def doubt(self, c, view):
         """While the current is within its ripple or its shift by the dead time, the loss is no function of it."""
-        m, period, loss = view.machine, view.sample_time_s, self.size(c, view.nominal)
-        reach = period * (RIPPLE * view.u_dc.mean() + 0.5 * loss) / min(m.inductance_d_h, m.inductance_q_h)
-        return CLAMPED * loss * np.mean(np.abs(_currents(view)) < reach, axis=(1, 2))
+        within = np.abs(_currents(view)) < self.reach(c, view.nominal)
+        return CLAMPED * self.size(c, view.nominal) * np.mean(within, axis=(1, 2))
+
+    def reach(self, c, nominal) -> float:
+        """Current [A] within which its ripple and its shift by the dead time decide the loss."""
+        m, volts = nominal.machine, RIPPLE * nominal.inverter.dc_bus_v + 0.5 * self.size(c, nominal)
+        return nominal.sample_time_s * volts / min(m.inductance_d_h, m.inductance_q_h)
 
     def estimates(self, c, covariance, nominal):
         at_full = _at_full(c)
