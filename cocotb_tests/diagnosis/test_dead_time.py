@@ -6,6 +6,8 @@ The recordings are of the blind benchmark's drives, whose inverter model switche
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -106,3 +108,18 @@ def test_effects_with_strong_dead_time(seed, number, names, tmp_path):
     found = {e.name for e in answer.effects}
     assert "dead_time" in found <= set(names) and answer.verdict in ("explained", "partly_explained", "ambiguous")
     assert len(names) > 2 or found == set(names) or {"resistance"} == set(names) - found
+
+
+def test_within_the_ripple_of_the_current_the_loss_has_no_sign(strong):
+    """A loss that is a gain at 2 % of rated current: possible only where the ripple is larger than that current."""
+    _, setup, _ = strong
+    nominal = setup.view.nominal
+    keys = EFFECT.core(setup.view) | EFFECT.free(setup.view)
+    c = {key: 0.0 for key in keys} | {"v_0.12": 0.01 * nominal.inverter.dc_bus_v}
+    c["bump_0.005"] = -0.5 * c["v_0.12"]
+    sure = 1e-12 * np.eye(len(c))
+    for period, possible in ((1e-6, False), (2e-4, True)):
+        control = dataclasses.replace(nominal.control, sample_time_s=period)
+        small = dataclasses.replace(nominal.machine, inductance_d_h=1e-3, inductance_q_h=1e-3)
+        drive = dataclasses.replace(nominal, control=control, machine=small)
+        assert EFFECT.possible(c, sure, drive) is possible
