@@ -17,7 +17,8 @@ from fluxproof.diagnosis.balance.quantised_angle import beat_ripple, beat_spectr
 from fluxproof.diagnosis.effects.effect import rated_torque
 from fluxproof.diagnosis.inference import constants as k
 
-MOST_ORDER = 80  # per mechanical turn
+MOST_ORDER = 80  # per mechanical turn, and
+MOST_ELECTRICAL = 12  # per electrical turn: the larger of the two
 LEAST_BLOCKS = 6  # in which an order is looked for
 WEIGHTS = {
     "1": (lambda v: np.ones(len(v)), "V"),
@@ -88,10 +89,11 @@ def stray_order(view, residual, floor, known=()) -> Stray | None:
     known: electrical orders that belong to an effect of the model and are skipped.
     """
     p, m, level = view.machine.pole_pairs, residual.shape[1], voltage_level(view)
+    most = max(MOST_ORDER, MOST_ELECTRICAL * p)
     turns = np.abs(view.theta[:, -1] - view.theta[:, 0]) / (2 * np.pi * p)
     tapered = residual * (1.0 - np.cos(2 * np.pi * (np.arange(m) + 0.5) / m))
     turn, wave, found = np.exp(-1j * view.theta_mid / p), 1.0, {}
-    for n in range(1, MOST_ORDER + 1):
+    for n in range(1, most + 1):
         wave = wave * turn
         found[n], found[-n] = (tapered * wave).mean(axis=1), (tapered * np.conj(wave)).mean(axis=1)
     def locked(n, use, largest):
@@ -114,7 +116,7 @@ def stray_order(view, residual, floor, known=()) -> Stray | None:
         return max(floor, k.LEAST_RIPPLE * float(np.sqrt(np.mean(level[use] ** 2))))
 
     best = None
-    for n in [*range(1, MOST_ORDER + 1), *range(-MOST_ORDER, 0)]:
+    for n in [*range(1, most + 1), *range(-most, 0)]:
         if any(abs(n) == h * p for h in known):
             continue
         use, largest = (abs(n) * turns >= 2.5) & (abs(n) * turns < m / 5), best.size if best else 0.0
