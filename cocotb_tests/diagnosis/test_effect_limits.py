@@ -10,6 +10,7 @@ import pytest
 from cocotb_tests.core.test_registers import PAPER
 from cocotb_tests.support.diagnosed_drives import GRID, MACHINE, columns, recorded
 from fluxproof.diagnosis import diagnose
+from fluxproof.diagnosis.answer.names import MEDIAN, _seen_discrepancy
 from fluxproof.diagnosis.balance.blocks import view_of
 from fluxproof.diagnosis.balance.joined import joined_views
 from fluxproof.diagnosis.balance.misfit import bulge, misfit
@@ -190,3 +191,26 @@ def test_missing_flux_at_zero_current_is_found_or_open():
     answer = diagnose(recorded(IDLE, machine={"magnet_flux_wb": 0.995 * MACHINE.magnet_flux_wb}), NOMINAL)
     assert {e.name for e in answer.effects} <= {"magnet_flux"}
     assert answer.effects or any("magnet_flux" in group for group in answer.ambiguity)
+
+
+def test_the_resistance_of_a_metal_rises_with_its_temperature(view):
+    """Magnets that warm at i_d = 0 look like a winding of -1.2 %/K."""
+    possible, sure = CATALOGUE["resistance_temperature"].possible, 1e-12 * np.eye(2)
+    assert not possible({"alpha": -0.012, "ahead": 0.0}, sure, view.nominal)
+    assert possible({"alpha": 0.004, "ahead": 0.0}, sure, view.nominal)
+    assert possible({"alpha": -0.001, "ahead": 0.0}, 1e-6 * np.eye(2), view.nominal)  # within its uncertainty
+    assert possible({"drift": -0.1}, sure[:1, :1], view.nominal)  # without a temperature it may cool down
+
+
+def test_half_of_the_points_show_what_is_left_beside_a_load():
+    """A friction of 0.8 N m on a free shaft, with 0.03 N m left, was no more credible than beside 0.25 N m."""
+    left = np.array([0.03, -0.02, 0.05, -0.03, 5.0])  # the last one is loaded
+    points = SimpleNamespace(
+        y=left, x=np.zeros((5, 1)), level=np.full(5, 0.085), group=np.zeros(5, int), loads=0, groups=[0]
+    )
+    fit = SimpleNamespace(
+        problem=SimpleNamespace(p=points), lam=np.array([3.0]), take=np.zeros(1, int), vector=np.zeros(1)
+    )
+    assert _seen_discrepancy(fit)[0] == pytest.approx(0.03 / 0.085 / MEDIAN)
+    points.y = np.full(5, 5.0)
+    assert _seen_discrepancy(fit)[0] == 3.0

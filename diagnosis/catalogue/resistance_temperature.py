@@ -4,7 +4,7 @@ import numpy as np
 
 from fluxproof.diagnosis.balance.curves import COURSE_KNOTS, course, courses, known_temperature, reference_c
 from fluxproof.diagnosis.catalogue.resistance import to_true_resistance
-from fluxproof.diagnosis.effects.effect import Effect, Parameter, one, sigma, voltage
+from fluxproof.diagnosis.effects.effect import DOUBT, Effect, Parameter, one, sigma, voltage
 
 BEHIND = 0.05  # of the recording: by how much a sensor usually is behind the winding
 
@@ -38,6 +38,10 @@ class ResistanceTemperature(Effect):
     def curve_scale(self, key, cores, nominal):
         # Of the course [ohm], also if the formula has a temperature coefficient.
         return cores["alpha"] if key == "ahead" else self.floor(nominal)
+
+    def possible(self, c, covariance, nominal):
+        # A metal's resistance rises with its temperature.
+        return c.get("alpha", 0.0) >= -DOUBT * sigma(covariance, list(c).index("alpha") if "alpha" in c else 0)
 
     def floor(self, nominal):
         return 0.015 * nominal.machine.resistance_ohm
