@@ -150,6 +150,20 @@ def test_an_error_is_named_up_to_the_ceiling_of_its_effect(tmp_path, name):
     assert not answer.conventions and effect in {e.name for e in answer.effects} | set().union(*answer.ambiguity)
 
 
+SEVERAL = Truth(psi=0.95 * PSI, r=1.3 * R, l_q=0.8 * L_Q, v_dead=2.0)
+
+
+def test_what_nothing_explains_is_not_noise(tmp_path):
+    """Without repeated points the noise is judged by what no effect explains, which may be a third of the voltage."""
+    answer = answer_of(tmp_path, scaled(("i_q",), -1.0)(table(SEVERAL)))
+    assert answer.verdict == "unexplained" and answer.fit.noise_floor < 0.05 * answer.fit.train_before, answer.sentence
+
+
+def test_a_scale_of_two_is_not_asserted_in_place_of_several_usual_errors(tmp_path):
+    answer = answer_of(tmp_path, scaled(("i_d", "i_q"), 0.5)(table(SEVERAL)))
+    assert not {e.name for e in answer.effects} & {"udc_gain", "current_scale"}, answer.sentence
+
+
 @pytest.mark.parametrize("rows", [1, 2, 3])
 def test_few_rows_of_a_healthy_drive_are_healthy(tmp_path, rows):
     for first in (0, 4, 10, 20):
