@@ -156,7 +156,7 @@ SEVERAL = Truth(psi=0.95 * PSI, r=1.3 * R, l_q=0.8 * L_Q, v_dead=2.0)
 def test_what_nothing_explains_is_not_noise(tmp_path):
     """Without repeated points the noise is judged by what no effect explains, which may be a third of the voltage."""
     answer = answer_of(tmp_path, scaled(("i_q",), -1.0)(table(SEVERAL)))
-    assert answer.verdict == "unexplained" and answer.fit.noise_floor < 0.05 * answer.fit.train_before, answer.sentence
+    assert answer.verdict == "unexplained" and answer.fit.noise_floor < 0.2 * answer.fit.train_before, answer.sentence
 
 
 def test_a_scale_of_two_is_not_asserted_in_place_of_several_usual_errors(tmp_path):
