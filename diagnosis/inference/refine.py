@@ -13,6 +13,7 @@ from fluxproof.diagnosis.effects.corrections import in_turn, with_flux
 from fluxproof.diagnosis.inference.fit import Fitter, Model, Solution, everything
 
 STEPS = 4
+UNLIMITED = 300.0  # times its floor: usual range of an effect without a ceiling
 
 
 class Refiner:
@@ -48,8 +49,7 @@ class Refiner:
         else:
             solution = self.linear.solve(model, self.dispersion)
             solution.view = self.view
-        if not self.plausible(solution):
-            solution.score = np.inf
+        solution.score += self.unusual(solution) if self.plausible(solution) else np.inf
         self.refined[model] = solution
         return solution
 
@@ -90,6 +90,16 @@ class Refiner:
         """The view without the measurement errors given by the totals; None if these are impossible."""
         view = in_turn(self.view, self.effects, totals)
         return view if np.isfinite(view.u).all() and np.isfinite(view.i_raw).all() else None
+
+    def unusual(self, solution) -> float:
+        """Twice the negative log prior of the sizes, as in the search of fast logs: it falls beyond usual ones."""
+        nominal, total = self.view.nominal, 0.0
+        for name, c in solution.c.items():
+            effect = self.effects[name]
+            floor, ceiling = effect.floor(nominal), effect.ceiling(nominal)
+            most = max(ceiling / floor, 2.0) if np.isfinite(ceiling) else UNLIMITED
+            total += 2.0 * float(np.log1p((effect.size(c, nominal) / floor) ** 2 / most))
+        return total
 
     def plausible(self, solution) -> bool:
         """Whether no effect has an impossible size or, beyond its uncertainty, an impossible sign."""

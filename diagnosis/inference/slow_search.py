@@ -24,16 +24,6 @@ REFINED = 40
 TIE = 20.0  # margin of a tie: neighbouring rows share messages and contain less information than their number suggests
 LOADED = 0.02  # of rated current
 LEAST_PAIRS = 4
-LIMITS = {  # generous limits for a real drive
-    "resistance_ohm": lambda x, n: 0.5 < x / n.machine.resistance_ohm < 4.0,
-    "inductance_d_h": lambda x, n: 0.4 < x / n.machine.inductance_d_h < 2.5,
-    "inductance_q_h": lambda x, n: 0.4 < x / n.machine.inductance_q_h < 2.5,
-    "magnet_flux_wb": lambda x, n: 0.5 < x / n.machine.magnet_flux_wb < 2.0,
-    "scale": lambda x, n: abs(x) < 0.15,
-    "udc_gain": lambda x, n: abs(x) < 0.15,
-    "offset_rad": lambda x, n: abs(x) < 0.6,
-    "delay_s": lambda x, n: abs(x) < 3.0 * n.sample_time_s,
-}
 
 
 @dataclass
@@ -59,7 +49,7 @@ class SlowSearch:
         self.silent = not view.i.real.any()  # the d axis never had a current
         self.effects = view.visible(CATALOGUE)
         self.view, self.progress = view, progress
-        self.problem = Sets(view, self.effects, train_blocks, sigmas, self.hide)
+        self.problem = Refiner(view, self.effects, train_blocks, sigmas, self.hide)
         self.cells, self.linear = self.problem.cells, self.problem.linear
 
     def run(self) -> Outcome:
@@ -142,19 +132,6 @@ class SlowSearch:
                 columns = fitter.cells.columns[name]
                 values += sum(v * columns[column_of(columns, k)] for k, v in c.items() if v and column_of(columns, k))
         return fitter.cells, fitter.cells.y - values
-
-
-class Sets(Refiner):
-    """The refined sets of a slow log."""
-
-    def plausible(self, solution) -> bool:
-        """Whether all parameters are within LIMITS: a sum of absurd effects may fit as well as the true ones."""
-        nominal = self.view.nominal
-        for name in solution.model.names:
-            found = self.effects[name].estimates(solution.c[name], solution.covariance[name], nominal)
-            if any(key in LIMITS and not LIMITS[key](e.value, nominal) for key, e in found.items()):
-                return False
-        return super().plausible(solution)
 
 
 def most_effects(points: int) -> int:
