@@ -20,6 +20,7 @@ from fluxproof.diagnosis.effects.effect import Parameter
 from fluxproof.diagnosis.nominal import load_nominal
 from fluxproof.diagnosis.physics import known_effects
 from fluxproof.diagnosis.quantities import ascii_of, measured
+from fluxproof.diagnosis.recording import Problem
 from fluxproof.diagnosis.result import VERDICTS, Estimate, NamedEffect, Remainder, Request, UnknownTerm
 
 NOMINAL, KNOWN = load_nominal(PAPER), known_effects()
@@ -120,6 +121,21 @@ def test_advice_names_what_shows_at_an_order():
 def test_no_mismatch_says_what_was_covered():
     answer = replace(made_up()["no_mismatch"], evidence=evidence(0.0, after=False))
     assert "i_q of -5 to 5 A" in advice(answer, NOMINAL, KNOWN)
+
+
+@pytest.mark.parametrize(
+    "code, says, how",
+    [
+        ("swapped_phases", "phase currents b and c are swapped", "exchange the names of the columns"),
+        ("sign", "i_b has the opposite sign", "factor = -1"),
+    ],
+)
+def test_what_was_corrected_is_told_and_to_be_changed(code, says, how):
+    found = Problem(code, f"{says}: misfit 39% of the voltage as recorded, 2% with it", "i_b", action="corrected")
+    answer = replace(made_up()["no_mismatch"], problems=[found])
+    assert sentence(answer, KNOWN).startswith(f"Simulation and recording agree once corrected: {says}. The misfit")
+    told = advice(answer, NOMINAL, KNOWN)
+    assert how in told and "[columns]" in told and "Nothing else to change" in told, told
 
 
 @pytest.mark.parametrize(

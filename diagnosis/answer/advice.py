@@ -9,11 +9,17 @@ import numpy as np
 
 from fluxproof.diagnosis.answer.doubts import doubts
 from fluxproof.diagnosis.answer.headline import details
-from fluxproof.diagnosis.answer.phrases import SIGNALS, capital, joined
+from fluxproof.diagnosis.answer.phrases import CORRECTED, SIGNALS, capital, corrected, joined
 from fluxproof.diagnosis.quantities import RPM, ascii_of, number
 
 MOST_TITLES = 4
 NEAR = 0.05  # of an order: closer ones are the same
+HOW = {  # by the code of a finding
+    "swapped_phases": "exchange the names of the columns",
+    "sign": "give the column factor = -1",
+    "rotation": "give angle and speed factor = -1, or exchange two phases",
+    "unit": "name the unit",
+}
 
 
 def complete(answer, nominal, effects) -> None:
@@ -32,8 +38,23 @@ def advice(answer, nominal, effects) -> str:
             "Compare the registers and the build of the core with the drive file, and record again: the physics is "
             "diagnosed when the controller computes what its golden model computes."
         )
+    return " ".join(filter(None, [_columns(answer), _next(answer, nominal, effects)]))
+
+
+def _columns(answer) -> str:
+    """What to correct in [columns] so that the next recording is read without a guess."""
+    found = [p for p in answer.problems if p.action in CORRECTED]
+    how = dict.fromkeys(HOW[p.code] for p in found if p.code in HOW)
+    if not found:
+        return ""
+    return f"Correct it in [columns] of the drive file, or in the log{f': {joined(list(how))}' if how else ''}."
+
+
+def _next(answer, nominal, effects) -> str:
+    """What to do after a verdict on the physics."""
     if answer.verdict == "no_mismatch":
-        return f"Nothing to change. {capital(covered(answer, nominal))}; beyond them the drive file is not confirmed."
+        else_ = "Nothing else" if corrected(answer) else "Nothing"
+        return f"{else_} to change. {capital(covered(answer, nominal))}; beyond them the drive file is not confirmed."
     if answer.verdict == "explained":
         return _take(answer, effects)
     if answer.verdict == "ambiguous":

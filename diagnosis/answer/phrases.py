@@ -6,6 +6,7 @@ from fluxproof.diagnosis.quantities import ascii_of, measured, quantity
 
 SIGNALS = {"u_dq": "voltage", "u_d": "d-axis voltage", "u_q": "q-axis voltage", "u": "voltage",
            "current_sum": "sum of the phase currents", "torque": "torque"}  # fmt: skip
+CORRECTED = ("converted", "corrected")  # actions of findings by which columns were read otherwise than recorded
 
 
 def said(effect, effects, most=None, brackets=False) -> str:
@@ -65,6 +66,12 @@ def title_of(name, effects) -> str:
 def joined(texts, word="and") -> str:
     """'a, b and c'."""
     return f"{', '.join(texts[:-1])} {word} {texts[-1]}" if len(texts) > 1 else "".join(texts)
+
+
+def corrected(answer) -> list[str]:
+    """What the checks read otherwise than recorded, as clauses: 'phase currents b and c are swapped'."""
+    found = [p.message.split(": misfit ")[0] for p in answer.problems if p.action in CORRECTED]
+    return list(dict.fromkeys(found))
 
 
 def capital(text: str) -> str:
