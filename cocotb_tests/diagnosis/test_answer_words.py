@@ -21,7 +21,7 @@ from fluxproof.diagnosis.nominal import load_nominal
 from fluxproof.diagnosis.physics import known_effects
 from fluxproof.diagnosis.quantities import ascii_of, measured
 from fluxproof.diagnosis.recording import Problem
-from fluxproof.diagnosis.result import VERDICTS, Estimate, NamedEffect, Remainder, Request, UnknownTerm
+from fluxproof.diagnosis.result import VERDICTS, Estimate, NamedEffect, Region, Remainder, Request, UnknownTerm
 
 NOMINAL, KNOWN = load_nominal(PAPER), known_effects()
 KEYS = {p.name for e in KNOWN.values() for p in e.parameters if "_" in p.name}
@@ -116,6 +116,24 @@ def test_advice_names_what_shows_at_an_order():
     assert CATALOGUE["emf_harmonics"].title in at(6.0) and CATALOGUE["dead_time"].title in at(6.0)
     assert CATALOGUE["encoder_eccentricity"].title in at(1.0 / NOMINAL.machine.pole_pairs)
     assert "no known effect shows there" in at(5.0)
+
+
+@pytest.mark.parametrize(
+    "formula, says",
+    [
+        ("u_d = c * omega", "changes the mean d-axis voltage with the speed:"),
+        ("u_d = c * omega^2", "with the square of the speed:"),
+        ("u_q = c * omega i_q^2", "changes the mean q-axis voltage with the speed times the square of i_q:"),
+        ("u_q = c * abs(i)", "with the magnitude of the current:"),
+        ("u_q = c * 1", "adds a constant to the mean q-axis voltage:"),
+        ("torque = c * sin(6 theta_m + phi)", "changes the mean voltage with time:"),
+    ],
+)
+def test_advice_uses_the_variable_of_the_unknown_term(formula, says):
+    answer = replace(made_up()["unexplained"], remainder=[Remainder("u_dq", 0.0, 1.0, "V", 0.5)])
+    answer.unknown_term = UnknownTerm("u_d", formula, 1e-4, 1e-6, "V", 0.5)
+    answer.location.regions = [Region("t", 0.0, 1.0, "s", 2.0, 1.0)]
+    assert says in advice(answer, NOMINAL, KNOWN)
 
 
 def test_no_mismatch_says_what_was_covered():

@@ -5,6 +5,8 @@ complete(answer, nominal, effects)  # sets details, advice, and adds notes
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 
 from fluxproof.diagnosis.answer.doubts import doubts
@@ -14,6 +16,8 @@ from fluxproof.diagnosis.quantities import RPM, ascii_of, number
 
 MOST_TITLES = 4
 NEAR = 0.05  # of an order: closer ones are the same
+VARIABLES = {"omega": "the speed", "omega_e": "the speed", "i_d": "i_d", "i_q": "i_q", "i": "the current", "t": "time",
+             "u_dc": "the bus voltage", "temp_winding": "the winding's temperature"}  # fmt: skip
 HOW = {  # by the code of a finding
     "swapped_phases": "exchange the names of the columns",
     "sign": "give the column factor = -1",
@@ -112,7 +116,8 @@ def _where(answer, nominal, effects) -> str:
     r = max(answer.remainder, key=lambda part: part.share)
     signal = SIGNALS.get(r.signal, r.signal)
     if not r.order:
-        return f"Look for what changes the mean {signal} with {_varies(answer)}: no known effect has this course."
+        course = _course(u) or f"changes the mean {signal} with {_varies(answer)}"
+        return f"Look for what {course}: no known effect has this course."
     pairs = nominal.machine.pole_pairs
     known = [e.title for e in effects.values() if shows(e, r.order, pairs)][:MOST_TITLES]
     turns = r.order * pairs
@@ -128,12 +133,22 @@ def shows(effect, order, pole_pairs) -> bool:
     return any(abs(abs(order) - h) <= NEAR * h for h in orders if h)
 
 
+def _course(u) -> str:
+    """How the best single term changes the mean voltage: of 'u_d = c * omega i_q' with the speed times i_q."""
+    part, _, factor = u.formula.partition(" = c * ") if u is not None else ("", "", "")
+    if part not in ("u_d", "u_q"):  # an order, or a formula that is no term of the dictionary
+        return ""
+    if factor == "1":
+        return f"adds a constant to the mean {SIGNALS[part]}"
+    found = re.findall(r"(abs\()?\b(omega|i_d|i_q|i|u_dc|t)\b\)?(\^2)?", factor)
+    texts = [f"{'the magnitude of ' * bool(a)}{'the square of ' * bool(s)}{VARIABLES[name]}" for a, name, s in found]
+    return f"changes the mean {SIGNALS[part]} with {' times '.join(texts)}" if texts else ""
+
+
 def _varies(answer) -> str:
     """The variable that bounds the region with the largest misfit."""
-    words = {"omega_e": "the speed", "i_d": "i_d", "i_q": "i_q", "u_dc": "the bus voltage", "t": "time",
-             "temp_winding": "the winding's temperature"}  # fmt: skip
     regions = answer.location.regions
-    return words.get(regions[0].variable, "the operating point") if regions else "the operating point"
+    return VARIABLES.get(regions[0].variable, "the operating point") if regions else "the operating point"
 
 
 def covered(answer, nominal) -> str:
