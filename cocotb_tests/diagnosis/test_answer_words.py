@@ -16,12 +16,13 @@ from fluxproof.diagnosis.answer.bench_point import neighbours, on_the_bench
 from fluxproof.diagnosis.answer.doubts import IMPLAUSIBLE, doubts
 from fluxproof.diagnosis.answer.headline import MOST, details, sentence
 from fluxproof.diagnosis.catalogue import CATALOGUE
+from fluxproof.diagnosis.command import effect_table
 from fluxproof.diagnosis.effects.effect import Parameter
 from fluxproof.diagnosis.nominal import load_nominal
 from fluxproof.diagnosis.physics import known_effects
 from fluxproof.diagnosis.quantities import ascii_of, measured
 from fluxproof.diagnosis.recording import Problem
-from fluxproof.diagnosis.result import VERDICTS, Estimate, NamedEffect, Region, Remainder, Request, UnknownTerm
+from fluxproof.diagnosis.result import VERDICTS, Estimate, Location, NamedEffect, Region, Remainder, Request, UnknownTerm
 
 NOMINAL, KNOWN = load_nominal(PAPER), known_effects()
 KEYS = {p.name for e in KNOWN.values() for p in e.parameters if "_" in p.name}
@@ -69,6 +70,37 @@ def test_a_headline_says_what_and_how_large():
     rest = [Remainder("u_dq", 6.0, 1.234, "V", 0.2)]
     part = sentence(replace(made_up()["partly_explained"], effects=[dead], remainder=rest, unknown_term=None), KNOWN)
     assert "mostly at order 6 of the voltage (1.2 V)" in part and "(dead-time voltage 5.1 +- 0.2 V) explains" in part
+
+
+@pytest.mark.parametrize(
+    "name, key, periods, says, then",
+    [
+        ("delay", "delay_s", -1.0, "earlier by 0.1000 +-", "Earlier by one sample: [control] duty_applied_after"),
+        ("delay", "delay_s", 0.27, "later by 27.00 +-", None),
+        ("sampling_skew", "skew_s", -0.042, "early by 4.20 +-", None),
+    ],
+)
+def test_a_time_is_early_or_late_and_has_no_sign(name, key, periods, says, then):
+    time = Estimate(periods * NOMINAL.sample_time_s, 3e-7 if periods == -1.0 else 8e-8, "s")
+    answer = replace(made_up()["explained"], effects=[NamedEffect(name, 0.99, {key: time}, 0.9, {"timing.x": 1.0})])
+    assert says in sentence(answer, KNOWN) and "-0" not in sentence(answer, KNOWN).replace("+-", "")
+    told = advice(answer, NOMINAL, KNOWN)
+    assert then in told if then else "sample:" not in told, told
+
+
+@pytest.mark.parametrize(
+    "names, explains, text",
+    [
+        (["cogging"], 0.0, "in the torque"),
+        (["inductance_d", "saturation"], 0.003, "with the others"),
+        (["resistance"], 0.0, "–"),
+        (["resistance"], 0.5, "50 %"),
+    ],
+)
+def test_a_share_that_is_not_counted_is_not_told_as_none(names, explains, text):
+    effects = [replace(named(n), explains=explains) for n in names]
+    table = effect_table(effects)
+    assert table[1].endswith(text) and not any(line.endswith(" 0 %") for line in table), table
 
 
 def test_a_share_is_of_the_alternatives_too():
@@ -132,7 +164,7 @@ def test_advice_names_what_shows_at_an_order():
 def test_advice_uses_the_variable_of_the_unknown_term(formula, says):
     answer = replace(made_up()["unexplained"], remainder=[Remainder("u_dq", 0.0, 1.0, "V", 0.5)])
     answer.unknown_term = UnknownTerm("u_d", formula, 1e-4, 1e-6, "V", 0.5)
-    answer.location.regions = [Region("t", 0.0, 1.0, "s", 2.0, 1.0)]
+    answer.location = Location(regions=[Region("t", 0.0, 1.0, "s", 2.0, 1.0)])
     assert says in advice(answer, NOMINAL, KNOWN)
 
 

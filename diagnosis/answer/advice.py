@@ -15,6 +15,7 @@ from fluxproof.diagnosis.answer.phrases import CORRECTED, SIGNALS, capital, corr
 from fluxproof.diagnosis.quantities import RPM, ascii_of, number
 
 MOST_TITLES = 4
+WHOLE, SIGMAS = 0.01, 3.0  # of a control period, and standard deviations: nearer times are a whole number of periods
 NEAR = 0.05  # of an order: closer ones are the same
 VARIABLES = {"omega": "the speed", "omega_e": "the speed", "i_d": "i_d", "i_q": "i_q", "i": "the current", "t": "time",
              "u_dc": "the bus voltage", "temp_winding": "the winding's temperature"}  # fmt: skip
@@ -60,15 +61,15 @@ def _next(answer, nominal, effects) -> str:
         else_ = "Nothing else" if corrected(answer) else "Nothing"
         return f"{else_} to change. {capital(covered(answer, nominal))}; beyond them the drive file is not confirmed."
     if answer.verdict == "explained":
-        return _take(answer, effects)
+        return _take(answer, nominal, effects)
     if answer.verdict == "ambiguous":
         return _record(answer, nominal) or _separated(answer, effects)
     if answer.verdict == "partly_explained":
-        return f"{_take(answer, effects)} {_where(answer, nominal, effects)}"
+        return f"{_take(answer, nominal, effects)} {_where(answer, nominal, effects)}"
     return _where(answer, nominal, effects)
 
 
-def _take(answer, effects) -> str:
+def _take(answer, nominal, effects) -> str:
     """Which values of an explanation go into the drive file, and which belong to the recording."""
     if answer.conventions:
         rivals = " If it is the other, correct that instead." if any(c.rivals for c in answer.conventions) else ""
@@ -78,7 +79,23 @@ def _take(answer, effects) -> str:
         return "Correct the recording as stated: the drive file has no key for what was found."
     trims = any(e.name in effects and effects[e.name].corrects for e in answer.effects)
     later = " Errors of measurement stay in this recording; the trims act from the next one on." if trims else ""
-    return f"Simulate with drive_improved.toml, which holds the values found.{later}"
+    whole_periods = "".join(f" {text}" for text in _periods(answer, nominal, effects))
+    return f"Simulate with drive_improved.toml, which holds the values found.{later}{whole_periods}"
+
+
+def _periods(answer, nominal, effects) -> list[str]:
+    """What to correct where a time is a whole number of control periods: a count is then wrong, not a time."""
+    out, period = [], nominal.sample_time_s
+    for effect in answer.effects:
+        for p in effects[effect.name].parameters if effect.name in effects else ():
+            e = effect.parameters.get(p.name)
+            n = round(e.value / period) if p.periods and e is not None else 0
+            if n and abs(e.value - n * period) <= max(SIGMAS * e.sigma, WHOLE * period):
+                many = "one sample" if abs(n) == 1 else f"{abs(n)} samples"
+                now = getattr(nominal.control, p.periods)
+                out.append(f"{capital(p.negative if n < 0 else p.called)} {many}: "
+                           f"[control] {p.periods} seems to be {now + n}, not {now}.")  # fmt: skip
+    return out
 
 
 def _record(answer, nominal) -> str:

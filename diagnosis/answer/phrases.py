@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from fluxproof.diagnosis.quantities import ascii_of, measured, quantity
 
 SIGNALS = {"u_dq": "voltage", "u_d": "d-axis voltage", "u_q": "q-axis voltage", "u": "voltage",
@@ -15,17 +17,24 @@ def said(effect, effects, most=None, brackets=False) -> str:
     most: number of its largest parameters, None: all; brackets: parameters in brackets instead of behind a colon.
     """
     entry = effects.get(effect.name)
-    called = {p.name: p.called for p in entry.parameters} if entry else {}
+    declared = {p.name: p for p in entry.parameters} if entry else {}
     estimates = dict(effect.parameters)
     if most is not None and len(estimates) > most:
         unit = next(iter(estimates.values())).unit
         same = {k: e for k, e in estimates.items() if e.unit == unit}
         estimates = dict(sorted(same.items(), key=lambda item: -abs(item[1].value))[:most])
-    texts = [f"{called.get(key, key.replace('_', ' '))} {size_text(e)}" for key, e in estimates.items()]
+    texts = [_parameter(declared.get(key), key, e) for key, e in estimates.items()]
     title, sizes = title_of(effect.name, effects), ", ".join(texts)
     if not texts:
         return title
     return f"{title} ({sizes})" if brackets else f"{title}: {sizes}"
+
+
+def _parameter(p, key, e) -> str:
+    """'later by 27.0 +- 0.3 us', or 'earlier by' of a negative one; p: its Parameter, or None."""
+    if p is not None and p.negative and e.value < 0.0:
+        return f"{p.negative} {size_text(replace(e, value=-e.value))}"
+    return f"{p.called if p is not None else key.replace('_', ' ')} {size_text(e)}"
 
 
 def size_text(e) -> str:
