@@ -22,7 +22,16 @@ from fluxproof.diagnosis.nominal import load_nominal
 from fluxproof.diagnosis.physics import known_effects
 from fluxproof.diagnosis.quantities import ascii_of, measured
 from fluxproof.diagnosis.recording import Problem
-from fluxproof.diagnosis.result import VERDICTS, Estimate, Location, NamedEffect, Region, Remainder, Request, UnknownTerm
+from fluxproof.diagnosis.result import (
+    VERDICTS,
+    Estimate,
+    Location,
+    NamedEffect,
+    Region,
+    Remainder,
+    Request,
+    UnknownTerm,
+)
 
 NOMINAL, KNOWN = load_nominal(PAPER), known_effects()
 KEYS = {p.name for e in KNOWN.values() for p in e.parameters if "_" in p.name}
