@@ -120,11 +120,11 @@ def answer_lines(answer, nominal, out: Path) -> list[str]:
 
 def effect_table(effects) -> list[str]:
     """The asserted effects, one line per parameter, in aligned columns."""
-    from fluxproof.diagnosis.report.words import measured, percent
+    from fluxproof.diagnosis.report.words import explained, measured, percent
 
     rows = [("effect", "parameter", "value", "confidence", "explains")]
     for effect in effects:
-        first = (effect.name, percent(effect.confidence), percent(effect.explains))
+        first = (effect.name, percent(effect.confidence), explained(effect, effects))
         for key, e in effect.parameters.items():
             rows.append((first[0], key, measured(e.value, e.sigma, e.unit), *first[1:]))
             first = ("", "", "")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from fluxproof.diagnosis.answer.conclude import conclude
+from fluxproof.diagnosis.answer.headline import sentence
 from fluxproof.diagnosis.balance.blocks import views_of
 from fluxproof.diagnosis.balance.holdout import held_out
 from fluxproof.diagnosis.balance.joined import joined_views
@@ -40,6 +41,8 @@ def explain(loaded: list[Recording], nominal: Nominal, progress=lambda text: Non
     else:
         answer = _physics(loaded, nominal, progress, shifts)
     answer.rows, answer.problems = rows, problems
+    if answer.verdict == "no_mismatch":  # it agrees as the checks read it, which the headline must say
+        answer.sentence = sentence(answer, known_effects())
     return answer
 
 

@@ -16,11 +16,22 @@ from fluxproof.diagnosis.answer.bench_point import neighbours, on_the_bench
 from fluxproof.diagnosis.answer.doubts import IMPLAUSIBLE, doubts
 from fluxproof.diagnosis.answer.headline import MOST, details, sentence
 from fluxproof.diagnosis.catalogue import CATALOGUE
+from fluxproof.diagnosis.command import effect_table
 from fluxproof.diagnosis.effects.effect import Parameter
 from fluxproof.diagnosis.nominal import load_nominal
 from fluxproof.diagnosis.physics import known_effects
 from fluxproof.diagnosis.quantities import ascii_of, measured
-from fluxproof.diagnosis.result import VERDICTS, Estimate, NamedEffect, Remainder, Request, UnknownTerm
+from fluxproof.diagnosis.recording import Problem
+from fluxproof.diagnosis.result import (
+    VERDICTS,
+    Estimate,
+    Location,
+    NamedEffect,
+    Region,
+    Remainder,
+    Request,
+    UnknownTerm,
+)
 
 NOMINAL, KNOWN = load_nominal(PAPER), known_effects()
 KEYS = {p.name for e in KNOWN.values() for p in e.parameters if "_" in p.name}
@@ -70,6 +81,37 @@ def test_a_headline_says_what_and_how_large():
     assert "mostly at order 6 of the voltage (1.2 V)" in part and "(dead-time voltage 5.1 +- 0.2 V) explains" in part
 
 
+@pytest.mark.parametrize(
+    "name, key, periods, says, then",
+    [
+        ("delay", "delay_s", -1.0, "earlier by 0.1000 +-", "Earlier by one sample: [control] duty_applied_after"),
+        ("delay", "delay_s", 0.27, "later by 27.00 +-", None),
+        ("sampling_skew", "skew_s", -0.042, "early by 4.20 +-", None),
+    ],
+)
+def test_a_time_is_early_or_late_and_has_no_sign(name, key, periods, says, then):
+    time = Estimate(periods * NOMINAL.sample_time_s, 3e-7 if periods == -1.0 else 8e-8, "s")
+    answer = replace(made_up()["explained"], effects=[NamedEffect(name, 0.99, {key: time}, 0.9, {"timing.x": 1.0})])
+    assert says in sentence(answer, KNOWN) and "-0" not in sentence(answer, KNOWN).replace("+-", "")
+    told = advice(answer, NOMINAL, KNOWN)
+    assert then in told if then else "sample:" not in told, told
+
+
+@pytest.mark.parametrize(
+    "names, explains, text",
+    [
+        (["cogging"], 0.0, "in the torque"),
+        (["inductance_d", "saturation"], 0.003, "with the others"),
+        (["resistance"], 0.0, "–"),
+        (["resistance"], 0.5, "50 %"),
+    ],
+)
+def test_a_share_that_is_not_counted_is_not_told_as_none(names, explains, text):
+    effects = [replace(named(n), explains=explains) for n in names]
+    table = effect_table(effects)
+    assert table[1].endswith(text) and not any(line.endswith(" 0 %") for line in table), table
+
+
 def test_a_share_is_of_the_alternatives_too():
     """Of a dead time and one of two other effects: the dead time alone explains less."""
     dead = NamedEffect("dead_time", 0.99, {"v_dead_v": Estimate(5.0873, 0.23, "V")}, 0.2)
@@ -117,9 +159,42 @@ def test_advice_names_what_shows_at_an_order():
     assert "no known effect shows there" in at(5.0)
 
 
+@pytest.mark.parametrize(
+    "formula, says",
+    [
+        ("u_d = c * omega", "changes the mean d-axis voltage with the speed:"),
+        ("u_d = c * omega^2", "with the square of the speed:"),
+        ("u_q = c * omega i_q^2", "changes the mean q-axis voltage with the speed times the square of i_q:"),
+        ("u_q = c * abs(i)", "with the magnitude of the current:"),
+        ("u_q = c * 1", "adds a constant to the mean q-axis voltage:"),
+        ("torque = c * sin(6 theta_m + phi)", "changes the mean voltage with time:"),
+    ],
+)
+def test_advice_uses_the_variable_of_the_unknown_term(formula, says):
+    answer = replace(made_up()["unexplained"], remainder=[Remainder("u_dq", 0.0, 1.0, "V", 0.5)])
+    answer.unknown_term = UnknownTerm("u_d", formula, 1e-4, 1e-6, "V", 0.5)
+    answer.location = Location(regions=[Region("t", 0.0, 1.0, "s", 2.0, 1.0)])
+    assert says in advice(answer, NOMINAL, KNOWN)
+
+
 def test_no_mismatch_says_what_was_covered():
     answer = replace(made_up()["no_mismatch"], evidence=evidence(0.0, after=False))
     assert "i_q of -5 to 5 A" in advice(answer, NOMINAL, KNOWN)
+
+
+@pytest.mark.parametrize(
+    "code, says, how",
+    [
+        ("swapped_phases", "phase currents b and c are swapped", "exchange the names of the columns"),
+        ("sign", "i_b has the opposite sign", "factor = -1"),
+    ],
+)
+def test_what_was_corrected_is_told_and_to_be_changed(code, says, how):
+    found = Problem(code, f"{says}: misfit 39% of the voltage as recorded, 2% with it", "i_b", action="corrected")
+    answer = replace(made_up()["no_mismatch"], problems=[found])
+    assert sentence(answer, KNOWN).startswith(f"Simulation and recording agree once corrected: {says}. The misfit")
+    told = advice(answer, NOMINAL, KNOWN)
+    assert how in told and "[columns]" in told and "Nothing else to change" in told, told
 
 
 @pytest.mark.parametrize(

@@ -5,15 +5,26 @@ complete(answer, nominal, effects)  # sets details, advice, and adds notes
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 
 from fluxproof.diagnosis.answer.doubts import doubts
 from fluxproof.diagnosis.answer.headline import details
-from fluxproof.diagnosis.answer.phrases import SIGNALS, capital, joined
+from fluxproof.diagnosis.answer.phrases import CORRECTED, SIGNALS, capital, corrected, joined
 from fluxproof.diagnosis.quantities import RPM, ascii_of, number
 
 MOST_TITLES = 4
+WHOLE, SIGMAS = 0.01, 3.0  # of a control period, and standard deviations: nearer times are a whole number of periods
 NEAR = 0.05  # of an order: closer ones are the same
+VARIABLES = {"omega": "the speed", "omega_e": "the speed", "i_d": "i_d", "i_q": "i_q", "i": "the current", "t": "time",
+             "u_dc": "the bus voltage", "temp_winding": "the winding's temperature"}  # fmt: skip
+HOW = {  # by the code of a finding
+    "swapped_phases": "exchange the names of the columns",
+    "sign": "give the column factor = -1",
+    "rotation": "give angle and speed factor = -1, or exchange two phases",
+    "unit": "name the unit",
+}
 
 
 def complete(answer, nominal, effects) -> None:
@@ -32,18 +43,33 @@ def advice(answer, nominal, effects) -> str:
             "Compare the registers and the build of the core with the drive file, and record again: the physics is "
             "diagnosed when the controller computes what its golden model computes."
         )
+    return " ".join(filter(None, [_columns(answer), _next(answer, nominal, effects)]))
+
+
+def _columns(answer) -> str:
+    """What to correct in [columns] so that the next recording is read without a guess."""
+    found = [p for p in answer.problems if p.action in CORRECTED]
+    how = dict.fromkeys(HOW[p.code] for p in found if p.code in HOW)
+    if not found:
+        return ""
+    return f"Correct it in [columns] of the drive file, or in the log{f': {joined(list(how))}' if how else ''}."
+
+
+def _next(answer, nominal, effects) -> str:
+    """What to do after a verdict on the physics."""
     if answer.verdict == "no_mismatch":
-        return f"Nothing to change. {capital(covered(answer, nominal))}; beyond them the drive file is not confirmed."
+        else_ = "Nothing else" if corrected(answer) else "Nothing"
+        return f"{else_} to change. {capital(covered(answer, nominal))}; beyond them the drive file is not confirmed."
     if answer.verdict == "explained":
-        return _take(answer, effects)
+        return _take(answer, nominal, effects)
     if answer.verdict == "ambiguous":
         return _record(answer, nominal) or _separated(answer, effects)
     if answer.verdict == "partly_explained":
-        return f"{_take(answer, effects)} {_where(answer, nominal, effects)}"
+        return f"{_take(answer, nominal, effects)} {_where(answer, nominal, effects)}"
     return _where(answer, nominal, effects)
 
 
-def _take(answer, effects) -> str:
+def _take(answer, nominal, effects) -> str:
     """Which values of an explanation go into the drive file, and which belong to the recording."""
     if answer.conventions:
         rivals = " If it is the other, correct that instead." if any(c.rivals for c in answer.conventions) else ""
@@ -53,7 +79,23 @@ def _take(answer, effects) -> str:
         return "Correct the recording as stated: the drive file has no key for what was found."
     trims = any(e.name in effects and effects[e.name].corrects for e in answer.effects)
     later = " Errors of measurement stay in this recording; the trims act from the next one on." if trims else ""
-    return f"Simulate with drive_improved.toml, which holds the values found.{later}"
+    whole_periods = "".join(f" {text}" for text in _periods(answer, nominal, effects))
+    return f"Simulate with drive_improved.toml, which holds the values found.{later}{whole_periods}"
+
+
+def _periods(answer, nominal, effects) -> list[str]:
+    """What to correct where a time is a whole number of control periods: a count is then wrong, not a time."""
+    out, period = [], nominal.sample_time_s
+    for effect in answer.effects:
+        for p in effects[effect.name].parameters if effect.name in effects else ():
+            e = effect.parameters.get(p.name)
+            n = round(e.value / period) if p.periods and e is not None else 0
+            if n and abs(e.value - n * period) <= max(SIGMAS * e.sigma, WHOLE * period):
+                many = "one sample" if abs(n) == 1 else f"{abs(n)} samples"
+                now = getattr(nominal.control, p.periods)
+                out.append(f"{capital(p.negative if n < 0 else p.called)} {many}: "
+                           f"[control] {p.periods} seems to be {now + n}, not {now}.")  # fmt: skip
+    return out
 
 
 def _record(answer, nominal) -> str:
@@ -91,7 +133,8 @@ def _where(answer, nominal, effects) -> str:
     r = max(answer.remainder, key=lambda part: part.share)
     signal = SIGNALS.get(r.signal, r.signal)
     if not r.order:
-        return f"Look for what changes the mean {signal} with {_varies(answer)}: no known effect has this course."
+        course = _course(u) or f"changes the mean {signal} with {_varies(answer)}"
+        return f"Look for what {course}: no known effect has this course."
     pairs = nominal.machine.pole_pairs
     known = [e.title for e in effects.values() if shows(e, r.order, pairs)][:MOST_TITLES]
     turns = r.order * pairs
@@ -107,12 +150,22 @@ def shows(effect, order, pole_pairs) -> bool:
     return any(abs(abs(order) - h) <= NEAR * h for h in orders if h)
 
 
+def _course(u) -> str:
+    """How the best single term changes the mean voltage: of 'u_d = c * omega i_q' with the speed times i_q."""
+    part, _, factor = u.formula.partition(" = c * ") if u is not None else ("", "", "")
+    if part not in ("u_d", "u_q"):  # an order, or a formula that is no term of the dictionary
+        return ""
+    if factor == "1":
+        return f"adds a constant to the mean {SIGNALS[part]}"
+    found = re.findall(r"(abs\()?\b(omega|i_d|i_q|i|u_dc|t)\b\)?(\^2)?", factor)
+    texts = [f"{'the magnitude of ' * bool(a)}{'the square of ' * bool(s)}{VARIABLES[name]}" for a, name, s in found]
+    return f"changes the mean {SIGNALS[part]} with {' times '.join(texts)}" if texts else ""
+
+
 def _varies(answer) -> str:
     """The variable that bounds the region with the largest misfit."""
-    words = {"omega_e": "the speed", "i_d": "i_d", "i_q": "i_q", "u_dc": "the bus voltage", "t": "time",
-             "temp_winding": "the winding's temperature"}  # fmt: skip
     regions = answer.location.regions
-    return words.get(regions[0].variable, "the operating point") if regions else "the operating point"
+    return VARIABLES.get(regions[0].variable, "the operating point") if regions else "the operating point"
 
 
 def covered(answer, nominal) -> str:

@@ -8,7 +8,18 @@ from __future__ import annotations
 
 import itertools
 
-from fluxproof.diagnosis.answer.phrases import as_if, capital, joined, located, part_text, percent_below, said, title_of
+from fluxproof.diagnosis.answer.phrases import (
+    CORRECTED,
+    as_if,
+    capital,
+    corrected,
+    joined,
+    located,
+    part_text,
+    percent_below,
+    said,
+    title_of,
+)
 from fluxproof.diagnosis.quantities import ascii_of, quantity
 
 MOST = 200  # letters of a headline: two lines of a terminal or of the report
@@ -40,7 +51,7 @@ def details(answer, effects) -> str:
     u = answer.unknown_term
     if u is not None and u.meaning:
         parts.append(f"That {as_if(u).removeprefix('as if ')} would explain {percent_below(u.explains)} of the rest.")
-    read = [p.message for p in answer.problems if p.action in ("converted", "corrected")]
+    read = [p.message for p in answer.problems if p.action in CORRECTED]
     if read:
         parts.append(f"Corrected while reading: {'; '.join(read)}.")
     if len(answer.remainder) > 1:
@@ -52,7 +63,11 @@ def _variants(answer, effects) -> list[str]:
     """The headline from the most detailed one to the shortest."""
     misfit = ascii_of(quantity(answer.fit.train_before, answer.fit.unit, 3))
     if answer.verdict == "no_mismatch":
-        return [f"Simulation and recording agree: the misfit of {misfit} is at the noise floor."]
+        floor = f"the misfit of {misfit} is at the noise floor"
+        if found := corrected(answer):
+            once = [joined(found), f"{found[0]}, and {len(found) - 1} more", "the columns are read otherwise"]
+            return [f"Simulation and recording agree once corrected: {what}. {capital(floor)}." for what in once]
+        return [f"Simulation and recording agree: {floor}."]
     if answer.verdict == "explained":
         return [f"{capital(what)}." for what in _named(answer, effects)]
     named, sets = _named(answer, effects, brackets=True), _sets(answer.ambiguity, effects)

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from fluxproof.diagnosis.quantities import ascii_of, measured, quantity
 
 SIGNALS = {"u_dq": "voltage", "u_d": "d-axis voltage", "u_q": "q-axis voltage", "u": "voltage",
            "current_sum": "sum of the phase currents", "torque": "torque"}  # fmt: skip
+CORRECTED = ("converted", "corrected")  # actions of findings by which columns were read otherwise than recorded
 
 
 def said(effect, effects, most=None, brackets=False) -> str:
@@ -14,17 +17,24 @@ def said(effect, effects, most=None, brackets=False) -> str:
     most: number of its largest parameters, None: all; brackets: parameters in brackets instead of behind a colon.
     """
     entry = effects.get(effect.name)
-    called = {p.name: p.called for p in entry.parameters} if entry else {}
+    declared = {p.name: p for p in entry.parameters} if entry else {}
     estimates = dict(effect.parameters)
     if most is not None and len(estimates) > most:
         unit = next(iter(estimates.values())).unit
         same = {k: e for k, e in estimates.items() if e.unit == unit}
         estimates = dict(sorted(same.items(), key=lambda item: -abs(item[1].value))[:most])
-    texts = [f"{called.get(key, key.replace('_', ' '))} {size_text(e)}" for key, e in estimates.items()]
+    texts = [_parameter(declared.get(key), key, e) for key, e in estimates.items()]
     title, sizes = title_of(effect.name, effects), ", ".join(texts)
     if not texts:
         return title
     return f"{title} ({sizes})" if brackets else f"{title}: {sizes}"
+
+
+def _parameter(p, key, e) -> str:
+    """'later by 27.0 +- 0.3 us', or 'earlier by' of a negative one; p: its Parameter, or None."""
+    if p is not None and p.negative and e.value < 0.0:
+        return f"{p.negative} {size_text(replace(e, value=-e.value))}"
+    return f"{p.called if p is not None else key.replace('_', ' ')} {size_text(e)}"
 
 
 def size_text(e) -> str:
@@ -65,6 +75,12 @@ def title_of(name, effects) -> str:
 def joined(texts, word="and") -> str:
     """'a, b and c'."""
     return f"{', '.join(texts[:-1])} {word} {texts[-1]}" if len(texts) > 1 else "".join(texts)
+
+
+def corrected(answer) -> list[str]:
+    """What the checks read otherwise than recorded, as clauses: 'phase currents b and c are swapped'."""
+    found = [p.message.split(": misfit ")[0] for p in answer.problems if p.action in CORRECTED]
+    return list(dict.fromkeys(found))
 
 
 def capital(text: str) -> str:

@@ -15,6 +15,7 @@ TRIED, FINE = np.arange(1, 50) / 50, 0.002  # periods, of late pulses
 NEAR = 0.15  # periods between a delay and that of its ripple: about a zero vector
 STEP = 0.005  # periods on both sides of a delay, over which the slope of the ripple is taken
 RIPPLE = 0.1  # share by which the ripple may be wrong: a filter of the currents rounds it
+COUNT = "duty_applied_after_samples"
 TIMES = ("tau", "gates", "shift")  # coefficients whose sum is the delay
 
 
@@ -140,7 +141,7 @@ EFFECT = Delay(
     signature="order 0: the whole voltage vector rotated by omega tau; orders 3 and 6 of late gates",
     confounders=("encoder_offset", "sampling_skew", "iron_loss"),
     separated_by="two speeds, both directions; load at each; a step",
-    parameters=(Parameter("delay_s", "s", "beyond duty_applied_after_samples", "later by"),),
+    parameters=(Parameter("delay_s", "s", f"beyond {COUNT}", "later by", "earlier by", COUNT),),
     one_of=(("tau",), ("gates", "shift", "filter", "torque")),
     corrects=True,
     stays="an error in time is in the recording itself",

@@ -103,7 +103,9 @@ EFFECT = SamplingSkew(
     confounders=("iron_loss", "delay", "inductance_q"),
     one_of=(("tau",), ("angle",), ("pulses", "shift", "filter")),
     separated_by="load (an iron loss also follows omega^2 i_q); a deliberately shifted sampling trigger",
-    parameters=(Parameter("skew_s", "s", "of the currents relative to the angle; positive: late", "late by"),),
+    parameters=(
+        Parameter("skew_s", "s", "of the currents relative to the angle; positive: late", "late by", "early by"),
+    ),
     corrects=True,
     stays="an error in time is in the recording itself",
     corrected_last=True,

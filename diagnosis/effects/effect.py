@@ -41,6 +41,8 @@ class Parameter:
     unit: str
     meaning: str
     title: str = ""  # as a headline calls it, "dead-time voltage"; empty: the meaning
+    negative: str = ""  # as a headline calls a negative one, whose sign it then leaves out: "earlier by"
+    periods: str = ""  # key of [control] that counts it, if it is a whole number of control periods
 
     @property
     def called(self) -> str:

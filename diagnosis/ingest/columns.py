@@ -99,7 +99,9 @@ def canonical(table: Table, plan: Plan) -> dict[str, np.ndarray]:
     arrays = {}
     for name, source in plan.sources.items():
         raw = table.columns.get(source.column)
-        if raw is not None:
+        if raw is not None and source.unit and source.column in table.meta.get("moments", ()):
+            arrays[name] = raw  # in seconds, whatever the header says
+        elif raw is not None:
             arrays[name] = (
                 raw if source.factor == 1.0 and not source.offset else raw * source.factor + source.offset
             )

@@ -29,6 +29,7 @@ FACTORS = {
         "ns": 1e-9,
         "min": 60.0,
         "h": 3600.0,
+        "hh:mm:ss": 1.0,  # readers give clock times in seconds
     },
     "A": {
         "A": 1.0,
@@ -67,6 +68,7 @@ FACTORS = {
     "rad/s": {
         "rad/s": 1.0,
         "rad/s el": 1.0,
+        "mrad/s": 1e-3,
         "deg/s": DEGREE,
         "°/s": DEGREE,
         "Hz": TURN,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from fluxproof.diagnosis.readers.clock import seconds
 from fluxproof.diagnosis.readers.table import Table, chosen, row_limit, too_long
 from fluxproof.diagnosis.recording import RecordingError
 
@@ -27,7 +28,7 @@ def read(path, select=None) -> Table:
         kind = column.type
         if pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_boolean(kind):
             numeric[column.name] = (column.metadata or {}).get(b"unit", b"").decode("utf-8", "replace")
-        elif pa.types.is_decimal(kind):
+        elif pa.types.is_decimal(kind) or pa.types.is_timestamp(kind):
             numeric[column.name] = ""
         else:
             text.append(column.name)
@@ -49,14 +50,18 @@ def read(path, select=None) -> Table:
         if have >= limit:
             break
     columns = {name: np.concatenate(values) for name, values in parts.items()}
-    table = Table(columns, {n: u for n, u in numeric.items() if u}, text=text)
+    when = [name for name, values in columns.items() if values.dtype.kind == "M"]
+    columns |= {name: seconds(columns[name]) for name in when}
+    table = Table(columns, {n: u for n, u in numeric.items() if u}, text=text, meta={"moments": when} if when else {})
     if rows > limit:
         table.problems.append(too_long(limit, rows))
     return table
 
 
 def _floats(array, pa) -> np.ndarray:
-    """One column of a batch as float64, nulls as NaN."""
+    """One column of a batch as float64, nulls as NaN; a timestamp as datetime64."""
+    if pa.types.is_timestamp(array.type):
+        return array.cast(pa.timestamp("ns", array.type.tz)).to_numpy(zero_copy_only=False)
     if not pa.types.is_floating(array.type):
         array = array.cast(pa.float64())
     return array.to_numpy(zero_copy_only=False).astype(float, copy=False)

@@ -1,8 +1,8 @@
 """The layout of a text table: separator, decimal mark, header, units, first line of numbers.
 
 Every pair of separator and decimal mark is tested on the first lines; the one that gives the most numbers in lines
-with the same number of fields is used.  "1,5;2,5" can only be two numbers with a decimal comma, "1,5,2,5" only four;
-the locale is not considered.
+with the same number of fields is used; dates and clock times count as numbers.  "1,5;2,5" can only be two numbers with
+a decimal comma, "1,5,2,5" only four, and with quotes, "1,5","2,5", two; the locale is not considered.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import re
 from collections import Counter
 from dataclasses import dataclass
 
+from fluxproof.diagnosis.readers.clock import MOMENT
 from fluxproof.diagnosis.recording import RecordingError
 
 SNIFF_BYTES = 1 << 18
@@ -84,10 +85,10 @@ def _candidate(lines, separator, decimal):
     """(score, separator, decimal, first line, fields) under one assumption; a word costs two numbers."""
     scores, first = Counter(), {}
     for k, line in enumerate(lines):
-        if separator == decimal or not line.strip() or line.lstrip().startswith(COMMENT):
+        if (separator == decimal and '"' not in line) or not line.strip() or line.lstrip().startswith(COMMENT):
             continue
         fields = split(line, separator)
-        numbers = sum(bool(NUMBER[decimal].fullmatch(f)) for f in fields)
+        numbers = sum(bool(NUMBER[decimal].fullmatch(f) or MOMENT.fullmatch(f)) for f in fields)
         words = len(fields) - numbers - sum(f.lower() in MISSING for f in fields)
         if numbers > words:
             scores[len(fields)] += numbers - 2 * words

@@ -7,9 +7,11 @@ from __future__ import annotations
 
 import os
 import re
+from dataclasses import dataclass
 
 import numpy as np
 
+from fluxproof.diagnosis.readers.clock import moments
 from fluxproof.diagnosis.readers.sniff import sniff
 from fluxproof.diagnosis.readers.table import Table, chosen, row_limit, shown, too_long
 from fluxproof.diagnosis.recording import Problem, RecordingError
@@ -17,6 +19,11 @@ from fluxproof.diagnosis.recording import Problem, RecordingError
 FORMAT = "text"
 SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".asc", ".log")
 MOSTLY_TEXT = 0.5  # a column with a larger share of words is not numeric
+FIRST_WORDS = 1000  # of a column, among which thousands separators are looked for
+THOUSANDS = {  # by the decimal mark
+    ",": re.compile(r"[+-]?[1-9]\d{0,2}([.' ]\d{3})+(,\d*)?"),
+    ".": re.compile(r"[+-]?[1-9]\d{0,2}([,' ]\d{3})+(\.\d*)?"),
+}
 
 
 def matches(head: bytes, path) -> bool:
@@ -79,30 +86,95 @@ def read(path, select=None) -> Table:
     if not len(frame):
         raise RecordingError(f"{path}: a header but no rows")
     table.lines = lines
-    for name, k in zip(wanted, index, strict=True):
-        _take(table, name, frame[k], pd)
+    columns = {name: _numbers(frame[k], layout.decimal, pd) for name, k in zip(wanted, index, strict=True)}
+    for name, column in columns.items():
+        if column.moment:
+            table.meta.setdefault("moments", []).append(name)
+            table.notes.append(f"{name}: dates or clock times, read as seconds from the first row")
+    _reject_thousands(path, columns, lines, layout)
+    _leave_out_headers(table, columns, layout)
+    for name, column in columns.items():
+        _take(table, name, column)
     if not table.columns:
         raise RecordingError(f"{path}:{lines[0]}: no column of numbers")
     return table
 
 
-def _take(table: Table, name: str, values, pd) -> None:
-    """Add one column to the table; words among numbers become NaN and a finding."""
+@dataclass
+class _Column:
+    """raw: pandas Series; numbers: (n,), NaN where there is none; words: (n,) bool, where there is a word instead."""
+
+    raw: object
+    numbers: np.ndarray
+    words: np.ndarray
+    moment: bool = False
+
+    @property
+    def text(self) -> bool:
+        return np.count_nonzero(self.words) > MOSTLY_TEXT * len(self.words)
+
+
+def _numbers(values, decimal, pd) -> _Column:
+    """A column of the frame; one with any word comes as texts, in which the decimal mark is still the file's."""
     if values.dtype.kind in "biuf":
-        table.columns[name] = values.to_numpy(float)
+        return _Column(values, values.to_numpy(float), np.zeros(len(values), bool))
+    numbers = moments(values, pd)
+    moment = numbers is not None
+    if not moment:
+        texts = values
+        if decimal == ",":  # a point is then no decimal mark, and must not be read as one
+            texts = values.astype("string").str.replace(".", "?", regex=False).str.replace(",", ".", regex=False)
+        numbers = pd.to_numeric(texts, errors="coerce").to_numpy(float, na_value=np.nan)
+    return _Column(values, numbers, np.isnan(numbers) & values.notna().to_numpy(), moment)
+
+
+def _reject_thousands(path, columns, lines, layout) -> None:
+    """RecordingError at a number with thousands separators: whether 1.234 is a thousand nobody can tell for sure."""
+    pattern = THOUSANDS[layout.decimal]
+    for name, column in columns.items():
+        for row in np.flatnonzero(column.words)[:FIRST_WORDS]:
+            found = str(column.raw.iloc[row]).strip()
+            if pattern.fullmatch(found):
+                plain = re.sub(r"[^\d+-]", "", found.partition(layout.decimal)[0])
+                plain += found[found.index(layout.decimal) :] if layout.decimal in found else ""
+                raise RecordingError(
+                    f"{path}:{lines[row]}: column {shown(name)!r}: {shown(found, 30)!r} has thousands separators; "
+                    f"the decimal mark is {layout.decimal!r}, {plain!r} was expected: export it without them"
+                )
+
+
+def _leave_out_headers(table: Table, columns, layout) -> None:
+    """Leave out lines of words in every column, such as the header of a file that was appended to another."""
+    given = [c for c in columns.values() if not c.text]
+    if len(given) < 2:
         return
-    numbers = pd.to_numeric(values, errors="coerce").to_numpy(float)
-    words = np.flatnonzero(np.isnan(numbers) & values.notna().to_numpy())
-    if len(words) > MOSTLY_TEXT * len(numbers):
+    between = np.all([c.words for c in given], axis=0)
+    if not between.any():
+        return
+    row = int(np.argmax(between))
+    names = [str(c.raw.iloc[row]).strip() for c in columns.values()]
+    what = "repeats the header: another file was appended" if names == list(columns) else "is a line of words"
+    count = np.count_nonzero(between)
+    message = f"line {table.lines[row]} {what}{f', as do {count - 1} more' if count > 1 else ''}"
+    table.problems.append(Problem("header_inside", message, "", row, int(count), "left out"))
+    table.lines = table.lines[~between]
+    for c in columns.values():
+        c.raw, c.numbers, c.words = c.raw[~between], c.numbers[~between], c.words[~between]
+
+
+def _take(table: Table, name: str, column: _Column) -> None:
+    """Add one column to the table; words among numbers become NaN and a finding."""
+    if column.text:
         table.text.append(name)
         return
-    table.columns[name] = numbers
+    table.columns[name] = column.numbers
+    words = np.flatnonzero(column.words)
     if len(words):
         row = int(words[0])
         table.problems.append(
             Problem(
                 "not_a_number",
-                f"line {table.lines[row]}: {shown(values.iloc[row], 30)!r} is not a number",
+                f"line {table.lines[row]}: {shown(column.raw.iloc[row], 30)!r} is not a number",
                 name,
                 row,
                 len(words),

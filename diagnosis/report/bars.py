@@ -7,7 +7,7 @@ import numpy as np
 from fluxproof.diagnosis.answer.phrases import SIGNALS
 from fluxproof.diagnosis.report import theme
 from fluxproof.diagnosis.report.maps import LeftOut
-from fluxproof.diagnosis.report.words import effect_text, percent
+from fluxproof.diagnosis.report.words import effect_text, explained, percent
 
 LONGEST = 34  # letters of a label beside a bar
 
@@ -47,18 +47,20 @@ def fit_bars(fit) -> theme.Picture:
 
 def shares(diagnosis) -> theme.Picture:
     """One bar per named effect with its share of the misfit's power, and one for the rest."""
-    rows = [(effect_text(e.name).title, e.explains, theme.AFTER) for e in diagnosis.effects]
+    named = diagnosis.effects
+    rows = [(effect_text(e.name).title, e.explains, explained(e, named), theme.AFTER) for e in named]
     if not rows:
         raise LeftOut("no effect is named")
     if diagnosis.explained_share is not None:
-        rows.append(("the rest", 1.0 - diagnosis.explained_share, theme.BEFORE))
+        rest = 1.0 - diagnosis.explained_share
+        rows.append(("the rest", rest, percent(rest), theme.BEFORE))
     figure, axis = theme.axes(height=0.7 + 0.36 * len(rows))
-    for place, (_, share, color) in enumerate(rows):
+    for place, (_, share, text, color) in enumerate(rows):
         axis.barh(place, np.clip(share, 0.0, 1.0), 0.7, color=color)
         axis.annotate(
-            percent(share), (np.clip(share, 0.0, 1.0), place), (4, 0), textcoords="offset points", va="center"
+            text, (np.clip(share, 0.0, 1.0), place), (4, 0), textcoords="offset points", va="center"
         )
-    labels = [theme.plain(t if len(t) <= LONGEST else f"{t[: LONGEST - 1]}…") for t, _, _ in rows]
+    labels = [theme.plain(t if len(t) <= LONGEST else f"{t[: LONGEST - 1]}…") for t, *_ in rows]
     axis.set_yticks(range(len(rows)), labels)
     axis.set(xlim=(0, 1.18), xticks=(0, 0.5, 1), xticklabels=("0", "50 %", "100 %"))
     axis.tick_params(axis="y", length=0)

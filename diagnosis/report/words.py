@@ -9,7 +9,7 @@ from types import SimpleNamespace
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.quantities import measured, number, quantity, unit_text
 
-__all__ = ["brief", "effect_text", "measured", "number", "percent", "quantity", "span", "unit_text"]
+__all__ = ["brief", "effect_text", "explained", "measured", "number", "percent", "quantity", "span", "unit_text"]
 
 # verdict: (mood, meaning); the mood selects the colour of the badge.
 VERDICTS = {
@@ -30,6 +30,7 @@ VERDICTS = {
     ),
     "bad_recording": ("bad", "The recording cannot be diagnosed. Nothing was compared."),
 }
+LEAST = 0.005  # a smaller share would be told as 0 %
 VARIABLES = {
     "t": ("time", "s"),
     "theta_e": ("electrical angle", "rad"),
@@ -46,6 +47,20 @@ def percent(share: float) -> str:
     if share is None or not math.isfinite(share):
         return "–"
     return "> 99 %" if 0.995 <= share < 1.0 else f"{100 * share:.0f} %".replace("-", "−")
+
+
+def explained(effect, effects) -> str:
+    """The share that a NamedEffect explains; where it counts none, where it shows instead.
+
+    The share is what is left without the effect alone: none of a torque if the voltage counts, and none of two effects
+    that take each other's part.
+    """
+    if not math.isfinite(effect.explains) or effect.explains > LEAST:
+        return percent(effect.explains)
+    entry = CATALOGUE.get(effect.name)
+    if entry is not None and entry.mechanical:
+        return "in the torque"
+    return "with the others" if len(effects) > 1 else "–"
 
 
 def span(low, high, unit: str) -> str:
