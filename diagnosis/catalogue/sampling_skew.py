@@ -104,7 +104,7 @@ EFFECT = SamplingSkew(
     one_of=(("tau",), ("angle",), ("pulses", "shift", "filter")),
     separated_by="load (an iron loss also follows omega^2 i_q); a deliberately shifted sampling trigger",
     parameters=(
-        Parameter("skew_s", "s", "of the currents relative to the angle; positive: late", "late by", "early by"),
+        Parameter("skew_s", "s", "of the currents; positive: late", "after the angle by", "before the angle by"),
     ),
     corrects=True,
     stays="an error in time is in the recording itself",
