@@ -159,6 +159,7 @@ def test_what_nothing_explains_is_not_noise(tmp_path):
     assert answer.verdict == "unexplained" and answer.fit.noise_floor < 0.2 * answer.fit.train_before, answer.sentence
 
 
+@pytest.mark.slow
 def test_a_scale_of_two_is_not_asserted_in_place_of_several_usual_errors(tmp_path):
     answer = answer_of(tmp_path, scaled(("i_d", "i_q"), 0.5)(table(SEVERAL)))
     assert not {e.name for e in answer.effects} & {"udc_gain", "current_scale"}, answer.sentence
@@ -302,8 +303,23 @@ def test_a_constant_misfit_at_one_point_is_an_ambiguity(tmp_path):
     answer = answer_of(tmp_path, columns)
     assert answer.verdict == "ambiguous" and not answer.effects
     assert {"magnet_flux", "udc_gain"} <= set(answer.ambiguity[-1]) and said(answer, "one point cannot tell why")
+    assert answer.fit.train_before == pytest.approx(2.63, abs=0.02) and answer.explained_share > 0.99
+    assert answer.fit.train_after < answer.fit.noise_floor and answer.fit.holdout_after < answer.fit.noise_floor
     two_rows = answer_of(tmp_path, table(WEAK, points=[(300.0, 0.0, 4.0)] * 2))
+    assert two_rows.fit.train_before > 2.0 > two_rows.fit.train_after
     assert two_rows.verdict == "ambiguous" and "magnet_flux" in two_rows.ambiguity[0]
+
+
+def test_a_constant_misfit_that_nothing_explains_is_the_remainder(tmp_path):
+    columns = warming()
+    columns["u_d_ref"] = columns["u_d_ref"] + 60.0
+    columns["u_q_ref"] = 0.7 * columns["u_q_ref"]
+    answer = answer_of(tmp_path, columns)
+    assert answer.verdict == "unexplained" and answer.explained_share == 0.0 and not answer.effects
+    assert answer.fit.holdout_after == answer.fit.holdout_before == pytest.approx(63.2, abs=0.5)
+    assert [part.size for part in answer.remainder] == [pytest.approx(63.2, abs=0.5)]
+    assert said(answer, "would explain the drift, but")
+    assert [p.code for p in answer.problems] == ["slow_sampling"]  # at one point a change of signs fits by chance
 
 
 @pytest.mark.parametrize("hertz, hold_s", [(500.0, 1.0), (200.0, 0.6), (1000.0, 0.3)])
