@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cocotb_tests.support.bench_logs import GRID, L_Q, PSI, R, Truth, sampled, table, warming
+from cocotb_tests.support.bench_logs import GRID, L_D, L_Q, PSI, RATED, R, Truth, sampled, table, warming
 from cocotb_tests.support.mistakes import all_of, frame, moved, scaled
 from cocotb_tests.support.recordings_made import DRIVE, codes, made, nominal_of, write
 from fluxproof.diagnosis import diagnose
@@ -359,6 +359,29 @@ def test_several_slow_recordings_are_joined(tmp_path):
     files = [write(tmp_path / "a.csv", held(table(WEAK))), write(tmp_path / "b.csv", sampled(500.0, WEAK, hold_s=0.6))]
     answer = diagnose([*files, write(tmp_path / "c.csv", table(WEAK, seed=9))], tmp_path / "drive.toml")
     assert [e.name for e in answer.effects] == ["magnet_flux"]
+
+
+AREA = [(w, d, q) for w in (250.0, 500.0, -300.0) for d in (-4.0, -2.0, 0.0) for q in (-5.0, -3.0, -1.5, 0.0, 2.0, 4.0)]
+
+
+@pytest.mark.parametrize("points, written", [(AREA, True), ([(w, 0.4 * q, q) for w, _, q in AREA], False)])
+def test_flux_map_of_a_table(tmp_path, points, written):
+    """The q axis saturates: L_q is a quarter smaller at rated current.  Currents on a line leave no map."""
+    from fluxproof.diagnosis.answer.improved_plant import read_flux_map
+    from fluxproof.diagnosis.session import run
+
+    flux_q = lambda i_q: L_Q * i_q * (1.0 - 0.25 * np.abs(i_q) / RATED)  # noqa: E731
+    columns = table(points=points, noise_v=0.02, noise_a=0.0)
+    columns["u_d_ref"] -= columns["omega_e"] * (flux_q(columns["i_q"]) - L_Q * columns["i_q"])
+    (tmp_path / "drive.toml").write_text(DRIVE)
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "flux_map.csv").write_text("of an earlier run")
+    answer = run(write(tmp_path / "r.csv", columns), tmp_path / "drive.toml", tmp_path / "out")
+    assert (tmp_path / "out" / "flux_map.csv").exists() == written == said(answer, "flux_map.csv"), answer.sentence
+    if written:
+        chart = read_flux_map(tmp_path / "out" / "flux_map.csv")
+        assert np.abs(chart.psi_q_wb - flux_q(chart.i_q_a)).max() < 0.002 * flux_q(RATED)
+        assert np.abs(chart.psi_d_wb - (PSI + L_D * chart.i_d_a)[:, None]).max() < 0.002 * PSI
 
 
 def test_constants_survive_in_the_improved_drive(tmp_path):
