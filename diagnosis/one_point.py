@@ -49,21 +49,27 @@ def diagnose_one_point(view) -> Diagnosis:
     names, groups = _sorted_out(best, tied, effects, view)
     left = best.residual
     constant = complex(np.nanmean(raw - fitted(cells, best)))
-    fit = _fit(cells, centred.y, left, sigma, held) if long else _constant_fit(constant, sigma)
     candidates = _explaining(view, cells, effects, drifting, constant)
-    if abs(constant) > _resolution(view):
-        groups = groups + ([candidates] if len(candidates) > 1 else [])
+    off = abs(constant) > _resolution(view)
+    fit = _fit(cells, centred.y, left, sigma, held) if long else _spread(raw - constant * off, sigma)
+    known = off and len(candidates) > 1  # by what one of them explains
     left_over = best.chi2 > k.LEFTOVER * max(best.rows - best.count, 1) and fit.share_left > k.FLOOR_SHARE
-    if names and left_over:
-        kind = "partly_explained" if fit.explained_share >= k.NAMED_SHARE else "unexplained"
-        if kind == "unexplained":
-            names, groups = [], []
-    else:
-        kind = "ambiguous" if groups else "explained" if names else _nothing(constant, view, fit)
+    unclear = bool(names) and left_over and fit.explained_share < k.NAMED_SHARE
+    names, groups = ([], []) if unclear else (names, groups)
+    groups = groups + ([candidates] if known and not unclear else [])
+    quiet = not unclear and _quiet(off, view, fit)
+    fit = _with_constant(fit, abs(constant) * off, known)
+    beside = []  # beside a large unknown constant a drift may be its imitation
+    if off and not known and fit.explained_share < k.HALF:
+        names, groups, beside = [], [], names
+    kind = _kind(names, groups, left_over or (off and not known), quiet)
+    if kind == "unexplained":  # nothing is named, so that the whole misfit is left
+        fit.train_after, fit.holdout_after = fit.train_before, fit.holdout_before
     answer = Diagnosis(kind, "", location=locate(view, cells, sigma), fit=fit, ambiguity=groups)
-    if kind == "partly_explained":
-        size = max(fit.holdout_after**2 - fit.noise_floor**2, 0.0) ** 0.5
+    if kind != "no_mismatch":
         answer.explained_share = fit.explained_share
+    if kind in ("partly_explained", "unexplained"):
+        size = max(fit.holdout_after**2 - fit.noise_floor**2, 0.0) ** 0.5
         answer.remainder = [Remainder("u_dq", 0.0, size, "V", 1.0 - fit.explained_share)]
     wider = fuller(fitter, best, effects, drifting, view) + with_copper(fitter, best, cells, view)
     answer.effects = [_named(n, effects[n], best, wider, fitter, view) for n in names]
@@ -71,6 +77,8 @@ def diagnose_one_point(view) -> Diagnosis:
     answer.evidence = evidence(view, (cells, centred.y), (cells, left), sigma, held)
     answer.sentence = sentence(answer, CATALOGUE)
     answer.notes = _notes(view, constant, candidates, held, long)
+    why = "would explain the drift, but the constant misfit is not known: not asserted."
+    answer.notes += [f"{name} {why}" for name in beside]
     return answer
 
 
@@ -91,10 +99,17 @@ def _fit(cells, before, after, sigma, held) -> Fit:
     return Fit("u_dq", "V", *parts, float(np.sqrt(2.0 * np.mean(sigma[rows] ** 2))))
 
 
-def _constant_fit(constant, sigma) -> Fit:
-    """The fit of a point that was not held long enough for a drift: nothing is fitted."""
-    size = abs(constant)
+def _spread(around, sigma) -> Fit:
+    """The fit of a point that was not held long enough for a drift: its rows (b,) around a constant, nothing fitted."""
+    size = float(np.sqrt(np.nanmean(np.abs(around) ** 2)))
     return Fit("u_dq", "V", size, size, size, size, float(np.sqrt(2.0 * np.mean(sigma**2))))
+
+
+def _with_constant(fit, size, known) -> Fit:
+    """The fit with the misfit [V] that stays the same over time; known: whether one of several effects explains it."""
+    for name in ("train_before", "holdout_before", *(() if known else ("train_after", "holdout_after"))):
+        setattr(fit, name, float(np.hypot(getattr(fit, name), size)))
+    return fit
 
 
 def _resolution(view) -> float:
@@ -122,10 +137,18 @@ def _explaining(view, cells, effects, drifting, constant) -> list[str]:
     return sorted(out)
 
 
-def _nothing(constant, view, fit) -> str:
-    """Verdict without a name: nothing drifts, and the constant misfit is within the resolution or not."""
-    quiet = fit.train_before < max(2.0 * fit.noise_floor, _resolution(view)) and abs(constant) <= _resolution(view)
-    return "no_mismatch" if quiet else "unexplained"
+def _quiet(off, view, fit) -> bool:
+    """Whether nothing drifts and the constant misfit is not off either."""
+    return fit.train_before < max(2.0 * fit.noise_floor, _resolution(view)) and not off
+
+
+def _kind(names, groups, left_over, quiet) -> str:
+    """The verdict; left_over: a part of drift or constant is not explained; quiet: there is nothing to explain."""
+    if not (names or groups):
+        return "no_mismatch" if quiet else "unexplained"
+    if left_over and names:
+        return "partly_explained"
+    return "ambiguous" if groups else "explained"
 
 
 def _named(name, effect, best, wider, fitter, view) -> NamedEffect:

@@ -69,6 +69,7 @@ def diagnose_points(view, progress=lambda text: None) -> Diagnosis:
     if told is found.best:
         answer.effects = model_effects(search, found, names)
         answer.ambiguity = ambiguity
+    if verdict != "no_mismatch":
         answer.explained_share = fit.explained_share
     if verdict in ("partly_explained", "unexplained"):
         size = max(fit.holdout_after**2 - fit.noise_floor**2, 0.0) ** 0.5

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cocotb_tests.support.bench_logs import GRID, L_Q, PSI, R, Truth, sampled, table, warming
+from cocotb_tests.support.bench_logs import GRID, L_D, L_Q, PSI, RATED, R, Truth, sampled, table, warming
 from cocotb_tests.support.mistakes import all_of, frame, moved, scaled
 from cocotb_tests.support.recordings_made import DRIVE, codes, made, nominal_of, write
 from fluxproof.diagnosis import diagnose
@@ -159,6 +159,7 @@ def test_what_nothing_explains_is_not_noise(tmp_path):
     assert answer.verdict == "unexplained" and answer.fit.noise_floor < 0.2 * answer.fit.train_before, answer.sentence
 
 
+@pytest.mark.slow
 def test_a_scale_of_two_is_not_asserted_in_place_of_several_usual_errors(tmp_path):
     answer = answer_of(tmp_path, scaled(("i_d", "i_q"), 0.5)(table(SEVERAL)))
     assert not {e.name for e in answer.effects} & {"udc_gain", "current_scale"}, answer.sentence
@@ -302,8 +303,23 @@ def test_a_constant_misfit_at_one_point_is_an_ambiguity(tmp_path):
     answer = answer_of(tmp_path, columns)
     assert answer.verdict == "ambiguous" and not answer.effects
     assert {"magnet_flux", "udc_gain"} <= set(answer.ambiguity[-1]) and said(answer, "one point cannot tell why")
+    assert answer.fit.train_before == pytest.approx(2.63, abs=0.02) and answer.explained_share > 0.99
+    assert answer.fit.train_after < answer.fit.noise_floor and answer.fit.holdout_after < answer.fit.noise_floor
     two_rows = answer_of(tmp_path, table(WEAK, points=[(300.0, 0.0, 4.0)] * 2))
+    assert two_rows.fit.train_before > 2.0 > two_rows.fit.train_after
     assert two_rows.verdict == "ambiguous" and "magnet_flux" in two_rows.ambiguity[0]
+
+
+def test_a_constant_misfit_that_nothing_explains_is_the_remainder(tmp_path):
+    columns = warming()
+    columns["u_d_ref"] = columns["u_d_ref"] + 60.0
+    columns["u_q_ref"] = 0.7 * columns["u_q_ref"]
+    answer = answer_of(tmp_path, columns)
+    assert answer.verdict == "unexplained" and answer.explained_share == 0.0 and not answer.effects
+    assert answer.fit.holdout_after == answer.fit.holdout_before == pytest.approx(63.2, abs=0.5)
+    assert [part.size for part in answer.remainder] == [pytest.approx(63.2, abs=0.5)]
+    assert said(answer, "would explain the drift, but")
+    assert [p.code for p in answer.problems] == ["slow_sampling"]  # at one point a change of signs fits by chance
 
 
 @pytest.mark.parametrize("hertz, hold_s", [(500.0, 1.0), (200.0, 0.6), (1000.0, 0.3)])
@@ -343,6 +359,29 @@ def test_several_slow_recordings_are_joined(tmp_path):
     files = [write(tmp_path / "a.csv", held(table(WEAK))), write(tmp_path / "b.csv", sampled(500.0, WEAK, hold_s=0.6))]
     answer = diagnose([*files, write(tmp_path / "c.csv", table(WEAK, seed=9))], tmp_path / "drive.toml")
     assert [e.name for e in answer.effects] == ["magnet_flux"]
+
+
+AREA = [(w, d, q) for w in (250.0, 500.0, -300.0) for d in (-4.0, -2.0, 0.0) for q in (-5.0, -3.0, -1.5, 0.0, 2.0, 4.0)]
+
+
+@pytest.mark.parametrize("points, written", [(AREA, True), ([(w, 0.4 * q, q) for w, _, q in AREA], False)])
+def test_flux_map_of_a_table(tmp_path, points, written):
+    """The q axis saturates: L_q is a quarter smaller at rated current.  Currents on a line leave no map."""
+    from fluxproof.diagnosis.answer.improved_plant import read_flux_map
+    from fluxproof.diagnosis.session import run
+
+    flux_q = lambda i_q: L_Q * i_q * (1.0 - 0.25 * np.abs(i_q) / RATED)  # noqa: E731
+    columns = table(points=points, noise_v=0.02, noise_a=0.0)
+    columns["u_d_ref"] -= columns["omega_e"] * (flux_q(columns["i_q"]) - L_Q * columns["i_q"])
+    (tmp_path / "drive.toml").write_text(DRIVE)
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "flux_map.csv").write_text("of an earlier run")
+    answer = run(write(tmp_path / "r.csv", columns), tmp_path / "drive.toml", tmp_path / "out")
+    assert (tmp_path / "out" / "flux_map.csv").exists() == written == said(answer, "flux_map.csv"), answer.sentence
+    if written:
+        chart = read_flux_map(tmp_path / "out" / "flux_map.csv")
+        assert np.abs(chart.psi_q_wb - flux_q(chart.i_q_a)).max() < 0.002 * flux_q(RATED)
+        assert np.abs(chart.psi_d_wb - (PSI + L_D * chart.i_d_a)[:, None]).max() < 0.002 * PSI
 
 
 def test_constants_survive_in_the_improved_drive(tmp_path):

@@ -24,27 +24,52 @@ from fluxproof.plant import FluxMap
 NAME = "flux_map.csv"
 HEADER = "i_d_a,i_q_a,psi_d_wb,psi_q_wb"
 POINTS = 13  # along each axis
+WIDTH = 0.05  # rms distance of the currents from a line, in units of their range
 
 
 def flux_map_of(answer) -> FluxMap | None:
-    """The map of a fast recording's answer; None if no named effect bends the flux or an axis had no current."""
-    posterior = answer.search
-    if posterior is None or not hasattr(posterior, "best"):
+    """The map of an answer; None if nothing that it tells bends the flux or the recorded currents cover no area."""
+    effects, c, view, mine = _model(answer)
+    if not mine:
         return None
-    best, effects = posterior.best(), posterior.setup.effects
-    mine = [n for n in (e.name for e in answer.effects) if isinstance(effects[n], FluxEffect) and n in best.c]
-    if not any(effects[n].bends for n in mine):
-        return None
-    view = posterior.setup.view
-    seen, rated = view.i.mean(axis=1), view.machine.rated_current_a
+    seen = view.i.mean(axis=1)
     axes = [np.linspace(x.min(), x.max(), POINTS) for x in (seen.real, seen.imag)]
-    if min(np.ptp(axis) for axis in axes) < LEAST_CURRENT * rated:
+    if not _covers_area(seen, view.machine.rated_current_a):
         return None
     i_d, i_q = (grid.ravel() for grid in np.meshgrid(*axes, indexing="ij"))
     at = steady_view(view, np.zeros(i_d.size), i_d + 1j * i_q, rows=1)
-    psi = at.nominal_psi + sum(effects[n].psi(at, best.c[n]) for n in mine)
+    psi = at.nominal_psi + sum(effects[n].psi(at, c[n]) for n in mine)
     psi = psi[:, 0].reshape(POINTS, POINTS)
     return FluxMap(*axes, psi.real, psi.imag)
+
+
+def _model(answer):
+    """(effects, their coefficients {effect: {coefficient: value}}, view, effects of the map) of an answer."""
+    search, named = answer.search, [e.name for e in answer.effects]
+    if hasattr(search, "best"):  # of fast recordings
+        effects, c = search.setup.effects, search.best().c
+        mine = [n for n in named if n in c and isinstance(effects[n], FluxEffect)]
+        return effects, c, search.setup.view, mine if any(effects[n].bends for n in mine) else []
+    found = getattr(answer, "found", None)
+    if found is None or not (named or answer.ambiguity):
+        return {}, {}, None, []
+    best, effects = found.best, search.effects
+    magnetic = {n for n, effect in effects.items() if isinstance(effect, FluxEffect)}
+    told = {n for n in (*named, *(n for group in answer.ambiguity for n in group)) if n in magnetic}
+    # Effects that replace each other leave one flux, if none of the group is something else.
+    split = any(magnetic & set(group) and not magnetic >= set(group) for group in answer.ambiguity)
+    bent = any(effects[n].bends or n in best.model.free for n in told & best.model.names)
+    mine = [] if split or not bent else sorted(told & best.model.names)
+    return effects, best.c, best.view, mine
+
+
+def _covers_area(seen, rated) -> bool:
+    """Whether currents (b,) [A] are on both axes, and on no line: the map between would be a guess."""
+    sides = np.array([np.ptp(seen.real), np.ptp(seen.imag)])
+    if sides.min() < LEAST_CURRENT * rated:
+        return False
+    scaled = np.stack([seen.real - seen.real.mean(), seen.imag - seen.imag.mean()]) / sides[:, None]
+    return float(np.linalg.svd(scaled, compute_uv=False)[-1]) > WIDTH * np.sqrt(len(seen))
 
 
 def write_flux_map(answer, out) -> Path | None:

@@ -18,7 +18,8 @@ import numpy as np
 MOST_ROWS = 5000
 FIT = 0.25  # misfit over voltage: any real effect is smaller at speed
 BETTER = 0.3  # a change is accepted if the misfit falls below this share
-LEAST_ROWS, LEAST_POINTS = 20, 6  # of a log, and of a table: fewer fit by chance with some change
+LEAST_ROWS, LEAST_OF_TABLE = 20, 6  # fewer fit by chance with some change
+LEAST_POINTS, SAME = 3, 0.1  # of dq values: operating points that are so far apart, of rated current and top speed
 TURNS = np.exp(2j * np.pi / 3 * np.arange(3))
 
 
@@ -55,7 +56,9 @@ def rows_of(recording, nominal) -> Rows | None:
     if not recording.has(*needed) or not (recording.has("theta_e") or recording.slow):
         return None
     k = np.flatnonzero(recording.usable) if recording.points else _intervals(recording, delay)
-    if len(k) < (LEAST_POINTS if recording.points else LEAST_ROWS):
+    if len(k) < (LEAST_OF_TABLE if recording.points else LEAST_ROWS):
+        return None
+    if dq_only and _points(columns["i_d"][k], columns["i_q"][k], columns["omega_e"][k], machine) < LEAST_POINTS:
         return None
     ends = np.stack([k, k if recording.points else k + 1])
     i = d = dq = u_dq = None
@@ -73,6 +76,13 @@ def rows_of(recording, nominal) -> Rows | None:
     # The steady balance does not use the angle.
     theta = columns["theta_e"][ends] if "theta_e" in columns else np.zeros(ends.shape)
     return Rows(machine, nominal.sample_time_s, dq_only, i, dq, d, u_dq, u_dc, theta, columns["omega_e"][ends])
+
+
+def _points(i_d, i_q, omega, machine) -> int:
+    """Number of operating points (n,) that differ."""
+    scales = (machine.rated_current_a, machine.rated_current_a, max(float(np.abs(omega).max()), 1e-9))
+    steps = [np.round(x / scale / SAME) for x, scale in zip((i_d, i_q, omega), scales, strict=True)]
+    return len(np.unique(np.stack(steps), axis=1).T)
 
 
 def misfit(rows: Rows, at_current: bool = False, at_d_current: bool = False) -> float:
