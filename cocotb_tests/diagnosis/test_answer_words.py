@@ -195,6 +195,8 @@ def test_what_was_corrected_is_told_and_to_be_changed(code, says, how):
     assert sentence(answer, KNOWN).startswith(f"Simulation and recording agree once corrected: {says}. The misfit")
     told = advice(answer, NOMINAL, KNOWN)
     assert how in told and "[columns]" in told and "Nothing else to change" in told, told
+    beside = advice(replace(made_up()["unexplained"], problems=[found]), NOMINAL, KNOWN)
+    assert f" Besides, {says}: correct that in [columns]" in beside and how in beside, beside
 
 
 @pytest.mark.parametrize(
