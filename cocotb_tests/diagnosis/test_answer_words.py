@@ -11,6 +11,8 @@ import pytest
 
 from cocotb_tests.core.test_registers import PAPER
 from cocotb_tests.support.diagnosis_samples import evidence, made_up
+from cocotb_tests.support.recordings_made import made, nominal_of, write
+from fluxproof.diagnosis import physics
 from fluxproof.diagnosis.answer.advice import advice, complete, point_text
 from fluxproof.diagnosis.answer.bench_point import neighbours, on_the_bench
 from fluxproof.diagnosis.answer.doubts import IMPLAUSIBLE, doubts
@@ -18,6 +20,7 @@ from fluxproof.diagnosis.answer.headline import MOST, details, sentence
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.command import effect_table
 from fluxproof.diagnosis.effects.effect import Parameter
+from fluxproof.diagnosis.ingest.load import load_recording
 from fluxproof.diagnosis.nominal import load_nominal
 from fluxproof.diagnosis.physics import known_effects
 from fluxproof.diagnosis.quantities import ascii_of, measured
@@ -197,6 +200,14 @@ def test_what_was_corrected_is_told_and_to_be_changed(code, says, how):
     assert how in told and "[columns]" in told and "Nothing else to change" in told, told
     beside = advice(replace(made_up()["unexplained"], problems=[found]), NOMINAL, KNOWN)
     assert f" Besides, {says}: correct that in [columns]" in beside and how in beside, beside
+
+
+def test_the_headline_knows_what_the_checks_found(tmp_path, monkeypatch):
+    table, nominal = made(), nominal_of(tmp_path)
+    table["i_b"], table["i_c"] = table["i_c"], table["i_b"]
+    recording = load_recording(write(tmp_path / "r.parquet", table), nominal)
+    monkeypatch.setattr(physics, "_physics", lambda *_: made_up()["no_mismatch"])
+    assert "once corrected: phase currents b and c are swapped" in physics.explain([recording], nominal).sentence
 
 
 @pytest.mark.parametrize(
