@@ -105,12 +105,14 @@ def test_a_time_is_early_or_late_and_has_no_sign(name, key, periods, says, then)
     [
         (["cogging"], 0.0, "in the torque"),
         (["inductance_d", "saturation"], 0.003, "with the others"),
+        (["sampling_skew", "magnet_flux"], (0.002, 0.999), "< 1 %"),
         (["resistance"], 0.0, "–"),
         (["resistance"], 0.5, "50 %"),
     ],
 )
 def test_a_share_that_is_not_counted_is_not_told_as_none(names, explains, text):
-    effects = [replace(named(n), explains=explains) for n in names]
+    shares = explains if isinstance(explains, tuple) else (explains,) * len(names)
+    effects = [replace(named(n), explains=share) for n, share in zip(names, shares, strict=True)]
     table = effect_table(effects)
     assert table[1].endswith(text) and not any(line.endswith(" 0 %") for line in table), table
 
