@@ -11,6 +11,8 @@ import pytest
 
 from cocotb_tests.core.test_registers import PAPER
 from cocotb_tests.support.diagnosis_samples import evidence, made_up
+from cocotb_tests.support.recordings_made import made, nominal_of, write
+from fluxproof.diagnosis import physics
 from fluxproof.diagnosis.answer.advice import advice, complete, point_text
 from fluxproof.diagnosis.answer.bench_point import neighbours, on_the_bench
 from fluxproof.diagnosis.answer.doubts import IMPLAUSIBLE, doubts
@@ -18,6 +20,7 @@ from fluxproof.diagnosis.answer.headline import MOST, details, sentence
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.command import effect_table
 from fluxproof.diagnosis.effects.effect import Parameter
+from fluxproof.diagnosis.ingest.load import load_recording
 from fluxproof.diagnosis.nominal import load_nominal
 from fluxproof.diagnosis.physics import known_effects
 from fluxproof.diagnosis.quantities import ascii_of, measured
@@ -102,12 +105,14 @@ def test_a_time_is_early_or_late_and_has_no_sign(name, key, periods, says, then)
     [
         (["cogging"], 0.0, "in the torque"),
         (["inductance_d", "saturation"], 0.003, "with the others"),
+        (["sampling_skew", "magnet_flux"], (0.002, 0.999), "< 1 %"),
         (["resistance"], 0.0, "–"),
         (["resistance"], 0.5, "50 %"),
     ],
 )
 def test_a_share_that_is_not_counted_is_not_told_as_none(names, explains, text):
-    effects = [replace(named(n), explains=explains) for n in names]
+    shares = explains if isinstance(explains, tuple) else (explains,) * len(names)
+    effects = [replace(named(n), explains=share) for n, share in zip(names, shares, strict=True)]
     table = effect_table(effects)
     assert table[1].endswith(text) and not any(line.endswith(" 0 %") for line in table), table
 
@@ -195,6 +200,16 @@ def test_what_was_corrected_is_told_and_to_be_changed(code, says, how):
     assert sentence(answer, KNOWN).startswith(f"Simulation and recording agree once corrected: {says}. The misfit")
     told = advice(answer, NOMINAL, KNOWN)
     assert how in told and "[columns]" in told and "Nothing else to change" in told, told
+    beside = advice(replace(made_up()["unexplained"], problems=[found]), NOMINAL, KNOWN)
+    assert f" Besides, {says}: correct that in [columns]" in beside and how in beside, beside
+
+
+def test_the_headline_knows_what_the_checks_found(tmp_path, monkeypatch):
+    table, nominal = made(), nominal_of(tmp_path)
+    table["i_b"], table["i_c"] = table["i_c"], table["i_b"]
+    recording = load_recording(write(tmp_path / "r.parquet", table), nominal)
+    monkeypatch.setattr(physics, "_physics", lambda *_: made_up()["no_mismatch"])
+    assert "once corrected: phase currents b and c are swapped" in physics.explain([recording], nominal).sentence
 
 
 @pytest.mark.parametrize(

@@ -23,7 +23,7 @@ HOW = {  # by the code of a finding
     "swapped_phases": "exchange the names of the columns",
     "sign": "give the column factor = -1",
     "rotation": "give angle and speed factor = -1, or exchange two phases",
-    "unit": "name the unit",
+    "unit": "state the unit",
 }
 
 
@@ -43,16 +43,20 @@ def advice(answer, nominal, effects) -> str:
             "Compare the registers and the build of the core with the drive file, and record again: the physics is "
             "diagnosed when the controller computes what its golden model computes."
         )
-    return " ".join(filter(None, [_columns(answer), _next(answer, nominal, effects)]))
+    told, columns = _next(answer, nominal, effects), _columns(answer)
+    if not columns:
+        return told
+    if answer.verdict == "no_mismatch":  # the headline names it
+        return f"Correct it {columns}. {told}"
+    return f"{told} Besides, {joined(corrected(answer))}: correct that {columns}."
 
 
 def _columns(answer) -> str:
-    """What to correct in [columns] so that the next recording is read without a guess."""
+    """Where and how to correct columns so that the next recording is read without a guess; "" if none are."""
     found = [p for p in answer.problems if p.action in CORRECTED]
     how = dict.fromkeys(HOW[p.code] for p in found if p.code in HOW)
-    if not found:
-        return ""
-    return f"Correct it in [columns] of the drive file, or in the log{f': {joined(list(how))}' if how else ''}."
+    where = "in [columns] of the drive file, or in the log"
+    return f"{where}{f': {joined(list(how))}' if how else ''}" if found else ""
 
 
 def _next(answer, nominal, effects) -> str:

@@ -31,6 +31,7 @@ VERDICTS = {
     "bad_recording": ("bad", "The recording cannot be diagnosed. Nothing was compared."),
 }
 LEAST = 0.005  # a smaller share would be told as 0 %
+SMALL = 0.5  # where shares sum up to more, one without any is small and not taken over
 VARIABLES = {
     "t": ("time", "s"),
     "theta_e": ("electrical angle", "rad"),
@@ -60,6 +61,8 @@ def explained(effect, effects) -> str:
     entry = CATALOGUE.get(effect.name)
     if entry is not None and entry.mechanical:
         return "in the torque"
+    if sum(e.explains for e in effects) > SMALL:
+        return "< 1 %"
     return "with the others" if len(effects) > 1 else "–"
 
 
