@@ -35,9 +35,9 @@ def load_recording(path, nominal) -> Recording:
     """
     recording = _checked(Path(path), nominal)
     if doubtful(recording):
-        for restated in alternatives(nominal):
+        for restated in alternatives(recording, nominal):
             other = _checked(Path(path), restated.of(nominal))
-            if fits(other, restated.of(nominal)):
+            if fits(other, restated.of(nominal), restated):
                 other.meta["restated"] = restated
                 return other
     return recording
