@@ -103,6 +103,20 @@ READINGS = (
 )  # fmt: skip
 
 
+def pole_pairs_for(nominal) -> list[Reading]:
+    """Readings with other pole pairs: a digit beside the right one, or poles in place of pairs."""
+    stated = nominal.machine.pole_pairs
+    near = {stated - 2, stated - 1, stated + 1, stated + 2, 2 * stated} | ({stated // 2} if stated % 2 == 0 else set())
+    return [
+        Reading(
+            f"pole_pairs {n}", "machine.pole_pairs",
+            f"the machine has {n} pole pair{'s' * (n != 1)}, not {stated} as in the drive file",
+            pole_pairs=n, speed=n / stated,
+        )
+        for n in sorted(near) if n > 0
+    ]  # fmt: skip
+
+
 def readings_for(nominal) -> list[Reading]:
     """All readings; those of the shaft depend on the pole pairs."""
     pairs = nominal.machine.pole_pairs
