@@ -57,4 +57,5 @@ def test_every_code_of_a_convention_is_listed():
     listed.remove("conventions"), listed.remove("rivals")  # the head of the table
     drive = load_nominal(ROOT / "docs" / "drives" / "paper001.toml")
     assert sorted(listed) == sorted([r.code for r in readings_for(drive)] + ["pole_pairs", "sample_time_s"])
-    assert f"{len(READINGS)}, and {('no', 'one', 'two')[len(readings_for(drive)) - len(READINGS)]} more" in section
+    more = ("no", "one", "two", "three", "four", "five", "six")[len(readings_for(drive)) - len(READINGS)]
+    assert f"{len(READINGS)}, and {more} more" in section

@@ -21,9 +21,12 @@ GIVEN_BACK = (  # whose improved drive file is tried as well
     "L in mH", "half the pole pairs, angle of the shaft", "sample time half", "R and L line to line, currents in rms",
 )  # fmt: skip
 
+OF_DATA_SHEETS = ("psi_line_rms_of_shaft", "psi_line_rms_krpm", "psi_torque_rms")
+
 # Every mistake that a table can show: of dq values, of the speed, of the drive file without its times.
 IN_TABLES = [
-    name for name, m in MISTAKES.items() if m.dq or (m.file and not m.log and m.found != "sample_time_s")
+    name for name, m in MISTAKES.items()
+    if m.dq or (m.file and not m.log and m.found not in ("sample_time_s", *OF_DATA_SHEETS))
 ] + ["speed of the shaft", "speed in rpm"]  # fmt: skip
 
 
@@ -110,6 +113,13 @@ def test_one_operating_point_tells_no_convention():
 def test_a_healthy_recording_has_no_convention():
     answer = diagnose(recorded(), load_nominal(PAPER))
     assert answer.verdict == "no_mismatch" and not answer.conventions
+
+
+@pytest.mark.parametrize("name", [n for n, m in MISTAKES.items() if m.found in OF_DATA_SHEETS])
+def test_a_constant_of_a_data_sheet_is_told(name, tmp_path):
+    recording, drive = written(dataclasses.replace(MISTAKES[name], dq=True), tmp_path)
+    answer = diagnose(table_of(recording, tmp_path / "points.csv"), drive)
+    assert [c.code for c in answer.conventions] == [MISTAKES[name].found] and not answer.effects, answer.sentence
 
 
 def test_every_reading_has_a_code_of_its_own_and_an_inverse_factor():

@@ -276,5 +276,11 @@ def test_a_dq_log_with_the_speed_of_the_other_direction(tmp_path, nominal):
     np.testing.assert_allclose(recording["omega_e"], table["omega_e"])
 
 
+def test_one_gap_is_singular(tmp_path, nominal):
+    table = {name: np.delete(values, 2000) for name, values in made().items()}
+    recording = load_recording(write(tmp_path / "r.csv", table), nominal)
+    assert [p.message for p in recording.problems] == ["1 gap, about 1 sample missing"]
+
+
 def test_every_check_has_a_stage():
     assert {m.STAGE for m in checks()} == set(STAGES)

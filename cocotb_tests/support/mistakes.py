@@ -138,6 +138,13 @@ MISTAKES = {
     "psi in rms": Mistake("psi_rms", file={"magnet_flux_wb": 1 / ROOT2}),
     "psi line to line in rms": Mistake("psi_line_rms", file={"magnet_flux_wb": ROOT3 / ROOT2}),
     "psi per turn of the shaft": Mistake("psi_of_shaft", file={"magnet_flux_wb": PAIRS}),
+    "psi per turn of the shaft, line to line in rms": Mistake(
+        "psi_line_rms_of_shaft", file={"magnet_flux_wb": PAIRS * POWER}
+    ),
+    "psi per 1000 rpm, line to line in rms": Mistake(
+        "psi_line_rms_krpm", file={"magnet_flux_wb": PAIRS * POWER * 1000 / 60 * 2 * math.pi}
+    ),
+    "psi as Nm per A rms": Mistake("psi_torque_rms", file={"magnet_flux_wb": 1.5 * PAIRS * ROOT2}),
     "psi in mWb": Mistake("psi_milli", file={"magnet_flux_wb": 1e3}),
     "L in mH": Mistake("inductances_milli", file=dict.fromkeys(RL[1:], 1e3)),
     "R in milliohm": Mistake("resistance_milli", file={"resistance_ohm": 1e3}),

@@ -62,6 +62,11 @@ class SlowView(View):
     def interval_angle(self):
         return super().interval_angle + self._advance(self.u.shape[1], -0.5)
 
+    def at_speed(self, factor):
+        """The view with the speed times ``factor`` and the same voltages in dq."""
+        u = self.u * np.exp(1j * (factor - 1.0) * self._advance(self.u.shape[1], -0.5))
+        return self.replace(omega=factor * self.omega, u=u)
+
     def to_dq(self, stator):
         return stator * np.exp(-1j * (self.theta_mid + self._advance(stator.shape[1])))
 

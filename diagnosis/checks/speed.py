@@ -36,6 +36,7 @@ def check(recording, nominal) -> None:
             action = "the speed is reversed"
         recording.problems.append(Problem("rotation", message, "omega_e", 0, n, action))
         return
+    recording.meta["angle_speed"] = ratio  # tells other pole pairs (ingest/restated.py)
     message = f"the angle advances {ratio:.3g} times as fast as the speed says"
     if not confirmed and not 1.0 / WRONG < ratio < WRONG:
         message += ": omega_e is electrical; name its unit in [columns], or correct pole_pairs"

@@ -23,6 +23,8 @@ def read_recording(recording: Recording, readings) -> Recording:
         for name, (factor, offset) in reading.columns().items():
             if name in columns:
                 columns[name] = columns[name] * factor + offset
+        if reading.speed != 1.0:  # in a drive file the pole pairs do that
+            columns["omega_e"] = columns["omega_e"] * reading.speed
     return dataclasses.replace(recording, columns=columns)
 
 

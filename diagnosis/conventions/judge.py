@@ -11,13 +11,14 @@ currents in rms are told from a gain error by how exactly the factor is met.
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
 
 from fluxproof.diagnosis.balance.misfit import bulge
 from fluxproof.diagnosis.conventions.reading import Reading
-from fluxproof.diagnosis.conventions.table import readings_for
+from fluxproof.diagnosis.conventions.table import pole_pairs_for, readings_for
 from fluxproof.diagnosis.effects.effect import torque_of
 from fluxproof.diagnosis.inference import constants as k
 from fluxproof.diagnosis.inference.evidence import evidence
@@ -54,7 +55,7 @@ def preferred(recordings, posterior, explained, progress=lambda text: None):
     if len(np.unique(setup.points)) < LEAST_POINTS:
         return (), [], posterior
     most = len(posterior.best().names) if explained else np.inf
-    able = [r for r in readings_for(setup.view.nominal) if r.possible(recordings)]
+    able = [r for r in _all(setup.view.nominal) if r.possible(recordings)]
     able = [r for r in able if all(getattr(setup.view.machine, key) for key in r.machine)]
     terms = Terms(setup)
     perfect = terms.perfect()
@@ -75,7 +76,10 @@ def preferred(recordings, posterior, explained, progress=lambda text: None):
         value = other.best().value + prior + terms.jacobian(j.readings)
         left = other.best().names
         exact = not any(set(setup.effects[n].rescales) & r.touches for n in left for r in j.readings)
-        if value > known and exact and (not left or len(left) + len(j.readings) <= most):
+        # Other pole pairs scale L_d, L_q and psi: instead of one effect they would be chance.
+        cost = sum(1 + bool(r.pole_pairs) for r in j.readings)
+        few = len(left) + cost <= most or (not left and cost == len(j.readings))
+        if value > known and exact and few:
             best, known, found = j, value, other
         if best is j and not other.best().names:
             break  # nothing is left that another reading could explain
@@ -102,15 +106,20 @@ def _rows_as_read(rows, codes) -> Rows:
     """The rows of a recording under readings."""
     view = rows.view
     for reading in _coded(rows, codes):
-        view = reading.of_view(view)
+        # The cells stay those of the stated pole pairs, whose mechanical orders no operating point shows.
+        view = dataclasses.replace(reading, pole_pairs=0).of_view(view)
     train = np.zeros(len(view), bool)
     train[rows.projector.block[rows.train]] = True
     return Rows(view, rows.effects, train)
 
 
+def _all(nominal) -> list[Reading]:
+    return [*readings_for(nominal), *pole_pairs_for(nominal)]
+
+
 def _coded(rows, codes) -> list[Reading]:
     """The readings of a recording with these codes."""
-    known = {r.code: r for r in readings_for(rows.view.nominal)}
+    known = {r.code: r for r in _all(rows.view.nominal)}
     return [known[code] for code in codes]
 
 
@@ -222,8 +231,9 @@ def _factor(term, readings) -> float:
     amps = _product(r.currents for r in readings)
     volts = _product(x.volts for x in readings)
     r, d, q, psi = (_product(x.machine.get(key, 1.0) for x in readings) for key in KEYS)
+    speed = _product(x.speed for x in readings)
     return {
-        "u": volts, "r": r * amps, "d": d * amps, "q": q * amps, "psi": psi,
-        "t_psi": psi * amps, "t_d": d * amps**2, "t_q": q * amps**2,
+        "u": volts, "r": r * amps, "d": d * amps * speed, "q": q * amps * speed, "psi": psi * speed,
+        "t_psi": psi * amps * speed, "t_d": d * amps**2 * speed, "t_q": q * amps**2 * speed,
         "rest_u": volts, "rest_sum": amps, "rest_torque": 1.0,
     }[term]  # fmt: skip

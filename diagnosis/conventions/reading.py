@@ -16,7 +16,8 @@ class Reading:
     """currents, voltages, bus: factors from recorded to true values; turn: rad added to the recorded angle.
 
     machine: {key of [machine]: factor from the file's value to the true one}; quantity: for Convention; dq: whether
-    only logs in dq can have it; says: the finding as a clause.
+    only logs in dq can have it; says: the finding as a clause; pole_pairs: the right number, with the factor ``speed``
+    from the speed as it was read, for operating points without an angle.
     """
 
     code: str
@@ -27,6 +28,8 @@ class Reading:
     bus: float = 1.0
     turn: float = 0.0
     machine: dict = field(default_factory=dict)
+    pole_pairs: int = 0
+    speed: float = 1.0
     dq: bool | None = None  # whether it is of logs in dq, of logs of phases and duties, or of both
 
     def possible(self, recordings) -> bool:
@@ -38,13 +41,15 @@ class Reading:
             return False
         if self.turn and not (logs_dq or all(r.has("theta_e") for r in recordings)):
             return False
+        if self.pole_pairs and not all(r.slow and "omega_e" in r.meta.get("of_shaft", ()) for r in recordings):
+            return False
         return not any("inverter" in r.lacks for r in recordings)  # an EMF run measures voltages of its own
 
     @property
     def touches(self) -> set[str]:
-        """The quantities that it rescales, as effects name theirs: i, u, u_dc, theta_e, keys of [machine]."""
+        """The quantities that it rescales, as effects name theirs: i, u, u_dc, theta_e, omega_e, keys of [machine]."""
         named = (("i", self.currents != 1.0), ("u", self.voltages != 1.0), ("u_dc", self.bus != 1.0),
-                 ("theta_e", self.turn != 0.0))  # fmt: skip
+                 ("theta_e", self.turn != 0.0), ("omega_e", self.speed != 1.0))  # fmt: skip
         return {name for name, changed in named if changed} | set(self.machine)
 
     @property
@@ -55,12 +60,14 @@ class Reading:
     @property
     def factor(self) -> float | None:
         """Recorded or stated value over the true one; None: an angle, or several factors."""
-        factors = {1.0 / f for f in (self.currents, self.voltages, self.bus, *self.machine.values()) if f != 1.0}
+        scales = (self.currents, self.voltages, self.bus, self.speed, *self.machine.values())
+        factors = {1.0 / f for f in scales if f != 1.0}
         return factors.pop() if len(factors) == 1 else None
 
     def keys(self, nominal) -> list[tuple[str, str, float]]:
         """[(section, key, value)] of the drive file that it changes."""
-        return [("machine", key, getattr(nominal.machine, key) * f) for key, f in self.machine.items()]
+        right = [("machine", "pole_pairs", self.pole_pairs)] if self.pole_pairs else []
+        return right + [("machine", key, getattr(nominal.machine, key) * f) for key, f in self.machine.items()]
 
     def of(self, nominal):
         """The drive read this way."""
@@ -70,6 +77,7 @@ class Reading:
     def of_view(self, view):
         """The view read this way, with the same blocks."""
         turned = view.turned(-self.turn) if self.turn else view
+        turned = turned.at_speed(self.speed) if self.speed != 1.0 else turned
         return turned.replace(
             nominal=self.of(view.nominal),
             i=turned.i * self.currents,
@@ -94,4 +102,5 @@ class Reading:
         says = self.says
         if rivals:
             says = f"{says}, or {', or '.join(r.says for r in rivals)} (this recording cannot tell)"
-        return Convention(self.code, self.quantity, self.factor, says, [r.code for r in rivals])
+        code = "pole_pairs" if self.pole_pairs else self.code
+        return Convention(code, self.quantity, self.factor, says, [r.code for r in rivals])

@@ -4,7 +4,8 @@ A new entry is a new line; of entries that leave the same balance the first is t
 numbers reveal (degrees, percent, mA, rpm) and exchanged phases are corrected by the checks.
 
 Sources of the factors: amplitude-invariant against power-invariant Clarke, sqrt(3/2); peak against rms, sqrt(2); phase
-against line-to-line voltage, sqrt(3), and resistance or inductance between two terminals, 2.
+against line-to-line voltage, sqrt(3), and resistance or inductance between two terminals, 2; a
+voltage or torque constant of the shaft, the pole pairs.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import math
 from fluxproof.diagnosis.conventions.reading import Reading
 
 ROOT2, ROOT3, POWER = math.sqrt(2.0), math.sqrt(3.0), math.sqrt(1.5)
+KRPM = 1000.0 * math.pi / 30.0  # rad/s
 R, L, PSI = ("resistance_ohm",), ("inductance_d_h", "inductance_q_h"), ("magnet_flux_wb",)
 
 
@@ -103,6 +105,20 @@ READINGS = (
 )  # fmt: skip
 
 
+def pole_pairs_for(nominal) -> list[Reading]:
+    """Readings with other pole pairs: a digit beside the right one, or poles in place of pairs."""
+    stated = nominal.machine.pole_pairs
+    near = {stated - 2, stated - 1, stated + 1, stated + 2, 2 * stated} | ({stated // 2} if stated % 2 == 0 else set())
+    return [
+        Reading(
+            f"pole_pairs {n}", "machine.pole_pairs",
+            f"the machine has {n} pole pair{'s' * (n != 1)}, not {stated} as in the drive file",
+            pole_pairs=n, speed=n / stated,
+        )
+        for n in sorted(near) if n > 0
+    ]  # fmt: skip
+
+
 def readings_for(nominal) -> list[Reading]:
     """All readings; those of the shaft depend on the pole pairs."""
     pairs = nominal.machine.pole_pairs
@@ -117,4 +133,16 @@ def readings_for(nominal) -> list[Reading]:
         _machine(
             "psi_torque", PSI, 1.5 * pairs, f"the magnet flux is a torque constant, {1.5 * pairs:g} times the flux"
         ),
+        *(_machine(code, PSI, factor, f"the magnet flux is {what}, {factor:.5g} times the flux linkage")
+          for code, factor, what in _of_data_sheets(pairs)),
     ]  # fmt: skip
+
+
+def _of_data_sheets(pairs):
+    """(code, factor, what) of the constants of a data sheet that are rms values and of the shaft."""
+    line = pairs * POWER  # rms value of the line-to-line voltage at 1 rad/s of the shaft, per flux linkage
+    return (
+        ("psi_line_rms_of_shaft", line, "a voltage constant, line-to-line rms per rad/s of the shaft"),
+        ("psi_line_rms_krpm", line * KRPM, "a voltage constant, line-to-line rms per 1000 rpm"),
+        ("psi_torque_rms", 1.5 * pairs * ROOT2, "a torque constant per ampere rms"),
+    )

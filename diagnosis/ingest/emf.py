@@ -6,7 +6,7 @@ period follows from the integral of the samples, so that the balance is the same
 measured voltage in place of duties times bus voltage and a current of zero.
 
 The angle, if it was not recorded, is that of the fundamental: its phase, averaged over one electrical turn, in which
-harmonics cancel.  An angle error cannot be seen then.
+harmonics cancel, less what a changing speed adds to that mean.  An angle error cannot be seen then.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from fluxproof.diagnosis.recording import Problem, Recording, RecordingError
 
 LEAST_PER_TURN = 10.0  # samples of an electrical turn
 GAP = 1.5  # times the usual step of the time
+LEAST_ROWS = 20  # of a stretch
 LEAST_VOLTAGE = 0.05  # of the largest one: at a lower speed the fundamental's phase is noise
 NO_CURRENT = 0.02  # of rated current
 TURNS = np.exp(2j * np.pi / 3 * np.arange(3))
@@ -47,8 +48,7 @@ def emf_rows(path, columns: dict, nominal, meta: dict) -> Recording:
     parts = [part for part in parts if part is not None]
     if not parts:
         raise RecordingError(f"{path}: no part without a gap is longer than {4 * period:g} s")
-    rows = [_known(_rows(at, u, columns, t, nominal)) for at, u in parts]
-    rows = [r for r in rows if len(r["t"])]
+    rows = [known for at, u in parts for known in _known(_rows(at, u, columns, t, nominal))]
     if not rows:
         raise RecordingError(f"{path}: no part without a gap contains a whole electrical turn: record longer")
     count = [len(r["t"]) for r in rows]
@@ -160,10 +160,13 @@ def _rows(at, u, columns, t, nominal) -> dict:
     return out | {name: np.interp(at, t, columns[name]) for name in SLOW if name in columns}
 
 
-def _known(rows: dict) -> dict:
-    """The rows whose angle is known."""
-    known = np.isfinite(rows["theta_e"])
-    return {name: values[known] for name, values in rows.items()}
+def _known(rows: dict) -> list[dict]:
+    """The stretches whose angle is known; what is between them was recorded, so that they are runs and no gaps."""
+    inside = np.concatenate([[False], np.isfinite(rows["theta_e"]), [False]])
+    begins, ends = np.flatnonzero(inside[1:] & ~inside[:-1]), np.flatnonzero(~inside[1:] & inside[:-1])
+    # Noise of the speed lets single rows near an end have a whole turn around them.
+    kept = [slice(a, b) for a, b in zip(begins, ends, strict=True) if b - a >= LEAST_ROWS]
+    return [{name: values[part] for name, values in rows.items()} for part in kept]
 
 
 def angle_of(u, period) -> np.ndarray:
@@ -176,11 +179,37 @@ def angle_of(u, period) -> np.ndarray:
     known = np.isfinite(speed)
     if not known.any():
         return np.full(len(u), np.nan)
-    speed = np.where(known, speed, np.interp(np.arange(len(u)), np.flatnonzero(known), speed[known]))
+    speed = _filled(speed, known)
     turn = 2 * np.pi / np.maximum(np.abs(speed) * period, 2 * np.pi / len(u))
-    middle = _over_turns(phase, turn) - 0.5 * np.pi * np.sign(speed)
+    mean = _over_turns(phase, turn)
+    middle = mean - _bend(mean, turn) - 0.5 * np.pi * np.sign(speed)
     middle[np.abs(_over_turns(np.sign(speed), turn)) < 1.0 - 1e-9] = np.nan
     return np.append(np.nan, 0.5 * (middle[1:] + middle[:-1]))
+
+
+def _bend(mean, turn) -> np.ndarray:
+    """What a steady acceleration adds to the mean of an angle over ``turn`` rows: d2 theta / dk2 turn^2 / 24.
+
+    A mean of the means differs from them by the same.
+    """
+    rows, known = np.arange(len(mean)), np.isfinite(mean)
+    if not known.any():
+        return np.zeros(len(mean))
+    again = _over_turns(_filled(mean, known), turn) - mean
+    whole = np.isfinite(again) & (_over_turns(known.astype(float), turn) > 1.0 - 1e-9)
+    change = np.where(whole, again / turn**2, np.nan)
+    # The least of three turns: about a step of the speed or the noise of a constant one there is nothing to subtract.
+    three = np.array([np.interp(rows + turn * side, rows, change, left=np.nan, right=np.nan) for side in (-1, 0, 1)])
+    known = np.isfinite(three).all(axis=0)
+    if not known.any():
+        return np.zeros(len(mean))
+    least = np.where(np.ptp(np.sign(three), axis=0) == 0, np.abs(three).min(axis=0), 0.0) * np.sign(three[1])
+    return _filled(least, known) * turn**2
+
+
+def _filled(x, known) -> np.ndarray:
+    """x (m,) with what is not known from the nearest that is."""
+    return np.interp(np.arange(len(x)), np.flatnonzero(known), x[known])
 
 
 def _rough_turn(phase) -> float:

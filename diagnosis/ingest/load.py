@@ -23,6 +23,7 @@ from fluxproof.diagnosis.ingest.demand import is_emf_run
 from fluxproof.diagnosis.ingest.emf import emf_rows
 from fluxproof.diagnosis.ingest.points import as_table, is_table
 from fluxproof.diagnosis.ingest.restated import alternatives, doubtful, fits
+from fluxproof.diagnosis.ingest.units import conversion
 from fluxproof.diagnosis.readers import read_table
 from fluxproof.diagnosis.readers.table import Table, shown
 from fluxproof.diagnosis.recording import Recording, RecordingError
@@ -35,9 +36,9 @@ def load_recording(path, nominal) -> Recording:
     """
     recording = _checked(Path(path), nominal)
     if doubtful(recording):
-        for restated in alternatives(nominal):
+        for restated in alternatives(recording, nominal):
             other = _checked(Path(path), restated.of(nominal))
-            if fits(other, restated.of(nominal)):
+            if fits(other, restated.of(nominal), restated):
                 other.meta["restated"] = restated
                 return other
     return recording
@@ -79,6 +80,7 @@ def _recording(path, table: Table, plan: Plan, nominal) -> Recording:
     meta["column_scales"] = {k: (s.factor, s.offset) for k, s in plan.sources.items()}
     meta["stated_units"] = [name for name, s in plan.sources.items() if s.stated]
     meta["documented_units"] = [name for name in meta["stated_units"] if not plan.sources[name].by_name]
+    meta["of_shaft"] = [name for name, s in plan.sources.items() if _of_shaft(name, s.unit)]
     for name, value in plan.assumed.items():
         columns[name] = np.full(n, value)
     notes += [f"{name} = {plan.assumed[name]:g} by [constants] of the drive file" for name in plan.stated]
@@ -98,6 +100,11 @@ def _recording(path, table: Table, plan: Plan, nominal) -> Recording:
     )
     recording.problems += [_renamed(problem, meta["columns"]) for problem in table.problems]
     return recording
+
+
+def _of_shaft(name, unit) -> bool:
+    """Whether the pole pairs are in the conversion of a unit."""
+    return bool(unit) and conversion(name, unit, 1) != conversion(name, unit, 2)
 
 
 def _renamed(problem, columns):

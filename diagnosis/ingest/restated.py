@@ -1,7 +1,11 @@
-"""A drive file whose sample time or pole pairs are off by two: the recording is read again with the right ones.
+"""A drive file whose sample time is off by two, or with wrong pole pairs: the recording is read again with the right
+ones.
 
 These two decide how rows follow each other and what the angle is, so that nothing can be judged without them.  The
 other keys of a drive file are judged with the balance (judge.py).
+
+With duties the balance needs the angle alone, which the pole pairs do not change if it is electrical: they are told
+only where angle and speed agree with them and disagreed before.
 """
 
 from __future__ import annotations
@@ -10,11 +14,14 @@ import dataclasses
 
 import numpy as np
 
-from fluxproof.diagnosis.checks.balance import discriminates, misfit, rows_of
+from fluxproof.diagnosis.checks.agreement import angle_speed_ratio
+from fluxproof.diagnosis.checks.balance import FIT, discriminates, misfit, rows_of
 from fluxproof.diagnosis.quantities import ascii_of, quantity
 from fluxproof.diagnosis.result import Convention
 
 FITS = 0.02  # of the voltage: largest misfit of a recording that is read rightly, whatever effect the drive has
+AGREES = 0.02  # of the speed: how well angle and speed agree with the right pole pairs
+WHOLE = 0.1  # how near to a whole number: of many pole pairs 2 % would meet some number always
 VISIBLE = 3.0  # times FITS: what one sample time of delay must change, in rad, to be noticed
 CODES = ("sample_time", "angle_speed", "no_fit", "slow_sampling")
 
@@ -50,8 +57,8 @@ def doubtful(recording) -> bool:
     return any(p.code in CODES for p in recording.problems) and not recording.points
 
 
-def alternatives(nominal) -> list[Restated]:
-    """The drive file with its sample time or its pole pairs halved and doubled."""
+def alternatives(recording, nominal) -> list[Restated]:
+    """The drive file with half and twice its sample time, and with the pole pairs that angle and speed suggest."""
     period, pairs = nominal.sample_time_s, nominal.machine.pole_pairs
     words = lambda s: ascii_of(quantity(s, "s"))  # noqa: E731
     out = [
@@ -61,19 +68,37 @@ def alternatives(nominal) -> list[Restated]:
         )
         for f in (0.5, 2.0)
     ]  # fmt: skip
-    whole = [n for n in (pairs / 2, pairs * 2) if n == int(n)]
-    says = "the machine has {} pole pairs, not {} as in the drive file"
-    return out + [Restated("machine", "pole_pairs", pairs, int(n), says.format(int(n), pairs)) for n in whole]
+    says = "the machine has {} pole pair{}, not {} as in the drive file"
+    return out + [
+        Restated("machine", "pole_pairs", pairs, n, says.format(n, "s" * (n != 1), pairs))
+        for n in _pole_pairs(recording, pairs)
+    ]
 
 
-def fits(recording, nominal) -> bool:
-    """Whether a recording, as read with a drive file, is met by the nominal balance and would show another timing."""
+def _pole_pairs(recording, pairs) -> list[int]:
+    """Numbers of pole pairs with which angle and speed could agree."""
+    ratio = abs(recording.meta.get("angle_speed", 0.0))
+    if not ratio:  # poles in place of pole pairs, or half of them
+        wanted = (pairs / 2, pairs * 2)
+    else:  # a speed of the shaft, an angle of the shaft, and one that nobody said to be of the shaft
+        wanted = (pairs * ratio, pairs / ratio, 1.0 / ratio)
+    whole = dict.fromkeys(round(n) for n in wanted if abs(n - round(n)) <= min(AGREES * n, WHOLE))
+    return [n for n in whole if n not in (0, pairs)]
+
+
+def fits(recording, nominal, restated) -> bool:
+    """Whether a recording, as read with a restated drive file, is met by it and would show another reading."""
     if recording.fatal or recording.slow or recording.points:
         return False
     rows = rows_of(recording, nominal)
-    if rows is None or rows.steady or not discriminates(rows):
-        return False
-    turn = float(np.percentile(np.abs(rows.omega), 75)) * nominal.sample_time_s
+    met = rows is not None and not rows.steady and discriminates(rows)
+    if restated.key == "pole_pairs":
+        ratio = angle_speed_ratio(recording, nominal.sample_time_s)
+        if "angle_speed" in recording.meta or ratio is None or abs(ratio - 1.0) > AGREES:
+            return False
+        # The angle of an EMF run is that of its voltages; else any effect may be left, as the ratio is the evidence.
+        return "inverter" in recording.lacks or (met and misfit(rows) < FIT)
+    turn = float(np.percentile(np.abs(rows.omega), 75)) * nominal.sample_time_s if met else 0.0
     return turn > VISIBLE * FITS and misfit(rows) < FITS
 
 
