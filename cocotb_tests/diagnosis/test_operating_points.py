@@ -251,8 +251,8 @@ def test_standstill_needs_the_angle(tmp_path):
 
 def test_standstill_counts_in_a_slow_log(tmp_path):
     answer = answer_of(tmp_path, sampled(500.0, Truth(r=2.3), points=AT_REST, hold_s=0.8))
-    # Half more voltage at rest is a resistance, or a scale of the currents or of the voltages.
-    assert not answer.effects and answer.ambiguity == [["current_scale", "resistance", "udc_gain"]], answer.sentence
+    # A scale of currents or voltages would fit too, but none is off by so much in a usual drive.
+    assert found(answer)["resistance_ohm"] == pytest.approx(2.3, abs=0.08)
     nothing = answer_of(tmp_path, sampled(500.0, Truth(r=2.3), points=AT_REST, hold_s=0.8, angle=False))
     assert nothing.verdict == "bad_recording" and "theta_e" in nothing.sentence
 

@@ -14,6 +14,7 @@ from fluxproof.diagnosis.balance.slow_stretches import message_period, stretches
 from fluxproof.diagnosis.balance.slow_view import slow_view
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.inference.fit import Model
+from fluxproof.diagnosis.inference.refine import IMPLAUSIBLE
 from fluxproof.diagnosis.inference.slow_model import bounds, flux_map_of
 from fluxproof.diagnosis.inference.slow_search import SlowSearch
 from fluxproof.diagnosis.recording import RecordingError
@@ -159,6 +160,15 @@ def test_absurd_sizes_are_implausible():
     search = SlowSearch(view, np.ones(len(view), bool))
     alone = next(m for m in search.every_set() if m.names == {"inductance_q"})
     assert not np.isfinite(search.refine(alone).score)
+
+
+@pytest.mark.parametrize("share, costs", [(0.95, False), (0.5, True)])
+def test_an_implausible_value_costs(share, costs):
+    """Else a sum of absurd effects that cancel is preferred to the true ones."""
+    view = slow_view(log(Truth(psi_m=share * PSI), levels=LEVELS[:8]), NOMINAL)
+    search, model = SlowSearch(view, np.ones(len(view), bool)), Model(frozenset(["magnet_flux"]))
+    prior = search.refine(model).score - search.linear.score(model, search.problem.dispersion)
+    assert (prior > IMPLAUSIBLE) == costs and prior > 0.0
 
 
 SETS = {  # the best set and those that tie with it: what is named, what is ambiguous, what is weak

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import math
-
 from fluxproof.diagnosis.answer.phrases import capital, size_text, title_of
-from fluxproof.diagnosis.effects.effect import DOUBT
+from fluxproof.diagnosis.effects.effect import believable, plausible_range
 from fluxproof.diagnosis.quantities import ascii_of, quantity
 
 IMPLAUSIBLE = "is implausible"
@@ -20,10 +18,9 @@ def doubts(answer, nominal, effects) -> list[str]:
             estimate = e.parameters.get(key)
             if estimate is None:
                 continue
-            low, high = (x * _reference(limits, nominal) for x in limits[:2])
-            doubt = DOUBT * estimate.sigma if math.isfinite(estimate.sigma) else 0.0
-            if low - doubt <= estimate.value <= high + doubt:
+            if believable(estimate, limits, nominal):
                 continue
+            low, high = plausible_range(limits, nominal)
             called = next(p.called for p in entry.parameters if p.name == key)
             usual = f"{ascii_of(quantity(low, estimate.unit, 3))} to {ascii_of(quantity(high, estimate.unit, 3))}"
             notes.append(
@@ -31,11 +28,3 @@ def doubts(answer, nominal, effects) -> list[str]:
                 f"Perhaps {entry.otherwise}."
             )
     return notes
-
-
-def _reference(limits, nominal) -> float:
-    """The value of the drive file to which limits are relative, 1 if they are absolute."""
-    if len(limits) < 3:
-        return 1.0
-    section, key = limits[2].split(".")
-    return float(getattr(getattr(nominal, section), key))

@@ -269,3 +269,19 @@ def sigma(covariance, k=0) -> float:
 def one(name, unit, value, spread) -> dict[str, Estimate]:
     """{name: Estimate} of a single parameter."""
     return {name: Estimate(float(value), float(spread), unit)}
+
+
+def plausible_range(limits, nominal) -> tuple[float, float]:
+    """(least, largest) value of a usual drive; limits: an entry of ``Effect.plausible``."""
+    reference = 1.0
+    if len(limits) > 2:
+        section, key = limits[2].split(".")
+        reference = float(getattr(getattr(nominal, section), key))
+    return limits[0] * reference, limits[1] * reference
+
+
+def believable(estimate, limits, nominal) -> bool:
+    """Whether an estimate is within what its effect declares as plausible, or doubtfully beyond it."""
+    low, high = plausible_range(limits, nominal)
+    doubt = DOUBT * estimate.sigma if np.isfinite(estimate.sigma) else 0.0
+    return low - doubt <= estimate.value <= high + doubt

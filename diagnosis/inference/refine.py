@@ -10,9 +10,11 @@ import numpy as np
 
 from fluxproof.diagnosis.balance.cells import Projector, cells_of
 from fluxproof.diagnosis.effects.corrections import in_turn, with_flux
+from fluxproof.diagnosis.effects.effect import believable
 from fluxproof.diagnosis.inference.fit import Fitter, Model, Solution, everything
 
 STEPS = 4
+IMPLAUSIBLE = 20.0  # of the score, for a value outside of what its effect declares: odds of one in 20 000
 UNLIMITED = 300.0  # times its floor: usual range of an effect without a ceiling
 
 
@@ -92,13 +94,19 @@ class Refiner:
         return view if np.isfinite(view.u).all() and np.isfinite(view.i_raw).all() else None
 
     def unusual(self, solution) -> float:
-        """Twice the negative log prior of the sizes, as in the search of fast logs: it falls beyond usual ones."""
+        """Twice the negative log prior of the sizes, as in the search of fast logs: it falls beyond usual ones.
+
+        A sum of absurd effects may fit as well as the true ones: each value that its effect calls implausible costs.
+        """
         nominal, total = self.view.nominal, 0.0
         for name, c in solution.c.items():
             effect = self.effects[name]
             floor, ceiling = effect.floor(nominal), effect.ceiling(nominal)
             most = max(ceiling / floor, 2.0) if np.isfinite(ceiling) else UNLIMITED
             total += 2.0 * float(np.log1p((effect.size(c, nominal) / floor) ** 2 / most))
+            found = effect.estimates(c, solution.covariance[name], nominal)
+            total += IMPLAUSIBLE * sum(not believable(e, effect.plausible[k], nominal) for k, e in found.items()
+                                       if k in effect.plausible)  # fmt: skip
         return total
 
     def plausible(self, solution) -> bool:
