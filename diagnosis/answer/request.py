@@ -15,6 +15,7 @@ from fluxproof.diagnosis.balance.joined import stayed_cold
 from fluxproof.diagnosis.balance.view import View
 from fluxproof.diagnosis.effects.effect import LEAST_CURRENT
 from fluxproof.diagnosis.inference import constants
+from fluxproof.diagnosis.nominal import flux_level
 from fluxproof.diagnosis.quantities import ascii_of, quantity
 from fluxproof.diagnosis.result import Request
 
@@ -89,7 +90,7 @@ def limits(view) -> tuple[float, float]:
     """(largest voltage [V], speed to which SPEEDS refer [rad/s])."""
     linear = view.nominal.inverter.dc_bus_v / np.sqrt(3)
     u_max = np.clip(float(voltage_level(view).max()), 0.74 * linear, 0.9 * linear)
-    return u_max, max(view.top_speed, REACHED * u_max / view.machine.magnet_flux_wb)
+    return u_max, max(view.top_speed, REACHED * u_max / flux_level(view.machine))
 
 
 def within_limits(view):
