@@ -36,6 +36,9 @@ def _optional(section, kind):
     return dataclasses.make_dataclass(kind.__name__, fields, frozen=True)
 
 
+RELUCTANCE = 0.05  # of the flux of rated current: with less the magnets do not count
+NO_MAGNETS = 1e-6  # the same, in place of no flux
+
 SECTIONS = {name: _optional(name, kind) for name, kind in drive.SECTIONS.items()}
 
 
@@ -65,6 +68,16 @@ class Nominal:
         return self.control.sample_time_s or period / self.core.updates_per_period
 
 
+def flux_level(machine) -> float:
+    """Flux linkage [Wb] that limits the speed: of the magnets, or of rated current in a reluctance machine."""
+    load = _load_flux(machine)
+    return machine.magnet_flux_wb if machine.magnet_flux_wb > RELUCTANCE * load else load
+
+
+def _load_flux(machine) -> float:
+    return max(machine.inductance_d_h, machine.inductance_q_h) * machine.rated_current_a
+
+
 def load_nominal(path) -> Nominal:
     """The nominal drive of a TOML file; DriveError names file, section, key and what was expected."""
     sections = read_sections(path, SECTIONS)
@@ -78,6 +91,7 @@ def load_nominal(path) -> Nominal:
     if not isinstance(plant, dict) or not all(isinstance(table, dict) for table in plant.values()):
         raise DriveError(f"{path}: plant must contain sections such as [plant.machine]")
     m = sections["machine"]
-    if m.magnet_flux_wb <= 0.0:
-        raise DriveError(f"{path}: [machine] magnet_flux_wb = {m.magnet_flux_wb:g}: must be above 0 Wb to diagnose")
+    if m.magnet_flux_wb == 0.0:  # sizes that refer to the magnets' flux stay finite, and no magnets are ever named
+        small = NO_MAGNETS * _load_flux(m)
+        sections["machine"] = dataclasses.replace(m, magnet_flux_wb=small)
     return Nominal(*sections.values(), columns=columns, path=str(path), plant=plant, constants=constants)

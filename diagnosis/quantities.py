@@ -90,3 +90,8 @@ def _fixed(x: float, places: int) -> str:
 
 def _joined(value: str, unit: str) -> str:
     return f"{value} {unit}".rstrip()
+
+
+def counted(n: int, what: str) -> str:
+    """A number of things: "1 gap", "2 gaps"."""
+    return f"{n} {what}{'s' * (n != 1)}"

@@ -8,6 +8,7 @@ import pytest
 from cocotb_tests.support.bench_logs import L_D, L_Q, PSI, Truth, emf, table
 from cocotb_tests.support.recordings_made import DRIVE, made, write
 from fluxproof.diagnosis import diagnose
+from fluxproof.diagnosis.conventions.apply import read_recording
 from fluxproof.diagnosis.ingest.load import load_recording
 from fluxproof.diagnosis.nominal import load_nominal
 
@@ -31,6 +32,12 @@ def test_a_speed_of_the_shaft_tells_the_pole_pairs(tmp_path, stated):
     recording = read(tmp_path, in_rpm(made()), stated)
     assert recording.meta["restated"].value == 4
     assert "angle_speed" not in {p.code for p in recording.problems}
+
+
+def test_a_recording_that_was_read_again_is_not_scaled_once_more(tmp_path):
+    recording = read(tmp_path, in_rpm(made()), 3)
+    again = read_recording(recording, [recording.meta["restated"]])
+    np.testing.assert_array_equal(again["omega_e"], recording["omega_e"])
 
 
 def test_one_pole_pair_is_singular(tmp_path):

@@ -146,6 +146,26 @@ def test_points_are_within_the_recorded_range(lossy):
     assert {(np.sign(w), np.sign(x.imag.round(9))) for w, x in zip(omega, i, strict=True)} >= {(1, 1), (1, -1), (-1, 1)}
 
 
+def test_a_locked_rotor_asks_for_what_the_drive_can_do():
+    """At rest the share of a resistance that rises with speed is noise: it was multiplied to 1e19 kV at speed."""
+    locked = tuple((0.0, d, q) for d, q in ((0.0, 0.0), (2.0, 0.0), (4.0, 0.0), (-3.0, 0.0), (0.0, 3.0))) * 2
+    view = view_of(recorded(locked, machine={"resistance_ohm": 1.3 * MACHINE.resistance_ohm}), NOMINAL)
+    view = view.replace(omega=1e-6 * (1.0 + 0.0 * view.omega))
+    search = setup_of(view)
+    solutions = [fit_of_set(search, [n]) for n in ("resistance", "udc_gain")]
+    solutions[0].c["resistance"]["skin"] = 1e-3 * solutions[0].c["resistance"]["delta_r"]
+    for r in requests(search, solutions, NOISE_V):
+        volts = [float(part.split()[0]) for part in r.why.split("differs by ")[1:] if part.split()[1] == "V"]
+        assert " kV" not in r.why and all(v < NOMINAL.inverter.dc_bus_v for v in volts), r.why
+
+
+def test_a_prediction_above_the_bus_voltage_has_no_figure(lossy):
+    solutions = [fit_of_set(lossy, [n]) for n in ("iron_loss", "resistance")]
+    solutions[1].c["resistance"]["delta_r"] = 1e6
+    asked = requests(lossy, solutions, NOISE_V)
+    assert any(" differs between " in r.why for r in asked) and not any("kV" in r.why for r in asked)
+
+
 def test_undetermined_part_of_a_curve_has_no_information(lossy):
     """At one speed a resistance and its growth with speed are collinear: only their sum is known."""
     view = lossy.view

@@ -15,6 +15,7 @@ from fluxproof.diagnosis.balance.joined import stayed_cold
 from fluxproof.diagnosis.balance.view import View
 from fluxproof.diagnosis.effects.effect import LEAST_CURRENT
 from fluxproof.diagnosis.inference import constants
+from fluxproof.diagnosis.nominal import flux_level
 from fluxproof.diagnosis.quantities import ascii_of, quantity
 from fluxproof.diagnosis.result import Request
 
@@ -89,7 +90,7 @@ def limits(view) -> tuple[float, float]:
     """(largest voltage [V], speed to which SPEEDS refer [rad/s])."""
     linear = view.nominal.inverter.dc_bus_v / np.sqrt(3)
     u_max = np.clip(float(voltage_level(view).max()), 0.74 * linear, 0.9 * linear)
-    return u_max, max(view.top_speed, REACHED * u_max / view.machine.magnet_flux_wb)
+    return u_max, max(view.top_speed, REACHED * u_max / flux_level(view.machine))
 
 
 def within_limits(view):
@@ -130,6 +131,7 @@ def known_of(fit, columns) -> np.ndarray:
     weight = 1.0 / np.sqrt(fit.variance)
     x = p.x * weight[:, None]
     length = np.linalg.norm(x, axis=0)
+    c = determined(fit)
     out = np.zeros((len(columns),) * 2)
     for a, key_a in enumerate(columns):
         mine = [key for key in columns if key[0] == key_a[0]]
@@ -137,11 +139,26 @@ def known_of(fit, columns) -> np.ndarray:
         # Within the recorded range at most as large as the effect itself; beyond it a curve over speed may be larger.
         shown = seen.get(key_a, 0.0) > SHOWN * max(seen.values(), default=0.0)
         size = seen if shown else {key: np.linalg.norm(columns[key]) for key in mine}
-        own = sum(abs(fit.c[n].get(key, 0.0)) * size[n, key] for n, key in size)
+        own = sum(abs(c[n].get(key, 0.0)) * size[n, key] for n, key in size)
         out[a, a] += (size[key_a] / (BENDS * own + 1e-12 * size[key_a] + 1e-30)) ** 2
         for b, key_b in enumerate(columns):
             if key_a in place and key_b in place:
                 out[a, b] += x[:, place[key_a]] @ x[:, place[key_b]]
+    return out
+
+
+def determined(fit) -> dict:
+    """{effect: {coefficient: value}} of a fit without the free coefficients that the recording does not show.
+
+    At a locked rotor the share of a resistance that rises with speed is noise, which no speed may multiply.
+    """
+    problem, out = fit.problem, {n: dict(c) for n, c in fit.c.items()}
+    length = np.linalg.norm(problem.p.x / np.sqrt(fit.variance)[:, None], axis=0)
+    for n, c in out.items():
+        mine = {key: length[j] for j, (name, key) in enumerate(problem.keys) if name == n}
+        least = SHOWN * max(mine.values(), default=0.0)
+        for key in [k for k, size in mine.items() if k.startswith("~") and size <= least]:
+            c.pop(key.lstrip("~"), None)
     return out
 
 
@@ -175,7 +192,7 @@ def requests(setup, fits, noise_v, cold=False) -> list[Request]:
     of = {n: columns_at(p, made, effects[n]) for s in solutions for n in s.names}
     predictions, knows = [], []
     for s in solutions:
-        parts = (v * of[n][k] for n, c in s.c.items() for k, v in c.items() if k in of[n])
+        parts = (v * of[n][k] for n, c in determined(s).items() for k, v in c.items() if k in of[n])
         predictions.append(sum(parts, np.zeros(len(p.ok))))
         columns = {(n, k): column for n in sorted(s.names) for k, column in of[n].items() if column.any()}
         stack = np.array(list(columns.values())).reshape(len(columns), len(p.ok))
@@ -197,7 +214,7 @@ def requests(setup, fits, noise_v, cold=False) -> list[Request]:
                 current.real,
                 current.imag,
                 names,
-                _why(p, k, predictions, worst, solutions, effects) + (COLD if cooled[k] else ""),
+                _why(p, k, predictions, worst, solutions, effects, drive) + (COLD if cooled[k] else ""),
                 float(drive),
                 float(view.machine.temperature_ref_c) if cooled[k] else None,
             )
@@ -208,8 +225,11 @@ def requests(setup, fits, noise_v, cold=False) -> list[Request]:
 COLD = ", once the machine has cooled down (record temp_winding)"
 
 
-def _why(p, k, predictions, pair, solutions, effects):
-    """What differs at candidate k between what is open: the effects that only one of the two sets contains."""
+def _why(p, k, predictions, pair, solutions, effects, most):
+    """What differs at candidate k between what is open: the effects that only one of the two sets contains.
+
+    most: the bus voltage [V]; a prediction above it is beyond the drive, so that its size is left out.
+    """
     at = p.ok & (p.block == k) & (p.channel == "u")
     sets = [set(solutions[n].names) for n in pair]
     only = [sorted(title_of(n, effects) for n in mine - other) for mine, other in (sets, sets[::-1])]
@@ -217,5 +237,5 @@ def _why(p, k, predictions, pair, solutions, effects):
     difference = np.where(at, np.abs(predictions[pair[0]] - predictions[pair[1]]), 0.0)
     row = int(np.argmax(difference))
     order = f"order {abs(p.order[row]):.4g} of the " if p.order[row] else ""
-    size = ascii_of(quantity(float(difference[row]), "V", 2))
-    return f"the {order}{SIGNALS['u_' + 'dq'[p.part[row]]]} differs by {size} between {a} and {b}"
+    size = f" by {ascii_of(quantity(float(difference[row]), 'V', 2))}" if difference[row] <= most else ""
+    return f"the {order}{SIGNALS['u_' + 'dq'[p.part[row]]]} differs{size} between {a} and {b}"

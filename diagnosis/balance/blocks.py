@@ -14,6 +14,7 @@ from fluxproof.diagnosis.balance.quantised_angle import angle_step
 from fluxproof.diagnosis.balance.settling import settled
 from fluxproof.diagnosis.balance.shaft import airgap, is_airgap, shaft_kind
 from fluxproof.diagnosis.balance.view import HALF_WIDTH, View, lacking
+from fluxproof.diagnosis.nominal import flux_level
 from fluxproof.diagnosis.recording import Recording, RecordingError
 
 BLOCK_ROWS = 200
@@ -198,7 +199,7 @@ def _cut(recording, nominal, run, i_s, omega, block_rows):
     """(first rows, dwell numbers, rows of a block); long steady blocks if there are enough of them."""
     machine, period = nominal.machine, nominal.sample_time_s
     margin = HALF_WIDTH + nominal.control.duty_applied_after_samples + 2
-    slow = SLOW_SHARE * nominal.inverter.dc_bus_v / machine.magnet_flux_wb
+    slow = SLOW_SHARE * nominal.inverter.dc_bus_v / flux_level(machine)
     top = max(float(np.nanmax(np.abs(omega), initial=0.0)), slow)
     scale = (machine.rated_current_a, top)
     tries = [(block_rows, 1.0), *((n, 1.0) for n in SHORTER if n < block_rows), (min(SHORTER), RESTLESS)]

@@ -19,6 +19,7 @@ from fluxproof.diagnosis.balance.slow_stretches import (
     known_voltage,
     operating_columns,
 )
+from fluxproof.diagnosis.nominal import flux_level
 from fluxproof.diagnosis.recording import RecordingError
 
 MEANS = 64  # number of means of a long operating point, fine enough for its drift
@@ -38,7 +39,7 @@ def point_rows(recording, nominal) -> Stretches:
     nominal_u = m.resistance_ohm * i + 1j * omega * psi
     u, both_axes = known_voltage(u, nominal_u)
     good = r.usable & np.isfinite(u) & np.isfinite(nominal_u)
-    at_rest = np.abs(omega) < STANDSTILL * nominal.inverter.dc_bus_v / m.magnet_flux_wb
+    at_rest = np.abs(omega) < STANDSTILL * nominal.inverter.dc_bus_v / flux_level(m)
     rest = np.where(at_rest, known_angle(recording), np.nan)
     lost = good & at_rest & ~np.isfinite(rest) & (np.abs(i) > NO_LOSS * m.rated_current_a)
     good &= ~lost

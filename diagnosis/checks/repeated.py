@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from fluxproof.diagnosis.checks.agreement import wrapped
+from fluxproof.diagnosis.quantities import counted
 from fluxproof.diagnosis.recording import Problem
 
 STAGE = "signals"
@@ -39,10 +40,10 @@ def check(recording, nominal) -> None:
     where = np.flatnonzero(clear & (turns > 0.7) & (np.abs(turns - np.round(turns)) < 0.3))
     if len(where) and len(where) <= RARE * np.count_nonzero(clear):
         recording.joined[where] = False
-        lost = int(np.sum(np.round(turns[where])))
+        lost = counted(int(np.sum(np.round(turns[where]))), "sample")
+        message = f"the angle jumps ahead in {counted(len(where), 'row')}, about {lost} missing"
         recording.problems.append(
-            Problem("dropped", f"the angle jumps ahead in {len(where)} rows, about {lost} samples missing", "theta_e",
-                    int(where[0]) + 1, len(where), "no balance is made across them")
+            Problem("dropped", message, "theta_e", int(where[0]) + 1, len(where), "no balance is made across them")
         )  # fmt: skip
 
 

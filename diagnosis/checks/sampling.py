@@ -11,6 +11,7 @@ import numpy as np
 
 from fluxproof.diagnosis.checks.agreement import angle_speed_ratio
 from fluxproof.diagnosis.ingest.points import held_one_after_another, mark_points
+from fluxproof.diagnosis.quantities import counted
 from fluxproof.diagnosis.recording import Problem
 
 STAGE = "time"
@@ -86,7 +87,7 @@ def _join(recording, step, usual) -> None:
     if "run" in recording.meta:
         new_run = np.diff(recording.meta["run"]) != 0
         recording.joined[:-1] &= ~new_run
-        recording.meta["notes"].append(f"{_count(int(new_run.sum()) + 1, 'run')}, treated separately")
+        recording.meta["notes"].append(f"{counted(int(new_run.sum()) + 1, 'run')}, treated separately")
     gaps = np.flatnonzero((step > 1.5 * usual) & ~new_run)
     together = np.flatnonzero((step < 0.5 * usual) & ~new_run)
     irregular = recording.slow and len(gaps) + len(together) > 0.2 * len(step)
@@ -95,20 +96,16 @@ def _join(recording, step, usual) -> None:
         return
     if len(gaps):
         lost = int(np.sum(np.round(step[gaps] / usual) - 1))
-        message = f"{_count(len(gaps), 'gap')}, about {_count(lost, 'sample')} missing"
+        message = f"{counted(len(gaps), 'gap')}, about {counted(lost, 'sample')} missing"
         recording.problems.append(
             Problem("gap", message, "t", int(gaps[0]) + 1, len(gaps),
                     "no balance is made across them")
         )  # fmt: skip
     if len(together):
         recording.problems.append(
-            Problem("duplicate", f"{_count(len(together), 'row')} almost simultaneous with the previous one", "t",
+            Problem("duplicate", f"{counted(len(together), 'row')} almost simultaneous with the previous one", "t",
                     int(together[0]) + 1, len(together), "no balance is made across them")
         )  # fmt: skip
-
-
-def _count(n, what) -> str:
-    return f"{n} {what}{'s' * (n != 1)}"
 
 
 def _unit(recording, usual, period) -> str:

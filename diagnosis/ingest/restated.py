@@ -35,6 +35,7 @@ class Restated:
     stated: float
     value: float
     says: str
+    speed: float = 1.0  # as of a Reading: the recording was read again, with the right speed
 
     def of(self, nominal):
         """The drive with the other value."""
