@@ -109,12 +109,14 @@ class DeadTime(Effect):
     def possible(self, c, covariance, nominal):
         """A leg loses voltage at every current: noise around zero current would also fit a gain there.
 
-        Within the ripple of the current the loss is no function of its sample, so that a curve may have any sign there.
+        Within the ripple of the current a pulse may end as if the current had either sign: there a gain up to the full
+        loss is possible.
         """
-        values = np.array(list(c.values()))
+        values, full = np.array(list(c.values())), _at_full(c)
         reach = self.reach(c, nominal) / nominal.machine.rated_current_a
-        for weights in (_at_full(c), *(_at(c, x) for x in KNOTS[1:] if x > reach)):
-            if weights @ values < -DOUBT * np.sqrt(max(weights @ covariance @ weights, 0.0)):
+        most = abs(full @ values)
+        for weights, least in ((full, 0.0), *((_at(c, x), -most if x <= reach else 0.0) for x in KNOTS[1:])):
+            if weights @ values < least - DOUBT * np.sqrt(max(weights @ covariance @ weights, 0.0)):
                 return False
         return True
 

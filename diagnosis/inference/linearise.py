@@ -36,23 +36,14 @@ class Rows:
         self.load = 0.0 if measured else rated_torque(view.nominal)
         self.train = train_blocks[self.projector.block]
         self.cells = cells_of(view, self.effects.values(), self.projector)
-        every = np.ones(len(self.cells.y), bool)
         plain = noise(view, self.cells, self.cells.y)
-        # The torque of a free shaft may be all noise at high orders: equal weights would fit that alone.
-        rough = Fitter(self.cells, _weighable(plain, self.cells), every).unscored(everything(self.cells))
+        # The ripple of a free shaft's acceleration is mostly noise, which a fit with equal weights would follow.
+        bends = (self.cells.channel == "torque") & (self.cells.order != 0) & view.turns_freely[self.cells.block]
+        rough = Fitter(self.cells, np.ones(len(bends)), ~bends).unscored(everything(self.cells))
         # Both bound the noise: the misfit also has what differs between neighbours, the rough fit what it fits wrongly.
         self.noise = np.minimum(noise(view, self.cells, rough.residual), plain)
         self.smooth = smooth(view)
         self.smooth_rows = self.projector.rows(misfit(self.smooth))
-
-
-def _weighable(sigma, cells):
-    """(r,) noise for the weights of a fit: none is far below what is usual in its channel."""
-    out = sigma.copy()
-    for channel in np.unique(cells.channel):
-        mine = cells.channel == channel
-        out[mine] = np.maximum(sigma[mine], np.median(sigma[mine & cells.ok]) if (mine & cells.ok).any() else 1.0)
-    return out
 
 
 def smooth(view):
