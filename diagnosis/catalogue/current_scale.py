@@ -28,7 +28,7 @@ class CurrentScale(Effect):
         return 0.004
 
     def ceiling(self, nominal):
-        return -LEAST / (1.0 + LEAST)
+        return 0.6
 
     def too_large(self, c, view):
         return c["share"] >= 1.0 or not LEAST < _scale(c) < MOST

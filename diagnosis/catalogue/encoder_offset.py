@@ -17,7 +17,10 @@ class EncoderOffset(Effect):
         return 0.004
 
     def ceiling(self, nominal):
-        return np.pi
+        return 0.8
+
+    def too_large(self, c, view):
+        return abs(c["offset"]) > np.pi
 
     def corrected(self, view, c):
         return view.turned(c["offset"] + c.get("creep", 0.0) * course(view))

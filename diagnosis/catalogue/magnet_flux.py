@@ -5,6 +5,8 @@ import numpy as np
 from fluxproof.diagnosis.balance.curves import course
 from fluxproof.diagnosis.effects.effect import DOUBT, FluxEffect, Parameter, one, sigma
 
+MOST = 2.0  # of the nameplate's flux, by which the true one may differ
+
 
 class MagnetFlux(FluxEffect):
     def core_psi(self, view):
@@ -24,7 +26,11 @@ class MagnetFlux(FluxEffect):
         return 0.003 * nominal.machine.magnet_flux_wb
 
     def ceiling(self, nominal):
-        return 2.0 * nominal.machine.magnet_flux_wb
+        return 0.6 * nominal.machine.magnet_flux_wb
+
+    def too_large(self, c, view):
+        most = MOST * view.machine.magnet_flux_wb
+        return self.size(c, view.nominal) > most or self._leaves_nothing(c, view.machine)
 
     def estimates(self, c, covariance, nominal):
         return one("magnet_flux_wb", "Wb", nominal.machine.magnet_flux_wb + c["delta_psi_m"], sigma(covariance))

@@ -14,7 +14,7 @@ class UdcGain(Effect):
         return 0.003
 
     def ceiling(self, nominal):
-        return MOST
+        return 0.5
 
     def too_large(self, c, view):
         return not LEAST < c["gain"] < MOST

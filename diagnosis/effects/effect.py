@@ -120,7 +120,7 @@ class Effect:
         raise NotImplementedError
 
     def ceiling(self, nominal) -> float:
-        """Largest size at which a drive still runs, in units of ``size``."""
+        """Largest usual size, in units of ``size``: it sets the prior, and what is larger is impossible (too_large)."""
         return float("inf")
 
     def too_large(self, c: dict[str, float], view) -> bool:
