@@ -33,8 +33,12 @@ def sorted_out(found):
 
 
 def at_floor(fit, found) -> bool:
-    """Whether the misfit before any explanation is noise, in volts and in units of each row's own noise."""
-    quiet = found.empty.chi2 <= AT_FLOOR**2 * found.empty.rows
+    """Whether the misfit before any explanation is noise, in volts and in units of each row's own noise.
+
+    What effects explain at points that were not fitted is not noise, however much is left.
+    """
+    explained = fit.holdout_before**2 - fit.holdout_after**2 > k.HALF * fit.holdout_before**2
+    quiet = found.empty.chi2 <= AT_FLOOR**2 * found.empty.rows and not explained
     return fit.train_before <= AT_FLOOR * fit.noise_floor and (quiet or not found.best.model.names)
 
 
