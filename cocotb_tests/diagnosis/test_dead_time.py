@@ -11,6 +11,7 @@ import dataclasses
 import numpy as np
 import pytest
 
+from cocotb_tests.core.test_registers import PAPER
 from cocotb_tests.support.slow import slowly
 from fluxproof.diagnosis import diagnose
 from fluxproof.diagnosis.balance.blocks import view_of
@@ -22,6 +23,8 @@ from fluxproof.diagnosis.nominal import load_nominal
 from fluxproof.diagnosis.recording import from_columns
 from studies.blind import cases
 from studies.blind.generate import listing
+
+NOMINAL = load_nominal(PAPER)
 
 
 def drive_of(seed, number, folder, trace=False):
@@ -87,8 +90,9 @@ def test_loss_is_uncertain_near_zero_current(strong):
 def test_no_leg_gains_voltage():
     """Noise around zero current would also fit a gain there."""
     c, sure = {"v_0.02": -1.6, "v_0.12": 3.0, "bump_0.005": -0.5}, 1e-4 * np.eye(3)
-    assert full_loss(c) > 0.0 and not EFFECT.possible(c, sure, None)
-    assert EFFECT.possible(c, 1e4 * sure, None) and EFFECT.possible({"v_0.02": 1.6, "v_0.12": 0.0}, sure[:2, :2], None)
+    assert full_loss(c) > 0.0 and not EFFECT.possible(c, sure, NOMINAL)
+    assert EFFECT.possible(c, 1e4 * sure, NOMINAL)
+    assert EFFECT.possible({"v_0.02": 1.6, "v_0.12": 0.0}, sure[:2, :2], NOMINAL)
 
 
 @pytest.mark.parametrize(

@@ -23,7 +23,7 @@ def view_of(turn, dq_voltage=False):
         omega=np.full((1, 3), turn / PERIOD),
         nominal_psi=np.full((1, 3), PSI),
         u_dc=np.zeros((1, ROWS)),
-        shaft=np.array(["free"]),
+        turns_freely=np.array([True]),
         machine=SimpleNamespace(inertia_kgm2=INERTIA, pole_pairs=PAIRS),
     )
 
