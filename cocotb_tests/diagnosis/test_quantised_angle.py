@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fluxproof.diagnosis.balance.quantised_angle import angle_step, beat_spectrum, beat_variance
-from fluxproof.diagnosis.balance.view import HALF_WIDTH
+from fluxproof.diagnosis.balance.view import HALF_WIDTH, SLOPE_REACH
 
 PERIOD, PSI, ROWS, INERTIA, PAIRS = 1e-4, 0.1, 200, 2e-3, 3
 ORDERS = np.array([0.0, 1.0, -1.0, 2.0, 6.0])
@@ -14,7 +14,7 @@ STEP = PAIRS * 2 * np.pi / 2048  # electrical
 MARGIN = HALF_WIDTH + 1
 
 
-def view_of(turn, dq_voltage=False):
+def view_of(turn, dq_voltage=False, free=True):
     """What is needed of a view of one block at ``turn`` rad per sample."""
     return SimpleNamespace(
         angle_step=STEP,
@@ -23,14 +23,14 @@ def view_of(turn, dq_voltage=False):
         omega=np.full((1, 3), turn / PERIOD),
         nominal_psi=np.full((1, 3), PSI),
         u_dc=np.zeros((1, ROWS)),
-        turns_freely=np.array([True]),
+        turns_freely=np.array([free]),
         machine=SimpleNamespace(inertia_kgm2=INERTIA, pole_pairs=PAIRS),
     )
 
 
-def error_of(turn, phase):
-    """Error of the codes from MARGIN samples before a block to MARGIN after it."""
-    true = phase + turn * np.arange(-MARGIN, ROWS + MARGIN + 1)
+def error_of(turn, phase, margin=MARGIN):
+    """Error of the codes from ``margin`` samples before a block to as many after it."""
+    true = phase + turn * np.arange(-margin, ROWS + margin + 1)
     return STEP * np.floor(true / STEP) - true + STEP / 2
 
 
@@ -62,6 +62,14 @@ def torque(turn, phase):
     bend = (e[3:] - e[2:-1] - e[1:-2] + e[:-3]) / (2 * PERIOD**2)
     taper = 1.0 - np.cos(2 * np.pi * (np.arange(ROWS) + 0.5) / ROWS)
     return waves(turn) @ (INERTIA / PAIRS * bend * taper) / ROWS
+
+
+def torque_imposed(turn, phase):
+    """(h,) the same of a shaft with an imposed speed, whose acceleration is taken over many samples."""
+    smooth = smoothed(error_of(turn, phase, MARGIN + SLOPE_REACH))
+    bend = (smooth[2 * SLOPE_REACH :] - 2 * smooth[SLOPE_REACH:-SLOPE_REACH] + smooth[: -2 * SLOPE_REACH])[:ROWS]
+    taper = 1.0 - np.cos(2 * np.pi * (np.arange(ROWS) + 0.5) / ROWS)
+    return waves(turn) @ (INERTIA / PAIRS * bend / (SLOPE_REACH * PERIOD) ** 2 * taper) / ROWS
 
 
 def variance(simulated):
@@ -98,6 +106,16 @@ def test_the_beat_in_the_torque(beat):
     simulated = variance([torque(turn, phase) for phase in phases])
     predicted = beat_variance(view_of(turn), "torque", ORDERS)[0]
     assert np.allclose(predicted[1:], simulated[1:], rtol=0.15, atol=0.02 * simulated.max())
+
+
+@pytest.mark.parametrize("beat", [0.01, 0.02])
+def test_the_beat_in_the_torque_of_an_imposed_speed(beat):
+    """It was told as a cogging of 1 % of the rated torque at order 188."""
+    turn = (1 + beat) * STEP
+    phases = STEP * np.random.default_rng(9).random(2000)
+    simulated = variance([torque_imposed(turn, phase) for phase in phases])
+    predicted = beat_variance(view_of(turn, free=False), "torque", ORDERS)[0]
+    assert np.allclose(predicted, simulated, rtol=0.15, atol=0.02 * simulated.max())
 
 
 def test_the_step_is_that_of_the_codes():

@@ -13,7 +13,7 @@ from fluxproof.diagnosis.balance.curves import parabola
 from fluxproof.diagnosis.balance.quantised_angle import angle_step
 from fluxproof.diagnosis.balance.settling import settled
 from fluxproof.diagnosis.balance.shaft import airgap, is_airgap, shaft_kind
-from fluxproof.diagnosis.balance.view import HALF_WIDTH, View, lacking
+from fluxproof.diagnosis.balance.view import HALF_WIDTH, SLOPE_REACH, View, lacking
 from fluxproof.diagnosis.nominal import flux_level
 from fluxproof.diagnosis.recording import Recording, RecordingError
 
@@ -22,7 +22,6 @@ SHORTER = (100, 50)  # for short dwells
 LEAST_BLOCKS = 12
 MOST_BLOCKS = 320  # more blocks increase the run time but hardly the accuracy
 RAMP_TORQUE = 0.02  # of rated torque: a larger change of inertial torque within a block means a ramp
-SLOPE_REACH = 60  # samples over which the shaft acceleration is computed with a transducer
 CURRENT_STEP = 0.08  # of rated current: a larger change within a block means a transient
 RIPPLE = 0.05  # of rated current, rms around the block's parabola
 SPEED_STEP = 0.06  # of the largest speed

@@ -7,6 +7,7 @@ some speeds so low that the moving average g(f) of the angle lets it pass.  Its 
     u: psi (omega + d/dt) delta                   the voltage is known in the stator frame, as duties are
     u: psi (omega + g d/dt) delta / g             the drive turned a voltage in dq with its own codes
     torque: J/p d^2/dt^2 delta / g                of a shaft whose acceleration follows from the codes themselves
+    torque: J/p d^2/dt^2 delta                    of one with an imposed speed, over many samples
 
 Its phase differs from block to block, so that it is noise, but only at these speeds.
 """
@@ -15,7 +16,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fluxproof.diagnosis.balance.view import HALF_WIDTH
+from fluxproof.diagnosis.balance.view import HALF_WIDTH, SLOPE_REACH
 
 MOST = 50  # harmonics of the sawtooth; those above have less than 1 % of its power
 REGULAR, OF_A_STEP = 0.95, 0.1  # share of the second differences that are whole steps, within this part of one
@@ -91,10 +92,11 @@ def _voltage(view, part, turn, cycles):
 
 
 def _torque(view, part, _turn, cycles):
-    """Torque [Nm] per rad of the codes' error: the four-point second difference of blocks.py."""
-    x = np.pi * cycles
-    inertia = np.where(view.turns_freely[part], view.machine.inertia_kgm2 or 0.0, 0.0)[:, None]
-    return inertia / view.machine.pole_pairs * (np.cos(3 * x) - np.cos(x)) / view.sample_time_s**2
+    """Torque [Nm] per rad of the codes' error: the second differences of blocks.py, four-point or slow."""
+    x, inertia = np.pi * cycles, (view.machine.inertia_kgm2 or 0.0) / view.machine.pole_pairs
+    slow = _mean(cycles, 2 * HALF_WIDTH + 1) * 2.0 * (np.cos(2 * SLOPE_REACH * x) - 1.0) / SLOPE_REACH**2
+    bend = np.where(view.turns_freely[part][:, None], np.cos(3 * x) - np.cos(x), slow)
+    return inertia * bend / view.sample_time_s**2
 
 
 def _window(cycles, count, tapered):

@@ -20,6 +20,7 @@ from fluxproof.diagnosis.inference import constants as k
 # What is computed from the angle alone stays known in a copy with the same angle.
 OF_THE_ANGLE = ("half_turn", "mid_turn", "turn", "theta_mid", "interval_angle")
 HALF_WIDTH = 8  # the smoothed angle is the moving average over 2 HALF_WIDTH + 1 samples
+SLOPE_REACH = 60  # samples over which the acceleration of a shaft with an imposed speed is computed
 STACKED = ("theta", "omega", "i", "i_raw", "u", "u_dc", "temp", "torque", "slope_m", "shaft", "rows")
 
 
