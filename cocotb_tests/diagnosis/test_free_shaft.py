@@ -1,9 +1,12 @@
 """A free shaft: its acceleration is a second difference of the angle, whose noise is small at low speed only."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from cocotb_tests.diagnosis.test_strange_cases import files_of
+from fluxproof.diagnosis.answer import conclude
 from fluxproof.diagnosis.balance.cells import _steep_variance
 from fluxproof.diagnosis.balance.shaft import bend_gain
 from fluxproof.diagnosis.ingest.load import load_recording
@@ -48,3 +51,30 @@ def test_the_variance_of_a_part_is_found_at_any_size(constant, growing):
     found = _steep_variance(rng.normal(size=n) * np.sqrt(true), np.ones(n, bool), np.arange(n - 1), shape)
     seen = true > 1e-6
     assert np.all(np.abs(np.log(found[seen] / true[seen])) < np.log(3.0))
+
+
+def test_a_mean_torque_counts_beside_the_noise_of_its_ripple(monkeypatch):
+    """A friction was dropped as one part in a thousand of the voltage's noise fitted better without it."""
+    means, ripple, volts = np.arange(10), np.arange(10, 110), np.arange(110, 210)
+    left, fewer, noise = (np.zeros(210) for _ in range(3))
+    left[means], fewer[means], noise[means] = 0.2, 4.0, 0.6
+    left[ripple], fewer[ripple], noise[ripple] = 30.0, 30.0, 50.0
+    left[volts], fewer[volts], noise[volts] = 0.0900, 0.0899, 0.1
+    cells = SimpleNamespace(
+        channel=np.where(np.arange(210) < 110, "torque", "u"),
+        order=np.where((np.arange(210) >= 10) & (np.arange(210) < 110), 34.0, 0.0),
+        ok=np.ones(210, bool),
+        block=np.zeros(210, int),
+    )
+    setup = SimpleNamespace(cells=cells, noise=noise, level=np.zeros(210), load=0.0)
+    without = SimpleNamespace(names=(), left=lambda told: fewer)
+    best = SimpleNamespace(
+        names=("a",),
+        left=lambda told: left if told else fewer,
+        problem=SimpleNamespace(setup=setup, fit=lambda names: without),
+    )
+    monkeypatch.setattr(conclude, "_uncertain", lambda fit, told, rows: np.zeros(len(rows)))
+    posterior = SimpleNamespace(best=lambda: best, setup=setup)
+    assert conclude.helps(posterior, "a", {"a"}, np.ones(1, bool))
+    left[means] = 4.1  # it explains nothing there
+    assert not conclude.helps(posterior, "a", {"a"}, np.ones(1, bool))
