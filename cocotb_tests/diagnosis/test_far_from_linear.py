@@ -26,7 +26,7 @@ def test_an_angle_off_by_any_part_of_a_turn_is_found(degrees, tmp_path):
         (PHASES, 0.3, "current_scale", "scale"),  # R, L_d and L_q, each by the same factor
         slowly(PHASES, 1.6, "current_scale", "scale"),  # line-to-line values, and a scale beside them
         slowly(PHASES, 3.0, "current_scale", "scale"),
-        (("u_dc",), 1.7, "udc_gain", "udc_gain"),  # two readings, and a gain beside them
+        slowly(("u_dc",), 1.7, "udc_gain", "udc_gain"),  # two readings, and a gain beside them
         slowly(("u_dc",), 0.4, "udc_gain", "udc_gain"),
         slowly(("u_dc",), 3.0, "udc_gain", "udc_gain"),
     ],

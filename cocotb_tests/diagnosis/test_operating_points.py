@@ -8,6 +8,7 @@ import pytest
 from cocotb_tests.support.bench_logs import GRID, L_D, L_Q, PSI, RATED, R, Truth, sampled, table, warming
 from cocotb_tests.support.mistakes import all_of, frame, moved, scaled
 from cocotb_tests.support.recordings_made import DRIVE, codes, made, nominal_of, write
+from cocotb_tests.support.slow import halved, slowly
 from fluxproof.diagnosis import diagnose
 from fluxproof.diagnosis.balance.slow_view import slow_view
 from fluxproof.diagnosis.ingest.load import load_recording
@@ -139,7 +140,7 @@ OFF = {  # by a size that is no convention: the effect, its parameter and value
 }
 
 
-@pytest.mark.parametrize("name", OFF)
+@pytest.mark.parametrize("name", halved(OFF, every=3))
 def test_an_error_is_named_up_to_the_ceiling_of_its_effect(tmp_path, name):
     change, effect, key, value = OFF[name]
     answer = answer_of(tmp_path, change(table()))
@@ -322,7 +323,7 @@ def test_a_constant_misfit_that_nothing_explains_is_the_remainder(tmp_path):
     assert [p.code for p in answer.problems] == ["slow_sampling"]  # at one point a change of signs fits by chance
 
 
-@pytest.mark.parametrize("hertz, hold_s", [(500.0, 1.0), (200.0, 0.6), (1000.0, 0.3)])
+@pytest.mark.parametrize("hertz, hold_s", [slowly(500.0, 1.0), (200.0, 0.6), slowly(1000.0, 0.3)])
 def test_logs_of_a_few_hundred_hertz_are_operating_points(tmp_path, hertz, hold_s):
     answer = answer_of(tmp_path, sampled(hertz, WEAK, hold_s=hold_s))
     assert "slow_sampling" in [p.code for p in answer.problems]

@@ -8,6 +8,6 @@ def slowly(*case):
     return pytest.param(*case, marks=pytest.mark.slow)
 
 
-def halved(cases) -> list:
-    """The cases, every second one only for `make slow`."""
-    return [slowly(case) if k % 2 else case for k, case in enumerate(cases)]
+def halved(cases, every=2) -> list:
+    """The cases, all but every second one (or one of ``every``) only for `make slow`."""
+    return [slowly(case) if k % every else case for k, case in enumerate(cases)]

@@ -9,7 +9,7 @@ import numpy as np
 
 from fluxproof.diagnosis.balance.cells import voltage_level
 from fluxproof.diagnosis.inference.problem import Problem, Setup, covariance_of
-from fluxproof.diagnosis.inference.settle import around, settled, settled_from
+from fluxproof.diagnosis.inference.settle import around, fit_at, settled
 
 ROUNDS = 3
 SETTLED = 12  # most linearisations of the final set
@@ -112,10 +112,11 @@ class Posterior:
         means = (cells.channel == "u") & (cells.order == 0.0)
         if np.sum(cells.y[means] ** 2) < FAR**2 * np.sum(voltage_level(self.setup.view) ** 2):
             return False
-        for c in self.setup.effects[name].starts:
-            fit = settled_from(self.setup, {name: c}, SETTLED)
-            if fit is not None and possible(fit) and fit.value > self.fits[(name,)].value:
-                self.fits[(name,)] = fit
+        tried = [fit_at(self.setup, {name: c}) for c in self.setup.effects[name].starts]
+        nearest = max((f for f in tried if f is not None), key=lambda f: f.value, default=None)
+        fit = nearest and settled(self.setup, nearest, SETTLED)
+        if fit and possible(fit) and fit.value > plain.value:
+            self.fits[(name,)] = fit
         return self.fits[(name,)] is not plain
 
     def _grow(self, problem, able):

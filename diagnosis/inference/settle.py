@@ -67,10 +67,10 @@ def settled(setup, fit, steps) -> Fit | None:
     return fit
 
 
-def settled_from(setup, c, steps) -> Fit | None:
-    """A set of effects on its own linearisation, approached from its coefficients c, or None."""
+def fit_at(setup, c) -> Fit | None:
+    """A set of effects on the linearisation at its coefficients c, or None."""
     problem = _at(setup, c, tuple(c))
-    return None if problem is None else settled(setup, problem.fit(tuple(c)), steps)
+    return None if problem is None else problem.fit(tuple(c))
 
 
 def fit_of_set(setup, names, steps=3) -> Fit:
