@@ -12,8 +12,6 @@ DROP = 0.05  # of rated current: where device drops have reached their full valu
 STILL_GROWS = (0.12, 0.3)  # of rated current: growth beyond this range counts as resistance
 RIPPLE = 1 / 32  # of u_dc T / L: a quarter of the largest current ripple
 TAILS = {"log": -np.log(KNOTS[-1]), "fade": 1.0 - KNOTS[-1]}  # of device_tails at rated current
-DEVICE_LOG = 0.1  # V per factor e of the current: the drop of a junction in a device
-USUAL = 0.01  # of the bus voltage: a usual loss by dead time, which the drop of devices is compared with
 CLAMPED = 0.1  # uncertainty, as a share of the loss, while ripple decides which diode conducts
 
 
@@ -98,13 +96,6 @@ class DeadTime(Effect):
             # Device drops do not depend on the bus voltage.
             out |= _leg_losses(view, {"drop": lambda x: np.clip(x / DROP, -1.0, 1.0)})
         return out
-
-    def curve_scale(self, key, cores, nominal):
-        whole = super().curve_scale(key, cores, nominal)
-        if key != "log":
-            return whole
-        usual = USUAL * nominal.inverter.dc_bus_v
-        return whole * min(DEVICE_LOG / usual / self.curve, 1.0)
 
     def possible(self, c, covariance, nominal):
         """A leg loses voltage at every current: noise around zero current would also fit a gain there.
