@@ -22,7 +22,6 @@ from fluxproof.diagnosis.inference.problem import covariance_of
 from fluxproof.diagnosis.result import Diagnosis, UnknownTerm
 
 MOST_RIVALS = 5
-SHOWS = 0.1  # of what an effect explains: with less in the rows that count, it shows in others
 LOADED = 9.0  # of the noise floor's power: what is left of a torque beyond may be a load
 
 
@@ -83,16 +82,15 @@ def helps(posterior, name, told, held) -> bool:
     """Whether ``told`` leaves no less of the held-out blocks, in units of the noise floor, without ``name``.
 
     Rows beyond the fitted operating points, of which the coefficients' own uncertainty exceeds the floor, do not count,
-    unless the effect shows in these alone.  The torque counts without a transducer too: friction and cogging of a free
-    shaft show nowhere else.  Where a load may act that nobody recorded, what is left counts up to a limit.
+    but for a mean torque in which a load may act, as that uncertainty is the load's.  The torque counts without a
+    transducer too: friction and cogging of a free shaft show nowhere else.  Where a load may act that nobody recorded,
+    what is left counts up to a limit.
     """
     best, setup = posterior.best(), posterior.setup
     cells, floor2 = setup.cells, setup.noise**2 + setup.level**2
     loads = (cells.channel == "torque") & (cells.order == 0) & (setup.load > 0.0)
     rows = np.flatnonzero(cells.ok & held[cells.block])
-    certain = _uncertain(best, told, rows) <= floor2[rows]
-    own = (best.left(told - {name}) - best.left(told))[rows] ** 2 / floor2[rows]
-    rows = rows[certain] if own[certain].sum() >= SHOWS * own.sum() else rows
+    rows = rows[loads[rows] | (_uncertain(best, told, rows) <= floor2[rows])]
     fewer = best.problem.fit([n for n in best.names if n != name])
     left2 = [fit.left(told & set(fit.names))[rows] ** 2 for fit in (best, fewer)]
     left2 = [np.where(loads[rows], np.minimum(x, LOADED * floor2[rows]), x) for x in left2]
