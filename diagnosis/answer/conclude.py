@@ -22,7 +22,6 @@ from fluxproof.diagnosis.inference.problem import covariance_of
 from fluxproof.diagnosis.result import Diagnosis, UnknownTerm
 
 MOST_RIVALS = 5
-LOADED = 9.0  # of the noise floor's power: what is left of a torque beyond may be a load
 
 
 @dataclass(frozen=True)
@@ -93,7 +92,7 @@ def helps(posterior, name, told, held) -> bool:
     rows = rows[loads[rows] | (_uncertain(best, told, rows) <= floor2[rows])]
     fewer = best.problem.fit([n for n in best.names if n != name])
     left2 = [fit.left(told & set(fit.names))[rows] ** 2 for fit in (best, fewer)]
-    left2 = [np.where(loads[rows], np.minimum(x, LOADED * floor2[rows]), x) for x in left2]
+    left2 = [np.where(loads[rows], np.minimum(x, k.DISCREPANCY**2 * floor2[rows]), x) for x in left2]
     left = np.zeros(2)
     # The ripple of a free shaft's acceleration is mostly noise, beside which its mean would not count.
     channels = np.where((cells.channel == "torque") & (cells.order == 0), "mean torque", cells.channel)[rows]

@@ -17,8 +17,8 @@ from fluxproof.diagnosis.balance.quantised_angle import beat_ripple, beat_spectr
 from fluxproof.diagnosis.effects.effect import rated_torque
 from fluxproof.diagnosis.inference import constants as k
 
-MOST_ORDER = 80  # per mechanical turn, and
-MOST_ELECTRICAL = 12  # per electrical turn: the larger of the two
+MOST_ORDER = 80  # per mechanical turn; of a machine with many pole pairs those up to
+MOST_ELECTRICAL = 12  # per electrical turn
 LEAST_BLOCKS = 6  # in which an order is looked for
 WEIGHTS = {
     "1": (lambda v: np.ones(len(v)), "V"),
@@ -96,6 +96,7 @@ def stray_order(view, residual, floor, known=()) -> Stray | None:
     for n in range(1, most + 1):
         wave = wave * turn
         found[n], found[-n] = (tapered * wave).mean(axis=1), (tapered * np.conj(wave)).mean(axis=1)
+
     def locked(n, use, largest):
         """The Stray of an order in the blocks ``use`` if it is larger than ``largest`` [V]."""
         out, f = None, found[n][use]

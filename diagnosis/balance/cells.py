@@ -245,7 +245,10 @@ STEPS = 30  # of the iteration; it changes by less than 1 % before
 
 
 def _steep_variance(e, ok, pair, shape):
-    """The same where b may be all: the most likely a and b of squares that have an exponential distribution."""
+    """Variance a + b shape of the blocks where b may be nearly all of it, as of a second difference at low speed.
+
+    The differences' squares have about an exponential distribution, of which a and b are the most likely ones.
+    """
     both = pair[ok[pair] & ok[pair + 1]]
     if len(both) < 8:
         return _variance(e, ok, pair, shape)
