@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from fluxproof.diagnosis.answer.conclude import conclude
 from fluxproof.diagnosis.answer.headline import sentence
 from fluxproof.diagnosis.balance.blocks import views_of
-from fluxproof.diagnosis.balance.holdout import held_out
+from fluxproof.diagnosis.balance.cells import voltage_rms
+from fluxproof.diagnosis.balance.holdout import held_out, holdout_blocks
 from fluxproof.diagnosis.balance.joined import joined_views
 from fluxproof.diagnosis.balance.parts import sound
+from fluxproof.diagnosis.balance.slow_view import SlowView, slow_view
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.conventions.judge import preferred
 from fluxproof.diagnosis.conventions.tell import under
@@ -16,16 +20,16 @@ from fluxproof.diagnosis.inference.posterior import Posterior
 from fluxproof.diagnosis.inference.problem import Setup
 from fluxproof.diagnosis.ingest.restated import as_read
 from fluxproof.diagnosis.nominal import Nominal
+from fluxproof.diagnosis.one_point import diagnose_one_point
 from fluxproof.diagnosis.recording import Recording
 from fluxproof.diagnosis.result import Diagnosis
-from fluxproof.diagnosis.slow_diagnosis import diagnose_slow
 from fluxproof.diagnosis.suspects import SUSPECTS
 
 
 def explain(loaded: list[Recording], nominal: Nominal, progress=lambda text: None, shifts=None) -> Diagnosis:
     """Explain one recording, or several of the same drive, against a nominal drive.
 
-    shifts: {effect: change of its log prior odds}, which slow logs, whose search has no prior, do not use.
+    shifts: {effect: change of its log prior odds}.
     Raises RecordingError if the recordings contain no operating point for which a voltage balance can be made.
     """
     nominal = as_read(loaded, nominal)
@@ -36,10 +40,7 @@ def explain(loaded: list[Recording], nominal: Nominal, progress=lambda text: Non
         worst = next(p for p in problems if p.fatal)
         why = f"The recording cannot be used: {worst.located()}"
         return Diagnosis("bad_recording", why, rows=rows, problems=problems)
-    if any(r.slow for r in loaded):  # sampled too slowly for a voltage balance between rows
-        answer = diagnose_slow(loaded, nominal, progress)
-    else:
-        answer = _physics(loaded, nominal, progress, shifts)
+    answer = _physics(loaded, nominal, progress, shifts)
     answer.rows, answer.problems = rows, problems
     if answer.verdict == "no_mismatch":  # it agrees as the checks read it, which the headline must say
         answer.sentence = sentence(answer, known_effects())
@@ -51,27 +52,39 @@ def known_effects() -> dict:
     return {**CATALOGUE, **SUSPECTS}
 
 
-def rows_of(recordings, nominal):
-    """(Rows, (b,) held-out blocks) of fast recordings of one drive."""
+def view_of(recordings, nominal):
+    """(View, (b,) held-out blocks) of recordings of one drive: blocks of rows, or operating points.
+
+    Operating points if any of them is sampled too slowly for a voltage balance between rows.
+    """
+    if any(r.slow for r in recordings):
+        view = joined_views([slow_view(r, nominal) for r in recordings])
+        return view, holdout_blocks(view)
     views = views_of(recordings, nominal)
-    view = joined_views(views)
-    held = held_out(views)
-    return Rows(view, view.visible(known_effects()), ~held), held
+    return joined_views(views), held_out(views)
 
 
-def posterior_of(recordings, nominal, progress=lambda text: None, shifts=None):
-    """(posterior, (b,) held-out blocks) of fast recordings of one drive; shifts: see ``explain``."""
-    rows, held = rows_of(recordings, nominal)
+def rows_of(view, held) -> Rows:
+    """The rows of a view, of which the blocks ``held`` (b,) bool are not fitted."""
+    return Rows(view, view.visible(known_effects()), ~held)
+
+
+def _posterior(view, held, progress, shifts) -> Posterior:
     progress("sets of effects")
-    setup = Setup.of(rows)
+    setup = Setup.of(rows_of(view, held))
     setup.shifts = dict(shifts or {})
-    return Posterior(setup, progress), held
+    return Posterior(setup, progress)
 
 
 def _physics(recordings, nominal, progress, shifts) -> Diagnosis:
-    posterior, held = posterior_of(recordings, nominal, progress, shifts)
+    view, held = view_of(recordings, nominal)
+    if isinstance(view, SlowView) and np.ptp(view.run) == 0:
+        return diagnose_one_point(view)
+    posterior = _posterior(view, held, progress, shifts)
     answer = conclude(posterior, held, progress)
     if answer.verdict == "no_mismatch":
         return answer
     readings, rivals, read = preferred(recordings, posterior, answer.verdict != "unexplained", progress)
-    return under(readings, rivals, answer, conclude(read, held, progress)) if readings else answer
+    if not readings:
+        return answer
+    return under(readings, rivals, answer, conclude(read, held, progress), voltage_rms(view))

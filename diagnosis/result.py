@@ -232,14 +232,13 @@ class Diagnosis:
     notes: list[str] = field(default_factory=list)  # for people: assumptions and omissions
     evidence: Evidence = field(default_factory=Evidence)
     readings: tuple = ()  # what ``conventions`` tells, as conventions/ applies it
-    search: object = field(default=None, repr=False)  # Posterior, or SlowSearch of slow logs
-    found: object = field(default=None, repr=False)  # slow_search.Outcome of a slow log
+    search: object = field(default=None, repr=False)  # Posterior; None of one operating point
     held: np.ndarray | None = field(default=None, repr=False, compare=False)  # (b,) bool, blocks not fitted
     trace: str = ""  # the figures that decided the verdict
 
     def to_json(self) -> dict:
         """The mapping written to diagnosis.json (schema 2)."""
-        inner = {"evidence": Evidence(), "readings": (), "search": None, "found": None, "held": None}
+        inner = {"evidence": Evidence(), "readings": (), "search": None, "held": None}
         plain = dataclasses.asdict(dataclasses.replace(self, **inner))
         problems = plain.pop("problems")
         for key in (*inner, "rows", "trace"):

@@ -148,7 +148,7 @@ def _prior_note(answer) -> str:
     did = (
         "it changed the prior odds of the effects, to even ones at most, so that no name rests on the fleet alone"
         if used
-        else "it was not used, as only logs of the control are judged with a prior"
+        else "it was not used, as one operating point is judged without a prior"
     )
     return f"The population of {fleet.drives} drives in {fleet.path} was the prior: {did}."
 

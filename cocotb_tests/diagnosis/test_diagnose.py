@@ -149,7 +149,6 @@ def test_catalogue_entries_are_complete(name):
     assert effect.name == name and effect.title and effect.signature and effect.separated_by
     assert "=" in effect.equation
     assert effect.confounders and set(effect.confounders) <= set(CATALOGUE) - {name}
-    assert set(effect.absorbs) <= set(CATALOGUE) - {name}
     assert effect.parameters and all(
         p.name.isidentifier() and p.unit and p.meaning for p in effect.parameters
     )

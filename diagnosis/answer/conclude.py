@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fluxproof.diagnosis.answer.balance_notes import balance_notes
 from fluxproof.diagnosis.answer.estimates import named_effects
 from fluxproof.diagnosis.answer.headline import sentence
 from fluxproof.diagnosis.answer.locate import at_order, evidence, locate
@@ -86,7 +87,7 @@ def helps(posterior, name, told, held) -> bool:
     what is left counts up to a limit.
     """
     best, setup = posterior.best(), posterior.setup
-    cells, floor2 = setup.cells, setup.noise**2 + setup.level**2
+    cells, floor2 = setup.cells, setup.usual**2
     loads = (cells.channel == "torque") & (cells.order == 0) & (setup.load > 0.0)
     rows = np.flatnonzero(cells.ok & held[cells.block])
     rows = rows[loads[rows] | (_uncertain(best, told, rows) <= floor2[rows])]
@@ -155,10 +156,8 @@ def conclude(posterior, held, progress=lambda text: None) -> Diagnosis:
             answer.fit = fit_of(train, unseen)
     answer.evidence = evidence(view, (cells, before), (cells, after), setup.noise, held)
     answer.sentence = sentence(answer, setup.effects)
-    rows = view.u_dc.shape[1]
-    answer.notes.append(
-        f"The voltage balance was made on {len(view)} steady blocks of {rows} rows; {int(held.sum())} were not fitted."
-    )
+    answer.notes += balance_notes(view, held, setup.effects, answer.ambiguity)
+    answer.held = held
     for name in names.suspects:
         if answer.unknown_term is None or answer.unknown_term.meaning != setup.effects[name].clause:
             answer.notes.append(f"Besides, it is {as_if(_described(best, name, held, unseen))}.")
@@ -217,7 +216,7 @@ def stray_of(posterior, held) -> Stray | None:
     view, rows = problem.view.take(certain), row_residual(best)[certain]
     found = stray_order(view, rows, floor, known) or stray_swing(view, rows, floor)
     if found is None and setup.load == 0.0:
-        found = stray_torque(setup.view, setup.projector, setup.cells, best.left(), np.hypot(setup.noise, setup.level))
+        found = stray_torque(setup.view, setup.projector, setup.cells, best.left(), setup.usual)
     return found
 
 
@@ -228,8 +227,7 @@ def _unknown(best, after, stray, names, held, unseen) -> UnknownTerm | None:
         return _described(best, suspect, held, unseen)
     if stray is None:
         setup = best.problem.setup
-        sigma = np.hypot(setup.noise, setup.level)
-        return sparse_term(best.problem.view, setup.cells, after, sigma, setup.train)
+        return sparse_term(best.problem.view, setup.cells, after, setup.usual, setup.train)
     signal = "torque" if stray.kind == "torque" else "u_dq"
     return UnknownTerm(signal, stray.formula, stray.value, stray.sigma, stray.unit, min(stray.explains, 1.0))
 

@@ -45,22 +45,16 @@ def flux_map_of(answer) -> FluxMap | None:
 
 def _model(answer):
     """(effects, their coefficients {effect: {coefficient: value}}, view, effects of the map) of an answer."""
-    search, named = answer.search, [e.name for e in answer.effects]
-    if hasattr(search, "best"):  # of fast recordings
-        effects, c = search.setup.effects, search.best().c
-        mine = [n for n in named if n in c and isinstance(effects[n], FluxEffect)]
-        return effects, c, search.setup.view, mine if any(effects[n].bends for n in mine) else []
-    found = getattr(answer, "found", None)
-    if found is None or not (named or answer.ambiguity):
+    if answer.search is None:
         return {}, {}, None, []
-    best, effects = found.best, search.effects
-    magnetic = {n for n, effect in effects.items() if isinstance(effect, FluxEffect)}
-    told = {n for n in (*named, *(n for group in answer.ambiguity for n in group)) if n in magnetic}
+    best, setup = answer.search.best(), answer.search.setup
+    magnetic = {n for n, effect in setup.effects.items() if isinstance(effect, FluxEffect)}
+    told = {n for group in ([e.name for e in answer.effects], *answer.ambiguity) for n in group}
+    mine = sorted(told & magnetic & set(best.names))
     # Effects that replace each other leave one flux, if none of the group is something else.
     split = any(magnetic & set(group) and not magnetic >= set(group) for group in answer.ambiguity)
-    bent = any(effects[n].bends or n in best.model.free for n in told & best.model.names)
-    mine = [] if split or not bent else sorted(told & best.model.names)
-    return effects, best.c, best.view, mine
+    bent = not split and any(setup.effects[n].bends for n in mine)
+    return setup.effects, best.c, setup.view, mine if bent else []
 
 
 def _covers_area(seen, rated) -> bool:

@@ -14,11 +14,15 @@ UNITS = {"u": ("u_dq", "V"), "sum": ("current_sum", "A"), "torque": ("torque", "
 
 @dataclass
 class Size:
-    """rms over blocks of one channel and order, or of all orders: misfit before and after, and the noise floor."""
+    """rms over blocks of one channel and order, or of all orders: misfit before and after, and the noise floor.
+
+    usual: the misfit that any recording of this kind may have; above the floor where the log's own error is not known.
+    """
 
     before: float
     after: float
     floor: float
+    usual: float = 0.0
 
     @property
     def excess(self) -> float:
@@ -29,8 +33,8 @@ class Size:
         return max(self.after**2 - self.floor**2, 0.0)
 
     def above(self, power) -> float:
-        """The rms whose power exceeds that of the floor by ``power`` times the floor's."""
-        return self.floor * (1.0 + power) ** 0.5
+        """The rms whose power exceeds that of a usual misfit by ``power`` times."""
+        return max(self.floor, self.usual) * (1.0 + power) ** 0.5
 
 
 class Sizes:
@@ -45,20 +49,20 @@ class Sizes:
         ok &= ~loads & ~(bends & measured_torque)
         self.channels, self.orders = {}, {}
         count = max(int(blocks.sum()), 1)
-        floor2 = setup.noise**2 + setup.level**2
+        noise2 = setup.floor**2, setup.usual**2
         for channel in np.unique(cells.channel):
             mine = ok & (cells.channel == channel)
             if mine.any() and (channel != "torque" or measured_torque):
-                self.channels[str(channel)] = self._size(mine, before, after, floor2, count)
+                self.channels[str(channel)] = self._size(mine, before, after, noise2, count)
             for order in np.unique(np.abs(cells.order[mine])):
                 self.orders[str(channel), float(order)] = self._size(
-                    mine & (np.abs(cells.order) == order), before, after, floor2, count
+                    mine & (np.abs(cells.order) == order), before, after, noise2, count
                 )
 
     @staticmethod
-    def _size(rows, before, after, floor2, count):
+    def _size(rows, before, after, noise2, count):
         rms = lambda x2: float(np.sqrt(x2[rows].sum() / count))  # noqa: E731
-        return Size(rms(before**2), rms(after**2), rms(floor2))
+        return Size(rms(before**2), rms(after**2), *map(rms, noise2))
 
     def primary(self) -> str:
         """The channel whose misfit is largest over its floor."""

@@ -25,9 +25,12 @@ def kind_of(names, train, held, channel, share, stray) -> str:
 
 
 def at_floor(sizes) -> bool:
-    """Whether the misfit before any explanation is noise in every channel and order: nothing is named then."""
+    """Whether the misfit before any explanation is noise in every channel and order: nothing is named then.
+
+    Here the floor counts: what effects explain above it is there, also where other recordings have as much.
+    """
     orders = [s for (channel, _), s in sizes.orders.items() if channel in sizes.channels]
-    return all(s.before <= s.above(k.FLOOR) for s in (*sizes.channels.values(), *orders))
+    return all(s.before <= s.floor * (1.0 + k.FLOOR) ** 0.5 for s in (*sizes.channels.values(), *orders))
 
 
 def standing_out(sizes) -> list:

@@ -141,17 +141,17 @@ class Projector:
         return np.nan_to_num(np.concatenate(out, axis=1))
 
 
-def cells_of(view, effects, projector=None, free=None) -> Cells:
+def cells_of(view, effects, projector=None) -> Cells:
     """Cells of a view with the columns of the effects; free columns have a leading '~'.
 
-    projector: that of a view of the same blocks, or None.  free: names of effects with free columns; None: all.
+    projector: that of a view of the same blocks, or None.
     """
     p = projector or Projector(view)
-    columns, electrical = columns_of(view, effects, p, free)
+    columns, electrical = columns_of(view, effects, p)
     return Cells(p.rows(misfit(view)), columns, p.block, p.order, p.part, p.channel, p.ok, electrical)
 
 
-def columns_of(view, effects, projector, free=None) -> tuple[dict[str, dict[str, np.ndarray]], frozenset[str]]:
+def columns_of(view, effects, projector) -> tuple[dict[str, dict[str, np.ndarray]], frozenset[str]]:
     """Columns {effect: {coefficient: (r,)}} as in ``cells_of``, and the effects whose formula acts on the voltage."""
     raw, shown, electrical = {}, {}, set()
     for effect in effects:
@@ -160,26 +160,31 @@ def columns_of(view, effects, projector, free=None) -> tuple[dict[str, dict[str,
         if any("u" in column for column in core.values()):
             electrical.add(effect.name)
         raw |= {(effect.name, key): column for key, column in core.items()}
-        if free is None or effect.name in free:
-            raw |= {(effect.name, f"~{key}"): column for key, column in effect.free(view).items()}
+        raw |= {(effect.name, f"~{key}"): column for key, column in effect.free(view).items()}
     columns = {name: {} for name in shown}
     for (name, key), column in zip(raw, projector.all_rows(list(raw.values())), strict=True):
         columns[name][key] = column * shown[name]
     return columns, frozenset(electrical)
 
 
-def column_of(columns, key) -> str:
-    """Name of a coefficient's column, core or free; "" in a view in which its axis has too little current.
-
-    The data of a solution are corrected for measurement errors, so that a column may exist there but not in the raw
-    data.
-    """
-    return next((k for k in (key, f"~{key}") if k in columns), "")
-
-
 def voltage_level(view):
     """Magnitude of the mean voltage vector of each block, (b,) [V]."""
     return np.abs(view.to_dq(view.u[:, 1:-1]).mean(axis=1))
+
+
+def voltage_rms(view) -> float:
+    """rms of ``voltage_level`` over all blocks [V]."""
+    return float(np.sqrt(np.mean(voltage_level(view) ** 2)))
+
+
+LEAST_PAIRS = 8  # neighbours in a dwell; the differences of fewer do not tell the noise
+
+
+def repeats(view, ok, block) -> bool:
+    """Whether operating points repeat often enough to see their noise; ok, block: (r,) of the rows."""
+    known = np.zeros(len(view), bool)
+    known[block[ok]] = True
+    return int(np.sum((np.diff(view.run) == 0) & known[1:] & known[:-1])) >= LEAST_PAIRS
 
 
 def noise(view, cells, residual) -> np.ndarray:
@@ -219,7 +224,7 @@ OUTLIER = 12.0  # times the median of the squares at a speed: a larger one is no
 def _variance(e, ok, pair, shape):
     """Variance a + b omega^2 of the blocks from differences of neighbours, or from all values if there are few."""
     both = pair[ok[pair] & ok[pair + 1]]
-    if len(both) >= 8:
+    if len(both) >= LEAST_PAIRS:
         squares, where = 0.5 * (e[both + 1] - e[both]) ** 2, 0.5 * (shape[both] + shape[both + 1])
     else:
         squares, where = e[ok] ** 2, shape[ok]
@@ -250,7 +255,7 @@ def _steep_variance(e, ok, pair, shape):
     The differences' squares have about an exponential distribution, of which a and b are the most likely ones.
     """
     both = pair[ok[pair] & ok[pair + 1]]
-    if len(both) < 8:
+    if len(both) < LEAST_PAIRS:
         return _variance(e, ok, pair, shape)
     squares, where = 0.5 * (e[both + 1] - e[both]) ** 2, 0.5 * (shape[both] + shape[both + 1])
     share = np.maximum(squares.mean() / where.mean(axis=0), 1e-30) * 0.5

@@ -47,6 +47,7 @@ class SlowView(View):
     rest: np.ndarray | float = np.nan
     d_known: np.ndarray | bool = True
 
+    least_error = k.SLOW_LEAST
     stacked = (*STACKED, "unsteady", "rest", "d_known")
 
     def balance_error(self):

@@ -72,6 +72,7 @@ class View:
     dq_voltage: bool = False  # whether the drive turned the recorded voltage with the encoder's codes
     lacks: np.ndarray | None = None  # (b,) frozensets of words in effect.NEEDS that a block cannot show; None: nothing
 
+    least_error = 1.0  # of ``balance_error``: what the balance of a good recording has at least
     stacked = STACKED  # arrays over blocks that several recordings simply append
 
     def __len__(self):

@@ -65,6 +65,5 @@ EFFECT = CrossSaturation(
     map_shapes=("separable", "full"),
     separated_by="a grid of i_d and i_q that includes i_q = 0",
     parameters=(Parameter("cross_saturation_wb_per_a2", "Wb/A2", "c at rated i_q", "coefficient"),),
-    bounded=("y3", "x3"),
     bends=True,
 )

@@ -71,7 +71,6 @@ EFFECT = CurrentGain(
     confounders=("phase_resistance_asymmetry", "inductance_d", "current_scale"),
     separated_by="a sweep of the speed: the sensors' error also follows omega L i; the sum of three measured currents",
     parameters=tuple(Parameter(f"gain_{x}", "1", f"relative error of phase {x}", f"phase {x}") for x in "abc"),
-    absorbs=("current_scale",),
     shows_at=(2.0,),
     plausible={f"gain_{x}": (-0.1, 0.1) for x in "abc"},
     otherwise="a shunt of another value, a wrong scale of one column, or a converter that clips",

@@ -176,5 +176,4 @@ EFFECT = DeadTime(
     plausible={"v_dead_v": (0.0, 0.06, "inverter.dc_bus_v")},
     otherwise="the dead time is already compensated by the recorded duties, or the bus voltage is wrong",
     needs=("inverter",),
-    bounded=("log", "fade"),
 )

@@ -45,7 +45,6 @@ EFFECT = InductanceD(
     separated_by="two non-zero values of i_d",
     parameters=(Parameter("inductance_d_h", "H", "of the d axis", "L_d"),),
     spreads=True,
-    needs_d_current=("delta_l_d", "bend_"),
     plausible={"inductance_d_h": (0.5, 1.9, "machine.inductance_d_h")},
     otherwise="an inductance between two terminals is twice that of a phase; an incremental one is smaller",
 )

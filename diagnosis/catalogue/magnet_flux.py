@@ -50,7 +50,6 @@ EFFECT = MagnetFlux(
     parameters=(Parameter("magnet_flux_wb", "Wb", "peak, per phase", "flux linkage"),),
     spreads=True,
     curve=0.1,  # a part of lost flux recovers; more is a drift
-    bounded=("recovery",),
     plausible={"magnet_flux_wb": (0.75, 1.25, "machine.magnet_flux_wb")},
     otherwise="a drive file with the value between two terminals (1.73 times) or the rms value (0.71), or lost magnets",
 )

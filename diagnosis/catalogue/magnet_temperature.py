@@ -55,7 +55,6 @@ EFFECT = MagnetTemperature(
     parameters=(
         Parameter("magnet_flux_drift_wb", "Wb", "from start to end; the magnet temperature is not measured", "change"),
     ),
-    absorbs=("magnet_flux",),
     plausible={"magnet_flux_drift_wb": (-0.25, 0.0, "machine.magnet_flux_wb")},
     otherwise="magnets lose 0.05 to 0.2 % of their flux per kelvin: a sensor drifts, or the machine cooled",
     stays="the temperature of the magnets is not recorded, so that a coefficient cannot be applied",

@@ -61,7 +61,6 @@ EFFECT = PhaseResistanceAsymmetry(
     confounders=("current_gain", "resistance"),
     separated_by="standstill and speed: a sensor error also follows omega L i; the sum of three measured currents",
     parameters=tuple(Parameter(f"asymmetry_{x}", "1", f"phase {x}, relative to the mean", f"phase {x}") for x in "abc"),
-    absorbs=("resistance",),
     shows_at=(2.0,),
     plausible={f"asymmetry_{x}": (-0.3, 0.3) for x in "abc"},
     otherwise="a loose contact or a broken strand in the cable",

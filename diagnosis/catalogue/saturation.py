@@ -93,8 +93,6 @@ EFFECT = Saturation(
         Parameter("psi_q_change_at_rated_wb", "Wb", "flux linkage at rated i_q minus L_q i_q", "psi_q at rated i_q"),
         Parameter("psi_d_change_at_rated_wb", "Wb", "flux linkage at rated i_d minus L_d i_d", "psi_d at rated i_d"),
     ),
-    absorbs=("inductance_d", "inductance_q"),
-    needs_d_current=("d_",),
     curve=1.0,  # no formula of a saturation is preferred
     bends=True,
 )

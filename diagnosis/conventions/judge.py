@@ -208,14 +208,13 @@ class Terms:
         """(n,) bool: points of a channel."""
         return np.array([name == channel for name, _, _ in points.groups])[points.group]
 
-    @staticmethod
-    def _evidence(p, y, scale) -> float:
+    def _evidence(self, p, y, scale) -> float:
         none, nothing = np.zeros(0), np.zeros(0, np.int64)
         return evidence(
             np.zeros((len(y), 0)), y, p.s2 * scale**2, p.level * scale, p.doubt * scale,
             p.group, len(p.groups), p.loads, p.load,
             none, nothing, np.zeros(0, bool), none,
-            k.FORMULA, k.DISCREPANCY, k.ALWAYS_LOADED if p.loads >= 0 else 1.0, np.inf,
+            k.FORMULA, k.DISCREPANCY, self.setup.view.least_error, k.ALWAYS_LOADED if p.loads >= 0 else 1.0, np.inf,
         )[0]  # fmt: skip
 
 

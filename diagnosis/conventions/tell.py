@@ -12,10 +12,11 @@ from fluxproof.diagnosis.suspects import SUSPECTS
 OF_THE_REST = ("after", "noise", "spectrum_after", "angle_after")  # arrays of the evidence in true volts
 
 
-def under(readings, rivals, documented: Diagnosis, answer: Diagnosis, least: float = k.HALF) -> Diagnosis:
-    """``answer``, found with the readings, as an answer to the recording as it is.
+def under(readings, rivals, documented: Diagnosis, answer: Diagnosis, level: float) -> Diagnosis:
+    """``answer``, found with the readings, as an answer to the recording as it is; level: rms of its voltage [V].
 
-    ``documented`` if nothing is explained with them: readings must then explain the share ``least`` of the misfit.
+    ``documented`` if nothing is explained with them: they must explain half of the misfit and of the voltage, as a
+    recording in other units leaves a misfit that is nearly all of the simulation's voltage.
     Voltages are those of the recording: where the bus is recorded at half, the rest is told in recorded volts.
     readings: tuple of Reading; rivals: list of those that fit as well as the only one.  documented: the answer without
     readings, for the misfit before.
@@ -35,9 +36,9 @@ def under(readings, rivals, documented: Diagnosis, answer: Diagnosis, least: flo
     answer.explained_share = fit.explained_share
     if answer.verdict == "no_mismatch":
         answer.verdict = "explained"
-    elif answer.verdict == "unexplained" and answer.remainder and answer.explained_share >= least:
+    elif answer.verdict == "unexplained" and answer.remainder and answer.explained_share >= k.HALF:
         answer.verdict = "partly_explained"
-    if answer.verdict == "unexplained":
+    if answer.verdict == "unexplained" or fit.holdout_after**2 > k.HALF * level**2:
         return not_told(readings, documented)
     answer.readings, answer.conventions = readings, [r.told(rivals) for r in readings]
     answer.location = documented.location

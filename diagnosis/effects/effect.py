@@ -53,7 +53,6 @@ class Parameter:
 class Effect:
     """Base class of the catalogue's entries; each has its own file, which the catalogue imports automatically.
 
-    absorbs: effects that a freer curve of this one contains; asserting them together with it needs stronger evidence.
     confounders: effects with a similar signature; ``separated_by`` describes the experiment that separates them.
     """
 
@@ -64,7 +63,6 @@ class Effect:
     confounders: tuple[str, ...]
     separated_by: str
     parameters: tuple[Parameter, ...]
-    absorbs: tuple[str, ...] = ()
     rescales: tuple[str, ...] = ()  # of which it is a scale or an offset: i, u, u_dc, theta_e, keys of [machine]
     needs: tuple[str, ...] = ()  # of NEEDS: what a recording must show for the effect to be seen
     named: bool = True  # False: no parameter of the simulation carries it; it is described and not asserted
@@ -75,7 +73,6 @@ class Effect:
     )
     starts: tuple[dict, ...] = ()  # coefficients from which a large misfit is also approached, far from a linear effect
     one_of: tuple[tuple[str, ...], ...] = ()  # groups of coefficients that exclude each other
-    bounded: tuple[str, ...] = ()  # free coefficients that only their prior keeps apart from other effects
     drift_of: str = ""  # the constant effect of which this one is a slow drift
     trailing: tuple[float, ...] = ()  # further electrical orders at which the effect may have harmonics
     mechanical: bool = False  # a torque of the shaft rather than a voltage of the machine
@@ -86,11 +83,10 @@ class Effect:
     map_shapes: tuple[str, ...] = ()  # shapes of a flux map without and with it (flux_surface.SHAPES)
     beside_map: bool = False  # a function of the current that is no flux: fitted together with a flux map
     takes_flux: bool = False  # ``lost_flux``: its current does not magnetise
-    needs_d_current: tuple[str, ...] = ()  # beginnings of coefficients that only a current on the d axis determines
     shows_at: tuple[float, ...] = (0.0,)  # electrical orders at which its voltage, current sum or torque appears
     shows_at_turns: tuple[float, ...] = ()  # the same per mechanical turn
-    # {parameter: (least, largest) or (least, largest, "machine.key" that they are relative to)} of a usual drive, and
-    # what it may be otherwise.
+    # {parameter: (least, largest) or (least, largest, "machine.key" that they are relative to)} of a usual drive: what
+    # is outside has low prior odds and is flagged, with what it may be otherwise.
     plausible: dict = field(default_factory=dict, hash=False)
     otherwise: str = ""
     stays: str = ""  # why a drive file cannot take the effect out of a recording that has it

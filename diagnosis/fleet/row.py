@@ -59,7 +59,7 @@ def _digital(digital) -> str:
 
 
 def _hypotheses(answer) -> list[dict]:
-    """The sets that a posterior leaves open; a slow log has no posterior: what is named is its only set."""
+    """The sets that a posterior leaves open; one operating point has none: what is named is its only set."""
     if isinstance(answer.search, Posterior):
         return hypothesis_rows(answer.search)
     if answer.verdict in ("digital_mismatch", "bad_recording"):

@@ -6,6 +6,9 @@ What only limits effort (how many sets are tried), grids and tolerances of a num
 # ---- what a recording may contain
 # Prior probability that a given effect of the catalogue is present: of some twenty effects one is expected.
 PRESENT = 0.05
+# Odds of a parameter outside of what its effect declares as plausible: absurd errors that cancel may fit as well as the
+# true ones.
+IMPLAUSIBLE = 1e-3
 # Error of the balance that no parameter explains, relative to the voltage of an operating point: PWM ripple, the
 # trapezoidal mean of the current, the converters' timing.
 BALANCE_U = 2e-4
@@ -83,14 +86,15 @@ LEAST_TORQUE = 0.01
 # Low end of the rising noise spectrum over its neighbourhood, from which it is a swing.
 SWING = 8.0
 
-# ---- slow logs
+# ---- operating points: slow logs and tables
 # Resolution and timing of messages, ripple and clamping, relative to the bus and to the voltage; share of the voltage's
 # change around a stretch, as a row combines messages of different age.
 SLOW_DC, SLOW_U, SLOW_CHANGE = 2.5e-4, 2e-3, 0.05
-# Of the voltage: largest noise that may be taken from what no effect explains; more has a cause that is not known.
-SLOW_NOISE = 0.03
-# Of the voltage: largest remainder beside names or readings, which physics without a name can leave.
-SLOW_REST = 0.1
+# Of that error: what a log may have at least, as a table of long means is better than messages of a bus.
+SLOW_LEAST = 0.1
+# Of the voltage: largest noise that may be taken from what no effect explains, where no operating point repeats; more
+# has a cause that is not known.
+UNREPEATED = 0.03
 # Largest reduced chi^2 of an accepted explanation; share of the misfit's rms that may be left to the shapes of curves;
 # share of its power that names must explain beside a remainder, as that search does not know how much may imitate an
 # effect.

@@ -4,10 +4,10 @@
 
 a_e is the size of effect e in units of its floor of practical interest, with a log-uniform prior from 1 to the size at
 which a drive no longer runs; p_k is the coefficient that makes column k as large as the floor (of a curve: the share of
-it by which the curve may depart from the formula).  lambda_g >= 1 is the discrepancy of group g, with the prior
-1 / (1 + (lambda / k)^2).  w is the error that the curve of an effect may have at most, and mu_g <= 1 the share of it
-that is seen in group g: with all of it, a set would gain by a smaller effect with a smaller w.  All are found by
-expectation maximisation; the log evidence is exact for them.
+it by which the curve may depart from the formula).  lambda_g is the discrepancy of group g, with the prior
+1 / (1 + (lambda / k)^2), and at least 1 where the error of the balance is known.  w is the error that the curve of an
+effect may have at most, and mu_g <= 1 the share of it that is seen in group g: with all of it, a set would gain by a
+smaller effect with a smaller w.  All are found by expectation maximisation; the log evidence is exact for them.
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ import numba
 import numpy as np
 
 STEPS = 7
-LEAST = 1.0  # in units of the balance's error
 SMALL, LARGE = 1e-200, 1e200  # range of a product of variances, each of which lies within 1e-100 and 1e100
 FACTORS = np.array([0.1, 0.35, 0.7, 1.0, 1.4, 3.0, 10.0])  # of the discrepancy: the grid of every step
 SEEN = np.array([0.0, 0.03, 0.1, 0.2, 0.4, 0.7, 1.0])  # shares mu: the grid of every step
@@ -39,7 +38,7 @@ def _share_seen(mu, lam, s2, level2, doubt2, own, e2, group, loads):
 
 @numba.njit(cache=True, error_model="numpy")  # no division here is by zero, which need not be checked in every row
 def evidence(
-    x, y, s2, level, doubt, group, groups, loads, load, prior, owner, core, most, formula, scale, always, start
+    x, y, s2, level, doubt, group, groups, loads, load, prior, owner, core, most, formula, scale, least, always, start
 ):
     """(log evidence, coefficients (k,), covariance (k, k), sizes (effects,), lambda and mu (groups,)).
 
@@ -48,7 +47,7 @@ def evidence(
     loads, load: group whose rows may contain a load of the scale ``load`` each, -1: none.
     start: torque, in multiples of the smallest one, above which a row is first taken as loaded.
     always: odds against a load at every operating point.
-    formula: share of an effect's contribution that counts as discrepancy; scale: prior of lambda.
+    formula: share of an effect's contribution that counts as discrepancy; scale: prior of lambda; least: smallest one.
     Where a load hides the discrepancy, lambda stays at this scale.
     """
     n, k = x.shape
@@ -69,12 +68,12 @@ def evidence(
     e2 = np.zeros(n)
     part = np.zeros(n)
     squares = np.zeros((groups, len(FACTORS)))
-    least = 1e300
+    lightest = 1e300
     for i in range(n):
         if group[i] == loads:
-            least = min(least, abs(y[i]) + level[i])
+            lightest = min(lightest, abs(y[i]) + level[i])
     for i in range(n):
-        if group[i] == loads and abs(y[i]) > start * least:
+        if group[i] == loads and abs(y[i]) > start * lightest:
             loaded[i] = load * load
     value = 0.0
     for step in range(STEPS):
@@ -159,7 +158,7 @@ def evidence(
         products = np.ones((groups, len(FACTORS)))
         for g in range(groups):
             for h in range(len(FACTORS)):
-                squares[g, h] = max(lam[g] * FACTORS[h], LEAST) ** 2
+                squares[g, h] = max(lam[g] * FACTORS[h], least) ** 2
         for i in range(n):
             g = group[i]
             known = s2[i] + own[i] + mu[g] ** 2 * doubt2[i]
@@ -179,7 +178,7 @@ def evidence(
         for g in range(groups):
             best, chosen = -1e300, lam[g]
             for h in range(len(FACTORS)):
-                tried = max(lam[g] * FACTORS[h], LEAST)
+                tried = max(lam[g] * FACTORS[h], least)
                 total = score[g, h] - 0.5 * np.log(products[g, h]) - np.log(1.0 + (tried / scale) ** 2)
                 if total > best:
                     best, chosen = total, tried

@@ -61,9 +61,6 @@ class Model:
     def with_(self, name, free=False):
         return Model(self.names | {name}, self.free | {name} if free else self.free - {name})
 
-    def freed(self):
-        return Model(self.names, self.names)
-
 
 @dataclass
 class Solution:
@@ -77,18 +74,12 @@ class Solution:
     covariance: dict = field(default_factory=dict)  # {effect: (k, k)}
     score: float = np.inf
     residual: np.ndarray | None = None
-    view: object = None  # the corrected view on which it was solved
-    total: dict = field(default_factory=dict)  # accumulated coefficients of measurement errors
-
-    @property
-    def dispersion(self):
-        return self.chi2 / max(self.rows - self.count, 1)
 
 
 class Fitter:
     """The weighted problem of one view; ``train``: (r,) bool, rows used for the fit."""
 
-    def __init__(self, cells, sigma, train, penalty=None):
+    def __init__(self, cells, sigma, train):
         self.cells, self.sigma = cells, sigma
         self.use = cells.ok & train
         self.names, self.owner, stack = [], [], []
@@ -103,7 +94,7 @@ class Fitter:
         self.scale[self.scale < 1e-9] = np.inf
         self.a = a / self.scale
         self.gram, self.right, self.power = self.a.T @ self.a, self.a.T @ self.y, float(self.y @ self.y)
-        self.penalty = float(np.log(max(len(self.y), 10))) if penalty is None else penalty
+        self.penalty = float(np.log(max(len(self.y), 10)))
         self.index = {effect: ([], []) for effect in cells.columns}  # includes effects without columns
         for k, (effect, key) in enumerate(zip(self.owner, self.names, strict=True)):
             core, free = self.index[effect]
@@ -132,15 +123,15 @@ class Fitter:
         gain, kept = _explained(self.gram, self.right, self.columns_of(model), FRESH**2)
         return max(self.power - gain, 0.0), int(kept.sum())
 
-    def score(self, model, dispersion=1.0) -> float:
-        """chi^2 over the dispersion plus the penalty of coefficients and effects."""
+    def score(self, model) -> float:
+        """chi^2 plus the penalty of coefficients and effects."""
         chi2, count = self.chi2(model)
-        return chi2 / dispersion + self.penalty * count + constants.PER_EFFECT * len(model)
+        return chi2 + self.penalty * count + constants.PER_EFFECT * len(model)
 
-    def solve(self, model, dispersion=1.0) -> Solution:
+    def solve(self, model) -> Solution:
         """Coefficients, covariance, residual and score of a model."""
         out = self.unscored(model)
-        out.score = self.score(model, dispersion)
+        out.score = self.score(model)
         return out
 
     def unscored(self, model) -> Solution:

@@ -162,7 +162,9 @@ class Posterior:
             self._linearise(best, SETTLED)
             for out in best:
                 part = tuple(n for n in best if n != out)
-                if part in self.fits and not self.fits[part].stands and np.isfinite(self.fits[part].value):
+                fit = self.fits.get(part)
+                # A part that is impossible on the linearisation of another set may be possible on its own.
+                if fit is not None and not fit.stands and (part not in self.own or np.isfinite(fit.value)):
                     self._linearise(part, SETTLED)
             if self.best().names == best:
                 return

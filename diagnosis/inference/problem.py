@@ -13,6 +13,8 @@ import itertools
 
 import numpy as np
 
+from fluxproof.diagnosis.balance.cells import repeats, voltage_level
+from fluxproof.diagnosis.effects.effect import believable
 from fluxproof.diagnosis.inference import constants as k
 from fluxproof.diagnosis.inference.evidence import evidence
 from fluxproof.diagnosis.inference.linearise import Linearisation, Rows, at_once
@@ -39,7 +41,7 @@ class Setup:
     def _share(self, rows, call):
         self.rows, self.call = rows, call
         self.view, self.effects, self.projector, self.load = rows.view, rows.effects, rows.projector, rows.load
-        self.train, self.cells, self.noise = rows.train, rows.cells, rows.noise
+        self.train, self.cells, self.noise = rows.train, rows.cells, _believed(rows)
         self.smooth_rows = rows.smooth_rows
         self.level = balance_level(self.view, self.cells)
         self.points = point_numbers(self.view)
@@ -47,6 +49,16 @@ class Setup:
         self.grouping = Grouping(self.cells, self.points, self.visits, self.cells.ok & self.train, self.view.run)
         self.repeats = _repeats(self.cells, self.points)
         self.shifts = {}
+
+    @property
+    def floor(self):
+        """(r,) standard deviation of every row in a recording whose balance is as good as it can be."""
+        return np.hypot(self.noise, self.view.least_error * self.level)
+
+    @property
+    def usual(self):
+        """(r,) the same in a usual recording."""
+        return np.hypot(self.noise, self.level)
 
     def odds(self, name) -> float:
         """Log prior odds of an effect; ``shifts`` {effect: change} holds what a fleet says of them."""
@@ -172,7 +184,7 @@ class Problem:
         tried = [
             evidence(
                 x, p.y, p.s2, p.level, p.doubt, p.group, len(p.groups), p.loads, p.load,
-                self.prior[take], owner, core, most, k.FORMULA, k.DISCREPANCY, always, start,
+                self.prior[take], owner, core, most, k.FORMULA, k.DISCREPANCY, self.view.least_error, always, start,
             )
             for start in ((np.inf, 1.5, 3.0) if drags else (np.inf,))
         ]  # fmt: skip
@@ -189,7 +201,9 @@ class Problem:
             - np.log(np.log(self.most[n])) - np.log1p(x**2 / self.most[n])
             for n, x in zip(names, a, strict=True)
         )
-        return Fit(self, names, float(value), take, c, cov, a, lam, mu)
+        found = Fit(self, names, float(value), take, c, cov, a, lam, mu)
+        found.value += np.log(k.IMPLAUSIBLE) * sum(_implausible(found, name) for name in names)
+        return found
 
 
 class Fit:
@@ -232,6 +246,23 @@ def covariance_of(fit, name, full) -> np.ndarray:
             if first in place and second in place:
                 out[a, b] = full[place[first], place[second]]
     return out
+
+
+def _implausible(fit, name) -> int:
+    """Number of an effect's parameters outside of what it declares as plausible."""
+    effect, nominal = fit.problem.setup.effects[name], fit.problem.view.nominal
+    if not effect.plausible:
+        return 0
+    found = effect.estimates(fit.c[name], covariance_of(fit, name, fit.cov), nominal)
+    return sum(not believable(found[key], limits, nominal) for key, limits in effect.plausible.items() if key in found)
+
+
+def _believed(rows):
+    """(r,) the noise of rows, of which not all is believed where nothing repeats and it is what no effect explains."""
+    if repeats(rows.view, rows.cells.ok, rows.cells.block):
+        return rows.noise
+    most = k.UNREPEATED * voltage_level(rows.view)[rows.cells.block]
+    return np.where(rows.cells.channel == "u", np.minimum(rows.noise, np.maximum(most, 1e-15)), rows.noise)
 
 
 def _repeats(cells, points):

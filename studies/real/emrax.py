@@ -12,13 +12,15 @@ from pathlib import Path
 import numpy as np
 
 from fluxproof.checkout import ROOT
+from fluxproof.diagnosis.answer.estimates import named_effects
 from fluxproof.diagnosis.answer.headline import sentence
-from fluxproof.diagnosis.catalogue import CATALOGUE
-from fluxproof.diagnosis.inference.slow_model import bounds, flux_map_of, on_other_rows
+from fluxproof.diagnosis.answer.names import names_of
+from fluxproof.diagnosis.inference import constants as k
 from fluxproof.diagnosis.ingest.load import load_recording
 from fluxproof.diagnosis.nominal import load_nominal
-from fluxproof.diagnosis.slow_diagnosis import axis_misfit, diagnose_slow, model_effects
+from fluxproof.diagnosis.physics import explain
 from studies.real.outputs import write
+from studies.real.splits import axis_misfit, bounds, estimates_of, flux_map_of, on_other_rows
 
 FILE = Path("emrax228") / "coastdown_run.csv"
 DRIVE = ROOT / "docs" / "drives" / "emrax228.toml"
@@ -31,31 +33,32 @@ def run(folder: Path, out: Path, progress=lambda text: None) -> dict:
     """Diagnose, verify on other points and on a later part, write the outputs; returns the entry of result.json."""
     started, nominal = time.perf_counter(), load_nominal(DRIVE)
     recording = load_recording(folder / FILE, nominal)
-    answer = diagnose_slow([recording], nominal, progress)
-    answer.rows, answer.problems = len(recording), recording.problems
+    answer = explain([recording], nominal, progress)
     diagnosed = time.perf_counter()
     progress("other splits")
-    search, found, view = answer.search, answer.found, answer.search.view
+    posterior, held = answer.search, answer.held
+    best, setup = posterior.best(), posterior.setup
+    view, effects = setup.view, setup.effects
     loaded = np.abs(view.i_raw[:, 0]) > LOADED * nominal.machine.rated_current_a
     early = view.t < np.quantile(view.t[loaded], EARLY)
-    later, later_solution, by_time = on_other_rows(view, found.best.model, early)
-    alone, alone_solution, at_rest = on_other_rows(view, found.best.model, loaded)
-    held = {
-        "operating_points": axis_misfit(search, found.best, answer.held),
-        "operating_points_loaded": axis_misfit(search, found.best, answer.held & loaded),
+    later_fit, by_time = on_other_rows(view, effects, best.names, early)
+    alone_fit, at_rest = on_other_rows(view, effects, best.names, loaded)
+    splits = {
+        "operating_points": axis_misfit(best, held),
+        "operating_points_loaded": axis_misfit(best, held & loaded),
         "later_time": by_time,
-        "later_time_loaded": axis_misfit(later, later_solution, ~early & loaded),
+        "later_time_loaded": axis_misfit(later_fit, ~early & loaded),
         "unloaded_from_loaded": at_rest,
     }
-    parts = [_estimates(alone, alone_solution), _estimates(later, later_solution)]
+    parts = [estimates_of(alone_fit), estimates_of(later_fit)]
     for effect in answer.effects:
         _widen(effect, parts)
-    answer.sentence = sentence(answer, CATALOGUE)
+    answer.sentence = sentence(answer, effects)
     answer.notes.append("Standard deviations include the differences between separately fitted parts of the log.")
-    model = _with_map(model_effects(search, found), flux_map_of(search, found.best))
+    model = _with_map(named_effects(names_of(posterior), posterior, {}, only=best.names), flux_map_of(best))
     for effect in model:
         _widen(effect, parts)
-    ruled_out = bounds(search, found)
+    if_added = bounds(posterior)
     entry = write(
         "emrax228",
         answer,
@@ -63,16 +66,14 @@ def run(folder: Path, out: Path, progress=lambda text: None) -> dict:
         recording,
         out,
         {
-            "held_out": held["operating_points"],
-            "held_out_splits": held,
-            "stretches": {"all": len(view), "loaded": int(loaded.sum()), "held_out": int(answer.held.sum())},
-            "tied_models": [
-                {"effects": sorted(s.model.names), "score": s.score - found.best.score} for s in found.tied
-            ],
-            "if_added": ruled_out,
+            "held_out": splits["operating_points"],
+            "held_out_splits": splits,
+            "stretches": {"all": len(view), "loaded": int(loaded.sum()), "held_out": int(held.sum())},
+            "sets": [{"effects": fit.names, "probability": p} for p, fit in posterior.weights() if p >= k.OPEN],
+            "if_added": if_added,
             "from_loaded_stretches_alone": parts[0],
             "from_the_first_part_alone": parts[1],
-            "cannot_tell": _cannot_tell(view, nominal, found, ruled_out, alone, alone_solution, at_rest),
+            "cannot_tell": _cannot_tell(view, nominal, best, if_added, parts[0], at_rest),
         },
         model=model,
     )
@@ -99,18 +100,8 @@ def _widen(effect, parts) -> None:
         estimate.sigma = float(max([estimate.sigma, *(abs(x - estimate.value) for x in others)]))
 
 
-def _estimates(search, solution) -> dict:
-    """{parameter: [value, standard deviation, unit]} of a solution."""
-    out = {}
-    for name in sorted(solution.model.names):
-        covariance = solution.covariance[name] * search.problem.dispersion
-        found = search.effects[name].estimates(solution.c[name], covariance, search.view.nominal)
-        out |= {k: [e.value, e.sigma, e.unit] for k, e in found.items()}
-    return out
-
-
-def _cannot_tell(view, nominal, found, ruled_out, alone, alone_solution, at_rest) -> list[str]:
-    m, alone_values = nominal.machine, _estimates(alone, alone_solution)
+def _cannot_tell(view, nominal, best, if_added, alone, at_rest) -> list[str]:
+    m = nominal.machine
     said = [
         "The voltages are commanded ones: inverter loss and delay are part of the misfit.  Without a reversal of i_q, "
         "the loss is separated from other voltages in phase with the current by its size only.",
@@ -119,9 +110,9 @@ def _cannot_tell(view, nominal, found, ruled_out, alone, alone_solution, at_rest
         "i_d was never driven: L_d and saturation of the d axis are unknown, cross-saturation only from its q part.",
         "No harmonics and no sampling instants: EMF harmonics, sensor offsets and gains, eccentricity are unknown.",
     ]
-    if "magnet_flux" in found.best.model.names and "magnet_flux_wb" in alone_values:
-        value, sigma, _ = alone_values["magnet_flux_wb"]
-        own = m.magnet_flux_wb + found.best.c["magnet_flux"]["delta_psi_m"]
+    if "magnet_flux" in best.names:
+        value, sigma, _ = alone["magnet_flux_wb"]
+        own = m.magnet_flux_wb + best.c["magnet_flux"]["delta_psi_m"]
         said.append(
             f"The magnet flux of {1e3 * own:.3g} mWb depends on stretches without current, in which the controller may "
             f"have been passive.  Loaded stretches alone give {1e3 * value:.3g} +- {1e3 * sigma:.2g} mWb and "
@@ -132,13 +123,11 @@ def _cannot_tell(view, nominal, found, ruled_out, alone, alone_solution, at_rest
         ("udc_gain", "udc_gain"),
         ("current_scale", "scale"),
     ):
-        if "parameters" in ruled_out.get(name, {}):
-            value, sigma, unit = ruled_out[name]["parameters"][parameter]
-            said.append(
-                f"{name} added to the model would be {value:.3g} +- {sigma:.1g} {unit}: not significant, not excluded."
-            )
+        if "parameters" in if_added.get(name, {}):
+            value, sigma, unit = if_added[name]["parameters"][parameter]
+            said.append(f"{name} added to the set would be {value:.3g} +- {sigma:.1g} {unit}: not needed, not excluded.")
     said.append(
-        "A current scale or bus gain error above 15 % was not considered: either would rescale all other values."
+        "A current scale or bus gain error above 10 % was taken as improbable: either would rescale all other values."
     )
     said.append("Winding and magnets warmed by 12 K only: temperature coefficients cannot be determined.")
     return said

@@ -6,6 +6,7 @@ import contextlib
 from pathlib import Path
 
 from fluxproof.diagnosis.answer.conclude import conclude, judge
+from fluxproof.diagnosis.balance.cells import voltage_rms
 from fluxproof.diagnosis.balance.parts import sound
 from fluxproof.diagnosis.conventions.judge import preferred
 from fluxproof.diagnosis.conventions.tell import under
@@ -15,14 +16,13 @@ from fluxproof.diagnosis.inference.problem import Setup
 from fluxproof.diagnosis.ingest.load import load_recording
 from fluxproof.diagnosis.ingest.restated import as_read
 from fluxproof.diagnosis.nominal import load_nominal
-from fluxproof.diagnosis.physics import explain, rows_of
+from fluxproof.diagnosis.physics import explain, rows_of, view_of
 from studies.sensitivity.steps import Steps, recorded, varied
 
 FACTORS = (0.5, 2.0)
-# Read by the search of slow logs alone, of which the cases contain none.
+# Read with slow logs alone, of which the cases contain none.
 OF_SLOW_LOGS = (
-    "SLOW_DC", "SLOW_U", "SLOW_CHANGE", "SLOW_NOISE", "SLOW_REST",
-    "LEFTOVER", "FLOOR_SHARE", "NAMED_SHARE", "PER_EFFECT",
+    "SLOW_DC", "SLOW_U", "SLOW_CHANGE", "SLOW_LEAST", "LEFTOVER", "FLOOR_SHARE", "NAMED_SHARE", "PER_EFFECT",
 )  # fmt: skip
 
 
@@ -86,12 +86,14 @@ class Case:
 
 
 def _rows_of(recordings, nominal):
-    return rows_of(recordings, nominal)
+    view, held = view_of(recordings, nominal)
+    return rows_of(view, held), held
 
 
 def _under(found, posterior, held) -> dict:
     readings, rivals, read = found
-    answer = under(readings, rivals, conclude(posterior, held), conclude(read, held))
+    level = voltage_rms(posterior.setup.view)
+    answer = under(readings, rivals, conclude(posterior, held), conclude(read, held), level)
     return said(answer.verdict, [e.name for e in answer.effects], answer.ambiguity)
 
 

@@ -1,0 +1,53 @@
+"""What the balance of a recording was made of, and what it cannot show: notes of an answer."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fluxproof.diagnosis.balance.cells import voltage_level
+from fluxproof.diagnosis.balance.holdout import FEW
+from fluxproof.diagnosis.balance.slow_view import SlowView
+from fluxproof.diagnosis.catalogue import CATALOGUE
+
+SMALL_DROP = 0.1  # of the voltage: a smaller drop of the resistance does not determine it
+
+
+def balance_notes(view, held, effects, ambiguity) -> list[str]:
+    """The notes on a view; held: (b,) bool, blocks that were not fitted; effects: those that the view shows."""
+    if isinstance(view, SlowView):
+        return [*_of_points(view, held), *(_separated(effects[n]) for group in ambiguity for n in group)]
+    rows, out = view.u_dc.shape[1], int(held.sum())
+    return [f"The voltage balance was made on {len(view)} steady blocks of {rows} rows; {out} were not fitted."]
+
+
+def _of_points(view, held) -> list[str]:
+    """Operating points: how many, and what they cannot show."""
+    points, i = len(np.unique(view.run)), view.i.mean(axis=1)
+    unseen = [name for name, effect in CATALOGUE.items() if not view.shows(effect).any()]
+    notes = [
+        f"The voltage balance was made on {len(view)} steady stretches at {points} operating points; "
+        f"{int(held.sum())} of the stretches were not fitted.",
+        f"Operating points have no harmonics and no sampling instants; these effects cannot be diagnosed: "
+        f"{', '.join(unseen)}.",
+    ]
+    if not view.d_known.all():
+        notes.append("u_d is not recorded: only the q axis was balanced.")
+    if points < FEW:
+        notes.append(
+            f"With {points} operating points every fourth stretch instead of every fourth point was held out: record "
+            "more points."
+        )
+    if not i.real.any():
+        notes.append("The d axis never had a current: L_d and the saturation of the d axis cannot be diagnosed.")
+    if len({x > 0 for x in np.sign(view.omega[:, 0]) if x}) < 2:
+        notes.append(
+            "One direction only: encoder offset and inverter loss are separated from others by load and speed alone."
+        )
+    share = view.machine.resistance_ohm * np.abs(i) / voltage_level(view).clip(1e-9)
+    if share.max() < SMALL_DROP:
+        notes.append(f"The resistance drops at most {share.max():.1%} of the voltage: it cannot be determined here.")
+    return notes
+
+
+def _separated(effect) -> str:
+    return f"{effect.name} is separated from similar effects by: {effect.separated_by}."
