@@ -64,6 +64,11 @@ def view_of(recordings, nominal):
     return joined_views(views), held_out(views)
 
 
+def single_point(view) -> bool:
+    """Whether a view has one operating point, of which only the drift is evidence (one_point.py)."""
+    return isinstance(view, SlowView) and np.ptp(view.run) == 0
+
+
 def rows_of(view, held) -> Rows:
     """The rows of a view, of which the blocks ``held`` (b,) bool are not fitted."""
     return Rows(view, view.visible(known_effects()), ~held)
@@ -78,7 +83,7 @@ def _posterior(view, held, progress, shifts) -> Posterior:
 
 def _physics(recordings, nominal, progress, shifts) -> Diagnosis:
     view, held = view_of(recordings, nominal)
-    if isinstance(view, SlowView) and np.ptp(view.run) == 0:
+    if single_point(view):
         return diagnose_one_point(view)
     posterior = _posterior(view, held, progress, shifts)
     answer = conclude(posterior, held, progress)

@@ -87,16 +87,31 @@ def test_rounded_values_and_transients_of_a_slow_log(tmp_path):
     assert found(answer) == {"magnet_flux_wb": pytest.approx(0.95 * PSI, rel=0.005)}
 
 
-@pytest.mark.parametrize("size, verdict", [(0.1, "no_mismatch"), (0.5, "ambiguous"), (4.0, "ambiguous")])
+def test_a_table_at_several_temperatures_shows_winding_and_magnets(tmp_path):
+    parts = []
+    for temp in (20.0, 60.0, 100.0):
+        warm = Truth(r=R * (1.0 + 0.0039 * (temp - 20.0)), psi=PSI * (1.0 - 0.001 * (temp - 20.0)))
+        part = table(warm, seed=int(temp))
+        parts.append(part | {"temp_winding": np.full(len(part["i_q"]), temp)})
+    answer = answer_of(tmp_path, {name: np.concatenate([part[name] for part in parts]) for name in parts[0]})
+    assert answer.verdict == "explained", answer.sentence
+    assert found(answer)["magnet_flux_drift_wb"] == pytest.approx(-0.08 * PSI, rel=0.05)
+    assert found(answer)["resistance_temp_coeff_per_k"] == pytest.approx(0.0039, rel=0.1)
+
+
+@pytest.mark.parametrize("size, verdict", [(0.1, "no_mismatch"), (0.5, "ambiguous"), (4.0, "explained")])
 def test_either_of_two_causes_is_not_agreement(tmp_path, size, verdict):
-    """Within so narrow a range of currents resistance and dead time imitate each other."""
+    """Within so narrow a range of currents resistance and dead time imitate each other: one value has to say so."""
     points = [(w, 0.0, q) for w in (80.0, 200.0, 350.0, -300.0) for q in np.linspace(2.5, 4.5, 4)]
     truth = Truth(r=R + 0.08 * size, v_dead=0.25 * size)
     answer = answer_of(tmp_path, table(truth, points=points, noise_v=0.02))
-    assert answer.verdict == verdict and not answer.effects, answer.sentence
+    assert answer.verdict == verdict, answer.sentence
     assert answer.ambiguity == ([["dead_time", "resistance"]] if verdict == "ambiguous" else [])
     if verdict == "no_mismatch":
-        assert answer.fit.train_before <= 2.0 * answer.fit.noise_floor
+        assert not answer.effects and answer.fit.train_before <= 2.0 * answer.fit.noise_floor
+    if answer.effects:
+        (loss,) = [e.parameters["v_dead_v"] for e in answer.effects]
+        assert abs(loss.value - 0.25 * size) < 2.0 * loss.sigma and said(answer, "Winding resistance")
 
 
 CORRECTED = {  # what a check corrects before the magnets are found

@@ -11,16 +11,16 @@ from cocotb_tests.core.test_registers import PAPER
 from cocotb_tests.support.diagnosed_drives import GRID, MACHINE, columns
 from fluxproof.checkout import ROOT
 from fluxproof.diagnosis.inference import constants
-from studies.sensitivity.run import OF_SLOW_LOGS, Case, answers_of, names, said_in_full, shares
+from studies.sensitivity.run import OF_ONE_POINT, Case, answers_of, names, said_in_full, shares
 from studies.sensitivity.steps import Steps, recorded, varied
 
 
 def test_every_constant_is_varied():
     declared = {t.id for node in ast.parse(open(constants.__file__).read()).body if isinstance(node, ast.Assign)
                 for target in node.targets for t in ast.walk(target) if isinstance(t, ast.Name)}  # fmt: skip
-    assert declared == set(names()) | set(OF_SLOW_LOGS)
+    assert declared == set(names()) | set(OF_ONE_POINT)
     text = (ROOT / "docs" / "diagnosis.md").read_text()
-    assert f"its reason: {len(names())}, and {len(OF_SLOW_LOGS)} more of slow logs" in text
+    assert f"its reason: {len(names())}, and {len(OF_ONE_POINT)} more of one operating point" in text
 
 
 def test_no_constant_is_imported_by_value():

@@ -26,6 +26,7 @@ from fluxproof.diagnosis.recording import Recording
 
 ROWS = 36  # one turn in steps of ten degrees: the mean inverter loss is accurate to 0.1 %
 BIN_CURRENT, BIN_SPEED = 0.05, 0.05  # of rated current and of the largest speed: the same operating point
+BIN_TEMP_K = 10.0  # of the winding
 NO_CURRENT = 0.02  # of rated current: an axis that never had more contains only noise
 MOST_ALIKE = 6  # largest number of stretches per operating point
 MOST_OF_ONE = 120  # the same of a recording with one operating point
@@ -47,8 +48,11 @@ class SlowView(View):
     rest: np.ndarray | float = np.nan
     d_known: np.ndarray | bool = True
 
-    least_error = k.SLOW_LEAST
     stacked = (*STACKED, "unsteady", "rest", "d_known")
+
+    @property
+    def least_error(self):
+        return k.SLOW_LEAST
 
     def balance_error(self):
         level = np.abs(self.u).mean(axis=1)
@@ -110,6 +114,9 @@ def view_of_points(found: Stretches, recording, nominal) -> SlowView:
     b, period = len(order), nominal.sample_time_s
     span = 0.0 if "time" in recording.lacks else float(recording["t"][-1] - recording["t"][0])
     recording.meta.setdefault("notes", []).extend(found.notes)
+    lacks, course = LACKS | recording.lacks, found.t[order] / max(span, 1e-9)
+    if "time" in lacks and np.ptp(found.temp[order]) > BIN_TEMP_K:  # rows of a table from the coldest to the hottest
+        lacks, course = lacks - {"time"}, (found.temp[order] - found.temp.min()) / np.ptp(found.temp)
     held = lambda x, n: np.repeat(np.asarray(x)[order, None], n, axis=1)  # noqa: E731
     i, omega = held(found.i, ROWS + 1), held(found.omega, ROWS + 1)
     least = NO_CURRENT * nominal.machine.rated_current_a
@@ -127,7 +134,7 @@ def view_of_points(found: Stretches, recording, nominal) -> SlowView:
         u=held(found.u, ROWS + 2) * np.exp(1j * turning),
         u_dc=held(found.u_dc, ROWS),
         t=found.t[order],
-        course=found.t[order] / max(span, 1e-9),
+        course=course,
         temp=found.temp[order],
         torque=np.full((b, ROWS), np.nan),
         slope_m=np.zeros((b, ROWS)),
@@ -138,7 +145,7 @@ def view_of_points(found: Stretches, recording, nominal) -> SlowView:
         unsteady=found.unsteady[order],
         rest=found.rest[order],
         d_known=np.full(b, found.both_axes),
-        lacks=lacking(LACKS | recording.lacks, b),
+        lacks=lacking(lacks, b),
     )
 
 
@@ -150,6 +157,9 @@ def alike(found: Stretches, nominal) -> tuple[np.ndarray, np.ndarray]:
     steps = _steps(found, nominal)
     if alone(found, nominal):  # fixed bins would split some points
         return np.arange(len(found)), np.zeros(len(found), int)
+    # A table may hold the same points at several temperatures, which differ by more than noise.
+    warm = np.where(np.isfinite(found.temp), found.temp, 0.0) / BIN_TEMP_K
+    steps = np.column_stack([steps, warm])
     _, point = np.unique(np.round(steps).astype(int), axis=0, return_inverse=True)
     order, dwell = [], []
     for number in np.unique(point):

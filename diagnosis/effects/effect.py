@@ -23,7 +23,7 @@ Column = dict  # channel -> array
 NEEDS = {
     "harmonics": "a row per control period",
     "samples": "the instants of sampling, in a log of the control",
-    "time": "a time axis",
+    "time": "a time axis, or several temperatures",
     "angle": "an angle that was measured, not taken from the voltages",
     "inverter": "an inverter that switches",
     "current": "measured currents",

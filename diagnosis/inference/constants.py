@@ -95,9 +95,10 @@ SLOW_LEAST = 0.1
 # Of the voltage: largest noise that may be taken from what no effect explains, where no operating point repeats; more
 # has a cause that is not known.
 UNREPEATED = 0.03
-# Largest reduced chi^2 of an accepted explanation; share of the misfit's rms that may be left to the shapes of curves;
-# share of its power that names must explain beside a remainder, as that search does not know how much may imitate an
-# effect.
+
+# ---- one operating point
+# Largest reduced chi^2 of an accepted drift; share of the misfit's rms that may be left to the shapes of curves; share
+# of its power that names must explain beside a remainder, as it is not known how much may imitate an effect.
 LEFTOVER, FLOOR_SHARE, NAMED_SHARE = 2.0, 0.15, 0.9
 # Penalty of an effect in chi^2, in addition to that of its coefficients: a prior probability of about one in twenty.
 PER_EFFECT = 10.0

@@ -9,7 +9,7 @@ import numpy as np
 from fluxproof.diagnosis.effects.effect import FluxEffect
 from fluxproof.diagnosis.inference.posterior import possible
 from fluxproof.diagnosis.inference.problem import Setup, covariance_of
-from fluxproof.diagnosis.inference.settle import fit_of_set, settled
+from fluxproof.diagnosis.inference.settle import around, fit_of_set, settled
 from fluxproof.plant import FluxMap
 
 STEPS = (9, 41)  # of the map along i_d and i_q
@@ -48,10 +48,11 @@ def bounds(posterior) -> dict[str, dict]:
     there.  refused: the reason why it cannot be added.
     """
     best, out = posterior.best(), {}
-    for name in best.problem.able():
+    problem = around(posterior.setup, best)
+    for name in problem.able():
         if name in best.names:
             continue
-        fit = best.problem.fit((*best.names, name))
+        fit = problem.fit((*best.names, name))
         fit = settled(posterior.setup, fit, len(best.names)) or fit
         if not possible(fit, small=(name,)):
             out[name] = {"refused": "its sign or size is impossible"}

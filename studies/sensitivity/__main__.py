@@ -77,7 +77,7 @@ def measure(seed: int, mix: dict[str, int], jobs: int, chosen) -> dict:
 
 
 def summary(seed: int, known: dict, chosen) -> dict:
-    """The figures of the cases that are known so far; those without a fast recording do not count."""
+    """The figures of the cases that are known so far; those without a posterior do not count."""
     judged = {case: out for case, out in known.items() if out}
     each = shares(judged, chosen)
     worst = max(each, key=lambda n: each[n]["share"])

@@ -16,19 +16,17 @@ from fluxproof.diagnosis.inference.problem import Setup
 from fluxproof.diagnosis.ingest.load import load_recording
 from fluxproof.diagnosis.ingest.restated import as_read
 from fluxproof.diagnosis.nominal import load_nominal
-from fluxproof.diagnosis.physics import explain, rows_of, view_of
+from fluxproof.diagnosis.physics import explain, rows_of, single_point, view_of
 from studies.sensitivity.steps import Steps, recorded, varied
 
 FACTORS = (0.5, 2.0)
-# Read with slow logs alone, of which the cases contain none.
-OF_SLOW_LOGS = (
-    "SLOW_DC", "SLOW_U", "SLOW_CHANGE", "SLOW_LEAST", "LEFTOVER", "FLOOR_SHARE", "NAMED_SHARE", "PER_EFFECT",
-)  # fmt: skip
+# Read at one operating point alone, which has no posterior.
+OF_ONE_POINT = ("LEFTOVER", "FLOOR_SHARE", "NAMED_SHARE", "PER_EFFECT")
 
 
 def names() -> list[str]:
     """The constants that are varied."""
-    return [n for n in vars(constants) if n.isupper() and n not in OF_SLOW_LOGS]
+    return [n for n in vars(constants) if n.isupper() and n not in OF_ONE_POINT]
 
 
 def said(verdict, effects, ambiguity) -> dict:
@@ -51,14 +49,13 @@ class Case:
         self.nominal = load_nominal(folder / "drive.toml")
         path = next(p for p in sorted(folder.iterdir()) if p.stem == "recording")
         self.loaded = [load_recording(path, self.nominal)]
-        self.fast = not any(r.slow or r.fatal for r in self.loaded)
-        self.steps, self.recordings = Steps(), None
+        nominal = as_read(self.loaded, self.nominal)
+        self.recordings, self.steps = sound(self.loaded, nominal), Steps()
+        self.known = not any(r.fatal for r in self.loaded) and not single_point(view_of(self.recordings, nominal)[0])
 
     def base(self) -> dict:
         """What is said with the constants as they are."""
-        nominal = as_read(self.loaded, self.nominal)
-        self.recordings = sound(self.loaded, nominal)
-        self.rows, self.held = self.steps(_rows_of, self.recordings, nominal)
+        self.rows, self.held = self.steps(_rows_of, self.recordings, as_read(self.loaded, self.nominal))
         if self.steps.reads():
             raise AssertionError(f"rows depend on {', '.join(sorted(self.steps.reads()))}")
         out = self.said()
@@ -66,7 +63,7 @@ class Case:
         return out
 
     def said(self) -> dict:
-        """What is said now, as the diagnosis of fast recordings does (physics.py)."""
+        """What is said now, as the diagnosis does (physics.py)."""
         steps = self.steps
         posterior = steps(Posterior, steps(Setup.of, self.rows, steps))
         j = steps(judge, posterior, self.held)
@@ -103,10 +100,10 @@ def variations(chosen) -> list[tuple[str, float]]:
 
 
 def answers_of(job) -> tuple[str, dict]:
-    """(name, {"base": said, "NAME x2": said, ...}) of (name, folder, constants); {} without a fast recording."""
+    """(name, {"base": said, "NAME x2": said, ...}) of (name, folder, constants); {} without a posterior."""
     name, folder, chosen = job
     case = Case(folder)
-    if not case.fast:
+    if not case.known:
         return name, {}
     with recorded():
         out = {"base": case.base()}
