@@ -16,7 +16,7 @@ from fluxproof.diagnosis.answer.request import requests, wants_cold
 from fluxproof.diagnosis.answer.scan import Stray, row_residual, stray_order, stray_swing, stray_torque
 from fluxproof.diagnosis.answer.sizes import Sizes, fit_of, with_stray
 from fluxproof.diagnosis.answer.unknown import sparse_term
-from fluxproof.diagnosis.answer.verdict import at_floor, kind_of
+from fluxproof.diagnosis.answer.verdict import at_floor, kind_of, usual
 from fluxproof.diagnosis.inference import constants as k
 from fluxproof.diagnosis.inference.posterior import Posterior
 from fluxproof.diagnosis.inference.problem import covariance_of
@@ -50,13 +50,12 @@ def judge(posterior, held) -> Judgement:
     posterior = setup.call(shown, posterior, held)
     names, best = setup.call(names_of, posterior), posterior.best()
     stray = setup.call(stray_of, posterior, held)
-    if not stray and at_floor(Sizes(setup, setup.cells.y, setup.cells.y, ~held, measured_torque(setup))):
+    if not stray and _is_noise(posterior, names, held):
         # What only the angle of a free shaft shows is in no size: there the names decide.
         shaft = {n for n, effect in setup.effects.items() if effect.mechanical}
         hidden = setup.view.turns_freely.any() or not measured_torque(setup)
         names = names.withheld(frozenset(shaft if hidden else ()))
-    likely = {n for n, p in names.maybe.items() if p >= k.LIKELY}
-    told = (names.said | {n for group in names.open for n in group} | likely) & set(best.names) - set(names.suspects)
+    told = told_of(names, best)
     before, after = setup.cells.y, left_by(best, told)
     train = Sizes(setup, before, after, ~held, measured_torque(setup))
     unseen = Sizes(setup, before, after, held, measured_torque(setup))
@@ -65,6 +64,21 @@ def judge(posterior, held) -> Judgement:
     share = unseen.share(channel) if electrical or (told and measured_torque(setup)) else None
     kind = kind_of(names, train, unseen, channel, share, stray)
     return Judgement(posterior, kind, names, told, channel, share, stray, train, unseen)
+
+
+def told_of(names, best) -> set[str]:
+    """Effects of the best set that explain a part of the misfit: those that are named, open, or likely."""
+    likely = {n for n, p in names.maybe.items() if p >= k.LIKELY}
+    return (names.said | {n for group in names.open for n in group} | likely) & set(best.names) - set(names.suspects)
+
+
+def _is_noise(posterior, names, held) -> bool:
+    """Whether the misfit is at the floor, or is usual and its larger part is not explained at held-out points."""
+    setup, best = posterior.setup, posterior.best()
+    before, after = setup.cells.y, left_by(best, told_of(names, best))
+    train, unseen = (Sizes(setup, before, after, blocks, measured_torque(setup)) for blocks in (~held, held))
+    share = unseen.share(train.primary())
+    return at_floor(train) or (usual(train) and share is not None and share < k.HALF)
 
 
 def shown(posterior, held):

@@ -73,7 +73,7 @@ class Sizes:
     def share(self, channel, orders=None) -> float | None:
         """Share of a channel's power above the floor that was explained, in some or all of its orders."""
         mine = [s for (c, h), s in self.orders.items() if c == channel and (orders is None or h in orders)]
-        mine = [s for s in mine if max(s.before, s.after) > s.above(k.VISIBLE)]
+        mine = [s for s in mine if max(s.before, s.after) > s.floor * (1.0 + k.VISIBLE) ** 0.5]
         excess, left = sum(s.excess for s in mine), sum(s.left for s in mine)
         return float(1.0 - left / excess) if excess > 0.0 else None
 

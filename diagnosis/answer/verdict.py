@@ -14,8 +14,7 @@ def kind_of(names, train, held, channel, share, stray) -> str:
     if not names.confidence and not names.open:
         if names.suspects:
             return "unexplained"
-        quiet = all(s.before <= s.above(k.FLOOR) for s in train.channels.values())
-        return "no_mismatch" if quiet and not stray and not standing_out(train) else "unexplained"
+        return "no_mismatch" if usual(train) and not stray and not standing_out(train) else "unexplained"
     shares = {c: held.share(c) for c in held.channels} | {channel: share}
     left = [c for c, s in held.channels.items() if s.after > s.above(k.FLOOR)]
     whole = all(shares[c] is not None and shares[c] >= 1.0 - k.SMALL for c in left)
@@ -31,6 +30,11 @@ def at_floor(sizes) -> bool:
     """
     orders = [s for (channel, _), s in sizes.orders.items() if channel in sizes.channels]
     return all(s.before <= s.floor * (1.0 + k.FLOOR) ** 0.5 for s in (*sizes.channels.values(), *orders))
+
+
+def usual(sizes) -> bool:
+    """Whether any recording of this kind may have the misfit before an explanation in every channel."""
+    return all(s.before <= s.above(k.FLOOR) for s in sizes.channels.values())
 
 
 def standing_out(sizes) -> list:

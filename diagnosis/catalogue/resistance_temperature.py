@@ -81,7 +81,10 @@ EFFECT = ResistanceTemperature(
         Parameter("resistance_temp_coeff_per_k", "1/K", "copper: 0.0039; needs temp_winding", "coefficient"),
         Parameter("resistance_drift_ohm", "ohm", "from start to end, if no temperature was recorded", "change"),
     ),
-    plausible={"resistance_temp_coeff_per_k": (0.003, 0.005)},
+    plausible={
+        "resistance_temp_coeff_per_k": (0.003, 0.005),
+        "resistance_drift_ohm": (-0.2, 0.6, "machine.resistance_ohm"),
+    },
     otherwise="copper has 0.39 %/K: something else warms up, or the sensor is not at the winding",
     drift_of="resistance",
 )
