@@ -32,6 +32,10 @@ class Size:
     def left(self) -> float:
         return max(self.after**2 - self.floor**2, 0.0)
 
+    def floor_times(self, power) -> float:
+        """The rms whose power exceeds that of the floor by ``power`` times."""
+        return self.floor * (1.0 + power) ** 0.5
+
     def above(self, power) -> float:
         """The rms whose power exceeds that of a usual misfit by ``power`` times."""
         return max(self.floor, self.usual) * (1.0 + power) ** 0.5
@@ -73,7 +77,7 @@ class Sizes:
     def share(self, channel, orders=None) -> float | None:
         """Share of a channel's power above the floor that was explained, in some or all of its orders."""
         mine = [s for (c, h), s in self.orders.items() if c == channel and (orders is None or h in orders)]
-        mine = [s for s in mine if max(s.before, s.after) > s.floor * (1.0 + k.VISIBLE) ** 0.5]
+        mine = [s for s in mine if max(s.before, s.after) > s.floor_times(k.VISIBLE)]
         excess, left = sum(s.excess for s in mine), sum(s.left for s in mine)
         return float(1.0 - left / excess) if excess > 0.0 else None
 

@@ -16,7 +16,10 @@ def kind_of(names, train, held, channel, share, stray) -> str:
             return "unexplained"
         return "no_mismatch" if usual(train) and not stray and not standing_out(train) else "unexplained"
     shares = {c: held.share(c) for c in held.channels} | {channel: share}
-    left = [c for c, s in held.channels.items() if s.after > s.above(k.FLOOR)]
+    # Of what any recording may have, names must explain the larger part too.
+    most = {c: s.floor_times(k.FLOOR) if (shares[c] or 0.0) < k.HALF else s.above(k.FLOOR)
+            for c, s in held.channels.items()}  # fmt: skip
+    left = [c for c, s in held.channels.items() if s.after > most[c]]
     whole = all(shares[c] is not None and shares[c] >= 1.0 - k.SMALL for c in left)
     if not whole or stray:
         return "partly_explained" if share is not None and share >= k.HALF else "unexplained"
@@ -29,7 +32,7 @@ def at_floor(sizes) -> bool:
     Here the floor counts: what effects explain above it is there, also where other recordings have as much.
     """
     orders = [s for (channel, _), s in sizes.orders.items() if channel in sizes.channels]
-    return all(s.before <= s.floor * (1.0 + k.FLOOR) ** 0.5 for s in (*sizes.channels.values(), *orders))
+    return all(s.before <= s.floor_times(k.FLOOR) for s in (*sizes.channels.values(), *orders))
 
 
 def usual(sizes) -> bool:

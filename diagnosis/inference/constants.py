@@ -91,7 +91,7 @@ SWING = 8.0
 # change around a stretch, as a row combines messages of different age.
 SLOW_DC, SLOW_U, SLOW_CHANGE = 2.5e-4, 2e-3, 0.05
 # Of that error: what a log may have at least, as a table of long means is better than messages of a bus.
-SLOW_LEAST = 0.1
+SLOW_LEAST = 0.2
 # Of the voltage: largest noise that may be taken from what no effect explains, where no operating point repeats; more
 # has a cause that is not known.
 UNREPEATED = 0.03
