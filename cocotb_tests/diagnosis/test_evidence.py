@@ -22,7 +22,7 @@ def value_of(y, doubt, x=None):
     k = columns.shape[1]
     return evidence(
         columns, y, np.full(len(y), NOISE**2), np.full(len(y), 1e-4), doubt, np.zeros(len(y), np.int64), 1, -1, 0.0,
-        np.ones(k), np.zeros(k, np.int64), np.ones(k, bool), np.full(k, 100.0), 0.01, 3.0, 1.0, np.inf,
+        np.ones(k), np.zeros(k, np.int64), np.ones(k, bool), np.full(k, 100.0), 0.01, 3.0, 1.0, 1.0, np.inf,
     )  # fmt: skip
 
 

@@ -66,7 +66,7 @@ def test_a_mean_torque_counts_beside_the_noise_of_its_ripple(monkeypatch):
         ok=np.ones(210, bool),
         block=np.zeros(210, int),
     )
-    setup = SimpleNamespace(cells=cells, noise=noise, level=np.zeros(210), load=0.0)
+    setup = SimpleNamespace(cells=cells, usual=noise, load=0.0)
     without = SimpleNamespace(names=(), left=lambda told: fewer)
     best = SimpleNamespace(
         names=("a",),

@@ -114,6 +114,18 @@ def test_either_of_two_causes_is_not_agreement(tmp_path, size, verdict):
         assert abs(loss.value - 0.25 * size) < 2.0 * loss.sigma and said(answer, "Winding resistance")
 
 
+@pytest.mark.parametrize("error_v, verdict", [(0.1, "ambiguous"), (0.15, "no_mismatch")])
+def test_of_a_usual_misfit_effects_explain_the_larger_part_or_are_not_told(tmp_path, error_v, verdict):
+    """A resistance 5 % too large beside errors of the points that repeat: 0.14 V and 0.2 % of the voltage are usual."""
+    columns = {k: np.repeat(v, 2) for k, v in table(Truth(r=1.05 * R), noise_v=error_v, noise_a=0.0).items()}
+    for name in ("u_d_ref", "u_q_ref"):
+        columns[name] += 0.005 * np.random.default_rng(1).standard_normal(len(columns[name]))
+    answer = answer_of(tmp_path, columns)
+    assert answer.verdict == verdict and not answer.effects, answer.sentence
+    assert answer.ambiguity == ([["dead_time", "resistance"]] if verdict == "ambiguous" else [])
+    assert answer.fit.train_before > 3.0 * answer.fit.noise_floor
+
+
 CORRECTED = {  # what a check corrects before the magnets are found
     "i_q has the opposite sign": scaled(("i_q",), -1.0),
     "i_d and i_q are swapped": moved(("i_d", "i_q"), ("i_q", "i_d")),
