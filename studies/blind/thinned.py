@@ -13,26 +13,28 @@ from pathlib import Path
 import pyarrow.parquet as parquet
 
 from fluxproof.diagnosis.catalogue import CATALOGUE
-from fluxproof.files import write_json
+from fluxproof.files import write_json, write_text
 from fluxproof.fleet.engine import in_parallel
 from studies.blind.__main__ import FOLDER
 from studies.blind.figures import asserted, confidently_wrong, named_right, rate, tied, true_names
 from studies.blind.generate import GENERATORS, generate
-from studies.blind.score import answer_of
+from studies.blind.score import answer_of, recording_of
 from studies.blind.seal import unseal
 
 EVERY = 6  # rows; of 8 to 20 kHz
 
 
-def thin(case: Path, out: Path, every: int) -> Path | None:
-    """Write every N-th row of a case's recording and its drive file to ``out``; None if it is no Parquet file."""
-    source = case / "recording.parquet"
-    if not source.exists():
-        return None
+def thin(case: Path, out: Path, every: int) -> Path:
+    """Write every N-th row of a case's recording and its drive file to ``out``."""
+    source = recording_of(case)
     out.mkdir(parents=True, exist_ok=True)
-    table = parquet.read_table(source)
-    parquet.write_table(table.take(list(range(0, table.num_rows, every))), out / "recording.parquet")
-    (out / "drive.toml").write_text((case / "drive.toml").read_text())
+    if source.suffix == ".parquet":
+        table = parquet.read_table(source)
+        parquet.write_table(table.take(list(range(0, table.num_rows, every))), out / source.name)
+    else:
+        head, *rows = source.read_text().splitlines()
+        write_text(out / source.name, "\n".join([head, *rows[::every]]) + "\n")
+    write_text(out / "drive.toml", (case / "drive.toml").read_text())
     return out
 
 
@@ -72,7 +74,7 @@ def main(arguments=None) -> int:
         generate(options.seed, folder, options.count, jobs=options.jobs, generator=options.generator)
     cases = sorted(folder.glob("case_*"))[: options.count]
     made = folder.parent / f"thinned_{options.every}_seed{options.seed}"
-    work = [out for case in cases if (out := thin(case, made / case.name, options.every))]
+    work = [thin(case, made / case.name, options.every) for case in cases]
     answers = dict(answer for _, answer in in_parallel(answer_of, work, options.jobs, "diagnosed"))
     truth = {t["case"]: t for t in unseal(folder)["cases"]}
     result = summary([(truth[name], answer) for name, answer in sorted(answers.items())])

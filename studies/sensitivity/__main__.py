@@ -15,6 +15,7 @@ import multiprocessing
 import os
 import sys
 import time
+from collections import Counter
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: one core for each case
@@ -22,21 +23,28 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: one core for
 from fluxproof.checkout import BUILD, ROOT
 from fluxproof.files import write_json  # noqa: E402
 from studies.blind.generate import GENERATORS, generate  # noqa: E402
+from studies.blind.thinned import thin  # noqa: E402
 from studies.sensitivity.run import FACTORS, answers_of, differences, names, shares  # noqa: E402
 
 LIMIT = 0.02  # of the verdicts: a constant that changes more is a tuned one
-MIX = "own:140,motulator:25,gem:15"
+MIX = "own:110,motulator:25,gem:25,own@6:60"
 OUT = BUILD / "sensitivity"
 
 
 def cases_of(seed: int, mix: dict[str, int], jobs: int) -> dict[str, Path]:
-    """{"own/case_0001": folder}, the generators mixed; cases that do not exist are simulated."""
+    """{"own/case_0001": folder}, the generators mixed; cases that do not exist are simulated.
+
+    mix: cases of each generator, of "own@6" with every sixth row of them, which makes operating points.
+    """
     placed = []
     for generator, count in mix.items():
-        folder = OUT / f"seed{seed}" / generator
+        name, _, every = generator.partition("@")
+        folder = OUT / f"seed{seed}" / name
         if not (folder / "sealed.sha256").exists():
-            generate(seed, folder, count, jobs=jobs, generator=generator)
+            generate(seed, folder, count, jobs=jobs, generator=name)
         cases = sorted(folder.glob("case_*"))[:count]
+        if every:
+            cases = [thin(case, folder.with_name(generator) / case.name, int(every)) for case in cases]
         placed += [((n + 0.5) / len(cases), f"{generator}/{case.name}", case) for n, case in enumerate(cases)]
     return {name: case for _, name, case in sorted(placed)}
 
@@ -84,7 +92,7 @@ def summary(seed: int, known: dict, chosen) -> dict:
     return {
         "constants": len(each),
         "cases": len(judged),
-        "generators": {g: sum(case.startswith(f"{g}/") for case in judged) for g in GENERATORS},
+        "generators": dict(Counter(case.split("/")[0] for case in judged)),
         "seed": seed,
         "worst": worst,
         "worst_share": each[worst]["share"],
@@ -107,7 +115,7 @@ def main(arguments=None) -> int:
     """The command line; returns 0 whatever the figures, or the number of differences found."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seed", type=int, default=7)
-    parser.add_argument("--mix", default=MIX, help="GENERATOR:CASES, separated by commas")
+    parser.add_argument("--mix", default=MIX, help="GENERATOR:CASES or GENERATOR@EVERY:CASES, separated by commas")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--constants", default="", help="names, separated by commas (default: all)")
     parser.add_argument("--check", type=int, default=0, help="compare reused with whole runs on so many cases instead")
@@ -117,7 +125,7 @@ def main(arguments=None) -> int:
     if unknown:
         parser.error(f"--constants: {', '.join(unknown)} is not among {', '.join(names())}")
     mix = {generator: int(count) for generator, count in (part.split(":") for part in options.mix.split(","))}
-    if not set(mix) <= set(GENERATORS):
+    if not {generator.partition("@")[0] for generator in mix} <= set(GENERATORS):
         parser.error(f"--mix: generators are {', '.join(GENERATORS)}")
     if options.check:
         return check(list(cases_of(options.seed, mix, options.jobs).items())[: options.check], chosen)
