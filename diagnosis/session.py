@@ -21,6 +21,7 @@ from pathlib import Path
 from threadpoolctl import threadpool_limits
 
 from fluxproof.diagnosis.answer.advice import complete
+from fluxproof.diagnosis.answer.flux_found import NAME as FLUX_MAP
 from fluxproof.diagnosis.answer.flux_found import write_flux_map
 from fluxproof.diagnosis.answer.improve import write_improved
 from fluxproof.diagnosis.balance.parts import left_out
@@ -39,7 +40,7 @@ from fluxproof.diagnosis.report import write_outputs
 from fluxproof.diagnosis.result import Diagnosis, Digital
 from fluxproof.golden_model.drive_keys import DriveError
 
-IMPROVED = "drive_improved.toml"
+IMPROVED, ANSWER = "drive_improved.toml", "diagnosis.json"
 FLUX_MAP_NOTE = (
     'flux_map.csv holds the flux linkage over the recorded currents; [plant.machine] flux_map = "flux_map.csv" uses it.'
 )
@@ -133,12 +134,22 @@ def _diagnose(loaded, nominal, progress, fleet=None) -> Diagnosis:
 
 
 def _folder(out: Path, nominal: Nominal) -> Path:
-    """Create the folder before the long computation; DriveError if the result would overwrite the drive file."""
+    """Create the folder before the long computation; DriveError if the results would overwrite a file of the user."""
     out.mkdir(parents=True, exist_ok=True)
-    target = out / IMPROVED
-    if nominal.path and target.exists() and Path(nominal.path).exists() and target.samefile(nominal.path):
+    target, chart = out / IMPROVED, out / FLUX_MAP
+    if _same(target, nominal.path):
         raise DriveError(f"{target}: this is the drive to diagnose and would be overwritten; choose another folder")
+    used = nominal.plant.get("machine", {}).get("flux_map")
+    if isinstance(used, str) and _same(chart, Path(nominal.path or "").parent / used):
+        raise DriveError(f"{chart}: this is the flux map of the drive and would be overwritten; choose another folder")
+    if chart.exists() and not (out / ANSWER).exists():
+        raise DriveError(f"{chart}: this is of no earlier diagnosis and would be overwritten; choose another folder")
     return out
+
+
+def _same(target: Path, source) -> bool:
+    """Whether both are one existing file; source: a path or None."""
+    return bool(source) and target.exists() and Path(source).exists() and target.samefile(source)
 
 
 def _prior_note(answer) -> str:

@@ -136,6 +136,19 @@ def test_the_drive_to_diagnose_is_never_overwritten(explained, dump, tmp_path, c
     assert "would be overwritten" in capsys.readouterr().err and mine.read_bytes() == before
 
 
+@pytest.mark.parametrize("used", [False, True])
+def test_a_flux_map_of_the_user_is_never_overwritten(explained, dump, tmp_path, capsys, used):
+    drive, mine, out = tmp_path / "drive.toml", tmp_path / "out" / "flux_map.csv", tmp_path / "out"
+    text = (explained[0] / "drive_improved.toml").read_text()
+    drive.write_text(text + ('\n[plant.machine]\nflux_map = "out/flux_map.csv"\n' if used else ""))
+    out.mkdir()
+    mine.write_text("mine\n")
+    if used:
+        (out / "diagnosis.json").write_text("{}\n")
+    assert diagnose(out, write_dump(tmp_path / "run.dump", dump, rows=2000), drive=drive) == 2
+    assert "would be overwritten" in capsys.readouterr().err and mine.read_text() == "mine\n"
+
+
 @pytest.mark.parametrize(
     ("register", "bit", "block"), [("kp_q", 5, "current_pi"), ("k_delay", 4, "svm_delay_compensation")]
 )

@@ -403,7 +403,8 @@ def test_flux_map_of_a_table(tmp_path, points, written):
     columns["u_d_ref"] -= columns["omega_e"] * (flux_q(columns["i_q"]) - L_Q * columns["i_q"])
     (tmp_path / "drive.toml").write_text(DRIVE)
     (tmp_path / "out").mkdir()
-    (tmp_path / "out" / "flux_map.csv").write_text("of an earlier run")
+    for name in ("flux_map.csv", "diagnosis.json"):
+        (tmp_path / "out" / name).write_text("of an earlier run")
     answer = run(write(tmp_path / "r.csv", columns), tmp_path / "drive.toml", tmp_path / "out")
     assert (tmp_path / "out" / "flux_map.csv").exists() == written == said(answer, "flux_map.csv"), answer.sentence
     if written:
