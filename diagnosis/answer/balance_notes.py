@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from fluxproof.diagnosis.balance.cells import voltage_level
+from fluxproof.diagnosis.answer.phrases import capital
 from fluxproof.diagnosis.balance.holdout import FEW
 from fluxproof.diagnosis.balance.slow_view import SlowView
 from fluxproof.diagnosis.catalogue import CATALOGUE
-
-SMALL_DROP = 0.1  # of the voltage: a smaller drop of the resistance does not determine it
 
 
 def balance_notes(view, held, effects, ambiguity) -> list[str]:
@@ -43,11 +41,8 @@ def _of_points(view, held) -> list[str]:
         notes.append(
             "One direction only: encoder offset and inverter loss are separated from others by load and speed alone."
         )
-    share = view.machine.resistance_ohm * np.abs(i) / voltage_level(view).clip(1e-9)
-    if share.max() < SMALL_DROP:
-        notes.append(f"The resistance drops at most {share.max():.1%} of the voltage: it cannot be determined here.")
     return notes
 
 
 def _separated(effect) -> str:
-    return f"{effect.name} is separated from similar effects by: {effect.separated_by}."
+    return f"{capital(effect.title)} is separated from similar effects by: {effect.separated_by}."

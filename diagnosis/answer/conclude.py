@@ -73,12 +73,16 @@ def told_of(names, best) -> set[str]:
 
 
 def _is_noise(posterior, names, held) -> bool:
-    """Whether the misfit is at the floor, or is usual and its larger part is not explained at held-out points."""
+    """Whether the misfit is at the floor, or is usual and its larger part is not explained at held-out points.
+
+    Usual is what a log may have whose own error is not known (least_error); that of others is their floor.
+    """
     setup, best = posterior.setup, posterior.best()
     before, after = setup.cells.y, left_by(best, told_of(names, best))
     train, unseen = (Sizes(setup, before, after, blocks, measured_torque(setup)) for blocks in (~held, held))
     share = unseen.share(train.primary())
-    return at_floor(train) or (usual(train) and share is not None and share < k.HALF)
+    little = share is not None and share < k.HALF and setup.view.least_error < 1.0
+    return at_floor(train) or (little and usual(train))
 
 
 def shown(posterior, held):
