@@ -1,7 +1,8 @@
 """The answer in words: a headline of at most two lines, and the figures below it.
 
-Titles of effects and parameters are those that the effects declare.  Where a headline would be longer than MOST
-letters, it says less of each effect, then of fewer effects; the whole is in ``details`` and in the table of effects.
+Titles of effects and parameters are those that the effects declare.  Where a headline would be longer than
+MOST_LETTERS letters, it says less of each effect, then of fewer effects; the whole is in ``details`` and in the table
+of effects.
 """
 
 from __future__ import annotations
@@ -22,13 +23,13 @@ from fluxproof.diagnosis.answer.phrases import (
 )
 from fluxproof.diagnosis.quantities import ascii_of, quantity
 
-MOST = 200  # letters of a headline: two lines of a terminal or of the report
+MOST_LETTERS = 200  # letters of a headline: two lines of a terminal or of the report
 
 
 def sentence(answer, effects) -> str:
     """The verdict of an answer as a headline; effects: the catalogue."""
     variants = _variants(answer, effects)
-    return next((text for text in variants if len(text) <= MOST), variants[-1])
+    return next((text for text in variants if len(text) <= MOST_LETTERS), variants[-1])
 
 
 def details(answer, effects) -> str:

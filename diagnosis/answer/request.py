@@ -22,7 +22,7 @@ from fluxproof.diagnosis.result import Request
 ROWS = 200
 SHOWN = 0.06  # share of an effect's longest column below which the recording does not show a coefficient
 BLOCKS = 20  # independent blocks assumed in a dwell of half a second
-MOST = 3
+MOST_REQUESTS = 3
 # Share of D^2 that is given up to avoid an axis without current so far, whose parameters are unknown, and to avoid
 # full speed and rated current, since unmodelled effects grow with both.
 NEW_AXIS, STRAIN = 0.2, 0.2
@@ -173,7 +173,7 @@ def wants_cold(names, effects, view) -> bool:
 
 
 def requests(setup, fits, noise_v, cold=False) -> list[Request]:
-    """Up to MOST operating points that together separate the sets of ``fits`` best, the most informative first.
+    """Up to MOST_REQUESTS operating points that together separate the sets of ``fits`` best, the best one first.
 
     cold: points of a machine that has cooled down are candidates too.
     """
@@ -200,7 +200,7 @@ def requests(setup, fits, noise_v, cold=False) -> list[Request]:
     pairs = list(itertools.permutations(range(len(solutions)), 2))
     rivals = [rivalry(predictions[a], predictions[b], *knows[b], sigma, p.block, len(omega)) for a, b in pairs]
     effort = (omega / np.abs(omega).max()) ** 2 + np.abs(i / view.machine.rated_current_a) ** 2
-    chosen = best_points(rivals, MOST, NEW_AXIS * new_axes(view, i), STRAIN * effort)
+    chosen = best_points(rivals, MOST_REQUESTS, NEW_AXIS * new_axes(view, i), STRAIN * effort)
     out, within = [], within_limits(view)
     for k in chosen:
         each = [r.left([k]) for r in rivals]

@@ -18,7 +18,7 @@ import numpy as np
 
 from fluxproof.diagnosis.balance.view import HALF_WIDTH, SLOPE_REACH
 
-MOST = 50  # harmonics of the sawtooth; those above have less than 1 % of its power
+HARMONICS = 50  # harmonics of the sawtooth; those above have less than 1 % of its power
 REGULAR, OF_A_STEP = 0.95, 0.1  # share of the second differences that are whole steps, within this part of one
 BLOCKS = 64  # at once, for the memory
 
@@ -70,7 +70,7 @@ def _beats(view, response, places, tapered):
     out = np.zeros(places.shape)
     if not view.angle_step:
         return out
-    m, turn = np.arange(1, MOST + 1), _turn(view)
+    m, turn = np.arange(1, HARMONICS + 1), _turn(view)
     for at in range(0, len(out), BLOCKS):
         part = slice(at, at + BLOCKS)
         cycles = m * (turn[part, None] / view.angle_step)

@@ -12,9 +12,9 @@ import numpy as np
 from fluxproof.diagnosis.balance.misfit import misfit
 from fluxproof.diagnosis.balance.shaft import bend_gain
 
-LEAST = 5  # per mechanical turn: an unbalanced load or a bent shaft has fewer
+LEAST_PER_TURN = 5  # per mechanical turn: an unbalanced load or a bent shaft has fewer
 EVERY = 36  # per electrical turn: up to here every order per mechanical turn is a candidate
-MOST = 108  # per electrical turn: up to here the even ones
+MOST_PER_PERIOD = 108  # per electrical turn: up to here the even ones
 ALWAYS = range(2, 38, 2)  # per electrical turn, evaluated in every recording
 MULTIPLES = (1, 2, 3)  # of the repeating order
 LOCKS = 0.5  # least phase lock, relative to the best one, of a cogging order
@@ -50,8 +50,8 @@ def log_prior(view) -> float:
 
 def _candidates(pairs: int) -> list[int]:
     """Orders per mechanical turn that are tried."""
-    even = range(2 * pairs, MOST * pairs + 1, 2 * pairs)
-    return sorted({*range(LEAST, EVERY * pairs + 1), *even})
+    even = range(2 * pairs, MOST_PER_PERIOD * pairs + 1, 2 * pairs)
+    return sorted({*range(LEAST_PER_TURN, EVERY * pairs + 1), *even})
 
 
 def _searched(view) -> int:

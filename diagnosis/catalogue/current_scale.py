@@ -9,7 +9,7 @@ import numpy as np
 from fluxproof.diagnosis.catalogue.current_gain import gain_column
 from fluxproof.diagnosis.effects.effect import Effect, Parameter, current_error, one, sigma
 
-MOST, LEAST = 2.5, -0.75  # of the scale: sensors of a drive that runs measure the current within a factor of 3.5
+LARGEST_SCALE, SMALLEST_SCALE = 2.5, -0.75  # the sensors of a drive that runs are right within a factor of 3.5
 
 
 def _scale(c) -> float:
@@ -31,11 +31,11 @@ class CurrentScale(Effect):
         return 0.6
 
     def too_large(self, c, view):
-        return c["share"] >= 1.0 or not LEAST < _scale(c) < MOST
+        return c["share"] >= 1.0 or not SMALLEST_SCALE < _scale(c) < LARGEST_SCALE
 
     def corrected(self, view, c):
         rated = view.machine.rated_current_a
-        kept = 1.0 - min(c["share"], MOST / (1.0 + MOST))
+        kept = 1.0 - min(c["share"], LARGEST_SCALE / (1.0 + LARGEST_SCALE))
         factor = kept / (1.0 + kept * c.get("droop", 0.0) * np.abs(view.i / rated) ** 2)
         return view.replace(
             i=view.i * factor,

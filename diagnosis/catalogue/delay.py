@@ -10,7 +10,7 @@ from fluxproof.diagnosis.balance.curves import parabola
 from fluxproof.diagnosis.balance.late_pulses import instant, late_ripple
 from fluxproof.diagnosis.effects.effect import Effect, Parameter, current_error, one, torque_of, voltage
 
-MOST = 1.2  # periods: beyond one period the interpolation continues linearly, so that the iteration can return
+MOST_PERIODS = 1.2  # periods: beyond one period the interpolation continues linearly, so that the iteration can return
 TRIED, FINE = np.arange(1, 50) / 50, 0.002  # periods, of late pulses
 NEAR = 0.15  # periods between a delay and that of its ripple: about a zero vector
 STEP = 0.005  # periods on both sides of a delay, over which the slope of the ripple is taken
@@ -114,7 +114,7 @@ class Delay(Effect):
         return RIPPLE * np.sqrt(np.mean(np.abs(seen) ** 2, axis=1))
 
     def corrected(self, view, c):
-        late = float(np.clip(_time(c) / view.sample_time_s, -MOST, MOST))
+        late = float(np.clip(_time(c) / view.sample_time_s, -MOST_PERIODS, MOST_PERIODS))
         moved, error = view.replace(u=view.u + _moved(view, late)), _error(view, c)
         if not error.any():
             return moved

@@ -5,7 +5,7 @@ import numpy as np
 from fluxproof.diagnosis.balance.curves import course
 from fluxproof.diagnosis.effects.effect import DOUBT, FluxEffect, Parameter, one, sigma
 
-MOST = 2.0  # of the nameplate's flux, by which the true one may differ
+MOST_OF_NAMEPLATE = 2.0  # of the nameplate's flux, by which the true one may differ
 
 
 class MagnetFlux(FluxEffect):
@@ -29,7 +29,7 @@ class MagnetFlux(FluxEffect):
         return 0.6 * nominal.machine.magnet_flux_wb
 
     def too_large(self, c, view):
-        most = MOST * view.machine.magnet_flux_wb
+        most = MOST_OF_NAMEPLATE * view.machine.magnet_flux_wb
         return self.size(c, view.nominal) > most or self._leaves_nothing(c, view.machine)
 
     def estimates(self, c, covariance, nominal):

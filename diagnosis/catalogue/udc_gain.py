@@ -2,7 +2,7 @@
 
 from fluxproof.diagnosis.effects.effect import Effect, Parameter, one, sigma, voltage
 
-MOST, LEAST = 2.5, -0.75  # of the gain: the sensor of a drive that runs measures its bus within a factor of 3.5
+LARGEST_GAIN, SMALLEST_GAIN = 2.5, -0.75  # the sensor of a drive that runs is right within a factor of 3.5
 
 
 class UdcGain(Effect):
@@ -17,10 +17,10 @@ class UdcGain(Effect):
         return 0.5
 
     def too_large(self, c, view):
-        return not LEAST < c["gain"] < MOST
+        return not SMALLEST_GAIN < c["gain"] < LARGEST_GAIN
 
     def corrected(self, view, c):
-        factor = 1.0 / (1.0 + max(c["gain"], LEAST))
+        factor = 1.0 / (1.0 + max(c["gain"], SMALLEST_GAIN))
         return view.replace(u=view.u * factor, u_dc=view.u_dc * factor)
 
     def estimates(self, c, covariance, nominal):

@@ -12,7 +12,7 @@ from fluxproof.diagnosis.checks.runs import mark, quantum, runs_of_equal
 from fluxproof.diagnosis.recording import Problem
 
 STAGE = "signals"
-LEAST = 3  # rows
+LEAST_CLIPPED = 3  # rows
 CODES = 12.0
 SHARE = 0.03  # of the channel's range
 MOST_RUNS = 5000
@@ -33,7 +33,7 @@ def _check_one(recording, name) -> None:
     least_gain = max(CODES * step, SHARE * (high - low))
     tops, starts, lengths = 0, [], []
     for top in (high, low):
-        first, length = runs_of_equal(x == top, LEAST)
+        first, length = runs_of_equal(x == top, LEAST_CLIPPED)
         at_top = x[first] == top
         first, length = first[at_top], length[at_top]
         found = _clipped(x, first[:MOST_RUNS], length[:MOST_RUNS], least_gain)

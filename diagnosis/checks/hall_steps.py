@@ -8,7 +8,7 @@ from fluxproof.diagnosis.checks.agreement import wrapped
 from fluxproof.diagnosis.recording import Problem
 
 STAGE = "units"
-FEWEST, MOST = 3, 12  # different angles per turn
+LEAST_ANGLES, MOST_ANGLES = 3, 12  # different angles per turn
 STEPS = 24  # from one angle to the next in the whole recording: a few turns
 LARGE = 0.4  # rad of a step: an encoder of a rotor at rest jumps by one code
 STILL = 0.5  # least share of rows in which the angle stays: sampling in step with the rotor sees few angles too
@@ -23,7 +23,7 @@ def check(recording, nominal) -> None:
     if not STEPS <= len(moves) <= (1.0 - STILL) * len(steps) or np.median(np.abs(wrapped(steps[moves]))) < LARGE:
         return
     angles = len(np.unique(np.round(np.mod(theta, 2.0 * np.pi), 3)))
-    if not FEWEST <= angles <= MOST:
+    if not LEAST_ANGLES <= angles <= MOST_ANGLES:
         return
     message = (
         f"the angle moves in {angles} steps per turn, as that of Hall sensors: record the angle of an encoder, or the "

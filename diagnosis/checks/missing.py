@@ -14,7 +14,7 @@ ABSURD = 1e9  # larger values are due to an overflow or a wrong format
 SLOW = ("temp_winding", "torque", "u_dc", "i_d_ref", "i_q_ref", "u_d_ref", "u_q_ref")
 OPTIONAL = ("temp_winding", "torque", "i_d_ref", "i_q_ref")
 PHASES = ("i_a", "i_b", "i_c")
-MOST = 0.5  # largest missing share of a required column
+MOST_MISSING = 0.5  # largest missing share of a required column
 
 
 def check(recording, nominal) -> None:
@@ -42,7 +42,7 @@ def check(recording, nominal) -> None:
                     Problem("missing", "contains no finite number", name, row, bad, fatal=True)
                 )
             continue
-        if name not in SLOW and bad > MOST * n:
+        if name not in SLOW and bad > MOST_MISSING * n:
             message = f"{bad} of {n} values are missing or not finite"
             recording.problems.append(Problem("missing", message, name, row, bad, fatal=True))
             continue
@@ -82,7 +82,7 @@ def _drop_rows_without_time(recording) -> None:
     if not bad:
         return
     row = int(np.argmin(good))
-    if bad > MOST * len(t) or len(t) - bad < 2:
+    if bad > MOST_MISSING * len(t) or len(t) - bad < 2:
         message = f"{bad} of {len(t)} times are missing or not finite"
         recording.problems.append(Problem("missing", message, "t", row, bad, fatal=True))
         return

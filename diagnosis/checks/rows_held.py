@@ -12,19 +12,19 @@ from fluxproof.diagnosis.checks.missing import keep_rows
 from fluxproof.diagnosis.recording import Problem
 
 STAGE = "time"
-LEAST = 100  # different rows
+LEAST_DIFFERENT = 100  # different rows
 REGULAR = 0.9  # share of them that are written equally often
 CLOSE = 0.02  # of the angle's advance
 
 
 def check(recording, nominal) -> None:
     n = len(recording)
-    if recording.points or n < 2 * LEAST:
+    if recording.points or n < 2 * LEAST_DIFFERENT:
         return
     new = np.ones(n, bool)
     new[1:] = ~np.all([v[1:] == v[:-1] for name, v in recording.columns.items() if name != "t"], axis=0)
     first = np.flatnonzero(new)
-    if len(first) < LEAST:
+    if len(first) < LEAST_DIFFERENT:
         return
     often = np.diff(first)
     times = int(np.median(often))

@@ -15,7 +15,7 @@ from fluxproof.diagnosis.checks.runs import mark, runs_of_equal
 from fluxproof.diagnosis.recording import Problem
 
 STAGE = "signals"
-LEAST = 50  # rows
+LEAST_STUCK = 50  # rows
 MOST_RUNS = 2000
 CURRENT = 0.1  # of rated current: what counts as a change
 DUTY = 0.03
@@ -49,7 +49,7 @@ def check(recording, nominal) -> None:
 
 
 def _check_one(recording, name, moved) -> None:
-    first, length = runs_of_equal(recording[name], LEAST)
+    first, length = runs_of_equal(recording[name], LEAST_STUCK)
     if not len(first):
         return
     longest = np.argsort(-length, kind="stable")[:MOST_RUNS]
@@ -82,7 +82,7 @@ def _turned(recording, period) -> tuple[np.ndarray, np.ndarray]:
 
 def _speed_left(recording, by_angle, a, b, period) -> bool:
     """Whether the rate of the angle differs between the halves of the run and from the constant speed."""
-    if "theta_e" not in recording.columns or b - a < LEAST:
+    if "theta_e" not in recording.columns or b - a < LEAST_STUCK:
         return False
     middle = (a + b) // 2
     first, second = (

@@ -15,7 +15,7 @@ import numpy as np
 from scipy import optimize, stats
 
 WIDE = 10.0
-LEAST = 3  # drives of a population: with two, spread and mean cannot be told apart
+LEAST_DRIVES = 3  # drives of a population: with two, spread and mean cannot be told apart
 MOST_FAULTY = 0.3  # epsilon: beyond, the faulty ones are a population of their own
 FAULTY_PRIOR = (1.0, 30.0)  # Beta: one drive in thirty
 
@@ -59,9 +59,9 @@ def pooled(values, sigmas) -> tuple[float, float]:
 
 
 def population(effect, parameter, unit, serials, x, s) -> Population | None:
-    """The population of values x (n,) with standard deviations s (n,); None for fewer than LEAST drives."""
+    """The population of values x (n,) with standard deviations s (n,); None for fewer than LEAST_DRIVES drives."""
     x, s = np.asarray(x, float), np.asarray(s, float)
-    if len(x) < LEAST:
+    if len(x) < LEAST_DRIVES:
         return None
     centre = float(np.median(x))
     scale = max(float(stats.median_abs_deviation(x, scale="normal")), float(np.median(s)), 1e-12 * abs(centre), 1e-300)

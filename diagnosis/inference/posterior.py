@@ -17,7 +17,7 @@ KEPT = (12, 80)  # least and most sets of one size that are grown further
 EFFORT = 20000  # rows times sets of one size
 CLOSE = 20.0  # log evidence below the best within which linearising a set on its own is worth the effort
 GROWN = 3  # effects up to which all good sets are grown
-MOST = 6
+MOST_EFFECTS = 6
 ALIKE = 8  # best sets that are linearised on their own before the search around one of them
 LEADERS = 3  # best single effects that are linearised on their own
 FAR = 0.3  # of the voltage: only a larger misfit can be of an effect that is far from linear
@@ -121,7 +121,7 @@ class Posterior:
 
     def _grow(self, problem, able):
         wide = int(np.clip(EFFORT / max(len(problem.p.y), 1), *KEPT))
-        for size in range(2, (MOST if wide == KEPT[1] else GROWN) + 1):
+        for size in range(2, (MOST_EFFECTS if wide == KEPT[1] else GROWN) + 1):
             leaders = sorted((f for f in self.fits.values() if len(f.names) == size - 1), key=lambda f: -f.value)
             leaders = leaders[: len(able) if size == 2 else wide]
             sets = {tuple(sorted({*f.names, n})) for f in leaders for n in able if n not in f.names}
@@ -136,7 +136,7 @@ class Posterior:
         rests = itertools.combinations(names, len(names) - 2) if len(names) > 1 else ()
         fewer = [(*rest, n) for rest in rests for n in able]
         two = [(*names, *pair) for pair in itertools.combinations(able, 2)] if len(names) <= 1 else []
-        self._add(problem, [*less, *(m for m in more if len(m) <= MOST), *swapped, *fewer, *two])
+        self._add(problem, [*less, *(m for m in more if len(m) <= MOST_EFFECTS), *swapped, *fewer, *two])
 
     def _near(self, known):
         """Linearise close sets on their own if they correct other errors than the best one."""
@@ -155,7 +155,7 @@ class Posterior:
 
     def _settle(self):
         """Judge the best set and its parts on their own linearisations until the best one stands."""
-        for _ in range(MOST):
+        for _ in range(MOST_EFFECTS):
             best = self.best().names
             if not best:
                 return

@@ -30,7 +30,7 @@ VERDICTS = {
     ),
     "bad_recording": ("bad", "The recording cannot be diagnosed. Nothing was compared."),
 }
-LEAST = 0.005  # a smaller share would be told as 0 %
+LEAST_SHARE = 0.005  # a smaller share would be told as 0 %
 SMALL = 0.5  # where shares sum up to more, one without any is small and not taken over
 VARIABLES = {
     "t": ("time", "s"),
@@ -56,7 +56,7 @@ def explained(effect, effects) -> str:
     The share is what is left without the effect alone: none of a torque if the voltage counts, and none of two effects
     that take each other's part.
     """
-    if not math.isfinite(effect.explains) or effect.explains > LEAST:
+    if not math.isfinite(effect.explains) or effect.explains > LEAST_SHARE:
         return percent(effect.explains)
     entry = CATALOGUE.get(effect.name)
     if entry is not None and entry.mechanical:
