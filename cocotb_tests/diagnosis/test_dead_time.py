@@ -98,7 +98,7 @@ def test_no_leg_gains_voltage():
 @pytest.mark.parametrize(
     ("seed", "number", "names"),
     [
-        (27182818, 130, ["dead_time"]),  # no d-axis inductance for the residual of late pulses
+        slowly(27182818, 130, ["dead_time"]),  # no d-axis inductance for the residual of late pulses
         slowly(27182818, 229, ["dead_time", "phase_resistance_asymmetry"]),  # a dominant effect does not replace both
         # A resistance of a tenth of the loss may be a device's: it is named or left out, and nothing else is.
         slowly(27182818, 30, ["dead_time", "resistance"]),
