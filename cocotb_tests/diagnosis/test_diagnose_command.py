@@ -17,6 +17,7 @@ from cocotb_tests.support import diagnosed_drives as bench
 from cocotb_tests.support.damaged_files import damaged_files
 from cocotb_tests.support.mistakes import MISTAKES, written
 from cocotb_tests.support.recordings_made import nominal_of
+from cocotb_tests.support.slow import slowly
 from fluxproof import command as fluxproof
 from fluxproof.checkout import ROOT
 from fluxproof.diagnosis import command, session
@@ -326,11 +327,12 @@ def test_failing_overlay_adds_only_a_note(dump, tmp_path, monkeypatch):
     answer(tmp_path / "out")
 
 
-@pytest.mark.parametrize("digit", ["0", pytest.param("5", marks=pytest.mark.slow)])
-def test_files_with_flipped_bits_end_without_traceback_and_without_a_name(digit, tmp_path):
+@pytest.mark.parametrize("digit, every", [("0", 3), slowly("0", 1), slowly("5", 1)])
+def test_files_with_flipped_bits_end_without_traceback_and_without_a_name(digit, every, tmp_path):
     """Bits flipped in files of every format: they may be rejected, but no name comes without a finding."""
     nominal = nominal_of(tmp_path)
-    files = {n: path for n, (path, _) in damaged_files(tmp_path).items() if n.startswith("flip") and n[4] == digit}
+    flipped = {n: path for n, (path, _) in damaged_files(tmp_path).items() if n.startswith("flip") and n[4] == digit}
+    files = dict(list(flipped.items())[::every])
     named, refused = [], 0
     for name, path in files.items():
         try:
@@ -340,4 +342,4 @@ def test_files_with_flipped_bits_end_without_traceback_and_without_a_name(digit,
             continue
         if (found.effects or found.ambiguity) and not found.problems:
             named.append(f"{name}: {found.sentence} {[p.message for p in found.problems]}")
-    assert len(files) >= 9 and refused < len(files) and not named, "\n".join(named)
+    assert len(files) >= 9 // every and refused < len(files) and not named, "\n".join(named)
