@@ -110,6 +110,12 @@ def test_a_case_under_variations(folder):
     assert out["base"]["names"] == ["resistance"] and all(value == out["base"] for value in out.values())
 
 
+def test_a_recording_without_a_steady_stretch_does_not_count(folder):
+    table = pd.read_parquet(folder / "recording.parquet")
+    table.iloc[::400].to_parquet(folder / "recording.parquet")
+    assert answers_of(("own/case_0001", folder, ["HALF"])) == ("own/case_0001", {})
+
+
 @pytest.mark.parametrize("name, factor", [("BALANCE_U", 1e4), ("POINT", 2.0)] + [
     pytest.param(*varied, marks=pytest.mark.slow)
     for varied in (("BALANCE_U", 2.0), ("FORMULA", 0.5), ("PRESENT", 0.5), ("DOUBTED", 0.5), ("MISREAD", 0.5))

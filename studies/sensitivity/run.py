@@ -17,6 +17,7 @@ from fluxproof.diagnosis.ingest.load import load_recording
 from fluxproof.diagnosis.ingest.restated import as_read
 from fluxproof.diagnosis.nominal import load_nominal
 from fluxproof.diagnosis.physics import explain, rows_of, single_point, view_of
+from fluxproof.diagnosis.recording import RecordingError
 from studies.sensitivity.steps import Steps, recorded, varied
 
 FACTORS = (0.5, 2.0)
@@ -51,7 +52,14 @@ class Case:
         self.loaded = [load_recording(path, self.nominal)]
         nominal = as_read(self.loaded, self.nominal)
         self.recordings, self.steps = sound(self.loaded, nominal), Steps()
-        self.known = not any(r.fatal for r in self.loaded) and not single_point(view_of(self.recordings, nominal)[0])
+        self.known = not any(r.fatal for r in self.loaded) and self._has_posterior(nominal)
+
+    def _has_posterior(self, nominal) -> bool:
+        """Whether there is a steady stretch, and more than one operating point."""
+        try:
+            return not single_point(view_of(self.recordings, nominal)[0])
+        except RecordingError:
+            return False
 
     def base(self) -> dict:
         """What is said with the constants as they are."""
