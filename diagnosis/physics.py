@@ -52,13 +52,14 @@ def known_effects() -> dict:
     return {**CATALOGUE, **SUSPECTS}
 
 
-def view_of(recordings, nominal):
+def view_and_held(recordings, nominal):
     """(View, (b,) held-out blocks) of recordings of one drive: blocks of rows, or operating points.
 
     Operating points if any of them is sampled too slowly for a voltage balance between rows.
     """
     if any(r.slow for r in recordings):
         view = joined_views([slow_view(r, nominal) for r in recordings])
+        # A file may be a single operating point, so that some are held out of all files together.
         return view, holdout_blocks(view)
     views = views_of(recordings, nominal)
     return joined_views(views), held_out(views)
@@ -82,7 +83,7 @@ def _posterior(view, held, progress, shifts) -> Posterior:
 
 
 def _physics(recordings, nominal, progress, shifts) -> Diagnosis:
-    view, held = view_of(recordings, nominal)
+    view, held = view_and_held(recordings, nominal)
     if single_point(view):
         return diagnose_one_point(view)
     posterior = _posterior(view, held, progress, shifts)

@@ -11,7 +11,7 @@ from fluxproof.diagnosis.balance.cells import _steep_variance
 from fluxproof.diagnosis.balance.shaft import bend_gain
 from fluxproof.diagnosis.ingest.load import load_recording
 from fluxproof.diagnosis.nominal import load_nominal
-from fluxproof.diagnosis.physics import rows_of, view_of
+from fluxproof.diagnosis.physics import rows_of, view_and_held
 from fluxproof.diagnosis.session import diagnose
 
 
@@ -33,7 +33,7 @@ def test_cogging_that_the_speed_loop_conceals_is_named(seed, count, number, kind
 def test_the_noise_of_an_acceleration_follows_the_gain_of_the_second_difference(tmp_path):
     recording, drive = files_of(6, tmp_path, 26112026, "own", 80)
     nominal = load_nominal(drive)
-    rows = rows_of(*view_of([load_recording(recording, nominal)], nominal))
+    rows = rows_of(*view_and_held([load_recording(recording, nominal)], nominal))
     cells, order = rows.cells, 36.0  # not of the cogging
     mine = (cells.channel == "torque") & (cells.order == order) & cells.ok
     gain = bend_gain(rows.view, order)[cells.block[mine]]

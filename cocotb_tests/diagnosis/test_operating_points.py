@@ -1,11 +1,12 @@
-"""Operating points as a recording: tables, constants, one axis, standstill, one point that warms up, logs of 500 Hz."""
+"""Operating points as a recording: tables, constants, one axis, logs of a few hundred hertz, several files."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from cocotb_tests.support.bench_logs import GRID, L_D, L_Q, PSI, RATED, R, Truth, sampled, table, warming
+from cocotb_tests.support.bench_answers import answer_of, found, held, said, without
+from cocotb_tests.support.bench_logs import GRID, L_D, L_Q, PSI, RATED, R, Truth, sampled, table
 from cocotb_tests.support.mistakes import all_of, frame, moved, scaled
 from cocotb_tests.support.recordings_made import DRIVE, codes, made, nominal_of, write
 from cocotb_tests.support.slow import halved, slowly
@@ -16,30 +17,6 @@ from fluxproof.diagnosis.nominal import load_nominal
 from fluxproof.diagnosis.recording import RecordingError
 
 WEAK = Truth(psi=0.95 * PSI)
-AT_REST = [(0.0, d, 0.0) for d in (-5.0, -4.0, -3.0, -2.0, -1.0, 1.0, 2.0, 3.0, 4.0, 5.0)]
-
-
-def without(columns, *names):
-    return {name: values for name, values in columns.items() if name not in names}
-
-
-def held(columns, step_s=5.0):
-    n = len(next(iter(columns.values())))
-    return {"t": step_s * np.arange(n), **columns}
-
-
-def answer_of(folder, columns, more="", file="r.csv"):
-    drive = folder / "drive.toml"
-    drive.write_text(DRIVE + more)
-    return diagnose(write(folder / file, columns), drive)
-
-
-def found(answer):
-    return {k: e.value for effect in answer.effects for k, e in effect.parameters.items()}
-
-
-def said(answer, text) -> bool:
-    return any(text in note for note in answer.notes)
 
 
 @pytest.mark.parametrize("kind", [table, lambda truth: held(table(truth))], ids=["table", "held one after another"])
@@ -258,99 +235,6 @@ def test_without_u_d_a_fast_recording_becomes_operating_points(tmp_path):
     assert "one_axis" in [p.code for p in answer.problems]
     named = {e.name for e in answer.effects} | set().union(*answer.ambiguity)
     assert "magnet_flux" in named
-
-
-def test_standstill_shows_resistance_and_dead_time(tmp_path):
-    angle = np.full(len(AT_REST) * 3, 0.4)
-    columns = table(Truth(r=2.4), points=AT_REST, repeats=3, theta=angle)
-    ohms = answer_of(tmp_path, columns)
-    named = {e.name for e in ohms.effects} | set().union(*ohms.ambiguity)
-    assert "resistance" in named and "dead_time" not in {e.name for e in ohms.effects}
-    loss = answer_of(tmp_path, table(Truth(v_dead=4.0), points=AT_REST, repeats=3, theta=angle))
-    assert found(loss)["v_dead_v"] == pytest.approx(4.0, abs=0.3)
-
-
-def test_standstill_needs_the_angle(tmp_path):
-    columns = without(table(Truth(r=2.4), points=AT_REST, theta=np.zeros(len(AT_REST))), "theta_e")
-    answer = answer_of(tmp_path, columns)
-    assert answer.verdict == "bad_recording" and "record theta_e, or add it to [constants]" in answer.sentence
-    assert answer_of(tmp_path, columns, "[constants]\ntheta_e = 0\n").verdict in ("explained", "ambiguous")
-    mixed = answer_of(tmp_path, table(WEAK, points=[*AT_REST[:3], *[(w, 0.0, q) for w in (200.0, 400.0) for q in
-                                                                   (-4.0, -2.0, 0.0, 2.0, 4.0)]]))  # fmt: skip
-    assert said(mixed, "3 rows at standstill are not used") and found(mixed).keys() == {"magnet_flux_wb"}
-
-
-def test_standstill_counts_in_a_slow_log(tmp_path):
-    answer = answer_of(tmp_path, sampled(500.0, Truth(r=2.3), points=AT_REST, hold_s=0.8))
-    # A scale of currents or voltages would fit too, but none is off by so much in a usual drive.
-    assert found(answer)["resistance_ohm"] == pytest.approx(2.3, abs=0.08)
-    nothing = answer_of(tmp_path, sampled(500.0, Truth(r=2.3), points=AT_REST, hold_s=0.8, angle=False))
-    assert nothing.verdict == "bad_recording" and "theta_e" in nothing.sentence
-
-
-def test_loss_at_rest_is_that_of_the_angle(tmp_path):
-    from fluxproof.diagnosis.catalogue import CATALOGUE
-
-    angle, nominal = np.linspace(0.05, 0.45, len(AT_REST)), nominal_of(tmp_path)
-    truth = Truth(v_dead=1.0)
-    recording = load_recording(
-        write(tmp_path / "r.csv", table(truth, points=AT_REST, theta=angle, noise_v=0.0)), nominal
-    )
-    view = slow_view(recording, nominal)
-    column = CATALOGUE["dead_time"].core(view)["v_0.02"]["u"].mean(axis=1)
-    i = np.array([d for _, d, _ in AT_REST])
-    left = (recording["u_d_ref"] + 1j * recording["u_q_ref"] - R * i)[view.rows]
-    assert np.abs(column - left).max() < 0.02
-
-
-def test_one_point_that_warms_up(tmp_path):
-    answer = answer_of(tmp_path, warming())
-    assert answer.verdict == "explained"
-    values = found(answer)
-    assert values["magnet_flux_drift_wb"] == pytest.approx(-0.05 * PSI, rel=0.06)
-    assert values["resistance_temp_coeff_per_k"] == pytest.approx(0.0039, rel=0.1)
-    assert answer.fit.holdout_after < answer.fit.noise_floor < 0.1 * answer.fit.holdout_before
-    assert said(answer, "One operating point") and said(answer, "winding was recorded from")
-    faster = found(answer_of(tmp_path, warming(hours=0.2, step_s=0.1)))
-    assert faster["magnet_flux_drift_wb"] == pytest.approx(-0.05 * PSI, rel=0.03)
-    assert faster["resistance_temp_coeff_per_k"] == pytest.approx(0.0039, rel=0.1)
-    steady = answer_of(tmp_path, warming(magnets=0.0, copper=0.0))
-    assert steady.verdict == "no_mismatch" and not steady.effects
-
-
-def test_one_point_without_i_d_cannot_separate_winding_and_magnets(tmp_path):
-    blind = answer_of(tmp_path, without(warming(i=4j), "temp_winding"))
-    assert blind.verdict == "ambiguous" and blind.ambiguity == [["magnet_temperature", "resistance_temperature"]]
-    assert len({(r.omega_e, r.i_d, r.i_q) for r in blind.next_recording}) == 3
-    known = answer_of(tmp_path, warming(i=4j))
-    (magnets,) = known.effects
-    drift = magnets.parameters["magnet_flux_drift_wb"]
-    assert abs(drift.value + 0.05 * PSI) < 2.0 * drift.sigma  # copper may hide a part of it
-
-
-def test_a_constant_misfit_at_one_point_is_an_ambiguity(tmp_path):
-    columns = warming(magnets=0.0, copper=0.0)
-    columns["u_q_ref"] = 1.04 * columns["u_q_ref"]
-    answer = answer_of(tmp_path, columns)
-    assert answer.verdict == "ambiguous" and not answer.effects
-    assert {"magnet_flux", "udc_gain"} <= set(answer.ambiguity[-1]) and said(answer, "one point cannot tell why")
-    assert answer.fit.train_before == pytest.approx(2.63, abs=0.02) and answer.explained_share > 0.99
-    assert answer.fit.train_after < answer.fit.noise_floor and answer.fit.holdout_after < answer.fit.noise_floor
-    two_rows = answer_of(tmp_path, table(WEAK, points=[(300.0, 0.0, 4.0)] * 2))
-    assert two_rows.fit.train_before > 2.0 > two_rows.fit.train_after
-    assert two_rows.verdict == "ambiguous" and "magnet_flux" in two_rows.ambiguity[0]
-
-
-def test_a_constant_misfit_that_nothing_explains_is_the_remainder(tmp_path):
-    columns = warming()
-    columns["u_d_ref"] = columns["u_d_ref"] + 60.0
-    columns["u_q_ref"] = 0.7 * columns["u_q_ref"]
-    answer = answer_of(tmp_path, columns)
-    assert answer.verdict == "unexplained" and answer.explained_share == 0.0 and not answer.effects
-    assert answer.fit.holdout_after == answer.fit.holdout_before == pytest.approx(63.2, abs=0.5)
-    assert [part.size for part in answer.remainder] == [pytest.approx(63.2, abs=0.5)]
-    assert said(answer, "would explain the drift, but")
-    assert [p.code for p in answer.problems] == ["slow_sampling"]  # at one point a change of signs fits by chance
 
 
 @pytest.mark.parametrize("hertz, hold_s", [slowly(500.0, 1.0), (200.0, 0.6), slowly(1000.0, 0.3)])

@@ -7,7 +7,7 @@ from cocotb_tests.support.slow import slowly
 from fluxproof.diagnosis.balance.cells import noise
 from fluxproof.diagnosis.ingest.load import load_recording
 from fluxproof.diagnosis.nominal import load_nominal
-from fluxproof.diagnosis.physics import rows_of, view_of
+from fluxproof.diagnosis.physics import rows_of, view_and_held
 from fluxproof.diagnosis.session import diagnose
 from studies.blind.generate import generate_case, listing
 
@@ -53,7 +53,7 @@ def test_exactly_what_is_there_is_named(seed, number, names, tmp_path):
 def test_the_noise_is_at_most_that_of_the_misfit(tmp_path):
     recording, drive = files_of(31, tmp_path)
     nominal = load_nominal(drive)
-    rows = rows_of(*view_of([load_recording(recording, nominal)], nominal))
+    rows = rows_of(*view_and_held([load_recording(recording, nominal)], nominal))
     assert np.all(rows.noise <= noise(rows.view, rows.cells, rows.cells.y) * 1.000001)
 
 

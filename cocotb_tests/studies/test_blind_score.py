@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import json
 
+import pandas as pd
 import pytest
 
 from studies.blind import figures
 from studies.blind.page import page
 from studies.blind.score import summary
+from studies.blind.thinned import summary as thinned_summary
+from studies.blind.thinned import thin, visible
 
 
 def _truth(stratum="single", names=("resistance",), identifiable=True, form="catalogue", **more):
@@ -163,3 +166,33 @@ def test_summary_and_page():
     assert result["by_effect"]["delay"] == {"false": 1} and result["times"]["median_s"] == 1.0
     text = page({**json.loads(json.dumps(result)), "seed": 1, "cases_total": 3, "sha256": "0" * 64})
     assert "delay" in text and "&lt;b&gt;" in text and "<b>" not in text
+
+
+@pytest.mark.parametrize("kind", ["csv", "parquet"])
+def test_a_thinned_case_has_every_sixth_row(tmp_path, kind):
+    case, table = tmp_path / "case_0001", pd.DataFrame({"t": range(20), "i_a": range(20)})
+    case.mkdir()
+    (case / "drive.toml").write_text("[machine]\n")
+    path = case / f"recording.{kind}"
+    table.to_csv(path, index=False) if kind == "csv" else table.to_parquet(path, index=False)
+    out = thin(case, tmp_path / "out", 6)
+    read = pd.read_csv if kind == "csv" else pd.read_parquet
+    assert read(out / path.name)["t"].tolist() == [0, 6, 12, 18] and (out / "drive.toml").read_text() == "[machine]\n"
+
+
+def test_thinned_figures_count_what_operating_points_show():
+    told = dict(ambiguity=[], verdict="explained")
+    right, hidden = _truth(), _truth(names=("cogging",))
+    assert visible(right) and not visible(hidden)
+    pairs = [
+        (right, told | {"effects": [{"name": "resistance"}]}),
+        (right, told | {"effects": [], "verdict": "ambiguous", "ambiguity": [["resistance", "dead_time"]]}),
+        (hidden, told | {"effects": [{"name": "friction"}]}),
+        (_truth("healthy", ()), told | {"effects": [], "verdict": "no_mismatch"}),
+        (right, {"verdict": "bad_recording"}),
+    ]
+    found = thinned_summary(pairs)
+    counted = {name: (f["k"], f["n"]) for name, f in found.items() if isinstance(f, dict)}
+    assert found["cases"] == 5 and found["refused"] == 1
+    assert counted == {"exactly_right": (1, 2), "ambiguous": (1, 2), "truth_inside": (1, 1), "false_names": (1, 4),
+                       "healthy_with_mismatch": (0, 1)}  # fmt: skip

@@ -16,7 +16,7 @@ from fluxproof.diagnosis.answer.request import requests, wants_cold
 from fluxproof.diagnosis.answer.scan import Stray, row_residual, stray_order, stray_swing, stray_torque
 from fluxproof.diagnosis.answer.sizes import Sizes, fit_of, with_stray
 from fluxproof.diagnosis.answer.unknown import sparse_term
-from fluxproof.diagnosis.answer.verdict import at_floor, kind_of, usual
+from fluxproof.diagnosis.answer.verdict import at_floor, is_usual, kind_of
 from fluxproof.diagnosis.inference import constants as k
 from fluxproof.diagnosis.inference.posterior import Posterior
 from fluxproof.diagnosis.inference.problem import covariance_of
@@ -82,7 +82,7 @@ def _is_noise(posterior, names, held) -> bool:
     train, unseen = (Sizes(setup, before, after, blocks, measured_torque(setup)) for blocks in (~held, held))
     share = unseen.share(train.primary())
     little = share is not None and share < k.HALF and setup.view.least_error < 1.0
-    return at_floor(train) or (little and usual(train))
+    return at_floor(train) or (little and is_usual(train))
 
 
 def shown(posterior, held):

@@ -14,7 +14,7 @@ def kind_of(names, train, held, channel, share, stray) -> str:
     if not names.confidence and not names.open:
         if names.suspects:
             return "unexplained"
-        return "no_mismatch" if usual(train) and not stray and not standing_out(train) else "unexplained"
+        return "no_mismatch" if is_usual(train) and not stray and not standing_out(train) else "unexplained"
     shares = {c: held.share(c) for c in held.channels} | {channel: share}
     # Of what any recording may have, names must explain the larger part too.
     most = {c: s.floor_times(k.FLOOR) if (shares[c] or 0.0) < k.HALF else s.above(k.FLOOR)
@@ -35,7 +35,7 @@ def at_floor(sizes) -> bool:
     return all(s.before <= s.floor_times(k.FLOOR) for s in (*sizes.channels.values(), *orders))
 
 
-def usual(sizes) -> bool:
+def is_usual(sizes) -> bool:
     """Whether any recording of this kind may have the misfit before an explanation in every channel."""
     return all(s.before <= s.above(k.FLOOR) for s in sizes.channels.values())
 

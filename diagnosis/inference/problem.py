@@ -41,7 +41,7 @@ class Setup:
     def _share(self, rows, call):
         self.rows, self.call = rows, call
         self.view, self.effects, self.projector, self.load = rows.view, rows.effects, rows.projector, rows.load
-        self.train, self.cells, self.noise = rows.train, rows.cells, _believed(rows)
+        self.train, self.cells, self.noise = rows.train, rows.cells, _bounded_noise(rows)
         self.smooth_rows = rows.smooth_rows
         self.level = balance_level(self.view, self.cells)
         self.points = point_numbers(self.view)
@@ -257,8 +257,8 @@ def _implausible(fit, name) -> int:
     return sum(not believable(found[key], limits, nominal) for key, limits in effect.plausible.items() if key in found)
 
 
-def _believed(rows):
-    """(r,) the noise of rows, of which not all is believed where nothing repeats and it is what no effect explains."""
+def _bounded_noise(rows):
+    """(r,) noise of the rows; where no operating point repeats, it is what no effect explains, and bounded."""
     if repeats(rows.view, rows.cells.ok, rows.cells.block):
         return rows.noise
     most = k.UNREPEATED * voltage_level(rows.view)[rows.cells.block]

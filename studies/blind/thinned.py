@@ -12,15 +12,16 @@ from pathlib import Path
 
 import pyarrow.parquet as parquet
 
+from fluxproof.checkout import BUILD
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.files import write_json, write_text
 from fluxproof.fleet.engine import in_parallel
-from studies.blind.__main__ import FOLDER
 from studies.blind.figures import asserted, confidently_wrong, named_right, rate, tied, true_names
 from studies.blind.generate import GENERATORS, generate
 from studies.blind.score import answer_of, recording_of
 from studies.blind.seal import unseal
 
+FOLDER = BUILD / "blind"
 EVERY = 6  # rows; of 8 to 20 kHz
 
 

@@ -16,7 +16,7 @@ from fluxproof.diagnosis.inference.problem import Setup
 from fluxproof.diagnosis.ingest.load import load_recording
 from fluxproof.diagnosis.ingest.restated import as_read
 from fluxproof.diagnosis.nominal import load_nominal
-from fluxproof.diagnosis.physics import explain, rows_of, single_point, view_of
+from fluxproof.diagnosis.physics import explain, rows_of, single_point, view_and_held
 from fluxproof.diagnosis.recording import RecordingError
 from studies.sensitivity.steps import Steps, recorded, varied
 
@@ -57,7 +57,7 @@ class Case:
     def _has_posterior(self, nominal) -> bool:
         """Whether there is a steady stretch, and more than one operating point."""
         try:
-            return not single_point(view_of(self.recordings, nominal)[0])
+            return not single_point(view_and_held(self.recordings, nominal)[0])
         except RecordingError:
             return False
 
@@ -91,7 +91,7 @@ class Case:
 
 
 def _rows_of(recordings, nominal):
-    view, held = view_of(recordings, nominal)
+    view, held = view_and_held(recordings, nominal)
     return rows_of(view, held), held
 
 
