@@ -66,6 +66,7 @@ def test_closed_loop_over_2000_periods(figure, tmp_path):
     assert facts["rpm"] < -0.9 * RPM and facts["samples"] > 1900
 
 
+@pytest.mark.slow
 def test_a_drive_file_with_hall_sensors_and_xadc_in_ghdl(tmp_path):
     """Every register from the file; the shaft turns, the speed is that between its Hall edges; the stream replays."""
     facts = in_ghdl(HUB_PERIODS, "hub_36v, slow clock", tmp_path)

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from cocotb_tests.support.slow import halved
 from fluxproof import command
 from fluxproof.checkout import DRIVES
 from fluxproof.commission import command as commissioning
@@ -32,17 +33,19 @@ AGAIN = (  # in the study alone
 DRIVE = DRIVES / "spindle_400v.toml"
 
 
+@pytest.mark.slow
 def test_a_motor_with_a_wrong_file_is_measured():
     outcome = run(case(2))
     assert outcome.reason is None and outcome.right, outcome
     assert outcome.current <= 1.0 and outcome.inertia < 5.0
 
 
+@pytest.mark.slow
 def test_a_rotor_in_resonance_with_the_field_is_aligned_at_a_slower_one():
     assert run(case(30)).right
 
 
-@pytest.mark.parametrize("name", [name for name in FAULTS if name not in AGAIN])
+@pytest.mark.parametrize("name", halved([name for name in FAULTS if name not in AGAIN]))
 def test_each_fault_is_refused_for_its_reason(name):
     right, said, current = refused(name, case(1002))
     assert right, said
@@ -50,6 +53,7 @@ def test_each_fault_is_refused_for_its_reason(name):
     assert current <= 1.0
 
 
+@pytest.mark.slow
 def test_two_sensors_are_enough_to_find_a_swapped_one():
     motor = case(1002)
     drive = replace(motor.file, sensors=replace(motor.file.sensors, current_sensors=2))

@@ -6,6 +6,7 @@ The long run is the converted RTL in Verilator; GHDL runs a shorter one on the V
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from cocotb_tests.support.needs import skip_without_ghdl5
 from fluxproof.checkout import DRIVES
@@ -108,6 +109,7 @@ def check_pwm_timing(arrays, register_set, leg: int):
     assert whole > 1500
 
 
+@pytest.mark.slow
 def test_smallest_converters(tmp_path):
     """12-bit currents and a 12-bit resolver: the lower end of the generics."""
     text = (

@@ -54,6 +54,7 @@ def test_closed_loop_in_verilator(twice):
         check_edges(arrays, register_set, leg)
 
 
+@pytest.mark.slow
 def test_closed_loop_in_ghdl(twice):
     """300 half periods of the VHDL itself, at start and under load."""
     summary, arrays, _ = close_loop(InGhdl, twice, "short", 100, key=" twice", periods=300)

@@ -53,6 +53,7 @@ def test_fusesoc_lint_of_the_board(tmp_path):
     assert "elaborate fluxproof_board" in done.stdout + done.stderr
 
 
+@pytest.mark.slow
 def test_fusesoc_vivado_setup_of_the_board(tmp_path):
     done = fusesoc(tmp_path, "vivado_board", "--setup")
     assert done.returncode == 0, done.stderr[-2000:]

@@ -31,6 +31,7 @@ def tools():
     skip_without_ghdl5()
 
 
+@pytest.mark.slow
 def test_small_block(tools):
     """Most mutants are noticed, some are proved equivalent, none is left; the same seed draws the same mutants."""
     found = judge(SMALL, command.SEED)

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import pytest
 
+from cocotb_tests.support.slow import slowly
 from fluxproof.cosim.verilog import NoUsableGhdl, find_ghdl
 from fluxproof.golden_model.registry import BLOCKS
 from scripts.prove import abc_engine
@@ -35,7 +36,7 @@ def own_folder(monkeypatch, tmp_path):
     return tmp_path
 
 
-@pytest.mark.parametrize("name", ["gates_trip_off", "axi_lite_stable"])
+@pytest.mark.parametrize("name", ["gates_trip_off", slowly("axi_lite_stable")])
 def test_proved_and_faults_detected(name, own_folder):
     entry = judge(PROOFS[name], LIMIT)
     assert entry["pass"] and entry["mutant_caught"] and entry["covered"], entry["reason"]

@@ -17,6 +17,7 @@ def run(command: list[str]) -> None:
     assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-1000:]
 
 
+@pytest.mark.slow
 def test_vhdl_style():
     sources = sorted((ROOT / "rtl").rglob("*.vhd")) + sorted((ROOT / "tb").glob("*.vhd"))
     run(["vsg", "-c", "vsg.yaml", "-f", *(str(s) for s in sources if s.name != "fluxproof_pkg.vhd")])

@@ -85,6 +85,7 @@ def test_wheel_holds_one_package_with_all_its_files(wheel):
         assert not missing, f"pyproject.toml lacks the package or data of {sorted(missing)}"
 
 
+@pytest.mark.slow
 def test_environment_has_nothing_of_tests_and_studies(environment):
     (site,) = environment.glob("lib/python3*/site-packages")
     names = {path.name.split("-")[0].lower() for path in site.iterdir()}
@@ -94,6 +95,7 @@ def test_environment_has_nothing_of_tests_and_studies(environment):
     assert not names & (tools | rooms)
 
 
+@pytest.mark.slow
 def test_registers(environment, tmp_path):
     assert "kp_q" in run(environment, "fluxproof", "registers", PAPER, cwd=tmp_path)
 

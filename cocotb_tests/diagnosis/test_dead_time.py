@@ -103,7 +103,7 @@ def test_no_leg_gains_voltage():
         # A resistance of a tenth of the loss may be a device's: it is named or left out, and nothing else is.
         slowly(27182818, 30, ["dead_time", "resistance"]),
         (14142135, 24, ["dead_time", "encoder_eccentricity", "resistance"]),
-        (14142135, 263, ["dead_time"]),  # a diode's logarithm, which resembles a resistance
+        slowly(14142135, 263, ["dead_time"]),  # a diode's logarithm, which resembles a resistance
     ],
 )
 def test_effects_with_strong_dead_time(seed, number, names, tmp_path):

@@ -27,12 +27,12 @@ def files_of(number, tmp_path, seed=SEED, generator="sealed", count=COUNT):
     [
         (SEED, 48, {"delay"}),  # a sampling skew beside it fitted better, but not the points that were not fitted
         slowly(SEED, 31, set()),  # healthy: the encoder's codes beat with the sampling near the first order
-        (LATER, 9, {"iron_loss", "resistance"}),  # eddy currents that lag looked like a delay
+        slowly(LATER, 9, {"iron_loss", "resistance"}),  # eddy currents that lag looked like a delay
         slowly(LATER, 59, {"current_gain", "friction", "iron_loss"}),  # and like a sampling skew
         slowly(LATER, 54, {"inductance_d", "resistance_temperature"}),  # codes that beat were a swing
         slowly(SEED, 10, {"dead_time", "saturation"}),  # a twisting shaft as alternative, which does not help
         slowly(LATER, 24, {"cross_saturation", "friction", "sampling_skew"}),  # both late: a delay instead
-        (LAST, 1, {"cogging"}),  # a ripple was judged by the error of a mean torque
+        slowly(LAST, 1, {"cogging"}),  # a ripple was judged by the error of a mean torque
         (LAST, 10, {"phase_resistance_asymmetry"}),  # a ripple at a fifth of the order was taken for its cause
         # Without the saturation, held-out points beyond the fitted ones fitted better.
         slowly(LAST, 40, {"cross_saturation", "iron_loss", "saturation"}),
@@ -63,7 +63,7 @@ def test_the_noise_is_at_most_that_of_the_misfit(tmp_path):
         slowly(24112026, 100, 10, {"dead_time", "emf_harmonics"}),  # a resistance made its uncertain curve smaller
         (24112026, 100, 24, {"magnet_temperature", "resistance_temperature"}),  # the sensor lags: no wrong resistance
         slowly(LATER, 80, 1, {"current_offset", "sampling_skew"}),  # noise at full speed was cut as if it were outliers
-        (LATER, 80, 15, {"inductance_q", "saturation"}),  # the saturation's curve took the inductance
+        slowly(LATER, 80, 15, {"inductance_q", "saturation"}),  # the saturation's curve took the inductance
         slowly(LAST, 100, 17, {"cross_saturation", "saturation"}),  # its curve took an inductance to help
         slowly(FOURTH, 100, 29, {"delay"}),  # all pulses late: a friction, as the torque is a sample too
         slowly(LAST, 100, 51, {"encoder_offset", "inductance_q"}),  # a twisting shaft looked better at first
@@ -77,7 +77,7 @@ def test_exactly_what_is_there_is_named_of_the_own_generator(seed, count, number
 @pytest.mark.parametrize(
     ("seed", "number", "says"),
     [
-        (SEED, 12, "bent towards full scale"),
+        slowly(SEED, 12, "bent towards full scale"),
         slowly(LATER, 28, "bent towards full scale"),
         slowly(LATER, 27, "soft shaft"),
         (LAST, 27, "soft shaft"),  # of a machine whose torque depends much on the angle

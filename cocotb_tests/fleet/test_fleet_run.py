@@ -85,18 +85,10 @@ def cluster(folder: Path):
 
 @pytest.fixture(scope="module")
 def fleet(tmp_path_factory):
-    """(manifest, folder of the results) of a fleet whose first run was stopped; a cluster made the second one."""
+    """(manifest, folder of the results) of a fleet."""
     folder = tmp_path_factory.mktemp("fleet")
-    manifest = small_fleet.write(folder)
-    out = folder / "out"
-    assert stopped(manifest, out) == 130
-    before = {path: path.stat().st_mtime_ns for path in rows_of(out)}
-    assert 2 <= len(before) < small_fleet.GOOD + 2 and not (out / "fleet.parquet").exists()
-    assert all(pq.read_metadata(path).num_rows == 1 for path in before)
-    command = ["fleet", str(manifest), "--drive", str(folder / "drive.toml"), "--out", str(out)]
-    with cluster(folder) as address:
-        assert main([*command, "--scheduler", address, "--quiet"]) == 0
-    assert all(path.stat().st_mtime_ns == at for path, at in before.items())
+    manifest, out = small_fleet.write(folder), folder / "out"
+    run(listed(manifest), out, Here, quiet=True)
     return manifest, out
 
 
@@ -124,6 +116,20 @@ def test_every_recording_has_one_row(fleet):
     assert good["serial"] == "S03" and good["time"].isoformat() == "2026-01-04T08:00:00+00:00"
     assert good["temperature"] == 25.5 and dict(good["more"]) == {"station": "line 2"}
     assert {e["effect"] for h in good["hypotheses"][:1] for e in h["estimates"]} >= {"resistance", "magnet_flux"}
+
+
+@pytest.mark.slow
+def test_a_cluster_goes_on_where_a_run_was_stopped(fleet, tmp_path):
+    folder, out = fleet[0].parent, tmp_path / "out"
+    assert stopped(fleet[0], out) == 130
+    before = {path: path.stat().st_mtime_ns for path in rows_of(out)}
+    assert 2 <= len(before) < small_fleet.GOOD + 2 and not (out / "fleet.parquet").exists()
+    assert all(pq.read_metadata(path).num_rows == 1 for path in before)
+    command = ["fleet", str(fleet[0]), "--drive", str(folder / "drive.toml"), "--out", str(out)]
+    with cluster(tmp_path) as address:
+        assert main([*command, "--scheduler", address, "--quiet"]) == 0
+    assert all(path.stat().st_mtime_ns == at for path, at in before.items())
+    assert pq.read_table(out / "fleet.parquet").equals(pq.read_table(fleet[1] / "fleet.parquet"))
 
 
 def test_faults_are_found_by_the_fleet(fleet):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from cocotb_tests.support.slow import slowly
 from fluxproof.diagnosis.balance.blocks import view_of
 from fluxproof.diagnosis.balance.holdout import holdout_blocks
 from fluxproof.diagnosis.balance.misfit import misfit
@@ -74,7 +75,7 @@ def _data(nominal, **changes):
     return Data(view, misfit(view), holdout_blocks(view))
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", [slowly(m) if m == "joint" else m for m in METHODS])
 def test_names_one_effect_and_none(nominal, method):
     if method in PACKAGES:
         pytest.importorskip(PACKAGES[method], reason=f"{PACKAGES[method]} is not installed (make setup)")

@@ -9,6 +9,7 @@ import pytest
 
 from cocotb_tests.core.test_registers import PAPER
 from cocotb_tests.support.diagnosed_drives import GRID, MACHINE, columns
+from cocotb_tests.support.slow import slowly
 from fluxproof.checkout import ROOT
 from fluxproof.diagnosis.inference import constants
 from studies.sensitivity.run import OF_ONE_POINT, Case, answers_of, names, said_in_full, shares
@@ -116,10 +117,14 @@ def test_a_recording_without_a_steady_stretch_does_not_count(folder):
     assert answers_of(("own/case_0001", folder, ["HALF"])) == ("own/case_0001", {})
 
 
-@pytest.mark.parametrize("name, factor", [("BALANCE_U", 1e4), ("POINT", 2.0)] + [
-    pytest.param(*varied, marks=pytest.mark.slow)
-    for varied in (("BALANCE_U", 2.0), ("FORMULA", 0.5), ("PRESENT", 0.5), ("DOUBTED", 0.5), ("MISREAD", 0.5))
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "name, factor",
+    [
+        slowly("BALANCE_U", 1e4),
+        *(slowly(name, 2.0) for name in ("BALANCE_U", "POINT")),
+        *(slowly(name, 0.5) for name in ("FORMULA", "PRESENT", "DOUBTED", "MISREAD")),
+    ],
+)
 def test_what_is_reused_changes_no_answer(folder, name, factor):
     """A balance that is wrong by the whole voltage changes the answer, the other variations do not."""
     case = Case(folder)

@@ -108,6 +108,7 @@ class Problem:
                     y = y + value * column
         self.y = y
         self.keys = [(name, key) for name, columns in cells.columns.items() for key in columns]
+        self.coefficients = {name: [key.lstrip("~") for key in columns] for name, columns in cells.columns.items()}
         stack = [cells.columns[n][key] for n, key in self.keys]
         x = np.array(stack).T if stack else np.zeros((len(y), 0))
         if doubt is not None:
@@ -214,17 +215,20 @@ class Fit:
     def __init__(self, problem, names, value, take, c, cov, sizes, lam, mu):
         self.problem, self.names, self.value = problem, names, value
         self.take, self.vector, self.cov, self.sizes, self.lam, self.mu = take, c, cov, sizes, lam, mu
-        p = problem.p
-        # (n,) of means and contrasts: noise, discrepancy and errors of the curves
-        self.variance = p.s2 + (lam[p.group] * p.level) ** 2 + (mu[p.group] * p.doubt) ** 2
-        self.c = {name: {} for name in names}
-        for n, v in zip(take, c, strict=True):
+        self.c, self.places = {name: {} for name in names}, {name: [] for name in names}
+        for place, (n, v) in enumerate(zip(take, c, strict=True)):
             name, key = problem.keys[n]
             self.c[name][key.lstrip("~")] = float(v)
+            self.places[name].append(place)  # of the effect's coefficients in the set's
         for name in names:
-            for n, (owner, key) in enumerate(problem.keys):
-                if owner == name:
-                    self.c[name].setdefault(key.lstrip("~"), 0.0)
+            for key in problem.coefficients[name]:
+                self.c[name].setdefault(key, 0.0)
+
+    @property
+    def variance(self) -> np.ndarray:
+        """(n,) of means and contrasts: noise, discrepancy and errors of the curves."""
+        p = self.problem.p
+        return p.s2 + (self.lam[p.group] * p.level) ** 2 + (self.mu[p.group] * p.doubt) ** 2
 
     def left(self, names=None):
         """(r,) remainder of the misfit if the effects ``names`` (None: all of the set) explain their part."""
@@ -238,13 +242,11 @@ class Fit:
 
 def covariance_of(fit, name, full) -> np.ndarray:
     """The covariance of one effect's coefficients in their order in ``fit.c``; full: (k, k) of the set's columns."""
-    keys = list(fit.c[name])
-    place = {fit.problem.keys[n][1].lstrip("~"): j for j, n in enumerate(fit.take) if fit.problem.keys[n][0] == name}
-    out = np.zeros((len(keys), len(keys)))
-    for a, first in enumerate(keys):
-        for b, second in enumerate(keys):
-            if first in place and second in place:
-                out[a, b] = full[place[first], place[second]]
+    out = np.zeros((len(fit.c[name]),) * 2)
+    mine = fit.places[name]  # next to each other; what was estimated comes first in fit.c
+    if mine:
+        own = slice(mine[0], mine[-1] + 1)
+        out[: len(mine), : len(mine)] = full[own, own]
     return out
 
 
