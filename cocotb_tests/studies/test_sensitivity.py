@@ -91,6 +91,14 @@ def test_shares_count_cases_that_differ():
     entry = shares(cases, ["HALF"])
     assert entry["HALF"]["half"] == entry["HALF"]["share"] == 0.5 and entry["HALF"]["double"] == 0.25
     assert entry["HALF"]["changed"] == {"half": ["b", "d"], "double": ["c"]}
+    assert entry["HALF"]["verdicts"] == 0.5
+
+
+def test_another_alternative_is_no_other_verdict():
+    base = {"verdict": "ambiguous", "names": ["delay"], "ambiguity": [["friction", "iron_loss"]]}
+    longer = base | {"ambiguity": [["cogging", "friction", "iron_loss"]]}
+    entry = shares({"a": {"base": base, "HALF x0.5": base, "HALF x2": longer}}, ["HALF"])
+    assert entry["HALF"]["share"] == 1.0 and entry["HALF"]["verdicts"] == 0.0
 
 
 @pytest.fixture

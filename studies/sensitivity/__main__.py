@@ -1,9 +1,9 @@
 """Halve and double every constant of the inference: `python -m studies.sensitivity --seed 7`.
 
-Writes build/sensitivity/result.json: {"constants", "cases", "worst", "worst_share", "each": {NAME: {...}}}.  A verdict
-counts as changed if its kind, a name or an ambiguity is another one.  Cases are judged in an order that mixes the
-generators, and an interrupted run goes on where it was: answers are kept for as long as the code of the diagnosis is
-the same.
+Writes build/sensitivity/result.json: {"constants", "cases", "worst", "worst_share", "each": {NAME: {...}}}.  An answer
+counts as changed if its kind, a name or an ambiguity is another one; "verdicts" counts kinds and names alone.  Cases
+are judged in an order that mixes the generators, and an interrupted run goes on where it was: answers are kept for as
+long as the code of the diagnosis is the same.
 """
 
 from __future__ import annotations
@@ -132,7 +132,8 @@ def main(arguments=None) -> int:
     result = measure(options.seed, mix, options.jobs, chosen)
     write_json(OUT / "result.json", result)
     for name, entry in sorted(result["each"].items(), key=lambda e: -e[1]["share"]):
-        print(f"{name:18s} {entry['value']:<8g} halved {entry['half']:6.1%}  doubled {entry['double']:6.1%}")
+        print(f"{name:18s} {entry['value']:<8g} halved {entry['half']:6.1%}  doubled {entry['double']:6.1%}"
+              f"  verdicts {entry['verdicts']:6.1%}")  # fmt: skip
     print(f"{result['cases']} cases, worst {result['worst']} {result['worst_share']:.1%} (limit {LIMIT:.0%})")
     return 0
 

@@ -135,15 +135,25 @@ def differences(folder: Path, chosen) -> list[str]:
     return out
 
 
+def _verdict(answer: dict) -> tuple:
+    return answer["verdict"], answer["names"]
+
+
 def shares(cases: dict[str, dict], chosen) -> dict:
-    """{constant: {"value", "half", "double", "share", "changed": [...]}}; share: of the cases that either changes."""
+    """{constant: {"value", "half", "double", "share", "verdicts", "changed": {"half": [...], "double": [...]}}}.
+
+    share: of the cases whose answer the worse of both changes; verdicts: whose kind or names, and not only which
+    alternatives an ambiguity lists.
+    """
     every = {}
     for name in chosen:
-        entry = {"value": getattr(constants, name)}
+        entry = {"value": getattr(constants, name), "verdicts": 0.0}
         changed = {}
         for factor, word in zip(FACTORS, ("half", "double"), strict=True):
             differs = [c for c, out in cases.items() if out[f"{name} x{factor:g}"] != out["base"]]
+            others = [c for c in differs if _verdict(cases[c][f"{name} x{factor:g}"]) != _verdict(cases[c]["base"])]
             entry[word] = len(differs) / max(len(cases), 1)
+            entry["verdicts"] = max(entry["verdicts"], len(others) / max(len(cases), 1))
             changed[word] = differs
         entry["share"] = max(entry["half"], entry["double"])
         entry["changed"] = changed
