@@ -60,7 +60,7 @@ COLUMNS = (
     Column("misfit_before", pa.float64(), "rms at held-out points"),
     Column("misfit_after", pa.float64(), "rms at held-out points"),
     Column("noise_floor", pa.float64(), "rms"),
-    Column("misfit_unit", pa.string(), "V, or 1 of the slow logs"),
+    Column("misfit_unit", pa.string(), "of the three above: V"),
     Column("remainder", pa.list_(PART), "what the names leave: signal, electrical order, rms size, share"),
     Column("unknown", UNKNOWN, "the single term that fits the remainder best"),
     Column("conventions", WORDS, "codes of mistaken conventions"),
