@@ -66,7 +66,7 @@ blind: setup ## run the sealed benchmark of the diagnosis
 fleet: setup ## measure the figures of `fluxproof fleet` on simulated fleets of 1,000 drives (ARGS='--count 60': fewer)
 	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m studies.fleet $(ARGS)
 
-sensitivity: setup ## halve and double every constant of the inference and count the verdicts that change
+sensitivity: setup ## halve and double every constant of the inference and count the answers that change
 	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m studies.sensitivity $(ARGS)
 
 real: setup ## diagnose the recordings of real drives

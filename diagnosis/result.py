@@ -202,7 +202,6 @@ class Evidence:
 
     before_d, before_q, after_d, after_q: misfit in dq [V]; noise: standard deviation of one block's mean [V].
     orders: (m,) electrical orders with spectrum_before, spectrum_after: (m,) amplitudes [V].
-    angle: (b,) rad with angle_before_d, ..., the mean misfit over the electrical angle.
     """
 
     arrays: dict[str, np.ndarray] = field(default_factory=dict)
@@ -234,13 +233,12 @@ class Diagnosis:
     readings: tuple = ()  # what ``conventions`` tells, as conventions/ applies it
     search: object = field(default=None, repr=False)  # Posterior; None of one operating point
     held: np.ndarray | None = field(default=None, repr=False, compare=False)  # (b,) bool, blocks not fitted
-    trace: str = ""  # the figures that decided the verdict
 
     def to_json(self) -> dict:
         """The mapping written to diagnosis.json (schema 2)."""
         inner = {"evidence": Evidence(), "readings": (), "search": None, "held": None}
         plain = dataclasses.asdict(dataclasses.replace(self, **inner))
         problems = plain.pop("problems")
-        for key in (*inner, "rows", "trace"):
+        for key in (*inner, "rows"):
             plain.pop(key)
         return {"schema": 2, **plain, "recording": {"rows": self.rows, "problems": problems}}

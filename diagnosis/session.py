@@ -156,11 +156,12 @@ def _prior_note(answer) -> str:
     """That a fleet was the prior, and what it did."""
     fleet = answer.prior
     used = isinstance(answer.search, Posterior)
-    did = (
-        "it changed the prior odds of the effects, to even ones at most, so that no name rests on the fleet alone"
-        if used
-        else "it was not used, as one operating point is judged without a prior"
-    )
+    if used:
+        did = "it changed the prior odds of the effects, to even ones at most, so that no name rests on the fleet alone"
+    elif answer.verdict in ("bad_recording", "digital_mismatch"):
+        did = "it was not used, as the physics was not diagnosed"
+    else:
+        did = "it was not used, as one operating point is judged without a prior"
     return f"The population of {fleet.drives} drives in {fleet.path} was the prior: {did}."
 
 

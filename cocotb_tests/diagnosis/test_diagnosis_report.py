@@ -147,7 +147,6 @@ def test_page_escapes_text_from_files(written, tmp_path):
         ({"theta_e"}, "angle_current", "misfit over angle and current: theta_e is missing"),
         ({"orders"}, "orders", "harmonic orders: orders is missing"),
         ({"t"}, "over_time", "misfit over time: t is missing"),
-        ({"angle_before_q"}, "over_angle", "misfit over the angle: angle_before_q is missing"),
     ],
 )
 def test_omitted_picture_is_reported(tmp_path, without, picture, said):

@@ -74,6 +74,13 @@ def test_exactly_what_is_there_is_named_of_the_own_generator(seed, count, number
     assert {e.name for e in answer.effects} == names and answer.verdict == "explained"
 
 
+@pytest.mark.slow
+def test_an_offset_beside_a_resistance_that_is_half_wrong_is_found(tmp_path):
+    """On the linearisation of three other effects the pair was far worse than they, which were named."""
+    answer = diagnose(*files_of(14, tmp_path, 3122026, "gem", 24))
+    assert {e.name for e in answer.effects} == {"current_offset", "resistance"} and answer.verdict == "explained"
+
+
 @pytest.mark.parametrize(
     ("seed", "number", "says"),
     [

@@ -97,12 +97,12 @@ def shown(posterior, held):
 
 
 def helps(posterior, name, told, held) -> bool:
-    """Whether ``told`` leaves no less of the held-out blocks, in units of the noise floor, without ``name``.
+    """Whether ``told`` leaves no less of the held-out blocks, in units of the usual error, without ``name``.
 
-    Rows beyond the fitted operating points, of which the coefficients' own uncertainty exceeds the floor, do not count,
-    but for a mean torque in which a load may act, as that uncertainty is the load's.  The torque counts without a
-    transducer too: friction and cogging of a free shaft show nowhere else.  Where a load may act that nobody recorded,
-    what is left counts up to a limit.
+    Rows beyond the fitted operating points, of which the coefficients' own uncertainty exceeds that error, do not
+    count, but for a mean torque in which a load may act, as that uncertainty is the load's.  The torque counts without
+    a transducer too: friction and cogging of a free shaft show nowhere else.  Where a load may act that nobody
+    recorded, what is left counts up to a limit.
     """
     best, setup = posterior.best(), posterior.setup
     cells, floor2 = setup.cells, setup.usual**2
@@ -182,11 +182,10 @@ def conclude(posterior, held, progress=lambda text: None) -> Diagnosis:
     for name in sorted(posterior.idle):
         title = capital(setup.effects[name].title)
         answer.notes.append(f"{title}: would fit, but points that were not fitted fit better without; not asserted.")
-    why = " as the misfit is at the noise floor" if kind == "no_mismatch" else ""
+    why = " as recording and simulation agree" if kind == "no_mismatch" else ""
     for name, p in sorted(names.maybe.items(), key=lambda entry: -entry[1])[:3]:
         title = capital(setup.effects[name].title)
         answer.notes.append(f"{title}: possible (probability {p:.2f}), not asserted{why}.")
-    answer.trace = "; ".join(f"{p:.3f} {'+'.join(f.names) or 'none'}" for p, f in names.fits[:4])
     return answer
 
 

@@ -1,7 +1,7 @@
 """Parameters of the named effects with standard deviations.
 
-The posterior covariance of a set holds noise and discrepancy.  Two errors are added: the balance's common error, which
-is proportional to the voltage everywhere, and the differences between the sets that share the posterior's mass.
+The posterior covariance of a set holds noise, discrepancy and the balance's common error.  The differences between the
+sets that share the posterior's mass are added.
 """
 
 from __future__ import annotations
@@ -9,23 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from fluxproof.diagnosis.answer.improved_plant import in_addition
-from fluxproof.diagnosis.inference import constants as k
 from fluxproof.diagnosis.inference.problem import covariance_of
 from fluxproof.diagnosis.result import NamedEffect
-
-
-def common(fit) -> np.ndarray:
-    """Covariance (k, k) of a fit's coefficients due to the common error of the balance."""
-    problem = fit.problem
-    setup, view = problem.setup, problem.view
-    u, bus = view.to_dq(view.u[:, 1:-1]), view.nominal.inverter.dc_bus_v
-    along = view.i_mid / np.abs(view.i_mid).clip(0.02 * view.machine.rated_current_a)
-    patterns = (k.COMMON_U * u, 1j * k.COMMON_U * u, k.COMMON_DC * bus * along)
-    rows = np.array([problem.condensed(setup.projector.rows({"u": p})) for p in patterns]).T
-    p = problem.p
-    weight = 1.0 / fit.variance
-    moved = fit.cov @ (p.x[:, fit.take].T @ (weight[:, None] * rows))
-    return moved @ moved.T
 
 
 def without_possible(names, best):
@@ -41,7 +26,7 @@ def named_effects(names, posterior, explains, only=None) -> list[NamedEffect]:
     """The named effects of the best set; explains: {effect: share}; only: names in place of the named ones."""
     best = posterior.best()
     effects, nominal = posterior.setup.effects, best.problem.view.nominal
-    full, out = best.cov + common(best), []
+    out = []
     total = sum(p for p, _ in names.fits)
     fewer, absent = without_possible(names, best)
     for name in sorted(names.confidence if only is None else only):
@@ -49,7 +34,7 @@ def named_effects(names, posterior, explains, only=None) -> list[NamedEffect]:
         simpler = fewer.c.get(name, c)
         c = {key: (1.0 - absent) * v + absent * simpler.get(key, 0.0) for key, v in c.items()}
         share = effect.relative({n: best.c[n] for n in best.names}, nominal)
-        estimates = effect.estimates(c, covariance_of(best, name, full), nominal)
+        estimates = effect.estimates(c, covariance_of(best, name, best.cov), nominal)
         exact = np.zeros((len(c),) * 2)
         ends = [effect.estimates(x, exact, nominal) for x in (best.c[name], simpler)]
         for key, e in estimates.items():

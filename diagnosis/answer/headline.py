@@ -21,6 +21,7 @@ from fluxproof.diagnosis.answer.phrases import (
     said,
     title_of,
 )
+from fluxproof.diagnosis.inference import constants as k
 from fluxproof.diagnosis.quantities import ascii_of, quantity
 
 MOST_LETTERS = 200  # letters of a headline: two lines of a terminal or of the report
@@ -64,7 +65,9 @@ def _variants(answer, effects) -> list[str]:
     """The headline from the most detailed one to the shortest."""
     misfit = ascii_of(quantity(answer.fit.train_before, answer.fit.unit, 3))
     if answer.verdict == "no_mismatch":
-        floor = f"the misfit of {misfit} is at the noise floor"
+        at_floor = answer.fit.train_before**2 <= (1.0 + k.FLOOR) * answer.fit.noise_floor**2
+        usual = "is at the noise floor" if at_floor else "is not larger than such recordings usually have"
+        floor = f"the misfit of {misfit} {usual}"
         if found := corrected(answer):
             once = [joined(found), f"{found[0]}, and {len(found) - 1} more", "the columns are read otherwise"]
             return [f"Simulation and recording agree once corrected: {what}. {capital(floor)}." for what in once]

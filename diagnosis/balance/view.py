@@ -64,7 +64,6 @@ class View:
     delta_l: tuple[float, float] = (0.0, 0.0)
     late_s: float = 0.0
     mean_duty: np.ndarray | None = None
-    noise_gain: float = 1.0  # factor of a current correction on the current noise
     current_kept: float = 1.0  # share of the recorded current that a common scale leaves
     memo: dict = dataclasses.field(default_factory=dict)  # cache of the effects, shared by all views of a recording
 

@@ -47,8 +47,7 @@ class CurrentGain(Effect):
         error = i_abc * (self._gains(c) / (1.0 + self._gains(c)))
         if c.get("turn"):
             error = error + view.phases(1j * c["turn"] * view.i)
-        mended = view.without_current(error, raw_gain=1.0 + self._gains(c), turn=c.get("turn", 0.0))
-        return mended.replace(noise_gain=view.noise_gain / (1.0 + float(np.mean(self._gains(c)))))
+        return view.without_current(error, raw_gain=1.0 + self._gains(c), turn=c.get("turn", 0.0))
 
     def estimates(self, c, covariance, nominal):
         names = list(c)

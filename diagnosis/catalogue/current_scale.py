@@ -41,7 +41,6 @@ class CurrentScale(Effect):
             i=view.i * factor,
             i_raw=view.i_raw * factor,
             i_abc=None if view.i_abc is None else view.i_abc * factor[..., None],
-            noise_gain=view.noise_gain * kept,
             current_kept=view.current_kept * kept,
         )
 

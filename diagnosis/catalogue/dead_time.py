@@ -86,7 +86,7 @@ class DeadTime(Effect):
         return _following_bus(view, _leg_losses(view, ramps))
 
     def free(self, view):
-        # Bumps instead of more ramps: a ramp between two others is nearly their mean and rejected as collinear.
+        # Bumps instead of more ramps: a ramp between two others is nearly their mean.
         places = [k for k in range(1, len(KNOTS) - 1) if KNOTS[k] not in WIDTHS]
         shapes = {f"bump_{KNOTS[k]:g}": lambda x, k=k: _bump(x, _around(KNOTS[k])) for k in places}
         shapes["growth"] = lambda x: np.sign(x) * np.interp(np.abs(x), STILL_GROWS, (0.0, 1.0))

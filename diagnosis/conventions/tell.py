@@ -9,7 +9,7 @@ from fluxproof.diagnosis.inference import constants as k
 from fluxproof.diagnosis.result import Diagnosis
 from fluxproof.diagnosis.suspects import SUSPECTS
 
-OF_THE_REST = ("after", "noise", "spectrum_after", "angle_after")  # arrays of the evidence in true volts
+OF_THE_REST = ("after", "noise", "spectrum_after")  # arrays of the evidence in true volts
 
 
 def under(readings, rivals, documented: Diagnosis, answer: Diagnosis, level: float) -> Diagnosis:
@@ -25,14 +25,11 @@ def under(readings, rivals, documented: Diagnosis, answer: Diagnosis, level: flo
     for reading in readings:
         volts *= reading.volts
     fit, before = answer.fit, documented.fit
-    if fit.unit == "V":
-        for name in ("train_after", "holdout_after", "noise_floor"):
-            setattr(fit, name, getattr(fit, name) / volts)
-        for part in answer.remainder:
-            part.size /= volts if part.unit == "V" else 1.0
-    same = fit.unit == before.unit
-    fit.train_before = before.train_before if same else fit.train_before
-    fit.holdout_before = before.holdout_before if same else fit.holdout_before
+    for name in ("train_after", "holdout_after", "noise_floor"):
+        setattr(fit, name, getattr(fit, name) / volts)
+    for part in answer.remainder:
+        part.size /= volts if part.unit == "V" else 1.0
+    fit.train_before, fit.holdout_before = before.train_before, before.holdout_before
     answer.explained_share = fit.explained_share
     if answer.verdict == "no_mismatch":
         answer.verdict = "explained"
@@ -44,7 +41,7 @@ def under(readings, rivals, documented: Diagnosis, answer: Diagnosis, level: flo
     answer.location = documented.location
     arrays, old = answer.evidence.arrays, documented.evidence.arrays
     for name in arrays:
-        if name.startswith(("before", "spectrum_before", "angle_before")) and name in old:
+        if name.startswith(("before", "spectrum_before")) and name in old:
             arrays[name] = old[name]
         elif name.startswith(OF_THE_REST):
             arrays[name] = arrays[name] / volts

@@ -7,12 +7,11 @@ import numpy as np
 from fluxproof.diagnosis.effects.effect import FluxEffect
 
 
-def in_turn(view, effects, totals, show=None):
+def in_turn(view, effects, totals, show):
     """The view without measurement errors {effect: {coefficient: value}}, corrected one after the other.
 
-    show: the view that decides in which blocks an effect can be seen (default: the view itself).
+    show: the view that decides in which blocks an effect can be seen.
     """
-    show = view if show is None else show
     for name in sorted(totals, key=lambda n: effects[n].corrected_last):
         view = view.kept_where(~show.shows(effects[name]), effects[name].corrected(view, totals[name]))
     return view

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from fluxproof.diagnosis.answer.conclude import measured_torque
-from fluxproof.diagnosis.answer.estimates import common
 from fluxproof.diagnosis.answer.names import credibility
 from fluxproof.diagnosis.answer.sizes import UNITS, Sizes
 from fluxproof.diagnosis.catalogue import CATALOGUE
@@ -163,7 +162,7 @@ def estimates(fit) -> list[Estimated]:
     """Parameters of a fit's effects, as maximum-likelihood values with the covariance of the data alone."""
     values, covariance = without_prior(fit)
     nominal, effects = fit.problem.view.nominal, fit.problem.setup.effects
-    full, out = covariance + common(fit), []
+    out = []
     place = {fit.problem.keys[n]: j for j, n in enumerate(fit.take)}
     for name in fit.names:
         c = dict(fit.c[name])
@@ -171,7 +170,7 @@ def estimates(fit) -> list[Estimated]:
             for column in ((name, key), (name, f"~{key}")):
                 if column in place:
                     c[key] = float(values[place[column]])
-        found = effects[name].estimates(c, covariance_of(fit, name, full), nominal)
+        found = effects[name].estimates(c, covariance_of(fit, name, covariance), nominal)
         out += [Estimated(name, key, float(e.value), float(e.sigma), e.unit) for key, e in found.items()]
     return out
 

@@ -47,7 +47,7 @@ def outliers(populations, present: dict[str, dict[str, float]], values, rates) -
 
     present: {serial: {extra: probability}}; values: {(effect, parameter): {serial: (value, sigma, unit)}}.
     """
-    found = [*_sizes(populations, rates, len(present)), *_presences(present, values, rates)]
+    found = [*_sizes(populations, rates), *_presences(present, values, rates)]
     out: dict[str, list[Finding]] = {}
     for finding in sorted(found, key=lambda f: (f.doubt, -abs(np.nan_to_num(f.z)), f.serial, f.effect, f.parameter)):
         out.setdefault(finding.serial, []).append(finding)
@@ -64,7 +64,7 @@ def common(effect, rates) -> bool:
     return effect in BASE or rates.get(effect, 0.0) >= COMMON
 
 
-def _sizes(populations, rates, drives) -> list[Finding]:
+def _sizes(populations, rates) -> list[Finding]:
     tests = [
         (pop, n) for pop in populations if common(pop.effect, rates) and len(pop.x) >= LEAST_DRIVES
         for n in range(len(pop.x))

@@ -48,7 +48,7 @@ COLUMNS = (
     Column("status", pa.string(), "`done`, or `failed` with a reason", False),
     Column("reason", pa.string(), "why it failed: one line"),
     Column("design", pa.string(), "hash of the drive file: recordings of one design are one population"),
-    Column("key", pa.string(), "hash of recording, drive file, version and options: what resuming compares", False),
+    Column("key", pa.string(), "hash of recording, drive file and version: what resuming compares", False),
     Column("version", pa.string(), "version of Fluxproof and hash of its source"),
     Column("verdict", pa.string(), "as in diagnosis.json"),
     Column("sentence", pa.string(), "as in diagnosis.json"),

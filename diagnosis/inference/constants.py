@@ -17,7 +17,7 @@ BALANCE_DC = 1.5e-5
 # Of the error of a mean voltage or torque, what a harmonic has: less of the ripple and of the timing reaches it.
 BALANCE_ORDER = 0.5
 # The part of the balance's error that all operating points have in common and that moves a parameter, relative to the
-# voltage, and to the bus voltage in the direction of the current: rms in healthy recordings.
+# voltage, and to the bus voltage in the direction of the current: rms in healthy recordings.  It is in every set.
 COMMON_U, COMMON_DC = 2e-5, 1e-5
 # Error of the mean of three phase currents, relative to the rated current: matching of the converters' references.
 BALANCE_SUM = 2e-4
@@ -92,13 +92,13 @@ SWING = 8.0
 SLOW_DC, SLOW_U, SLOW_CHANGE = 2.5e-4, 2e-3, 0.05
 # Of that error: what a log may have at least, as a table of long means is better than messages of a bus.
 SLOW_LEAST = 0.2
-# Of the voltage: largest noise that may be taken from what no effect explains, where no operating point repeats; more
-# has a cause that is not known.
+# Of the voltage: largest noise that may be taken from what no effect explains, where operating points repeat too seldom
+# to show it; a larger remainder is no noise.
 UNREPEATED = 0.03
 
 # ---- one operating point
 # Largest reduced chi^2 of an accepted drift; share of the misfit's rms that may be left to the shapes of curves; share
 # of its power that names must explain beside a remainder, as it is not known how much may imitate an effect.
 LEFTOVER, FLOOR_SHARE, NAMED_SHARE = 2.0, 0.15, 0.9
-# Penalty of an effect in chi^2, in addition to that of its coefficients: a prior probability of about one in twenty.
+# Penalty of an effect in chi^2, in addition to that of its coefficients: a prior probability of one in 150.
 PER_EFFECT = 10.0

@@ -71,6 +71,7 @@ class Posterior:
             self._add(problem, [known], force=True)
             self._neighbours(problem, known)
             self._near(known)
+            self._simpler(known)
         self._settle()
 
     def within(self, allowed, idle):
@@ -152,6 +153,18 @@ class Posterior:
             if not close:
                 return
             self._linearise(max(close, key=lambda f: f.value).names)
+
+    def _simpler(self, known):
+        """Linearise the best set of every smaller number of effects on its own.
+
+        An offset beside a resistance that is half wrong, say: on the linearisation of a larger set, which found other
+        causes for what is not linear, the true pair may be far worse than it is.
+        """
+        for size in range(1, len(known)):
+            sets = [f for f in self.fits.values() if len(f.names) == size]
+            simple = max(sets, key=lambda f: f.value, default=None)
+            if simple is not None and simple.names not in self.own and np.isfinite(simple.value):
+                self._linearise(simple.names, SETTLED)
 
     def _settle(self):
         """Judge the best set and its parts on their own linearisations until the best one stands."""

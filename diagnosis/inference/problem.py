@@ -113,7 +113,9 @@ class Problem:
         x = np.array(stack).T if stack else np.zeros((len(y), 0))
         if doubt is not None:
             doubt = np.where(cells.channel == "u", doubt[cells.block], 0.0)
+        x = np.column_stack([x, common_error(setup)])
         self.p = condense(setup.grouping, y, x, setup.noise, setup.level, setup.load, doubt)
+        self.p.x, self.common = self.p.x[:, : len(self.keys)], self.p.x[:, len(self.keys) :]
         self._priors()
 
     def _priors(self):
@@ -173,23 +175,27 @@ class Problem:
 
     def _likelihood(self, names, mine):
         """``likelihood`` with the columns ``mine``."""
-        owner = np.array([names.index(self.keys[n][0]) for n in mine], np.int64)
-        most = np.array([self.most[n] for n in names], float)
-        p, take = self.p, np.array(mine, np.int64)
-        x = np.ascontiguousarray(p.x[:, take])
+        p, take, common = self.p, np.array(mine, np.int64), self.common.shape[1]
+        # The common error of the balance is in every set, as an effect of fixed size that nobody names.
+        owner = np.array([names.index(self.keys[n][0]) for n in mine] + [len(names)] * common, np.int64)
+        most = np.array([self.most[n] for n in names] + [1.0], float)
+        prior = np.append(self.prior[take], np.ones(common))
+        x = np.column_stack([p.x[:, take], self.common])
         # Where no formula is preferred (a curve of 1), the free columns tell the size too.
         tells = lambda name, key: not key.startswith("~") or self.setup.effects[name].curve >= 1.0  # noqa: E731
-        core = np.array([tells(*self.keys[n]) for n in mine], bool)
+        core = np.array([tells(*self.keys[n]) for n in mine] + [True] * common, bool)
         drags = p.loads >= 0 and bool(x[p.group == p.loads].any())
         always = k.ALWAYS_LOADED if p.loads >= 0 else 1.0
         tried = [
             evidence(
                 x, p.y, p.s2, p.level, p.doubt, p.group, len(p.groups), p.loads, p.load,
-                self.prior[take], owner, core, most, k.FORMULA, k.DISCREPANCY, self.view.least_error, always, start,
+                prior, owner, core, most, k.FORMULA, k.DISCREPANCY, self.view.least_error, always, start,
             )
             for start in ((np.inf, 1.5, 3.0) if drags else (np.inf,))
         ]  # fmt: skip
-        return take, *max(tried, key=lambda found: found[0])
+        value, c, cov, sizes, lam, mu = max(tried, key=lambda found: found[0])
+        own = slice(len(take))
+        return take, value, c[own], cov[own, own], sizes[:-1], lam, mu
 
     def fit(self, names):
         """The Fit of a set of effects on this problem."""
@@ -257,6 +263,18 @@ def _implausible(fit, name) -> int:
         return 0
     found = effect.estimates(fit.c[name], covariance_of(fit, name, fit.cov), nominal)
     return sum(not believable(found[key], limits, nominal) for key, limits in effect.plausible.items() if key in found)
+
+
+def common_error(setup) -> np.ndarray:
+    """(r, 3) errors of the balance that all operating points have in common, each of the size of its prior.
+
+    Along and across the voltage, as the converters' timing; along the current, as minimum pulses.
+    """
+    view = setup.view
+    u, bus = view.to_dq(view.u[:, 1:-1]), view.nominal.inverter.dc_bus_v
+    along = view.i_mid / np.abs(view.i_mid).clip(0.02 * view.machine.rated_current_a)
+    patterns = (k.COMMON_U * u, 1j * k.COMMON_U * u, k.COMMON_DC * bus * along)
+    return np.array([setup.projector.rows({"u": p}) for p in patterns]).T
 
 
 def _bounded_noise(rows):

@@ -57,7 +57,7 @@ def emf_rows(path, columns: dict, nominal, meta: dict) -> Recording:
     joined = np.ones(len(usable), bool)
     joined[np.cumsum(count) - 1] = False
     lacks = LACKS if "theta_e" in columns else LACKS | {"angle"}
-    meta["notes"] += _notes(columns, t, period, nominal)
+    meta["notes"] += _notes(columns, t, period)
     if len(count) > 1:
         meta["run"] = np.repeat(np.arange(len(count)), count)
     return Recording(str(path), arrays, usable, joined, lacks=lacks, problems=problems, meta=meta)
@@ -227,7 +227,7 @@ def _over_turns(x, turn) -> np.ndarray:
     return np.where((low >= -0.5) & (high <= m - 0.5), mean, np.nan)
 
 
-def _notes(columns, t, period, nominal) -> list[str]:
+def _notes(columns, t, period) -> list[str]:
     notes = [
         f"EMF run: terminal voltages, a sample every {float(np.median(np.diff(t))):.3g} s, as means over control "
         f"periods of {period:g} s; the current is zero, so that resistance, inductances, inverter and current sensors "

@@ -16,8 +16,7 @@ DEGREE = math.pi / 180.0
 RPM = TURN / 60.0
 PEAK = math.sqrt(2.0)
 
-# quantity -> {unit: factor}; units in SHAFT are also multiplied by the pole pairs.
-SHAFT = "mech"
+# quantity -> {unit: factor}; units in OF_SHAFT are also multiplied by the pole pairs.
 FACTORS = {
     "s": {
         "s": 1.0,

@@ -1,4 +1,4 @@
-"""Line charts: misfit over time and over the angle, harmonic orders.
+"""Line charts: misfit over time, harmonic orders.
 
 The arrays are those of diagnosis.result.Evidence; a drawing function raises KeyError if one is missing.
 """
@@ -42,23 +42,6 @@ def over_time(e) -> theme.Picture:
     theme.key(axis, *names)
     caption = "Magnitude of the misfit vector over time. Vertical shading: intervals held out of every fit."
     return theme.picture("over_time", figure, caption)
-
-
-def over_angle(e) -> theme.Picture:
-    """Mean misfit over the electrical angle, d above q, on a common scale."""
-    _same_length(e, "angle", "angle_{}_d", "angle_{}_q")
-    angle = np.degrees(e["angle"]) % 360.0
-    order = np.argsort(angle)
-    figure, panels = theme.axes(2, 1, height=3.3, sharex=True, sharey=True)
-    given = _given(e, "angle_{}_d", "angle_{}_q")
-    for axis, name in zip(panels, "dq", strict=True):
-        for when in given:
-            axis.plot(angle[order], e[f"angle_{when}_{name}"][order], color=WHEN[when])
-        axis.set(title=f"Misfit of $u_{name}$", ylabel="V", xlim=(0, 360), xticks=range(0, 361, 60))
-        theme.key(axis, *((_called(e, when), WHEN[when]) for when in given))
-    panels[-1].set_xlabel("electrical angle [°]")
-    caption = "Mean misfit over the electrical angle. Six periods per turn indicate the inverter or the magnets."
-    return theme.picture("over_angle", figure, caption)
 
 
 def orders(e) -> theme.Picture:

@@ -24,7 +24,6 @@ DRAWN = {
         "misfit over angle and current",
     ),
     "orders": (lines.orders, ("orders", "spectrum_before"), "harmonic orders"),
-    "over_angle": (lines.over_angle, ("angle", "angle_before_d", "angle_before_q"), "misfit over the angle"),
     "over_time": (lines.over_time, ("t", *BLOCKS), "misfit over time"),
 }
 BLOCK_ARRAYS = (

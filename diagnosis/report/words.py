@@ -8,6 +8,7 @@ from types import SimpleNamespace
 
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.quantities import measured, number, quantity, unit_text
+from fluxproof.diagnosis.suspects import SUSPECTS
 
 __all__ = ["brief", "effect_text", "explained", "measured", "number", "percent", "quantity", "span", "unit_text"]
 
@@ -23,7 +24,7 @@ VERDICTS = {
     ),
     "ambiguous": ("open", "Several causes fit this recording equally well."),
     "unexplained": ("open", "No effect of the catalogue explains half of the difference."),
-    "no_mismatch": ("good", "Recording and simulation agree to within the noise floor."),
+    "no_mismatch": ("good", "Recording and simulation agree."),
     "digital_mismatch": (
         "bad",
         "The controller's outputs differ from those of its golden model. Correct that first.",
@@ -106,7 +107,7 @@ def effect_text(name: str) -> SimpleNamespace:
 
     A name without an entry is its own title; the other texts are then empty.
     """
-    entry = CATALOGUE.get(name)
+    entry = CATALOGUE.get(name) or SUSPECTS.get(name)
 
     def of(key: str):
         return getattr(entry, key, "") or ""

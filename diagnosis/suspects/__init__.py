@@ -1,6 +1,6 @@
 """Causes that the simulation has no parameter for: they compete with the catalogue, are described and never named.
 
-Every module in this folder that defines EFFECT is an entry; its title completes "this would be explained if ...".
+Every module in this folder that defines EFFECT is an entry; its ``clause`` completes "as if ...".
 Without them their misfit would be shared out among effects of the catalogue that together look alike.
 """
 

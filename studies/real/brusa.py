@@ -36,7 +36,7 @@ NAMING = ((1000.0, 1), (-1800.0, 2))  # rpm, seed of the order, which decorrelat
 MAPPING_RPM, DWELL_S = 1000.0, 0.046
 MAP_STEP_A = 10.0
 TARGET = 0.02  # of the map's range
-EARNS = 30.0  # as in the search
+EARNS = 30.0  # chi^2 by which an effect beside the map must improve the fit
 
 
 def run(folder: Path, out: Path, progress=lambda text: None) -> dict:
@@ -183,6 +183,8 @@ def _tell(answer, surface, found, beside, view, held, noise_v) -> None:
         f"{what[0].upper()}{what[1:]}: with the flux map found, the misfit at held-out operating points falls from "
         f"{answer.fit.holdout_before:.3g} V to {answer.fit.holdout_after:.3g} V."
     )
+    answer.explained_share, answer.remainder = answer.fit.explained_share, []
+    answer.advice = ""  # that of the answer with the map is written with its outputs
     answer.notes.append(
         f"The flux map is a free reciprocal surface over {int(covered.sum())} of {covered.size} points of its grid; "
         f"its estimated error is {1e3 * sigma:.2g} mWb rms."
