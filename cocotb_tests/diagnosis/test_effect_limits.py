@@ -214,3 +214,15 @@ def test_half_of_the_points_show_what_is_left_beside_a_load():
     assert _seen_discrepancy(fit)[0] == pytest.approx(0.03 / 0.085 / MEDIAN)
     points.y = np.full(5, 5.0)
     assert _seen_discrepancy(fit)[0] == 3.0
+
+
+def test_the_gain_of_one_of_two_sensors_is_that_of_one():
+    """The third current is computed, so that it has the error of the others; three gains were 4.5, -1.5, 1.5 %."""
+    c = dict(columns(GRID))
+    del c["i_c"]
+    c["i_a"] = 1.03 * c["i_a"]
+    (found,) = diagnose(from_columns(c, NOMINAL.sample_time_s), NOMINAL).effects
+    assert found.name == "current_gain" and set(found.parameters) == {"gain_a", "gain_b"}
+    assert found.parameters["gain_a"].value == pytest.approx(0.03, abs=1e-3)
+    assert abs(found.parameters["gain_b"].value) < 1e-3
+    assert found.plant["sensors.current_gain_error"] == pytest.approx([0.03, 0.0, 0.0], abs=1e-3)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from cocotb_tests.support.diagnosed_drives import MACHINE
 from cocotb_tests.support.mistakes import PHASES, Mistake, scaled, turned, written
 from cocotb_tests.support.slow import slowly
 from fluxproof.diagnosis.session import diagnose
@@ -37,6 +38,30 @@ def test_a_scale_is_one_cause_at_any_size(columns, factor, name, parameter, tmp_
     assert [e.name for e in answer.effects] == [name]
     found = answer.effects[0].parameters[parameter]
     assert abs(found.value - (factor - 1.0)) < 0.01 * factor + 2.0 * found.sigma
+
+
+@pytest.mark.parametrize(("degrees", "factor"), [(5, 0.85), slowly(3, 0.85), slowly(-4, 1.2)])
+def test_an_inductance_beside_an_angle_that_is_off(degrees, factor, tmp_path):
+    """On data whose angle a soft shaft corrected too, the inductance looked worse than a cross-saturation."""
+    deviations = {"machine": (("inductance_q_h", factor * MACHINE.inductance_q_h),)}
+    answer = diagnose(*written(Mistake("", turned(np.radians(degrees))), tmp_path, deviations))
+    assert answer.verdict == "explained"
+    assert sorted(e.name for e in answer.effects) == ["encoder_offset", "inductance_q"], answer.sentence
+    found = {k: e.value for effect in answer.effects for k, e in effect.parameters.items()}
+    assert found["inductance_q_h"] == pytest.approx(factor * MACHINE.inductance_q_h, rel=0.01)
+    assert abs(np.degrees(found["offset_rad"]) - degrees) < 0.1
+
+
+def shifted(rows):
+    """Duties ``rows`` rows later than the drive file says; the first and the last rows are not steady."""
+    return lambda c: {**c, **{f"d_{x}": np.roll(c[f"d_{x}"], rows) for x in "abc"}}
+
+
+@pytest.mark.parametrize("rows", [2, slowly(1), slowly(-2)])
+def test_a_delay_of_more_than_a_period_has_its_size(rows, tmp_path):
+    answer = answer_to(Mistake("", shifted(rows)), tmp_path)
+    assert answer.verdict == "explained" and [e.name for e in answer.effects] == ["delay"], answer.sentence
+    assert answer.effects[0].parameters["delay_s"].value == pytest.approx(-rows * 1e-4, abs=1e-6)
 
 
 def test_no_parameter_of_a_machine_is_negative(tmp_path):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cocotb_tests.support.bench_logs import L_D, L_Q, PSI, Truth, emf, table
+from cocotb_tests.support.bench_logs import L_D, L_Q, PSI, R, Truth, emf, table
 from cocotb_tests.support.recordings_made import DRIVE, made, write
 from fluxproof.diagnosis import diagnose
 from fluxproof.diagnosis.conventions.apply import read_recording
@@ -74,6 +74,14 @@ def test_weak_magnets_behind_wrong_pole_pairs_have_their_size(tmp_path):
     assert [c.code for c in answer.conventions] == ["pole_pairs"], answer.sentence
     found = {k: e.value for effect in answer.effects for k, e in effect.parameters.items()}
     assert found == {"magnet_flux_wb": pytest.approx(0.95 * PSI, rel=0.005)}
+
+
+def test_a_resistance_behind_wrong_pole_pairs_is_no_bus_sensor(tmp_path):
+    """A bus that reads a third too much, and a resistance of its own, leave the same."""
+    answer = answer_of(tmp_path, Truth(r=1.2 * R), 3)
+    assert [c.code for c in answer.conventions] == ["pole_pairs"], answer.sentence
+    found = {k: e.value for effect in answer.effects for k, e in effect.parameters.items()}
+    assert found == {"resistance_ohm": pytest.approx(1.2 * R, rel=0.01)}
 
 
 @pytest.mark.parametrize("truth", [Truth(psi=0.75 * PSI), Truth(l_d=0.75 * L_D, l_q=0.75 * L_Q)])

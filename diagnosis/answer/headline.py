@@ -24,6 +24,7 @@ from fluxproof.diagnosis.answer.phrases import (
 from fluxproof.diagnosis.inference import constants as k
 from fluxproof.diagnosis.quantities import ascii_of, quantity
 
+MUCH_LEFT = 3.0  # times the noise floor: a remainder that is told though the misfit is explained
 MOST_LETTERS = 200  # letters of a headline: two lines of a terminal or of the report
 
 
@@ -48,6 +49,9 @@ def details(answer, effects) -> str:
         fall = both if told and fit.holdout_after < fit.holdout_before else f"is {volts(fit.holdout_before)}"
         floor = f"the noise floor is {volts(fit.noise_floor)}"
         parts.append(f"The misfit at operating points that were not fitted {fall}; {floor}.")
+        if answer.verdict == "explained" and fit.holdout_after > MUCH_LEFT * fit.noise_floor:
+            times = f"{fit.holdout_after / fit.noise_floor:.2g} times the noise floor"
+            parts.append(f"What is left is {times}: a formula does not fit this drive, or a small effect is not named.")
     if answer.explained_share is not None and answer.effects:
         parts.append(f"The effects explain {percent_below(answer.explained_share)} of its power.")
     u = answer.unknown_term

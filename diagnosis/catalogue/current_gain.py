@@ -7,6 +7,10 @@ from fluxproof.diagnosis.result import Estimate
 
 # Gains of two sensors that differ by g cause a harmonic of 0.58 g and a rotation of 0.29 g; twice that is allowed.
 MOST_TURN = 1 / 3
+# Coefficients of gains of +1/2 and -1/2 of two sensors whose third current is computed, i_c = -i_a - i_b, and the part
+# of the coefficients by which they may differ from that.
+PAIR = {"alpha": 1.5, "beta": -0.75**0.5, "turn": 12**-0.5}
+UNLIKE_PAIR = 0.2
 PATTERNS = {"alpha": (2 / 3, -1 / 3, -1 / 3), "beta": (0.0, 3**-0.5, -(3**-0.5))}
 
 
@@ -49,17 +53,28 @@ class CurrentGain(Effect):
             error = error + view.phases(1j * c["turn"] * view.i)
         return view.without_current(error, raw_gain=1.0 + self._gains(c), turn=c.get("turn", 0.0))
 
+    @staticmethod
+    def _of_sensors(c) -> dict[str, dict[str, float]]:
+        """{phase: weights of the coefficients in the gain of its sensor}; two phases if the third was computed."""
+        seen, pair = (np.array([weights.get(n, 0.0) for n in PAIR]) for weights in (c, PAIR))
+        differ = pair @ seen / (pair @ pair)
+        if c.get("turn") and np.linalg.norm(seen - differ * pair) < UNLIKE_PAIR * np.linalg.norm(seen):
+            half = {n: 0.5 * weight / (pair @ pair) for n, weight in PAIR.items()}
+            return {"a": {"common": 1.0} | half, "b": {"common": 1.0} | {n: -w for n, w in half.items()}}
+        return {x: {"common": 1.0} | {n: w[k] for n, w in PATTERNS.items()} for k, x in enumerate("abc")}
+
     def estimates(self, c, covariance, nominal):
-        names = list(c)
         out = {}
-        for k, phase in enumerate("abc"):
-            weights = np.array([PATTERNS[n][k] if n in PATTERNS else 1.0 if n == "common" else 0.0 for n in names])
+        for phase, of in self._of_sensors(c).items():
+            weights = np.array([of.get(n, 0.0) for n in c])
             spread = float(np.sqrt(max(weights @ covariance @ weights, 0.0)))
-            out[f"gain_{phase}"] = Estimate(float(self._gains(c)[k]), spread, "1")
+            out[f"gain_{phase}"] = Estimate(float(weights @ np.array(list(c.values()))), spread, "1")
         return out
 
     def plant(self, c, nominal):
-        return {"sensors.current_gain_error": [float(v) for v in self._gains(c)]}
+        sensors = self._of_sensors(c)
+        gains = {x: sum(weight * c.get(n, 0.0) for n, weight in of.items()) for x, of in sensors.items()}
+        return {"sensors.current_gain_error": [float(gains.get(x, 0.0)) for x in "abc"]}
 
 
 EFFECT = CurrentGain(

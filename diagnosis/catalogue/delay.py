@@ -10,7 +10,7 @@ from fluxproof.diagnosis.balance.curves import parabola
 from fluxproof.diagnosis.balance.late_pulses import instant, late_ripple
 from fluxproof.diagnosis.effects.effect import Effect, Parameter, current_error, one, torque_of, voltage
 
-MOST_PERIODS = 1.2  # periods: beyond one period the interpolation continues linearly, so that the iteration can return
+MOST_PERIODS = 3.0  # periods; more than is possible, so that the iteration can return
 TRIED, FINE = np.arange(1, 50) / 50, 0.002  # periods, of late pulses
 NEAR = 0.15  # periods between a delay and that of its ripple: about a zero vector
 STEP = 0.005  # periods on both sides of a delay, over which the slope of the ripple is taken
@@ -29,14 +29,19 @@ def _smooth(view):
     return parabola(view.u * np.conj(turn)) * turn
 
 
+def _shifted(view, u, rows):
+    """The voltage u (b, m+2) [V] of ``rows`` intervals earlier; at the ends of a block it turns on with the angle."""
+    place = np.arange(u.shape[1]) - rows
+    inside, angle = np.clip(place, 0, u.shape[1] - 1), view.interval_angle
+    step = np.where(place < 0, angle[:, 1:2] - angle[:, :1], angle[:, -1:] - angle[:, -2:-1])
+    return u[:, inside] * np.exp(1j * (place - inside) * step)
+
+
 def _moved(view, share):
     """Change of the voltage (b, m+2) [V] if it is taken ``share`` periods earlier."""
-    u, change = _smooth(view), np.zeros_like(view.u)
-    if share >= 0.0:
-        change[:, 1:] = share * (u[:, :-1] - u[:, 1:])
-    else:
-        change[:, :-1] = -share * (u[:, 1:] - u[:, :-1])
-    return change
+    u, whole = _smooth(view), int(np.floor(share))
+    part = share - whole
+    return (1.0 - part) * _shifted(view, u, whole) + part * _shifted(view, u, whole + 1) - u
 
 
 def _seen(view, at):

@@ -25,7 +25,7 @@ from fluxproof.diagnosis.inference.evidence import evidence
 from fluxproof.diagnosis.inference.linearise import Rows
 from fluxproof.diagnosis.inference.points import condense
 from fluxproof.diagnosis.inference.posterior import Posterior
-from fluxproof.diagnosis.inference.problem import Problem, Setup
+from fluxproof.diagnosis.inference.problem import Problem, Setup, implausible
 
 WIDE = 6  # readings to which a second one is added
 SEARCHED = 2  # readings, or pairs of them, that are judged with the whole search
@@ -54,7 +54,8 @@ def preferred(recordings, posterior, explained, progress=lambda text: None):
     setup, known = posterior.setup, posterior.best().value
     if len(np.unique(setup.points)) < LEAST_POINTS:
         return (), [], posterior
-    most = len(posterior.best().names) if explained else np.inf
+    # A reading may also take the place of an implausible size: a bus sensor that is off by a third, say.
+    most = len(posterior.best().names) + implausible(posterior.best()) if explained else np.inf
     able = [r for r in _all(setup.view.nominal) if r.possible(recordings)]
     able = [r for r in able if all(getattr(setup.view.machine, key) for key in r.machine)]
     terms = Terms(setup)

@@ -20,6 +20,7 @@ GROWN = 3  # effects up to which all good sets are grown
 MOST_EFFECTS = 6
 ALIKE = 8  # best sets that are linearised on their own before the search around one of them
 LEADERS = 3  # best single effects that are linearised on their own
+OTHERS = 3  # sets of measurement errors, other than those of the best set, around which sets are judged too
 FAR = 0.3  # of the voltage: only a larger misfit can be of an effect that is far from linear
 
 
@@ -30,6 +31,7 @@ class Posterior:
         self.setup, self.progress = setup, progress
         self.fits = {}
         self.own = set()  # sets judged on their own linearisation
+        self.around = set()  # sets of measurement errors around which others were judged
         self.allowed = None  # effects that a set may contain; None: all
         self.idle = frozenset()  # effects that were taken out (answer/conclude.py)
         self._search()
@@ -72,6 +74,7 @@ class Posterior:
             self._neighbours(problem, known)
             self._near(known)
             self._simpler(known)
+            self._others(known)
         self._settle()
 
     def within(self, allowed, idle):
@@ -128,7 +131,12 @@ class Posterior:
             sets = {tuple(sorted({*f.names, n})) for f in leaders for n in able if n not in f.names}
             self._add(problem, sets)
 
-    def _neighbours(self, problem, names):
+    def _errors(self, names) -> frozenset:
+        """The measurement errors of a set, which are removed from the data: what is far from linear."""
+        return frozenset(n for n in names if self.setup.effects[n].corrects)
+
+    def _neighbours(self, problem, names, errors=None):
+        """Judge the sets near ``names``; errors: only those with these measurement errors (None: all)."""
         able = [n for n in problem.able() if n not in names]
         less = [tuple(n for n in names if n != out) for out in names]
         more = [(*names, n) for n in able]
@@ -137,18 +145,17 @@ class Posterior:
         rests = itertools.combinations(names, len(names) - 2) if len(names) > 1 else ()
         fewer = [(*rest, n) for rest in rests for n in able]
         two = [(*names, *pair) for pair in itertools.combinations(able, 2)] if len(names) <= 1 else []
-        self._add(problem, [*less, *(m for m in more if len(m) <= MOST_EFFECTS), *swapped, *fewer, *two])
+        sets = [*less, *(m for m in more if len(m) <= MOST_EFFECTS), *swapped, *fewer, *two]
+        self._add(problem, [s for s in sets if errors is None or self._errors(s) == errors])
 
     def _near(self, known):
         """Linearise close sets on their own if they correct other errors than the best one."""
-        effects = self.setup.effects
+        mine = self._errors(known)
         for _ in range(8):
             best = self.best()
-            mine = {n for n in known if effects[n].corrects}
             close = [
                 f for f in self.fits.values()
-                if f.names not in self.own and f.value > best.value - CLOSE
-                and {n for n in f.names if effects[n].corrects} != mine
+                if f.names not in self.own and f.value > best.value - CLOSE and self._errors(f.names) != mine
             ]  # fmt: skip
             if not close:
                 return
@@ -165,6 +172,24 @@ class Posterior:
             simple = max(sets, key=lambda f: f.value, default=None)
             if simple is not None and simple.names not in self.own and np.isfinite(simple.value):
                 self._linearise(simple.names, SETTLED)
+
+    def _others(self, known):
+        """Judge sets around the best ones that correct other measurement errors.
+
+        Where an angle is off, say, the cause beside it is judged rightly only on data whose angle is corrected, and by
+        nothing else: what the best set corrects besides makes others look worse than they are.
+        """
+        self.around.add(self._errors(known))
+        best = {}
+        for fit in sorted((self.fits[n] for n in self.own), key=lambda f: -f.value):
+            if np.isfinite(fit.value) and fit.stands:
+                best.setdefault(self._errors(fit.names), fit)
+        for errors, fit in list(best.items())[:OTHERS]:
+            if errors and errors not in self.around:
+                self.around.add(errors)
+                problem = around(self.setup, fit)
+                if problem is not None:
+                    self._neighbours(problem, fit.names, errors)
 
     def _settle(self):
         """Judge the best set and its parts on their own linearisations until the best one stands."""

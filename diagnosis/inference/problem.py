@@ -209,7 +209,7 @@ class Problem:
             for n, x in zip(names, a, strict=True)
         )
         found = Fit(self, names, float(value), take, c, cov, a, lam, mu)
-        found.value += np.log(k.IMPLAUSIBLE) * sum(_implausible(found, name) for name in names)
+        found.value += np.log(k.IMPLAUSIBLE) * implausible(found)
         return found
 
 
@@ -256,8 +256,12 @@ def covariance_of(fit, name, full) -> np.ndarray:
     return out
 
 
+def implausible(fit) -> int:
+    """Number of the parameters of a set that are outside of what their effects declare as plausible."""
+    return sum(_implausible(fit, name) for name in fit.names)
+
+
 def _implausible(fit, name) -> int:
-    """Number of an effect's parameters outside of what it declares as plausible."""
     effect, nominal = fit.problem.setup.effects[name], fit.problem.view.nominal
     if not effect.plausible:
         return 0
