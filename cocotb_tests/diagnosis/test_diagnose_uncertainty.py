@@ -8,7 +8,6 @@ import pytest
 from cocotb_tests.core.test_registers import PAPER
 from cocotb_tests.support.diagnosed_drives import DRIVE, MACHINE, POINT, columns, recorded
 from fluxproof.diagnosis import diagnose
-from fluxproof.diagnosis.answer.estimates import common
 from fluxproof.diagnosis.balance.blocks import view_of
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.inference.problem import Problem, Setup, covariance_of
@@ -33,8 +32,7 @@ def setup_of(view, *names) -> Setup:
 def fitted(view, *names):
     """A set of effects on a view, and its parameters {effect: {name: Estimate}}."""
     fit = fit_of_set(setup_of(view, *names), names)
-    full = fit.cov + common(fit)
-    return fit, {n: CATALOGUE[n].estimates(fit.c[n], covariance_of(fit, n, full), NOMINAL) for n in names}
+    return fit, {n: CATALOGUE[n].estimates(fit.c[n], covariance_of(fit, n, fit.cov), NOMINAL) for n in names}
 
 
 def test_a_delay_of_a_whole_period_is_found_without_bias(view):

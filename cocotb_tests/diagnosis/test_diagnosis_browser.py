@@ -82,7 +82,7 @@ def test_in_a_browser(written, tmp_path, verdict):
     assert log == ""
     assert saw["first"] == made_up()[verdict].sentence
     assert saw["width"] == pytest.approx(400, abs=20) and saw["overflow"] <= 0 and saw["cut"] == 0
-    pictures = {"explained": 8, "partly_explained": 7, "ambiguous": 7, "unexplained": 6, "no_mismatch": 6}
+    pictures = {"explained": 7, "partly_explained": 6, "ambiguous": 6, "unexplained": 5, "no_mismatch": 5}
     assert len(saw["pictures"]) == pictures.get(verdict, 0) and all(size > 70 for size in saw["pictures"])
     # Two maps and a colour scale in two pictures; without an explanation there is one map in each.
     rasters = {"explained": 6, "partly_explained": 6, "ambiguous": 6, "unexplained": 4, "no_mismatch": 4}

@@ -47,18 +47,15 @@ def evidence(effect: float = 0.9, noise: float = 0.08, after: bool = True) -> Ev
     i_d = -0.15 * np.abs(i_q)
     before = effect * six_step(theta, i_d + 1j * i_q) + noise * noise_of(rng, len(omega))
     left = noise * noise_of(rng, len(omega))
-    angle = np.radians(np.arange(2.5, 360, 5.0))
-    mean = effect * six_step(angle, np.full(len(angle), 3j)) + noise / 8 * noise_of(rng, len(angle))
     orders = np.array([0, 0.25, 0.5, 1, 2, 3, 4, 6, 12])
     arrays = dict(t=np.arange(len(omega)) * 0.01, theta_e=theta, omega_e=omega, i_d=i_d, i_q=i_q)
     arrays |= dict(
         before_d=before.real, before_q=before.imag, holdout=(np.arange(len(omega)) // 320) % 4 == 3
     )
-    arrays |= dict(noise=np.array(noise), angle=angle, angle_before_d=mean.real, angle_before_q=mean.imag)
+    arrays |= dict(noise=np.array(noise))
     arrays |= dict(orders=orders, spectrum_before=effect * np.array([1.27, *6 * [0.0], 0.25, 0.09]) + 0.003)
     if after:
         arrays |= dict(after_d=left.real, after_q=left.imag, spectrum_after=0.003 + 0.002 * rng.random(9))
-        arrays |= dict(angle_after_d=0.02 * np.sin(angle), angle_after_q=0.02 * np.cos(angle))
     return Evidence(arrays)
 
 
