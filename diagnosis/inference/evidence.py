@@ -1,15 +1,13 @@
 """The marginal likelihood of a set of effects, with the sizes of the effects and of the discrepancy learnt.
 
-    y = X c + d + f + q + e,   c_k ~ N(0, (a_e p_k)^2)
-    e ~ N(0, s^2),   d ~ N(0, (lambda_g l)^2),   f ~ N(0, (nu_g z)^2),   q ~ N(0, (mu_g w)^2)
+    y = X c + d + q + e,   e ~ N(0, s^2),   d ~ N(0, (lambda_g l)^2),   q ~ N(0, (mu_g w)^2),   c_k ~ N(0, (a_e p_k)^2)
 
 a_e is the size of effect e in units of its floor of practical interest, with a log-uniform prior from 1 to the size at
 which a drive no longer runs; p_k is the coefficient that makes column k as large as the floor (of a curve: the share of
 it by which the curve may depart from the formula).  lambda_g is the discrepancy of group g, with the prior
-1 / (1 + (lambda / k)^2), and at least 1 where the error of the balance is known.  z is the error that the formulas of
-the effects may have at most, a share of what they contribute, and w that of their curves; nu_g and mu_g <= 1 are the
-shares of them that are seen in group g.  With all of it, a set would gain by smaller effects with smaller errors, also
-where another set leaves the same.  All are found by expectation maximisation; the log evidence is exact for them.
+1 / (1 + (lambda / k)^2), and at least 1 where the error of the balance is known.  w is the error that the curve of an
+effect may have at most, and mu_g <= 1 the share of it that is seen in group g: with all of it, a set would gain by a
+smaller effect with a smaller w.  All are found by expectation maximisation; the log evidence is exact for them.
 """
 
 from __future__ import annotations
@@ -21,7 +19,6 @@ STEPS = 7
 SMALL, LARGE = 1e-200, 1e200  # range of a product of variances, each of which lies within 1e-100 and 1e100
 FACTORS = np.array([0.1, 0.35, 0.7, 1.0, 1.4, 3.0, 10.0])  # of the discrepancy: the grid of every step
 SEEN = np.array([0.0, 0.03, 0.1, 0.2, 0.4, 0.7, 1.0])  # shares mu: the grid of every step
-FORMULAS = np.array([0.0, 0.1, 0.3, 1.0])  # shares nu: the grid of every step
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -39,35 +36,6 @@ def _share_seen(mu, lam, s2, level2, doubt2, own, e2, group, loads):
         mu[g] = SEEN[np.argmax(score[g])]
 
 
-@numba.njit(cache=True, error_model="numpy")
-def _formulas_seen(own, lam, mu, s2, level2, doubt2, e2, group, groups, loads):
-    """Multiply the squared errors of formulas own (n,) by the squared share nu that is seen in each group."""
-    score = np.zeros((groups, len(FORMULAS)))
-    product = np.ones((groups, len(FORMULAS)))
-    for i in range(len(own)):
-        g = group[i]
-        if g == loads:
-            continue
-        known = s2[i] + lam[g] ** 2 * level2[i] + mu[g] ** 2 * doubt2[i]
-        for h in range(len(FORMULAS)):
-            u = known + FORMULAS[h] ** 2 * own[i]
-            score[g, h] -= 0.5 * e2[i] / u
-            product[g, h] *= u
-            if not SMALL < product[g, h] < LARGE:
-                score[g, h] -= 0.5 * np.log(product[g, h])
-                product[g, h] = 1.0
-    nu2 = np.ones(groups)
-    for g in range(groups):
-        best = -1e300
-        for h in range(len(FORMULAS)):
-            total = score[g, h] - 0.5 * np.log(product[g, h])
-            if total > best:
-                best, nu2[g] = total, FORMULAS[h] ** 2
-    for i in range(len(own)):
-        if group[i] != loads:
-            own[i] *= nu2[group[i]]
-
-
 @numba.njit(cache=True, error_model="numpy")  # no division here is by zero, which need not be checked in every row
 def evidence(
     x, y, s2, level, doubt, group, groups, loads, load, prior, owner, core, most, formula, scale, least, always, start
@@ -79,8 +47,7 @@ def evidence(
     loads, load: group whose rows may contain a load of the scale ``load`` each, -1: none.
     start: torque, in multiples of the smallest one, above which a row is first taken as loaded.
     always: odds against a load at every operating point.
-    formula: share of an effect's contribution by which its formula may be wrong; scale: prior of lambda; least: the
-    smallest one.
+    formula: share of an effect's contribution that counts as discrepancy; scale: prior of lambda; least: smallest one.
     Where a load hides the discrepancy, lambda stays at this scale.
     """
     n, k = x.shape
@@ -186,7 +153,6 @@ def evidence(
         for p in range(k):
             for i in range(n):
                 e2[i] += spread[p, i] * columns[p, i]
-        _formulas_seen(own, lam, mu, s2, level2, doubt2, e2, group, groups, loads)
         # discrepancy: the log density at several lambda; a row with a load is left out
         score = np.zeros((groups, len(FACTORS)))
         products = np.ones((groups, len(FACTORS)))
