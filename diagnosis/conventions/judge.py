@@ -54,8 +54,8 @@ def preferred(recordings, posterior, explained, progress=lambda text: None):
     setup, known = posterior.setup, posterior.best().value
     if len(np.unique(setup.points)) < LEAST_POINTS:
         return (), [], posterior
-    # A reading may also take the place of an implausible size: a bus sensor that is off by a third, say.
-    most = len(posterior.best().names) + implausible(posterior.best()) if explained else np.inf
+    most = len(posterior.best().names) if explained else np.inf
+    absurd = implausible(posterior.best()) > 0  # a bus sensor that is off by a third, say
     able = [r for r in _all(setup.view.nominal) if r.possible(recordings)]
     able = [r for r in able if all(getattr(setup.view.machine, key) for key in r.machine)]
     terms = Terms(setup)
@@ -77,8 +77,8 @@ def preferred(recordings, posterior, explained, progress=lambda text: None):
         value = other.best().value + prior + terms.jacobian(j.readings)
         left = other.best().names
         exact = not any(set(setup.effects[n].rescales) & r.touches for n in left for r in j.readings)
-        # Other pole pairs scale L_d, L_q and psi: instead of one effect they would be chance.
-        cost = sum(1 + bool(r.pole_pairs) for r in j.readings)
+        # Other pole pairs scale L_d, L_q and psi: instead of one effect of a plausible size they would be chance.
+        cost = sum(1 + bool(r.pole_pairs and not absurd) for r in j.readings)
         few = len(left) + cost <= most or (not left and cost == len(j.readings))
         if value > known and exact and few:
             best, known, found = j, value, other
