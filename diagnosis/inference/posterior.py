@@ -73,8 +73,8 @@ class Posterior:
             self._add(problem, [known], force=True)
             self._neighbours(problem, known)
             self._near(known)
-            self._simpler(known)
             self._others(known)
+            self._simpler(known)
         self._settle()
 
     def within(self, allowed, idle):
