@@ -28,6 +28,7 @@ from fluxproof.diagnosis.recording import Problem
 from fluxproof.diagnosis.result import (
     VERDICTS,
     Estimate,
+    Fit,
     Location,
     NamedEffect,
     Region,
@@ -71,6 +72,19 @@ def test_headline_is_short_and_has_no_raw_keys(answer):
     assert 20 < len(text) <= MOST_LETTERS and text.endswith(".") and text.isascii(), text
     words = set(re.findall(r"\w+", text + details(answer, KNOWN)))
     assert not words & KEYS and "u_dq" not in words and not re.search(r"\de[-+]\d", text), text
+
+
+def test_a_misfit_above_the_floor_is_not_told_to_be_at_it():
+    agree = made_up()["no_mismatch"]
+    for floor, says in ((0.6, "1 V is at the noise floor"), (0.2, "1 V is not larger than such recordings")):
+        assert says in sentence(replace(agree, fit=Fit(train_before=1.0, noise_floor=floor)), KNOWN)
+
+
+def test_much_that_is_left_beside_an_explanation_is_told():
+    explained = made_up()["explained"]
+    for left, told in ((0.2, False), (0.5, True)):
+        fit = Fit(holdout_before=9.0, holdout_after=left, noise_floor=0.1)
+        assert ("5 times the noise floor" in details(replace(explained, fit=fit), KNOWN)) == told
 
 
 def test_a_headline_says_what_and_how_large():

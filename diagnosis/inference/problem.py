@@ -44,6 +44,7 @@ class Setup:
         self.train, self.cells, self.noise = rows.train, rows.cells, _bounded_noise(rows)
         self.smooth_rows = rows.smooth_rows
         self.level = balance_level(self.view, self.cells)
+        self.common = _common_error(self)
         self.points = point_numbers(self.view)
         self.visits = visits(self.view, self.points)
         self.grouping = Grouping(self.cells, self.points, self.visits, self.cells.ok & self.train, self.view.run)
@@ -113,7 +114,7 @@ class Problem:
         x = np.array(stack).T if stack else np.zeros((len(y), 0))
         if doubt is not None:
             doubt = np.where(cells.channel == "u", doubt[cells.block], 0.0)
-        x = np.column_stack([x, common_error(setup)])
+        x = np.column_stack([x, setup.common])
         self.p = condense(setup.grouping, y, x, setup.noise, setup.level, setup.load, doubt)
         self.p.x, self.common = self.p.x[:, : len(self.keys)], self.p.x[:, len(self.keys) :]
         self._priors()
@@ -269,7 +270,7 @@ def _implausible(fit, name) -> int:
     return sum(not believable(found[key], limits, nominal) for key, limits in effect.plausible.items() if key in found)
 
 
-def common_error(setup) -> np.ndarray:
+def _common_error(setup) -> np.ndarray:
     """(r, 3) errors of the balance that all operating points have in common, each of the size of its prior.
 
     Along and across the voltage, as the converters' timing; along the current, as minimum pulses.

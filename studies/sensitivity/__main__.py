@@ -26,7 +26,7 @@ from studies.blind.generate import GENERATORS, generate  # noqa: E402
 from studies.blind.thinned import thin  # noqa: E402
 from studies.sensitivity.run import FACTORS, answers_of, differences, names, shares  # noqa: E402
 
-LIMIT = 0.02  # of the verdicts: a constant that changes more is a tuned one
+LIMIT = 0.02  # of the answers: a constant that changes more is a tuned one
 MIX = "own:110,motulator:25,gem:25,own@6:60"
 OUT = BUILD / "sensitivity"
 
