@@ -38,6 +38,7 @@ def test_everything_at_once():
         check_pwm_timing(arrays, register_set, leg)
 
 
+@pytest.mark.slow
 def test_every_event_in_ghdl():
     """500 periods of the VHDL itself: voltage limit, speed limit, torque mode, reversal, gates off and on."""
     summary, arrays, _ = close_loop(InGhdl, PAPER, "compressed", 72)
@@ -124,6 +125,7 @@ def test_smallest_converters(tmp_path):
     assert summary["differences"] == 0 and summary["periods_compared"] == 150
 
 
+@pytest.mark.slow
 def test_without_estimators(tmp_path):
     """ESTIMATORS = 0: the same events, every value equal, what the estimators would show zero."""
     skip_without_ghdl5()

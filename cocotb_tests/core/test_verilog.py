@@ -177,7 +177,7 @@ def differences(names, wanted, got) -> list[str]:
 
 
 @pytest.mark.parametrize(
-    "generics", [GENERICS, pytest.param(OTHER, marks=pytest.mark.slow)], ids=["sixteen_bits", "other_widths"]
+    "generics", [pytest.param(GENERICS, marks=pytest.mark.slow), pytest.param(OTHER, marks=pytest.mark.slow)], ids=["sixteen_bits", "other_widths"]
 )
 def test_equals_vhdl_clock_by_clock(ghdl5, generics, tmp_path, capsys):
     seed = int(os.environ.get("FLUXPROOF_SEED", "1"))
@@ -205,6 +205,7 @@ def test_equals_vhdl_clock_by_clock(ghdl5, generics, tmp_path, capsys):
         print(f"\nseed {seed}: {equal}; {len(undefined)} values undefined before clock {first}")
 
 
+@pytest.mark.slow
 def test_constant_wider_than_the_vector(ghdl5, tmp_path):
     """min_pulse has 12 bits, CARRIER_HALF more: GHDL 5 would compare with its lower 12 bits."""
     generics = GENERICS | {"CARRIER_HALF": 10_000}

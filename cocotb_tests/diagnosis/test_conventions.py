@@ -39,7 +39,7 @@ def test_there_are_enough_mistakes():
     assert len(MISTAKES) >= 25
 
 
-@pytest.mark.parametrize("name", halved(MISTAKES, every=6))
+@pytest.mark.parametrize("name", halved(MISTAKES, every=7))
 def test_a_mistake_is_told_and_nothing_else(name, tmp_path):
     mistake = MISTAKES[name]
     recording, drive = written(mistake, tmp_path)

@@ -102,7 +102,7 @@ def test_no_leg_gains_voltage():
         slowly(27182818, 229, ["dead_time", "phase_resistance_asymmetry"]),  # a dominant effect does not replace both
         # A resistance of a tenth of the loss may be a device's: it is named or left out, and nothing else is.
         slowly(27182818, 30, ["dead_time", "resistance"]),
-        (14142135, 24, ["dead_time", "encoder_eccentricity", "resistance"]),
+        slowly(14142135, 24, ["dead_time", "encoder_eccentricity", "resistance"]),
         slowly(14142135, 263, ["dead_time"]),  # a diode's logarithm, which resembles a resistance
     ],
 )

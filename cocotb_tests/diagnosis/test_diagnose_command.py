@@ -328,7 +328,7 @@ def test_failing_overlay_adds_only_a_note(dump, tmp_path, monkeypatch):
     answer(tmp_path / "out")
 
 
-@pytest.mark.parametrize("digit, every", [("0", 6), slowly("0", 1), slowly("5", 1)])
+@pytest.mark.parametrize("digit, every", [("0", 12), slowly("0", 1), slowly("5", 1)])
 def test_files_with_flipped_bits_end_without_traceback_and_without_a_name(digit, every, tmp_path):
     """Bits flipped in files of every format: they may be rejected, but no name comes without a finding."""
     nominal = nominal_of(tmp_path)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from cocotb_tests.diagnosis.test_strange_cases import files_of
+from cocotb_tests.support.slow import slowly
 from fluxproof.diagnosis.answer import conclude
 from fluxproof.diagnosis.balance.cells import _steep_variance
 from fluxproof.diagnosis.balance.shaft import bend_gain
@@ -18,7 +19,7 @@ from fluxproof.diagnosis.session import diagnose
 @pytest.mark.parametrize(
     ("seed", "count", "number", "kind", "names"),
     [
-        (26112026, 80, 6, "free", {"cogging"}),
+        slowly(26112026, 80, 6, "free", {"cogging"}),
         (27112026, 100, 34, "loaded", {"cogging", "magnet_flux"}),  # the transducer measures the load only
     ],
 )

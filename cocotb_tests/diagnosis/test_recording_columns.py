@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
+import tomlkit
 
 from cocotb_tests.support.recordings_made import codes, dq_made, made, nominal_of, write
+from fluxproof.diagnosis.answer.improve import _set
 from fluxproof.diagnosis.column_maps import maps
+from fluxproof.diagnosis.conventions.apply import edit
+from fluxproof.diagnosis.conventions.table import READINGS
 from fluxproof.diagnosis.ingest.load import load_recording
+from fluxproof.diagnosis.ingest.units import OF_BUS
 from fluxproof.diagnosis.recording import COLUMNS, RecordingError
 
 
@@ -61,6 +68,60 @@ def test_wrong_columns_name_the_entry(tmp_path, lines):
     assert "[columns]" in message and "\n" not in message
     for word in WRONG_COLUMNS[lines]:
         assert word in message
+
+
+def test_files_of_several_loggers_share_the_columns(tmp_path):
+    nominal = nominal_of(tmp_path, '"I U [mA]" = "i_a"\n"Motor current U" = "i_a"')
+    table = made(500)
+    i_a = table.pop("i_a")
+    for name, values in {"I U [mA]": i_a * 1e3, "Motor current U": i_a}.items():
+        recording = load_recording(write(tmp_path / "r.csv", {**table, name: values}), nominal)
+        np.testing.assert_allclose(recording["i_a"], i_a, rtol=1e-9, atol=1e-9)
+
+
+def test_a_torque_of_unknown_name_is_noted(tmp_path, nominal):
+    table = made(500)
+    recording = load_recording(write(tmp_path / "r.csv", {**table, "M [Nm]": 0.0 * table["i_a"]}), nominal)
+    assert "column 'M [Nm]' is not used; if it is torque, say so in [columns]" in recording.meta["notes"]
+    spare = nominal_of(tmp_path, '"M [Nm]" = ""\ni_a = "i_a"')
+    recording = load_recording(write(tmp_path / "r.csv", {**table, "M [Nm]": 0.0 * table["i_a"]}), spare)
+    assert not any("is not used" in note for note in recording.meta["notes"])
+
+
+def of_index(table, share, bus="u_dc"):
+    """A dq log whose voltages are a modulation index."""
+    return {**table, **{name: table[name] / (share * table[bus]) for name in ("u_d_ref", "u_q_ref")}}
+
+
+@pytest.mark.parametrize("unit", OF_BUS)
+def test_a_modulation_index_is_told_by_its_unit(tmp_path, unit):
+    entries = [f"{name} = {{name = '{name}', unit = '{unit}'}}" for name in ("u_d_ref", "u_q_ref")]
+    nominal, table = nominal_of(tmp_path, "\n".join(entries)), dq_made(400)
+    log = of_index(table, OF_BUS[unit])
+    recording = load_recording(write(tmp_path / "r.csv", log), nominal)
+    assert codes(recording) == ["slow_sampling"]
+    np.testing.assert_allclose(recording["u_q_ref"], table["u_q_ref"], rtol=1e-9, atol=1e-9)
+    del log["u_dc"]
+    with pytest.raises(RecordingError, match=r"'u_d_ref' is a share of u_dc, which is missing"):
+        load_recording(write(tmp_path / "r.csv", log), nominal)
+
+
+def test_voltages_that_are_a_modulation_index_are_refused_with_the_way_out(tmp_path, nominal):
+    recording = load_recording(write(tmp_path / "r.csv", of_index(dq_made(400), 0.5)), nominal)
+    message = next(problem.message for problem in recording.problems if problem.fatal)
+    assert "modulation index" in message and "unit = 'u_dc/2'" in message
+    slow = {**dq_made(400)}  # 1 V at standstill is a voltage
+    slow |= {name: 0.02 * slow[name] for name in ("u_d_ref", "u_q_ref", "omega_e")}
+    assert not any("index" in p.message for p in load_recording(write(tmp_path / "s.csv", slow), nominal).problems)
+
+
+def test_a_reading_of_a_modulation_index_goes_into_its_unit(nominal):
+    """As u_dc the index is twice what fits: the improved drive says u_dc/2."""
+    recording = SimpleNamespace(problems=[], meta={"columns": {"u_q_ref": "m_q"}, "of_bus": ["u_q_ref"]})
+    half = next(r for r in READINGS if r.code == "voltages_double")
+    document = tomlkit.document()
+    edit(document, nominal, [half], recording, _set)
+    assert document["columns"]["m_q"] == {"name": "u_q_ref", "unit": "u_dc/2"}
 
 
 @pytest.mark.parametrize(

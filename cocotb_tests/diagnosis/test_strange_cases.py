@@ -25,7 +25,7 @@ def files_of(number, tmp_path, seed=SEED, generator="sealed", count=COUNT):
 @pytest.mark.parametrize(
     ("seed", "number", "names"),
     [
-        (SEED, 48, {"delay"}),  # a sampling skew beside it fitted better, but not the points that were not fitted
+        slowly(SEED, 48, {"delay"}),  # a sampling skew beside it fitted better, but not the points that were not fitted
         slowly(SEED, 31, set()),  # healthy: the encoder's codes beat with the sampling near the first order
         slowly(LATER, 9, {"iron_loss", "resistance"}),  # eddy currents that lag looked like a delay
         slowly(LATER, 59, {"current_gain", "friction", "iron_loss"}),  # and like a sampling skew

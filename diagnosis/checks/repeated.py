@@ -19,6 +19,7 @@ RARE = 0.05
 CHANCE = 20.0
 INDEPENDENT = ("i_a", "i_b", "i_d", "i_q", "theta_e", "u_dc")
 HELD = 0.4
+CODES = 1.5  # smallest steps of the angle up to which an encoder's next code doubles the advance
 LEAST_ADVANCE = 1e-3  # rad per row; a smaller advance is not significant
 
 
@@ -42,6 +43,9 @@ def check(recording, nominal) -> None:
         recording.joined[where] = False
         lost = counted(int(np.sum(np.round(turns[where]))), "sample")
         message = f"the angle jumps ahead in {counted(len(where), 'row')}, about {lost} missing"
+        turning = np.abs(advance[joined & (advance != 0.0)])
+        if np.median(np.abs(expected[where])) < CODES * np.min(turning):
+            message += ", or the steps of a coarse encoder"
         recording.problems.append(
             Problem("dropped", message, "theta_e", int(where[0]) + 1, len(where), "no balance is made across them")
         )  # fmt: skip

@@ -15,6 +15,7 @@ STAGE = "units"
 MUCH = 20.0  # times the rated value: more than any overload
 PLAUSIBLE = 4.0  # times the rated value, after the conversion
 ROUNDING = 0.005
+LARGEST_INDEX = 1.3  # 4 / pi, of the six-step operation, relative to half the bus voltage
 CURRENTS = ("i_a", "i_b", "i_c", "i_d", "i_q", "i_d_ref", "i_q_ref")
 
 
@@ -22,7 +23,7 @@ def check(recording, nominal) -> None:
     _currents(recording, nominal.machine.rated_current_a)
     _duties(recording)
     _bus(recording, nominal.inverter.dc_bus_v)
-    _voltages(recording, nominal.inverter.dc_bus_v)
+    _voltages(recording, nominal)
     _winding(recording)
 
 
@@ -130,7 +131,8 @@ def _bus(recording, nominal_v) -> None:
         _refuse(recording, "u_dc", message)
 
 
-def _voltages(recording, nominal_v) -> None:
+def _voltages(recording, nominal) -> None:
+    nominal_v = nominal.inverter.dc_bus_v
     names = tuple(name for name in ("u_d_ref", "u_q_ref") if name in recording.columns)
     size = max((_size(recording[name]) for name in names), default=0.0)
     if size > MUCH * nominal_v:
@@ -138,3 +140,19 @@ def _voltages(recording, nominal_v) -> None:
             _convert(recording, names, 1e-3, "mV")
         else:
             _refuse(recording, names[0], f"voltages reach {size:.4g} V with a bus of {nominal_v:g} V", names)
+    if names and not set(names) & set(recording.meta.get("of_bus", ())):
+        _modulation_index(recording, names, size, nominal)
+
+
+def _modulation_index(recording, names, size, nominal) -> None:
+    """Refuse voltages that are no larger than a modulation index, where the speed needs many times as much."""
+    if not 0.0 < size < LARGEST_INDEX or not recording.has("omega_e"):
+        return
+    needed = _size(recording["omega_e"]) * nominal.machine.magnet_flux_wb
+    as_index = size * nominal.inverter.dc_bus_v
+    if needed > MUCH * size and needed / PLAUSIBLE < as_index < needed * PLAUSIBLE:
+        message = (
+            f"{', '.join(names)} reach {size:.3g} V, but the recorded speed needs about {needed:.3g} V; if they are a "
+            f"modulation index, say of what in [columns], such as {names[0]} = {{name = '{names[0]}', unit = 'u_dc/2'}}"
+        )
+        recording.problems.append(Problem("unit", message, names[0], 0, len(recording), fatal=True))

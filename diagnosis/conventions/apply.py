@@ -6,6 +6,7 @@ import dataclasses
 
 import tomlkit
 
+from fluxproof.diagnosis.ingest.units import OF_BUS
 from fluxproof.diagnosis.recording import Recording
 
 
@@ -54,8 +55,18 @@ def edit(document, nominal, readings, recording, put) -> None:
                 why.append(reading.says)
         if why and name not in converted:
             entry = tomlkit.inline_table()
-            entry.update({"name": name} | {"factor": _digits(factor)} | ({"offset": _digits(offset)} if offset else {}))
+            entry.update({"name": name} | _written(factor, offset, name in recording.meta.get("of_bus", ())))
             put(document.setdefault("columns", tomlkit.table()), sources[name], entry, "; ".join(why))
+
+
+def _written(factor, offset, of_bus) -> dict:
+    """Factor and offset of a column as keys of its entry; of_bus: it is a share of the bus voltage, whose unit says it.
+
+    The readings of a modulation index are from one of its units to another.
+    """
+    if of_bus:
+        return {"unit": min(OF_BUS, key=lambda unit: abs(OF_BUS[unit] - factor))}
+    return {"factor": _digits(factor)} | ({"offset": _digits(offset)} if offset else {})
 
 
 def _digits(value) -> float:

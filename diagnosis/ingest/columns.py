@@ -11,9 +11,10 @@ A column that the file lacks may be a constant of drive.toml (constants.py).
     "n"               = {name = "omega_e", unit = "rpm"}          # of the shaft: times the pole pairs
     "Spare"           = ""                                        # ignored
 
-A column without a header is called by its number, "1", "2", ...  Columns that [columns] does not name are found by the
-exact canonical names, then by the maps in column_maps/.  Units are those of units.py; a shaft angle is "rad mech", a
-shaft speed "rpm" or "rad/s mech".
+A column without a header is called by its number, "1", "2", ...  The files of several loggers may be named in one
+[columns]: of the columns with one canonical name, a file has one.  Columns that [columns] does not name are found by
+the exact canonical names, then by the maps in column_maps/.  Units are those of units.py; a shaft angle is "rad mech",
+a shaft speed "rpm" or "rad/s mech".
 """
 
 from __future__ import annotations
@@ -29,18 +30,20 @@ import numpy as np
 from fluxproof.diagnosis.column_maps import maps, plain
 from fluxproof.diagnosis.ingest.demand import LINE_VOLTAGES, PHASE_VOLTAGES, is_emf_run, missing_columns
 from fluxproof.diagnosis.ingest.stated import constants_of
-from fluxproof.diagnosis.ingest.units import conversion, known_units, split_unit
+from fluxproof.diagnosis.ingest.units import COMMANDED, OF_BUS, conversion, known_units, split_unit
 from fluxproof.diagnosis.readers.table import Table, shown
 from fluxproof.diagnosis.recording import COLUMNS, RecordingError
 
 KEYS = {"name", "unit", "factor", "offset"}
+WORTH_NAMING = ("torque", "temp_winding", "omega_e", "u_dc")  # which a diagnosis does without if they are not found
 
 
 @dataclass(frozen=True)
 class Source:
     """Source of a canonical column: value = raw * factor + offset.
 
-    stated: the unit was given explicitly; by_name: it is only what a common name ("ia") usually means.
+    stated: the unit was given explicitly; by_name: it is only what a common name ("ia") usually means; bus: the value is
+    to be multiplied by the bus voltage of its row.
     """
 
     column: str
@@ -49,6 +52,7 @@ class Source:
     unit: str = ""
     stated: bool = False
     by_name: bool = False
+    bus: bool = False
 
 
 @dataclass
@@ -91,6 +95,13 @@ def plan_columns(names: dict[str, str], nominal, path) -> Plan:
         for name in (*PHASE_VOLTAGES, *LINE_VOLTAGES):
             plan.sources.pop(name, None)
     _demand(plan, names, path)
+    for source in plan.sources.values():
+        if source.bus and "u_dc" not in plan.sources | plan.assumed:
+            raise RecordingError(
+                f"{path}: column {shown(source.column)!r} is a share of u_dc, which is missing: name its column in "
+                f"[columns] of drive.toml, or give a value that was constant in [constants]"
+            )
+    _not_used(plan, {name: unit for name, unit in names.items() if name not in taken})
     return plan
 
 
@@ -105,6 +116,8 @@ def canonical(table: Table, plan: Plan) -> dict[str, np.ndarray]:
             arrays[name] = (
                 raw if source.factor == 1.0 and not source.offset else raw * source.factor + source.offset
             )
+    for name in [name for name in arrays if plan.sources[name].bus]:
+        arrays[name] = arrays[name] * arrays.get("u_dc", plan.assumed.get("u_dc"))
     return arrays
 
 
@@ -120,8 +133,11 @@ def _explicit(names, nominal, path) -> tuple[Plan, set[str]]:
         if entries:
             plan.notes.append("none of the columns named in [columns] is in the file; [columns] was ignored")
         return plan, taken
+    served = {entries[key]["name"] for key, column in found.items() if column is not None}
     for key, entry in entries.items():
         where = f"{nominal.path}: [columns] {shown(key)!r}"
+        if found[key] is None and entry["name"] in served - {""}:
+            continue  # a column of another logger's files
         if found[key] is None:
             raise RecordingError(f"{where} is not a column of {path}{_nearest(key, names)}")
         taken.add(found[key])
@@ -175,6 +191,8 @@ def _source(column, name, unit, nominal, where) -> Source:
     """The source of a canonical column in a unit; no unit: SI."""
     if not unit:
         return Source(column)
+    if name in COMMANDED and unit in OF_BUS:
+        return Source(column, OF_BUS[unit], 0.0, unit, True, bus=True)
     found = conversion(name, unit, nominal.machine.pole_pairs)
     if found is None:
         raise RecordingError(
@@ -245,6 +263,18 @@ def _demand(plan, names, path) -> None:
             f"{path}: missing {' and '.join(missing)}; found columns {found or 'none'}{_guesses(missing, names)}; "
             f"name them in [columns] of drive.toml, or give a value that was constant in [constants]{why}"
         )
+
+
+def _not_used(plan, left) -> None:
+    """Note a column that is not used though its unit is that of a quantity which the recording lacks."""
+    used = plan.wanted()
+    for name in WORTH_NAMING:
+        if name in plan.sources or name in plan.assumed:
+            continue
+        for column in left:
+            unit, known = _unit_of(column, left), split_unit(column)[0] in COLUMNS
+            if unit and not known and column not in used and conversion(name, unit, 1) is not None:
+                plan.notes.append(f"column {shown(column)!r} is not used; if it is {name}, say so in [columns]")
 
 
 def _guesses(missing, names) -> str:

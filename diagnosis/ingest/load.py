@@ -78,6 +78,7 @@ def _recording(path, table: Table, plan: Plan, nominal) -> Recording:
         "columns": {k: s.column for k, s in plan.sources.items()},
     }
     meta["column_scales"] = {k: (s.factor, s.offset) for k, s in plan.sources.items()}
+    meta["of_bus"] = [name for name, s in plan.sources.items() if s.bus]
     meta["stated_units"] = [name for name, s in plan.sources.items() if s.stated]
     meta["documented_units"] = [name for name in meta["stated_units"] if not plan.sources[name].by_name]
     meta["of_shaft"] = [name for name, s in plan.sources.items() if _of_shaft(name, s.unit)]

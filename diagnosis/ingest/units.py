@@ -1,7 +1,8 @@
 """Units of recordings, as factor and offset to the canonical SI unit of a column.
 
 canonical = raw * factor + offset.  A shaft quantity ("mech", "rpm", turns per second of the shaft) is multiplied
-by the number of pole pairs; "erpm" and "Hz" are electrical.  rms values ("Arms") become peak values.
+by the number of pole pairs; "erpm" and "Hz" are electrical.  rms values ("Arms") become peak values.  A modulation index
+has the unit of the voltage that it is a share of, such as "u_dc/2".
 """
 
 from __future__ import annotations
@@ -112,6 +113,9 @@ OF_SHAFT = {
     "rev/s",
     "rps",
 }
+# Voltages as a modulation index: shares of the bus voltage of the same row.
+OF_BUS = {"u_dc": 1.0, "u_dc/2": 0.5, "u_dc/sqrt(3)": 1.0 / math.sqrt(3.0), "2/pi u_dc": 2.0 / math.pi}
+COMMANDED = ("u_d_ref", "u_q_ref")
 OFFSETS = {"K": -273.15, "degF": -160 / 9, "°F": -160 / 9}
 BRACKETS = re.compile(r"^(?P<name>.*?)\s*[\[(](?P<unit>[^\[\]()]*)[\])]\s*$")
 
@@ -131,7 +135,7 @@ def conversion(column: str, unit: str, pole_pairs: int) -> tuple[float, float] |
 
 def known_units(column: str) -> str:
     """The units that are known for a column, for messages."""
-    return ", ".join(u for u in FACTORS[COLUMNS[column]] if u)
+    return ", ".join([*(u for u in FACTORS[COLUMNS[column]] if u), *(OF_BUS if column in COMMANDED else ())])
 
 
 def split_unit(name: str) -> tuple[str, str]:
