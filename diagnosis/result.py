@@ -202,9 +202,11 @@ class Evidence:
 
     before_d, before_q, after_d, after_q: misfit in dq [V]; noise: standard deviation of one block's mean [V].
     orders: (m,) electrical orders with spectrum_before, spectrum_after: (m,) amplitudes [V].
+    torque: whether the torque was compared, as measured or as that of a shaft that turns freely.
     """
 
     arrays: dict[str, np.ndarray] = field(default_factory=dict)
+    torque: bool = False
 
 
 @dataclass

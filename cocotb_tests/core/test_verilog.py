@@ -177,8 +177,9 @@ def differences(names, wanted, got) -> list[str]:
 
 
 @pytest.mark.parametrize(
-    "generics", [pytest.param(GENERICS, marks=pytest.mark.slow), pytest.param(OTHER, marks=pytest.mark.slow)], ids=["sixteen_bits", "other_widths"]
+    "generics", [GENERICS, OTHER], ids=["sixteen_bits", "other_widths"]
 )
+@pytest.mark.slow
 def test_equals_vhdl_clock_by_clock(ghdl5, generics, tmp_path, capsys):
     seed = int(os.environ.get("FLUXPROOF_SEED", "1"))
     core = VerilatedCore(generics)

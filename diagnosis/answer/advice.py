@@ -63,7 +63,9 @@ def _next(answer, nominal, effects) -> str:
     """What to do after a verdict on the physics."""
     if answer.verdict == "no_mismatch":
         else_ = "Nothing else" if corrected(answer) else "Nothing"
-        return f"{else_} to change. {capital(covered(answer, nominal))}; beyond them the drive file is not confirmed."
+        limits = f"{capital(covered(answer, nominal))}; beyond them the drive file is not confirmed"
+        without = "" if answer.evidence.torque else ", nor are friction and cogging torque, as no torque was compared"
+        return f"{else_} to change. {limits}{without}."
     if answer.verdict == "explained":
         return _take(answer, nominal, effects)
     if answer.verdict == "ambiguous":

@@ -15,7 +15,19 @@ def balance_notes(view, held, effects, ambiguity) -> list[str]:
     if isinstance(view, SlowView):
         return [*_of_points(view, held), *(_separated(effects[n]) for group in ambiguity for n in group)]
     rows, out = view.u_dc.shape[1], int(held.sum())
-    return [f"The voltage balance was made on {len(view)} steady blocks of {rows} rows; {out} were not fitted."]
+    notes = [f"The voltage balance was made on {len(view)} steady blocks of {rows} rows; {out} were not fitted."]
+    if not np.isfinite(view.torque).any():
+        notes.append(_without_torque(view.machine))
+    return notes
+
+
+def _without_torque(machine) -> str:
+    """Why the torque was not compared, and what would make it comparable."""
+    if not machine.inertia_kgm2:
+        why = "it is not recorded, and the drive file has no inertia_kgm2 that would tell it from the acceleration"
+    else:
+        why = "it is not recorded, and no quick change of the torque shows that the shaft turns freely"
+    return f"The torque was not compared, so that friction and cogging torque are not judged: {why}."
 
 
 def _of_points(view, held) -> list[str]:

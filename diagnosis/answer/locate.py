@@ -128,4 +128,4 @@ def evidence(view, before, after, pure, holdout_blocks) -> Evidence:
     if view.lacks is not None and all("harmonics" in words for words in view.lacks):  # operating points of a slow log
         for name in ("theta_e", "orders", "spectrum_before", "spectrum_after"):
             arrays.pop(name)
-    return Evidence(arrays)
+    return Evidence(arrays, torque=bool(np.isfinite(view.torque).any()))

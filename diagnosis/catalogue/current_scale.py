@@ -58,6 +58,7 @@ EFFECT = CurrentScale(
     signature="R, L_d and L_q wrong by the same factor",
     confounders=("resistance", "inductance_d", "inductance_q", "cross_saturation"),
     rescales=("i",),
+    exact=True,
     separated_by="an external ammeter or a torque transducer",
     parameters=(Parameter("scale", "1", "relative error of all phases", "error"),),
     corrects=True,

@@ -46,6 +46,7 @@ EFFECT = MagnetFlux(
     signature="order 0 on the q axis, proportional to speed, at every current including zero",
     confounders=("resistance", "cross_saturation", "magnet_temperature", "inductance_d"),
     rescales=("magnet_flux_wb",),
+    exact=True,
     separated_by="three speeds; rotation at zero current",
     parameters=(Parameter("magnet_flux_wb", "Wb", "peak, per phase", "flux linkage"),),
     spreads=True,

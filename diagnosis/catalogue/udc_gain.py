@@ -37,6 +37,7 @@ EFFECT = UdcGain(
     signature="R, L_d, L_q and psi_m wrong by the same factor",
     confounders=("magnet_flux", "current_scale", "resistance", "inductance_d", "inductance_q"),
     rescales=("u", "u_dc"),
+    exact=True,
     separated_by="an external voltmeter, or the open-circuit EMF",
     parameters=(Parameter("udc_gain", "1", "relative error", "error"),),
     corrects=True,

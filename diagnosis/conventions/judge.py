@@ -214,8 +214,8 @@ class Terms:
         return evidence(
             np.zeros((len(y), 0)), y, p.s2 * scale**2, p.level * scale, p.doubt * scale,
             p.group, len(p.groups), p.loads, p.load,
-            none, nothing, np.zeros(0, bool), none,
-            k.FORMULA, k.DISCREPANCY, self.setup.view.least_error, k.ALWAYS_LOADED if p.loads >= 0 else 1.0, np.inf,
+            none, nothing, np.zeros(0, bool), none, none,
+            k.DISCREPANCY, self.setup.view.least_error, k.ALWAYS_LOADED if p.loads >= 0 else 1.0, np.inf, k.STRAIGHT,
         )[0]  # fmt: skip
 
 

@@ -4,10 +4,12 @@
 
 a_e is the size of effect e in units of its floor of practical interest, with a log-uniform prior from 1 to the size at
 which a drive no longer runs; p_k is the coefficient that makes column k as large as the floor (of a curve: the share of
-it by which the curve may depart from the formula).  lambda_g is the discrepancy of group g, with the prior
-1 / (1 + (lambda / k)^2), and at least 1 where the error of the balance is known.  w is the error that the curve of an
-effect may have at most, and mu_g <= 1 the share of it that is seen in group g: with all of it, a set would gain by a
-smaller effect with a smaller w.  All are found by expectation maximisation; the log evidence is exact for them.
+it by which the curve may depart from the formula at most).  Of the curve of an effect p_k is multiplied by b_e, with a
+log-uniform prior from ``straight`` to 1: a curve that is not needed is no reason against its effect.  lambda_g is the
+discrepancy of group g, with the prior 1 / (1 + (lambda / k)^2), and at least 1 where the error of the balance is known.
+w is the error that the curve of an effect may have at most, and mu_g <= 1 the share of it that is seen in group g: with
+all of it, a set would gain by a smaller effect with a smaller w.  All are found by expectation maximisation; the log
+evidence is exact for them.
 """
 
 from __future__ import annotations
@@ -38,7 +40,8 @@ def _share_seen(mu, lam, s2, level2, doubt2, own, e2, group, loads):
 
 @numba.njit(cache=True, error_model="numpy")  # no division here is by zero, which need not be checked in every row
 def evidence(
-    x, y, s2, level, doubt, group, groups, loads, load, prior, owner, core, most, formula, scale, least, always, start
+    x, y, s2, level, doubt, group, groups, loads, load, prior, owner, core, most, formula, scale, least, always, start,
+    straight,
 ):
     """(log evidence, coefficients (k,), covariance (k, k), sizes (effects,), lambda and mu (groups,)).
 
@@ -47,12 +50,13 @@ def evidence(
     loads, load: group whose rows may contain a load of the scale ``load`` each, -1: none.
     start: torque, in multiples of the smallest one, above which a row is first taken as loaded.
     always: odds against a load at every operating point.
-    formula: share of an effect's contribution that counts as discrepancy; scale: prior of lambda; least: smallest one.
-    Where a load hides the discrepancy, lambda stays at this scale.
+    formula: (effects,) share of a contribution that counts as discrepancy; scale: prior of lambda; least: smallest
+    one; straight: smallest b_e.  Where a load hides the discrepancy, lambda stays at its scale.
     """
     n, k = x.shape
     effects = len(most)
     a = np.sqrt(most)
+    bend = np.ones(effects)
     lam = np.full(groups, scale)
     mu = np.ones(groups)
     c = np.zeros(k)
@@ -97,7 +101,7 @@ def evidence(
         before = 0.0
         sd = np.zeros(k)
         for p in range(k):
-            sd[p] = a[owner[p]] * prior[p]
+            sd[p] = a[owner[p]] * prior[p] * (1.0 if core[p] else bend[owner[p]])
         # in units of the prior's standard deviation
         m = np.zeros((k, k))
         b = np.zeros(k)
@@ -123,16 +127,18 @@ def evidence(
             value -= np.log(1.0 + (lam[g] / scale) ** 2)
         if step == STEPS - 1:
             break
-        # sizes of the effects
-        sums = np.zeros(effects)
-        counts = np.zeros(effects)
+        # sizes of the effects, and of their curves relative to them
+        sums = np.zeros((effects, 2))
+        counts = np.zeros((effects, 2))
         for p in range(k):
-            if core[p]:
-                sums[owner[p]] += (c[p] ** 2 + cov[p, p]) / prior[p] ** 2
-                counts[owner[p]] += 1.0
+            kind = 0 if core[p] else 1
+            sums[owner[p], kind] += (c[p] ** 2 + cov[p, p]) / prior[p] ** 2
+            counts[owner[p], kind] += 1.0
         for e in range(effects):
-            if counts[e] > 0:
-                a[e] = min(max(np.sqrt(sums[e] / counts[e]), 1.0), most[e])
+            if counts[e, 0] > 0:
+                a[e] = min(max(np.sqrt(sums[e, 0] / counts[e, 0]), 1.0), most[e])
+            if counts[e, 1] > 0:
+                bend[e] = min(max(np.sqrt(sums[e, 1] / counts[e, 1]) / a[e], straight), 1.0)
         # expected squares of the remainder, and the share of each effect's contribution
         spread = np.dot(cov, columns)
         for i in range(n):
@@ -147,7 +153,7 @@ def evidence(
                         part[i] += columns[p, i] * c[p]
             for i in range(n):
                 e2[i] -= part[i]
-                own[i] += (formula * part[i]) ** 2
+                own[i] += (formula[e] * part[i]) ** 2
         for i in range(n):
             e2[i] *= e2[i]
         for p in range(k):

@@ -42,8 +42,8 @@ WORTH_NAMING = ("torque", "temp_winding", "omega_e", "u_dc")  # which a diagnosi
 class Source:
     """Source of a canonical column: value = raw * factor + offset.
 
-    stated: the unit was given explicitly; by_name: it is only what a common name ("ia") usually means; bus: the value is
-    to be multiplied by the bus voltage of its row.
+    stated: the unit was given explicitly; by_name: it is only what a common name ("ia") usually means; bus: the value
+    is to be multiplied by the bus voltage of its row.
     """
 
     column: str

@@ -1,8 +1,8 @@
 """Units of recordings, as factor and offset to the canonical SI unit of a column.
 
 canonical = raw * factor + offset.  A shaft quantity ("mech", "rpm", turns per second of the shaft) is multiplied
-by the number of pole pairs; "erpm" and "Hz" are electrical.  rms values ("Arms") become peak values.  A modulation index
-has the unit of the voltage that it is a share of, such as "u_dc/2".
+by the number of pole pairs; "erpm" and "Hz" are electrical.  rms values ("Arms") become peak values.  A modulation
+index has the unit of the voltage that it is a share of, such as "u_dc/2".
 """
 
 from __future__ import annotations
