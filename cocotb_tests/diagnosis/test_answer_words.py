@@ -199,6 +199,9 @@ def test_advice_uses_the_variable_of_the_unknown_term(formula, says):
 def test_no_mismatch_says_what_was_covered():
     answer = replace(made_up()["no_mismatch"], evidence=evidence(0.0, after=False))
     assert "i_q of -5 to 5 A" in advice(answer, NOMINAL, KNOWN)
+    assert "nor are friction and cogging torque, as no torque was compared" in advice(answer, NOMINAL, KNOWN)
+    answer.evidence.torque = True
+    assert "friction" not in advice(answer, NOMINAL, KNOWN)
 
 
 @pytest.mark.parametrize(

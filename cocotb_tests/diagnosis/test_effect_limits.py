@@ -226,3 +226,10 @@ def test_the_gain_of_one_of_two_sensors_is_that_of_one():
     assert found.parameters["gain_a"].value == pytest.approx(0.03, abs=1e-3)
     assert abs(found.parameters["gain_b"].value) < 1e-3
     assert found.plant["sensors.current_gain_error"] == pytest.approx([0.03, 0.0, 0.0], abs=1e-3)
+
+
+def test_offsets_of_dq_currents_are_told_as_differences():
+    """An equal offset of all three phases does not show in dq: a single sensor that is off looks like three."""
+    effect = CATALOGUE["current_offset"]
+    assert "sum of zero" in effect.caveat(SimpleNamespace(has_sum=False))
+    assert not effect.caveat(SimpleNamespace(has_sum=True))

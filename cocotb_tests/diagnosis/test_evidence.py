@@ -16,14 +16,39 @@ from fluxproof.diagnosis.physics import known_effects
 ROWS, NOISE = 60, 0.01
 
 
-def value_of(y, doubt, x=None):
-    """Log evidence of rows y with the errors ``doubt`` of curves and, if x is given, one effect with this column."""
-    columns = np.zeros((len(y), 0)) if x is None else x[:, None]
+def value_of(y, doubt, x=None, curve=None, formula=0.01):
+    """Log evidence of rows y with the errors ``doubt`` of curves and, if x is given, one effect with this column.
+
+    curve: a column of the effect's curve; formula: share of the effect's contribution that may be wrong.
+    """
+    columns = np.stack([c for c in (x, curve) if c is not None] or [np.zeros(0)] * len(y), axis=-1)
+    columns = columns.reshape(len(y), -1)
     k = columns.shape[1]
+    effects = min(k, 1)
     return evidence(
         columns, y, np.full(len(y), NOISE**2), np.full(len(y), 1e-4), doubt, np.zeros(len(y), np.int64), 1, -1, 0.0,
-        np.ones(k), np.zeros(k, np.int64), np.ones(k, bool), np.full(k, 100.0), 0.01, 3.0, 1.0, 1.0, np.inf,
+        np.ones(k), np.zeros(k, np.int64), np.arange(k) == 0, np.full(effects, 100.0), np.full(effects, formula),
+        3.0, 1.0, 1.0, np.inf, 0.01,
     )  # fmt: skip
+
+
+def test_a_curve_that_is_not_needed_is_no_reason_against_its_effect():
+    """It is known to a ten-thousandth of what it may be, which cost eight nats; one that is needed is found whole."""
+    rng, x = np.random.default_rng(6), np.linspace(-1.0, 1.0, ROWS)
+    curve, none = x**3 - 0.6 * x, np.zeros(ROWS)
+    y = 50.0 * x + NOISE * rng.standard_normal(ROWS)
+    straight, free = (value_of(y, none, x, c, formula=0.0) for c in (None, curve))
+    assert free[0] > straight[0] - 4.0 and abs(free[1][1]) < 4.0 * np.sqrt(free[2][1, 1]) + 0.02
+    bent = value_of(y + 20.0 * curve, none, x, curve, formula=0.0)
+    assert bent[1] == pytest.approx([50.0, 20.0], abs=0.05) and bent[0] > free[0] - 6.0
+
+
+def test_what_may_be_wrong_of_a_contribution_grows_with_it():
+    """Of a scale nothing may be: of two causes that leave the same, the larger one is not worse for its size."""
+    x, y = np.linspace(-1.0, 1.0, ROWS), np.zeros(ROWS)
+    y = 50.0 * x + NOISE * np.random.default_rng(7).standard_normal(ROWS)
+    exact, doubtful = (value_of(y, np.zeros(ROWS), x, formula=f) for f in (0.0, 0.01))
+    assert exact[0] > doubtful[0] + 50.0
 
 
 def test_a_curve_may_be_wrong_without_being_so():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from cocotb_tests.support.diagnosed_drives import MACHINE
-from cocotb_tests.support.mistakes import PHASES, Mistake, scaled, turned, written
+from cocotb_tests.support.mistakes import PHASES, Mistake, scaled, table_of, turned, written
 from cocotb_tests.support.slow import slowly
 from fluxproof.diagnosis.session import diagnose
 
@@ -50,6 +50,16 @@ def test_an_inductance_beside_an_angle_that_is_off(degrees, factor, tmp_path):
     found = {k: e.value for effect in answer.effects for k, e in effect.parameters.items()}
     assert found["inductance_q_h"] == pytest.approx(factor * MACHINE.inductance_q_h, rel=0.01)
     assert abs(np.degrees(found["offset_rad"]) - degrees) < 0.1
+
+
+@pytest.mark.parametrize("columns", [("u_d_ref", "u_q_ref", "u_dc"), ("i_d", "i_q")])
+def test_a_gain_beside_a_wrong_flux_is_not_told_from_another_gain(columns, tmp_path):
+    """A gain of the bus or a scale of the currents, each with another magnet flux, leave the same operating points."""
+    deviations = {"machine": (("magnet_flux_wb", 0.92 * MACHINE.magnet_flux_wb),)}
+    recording, drive = written(Mistake("", scaled(columns, 1.03), dq=True), tmp_path, deviations)
+    answer = diagnose(table_of(recording, tmp_path / "points.csv"), drive)
+    assert answer.verdict == "ambiguous", answer.sentence
+    assert {"current_scale", "udc_gain"} <= {name for group in answer.ambiguity for name in group}
 
 
 def shifted(rows):

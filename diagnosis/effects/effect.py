@@ -161,6 +161,10 @@ class Effect:
         """Parameters of the effect, {name: Estimate}, from its coefficients in the order of the covariance."""
         raise NotImplementedError
 
+    def caveat(self, view) -> str:
+        """What its estimates leave open in such a recording, as a sentence; "" if nothing."""
+        return ""
+
     def relative(self, c: dict[str, dict], nominal) -> float:
         """Factor on the coefficients that follows from the other named effects; c: {effect: coefficients}."""
         return 1.0
