@@ -66,8 +66,10 @@ class CurrentOffset(Effect):
         return out
 
     def caveat(self, view):
-        seen = "The offsets are stated with a sum of zero: an equal offset of three sensors does not show in this recording"
-        return "" if view.has_sum else f"{seen}, and would add to each."
+        if view.has_sum:
+            return ""
+        zero = "The offsets are stated with a sum of zero"
+        return f"{zero}: an equal offset of three sensors does not show in this recording, and would add to each."
 
     def plant(self, c, nominal):
         return {"sensors.current_offset_a": [float(v) for v in self._phases(c)]}
