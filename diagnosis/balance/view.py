@@ -65,6 +65,7 @@ class View:
     late_s: float = 0.0
     mean_duty: np.ndarray | None = None
     current_kept: float = 1.0  # share of the recorded current that a common scale leaves
+    voltage_kept: float = 1.0  # share of the recorded voltage that a gain of the bus sensor leaves
     memo: dict = dataclasses.field(default_factory=dict)  # cache of the effects, shared by all views of a recording
 
     angle_step: float = 0.0  # of the encoder's codes [rad]; 0: none is seen

@@ -21,7 +21,8 @@ class UdcGain(Effect):
 
     def corrected(self, view, c):
         factor = 1.0 / (1.0 + max(c["gain"], SMALLEST_GAIN))
-        return view.replace(u=view.u * factor, u_dc=view.u_dc * factor)
+        kept = view.voltage_kept * factor
+        return view.replace(u=view.u * factor, u_dc=view.u_dc * factor, voltage_kept=kept)
 
     def estimates(self, c, covariance, nominal):
         return one("udc_gain", "1", c["gain"], sigma(covariance) * (1.0 + c["gain"]))

@@ -7,7 +7,7 @@ sensitivity`).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -70,6 +70,12 @@ class Linearisation:
     doubt: np.ndarray | None
 
 
+def scaled(cells: Cells, scale) -> Cells:
+    """The cells with misfit and columns times ``scale`` (r,)."""
+    columns = {name: {key: scale * x for key, x in own.items()} for name, own in cells.columns.items()}
+    return replace(cells, y=scale * cells.y, columns=columns)
+
+
 def frozen(c) -> tuple:
     """{effect: {coefficient: value}} as a value that is equal if the coefficients are."""
     return tuple((name, tuple(own.items())) for name, own in c.items())
@@ -85,7 +91,11 @@ def linearised(rows: Rows, coefficients: tuple, names: tuple | None) -> Linearis
     late = sum(effects[n].late_s(own, view.nominal) for n, own in c.items())
     view = with_flux(view, effects, c, late_s=late)
     cells = cells_of(view, [e for n, e in effects.items() if names is None or n in names], rows.projector)
-    change = rows.projector.rows(misfit(plain)) - rows.smooth_rows if totals else np.zeros(len(cells.y))
+    # The balance stays in recorded units: one that a gain scales down leaves less, and is not better for that.
+    scale = np.where(cells.channel == "u", 1.0 / view.voltage_kept, 1.0)
+    scale = np.where(cells.channel == "sum", 1.0 / view.current_kept, scale)
+    cells = scaled(cells, scale)
+    change = scale * rows.projector.rows(misfit(plain)) - rows.smooth_rows if totals else np.zeros(len(cells.y))
     ripple = cells.y - rows.cells.y - change
     kept = [n for n in c if not effects[n].corrects and not effects[n].smoothed and n in cells.electrical]
     if kept:
@@ -95,7 +105,7 @@ def linearised(rows: Rows, coefficients: tuple, names: tuple | None) -> Linearis
         for key, value in c[name].items():
             key = key if key in even else f"~{key}"
             if value and key in even and key in raw:
-                ripple -= value * (raw[key] - even[key])
+                ripple -= value * (scale * raw[key] - even[key])
     doubts = [effects[n].doubt(own, view) for n, own in c.items()]
     doubt = np.sqrt(sum((np.square(d) for d in doubts), np.zeros(len(view)))) if doubts else None
     return Linearisation(view, cells, totals, change, ripple, doubt)
