@@ -52,14 +52,23 @@ def test_an_inductance_beside_an_angle_that_is_off(degrees, factor, tmp_path):
     assert abs(np.degrees(found["offset_rad"]) - degrees) < 0.1
 
 
-@pytest.mark.parametrize("columns", [("u_d_ref", "u_q_ref", "u_dc"), ("i_d", "i_q")])
-def test_a_gain_beside_a_wrong_flux_is_not_told_from_another_gain(columns, tmp_path):
-    """A gain of the bus or a scale of the currents, each with another magnet flux, leave the same operating points."""
+@pytest.mark.parametrize(
+    ("columns", "table"),
+    [(("u_dc",), False), slowly(PHASES, False), (("u_d_ref", "u_q_ref", "u_dc"), True), (("i_d", "i_q"), True)],
+)
+def test_a_gain_beside_a_wrong_flux_is_not_told_from_another_gain(columns, table, tmp_path):
+    """A gain of the bus or a scale of the currents, each with another magnet flux, leave the same.
+
+    The one that scales the remainder down was named before.
+    """
     deviations = {"machine": (("magnet_flux_wb", 0.92 * MACHINE.magnet_flux_wb),)}
-    recording, drive = written(Mistake("", scaled(columns, 1.03), dq=True), tmp_path, deviations)
-    answer = diagnose(table_of(recording, tmp_path / "points.csv"), drive)
+    recording, drive = written(Mistake("", scaled(columns, 1.03), dq=table), tmp_path, deviations)
+    answer = diagnose(table_of(recording, tmp_path / "points.csv") if table else recording, drive)
     assert answer.verdict == "ambiguous", answer.sentence
     assert {"current_scale", "udc_gain"} <= {name for group in answer.ambiguity for name in group}
+    fits = {fit.names: fit.value for _, fit in answer.search.weights()}
+    pairs = [fits[tuple(sorted(pair))] for pair in (("current_scale", "magnet_flux"), ("magnet_flux", "udc_gain"))]
+    assert abs(pairs[0] - pairs[1]) < 2.0
 
 
 def shifted(rows):

@@ -41,6 +41,8 @@ def files_of(number, tmp_path, seed=SEED, generator="sealed", count=COUNT):
         slowly(FOURTH, 49, {"current_scale", "delay", "magnet_temperature"}),  # the same
         slowly(FIFTH, 22, set()),  # healthy: at one speed the codes beat with the sampling at order 9.5
         (FIFTH, 1, set()),  # a dry friction that explained the load of one dwell, which was counted twice
+        # A gain of the bus and a scale of the currents scaled the remainder down.
+        slowly(5122026, 7, {"inductance_q", "magnet_flux"}),
         slowly(SEED, 18, {"cogging", "sampling_skew"}),  # currents sampled while pulses begin: nothing
     ],
 )
