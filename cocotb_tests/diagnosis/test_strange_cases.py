@@ -83,6 +83,13 @@ def test_an_offset_beside_a_resistance_that_is_half_wrong_is_found(tmp_path):
     assert {e.name for e in answer.effects} == {"current_offset", "resistance"} and answer.verdict == "explained"
 
 
+@pytest.mark.slow
+def test_a_name_is_judged_against_the_best_set_without_it(tmp_path):
+    """The set of the true causes did not stand yet, so that a resistance beside them seemed certain."""
+    answer = diagnose(*files_of(18, tmp_path, FOURTH, "gem", 24))
+    assert {e.name for e in answer.effects} == {"current_offset", "dead_time", "udc_gain"}, answer.sentence
+
+
 @pytest.mark.parametrize(
     ("seed", "number", "says"),
     [

@@ -16,6 +16,7 @@ SETTLED = 12  # most linearisations of the final set
 KEPT = (12, 80)  # least and most sets of one size that are grown further
 EFFORT = 20000  # rows times sets of one size
 CLOSE = 20.0  # log evidence below the best within which linearising a set on its own is worth the effort
+RIVAL = 50.0  # log evidence below the best from which a set that does not stand may still reach it
 GROWN = 3  # effects up to which all good sets are grown
 MOST_EFFECTS = 6
 ALIKE = 8  # best sets that are linearised on their own before the search around one of them
@@ -204,8 +205,15 @@ class Posterior:
                 # A part that is impossible on the linearisation of another set may be possible on its own.
                 if fit is not None and not fit.stands and (part not in self.own or np.isfinite(fit.value)):
                     self._linearise(part, SETTLED)
+                self._without(out)
             if self.best().names == best:
                 return
+
+    def _without(self, name):
+        """Judge the best set without an effect on its own linearisation: only then is it known what the effect adds."""
+        best = max((f for f in self.fits.values() if name not in f.names), key=lambda f: f.value, default=None)
+        if best is not None and not best.stands and best.value > self.best().value - RIVAL:
+            self._linearise(best.names, SETTLED)
 
     def weights(self):
         """[(probability, Fit)] of all sets, the most probable first."""
