@@ -121,6 +121,16 @@ def test_emf_run_beside_a_fast_recording_separates_bus_and_magnets(tmp_path):
     assert found(answer) == {"udc_gain": pytest.approx(0.05, abs=0.001)}
 
 
+def test_emf_run_beside_a_fast_recording_decides_between_gains(tmp_path):
+    """The gain of the bus is none of the oscilloscope's: its blocks keep their volts."""
+    other = DRIVE.replace(f"magnet_flux_wb = {PSI}", f"magnet_flux_wb = {PSI / 0.92}")
+    assert other != DRIVE
+    (tmp_path / "drive.toml").write_text(other)
+    files = [write(tmp_path / "scope.csv", emf(psi=PSI)), write(tmp_path / "drive.csv", made(8000, u_dc_gain=1.05))]
+    values = found(diagnose(files, tmp_path / "drive.toml"))
+    assert values == {"udc_gain": pytest.approx(0.05, abs=0.001), "magnet_flux_wb": pytest.approx(PSI, rel=5e-4)}
+
+
 def test_blocks_of_an_emf_run_show_magnets_only(tmp_path):
     nominal = nominal_of(tmp_path)
     view = view_of(load_recording(write(tmp_path / "scope.csv", emf(seconds=0.2)), nominal), nominal)

@@ -64,8 +64,9 @@ class View:
     delta_l: tuple[float, float] = (0.0, 0.0)
     late_s: float = 0.0
     mean_duty: np.ndarray | None = None
-    current_kept: float = 1.0  # share of the recorded current that a common scale leaves
-    voltage_kept: float = 1.0  # share of the recorded voltage that a gain of the bus sensor leaves
+    # Shares that a common scale of the currents and a gain of the bus sensor leave of what was recorded, (b, 1) or 1.
+    current_kept: np.ndarray | float = 1.0
+    voltage_kept: np.ndarray | float = 1.0
     memo: dict = dataclasses.field(default_factory=dict)  # cache of the effects, shared by all views of a recording
 
     angle_step: float = 0.0  # of the encoder's codes [rad]; 0: none is seen
@@ -90,7 +91,10 @@ class View:
             return changed
         pick = lambda old, new: np.where(blocks.reshape(-1, *[1] * (np.ndim(new) - 1)), old, new)  # noqa: E731
         names = ("theta", "omega", "i", "i_raw", "u", "u_dc")
-        return changed.replace(**{name: pick(getattr(self, name), getattr(changed, name)) for name in names})
+        data = {name: pick(getattr(self, name), getattr(changed, name)) for name in names}
+        for name in ("current_kept", "voltage_kept"):
+            data[name] = np.where(blocks[:, None], getattr(self, name), getattr(changed, name))
+        return changed.replace(**data)
 
     def visible(self, effects: dict) -> dict:
         """Those of the effects {name: Effect} that can be seen in any block."""

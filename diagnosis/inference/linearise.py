@@ -92,8 +92,9 @@ def linearised(rows: Rows, coefficients: tuple, names: tuple | None) -> Linearis
     view = with_flux(view, effects, c, late_s=late)
     cells = cells_of(view, [e for n, e in effects.items() if names is None or n in names], rows.projector)
     # The balance stays in recorded units: one that a gain scales down leaves less, and is not better for that.
-    scale = np.where(cells.channel == "u", 1.0 / view.voltage_kept, 1.0)
-    scale = np.where(cells.channel == "sum", 1.0 / view.current_kept, scale)
+    kept = (view.voltage_kept, view.current_kept)
+    volts, amps = (np.broadcast_to(share, (len(view), 1))[cells.block, 0] for share in kept)
+    scale = 1.0 / np.where(cells.channel == "u", volts, np.where(cells.channel == "sum", amps, 1.0))
     cells = scaled(cells, scale)
     change = scale * rows.projector.rows(misfit(plain)) - rows.smooth_rows if totals else np.zeros(len(cells.y))
     ripple = cells.y - rows.cells.y - change
