@@ -220,6 +220,7 @@ def test_constant_wider_than_the_vector(ghdl5, tmp_path):
     assert got[3:9] == [0, 0, 0, 1, 0, 0]
 
 
+@pytest.mark.slow
 def test_run_period_records_what_a_trace_shows(ghdl5):
     settings = {"enable": 1, "fault_ignore": IGNORE.hi, "dead_time": 3, "min_pulse": 8}
     settings |= {"lambda_mg": 9000, "u_dc_gain": 60000}

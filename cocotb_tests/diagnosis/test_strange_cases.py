@@ -33,7 +33,7 @@ def files_of(number, tmp_path, seed=SEED, generator="sealed", count=COUNT):
         slowly(SEED, 10, {"dead_time", "saturation"}),  # a twisting shaft as alternative, which does not help
         slowly(LATER, 24, {"cross_saturation", "friction", "sampling_skew"}),  # both late: a delay instead
         slowly(LAST, 1, {"cogging"}),  # a ripple was judged by the error of a mean torque
-        (LAST, 10, {"phase_resistance_asymmetry"}),  # a ripple at a fifth of the order was taken for its cause
+        slowly(LAST, 10, {"phase_resistance_asymmetry"}),  # a ripple at a fifth of the order was taken for its cause
         # Without the saturation, held-out points beyond the fitted ones fitted better.
         slowly(LAST, 40, {"cross_saturation", "iron_loss", "saturation"}),
         (FOURTH, 17, {"cogging", "delay"}),  # all pulses late: a sampling skew, or nothing
