@@ -101,6 +101,9 @@ def test_a_modulation_index_is_told_by_its_unit(tmp_path, unit):
     recording = load_recording(write(tmp_path / "r.csv", log), nominal)
     assert codes(recording) == ["slow_sampling"]
     np.testing.assert_allclose(recording["u_q_ref"], table["u_q_ref"], rtol=1e-9, atol=1e-9)
+    log["u_dc"] = ["off"] * len(log["t"])
+    with pytest.raises(RecordingError, match="contains no numbers"):
+        load_recording(write(tmp_path / "r.csv", log), nominal)
     del log["u_dc"]
     with pytest.raises(RecordingError, match=r"'u_d_ref' is a share of u_dc, which is missing"):
         load_recording(write(tmp_path / "r.csv", log), nominal)
@@ -122,6 +125,9 @@ def test_a_reading_of_a_modulation_index_goes_into_its_unit(nominal):
     document = tomlkit.document()
     edit(document, nominal, [half], recording, _set)
     assert document["columns"]["m_q"] == {"name": "u_q_ref", "unit": "u_dc/2"}
+    rms, document = next(r for r in READINGS if r.code == "voltages_rms"), tomlkit.document()
+    edit(document, nominal, [rms], recording, _set)
+    assert "columns" not in document  # no unit says 1.41 times the bus
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 
 import tomlkit
 
@@ -53,19 +54,20 @@ def edit(document, nominal, readings, recording, put) -> None:
                 f, o = reading.columns()[name]
                 factor, offset = factor * f, offset * f + o
                 why.append(reading.says)
-        if why and name not in converted:
+        written = _written(factor, offset, name in recording.meta.get("of_bus", ()))
+        if why and written and name not in converted:
             entry = tomlkit.inline_table()
-            entry.update({"name": name} | _written(factor, offset, name in recording.meta.get("of_bus", ())))
+            entry.update({"name": name} | written)
             put(document.setdefault("columns", tomlkit.table()), sources[name], entry, "; ".join(why))
 
 
 def _written(factor, offset, of_bus) -> dict:
     """Factor and offset of a column as keys of its entry; of_bus: it is a share of the bus voltage, whose unit says it.
 
-    The readings of a modulation index are from one of its units to another.
+    {} if no unit of a modulation index is such a share: the entry then stays as it is.
     """
     if of_bus:
-        return {"unit": min(OF_BUS, key=lambda unit: abs(OF_BUS[unit] - factor))}
+        return next(({"unit": unit} for unit, share in OF_BUS.items() if math.isclose(share, factor)), {})
     return {"factor": _digits(factor)} | ({"offset": _digits(offset)} if offset else {})
 
 

@@ -116,8 +116,9 @@ def canonical(table: Table, plan: Plan) -> dict[str, np.ndarray]:
             arrays[name] = (
                 raw if source.factor == 1.0 and not source.offset else raw * source.factor + source.offset
             )
-    for name in [name for name in arrays if plan.sources[name].bus]:
-        arrays[name] = arrays[name] * arrays.get("u_dc", plan.assumed.get("u_dc"))
+    bus = arrays.get("u_dc", plan.assumed.get("u_dc"))
+    for name in [name for name in arrays if plan.sources[name].bus and bus is not None]:
+        arrays[name] = arrays[name] * bus
     return arrays
 
 
