@@ -97,7 +97,7 @@ def _read(setup, codes) -> Setup:
     """
     readings = _coded(setup, codes)
     volts, amps = _product(r.volts for r in readings), _product(r.currents for r in readings)
-    raw = Setup.of(setup.call(_rows_as_read, setup.rows, codes), setup.call).read_like(setup, amps)
+    raw = Setup.of(setup.call(_rows_as_read, setup.rows, codes), setup.call).read_like(setup, volts, amps)
     if any(r.turn for r in readings):
         return raw
     return max((raw, raw.smoothly(setup, volts, amps)), key=lambda s: Problem(s).fit(()).value)

@@ -65,14 +65,15 @@ class Setup:
         """Log prior odds of an effect; ``shifts`` {effect: change} holds what a fleet says of them."""
         return float(np.log(k.PRESENT / (1 - k.PRESENT)) + self.shifts.get(name, 0.0))
 
-    def read_like(self, other, amps):
+    def read_like(self, other, volts, amps):
         """This reading of a recording with the operating points of ``other``, the same blocks as documented.
 
-        amps: factor of the currents between the two.
+        volts, amps: factors of voltages and currents between the two, which the error of the balance has too.
         """
         self.points, self.visits, self.shifts = other.points, other.visits, other.shifts
         self.grouping, self.repeats = other.grouping, other.repeats
-        self.level = self.level * np.where(self.cells.channel == "sum", amps, 1.0)
+        channel = self.cells.channel
+        self.level = other.level * np.where(channel == "u", volts, np.where(channel == "sum", amps, 1.0))
         return self
 
     def smoothly(self, other, volts, amps):
