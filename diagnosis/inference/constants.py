@@ -27,7 +27,7 @@ BALANCE_TORQUE = 3e-3
 DISCREPANCY = 3.0
 # Share of its own contribution by which the formula of an effect is wrong at each operating point.
 FORMULA = 0.01
-# Least share of its usual departure from the formula by which the curve of an effect departs: known to be straight.
+# Share of the usual departure from the formula (an effect's ``curve``) below which a curve is as good as the formula.
 STRAIGHT = 0.01
 # Largest size of an effect, in units of the smallest of interest, where a ceiling limits it, and where none does.
 WIDEST, UNBOUNDED = 1e3, 300.0
