@@ -251,7 +251,7 @@ def test_plausible_limits_are_of_declared_parameters():
         assert set(effect.plausible) <= {p.name for p in effect.parameters}
         assert bool(effect.plausible) == bool(effect.otherwise)
         assert all(low < high for low, high, *_ in effect.plausible.values())
-        assert effect.stays == "" or effect.corrects or effect.drift_of
+        assert effect.stays == "" or effect.corrects or "time" in effect.needs
 
 
 @pytest.mark.parametrize("sigma, text", [(0.1, "5.09 +- 0.10 V"), (0.23, "5.1 +- 0.2 V"), (0.0, "5.087 V")])

@@ -14,9 +14,9 @@ from fluxproof.diagnosis.answer.names import MEDIAN, _seen_discrepancy
 from fluxproof.diagnosis.balance.blocks import view_of
 from fluxproof.diagnosis.balance.joined import joined_views
 from fluxproof.diagnosis.balance.misfit import bulge, misfit
+from fluxproof.diagnosis.balance.operating_points import point_numbers
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.catalogue.current_gain import PATTERNS
-from fluxproof.diagnosis.inference.points import point_numbers
 from fluxproof.diagnosis.nominal import load_nominal
 from fluxproof.diagnosis.recording import from_columns
 

@@ -5,15 +5,19 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from cocotb_tests.core.test_registers import PAPER
 from cocotb_tests.diagnosis.test_strange_cases import files_of
 from cocotb_tests.support.slow import slowly
 from fluxproof.diagnosis.answer import conclude
 from fluxproof.diagnosis.balance.cells import _steep_variance
-from fluxproof.diagnosis.balance.shaft import bend_gain
+from fluxproof.diagnosis.balance.shaft import airgap, bend_gain, shaft_kind
 from fluxproof.diagnosis.ingest.load import load_recording
 from fluxproof.diagnosis.nominal import load_nominal
 from fluxproof.diagnosis.physics import rows_of, view_and_held
+from fluxproof.diagnosis.recording import from_columns
 from fluxproof.diagnosis.session import diagnose
+
+NOMINAL = load_nominal(PAPER)
 
 
 @pytest.mark.parametrize(
@@ -29,6 +33,24 @@ def test_cogging_that_the_speed_loop_conceals_is_named(seed, count, number, kind
     answer = diagnose(recording, drive)
     assert {e.name for e in answer.effects} == names and answer.verdict == "explained"
     assert set(answer.search.setup.view.shaft) == {kind}
+
+
+@pytest.mark.parametrize(
+    ("kind", "share"),
+    [("loaded", 0.0), ("driving", 1.0), ("loaded", 0.2), ("driving", 0.8)],  # of the inertia behind it
+)
+def test_what_the_transducer_measures_is_seen(kind, share):
+    """In front of load and inertia it shows the torque that accelerates; this had been subtracted once more."""
+    machine = SimpleNamespace(**vars(NOMINAL.machine) | {"inertia_kgm2": 1e-3})
+    nominal = SimpleNamespace(machine=machine, sample_time_s=1e-4)
+    t = np.arange(40000) * nominal.sample_time_s
+    i = 1j * machine.rated_current_a * np.sin(2 * np.pi * 3.0 * t)
+    load = 0.1 * airgap(nominal, 1j * machine.rated_current_a) * (t > 2.0)
+    inertial = airgap(nominal, i) - load
+    omega = np.cumsum(inertial) * nominal.sample_time_s / machine.inertia_kgm2
+    theta = machine.pole_pairs * np.cumsum(omega) * nominal.sample_time_s
+    recording = from_columns({"t": t, "torque": load + share * inertial}, nominal.sample_time_s)
+    assert shaft_kind(recording, nominal, i, theta, np.ones(len(t) - 1, bool)) == kind
 
 
 def test_the_noise_of_an_acceleration_follows_the_gain_of_the_second_difference(tmp_path):

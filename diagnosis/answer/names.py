@@ -124,6 +124,12 @@ def credibility(fit, name) -> float:
     # What is left where other effects explain much is rather an error of theirs.
     beside = left * left / np.maximum(left + others, 1e-300)
     best = (0.0, 1.0)
+
+    def changed(means):
+        """The groups of contrasts that belong to groups of means."""
+        orders = {p.groups[n][:2] for n in np.flatnonzero(means)}
+        return np.array([contrast and (channel, order) in orders for channel, order, contrast in p.groups], bool)
+
     whole = np.array([abs(order - round(order)) < 1e-6 for _, order, _ in p.groups])
     for part in {(channel, contrast) for channel, _, contrast in p.groups}:
         mine = np.array([(channel, contrast) == part for channel, _, contrast in p.groups])
@@ -135,6 +141,9 @@ def credibility(fit, name) -> float:
             mine &= whole
         elsewhere = 0.0 if part[0] == "torque" else k.ELSEWHERE  # an angle's quantisation is no physics of the shaft
         remains = left[own].sum() + elsewhere * beside[mine & ~own].sum()
+        # What has changed between visits to a point, and is not explained, is in the mean of these visits too.
+        if elsewhere and not part[1]:
+            remains += left[changed(own)].sum()
         strength = total / level2[mine].mean()
         if strength > best[0]:
             best = (strength, 1.0 - np.exp(-total / (2.0 * k.IMITATION**2 * remains)) if remains > 0.0 else 1.0)

@@ -171,7 +171,7 @@ def _mechanics(recording, nominal, i_s, theta, theta_s, linked):
         far = SLOPE_REACH
         bend = theta_s[2 * far :] - 2 * theta_s[far:-far] + theta_s[: -2 * far]
         slope[far:-far] = bend / (far * period) ** 2
-    else:  # the ripple of a free shaft appears in the angle only
+    elif kind != "driving":  # the ripple of a free shaft appears in the angle only
         slope[1:-2] = (theta[3:] - theta[2:-1] - theta[1:-2] + theta[:-3]) / (2 * period**2)
     slope_m = np.nan_to_num(slope) / nominal.machine.pole_pairs
     if recording.has("torque"):

@@ -6,7 +6,8 @@ milliseconds equal, in the median, those of J d omega_m / dt; occasional load st
 unloaded if the remaining torque is an odd function of speed alone, in both directions: friction is one, a load only
 by chance.
 
-A transducer on a free shaft measures the load, so that the ripple of the air-gap torque appears in the acceleration.
+A transducer on a free shaft measures what is behind it.  In front of the load alone it shows the load, and the ripple
+of the air-gap torque appears in the acceleration; in front of the inertia too, it shows that ripple itself.
 """
 
 from __future__ import annotations
@@ -16,15 +17,18 @@ import numpy as np
 FREE_RATIO = (0.7, 1.35)  # median of torque change over inertial change
 REACH, LAG = 80, 200  # samples: half window of the slope, and interval of a change
 FREE = ("loaded", "unloaded", "free")  # kinds whose acceleration is computed from the codes of the angle
-MEASURED = ("torque", "loaded")  # kinds with a transducer
+SHOWN = ("torque", "driving")  # kinds with a transducer that shows the ripple of the air-gap torque
+MEASURED = (*SHOWN, "loaded")  # kinds with a transducer
+DRIVES = 0.5  # least median of transducer change over air-gap change in front of the inertia; behind it there is none
 ODD_SHARE = 0.96  # share of the remaining torque's variance that an odd function of speed must explain
 ONE_SPEED = 0.8  # ratio of small and large drag above which the recording has only one speed
 SMALL = 0.01  # of rated torque: a smaller torque is never a load
 
 
 def shaft_kind(recording, nominal, i_s, theta, linked) -> str:
-    """'torque', 'loaded' (free, with a torque transducer), 'unloaded', 'free' (with a possible load) or ''.
+    """'torque' (imposed speed), 'loaded', 'driving', 'unloaded', 'free' (with a possible load) or ''.
 
+    A shaft that is 'loaded' or 'driving' is free and has a transducer, in front of the load or of load and inertia.
     i_s, theta: smoothed dq current and angle (n,).
     """
     m = nominal.machine
@@ -47,7 +51,8 @@ def shaft_kind(recording, nominal, i_s, theta, linked) -> str:
     if moving.sum() < 200 or not FREE_RATIO[0] < np.median(y[moving] / x[moving]) < FREE_RATIO[1]:
         return imposed
     if imposed:
-        return "loaded"
+        z = recording["torque"][LAG:] - recording["torque"][:-LAG]
+        return "driving" if np.nanmedian(z[moving] / y[moving]) > DRIVES else "loaded"
     good = np.isfinite(inert) & np.isfinite(torque)
     good[:-1] &= linked
     left = (torque - inert - (m.viscous_friction_nms or 0.0) * omega_m)[good][::10]

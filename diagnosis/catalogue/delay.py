@@ -8,6 +8,7 @@ import numpy as np
 
 from fluxproof.diagnosis.balance.curves import parabola
 from fluxproof.diagnosis.balance.late_pulses import instant, late_ripple
+from fluxproof.diagnosis.balance.shaft import SHOWN
 from fluxproof.diagnosis.effects.effect import Effect, Parameter, current_error, one, torque_of, voltage
 
 MOST_PERIODS = 3.0  # periods; more than is possible, so that the iteration can return
@@ -62,7 +63,7 @@ def _ripples(view):
 
 def _sampled(view):
     """(b, 1) whether the torque is measured: like the currents, it is a sample and has their ripple."""
-    return (view.shaft == "torque")[:, None]
+    return np.isin(view.shaft, SHOWN)[:, None]
 
 
 def _time(c):

@@ -46,22 +46,6 @@ class Points:
     condensed: object  # function of further rows (r,): their means and contrasts (n,)
 
 
-def point_numbers(view) -> np.ndarray:
-    """(b,) number of the operating point (speed, i_d, i_q) of each block of a view.
-
-    The first block that is far from all known points starts a new one; fixed bins would split some points.
-    """
-    m, omega, i = view.machine, view.omega.mean(axis=1), view.i.mean(axis=1)
-    top = max(float(np.abs(omega).max()), 1e-9)
-    points = np.stack([omega / top, i.real / m.rated_current_a, i.imag / m.rated_current_a], axis=1)
-    number, free = np.full(len(points), -1), 0
-    while (number < 0).any():
-        first = points[np.argmax(number < 0)]
-        number[(number < 0) & (np.abs(points - first).max(axis=1) < k.POINT)] = free
-        free += 1
-    return number
-
-
 def balance_level(view, cells):
     """(r,) error of the balance in every row, in the unit of its channel."""
     m = view.machine

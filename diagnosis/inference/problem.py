@@ -14,11 +14,12 @@ import itertools
 import numpy as np
 
 from fluxproof.diagnosis.balance.cells import repeats, voltage_level
+from fluxproof.diagnosis.balance.operating_points import point_numbers
 from fluxproof.diagnosis.effects.effect import believable
 from fluxproof.diagnosis.inference import constants as k
 from fluxproof.diagnosis.inference.evidence import evidence
 from fluxproof.diagnosis.inference.linearise import Linearisation, Rows, at_once
-from fluxproof.diagnosis.inference.points import Grouping, balance_level, condense, point_numbers, visits
+from fluxproof.diagnosis.inference.points import Grouping, balance_level, condense, visits
 
 
 class Setup:
