@@ -91,6 +91,19 @@ def test_a_soft_shaft_is_no_inductance():
     assert answer.unknown_term.value == pytest.approx(0.05, rel=0.1)
 
 
+def test_shorted_turns(phase=1, conductance=0.02):
+    """The current of the short flows in the terminals of its phase and does not magnetise."""
+    table = dict(columns(GRID))
+    axis = 2.0 * np.pi / 3.0 * phase
+    emf = -DRIVE.machine.magnet_flux_wb * table["omega_e"] * np.sin(table["theta_e"] - axis)
+    for n, x in enumerate("abc"):
+        table[f"i_{x}"] = table[f"i_{x}"] + conductance * emf * (2.0 / 3.0 if n == phase else -1.0 / 3.0)
+    answer = answer_of(table)
+    assert answer.verdict == "unexplained" and not answer.effects and "turns of one phase" in answer.sentence
+    assert answer.unknown_term.formula.startswith("conductance_b_s")
+    assert answer.unknown_term.value == pytest.approx(conductance, rel=0.1)
+
+
 def test_suspects_are_not_in_the_catalogue():
     assert SUSPECTS and not set(SUSPECTS) & set(CATALOGUE)
     assert not any(e.named for e in SUSPECTS.values()) and all(e.named for e in CATALOGUE.values())

@@ -140,10 +140,10 @@ def credibility(fit, name) -> float:
         if whole[own].all():  # what repeats with the electrical angle leaves nothing between its orders
             mine &= whole
         elsewhere = 0.0 if part[0] == "torque" else k.ELSEWHERE  # an angle's quantisation is no physics of the shaft
-        remains = left[own].sum() + elsewhere * beside[mine & ~own].sum()
-        # What has changed between visits to a point, and is not explained, is in the mean of these visits too.
-        if elsewhere and not part[1]:
-            remains += left[changed(own)].sum()
+        away = beside[mine & ~own].sum()
+        if not part[1]:  # what changes between visits to a point, and is not explained, may be in their mean too
+            away += left[changed(own)].sum()
+        remains = left[own].sum() + elsewhere * away
         strength = total / level2[mine].mean()
         if strength > best[0]:
             best = (strength, 1.0 - np.exp(-total / (2.0 * k.IMITATION**2 * remains)) if remains > 0.0 else 1.0)

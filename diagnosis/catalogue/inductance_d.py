@@ -42,6 +42,7 @@ EFFECT = InductanceD(
     signature="order 0, omega i_d on the q axis; and the slope of i_d",
     confounders=("magnet_flux", "current_gain", "cross_saturation", "saturation"),
     rescales=("inductance_d_h",),
+    exact=True,
     separated_by="two non-zero values of i_d",
     parameters=(Parameter("inductance_d_h", "H", "of the d axis", "L_d"),),
     spreads=True,

@@ -42,6 +42,7 @@ EFFECT = InductanceQ(
     signature="order 0, -omega i_q on the d axis; and the slope of i_q",
     confounders=("encoder_offset", "saturation", "iron_loss", "sampling_skew"),
     rescales=("inductance_q_h",),
+    exact=True,
     separated_by="several i_q of both signs; rotation at zero current",
     parameters=(Parameter("inductance_q_h", "H", "of the q axis", "L_q"),),
     spreads=True,

@@ -41,6 +41,7 @@ EFFECT = Resistance(
     signature="order 0, proportional to current, at every speed including standstill",
     confounders=("iron_loss", "magnet_flux", "dead_time", "resistance_temperature"),
     rescales=("resistance_ohm",),
+    exact=True,
     beside_map=True,
     separated_by="low speed and three loads; i_q reversed (against magnet_flux), several currents (against dead_time)",
     parameters=(Parameter("resistance_ohm", "ohm", "per phase, at the temperature of the recording", "resistance"),),

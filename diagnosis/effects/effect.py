@@ -77,7 +77,7 @@ class Effect:
     trailing: tuple[float, ...] = ()  # further electrical orders at which the effect may have harmonics
     mechanical: bool = False  # a torque of the shaft rather than a voltage of the machine
     curve: float = 0.3  # share of the formula by which the free curve may depart from it
-    exact: bool = False  # the scale of a signal or of the magnet: no formula that may be wrong at an operating point
+    exact: bool = False  # a constant of the nominal drive or a scale: no formula of its own that may be wrong
     corrected_last: bool = False  # of several measurement errors: its correction uses the corrected currents
     spreads: bool = False  # between any two drives: in every set of effects of a fleet
     bends: bool = False  # a flux linkage that is no line of the current: a flux map shows it

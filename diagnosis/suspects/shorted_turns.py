@@ -1,0 +1,65 @@
+"""Turns of one phase that are shorted: their EMF drives a current in the short, which the terminals do not see."""
+
+import numpy as np
+
+from fluxproof.diagnosis.effects.effect import Effect, Parameter, current_error, one, sigma
+
+PHASES = {"a": 0.0, "b": 2.0 * np.pi / 3.0, "c": -2.0 * np.pi / 3.0}
+LAG_S = 1e-4  # time in which the current of the short follows its EMF, L / R of the shorted turns
+
+
+def _short(view, phase):
+    """{"": column of the resistive current, "_lag": of its lag} of one phase, per siemens referred to the phase."""
+    axis = np.exp(1j * (PHASES[phase] - view.theta))
+    columns = {}
+    for name, turned in {"": 1.0, "_lag": -1j * view.omega * LAG_S}.items():
+        emf = (1j * view.omega * turned * view.psi * np.conj(axis)).real
+        columns[name] = current_error(view, (2.0 / 3.0) * emf * axis)
+    return columns
+
+
+class ShortedTurns(Effect):
+    def core(self, view):
+        return {phase: _short(view, phase)[""] for phase in PHASES}
+
+    def free(self, view):
+        return {f"{phase}_lag": _short(view, phase)["_lag"] for phase in PHASES}
+
+    def floor(self, nominal):
+        return 0.005 * nominal.machine.rated_current_a / self._rated_emf(nominal)
+
+    def too_large(self, c, view):
+        """Whether the current of the short, referred to the phase, exceeds rated current at the highest speed."""
+        emf = view.top_speed * view.machine.magnet_flux_wb
+        return self.size(c, view.nominal) * emf > view.machine.rated_current_a
+
+    @staticmethod
+    def _rated_emf(nominal):
+        return nominal.inverter.dc_bus_v / np.sqrt(3)
+
+    def possible(self, c, covariance, nominal):
+        """A short consumes power."""
+        return all(c.get(phase, 0.0) >= 0.0 for phase in PHASES)
+
+    def size(self, c, nominal):
+        return max(abs(c.get(phase, 0.0)) for phase in PHASES)
+
+    def estimates(self, c, covariance, nominal):
+        phase = max(PHASES, key=lambda x: abs(c.get(x, 0.0)))
+        return one(f"conductance_{phase}_s", "S", c[phase], sigma(covariance, list(c).index(phase)))
+
+
+EFFECT = ShortedTurns(
+    name="shorted_turns",
+    title="shorted turns",
+    clause="turns of one phase were shorted",
+    equation="i = i_terminal - (2/3) g Re(j omega psi e^(-j phase)) e^(j phase)",
+    signature="orders 0 and -2 of equal size, proportional to omega^2, and a drag torque",
+    confounders=("iron_loss", "phase_resistance_asymmetry", "current_gain"),
+    separated_by="standstill, where a resistance or a gain of one phase stays and a short vanishes",
+    parameters=tuple(Parameter(f"conductance_{x}_s", "S", f"of the short, referred to phase {x}") for x in PHASES),
+    named=False,
+    one_of=tuple((phase, f"{phase}_lag") for phase in PHASES),
+    shows_at=(0.0, 2.0),
+    needs=("harmonics", "angle"),
+)
