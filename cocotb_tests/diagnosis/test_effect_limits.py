@@ -84,8 +84,9 @@ def test_operating_point_is_not_split():
     """Blocks scatter around their point; fixed bins would split some points."""
     for i_q in np.linspace(0.1, 0.9, 81):
         scattered = [(1.0, i_q + 0.004 * (-1) ** n) for n in range(6)]
-        assert point_numbers(points_view(*scattered)).tolist() == [0] * 6
-    assert point_numbers(points_view((1.0, 0.2), (1.0, 0.6), (1.0, 0.21), (-1.0, 0.2))).tolist() == [0, 1, 0, 2]
+        assert point_numbers(points_view(*scattered), 0.08).tolist() == [0] * 6
+    apart = points_view((1.0, 0.2), (1.0, 0.6), (1.0, 0.21), (-1.0, 0.2))
+    assert point_numbers(apart, 0.08).tolist() == [0, 1, 0, 2]
 
 
 def test_hysteresis_draws_nothing_from_the_noise_of_a_standstill(view):

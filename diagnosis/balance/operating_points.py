@@ -5,14 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from fluxproof.diagnosis.balance.misfit import misfit
-from fluxproof.diagnosis.inference import constants as k
 
+NEAR = 0.08  # of the highest speed and of rated current: visits that are compared when an instant is searched
 LEAST_SHARE = 0.05  # of the square of the flux voltage, in points that are visited before and after an instant
 
 
-def point_numbers(view) -> np.ndarray:
+def point_numbers(view, near) -> np.ndarray:
     """(b,) number of the operating point (speed, i_d, i_q) of each block of a view.
 
+    near: difference of the blocks of one point, of the highest speed and of rated current.
     The first block that is far from all known points starts a new one; fixed bins would split some points.
     """
     m, omega, i = view.machine, view.omega.mean(axis=1), view.i.mean(axis=1)
@@ -21,7 +22,7 @@ def point_numbers(view) -> np.ndarray:
     number, free = np.full(len(points), -1), 0
     while (number < 0).any():
         first = points[np.argmax(number < 0)]
-        number[(number < 0) & (np.abs(points - first).max(axis=1) < k.POINT)] = free
+        number[(number < 0) & (np.abs(points - first).max(axis=1) < near)] = free
         free += 1
     return number
 
@@ -32,23 +33,25 @@ def instant_of_change(view) -> float | None:
     Only visits to one operating point are compared with each other, so that an error of the nominal drive that is
     constant over time has no influence.
     """
-    if "instant_of_change" not in view.memo:
-        view.memo["instant_of_change"] = _searched(view)[0]
-    return view.memo["instant_of_change"]
+    return _change(view)[0]
 
 
 def log_prior(view) -> float:
     """Log of the prior probability of that instant, one of all instants between two dwells."""
-    if "instants" not in view.memo:
-        view.memo["instants"] = max(_searched(view)[1], 1)
-    return -float(np.log(view.memo["instants"]))
+    return -float(np.log(max(_change(view)[1], 1)))
+
+
+def _change(view) -> tuple[float | None, int]:
+    """(instant or None, number of instants that were compared), searched once for all views of a recording."""
+    if "change" not in view.memo:
+        view.memo["change"] = _searched(view)
+    return view.memo["change"]
 
 
 def _searched(view) -> tuple[float | None, int]:
-    """(instant or None, number of instants that were compared)."""
     order = np.argsort(view.t, kind="stable")
     omega = view.omega.mean(axis=1)[order]
-    point, count = _ranked(point_numbers(view)[order])
+    point, count = _ranked(point_numbers(view, NEAR)[order])
     change = misfit(view)["u"].imag.mean(axis=1)[order]
     change = change - (np.bincount(point, change) / count)[point]
     # Of what a step after block n explains: its product with the misfit, and its square less what the means take.

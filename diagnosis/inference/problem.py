@@ -46,7 +46,7 @@ class Setup:
         self.smooth_rows = rows.smooth_rows
         self.level = balance_level(self.view, self.cells)
         self.common = _common_error(self)
-        self.points = point_numbers(self.view)
+        self.points = point_numbers(self.view, k.POINT)
         self.visits = visits(self.view, self.points)
         self.grouping = Grouping(self.cells, self.points, self.visits, self.cells.ok & self.train, self.view.run)
         self.repeats = _repeats(self.cells, self.points)
