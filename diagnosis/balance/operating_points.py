@@ -51,7 +51,8 @@ def _change(view) -> tuple[float | None, int]:
 def _searched(view) -> tuple[float | None, int]:
     order = np.argsort(view.t, kind="stable")
     omega = view.omega.mean(axis=1)[order]
-    point, count = _ranked(point_numbers(view, NEAR)[order])
+    point = point_numbers(view, NEAR)[order]
+    count = np.bincount(point)
     change = misfit(view)["u"].imag.mean(axis=1)[order]
     change = change - (np.bincount(point, change) / count)[point]
     # Of what a step after block n explains: its product with the misfit, and its square less what the means take.
@@ -72,9 +73,3 @@ def _searched(view) -> tuple[float | None, int]:
         return None, 0
     gain = np.where(seen, product**2 / np.maximum(square, 1e-300), -1.0)
     return float(view.t[order][np.argmax(gain)]), int(seen.sum())
-
-
-def _ranked(numbers) -> tuple[np.ndarray, np.ndarray]:
-    """(b,) numbers without gaps, and how many blocks each has."""
-    _, ranked, count = np.unique(numbers, return_inverse=True, return_counts=True)
-    return ranked.ravel(), count
