@@ -229,6 +229,17 @@ def test_the_gain_of_one_of_two_sensors_is_that_of_one():
     assert found.plant["sensors.current_gain_error"] == pytest.approx([0.03, 0.0, 0.0], abs=1e-3)
 
 
+def test_opposite_gains_of_two_of_three_sensors_are_told_in_full():
+    """They were told as those of two sensors whose third current is computed, which are half as large."""
+    c = dict(columns(GRID))
+    gains = {"a": -0.06, "b": 0.056, "c": 0.004}
+    for phase, gain in gains.items():
+        c[f"i_{phase}"] = (1.0 + gain) * c[f"i_{phase}"]
+    (found,) = diagnose(from_columns(c, NOMINAL.sample_time_s), NOMINAL).effects
+    assert found.name == "current_gain"
+    assert {x: found.parameters[f"gain_{x}"].value for x in "abc"} == pytest.approx(gains, abs=2e-3)
+
+
 def test_offsets_of_dq_currents_are_told_as_differences():
     """An equal offset of all three phases does not show in dq: a single sensor that is off looks like three."""
     effect = CATALOGUE["current_offset"]

@@ -15,6 +15,7 @@ from fluxproof.diagnosis.conventions.apply import edit
 from fluxproof.diagnosis.conventions.table import READINGS
 from fluxproof.diagnosis.ingest.load import load_recording
 from fluxproof.diagnosis.ingest.units import OF_BUS
+from fluxproof.diagnosis.ingest.usual_names import NAMES, TOLD_BY_UNIT, usual
 from fluxproof.diagnosis.recording import COLUMNS, RecordingError
 
 
@@ -81,11 +82,75 @@ def test_files_of_several_loggers_share_the_columns(tmp_path):
 
 def test_a_torque_of_unknown_name_is_noted(tmp_path, nominal):
     table = made(500)
-    recording = load_recording(write(tmp_path / "r.csv", {**table, "M [Nm]": 0.0 * table["i_a"]}), nominal)
-    assert "column 'M [Nm]' is not used; if it is torque, say so in [columns]" in recording.meta["notes"]
-    spare = nominal_of(tmp_path, '"M [Nm]" = ""\ni_a = "i_a"')
-    recording = load_recording(write(tmp_path / "r.csv", {**table, "M [Nm]": 0.0 * table["i_a"]}), spare)
+    recording = load_recording(write(tmp_path / "r.csv", {**table, "flange [Nm]": 0.0 * table["i_a"]}), nominal)
+    assert "column 'flange [Nm]' is not used; if it is torque, say so in [columns]" in recording.meta["notes"]
+    spare = nominal_of(tmp_path, '"flange [Nm]" = ""\ni_a = "i_a"')
+    recording = load_recording(write(tmp_path / "r.csv", {**table, "flange [Nm]": 0.0 * table["i_a"]}), spare)
     assert not any("is not used" in note for note in recording.meta["notes"])
+
+
+BENCHES = {  # header: canonical column, and how much larger its values are
+    "German": {
+        "Zeit [ms]": ("t", 1e3), "Id [A]": ("i_d", 1.0), "Iq [A]": ("i_q", 1.0),
+        "n [U/min]": ("omega_e", 60 / 8 / np.pi),
+        "Ud_soll [V]": ("u_d_ref", 1.0), "Uq_soll [V]": ("u_q_ref", 1.0), "U_ZK [V]": ("u_dc", 1.0),
+    },
+    "CAN": {
+        "time_ms": ("t", 1e3), "id_mA": ("i_d", 1e3), "iq_mA": ("i_q", 1e3), "speed_rpm": ("omega_e", 60 / 8 / np.pi),
+        "ud_ref_mV": ("u_d_ref", 1e3), "uq_ref_mV": ("u_q_ref", 1e3), "vbus_mV": ("u_dc", 1e3),
+    },
+    "controller": {
+        "Timestamp": ("t", 1.0), "Id-meas": ("i_d", 1.0), "Iq-meas": ("i_q", 1.0), "IdRef": ("i_d_ref", 1.0),
+        "Drehzahl (1/min)": ("omega_e", 60 / 8 / np.pi), "Vd [V]": ("u_d_ref", 1.0), "Vq [V]": ("u_q_ref", 1.0),
+        "Channel D (Vdc)": ("u_dc", 1.0),
+    },
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("bench", BENCHES)
+def test_usual_names_of_dq_logs(tmp_path, nominal, bench):
+    table = dq_made()
+    table["i_d_ref"], table["u_dc"] = table["i_d"], np.full(len(table["t"]), 563.0)
+    raw = {header: table[name] * factor for header, (name, factor) in BENCHES[bench].items()}
+    recording = load_recording(write(tmp_path / "log.csv", raw, sep=";"), nominal)
+    for name, _ in BENCHES[bench].values():
+        np.testing.assert_allclose(recording[name], table[name], rtol=1e-9, atol=1e-9)
+    (note,) = (note for note in recording.meta["notes"] if "usual names" in note)
+    assert all(f"from {header!r}" in note for header in raw)
+
+
+def test_usual_names_of_phases_and_torque(tmp_path, nominal):
+    table = made(500) | {"torque": np.linspace(0.0, 3.0, 500)}
+    phases = zip("abc", "UVW", strict=True)
+    headers = {f"{x}_{old}": f"{new}_{mark}" for old, mark in phases for x, new in (("i", "I"), ("d", "duty"))}
+    headers |= {"theta_e": "theta_el [rad]", "u_dc": "Ubat [V]", "torque": "M_Welle [Nm]"}
+    raw = {headers.get(name, name): values for name, values in table.items()}
+    recording = load_recording(write(tmp_path / "r.csv", raw), nominal)
+    for name, values in table.items():
+        np.testing.assert_allclose(recording[name], values, rtol=1e-9, atol=1e-9)
+
+
+def test_names_that_may_mean_something_else_need_their_unit():
+    unsure = ("n", "M", "speed", "speed [rad/s]", "M [%]", "T_stator", "theta [deg]", "uv [V]", "I [A]")
+    assert [column for column in unsure if usual(column, "")] == []
+    assert usual("speed", "rpm")[:2] == ("omega_e", "rpm")  # by a line of units
+    assert usual("U_V", "")[0] == "u_b" and usual("u_uv [V]", "")[0] == "u_ab"  # phase V; line U-V
+    assert usual("I_A", "")[:2] == ("i_a", "")  # not a current in amperes
+
+
+def test_no_name_is_usual_for_two_columns():
+    names = [name for of in NAMES.values() for name in of] + [name for of, _ in TOLD_BY_UNIT.values() for name in of]
+    assert len(names) == len(set(names)) and set(NAMES) <= set(COLUMNS)
+
+
+def test_the_first_of_two_usual_names_counts(tmp_path, nominal):
+    table = {name: values for name, values in dq_made(400).items() if name != "u_dc"}
+    table["Ubat [V]"], table["Udc [V]"] = np.full(400, 48.0), np.full(400, 563.0)
+    recording = load_recording(write(tmp_path / "log.csv", table), nominal)
+    assert recording.meta["columns"]["u_dc"] == "Udc [V]"
+    table = {("Left/Udc" if name == "Ubat [V]" else name): values for name, values in table.items()}
+    with pytest.raises(RecordingError, match=r"'Left/Udc' and 'Udc \[V\]' could both be u_dc"):
+        load_recording(write(tmp_path / "log.csv", table), nominal)
 
 
 def of_index(table, share, bus="u_dc"):
@@ -202,7 +267,7 @@ def test_known_logs_are_mapped(tmp_path, nominal, name):
 
 
 def test_every_map_is_tested():
-    untried = {"Paderborn inverter data set", "common names"}
+    untried = {"Paderborn inverter data set"}
     assert {m.NAME for m in maps()} - untried == set(LOGS)
     for known in maps():
         for canonical, unit in known.COLUMNS.values():

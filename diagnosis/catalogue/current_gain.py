@@ -7,10 +7,10 @@ from fluxproof.diagnosis.result import Estimate
 
 # Gains of two sensors that differ by g cause a harmonic of 0.58 g and a rotation of 0.29 g; twice that is allowed.
 MOST_TURN = 1 / 3
-# Coefficients of gains of +1/2 and -1/2 of two sensors whose third current is computed, i_c = -i_a - i_b, and the part
-# of the coefficients by which they may differ from that.
+# Coefficients of gains of +1/2 and -1/2 of two sensors whose third current is computed, i_c = -i_a - i_b; the part of
+# the coefficients by which they may differ from that, and of its rotation, which three sensors do not have.
 PAIR = {"alpha": 1.5, "beta": -0.75**0.5, "turn": 12**-0.5}
-UNLIKE_PAIR = 0.2
+UNLIKE_PAIR, TURNED = 0.2, 0.5
 PATTERNS = {"alpha": (2 / 3, -1 / 3, -1 / 3), "beta": (0.0, 3**-0.5, -(3**-0.5))}
 
 
@@ -58,7 +58,8 @@ class CurrentGain(Effect):
         """{phase: weights of the coefficients in the gain of its sensor}; two phases if the third was computed."""
         seen, pair = (np.array([weights.get(n, 0.0) for n in PAIR]) for weights in (c, PAIR))
         differ = pair @ seen / (pair @ pair)
-        if c.get("turn") and np.linalg.norm(seen - differ * pair) < UNLIKE_PAIR * np.linalg.norm(seen):
+        turned = bool(differ) and c.get("turn", 0.0) / differ >= TURNED * PAIR["turn"]
+        if turned and np.linalg.norm(seen - differ * pair) < UNLIKE_PAIR * np.linalg.norm(seen):
             half = {n: 0.5 * weight / (pair @ pair) for n, weight in PAIR.items()}
             return {"a": {"common": 1.0} | half, "b": {"common": 1.0} | {n: -w for n, w in half.items()}}
         return {x: {"common": 1.0} | {n: w[k] for n, w in PATTERNS.items()} for k, x in enumerate("abc")}

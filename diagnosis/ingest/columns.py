@@ -13,15 +13,14 @@ A column that the file lacks may be a constant of drive.toml (constants.py).
 
 A column without a header is called by its number, "1", "2", ...  The files of several loggers may be named in one
 [columns]: of the columns with one canonical name, a file has one.  Columns that [columns] does not name are found by
-the exact canonical names, then by the maps in column_maps/.  Units are those of units.py; a shaft angle is "rad mech",
-a shaft speed "rpm" or "rad/s mech".
+the exact canonical names, then by the maps of known logs in column_maps/ or, in other files, by usual_names.py.
+Units are those of units.py; a shaft angle is "rad mech", a shaft speed "rpm" or "rad/s mech".
 """
 
 from __future__ import annotations
 
 import dataclasses
 import difflib
-import math
 import re
 from dataclasses import dataclass, field
 
@@ -29,12 +28,13 @@ import numpy as np
 
 from fluxproof.diagnosis.column_maps import maps, plain
 from fluxproof.diagnosis.ingest.demand import LINE_VOLTAGES, PHASE_VOLTAGES, is_emf_run, missing_columns
+from fluxproof.diagnosis.ingest.entries import entry_of, nearest
 from fluxproof.diagnosis.ingest.stated import constants_of
 from fluxproof.diagnosis.ingest.units import COMMANDED, OF_BUS, conversion, known_units, split_unit
+from fluxproof.diagnosis.ingest.usual_names import usual
 from fluxproof.diagnosis.readers.table import Table, shown
 from fluxproof.diagnosis.recording import COLUMNS, RecordingError
 
-KEYS = {"name", "unit", "factor", "offset"}
 WORTH_NAMING = ("torque", "temp_winding", "omega_e", "u_dc")  # which a diagnosis does without if they are not found
 
 
@@ -84,7 +84,8 @@ def plan_columns(names: dict[str, str], nominal, path) -> Plan:
     plan, taken = _explicit(names, nominal, path)
     left = {name: unit for name, unit in names.items() if name not in taken}
     _exact(plan, left, nominal, path)
-    _ready_made(plan, left, nominal, path)
+    if not _ready_made(plan, left, nominal, path):
+        _usual_names(plan, left, nominal, path)
     constants = constants_of(nominal)
     for name in [name for name in constants if name in plan.sources]:
         plan.notes.append(f"[constants] {name} is not used: the recording has this column")
@@ -125,7 +126,7 @@ def canonical(table: Table, plan: Plan) -> dict[str, np.ndarray]:
 def _explicit(names, nominal, path) -> tuple[Plan, set[str]]:
     """The plan of [columns], and the file columns that it uses or ignores."""
     plan, taken = Plan(), set()
-    entries = {key: _entry(key, value, nominal) for key, value in nominal.columns.items()}
+    entries = {key: entry_of(key, value, nominal) for key, value in nominal.columns.items()}
     bare = {}
     for name in names:
         bare.setdefault(split_unit(name)[0], name)
@@ -140,7 +141,7 @@ def _explicit(names, nominal, path) -> tuple[Plan, set[str]]:
         if found[key] is None and entry["name"] in served - {""}:
             continue  # a column of another logger's files
         if found[key] is None:
-            raise RecordingError(f"{where} is not a column of {path}{_nearest(key, names)}")
+            raise RecordingError(f"{where} is not a column of {path}{nearest(key, names)}")
         taken.add(found[key])
         if not entry["name"]:
             continue
@@ -156,36 +157,6 @@ def _explicit(names, nominal, path) -> tuple[Plan, set[str]]:
         plan.sources[entry["name"]] = source
         plan.used = "[columns]"
     return plan, taken
-
-
-def _entry(key, value, nominal) -> dict:
-    """One line of [columns] as a validated table."""
-    where = f"{nominal.path}: [columns] {shown(key)!r}"
-    entry = {"name": value} if isinstance(value, str) else value
-    if not isinstance(entry, dict) or not isinstance(entry.get("name"), str):
-        raise RecordingError(
-            f"{where}: must be a canonical name or a table such as {{name = 'i_a', unit = 'mA'}}"
-        )
-    if entry["name"] and entry["name"] not in COLUMNS:
-        raise RecordingError(
-            f"{where}: {shown(entry['name'])!r} is not a canonical name{_nearest(entry['name'], COLUMNS)}"
-        )
-    for name in entry:
-        if name not in KEYS:
-            raise RecordingError(
-                f"{where}: unknown key {shown(name)!r}; known are name, unit, factor, offset"
-            )
-    for name in ("factor", "offset"):
-        number = entry.get(name, 1.0)
-        if isinstance(number, bool) or not isinstance(number, (int, float)) or not math.isfinite(number):
-            raise RecordingError(f"{where}: {name} must be a finite number")
-    if entry.get("factor") == 0:
-        raise RecordingError(f"{where}: factor must not be 0")
-    if not isinstance(entry.get("unit", ""), str) or (
-        "unit" in entry and ("factor" in entry or "offset" in entry)
-    ):
-        raise RecordingError(f"{where}: give either unit, as a string, or factor and offset")
-    return entry
 
 
 def _source(column, name, unit, nominal, where) -> Source:
@@ -216,8 +187,8 @@ def _exact(plan, left, nominal, path) -> None:
             plan.sources[name] = _source(column, name, unit, nominal, f"{path}: column {shown(column)!r}")
 
 
-def _ready_made(plan, left, nominal, path) -> None:
-    """Fill missing columns from the ready-made map that knows most of the file's columns."""
+def _ready_made(plan, left, nominal, path) -> bool:
+    """Fill missing columns from the map of a known log that knows most of the file's columns; whether there is one."""
     best, hits = None, {}
     for known in maps():
         key = getattr(known, "KEY", plain)
@@ -233,25 +204,44 @@ def _ready_made(plan, left, nominal, path) -> None:
             if (len(known.SIGNATURE), len(fits)) > (len(best.SIGNATURE), len(hits)) if best else fits:
                 best, hits = known, fits
     if best is None or not hits:
-        return
+        return False
     for key, columns in hits.items():
         name, unit = best.COLUMNS[key]
         if len(columns) > 1:
-            raise RecordingError(
-                f"{path}: {shown(columns[0])!r} and {shown(columns[1])!r} could both be {name}; say which in [columns]"
-            )
+            raise _doubtful(path, columns, name)
         if name not in plan.sources:
-            written = _unit_of(columns[0], left)
             where = f"{path}: column {shown(columns[0])!r}"
-            source = _source(columns[0], name, written or unit, nominal, where)
-            plan.sources[name] = dataclasses.replace(source, by_name=not (written or best.SIGNATURE))
-    if not best.SIGNATURE:
-        return
+            plan.sources[name] = _source(columns[0], name, _unit_of(columns[0], left) or unit, nominal, where)
     plan.used = f"{plan.used}, {best.NAME}" if plan.used == "[columns]" else best.NAME
     plan.notes += [f"column names as in {best.NAME}", *getattr(best, "NOTES", [])]
     plan.assumed |= {k: v for k, v in getattr(best, "ASSUMED", {}).items() if k not in plan.sources}
     plan.sample_time_s = getattr(best, "SAMPLE_TIME_S", None)
     plan.run = next((c for c in left if c == getattr(best, "RUN", None)), None)
+    return True
+
+
+def _usual_names(plan, left, nominal, path) -> None:
+    """Fill missing columns by the usual names of signals, and note which were found so."""
+    found: dict[str, list[tuple[int, str, str]]] = {}
+    for column in left:
+        named = usual(column, left[column].strip())
+        if named and named[0] not in plan.sources:
+            found.setdefault(named[0], []).append((named[2], column, named[1]))
+    for name, candidates in found.items():
+        (rank, column, unit), *others = sorted(candidates)
+        if others and others[0][0] == rank:
+            raise _doubtful(path, [column, others[0][1]], name)
+        source = _source(column, name, unit or COLUMNS[name], nominal, f"{path}: column {shown(column)!r}")
+        plan.sources[name] = dataclasses.replace(source, by_name=not unit)
+    if found:
+        read = ", ".join(f"{name} from {shown(plan.sources[name].column)!r}" for name in found)
+        plan.notes.append(f"columns read by their usual names: {read}; [columns] can say otherwise")
+
+
+def _doubtful(path, columns, name) -> RecordingError:
+    return RecordingError(
+        f"{path}: {shown(columns[0])!r} and {shown(columns[1])!r} could both be {name}; say which in [columns]"
+    )
 
 
 def _demand(plan, names, path) -> None:
@@ -285,8 +275,3 @@ def _guesses(missing, names) -> str:
     close = {w: difflib.get_close_matches(w.replace("_", ""), list(simple), n=1, cutoff=0.6) for w in wanted}
     pairs = [f"{shown(simple[match[0]], 24)!r} for {w}" for w, match in close.items() if match][:3]
     return f"; perhaps {', '.join(pairs)}" if pairs else ""
-
-
-def _nearest(name, known) -> str:
-    close = difflib.get_close_matches(name, list(known), n=1, cutoff=0.0)
-    return f"; the nearest is {shown(close[0])!r}" if close else ""

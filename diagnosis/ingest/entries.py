@@ -1,0 +1,47 @@
+"""One entry of [columns] of a drive.toml, checked."""
+
+from __future__ import annotations
+
+import difflib
+import math
+
+from fluxproof.diagnosis.readers.table import shown
+from fluxproof.diagnosis.recording import COLUMNS, RecordingError
+
+KEYS = {"name", "unit", "factor", "offset"}
+
+
+def entry_of(key, value, nominal) -> dict:
+    """One line of [columns] as a validated table."""
+    where = f"{nominal.path}: [columns] {shown(key)!r}"
+    entry = {"name": value} if isinstance(value, str) else value
+    if not isinstance(entry, dict) or not isinstance(entry.get("name"), str):
+        raise RecordingError(
+            f"{where}: must be a canonical name or a table such as {{name = 'i_a', unit = 'mA'}}"
+        )
+    if entry["name"] and entry["name"] not in COLUMNS:
+        raise RecordingError(
+            f"{where}: {shown(entry['name'])!r} is not a canonical name{nearest(entry['name'], COLUMNS)}"
+        )
+    for name in entry:
+        if name not in KEYS:
+            raise RecordingError(
+                f"{where}: unknown key {shown(name)!r}; known are name, unit, factor, offset"
+            )
+    for name in ("factor", "offset"):
+        number = entry.get(name, 1.0)
+        if isinstance(number, bool) or not isinstance(number, (int, float)) or not math.isfinite(number):
+            raise RecordingError(f"{where}: {name} must be a finite number")
+    if entry.get("factor") == 0:
+        raise RecordingError(f"{where}: factor must not be 0")
+    if not isinstance(entry.get("unit", ""), str) or (
+        "unit" in entry and ("factor" in entry or "offset" in entry)
+    ):
+        raise RecordingError(f"{where}: give either unit, as a string, or factor and offset")
+    return entry
+
+
+def nearest(name, known) -> str:
+    """The known name that is most like ``name``, as the end of a message."""
+    close = difflib.get_close_matches(name, list(known), n=1, cutoff=0.0)
+    return f"; the nearest is {shown(close[0])!r}" if close else ""

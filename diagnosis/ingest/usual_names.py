@@ -1,0 +1,109 @@
+"""Usual names of the canonical columns, as test benches and controllers write them.
+
+A name counts in lower case, with "_" for spaces and dashes, by the last part of a path in a model ("Model
+Root/Current control/i_a").  Its unit may stand at its end ("id_mA", "n_rpm").  Where the name is that of a channel and
+brackets hold the signal ("Channel A (U_U)"), the signal counts.  Names that may be of something else ("n", "M") count
+only with a unit that tells what they are.  A speed in rad/s may be of the shaft or electrical: it is never guessed.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+
+from fluxproof.diagnosis.ingest.units import FACTORS, OF_BUS, OF_SHAFT, conversion, split_unit
+from fluxproof.diagnosis.recording import COLUMNS
+
+PHASES = {"a": ("a", "u", "l1"), "b": ("b", "v", "l2"), "c": ("c", "w", "l3")}
+LINES = {"ab": ("ab", "uv"), "bc": ("bc", "vw"), "ca": ("ca", "wu")}
+MEASURED = ("", "_meas", "_measured", "_act", "_actual", "_ist")
+REFERENCE = ("_ref", "ref", "_reference", "_set", "_setpoint", "_soll", "_cmd", "_command")
+
+
+def _written(letters: Iterable[str], parts: Iterable[str], endings: Iterable[str] = ("",)) -> tuple[str, ...]:
+    """Names of a letter, a part and an ending, such as "i_u", "iu" and "id_ref"."""
+    return tuple(f"{x}{gap}{p}{end}" for p in parts for x in letters for gap in ("_", "") for end in endings)
+
+
+# The usual names of every column; of two columns with names of one signal, the one that stands first counts.
+NAMES: dict[str, tuple[str, ...]] = {
+    "t": ("t", "time", "timestamp", "time_stamp", "zeit"),
+    "theta_e": ("theta_e", "theta_el", "theta_elec", "phi_el"),
+    "omega_e": ("omega_e", "omega_el", "omega_elec"),
+    "u_dc": ("u_dc", "udc", "v_dc", "vdc", *_written("uv", ("bus", "bat", "zk", "dclink")), "dc_bus", "bus_voltage"),
+    "torque": ("torque",),
+    "temp_winding": ("temp_winding",),
+}
+for _phase, _marks in PHASES.items():
+    NAMES[f"i_{_phase}"] = (*_written("i", _marks), *(f"current_{m}" for m in _marks))
+    NAMES[f"d_{_phase}"] = (f"d_{_phase}", *(f"duty_{m}" for m in _marks), *(f"d_{m}" for m in _marks[1:]))
+    NAMES[f"u_{_phase}"] = tuple(f"{x}_{m}" for m in _marks for x in "uv")
+for _line, _marks in LINES.items():
+    NAMES[f"u_{_line}"] = _written("uv", _marks)
+for _axis in "dq":
+    NAMES[f"i_{_axis}"] = _written("i", _axis, MEASURED)
+    NAMES[f"i_{_axis}_ref"] = _written("i", _axis, REFERENCE)
+    NAMES[f"u_{_axis}_ref"] = _written("uv", _axis, (*REFERENCE, ""))
+
+# Names that count only with one of these units.
+TOLD_BY_UNIT = {
+    "omega_e": (
+        ("n", "n_mech", "n_motor", "n_act", "n_ist", "speed", "motor_speed", "speed_mech", "rotor_speed", "drehzahl"),
+        {u for u in FACTORS["rad/s"] if u in OF_SHAFT or u in ("erpm", "rad/s el")},
+    ),
+    "torque": (
+        ("m", "md", "m_shaft", "shaft_torque", "torque_shaft", "torque_meas", "m_welle", "drehmoment"),
+        set(FACTORS["Nm"]),
+    ),
+    "temp_winding": (
+        ("t_winding", "winding_temp", "winding_temperature", "temperature_winding", "t_wdg", "t_wicklung",
+         "temp_wicklung", "t_stator", "temp_stator"),
+        set(FACTORS["degC"]),
+    ),
+}  # fmt: skip
+
+KNOWN = {name: (canonical, rank) for canonical, names in NAMES.items() for rank, name in enumerate(names)}
+TOLD = {
+    name: (canonical, len(NAMES[canonical]) + rank)
+    for canonical, (names, _) in TOLD_BY_UNIT.items()
+    for rank, name in enumerate(names)
+}
+
+
+def usual(column: str, unit: str) -> tuple[str, str, int] | None:
+    """(canonical column, unit as written or "", rank among its names) of a file's column, or None.
+
+    unit: of a line of units or a field of the format, "" if there is none.
+    """
+    name, brackets = split_unit(column)
+    found = _of(name, unit or brackets)
+    if found is None and brackets and not _is_unit(brackets):
+        found = _of(brackets, unit)
+    return found
+
+
+def _of(name: str, unit: str) -> tuple[str, str, int] | None:
+    label = re.sub(r"[\s-]+", "_", re.split(r"[./]", name.strip(' ."'))[-1])
+    key = label.lower()
+    if key in KNOWN:
+        canonical, rank = KNOWN[key]
+        return canonical, unit, rank
+    stem, _, ending = label.rpartition("_")
+    if not unit and stem and key not in TOLD:
+        key, unit = stem.lower(), ending
+        if key in KNOWN and conversion(KNOWN[key][0], unit, 1) is not None:
+            return KNOWN[key][0], unit, KNOWN[key][1]
+    if key not in TOLD:
+        return None
+    canonical, rank = TOLD[key]
+    return (canonical, unit, rank) if _alike(unit, TOLD_BY_UNIT[canonical][1]) else None
+
+
+def _alike(unit: str, units: set[str]) -> bool:
+    """Whether a unit is one of ``units``, whose words may be in any case."""
+    return unit.lower() in {u.lower() for u in units}
+
+
+def _is_unit(text: str) -> bool:
+    """Whether a text in brackets is a unit of any column."""
+    return text in OF_BUS or any(conversion(name, text, 1) is not None for name in COLUMNS)
