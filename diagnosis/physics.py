@@ -17,7 +17,7 @@ from fluxproof.diagnosis.conventions.judge import preferred
 from fluxproof.diagnosis.conventions.tell import under
 from fluxproof.diagnosis.inference.linearise import Rows
 from fluxproof.diagnosis.inference.posterior import Posterior
-from fluxproof.diagnosis.inference.problem import Setup
+from fluxproof.diagnosis.inference.setup import Setup
 from fluxproof.diagnosis.ingest.restated import as_read
 from fluxproof.diagnosis.nominal import Nominal
 from fluxproof.diagnosis.one_point import diagnose_one_point

@@ -12,7 +12,7 @@ import re
 UNITS = {"ohm": "Ω", "degC": "°C", "1": "%", "1/K": "%/K", "Nm": "N m", "Nms": "N m s", "kgm2": "kg m²"}
 PERCENT = ("1", "1/K")  # a pure number reads best in percent
 PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
-PREFIXED = re.compile(r"(V|A|s|H|Wb|Ω|N m)(?![a-zA-Z0-9²])")  # units, also of a product or quotient, that take a prefix
+PREFIXED = re.compile(r"(V|A|s|H|F|Wb|Ω|N m)(?![a-zA-Z0-9²])")  # units, also of a product, that take a prefix
 LARGE = 1e4  # from here on kilo: 12 kΩ, but 1234 Ω
 ASCII = {"±": "+-", "Ω": "Ohm", "µ": "u", "−": "-", "°C": " degC", "²": "2", "°": " deg", "–": "-"}
 RPM = 9.549296585513721  # rad/s to 1/min, 60/(2 pi)
@@ -44,14 +44,15 @@ def measured(value: float, sigma: float | None, unit: str, digits: int = 2) -> s
     digits = 1: one digit of sigma, two if it begins with 1.  A sigma of zero belongs to a number without an error,
     such as a harmonic order.
     """
-    factor, name = scaled(value, unit)
+    largest = max(abs(value), sigma) if sigma is not None and math.isfinite(sigma) else value
+    factor, name = scaled(largest, unit)
     if sigma == 0.0:
         text = quantity(value, unit)
     elif sigma is None or not math.isfinite(sigma) or sigma < 0.0:
         text = f"{quantity(value, unit)} (uncertainty unknown)"
     else:
         places = decimals(sigma / factor, digits)
-        pair = " ± ".join(_fixed(x / factor, places) for x in (value, sigma))
+        pair = " ± ".join(fixed(x / factor, places) for x in (value, sigma))
         text = _joined(pair.replace("-", "−"), name)
     return f"{text} = {number(math.degrees(value), 3)}°" if unit == "rad" else text
 
@@ -83,9 +84,9 @@ def ascii_of(text: str) -> str:
     return text
 
 
-def _fixed(x: float, places: int) -> str:
+def fixed(x: float, places: int) -> str:
     """x rounded to decimal places, of which negative ones are tens and hundreds."""
-    return f"{round(x, places):.{max(places, 0)}f}"
+    return f"{round(x, places) + 0.0:.{max(places, 0)}f}"  # no minus in front of zero
 
 
 def _joined(value: str, unit: str) -> str:

@@ -18,7 +18,8 @@ from fluxproof.diagnosis.balance.blocks import view_of
 from fluxproof.diagnosis.balance.cells import cells_of
 from fluxproof.diagnosis.catalogue.dead_time import EFFECT, full_loss
 from fluxproof.diagnosis.inference.linearise import Linearisation
-from fluxproof.diagnosis.inference.problem import Problem, Setup
+from fluxproof.diagnosis.inference.problem import Problem
+from fluxproof.diagnosis.inference.setup import Setup
 from fluxproof.diagnosis.nominal import load_nominal
 from fluxproof.diagnosis.recording import from_columns
 from studies.blind import cases

@@ -9,7 +9,8 @@ from fluxproof.diagnosis.answer.scan import stray_swing
 from fluxproof.diagnosis.balance.blocks import view_of
 from fluxproof.diagnosis.inference.evidence import evidence
 from fluxproof.diagnosis.inference.points import repeated_dwells
-from fluxproof.diagnosis.inference.problem import Problem, Setup
+from fluxproof.diagnosis.inference.problem import Problem
+from fluxproof.diagnosis.inference.setup import Setup
 from fluxproof.diagnosis.nominal import load_nominal
 from fluxproof.diagnosis.physics import known_effects
 

@@ -64,6 +64,21 @@ def test_rounded_values_and_transients_of_a_slow_log(tmp_path):
     assert found(answer) == {"magnet_flux_wb": pytest.approx(0.95 * PSI, rel=0.005)}
 
 
+def test_a_sine_filter_is_described_with_its_capacitance(tmp_path):
+    """Currents measured in front of a filter looked like a gain of all sensors beside drifts of magnet and winding."""
+    columns = dict(table())
+    i, omega = columns["i_d"] + 1j * columns["i_q"], columns["omega_e"]
+    capacitance, choke, copper = 2e-6, 0.12 * L_D, 0.1 * R
+    u = R * i + 1j * omega * (L_D * i.real + 1j * L_Q * i.imag + PSI)
+    i = i + 1j * omega * capacitance * u
+    u = u + (copper + 1j * omega * choke) * i
+    columns |= {"i_d": i.real, "i_q": i.imag, "u_d_ref": u.real, "u_q_ref": u.imag}
+    answer = answer_of(tmp_path, columns)
+    assert answer.verdict == "unexplained" and not answer.effects
+    assert "sine filter" in answer.sentence and answer.unknown_term.explains > 0.95
+    assert answer.unknown_term.value == pytest.approx(capacitance, rel=0.05)
+
+
 def test_a_table_at_several_temperatures_shows_winding_and_magnets(tmp_path):
     parts = []
     for temp in (20.0, 60.0, 100.0):

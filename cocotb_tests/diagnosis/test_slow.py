@@ -14,7 +14,8 @@ from fluxproof.diagnosis.balance.slow_view import alike, slow_view
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.inference import constants
 from fluxproof.diagnosis.inference.posterior import possible
-from fluxproof.diagnosis.inference.problem import Problem, Setup
+from fluxproof.diagnosis.inference.problem import Problem
+from fluxproof.diagnosis.inference.setup import Setup
 from fluxproof.diagnosis.physics import explain
 from fluxproof.diagnosis.recording import RecordingError
 from studies.real.splits import axis_misfit, bounds, estimates_of, flux_map_of

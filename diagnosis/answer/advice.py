@@ -12,7 +12,7 @@ import numpy as np
 from fluxproof.diagnosis.answer.doubts import doubts
 from fluxproof.diagnosis.answer.headline import details
 from fluxproof.diagnosis.answer.phrases import CORRECTED, SIGNALS, capital, corrected, joined
-from fluxproof.diagnosis.quantities import RPM, ascii_of, number
+from fluxproof.diagnosis.quantities import RPM, decimals, fixed
 
 MOST_TITLES = 4
 WHOLE, SIGMAS = 0.01, 3.0  # of a control period, and standard deviations: nearer times are a whole number of periods
@@ -181,8 +181,9 @@ def covered(answer, nominal) -> str:
     for name, factor, unit in (("omega_e", shaft, "rpm"), ("i_d", 1.0, "A"), ("i_q", 1.0, "A")):
         values = np.asarray(arrays.get(name, ()), float) * factor
         if values.size:
-            show = whole if unit == "rpm" else lambda x: ascii_of(number(x, 2))
-            low, high = show(float(values.min())), show(float(values.max()))
+            ends = float(values.min()), float(values.max())
+            places = 0 if unit == "rpm" else decimals(max(*np.abs(ends), 1e-9), 2)
+            low, high = (fixed(x, places) for x in ends)
             span = f"{low} to {high} {unit}" if low != high else f"{low} {unit}"
             spans.append(span if unit == "rpm" else f"{name} of {span}")
     return f"the recording covers {joined(spans)}" if spans else "the recording covers few operating points"

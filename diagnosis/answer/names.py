@@ -3,7 +3,10 @@
 The posterior compares sets of effects.  Where much of the misfit is left, something unknown is at work, and a part of
 it may look like an effect: a leftover of the rms D, lying along the columns of an effect whose contribution has the rms
 A, would imitate it.  The confidence in a name is therefore the posterior of its presence times 1 - exp(-(A / D)^2 / 8):
-an effect twice as large as what is left may still be an imitation, and one five times as large is not.
+an effect twice as large as what is left may still be an imitation, and one five times as large is not.  Beside effects
+that are no imitation, and that explain E in the same orders, a leftover is rather an error of theirs, which lies along
+their columns: if these hold the share r of what the effect explains, the share r + (1 - r) D^2 / (D^2 + E^2) of the
+leftover's power counts.
 """
 
 from __future__ import annotations
@@ -56,10 +59,10 @@ def names_of(posterior) -> Names:
         if held >= 1.0 - k.LEFT_OUT:
             break
     best = posterior.best()
-    credit = {}
+    credit: dict[str, float] = {}
     for _, fit in kept:
-        for name in fit.names:
-            credit[name] = max(credit.get(name, 0.0), credibility(fit, name))
+        for name, p in credibilities(fit).items():
+            credit[name] = max(credit.get(name, 0.0), p)
     present = {n: p * credit[n] for n, p in posterior.present().items() if n in credit}
     effects = posterior.setup.effects
     sure = {n: p for n, p in present.items() if p >= 1.0 - k.DOUBTED and n in best.names}
@@ -108,21 +111,55 @@ def _seen_discrepancy(fit) -> np.ndarray:
     return lam
 
 
-def credibility(fit, name) -> float:
-    """Probability in (0, 1] that an effect of a fit is no imitation by what is left of the misfit."""
-    p = fit.problem.p
-    count = np.maximum(np.bincount(p.group, minlength=len(p.groups)), 1)
-    level2 = np.bincount(p.group, p.level**2, minlength=len(p.groups)) / count
+def credibilities(fit) -> dict[str, float]:
+    """{effect of a fit: probability in (0, 1] that it is no imitation by what is left of the misfit}."""
+    powers, real = _powers(fit), 1.0 - k.IMITATED
+    found = {name: _credibility(fit, name, powers) for name in fit.names}
+    sure = {name for name, p in found.items() if p >= real}
+    for name in sure ^ set(found):
+        found[name] = _credibility(fit, name, powers, sure)
+    return found
+
+
+def _powers(fit) -> dict[str, np.ndarray]:
+    """{effect: (groups,) power of what it explains}, of both components of an order together."""
+    p, owners = fit.problem.p, np.array([fit.problem.keys[n][0] for n in fit.take])
+    return {n: _power(p, p.x[:, fit.take[owners == n]] @ fit.vector[owners == n]) for n in fit.names}
+
+
+def _power(p, rows) -> np.ndarray:
+    """(groups,) mean squares of rows, of both components of an order together."""
     functionals = np.array([2.0 if order == 0 else 4.0 for _, order, _ in p.groups])
+    count = np.maximum(np.bincount(p.group, minlength=len(p.groups)), 1)
+    return np.bincount(p.group, rows**2, minlength=len(p.groups)) / count * functionals
+
+
+def _beside(left, others) -> np.ndarray:
+    """(groups,) what counts of the power ``left`` where the powers ``others`` are explained."""
+    return left * left / np.maximum(left + sum(others), 1e-300)
+
+
+def _along(fit, name, others) -> float:
+    """Share of what an effect explains, as power over that of the errors, that lies along the columns of ``others``."""
+    owners = np.array([fit.problem.keys[n][0] for n in fit.take])
+    weighted = fit.problem.p.x[:, fit.take] / np.sqrt(fit.variance)[:, None]
+    mine, theirs = weighted[:, owners == name] @ fit.vector[owners == name], weighted[:, np.isin(owners, list(others))]
+    left = mine - theirs @ np.linalg.lstsq(theirs, mine, rcond=None)[0]
+    return 1.0 - float(left @ left) / max(float(mine @ mine), 1e-300)
+
+
+def _credibility(fit, name, powers, sure=frozenset()) -> float:
+    """Probability that an effect is no imitation; sure: effects that are none, and may leave an error of their own."""
+    p, power = fit.problem.p, powers[name]
+    level2 = np.bincount(p.group, p.level**2, minlength=len(p.groups))
+    level2 /= np.maximum(np.bincount(p.group, minlength=len(p.groups)), 1)
     # A discrepancy within the error of the balance is what every recording has; errors of curves are seen as they are.
-    wrong2 = fit.mu**2 * np.bincount(p.group, p.doubt**2, minlength=len(p.groups)) / count
     lam = _seen_discrepancy(fit)
-    left = (np.where(lam > k.USUAL, lam**2 - 1.0, 0.0) * level2 + wrong2) * functionals
-    owned = np.array([fit.problem.keys[n][0] == name for n in fit.take], bool)
-    rows = [(p.x[:, fit.take[take]] @ fit.vector[take]) ** 2 for take in (owned, ~owned)]
-    power, others = (np.bincount(p.group, x, minlength=len(p.groups)) / count * functionals for x in rows)
-    # What is left where other effects explain much is rather an error of theirs.
-    beside = left * left / np.maximum(left + others, 1e-300)
+    left = np.where(lam > k.USUAL, lam**2 - 1.0, 0.0) * _power(p, p.level) + fit.mu**2 * _power(p, p.doubt)
+    beside = _beside(left, [powers[n] for n in fit.names if n != name])
+    if sure:
+        along = _along(fit, name, sure)
+        left = along * left + (1.0 - along) * _beside(left, [powers[n] for n in sure])
     best = (0.0, 1.0)
 
     def changed(means):

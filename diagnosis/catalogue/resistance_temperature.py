@@ -6,6 +6,7 @@ from fluxproof.diagnosis.balance.curves import COURSE_KNOTS, course, courses, kn
 from fluxproof.diagnosis.catalogue.resistance import to_true_resistance
 from fluxproof.diagnosis.effects.effect import DOUBT, Effect, Parameter, one, sigma, voltage
 
+COPPER = 0.0039  # 1/K
 BEHIND = 0.05  # of the recording: by how much a sensor usually is behind the winding
 
 
@@ -23,6 +24,13 @@ def _change(c, by_alpha):
 
 
 class ResistanceTemperature(Effect):
+    def expected(self, view):
+        """A winding that warms has another resistance; where the drive has no coefficient, it is left out."""
+        if not known_temperature(view) or view.machine.resistance_temp_coeff_per_k:
+            return False
+        change = COPPER * float(np.ptp(view.temp)) * view.machine.resistance_ohm
+        return change >= self.floor(view.nominal)
+
     def core(self, view):
         if known_temperature(view):
             rise = view.machine.resistance_ohm * (view.temp - reference_c(view.nominal))

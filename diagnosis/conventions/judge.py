@@ -25,7 +25,8 @@ from fluxproof.diagnosis.inference.evidence import evidence
 from fluxproof.diagnosis.inference.linearise import Rows
 from fluxproof.diagnosis.inference.points import condense
 from fluxproof.diagnosis.inference.posterior import Posterior
-from fluxproof.diagnosis.inference.problem import Problem, Setup, implausible
+from fluxproof.diagnosis.inference.problem import Problem, implausible
+from fluxproof.diagnosis.inference.setup import Setup
 
 WIDE = 6  # readings to which a second one is added
 SEARCHED = 2  # readings, or pairs of them, that are judged with the whole search

@@ -101,6 +101,10 @@ class Effect:
         """Further columns, for a curve as free as the effect's variables and symmetry allow."""
         return {}
 
+    def expected(self, view) -> bool:
+        """Whether the recording itself says that the effect acts, as a recorded temperature says of a resistance."""
+        return False
+
     def log_choice(self, view) -> float:
         """Log of the prior probability of what was chosen for the columns, such as an order of a torque."""
         return 0.0

@@ -13,12 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from fluxproof.diagnosis.answer.conclude import measured_torque
-from fluxproof.diagnosis.answer.names import credibility
+from fluxproof.diagnosis.answer.names import credibilities
 from fluxproof.diagnosis.answer.sizes import UNITS, Sizes
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.inference import constants as k
 from fluxproof.diagnosis.inference.posterior import possible
-from fluxproof.diagnosis.inference.problem import covariance_of
+from fluxproof.diagnosis.inference.problem import covariance_of, log_too_small
 from fluxproof.diagnosis.inference.settle import around, settled
 from fluxproof.diagnosis.result import Remainder
 
@@ -44,7 +44,7 @@ class Estimated:
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """A set of extras: log evidence without the odds of the extras, {extra: credibility}, parameters of the set.
+    """A set of extras: log evidence without the odds of the extras, {effect: credibility}, parameters of the set.
 
     left: what it leaves of the misfit, per signal and order; left_share: of the power above the noise floor that is
     there beside the spread of manufacture, in the signal of which most is left.
@@ -123,7 +123,7 @@ class _Search:
             judged = self.fits[extras]
             if not np.isfinite(judged.value):
                 continue
-            credible = {n: credibility(judged.fit, n) for n in extras}
+            credible = credibilities(judged.fit)
             left, share = self._left(judged.fit)
             out.append(Hypothesis(extras, judged.value, credible, tuple(estimates(judged.fit)), left, share))
         return out
@@ -151,7 +151,8 @@ class _Judged:
     def __init__(self, fit, base):
         self.fit = fit
         odds = sum(fit.problem.setup.odds(n) for n in fit.names)
-        self.value = float(fit.value - odds) if possible(fit, small=base) else -np.inf
+        spread = log_too_small(fit, [n for n in fit.names if n in base])  # of manufacture, which may be small
+        self.value = float(fit.value - odds - spread) if possible(fit) else -np.inf
 
     def problem_of_all(self, setup):
         """The linearisation at this fit with the columns of every effect."""

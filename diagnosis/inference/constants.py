@@ -9,6 +9,9 @@ PRESENT = 0.05
 # Odds of a parameter outside of what its effect declares as plausible: absurd errors that cancel may fit as well as the
 # true ones.
 IMPLAUSIBLE = 1e-3
+# Power of its size with which an effect that is smaller than what is of practical interest becomes improbable: a steep
+# edge, as nobody asks for smaller ones, but none that forbids what is clearly seen.
+SMALLER = 30.0
 # Error of the balance that no parameter explains, relative to the voltage of an operating point: PWM ripple, the
 # trapezoidal mean of the current, the converters' timing.
 BALANCE_U = 2e-4
@@ -59,6 +62,8 @@ LIKELY = 0.5
 USUAL = 1.5
 # A leftover imitates an effect up to this many times its own rms: smooth physics lies along a few directions only.
 IMITATION = 2.0
+# Probability of being an imitation up to which an effect is taken as real, so that a leftover may be an error of it.
+IMITATED = 1e-3
 # Share of an effect's power in an order from which it lives there; weight of what is left in its other orders.
 LIVES = 0.05
 ELSEWHERE = 0.1

@@ -17,7 +17,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-STEPS = 7
+STEPS, SETTLED = 20, 0.01  # most steps; relative change of all sizes and lambda after which one step more is enough
 SMALL, LARGE = 1e-200, 1e200  # range of a product of variances, each of which lies within 1e-100 and 1e100
 FACTORS = np.array([0.1, 0.35, 0.7, 1.0, 1.4, 3.0, 10.0])  # of the discrepancy: the grid of every step
 SEEN = np.array([0.0, 0.03, 0.1, 0.2, 0.4, 0.7, 1.0])  # shares mu: the grid of every step
@@ -73,6 +73,7 @@ def evidence(
     part = np.zeros(n)
     squares = np.zeros((groups, len(FACTORS)))
     lightest = 1e300
+    last = STEPS - 1
     for i in range(n):
         if group[i] == loads:
             lightest = min(lightest, abs(y[i]) + level[i])
@@ -125,8 +126,9 @@ def evidence(
         value = -0.5 * (power - gain + before + logdet)
         for g in range(groups):
             value -= np.log(1.0 + (lam[g] / scale) ** 2)
-        if step == STEPS - 1:
+        if step == last:
             break
+        moved = 0.0
         # sizes of the effects, and of their curves relative to them
         sums = np.zeros((effects, 2))
         counts = np.zeros((effects, 2))
@@ -136,7 +138,9 @@ def evidence(
             counts[owner[p], kind] += 1.0
         for e in range(effects):
             if counts[e, 0] > 0:
-                a[e] = min(max(np.sqrt(sums[e, 0] / counts[e, 0]), 1.0), most[e])
+                size = min(max(np.sqrt(sums[e, 0] / counts[e, 0]), 1.0), most[e])
+                moved = max(moved, abs(size / a[e] - 1.0))
+                a[e] = size
             if counts[e, 1] > 0:
                 bend[e] = min(max(np.sqrt(sums[e, 1] / counts[e, 1]) / a[e], straight), 1.0)
         # expected squares of the remainder, and the share of each effect's contribution
@@ -188,9 +192,13 @@ def evidence(
                 total = score[g, h] - 0.5 * np.log(products[g, h]) - np.log(1.0 + (tried / scale) ** 2)
                 if total > best:
                     best, chosen = total, tried
+            if g != loads:
+                moved = max(moved, abs(chosen / lam[g] - 1.0) if lam[g] > 0.0 else chosen)
             lam[g] = chosen if g != loads else scale
         if doubtful:
             _share_seen(mu, lam, s2, level2, doubt2, own, e2, group, loads)
+        if moved < SETTLED:
+            last = step + 1
     if loads >= 0:  # a drive is run without load at one of its operating points at least
         free = 0
         rows = 0

@@ -8,8 +8,9 @@ import itertools
 import numpy as np
 
 from fluxproof.diagnosis.balance.cells import voltage_level
-from fluxproof.diagnosis.inference.problem import Problem, Setup, covariance_of
+from fluxproof.diagnosis.inference.problem import Problem, covariance_of
 from fluxproof.diagnosis.inference.settle import around, fit_at, settled
+from fluxproof.diagnosis.inference.setup import Setup
 
 ROUNDS = 3
 SETTLED = 12  # most linearisations of the final set
@@ -230,19 +231,13 @@ class Posterior:
         return out
 
 
-def possible(fit, small=()) -> bool:
-    """Whether no effect of a set has an impossible size or, beyond its uncertainty, an impossible sign.
-
-    small: effects that may be smaller than what is of practical interest.
-    """
+def possible(fit) -> bool:
+    """Whether no effect of a set has an impossible size or, beyond its uncertainty, an impossible sign."""
     problem = fit.problem
     for name in fit.names:
         effect, c = problem.setup.effects[name], fit.c[name]
-        nominal = problem.view.nominal
         if effect.too_large(c, problem.setup.view):
             return False
-        if name not in small and effect.size(c, nominal) < effect.floor(nominal):
-            return False
-        if not effect.possible(c, covariance_of(fit, name, fit.cov), nominal):
+        if not effect.possible(c, covariance_of(fit, name, fit.cov), problem.view.nominal):
             return False
     return True

@@ -7,88 +7,16 @@ back to first order, so that the same problem serves every set.
 
 from __future__ import annotations
 
-import copy
-import dataclasses
 import itertools
 
 import numpy as np
 
-from fluxproof.diagnosis.balance.cells import repeats, voltage_level
-from fluxproof.diagnosis.balance.operating_points import point_numbers
 from fluxproof.diagnosis.effects.effect import believable
 from fluxproof.diagnosis.inference import constants as k
 from fluxproof.diagnosis.inference.evidence import evidence
-from fluxproof.diagnosis.inference.linearise import Linearisation, Rows, at_once
-from fluxproof.diagnosis.inference.points import Grouping, balance_level, condense, visits
-
-
-class Setup:
-    """What all problems of a recording share: its rows, the error of their balance, operating points.
-
-    call: how the steps of the inference are run (see linearise.py).
-    """
-
-    def __init__(self, view, effects, train_blocks, call=at_once):
-        """train_blocks: (b,) bool, blocks of the fit."""
-        self._share(Rows(view, effects, train_blocks), call)
-
-    @classmethod
-    def of(cls, rows: Rows, call=at_once) -> Setup:
-        """The setup of rows that are already known."""
-        out = cls.__new__(cls)
-        out._share(rows, call)
-        return out
-
-    def _share(self, rows, call):
-        self.rows, self.call = rows, call
-        self.view, self.effects, self.projector, self.load = rows.view, rows.effects, rows.projector, rows.load
-        self.train, self.cells, self.noise = rows.train, rows.cells, _bounded_noise(rows)
-        self.smooth_rows = rows.smooth_rows
-        self.level = balance_level(self.view, self.cells)
-        self.common = _common_error(self)
-        self.points = point_numbers(self.view, k.POINT)
-        self.visits = visits(self.view, self.points)
-        self.grouping = Grouping(self.cells, self.points, self.visits, self.cells.ok & self.train, self.view.run)
-        self.repeats = _repeats(self.cells, self.points)
-        self.shifts = {}
-
-    @property
-    def floor(self):
-        """(r,) standard deviation of every row in a recording whose balance is as good as it can be."""
-        return np.hypot(self.noise, self.view.least_error * self.level)
-
-    @property
-    def usual(self):
-        """(r,) the same in a usual recording."""
-        return np.hypot(self.noise, self.level)
-
-    def odds(self, name) -> float:
-        """Log prior odds of an effect; ``shifts`` {effect: change} holds what a fleet says of them."""
-        return float(np.log(k.PRESENT / (1 - k.PRESENT)) + self.shifts.get(name, 0.0))
-
-    def read_like(self, other, volts, amps):
-        """This reading of a recording with the operating points of ``other``, the same blocks as documented.
-
-        volts, amps: factors of voltages and currents between the two, which the error of the balance has too.
-        """
-        self.points, self.visits, self.shifts = other.points, other.visits, other.shifts
-        self.grouping, self.repeats = other.grouping, other.repeats
-        channel = self.cells.channel
-        self.level = other.level * np.where(channel == "u", volts, np.where(channel == "sum", amps, 1.0))
-        return self
-
-    def smoothly(self, other, volts, amps):
-        """A copy in which the reading changes the smooth signals only, as a correction of a measurement does.
-
-        Noise stays that of ``other``, as noise of a current that is told twice as large would count against it.
-        """
-        channel = self.cells.channel
-        scale = np.where(channel == "u", volts, np.where(channel == "sum", amps, 1.0))
-        out = copy.copy(self)
-        out.noise = other.noise * scale
-        y = other.cells.y * scale + self.smooth_rows - other.smooth_rows * scale
-        out.cells = dataclasses.replace(self.cells, y=y)
-        return out
+from fluxproof.diagnosis.inference.linearise import Linearisation
+from fluxproof.diagnosis.inference.points import condense
+from fluxproof.diagnosis.inference.setup import Setup, repeated
 
 
 class Problem:
@@ -213,7 +141,7 @@ class Problem:
             for n, x in zip(names, a, strict=True)
         )
         found = Fit(self, names, float(value), take, c, cov, a, lam, mu)
-        found.value += np.log(k.IMPLAUSIBLE) * implausible(found)
+        found.value += np.log(k.IMPLAUSIBLE) * implausible(found) + log_too_small(found, names)
         return found
 
 
@@ -265,47 +193,16 @@ def implausible(fit) -> int:
     return sum(_implausible(fit, name) for name in fit.names)
 
 
+def log_too_small(fit, names) -> float:
+    """Log prior of the effects ``names`` of a set as far as they are smaller than what is of practical interest."""
+    effects, nominal = fit.problem.setup.effects, fit.problem.view.nominal
+    sizes = [max(effects[n].size(fit.c[n], nominal) / effects[n].floor(nominal), 1e-30) for n in names]
+    return k.SMALLER * sum(min(float(np.log(size)), 0.0) for size in sizes)
+
+
 def _implausible(fit, name) -> int:
     effect, nominal = fit.problem.setup.effects[name], fit.problem.view.nominal
     if not effect.plausible:
         return 0
     found = effect.estimates(fit.c[name], covariance_of(fit, name, fit.cov), nominal)
     return sum(not believable(found[key], limits, nominal) for key, limits in effect.plausible.items() if key in found)
-
-
-def _common_error(setup) -> np.ndarray:
-    """(r, 3) errors of the balance that all operating points have in common, each of the size of its prior.
-
-    Along and across the voltage, as the converters' timing; along the current, as minimum pulses.
-    """
-    view = setup.view
-    u, bus = view.to_dq(view.u[:, 1:-1]), view.nominal.inverter.dc_bus_v
-    along = view.i_mid / np.abs(view.i_mid).clip(0.02 * view.machine.rated_current_a)
-    patterns = (k.COMMON_U * u, 1j * k.COMMON_U * u, k.COMMON_DC * bus * along)
-    return np.array([setup.projector.rows({"u": p}) for p in patterns]).T
-
-
-def _bounded_noise(rows):
-    """(r,) noise of the rows; where no operating point repeats, it is what no effect explains, and bounded."""
-    if repeats(rows.view, rows.cells.ok, rows.cells.block):
-        return rows.noise
-    most = k.UNREPEATED * voltage_level(rows.view)[rows.cells.block]
-    return np.where(rows.cells.channel == "u", np.minimum(rows.noise, np.maximum(most, 1e-15)), rows.noise)
-
-
-def _repeats(cells, points):
-    """(r,) number of the functional and operating point of every row."""
-    keys = np.stack([cells.order * 1e6, cells.part, points[cells.block], cells.channel == "u",
-                     cells.channel == "sum"], axis=1).astype(np.int64)  # fmt: skip
-    return np.unique(keys, axis=0, return_inverse=True)[1].ravel()
-
-
-def repeated(ripple, setup):
-    """(r,) the part of ripple rows that repeats in all blocks of an operating point, shrunk by what noise may be."""
-    cells, cell = setup.cells, setup.repeats
-    w = np.where(cells.ok, 1.0, 0.0)
-    count = np.maximum(np.bincount(cell, w), 1.0)
-    mean = np.bincount(cell, w * ripple) / count
-    spread = np.bincount(cell, w * (ripple - mean[cell]) ** 2) / np.maximum(count - 1.0, 1.0) / count
-    kept = np.maximum(1.0 - k.RIPPLE * spread / np.maximum(mean**2, 1e-300), 0.0) * (count > 2)
-    return (kept * mean)[cell]

@@ -12,7 +12,7 @@ from fluxproof.diagnosis.conventions.judge import preferred
 from fluxproof.diagnosis.conventions.tell import under
 from fluxproof.diagnosis.inference import constants
 from fluxproof.diagnosis.inference.posterior import Posterior
-from fluxproof.diagnosis.inference.problem import Setup
+from fluxproof.diagnosis.inference.setup import Setup
 from fluxproof.diagnosis.ingest.load import load_recording
 from fluxproof.diagnosis.ingest.restated import as_read
 from fluxproof.diagnosis.nominal import load_nominal

@@ -1,0 +1,60 @@
+"""A sine filter or a long cable: capacitors across the terminals, whose current is measured, behind a choke."""
+
+import numpy as np
+
+from fluxproof.diagnosis.effects.effect import Effect, Parameter, current_error, one, sigma, voltage
+
+CHOKE = 0.02  # of the machine's inductance and resistance: those of the choke of a filter that is just of interest
+
+
+def _rated_voltage(nominal):
+    return nominal.inverter.dc_bus_v / np.sqrt(3)
+
+
+def _rated_speed(nominal):
+    """Electrical speed at which rated current takes the whole voltage [rad/s]."""
+    m = nominal.machine
+    return _rated_voltage(nominal) / np.hypot(m.magnet_flux_wb, m.inductance_q_h * m.rated_current_a)
+
+
+class SineFilter(Effect):
+    def core(self, view):
+        slope = 1j * view.omega * (view.machine.resistance_ohm * view.i + 1j * view.omega * view.psi)
+        return {"capacitance": current_error(view, slope)}
+
+    def free(self, view):
+        return {"inductance": voltage(view.flux(view.i)), "resistance": voltage(view.i_mid)}
+
+    def curve_scale(self, key, cores, nominal):
+        # Of 1 / curve, which the share of a curve takes away again.
+        whole = CHOKE / self.curve
+        return whole * (nominal.machine.inductance_q_h if key == "inductance" else nominal.machine.resistance_ohm)
+
+    def floor(self, nominal):
+        return 0.005 * nominal.machine.rated_current_a / (_rated_speed(nominal) * _rated_voltage(nominal))
+
+    def too_large(self, c, view):
+        """Whether the capacitors' current exceeds half the rated one at the highest speed."""
+        voltage_v = min(view.top_speed / _rated_speed(view.nominal), 1.0) * _rated_voltage(view.nominal)
+        return c["capacitance"] * view.top_speed * voltage_v > 0.5 * view.machine.rated_current_a
+
+    def size(self, c, nominal):
+        return abs(c["capacitance"])
+
+    def estimates(self, c, covariance, nominal):
+        return one("capacitance_f", "F", c["capacitance"], sigma(covariance))
+
+
+EFFECT = SineFilter(
+    name="sine_filter",
+    title="sine filter or long cable",
+    clause="a sine filter or a long cable stood between inverter and machine",
+    equation="i_measured = i + C du/dt, u_measured = u + R_f i + L_f di/dt",
+    signature="order 0: i_d larger by omega C u_q, i_q smaller by omega C u_d, in proportion to omega^2",
+    confounders=("iron_loss", "current_lag", "magnet_flux"),
+    separated_by="zero current at two speeds",
+    parameters=(Parameter("capacitance_f", "F", "of each phase, in star"),),
+    positive=True,
+    named=False,
+    needs=("current",),
+)
