@@ -183,7 +183,7 @@ def covered(answer, nominal) -> str:
         if values.size:
             ends = float(values.min()), float(values.max())
             places = 0 if unit == "rpm" else decimals(max(*np.abs(ends), 1e-9), 2)
-            low, high = (fixed(x, places) for x in ends)
+            low, high = (f"{float(fixed(x, places)):g}" for x in ends)
             span = f"{low} to {high} {unit}" if low != high else f"{low} {unit}"
             spans.append(span if unit == "rpm" else f"{name} of {span}")
     return f"the recording covers {joined(spans)}" if spans else "the recording covers few operating points"

@@ -33,7 +33,6 @@ class Saturation(FluxEffect):
             "q_5": _q(view, lambda y: y**5),
             "d_2": _d(view, lambda x: x**2),
             "d_2s": _d(view, lambda x: x * np.abs(x)),
-            "d_5": _d(view, lambda x: x**5),
         }
 
     def core(self, view):

@@ -17,7 +17,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-STEPS, SETTLED = 20, 0.01  # most steps; relative change of all sizes and lambda after which one step more is enough
+STEPS, SETTLED = 20, 0.03  # most steps; relative change of all sizes and lambda after which one step more is enough
 SMALL, LARGE = 1e-200, 1e200  # range of a product of variances, each of which lies within 1e-100 and 1e100
 FACTORS = np.array([0.1, 0.35, 0.7, 1.0, 1.4, 3.0, 10.0])  # of the discrepancy: the grid of every step
 SEEN = np.array([0.0, 0.03, 0.1, 0.2, 0.4, 0.7, 1.0])  # shares mu: the grid of every step

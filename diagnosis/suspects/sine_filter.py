@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fluxproof.diagnosis.effects.effect import Effect, Parameter, current_error, one, sigma, voltage
+from fluxproof.diagnosis.effects.effect import DOUBT, Effect, Parameter, current_error, one, sigma, voltage
 
 CHOKE = 0.02  # of the machine's inductance and resistance: those of the choke of a filter that is just of interest
 
@@ -38,6 +38,11 @@ class SineFilter(Effect):
         voltage_v = min(view.top_speed / _rated_speed(view.nominal), 1.0) * _rated_voltage(view.nominal)
         return c["capacitance"] * view.top_speed * voltage_v > 0.5 * view.machine.rated_current_a
 
+    def possible(self, c, covariance, nominal):
+        """Capacitors and chokes are not negative; a choke that is not seen may be within its uncertainty."""
+        least = [-DOUBT * sigma(covariance, n) if key != "capacitance" else 0.0 for n, key in enumerate(c)]
+        return all(value >= limit for value, limit in zip(c.values(), least, strict=True))
+
     def size(self, c, nominal):
         return abs(c["capacitance"])
 
@@ -51,10 +56,9 @@ EFFECT = SineFilter(
     clause="a sine filter or a long cable stood between inverter and machine",
     equation="i_measured = i + C du/dt, u_measured = u + R_f i + L_f di/dt",
     signature="order 0: i_d larger by omega C u_q, i_q smaller by omega C u_d, in proportion to omega^2",
-    confounders=("iron_loss", "current_lag", "magnet_flux"),
+    confounders=("iron_loss", "current_scale", "magnet_flux"),
     separated_by="zero current at two speeds",
     parameters=(Parameter("capacitance_f", "F", "of each phase, in star"),),
-    positive=True,
     named=False,
     needs=("current",),
 )

@@ -55,7 +55,7 @@ def bounds(posterior) -> dict[str, dict]:
             continue
         fit = problem.fit((*best.names, name))
         fit = settled(posterior.setup, fit, len(best.names)) or fit
-        if not possible(fit, small=(name,)):
+        if not possible(fit):
             out[name] = {"refused": "its sign or size is impossible"}
             continue
         out[name] = {"parameters": estimates_of(fit, [name]), "log_odds": fit.value - best.value}
