@@ -2,7 +2,8 @@
 
 The posterior compares sets of effects.  Where much of the misfit is left, something unknown is at work, and a part of
 it may look like an effect: a leftover of the rms D, lying along the columns of an effect whose contribution has the rms
-A, would imitate it.  The confidence in a name is therefore the posterior of its presence times 1 - exp(-(A / D)^2 / 8):
+A, would imitate it.  The confidence in a name is therefore the posterior of its presence times 1 - exp(-(A / D)^2 / 8),
+its mean over the sets with the effect:
 an effect twice as large as what is left may still be an imitation, and one five times as large is not.  Beside effects
 that are no imitation, and that explain E in the same orders, a leftover is rather an error of theirs, which lies along
 their columns: if these hold the share r of what the effect explains, the share r + (1 - r) D^2 / (D^2 + E^2) of the
@@ -59,11 +60,12 @@ def names_of(posterior) -> Names:
         if held >= 1.0 - k.LEFT_OUT:
             break
     best = posterior.best()
-    credit: dict[str, float] = {}
-    for _, fit in kept:
-        for name, p in credibilities(fit).items():
-            credit[name] = max(credit.get(name, 0.0), p)
-    present = {n: p * credit[n] for n, p in posterior.present().items() if n in credit}
+    real, weight = {}, {}
+    for p, fit in kept:
+        for name, credit in credibilities(fit).items():
+            real[name] = real.get(name, 0.0) + p * credit
+            weight[name] = weight.get(name, 0.0) + p
+    present = {n: p * real[n] / weight[n] for n, p in posterior.present().items() if n in real}
     effects = posterior.setup.effects
     sure = {n: p for n, p in present.items() if p >= 1.0 - k.DOUBTED and n in best.names}
     named = {n: p for n, p in sure.items() if effects[n].named}
