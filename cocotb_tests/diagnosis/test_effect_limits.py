@@ -10,7 +10,7 @@ import pytest
 from cocotb_tests.core.test_registers import PAPER
 from cocotb_tests.support.diagnosed_drives import GRID, MACHINE, columns, recorded
 from fluxproof.diagnosis import diagnose
-from fluxproof.diagnosis.answer.names import MEDIAN, _seen_discrepancy, credibilities
+from fluxproof.diagnosis.answer.names import MEDIAN, _seen_discrepancy, credibilities, names_of
 from fluxproof.diagnosis.balance.blocks import view_of
 from fluxproof.diagnosis.balance.joined import joined_views
 from fluxproof.diagnosis.balance.misfit import bulge, misfit
@@ -278,6 +278,19 @@ def test_an_error_of_a_sure_effect_imitates_what_is_like_it():
     apart, alike = (credibilities(two_effects(share)) for share in (0.05, 0.99))
     assert apart["large"] > 0.999 and alike["large"] > 0.999
     assert apart["small"] > 0.95 > alike["small"]
+
+
+def test_an_effect_is_as_credible_as_in_the_mean_of_its_sets():
+    """An iron loss of 1750 +- 860 ohm was named, as one of its sets left less beside it than the best one."""
+    sets = [(0.6, two_effects(0.99)), (0.4, two_effects(0.05))]
+    posterior = SimpleNamespace(
+        weights=lambda: sets, best=lambda: sets[0][1], present=lambda: {"large": 1.0, "small": 1.0},
+        setup=SimpleNamespace(effects={name: SimpleNamespace(named=True) for name in ("large", "small")}),
+    )  # fmt: skip
+    names = names_of(posterior)
+    assert names.said == {"large"}
+    expected = sum(p * credibilities(fit)["small"] for p, fit in sets)
+    assert names.maybe["small"] == pytest.approx(expected)
 
 
 WARMED = [((20, 60), 0.0, True), ((20, 60), 0.0039, False), ((20, 23), 0.0, False)]

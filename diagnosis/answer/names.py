@@ -3,11 +3,10 @@
 The posterior compares sets of effects.  Where much of the misfit is left, something unknown is at work, and a part of
 it may look like an effect: a leftover of the rms D, lying along the columns of an effect whose contribution has the rms
 A, would imitate it.  The confidence in a name is therefore the posterior of its presence times 1 - exp(-(A / D)^2 / 8),
-its mean over the sets with the effect:
-an effect twice as large as what is left may still be an imitation, and one five times as large is not.  Beside effects
-that are no imitation, and that explain E in the same orders, a leftover is rather an error of theirs, which lies along
-their columns: if these hold the share r of what the effect explains, the share r + (1 - r) D^2 / (D^2 + E^2) of the
-leftover's power counts.
+its mean over the sets with the effect: an effect twice as large as what is left may still be an imitation, and one five
+times as large is not.  Beside effects that are no imitation, and that explain E in the same orders, a leftover is
+rather an error of theirs, which lies along their columns: if these hold the share r of what the effect explains, the
+share r + (1 - r) D^2 / (D^2 + E^2) of the leftover's power counts.
 """
 
 from __future__ import annotations
