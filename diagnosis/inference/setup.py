@@ -56,7 +56,7 @@ class Setup:
         return np.hypot(self.noise, self.level)
 
     def odds(self, name) -> float:
-        """Log prior odds of an effect, even if it is expected; ``shifts``: {effect: change} of them by a fleet."""
+        """Log prior odds of an effect, zero (one to one) for one that is expected; a fleet may have shifted them."""
         usual = 0.0 if name in self.expected else np.log(k.PRESENT / (1 - k.PRESENT))
         return float(usual + self.shifts.get(name, 0.0))
 

@@ -26,9 +26,9 @@ class SineFilter(Effect):
         return {"inductance": voltage(view.flux(view.i)), "resistance": voltage(view.i_mid)}
 
     def curve_scale(self, key, cores, nominal):
-        # Of 1 / curve, which the share of a curve takes away again.
-        whole = CHOKE / self.curve
-        return whole * (nominal.machine.inductance_q_h if key == "inductance" else nominal.machine.resistance_ohm)
+        # A choke is no share of the capacitance, so that the share ``curve``, by which this is multiplied, is taken out.
+        m = nominal.machine
+        return CHOKE / self.curve * (m.inductance_q_h if key == "inductance" else m.resistance_ohm)
 
     def floor(self, nominal):
         return 0.005 * nominal.machine.rated_current_a / (_rated_speed(nominal) * _rated_voltage(nominal))
