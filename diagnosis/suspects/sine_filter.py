@@ -26,7 +26,7 @@ class SineFilter(Effect):
         return {"inductance": voltage(view.flux(view.i)), "resistance": voltage(view.i_mid)}
 
     def curve_scale(self, key, cores, nominal):
-        # A choke is no share of the capacitance, so that the share ``curve``, by which this is multiplied, is taken out.
+        # A choke is no share of the capacitance: the share ``curve``, by which this is multiplied, is taken out.
         m = nominal.machine
         return CHOKE / self.curve * (m.inductance_q_h if key == "inductance" else m.resistance_ohm)
 
