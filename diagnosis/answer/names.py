@@ -117,7 +117,7 @@ def credibilities(fit) -> dict[str, float]:
     powers, real = _powers(fit), 1.0 - k.IMITATED
     found = {name: _credibility(fit, name, powers) for name in fit.names}
     sure = {name for name, p in found.items() if p >= real}
-    for name in sure ^ set(found):
+    for name in set(found) - sure:
         found[name] = _credibility(fit, name, powers, sure)
     return found
 
