@@ -16,6 +16,7 @@ import pytest
 
 from cocotb_tests.core.test_registers import PAPER
 from cocotb_tests.support.diagnosed_drives import DRIVE, GRID, MACHINE, POINT, columns, recorded
+from cocotb_tests.support.slow import slowly
 from fluxproof.checkout import ROOT
 from fluxproof.diagnosis import catalogue, diagnose, physics
 from fluxproof.diagnosis.answer.improved_plant import check_key, plain
@@ -115,7 +116,7 @@ def test_two_effects_are_separated():
     assert found["magnet_flux"]["magnet_flux_wb"].value == pytest.approx(0.15675, rel=0.005)
 
 
-@pytest.mark.parametrize("effect", ["resistance", "magnet_flux", "encoder_offset"])
+@pytest.mark.parametrize("effect", ["magnet_flux", slowly("resistance"), slowly("encoder_offset")])
 def test_one_operating_point_never_asserts_a_wrong_name(effect):
     answer = diagnose(recorded(POINT, **CASES[effect][0]), NOMINAL)
     asserted = {e.name for e in answer.effects}
@@ -264,7 +265,7 @@ def test_transducer_torque_is_not_mistaken_for_air_gap_torque():
 
 
 # 54: 27 slots and an odd number of pole pairs; 2.25: nine slots that are not alike
-@pytest.mark.parametrize("order", [12, 54, 2.25])
+@pytest.mark.parametrize("order", [2.25, slowly(12), slowly(54)])
 def test_torque_ripple_amplitude_is_independent_of_speed_and_direction(order):
     """The transducer is sampled with the currents, the balance is made between samples: 4 % at these speeds."""
     table = dict(columns(GRID))

@@ -30,7 +30,7 @@ def sizes(answer):
     return Sizes(setup, setup.cells.y, setup.cells.y, np.ones(len(setup.view), bool), True)
 
 
-@pytest.mark.parametrize("name", halved(CATALOGUE, every=3))
+@pytest.mark.parametrize("name", halved(CATALOGUE, every=4))
 def test_the_improved_drive_leaves_no_misfit(name, tmp_path):
     effect = CATALOGUE[name]
     if effect.stays:
