@@ -1,6 +1,6 @@
 """The nominal drive: the parameters of the simulation, read from drive.toml.
 
-Every key of the core's drive.toml is accepted with its range, but only those that the balance needs are required, so
+Every key of the core's drive.toml is accepted, but only those that the balance needs are required, so
 that a drive without the core can be described too.  A missing key is None, and its effect is not part of the nominal
 model.  [columns] maps names of a recording's file to canonical ones, [constants] gives values of columns that the file
 lacks.  [plant.machine], [plant.inverter],
@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 
 from fluxproof.golden_model import drive
 from fluxproof.golden_model.drive_file import read_sections, read_tables
-from fluxproof.golden_model.drive_keys import DriveError
+from fluxproof.golden_model.drive_keys import DriveError, key_of
 
 REQUIRED = {
     "machine": (
@@ -24,14 +24,20 @@ REQUIRED = {
     "inverter": ("dc_bus_v", "pwm_frequency_hz"),
 }  # fmt: skip
 
+# Ranges of drives without the core, whose formats allow less: {section: {key: (least, largest)}}.
+WIDER = {"machine": {"pole_pairs": (1, 1000)}, "sensors": {"adc_bits": (1, 32), "position_bits": (1, 32)}}
+
 
 def _optional(section, kind):
-    """The section's dataclass in which only the required keys are mandatory."""
-    fields = []
+    """The section's dataclass in which only the required keys are mandatory, with the ranges of any drive."""
+    fields, wider = [], WIDER.get(section, {})
     for f in dataclasses.fields(kind):
         needed = f.name in REQUIRED.get(section, ())
         default = dataclasses.MISSING if needed else None if f.default is dataclasses.MISSING else f.default
-        fields.append((f.name, f.type, dataclasses.field(default=default, metadata=f.metadata)))
+        key = key_of(f)
+        if f.name in wider:
+            key = dataclasses.replace(key, lo=wider[f.name][0], hi=wider[f.name][1])
+        fields.append((f.name, f.type, dataclasses.field(default=default, metadata={"key": key})))
     fields.sort(key=lambda entry: entry[2].default is not dataclasses.MISSING)
     return dataclasses.make_dataclass(kind.__name__, fields, frozen=True)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
 
 import numpy as np
 import pytest
@@ -181,6 +182,19 @@ def test_values_outside_the_core_formats_go_to_the_plant(tmp_path):
     registers(drive)
     assert drive.machine.inductance_q_h == 15.81e-3 and drive.machine.resistance_ohm == 1.6
     assert plant.machine.inductance_q_h == 0.4 and plant.machine.resistance_ohm == 1.6
+
+
+def test_sensors_that_are_finer_than_the_core_takes_are_described(tmp_path):
+    """A 23-bit encoder is usual; only the core's own drive file has its formats' limits."""
+    path = tmp_path / "fine.toml"
+    text = PAPER.read_text()
+    path.write_text(re.sub(r"position_bits = \d+", "position_bits = 23", text))
+    assert path.read_text() != text
+    nominal = load_nominal(path)
+    assert nominal.sensors.position_bits == 23
+    assert load_nominal(write_improved(nominal, [], tmp_path / "improved.toml")).sensors.position_bits == 23
+    with pytest.raises(DriveError, match="position_bits = 23 is out of range: allowed is 8 up to 18"):
+        drives.load(path)
 
 
 def test_a_drive_without_the_core(tmp_path):

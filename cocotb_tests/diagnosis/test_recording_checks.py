@@ -32,6 +32,18 @@ def test_physical_effects_are_no_findings(tmp_path, nominal, effect):
     assert recording.usable.all() and recording.joined[:-1].all()
 
 
+def shaft(table):
+    """Torque of a shaft (n,) [Nm]: that of the q current, as the inductances are nearly equal, less a friction."""
+    i = (2 / 3) * sum(table[f"i_{x}"] * np.exp(2j * np.pi / 3 * k) for k, x in enumerate("abc"))
+    return 6 * 0.165 * (i * np.exp(-1j * table["theta_e"])).imag - 0.3
+
+
+def test_a_torque_that_drives_is_no_finding(tmp_path, nominal):
+    table = made()
+    recording = load_recording(write(tmp_path / "r.parquet", table | {"torque": shaft(table)}), nominal)
+    assert codes(recording) == []
+
+
 def test_wrong_machine_data_are_no_swapped_phases(tmp_path, nominal):
     machine = dataclasses.replace(
         nominal.machine, resistance_ohm=4.0, magnet_flux_wb=0.12, inductance_q_h=0.03
@@ -191,6 +203,10 @@ FAULTS = {
     ),
     "speed reversed": (
         lambda x: edit(x, omega_e=-x["omega_e"]), "rotation", "omega_e", 0, same("omega_e"),
+    ),
+    "torque of a load": (
+        lambda x: edit(x, torque=-shaft(x)), "torque_sign", "torque", 0,
+        lambda r, x: np.array_equal(r["torque"], shaft(x)),
     ),
     "currents that do not belong together": (
         lambda x: edit(x, i_c=x["i_c"] * 0.2), "current_sum", "i_c", None,

@@ -27,6 +27,8 @@ RIPPLE = 0.05  # of rated current, rms around the block's parabola
 SPEED_STEP = 0.06  # of the largest speed
 SLOW_SHARE = 0.01  # of the speed at which the EMF reaches the bus voltage: tolerance at standstill
 RESTLESS = 3.0  # factor on the tolerances if no block is steady
+EXACT = 1e-6  # of rated current: rounding of numbers in a computer
+MOST_DECIMALS = 6  # with which a file writes currents
 
 
 def smooth(values, joined_run, half=HALF_WIDTH):
@@ -53,6 +55,21 @@ def stator_current(recording: Recording, theta):
     return (r["i_d"] + 1j * r["i_q"]) * np.exp(1j * theta), None  # a dq log was already rotated by the drive
 
 
+def _third_is_computed(i_abc, rated) -> bool:
+    """Whether phase currents (n, 3) sum to zero but for the decimals to which the three were rounded in a file."""
+    return bool(np.nanmax(np.abs(i_abc.sum(axis=1))) <= 1.5 * _decimal_step(i_abc) + EXACT * rated)
+
+
+def _decimal_step(values) -> float:
+    """The power of ten, 1 at most, of which all values are multiples; 0 if they have more than MOST_DECIMALS."""
+    known = values[np.isfinite(values)]
+    for decimals in range(MOST_DECIMALS + 1):
+        scaled = known * 10.0**decimals
+        if np.all(np.abs(scaled - np.round(scaled)) < 1e-3):
+            return 10.0**-decimals
+    return 0.0
+
+
 def _unwrapped(recording, run):
     """Unwrapped angle (n,) [rad]; gaps are bridged with the recorded speed, to preserve the mechanical turn."""
     theta = np.unwrap(recording["theta_e"])
@@ -76,8 +93,8 @@ def view_of(recording: Recording, nominal, block_rows=BLOCK_ROWS) -> View:
     run = np.concatenate([[0], np.cumsum(~linked)])
     theta = _unwrapped(r, run)
     i_raw, i_abc = stator_current(r, theta)
-    if i_abc is not None and np.nanmax(np.abs(i_abc.sum(axis=1))) < 1e-6 * machine.rated_current_a:
-        i_abc = None  # the third current was computed from the other two
+    if i_abc is not None and _third_is_computed(i_abc, machine.rated_current_a):
+        i_abc = None
     theta_s = smooth(theta, run)
     i_s = smooth(i_raw * np.exp(-1j * theta), run)
     omega = np.full(n, np.nan)

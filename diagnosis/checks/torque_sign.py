@@ -1,0 +1,54 @@
+"""A torque that is counted the other way: positive when the machine brakes, as a load's transducer may have it.
+
+The air-gap torque of the nominal machine, 3/2 p (psi_d i_q - psi_q i_d), has a sign that no friction or inertia hides
+under load.  The recorded one is reversed if it is like the opposite of it, and if the voltages confirm currents, angle
+and speed: of an angle that is half a turn off, the currents would have the wrong sign.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fluxproof.diagnosis.checks.balance import FIT, TURNS, discriminates, misfit, rows_of
+from fluxproof.diagnosis.recording import Problem
+
+STAGE = "signals"
+LOADED = 0.05  # of rated torque: least rms of an air-gap torque whose sign is told
+ALIKE = 0.5  # of the air-gap torque: most that the opposite of a reversed torque differs from it, friction included
+
+
+def check(recording, nominal) -> None:
+    if not recording.has("torque", "omega_e"):
+        return
+    i, m = _current(recording), nominal.machine
+    if i is None:
+        return
+    psi = m.inductance_d_h * i.real + 1j * m.inductance_q_h * i.imag + m.magnet_flux_wb
+    airgap, torque = 1.5 * m.pole_pairs * (np.conj(psi) * i).imag, recording["torque"]
+    good = recording.usable & np.isfinite(torque) & np.isfinite(airgap)
+    rated = 1.5 * m.pole_pairs * np.abs(psi).max() * m.rated_current_a
+    size = _rms(airgap[good])
+    if size < LOADED * rated or _rms((torque + airgap)[good]) > ALIKE * size:
+        return
+    rows = rows_of(recording, nominal)
+    if rows is None or not discriminates(rows) or misfit(rows) > 2 * FIT:
+        return
+    recording.columns["torque"] = -torque
+    message = "torque and currents have opposite signs"
+    n = int(good.sum())
+    recording.problems.append(Problem("torque_sign", message, "torque", 0, n, "the torque is reversed"))
+
+
+def _current(recording) -> np.ndarray | None:
+    """(n,) dq current [A], or None."""
+    if recording.has("i_d", "i_q"):
+        return recording["i_d"] + 1j * recording["i_q"]
+    if not recording.has("i_a", "i_b", "theta_e"):
+        return None
+    a, b = recording["i_a"], recording["i_b"]
+    c = recording["i_c"] if recording.has("i_c") else -a - b
+    return (2 / 3) * (np.stack([a, b, c], axis=-1) @ TURNS) * np.exp(-1j * recording["theta_e"])
+
+
+def _rms(x) -> float:
+    return float(np.sqrt(np.mean(np.square(x)))) if len(x) else 0.0
