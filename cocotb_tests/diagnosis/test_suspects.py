@@ -104,6 +104,16 @@ def test_shorted_turns(phase=1, conductance=0.02):
     assert answer.unknown_term.value == pytest.approx(conductance, rel=0.1)
 
 
+def test_a_resolver_with_unequal_signals():
+    """Sine 4 % larger than cosine: at the highest speed, the mean of the angle over some samples hides it."""
+    table = dict(columns(GRID))
+    theta = table["theta_e"]
+    table["theta_e"] = (theta + 0.02 * np.sin(2.0 * theta)) % (2 * np.pi)
+    answer = answer_of(table)
+    assert answer.verdict == "unexplained" and not answer.effects and "resolver" in answer.sentence
+    assert answer.unknown_term.value == pytest.approx(0.02, rel=0.05)
+
+
 def test_suspects_are_not_in_the_catalogue():
     assert SUSPECTS and not set(SUSPECTS) & set(CATALOGUE)
     assert not any(e.named for e in SUSPECTS.values()) and all(e.named for e in CATALOGUE.values())

@@ -175,7 +175,7 @@ def conclude(posterior, held, progress=lambda text: None) -> Diagnosis:
     answer.evidence = evidence(view, (cells, before), (cells, after), setup.noise, held)
     answer.sentence = sentence(answer, setup.effects)
     answer.notes += balance_notes(view, held, setup.effects, answer.ambiguity)
-    answer.notes += [text for e in answer.effects if (text := setup.effects[e.name].caveat(view))]
+    answer.notes += [text for e in answer.effects if (text := setup.effects[e.name].caveat(view, best.c[e.name]))]
     answer.held = held
     for name in names.suspects:
         if answer.unknown_term is None or answer.unknown_term.meaning != setup.effects[name].clause:

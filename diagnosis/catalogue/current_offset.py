@@ -65,7 +65,7 @@ class CurrentOffset(Effect):
             out[f"offset_{phase}_a"] = Estimate(float(self._phases(c)[k]), spread, "A")
         return out
 
-    def caveat(self, view):
+    def caveat(self, view, c):
         if view.has_sum:
             return ""
         zero = "The offsets are stated with a sum of zero"

@@ -12,6 +12,7 @@ DROP = 0.05  # of rated current: where device drops have reached their full valu
 STILL_GROWS = (0.12, 0.3)  # of rated current: growth beyond this range counts as resistance
 RIPPLE = 1 / 32  # of u_dc T / L: a quarter of the largest current ripple
 TAILS = {"log": -np.log(KNOTS[-1]), "fade": 1.0 - KNOTS[-1]}  # of device_tails at rated current
+TOLD = 0.05  # of the winding's resistance: a rise of the loss that is like more of it is told
 CLAMPED = 0.1  # uncertainty, as a share of the loss, while ripple decides which diode conducts
 
 
@@ -80,6 +81,11 @@ def full_loss(c) -> float:
     return float(sum(v * TAILS.get(key, key.startswith(("v_", "growth", "drop"))) for key, v in c.items()))
 
 
+def _rise(c) -> float:
+    """Growth of the loss [V] from the last knot to rated current."""
+    return c.get("growth", 0.0) + sum(value * c.get(key, 0.0) for key, value in TAILS.items())
+
+
 class DeadTime(Effect):
     def core(self, view):
         ramps = {f"v_{w:g}": lambda x, w=w: np.clip(x / w, -1.0, 1.0) for w in WIDTHS}
@@ -137,8 +143,16 @@ class DeadTime(Effect):
     def estimates(self, c, covariance, nominal):
         at_full = _at_full(c)
         # A loss that still grows towards rated current may belong to a resistance.
-        spread = float(np.hypot(np.sqrt(max(at_full @ covariance @ at_full, 0.0)), c.get("growth", 0.0)))
+        spread = float(np.hypot(np.sqrt(max(at_full @ covariance @ at_full, 0.0)), _rise(c)))
         return {"v_dead_v": Estimate(full_loss(c), spread, "V")}
+
+    def caveat(self, view, c):
+        m, last = view.machine, KNOTS[-1]
+        ohm = 4 / np.pi * _rise(c) / ((1.0 - last) * m.rated_current_a)  # of the fundamental of the leg's voltage
+        if ohm < TOLD * m.resistance_ohm:
+            return ""
+        rises = f"The loss of the inverter rises by {_rise(c):.2g} V from {last:g} of rated current to rated current"
+        return f"{rises}; a resistance that is {ohm:.2g} Ohm larger would be like it, and only a measured one tells."
 
     def given(self, view, plant):
         loss = plant.inverter.dead_time_s * view.nominal.inverter.pwm_frequency_hz * view.nominal.inverter.dc_bus_v

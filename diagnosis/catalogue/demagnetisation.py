@@ -28,7 +28,7 @@ class Demagnetisation(FluxEffect):
     def estimates(self, c, covariance, nominal):
         return one("magnet_flux_step_wb", "Wb", c["step"], sigma(covariance))
 
-    def caveat(self, view):
+    def caveat(self, view, c):
         begins = instant_of_change(view)
         return f"The loss was just before the steady rows that begin {begins:.3g} s after the first one."
 

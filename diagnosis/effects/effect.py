@@ -170,8 +170,8 @@ class Effect:
         """Parameters of the effect, {name: Estimate}, from its coefficients in the order of the covariance."""
         raise NotImplementedError
 
-    def caveat(self, view) -> str:
-        """What its estimates leave open in such a recording, as a sentence; "" if nothing."""
+    def caveat(self, view, c: dict[str, float]) -> str:
+        """What its estimates from coefficients c leave open in such a recording, as a sentence; "" if nothing."""
         return ""
 
     def relative(self, c: dict[str, dict], nominal) -> float:
