@@ -13,6 +13,7 @@ Canonical columns (only ``t`` is required here; columns.py checks what a balance
     temp_winding         degC
     torque               Nm     at the shaft, positive with positive speed when motoring
     u_a u_b u_c          V      measured at the terminals of a machine without current (EMF run), or u_ab u_bc u_ca
+    u_line i_line p_el   V A W  amplitudes and power of a power analyser, in a table with i_d_ref i_q_ref or i_d i_q
 """
 
 from __future__ import annotations
@@ -46,6 +47,9 @@ COLUMNS = {
     "u_ab": "V",
     "u_bc": "V",
     "u_ca": "V",
+    "u_line": "V",
+    "i_line": "A",
+    "p_el": "W",
 }
 
 

@@ -1,7 +1,8 @@
 """Which canonical columns a voltage balance requires.
 
-Three kinds of recordings contain enough: currents with commanded voltages, dq values of which u_d may be absent, and
-the terminal voltages of a machine that is driven without current (EMF run).
+Four kinds of recordings contain enough: currents with commanded voltages, dq values of which u_d may be absent, the
+terminal voltages of a machine that is driven without current (EMF run), and voltage and power of an analyser beside dq
+currents or their references.
 """
 
 from __future__ import annotations
@@ -20,10 +21,19 @@ def is_emf_run(have) -> bool:
     return has_terminal_voltages(have) and not COMMANDED & set(have)
 
 
+def is_analysed(have) -> bool:
+    """Whether the names ``have`` are those of a power analyser's table, with currents or their references."""
+    currents = {"i_d", "i_q"} <= set(have) or {"i_d_ref", "i_q_ref"} <= set(have)
+    return currents and {"u_line", "p_el", "omega_e"} <= set(have) and not COMMANDED & set(have)
+
+
 def missing_columns(have: set[str]) -> list[str]:
     """What a balance lacks, as texts for a message; empty if the names ``have`` suffice."""
-    if is_emf_run(have):
+    if is_emf_run(have) or is_analysed(have):
         return []
+    if "u_line" in have and not COMMANDED & have:
+        needed = {"omega_e", "p_el", "i_d_ref", "i_q_ref"}
+        return [f"of a power analyser's table {', '.join(sorted(needed - have))}"]
     missing = []
     phases = len({"i_a", "i_b", "i_c"} & have) >= 2
     dq = {"i_d", "i_q"} <= have

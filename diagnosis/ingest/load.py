@@ -18,6 +18,7 @@ import numpy as np
 
 from fluxproof.diagnosis.checks import check_recording
 from fluxproof.diagnosis.checks.missing import OPTIONAL
+from fluxproof.diagnosis.ingest.analyser import dq_of_analyser
 from fluxproof.diagnosis.ingest.columns import Plan, canonical, plan_columns
 from fluxproof.diagnosis.ingest.demand import is_emf_run
 from fluxproof.diagnosis.ingest.emf import emf_rows
@@ -85,6 +86,7 @@ def _recording(path, table: Table, plan: Plan, nominal) -> Recording:
     for name, value in plan.assumed.items():
         columns[name] = np.full(n, value)
     notes += [f"{name} = {plan.assumed[name]:g} by [constants] of the drive file" for name in plan.stated]
+    columns = dq_of_analyser(path, columns, nominal, notes)
     if is_emf_run(columns):
         return emf_rows(path, columns, nominal, meta)
     if ("t" not in columns or n == 1) and not table.meta.get("sample_time_s") and not plan.sample_time_s:

@@ -60,11 +60,14 @@ TOLD_BY_UNIT = {
          "temp_wicklung", "t_stator", "temp_stator"),
         set(FACTORS["degC"]),
     ),
+    "u_line": (("u_ll", "u1_ll", "u_ll_rms", "u_l_l", "urms_ll", "u_line"), {"V rms", "V_rms", "Vrms"}),
+    "i_line": (("i", "i1", "i_rms", "irms", "i_line", "i_phase"), {"A rms", "A_rms", "Arms"}),
+    "p_el": (("p_el", "p_elec", "p_electric", "p1", "p"), set(FACTORS["W"])),
 }  # fmt: skip
 
 KNOWN = {name: (canonical, rank) for canonical, names in NAMES.items() for rank, name in enumerate(names)}
 TOLD = {
-    name: (canonical, len(NAMES[canonical]) + rank)
+    name: (canonical, len(NAMES.get(canonical, ())) + rank)
     for canonical, (names, _) in TOLD_BY_UNIT.items()
     for rank, name in enumerate(names)
 }
