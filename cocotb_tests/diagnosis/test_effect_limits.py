@@ -252,8 +252,8 @@ def test_opposite_gains_of_two_of_three_sensors_are_told_in_full():
 def test_offsets_of_dq_currents_are_told_as_differences():
     """An equal offset of all three phases does not show in dq: a single sensor that is off looks like three."""
     effect = CATALOGUE["current_offset"]
-    assert "sum of zero" in effect.caveat(SimpleNamespace(has_sum=False))
-    assert not effect.caveat(SimpleNamespace(has_sum=True))
+    assert "sum of zero" in effect.caveat(SimpleNamespace(has_sum=False), {})
+    assert not effect.caveat(SimpleNamespace(has_sum=True), {})
 
 
 def test_what_is_clearly_seen_is_named_though_it_is_small():
@@ -275,11 +275,33 @@ def two_effects(share_along):
         y=np.zeros(100), x=x, level=np.full(100, 0.1), doubt=np.zeros(100), group=np.zeros(100, int), loads=-1,
         groups=[("u", 6.0, False)],
     )  # fmt: skip
-    problem = SimpleNamespace(p=points, keys=[("large", "a"), ("small", "a")])
+    problem = SimpleNamespace(p=points, keys=[("large", "a"), ("small", "a")], setup=SimpleNamespace(load=0.0))
     return SimpleNamespace(
         problem=problem, names=("large", "small"), lam=np.array([10.0]), mu=np.zeros(1), take=np.arange(2),
         vector=np.array([10.0, 2.0]), variance=np.ones(100),
     )  # fmt: skip
+
+
+@pytest.mark.parametrize("load, credible", [(1.0, True), (0.0, False)])
+def test_a_torque_that_nobody_measured_does_not_withhold_what_the_voltage_shows(load, credible):
+    """Offsets of the sensors, all that the voltage showed, were possible (0.21) beside an unknown load of the shaft.
+
+    A torque of a transducer counts.
+    """
+    seen, torque = np.repeat([True, False], 50), np.repeat([False, True], 50)
+    points = SimpleNamespace(
+        y=np.zeros(100), x=(np.where(seen, 1.0, 3.0))[:, None], level=np.full(100, 0.1), doubt=np.zeros(100),
+        group=torque.astype(int), loads=-1, groups=[("u", 1.0, False), ("torque", 1.0, False)],
+    )  # fmt: skip
+    problem = SimpleNamespace(
+        p=points, keys=[("offset", "a")], setup=SimpleNamespace(load=load),
+        cells=SimpleNamespace(electrical=frozenset({"offset"})),
+    )  # fmt: skip
+    fit = SimpleNamespace(
+        problem=problem, names=("offset",), lam=np.array([1.0, 30.0]), mu=np.zeros(2), take=np.arange(1),
+        vector=np.ones(1), variance=np.ones(100),
+    )  # fmt: skip
+    assert (credibilities(fit)["offset"] > 0.95) is credible
 
 
 def test_an_error_of_a_sure_effect_imitates_what_is_like_it():

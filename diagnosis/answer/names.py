@@ -162,6 +162,8 @@ def _credibility(fit, name, powers, sure=frozenset()) -> float:
         along = _along(fit, name, sure)
         left = along * left + (1.0 - along) * _beside(left, [powers[n] for n in sure])
     best = (0.0, 1.0)
+    # A torque that nobody measured has an unknown load in it, and speaks only for what no voltage shows.
+    inferred = fit.problem.setup.load > 0.0 and name in fit.problem.cells.electrical
 
     def changed(means):
         """The groups of contrasts that belong to groups of means."""
@@ -172,7 +174,7 @@ def _credibility(fit, name, powers, sure=frozenset()) -> float:
     for part in {(channel, contrast) for channel, _, contrast in p.groups}:
         mine = np.array([(channel, contrast) == part for channel, _, contrast in p.groups])
         total = power[mine].sum()
-        if total <= 0.0:
+        if total <= 0.0 or (inferred and part[0] == "torque"):
             continue
         own = mine & (power >= k.LIVES * total)
         if whole[own].all():  # what repeats with the electrical angle leaves nothing between its orders
