@@ -49,7 +49,7 @@ def judge(posterior, held) -> Judgement:
     setup = posterior.setup
     posterior = setup.call(shown, posterior, held)
     names, best = setup.call(names_of, posterior), posterior.best()
-    stray = setup.call(stray_of, posterior, held)
+    stray = setup.call(stray_of, posterior, frozenset(names.suspects), held)
     if not stray and _is_noise(posterior, names, held):
         # What only the angle of a free shaft shows is in no size: there the names decide.
         shaft = {n for n, effect in setup.effects.items() if effect.mechanical}
@@ -68,7 +68,8 @@ def judge(posterior, held) -> Judgement:
 
 def told_of(names, best) -> set[str]:
     """Effects of the best set that explain a part of the misfit: those that are named, open, or likely."""
-    likely = {n for n, p in names.maybe.items() if p >= k.LIKELY}
+    effects = best.problem.setup.effects
+    likely = {n for n, p in names.maybe.items() if p >= k.LIKELY and effects[n].named}
     return (names.said | {n for group in names.open for n in group} | likely) & set(best.names) - set(names.suspects)
 
 
@@ -217,11 +218,16 @@ def _shares(posterior, names, told, channel, held, measured) -> dict[str, float]
     return out
 
 
-def stray_of(posterior, held) -> Stray | None:
-    """A misfit outside the orders of the balance, after the best set."""
-    best = posterior.best()
-    problem, setup = best.problem, posterior.setup
+def stray_of(posterior, suspects, held) -> Stray | None:
+    """A misfit outside the orders of the balance, after the best set of which every cause is named or in ``suspects``.
+
+    What is only possible and has no name would not be told, so that it explains nothing here.
+    """
+    setup = posterior.setup
     effects = setup.effects
+    told = [f for f in posterior.fits.values() if all(effects[n].named or n in suspects for n in f.names)]
+    best = max(told, key=lambda f: f.value)
+    problem = best.problem
     doubts = [effects[n].doubt(best.c[n], setup.view) for n in best.names]
     doubt = np.sqrt(sum((np.square(d) for d in doubts), np.zeros(len(setup.view))))
     sizes = Sizes(setup, setup.cells.y, setup.cells.y, ~held, measured_torque(setup))
