@@ -202,10 +202,10 @@ FAULTS = {
         same("omega_e"),
     ),
     "speed reversed": (
-        lambda x: edit(x, omega_e=-x["omega_e"]), "rotation", "omega_e", 0, same("omega_e"),
+        lambda x: edit(x, omega_e=-x["omega_e"]), "sign", "omega_e", 0, same("omega_e"),
     ),
     "torque of a load": (
-        lambda x: edit(x, torque=-shaft(x)), "torque_sign", "torque", 0,
+        lambda x: edit(x, torque=-shaft(x)), "sign", "torque", 0,
         lambda r, x: np.array_equal(r["torque"], shaft(x)),
     ),
     "currents that do not belong together": (

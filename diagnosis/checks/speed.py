@@ -25,16 +25,13 @@ def check(recording, nominal) -> None:
     rows = rows_of(recording, nominal)
     confirmed = rows is not None and not rows.steady and discriminates(rows) and misfit(rows) < 2 * FIT
     if abs(ratio + 1.0) <= LARGE:
-        message = "speed and angle have opposite signs"
+        message, column = "speed and angle have opposite signs", "omega_e"
         if (
             rows is not None and rows.steady
         ):  # dq values: the speed was checked against them, the angle cannot be
-            recording.columns["theta_e"] = -recording["theta_e"]
-            action = "the angle is reversed"
-        else:
-            recording.columns["omega_e"] = -recording["omega_e"]
-            action = "the speed is reversed"
-        recording.problems.append(Problem("rotation", message, "omega_e", 0, n, action))
+            column = "theta_e"
+        recording.columns[column] = -recording[column]
+        recording.problems.append(Problem("sign", message, column, 0, n, "corrected"))
         return
     recording.meta["angle_speed"] = ratio  # tells other pole pairs (ingest/restated.py)
     message = f"the angle advances {ratio:.3g} times as fast as the speed says"

@@ -34,9 +34,8 @@ def check(recording, nominal) -> None:
     if rows is None or not discriminates(rows) or misfit(rows) > 2 * FIT:
         return
     recording.columns["torque"] = -torque
-    message = "torque and currents have opposite signs"
-    n = int(good.sum())
-    recording.problems.append(Problem("torque_sign", message, "torque", 0, n, "the torque is reversed"))
+    message = "torque is positive when the machine brakes"
+    recording.problems.append(Problem("sign", message, "torque", 0, int(good.sum()), "corrected"))
 
 
 def _current(recording) -> np.ndarray | None:
