@@ -16,7 +16,9 @@ def answer_to(mistake, tmp_path):
 @pytest.mark.parametrize("degrees", [100, slowly(48), slowly(-75), slowly(-150), slowly(165)])
 def test_an_angle_off_by_any_part_of_a_turn_is_found(degrees, tmp_path):
     answer = answer_to(Mistake("", turned(np.radians(degrees))), tmp_path)
-    assert answer.verdict == "explained" and [e.name for e in answer.effects] == ["encoder_offset"]
+    assert [e.name for e in answer.effects] == ["encoder_offset"]
+    # A resistance that is 1.6 % larger, less than what is of interest, may be seen beside it as one or as its drift.
+    assert {n for group in answer.ambiguity for n in group} <= {"resistance", "resistance_temperature"}
     offset = answer.effects[0].parameters["offset_rad"]
     assert abs(np.degrees(offset.value) - degrees) < 1.0 and offset.sigma < 0.02
 

@@ -62,7 +62,6 @@ def test_the_noise_is_at_most_that_of_the_misfit(tmp_path):
 @pytest.mark.parametrize(
     ("seed", "count", "number", "names"),
     [
-        slowly(24112026, 100, 10, {"dead_time", "emf_harmonics"}),  # a resistance made its uncertain curve smaller
         (24112026, 100, 24, {"magnet_temperature", "resistance_temperature"}),  # the sensor lags: no wrong resistance
         slowly(LATER, 80, 1, {"current_offset", "sampling_skew"}),  # noise at full speed was cut as if it were outliers
         slowly(LATER, 80, 15, {"inductance_q", "saturation"}),  # the saturation's curve took the inductance
@@ -74,6 +73,14 @@ def test_the_noise_is_at_most_that_of_the_misfit(tmp_path):
 def test_exactly_what_is_there_is_named_of_the_own_generator(seed, count, number, names, tmp_path):
     answer = diagnose(*files_of(number, tmp_path, seed, "own", count))
     assert {e.name for e in answer.effects} == names and answer.verdict == "explained"
+
+
+@pytest.mark.slow
+def test_what_a_strong_dead_time_leaves_is_named_as_nothing(tmp_path):
+    """A resistance made the uncertain curve of its loss smaller; a lag of 1.3 times what is of interest stays open."""
+    answer = diagnose(*files_of(10, tmp_path, 24112026, "own", 100))
+    assert {e.name for e in answer.effects} == {"dead_time", "emf_harmonics"}
+    assert answer.ambiguity in ([], [["delay", "sampling_skew"]])
 
 
 @pytest.mark.slow

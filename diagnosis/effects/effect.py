@@ -93,11 +93,6 @@ class Effect:
     stays: str = ""  # why a drive file cannot take the effect out of a recording that has it
     smoothed: bool = False  # its columns use smoothed currents also when the model is applied
 
-    @property
-    def may_be_wrong(self) -> bool:
-        """Whether its formula may be wrong by a share: not that of a constant or a scale, nor a curve of any form."""
-        return not self.exact and self.curve < 1.0
-
     def core(self, view) -> dict[str, Column]:
         """Columns of the usual formula, {coefficient: column}."""
         raise NotImplementedError

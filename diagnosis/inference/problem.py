@@ -115,7 +115,7 @@ class Problem:
         # Where no formula is preferred (a curve of 1), the free columns tell the size too.
         tells = lambda name, key: not key.startswith("~") or self.setup.effects[name].curve >= 1.0  # noqa: E731
         core = np.array([tells(*self.keys[n]) for n in mine] + [True] * common, bool)
-        formula = np.array([k.FORMULA if self.setup.effects[n].may_be_wrong else 0.0 for n in names] + [0.0])
+        formula = np.array([0.0 if self.setup.effects[n].exact else k.FORMULA for n in names] + [0.0])
         drags = p.loads >= 0 and bool(x[p.group == p.loads].any())
         always = k.ALWAYS_LOADED if p.loads >= 0 else 1.0
         tried = [
