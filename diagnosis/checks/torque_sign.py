@@ -9,7 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from fluxproof.diagnosis.checks.balance import FIT, TURNS, discriminates, misfit, rows_of
+from fluxproof.diagnosis.balance.blocks import stator_current
+from fluxproof.diagnosis.balance.shaft import airgap
+from fluxproof.diagnosis.checks.balance import FIT, discriminates, misfit, rows_of
+from fluxproof.diagnosis.nominal import flux_level
 from fluxproof.diagnosis.recording import Problem
 
 STAGE = "signals"
@@ -20,15 +23,14 @@ ALIKE = 0.5  # of the air-gap torque: most that the opposite of a reversed torqu
 def check(recording, nominal) -> None:
     if not recording.has("torque", "omega_e"):
         return
-    i, m = _current(recording), nominal.machine
+    i = _current(recording)
     if i is None:
         return
-    psi = m.inductance_d_h * i.real + 1j * m.inductance_q_h * i.imag + m.magnet_flux_wb
-    airgap, torque = 1.5 * m.pole_pairs * (np.conj(psi) * i).imag, recording["torque"]
-    good = recording.usable & np.isfinite(torque) & np.isfinite(airgap)
-    rated = 1.5 * m.pole_pairs * np.abs(psi).max() * m.rated_current_a
-    size = _rms(airgap[good])
-    if size < LOADED * rated or _rms((torque + airgap)[good]) > ALIKE * size:
+    driving, torque = airgap(nominal, i), recording["torque"]
+    good = recording.usable & np.isfinite(torque) & np.isfinite(driving)
+    rated = 1.5 * nominal.machine.pole_pairs * flux_level(nominal.machine) * nominal.machine.rated_current_a
+    size = _rms(driving[good])
+    if size < LOADED * rated or _rms((torque + driving)[good]) > ALIKE * size:
         return
     rows = rows_of(recording, nominal)
     if rows is None or not discriminates(rows) or misfit(rows) > 2 * FIT:
@@ -44,9 +46,7 @@ def _current(recording) -> np.ndarray | None:
         return recording["i_d"] + 1j * recording["i_q"]
     if not recording.has("i_a", "i_b", "theta_e"):
         return None
-    a, b = recording["i_a"], recording["i_b"]
-    c = recording["i_c"] if recording.has("i_c") else -a - b
-    return (2 / 3) * (np.stack([a, b, c], axis=-1) @ TURNS) * np.exp(-1j * recording["theta_e"])
+    return stator_current(recording, None)[0] * np.exp(-1j * recording["theta_e"])
 
 
 def _rms(x) -> float:
