@@ -85,7 +85,7 @@ def _beats(view, response, places, tapered):
 
 def _voltage(view, part, turn, cycles):
     """Misfit [V] per rad of the codes' error at so many cycles per sample."""
-    rate, gain = 2 * np.pi * cycles, _mean(cycles, 2 * HALF_WIDTH + 1)
+    rate, gain = 2 * np.pi * cycles, mean_of_wave(cycles, 2 * HALF_WIDTH + 1)
     psi = np.abs(view.nominal_psi[part].mean(axis=1))[:, None]
     rotated = turn + gain * rate if view.dq_voltage else gain * (turn + rate)
     return psi * rotated / view.sample_time_s
@@ -94,7 +94,7 @@ def _voltage(view, part, turn, cycles):
 def _torque(view, part, _turn, cycles):
     """Torque [Nm] per rad of the codes' error: the second differences of blocks.py, four-point or slow."""
     x, inertia = np.pi * cycles, (view.machine.inertia_kgm2 or 0.0) / view.machine.pole_pairs
-    slow = _mean(cycles, 2 * HALF_WIDTH + 1) * 2.0 * (np.cos(2 * SLOPE_REACH * x) - 1.0) / SLOPE_REACH**2
+    slow = mean_of_wave(cycles, 2 * HALF_WIDTH + 1) * 2.0 * (np.cos(2 * SLOPE_REACH * x) - 1.0) / SLOPE_REACH**2
     bend = np.where(view.turns_freely[part][:, None], np.cos(3 * x) - np.cos(x), slow)
     return inertia * bend / view.sample_time_s**2
 
@@ -102,11 +102,12 @@ def _torque(view, part, _turn, cycles):
 def _window(cycles, count, tapered):
     """Mean over ``count`` samples of a wave of so many cycles per sample; tapered: times 1 + cos, as the torque is."""
     if not tapered:
-        return _mean(cycles, count)
-    return _mean(cycles, count) + 0.5 * (_mean(cycles + 1 / count, count) + _mean(cycles - 1 / count, count))
+        return mean_of_wave(cycles, count)
+    beside = mean_of_wave(cycles + 1 / count, count) + mean_of_wave(cycles - 1 / count, count)
+    return mean_of_wave(cycles, count) + 0.5 * beside
 
 
-def _mean(cycles, count):
+def mean_of_wave(cycles, count):
     """Mean of a wave of so many cycles per sample over ``count`` samples around its maximum."""
     x = np.pi * cycles
     small = np.abs(np.sin(x)) < 1e-9

@@ -2,21 +2,19 @@
 
 With as many pole pairs as the machine it is wrong twice per electrical turn.  Of amplitudes that differ by the share a,
 and an angle between the windings that is wrong by q, the error is a/2 sin(2 theta_e) + q/2 cos(2 theta_e), beside a
-constant q/2 that is an offset.  The mean of the angle over N samples (blocks.py) keeps sin(N x / 2) / (N sin(x / 2)) of
-it, with x = 2 omega T.
+constant q/2 that is an offset.  The mean of the angle over some samples (blocks.py) keeps a part of it, less at higher
+speed.
 """
 
 import numpy as np
 
+from fluxproof.diagnosis.balance.quantised_angle import mean_of_wave
 from fluxproof.diagnosis.balance.view import HALF_WIDTH
 from fluxproof.diagnosis.effects.effect import Effect, Parameter, angle_error, one
 
-SAMPLES = 2 * HALF_WIDTH + 1
-
 
 def _waves(view):
-    half = view.omega * view.sample_time_s + 1e-9  # x / 2, never zero
-    kept = np.sin(SAMPLES * half) / (SAMPLES * np.sin(half))
+    kept = mean_of_wave(view.omega * view.sample_time_s / np.pi, 2 * HALF_WIDTH + 1)
     return {"sin": kept * np.sin(2.0 * view.theta), "cos": kept * np.cos(2.0 * view.theta)}
 
 
