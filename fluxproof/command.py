@@ -18,9 +18,9 @@ from fluxproof.commission import command as commission
 from fluxproof.diagnosis import command as diagnose
 from fluxproof.diagnosis.recording import RecordingError
 from fluxproof.fleet import command as fleet
-from fluxproof.golden_model.drive_keys import DriveError
 from fluxproof.project import command as project
 from fluxproof.simulate import command as simulate
+from golden_model.drive_keys import DriveError
 
 
 class Command(NamedTuple):

@@ -10,11 +10,11 @@ import argparse
 import json
 from pathlib import Path
 
-from fluxproof.golden_model import fluxproof
-from fluxproof.golden_model.board_registers import board_set
-from fluxproof.golden_model.drive import load
-from fluxproof.golden_model.drive_keys import DriveError
-from fluxproof.golden_model.registers import RegisterSet
+from golden_model import fluxproof
+from golden_model.board_registers import board_set
+from golden_model.drive import load
+from golden_model.drive_keys import DriveError
+from golden_model.registers import RegisterSet
 
 REPLAY = {
     "reset": "begins with the first sample after a reset: the golden model can replay all of it",

@@ -10,12 +10,12 @@ import json
 from pathlib import Path
 
 from fluxproof.files import write_json
-from fluxproof.golden_model.board_registers import board_generics, board_set, has_board
-from fluxproof.golden_model.drive import Drive, load
-from fluxproof.golden_model.drive_keys import DriveError
-from fluxproof.golden_model.generated.register_names import ADDRESSES
-from fluxproof.golden_model.registers import RegisterSet, Row
-from fluxproof.golden_model.units import SIGNALS, si_per_lsb
+from golden_model.board_registers import board_generics, board_set, has_board
+from golden_model.drive import Drive, load
+from golden_model.drive_keys import DriveError
+from golden_model.generated.register_names import ADDRESSES
+from golden_model.registers import RegisterSet, Row
+from golden_model.units import SIGNALS, si_per_lsb
 
 HEAD = ("register", "address", "SI value", "unit", "integer", "represented", "error", "legal range")
 LEFT = (0, 3)  # columns of words; numbers are right-aligned

@@ -29,8 +29,8 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
-from fluxproof.golden_model.fixed import Format
-from fluxproof.golden_model.formats import BIT
+from golden_model.fixed import Format
+from golden_model.formats import BIT
 
 
 @dataclass(frozen=True)

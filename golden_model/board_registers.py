@@ -12,14 +12,14 @@ does not have is 0, or the lowest value of its range.  docs/board.md says what e
 
 import math
 
-from fluxproof.golden_model.converters import sinc3, sinc_overcurrent
-from fluxproof.golden_model.drive import Drive
-from fluxproof.golden_model.drive_keys import DriveError
-from fluxproof.golden_model.encoders import edge_timer, position_bridge, turn_counter
-from fluxproof.golden_model.front_ends import frame_s
-from fluxproof.golden_model.io import board_map, speed
-from fluxproof.golden_model.io.sample_checks import JUMP
-from fluxproof.golden_model.registers import RegisterSet, Row, registers
+from golden_model.converters import sinc3, sinc_overcurrent
+from golden_model.drive import Drive
+from golden_model.drive_keys import DriveError
+from golden_model.encoders import edge_timer, position_bridge, turn_counter
+from golden_model.front_ends import frame_s
+from golden_model.io import board_map, speed
+from golden_model.io.sample_checks import JUMP
+from golden_model.registers import RegisterSet, Row, registers
 
 SECTORS = 6  # of Hall sensors in an electrical turn
 HALL_JUMP = 1.5 / SECTORS  # turns: a sector is a step, two at once are a fault

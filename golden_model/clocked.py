@@ -8,11 +8,11 @@ the following step on.
 
 from typing import NamedTuple
 
-from fluxproof.golden_model import fluxproof
-from fluxproof.golden_model.io import fault_latch, host_watch, sample_guard
-from fluxproof.golden_model.io.sample_guard import AGE_W
-from fluxproof.golden_model.kernel import kernel
-from fluxproof.golden_model.modulation import gate_generation
+from golden_model import fluxproof
+from golden_model.io import fault_latch, host_watch, sample_guard
+from golden_model.io.sample_guard import AGE_W
+from golden_model.kernel import kernel
+from golden_model.modulation import gate_generation
 
 INTERVAL = fluxproof.SAMPLE_INTERVAL
 # clocks after a sample entered -> its values that are valid then

@@ -15,10 +15,10 @@ import dataclasses
 import math
 from dataclasses import dataclass
 
-from fluxproof.golden_model.drive_checks import check
-from fluxproof.golden_model.drive_file import read_sections
-from fluxproof.golden_model.drive_keys import DriveError, flag, not_negative, positive, real, whole
-from fluxproof.golden_model.front_ends import Converters, Encoder
+from golden_model.drive_checks import check
+from golden_model.drive_file import read_sections
+from golden_model.drive_keys import DriveError, flag, not_negative, positive, real, whole
+from golden_model.front_ends import Converters, Encoder
 
 
 @dataclass(frozen=True)
@@ -40,9 +40,9 @@ class Machine:
     temperature_magnet_c: float = real("degC", "at the start of a simulation", 20.0)
     resistance_temp_coeff_per_k: float = real("1/K", "copper: 0.0039", 0.0)
     magnet_temp_coeff_per_k: float = real("1/K", "NdFeB: about -0.001", 0.0)
-    saturation_d_per_a2: float = not_negative("1/A2", "see plant/pmsm.py", 0.0)
-    saturation_q_per_a2: float = not_negative("1/A2", "see plant/pmsm.py", 0.0)
-    cross_saturation_wb_per_a2: float = real("Wb/A2", "see plant/pmsm.py", 0.0)
+    saturation_d_per_a2: float = not_negative("1/A2", "see fluxproof/plant/pmsm.py", 0.0)
+    saturation_q_per_a2: float = not_negative("1/A2", "see fluxproof/plant/pmsm.py", 0.0)
+    cross_saturation_wb_per_a2: float = real("Wb/A2", "see fluxproof/plant/pmsm.py", 0.0)
     iron_conductance_s: float = not_negative("S", "1 / R_fe", 0.0)
 
 

@@ -2,10 +2,10 @@
 
 import math
 
-from fluxproof.golden_model.drive_keys import DriveError
-from fluxproof.golden_model.fluxproof import SAMPLE_INTERVAL
-from fluxproof.golden_model.formats import PU, VECTOR
-from fluxproof.golden_model.front_ends import check_converters, check_encoder
+from golden_model.drive_keys import DriveError
+from golden_model.fluxproof import SAMPLE_INTERVAL
+from golden_model.formats import PU, VECTOR
+from golden_model.front_ends import check_converters, check_encoder
 
 CARRIER_HALF_RANGE = (8, 32767)  # generic CARRIER_HALF of rtl/fluxproof.vhd
 WHOLE = 1e-6  # relative; a decimal fraction with seven digits counts as exact

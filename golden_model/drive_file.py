@@ -14,7 +14,7 @@ try:
 except ModuleNotFoundError:  # Python 3.10
     import tomli as tomllib
 
-from fluxproof.golden_model.drive_keys import DriveError, key_of
+from golden_model.drive_keys import DriveError, key_of
 
 # Columns and constants of recordings, and physics beyond the core's model: all are read by diagnosis/.
 IGNORED = ("columns", "constants", "plant")

@@ -5,8 +5,8 @@
 
 from typing import NamedTuple
 
-from fluxproof.golden_model.control import dead_time_compensation
-from fluxproof.golden_model.estimators import (
+from golden_model.control import dead_time_compensation
+from golden_model.estimators import (
     applied_voltage,
     clean_voltage,
     current_directions,
@@ -21,8 +21,8 @@ from fluxproof.golden_model.estimators import (
     v_dead_adaline,
     winding_resistance,
 )
-from fluxproof.golden_model.kernel import kernel
-from fluxproof.golden_model.transforms import flux_inverse_park, flux_park, park
+from golden_model.kernel import kernel
+from golden_model.transforms import flux_inverse_park, flux_park, park
 
 
 class State(NamedTuple):

@@ -13,7 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-from fluxproof.golden_model.kernel import kernel
+from golden_model.kernel import kernel
 
 
 @dataclass(frozen=True)

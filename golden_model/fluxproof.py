@@ -7,9 +7,9 @@ at every clock (sample guard, fault latch, gate generation) is in golden_model/c
 from collections import namedtuple
 from typing import NamedTuple
 
-from fluxproof.golden_model import estimation
-from fluxproof.golden_model.block import Port
-from fluxproof.golden_model.control import (
+from golden_model import estimation
+from golden_model.block import Port
+from golden_model.control import (
     chord_speed,
     current_limit,
     current_pi,
@@ -18,8 +18,8 @@ from fluxproof.golden_model.control import (
     speed_pi,
     voltage_limit,
 )
-from fluxproof.golden_model.control.dead_time_compensation import D_D, D_Q
-from fluxproof.golden_model.estimators import (
+from golden_model.control.dead_time_compensation import D_D, D_Q
+from golden_model.estimators import (
     applied_voltage,
     clean_voltage,
     current_directions,
@@ -36,10 +36,10 @@ from fluxproof.golden_model.estimators import (
     v_dead_adaline,
     winding_resistance,
 )
-from fluxproof.golden_model.estimators.flux_models import CURRENT_MODEL
-from fluxproof.golden_model.fixed import Format
-from fluxproof.golden_model.formats import PU
-from fluxproof.golden_model.io import (
+from golden_model.estimators.flux_models import CURRENT_MODEL
+from golden_model.fixed import Format
+from golden_model.formats import PU
+from golden_model.io import (
     brake_chopper,
     current_conditioning,
     fault_latch,
@@ -55,9 +55,9 @@ from fluxproof.golden_model.io import (
     u_dc_conditioning,
     u_dc_processing,
 )
-from fluxproof.golden_model.kernel import kernel
-from fluxproof.golden_model.modulation import gate_generation, pwm_compare, svm, svm_delay_compensation
-from fluxproof.golden_model.transforms import clarke, flux_inverse_park, flux_park, inverse_park, park, sincos
+from golden_model.kernel import kernel
+from golden_model.modulation import gate_generation, pwm_compare, svm, svm_delay_compensation
+from golden_model.transforms import clarke, flux_inverse_park, flux_park, inverse_park, park, sincos
 
 # Instance of the top -> (its block, the instances it waits for).  A block starts when the last of them is done.
 WIRING = {

@@ -4,7 +4,7 @@
 of two: the base is the measuring range of the sensor, and sums of two such quantities still fit.
 """
 
-from fluxproof.golden_model.fixed import Format
+from golden_model.fixed import Format
 
 BIT = Format(0, 1, 0)
 PU = Format(1, 1, 16)  # currents, voltages, speeds, flux linkages

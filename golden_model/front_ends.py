@@ -5,7 +5,7 @@ The front ends of docs/board.md are set from these keys; without a section the c
 
 from dataclasses import dataclass
 
-from fluxproof.golden_model.drive_keys import DriveError, choice, flag, not_negative, positive, whole
+from golden_model.drive_keys import DriveError, choice, flag, not_negative, positive, whole
 
 # kind -> (keys it needs, keys it may have besides)
 ENCODERS = {

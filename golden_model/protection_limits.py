@@ -9,11 +9,11 @@ incremental encoder: no shaft accelerates that much within a sample, and a froze
 per sample on.
 """
 
-from fluxproof.golden_model.formats import LIMIT
-from fluxproof.golden_model.io.fault_latch import NAMES
-from fluxproof.golden_model.io.offset_check import OFFSET
-from fluxproof.golden_model.scale_entry import Entry, base_keys
-from fluxproof.golden_model.units import TURN_RAD
+from golden_model.formats import LIMIT
+from golden_model.io.fault_latch import NAMES
+from golden_model.io.offset_check import OFFSET
+from golden_model.scale_entry import Entry, base_keys
+from golden_model.units import TURN_RAD
 
 TRIP_OF_LIMIT, TRIP_OF_RANGE = 2.0, 0.98  # overcurrent: of the current limit, at most of the sensors' range
 SUM_OF_RATED = 0.2  # of the rated current: a larger sum of the phase currents is a sensor fault

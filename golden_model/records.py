@@ -11,10 +11,10 @@ generics say.
 
 from dataclasses import replace
 
-from fluxproof.golden_model import estimation, fluxproof, formats
-from fluxproof.golden_model.block import Port
-from fluxproof.golden_model.fixed import Format
-from fluxproof.golden_model.io import sample_latch
+from golden_model import estimation, fluxproof, formats
+from golden_model.block import Port
+from golden_model.fixed import Format
+from golden_model.io import sample_latch
 
 WIDEST = {"ADC_BITS": 16, "POSITION_BITS": 18}
 # Field of sample_t -> the name of the value as an input of sample_latch.

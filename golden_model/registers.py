@@ -7,11 +7,11 @@ Dead time and minimum pulse are rounded up, because they must not be shorter tha
 import math
 from typing import NamedTuple
 
-from fluxproof.golden_model.drive import Drive
-from fluxproof.golden_model.drive_keys import DriveError
-from fluxproof.golden_model.fluxproof import REGISTERS, Config, Registers
-from fluxproof.golden_model.scaling import PARTS, ROUND_UP, gates
-from fluxproof.golden_model.units import TURN_RAD
+from golden_model.drive import Drive
+from golden_model.drive_keys import DriveError
+from golden_model.fluxproof import REGISTERS, Config, Registers
+from golden_model.scaling import PARTS, ROUND_UP, gates
+from golden_model.units import TURN_RAD
 
 
 class Row(NamedTuple):

@@ -1,7 +1,7 @@
 """Every block of the core, one line each: add yours here and the bench finds it."""
 
-from fluxproof.golden_model.common import input_filter, multiply_add, packet_fifo, reciprocal, sqrt, sum_of_products
-from fluxproof.golden_model.control import (
+from golden_model.common import input_filter, multiply_add, packet_fifo, reciprocal, sqrt, sum_of_products
+from golden_model.control import (
     chord_speed,
     current_limit,
     current_pi,
@@ -10,7 +10,7 @@ from fluxproof.golden_model.control import (
     speed_pi,
     voltage_limit,
 )
-from fluxproof.golden_model.converters import (
+from golden_model.converters import (
     current_front,
     delta_sigma,
     modulator_input,
@@ -22,7 +22,7 @@ from fluxproof.golden_model.converters import (
     third_current,
     xadc_reader,
 )
-from fluxproof.golden_model.encoders import (
+from golden_model.encoders import (
     biss_master,
     edge_timer,
     endat_master,
@@ -38,7 +38,7 @@ from fluxproof.golden_model.encoders import (
     ssi_master,
     turn_counter,
 )
-from fluxproof.golden_model.estimators import (
+from golden_model.estimators import (
     applied_voltage,
     clean_voltage,
     current_directions,
@@ -55,7 +55,7 @@ from fluxproof.golden_model.estimators import (
     v_dead_adaline,
     winding_resistance,
 )
-from fluxproof.golden_model.io import (
+from golden_model.io import (
     board_faults,
     board_snapshot,
     brake_chopper,
@@ -77,8 +77,8 @@ from fluxproof.golden_model.io import (
     u_dc_conditioning,
     u_dc_processing,
 )
-from fluxproof.golden_model.modulation import gate_generation, pwm_compare, svm, svm_delay_compensation
-from fluxproof.golden_model.transforms import (
+from golden_model.modulation import gate_generation, pwm_compare, svm, svm_delay_compensation
+from golden_model.transforms import (
     clarke,
     flux_inverse_park,
     flux_park,

@@ -24,9 +24,9 @@ docs/board.md.
 
 import math
 
-from fluxproof.golden_model.protection_limits import protection
-from fluxproof.golden_model.scale_entry import Entry, base_keys
-from fluxproof.golden_model.units import TURN_RAD
+from golden_model.protection_limits import protection
+from golden_model.scale_entry import Entry, base_keys
+from golden_model.units import TURN_RAD
 
 INTEGRAL_CORNER = 5.0  # speed crossover over the corner of the speed regulator's integral
 FLUX_OVER_SPEED, FLUX_OF_CURRENT, FLUX_ALONE = 2.0, 0.5, 0.1  # flux bandwidth over the others, see above

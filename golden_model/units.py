@@ -5,8 +5,8 @@ The scale of a signal is the value of its LSB: format LSB times base.  Compare v
 
 import math
 
-from fluxproof.golden_model.fluxproof import OBSERVED
-from fluxproof.golden_model.io import sample_latch
+from golden_model.fluxproof import OBSERVED
+from golden_model.io import sample_latch
 
 TURN_RAD = 2.0 * math.pi
 SIGNALS = {p.name: p for p in sample_latch.BLOCK.outputs} | OBSERVED  # raw sample and references first

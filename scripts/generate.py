@@ -11,12 +11,12 @@ import sys
 from pathlib import Path
 
 from fluxproof.files import write_text
-from fluxproof.golden_model import fluxproof, formats
-from fluxproof.golden_model.block import Const, Port
-from fluxproof.golden_model.fixed import Format
-from fluxproof.golden_model.io import register_map
-from fluxproof.golden_model.records import RECORDS, vhdl_type
-from fluxproof.golden_model.registry import BLOCKS
+from golden_model import fluxproof, formats
+from golden_model.block import Const, Port
+from golden_model.fixed import Format
+from golden_model.io import register_map
+from golden_model.records import RECORDS, vhdl_type
+from golden_model.registry import BLOCKS
 from scripts import generate_telemetry
 
 PACKAGE = Path(__file__).resolve().parent.parent / "rtl" / "generated" / "fluxproof_pkg.vhd"

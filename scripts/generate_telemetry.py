@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from fluxproof.golden_model.io import telemetry_words as packet
-from fluxproof.golden_model.records import generic_of, vhdl_type
-from fluxproof.golden_model.units import UNITS
+from golden_model.io import telemetry_words as packet
+from golden_model.records import generic_of, vhdl_type
+from golden_model.units import UNITS
 
 ROOT = Path(__file__).resolve().parent.parent
 ENTITY = ROOT / "rtl" / "generated" / "telemetry_words.vhd"

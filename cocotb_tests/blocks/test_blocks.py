@@ -11,7 +11,7 @@ import pytest
 from fluxproof.checkout import ROOT, RTL
 from fluxproof.cosim import bench_plan, ghdl
 from fluxproof.cosim.stimulus import MEDIUM, samples
-from fluxproof.golden_model.registry import BLOCKS
+from golden_model.registry import BLOCKS
 
 SEED = int(os.environ.get("FLUXPROOF_SEED", "1"))
 CASES = [(b, k) for b in BLOCKS.values() for k in range(len(b.configs))]
@@ -86,7 +86,7 @@ def test_models_mirror_the_rtl():
 
 def test_sincos_at_every_angle():
     """The error is within its bound at all 2**18 angles, and the magnitude is 1 within twice the bound."""
-    from fluxproof.golden_model.transforms import sincos
+    from golden_model.transforms import sincos
 
     bound = sincos.bound(None, None)["cos_theta"]
     angles = np.arange(1 << 18)
@@ -98,7 +98,7 @@ def test_sincos_at_every_angle():
 
 def test_u_dc_reciprocal_over_the_whole_range():
     """U_dc as 2**n/m: relative error at most 2**-17 for every code from 1/32 to full scale."""
-    from fluxproof.golden_model.io import u_dc_processing
+    from golden_model.io import u_dc_processing
 
     for u_dc in range(u_dc_processing.U_DC_MIN, 1 << 17):
         inverse, _beta, low = u_dc_processing.step(u_dc)

@@ -14,7 +14,7 @@ import pytest
 from cocotb_tests.support import converter_twins
 from cocotb_tests.support.converter_models import SpiConverter, Xadc, modulate
 from fluxproof.cosim.verilated import VerilatedCore
-from fluxproof.golden_model.converters import sinc3, spi_converter, spi_frame, xadc_reader
+from golden_model.converters import sinc3, spi_converter, spi_frame, xadc_reader
 
 LINES = 3
 # bits, word, leading zeros, words, start, signed, first bit with CS, launching edge; SCLK idles high, second edge takes

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from fluxproof.checkout import ROOT, RTL
-from fluxproof.golden_model import fixed
-from fluxproof.golden_model.block import Const
-from fluxproof.golden_model.fixed import Format
+from golden_model import fixed
+from golden_model.block import Const
+from golden_model.fixed import Format
 from scripts import generate
 
 SMALL_BITS = 7

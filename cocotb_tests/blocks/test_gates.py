@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fluxproof.golden_model.modulation.gate_generation import BLOCK, step
+from golden_model.modulation.gate_generation import BLOCK, step
 
 HALF = 40
 CLOCKS = 60_000

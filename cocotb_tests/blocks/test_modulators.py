@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from cocotb_tests.support.converter_models import modulate
-from fluxproof.golden_model.converters import modulator_input, sinc_overcurrent
+from golden_model.converters import modulator_input, sinc_overcurrent
 
 VALID, HOLD = 3, 1  # clocks: a bit is on the line so long after the edge that launches it, the one before stays so long
 

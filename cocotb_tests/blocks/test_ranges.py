@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from fluxproof.golden_model.fixed import round_half_up
-from fluxproof.golden_model.formats import INTEGRAL, PU, PU_TO_INTEGRAL, U_DC, U_MAX
-from fluxproof.golden_model.io import speed, u_dc_conditioning, u_dc_processing
-from fluxproof.golden_model.modulation import svm
+from golden_model.fixed import round_half_up
+from golden_model.formats import INTEGRAL, PU, PU_TO_INTEGRAL, U_DC, U_MAX
+from golden_model.io import speed, u_dc_conditioning, u_dc_processing
+from golden_model.modulation import svm
 
 ROUNDING = 2  # LSB that the rotation back may add to what the circle grants
 

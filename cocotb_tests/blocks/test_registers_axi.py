@@ -16,15 +16,15 @@ from fluxproof.checkout import ROOT, RTL
 from fluxproof.command import main
 from fluxproof.cosim import flat, ghdl
 from fluxproof.cosim.entity import parse_entity, read_entity
-from fluxproof.golden_model import registers as drive_registers
-from fluxproof.golden_model.block import Port
-from fluxproof.golden_model.drive import load
-from fluxproof.golden_model.fixed import Format
-from fluxproof.golden_model.fluxproof import REGISTERS
-from fluxproof.golden_model.generated.register_names import ADDRESSES
-from fluxproof.golden_model.io import board_map, register_map
-from fluxproof.golden_model.io.register_file import RegisterFile, from_word, to_word
-from fluxproof.golden_model.io.register_map import DECERR, OKAY, SLVERR, Kind
+from golden_model import registers as drive_registers
+from golden_model.block import Port
+from golden_model.drive import load
+from golden_model.fixed import Format
+from golden_model.fluxproof import REGISTERS
+from golden_model.generated.register_names import ADDRESSES
+from golden_model.io import board_map, register_map
+from golden_model.io.register_file import RegisterFile, from_word, to_word
+from golden_model.io.register_map import DECERR, OKAY, SLVERR, Kind
 from scripts import generate
 from scripts.registers import export, generated, rdl, vhdl
 from scripts.registers.compiled import compile_file, words

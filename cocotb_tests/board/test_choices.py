@@ -7,8 +7,8 @@ import subprocess
 import pytest
 
 from fluxproof.cosim import ghdl
-from fluxproof.golden_model.converters import current_front
-from fluxproof.golden_model.encoders import position_front
+from golden_model.converters import current_front
+from golden_model.encoders import position_front
 
 CHOICES = [(encoder, encoder % len(current_front.KINDS)) for encoder in range(len(position_front.KINDS))]
 CHOICES += [(1, currents) for currents in (0, 2, 3)]

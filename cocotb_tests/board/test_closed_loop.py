@@ -29,12 +29,12 @@ from fluxproof.cosim.board_clock import SEEN
 from fluxproof.cosim.verilated import VerilatedCore
 from fluxproof.diagnosis.recording import from_columns
 from fluxproof.diagnosis.replay import digital, telemetry
-from fluxproof.golden_model.board_registers import board_set
-from fluxproof.golden_model.fluxproof import Observed, Sample
-from fluxproof.golden_model.generated.register_names import ADDRESSES
-from fluxproof.golden_model.io.fault_latch import TRIP
-from fluxproof.golden_model.io.telemetry_words import COUNT, pack
 from fluxproof.plant.sensors import current_code
+from golden_model.board_registers import board_set
+from golden_model.fluxproof import Observed, Sample
+from golden_model.generated.register_names import ADDRESSES
+from golden_model.io.fault_latch import TRIP
+from golden_model.io.telemetry_words import COUNT, pack
 
 
 def in_ghdl(periods: int, run: str, folder: Path, compiled: bool = False) -> dict[str, float]:

@@ -18,11 +18,11 @@ from fluxproof.commission.bus import CODES, VALUES, WINDOW, BusError, UioBus
 from fluxproof.commission.session import Refusal, Session
 from fluxproof.commission.simulated import SimulatedBus, board_of
 from fluxproof.commission.steps import commission
-from fluxproof.golden_model.drive import load
-from fluxproof.golden_model.drive_file import read_tables
-from fluxproof.golden_model.drive_keys import DriveError
-from fluxproof.golden_model.io import board_map
-from fluxproof.golden_model.io.register_map import IDENTIFICATION
+from golden_model.drive import load
+from golden_model.drive_file import read_tables
+from golden_model.drive_keys import DriveError
+from golden_model.io import board_map
+from golden_model.io.register_map import IDENTIFICATION
 from studies.board.commissioning import FAULTS, figures, refused, run
 from studies.board.motors import case
 

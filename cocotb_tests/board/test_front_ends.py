@@ -9,7 +9,7 @@ import sys
 
 from cocotb_tests.support.board_cases import MOVED, RATE
 from fluxproof.checkout import ROOT
-from fluxproof.golden_model.io.fault_latch import TRIP
+from golden_model.io.fault_latch import TRIP
 
 
 def run(case: str) -> dict:

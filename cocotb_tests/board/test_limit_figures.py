@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cocotb_tests.core.test_limits import DRIVE, QUARTER, SET, first, play, told
-from fluxproof.golden_model.units import from_si
+from golden_model.units import from_si
 
 
 @pytest.mark.study

@@ -10,12 +10,12 @@ import pytest
 from fluxproof.checkout import DRIVES
 from fluxproof.command import main
 from fluxproof.commission.session import Session
-from fluxproof.golden_model.board_registers import board_generics, board_registers, front_end_registers
-from fluxproof.golden_model.drive import load
-from fluxproof.golden_model.drive_keys import DriveError
-from fluxproof.golden_model.encoders import edge_timer
-from fluxproof.golden_model.front_ends import Converters, Encoder
-from fluxproof.golden_model.generated.register_names import ADDRESSES
+from golden_model.board_registers import board_generics, board_registers, front_end_registers
+from golden_model.drive import load
+from golden_model.drive_keys import DriveError
+from golden_model.encoders import edge_timer
+from golden_model.front_ends import Converters, Encoder
+from golden_model.generated.register_names import ADDRESSES
 
 NAMES = ("servo_24v", "hub_36v", "spindle_400v", "drone_24v")
 

@@ -15,10 +15,10 @@ from cocotb_tests.support.golden_board import GoldenBoard
 from cocotb_tests.support.rtl_board import RtlBoard
 from fluxproof.checkout import ROOT
 from fluxproof.cosim import verilog
-from fluxproof.golden_model import drive as drives
-from fluxproof.golden_model.io import board_map
-from fluxproof.golden_model.registers import registers
 from fluxproof.print_registers import c_lines
+from golden_model import drive as drives
+from golden_model.io import board_map
+from golden_model.registers import registers
 from scripts.registers.rdl import version_word
 
 PAPER = ROOT / "docs" / "drives" / "paper001.toml"

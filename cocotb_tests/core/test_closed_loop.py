@@ -11,9 +11,9 @@ import pytest
 from cocotb_tests.support.needs import skip_without_ghdl5
 from fluxproof.checkout import DRIVES
 from fluxproof.cosim.runs import InGhdl, InVerilator, Named
-from fluxproof.golden_model import drive as drives
-from fluxproof.golden_model import fluxproof
-from fluxproof.golden_model.estimation import Estimated
+from golden_model import drive as drives
+from golden_model import fluxproof
+from golden_model.estimation import Estimated
 from studies.timeline import __main__ as timeline
 
 PAPER = DRIVES / "paper001.toml"

@@ -8,12 +8,12 @@ import pytest
 from fluxproof.checkout import ROOT
 from fluxproof.cosim.golden_loop import run_averaged
 from fluxproof.cosim.scenarios import RPM
-from fluxproof.golden_model import drive as drives
-from fluxproof.golden_model import fluxproof
-from fluxproof.golden_model.estimators import flux_models
-from fluxproof.golden_model.registers import registers
-from fluxproof.golden_model.units import from_si
 from fluxproof.plant import FREE, IMPOSED_SPEED, Machine, Sensors, initial_state, plant_params, sensor_params
+from golden_model import drive as drives
+from golden_model import fluxproof
+from golden_model.estimators import flux_models
+from golden_model.registers import registers
+from golden_model.units import from_si
 
 DRIVE = drives.load(ROOT / "docs" / "drives" / "paper001.toml")
 T_S = DRIVE.sample_time_s

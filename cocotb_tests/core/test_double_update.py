@@ -13,13 +13,13 @@ from fluxproof.checkout import DRIVES
 from fluxproof.cosim.golden_loop import simulate
 from fluxproof.cosim.runs import InGhdl, InVerilator
 from fluxproof.cosim.scenarios import scenario
-from fluxproof.golden_model import drive as drives
-from fluxproof.golden_model import fluxproof
-from fluxproof.golden_model.drive_keys import DriveError
-from fluxproof.golden_model.modulation import pwm_compare
-from fluxproof.golden_model.registers import registers
-from fluxproof.golden_model.units import to_si
 from fluxproof.plant import IMPOSED_SPEED, RISING, AveragedPlant, Inverter, Machine, SwitchingPlant, half_gates
+from golden_model import drive as drives
+from golden_model import fluxproof
+from golden_model.drive_keys import DriveError
+from golden_model.modulation import pwm_compare
+from golden_model.registers import registers
+from golden_model.units import to_si
 from studies.board import double_update
 
 PAPER = DRIVES / "paper001.toml"

@@ -9,10 +9,10 @@ import pytest
 
 from cocotb_tests.core.test_registers import PAPER, ROOT, each_drive, edited
 from fluxproof.command import main
-from fluxproof.golden_model.board_registers import board_set, has_board
-from fluxproof.golden_model.drive import Drive, load, with_carrier
-from fluxproof.golden_model.drive_keys import DriveError
-from fluxproof.golden_model.fluxproof import REGISTERS
+from golden_model.board_registers import board_set, has_board
+from golden_model.drive import Drive, load, with_carrier
+from golden_model.drive_keys import DriveError
+from golden_model.fluxproof import REGISTERS
 
 WRONG = {  # section, line, what the message must contain besides the file's name
     "unknown key": (

@@ -10,9 +10,9 @@ from cocotb_tests.core.test_registers import PAPER
 from cocotb_tests.support.needs import skip_without_ghdl5
 from fluxproof.checkout import DRIVES
 from fluxproof.cosim.runs import InVerilator, Named
-from fluxproof.golden_model.drive import load, with_carrier
-from fluxproof.golden_model.registers import registers
 from fluxproof.plant import Sensors, position_code, sensor_params
+from golden_model.drive import load, with_carrier
+from golden_model.registers import registers
 
 NAMES = ("servo_24v", "hub_36v", "spindle_400v", "drone_24v")
 

@@ -14,12 +14,12 @@ from fluxproof.checkout import ROOT
 from fluxproof.cosim import ghdl
 from fluxproof.cosim.closed_loop import INPUT_PORTS, gate_words
 from fluxproof.cosim.golden_clock import SEEN, GoldenClock
-from fluxproof.golden_model import drive as drives
-from fluxproof.golden_model import fluxproof
-from fluxproof.golden_model.drive_keys import DriveError
-from fluxproof.golden_model.io import sample_latch
-from fluxproof.golden_model.io.fault_latch import NAMES
-from fluxproof.golden_model.registers import registers
+from golden_model import drive as drives
+from golden_model import fluxproof
+from golden_model.drive_keys import DriveError
+from golden_model.io import sample_latch
+from golden_model.io.fault_latch import NAMES
+from golden_model.registers import registers
 from studies.faults import __main__ as faults
 from studies.faults.bench import named, run, setup
 from studies.faults.cases import cases, tour

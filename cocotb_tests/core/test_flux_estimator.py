@@ -9,12 +9,12 @@ import pytest
 
 from fluxproof.checkout import ROOT
 from fluxproof.cosim.scenarios import RPM, scenario
-from fluxproof.golden_model import drive as drives
-from fluxproof.golden_model import fluxproof
-from fluxproof.golden_model.drive_keys import DriveError
-from fluxproof.golden_model.estimators.flux_monitor import FAULTS
-from fluxproof.golden_model.registers import registers
 from fluxproof.plant import IMPOSED_SPEED, Sensors
+from golden_model import drive as drives
+from golden_model import fluxproof
+from golden_model.drive_keys import DriveError
+from golden_model.estimators.flux_monitor import FAULTS
+from golden_model.registers import registers
 from studies.papers.__main__ import EXPERIMENTS
 from studies.papers.flux_bench import (
     CURRENT_MODEL,

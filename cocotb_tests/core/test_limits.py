@@ -15,12 +15,12 @@ from fluxproof.checkout import ROOT
 from fluxproof.cosim.closed_loop import GoldenPeriods, Scenario, cosimulate, run_now
 from fluxproof.cosim.golden_clock import GoldenClock
 from fluxproof.cosim.scenarios import RPM
-from fluxproof.golden_model import drive as drives
-from fluxproof.golden_model.control import current_limit
-from fluxproof.golden_model.io.fault_latch import NAMES
-from fluxproof.golden_model.registers import registers
-from fluxproof.golden_model.scaling import PARTS
-from fluxproof.golden_model.units import from_si, one_is
+from golden_model import drive as drives
+from golden_model.control import current_limit
+from golden_model.io.fault_latch import NAMES
+from golden_model.registers import registers
+from golden_model.scaling import PARTS
+from golden_model.units import from_si, one_is
 
 DRIVE = drives.with_carrier(drives.load(ROOT / "docs" / "drives" / "paper001.toml"), 64)
 SET = registers(DRIVE)

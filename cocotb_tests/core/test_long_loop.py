@@ -11,10 +11,10 @@ from fluxproof.cosim.closed_loop import cosimulate, run_now
 from fluxproof.cosim.scenarios import SCENARIOS
 from fluxproof.cosim.verilated import VerilatedCore
 from fluxproof.cosim.verilated_device import VerilatedDevice
-from fluxproof.golden_model import drive as drives
-from fluxproof.golden_model import fluxproof
-from fluxproof.golden_model.io import sample_latch
-from fluxproof.golden_model.registers import registers
+from golden_model import drive as drives
+from golden_model import fluxproof
+from golden_model.io import sample_latch
+from golden_model.registers import registers
 
 DRIVE = drives.load(ROOT / "docs" / "drives" / "paper001.toml")
 NO_TRIP = fluxproof.REGISTERS["fault_ignore"].high  # samples that no healthy drive gives shall not stop the gates

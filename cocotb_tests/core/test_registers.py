@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fluxproof.golden_model.drive import SECTIONS, load, with_carrier
-from fluxproof.golden_model.fluxproof import OBSERVED, REGISTERS, Registers
-from fluxproof.golden_model.registers import registers
-from fluxproof.golden_model.scaling import ROUND_UP, base_keys
-from fluxproof.golden_model.units import SIGNALS, UNITS, from_si, si_per_lsb, to_si, unit
 from fluxproof.plant import Machine, machine_params
+from golden_model.drive import SECTIONS, load, with_carrier
+from golden_model.fluxproof import OBSERVED, REGISTERS, Registers
+from golden_model.registers import registers
+from golden_model.scaling import ROUND_UP, base_keys
+from golden_model.units import SIGNALS, UNITS, from_si, si_per_lsb, to_si, unit
 
 ROOT = Path(__file__).resolve().parents[2]
 PAPER = ROOT / "docs" / "drives" / "paper001.toml"

@@ -6,14 +6,14 @@ import math
 import pytest
 
 from cocotb_tests.core.test_registers import DRIVES, each_drive
-from fluxproof.golden_model.control import current_pi, decoupling, speed_pi
-from fluxproof.golden_model.drive import Sampling, load
-from fluxproof.golden_model.drive_keys import DriveError
-from fluxproof.golden_model.estimators import flux_estimate, flux_models
-from fluxproof.golden_model.io import current_conditioning, speed, u_dc_conditioning
-from fluxproof.golden_model.modulation import svm_delay_compensation
-from fluxproof.golden_model.registers import registers
-from fluxproof.golden_model.units import from_si, si_per_lsb, to_si
+from golden_model.control import current_pi, decoupling, speed_pi
+from golden_model.drive import Sampling, load
+from golden_model.drive_keys import DriveError
+from golden_model.estimators import flux_estimate, flux_models
+from golden_model.io import current_conditioning, speed, u_dc_conditioning
+from golden_model.modulation import svm_delay_compensation
+from golden_model.registers import registers
+from golden_model.units import from_si, si_per_lsb, to_si
 
 
 @each_drive

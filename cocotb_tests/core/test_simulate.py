@@ -12,12 +12,12 @@ import pytest
 from cocotb_tests.core.test_registers import PAPER
 from fluxproof.checkout import DRIVES
 from fluxproof.command import main
-from fluxproof.golden_model.drive import load
-from fluxproof.golden_model.drive_keys import DriveError
-from fluxproof.golden_model.registers import registers
 from fluxproof.simulate import scene
 from fluxproof.simulate.margins import current_loop, margins, speed_loop
 from fluxproof.simulate.session import simulate
+from golden_model.drive import load
+from golden_model.drive_keys import DriveError
+from golden_model.registers import registers
 
 DRIVE = load(PAPER)
 

@@ -24,11 +24,11 @@ from fluxproof.diagnosis.recording import RecordingError
 from fluxproof.diagnosis.replay import digital
 from fluxproof.diagnosis.replay.capture import capture as golden_capture
 from fluxproof.diagnosis.replay.telemetry_stream import SIZE, parse, read_capture, write_piece
-from fluxproof.golden_model import drive as drives
-from fluxproof.golden_model import fluxproof
-from fluxproof.golden_model.io import telemetry_words
-from fluxproof.golden_model.io.telemetry_words import COUNT, FIELDS, HEADER_WORD, LAYOUT, PACKET, pack
-from fluxproof.golden_model.registers import registers
+from golden_model import drive as drives
+from golden_model import fluxproof
+from golden_model.io import telemetry_words
+from golden_model.io.telemetry_words import COUNT, FIELDS, HEADER_WORD, LAYOUT, PACKET, pack
+from golden_model.registers import registers
 from scripts import generate, generate_telemetry
 
 PAPER = ROOT / "docs" / "drives" / "paper001.toml"

@@ -16,8 +16,8 @@ from fluxproof.cosim import ghdl, verilog
 from fluxproof.cosim.sources import rtl_sources
 from fluxproof.cosim.values import random_value
 from fluxproof.cosim.verilated import VerilatedCore
-from fluxproof.golden_model.fluxproof import REGISTERS, SAMPLE_INTERVAL
-from fluxproof.golden_model.io import (
+from golden_model.fluxproof import REGISTERS, SAMPLE_INTERVAL
+from golden_model.io import (
     brake_chopper,
     fault_latch,
     host_watch,
@@ -28,7 +28,7 @@ from fluxproof.golden_model.io import (
     sample_guard,
     sample_latch,
 )
-from fluxproof.golden_model.io.sample_checks import IGNORE
+from golden_model.io.sample_checks import IGNORE
 
 GENERICS = {"ADC_BITS": 16, "POSITION_BITS": 16, "CARRIER_HALF": 100}
 OTHER = {"ADC_BITS": 12, "POSITION_BITS": 18, "CARRIER_HALF": 75}

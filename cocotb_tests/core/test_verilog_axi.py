@@ -8,7 +8,7 @@ import numpy as np
 
 from cocotb_tests.core.test_verilog import differences, ghdl5, trace_of_verilog, trace_of_vhdl  # noqa: F401
 from fluxproof.cosim.verilated import VerilatedCore
-from fluxproof.golden_model.io import register_map
+from golden_model.io import register_map
 
 TOP = "fluxproof_axi"
 GENERICS = {"ADC_BITS": 14, "POSITION_BITS": 17, "CARRIER_HALF": 60, "CLOCK_HZ": 1_000_000}

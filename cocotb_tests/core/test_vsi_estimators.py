@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from fluxproof.checkout import ROOT
-from fluxproof.golden_model import drive as drives
-from fluxproof.golden_model.drive_keys import DriveError
-from fluxproof.golden_model.estimators import psi_adaline, v_dead_adaline, winding_resistance
-from fluxproof.golden_model.registers import registers
 from fluxproof.plant import Inverter
+from golden_model import drive as drives
+from golden_model.drive_keys import DriveError
+from golden_model.estimators import psi_adaline, v_dead_adaline, winding_resistance
+from golden_model.registers import registers
 from studies.papers.flux_bench import scaled
 from studies.papers.vsi_bench import DRIVE, FAST, I_Q, NOMINAL, held_at, last, leg_loss, run, without
 

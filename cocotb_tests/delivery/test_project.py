@@ -13,8 +13,8 @@ from cocotb_tests.core.test_registers import PAPER
 from cocotb_tests.delivery.test_vivado_scripts import facts, stubbed  # noqa: F401 - facts is a fixture
 from fluxproof.checkout import ROOT
 from fluxproof.command import main
-from fluxproof.golden_model.drive import load
-from fluxproof.golden_model.registers import registers
+from golden_model.drive import load
+from golden_model.registers import registers
 from scripts.package import axi_top
 
 ZYNQ, ARTIX, ULTRASCALE = "xc7z020clg484-1", "xc7a100tcsg324-1", "xczu3eg-sbva484-1-e"

@@ -8,7 +8,7 @@ import pytest
 
 from cocotb_tests.support.slow import slowly
 from fluxproof.cosim.verilog import NoUsableGhdl, find_ghdl
-from fluxproof.golden_model.registry import BLOCKS
+from golden_model.registry import BLOCKS
 from scripts.prove import abc_engine
 from scripts.prove.catalogue import catalogue
 from scripts.prove.judge import judge

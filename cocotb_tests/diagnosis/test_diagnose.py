@@ -181,7 +181,7 @@ def test_columns_of_an_effect_are_finite_and_nonzero(name, view):
 def test_every_effect_of_the_issue_has_a_file_of_its_own():
     assert set(NAMES) <= set(CATALOGUE)
     for name in CATALOGUE:
-        assert (ROOT / "diagnosis" / "catalogue" / f"{name}.py").is_file()
+        assert (ROOT / "fluxproof" / "diagnosis" / "catalogue" / f"{name}.py").is_file()
 
 
 NEW_EFFECT = """
@@ -225,7 +225,7 @@ def test_at_the_noise_floor_nothing_is_named():
 def test_no_effect_is_named_outside_of_its_file():
     """Rules for one effect are attributes of it, so that a new one is one file; keys of drive.toml may sound alike."""
     names = set(known_effects()) - set(vars(NOMINAL.sensors))
-    for path in sorted((ROOT / "diagnosis").rglob("*.py")):
+    for path in sorted((ROOT / "fluxproof" / "diagnosis").rglob("*.py")):
         if path.parent.name not in ("catalogue", "suspects"):
             strings = {n.value for n in ast.walk(ast.parse(path.read_text())) if isinstance(n, ast.Constant)}
             assert not {s for s in strings if isinstance(s, str)} & names, path

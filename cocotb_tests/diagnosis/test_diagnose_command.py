@@ -25,10 +25,10 @@ from fluxproof.diagnosis import diagnose as run_diagnosis
 from fluxproof.diagnosis.nominal import load_nominal
 from fluxproof.diagnosis.recording import RecordingError
 from fluxproof.diagnosis.replay import telemetry
-from fluxproof.golden_model import drive as drives
-from fluxproof.golden_model.io import telemetry_words
-from fluxproof.golden_model.registers import registers
-from fluxproof.golden_model.units import to_si
+from golden_model import drive as drives
+from golden_model.io import telemetry_words
+from golden_model.registers import registers
+from golden_model.units import to_si
 
 SHORT = bench.GRID[:18]
 FLUX = 0.95 * bench.MACHINE.magnet_flux_wb

@@ -20,12 +20,12 @@ from fluxproof.diagnosis.replay import digital, telemetry
 from fluxproof.diagnosis.replay import flow as digital_flow
 from fluxproof.diagnosis.replay import local as digital_local
 from fluxproof.diagnosis.replay.capture import capture
-from fluxproof.golden_model import drive as drives
-from fluxproof.golden_model import fluxproof
-from fluxproof.golden_model.io import telemetry_words
-from fluxproof.golden_model.registers import registers
-from fluxproof.golden_model.units import from_si, to_si
 from fluxproof.plant import Inverter
+from golden_model import drive as drives
+from golden_model import fluxproof
+from golden_model.io import telemetry_words
+from golden_model.registers import registers
+from golden_model.units import from_si, to_si
 
 DRIVE = drives.load(PAPER)
 DRIVE = dataclasses.replace(

@@ -21,12 +21,6 @@ from fluxproof.diagnosis.recording import RecordingError, from_columns
 from fluxproof.diagnosis.replay.capture import capture
 from fluxproof.diagnosis.replay.telemetry import read_dump, write_dump
 from fluxproof.diagnosis.result import Estimate, NamedEffect
-from fluxproof.golden_model import drive as drives
-from fluxproof.golden_model.drive_keys import DriveError
-from fluxproof.golden_model.fixed import wrap_s
-from fluxproof.golden_model.io import current_conditioning, position, u_dc_conditioning
-from fluxproof.golden_model.registers import registers
-from fluxproof.golden_model.units import si_per_lsb
 from fluxproof.plant import (
     IMPOSED_SPEED,
     Harmonic,
@@ -38,6 +32,12 @@ from fluxproof.plant import (
     sensor_params,
     u_dc_code,
 )
+from golden_model import drive as drives
+from golden_model.drive_keys import DriveError
+from golden_model.fixed import wrap_s
+from golden_model.io import current_conditioning, position, u_dc_conditioning
+from golden_model.registers import registers
+from golden_model.units import si_per_lsb
 
 GRID = np.linspace(-6.0, 6.0, 5)
 SPECIAL = {

@@ -10,8 +10,8 @@ from cocotb_tests.support.absolute_runs import BEGIN, BITS, CODE, ERROR, VALID, 
 from cocotb_tests.support.golden_play import GoldenPlayer
 from cocotb_tests.support.needs import skip_without_ghdl5
 from fluxproof.cosim.verilated import VerilatedCore
-from fluxproof.golden_model.encoders import biss_master, endat_master, position_bridge
-from fluxproof.golden_model.registry import BLOCKS
+from golden_model.encoders import biss_master, endat_master, position_bridge
+from golden_model.registry import BLOCKS
 
 FRAMES = 100_000
 IN_VERILATOR = 20_000  # frames

@@ -13,7 +13,7 @@ from cocotb_tests.support.golden_play import GoldenPlayer
 from cocotb_tests.support.needs import skip_without_ghdl5
 from fluxproof.cosim import ghdl
 from fluxproof.cosim.verilated import VerilatedCore
-from fluxproof.golden_model.encoders import incremental_encoder
+from golden_model.encoders import incremental_encoder
 
 CLOCKS = 250_000
 EDGES = 1_000_000

@@ -7,7 +7,7 @@ import pytest
 
 from cocotb_tests.support.encoder_models import Incremental, wandering
 from cocotb_tests.support.golden_play import GoldenPlayer
-from fluxproof.golden_model.encoders import edge_timer, hall_decoder, incremental_encoder, turn_counter
+from golden_model.encoders import edge_timer, hall_decoder, incremental_encoder, turn_counter
 
 DELAY = 1  # clocks from the sensors to theta_hall
 

@@ -10,7 +10,7 @@ import pytest
 
 from cocotb_tests.support.encoder_models import Incremental, edges, glitches, wandering
 from cocotb_tests.support.golden_play import GoldenPlayer
-from fluxproof.golden_model.encoders import edge_timer, incremental_encoder, turn_counter
+from golden_model.encoders import edge_timer, incremental_encoder, turn_counter
 
 BITS = 18
 FILTER = 2

@@ -14,11 +14,11 @@ from fluxproof.cosim import recording as recordings
 from fluxproof.cosim import runs, verilog
 from fluxproof.cosim.golden_loop import run_controller
 from fluxproof.cosim.scenarios import RPM, fig9
-from fluxproof.golden_model import drive as drives
-from fluxproof.golden_model import fluxproof
-from fluxproof.golden_model.fluxproof import Observed
-from fluxproof.golden_model.registers import registers
-from fluxproof.golden_model.units import from_si, to_si
+from golden_model import drive as drives
+from golden_model import fluxproof
+from golden_model.fluxproof import Observed
+from golden_model.registers import registers
+from golden_model.units import from_si, to_si
 from studies.demo import __main__ as demo
 from studies.demo import plots, report
 

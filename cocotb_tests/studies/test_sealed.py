@@ -67,7 +67,7 @@ def test_it_shares_no_code_with_tool_plant_or_other_generators():
         for node in ast.walk(ast.parse(path.read_text())):
             names = [a.name for a in node.names] if isinstance(node, ast.Import) else []
             imported |= set(names + ([node.module] if isinstance(node, ast.ImportFrom) else []))
-    rooms = ("fluxproof", "diagnosis", "plant", "golden_model", "cosim", "studies")
+    rooms = ("fluxproof", "golden_model", "studies")
     own = {n for n in imported if n.split(".")[0] in rooms and not n.startswith("studies.blind.sealed")}
     assert own == {"fluxproof.files"}
 

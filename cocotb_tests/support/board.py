@@ -11,9 +11,9 @@ import subprocess
 from pathlib import Path
 
 from fluxproof.cosim.closed_loop import build_plant
-from fluxproof.golden_model.io import register_map
 from fluxproof.plant import sensor_params
 from fluxproof.plant.sensors import current_code, position_code, u_dc_code
+from golden_model.io import register_map
 
 
 class Board:

@@ -16,8 +16,8 @@ from cocotb_tests.support.board_loop import COUNTS, BoardLoop, with_abz_and_spi
 from cocotb_tests.support.board_runs import CARRIER_HALF, DRIVE, start_from_standstill, status
 from cocotb_tests.support.encoder_models import Incremental
 from fluxproof.cosim.board_clock import SEEN
-from fluxproof.golden_model.drive import load
-from fluxproof.golden_model.formats import PU, TURN
+from golden_model.drive import load
+from golden_model.formats import PU, TURN
 
 MOVED = 60  # counts by which Z moves after the first index
 RATE = 1 << 20  # turns a sample, in 2**-32

@@ -17,12 +17,12 @@ import numpy as np
 from cocotb_tests.support.board_pins import Motor, Pins
 from fluxproof.cosim.board_clock import BUS, PINS, SEEN, STATUS, BoardClock, GoldenBlocks
 from fluxproof.cosim.closed_loop import build_plant
-from fluxproof.golden_model.board_registers import board_generics, board_registers
-from fluxproof.golden_model.drive import Drive, with_carrier
-from fluxproof.golden_model.front_ends import Converters, Encoder
-from fluxproof.golden_model.generated.register_names import ADDRESSES
-from fluxproof.golden_model.registers import registers
 from fluxproof.plant import sensor_params
+from golden_model.board_registers import board_generics, board_registers
+from golden_model.drive import Drive, with_carrier
+from golden_model.front_ends import Converters, Encoder
+from golden_model.generated.register_names import ADDRESSES
+from golden_model.registers import registers
 
 COUNTS = 4000
 SLOT = 70  # clocks between two writes: a setting waits for the end of a sample

@@ -16,8 +16,8 @@ import numpy as np
 from cocotb_tests.support import absolute_models as models
 from cocotb_tests.support.converter_models import SpiConverter, Xadc
 from cocotb_tests.support.encoder_models import Incremental
-from fluxproof.golden_model.board_registers import PAIRS, spi_bits, spi_lines
 from fluxproof.plant.sensors import current_code, u_dc_code
+from golden_model.board_registers import PAIRS, spi_bits, spi_lines
 
 CALCULATION, MONOFLOP = 4, 3  # periods of the serial clock: EnDat's time to the start bit; until SSI lets go
 XADC_S = 1.0e-6  # a conversion

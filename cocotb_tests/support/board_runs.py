@@ -9,8 +9,8 @@ import numpy as np
 from cocotb_tests.support.board_loop import BoardLoop, with_abz_and_spi
 from fluxproof.checkout import DRIVES
 from fluxproof.cosim.board_clock import STATUS
-from fluxproof.golden_model.drive import load
-from fluxproof.golden_model.formats import PU, TURN
+from golden_model.drive import load
+from golden_model.formats import PU, TURN
 
 DRIVE = DRIVES / "paper001.toml"
 RPM, BEFORE_INDEX = 600.0, 0.05  # rad of the shaft from the start to the index

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from fluxproof.golden_model.converters import sinc3, spi_converter, xadc_reader
-from fluxproof.golden_model.kernel import kernel
+from golden_model.converters import sinc3, spi_converter, xadc_reader
+from golden_model.kernel import kernel
 
 
 @kernel

@@ -16,10 +16,10 @@ from fluxproof.cosim.closed_loop import Scenario, described_sensors
 from fluxproof.cosim.golden_loop import simulate
 from fluxproof.diagnosis.recording import Recording, from_columns
 from fluxproof.diagnosis.replay.capture import capture
-from fluxproof.golden_model import drive as drives
-from fluxproof.golden_model.registers import registers
-from fluxproof.golden_model.units import from_si, si_per_lsb
 from fluxproof.plant import IMPOSED_SPEED, Inverter, Machine
+from golden_model import drive as drives
+from golden_model.registers import registers
+from golden_model.units import from_si, si_per_lsb
 
 DRIVE = drives.load(PAPER)
 SET = registers(DRIVE)

@@ -14,11 +14,11 @@ from fluxproof.cosim.block_bench import read
 from fluxproof.cosim.closed_loop import cosimulate
 from fluxproof.cosim.inside import handle_of
 from fluxproof.cosim.scenarios import scenario
-from fluxproof.golden_model import drive as drives
-from fluxproof.golden_model.fluxproof import Observed, Sample
-from fluxproof.golden_model.io import register_map, telemetry_words
-from fluxproof.golden_model.io.telemetry_words import COUNT
-from fluxproof.golden_model.registers import registers
+from golden_model import drive as drives
+from golden_model.fluxproof import Observed, Sample
+from golden_model.io import register_map, telemetry_words
+from golden_model.io.telemetry_words import COUNT
+from golden_model.registers import registers
 from scripts.registers.rdl import version_word
 
 POLLED = ("omega_me", "i_d", "i_q", "u_dc", "theta_me", "torque", "psi_m", "v_dead", "flux_faults")

@@ -12,7 +12,7 @@ from cocotb.triggers import FallingEdge
 from cocotb_tests.support.encoder_runs import BITS, incremental
 from cocotb_tests.support.golden_play import GoldenPlayer
 from fluxproof.cosim.block_bench import read
-from fluxproof.golden_model.encoders import incremental_encoder
+from golden_model.encoders import incremental_encoder
 
 CLOCKS, CHUNKS = 6000, 3
 

@@ -10,7 +10,7 @@ from cocotb.triggers import FallingEdge
 
 from fluxproof.cosim.block_bench import read
 from fluxproof.cosim.golden_clock import SEEN
-from fluxproof.golden_model.io import sample_latch
+from golden_model.io import sample_latch
 from studies.faults.bench import run, setup
 from studies.faults.cases import tour
 from studies.faults.cores import GoldenCore

@@ -11,9 +11,9 @@ from cocotb.triggers import ClockCycles, FallingEdge, with_timeout
 from cocotbext.axi.axil_channels import AxiLiteAWTransaction, AxiLiteWTransaction
 
 from cocotb_tests.support.registers_bench import GENERICS, MAP, WRITABLE, Bench
-from fluxproof.golden_model.fluxproof import SAMPLE_INTERVAL
-from fluxproof.golden_model.io.register_file import to_word
-from fluxproof.golden_model.io.register_map import DECERR, OKAY, PATIENCE, SLVERR, Kind
+from golden_model.fluxproof import SAMPLE_INTERVAL
+from golden_model.io.register_file import to_word
+from golden_model.io.register_map import DECERR, OKAY, PATIENCE, SLVERR, Kind
 
 RUN = ("register_file", "cocotb_tests.support.dut_registers", {k.upper(): v for k, v in GENERICS.items()}, {})
 SEED = int(os.environ.get("FLUXPROOF_SEED", "1"))

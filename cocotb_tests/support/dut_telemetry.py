@@ -17,11 +17,11 @@ from fluxproof.cosim.ghdl_device import GhdlDevice, prepare
 from fluxproof.cosim.scenarios import SCENARIOS
 from fluxproof.cosim.values import random_value
 from fluxproof.diagnosis.replay import telemetry_stream
-from fluxproof.golden_model import drive as drives
-from fluxproof.golden_model import fluxproof
-from fluxproof.golden_model.io import sample_latch
-from fluxproof.golden_model.io.telemetry_words import COUNT, HEADER_WORD, pack
-from fluxproof.golden_model.registers import registers
+from golden_model import drive as drives
+from golden_model import fluxproof
+from golden_model.io import sample_latch
+from golden_model.io.telemetry_words import COUNT, HEADER_WORD, pack
+from golden_model.registers import registers
 
 INTERVAL = fluxproof.SAMPLE_INTERVAL
 PERIODS = 160  # of the closed loop

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from cocotb_tests.support.encoder_models import Incremental, glitches, wandering
-from fluxproof.golden_model.encoders import turn_counter
+from golden_model.encoders import turn_counter
 
 BITS = 16
 COUNTS = (4000, 10000, 4096, 52, 30)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from cocotb_tests.support.board import Board
 from fluxproof.cosim.closed_loop import FLAGS, INPUT_PORTS, GoldenPeriods
-from fluxproof.golden_model import fluxproof
-from fluxproof.golden_model.io.register_file import RegisterFile
-from fluxproof.golden_model.registers import registers
+from golden_model import fluxproof
+from golden_model.io.register_file import RegisterFile
+from golden_model.registers import registers
 
 REFERENCES = ("omega_ref", "i_d_ref", "i_q_ext", "speed_mode", "temp_winding", "temp_valid", "clear_faults")
 

@@ -8,8 +8,8 @@ from functools import lru_cache
 import numba
 import numpy as np
 
-from fluxproof.golden_model.block import Block
-from fluxproof.golden_model.registry import BLOCKS
+from golden_model.block import Block
+from golden_model.registry import BLOCKS
 
 PIECE = 1 << 18  # clocks at a time, for the memory
 

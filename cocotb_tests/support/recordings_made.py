@@ -162,8 +162,8 @@ def dump(path):
     from fluxproof.cosim.scenarios import everything
     from fluxproof.diagnosis.replay import telemetry
     from fluxproof.diagnosis.replay.capture import capture
-    from fluxproof.golden_model import drive, fluxproof
-    from fluxproof.golden_model.registers import registers
+    from golden_model import drive, fluxproof
+    from golden_model.registers import registers
 
     paper = drive.load(PAPER)
     register_set = registers(paper)

@@ -12,9 +12,9 @@ from cocotbext.axi import AxiLiteBus, AxiLiteMaster
 from cocotbext.axi.axil_channels import AxiLiteARTransaction, AxiLiteAWTransaction, AxiLiteWTransaction
 
 from fluxproof.cosim.block_bench import read
-from fluxproof.golden_model.fluxproof import SAMPLE_INTERVAL
-from fluxproof.golden_model.io.register_file import RegisterFile, to_word
-from fluxproof.golden_model.io.register_map import Kind, registers
+from golden_model.fluxproof import SAMPLE_INTERVAL
+from golden_model.io.register_file import RegisterFile, to_word
+from golden_model.io.register_map import Kind, registers
 from scripts.registers.rdl import version_word
 
 GENERICS = {"adc_bits": 14, "position_bits": 17, "carrier_half": 1234, "clock_hz": 125_000_000, "estimators": 0}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from cocotb_tests.support.board import Board
 from fluxproof.cosim.closed_loop import SAMPLE_DELAY
 from fluxproof.cosim.verilated import VerilatedCore
-from fluxproof.golden_model.registers import registers
+from golden_model.registers import registers
 
 PATIENCE = 1000  # clocks that an access may take
 

@@ -20,8 +20,8 @@ import numpy as np
 
 from fluxproof.commission import winding
 from fluxproof.commission.session import Refusal, Seen, Session, Step, Value
-from fluxproof.golden_model.scaling import leg_loss_v
-from fluxproof.golden_model.units import TURN_RAD
+from golden_model.scaling import leg_loss_v
+from golden_model.units import TURN_RAD
 
 CURRENT, OF_MAGNET = 0.6, 0.3  # of the limit; (L_q - L_d)*I over psi
 DAMPING, SLOW_HZ, OF_SWING = 0.33, 4.0, 0.3  # of the swing; the integral's corner, and as part of the swing

@@ -15,9 +15,9 @@ from typing import Protocol
 
 import numpy as np
 
-from fluxproof.golden_model.drive_keys import DriveError
-from fluxproof.golden_model.io import board_map, position
-from fluxproof.golden_model.io.register_map import IDENTIFICATION
+from golden_model.drive_keys import DriveError
+from golden_model.io import board_map, position
+from golden_model.io.register_map import IDENTIFICATION
 
 CODES = ("snap_code", "snap_position", "snap_adc_a", "snap_adc_b", "snap_adc_c", "snap_adc_u_dc")
 VALUES = ("i_d", "i_q", "omega_me", "u_dc", "u_d", "u_q")  # the voltages last: they are computed last

@@ -13,9 +13,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from fluxproof.files import write_json, write_text
-from fluxproof.golden_model.drive import load
-from fluxproof.golden_model.drive_file import read_tables
-from fluxproof.golden_model.drive_keys import DriveError
+from golden_model.drive import load
+from golden_model.drive_file import read_tables
+from golden_model.drive_keys import DriveError
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:

@@ -8,7 +8,7 @@ import tomlkit
 import tomlkit.items
 
 from fluxproof.commission.session import Step, Value
-from fluxproof.golden_model.drive import Drive
+from golden_model.drive import Drive
 
 SCHEMA = 1
 # section, key, value of a step; what is not among the steps' values has no uncertainty

@@ -22,7 +22,7 @@ import math
 import numpy as np
 
 from fluxproof.commission.session import Refusal, Seen, Session, Step, Value, solve
-from fluxproof.golden_model.units import TURN_RAD, from_si
+from golden_model.units import TURN_RAD, from_si
 
 TORQUE = (0.4, 0.8, 0.2, 0.1)  # of the current limit: usual, where the shaft does not move, where it moves too fast
 OF_RATED, OF_VOLTAGE = 0.5, 0.45  # the speed reached: of the rated one, of the speed at which the EMF takes the voltage

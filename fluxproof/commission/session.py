@@ -9,14 +9,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from fluxproof.commission.bus import Bus
-from fluxproof.golden_model.board_registers import SECTORS, board_registers
-from fluxproof.golden_model.drive import Drive
-from fluxproof.golden_model.drive_keys import DriveError
-from fluxproof.golden_model.encoders import forced_position
-from fluxproof.golden_model.fluxproof import REGISTERS
-from fluxproof.golden_model.io.fault_latch import NAMES
-from fluxproof.golden_model.registers import registers
-from fluxproof.golden_model.units import TURN_RAD, from_si, to_si
+from golden_model.board_registers import SECTORS, board_registers
+from golden_model.drive import Drive
+from golden_model.drive_keys import DriveError
+from golden_model.encoders import forced_position
+from golden_model.fluxproof import REGISTERS
+from golden_model.io.fault_latch import NAMES
+from golden_model.registers import registers
+from golden_model.units import TURN_RAD, from_si, to_si
 
 STOP_OF_LIMIT = 1.05  # of the current limit: a snapshot above ends the commissioning
 TRIPPED = 1 << 1  # of the register flags

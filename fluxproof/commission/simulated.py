@@ -16,14 +16,6 @@ from fluxproof.commission.bus import CODES, VALUES, checked
 from fluxproof.commission.simulated_edges import COUNTS, HALL, edge_speed, edges_of, hall_code
 from fluxproof.cosim.closed_loop import described_sensors
 from fluxproof.cosim.golden_loop import mixed_kernel
-from fluxproof.golden_model import fluxproof
-from fluxproof.golden_model.board_registers import board_generics
-from fluxproof.golden_model.drive_keys import DriveError
-from fluxproof.golden_model.encoders import forced_position
-from fluxproof.golden_model.io import board_map
-from fluxproof.golden_model.io.fault_latch import NAMES
-from fluxproof.golden_model.registers import registers
-from fluxproof.golden_model.units import TURN_RAD
 from fluxproof.plant import (
     FREE,
     IMPOSED_SPEED,
@@ -38,6 +30,14 @@ from fluxproof.plant import (
 )
 from fluxproof.plant import layout as L
 from fluxproof.plant.sensors import current_code, position_code, u_dc_code
+from golden_model import fluxproof
+from golden_model.board_registers import board_generics
+from golden_model.drive_keys import DriveError
+from golden_model.encoders import forced_position
+from golden_model.io import board_map
+from golden_model.io.fault_latch import NAMES
+from golden_model.registers import registers
+from golden_model.units import TURN_RAD
 
 PLACES = 1 << forced_position.PLACE_W
 SHIFT, PLACE_W = forced_position.SHIFT, forced_position.PLACE_W

@@ -10,10 +10,10 @@ import math
 
 import numpy as np
 
-from fluxproof.golden_model.board_registers import SECTORS
-from fluxproof.golden_model.encoders import hall_decoder
-from fluxproof.golden_model.formats import PU, TURN_W
-from fluxproof.golden_model.kernel import kernel
+from golden_model.board_registers import SECTORS
+from golden_model.encoders import hall_decoder
+from golden_model.formats import PU, TURN_W
+from golden_model.kernel import kernel
 
 COUNTS, HALL, SCALE, LAST, TIME, SENSE, OMEGA = range(7)  # of ``edges``
 MIDDLE = np.array(hall_decoder.MIDDLE, np.int64)

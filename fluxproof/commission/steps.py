@@ -8,9 +8,9 @@ from dataclasses import replace
 from fluxproof.commission import alignment, motion, winding, wiring
 from fluxproof.commission.bus import Bus, BusError
 from fluxproof.commission.session import Refusal, Session, Step
-from fluxproof.golden_model.board_registers import board_generics
-from fluxproof.golden_model.drive import Drive
-from fluxproof.golden_model.registers import registers
+from golden_model.board_registers import board_generics
+from golden_model.drive import Drive
+from golden_model.registers import registers
 
 
 def check_generics(bus: Bus, drive: Drive) -> None:

@@ -32,8 +32,8 @@ import math
 import numpy as np
 
 from fluxproof.commission.session import Refusal, Seen, Session, Step, Value, solve
-from fluxproof.golden_model.encoders.forced_position import RATE
-from fluxproof.golden_model.units import TURN_RAD
+from golden_model.encoders.forced_position import RATE
+from golden_model.units import TURN_RAD
 
 PARTS = (0.3, 0.5, 0.7)  # of the current limit; a salient rotor and the dead time add a third to the last
 HIGHEST_HZ, OF_RATE, OF_BASE = 240.0, 0.95, 1.7  # frequencies: largest, of the ranges

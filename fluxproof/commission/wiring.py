@@ -16,10 +16,10 @@ from itertools import permutations, product
 import numpy as np
 
 from fluxproof.commission.session import Refusal, Session, Step, Value
-from fluxproof.golden_model.fluxproof import REGISTERS
-from fluxproof.golden_model.io.fault_latch import NAMES
-from fluxproof.golden_model.scaling import leg_loss_v
-from fluxproof.golden_model.units import TURN_RAD, from_si
+from golden_model.fluxproof import REGISTERS
+from golden_model.io.fault_latch import NAMES
+from golden_model.scaling import leg_loss_v
+from golden_model.units import TURN_RAD, from_si
 
 SAMPLES, MOST_SAMPLES, OFFSET_SIGMA = 400, 12000, 0.3  # of an offset; more until its uncertainty [codes] is this
 LARGEST_OFFSET = 0.06  # of the range: a sensor beyond is not there, or not at zero

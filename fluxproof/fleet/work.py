@@ -17,10 +17,10 @@ from fluxproof.diagnosis.fleet.row import failed_row, one_line, row_of
 from fluxproof.diagnosis.nominal import load_nominal
 from fluxproof.diagnosis.recording import RecordingError
 from fluxproof.diagnosis.session import diagnose
-from fluxproof.golden_model.drive_keys import DriveError
+from golden_model.drive_keys import DriveError
 
-ROOMS = ("diagnosis", "golden_model", "plant", "cosim")  # a row follows from these,
-BESIDE = ("diagnosis/report", "diagnosis/fleet")  # but not from how it is shown, or from what the fleet makes of it,
+ROOMS = ("fluxproof/diagnosis", "fluxproof/plant", "fluxproof/cosim", "golden_model")  # a row follows from these,
+BESIDE = ("fluxproof/diagnosis/report", "fluxproof/diagnosis/fleet")  # but not from how it or a fleet is shown,
 ROW = ("row.py", "hypotheses.py", "schema.py")  # apart from these
 # What object stores call the state of a file's content.
 MARKS = ("ETag", "etag", "md5Hash", "crc32c", "generation", "content_md5", "CRC", "LastModified", "mtime")
@@ -121,12 +121,11 @@ def _design(drive, *_) -> str:
 @functools.cache
 def version() -> str:
     """The version of the package and a hash of its source, as a diagnosis follows from both."""
-    package = Path(__file__).resolve().parents[1]
-    root = package.parent if (package.parent / "pyproject.toml").is_file() else package
+    root = Path(__file__).resolve().parents[2]  # both packages are in one folder, of a checkout or of an installation
     digest = hashlib.sha256()
     for folder in (root / room for room in ROOMS):
         for path in sorted(folder.rglob("*.py")):
-            if path.parent.relative_to(folder.parent).as_posix() in BESIDE and path.name not in ROW:
+            if path.parent.relative_to(root).as_posix() in BESIDE and path.name not in ROW:
                 continue
             digest.update(path.relative_to(folder).as_posix().encode() + path.read_bytes())
     try:

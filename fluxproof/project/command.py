@@ -7,10 +7,10 @@ from pathlib import Path
 
 from fluxproof.checkout import ROOT
 from fluxproof.files import write_text
-from fluxproof.golden_model.board_registers import board_set, has_board
-from fluxproof.golden_model.drive import load
-from fluxproof.golden_model.drive_keys import DriveError
 from fluxproof.project import parts, render
+from golden_model.board_registers import board_set, has_board
+from golden_model.drive import load
+from golden_model.drive_keys import DriveError
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from fluxproof.golden_model.drive_keys import DriveError
+from golden_model.drive_keys import DriveError
 
 # A part's name: family, device, package with speed grade: xc7z020clg484-1, xczu3eg-sbva484-1-e, xc7a35ticsg324-1L.
 PART = re.compile(r"x[caq][a-z]*\d*[a-z]*\d+[a-z0-9]*(-[a-z0-9]+)+", re.IGNORECASE)

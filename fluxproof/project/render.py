@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from fluxproof.golden_model.board_registers import board_generics, has_board
-from fluxproof.golden_model.drive import Drive
-from fluxproof.golden_model.registers import RegisterSet
 from fluxproof.print_registers import c_lines
 from fluxproof.project.parts import ZYNQ, Processor, processor_of
+from golden_model.board_registers import board_generics, has_board
+from golden_model.drive import Drive
+from golden_model.registers import RegisterSet
 
 BY = "by `fluxproof project`; change the drive file and run it again"
 WINDOW = 0x1000  # bytes of the registers' address range

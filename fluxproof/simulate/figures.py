@@ -11,10 +11,10 @@ import math
 import numpy as np
 
 from fluxproof.cosim.scenarios import RPM
-from fluxproof.golden_model.drive import Drive
 from fluxproof.simulate import scene as scenes
 from fluxproof.simulate.run import Run
 from fluxproof.simulate.scene import Stage
+from golden_model.drive import Drive
 
 TAIL = 0.15  # of a stage, at its end: what must have settled
 BAND = 0.02  # of the top speed: back within it after the load step

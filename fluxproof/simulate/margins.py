@@ -21,8 +21,8 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from fluxproof.golden_model.drive import Drive
-from fluxproof.golden_model.registers import RegisterSet
+from golden_model.drive import Drive
+from golden_model.registers import RegisterSet
 
 POINTS = 20000
 

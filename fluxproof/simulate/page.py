@@ -8,8 +8,8 @@ from pathlib import Path
 import jinja2
 
 from fluxproof.diagnosis.report import page as diagnosis_page
-from fluxproof.golden_model.drive import SECTIONS, Drive
-from fluxproof.golden_model.drive_keys import key_of
+from golden_model.drive import SECTIONS, Drive
+from golden_model.drive_keys import key_of
 
 FOLDER = Path(__file__).resolve().parent
 ATTRIBUTE = {"bases": "base_choice"}  # section -> attribute of Drive, where the names differ

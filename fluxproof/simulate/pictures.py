@@ -9,12 +9,12 @@ import numpy as np
 
 from fluxproof.cosim.scenarios import RPM
 from fluxproof.diagnosis.report import theme
-from fluxproof.golden_model.drive import Drive
-from fluxproof.golden_model.units import to_si
 from fluxproof.simulate import scene as scenes
 from fluxproof.simulate.figures import rpm
 from fluxproof.simulate.margins import Loop
 from fluxproof.simulate.run import Run
+from golden_model.drive import Drive
+from golden_model.units import to_si
 
 COLUMNS = 700  # along the time axis: more than a screen's pixels in a picture of this width
 

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from fluxproof.golden_model.drive import Drive
 from fluxproof.plant import FREE, advance_switching, centred_gates, initial_state, layout, plant_params
 from fluxproof.simulate.run import Run, inverter_of, machine_of
+from golden_model.drive import Drive
 
 PROBES, PERIODS = 48, 24
 

@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fluxproof.cosim.golden_loop import simulate
-from fluxproof.golden_model.drive import Drive
-from fluxproof.golden_model.io.fault_latch import NAMES
-from fluxproof.golden_model.registers import RegisterSet
-from fluxproof.golden_model.units import to_si
 from fluxproof.plant import FREE, IMPOSED_SPEED, Inverter, Machine
 from fluxproof.simulate.scene import Scene
+from golden_model.drive import Drive
+from golden_model.io.fault_latch import NAMES
+from golden_model.registers import RegisterSet
+from golden_model.units import to_si
 
 IN_SI = ("i_d", "i_q", "i_q_ref", "u_d", "u_q", "u_max", "theta_me", "omega_me", "v_comp", "torque")
 

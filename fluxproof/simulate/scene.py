@@ -12,10 +12,10 @@ import numpy as np
 
 from fluxproof.cosim.closed_loop import Scenario
 from fluxproof.cosim.scenarios import RPM, scenario
-from fluxproof.golden_model.drive import Drive
-from fluxproof.golden_model.drive_keys import DriveError
-from fluxproof.golden_model.scaling import speed_gains
-from fluxproof.golden_model.units import from_si
+from golden_model.drive import Drive
+from golden_model.drive_keys import DriveError
+from golden_model.scaling import speed_gains
+from golden_model.units import from_si
 
 LOW, TOP, LOADED = 0.3, 0.8, 0.5  # of the rated speed, twice, and of the current limit
 OF_REACH = 0.9  # of the speed at which the loaded drive fills the voltage circle

@@ -6,13 +6,13 @@ from collections.abc import Callable
 
 import numpy as np
 
-from fluxproof.golden_model.drive import Drive
-from fluxproof.golden_model.registers import registers
 from fluxproof.simulate import figures, page, verdict
 from fluxproof.simulate.margins import current_loop, margins, speed_loop
 from fluxproof.simulate.ripple import ripple
 from fluxproof.simulate.run import Run, run
 from fluxproof.simulate.scene import current_step, main_scene
+from golden_model.drive import Drive
+from golden_model.registers import registers
 
 
 def simulate(drive: Drive, name: str, say: Callable[[str], None] = lambda text: None) -> tuple[dict, Callable[[], str]]:

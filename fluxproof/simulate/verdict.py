@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 
-from fluxproof.golden_model.drive import Drive
-from fluxproof.golden_model.scaling import leg_loss_v
 from fluxproof.simulate.figures import rpm, tail
 from fluxproof.simulate.margins import Margins
 from fluxproof.simulate.run import Run
+from golden_model.drive import Drive
+from golden_model.scaling import leg_loss_v
 
 LEARNT = 0.8  # of the loss of dead time and devices
 OF_SPEED, OF_CURRENT = 0.03, 0.1  # largest error of a settled stage: of the rated speed, rms of the current limit

@@ -9,10 +9,10 @@ Delay from pin to output: ``filter_clocks`` + 3 clocks.  Formats: clocks.  Round
 
 from typing import NamedTuple
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.fixed import Format
-from fluxproof.golden_model.formats import BIT
-from fluxproof.golden_model.kernel import kernel
+from golden_model.block import Block, Port
+from golden_model.fixed import Format
+from golden_model.formats import BIT
+from golden_model.kernel import kernel
 
 FILTER = Format(0, 10, 0)
 FILLED = 2  # clocks until the synchroniser holds the pin's level

@@ -7,10 +7,10 @@
 Formats: a*b has DROP fraction bits more than c and y.  Rounded half up; overflow saturates and is told.
 """
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.fixed import Format, exceeds, round_half_up, saturate
-from fluxproof.golden_model.formats import BIT
-from fluxproof.golden_model.kernel import kernel
+from golden_model.block import Block, Port
+from golden_model.fixed import Format, exceeds, round_half_up, saturate
+from golden_model.formats import BIT
+from golden_model.kernel import kernel
 
 
 @kernel

@@ -8,9 +8,9 @@ Formats: unchanged.  The RAM holds 2**DEPTH_BITS words, its read register and th
 
 from typing import NamedTuple
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.fixed import Format
-from fluxproof.golden_model.formats import BIT
+from golden_model.block import Block, Port
+from golden_model.fixed import Format
+from golden_model.formats import BIT
 
 
 class State(NamedTuple):

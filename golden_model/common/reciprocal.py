@@ -11,10 +11,10 @@ too small, never too large.
 
 import math
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.fixed import Format, round_half_up
-from fluxproof.golden_model.formats import BIT, RECIPROCAL, U_DC
-from fluxproof.golden_model.kernel import kernel
+from golden_model.block import Block, Port
+from golden_model.fixed import Format, round_half_up
+from golden_model.formats import BIT, RECIPROCAL, U_DC
+from golden_model.kernel import kernel
 
 X = U_DC
 MANTISSA_ONE = 1 << X.frac_bits

@@ -12,10 +12,10 @@ import math
 
 import numpy as np
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.fixed import Format
-from fluxproof.golden_model.formats import U_MAX
-from fluxproof.golden_model.kernel import kernel
+from golden_model.block import Block, Port
+from golden_model.fixed import Format
+from golden_model.formats import U_MAX
+from golden_model.kernel import kernel
 
 X = Format(0, 0, 32)
 ADDRESS_BITS, REST_BITS = 8, 12

@@ -7,10 +7,10 @@ Formats: y has DROP fraction bits less than the products.  Rounded half up once,
 In the RTL, c and d enter a clock after a, b and minus.
 """
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.fixed import Format, round_sat
-from fluxproof.golden_model.formats import BIT
-from fluxproof.golden_model.kernel import kernel
+from golden_model.block import Block, Port
+from golden_model.fixed import Format, round_sat
+from golden_model.formats import BIT
+from golden_model.kernel import kernel
 
 
 @kernel

@@ -14,10 +14,10 @@ pass through one multiplier one after the other.
 No saturation: k_chord*omega_me**2 < 1/16, so the result is closer to zero than omega_me and keeps its sign.
 """
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.fixed import Format, round_half_up
-from fluxproof.golden_model.formats import PU
-from fluxproof.golden_model.kernel import kernel
+from golden_model.block import Block, Port
+from golden_model.fixed import Format, round_half_up
+from golden_model.formats import PU
+from golden_model.kernel import kernel
 
 SQUARE = Format(0, 3, 14)
 K_CHORD = Format(0, -6, 23)

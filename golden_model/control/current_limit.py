@@ -14,10 +14,10 @@ Formats: i_d and i_q_max PU, radicand exact.
 import math
 from typing import NamedTuple
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.fixed import clamp
-from fluxproof.golden_model.formats import PU, PU_W
-from fluxproof.golden_model.kernel import kernel
+from golden_model.block import Block, Port
+from golden_model.fixed import clamp
+from golden_model.formats import PU, PU_W
+from golden_model.kernel import kernel
 
 STEPS = 2 * PU_W - 1  # clocks: a bit of the product each, then a bit of the root each
 

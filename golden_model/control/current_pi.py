@@ -15,11 +15,11 @@ the limiter grants; sum exact, rounded half up to PU and saturated, again twice 
 
 from typing import NamedTuple
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.common.multiply_add import multiply_add
-from fluxproof.golden_model.fixed import Format, round_half_up, round_sat, saturate
-from fluxproof.golden_model.formats import BIT, INTEGRAL, INTEGRAL_W, KI, KP, PU, PU_TO_INTEGRAL, PU_W
-from fluxproof.golden_model.kernel import kernel
+from golden_model.block import Block, Port
+from golden_model.common.multiply_add import multiply_add
+from golden_model.fixed import Format, round_half_up, round_sat, saturate
+from golden_model.formats import BIT, INTEGRAL, INTEGRAL_W, KI, KP, PU, PU_TO_INTEGRAL, PU_W
+from golden_model.kernel import kernel
 
 PROPORTIONAL = Format(1, 9, 28)
 PROPORTIONAL_W = PROPORTIONAL.width

@@ -10,10 +10,10 @@ of the paper's D_d, D_q of eq. (5), and this voltage is its D*gamma*V_dead.
 Formats: products exact, 34 fraction bits, rounded half up to PU.  |s| <= 4/3 and v_comp < 1/2: no saturation.
 """
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.fixed import round_half_up
-from fluxproof.golden_model.formats import PU, V_LEG
-from fluxproof.golden_model.kernel import kernel
+from golden_model.block import Block, Port
+from golden_model.fixed import round_half_up
+from golden_model.formats import PU, V_LEG
+from golden_model.kernel import kernel
 
 DROP = V_LEG.frac_bits
 

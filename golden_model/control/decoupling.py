@@ -7,10 +7,10 @@ Formats: products exact, 32 fraction bits, rounded half up to PU.
 Saturation: at 2 per unit, twice the largest voltage of the limiter.
 """
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.fixed import round_sat
-from fluxproof.golden_model.formats import PU, PU_W
-from fluxproof.golden_model.kernel import kernel
+from golden_model.block import Block, Port
+from golden_model.fixed import round_sat
+from golden_model.formats import PU, PU_W
+from golden_model.kernel import kernel
 
 DROP = PU.frac_bits
 

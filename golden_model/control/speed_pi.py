@@ -16,10 +16,10 @@ half up to PU.
 
 from typing import NamedTuple
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.fixed import Format, clamp, round_half_up, saturate
-from fluxproof.golden_model.formats import BIT, INTEGRAL, KI, KP, PU, PU_TO_INTEGRAL, PU_W
-from fluxproof.golden_model.kernel import kernel
+from golden_model.block import Block, Port
+from golden_model.fixed import Format, clamp, round_half_up, saturate
+from golden_model.formats import BIT, INTEGRAL, KI, KP, PU, PU_TO_INTEGRAL, PU_W
+from golden_model.kernel import kernel
 
 PROPORTIONAL = Format(1, 9, 28)
 PROPORTIONAL_W = PROPORTIONAL.width

@@ -17,12 +17,12 @@ above the true one, so the circle is never left.
 import math
 from typing import NamedTuple
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.common import sqrt
-from fluxproof.golden_model.control.current_pi import SAT
-from fluxproof.golden_model.fixed import clamp
-from fluxproof.golden_model.formats import PU, U_MAX
-from fluxproof.golden_model.kernel import kernel
+from golden_model.block import Block, Port
+from golden_model.common import sqrt
+from golden_model.control.current_pi import SAT
+from golden_model.fixed import clamp
+from golden_model.formats import PU, U_MAX
+from golden_model.kernel import kernel
 
 
 @kernel

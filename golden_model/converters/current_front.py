@@ -10,13 +10,13 @@ Formats: codes.  The codes change a clock after those of the converter, with ``c
 
 from typing import NamedTuple
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.converters import delta_sigma, spi_converter, xadc_reader
-from fluxproof.golden_model.converters.delta_sigma import renamed
-from fluxproof.golden_model.fixed import Format
-from fluxproof.golden_model.formats import BIT, CODE
-from fluxproof.golden_model.io.current_conditioning import code_format
-from fluxproof.golden_model.kernel import kernel
+from golden_model.block import Block, Port
+from golden_model.converters import delta_sigma, spi_converter, xadc_reader
+from golden_model.converters.delta_sigma import renamed
+from golden_model.fixed import Format
+from golden_model.formats import BIT, CODE
+from golden_model.io.current_conditioning import code_format
+from golden_model.kernel import kernel
 
 EXTERNAL, SPI, XADC, DELTA_SIGMA = range(4)
 KINDS = ("external", "spi", "xadc", "delta_sigma")

@@ -6,11 +6,11 @@ come together; one ``code_valid`` and one ``window_error`` stand for all.
 
 from typing import NamedTuple
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.converters import modulator_input, sinc3, sinc_overcurrent
-from fluxproof.golden_model.fixed import Format
-from fluxproof.golden_model.formats import BIT, CODE
-from fluxproof.golden_model.kernel import kernel
+from golden_model.block import Block, Port
+from golden_model.converters import modulator_input, sinc3, sinc_overcurrent
+from golden_model.fixed import Format
+from golden_model.formats import BIT, CODE
+from golden_model.kernel import kernel
 
 LINES = 4
 input_step, sinc_step, over_step = modulator_input.step, sinc3.step, sinc_overcurrent.step

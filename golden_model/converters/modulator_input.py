@@ -12,10 +12,10 @@ Formats: bits, clocks; nothing is computed.
 
 from typing import NamedTuple
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.fixed import Format
-from fluxproof.golden_model.formats import BIT
-from fluxproof.golden_model.kernel import kernel
+from golden_model.block import Block, Port
+from golden_model.fixed import Format
+from golden_model.formats import BIT
+from golden_model.kernel import kernel
 
 RATIO = Format(0, 6, 0)
 DELAY = Format(0, 4, 0)

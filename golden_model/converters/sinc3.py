@@ -24,11 +24,11 @@ Formats: code U(0,ADC_BITS); total loses its lowest bit, the product is rounded 
 
 from typing import NamedTuple
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.fixed import Format, round_half_up, saturate_u, wrap
-from fluxproof.golden_model.formats import BIT, CODE
-from fluxproof.golden_model.io.current_conditioning import code_format
-from fluxproof.golden_model.kernel import kernel
+from golden_model.block import Block, Port
+from golden_model.fixed import Format, round_half_up, saturate_u, wrap
+from golden_model.formats import BIT, CODE
+from golden_model.io.current_conditioning import code_format
+from golden_model.kernel import kernel
 
 OVERSAMPLING = Format(0, 9, 0)
 GAIN = Format(0, 3, 14)

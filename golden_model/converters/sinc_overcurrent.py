@@ -14,10 +14,10 @@ Formats: counts; nothing is rounded.  ``oversampling`` from 8 to 32, changed onl
 
 from typing import NamedTuple
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.fixed import Format, wrap
-from fluxproof.golden_model.formats import BIT
-from fluxproof.golden_model.kernel import kernel
+from golden_model.block import Block, Port
+from golden_model.fixed import Format, wrap
+from golden_model.formats import BIT
+from golden_model.kernel import kernel
 
 OVERSAMPLING = Format(0, 6, 0)
 TOTAL = Format(0, 16, 0)

@@ -9,10 +9,10 @@ line is stable then.
 
 from typing import NamedTuple
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.converters import spi_frame, spi_words
-from fluxproof.golden_model.formats import BIT
-from fluxproof.golden_model.kernel import kernel
+from golden_model.block import Block, Port
+from golden_model.converters import spi_frame, spi_words
+from golden_model.formats import BIT
+from golden_model.kernel import kernel
 
 
 class State(NamedTuple):

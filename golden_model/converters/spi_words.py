@@ -13,12 +13,12 @@ Formats: codes; nothing is computed.
 
 from typing import NamedTuple
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.converters.spi_frame import BITS, SKIP
-from fluxproof.golden_model.fixed import Format
-from fluxproof.golden_model.formats import BIT, CODE
-from fluxproof.golden_model.io.current_conditioning import code_format
-from fluxproof.golden_model.kernel import kernel
+from golden_model.block import Block, Port
+from golden_model.converters.spi_frame import BITS, SKIP
+from golden_model.fixed import Format
+from golden_model.formats import BIT, CODE
+from golden_model.io.current_conditioning import code_format
+from golden_model.kernel import kernel
 
 
 class State(NamedTuple):

@@ -12,10 +12,10 @@ nothing.
 Formats: PU, exact but for the saturation.
 """
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.fixed import Format, saturate
-from fluxproof.golden_model.formats import PU, PU_W
-from fluxproof.golden_model.kernel import kernel
+from golden_model.block import Block, Port
+from golden_model.fixed import Format, saturate
+from golden_model.formats import PU, PU_W
+from golden_model.kernel import kernel
 
 MISSING = Format(0, 2, 0)
 RAILS = Format(0, 3, 0)

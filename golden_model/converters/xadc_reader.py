@@ -19,11 +19,11 @@ Formats: clocks, codes; nothing is computed.
 
 from typing import NamedTuple
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.fixed import Format
-from fluxproof.golden_model.formats import BIT, CODE
-from fluxproof.golden_model.io.current_conditioning import code_format
-from fluxproof.golden_model.kernel import kernel
+from golden_model.block import Block, Port
+from golden_model.fixed import Format
+from golden_model.formats import BIT, CODE
+from golden_model.io.current_conditioning import code_format
+from golden_model.kernel import kernel
 
 ADDRESS = Format(0, 7, 0)
 WORD = Format(0, 16, 0)

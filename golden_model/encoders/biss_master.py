@@ -17,12 +17,12 @@ Formats: code of POSITION_BITS.  Rounding: bits below the code are cut; the angl
 
 from typing import NamedTuple
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.encoders.ssi_master import BITS, HALF_PERIOD
-from fluxproof.golden_model.fixed import Format
-from fluxproof.golden_model.formats import BIT
-from fluxproof.golden_model.io.position import code_format
-from fluxproof.golden_model.kernel import kernel
+from golden_model.block import Block, Port
+from golden_model.encoders.ssi_master import BITS, HALF_PERIOD
+from golden_model.fixed import Format
+from golden_model.formats import BIT
+from golden_model.io.position import code_format
+from golden_model.kernel import kernel
 
 START_MAX = Format(0, 16, 0)
 IDLE, ACKNOWLEDGE, BEGIN, TAKE, STOP = range(5)

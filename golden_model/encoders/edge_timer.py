@@ -19,10 +19,10 @@ A sample takes ``TAKES`` clocks from ``sample`` to ``omega_valid``, one bit of t
 import math
 from typing import NamedTuple
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.fixed import Format
-from fluxproof.golden_model.formats import BIT, PU
-from fluxproof.golden_model.kernel import kernel
+from golden_model.block import Block, Port
+from golden_model.fixed import Format
+from golden_model.formats import BIT, PU
+from golden_model.kernel import kernel
 
 K_EDGE = Format(0, 20, 12)
 UP = PU.frac_bits - K_EDGE.frac_bits  # from the product's fraction bits to the quotient's, less the rounding bit

@@ -19,13 +19,13 @@ Formats: code of POSITION_BITS.  Rounding: bits below the code are cut; the angl
 
 from typing import NamedTuple
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.encoders.biss_master import START_MAX, any_settings, late_answers
-from fluxproof.golden_model.encoders.ssi_master import BITS, HALF_PERIOD
-from fluxproof.golden_model.fixed import Format
-from fluxproof.golden_model.formats import BIT
-from fluxproof.golden_model.io.position import code_format
-from fluxproof.golden_model.kernel import kernel
+from golden_model.block import Block, Port
+from golden_model.encoders.biss_master import START_MAX, any_settings, late_answers
+from golden_model.encoders.ssi_master import BITS, HALF_PERIOD
+from golden_model.fixed import Format
+from golden_model.formats import BIT
+from golden_model.io.position import code_format
+from golden_model.kernel import kernel
 
 COMMAND_BITS = Format(0, 6, 0)
 IDLE, COMMAND, RELEASED, BEGIN, TAKE, STOP = range(6)

@@ -12,11 +12,11 @@ The code follows ``sample`` by two clocks, the encoder's code by one.  Rounding:
 
 from typing import NamedTuple
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.fixed import Format, wrap
-from fluxproof.golden_model.formats import BIT, TURN, TURN_W
-from fluxproof.golden_model.io.position import code_format
-from fluxproof.golden_model.kernel import kernel
+from golden_model.block import Block, Port
+from golden_model.fixed import Format, wrap
+from golden_model.formats import BIT, TURN, TURN_W
+from golden_model.io.position import code_format
+from golden_model.kernel import kernel
 
 RATE = Format(1, -7, 32)
 PLACE_W = RATE.frac_bits

@@ -14,12 +14,12 @@ Formats: angles TURN, sector_counts U(16,4).  Rounding: the middle of the sector
 
 from typing import NamedTuple
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.encoders.quadrature_decoder import EVENTS, EVENTS_MAX
-from fluxproof.golden_model.encoders.turn_counter import COUNT
-from fluxproof.golden_model.fixed import Format, wrap
-from fluxproof.golden_model.formats import BIT, TURN, TURN_W
-from fluxproof.golden_model.kernel import kernel
+from golden_model.block import Block, Port
+from golden_model.encoders.quadrature_decoder import EVENTS, EVENTS_MAX
+from golden_model.encoders.turn_counter import COUNT
+from golden_model.fixed import Format, wrap
+from golden_model.formats import BIT, TURN, TURN_W
+from golden_model.kernel import kernel
 
 SECTOR_COUNTS = Format(0, 16, 4)
 SECTORS = (0, 1, 3, 2, 5, 0, 4, 0)  # of the code a + 2b + 4c

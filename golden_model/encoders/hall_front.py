@@ -6,15 +6,15 @@ Nothing is computed here.  ``sample_trigger`` latches the upper bits of theta_ha
 
 from typing import NamedTuple
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.common import input_filter
-from fluxproof.golden_model.encoders import edge_timer, hall_decoder
-from fluxproof.golden_model.encoders.edge_timer import MOVED_W, TIME_W
-from fluxproof.golden_model.encoders.quadrature_decoder import EVENTS
-from fluxproof.golden_model.fixed import Format
-from fluxproof.golden_model.formats import BIT, TURN_W
-from fluxproof.golden_model.io.position import code_format
-from fluxproof.golden_model.kernel import kernel
+from golden_model.block import Block, Port
+from golden_model.common import input_filter
+from golden_model.encoders import edge_timer, hall_decoder
+from golden_model.encoders.edge_timer import MOVED_W, TIME_W
+from golden_model.encoders.quadrature_decoder import EVENTS
+from golden_model.fixed import Format
+from golden_model.formats import BIT, TURN_W
+from golden_model.io.position import code_format
+from golden_model.kernel import kernel
 
 filter_step, hall_step, timer_step = input_filter.step, hall_decoder.step, edge_timer.step
 

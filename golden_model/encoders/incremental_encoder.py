@@ -6,13 +6,13 @@ one clock after the decoder has seen it.  From a pin to the count: filter_clocks
 
 from typing import NamedTuple
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.common import input_filter
-from fluxproof.golden_model.encoders import edge_timer, index_check, quadrature_decoder, turn_counter
-from fluxproof.golden_model.encoders.edge_timer import MOVED_W, TIME_W
-from fluxproof.golden_model.formats import BIT
-from fluxproof.golden_model.io.position import code_format
-from fluxproof.golden_model.kernel import kernel
+from golden_model.block import Block, Port
+from golden_model.common import input_filter
+from golden_model.encoders import edge_timer, index_check, quadrature_decoder, turn_counter
+from golden_model.encoders.edge_timer import MOVED_W, TIME_W
+from golden_model.formats import BIT
+from golden_model.io.position import code_format
+from golden_model.kernel import kernel
 
 filter_step, decoder_step = input_filter.step, quadrature_decoder.step
 counter_step, check_step, timer_step = turn_counter.step, index_check.step, edge_timer.step

@@ -13,12 +13,12 @@ Formats: counts.  Rounding: none.
 
 from typing import NamedTuple
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.encoders.quadrature_decoder import EVENTS, EVENTS_MAX
-from fluxproof.golden_model.encoders.turn_counter import COUNT, COUNTS, PENDING, PENDING_W
-from fluxproof.golden_model.fixed import Format, saturate
-from fluxproof.golden_model.formats import BIT
-from fluxproof.golden_model.kernel import kernel
+from golden_model.block import Block, Port
+from golden_model.encoders.quadrature_decoder import EVENTS, EVENTS_MAX
+from golden_model.encoders.turn_counter import COUNT, COUNTS, PENDING, PENDING_W
+from golden_model.fixed import Format, saturate
+from golden_model.formats import BIT
+from golden_model.kernel import kernel
 
 CORRECT = Format(0, 12, 0)
 

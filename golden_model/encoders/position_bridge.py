@@ -15,12 +15,12 @@ Formats: codes of POSITION_BITS, modulo one turn; delay U(2,16).  Rounding: dela
 
 from typing import NamedTuple
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.encoders.quadrature_decoder import EVENTS, EVENTS_MAX
-from fluxproof.golden_model.fixed import Format, round_half_up, wrap, wrap_s
-from fluxproof.golden_model.formats import BIT
-from fluxproof.golden_model.io.position import code_format
-from fluxproof.golden_model.kernel import kernel
+from golden_model.block import Block, Port
+from golden_model.encoders.quadrature_decoder import EVENTS, EVENTS_MAX
+from golden_model.fixed import Format, round_half_up, wrap, wrap_s
+from golden_model.formats import BIT
+from golden_model.io.position import code_format
+from golden_model.kernel import kernel
 
 DELAY = Format(0, 2, 16)
 DROP = DELAY.frac_bits

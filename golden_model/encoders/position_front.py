@@ -14,14 +14,14 @@ Formats: those of the blocks.
 
 from typing import NamedTuple
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.encoders import hall_decoder, hall_front, incremental_encoder, serial_encoder
-from fluxproof.golden_model.encoders.quadrature_decoder import EVENTS
-from fluxproof.golden_model.encoders.turn_counter import COUNT
-from fluxproof.golden_model.fixed import Format
-from fluxproof.golden_model.formats import BIT, PU
-from fluxproof.golden_model.io.position import code_format
-from fluxproof.golden_model.kernel import kernel
+from golden_model.block import Block, Port
+from golden_model.encoders import hall_decoder, hall_front, incremental_encoder, serial_encoder
+from golden_model.encoders.quadrature_decoder import EVENTS
+from golden_model.encoders.turn_counter import COUNT
+from golden_model.fixed import Format
+from golden_model.formats import BIT, PU
+from golden_model.io.position import code_format
+from golden_model.kernel import kernel
 
 EXTERNAL, ABZ, HALL, HALL_ABZ = range(4)
 KINDS = ("external", "abz", "hall", "hall_abz", "ssi", "biss", "endat")

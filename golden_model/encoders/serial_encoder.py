@@ -6,11 +6,11 @@ codes, so a frame that has ended by then is this sample's.  ``encoder`` is 4 (SS
 
 from typing import NamedTuple
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.encoders import biss_master, endat_master, position_bridge, ssi_master
-from fluxproof.golden_model.formats import BIT
-from fluxproof.golden_model.io.position import code_format
-from fluxproof.golden_model.kernel import kernel
+from golden_model.block import Block, Port
+from golden_model.encoders import biss_master, endat_master, position_bridge, ssi_master
+from golden_model.formats import BIT
+from golden_model.io.position import code_format
+from golden_model.kernel import kernel
 
 SSI, BISS, ENDAT = 4, 5, 6
 SOME = 2000  # clocks of the master's hard cases

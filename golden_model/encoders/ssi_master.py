@@ -15,11 +15,11 @@ Formats: code of POSITION_BITS.  Rounding: bits below the code are cut; the angl
 
 from typing import NamedTuple
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.fixed import Format
-from fluxproof.golden_model.formats import BIT
-from fluxproof.golden_model.io.position import code_format
-from fluxproof.golden_model.kernel import kernel
+from golden_model.block import Block, Port
+from golden_model.fixed import Format
+from golden_model.formats import BIT
+from golden_model.io.position import code_format
+from golden_model.kernel import kernel
 
 HALF_PERIOD = Format(0, 10, 0)
 BITS = Format(0, 6, 0)

@@ -16,11 +16,11 @@ Formats: counts.  Rounding: half up, exact.  Code and count wrap, because angles
 
 from typing import NamedTuple
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.fixed import Format, saturate, wrap
-from fluxproof.golden_model.formats import BIT
-from fluxproof.golden_model.io.position import code_format
-from fluxproof.golden_model.kernel import kernel
+from golden_model.block import Block, Port
+from golden_model.fixed import Format, saturate, wrap
+from golden_model.formats import BIT
+from golden_model.io.position import code_format
+from golden_model.kernel import kernel
 
 COUNTS = Format(0, 19, 0)
 COUNT = Format(0, 18, 0)

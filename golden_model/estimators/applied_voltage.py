@@ -15,12 +15,12 @@ Saturation: none.  Compare values are at most CARRIER_HALF, so |u_applied| <= 2/
 
 import math
 
-from fluxproof.golden_model.block import Block, Const, Port
-from fluxproof.golden_model.fixed import Format, round_half_up
-from fluxproof.golden_model.formats import BIT, FLUX, U_DC
-from fluxproof.golden_model.io.u_dc_processing import U_DC_MIN
-from fluxproof.golden_model.kernel import kernel
-from fluxproof.golden_model.modulation.pwm_compare import COUNT
+from golden_model.block import Block, Const, Port
+from golden_model.fixed import Format, round_half_up
+from golden_model.formats import BIT, FLUX, U_DC
+from golden_model.io.u_dc_processing import U_DC_MIN
+from golden_model.kernel import kernel
+from golden_model.modulation.pwm_compare import COUNT
 
 K_FRAC = 16  # fraction bits of 2**SHIFT/CARRIER_HALF
 SCALE = Format(0, 2, 22)

@@ -13,11 +13,11 @@ largest sum of voltage, 1.34, and leg voltage, 0.5*4/3.
 
 from typing import NamedTuple
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.common.multiply_add import multiply_subtract
-from fluxproof.golden_model.control.dead_time_compensation import S_ALPHA, S_BETA
-from fluxproof.golden_model.formats import FLUX, FLUX_W, PU, V_LEG
-from fluxproof.golden_model.kernel import kernel
+from golden_model.block import Block, Port
+from golden_model.common.multiply_add import multiply_subtract
+from golden_model.control.dead_time_compensation import S_ALPHA, S_BETA
+from golden_model.formats import FLUX, FLUX_W, PU, V_LEG
+from golden_model.kernel import kernel
 
 DROP = PU.frac_bits + V_LEG.frac_bits - FLUX.frac_bits
 

@@ -20,12 +20,12 @@ range; products with k_sign rounded half up.  All other operations are exact.
 
 import math
 
-from fluxproof.golden_model.block import Block, Const, Port
-from fluxproof.golden_model.common.multiply_add import multiply_add, multiply_subtract
-from fluxproof.golden_model.fixed import Format, clamp, round_half_up, round_sat, saturate
-from fluxproof.golden_model.formats import PU, PU_W
-from fluxproof.golden_model.kernel import kernel
-from fluxproof.golden_model.transforms import clarke
+from golden_model.block import Block, Const, Port
+from golden_model.common.multiply_add import multiply_add, multiply_subtract
+from golden_model.fixed import Format, clamp, round_half_up, round_sat, saturate
+from golden_model.formats import PU, PU_W
+from golden_model.kernel import kernel
+from golden_model.transforms import clarke
 
 K_SIGN = Format(0, 12, 12)
 K_AHEAD = Format(0, 1, 16)

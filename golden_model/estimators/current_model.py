@@ -10,11 +10,11 @@ Formats: model S(6,36), rounded half up to FLUX; the sum exact.
 Saturation: at 2 per unit of flux, twice the flux of full voltage at base speed; reported by ``model_limited``.
 """
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.estimators.flux_models import DROP_MODEL, MODEL
-from fluxproof.golden_model.fixed import exceeds, round_half_up, saturate
-from fluxproof.golden_model.formats import BIT, FLUX, FLUX_W
-from fluxproof.golden_model.kernel import kernel
+from golden_model.block import Block, Port
+from golden_model.estimators.flux_models import DROP_MODEL, MODEL
+from golden_model.fixed import exceeds, round_half_up, saturate
+from golden_model.formats import BIT, FLUX, FLUX_W
+from golden_model.kernel import kernel
 
 
 @kernel

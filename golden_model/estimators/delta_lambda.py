@@ -20,13 +20,13 @@ have, but reached at low speed by a small voltage error; reported by ``delta_lim
 
 from typing import NamedTuple
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.control.current_pi import SAT
-from fluxproof.golden_model.estimators import speed_reciprocal
-from fluxproof.golden_model.estimators.winding_resistance import R
-from fluxproof.golden_model.fixed import Format, exceeds, round_half_up, saturate
-from fluxproof.golden_model.formats import BIT, FLUX, FLUX_W, INTEGRAL, PU, RESISTANCE
-from fluxproof.golden_model.kernel import kernel
+from golden_model.block import Block, Port
+from golden_model.control.current_pi import SAT
+from golden_model.estimators import speed_reciprocal
+from golden_model.estimators.winding_resistance import R
+from golden_model.fixed import Format, exceeds, round_half_up, saturate
+from golden_model.formats import BIT, FLUX, FLUX_W, INTEGRAL, PU, RESISTANCE
+from golden_model.kernel import kernel
 
 DROP_R = PU.frac_bits + RESISTANCE.frac_bits - INTEGRAL.frac_bits
 DROP_SHIFTED = INTEGRAL.frac_bits - FLUX.frac_bits

@@ -16,12 +16,12 @@ the limit, a multiple of FLUX's LSB.  Saturation: at delta_max, intended; report
 
 from typing import NamedTuple
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.estimators.delta_lambda import DELTA
-from fluxproof.golden_model.estimators.flux_models import EARLIER, FLUX_MODE, PROPOSED
-from fluxproof.golden_model.fixed import Format, clamp, round_half_up
-from fluxproof.golden_model.formats import BIT, FLUX, FLUX_STATE, FLUX_TO_STATE, PU
-from fluxproof.golden_model.kernel import kernel
+from golden_model.block import Block, Port
+from golden_model.estimators.delta_lambda import DELTA
+from golden_model.estimators.flux_models import EARLIER, FLUX_MODE, PROPOSED
+from golden_model.fixed import Format, clamp, round_half_up
+from golden_model.formats import BIT, FLUX, FLUX_STATE, FLUX_TO_STATE, PU
+from golden_model.kernel import kernel
 
 FLUX_KP = Format(0, 7, 10)
 FLUX_KI = Format(0, 0, 17)

@@ -12,11 +12,11 @@ Saturation: at 2 per unit of flux, twice the flux of full voltage at base speed;
 which also reports a saturated merged flux.
 """
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.estimators.flux_models import CHOSEN, DROP_MERGED, DROP_MODEL, MODEL
-from fluxproof.golden_model.fixed import exceeds, round_half_up, saturate
-from fluxproof.golden_model.formats import BIT, FLUX, PU, PU_TO_FLUX, PU_W
-from fluxproof.golden_model.kernel import kernel
+from golden_model.block import Block, Port
+from golden_model.estimators.flux_models import CHOSEN, DROP_MERGED, DROP_MODEL, MODEL
+from golden_model.fixed import exceeds, round_half_up, saturate
+from golden_model.formats import BIT, FLUX, PU, PU_TO_FLUX, PU_W
+from golden_model.kernel import kernel
 
 
 @kernel

@@ -29,11 +29,11 @@ time constant.  y needs none: |eps| <= 2 and w < 1/4.
 
 from typing import NamedTuple
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.common.multiply_add import multiply_add
-from fluxproof.golden_model.estimators.winding_resistance import RHO, T_S
-from fluxproof.golden_model.fixed import Format, exceeds, round_half_up, round_sat, saturate
-from fluxproof.golden_model.formats import (
+from golden_model.block import Block, Port
+from golden_model.common.multiply_add import multiply_add
+from golden_model.estimators.winding_resistance import RHO, T_S
+from golden_model.fixed import Format, exceeds, round_half_up, round_sat, saturate
+from golden_model.formats import (
     BIT,
     FLUX,
     FLUX_STATE,
@@ -44,8 +44,8 @@ from fluxproof.golden_model.formats import (
     RESISTANCE,
     SAMPLE_TIME,
 )
-from fluxproof.golden_model.kernel import kernel
-from fluxproof.golden_model.transforms.flux_park import LAMBDA_M
+from golden_model.kernel import kernel
+from golden_model.transforms.flux_park import LAMBDA_M
 
 OMEGA_0 = Format(0, -2, 18)
 XI = Format(0, 2, 14)

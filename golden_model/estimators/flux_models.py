@@ -14,12 +14,12 @@ Formats: model S(6,36) and merged S(2,40), both exact.
 
 from dataclasses import replace
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.estimators.winding_resistance import MINUS_RHO
-from fluxproof.golden_model.fixed import Format
-from fluxproof.golden_model.formats import BIT, FLUX, INDUCTANCE, PU, RESISTANCE
-from fluxproof.golden_model.kernel import kernel
-from fluxproof.golden_model.transforms.flux_park import LAMBDA_M_DQ
+from golden_model.block import Block, Port
+from golden_model.estimators.winding_resistance import MINUS_RHO
+from golden_model.fixed import Format
+from golden_model.formats import BIT, FLUX, INDUCTANCE, PU, RESISTANCE
+from golden_model.kernel import kernel
+from golden_model.transforms.flux_park import LAMBDA_M_DQ
 
 MODE = Format(0, 2, 0)
 CURRENT_MODEL, MERGED, EARLIER, PROPOSED = 0, 1, 2, 3

@@ -14,15 +14,15 @@ omega*e FLUX; psi_m S(1,34), so that an eta of 1e-4 per unit still moves it by a
 
 from typing import NamedTuple
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.common.multiply_add import multiply_add, multiply_subtract
-from fluxproof.golden_model.control.current_pi import SAT
-from fluxproof.golden_model.control.dead_time_compensation import D_Q
-from fluxproof.golden_model.estimators.flux_models import L_D
-from fluxproof.golden_model.estimators.v_dead_adaline import V_LEG_PORT
-from fluxproof.golden_model.estimators.winding_resistance import R
-from fluxproof.golden_model.fixed import Format, round_half_up, round_sat, saturate
-from fluxproof.golden_model.formats import (
+from golden_model.block import Block, Port
+from golden_model.common.multiply_add import multiply_add, multiply_subtract
+from golden_model.control.current_pi import SAT
+from golden_model.control.dead_time_compensation import D_Q
+from golden_model.estimators.flux_models import L_D
+from golden_model.estimators.v_dead_adaline import V_LEG_PORT
+from golden_model.estimators.winding_resistance import R
+from golden_model.fixed import Format, round_half_up, round_sat, saturate
+from golden_model.formats import (
     BIT,
     FLUX,
     FLUX_W,
@@ -33,7 +33,7 @@ from fluxproof.golden_model.formats import (
     RESISTANCE,
     V_LEG,
 )
-from fluxproof.golden_model.kernel import kernel
+from golden_model.kernel import kernel
 
 ETA_PSI = Format(0, -2, 19)
 PSI_STATE = Format(1, 1, 34)

@@ -11,11 +11,11 @@ Formats: reciprocal as in common/reciprocal, |omega_me| from 2**-12 on; weight U
 fraction bits, half up: m*weight <= m < 1, so it fits.  |omega_me| = 2 is replaced by the next smaller number.
 """
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.common import reciprocal
-from fluxproof.golden_model.fixed import Format, clamp, round_half_up
-from fluxproof.golden_model.formats import DUTY, PU, RECIPROCAL, U_DC
-from fluxproof.golden_model.kernel import kernel
+from golden_model.block import Block, Port
+from golden_model.common import reciprocal
+from golden_model.fixed import Format, clamp, round_half_up
+from golden_model.formats import DUTY, PU, RECIPROCAL, U_DC
+from golden_model.kernel import kernel
 
 N_MAX = 12
 K_RAMP = Format(0, 12, 4)

@@ -25,12 +25,12 @@ All rounded half up.  Limits: v_dead within +-v_comp_max, v_sum and v_comp from 
 
 from typing import NamedTuple
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.common.multiply_add import multiply_add, multiply_subtract
-from fluxproof.golden_model.control.current_pi import SAT
-from fluxproof.golden_model.control.dead_time_compensation import D_D
-from fluxproof.golden_model.fixed import Format, clamp, round_half_up, round_sat, saturate
-from fluxproof.golden_model.formats import (
+from golden_model.block import Block, Port
+from golden_model.common.multiply_add import multiply_add, multiply_subtract
+from golden_model.control.current_pi import SAT
+from golden_model.control.dead_time_compensation import D_D
+from golden_model.fixed import Format, clamp, round_half_up, round_sat, saturate
+from golden_model.formats import (
     BIT,
     FLUX,
     FLUX_W,
@@ -43,7 +43,7 @@ from fluxproof.golden_model.formats import (
     V_LEG,
     V_LEG_W,
 )
-from fluxproof.golden_model.kernel import kernel
+from golden_model.kernel import kernel
 
 K_LP = Format(0, 0, 20)
 V_STATE = Format(1, -1, 38)

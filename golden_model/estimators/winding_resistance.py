@@ -9,11 +9,11 @@ Formats: temperatures S(9,6) in degrees, tcr U(-6,30); product 36 fraction bits,
 0 .. 1; rho rounded half up to 24 fraction bits, below 1/4 since t_s < 1/2.
 """
 
-from fluxproof.golden_model import formats
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.fixed import Format, round_half_up, saturate_u
-from fluxproof.golden_model.formats import BIT, RESISTANCE, SAMPLE_TIME
-from fluxproof.golden_model.kernel import kernel
+from golden_model import formats
+from golden_model.block import Block, Port
+from golden_model.fixed import Format, round_half_up, saturate_u
+from golden_model.formats import BIT, RESISTANCE, SAMPLE_TIME
+from golden_model.kernel import kernel
 
 CELSIUS = Format(1, 9, 6)
 TCR = Format(0, -6, 30)

@@ -13,10 +13,10 @@ Formats: bits.
 
 from typing import NamedTuple
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.fixed import Format
-from fluxproof.golden_model.formats import BIT
-from fluxproof.golden_model.kernel import kernel
+from golden_model.block import Block, Port
+from golden_model.fixed import Format
+from golden_model.formats import BIT
+from golden_model.kernel import kernel
 
 FAULTS = Format(0, 3, 0)
 NAMES = ("index_wrong", "position_lost", "converter_over")

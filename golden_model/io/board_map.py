@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from fluxproof.golden_model.block import Port
-from fluxproof.golden_model.converters import current_front
-from fluxproof.golden_model.encoders import forced_position, position_front
-from fluxproof.golden_model.formats import BIT
-from fluxproof.golden_model.io import board_faults, board_snapshot, register_map
-from fluxproof.golden_model.io.register_map import WORD, Field, Kind, Register
+from golden_model.block import Port
+from golden_model.converters import current_front
+from golden_model.encoders import forced_position, position_front
+from golden_model.formats import BIT
+from golden_model.io import board_faults, board_snapshot, register_map
+from golden_model.io.register_map import WORD, Field, Kind, Register
 
 BASE, END = 0x400, 0x600
 GENERICS = ("encoder", "currents", "spi_lines")

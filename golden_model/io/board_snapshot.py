@@ -8,14 +8,14 @@ Formats: codes right-aligned.
 
 from typing import NamedTuple
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.encoders import position_front
-from fluxproof.golden_model.encoders.turn_counter import COUNT
-from fluxproof.golden_model.fixed import Format
-from fluxproof.golden_model.formats import BIT, CODE, TURN
-from fluxproof.golden_model.io.current_conditioning import code_format
-from fluxproof.golden_model.io.position import code_format as turn_format
-from fluxproof.golden_model.kernel import kernel
+from golden_model.block import Block, Port
+from golden_model.encoders import position_front
+from golden_model.encoders.turn_counter import COUNT
+from golden_model.fixed import Format
+from golden_model.formats import BIT, CODE, TURN
+from golden_model.io.current_conditioning import code_format
+from golden_model.io.position import code_format as turn_format
+from golden_model.kernel import kernel
 
 CODES = ("a", "b", "c", "u_dc")
 RAW = Format(0, CODE.width, 0)

@@ -8,10 +8,10 @@ Formats: u_dc cut (floor) to U(1,8).  With brake_off above brake_on the bus deci
 
 from typing import NamedTuple
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.formats import BIT, LIMIT, U_DC
-from fluxproof.golden_model.io.sample_checks import DROP_LIMIT
-from fluxproof.golden_model.kernel import kernel
+from golden_model.block import Block, Port
+from golden_model.formats import BIT, LIMIT, U_DC
+from golden_model.io.sample_checks import DROP_LIMIT
+from golden_model.kernel import kernel
 
 
 class State(NamedTuple):

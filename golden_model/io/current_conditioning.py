@@ -8,10 +8,10 @@ With ``two_sensors`` phase a has none: i_a = -(i_b + i_c), saturated at 2 per un
 rail flag is 0, since its code is no measurement.  Any leg may be called a, because the phases turn in a circle.
 """
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.fixed import Format, round_sat, saturate
-from fluxproof.golden_model.formats import BIT, CODE, GAIN, PU, PU_W
-from fluxproof.golden_model.kernel import kernel
+from golden_model.block import Block, Port
+from golden_model.fixed import Format, round_sat, saturate
+from golden_model.formats import BIT, CODE, GAIN, PU, PU_W
+from golden_model.kernel import kernel
 
 DROP = CODE.frac_bits + GAIN.frac_bits - PU.frac_bits
 

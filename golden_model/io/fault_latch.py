@@ -19,11 +19,11 @@ Formats: bits.
 
 from typing import NamedTuple
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.formats import BIT
-from fluxproof.golden_model.io.motion_checks import FAULTS as MOTION_FAULTS
-from fluxproof.golden_model.io.sample_checks import CHECKS, IGNORE
-from fluxproof.golden_model.kernel import kernel
+from golden_model.block import Block, Port
+from golden_model.formats import BIT
+from golden_model.io.motion_checks import FAULTS as MOTION_FAULTS
+from golden_model.io.sample_checks import CHECKS, IGNORE
+from golden_model.kernel import kernel
 
 NAMES = (
     "overcurrent", "current_sum", "at_rail", "u_dc_low", "u_dc_high", "position", "watchdog", "trip", "early",

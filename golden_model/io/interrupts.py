@@ -12,11 +12,11 @@ Formats: bits.
 
 from typing import NamedTuple
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.fixed import Format
-from fluxproof.golden_model.formats import BIT
-from fluxproof.golden_model.io.fault_latch import FLAGS
-from fluxproof.golden_model.kernel import kernel
+from golden_model.block import Block, Port
+from golden_model.fixed import Format
+from golden_model.formats import BIT
+from golden_model.io.fault_latch import FLAGS
+from golden_model.kernel import kernel
 
 CAUSES = Format(0, 4, 0)
 

@@ -14,11 +14,11 @@ Formats: i_open U(1,8); currents are cut (floor) to it, |x| is the one's complem
 
 from typing import NamedTuple
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.formats import BIT, LIMIT, PU, TURN, TURN_W
-from fluxproof.golden_model.io.motion_checks import FAULTS
-from fluxproof.golden_model.io.sample_checks import DROP_LIMIT, reaches
-from fluxproof.golden_model.kernel import kernel
+from golden_model.block import Block, Port
+from golden_model.formats import BIT, LIMIT, PU, TURN, TURN_W
+from golden_model.io.motion_checks import FAULTS
+from golden_model.io.sample_checks import DROP_LIMIT, reaches
+from golden_model.kernel import kernel
 
 STALL = 4  # of motion_faults
 ALL = 15  # quadrants

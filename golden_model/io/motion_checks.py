@@ -16,11 +16,11 @@ compared in full.  Counters saturate.
 
 from typing import NamedTuple
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.fixed import Format
-from fluxproof.golden_model.formats import BIT, LIMIT, PU
-from fluxproof.golden_model.io.sample_checks import DROP_LIMIT
-from fluxproof.golden_model.kernel import kernel
+from golden_model.block import Block, Port
+from golden_model.fixed import Format
+from golden_model.formats import BIT, LIMIT, PU
+from golden_model.io.sample_checks import DROP_LIMIT
+from golden_model.kernel import kernel
 
 FAULTS = Format(0, 3, 0)
 AWAY, STALLED = Format(0, 12, 0), Format(0, 16, 0)  # counts of samples

@@ -11,11 +11,11 @@ is the one's complement where x is negative.  The sum holds every window.
 
 from typing import NamedTuple
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.fixed import Format
-from fluxproof.golden_model.formats import BIT, LIMIT, PU
-from fluxproof.golden_model.io.sample_checks import DROP_LIMIT, reaches
-from fluxproof.golden_model.kernel import kernel
+from golden_model.block import Block, Port
+from golden_model.fixed import Format
+from golden_model.formats import BIT, LIMIT, PU
+from golden_model.io.sample_checks import DROP_LIMIT, reaches
+from golden_model.kernel import kernel
 
 WINDOW_BITS = 6
 OFFSET = Format(0, -2, 12)

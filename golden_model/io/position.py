@@ -4,10 +4,10 @@ Formats: a code of 8 to 18 bits is left-aligned in 18 bits.  Nothing is rounded;
 modulo one turn, because angles wrap.  ``reverse`` = 1 inverts the sense of rotation (code -> -code).
 """
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.fixed import Format, wrap
-from fluxproof.golden_model.formats import BIT, TURN, TURN_W
-from fluxproof.golden_model.kernel import kernel
+from golden_model.block import Block, Port
+from golden_model.fixed import Format, wrap
+from golden_model.formats import BIT, TURN, TURN_W
+from golden_model.kernel import kernel
 
 POLE_PAIRS = Format(0, 6, 0)
 

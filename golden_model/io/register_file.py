@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from fluxproof.golden_model.fluxproof import Registers
-from fluxproof.golden_model.io.register_map import (
+from golden_model.fluxproof import Registers
+from golden_model.io.register_map import (
     ADDRESS_BITS,
     DECERR,
     GENERICS,

@@ -20,12 +20,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
 
-from fluxproof.golden_model import fluxproof
-from fluxproof.golden_model.block import Port
-from fluxproof.golden_model.fixed import Format
-from fluxproof.golden_model.formats import BIT
-from fluxproof.golden_model.io import fault_latch, interrupts, sample_guard, sample_latch, telemetry
-from fluxproof.golden_model.modulation import gate_generation
+from golden_model import fluxproof
+from golden_model.block import Port
+from golden_model.fixed import Format
+from golden_model.formats import BIT
+from golden_model.io import fault_latch, interrupts, sample_guard, sample_latch, telemetry
+from golden_model.modulation import gate_generation
 
 ADDRESS_BITS, WORDS = 12, 256  # the slave decodes 4 KiB; the registers are in the first WORDS words
 OKAY, SLVERR, DECERR = 0, 2, 3  # responses of AXI4

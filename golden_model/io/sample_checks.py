@@ -19,11 +19,11 @@ Codes in 1/2**18 turn; their difference is the shorter angle, floored to U(-1,13
 
 from typing import NamedTuple
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.fixed import Format, wrap, wrap_s
-from fluxproof.golden_model.formats import BIT, LIMIT, PU, TURN_W, U_DC
-from fluxproof.golden_model.io.position import code_format
-from fluxproof.golden_model.kernel import kernel
+from golden_model.block import Block, Port
+from golden_model.fixed import Format, wrap, wrap_s
+from golden_model.formats import BIT, LIMIT, PU, TURN_W, U_DC
+from golden_model.io.position import code_format
+from golden_model.kernel import kernel
 
 JUMP = Format(0, -1, 13)
 SAMPLES = Format(0, 4, 0)

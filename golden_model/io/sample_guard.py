@@ -12,10 +12,10 @@ Formats: clocks; the age has AGE_W bits, which no age that stops at ``watchdog``
 
 from typing import NamedTuple
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.fixed import Format
-from fluxproof.golden_model.formats import BIT
-from fluxproof.golden_model.kernel import kernel
+from golden_model.block import Block, Port
+from golden_model.fixed import Format
+from golden_model.formats import BIT
+from golden_model.kernel import kernel
 
 AGE_W = 20
 AGE = Format(0, AGE_W, 0)

@@ -8,9 +8,9 @@ What comes at the clock of a trigger belongs to that trigger.
 
 from typing import NamedTuple
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.formats import BIT
-from fluxproof.golden_model.kernel import kernel
+from golden_model.block import Block, Port
+from golden_model.formats import BIT
+from golden_model.kernel import kernel
 
 
 class State(NamedTuple):

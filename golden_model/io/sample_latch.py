@@ -5,11 +5,11 @@ state) enters the core here; the blocks after it have constant inputs until the 
 Formats: unchanged; nothing is computed.
 """
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.estimators import winding_resistance
-from fluxproof.golden_model.formats import BIT, PU
-from fluxproof.golden_model.io import current_conditioning, position, u_dc_conditioning
-from fluxproof.golden_model.kernel import kernel
+from golden_model.block import Block, Port
+from golden_model.estimators import winding_resistance
+from golden_model.formats import BIT, PU
+from golden_model.io import current_conditioning, position, u_dc_conditioning
+from golden_model.kernel import kernel
 
 
 @kernel

@@ -16,11 +16,11 @@ from omega_me, so omega stays within half an LSB of PU of the range of raw, and 
 
 from typing import NamedTuple
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.fixed import Format, round_half_up, round_sat, wrap_s
-from fluxproof.golden_model.formats import BIT, PU, PU_W, TURN_W
-from fluxproof.golden_model.io.position import code_format
-from fluxproof.golden_model.kernel import kernel
+from golden_model.block import Block, Port
+from golden_model.fixed import Format, round_half_up, round_sat, wrap_s
+from golden_model.formats import BIT, PU, PU_W, TURN_W
+from golden_model.io.position import code_format
+from golden_model.kernel import kernel
 
 K_SPEED = Format(0, 12, 12)
 K_FILTER = Format(0, 1, 16)

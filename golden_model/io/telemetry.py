@@ -14,13 +14,13 @@ Formats: unchanged, see telemetry_words.
 
 from typing import NamedTuple
 
-from fluxproof.golden_model import fluxproof
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.common import packet_fifo
-from fluxproof.golden_model.fixed import Format
-from fluxproof.golden_model.formats import BIT
-from fluxproof.golden_model.io import sample_latch, telemetry_words
-from fluxproof.golden_model.io.telemetry_words import COUNT, FIELDS, INPUTS, PORTS, START, WORD
+from golden_model import fluxproof
+from golden_model.block import Block, Port
+from golden_model.common import packet_fifo
+from golden_model.fixed import Format
+from golden_model.formats import BIT
+from golden_model.io import sample_latch, telemetry_words
+from golden_model.io.telemetry_words import COUNT, FIELDS, INPUTS, PORTS, START, WORD
 
 INTERVAL = fluxproof.SAMPLE_INTERVAL
 DROPPED = Format(0, 16, 0)

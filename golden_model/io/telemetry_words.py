@@ -15,10 +15,10 @@ the import fails with the name of the word.
 
 from typing import NamedTuple
 
-from fluxproof.golden_model import fluxproof
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.fixed import Format
-from fluxproof.golden_model.io import sample_latch
+from golden_model import fluxproof
+from golden_model.block import Block, Port
+from golden_model.fixed import Format
+from golden_model.io import sample_latch
 
 VERSION = 2
 MAGIC = 0x4650  # "FP"

@@ -8,11 +8,11 @@ Saturation: u_dc at 0 and 2 per unit, u_max at 1 per unit: choose the voltage ba
 stays below sqrt(3).  ``u_dc_at_rail`` = 1: the code was at either end.
 """
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.fixed import Format, round_half_up, saturate_u
-from fluxproof.golden_model.formats import BIT, CODE, GAIN, U_DC, U_MAX
-from fluxproof.golden_model.io.current_conditioning import at_rail
-from fluxproof.golden_model.kernel import kernel
+from golden_model.block import Block, Port
+from golden_model.fixed import Format, round_half_up, saturate_u
+from golden_model.formats import BIT, CODE, GAIN, U_DC, U_MAX
+from golden_model.io.current_conditioning import at_rail
+from golden_model.kernel import kernel
 
 K_U_MAX = Format(0, 0, 17)
 DROP_U_DC = CODE.frac_bits + GAIN.frac_bits - U_DC.frac_bits

@@ -13,11 +13,11 @@ Rounding: m_beta half up; it is below m, so it fits.  The shift by n loses nothi
 
 import math
 
-from fluxproof.golden_model.block import Block, Const, Port
-from fluxproof.golden_model.common import reciprocal
-from fluxproof.golden_model.fixed import Format, round_half_up
-from fluxproof.golden_model.formats import BIT, RECIPROCAL, U_DC
-from fluxproof.golden_model.kernel import kernel
+from golden_model.block import Block, Const, Port
+from golden_model.common import reciprocal
+from golden_model.fixed import Format, round_half_up
+from golden_model.formats import BIT, RECIPROCAL, U_DC
+from golden_model.kernel import kernel
 
 N_MAX = 5
 INVERSE = Format(0, N_MAX, RECIPROCAL.frac_bits)

@@ -20,11 +20,11 @@ dead time and minimum pulse at the valley only.  A half period then has its own 
 
 from typing import NamedTuple
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.fixed import Format
-from fluxproof.golden_model.formats import BIT
-from fluxproof.golden_model.kernel import kernel
-from fluxproof.golden_model.modulation.pwm_compare import CLOCKS, COUNT
+from golden_model.block import Block, Port
+from golden_model.fixed import Format
+from golden_model.formats import BIT
+from golden_model.kernel import kernel
+from golden_model.modulation.pwm_compare import CLOCKS, COUNT
 
 LEGS = Format(0, 3, 0)
 

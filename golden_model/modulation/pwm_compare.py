@@ -10,10 +10,10 @@ Rounding: half up to whole clocks.  No overflow: duty <= 1, so compare <= CARRIE
 The three values change together, so the carrier can never load a mixture of two samples.
 """
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.fixed import Format, round_half_up
-from fluxproof.golden_model.formats import BIT, DUTY, DUTY_ONE
-from fluxproof.golden_model.kernel import kernel
+from golden_model.block import Block, Port
+from golden_model.fixed import Format, round_half_up
+from golden_model.formats import BIT, DUTY, DUTY_ONE
+from golden_model.kernel import kernel
 
 COUNT = Format(0, 16, 0)
 CLOCKS = Format(0, 12, 0)

@@ -13,11 +13,11 @@ is below 1, and the circle's radius and the inverses come from the same sample's
 
 import math
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.fixed import Format, clamp, round_half_up
-from fluxproof.golden_model.formats import DUTY, DUTY_ONE, PU
-from fluxproof.golden_model.io.u_dc_processing import INVERSE
-from fluxproof.golden_model.kernel import kernel
+from golden_model.block import Block, Port
+from golden_model.fixed import Format, clamp, round_half_up
+from golden_model.formats import DUTY, DUTY_ONE, PU
+from golden_model.io.u_dc_processing import INVERSE
+from golden_model.kernel import kernel
 
 SCALED = Format(1, 1, 17)
 SCALED_W = SCALED.width

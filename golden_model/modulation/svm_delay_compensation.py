@@ -7,10 +7,10 @@ Park transform rotates the voltage vector.
 Formats: product 33 fraction bits, rounded half up to TURN; the sum wraps, it is an angle.
 """
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.fixed import Format, round_half_up, wrap
-from fluxproof.golden_model.formats import PU, TURN, TURN_W
-from fluxproof.golden_model.kernel import kernel
+from golden_model.block import Block, Port
+from golden_model.fixed import Format, round_half_up, wrap
+from golden_model.formats import PU, TURN, TURN_W
+from golden_model.kernel import kernel
 
 K_DELAY = Format(0, 0, 17)
 DROP = PU.frac_bits + K_DELAY.frac_bits - TURN.frac_bits

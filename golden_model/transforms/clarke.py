@@ -11,10 +11,10 @@ currents that sum to zero give no component beyond the largest of them.
 
 import math
 
-from fluxproof.golden_model.block import Block, Const, Port
-from fluxproof.golden_model.fixed import Format, clamp, round_half_up
-from fluxproof.golden_model.formats import PU, VECTOR
-from fluxproof.golden_model.kernel import kernel
+from golden_model.block import Block, Const, Port
+from golden_model.fixed import Format, clamp, round_half_up
+from golden_model.formats import PU, VECTOR
+from golden_model.kernel import kernel
 
 THIRD = Const(1 / 3, Format(0, -1, 18))
 INV_SQRT12 = Const(1 / math.sqrt(12), Format(0, -1, 18))

@@ -6,10 +6,10 @@
 Formats, rounding and saturation: those of flux_rotate.
 """
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.formats import FLUX
-from fluxproof.golden_model.kernel import kernel
-from fluxproof.golden_model.transforms import flux_rotate, rotate
+from golden_model.block import Block, Port
+from golden_model.formats import FLUX
+from golden_model.kernel import kernel
+from golden_model.transforms import flux_rotate, rotate
 
 
 @kernel

@@ -8,11 +8,11 @@ FLUX.
 Saturation: a flux with both components near 2 per unit rotated by 45 degrees reaches 2.83.
 """
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.fixed import round_sat
-from fluxproof.golden_model.formats import FLUX, FLUX_W
-from fluxproof.golden_model.kernel import kernel
-from fluxproof.golden_model.transforms import rotate
+from golden_model.block import Block, Port
+from golden_model.fixed import round_sat
+from golden_model.formats import FLUX, FLUX_W
+from golden_model.kernel import kernel
+from golden_model.transforms import rotate
 
 DROP = rotate.DROP
 

@@ -6,10 +6,10 @@
 Formats, rounding and range: those of rotate; the voltage is within the circle, below 1 per unit.
 """
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.formats import PU, VECTOR
-from fluxproof.golden_model.kernel import kernel
-from fluxproof.golden_model.transforms import rotate
+from golden_model.block import Block, Port
+from golden_model.formats import PU, VECTOR
+from golden_model.kernel import kernel
+from golden_model.transforms import rotate
 
 
 @kernel

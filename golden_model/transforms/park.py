@@ -9,10 +9,10 @@ is the backward rotation.
 
 from dataclasses import replace
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.formats import PU
-from fluxproof.golden_model.kernel import kernel
-from fluxproof.golden_model.transforms import clarke, rotate
+from golden_model.block import Block, Port
+from golden_model.formats import PU
+from golden_model.kernel import kernel
+from golden_model.transforms import clarke, rotate
 
 
 @kernel

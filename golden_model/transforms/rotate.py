@@ -10,10 +10,10 @@ Range: the components of currents and voltages are limited to VECTOR, 1.375 per 
 
 import math
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.common.sum_of_products import difference_of_products, sum_of_products
-from fluxproof.golden_model.formats import PU, PU_W, TRIG, TRIG_ONE, VECTOR
-from fluxproof.golden_model.kernel import kernel
+from golden_model.block import Block, Port
+from golden_model.common.sum_of_products import difference_of_products, sum_of_products
+from golden_model.formats import PU, PU_W, TRIG, TRIG_ONE, VECTOR
+from golden_model.kernel import kernel
 
 DROP = TRIG.frac_bits
 

@@ -13,10 +13,10 @@ import math
 
 import numpy as np
 
-from fluxproof.golden_model.block import Block, Port
-from fluxproof.golden_model.fixed import Format, round_half_up
-from fluxproof.golden_model.formats import TRIG, TRIG_ONE, TURN, TURN_W
-from fluxproof.golden_model.kernel import kernel
+from golden_model.block import Block, Port
+from golden_model.fixed import Format, round_half_up
+from golden_model.formats import TRIG, TRIG_ONE, TURN, TURN_W
+from golden_model.kernel import kernel
 
 ADDRESS_BITS = 10
 DELTA_BITS = TURN_W - 2 - ADDRESS_BITS

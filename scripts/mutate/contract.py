@@ -3,15 +3,16 @@
 The module `miter` holds the block twice, as it is (`gold`) and mutated (`gate`): graph.py gives their inputs `mutant`
 the values.  Its other inputs are free; `rst` is
 high in the first clock, samples keep their distance, inputs and registers are held as long as the contract says
-(golden_model/block.py), numbers outside a port's range are replaced by the lowest.  What cosim/schedule.py drives is
-one of these sequences.  `bad` is high where cosim.schedule.due compares and the two differ.
+(golden_model/block.py), numbers outside a port's range are replaced by the lowest.  What
+fluxproof/cosim/schedule.py drives is one of these sequences.  `bad` is high where `due` there
+compares and the two differ.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from fluxproof.golden_model.block import Block, Port
+from golden_model.block import Block, Port
 from scripts.mutate.product import Product, bounded
 
 

@@ -1,8 +1,8 @@
 """The wiring of the whole core: mutants of the top's own cells and connections, judged by the golden core.
 
-Three runs, each clock of them compared: every operating condition in 50 ms in closed loop (cosim/scenarios.py,
-`compressed`), the same with bits of some settings inverted from time to time, and samples with any settings.  Inputs
-and expected outputs come from the golden core alone, by the names of the ports.
+Three runs, each clock of them compared: every operating condition in 50 ms in closed loop (`compressed` in
+fluxproof/cosim/scenarios.py), the same with bits of some settings inverted from time to time, and samples with any
+settings.  Inputs and expected outputs come from the golden core alone, by the names of the ports.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from fluxproof.cosim.golden_clock import SEEN, GoldenClock
 from fluxproof.cosim.runs import closed_loop, generics
 from fluxproof.cosim.values import random_value
 from fluxproof.cosim.verilog import VerilogPort
-from fluxproof.golden_model import clocked
-from fluxproof.golden_model.fluxproof import OBSERVED, REGISTERS, Observed
-from fluxproof.golden_model.io import fault_latch, offset_check, sample_latch
+from golden_model import clocked
+from golden_model.fluxproof import OBSERVED, REGISTERS, Observed
+from golden_model.io import fault_latch, offset_check, sample_latch
 from scripts.mutate.harness import Trial
 from scripts.prove.pipeline import core_ends
 

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from fluxproof.checkout import BUILD, ROOT
-from fluxproof.golden_model.registry import BLOCKS
+from golden_model.registry import BLOCKS
 
 FOLDER = BUILD / "mutate" / "defects"
 

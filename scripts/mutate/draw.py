@@ -25,7 +25,7 @@ PREPARE += "; splitnets -driver; splitcells; opt_dff -nodffe -nosdff"
 _DETAIL = re.compile(r" -(?:wire|wirebit|src) \S+")
 # What a cell does not calculate with: a mutated clock is no fault of the logic.
 _PLACE = re.compile(r"mutate -mode (\w+) -module \S+ -cell (\S+) -port \\?(\S+) -portbit (\d+)")
-_WRAPPED = re.compile(r"^\s*(\w+) inside \(", re.MULTILINE)  # cosim/flat.py
+_WRAPPED = re.compile(r"^\s*(\w+) inside \(", re.MULTILINE)  # fluxproof/cosim/flat.py
 _CLOCKS = re.compile(r" -port (?:CLK|RD_CLK|WR_CLK|clk) ")
 
 

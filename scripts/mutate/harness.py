@@ -12,7 +12,7 @@ import numpy as np
 from fluxproof.cosim.schedule import due, schedule
 from fluxproof.cosim.verilator import LIBRARY, compile_library
 from fluxproof.cosim.verilog import VerilogPort
-from fluxproof.golden_model.block import Block
+from golden_model.block import Block
 from scripts.mutate.draw import TOP, Drawn, mutated
 
 WRAPPER = Path(__file__).with_name("judge.cpp")
@@ -50,7 +50,7 @@ def block_ports(block: Block, config) -> tuple[VerilogPort, ...]:
 
 
 def block_trial(block: Block, config, seed: int) -> Trial:
-    """What cosim/block_bench.py drives and compares, clock by clock."""
+    """What fluxproof/cosim/block_bench.py drives and compares, clock by clock."""
     ports = block_ports(block, config)
     number = {p.name: k for k, p in enumerate(ports)}
     clocks = schedule(block, config, seed)

@@ -11,8 +11,8 @@ from fluxproof.checkout import BUILD, ROOT
 from fluxproof.cosim.flat import FLAT, flat_top
 from fluxproof.cosim.sources import rtl_sources
 from fluxproof.cosim.verilog import TOP, sources_of, synthesize, top_ports
-from fluxproof.golden_model.block import Block
-from fluxproof.golden_model.registry import BLOCKS
+from golden_model.block import Block
+from golden_model.registry import BLOCKS
 from scripts.mutate import core
 from scripts.mutate.harness import BENCH_SEED, Trial, block_trial
 

@@ -14,7 +14,7 @@ from pathlib import Path
 from fluxproof.checkout import RTL
 from fluxproof.cosim.entity import Entity, Pin, read_entity
 from fluxproof.cosim.sources import rtl_sources
-from fluxproof.golden_model.records import ENTERS_AS, generic_of
+from golden_model.records import ENTERS_AS, generic_of
 
 TOP = "fluxproof_axi"
 PATH = RTL / "generated" / f"{TOP}.vhd"

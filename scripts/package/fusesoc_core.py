@@ -1,4 +1,4 @@
-"""Writes fluxproof.core for FuseSoC (CAPI2): lint, simulation, synthesis; the files are those of cosim/sources.py."""
+"""Writes fluxproof.core for FuseSoC (CAPI2): lint, simulation, synthesis; files as in fluxproof/cosim/sources.py."""
 
 from __future__ import annotations
 

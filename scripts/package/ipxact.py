@@ -1,7 +1,7 @@
 """Writes component.xml, the IP-XACT description (IEEE 1685-2009) of fluxproof_axi for Vivado.
 
 Ports and generics come from the VHDL entity, the memory map from the registers' SystemRDL, the files from
-cosim/sources.py.  Tool-specific parts (views, families, the type of a VHDL-2008 file) are written as
+fluxproof/cosim/sources.py.  Tool-specific parts (views, families, the type of a VHDL-2008 file) are written as
 Vivado writes them.
 """
 
@@ -19,7 +19,7 @@ from systemrdl import RDLCompiler
 
 from fluxproof.checkout import ROOT, RTL
 from fluxproof.cosim.entity import Entity, Generic, Pin, parse_entity
-from fluxproof.golden_model.io import board_map
+from golden_model.io import board_map
 from scripts.package.axi_top import PATH as TOP_PATH
 from scripts.package.axi_top import source_names
 

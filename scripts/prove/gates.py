@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fluxproof.golden_model.modulation import pwm_compare
+from golden_model.modulation import pwm_compare
 from scripts.prove.proof import Fault, Proof, committed
 
 GATES = "modulation/gate_generation.vhd"

@@ -9,9 +9,9 @@ import re
 from functools import partial
 
 from fluxproof.checkout import ROOT
-from fluxproof.golden_model import fluxproof
-from fluxproof.golden_model.block import Block
-from fluxproof.golden_model.registry import BLOCKS
+from golden_model import fluxproof
+from golden_model.block import Block
+from golden_model.registry import BLOCKS
 from scripts.prove.proof import Fault, Proof
 
 _PORT = re.compile(r"\b(input|output)\s+(\[\d+:0\]\s*)?(\w+)")

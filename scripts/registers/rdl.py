@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from fluxproof.checkout import ROOT
-from fluxproof.golden_model import units
-from fluxproof.golden_model.drive import load
-from fluxproof.golden_model.io import board_map
-from fluxproof.golden_model.io.register_map import Field, Kind, Register
-from fluxproof.golden_model.scaling import PARTS
+from golden_model import units
+from golden_model.drive import load
+from golden_model.io import board_map
+from golden_model.io.register_map import Field, Kind, Register
+from golden_model.scaling import PARTS
 
 try:
     import tomllib

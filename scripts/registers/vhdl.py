@@ -7,8 +7,8 @@ from pathlib import Path
 
 import jinja2
 
-from fluxproof.golden_model.io import board_map
-from fluxproof.golden_model.records import RECORDS
+from golden_model.io import board_map
+from golden_model.records import RECORDS
 from scripts.registers.compiled import Part, Word
 
 TEMPLATES = Path(__file__).resolve().parent

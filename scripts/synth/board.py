@@ -15,8 +15,8 @@ from pathlib import Path
 from fluxproof.checkout import RTL
 from fluxproof.cosim.sources import rtl_sources
 from fluxproof.cosim.verilog import synthesize
-from fluxproof.golden_model.converters import current_front
-from fluxproof.golden_model.encoders import position_front
+from golden_model.converters import current_front
+from golden_model.encoders import position_front
 from scripts.synth.count import Count, count, read_cells
 from scripts.synth.yosys import SYNTH, yosys
 

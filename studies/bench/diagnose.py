@@ -26,11 +26,11 @@ from fluxproof.cosim.closed_loop import Scenario
 from fluxproof.diagnosis.replay.capture import capture
 from fluxproof.diagnosis.replay.telemetry_columns import electrical_angle
 from fluxproof.files import write_json
-from fluxproof.golden_model import drive as drives
-from fluxproof.golden_model.formats import TURN
-from fluxproof.golden_model.registers import registers
-from fluxproof.golden_model.units import TURN_RAD, si_per_lsb
 from fluxproof.plant import IMPOSED_SPEED, Machine
+from golden_model import drive as drives
+from golden_model.formats import TURN
+from golden_model.registers import registers
+from golden_model.units import TURN_RAD, si_per_lsb
 
 DRIVE = ROOT / "docs" / "drives" / "paper001.toml"
 ROWS = (10_000, 100_000, 1_000_000)

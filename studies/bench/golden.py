@@ -11,10 +11,10 @@ from fluxproof.checkout import BUILD, ROOT
 from fluxproof.cosim.golden_loop import run_averaged, run_controller
 from fluxproof.cosim.scenarios import fig9
 from fluxproof.files import write_json
-from fluxproof.golden_model import drive as drives
-from fluxproof.golden_model import fluxproof
-from fluxproof.golden_model.registers import registers
 from fluxproof.plant import Machine, Sensors, initial_state, plant_params, sensor_params
+from golden_model import drive as drives
+from golden_model import fluxproof
+from golden_model.registers import registers
 
 DRIVE = ROOT / "docs" / "drives" / "paper001.toml"
 RUNS = 5

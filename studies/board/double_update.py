@@ -26,10 +26,10 @@ from fluxproof.cosim.golden_loop import simulate
 from fluxproof.cosim.runs import ClosedLoop, InVerilator, Named
 from fluxproof.cosim.scenarios import SCENARIOS
 from fluxproof.files import write_json
-from fluxproof.golden_model import drive as drives
-from fluxproof.golden_model.registers import registers
-from fluxproof.golden_model.units import from_si, to_si
 from fluxproof.plant import IMPOSED_SPEED
+from golden_model import drive as drives
+from golden_model.registers import registers
+from golden_model.units import from_si, to_si
 from studies.demo.plots import D_AXIS, HEIGHT, Q_AXIS, QUIET, REFERENCE, SPEED, STYLE, WIDTH, write_png
 
 DRIVE = DRIVES / "paper001.toml"

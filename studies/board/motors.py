@@ -9,9 +9,9 @@ import numpy as np
 
 from fluxproof.commission.simulated import Board, SimulatedBus
 from fluxproof.cosim.closed_loop import described_sensors
-from fluxproof.golden_model import drive as drives
-from fluxproof.golden_model.front_ends import Encoder
 from fluxproof.plant import Inverter, Machine
+from golden_model import drive as drives
+from golden_model.front_ends import Encoder
 
 # bus [V], rated current [A] from and to, PWM [Hz], dead time [s]
 CLASSES = ((24.0, 3.0, 20.0, 20e3, 300e-9), (80.0, 4.0, 40.0, 16e3, 500e-9), (560.0, 3.0, 40.0, 10e3, 2e-6))

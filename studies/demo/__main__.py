@@ -21,7 +21,7 @@ from fluxproof.checkout import BUILD, DRIVES, ROOT
 from fluxproof.cosim import recording as recordings
 from fluxproof.cosim.runs import InGhdl, InVerilator, Job, Named, kernels
 from fluxproof.files import write_json
-from fluxproof.golden_model import drive as drives
+from golden_model import drive as drives
 from studies.demo import plots, report
 
 DEMO = BUILD / "demo"

@@ -13,10 +13,10 @@ import numpy as np
 from fluxproof.cosim.closed_loop import Scenario
 from fluxproof.cosim.scenarios import RPM
 from fluxproof.files import write_text
-from fluxproof.golden_model.drive import Drive
-from fluxproof.golden_model.drive_keys import key_of
-from fluxproof.golden_model.fluxproof import Observed
-from fluxproof.golden_model.units import to_si
+from golden_model.drive import Drive
+from golden_model.drive_keys import key_of
+from golden_model.fluxproof import Observed
+from golden_model.units import to_si
 from studies.demo import plots
 
 TEMPLATES = Path(__file__).resolve().parents[1] / "templates"

@@ -16,13 +16,13 @@ from fluxproof.checkout import ROOT
 from fluxproof.cosim.closed_loop import INPUT_PORTS, SAMPLE_DELAY, build_plant, gate_words
 from fluxproof.cosim.golden_clock import SEEN, GoldenClock
 from fluxproof.cosim.scenarios import RPM
-from fluxproof.golden_model import clocked, fluxproof
-from fluxproof.golden_model import drive as drives
-from fluxproof.golden_model.io.fault_latch import LATE, NAMES
-from fluxproof.golden_model.registers import registers
-from fluxproof.golden_model.units import from_si
 from fluxproof.plant import sensor_params
 from fluxproof.plant.sensors import current_code, position_code, u_dc_code
+from golden_model import clocked, fluxproof
+from golden_model import drive as drives
+from golden_model.io.fault_latch import LATE, NAMES
+from golden_model.registers import registers
+from golden_model.units import from_si
 
 DRIVE = ROOT / "docs" / "drives" / "paper001.toml"
 NEAR_RPM = 15.0  # of the reference: speed is reached again

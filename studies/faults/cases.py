@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from fluxproof.cosim.closed_loop import SAMPLE_DELAY, gate_words
-from fluxproof.golden_model.fluxproof import REGISTERS
+from golden_model.fluxproof import REGISTERS
 from studies.faults.bench import Case, Outcome, Plan
 
 START, STOP = Case.start, Case.stop

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from fluxproof.cosim.golden_clock import SEEN, GoldenClock
-from fluxproof.golden_model.fluxproof import Observed
+from golden_model.fluxproof import Observed
 
 
 class Noted:

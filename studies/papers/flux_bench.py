@@ -16,10 +16,10 @@ from fluxproof.checkout import ROOT
 from fluxproof.cosim.closed_loop import Result, Scenario
 from fluxproof.cosim.golden_loop import simulate
 from fluxproof.cosim.scenarios import RPM, scenario
-from fluxproof.golden_model import drive as drives
-from fluxproof.golden_model.registers import RegisterSet, registers
-from fluxproof.golden_model.units import from_si, si_per_lsb
 from fluxproof.plant import Machine
+from golden_model import drive as drives
+from golden_model.registers import RegisterSet, registers
+from golden_model.units import from_si, si_per_lsb
 
 PAPER_DRIVE = ROOT / "docs" / "drives" / "paper001.toml"
 LAMBDA_N, TORQUE_N = 0.2021, 3.7  # Table 2

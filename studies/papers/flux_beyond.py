@@ -10,10 +10,10 @@ from fluxproof.checkout import ROOT
 from fluxproof.cosim.golden_loop import simulate
 from fluxproof.cosim.recording import recording_path
 from fluxproof.cosim.scenarios import RPM, scenario
-from fluxproof.golden_model import drive as drives
-from fluxproof.golden_model.registers import registers
-from fluxproof.golden_model.units import from_si
 from fluxproof.plant import IMPOSED_SPEED, FluxMap, Machine
+from golden_model import drive as drives
+from golden_model.registers import registers
+from golden_model.units import from_si
 from studies.papers.flux_bench import (
     ALONE,
     CURRENT_MODEL,

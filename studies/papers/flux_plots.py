@@ -6,7 +6,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
-from fluxproof.golden_model.units import TURN_RAD
+from golden_model.units import TURN_RAD
 from studies.demo.plots import D_AXIS, Q_AXIS, QUIET, REFERENCE, SPEED, STYLE, WIDTH, _axes
 from studies.papers.flux_bench import DRIVE, LAMBDA_N, Experiment, Trace
 

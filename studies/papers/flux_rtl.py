@@ -14,10 +14,10 @@ import numpy as np
 from fluxproof.cosim.closed_loop import Scenario
 from fluxproof.cosim.runs import ClosedLoop, InGhdl, InVerilator, Named
 from fluxproof.cosim.scenarios import RPM, scenario
-from fluxproof.golden_model import drive as drives
-from fluxproof.golden_model.registers import RegisterSet, registers
-from fluxproof.golden_model.units import from_si
 from fluxproof.plant import Machine
+from golden_model import drive as drives
+from golden_model.registers import RegisterSet, registers
+from golden_model.units import from_si
 from studies.papers.flux_bench import (
     ALONE,
     DRIVE,
@@ -74,7 +74,7 @@ def runs(drive) -> dict[str, RtlRun]:
 
 
 def rtl_run(name: str, carrier_half: int, periods: int | None = None) -> ClosedLoop:
-    """A key experiment, or its first ``periods``, as cosim/runs.py carries it out."""
+    """A key experiment, or its first ``periods``, as fluxproof/cosim/runs.py carries it out."""
     drive = drives.with_carrier(DRIVE, carrier_half)
     run = runs(drive)[name]
     return ClosedLoop(drive, run.registers, run.scenario.first(periods), run.machine, run.end is not None)

@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from fluxproof.golden_model.scaling import current_gains, flux_estimator
+from golden_model.scaling import current_gains, flux_estimator
 from studies.papers.flux_bench import DRIVE, Experiment, Finding
 
 FLUX, VOLTAGE, INTEGRAL, INTEGRAL_1, MERGED, X, COMPENSATION, LEARNT = range(8)

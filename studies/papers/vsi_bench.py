@@ -17,10 +17,10 @@ from fluxproof.checkout import ROOT
 from fluxproof.cosim.closed_loop import Result, Scenario
 from fluxproof.cosim.golden_loop import simulate
 from fluxproof.cosim.scenarios import RPM, scenario
-from fluxproof.golden_model import drive as drives
-from fluxproof.golden_model.registers import RegisterSet, registers
-from fluxproof.golden_model.units import si_per_lsb
 from fluxproof.plant import IMPOSED_SPEED, Inverter, Machine
+from golden_model import drive as drives
+from golden_model.registers import RegisterSet, registers
+from golden_model.units import si_per_lsb
 from studies.papers.flux_bench import ALONE, scaled
 
 VSI_DRIVE = ROOT / "docs" / "drives" / "paper000.toml"

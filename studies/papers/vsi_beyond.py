@@ -7,9 +7,9 @@ import dataclasses
 import numpy as np
 
 from fluxproof.cosim.golden_loop import simulate
-from fluxproof.golden_model import drive as drives
-from fluxproof.golden_model.registers import registers
 from fluxproof.plant import IMPOSED_SPEED, Machine
+from golden_model import drive as drives
+from golden_model.registers import registers
 from studies.papers import flux_bench, vsi_bench
 from studies.papers.flux_bench import Experiment, Finding, scaled
 from studies.papers.vsi_bench import (

@@ -8,10 +8,10 @@ import math
 import numpy as np
 
 from fluxproof.cosim.scenarios import scenario
-from fluxproof.golden_model.drive_keys import DriveError
-from fluxproof.golden_model.registers import registers
-from fluxproof.golden_model.units import TURN_RAD
 from fluxproof.plant import FREE
+from golden_model.drive_keys import DriveError
+from golden_model.registers import registers
+from golden_model.units import TURN_RAD
 from studies.papers.flux_bench import Experiment, Finding, scaled
 from studies.papers.vsi_bench import (
     DRIVE,

@@ -15,10 +15,10 @@ from fluxproof.cosim.closed_loop import Scenario
 from fluxproof.cosim.golden_loop import simulate
 from fluxproof.cosim.scenarios import RPM
 from fluxproof.diagnosis.recording import Recording, from_columns
-from fluxproof.golden_model import drive as drives
-from fluxproof.golden_model.registers import registers
-from fluxproof.golden_model.units import from_si, si_per_lsb
 from fluxproof.plant import IMPOSED_SPEED, FluxMap, Machine
+from golden_model import drive as drives
+from golden_model.registers import registers
+from golden_model.units import from_si, si_per_lsb
 
 LINEAR_CURRENT_MODEL = 0  # register flux_mode: the decoupling uses the nameplate
 RAMP_S = 0.02  # from one operating point to the next; a step would saturate the voltage

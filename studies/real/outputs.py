@@ -11,7 +11,7 @@ from fluxproof.diagnosis.overlay.compare import closed_loop
 from fluxproof.diagnosis.physics import known_effects
 from fluxproof.diagnosis.recording import RecordingError
 from fluxproof.diagnosis.report.write import json_ready, write_outputs
-from fluxproof.golden_model.drive_keys import DriveError
+from golden_model.drive_keys import DriveError
 
 NAMES_OF_AXES = {
     "saturation": "saturation of an axis by its own current",

@@ -51,7 +51,7 @@ def cases_of(seed: int, mix: dict[str, int], jobs: int) -> dict[str, Path]:
 
 def code() -> str:
     """Digest of the diagnosis and of this study, for which answers are kept."""
-    files = [*(ROOT / "diagnosis").rglob("*.py"), *(ROOT / "studies" / "sensitivity").rglob("*.py")]
+    files = [*(ROOT / "fluxproof" / "diagnosis").rglob("*.py"), *(ROOT / "studies" / "sensitivity").rglob("*.py")]
     return hashlib.sha256(b"".join(f.read_bytes() for f in sorted(files))).hexdigest()[:16]
 
 

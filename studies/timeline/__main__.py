@@ -17,7 +17,7 @@ import matplotlib.pyplot as plt
 from fluxproof.checkout import BUILD, ROOT, RTL
 from fluxproof.cosim import ghdl
 from fluxproof.files import write_json
-from fluxproof.golden_model.registry import BLOCKS
+from golden_model.registry import BLOCKS
 
 COLOURS = {
     "io": "#7a8b99",

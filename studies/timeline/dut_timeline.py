@@ -13,8 +13,8 @@ from cocotb.triggers import FallingEdge
 from fluxproof.cosim.block_bench import read
 from fluxproof.cosim.ghdl_device import prepare
 from fluxproof.cosim.inside import instance
-from fluxproof.golden_model import drive as drives
-from fluxproof.golden_model.registers import registers
+from golden_model import drive as drives
+from golden_model.registers import registers
 
 CLOCKS = 80
 

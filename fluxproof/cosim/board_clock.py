@@ -1,0 +1,304 @@
+"""The golden fluxproof_board clock by clock: pins in, pins out; the core's samples as in golden_clock.
+
+The front ends' twins (golden_model/encoders, converters, io) and the clocked part of the core are wired as in
+rtl/generated/fluxproof_board.vhd: what an instance reads from another is what that had registered before the clock.
+Registers are written by name; a write on the bus takes effect ``BUS`` clocks after its address and data were first
+valid, a setting then waits for the end of the sample in flight (io/register_access.vhd).  The trip pin, which acts
+without a clock, changes between two clocks here (io/power_stage.vhd).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from golden_model import clocked, fluxproof
+from golden_model.converters import current_front
+from golden_model.encoders import forced_position, position_front
+from golden_model.io import board_faults, board_map, board_snapshot, interrupts, sample_join
+from golden_model.io.register_file import RegisterFile
+from golden_model.io.register_map import OKAY, Kind
+from golden_model.kernel import kernel
+
+BUS = 7
+REFERENCES = ("omega_ref", "i_d_ref", "i_q_ext", "speed_mode", "temp_winding", "temp_valid", "clear_faults")
+# The pins in the order of the blocks' inputs; what is not a pin comes from another block or a register.
+POSITION_PINS = tuple(p.name for p in position_front.BLOCK.inputs[:8])
+CONVERTER_PINS = tuple(p.name for p in current_front.BLOCK.inputs[:12])
+PINS = (*POSITION_PINS, *CONVERTER_PINS, "trip")
+AT_CONVERTERS, AT_TRIP = len(POSITION_PINS), len(PINS) - 1
+GATES = ("gate_high", "gate_low", "sample_trigger", "irq")
+SEEN = (*GATES, "serial_clock", "serial_out", "serial_drive", "convst", "cs_n", "sclk", "den", "daddr", "mod_clock")
+# What is not a pin, of the same rows
+STATUS = tuple(board_map.STATUS)
+position_step, converter_step, forced_step = position_front.step, current_front.step, forced_position.step
+join_step, faults_step, snapshot_step = sample_join.step, board_faults.step, board_snapshot.step
+interrupts_step = interrupts.step
+
+
+class Wires(NamedTuple):
+    """Registered outputs that other instances read at the next clock."""
+
+    trigger: int = 0
+    gate_high: int = 0
+    gate_low: int = 0
+    sample_valid: int = 0
+    codes_done: int = 0
+    adc_a: int = 0
+    adc_b: int = 0
+    adc_c: int = 0
+    adc_u_dc: int = 0
+    encoder_code: int = 0
+    encoder_restart: int = 0
+    omega_now: int = 0
+    position_done: int = 0
+    encoder_count: int = 0
+    encoder_flags: int = 0
+    index_wrong: int = 0
+    position_lost: int = 0
+    converter_over: int = 0
+    position_code: int = 0
+    position_restart: int = 0
+    speed_now: int = 0
+    board_stop: int = 0
+    running: int = 0
+    tripped: int = 0
+    fault_flags: int = 0
+    setting_refused: int = 0
+    irq: int = 0
+
+
+class State(NamedTuple):
+    of_core: clocked.State = clocked.State()
+    of_position: position_front.State = position_front.State()
+    of_converters: current_front.State = current_front.State()
+    of_forcing: forced_position.State = forced_position.State()
+    of_join: sample_join.State = sample_join.State()
+    of_faults: board_faults.State = board_faults.State()
+    of_snapshot: board_snapshot.State = board_snapshot.State()
+    of_interrupts: interrupts.State = interrupts.State()
+    caught: int = 0  # of the trip pin
+    trip_1: int = 0
+    trip_2: int = 0
+    wires: Wires = Wires()
+
+
+# Registers of the core that the front ends and the interrupt read
+OF_THE_CORE = ("reverse", "omega_given", "speed_given", "irq_mask", "irq_clear")
+BoardRegisters = NamedTuple(
+    "BoardRegisters", [(name, int) for name in (*board_map.settings(), *OF_THE_CORE)]
+)  # fmt: skip
+
+
+@kernel
+def one_clock(state, inputs, regs, b, pins, carrier_half, config):
+    """One clock: (next state, whether a sample has entered, core, position, converters, board, snapshot, gates off)."""
+    w, p, c = state.wires, pins, AT_CONVERTERS
+    encoder, currents, adc_bits, position_bits, lines = config
+    position, seen_position = position_step(
+        state.of_position, p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7], w.trigger, w.codes_done, b.clear_encoder,
+        b.omega_given, b.reverse, b.filter_clocks, b.index_phase, b.counts, b.code_step, b.code_rest, b.correct_max,
+        b.k_edge, b.hall_reverse, b.hall_offset, b.start_first, b.sector_counts, b.half_period, b.encoder_bits,
+        b.turn_bits, b.gray, b.parity_on, b.crc_on, b.start_max, b.mode_command, b.two_errors, b.position_delay,
+        b.bridge_max, encoder, position_bits,
+    )  # fmt: skip
+    converters, seen_converters = converter_step(
+        state.of_converters, p[c], p[c + 1], p[c + 2], p[c + 3], p[c + 4], p[c + 5], p[c + 6], p[c + 7], p[c + 8],
+        p[c + 9], p[c + 10], p[c + 11], w.trigger, b.clear_encoder, b.clock_ratio, b.spi_bits, b.spi_skip, b.spi_delay,
+        b.wait_clocks, b.busy_timeout, b.two_words, b.use_convst, b.clock_idle, b.second_edge, b.signed_code,
+        b.channel_a, b.channel_b, b.channel_c, b.channel_u_dc, b.conversions, b.xadc_channels, b.address_0, b.address_1,
+        b.address_2, b.address_3, b.xadc_timeout, b.mod_ratio, b.mod_delay, b.follow_clock, b.oversampling, b.sinc_gain,
+        b.start_clocks, b.trip_oversampling, b.limit_high, b.limit_low, currents, adc_bits, lines,
+    )  # fmt: skip
+    forcing, (position_code, position_restart, speed_now, forced) = forced_step(
+        state.of_forcing, w.encoder_code, w.encoder_restart, b.speed_given, w.trigger, b.position_source,
+        b.forced_angle, b.forced_rate, position_bits,
+    )  # fmt: skip
+    join, (sample_valid,) = join_step(state.of_join, w.trigger, w.codes_done, w.position_done)
+    faults, (board_flags, board_first, board_stop) = faults_step(
+        state.of_faults, w.index_wrong, w.position_lost, w.converter_over, inputs.enable, inputs.clear_trip,
+        b.board_ignore,
+    )  # fmt: skip
+    snapshot, seen_snapshot = snapshot_step(
+        state.of_snapshot, w.sample_valid, b.take_snapshot, w.encoder_code, w.position_code, w.encoder_count,
+        w.encoder_flags, w.adc_a, w.adc_b, w.adc_c, w.adc_u_dc, adc_bits, position_bits,
+    )  # fmt: skip
+    now = clocked.Inputs(
+        w.sample_valid, inputs.enable, 1 if w.board_stop or state.trip_2 else 0, inputs.clear_trip,
+        inputs.host_write, inputs.sample_faults, inputs.sample_trip, inputs.current_offset, inputs.motion_faults,
+        inputs.open_load, inputs.brake_asked, inputs.compare_a, inputs.compare_b, inputs.compare_c,
+    )  # fmt: skip
+    core, entered, seen_core = clocked.step(state.of_core, now, regs, carrier_half)
+    causes, (_, irq) = interrupts_step(
+        state.of_interrupts, w.tripped, w.fault_flags, w.setting_refused, w.running, b.irq_mask, b.irq_clear
+    )
+    encoder_code, restart, omega_now, position_done, count, flags, _, _, _, _, wrong, lost, _, _, _ = seen_position
+    adc_a, adc_b, adc_c, adc_u_dc, codes_done, _, _, over, _, _, _, _, _, _ = seen_converters
+    wires = Wires(
+        seen_core.sample_trigger, seen_core.gate_high, seen_core.gate_low, sample_valid, codes_done, adc_a, adc_b,
+        adc_c, adc_u_dc, encoder_code, restart, omega_now, position_done, count, flags, wrong, lost, over,
+        position_code, position_restart, speed_now, board_stop, seen_core.running, seen_core.tripped,
+        seen_core.fault_flags, seen_core.setting_refused, irq,
+    )  # fmt: skip
+    # The power stage: a trip is caught without a clock, and let go when the core has it
+    caught = 1 if p[AT_TRIP] or state.caught else 0
+    kept = 1 if p[AT_TRIP] or (caught and not state.trip_2) else 0
+    following = State(
+        core, position, converters, forcing, join, faults, snapshot, causes, kept, caught, state.trip_1, wires
+    )
+    board = (forced, board_flags, board_first)
+    return following, entered, seen_core, seen_position, seen_converters, board, seen_snapshot, caught
+
+
+@kernel
+def run_clocks(state, inputs, regs, b, pins, carrier_half, config, until_idle, seen, status):
+    """Clocks with the pins of each row until a sample enters or, with ``until_idle``, none is in flight any more.
+
+    Returns (state, clocks made, whether a sample has entered at the last, the wires that it entered with).
+    """
+    before = state.wires
+    entered = 0
+    for k in range(len(pins)):
+        if k > 0 and until_idle and not state.of_core.sample_busy:
+            return state, k, 0, before
+        before = state.wires
+        state, entered, core, position, converters, board, snapshot, off = one_clock(
+            state, inputs, regs, b, pins[k], carrier_half, config
+        )
+        x = seen[k]
+        x[0], x[1] = 0 if off else before.gate_high, 0 if off else before.gate_low
+        x[2], x[3] = before.trigger, state.wires.irq
+        x[4], x[5], x[6] = position[12], position[13], position[14]
+        x[7], x[8], x[9], x[10], x[11], x[12] = (
+            converters[8], converters[9], converters[10], converters[11], converters[12], converters[13]
+        )  # fmt: skip
+        y = status[k]
+        y[0], y[1], y[2] = position[5], position[4], position[6]
+        y[3], y[4], y[5] = position[7], position[8], position[9]
+        y[6], y[7] = converters[5], converters[6]
+        y[8], y[9], y[10] = board
+        y[11], y[12], y[13], y[14], y[15], y[16], y[17], y[18], y[19] = snapshot
+        if entered:
+            return state, k + 1, entered, before
+    return state, len(pins), entered, before
+
+
+class GoldenBlocks:
+    """Which kind of front ends: the generics of fluxproof_board that the golden board needs."""
+
+    def __init__(self, config: fluxproof.Config, encoder: int = 1, currents: int = 1, spi_lines: int = 4):
+        self.core, self.encoder, self.currents, self.spi_lines = config, encoder, currents, spi_lines
+
+    def generics(self, clock_hz: int) -> dict[str, int]:
+        """By the names of the VHDL."""
+        own = {"ENCODER": self.encoder, "CURRENTS": self.currents, "SPI_LINES": self.spi_lines}
+        return {name.upper(): value for name, value in self.core._asdict().items()} | own | {"CLOCK_HZ": clock_hz}
+
+
+class BoardClock:
+    """One golden board after its reset; ``clock`` counts from the first clock without reset inside."""
+
+    def __init__(self, blocks: GoldenBlocks, clock_hz: int):
+        self.blocks, core = blocks, blocks.core
+        generics = {**core._asdict(), "clock_hz": clock_hz}
+        self.registers = RegisterFile(generics)
+        self.registers.map = board_map.registers()
+        self.registers.at = {register.address: register for register in self.registers.map.values()}
+        self.registers.reset()
+        self.config = (blocks.encoder, blocks.currents, core.adc_bits, core.position_bits, blocks.spi_lines)
+        self.state, self.of_samples = State(), fluxproof.State()
+        self.inputs = clocked.Inputs()
+        self.clock = 0
+        self.observed: fluxproof.Observed | None = None
+        self.samples = 0
+        self.history: list[tuple[fluxproof.Sample, fluxproof.Observed]] = []  # of the samples
+        self._due: list[tuple[int, dict[str, int]]] = []
+        self._writes: list[tuple[int, str, int]] = []
+        self._taken: list[tuple[int, str, int]] = []  # registers that change
+        self._stored = False  # a write was accepted: their registers change with the coming clock
+
+    def write(self, name: str, value: int, at: int) -> None:
+        """A write whose address and data are on the bus at clock ``at``; one at a time, in their order."""
+        if at < self.clock or (self._writes and at < self._writes[-1][0]):
+            raise ValueError(f"{name} is written at clock {at}, too late or out of order")
+        self._writes.append((at + BUS, name, value))
+
+    def advance(self, pins: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """A clock for each row of ``pins`` (columns PINS): (rows of SEEN, rows of STATUS), as each clock left them."""
+        seen = np.zeros((len(pins), len(SEEN)), np.int64)
+        status = np.zeros((len(pins), len(STATUS)), np.int64)
+        at = 0
+        while at < len(pins):
+            waits = self._take_writes()
+            stops = [when - self.clock for when, *_ in (*self._due, *self._writes, *self._taken) if when > self.clock]
+            length = min([len(pins) - at, *stops])
+            part = slice(at, at + length)
+            inputs = self.inputs._replace(host_write=int(self._stored))
+            self.state, made, entered, wires = run_clocks(
+                self.state, inputs, self._settings(), self._board(), pins[part], self.blocks.core.carrier_half,
+                self.config, waits, seen[part], status[part],
+            )  # fmt: skip
+            references = [self.registers.values[name] for name in REFERENCES]
+            self.clock += made
+            at += made
+            self._take_due()
+            if entered:
+                self._enter(wires, references)
+        return seen, status
+
+    def _settings(self) -> fluxproof.Registers:
+        return self.registers.settings()
+
+    def _board(self) -> BoardRegisters:
+        values = self.registers.values
+        return BoardRegisters(*(values.get(name, 0) for name in BoardRegisters._fields))
+
+    def _take_due(self) -> None:
+        """Results of a sample and registers that change with the clock that has passed."""
+        for when, values in self._due:
+            if when == self.clock:
+                self.inputs = self.inputs._replace(**values)
+        self._due = [due for due in self._due if due[0] > self.clock]
+        taken, self._taken = self._taken, [write for write in self._taken if write[0] > self.clock]
+        for when, name, value in taken:
+            register = self.registers.map[name]
+            if when > self.clock:
+                continue
+            if self.registers.write(register.address, value & 0xFFFFFFFF) != OKAY:
+                raise ValueError(f"{name} = {value} is refused")
+            if register.kind is Kind.PULSE and value:
+                self._taken.append((self.clock + 1, name, 0))
+        values = self.registers.values
+        self.inputs = self.inputs._replace(enable=values["enable"], clear_trip=values["clear_trip"])
+
+    def _take_writes(self) -> bool:
+        """Accepts writes whose registers change at the coming clock; True where one waits for the end of a sample."""
+        self._stored = False
+        while self._writes and self._writes[0][0] <= self.clock:
+            _, name, value = self._writes[0]
+            if self.registers.map[name].kind is Kind.SETTING and self.state.of_core.sample_busy:
+                return True
+            self._taken.append((self.clock + 1, name, value))
+            self._writes.pop(0)
+            self._stored = True
+        return False
+
+    def _enter(self, w: Wires, references: list[int]) -> None:
+        """The results of a sample that has entered with these wires, and their clocks; settings are those after it."""
+        self.samples += 1
+        values = self.registers.values
+        sample = fluxproof.Sample(w.adc_a, w.adc_b, w.adc_c, w.adc_u_dc, w.position_code, *references, w.running)
+        gates = self.state.of_core.of_gate_generation
+        registers = self._settings()._replace(
+            min_pulse=gates.min_pulse,
+            double_update=gates.double_update,
+            omega_given=w.omega_now,
+            speed_given=w.speed_now,
+            position_restart=1 if values["position_restart"] or w.position_restart else 0,
+        )
+        self.of_samples, self.observed = fluxproof.step(self.of_samples, sample, registers, self.blocks.core)
+        del self.history[self.samples - 1 :]  # of a clock that is made again
+        self.history.append((sample, self.observed))
+        for after, names in clocked.DUE.values():
+            self._due.append((self.clock - 1 + after, {name: getattr(self.observed, name) for name in names}))

@@ -1,0 +1,188 @@
+"""The golden model in compiled loops: open loop, and closed with the averaged or the switching plant."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fluxproof.cosim.closed_loop import Result, Scenario, described_sensors, load_torque
+from fluxproof.plant import (
+    FREE,
+    Inverter,
+    Machine,
+    advance_averaged,
+    advance_switching,
+    centred_gates,
+    half_gates,
+    initial_state,
+    plant_params,
+    sensor_params,
+)
+from fluxproof.plant import layout as L
+from fluxproof.plant.jit import SOURCE_HASH
+from fluxproof.plant.sensors import current_code, position_code, u_dc_code
+from golden_model import fluxproof
+from golden_model.kernel import CACHE_DIR, kernel
+
+BOTH = CACHE_DIR.parent / f"{CACHE_DIR.name}-{SOURCE_HASH}"
+
+
+def mixed_kernel(function):
+    """A kernel that calls the golden model and the plant."""
+    return kernel(function, BOTH)
+
+
+@kernel
+def run_controller(state, samples, registers, config, observed):
+    """``samples`` (n, 13) in, ``observed`` (n, len(Observed)) out, both int64; returns the last state."""
+    for k in range(samples.shape[0]):
+        x = samples[k]
+        sample = fluxproof.Sample(x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8], x[9], x[10], x[11], x[12])
+        state, out = fluxproof.step(state, sample, registers, config)
+        for n, value in enumerate(out):
+            observed[k, n] = value
+    return state
+
+
+@mixed_kernel
+def run_averaged(state, references, u_dc, load, registers, config, plant_state, plant_params, sensors, period_s, out):
+    """Closed loop over the averaged plant; the duties of a sample act in the next period of ``period_s``, which is half
+    a PWM period with double_update.
+
+    ``references`` (n, 4) int64: omega_ref, i_d_ref, i_q_ext, speed_mode; ``u_dc`` [V], ``load`` [Nm] (n,).
+    ``out`` (n, 8) float64 receives i_d, i_q [A], lambda_d, lambda_q [Wb], omega_m [rad/s], torque [Nm] before the
+    period, and u_alpha, u_beta [V] during it.  Returns the controller's last state.
+    """
+    duties = np.full(3, 0.5)
+    for k in range(load.shape[0]):
+        out[k, 0], out[k, 1] = plant_state[L.I_D], plant_state[L.I_Q]
+        out[k, 2], out[k, 3] = plant_state[L.LAMBDA_D], plant_state[L.LAMBDA_Q]
+        out[k, 4], out[k, 5] = plant_state[L.OMEGA_M], plant_state[L.TORQUE]
+        sample = fluxproof.Sample(
+            current_code(sensors, 0, plant_state[L.I_A], k),
+            current_code(sensors, 1, plant_state[L.I_B], k),
+            current_code(sensors, 2, plant_state[L.I_C], k),
+            u_dc_code(sensors, u_dc[k], k),
+            position_code(sensors, plant_state[L.THETA_M], k),
+            references[k, 0],
+            references[k, 1],
+            references[k, 2],
+            references[k, 3],
+            0,
+            0,
+            0,
+            1,
+        )
+        state, seen = fluxproof.step(state, sample, registers, config)
+        half = (1 - 2 * (k & 1)) * registers.double_update
+        advance_averaged(plant_state, plant_params, duties, u_dc[k], load[k], period_s, half)
+        out[k, 6], out[k, 7] = plant_state[L.U_ALPHA], plant_state[L.U_BETA]
+        duties[0] = seen.compare_a / config.carrier_half
+        duties[1] = seen.compare_b / config.carrier_half
+        duties[2] = seen.compare_c / config.carrier_half
+    return state
+
+
+PROGRESS_PERIODS = 5000  # a tenth of a second
+PLANT = ("i_d", "i_q", "lambda_d", "lambda_q", "omega_m", "torque")
+
+
+@mixed_kernel
+def run_switching(
+    state, samples, u_dc, load, brake, registers, config, plant_state, plant_params, sensors, dead_time_s, period_s,
+    first, free, out, observed, levels, waits,
+):  # fmt: skip
+    """Closed loop over the switching plant; returns the controller's state.
+
+    ``samples`` (n, 8) int64: the fields of fluxproof.Sample after the codes; ``u_dc`` [V], ``load``,
+    ``brake`` [Nm] (n,), with an imposed speed ``load`` [rad/s].  ``first``: number of the first period, for the
+    sensors' noise, and with double_update for the half: even ones rise; ``levels``, ``waits`` are those of half_gates.
+    ``out`` (n, 6) receives the signals of PLANT before each period, ``observed`` the core's.
+    """
+    duties = np.zeros(3)
+    for k in range(load.shape[0]):
+        out[k, 0], out[k, 1] = plant_state[L.I_D], plant_state[L.I_Q]
+        out[k, 2], out[k, 3] = plant_state[L.LAMBDA_D], plant_state[L.LAMBDA_Q]
+        out[k, 4], out[k, 5] = plant_state[L.OMEGA_M], plant_state[L.TORQUE]
+        sample = fluxproof.Sample(
+            current_code(sensors, 0, plant_state[L.I_A], first + k),
+            current_code(sensors, 1, plant_state[L.I_B], first + k),
+            current_code(sensors, 2, plant_state[L.I_C], first + k),
+            u_dc_code(sensors, u_dc[k], first + k),
+            position_code(sensors, plant_state[L.THETA_M], first + k),
+            samples[k, 0],
+            samples[k, 1],
+            samples[k, 2],
+            samples[k, 3],
+            samples[k, 4],
+            samples[k, 5],
+            samples[k, 6],
+            samples[k, 7],
+        )
+        duties[0] = state.compare_a / config.carrier_half
+        duties[1] = state.compare_b / config.carrier_half
+        duties[2] = state.compare_c / config.carrier_half
+        state, seen = fluxproof.step(state, sample, registers, config)
+        for n, value in enumerate(seen):
+            observed[k, n] = value
+        if registers.double_update:
+            half = 1 - 2 * ((first + k) & 1)
+            times, words = half_gates(duties, half, levels, waits, dead_time_s, period_s)
+        else:
+            times, words = centred_gates(duties, dead_time_s, period_s)
+        if not samples[k, 7]:
+            words[:], levels[:], waits[:] = 0, 0.0, dead_time_s
+        pull = load_torque(load[k], brake[k], plant_state[L.OMEGA_M]) if free else load[k]
+        advance_switching(plant_state, plant_params, times, words, u_dc[k], pull, period_s, -1.0)
+    return state
+
+
+def simulate(
+    drive, register_set, scenario: Scenario, machine=None, sensors=None, dead_time_s=0.0, mode=FREE, state=None,
+    inverter=None, progress=None,
+) -> Result:  # fmt: skip
+    """``scenario`` with the golden model and the switching plant, compiled; as cosim.cosimulate, but faster.
+
+    The inverter follows the compare values in force with a dead time of ``dead_time_s``; zero is the ideal inverter
+    that paper 001 assumes; ``inverter`` adds device drops.  ``state`` is the controller's initial state; the result has
+    the last one.  ``mode`` IMPOSED_SPEED: the scenario's load is the mechanical speed [rad/s].
+    ``progress``, if given, is called with the periods done and their number, every PROGRESS_PERIODS.
+    """
+    machine = machine or Machine.from_mapping(vars(drive.machine))
+    params = plant_params(machine, inverter or Inverter(), mode=mode)
+    plant_state = initial_state(machine, params, omega_m=scenario.omega_m)
+    codes = sensor_params(sensors or described_sensors(drive))
+    n = len(scenario)
+    inputs = np.zeros((n, 8), np.int64)
+    columns = (
+        scenario.omega_ref,
+        scenario.i_d_ref,
+        scenario.i_q_ext,
+        scenario.speed_mode,
+        *scenario.slow_inputs(),
+        scenario.enable,
+    )
+    for column, values in enumerate(columns):
+        inputs[:, column] = values
+    brake = np.zeros(n) if scenario.brake is None else scenario.brake
+    out, observed = np.zeros((n, len(PLANT))), np.zeros((n, len(fluxproof.Observed._fields)), np.int64)
+    state, values = state or fluxproof.State(), register_set.values
+    levels, waits = np.zeros(3), np.full(3, float(dead_time_s))
+    shown = set() if progress is None else set(range(0, n, PROGRESS_PERIODS))
+    ends = [*sorted((set(scenario.changes) | shown) - {0}), n]
+    for start, end in zip([0, *ends[:-1]], ends, strict=True):
+        values = values._replace(**scenario.changes.get(start, {}))
+        part = slice(start, end)
+        state = run_switching(
+            state, inputs[part], scenario.u_dc[part], scenario.load[part], brake[part], values, register_set.config,
+            plant_state, params, codes, float(dead_time_s), drive.sample_time_s, start, mode == FREE,
+            out[part], observed[part], levels, waits,
+        )  # fmt: skip
+        if progress is not None:
+            progress(end, n)
+    names = fluxproof.Observed._fields
+    return Result(
+        observed=dict(zip(names, observed.T, strict=True)),
+        plant=dict(zip(PLANT, out.T, strict=True)),
+        periods_compared=n,
+        state=state,
+    )

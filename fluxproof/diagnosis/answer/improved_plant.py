@@ -1,0 +1,205 @@
+"""The plant that a drive file describes: drive.toml with its [plant.*] sections.
+
+The core's own sections describe the machine and the inverter.  [sensors] describes the sensors as the core assumes
+them; without [plant.sensors] they are exactly that: an offset code of 32800 means a sensor offset of 32 codes.
+A key in [plant.machine], [plant.inverter] or [plant.sensors] replaces the value from the core's sections; the names are
+those of plant.Machine, plant.Inverter and plant.Sensors.  Three of them have a special form in TOML:
+
+    emf_harmonics = [[order, amplitude_d, amplitude_q, phase_rad], ...]
+    flux_map      = a table of i_d_a (n), i_q_a (m), psi_d_wb (n x m), psi_q_wb (n x m), or the name of a CSV file with
+                    these columns beside the drive file, such as flux_map.csv of a diagnosis
+    lists of three for the phases a, b, c
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from fluxproof.diagnosis.nominal import Nominal, load_nominal
+from fluxproof.diagnosis.result import NamedEffect
+from fluxproof.plant import FluxMap, Harmonic, Inverter, Machine, Sensors
+from golden_model.drive_keys import DriveError
+
+FINE_BITS = 24  # resolution of undescribed sensors: fine enough to be negligible
+
+
+@dataclass(frozen=True)
+class Timing:
+    """Deviations in time from the nominal drive [s].
+
+    delay_s: the voltage acts this much later than duty_applied_after_samples says.
+    sampling_skew_s: the currents are sampled this long after the PWM centre; negative: before it.
+    """
+
+    delay_s: float = 0.0
+    sampling_skew_s: float = 0.0
+
+
+class Plant(NamedTuple):
+    """The hardware of a drive in the types of the float plant."""
+
+    machine: Machine
+    inverter: Inverter
+    sensors: Sensors
+    timing: Timing
+
+
+# Keys that an effect gives in addition to those of the drive file; the others it gives as a whole.
+HARMONICS = "machine.emf_harmonics"
+ADDS = {
+    "machine.saturation_d_per_a2", "machine.saturation_q_per_a2", "machine.cross_saturation_wb_per_a2",
+    "machine.iron_conductance_s", "machine.phase_resistance_asymmetry", HARMONICS,
+    "machine.resistance_temp_coeff_per_k", "inverter.dead_time_s",
+}  # fmt: skip
+ORDERED = ("inverter.dead_time_s",)
+SECTIONS = {"machine": Machine, "inverter": Inverter, "sensors": Sensors, "timing": Timing}
+KEYS = {f"{name}.{f.name}": f for name, kind in SECTIONS.items() for f in dataclasses.fields(kind)}
+# Keys for which the plant rejects negative values; a noisy estimate of zero may be negative and is clipped.
+NOT_NEGATIVE = {f"inverter.{f.name}" for f in dataclasses.fields(Inverter)} | {
+    f"machine.{name}"
+    for name in ("saturation_d_per_a2", "saturation_q_per_a2", "iron_conductance_s", "viscous_friction_nms",
+                 "coulomb_friction_nm")
+}  # fmt: skip
+
+
+def check_key(key: str) -> None:
+    """Raise ValueError for an unknown plant key, with the nearest known one."""
+    if key not in KEYS:
+        near = difflib.get_close_matches(key, KEYS, n=1, cutoff=0.0)[0]
+        raise ValueError(f"{key} is not a key of the plant; the nearest known one is {near}")
+
+
+def merged(effects: list[NamedEffect]) -> dict:
+    """{plant key: (value, names of the effects)}.  If several effects change one key, gains multiply, offsets add and
+    harmonics are concatenated; for other keys the last value is used, since effects that were estimated together agree.
+    """
+    found: dict = {}
+    for effect in effects:
+        for key, value in effect.plant.items():
+            value = plain(key, value)
+            value = max(value, 0.0) if key in NOT_NEGATIVE else value
+            before, names = found.get(key, (None, ()))
+            if before is not None and key == "sensors.current_gain_error":
+                value = tuple((1.0 + a) * (1.0 + b) - 1.0 for a, b in zip(before, value, strict=True))
+            elif before is not None and key == "sensors.current_offset_a":
+                value = tuple(a + b for a, b in zip(before, value, strict=True))
+            elif before is not None and key == HARMONICS:
+                value = before + value
+            found[key] = (value, (*names, effect.name))
+    return found
+
+
+def in_addition(found: dict, nominal: Nominal) -> dict:
+    """The plant keys of an effect that was found beside what the drive file describes of it: both together."""
+    out, plant = dict(found), None
+    for key in ADDS & set(found):
+        plant = plant or plant_of(nominal)
+        section, name = key.split(".", 1)
+        given, value = getattr(getattr(plant, section), name), plain(key, found[key])
+        if key in ORDERED and name not in nominal.plant.get(section, {}):
+            continue  # in the core's own section it is a command to the gates
+        several = isinstance(value, tuple) and key != HARMONICS
+        out[key] = [a + b for a, b in zip(given, value, strict=True)] if several else given + value
+    return out
+
+
+def plant_of(source) -> Plant:
+    """(Machine, Inverter, Sensors, Timing) of a drive file's path or of a Nominal; DriveError as in load_nominal."""
+    nominal = source if isinstance(source, Nominal) else load_nominal(source)
+    tables = {name: dict(nominal.plant.get(name, {})) for name in SECTIONS}
+    unknown = set(nominal.plant) - set(SECTIONS)
+    if unknown:
+        raise DriveError(f"{nominal.path}: unknown section [plant.{unknown.pop()}]; known are {', '.join(SECTIONS)}")
+    chart = tables["machine"].get("flux_map")
+    try:
+        if isinstance(chart, str):
+            tables["machine"]["flux_map"] = read_flux_map(Path(nominal.path).parent / chart)
+        given = {name: {k: plain(f"{name}.{k}", v) for k, v in table.items()} for name, table in tables.items()}
+        return Plant(
+            Machine(**({"inertia_kgm2": 1e-3} | _described(nominal.machine, Machine) | given["machine"])),
+            Inverter(**(_described(nominal.inverter, Inverter) | given["inverter"])),
+            Sensors(**(described_sensors(nominal) | given["sensors"])),
+            Timing(**given["timing"]),
+        )
+    except (TypeError, ValueError, KeyError) as error:
+        raise DriveError(f"{nominal.path}: section [plant]: {error}") from None
+
+
+def _described(section, kind) -> dict:
+    """The section's values under the plant's names; None selects the plant's default."""
+    known = {f.name for f in dataclasses.fields(kind)}
+    return {k: v for k, v in vars(section).items() if k in known and v is not None}
+
+
+def described_sensors(nominal: Nominal) -> dict:
+    """Fields of plant.Sensors as [sensors] describes them; fine and unlimited if it does not."""
+    s, reach = nominal.sensors, 10.0 * nominal.machine.rated_current_a
+    bits, full = s.adc_bits or FINE_BITS, s.current_range_a or reach
+    volts = s.u_dc_range_v or 4.0 * nominal.inverter.dc_bus_v
+    mid, turning = 2 ** (bits - 1), -1 if s.position_reverse else 1
+    return {
+        "current_bits": bits,
+        "current_full_scale_a": full,
+        "current_gain_error": tuple(1.0 / trim - 1.0 for trim in s.current_gain),
+        "current_offset_a": tuple((code - mid) * full / mid for code in s.current_offset_code or (mid,) * 3),
+        "u_dc_bits": bits,
+        "u_dc_full_scale_v": volts,
+        "u_dc_gain_error": 1.0 / s.u_dc_gain - 1.0,
+        "u_dc_offset_v": s.u_dc_offset_code * volts / 2**bits,
+        "position_bits": s.position_bits or FINE_BITS,
+        "position_offset_rad": -turning * s.theta_offset_rad / nominal.machine.pole_pairs,
+        "position_direction": turning,
+    }
+
+
+def read_flux_map(path) -> FluxMap:
+    """A CSV with i_d_a, i_q_a, psi_d_wb, psi_q_wb (flux_found.py); ValueError names the file if it is none."""
+    try:
+        rows = np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2)
+        return FluxMap.from_points(*rows.T)
+    except (OSError, TypeError, ValueError) as error:
+        raise ValueError(f"flux_map {path}: {error}") from None
+
+
+def plain(key: str, value):
+    """A TOML value in the type of the plant's field; ValueError for a wrong value."""
+    check_key(key)
+    if key == HARMONICS:
+        return tuple(h if isinstance(h, Harmonic) else Harmonic(*map(float, h)) for h in value)
+    if key == "machine.flux_map":
+        if value is None or isinstance(value, FluxMap):
+            return value
+        return FluxMap(**{name: np.asarray(grid, float) for name, grid in value.items()})
+    if isinstance(value, (list, tuple, np.ndarray)):
+        value = tuple(float(v) for v in value)
+        if len(value) != 3:
+            raise ValueError(f"{key} needs three values, phases a, b, c, not {len(value)}")
+        return value
+    if isinstance(value, bool) or not isinstance(value, (int, float, np.number)) or not math.isfinite(value):
+        raise ValueError(f"{key} = {value!r} must be a finite number")
+    return value
+
+
+def errors_beyond(sensors: Sensors, nominal: Nominal) -> dict:
+    """Errors of the readings after the core has applied its nominal trims.
+
+    current_gain (3,), current_offset [A] (3,): reading = current * gain + offset; u_dc_gain;
+    theta_offset [rad]: electrical angle read minus the true one.
+    """
+    s, assumed = nominal.sensors, described_sensors(nominal)
+    trims, p = np.array(s.current_gain), nominal.machine.pole_pairs
+    beyond = np.subtract(sensors.current_offset_a, assumed["current_offset_a"])
+    turned = sensors.position_offset_rad - assumed["position_offset_rad"]
+    return {
+        "current_gain": trims * (1.0 + np.array(sensors.current_gain_error)),
+        "current_offset_a": trims * beyond,
+        "u_dc_gain": s.u_dc_gain * (1.0 + sensors.u_dc_gain_error),
+        "theta_offset": p * assumed["position_direction"] * turned,
+    }
