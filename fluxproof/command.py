@@ -16,7 +16,7 @@ from typing import NamedTuple
 from fluxproof import dump_capture, print_registers
 from fluxproof.commission import command as commission
 from fluxproof.diagnosis import command as diagnose
-from fluxproof.diagnosis.recording import RecordingError
+from fluxproof.diagnosis.ground.recording import RecordingError
 from fluxproof.fleet import command as fleet
 from fluxproof.project import command as project
 from fluxproof.simulate import command as simulate

@@ -27,7 +27,7 @@ from fluxproof.checkout import DRIVES, ROOT
 from fluxproof.command import main
 from fluxproof.cosim.board_clock import SEEN
 from fluxproof.cosim.verilated import VerilatedCore
-from fluxproof.diagnosis.recording import from_columns
+from fluxproof.diagnosis.ground.recording import from_columns
 from fluxproof.diagnosis.replay import digital, telemetry
 from fluxproof.plant.sensors import current_code
 from golden_model.board_registers import board_set

@@ -20,7 +20,7 @@ from fluxproof.command import main
 from fluxproof.cosim import ghdl
 from fluxproof.cosim.golden_loop import run_controller
 from fluxproof.cosim.scenarios import everything
-from fluxproof.diagnosis.recording import RecordingError
+from fluxproof.diagnosis.ground.recording import RecordingError
 from fluxproof.diagnosis.replay import digital
 from fluxproof.diagnosis.replay.capture import capture as golden_capture
 from fluxproof.diagnosis.replay.telemetry_stream import SIZE, parse, read_capture, write_piece

@@ -9,7 +9,7 @@ import pytest
 
 from fluxproof.checkout import ROOT
 from fluxproof.diagnosis.conventions.table import READINGS, readings_for
-from fluxproof.diagnosis.nominal import load_nominal
+from fluxproof.diagnosis.ground.nominal import load_nominal
 
 CODE = re.compile(r"^```.*?^```", re.S | re.M)
 LINK = re.compile(r"\[([^\]]*)\]\(([^)\s]+)\)(?:, section (\d+))?")

@@ -8,8 +8,8 @@ import pytest
 
 from cocotb_tests.support.recordings_made import nominal_of
 from fluxproof.diagnosis import diagnose
-from fluxproof.diagnosis.ingest.load import load_recording
-from fluxproof.diagnosis.recording import RecordingError
+from fluxproof.diagnosis.ground.recording import RecordingError
+from fluxproof.diagnosis.loading.load import load_recording
 
 WEAK = 0.95  # of the magnets' flux
 

@@ -20,12 +20,10 @@ from fluxproof.diagnosis.answer.headline import MOST_LETTERS, details, sentence
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.command import effect_table
 from fluxproof.diagnosis.effects.effect import Parameter
-from fluxproof.diagnosis.ingest.load import load_recording
-from fluxproof.diagnosis.nominal import load_nominal
-from fluxproof.diagnosis.physics import known_effects
-from fluxproof.diagnosis.quantities import ascii_of, measured
-from fluxproof.diagnosis.recording import Problem
-from fluxproof.diagnosis.result import (
+from fluxproof.diagnosis.ground.nominal import load_nominal
+from fluxproof.diagnosis.ground.quantities import ascii_of, measured
+from fluxproof.diagnosis.ground.recording import Problem
+from fluxproof.diagnosis.ground.result import (
     VERDICTS,
     Estimate,
     Fit,
@@ -36,6 +34,8 @@ from fluxproof.diagnosis.result import (
     Request,
     UnknownTerm,
 )
+from fluxproof.diagnosis.loading.load import load_recording
+from fluxproof.diagnosis.physics import known_effects
 
 NOMINAL, KNOWN = load_nominal(PAPER), known_effects()
 KEYS = {p.name for e in KNOWN.values() for p in e.parameters if "_" in p.name}

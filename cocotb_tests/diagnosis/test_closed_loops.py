@@ -10,8 +10,8 @@ import pytest
 from cocotb_tests.support.slow import slowly
 from fluxproof import diagnose
 from fluxproof.checkout import recordings
-from fluxproof.diagnosis.nominal import load_nominal
-from fluxproof.diagnosis.recording import from_columns
+from fluxproof.diagnosis.ground.nominal import load_nominal
+from fluxproof.diagnosis.ground.recording import from_columns
 from studies.blind.strangers import cases, rows
 from studies.blind.strangers.drives import DRIVES
 from studies.blind.strangers.faults import truth_of

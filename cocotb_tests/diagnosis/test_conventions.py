@@ -14,8 +14,8 @@ from cocotb_tests.support.slow import halved
 from fluxproof.diagnosis import diagnose
 from fluxproof.diagnosis.answer.improve import write_improved
 from fluxproof.diagnosis.conventions.table import READINGS, readings_for
-from fluxproof.diagnosis.ingest.load import load_recording
-from fluxproof.diagnosis.nominal import load_nominal
+from fluxproof.diagnosis.ground.nominal import load_nominal
+from fluxproof.diagnosis.loading.load import load_recording
 from fluxproof.diagnosis.session import run
 
 GIVEN_BACK = (  # whose improved drive file is tried as well

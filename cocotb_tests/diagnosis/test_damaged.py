@@ -10,8 +10,8 @@ import pytest
 from cocotb_tests.support.damaged_files import REFUSED, SUFFIXES, damaged_files
 from cocotb_tests.support.recordings_made import made, nominal_of, write
 from cocotb_tests.support.slow import slowly
-from fluxproof.diagnosis.ingest.load import load_recording
-from fluxproof.diagnosis.recording import RecordingError
+from fluxproof.diagnosis.ground.recording import RecordingError
+from fluxproof.diagnosis.loading.load import load_recording
 
 
 @pytest.fixture(scope="module")

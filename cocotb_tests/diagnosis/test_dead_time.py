@@ -18,11 +18,11 @@ from fluxproof.diagnosis import diagnose
 from fluxproof.diagnosis.balance.blocks import view_of
 from fluxproof.diagnosis.balance.cells import cells_of
 from fluxproof.diagnosis.catalogue.dead_time import EFFECT, full_loss
+from fluxproof.diagnosis.ground.nominal import load_nominal
+from fluxproof.diagnosis.ground.recording import from_columns
 from fluxproof.diagnosis.inference.linearise import Linearisation
 from fluxproof.diagnosis.inference.problem import Problem
 from fluxproof.diagnosis.inference.setup import Setup
-from fluxproof.diagnosis.nominal import load_nominal
-from fluxproof.diagnosis.recording import from_columns
 from studies.blind import cases
 from studies.blind.generate import listing
 

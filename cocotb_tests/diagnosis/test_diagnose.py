@@ -19,13 +19,13 @@ from cocotb_tests.support.diagnosed_drives import DRIVE, GRID, MACHINE, POINT, c
 from cocotb_tests.support.slow import slowly
 from fluxproof.checkout import ROOT
 from fluxproof.diagnosis import catalogue, diagnose, physics
-from fluxproof.diagnosis.answer.improved_plant import check_key, plain
 from fluxproof.diagnosis.balance.blocks import view_of
 from fluxproof.diagnosis.balance.shaft import is_airgap
 from fluxproof.diagnosis.catalogue import CATALOGUE
-from fluxproof.diagnosis.nominal import load_nominal
+from fluxproof.diagnosis.ground.nominal import load_nominal
+from fluxproof.diagnosis.ground.plant_section import check_key, plain
+from fluxproof.diagnosis.ground.recording import from_columns
 from fluxproof.diagnosis.physics import known_effects
-from fluxproof.diagnosis.recording import from_columns
 from fluxproof.plant import Harmonic, flux_from_currents, machine_params
 
 NOMINAL = load_nominal(PAPER)

@@ -22,8 +22,8 @@ from fluxproof import command as fluxproof
 from fluxproof.checkout import ROOT
 from fluxproof.diagnosis import command, session
 from fluxproof.diagnosis import diagnose as run_diagnosis
-from fluxproof.diagnosis.nominal import load_nominal
-from fluxproof.diagnosis.recording import RecordingError
+from fluxproof.diagnosis.ground.nominal import load_nominal
+from fluxproof.diagnosis.ground.recording import RecordingError
 from fluxproof.diagnosis.replay import telemetry
 from golden_model import drive as drives
 from golden_model.io import telemetry_words

@@ -10,11 +10,11 @@ from cocotb_tests.support.diagnosed_drives import DRIVE, MACHINE, POINT, columns
 from fluxproof.diagnosis import diagnose
 from fluxproof.diagnosis.balance.blocks import view_of
 from fluxproof.diagnosis.catalogue import CATALOGUE
+from fluxproof.diagnosis.ground.nominal import load_nominal
+from fluxproof.diagnosis.ground.recording import from_columns
 from fluxproof.diagnosis.inference.problem import Problem, covariance_of
 from fluxproof.diagnosis.inference.settle import fit_of_set
 from fluxproof.diagnosis.inference.setup import Setup
-from fluxproof.diagnosis.nominal import load_nominal
-from fluxproof.diagnosis.recording import from_columns
 
 NOMINAL = load_nominal(PAPER)
 T = NOMINAL.sample_time_s

@@ -15,7 +15,7 @@ from html import unescape
 import pytest
 
 from cocotb_tests.support.diagnosis_samples import html_of, made_up, write_all
-from fluxproof.diagnosis import result
+from fluxproof.diagnosis.ground import result
 
 BROWSERS = "chromium", "chromium-headless-shell", "chromium-browser", "google-chrome"
 CHROMIUM = next(filter(None, map(shutil.which, BROWSERS)), None)

@@ -21,10 +21,10 @@ from cocotb_tests.support.diagnosis_samples import (
     write_all,
 )
 from fluxproof.checkout import ROOT
-from fluxproof.diagnosis import result
+from fluxproof.diagnosis.ground import result
+from fluxproof.diagnosis.ground.result import Estimate, Evidence
 from fluxproof.diagnosis.report import words, write_outputs
 from fluxproof.diagnosis.report.overlay import thinned
-from fluxproof.diagnosis.result import Estimate, Evidence
 
 
 def schema() -> dict:

@@ -15,7 +15,7 @@ import pytest
 from cocotb_tests.core.test_registers import PAPER
 from fluxproof.cosim.golden_loop import run_controller
 from fluxproof.cosim.scenarios import everything
-from fluxproof.diagnosis.recording import RecordingError, from_columns
+from fluxproof.diagnosis.ground.recording import RecordingError, from_columns
 from fluxproof.diagnosis.replay import digital, telemetry
 from fluxproof.diagnosis.replay import flow as digital_flow
 from fluxproof.diagnosis.replay import local as digital_local

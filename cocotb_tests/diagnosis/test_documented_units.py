@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cocotb_tests.support.recordings_made import codes, made, nominal_of, write
-from fluxproof.diagnosis.ingest.load import load_recording
+from fluxproof.diagnosis.loading.load import load_recording
 
 
 @pytest.fixture(scope="module")

@@ -17,8 +17,8 @@ from fluxproof.diagnosis.balance.misfit import bulge, misfit
 from fluxproof.diagnosis.balance.operating_points import point_numbers
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.catalogue.current_gain import PATTERNS
-from fluxproof.diagnosis.nominal import load_nominal
-from fluxproof.diagnosis.recording import from_columns
+from fluxproof.diagnosis.ground.nominal import load_nominal
+from fluxproof.diagnosis.ground.recording import from_columns
 
 NOMINAL = load_nominal(PAPER)
 IDLE = ((160.0, 0.0, 0.0),) * 20

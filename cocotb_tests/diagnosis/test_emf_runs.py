@@ -10,12 +10,12 @@ from cocotb_tests.support.recordings_made import DRIVE, U_DC, T, made, nominal_o
 from fluxproof.diagnosis import diagnose
 from fluxproof.diagnosis.balance.blocks import view_of
 from fluxproof.diagnosis.catalogue import CATALOGUE
+from fluxproof.diagnosis.ground.recording import RecordingError, from_columns
 from fluxproof.diagnosis.inference.problem import Problem
 from fluxproof.diagnosis.inference.settle import fit_of_set
 from fluxproof.diagnosis.inference.setup import Setup
 from fluxproof.diagnosis.ingest.emf import angle_of
-from fluxproof.diagnosis.ingest.load import load_recording
-from fluxproof.diagnosis.recording import RecordingError, from_columns
+from fluxproof.diagnosis.loading.load import load_recording
 
 
 def answer_of(folder, columns, file="scope.csv"):

@@ -7,11 +7,11 @@ from cocotb_tests.core.test_registers import PAPER
 from cocotb_tests.support.diagnosed_drives import recorded
 from fluxproof.diagnosis.answer.scan import stray_swing
 from fluxproof.diagnosis.balance.blocks import view_of
+from fluxproof.diagnosis.ground.nominal import load_nominal
 from fluxproof.diagnosis.inference.evidence import evidence
 from fluxproof.diagnosis.inference.points import repeated_dwells
 from fluxproof.diagnosis.inference.problem import Problem
 from fluxproof.diagnosis.inference.setup import Setup
-from fluxproof.diagnosis.nominal import load_nominal
 from fluxproof.diagnosis.physics import known_effects
 
 ROWS, NOISE = 60, 0.01

@@ -8,10 +8,10 @@ import pytest
 from fluxproof.checkout import ROOT
 from fluxproof.diagnosis.balance.blocks import view_of
 from fluxproof.diagnosis.balance.joined import joined_views
-from fluxproof.diagnosis.effects.flux_splines import INTERVALS, gradients, knots_over, powers
-from fluxproof.diagnosis.effects.flux_surface import earned, flux_map, ladder, names
-from fluxproof.diagnosis.nominal import load_nominal
-from fluxproof.diagnosis.recording import from_columns
+from fluxproof.diagnosis.ground.nominal import load_nominal
+from fluxproof.diagnosis.ground.recording import from_columns
+from studies.real.flux_splines import INTERVALS, gradients, knots_over, powers
+from studies.real.flux_surface import earned, flux_map, ladder, names
 
 NOMINAL = load_nominal(ROOT / "docs" / "drives" / "brusa_hsm1.toml")
 MACHINE, T = NOMINAL.machine, NOMINAL.sample_time_s

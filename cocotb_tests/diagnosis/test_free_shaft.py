@@ -11,10 +11,10 @@ from cocotb_tests.support.slow import slowly
 from fluxproof.diagnosis.answer import conclude
 from fluxproof.diagnosis.balance.cells import _steep_variance
 from fluxproof.diagnosis.balance.shaft import airgap, bend_gain, shaft_kind
-from fluxproof.diagnosis.ingest.load import load_recording
-from fluxproof.diagnosis.nominal import load_nominal
+from fluxproof.diagnosis.ground.nominal import load_nominal
+from fluxproof.diagnosis.ground.recording import from_columns
+from fluxproof.diagnosis.loading.load import load_recording
 from fluxproof.diagnosis.physics import rows_of, view_and_held
-from fluxproof.diagnosis.recording import from_columns
 from fluxproof.diagnosis.session import diagnose
 
 NOMINAL = load_nominal(PAPER)

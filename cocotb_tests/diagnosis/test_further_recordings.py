@@ -11,9 +11,9 @@ from fluxproof.diagnosis.answer.request import wants_cold
 from fluxproof.diagnosis.balance.blocks import view_of, views_of
 from fluxproof.diagnosis.balance.joined import joined_views
 from fluxproof.diagnosis.catalogue import CATALOGUE
-from fluxproof.diagnosis.nominal import load_nominal
+from fluxproof.diagnosis.ground.nominal import load_nominal
+from fluxproof.diagnosis.ground.recording import from_columns
 from fluxproof.diagnosis.physics import held_out
-from fluxproof.diagnosis.recording import from_columns
 
 NOMINAL = load_nominal(PAPER)
 COLD = NOMINAL.machine.temperature_ref_c

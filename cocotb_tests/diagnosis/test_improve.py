@@ -13,14 +13,14 @@ from cocotb_tests.core.test_registers import PAPER, each_drive, edited
 from fluxproof.cosim.closed_loop import described_sensors
 from fluxproof.cosim.scenarios import RPM, scenario, steps
 from fluxproof.diagnosis.answer.improve import core_values, improved_toml, plant_of, write_improved
-from fluxproof.diagnosis.answer.improved_plant import KEYS
-from fluxproof.diagnosis.nominal import load_nominal
+from fluxproof.diagnosis.ground.nominal import load_nominal
+from fluxproof.diagnosis.ground.plant_section import KEYS
+from fluxproof.diagnosis.ground.recording import RecordingError, from_columns
+from fluxproof.diagnosis.ground.result import Estimate, NamedEffect
 from fluxproof.diagnosis.overlay.compare import closed_loop
 from fluxproof.diagnosis.overlay.inputs import dq_currents
-from fluxproof.diagnosis.recording import RecordingError, from_columns
 from fluxproof.diagnosis.replay.capture import capture
 from fluxproof.diagnosis.replay.telemetry import read_dump, write_dump
-from fluxproof.diagnosis.result import Estimate, NamedEffect
 from fluxproof.plant import (
     IMPOSED_SPEED,
     Harmonic,

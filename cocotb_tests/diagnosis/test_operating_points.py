@@ -12,9 +12,9 @@ from cocotb_tests.support.recordings_made import DRIVE, codes, made, nominal_of,
 from cocotb_tests.support.slow import halved, slowly
 from fluxproof.diagnosis import diagnose
 from fluxproof.diagnosis.balance.slow_view import slow_view
-from fluxproof.diagnosis.ingest.load import load_recording
-from fluxproof.diagnosis.nominal import load_nominal
-from fluxproof.diagnosis.recording import RecordingError
+from fluxproof.diagnosis.ground.nominal import load_nominal
+from fluxproof.diagnosis.ground.recording import RecordingError
+from fluxproof.diagnosis.loading.load import load_recording
 
 WEAK = Truth(psi=0.95 * PSI)
 
@@ -298,7 +298,7 @@ AREA = [(w, d, q) for w in (250.0, 500.0, -300.0) for d in (-4.0, -2.0, 0.0) for
 @pytest.mark.parametrize("points, written", [(AREA, True), ([(w, 0.4 * q, q) for w, _, q in AREA], False)])
 def test_flux_map_of_a_table(tmp_path, points, written):
     """The q axis saturates: L_q is a quarter smaller at rated current.  Currents on a line leave no map."""
-    from fluxproof.diagnosis.answer.improved_plant import read_flux_map
+    from fluxproof.diagnosis.ground.plant_section import read_flux_map
     from fluxproof.diagnosis.session import run
 
     flux_q = lambda i_q: L_Q * i_q * (1.0 - 0.25 * np.abs(i_q) / RATED)  # noqa: E731

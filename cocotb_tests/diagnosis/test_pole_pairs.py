@@ -9,8 +9,8 @@ from cocotb_tests.support.bench_logs import L_D, L_Q, PSI, R, Truth, emf, table
 from cocotb_tests.support.recordings_made import DRIVE, made, write
 from fluxproof.diagnosis import diagnose
 from fluxproof.diagnosis.conventions.apply import read_recording
-from fluxproof.diagnosis.ingest.load import load_recording
-from fluxproof.diagnosis.nominal import load_nominal
+from fluxproof.diagnosis.ground.nominal import load_nominal
+from fluxproof.diagnosis.loading.load import load_recording
 
 RPM = 30 / np.pi
 

@@ -10,7 +10,7 @@ import pytest
 
 from cocotb_tests.support.recordings_made import T, codes, dq_made, made, nominal_of, write
 from fluxproof.diagnosis.checks import STAGES, checks
-from fluxproof.diagnosis.ingest.load import load_recording
+from fluxproof.diagnosis.loading.load import load_recording
 
 
 @pytest.fixture(scope="module")

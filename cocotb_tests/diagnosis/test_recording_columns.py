@@ -13,10 +13,10 @@ from fluxproof.diagnosis.answer.improve import _set
 from fluxproof.diagnosis.column_maps import maps
 from fluxproof.diagnosis.conventions.apply import edit
 from fluxproof.diagnosis.conventions.table import READINGS
-from fluxproof.diagnosis.ingest.load import load_recording
+from fluxproof.diagnosis.ground.recording import COLUMNS, RecordingError
 from fluxproof.diagnosis.ingest.units import OF_BUS
 from fluxproof.diagnosis.ingest.usual_names import NAMES, TOLD_BY_UNIT, usual
-from fluxproof.diagnosis.recording import COLUMNS, RecordingError
+from fluxproof.diagnosis.loading.load import load_recording
 
 
 @pytest.fixture(scope="module")

@@ -9,10 +9,10 @@ import pandas as pd
 import pytest
 
 from cocotb_tests.support.recordings_made import as_text, codes, dump, made, nominal_of, write, write_mat73
-from fluxproof.diagnosis.ingest.load import load_recording
-from fluxproof.diagnosis.nominal import load_nominal
+from fluxproof.diagnosis.ground.nominal import load_nominal
+from fluxproof.diagnosis.ground.recording import COLUMNS, RecordingError
+from fluxproof.diagnosis.loading.load import load_recording
 from fluxproof.diagnosis.readers import read_table
-from fluxproof.diagnosis.recording import COLUMNS, RecordingError
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,7 @@ from cocotb_tests.support.bench_logs import Truth, table
 from cocotb_tests.support.diagnosed_drives import recorded
 from cocotb_tests.support.recordings_made import DRIVE, write
 from fluxproof.diagnosis import diagnose
-from fluxproof.diagnosis.nominal import flux_level, load_nominal
+from fluxproof.diagnosis.ground.nominal import flux_level, load_nominal
 
 L_D, L_Q, RATED = 0.06, 0.01581, 5.23
 CURRENTS = ((1.0, 1.0), (2.0, 3.0), (3.0, -2.0), (4.0, 0.5))

@@ -11,9 +11,9 @@ from fluxproof.diagnosis.answer.experiment import ENOUGH, best_points, closest_d
 from fluxproof.diagnosis.answer.request import grid, known_of, new_axes, requests, steady_view, within_limits
 from fluxproof.diagnosis.balance.blocks import view_of
 from fluxproof.diagnosis.catalogue import CATALOGUE
+from fluxproof.diagnosis.ground.nominal import load_nominal
 from fluxproof.diagnosis.inference.settle import fit_of_set
 from fluxproof.diagnosis.inference.setup import Setup
-from fluxproof.diagnosis.nominal import load_nominal
 
 NOMINAL = load_nominal(PAPER)
 RATED = NOMINAL.machine.rated_current_a

@@ -9,8 +9,8 @@ from cocotb_tests.core.test_registers import PAPER
 from cocotb_tests.support.diagnosed_drives import POINT, columns
 from fluxproof.diagnosis.balance.blocks import view_of
 from fluxproof.diagnosis.balance.settling import MOST_DROPPED, settled, swings
-from fluxproof.diagnosis.nominal import load_nominal
-from fluxproof.diagnosis.recording import from_columns
+from fluxproof.diagnosis.ground.nominal import load_nominal
+from fluxproof.diagnosis.ground.recording import from_columns
 
 NOMINAL = load_nominal(PAPER)
 BEGIN = 2000  # row at which the operating point begins

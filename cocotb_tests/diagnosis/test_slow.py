@@ -12,12 +12,12 @@ from fluxproof.diagnosis.balance.misfit import misfit
 from fluxproof.diagnosis.balance.slow_stretches import Stretches, message_period, stretches
 from fluxproof.diagnosis.balance.slow_view import alike, slow_view
 from fluxproof.diagnosis.catalogue import CATALOGUE
-from fluxproof.diagnosis.inference import constants
+from fluxproof.diagnosis.ground import constants
+from fluxproof.diagnosis.ground.recording import RecordingError
 from fluxproof.diagnosis.inference.posterior import possible
 from fluxproof.diagnosis.inference.problem import Problem
 from fluxproof.diagnosis.inference.setup import Setup
 from fluxproof.diagnosis.physics import explain
-from fluxproof.diagnosis.recording import RecordingError
 from studies.real.splits import axis_misfit, bounds, estimates_of, flux_map_of
 
 PSI, L_Q = NOMINAL.machine.magnet_flux_wb, NOMINAL.machine.inductance_q_h

@@ -9,7 +9,7 @@ from cocotb_tests.support.bench_answers import answer_of, found, said, without
 from cocotb_tests.support.bench_logs import PSI, R, Truth, sampled, table
 from cocotb_tests.support.recordings_made import nominal_of, write
 from fluxproof.diagnosis.balance.slow_view import slow_view
-from fluxproof.diagnosis.ingest.load import load_recording
+from fluxproof.diagnosis.loading.load import load_recording
 
 AT_REST = [(0.0, d, 0.0) for d in (-5.0, -4.0, -3.0, -2.0, -1.0, 1.0, 2.0, 3.0, 4.0, 5.0)]
 WEAK = Truth(psi=0.95 * PSI)

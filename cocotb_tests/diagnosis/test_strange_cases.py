@@ -5,8 +5,8 @@ import pytest
 
 from cocotb_tests.support.slow import slowly
 from fluxproof.diagnosis.balance.cells import noise
-from fluxproof.diagnosis.ingest.load import load_recording
-from fluxproof.diagnosis.nominal import load_nominal
+from fluxproof.diagnosis.ground.nominal import load_nominal
+from fluxproof.diagnosis.loading.load import load_recording
 from fluxproof.diagnosis.physics import rows_of, view_and_held
 from fluxproof.diagnosis.session import diagnose
 from studies.blind.generate import generate_case, listing

@@ -10,8 +10,8 @@ from fluxproof.diagnosis.balance.blocks import view_of
 from fluxproof.diagnosis.balance.joined import joined_views
 from fluxproof.diagnosis.balance.operating_points import instant_of_change, log_prior
 from fluxproof.diagnosis.catalogue import CATALOGUE
-from fluxproof.diagnosis.nominal import load_nominal
-from fluxproof.diagnosis.recording import from_columns
+from fluxproof.diagnosis.ground.nominal import load_nominal
+from fluxproof.diagnosis.ground.recording import from_columns
 
 NOMINAL = load_nominal(PAPER)
 LOST = 0.1  # of the magnet flux

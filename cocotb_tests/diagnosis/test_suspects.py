@@ -9,7 +9,7 @@ from cocotb_tests.core.test_registers import PAPER
 from cocotb_tests.support.diagnosed_drives import DRIVE, GRID, MACHINE, columns
 from fluxproof.diagnosis import diagnose
 from fluxproof.diagnosis.catalogue import CATALOGUE
-from fluxproof.diagnosis.recording import from_columns
+from fluxproof.diagnosis.ground.recording import from_columns
 from fluxproof.diagnosis.suspects import SUSPECTS
 
 T = DRIVE.sample_time_s

@@ -7,8 +7,8 @@ import pandas as pd
 import pytest
 
 from cocotb_tests.support.recordings_made import T, as_text, codes, made, nominal_of
-from fluxproof.diagnosis.ingest.load import load_recording
-from fluxproof.diagnosis.recording import RecordingError
+from fluxproof.diagnosis.ground.recording import RecordingError
+from fluxproof.diagnosis.loading.load import load_recording
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,7 @@ import pandas as pd
 import pytest
 
 from fluxproof.command import main
-from fluxproof.diagnosis.recording import RecordingError
+from fluxproof.diagnosis.ground.recording import RecordingError
 from fluxproof.fleet.manifest import entries
 
 

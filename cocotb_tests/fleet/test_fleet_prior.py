@@ -18,7 +18,7 @@ from fluxproof.diagnosis import diagnose
 from fluxproof.diagnosis.fleet.prior import design_of, load_prior, placed
 from fluxproof.diagnosis.fleet.row import row_of
 from fluxproof.diagnosis.fleet.schema import schema
-from fluxproof.diagnosis.recording import RecordingError
+from fluxproof.diagnosis.ground.recording import RecordingError
 from fluxproof.diagnosis.report.write import json_ready
 from studies.blind.generate import write_recording
 from studies.fleet import drives

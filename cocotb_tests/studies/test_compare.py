@@ -9,8 +9,8 @@ from cocotb_tests.support.slow import slowly
 from fluxproof.diagnosis.balance.blocks import view_of
 from fluxproof.diagnosis.balance.holdout import holdout_blocks
 from fluxproof.diagnosis.balance.misfit import misfit
-from fluxproof.diagnosis.nominal import load_nominal
-from fluxproof.diagnosis.recording import from_columns
+from fluxproof.diagnosis.ground.nominal import load_nominal
+from fluxproof.diagnosis.ground.recording import from_columns
 from studies.compare import __main__ as command
 from studies.compare.data import Data, holdout_rms, neighbour_rms
 from studies.compare.methods import METHODS, PACKAGES, TITLES, tuned

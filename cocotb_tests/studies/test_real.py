@@ -10,7 +10,7 @@ import json
 import pytest
 
 from fluxproof.checkout import recordings
-from fluxproof.diagnosis.nominal import load_nominal
+from fluxproof.diagnosis.ground.nominal import load_nominal
 from studies.real import brusa, emrax, laas
 from studies.real.__main__ import main
 

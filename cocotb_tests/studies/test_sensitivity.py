@@ -11,7 +11,7 @@ from cocotb_tests.core.test_registers import PAPER
 from cocotb_tests.support.diagnosed_drives import GRID, MACHINE, columns
 from cocotb_tests.support.slow import slowly
 from fluxproof.checkout import ROOT
-from fluxproof.diagnosis.inference import constants
+from fluxproof.diagnosis.ground import constants
 from studies.sensitivity.run import OF_ONE_POINT, Case, answers_of, names, said_in_full, shares
 from studies.sensitivity.steps import Steps, recorded, varied
 

@@ -14,7 +14,7 @@ import numpy as np
 from cocotb_tests.core.test_registers import PAPER
 from fluxproof.cosim.closed_loop import Scenario, described_sensors
 from fluxproof.cosim.golden_loop import simulate
-from fluxproof.diagnosis.recording import Recording, from_columns
+from fluxproof.diagnosis.ground.recording import Recording, from_columns
 from fluxproof.diagnosis.replay.capture import capture
 from fluxproof.plant import IMPOSED_SPEED, Inverter, Machine
 from golden_model import drive as drives

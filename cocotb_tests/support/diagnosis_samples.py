@@ -7,11 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from fluxproof.diagnosis import result
-from fluxproof.diagnosis.nominal import load_nominal
-from fluxproof.diagnosis.recording import Problem
-from fluxproof.diagnosis.report import write_outputs
-from fluxproof.diagnosis.result import (
+from fluxproof.diagnosis.ground import result
+from fluxproof.diagnosis.ground.nominal import load_nominal
+from fluxproof.diagnosis.ground.recording import Problem
+from fluxproof.diagnosis.ground.result import (
     Diagnosis,
     Estimate,
     Evidence,
@@ -22,6 +21,7 @@ from fluxproof.diagnosis.result import (
     Region,
     Request,
 )
+from fluxproof.diagnosis.report import write_outputs
 from fluxproof.plant import FluxMap
 
 HOSTILE = "i_a</code><script>document.title='taken'</script><img src=x onerror=alert(1)>$\\frac{$\u202e\x00"

@@ -14,8 +14,8 @@ from cocotb_tests.core.test_registers import PAPER
 from cocotb_tests.support.diagnosed_drives import DRIVE, GRID, columns
 from fluxproof.diagnosis.balance.blocks import view_of
 from fluxproof.diagnosis.balance.misfit import shaft_torque
-from fluxproof.diagnosis.nominal import load_nominal
-from fluxproof.diagnosis.recording import from_columns
+from fluxproof.diagnosis.ground.nominal import load_nominal
+from fluxproof.diagnosis.ground.recording import from_columns
 
 NOMINAL = load_nominal(PAPER)
 T = DRIVE.sample_time_s

@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from fluxproof.diagnosis.nominal import load_nominal
-from fluxproof.diagnosis.recording import COLUMNS
+from fluxproof.diagnosis.ground.nominal import load_nominal
+from fluxproof.diagnosis.ground.recording import COLUMNS
 
 DRIVE = """
 [machine]

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from fluxproof.checkout import ROOT
-from fluxproof.diagnosis.nominal import load_nominal
-from fluxproof.diagnosis.recording import Recording
+from fluxproof.diagnosis.ground.nominal import load_nominal
+from fluxproof.diagnosis.ground.recording import Recording
 
 DRIVE = ROOT / "docs" / "drives" / "emrax228.toml"
 NOMINAL = load_nominal(DRIVE)

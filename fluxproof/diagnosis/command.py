@@ -31,7 +31,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Diagnose, write the outputs, print the answer; returns 0."""
-    from fluxproof.diagnosis.nominal import load_nominal
+    from fluxproof.diagnosis.ground.nominal import load_nominal
     from fluxproof.diagnosis.session import run as session
 
     nominal = load_nominal(args.drive)
@@ -89,7 +89,7 @@ def printable(text: str, encoding: str | None) -> str:
 def answer_lines(answer, nominal, out: Path) -> list[str]:
     """Headline, advice, effects, ambiguities, next recordings, misfit, findings and the files, as lines of text."""
     from fluxproof.diagnosis.answer.doubts import IMPLAUSIBLE
-    from fluxproof.diagnosis.quantities import measured
+    from fluxproof.diagnosis.ground.quantities import measured
 
     lines = [answer.sentence, *([answer.advice] if answer.advice else [])]
     if answer.effects:
@@ -134,7 +134,7 @@ def effect_table(effects) -> list[str]:
 
 def _among(p) -> str:
     """Where a parameter stands among the other drives."""
-    from fluxproof.diagnosis.quantities import measured, quantity
+    from fluxproof.diagnosis.ground.quantities import measured, quantity
 
     others = f"the others {quantity(p.mean, p.unit)} ± {quantity(p.spread, p.unit, 2)}"
     shrunk = measured(p.shrunk, p.shrunk_sigma, p.unit)

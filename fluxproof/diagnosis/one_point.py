@@ -12,11 +12,13 @@ import numpy as np
 
 from fluxproof.diagnosis.answer.bench_point import on_the_bench
 from fluxproof.diagnosis.answer.headline import sentence
-from fluxproof.diagnosis.answer.locate import at_order, evidence, locate
+from fluxproof.diagnosis.answer.locate import evidence, locate
 from fluxproof.diagnosis.balance.cells import cells_of, voltage_level
 from fluxproof.diagnosis.balance.holdout import holdout_blocks
+from fluxproof.diagnosis.balance.orders import at_order
 from fluxproof.diagnosis.catalogue import CATALOGUE
-from fluxproof.diagnosis.inference import constants as k
+from fluxproof.diagnosis.ground import constants as k
+from fluxproof.diagnosis.ground.result import Diagnosis, Fit, NamedEffect, Remainder, Request
 from fluxproof.diagnosis.inference.drift_fit import (
     best_sets,
     centred_cells,
@@ -27,7 +29,6 @@ from fluxproof.diagnosis.inference.drift_fit import (
     with_copper,
 )
 from fluxproof.diagnosis.inference.fit import Fitter
-from fluxproof.diagnosis.result import Diagnosis, Fit, NamedEffect, Remainder, Request
 
 LEAST_MEANS = 12  # over time; fewer do not determine a drift
 CONSTANT = (1e-3, 5e-3)  # of the bus and of the voltage: a smaller constant misfit may be ripple or resolution

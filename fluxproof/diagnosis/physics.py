@@ -13,16 +13,16 @@ from fluxproof.diagnosis.balance.joined import joined_views
 from fluxproof.diagnosis.balance.parts import sound
 from fluxproof.diagnosis.balance.slow_view import SlowView, slow_view
 from fluxproof.diagnosis.catalogue import CATALOGUE
-from fluxproof.diagnosis.conventions.judge import preferred
-from fluxproof.diagnosis.conventions.tell import under
+from fluxproof.diagnosis.ground.nominal import Nominal
+from fluxproof.diagnosis.ground.recording import Recording
+from fluxproof.diagnosis.ground.result import Diagnosis
 from fluxproof.diagnosis.inference.linearise import Rows
 from fluxproof.diagnosis.inference.posterior import Posterior
 from fluxproof.diagnosis.inference.setup import Setup
-from fluxproof.diagnosis.ingest.restated import as_read
-from fluxproof.diagnosis.nominal import Nominal
+from fluxproof.diagnosis.interpret.judge import preferred
+from fluxproof.diagnosis.interpret.tell import under
+from fluxproof.diagnosis.loading.restated import as_read
 from fluxproof.diagnosis.one_point import diagnose_one_point
-from fluxproof.diagnosis.recording import Recording
-from fluxproof.diagnosis.result import Diagnosis
 from fluxproof.diagnosis.suspects import SUSPECTS
 
 
@@ -33,7 +33,7 @@ def explain(loaded: list[Recording], nominal: Nominal, progress=lambda text: Non
     Raises RecordingError if the recordings contain no operating point for which a voltage balance can be made.
     """
     nominal = as_read(loaded, nominal)
-    loaded = sound(loaded, nominal)
+    loaded = sound(loaded, nominal, CATALOGUE)
     problems = [p for r in loaded for p in r.problems]
     rows = sum(len(r) for r in loaded)
     if any(r.fatal for r in loaded):
@@ -58,10 +58,10 @@ def view_and_held(recordings, nominal):
     Operating points if any of them is sampled too slowly for a voltage balance between rows.
     """
     if any(r.slow for r in recordings):
-        view = joined_views([slow_view(r, nominal) for r in recordings])
+        view = joined_views([slow_view(r, nominal, CATALOGUE) for r in recordings])
         # A file may be a single operating point, so that some are held out of all files together.
         return view, holdout_blocks(view)
-    views = views_of(recordings, nominal)
+    views = views_of(recordings, nominal, CATALOGUE)
     return joined_views(views), held_out(views)
 
 

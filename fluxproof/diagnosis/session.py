@@ -27,17 +27,17 @@ from fluxproof.diagnosis.answer.improve import write_improved
 from fluxproof.diagnosis.balance.parts import left_out
 from fluxproof.diagnosis.checks import check_recording
 from fluxproof.diagnosis.conventions.apply import read_drive, read_recording
-from fluxproof.diagnosis.conventions.tell import restate
 from fluxproof.diagnosis.fleet.prior import among, load_prior
+from fluxproof.diagnosis.ground.nominal import Nominal, load_nominal
+from fluxproof.diagnosis.ground.recording import Problem, Recording, RecordingError
+from fluxproof.diagnosis.ground.result import Diagnosis, Digital
 from fluxproof.diagnosis.inference.posterior import Posterior
-from fluxproof.diagnosis.ingest.load import load_recording
-from fluxproof.diagnosis.nominal import Nominal, load_nominal
+from fluxproof.diagnosis.interpret.tell import restate
+from fluxproof.diagnosis.loading.load import load_recording
 from fluxproof.diagnosis.overlay.compare import closed_loop
 from fluxproof.diagnosis.physics import explain, known_effects
-from fluxproof.diagnosis.recording import Problem, Recording, RecordingError
 from fluxproof.diagnosis.replay.digital import replay
 from fluxproof.diagnosis.report import write_outputs
-from fluxproof.diagnosis.result import Diagnosis, Digital
 from golden_model.drive_keys import DriveError
 
 IMPROVED, ANSWER = "drive_improved.toml", "diagnosis.json"

@@ -33,7 +33,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Diagnose what is not done, write the outputs, print what is worth a look; returns 0, or 130 after Ctrl-C."""
     from fluxproof.diagnosis.command import printable
-    from fluxproof.diagnosis.recording import RecordingError
+    from fluxproof.diagnosis.ground.recording import RecordingError
 
     try:
         from fluxproof.fleet.engine import Engine, EngineError
@@ -77,7 +77,7 @@ def _told(quiet):
 def _limits(texts) -> dict[str, str]:
     """{parameter: value} of the options; RecordingError says what was expected."""
     from fluxproof.diagnosis.fleet.drift import limit_of
-    from fluxproof.diagnosis.recording import RecordingError
+    from fluxproof.diagnosis.ground.recording import RecordingError
 
     out = {}
     for text in texts:

@@ -15,8 +15,8 @@ from pathlib import Path
 import fsspec
 import pandas as pd
 
+from fluxproof.diagnosis.ground.recording import RecordingError
 from fluxproof.diagnosis.readers import readers
-from fluxproof.diagnosis.recording import RecordingError
 from fluxproof.fleet.work import remote
 
 KNOWN = ("recording", "drive", "serial", "time", "temperature")

@@ -9,7 +9,7 @@ import numpy as np
 
 from fluxproof.diagnosis.fleet.findings import Design, Findings
 from fluxproof.diagnosis.fleet.groups import signature
-from fluxproof.diagnosis.quantities import measured, number, quantity
+from fluxproof.diagnosis.ground.quantities import measured, number, quantity
 from fluxproof.diagnosis.report import page as diagnosis_page
 from fluxproof.diagnosis.report import words
 from fluxproof.files import write_text

@@ -8,7 +8,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
 
-from fluxproof.diagnosis.quantities import number, unit_text
+from fluxproof.diagnosis.ground.quantities import number, unit_text
 from fluxproof.diagnosis.report import theme
 
 MOST_DRIVES = 120  # of a picture: beyond, every n-th drive is drawn, and every outlier

@@ -9,8 +9,8 @@ from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
-from fluxproof.diagnosis.nominal import load_nominal
-from fluxproof.diagnosis.recording import RecordingError
+from fluxproof.diagnosis.ground.nominal import load_nominal
+from fluxproof.diagnosis.ground.recording import RecordingError
 from fluxproof.diagnosis.session import run as session
 from fluxproof.fleet.manifest import Entry
 from fluxproof.fleet.page import PAGE, REPORTS

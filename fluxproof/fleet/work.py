@@ -14,8 +14,8 @@ import fsspec
 
 from fluxproof.diagnosis.fleet.prior import design_of
 from fluxproof.diagnosis.fleet.row import failed_row, one_line, row_of
-from fluxproof.diagnosis.nominal import load_nominal
-from fluxproof.diagnosis.recording import RecordingError
+from fluxproof.diagnosis.ground.nominal import load_nominal
+from fluxproof.diagnosis.ground.recording import RecordingError
 from fluxproof.diagnosis.session import diagnose
 from golden_model.drive_keys import DriveError
 

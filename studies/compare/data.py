@@ -19,9 +19,10 @@ import numpy as np
 from fluxproof.diagnosis.balance.blocks import view_of
 from fluxproof.diagnosis.balance.holdout import holdout_blocks
 from fluxproof.diagnosis.balance.misfit import misfit
-from fluxproof.diagnosis.ingest.load import load_recording
-from fluxproof.diagnosis.nominal import load_nominal
-from fluxproof.diagnosis.recording import RecordingError
+from fluxproof.diagnosis.catalogue import CATALOGUE
+from fluxproof.diagnosis.ground.nominal import load_nominal
+from fluxproof.diagnosis.ground.recording import RecordingError
+from fluxproof.diagnosis.loading.load import load_recording
 
 
 @dataclass
@@ -66,7 +67,7 @@ def load(folder: Path) -> Data:
     recording = load_recording(recording_of(folder), nominal)
     if recording.fatal:
         raise RecordingError(f"{recording.source}: unusable: {recording.problems[0].message}")
-    view = view_of(recording, nominal)
+    view = view_of(recording, nominal, CATALOGUE)
     whole = np.isfinite(view.u).all(axis=1) & np.isfinite(view.u_dc).all(axis=1)
     view = view.take(whole)
     channels = misfit(view)

@@ -17,12 +17,13 @@ from fluxproof.diagnosis.balance.blocks import view_of
 from fluxproof.diagnosis.balance.holdout import holdout_blocks
 from fluxproof.diagnosis.balance.joined import joined_views
 from fluxproof.diagnosis.balance.misfit import misfit
-from fluxproof.diagnosis.effects.flux_surface import Surface, earned, flux_map, ladder, names
-from fluxproof.diagnosis.nominal import load_nominal
-from fluxproof.diagnosis.result import Estimate, Fit, NamedEffect
+from fluxproof.diagnosis.catalogue import CATALOGUE
+from fluxproof.diagnosis.ground.nominal import load_nominal
+from fluxproof.diagnosis.ground.result import Estimate, Fit, NamedEffect
 from fluxproof.files import write_text
 from fluxproof.plant import FluxMap
 from studies.real.brusa_loop import Course, measured_map, record, serpentine
+from studies.real.flux_surface import Surface, earned, flux_map, ladder, names
 from studies.real.outputs import NAMES_OF_AXES, write
 
 FILE = Path("brusa_flux_map") / "brusa_meas.csv"
@@ -49,11 +50,11 @@ def run(folder: Path, out: Path, progress=lambda text: None) -> dict:
     answer = diagnose(naming, nominal, progress)
     diagnosed = time.perf_counter()
     progress("flux surface")
-    views = [view_of(r, nominal) for r in naming]
+    views = [view_of(r, nominal, CATALOGUE) for r in naming]
     view = joined_views(views)
     held = holdout_blocks(view)
     steps = ladder(view, ~held)
-    everything = joined_views([*views, view_of(mapping, nominal)])
+    everything = joined_views([*views, view_of(mapping, nominal, CATALOGUE)])
     train = np.append(~held, np.ones(len(everything) - len(view), bool))
     surface = flux_map(everything, train=train)
     noise_v = surface.error_wb * float(np.abs(view.omega).mean())

@@ -14,7 +14,7 @@ import numpy as np
 from fluxproof.cosim.closed_loop import Scenario
 from fluxproof.cosim.golden_loop import simulate
 from fluxproof.cosim.scenarios import RPM
-from fluxproof.diagnosis.recording import Recording, from_columns
+from fluxproof.diagnosis.ground.recording import Recording, from_columns
 from fluxproof.plant import IMPOSED_SPEED, FluxMap, Machine
 from golden_model import drive as drives
 from golden_model.registers import registers

@@ -12,9 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
-from fluxproof.diagnosis.ingest.load import load_recording
-from fluxproof.diagnosis.nominal import load_nominal
-from fluxproof.diagnosis.result import Diagnosis, Estimate, Evidence, Fit, NamedEffect
+from fluxproof.diagnosis.ground.nominal import load_nominal
+from fluxproof.diagnosis.ground.result import Diagnosis, Estimate, Evidence, Fit, NamedEffect
+from fluxproof.diagnosis.loading.load import load_recording
 from studies.real import q_axis
 from studies.real.laas_words import cannot_tell
 from studies.real.outputs import write

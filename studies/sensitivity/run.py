@@ -8,16 +8,17 @@ from pathlib import Path
 from fluxproof.diagnosis.answer.conclude import conclude, judge
 from fluxproof.diagnosis.balance.cells import voltage_rms
 from fluxproof.diagnosis.balance.parts import sound
-from fluxproof.diagnosis.conventions.judge import preferred
-from fluxproof.diagnosis.conventions.tell import under
-from fluxproof.diagnosis.inference import constants
+from fluxproof.diagnosis.catalogue import CATALOGUE
+from fluxproof.diagnosis.ground import constants
+from fluxproof.diagnosis.ground.nominal import load_nominal
+from fluxproof.diagnosis.ground.recording import RecordingError
 from fluxproof.diagnosis.inference.posterior import Posterior
 from fluxproof.diagnosis.inference.setup import Setup
-from fluxproof.diagnosis.ingest.load import load_recording
-from fluxproof.diagnosis.ingest.restated import as_read
-from fluxproof.diagnosis.nominal import load_nominal
+from fluxproof.diagnosis.interpret.judge import preferred
+from fluxproof.diagnosis.interpret.tell import under
+from fluxproof.diagnosis.loading.load import load_recording
+from fluxproof.diagnosis.loading.restated import as_read
 from fluxproof.diagnosis.physics import explain, rows_of, single_point, view_and_held
-from fluxproof.diagnosis.recording import RecordingError
 from studies.sensitivity.steps import Steps, recorded, varied
 
 FACTORS = (0.5, 2.0)
@@ -51,7 +52,7 @@ class Case:
         path = next(p for p in sorted(folder.iterdir()) if p.stem == "recording")
         self.loaded = [load_recording(path, self.nominal)]
         nominal = as_read(self.loaded, self.nominal)
-        self.recordings, self.steps = sound(self.loaded, nominal), Steps()
+        self.recordings, self.steps = sound(self.loaded, nominal, CATALOGUE), Steps()
         self.known = not any(r.fatal for r in self.loaded) and self._has_posterior(nominal)
 
     def _has_posterior(self, nominal) -> bool:

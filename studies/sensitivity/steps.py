@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fluxproof.diagnosis.inference import constants
+from fluxproof.diagnosis.ground import constants
 from fluxproof.diagnosis.inference.setup import Setup
 
 _reading: list[dict[str, float]] = []  # {constant: value} read by the steps that run now, the outermost first

@@ -12,7 +12,7 @@ import numpy as np
 from fluxproof.diagnosis.answer.doubts import doubts
 from fluxproof.diagnosis.answer.headline import details
 from fluxproof.diagnosis.answer.phrases import CORRECTED, SIGNALS, capital, corrected, joined
-from fluxproof.diagnosis.quantities import RPM, decimals, fixed
+from fluxproof.diagnosis.ground.quantities import RPM, decimals, fixed
 
 MOST_TITLES = 4
 WHOLE, SIGMAS = 0.01, 3.0  # of a control period, and standard deviations: nearer times are a whole number of periods

@@ -9,7 +9,7 @@ import numpy as np
 from fluxproof.diagnosis.answer.balance_notes import balance_notes
 from fluxproof.diagnosis.answer.estimates import named_effects
 from fluxproof.diagnosis.answer.headline import sentence
-from fluxproof.diagnosis.answer.locate import at_order, evidence, locate
+from fluxproof.diagnosis.answer.locate import evidence, locate
 from fluxproof.diagnosis.answer.names import Names, names_of
 from fluxproof.diagnosis.answer.phrases import as_if, capital
 from fluxproof.diagnosis.answer.request import requests, wants_cold
@@ -17,10 +17,11 @@ from fluxproof.diagnosis.answer.scan import Stray, row_residual, stray_order, st
 from fluxproof.diagnosis.answer.sizes import Sizes, fit_of, with_stray
 from fluxproof.diagnosis.answer.unknown import sparse_term
 from fluxproof.diagnosis.answer.verdict import at_floor, is_usual, kind_of
-from fluxproof.diagnosis.inference import constants as k
+from fluxproof.diagnosis.balance.orders import at_order
+from fluxproof.diagnosis.ground import constants as k
+from fluxproof.diagnosis.ground.result import Diagnosis, UnknownTerm
 from fluxproof.diagnosis.inference.posterior import Posterior
 from fluxproof.diagnosis.inference.problem import covariance_of
-from fluxproof.diagnosis.result import Diagnosis, UnknownTerm
 
 MOST_RIVALS = 5
 

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from fluxproof.diagnosis.answer.improved_plant import in_addition
+from fluxproof.diagnosis.ground.plant_section import in_addition
+from fluxproof.diagnosis.ground.result import NamedEffect
 from fluxproof.diagnosis.inference.problem import covariance_of
-from fluxproof.diagnosis.result import NamedEffect
 
 
 def without_possible(names, best):

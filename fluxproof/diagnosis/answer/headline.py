@@ -21,8 +21,8 @@ from fluxproof.diagnosis.answer.phrases import (
     said,
     title_of,
 )
-from fluxproof.diagnosis.inference import constants as k
-from fluxproof.diagnosis.quantities import ascii_of, quantity
+from fluxproof.diagnosis.ground import constants as k
+from fluxproof.diagnosis.ground.quantities import ascii_of, quantity
 
 MUCH_LEFT = 3.0  # times the noise floor: a remainder that is told though the misfit is explained
 MOST_LETTERS = 200  # letters of a headline: two lines of a terminal or of the report

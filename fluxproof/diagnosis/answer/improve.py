@@ -16,10 +16,10 @@ import numpy as np
 import tomlkit
 
 from fluxproof.diagnosis.answer.improved_core import CoreValue, core_changes, core_values
-from fluxproof.diagnosis.answer.improved_plant import Plant, Timing, described_sensors, merged, plant_of
 from fluxproof.diagnosis.conventions.apply import edit, read_drive
-from fluxproof.diagnosis.nominal import Nominal
-from fluxproof.diagnosis.result import NamedEffect
+from fluxproof.diagnosis.ground.nominal import Nominal
+from fluxproof.diagnosis.ground.plant_section import Plant, Timing, described_sensors, merged, plant_of
+from fluxproof.diagnosis.ground.result import NamedEffect
 from fluxproof.plant import FluxMap, Harmonic
 from golden_model import drive as drives
 

@@ -15,9 +15,9 @@ from __future__ import annotations
 import dataclasses
 from typing import NamedTuple
 
-from fluxproof.diagnosis.answer.improved_plant import merged
-from fluxproof.diagnosis.nominal import Nominal
-from fluxproof.diagnosis.result import NamedEffect
+from fluxproof.diagnosis.ground.nominal import Nominal
+from fluxproof.diagnosis.ground.plant_section import merged
+from fluxproof.diagnosis.ground.result import NamedEffect
 from golden_model import drive as drives
 from golden_model.drive_keys import DriveError, key_of
 from golden_model.registers import registers

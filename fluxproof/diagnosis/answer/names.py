@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from fluxproof.diagnosis.inference import constants as k
+from fluxproof.diagnosis.ground import constants as k
 
 MEDIAN = 0.6745  # of the magnitude of normal noise, in standard deviations
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from fluxproof.diagnosis.quantities import ascii_of, measured, quantity
+from fluxproof.diagnosis.ground.quantities import ascii_of, measured, quantity
 
 SIGNALS = {"u_dq": "voltage", "u_d": "d-axis voltage", "u_q": "q-axis voltage", "u": "voltage",
            "current_sum": "sum of the phase currents", "torque": "torque"}  # fmt: skip

@@ -14,10 +14,10 @@ from fluxproof.diagnosis.balance.cells import Projector, voltage_level
 from fluxproof.diagnosis.balance.joined import stayed_cold
 from fluxproof.diagnosis.balance.view import View
 from fluxproof.diagnosis.effects.effect import LEAST_CURRENT
-from fluxproof.diagnosis.inference import constants
-from fluxproof.diagnosis.nominal import flux_level
-from fluxproof.diagnosis.quantities import ascii_of, quantity
-from fluxproof.diagnosis.result import Request
+from fluxproof.diagnosis.ground import constants
+from fluxproof.diagnosis.ground.nominal import flux_level
+from fluxproof.diagnosis.ground.quantities import ascii_of, quantity
+from fluxproof.diagnosis.ground.result import Request
 
 ROWS = 200
 SHOWN = 0.06  # share of an effect's longest column below which the recording does not show a coefficient

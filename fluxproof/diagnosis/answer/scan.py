@@ -15,7 +15,7 @@ from fluxproof.diagnosis.balance.cells import voltage_level
 from fluxproof.diagnosis.balance.misfit import misfit
 from fluxproof.diagnosis.balance.quantised_angle import beat_ripple, beat_spectrum
 from fluxproof.diagnosis.effects.effect import rated_torque
-from fluxproof.diagnosis.inference import constants as k
+from fluxproof.diagnosis.ground import constants as k
 
 MOST_ORDER = 80  # per mechanical turn; of a machine with many pole pairs those up to
 MOST_ELECTRICAL = 12  # per electrical turn

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fluxproof.diagnosis.inference import constants as k
-from fluxproof.diagnosis.result import Fit, Remainder
+from fluxproof.diagnosis.ground import constants as k
+from fluxproof.diagnosis.ground.result import Fit, Remainder
 
 UNITS = {"u": ("u_dq", "V"), "sum": ("current_sum", "A"), "torque": ("torque", "Nm")}
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fluxproof.diagnosis.result import UnknownTerm
+from fluxproof.diagnosis.ground.result import UnknownTerm
 
 
 def _dependences(view):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fluxproof.diagnosis.inference import constants as k
+from fluxproof.diagnosis.ground import constants as k
 
 
 def kind_of(names, train, held, channel, share, stray) -> str:

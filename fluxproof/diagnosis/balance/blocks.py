@@ -14,8 +14,8 @@ from fluxproof.diagnosis.balance.quantised_angle import angle_step
 from fluxproof.diagnosis.balance.settling import settled
 from fluxproof.diagnosis.balance.shaft import airgap, is_airgap, shaft_kind
 from fluxproof.diagnosis.balance.view import HALF_WIDTH, SLOPE_REACH, View, lacking
-from fluxproof.diagnosis.nominal import flux_level
-from fluxproof.diagnosis.recording import Recording, RecordingError
+from fluxproof.diagnosis.ground.nominal import flux_level
+from fluxproof.diagnosis.ground.recording import Recording, RecordingError
 
 BLOCK_ROWS = 200
 SHORTER = (100, 50)  # for short dwells
@@ -82,8 +82,8 @@ def _unwrapped(recording, run):
     return theta
 
 
-def view_of(recording: Recording, nominal, block_rows=BLOCK_ROWS) -> View:
-    """Cut a recording into steady blocks.
+def view_of(recording: Recording, nominal, catalogue: dict | None = None, block_rows=BLOCK_ROWS) -> View:
+    """Cut a recording into steady blocks; catalogue: {name: Effect} that the drive file can describe.
 
     Raises RecordingError if there is no steady block.
     """
@@ -115,6 +115,7 @@ def view_of(recording: Recording, nominal, block_rows=BLOCK_ROWS) -> View:
     passed = r["t"][rows].mean(axis=1) - r["t"][0]
     view = View(
         nominal=nominal,
+        catalogue=catalogue or {},
         sample_time_s=period,
         theta=theta_s[samples],
         omega=omega[samples],
@@ -140,12 +141,12 @@ def view_of(recording: Recording, nominal, block_rows=BLOCK_ROWS) -> View:
     return settled(view)
 
 
-def views_of(recordings, nominal) -> list[View]:
+def views_of(recordings, nominal, catalogue: dict | None = None) -> list[View]:
     """Views of several recordings of a drive, all with the block length of the one that needs the shortest."""
-    views = [view_of(r, nominal) for r in recordings]
+    views = [view_of(r, nominal, catalogue) for r in recordings]
     shortest = min(v.u_dc.shape[1] for v in views)
     return [
-        v if v.u_dc.shape[1] == shortest else view_of(r, nominal, shortest)
+        v if v.u_dc.shape[1] == shortest else view_of(r, nominal, catalogue, shortest)
         for r, v in zip(recordings, views, strict=True)
     ]
 

@@ -1,8 +1,8 @@
 """What a drive file describes beyond a linear machine: an improved drive given back as the drive to diagnose.
 
 Saturation, iron loss, dead time and the like stand in [machine], [plant.machine] and [plant.inverter].  They belong to
-the simulation, so that only what they leave is a misfit.  Each effect states its part (``Effect.given``); the flux
-linkage is that of the plant, which saturates both axes together.
+the simulation, so that only what they leave is a misfit.  Each effect of the view's catalogue states its part
+(``Effect.given``); the flux linkage is that of the plant, which saturates both axes together.
 """
 
 from __future__ import annotations
@@ -11,9 +11,8 @@ import dataclasses
 
 import numpy as np
 
-from fluxproof.diagnosis.answer.improved_plant import plant_of
-from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.effects.effect import flux
+from fluxproof.diagnosis.ground.plant_section import plant_of
 from fluxproof.plant import flux_from_currents, machine_params
 from fluxproof.plant.jit import njit
 
@@ -25,8 +24,10 @@ def described(view) -> dict[str, np.ndarray]:
     """Values {channel: array} that the drive file adds to those of its linear machine (see effect.py)."""
     if not view.nominal.plant and not any(getattr(view.machine, key, None) for key in BENDS + LOSSES):
         return {}
+    if not view.catalogue:
+        raise ValueError("a view of a drive file with physics beyond a linear machine needs the catalogue of effects")
     plant, out = plant_of(view.nominal), {}
-    parts = [effect.given(view, plant) for effect in view.visible(CATALOGUE).values()]
+    parts = [effect.given(view, plant) for effect in view.visible(view.catalogue).values()]
     if any(getattr(plant.machine, key) for key in BENDS):
         parts.append(bent(view, plant.machine))
     for part in parts:

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from fluxproof.diagnosis.balance.described import described
 from fluxproof.diagnosis.effects.effect import torque_of
 
 
@@ -34,8 +35,6 @@ def misfit(view) -> dict[str, np.ndarray]:
         out["sum"] = 0.5 * (total[:, 1:] + total[:, :-1])
     if np.isfinite(view.torque).any():
         out["torque"] = view.torque - shaft_torque(view, exact)
-    from fluxproof.diagnosis.balance.described import described  # here, since the catalogue needs this module
-
     for channel, values in described(view).items():
         if channel in out:
             out[channel] = out[channel] - values

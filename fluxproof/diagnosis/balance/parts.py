@@ -1,6 +1,6 @@
 """Several recordings of one drive: a part that cannot be used costs only that part.
 
-    loaded = sound(loaded, nominal)          # of the rest, a finding names the parts that were left out and why
+    loaded = sound(loaded, nominal, CATALOGUE)  # of the rest, a finding names the parts that were left out and why
 
 Parts are left out if a check found them unusable, or if they contain no steady operating point.
 """
@@ -11,14 +11,14 @@ from pathlib import Path
 
 from fluxproof.diagnosis.balance.blocks import view_of
 from fluxproof.diagnosis.balance.slow_view import slow_view
-from fluxproof.diagnosis.recording import Problem, Recording, RecordingError
+from fluxproof.diagnosis.ground.recording import Problem, Recording, RecordingError
 
 
-def sound(loaded: list[Recording], nominal) -> list[Recording]:
+def sound(loaded: list[Recording], nominal, catalogue: dict) -> list[Recording]:
     """The recordings that can be used, if any can; otherwise all of them, so that the reason is reported."""
     if len(loaded) < 2:
         return loaded
-    reasons = {id(recording): _reason(recording, nominal) for recording in loaded}
+    reasons = {id(recording): _reason(recording, nominal, catalogue) for recording in loaded}
     kept = [recording for recording in loaded if not reasons[id(recording)]]
     if not kept:
         return loaded
@@ -41,13 +41,13 @@ def left_out(recording: Recording, source, reason: str, rows: int = 0) -> None:
         recording.problems.append(finding)
 
 
-def _reason(recording, nominal) -> str:
+def _reason(recording, nominal, catalogue) -> str:
     """Why a recording cannot be used; "" if it can."""
     for problem in recording.problems:
         if problem.fatal:
             return f"{recording.source}: {problem.located()}"
     try:
-        (slow_view if recording.slow else view_of)(recording, nominal)
+        (slow_view if recording.slow else view_of)(recording, nominal, catalogue)
     except RecordingError as error:
         return str(error)
     return ""

@@ -19,8 +19,8 @@ from fluxproof.diagnosis.balance.slow_stretches import (
     known_voltage,
     operating_columns,
 )
-from fluxproof.diagnosis.nominal import flux_level
-from fluxproof.diagnosis.recording import RecordingError
+from fluxproof.diagnosis.ground.nominal import flux_level
+from fluxproof.diagnosis.ground.recording import RecordingError
 
 MEANS = 64  # number of means of a long operating point, fine enough for its drift
 SAME_SPEED = 0.02  # relative
@@ -56,12 +56,12 @@ def point_rows(recording, nominal) -> Stretches:
     return Stretches(*means, first, end, np.zeros(len(groups)), rest[first], 0.0, both_axes, notes)
 
 
-def block_points(recording, nominal) -> Stretches:
+def block_points(recording, nominal, catalogue: dict | None = None) -> Stretches:
     """The steady blocks of a recording with a row per control period, as operating points.
 
     Raises RecordingError if there is no steady block.
     """
-    view = view_of(recording, nominal)
+    view = view_of(recording, nominal, catalogue)
     u, i, omega = view.to_dq(view.u[:, 1:-1]).mean(axis=1), view.i.mean(axis=1), view.omega.mean(axis=1)
     span = np.abs(view.theta[:, -1] - view.theta[:, 0])
     rest = np.where(span < AT_REST, view.theta[:, 0], np.nan)

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fluxproof.diagnosis.recording import Recording, RecordingError
+from fluxproof.diagnosis.ground.recording import Recording, RecordingError
 
 SIGNALS = ("i_d", "i_q", "u_d", "u_q", "omega")
 STILL = 0.015  # of the largest voltage: largest change of nominal and recorded voltage

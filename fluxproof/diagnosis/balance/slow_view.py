@@ -21,8 +21,8 @@ import numpy as np
 from fluxproof.diagnosis.balance.point_rows import block_points, point_rows
 from fluxproof.diagnosis.balance.slow_stretches import Stretches, stretches
 from fluxproof.diagnosis.balance.view import STACKED, View, lacking
-from fluxproof.diagnosis.inference import constants as k
-from fluxproof.diagnosis.recording import Recording
+from fluxproof.diagnosis.ground import constants as k
+from fluxproof.diagnosis.ground.recording import Recording
 
 ROWS = 36  # one turn in steps of ten degrees: the mean inverter loss is accurate to 0.1 %
 BIN_CURRENT, BIN_SPEED = 0.05, 0.05  # of rated current and of the largest speed: the same operating point
@@ -94,19 +94,19 @@ class SlowView(View):
         return stator * np.exp(-1j * self._turn(abc.shape[1]))
 
 
-def slow_view(recording: Recording, nominal) -> SlowView:
+def slow_view(recording: Recording, nominal, catalogue: dict | None = None) -> SlowView:
     """The operating points of a recording as blocks, similar ones next to each other.
 
     Raises RecordingError if signals are missing or no stretch is steady.
     """
     if not recording.slow:
-        found = block_points(recording, nominal)
+        found = block_points(recording, nominal, catalogue)
     else:
         found = point_rows(recording, nominal) if recording.points else stretches(recording, nominal)
-    return view_of_points(found, recording, nominal)
+    return view_of_points(found, recording, nominal, catalogue)
 
 
-def view_of_points(found: Stretches, recording, nominal) -> SlowView:
+def view_of_points(found: Stretches, recording, nominal, catalogue: dict | None = None) -> SlowView:
     """The same for given stretches."""
     if alone(found, nominal):  # all that it can show is its drift
         found = found.averaged(MOST_OF_ONE)
@@ -125,6 +125,7 @@ def view_of_points(found: Stretches, recording, nominal) -> SlowView:
     turning = omega[:, :1] * period * (np.arange(-1, ROWS + 1) + 0.5)
     return SlowView(
         nominal=nominal,
+        catalogue=catalogue or {},
         sample_time_s=period,
         theta=np.zeros((b, ROWS + 1)),
         omega=omega,

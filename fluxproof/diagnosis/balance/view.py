@@ -15,7 +15,7 @@ import numpy as np
 
 from fluxproof.diagnosis.balance.curves import parabola
 from fluxproof.diagnosis.balance.shaft import FREE
-from fluxproof.diagnosis.inference import constants as k
+from fluxproof.diagnosis.ground import constants as k
 
 # What is computed from the angle alone stays known in a copy with the same angle.
 OF_THE_ANGLE = ("half_turn", "mid_turn", "turn", "theta_mid", "interval_angle")
@@ -67,6 +67,7 @@ class View:
     # Shares that a common scale of the currents and a gain of the bus sensor leave of what was recorded, (b, 1) or 1.
     current_kept: np.ndarray | float = 1.0
     voltage_kept: np.ndarray | float = 1.0
+    catalogue: dict = dataclasses.field(default_factory=dict)  # {name: Effect} that a drive file can describe
     memo: dict = dataclasses.field(default_factory=dict)  # cache of the effects, shared by all views of a recording
 
     angle_step: float = 0.0  # of the encoder's codes [rad]; 0: none is seen

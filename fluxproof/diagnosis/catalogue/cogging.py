@@ -4,7 +4,7 @@ import numpy as np
 
 from fluxproof.diagnosis.balance.torque_order import log_prior, repeating_order
 from fluxproof.diagnosis.effects.effect import Effect, Parameter, rated_torque
-from fluxproof.diagnosis.result import Estimate
+from fluxproof.diagnosis.ground.result import Estimate
 
 
 def _seen(view, h):

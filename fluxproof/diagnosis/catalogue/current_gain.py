@@ -3,7 +3,7 @@
 import numpy as np
 
 from fluxproof.diagnosis.effects.effect import DOUBT, Effect, Parameter, current_error, phase_error, sigma
-from fluxproof.diagnosis.result import Estimate
+from fluxproof.diagnosis.ground.result import Estimate
 
 # Gains of two sensors that differ by g cause a harmonic of 0.58 g and a rotation of 0.29 g; twice that is allowed.
 MOST_TURN = 1 / 3

@@ -3,7 +3,7 @@
 import numpy as np
 
 from fluxproof.diagnosis.effects.effect import Effect, Parameter, current_error
-from fluxproof.diagnosis.result import Estimate
+from fluxproof.diagnosis.ground.result import Estimate
 
 PHASES = "abc"
 

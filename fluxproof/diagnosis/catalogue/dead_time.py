@@ -3,7 +3,7 @@
 import numpy as np
 
 from fluxproof.diagnosis.effects.effect import DOUBT, Effect, Parameter, voltage, zero_vector_slope
-from fluxproof.diagnosis.result import Estimate
+from fluxproof.diagnosis.ground.result import Estimate
 
 # No width is so large that the curve would resemble a resistance over most of the current range.
 WIDTHS = (0.02, 0.12)  # of rated current: where the loss of the core has reached its full value

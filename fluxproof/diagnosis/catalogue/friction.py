@@ -3,7 +3,7 @@
 import numpy as np
 
 from fluxproof.diagnosis.effects.effect import DOUBT, Effect, Parameter, rated_torque
-from fluxproof.diagnosis.result import Estimate
+from fluxproof.diagnosis.ground.result import Estimate
 
 LOW = 0.1  # of top speed: where the friction of a shaft that begins to turn has fallen to 1 / e
 SPEEDS = (0.05, 0.3, 1.0)  # of top speed, at which a drag must not be negative

@@ -6,7 +6,7 @@ from fluxproof.diagnosis.balance.curves import course
 from fluxproof.diagnosis.catalogue.current_gain import PATTERNS
 from fluxproof.diagnosis.catalogue.resistance import to_true_resistance
 from fluxproof.diagnosis.effects.effect import Effect, Parameter, voltage
-from fluxproof.diagnosis.result import Estimate
+from fluxproof.diagnosis.ground.result import Estimate
 
 
 class PhaseResistanceAsymmetry(Effect):

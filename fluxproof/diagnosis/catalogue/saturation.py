@@ -3,7 +3,7 @@
 import numpy as np
 
 from fluxproof.diagnosis.effects.effect import LEAST_CURRENT, FluxEffect, Parameter
-from fluxproof.diagnosis.result import Estimate
+from fluxproof.diagnosis.ground.result import Estimate
 
 
 def _q(view, shape):

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from fluxproof.diagnosis.checks.runs import mark, quantum, runs_of_equal
-from fluxproof.diagnosis.recording import Problem
+from fluxproof.diagnosis.ground.recording import Problem
 
 STAGE = "signals"
 LEAST_CLIPPED = 3  # rows

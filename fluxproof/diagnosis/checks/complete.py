@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from fluxproof.diagnosis.checks.agreement import wrapped
-from fluxproof.diagnosis.recording import Problem
+from fluxproof.diagnosis.ground.recording import Problem
 
 STAGE = "complete"
 SPEED_ROWS = 32  # over which the angle is differentiated: the resolution of an encoder is too coarse for one row

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fluxproof.diagnosis.recording import Problem
+from fluxproof.diagnosis.ground.recording import Problem
 
 STAGE = "extent"
 LEAST_ROWS = 400  # two blocks of a balance in time

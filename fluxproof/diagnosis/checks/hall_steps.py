@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fluxproof.diagnosis.checks.agreement import wrapped
-from fluxproof.diagnosis.recording import Problem
+from fluxproof.diagnosis.ground.recording import Problem
 
 STAGE = "units"
 LEAST_ANGLES, MOST_ANGLES = 3, 12  # different angles per turn

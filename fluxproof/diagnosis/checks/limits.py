@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fluxproof.diagnosis.recording import Problem
+from fluxproof.diagnosis.ground.recording import Problem
 
 STAGE = "signals"
 ROUNDING = 0.005  # tolerance for the rounding of 12-bit duties

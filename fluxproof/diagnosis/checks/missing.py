@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fluxproof.diagnosis.recording import Problem
+from fluxproof.diagnosis.ground.recording import Problem
 
 STAGE = "values"
 ABSURD = 1e9  # larger values are due to an overflow or a wrong format

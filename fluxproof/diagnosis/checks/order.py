@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fluxproof.diagnosis.checks.missing import keep_rows
-from fluxproof.diagnosis.recording import Problem
+from fluxproof.diagnosis.ground.recording import Problem
 
 STAGE = "time"
 RESTART_STEPS = 100  # a longer step back is a restart of the clock, a shorter one a misplaced row

@@ -13,7 +13,7 @@ import numpy as np
 from fluxproof.diagnosis.checks.agreement import angle_speed_ratio
 from fluxproof.diagnosis.checks.balance import BETTER, FIT, Rows, discriminates, misfit, rows_of
 from fluxproof.diagnosis.checks.rival_readings import CLEAR, best_reading, misfit_of
-from fluxproof.diagnosis.recording import Problem
+from fluxproof.diagnosis.ground.recording import Problem
 
 STAGE = "geometry"
 SMALL = 0.03  # of the voltage: a smaller misfit is indistinguishable from noise

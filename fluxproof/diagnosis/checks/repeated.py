@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 from fluxproof.diagnosis.checks.agreement import wrapped
-from fluxproof.diagnosis.quantities import counted
-from fluxproof.diagnosis.recording import Problem
+from fluxproof.diagnosis.ground.quantities import counted
+from fluxproof.diagnosis.ground.recording import Problem
 
 STAGE = "signals"
 CLEAR = 10.0  # times the usual scatter of the angle steps

@@ -9,7 +9,7 @@ import numpy as np
 
 from fluxproof.diagnosis.checks.agreement import angle_speed_ratio
 from fluxproof.diagnosis.checks.missing import keep_rows
-from fluxproof.diagnosis.recording import Problem
+from fluxproof.diagnosis.ground.recording import Problem
 
 STAGE = "time"
 LEAST_DIFFERENT = 100  # different rows

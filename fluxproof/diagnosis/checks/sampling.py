@@ -10,9 +10,9 @@ from __future__ import annotations
 import numpy as np
 
 from fluxproof.diagnosis.checks.agreement import angle_speed_ratio
+from fluxproof.diagnosis.ground.quantities import counted
+from fluxproof.diagnosis.ground.recording import Problem
 from fluxproof.diagnosis.ingest.points import held_one_after_another, mark_points
-from fluxproof.diagnosis.quantities import counted
-from fluxproof.diagnosis.recording import Problem
 
 STAGE = "time"
 TOLERANCE = 0.02  # of the sample time: the clock of a logger is more accurate

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fluxproof.diagnosis.recording import Problem
+from fluxproof.diagnosis.ground.recording import Problem
 
 STAGE = "units"
 MUCH = 20.0  # times the rated value: more than any overload

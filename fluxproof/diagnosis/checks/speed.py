@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from fluxproof.diagnosis.checks.agreement import angle_speed_ratio
 from fluxproof.diagnosis.checks.balance import FIT, discriminates, misfit, rows_of
-from fluxproof.diagnosis.recording import Problem
+from fluxproof.diagnosis.ground.recording import Problem
 
 STAGE = "geometry"
 LARGE = 0.05  # largest deviation of a lagging or scaled speed estimate; beyond it the unit is wrong
@@ -33,7 +33,7 @@ def check(recording, nominal) -> None:
         recording.columns[column] = -recording[column]
         recording.problems.append(Problem("sign", message, column, 0, n, "corrected"))
         return
-    recording.meta["angle_speed"] = ratio  # tells other pole pairs (ingest/restated.py)
+    recording.meta["angle_speed"] = ratio  # tells other pole pairs (loading/restated.py)
     message = f"the angle advances {ratio:.3g} times as fast as the speed says"
     if not confirmed and not 1.0 / WRONG < ratio < WRONG:
         message += ": omega_e is electrical; name its unit in [columns], or correct pole_pairs"

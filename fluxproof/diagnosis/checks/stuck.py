@@ -12,7 +12,7 @@ import numpy as np
 
 from fluxproof.diagnosis.checks.agreement import wrapped
 from fluxproof.diagnosis.checks.runs import mark, runs_of_equal
-from fluxproof.diagnosis.recording import Problem
+from fluxproof.diagnosis.ground.recording import Problem
 
 STAGE = "signals"
 LEAST_STUCK = 50  # rows

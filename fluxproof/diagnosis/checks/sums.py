@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fluxproof.diagnosis.recording import Problem
+from fluxproof.diagnosis.ground.recording import Problem
 
 STAGE = "signals"
 NOTED = 0.002  # of rated current

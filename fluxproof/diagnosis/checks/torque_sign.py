@@ -12,8 +12,8 @@ import numpy as np
 from fluxproof.diagnosis.balance.blocks import stator_current
 from fluxproof.diagnosis.balance.shaft import airgap
 from fluxproof.diagnosis.checks.balance import FIT, discriminates, misfit, rows_of
-from fluxproof.diagnosis.nominal import flux_level
-from fluxproof.diagnosis.recording import Problem
+from fluxproof.diagnosis.ground.nominal import flux_level
+from fluxproof.diagnosis.ground.recording import Problem
 
 STAGE = "signals"
 LOADED = 0.05  # of rated torque: least rms of an air-gap torque whose sign is told

@@ -14,7 +14,7 @@ import numpy as np
 from fluxproof.diagnosis.checks.agreement import angle_speed_ratio
 from fluxproof.diagnosis.checks.balance import BETTER, FIT, discriminates, misfit, rows_of
 from fluxproof.diagnosis.checks.rival_readings import CLEAR, best_reading, misfit_of
-from fluxproof.diagnosis.recording import Problem
+from fluxproof.diagnosis.ground.recording import Problem
 
 STAGE = "units"
 TURN = 2.0 * math.pi

@@ -7,8 +7,8 @@ import math
 
 import tomlkit
 
+from fluxproof.diagnosis.ground.recording import Recording
 from fluxproof.diagnosis.ingest.units import OF_BUS
-from fluxproof.diagnosis.recording import Recording
 
 
 def read_drive(nominal, readings):

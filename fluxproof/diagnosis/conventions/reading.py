@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass, field
 
-from fluxproof.diagnosis.result import Convention
+from fluxproof.diagnosis.ground.result import Convention
 
 CURRENTS = ("i_a", "i_b", "i_c", "i_d", "i_q")
 VOLTAGES = ("u_d_ref", "u_q_ref")

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.cluster.hierarchy import fcluster, linkage
 
 from fluxproof.diagnosis.fleet.rates import Weighed
-from fluxproof.diagnosis.inference import constants as k
+from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.suspects import SUSPECTS
 
 APART = 0.35

@@ -16,11 +16,11 @@ from fluxproof.diagnosis.answer.conclude import measured_torque
 from fluxproof.diagnosis.answer.names import credibilities
 from fluxproof.diagnosis.answer.sizes import UNITS, Sizes
 from fluxproof.diagnosis.catalogue import CATALOGUE
-from fluxproof.diagnosis.inference import constants as k
+from fluxproof.diagnosis.ground import constants as k
+from fluxproof.diagnosis.ground.result import Remainder
 from fluxproof.diagnosis.inference.posterior import possible
 from fluxproof.diagnosis.inference.problem import covariance_of, log_too_small
 from fluxproof.diagnosis.inference.settle import around, settled
-from fluxproof.diagnosis.result import Remainder
 
 BASE = tuple(name for name, effect in CATALOGUE.items() if effect.spreads)
 CLOSE = 20.0  # log evidence below the best within which a set is kept: e^-20 is no alternative at any rate

@@ -16,7 +16,7 @@ from scipy import stats
 
 from fluxproof.diagnosis.fleet.hypotheses import BASE
 from fluxproof.diagnosis.fleet.rates import Weighed
-from fluxproof.diagnosis.inference import constants as k
+from fluxproof.diagnosis.ground import constants as k
 
 FALSE = 0.05  # share of the told findings that may be false
 COMMON = 0.2  # share of the fleet from which an effect is a property of the design: then its size is compared

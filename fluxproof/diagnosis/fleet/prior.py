@@ -28,11 +28,11 @@ from fluxproof.diagnosis.fleet.rates import log_odds, prior_rate, weighed
 from fluxproof.diagnosis.fleet.row import hypothesis_rows
 from fluxproof.diagnosis.fleet.schema import COLUMNS
 from fluxproof.diagnosis.fleet.values import values_of
-from fluxproof.diagnosis.inference import constants as k
+from fluxproof.diagnosis.ground import constants as k
+from fluxproof.diagnosis.ground.nominal import load_nominal
+from fluxproof.diagnosis.ground.recording import RecordingError
+from fluxproof.diagnosis.ground.result import Fleet, InFleet
 from fluxproof.diagnosis.inference.posterior import Posterior
-from fluxproof.diagnosis.nominal import load_nominal
-from fluxproof.diagnosis.recording import RecordingError
-from fluxproof.diagnosis.result import Fleet, InFleet
 
 EVEN = 0.5  # the most that a fleet makes of the prior probability of an effect
 

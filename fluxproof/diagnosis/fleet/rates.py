@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fluxproof.diagnosis.inference import constants as k
+from fluxproof.diagnosis.ground import constants as k
 
 WORTH = 2.0  # recordings that the prior rate counts as
 STEPS, STANDS = 200, 1e-6

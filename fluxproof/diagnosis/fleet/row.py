@@ -6,8 +6,8 @@ import dataclasses
 import math
 
 from fluxproof.diagnosis.fleet.hypotheses import BASE, hypotheses
+from fluxproof.diagnosis.ground.result import Diagnosis
 from fluxproof.diagnosis.inference.posterior import Posterior
-from fluxproof.diagnosis.result import Diagnosis
 
 REASON = 300  # letters of a reason
 

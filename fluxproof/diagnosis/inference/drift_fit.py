@@ -10,9 +10,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from fluxproof.diagnosis.answer.locate import at_order
 from fluxproof.diagnosis.balance.cells import voltage_level
-from fluxproof.diagnosis.inference import constants
+from fluxproof.diagnosis.balance.orders import at_order
+from fluxproof.diagnosis.ground import constants
 from fluxproof.diagnosis.inference.fit import Fitter, Model
 
 DRIFTS = 0.1  # least change of a column over time relative to its size

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import numba
 import numpy as np
 
-from fluxproof.diagnosis.inference import constants
+from fluxproof.diagnosis.ground import constants
 
 FRESH = 0.06  # least share of a column that is independent of the earlier ones; else it is rejected as collinear
 

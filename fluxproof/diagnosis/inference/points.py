@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fluxproof.diagnosis.effects.effect import rated_torque
-from fluxproof.diagnosis.inference import constants as k
+from fluxproof.diagnosis.ground import constants as k
 
 
 @dataclass

@@ -12,7 +12,7 @@ import itertools
 import numpy as np
 
 from fluxproof.diagnosis.effects.effect import believable
-from fluxproof.diagnosis.inference import constants as k
+from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.inference.evidence import evidence
 from fluxproof.diagnosis.inference.linearise import Linearisation
 from fluxproof.diagnosis.inference.points import condense

@@ -9,7 +9,7 @@ import numpy as np
 
 from fluxproof.diagnosis.balance.cells import repeats, voltage_level
 from fluxproof.diagnosis.balance.operating_points import point_numbers
-from fluxproof.diagnosis.inference import constants as k
+from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.inference.linearise import Rows, at_once
 from fluxproof.diagnosis.inference.points import Grouping, balance_level, visits
 

@@ -16,8 +16,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from fluxproof.diagnosis.ground.recording import RecordingError
 from fluxproof.diagnosis.ingest.demand import is_analysed
-from fluxproof.diagnosis.recording import RecordingError
 
 LEAST_CURRENT = 0.01  # of rated current: with less the power does not tell the angle of the voltage
 STEPS = 20  # most, in which the choice of one of two angles is repeated

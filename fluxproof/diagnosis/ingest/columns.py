@@ -27,13 +27,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fluxproof.diagnosis.column_maps import maps, plain
+from fluxproof.diagnosis.ground.recording import COLUMNS, RecordingError
 from fluxproof.diagnosis.ingest.demand import LINE_VOLTAGES, PHASE_VOLTAGES, is_emf_run, missing_columns
 from fluxproof.diagnosis.ingest.entries import entry_of, nearest
 from fluxproof.diagnosis.ingest.stated import constants_of
 from fluxproof.diagnosis.ingest.units import COMMANDED, OF_BUS, conversion, known_units, split_unit
 from fluxproof.diagnosis.ingest.usual_names import usual
 from fluxproof.diagnosis.readers.table import Table, shown
-from fluxproof.diagnosis.recording import COLUMNS, RecordingError
 
 WORTH_NAMING = ("torque", "temp_winding", "omega_e", "u_dc")  # which a diagnosis does without if they are not found
 

@@ -14,8 +14,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from fluxproof.diagnosis.ground.recording import Problem, Recording, RecordingError
 from fluxproof.diagnosis.ingest.demand import LINE_VOLTAGES, PHASE_VOLTAGES
-from fluxproof.diagnosis.recording import Problem, Recording, RecordingError
 
 LEAST_PER_TURN = 10.0  # samples of an electrical turn
 GAP = 1.5  # times the usual step of the time

@@ -5,8 +5,8 @@ from __future__ import annotations
 import difflib
 import math
 
+from fluxproof.diagnosis.ground.recording import COLUMNS, RecordingError
 from fluxproof.diagnosis.readers.table import shown
-from fluxproof.diagnosis.recording import COLUMNS, RecordingError
 
 KEYS = {"name", "unit", "factor", "offset"}
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fluxproof.diagnosis.recording import Problem, Recording
+from fluxproof.diagnosis.ground.recording import Problem, Recording
 
 LEAST_ROWS = 400  # a fast log needs more rows (checks/enough.py)
 STEP_S = 0.5  # of the time: a slower log has no rows between two operating points

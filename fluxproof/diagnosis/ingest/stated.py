@@ -14,9 +14,9 @@ from __future__ import annotations
 import difflib
 import math
 
+from fluxproof.diagnosis.ground.recording import COLUMNS, RecordingError
 from fluxproof.diagnosis.ingest.units import conversion, known_units
 from fluxproof.diagnosis.readers.table import shown
-from fluxproof.diagnosis.recording import COLUMNS, RecordingError
 
 MEASURED = ("t", "u_a", "u_b", "u_c", "u_ab", "u_bc", "u_ca")  # a constant would state nothing
 

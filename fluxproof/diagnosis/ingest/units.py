@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import re
 
-from fluxproof.diagnosis.recording import COLUMNS
+from fluxproof.diagnosis.ground.recording import COLUMNS
 
 TURN = 2.0 * math.pi
 DEGREE = math.pi / 180.0

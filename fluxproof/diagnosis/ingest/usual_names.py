@@ -11,8 +11,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 
+from fluxproof.diagnosis.ground.recording import COLUMNS
 from fluxproof.diagnosis.ingest.units import FACTORS, OF_BUS, OF_SHAFT, conversion, split_unit
-from fluxproof.diagnosis.recording import COLUMNS
 
 PHASES = {"a": ("a", "u", "l1"), "b": ("b", "v", "l2"), "c": ("c", "w", "l3")}
 LINES = {"ab": ("ab", "uv"), "bc": ("bc", "vw"), "ca": ("ca", "wu")}

@@ -11,11 +11,11 @@ import dataclasses
 
 import numpy as np
 
-from fluxproof.diagnosis.answer.improved_plant import Plant, errors_beyond, plant_of
-from fluxproof.diagnosis.nominal import Nominal, load_nominal
+from fluxproof.diagnosis.ground.nominal import Nominal, load_nominal
+from fluxproof.diagnosis.ground.plant_section import Plant, errors_beyond, plant_of
+from fluxproof.diagnosis.ground.recording import Recording, RecordingError
 from fluxproof.diagnosis.overlay.inputs import SETTLING_ROWS, Stretch, dq, dq_currents, stretches
 from fluxproof.diagnosis.overlay.loop import Controller, Errors, run_loop
-from fluxproof.diagnosis.recording import Recording, RecordingError
 from fluxproof.plant import IMPOSED_SPEED, initial_state, plant_params
 from golden_model.scaling import current_gains
 

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.signal import savgol_filter
 
-from fluxproof.diagnosis.nominal import Nominal
-from fluxproof.diagnosis.recording import Recording, RecordingError
+from fluxproof.diagnosis.ground.nominal import Nominal
+from fluxproof.diagnosis.ground.recording import Recording, RecordingError
 
 MOST_ROWS = 20_000  # simulated rows
 WINDOW_ROWS = 2_000

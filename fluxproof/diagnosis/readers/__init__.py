@@ -16,9 +16,9 @@ import sys
 import warnings
 from pathlib import Path
 
+from fluxproof.diagnosis.ground.recording import RecordingError
 from fluxproof.diagnosis.readers.memory import limited_memory
 from fluxproof.diagnosis.readers.table import Select, Table, shown
-from fluxproof.diagnosis.recording import RecordingError
 
 HEAD_BYTES = 4096
 

@@ -12,9 +12,9 @@ import zlib
 
 import numpy as np
 
+from fluxproof.diagnosis.ground.recording import RecordingError
 from fluxproof.diagnosis.readers.hdf5 import SIGNATURE, declared_cells, safe_datasets
 from fluxproof.diagnosis.readers.table import MAX_CELLS, Table, as_columns, chosen, row_limit, shown, too_long
-from fluxproof.diagnosis.recording import RecordingError
 
 FORMAT = "MATLAB"
 SUFFIXES = (".mat",)

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from fluxproof.diagnosis.ground.recording import RecordingError
 from fluxproof.diagnosis.readers.table import Table, chosen, row_limit, shown, too_long
-from fluxproof.diagnosis.recording import RecordingError
 
 FORMAT = "MDF"
 SUFFIXES = (".mf4", ".mdf", ".dat4")

@@ -9,8 +9,8 @@ import zipfile
 
 import numpy as np
 
+from fluxproof.diagnosis.ground.recording import RecordingError
 from fluxproof.diagnosis.readers.table import MAX_CELLS, Table, as_columns, chosen, row_limit, shown, too_long
-from fluxproof.diagnosis.recording import RecordingError
 
 FORMAT = "NumPy"
 SUFFIXES = (".npy", ".npz")

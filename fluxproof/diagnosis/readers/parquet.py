@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from fluxproof.diagnosis.ground.recording import RecordingError
 from fluxproof.diagnosis.readers.clock import seconds
 from fluxproof.diagnosis.readers.table import Table, chosen, row_limit, too_long
-from fluxproof.diagnosis.recording import RecordingError
 
 FORMAT = "Parquet"
 SUFFIXES = (".parquet", ".pq")

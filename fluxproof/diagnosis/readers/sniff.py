@@ -12,8 +12,8 @@ import re
 from collections import Counter
 from dataclasses import dataclass
 
+from fluxproof.diagnosis.ground.recording import RecordingError
 from fluxproof.diagnosis.readers.clock import MOMENT
-from fluxproof.diagnosis.recording import RecordingError
 
 SNIFF_BYTES = 1 << 18
 SNIFF_LINES = 500

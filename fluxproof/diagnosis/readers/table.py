@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from fluxproof.diagnosis.recording import Problem, RecordingError
+from fluxproof.diagnosis.ground.recording import Problem, RecordingError
 
 MAX_ROWS = 20_000_000
 MAX_COLUMNS = 4096

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fluxproof.diagnosis.ground.recording import Problem, RecordingError
 from fluxproof.diagnosis.readers.clock import moments
 from fluxproof.diagnosis.readers.sniff import sniff
 from fluxproof.diagnosis.readers.table import Table, chosen, row_limit, shown, too_long
-from fluxproof.diagnosis.recording import Problem, RecordingError
 
 FORMAT = "text"
 SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".asc", ".log")

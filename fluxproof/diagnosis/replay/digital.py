@@ -15,12 +15,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from fluxproof.diagnosis.recording import Recording
+from fluxproof.diagnosis.ground.recording import Recording
+from fluxproof.diagnosis.ground.result import Digital
 from fluxproof.diagnosis.replay.cause import Cause, find_cause, golden_value, lowest_bit, where_they_part
 from fluxproof.diagnosis.replay.chain import Run, run_of
 from fluxproof.diagnosis.replay.flow import OWNER, block_name, first_in_flow, hidden_before
 from fluxproof.diagnosis.replay.local import check_rows, checkable
-from fluxproof.diagnosis.result import Digital
 from golden_model import fluxproof
 from golden_model.fluxproof import OBSERVED
 from golden_model.io import sample_latch

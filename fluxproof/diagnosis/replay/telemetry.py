@@ -27,7 +27,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fluxproof.diagnosis.recording import RecordingError
+from fluxproof.diagnosis.ground.recording import RecordingError
 from fluxproof.diagnosis.replay.telemetry_columns import columns_of
 from golden_model import fluxproof
 from golden_model.drive_checks import CARRIER_HALF_RANGE

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fluxproof.diagnosis.recording import RecordingError
+from fluxproof.diagnosis.ground.recording import RecordingError
 from fluxproof.diagnosis.replay.telemetry import write_dump
 from golden_model.fluxproof import Sample
 from golden_model.io import telemetry_words as packet

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fluxproof.diagnosis.recording import COLUMNS
+from fluxproof.diagnosis.ground.recording import COLUMNS
 from fluxproof.diagnosis.report import theme
 from fluxproof.diagnosis.report.maps import LeftOut
 

@@ -11,10 +11,10 @@ from types import SimpleNamespace
 import jinja2
 
 from fluxproof.diagnosis.answer.improved_core import core_values
-from fluxproof.diagnosis.answer.improved_plant import merged, plant_of
 from fluxproof.diagnosis.answer.phrases import SIGNALS
-from fluxproof.diagnosis.nominal import SECTIONS
-from fluxproof.diagnosis.quantities import RPM
+from fluxproof.diagnosis.ground.nominal import SECTIONS
+from fluxproof.diagnosis.ground.plant_section import merged, plant_of
+from fluxproof.diagnosis.ground.quantities import RPM
 from fluxproof.diagnosis.report import pictures, words
 
 FOLDER = Path(__file__).resolve().parent

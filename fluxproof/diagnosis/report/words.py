@@ -7,7 +7,7 @@ import math
 from types import SimpleNamespace
 
 from fluxproof.diagnosis.catalogue import CATALOGUE
-from fluxproof.diagnosis.quantities import measured, number, quantity, unit_text
+from fluxproof.diagnosis.ground.quantities import measured, number, quantity, unit_text
 from fluxproof.diagnosis.suspects import SUSPECTS
 
 __all__ = ["brief", "effect_text", "explained", "measured", "number", "percent", "quantity", "span", "unit_text"]

@@ -4,7 +4,7 @@ import numpy as np
 
 from fluxproof.diagnosis.catalogue.current_offset import PATTERNS
 from fluxproof.diagnosis.effects.effect import Effect, Parameter, voltage
-from fluxproof.diagnosis.result import Estimate
+from fluxproof.diagnosis.ground.result import Estimate
 
 LEGS = {name: np.array(weights) for name, weights in PATTERNS.items() if name != "zero"}
 

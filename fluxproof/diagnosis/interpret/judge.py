@@ -20,7 +20,7 @@ from fluxproof.diagnosis.balance.misfit import bulge
 from fluxproof.diagnosis.conventions.reading import Reading
 from fluxproof.diagnosis.conventions.table import pole_pairs_for, readings_for
 from fluxproof.diagnosis.effects.effect import torque_of
-from fluxproof.diagnosis.inference import constants as k
+from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.inference.evidence import evidence
 from fluxproof.diagnosis.inference.linearise import Rows
 from fluxproof.diagnosis.inference.points import condense

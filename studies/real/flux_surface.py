@@ -22,9 +22,9 @@ from scipy.spatial import Delaunay, cKDTree
 
 from fluxproof.diagnosis.balance.misfit import misfit
 from fluxproof.diagnosis.catalogue import CATALOGUE
-from fluxproof.diagnosis.effects.flux_splines import emf_columns, gradients, knots_over, powers
-from fluxproof.diagnosis.result import Estimate
+from fluxproof.diagnosis.ground.result import Estimate
 from fluxproof.plant import FluxMap
+from studies.real.flux_splines import emf_columns, gradients, knots_over, powers
 
 BETTER = 1.3
 DAMPING = tuple(10.0**k for k in range(-9, 2))  # relative to the mean diagonal of the normal matrix

@@ -5,7 +5,7 @@ that a drive without the core can be described too.  A missing key is None, and 
 model.  [columns] maps names of a recording's file to canonical ones, [constants] gives values of columns that the file
 lacks.  [plant.machine], [plant.inverter],
 [plant.sensors] and [plant.timing] contain physics that the core does not use, as in an improved drive;
-diagnosis/answer/improved_plant.py builds the plant.
+diagnosis/ground/plant_section.py builds the plant.
 """
 
 from __future__ import annotations

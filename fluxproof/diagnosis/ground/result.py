@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from fluxproof.diagnosis.recording import Problem
+from fluxproof.diagnosis.ground.recording import Problem
 
 VERDICTS = (
     "explained", "partly_explained", "ambiguous", "unexplained", "no_mismatch", "digital_mismatch", "bad_recording",

@@ -16,8 +16,8 @@ import numpy as np
 
 from fluxproof.diagnosis.checks.agreement import angle_speed_ratio
 from fluxproof.diagnosis.checks.balance import FIT, discriminates, misfit, rows_of
-from fluxproof.diagnosis.quantities import ascii_of, quantity
-from fluxproof.diagnosis.result import Convention
+from fluxproof.diagnosis.ground.quantities import ascii_of, quantity
+from fluxproof.diagnosis.ground.result import Convention
 
 FITS = 0.02  # of the voltage: largest misfit of a recording that is read rightly, whatever effect the drive has
 AGREES = 0.02  # of the speed: how well angle and speed agree with the right pole pairs

@@ -22,8 +22,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fluxproof.diagnosis.nominal import Nominal, load_nominal
-from fluxproof.diagnosis.result import NamedEffect
+from fluxproof.diagnosis.ground.nominal import Nominal, load_nominal
+from fluxproof.diagnosis.ground.result import NamedEffect
 from fluxproof.plant import FluxMap, Harmonic, Inverter, Machine, Sensors
 from golden_model.drive_keys import DriveError
 

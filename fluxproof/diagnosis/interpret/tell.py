@@ -5,8 +5,8 @@ from __future__ import annotations
 from fluxproof.diagnosis.answer.headline import sentence
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.conventions.reading import Reading
-from fluxproof.diagnosis.inference import constants as k
-from fluxproof.diagnosis.result import Diagnosis
+from fluxproof.diagnosis.ground import constants as k
+from fluxproof.diagnosis.ground.result import Diagnosis
 from fluxproof.diagnosis.suspects import SUSPECTS
 
 OF_THE_REST = ("after", "noise", "spectrum_after")  # arrays of the evidence in true volts

@@ -1,0 +1,1 @@
+"""Did the file mean something else?  judge.py finds the reading that the data prefer, tell.py answers under it."""

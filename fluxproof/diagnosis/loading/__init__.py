@@ -1,0 +1,5 @@
+"""A file becomes a checked recording.
+
+load.py      reads a file, maps its columns, checks it
+restated.py  a drive file whose sample time is off by two, or with wrong pole pairs: the file is read again
+"""
