@@ -100,7 +100,7 @@ def run(
         build_dir=built,
         test_dir=folder,
         test_args=["--std=08", f"--workdir={built}"],
-        plusargs=["--ieee-asserts=disable"],
+        plusargs=["--ieee-asserts=disable", *_waves(folder)],
         extra_env={
             "PYTHONPATH": f"{ROOT}{os.pathsep}{os.environ.get('PYTHONPATH', '')}",
             # Else pytest recompiles all that is imported (numba, scipy) to explain asserts: seconds in every run.
@@ -113,6 +113,11 @@ def run(
     with contextlib.suppress(SystemExit):  # how the runner says that a test failed: the caller asks failure()
         get_runner("ghdl").test(**command)
     return folder
+
+
+def _waves(folder: Path) -> list[str]:
+    """GHDL's option for the waveform of a run where FLUXPROOF_WAVES is set; of its formats FST alone takes every top."""
+    return [f"--fst={folder / 'waves.fst'}"] if os.environ.get("FLUXPROOF_WAVES") else []
 
 
 def _log(folder: Path, name: str) -> Path:
