@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import signal
 import threading
 import time
 from collections.abc import Callable
@@ -10,7 +12,11 @@ from distributed import Client
 
 LOOKS = 10  # within the limit
 LOOK_S = (0.05, 2.0)  # shortest and longest time between two of them
-END_S = 30.0  # for a worker to end and to be started again
+
+
+def kill(dask_worker) -> None:
+    """End the worker process of a nanny, in the nanny."""
+    os.kill(dask_worker.pid, getattr(signal, "SIGKILL", signal.SIGTERM))
 
 
 class Watch(threading.Thread):
@@ -23,6 +29,7 @@ class Watch(threading.Thread):
         super().__init__(daemon=True)
         self.client, self.limit_s, self.give_up = client, limit_s, give_up
         self.since: dict[tuple[str, str], float] = {}  # when a (worker, key) was first seen to run
+        self.doomed: set[str] = set()  # workers that are to be killed, until they are gone
         self.ended = threading.Event()
 
     def __enter__(self) -> Watch:
@@ -38,7 +45,7 @@ class Watch(threading.Thread):
         while not self.ended.wait(pause):
             try:
                 self.look(time.monotonic())
-            except (OSError, TimeoutError):  # no answer of the scheduler this time
+            except Exception:  # no answer this time, such as of a scheduler that is closing: the next look may get one
                 continue
 
     def look(self, now: float) -> None:
@@ -48,11 +55,13 @@ class Watch(threading.Thread):
         running = [(w, key) for w, keys in self.client.processing().items() for key in self._first(w, keys, threads)]
         self.since = {pair: self.since.get(pair, now) for pair in running}
         late = [(worker, key) for (worker, key), at in self.since.items() if now - at > self.limit_s]
-        for _, key in late:
+        for worker, key in late:
+            self.doomed.add(worker)
             self.give_up(key)
-        if late:
-            self.client.restart_workers(sorted({w for w, _ in late}), timeout=END_S, raise_for_error=False)
-            self.since = {pair: at for pair, at in self.since.items() if pair not in late}
+        self.doomed &= set(threads)  # one that is started again has another address
+        if self.doomed:
+            # The worker itself may be deaf; its nanny, a process of its own, kills it and starts it again.
+            self.client.run(kill, workers=sorted(self.doomed), nanny=True, on_error="ignore")
 
     def _first(self, worker, keys, threads) -> list[str]:
         """The keys that a worker has had longest, one for each of its threads."""
