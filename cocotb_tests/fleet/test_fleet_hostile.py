@@ -94,7 +94,7 @@ def test_manifests_of_other_programs(tmp_path, encoding, separator):
 @pytest.mark.parametrize(
     ("data", "said"),
     [
-        ("recording,serial\na.csv,ä\n".encode("utf-16-le"), ": UTF-16-LE without a byte-order mark; expected UTF-8, or"),
+        ("recording,serial\na.csv,ä\n".encode("utf-16-le"), ": UTF-16-LE without a byte-order mark; expected UTF-8"),
         ("recording\na.csv\n".encode("utf-16") + b"\x00\xd8", ":3: not UTF-16 text, as the byte-order mark says"),
         (b"recording,serial\na.csv,\xe4\n", ":2: column 'serial': byte 0xe4 is not UTF-8; save the manifest as UTF-8"),
         (b"recording,\xe4\na.csv,1\n", ":1: column 2: byte 0xe4 is not UTF-8"),
