@@ -262,7 +262,7 @@ def test_a_worker_is_killed_until_it_is_gone_and_what_waits_has_its_time():
         def processing(self):
             return self.work
 
-        def run(self, function, workers, **_):
+        def run(self, function, doomed, workers, **_):
             self.killed.append(workers)
 
     given_up = []

@@ -14,9 +14,10 @@ LOOKS = 10  # within the limit
 LOOK_S = (0.05, 2.0)  # shortest and longest time between two of them
 
 
-def kill(dask_worker) -> None:
-    """End the worker process of a nanny, in the nanny."""
-    os.kill(dask_worker.pid, getattr(signal, "SIGKILL", signal.SIGTERM))
+def kill(addresses, dask_worker) -> None:
+    """End the worker process of a nanny, in the nanny, unless it already is another one, which is just starting."""
+    if dask_worker.worker_address in addresses:
+        os.kill(dask_worker.pid, getattr(signal, "SIGKILL", signal.SIGTERM))
 
 
 class Watch(threading.Thread):
@@ -61,7 +62,8 @@ class Watch(threading.Thread):
         self.doomed &= set(threads)  # one that is started again has another address
         if self.doomed:
             # The worker itself may be deaf; its nanny, a process of its own, kills it and starts it again.
-            self.client.run(kill, workers=sorted(self.doomed), nanny=True, on_error="ignore")
+            doomed = sorted(self.doomed)
+            self.client.run(kill, doomed, workers=doomed, nanny=True, on_error="ignore")
 
     def _first(self, worker, keys, threads) -> list[str]:
         """The keys that a worker has had longest, one for each of its threads."""
