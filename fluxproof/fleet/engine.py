@@ -17,10 +17,12 @@ AHEAD = 4  # items per worker that wait at the scheduler; more would only take i
 DEATHS = 10  # workers that one item may take with it before it is suspected
 EVERY_S = 10.0  # between lines of progress where the line cannot be updated
 CONNECT_S = 15.0
+LOST = "600s"  # without a worker before its place is given up
 RESTART_S = 5.0  # of a worker that has died
 SETTINGS = {
     "distributed.scheduler.allowed-failures": DEATHS,
     "distributed.scheduler.worker-saturation": 1.0,  # nothing waits at a worker, and dies with it
+    "distributed.deploy.lost-worker-timeout": LOST,  # by default, a worker that is started again slowly is lost for good
     "distributed.comm.timeouts.connect": f"{CONNECT_S:g}s",
     "distributed.admin.large-graph-warning-threshold": "1GB",
     "distributed.worker.memory.target": False,  # nothing is kept on workers that could be spilled
