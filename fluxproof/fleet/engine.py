@@ -22,7 +22,7 @@ RESTART_S = 5.0  # of a worker that has died
 SETTINGS = {
     "distributed.scheduler.allowed-failures": DEATHS,
     "distributed.scheduler.worker-saturation": 1.0,  # nothing waits at a worker, and dies with it
-    "distributed.deploy.lost-worker-timeout": LOST,  # by default, a worker that is started again slowly is lost for good
+    "distributed.deploy.lost-worker-timeout": LOST,  # by default, a slow restart loses the worker for good
     "distributed.comm.timeouts.connect": f"{CONNECT_S:g}s",
     "distributed.admin.large-graph-warning-threshold": "1GB",
     "distributed.worker.memory.target": False,  # nothing is kept on workers that could be spilled
