@@ -15,6 +15,9 @@ from golden_model.board_registers import board_set
 from golden_model.drive import load
 from golden_model.drive_keys import DriveError
 from golden_model.registers import RegisterSet
+from golden_model.regular_file import read_regular
+
+MOST_BYTES = 1_000_000  # of a file of registers
 
 REPLAY = {
     "reset": "begins with the first sample after a reset: the golden model can replay all of it",
@@ -96,7 +99,9 @@ def with_registers(base: RegisterSet, path: Path) -> RegisterSet:
     from fluxproof.diagnosis.replay.telemetry import CONFIG
 
     try:
-        data = json.loads(path.read_text(encoding="utf-8"))
+        data = json.loads(read_regular(path, MOST_BYTES).decode("utf-8"))
+    except OSError as error:
+        raise DriveError(f"{path}: cannot be read: {error.strerror or error}") from None
     except (ValueError, RecursionError) as error:
         raise DriveError(f"{path}: not JSON: {error}") from None
     if not isinstance(data, dict):

@@ -15,9 +15,11 @@ except ModuleNotFoundError:  # Python 3.10
     import tomli as tomllib
 
 from golden_model.drive_keys import DriveError, key_of
+from golden_model.regular_file import read_regular
 
 # Columns and constants of recordings, and physics beyond the core's model: all are read by diagnosis/.
 IGNORED = ("columns", "constants", "plant")
+MOST_BYTES = 1_000_000
 
 
 def read_sections(path, schema):
@@ -41,7 +43,7 @@ def read_tables(path):
 def _tables(path):
     """The file as nested dictionaries; an error message starts right after the file name."""
     try:
-        text = path.read_bytes().decode("utf-8")
+        text = read_regular(path, MOST_BYTES).decode("utf-8")
     except UnicodeDecodeError as error:
         line = error.object[: error.start].count(b"\n") + 1
         raise DriveError(f":{line}: not UTF-8 text") from None

@@ -21,7 +21,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from cocotb_tests.support import small_fleet
-from cocotb_tests.support.slow_work import fatal, slowly
+from cocotb_tests.support.slow_work import blocking, fatal, slowly
 from cocotb_tests.support.small_fleet import Here
 from fluxproof.checkout import ROOT
 from fluxproof.command import main
@@ -31,6 +31,7 @@ from fluxproof.fleet import reports, table
 from fluxproof.fleet.engine import Engine, Lost
 from fluxproof.fleet.manifest import entries
 from fluxproof.fleet.session import run
+from fluxproof.fleet.watch import Watch
 from fluxproof.fleet.work import Item, work
 from studies.fleet.figures import Killer
 
@@ -238,6 +239,49 @@ def test_a_recording_that_takes_its_workers_with_it_is_given_up(monkeypatch):
     with Engine(2) as engine:
         found = dict(engine.each(fatal, range(4)))
     assert isinstance(found.pop(2), Lost) and found == {0: 0, 1: 1, 3: 3}
+
+
+def test_an_item_beyond_its_time_is_given_up_and_the_others_go_on():
+    """One sleeps deaf to signals, one holds the interpreter's lock: only a kill from outside ends either."""
+    with Engine(2, limit_s=3.0) as engine:
+        found = dict(engine.each(blocking, range(6)))
+    late = {n: found.pop(n) for n in (1, 3)}
+    assert found == {n: n * n for n in (0, 2, 4, 5)}
+    assert all(isinstance(r, Lost) and r.final and r.reason == "took longer than 3 s" for r in late.values())
+
+
+def test_a_worker_is_killed_until_it_is_gone_and_what_waits_has_its_time():
+    class Scheduler:
+        """Its first order to a nanny is lost."""
+
+        threads, work, killed = {"a": 1, "b": 1}, {"a": ("late", "waits"), "b": ()}, []
+
+        def nthreads(self):
+            return self.threads
+
+        def processing(self):
+            return self.work
+
+        def run(self, function, doomed, workers, **_):
+            self.killed.append(workers)
+
+    given_up = []
+    watch = Watch(Scheduler(), 10.0, given_up.append)
+    for now in (0.0, 9.0, 11.0):
+        watch.look(now)
+    assert given_up == ["late"] and watch.client.killed == [["a"]]
+    Scheduler.work = {"a": (), "b": ("waits",)}  # the item is cancelled, the worker still there
+    watch.look(12.0)
+    assert watch.client.killed == [["a"], ["a"]]
+    Scheduler.threads = {"b": 1, "c": 1}
+    watch.look(21.0)
+    assert given_up == ["late"] and len(watch.client.killed) == 2
+
+
+@pytest.mark.parametrize("seconds", ["0", "-1", "nan", "inf"])
+def test_a_limit_of_time_is_more_than_nothing(seconds, capsys):
+    assert main(["fleet", "run.csv", "--drive", "drive.toml", f"--timeout={seconds}"]) == 2
+    assert "--timeout" in capsys.readouterr().err
 
 
 def test_no_scheduler_is_one_line(fleet, tmp_path, monkeypatch, capsys):

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
+import re
+import signal
 import time
 
 
@@ -17,3 +20,17 @@ def fatal(number: int) -> int:
     if number == 2:
         os._exit(1)
     return number
+
+
+def blocking(number: int) -> int:
+    """Work of which item 1 never ends, deaf to signals, and item 3 never ends inside one call of C, which no other
+    thread of its process interrupts."""
+    if number == 1:
+        for one in (signal.SIGTERM, signal.SIGINT):
+            with contextlib.suppress(ValueError):  # only the main thread may set it
+                signal.signal(one, signal.SIG_IGN)
+        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGTERM, signal.SIGINT})
+        time.sleep(1e6)
+    if number == 3:
+        re.match(r"(a+)+$", "a" * 60 + "b")
+    return number * number

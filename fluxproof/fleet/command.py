@@ -8,11 +8,13 @@ and 2 with one line on stderr for unusable input.  Slow imports are made inside 
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 from pathlib import Path
 
 FOLDER = Path("build") / "fleet"
 MOST_LINES = 20
+TIMEOUT_S = 600.0
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -23,6 +25,10 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", metavar="DIR", default=str(FOLDER), help=f"folder for the results (default: {FOLDER})")
     parser.add_argument("--workers", type=int, help="processes on this machine (default: one for each core)")
     parser.add_argument("--scheduler", metavar="ADDRESS", help="a running dask scheduler, such as tcp://host:8786")
+    late = f"the most that one recording may take (default: {TIMEOUT_S:g})"
+    parser.add_argument("--timeout", metavar="SECONDS", type=float, default=TIMEOUT_S, help=late)
+    allow = "a protocol that addresses in a manifest may have, such as s3; may be repeated"
+    parser.add_argument("--allow", metavar="PROTOCOL", action="append", default=[], help=allow)
     limit = "where a drift is to end: in SI units, or such as 95%% of the first value; may be repeated"
     parser.add_argument("--limit", metavar="PARAMETER=VALUE", action="append", default=[], help=limit)
     parser.add_argument("--report", metavar="NAME", action="append", default=[], help="also write its report")
@@ -47,11 +53,15 @@ def run(args: argparse.Namespace) -> int:
 
     if args.workers is not None and args.workers < 1:
         raise RecordingError(f"--workers {args.workers}: expected 1 or more")
-    limits, listed, out = _limits(args.limit), entries(args.recordings, args.drive), Path(args.out)
+    if not 0 < args.timeout < math.inf:
+        raise RecordingError(f"--timeout {args.timeout:g}: expected seconds, more than 0")
+    limits, listed, out = _limits(args.limit), entries(args.recordings, args.drive, args.allow), Path(args.out)
+
+    def engine():
+        return Engine(args.workers, args.scheduler, args.timeout)
+
     try:
-        outcome = session(
-            listed, out, lambda: Engine(args.workers, args.scheduler), limits, args.quiet, _told(args.quiet)
-        )
+        outcome = session(listed, out, engine, limits, args.quiet, _told(args.quiet), args.timeout)
         for name in args.report:
             print(f"wrote {make(listed, name, out)}")
     except EngineError as error:

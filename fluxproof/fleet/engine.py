@@ -9,16 +9,20 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 
 import dask
-from distributed import Client, KilledWorker, LocalCluster, as_completed
+from distributed import CancelledError, Client, KilledWorker, LocalCluster, as_completed
+
+from fluxproof.fleet.watch import Watch
 
 AHEAD = 4  # items per worker that wait at the scheduler; more would only take its memory
 DEATHS = 10  # workers that one item may take with it before it is suspected
 EVERY_S = 10.0  # between lines of progress where the line cannot be updated
 CONNECT_S = 15.0
+LOST = "600s"  # without a worker before its place is given up
 RESTART_S = 5.0  # of a worker that has died
 SETTINGS = {
     "distributed.scheduler.allowed-failures": DEATHS,
     "distributed.scheduler.worker-saturation": 1.0,  # nothing waits at a worker, and dies with it
+    "distributed.deploy.lost-worker-timeout": LOST,  # by default, a slow restart loses the worker for good
     "distributed.comm.timeouts.connect": f"{CONNECT_S:g}s",
     "distributed.admin.large-graph-warning-threshold": "1GB",
     "distributed.worker.memory.target": False,  # nothing is kept on workers that could be spilled
@@ -32,10 +36,13 @@ class EngineError(ValueError):
 
 
 class Lost:
-    """In place of a result: the item took all its workers with it, or the cluster was lost."""
+    """In place of a result: the item took all its workers with it, the cluster was lost, or the time was up.
 
-    def __init__(self, reason: str):
-        self.reason = reason
+    final: it is not tried once more.
+    """
+
+    def __init__(self, reason: str, final: bool = False):
+        self.reason, self.final = reason, final
 
 
 class Engine:
@@ -44,10 +51,12 @@ class Engine:
     with Engine(workers=2) as engine:
         for item, result in engine.each(function, items):
             ...
+
+    limit_s: the most that one item may take; its worker is then started again, and the others go on.
     """
 
-    def __init__(self, workers: int | None = None, scheduler: str | None = None):
-        self.workers, self.scheduler = workers, scheduler
+    def __init__(self, workers: int | None = None, scheduler: str | None = None, limit_s: float | None = None):
+        self.workers, self.scheduler, self.limit_s = workers, scheduler, limit_s
         self.cluster = self.client = None
 
     def __enter__(self) -> Engine:
@@ -90,7 +99,7 @@ class Engine:
         """
         suspects = []
         for item, result in self._ended(function, items):
-            if isinstance(result, Lost):
+            if isinstance(result, Lost) and not result.final:
                 suspects.append(item)
             else:
                 yield item, result
@@ -104,19 +113,26 @@ class Engine:
         def more(count):
             for item in itertools.islice(waiting, count):
                 future = self.client.submit(function, item, pure=False)
-                running[future.key] = item
+                running[future.key] = item, future
                 ended.add(future)
 
+        def give_up(key):
+            if found := running.get(key):
+                found[1].cancel(force=True)
+
         more(AHEAD * self.cores())
-        for future in ended:
-            item = running.pop(future.key)
-            try:
-                result = future.result()
-            except KilledWorker:
-                result = Lost("its worker process ended again and again, such as for want of memory")
-            future.release()
-            more(1)
-            yield item, result
+        with Watch(self.client, self.limit_s, give_up) if self.limit_s else contextlib.nullcontext():
+            for future in ended:
+                item, _ = running.pop(future.key)
+                try:
+                    result = future.result()
+                except KilledWorker:
+                    result = Lost("its worker process ended again and again, such as for want of memory")
+                except CancelledError:
+                    result = Lost(f"took longer than {self.limit_s:g} s", final=True)
+                future.release()
+                more(1)
+                yield item, result
 
 
 def in_parallel(function: Callable, items: list, workers: int | None, what: str) -> Iterator[tuple]:

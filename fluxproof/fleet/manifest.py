@@ -6,22 +6,24 @@ A manifest has a column ``recording`` and may have ``drive`` (drive file), ``ser
 
 from __future__ import annotations
 
-import csv
+import contextlib
 import datetime
 import glob
+import math
+import os
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import fsspec
-import pandas as pd
-
 from fluxproof.diagnosis.ground.recording import RecordingError
 from fluxproof.diagnosis.readers import readers
-from fluxproof.fleet.work import remote
+from fluxproof.diagnosis.readers.table import shown
+from fluxproof.fleet.addresses import check_address, matching, remote, spelled
+from fluxproof.fleet.manifest_file import is_manifest, table
+from golden_model.regular_file import open_regular
 
 KNOWN = ("recording", "drive", "serial", "time", "temperature")
 EXAMPLE = "2026-11-25T08:00:00"
-HEAD_BYTES = 4096
 
 
 @dataclass(frozen=True)
@@ -37,14 +39,15 @@ class Entry:
     more: dict = field(default_factory=dict, hash=False)
 
 
-def entries(sources: list[str], drive: str | None) -> list[Entry]:
+def entries(sources: list[str], drive: str | None, allowed: Iterable[str] = ()) -> list[Entry]:
     """All recordings of the command line, sorted by name; drive: the drive file where a manifest names none.
 
+    allowed: protocols that addresses of a manifest may have beside those of files on this machine.
     Raises RecordingError: nothing found, a manifest's line and column with what was expected, a recording named twice.
     """
     out = []
     for source in sources:
-        out += _of(source, drive)
+        out += _of(source, drive, frozenset(allowed))
     if not out:
         raise RecordingError(f"{', '.join(sources)}: no recording found")
     seen: dict[str, Entry] = {}
@@ -52,33 +55,52 @@ def entries(sources: list[str], drive: str | None) -> list[Entry]:
         other = seen.setdefault(entry.name, entry)
         if other is not entry and other != entry:
             raise RecordingError(f"{entry.name}: named twice, with different drive file, serial number or time")
-    for entry in seen.values():
-        if not Path(entry.drive).is_file():
-            raise RecordingError(f"{entry.drive}: drive file of {entry.name}: no such file")
+    for chosen, entry in {entry.drive: entry for entry in seen.values()}.items():
+        _check_drive(f"{chosen}: drive file of {entry.name}", chosen)
     return sorted(seen.values(), key=lambda e: e.name)
 
 
-def _of(source: str, drive) -> list[Entry]:
+def _of(source: str, drive, allowed) -> list[Entry]:
     if remote(source):
+        check_address(source)
         return [_plain(path, drive) for path in _remote(source)]
     path = Path(source)
     if path.is_dir():
-        return [_plain(str(p), drive) for p in sorted(path.rglob("*")) if _is_recording(p)]
-    if not path.exists():
-        found = sorted(glob.glob(source, recursive=True))
-        if not found:
-            raise RecordingError(f"{source}: no such file or folder, and no file matches it")
-        return [entry for name in found for entry in _of(name, drive)]
-    header = _header(path)
-    if "recording" in header:
-        return _manifest(path, drive)
-    return [_plain(source, drive)]
+        return [_plain(str(p), drive) for p in _files(path) if _is_recording(p)]
+    if path.is_file():
+        return _file(path, source, drive, allowed)
+    if path.exists():
+        with _readable(path):
+            open_regular(path)  # says what it is instead
+    found = _matching(source)
+    if not found:
+        raise RecordingError(f"{source}: no such file or folder, and no file matches it")
+    out = []
+    for name in found:
+        if name.is_dir():
+            out += [_plain(str(p), drive) for p in _files(name) if _is_recording(p)]
+        else:
+            out += _file(name, str(name), drive, allowed)
+    return out
+
+
+def _file(path: Path, source: str, drive, allowed) -> list[Entry]:
+    """The recordings of a manifest, or the file itself; what is no file becomes a recording whose row says so."""
+    return _manifest(path, drive, allowed) if is_manifest(path) else [_plain(source, drive)]
 
 
 def _plain(path: str, drive) -> Entry:
     if drive is None:
         raise RecordingError(f"{path}: --drive drive.toml is missing, and no manifest names a drive file")
-    return Entry(path, path, str(drive), path)
+    return Entry(spelled(path), path, str(drive), spelled(path))
+
+
+@contextlib.contextmanager
+def _readable(path):
+    try:
+        yield
+    except OSError as error:
+        raise RecordingError(f"{path}: cannot be read: {error.strerror or error}") from None
 
 
 def _remote(source: str) -> list[str]:
@@ -87,85 +109,71 @@ def _remote(source: str) -> list[str]:
         source += "*"
     if "*" not in source:
         return [source]
-    system, path = fsspec.core.url_to_fs(source)
-    tail = "::" + source.split("::", 1)[1] if "::" in source else ""
-    names = sorted(system.glob(path))
-    if not names:
-        raise RecordingError(f"{source}: no file matches it")
-    return [f"{source.split('://')[0]}://{name}{tail}" if tail else system.unstrip_protocol(name) for name in names]
+    with _readable(source):
+        return matching(source)
+
+
+def _files(folder: Path) -> list[Path]:
+    """All files below a folder, sorted; links to folders are not followed, as they may lead back."""
+
+    def stop(error):
+        raise error
+
+    with _readable(folder):
+        return sorted(Path(at) / name for at, _, names in os.walk(folder, onerror=stop) for name in names)
+
+
+def _matching(pattern: str) -> list[Path]:
+    """What a pattern matches, sorted; ** follows no links to folders, and * matches no hidden files."""
+    parts = Path(pattern).parts
+    first = next((n for n, part in enumerate(parts) if glob.has_magic(part)), None)
+    if first is None:
+        return []
+    rest = parts[first:]
+    hidden = any(part.startswith(".") for part in rest)
+    found = {p for p in Path(*parts[:first]).glob(str(Path(*rest)))}
+    return sorted(p for p in found if hidden or not any(part.startswith(".") for part in p.parts[first:]))
 
 
 def _is_recording(path: Path) -> bool:
     """Whether a file of a folder has the suffix of a readable format and is no manifest or hidden file."""
     suffixes = {s for reader in readers() for s in reader.SUFFIXES}
-    if path.name.startswith(".") or not path.is_file() or path.suffix.lower() not in suffixes:
-        return False
-    return "recording" not in _header(path)
+    return not path.name.startswith(".") and path.suffix.lower() in suffixes and not is_manifest(path)
 
 
-def _header(path: Path) -> list[str]:
-    """Names of the columns if the file can be a manifest, else none."""
-    if path.suffix.lower() == ".parquet":
-        import pyarrow.parquet as pq
-
-        try:
-            return pq.read_schema(path).names
-        except (OSError, ValueError):  # damaged: it is a recording that fails, with a reason
-            return []
-    if path.suffix.lower() not in (".csv", ".txt"):
-        return []
-    try:
-        with open(path, encoding="utf-8-sig", errors="replace", newline="") as file:
-            return [name.strip() for name in next(csv.reader([file.readline(HEAD_BYTES)]), [])]
-    except (OSError, csv.Error):
-        return []
+def _manifest(path: Path, drive, allowed) -> list[Entry]:
+    return [_entry(path, line, cells, drive, allowed) for line, cells in table(path)]
 
 
-def _manifest(path: Path, drive) -> list[Entry]:
-    table = _table(path)
-    return [_entry(path, line, cells, drive) for line, cells in table]
-
-
-def _table(path: Path) -> list[tuple[int, dict]]:
-    """[(line, {column: text})]; of a Parquet file the line is the row, counted from 1."""
-    if path.suffix.lower() == ".parquet":
-        frame = pd.read_parquet(path)
-        records = frame.astype(object).where(frame.notna(), "").to_dict("records")
-        return [(n, {k: str(v) for k, v in record.items()}) for n, record in enumerate(records, 1)]
-    with open(path, encoding="utf-8-sig", newline="") as file:
-        reader = csv.reader(file)
-        try:
-            header = [name.strip() for name in next(reader)]
-            twice = next((name for n, name in enumerate(header) if name in header[:n]), None)
-            if twice is not None:
-                raise RecordingError(f"{path}:1: column {twice!r} twice")
-            rows = []
-            for cells in reader:
-                if not any(cell.strip() for cell in cells):
-                    continue
-                if len(cells) != len(header):
-                    expected = f"{len(header)} columns expected, as in line 1"
-                    raise RecordingError(f"{path}:{reader.line_num}: {len(cells)} columns; {expected}")
-                pairs = zip(header, (cell.strip() for cell in cells), strict=True)
-                rows.append((reader.line_num, dict(pairs)))
-            return rows
-        except (UnicodeDecodeError, csv.Error) as error:
-            raise RecordingError(f"{path}:{reader.line_num + 1}: not a text of UTF-8 with commas: {error}") from None
-
-
-def _entry(path: Path, line: int, cells: dict, drive) -> Entry:
+def _entry(path: Path, line: int, cells: dict, drive, allowed) -> Entry:
     at = f"{path}:{line}"
     name = cells["recording"]
     if not name:
         raise RecordingError(f"{at}: column 'recording': empty; expected a file name or address")
+    if remote(name):
+        try:
+            check_address(name, allowed)
+        except RecordingError as error:
+            raise RecordingError(f"{at}: column 'recording': {error}") from None
     chosen = _beside(path, cells["drive"]) if cells.get("drive") else drive
     if chosen is None:
         raise RecordingError(f"{at}: column 'drive': empty or missing, and there is no --drive drive.toml")
-    if not Path(chosen).is_file():
-        raise RecordingError(f"{at}: column 'drive': {chosen}: no such file; expected a drive file")
+    _check_drive(f"{at}: column 'drive': {shown(chosen, 200)}", chosen)
     more = {k: v for k, v in cells.items() if k not in KNOWN and v}
     time, temperature = _time(at, cells.get("time", "")), _number(at, cells.get("temperature", ""))
-    return Entry(name, _beside(path, name), str(chosen), cells.get("serial") or name, time, temperature, more)
+    return Entry(
+        spelled(name), _beside(path, name), str(chosen), cells.get("serial") or spelled(name), time, temperature, more
+    )
+
+
+def _check_drive(at: str, chosen) -> None:
+    """RecordingError unless it is a regular file."""
+    try:
+        why = None if Path(chosen).is_file() else "not a regular file" if Path(chosen).exists() else "no such file"
+    except OSError as error:
+        why = error.strerror
+    if why:
+        raise RecordingError(f"{at}: {why}; expected a drive file")
 
 
 def _beside(path: Path, name: str) -> str:
@@ -179,16 +187,21 @@ def _time(at, text) -> datetime.datetime | None:
         return None
     try:
         found = datetime.datetime.fromisoformat(text.replace("Z", "+00:00"))
-    except ValueError:
-        raise RecordingError(f"{at}: column 'time': {text!r} is no time; expected ISO 8601 such as {EXAMPLE}") from None
-    utc = datetime.timezone.utc
-    return found.replace(tzinfo=utc) if found.tzinfo is None else found.astimezone(utc)
+        utc = datetime.timezone.utc
+        return found.replace(tzinfo=utc) if found.tzinfo is None else found.astimezone(utc)
+    except (ValueError, OverflowError):  # the latter within a day of the years 1 and 9999
+        raise RecordingError(
+            f"{at}: column 'time': {shown(text)!r} is no time; expected ISO 8601 such as {EXAMPLE}"
+        ) from None
 
 
 def _number(at, text) -> float | None:
     if not text:
         return None
     try:
-        return float(text)
+        found = float(text)
     except ValueError:
-        raise RecordingError(f"{at}: column 'temperature': {text!r} is no number; expected degrees Celsius") from None
+        found = math.nan
+    if not math.isfinite(found):
+        raise RecordingError(f"{at}: column 'temperature': {shown(text)!r} is no number; expected degrees Celsius")
+    return found

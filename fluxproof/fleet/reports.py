@@ -12,16 +12,18 @@ from urllib.parse import unquote, urlsplit
 from fluxproof.diagnosis.ground.nominal import load_nominal
 from fluxproof.diagnosis.ground.recording import RecordingError
 from fluxproof.diagnosis.session import run as session
+from fluxproof.fleet.addresses import local, spelled
 from fluxproof.fleet.manifest import Entry
 from fluxproof.fleet.page import PAGE, REPORTS
-from fluxproof.fleet.work import key_of, local
+from fluxproof.fleet.session import keys_of
+from fluxproof.fleet.work import key_of
 
 ONE_AT_A_TIME = threading.Lock()
 
 
 def make(entries: list[Entry], name: str, out: Path) -> Path:
     """Write OUT/reports/KEY/report.html of a recording by its name; RecordingError if the fleet has none."""
-    entry = next((e for e in entries if e.name == name), None)
+    entry = next((e for e in entries if e.name in (name, spelled(name))), None)
     if entry is None:
         raise RecordingError(f"--report {name}: no recording of this fleet; expected a name as in {PAGE}")
     return _made(entry, key_of(entry.path, entry.drive), out)
@@ -39,7 +41,8 @@ def _made(entry: Entry, key: str, out: Path) -> Path:
 
 def server(entries: list[Entry], out: Path) -> ThreadingHTTPServer:
     """A server on this machine alone that shows OUT and makes reports as they are asked for."""
-    by_key = {key_of(e.path, e.drive): e for e in entries if Path(e.path).exists() or "://" in e.path}
+    keys, _ = keys_of(entries)
+    by_key = {keys[e.name]: e for e in entries if e.name in keys}
 
     class Handler(SimpleHTTPRequestHandler):
         def do_GET(self):

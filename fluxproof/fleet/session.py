@@ -34,14 +34,16 @@ def run(
     limits: dict[str, str] | None = None,
     quiet: bool = False,
     told: Callable[[Engine], None] = lambda engine: None,
+    limit_s: float | None = None,
 ) -> Outcome:
     """Diagnose what is not done yet and write OUT/fleet.parquet and OUT/fleet.html.
 
-    engine: makes the engine, which is started only if something is to be done; told: called with it once it runs.
+    engine: makes the engine, which is started only if something is to be done; told: called with it once it runs;
+    limit_s: the most that reading one recording for its key may take.
     Raises OSError if a row cannot be written: what was written stays, and the next run goes on from there.
     """
     rows = Rows(out)
-    keys, failures = _keys(entries)
+    keys, failures = keys_of(entries, limit_s)
     todo = {key: name for name, key in keys.items() if not rows.has(key)}
     items = _items(entries, keys, todo)
     if items:
@@ -56,14 +58,15 @@ def run(
     return Outcome(len(items), len(entries) - len(items), failed, found, fleet, page)
 
 
-def _keys(entries) -> tuple[dict[str, str], dict[str, str]]:
+def keys_of(entries, limit_s=None) -> tuple[dict[str, str], dict[str, str]]:
     """({name: key}, {name: reason}) of the recordings that can and that cannot be read."""
     keys, failures = {}, {}
     for entry in entries:
         try:
-            keys[entry.name] = key_of(entry.path, entry.drive)
+            keys[entry.name] = key_of(entry.path, entry.drive, limit_s=limit_s)
         except (OSError, ValueError) as error:
-            failures[entry.name] = f"cannot be read: {getattr(error, 'strerror', None) or error}"
+            said = getattr(error, "strerror", None) or error
+            failures[entry.name] = f"cannot be read: {said}" if isinstance(error, OSError) else str(error)
     return keys, failures
 
 

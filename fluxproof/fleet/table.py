@@ -13,6 +13,7 @@ import pyarrow.parquet as pq
 
 from fluxproof.diagnosis.fleet.row import failed_row
 from fluxproof.diagnosis.fleet.schema import schema
+from fluxproof.fleet.addresses import spelled
 
 ROWS, FLEET = "rows", "fleet.parquet"
 
@@ -75,7 +76,7 @@ def joined(entries, keys: dict[str, str], rows: Rows, failures: dict[str, str]) 
             row = read.setdefault(key, rows.read(key)) if key else None
         if row is None:
             row = failed_row(failures.get(entry.name, "not diagnosed: the run was stopped"))
-        head = dict(recording=entry.name, drive=entry.drive, serial=entry.serial, time=entry.time,
+        head = dict(recording=entry.name, drive=spelled(entry.drive), serial=entry.serial, time=entry.time,
                     temperature=entry.temperature, more=sorted(entry.more.items()), key=key)  # fmt: skip
         status = "failed" if row.get("reason") else "done"
         out.append({**row, **head, "status": status})

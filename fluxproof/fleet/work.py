@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import functools
 import hashlib
-import tempfile
 import traceback
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
-
-import fsspec
 
 from fluxproof.diagnosis.fleet.prior import design_of
 from fluxproof.diagnosis.fleet.row import failed_row, one_line, row_of
 from fluxproof.diagnosis.ground.nominal import load_nominal
 from fluxproof.diagnosis.ground.recording import RecordingError
 from fluxproof.diagnosis.session import diagnose
+from fluxproof.fleet.addresses import MOST_BYTES, blocks, local, opened, remote, stated
 from golden_model.drive_keys import DriveError
 
 ROOMS = ("fluxproof/diagnosis", "fluxproof/plant", "fluxproof/cosim", "golden_model")  # a row follows from these,
@@ -55,7 +53,7 @@ def work(item: Item) -> Result:
             folder = path.parent
             row = row_of(diagnose(path, nominal))
     except (RecordingError, DriveError) as error:
-        row = failed_row(str(error))
+        row, lasting = failed_row(str(error)), _unchanged(item)  # a file may have been removed or replaced meanwhile
     except (OSError, MemoryError) as error:  # of this machine, not of the recording
         row, lasting = failed_row(f"{type(error).__name__}: {error}"), False
     except Exception as error:  # a defect costs one row
@@ -67,44 +65,29 @@ def work(item: Item) -> Result:
     return Result(item, {**row, "design": item.design, "version": item.version}, lasting)
 
 
-def remote(recording: str) -> bool:
-    """Whether it is in an object store or an archive, which fsspec opens."""
-    return "://" in recording
+def _unchanged(item: Item) -> bool:
+    """Whether recording and drive file still are what the key of the item was made of."""
+    try:
+        return key_of(item.recording, item.drive, item.version) == item.key
+    except (OSError, ValueError):
+        return False
 
 
-class local:
-    """The path of a recording on this machine; one of an object store is fetched for as long as it is used."""
+def content(recording: str, limit_s: float | None = None) -> str:
+    """Hash of a recording: of its bytes; in an object store of what that says of its content, such as an ETag.
 
-    def __init__(self, recording: str):
-        self.recording, self.folder = recording, None
-
-    def __enter__(self) -> Path:
-        if not remote(self.recording):
-            return Path(self.recording)
-        self.folder = tempfile.TemporaryDirectory(prefix="fluxproof_")
-        target = Path(self.folder.name) / self.recording.split("::")[0].rstrip("/").rsplit("/", 1)[-1]
-        with fsspec.open(self.recording, "rb") as source, open(target, "wb") as file:
-            while block := source.read(1 << 20):
-                file.write(block)
-        return target
-
-    def __exit__(self, *_):
-        if self.folder is not None:
-            self.folder.cleanup()
-
-
-def content(recording: str) -> str:
-    """Hash of a recording: of its bytes; in an object store of what that says of its content, such as an ETag."""
-    if not remote(recording):
-        with open(recording, "rb") as file:
-            return _hash(file)
-    system, path = fsspec.core.url_to_fs(recording)
-    info = system.info(path)
-    marks = {name: str(info[name]) for name in MARKS if info.get(name) is not None}
-    if marks:
-        return f"{sorted(marks.items())}, {info.get('size')} bytes"
-    with system.open(path, "rb") as file:
-        return _hash(file)
+    Raises OSError if it cannot be read within ``limit_s`` seconds.
+    """
+    if remote(recording):
+        info = stated(recording)
+        marks = {name: str(info[name]) for name in MARKS if info.get(name) is not None}
+        if marks:
+            return f"{sorted(marks.items())}, {info.get('size')} bytes"
+    digest = hashlib.sha256()
+    with opened(recording) as file:
+        for block in blocks(file, limit_s, MOST_BYTES if remote(recording) else None):
+            digest.update(block)
+    return digest.hexdigest()
 
 
 def design(drive: str) -> str:
@@ -135,14 +118,7 @@ def version() -> str:
     return f"{number}+{digest.hexdigest()[:8]}"
 
 
-def key_of(recording: str, drive: str) -> str:
+def key_of(recording: str, drive: str, of_version: str | None = None, limit_s: float | None = None) -> str:
     """The key of a row: a recording, drive file or version that changed has another one."""
-    parts = (content(recording), design(drive), version())
+    parts = (content(recording, limit_s), design(drive), of_version or version())
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:32]
-
-
-def _hash(file) -> str:
-    digest = hashlib.sha256()
-    while block := file.read(1 << 20):
-        digest.update(block)
-    return digest.hexdigest()

@@ -25,15 +25,20 @@ from fluxproof.diagnosis.fleet.findings import findings
 from fluxproof.diagnosis.fleet.hypotheses import BASE
 from fluxproof.diagnosis.fleet.population import WIDE, Population
 from fluxproof.diagnosis.fleet.rates import log_odds, prior_rate, weighed
-from fluxproof.diagnosis.fleet.row import hypothesis_rows
+from fluxproof.diagnosis.fleet.row import hypothesis_rows, one_line
 from fluxproof.diagnosis.fleet.schema import COLUMNS
 from fluxproof.diagnosis.fleet.values import values_of
 from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.ground.nominal import load_nominal
+from fluxproof.diagnosis.ground.plant_section import MOST_MAP_BYTES
 from fluxproof.diagnosis.ground.recording import RecordingError
 from fluxproof.diagnosis.ground.result import Fleet, InFleet
 from fluxproof.diagnosis.inference.posterior import Posterior
+from fluxproof.diagnosis.readers.memory import limited_memory
+from golden_model.drive_file import MOST_BYTES
+from golden_model.regular_file import open_regular, read_regular
 
+MOST_ROWS = 1_000_000
 EVEN = 0.5  # the most that a fleet makes of the prior probability of an effect
 
 
@@ -62,23 +67,35 @@ class Prior:
 
 def read_fleet(path) -> list[dict]:
     """The rows of a fleet.parquet; RecordingError says what else the file is."""
+    expected = "expected a fleet.parquet of `fluxproof fleet`"
     try:
-        table = pq.read_table(path)
+        with open_regular(path) as file, limited_memory(), pq.ParquetFile(file) as parquet:
+            if (rows := parquet.metadata.num_rows) > MOST_ROWS:
+                raise RecordingError(f"{path}: {rows} rows; at most {MOST_ROWS} are read")
+            found = parquet.schema_arrow
+            for column in COLUMNS:
+                if found.names.count(column.name) != 1:
+                    how = "twice" if column.name in found.names else "missing"
+                    raise RecordingError(f"{path}: column {column.name!r} is {how}; {expected}")
+                if (kind := found.field(column.name).type) != column.type:
+                    raise RecordingError(f"{path}: column {column.name!r} is {kind}, not {column.type}; {expected}")
+            return parquet.read(columns=[c.name for c in COLUMNS]).to_pylist()
+    except MemoryError:
+        raise RecordingError(f"{path}: too large for the memory limit") from None
+    except OSError as error:
+        raise RecordingError(f"{path}: cannot be read: {error.strerror or one_line(error)}") from None
     except (pa.ArrowException, ValueError) as error:
-        raise RecordingError(f"{path}: not a readable Parquet file: {str(error).splitlines()[0]}") from None
-    missing = [c.name for c in COLUMNS if c.name not in table.column_names]
-    if missing:
-        expected = "expected a fleet.parquet of `fluxproof fleet`"
-        raise RecordingError(f"{path}: column {missing[0]!r} is missing; {expected}")
-    return table.to_pylist()
+        if isinstance(error, RecordingError):
+            raise
+        raise RecordingError(f"{path}: not a readable Parquet file: {one_line(error)}") from None
 
 
 def design_of(drive) -> str:
     """Hash of a drive file and of the flux map that it names: recordings of one design are one population."""
-    digest = hashlib.sha256(Path(drive).read_bytes())
+    digest = hashlib.sha256(read_regular(drive, MOST_BYTES))
     flux_map = load_nominal(drive).plant.get("machine", {}).get("flux_map")
     if isinstance(flux_map, str):
-        digest.update((Path(drive).parent / flux_map).read_bytes())
+        digest.update(read_regular(Path(drive).parent / flux_map, MOST_MAP_BYTES))
     return digest.hexdigest()[:16]
 
 
@@ -89,10 +106,14 @@ def load_prior(path, drive) -> Prior:
     if not rows:
         expected = "expected a fleet that was diagnosed with this file"
         raise RecordingError(f"{path}: no recording of the drive file {drive}; {expected}")
-    found = findings(rows).designs[0]
-    rates = dict(found.rates)
-    for name in BASE:
-        rates[name] = prior_rate(sum(any(n["effect"] == name for n in row["names"]) for row in rows), len(rows))
+    try:
+        found = findings(rows).designs[0]
+        rates = dict(found.rates)
+        for name in BASE:
+            rates[name] = prior_rate(sum(any(n["effect"] == name for n in row["names"]) for row in rows), len(rows))
+    except (ArithmeticError, LookupError, TypeError, ValueError) as error:  # made or changed by something else
+        said = f"{type(error).__name__}: {one_line(error)}"
+        raise RecordingError(f"{path}: its rows are not those of `fluxproof fleet`: {said}") from None
     return Prior(str(path), len(found.serials), len(rows), rates, tuple(found.populations))
 
 

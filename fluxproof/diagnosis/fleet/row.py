@@ -48,7 +48,12 @@ def failed_row(reason: str) -> dict:
 
 
 def one_line(text: str) -> str:
-    return " ".join(str(text).split())[:REASON] or "no reason given"
+    return writable(" ".join(str(text).split())[:REASON]) or "no reason given"
+
+
+def writable(text: str) -> str:
+    r"""Text that Parquet can hold: a byte of a file's name that is not UTF-8 becomes \udcNN."""
+    return text.encode("utf-8", "backslashreplace").decode()
 
 
 def _digital(digital) -> str:
@@ -97,12 +102,14 @@ def hypothesis_rows(posterior) -> list[dict]:
 
 
 def finite(value):
-    """NaN and infinity become None, as Parquet's readers differ about them."""
+    """NaN and infinity become None, as Parquet's readers differ about them; texts become writable."""
     if isinstance(value, dict):
         return {key: finite(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
         return [finite(item) for item in value]
-    if isinstance(value, (bool, str)) or value is None:
+    if isinstance(value, str):
+        return writable(value)
+    if isinstance(value, bool) or value is None:
         return value
     if hasattr(value, "item"):
         value = value.item()

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import dataclasses
 import difflib
+import io
 import math
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,7 +27,9 @@ from fluxproof.diagnosis.ground.nominal import Nominal, load_nominal
 from fluxproof.diagnosis.ground.result import NamedEffect
 from fluxproof.plant import FluxMap, Harmonic, Inverter, Machine, Sensors
 from golden_model.drive_keys import DriveError
+from golden_model.regular_file import read_regular
 
+MOST_MAP_BYTES = 64_000_000  # of a flux map's file
 FINE_BITS = 24  # resolution of undescribed sensors: fine enough to be negligible
 
 
@@ -162,7 +165,8 @@ def described_sensors(nominal: Nominal) -> dict:
 def read_flux_map(path) -> FluxMap:
     """A CSV with i_d_a, i_q_a, psi_d_wb, psi_q_wb (flux_found.py); ValueError names the file if it is none."""
     try:
-        rows = np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2)
+        text = read_regular(path, MOST_MAP_BYTES).decode()  # by its name, numpy would unpack or fetch a file
+        rows = np.loadtxt(io.StringIO(text), delimiter=",", skiprows=1, ndmin=2)
         return FluxMap.from_points(*rows.T)
     except (OSError, TypeError, ValueError) as error:
         raise ValueError(f"flux_map {path}: {error}") from None

@@ -21,7 +21,9 @@ from fluxproof.diagnosis.replay.telemetry import write_dump
 from golden_model.fluxproof import Sample
 from golden_model.io import telemetry_words as packet
 from golden_model.io.telemetry_words import COUNT, COUNTER, FIELDS, HEADER_WORD, LAYOUT, PACKET
+from golden_model.regular_file import read_regular
 
+MOST_BYTES = 2 << 30  # of a capture, which is read whole
 SIZE = 4 * COUNT
 MARK = HEADER_WORD.to_bytes(4, "little")
 USED = np.zeros(COUNT, np.uint32)  # the bits of each word that belong to fields
@@ -55,7 +57,7 @@ class Capture(NamedTuple):
 def read_capture(path) -> Capture:
     """Read a file of little-endian words; RecordingError if it is unreadable, contains no packet or is damaged."""
     try:
-        raw = Path(path).read_bytes()
+        raw = read_regular(path, MOST_BYTES)
     except OSError as error:
         raise RecordingError(f"{path}: cannot be read: {error.strerror or error}") from None
     return parse(raw, str(path))
