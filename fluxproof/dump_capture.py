@@ -15,6 +15,7 @@ from fluxproof.golden_model.board_registers import board_set
 from fluxproof.golden_model.drive import load
 from fluxproof.golden_model.drive_keys import DriveError
 from fluxproof.golden_model.registers import RegisterSet
+from fluxproof.quote import say
 
 REPLAY = {
     "reset": "begins with the first sample after a reset: the golden model can replay all of it",
@@ -59,7 +60,7 @@ def run(args: argparse.Namespace) -> int:
     out = Path(args.out) if args.out else Path(args.capture).with_suffix(".fluxdump")
     write_piece(out, capture.pieces[number], drive, register_set)
     print("\n".join(summary(capture, number)))
-    print(f"wrote {out}")
+    say(f"wrote {out}")
     return 0
 
 

@@ -16,6 +16,7 @@ from fluxproof.golden_model.drive_keys import DriveError
 from fluxproof.golden_model.generated.register_names import ADDRESSES
 from fluxproof.golden_model.registers import RegisterSet, Row
 from fluxproof.golden_model.units import SIGNALS, si_per_lsb
+from fluxproof.quote import c_comment
 
 HEAD = ("register", "address", "SI value", "unit", "integer", "represented", "error", "legal range")
 LEFT = (0, 3)  # columns of words; numbers are right-aligned
@@ -70,7 +71,7 @@ def c_lines(name: str, drive: Drive, result: RegisterSet) -> list[str]:
             f"    {{0x{ADDRESSES[r.name]:03X}, {r.integer}}}, /* {r.name}: {r.represented:.7g}{unit} */"
         )
     return [
-        f"/* {Path(name).name} by `fluxproof registers --format c`: write each value to its offset. */",
+        c_comment(f"{Path(name).name} by `fluxproof registers --format c`: write each value to its offset."),
         "#ifndef FLUXPROOF_SETTINGS_H",
         "#define FLUXPROOF_SETTINGS_H",
         "#include <stdint.h>",

@@ -9,6 +9,7 @@ import tomlkit.items
 
 from fluxproof.commission.session import Step, Value
 from fluxproof.golden_model.drive import Drive
+from fluxproof.quote import toml_comment
 
 SCHEMA = 1
 # section, key, value of a step; what is not among the steps' values has no uncertainty
@@ -73,7 +74,7 @@ def _put(table, key: str, value, why: str) -> None:
         note = old.trivia.comment.lstrip("# ")
     item = tomlkit.item(value)
     words = [why] if old is None else [why, f"was {' '.join(old.as_string().split())}"]
-    item.comment("; ".join([*words, *([note] if note else [])]))
+    item.comment(toml_comment("; ".join([*words, *([note] if note else [])])))
     table[key] = item
 
 

@@ -13,6 +13,7 @@ from pathlib import Path
 from fluxproof.files import write_json, write_text
 from fluxproof.golden_model.drive import load
 from fluxproof.golden_model.drive_keys import DriveError
+from fluxproof.quote import say
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -38,10 +39,10 @@ def run_command(args: argparse.Namespace) -> int:
     report = write_text(folder / "report.html", pages())
     _clear()
     for line in summary(data):
-        print(line)
-    print(f"{report} ({time.monotonic() - began:.1f} s)")
+        say(line)
+    say(f"{report} ({time.monotonic() - began:.1f} s)")
     if data["status"] != "ok":
-        print(f"fluxproof: {args.drive}: {data['reason']}", file=sys.stderr)
+        say(f"fluxproof: {args.drive}: {data['reason']}", sys.stderr)
         return 1
     return 0
 
