@@ -23,7 +23,7 @@ PIECES = (
 NAMES = (
     "a\nexec touch ran\n#.toml", "a\rputs ran\r.toml", "a\vend package drive_pkg;\v.toml", "a\x85b.toml", "a??",
     "a} [exec touch ran] {.toml", '"; exec touch ran; ".toml', "$argv0 ${x.toml", "a\\", "a\\\n.toml", "*.toml",
-    "<script>x</script>&.toml", "$\\frac{a}$ é ж \U0001f600.toml", os.fsdecode(b"a\xff\xfe.toml"),
+    "<script>x<script>&amp;.toml", "$\\frac{a}$ é ж \U0001f600.toml", os.fsdecode(b"a\xff\xfe.toml"),
     "a\x1b[2J\u202e.toml", "pragma translate_off",
 )  # fmt: skip
 UNICODE_ESCAPE = re.compile(r"\\x([0-9a-f]{2})|\\u([0-9a-f]{4})|\\U([0-9a-f]{8})")
