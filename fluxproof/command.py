@@ -11,7 +11,7 @@ import argparse
 import os
 import sys
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import NamedTuple, NoReturn
 
 from fluxproof import dump_capture, print_registers
 from fluxproof.commission import command as commission
@@ -19,6 +19,7 @@ from fluxproof.diagnosis import command as diagnose
 from fluxproof.diagnosis.ground.recording import RecordingError
 from fluxproof.fleet import command as fleet
 from fluxproof.project import command as project
+from fluxproof.quote import printable, say
 from fluxproof.simulate import command as simulate
 from golden_model.drive_keys import DriveError
 
@@ -52,9 +53,16 @@ COMMANDS = {
 }
 
 
+class Parser(argparse.ArgumentParser):
+    """Repeats a mistaken argument without the control characters that it may hold."""
+
+    def error(self, message: str) -> NoReturn:
+        super().error(printable(message, sys.stderr.encoding))
+
+
 def parser() -> argparse.ArgumentParser:
     """The command line with every subcommand."""
-    top = argparse.ArgumentParser(prog="fluxproof", description="Tools around the Fluxproof drive core.")
+    top = Parser(prog="fluxproof", description="Tools around the Fluxproof drive core.")
     commands = top.add_subparsers(metavar="command", required=True)
     for name, command in COMMANDS.items():
         sub = commands.add_parser(name, help=command.help, description=command.help)
@@ -71,14 +79,13 @@ def main(argv: list[str] | None = None) -> int:
         sys.stdout.flush()
         return status
     except (DriveError, RecordingError) as error:
-        print(f"fluxproof: {diagnose.printable(str(error), sys.stderr.encoding)}", file=sys.stderr)
+        say(f"fluxproof: {error}", sys.stderr)
     except BrokenPipeError:  # the reader, a pager or head, has closed the pipe
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except OSError as error:
         name = f"{error.filename}: " if error.filename else ""
-        text = diagnose.printable(f"{name}{error.strerror or error}", sys.stderr.encoding)
-        print(f"fluxproof: {text}", file=sys.stderr)
+        say(f"fluxproof: {name}{error.strerror or error}", sys.stderr)
     return 2
 
 

@@ -10,6 +10,7 @@ import argparse
 import json
 from pathlib import Path
 
+from fluxproof.quote import say
 from golden_model import fluxproof
 from golden_model.board_registers import board_set
 from golden_model.drive import load
@@ -62,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
     out = Path(args.out) if args.out else Path(args.capture).with_suffix(".fluxdump")
     write_piece(out, capture.pieces[number], drive, register_set)
     print("\n".join(summary(capture, number)))
-    print(f"wrote {out}")
+    say(f"wrote {out}")
     return 0
 
 

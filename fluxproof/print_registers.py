@@ -10,6 +10,7 @@ import json
 from pathlib import Path
 
 from fluxproof.files import write_json
+from fluxproof.quote import c_comment
 from golden_model.board_registers import board_generics, board_set, has_board
 from golden_model.drive import Drive, load
 from golden_model.drive_keys import DriveError
@@ -70,7 +71,7 @@ def c_lines(name: str, drive: Drive, result: RegisterSet) -> list[str]:
             f"    {{0x{ADDRESSES[r.name]:03X}, {r.integer}}}, /* {r.name}: {r.represented:.7g}{unit} */"
         )
     return [
-        f"/* {Path(name).name} by `fluxproof registers --format c`: write each value to its offset. */",
+        c_comment(f"{Path(name).name} by `fluxproof registers --format c`: write each value to its offset."),
         "#ifndef FLUXPROOF_SETTINGS_H",
         "#define FLUXPROOF_SETTINGS_H",
         "#include <stdint.h>",

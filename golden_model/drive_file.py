@@ -16,6 +16,7 @@ except ModuleNotFoundError:  # Python 3.10
 
 from golden_model.drive_keys import DriveError, key_of
 from golden_model.regular_file import read_regular
+from golden_model.toml_depth import check_keys
 
 # Columns and constants of recordings, and physics beyond the core's model: all are read by diagnosis/.
 IGNORED = ("columns", "constants", "plant")
@@ -50,6 +51,7 @@ def _tables(path):
     except (OSError, ValueError) as error:
         raise DriveError(f": cannot be read: {getattr(error, 'strerror', None) or error}") from None
     try:
+        check_keys(text)
         return tomllib.loads(text)
     except (ValueError, RecursionError) as error:
         raise DriveError(_syntax_message(str(error), text)) from None
@@ -71,6 +73,7 @@ def _refuse_unknown(table, known, what, where=""):
     for name in table:
         if name not in known:
             shown = name if name.isprintable() else repr(name)
+            shown = shown if len(shown) <= 60 else f"{shown[:57]}..."
             raise DriveError(f": {where}unknown {what} {shown}; {_nearest(name, known)}")
 
 

@@ -13,6 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from fluxproof.files import write_json, write_text
+from fluxproof.quote import say
 from golden_model.drive import load
 from golden_model.drive_file import read_tables
 from golden_model.drive_keys import DriveError
@@ -69,7 +70,7 @@ def commission_file(bus, path: str, drive, reverse: bool | None, folder: Path) -
     def done(step) -> None:
         steps.append(step)
         _clear()
-        print(f"{step.name}: {step.said}", flush=True)
+        say(f"{step.name}: {step.said}")
 
     def ended(status: str, reason: str) -> None:
         _clear()
@@ -81,11 +82,11 @@ def commission_file(bus, path: str, drive, reverse: bool | None, folder: Path) -
         found, _ = commission(bus, drive, reverse, _say, done)
     except Refusal as refusal:
         ended("refused", str(refusal))
-        print(f"fluxproof: {path}: refused: {refusal}", file=sys.stderr)
+        say(f"fluxproof: {path}: refused: {refusal}", sys.stderr)
         return 1
     except KeyboardInterrupt:
         ended("stopped", "stopped by the user")
-        print(f"fluxproof: {path}: stopped, gates off", file=sys.stderr)
+        say(f"fluxproof: {path}: stopped, gates off", sys.stderr)
         return 1
     finally:
         for number, handler in before.items():
@@ -93,7 +94,7 @@ def commission_file(bus, path: str, drive, reverse: bool | None, folder: Path) -
     ended("accepted", "")
     written = write_text(folder / "drive.toml", document.document(text, found, steps))
     load(written)  # what was written can be read
-    print(f"accepted: {written}, {folder / 'commission.json'} ({bus.now() - began:.1f} s of the drive)")
+    say(f"accepted: {written}, {folder / 'commission.json'} ({bus.now() - began:.1f} s of the drive)")
     return 0
 
 

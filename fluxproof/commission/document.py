@@ -8,6 +8,7 @@ import tomlkit
 import tomlkit.items
 
 from fluxproof.commission.session import Step, Value
+from fluxproof.quote import toml_comment
 from golden_model.drive import Drive
 
 SCHEMA = 1
@@ -73,7 +74,7 @@ def _put(table, key: str, value, why: str) -> None:
         note = old.trivia.comment.lstrip("# ")
     item = tomlkit.item(value)
     words = [why] if old is None else [why, f"was {' '.join(old.as_string().split())}"]
-    item.comment("; ".join([*words, *([note] if note else [])]))
+    item.comment(toml_comment("; ".join([*words, *([note] if note else [])])))
     table[key] = item
 
 

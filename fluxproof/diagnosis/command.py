@@ -12,6 +12,8 @@ import sys
 import webbrowser
 from pathlib import Path
 
+from fluxproof.quote import printable, say
+
 FOLDER = Path("build") / "diagnosis"
 FILES = ("report.html", "diagnosis.json", "drive_improved.toml", "flux_map.csv")
 MOST_PROBLEMS = 5
@@ -39,9 +41,9 @@ def run(args: argparse.Namespace) -> int:
     with Progress(quiet=args.quiet) as progress:
         answer = session(args.recordings, nominal, out, progress, args.prior)
     for line in answer_lines(answer, nominal, out):
-        print(printable(line, sys.stdout.encoding))
+        say(line)
     if args.open and not show(out / "report.html"):
-        print(f"fluxproof: no browser can be opened; the report is {out / 'report.html'}", file=sys.stderr)
+        say(f"fluxproof: no browser can be opened; the report is {out / 'report.html'}", sys.stderr)
     return 0
 
 
@@ -78,12 +80,6 @@ class Progress:
         text = printable(text, self.stream.encoding)
         self.stream.write(f"\r\x1b[K{text[:100]} ..." if self.updating else f"{text}\n")
         self.stream.flush()
-
-
-def printable(text: str, encoding: str | None) -> str:
-    """One printable line: control characters from a file become spaces, letters outside the encoding are escaped."""
-    one = "".join(c if c.isprintable() else " " for c in text)
-    return one.encode(encoding or "utf-8", "backslashreplace").decode(encoding or "utf-8")
 
 
 def answer_lines(answer, nominal, out: Path) -> list[str]:

@@ -12,6 +12,8 @@ import math
 import sys
 from pathlib import Path
 
+from fluxproof.quote import say
+
 FOLDER = Path("build") / "fleet"
 MOST_LINES = 20
 TIMEOUT_S = 600.0
@@ -38,7 +40,6 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Diagnose what is not done, write the outputs, print what is worth a look; returns 0, or 130 after Ctrl-C."""
-    from fluxproof.diagnosis.command import printable
     from fluxproof.diagnosis.ground.recording import RecordingError
 
     try:
@@ -63,14 +64,14 @@ def run(args: argparse.Namespace) -> int:
     try:
         outcome = session(listed, out, engine, limits, args.quiet, _told(args.quiet), args.timeout)
         for name in args.report:
-            print(f"wrote {make(listed, name, out)}")
+            say(f"wrote {make(listed, name, out)}")
     except EngineError as error:
         raise RecordingError(str(error)) from None
     except KeyboardInterrupt:
         print("fluxproof: stopped; the same command goes on from here", file=sys.stderr)
         return 130
     for line in lines(outcome):
-        print(printable(line, sys.stdout.encoding))
+        say(line)
     if args.serve:
         serve(listed, out)
     return 0

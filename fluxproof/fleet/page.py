@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import jinja2
 import numpy as np
 
 from fluxproof.diagnosis.fleet.findings import Design, Findings
@@ -14,6 +13,7 @@ from fluxproof.diagnosis.report import page as diagnosis_page
 from fluxproof.diagnosis.report import words
 from fluxproof.files import write_text
 from fluxproof.fleet import pictures
+from fluxproof.quote import pages
 
 PAGE, REPORTS = "fleet.html", "reports"
 FOLDER = Path(__file__).resolve().parent
@@ -28,10 +28,6 @@ def write_page(out: Path, found: Findings) -> Path:
 
 def render(found: Findings) -> str:
     """The page as one string."""
-    loader = jinja2.ChoiceLoader([jinja2.FileSystemLoader(folder) for folder in (FOLDER, diagnosis_page.FOLDER)])
-    environment = jinja2.Environment(
-        loader=loader, autoescape=True, trim_blocks=True, undefined=jinja2.StrictUndefined
-    )
     drives = sum(len(d.serials) for d in found.designs)
     context = {
         "found": found,
@@ -44,8 +40,7 @@ def render(found: Findings) -> str:
         "failed": found.failed,
         "number": number,
     }
-    html = environment.get_template("fleet.html").render(context)
-    return html.lstrip().encode("utf-8", "replace").decode()
+    return pages(FOLDER, diagnosis_page.FOLDER).get_template("fleet.html").render(context).lstrip()
 
 
 def headline(found: Findings) -> str:

@@ -34,7 +34,7 @@ def verdicts(counts: dict[str, int]) -> theme.Picture:
     for place, (_, count) in enumerate(rows):
         axis.barh(place, count, 0.7, color=theme.AFTER)
         axis.annotate(str(count), (count, place), (4, 0), textcoords="offset points", va="center")
-    axis.set_yticks(range(len(rows)), [name.replace("_", " ") for name, _ in rows])
+    axis.set_yticks(range(len(rows)), [theme.plain(name.replace("_", " ")) for name, _ in rows])
     axis.set(xlim=(0, 1.15 * top), xlabel="recordings")
     axis.tick_params(axis="y", length=0)
     axis.grid(axis="y", visible=False)
@@ -57,7 +57,7 @@ def population(pop, name: str, outlying: set[str]) -> theme.Picture:
     out = [k for k, n in enumerate(chosen) if pop.serials[n] in outlying]
     if out:
         axis.plot(at[out], pop.x[np.array(chosen)[out]], "o", color=theme.BEFORE, markersize=4.2, linestyle="none")
-    axis.set(xlabel="drives, sorted", ylabel=f"{pop.parameter} [{unit_text(pop.unit)}]", xticks=[])
+    axis.set(xlabel="drives, sorted", ylabel=theme.plain(f"{pop.parameter} [{unit_text(pop.unit)}]"), xticks=[])
     theme.key(axis, ("recording ± 2 σ", theme.RECORDED), ("shrunk", theme.AFTER), ("outlier", theme.BEFORE))
     caption = (
         f"{pop.parameter}: mean {number(pop.mean)} ± {number(pop.mean_sigma, 2)}, spread of drives "
@@ -82,8 +82,8 @@ def drift(found, name: str) -> theme.Picture:
     locator = AutoDateLocator(maxticks=6)
     axis.xaxis.set_major_locator(locator)
     axis.xaxis.set_major_formatter(ConciseDateFormatter(locator))
-    axis.set(ylabel=f"{found.parameter} [{unit_text(found.unit)}]")
-    return theme.picture(name, figure, f"{theme.plain(found.serial)}: {found.parameter} over time; dashed: noticed.")
+    axis.set(ylabel=theme.plain(f"{found.parameter} [{unit_text(found.unit)}]"))
+    return theme.picture(name, figure, f"{found.serial}: {found.parameter} over time; dashed: noticed.")
 
 
 @styled
@@ -94,7 +94,7 @@ def signature(group, name: str) -> theme.Picture:
     for place, line in enumerate(lines):
         axis.barh(place, line.share, 0.7, color=theme.BEFORE)
         size = f"{line.size:.3g} {line.unit}" if np.isfinite(line.size) else ""
-        axis.annotate(size, (line.share, place), (4, 0), textcoords="offset points", va="center")
+        axis.annotate(theme.plain(size), (line.share, place), (4, 0), textcoords="offset points", va="center")
     axis.set_yticks(range(len(lines)), [theme.plain(place_text(line)) for line in lines])
     axis.set(xlim=(0, 1.25 * max(line.share for line in lines)), xlabel="share of the remainder's power")
     axis.tick_params(axis="y", length=0)

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import argparse
+import re
 from pathlib import Path
 
 from fluxproof.checkout import ROOT
 from fluxproof.files import write_text
 from fluxproof.project import parts, render
+from fluxproof.quote import say, shown
 from golden_model.board_registers import board_set, has_board
 from golden_model.drive import load
 from golden_model.drive_keys import DriveError
+
+NUMBER = re.compile("0[xX][0-9a-fA-F]{1,16}|[1-9][0-9]{0,15}")
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -41,7 +45,7 @@ def run(args: argparse.Namespace) -> int:
     found = render.files(args.drive, drive, register_set, part, processor, base, core_folder(args.core))
     folder = Path(args.out)
     for name, text in found.items():
-        print(write_text(folder / name, text))
+        say(str(write_text(folder / name, text)))
     if processor is None:
         print(f"no device tree: {part} has no processor; the script builds the core alone")
     elif has_board(drive):
@@ -53,12 +57,10 @@ def run(args: argparse.Namespace) -> int:
 
 def address(text: str) -> int:
     """A multiple of the window, of 32 bits; DriveError otherwise."""
-    try:
-        value = int(text, 0)
-    except ValueError:
-        value = -1
+    value = int(text, 0) if NUMBER.fullmatch(text) else -1
     if not 0 < value < 1 << 32 or value % render.WINDOW:
-        raise DriveError(f"--base {text!r}: allowed is a multiple of 0x{render.WINDOW:x} of 32 bits, like 0x43C00000")
+        allowed = f"a multiple of 0x{render.WINDOW:x} of 32 bits, like 0x43C00000"
+        raise DriveError(f"--base '{shown(text)}': allowed is {allowed}")
     return value
 
 

@@ -5,10 +5,12 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
+from fluxproof.quote import shown
 from golden_model.drive_keys import DriveError
 
 # A part's name: family, device, package with speed grade: xc7z020clg484-1, xczu3eg-sbva484-1-e, xc7a35ticsg324-1L.
-PART = re.compile(r"x[caq][a-z]*\d*[a-z]*\d+[a-z0-9]*(-[a-z0-9]+)+", re.IGNORECASE)
+PART = re.compile(r"x[caq][a-z]*[0-9][a-z0-9]*(-[a-z0-9]+)+", re.IGNORECASE | re.ASCII)
+MOST_LETTERS = 64
 
 
 @dataclass(frozen=True)
@@ -35,8 +37,9 @@ PROCESSORS = {"xc7z": ZYNQ, "xa7z": ZYNQ, "xq7z": ZYNQ, "xczu": ZYNQMP, "xazu": 
 
 def checked(part: str) -> str:
     """The part's name in lower case; DriveError if it is none."""
-    if not PART.fullmatch(part):
-        raise DriveError(f"--part {part!r} is not a part of Xilinx: expected is a full name like xc7z020clg484-1")
+    if len(part) > MOST_LETTERS or not PART.fullmatch(part):
+        expected = "a full name like xc7z020clg484-1"
+        raise DriveError(f"--part '{shown(part)}' is not a part of Xilinx: expected is {expected}")
     return part.lower()
 
 

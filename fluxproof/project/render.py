@@ -7,6 +7,7 @@ from pathlib import Path
 
 from fluxproof.print_registers import c_lines
 from fluxproof.project.parts import ZYNQ, Processor, processor_of
+from fluxproof.quote import c_comment, tcl_comment, tcl_word, vhdl_comment
 from golden_model.board_registers import board_generics, has_board
 from golden_model.drive import Drive
 from golden_model.registers import RegisterSet
@@ -35,7 +36,7 @@ def clock_period_ns(drive: Drive) -> float:
 def clock_xdc(name: str, drive: Drive) -> str:
     """The clock constraint of the core alone; in a block design the clock comes from outside."""
     return (
-        f"# {name} {BY}: [core] clock_hz = {drive.core.clock_hz:g}.\n"
+        tcl_comment(f"{name} {BY}: [core] clock_hz = {drive.core.clock_hz:g}.") + "\n"
         "# Only where the core is the top: in a block design the clock comes from outside, with a constraint.\n"
         f"create_clock -name aclk -period {clock_period_ns(drive):.3f} [get_ports aclk]\n"
     )
@@ -46,8 +47,9 @@ def vhdl_package(name: str, drive: Drive, register_set: RegisterSet) -> str:
     values = generics(drive, register_set)
     wide = max(map(len, values))
     lines = [f"  constant {key:{wide}} : natural := {value};" for key, value in values.items()]
-    head = f"-- {name} {BY}.\n-- Generics of {top(drive)}: generic map (CLOCK_HZ => drive_pkg.CLOCK_HZ, ...)\n\n"
-    return head + "\n".join(["package drive_pkg is", *lines, "end package drive_pkg;"]) + "\n"
+    use = f"-- Generics of {top(drive)}: generic map (CLOCK_HZ => drive_pkg.CLOCK_HZ, ...)"
+    head = [vhdl_comment(f"{name} {BY}."), use, ""]
+    return "\n".join([*head, "package drive_pkg is", *lines, "end package drive_pkg;"]) + "\n"
 
 
 def tcl(name: str, drive: Drive, register_set: RegisterSet, part: str, base: int, core: str) -> str:
@@ -55,14 +57,14 @@ def tcl(name: str, drive: Drive, register_set: RegisterSet, part: str, base: int
     values = generics(drive, register_set)
     whole = processor_of(part) is ZYNQ and not has_board(drive)
     head = [
-        f"# {name} {BY}.",
+        tcl_comment(f"{name} {BY}."),
         "#",
         "#   vivado -mode batch -source project.tcl [-tclargs CORE_DIR]",
         "#",
         "# CORE_DIR: the folder of a checkout of Fluxproof.",
         "",
         "set here [file dirname [file normalize [info script]]]",
-        f"set core {{{core}}}",
+        f"set core {tcl_word(core)}",
         "if {$argc > 0} {",
         "  set core [file normalize [lindex $argv 0]]",
         "}",
@@ -114,12 +116,14 @@ def c_header(name: str, drive: Drive, register_set: RegisterSet) -> str:
 def device_tree(name: str, drive: Drive, processor: Processor, base: int) -> str:
     """The core as a UIO device of Linux, with the clock that its fabric clock must run at."""
     wide = "0x0 " if processor.cells == 2 else ""
+    head = c_comment(
+        f"{name} {BY}.",
+        "",
+        f"Fragment for a {processor.name}: include it in the board's device tree.  The kernel needs",
+        "uio_pdrv_genirq with uio_pdrv_genirq.of_id=generic-uio on its command line.",
+    )
     return f"""\
-/* {name} {BY}.
- *
- * Fragment for a {processor.name}: include it in the board's device tree.  The kernel needs uio_pdrv_genirq with
- * uio_pdrv_genirq.of_id=generic-uio on its command line.
- */
+{head}
 / {{
     fluxproof: fluxproof@{base:x} {{
         compatible = "generic-uio";

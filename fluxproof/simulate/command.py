@@ -11,6 +11,7 @@ import time
 from pathlib import Path
 
 from fluxproof.files import write_json, write_text
+from fluxproof.quote import say
 from golden_model.drive import load
 from golden_model.drive_keys import DriveError
 
@@ -38,10 +39,10 @@ def run_command(args: argparse.Namespace) -> int:
     report = write_text(folder / "report.html", pages())
     _clear()
     for line in summary(data):
-        print(line)
-    print(f"{report} ({time.monotonic() - began:.1f} s)")
+        say(line)
+    say(f"{report} ({time.monotonic() - began:.1f} s)")
     if data["status"] != "ok":
-        print(f"fluxproof: {args.drive}: {data['reason']}", file=sys.stderr)
+        say(f"fluxproof: {args.drive}: {data['reason']}", sys.stderr)
         return 1
     return 0
 

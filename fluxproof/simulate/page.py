@@ -5,9 +5,8 @@ from __future__ import annotations
 import dataclasses
 from pathlib import Path
 
-import jinja2
-
 from fluxproof.diagnosis.report import page as diagnosis_page
+from fluxproof.quote import pages
 from golden_model.drive import SECTIONS, Drive
 from golden_model.drive_keys import key_of
 
@@ -17,10 +16,6 @@ ATTRIBUTE = {"bases": "base_choice"}  # section -> attribute of Drive, where the
 
 def render(data: dict, drive: Drive, pictures: dict) -> str:
     """The page as one string; ``data`` is that of simulation.json."""
-    folders = [jinja2.FileSystemLoader(folder) for folder in (FOLDER, diagnosis_page.FOLDER)]
-    environment = jinja2.Environment(
-        loader=jinja2.ChoiceLoader(folders), autoescape=True, trim_blocks=True, undefined=jinja2.StrictUndefined
-    )
     context = {
         **data,
         "mood": "good" if data["status"] == "ok" else "bad",
@@ -30,7 +25,7 @@ def render(data: dict, drive: Drive, pictures: dict) -> str:
         "sections": described(drive),
         "shown": lambda value: "–" if value is None else f"{value:.5g}",
     }
-    return environment.get_template("simulate.html").render(context)
+    return pages(FOLDER, diagnosis_page.FOLDER).get_template("simulate.html").render(context)
 
 
 def described(drive: Drive) -> dict[str, list[dict]]:

@@ -21,6 +21,7 @@ from fluxproof.diagnosis.ground.nominal import Nominal
 from fluxproof.diagnosis.ground.plant_section import Plant, Timing, described_sensors, merged, plant_of
 from fluxproof.diagnosis.ground.result import NamedEffect
 from fluxproof.plant import FluxMap, Harmonic
+from fluxproof.quote import toml_comment
 from golden_model import drive as drives
 
 __all__ = ["CoreValue", "Plant", "Timing", "core_values", "improved_toml", "plant_of", "write_improved"]
@@ -90,9 +91,9 @@ def _set(table, key, value, why):
         if isinstance(part, tomlkit.items.Array) and any(isinstance(row, list) for row in part.unwrap()):
             part.multiline(True)  # one line per row of the matrix
     if not isinstance(item, tomlkit.items.AbstractTable):
-        item.comment("; ".join([*words, *([note] if note else [])]))
+        item.comment(toml_comment("; ".join([*words, *([note] if note else [])])))
     else:
-        item.comment(why)
+        item.comment(toml_comment(why))
     table[key] = item
 
 

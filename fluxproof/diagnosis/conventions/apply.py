@@ -9,6 +9,8 @@ import tomlkit
 
 from fluxproof.diagnosis.ground.recording import Recording
 from fluxproof.diagnosis.ingest.units import OF_BUS
+from fluxproof.quote import toml_comment, toml_key
+from golden_model.drive_keys import DriveError
 
 
 def read_drive(nominal, readings):
@@ -58,7 +60,11 @@ def edit(document, nominal, readings, recording, put) -> None:
         if why and written and name not in converted:
             entry = tomlkit.inline_table()
             entry.update({"name": name} | written)
-            put(document.setdefault("columns", tomlkit.table()), sources[name], entry, "; ".join(why))
+            table = document.setdefault("columns", tomlkit.table())
+            try:
+                put(table, toml_key(sources[name]), entry, "; ".join(why))
+            except DriveError as error:  # the other values of the file are as good without this one
+                table.add(tomlkit.comment(toml_comment(f"{error}; it is {entry.as_string()}")))
 
 
 def _written(factor, offset, of_bus) -> dict:

@@ -8,7 +8,6 @@ index has the unit of the voltage that it is a share of, such as "u_dc/2".
 from __future__ import annotations
 
 import math
-import re
 
 from fluxproof.diagnosis.ground.recording import COLUMNS
 
@@ -126,7 +125,6 @@ OF_SHAFT = {
 OF_BUS = {"u_dc": 1.0, "u_dc/2": 0.5, "u_dc/sqrt(3)": 1.0 / math.sqrt(3.0), "2/pi u_dc": 2.0 / math.pi}
 COMMANDED = ("u_d_ref", "u_q_ref")
 OFFSETS = {"K": -273.15, "degF": -160 / 9, "°F": -160 / 9}
-BRACKETS = re.compile(r"^(?P<name>.*?)\s*[\[(](?P<unit>[^\[\]()]*)[\])]\s*$")
 
 
 def conversion(column: str, unit: str, pole_pairs: int) -> tuple[float, float] | None:
@@ -149,9 +147,8 @@ def known_units(column: str) -> str:
 
 def split_unit(name: str) -> tuple[str, str]:
     """("i_a", "mA") of "i_a [mA]" or "i_a (mA)"; ("i_a", "") without a unit."""
-    found = BRACKETS.match(name.strip())
-    return (
-        (found["name"].strip(), found["unit"].strip())
-        if found and found["name"].strip()
-        else (name.strip(), "")
-    )
+    name = name.strip()
+    inside = name[:-1] if name.endswith(("]", ")")) else ""
+    start = max(inside.rfind("["), inside.rfind("("))
+    stem, unit = inside[: max(start, 0)].strip(), inside[start + 1 :].strip()
+    return (stem, unit) if stem and not any(c in unit for c in "])") else (name, "")

@@ -10,7 +10,7 @@ DAY = 86400.0
 CLOCK = r"\d{1,2}:\d{2}:\d{2}([.,]\d+)?"
 ISO = rf"\d{{4}}-\d{{2}}-\d{{2}}[T ]{CLOCK}\s*(Z|[+-]\d{{2}}:?\d{{2}})?"
 DOTTED = rf"\d{{1,2}}\.\d{{1,2}}\.\d{{4}} {CLOCK}"
-MOMENT = re.compile(rf"{CLOCK}|{ISO}|{DOTTED}")
+MOMENT = re.compile(rf"{CLOCK}|{ISO}|{DOTTED}", re.ASCII)
 
 
 def moments(values, pd) -> np.ndarray | None:

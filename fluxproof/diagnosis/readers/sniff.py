@@ -21,11 +21,11 @@ COMMENT = ("#", "%", "//")
 SEPARATORS = (";", "\t", ",", "|", " ")
 MISSING = {"", "nan", "-nan", "inf", "-inf", "+inf", "na", "n/a", "null", "none", "-"}
 NUMBER = {
-    ".": re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eEdD][+-]?\d+)?"),
-    ",": re.compile(r"[+-]?(\d+(,\d*)?|,\d+)([eE][+-]?\d+)?"),
+    ".": re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eEdD][+-]?\d+)?", re.ASCII),
+    ",": re.compile(r"[+-]?(\d+(,\d*)?|,\d+)([eE][+-]?\d+)?", re.ASCII),
 }
 UNIT_LINE = re.compile(
-    r"[\[(]?\s*(s|ms|[uµ]s|A|mA|V|mV|rad|deg|°|rpm|1/min|min-1|rad/s|°C|degC|C|Nm|N[m·.]|%|1|-|)\s*[\])]?"
+    r"[\[(]?\s*((s|ms|[uµ]s|A|mA|V|mV|rad|deg|°|rpm|1/min|min-1|rad/s|°C|degC|C|Nm|N[m·.]|%|1|-)\s*)?[\])]?"
 )
 
 

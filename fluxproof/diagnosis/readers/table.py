@@ -19,6 +19,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fluxproof.diagnosis.ground.recording import Problem, RecordingError
+from fluxproof.quote import shown
 
 MAX_ROWS = 20_000_000
 MAX_COLUMNS = 4096
@@ -105,10 +106,3 @@ def as_columns(arrays: dict[str, object], path) -> tuple[dict[str, np.ndarray], 
         array = array[:limit].astype(float)
         columns[name] = array if len(array) == min(n, limit) else np.full(min(n, limit), array[0])
     return columns, text
-
-
-def shown(name: object, most: int = 60) -> str:
-    """A name from a file as short printable text, safe for a terminal."""
-    text = str(name)
-    text = text if text.isprintable() else repr(text)[1:-1]
-    return text if len(text) <= most else f"{text[: most - 3]}..."

@@ -8,14 +8,13 @@ from __future__ import annotations
 from pathlib import Path
 from types import SimpleNamespace
 
-import jinja2
-
 from fluxproof.diagnosis.answer.improved_core import core_values
 from fluxproof.diagnosis.answer.phrases import SIGNALS
 from fluxproof.diagnosis.ground.nominal import SECTIONS
 from fluxproof.diagnosis.ground.plant_section import merged, plant_of
 from fluxproof.diagnosis.ground.quantities import RPM
 from fluxproof.diagnosis.report import pictures, words
+from fluxproof.quote import pages
 
 FOLDER = Path(__file__).resolve().parent
 MOST_PROBLEMS = 60
@@ -47,10 +46,7 @@ def render(diagnosis, nominal=None, overlay: dict | None = None) -> str:
         left_out=left_out if compared else [],
         drive=nominal.path if nominal is not None else "",
     )
-    loader = jinja2.FileSystemLoader(FOLDER)
-    environment = jinja2.Environment(loader=loader, autoescape=True, trim_blocks=True, undefined=jinja2.StrictUndefined)
-    html = environment.get_template("report.html").render(context)
-    return html.lstrip().encode("utf-8", "replace").decode()  # a path may contain bytes that are not UTF-8
+    return pages(FOLDER).get_template("report.html").render(context).lstrip()
 
 
 def fit_view(fit) -> SimpleNamespace:

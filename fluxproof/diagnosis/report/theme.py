@@ -15,6 +15,8 @@ import matplotlib as mpl
 from markupsafe import Markup, escape
 from matplotlib.figure import Figure
 
+from fluxproof.quote import mathtext, visible
+
 LIGHT = {
     "--ink": "#1d2127",
     "--soft": "#5c636d",
@@ -72,9 +74,9 @@ def key(axis, *words: tuple[str, str]) -> None:
 
 
 def plain(text: str) -> str:
-    """Text from a file as a label: never parsed as a formula, cut to the available length."""
-    printable = "".join(c if c.isprintable() else "?" for c in str(text)).replace("$", r"\$")
-    return printable if len(printable) <= 40 else printable[:39] + "…"
+    """Text from a file as a label: never parsed as a formula, on one line, cut to the available length."""
+    line = visible(" ".join(str(text).split()))
+    return mathtext(line if len(line) <= 40 else f"{line[:39]}…")
 
 
 def picture(name: str, figure: Figure, caption: str) -> Picture:
@@ -88,5 +90,5 @@ def picture(name: str, figure: Figure, caption: str) -> Picture:
     for role, color in LIGHT.items():
         svg = svg.replace(color, f"var({role})")
     head = re.sub(r'\s(width|height|version|xmlns)="[^"]*"', "", svg[: svg.index(">")])
-    head = f'{head} role="img" aria-label="{escape(caption)}">'
+    head = f'{head} role="img" aria-label="{escape(visible(caption))}">'
     return Picture(Markup(head + svg[svg.index(">") + 1 :]), caption)
