@@ -53,8 +53,21 @@ COLUMNS = {
 }
 
 
+def printable(text: str) -> str:
+    """The text with every character escaped that a terminal or UTF-8 cannot show: line ends, controls, lone surrogates."""
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+
+
 class RecordingError(ValueError):
-    """Unusable input; the message is one line with the file, the line or column, and what was expected."""
+    """Unusable input; the message is one line with the file, the line or column, and what was expected.
+
+    What a terminal or UTF-8 cannot show, as in some names of files, is escaped.
+    """
+
+    def __init__(self, message: object = ""):
+        super().__init__(printable(str(message)))
 
 
 @dataclass(frozen=True)

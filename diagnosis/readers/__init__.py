@@ -1,7 +1,8 @@
 """Reads a recording's file into a Table; the format is recognised by content and must agree with the file name.
 
-Files are untrusted: nothing in them is executed (no pickles), links to other files are not followed, and sizes are
-checked before memory is allocated.  Any exception of a parsing library becomes a RecordingError of one line.
+Files are untrusted: nothing in them is executed (no pickles, no formulas), links to other files are not followed, and
+time and memory are limited by the file's size (limits.py).  Any exception of a parsing library becomes a RecordingError
+of one line.  docs/security.md states what each library could do and why it does not.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import gc
 import importlib
+import io
 import os
 import pkgutil
 import stat
@@ -16,9 +18,9 @@ import sys
 import warnings
 from pathlib import Path
 
-from fluxproof.diagnosis.readers.memory import limited_memory
+from fluxproof.diagnosis.readers.limits import limited
 from fluxproof.diagnosis.readers.table import Select, Table, shown
-from fluxproof.diagnosis.recording import RecordingError
+from fluxproof.diagnosis.recording import RecordingError, printable
 
 HEAD_BYTES = 4096
 
@@ -34,17 +36,17 @@ def read_table(path, select: Select | None = None) -> Table:
     """The file's columns; RecordingError names the file and what was expected."""
     path = Path(path)
     head = _head(path)
-    reader = _reader_of(path, head)
-    with warnings.catch_warnings(), limited_memory(), _quiet_finalizers():
+    with warnings.catch_warnings(), _quiet(), limited(path):
         warnings.simplefilter("ignore")  # a damaged file leads to findings or errors of this package instead
+        reader = _reader_of(path, head)
         try:
             return reader.read(path, select)
         except RecordingError as error:
-            if str(path) in str(error):
+            if printable(str(path)) in str(error):
                 raise
             failure = str(error)
         except MemoryError:
-            failure = "too large for the memory limit"
+            failure = "too large for the memory limit of its size"
         except (Exception, SystemExit) as error:  # parsing libraries raise anything on damaged content
             first = (str(error).strip().splitlines() or [type(error).__name__])[0]
             failure = f"not a readable {reader.FORMAT} file: {shown(first, 160)}"
@@ -53,12 +55,13 @@ def read_table(path, select: Select | None = None) -> Table:
 
 
 @contextlib.contextmanager
-def _quiet_finalizers():
-    """Suppress tracebacks that incomplete objects of a parsing library print when they are deleted."""
+def _quiet():
+    """Suppress what a parsing library prints of a damaged file, also when it deletes its incomplete objects."""
     hook = sys.unraisablehook
     sys.unraisablehook = lambda _: None
     try:
-        yield
+        with contextlib.redirect_stdout(io.StringIO()):
+            yield
     finally:
         sys.unraisablehook = hook
 
@@ -75,7 +78,7 @@ def _head(path: Path) -> bytes:
         if isinstance(error, RecordingError):
             raise
         reason = getattr(error, "strerror", None) or error
-        raise RecordingError(f"{shown(path, 200)}: cannot be read: {reason}") from None
+        raise RecordingError(f"{path}: cannot be read: {reason}") from None
     if not head:
         raise RecordingError(f"{path}: the file is empty")
     return head

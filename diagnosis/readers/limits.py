@@ -1,0 +1,99 @@
+"""How much time, memory and how many numbers one file may take, from its size alone (not itself a reader).
+
+Numbers: a recording of a drive has at least two phase currents of one bit of news a row among at most eight columns, so
+0.25 bit a number, however well it is packed: at most 32 numbers per byte of the file.  Small files may have 4 million.
+Time: a file of text takes 2 MB/s on a slow machine; Python, its libraries and the search of small files 20 s more.
+Memory: three float64 copies of the numbers, four times the file, and what the libraries reserve.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import threading
+import time
+from collections.abc import Iterator
+
+from fluxproof.diagnosis.readers.memory import limited_memory
+from fluxproof.diagnosis.readers.table import MAX_CELLS
+from fluxproof.diagnosis.recording import RecordingError
+
+CELLS_PER_BYTE = 32
+FEW_CELLS = 4_000_000  # what every file may have
+FEW_SECONDS = 20.0
+BYTES_PER_SECOND = 2e6
+LIBRARIES = 2 << 30  # bytes of address space
+OF_A_CORE = 128 << 20  # bytes of address space that each core's threads reserve
+AGAIN = 0.5  # s until the alarm is repeated, if a library caught the first
+
+
+class OutOfTime(BaseException):
+    """The time is over; no Exception, so that a library does not take it for one of its own."""
+
+
+def most_cells(size: int) -> int:
+    """The most numbers that are read of a file of ``size`` bytes."""
+    return min(MAX_CELLS, max(FEW_CELLS, CELLS_PER_BYTE * size))
+
+
+def most_bytes(size: int) -> int:
+    """The most address space that reading a file of ``size`` bytes may add."""
+    return LIBRARIES + OF_A_CORE * (os.cpu_count() or 1) + 3 * 8 * most_cells(size) + 4 * size
+
+
+def most_seconds(size: int) -> float:
+    """The longest that reading a file of ``size`` bytes may take."""
+    return FEW_SECONDS + size / BYTES_PER_SECOND
+
+
+def check_cells(path, cells: int, what: str = "the file") -> None:
+    """RecordingError if ``what`` declares more numbers than a recording of the file's size can have."""
+    size = os.stat(path).st_size
+    if cells > most_cells(size):
+        raise RecordingError(
+            f"{path}: {what} declares {cells} numbers in a file of {size} bytes; "
+            f"at most {most_cells(size)} are read of that size"
+        )
+
+
+@contextlib.contextmanager
+def limited(path) -> Iterator[None]:
+    """Within the block, memory and time are limited as the file's size allows; RecordingError when the time is over."""
+    size = os.stat(path).st_size
+    seconds = most_seconds(size)
+    try:
+        with limited_memory(most_bytes(size)), limited_time(seconds):
+            yield
+    except OutOfTime:
+        raise RecordingError(f"{path}: reading took longer than {seconds:.0f} s, the limit of its size") from None
+
+
+@contextlib.contextmanager
+def limited_time(seconds: float) -> Iterator[None]:
+    """Within the block, OutOfTime after ``seconds``; only in the main thread of a POSIX system, and after C code returns.
+
+    An alarm that somebody else set is kept: if it rings earlier it is left alone, else what remains of it is set again.
+    """
+    if not hasattr(signal, "setitimer") or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    other, other_again = signal.getitimer(signal.ITIMER_REAL)
+    if 0.0 < other <= seconds:
+        yield
+        return
+    start = time.monotonic()
+    before = signal.signal(signal.SIGALRM, _ring)
+    signal.setitimer(signal.ITIMER_REAL, seconds, AGAIN)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, signal.SIG_DFL if before is None else before)
+        if other:
+            left = max(1e-3, other - (time.monotonic() - start))
+            signal.setitimer(signal.ITIMER_REAL, left, other_again)
+
+
+def _ring(number, frame) -> None:
+    raise OutOfTime
