@@ -54,7 +54,7 @@ COLUMNS = {
 
 
 def printable(text: str) -> str:
-    """The text with every character escaped that a terminal or UTF-8 cannot show: line ends, controls, lone surrogates."""
+    """The text with what a terminal or UTF-8 cannot show escaped: line ends, controls, lone surrogates."""
     if text.isprintable():
         return text
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)

@@ -47,13 +47,13 @@ def most_seconds(size: int) -> float:
     return FEW_SECONDS + size / BYTES_PER_SECOND
 
 
-def check_cells(path, cells: int, what: str = "the file") -> None:
+def check_cells(path, cells: int, what: str = "its columns") -> None:
     """RecordingError if ``what`` declares more numbers than a recording of the file's size can have."""
     size = os.stat(path).st_size
     if cells > most_cells(size):
         raise RecordingError(
-            f"{path}: {what} declares {cells} numbers in a file of {size} bytes; "
-            f"at most {most_cells(size)} are read of that size"
+            f"{path}: with {what}, {cells} numbers are to be read from {size} bytes; "
+            f"a file of this size can have {most_cells(size)}"
         )
 
 
@@ -71,9 +71,9 @@ def limited(path) -> Iterator[None]:
 
 @contextlib.contextmanager
 def limited_time(seconds: float) -> Iterator[None]:
-    """Within the block, OutOfTime after ``seconds``; only in the main thread of a POSIX system, and after C code returns.
+    """Within the block, OutOfTime after ``seconds``, as soon as C code returns; only in the main thread of POSIX.
 
-    An alarm that somebody else set is kept: if it rings earlier it is left alone, else what remains of it is set again.
+    An alarm that somebody else set is kept: if it rings earlier it stays, else what remains of it is set again.
     """
     if not hasattr(signal, "setitimer") or threading.current_thread() is not threading.main_thread():
         yield

@@ -102,7 +102,7 @@ def _check_sizes(path, mdf, places, limit: int) -> None:
 
 
 def _taken_out(path, mdf, places) -> dict:
-    """{name: (conversion, conversion of its master or None)}; afterwards no channel of ``mdf`` has one, nor attachments.
+    """{name: (conversion, conversion of its master or None)}; afterwards no channel has one, nor an attachment.
 
     RecordingError names a requested channel whose conversion, or that of its time, cannot be applied.
     """

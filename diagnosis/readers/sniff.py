@@ -76,7 +76,8 @@ def sniff(path) -> Layout:
     if len(head) == SNIFF_BYTES:
         lines.pop()  # cut by the limit
         if not lines:
-            raise RecordingError(f"{path}:1: no line end in the first {SNIFF_BYTES} bytes; {_fields_in(head, encoding)}")
+            found = _fields_in(head, encoding)
+            raise RecordingError(f"{path}:1: no line end in the first {SNIFF_BYTES} bytes; {found}")
     lines = lines[:SNIFF_LINES]
     _reject_wide(path, lines)
     candidates = (_candidate(lines, separator, decimal) for separator in SEPARATORS for decimal in ".,")
