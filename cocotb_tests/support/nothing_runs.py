@@ -14,8 +14,8 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
-RUNS = (
-    "exec", "compile", "import", "os.system", "os.exec", "os.posix_spawn", "os.fork", "os.forkpty", "subprocess.Popen",
+RUNS = (  # not "compile": NumPy parses a header without running it (ast.literal_eval); what runs is an "exec"
+    "exec", "import", "os.system", "os.exec", "os.posix_spawn", "os.fork", "os.forkpty", "subprocess.Popen",
     "pickle.find_class", "marshal.loads", "ctypes.dlopen", "socket.connect", "socket.getaddrinfo", "urllib.Request",
     "webbrowser.open",
 )  # fmt: skip
@@ -69,5 +69,6 @@ def _harmless(event: str, what: str, path: Path) -> bool:
     if opened == path.absolute():
         return True
     installed = [sysconfig.get_path("purelib"), sysconfig.get_path("stdlib"), sys.base_prefix, str(ROOT)]
-    own = opened.parent == Path(tempfile.gettempdir()) and path.parent != opened.parent
+    temporary = Path(tempfile.gettempdir())
+    own = opened == temporary or opened.parent == temporary != path.parent
     return own or any(opened.is_relative_to(folder) for folder in installed if folder)
