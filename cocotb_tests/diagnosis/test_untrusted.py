@@ -16,6 +16,8 @@ from cocotb_tests.support.recordings_made import as_text, dump, made, nominal_of
 from fluxproof.diagnosis.ingest.load import load_recording
 from fluxproof.diagnosis.readers import limits, read_table
 from fluxproof.diagnosis.recording import RecordingError
+from fluxproof.golden_model import kernel
+from fluxproof.plant import jit
 
 
 @pytest.fixture(scope="module")
@@ -216,6 +218,30 @@ def test_the_watch_sees_what_runs(tmp_path):
         open(tmp_path / "other").close()
         import this  # noqa: F401
     assert {"exec", "open", "import"} <= {name for name, _ in events}
+
+
+@pytest.mark.parametrize("module", [kernel, jit])
+def test_the_cache_of_compiled_code_is_the_users_own(tmp_path, module):
+    """numba unpickles it, so a folder that others can write is not used."""
+    _private = module._private
+    own = _private(tmp_path / "own")
+    assert own == tmp_path / "own" == _private(own) and own.stat().st_mode & 0o777 == 0o700
+    own.chmod(0o777)
+    (tmp_path / "link").symlink_to(tmp_path / "own")
+    (tmp_path / "file").write_text("")
+    for name in ("own", "link", "file"):
+        other = _private(tmp_path / name)
+        assert other.parent != tmp_path and other.stat().st_mode & 0o777 == 0o700
+        other.rmdir()
+
+
+def test_mdf_frames_of_buses_are_not_decoded(tmp_path, monkeypatch):
+    """asammdf would load the databases that the file attaches or names."""
+    from asammdf.blocks.mdf_v4 import MDF4
+
+    monkeypatch.setattr(MDF4, "_process_bus_logging", lambda self: pytest.fail("decoded"))
+    monkeypatch.setattr(MDF4, "_extract_attachment", lambda *_: pytest.fail("attachment opened"))
+    assert len(read_table(hostile.mdf(tmp_path / "r.mf4", None)).columns["u_dc"]) == 800
 
 
 def test_hdf5_plugins_are_not_loaded(tmp_path):

@@ -11,18 +11,14 @@ import contextlib
 import gc
 import importlib
 import io
-import os
 import pkgutil
-import stat
 import sys
 import warnings
 from pathlib import Path
 
-from fluxproof.diagnosis.readers.limits import limited
+from fluxproof.diagnosis.readers.limits import head_of, limited
 from fluxproof.diagnosis.readers.table import Select, Table, shown
 from fluxproof.diagnosis.recording import RecordingError, printable
-
-HEAD_BYTES = 4096
 
 
 def readers() -> list:
@@ -35,7 +31,7 @@ def readers() -> list:
 def read_table(path, select: Select | None = None) -> Table:
     """The file's columns; RecordingError names the file and what was expected."""
     path = Path(path)
-    head = _head(path)
+    head = head_of(path)
     with warnings.catch_warnings(), _quiet(), limited(path):
         warnings.simplefilter("ignore")  # a damaged file leads to findings or errors of this package instead
         reader = _reader_of(path, head)
@@ -64,24 +60,6 @@ def _quiet():
             yield
     finally:
         sys.unraisablehook = hook
-
-
-def _head(path: Path) -> bytes:
-    """The first bytes of an ordinary, non-empty file."""
-    try:
-        mode = os.stat(path).st_mode
-        if not stat.S_ISREG(mode):
-            raise RecordingError(f"{path}: not a file")
-        with open(path, "rb") as file:
-            head = file.read(HEAD_BYTES)
-    except (OSError, ValueError) as error:
-        if isinstance(error, RecordingError):
-            raise
-        reason = getattr(error, "strerror", None) or error
-        raise RecordingError(f"{path}: cannot be read: {reason}") from None
-    if not head:
-        raise RecordingError(f"{path}: the file is empty")
-    return head
 
 
 def _reader_of(path: Path, head: bytes):

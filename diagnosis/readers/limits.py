@@ -11,6 +11,7 @@ from __future__ import annotations
 import contextlib
 import os
 import signal
+import stat
 import threading
 import time
 from collections.abc import Iterator
@@ -25,6 +26,7 @@ FEW_SECONDS = 20.0
 BYTES_PER_SECOND = 2e6
 LIBRARIES = 2 << 30  # bytes of address space
 OF_A_CORE = 128 << 20  # bytes of address space that each core's threads reserve
+HEAD_BYTES = 4096
 AGAIN = 0.5  # s until the alarm is repeated, if a library caught the first
 
 
@@ -45,6 +47,24 @@ def most_bytes(size: int) -> int:
 def most_seconds(size: int) -> float:
     """The longest that reading a file of ``size`` bytes may take."""
     return FEW_SECONDS + size / BYTES_PER_SECOND
+
+
+def head_of(path) -> bytes:
+    """The first bytes of an ordinary, non-empty file."""
+    try:
+        mode = os.stat(path).st_mode
+        if not stat.S_ISREG(mode):
+            raise RecordingError(f"{path}: not a file")
+        with open(path, "rb") as file:
+            head = file.read(HEAD_BYTES)
+    except (OSError, ValueError) as error:
+        if isinstance(error, RecordingError):
+            raise
+        reason = getattr(error, "strerror", None) or error
+        raise RecordingError(f"{path}: cannot be read: {reason}") from None
+    if not head:
+        raise RecordingError(f"{path}: the file is empty")
+    return head
 
 
 def check_cells(path, cells: int, what: str = "its columns") -> None:

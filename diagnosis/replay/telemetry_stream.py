@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fluxproof.diagnosis.readers.limits import head_of, limited
 from fluxproof.diagnosis.recording import RecordingError
 from fluxproof.diagnosis.replay.telemetry import write_dump
 from fluxproof.golden_model.fluxproof import Sample
@@ -53,12 +54,10 @@ class Capture(NamedTuple):
 
 
 def read_capture(path) -> Capture:
-    """Read a file of little-endian words; RecordingError if it is unreadable, contains no packet or is damaged."""
-    try:
-        raw = Path(path).read_bytes()
-    except OSError as error:
-        raise RecordingError(f"{path}: cannot be read: {error.strerror or error}") from None
-    return parse(raw, str(path))
+    """Read a file of little-endian words; RecordingError if it is no file, has no packet or is damaged."""
+    head_of(path)
+    with limited(path):
+        return parse(Path(path).read_bytes(), str(path))
 
 
 def parse(raw: bytes, name: str = "capture") -> Capture:
