@@ -31,10 +31,12 @@ def readers() -> list:
 def read_table(path, select: Select | None = None) -> Table:
     """The file's columns; RecordingError names the file and what was expected."""
     path = Path(path)
-    head = head_of(path)
+    reader = _reader_of(path, head_of(path))
+    for library in reader.LIBRARIES:
+        with contextlib.suppress(ImportError):  # the reader reports it
+            importlib.import_module(library)
     with warnings.catch_warnings(), _quiet(), limited(path):
         warnings.simplefilter("ignore")  # a damaged file leads to findings or errors of this package instead
-        reader = _reader_of(path, head)
         try:
             return reader.read(path, select)
         except RecordingError as error:

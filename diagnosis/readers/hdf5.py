@@ -15,6 +15,7 @@ from fluxproof.diagnosis.readers.table import Table, as_columns, chosen, repeate
 
 FORMAT = "HDF5"
 SUFFIXES = (".h5", ".hdf5", ".hdf", ".he5")
+LIBRARIES = ("h5py",)
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 

@@ -2,8 +2,8 @@
 
 Numbers: a recording of a drive has at least two phase currents of one bit of news a row among at most eight columns, so
 0.25 bit a number, however well it is packed: at most 32 numbers per byte of the file.  Small files may have 4 million.
-Time: a file of text takes 2 MB/s on a slow machine; Python, its libraries and the search of small files 20 s more.
-Memory: three float64 copies of the numbers, four times the file, and what the libraries reserve.
+Time: a file of text takes 2 MB/s on a slow machine; small files get 20 s, as other processes may have the cores.
+Memory: three float64 copies of the numbers, four times the file, and what the libraries' threads reserve.
 """
 
 from __future__ import annotations

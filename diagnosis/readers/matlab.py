@@ -21,6 +21,7 @@ from fluxproof.diagnosis.recording import RecordingError
 
 FORMAT = "MATLAB"
 SUFFIXES = (".mat",)
+LIBRARIES = ("h5py", "pymatreader")
 COMPRESSED = 15  # tag of a compressed element of a version 5 file
 NAMES, VALUES, UNITS = (
     ("Name", "name", "label", "Label"),

@@ -20,6 +20,7 @@ from fluxproof.diagnosis.recording import RecordingError
 
 FORMAT = "MDF"
 SUFFIXES = (".mf4", ".mdf", ".dat4")
+LIBRARIES = ("asammdf",)
 TIME = "time"
 REMOTE_MASTER = 1 << 3  # flag of a channel group in ASAM MDF 4.2
 EXPORT = "export the file with its conversions applied"

@@ -25,6 +25,7 @@ from fluxproof.diagnosis.recording import RecordingError
 
 FORMAT = "NumPy"
 SUFFIXES = (".npy", ".npz")
+LIBRARIES = ()
 NPY = b"\x93NUMPY"
 
 

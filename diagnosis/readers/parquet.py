@@ -13,6 +13,7 @@ from fluxproof.diagnosis.recording import RecordingError
 
 FORMAT = "Parquet"
 SUFFIXES = (".parquet", ".pq")
+LIBRARIES = ("pyarrow.parquet",)
 
 
 def matches(head: bytes, path) -> bool:

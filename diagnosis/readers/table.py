@@ -4,6 +4,7 @@ A reader is one file in this folder with
 
     FORMAT    its name in messages
     SUFFIXES  file names that claim this format, lower case, with the dot
+    LIBRARIES what ``read`` imports, which neither counts as its time nor as its memory
     matches(head, path)  whether the content (first bytes) is this format
     read(path, select)   -> Table
 

@@ -18,6 +18,7 @@ from fluxproof.diagnosis.recording import Problem, RecordingError
 
 FORMAT = "text"
 SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".asc", ".log")
+LIBRARIES = ("pandas",)
 MOSTLY_TEXT = 0.5  # a column with a larger share of words is not numeric
 FIRST_WORDS = 1000  # of a column, among which thousands separators are looked for
 THOUSANDS = {  # by the decimal mark
