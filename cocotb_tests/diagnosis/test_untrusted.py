@@ -176,7 +176,7 @@ def pairs(folder, suffix):
     bad = folder / f"bad{suffix if suffix != '7.3' else '.mat'}"
     objects = np.array([Canary(folder / "canary"), 1], dtype=object)
     if suffix == ".csv":
-        bad.write_text("t,i_a,__import__('os').system('touch x')\n" + "0,=cmd|1,http://127.0.0.1:1/x\n" * 300)
+        bad.write_text("t,i_a,i_b,__import__('os').abort(),x\n" + "0,1,2,=cmd|1,http://127.0.0.1:1/x\n" * 300)
     elif suffix == ".npy":
         np.save(bad, objects, allow_pickle=True)
     elif suffix == ".npz":
@@ -201,13 +201,15 @@ def pairs(folder, suffix):
 def test_reading_runs_nothing(tmp_path, suffix):
     good, bad = pairs(tmp_path, suffix)
     read_table(good)  # libraries are imported when the first file of a format comes
+    refused = []
     for path in (good, bad):
         with watched(path) as events:
             try:
                 read_table(path)
             except RecordingError:
-                assert path == bad
+                refused.append(path)
         assert not events
+    assert refused == ([] if suffix in (".csv", ".parquet", ".mat") else [bad])  # these contain numbers as well
     assert not (tmp_path / "canary").exists()
 
 

@@ -1,7 +1,8 @@
 """Watches what Python does while a file is read: no code, no import, no process, no network, no file but that one.
 
-The library's own audit events report it, also of what a C extension does through Python.  A hook cannot be removed, so
-there is one, which records only inside ``watched``.
+Python's audit events report it, also of what a C extension does through Python; not the files that a C library opens by
+itself, as HDF5 does: such files have to be refused.  A hook cannot be removed, so there is one, which records only
+inside ``watched``.
 """
 
 from __future__ import annotations

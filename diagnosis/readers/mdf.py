@@ -13,7 +13,7 @@ import os
 
 import numpy as np
 
-from fluxproof.diagnosis.readers.limits import check_cells, most_bytes
+from fluxproof.diagnosis.readers.limits import check_cells, most_cells
 from fluxproof.diagnosis.readers.mdf_conversion import is_plain, physical, refusal
 from fluxproof.diagnosis.readers.table import Table, chosen, row_limit, shown, too_long
 from fluxproof.diagnosis.recording import RecordingError
@@ -96,7 +96,8 @@ def _check_sizes(path, mdf, places, limit: int) -> None:
     for group in sorted({g for g, _ in places}):
         block = mdf.groups[group].channel_group
         what = f"channel group {group}"
-        if block.cycles_nr * max(1, block.samples_byte_nr) > most_bytes(size):
+        # What is not needed is unpacked, too.
+        if block.cycles_nr * max(1, block.samples_byte_nr) > 8 * most_cells(size):
             raise RecordingError(f"{path}: {what} declares {block.cycles_nr} samples, too many for its {size} bytes")
         cells += min(block.cycles_nr, limit) * (1 + sum(g == group for g, _ in places))
         check_cells(path, cells, what)
