@@ -176,7 +176,8 @@ def pairs(folder, suffix):
     bad = folder / f"bad{suffix if suffix != '7.3' else '.mat'}"
     objects = np.array([Canary(folder / "canary"), 1], dtype=object)
     if suffix == ".csv":
-        bad.write_text("t,i_a,i_b,__import__('os').abort(),x\n" + "0,1,2,=cmd|1,http://127.0.0.1:1/x\n" * 300)
+        head = "t,i_a,i_b,i_c,u_dc,d_a,__import__('os').abort(),x\n"
+        bad.write_text(head + "0,1,2,3,4,5,=cmd|1,http://127.0.0.1:1/x\n" * 300)
     elif suffix == ".npy":
         np.save(bad, objects, allow_pickle=True)
     elif suffix == ".npz":
