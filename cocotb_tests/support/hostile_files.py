@@ -7,8 +7,21 @@ import zipfile
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from cocotb_tests.support.recordings_made import made
+from fluxproof.diagnosis.readers import read_table
+from fluxproof.diagnosis.recording import RecordingError
+
+
+def refused(path, *parts):
+    """The message of the refusal, in which all ``parts`` occur."""
+    with pytest.raises(RecordingError) as error:
+        read_table(path)
+    message = str(error.value)
+    assert message.isprintable() and len(message) < 400
+    assert all(part in message for part in parts), message
+    return message
 
 
 def planting(marker: Path, variable: str) -> str:
