@@ -31,10 +31,14 @@ def visible(text: object) -> str:
     return UNSEEN.sub(_escape, str(text))
 
 
+def escaped(text: object) -> str:
+    """The text with what a terminal or UTF-8 cannot show as escapes: line ends, controls, lone surrogates."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in str(text))
+
+
 def shown(text: object, most: int = MOST_SHOWN) -> str:
     """A name from a file as short printable text, safe for a terminal."""
-    text = str(text)
-    text = text if text.isprintable() else repr(text)[1:-1]
+    text = escaped(text)
     return text if len(text) <= most else f"{text[: most - 3]}..."
 
 

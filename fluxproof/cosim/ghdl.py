@@ -116,7 +116,7 @@ def run(
 
 
 def _waves(folder: Path) -> list[str]:
-    """GHDL's option for the waveform of a run where FLUXPROOF_WAVES is set; of its formats FST alone takes every top."""
+    """GHDL's option for the waveform of a run where FLUXPROOF_WAVES is set; only FST takes every top."""
     return [f"--fst={folder / 'waves.fst'}"] if os.environ.get("FLUXPROOF_WAVES") else []
 
 

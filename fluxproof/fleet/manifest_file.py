@@ -13,8 +13,8 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from fluxproof.diagnosis.ground.limits import limited
 from fluxproof.diagnosis.ground.recording import RecordingError
-from fluxproof.diagnosis.readers.memory import limited_memory
 from fluxproof.diagnosis.readers.table import shown
 from golden_model.regular_file import open_regular
 
@@ -146,7 +146,7 @@ def _check_text(at: str, text: str) -> None:
 
 def _parquet(path: Path) -> list[tuple[int, dict[str, str]]]:
     try:
-        with open_regular(path) as file, limited_memory(), pq.ParquetFile(file) as parquet:
+        with open_regular(path) as file, limited(path), pq.ParquetFile(file) as parquet:
             schema = parquet.schema_arrow
             _check_names(path, schema.names)
             if (rows := parquet.metadata.num_rows) > MOST_ROWS:

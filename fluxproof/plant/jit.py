@@ -9,6 +9,7 @@ must include `SOURCE_HASH` in its key.
 
 import hashlib
 import os
+import stat
 import tempfile
 from pathlib import Path
 
@@ -25,15 +26,31 @@ def _source_hash():
 
 
 def _cache_root():
-    """build/ of a checkout; for an installed package the user's cache folder, else the temporary one."""
+    """build/ of a checkout; for an installed package the user's cache folder, else a private temporary one."""
     if (PACKAGE.parent / "pyproject.toml").is_file() and os.access(PACKAGE.parent, os.W_OK):
         return PACKAGE.parent / "build"
     try:
         cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "fluxproof"
         cache.mkdir(parents=True, exist_ok=True)
     except (OSError, RuntimeError):  # read-only, or a user without a home
-        return Path(tempfile.gettempdir()) / "fluxproof"
+        return _private(Path(tempfile.gettempdir()) / f"fluxproof-{_user()}")
     return cache
+
+
+def _private(folder: Path) -> Path:
+    """The folder if it is this user's alone, else a new one: numba unpickles its cache, which others must not write."""
+    try:
+        folder.mkdir(mode=0o700, exist_ok=True)
+        found = os.lstat(folder)
+        if stat.S_ISDIR(found.st_mode) and found.st_uid == _user() and not found.st_mode & 0o022:
+            return folder
+    except OSError:  # a file of that name
+        pass
+    return Path(tempfile.mkdtemp(prefix="fluxproof-"))
+
+
+def _user() -> int:
+    return getattr(os, "getuid", lambda: 0)()
 
 
 SOURCE_HASH = _source_hash()

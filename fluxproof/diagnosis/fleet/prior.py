@@ -29,12 +29,12 @@ from fluxproof.diagnosis.fleet.row import hypothesis_rows, one_line
 from fluxproof.diagnosis.fleet.schema import COLUMNS
 from fluxproof.diagnosis.fleet.values import values_of
 from fluxproof.diagnosis.ground import constants as k
+from fluxproof.diagnosis.ground.limits import limited
 from fluxproof.diagnosis.ground.nominal import load_nominal
 from fluxproof.diagnosis.ground.plant_section import MOST_MAP_BYTES
 from fluxproof.diagnosis.ground.recording import RecordingError
 from fluxproof.diagnosis.ground.result import Fleet, InFleet
 from fluxproof.diagnosis.inference.posterior import Posterior
-from fluxproof.diagnosis.readers.memory import limited_memory
 from golden_model.drive_file import MOST_BYTES
 from golden_model.regular_file import open_regular, read_regular
 
@@ -69,7 +69,7 @@ def read_fleet(path) -> list[dict]:
     """The rows of a fleet.parquet; RecordingError says what else the file is."""
     expected = "expected a fleet.parquet of `fluxproof fleet`"
     try:
-        with open_regular(path) as file, limited_memory(), pq.ParquetFile(file) as parquet:
+        with open_regular(path) as file, limited(path), pq.ParquetFile(file) as parquet:
             if (rows := parquet.metadata.num_rows) > MOST_ROWS:
                 raise RecordingError(f"{path}: {rows} rows; at most {MOST_ROWS} are read")
             found = parquet.schema_arrow

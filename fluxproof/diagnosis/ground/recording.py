@@ -22,6 +22,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from fluxproof.quote import escaped
+
 COLUMNS = {
     "t": "s",
     "i_a": "A",
@@ -54,7 +56,13 @@ COLUMNS = {
 
 
 class RecordingError(ValueError):
-    """Unusable input; the message is one line with the file, the line or column, and what was expected."""
+    """Unusable input; the message is one line with the file, the line or column, and what was expected.
+
+    What a terminal or UTF-8 cannot show, as in some names of files, is escaped.
+    """
+
+    def __init__(self, message: object = ""):
+        super().__init__(escaped(message))
 
 
 @dataclass(frozen=True)

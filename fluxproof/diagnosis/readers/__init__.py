@@ -1,7 +1,8 @@
 """Reads a recording's file into a Table; the format is recognised by content and must agree with the file name.
 
-Files are untrusted: nothing in them is executed (no pickles), links to other files are not followed, and sizes are
-checked before memory is allocated.  Any exception of a parsing library becomes a RecordingError of one line.
+Files are untrusted: nothing in them is executed (no pickles, no formulas), links to other files are not followed, and
+time and memory are limited by the file's size (limits.py).  Any exception of a parsing library becomes a RecordingError
+of one line.  docs/security.md states what each library could do and why it does not.
 """
 
 from __future__ import annotations
@@ -9,18 +10,16 @@ from __future__ import annotations
 import contextlib
 import gc
 import importlib
-import os
+import io
 import pkgutil
-import stat
 import sys
 import warnings
 from pathlib import Path
 
+from fluxproof.diagnosis.ground.limits import head_of, limited
 from fluxproof.diagnosis.ground.recording import RecordingError
-from fluxproof.diagnosis.readers.memory import limited_memory
 from fluxproof.diagnosis.readers.table import Select, Table, shown
-
-HEAD_BYTES = 4096
+from fluxproof.quote import escaped
 
 
 def readers() -> list:
@@ -33,18 +32,20 @@ def readers() -> list:
 def read_table(path, select: Select | None = None) -> Table:
     """The file's columns; RecordingError names the file and what was expected."""
     path = Path(path)
-    head = _head(path)
-    reader = _reader_of(path, head)
-    with warnings.catch_warnings(), limited_memory(), _quiet_finalizers():
+    reader = _reader_of(path, head_of(path))
+    for library in reader.LIBRARIES:
+        with contextlib.suppress(ImportError):  # the reader reports it
+            importlib.import_module(library)
+    with warnings.catch_warnings(), _quiet(), limited(path):
         warnings.simplefilter("ignore")  # a damaged file leads to findings or errors of this package instead
         try:
             return reader.read(path, select)
         except RecordingError as error:
-            if str(path) in str(error):
+            if escaped(path) in str(error):
                 raise
             failure = str(error)
         except MemoryError:
-            failure = "too large for the memory limit"
+            failure = "too large for the memory limit of its size"
         except (Exception, SystemExit) as error:  # parsing libraries raise anything on damaged content
             first = (str(error).strip().splitlines() or [type(error).__name__])[0]
             failure = f"not a readable {reader.FORMAT} file: {shown(first, 160)}"
@@ -53,32 +54,15 @@ def read_table(path, select: Select | None = None) -> Table:
 
 
 @contextlib.contextmanager
-def _quiet_finalizers():
-    """Suppress tracebacks that incomplete objects of a parsing library print when they are deleted."""
+def _quiet():
+    """Suppress what a parsing library prints of a damaged file, also when it deletes its incomplete objects."""
     hook = sys.unraisablehook
     sys.unraisablehook = lambda _: None
     try:
-        yield
+        with contextlib.redirect_stdout(io.StringIO()):
+            yield
     finally:
         sys.unraisablehook = hook
-
-
-def _head(path: Path) -> bytes:
-    """The first bytes of an ordinary, non-empty file."""
-    try:
-        mode = os.stat(path).st_mode
-        if not stat.S_ISREG(mode):
-            raise RecordingError(f"{path}: not a file")
-        with open(path, "rb") as file:
-            head = file.read(HEAD_BYTES)
-    except (OSError, ValueError) as error:
-        if isinstance(error, RecordingError):
-            raise
-        reason = getattr(error, "strerror", None) or error
-        raise RecordingError(f"{shown(path, 200)}: cannot be read: {reason}") from None
-    if not head:
-        raise RecordingError(f"{path}: the file is empty")
-    return head
 
 
 def _reader_of(path: Path, head: bytes):

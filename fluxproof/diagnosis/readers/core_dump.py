@@ -6,6 +6,7 @@ from fluxproof.diagnosis.readers.table import Table, chosen
 
 FORMAT = "telemetry dump"
 SUFFIXES = (".dump",)
+LIBRARIES = ("fluxproof.diagnosis.replay.telemetry",)
 
 
 def matches(head: bytes, path) -> bool:

@@ -7,17 +7,21 @@ Objects of classes (timeseries, table) contain no plain numbers; save arrays or 
 
 from __future__ import annotations
 
+import os
 import struct
 import zlib
 
 import numpy as np
 
+from fluxproof.diagnosis.ground.limits import check_cells, most_cells
 from fluxproof.diagnosis.ground.recording import RecordingError
-from fluxproof.diagnosis.readers.hdf5 import SIGNATURE, declared_cells, safe_datasets
-from fluxproof.diagnosis.readers.table import MAX_CELLS, Table, as_columns, chosen, row_limit, shown, too_long
+from fluxproof.diagnosis.readers.hdf5 import SIGNATURE
+from fluxproof.diagnosis.readers.hdf5_walk import check_readable, check_references, tree
+from fluxproof.diagnosis.readers.table import Table, as_columns, chosen, row_limit, too_long
 
 FORMAT = "MATLAB"
 SUFFIXES = (".mat",)
+LIBRARIES = ("h5py", "pymatreader")
 COMPRESSED = 15  # tag of a compressed element of a version 5 file
 NAMES, VALUES, UNITS = (
     ("Name", "name", "label", "Label"),
@@ -41,9 +45,12 @@ def read(path, select=None) -> Table:
         import h5py
 
         with h5py.File(path, "r") as file:
-            datasets = safe_datasets(file, path)
-            if declared_cells(datasets) > MAX_CELLS:
-                raise RecordingError(f"{path}: more than {MAX_CELLS} numbers; save it in parts or as HDF5")
+            datasets, known = tree(file, path)
+            check_references(datasets, known, path)
+            check_cells(path, sum(dataset.size or 0 for dataset in datasets.values()))
+            for dataset in datasets.values():
+                if dataset.size:
+                    check_readable(dataset, path)
     else:
         _limit_inflated(path)
     arrays: dict[str, np.ndarray] = {}
@@ -111,8 +118,8 @@ def _put(name, array, arrays) -> None:
 
 
 def _limit_inflated(path) -> None:
-    """Reject a version 5 file whose compressed elements unpack to more than the limit."""
-    left = 8 * MAX_CELLS
+    """Reject a version 5 file whose compressed elements unpack to more than the limit of its size."""
+    most = left = 8 * most_cells(os.stat(path).st_size)
     with open(path, "rb") as file:
         head = file.read(128)
         order = "<" if head[126:128] == b"IM" else ">"
@@ -128,5 +135,5 @@ def _limit_inflated(path) -> None:
                     left -= len(unpacker.decompress(packed, 1 << 24))
                     packed = unpacker.unconsumed_tail
                     if left < 0:
-                        limit = 8 * MAX_CELLS / 1e9
-                        raise RecordingError(f"{shown(path, 200)}: unpacks to more than {limit:.1f} GB")
+                        size = os.stat(path).st_size
+                        raise RecordingError(f"{path}: unpacks from {size} bytes to more than {most / 1e6:.0f} MB")

@@ -5,15 +5,27 @@ Pickles are never loaded, since loading one runs its code.  A matrix without nam
 
 from __future__ import annotations
 
+import math
 import zipfile
 
 import numpy as np
 
+from fluxproof.diagnosis.ground.limits import check_cells
 from fluxproof.diagnosis.ground.recording import RecordingError
-from fluxproof.diagnosis.readers.table import MAX_CELLS, Table, as_columns, chosen, row_limit, shown, too_long
+from fluxproof.diagnosis.readers.table import (
+    MAX_COLUMNS,
+    Table,
+    as_columns,
+    chosen,
+    repeated,
+    row_limit,
+    shown,
+    too_long,
+)
 
 FORMAT = "NumPy"
 SUFFIXES = (".npy", ".npz")
+LIBRARIES = ()
 NPY = b"\x93NUMPY"
 
 
@@ -33,48 +45,74 @@ def read(path, select=None) -> Table:
     """The numeric arrays."""
     with open(path, "rb") as file:
         single = file.read(len(NPY)) == NPY
-    arrays = _single(path) if single else _archive(path)
-    # "meta" and other scalars or texts of an archive are not columns.
-    arrays = {name: a for name, a in arrays.items() if a.ndim and a.size > 1}
-    names = chosen(dict.fromkeys(arrays, ""), select, path)
-    columns, text = as_columns({name: arrays[name] for name in names}, path)
+    return _single(path, select) if single else _archive(path, select)
+
+
+def _table(arrays, path) -> Table:
+    """The chosen arrays as columns."""
+    columns, text = as_columns(arrays, path)
     table = Table(columns, text=text)
-    longest = max(len(arrays[name]) for name in names)
-    if longest > row_limit(len(names)):
-        table.problems.append(too_long(row_limit(len(names)), longest))
+    longest = max(a.size for a in arrays.values())
+    if longest > row_limit(len(arrays)):
+        table.problems.append(too_long(row_limit(len(arrays)), longest))
     return table
 
 
-def _single(path) -> dict[str, np.ndarray]:
+def _single(path, select) -> Table:
     """The columns of one array, memory-mapped instead of read as a whole."""
     array = np.load(path, mmap_mode="r", allow_pickle=False)
     if array.dtype.names:
-        return {name: array[name] for name in array.dtype.names if array.ndim == 1 and array[name].ndim == 1}
-    if array.ndim != 2:
+        arrays = {name: array[name] for name in array.dtype.names if array.ndim == 1 and array[name].ndim == 1}
+    elif array.ndim != 2:
         raise RecordingError(
             f"{path}: an array of {array.ndim} dimensions without names; a matrix is expected"
         )
-    if array.shape[0] < array.shape[1]:
-        array = array.T
-    return {str(k + 1): array[:, k] for k in range(min(array.shape[1], 4096))}
+    else:
+        array = array.T if array.shape[0] < array.shape[1] else array
+        arrays = {str(k + 1): array[:, k] for k in range(min(array.shape[1], MAX_COLUMNS))}
+    arrays = {name: a for name, a in arrays.items() if a.size > 1}
+    names = chosen(dict.fromkeys(arrays, ""), select, path)
+    return _table({name: arrays[name] for name in names}, path)
 
 
-def _archive(path) -> dict[str, np.ndarray]:
-    """The arrays of an .npz, unpacked only if the declared size is within the limit."""
+def _archive(path, select) -> Table:
+    """The chosen arrays of an .npz; their declared sizes are checked before any is unpacked."""
     with zipfile.ZipFile(path) as archive:
-        size = sum(info.file_size for info in archive.infolist())
-    if size > 8 * MAX_CELLS:
-        raise RecordingError(
-            f"{path}: unpacks to {size / 1e9:.1f} GB; at most {8 * MAX_CELLS / 1e9:.1f} GB are read"
-        )
-    arrays = {}
-    with np.load(path, allow_pickle=False) as archive:
-        for name in archive.files:
-            try:
-                arrays[name] = archive[name]
-            except ValueError as error:
-                if "pickle" not in str(error).lower():
+        members = [m for m in archive.infolist() if m.filename.endswith(".npy")]
+        sizes, plain = {}, 0
+        for member in members:
+            name = member.filename.removesuffix(".npy")
+            size, is_plain = _declared(path, archive, member)
+            plain += is_plain
+            # "meta" and other scalars or texts of an archive are not columns.
+            if is_plain and size > 1:
+                sizes[name] = size
+        if not plain:
+            raise RecordingError(f"{path}: contains no plain array; pickled objects are not loaded")
+        twice = repeated(m.filename.removesuffix(".npy") for m in members)
+        names = chosen(dict.fromkeys(sizes, ""), select, path, twice)
+        check_cells(path, sum(sizes[name] for name in names))
+        arrays = {}
+        for name in names:
+            with archive.open(f"{name}.npy") as file:
+                try:
+                    arrays[name] = np.lib.format.read_array(file, allow_pickle=False)
+                except ValueError as error:
                     raise RecordingError(f"{path}: array {shown(name)}: {shown(error, 120)}") from None
-    if not arrays:
-        raise RecordingError(f"{path}: contains no plain array; pickled objects are not loaded")
-    return arrays
+    return _table(arrays, path)
+
+
+def _declared(path, archive, member) -> tuple[int, bool]:
+    """(numbers that the header of one array declares, whether it is stored without pickled objects)."""
+    form = np.lib.format
+    with archive.open(member) as file:
+        try:
+            version = form.read_magic(file)
+            header = form.read_array_header_1_0 if version == (1, 0) else form.read_array_header_2_0
+            shape, _, dtype = header(file)
+        except ValueError as error:
+            name = shown(member.filename)
+            raise RecordingError(f"{path}: array {name}: {shown(error, 120)}") from None
+    if any(n < 0 for n in shape):
+        raise RecordingError(f"{path}: array {shown(member.filename)} declares a negative size")
+    return math.prod(shape) * max(1, dtype.itemsize // 8), not dtype.hasobject

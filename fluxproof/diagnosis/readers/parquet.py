@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import os
+
 import numpy as np
 
+from fluxproof.diagnosis.ground.limits import check_cells, most_cells
 from fluxproof.diagnosis.ground.recording import RecordingError
 from fluxproof.diagnosis.readers.clock import seconds
-from fluxproof.diagnosis.readers.table import Table, chosen, row_limit, too_long
+from fluxproof.diagnosis.readers.table import Table, chosen, repeated, row_limit, shown, too_long
 
 FORMAT = "Parquet"
 SUFFIXES = (".parquet", ".pq")
+LIBRARIES = ("pyarrow.parquet",)
 
 
 def matches(head: bytes, path) -> bool:
@@ -21,7 +25,7 @@ def read(path, select=None) -> Table:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    file = pq.ParquetFile(path)
+    file = pq.ParquetFile(pa.OSFile(str(path)))  # never an address of a remote store
     schema = file.schema_arrow
     numeric, text = {}, []
     for column in schema:
@@ -32,15 +36,14 @@ def read(path, select=None) -> Table:
             numeric[column.name] = ""
         else:
             text.append(column.name)
-    names = chosen(numeric, select, path)
-    if len(set(schema.names)) != len(schema.names):
-        twice = next(name for name in schema.names if schema.names.count(name) > 1)
-        raise RecordingError(f"{path}: duplicate column {twice}")
+    names = chosen(numeric, select, path, repeated(schema.names))
     limit = row_limit(len(names))
     rows = file.metadata.num_rows
     if rows == 0:
         raise RecordingError(f"{path}: no rows")
-    # Row group by row group, so that a size declared by a damaged or hostile footer is never allocated at once.
+    check_cells(path, min(rows, limit) * len(names))
+    _check_pages(path, file.metadata, names)
+    # Batch by batch, so that a size declared by a damaged or hostile footer is never allocated at once.
     parts: dict[str, list[np.ndarray]] = {name: [] for name in names}
     have = 0
     for batch in file.iter_batches(batch_size=1 << 18, columns=names):
@@ -56,6 +59,20 @@ def read(path, select=None) -> Table:
     if rows > limit:
         table.problems.append(too_long(limit, rows))
     return table
+
+
+def _check_pages(path, metadata, names) -> None:
+    """RecordingError if a column of a row group, which is read as a whole, unpacks to more than the file's limit."""
+    most = 8 * most_cells(os.stat(path).st_size)
+    for k in range(metadata.num_row_groups):
+        group = metadata.row_group(k)
+        for c in range(group.num_columns):
+            column = group.column(c)
+            if column.path_in_schema in names and column.total_uncompressed_size > most:
+                raise RecordingError(
+                    f"{path}: column {shown(column.path_in_schema)} of row group {k} unpacks to "
+                    f"{column.total_uncompressed_size} bytes; at most {most} are read of a file of this size"
+                )
 
 
 def _floats(array, pa) -> np.ndarray:

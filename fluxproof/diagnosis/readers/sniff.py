@@ -17,6 +17,7 @@ from fluxproof.diagnosis.readers.clock import MOMENT
 
 SNIFF_BYTES = 1 << 18
 SNIFF_LINES = 500
+MOST_FIELDS = 20_000
 COMMENT = ("#", "%", "//")
 SEPARATORS = (";", "\t", ",", "|", " ")
 MISSING = {"", "nan", "-nan", "inf", "-inf", "+inf", "na", "n/a", "null", "none", "-"}
@@ -42,7 +43,9 @@ class Layout:
 
 
 def encoding_of(head: bytes) -> str:
-    """UTF-16 and UTF-8 by their byte-order marks, else UTF-8 if it decodes, else Windows-1252."""
+    """UTF-16 and UTF-8 by their byte-order marks or their zero bytes, else UTF-8 if it decodes, else Windows-1252."""
+    if half := half_zero(head):
+        return half
     if head.startswith((b"\xff\xfe", b"\xfe\xff")):
         return "utf-16"
     if head.startswith(b"\xef\xbb\xbf"):
@@ -55,6 +58,15 @@ def encoding_of(head: bytes) -> str:
     return "utf-8"
 
 
+def half_zero(head: bytes) -> str:
+    """ "utf-16-le" or "utf-16-be" if nearly every second byte is zero and no other, as in a table without a mark."""
+    low, high = head[:-1:2], head[1::2]
+    for half, other, name in ((high, low, "utf-16-le"), (low, high, "utf-16-be")):
+        if len(half) > 2 and half.count(0) >= 0.9 * len(half) and not other.count(0):
+            return name
+    return ""
+
+
 def sniff(path) -> Layout:
     """The layout of the file; RecordingError when no line of numbers is found."""
     with open(path, "rb") as file:
@@ -64,10 +76,10 @@ def sniff(path) -> Layout:
     if len(head) == SNIFF_BYTES:
         lines.pop()  # cut by the limit
         if not lines:
-            raise RecordingError(
-                f"{path}:1: no line end in the first {SNIFF_BYTES} bytes; rows of numbers expected"
-            )
+            found = _fields_in(head, encoding)
+            raise RecordingError(f"{path}:1: no line end in the first {SNIFF_BYTES} bytes; {found}")
     lines = lines[:SNIFF_LINES]
+    _reject_wide(path, lines)
     candidates = (_candidate(lines, separator, decimal) for separator in SEPARATORS for decimal in ".,")
     score, separator, decimal, first, width = max(candidates, key=lambda c: c[0])
     if score <= 0:
@@ -79,6 +91,23 @@ def sniff(path) -> Layout:
     if names[0] == "1" and len(above) > 2 and all(above) and separator != " ":
         raise RecordingError(f"{path}:{first}: a header of {len(above)} names above rows of {width} fields")
     return Layout(encoding, separator, decimal, first, names, units)
+
+
+def _fields_in(head: bytes, encoding: str) -> str:
+    """How many columns a first line without an end has at least."""
+    text = head.decode(encoding, "replace")
+    most = max(text.count(separator) for separator in SEPARATORS)
+    if not most:
+        return "rows of numbers expected"
+    return f"more than {most} columns in it; at most {MOST_FIELDS} columns are read"
+
+
+def _reject_wide(path, lines) -> None:
+    """RecordingError if a line has more fields than the limit."""
+    for k, line in enumerate(lines):
+        fields = 1 + max(line.count(separator) for separator in SEPARATORS)
+        if fields > MOST_FIELDS:
+            raise RecordingError(f"{path}:{k + 1}: {fields} columns; at most {MOST_FIELDS} are read")
 
 
 def _candidate(lines, separator, decimal):

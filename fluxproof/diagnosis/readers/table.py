@@ -4,6 +4,7 @@ A reader is one file in this folder with
 
     FORMAT    its name in messages
     SUFFIXES  file names that claim this format, lower case, with the dot
+    LIBRARIES what ``read`` imports, which neither counts as its time nor as its memory
     matches(head, path)  whether the content (first bytes) is this format
     read(path, select)   -> Table
 
@@ -13,17 +14,18 @@ large file use memory; None reads all.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
 
+from fluxproof.diagnosis.ground.limits import MAX_CELLS
 from fluxproof.diagnosis.ground.recording import Problem, RecordingError
 from fluxproof.quote import shown
 
 MAX_ROWS = 20_000_000
 MAX_COLUMNS = 4096
-MAX_CELLS = 200_000_000  # 1.6 GB as float64: limit of a reader
 
 Select = Callable[[dict[str, str]], list[str]]
 
@@ -46,14 +48,31 @@ class Table:
     meta: dict = field(default_factory=dict)
 
 
-def chosen(names: dict[str, str], select: Select | None, path) -> list[str]:
-    """The names to read, at most MAX_COLUMNS."""
-    wanted = list(names) if select is None else select(names)
+def chosen(names: dict[str, str], select: Select | None, path, twice=(), where: str = "") -> list[str]:
+    """The names to read, at most MAX_COLUMNS.
+
+    twice: names that the file gives to several columns; RecordingError if one of them is needed, since nobody can tell
+    which is meant.  where: ":LINE" of the names.
+    """
+    try:
+        wanted = list(names) if select is None else select(names)
+    except RecordingError as error:
+        if not twice:
+            raise
+        raise RecordingError(f"{error}; the file has column {shown(twice[0])} twice, is one of them this?") from None
+    doubtful = [name for name in wanted if name in twice]
+    if doubtful:
+        raise RecordingError(f"{path}{where}: duplicate column {shown(doubtful[0])}; each name is needed once")
     if len(wanted) > MAX_COLUMNS:
         raise RecordingError(f"{path}: {len(wanted)} columns; at most {MAX_COLUMNS} are read")
     if not wanted:
         raise RecordingError(f"{path}: contains no numeric column")
     return wanted
+
+
+def repeated(names) -> list[str]:
+    """The names that occur more than once, in order."""
+    return [name for name, count in Counter(names).items() if count > 1]
 
 
 def row_limit(n_columns: int) -> int:

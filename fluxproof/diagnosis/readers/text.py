@@ -13,11 +13,12 @@ import numpy as np
 
 from fluxproof.diagnosis.ground.recording import Problem, RecordingError
 from fluxproof.diagnosis.readers.clock import moments
-from fluxproof.diagnosis.readers.sniff import sniff
-from fluxproof.diagnosis.readers.table import Table, chosen, row_limit, shown, too_long
+from fluxproof.diagnosis.readers.sniff import half_zero, sniff
+from fluxproof.diagnosis.readers.table import Table, chosen, repeated, row_limit, shown, too_long
 
 FORMAT = "text"
 SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".asc", ".log")
+LIBRARIES = ("pandas",)
 MOSTLY_TEXT = 0.5  # a column with a larger share of words is not numeric
 FIRST_WORDS = 1000  # of a column, among which thousands separators are looked for
 THOUSANDS = {  # by the decimal mark
@@ -27,8 +28,8 @@ THOUSANDS = {  # by the decimal mark
 
 
 def matches(head: bytes, path) -> bool:
-    """Text has no zero bytes and hardly any control characters."""
-    if head.startswith((b"\xff\xfe", b"\xfe\xff")):
+    """Text has no zero bytes, except in UTF-16, and hardly any control characters."""
+    if head.startswith((b"\xff\xfe", b"\xfe\xff")) or half_zero(head):
         return True
     odd = sum(byte < 32 and byte not in b"\t\n\r\f" for byte in head)
     return b"\0" not in head and odd <= len(head) // 200
@@ -40,10 +41,7 @@ def read(path, select=None) -> Table:
 
     layout = sniff(path)
     units = {name: unit for name, unit in zip(layout.names, layout.units, strict=True)}
-    wanted = chosen(units, select, path)
-    for name in wanted:
-        if layout.names.count(name) > 1:
-            raise RecordingError(f"{path}:{layout.first}: duplicate column {shown(name)}")
+    wanted = chosen(units, select, path, repeated(layout.names), f":{layout.first}")
     index = [layout.names.index(name) for name in wanted]
     limit = row_limit(len(layout.names))
     try:

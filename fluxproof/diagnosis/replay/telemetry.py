@@ -29,6 +29,7 @@ import numpy as np
 
 from fluxproof.diagnosis.ground.recording import RecordingError
 from fluxproof.diagnosis.replay.telemetry_columns import columns_of
+from fluxproof.quote import shown
 from golden_model import fluxproof
 from golden_model.drive_checks import CARRIER_HALF_RANGE
 from golden_model.io import sample_latch
@@ -198,7 +199,7 @@ def _read_header(path, file, size) -> tuple[dict, int]:
         raise RecordingError(f"{path}: the header does not identify fluxproof telemetry")
     if header.get("version") != VERSION:
         raise RecordingError(
-            f"{path}: dump version {header.get('version')!r}: this reader knows version {VERSION}"
+            f"{path}: dump version {shown(header.get('version'))}: this reader knows version {VERSION}"
         )
     for key, kind in REQUIRED.items():
         if type(header.get(key)) is not kind:
@@ -219,20 +220,18 @@ def _check_names(path, header):
         legal = {name: lo <= header["config"][name] <= hi for name, (lo, hi) in CONFIG.items()}
         sane = all(isinstance(x, float) and math.isfinite(x) and x > 0.0 for x in numbers)
     except (KeyError, TypeError) as error:
-        raise RecordingError(f"{path}: header: bases, config or fields are incomplete: {error}") from None
+        raise RecordingError(f"{path}: header: bases, config or fields are incomplete: {shown(error)}") from None
     if not sane or not all(legal.values()):
         raise RecordingError(f"{path}: header: a scale or a generic of the core is out of its range")
     known = set(fluxproof.Observed._fields)
     inputs, answers = names[: len(INPUTS)], names[len(INPUTS) :]
     strangers = [name for name in answers if name not in known]
     if inputs != list(INPUTS) or strangers or len(set(answers)) != len(answers):
-        shown = strangers or inputs
-        raise RecordingError(
-            f"{path}: header: fields {', '.join(map(str, shown))} are not those of this core"
-        )
+        which = shown(", ".join(map(str, strangers or inputs)), 200)
+        raise RecordingError(f"{path}: header: fields {which} are not those of this core")
     for name, value in header["registers"].items():
         if name not in fluxproof.REGISTERS:
-            raise RecordingError(f"{path}: header: register {name!r} is unknown to this core")
+            raise RecordingError(f"{path}: header: register {shown(name)} is unknown to this core")
         if type(value) is not int or not -(2**31) <= value < 2**31:
             raise RecordingError(
                 f"{path}: header: register {name} = {str(value)[:40]} must be a 32-bit integer"

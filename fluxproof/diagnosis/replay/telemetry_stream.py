@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fluxproof.diagnosis.ground.limits import limited
 from fluxproof.diagnosis.ground.recording import RecordingError
 from fluxproof.diagnosis.replay.telemetry import write_dump
 from golden_model.fluxproof import Sample
@@ -55,12 +56,13 @@ class Capture(NamedTuple):
 
 
 def read_capture(path) -> Capture:
-    """Read a file of little-endian words; RecordingError if it is unreadable, contains no packet or is damaged."""
+    """Read a file of little-endian words; RecordingError if it is unreadable, has no packet or is damaged."""
     try:
         raw = read_regular(path, MOST_BYTES)
+        with limited(path):
+            return parse(raw, str(path))
     except OSError as error:
         raise RecordingError(f"{path}: cannot be read: {error.strerror or error}") from None
-    return parse(raw, str(path))
 
 
 def parse(raw: bytes, name: str = "capture") -> Capture:

@@ -1,6 +1,6 @@
-"""A limit on the memory for reading one file (not itself a reader).
+"""A limit on the memory for reading one file.
 
-Readers check the sizes that a file declares where possible.  This limit catches the rest, such as compressed data that
+Readers check the sizes that a file declares (limits.py).  This limit catches the rest, such as compressed data that
 unpack to a thousand times their size: the allocation fails, and the file is rejected.
 """
 
@@ -8,11 +8,9 @@ from __future__ import annotations
 
 import contextlib
 
-LIMIT_BYTES = 8 << 30
-
 
 @contextlib.contextmanager
-def limited_memory(limit: int = LIMIT_BYTES):
+def limited_memory(limit: int):
     """Within the block, allocations beyond ``limit`` more bytes fail; no limit on systems without this function."""
     try:
         import resource
