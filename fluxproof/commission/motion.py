@@ -237,7 +237,7 @@ def judge(s: Session, first: Step, points: list[np.ndarray], v_1: float) -> Step
     (r, error), (_, s_error), _ = solve(np.column_stack([cosine * i_d, w_e * psi])[:-1], rest_d[:-1])
     if abs(math.degrees(error)) > LARGEST_ERROR_DEG:
         raise Refusal(
-            f"the EMF says that the encoder's offset is wrong by {math.degrees(error):.0f} degrees, expected "
+            f"the EMF shows that the encoder's offset is wrong by {math.degrees(error):.0f} degrees, expected "
             f"{LARGEST_ERROR_DEG:.0f} at most: the encoder slips, or alignment was disturbed"
         )
     told_q = (w_e * psi + w_l * l_d * i_d + u_q - rest_q)[-1]

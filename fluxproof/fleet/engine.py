@@ -113,7 +113,7 @@ class Engine:
             try:
                 result = future.result()
             except KilledWorker:
-                result = Lost("its worker process ended again and again, such as for want of memory")
+                result = Lost("its worker process ended repeatedly, perhaps for lack of memory")
             future.release()
             more(1)
             yield item, result

@@ -54,7 +54,7 @@ def _documented(recording, *names) -> bool:
 def _refuse(recording, name, message, names=()) -> None:
     """Reject a recording because of a column; names: all columns that a conversion would have changed."""
     if _documented(recording, name, *names):
-        message += "; its unit is documented and was kept: correct the unit in [columns], or the drive file"
+        message += "; its documented unit was not changed: correct the unit in [columns], or the drive file"
     recording.problems.append(Problem("unit", message, name, 0, len(recording), fatal=True))
 
 

@@ -235,12 +235,12 @@ def _usual_names(plan, left, nominal, path) -> None:
         plan.sources[name] = dataclasses.replace(source, by_name=not unit)
     if found:
         read = ", ".join(f"{name} from {shown(plan.sources[name].column)!r}" for name in found)
-        plan.notes.append(f"columns read by their usual names: {read}; [columns] can say otherwise")
+        plan.notes.append(f"columns read by their usual names: {read}; override them in [columns]")
 
 
 def _doubtful(path, columns, name) -> RecordingError:
     return RecordingError(
-        f"{path}: {shown(columns[0])!r} and {shown(columns[1])!r} could both be {name}; say which in [columns]"
+        f"{path}: {shown(columns[0])!r} and {shown(columns[1])!r} could both be {name}; choose one in [columns]"
     )
 
 

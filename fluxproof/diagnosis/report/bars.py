@@ -41,7 +41,7 @@ def fit_bars(fit) -> theme.Picture:
     return theme.picture(
         "fit_bars",
         figure,
-        "Misfit before and after, on operating points that were not fitted and on those that were.",
+        "Misfit before and after, at held-out and at fitted operating points.",
     )
 
 
