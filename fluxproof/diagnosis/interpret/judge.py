@@ -6,7 +6,7 @@ cheap, as the balance is a sum of few terms that a reading scales,
     y = f_u u - f_R R i - f_Ld d(L_d i_d) - f_Lq d(L_q i_q) - f_psi d(psi_m)
 
 then the best ones with the whole search of effects.  A reading has no free size, which the evidence rewards by itself:
-currents in rms are told from a gain error by how exactly the factor is met.
+currents in rms differ from a gain error in how exactly the factor is met.
 """
 
 from __future__ import annotations

@@ -17,7 +17,7 @@ def under(readings, rivals, documented: Diagnosis, answer: Diagnosis, level: flo
 
     ``documented`` if nothing is explained with them: they must explain half of the misfit and of the voltage, as a
     recording in other units leaves a misfit that is nearly all of the simulation's voltage.
-    Voltages are those of the recording: where the bus is recorded at half, the rest is told in recorded volts.
+    Voltages are those of the recording: where the bus is recorded at half, the residual is given in recorded volts.
     readings: tuple of Reading; rivals: list of those that fit as well as the only one.  documented: the answer without
     readings, for the misfit before.
     """
