@@ -245,7 +245,7 @@ def judge(s: Session, first: Step, points: list[np.ndarray], v_1: float) -> Step
     wrong = math.hypot(told_d - u_d[-1], told_q - u_q[-1]) / math.hypot(u_d[-1], u_q[-1])
     if wrong > PREDICTED:
         raise Refusal(
-            f"at a speed that was not fitted the voltage is {100 * wrong:.1f} % off, expected {100 * PREDICTED:.0f} %: "
+            f"at a held-out speed the voltage is {100 * wrong:.1f} % off, expected {100 * PREDICTED:.0f} %: "
             "R, L and psi do not describe this machine"
         )
     k, b, c = (first.notes[name] for name in "kbc")

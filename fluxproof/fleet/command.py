@@ -98,7 +98,7 @@ def lines(outcome) -> list[str]:
     from fluxproof.fleet.page import cause, drift_view, headline
 
     found = outcome.findings
-    out = [headline(found), f"diagnosed {outcome.diagnosed}, kept {outcome.kept} from earlier runs"]
+    out = [headline(found), f"diagnosed {outcome.diagnosed}, reused {outcome.kept} from earlier runs"]
     for design in found.designs:
         out += [
             f"{serial}: {c['title']}: {c['why']}" for serial, fs in design.outliers.items() for c in map(cause, fs)

@@ -40,7 +40,7 @@ def check(recording, nominal) -> None:
     if ratio is not None and abs(ratio - 1.0) < CLOSE:  # the angle moves on as if only the others had not been written
         t = recording["t"]
         recording.columns["t"] = t[0] + (t - t[0]) / times
-        action += f", {step:g} s apart as the angle says"
+        action += f", {step:g} s apart by the angle"
     elif abs(step - nominal.sample_time_s) < CLOSE * step:
         action += f"; if the control samples every {times * step:g} s, correct sample_time_s"
     recording.problems.append(Problem("repeated", message, "", 1, n - len(recording), action))

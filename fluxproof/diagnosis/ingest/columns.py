@@ -265,7 +265,7 @@ def _not_used(plan, left) -> None:
         for column in left:
             unit, known = _unit_of(column, left), split_unit(column)[0] in COLUMNS
             if unit and not known and column not in used and conversion(name, unit, 1) is not None:
-                plan.notes.append(f"column {shown(column)!r} is not used; if it is {name}, say so in [columns]")
+                plan.notes.append(f"column {shown(column)!r} is not used; if it is {name}, assign it in [columns]")
 
 
 def _guesses(missing, names) -> str:
