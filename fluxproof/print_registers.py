@@ -78,7 +78,7 @@ def c_lines(name: str, drive: Drive, result: RegisterSet) -> list[str]:
         "",
         "/* SI values of 1.0 per unit; peak values, electrical speed. */",
         *(f"#define FLUXPROOF_BASE_{key.upper()} {value!r}" for key, value in bases.items()),
-        "/* What the core must have been built with. */",
+        "/* Generics that the core must have been built with. */",
         *(f"#define FLUXPROOF_{key.upper()} {value}" for key, value in generics.items()),
         "",
         "struct fluxproof_setting {",

@@ -4,7 +4,7 @@
 --
 -- Each block starts when its last input is valid and runs in parallel with the blocks that do not depend on it.  Which
 -- input is the last is known, because latencies are constants (a test compares them with the measured ones).
--- An instance's lines: strobes; inputs; settings; outputs.  o and e are what is observed and estimated.
+-- An instance's lines: strobes; inputs; settings; outputs.  o: observed signals; e: estimates.
 -- ESTIMATORS = 0 leaves out the flux estimator and both Adalines: the decoupling then uses the current model alone, as
 -- with flux_mode 0, dead time is not compensated, and what they would show is zero.
 -- Formats: per unit, see golden_model/formats.py; settings as `fluxproof registers drive.toml` prints them.

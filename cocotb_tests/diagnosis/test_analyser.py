@@ -62,7 +62,7 @@ def test_weak_magnets_are_named(tmp_path, nominal):
 
 
 def test_what_is_missing_or_contradicts_itself_is_told(tmp_path, nominal):
-    with pytest.raises(RecordingError, match="missing of a power analyser's table p_el"):
+    with pytest.raises(RecordingError, match="missing for a power-analyser table: p_el"):
         load_recording(written(tmp_path / "a.csv", nominal, drop=("P_el [kW]",)), nominal)
     with pytest.raises(RecordingError, match="p_el is 1.7.* times the apparent power of u_line"):
         load_recording(written(tmp_path / "b.csv", nominal, u_scale=1 / np.sqrt(3)), nominal)

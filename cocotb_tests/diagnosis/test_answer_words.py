@@ -76,7 +76,7 @@ def test_headline_is_short_and_has_no_raw_keys(answer):
 
 def test_a_misfit_above_the_floor_is_not_told_to_be_at_it():
     agree = made_up()["no_mismatch"]
-    for floor, says in ((0.6, "1 V is at the noise floor"), (0.2, "1 V is not larger than such recordings")):
+    for floor, says in ((0.6, "1 V is at the noise floor"), (0.2, "1 V is within the usual error")):
         assert says in sentence(replace(agree, fit=Fit(train_before=1.0, noise_floor=floor)), KNOWN)
 
 
@@ -118,7 +118,7 @@ def test_a_time_is_early_or_late_and_has_no_sign(name, key, periods, says, then)
     "names, explains, text",
     [
         (["cogging"], 0.0, "in the torque"),
-        (["inductance_d", "saturation"], 0.003, "with the others"),
+        (["inductance_d", "saturation"], 0.003, "shared (see total)"),
         (["sampling_skew", "magnet_flux"], (0.002, 0.999), "< 1 %"),
         (["resistance"], 0.0, "–"),
         (["resistance"], 0.5, "50 %"),
@@ -137,9 +137,9 @@ def test_a_share_is_of_the_alternatives_too():
     both = replace(made_up()["partly_explained"], effects=[dead], ambiguity=[["current_lag", "delay"]])
     both.remainder, both.unknown_term = [Remainder("u_dq", 6.0, 1.234, "V", 0.2)], None
     text = sentence(both, KNOWN)
-    assert ", with one of late currents behind a filter and 1 other effect, explain " in text, text
+    assert ", with one of currents delayed by a filter and 1 other effect, explain " in text, text
     alone = sentence(replace(both, effects=[]), KNOWN)
-    assert alone.startswith("One of late currents behind a filter and delay of the voltage explains "), alone
+    assert alone.startswith("One of currents delayed by a filter and delay of the voltage explains "), alone
 
 
 def test_an_effect_outside_the_catalogue_is_called_by_its_meaning():
@@ -175,7 +175,7 @@ def test_advice_names_what_shows_at_an_order():
 
     assert CATALOGUE["emf_harmonics"].title in at(6.0) and CATALOGUE["dead_time"].title in at(6.0)
     assert CATALOGUE["encoder_eccentricity"].title in at(1.0 / NOMINAL.machine.pole_pairs)
-    assert "no known effect shows there" in at(5.0)
+    assert "no known effect acts at this order" in at(5.0)
 
 
 @pytest.mark.parametrize(
@@ -199,7 +199,7 @@ def test_advice_uses_the_variable_of_the_unknown_term(formula, says):
 def test_no_mismatch_says_what_was_covered():
     answer = replace(made_up()["no_mismatch"], evidence=evidence(0.0, after=False))
     assert "i_q of -5 to 5 A" in advice(answer, NOMINAL, KNOWN)
-    assert "nor are friction and cogging torque, as no torque was compared" in advice(answer, NOMINAL, KNOWN)
+    assert "and for friction and cogging torque (no torque was compared), the drive" in advice(answer, NOMINAL, KNOWN)
     answer.evidence.torque = True
     assert "friction" not in advice(answer, NOMINAL, KNOWN)
 
@@ -216,9 +216,9 @@ def test_what_was_corrected_is_told_and_to_be_changed(code, says, how):
     answer = replace(made_up()["no_mismatch"], problems=[found])
     assert sentence(answer, KNOWN).startswith(f"Simulation and recording agree once corrected: {says}. The misfit")
     told = advice(answer, NOMINAL, KNOWN)
-    assert how in told and "[columns]" in told and "Nothing else to change" in told, told
+    assert how in told and "[columns]" in told and "No other change needed" in told, told
     beside = advice(replace(made_up()["unexplained"], problems=[found]), NOMINAL, KNOWN)
-    assert f" Besides, {says}: correct that in [columns]" in beside and how in beside, beside
+    assert f" In addition, {says}: correct this in [columns]" in beside and how in beside, beside
 
 
 def test_the_headline_knows_what_the_checks_found(tmp_path, monkeypatch):

@@ -218,7 +218,7 @@ def test_at_the_noise_floor_nothing_is_named():
     answer = diagnose(recorded(machine=off), load_nominal(PAPER))
     assert answer.fit.train_before < 1.2 * answer.fit.noise_floor
     assert answer.verdict == "no_mismatch" and not answer.effects and not answer.ambiguity, answer.sentence
-    (note,) = [n for n in answer.notes if "not asserted as recording and simulation agree" in n]
+    (note,) = [n for n in answer.notes if "but recording and simulation already agree within noise" in n]
     assert note.startswith("Winding resistance")
 
 

@@ -17,7 +17,7 @@ def test_one_point_that_warms_up(tmp_path):
     assert values["magnet_flux_drift_wb"] == pytest.approx(-0.05 * PSI, rel=0.06)
     assert values["resistance_temp_coeff_per_k"] == pytest.approx(0.0039, rel=0.1)
     assert answer.fit.holdout_after < answer.fit.noise_floor < 0.1 * answer.fit.holdout_before
-    assert said(answer, "One operating point") and said(answer, "winding was recorded from")
+    assert said(answer, "One operating point") and said(answer, "winding temperature was recorded from")
     faster = found(answer_of(tmp_path, warming(hours=0.2, step_s=0.1)))
     assert faster["magnet_flux_drift_wb"] == pytest.approx(-0.05 * PSI, rel=0.03)
     assert faster["resistance_temp_coeff_per_k"] == pytest.approx(0.0039, rel=0.1)
@@ -40,7 +40,7 @@ def test_a_constant_misfit_at_one_point_is_an_ambiguity(tmp_path):
     columns["u_q_ref"] = 1.04 * columns["u_q_ref"]
     answer = answer_of(tmp_path, columns)
     assert answer.verdict == "ambiguous" and not answer.effects
-    assert {"magnet_flux", "udc_gain"} <= set(answer.ambiguity[-1]) and said(answer, "one point cannot tell why")
+    assert {"magnet_flux", "udc_gain"} <= set(answer.ambiguity[-1]) and said(answer, "one point cannot show why")
     assert answer.fit.train_before == pytest.approx(2.63, abs=0.02) and answer.explained_share > 0.99
     assert answer.fit.train_after < answer.fit.noise_floor and answer.fit.holdout_after < answer.fit.noise_floor
     two_rows = answer_of(tmp_path, table(WEAK, points=[(300.0, 0.0, 4.0)] * 2))
@@ -56,5 +56,5 @@ def test_a_constant_misfit_that_nothing_explains_is_the_remainder(tmp_path):
     assert answer.verdict == "unexplained" and answer.explained_share == 0.0 and not answer.effects
     assert answer.fit.holdout_after == answer.fit.holdout_before == pytest.approx(63.2, abs=0.5)
     assert [part.size for part in answer.remainder] == [pytest.approx(63.2, abs=0.5)]
-    assert said(answer, "would explain the drift, but")
+    assert said(answer, "would explain the drift; not reported, as")
     assert [p.code for p in answer.problems] == ["slow_sampling"]  # at one point a change of signs fits by chance

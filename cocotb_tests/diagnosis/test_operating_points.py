@@ -282,7 +282,7 @@ def test_fast_and_slow_recordings_together(tmp_path):
     (tmp_path / "drive.toml").write_text(DRIVE)
     fast = write(tmp_path / "fast.csv", made(6000, u_dc_gain=1.0))
     answer = diagnose([fast, write(tmp_path / "points.csv", table())], tmp_path / "drive.toml")
-    assert answer.verdict == "no_mismatch" and said(answer, "for harmonics and instants of sampling diagnose fast.csv")
+    assert answer.verdict == "no_mismatch" and said(answer, "for harmonics and sampling instants, diagnose fast.csv")
 
 
 def test_several_slow_recordings_are_joined(tmp_path):

@@ -83,7 +83,7 @@ def test_files_of_several_loggers_share_the_columns(tmp_path):
 def test_a_torque_of_unknown_name_is_noted(tmp_path, nominal):
     table = made(500)
     recording = load_recording(write(tmp_path / "r.csv", {**table, "flange [Nm]": 0.0 * table["i_a"]}), nominal)
-    assert "column 'flange [Nm]' is not used; if it is torque, say so in [columns]" in recording.meta["notes"]
+    assert "column 'flange [Nm]' is not used; if it is torque, assign it in [columns]" in recording.meta["notes"]
     spare = nominal_of(tmp_path, '"flange [Nm]" = ""\ni_a = "i_a"')
     recording = load_recording(write(tmp_path / "r.csv", {**table, "flange [Nm]": 0.0 * table["i_a"]}), spare)
     assert not any("is not used" in note for note in recording.meta["notes"])

@@ -150,7 +150,7 @@ def test_dspace_structures(tmp_path, nominal):
 def test_suffix_of_another_format_is_rejected(tmp_path, nominal):
     path = write(tmp_path / "r.parquet", made())
     path.rename(tmp_path / "r.csv")
-    with pytest.raises(RecordingError, match="the name says text, the content is Parquet"):
+    with pytest.raises(RecordingError, match="the name suggests text, the content is Parquet"):
         load_recording(tmp_path / "r.csv", nominal)
 
 

@@ -100,8 +100,8 @@ def test_a_name_is_judged_against_the_best_set_without_it(tmp_path):
 @pytest.mark.parametrize(
     ("seed", "number", "says"),
     [
-        slowly(SEED, 12, "bent towards full scale"),
-        slowly(LATER, 28, "bent towards full scale"),
+        slowly(SEED, 12, "nonlinear towards full scale"),
+        slowly(LATER, 28, "nonlinear towards full scale"),
         slowly(LATER, 27, "soft shaft"),
         (LAST, 27, "soft shaft"),  # of a machine whose torque depends much on the angle
     ],

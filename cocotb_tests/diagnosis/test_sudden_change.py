@@ -43,7 +43,7 @@ def test_the_lost_flux_and_its_instant_are_named(halves, recording):
     assert step.value == pytest.approx(-LOST * MACHINE.magnet_flux_wb, rel=0.02)
     begins = halves[1]["t"][0]
     assert begins <= instant_of_change(view_of(recording, NOMINAL)) < begins + 0.2
-    assert any("loss was just before" in note for note in answer.notes)
+    assert any("loss occurred just before" in note for note in answer.notes)
 
 
 def test_without_these_effects_no_constant_one_takes_their_place(recording, monkeypatch):

@@ -34,7 +34,7 @@ def found():
 def test_in_a_browser(found, tmp_path):
     saw, log = seen(render(found), tmp_path)
     assert log == "" and saw["first"] == headline(found)
-    assert "2 drives differ from the rest, 1 drifts, 1 group shares an unexplained remainder, 1 rec" in saw["first"]
+    assert "2 drives differ from the rest, 1 drifts, 1 group shares an unexplained residual, 1 rec" in saw["first"]
     assert saw["width"] == pytest.approx(400, abs=20) and saw["overflow"] <= 0 and saw["cut"] == 0
     assert len(saw["pictures"]) == 4 and all(size > 70 for size in saw["pictures"])
     assert saw["fetched"] == [] and saw["scripts"] == 0
@@ -45,6 +45,6 @@ def test_in_a_browser(found, tmp_path):
 def test_nothing_to_tell(tmp_path):
     rows = [row(n, [hypothesis(values=flux(0.1 + 1e-4 * n))], verdict="no_mismatch") for n in range(10)]
     page = render(findings(rows))
-    assert "10 recordings of 10 drives: nothing stands out." in page and "None, at a share of false ones" in page
+    assert "10 recordings of 10 drives: no drive differs." in page and "None, at a share of false ones" in page
     failed = {**row(0, []), "status": "failed", "reason": "not a file", "verdict": "bad_recording"}
     assert "1 recording of" in headline(findings([failed]))

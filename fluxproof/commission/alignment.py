@@ -149,8 +149,8 @@ def judge(s: Session, ways: list[Seen], reverse_given: bool | None) -> Step:
     if reverse_given is not None and reverse_given != reverse:
         raise Refusal(
             f"reversed encoder: its code {'falls' if reverse else 'rises'} while the field turns forward, "
-            f"[sensors] position_reverse = {str(reverse_given).lower()} says otherwise; two phases of the motor or two "
-            "lines of the encoder are exchanged, or leave the key out to have it measured"
+            f"[sensors] position_reverse = {str(reverse_given).lower()} contradicts this; two phases of the motor or "
+            "two lines of the encoder are exchanged, or leave the key out to have it measured"
         )
     sign = -1.0 if reverse else 1.0
     # The field is where the current is, which the dead time moves around the forced angle.

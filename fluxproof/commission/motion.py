@@ -237,7 +237,7 @@ def judge(s: Session, first: Step, points: list[np.ndarray], v_1: float) -> Step
     (r, error), (_, s_error), _ = solve(np.column_stack([cosine * i_d, w_e * psi])[:-1], rest_d[:-1])
     if abs(math.degrees(error)) > LARGEST_ERROR_DEG:
         raise Refusal(
-            f"the EMF says that the encoder's offset is wrong by {math.degrees(error):.0f} degrees, expected "
+            f"the EMF shows that the encoder's offset is wrong by {math.degrees(error):.0f} degrees, expected "
             f"{LARGEST_ERROR_DEG:.0f} at most: the encoder slips, or alignment was disturbed"
         )
     told_q = (w_e * psi + w_l * l_d * i_d + u_q - rest_q)[-1]
@@ -245,7 +245,7 @@ def judge(s: Session, first: Step, points: list[np.ndarray], v_1: float) -> Step
     wrong = math.hypot(told_d - u_d[-1], told_q - u_q[-1]) / math.hypot(u_d[-1], u_q[-1])
     if wrong > PREDICTED:
         raise Refusal(
-            f"at a speed that was not fitted the voltage is {100 * wrong:.1f} % off, expected {100 * PREDICTED:.0f} %: "
+            f"at a held-out speed the voltage is {100 * wrong:.1f} % off, expected {100 * PREDICTED:.0f} %: "
             "R, L and psi do not describe this machine"
         )
     k, b, c = (first.notes[name] for name in "kbc")

@@ -25,7 +25,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("recordings", metavar="RECORDING", nargs="+", help=formats)
     parser.add_argument("--drive", metavar="drive.toml", required=True, help="the nominal drive in SI units")
     parser.add_argument("--out", metavar="DIR", help=f"folder for the results (default: {FOLDER}/NAME OF RECORDING)")
-    prior = "a population of drives with the same drive file, of `fluxproof fleet`, as prior"
+    prior = "fleet.parquet of `fluxproof fleet` for the same drive file, used as prior"
     parser.add_argument("--prior", metavar="fleet.parquet", help=prior)
     parser.add_argument("--open", action="store_true", help="show the report in the browser")
     parser.add_argument("--quiet", action="store_true", help="no progress on stderr")
@@ -92,16 +92,17 @@ def answer_lines(answer, nominal, out: Path) -> list[str]:
         lines += ["", *effect_table(answer.effects)]
     lines += [f"not separable: {', '.join(group)}" for group in answer.ambiguity]
     if answer.next_recording:
-        lines += ["", "record next, held until steady:", *map(_request(nominal), answer.next_recording)]
+        lines += ["", "record next, each until steady:", *map(_request(nominal), answer.next_recording)]
     if answer.unknown_term is not None:
         u = answer.unknown_term
-        said = f"as if {u.meaning}: {u.formula}" if u.meaning else f"best single term: {u.formula} with c"
-        lines.append(f"{said} = {measured(u.value, u.sigma, u.unit)}")
+        form = f"the residual looks as if {u.meaning}:" if u.meaning else "best single term:"
+        factor = "" if u.meaning else " with c"
+        lines.append(f"{form} {u.formula}{factor} = {measured(u.value, u.sigma, u.unit)}")
     lines += [f"doubtful: {note}" for note in answer.notes if IMPLAUSIBLE in note]
     fit = answer.fit
     if answer.verdict not in ("bad_recording", "digital_mismatch"):
         lines.append(
-            f"misfit at operating points that were not fitted: {fit.holdout_before:.3g} {fit.unit} before, "
+            f"misfit at held-out operating points: {fit.holdout_before:.3g} {fit.unit} before, "
             f"{fit.holdout_after:.3g} {fit.unit} after, noise floor {fit.noise_floor:.3g} {fit.unit}"
         )
     if answer.prior is not None:
@@ -115,7 +116,7 @@ def answer_lines(answer, nominal, out: Path) -> list[str]:
 
 
 def effect_table(effects) -> list[str]:
-    """The asserted effects, one line per parameter, in aligned columns."""
+    """The reported effects, one line per parameter, in aligned columns."""
     from fluxproof.diagnosis.report.words import explained, measured, percent
 
     rows = [("effect", "parameter", "value", "confidence", "explains")]
@@ -134,7 +135,7 @@ def _among(p) -> str:
 
     others = f"the others {quantity(p.mean, p.unit)} ± {quantity(p.spread, p.unit, 2)}"
     shrunk = measured(p.shrunk, p.shrunk_sigma, p.unit)
-    return f"  {p.parameter} {measured(p.value, p.sigma, p.unit)}, {others}; with them {shrunk}, {abs(p.z):.1f} σ off"
+    return f"  {p.parameter} {measured(p.value, p.sigma, p.unit)}, {others}; combined {shrunk}, {abs(p.z):.1f} σ away"
 
 
 def _request(nominal):

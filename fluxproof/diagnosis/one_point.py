@@ -1,9 +1,9 @@
-"""One operating point: what drifts while it is held, and what a single point cannot tell.
+"""One operating point: what drifts while it is held, and what a single point cannot separate.
 
 At one point a constant misfit is two numbers, which every effect with two coefficients explains.  Only its change over
 time is evidence: the mean over time is subtracted from the misfit and from every column, after which an effect that
 does not drift has no columns left.  Magnets change the voltage along j omega, the winding along the current, which are
-the same direction without i_d; a recorded winding temperature separates them by its course.
+the same direction without i_d; a recorded winding temperature separates them by its change over time.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import numpy as np
 from fluxproof.diagnosis.answer.bench_point import on_the_bench
 from fluxproof.diagnosis.answer.headline import sentence
 from fluxproof.diagnosis.answer.locate import evidence, locate
+from fluxproof.diagnosis.answer.phrases import capital
 from fluxproof.diagnosis.balance.cells import cells_of, voltage_level
 from fluxproof.diagnosis.balance.holdout import holdout_blocks
 from fluxproof.diagnosis.balance.orders import at_order
@@ -78,8 +79,8 @@ def diagnose_one_point(view) -> Diagnosis:
     answer.evidence = evidence(view, (cells, centred.y), (cells, left), sigma, held)
     answer.sentence = sentence(answer, CATALOGUE)
     answer.notes = _notes(view, constant, candidates, held, long)
-    why = "would explain the drift, but the constant misfit is not known: not asserted."
-    answer.notes += [f"{name} {why}" for name in beside]
+    why = "would explain the drift; not reported, as the constant misfit is unexplained and may imitate it."
+    answer.notes += [f"{capital(effects[name].title)}: {why}" for name in beside]
     return answer
 
 
@@ -180,9 +181,9 @@ def _requests(view, groups) -> list[Request]:
     rated = view.machine.rated_current_a
     other = -np.conj(i) if abs(i.real) > 0.2 * rated else i - 0.5 * rated
     points = (
-        (omega, 0j, "without current only magnets, iron and angle remain"),
-        (OTHER_SPEED * omega, i, "at another speed and the same current fluxes change the voltage, resistances do not"),
-        (omega, complex(other), "with another i_d the winding and the magnets act on different axes"),
+        (omega, 0j, "without current, only errors of magnet flux, iron loss and angle remain"),
+        (OTHER_SPEED * omega, i, "at another speed, errors of the flux change the voltage and errors of R do not"),
+        (omega, complex(other), "with another i_d, winding and magnets act on different axes"),
     )
     points = [(*on_the_bench(w, complex(x), view.machine), why) for w, x, why in points]
     names, bus = sorted({n for g in groups for n in g}), float(view.nominal.inverter.dc_bus_v)
@@ -193,22 +194,23 @@ def _notes(view, constant, candidates, held, long) -> list[str]:
     i, omega = view.i.mean(), view.omega.mean()
     point = f"One operating point (omega_e = {omega:.4g} rad/s, i_d = {i.real:.3g} A, i_q = {i.imag:.3g} A)"
     notes = [
-        f"{point} in {len(view)} means over {view.span_s:.4g} s, of which {int(held.sum())} were not fitted: only "
-        "changes over time can be diagnosed."
+        f"{point} in {len(view)} means over {view.span_s:.4g} s, {int(held.sum())} of them held out: only changes "
+        "over time can be diagnosed."
         if long
-        else f"{point} with {len(view)} steady stretches, too few for a drift ({LEAST_MEANS} are needed, with a time)."
+        else f"{point} with {len(view)} steady stretches; at least {LEAST_MEANS} with time stamps are needed to "
+        "detect a drift."
     ]
     if np.isfinite(view.temp).all():
-        notes.append(f"The winding was recorded from {view.temp.min():.0f} to {view.temp.max():.0f} degC.")
+        notes.append(f"The winding temperature was recorded from {view.temp.min():.0f} to {view.temp.max():.0f} degC.")
     if abs(constant) > _resolution(view):
-        what = f" ({', '.join(candidates)} each could)" if candidates else ""
+        what = f" (each of {', '.join(candidates)} could)" if candidates else ""
         notes.append(
             f"At the start the voltage differs by {constant.real:.3g} V on the d axis and {constant.imag:.3g} V on the "
-            f"q axis; one point cannot tell why{what}: record more speeds and currents."
+            f"q axis; one point cannot show why{what}: record more speeds and currents."
         )
     else:
         notes.append(
             "At the start the voltage agrees; errors of R, inductances, magnet flux, inverter loss and angle that "
-            "cancel at this point are not seen."
+            "cancel at this point cannot be detected."
         )
     return notes

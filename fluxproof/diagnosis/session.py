@@ -42,7 +42,8 @@ from golden_model.drive_keys import DriveError
 
 IMPROVED, ANSWER = "drive_improved.toml", "diagnosis.json"
 FLUX_MAP_NOTE = (
-    'flux_map.csv holds the flux linkage over the recorded currents; [plant.machine] flux_map = "flux_map.csv" uses it.'
+    'flux_map.csv contains the flux linkage over the recorded currents; '
+    'use it by [plant.machine] flux_map = "flux_map.csv".'
 )
 OVERLAY_SIGNALS = ("u_d_ref", "u_q_ref")  # not the currents: the controller regulates them to their references
 
@@ -143,7 +144,7 @@ def _folder(out: Path, nominal: Nominal) -> Path:
     if isinstance(used, str) and _same(chart, Path(nominal.path or "").parent / used):
         raise DriveError(f"{chart}: this is the flux map of the drive and would be overwritten; choose another folder")
     if chart.exists() and not (out / ANSWER).exists():
-        raise DriveError(f"{chart}: this is of no earlier diagnosis and would be overwritten; choose another folder")
+        raise DriveError(f"{chart}: no diagnosis wrote this, and it would be overwritten; choose another folder")
     return out
 
 
@@ -157,7 +158,7 @@ def _prior_note(answer) -> str:
     fleet = answer.prior
     used = isinstance(answer.search, Posterior)
     if used:
-        did = "it changed the prior odds of the effects, to even ones at most, so that no name rests on the fleet alone"
+        did = "it changed the prior odds of the effects, to even odds at most, so the fleet alone is no evidence"
     elif answer.verdict in ("bad_recording", "digital_mismatch"):
         did = "it was not used, as the physics was not diagnosed"
     else:
@@ -194,7 +195,7 @@ def _digital(loaded, progress) -> tuple[Digital, list[str]]:
                 digital.first_difference["recording"] = recording.source
             break
     if digital.checked and digital.first_difference is None:
-        notes.append("The controller equals its golden model in every bit: the difference is physical.")
+        notes.append("The controller equals its golden model in every bit, so any difference is physical.")
     return digital, notes
 
 
@@ -253,8 +254,8 @@ def _overlay(recording, nominal, improved, answer) -> dict | None:
         before = laid_over["rms_before"].get(signal)
         after = laid_over.get("rms_after", {}).get(signal)
         if before is not None:
-            then = f", and by {after:.3g} V with the improved drive" if after is not None else ""
+            then = f" and by {after:.3g} V with the improved drive" if after is not None else ""
             answer.notes.append(
-                f"Simulated in closed loop, {signal} differs by {before:.3g} V rms with the drive as described{then}."
+                f"In closed-loop simulation, {signal} differs by {before:.3g} V rms with the nominal drive{then}."
             )
     return laid_over

@@ -31,7 +31,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--timeout", metavar="SECONDS", type=float, default=TIMEOUT_S, help=late)
     allow = "a protocol that addresses in a manifest may have, such as s3; may be repeated"
     parser.add_argument("--allow", metavar="PROTOCOL", action="append", default=[], help=allow)
-    limit = "where a drift is to end: in SI units, or such as 95%% of the first value; may be repeated"
+    limit = "limit of a drift, in SI units or such as 95%% of the first value; may be repeated"
     parser.add_argument("--limit", metavar="PARAMETER=VALUE", action="append", default=[], help=limit)
     parser.add_argument("--report", metavar="NAME", action="append", default=[], help="also write its report")
     parser.add_argument("--serve", action="store_true", help="show it in the browser; a click makes a report")
@@ -68,7 +68,7 @@ def run(args: argparse.Namespace) -> int:
     except EngineError as error:
         raise RecordingError(str(error)) from None
     except KeyboardInterrupt:
-        print("fluxproof: stopped; the same command goes on from here", file=sys.stderr)
+        print("fluxproof: stopped; the same command resumes from here", file=sys.stderr)
         return 130
     for line in lines(outcome):
         say(line)
@@ -109,14 +109,14 @@ def lines(outcome) -> list[str]:
     from fluxproof.fleet.page import cause, drift_view, headline
 
     found = outcome.findings
-    out = [headline(found), f"diagnosed {outcome.diagnosed}, kept {outcome.kept} of earlier runs"]
+    out = [headline(found), f"diagnosed {outcome.diagnosed}, reused {outcome.kept} from earlier runs"]
     for design in found.designs:
         out += [
             f"{serial}: {c['title']}: {c['why']}" for serial, fs in design.outliers.items() for c in map(cause, fs)
         ][:MOST_LINES]
         for d in map(drift_view, design.drifts[:MOST_LINES]):
             out.append(f"{d['serial']}: {d['parameter']} {d['relative']} per year, limit reached: {d['reaches']}")
-        out += [f"{len(g.serials)} drives share a remainder: {_lines(g)}" for g in design.groups]
+        out += [f"{len(g.serials)} drives share a residual: {_lines(g)}" for g in design.groups]
     out += [f"{row['recording']}: {row['reason']}" for row in found.failed[:MOST_LINES]]
     return [*out, "", f"wrote {outcome.page}", f"wrote {outcome.fleet}"]
 

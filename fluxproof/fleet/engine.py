@@ -127,7 +127,7 @@ class Engine:
                 try:
                     result = future.result()
                 except KilledWorker:
-                    result = Lost("its worker process ended again and again, such as for want of memory")
+                    result = Lost("its worker process ended repeatedly, perhaps for lack of memory")
                 except CancelledError:
                     result = Lost(f"took longer than {self.limit_s:g} s", final=True)
                 future.release()

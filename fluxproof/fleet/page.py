@@ -51,10 +51,10 @@ def headline(found: Findings) -> str:
     parts = [
         _count(outlying, "drive differs from the rest", "drives differ from the rest"),
         _count(drifting, "drifts", "drift"),
-        _count(grouped, "group shares an unexplained remainder", "groups share an unexplained remainder"),
+        _count(grouped, "group shares an unexplained residual", "groups share an unexplained residual"),
         _count(len(found.failed), "recording could not be used", "recordings could not be used"),
     ]
-    said = ", ".join(part for part in parts if part) or "nothing stands out"
+    said = ", ".join(part for part in parts if part) or "no drive differs"
     drives = sum(len(d.serials) for d in found.designs)
     return f"{_count(found.count, 'recording', 'recordings')} of {_count(drives, 'drive', 'drives')}: {said}."
 
@@ -135,7 +135,7 @@ def drift_view(d) -> dict:
         "parameter": d.parameter,
         "rate": measured(d.line.b * year, d.line.sigma * year, f"{d.unit}"),
         "relative": f"{100 * relative:+.3g} %".replace("-", "−"),
-        "noticed": day(d.times[d.noticed]) if d.noticed is not None else "not yet by the test in sequence",
+        "noticed": day(d.times[d.noticed]) if d.noticed is not None else "not yet by the sequential test",
         "limit": quantity(d.limit, d.unit) if d.limit is not None else "none",
         "reaches": f"{day(d.reaches)}{between}" if d.reaches else "no",
     }

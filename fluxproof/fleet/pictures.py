@@ -96,7 +96,7 @@ def signature(group, name: str) -> theme.Picture:
         size = f"{line.size:.3g} {line.unit}" if np.isfinite(line.size) else ""
         axis.annotate(theme.plain(size), (line.share, place), (4, 0), textcoords="offset points", va="center")
     axis.set_yticks(range(len(lines)), [theme.plain(place_text(line)) for line in lines])
-    axis.set(xlim=(0, 1.25 * max(line.share for line in lines)), xlabel="share of the remainder's power")
+    axis.set(xlim=(0, 1.25 * max(line.share for line in lines)), xlabel="share of the residual's power")
     axis.tick_params(axis="y", length=0)
     axis.grid(axis="y", visible=False)
     axis.invert_yaxis()

@@ -64,7 +64,7 @@ def _unlearnt(drive: Drive, run: Run, end: slice) -> str:
     if not drive.control.dead_time_compensation or compensated > LEARNT * loss:
         return ""
     missing = f"of the {loss:.2g} V that dead time and devices take {compensated:.2g} V are compensated so far"
-    return f"; {missing}: the rest is not learnt yet, and distorts currents and flux estimate"
+    return f"; {missing}: the remaining loss is not learnt yet and distorts currents and flux estimate"
 
 
 def _or(value: float | None) -> float:
@@ -95,7 +95,7 @@ def modelled(drive: Drive, runs: list[Run]) -> list[str]:
 def not_modelled(drive: Drive, runs: list[Run]) -> list[str]:
     """What the simulation does not contain, so that nobody takes it for shown."""
     lines = [
-        "heating: winding and magnets keep their temperatures; losses are told, no temperature is computed from them",
+        "heating: winding and magnets keep their temperatures; losses are reported, temperatures are not computed",
         "switching losses and the temperature of the inverter",
         "the bus: an ideal source at the nominal voltage; what is fed back at braking raises no voltage here",
         "noise, offset and gain errors of sensors; delays of drivers; the angle error of the encoder's mounting",

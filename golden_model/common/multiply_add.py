@@ -4,7 +4,7 @@
     y = saturate(c - round_half_up(a*b, DROP))        multiply_subtract, MINUS = 1
     limited = 1 if y is saturated
 
-Formats: a*b has DROP fraction bits more than c and y.  Rounded half up; overflow saturates and is told.
+Formats: a*b has DROP fraction bits more than c and y.  Rounded half up; overflow saturates and sets `overflow`.
 """
 
 from golden_model.block import Block, Port

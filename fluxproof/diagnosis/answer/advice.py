@@ -41,14 +41,14 @@ def advice(answer, nominal, effects) -> str:
     if answer.verdict == "digital_mismatch":
         return (
             "Compare the registers and the build of the core with the drive file, and record again: the physics is "
-            "diagnosed when the controller computes what its golden model computes."
+            "diagnosed only when the controller agrees with its golden model."
         )
-    told, columns = _next(answer, nominal, effects), _columns(answer)
+    action, columns = _next(answer, nominal, effects), _columns(answer)
     if not columns:
-        return told
+        return action
     if answer.verdict == "no_mismatch":  # the headline names it
-        return f"Correct it {columns}. {told}"
-    return f"{told} Besides, {joined(corrected(answer))}: correct that {columns}."
+        return f"Correct it {columns}. {action}"
+    return f"{action} In addition, {joined(corrected(answer))}: correct this {columns}."
 
 
 def _columns(answer) -> str:
@@ -62,10 +62,12 @@ def _columns(answer) -> str:
 def _next(answer, nominal, effects) -> str:
     """What to do after a verdict on the physics."""
     if answer.verdict == "no_mismatch":
-        else_ = "Nothing else" if corrected(answer) else "Nothing"
-        limits = f"{capital(covered(answer, nominal))}; beyond them the drive file is not confirmed"
-        without = "" if answer.evidence.torque else ", nor are friction and cogging torque, as no torque was compared"
-        return f"{else_} to change. {limits}{without}."
+        change = "No other change" if corrected(answer) else "No change"
+        torque = "" if answer.evidence.torque else ", and for friction and cogging torque (no torque was compared),"
+        return (
+            f"{change} needed for {covered(answer, nominal)}. "
+            f"Outside this range{torque} the drive file is not verified."
+        )
     if answer.verdict == "explained":
         return _take(answer, nominal, effects)
     if answer.verdict == "ambiguous":
@@ -78,15 +80,16 @@ def _next(answer, nominal, effects) -> str:
 def _take(answer, nominal, effects) -> str:
     """Which values of an explanation go into the drive file, and which belong to the recording."""
     if answer.conventions:
-        rivals = " If it is the other, correct that instead." if any(c.rivals for c in answer.conventions) else ""
-        found = ", and the values found" if answer.effects else ""
-        return f"Correct it as in drive_improved.toml, which reads both files so{found}; diagnose again.{rivals}"
+        open_ = any(c.rivals for c in answer.conventions)
+        rivals = " If an alternative interpretation is the right one, correct that instead." if open_ else ""
+        found = " and contains the identified values" if answer.effects else ""
+        return f"Use drive_improved.toml, which applies this interpretation{found}, and diagnose again.{rivals}"
     if not any(e.plant for e in answer.effects):
-        return "Correct the recording as stated: the drive file has no key for what was found."
+        return "Correct the recording as stated: the drive file has no key for these effects."
     trims = any(e.name in effects and effects[e.name].corrects for e in answer.effects)
-    later = " Errors of measurement stay in this recording; the trims act from the next one on." if trims else ""
+    later = " Measurement errors remain in this recording; the trims act from the next recording on." if trims else ""
     whole_periods = "".join(f" {text}" for text in _periods(answer, nominal, effects))
-    return f"Simulate with drive_improved.toml, which holds the values found.{later}{whole_periods}"
+    return f"Simulate with drive_improved.toml, which contains the identified values.{later}{whole_periods}"
 
 
 def _periods(answer, nominal, effects) -> list[str]:
@@ -129,25 +132,28 @@ def _separated(answer, effects) -> str:
 
 
 def _where(answer, nominal, effects) -> str:
-    """Where to look for what nothing explains: the physics that shows at the order of the largest remainder."""
+    """Where to look for an unexplained residual: the physics that acts at the order of its largest part."""
     u = answer.unknown_term
     if u is not None and u.meaning:
         how = [e.separated_by for e in effects.values() if e.clause == u.meaning]
-        return f"Check in the hardware whether {u.meaning}{f'; what tells: {how[0]}' if how else ''}."
+        return f"Check on the drive whether {u.meaning}.{f' Test: {how[0]}.' if how else ''}"
     if not answer.remainder:
         return "Record more speeds and currents of both signs, so that the misfit can be located."
     r = max(answer.remainder, key=lambda part: part.share)
     signal = SIGNALS.get(r.signal, r.signal)
     if not r.order:
-        course = _course(u) or f"changes the mean {signal} with {_varies(answer)}"
-        return f"Look for what {course}: no known effect has this course."
+        dependence = _dependence(u) or f"changes the mean {signal} with {_varies(answer)}"
+        return f"Look for something that {dependence}: no known effect has this dependence."
     pairs = nominal.machine.pole_pairs
     known = [e.title for e in effects.values() if shows(e, r.order, pairs)][:MOST_TITLES]
     turns = r.order * pairs
     place = f"at order {r.order:.4g} of the {signal}, {turns:.4g} per mechanical turn"
     if known:
-        return f"Look {place}: {joined(known)} show there, but with another course over speed and current."
-    return f"Look {place}: no known effect shows there, so compare it with numbers of slots, poles, bearings and gears."
+        return f"Look {place}: {joined(known)} act at this order, but depend differently on speed and current."
+    return (
+        f"Look {place}: no known effect acts at this order. "
+        "Compare it with the numbers of slots, poles, bearing elements and gear teeth."
+    )
 
 
 def shows(effect, order, pole_pairs) -> bool:
@@ -156,7 +162,7 @@ def shows(effect, order, pole_pairs) -> bool:
     return any(abs(abs(order) - h) <= NEAR * h for h in orders if h)
 
 
-def _course(u) -> str:
+def _dependence(u) -> str:
     """How the best single term changes the mean voltage: of 'u_d = c * omega i_q' with the speed times i_q."""
     part, _, factor = u.formula.partition(" = c * ") if u is not None else ("", "", "")
     if part not in ("u_d", "u_q"):  # an order, or a formula that is no term of the dictionary
@@ -175,7 +181,7 @@ def _varies(answer) -> str:
 
 
 def covered(answer, nominal) -> str:
-    """'the recording covers -800 to 1200 rpm, i_d from -2 to 0 A and i_q from -5 to 5 A' from the steady blocks."""
+    """'-800 to 1200 rpm, i_d of -2 to 0 A and i_q of -5 to 5 A' of the steady blocks."""
     arrays, spans = answer.evidence.arrays, []
     shaft = RPM / nominal.machine.pole_pairs
     for name, factor, unit in (("omega_e", shaft, "rpm"), ("i_d", 1.0, "A"), ("i_q", 1.0, "A")):
@@ -186,4 +192,4 @@ def covered(answer, nominal) -> str:
             low, high = (f"{float(fixed(x, places)):g}" for x in ends)
             span = f"{low} to {high} {unit}" if low != high else f"{low} {unit}"
             spans.append(span if unit == "rpm" else f"{name} of {span}")
-    return f"the recording covers {joined(spans)}" if spans else "the recording covers few operating points"
+    return joined(spans) if spans else "the recorded operating points"

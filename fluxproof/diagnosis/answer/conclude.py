@@ -11,7 +11,7 @@ from fluxproof.diagnosis.answer.estimates import named_effects
 from fluxproof.diagnosis.answer.headline import sentence
 from fluxproof.diagnosis.answer.locate import evidence, locate
 from fluxproof.diagnosis.answer.names import Names, names_of
-from fluxproof.diagnosis.answer.phrases import as_if, capital
+from fluxproof.diagnosis.answer.phrases import as_if, capital, percent_below
 from fluxproof.diagnosis.answer.request import requests, wants_cold
 from fluxproof.diagnosis.answer.scan import Stray, row_residual, stray_order, stray_swing, stray_torque
 from fluxproof.diagnosis.answer.sizes import Sizes, fit_of, with_stray
@@ -28,10 +28,11 @@ MOST_RIVALS = 5
 
 @dataclass(frozen=True)
 class Judgement:
-    """What a posterior says: the verdict, names, what is told of the set, sizes of the misfit, and what is beside them.
+    """The decision drawn from a posterior: verdict, reported effects, sizes of the misfit and of its residual.
 
-    posterior: over the sets that are possible; told: effects that explain a part; channel: in which the explained share
-    is counted; stray: a misfit outside the orders of the balance; train, unseen: sizes on fitted and on other blocks.
+    posterior: over the sets that are possible; told: effects that explain a part; channel: the one in which the
+    explained share is counted; stray: a misfit outside the orders of the balance; train, unseen: sizes on fitted and on
+    held-out blocks.
     """
 
     posterior: Posterior
@@ -88,7 +89,7 @@ def _is_noise(posterior, names, held) -> bool:
 
 
 def shown(posterior, held):
-    """The posterior without effects that would be told though the points that were not fitted fit better without."""
+    """The posterior without effects that worsen the prediction at held-out points, whatever their probability."""
     while True:
         names = names_of(posterior)
         told = names.said | {n for group in names.open for n in group}
@@ -168,7 +169,8 @@ def conclude(posterior, held, progress=lambda text: None) -> Diagnosis:
     if kind == "unexplained":  # beside a large unknown part even a credible name may be its imitation
         for e in answer.effects:
             title = capital(setup.effects[e.name].title)
-            answer.notes.append(f"{title}: would explain {100 * e.explains:.0f} %, not asserted.")
+            share = f"would explain {100 * e.explains:.0f} %"
+            answer.notes.append(f"{title}: {share}; not reported, as the large residual may imitate it.")
         answer.effects, answer.ambiguity, answer.next_recording = [], [], []
         if told:  # nothing is named, so nothing is explained and the whole misfit is left
             after, answer.explained_share = before, 0.0
@@ -181,14 +183,15 @@ def conclude(posterior, held, progress=lambda text: None) -> Diagnosis:
     answer.held = held
     for name in names.suspects:
         if answer.unknown_term is None or answer.unknown_term.meaning != setup.effects[name].clause:
-            answer.notes.append(f"Besides, it is {as_if(_described(best, name, held, unseen))}.")
+            answer.notes.append(f"The residual also looks {as_if(_described(best, name, held, unseen))}.")
     for name in sorted(posterior.idle):
         title = capital(setup.effects[name].title)
-        answer.notes.append(f"{title}: would fit, but points that were not fitted fit better without; not asserted.")
-    why = " as recording and simulation agree" if kind == "no_mismatch" else ""
+        answer.notes.append(f"{title}: rejected, as it worsens the prediction at the held-out operating points.")
+    agree = "recording and simulation already agree within noise"
+    why = agree if kind == "no_mismatch" else "not significant"
     for name, p in sorted(names.maybe.items(), key=lambda entry: -entry[1])[:3]:
         title = capital(setup.effects[name].title)
-        answer.notes.append(f"{title}: possible (probability {p:.2f}), not asserted{why}.")
+        answer.notes.append(f"{title}: possible ({percent_below(p)}), but {why}.")
     return answer
 
 
@@ -222,7 +225,7 @@ def _shares(posterior, names, told, channel, held, measured) -> dict[str, float]
 def stray_of(posterior, suspects, held) -> Stray | None:
     """A misfit outside the orders of the balance, after the best set of which every cause is named or in ``suspects``.
 
-    What is only possible and has no name would not be told, so that it explains nothing here.
+    An effect that is only possible is not reported, so it explains nothing here.
     """
     setup = posterior.setup
     effects = setup.effects

@@ -1,4 +1,4 @@
-"""What of an answer is hard to believe: parameters outside of what their effects declare as plausible."""
+"""Parameters of an answer outside the range that their effects declare as plausible."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ from fluxproof.diagnosis.answer.phrases import (
 from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.ground.quantities import ascii_of, quantity
 
-MUCH_LEFT = 3.0  # times the noise floor: a remainder that is told though the misfit is explained
+MUCH_LEFT = 3.0  # times the noise floor: a larger residual is reported although the misfit is explained
 MOST_LETTERS = 200  # letters of a headline: two lines of a terminal or of the report
 
 
@@ -45,23 +45,25 @@ def details(answer, effects) -> str:
     volts = lambda x: ascii_of(quantity(x, fit.unit, 3))  # noqa: E731
     if fit.holdout_before > 0.0:
         both = f"falls from {volts(fit.holdout_before)} to {volts(fit.holdout_after)}"
-        told = bool(answer.effects or answer.ambiguity or answer.conventions)
-        fall = both if told and fit.holdout_after < fit.holdout_before else f"is {volts(fit.holdout_before)}"
+        found = bool(answer.effects or answer.ambiguity or answer.conventions)
+        fall = both if found and fit.holdout_after < fit.holdout_before else f"is {volts(fit.holdout_before)}"
         floor = f"the noise floor is {volts(fit.noise_floor)}"
-        parts.append(f"The misfit at operating points that were not fitted {fall}; {floor}.")
+        parts.append(f"The misfit at held-out operating points {fall}; {floor}.")
         if answer.verdict == "explained" and fit.holdout_after > MUCH_LEFT * fit.noise_floor:
             times = f"{fit.holdout_after / fit.noise_floor:.2g} times the noise floor"
-            parts.append(f"What is left is {times}: a formula does not fit this drive, or a small effect is not named.")
+            why = "a formula is inexact for this drive, or a small effect is missing"
+            parts.append(f"The remaining residual is {times}: {why}.")
     if answer.explained_share is not None and answer.effects:
         parts.append(f"The effects explain {percent_below(answer.explained_share)} of its power.")
     u = answer.unknown_term
     if u is not None and u.meaning:
-        parts.append(f"That {as_if(u).removeprefix('as if ')} would explain {percent_below(u.explains)} of the rest.")
+        cause = as_if(u).removeprefix("as if ")
+        parts.append(f"That {cause} would explain {percent_below(u.explains)} of the residual.")
     read = [p.message for p in answer.problems if p.action in CORRECTED]
     if read:
         parts.append(f"Corrected while reading: {'; '.join(read)}.")
     if len(answer.remainder) > 1:
-        parts.append(f"What is left is {', '.join(part_text(r) for r in answer.remainder[:3])}.")
+        parts.append(f"The largest residuals are {', '.join(part_text(r) for r in answer.remainder[:3])}.")
     return " ".join(parts)
 
 
@@ -70,10 +72,10 @@ def _variants(answer, effects) -> list[str]:
     misfit = ascii_of(quantity(answer.fit.train_before, answer.fit.unit, 3))
     if answer.verdict == "no_mismatch":
         at_floor = answer.fit.train_before**2 <= (1.0 + k.FLOOR) * answer.fit.noise_floor**2
-        usual = "is at the noise floor" if at_floor else "is not larger than such recordings usually have"
+        usual = "is at the noise floor" if at_floor else "is within the usual error for this kind of recording"
         floor = f"the misfit of {misfit} {usual}"
         if found := corrected(answer):
-            once = [joined(found), f"{found[0]}, and {len(found) - 1} more", "the columns are read otherwise"]
+            once = [joined(found), f"{found[0]}, and {len(found) - 1} more", "the columns are interpreted differently"]
             return [f"Simulation and recording agree once corrected: {what}. {capital(floor)}." for what in once]
         return [f"Simulation and recording agree: {floor}."]
     if answer.verdict == "explained":
@@ -94,7 +96,7 @@ def _variants(answer, effects) -> list[str]:
             names = [capital(n) for n in ([*pairs, f"{named[-1]} and others"] if answer.effects else one_of)]
         else:
             names = [capital(n) for n in named]
-        return [f"{n} {share}; the rest is {where} and {c}." for n, c in _both(names, cause)]
+        return [f"{n} {share}; the residual is {where} and {c}." for n, c in _both(names, cause)]
     if answer.unknown_term is not None and answer.unknown_term.meaning:
         return [f"No parameter of the simulation explains the misfit of {misfit}: it {c}." for c in cause]
     return [f"Unknown: no effect of the catalogue explains half of the misfit of {misfit}, {where}."]
@@ -127,8 +129,9 @@ def _sets(groups, effects) -> list[str]:
 
 
 def _cause(answer) -> list[str]:
-    """What the rest looks like."""
+    """What the residual looks like."""
     u = answer.unknown_term
     if u is not None and u.meaning:
-        return [f"is {as_if(u)}", f"is as if {u.meaning}", "looks like a cause without a parameter in the simulation"]
+        without = "looks like a cause without a parameter in the simulation"
+        return [f"looks {as_if(u)}", f"looks as if {u.meaning}", without]
     return ["its cause is not known"]

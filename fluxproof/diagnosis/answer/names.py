@@ -113,7 +113,7 @@ def _seen_discrepancy(fit) -> np.ndarray:
 
 
 def credibilities(fit) -> dict[str, float]:
-    """{effect of a fit: probability in (0, 1] that it is no imitation by what is left of the misfit}."""
+    """{effect of a fit: probability in (0, 1] that it is real and not an artefact of the unexplained residual}."""
     powers, real = _powers(fit), 1.0 - k.IMITATED
     found = {name: _credibility(fit, name, powers) for name in fit.names}
     sure = {name for name, p in found.items() if p >= real}

@@ -29,7 +29,7 @@ def sound(loaded: list[Recording], nominal, catalogue: dict) -> list[Recording]:
         fast = ", ".join(Path(r.source).name for r in kept if not r.slow)
         kept[0].meta.setdefault("notes", []).append(
             f"recordings with and without a row per control period are diagnosed together by their operating points; "
-            f"for harmonics and instants of sampling diagnose {fast} alone"
+            f"for harmonics and sampling instants, diagnose {fast} alone"
         )
     return kept
 

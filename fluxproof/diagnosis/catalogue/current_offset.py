@@ -68,8 +68,10 @@ class CurrentOffset(Effect):
     def caveat(self, view, c):
         if view.has_sum:
             return ""
-        zero = "The offsets are stated with a sum of zero"
-        return f"{zero}: an equal offset of three sensors does not show in this recording, and would add to each."
+        return (
+            "The offsets are given with a sum of zero: this recording does not show an equal offset of all three "
+            "sensors, which would add to each."
+        )
 
     def plant(self, c, nominal):
         return {"sensors.current_offset_a": [float(v) for v in self._phases(c)]}

@@ -12,7 +12,7 @@ DROP = 0.05  # of rated current: where device drops have reached their full valu
 STILL_GROWS = (0.12, 0.3)  # of rated current: growth beyond this range counts as resistance
 RIPPLE = 1 / 32  # of u_dc T / L: a quarter of the largest current ripple
 TAILS = {"log": -np.log(KNOTS[-1]), "fade": 1.0 - KNOTS[-1]}  # of device_tails at rated current
-TOLD = 0.05  # of the winding's resistance: a rise of the loss that is like more of it is told
+TOLD = 0.05  # of the winding resistance: a steeper rise of the loss is reported, because it looks like resistance
 CLAMPED = 0.1  # uncertainty, as a share of the loss, while ripple decides which diode conducts
 
 
@@ -152,7 +152,7 @@ class DeadTime(Effect):
         if ohm < TOLD * m.resistance_ohm:
             return ""
         rises = f"The loss of the inverter rises by {_rise(c):.2g} V from {last:g} of rated current to rated current"
-        return f"{rises}; a resistance that is {ohm:.2g} Ohm larger would be like it, and only a measured one tells."
+        return f"{rises}; a resistance {ohm:.2g} Ohm larger looks the same, and only a measured one separates them."
 
     def given(self, view, plant):
         loss = plant.inverter.dead_time_s * view.nominal.inverter.pwm_frequency_hz * view.nominal.inverter.dc_bus_v

@@ -30,7 +30,7 @@ class Demagnetisation(FluxEffect):
 
     def caveat(self, view, c):
         begins = instant_of_change(view)
-        return f"The loss was just before the steady rows that begin {begins:.3g} s after the first one."
+        return f"The loss occurred just before the steady rows that begin {begins:.3g} s after the first one."
 
 
 EFFECT = Demagnetisation(

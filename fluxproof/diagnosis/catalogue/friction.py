@@ -76,7 +76,7 @@ class Friction(Effect):
 
 EFFECT = Friction(
     name="friction",
-    title="friction off the drive file",
+    title="friction different from the drive file",
     equation="T_shaft = T_airgap - B omega_m - T_c sign(omega_m)",
     signature="torque against the motion, odd in speed, at every load",
     confounders=("iron_loss",),

@@ -26,7 +26,7 @@ def check(recording, nominal) -> None:
     if not LEAST_ANGLES <= angles <= MOST_ANGLES:
         return
     message = (
-        f"the angle moves in {angles} steps per turn, as that of Hall sensors: record the angle of an encoder, or the "
-        "one that the control interpolates; i_d, i_q, u_d_ref and u_q_ref with omega_e need no angle"
+        f"the angle moves in {angles} steps per turn, like that of Hall sensors: record an encoder angle, or the "
+        "angle that the control interpolates; i_d, i_q, u_d_ref and u_q_ref with omega_e need no angle"
     )
     recording.problems.append(Problem("hall_steps", message, "theta_e", int(moves[0]) + 1, len(recording), fatal=True))

@@ -64,7 +64,7 @@ def _held(recording, advance, joined, period) -> bool:
     slow = count > HELD * np.count_nonzero(turning)
     if slow:
         recording.slow = True
-        message = f"{count} rows repeat the previous one: sampled more slowly than the time says"
+        message = f"{count} rows repeat the previous one: sampled more slowly than the time column states"
         action = "only steady operating points are used"
     else:
         recording.usable[still + 1] = False

@@ -34,13 +34,13 @@ def check(recording, nominal) -> None:
     step = float(np.median(np.diff(recording["t"])))
     keep_rows(recording, np.flatnonzero(since % times == 0))
     recording.joined[:-1] = True
-    message = f"every row is written {times} times: the log is faster than what it records"
+    message = f"every row is written {times} times: the log is faster than its signals"
     action = "one of each is used"
     ratio = angle_speed_ratio(recording, step)
     if ratio is not None and abs(ratio - 1.0) < CLOSE:  # the angle moves on as if only the others had not been written
         t = recording["t"]
         recording.columns["t"] = t[0] + (t - t[0]) / times
-        action += f", {step:g} s apart as the angle says"
+        action += f", {step:g} s apart by the angle"
     elif abs(step - nominal.sample_time_s) < CLOSE * step:
         action += f"; if the control samples every {times * step:g} s, correct sample_time_s"
     recording.problems.append(Problem("repeated", message, "", 1, n - len(recording), action))

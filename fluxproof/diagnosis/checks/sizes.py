@@ -54,7 +54,7 @@ def _documented(recording, *names) -> bool:
 def _refuse(recording, name, message, names=()) -> None:
     """Reject a recording because of a column; names: all columns that a conversion would have changed."""
     if _documented(recording, name, *names):
-        message += "; its unit is documented and was kept: correct the unit in [columns], or the drive file"
+        message += "; its documented unit was not changed: correct the unit in [columns], or the drive file"
     recording.problems.append(Problem("unit", message, name, 0, len(recording), fatal=True))
 
 
@@ -153,6 +153,6 @@ def _modulation_index(recording, names, size, nominal) -> None:
     if needed > MUCH * size and needed / PLAUSIBLE < as_index < needed * PLAUSIBLE:
         message = (
             f"{', '.join(names)} reach {size:.3g} V, but the recorded speed needs about {needed:.3g} V; if they are a "
-            f"modulation index, say of what in [columns], such as {names[0]} = {{name = '{names[0]}', unit = 'u_dc/2'}}"
+            f"modulation index, name its unit in [columns]: {names[0]} = {{name = '{names[0]}', unit = 'u_dc/2'}}"
         )
         recording.problems.append(Problem("unit", message, names[0], 0, len(recording), fatal=True))

@@ -16,7 +16,7 @@ from fluxproof.diagnosis.ground.nominal import flux_level
 from fluxproof.diagnosis.ground.recording import Problem
 
 STAGE = "signals"
-LOADED = 0.05  # of rated torque: least rms of an air-gap torque whose sign is told
+LOADED = 0.05  # of rated torque: least rms of an air-gap torque whose sign is determined
 ALIKE = 0.5  # of the air-gap torque: most that the opposite of a reversed torque differs from it, friction included
 
 

@@ -101,6 +101,6 @@ class Reading:
         """The finding; rivals: readings that fit as well."""
         says = self.says
         if rivals:
-            says = f"{says}, or {', or '.join(r.says for r in rivals)} (this recording cannot tell)"
+            says = f"{says}, or {', or '.join(r.says for r in rivals)} (this recording cannot separate them)"
         code = "pole_pairs" if self.pole_pairs else self.code
         return Convention(code, self.quantity, self.factor, says, [r.code for r in rivals])

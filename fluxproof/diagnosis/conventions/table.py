@@ -1,6 +1,6 @@
 """The mistakes that people make with drive recordings and data sheets, one entry each.
 
-A new entry is a new line; of entries that leave the same balance the first is told first.  Units that only the
+A new entry is a new line; of entries that leave the same balance the first is reported first.  Units that only the
 numbers reveal (degrees, percent, mA, rpm) and exchanged phases are corrected by the checks.
 
 Sources of the factors: amplitude-invariant against power-invariant Clarke, sqrt(3/2); peak against rms, sqrt(2); phase
@@ -56,8 +56,8 @@ READINGS = (
     _machine("resistance_milli", R, 1e3, "the resistance is in milliohm"),
     # scales of recorded columns
     Reading("currents_rms", "i", "the currents are rms values, 0.7071 of the peak values", currents=ROOT2),
-    Reading("currents_double", "i", "the currents are recorded at twice, as from peak to peak", currents=0.5),
-    Reading("currents_half", "i", "the currents are recorded at half", currents=2.0),
+    Reading("currents_double", "i", "the recorded currents are twice the true ones (peak to peak)", currents=0.5),
+    Reading("currents_half", "i", "the recorded currents are half the true ones", currents=2.0),
     Reading(
         "currents_power_invariant", "i_d, i_q", "the dq currents are power-invariant, 1.2247 of the peak values",
         currents=1 / POWER, dq=True,
@@ -76,8 +76,10 @@ READINGS = (
         "voltages_rms", "u_d_ref, u_q_ref", "the voltages are rms values, 0.7071 of the peak values", voltages=ROOT2,
         dq=True,
     ),
-    Reading("voltages_half", "u_d_ref, u_q_ref", "the voltages are recorded at half", voltages=2.0, dq=True),
-    Reading("voltages_double", "u_d_ref, u_q_ref", "the voltages are recorded at twice", voltages=0.5, dq=True),
+    Reading("voltages_half", "u_d_ref, u_q_ref", "the recorded voltages are half the true ones", voltages=2.0, dq=True),
+    Reading(
+        "voltages_double", "u_d_ref, u_q_ref", "the recorded voltages are twice the true ones", voltages=0.5, dq=True,
+    ),
     Reading(
         "voltages_line", "u_d_ref, u_q_ref", "the voltages are line-to-line values, 1.7321 of the phase values",
         voltages=1 / ROOT3, dq=True,
@@ -90,11 +92,11 @@ READINGS = (
         "voltages_power_invariant", "u_d_ref, u_q_ref",
         "the dq voltages are power-invariant, 1.2247 of the peak values", voltages=1 / POWER, dq=True,
     ),
-    Reading("bus_half", "u_dc", "the bus voltage is recorded at half", bus=2.0, dq=False),
-    Reading("bus_double", "u_dc", "the bus voltage is recorded at twice", bus=0.5, dq=False),
+    Reading("bus_half", "u_dc", "the recorded bus voltage is half the true one", bus=2.0, dq=False),
+    Reading("bus_double", "u_dc", "the recorded bus voltage is twice the true one", bus=0.5, dq=False),
     # the angle
-    _angle(90, ": that of the q axis"),
-    _angle(-90, ": its d axis is our q axis"),
+    _angle(90, ": it is the angle of the q axis"),
+    _angle(-90, ": its d axis is the q axis of the model"),
     _angle(180, ": the magnet points the other way"),
     _angle(60, ", one sector"),
     _angle(-60, ", one sector"),

@@ -63,31 +63,31 @@ class Effect:
     confounders: tuple[str, ...]
     separated_by: str
     parameters: tuple[Parameter, ...]
-    rescales: tuple[str, ...] = ()  # of which it is a scale or an offset: i, u, u_dc, theta_e, keys of [machine]
+    rescales: tuple[str, ...] = ()  # signals and [machine] keys that it scales or offsets: i, u, u_dc, theta_e, ...
     needs: tuple[str, ...] = ()  # of NEEDS: what a recording must show for the effect to be seen
-    named: bool = True  # False: no parameter of the simulation carries it; it is described and not asserted
-    clause: str = ""  # of an effect that is not named: what it is described with, "as if ..."
+    named: bool = True  # False: the simulation has no parameter for it, so it is described and not reported
+    clause: str = ""  # of an effect that is not reported: completes "the residual looks as if ..."
     positive: bool = False  # the leading coefficient cannot be negative
     corrects: bool = (
         False  # a measurement error rather than a property of the machine: ``corrected`` removes it from the data
     )
     starts: tuple[dict, ...] = ()  # coefficients from which a large misfit is also approached, far from a linear effect
-    one_of: tuple[tuple[str, ...], ...] = ()  # groups of coefficients that exclude each other
+    one_of: tuple[tuple[str, ...], ...] = ()  # groups of coefficients that are mutually exclusive
     drift_of: str = ""  # the constant effect of which this one is a slow drift
     trailing: tuple[float, ...] = ()  # further electrical orders at which the effect may have harmonics
     mechanical: bool = False  # a torque of the shaft rather than a voltage of the machine
     curve: float = 0.3  # share of the formula by which the free curve may depart from it
-    exact: bool = False  # a constant of the nominal drive or a scale: no formula of its own that may be wrong
+    exact: bool = False  # a constant of the nominal drive or a scale: no error of a formula is assumed
     corrected_last: bool = False  # of several measurement errors: its correction uses the corrected currents
-    spreads: bool = False  # between any two drives: in every set of effects of a fleet
+    spreads: bool = False  # varies from drive to drive, so every set of a fleet includes it
     bends: bool = False  # a flux linkage that is no line of the current: a flux map shows it
     map_shapes: tuple[str, ...] = ()  # shapes of a flux map without and with it (flux_surface.SHAPES)
-    beside_map: bool = False  # a function of the current that is no flux: fitted together with a flux map
+    beside_map: bool = False  # a function of the current that is not a flux: fitted together with a flux map
     takes_flux: bool = False  # ``lost_flux``: its current does not magnetise
     shows_at: tuple[float, ...] = (0.0,)  # electrical orders at which its voltage, current sum or torque appears
     shows_at_turns: tuple[float, ...] = ()  # the same per mechanical turn
-    # {parameter: (least, largest) or (least, largest, "machine.key" that they are relative to)} of a usual drive: what
-    # is outside has low prior odds and is flagged, with what it may be otherwise.
+    # {parameter: (least, largest) or (least, largest, "machine.key" that they are relative to)} of a usual drive:
+    # values outside have low prior odds and are flagged, with another explanation.
     plausible: dict = field(default_factory=dict, hash=False)
     otherwise: str = ""
     stays: str = ""  # why a drive file cannot take the effect out of a recording that has it

@@ -3,7 +3,7 @@
     x_k = a + b t_k + e_k,   e_k ~ N(0, (g s_k)^2),   g >= 1
 
 weighted least squares; g^2 is the reduced chi^2, as recordings of one drive differ by more than their own sigma where
-temperature or mounting does.  The rate is told if b is significant among all rates of the fleet (Benjamini-Hochberg).
+temperature or mounting does.  The rate is reported if b is significant among all rates (Benjamini-Hochberg).
 It is noticed at the first recording k at which the test of the first k ones has a probability below
 
     ALPHA (6 / pi^2) / (k - FEWEST + 1)^2
@@ -21,11 +21,11 @@ import numpy as np
 from scipy import stats
 
 ALPHA = 0.01
-FALSE = 0.05  # share of the told rates that may be false
+FALSE = 0.05  # share of the reported rates that may be false
 FEWEST = 5  # recordings: a line through fewer has hardly a scatter to be judged by
 CONFIDENT = 0.95
 DAY_S = 86400.0
-FAR_DAYS = 36500.0  # a limit beyond a century is not told
+FAR_DAYS = 36500.0  # a limit beyond a century is not reported
 LIMITS = {"magnet_flux_wb": "95%", "resistance_ohm": "130%"}  # of the first value; --limit sets others
 
 

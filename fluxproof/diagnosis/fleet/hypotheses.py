@@ -1,7 +1,7 @@
-"""What a recording holds beside the spread of manufacture: sets of effects with their evidence, for the fleet to weigh.
+"""Effects of one recording beyond normal production tolerance: sets of effects with their evidence, for the fleet.
 
 No two drives have the same resistance, inductances and magnet flux, so these are in every set whether or not they reach
-the size of practical interest: an estimate that is told only if it is large would distort the population's mean and
+the size of practical interest: an estimate that is reported only if it is large would bias the population's mean and
 spread.  What else a set contains are its extras.  Their prior is left out here; rates.py learns it from the fleet.
 """
 

@@ -18,7 +18,7 @@ from fluxproof.diagnosis.fleet.hypotheses import BASE
 from fluxproof.diagnosis.fleet.rates import Weighed
 from fluxproof.diagnosis.ground import constants as k
 
-FALSE = 0.05  # share of the told findings that may be false
+FALSE = 0.05  # share of the reported findings that may be false
 COMMON = 0.2  # share of the fleet from which an effect is a property of the design: then its size is compared
 LEAST_DRIVES = 8  # fewer tell no outlier from a spread
 

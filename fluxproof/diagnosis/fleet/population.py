@@ -15,7 +15,7 @@ import numpy as np
 from scipy import optimize, stats
 
 WIDE = 10.0
-LEAST_DRIVES = 3  # drives of a population: with two, spread and mean cannot be told apart
+LEAST_DRIVES = 3  # drives of a population: with two, spread and mean cannot be separated
 MOST_FAULTY = 0.3  # epsilon: beyond, the faulty ones are a population of their own
 FAULTY_PRIOR = (1.0, 30.0)  # Beta: one drive in thirty
 

@@ -7,7 +7,7 @@ theirs.  The odds are never better than even, so that
 
 and a name, which needs 0.95, needs a recording that is by itself 19 times as probable with the effect as without: a
 fleet of faulty drives makes no faulty one of a healthy drive.  Values of named effects stay those of the recording
-alone; the value in the light of the others is told beside them.
+alone; the value combined with the others is reported in addition.
 """
 
 from __future__ import annotations

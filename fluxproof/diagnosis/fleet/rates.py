@@ -1,11 +1,11 @@
-"""How frequent each effect is in a fleet, and what that makes of every recording.
+"""How frequent each effect is in a fleet, and the posterior of every recording with these rates.
 
 Recording n has the evidence z_n(S) for each set S of extras.  Effect e is present in the share pi_e of the fleet:
 
     P_n(S) ~ z_n(S) prod_{e in S} pi_e / (1 - pi_e),    pi_e = (a + sum_n P_n(e)) / (a + b + N)
 
 which expectation maximisation solves.  a / (a + b) is the prior rate of an effect; an effect seen nowhere else needs
-stronger evidence than one that every third drive has, and both are told what the fleet has told.
+stronger evidence than one that every third drive has; recordings are then judged with the rates of the fleet.
 """
 
 from __future__ import annotations

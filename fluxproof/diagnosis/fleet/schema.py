@@ -61,12 +61,12 @@ COLUMNS = (
     Column("misfit_after", pa.float64(), "rms at held-out points"),
     Column("noise_floor", pa.float64(), "rms"),
     Column("misfit_unit", pa.string(), "of the three above: V"),
-    Column("remainder", pa.list_(PART), "what the names leave: signal, electrical order, rms size, share"),
-    Column("unknown", UNKNOWN, "the single term that fits the remainder best"),
+    Column("remainder", pa.list_(PART), "residual of the named effects: signal, electrical order, rms size, share"),
+    Column("unknown", UNKNOWN, "the single term that fits the residual best"),
     Column("conventions", WORDS, "codes of mistaken conventions"),
     Column("problems", WORDS, "codes of what the checks found"),
     Column("digital", pa.string(), "`not recorded`, `equal`, or block, sample, signal and bit of a difference"),
-    Column("hypotheses", pa.list_(HYPOTHESIS), "sets of effects beside the spread of manufacture (hypotheses.py)"),
+    Column("hypotheses", pa.list_(HYPOTHESIS), "sets of effects beyond production tolerance (hypotheses.py)"),
 )
 
 

@@ -29,7 +29,7 @@ def values_of(weighed: Weighed | None) -> dict[tuple[str, str], tuple[float, flo
         p, x, s = (np.array(column) for column in list(zip(*entries, strict=True))[:3])
         if p.sum() < 0.5:  # of a set that is not believed
             continue
-        told = s <= USELESS * s.min()  # a set in which the parameter is not determined says nothing of it
+        told = s <= USELESS * s.min()  # a set that does not determine the parameter is ignored
         p, x, s = p[told], x[told], s[told]
         p = p / p.sum()
         mean = float(p @ x)

@@ -1,4 +1,4 @@
-"""What an inference computes from a recording without any constant of constants.py: rows, columns, linearisations.
+"""Linear model of a recording: rows, columns, linearisations, independent of the constants in constants.py.
 
 The steps of an inference are run by a function ``call(step, *arguments)``, by default ``at_once``.  A step is pure: its
 result depends on its arguments and on the constants that it reads, so that a study may keep results (`make

@@ -49,7 +49,7 @@ def _halfway(one, other):
 def settled(setup, fit, steps) -> Fit | None:
     """A set of effects on its own linearisation, or None; steps: at most so many.
 
-    Once a step is not shorter than the last one, as between two signs of a small current, all are halved.
+    If steps stop shrinking (for example where a small current changes sign), every further step is halved.
     """
     at, last, damped = fit.c, np.inf, False
     for _ in range(steps):

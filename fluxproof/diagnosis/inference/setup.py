@@ -61,9 +61,9 @@ class Setup:
         return float(usual + self.shifts.get(name, 0.0))
 
     def read_like(self, other, volts, amps):
-        """This reading of a recording with the operating points of ``other``, the same blocks as documented.
+        """Reuse the operating points of the uncorrected setup ``other``, so that both are judged on the same blocks.
 
-        volts, amps: factors of voltages and currents between the two, which the error of the balance has too.
+        volts, amps: factors of voltages and currents between the two; they scale the error of the balance too.
         """
         self.points, self.visits, self.shifts = other.points, other.visits, other.shifts
         self.grouping, self.repeats = other.grouping, other.repeats
@@ -72,9 +72,9 @@ class Setup:
         return self
 
     def smoothly(self, other, volts, amps):
-        """A copy in which the reading changes the smooth signals only, as a correction of a measurement does.
+        """A copy in which the interpretation changes the smooth signals only, as a measurement correction does.
 
-        Noise stays that of ``other``, as noise of a current that is told twice as large would count against it.
+        It keeps the noise of the uncorrected setup; otherwise a scaled current would be penalised for its scaled noise.
         """
         channel = self.cells.channel
         scale = np.where(channel == "u", volts, np.where(channel == "sum", amps, 1.0))

@@ -1,7 +1,7 @@
 """The table of a power analyser as dq values: a row per operating point, without an angle.
 
     u_line p_el          line-to-line voltage (fundamental) and electric power of the machine
-    i_d_ref i_q_ref      what the drive was told, or i_d i_q
+    i_d_ref i_q_ref      the references of the drive, or i_d i_q
     i_line               line current (fundamental), which then replaces the magnitude of the references
 
 All values are amplitudes; the units "V rms" and "A rms" are converted.  With P = 3/2 Re(u conj(i)) the voltage lies

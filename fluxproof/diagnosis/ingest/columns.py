@@ -235,12 +235,12 @@ def _usual_names(plan, left, nominal, path) -> None:
         plan.sources[name] = dataclasses.replace(source, by_name=not unit)
     if found:
         read = ", ".join(f"{name} from {shown(plan.sources[name].column)!r}" for name in found)
-        plan.notes.append(f"columns read by their usual names: {read}; [columns] can say otherwise")
+        plan.notes.append(f"columns read by their usual names: {read}; override them in [columns]")
 
 
 def _doubtful(path, columns, name) -> RecordingError:
     return RecordingError(
-        f"{path}: {shown(columns[0])!r} and {shown(columns[1])!r} could both be {name}; say which in [columns]"
+        f"{path}: {shown(columns[0])!r} and {shown(columns[1])!r} could both be {name}; choose one in [columns]"
     )
 
 
@@ -265,7 +265,7 @@ def _not_used(plan, left) -> None:
         for column in left:
             unit, known = _unit_of(column, left), split_unit(column)[0] in COLUMNS
             if unit and not known and column not in used and conversion(name, unit, 1) is not None:
-                plan.notes.append(f"column {shown(column)!r} is not used; if it is {name}, say so in [columns]")
+                plan.notes.append(f"column {shown(column)!r} is not used; if it is {name}, assign it in [columns]")
 
 
 def _guesses(missing, names) -> str:

@@ -33,7 +33,7 @@ def missing_columns(have: set[str]) -> list[str]:
         return []
     if "u_line" in have and not COMMANDED & have:
         needed = {"omega_e", "p_el", "i_d_ref", "i_q_ref"}
-        return [f"of a power analyser's table {', '.join(sorted(needed - have))}"]
+        return [f"for a power-analyser table: {', '.join(sorted(needed - have))}"]
     missing = []
     phases = len({"i_a", "i_b", "i_c"} & have) >= 2
     dq = {"i_d", "i_q"} <= have

@@ -66,7 +66,7 @@ def emf_rows(path, columns: dict, nominal, meta: dict) -> Recording:
 def _time(path, columns) -> np.ndarray:
     if "t" not in columns:
         raise RecordingError(
-            f"{path}: terminal voltages need a time column t; the sampling of the instrument is not that of the control"
+            f"{path}: terminal voltages need a time column t; as the instrument does not sample with the control"
         )
     t = columns["t"]
     if len(t) < 4 or not np.isfinite(t).all() or not (np.diff(t) > 0).all():
@@ -230,7 +230,7 @@ def _over_turns(x, turn) -> np.ndarray:
 def _notes(columns, t, period) -> list[str]:
     notes = [
         f"EMF run: terminal voltages, a sample every {float(np.median(np.diff(t))):.3g} s, as means over control "
-        f"periods of {period:g} s; the current is zero, so that resistance, inductances, inverter and current sensors "
+        f"periods of {period:g} s; the current is zero, so resistance, inductances, inverter and current sensors "
         "cannot be diagnosed"
     ]
     if "theta_e" not in columns:

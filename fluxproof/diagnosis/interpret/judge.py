@@ -6,7 +6,7 @@ cheap, as the balance is a sum of few terms that a reading scales,
     y = f_u u - f_R R i - f_Ld d(L_d i_d) - f_Lq d(L_q i_q) - f_psi d(psi_m)
 
 then the best ones with the whole search of effects.  A reading has no free size, which the evidence rewards by itself:
-currents in rms are told from a gain error by how exactly the factor is met.
+currents in rms differ from a gain error in how exactly the factor is met.
 """
 
 from __future__ import annotations
@@ -48,8 +48,8 @@ class Judged:
 def preferred(recordings, posterior, explained, progress=lambda text: None):
     """(readings, rivals, Posterior) that the data prefer; without readings if what is documented fits best.
 
-    A convention is met exactly and takes the place of an effect: a reading after which the same quantity still has to
-    be rescaled, or that leaves as many effects as there were without it, is chance.  rivals: readings that leave the
+    A convention is met exactly and replaces an effect: an interpretation that still needs a scale error for the same
+    quantity, or as many effects as without it, is a coincidence and is rejected.  rivals: readings that leave the
     same balance; posterior: of the effects as documented; explained: whether these explain the misfit.
     """
     setup, known = posterior.setup, posterior.best().value
@@ -72,7 +72,7 @@ def preferred(recordings, posterior, explained, progress=lambda text: None):
         prior = len(j.readings) * np.log(k.MISREAD)
         if max(j.value, perfect - ONE_EFFECT + prior) <= known:
             continue
-        progress(f"as if {j.readings[0].says}")
+        progress(f"interpretation: {j.readings[0].says}")
         read = setup.call(_read, setup, tuple(r.code for r in j.readings))
         other = setup.call(Posterior, read, progress)
         value = other.best().value + prior + terms.jacobian(j.readings)

@@ -17,7 +17,7 @@ def under(readings, rivals, documented: Diagnosis, answer: Diagnosis, level: flo
 
     ``documented`` if nothing is explained with them: they must explain half of the misfit and of the voltage, as a
     recording in other units leaves a misfit that is nearly all of the simulation's voltage.
-    Voltages are those of the recording: where the bus is recorded at half, the rest is told in recorded volts.
+    Voltages are those of the recording: where the bus is recorded at half, the residual is given in recorded volts.
     readings: tuple of Reading; rivals: list of those that fit as well as the only one.  documented: the answer without
     readings, for the misfit before.
     """
@@ -50,14 +50,15 @@ def under(readings, rivals, documented: Diagnosis, answer: Diagnosis, level: flo
 
 
 def not_told(readings: tuple[Reading, ...], documented: Diagnosis) -> Diagnosis:
-    """The answer without readings, with a note that they would fit better and leave too much."""
+    """The answer without readings, with a note that they would fit better but leave a large residual."""
     says = "; ".join(r.says for r in readings)
-    documented.notes.append(f"It fits better as if {says}, but too much is left for that: not asserted.")
+    why = "would fit better, but a large residual remains, so this is only a hint"
+    documented.notes.append(f"The interpretation that {says} {why}.")
     return documented
 
 
 def restate(answer: Diagnosis, loaded) -> None:
-    """Tell of a key of the drive file that had to be another one for the recording to be read at all."""
+    """Report a key of the drive file that had to be changed for the recording to be usable at all."""
     restated = loaded[0].meta.get("restated")
     if restated is None or answer.verdict == "bad_recording":
         return

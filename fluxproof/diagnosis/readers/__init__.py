@@ -73,10 +73,10 @@ def _reader_of(path: Path, head: bytes):
     claims = [m for m in known if suffix in m.SUFFIXES]
     if found is None:
         formats = ", ".join(m.FORMAT for m in known)
-        claimed = f"not a {claims[0].FORMAT} file as its name says" if claims else "unknown format"
+        claimed = f"not a {claims[0].FORMAT} file, as its name suggests" if claims else "unknown format"
         raise RecordingError(f"{path}: {claimed}; readable formats: {formats}")
     if claims and found not in claims:
         raise RecordingError(
-            f"{path}: the name says {claims[0].FORMAT}, the content is {found.FORMAT}; rename it if that is right"
+            f"{path}: the name suggests {claims[0].FORMAT}, the content is {found.FORMAT}; rename it if that is right"
         )
     return found

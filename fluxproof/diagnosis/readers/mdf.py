@@ -168,7 +168,7 @@ def _table(path, wanted, signals, units, limit) -> Table:
     if other:
         names = ", ".join(shown(name, 24) for name in other[:6]) + (", ..." if len(other) > 6 else "")
         table.notes.append(
-            f"{names} are on other rasters; their last value is held on the raster of {shown(main)}"
+            f"{names} are on other rasters; their last value is repeated on the raster of {shown(main)}"
         )
     if len(raster) >= limit:
         table.problems.append(too_long(limit))

@@ -41,19 +41,19 @@ def fit_bars(fit) -> theme.Picture:
     return theme.picture(
         "fit_bars",
         figure,
-        "Misfit before and after, on operating points that were not fitted and on those that were.",
+        "Misfit before and after, at held-out and at fitted operating points.",
     )
 
 
 def shares(diagnosis) -> theme.Picture:
-    """One bar per named effect with its share of the misfit's power, and one for the rest."""
+    """One bar per named effect with its share of the misfit's power, and one for the residual."""
     named = diagnosis.effects
     rows = [(effect_text(e.name).title, e.explains, explained(e, named), theme.AFTER) for e in named]
     if not rows:
         raise LeftOut("no effect is named")
     if diagnosis.explained_share is not None:
         rest = 1.0 - diagnosis.explained_share
-        rows.append(("the rest", rest, percent(rest), theme.BEFORE))
+        rows.append(("residual", rest, percent(rest), theme.BEFORE))
     figure, axis = theme.axes(height=0.7 + 0.36 * len(rows))
     for place, (_, share, text, color) in enumerate(rows):
         axis.barh(place, np.clip(share, 0.0, 1.0), 0.7, color=color)

@@ -77,8 +77,8 @@ def orders(e) -> theme.Picture:
     )
     theme.key(axis, *((_called(e, when), WHEN[when]) for when in values))
     caption = (
-        "Amplitude of the misfit's harmonics. Order 0 is the part that does not depend on the angle; what it leaves"
-        " in the other orders of incomplete turns is subtracted."
+        "Amplitude of the misfit's harmonics. Order 0 is the part that does not depend on the angle; its leakage"
+        " into the other orders of incomplete turns is subtracted."
     )
     return theme.picture("orders", figure, caption)
 

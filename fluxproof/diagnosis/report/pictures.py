@@ -51,7 +51,7 @@ def draw(diagnosis, laid_over: dict | None) -> tuple[dict[str, theme.Picture], l
     except LeftOut as reason:
         return {}, [f"every picture of the misfit: {reason}"] if arrays else []
     if diagnosis.verdict == "partly_explained":
-        arrays["words"] = {"before": "before", "after": "the rest"}
+        arrays["words"] = {"before": "before", "after": "residual"}
     jobs = [(name, title, needs, function, arrays) for name, (function, needs, title) in DRAWN.items()]
     jobs.append(("shares", "shares of the misfit", (), bars.shares, diagnosis))
     jobs.append(("fit_bars", "misfit before and after", (), bars.fit_bars, diagnosis.fit))

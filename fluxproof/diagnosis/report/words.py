@@ -16,11 +16,11 @@ __all__ = ["brief", "effect_text", "explained", "measured", "number", "percent",
 VERDICTS = {
     "explained": (
         "good",
-        "Known physics accounts for the difference, also at operating points that were not fitted.",
+        "Known physics accounts for the difference, also at held-out operating points.",
     ),
     "partly_explained": (
         "good",
-        "Known physics accounts for most of the difference; the rest is located, and its cause is not known.",
+        "Known physics accounts for most of the difference; the residual is located, but its cause is not known.",
     ),
     "ambiguous": ("open", "Several causes fit this recording equally well."),
     "unexplained": ("open", "No effect of the catalogue explains half of the difference."),
@@ -31,7 +31,7 @@ VERDICTS = {
     ),
     "bad_recording": ("bad", "The recording cannot be diagnosed. Nothing was compared."),
 }
-LEAST_SHARE = 0.005  # a smaller share would be told as 0 %
+LEAST_SHARE = 0.005  # a smaller share would be printed as 0 %
 SMALL = 0.5  # where shares sum up to more, one without any is small and not taken over
 VARIABLES = {
     "t": ("time", "s"),
@@ -64,7 +64,7 @@ def explained(effect, effects) -> str:
         return "in the torque"
     if sum(e.explains for e in effects) > SMALL:
         return "< 1 %"
-    return "with the others" if len(effects) > 1 else "–"
+    return "shared (see total)" if len(effects) > 1 else "–"
 
 
 def span(low, high, unit: str) -> str:

@@ -57,10 +57,10 @@ class CurrentBend(Effect):
 
 EFFECT = CurrentBend(
     name="current_bend",
-    title="current sensors that bend towards full scale",
-    clause="the current sensors bent towards full scale, as behind a core that saturates",
+    title="nonlinear current sensors near full scale",
+    clause="the current sensors were nonlinear towards full scale, as with a saturating core",
     equation="i_measured = i + b i^3, b of each phase",
-    signature="a sum of the phase currents that follows their third power; order 0 as of a saturation, and order 6",
+    signature="a sum of the phase currents that follows their third power; order 0 as for a saturation, and order 6",
     confounders=("saturation", "current_scale", "current_gain"),
     separated_by="a second current sensor at full scale; the sum of three measured currents",
     parameters=(Parameter("bend", "1", "relative error at rated current of the worst phase", "bend"),),

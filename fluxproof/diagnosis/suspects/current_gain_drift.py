@@ -40,8 +40,8 @@ class CurrentGainDrift(Effect):
 
 EFFECT = CurrentGainDrift(
     name="current_gain_drift",
-    title="a drifting gain of all current sensors",
-    clause="the gain of all current sensors drifted over the recording, as of a shunt that warms up",
+    title="drifting gain of all current sensors",
+    clause="the gain of all current sensors drifted over the recording, as with a shunt that warms up",
     equation="i_measured = (1 + s t) i, with t from 0 to 1 over the recording",
     signature="R, L_d and L_q drift by the same factor",
     confounders=("resistance_temperature", "current_scale"),

@@ -29,8 +29,8 @@ class CurrentLag(Effect):
 
 EFFECT = CurrentLag(
     name="current_lag",
-    title="late currents behind a filter",
-    clause="the measured currents were late, as behind a filter in front of the converters",
+    title="currents delayed by a filter",
+    clause="the measured currents were delayed, as by a filter before the converters",
     equation="i_measured + tau di_measured/dt = i",
     signature="order 0: the whole current vector rotated by omega tau, and smaller by its square",
     confounders=("sampling_skew", "delay", "encoder_offset"),

@@ -32,7 +32,7 @@ class LegVoltage(Effect):
 EFFECT = LegVoltage(
     name="leg_voltage",
     title="unequal voltage errors of the legs",
-    clause="the legs of the inverter had different voltage errors, as of drivers with different delays",
+    clause="the legs of the inverter had different voltage errors, as with unequal gate-driver delays",
     equation="u = u_recorded - e_abc, constant in the stator frame",
     signature="order 1 in dq, the same at every speed and current",
     confounders=("current_offset", "encoder_eccentricity"),

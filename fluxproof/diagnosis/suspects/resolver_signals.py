@@ -41,8 +41,8 @@ class ResolverSignals(Effect):
 
 EFFECT = ResolverSignals(
     name="resolver_signals",
-    title="a resolver with unequal signals",
-    clause="the angle were that of a resolver with unequal sine and cosine",
+    title="resolver with unequal signals",
+    clause="the angle came from a resolver with unequal sine and cosine",
     equation="theta_measured = theta_e + a sin(2 theta_e) + b cos(2 theta_e)",
     signature="orders 2 and -2, proportional to speed, without current too",
     confounders=("current_gain", "phase_resistance_asymmetry", "encoder_eccentricity"),

@@ -34,10 +34,10 @@ class ShaftTwist(Effect):
 
 EFFECT = ShaftTwist(
     name="shaft_twist",
-    title="a soft shaft between rotor and angle sensor",
-    clause="the angle sensor turned against the rotor with the torque, as behind a soft shaft",
+    title="soft shaft between rotor and angle sensor",
+    clause="the angle sensor twisted against the rotor with the torque, as with a soft shaft",
     equation="theta_measured = theta_e + k T",
-    signature="order 0: omega psi_m k T on the d axis, odd in i_q: as an error of L_q and a cross-saturation together",
+    signature="order 0: omega psi_m k T on the d axis, odd in i_q: like an error of L_q with a cross-saturation",
     confounders=("inductance_q", "cross_saturation", "encoder_offset"),
     separated_by="i_d of both signs at one torque; the angle against a second sensor, loaded and unloaded",
     parameters=(Parameter("twist_rad", "rad", "electrical, at rated torque", "twist"),),

@@ -56,7 +56,7 @@ EFFECT = ShortedTurns(
     equation="i = i_terminal - (2/3) g Re(j omega psi e^(-j phase)) e^(j phase)",
     signature="orders 0 and -2 of equal size, proportional to omega^2, and a drag torque",
     confounders=("iron_loss", "phase_resistance_asymmetry", "current_gain"),
-    separated_by="standstill, where a resistance or a gain of one phase stays and a short vanishes",
+    separated_by="standstill, where a short vanishes but a resistance or gain error of one phase does not",
     parameters=tuple(Parameter(f"conductance_{x}_s", "S", f"of the short, referred to phase {x}") for x in PHASES),
     named=False,
     one_of=tuple((phase, f"{phase}_lag") for phase in PHASES),

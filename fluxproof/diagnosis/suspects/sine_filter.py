@@ -53,7 +53,7 @@ class SineFilter(Effect):
 EFFECT = SineFilter(
     name="sine_filter",
     title="sine filter or long cable",
-    clause="a sine filter or a long cable stood between inverter and machine",
+    clause="a sine filter or a long cable was connected between inverter and machine",
     equation="i_measured = i + C du/dt, u_measured = u + R_f i + L_f di/dt",
     signature="order 0: i_d larger by omega C u_q, i_q smaller by omega C u_d, in proportion to omega^2",
     confounders=("iron_loss", "current_scale", "magnet_flux"),
