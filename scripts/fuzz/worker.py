@@ -1,0 +1,98 @@
+"""The parent's side of the child: a case goes there as a file, and a child that ends or hangs is a verdict too."""
+
+from __future__ import annotations
+
+import multiprocessing
+import re
+import shutil
+import signal
+import tempfile
+from pathlib import Path
+
+from scripts.fuzz.case import Case, Verdict
+
+CASES = 2000  # after so many a child is replaced, so that what libraries leave behind does not add up
+STARTING = 300.0  # s, in which libraries load and kernels are compiled
+LOADED = ["scripts.fuzz.child", "pandas", "scipy.io", "h5py", "pyarrow.parquet", "fluxproof.diagnosis.ingest.load"]
+
+
+class Worker:
+    """Runs the cases of one target; close it at the end."""
+
+    def __init__(self, target):
+        self.target, self.cases, self.process, self.connection = target, 0, None, None
+        self.folder = Path(tempfile.mkdtemp(prefix="fluxproof-fuzz-"))
+        self.context = multiprocessing.get_context("forkserver")
+        self.context.set_forkserver_preload(LOADED)
+
+    def verdict(self, case: Case) -> Verdict:
+        """What became of the case."""
+        if self.process is None or self.cases >= CASES:
+            self._start()
+        self.cases += 1
+        inputs = self.folder / "case"
+        _empty(inputs)
+        path = inputs / f"{case.key}{case.suffix}"
+        path.write_bytes(case.content)
+        try:
+            self.connection.send(str(path))
+            if self.connection.poll(4.0 * self.target.SECONDS + 5.0):
+                return self.connection.recv()
+            text = self._log()
+            self._stop()
+            return Verdict(f"hang at {_place(text)}", text)
+        except (EOFError, OSError):
+            return self._ended()
+
+    def _ended(self) -> Verdict:
+        """The verdict on a child that is no more."""
+        self.process.join(5.0)
+        code, text = self.process.exitcode, self._log()
+        self._stop()
+        name = signal.Signals(-code).name if code is not None and code < 0 else f"status {code}"
+        return Verdict(f"crash: {name} at {_place(text)}", f"the process ended with {name}\n{text}")
+
+    def _start(self) -> None:
+        self._stop()
+        self.connection, other = self.context.Pipe()
+        arguments = (self.target.__name__, str(self.folder), other)
+        from scripts.fuzz.child import serve
+
+        self.process = self.context.Process(target=serve, args=arguments, daemon=True)
+        self.process.start()
+        other.close()
+        self.cases = 0
+        if not self.connection.poll(STARTING):
+            raise RuntimeError(f"{self.target.__name__}: the child does not start: {self._log()}")
+        try:
+            self.connection.recv()
+        except EOFError:
+            raise RuntimeError(f"{self.target.__name__}: the child ends at its start: {self._log()}") from None
+
+    def _stop(self) -> None:
+        if self.process is not None:
+            self.process.kill()
+            self.process.join()
+            self.connection.close()
+            self.process = None
+
+    def _log(self) -> str:
+        with open(self.folder / "child.log", errors="replace") as file:
+            return file.read()[-4000:]
+
+    def close(self) -> None:
+        self._stop()
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+
+def _empty(folder: Path) -> None:
+    """Remove what a case left; the folder stays, as the child is in it."""
+    folder.mkdir(exist_ok=True)
+    for path in folder.iterdir():
+        shutil.rmtree(path) if path.is_dir() and not path.is_symlink() else path.unlink()
+
+
+def _place(log: str) -> str:
+    """The innermost place of the project in what faulthandler wrote, innermost first."""
+    at = re.search(r'File "\S*?/((?:diagnosis|fluxproof|golden_model|plant)/\S+)", line (\d+) in (\w+)', log)
+    return f"{at[1]}:{at[2]} {at[3]}" if at else "an unknown place"
