@@ -43,7 +43,8 @@ def main() -> int:
     if given.file:
         return again(given.targets[0], given.file)
     stop = time.monotonic() + 60.0 * given.minutes
-    searches = [Search(by_name(name), given.seed, stop_at=stop) for name in given.targets]
+    worker = Worker()
+    searches = [Search(by_name(name), given.seed, worker, stop_at=stop) for name in given.targets]
     progress, written = Progress(searches), []
     try:
         while time.monotonic() < stop:
@@ -54,8 +55,7 @@ def main() -> int:
     except KeyboardInterrupt:
         progress.say("stopped")
     finally:
-        for search in searches:
-            search.close()
+        worker.close()
     for search in searches:
         progress.say(f"{search.name}: {search.cases} cases, {len(search.finds)} finds")
     print("\n".join(written or ["no finds"]))
@@ -64,9 +64,9 @@ def main() -> int:
 
 def again(name: str, path: Path) -> int:
     """Judge one file."""
-    worker = Worker(by_name(name))
+    worker = Worker()
     try:
-        verdict = worker.verdict(Case("".join(path.suffixes[-1:]), path.read_bytes()))
+        verdict = worker.verdict(by_name(name), Case("".join(path.suffixes[-1:]), path.read_bytes()))
     finally:
         worker.close()
     print(f"{name}: {verdict.kind}\n{verdict.text}" if verdict.kind else f"{name}: nothing wrong")
@@ -89,7 +89,9 @@ class Progress:
         cases, found = sum(s.cases for s in self.searches), sum(len(s.finds) for s in self.searches)
         rate = cases / max(now - self.start, 1e-3)
         text = f"{now - self.start:.0f} s, {cases} cases, {rate:.1f} a second, {found} finds"
-        print(f"\r\x1b[K{text}" if self.terminal else text, end="" if self.terminal else "\n", file=sys.stderr, flush=True)
+        print(
+            f"\r\x1b[K{text}" if self.terminal else text, end="" if self.terminal else "\n", file=sys.stderr, flush=True
+        )
 
     def say(self, text: str) -> None:
         print(f"\r\x1b[K{text}" if self.terminal else text, file=sys.stderr, flush=True)

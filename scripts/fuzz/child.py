@@ -18,29 +18,36 @@ from scripts.fuzz.watch import Watch
 ADDRESS_SPACE = 6 << 30  # beyond what the process has at its start
 
 
-def serve(target_name: str, folder: str, connection) -> None:
-    """Judge the file that each message names until the other end closes; first one valid case, which loads libraries."""
-    sys.dont_write_bytecode = True
-    warnings.simplefilter("ignore")
+def serve(folder: str, connection) -> None:
+    """Answer each message (target, path) with a Verdict until the other end closes; an empty path loads the target."""
     log = open(Path(folder, "child.log"), "w")
     for number in (1, 2):  # what libraries print belongs to nobody's terminal
         os.dup2(log.fileno(), number)
+    sys.dont_write_bytecode = True
+    warnings.simplefilter("ignore")
     faulthandler.enable(log)
-    target = importlib.import_module(target_name)
     inputs = Path(folder, "case")
     inputs.mkdir(exist_ok=True)
     os.environ["TMPDIR"] = str(inputs)
     os.chdir(inputs)
-    target.warm(inputs)
-    with open("/proc/self/statm") as file:
-        most = int(file.read().split()[0]) * resource.getpagesize() + ADDRESS_SPACE
-    resource.setrlimit(resource.RLIMIT_AS, (most, resource.getrlimit(resource.RLIMIT_AS)[1]))
     watch = Watch()
-    connection.send(Verdict())
     with contextlib.suppress(EOFError, OSError):
         while True:
-            path = Path(connection.recv())
+            name, path = connection.recv()
+            target = importlib.import_module(name)
+            if not path:
+                target.warm(inputs)
+                _limit_memory()
+                connection.send(Verdict())
+                continue
             faulthandler.dump_traceback_later(3 * target.SECONDS, file=log)
-            verdict = judge(target, path, watch)
+            verdict = judge(target, Path(path), watch)
             faulthandler.cancel_dump_traceback_later()
             connection.send(verdict)
+
+
+def _limit_memory() -> None:
+    """What a file may make the process take at most, so that the machine goes on; the verdict is by less (judge.py)."""
+    with contextlib.suppress(OSError), open("/proc/self/statm") as file:
+        most = int(file.read().split()[0]) * resource.getpagesize() + ADDRESS_SPACE
+        resource.setrlimit(resource.RLIMIT_AS, (most, resource.getrlimit(resource.RLIMIT_AS)[1]))

@@ -33,10 +33,9 @@ class _Enough(BaseException):
 class Search:
     """The search in one target; the same seed draws the same cases, turn by turn."""
 
-    def __init__(self, target, seed: int, shrinking: float = SHRINKING, stop_at: float = float("inf")):
-        self.target, self.seed, self.shrinking, self.stop_at = target, seed, shrinking, stop_at
+    def __init__(self, target, seed: int, worker: Worker, shrinking: float = SHRINKING, stop_at: float = float("inf")):
+        self.target, self.worker, self.seed, self.shrinking, self.stop_at = target, worker, seed, shrinking, stop_at
         self.name = target.__name__.rpartition(".")[2]
-        self.worker = Worker(target)
         self.strategy = target.cases()
         self.turns = self.cases = 0
         self.finds: dict[str, Find] = {}
@@ -53,7 +52,7 @@ class Search:
                 raise _Enough
             self.cases += 1
             after_each()
-            verdict = self.worker.verdict(case)
+            verdict = self.worker.verdict(self.target, case)
             if not verdict.kind or verdict.kind in self.finds or (new and verdict.kind != new[0].verdict.kind):
                 return False
             if not new or len(case.content) <= len(new[0].case.content):
@@ -74,16 +73,13 @@ class Search:
         last = [found]
 
         def fails(content: bytes) -> bool:
-            verdict = self.worker.verdict(Case(found.case.suffix, content))
+            verdict = self.worker.verdict(self.target, Case(found.case.suffix, content))
             if verdict.kind == found.verdict.kind:
                 last[0] = found._replace(case=Case(found.case.suffix, content), verdict=verdict)
             return verdict.kind == found.verdict.kind
 
         smaller(found.case.content, fails, self.shrinking)
         return last[0]
-
-    def close(self) -> None:
-        self.worker.close()
 
 
 def _how(cases: int) -> settings:

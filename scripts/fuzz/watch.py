@@ -21,7 +21,17 @@ FORBIDDEN = (
 )  # fmt: skip
 CHANGES = ("os.remove", "os.rename", "os.rmdir", "os.mkdir", "os.truncate")  # allowed in the case's own folder
 # Code that these compile is their own: classes from field names, compiled kernels.
-COMPILES = ("collections", "dataclasses.py", "enum.py", "typing.py", "numba", "attr", "jinja2", "importlib", "reprlib.py")
+COMPILES = (
+    "collections",
+    "dataclasses.py",
+    "enum.py",
+    "typing.py",
+    "numba",
+    "attr",
+    "jinja2",
+    "importlib",
+    "reprlib.py",
+)
 INSTALLED = tuple({str(Path(p).resolve()) for p in (*sysconfig.get_paths().values(), sys.prefix, sys.base_prefix)})
 SYSTEM = ("/proc/self/", "/proc/cpuinfo", "/proc/meminfo", "/sys/devices/system/", "/dev/null", "/dev/urandom", "/usr/")
 SYSTEM += ("/etc/mime.types", "/etc/localtime", "/etc/fonts", "/sys/fs/cgroup", "/proc/stat")
@@ -33,7 +43,14 @@ class Watch:
     def __init__(self, extra: tuple[str, ...] = ()):
         """extra: further folders that may be read."""
         self.folder, self.seen, self.inside = "", [], False
-        self.readable = (str(ROOT), *INSTALLED, *SYSTEM, *extra, *filter(None, map(os.path.realpath, sys.path)))
+        self.readable = (
+            str(ROOT),
+            *INSTALLED,
+            *SYSTEM,
+            f"/proc/{os.getpid()}/",
+            *extra,
+            *filter(None, map(os.path.realpath, sys.path)),
+        )
         sys.addaudithook(self._hook)
 
     def begin(self, folder: Path) -> None:

@@ -17,26 +17,29 @@ LOADED = ["scripts.fuzz.child", "pandas", "scipy.io", "h5py", "pyarrow.parquet",
 
 
 class Worker:
-    """Runs the cases of one target; close it at the end."""
+    """Runs cases of any target in one process, which loads a target with its first case; close it at the end."""
 
-    def __init__(self, target):
-        self.target, self.cases, self.process, self.connection = target, 0, None, None
+    def __init__(self):
+        self.cases, self.process, self.connection = 0, None, None
+        self.loaded: set[str] = set()
         self.folder = Path(tempfile.mkdtemp(prefix="fluxproof-fuzz-"))
         self.context = multiprocessing.get_context("forkserver")
         self.context.set_forkserver_preload(LOADED)
 
-    def verdict(self, case: Case) -> Verdict:
-        """What became of the case."""
+    def verdict(self, target, case: Case) -> Verdict:
+        """What became of the case; target: a module of targets/."""
         if self.process is None or self.cases >= CASES:
             self._start()
+        if target.__name__ not in self.loaded:
+            self._load(target)
         self.cases += 1
         inputs = self.folder / "case"
         _empty(inputs)
         path = inputs / f"{case.key}{case.suffix}"
         path.write_bytes(case.content)
         try:
-            self.connection.send(str(path))
-            if self.connection.poll(4.0 * self.target.SECONDS + 5.0):
+            self.connection.send((target.__name__, str(path)))
+            if self.connection.poll(4.0 * target.SECONDS + 5.0):
                 return self.connection.recv()
             text = self._log()
             self._stop()
@@ -53,21 +56,27 @@ class Worker:
         return Verdict(f"crash: {name} at {_place(text)}", f"the process ended with {name}\n{text}")
 
     def _start(self) -> None:
-        self._stop()
-        self.connection, other = self.context.Pipe()
-        arguments = (self.target.__name__, str(self.folder), other)
         from scripts.fuzz.child import serve
 
-        self.process = self.context.Process(target=serve, args=arguments, daemon=True)
+        self._stop()
+        self.connection, other = self.context.Pipe()
+        self.process = self.context.Process(target=serve, args=(str(self.folder), other), daemon=True)
         self.process.start()
         other.close()
         self.cases = 0
-        if not self.connection.poll(STARTING):
-            raise RuntimeError(f"{self.target.__name__}: the child does not start: {self._log()}")
+
+    def _load(self, target) -> None:
+        """Have the child load the target and run its valid inputs; RuntimeError if it cannot."""
+        _empty(self.folder / "case")
         try:
-            self.connection.recv()
-        except EOFError:
-            raise RuntimeError(f"{self.target.__name__}: the child ends at its start: {self._log()}") from None
+            self.connection.send((target.__name__, ""))
+            if self.connection.poll(STARTING):
+                self.connection.recv()
+                self.loaded.add(target.__name__)
+                return
+        except (EOFError, OSError):
+            pass
+        raise RuntimeError(f"{target.__name__}: the child does not start: {self._log()}")
 
     def _stop(self) -> None:
         if self.process is not None:
@@ -75,6 +84,7 @@ class Worker:
             self.process.join()
             self.connection.close()
             self.process = None
+            self.loaded.clear()
 
     def _log(self) -> str:
         with open(self.folder / "child.log", errors="replace") as file:

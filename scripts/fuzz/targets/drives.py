@@ -1,0 +1,83 @@
+"""Drive files: as `registers`, `diagnose` and `simulate` read them, without the simulation itself."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+
+from fluxproof.diagnosis.answer.improved_plant import plant_of
+from fluxproof.diagnosis.nominal import load_nominal
+from fluxproof.golden_model.board_registers import board_set
+from fluxproof.golden_model.drive import load
+from fluxproof.golden_model.drive_keys import DriveError
+from fluxproof.print_registers import as_json, bases_lines, c_lines, load_list, table
+from fluxproof.simulate.margins import current_loop, margins, speed_loop
+from fluxproof.simulate.scene import current_step, main_scene
+from scripts.fuzz import corpus
+from scripts.fuzz.drawn import toml
+
+SECONDS, TURN, NAMES_FILE = 5.0, 100, True
+
+
+def cases():
+    return toml.drive(corpus.drives())
+
+
+def run(path) -> None:
+    """Each reading by itself: what one refuses another may take."""
+    failures = []
+    for reading in (_registers, _nominal, _simulated):
+        try:
+            reading(path)
+        except DriveError as error:
+            failures.append(error)
+    if failures:
+        raise failures[0]
+
+
+def _registers(path) -> None:
+    """What `registers` prints in its three formats and writes as JSON."""
+    drive = load(path)
+    with _named(path):
+        result = board_set(drive)
+    assert all(row.low <= row.integer <= row.high for row in result.rows), "a register out of its range"
+    lines = [*bases_lines(drive, result), *table(result.rows), *c_lines(str(path), drive, result)]
+    assert all(line.isprintable() for line in lines), "a line that is not printable"
+    json.dumps(as_json(drive, result), allow_nan=False)
+    json.dumps(load_list(result), allow_nan=False)
+
+
+def _nominal(path) -> None:
+    nominal = load_nominal(path)
+    assert nominal.sample_time_s > 0.0
+    plant_of(nominal)
+
+
+def _simulated(path) -> None:
+    """The scene and the margins of `simulate`."""
+    drive = load(path)
+    with _named(path), contextlib.redirect_stdout(io.StringIO()):
+        result = board_set(drive)
+        main_scene(drive)
+        current_step(drive)
+        for loop in (*(current_loop(drive, result, axis) for axis in "dq"), speed_loop(drive, result)):
+            if loop is not None:
+                margins(loop)
+
+
+@contextlib.contextmanager
+def _named(path):
+    """The command puts the file's name before such a message."""
+    try:
+        yield
+    except DriveError as error:
+        raise DriveError(f"{path}: {error}") from None
+
+
+def warm(folder) -> None:
+    for number, content in enumerate(corpus.drives()[1:3]):
+        path = folder / f"valid{number}.toml"
+        path.write_bytes(content)
+        with contextlib.suppress(DriveError):
+            run(path)
