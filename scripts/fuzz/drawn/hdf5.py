@@ -86,7 +86,7 @@ def _add(file, kind, name, how, values, h5py) -> None:
         chunks = tuple(min(s, 1 << (20 // len(huge))) for s in huge)
         _attributed(file.create_dataset(name, huge, "f8", chunks=chunks, compression="gzip", fillvalue=1.5), how)
     elif kind == "filled":  # one chunk of zeros that packs to a thousandth
-        data = np.zeros(4_000_000)
+        data = np.zeros(500_000)
         _attributed(file.create_dataset(name, data=data, chunks=data.shape, compression="gzip"), how)
     elif kind == "external":
         file.create_dataset(name, (64,), "f8", external=[("canary.bin", 0, 512)])

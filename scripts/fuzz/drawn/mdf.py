@@ -18,7 +18,8 @@ CODE = (
     "X+1", "2*X", "X", "1/X", "X**9**9**9", "(X", "", "sin(X)", "X if X else 1", "9**9**9**9",
     "__import__('os').system('touch canary')", "().__class__.__base__.__subclasses__()", "open('canary','w')",
     "X+(lambda: __import__('os').system('touch canary'))()", "exec('import os')", "os.system('touch canary')",
-    "where(X > 0, X, __import__('os').getpid())", "X.__class__", "X[0].__init__", "eval('1')", "X" * 5000, "(" * 300 + "X" + ")" * 300,
+    "where(X > 0, X, __import__('os').getpid())", "X.__class__", "X[0].__init__", "eval('1')", "X" * 5000,
+    "(" * 300 + "X" + ")" * 300,
 )  # fmt: skip
 numbers = st.one_of(st.floats(), st.sampled_from((0.0, 1.0, -1.0, 1e308, 5e-324)))
 formulas = st.one_of(st.sampled_from(CODE), names)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import functools
 import io
 import struct
+import warnings
 import zipfile
 
 import numpy as np
@@ -14,11 +16,25 @@ from scripts.fuzz.corpus import motor
 from scripts.fuzz.drawn.text import names
 
 USUAL = ("t", "i_a", "i_b", "i_c", "theta_e", "u_dc", "d_a", "d_b", "d_c")
+PARTS = ("Name", "Data", "X", "signals", "label", "values", "unit")
 columns = st.one_of(st.sampled_from(USUAL), names)
 
 
 def hostile():
-    return st.one_of(parquet(), npy(), npz(), mat())
+    return st.one_of(parquet(), parquet(), npy(), npz(), mat(), st.sampled_from((1, 10, 30)).map(packed))
+
+
+@functools.cache
+def packed(millions: int) -> Case:
+    """A Parquet file of so many million equal rows, which pack to a few kilobytes."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    table, stream = pa.table({name: np.ones(1_000_000) for name in ("t", "i_a")}), io.BytesIO()
+    with pq.ParquetWriter(stream, table.schema) as writer:
+        for _ in range(millions):
+            writer.write_table(table)
+    return Case(".parquet", stream.getvalue())
 
 
 @st.composite
@@ -26,7 +42,7 @@ def parquet(draw) -> Case:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    rows = draw(st.sampled_from((24, 24, 0, 1, 3_000_000)))
+    rows = draw(st.sampled_from((24, 24, 24, 0, 1, 100_000)))
     kinds = {
         "double": lambda: pa.array(np.resize(motor(24)["i_a"], rows)),
         "half": lambda: pa.array(np.zeros(rows, np.float16)),
@@ -95,14 +111,16 @@ def npz(draw) -> Case:
     """An archive of arrays and of what is none, with names that leave the folder, twice the same, or packed zeros."""
     stream = io.BytesIO()
     method = draw(st.sampled_from((zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA)))
-    with zipfile.ZipFile(stream, "w", method) as archive:
-        for name in draw(st.lists(columns, min_size=1, max_size=6)):
-            data = draw(st.one_of(st.just(_valid(24)), npy_bytes(), st.just(_valid(3_000_000)), st.binary(max_size=40)))
+    with zipfile.ZipFile(stream, "w", method) as archive, warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # a name twice is meant
+        for name in draw(st.lists(columns, min_size=1, max_size=4)):
+            data = draw(st.one_of(st.just(_valid(24)), npy_bytes(), st.just(_valid(500_000)), st.binary(max_size=40)))
             member = name.encode("utf-8", "replace").decode() + draw(st.sampled_from((".npy", ".npy", ".npy", "", "/")))
             archive.writestr(member, data)
     return Case(".npz", stream.getvalue())
 
 
+@functools.cache
 def _valid(n: int) -> bytes:
     stream = io.BytesIO()
     np.save(stream, np.zeros(n))
@@ -112,10 +130,11 @@ def _valid(n: int) -> bytes:
 values = st.recursive(
     st.one_of(
         names, st.floats(), st.integers(-(2**31), 2**31), st.just(np.zeros(24)), st.just(np.zeros((24, 3))),
-        st.just(np.zeros((2, 3, 4))), st.just(np.zeros(0)), st.just(np.array(["a", 1, None], object)), st.just(1j * np.ones(24)),
+        st.just(np.zeros((2, 3, 4))), st.just(np.zeros(0)), st.just(np.array(["a", 1, None], object)),
+        st.just(1j * np.ones(24)),
         st.just(motor(24)["i_a"]), st.just(np.zeros(24, np.uint8)), st.just(np.zeros(24, bool)),
     ),
-    lambda inner: st.dictionaries(st.sampled_from((*USUAL, "Name", "Data", "X", "signals", "label", "values", "unit")), inner, max_size=5),
+    lambda inner: st.dictionaries(st.sampled_from((*USUAL, *PARTS)), inner, max_size=5),
     max_leaves=12,
 )  # fmt: skip
 

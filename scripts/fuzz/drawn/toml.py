@@ -18,7 +18,8 @@ except ModuleNotFoundError:  # Python 3.10
 FLOATS = (0.0, -0.0, -1.0, 1e-300, 1e300, 1e308, -1e308, 5e-324, 1e-9, 1e9, float("nan"), float("inf"), -float("inf"))
 INTEGERS = (0, 1, -1, 2, 63, 64, 2**31, 2**53, 2**63 - 1, -(2**63), 10**400)
 UNUSUAL = st.one_of(
-    names, st.booleans(), st.just(datetime.date(2026, 1, 1)), st.just(datetime.datetime(2026, 1, 1, 1, 1)), st.just(datetime.time(1, 1))
+    names, st.booleans(), st.just(datetime.date(2026, 1, 1)),
+    st.just(datetime.datetime(2026, 1, 1, 1, 1)), st.just(datetime.time(1, 1))
 )  # fmt: skip
 NUMBERS = st.one_of(st.sampled_from(FLOATS), st.sampled_from(INTEGERS), st.floats(), st.integers(-(2**63), 2**63 - 1))
 VALUES = st.recursive(
