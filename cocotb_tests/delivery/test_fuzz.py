@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import random
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
-from fluxproof.checkout import ROOT
 from fluxproof.diagnosis.readers import read_table
 
 hypothesis = pytest.importorskip("hypothesis", reason="hypothesis is not installed")
 
 from cocotb_tests.support import planted_faults  # noqa: E402
 from scripts.fuzz import corpus, finds  # noqa: E402
-from scripts.fuzz.case import Case  # noqa: E402
+from scripts.fuzz.__main__ import again  # noqa: E402
+from scripts.fuzz.case import Case, Verdict  # noqa: E402
 from scripts.fuzz.search import Search  # noqa: E402
 from scripts.fuzz.smaller import smaller  # noqa: E402
 from scripts.fuzz.targets import by_name, names  # noqa: E402
@@ -52,9 +50,8 @@ def test_the_same_seed_draws_the_same_cases():
 
         def verdict(self, target, case):
             self.cases.append(case)
-            return planted_faults_fine
+            return Verdict()
 
-    planted_faults_fine = type("Fine", (), {"kind": ""})()
     drawn = []
     for seed in (1, 1, 2):
         recorded = Recorded()
@@ -104,11 +101,13 @@ def test_lines_and_blocks_are_left_out():
     assert len(smaller(bytes(content), lambda c: b"\0EVL" in c, 10.0)) <= 16
 
 
-def test_a_find_is_judged_again_by_the_command(tmp_path):
-    """The file of a find, by the command that the find names; a harmless one has status 0."""
+def test_a_file_is_judged_again_by_the_command(worker, tmp_path, capsys, monkeypatch):
+    """By its target; a harmless one has status 0, a find status 1."""
     path = tmp_path / "drives-0123.toml"
     path.write_bytes(corpus.drives()[1])
-    done = subprocess.run(
-        [sys.executable, "-m", "scripts.fuzz", "--file", str(path)], cwd=ROOT, capture_output=True, text=True
-    )
-    assert done.returncode == 0 and done.stdout == "drives: nothing wrong\n", done.stdout + done.stderr
+    assert again("drives", path, worker) == 0
+    assert capsys.readouterr().out == "drives: nothing wrong\n"
+    monkeypatch.setattr("scripts.fuzz.__main__.by_name", lambda name: planted_faults)
+    path.write_bytes(b"k")
+    assert again("planted", path, worker) == 1
+    assert "KeyError" in capsys.readouterr().out

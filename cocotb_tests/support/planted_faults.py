@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from fluxproof.diagnosis.recording import RecordingError
 from scripts.fuzz.case import Case
 
-SECONDS, TURN, NAMES_FILE = 0.5, 200, True
+SECONDS, TURN, NAMES_FILE = 1.5, 200, True
 ELSEWHERE = "/fluxproof_planted_fault"
 kept: list = []
 

@@ -41,7 +41,11 @@ def arguments() -> argparse.Namespace:
 def main() -> int:
     given = arguments()
     if given.file:
-        return again(given.targets[0], given.file)
+        worker = Worker()
+        try:
+            return again(given.targets[0], given.file, worker)
+        finally:
+            worker.close()
     stop = time.monotonic() + 60.0 * given.minutes
     worker = Worker()
     searches = [Search(by_name(name), given.seed, worker, stop_at=stop) for name in given.targets]
@@ -62,13 +66,9 @@ def main() -> int:
     return 1 if written else 0
 
 
-def again(name: str, path: Path) -> int:
-    """Judge one file."""
-    worker = Worker()
-    try:
-        verdict = worker.verdict(by_name(name), Case("".join(path.suffixes[-1:]), path.read_bytes()))
-    finally:
-        worker.close()
+def again(name: str, path: Path, worker: Worker) -> int:
+    """Judge one file; the exit status."""
+    verdict = worker.verdict(by_name(name), Case(path.suffix, path.read_bytes()))
     print(f"{name}: {verdict.kind}\n{verdict.text}" if verdict.kind else f"{name}: nothing wrong")
     return 1 if verdict.kind else 0
 

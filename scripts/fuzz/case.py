@@ -12,6 +12,9 @@ class Case(NamedTuple):
     suffix: str
     content: bytes
 
+    def __repr__(self) -> str:
+        return f"Case({self.suffix!r}, {len(self.content)} bytes)"
+
     @property
     def key(self) -> str:
         """A short name that depends on the content alone."""

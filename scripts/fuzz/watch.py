@@ -13,6 +13,7 @@ import traceback
 from pathlib import Path
 
 from fluxproof.checkout import ROOT
+from fluxproof.golden_model.kernel import CACHE_DIR
 
 FORBIDDEN = (
     "os.system", "os.exec", "os.posix_spawn", "os.spawn", "os.startfile", "os.symlink", "os.link", "os.chmod",
@@ -78,7 +79,7 @@ class Watch:
         if event == "open":
             return self._of_open(*args[:3])
         if event in CHANGES and not isinstance(args[0], int):
-            return "" if self._own(args[0]) else f"{event} {args[0]!r}"
+            return "" if self._own(args[0]) or _of_kernels(args[0]) else f"{event} {args[0]!r}"
         return f"{event} {args!r}"[:300] if event in FORBIDDEN and not _importing() else ""
 
     def _of_code(self, code) -> str:
@@ -99,12 +100,17 @@ class Watch:
             return ""
         name = os.path.realpath(os.fsdecode(path))
         if writes:
-            return "" if name == os.devnull or f"{os.sep}numba{os.sep}" in name else f"opens {name!r} for writing"
+            return "" if name == os.devnull or _of_kernels(name) else f"opens {name!r} for writing"
         return "" if name.startswith(self.readable) else f"opens {name!r}, which is not the file it was given"
 
     def _own(self, path) -> bool:
         name = os.path.realpath(os.fsdecode(path))
         return name == self.folder or name.startswith(self.folder + os.sep)
+
+
+def _of_kernels(path) -> bool:
+    """Whether a path belongs to the folder of compiled kernels (golden_model/kernel.py)."""
+    return os.path.realpath(os.fsdecode(path)).startswith(str(CACHE_DIR.parent))
 
 
 def _importing() -> bool:

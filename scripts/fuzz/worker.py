@@ -39,7 +39,7 @@ class Worker:
         path.write_bytes(case.content)
         try:
             self.connection.send((target.__name__, str(path)))
-            if self.connection.poll(4.0 * target.SECONDS + 5.0):
+            if self.connection.poll(max(4.0 * target.SECONDS, target.SECONDS + 5.0)):
                 return self.connection.recv()
             text = self._log()
             self._stop()
