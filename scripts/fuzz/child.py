@@ -40,7 +40,7 @@ def serve(folder: str, connection) -> None:
                 _limit_memory()
                 connection.send(Verdict())
                 continue
-            faulthandler.dump_traceback_later(3 * target.SECONDS, file=log)
+            faulthandler.dump_traceback_later(2 * target.SECONDS, repeat=True, file=log)
             verdict = judge(target, Path(path), watch)
             faulthandler.cancel_dump_traceback_later()
             connection.send(verdict)

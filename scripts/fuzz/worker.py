@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
 import re
 import shutil
 import signal
 import tempfile
+import time
 from pathlib import Path
 
 from scripts.fuzz.case import Case, Verdict
 
 CASES = 2000  # after so many a child is replaced, so that what libraries leave behind does not add up
+IDLE = 4.0  # s without any work, after which a child hangs
 STARTING = 300.0  # s, in which libraries load and kernels are compiled
 LOADED = ["scripts.fuzz.child", "pandas", "scipy.io", "h5py", "pyarrow.parquet", "fluxproof.diagnosis.ingest.load"]
 
@@ -39,13 +42,33 @@ class Worker:
         path.write_bytes(case.content)
         try:
             self.connection.send((target.__name__, str(path)))
-            if self.connection.poll(max(4.0 * target.SECONDS, target.SECONDS + 5.0)):
+            if self._answers(target.SECONDS):
                 return self.connection.recv()
             text = self._log()
             self._stop()
             return Verdict(f"hang at {_place(text)}", text)
         except (EOFError, OSError):
             return self._ended()
+
+    def _answers(self, seconds: float) -> bool:
+        """Whether an answer comes; not if the child does nothing for a while, or computes far longer than allowed."""
+        busy = first = self._processor_s()
+        since = time.monotonic()
+        while not self.connection.poll(0.5):
+            now, used = time.monotonic(), self._processor_s()
+            if used > busy:
+                busy, since = used, now
+            if now - since > IDLE or used - first > 3.0 * seconds:
+                return False
+        return True
+
+    def _processor_s(self) -> float:
+        """Processor time of the child [s]; the clock on the wall where the system does not say."""
+        try:
+            fields = Path(f"/proc/{self.process.pid}/stat").read_text().rpartition(")")[2].split()
+            return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+        except OSError:
+            return time.monotonic()
 
     def _ended(self) -> Verdict:
         """The verdict on a child that is no more."""

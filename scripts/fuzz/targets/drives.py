@@ -1,9 +1,8 @@
-"""Drive files: as `registers`, `diagnose` and `simulate` read them, without the simulation itself."""
+"""Drive files, as `registers` and `diagnose` read them."""
 
 from __future__ import annotations
 
 import contextlib
-import io
 import json
 
 from fluxproof.diagnosis.answer.improved_plant import plant_of
@@ -12,8 +11,6 @@ from fluxproof.golden_model.board_registers import board_set
 from fluxproof.golden_model.drive import load
 from fluxproof.golden_model.drive_keys import DriveError
 from fluxproof.print_registers import as_json, bases_lines, c_lines, load_list, table
-from fluxproof.simulate.margins import current_loop, margins, speed_loop
-from fluxproof.simulate.scene import current_step, main_scene
 from scripts.fuzz import corpus
 from scripts.fuzz.drawn import toml
 
@@ -27,7 +24,7 @@ def cases():
 def run(path) -> None:
     """Each reading by itself: what one refuses another may take."""
     failures = []
-    for reading in (_registers, _nominal, _simulated):
+    for reading in (_registers, _nominal):
         try:
             reading(path)
         except DriveError as error:
@@ -39,7 +36,7 @@ def run(path) -> None:
 def _registers(path) -> None:
     """What `registers` prints in its three formats and writes as JSON."""
     drive = load(path)
-    with _named(path):
+    with named(path):
         result = board_set(drive)
     assert all(row.low <= row.integer <= row.high for row in result.rows), "a register out of its range"
     lines = [*bases_lines(drive, result), *table(result.rows), *c_lines(str(path), drive, result)]
@@ -54,20 +51,8 @@ def _nominal(path) -> None:
     plant_of(nominal)
 
 
-def _simulated(path) -> None:
-    """The scene and the margins of `simulate`."""
-    drive = load(path)
-    with _named(path), contextlib.redirect_stdout(io.StringIO()):
-        result = board_set(drive)
-        main_scene(drive)
-        current_step(drive)
-        for loop in (*(current_loop(drive, result, axis) for axis in "dq"), speed_loop(drive, result)):
-            if loop is not None:
-                margins(loop)
-
-
 @contextlib.contextmanager
-def _named(path):
+def named(path):
     """The command puts the file's name before such a message."""
     try:
         yield
