@@ -21,7 +21,8 @@ from scripts.fuzz.targets import by_name, names  # noqa: E402
 from scripts.fuzz.worker import Worker  # noqa: E402
 
 SEED = 46
-CASES = {"readers": 150, "drives": 150, "manifests": 60, "dumps": 40, "project": 40, "scenes": 5}  # diagnose takes seconds a case
+# Of each target but diagnose, which takes seconds a case.
+CASES = {"readers": 150, "drives": 150, "manifests": 60, "dumps": 40, "project": 40, "scenes": 5}
 
 
 @pytest.fixture(scope="module")
