@@ -112,3 +112,21 @@ def test_a_file_is_judged_again_by_the_command(worker, tmp_path, capsys, monkeyp
     path.write_bytes(b"k")
     assert again("planted", path, worker) == 1
     assert "KeyError" in capsys.readouterr().out
+
+
+def test_ctrl_c_keeps_what_was_found():
+    """Also what the interrupted turn has not made small yet."""
+
+    class Interrupted:
+        failed = False
+
+        def verdict(self, target, case):
+            if self.failed:
+                raise KeyboardInterrupt
+            self.failed = b"k" in case.content
+            return Verdict("KeyError" if self.failed else "")
+
+    search = Search(planted_faults, 1, Interrupted())
+    with pytest.raises(KeyboardInterrupt):
+        search.turn(300)
+    assert list(search.finds) == ["KeyError"] and search.turns == 1

@@ -49,21 +49,21 @@ def main() -> int:
     stop = time.monotonic() + 60.0 * given.minutes
     worker = Worker()
     searches = [Search(by_name(name), given.seed, worker, stop_at=stop) for name in given.targets]
-    progress, written = Progress(searches), []
+    progress = Progress(searches)
     try:
         while time.monotonic() < stop:
             for search in searches:
                 for found in search.turn(search.target.TURN, progress.show):
-                    written.append(finds.line(found, finds.write(found, given.seed)))
-                    progress.say(written[-1])
+                    progress.say(finds.line(found, finds.write(found, given.seed)))
     except KeyboardInterrupt:
         progress.say("stopped")
     finally:
         worker.close()
     for search in searches:
         progress.say(f"{search.name}: {search.cases} cases, {len(search.finds)} finds")
-    print("\n".join(written or ["no finds"]))
-    return 1 if written else 0
+    found = [finds.line(f, finds.write(f, given.seed)) for search in searches for f in search.finds.values()]
+    print("\n".join(found or ["no finds"]))
+    return 1 if found else 0
 
 
 def again(name: str, path: Path, worker: Worker) -> int:

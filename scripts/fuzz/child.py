@@ -7,6 +7,7 @@ import faulthandler
 import importlib
 import os
 import resource
+import signal
 import sys
 import warnings
 from pathlib import Path
@@ -26,6 +27,7 @@ def serve(folder: str, connection) -> None:
     sys.dont_write_bytecode = True
     warnings.simplefilter("ignore")
     faulthandler.enable(log)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent
     inputs = Path(folder, "case")
     inputs.mkdir(exist_ok=True)
     os.environ["TMPDIR"] = str(inputs)

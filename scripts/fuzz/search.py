@@ -41,7 +41,7 @@ class Search:
         self.finds: dict[str, Find] = {}
 
     def turn(self, cases: int, after_each: Callable[[], None] = lambda: None) -> list[Find]:
-        """Draw so many cases, fewer if one fails; the new finds."""
+        """Draw so many cases, fewer if one fails; the new finds, which ``finds`` has even if Ctrl-C ends the turn."""
         self.turns += 1
         new: list[Find] = []
         first = [0.0]
@@ -64,6 +64,8 @@ class Search:
             find(self.strategy, fails, random=Random(f"{self.seed} {self.name} {self.turns}"), settings=_how(cases))
         except (_Enough, HypothesisException):  # none in this turn; or one that fails only sometimes, which is kept
             pass
+        finally:
+            self.finds |= {f.verdict.kind: f for f in new}
         for found in new:
             self.finds[found.verdict.kind] = self._shortened(found)
         return [self.finds[found.verdict.kind] for found in new]
