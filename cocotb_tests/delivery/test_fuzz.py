@@ -13,7 +13,7 @@ hypothesis = pytest.importorskip("hypothesis", reason="hypothesis is not install
 
 from cocotb_tests.support import planted_faults  # noqa: E402
 from scripts.fuzz import corpus, finds  # noqa: E402
-from scripts.fuzz.__main__ import again  # noqa: E402
+from scripts.fuzz.__main__ import again, main  # noqa: E402
 from scripts.fuzz.case import Case, Verdict  # noqa: E402
 from scripts.fuzz.search import Search  # noqa: E402
 from scripts.fuzz.smaller import smaller  # noqa: E402
@@ -130,3 +130,9 @@ def test_ctrl_c_keeps_what_was_found():
     with pytest.raises(KeyboardInterrupt):
         search.turn(300)
     assert list(search.finds) == ["KeyError"] and search.turns == 1
+
+
+def test_a_run_without_a_case_is_no_success(monkeypatch, capsys):
+    monkeypatch.setattr("sys.argv", ["fuzz", "--minutes", "0", "--only", "drives,manifests"])
+    assert main() == 1
+    assert "no case of drives, manifests" in capsys.readouterr().out
