@@ -33,8 +33,9 @@ class _Enough(BaseException):
 class Search:
     """The search in one target; the same seed draws the same cases, turn by turn."""
 
-    def __init__(self, target, seed: int, worker: Worker, shrinking: float = SHRINKING, stop_at: float = float("inf")):
-        self.target, self.worker, self.seed, self.shrinking, self.stop_at = target, worker, seed, shrinking, stop_at
+    def __init__(self, target, seed: int, worker: Worker, shrinking: float = SHRINKING):
+        self.target, self.worker, self.seed, self.shrinking = target, worker, seed, shrinking
+        self.stop_at = float("inf")  # by time.monotonic
         self.name = target.__name__.rpartition(".")[2]
         self.strategy = target.cases()
         self.turns = self.cases = 0
