@@ -115,7 +115,9 @@ def npz(draw) -> Case:
         warnings.simplefilter("ignore")  # a name twice is meant
         for name in draw(st.lists(columns, min_size=1, max_size=4)):
             data = draw(st.one_of(st.just(_valid(24)), npy_bytes(), st.just(_valid(500_000)), st.binary(max_size=40)))
-            member = name.encode("utf-8", "replace").decode() + draw(st.sampled_from((".npy", ".npy", ".npy", "", "/")))
+            member = (name.encode("utf-8", "replace").decode().replace("\0", "") or "x") + draw(
+                st.sampled_from((".npy", ".npy", ".npy", "", "/"))
+            )
             archive.writestr(member, data)
     return Case(".npz", stream.getvalue())
 

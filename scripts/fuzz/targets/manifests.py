@@ -16,7 +16,7 @@ ROWS = (
     "recording,drive,serial,time,temperature,station\n"
     "a.csv,drive.toml,S1,2026-01-01T08:00:00,25.5,line 2\n"
     "b.parquet,,S2,2026-01-02T08:00:00+01:00,,\n"
-    "c.csv,drive.toml,,,nan,x\n"
+    "c.csv,drive.toml,,,21,x\n"
 )
 
 
