@@ -15,7 +15,7 @@ needs_of() {
         fleet) echo run fleet ;;
         sensitivity) echo run fleet ;;
         board) echo core run report sim test ghdl c++ ghdl5 ;;
-        bench) echo run test ;;
+        bench | fuzz) echo run test ;;
         real) echo run fleet test ;;
         compare) echo run compare fleet ;;
         verilog) echo core ghdl5 ;;

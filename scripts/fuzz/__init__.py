@@ -1,0 +1,1 @@
+"""`make fuzz`: hostile and damaged inputs, drawn and made smaller by Hypothesis."""

@@ -1,0 +1,1 @@
+"""Strategies of Hypothesis: damage to bytes, hostile text, and files that only their own library can write."""
