@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import os
 import signal
+import struct
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -77,6 +79,22 @@ def test_mdf_that_declares_much(tmp_path):
     content[at : at + 8] = (10**12).to_bytes(8, "little")
     path.write_bytes(content)
     quick(path, "1000000000000 samples")
+
+
+@pytest.mark.parametrize("version", ["3.30", "4.10"])
+def test_a_ring_of_channel_groups_in_an_mdf_file(tmp_path, version):
+    """The next group of the only group is itself: asammdf would count groups for ever."""
+    path = hostile.mdf(tmp_path / f"r.{'mf4' if version >= '4' else 'mdf'}", None, version=version)
+    data = bytearray(Path(path).read_bytes())
+    if version >= "4":
+        group = data.index(b"##CG")
+        data[group + 24 : group + 32] = group.to_bytes(8, "little")
+    else:
+        group = struct.unpack_from("<I", data, struct.unpack_from("<I", data, 68)[0] + 8)[0]
+        data[group + 4 : group + 8] = group.to_bytes(4, "little")
+    path = tmp_path / Path(path).name
+    path.write_bytes(data)
+    quick(path, "leads back to the block at byte")
 
 
 def test_constant_columns_beside_real_ones_load(tmp_path):

@@ -59,7 +59,7 @@ def test_manifest_in_csv_and_parquet(folder):
         ("recording,serial\n,5\n", "list.csv:2: column 'recording': empty; expected a file name or address"),
         ("recording,recording\na.csv,b.csv\n", "list.csv:1: column 'recording' twice"),
         ("recording,drive\na.csv,other.toml\n", "list.csv:2: column 'drive': "),
-        ("recording,serial\na.csv,1\na.csv,2\n", "a.csv: named twice, with different drive file, serial number"),
+        ("recording,serial\na.csv,1\na.csv,2\n", "a.csv is named twice, with different drive file, serial number"),
     ],
 )
 def test_mistakes_name_line_and_column(folder, text, said, capsys):

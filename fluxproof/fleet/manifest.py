@@ -54,7 +54,8 @@ def entries(sources: list[str], drive: str | None, allowed: Iterable[str] = ()) 
     for entry in out:
         other = seen.setdefault(entry.name, entry)
         if other is not entry and other != entry:
-            raise RecordingError(f"{entry.name}: named twice, with different drive file, serial number or time")
+            twice = f"{entry.name} is named twice, with different drive file, serial number or time"
+            raise RecordingError(f"{', '.join(sources)}: {twice}")
     for chosen, entry in {entry.drive: entry for entry in seen.values()}.items():
         _check_drive(f"{chosen}: drive file of {entry.name}", chosen)
     return sorted(seen.values(), key=lambda e: e.name)

@@ -164,7 +164,7 @@ def _parquet(path: Path) -> list[tuple[int, dict[str, str]]]:
                     raise RecordingError(f"{path}: column {shown(name)!r}: its text is not UTF-8") from None
     except RecordingError:
         raise
-    except (pa.ArrowException, ArithmeticError, ValueError) as error:
+    except (pa.ArrowException, OSError, ArithmeticError, ValueError) as error:
         raise RecordingError(f"{path}: not a readable Parquet file: {shown(error, 160)}") from None
     return [(n + 1, {name: texts[n] for name, texts in columns.items()}) for n in range(rows)]
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from fluxproof.diagnosis.ground.limits import check_cells, most_cells
 from fluxproof.diagnosis.ground.recording import RecordingError
+from fluxproof.diagnosis.readers.mdf_chains import check_chains
 from fluxproof.diagnosis.readers.mdf_conversion import is_plain, physical, refusal
 from fluxproof.diagnosis.readers.table import Table, chosen, row_limit, shown, too_long
 
@@ -39,6 +40,7 @@ def read(path, select=None) -> Table:
 
     if str(path).lower().endswith((".zip", ".mf4z")):  # the name alone would make asammdf unpack it
         raise RecordingError(f"{path}: packed; unpack it first")
+    check_chains(path)
     with _no_evaluation(), MDF(path, process_bus_logging=False, use_display_names=False) as mdf:
         places, units = _channels(mdf)
         wanted = [name for name in chosen(units | {TIME: "s"}, select, path) if name != TIME]
