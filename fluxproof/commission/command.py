@@ -14,7 +14,7 @@ from pathlib import Path
 
 from fluxproof.files import write_json, write_text
 from fluxproof.golden_model.drive import load
-from fluxproof.golden_model.drive_file import read_tables
+from fluxproof.golden_model.drive_file import read_tables, read_text
 from fluxproof.golden_model.drive_keys import DriveError
 
 
@@ -63,7 +63,7 @@ def commission_file(bus, path: str, drive, reverse: bool | None, folder: Path) -
     from fluxproof.commission.steps import commission
 
     steps, began = [], bus.now()
-    text = Path(path).read_text(encoding="utf-8")
+    text = read_text(path)
     drive = replace(drive, sensors=replace(drive.sensors, position_reverse=False, theta_offset_rad=0.0))
 
     def done(step) -> None:
