@@ -9,9 +9,10 @@ import argparse
 import json
 from pathlib import Path
 
+from fluxproof.diagnosis.whole_drive import load_drive
 from fluxproof.files import write_json
 from fluxproof.golden_model.board_registers import board_generics, board_set, has_board
-from fluxproof.golden_model.drive import Drive, load
+from fluxproof.golden_model.drive import Drive
 from fluxproof.golden_model.drive_keys import DriveError
 from fluxproof.golden_model.generated.register_names import ADDRESSES
 from fluxproof.golden_model.registers import RegisterSet, Row
@@ -35,7 +36,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print the table and write the JSON file if one is asked for."""
-    drive = load(args.drive)
+    drive = load_drive(args.drive)
     try:
         result = board_set(drive)
     except DriveError as error:

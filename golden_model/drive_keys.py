@@ -8,7 +8,6 @@ import dataclasses
 import math
 from dataclasses import MISSING, dataclass
 
-
 # Unit: (least of a positive value, largest magnitude).  From a vibration motor of 1 g (mA, mohm to kohm, 1e-10 kg m2)
 # and a telescope that turns once a day to a generator of 50 MW (100 kA, 30 kV, 1e7 kg m2), with two or three decades to
 # spare on each side: what lies beyond is a typing error or a wrong unit, and would overflow a format or a division.
@@ -39,6 +38,7 @@ RANGES = {
     "s2/rad2": (1e-24, 1e12),
     "codes": (1e-6, 2.0**32),
     "rad": (1e-9, 1e4),
+    "W": (1e-9, 1e12),
 }
 
 

@@ -19,7 +19,7 @@ from cocotb_tests.support.diagnosed_drives import DRIVE, GRID, MACHINE, POINT, c
 from cocotb_tests.support.slow import slowly
 from fluxproof.checkout import ROOT
 from fluxproof.diagnosis import catalogue, diagnose, physics
-from fluxproof.diagnosis.answer.improved_plant import check_key, plain
+from fluxproof.diagnosis.answer.plant_keys import check_key, plain
 from fluxproof.diagnosis.balance.blocks import view_of
 from fluxproof.diagnosis.balance.shaft import is_airgap
 from fluxproof.diagnosis.catalogue import CATALOGUE

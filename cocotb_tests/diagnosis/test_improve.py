@@ -13,7 +13,7 @@ from cocotb_tests.core.test_registers import PAPER, each_drive, edited
 from fluxproof.cosim.closed_loop import described_sensors
 from fluxproof.cosim.scenarios import RPM, scenario, steps
 from fluxproof.diagnosis.answer.improve import core_values, improved_toml, plant_of, write_improved
-from fluxproof.diagnosis.answer.improved_plant import KEYS
+from fluxproof.diagnosis.answer.plant_keys import KEYS
 from fluxproof.diagnosis.nominal import load_nominal
 from fluxproof.diagnosis.overlay.compare import closed_loop
 from fluxproof.diagnosis.overlay.inputs import dq_currents

@@ -23,7 +23,7 @@ from fluxproof.simulate import verdict
 from fluxproof.simulate.margins import current_loop, margins, speed_loop
 from fluxproof.simulate.scene import current_step, main_scene
 
-KEYS = [(section, field.name, key_of(field)) for section, kind in SECTIONS.items() for field in dataclasses.fields(kind)]
+KEYS = [(section, f.name, key_of(f)) for section, kind in SECTIONS.items() for f in dataclasses.fields(kind)]
 BEYOND = (0.0, -1.0, 5e-324, 1e-300, 1e300, 1.7e308, math.nan, math.inf, -math.inf)
 PART = "xc7z020clg484-1"
 

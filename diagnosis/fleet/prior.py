@@ -30,7 +30,7 @@ from fluxproof.diagnosis.fleet.schema import COLUMNS
 from fluxproof.diagnosis.fleet.values import values_of
 from fluxproof.diagnosis.inference import constants as k
 from fluxproof.diagnosis.inference.posterior import Posterior
-from fluxproof.diagnosis.nominal import load_nominal
+from fluxproof.diagnosis.nominal import flux_map_path, load_nominal
 from fluxproof.diagnosis.recording import RecordingError
 from fluxproof.diagnosis.result import Fleet, InFleet
 
@@ -76,9 +76,9 @@ def read_fleet(path) -> list[dict]:
 def design_of(drive) -> str:
     """Hash of a drive file and of the flux map that it names: recordings of one design are one population."""
     digest = hashlib.sha256(Path(drive).read_bytes())
-    flux_map = load_nominal(drive).plant.get("machine", {}).get("flux_map")
-    if isinstance(flux_map, str):
-        digest.update((Path(drive).parent / flux_map).read_bytes())
+    flux_map = flux_map_path(load_nominal(drive))
+    if flux_map is not None:
+        digest.update(flux_map.read_bytes())
     return digest.hexdigest()[:16]
 
 

@@ -16,7 +16,7 @@ import difflib
 from fluxproof.diagnosis.ingest.units import conversion, known_units
 from fluxproof.diagnosis.readers.table import shown
 from fluxproof.diagnosis.recording import COLUMNS, RecordingError
-from fluxproof.golden_model.drive_keys import is_finite
+from fluxproof.golden_model.drive_keys import RANGES, is_finite
 
 MEASURED = ("t", "u_a", "u_b", "u_c", "u_ab", "u_bc", "u_ca")  # a constant would state nothing
 
@@ -39,9 +39,10 @@ def _value(name, value, nominal) -> float:
         value, unit = value["value"], value.get("unit", "")
     if not is_finite(value):
         raise RecordingError(f"{where}: must be a finite number, or {{value = 3000, unit = 'rpm'}}")
-    if not unit:
-        return float(value)
-    found = conversion(name, unit, nominal.machine.pole_pairs)
+    found = conversion(name, unit, nominal.machine.pole_pairs) if unit else (1.0, 0.0)
     if found is None:
         raise RecordingError(f"{where}: unit {shown(unit)!r} is unknown for {name}; known are {known_units(name)}")
-    return float(value) * found[0] + found[1]
+    value, most = float(value) * found[0] + found[1], RANGES[COLUMNS[name]][1]
+    if abs(value) > most:
+        raise RecordingError(f"{where} = {value:g} is out of range: allowed is up to {most:g} {COLUMNS[name]}")
+    return value

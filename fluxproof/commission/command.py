@@ -12,6 +12,7 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
+from fluxproof.diagnosis.whole_drive import load_drive
 from fluxproof.files import write_json, write_text
 from fluxproof.golden_model.drive import load
 from fluxproof.golden_model.drive_file import read_tables, read_text
@@ -32,7 +33,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run_command(args: argparse.Namespace) -> int:
     """Measure, write both files, say each step."""
-    drive = load(args.drive)
+    drive = load_drive(args.drive)
     if drive.machine.magnet_flux_wb <= 0.0:
         raise DriveError(f"{args.drive}: [machine] magnet_flux_wb = 0: commissioning is for machines with magnets")
     given = read_tables(args.drive).get("sensors", {})

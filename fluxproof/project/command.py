@@ -6,9 +6,9 @@ import argparse
 from pathlib import Path
 
 from fluxproof.checkout import ROOT
+from fluxproof.diagnosis.whole_drive import load_drive
 from fluxproof.files import write_text
 from fluxproof.golden_model.board_registers import board_set, has_board
-from fluxproof.golden_model.drive import load
 from fluxproof.golden_model.drive_keys import DriveError
 from fluxproof.project import parts, render
 
@@ -24,7 +24,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write the files; an error in the drive or an argument writes nothing."""
-    drive = load(args.drive)
+    drive = load_drive(args.drive)
     try:
         register_set = board_set(drive)
     except DriveError as error:
