@@ -52,6 +52,7 @@ SPECIAL = {
     "machine.pole_pairs": 5,
     "sensors.position_direction": -1,
     "sensors.seed": 3,
+    "sensors.position_counts": 4096,
 }
 THREE = ("phase_resistance_asymmetry", "current_gain_error", "current_offset_a")
 MINIMAL = """[machine]

@@ -68,11 +68,11 @@ def plain(key: str, value):
         return value if value is None or isinstance(value, FluxMap) else _flux_map(value)
     several = isinstance(value, (list, tuple, np.ndarray))
     if several != isinstance(KEYS[key].default, tuple):
-        raise ValueError(f"{key} needs {'one number' if several else 'three numbers, phases a, b, c'}")
+        raise ValueError(f"{key} needs {'one number' if several else 'three values, phases a, b, c'}")
     if not several:
         return _number(key, value)
     if len(value) != 3:
-        raise ValueError(f"{key} needs three numbers, phases a, b, c, not {len(value)}")
+        raise ValueError(f"{key} needs three values, phases a, b, c, not {len(value)}")
     return tuple(float(_number(key, v)) for v in value)
 
 
@@ -90,7 +90,7 @@ def plant_given(nominal: Nominal) -> dict[str, dict]:
             try:
                 given[section][name] = _in_range(key, plain(key, value))
             except (TypeError, ValueError) as error:
-                raise DriveError(f"{nominal.path}: [plant.{section}] {shown(name)}: {error}") from None
+                raise DriveError(f"{nominal.path}: [plant] {error}") from None
     return given
 
 
@@ -174,7 +174,7 @@ def _in_range(key: str, value):
     allowed = _range_of(key)
     for number in value if isinstance(value, tuple) else (value,):
         if not allowed.accepts(number) and (number != 0 or key in OWN):
-            raise ValueError(f"{number:g} is out of range: allowed is {allowed.allowed}")
+            raise ValueError(f"{key} = {number:g} is out of range: allowed is {allowed.allowed}")
     return value
 
 
