@@ -20,7 +20,7 @@ def tried(path, files, scene=False) -> int:
             refused = derived(written(path, tables, changes), scene)
         except Exception as error:
             raise AssertionError(f"{changes}: {type(error).__name__}: {error}") from error
-        assert all(line.isprintable() and len(line) < 700 and str(path) in line for line in refused), refused
+        assert all(line.isprintable() and len(line) < 700 for line in refused), refused
         accepted += not refused
     return accepted
 
