@@ -48,7 +48,8 @@ def _tables(path):
     except tomllib.TOMLDecodeError as error:
         raise DriveError(_syntax_message(str(error), text)) from None
     except (ValueError, RecursionError) as error:
-        reason = "too many levels" if isinstance(error, RecursionError) else "a number of too many digits"
+        reason = "too many levels" if isinstance(error, RecursionError) else str(error)
+        reason = "a number of too many digits" if "integer string" in reason else reason
         raise DriveError(f": not TOML: {reason}") from None
 
 
