@@ -10,10 +10,10 @@ import argparse
 import json
 from pathlib import Path
 
+from fluxproof.diagnosis.whole_drive import load_drive
 from fluxproof.quote import say
 from golden_model import fluxproof
 from golden_model.board_registers import board_set
-from golden_model.drive import load
 from golden_model.drive_keys import DriveError
 from golden_model.registers import RegisterSet
 from golden_model.regular_file import read_regular
@@ -51,7 +51,7 @@ def run(args: argparse.Namespace) -> int:
     """Write the dump and print its contents; returns 0."""
     from fluxproof.diagnosis.replay.telemetry_stream import read_capture, write_piece  # takes a second to import
 
-    drive = load(args.drive)
+    drive = load_drive(args.drive)
     try:
         register_set = board_set(drive)
     except DriveError as error:

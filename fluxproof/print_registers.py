@@ -9,10 +9,11 @@ import argparse
 import json
 from pathlib import Path
 
+from fluxproof.diagnosis.whole_drive import load_drive
 from fluxproof.files import write_json
 from fluxproof.quote import c_comment
 from golden_model.board_registers import board_generics, board_set, has_board
-from golden_model.drive import Drive, load
+from golden_model.drive import Drive
 from golden_model.drive_keys import DriveError
 from golden_model.generated.register_names import ADDRESSES
 from golden_model.registers import RegisterSet, Row
@@ -36,7 +37,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print the table and write the JSON file if one is asked for."""
-    drive = load(args.drive)
+    drive = load_drive(args.drive)
     try:
         result = board_set(drive)
     except DriveError as error:

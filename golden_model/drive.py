@@ -110,10 +110,10 @@ class Sensors:
     u_dc_range_v: float = positive("V", "bus voltage at full code")
     position_bits: int = whole(8, 18, "codes per mechanical turn")
     current_offset_code: tuple | None = real("codes", "at zero current, mid code if none", None, count=3)
-    current_gain: tuple = real("1", "trim, negative for a reversed sensor", (1.0, 1.0, 1.0), count=3)
+    current_gain: tuple = real("1", "trim, negative for a reversed sensor", (1.0, 1.0, 1.0), 3, nonzero=True)
     current_sensors: int = whole(2, 3, "3, or 2: phase a has none, its current is minus the sum of the others", 3)
     u_dc_offset_code: float = not_negative("codes", "at zero volts", 0.0)
-    u_dc_gain: float = real("1", "trim", 1.0)
+    u_dc_gain: float = real("1", "trim", 1.0, nonzero=True)
     position_reverse: bool = flag("true: the code counts against the phase order", False)
     theta_offset_rad: float = real("rad", "electrical angle at code zero", 0.0)
 

@@ -4,6 +4,7 @@ A message names the file, the section and the key, and what is allowed: the rang
 unknown name the nearest known one.
 """
 
+import codecs
 import dataclasses
 import difflib
 import re
@@ -21,6 +22,7 @@ from golden_model.toml_depth import check_keys
 # Columns and constants of recordings, and physics beyond the core's model: all are read by diagnosis/.
 IGNORED = ("columns", "constants", "plant")
 MOST_BYTES = 1_000_000
+LONGEST = 40  # characters of a value or a name in a message
 
 
 def read_sections(path, schema):
@@ -43,18 +45,38 @@ def read_tables(path):
 
 def _tables(path):
     """The file as nested dictionaries; an error message starts right after the file name."""
-    try:
-        text = read_regular(path, MOST_BYTES).decode("utf-8")
-    except UnicodeDecodeError as error:
-        line = error.object[: error.start].count(b"\n") + 1
-        raise DriveError(f":{line}: not UTF-8 text") from None
-    except (OSError, ValueError) as error:
-        raise DriveError(f": cannot be read: {getattr(error, 'strerror', None) or error}") from None
+    text = _text(path)
     try:
         check_keys(text)
         return tomllib.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise DriveError(_syntax_message(str(error), text)) from None
+    except RecursionError:
+        raise DriveError(": not TOML: too many levels") from None
+    except ValueError as error:
+        reason = "a number of too many digits" if "integer string" in str(error) else str(error)
+        raise DriveError(_syntax_message(reason, text)) from None
+
+
+def read_text(path):
+    """The file's text for those who edit it: without a byte-order mark, lines ending with a line feed."""
+    try:
+        return _text(Path(path)).replace("\r\n", "\n")
+    except DriveError as error:
+        raise DriveError(f"{path}{error}") from None
+
+
+def _text(path):
+    """The text without a byte-order mark, which editors of Windows write; an error as in ``_tables``."""
+    try:
+        data = read_regular(path, MOST_BYTES)
+    except (OSError, ValueError) as error:
+        raise DriveError(f": cannot be read: {getattr(error, 'strerror', None) or error}") from None
+    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) or b"\0" in data[:4]:
+        raise DriveError(":1: not UTF-8 but UTF-16 text: TOML is UTF-8; save the file as UTF-8")
+    try:
+        return data.removeprefix(codecs.BOM_UTF8).decode("utf-8")
+    except UnicodeDecodeError as error:
+        line = error.object[: error.start].count(b"\n") + 1
+        raise DriveError(f":{line}: not UTF-8 text") from None
 
 
 def _syntax_message(message, text):
@@ -66,14 +88,13 @@ def _syntax_message(message, text):
 
 
 def _nearest(name, known):
-    return f"the nearest known one is {difflib.get_close_matches(name, known, n=1, cutoff=0.0)[0]}"
+    return f"the nearest known one is {difflib.get_close_matches(name[:LONGEST], known, n=1, cutoff=0.0)[0]}"
 
 
 def _refuse_unknown(table, known, what, where=""):
     for name in table:
         if name not in known:
-            shown = name if name.isprintable() else repr(name)
-            shown = shown if len(shown) <= 60 else f"{shown[:57]}..."
+            shown = name if name.isprintable() and len(name) <= LONGEST else _shown(name)
             raise DriveError(f": {where}unknown {what} {shown}; {_nearest(name, known)}")
 
 
@@ -146,5 +167,10 @@ def _type_name(value):
 
 def _shown(value):
     """The value as text that fits a line."""
-    text = repr(value) if not isinstance(value, bool) else str(value).lower()
-    return text if len(text) <= 40 else f"{text[:37]}..."
+    if isinstance(value, int) and value.bit_length() > 1000:  # Python writes no number of more than 4300 digits
+        return f"a whole number of {value.bit_length()} bits"
+    try:
+        text = repr(value) if not isinstance(value, bool) else str(value).lower()
+    except (RecursionError, ValueError):  # such a number, or many levels, within a list or table
+        return f"a {_type_name(value)}"
+    return text if len(text) <= LONGEST else f"{text[: LONGEST - 3]}..."

@@ -8,6 +8,39 @@ import dataclasses
 import math
 from dataclasses import MISSING, dataclass
 
+# Unit: (least of a positive value, largest magnitude).  From a vibration motor of 1 g (mA, mohm to kohm, 1e-10 kg m2)
+# and a telescope that turns once a day to a generator of 50 MW (100 kA, 30 kV, 1e7 kg m2), with two or three decades to
+# spare on each side: what lies beyond is a typing error or a wrong unit, and would overflow a format or a division.
+RANGES = {
+    "1": (1e-12, 1e6),
+    "A": (1e-6, 1e6),
+    "V": (1e-6, 1e6),
+    "ohm": (1e-7, 1e6),
+    "H": (1e-9, 1e4),
+    "Wb": (1e-9, 1e5),
+    "rad/s": (1e-6, 1e6),
+    "kg m2": (1e-15, 1e10),
+    "Nm s": (1e-15, 1e10),
+    "Nm": (1e-12, 1e10),
+    "degC": (-273.15, 2000.0),
+    "1/K": (1e-9, 1.0),
+    "1/A2": (1e-15, 1e12),
+    "Wb/A2": (1e-15, 1e6),
+    "S": (1e-12, 1e6),
+    "Hz": (1e-6, 1e12),
+    "s": (1e-12, 1e6),
+    "samples": (1e-6, 10.0),
+    "V/A": (1e-9, 1e9),
+    "V/(A s)": (1e-9, 1e12),
+    "A s/rad": (1e-12, 1e9),
+    "A/rad": (1e-12, 1e12),
+    "1/s": (1e-9, 1e12),
+    "s2/rad2": (1e-24, 1e12),
+    "codes": (1e-6, 2.0**32),
+    "rad": (1e-9, 1e4),
+    "W": (1e-9, 1e12),
+}
+
 
 class DriveError(ValueError):
     """An invalid drive description; the message is one line for its author."""
@@ -15,13 +48,13 @@ class DriveError(ValueError):
 
 @dataclass(frozen=True)
 class Key:
-    """Type and legal range of one key; ``open_lo``: the lower end itself is excluded."""
+    """Type and legal range of one key, both ends included; ``nonzero``: zero in between is excluded."""
 
     kind: str  # "float", "int", "bool", "word"
     unit: str = "1"
     lo: float = -math.inf
     hi: float = math.inf
-    open_lo: bool = False
+    nonzero: bool = False
     count: int = 0  # 0: a single value; n: a list of n values
     doc: str = ""
     words: tuple = ()  # of a "word": the allowed ones
@@ -30,8 +63,7 @@ class Key:
         """Whether one number is finite and within the range, or a word one of the allowed."""
         if self.kind == "word":
             return value in self.words
-        above = value > self.lo if self.open_lo else value >= self.lo
-        return above and value <= self.hi and math.isfinite(value)
+        return self.lo <= value <= self.hi and math.isfinite(value) and not (self.nonzero and value == 0)
 
     @property
     def allowed(self):
@@ -39,30 +71,27 @@ class Key:
         if self.kind == "word":
             return f"{', '.join(self.words[:-1])} or {self.words[-1]}"
         unit = "" if self.unit == "1" else f" {self.unit}"
-        if math.isfinite(self.lo) and math.isfinite(self.hi):
-            return f"{'above ' if self.open_lo else ''}{self.lo:g} up to {self.hi:g}{unit}"
-        if math.isfinite(self.lo):
-            return f"{'above' if self.open_lo else 'at least'} {self.lo:g}{unit}"
-        return f"a finite number{unit and ' of' + unit}"
+        return f"{self.lo:.10g} up to {self.hi:.10g}{unit}{' but not 0' if self.nonzero else ''}"
 
 
 def _field(key, default):
     return dataclasses.field(default=default, metadata={"key": key})
 
 
-def real(unit, doc, default=MISSING, count=0):
-    """A real number of either sign."""
-    return _field(Key("float", unit, count=count, doc=doc), default)
+def real(unit, doc, default=MISSING, count=0, nonzero=False):
+    """A real number of either sign, within the range of its unit."""
+    least, most = RANGES[unit]
+    return _field(Key("float", unit, -most if least > 0.0 else least, most, nonzero, count, doc), default)
 
 
-def positive(unit, doc, default=MISSING, most=math.inf):
-    """A real number above zero."""
-    return _field(Key("float", unit, 0.0, most, open_lo=True, doc=doc), default)
+def positive(unit, doc, default=MISSING, most=None):
+    """A real number above zero, within the range of its unit."""
+    return _field(Key("float", unit, RANGES[unit][0], most or RANGES[unit][1], doc=doc), default)
 
 
-def not_negative(unit, doc, default=MISSING, most=math.inf):
-    """A real number of zero or more."""
-    return _field(Key("float", unit, 0.0, most, doc=doc), default)
+def not_negative(unit, doc, default=MISSING, most=None):
+    """Zero, or a real number up to the largest of its unit."""
+    return _field(Key("float", unit, 0.0, most or RANGES[unit][1], doc=doc), default)
 
 
 def whole(lo, hi, doc, default=MISSING):
@@ -78,6 +107,13 @@ def flag(doc, default=MISSING):
 def choice(words, doc, default=MISSING):
     """One of several words."""
     return _field(Key("word", doc=doc, words=words), default)
+
+
+def is_finite(value):
+    """Whether a value of TOML is a number, true and false excepted, that a float holds."""
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        return False
+    return abs(value) < 1e300 if isinstance(value, int) else math.isfinite(value)
 
 
 def key_of(field):

@@ -52,7 +52,7 @@ def _row(entry, port):
     """The entry as an integer of the port's format; DriveError if it does not fit."""
     lsb, up = port.fmt.lsb, entry.name in ROUND_UP
     value = entry.si / entry.scale if entry.scale else math.inf
-    if not math.isfinite(value):
+    if not math.isfinite(value / lsb):
         raise DriveError(f"register {entry.name} from {entry.keys}: these values give no number")
     # A value within a relative 1e-9 above a whole number of clocks is that number: rounding of the division.
     integer = math.ceil(value / lsb * (1.0 - 1e-9)) if up else math.floor(value / lsb + 0.5)
@@ -62,7 +62,7 @@ def _row(entry, port):
         lo, hi = (f"{end * lsb * entry.scale:.6g}" for end in (port.low, port.high))
         unit = "" if entry.unit == "1" else f" {entry.unit}"
         raise DriveError(
-            f"register {entry.name} from {entry.keys}: {entry.si:.6g}{unit} is {integer}, out of range: "
+            f"register {entry.name} from {entry.keys}: {entry.si:.6g}{unit} is {integer:.12g}, out of range: "
             f"allowed is {port.low} to {port.high}, that is {lo} to {hi}{unit}"
         )
     if integer == 0 and entry.si != 0.0 and entry.unit not in ("rad", "code"):

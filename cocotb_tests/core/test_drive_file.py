@@ -1,7 +1,9 @@
 """Every error in drive.toml or on the command line gives one clear line; the table and the JSON file."""
 
+import codecs
 import dataclasses
 import json
+import os
 import subprocess
 import sys
 
@@ -11,6 +13,7 @@ from cocotb_tests.core.test_registers import PAPER, ROOT, each_drive, edited
 from fluxproof.command import main
 from golden_model.board_registers import board_set, has_board
 from golden_model.drive import Drive, load, with_carrier
+from golden_model.drive_file import read_text
 from golden_model.drive_keys import DriveError
 from golden_model.fluxproof import REGISTERS
 
@@ -25,12 +28,19 @@ WRONG = {  # section, line, what the message must contain besides the file's nam
     "short list": ("sensors", "current_gain = [1, 2]", "[sensors] current_gain", "a list of 3"),
     "no list": ("sensors", "current_gain = 1", "[sensors] current_gain", "a list of 3"),
     "list of words": ("sensors", 'current_gain = [1, 1, "x"]', "[sensors] current_gain = 'x'", "number"),
-    "negative": ("machine", "resistance_ohm = -1", "[machine] resistance_ohm = -1", "above 0 ohm"),
-    "not a number": ("machine", "resistance_ohm = nan", "[machine] resistance_ohm = nan", "above 0 ohm"),
-    "infinite": ("machine", "resistance_ohm = inf", "[machine] resistance_ohm = inf", "above 0 ohm"),
+    "negative": ("machine", "resistance_ohm = -1", "[machine] resistance_ohm = -1", "1e-07 up to 1000000 ohm"),
+    "not a number": ("machine", "resistance_ohm = nan", "[machine] resistance_ohm = nan", "1e-07 up to 1000000 ohm"),
+    "infinite": ("machine", "resistance_ohm = inf", "[machine] resistance_ohm = inf", "1e-07 up to 1000000 ohm"),
     "huge": ("machine", f"pole_pairs = {10**400}", "[machine] pole_pairs", "1 up to 63"),
-    "huge real": ("machine", f"resistance_ohm = {10**400}", "[machine] resistance_ohm", "above 0 ohm"),
-    "extreme": ("machine", "rated_speed_rad_s = 1e-320", "rated_speed_rad_s", "give no number"),
+    "huge real": ("machine", f"resistance_ohm = {10**400}", "[machine] resistance_ohm", "up to 1000000 ohm"),
+    "extreme": ("machine", "rated_speed_rad_s = 1e-300", "rated_speed_rad_s = 1e-300", "1e-06 up to 1000000 rad/s"),
+    "huge inertia": ("machine", "inertia_kgm2 = 1e300", "[machine] inertia_kgm2 = 1e+300", "0 up to 1e+10 kg m2"),
+    "huge gain": ("control", "current_kp_d_v_per_a = 1e308", "current_kp_d_v_per_a = 1e+308", "up to 1000000000 V/A"),
+    "no gain": ("sensors", "current_gain = [1, 0, 1]", "current_gain = 0 is", "but not 0"),
+    "two extremes": ("control", "speed_kp_as_per_rad = 1e9", "register speed_kp", "out of range"),
+    "many bits": ("machine", f"pole_pairs = 0x{'f' * 100000}", "= a whole number of 400000 bits", "1 up to 63"),
+    "many digits": ("machine", f"pole_pairs = {'9' * 10000}", "not TOML: a number of too many digits"),
+    "long key": ("machine", f"{'x' * 100000} = 1", "[machine] unknown key 'xxx", "nearest"),
     "date": ("machine", "resistance_ohm = 2020-01-01", "[machine] resistance_ohm", "number"),
     "adc bits": ("sensors", "adc_bits = 18", "[sensors] adc_bits = 18", "12 up to 16"),
     "reserve": ("control", "voltage_reserve = 1", "[control] voltage_reserve = 1", "0 up to 0.99"),
@@ -45,9 +55,9 @@ WRONG = {  # section, line, what the message must contain besides the file's nam
         "core", "clock_hz = 200.001e6", "[core] clock_hz", "[inverter] pwm_frequency_hz", "whole number",
     ),
     "slow clock": ("core", "clock_hz = 1e5", "[core] clock_hz", "8 to 32767"),
-    "tiny pwm": ("core", "clock_hz = 1e300", "[core] clock_hz", "8 to 32767"),
+    "tiny pwm": ("core", "clock_hz = 1e12", "[core] clock_hz", "8 to 32767"),
     "dead time": ("inverter", "dead_time_s = 3e-6", "[inverter] dead_time_s", "below min_pulse_s = 3e-06 s"),
-    "no dead time": ("inverter", "dead_time_s = 0", "[inverter] dead_time_s = 0", "above 0 s"),
+    "no dead time": ("inverter", "dead_time_s = 0", "[inverter] dead_time_s = 0", "1e-12 up to 1000000 s"),
     "min pulse": ("inverter", "min_pulse_s = 60e-6", "[inverter] min_pulse_s", "5e-05 s"),
     "bus": ("inverter", "dc_bus_v = 900", "[inverter] dc_bus_v = 900", "sqrt(3)", "866.025 V"),
     "bus range": ("inverter", "dc_bus_v = 1100", "[inverter] dc_bus_v = 1100", "u_dc_range_v = 1000 V"),
@@ -95,13 +105,14 @@ TEXTS = {
     "duplicate": ("[machine]\na = 1\na = 2\n", ":3: not TOML"),
     "empty": ("", "section [machine] is missing", "resistance_ohm"),
     "missing key": (
-        "[machine]\npole_pairs = 4\n", "[machine] resistance_ohm is missing", "number, above 0 ohm",
+        "[machine]\npole_pairs = 4\n", "[machine] resistance_ohm is missing", "number, 1e-07 up to 1000000 ohm",
     ),
     "section name": ("[machines]\n", "unknown section machines", "machine"),
     "odd section name": ('["a\\nb"]\n', "unknown section 'a\\nb'"),
     "key outside": ("pole_pairs = 4\n", "unknown section pole_pairs"),
     "not a section": ("machine = 4\n", "machine must be a section", "whole number"),
     "tables": ("[[machine]]\n", "machine must be a section", "list"),
+    "levels": ("[machine" + ".a" * 5000 + "]\n", "[machine] unknown key a"),
     "deep": ("a = " + "[" * 100000, "not TOML"),
 }
 
@@ -117,6 +128,75 @@ def test_files_that_cannot_be_read(tmp_path, capsys):
     check_message(capsys, tmp_path, ["cannot be read"])
     (tmp_path / "latin.toml").write_bytes(b"# one\n# \xe9\n")
     check_message(capsys, tmp_path / "latin.toml", [":2: not UTF-8"])
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
+def test_a_mark_of_byte_order_is_read_over(tmp_path, capsys, end):
+    """Editors of Windows write one; the lines and columns of an error are those without it."""
+    marked, text = tmp_path / "marked.toml", PAPER.read_text(encoding="utf-8").replace("\n", end)
+    marked.write_bytes(codecs.BOM_UTF8 + text.encode())
+    assert load(marked) == load(PAPER)
+    assert read_text(marked) == PAPER.read_text(encoding="utf-8")
+    marked.write_bytes(codecs.BOM_UTF8 + f"[machine]{end}pole_pairs = = 4{end}".encode())
+    check_message(capsys, marked, [":2: not TOML: Invalid value (column 14)"])
+    marked.write_bytes(codecs.BOM_UTF8 + b"pole pairs = 4")
+    check_message(capsys, marked, [":1: not TOML", "(column 6)"])
+
+
+@pytest.mark.parametrize("code", ["utf-16", "utf-16-le", "utf-16-be", "utf-32"])
+def test_utf_16_is_named(tmp_path, capsys, code):
+    (tmp_path / "wide.toml").write_bytes(PAPER.read_text(encoding="utf-8").encode(code))
+    check_message(capsys, tmp_path / "wide.toml", ["UTF-16", "save the file as UTF-8"])
+
+
+PLANT = {  # lines at the end of the file, what each command must say of them
+    "nan": ("[plant.machine]\nresistance_ohm = nan", "[plant] machine.resistance_ohm", "finite number"),
+    "word": ("[plant.machine]\ncogging_order = 'six'", "[plant] machine.cogging_order", "finite number"),
+    "key": ("[plant.machine]\ncoging_order = 6", "machine.coging_order", "nearest", "machine.cogging_order"),
+    "section": ("[plant.motor]\ncogging_order = 6", "[plant.motor]", "machine, inverter"),
+    "no section": ("[plant]\ncogging_order = 6", "[plant.machine]"),
+    "range": ("[plant.sensors]\ncurrent_noise_a = 1e300", "current_noise_a = 1e+300", "0 up to 1000000 A"),
+    "bits": ("[plant.sensors]\ncurrent_bits = 99", "current_bits = 99", "8 up to 24"),
+    "fraction": ("[plant.sensors]\nposition_bits = 12.5", "position_bits = 12.5", "whole number"),
+    "huge": (f"[plant.machine]\ncogging_order = 0x{'f' * 90000}", "cogging_order", "finite number"),
+    "phases": ("[plant.sensors]\ncurrent_gain_error = [0, 0]", "current_gain_error", "three values"),
+    "harmonics": ("[plant.machine]\nemf_harmonics = [[6, nan]]", "emf_harmonics", "finite numbers"),
+    "map": ("[plant.machine]\nflux_map = 3", "flux_map", "CSV file"),
+    "map outside": ("[plant.machine]\nflux_map = '../other/map.csv'", "flux_map", "in the folder of the drive file"),
+    "absolute map": ("[plant.machine]\nflux_map = '/etc/passwd'", "flux_map", "in the folder of the drive file"),
+    "no map": ("[plant.machine]\nflux_map = 'none.csv'", "flux_map", "no such file"),
+    "zero map": ('[plant.machine]\nflux_map = "a\\u0000"', "flux_map"),
+    "pipe": ("[plant.machine]\nflux_map = 'pipe'", "flux_map", "no such file"),
+    "empty map": ("[plant.machine]\nflux_map = 'empty.csv'", "flux_map", "empty.csv"),
+    "one row": ("[plant.machine]\nflux_map = 'row.csv'", "flux_map", "row.csv", "three or more"),
+    "falling": ("[plant.machine]\nflux_map = {i_d_a=[3,2,1], i_q_a=[1], psi_d_wb=[[0]], psi_q_wb=[[0]]}", "must rise"),
+    "ragged": ("[plant.machine]\nflux_map = {i_d_a=[1,2], i_q_a=[1], psi_d_wb=[[0],[1,2]], psi_q_wb=0}", "flux_map"),
+    "column": ("[columns]\ncurrent = 'i_aa'", "[columns] 'current'", "'i_aa'", "i_a"),
+    "constant": ("[constants]\nomega = 3", "[constants] omega", "omega_e"),
+    "huge constant": ("[constants]\nomega_e = 1e308", "[constants] omega_e = 1e+308", "up to 1e+06 rad/s"),
+    "long constant": (f"[constants]\nu_dc = 0x{'f' * 90000}", "[constants] u_dc", "finite number"),
+    "wordy constant": ("[constants]\nu_dc = '48'", "[constants] u_dc", "finite number"),
+}
+
+
+@pytest.mark.parametrize("case", PLANT)
+def test_mistakes_in_the_other_sections_are_told_by_every_command(tmp_path, capsys, case):
+    lines, *words = PLANT[case]
+    path = edited(tmp_path, None, text=f"{PAPER.read_text()}\n{lines}\n")
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "empty.csv").write_text("i_d_a,i_q_a,psi_d_wb,psi_q_wb\n")
+    (tmp_path / "row.csv").write_text("i_d_a,i_q_a,psi_d_wb,psi_q_wb\n0,0,0,0\n")
+    check_message(capsys, path, words)
+    others = (
+        ["simulate", str(path)],
+        ["commission", str(path), "--out", str(tmp_path / "out")],
+        ["project", str(path), "--part", "xc7z020clg484-1", "--out", str(tmp_path / "out")],
+        ["dump", str(tmp_path / "capture.bin"), "--drive", str(path)],
+    )
+    for command in others:
+        assert main(command) == 2
+        assert words[0] in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
 
 
 def test_contradictions_are_found_without_a_file():

@@ -47,6 +47,9 @@ def edited(tmp_path, **changes):
 
 # ---------------------------------------------------------------- verdicts
 
+# Physics that the simulation does not use
+FOR_DIAGNOSE = "\n[plant.machine]\ncogging_order = 12\ncogging_amplitude_nm = 0.01\n[plant.timing]\ndelay_s = 1e-6\n"
+
 
 @pytest.mark.parametrize(
     "name",
@@ -54,8 +57,10 @@ def edited(tmp_path, **changes):
     + [pytest.param(name, marks=pytest.mark.study) for name in ("hub_36v", "drone_24v", "paper001", "emrax228")],
 )
 def test_drives_work(tmp_path, capsys, name):
-    """Exit status 0, no trip, margins of a sensible design; everything that is not modelled is said."""
-    status, data, out, err = run(tmp_path, capsys, DRIVES / f"{name}.toml")
+    """Exit status 0, no trip, margins of a sensible design; everything that is not modelled is said, [plant.*] too."""
+    path = tmp_path / f"{name}.toml"
+    path.write_text((DRIVES / f"{name}.toml").read_text() + FOR_DIAGNOSE)
+    status, data, out, err = run(tmp_path, capsys, path)
     assert status == 0 and err == "" and data["status"] == "ok" and out.startswith(f"{name}.toml: ok")
     for margin in data["margins"].values():
         assert margin["stable"] and margin["phase_margin_deg"] > 45 and margin["gain_margin_db"] > 6
@@ -65,6 +70,8 @@ def test_drives_work(tmp_path, capsys, name):
     text = " ".join(data["not_modelled"])
     assert "heating" in text and "bus" in text and ("Hall" in text) == (name == "hub_36v")
     html = (tmp_path / "out" / "report.html").read_text()
+    for key in ("machine.cogging_order", "machine.cogging_amplitude_nm", "timing.delay_s"):
+        assert key in text and key in html
     assert html.count("<svg") == 6 and "http-equiv" in html and "What is not modelled" in html
     assert not re.search(r"<script|(?:src|href)=\"http", html)
 

@@ -23,7 +23,7 @@ from fluxproof.diagnosis.balance.blocks import view_of
 from fluxproof.diagnosis.balance.shaft import is_airgap
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.ground.nominal import load_nominal
-from fluxproof.diagnosis.ground.plant_section import check_key, plain
+from fluxproof.diagnosis.ground.plant_keys import check_key, plain
 from fluxproof.diagnosis.ground.recording import from_columns
 from fluxproof.diagnosis.physics import known_effects
 from fluxproof.plant import Harmonic, flux_from_currents, machine_params

@@ -14,7 +14,7 @@ from fluxproof.cosim.closed_loop import described_sensors
 from fluxproof.cosim.scenarios import RPM, scenario, steps
 from fluxproof.diagnosis.answer.improve import core_values, improved_toml, plant_of, write_improved
 from fluxproof.diagnosis.ground.nominal import load_nominal
-from fluxproof.diagnosis.ground.plant_section import KEYS
+from fluxproof.diagnosis.ground.plant_keys import KEYS
 from fluxproof.diagnosis.ground.recording import RecordingError, from_columns
 from fluxproof.diagnosis.ground.result import Estimate, NamedEffect
 from fluxproof.diagnosis.overlay.compare import closed_loop
@@ -52,6 +52,7 @@ SPECIAL = {
     "machine.pole_pairs": 5,
     "sensors.position_direction": -1,
     "sensors.seed": 3,
+    "sensors.position_counts": 4096,
 }
 THREE = ("phase_resistance_asymmetry", "current_gain_error", "current_offset_a")
 MINIMAL = """[machine]

@@ -8,7 +8,8 @@ import json
 import numpy as np
 import pytest
 
-from cocotb_tests.support.recordings_made import T, codes, dq_made, made, nominal_of, write
+from cocotb_tests.support.recordings_made import FAST, T, codes, dq_made, made, nominal_of, write
+from cocotb_tests.support.slow import slowly
 from fluxproof.diagnosis.checks import STAGES, checks
 from fluxproof.diagnosis.loading.load import load_recording
 
@@ -300,3 +301,14 @@ def test_one_gap_is_singular(tmp_path, nominal):
 
 def test_every_check_has_a_stage():
     assert {m.STAGE for m in checks()} == set(STAGES)
+
+
+@pytest.mark.parametrize("bad", [np.nan, slowly(np.inf), slowly(1e300)])
+@pytest.mark.parametrize("name", [name for name in FAST if name not in ("t", "u_dc")])
+def test_a_value_that_is_missing_in_every_second_row_leaves_nothing_to_balance(tmp_path, nominal, name, bad):
+    """No two usable rows follow each other then, which is a finding and no exception."""
+    table = made(700)
+    table[name] = np.where(np.arange(700) % 2, bad, table[name])
+    recording = load_recording(write(tmp_path / "r.csv", table), nominal)
+    assert [(p.code, p.column) for p in recording.problems] == [("missing", name), ("too_short", "")]
+    assert recording.fatal and not (recording.usable[1:] & recording.usable[:-1]).any()

@@ -166,7 +166,8 @@ def _texts(add) -> None:
 def _values(add) -> None:
     """Tables that are well formed and wrong; what is fatal comes as a problem, not as an error."""
     n = 800
-    nothing = np.full(n, np.nan)
+    nothing, k = np.full(n, np.nan), np.arange(n)
+    parts = {"second": k % 2 == 0, "third": k % 3 == 1, "but_one": k > 0, "half": k < n // 2, "last": k == n - 1}
     for name in made(4):
         for what, values in (
             ("nan", nothing),
@@ -175,6 +176,9 @@ def _values(add) -> None:
             ("huge", np.full(n, 1e300)),
         ):
             add(f"{what}_{name}.csv", as_text(made(n) | {name: values}, ",", "."))
+        for bad in (np.nan, np.inf, 1e300):
+            for part, rows in parts.items():
+                add(f"{bad}_{part}_{name}.csv", as_text(made(n) | {name: np.where(rows, bad, made(n)[name])}, ",", "."))
         add(f"without_{name}.csv", as_text({k: v for k, v in made(n).items() if k != name}, ",", "."))
     rng = np.random.default_rng(3)
     add("noise.csv", as_text({name: rng.normal(size=n) for name in made(4)}, ",", "."))

@@ -12,10 +12,11 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
+from fluxproof.diagnosis.whole_drive import load_drive
 from fluxproof.files import write_json, write_text
 from fluxproof.quote import say
 from golden_model.drive import load
-from golden_model.drive_file import read_tables
+from golden_model.drive_file import read_tables, read_text
 from golden_model.drive_keys import DriveError
 
 
@@ -33,7 +34,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run_command(args: argparse.Namespace) -> int:
     """Measure, write both files, say each step."""
-    drive = load(args.drive)
+    drive = load_drive(args.drive)
     if drive.machine.magnet_flux_wb <= 0.0:
         raise DriveError(f"{args.drive}: [machine] magnet_flux_wb = 0: commissioning is for machines with magnets")
     given = read_tables(args.drive).get("sensors", {})
@@ -64,7 +65,7 @@ def commission_file(bus, path: str, drive, reverse: bool | None, folder: Path) -
     from fluxproof.commission.steps import commission
 
     steps, began = [], bus.now()
-    text = Path(path).read_text(encoding="utf-8")
+    text = read_text(path)
     drive = replace(drive, sensors=replace(drive.sensors, position_reverse=False, theta_offset_rad=0.0))
 
     def done(step) -> None:

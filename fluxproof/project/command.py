@@ -7,11 +7,11 @@ import re
 from pathlib import Path
 
 from fluxproof.checkout import ROOT
+from fluxproof.diagnosis.whole_drive import load_drive
 from fluxproof.files import write_text
 from fluxproof.project import parts, render
 from fluxproof.quote import say, shown
 from golden_model.board_registers import board_set, has_board
-from golden_model.drive import load
 from golden_model.drive_keys import DriveError
 
 NUMBER = re.compile("0[xX][0-9a-fA-F]{1,16}|[1-9][0-9]{0,15}")
@@ -28,7 +28,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write the files; an error in the drive or an argument writes nothing."""
-    drive = load(args.drive)
+    drive = load_drive(args.drive)
     try:
         register_set = board_set(drive)
     except DriveError as error:

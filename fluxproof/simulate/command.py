@@ -10,9 +10,9 @@ import sys
 import time
 from pathlib import Path
 
+from fluxproof.diagnosis.whole_drive import load_drive, stated_plant
 from fluxproof.files import write_json, write_text
 from fluxproof.quote import say
-from golden_model.drive import load
 from golden_model.drive_keys import DriveError
 
 
@@ -25,12 +25,12 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run_command(args: argparse.Namespace) -> int:
     """Simulate, write both files, say the result."""
     began = time.monotonic()
-    drive = load(args.drive)
+    drive = load_drive(args.drive)
     _say("loading the model")
     from fluxproof.simulate.session import simulate  # takes seconds, which a typing error should not wait for
 
     try:
-        data, pages = simulate(drive, Path(args.drive).name, _say)
+        data, pages = simulate(drive, Path(args.drive).name, _say, stated_plant(args.drive))
     except DriveError as error:
         _clear()
         raise DriveError(f"{args.drive}: {error}") from None

@@ -96,8 +96,9 @@ def speed_loop(drive: Drive, register_set: RegisterSet) -> Loop | None:
     torque = 1.5 * m.pole_pairs**2 * m.magnet_flux_wb  # on the electrical speed
     decay, gain = 1.0, torque * t_s / m.inertia_kgm2
     if m.viscous_friction_nms > 0.0:
-        decay = np.exp(-m.viscous_friction_nms * t_s / m.inertia_kgm2)
-        gain = torque * (1.0 - decay) / m.viscous_friction_nms
+        lost = m.viscous_friction_nms * t_s / m.inertia_kgm2
+        decay = np.exp(-lost)
+        gain *= -np.expm1(-lost) / lost if lost > 0.0 else 1.0
     numerator = np.polymul([kp, ki * t_s - kp], inner.numerator)
     numerator = np.polymul(np.polymul(numerator, [0.5, 0.5]), [gain * k, 0.0])
     denominator = np.polymul([1.0, -1.0], np.polyadd(inner.denominator, inner.numerator))

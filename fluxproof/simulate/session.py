@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -15,10 +15,12 @@ from golden_model.drive import Drive
 from golden_model.registers import registers
 
 
-def simulate(drive: Drive, name: str, say: Callable[[str], None] = lambda text: None) -> tuple[dict, Callable[[], str]]:
+def simulate(
+    drive: Drive, name: str, say: Callable[[str], None] = lambda text: None, plant: Sequence[str] = ()
+) -> tuple[dict, Callable[[], str]]:
     """(simulation.json as data, a function that renders the page); DriveError where the drive cannot be simulated.
 
-    ``say`` is told in a word or two what is being done.
+    ``say`` is told in a word or two what is being done; ``plant``: keys of [plant.*], which are not simulated.
     """
     register_set = registers(drive)
     scene = main_scene(drive)
@@ -43,7 +45,7 @@ def simulate(drive: Drive, name: str, say: Callable[[str], None] = lambda text: 
         "margins": {loop: value.to_json() for loop, value in found.items()},
         "figures": _figures(drive, main, step, rippled),
         "modelled": verdict.modelled(drive, [main]),
-        "not_modelled": verdict.not_modelled(drive, [main]),
+        "not_modelled": verdict.not_modelled(drive, [main], plant),
     }
 
     def pages() -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from fluxproof.simulate.run import Run
 from golden_model.drive import Drive
 from golden_model.scaling import leg_loss_v
 
+MOST_KEYS = 8  # of [plant.*], in a line
 LEARNT = 0.8  # of the loss of dead time and devices
 OF_SPEED, OF_CURRENT = 0.03, 0.1  # largest error of a settled stage: of the rated speed, rms of the current limit
 
@@ -92,8 +94,8 @@ def modelled(drive: Drive, runs: list[Run]) -> list[str]:
     return lines
 
 
-def not_modelled(drive: Drive, runs: list[Run]) -> list[str]:
-    """What the simulation does not contain, so that nobody takes it for shown."""
+def not_modelled(drive: Drive, runs: list[Run], plant: Sequence[str] = ()) -> list[str]:
+    """What the simulation does not contain, so that nobody takes it for shown; ``plant``: keys of [plant.*]."""
     lines = [
         "heating: winding and magnets keep their temperatures; losses are reported, temperatures are not computed",
         "switching losses and the temperature of the inverter",
@@ -113,6 +115,10 @@ def not_modelled(drive: Drive, runs: list[Run]) -> list[str]:
         lines.append(f"[sampling] delay_s = {drive.sampling.delay_s:g} s: the plant is sampled in the valley")
     if any(run.scene.shortened for run in runs):
         lines.append("the top speed: the inertia would take too long, so the scene stays at lower speeds")
+    if plant:
+        more = f" and {len(plant) - MOST_KEYS} more" if len(plant) > MOST_KEYS else ""
+        keys = f"{', '.join(plant[:MOST_KEYS])}{more}"
+        lines.append(f"[plant.*] of the drive file: {keys} are used by `fluxproof diagnose` alone")
     if not drive.machine.iron_conductance_s:
         lines.append("iron losses: [machine] iron_conductance_s gives none")
     return lines

@@ -23,6 +23,7 @@ from fluxproof.diagnosis.ground.result import NamedEffect
 from fluxproof.plant import FluxMap, Harmonic
 from fluxproof.quote import toml_comment
 from golden_model import drive as drives
+from golden_model.drive_file import read_text
 
 __all__ = ["CoreValue", "Plant", "Timing", "core_values", "improved_toml", "plant_of", "write_improved"]
 
@@ -66,7 +67,7 @@ def write_improved(nominal: Nominal, effects: list[NamedEffect], path, readings=
 def _original(nominal: Nominal):
     """The nominal file as a TOML document with its comments; a new document of its values if there is no file."""
     if nominal.path and Path(nominal.path).is_file():
-        return tomlkit.parse(Path(nominal.path).read_text(encoding="utf-8"))
+        return tomlkit.parse(read_text(nominal.path))
     document = tomlkit.document()
     for name, kind in drives.SECTIONS.items():
         given = {k: _toml(v) for k, v in vars(getattr(nominal, name)).items() if v is not None}

@@ -26,6 +26,8 @@ def angle_speed_ratio(recording, period, theta_factor=1.0, omega_factor=1.0) -> 
     if not recording.has("theta_e", "omega_e") or len(recording) < 3:
         return None
     rows = _rows(recording)
+    if not len(rows):  # no two usable rows follow each other, as with a value missing in every second row
+        return None
     theta, omega = recording["theta_e"] * theta_factor, recording["omega_e"] * omega_factor
     advance = 0.5 * (omega[rows] + omega[rows + 1]) * period
     turned = wrapped(theta[rows + 1] - theta[rows])

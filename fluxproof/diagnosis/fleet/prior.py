@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
@@ -30,8 +29,7 @@ from fluxproof.diagnosis.fleet.schema import COLUMNS
 from fluxproof.diagnosis.fleet.values import values_of
 from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.ground.limits import limited
-from fluxproof.diagnosis.ground.nominal import load_nominal
-from fluxproof.diagnosis.ground.plant_section import MOST_MAP_BYTES
+from fluxproof.diagnosis.ground.nominal import MOST_MAP_BYTES, flux_map_path, load_nominal
 from fluxproof.diagnosis.ground.recording import RecordingError
 from fluxproof.diagnosis.ground.result import Fleet, InFleet
 from fluxproof.diagnosis.inference.posterior import Posterior
@@ -93,9 +91,9 @@ def read_fleet(path) -> list[dict]:
 def design_of(drive) -> str:
     """Hash of a drive file and of the flux map that it names: recordings of one design are one population."""
     digest = hashlib.sha256(read_regular(drive, MOST_BYTES))
-    flux_map = load_nominal(drive).plant.get("machine", {}).get("flux_map")
-    if isinstance(flux_map, str):
-        digest.update(read_regular(Path(drive).parent / flux_map, MOST_MAP_BYTES))
+    flux_map = flux_map_path(load_nominal(drive))
+    if flux_map is not None:
+        digest.update(read_regular(flux_map, MOST_MAP_BYTES))
     return digest.hexdigest()[:16]
 
 

@@ -12,7 +12,9 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass, field
+from pathlib import Path
 
+from fluxproof.quote import shown
 from golden_model import drive
 from golden_model.drive_file import read_sections, read_tables
 from golden_model.drive_keys import DriveError, key_of
@@ -44,6 +46,7 @@ def _optional(section, kind):
 
 RELUCTANCE = 0.05  # of the flux of rated current: with less the magnets do not count
 NO_MAGNETS = 1e-6  # the same, in place of no flux
+MOST_MAP_BYTES = 20_000_000  # of a flux map's CSV
 
 SECTIONS = {name: _optional(name, kind) for name, kind in drive.SECTIONS.items()}
 
@@ -82,6 +85,28 @@ def flux_level(machine) -> float:
 
 def _load_flux(machine) -> float:
     return max(machine.inductance_d_h, machine.inductance_q_h) * machine.rated_current_a
+
+
+def flux_map_path(nominal: Nominal) -> Path | None:
+    """The CSV file that [plant.machine] flux_map names, or None; DriveError unless it lies beside the drive file."""
+    name = nominal.plant.get("machine", {}).get("flux_map")
+    if not isinstance(name, str):
+        return None
+    where = f"{nominal.path}: [plant.machine] flux_map = {shown(name)!r}"
+    folder = Path(nominal.path).parent
+    try:
+        path = folder / name
+        if not path.resolve().is_relative_to(folder.resolve()):
+            raise DriveError(f"{where} must be a CSV file in the folder of the drive file")
+        if not path.is_file():
+            raise DriveError(f"{where}: there is no such file in the folder of the drive file")
+        if path.stat().st_size > MOST_MAP_BYTES:
+            raise DriveError(f"{where} has {path.stat().st_size} bytes: allowed is up to {MOST_MAP_BYTES}")
+    except (OSError, RuntimeError) as error:  # a ring of links, a name that is too long
+        raise DriveError(f"{where}: cannot be read: {getattr(error, 'strerror', None) or error}") from None
+    except ValueError as error:
+        raise error if isinstance(error, DriveError) else DriveError(f"{where}: no file has such a name") from None
+    return path
 
 
 def load_nominal(path) -> Nominal:

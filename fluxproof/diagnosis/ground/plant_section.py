@@ -3,7 +3,7 @@
 The core's own sections describe the machine and the inverter.  [sensors] describes the sensors as the core assumes
 them; without [plant.sensors] they are exactly that: an offset code of 32800 means a sensor offset of 32 codes.
 A key in [plant.machine], [plant.inverter] or [plant.sensors] replaces the value from the core's sections; the names are
-those of plant.Machine, plant.Inverter and plant.Sensors.  Three of them have a special form in TOML:
+those of plant.Machine, plant.Inverter and plant.Sensors (plant_keys.py).  Three of them have a special form in TOML:
 
     emf_harmonics = [[order, amplitude_d, amplitude_q, phase_rad], ...]
     flux_map      = a table of i_d_a (n), i_q_a (m), psi_d_wb (n x m), psi_q_wb (n x m), or the name of a CSV file with
@@ -14,35 +14,17 @@ those of plant.Machine, plant.Inverter and plant.Sensors.  Three of them have a 
 from __future__ import annotations
 
 import dataclasses
-import difflib
-import io
-import math
-from dataclasses import dataclass
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from fluxproof.diagnosis.ground.nominal import Nominal, load_nominal
+from fluxproof.diagnosis.ground.nominal import Nominal, flux_map_path, load_nominal
+from fluxproof.diagnosis.ground.plant_keys import HARMONICS, Timing, plain, plant_given, read_flux_map
 from fluxproof.diagnosis.ground.result import NamedEffect
-from fluxproof.plant import FluxMap, Harmonic, Inverter, Machine, Sensors
+from fluxproof.plant import Inverter, Machine, Sensors
 from golden_model.drive_keys import DriveError
-from golden_model.regular_file import read_regular
 
-MOST_MAP_BYTES = 64_000_000  # of a flux map's file
 FINE_BITS = 24  # resolution of undescribed sensors: fine enough to be negligible
-
-
-@dataclass(frozen=True)
-class Timing:
-    """Deviations in time from the nominal drive [s].
-
-    delay_s: the voltage acts this much later than duty_applied_after_samples says.
-    sampling_skew_s: the currents are sampled this long after the PWM centre; negative: before it.
-    """
-
-    delay_s: float = 0.0
-    sampling_skew_s: float = 0.0
 
 
 class Plant(NamedTuple):
@@ -55,28 +37,18 @@ class Plant(NamedTuple):
 
 
 # Keys that an effect gives in addition to those of the drive file; the others it gives as a whole.
-HARMONICS = "machine.emf_harmonics"
 ADDS = {
     "machine.saturation_d_per_a2", "machine.saturation_q_per_a2", "machine.cross_saturation_wb_per_a2",
     "machine.iron_conductance_s", "machine.phase_resistance_asymmetry", HARMONICS,
     "machine.resistance_temp_coeff_per_k", "inverter.dead_time_s",
 }  # fmt: skip
 ORDERED = ("inverter.dead_time_s",)
-SECTIONS = {"machine": Machine, "inverter": Inverter, "sensors": Sensors, "timing": Timing}
-KEYS = {f"{name}.{f.name}": f for name, kind in SECTIONS.items() for f in dataclasses.fields(kind)}
 # Keys for which the plant rejects negative values; a noisy estimate of zero may be negative and is clipped.
 NOT_NEGATIVE = {f"inverter.{f.name}" for f in dataclasses.fields(Inverter)} | {
     f"machine.{name}"
     for name in ("saturation_d_per_a2", "saturation_q_per_a2", "iron_conductance_s", "viscous_friction_nms",
                  "coulomb_friction_nm")
 }  # fmt: skip
-
-
-def check_key(key: str) -> None:
-    """Raise ValueError for an unknown plant key, with the nearest known one."""
-    if key not in KEYS:
-        near = difflib.get_close_matches(key, KEYS, n=1, cutoff=0.0)[0]
-        raise ValueError(f"{key} is not a key of the plant; the nearest known one is {near}")
 
 
 def merged(effects: list[NamedEffect]) -> dict:
@@ -116,22 +88,17 @@ def in_addition(found: dict, nominal: Nominal) -> dict:
 def plant_of(source) -> Plant:
     """(Machine, Inverter, Sensors, Timing) of a drive file's path or of a Nominal; DriveError as in load_nominal."""
     nominal = source if isinstance(source, Nominal) else load_nominal(source)
-    tables = {name: dict(nominal.plant.get(name, {})) for name in SECTIONS}
-    unknown = set(nominal.plant) - set(SECTIONS)
-    if unknown:
-        raise DriveError(f"{nominal.path}: unknown section [plant.{unknown.pop()}]; known are {', '.join(SECTIONS)}")
-    chart = tables["machine"].get("flux_map")
+    given, chart = plant_given(nominal), flux_map_path(nominal)
     try:
-        if isinstance(chart, str):
-            tables["machine"]["flux_map"] = read_flux_map(Path(nominal.path).parent / chart)
-        given = {name: {k: plain(f"{name}.{k}", v) for k, v in table.items()} for name, table in tables.items()}
+        if chart is not None:
+            given["machine"]["flux_map"] = read_flux_map(chart)
         return Plant(
             Machine(**({"inertia_kgm2": 1e-3} | _described(nominal.machine, Machine) | given["machine"])),
             Inverter(**(_described(nominal.inverter, Inverter) | given["inverter"])),
             Sensors(**(described_sensors(nominal) | given["sensors"])),
             Timing(**given["timing"]),
         )
-    except (TypeError, ValueError, KeyError) as error:
+    except (TypeError, ValueError) as error:
         raise DriveError(f"{nominal.path}: section [plant]: {error}") from None
 
 
@@ -160,35 +127,6 @@ def described_sensors(nominal: Nominal) -> dict:
         "position_offset_rad": -turning * s.theta_offset_rad / nominal.machine.pole_pairs,
         "position_direction": turning,
     }
-
-
-def read_flux_map(path) -> FluxMap:
-    """A CSV with i_d_a, i_q_a, psi_d_wb, psi_q_wb (flux_found.py); ValueError names the file if it is none."""
-    try:
-        text = read_regular(path, MOST_MAP_BYTES).decode()  # by its name, numpy would unpack or fetch a file
-        rows = np.loadtxt(io.StringIO(text), delimiter=",", skiprows=1, ndmin=2)
-        return FluxMap.from_points(*rows.T)
-    except (OSError, TypeError, ValueError) as error:
-        raise ValueError(f"flux_map {path}: {error}") from None
-
-
-def plain(key: str, value):
-    """A TOML value in the type of the plant's field; ValueError for a wrong value."""
-    check_key(key)
-    if key == HARMONICS:
-        return tuple(h if isinstance(h, Harmonic) else Harmonic(*map(float, h)) for h in value)
-    if key == "machine.flux_map":
-        if value is None or isinstance(value, FluxMap):
-            return value
-        return FluxMap(**{name: np.asarray(grid, float) for name, grid in value.items()})
-    if isinstance(value, (list, tuple, np.ndarray)):
-        value = tuple(float(v) for v in value)
-        if len(value) != 3:
-            raise ValueError(f"{key} needs three values, phases a, b, c, not {len(value)}")
-        return value
-    if isinstance(value, bool) or not isinstance(value, (int, float, np.number)) or not math.isfinite(value):
-        raise ValueError(f"{key} = {value!r} must be a finite number")
-    return value
 
 
 def errors_beyond(sensors: Sensors, nominal: Nominal) -> dict:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import difflib
-import math
 
 from fluxproof.diagnosis.ground.recording import COLUMNS, RecordingError
 from fluxproof.diagnosis.readers.table import shown
+from golden_model.drive_keys import is_finite
 
 KEYS = {"name", "unit", "factor", "offset"}
 
@@ -29,8 +29,7 @@ def entry_of(key, value, nominal) -> dict:
                 f"{where}: unknown key {shown(name)!r}; known are name, unit, factor, offset"
             )
     for name in ("factor", "offset"):
-        number = entry.get(name, 1.0)
-        if isinstance(number, bool) or not isinstance(number, (int, float)) or not math.isfinite(number):
+        if not is_finite(entry.get(name, 1.0)):
             raise RecordingError(f"{where}: {name} must be a finite number")
     if entry.get("factor") == 0:
         raise RecordingError(f"{where}: factor must not be 0")

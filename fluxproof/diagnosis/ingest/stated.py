@@ -12,11 +12,11 @@ They apply to every recording that is diagnosed with this drive file and does no
 from __future__ import annotations
 
 import difflib
-import math
 
 from fluxproof.diagnosis.ground.recording import COLUMNS, RecordingError
 from fluxproof.diagnosis.ingest.units import conversion, known_units
 from fluxproof.diagnosis.readers.table import shown
+from golden_model.drive_keys import RANGES, is_finite
 
 MEASURED = ("t", "u_a", "u_b", "u_c", "u_ab", "u_bc", "u_ca")  # a constant would state nothing
 
@@ -37,11 +37,12 @@ def _value(name, value, nominal) -> float:
         if not {"value"} <= set(value) <= {"value", "unit"} or not isinstance(value.get("unit", ""), str):
             raise RecordingError(f"{where}: must be a number or a table such as {{value = 3000, unit = 'rpm'}}")
         value, unit = value["value"], value.get("unit", "")
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+    if not is_finite(value):
         raise RecordingError(f"{where}: must be a finite number, or {{value = 3000, unit = 'rpm'}}")
-    if not unit:
-        return float(value)
-    found = conversion(name, unit, nominal.machine.pole_pairs)
+    found = conversion(name, unit, nominal.machine.pole_pairs) if unit else (1.0, 0.0)
     if found is None:
         raise RecordingError(f"{where}: unit {shown(unit)!r} is unknown for {name}; known are {known_units(name)}")
-    return float(value) * found[0] + found[1]
+    value, most = float(value) * found[0] + found[1], RANGES[COLUMNS[name]][1]
+    if abs(value) > most:
+        raise RecordingError(f"{where} = {value:g} is out of range: allowed is up to {most:g} {COLUMNS[name]}")
+    return value

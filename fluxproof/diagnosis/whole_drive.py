@@ -1,0 +1,42 @@
+"""The core's drive from a file whose other sections are checked too: [plant.*], [columns] and [constants].
+
+golden_model.drive.load knows the core's sections alone; the other ones belong to the diagnosis, but a mistake in them
+is one of the file, so every command reports it.
+"""
+
+from __future__ import annotations
+
+from golden_model.drive import Drive, load
+from golden_model.drive_file import IGNORED, read_tables
+from golden_model.drive_keys import DriveError
+
+
+def load_drive(path) -> Drive:
+    """The drive of a file; DriveError names file, section, key and what is allowed, in any of its sections."""
+    drive = load(path)
+    if set(read_tables(path)) & set(IGNORED):
+        _check_others(path)
+    return drive
+
+
+def stated_plant(path) -> list[str]:
+    """The keys of [plant.*], "machine.cogging_order" for example, in the order of the file."""
+    return [f"{section}.{key}" for section, table in read_tables(path).get("plant", {}).items() for key in table]
+
+
+def _check_others(path) -> None:
+    """DriveError for the first mistake in [columns], [constants] or [plant.*]."""
+    from fluxproof.diagnosis.ground.nominal import load_nominal
+    from fluxproof.diagnosis.ground.plant_section import plant_of  # these take a second, which most files do not need
+    from fluxproof.diagnosis.ground.recording import RecordingError
+    from fluxproof.diagnosis.ingest.entries import entry_of
+    from fluxproof.diagnosis.ingest.stated import constants_of
+
+    nominal = load_nominal(path)
+    try:
+        for key, value in nominal.columns.items():
+            entry_of(key, value, nominal)
+        constants_of(nominal)
+    except RecordingError as error:
+        raise DriveError(str(error)) from None
+    plant_of(nominal)
