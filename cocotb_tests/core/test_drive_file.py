@@ -112,7 +112,8 @@ TEXTS = {
     "key outside": ("pole_pairs = 4\n", "unknown section pole_pairs"),
     "not a section": ("machine = 4\n", "machine must be a section", "whole number"),
     "tables": ("[[machine]]\n", "machine must be a section", "list"),
-    "levels": ("[machine" + ".a" * 5000 + "]\n", "[machine] unknown key a"),
+    "levels": ("[machine" + ".a" * 20 + "]\n", "[machine] unknown key a"),
+    "many levels": ("[machine" + ".a" * 5000 + "]\n", ":1: not TOML: A key has more than 32 parts"),
     "deep": ("a = " + "[" * 100000, "not TOML"),
 }
 
