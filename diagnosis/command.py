@@ -114,7 +114,7 @@ def answer_lines(answer, nominal, out: Path) -> list[str]:
     if answer.digital.checked and answer.digital.first_difference is None:
         lines.append(f"controller: {answer.digital.samples} samples equal to the golden model in every bit")
     lines += _problem_lines(answer.problems)
-    # session.run removes what an earlier run left, so that a file that is there was written by this one.
+    # All files of FILES are those of this run, those of an earlier one are removed with it.
     return [*lines, "", *(f"wrote {out / name}" for name in FILES if (out / name).exists())]
 
 

@@ -10,11 +10,13 @@ import argparse
 import json
 from pathlib import Path
 
+from fluxproof.files import refuse_overwriting
 from fluxproof.golden_model import fluxproof
 from fluxproof.golden_model.board_registers import board_set
 from fluxproof.golden_model.drive import load
 from fluxproof.golden_model.drive_keys import DriveError
 from fluxproof.golden_model.registers import RegisterSet
+from fluxproof.stage import alone
 
 REPLAY = {
     "reset": "begins with the first sample after a reset: the golden model can replay all of it",
@@ -47,6 +49,8 @@ def run(args: argparse.Namespace) -> int:
     """Write the dump and print its contents; returns 0."""
     from fluxproof.diagnosis.replay.telemetry_stream import read_capture, write_piece  # takes a second to import
 
+    out = Path(args.out) if args.out else Path(args.capture).with_suffix(".fluxdump")
+    refuse_overwriting([out], [args.capture, args.drive, args.registers])
     drive = load(args.drive)
     try:
         register_set = board_set(drive)
@@ -56,8 +60,8 @@ def run(args: argparse.Namespace) -> int:
         register_set = with_registers(register_set, Path(args.registers))
     capture = read_capture(args.capture)
     number = chosen(capture.pieces, args.piece, args.capture)
-    out = Path(args.out) if args.out else Path(args.capture).with_suffix(".fluxdump")
-    write_piece(out, capture.pieces[number], drive, register_set)
+    with alone(out) as file:
+        write_piece(file, capture.pieces[number], drive, register_set)
     print("\n".join(summary(capture, number)))
     print(f"wrote {out}")
     return 0

@@ -9,13 +9,14 @@ import argparse
 import json
 from pathlib import Path
 
-from fluxproof.files import write_json
+from fluxproof.files import refuse_overwriting, write_json
 from fluxproof.golden_model.board_registers import board_generics, board_set, has_board
 from fluxproof.golden_model.drive import Drive, load
 from fluxproof.golden_model.drive_keys import DriveError
 from fluxproof.golden_model.generated.register_names import ADDRESSES
 from fluxproof.golden_model.registers import RegisterSet, Row
 from fluxproof.golden_model.units import SIGNALS, si_per_lsb
+from fluxproof.stage import alone
 
 HEAD = ("register", "address", "SI value", "unit", "integer", "represented", "error", "legal range")
 LEFT = (0, 3)  # columns of words; numbers are right-aligned
@@ -41,7 +42,9 @@ def run(args: argparse.Namespace) -> int:
     except DriveError as error:
         raise DriveError(f"{args.drive}: {error}") from None
     if args.json:
-        write_json(Path(args.json), as_json(drive, result))
+        refuse_overwriting([args.json], [args.drive])
+        with alone(Path(args.json)) as file:
+            write_json(file, as_json(drive, result))
     if args.format == "c":
         print("\n".join(c_lines(args.drive, drive, result)))
     elif args.format == "json":

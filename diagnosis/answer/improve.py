@@ -9,7 +9,6 @@ of the hardware, and in [sensors] as the trim that cancels it.
 from __future__ import annotations
 
 import dataclasses
-import os
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +19,7 @@ from fluxproof.diagnosis.answer.improved_plant import Plant, Timing, described_s
 from fluxproof.diagnosis.conventions.apply import edit, read_drive
 from fluxproof.diagnosis.nominal import Nominal
 from fluxproof.diagnosis.result import NamedEffect
+from fluxproof.files import write_text
 from fluxproof.golden_model import drive as drives
 from fluxproof.plant import FluxMap, Harmonic
 
@@ -55,11 +55,7 @@ def improved_toml(nominal: Nominal, effects: list[NamedEffect], readings=(), rec
 
 def write_improved(nominal: Nominal, effects: list[NamedEffect], path, readings=(), recording=None) -> Path:
     """Write ``improved_toml`` atomically to ``path``; returns the path."""
-    path = Path(path)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
-    temporary.write_text(improved_toml(nominal, effects, readings, recording), encoding="utf-8")
-    os.replace(temporary, path)
-    return path
+    return write_text(Path(path), improved_toml(nominal, effects, readings, recording))
 
 
 def _original(nominal: Nominal):

@@ -51,7 +51,7 @@ class Engine:
         self.cluster = self.client = None
 
     def __enter__(self) -> Engine:
-        self.settings = dask.config.set(SETTINGS)
+        self.settings, self.main = dask.config.set(SETTINGS), _Main()
         try:
             if self.scheduler is None:
                 self.cluster = LocalCluster(
@@ -72,6 +72,7 @@ class Engine:
         for part in (self.client, self.cluster):
             if part is not None:
                 part.close()
+        self.main.restore()
         self.settings.__exit__(None, None, None)
 
     @property
@@ -117,6 +118,23 @@ class Engine:
             future.release()
             more(1)
             yield item, result
+
+
+class _Main:
+    """The script of this process, unknown to its workers until ``restore``.
+
+    A worker process imports the script that started it, and one without ``if __name__ == "__main__"`` would start the
+    command anew in each.  What a worker runs is in modules.
+    """
+
+    def __init__(self):
+        module = sys.modules["__main__"]
+        self.names = vars(module)
+        self.file = self.names.pop("__file__", None) if self.names.get("__spec__") is None else None
+
+    def restore(self) -> None:
+        if self.file is not None:
+            self.names["__file__"] = self.file
 
 
 def in_parallel(function: Callable, items: list, workers: int | None, what: str) -> Iterator[tuple]:

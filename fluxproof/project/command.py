@@ -6,11 +6,12 @@ import argparse
 from pathlib import Path
 
 from fluxproof.checkout import ROOT
-from fluxproof.files import write_text
+from fluxproof.files import refuse_overwriting, write_text
 from fluxproof.golden_model.board_registers import board_set, has_board
 from fluxproof.golden_model.drive import load
 from fluxproof.golden_model.drive_keys import DriveError
 from fluxproof.project import parts, render
+from fluxproof.stage import together
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -40,8 +41,12 @@ def run(args: argparse.Namespace) -> int:
     base = address(args.base) if args.base else processor.base if processor else 0
     found = render.files(args.drive, drive, register_set, part, processor, base, core_folder(args.core))
     folder = Path(args.out)
-    for name, text in found.items():
-        print(write_text(folder / name, text))
+    refuse_overwriting([folder / name for name in found], [args.drive])
+    with together(folder, render.NAMES) as stage:
+        for name, text in found.items():
+            write_text(stage / name, text)
+    for name in found:
+        print(folder / name)
     if processor is None:
         print(f"no device tree: {part} has no processor; the script builds the core alone")
     elif has_board(drive):

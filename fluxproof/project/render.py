@@ -12,6 +12,7 @@ from fluxproof.print_registers import c_lines
 from fluxproof.project.parts import ZYNQ, Processor, processor_of
 
 BY = "by `fluxproof project`; change the drive file and run it again"
+NAMES = ("fluxproof_clock.xdc", "drive_pkg.vhd", "project.tcl", "drive_registers.h", "fluxproof.dtsi")
 WINDOW = 0x1000  # bytes of the registers' address range
 
 
@@ -139,12 +140,11 @@ def files(
 ) -> dict[str, str]:
     """{file name: text} of the whole project."""
     name = Path(path).name
-    made = {
-        "fluxproof_clock.xdc": clock_xdc(name, drive),
-        "drive_pkg.vhd": vhdl_package(name, drive, register_set),
-        "project.tcl": tcl(name, drive, register_set, part, base, core),
-        "drive_registers.h": c_header(path, drive, register_set),
-    }
-    if processor is not None:
-        made["fluxproof.dtsi"] = device_tree(name, drive, processor, base)
-    return made
+    texts = [
+        clock_xdc(name, drive),
+        vhdl_package(name, drive, register_set),
+        tcl(name, drive, register_set, part, base, core),
+        c_header(path, drive, register_set),
+        *([device_tree(name, drive, processor, base)] if processor is not None else []),
+    ]
+    return dict(zip(NAMES, texts, strict=False))
