@@ -63,6 +63,4 @@ def main(argv: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    from fluxproof.__main__ import main as process
-
-    sys.exit(process())
+    sys.exit(guarded(lambda: dispatch(sys.argv[1:]), process=True))
