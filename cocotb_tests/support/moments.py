@@ -49,7 +49,8 @@ def run(folder: Path, arguments: list, moment: Moment | None = None, program=Non
         (folder / "sitecustomize.py").write_text(HOOK.format(**moment._asdict() | {"number": int(moment.number)}))
         paths.insert(0, str(folder))
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(paths), "OPENBLAS_NUM_THREADS": "1"}
-    environment.pop("FLUXPROOF_DEBUG", None)
+    for name in ("FLUXPROOF_DEBUG", "PYTHONUNBUFFERED"):
+        environment.pop(name, None)
     command = [*(program or [sys.executable, "-m", "fluxproof"]), *arguments]
     given = dict(cwd=ROOT, env=environment, capture_output=True, text=True, timeout=300)
     return subprocess.run([x if isinstance(x, bytes) else str(x) for x in command], **given | options)
