@@ -129,6 +129,7 @@ GUARDED = "import os, signal, sys, warnings\nfrom fluxproof.guard import guarded
 PRESS = "os.kill(me, signal.SIGINT)"
 BODIES = {
     "in a destructor": f"class Late:\n def __del__(_): {PRESS}\ndef body():\n Late()\n while True: pass",
+    "in a text": f"import fluxproof.diagnosis.command\ndef body(): exec('{PRESS}')",
     "twice": f"def body():\n try: {PRESS}\n finally: {PRESS}",
     "as another error": f"def body():\n try: {PRESS}\n except KeyboardInterrupt: raise ImportError",
     "in a __set_name__": f"class Name:\n def __set_name__(*_): {PRESS}\ndef body():\n class A: x = Name()",

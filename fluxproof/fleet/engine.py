@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import contextlib
 import itertools
+import signal
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator
 
 import dask
 from distributed import Client, KilledWorker, LocalCluster, as_completed
+from distributed.utils import LoopRunner
 
 AHEAD = 4  # items per worker that wait at the scheduler; more would only take its memory
 DEATHS = 10  # workers that one item may take with it before it is suspected
@@ -48,13 +50,15 @@ class Engine:
 
     def __init__(self, workers: int | None = None, scheduler: str | None = None):
         self.workers, self.scheduler = workers, scheduler
-        self.cluster = self.client = None
+        self.cluster = self.client = self.runner = None
 
     def __enter__(self) -> Engine:
         self.settings, self.main = dask.config.set(SETTINGS), _Main()
         try:
             if self.scheduler is None:
+                self.runner = _deaf_loop()
                 self.cluster = LocalCluster(
+                    loop=self.runner.loop,
                     n_workers=self.workers, threads_per_worker=1, processes=True, memory_limit=0,
                     dashboard_address="127.0.0.1:0", silence_logs=50,
                 )  # fmt: skip
@@ -72,6 +76,8 @@ class Engine:
         for part in (self.client, self.cluster):
             if part is not None:
                 part.close()
+        if self.runner is not None:
+            self.runner.stop()
         self.main.restore()
         self.settings.__exit__(None, None, None)
 
@@ -118,6 +124,20 @@ class Engine:
             future.release()
             more(1)
             yield item, result
+
+
+def _deaf_loop() -> LoopRunner:
+    """A running event loop whose thread, and with it the processes that it starts, does not get Ctrl-C.
+
+    A terminal sends Ctrl-C to the workers too, which would print tracebacks; this process ends them.
+    """
+    runner = LoopRunner()
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        runner.start()
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+    return runner
 
 
 class _Main:

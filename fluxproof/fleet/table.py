@@ -22,7 +22,6 @@ class Rows:
 
     def __init__(self, out: Path):
         self.folder = Path(out) / ROWS
-        self.folder.mkdir(parents=True, exist_ok=True)
         for left in self.folder.glob(".*.tmp"):  # of a run that was stopped while writing
             left.unlink(missing_ok=True)
 
