@@ -137,8 +137,9 @@ BODIES = {
 
 
 @pytest.mark.parametrize("where", BODIES)
-def test_ctrl_c_where_python_makes_something_else_of_it(where):
-    done = run(Path(), [], None, [sys.executable, "-c", f"{GUARDED}{BODIES[where]}\nsys.exit(guarded(body, True))"])
+def test_ctrl_c_where_python_makes_something_else_of_it(where, tmp_path):
+    (tmp_path / "body.py").write_text(f"{GUARDED}{BODIES[where]}\nsys.exit(guarded(body, True))")
+    done = run(tmp_path, [], None, [sys.executable, "-m", "body"], cwd=tmp_path)
     assert (done.returncode, done.stderr) == (130, STOPPED)
 
 
