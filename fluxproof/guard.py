@@ -100,7 +100,7 @@ def _ended(error: BaseException, stopped: bool) -> int:
 
         traceback.print_exception(error)
     if stopped:
-        exec("")  # Python forgets that Ctrl-C ended another text, such as a dataclass: it would end by the signal itself
+        exec("")  # else Python ends itself by the signal if Ctrl-C came while it ran a text, such as a dataclass
         return _told("stopped", STOPPED)
     if isinstance(error, BrokenPipeError):  # the reader, a pager or head, has closed the pipe
         _discard_output()
