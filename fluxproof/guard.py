@@ -119,11 +119,18 @@ def _told(text: str, status: int) -> int:
     return status
 
 
-def _sentence(error: BaseException) -> str:
-    from fluxproof.diagnosis.recording import RecordingError
-    from fluxproof.golden_model.drive_keys import DriveError
+def _bad_input() -> tuple[type[Exception], ...]:
+    """The exceptions whose text is the line; none where the installation is broken, which is then the error."""
+    try:
+        from fluxproof.diagnosis.recording import RecordingError
+        from fluxproof.golden_model.drive_keys import DriveError
+    except Exception:
+        return ()
+    return DriveError, RecordingError
 
-    if isinstance(error, (DriveError, RecordingError)):
+
+def _sentence(error: BaseException) -> str:
+    if isinstance(error, _bad_input()):
         return str(error)
     if isinstance(error, OSError):
         name = error.filename if error.filename is not None else _full_output()

@@ -189,6 +189,12 @@ def test_an_argument_that_is_no_text(tmp_path):
         assert "No such file" in line and ("caf" in line or "new line" in line) and "\x1b" not in line
 
 
+def test_a_broken_installation_is_one_line(tmp_path):
+    (tmp_path / "numpy.py").write_text("raise ImportError('broken')")
+    program = ["env", f"PYTHONPATH={tmp_path}:{ROOT}", sys.executable, "-m", "fluxproof"]
+    assert "ImportError: broken (" in one_line(run(tmp_path, ["registers", PAPER], program=program))
+
+
 def test_warnings_are_for_debugging(tmp_path, monkeypatch):
     body = f"{GUARDED}import logging\ndef body():\n warnings.warn('one')\n logging.warning('two')\n return 0\n"
     command = [sys.executable, "-c", f"{body}sys.exit(guarded(body, True))"]

@@ -132,7 +132,7 @@ def _deaf_loop() -> LoopRunner:
     A terminal sends Ctrl-C to the workers too, which would print tracebacks; this process ends them.
     """
     runner = LoopRunner()
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # a thread and a process inherit it
     try:
         runner.start()
     finally:
