@@ -311,7 +311,7 @@ def fleet_of(program, inputs, tmp_path) -> None:
     out = tmp_path / "out"
     recordings = [inputs / "stopped.csv", inputs / "stopped_too.csv"]
     arguments = ["fleet", *recordings, "--drive", inputs / "drive.toml", "--out", out, "--workers", "2", "--quiet"]
-    done = run(tmp_path, arguments, program=program, cwd=tmp_path, timeout=120)
+    done = run(tmp_path, arguments, program=program, cwd=tmp_path)
     assert (done.returncode, done.stderr) == (0, ""), done.stderr
     rows = pq.read_table(out / "fleet.parquet").to_pylist()
     assert [row["verdict"] for row in rows] == ["bad_recording"] * 2, [row["reason"] for row in rows]
