@@ -130,7 +130,7 @@ def test_commands_that_write_a_folder(environment, tmp_path, command, names):
 @pytest.mark.slow
 def test_dump(environment, tmp_path):
     """A stream as a DMA stores it becomes a dump."""
-    samples, observed = bench.dumped(bench.GRID[:1], {})
+    samples, observed = bench.dumped(bench.GRID[:18], {})
     fields = [dict(zip(Sample._fields, row, strict=True)) for row in samples[:200]]
     seen = [{name: observed[name][k] for name in telemetry_words.PACKET} for k in range(200)]
     words = [telemetry_words.pack(k, fields[k] | seen[k]) for k in range(200)]
