@@ -26,16 +26,19 @@ STOPPED = "fluxproof: stopped\n"
 PART = "xc7z020clg484-1"
 
 
-@pytest.fixture(scope="module")
-def inputs(tmp_path_factory):
-    """A folder with drive.toml, a recording whose time stands still, and a good one."""
-    folder = tmp_path_factory.mktemp("inputs")
+def write_inputs(folder: Path) -> Path:
+    """A folder with drive.toml, two recordings whose time stands still, and a good one."""
     (folder / "drive.toml").write_bytes(PAPER.read_bytes())
     table = pd.DataFrame({name: values[:900] for name, values in bench.columns(bench.GRID[:4]).items()})
     table.to_csv(folder / "good.csv", index=False)
     table.assign(t=np.zeros(len(table))).to_csv(folder / "stopped.csv", index=False)
     table.assign(t=np.ones(len(table))).to_csv(folder / "stopped_too.csv", index=False)
     return folder
+
+
+@pytest.fixture(scope="module")
+def inputs(tmp_path_factory):
+    return write_inputs(tmp_path_factory.mktemp("inputs"))
 
 
 @pytest.fixture

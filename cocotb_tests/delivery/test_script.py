@@ -8,10 +8,15 @@ import sys
 import pyarrow.parquet as pq
 import pytest
 
-from cocotb_tests.delivery.test_commands import STOPPED, inputs  # noqa: F401 - inputs is a fixture
+from cocotb_tests.delivery.test_commands import STOPPED, write_inputs
 from cocotb_tests.support.moments import Moment, run
 from fluxproof.checkout import ROOT
 from fluxproof.fleet import engine
+
+
+@pytest.fixture(scope="module")
+def inputs(tmp_path_factory):
+    return write_inputs(tmp_path_factory.mktemp("inputs"))
 
 
 @pytest.fixture
