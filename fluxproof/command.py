@@ -1,55 +1,41 @@
 """The command ``fluxproof`` with the subcommands listed in COMMANDS, e.g. ``fluxproof registers drive.toml``.
 
-Exit status: 0 done, 2 bad input (one line on stderr says which and why), 1 if a command found a fault.
+Exit status: 0 done, 1 if a command found a fault, 2 bad input, a full disk or a defect of the tool (one line on stderr
+says which and why), 130 after Ctrl-C.
 A subcommand is a module with two functions: ``arguments(parser)`` declares its options, ``run(args)`` returns
-the exit status; an entry in COMMANDS registers it.
+the exit status; an entry in COMMANDS registers it.  Only the module of the chosen subcommand is imported.
 """
 
 from __future__ import annotations
 
 import argparse
-import os
 import sys
-from collections.abc import Callable
+from importlib import import_module
 from typing import NamedTuple, NoReturn
 
-from fluxproof import dump_capture, print_registers
-from fluxproof.commission import command as commission
-from fluxproof.diagnosis import command as diagnose
-from fluxproof.diagnosis.ground.recording import RecordingError
-from fluxproof.fleet import command as fleet
-from fluxproof.project import command as project
-from fluxproof.quote import printable, say
-from fluxproof.simulate import command as simulate
-from golden_model.drive_keys import DriveError
+from fluxproof.guard import guarded
+from fluxproof.quote import printable
 
 
 class Command(NamedTuple):
-    """One subcommand: a line of help, its options, its function."""
+    """One subcommand: its module, a line of help."""
 
+    module: str
     help: str
-    arguments: Callable[[argparse.ArgumentParser], None]
-    run: Callable[[argparse.Namespace], int]
 
 
 COMMANDS = {
     "commission": Command(
-        "measure what a drive file cannot know, over the registers of a board",
-        commission.arguments,
-        commission.run_command,
+        "fluxproof.commission.command", "measure what a drive file cannot know, over the registers of a board"
     ),
-    "diagnose": Command("why a recording differs from its simulation", diagnose.arguments, diagnose.run),
-    "dump": Command(
-        "convert a captured telemetry stream to the input of diagnose", dump_capture.arguments, dump_capture.run
-    ),
+    "diagnose": Command("fluxproof.diagnosis.command", "why a recording differs from its simulation"),
+    "dump": Command("fluxproof.dump_capture", "convert a captured telemetry stream to the input of diagnose"),
     "fleet": Command(
-        "many recordings: which drives differ, what drifts, what is worth a look", fleet.arguments, fleet.run
+        "fluxproof.fleet.command", "many recordings: which drives differ, what drifts, what is worth a look"
     ),
-    "project": Command("the files of a Vivado project for a drive", project.arguments, project.run),
-    "registers": Command("the registers for a drive", print_registers.arguments, print_registers.run),
-    "simulate": Command(
-        "a drive in closed loop with the golden core: does it work", simulate.arguments, simulate.run_command
-    ),
+    "project": Command("fluxproof.project.command", "the files of a Vivado project for a drive"),
+    "registers": Command("fluxproof.print_registers", "the registers for a drive"),
+    "simulate": Command("fluxproof.simulate.command", "a drive in closed loop with the golden core: does it work"),
 }
 
 
@@ -60,34 +46,29 @@ class Parser(argparse.ArgumentParser):
         super().error(printable(message, sys.stderr.encoding))
 
 
-def parser() -> argparse.ArgumentParser:
-    """The command line with every subcommand."""
+def parser(chosen: str | None = None) -> argparse.ArgumentParser:
+    """The command line with every subcommand, and the options of the chosen one."""
     top = Parser(prog="fluxproof", description="Tools around the Fluxproof drive core.")
     commands = top.add_subparsers(metavar="command", required=True)
     for name, command in COMMANDS.items():
         sub = commands.add_parser(name, help=command.help, description=command.help)
-        command.arguments(sub)
-        sub.set_defaults(run=command.run)
+        if name == chosen:
+            module = import_module(command.module)
+            module.arguments(sub)
+            sub.set_defaults(run=module.run)
     return top
 
 
+def dispatch(argv: list[str]) -> int:
+    """Run a subcommand; its exit status.  The first argument is the subcommand, as there are no other options."""
+    args = parser(argv[0] if argv else None).parse_args(argv)
+    return args.run(args)
+
+
 def main(argv: list[str] | None = None) -> int:
-    """Run a subcommand; bad input and unreadable files give one line and status 2, never a traceback."""
-    args = parser().parse_args(argv)
-    try:
-        status = args.run(args)
-        sys.stdout.flush()
-        return status
-    except (DriveError, RecordingError) as error:
-        say(f"fluxproof: {error}", sys.stderr)
-    except BrokenPipeError:  # the reader, a pager or head, has closed the pipe
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
-    except OSError as error:
-        name = f"{error.filename}: " if error.filename else ""
-        say(f"fluxproof: {name}{error.strerror or error}", sys.stderr)
-    return 2
+    """``dispatch`` inside another program: bad input and any error give one line and a status, never a traceback."""
+    return guarded(lambda: dispatch(sys.argv[1:] if argv is None else argv))
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(guarded(lambda: dispatch(sys.argv[1:]), process=True))

@@ -11,7 +11,9 @@ import json
 from pathlib import Path
 
 from fluxproof.diagnosis.whole_drive import load_drive
+from fluxproof.files import refuse_overwriting
 from fluxproof.quote import say
+from fluxproof.stage import alone
 from golden_model import fluxproof
 from golden_model.board_registers import board_set
 from golden_model.drive_keys import DriveError
@@ -51,6 +53,8 @@ def run(args: argparse.Namespace) -> int:
     """Write the dump and print its contents; returns 0."""
     from fluxproof.diagnosis.replay.telemetry_stream import read_capture, write_piece  # takes a second to import
 
+    out = Path(args.out) if args.out else Path(args.capture).with_suffix(".fluxdump")
+    refuse_overwriting([out], [args.capture, args.drive, args.registers])
     drive = load_drive(args.drive)
     try:
         register_set = board_set(drive)
@@ -60,8 +64,8 @@ def run(args: argparse.Namespace) -> int:
         register_set = with_registers(register_set, Path(args.registers))
     capture = read_capture(args.capture)
     number = chosen(capture.pieces, args.piece, args.capture)
-    out = Path(args.out) if args.out else Path(args.capture).with_suffix(".fluxdump")
-    write_piece(out, capture.pieces[number], drive, register_set)
+    with alone(out) as file:
+        write_piece(file, capture.pieces[number], drive, register_set)
     print("\n".join(summary(capture, number)))
     say(f"wrote {out}")
     return 0

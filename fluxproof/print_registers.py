@@ -10,8 +10,9 @@ import json
 from pathlib import Path
 
 from fluxproof.diagnosis.whole_drive import load_drive
-from fluxproof.files import write_json
+from fluxproof.files import refuse_overwriting, write_json
 from fluxproof.quote import c_comment
+from fluxproof.stage import alone
 from golden_model.board_registers import board_generics, board_set, has_board
 from golden_model.drive import Drive
 from golden_model.drive_keys import DriveError
@@ -43,7 +44,9 @@ def run(args: argparse.Namespace) -> int:
     except DriveError as error:
         raise DriveError(f"{args.drive}: {error}") from None
     if args.json:
-        write_json(Path(args.json), as_json(drive, result))
+        refuse_overwriting([args.json], [args.drive])
+        with alone(Path(args.json)) as file:
+            write_json(file, as_json(drive, result))
     if args.format == "c":
         print("\n".join(c_lines(args.drive, drive, result)))
     elif args.format == "json":

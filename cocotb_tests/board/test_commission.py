@@ -114,7 +114,7 @@ def test_a_signal_leaves_the_gates_off(tmp_path, monkeypatch, number):
 
     bus.write = write
     monkeypatch.setattr(commissioning, "open_bus", lambda name, drive: bus)
-    assert command.main(["commission", str(DRIVE), "--out", str(tmp_path)]) == 1
+    assert command.main(["commission", str(DRIVE), "--out", str(tmp_path)]) == 130
     assert ("enable", 1) in written and bus.read("enable") == 0
     assert json.loads((tmp_path / "commission.json").read_text())["status"] == "stopped"
 

@@ -11,11 +11,16 @@ import sys
 import zipfile
 from pathlib import Path
 
+import numpy as np
+import pandas as pd
+import pyarrow.parquet as pq
 import pytest
 
 from cocotb_tests.support import diagnosed_drives as bench
 from fluxproof.checkout import DRIVES, ROOT
 from fluxproof.diagnosis.replay import telemetry
+from fluxproof.project import render
+from golden_model.fluxproof import Sample
 from golden_model.io import telemetry_words
 
 UV = Path(sys.executable).with_name("uv")
@@ -66,11 +71,16 @@ def environment(wheel, tmp_path_factory):
     return folder
 
 
-def run(environment, command: str, *arguments, cwd) -> str:
-    """Output of a program of the environment, started in ``cwd`` without this checkout on any path."""
+def started(environment, command: str, *arguments, cwd) -> subprocess.CompletedProcess:
+    """A program of the environment, started in ``cwd`` without this checkout on any path."""
     clean = {k: v for k, v in os.environ.items() if k not in ("PYTHONPATH", "VIRTUAL_ENV")}
     command = [environment / "bin" / command, *map(str, arguments)]
-    done = subprocess.run(command, cwd=cwd, env=clean, capture_output=True, text=True)
+    return subprocess.run(command, cwd=cwd, env=clean, capture_output=True, text=True, timeout=600)
+
+
+def run(environment, command: str, *arguments, cwd) -> str:
+    """Output of such a program, which must end well."""
+    done = started(environment, command, *arguments, cwd=cwd)
     assert done.returncode == 0, done.stderr
     return done.stdout
 
@@ -97,6 +107,53 @@ def test_environment_has_nothing_of_tests_and_studies(environment):
 @pytest.mark.slow
 def test_registers(environment, tmp_path):
     assert "kp_q" in run(environment, "fluxproof", "registers", PAPER, cwd=tmp_path)
+    assert "fluxproof_settings" in run(environment, "fluxproof", "registers", PAPER, "--format", "c", cwd=tmp_path)
+    run(environment, "fluxproof", "registers", PAPER, "--json", tmp_path / "r.json", cwd=tmp_path)
+    assert "kp_q" in json.loads((tmp_path / "r.json").read_text())["registers"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("command", "names"),
+    [
+        (("simulate", PAPER), {"report.html", "simulation.json"}),
+        (("commission", DRIVES / "spindle_400v.toml"), {"drive.toml", "commission.json"}),
+        (("project", PAPER, "--part", "xc7z020clg484-1"), set(render.NAMES)),
+    ],
+)
+def test_commands_that_write_a_folder(environment, tmp_path, command, names):
+    run(environment, "fluxproof", *command, "--out", tmp_path / "out", cwd=tmp_path)
+    assert {path.name for path in (tmp_path / "out").iterdir()} == names
+
+
+@pytest.mark.slow
+def test_dump(environment, tmp_path):
+    """A stream as a DMA stores it becomes a dump."""
+    samples, observed = bench.dumped(bench.GRID[:18], {})
+    fields = [dict(zip(Sample._fields, row, strict=True)) for row in samples[:200]]
+    seen = [{name: observed[name][k] for name in telemetry_words.PACKET} for k in range(200)]
+    words = [telemetry_words.pack(k, fields[k] | seen[k]) for k in range(200)]
+    (tmp_path / "capture.bin").write_bytes(np.array(words, "<u4").tobytes())
+    said = run(environment, "fluxproof", "dump", "capture.bin", "--drive", PAPER, cwd=tmp_path)
+    assert "200 samples" in said and telemetry.is_dump(tmp_path / "capture.fluxdump")
+
+
+@pytest.mark.slow
+def test_fleet(environment, tmp_path):
+    """Without dask one line says what to install; with it two workers make a row for each recording."""
+    table = pd.DataFrame({name: values[:900] for name, values in bench.columns(bench.GRID[:4]).items()})
+    for name in ("a.csv", "b.csv"):
+        table.assign(i_a=table["i_a"] + 0.01 * (name == "b.csv")).to_csv(tmp_path / name, index=False)
+    command = ["fleet", "a.csv", "b.csv", "--drive", PAPER, "--out", "out", "--workers", "2", "--quiet"]
+    refused = started(environment, "fluxproof", *command, cwd=tmp_path)
+    assert refused.returncode == 2 and "pip install 'fluxproof[fleet]'" in refused.stderr
+    assert refused.stderr.count("\n") == 1
+    locked = ("--require-hashes", "--constraints", "requirements.lock", "--requirements", "requirements/fleet.txt")
+    uv("pip", "install", "--quiet", "--python", environment / "bin" / "python", *locked)
+    run(environment, "fluxproof", *command, cwd=tmp_path)
+    rows = pq.read_table(tmp_path / "out" / "fleet.parquet").to_pylist()
+    assert [row["status"] for row in rows] == ["done", "done"], [row["reason"] for row in rows]
+    assert (tmp_path / "out" / "fleet.html").exists()
 
 
 @pytest.mark.slow

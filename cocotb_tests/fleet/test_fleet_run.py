@@ -48,7 +48,7 @@ def stopped(manifest: Path, out: Path) -> int:
     command += ["--drive", str(manifest.parent / "drive.toml")]
     done = subprocess.Popen(
         [*command, "--out", str(out), "--workers", "2", "--quiet"], cwd=ROOT, env=ENVIRONMENT, start_new_session=True,
-        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
     deadline = time.monotonic() + 180
     while len(rows_of(out)) < 2 and done.poll() is None and time.monotonic() < deadline:
@@ -56,7 +56,9 @@ def stopped(manifest: Path, out: Path) -> int:
     children = psutil.Process(done.pid).children(recursive=True) if done.poll() is None else []
     with contextlib.suppress(ProcessLookupError):
         os.killpg(done.pid, signal.SIGINT)
-    status = done.wait(60)
+    _, said = done.communicate(timeout=60)
+    assert said == "fluxproof: stopped; the same command goes on from here\n"  # the workers are silent
+    status = done.returncode
     psutil.wait_procs(children, 20)
     assert not [c for c in children if c.is_running() and c.status() != psutil.STATUS_ZOMBIE]
     return status

@@ -1,23 +1,28 @@
 """The subcommand ``fluxproof commission drive.toml [--bus sim|/dev/uioN] [--out DIR]``: drive.toml and commission.json.
 
-Exit status: 0 accepted, 1 refused or stopped, with the reason in one line on stderr, 2 bad input.  The gates are off at
-the end, Ctrl-C and SIGTERM included.
+Exit status: 0 accepted, 1 refused, 130 stopped by a signal, with the reason in one line on stderr, 2 bad input.  The
+gates are off at the end, Ctrl-C and SIGTERM included.
 """
 
 from __future__ import annotations
 
 import argparse
+import shutil
 import signal
 import sys
 from dataclasses import replace
 from pathlib import Path
 
 from fluxproof.diagnosis.whole_drive import load_drive
-from fluxproof.files import write_json, write_text
+from fluxproof.files import refuse_overwriting, write_json, write_text
 from fluxproof.quote import say
+from fluxproof.stage import SIGNALS, together
 from golden_model.drive import load
 from golden_model.drive_file import read_tables, read_text
 from golden_model.drive_keys import DriveError
+
+DATA, DRIVE, EARLIER = "commission.json", "drive.toml", "drive_earlier.toml"
+STOPPED = 130
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -32,7 +37,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", metavar="DIR", help="folder of the results; default build/commission/NAME")
 
 
-def run_command(args: argparse.Namespace) -> int:
+def run(args: argparse.Namespace) -> int:
     """Measure, write both files, say each step."""
     drive = load_drive(args.drive)
     if drive.machine.magnet_flux_wb <= 0.0:
@@ -40,8 +45,7 @@ def run_command(args: argparse.Namespace) -> int:
     given = read_tables(args.drive).get("sensors", {})
     reverse = given.get("position_reverse")
     folder = Path(args.out) if args.out else Path("build") / "commission" / Path(args.drive).stem
-    if (folder / "drive.toml").resolve() == Path(args.drive).resolve():
-        raise DriveError(f"{args.drive}: --out {folder} would replace the input; give another folder")
+    refuse_overwriting([folder / name for name in (DATA, DRIVE, EARLIER)], [args.drive])
     _say("loading")
     bus = open_bus(args.bus, drive)
     return commission_file(bus, args.drive, drive, reverse, folder)
@@ -73,12 +77,16 @@ def commission_file(bus, path: str, drive, reverse: bool | None, folder: Path) -
         _clear()
         say(f"{step.name}: {step.said}")
 
-    def ended(status: str, reason: str) -> None:
+    def ended(status: str, reason: str, found=None) -> None:
         _clear()
-        data = document.data(Path(path).name, status, reason, steps, bus.now() - began)
-        write_json(folder / "commission.json", data)
+        with together(folder, (DATA, DRIVE)) as stage:
+            write_json(stage / DATA, document.data(Path(path).name, status, reason, steps, bus.now() - began))
+            if found is not None:
+                load(write_text(stage / DRIVE, document.document(text, found, steps)))  # it can be read
+            elif (folder / DRIVE).exists():  # measured values are not lost, but do not stand beside a refusal
+                shutil.copyfile(folder / DRIVE, stage / EARLIER)
 
-    before = {number: signal.signal(number, _stop) for number in (signal.SIGTERM, signal.SIGHUP)}
+    before = _stop_once()
     try:
         found, _ = commission(bus, drive, reverse, _say, done)
     except Refusal as refusal:
@@ -86,21 +94,33 @@ def commission_file(bus, path: str, drive, reverse: bool | None, folder: Path) -
         say(f"fluxproof: {path}: refused: {refusal}", sys.stderr)
         return 1
     except KeyboardInterrupt:
+        bus.write("enable", 0)  # once more: the signal may have come while `commission` did it
         ended("stopped", "stopped by the user")
         say(f"fluxproof: {path}: stopped, gates off", sys.stderr)
-        return 1
+        return STOPPED
     finally:
         for number, handler in before.items():
-            signal.signal(number, handler)
-    ended("accepted", "")
-    written = write_text(folder / "drive.toml", document.document(text, found, steps))
-    load(written)  # what was written can be read
-    say(f"accepted: {written}, {folder / 'commission.json'} ({bus.now() - began:.1f} s of the drive)")
+            signal.signal(number, handler or signal.SIG_DFL)
+    ended("accepted", "", found)
+    say(f"accepted: {folder / DRIVE}, {folder / DATA} ({bus.now() - began:.1f} s of the drive)")
     return 0
 
 
-def _stop(_number, _frame) -> None:
-    raise KeyboardInterrupt
+def _stop_once() -> dict:
+    """Ctrl-C, SIGTERM and SIGHUP raise KeyboardInterrupt, the first one only: nothing interrupts what follows.
+
+    Returns the handlers so far; what was ignored, such as SIGHUP by nohup, stays so.
+    """
+    before = {number: handler for number in SIGNALS if (handler := signal.getsignal(number)) is not signal.SIG_IGN}
+
+    def stop(_number, _frame) -> None:
+        for number in before:
+            signal.signal(number, signal.SIG_IGN)
+        raise KeyboardInterrupt
+
+    for number in before:
+        signal.signal(number, stop)
+    return before
 
 
 def _say(text: str) -> None:

@@ -15,7 +15,6 @@ from pathlib import Path
 from fluxproof.quote import printable, say
 
 FOLDER = Path("build") / "diagnosis"
-FILES = ("report.html", "diagnosis.json", "drive_improved.toml", "flux_map.csv")
 MOST_PROBLEMS = 5
 
 
@@ -86,6 +85,7 @@ def answer_lines(answer, nominal, out: Path) -> list[str]:
     """Headline, advice, effects, ambiguities, next recordings, misfit, findings and the files, as lines of text."""
     from fluxproof.diagnosis.answer.doubts import IMPLAUSIBLE
     from fluxproof.diagnosis.ground.quantities import measured
+    from fluxproof.diagnosis.ground.result import FILES
 
     lines = [answer.sentence, *([answer.advice] if answer.advice else [])]
     if answer.effects:
@@ -111,7 +111,7 @@ def answer_lines(answer, nominal, out: Path) -> list[str]:
     if answer.digital.checked and answer.digital.first_difference is None:
         lines.append(f"controller: {answer.digital.samples} samples equal to the golden model in every bit")
     lines += _problem_lines(answer.problems)
-    # session.run removes what an earlier run left, so that a file that is there was written by this one.
+    # All files of FILES are those of this run, those of an earlier one are removed with it.
     return [*lines, "", *(f"wrote {out / name}" for name in FILES if (out / name).exists())]
 
 

@@ -10,6 +10,8 @@
 2. The physics (physics.py).
 3. OUT/drive_improved.toml with the asserted values, and closed-loop simulations of both drives over the recording.
 4. OUT/diagnosis.json and OUT/report.html.
+
+All files enter OUT together at the end (fluxproof/stage.py).
 """
 
 from __future__ import annotations
@@ -30,7 +32,7 @@ from fluxproof.diagnosis.conventions.apply import read_drive, read_recording
 from fluxproof.diagnosis.fleet.prior import among, load_prior
 from fluxproof.diagnosis.ground.nominal import Nominal, load_nominal
 from fluxproof.diagnosis.ground.recording import Problem, Recording, RecordingError
-from fluxproof.diagnosis.ground.result import Diagnosis, Digital
+from fluxproof.diagnosis.ground.result import FILES, Diagnosis, Digital
 from fluxproof.diagnosis.inference.posterior import Posterior
 from fluxproof.diagnosis.interpret.tell import restate
 from fluxproof.diagnosis.loading.load import load_recording
@@ -38,6 +40,8 @@ from fluxproof.diagnosis.overlay.compare import closed_loop
 from fluxproof.diagnosis.physics import explain, known_effects
 from fluxproof.diagnosis.replay.digital import replay
 from fluxproof.diagnosis.report import write_outputs
+from fluxproof.files import refuse_overwriting
+from fluxproof.stage import together
 from golden_model.drive_keys import DriveError
 
 IMPROVED, ANSWER = "drive_improved.toml", "diagnosis.json"
@@ -65,27 +69,35 @@ def run(recordings, drive, out, progress=lambda text: None, prior=None) -> Diagn
     """``diagnose`` and write the output files to the folder ``out``; raises OSError if it cannot be written."""
     nominal = drive if isinstance(drive, Nominal) else load_nominal(drive)
     with threadpool_limits(1):
+        _keep_inputs(Path(out), nominal, [*_listed(recordings), prior])
         loaded = _loaded(recordings, nominal, progress)
-        out = _folder(Path(out), nominal)
-        answer = _diagnose(loaded, nominal, progress, prior)
-        improved = _improved(nominal, answer, out, loaded[0])
-        if write_flux_map(answer, out):
-            answer.notes.append(FLUX_MAP_NOTE)
-        laid_over = None
-        if answer.verdict not in ("bad_recording", "digital_mismatch"):
-            progress("the closed loop over the recording")
-            read = read_recording(loaded[0], answer.readings), read_drive(nominal, answer.readings)
-            laid_over = _overlay(*read, improved, answer)
-        progress("writing the report")
-        write_outputs(answer, out, nominal, laid_over)
+        with together(out, FILES) as stage:
+            answer = _diagnose(loaded, nominal, progress, prior)
+            _write(answer, loaded[0], nominal, stage, Path(out), progress)
     return answer
 
 
+def _write(answer, recording, nominal, stage, out, progress) -> None:
+    """All files of the answer into ``stage``, from where they enter ``out``."""
+    improved = _improved(nominal, answer, stage, recording)
+    if write_flux_map(answer, stage):
+        answer.notes.append(FLUX_MAP_NOTE)
+    laid_over = None
+    if answer.verdict not in ("bad_recording", "digital_mismatch"):
+        progress("the closed loop over the recording")
+        read = read_recording(recording, answer.readings), read_drive(nominal, answer.readings)
+        laid_over = _overlay(*read, improved and (improved, out / IMPROVED), answer)
+    progress("writing the report")
+    write_outputs(answer, stage, nominal, laid_over)
+
+
+def _listed(recordings) -> list:
+    return [recordings] if isinstance(recordings, (str, os.PathLike, Recording)) else list(recordings)
+
+
 def _loaded(recordings, nominal, progress) -> list[Recording]:
-    if isinstance(recordings, (str, os.PathLike, Recording)):
-        recordings = [recordings]
     loaded, refused = [], []
-    for item in recordings:
+    for item in _listed(recordings):
         if not isinstance(item, Recording):
             progress(f"reading {item}")
             try:
@@ -134,23 +146,18 @@ def _diagnose(loaded, nominal, progress, fleet=None) -> Diagnosis:
     return answer
 
 
-def _folder(out: Path, nominal: Nominal) -> Path:
-    """Create the folder before the long computation; DriveError if the results would overwrite a file of the user."""
-    out.mkdir(parents=True, exist_ok=True)
-    target, chart = out / IMPROVED, out / FLUX_MAP
-    if _same(target, nominal.path):
-        raise DriveError(f"{target}: this is the drive to diagnose and would be overwritten; choose another folder")
+def _keep_inputs(out: Path, nominal: Nominal, read: list) -> None:
+    """Before the long computation: FileExistsError or DriveError if results would overwrite a file of the user.
+
+    read: recordings, by path or as objects, and the fleet; None for none.
+    """
     used = nominal.plant.get("machine", {}).get("flux_map")
-    if isinstance(used, str) and _same(chart, Path(nominal.path or "").parent / used):
-        raise DriveError(f"{chart}: this is the flux map of the drive and would be overwritten; choose another folder")
+    flux_map = Path(nominal.path or "").parent / used if isinstance(used, str) else None
+    files = [item for item in read if not isinstance(item, Recording)]
+    refuse_overwriting([out / name for name in FILES], [nominal.path, flux_map, *files])
+    chart = out / FLUX_MAP
     if chart.exists() and not (out / ANSWER).exists():
         raise DriveError(f"{chart}: no diagnosis wrote this, and it would be overwritten; choose another folder")
-    return out
-
-
-def _same(target: Path, source) -> bool:
-    """Whether both are one existing file; source: a path or None."""
-    return bool(source) and target.exists() and Path(source).exists() and target.samefile(source)
 
 
 def _prior_note(answer) -> str:
@@ -229,24 +236,32 @@ def _reading_notes(loaded) -> list[str]:
     return list(dict.fromkeys(notes))
 
 
-def _improved(nominal, answer, out, recording) -> Path | None:
-    """Write the improved drive if anything was found; otherwise remove the file of an earlier run."""
-    path = out / IMPROVED
+def _improved(nominal, answer, stage, recording) -> Path | None:
+    """Write the improved drive if anything was found."""
     if not answer.effects and not answer.readings:
-        path.unlink(missing_ok=True)
         return None
     try:
-        return write_improved(nominal, answer.effects, path, answer.readings, recording)
+        return write_improved(nominal, answer.effects, stage / IMPROVED, answer.readings, recording)
     except (DriveError, ValueError) as error:
-        path.unlink(missing_ok=True)
         answer.notes.append(f"No {IMPROVED}: {error}.")
         return None
 
 
-def _overlay(recording, nominal, improved, answer) -> dict | None:
-    """The closed-loop simulation of the first recording; a drive that cannot be simulated only adds a note."""
+def _named(file: Path, name: Path) -> Nominal:
+    """The drive of a file that will have another name: files that it refers to are beside that."""
     try:
-        laid_over = closed_loop(recording, nominal, improved)
+        return replace(load_nominal(file), path=str(name))
+    except DriveError as error:
+        raise DriveError(str(error).replace(str(file), str(name))) from None
+
+
+def _overlay(recording, nominal, improved, answer) -> dict | None:
+    """The closed-loop simulation of the first recording; a drive that cannot be simulated only adds a note.
+
+    improved: (the improved drive's file, its name when all is written), or None.
+    """
+    try:
+        laid_over = closed_loop(recording, nominal, _named(*improved) if improved else None)
     except (ArithmeticError, IndexError, KeyError, TypeError, ValueError) as error:  # RecordingError, DriveError too
         answer.notes.append(f"The closed loop was not simulated: {error}.")
         return None

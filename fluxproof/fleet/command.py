@@ -49,14 +49,18 @@ def run(args: argparse.Namespace) -> int:
         if error.name not in ("dask", "distributed", "fsspec"):
             raise
         raise RecordingError(f"{error.name} is not installed: pip install 'fluxproof[fleet]'") from None
+    from fluxproof.files import refuse_overwriting
     from fluxproof.fleet.manifest import entries
+    from fluxproof.fleet.page import PAGE
     from fluxproof.fleet.reports import make, serve
+    from fluxproof.fleet.table import FLEET
 
     if args.workers is not None and args.workers < 1:
         raise RecordingError(f"--workers {args.workers}: expected 1 or more")
     if not 0 < args.timeout < math.inf:
         raise RecordingError(f"--timeout {args.timeout:g}: expected seconds, more than 0")
     limits, listed, out = _limits(args.limit), entries(args.recordings, args.drive, args.allow), Path(args.out)
+    refuse_overwriting([out / FLEET, out / PAGE], args.recordings)  # a manifest; recordings and drives: the session
 
     def engine():
         return Engine(args.workers, args.scheduler, args.timeout)

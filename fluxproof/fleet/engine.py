@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import contextlib
 import itertools
+import signal
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator
 
 import dask
 from distributed import CancelledError, Client, KilledWorker, LocalCluster, as_completed
+from distributed.utils import LoopRunner
 
 from fluxproof.fleet.watch import Watch
 
@@ -57,13 +59,15 @@ class Engine:
 
     def __init__(self, workers: int | None = None, scheduler: str | None = None, limit_s: float | None = None):
         self.workers, self.scheduler, self.limit_s = workers, scheduler, limit_s
-        self.cluster = self.client = None
+        self.cluster = self.client = self.runner = None
 
     def __enter__(self) -> Engine:
-        self.settings = dask.config.set(SETTINGS)
+        self.settings, self.main = dask.config.set(SETTINGS), _Main()
         try:
             if self.scheduler is None:
+                self.runner = _deaf_loop()
                 self.cluster = LocalCluster(
+                    loop=self.runner.loop,
                     n_workers=self.workers, threads_per_worker=1, processes=True, memory_limit=0,
                     dashboard_address="127.0.0.1:0", silence_logs=50,
                 )  # fmt: skip
@@ -81,6 +85,9 @@ class Engine:
         for part in (self.client, self.cluster):
             if part is not None:
                 part.close()
+        if self.runner is not None:
+            self.runner.stop()
+        self.main.restore()
         self.settings.__exit__(None, None, None)
 
     @property
@@ -133,6 +140,37 @@ class Engine:
                 future.release()
                 more(1)
                 yield item, result
+
+
+def _deaf_loop() -> LoopRunner:
+    """A running event loop whose thread, and with it the processes that it starts, does not get Ctrl-C.
+
+    A terminal sends Ctrl-C to the workers too, which would print tracebacks; this process ends them.
+    """
+    runner = LoopRunner()
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # a thread and a process inherit it
+    try:
+        runner.start()
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+    return runner
+
+
+class _Main:
+    """The script of this process, unknown to its workers until ``restore``.
+
+    A worker process imports the script that started it, and one without ``if __name__ == "__main__"`` would start the
+    command anew in each.  What a worker runs is in modules.
+    """
+
+    def __init__(self):
+        module = sys.modules["__main__"]
+        self.names = vars(module)
+        self.file = self.names.pop("__file__", None) if self.names.get("__spec__") is None else None
+
+    def restore(self) -> None:
+        if self.file is not None:
+            self.names["__file__"] = self.file
 
 
 def in_parallel(function: Callable, items: list, workers: int | None, what: str) -> Iterator[tuple]:

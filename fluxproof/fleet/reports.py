@@ -50,7 +50,7 @@ def server(entries: list[Entry], out: Path) -> ThreadingHTTPServer:
             if len(parts) == 3 and parts[0] == REPORTS and parts[2] == "report.html" and parts[1] in by_key:
                 try:
                     _made(by_key[parts[1]], parts[1], out)
-                except (OSError, ValueError) as error:  # RecordingError, DriveError too
+                except Exception as error:  # bad input, a full disk or a defect costs one report
                     self.send_error(500, explain=str(error))
                     return
             super().do_GET()
@@ -58,7 +58,12 @@ def server(entries: list[Entry], out: Path) -> ThreadingHTTPServer:
         def log_message(self, *_):
             pass
 
-    return ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Handler, directory=str(out)))
+    return _Server(("127.0.0.1", 0), functools.partial(Handler, directory=str(out)))
+
+
+class _Server(ThreadingHTTPServer):
+    def handle_error(self, *_):
+        """Nothing: a browser may go while a page is being sent."""
 
 
 def serve(entries: list[Entry], out: Path) -> None:

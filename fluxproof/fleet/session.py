@@ -8,11 +8,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fluxproof.diagnosis.fleet.findings import Findings, findings
+from fluxproof.files import refuse_overwriting
 from fluxproof.fleet.engine import Engine, Lost, Progress
 from fluxproof.fleet.manifest import Entry
-from fluxproof.fleet.page import write_page
-from fluxproof.fleet.table import Rows, joined, write_fleet
+from fluxproof.fleet.page import PAGE, write_page
+from fluxproof.fleet.table import FLEET, Rows, joined, write_fleet
 from fluxproof.fleet.work import Item, design, key_of, version, work
+from fluxproof.stage import together
 
 
 @dataclass(frozen=True)
@@ -36,12 +38,13 @@ def run(
     told: Callable[[Engine], None] = lambda engine: None,
     limit_s: float | None = None,
 ) -> Outcome:
-    """Diagnose what is not done yet and write OUT/fleet.parquet and OUT/fleet.html.
+    """Diagnose what is not done yet and write OUT/fleet.parquet and OUT/fleet.html, together.
 
     engine: makes the engine, which is started only if something is to be done; told: called with it once it runs;
     limit_s: the most that reading one recording for its key may take.
     Raises OSError if a row cannot be written: what was written stays, and the next run goes on from there.
     """
+    refuse_overwriting([out / FLEET, out / PAGE], [path for e in entries for path in (e.path, e.drive)])
     rows = Rows(out)
     keys, failures = keys_of(entries, limit_s)
     todo = {key: name for name, key in keys.items() if not rows.has(key)}
@@ -51,11 +54,12 @@ def run(
             told(running)
             failures |= _diagnose(running, items, rows, todo, quiet)
     table = joined(entries, keys, rows, _shared(failures, keys))
-    fleet = write_fleet(out, table)
-    found = findings(table, limits)
-    page = write_page(out, found)
+    with together(out, (FLEET, PAGE)) as stage:
+        write_fleet(stage, table)
+        found = findings(table, limits)
+        write_page(stage, found)
     failed = sum(row["status"] != "done" for row in table)
-    return Outcome(len(items), len(entries) - len(items), failed, found, fleet, page)
+    return Outcome(len(items), len(entries) - len(items), failed, found, out / FLEET, out / PAGE)
 
 
 def keys_of(entries, limit_s=None) -> tuple[dict[str, str], dict[str, str]]:

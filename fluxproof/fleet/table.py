@@ -5,7 +5,6 @@ The key is a hash of what a row follows from, so that a later run finds what is 
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import pyarrow as pa
@@ -13,6 +12,7 @@ import pyarrow.parquet as pq
 
 from fluxproof.diagnosis.fleet.row import failed_row
 from fluxproof.diagnosis.fleet.schema import schema
+from fluxproof.files import replacing
 from fluxproof.fleet.addresses import spelled
 
 ROWS, FLEET = "rows", "fleet.parquet"
@@ -23,7 +23,6 @@ class Rows:
 
     def __init__(self, out: Path):
         self.folder = Path(out) / ROWS
-        self.folder.mkdir(parents=True, exist_ok=True)
         for left in self.folder.glob(".*.tmp"):  # of a run that was stopped while writing
             left.unlink(missing_ok=True)
 
@@ -57,13 +56,8 @@ class Rows:
 
 def write_table(path: Path, table: pa.Table) -> None:
     """A Parquet file, written under a temporary name and renamed."""
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    try:
+    with replacing(path) as temporary:
         pq.write_table(table, temporary, compression="zstd")
-        os.replace(temporary, path)
-    except BaseException:
-        temporary.unlink(missing_ok=True)
-        raise
 
 
 def joined(entries, keys: dict[str, str], rows: Rows, failures: dict[str, str]) -> list[dict]:

@@ -8,9 +8,10 @@ from pathlib import Path
 
 from fluxproof.checkout import ROOT
 from fluxproof.diagnosis.whole_drive import load_drive
-from fluxproof.files import write_text
+from fluxproof.files import refuse_overwriting, write_text
 from fluxproof.project import parts, render
 from fluxproof.quote import say, shown
+from fluxproof.stage import together
 from golden_model.board_registers import board_set, has_board
 from golden_model.drive_keys import DriveError
 
@@ -44,8 +45,12 @@ def run(args: argparse.Namespace) -> int:
     base = address(args.base) if args.base else processor.base if processor else 0
     found = render.files(args.drive, drive, register_set, part, processor, base, core_folder(args.core))
     folder = Path(args.out)
-    for name, text in found.items():
-        say(str(write_text(folder / name, text)))
+    refuse_overwriting([folder / name for name in found], [args.drive])
+    with together(folder, render.NAMES) as stage:
+        for name, text in found.items():
+            write_text(stage / name, text)
+    for name in found:
+        say(str(folder / name))
     if processor is None:
         print(f"no device tree: {part} has no processor; the script builds the core alone")
     elif has_board(drive):

@@ -13,6 +13,7 @@ from golden_model.drive import Drive
 from golden_model.registers import RegisterSet
 
 BY = "by `fluxproof project`; change the drive file and run it again"
+NAMES = ("fluxproof_clock.xdc", "drive_pkg.vhd", "project.tcl", "drive_registers.h", "fluxproof.dtsi")
 WINDOW = 0x1000  # bytes of the registers' address range
 
 
@@ -143,12 +144,11 @@ def files(
 ) -> dict[str, str]:
     """{file name: text} of the whole project."""
     name = Path(path).name
-    made = {
-        "fluxproof_clock.xdc": clock_xdc(name, drive),
-        "drive_pkg.vhd": vhdl_package(name, drive, register_set),
-        "project.tcl": tcl(name, drive, register_set, part, base, core),
-        "drive_registers.h": c_header(path, drive, register_set),
-    }
-    if processor is not None:
-        made["fluxproof.dtsi"] = device_tree(name, drive, processor, base)
-    return made
+    texts = [
+        clock_xdc(name, drive),
+        vhdl_package(name, drive, register_set),
+        tcl(name, drive, register_set, part, base, core),
+        c_header(path, drive, register_set),
+        *([device_tree(name, drive, processor, base)] if processor is not None else []),
+    ]
+    return dict(zip(NAMES, texts, strict=False))

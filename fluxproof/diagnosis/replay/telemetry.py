@@ -19,7 +19,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import struct
 import zlib
 from importlib import metadata
@@ -29,6 +28,7 @@ import numpy as np
 
 from fluxproof.diagnosis.ground.recording import RecordingError
 from fluxproof.diagnosis.replay.telemetry_columns import columns_of
+from fluxproof.files import write_bytes
 from fluxproof.quote import shown
 from golden_model import fluxproof
 from golden_model.drive_checks import CARRIER_HALF_RANGE
@@ -82,11 +82,7 @@ def write_dump(path, drive, register_set, samples, observed, first_state=None, c
         rows[name] = observed[name]
     header = _header(drive, register_set, names, len(samples), first_state)
     text = json.dumps(header).encode()
-    path = Path(path)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
-    temporary.write_bytes(MAGIC + struct.pack("<I", len(text)) + text + rows.tobytes())
-    os.replace(temporary, path)
-    return path
+    return write_bytes(Path(path), MAGIC + struct.pack("<I", len(text)) + text + rows.tobytes())
 
 
 def read_dump(path) -> tuple[dict[str, np.ndarray], dict]:
