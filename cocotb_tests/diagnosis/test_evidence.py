@@ -9,6 +9,7 @@ from fluxproof.diagnosis.answer.scan import stray_swing
 from fluxproof.diagnosis.balance.blocks import view_of
 from fluxproof.diagnosis.ground.nominal import load_nominal
 from fluxproof.diagnosis.inference.evidence import evidence
+from fluxproof.diagnosis.inference.model import BalanceRows, Columns, Prior
 from fluxproof.diagnosis.inference.points import repeated_dwells
 from fluxproof.diagnosis.inference.problem import Problem
 from fluxproof.diagnosis.inference.setup import Setup
@@ -26,11 +27,11 @@ def value_of(y, doubt, x=None, curve=None, formula=0.01):
     columns = columns.reshape(len(y), -1)
     k = columns.shape[1]
     effects = min(k, 1)
-    return evidence(
-        columns, y, np.full(len(y), NOISE**2), np.full(len(y), 1e-4), doubt, np.zeros(len(y), np.int64), 1, -1, 0.0,
-        np.ones(k), np.zeros(k, np.int64), np.arange(k) == 0, np.full(effects, 100.0), np.full(effects, formula),
-        3.0, 1.0, 1.0, np.inf, 0.01,
-    )  # fmt: skip
+    level, group = np.full(len(y), 1e-4), np.zeros(len(y), np.int64)
+    rows = BalanceRows(y, np.full(len(y), NOISE**2), level, doubt, group, groups=1, loads=-1, load=0.0)
+    most, wrong = np.full(effects, 100.0), np.full(effects, formula)
+    effect = Columns(columns, np.ones(k), np.zeros(k, np.int64), np.arange(k) == 0, most, wrong)
+    return evidence(rows, effect, Prior(typical=3.0, least=1.0, straight=0.01, always=1.0), np.inf)
 
 
 def test_a_curve_that_is_not_needed_is_no_reason_against_its_effect():

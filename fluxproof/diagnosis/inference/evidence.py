@@ -1,211 +1,262 @@
-"""The marginal likelihood of a set of effects, with the sizes of the effects and of the discrepancy learnt.
+"""The marginal likelihood of a set of effects, with the sizes of the effects and of the discrepancy learnt (model.py).
 
-    y = X c + d + q + e,   e ~ N(0, s^2),   d ~ N(0, (lambda_g l)^2),   q ~ N(0, (mu_g w)^2),   c_k ~ N(0, (a_e p_k)^2)
-
-a_e is the size of effect e in units of its floor of practical interest, with a log-uniform prior from 1 to the size at
-which a drive no longer runs; p_k is the coefficient that makes column k as large as the floor (of a curve: the share of
-it by which the curve may depart from the formula at most).  Of the curve of an effect p_k is multiplied by b_e, with a
-log-uniform prior from ``straight`` to 1: a curve that is not needed is no reason against its effect.  lambda_g is the
-discrepancy of group g, with the prior 1 / (1 + (lambda / k)^2), and at least 1 where the error of the balance is known.
-w is the error that the curve of an effect may have at most, and mu_g <= 1 the share of it that is seen in group g: with
-all of it, a set would gain by a smaller effect with a smaller w.  All are found by expectation maximisation; the log
-evidence is exact for them.
+Expectation maximisation: coefficients at the present sizes, sizes at these coefficients, then the discrepancy of each
+group and the share of the curves' errors that its residual shows.
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numba
 import numpy as np
+
+from fluxproof.diagnosis.inference.model import BalanceRows, Columns, Found, Prior
 
 STEPS, SETTLED = 20, 0.03  # most steps; relative change of all sizes and lambda after which one step more is enough
 SMALL, LARGE = 1e-200, 1e200  # range of a product of variances, each of which lies within 1e-100 and 1e100
 FACTORS = np.array([0.1, 0.35, 0.7, 1.0, 1.4, 3.0, 10.0])  # of the discrepancy: the grid of every step
 SEEN = np.array([0.0, 0.03, 0.1, 0.2, 0.4, 0.7, 1.0])  # shares mu: the grid of every step
+FORMULA, CURVE = 0, 1  # kinds of columns
+
+jit = numba.njit(cache=True, error_model="numpy")  # no division here is by zero, which need not be checked in every row
 
 
-@numba.njit(cache=True, error_model="numpy")
-def _share_seen(mu, lam, s2, level2, doubt2, own, e2, group, loads):
-    """Choose the share mu (groups,) of the curves' errors that is seen in each group, at the discrepancy lam."""
-    score = np.zeros((len(mu), len(SEEN)))
-    for i in range(len(s2)):
-        g = group[i]
-        if g != loads and doubt2[i] > 0.0:
-            known = s2[i] + own[i] + lam[g] ** 2 * level2[i]
-            for h in range(len(SEEN)):
-                u = known + SEEN[h] ** 2 * doubt2[i]
-                score[g, h] -= 0.5 * (e2[i] / u + np.log(u))
-    for g in range(len(mu)):
-        mu[g] = SEEN[np.argmax(score[g])]
+class _State(NamedTuple):
+    """Arrays that a step changes in place."""
+
+    sizes: np.ndarray  # (effects,)
+    bend: np.ndarray  # (effects,)
+    lam: np.ndarray  # (groups,)
+    mu: np.ndarray  # (groups,)
+    c: np.ndarray  # (k,)
+    cov: np.ndarray  # (k, k)
+    own: np.ndarray  # (n,) variance of the formulas' errors
+    loaded: np.ndarray  # (n,) variance of the load in the row
+    squares: np.ndarray  # (n,) expected squares of the residual
+    error2: np.ndarray  # (n,) squares of the rows' errors, which do not change
+    curve2: np.ndarray  # (n,)
 
 
-@numba.njit(cache=True, error_model="numpy")  # no division here is by zero, which need not be checked in every row
-def evidence(
-    x, y, s2, level, doubt, group, groups, loads, load, prior, owner, core, most, formula, scale, least, always, start,
-    straight,
-):
-    """(log evidence, coefficients (k,), covariance (k, k), sizes (effects,), lambda and mu (groups,)).
+@jit
+def evidence(rows: BalanceRows, columns: Columns, prior: Prior, start: float) -> Found:
+    """The evidence of a set of effects and its most probable sizes.
 
-    x: (n, k) columns of the set; doubt: (n,) errors w of curves; prior: (k,) p_k; owner: (k,) effect of a column;
-    core: (k,) bool, a column of the formula and not of the free curve; most: (effects,) largest size.
-    loads, load: group whose rows may contain a load of the scale ``load`` each, -1: none.
     start: torque, in multiples of the smallest one, above which a row is first taken as loaded.
-    always: odds against a load at every operating point.
-    formula: (effects,) share of a contribution that counts as discrepancy; scale: prior of lambda; least: smallest
-    one; straight: smallest b_e.  Where a load hides the discrepancy, lambda stays at its scale.
+    Where a load hides the discrepancy, lambda stays at its scale.
     """
-    n, k = x.shape
-    effects = len(most)
-    a = np.sqrt(most)
-    bend = np.ones(effects)
-    lam = np.full(groups, scale)
-    mu = np.ones(groups)
-    c = np.zeros(k)
-    cov = np.zeros((k, k))
-    columns = np.ascontiguousarray(x.T)  # rows one after the other in memory, for every loop over them
-    v = np.zeros(n)
-    own = np.zeros(n)
-    loaded = np.zeros(n)
+    n, k = columns.x.shape
+    state = _State(
+        np.sqrt(columns.most), np.ones(len(columns.most)), np.full(rows.groups, prior.typical), np.ones(rows.groups),
+        np.zeros(k), np.zeros((k, k)), np.zeros(n), _first_loads(rows, start), np.zeros(n),
+        rows.error**2, rows.curve_error**2,
+    )  # fmt: skip
+    across = np.ascontiguousarray(columns.x.T)  # rows one after the other in memory, for every loop over them
     weighted = np.zeros((k, n))
-    level2 = level**2
-    doubt2 = doubt**2
-    doubtful = doubt2.max() > 0.0 if n else False
-    e2 = np.zeros(n)
-    part = np.zeros(n)
-    squares = np.zeros((groups, len(FACTORS)))
-    lightest = 1e300
-    last = STEPS - 1
-    for i in range(n):
-        if group[i] == loads:
-            lightest = min(lightest, abs(y[i]) + level[i])
-    for i in range(n):
-        if group[i] == loads and abs(y[i]) > start * lightest:
-            loaded[i] = load * load
-    value = 0.0
+    doubtful = state.curve2.max() > 0.0 if n else False
+    value, last = 0.0, STEPS - 1
     for step in range(STEPS):
-        power = 0.0
-        logdet = 0.0
-        product = 1.0  # a logarithm of many factors at once, before the product leaves the range of a float
-        for i in range(n):
-            g = group[i]
-            v[i] = s2[i] + lam[g] ** 2 * level2[i] + mu[g] ** 2 * doubt2[i] + own[i] + loaded[i]
-            power += y[i] * y[i] / v[i]
-            product *= v[i]
-            if not SMALL < product < LARGE:
-                logdet += np.log(product)
-                product = 1.0
-        logdet += np.log(product)
-        for p in range(k):
-            for i in range(n):
-                weighted[p, i] = columns[p, i] / v[i]
-        precision = np.dot(weighted, x)
-        right = np.dot(weighted, y)
-        before = 0.0
-        sd = np.zeros(k)
-        for p in range(k):
-            sd[p] = a[owner[p]] * prior[p] * (1.0 if core[p] else bend[owner[p]])
-        # in units of the prior's standard deviation
-        m = np.zeros((k, k))
-        b = np.zeros(k)
-        for p in range(k):
-            b[p] = right[p] * sd[p]
-            for q in range(k):
-                m[p, q] = precision[p, q] * sd[p] * sd[q]
-            m[p, p] += 1.0
-        gain = 0.0
-        if k:
-            factor = np.linalg.cholesky(m)
-            for p in range(k):
-                before += 2.0 * np.log(factor[p, p])
-            inverse = np.linalg.inv(m)
-            z = inverse @ b
-            for p in range(k):
-                gain += z[p] * b[p]
-                c[p] = z[p] * sd[p]
-                for q in range(k):
-                    cov[p, q] = inverse[p, q] * sd[p] * sd[q]
-        value = -0.5 * (power - gain + before + logdet)
-        for g in range(groups):
-            value -= np.log(1.0 + (lam[g] / scale) ** 2)
+        value = _coefficients(rows, columns, prior, across, weighted, state)
         if step == last:
             break
-        moved = 0.0
-        # sizes of the effects, and of their curves relative to them
-        sums = np.zeros((effects, 2))
-        counts = np.zeros((effects, 2))
-        for p in range(k):
-            kind = 0 if core[p] else 1
-            sums[owner[p], kind] += (c[p] ** 2 + cov[p, p]) / prior[p] ** 2
-            counts[owner[p], kind] += 1.0
-        for e in range(effects):
-            if counts[e, 0] > 0:
-                size = min(max(np.sqrt(sums[e, 0] / counts[e, 0]), 1.0), most[e])
-                moved = max(moved, abs(size / a[e] - 1.0))
-                a[e] = size
-            if counts[e, 1] > 0:
-                bend[e] = min(max(np.sqrt(sums[e, 1] / counts[e, 1]) / a[e], straight), 1.0)
-        # expected squares of the remainder, and the share of each effect's contribution
-        spread = np.dot(cov, columns)
-        for i in range(n):
-            e2[i] = y[i]
-            own[i] = 0.0
-        for e in range(effects):
-            for i in range(n):
-                part[i] = 0.0
-            for p in range(k):
-                if owner[p] == e:
-                    for i in range(n):
-                        part[i] += columns[p, i] * c[p]
-            for i in range(n):
-                e2[i] -= part[i]
-                own[i] += (formula[e] * part[i]) ** 2
-        for i in range(n):
-            e2[i] *= e2[i]
-        for p in range(k):
-            for i in range(n):
-                e2[i] += spread[p, i] * columns[p, i]
-        # discrepancy: the log density at several lambda; a row with a load is left out
-        score = np.zeros((groups, len(FACTORS)))
-        products = np.ones((groups, len(FACTORS)))
-        for g in range(groups):
-            for h in range(len(FACTORS)):
-                squares[g, h] = max(lam[g] * FACTORS[h], least) ** 2
-        for i in range(n):
-            g = group[i]
-            known = s2[i] + own[i] + mu[g] ** 2 * doubt2[i]
-            if g == loads:
-                u = known + scale**2 * level2[i]
-                with_load = u + load * load
-                loaded[i] = load * load if e2[i] / with_load + np.log(with_load) < e2[i] / u + np.log(u) else 0.0
-                continue
-            for h in range(len(FACTORS)):
-                u = known + squares[g, h] * level2[i]
-                score[g, h] -= 0.5 * e2[i] / u
-                products[g, h] *= u
-            if products[g, 0] < SMALL or products[g, -1] > LARGE:
-                for h in range(len(FACTORS)):
-                    score[g, h] -= 0.5 * np.log(products[g, h])
-                    products[g, h] = 1.0
-        for g in range(groups):
-            best, chosen = -1e300, lam[g]
-            for h in range(len(FACTORS)):
-                tried = max(lam[g] * FACTORS[h], least)
-                total = score[g, h] - 0.5 * np.log(products[g, h]) - np.log(1.0 + (tried / scale) ** 2)
-                if total > best:
-                    best, chosen = total, tried
-            if g != loads:
-                moved = max(moved, abs(chosen / lam[g] - 1.0) if lam[g] > 0.0 else chosen)
-            lam[g] = chosen if g != loads else scale
+        moved = _sizes(columns, prior, state)
+        _residual(rows, columns, across, state)
+        moved = max(moved, _discrepancy(rows, prior, state))
         if doubtful:
-            _share_seen(mu, lam, s2, level2, doubt2, own, e2, group, loads)
+            _share_seen(rows, state)
         if moved < SETTLED:
             last = step + 1
-    if loads >= 0:  # a drive is run without load at one of its operating points at least
-        free = 0
-        rows = 0
+    value -= _log_never_free(rows, prior, state)
+    return Found(value, state.c, state.cov, state.sizes, state.lam, state.mu)
+
+
+@jit
+def _first_loads(rows, start):
+    """(n,) variance of the load in the rows whose torque is above ``start`` times the smallest one."""
+    loaded = np.zeros(len(rows.y))
+    lightest = 1e300
+    for i in range(len(rows.y)):
+        if rows.group[i] == rows.loads:
+            lightest = min(lightest, abs(rows.y[i]) + rows.error[i])
+    for i in range(len(rows.y)):
+        if rows.group[i] == rows.loads and abs(rows.y[i]) > start * lightest:
+            loaded[i] = rows.load * rows.load
+    return loaded
+
+
+@jit
+def _coefficients(rows, columns, prior, across, weighted, state):
+    """Coefficients and their covariance at the sizes of ``state``; the log evidence.
+
+    log p(y) = -1/2 (y' V^-1 y - gain + log|V| + log|M|), M the posterior precision in units of the prior's deviation.
+    """
+    n, k = columns.x.shape
+    v = np.zeros(n)
+    power, logdet = 0.0, 0.0
+    product = 1.0  # a logarithm of many factors at once, before the product leaves the range of a float
+    for i in range(n):
+        g = rows.group[i]
+        v[i] = rows.variance[i] + state.lam[g] ** 2 * state.error2[i] + state.mu[g] ** 2 * state.curve2[i]
+        v[i] += state.own[i]
+        v[i] += state.loaded[i]
+        power += rows.y[i] * rows.y[i] / v[i]
+        product *= v[i]
+        if not SMALL < product < LARGE:
+            logdet += np.log(product)
+            product = 1.0
+    logdet += np.log(product)
+    for p in range(k):
         for i in range(n):
-            if group[i] == loads:
-                rows += 1
-                free += loaded[i] == 0.0
-        if rows and not free:
-            value -= np.log(always)
-    return value, c, cov, a, lam, mu
+            weighted[p, i] = across[p, i] / v[i]
+    precision = np.dot(weighted, columns.x)
+    right = np.dot(weighted, rows.y)
+    deviation = np.zeros(k)
+    for p in range(k):
+        e = columns.owner[p]
+        deviation[p] = state.sizes[e] * columns.scale[p] * (1.0 if columns.core[p] else state.bend[e])
+    m = np.zeros((k, k))
+    b = np.zeros(k)
+    for p in range(k):
+        b[p] = right[p] * deviation[p]
+        for q in range(k):
+            m[p, q] = precision[p, q] * deviation[p] * deviation[q]
+        m[p, p] += 1.0
+    gain, log_m = 0.0, 0.0
+    if k:
+        factor = np.linalg.cholesky(m)
+        for p in range(k):
+            log_m += 2.0 * np.log(factor[p, p])
+        inverse = np.linalg.inv(m)
+        z = inverse @ b
+        for p in range(k):
+            gain += z[p] * b[p]
+            state.c[p] = z[p] * deviation[p]
+            for q in range(k):
+                state.cov[p, q] = inverse[p, q] * deviation[p] * deviation[q]
+    value = -0.5 * (power - gain + log_m + logdet)
+    for g in range(rows.groups):
+        value -= np.log(1.0 + (state.lam[g] / prior.typical) ** 2)
+    return value
+
+
+@jit
+def _sizes(columns, prior, state):
+    """Sizes of the effects, and of their curves relative to them; the largest relative change of a size."""
+    moved = 0.0
+    sums = np.zeros((len(columns.most), 2))
+    counts = np.zeros((len(columns.most), 2))
+    for p in range(len(state.c)):
+        kind = FORMULA if columns.core[p] else CURVE
+        sums[columns.owner[p], kind] += (state.c[p] ** 2 + state.cov[p, p]) / columns.scale[p] ** 2
+        counts[columns.owner[p], kind] += 1.0
+    for e in range(len(columns.most)):
+        if counts[e, FORMULA] > 0:
+            size = min(max(np.sqrt(sums[e, FORMULA] / counts[e, FORMULA]), 1.0), columns.most[e])
+            moved = max(moved, abs(size / state.sizes[e] - 1.0))
+            state.sizes[e] = size
+        if counts[e, CURVE] > 0:
+            bend = np.sqrt(sums[e, CURVE] / counts[e, CURVE]) / state.sizes[e]
+            state.bend[e] = min(max(bend, prior.straight), 1.0)
+    return moved
+
+
+@jit
+def _residual(rows, columns, across, state):
+    """Expected squares of the residual, and the variance of the formulas' errors in it."""
+    n, k = columns.x.shape
+    spread = np.dot(state.cov, across)
+    part = np.zeros(n)
+    squares, own = state.squares, state.own
+    for i in range(n):
+        squares[i] = rows.y[i]
+        own[i] = 0.0
+    for e in range(len(columns.most)):
+        for i in range(n):
+            part[i] = 0.0
+        for p in range(k):
+            if columns.owner[p] == e:
+                for i in range(n):
+                    part[i] += across[p, i] * state.c[p]
+        for i in range(n):
+            squares[i] -= part[i]
+            own[i] += (columns.formula[e] * part[i]) ** 2
+    for i in range(n):
+        squares[i] *= squares[i]
+    for p in range(k):
+        for i in range(n):
+            squares[i] += spread[p, i] * across[p, i]
+
+
+@jit
+def _discrepancy(rows, prior, state):
+    """Choose lambda of each group by the log density at several values; the largest relative change.
+
+    BalanceRows with a load do not count: whether a row has one is chosen here too.
+    """
+    groups, lam = rows.groups, state.lam
+    score = np.zeros((groups, len(FACTORS)))
+    products = np.ones((groups, len(FACTORS)))
+    tried2 = np.zeros((groups, len(FACTORS)))
+    for g in range(groups):
+        for h in range(len(FACTORS)):
+            tried2[g, h] = max(lam[g] * FACTORS[h], prior.least) ** 2
+    for i in range(len(rows.y)):
+        g = rows.group[i]
+        known = rows.variance[i] + state.own[i] + state.mu[g] ** 2 * state.curve2[i]
+        error2 = state.error2[i]
+        square = state.squares[i]
+        if g == rows.loads:
+            u = known + prior.typical**2 * error2
+            with_load = u + rows.load * rows.load
+            likelier = square / with_load + np.log(with_load) < square / u + np.log(u)
+            state.loaded[i] = rows.load * rows.load if likelier else 0.0
+            continue
+        for h in range(len(FACTORS)):
+            u = known + tried2[g, h] * error2
+            score[g, h] -= 0.5 * square / u
+            products[g, h] *= u
+        if products[g, 0] < SMALL or products[g, -1] > LARGE:
+            for h in range(len(FACTORS)):
+                score[g, h] -= 0.5 * np.log(products[g, h])
+                products[g, h] = 1.0
+    moved = 0.0
+    for g in range(groups):
+        if g == rows.loads:
+            lam[g] = prior.typical
+            continue
+        best, chosen = -1e300, lam[g]
+        for h in range(len(FACTORS)):
+            tried = max(lam[g] * FACTORS[h], prior.least)
+            total = score[g, h] - 0.5 * np.log(products[g, h]) - np.log(1.0 + (tried / prior.typical) ** 2)
+            if total > best:
+                best, chosen = total, tried
+        moved = max(moved, abs(chosen / lam[g] - 1.0) if lam[g] > 0.0 else chosen)
+        lam[g] = chosen
+    return moved
+
+
+@jit
+def _share_seen(rows, state):
+    """Choose the share mu of the curves' errors that is seen in each group, at its discrepancy lambda."""
+    score = np.zeros((rows.groups, len(SEEN)))
+    for i in range(len(rows.y)):
+        g = rows.group[i]
+        curve2 = state.curve2[i]
+        if g != rows.loads and curve2 > 0.0:
+            known = rows.variance[i] + state.own[i] + state.lam[g] ** 2 * state.error2[i]
+            for h in range(len(SEEN)):
+                u = known + SEEN[h] ** 2 * curve2
+                score[g, h] -= 0.5 * (state.squares[i] / u + np.log(u))
+    for g in range(rows.groups):
+        state.mu[g] = SEEN[np.argmax(score[g])]
+
+
+@jit
+def _log_never_free(rows, prior, state):
+    """Log odds against a set in which every operating point is loaded: a drive is run without load at one at least."""
+    free, count = 0, 0
+    for i in range(len(rows.y)):
+        if rows.group[i] == rows.loads:
+            count += 1
+            free += state.loaded[i] == 0.0
+    return np.log(prior.always) if rows.loads >= 0 and count and not free else 0.0

@@ -20,6 +20,7 @@ import numpy as np
 
 from fluxproof.diagnosis.effects.effect import rated_torque
 from fluxproof.diagnosis.ground import constants as k
+from fluxproof.diagnosis.inference.model import BalanceRows
 
 
 @dataclass
@@ -44,6 +45,13 @@ class Points:
     loads: int
     load: float
     condensed: object  # function of further rows (r,): their means and contrasts (n,)
+
+    def rows(self, y: np.ndarray | None = None, scale: np.ndarray | float = 1.0) -> BalanceRows:
+        """The rows of the balance, with another misfit y (n,) and all errors times ``scale``, (n,) or 1."""
+        y = self.y if y is None else y
+        variance, error, curve_error = self.s2 * scale**2, self.level * scale, self.doubt * scale
+        groups, load = len(self.groups), float(self.load)
+        return BalanceRows(y, variance, error, curve_error, self.group, groups, self.loads, load)
 
 
 def balance_level(view, cells):

@@ -15,6 +15,7 @@ from fluxproof.diagnosis.effects.effect import believable
 from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.inference.evidence import evidence
 from fluxproof.diagnosis.inference.linearise import Linearisation
+from fluxproof.diagnosis.inference.model import Columns
 from fluxproof.diagnosis.inference.points import condense
 from fluxproof.diagnosis.inference.setup import Setup, repeated
 
@@ -110,24 +111,18 @@ class Problem:
         # The common error of the balance is in every set, as an effect of fixed size that nobody names.
         owner = np.array([names.index(self.keys[n][0]) for n in mine] + [len(names)] * common, np.int64)
         most = np.array([self.most[n] for n in names] + [1.0], float)
-        prior = np.append(self.prior[take], np.ones(common))
+        scale = np.append(self.prior[take], np.ones(common))
         x = np.column_stack([p.x[:, take], self.common])
         # Where no formula is preferred (a curve of 1), the free columns tell the size too.
         tells = lambda name, key: not key.startswith("~") or self.setup.effects[name].curve >= 1.0  # noqa: E731
         core = np.array([tells(*self.keys[n]) for n in mine] + [True] * common, bool)
         formula = np.array([0.0 if self.setup.effects[n].exact else k.FORMULA for n in names] + [0.0])
         drags = p.loads >= 0 and bool(x[p.group == p.loads].any())
-        always = k.ALWAYS_LOADED if p.loads >= 0 else 1.0
-        tried = [
-            evidence(
-                x, p.y, p.s2, p.level, p.doubt, p.group, len(p.groups), p.loads, p.load,
-                prior, owner, core, most, formula, k.DISCREPANCY, self.view.least_error, always, start, k.STRAIGHT,
-            )
-            for start in ((np.inf, 1.5, 3.0) if drags else (np.inf,))
-        ]  # fmt: skip
-        value, c, cov, sizes, lam, mu = max(tried, key=lambda found: found[0])
+        columns, starts = Columns(x, scale, owner, core, most, formula), (np.inf, 1.5, 3.0) if drags else (np.inf,)
+        tried = [evidence(p.rows(), columns, self.setup.prior(p), start) for start in starts]
+        best = max(tried, key=lambda found: found.log_evidence)
         own = slice(len(take))
-        return take, value, c[own], cov[own, own], sizes[:-1], lam, mu
+        return take, best.log_evidence, best.c[own], best.covariance[own, own], best.sizes[:-1], best.lam, best.mu
 
     def fit(self, names):
         """The Fit of a set of effects on this problem."""

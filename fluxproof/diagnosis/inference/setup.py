@@ -11,6 +11,7 @@ from fluxproof.diagnosis.balance.cells import repeats, voltage_level
 from fluxproof.diagnosis.balance.operating_points import point_numbers
 from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.inference.linearise import Rows, at_once
+from fluxproof.diagnosis.inference.model import Prior
 from fluxproof.diagnosis.inference.points import Grouping, balance_level, visits
 
 
@@ -54,6 +55,11 @@ class Setup:
     def usual(self):
         """(r,) the same in a usual recording."""
         return np.hypot(self.noise, self.level)
+
+    def prior(self, points) -> Prior:
+        """What the constants say of every set of effects on these points."""
+        always = k.ALWAYS_LOADED if points.loads >= 0 else 1.0
+        return Prior(float(k.DISCREPANCY), float(self.view.least_error), float(k.STRAIGHT), float(always))
 
     def odds(self, name) -> float:
         """Log prior odds of an effect, zero (one to one) for one that is expected; a fleet may have shifted them."""

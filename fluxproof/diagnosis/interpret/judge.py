@@ -23,6 +23,7 @@ from fluxproof.diagnosis.effects.effect import torque_of
 from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.inference.evidence import evidence
 from fluxproof.diagnosis.inference.linearise import Rows
+from fluxproof.diagnosis.inference.model import no_columns
 from fluxproof.diagnosis.inference.points import condense
 from fluxproof.diagnosis.inference.posterior import Posterior
 from fluxproof.diagnosis.inference.problem import Problem, implausible
@@ -211,13 +212,7 @@ class Terms:
         return np.array([name == channel for name, _, _ in points.groups])[points.group]
 
     def _evidence(self, p, y, scale) -> float:
-        none, nothing = np.zeros(0), np.zeros(0, np.int64)
-        return evidence(
-            np.zeros((len(y), 0)), y, p.s2 * scale**2, p.level * scale, p.doubt * scale,
-            p.group, len(p.groups), p.loads, p.load,
-            none, nothing, np.zeros(0, bool), none, none,
-            k.DISCREPANCY, self.setup.view.least_error, k.ALWAYS_LOADED if p.loads >= 0 else 1.0, np.inf, k.STRAIGHT,
-        )[0]  # fmt: skip
+        return evidence(p.rows(y, scale), no_columns(len(y)), self.setup.prior(p), np.inf).log_evidence
 
 
 def _product(factors) -> float:
