@@ -230,7 +230,7 @@ class Comparison:
         self.compare(got, golden, wanted)
         k = len(self.observed)
         self.edges += [(k, int(c), int(w)) for c, w in zip(got.edge_clocks, got.gate_words, strict=True)]
-        self.samples.append((*inputs.values(), enable))
+        self.samples.append((*inputs.values(), got.running))
         self.observed.append(golden if got.observed is None else read_out(got.observed))
         return got
 

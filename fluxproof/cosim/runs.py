@@ -135,6 +135,8 @@ async def carry_out(run: Run, device: Device, folder: Path) -> Result:
 class Job:
     """One run on one engine and what became of it; ``name`` must be its own, it also names the folder in build/runs."""
 
+    starts = "building"  # what it does before its first period
+
     def __init__(self, name: str, named: Named):
         self.name, self.named, self.run = name, named, named.make()
         self.total = len(self.run)

@@ -59,7 +59,8 @@ def check_inputs(args: argparse.Namespace) -> None:
     if args.example and (args.recordings or args.drive):
         given = f"RECORDING {args.recordings[0]}" if args.recordings else f"--drive {args.drive}"
         raise RecordingError(f"--example brings a recording and a drive file of its own: leave out {given}")
-    missing = [name for name, value in (("RECORDING", args.recordings), ("--drive drive.toml", args.drive)) if not value]
+    needed = {"RECORDING": args.recordings, "--drive drive.toml": args.drive}
+    missing = [name for name, value in needed.items() if not value]
     if missing and not args.example:
         raise RecordingError(f"missing: {' and '.join(missing)} (or --example for a recording that is made here)")
 

@@ -18,12 +18,11 @@ DRIVE_FILE = Path(__file__).with_name("drive.toml")
 MAGNET_SHARE = 0.92  # of the flux in the drive file: magnets that were too hot once
 ENCODER_RAD = math.radians(2.0)  # electrical angle by which the encoder is mounted wrongly
 DEAD_TIME_S = 2e-6
-ZERO_CURRENT_A = 0.1  # ripple: a smaller current changes its sign within a period and loses less voltage
 
-RAMP, DWELL = 100, 350  # rows from one operating point to the next, and at it
+RAMP, DWELL = 100, 450  # rows from one operating point to the next, and at it
 # Mechanical speeds [rad/s], each with currents i_d, i_q [A] in an order of its own, so that nothing follows the time.
-SPEEDS = (60.0, 150.0, -100.0)
-CURRENTS = ((0.0, 0.3), (0.0, 4.5), (-2.5, 2.0), (0.0, -4.5), (-2.5, -3.0), (2.0, 1.0))
+SPEEDS = (30.0, 150.0, -90.0)
+CURRENTS = ((0.0, 0.0), (0.0, 4.5), (-2.5, 2.0), (0.0, -4.5), (-2.5, -3.0), (2.0, 1.0))
 PLAN = tuple(
     (speed, *point) for turn, speed in enumerate(SPEEDS) for point in CURRENTS[turn:] + CURRENTS[:turn]
 )
@@ -42,10 +41,11 @@ def hidden(drive: Drive) -> list[Hidden]:
     """All differences; everything else is as the drive file says."""
     flux = MAGNET_SHARE * drive.machine.magnet_flux_wb
     volts = DEAD_TIME_S * drive.inverter.pwm_frequency_hz * drive.inverter.dc_bus_v
+    lost = f"{1e6 * DEAD_TIME_S:g} us of dead time take voltage away"
     return [
-        Hidden("dead_time", "v_dead_v", volts, f"the inverter loses voltage by its dead time of {1e6 * DEAD_TIME_S:g} us"),
+        Hidden("dead_time", "v_dead_v", volts, lost),
         Hidden("magnet_flux", "magnet_flux_wb", flux, f"magnets {100.0 * (MAGNET_SHARE - 1.0):+.0f} %"),
-        Hidden("encoder_offset", "offset_rad", ENCODER_RAD, "encoder mounted at a wrong angle"),
+        Hidden("encoder_offset", "offset_rad", ENCODER_RAD, f"encoder {math.degrees(ENCODER_RAD):g} degrees off"),
     ]
 
 
@@ -57,7 +57,7 @@ def machine(drive: Drive) -> Machine:
 
 def inverter() -> Inverter:
     """The inverter as the averaged plant has it; a switching plant follows the core's gates instead."""
-    return Inverter(dead_time_s=DEAD_TIME_S, zero_current_a=ZERO_CURRENT_A)
+    return Inverter(dead_time_s=DEAD_TIME_S)
 
 
 def sensors(drive: Drive) -> Sensors:

@@ -52,7 +52,8 @@ def files_in(folder: Path) -> Example:
     if example.drive.exists():
         ours = ours and example.drive.read_bytes() == motor.DRIVE_FILE.read_bytes()
     if not ours:
-        raise DriveError(f"{folder}: has another {RECORDING} or {DRIVE}, which would be overwritten; choose another folder")
+        names = f"{RECORDING} or {DRIVE}"
+        raise DriveError(f"{folder}: has another {names}, which would be overwritten; choose another folder")
     return example
 
 

@@ -1,0 +1,75 @@
+"""The demo's second half: the RTL drives the motor of `fluxproof diagnose --example`, and its telemetry is diagnosed.
+
+The motor differs from its drive file; the currents follow their references all the same, as the loop is closed.  What
+the core was given and what it put out are written as its telemetry and go through the ordinary command.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+from fluxproof.checkout import ROOT
+from fluxproof.cosim.runs import ClosedLoop, InVerilator
+from fluxproof.diagnosis.example import motor, recording
+from fluxproof.plant import IMPOSED_SPEED
+from golden_model import drive as drives
+from golden_model.registers import registers
+
+
+def in_the_loop(carrier_half: int) -> ClosedLoop:
+    """The example's run for an RTL with so many clocks in half a period; its gates switch the motor's inverter."""
+    drive = drives.with_carrier(drives.load(motor.DRIVE_FILE), carrier_half)
+    motor_of, seen_by = motor.machine(drive), motor.sensors(drive)
+    return ClosedLoop(drive, registers(drive), motor.scenario(drive), motor_of, sensors=seen_by, mode=IMPOSED_SPEED)
+
+
+def run_length() -> int:
+    """Rows of an operating point, ramp included."""
+    return motor.RAMP + motor.DWELL
+
+
+class Diagnosis:
+    """`fluxproof diagnose` on what the RTL left behind, in a process of its own; shown beside the runs."""
+
+    starts, total = "running", 1
+
+    def __init__(self, job: InVerilator, folder: Path):
+        self.name, self.job, self.folder = "diagnosis", job, folder
+        self.files = recording.Example(folder / recording.RECORDING, folder / recording.DRIVE)
+        self.begun, self.seconds = False, 0.0
+        self.problem: str | None = None
+
+    def carry_out(self) -> None:
+        """Write the telemetry and diagnose it; afterwards ``problem`` says what failed, or None."""
+        if self.job.problem:
+            self.problem = f"not done: {self.job.name} failed"
+            return
+        self.begun, began = True, time.monotonic()
+        files, run, arrays = self.files, self.job.run, self.job.arrays()
+        recording.write_files(files, run.drive, run.registers, arrays["samples"], observed(arrays))
+        command = ["fluxproof", "diagnose", files.recording, "--drive", files.drive, "--out", self.folder, "--quiet"]
+        done = subprocess.run([sys.executable, "-m", *map(str, command)], cwd=ROOT, capture_output=True, text=True)
+        self.seconds = time.monotonic() - began
+        if done.returncode:
+            self.problem = (done.stderr.splitlines() or ["it failed"])[-1]
+
+    def done(self) -> int:
+        """1 if there is an answer of this run."""
+        return int(self.seconds > 0.0 and not self.problem)
+
+    def summary(self) -> dict:
+        """diagnosis.json; empty without an answer."""
+        path = self.folder / "diagnosis.json"
+        return json.loads(path.read_text()) if self.done() and path.exists() else {}
+
+
+def observed(arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """The core's values in a run's arrays, by their names in fluxproof.Observed."""
+    head = "observed_"
+    return {name[len(head) :]: values for name, values in arrays.items() if name.startswith(head)}
