@@ -176,8 +176,7 @@ def collect(loop: SimpleNamespace, replay: SimpleNamespace | None, recording, sk
 
 def found(driven: InVerilator, diagnosis: Diagnosis):
     """(the summary's part on the example, what its figure shows)."""
-    run = driven.run
-    view = concealed.view(diagnosis.files.recording, diagnosis.files.drive, diagnosis.folder, run.drive)
+    view = concealed.view(*diagnosis.files, diagnosis.folder)
     counts = driven.summary()
     numbers = concealed.metrics(view, diagnosis.summary(), run_length())
     times = {"seconds": counts["seconds"], "diagnosis_seconds": round(diagnosis.seconds, 1)}

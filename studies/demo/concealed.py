@@ -14,15 +14,14 @@ from fluxproof.diagnosis.ground.quantities import measured, quantity
 from fluxproof.diagnosis.loading.load import load_recording
 from fluxproof.diagnosis.overlay.compare import closed_loop
 from fluxproof.diagnosis.session import IMPROVED
-from golden_model.drive import Drive
-from golden_model.units import si_per_lsb
+from golden_model.fluxproof import Sample
 from studies.demo.plots import D_AXIS, Q_AXIS, QUIET, REFERENCE, SPEED, WIDTH, label
 
 MOST_SIGMAS = 3.0  # an estimate further from the truth is wrong
 SETTLED = 100  # rows at the end of an operating point
 
 
-def view(recording: Path, drive_file: Path, out: Path, drive: Drive) -> SimpleNamespace:
+def view(recording: Path, drive_file: Path, out: Path) -> SimpleNamespace:
     """The recorded run and the closed loop simulated with the drive file and with the improved one.
 
     recording: a telemetry dump; out: the folder of its diagnosis.
@@ -31,13 +30,14 @@ def view(recording: Path, drive_file: Path, out: Path, drive: Drive) -> SimpleNa
     seen = load_recording(recording, nominal)
     improved = out / IMPROVED
     over = closed_loop(seen, nominal, improved if improved.exists() else None)
-    scale = si_per_lsb("i_q_ref", drive)
+    samples, read_out, scales = (seen.meta[part] for part in ("samples", "observed", "scales"))
+    given = {name: samples[:, Sample._fields.index(name)] * scales[name] for name in ("i_d_ref", "i_q_ext")}
     return SimpleNamespace(
         ms=1e3 * seen["t"],
-        i_d=seen["i_d"],
-        i_q=seen["i_q"],
-        i_d_ref=seen.meta["samples"][:, 6] * scale,
-        i_q_ref=seen.meta["samples"][:, 7] * scale,
+        i_d=read_out["i_d"] * scales["i_d"],
+        i_q=read_out["i_q"] * scales["i_q"],
+        i_d_ref=given["i_d_ref"],
+        i_q_ref=given["i_q_ext"],
         over=over,
     )
 
@@ -80,7 +80,12 @@ def good(found: dict) -> bool:
 def figure(run: SimpleNamespace) -> Figure:
     """Currents above, the voltages that the core asks for below; call it under plots.STYLE."""
     page = Figure(figsize=(WIDTH + 1.4, 5.6), layout="constrained")
-    currents, d_axis, q_axis = page.subplots(3, 1, sharex=True)
+    _course(run, *page.subplots(3, 1, sharex=True))
+    return page
+
+
+def _course(run: SimpleNamespace, currents, d_axis, q_axis) -> None:
+    """Currents with their references, and both voltages as recorded and as simulated, over time."""
     for values, reference, text, color in (
         (run.i_q, run.i_q_ref, "$i_q$", Q_AXIS),
         (run.i_d, run.i_d_ref, "$i_d$", D_AXIS),
@@ -100,4 +105,28 @@ def figure(run: SimpleNamespace) -> Figure:
         axis.set(title=f"Voltage {text}: recorded, and simulated in closed loop", ylabel="V")
     d_axis.legend(loc="lower left", ncols=3, frameon=False, fontsize=9, borderpad=0)
     q_axis.set(xlabel="time [ms]", xlim=(run.ms[0], run.ms[-1]))
+
+
+def overview(run: SimpleNamespace, answer: dict) -> Figure:
+    """The README's picture: the figure's course on the left, misfit and sizes against the truth on the right."""
+    page = Figure(figsize=(9.6, 4.4), layout="constrained")
+    left, right = page.subfigures(1, 2, width_ratios=(1.55, 1))
+    _course(run, *left.subplots(3, 1, sharex=True))
+    misfit, sizes = right.subplots(2, 1, height_ratios=(1, 1.3))
+    fit = answer["fit"]
+    bars = ((fit["holdout_before"], Q_AXIS), (fit["holdout_after"], SPEED), (fit["noise_floor"], QUIET))
+    for row, (value, color) in enumerate(bars):
+        misfit.barh(row, value, 0.7, color=color)
+        misfit.annotate(f"{value:.2g} V", (value, row), (4, 0), textcoords="offset points", va="center")
+    misfit.set_yticks(range(3), ("before", "after", "noise floor"))
+    misfit.set(title="Misfit at points not fitted, rms", xlabel="V", xlim=(0, 1.2 * fit["holdout_before"]))
+    misfit.invert_yaxis()
+    rows, _ = truth.compare(answer["effects"])
+    for row, compared in enumerate(rows):
+        if compared.value is not None:
+            share, spread = compared.value / compared.hidden.value, compared.sigma / abs(compared.hidden.value)
+            sizes.errorbar(100 * share, row, xerr=200 * spread, fmt="o", color=SPEED, markersize=4, capsize=3)
+    sizes.axvline(100, color=REFERENCE, linewidth=1.1)
+    sizes.set(title="Found ± 2 σ, % of the truth", ylim=(len(rows) - 0.5, -0.5), xlim=(80, 120))
+    sizes.set_yticks(range(len(rows)), [compared.hidden.effect.replace("_", "\n") for compared in rows])
     return page

@@ -22,11 +22,14 @@ from golden_model import drive as drives
 from golden_model.registers import registers
 
 
-def in_the_loop(carrier_half: int) -> ClosedLoop:
-    """The example's run for an RTL with so many clocks in half a period; its gates switch the motor's inverter."""
+def in_the_loop(carrier_half: int, periods: int | None = None) -> ClosedLoop:
+    """The example's run, or its first ``periods``, for an RTL with so many clocks in half a period.
+
+    The RTL's gates switch the motor's inverter.
+    """
     drive = drives.with_carrier(drives.load(motor.DRIVE_FILE), carrier_half)
-    motor_of, seen_by = motor.machine(drive), motor.sensors(drive)
-    return ClosedLoop(drive, registers(drive), motor.scenario(drive), motor_of, sensors=seen_by, mode=IMPOSED_SPEED)
+    machine, sensors, scenario = motor.machine(drive), motor.sensors(drive), motor.scenario(drive).first(periods)
+    return ClosedLoop(drive, registers(drive), scenario, machine, sensors=sensors, mode=IMPOSED_SPEED)
 
 
 def run_length() -> int:
