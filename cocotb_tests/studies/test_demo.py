@@ -97,13 +97,12 @@ def summary_of(run) -> dict:
 
 
 def voltages():
-    """Two operating points, with simulated voltages that are off by 3 V before and right after."""
+    """Two operating points, with a misfit of 3 V before and none after; the second one is held out."""
     n = np.arange(200)
-    i_q, u = np.where(n < 100, 0.0, 4.0), 10.0 + n
-    runs = {"recorded": u, "simulated_before": u - 3.0, "simulated_after": u}
-    over = {name: {"u_d_ref": values, "u_q_ref": values} for name, values in runs.items()}
-    currents = dict(i_d=0.0 * n, i_q=i_q + 0.1, i_d_ref=0.0 * n, i_q_ref=i_q)
-    return SimpleNamespace(ms=0.1 * n, over={"t": 1e-4 * n, **over}, **currents)
+    i_q, none = np.where(n < 100, 0.0, 4.0), 0.0 * n
+    currents = dict(i_d=none, i_q=i_q + 0.1, i_d_ref=none, i_q_ref=i_q)
+    misfit = dict(block_ms=0.1 * n, held=n >= 100, before=(none + 3.0, none - 3.0), after=(none, none))
+    return SimpleNamespace(ms=0.1 * n, **currents, **misfit)
 
 
 def test_metrics_of_the_motor_that_differs():

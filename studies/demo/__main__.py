@@ -176,7 +176,7 @@ def collect(loop: SimpleNamespace, replay: SimpleNamespace | None, recording, sk
 
 def found(driven: InVerilator, diagnosis: Diagnosis):
     """(the summary's part on the example, what its figure shows)."""
-    view = concealed.view(*diagnosis.files, diagnosis.folder)
+    view = concealed.view(*diagnosis.files, diagnosis.answer)
     counts = driven.summary()
     numbers = concealed.metrics(view, diagnosis.summary(), run_length())
     times = {"seconds": counts["seconds"], "diagnosis_seconds": round(diagnosis.seconds, 1)}

@@ -6,19 +6,19 @@ the core was given and what it put out are written as its telemetry and go throu
 
 from __future__ import annotations
 
-import json
-import subprocess
-import sys
 import time
 from pathlib import Path
 
 import numpy as np
 
-from fluxproof.checkout import ROOT
 from fluxproof.cosim.runs import ClosedLoop, InVerilator
+from fluxproof.diagnosis import session
 from fluxproof.diagnosis.example import motor, recording
+from fluxproof.diagnosis.ground.recording import RecordingError
+from fluxproof.diagnosis.ground.result import Diagnosis as Answer
 from fluxproof.plant import IMPOSED_SPEED
 from golden_model import drive as drives
+from golden_model.drive_keys import DriveError
 from golden_model.registers import registers
 
 
@@ -38,7 +38,7 @@ def run_length() -> int:
 
 
 class Diagnosis:
-    """`fluxproof diagnose` on what the RTL left behind, in a process of its own; shown beside the runs."""
+    """What `fluxproof diagnose` does, on what the RTL left behind; shown beside the runs."""
 
     starts, total = "running", 1
 
@@ -47,6 +47,7 @@ class Diagnosis:
         self.files = recording.Example(folder / recording.RECORDING, folder / recording.DRIVE)
         self.begun, self.seconds = False, 0.0
         self.problem: str | None = None
+        self.answer: Answer | None = None
 
     def carry_out(self) -> None:
         """Write the telemetry and diagnose it; afterwards ``problem`` says what failed, or None."""
@@ -55,21 +56,20 @@ class Diagnosis:
             return
         self.begun, began = True, time.monotonic()
         files, run, arrays = self.files, self.job.run, self.job.arrays()
-        recording.write_files(files, run.drive, run.registers, arrays["samples"], observed(arrays))
-        command = ["fluxproof", "diagnose", files.recording, "--drive", files.drive, "--out", self.folder, "--quiet"]
-        done = subprocess.run([sys.executable, "-m", *map(str, command)], cwd=ROOT, capture_output=True, text=True)
+        try:
+            recording.write_files(files, run.drive, run.registers, arrays["samples"], observed(arrays))
+            self.answer = session.run([files.recording], files.drive, self.folder)
+        except (DriveError, RecordingError, OSError) as error:
+            self.problem = str(error)
         self.seconds = time.monotonic() - began
-        if done.returncode:
-            self.problem = (done.stderr.splitlines() or ["it failed"])[-1]
 
     def done(self) -> int:
-        """1 if there is an answer of this run."""
-        return int(self.seconds > 0.0 and not self.problem)
+        """1 if there is an answer."""
+        return int(self.answer is not None)
 
     def summary(self) -> dict:
         """diagnosis.json; empty without an answer."""
-        path = self.folder / "diagnosis.json"
-        return json.loads(path.read_text()) if self.done() and path.exists() else {}
+        return self.answer.to_json() if self.answer else {}
 
 
 def observed(arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:

@@ -18,9 +18,9 @@ def main() -> None:
     options = parser.parse_args()
     out = BUILD / "demo" / "picture"
     example = write(out)
-    answer = run([example.recording], example.drive, out).to_json()
-    shown = concealed.view(*example, out)
-    plots.write_png(plots.styled(concealed.overview, shown, answer), options.picture)
+    answer = run([example.recording], example.drive, out)
+    shown = concealed.view(*example, answer)
+    plots.write_png(plots.styled(concealed.overview, shown, answer.to_json()), options.picture)
 
 
 if __name__ == "__main__":
