@@ -206,11 +206,11 @@ def test_the_telemetry_of_the_rtl_is_that_of_the_golden_model(tmp_path, monkeypa
     needs_conversion()
     monkeypatch.setattr(runs, "BUILD", tmp_path)
     periods = motor.RAMP + 50  # the speed has been ramped up, with the first current on its way
-    named = runs.Named("studies.demo.example:in_the_loop", (demo.REPLAY_CARRIER, periods))
+    named = runs.Named("studies.demo.example:in_the_loop", (demo.CARRIER, periods))
     job = runs.InVerilator("motor that differs", named)
     job.carry_out()
     assert job.problem is None and job.summary()["differences"] == 0
-    arrays, settings = job.arrays(), in_the_loop(demo.REPLAY_CARRIER).registers
+    arrays, settings = job.arrays(), in_the_loop(demo.CARRIER).registers
     assert arrays["plant_omega_m"][-1] == pytest.approx(motor.SPEEDS[0], rel=1e-6)  # as the bench imposes it
     assert arrays["samples"].shape == (periods, len(fluxproof.Sample._fields))
     observed = np.zeros((periods, len(Observed._fields)), np.int64)
@@ -225,7 +225,7 @@ def test_replay(log, engine, tmp_path, monkeypatch):
     if engine is runs.InVerilator:
         needs_conversion()
     monkeypatch.setattr(runs, "BUILD", tmp_path)
-    named = runs.Named("fluxproof.cosim.recording:replay", (str(log), str(demo.EMRAX), demo.REPLAY_CARRIER))
+    named = runs.Named("fluxproof.cosim.recording:replay", (str(log), str(demo.EMRAX), demo.CARRIER))
     job = engine("made up", named)
     job.carry_out()
     assert job.problem is None

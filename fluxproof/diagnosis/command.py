@@ -69,7 +69,7 @@ def make_example(out: Path, progress) -> tuple[list[Path], Path]:
     """Write the example's recording and drive file to ``out``; ([recording], drive file)."""
     from fluxproof.diagnosis.example.recording import write
 
-    progress("the golden core drives the motor of the example")
+    progress("the golden core drives the motor of the example; the first run compiles it, half a minute")
     example = write(out)
     return [example.recording], example.drive
 

@@ -28,11 +28,11 @@ from studies.demo.example import Diagnosis, run_length
 
 DEMO = BUILD / "demo"
 PAPER, EMRAX = DRIVES / "paper001.toml", DRIVES / "emrax228.toml"
-# Clocks in half a PWM period.  GHDL takes 30 times as long for a clock as Verilator, so a period has a tenth of them.
-# The recording has no clock of its own: one sample in 200 clocks is as much idle time as working time for the core.
-# The example is run with as many, in the same library.
-GHDL_CARRIER, REPLAY_CARRIER = 250, 100
-GHDL_PERIODS, GHDL_ROWS = 150, 400
+# Clocks in half a PWM period, for all but Fig. 9 in Verilator, which has the drive's own: 200 clocks in a period are as
+# much idle as working time for the core.  GHDL takes a thousand times as long for a clock as Verilator, so the VHDL
+# runs as much as takes it ten seconds each.
+CARRIER = 100
+GHDL_PERIODS, GHDL_ROWS = 150, 200
 LEAST_PERIODS, LEAST_GHDL_PERIODS = 3000, 150
 
 
@@ -128,19 +128,19 @@ def both(name: str, function: str, verilator: tuple, ghdl: tuple) -> SimpleNames
 
 def diagnosed() -> tuple[InVerilator, Diagnosis]:
     """The RTL on the motor of the example, and the diagnosis of its telemetry."""
-    driven = InVerilator("example in Verilator", Named("studies.demo.example:in_the_loop", (REPLAY_CARRIER,)))
+    driven = InVerilator("example in Verilator", Named("studies.demo.example:in_the_loop", (CARRIER,)))
     return driven, Diagnosis(driven, DEMO / "diagnosis")
 
 
 def prepare(carrier_half: int, ghdl_periods: int):
     """(closed loop, replay, recording, why it is skipped); the last three may be None."""
     function, paper = "fluxproof.cosim.runs:closed_loop", str(PAPER)
-    in_ghdl = (paper, GHDL_CARRIER, "fig9", ghdl_periods)
+    in_ghdl = (paper, CARRIER, "fig9", ghdl_periods)
     loop = both("Fig. 9", function, (paper, carrier_half, "fig9"), in_ghdl)
     path, skipped = recordings.recording_path()
     if skipped:
         return loop, None, None, skipped
-    function, log = "fluxproof.cosim.recording:replay", (str(path), str(EMRAX), REPLAY_CARRIER)
+    function, log = "fluxproof.cosim.recording:replay", (str(path), str(EMRAX), CARRIER)
     replay = both("recording", function, log, (*log, GHDL_ROWS))
     return loop, replay, recordings.load_recording(path), None
 
@@ -226,7 +226,7 @@ def main(argv: list[str] | None = None) -> int:
 
     summary, figures, view = collect(loop, replay, recording, skipped)
     summary["example"], shown = found(driven, diagnosis)
-    summary["example_carrier_half_clocks"] = REPLAY_CARRIER
+    summary["example_carrier_half_clocks"] = CARRIER
     summary["lanes"] = [lane.seconds for lane in lanes]
     figures["concealed"] = plots.styled(concealed.figure, shown)
     for name, figure in figures.items():
