@@ -228,7 +228,12 @@ class InGhdl(Job):
 
 def kernels(part: str) -> Callable[[], object]:
     """A call that compiles the kernels ``golden`` or ``plant`` in another process, where they are not on disk yet."""
-    return lambda: subprocess.run([sys.executable, "-m", __spec__.name, part], cwd=ROOT, capture_output=True)
+
+    def compile_them() -> None:
+        subprocess.run([sys.executable, "-m", __spec__.name, part], cwd=ROOT, capture_output=True)
+
+    compile_them.__name__ = f"kernels of the {part}"
+    return compile_them
 
 
 def compile_kernels(part: str) -> None:

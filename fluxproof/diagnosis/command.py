@@ -29,6 +29,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--prior", metavar="fleet.parquet", help=prior)
     parser.add_argument("--open", action="store_true", help="show the report in the browser")
     parser.add_argument("--quiet", action="store_true", help="no progress on stderr")
+    parser.set_defaults(usage_error=parser.error)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -53,16 +54,15 @@ def run(args: argparse.Namespace) -> int:
 
 
 def check_inputs(args: argparse.Namespace) -> None:
-    """RecordingError unless there are a recording and a drive file, or --example in place of both."""
-    from fluxproof.diagnosis.ground.recording import RecordingError
-
+    """End with the usage unless there are a recording and a drive file, or --example in place of both."""
     if args.example and (args.recordings or args.drive):
         given = f"RECORDING {args.recordings[0]}" if args.recordings else f"--drive {args.drive}"
-        raise RecordingError(f"--example brings a recording and a drive file of its own: leave out {given}")
+        args.usage_error(f"--example brings a recording and a drive file of its own: leave out {given}")
     needed = {"RECORDING": args.recordings, "--drive drive.toml": args.drive}
     missing = [name for name, value in needed.items() if not value]
     if missing and not args.example:
-        raise RecordingError(f"missing: {' and '.join(missing)} (or --example for a recording that is made here)")
+        needed = f"the following arguments are required: {', '.join(missing)}"
+        args.usage_error(f"{needed} (or --example for a recording that is made here)")
 
 
 def make_example(out: Path, progress) -> tuple[list[Path], Path]:

@@ -54,7 +54,7 @@ class Lane(threading.Thread):
 def step_name(step: Callable[[], object]) -> str:
     """What a lane's step does, for summary.json."""
     job = getattr(step, "__self__", None)
-    return f"{job.name}, {step.__name__}" if hasattr(job, "name") else getattr(step, "__name__", "kernels")
+    return f"{job.name}, {step.__name__}" if hasattr(job, "name") else step.__name__
 
 
 class Progress:
