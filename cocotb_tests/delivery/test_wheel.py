@@ -89,7 +89,7 @@ def test_wheel_holds_both_packages_with_all_their_files(wheel):
     names = zipfile.ZipFile(wheel).namelist()
     assert {name.split("/")[0] for name in names if ".dist-info/" not in name} == set(PACKAGES)
     for source in PACKAGES:
-        files = [p for p in (ROOT / source).rglob("*") if p.suffix in (".py", ".html", ".css", ".cpp")]
+        files = [p for p in (ROOT / source).rglob("*") if p.suffix in (".py", ".html", ".css", ".cpp", ".toml")]
         missing = {p.relative_to(ROOT).as_posix() for p in files} - set(names)
         assert not missing, f"pyproject.toml lacks the package or data of {sorted(missing)}"
 
@@ -175,3 +175,16 @@ print(answer.verdict, answer.digital.samples)
 """
     said = run(environment, "python", "-c", code, cwd=tmp_path)
     assert said.split() == ["explained", str(len(samples))]
+
+
+@pytest.mark.slow
+def test_diagnose_example(environment, tmp_path):
+    """A new user's first minute: no checkout, no compiler, no recording; every hidden difference is found."""
+    said = run(environment, "fluxproof", "diagnose", "--example", "--quiet", cwd=tmp_path)
+    out = tmp_path / "build" / "diagnosis" / "example"
+    answer = json.loads((out / "diagnosis.json").read_text())
+    assert answer["verdict"] == "explained" and answer["digital"]["first_difference"] is None
+    (at,) = (n for n, line in enumerate(said.splitlines()) if line == "hidden from the drive file:")
+    rows = said.splitlines()[at + 1 : at + 4]
+    assert all(re.search(r"true .* found .* [0-2]\.\d σ off", row) for row in rows)
+    assert {path.name for path in out.iterdir()} >= {"example.fluxdump", "drive.toml", "report.html"}

@@ -6,6 +6,7 @@ import base64
 import io
 import re
 from collections import namedtuple
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,13 +15,15 @@ from fluxproof.cosim import recording as recordings
 from fluxproof.cosim import runs, verilog
 from fluxproof.cosim.golden_loop import run_controller
 from fluxproof.cosim.scenarios import RPM, fig9
+from fluxproof.diagnosis.example import motor
 from golden_model import drive as drives
 from golden_model import fluxproof
 from golden_model.fluxproof import Observed
 from golden_model.registers import registers
 from golden_model.units import from_si, to_si
 from studies.demo import __main__ as demo
-from studies.demo import plots, report
+from studies.demo import concealed, plots, report
+from studies.demo.example import in_the_loop
 
 
 @pytest.fixture(scope="module")
@@ -76,21 +79,59 @@ def test_gate_view_finds_the_dead_time(made_up):
     assert gates.dead_us == pytest.approx((25.0, 27.0))
 
 
+def example(**changed) -> dict:
+    """The summary's part on the motor that differs, with one hidden difference."""
+    row = dict(name="magnet_flux", hidden="magnets -8 %", true=0.15, found=0.151, sigma=0.001, unit="Wb", deviation=1.0)
+    row |= dict(true_text="0.15 Wb", found_text="0.1510 ± 0.0010 Wb")
+    misfit = dict(holdout_before=9.0, holdout_after=0.5, train_before=9.5, train_after=0.4, noise_floor=0.3)
+    found = dict(verdict="explained", sentence="Magnets.", replayed=99, replay_equal=True, misfit=misfit, effects=[row])
+    counts = dict(periods_compared=99, differences=0, first_difference=None, seconds=1.0, diagnosis_seconds=2.0)
+    return {**counts, **found, "current_error_a": 0.01, "false_names": [], **changed}
+
+
 def summary_of(run) -> dict:
     counts = dict(periods_compared=3000, differences=0, sample_to_duty_clocks=38, gate_edges=9)
     counts |= dict(ghdl_seconds=1.0, verilator_seconds=3.0, ghdl_periods=200, ghdl_carrier_half_clocks=250)
+    counts |= dict(example=example(), example_carrier_half_clocks=100)
     return {**counts, **report.metrics(run), "recording": {"skipped": "not here"}, "seconds": 2.0}
+
+
+def voltages():
+    """Two operating points, with a misfit of 3 V before and none after; the second one is held out."""
+    n = np.arange(200)
+    i_q, none = np.where(n < 100, 0.0, 4.0), 0.0 * n
+    currents = dict(i_d=none, i_q=i_q + 0.1, i_d_ref=none, i_q_ref=i_q)
+    misfit = dict(block_ms=0.1 * n, held=n >= 100, before=(none + 3.0, none - 3.0), after=(none, none))
+    return SimpleNamespace(ms=0.1 * n, **currents, **misfit)
+
+
+def test_metrics_of_the_motor_that_differs():
+    """Currents 0.1 A off in every settled row; the estimates beside the truth in their own units."""
+    drive = drives.load(motor.DRIVE_FILE)
+    secrets = motor.hidden(drive)[:2]
+    effects = [
+        {"name": s.effect, "parameters": {s.parameter: {"value": 1.02 * s.value, "sigma": 0.01 * s.value, "unit": "V"}}}
+        for s in secrets
+    ]
+    answer = dict(verdict="explained", sentence="", fit={}, effects=[*effects, {"name": "friction", "parameters": {}}])
+    answer["digital"] = {"checked": True, "samples": 200, "first_difference": None}
+    found = concealed.metrics(voltages(), answer, 200)
+    assert found["current_error_a"] == pytest.approx(0.1)
+    assert [row["deviation"] for row in found["effects"]] == [2.0, 2.0, None]
+    assert found["false_names"] == ["friction"] and found["replay_equal"]
 
 
 def test_report_is_self_contained(made_up, drive, tmp_path):
     figures = plots.draw(made_up, report.gate_view(made_up, 7))
+    figures["concealed"] = plots.styled(concealed.figure, voltages())
     context = dict(good=True, problems=[], view=None, real=drive, emrax=None, drive_file="paper001.toml")
     context |= dict(clock=drive, registers=registers(drive))
     page = report.write(tmp_path / "report.html", figures, summary_of(made_up), **context).read_text()
     assert "3,000 periods in Verilator and 200 in GHDL, 0 differences" in page and "Skipped: not here" in page
     images = re.findall(r'src="data:image/svg\+xml;base64,([A-Za-z0-9+/=]+)"', page)
     assert len(images) == page.count("src=") == len(figures) - 1  # all but the README's picture
-    assert not re.search(r"href|url\(|@import|<script|<link", page)
+    assert re.findall(r'href="(.*?)"', page) == ["diagnosis/report.html"]  # the diagnosis's own page, beside this one
+    assert not re.search(r"url\(|@import|<script|<link", page)
     for image in images:  # inside a drawing, only its own parts are referred to
         assert not re.search(rb'href="(?!#)|url\((?!#)|@import', base64.b64decode(image))
 
@@ -102,12 +143,29 @@ def test_verdict_and_exit_status(made_up):
     assert not demo.passed({**summary, "ghdl_periods": 149}, [])
     assert not demo.passed({**summary, "recording": {"differences": 1}}, [])
     assert "1 difference," in report.verdict({**summary, "differences": 1})
-    assert len(report.text(summary, drives.load(demo.PAPER)).splitlines()) == 3
+    assert "1 of 1 differences named" in report.verdict(summary)
+    assert len(report.text(summary, drives.load(demo.PAPER)).splitlines()) == 6
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"differences": 1},
+        {"replay_equal": False},
+        {"verdict": "ambiguous"},
+        {"false_names": ["friction"]},
+        {"effects": [{**example()["effects"][0], "deviation": 3.1}]},
+        {"effects": [{**example()["effects"][0], "found": None, "deviation": None}]},
+    ],
+)
+def test_a_wrong_diagnosis_fails_the_demo(made_up, changed):
+    summary = summary_of(made_up)
+    assert not demo.passed({**summary, "example": example(**changed)}, [])
 
 
 def test_progress_lines():
     """Plain lines at every 10 %; on a terminal one line that fits, with the time left."""
-    kind = namedtuple("Job", "name total begun")
+    kind = namedtuple("Job", "name total begun starts", defaults=["building"])
     loop, replay = kind("Fig. 9", 3000, True), kind("recording", 14595, True)
     waiting = kind("recording in GHDL", 300, False)
     plain = demo.Progress([loop, replay, waiting], io.StringIO())
@@ -135,16 +193,39 @@ def log(tmp_path):
     return path
 
 
+def needs_conversion() -> None:
+    """Skip the test without a GHDL that converts the VHDL to Verilog."""
+    try:
+        verilog.find_ghdl()
+    except RuntimeError as reason:
+        pytest.skip(str(reason))
+
+
+def test_the_telemetry_of_the_rtl_is_that_of_the_golden_model(tmp_path, monkeypatch):
+    """What the core was given on the motor that differs, replayed, gives what the RTL put out."""
+    needs_conversion()
+    monkeypatch.setattr(runs, "BUILD", tmp_path)
+    periods = motor.RAMP + 50  # the speed has been ramped up, with the first current on its way
+    named = runs.Named("studies.demo.example:in_the_loop", (demo.CARRIER, periods))
+    job = runs.InVerilator("motor that differs", named)
+    job.carry_out()
+    assert job.problem is None and job.summary()["differences"] == 0
+    arrays, settings = job.arrays(), in_the_loop(demo.CARRIER).registers
+    assert arrays["plant_omega_m"][-1] == pytest.approx(motor.SPEEDS[0], rel=1e-6)  # as the bench imposes it
+    assert arrays["samples"].shape == (periods, len(fluxproof.Sample._fields))
+    observed = np.zeros((periods, len(Observed._fields)), np.int64)
+    run_controller(fluxproof.State(), arrays["samples"], settings.values, settings.config, observed)
+    for k, name in enumerate(Observed._fields):
+        assert np.array_equal(observed[:, k], arrays[f"observed_{name}"]), name
+
+
 @pytest.mark.parametrize("engine", [runs.InVerilator, runs.InGhdl])
 def test_replay(log, engine, tmp_path, monkeypatch):
     """A recording in both engines, equal in every bit of every sample, the demo's way."""
     if engine is runs.InVerilator:
-        try:
-            verilog.find_ghdl()
-        except RuntimeError as reason:
-            pytest.skip(str(reason))
+        needs_conversion()
     monkeypatch.setattr(runs, "BUILD", tmp_path)
-    named = runs.Named("fluxproof.cosim.recording:replay", (str(log), str(demo.EMRAX), demo.REPLAY_CARRIER))
+    named = runs.Named("fluxproof.cosim.recording:replay", (str(log), str(demo.EMRAX), demo.CARRIER))
     job = engine("made up", named)
     job.carry_out()
     assert job.problem is None

@@ -14,7 +14,16 @@ from typing import Protocol
 import numpy as np
 
 from fluxproof.cosim.golden_clock import SEEN, GoldenClock
-from fluxproof.plant import Inverter, Machine, Sensors, SwitchingPlant, centred_gates, half_gates, sensor_params
+from fluxproof.plant import (
+    FREE,
+    Inverter,
+    Machine,
+    Sensors,
+    SwitchingPlant,
+    centred_gates,
+    half_gates,
+    sensor_params,
+)
 from fluxproof.plant.sensors import current_code, position_code, u_dc_code
 from golden_model import fluxproof
 from golden_model.io import sample_latch
@@ -140,6 +149,7 @@ class GoldenPeriods:
 class Result:
     """The recorded run: one row per period, integers of the core, plant in SI units."""
 
+    samples: np.ndarray | None = None  # (n, 13) what the core was given, in the order of fluxproof.Sample
     observed: dict[str, np.ndarray] = field(default_factory=dict)
     plant: dict[str, np.ndarray] = field(default_factory=dict)
     periods_compared: int = 0
@@ -175,11 +185,16 @@ def described_sensors(drive) -> Sensors:
 
 
 def build_plant(
-    drive, sensors: Sensors | None = None, machine: Machine | None = None, omega_m: float = 0.0
+    drive, sensors: Sensors | None = None, machine: Machine | None = None, omega_m: float = 0.0, mode: int = FREE
 ) -> tuple[SwitchingPlant, Sensors]:
     """Plant and sensors as drive.toml describes them; the dead time is that of the device's gates."""
     machine = machine or Machine.from_mapping(vars(drive.machine))
-    return SwitchingPlant(machine, Inverter(), omega_m=omega_m), sensors or described_sensors(drive)
+    return SwitchingPlant(machine, Inverter(), mode, omega_m=omega_m), sensors or described_sensors(drive)
+
+
+def read_out(values: Mapping[str, int]) -> fluxproof.Observed:
+    """A device's values of a sample in the golden model's type."""
+    return fluxproof.Observed(*(values[name] for name in fluxproof.Observed._fields))
 
 
 class Comparison:
@@ -188,6 +203,7 @@ class Comparison:
     def __init__(self, device: Device, register_set):
         self.device, self.config = device, register_set.config
         self.golden, self.result = GoldenPeriods(register_set), Result()
+        self.samples: list[tuple[int, ...]] = []
         self.observed: list[fluxproof.Observed] = []
         self.edges: list[tuple[int, int, int]] = []
 
@@ -214,7 +230,8 @@ class Comparison:
         self.compare(got, golden, wanted)
         k = len(self.observed)
         self.edges += [(k, int(c), int(w)) for c, w in zip(got.edge_clocks, got.gate_words, strict=True)]
-        self.observed.append(golden)
+        self.samples.append((*inputs.values(), got.running))
+        self.observed.append(golden if got.observed is None else read_out(got.observed))
         return got
 
     def compare(self, got: Period, golden: fluxproof.Observed, wanted: Period) -> None:
@@ -233,19 +250,30 @@ class Comparison:
         self.result.sample_to_duty_clocks = max(self.result.sample_to_duty_clocks, got.sample_to_duty)
 
     def finish(self) -> Result:
-        """The recorded run with the golden values, which equal the device's if there is no difference."""
+        """The recorded run with the device's values, which equal the golden ones if there is no difference."""
         self.result.periods_compared = len(self.observed)
+        self.result.samples = np.array(self.samples, np.int64).reshape(-1, len(fluxproof.Sample._fields))
         self.result.observed = dict(zip(fluxproof.Observed._fields, np.array(self.observed).T, strict=True))
         self.result.gate_edges = np.array(self.edges, np.int64).reshape(-1, 3)
         return self.result
 
 
 class PlantPeriods:
-    """A scenario's plant period by period: its sensors' codes for the core, gate edges back."""
+    """A scenario's plant period by period: its sensors' codes for the core, gate edges back.
 
-    def __init__(self, drive, scenario: Scenario, sensors: Sensors | None = None, machine: Machine | None = None):
-        self.scenario, self.period_s = scenario, drive.sample_time_s
-        self.plant, described = build_plant(drive, sensors, machine, scenario.omega_m)
+    ``mode`` IMPOSED_SPEED: the scenario's load is the mechanical speed [rad/s].
+    """
+
+    def __init__(
+        self,
+        drive,
+        scenario: Scenario,
+        sensors: Sensors | None = None,
+        machine: Machine | None = None,
+        mode: int = FREE,
+    ):
+        self.scenario, self.period_s, self.mode = scenario, drive.sample_time_s, mode
+        self.plant, described = build_plant(drive, sensors, machine, scenario.omega_m, mode)
         self.codes, self.slow_inputs, self.rows = sensor_params(described), scenario.slow_inputs(), []
 
     def inputs(self, k: int) -> dict[str, int]:
@@ -265,7 +293,9 @@ class PlantPeriods:
         """Period ``k`` with these gate words from these times [s] on."""
         scenario, plant = self.scenario, self.plant
         brake = 0.0 if scenario.brake is None else scenario.brake[k]
-        load = load_torque(float(scenario.load[k]), float(brake), plant.omega_m)
+        load = float(scenario.load[k])
+        if self.mode == FREE:
+            load = load_torque(load, float(brake), plant.omega_m)
         plant.advance(times, words, float(scenario.u_dc[k]), load, self.period_s)
 
 
@@ -278,13 +308,15 @@ async def cosimulate(
     sensors: Sensors | None = None,
     machine: Machine | None = None,
     ideal_inverter: bool = False,
+    mode: int = FREE,
 ) -> Result:
     """Run ``scenario`` on ``device`` in closed loop and compare with the golden model at every period.
 
+    ``mode`` IMPOSED_SPEED: the scenario's load is the mechanical speed [rad/s].
     ``ideal_inverter``: the plant follows the compare values in force, as if its inverter had no dead time; the
     gates are still compared edge by edge.
     """
-    plant, duties = PlantPeriods(drive, scenario, sensors, machine), np.zeros(3)
+    plant, duties = PlantPeriods(drive, scenario, sensors, machine, mode), np.zeros(3)
     levels, waits = np.zeros(3), np.zeros(3)  # of half_gates
     comparison = Comparison(device, register_set)
     await comparison.start(int(scenario.enable[0]))

@@ -37,7 +37,7 @@ from fluxproof.cosim.closed_loop import (
 )
 from fluxproof.cosim.scenarios import SCENARIOS
 from fluxproof.files import write_json
-from fluxproof.plant import Machine
+from fluxproof.plant import FREE, Machine, Sensors
 from golden_model import drive as drives
 from golden_model.fluxproof import Config
 from golden_model.registers import registers
@@ -67,6 +67,8 @@ class ClosedLoop:
     scenario: Scenario
     machine: Machine | None = None
     ideal_inverter: bool = False
+    sensors: Sensors | None = None
+    mode: int = FREE
 
     @property
     def config(self) -> Config:
@@ -76,7 +78,7 @@ class ClosedLoop:
         return len(self.scenario)
 
     async def on(self, device: Device, progress: Progress) -> Result:
-        options = dict(machine=self.machine, ideal_inverter=self.ideal_inverter)
+        options = dict(machine=self.machine, ideal_inverter=self.ideal_inverter, sensors=self.sensors, mode=self.mode)
         return await cosimulate(device, self.drive, self.registers, self.scenario, progress, **options)
 
 
@@ -121,7 +123,7 @@ async def carry_out(run: Run, device: Device, folder: Path) -> Result:
     arrays = {f"observed_{name}": values for name, values in result.observed.items()}
     arrays |= {f"plant_{name}": values for name, values in result.plant.items()}
     temporary = folder / ".result.npz"
-    np.savez(temporary, **arrays, gate_edges=result.gate_edges)
+    np.savez(temporary, **arrays, samples=result.samples, gate_edges=result.gate_edges)
     os.replace(temporary, folder / "result.npz")
     names = ("periods_compared", "differences", "first_difference", "sample_to_duty_clocks")
     counts = {name: getattr(result, name) for name in names}
@@ -132,6 +134,8 @@ async def carry_out(run: Run, device: Device, folder: Path) -> Result:
 
 class Job:
     """One run on one engine and what became of it; ``name`` must be its own, it also names the folder in build/runs."""
+
+    starts = "building"  # what it does before its first period
 
     def __init__(self, name: str, named: Named):
         self.name, self.named, self.run = name, named, named.make()
@@ -167,7 +171,7 @@ class Job:
         return json.loads(path.read_text()) if path.exists() else {}
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """The run's values: observed_NAME, plant_NAME and gate_edges."""
+        """The run's values: observed_NAME, plant_NAME, samples and gate_edges."""
         with np.load(self.folder / "result.npz") as stored:
             return dict(stored)
 
@@ -224,7 +228,12 @@ class InGhdl(Job):
 
 def kernels(part: str) -> Callable[[], object]:
     """A call that compiles the kernels ``golden`` or ``plant`` in another process, where they are not on disk yet."""
-    return lambda: subprocess.run([sys.executable, "-m", __spec__.name, part], cwd=ROOT, capture_output=True)
+
+    def compile_them() -> None:
+        subprocess.run([sys.executable, "-m", __spec__.name, part], cwd=ROOT, capture_output=True)
+
+    compile_them.__name__ = f"kernels of the {part}"
+    return compile_them
 
 
 def compile_kernels(part: str) -> None:

@@ -21,13 +21,16 @@ MOST_PROBLEMS = 5
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the subcommand."""
     formats = "CSV, Parquet, MATLAB, MDF4, HDF5, NumPy or a telemetry dump; several of the same drive"
-    parser.add_argument("recordings", metavar="RECORDING", nargs="+", help=formats)
-    parser.add_argument("--drive", metavar="drive.toml", required=True, help="the nominal drive in SI units")
+    parser.add_argument("recordings", metavar="RECORDING", nargs="*", help=formats)
+    parser.add_argument("--drive", metavar="drive.toml", help="the nominal drive in SI units")
+    example = "make a recording of a simulated motor that differs from its drive file, and diagnose it"
+    parser.add_argument("--example", action="store_true", help=example)
     parser.add_argument("--out", metavar="DIR", help=f"folder for the results (default: {FOLDER}/NAME OF RECORDING)")
     prior = "fleet.parquet of `fluxproof fleet` for the same drive file, used as prior"
     parser.add_argument("--prior", metavar="fleet.parquet", help=prior)
     parser.add_argument("--open", action="store_true", help="show the report in the browser")
     parser.add_argument("--quiet", action="store_true", help="no progress on stderr")
+    parser.set_defaults(usage_error=parser.error)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -35,15 +38,49 @@ def run(args: argparse.Namespace) -> int:
     from fluxproof.diagnosis.ground.nominal import load_nominal
     from fluxproof.diagnosis.session import run as session
 
-    nominal = load_nominal(args.drive)
-    out = Path(args.out) if args.out else default_folder(args.recordings)
+    check_inputs(args)
+    out = Path(args.out) if args.out else FOLDER / "example" if args.example else default_folder(args.recordings)
     with Progress(quiet=args.quiet) as progress:
-        answer = session(args.recordings, nominal, out, progress, args.prior)
-    for line in answer_lines(answer, nominal, out):
+        recordings, drive = make_example(out, progress) if args.example else (args.recordings, args.drive)
+        nominal = load_nominal(drive)
+        answer = session(recordings, nominal, out, progress, args.prior)
+    lines = answer_lines(answer, nominal, out)
+    if args.example:
+        lines += example_lines(answer, recordings, drive)
+    for line in lines:
         say(line)
     if args.open and not show(out / "report.html"):
         say(f"fluxproof: no browser can be opened; the report is {out / 'report.html'}", sys.stderr)
     return 0
+
+
+def check_inputs(args: argparse.Namespace) -> None:
+    """End with the usage unless there are a recording and a drive file, or --example in place of both."""
+    if args.example and (args.recordings or args.drive):
+        given = f"RECORDING {args.recordings[0]}" if args.recordings else f"--drive {args.drive}"
+        args.usage_error(f"--example brings a recording and a drive file of its own: leave out {given}")
+    needed = {"RECORDING": args.recordings, "--drive drive.toml": args.drive}
+    missing = [name for name, value in needed.items() if not value]
+    if missing and not args.example:
+        needed = f"the following arguments are required: {', '.join(missing)}"
+        args.usage_error(f"{needed} (or --example for a recording that is made here)")
+
+
+def make_example(out: Path, progress) -> tuple[list[Path], Path]:
+    """Write the example's recording and drive file to ``out``; ([recording], drive file)."""
+    from fluxproof.diagnosis.example.recording import write
+
+    progress("the golden core drives the motor of the example; the first run compiles it, half a minute")
+    example = write(out)
+    return [example.recording], example.drive
+
+
+def example_lines(answer, recordings: list[Path], drive: Path) -> list[str]:
+    """What was hidden and what was found of it, and the ordinary command on the same files."""
+    from fluxproof.diagnosis.example.truth import lines
+
+    again = f"the same again: fluxproof diagnose {recordings[0]} --drive {drive}"
+    return ["", *lines(answer.to_json()["effects"]), "", again]
 
 
 def show(page: Path) -> bool:

@@ -8,7 +8,8 @@
 #   yosys, nextpnr               compiled for this machine where they first run, a minute of work
 needs_of() {
     case "$1" in
-        demo | papers | faults) echo core report sim ghdl c++ ghdl5 ;;
+        demo) echo core run report sim ghdl c++ ghdl5 ;;
+        papers | faults) echo core report sim ghdl c++ ghdl5 ;;
         timeline) echo core report sim ghdl ;;
         generate | registers | package) echo core report package ;;
         blind) echo run blind fleet ;;

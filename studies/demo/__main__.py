@@ -1,9 +1,10 @@
-"""`make demo`: Fig. 9 of paper 001 with the RTL in the loop, and a real recording through the same core.
+"""`make demo`: the RTL spins a motor, and says why another one differs from its drive file.
 
-In Verilator the RTL, converted to Verilog, runs Fig. 9 at the drive's own clock and the whole recording; beside it
-the VHDL itself runs the first periods of both in GHDL, at fewer clocks in a period.  The golden model goes along with
-each.  Writes build/demo/summary.json, the figures and report.html.  Exit status: 0 equal in every bit, 1 where anything
-differs or fails.
+In Verilator the RTL, converted to Verilog, runs Fig. 9 of paper 001 at the drive's own clock, then a real recording;
+beside it the VHDL itself runs the first periods of both in GHDL, at fewer clocks in a period.  Then the RTL drives the
+motor of `fluxproof diagnose --example`, and its telemetry is diagnosed.  The golden model goes along with each run.
+Writes build/demo/summary.json, the figures, report.html and diagnosis/.  Exit status: 0 equal in every bit and every
+hidden difference named, 1 where anything differs or fails.
 """
 
 from __future__ import annotations
@@ -22,14 +23,16 @@ from fluxproof.cosim import recording as recordings
 from fluxproof.cosim.runs import InGhdl, InVerilator, Job, Named, kernels
 from fluxproof.files import write_json
 from golden_model import drive as drives
-from studies.demo import plots, report
+from studies.demo import concealed, plots, report
+from studies.demo.example import Diagnosis, run_length
 
 DEMO = BUILD / "demo"
 PAPER, EMRAX = DRIVES / "paper001.toml", DRIVES / "emrax228.toml"
-# Clocks in half a PWM period.  GHDL takes 30 times as long for a clock as Verilator, so a period has a tenth of them.
-# The recording has no clock of its own: one sample in 200 clocks is as much idle time as working time for the core.
-GHDL_CARRIER, REPLAY_CARRIER = 1000, 100
-GHDL_PERIODS, GHDL_ROWS = 150, 400
+# Clocks in half a PWM period, for all but Fig. 9 in Verilator, which has the drive's own: 200 clocks in a period are as
+# much idle as working time for the core.  GHDL takes a thousand times as long for a clock as Verilator, so the VHDL
+# runs as much as takes it ten seconds each.
+CARRIER = 100
+GHDL_PERIODS, GHDL_ROWS = 150, 200
 LEAST_PERIODS, LEAST_GHDL_PERIODS = 3000, 150
 
 
@@ -39,10 +42,19 @@ class Lane(threading.Thread):
     def __init__(self, *steps: Callable[[], object]):
         super().__init__(daemon=True)
         self.steps = steps
+        self.seconds: list[tuple[str, float]] = []  # what each step took
 
     def run(self) -> None:
         for step in self.steps:
+            began = time.monotonic()
             step()
+            self.seconds.append((step_name(step), round(time.monotonic() - began, 1)))
+
+
+def step_name(step: Callable[[], object]) -> str:
+    """What a lane's step does, for summary.json."""
+    job = getattr(step, "__self__", None)
+    return f"{job.name}, {step.__name__}" if hasattr(job, "name") else step.__name__
 
 
 class Progress:
@@ -65,9 +77,12 @@ class Progress:
             tenth = 10 * done[s] // s.total
             if s not in self.shown and s.begun:
                 self.shown[s] = 0
-                print(f"{s.name}: building", file=self.out, flush=True)
+                print(f"{s.name}: {s.starts}", file=self.out, flush=True)
             if tenth > self.shown.get(s, 0):
                 self.shown[s] = tenth
+                if s.total == 1:  # done in one piece: no rate to show
+                    print(f"{s.name}: done", file=self.out, flush=True)
+                    continue
                 rate, left = self.speed(s, done[s], now)
                 state = f"{s.name}: {10 * tenth} %, {done[s]} of {s.total} periods"
                 print(f"{state}, {rate:.0f}/s, {left:.0f} s left", file=self.out, flush=True)
@@ -85,7 +100,7 @@ class Progress:
         for s in running:
             bar = "#" * (width * done[s] // s.total)
             text = f"[{bar:.<{width}}] {done[s]}/{s.total} {self.speed(s, done[s], now)[0]:.0f}/s"
-            parts.append(f"{s.name} {text if done[s] else 'building'}")
+            parts.append(f"{s.name} {text if done[s] else s.starts}")
         left = max([self.speed(s, done[s], now)[1] for s in running], default=0)
         return "  ".join([*parts, f"{left:.0f} s left" if left else ""])[:columns]
 
@@ -111,15 +126,21 @@ def both(name: str, function: str, verilator: tuple, ghdl: tuple) -> SimpleNames
     )
 
 
+def diagnosed() -> tuple[InVerilator, Diagnosis]:
+    """The RTL on the motor of the example, and the diagnosis of its telemetry."""
+    driven = InVerilator("example in Verilator", Named("studies.demo.example:in_the_loop", (CARRIER,)))
+    return driven, Diagnosis(driven, DEMO / "diagnosis")
+
+
 def prepare(carrier_half: int, ghdl_periods: int):
     """(closed loop, replay, recording, why it is skipped); the last three may be None."""
     function, paper = "fluxproof.cosim.runs:closed_loop", str(PAPER)
-    in_ghdl = (paper, GHDL_CARRIER, "fig9", ghdl_periods)
+    in_ghdl = (paper, CARRIER, "fig9", ghdl_periods)
     loop = both("Fig. 9", function, (paper, carrier_half, "fig9"), in_ghdl)
     path, skipped = recordings.recording_path()
     if skipped:
         return loop, None, None, skipped
-    function, log = "fluxproof.cosim.recording:replay", (str(path), str(EMRAX), REPLAY_CARRIER)
+    function, log = "fluxproof.cosim.recording:replay", (str(path), str(EMRAX), CARRIER)
     replay = both("recording", function, log, (*log, GHDL_ROWS))
     return loop, replay, recordings.load_recording(path), None
 
@@ -153,11 +174,22 @@ def collect(loop: SimpleNamespace, replay: SimpleNamespace | None, recording, sk
     return {**summary, "recording": found}, plots.draw(run, gates, view), view
 
 
+def found(driven: InVerilator, diagnosis: Diagnosis):
+    """(the summary's part on the example, what its figure shows)."""
+    view = concealed.view(*diagnosis.files, diagnosis.answer)
+    counts = driven.summary()
+    numbers = concealed.metrics(view, diagnosis.summary(), run_length())
+    times = {"seconds": counts["seconds"], "diagnosis_seconds": round(diagnosis.seconds, 1)}
+    names = ("periods_compared", "differences", "first_difference")
+    return {**{name: counts[name] for name in names}, **numbers, **times}, view
+
+
 def passed(summary: dict, problems: list[str]) -> bool:
-    """Equal in every bit, and enough of it compared."""
+    """Equal in every bit, enough of it compared, and the example's differences named."""
     differences = summary["differences"] + summary["recording"].get("differences", 0)
+    differences += summary["example"]["differences"]
     enough = summary["periods_compared"] >= LEAST_PERIODS and summary["ghdl_periods"] >= LEAST_GHDL_PERIODS
-    return not problems and differences == 0 and enough
+    return not problems and differences == 0 and enough and concealed.good(summary["example"])
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -171,18 +203,21 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--picture", type=Path, metavar="FILE.png", help="write the README's picture here")
     options, began = parser.parse_args(argv), time.monotonic()
 
-    for old in DEMO.glob("*.*"):  # a run that fails leaves nothing that looks like a result
+    # A run that fails leaves nothing that looks like a result.
+    for old in (*DEMO.glob("*.*"), *DEMO.glob("diagnosis/*.*")):
         old.unlink()
     print("RTL beside its golden model, compared in every value and gate edge of every control period", flush=True)
     loop, replay, recording, skipped = prepare(options.carrier_half, options.ghdl_periods)
     if skipped:
         print(f"recording skipped: {skipped}", flush=True)
     runs = [r for r in (loop, replay) if r]
-    jobs = [job for r in runs for job in (r.verilator, r.ghdl)]
-    # Fig. 9 in Verilator takes the longest; the other lane builds its library meanwhile, then runs all the rest.
-    rest = [loop.ghdl, *([replay.ghdl, replay.verilator] if replay else [])]
-    lanes = [Lane(kernels("golden"), loop.verilator.carry_out)]
-    lanes += [Lane(loop.verilator.build, kernels("plant"), InGhdl.analyse, *(job.carry_out for job in rest))]
+    driven, diagnosis = diagnosed()
+    jobs = [*(job for r in runs for job in (r.verilator, r.ghdl)), driven, diagnosis]
+    # Fig. 9 in Verilator takes the longest; the other lane builds its library meanwhile, then runs nearly all the rest.
+    first = [loop.verilator, *([replay.verilator] if replay else [])]
+    second = [driven, diagnosis, loop.ghdl, *([replay.ghdl] if replay else [])]
+    lanes = [Lane(kernels("golden"), *(job.carry_out for job in first))]
+    lanes += [Lane(loop.verilator.build, kernels("plant"), InGhdl.analyse, *(job.carry_out for job in second))]
     watch(lanes, jobs)
     problems = [f"{job.name}: {job.problem}" for job in jobs if job.problem]
     sys.stderr.writelines(f"{problem}\n" for problem in problems)
@@ -190,6 +225,10 @@ def main(argv: list[str] | None = None) -> int:
         return 1
 
     summary, figures, view = collect(loop, replay, recording, skipped)
+    summary["example"], shown = found(driven, diagnosis)
+    summary["example_carrier_half_clocks"] = CARRIER
+    summary["lanes"] = [lane.seconds for lane in lanes]
+    figures["concealed"] = plots.styled(concealed.figure, shown)
     for name, figure in figures.items():
         plots.write_png(figure, DEMO / f"{name}.png")
     if options.picture:

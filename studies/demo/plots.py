@@ -47,6 +47,12 @@ def draw(run, gates, rec=None) -> dict[str, Figure]:
         return figures if rec is None else {**figures, "recording": recording(rec)}
 
 
+def styled(function, *arguments) -> Figure:
+    """A figure of a drawing function under the one style."""
+    with mpl.rc_context(STYLE):
+        return function(*arguments)
+
+
 def image(figure: Figure, kind: str, **options) -> bytes:
     """The figure as "png" or "svg"; SVG holds its letters as outlines, no font is needed to show it."""
     with mpl.rc_context(STYLE), io.BytesIO() as stream:
@@ -67,7 +73,7 @@ def _axes(*shape: int, size=(WIDTH, HEIGHT), **kwargs):
     return figure, figure.subplots(*shape, **kwargs)
 
 
-def _name(axis, x, y, text: str, color: str, dy: int = 0) -> None:
+def label(axis, x, y, text: str, color: str, dy: int = 0) -> None:
     """A line's name beside its last point, moved up by ``dy`` points."""
     at = dict(textcoords="offset points", va="center", annotation_clip=False)
     axis.annotate(text, (x, y), (4, dy), color=color, **at)
@@ -85,8 +91,8 @@ def _events(axis, run, names: bool = False) -> None:
 def _speed_panel(axis, run) -> None:
     axis.step(run.ms, run.rpm_ref, where="post", color=REFERENCE, linewidth=1.1, linestyle=(0, (4, 2)))
     axis.plot(run.ms, run.rpm, color=SPEED)
-    _name(axis, run.ms[-1], run.rpm_ref[-1], "reference", REFERENCE, dy=6)
-    _name(axis, run.ms[-1], run.rpm[-1], "speed", SPEED, dy=-6)
+    label(axis, run.ms[-1], run.rpm_ref[-1], "reference", REFERENCE, dy=6)
+    label(axis, run.ms[-1], run.rpm[-1], "speed", SPEED, dy=-6)
     _events(axis, run, names=True)
     axis.set(title="Mechanical speed", ylabel="rpm", xlim=(0, run.ms[-1]), ylim=(0, 860))
 
@@ -98,11 +104,11 @@ def _current_panel(axis, run, part=slice(None)) -> None:
     axis.plot(ms, i_q, color=Q_AXIS)
     axis.plot(ms, i_d, color=D_AXIS)
     at_limit = i_q_ref[-1] > run.i_max - 0.3
-    _name(axis, ms[-1], run.i_max, "$i_q$ ref. = limit" if at_limit else "limit", REFERENCE, dy=3)
+    label(axis, ms[-1], run.i_max, "$i_q$ ref. = limit" if at_limit else "limit", REFERENCE, dy=3)
     if not at_limit:
-        _name(axis, ms[-1], i_q_ref[-1], "$i_q$ ref.", REFERENCE, dy=8)
-    _name(axis, ms[-1], i_q[-1], "$i_q$", Q_AXIS, dy=-4)
-    _name(axis, ms[-1], i_d[-1], "$i_d$", D_AXIS)
+        label(axis, ms[-1], i_q_ref[-1], "$i_q$ ref.", REFERENCE, dy=8)
+    label(axis, ms[-1], i_q[-1], "$i_q$", Q_AXIS, dy=-4)
+    label(axis, ms[-1], i_d[-1], "$i_d$", D_AXIS)
     _events(axis, run)
     axis.set(ylabel="A", xlim=(ms[0], ms[-1]))
 
@@ -143,7 +149,7 @@ def phases(run, signal: str, scale: float, title: str, unit: str) -> Figure:
     for phase, color in PHASES.items():
         values = scale * getattr(run, f"{signal}_{phase}")[part]
         axis.plot(run.ms[part], values, color=color)
-        _name(axis, run.ms[-1], values[-1], phase, color)
+        label(axis, run.ms[-1], values[-1], phase, color)
     axis.set(title=title, xlabel="time [ms]", ylabel=unit, xlim=(run.ms[part][0], run.ms[-1]))
     return figure
 

@@ -154,11 +154,14 @@ def verdict(summary: dict) -> str:
     """The whole result in one sentence."""
     text = f"{summary['periods_compared']:,} periods in Verilator and {summary['ghdl_periods']:,} in GHDL, "
     text += f"{_count(summary['differences'])}, duties {summary['sample_to_duty_clocks']} clocks after the sample"
-    rec = summary["recording"]
+    rec, ex = summary["recording"], summary["example"]
     if "skipped" in rec:
-        return f"{text}; recording skipped."
-    text += f"; a real recording: {rec['samples_compared']:,} samples in Verilator and {rec['ghdl_periods']:,} in GHDL"
-    return f"{text}, {_count(rec['differences'])}."
+        text += "; recording skipped"
+    else:
+        text += f"; a real recording: {rec['samples_compared']:,} samples in Verilator and {rec['ghdl_periods']:,} in "
+        text += f"GHDL, {_count(rec['differences'])}"
+    named = sum(row["found"] is not None for row in ex["effects"])
+    return f"{text}; on a motor that differs from its drive file {named} of {len(ex['effects'])} differences named."
 
 
 def _count(differences: int) -> str:
@@ -166,7 +169,7 @@ def _count(differences: int) -> str:
 
 
 def text(summary: dict, drive: Drive) -> str:
-    """The result for the terminal in three lines: what was compared, how it controls, the recording."""
+    """The result for the terminal: what was compared, how it controls, the recording, the motor that differs."""
     s, rec, ns = summary, summary["recording"], summary["sample_to_duty_clocks"] / drive.core.clock_hz * 1e9
     ratio = f"{2 * s['carrier_half_clocks']:,} clocks a period"
     recording = "skipped: {skipped}" if "skipped" in rec else f"{{samples_compared:,}} samples, {LOGGED}"
@@ -176,7 +179,21 @@ def text(summary: dict, drive: Drive) -> str:
 control: duties {ns:.0f} ns after the sample, {s["speed_error_rpm"]["before_load_step"]:.1f} rpm off at 732 rpm, \
 {s["speed_dip_rpm"]:.0f} rpm dip under load, peak current {s["peak_current_a"]:.2f} A, \
 dead time {s["shortest_dead_time_us"]:g} µs
-EMRAX 228 recording: {recording.format(**rec)}"""
+EMRAX 228 recording: {recording.format(**rec)}
+{example_text(s["example"])}"""
+
+
+def example_text(ex: dict) -> str:
+    """The motor that differs from its drive file: the replay, the misfit, every name beside the truth."""
+    fit, equal = ex["misfit"], "equal" if ex["replay_equal"] else "NOT equal"
+    lines = [
+        f"motor that differs from its drive file: {ex['periods_compared']:,} periods, {_count(ex['differences'])}; "
+        f"{ex['replayed']:,} samples of telemetry replayed, {equal} in every bit",
+        f"diagnosis: misfit at points that were not fitted {fit['holdout_before']:.3g} V before, "
+        f"{fit['holdout_after']:.3g} V after",
+    ]
+    lines += [f"  {row['hidden']}: true {row['true_text']}, found {row['found_text']}" for row in ex["effects"]]
+    return "\n".join([*lines, *(f"  {name}: asserted, but not there" for name in ex["false_names"])])
 
 
 def described(drive: Drive) -> list[SimpleNamespace]:
