@@ -163,7 +163,7 @@ def test_any_error_is_one_line(error, words, inputs, monkeypatch, capsys):
     def fails(*_):
         raise error
 
-    monkeypatch.setattr("fluxproof.print_registers.load", fails)
+    monkeypatch.setattr("fluxproof.print_registers.load_drive", fails)
     monkeypatch.delenv("FLUXPROOF_DEBUG", raising=False)
     assert main(["registers", str(inputs / "drive.toml")]) == 2
     err = capsys.readouterr().err

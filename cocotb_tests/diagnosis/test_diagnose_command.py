@@ -88,7 +88,7 @@ def test_outputs_with_a_correct_controller(explained, dump):
     assert data["verdict"] == "explained" and [e["name"] for e in data["effects"]] == ["magnet_flux"]
     assert data["digital"] == {"checked": True, "samples": len(dump[0]), "first_difference": None}
     assert any("equals its golden model" in note for note in data["notes"])
-    assert any("closed loop" in note and "improved" in note for note in data["notes"])
+    assert any("closed-loop" in note and "improved" in note for note in data["notes"])
     page = (out / "report.html").read_text()
     assert data["sentence"].split(" (")[0] in page and 'id="overlay"' in page
 
