@@ -58,7 +58,7 @@ papers: setup ## reproduce the papers' experiments: findings, figures, report
 bench: setup ## run the benchmarks
 	$(PYTHON_RUN) -m studies.bench.golden $(ARGS)
 	$(PYTHON_RUN) -m studies.bench.diagnose
-	$(PYTHON_RUN) -m pytest -q -m study cocotb_tests/diagnosis/test_recordings.py
+	$(PYTHON_RUN) -m pytest -q -m study cocotb_tests/diagnosis/readers/test_recordings.py
 
 blind: setup ## run the sealed benchmark of the diagnosis
 	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m studies.blind $(ARGS)

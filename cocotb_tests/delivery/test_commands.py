@@ -15,9 +15,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from cocotb_tests.core.test_registers import PAPER
-from cocotb_tests.support import diagnosed_drives as bench
-from cocotb_tests.support.moments import Moment, contents, run
+from cocotb_tests.support.drives import PAPER
+from cocotb_tests.support.processes.moments import Moment, contents, run
+from cocotb_tests.support.recordings import from_core as bench
 from fluxproof import files
 from fluxproof.checkout import ROOT
 from fluxproof.command import main

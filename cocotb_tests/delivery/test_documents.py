@@ -7,6 +7,7 @@ import subprocess
 
 import pytest
 
+from cocotb_tests.support.drives import PAPER
 from fluxproof.checkout import ROOT
 from fluxproof.diagnosis.conventions.table import READINGS, readings_for
 from fluxproof.diagnosis.ground.nominal import load_nominal
@@ -55,7 +56,7 @@ def test_every_code_of_a_convention_is_listed():
     section = text[text.index("## 8. ") : text.index("## 9. ")]
     listed = re.findall(r"`(\w+)`", "".join(re.findall(r"^\|.*$", section, re.M)))
     listed.remove("conventions"), listed.remove("rivals")  # the head of the table
-    drive = load_nominal(ROOT / "docs" / "drives" / "paper001.toml")
+    drive = load_nominal(PAPER)
     assert sorted(listed) == sorted([r.code for r in readings_for(drive)] + ["pole_pairs", "sample_time_s"])
     more = ("no", "one", "two", "three", "four", "five", "six")[len(readings_for(drive)) - len(READINGS)]
     assert f"{len(READINGS)}, and {more} more" in section

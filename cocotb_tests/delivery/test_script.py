@@ -9,7 +9,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from cocotb_tests.delivery.test_commands import STOPPED, write_inputs
-from cocotb_tests.support.moments import Moment, run
+from cocotb_tests.support.processes.moments import Moment, run
 from fluxproof.checkout import ROOT
 from fluxproof.fleet import engine
 
