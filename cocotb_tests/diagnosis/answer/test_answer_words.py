@@ -21,7 +21,6 @@ from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.command import effect_table
 from fluxproof.diagnosis.effects.effect import Parameter
 from fluxproof.diagnosis.ground.nominal import load_nominal
-from fluxproof.diagnosis.ground.quantities import ascii_of, measured
 from fluxproof.diagnosis.ground.recording import Problem
 from fluxproof.diagnosis.ground.result import (
     VERDICTS,
@@ -252,11 +251,6 @@ def test_plausible_limits_are_of_declared_parameters():
         assert bool(effect.plausible) == bool(effect.otherwise)
         assert all(low < high for low, high, *_ in effect.plausible.values())
         assert effect.stays == "" or effect.corrects or "time" in effect.needs
-
-
-@pytest.mark.parametrize("sigma, text", [(0.1, "5.09 +- 0.10 V"), (0.23, "5.1 +- 0.2 V"), (0.0, "5.087 V")])
-def test_error_has_one_digit_or_two(sigma, text):
-    assert ascii_of(measured(5.0873, sigma, "V", digits=1)) == text
 
 
 def test_requested_points_are_round_and_within_the_limits():

@@ -7,32 +7,14 @@ import pytest
 
 from cocotb_tests.support.drives import PAPER
 from cocotb_tests.support.recordings.blind_cases import files_of
-from cocotb_tests.support.slow import slowly
-from fluxproof.diagnosis.answer import conclude
 from fluxproof.diagnosis.balance.cells import _steep_variance
 from fluxproof.diagnosis.balance.shaft import airgap, bend_gain, shaft_kind
 from fluxproof.diagnosis.ground.nominal import load_nominal
 from fluxproof.diagnosis.ground.recording import from_columns
 from fluxproof.diagnosis.loading.load import load_recording
 from fluxproof.diagnosis.physics import rows_of, view_and_held
-from fluxproof.diagnosis.session import diagnose
 
 NOMINAL = load_nominal(PAPER)
-
-
-@pytest.mark.parametrize(
-    ("seed", "count", "number", "kind", "names"),
-    [
-        slowly(26112026, 80, 6, "free", {"cogging"}),
-        (27112026, 100, 34, "loaded", {"cogging", "magnet_flux"}),  # the transducer measures the load only
-    ],
-)
-def test_cogging_that_the_speed_loop_conceals_is_named(seed, count, number, kind, names, tmp_path):
-    """Only slow blocks show it; they were given the noise of the fast ones."""
-    recording, drive = files_of(number, tmp_path, seed, "own", count)
-    answer = diagnose(recording, drive)
-    assert {e.name for e in answer.effects} == names and answer.verdict == "explained"
-    assert set(answer.search.setup.view.shaft) == {kind}
 
 
 @pytest.mark.parametrize(
@@ -74,30 +56,3 @@ def test_the_variance_of_a_part_is_found_at_any_size(constant, growing):
     found = _steep_variance(rng.normal(size=n) * np.sqrt(true), np.ones(n, bool), np.arange(n - 1), shape)
     seen = true > 1e-6
     assert np.all(np.abs(np.log(found[seen] / true[seen])) < np.log(3.0))
-
-
-def test_a_mean_torque_counts_beside_the_noise_of_its_ripple(monkeypatch):
-    """A friction was dropped as one part in a thousand of the voltage's noise fitted better without it."""
-    means, ripple, volts = np.arange(10), np.arange(10, 110), np.arange(110, 210)
-    left, fewer, noise = (np.zeros(210) for _ in range(3))
-    left[means], fewer[means], noise[means] = 0.2, 4.0, 0.6
-    left[ripple], fewer[ripple], noise[ripple] = 30.0, 30.0, 50.0
-    left[volts], fewer[volts], noise[volts] = 0.0900, 0.0899, 0.1
-    cells = SimpleNamespace(
-        channel=np.where(np.arange(210) < 110, "torque", "u"),
-        order=np.where((np.arange(210) >= 10) & (np.arange(210) < 110), 34.0, 0.0),
-        ok=np.ones(210, bool),
-        block=np.zeros(210, int),
-    )
-    setup = SimpleNamespace(cells=cells, usual=noise, load=0.0)
-    without = SimpleNamespace(names=(), left=lambda told: fewer)
-    best = SimpleNamespace(
-        names=("a",),
-        left=lambda told: left if told else fewer,
-        problem=SimpleNamespace(setup=setup, fit=lambda names: without),
-    )
-    monkeypatch.setattr(conclude, "_uncertain", lambda fit, told, rows: np.zeros(len(rows)))
-    posterior = SimpleNamespace(best=lambda: best, setup=setup)
-    assert conclude.helps(posterior, "a", {"a"}, np.ones(1, bool))
-    left[means] = 4.1  # it explains nothing there
-    assert not conclude.helps(posterior, "a", {"a"}, np.ones(1, bool))

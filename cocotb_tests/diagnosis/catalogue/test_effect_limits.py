@@ -10,11 +10,8 @@ import pytest
 from cocotb_tests.support.drives import PAPER
 from cocotb_tests.support.recordings.from_core import GRID, MACHINE, columns, recorded
 from fluxproof.diagnosis import diagnose
-from fluxproof.diagnosis.answer.names import MEDIAN, _seen_discrepancy, credibilities, names_of
 from fluxproof.diagnosis.balance.blocks import view_of
-from fluxproof.diagnosis.balance.joined import joined_views
-from fluxproof.diagnosis.balance.misfit import bulge, misfit
-from fluxproof.diagnosis.balance.operating_points import point_numbers
+from fluxproof.diagnosis.balance.misfit import misfit
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.catalogue.current_gain import PATTERNS
 from fluxproof.diagnosis.ground.nominal import load_nominal
@@ -27,22 +24,6 @@ IDLE = ((160.0, 0.0, 0.0),) * 20
 @pytest.fixture(scope="module")
 def view():
     return view_of(recorded(), NOMINAL)
-
-
-def test_the_mean_current_of_a_period_is_that_of_the_stator_frame(view):
-    """The flux is linear in time while the rotor turns; here the current is integrated numerically."""
-    m, omega, i = MACHINE, 900.0, -2.0 + 4.0j
-    period = NOMINAL.sample_time_s
-    theta = np.array([[-0.5, 0.5]]) * omega * period
-    psi = m.inductance_d_h * i.real + m.magnet_flux_wb + 1j * m.inductance_q_h * i.imag
-    begin, end = psi * np.exp(1j * theta[0])
-    share = (np.arange(20000) + 0.5) / 20000
-    turn = np.exp(1j * (theta[0, 0] + share * omega * period))
-    linked = (begin + share * (end - begin)) / turn
-    mean = np.mean(turn * ((linked.real - m.magnet_flux_wb) / m.inductance_d_h + 1j * linked.imag / m.inductance_q_h))
-    made = view.replace(theta=theta, i=np.full((1, 2), i), omega=np.full((1, 2), omega))
-    plain = i - bulge(made)[0, 0]
-    assert abs(made.i_mid[0, 0] - bulge(made)[0, 0] - mean) < 0.02 * abs(plain - mean)
 
 
 def test_resistance_does_not_fall_with_speed():
@@ -64,29 +45,6 @@ def test_encoder_error_at_the_electrical_order_is_no_current_offset():
 def test_effects_below_their_floor_stay_unnamed():
     answer = diagnose(recorded(machine={"resistance_ohm": 1.007 * MACHINE.resistance_ohm}), NOMINAL)
     assert answer.verdict == "no_mismatch" and not answer.effects
-
-
-def test_short_further_recording_has_no_drift(view):
-    short = view.take(view.run == 2).replace(span_s=0.1 * view.span_s)
-    course = joined_views([view, short, short]).course
-    assert np.all(course[len(view) :] == 1.0) and course[len(view) - 1] == pytest.approx(view.course[-1])
-    as_long = joined_views([view, view]).course
-    assert as_long[len(view) - 1] == pytest.approx(0.5 * view.course[-1]) and as_long[-1] > 0.9
-
-
-def points_view(*points):
-    """A stub view for counting points, with blocks at (speed, i_q) in per unit."""
-    omega, i_q = 500.0 * np.array(points)[:, :1], NOMINAL.machine.rated_current_a * np.array(points)[:, 1:]
-    return SimpleNamespace(machine=NOMINAL.machine, omega=np.repeat(omega, 3, axis=1), i=np.repeat(1j * i_q, 3, axis=1))
-
-
-def test_operating_point_is_not_split():
-    """Blocks scatter around their point; fixed bins would split some points."""
-    for i_q in np.linspace(0.1, 0.9, 81):
-        scattered = [(1.0, i_q + 0.004 * (-1) ** n) for n in range(6)]
-        assert point_numbers(points_view(*scattered), 0.08).tolist() == [0] * 6
-    apart = points_view((1.0, 0.2), (1.0, 0.6), (1.0, 0.21), (-1.0, 0.2))
-    assert point_numbers(apart, 0.08).tolist() == [0, 1, 0, 2]
 
 
 def test_hysteresis_draws_nothing_from_the_noise_of_a_standstill(view):
@@ -203,20 +161,6 @@ def test_the_resistance_of_a_metal_rises_with_its_temperature(view):
     assert possible({"drift": -0.1}, sure[:1, :1], view.nominal)  # without a temperature it may cool down
 
 
-def test_half_of_the_points_show_what_is_left_beside_a_load():
-    """A friction of 0.8 N m on a free shaft, with 0.03 N m left, was no more credible than beside 0.25 N m."""
-    left = np.array([0.03, -0.02, 0.05, -0.03, 5.0])  # the last one is loaded
-    points = SimpleNamespace(
-        y=left, x=np.zeros((5, 1)), level=np.full(5, 0.085), group=np.zeros(5, int), loads=0, groups=[0]
-    )
-    fit = SimpleNamespace(
-        problem=SimpleNamespace(p=points), lam=np.array([3.0]), take=np.zeros(1, int), vector=np.zeros(1)
-    )
-    assert _seen_discrepancy(fit)[0] == pytest.approx(0.03 / 0.085 / MEDIAN)
-    points.y = np.full(5, 5.0)
-    assert _seen_discrepancy(fit)[0] == 3.0
-
-
 @pytest.mark.parametrize("written", [False, True])
 def test_the_gain_of_one_of_two_sensors_is_that_of_one(written):
     """The third current is computed, so that it has the error of the others; three gains were 4.5, -1.5, 1.5 %.
@@ -262,66 +206,6 @@ def test_what_is_clearly_seen_is_named_though_it_is_small():
     c["i_a"] = c["i_a"] + 0.8 * CATALOGUE["current_offset"].floor(NOMINAL)
     answer = diagnose(from_columns(c, NOMINAL.sample_time_s), NOMINAL)
     assert [e.name for e in answer.effects] == ["current_offset"] and answer.verdict == "explained"
-
-
-def two_effects(share_along):
-    """A fit of a sure effect of the size 10 and one of the size 2, beside a leftover of the size 1.
-
-    share_along: of what the small one explains that lies along the large one's column.
-    """
-    x = np.stack([np.tile([1.0, 1.0], 50), np.tile([1.0, -1.0], 50)], axis=1)
-    x[:, 1] = np.sqrt(share_along) * x[:, 0] + np.sqrt(1.0 - share_along) * x[:, 1]
-    points = SimpleNamespace(
-        y=np.zeros(100), x=x, level=np.full(100, 0.1), doubt=np.zeros(100), group=np.zeros(100, int), loads=-1,
-        groups=[("u", 6.0, False)],
-    )  # fmt: skip
-    problem = SimpleNamespace(p=points, keys=[("large", "a"), ("small", "a")], setup=SimpleNamespace(load=0.0))
-    return SimpleNamespace(
-        problem=problem, names=("large", "small"), lam=np.array([10.0]), mu=np.zeros(1), take=np.arange(2),
-        vector=np.array([10.0, 2.0]), variance=np.ones(100),
-    )  # fmt: skip
-
-
-@pytest.mark.parametrize("load, credible", [(1.0, True), (0.0, False)])
-def test_a_torque_that_nobody_measured_does_not_withhold_what_the_voltage_shows(load, credible):
-    """Offsets of the sensors, all that the voltage showed, were possible (0.21) beside an unknown load of the shaft.
-
-    A torque of a transducer counts.
-    """
-    seen, torque = np.repeat([True, False], 50), np.repeat([False, True], 50)
-    points = SimpleNamespace(
-        y=np.zeros(100), x=(np.where(seen, 1.0, 3.0))[:, None], level=np.full(100, 0.1), doubt=np.zeros(100),
-        group=torque.astype(int), loads=-1, groups=[("u", 1.0, False), ("torque", 1.0, False)],
-    )  # fmt: skip
-    problem = SimpleNamespace(
-        p=points, keys=[("offset", "a")], setup=SimpleNamespace(load=load),
-        cells=SimpleNamespace(electrical=frozenset({"offset"})),
-    )  # fmt: skip
-    fit = SimpleNamespace(
-        problem=problem, names=("offset",), lam=np.array([1.0, 30.0]), mu=np.zeros(2), take=np.arange(1),
-        vector=np.ones(1), variance=np.ones(100),
-    )  # fmt: skip
-    assert (credibilities(fit)["offset"] > 0.95) is credible
-
-
-def test_an_error_of_a_sure_effect_imitates_what_is_like_it():
-    """EMF harmonics beside a dead time were withheld for its error; a resistance beside it may well be that error."""
-    apart, alike = (credibilities(two_effects(share)) for share in (0.05, 0.99))
-    assert apart["large"] > 0.999 and alike["large"] > 0.999
-    assert apart["small"] > 0.95 > alike["small"]
-
-
-def test_an_effect_is_as_credible_as_in_the_mean_of_its_sets():
-    """An iron loss of 1750 +- 860 ohm was named, as one of its sets left less beside it than the best one."""
-    sets = [(0.6, two_effects(0.99)), (0.4, two_effects(0.05))]
-    posterior = SimpleNamespace(
-        weights=lambda: sets, best=lambda: sets[0][1], present=lambda: {"large": 1.0, "small": 1.0},
-        setup=SimpleNamespace(effects={name: SimpleNamespace(named=True) for name in ("large", "small")}),
-    )  # fmt: skip
-    names = names_of(posterior)
-    assert names.said == {"large"}
-    expected = sum(p * credibilities(fit)["small"] for p, fit in sets)
-    assert names.maybe["small"] == pytest.approx(expected)
 
 
 WARMED = [((20, 60), 0.0, True), ((20, 60), 0.0039, False), ((20, 23), 0.0, False)]

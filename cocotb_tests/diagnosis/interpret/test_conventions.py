@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 
-import numpy as np
 import pytest
 
 from cocotb_tests.support.drives import PAPER
@@ -13,7 +12,7 @@ from cocotb_tests.support.recordings.with_mistake import MISTAKES, PHASES, ROOT2
 from cocotb_tests.support.slow import halved
 from fluxproof.diagnosis import diagnose
 from fluxproof.diagnosis.answer.improve import write_improved
-from fluxproof.diagnosis.conventions.table import READINGS, readings_for
+from fluxproof.diagnosis.conventions.table import readings_for
 from fluxproof.diagnosis.ground.nominal import load_nominal
 from fluxproof.diagnosis.loading.load import load_recording
 from fluxproof.diagnosis.session import run
@@ -22,9 +21,7 @@ GIVEN_BACK = (  # whose improved drive file is tried as well
     "currents in rms", "dq voltages line to line", "angle of the q axis", "bus at half", "R, L and psi line to line",
     "L in mH", "half the pole pairs, angle of the shaft", "sample time half", "R and L line to line, currents in rms",
 )  # fmt: skip
-
 OF_DATA_SHEETS = ("psi_line_rms_of_shaft", "psi_line_rms_krpm", "psi_torque_rms")
-
 # Every mistake that a table can show: of dq values, of the speed, of the drive file without its times.
 IN_TABLES = [
     name for name, m in MISTAKES.items()
@@ -126,12 +123,3 @@ def test_a_constant_of_a_data_sheet_is_told(name, tmp_path):
     recording, drive = written(dataclasses.replace(MISTAKES[name], dq=True), tmp_path)
     answer = diagnose(table_of(recording, tmp_path / "points.csv"), drive)
     assert [c.code for c in answer.conventions] == [MISTAKES[name].found] and not answer.effects, answer.sentence
-
-
-def test_every_reading_has_a_code_of_its_own_and_an_inverse_factor():
-    codes = [r.code for r in READINGS]
-    assert len(set(codes)) == len(codes)
-    rms = next(r for r in READINGS if r.code == "currents_rms")
-    assert rms.factor == pytest.approx(1 / ROOT2) and rms.columns()["i_a"] == (pytest.approx(ROOT2), 0.0)
-    angle = next(r for r in READINGS if r.code == "angle_90")
-    assert angle.factor is None and angle.columns() == {"theta_e": (1.0, pytest.approx(-np.pi / 2))}

@@ -1,6 +1,5 @@
 """Cases of the blind study as files."""
 
-
 from studies.blind.generate import generate_case, listing
 
 SEED, LATER, LAST, FOURTH, FIFTH, COUNT = 25112032, 26112026, 27112026, 29112026, 30112026, 60
