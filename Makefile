@@ -1,7 +1,7 @@
 # Fluxproof. Every target that needs tools sets them up first (scripts/setup.sh);
 # when everything is there already, that is a comparison of hashes.
 #
-#   make test ARGS='-k current_loop'   hand options to pytest (or to any other script)
+#   make test ARGS='-k speed_pi'       hand options to pytest (or to any other script)
 #   make test JOBS=4                   number of test processes
 
 SHELL := /bin/bash
