@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+pytest.register_assert_rewrite("cocotb_tests.support")  # else a failing assert there shows no values
 COLLECTED = pytest.StashKey[list]()
 
 
