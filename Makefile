@@ -1,7 +1,7 @@
 # Fluxproof. Every target that needs tools sets them up first (scripts/setup.sh);
 # when everything is there already, that is a comparison of hashes.
 #
-#   make test ARGS='-k current_loop'   hand options to pytest (or to any other script)
+#   make test ARGS='-k speed_pi'       hand options to pytest (or to any other script)
 #   make test JOBS=4                   number of test processes
 
 SHELL := /bin/bash
@@ -58,7 +58,7 @@ papers: setup ## reproduce the papers' experiments: findings, figures, report
 bench: setup ## run the benchmarks
 	$(PYTHON_RUN) -m studies.bench.golden $(ARGS)
 	$(PYTHON_RUN) -m studies.bench.diagnose
-	$(PYTHON_RUN) -m pytest -q -m study cocotb_tests/diagnosis/test_recordings.py
+	$(PYTHON_RUN) -m pytest -q -m study cocotb_tests/diagnosis/readers/test_recordings.py
 
 blind: setup ## run the sealed benchmark of the diagnosis
 	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m studies.blind $(ARGS)

@@ -11,8 +11,8 @@ from random import Random
 import numpy as np
 import pytest
 
-from cocotb_tests.support import converter_twins
-from cocotb_tests.support.converter_models import SpiConverter, Xadc, modulate
+from cocotb_tests.support.peripherals import golden_converters
+from cocotb_tests.support.peripherals.converter_model import SpiConverter, Xadc, modulate
 from fluxproof.cosim.verilated import VerilatedCore
 from golden_model.converters import sinc3, spi_converter, spi_frame, xadc_reader
 
@@ -87,7 +87,7 @@ def check_spi(core, adc_bits, given, answers, regs):
     names = [p.name for p in spi_converter.BLOCK.inputs]
     seen = core.play(dict(zip(names, given.T, strict=True)), outputs_of(spi_converter))
     order = tuple(regs[p.name] for p in spi_converter.BLOCK.registers)
-    wanted = converter_twins.spi(spi_converter.State(), *np.ascontiguousarray(given.T), order, adc_bits, LINES)
+    wanted = golden_converters.spi(spi_converter.State(), *np.ascontiguousarray(given.T), order, adc_bits, LINES)
     assert np.array_equal(wanted, seen), np.argwhere(wanted != seen)[:3]
     codes = seen[seen[:, 3] == 1][:, 6:]
     held = [h for h in answers if h is not None]
@@ -169,7 +169,7 @@ def check_xadc(core, given, answers, regs, sign=0):
     names = [p.name for p in xadc_reader.BLOCK.inputs]
     seen = core.play(dict(zip(names, given.T, strict=True)), outputs_of(xadc_reader))
     order = tuple(regs[p.name] for p in xadc_reader.BLOCK.registers)
-    assert np.array_equal(converter_twins.xadc(xadc_reader.State(), given, order, 12), seen)
+    assert np.array_equal(golden_converters.xadc(xadc_reader.State(), given, order, 12), seen)
     codes = seen[seen[:, 3] == 1][:, 5:]
     held = [h for h in answers if h is not None]
     for got, channels in zip(codes.tolist(), held, strict=True):
@@ -223,7 +223,7 @@ def sinc_windows(core, bits, oversampling, every, seed):
     core.set_many(regs)
     core.reset()
     seen = core.play({"sample_trigger": trigger, "mod_bit": line, "bits_valid": valid}, outputs_of(sinc3))
-    assert np.array_equal(converter_twins.sinc(sinc3.State(), trigger, line, valid, *regs.values(), 16), seen)
+    assert np.array_equal(golden_converters.sinc(sinc3.State(), trigger, line, valid, *regs.values(), 16), seen)
     assert not seen[:, 2].any()
     codes = seen[seen[:, 1] == 1][:, 0]
     started = np.flatnonzero(trigger) + 2 + regs["start_clocks"]

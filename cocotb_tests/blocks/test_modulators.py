@@ -10,7 +10,7 @@ from random import Random
 import numpy as np
 import pytest
 
-from cocotb_tests.support.converter_models import modulate
+from cocotb_tests.support.peripherals.converter_model import modulate
 from golden_model.converters import modulator_input, sinc_overcurrent
 
 VALID, HOLD = 3, 1  # clocks: a bit is on the line so long after the edge that launches it, the one before stays so long

@@ -4,6 +4,6 @@ from fluxproof.cosim import ghdl
 
 
 def test_power_stage():
-    folder = ghdl.run("power_stage", "cocotb_tests.support.dut_power_stage", {}, {})
+    folder = ghdl.run("power_stage", "cocotb_tests.support.in_simulator.dut_power_stage", {}, {})
     problem = ghdl.failure(folder)
     assert problem is None, problem

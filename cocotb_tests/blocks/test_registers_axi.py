@@ -11,8 +11,9 @@ from pathlib import Path
 import pytest
 from lxml import etree
 
-from cocotb_tests.support import dut_registers
-from fluxproof.checkout import ROOT, RTL
+from cocotb_tests.support.drives import PAPER
+from cocotb_tests.support.in_simulator import dut_registers
+from fluxproof.checkout import RTL
 from fluxproof.command import main
 from fluxproof.cosim import flat, ghdl
 from fluxproof.cosim.entity import parse_entity, read_entity
@@ -29,7 +30,6 @@ from scripts import generate
 from scripts.registers import export, generated, rdl, vhdl
 from scripts.registers.compiled import compile_file, words
 
-PAPER = ROOT / "docs" / "drives" / "paper001.toml"
 MAP = register_map.registers()
 BESIDE_THE_CORE = ("telemetry", "irq_")  # names of registers that the core does not see
 WHOLE = board_map.registers()  # with the second block of addresses, that of a board

@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cocotb_tests.support.board_loop import CONSTANT
-from cocotb_tests.support.board_runs import (
+from cocotb_tests.support.board.loop_bench import CONSTANT
+from cocotb_tests.support.board.run_cases import (
     HUB_PERIODS,
     RPM,
     RUNS,
@@ -42,7 +42,7 @@ def in_ghdl(periods: int, run: str, folder: Path, compiled: bool = False) -> dic
 
     ``compiled``: with numba, which takes as long to compile the golden board as to run some hundred periods without.
     """
-    command = [sys.executable, "-m", "cocotb_tests.support.board_play", run, str(periods), str(folder)]
+    command = [sys.executable, "-m", "cocotb_tests.support.board.ghdl_bench", run, str(periods), str(folder)]
     environment = {**os.environ, "NUMBA_DISABLE_JIT": str(int(not compiled))}
     done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr

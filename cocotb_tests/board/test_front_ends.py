@@ -7,13 +7,13 @@ import os
 import subprocess
 import sys
 
-from cocotb_tests.support.board_cases import MOVED, RATE
+from cocotb_tests.support.board.fault_cases import MOVED, RATE
 from fluxproof.checkout import ROOT
 from golden_model.io.fault_latch import TRIP
 
 
 def run(case: str) -> dict:
-    command = [sys.executable, "-m", "cocotb_tests.support.board_cases", case]
+    command = [sys.executable, "-m", "cocotb_tests.support.board.fault_cases", case]
     environment = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
     done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr

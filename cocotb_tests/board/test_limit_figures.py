@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cocotb_tests.core.test_limits import DRIVE, QUARTER, SET, first, play, told
+from cocotb_tests.support.core.limits import DRIVE, QUARTER, SET, first, play, told
 from golden_model.units import from_si
 
 

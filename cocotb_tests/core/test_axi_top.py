@@ -6,10 +6,9 @@ import json
 
 import numpy as np
 
-from fluxproof.checkout import ROOT
+from cocotb_tests.support.drives import PAPER
 from fluxproof.cosim import ghdl
 
-PAPER = ROOT / "docs" / "drives" / "paper001.toml"
 CARRIER_HALF, CLOCK_HZ = 72, 1_440_000
 
 
@@ -20,7 +19,7 @@ def test_motor_spins_over_the_registers():
         "FLUXPROOF_CARRIER_HALF": str(CARRIER_HALF),
         "FLUXPROOF_CLOCK_HZ": str(CLOCK_HZ),
     }
-    folder = ghdl.run("fluxproof_axi", "cocotb_tests.support.dut_axi_loop", generics, environment)
+    folder = ghdl.run("fluxproof_axi", "cocotb_tests.support.in_simulator.dut_axi_loop", generics, environment)
     problem = ghdl.failure(folder)
     assert problem is None, problem
     summary = json.loads((folder / "summary.json").read_text())

@@ -11,8 +11,9 @@ from pathlib import Path
 
 import pytest
 
-from cocotb_tests.support.golden_board import GoldenBoard
-from cocotb_tests.support.rtl_board import RtlBoard
+from cocotb_tests.support.drives import PAPER
+from cocotb_tests.support.host.golden_board import GoldenBoard
+from cocotb_tests.support.host.rtl_board import RtlBoard
 from fluxproof.checkout import ROOT
 from fluxproof.cosim import verilog
 from fluxproof.print_registers import c_lines
@@ -21,7 +22,6 @@ from golden_model.io import board_map
 from golden_model.registers import registers
 from scripts.registers.rdl import version_word
 
-PAPER = ROOT / "docs" / "drives" / "paper001.toml"
 SOFTWARE = ROOT / "docs" / "software"
 STRICT = ("-std=c11", "-O1", "-Wall", "-Wextra", "-Werror", "-pedantic")
 RPM = 30 / math.pi
@@ -59,7 +59,8 @@ def compiled(folder: Path, drive, bus: Path) -> Path:
 
 @pytest.fixture(scope="module")
 def program(drive, tmp_path_factory):
-    return compiled(tmp_path_factory.mktemp("bring_up"), drive, ROOT / "cocotb_tests" / "support" / "bus_pipe.c")
+    bus = ROOT / "cocotb_tests" / "support" / "host" / "bus_pipe.c"
+    return compiled(tmp_path_factory.mktemp("bring_up"), drive, bus)
 
 
 def test_compiles_for_linux_on_a_zynq(drive, tmp_path):

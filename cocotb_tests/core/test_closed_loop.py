@@ -8,24 +8,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from cocotb_tests.support.core.closed_loop import close_loop, leg_runs
+from cocotb_tests.support.drives import PAPER
 from cocotb_tests.support.needs import skip_without_ghdl5
-from fluxproof.checkout import DRIVES
-from fluxproof.cosim.runs import InGhdl, InVerilator, Named
+from fluxproof.cosim.runs import InGhdl, InVerilator
 from golden_model import drive as drives
 from golden_model import fluxproof
 from golden_model.estimation import Estimated
 from studies.timeline import __main__ as timeline
-
-PAPER = DRIVES / "paper001.toml"
-
-
-def close_loop(engine, path, scenario: str, carrier_half: int, key: str = "", periods: int | None = None):
-    """(summary, arrays, registers) of one run; fails with the first difference."""
-    named = Named("fluxproof.cosim.runs:closed_loop", (str(path), carrier_half, scenario, periods))
-    job = engine(f"test {scenario} {carrier_half}{key}", named)
-    job.carry_out()
-    assert job.problem is None, job.problem
-    return job.summary(), job.arrays(), job.run.registers
 
 
 def test_everything_at_once():
@@ -68,18 +58,6 @@ def check_sensible_motion(arrays):
     loaded = slice(800, 890)
     assert np.abs(i_q[loaded] - i_q_ref[loaded]).max() < 0.3
     assert abs(arrays["plant_omega_m"][1950:2100].mean() * 30 / np.pi + 300) < 60
-
-
-def leg_runs(edges: np.ndarray, leg: int, period: int):
-    """[(start, stop, which)] of one leg's gate pulses in clocks since the start; which is 'high' or 'low'."""
-    clocks = edges[:, 0] * period + edges[:, 1]
-    runs = []
-    for name, bit in (("high", leg), ("low", leg + 3)):
-        on = (edges[:, 2] >> bit) & 1
-        change = np.flatnonzero(np.diff(on, prepend=0))
-        starts, stops = clocks[change[on[change] == 1]], clocks[change[on[change] == 0]]
-        runs += [(int(a), int(b), name) for a, b in zip(starts, stops, strict=False)]
-    return sorted(runs)
 
 
 def check_pwm_timing(arrays, register_set, leg: int):

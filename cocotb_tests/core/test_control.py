@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fluxproof.checkout import ROOT
+from cocotb_tests.support.drives import PAPER
 from fluxproof.cosim.golden_loop import run_averaged
 from fluxproof.cosim.scenarios import RPM
 from fluxproof.plant import FREE, IMPOSED_SPEED, Machine, Sensors, initial_state, plant_params, sensor_params
@@ -15,7 +15,7 @@ from golden_model.estimators import flux_models
 from golden_model.registers import registers
 from golden_model.units import from_si
 
-DRIVE = drives.load(ROOT / "docs" / "drives" / "paper001.toml")
+DRIVE = drives.load(PAPER)
 T_S = DRIVE.sample_time_s
 
 

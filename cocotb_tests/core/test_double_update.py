@@ -7,9 +7,9 @@ import dataclasses
 import numpy as np
 import pytest
 
-from cocotb_tests.core.test_closed_loop import close_loop, leg_runs
+from cocotb_tests.support.core.closed_loop import close_loop, leg_runs
+from cocotb_tests.support.drives import PAPER
 from cocotb_tests.support.needs import skip_without_ghdl5
-from fluxproof.checkout import DRIVES
 from fluxproof.cosim.golden_loop import simulate
 from fluxproof.cosim.runs import InGhdl, InVerilator
 from fluxproof.cosim.scenarios import scenario
@@ -22,7 +22,6 @@ from golden_model.registers import registers
 from golden_model.units import to_si
 from studies.board import double_update
 
-PAPER = DRIVES / "paper001.toml"
 CHANGES = (
     ("[core]\n", "[core]\nupdates_per_period = 2\n"),
     ("sample_time_s = 100e-6", "sample_time_s = 50e-6"),

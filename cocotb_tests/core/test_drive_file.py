@@ -9,7 +9,8 @@ import sys
 
 import pytest
 
-from cocotb_tests.core.test_registers import PAPER, ROOT, each_drive, edited
+from cocotb_tests.support.drives import PAPER, check_message, each_drive, edited
+from fluxproof.checkout import ROOT
 from fluxproof.command import main
 from golden_model.board_registers import board_set, has_board
 from golden_model.drive import Drive, load, with_carrier
@@ -82,15 +83,6 @@ WRONG = {  # section, line, what the message must contain besides the file's nam
     ),
     "long pulse": ("inverter", "min_pulse_s = 40e-6", "register min_pulse", "[inverter] min_pulse_s", "4095"),
 }
-
-
-def check_message(capsys, path, words):
-    """Exit status 2, nothing on stdout, one line on stderr with the file's name and the words."""
-    assert main(["registers", str(path)]) == 2
-    out, err = capsys.readouterr()
-    assert out == "" and err.count("\n") == 1
-    for word in (str(path), *words):
-        assert word in err
 
 
 @pytest.mark.parametrize("case", WRONG)

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cocotb_tests.core.test_drive_file import check_message
-from cocotb_tests.core.test_registers import PAPER
+from cocotb_tests.support.drives import PAPER, check_message
 from cocotb_tests.support.needs import skip_without_ghdl5
 from fluxproof.checkout import DRIVES
 from fluxproof.cosim.runs import InVerilator, Named

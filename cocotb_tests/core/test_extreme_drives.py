@@ -4,7 +4,7 @@ import random
 
 import pytest
 
-from cocotb_tests.core.test_registers import DRIVES
+from cocotb_tests.support.drives import DRIVE_FILES
 from cocotb_tests.support.extreme_drives import KEYS, beyond, changed_drives, derived, drawn, ends, written
 from cocotb_tests.support.slow import slowly
 from golden_model.drive import load
@@ -28,18 +28,18 @@ def tried(path, files, scene=False) -> int:
 @pytest.mark.parametrize("count", [60, slowly(3000)])
 @pytest.mark.parametrize("most", [1, 2, 6])
 def test_values_within_the_ranges_are_taken_or_refused(tmp_path, count, most):
-    accepted = tried(tmp_path / "drive.toml", changed_drives(DRIVES, count, most, drawn, most))
+    accepted = tried(tmp_path / "drive.toml", changed_drives(DRIVE_FILES, count, most, drawn, most))
     assert accepted > 0.04 * count, "the drawn values no longer reach the commands"
 
 
 @pytest.mark.parametrize("count", [60, slowly(3000)])
 def test_values_beyond_the_ranges_are_refused_or_harmless(tmp_path, count):
-    tried(tmp_path / "drive.toml", changed_drives(DRIVES, count, 7, beyond, 3))
+    tried(tmp_path / "drive.toml", changed_drives(DRIVE_FILES, count, 7, beyond, 3))
 
 
 @pytest.mark.parametrize("count", [80, slowly(20000)])
 def test_pairs_of_extremes(tmp_path, count):
-    rng, files = random.Random(11), [read_tables(path) for path in DRIVES]
+    rng, files = random.Random(11), [read_tables(path) for path in DRIVE_FILES]
 
     def pairs():
         for _ in range(count):
@@ -53,7 +53,7 @@ def test_pairs_of_extremes(tmp_path, count):
 
 @pytest.mark.parametrize("count", [5, slowly(200)])
 def test_scenes_of_extreme_drives(tmp_path, count):
-    tried(tmp_path / "drive.toml", changed_drives(DRIVES, count, 3), scene=True)
+    tried(tmp_path / "drive.toml", changed_drives(DRIVE_FILES, count, 3), scene=True)
 
 
 @pytest.mark.parametrize(("section", "name", "key"), KEYS, ids=lambda part: part if isinstance(part, str) else "")
@@ -63,7 +63,7 @@ def test_every_number_has_a_range_and_its_ends_are_refused_beyond(tmp_path, sect
         assert abs(key.lo) <= 2.0**32 and 0.0 < key.hi <= RANGES[key.unit][1]
     if key.kind not in ("float", "int"):
         return
-    tables = read_tables(DRIVES[0])
+    tables = read_tables(DRIVE_FILES[0])
     for value in (key.lo - 1, key.hi * 2 + 1):
         value = [value] * key.count if key.count else value
         with pytest.raises(DriveError) as caught:

@@ -8,7 +8,7 @@ import json
 import numpy as np
 import pytest
 
-from cocotb_tests.core.test_registers import PAPER, edited, row
+from cocotb_tests.support.drives import PAPER, edited, row_of
 from cocotb_tests.support.needs import ghdl5_missing
 from fluxproof.checkout import ROOT
 from fluxproof.cosim import ghdl
@@ -147,7 +147,7 @@ def test_enable_has_no_effect_during_a_fault():
 def test_tour_in_ghdl():
     """The VHDL in GHDL through eight faults: equal to the golden core in every clock."""
     generics = {name.upper(): value for name, value in SET.config._asdict().items()}
-    folder = ghdl.run("fluxproof", "cocotb_tests.support.dut_faults", generics, {}, key="faults")
+    folder = ghdl.run("fluxproof", "cocotb_tests.support.in_simulator.dut_faults", generics, {}, key="faults")
     problem = ghdl.failure(folder)
     assert problem is None, problem
     summary = json.loads((folder / "summary.json").read_text())
@@ -250,13 +250,13 @@ def test_protection_keys(tmp_path):
     path = with_protection(
         tmp_path, "current_trip_a = 8\nu_dc_max_v = 700\ntrip_watchdog = false\ntrip_u_dc_low = false"
     )
-    assert (row(path, "i_trip").integer, row(path, "u_dc_max").integer) == (
+    assert (row_of(path, "i_trip").integer, row_of(path, "u_dc_max").integer) == (
         round(8 / 12.5 * 256),
         round(700 / 500 * 256),
     )
-    assert row(path, "fault_ignore").integer == 0b1100001001000
-    assert row(with_protection(tmp_path, "position_jump_rad = 0.01"), "jump_max").integer == 13
-    assert row(with_protection(tmp_path, "watchdog_periods = 3"), "watchdog").integer == 60000
+    assert row_of(path, "fault_ignore").integer == 0b1100001001000
+    assert row_of(with_protection(tmp_path, "position_jump_rad = 0.01"), "jump_max").integer == 13
+    assert row_of(with_protection(tmp_path, "watchdog_periods = 3"), "watchdog").integer == 60000
 
 
 @pytest.mark.parametrize(("line", "words"), [

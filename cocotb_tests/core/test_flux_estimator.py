@@ -7,6 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
+from cocotb_tests.support.drives import PAPER
 from fluxproof.checkout import ROOT
 from fluxproof.cosim.scenarios import RPM, scenario
 from fluxproof.plant import IMPOSED_SPEED, Sensors
@@ -194,7 +195,7 @@ def test_no_wrapping_operation_in_the_estimators():
 
 
 def test_flux_bandwidth_between_the_loops():
-    path = ROOT / "docs" / "drives" / "paper001.toml"
+    path = PAPER
     drive = drives.load(path)
     for hz in (20.0, 600.0):
         control = dataclasses.replace(drive.control, flux_bandwidth_hz=hz)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from cocotb_tests.support.drives import PAPER
 from cocotb_tests.support.needs import skip_without_ghdl5
-from fluxproof.checkout import ROOT
 from fluxproof.cosim.closed_loop import cosimulate, run_now
 from fluxproof.cosim.scenarios import SCENARIOS
 from fluxproof.cosim.verilated import VerilatedCore
@@ -16,7 +16,7 @@ from golden_model import fluxproof
 from golden_model.io import sample_latch
 from golden_model.registers import registers
 
-DRIVE = drives.load(ROOT / "docs" / "drives" / "paper001.toml")
+DRIVE = drives.load(PAPER)
 NO_TRIP = fluxproof.REGISTERS["fault_ignore"].high  # samples that no healthy drive gives shall not stop the gates
 
 

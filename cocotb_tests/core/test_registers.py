@@ -3,34 +3,17 @@
 import dataclasses
 import math
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
 
+from cocotb_tests.support.drives import PAPER, each_drive, edited, row_of
 from fluxproof.plant import Machine, machine_params
 from golden_model.drive import SECTIONS, load, with_carrier
 from golden_model.fluxproof import OBSERVED, REGISTERS, Registers
 from golden_model.registers import registers
 from golden_model.scaling import ROUND_UP, base_keys
 from golden_model.units import SIGNALS, UNITS, from_si, si_per_lsb, to_si, unit
-
-ROOT = Path(__file__).resolve().parents[2]
-PAPER = ROOT / "docs" / "drives" / "paper001.toml"
-DRIVES = sorted(PAPER.parent.glob("*.toml"))
-each_drive = pytest.mark.parametrize("path", DRIVES, ids=lambda p: p.stem)
-
-
-def edited(tmp_path, section, line=None, text=None):
-    """The paper's drive with ``line`` (key = value) set in a section, or ``text`` as the whole file."""
-    if text is None:
-        head, body, tail = re.split(rf"(?m)^\[{section}\]\n((?:(?!\[).*\n)*)", PAPER.read_text(), maxsplit=1)
-        key = line.split("=")[0].strip()
-        body = re.sub(rf"(?m)^{re.escape(key)} *=.*\n", "", body) + line + "\n"
-        text = f"{head}[{section}]\n{body}{tail}"
-    path = tmp_path / "drive.toml"
-    path.write_text(text)
-    return path
 
 
 @each_drive
@@ -128,10 +111,6 @@ def test_machine_section_builds_the_plants_machine():
     assert (params.inductance_d, params.magnet_flux) == (16.07e-3, 0.165)
 
 
-def row(path, name):
-    return next(r for r in registers(load(path)).rows if r.name == name)
-
-
 def test_keys_name_where_a_base_comes_from(tmp_path):
     drive = load(PAPER)
     assert base_keys(drive, "current_a") == "[sensors] current_range_a"
@@ -140,16 +119,16 @@ def test_keys_name_where_a_base_comes_from(tmp_path):
 
 
 def test_explicit_gains_offsets_and_bases(tmp_path):
-    assert row(edited(tmp_path, "control", "current_kp_d_v_per_a = 10"), "kp_d").si == 10.0
-    assert row(edited(tmp_path, "control", "speed_ki_a_per_rad = 0.5"), "speed_ki").si == 0.5
+    assert row_of(edited(tmp_path, "control", "current_kp_d_v_per_a = 10"), "kp_d").si == 10.0
+    assert row_of(edited(tmp_path, "control", "speed_ki_a_per_rad = 0.5"), "speed_ki").si == 0.5
     path = edited(tmp_path, "sensors", "current_offset_code = [32700, 32768, 32801.5]")
-    assert [row(path, f"offset_{x}").integer for x in "abc"] == [32700, 32768, 32802]
+    assert [row_of(path, f"offset_{x}").integer for x in "abc"] == [32700, 32768, 32802]
     path = edited(tmp_path, "sensors", "current_gain = [1.01, -1, 0.5]")
-    assert [row(path, f"gain_{x}").integer for x in "abc"] == [66191, -65536, 32768]
+    assert [row_of(path, f"gain_{x}").integer for x in "abc"] == [66191, -65536, 32768]
     path = edited(tmp_path, "sensors", "theta_offset_rad = -0.1")
-    assert row(path, "theta_offset").integer == round(2**18 * (1 - 0.1 / (2 * math.pi)))
+    assert row_of(path, "theta_offset").integer == round(2**18 * (1 - 0.1 / (2 * math.pi)))
     path = edited(tmp_path, None, text=PAPER.read_text() + "[bases]\ncurrent_a = 10\n[columns]\nx = 'y'\n")
-    assert load(path).bases.current_a == 10.0 and row(path, "gain_a").integer == 81920
+    assert load(path).bases.current_a == 10.0 and row_of(path, "gain_a").integer == 81920
 
 
 def test_optional_loops(tmp_path):
@@ -157,4 +136,4 @@ def test_optional_loops(tmp_path):
     text = re.sub(rf"(?m)^({optional}).*\n", "", PAPER.read_text())
     values = registers(load(edited(tmp_path, None, text=text))).values
     assert (values.speed_kp, values.speed_ki, values.k_filter) == (0, 0, 65536)
-    assert row(edited(tmp_path, "control", "voltage_reserve = 0.5"), "k_u_max").integer == 37837
+    assert row_of(edited(tmp_path, "control", "voltage_reserve = 0.5"), "k_u_max").integer == 37837

@@ -5,7 +5,7 @@ import math
 
 import pytest
 
-from cocotb_tests.core.test_registers import DRIVES, each_drive
+from cocotb_tests.support.drives import DRIVE_FILES, each_drive
 from golden_model.control import current_pi, decoupling, speed_pi
 from golden_model.drive import Sampling, load
 from golden_model.drive_keys import DriveError
@@ -124,11 +124,11 @@ def test_voltage_acts_at_the_same_angle_wherever_the_sample_is(path, delay_s):
 
 def test_sampling_delay_is_read_and_limited(tmp_path):
     """The key of the drive file reaches the register; a sample nearer to another valley is refused."""
-    text = DRIVES[0].read_text()
+    text = DRIVE_FILES[0].read_text()
     path = tmp_path / "drive.toml"
     path.write_text(f"{text}\n[sampling]\ndelay_s = 5e-6\n")
     rows = {row.name: row for row in registers(load(path)).rows}
-    plain = {row.name: row for row in registers(load(DRIVES[0])).rows}
+    plain = {row.name: row for row in registers(load(DRIVE_FILES[0])).rows}
     assert plain["k_delay"].si - rows["k_delay"].si == pytest.approx(5e-6)
     assert {n for n in rows if rows[n].integer != plain[n].integer} == {"k_delay", "k_ahead"}
     path.write_text(f"{text}\n[sampling]\ndelay_s = 1.0\n")

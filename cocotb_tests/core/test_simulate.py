@@ -9,7 +9,7 @@ import re
 import numpy as np
 import pytest
 
-from cocotb_tests.core.test_registers import PAPER
+from cocotb_tests.support.drives import PAPER
 from fluxproof.checkout import DRIVES
 from fluxproof.command import main
 from fluxproof.simulate import scene

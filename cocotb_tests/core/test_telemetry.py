@@ -12,8 +12,9 @@ import subprocess
 import numpy as np
 import pytest
 
-from cocotb_tests.diagnosis.test_digital import OWNERS, first_row, recording
-from cocotb_tests.support.telemetry_top import NAME, write_top
+from cocotb_tests.support.drives import PAPER
+from cocotb_tests.support.in_simulator.telemetry_top import NAME, write_top
+from cocotb_tests.support.recordings.dumps import OWNERS, first_row, recording
 from fluxproof import dump_capture
 from fluxproof.checkout import ROOT, RTL
 from fluxproof.command import main
@@ -31,7 +32,6 @@ from golden_model.io.telemetry_words import COUNT, FIELDS, HEADER_WORD, LAYOUT, 
 from golden_model.registers import registers
 from scripts import generate, generate_telemetry
 
-PAPER = ROOT / "docs" / "drives" / "paper001.toml"
 CARRIER_HALF = 72
 DEPTH_BITS = 7
 DRIVE = drives.load(PAPER)
@@ -49,7 +49,8 @@ def folder():
         "FLUXPROOF_DEPTH_BITS": str(DEPTH_BITS),
         "FLUXPROOF_SEED": os.environ.get("FLUXPROOF_SEED", "1"),
     }
-    found = ghdl.run(NAME, "cocotb_tests.support.dut_telemetry", generics, environment, extra=[write_top()])
+    module = "cocotb_tests.support.in_simulator.dut_telemetry"
+    found = ghdl.run(NAME, module, generics, environment, extra=[write_top()])
     problem = ghdl.failure(found)
     assert problem is None, problem
     return found

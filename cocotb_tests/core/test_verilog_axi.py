@@ -6,7 +6,7 @@ import os
 
 import numpy as np
 
-from cocotb_tests.core.test_verilog import differences, ghdl5, trace_of_verilog, trace_of_vhdl  # noqa: F401
+from cocotb_tests.support.core.converted import differences, trace_of_verilog, trace_of_vhdl
 from fluxproof.cosim.verilated import VerilatedCore
 from golden_model.io import register_map
 

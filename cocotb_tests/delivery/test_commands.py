@@ -11,29 +11,16 @@ import sys
 import time
 from pathlib import Path
 
-import numpy as np
-import pandas as pd
 import pytest
 
-from cocotb_tests.core.test_registers import PAPER
-from cocotb_tests.support import diagnosed_drives as bench
-from cocotb_tests.support.moments import Moment, contents, run
+from cocotb_tests.support.drives import PAPER
+from cocotb_tests.support.processes.commands import STOPPED, write_inputs
+from cocotb_tests.support.processes.moments import Moment, contents, run
 from fluxproof import files
 from fluxproof.checkout import ROOT
 from fluxproof.command import main
 
-STOPPED = "fluxproof: stopped\n"
 PART = "xc7z020clg484-1"
-
-
-def write_inputs(folder: Path) -> Path:
-    """A folder with drive.toml, two recordings whose time stands still, and a good one."""
-    (folder / "drive.toml").write_bytes(PAPER.read_bytes())
-    table = pd.DataFrame({name: values[:900] for name, values in bench.columns(bench.GRID[:4]).items()})
-    table.to_csv(folder / "good.csv", index=False)
-    table.assign(t=np.zeros(len(table))).to_csv(folder / "stopped.csv", index=False)
-    table.assign(t=np.ones(len(table))).to_csv(folder / "stopped_too.csv", index=False)
-    return folder
 
 
 @pytest.fixture(scope="module")
@@ -59,8 +46,6 @@ def one_line(done, status: int = 2) -> str:
     assert done.stderr.startswith("fluxproof: ")
     return done.stderr.removeprefix("fluxproof: ").rstrip()
 
-
-# ---------------------------------------------------------------- Ctrl-C
 
 IMPORTS = ["fluxproof.command", "numba.core.registry", "_umath"]
 
@@ -144,9 +129,6 @@ def test_ctrl_c_where_python_makes_something_else_of_it(where, tmp_path):
     assert (done.returncode, done.stderr) == (130, STOPPED)
 
 
-# ---------------------------------------------------------------- errors
-
-
 @pytest.mark.parametrize(
     ("error", "words"),
     [
@@ -211,9 +193,6 @@ def test_help_is_quick(tmp_path):
     assert run(tmp_path, [], program=[sys.executable, "-c", code]).stdout.strip() == "[]"
 
 
-# ---------------------------------------------------------------- full disks
-
-
 def test_a_file_that_cannot_be_written_whole(inputs, tmp_path):
     """A limit of the file size in place of a full disk: the earlier file stays, nothing else does."""
     target = tmp_path / "settings" / "registers.json"
@@ -243,9 +222,6 @@ def test_a_full_disk_in_a_diagnosis(name, inputs, earlier, tmp_path, monkeypatch
         assert main([*map(str, diagnose(inputs, out))]) == 2
         assert capsys.readouterr().err == f"fluxproof: {out / name}: No space left on device\n"
         assert contents(out) == before
-
-
-# ---------------------------------------------------------------- inputs
 
 
 def refused(arguments, kept: list[Path], capsys) -> None:

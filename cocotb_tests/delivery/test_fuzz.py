@@ -11,7 +11,7 @@ from fluxproof.diagnosis.readers import read_table
 
 hypothesis = pytest.importorskip("hypothesis", reason="hypothesis is not installed")
 
-from cocotb_tests.support import planted_faults  # noqa: E402
+from cocotb_tests.support.untrusted import planted_faults  # noqa: E402
 from scripts.fuzz import corpus, finds  # noqa: E402
 from scripts.fuzz.__main__ import again, main  # noqa: E402
 from scripts.fuzz.case import Case, Verdict  # noqa: E402

@@ -12,10 +12,10 @@ from types import SimpleNamespace
 
 import pytest
 
-from cocotb_tests.core.test_registers import PAPER
-from cocotb_tests.delivery.test_vivado_scripts import facts, needs_tclsh, stubbed  # noqa: F401 - facts is a fixture
-from cocotb_tests.support.diagnosis_samples import made_up
-from cocotb_tests.support.foreign_text import NAMES, Page, c_tokens, unescaped, vhdl_analysed
+from cocotb_tests.support.diagnoses.samples import made_up
+from cocotb_tests.support.drives import PAPER
+from cocotb_tests.support.untrusted.foreign_text import NAMES, Page, c_tokens, unescaped, vhdl_analysed
+from cocotb_tests.support.vivado.tclsh import needs_tclsh, stubbed
 from fluxproof.command import main
 from fluxproof.commission import command as commissioning
 from fluxproof.commission import steps

@@ -1,7 +1,8 @@
-"""Directions of imports: the contract of pyproject.toml is fulfilled, and a violation is detected."""
+"""Directions of imports: the contract of pyproject.toml holds, no test imports a test, violations are detected."""
 
 from __future__ import annotations
 
+import ast
 import os
 import shutil
 import subprocess
@@ -56,3 +57,44 @@ def test_forbidden_import_is_detected(copy, file, line):
     done = contract(copy)
     path.write_text(before)
     assert done.returncode == 1 and "BROKEN" in done.stdout, done.stdout + done.stderr
+
+
+def imported_tests(text: str) -> list[str]:
+    """Names of all test modules that a Python text imports, also inside functions."""
+    names = []
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.ImportFrom):
+            names += [node.module or "", *(alias.name for alias in node.names)]
+        elif isinstance(node, ast.Import):
+            names += [alias.name for alias in node.names]
+    return [name for name in names if any(part.startswith("test_") for part in name.split("."))]
+
+
+def test_no_module_imports_a_test():
+    """What several tests share is in cocotb_tests/support or a conftest.py."""
+    paths = [path for name in PACKAGES for path in sorted((ROOT / name).rglob("*.py"))]
+    wrong = {str(path.relative_to(ROOT)): found for path in paths if (found := imported_tests(path.read_text()))}
+    assert paths and not wrong
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "from cocotb_tests.core.test_registers import PAPER",
+        "from cocotb_tests.core import test_registers as registers",
+        "import cocotb_tests.core.test_registers",
+        "from .test_registers import PAPER",
+        "def late():\n    from cocotb_tests.core.test_registers import PAPER",
+    ],
+)
+def test_an_imported_test_is_detected(line):
+    assert imported_tests(line) and not imported_tests(line.replace("test_registers", "drives"))
+
+
+def test_tests_of_the_diagnosis_are_in_the_folder_of_the_same_name():
+    """Each room of fluxproof/diagnosis has its tests in one folder; ``session`` has those of whole diagnoses."""
+    package, tests = ROOT / "fluxproof" / "diagnosis", ROOT / "cocotb_tests" / "diagnosis"
+    rooms = {path.parent.name for path in package.glob("*/__init__.py")}
+    folders = {path.parent.name for path in tests.glob("*/test_*.py")}
+    assert folders == rooms | {"session"}
+    assert not list(tests.glob("*/*/test_*.py")), "rooms have no rooms"

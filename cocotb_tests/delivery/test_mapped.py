@@ -6,7 +6,7 @@ import os
 
 import pytest
 
-from cocotb_tests.core.test_verilog import GENERICS, RARE, differences, stimulus, trace_of_verilog
+from cocotb_tests.support.core.converted import GENERICS, RARE, differences, stimulus, trace_of_verilog
 from fluxproof.cosim import verilog
 from fluxproof.cosim.verilated import VerilatedCore
 from scripts.synth.mapped import MappedCore, with_mapped

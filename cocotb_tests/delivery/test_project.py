@@ -9,8 +9,8 @@ import subprocess
 
 import pytest
 
-from cocotb_tests.core.test_registers import PAPER
-from cocotb_tests.delivery.test_vivado_scripts import facts, stubbed  # noqa: F401 - facts is a fixture
+from cocotb_tests.support.drives import PAPER
+from cocotb_tests.support.vivado.tclsh import stubbed
 from fluxproof.checkout import ROOT
 from fluxproof.command import main
 from golden_model.drive import load

@@ -9,7 +9,7 @@ import warnings
 import jinja2
 import pytest
 
-from cocotb_tests.support.foreign_text import PIECES, Page, c_tokens, tcl_calls, unescaped, vhdl_analysed
+from cocotb_tests.support.untrusted.foreign_text import PIECES, Page, c_tokens, tcl_calls, unescaped, vhdl_analysed
 from fluxproof import quote
 from fluxproof.command import main
 from fluxproof.diagnosis.report import page, theme

@@ -8,8 +8,8 @@ import sys
 import pyarrow.parquet as pq
 import pytest
 
-from cocotb_tests.delivery.test_commands import STOPPED, write_inputs
-from cocotb_tests.support.moments import Moment, run
+from cocotb_tests.support.processes.commands import STOPPED, write_inputs
+from cocotb_tests.support.processes.moments import Moment, run
 from fluxproof.checkout import ROOT
 from fluxproof.fleet import engine
 

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from cocotb_tests.support.moments import Moment, contents, run
+from cocotb_tests.support.processes.moments import Moment, contents, run
 from fluxproof.checkout import ROOT
 from fluxproof.files import refuse_overwriting, write_bytes, write_text
 from fluxproof.stage import DONE, PLAN, PREFIX, alone, together

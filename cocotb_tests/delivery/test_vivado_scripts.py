@@ -5,52 +5,16 @@ from __future__ import annotations
 import json
 import re
 import shutil
-import subprocess
 from pathlib import Path
 
 import pytest
-from lxml import etree
 
+from cocotb_tests.support.vivado.tclsh import stubbed
 from fluxproof.checkout import ROOT, RTL
 from fluxproof.cosim.sources import rtl_sources
 from scripts.package import axi_top, ipxact
 
-S = {"s": ipxact.SPIRIT}
 VIVADO = ROOT / "scripts" / "vivado"
-
-
-@pytest.fixture(scope="module")
-def facts(tmp_path_factory):
-    """component.xml in the words of vivado_stub.tcl."""
-    component = etree.parse(ipxact.PATH).getroot()
-
-    def tcl(elements) -> str:
-        return "{" + " ".join(e.findtext("s:name", namespaces=S) for e in elements) + "}"
-
-    vlnv = ":".join(component.findtext(f"s:{part}", namespaces=S) for part in ("vendor", "library", "name"))
-    path = tmp_path_factory.mktemp("vivado") / "facts.tcl"
-    path.write_text(
-        f"set core_vlnv {vlnv}\n"
-        f"set core_pins {tcl(component.findall('s:model/s:ports/s:port', S))}\n"
-        f"set core_interfaces {tcl(component.findall('s:busInterfaces/s:busInterface', S))}\n"
-        f"set core_parameters {tcl(component.findall('s:model/s:modelParameters/s:modelParameter', S))}\n"
-    )
-    return path
-
-
-def needs_tclsh() -> None:
-    """Skips where there is no Tcl."""
-    if shutil.which("tclsh") is None:
-        pytest.skip("there is no tclsh here")
-
-
-def stubbed(facts: Path, script: Path, *arguments: str, cwd: Path | None = None) -> subprocess.CompletedProcess:
-    """``script`` under vivado_stub.tcl."""
-    needs_tclsh()
-    stub = ROOT / "cocotb_tests" / "support" / "vivado_stub.tcl"
-    return subprocess.run(
-        ["tclsh", str(stub), str(facts), str(script), *arguments], cwd=cwd, capture_output=True, text=True
-    )
 
 
 def test_packaging_script(facts, tmp_path):

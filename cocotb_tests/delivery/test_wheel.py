@@ -16,7 +16,8 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 
-from cocotb_tests.support import diagnosed_drives as bench
+from cocotb_tests.support.drives import PAPER
+from cocotb_tests.support.recordings import from_core as bench
 from fluxproof.checkout import DRIVES, ROOT
 from fluxproof.diagnosis.replay import telemetry
 from fluxproof.project import render
@@ -24,7 +25,6 @@ from golden_model.fluxproof import Sample
 from golden_model.io import telemetry_words
 
 UV = Path(sys.executable).with_name("uv")
-PAPER = DRIVES / "paper001.toml"
 PACKAGES = ("fluxproof", "golden_model")
 
 

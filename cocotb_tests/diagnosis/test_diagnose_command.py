@@ -11,13 +11,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from cocotb_tests.core.test_registers import PAPER
-from cocotb_tests.diagnosis.test_diagnosis_report import failures
-from cocotb_tests.support import diagnosed_drives as bench
-from cocotb_tests.support.damaged_files import damaged_files
-from cocotb_tests.support.mistakes import MISTAKES, written
-from cocotb_tests.support.recordings_made import nominal_of
+from cocotb_tests.support.diagnoses.schema import failures
+from cocotb_tests.support.drives import PAPER
+from cocotb_tests.support.recordings import from_core as bench
+from cocotb_tests.support.recordings.from_equations import nominal_of
+from cocotb_tests.support.recordings.with_mistake import MISTAKES, written
 from cocotb_tests.support.slow import slowly
+from cocotb_tests.support.untrusted.damaged_files import damaged_files
 from fluxproof import command as fluxproof
 from fluxproof.checkout import ROOT
 from fluxproof.diagnosis import command, session

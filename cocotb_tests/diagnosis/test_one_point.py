@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from cocotb_tests.support.bench_answers import answer_of, found, said, without
-from cocotb_tests.support.bench_logs import PSI, Truth, table, warming
+from cocotb_tests.support.diagnoses.answers import answer_of, found, said, without
+from cocotb_tests.support.drives import PSI
+from cocotb_tests.support.recordings.bench_logs import Truth, table, warming
 
 WEAK = Truth(psi=0.95 * PSI)
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cocotb_tests.support import absolute_models as models
-from cocotb_tests.support.absolute_runs import BEGIN, BITS, CODE, ERROR, VALID, run
-from cocotb_tests.support.golden_play import GoldenPlayer
 from cocotb_tests.support.needs import skip_without_ghdl5
+from cocotb_tests.support.peripherals import absolute_model as models
+from cocotb_tests.support.peripherals.absolute_bench import BEGIN, BITS, CODE, ERROR, VALID, run
+from cocotb_tests.support.peripherals.golden_player import GoldenPlayer
 from fluxproof.cosim.verilated import VerilatedCore
 from golden_model.encoders import biss_master, endat_master, position_bridge
 from golden_model.registry import BLOCKS

@@ -7,10 +7,10 @@ from itertools import islice
 import numpy as np
 import pytest
 
-from cocotb_tests.support.encoder_models import edges
-from cocotb_tests.support.encoder_runs import BITS, incremental
-from cocotb_tests.support.golden_play import GoldenPlayer
 from cocotb_tests.support.needs import skip_without_ghdl5
+from cocotb_tests.support.peripherals.golden_player import GoldenPlayer
+from cocotb_tests.support.peripherals.incremental_model import edges
+from cocotb_tests.support.peripherals.incremental_stimulus import BITS, incremental
 from fluxproof.cosim import ghdl
 from fluxproof.cosim.verilated import VerilatedCore
 from golden_model.encoders import incremental_encoder
@@ -56,7 +56,7 @@ def compare(wanted_edges: int) -> int:
 def test_a_ride_in_ghdl(seed):
     folder = ghdl.run(
         "incremental_encoder",
-        "cocotb_tests.support.dut_encoder",
+        "cocotb_tests.support.in_simulator.dut_encoder",
         {"POSITION_BITS": BITS},
         {"FLUXPROOF_SEED": str(seed)},
     )

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cocotb_tests.support.encoder_models import Incremental, wandering
-from cocotb_tests.support.golden_play import GoldenPlayer
+from cocotb_tests.support.peripherals.golden_player import GoldenPlayer
+from cocotb_tests.support.peripherals.incremental_model import Incremental, wandering
 from golden_model.encoders import edge_timer, hall_decoder, incremental_encoder, turn_counter
 
 DELAY = 1  # clocks from the sensors to theta_hall

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cocotb_tests.support.encoder_models import Incremental, edges, glitches, wandering
-from cocotb_tests.support.golden_play import GoldenPlayer
+from cocotb_tests.support.peripherals.golden_player import GoldenPlayer
+from cocotb_tests.support.peripherals.incremental_model import Incremental, edges, glitches, wandering
 from golden_model.encoders import edge_timer, incremental_encoder, turn_counter
 
 BITS = 18

@@ -10,7 +10,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from cocotb_tests.support.small_fleet import Here
+from cocotb_tests.support.fleet.small_fleet import Here
 from fluxproof.command import main
 from fluxproof.diagnosis.fleet.prior import read_fleet
 from fluxproof.diagnosis.ground.recording import RecordingError

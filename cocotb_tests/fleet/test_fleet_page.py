@@ -7,9 +7,9 @@ import datetime
 import numpy as np
 import pytest
 
-from cocotb_tests.diagnosis.test_diagnosis_browser import seen
-from cocotb_tests.fleet.test_fleet_statistics import ageing, flux, hypothesis, row
-from cocotb_tests.support.diagnosis_samples import HOSTILE
+from cocotb_tests.support.browser import seen
+from cocotb_tests.support.diagnoses.samples import HOSTILE
+from cocotb_tests.support.fleet.rows import ageing, flux, hypothesis, row
 from fluxproof.diagnosis.fleet.findings import findings
 from fluxproof.fleet.page import headline, render
 

@@ -20,9 +20,9 @@ import psutil
 import pyarrow.parquet as pq
 import pytest
 
-from cocotb_tests.support import small_fleet
-from cocotb_tests.support.slow_work import blocking, fatal, slowly
-from cocotb_tests.support.small_fleet import Here
+from cocotb_tests.support.fleet import small_fleet
+from cocotb_tests.support.fleet.engine_work import blocking, fatal, lasting
+from cocotb_tests.support.fleet.small_fleet import Here
 from fluxproof.checkout import ROOT
 from fluxproof.command import main
 from fluxproof.diagnosis.fleet.schema import schema
@@ -231,7 +231,7 @@ def test_workers_that_are_killed_lose_and_double_nothing(monkeypatch):
     killer, found = Killer(2, pause_s=0.2), []
     with Engine(2) as engine, killer.around(engine):
         assert engine.dashboard.startswith("http://127.0.0.1:")
-        found = list(engine.each(slowly, range(12)))
+        found = list(engine.each(lasting, range(12)))
     assert killer.done == 2
     assert sorted(found) == [(n, n * n) for n in range(12)]
 

@@ -18,6 +18,7 @@ from motulator.drive.utils import SynchronousMachinePars
 from numba import njit
 from scipy.integrate import solve_ivp
 
+from cocotb_tests.support.drives import BUS, L_D, L_Q, PAIRS, PSI, R
 from fluxproof.plant import (
     FREE,
     IMPOSED_SPEED,
@@ -48,14 +49,14 @@ from fluxproof.plant import (
 )
 
 PERIOD = 1e-4
-U_DC = 563.0
+U_DC = BUS
 # Table 2 of the flux-estimator paper; rated current 3.7 A rms.
 MACHINE = Machine(
-    pole_pairs=4,
-    resistance_ohm=1.53,
-    inductance_d_h=16.07e-3,
-    inductance_q_h=15.81e-3,
-    magnet_flux_wb=0.165,
+    pole_pairs=PAIRS,
+    resistance_ohm=R,
+    inductance_d_h=L_D,
+    inductance_q_h=L_Q,
+    magnet_flux_wb=PSI,
     inertia_kgm2=1.6e-3,
     viscous_friction_nms=7.48e-4,
 )

@@ -8,6 +8,7 @@ import zlib
 import numpy as np
 import pytest
 
+from cocotb_tests.support.drives import BUS, L_D, PAIRS, PSI, R
 from studies.blind import cases, damage, forms, generate, identifiable, params, plans, unknown
 from studies.blind.again import further_recording, requested_plan
 from studies.blind.build import Build, fresh
@@ -18,13 +19,13 @@ from studies.blind.seal import SealError, seal, truth_path, unseal
 from studies.blind.simulator import simulate
 
 MACHINE = {
-    "pole_pairs": 4,
-    "resistance_ohm": 1.53,
-    "inductance_d_h": 0.01607,
+    "pole_pairs": PAIRS,
+    "resistance_ohm": R,
+    "inductance_d_h": L_D,
     "inductance_q_h": 0.0181,
-    "magnet_flux_wb": 0.165,
+    "magnet_flux_wb": PSI,
 }
-T, BUS = 1e-4, 563.0
+T = 1e-4
 
 
 def _drive(**motor):

@@ -11,6 +11,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from cocotb_tests.support.drives import PAPER
 from fluxproof.cosim import recording as recordings
 from fluxproof.cosim import runs, verilog
 from fluxproof.cosim.golden_loop import run_controller
@@ -28,7 +29,7 @@ from studies.demo.example import in_the_loop
 
 @pytest.fixture(scope="module")
 def drive():
-    return drives.with_carrier(drives.load(demo.DRIVES / "paper001.toml"), 1000)
+    return drives.with_carrier(drives.load(PAPER), 1000)
 
 
 def edges_of_a_run(periods: int) -> np.ndarray:

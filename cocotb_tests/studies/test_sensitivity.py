@@ -7,8 +7,8 @@ import ast
 import pandas as pd
 import pytest
 
-from cocotb_tests.core.test_registers import PAPER
-from cocotb_tests.support.diagnosed_drives import GRID, MACHINE, columns
+from cocotb_tests.support.drives import PAPER
+from cocotb_tests.support.recordings.from_core import GRID, MACHINE, columns
 from cocotb_tests.support.slow import slowly
 from fluxproof.checkout import ROOT
 from fluxproof.diagnosis.ground import constants

@@ -1,0 +1,88 @@
+"""Slow logs: selection of stretches, contents of a block, and which effects are named, excluded and ambiguous."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cocotb_tests.support.recordings.slow_logs import LEVELS, NOMINAL, Truth, log
+from fluxproof.diagnosis.balance.misfit import misfit
+from fluxproof.diagnosis.balance.slow_stretches import Stretches, message_period, stretches
+from fluxproof.diagnosis.balance.slow_view import alike, slow_view
+from fluxproof.diagnosis.catalogue import CATALOGUE
+from fluxproof.diagnosis.ground.recording import RecordingError
+
+
+def test_stretches_lie_within_the_dwells():
+    recording = log()
+    found = stretches(recording, NOMINAL)
+    steps = np.arange(len(LEVELS)) * 5.0
+    inside = [np.any((recording["t"][a] >= steps) & (recording["t"][b - 1] <= steps + 4.6)) for a, b in
+              zip(found.first, found.end, strict=True)]  # fmt: skip
+    assert len(found) >= len(LEVELS) and all(inside)
+    levels = {(round(w), round(q / 10) * 10) for w, q in zip(found.omega / 10, found.i.imag, strict=True)}
+    assert {q for _, q in levels} == {0, -60, -120, -180}
+
+
+def test_stretches_span_two_messages_of_the_slowest_signal():
+    recording = log()
+    assert message_period(recording["t"], recording["i_q"]) == pytest.approx(0.5, abs=0.04)
+    assert stretches(recording, NOMINAL).window_s >= 0.9
+
+
+def test_value_without_update_is_not_used():
+    recording = log()
+    frozen = recording["t"] > 0.5 * recording["t"][-1]
+    recording.columns["i_q"][frozen] = -111.0
+    recording.columns["i_d"][frozen] = 0.5
+    found = stretches(recording, NOMINAL)
+    assert len(found) and not frozen[found.first].any()
+
+
+def test_speed_is_needed():
+    recording = log()
+    del recording.columns["omega_e"]
+    with pytest.raises(RecordingError, match="omega_e"):
+        slow_view(recording, NOMINAL)
+
+
+def test_block_of_the_nominal_drive_has_no_misfit():
+    view = slow_view(log(Truth(noise_v=0.0, noise_a=0.0)), NOMINAL)
+    left = np.abs(misfit(view)["u"]).mean(axis=1)
+    assert np.median(left) < 0.02 and left.max() < 0.5  # the speed's own noise; a stretch may touch a ramp
+
+
+def test_mean_of_the_inverters_loss_is_that_of_a_whole_turn():
+    view = slow_view(log(), NOMINAL)
+    column = CATALOGUE["dead_time"].core(view)["v_0.02"]["u"].mean(axis=1)
+    heavy = view.i[:, 0].imag < -100.0
+    assert np.abs(column[heavy] + 1j * 4 / np.pi).max() < 0.01
+    assert np.ptp(np.abs(column[heavy])) < 1e-3
+
+
+def test_a_delay_turns_the_voltage_by_its_angle():
+    view = slow_view(log(), NOMINAL)
+    late = CATALOGUE["delay"].corrected(view, {"tau": view.sample_time_s})
+    turned = (late.to_dq(late.u[:, 1:-1]) / view.to_dq(view.u[:, 1:-1])).mean(axis=1)
+    assert np.angle(turned) == pytest.approx(-view.omega[:, 0] * view.sample_time_s, abs=1e-9)
+
+
+def test_repetitions_share_a_dwell():
+    view = slow_view(log(), NOMINAL)
+    same = np.diff(view.run) == 0
+    assert same.any()
+    assert np.abs(np.diff(view.omega[:, 0]))[same].max() < 0.05 * np.abs(view.omega).max()
+    assert np.abs(np.diff(view.i_raw[:, 0]))[same].max() < 0.05 * NOMINAL.machine.rated_current_a
+
+
+def test_readings_of_two_temperatures_are_no_noise():
+    """Rows at one speed and current differ by the temperature of the winding, which is a condition of its own."""
+    points = Stretches(**{name: np.full(12, x) for name, x in dict(i=-90j, u=20j, omega=-500.0, u_dc=400.0).items()},
+                       temp=np.repeat([20.0, 60.0, 100.0], 4), t=np.arange(12.0), first=np.arange(12),
+                       end=np.arange(1, 13), unsteady=np.zeros(12), rest=np.full(12, np.nan), window_s=1.0)  # fmt: skip
+    moved = replace(points, omega=np.tile([-500.0, -900.0, -1400.0, -1800.0], 3))
+    _, dwell = alike(moved, NOMINAL)
+    assert len(np.unique(dwell)) == 12
+    assert len(np.unique(alike(replace(moved, temp=np.full(12, np.nan)), NOMINAL)[1])) == 4

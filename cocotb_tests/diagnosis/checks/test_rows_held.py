@@ -1,0 +1,61 @@
+"""Loggers that hold rows, and angles that Hall sensors hold."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from cocotb_tests.support.recordings.from_equations import T, codes, made, nominal_of, write
+from fluxproof.diagnosis.loading.load import load_recording
+
+
+@pytest.fixture(scope="module")
+def nominal(tmp_path_factory):
+    return nominal_of(tmp_path_factory.mktemp("drive"))
+
+
+def held(table, rows):
+    """Every column but the time taken at these rows."""
+    return {name: values if name == "t" else values[rows] for name, values in table.items()}
+
+
+def test_rows_that_a_logger_holds_are_read_once(tmp_path, nominal):
+    table = made()
+    path = write(tmp_path / "r.parquet", held(table, np.arange(4000) // 2 * 2))
+    recording = load_recording(path, nominal)
+    assert codes(recording) == ["repeated", "slow_sampling"] and len(recording) == 2000
+    assert "written 2 times" in recording.problems[0].message and "sample_time_s" in recording.problems[0].action
+    np.testing.assert_allclose(np.diff(recording["t"]), 2 * T)
+    np.testing.assert_array_equal(recording["i_a"], table["i_a"][::2])
+
+
+def test_rows_that_are_written_thrice_but_follow_each_other(tmp_path, nominal):
+    table = made()
+    thrice = {name: values.repeat(3) for name, values in table.items()} | {"t": np.arange(12000) * T}
+    path = write(tmp_path / "r.parquet", thrice)
+    recording = load_recording(path, nominal)
+    assert codes(recording) == ["repeated"] and recording.joined[:-1].all() and not recording.slow
+    for name, values in table.items():
+        np.testing.assert_allclose(recording[name], values, rtol=1e-9, atol=1e-9)
+
+
+def test_a_drive_at_rest_in_coarse_codes_is_no_held_log(tmp_path, nominal):
+    table = made(speed=0.0, noise=0.0)
+    path = write(tmp_path / "r.parquet", {n: v if n == "t" else np.round(v, 1) for n, v in table.items()})
+    assert "repeated" not in codes(load_recording(path, nominal))
+
+
+@pytest.mark.parametrize("unit", [1.0, 180.0 / np.pi])
+def test_the_angle_of_hall_sensors_is_told(tmp_path, nominal, unit):
+    table = made()
+    steps = (np.floor(np.mod(table["theta_e"], 2 * np.pi) / (np.pi / 3)) + 0.5) * (np.pi / 3)
+    recording = load_recording(write(tmp_path / "r.parquet", table | {"theta_e": steps * unit}), nominal)
+    (fatal,) = [p for p in recording.problems if p.fatal]
+    assert fatal.code == "hall_steps" and "6 steps per turn" in fatal.message and "encoder" in fatal.message
+
+
+def test_an_angle_that_is_sampled_in_step_with_the_rotor_is_no_hall_angle(tmp_path, nominal):
+    table = made()
+    theta = np.arange(4000) * 2 * np.pi / 10
+    recording = load_recording(write(tmp_path / "r.parquet", table | {"theta_e": theta % (2 * np.pi)}), nominal)
+    assert "hall_steps" not in codes(recording)

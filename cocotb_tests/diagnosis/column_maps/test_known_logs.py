@@ -1,0 +1,100 @@
+"""Ready-made maps of the columns of known loggers."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from cocotb_tests.support.recordings.from_equations import codes, dq_made, nominal_of, write
+from fluxproof.diagnosis.column_maps import maps
+from fluxproof.diagnosis.ground.recording import COLUMNS, RecordingError
+from fluxproof.diagnosis.loading.load import load_recording
+
+
+@pytest.fixture(scope="module")
+def nominal(tmp_path_factory):
+    return nominal_of(tmp_path_factory.mktemp("drive"))
+
+
+LOGS = {
+    "VESC Tool": (
+        "ms_today=t*1000 d_axis_current=i_d q_axis_current=i_q d_axis_voltage=u_d_ref q_axis_voltage=u_q_ref"
+        " erpm=omega_e*9.549296585513721 input_voltage=u_dc",
+        {"fault_code": "FAULT_CODE_NONE"},
+    ),
+    "moteus": (
+        "timestamp=t servo_stats.d_A=i_d servo_stats.q_A=i_q servo_control.d_V=u_d_ref servo_control.q_V=u_q_ref"
+        f" servo_stats.velocity=omega_e*{1 / 8 / np.pi}",
+        {},
+    ),
+    "moteus registers": (
+        "time=t D_CURRENT=i_d Q_CURRENT=i_q VOLTAGE_DQ_D=u_d_ref VOLTAGE_DQ_Q=u_q_ref VOLTAGE=u_dc"
+        f" VELOCITY=omega_e*{1 / 8 / np.pi}",
+        {},
+    ),
+    "ODrive": (
+        "time=t odrv0.axis0.motor.foc.Id_measured=i_d odrv0.axis0.motor.foc.Iq_measured=i_q odrv0.vbus_voltage=u_dc"
+        " odrv0.axis0.motor.foc.v_current_control_integral_d=u_d_ref"
+        " odrv0.axis0.motor.foc.v_current_control_integral_q=u_q_ref"
+        f" odrv0.axis0.encoder.vel_estimate=omega_e*{1 / 8 / np.pi}",
+        {},
+    ),
+    "Kaggle electric motor temperature": (
+        f"u_q=u_q_ref u_d=u_d_ref motor_speed=omega_e*{60 / 8 / np.pi} i_d=i_d i_q=i_q",
+        {"coolant": 20.0, "stator_winding": 60.0, "pm": 50.0, "profile_id": 17},
+    ),
+    "WaveSculptor": (
+        f"t_s=t id_A=i_d iq_A=i_q vd_V=u_d_ref vq_V=u_q_ref n_rpm=omega_e*{60 / 8 / np.pi} u_dc_V=u_dc",
+        {"T_motor_C": 33.0},
+    ),
+    "LAAS omodri": ("Time=t Velocity=omega_e*0.25 Iq=i_q Uq=u_q_ref", {"Position": 0.0, "Vsupply": 0.47}),
+}
+
+
+@pytest.mark.parametrize("name", LOGS)
+def test_known_logs_are_mapped(tmp_path, nominal, name):
+    text, constants = LOGS[name]
+    entries = [entry.replace("*", "=").split("=") for entry in text.split()]
+    columns = {e[0]: (e[1], float(e[2]) if len(e) > 2 else 1.0) for e in entries}
+    table = dq_made(step=0.5 if name.startswith("Kaggle") else 0.01)
+    raw = {column: table[canonical] * factor for column, (canonical, factor) in columns.items()} | constants
+    recording = load_recording(write(tmp_path / "log.csv", raw, sep=";"), nominal)
+    assert recording.meta["map"] == name and recording.slow and not recording.fatal
+    assert set(codes(recording)) <= {"slow_sampling"}
+    for canonical, _ in columns.values():
+        np.testing.assert_allclose(recording[canonical], table[canonical], rtol=1e-9, atol=1e-9)
+    if name.startswith("Kaggle"):
+        np.testing.assert_allclose(recording["t"], table["t"])
+    assert all(p.column in (*COLUMNS, "") for p in recording.problems)
+
+
+def test_every_map_is_tested():
+    untried = {"Paderborn inverter data set"}
+    assert {m.NAME for m in maps()} - untried == set(LOGS)
+    for known in maps():
+        for canonical, unit in known.COLUMNS.values():
+            assert canonical in COLUMNS, (known.NAME, unit)
+
+
+def test_runs_of_a_log_are_kept_apart(tmp_path, nominal):
+    table = dq_made(step=0.5)
+    raw = {"u_q": table["u_q_ref"], "u_d": table["u_d_ref"], "motor_speed": table["omega_e"] * 60 / 8 / np.pi}
+    raw |= {
+        "i_d": table["i_d"],
+        "i_q": table["i_q"],
+        "stator_winding": 50.0,
+        "profile_id": np.repeat([4, 9], 1000),
+    }
+    recording = load_recording(write(tmp_path / "log.csv", raw), nominal)
+    assert list(np.flatnonzero(~recording.joined)) == [999, 1999]
+    assert codes(recording) == ["slow_sampling"]
+
+
+def test_the_inverter_data_set_is_refused_with_its_reason(tmp_path, nominal):
+    names = (
+        [f"{s}_{x}_k{d}" for s in "i" for x in "abc" for d in ("", "-1")]
+        + [f"d_{x}_k-2" for x in "abc"]
+        + ["u_dc_k"]
+    )
+    with pytest.raises(RecordingError, match="missing the angle theta_e.*induction motor"):
+        load_recording(write(tmp_path / "r.csv", {name: np.arange(500.0) for name in names}), nominal)

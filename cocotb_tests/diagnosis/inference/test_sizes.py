@@ -1,0 +1,32 @@
+"""Sizes that are impossible or implausible, and what they cost a set of effects."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from cocotb_tests.support.recordings.slow_logs import LEVELS, NOMINAL, Truth, log
+from fluxproof.diagnosis.balance.slow_view import slow_view
+from fluxproof.diagnosis.catalogue import CATALOGUE
+from fluxproof.diagnosis.ground import constants
+from fluxproof.diagnosis.inference.posterior import possible
+from fluxproof.diagnosis.inference.problem import Problem
+from fluxproof.diagnosis.inference.setup import Setup
+
+PSI, L_Q = NOMINAL.machine.magnet_flux_wb, NOMINAL.machine.inductance_q_h
+
+
+def test_absurd_sizes_are_impossible():
+    view = slow_view(log(Truth(l_q=6.0 * L_Q)), NOMINAL)
+    alone = Problem(Setup(view, view.visible(CATALOGUE), np.ones(len(view), bool))).fit(("inductance_q",))
+    assert not possible(alone)
+
+
+@pytest.mark.parametrize("share, costs", [(0.95, False), (0.5, True)])
+def test_an_implausible_value_costs(share, costs, monkeypatch):
+    """Else a sum of absurd effects that cancel is preferred to the true ones."""
+    view = slow_view(log(Truth(psi_m=share * PSI), levels=LEVELS[:8]), NOMINAL)
+    problem = Problem(Setup(view, view.visible(CATALOGUE), np.ones(len(view), bool)))
+    priced = problem.fit(("magnet_flux",)).value
+    monkeypatch.setattr(constants, "IMPLAUSIBLE", 1.0)
+    assert problem.fit(("magnet_flux",)).value - priced == pytest.approx(np.log(1e3) * costs)

@@ -1,0 +1,237 @@
+"""Columns of a recording: [columns] of drive.toml, ready-made maps, missing and derived columns."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import tomlkit
+
+from cocotb_tests.support.recordings.from_equations import codes, dq_made, made, nominal_of, write
+from fluxproof.diagnosis.answer.improve import _set
+from fluxproof.diagnosis.conventions.apply import edit
+from fluxproof.diagnosis.conventions.table import READINGS
+from fluxproof.diagnosis.ground.recording import COLUMNS, RecordingError
+from fluxproof.diagnosis.ingest.units import OF_BUS
+from fluxproof.diagnosis.ingest.usual_names import NAMES, TOLD_BY_UNIT, usual
+from fluxproof.diagnosis.loading.load import load_recording
+
+
+@pytest.fixture(scope="module")
+def nominal(tmp_path_factory):
+    return nominal_of(tmp_path_factory.mktemp("drive"))
+
+
+def test_columns_of_drive_toml(tmp_path):
+    table = made()
+    raw = {
+        "zeit": table["t"] * 1e6,
+        "U": table["i_a"] * 1000 + 50,
+        "V [mA]": table["i_b"] * 1000,
+        "n": table["omega_e"] / 4,
+    }
+    raw |= {name: table[name] for name in ("i_c", "theta_e", "u_dc", "d_a", "d_b", "d_c")}
+    nominal = nominal_of(
+        tmp_path,
+        """
+zeit = {name = "t", unit = "us"}
+U = {name = "i_a", factor = 0.001, offset = -0.05}
+V = "i_b"
+n = {name = "omega_e", unit = "rad/s mech"}
+""",
+    )
+    recording = load_recording(write(tmp_path / "r.csv", raw), nominal)
+    assert codes(recording) == [] and recording.meta["map"] == "[columns]"
+    for name, values in table.items():
+        np.testing.assert_allclose(recording[name], values, rtol=1e-9, atol=1e-9)
+
+
+WRONG_COLUMNS = {
+    'i_a = "i_z"': ("'i_a'", "'i_z' is not a canonical name", "nearest"),
+    "i_a = 4": ("'i_a'", "must be a canonical name or a table"),
+    'i_a = {name = "i_a", unit = "furlong"}': ("unit 'furlong' is unknown for i_a", "mA"),
+    'i_a = {name = "i_a", unit = "mA", factor = 2}': ("either unit",),
+    'i_a = {name = "i_a", gain = 2}': ("unknown key 'gain'",),
+    'i_a = {name = "i_a", factor = 0}': ("must not be 0",),
+    'i_a = {name = "i_a", factor = nan}': ("finite number",),
+    'i_a = "i_a"\ni_x = "i_b"': ("'i_x' is not a column of", "nearest"),
+    'i_a = "i_a"\ni_b = "i_a"': ("i_a is already assigned to 'i_a'",),
+}
+
+
+@pytest.mark.parametrize("lines", WRONG_COLUMNS)
+def test_wrong_columns_name_the_entry(tmp_path, lines):
+    with pytest.raises(RecordingError) as error:
+        load_recording(write(tmp_path / "r.csv", made(500)), nominal_of(tmp_path, lines))
+    message = str(error.value)
+    assert "[columns]" in message and "\n" not in message
+    for word in WRONG_COLUMNS[lines]:
+        assert word in message
+
+
+def test_files_of_several_loggers_share_the_columns(tmp_path):
+    nominal = nominal_of(tmp_path, '"I U [mA]" = "i_a"\n"Motor current U" = "i_a"')
+    table = made(500)
+    i_a = table.pop("i_a")
+    for name, values in {"I U [mA]": i_a * 1e3, "Motor current U": i_a}.items():
+        recording = load_recording(write(tmp_path / "r.csv", {**table, name: values}), nominal)
+        np.testing.assert_allclose(recording["i_a"], i_a, rtol=1e-9, atol=1e-9)
+
+
+def test_a_torque_of_unknown_name_is_noted(tmp_path, nominal):
+    table = made(500)
+    recording = load_recording(write(tmp_path / "r.csv", {**table, "flange [Nm]": 0.0 * table["i_a"]}), nominal)
+    assert "column 'flange [Nm]' is not used; if it is torque, assign it in [columns]" in recording.meta["notes"]
+    spare = nominal_of(tmp_path, '"flange [Nm]" = ""\ni_a = "i_a"')
+    recording = load_recording(write(tmp_path / "r.csv", {**table, "flange [Nm]": 0.0 * table["i_a"]}), spare)
+    assert not any("is not used" in note for note in recording.meta["notes"])
+
+
+BENCHES = {  # header: canonical column, and how much larger its values are
+    "German": {
+        "Zeit [ms]": ("t", 1e3), "Id [A]": ("i_d", 1.0), "Iq [A]": ("i_q", 1.0),
+        "n [U/min]": ("omega_e", 60 / 8 / np.pi),
+        "Ud_soll [V]": ("u_d_ref", 1.0), "Uq_soll [V]": ("u_q_ref", 1.0), "U_ZK [V]": ("u_dc", 1.0),
+    },
+    "CAN": {
+        "time_ms": ("t", 1e3), "id_mA": ("i_d", 1e3), "iq_mA": ("i_q", 1e3), "speed_rpm": ("omega_e", 60 / 8 / np.pi),
+        "ud_ref_mV": ("u_d_ref", 1e3), "uq_ref_mV": ("u_q_ref", 1e3), "vbus_mV": ("u_dc", 1e3),
+    },
+    "controller": {
+        "Timestamp": ("t", 1.0), "Id-meas": ("i_d", 1.0), "Iq-meas": ("i_q", 1.0), "IdRef": ("i_d_ref", 1.0),
+        "Drehzahl (1/min)": ("omega_e", 60 / 8 / np.pi), "Vd [V]": ("u_d_ref", 1.0), "Vq [V]": ("u_q_ref", 1.0),
+        "Channel D (Vdc)": ("u_dc", 1.0),
+    },
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("bench", BENCHES)
+def test_usual_names_of_dq_logs(tmp_path, nominal, bench):
+    table = dq_made()
+    table["i_d_ref"], table["u_dc"] = table["i_d"], np.full(len(table["t"]), 563.0)
+    raw = {header: table[name] * factor for header, (name, factor) in BENCHES[bench].items()}
+    recording = load_recording(write(tmp_path / "log.csv", raw, sep=";"), nominal)
+    for name, _ in BENCHES[bench].values():
+        np.testing.assert_allclose(recording[name], table[name], rtol=1e-9, atol=1e-9)
+    (note,) = (note for note in recording.meta["notes"] if "usual names" in note)
+    assert all(f"from {header!r}" in note for header in raw)
+
+
+def test_usual_names_of_phases_and_torque(tmp_path, nominal):
+    table = made(500) | {"torque": np.linspace(0.0, 3.0, 500)}
+    phases = zip("abc", "UVW", strict=True)
+    headers = {f"{x}_{old}": f"{new}_{mark}" for old, mark in phases for x, new in (("i", "I"), ("d", "duty"))}
+    headers |= {"theta_e": "theta_el [rad]", "u_dc": "Ubat [V]", "torque": "M_Welle [Nm]"}
+    raw = {headers.get(name, name): values for name, values in table.items()}
+    recording = load_recording(write(tmp_path / "r.csv", raw), nominal)
+    for name, values in table.items():
+        np.testing.assert_allclose(recording[name], values, rtol=1e-9, atol=1e-9)
+
+
+def test_names_that_may_mean_something_else_need_their_unit():
+    unsure = ("n", "M", "speed", "speed [rad/s]", "M [%]", "T_stator", "theta [deg]", "uv [V]", "I [A]")
+    assert [column for column in unsure if usual(column, "")] == []
+    assert usual("speed", "rpm")[:2] == ("omega_e", "rpm")  # by a line of units
+    assert usual("U_V", "")[0] == "u_b" and usual("u_uv [V]", "")[0] == "u_ab"  # phase V; line U-V
+    assert usual("I_A", "")[:2] == ("i_a", "")  # not a current in amperes
+
+
+def test_no_name_is_usual_for_two_columns():
+    names = [name for of in NAMES.values() for name in of] + [name for of, _ in TOLD_BY_UNIT.values() for name in of]
+    assert len(names) == len(set(names)) and set(NAMES) <= set(COLUMNS)
+
+
+def test_the_first_of_two_usual_names_counts(tmp_path, nominal):
+    table = {name: values for name, values in dq_made(400).items() if name != "u_dc"}
+    table["Ubat [V]"], table["Udc [V]"] = np.full(400, 48.0), np.full(400, 563.0)
+    recording = load_recording(write(tmp_path / "log.csv", table), nominal)
+    assert recording.meta["columns"]["u_dc"] == "Udc [V]"
+    table = {("Left/Udc" if name == "Ubat [V]" else name): values for name, values in table.items()}
+    with pytest.raises(RecordingError, match=r"'Left/Udc' and 'Udc \[V\]' could both be u_dc"):
+        load_recording(write(tmp_path / "log.csv", table), nominal)
+
+
+def of_index(table, share, bus="u_dc"):
+    """A dq log whose voltages are a modulation index."""
+    return {**table, **{name: table[name] / (share * table[bus]) for name in ("u_d_ref", "u_q_ref")}}
+
+
+@pytest.mark.parametrize("unit", OF_BUS)
+def test_a_modulation_index_is_told_by_its_unit(tmp_path, unit):
+    entries = [f"{name} = {{name = '{name}', unit = '{unit}'}}" for name in ("u_d_ref", "u_q_ref")]
+    nominal, table = nominal_of(tmp_path, "\n".join(entries)), dq_made(400)
+    log = of_index(table, OF_BUS[unit])
+    recording = load_recording(write(tmp_path / "r.csv", log), nominal)
+    assert codes(recording) == ["slow_sampling"]
+    np.testing.assert_allclose(recording["u_q_ref"], table["u_q_ref"], rtol=1e-9, atol=1e-9)
+    log["u_dc"] = ["off"] * len(log["t"])
+    with pytest.raises(RecordingError, match="contains no numbers"):
+        load_recording(write(tmp_path / "r.csv", log), nominal)
+    del log["u_dc"]
+    with pytest.raises(RecordingError, match=r"'u_d_ref' is a share of u_dc, which is missing"):
+        load_recording(write(tmp_path / "r.csv", log), nominal)
+
+
+def test_voltages_that_are_a_modulation_index_are_refused_with_the_way_out(tmp_path, nominal):
+    recording = load_recording(write(tmp_path / "r.csv", of_index(dq_made(400), 0.5)), nominal)
+    message = next(problem.message for problem in recording.problems if problem.fatal)
+    assert "modulation index" in message and "unit = 'u_dc/2'" in message
+    slow = {**dq_made(400)}  # 1 V at standstill is a voltage
+    slow |= {name: 0.02 * slow[name] for name in ("u_d_ref", "u_q_ref", "omega_e")}
+    assert not any("index" in p.message for p in load_recording(write(tmp_path / "s.csv", slow), nominal).problems)
+
+
+def test_a_reading_of_a_modulation_index_goes_into_its_unit(nominal):
+    """As u_dc the index is twice what fits: the improved drive says u_dc/2."""
+    recording = SimpleNamespace(problems=[], meta={"columns": {"u_q_ref": "m_q"}, "of_bus": ["u_q_ref"]})
+    half = next(r for r in READINGS if r.code == "voltages_double")
+    document = tomlkit.document()
+    edit(document, nominal, [half], recording, _set)
+    assert document["columns"]["m_q"] == {"name": "u_q_ref", "unit": "u_dc/2"}
+    rms, document = next(r for r in READINGS if r.code == "voltages_rms"), tomlkit.document()
+    edit(document, nominal, [rms], recording, _set)
+    assert "columns" not in document  # no unit says 1.41 times the bus
+
+
+@pytest.mark.parametrize(
+    "gone, words",
+    [
+        (("i_a",), ("currents", "i_a, i_b")),
+        (("theta_e",), ("the angle theta_e",)),
+        (("d_b",), ("voltages", "d_a, d_b, d_c or u_d_ref, u_q_ref")),
+        (("i_a", "i_b", "d_a"), ("currents", "voltages")),
+    ],
+)
+def test_missing_columns_are_listed_with_those_found(tmp_path, nominal, gone, words):
+    table = {name: v for name, v in made(500).items() if name not in gone}
+    if gone == ("i_a",):
+        del table["i_b"]
+    with pytest.raises(RecordingError) as error:
+        load_recording(write(tmp_path / "r.csv", table), nominal)
+    for word in (*words, "found columns t, ", "[columns]"):
+        assert word in str(error.value)
+
+
+def test_paths_of_a_model_tree_count_by_their_last_part(tmp_path, nominal):
+    table = made(600)
+    path = write(
+        tmp_path / "r.csv", {f"Model Root/Control/{name} [{COLUMNS[name]}]": v for name, v in table.items()}
+    )
+    assert codes(load_recording(path, nominal)) == []
+    twice = {"Left/i_a": table["i_a"]} | {f"Right/{name}": v for name, v in table.items()}
+    with pytest.raises(RecordingError, match="'Left/i_a' and 'Right/i_a' could both be i_a"):
+        load_recording(write(tmp_path / "r.csv", twice), nominal)
+
+
+def test_missing_columns_are_derived_and_noted(tmp_path, nominal):
+    table = made()
+    lean = {name: v for name, v in table.items() if name not in ("t", "omega_e", "u_dc", "i_b")}
+    recording = load_recording(write(tmp_path / "r.csv", lean), nominal)
+    assert codes(recording) == []
+    notes = " ".join(recording.meta["notes"])
+    for word in ("no time column", "omega_e is not recorded", "u_dc is not recorded", "i_b is not recorded"):
+        assert word in notes
+    np.testing.assert_allclose(recording["t"], table["t"], atol=1e-12)
+    np.testing.assert_allclose(recording["omega_e"][50:-50], table["omega_e"][50:-50], rtol=2e-3)
+    np.testing.assert_allclose(recording["i_b"], table["i_b"], atol=0.05)

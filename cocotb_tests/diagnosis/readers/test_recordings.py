@@ -1,0 +1,190 @@
+"""Reading recordings: every format and layout comes back as written, with units."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from cocotb_tests.support.recordings.from_equations import as_text, codes, dump, made, nominal_of, write, write_mat73
+from fluxproof.diagnosis.ground.nominal import load_nominal
+from fluxproof.diagnosis.ground.recording import COLUMNS, RecordingError
+from fluxproof.diagnosis.loading.load import load_recording
+from fluxproof.diagnosis.readers import read_table
+
+
+@pytest.fixture(scope="module")
+def nominal(tmp_path_factory):
+    return nominal_of(tmp_path_factory.mktemp("drive"))
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".txt", ".parquet", ".npz", ".npy", ".h5", ".mat", ".mf4", "7.3"])
+def test_every_format_comes_back_as_written(tmp_path, nominal, suffix):
+    table = made()
+    path = (
+        write_mat73(tmp_path / "r.mat", table) if suffix == "7.3" else write(tmp_path / f"r{suffix}", table)
+    )
+    recording = load_recording(path, nominal)
+    assert codes(recording) == []
+    assert set(recording.columns) == set(table)
+    for name, values in table.items():
+        np.testing.assert_allclose(recording[name], values, rtol=1e-12, atol=1e-12)
+    assert (
+        recording.joined[:-1].all()
+        and not recording.joined[-1]
+        and recording.usable.all()
+        and not recording.slow
+    )
+
+
+UNITS = {
+    "t": ("ms", 1e3), "i_a": ("mA", 1e3), "i_b": ("A", 1.0), "i_c": ("kA", 1e-3), "theta_e": ("deg", 180 / np.pi),
+    "omega_e": ("rpm", 60 / (2 * np.pi * 4)), "u_dc": ("mV", 1e3), "d_a": ("%", 100.0), "d_b": ("permille", 1e3),
+    "d_c": ("1", 1.0),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".parquet", ".h5", ".mf4"])
+def test_units_that_a_file_states_are_converted(tmp_path, nominal, suffix):
+    table = made()
+    units = {name: unit for name, (unit, _) in UNITS.items()}
+    raw = {name: values * UNITS[name][1] for name, values in table.items()}
+    if suffix == ".csv":
+        path = write(tmp_path / "r.csv", {f"{name} [{units[name]}]": v for name, v in raw.items()})
+    else:
+        if suffix == ".mf4":
+            raw["t"] = table["t"]
+        path = write(tmp_path / f"r{suffix}", raw, units)
+    recording = load_recording(path, nominal)
+    assert codes(recording) == []
+    for name, values in table.items():
+        np.testing.assert_allclose(recording[name], values, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "separator, decimal", [(",", "."), (";", ","), (";", "."), ("\t", ","), ("  ", "."), (" ", ",")]
+)
+@pytest.mark.parametrize("extra", ["", "units", "comments", "quoted"])
+def test_text_layouts(tmp_path, nominal, separator, decimal, extra):
+    table = made(600)
+    before = {"comments": "# recorded on a bench\n% 10 kHz\n\n", "quoted": ""}.get(extra, "")
+    text = as_text(table, separator, decimal, units=extra == "units", before=before)
+    if extra == "quoted":
+        head, rest = text.split("\n", 1)
+        text = (
+            separator.join(f'"{name}"' for name in table) + "\n" + rest
+            if separator.strip()
+            else head + "\n" + rest
+        )
+    path = tmp_path / "r.csv"
+    path.write_text(text)
+    recording = load_recording(path, nominal)
+    assert codes(recording) == []
+    for name, values in table.items():
+        np.testing.assert_array_equal(recording[name], values)
+
+
+def test_text_without_header_takes_numbers_as_names(tmp_path):
+    table = made(600)
+    path = tmp_path / "r.txt"
+    path.write_text(as_text(table, " ", ".", header=False))
+    nominal = nominal_of(tmp_path, "".join(f'{k + 1} = "{name}"\n' for k, name in enumerate(table)))
+    recording = load_recording(path, nominal)
+    np.testing.assert_array_equal(recording["d_c"], table["d_c"])
+
+
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "cp1252"])
+def test_text_encodings(tmp_path, nominal, encoding):
+    table = made(600) | {"temp_winding [°C]": np.full(600, 40.0)}
+    path = tmp_path / "r.csv"
+    path.write_bytes(as_text(table, ",", ".").encode(encoding))
+    assert load_recording(path, nominal)["temp_winding"][0] == 40.0
+
+
+def test_rows_without_a_line_end_and_lines_in_messages(tmp_path, nominal):
+    table = made(600)
+    path = tmp_path / "r.csv"
+    path.write_text(as_text(table, ",", ".", end=""))
+    recording = load_recording(path, nominal)
+    assert len(recording) == 599 and any("line end" in note for note in recording.meta["notes"])
+    lines = as_text(table, ",", ".").split("\n")
+    lines[100] += ",7"
+    path.write_text("\n".join(lines))
+    with pytest.raises(RecordingError, match=rf"^{path}:101: 11 fields; 10 expected"):
+        load_recording(path, nominal)
+    lines[100] = lines[100][:-2].replace(",", ",x", 1)
+    path.write_text("\n".join(lines))
+    problem = next(p for p in load_recording(path, nominal).problems if p.code == "not_a_number")
+    assert problem.column == "i_a" and problem.row == 99 and "line 101" in problem.message
+
+
+def test_other_rasters_are_brought_onto_the_currents(tmp_path, nominal):
+    from asammdf import MDF, Signal
+
+    table = made()
+    with MDF() as mdf:
+        mdf.append([Signal(table[n], table["t"], name=n) for n in table if n not in ("t", "u_dc")])
+        mdf.append([Signal(np.array([560.0, 570.0]), np.array([0.0, 0.2]), name="u_dc", unit="V")])
+        mdf.save(tmp_path / "r.mf4", overwrite=True)
+    recording = load_recording(tmp_path / "r.mf4", nominal)
+    assert len(recording) == 4000
+    assert (recording["u_dc"][:2000] == 560).all() and (recording["u_dc"][2001:] == 570).all()
+    assert any("u_dc" in note and "raster" in note for note in recording.meta["notes"])
+
+
+def test_dspace_structures(tmp_path, nominal):
+    from scipy.io import savemat
+
+    table = made()
+    signals = [
+        {"Name": name, "Data": values, "Unit": COLUMNS[name]} for name, values in table.items() if name != "t"
+    ]
+    savemat(tmp_path / "r.mat", {"exp1": {"X": {"Name": "", "Data": table["t"]}, "Y": signals}})
+    recording = load_recording(tmp_path / "r.mat", nominal)
+    assert codes(recording) == []
+    np.testing.assert_allclose(recording["d_b"], table["d_b"])
+
+
+def test_suffix_of_another_format_is_rejected(tmp_path, nominal):
+    path = write(tmp_path / "r.parquet", made())
+    path.rename(tmp_path / "r.csv")
+    with pytest.raises(RecordingError, match="the name suggests text, the content is Parquet"):
+        load_recording(tmp_path / "r.csv", nominal)
+
+
+def test_only_wanted_columns_are_read(tmp_path):
+    path = write(tmp_path / "r.parquet", made() | {f"other{k}": np.zeros(4000) for k in range(50)})
+    assert set(read_table(path, lambda names: ["t", "i_a"]).columns) == {"t", "i_a"}
+    assert len(read_table(path).columns) == 60
+
+
+def test_a_telemetry_dump_brings_its_registers(tmp_path):
+    path, drive = dump(tmp_path / "core.dump")
+    recording = load_recording(path, load_nominal(drive))
+    assert not recording.problems and recording.has("i_a", "theta_e", "d_a", "u_dc", "i_q_ref")
+    assert {"registers", "samples", "observed"} <= set(recording.meta) and len(
+        recording.meta["samples"]
+    ) == len(recording)
+
+
+@pytest.mark.study
+def test_a_million_rows_in_time(tmp_path, nominal):
+    table = made(1_000_000, speed=600.0)
+    table |= {"i_d_ref": np.zeros(1_000_000), "temp_winding": np.full(1_000_000, 40.0)}
+    csv, parquet = tmp_path / "r.csv", write(tmp_path / "r.parquet", table)
+    pd.DataFrame(table).to_csv(csv, index=False, float_format="%.7g")
+    load_recording(write(tmp_path / "warm.parquet", made(600)), nominal)
+    seconds = {}
+    for name, call in {
+        "csv": lambda: read_table(csv),
+        "parquet": lambda: read_table(parquet),
+        "all": lambda: load_recording(parquet, nominal),
+    }.items():
+        start = time.process_time()
+        call()
+        seconds[name] = time.process_time() - start
+    print(seconds)
+    # Twice what was measured on one core, for slower ones.
+    assert seconds["csv"] < 12 and seconds["parquet"] < 2 and seconds["all"] < 8

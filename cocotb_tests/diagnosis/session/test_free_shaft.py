@@ -1,0 +1,22 @@
+"""A free shaft behind a speed loop."""
+
+import pytest
+
+from cocotb_tests.support.recordings.blind_cases import files_of
+from cocotb_tests.support.slow import slowly
+from fluxproof.diagnosis.session import diagnose
+
+
+@pytest.mark.parametrize(
+    ("seed", "count", "number", "kind", "names"),
+    [
+        slowly(26112026, 80, 6, "free", {"cogging"}),
+        (27112026, 100, 34, "loaded", {"cogging", "magnet_flux"}),  # the transducer measures the load only
+    ],
+)
+def test_cogging_that_the_speed_loop_conceals_is_named(seed, count, number, kind, names, tmp_path):
+    """Only slow blocks show it; they were given the noise of the fast ones."""
+    recording, drive = files_of(number, tmp_path, seed, "own", count)
+    answer = diagnose(recording, drive)
+    assert {e.name for e in answer.effects} == names and answer.verdict == "explained"
+    assert set(answer.search.setup.view.shaft) == {kind}

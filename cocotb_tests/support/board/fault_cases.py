@@ -1,0 +1,64 @@
+"""Runs of the golden board that end in a fault or use a forced position; as a program: the facts of one as JSON.
+
+    NUMBA_DISABLE_JIT=1 python -m cocotb_tests.support.board.fault_cases index_wrong
+
+Some thousand clocks are faster in plain Python than compiled first.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+
+import numpy as np
+
+from cocotb_tests.support.board.loop_bench import COUNTS, BoardLoop, with_abz_and_spi
+from cocotb_tests.support.board.run_cases import CARRIER_HALF, DRIVE, start_from_standstill, status
+from cocotb_tests.support.peripherals.incremental_model import Incremental
+from fluxproof.cosim.board_clock import SEEN
+from golden_model.drive import load
+from golden_model.formats import PU, TURN
+
+MOVED = 60  # counts by which Z moves after the first index
+RATE = 1 << 20  # turns a sample, in 2**-32
+CURRENT_A = 2.0
+
+
+def index_wrong() -> dict:
+    """Z moves by MOVED counts once the drive is referenced: the next one trips, and says so."""
+    loop, moved, off_after = start_from_standstill(), False, 0
+    for chunk in loop.run(220):
+        if status(chunk)["encoder_flags"] & 1 and not moved:
+            loop.pins.encoder.encoder, moved = Incremental(COUNTS, index_from=float(MOVED)), True
+        if status(chunk)["board_first"]:
+            break
+    fault = chunk.status[:, 9].nonzero()[0][0]
+    gates = chunk.seen[:, :2].any(axis=1)
+    off_after = int(gates[fault:].sum())
+    core = loop.golden.state.of_core.of_fault_latch
+    irq = int(chunk.seen[-1, SEEN.index("irq")])
+    return {**status(chunk), "moved": moved, "clocks_to_off": off_after, "first_fault": core.first, "irq": irq}
+
+
+def forced() -> dict:
+    """A current along a position that the host turns: no fault at the change of source; the snapshot has both."""
+    drive = with_abz_and_spi(load(DRIVE), CARRIER_HALF)
+    writes = {
+        22: {"forced_angle": TURN.to_int(0.05), "forced_rate": RATE},
+        23: {"position_source": 1},
+        25: {"enable": 1, "i_d_ref": PU.to_int(CURRENT_A / drive.bases.current_a)},
+        60: {"take_snapshot": 1},
+        62: {"position_source": 0},
+    }
+    loop, codes = BoardLoop(drive, writes), []
+    for chunk in loop.run(66):
+        codes.append(loop.golden.state.wires.position_code)
+    steps = np.diff(codes[30:60]) % (1 << 16)
+    latch = loop.golden.state.of_core.of_fault_latch
+    currents = [round(float(i), 2) for i in loop.plant.i_abc]
+    facts = {"steps": sorted({int(s) for s in steps}), "fault_flags": latch.flags, "currents": currents}
+    return {**status(chunk), **facts, "after": codes[-1]}
+
+
+if __name__ == "__main__":
+    print(json.dumps({"index_wrong": index_wrong, "forced": forced}[sys.argv[1]]()))

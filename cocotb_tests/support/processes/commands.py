@@ -1,0 +1,23 @@
+"""What commands are given and what they say when they are stopped."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from cocotb_tests.support.drives import PAPER
+from cocotb_tests.support.recordings import from_core as bench
+
+STOPPED = "fluxproof: stopped\n"
+
+
+def write_inputs(folder: Path) -> Path:
+    """A folder with drive.toml, two recordings whose time stands still, and a good one."""
+    (folder / "drive.toml").write_bytes(PAPER.read_bytes())
+    table = pd.DataFrame({name: values[:900] for name, values in bench.columns(bench.GRID[:4]).items()})
+    table.to_csv(folder / "good.csv", index=False)
+    table.assign(t=np.zeros(len(table))).to_csv(folder / "stopped.csv", index=False)
+    table.assign(t=np.ones(len(table))).to_csv(folder / "stopped_too.csv", index=False)
+    return folder
