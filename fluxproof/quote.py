@@ -50,8 +50,8 @@ def printable(text: str, encoding: str | None) -> str:
 
 def say(text: str, stream: TextIO | None = None) -> None:
     """Print one line at once, on stdout or on ``stream``."""
-    stream = stream or sys.stdout
-    print(printable(text, stream.encoding), file=stream, flush=True)
+    out = sys.stdout if stream is None else stream
+    print(printable(text, out.encoding), file=out, flush=True)
 
 
 def tcl_word(text: str) -> str:

@@ -94,7 +94,8 @@ def to_si(name, value, drive):
 
 def from_si(name, value, drive):
     """Nearest integer for a value in SI units; angles wrap, anything else out of range is a ValueError."""
-    port, lsb = SIGNALS.get(name), si_per_lsb(name, drive)
+    lsb = si_per_lsb(name, drive)
+    port = SIGNALS[name]
     if not math.isfinite(value):
         raise ValueError(f"{name} = {value} is not a finite number")
     integer = math.floor(value / lsb + 0.5)

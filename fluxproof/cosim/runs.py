@@ -19,7 +19,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from types import SimpleNamespace
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -40,7 +40,7 @@ from fluxproof.files import write_json
 from fluxproof.plant import Machine
 from golden_model import drive as drives
 from golden_model.fluxproof import Config
-from golden_model.registers import registers
+from golden_model.registers import RegisterSet, registers
 
 FILES = ("progress", "result.npz", "summary.json")
 Progress = Callable[[int, int], None]
@@ -53,17 +53,19 @@ class Run(Protocol):
 
     def __len__(self) -> int:
         """Periods."""
+        ...
 
     async def on(self, device: Device, progress: Progress) -> Result:
         """Carry the run out."""
+        ...
 
 
 @dataclass(frozen=True)
 class ClosedLoop:
     """A scenario in closed loop; the fields are the arguments of cosimulate."""
 
-    drive: object
-    registers: object
+    drive: drives.Drive
+    registers: RegisterSet
     scenario: Scenario
     machine: Machine | None = None
     ideal_inverter: bool = False
@@ -76,8 +78,15 @@ class ClosedLoop:
         return len(self.scenario)
 
     async def on(self, device: Device, progress: Progress) -> Result:
-        options = dict(machine=self.machine, ideal_inverter=self.ideal_inverter)
-        return await cosimulate(device, self.drive, self.registers, self.scenario, progress, **options)
+        return await cosimulate(
+            device,
+            self.drive,
+            self.registers,
+            self.scenario,
+            progress,
+            machine=self.machine,
+            ideal_inverter=self.ideal_inverter,
+        )
 
 
 def closed_loop(drive_file: str, carrier_half: int, scenario: str, periods: int | None = None) -> ClosedLoop:
@@ -118,10 +127,11 @@ async def carry_out(run: Run, device: Device, folder: Path) -> Result:
     """The run on the device; its result goes into the folder."""
     began = time.monotonic()
     result = await run.on(device, progress_in(folder))
-    arrays = {f"observed_{name}": values for name, values in result.observed.items()}
+    arrays: dict[str, Any] = {f"observed_{name}": values for name, values in result.observed.items()}
     arrays |= {f"plant_{name}": values for name, values in result.plant.items()}
     temporary = folder / ".result.npz"
-    np.savez(temporary, **arrays, gate_edges=result.gate_edges)
+    arrays["gate_edges"] = result.gate_edges
+    np.savez(temporary, **arrays)
     os.replace(temporary, folder / "result.npz")
     names = ("periods_compared", "differences", "first_difference", "sample_to_duty_clocks")
     counts = {name: getattr(result, name) for name in names}

@@ -30,7 +30,7 @@ def _needs(paths: Collection[Path]) -> tuple[dict[Path, set[Path]], set[Path]]:
             if kind.lower() == "package":
                 packages.add(path)
     needs = {
-        path: {declared_by.get(name.lower()) for name in _USE.findall(text)} - {None, path}
+        path: {declared_by[unit] for name in _USE.findall(text) if (unit := name.lower()) in declared_by} - {path}
         for path, text in texts.items()
     }
     return needs, packages

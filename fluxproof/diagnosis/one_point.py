@@ -98,7 +98,7 @@ def _fit(cells, before, after, sigma, held) -> Fit:
     out = held[cells.block]
     rms = lambda x, w: float(np.sqrt(2.0 * np.mean(x[rows & w] ** 2)))  # noqa: E731
     parts = [rms(x, w) for w in (~out, out) for x in (before, after)]
-    return Fit("u_dq", "V", *parts, float(np.sqrt(2.0 * np.mean(sigma[rows] ** 2))))
+    return Fit("u_dq", "V", *parts, noise_floor=float(np.sqrt(2.0 * np.mean(sigma[rows] ** 2))))
 
 
 def _spread(around, sigma) -> Fit:

@@ -70,7 +70,7 @@ def opened(recording: str):
         return open_regular(recording)
     with _as_os_error():
         _check_target(recording)
-        return fsspec.open(recording, "rb").open()
+        return fsspec.open(recording, "rb").open()  # pyright: ignore[reportAttributeAccessIssue]  # one name: OpenFile
 
 
 def stated(recording: str) -> dict:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import Any
 
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -47,7 +48,8 @@ class Rows:
     def read(self, key: str) -> dict | None:
         """The row, or None if its file is missing or damaged, which is then removed."""
         try:
-            return pq.read_table(self.path(key), memory_map=False, partitioning=None).to_pylist()[0]
+            options: dict[str, Any] = {"memory_map": False, "partitioning": None}
+            return pq.read_table(self.path(key), **options).to_pylist()[0]
         except FileNotFoundError:
             return None
         except (OSError, ValueError, IndexError):

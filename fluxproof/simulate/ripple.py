@@ -34,6 +34,7 @@ def ripple(drive: Drive, run: Run, end: int, span: int) -> dict:
         if size > worst:
             worst, shown = size, (t, i_abc)
     rms = float(np.sqrt(np.mean(squares)))
+    assert shown is not None  # PERIODS is positive
     return {"t": shown[0], "i_abc": shown[1], "peak_to_peak_a": worst, "rms_a": rms}
 
 

@@ -134,7 +134,7 @@ def gain_of(oversampling):
     return GAIN.to_int(FULL / (oversampling**3 * weight_of(oversampling)))
 
 
-def centred(period_clocks, oversampling, bit_clocks, bit_delay=0):
+def centred(period_clocks: int, oversampling: int, bit_clocks: int, bit_delay: float = 0):
     """Register ``start_clocks`` that puts the window's middle on the next trigger.
 
     ``period_clocks``: distance of the triggers; ``bit_clocks``: of two bits; ``bit_delay``: from the middle of the

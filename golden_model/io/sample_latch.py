@@ -102,7 +102,7 @@ BLOCK = Block(
     outputs=tuple(_PORTS[out] for out in NAMES.values()),
     latency=1,
     configs=({"ADC_BITS": 16, "POSITION_BITS": 16}, {"ADC_BITS": 12, "POSITION_BITS": 18}),
-    width_from={k: sized(out) for name, out in NAMES.items() for k in (name, out) if sized(out)},
+    width_from={k: size for name, out in NAMES.items() for k in (name, out) if (size := sized(out))},
     reference=reference,
     bound=bound,
 )

@@ -141,7 +141,7 @@ BLOCK = Block(
     ),
     too_wide=(0,),
     width_from={
-        name: sample_latch.sized(out) for name, out in sample_latch.NAMES.items() if sample_latch.sized(out)
+        name: size for name, out in sample_latch.NAMES.items() if (size := sample_latch.sized(out))
     },
     reference=None,
     bound=None,

@@ -198,7 +198,7 @@ BLOCK = Block(
     latency=2,
     constants={"COUNT": COUNT, "START": START, "INDEX_W": INDEX.width},
     configs=({"ADC_BITS": 16, "POSITION_BITS": 16}, {"ADC_BITS": 12, "POSITION_BITS": 18}),
-    width_from={name: sized(name) for name in INPUTS if sized(name)},
+    width_from={name: size for name in INPUTS if (size := sized(name))},
     reference=None,
     bound=None,
     stimuli=stimuli,

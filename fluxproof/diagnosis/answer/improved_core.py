@@ -42,7 +42,7 @@ class Change(NamedTuple):
 
     section: str
     key: str
-    value: object
+    value: float | tuple[float, ...]
     why: str
 
 

@@ -47,8 +47,8 @@ class CurrentOffset(Effect):
         return float(np.max(np.abs(self._phases(c))))
 
     @staticmethod
-    def _phases(c, suffix=""):
-        return sum(c.get(name + suffix, 0.0) * np.array(w) for name, w in PATTERNS.items())
+    def _phases(c, suffix="") -> np.ndarray:
+        return sum((c.get(name + suffix, 0.0) * np.array(w) for name, w in PATTERNS.items()), np.zeros(3))
 
     def corrected(self, view, c):
         course = view.course[:, None, None]

@@ -61,7 +61,7 @@ def _held(recording, advance, joined, period) -> bool:
     row, count = int(still[0]) + 1, len(still)
     if count <= CHANCE * _by_chance(recording):
         return False
-    slow = count > HELD * np.count_nonzero(turning)
+    slow = bool(count > HELD * np.count_nonzero(turning))
     if slow:
         recording.slow = True
         message = f"{count} rows repeat the previous one: sampled more slowly than the time column states"

@@ -83,7 +83,7 @@ def _currents(recording, rated) -> None:
         # A unit applies to a sensor board: to all currents of a frame, unless the others differ in magnitude.
         _convert(recording, tuple(large), 1e-3, "mA")
         return
-    name = max(large, key=large.get)
+    name = max(large, key=large.__getitem__)
     times = f"{large[name] / rated:.0f} times rated_current_a = {rated:g} A"
     _refuse(recording, name, f"reaches {large[name]:.4g} A, {times}", large)
 

@@ -199,7 +199,7 @@ class FluxEffect(Effect):
     def free(self, view):
         return {name: flux(view, psi) for name, psi in self.free_psi(view).items()}
 
-    def psi(self, view, c) -> np.ndarray:
+    def psi(self, view, c) -> np.ndarray | float:
         """The effect's flux linkage, (b, m+1) complex dq [Wb]."""
         shapes = {**self.core_psi(view), **self.free_psi(view)}
         return sum(value * shapes[name] for name, value in c.items() if value)

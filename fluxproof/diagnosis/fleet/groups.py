@@ -101,7 +101,8 @@ def _joining(faint, mine) -> list:
 
 def _lines(mine) -> list[Line]:
     """Places of the signature that half of the recordings have, the largest first."""
-    shares, sizes, units = defaultdict(list), defaultdict(list), {}
+    shares: dict[tuple[str, float], list[float]] = defaultdict(list)
+    sizes, units = defaultdict(list), {}
     for _, weighed, own in mine:
         for place, value in own.items():
             shares[place].append(value**2)

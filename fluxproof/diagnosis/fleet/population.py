@@ -64,7 +64,8 @@ def population(effect, parameter, unit, serials, x, s) -> Population | None:
     if len(x) < LEAST_DRIVES:
         return None
     centre = float(np.median(x))
-    scale = max(float(stats.median_abs_deviation(x, scale="normal")), float(np.median(s)), 1e-12 * abs(centre), 1e-300)
+    scatter = stats.median_abs_deviation(x, scale="normal")  # pyright: ignore[reportArgumentType]  # a word of scipy's
+    scale = max(float(scatter), float(np.median(s)), 1e-12 * abs(centre), 1e-300)
     u, e = (x - centre) / scale, s / scale
     mu, tau, epsilon, spread_sigma = _fitted(u, e)
     v = tau**2 + e**2

@@ -47,7 +47,7 @@ def failed_row(reason: str) -> dict:
     return {"reason": one_line(reason), "verdict": "bad_recording", "sentence": one_line(reason)}
 
 
-def one_line(text: str) -> str:
+def one_line(text: object) -> str:
     return writable(" ".join(str(text).split())[:REASON]) or "no reason given"
 
 

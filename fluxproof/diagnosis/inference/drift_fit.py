@@ -13,6 +13,7 @@ import numpy as np
 from fluxproof.diagnosis.balance.cells import voltage_level
 from fluxproof.diagnosis.balance.orders import at_order
 from fluxproof.diagnosis.ground import constants
+from fluxproof.diagnosis.ground.arrays import Complex
 from fluxproof.diagnosis.inference.fit import Fitter, Model
 
 DRIFTS = 0.1  # least change of a column over time relative to its size
@@ -45,7 +46,7 @@ def drifts(cells, centred, name, effect) -> bool:
     return not effect.corrects and any(size(centred, k) > DRIFTS * max(size(cells, k), 1e-30) for k in cores)
 
 
-def row_sigmas(view, cells, raw):
+def row_sigmas(view, cells, raw: Complex):
     """(r,) standard deviation [V]: of neighbouring means, and a share of the voltage for the balance itself."""
     step = np.diff(raw) if len(raw) > 1 else np.zeros(1, complex)
     each = [float(np.sqrt(np.nanmean(x**2) / 2.0)) for x in (step.real, step.imag)]

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from fluxproof.diagnosis.ground.arrays import Complex
 from fluxproof.diagnosis.ground.recording import RecordingError
 from fluxproof.diagnosis.ingest.demand import is_analysed
 
@@ -49,15 +50,16 @@ def dq_of_analyser(path, columns: dict, nominal, notes: list) -> dict:
     return kept | {"i_d": i.real, "i_q": i.imag, "u_d_ref": found.real, "u_q_ref": found.imag}
 
 
-def _voltage(u, phi, i, omega, told, machine):
+def _voltage(u, phi, i: Complex, omega, told, machine) -> Complex:
     """Complex dq voltages (n,) [V] of the magnitudes u, by the angle phi ahead of the current or behind it.
 
     Where the two are close, the machine that fits best to all points decides, which starts as the nominal one.
     """
     ahead, behind = (u * np.exp(1j * (np.angle(i) + sign * phi)) for sign in (1.0, -1.0))
     usual = np.array([machine.resistance_ohm, machine.inductance_d_h, machine.inductance_q_h, machine.magnet_flux_wb])
-    terms = usual * np.stack([i, 1j * omega * i.real, -omega * i.imag, 1j * omega * np.ones(len(i))], axis=1)
-    share, found = np.ones(4), None
+    terms: Complex = usual * np.stack([i, 1j * omega * i.real, -omega * i.imag, 1j * omega * np.ones(len(i))], axis=1)
+    share = np.ones(4)
+    found: Complex | None = None
     for _ in range(STEPS):
         needed = terms @ share
         chosen = np.where(np.abs(ahead - needed) < np.abs(behind - needed), ahead, behind)
@@ -66,7 +68,8 @@ def _voltage(u, phi, i, omega, told, machine):
             break
         found = chosen
         known = np.isfinite(found) & np.isfinite(needed)
-        left = (found - needed)[known]
+        left: Complex = (found - needed)[known]
         rows = np.concatenate([terms[known].real, terms[known].imag])
         share = share + np.linalg.lstsq(rows, np.concatenate([left.real, left.imag]), rcond=1e-6)[0]
+    assert found is not None  # STEPS is positive
     return found

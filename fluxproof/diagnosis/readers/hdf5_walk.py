@@ -111,8 +111,8 @@ def _links(group, path) -> list[str]:
 
 
 def _address(identifier) -> tuple:
-    import h5py
+    from h5py import h5o
 
-    info = h5py.h5o.get_info(identifier)
+    info = h5o.get_info(identifier)
     return info.fileno, info.addr
 

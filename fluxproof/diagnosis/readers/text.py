@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import re
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,6 +16,9 @@ from fluxproof.diagnosis.ground.recording import Problem, RecordingError
 from fluxproof.diagnosis.readers.clock import moments
 from fluxproof.diagnosis.readers.sniff import half_zero, sniff
 from fluxproof.diagnosis.readers.table import Table, chosen, repeated, row_limit, shown, too_long
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 FORMAT = "text"
 SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".asc", ".log")
@@ -102,14 +106,14 @@ def read(path, select=None) -> Table:
 class _Column:
     """raw: pandas Series; numbers: (n,), NaN where there is none; words: (n,) bool, where there is a word instead."""
 
-    raw: object
+    raw: pd.Series
     numbers: np.ndarray
     words: np.ndarray
     moment: bool = False
 
     @property
     def text(self) -> bool:
-        return np.count_nonzero(self.words) > MOSTLY_TEXT * len(self.words)
+        return bool(np.count_nonzero(self.words) > MOSTLY_TEXT * len(self.words))
 
 
 def _numbers(values, decimal, pd) -> _Column:

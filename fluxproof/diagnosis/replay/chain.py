@@ -137,4 +137,8 @@ def _given(observed: dict, values: fluxproof.Registers) -> np.ndarray:
 
 def plain_state(state) -> fluxproof.State:
     """The state with Python integers, so that every call has the same types and is compiled once."""
-    return fluxproof.State(*(type(p)(*map(int, p)) if isinstance(p, tuple) else int(p) for p in state))
+    return fluxproof.State._make(map(_plain_part, state))
+
+
+def _plain_part(part):
+    return type(part)(*map(int, part)) if isinstance(part, tuple) else int(part)

@@ -79,9 +79,9 @@ def span(low, high, unit: str) -> str:
 
 def brief(value) -> str:
     """A value in the notation of drive.toml; a long array by its shape and range."""
-    if dataclasses.is_dataclass(value):
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
         value = dataclasses.asdict(value)
-    if hasattr(value, "tolist"):
+    elif hasattr(value, "tolist"):
         value = value.tolist()
     if isinstance(value, bool) or value is None:
         return {True: "true", False: "false", None: "–"}[value]
@@ -119,5 +119,5 @@ def effect_text(name: str) -> SimpleNamespace:
         equation=of("equation"),
         signature=of("signature"),
         separated_by=separated_by if isinstance(separated_by, str) else "; ".join(map(str, separated_by)),
-        meanings={parameter.name: parameter.meaning for parameter in of("parameters")},
+        meanings={parameter.name: parameter.meaning for parameter in getattr(entry, "parameters", ())},
     )
