@@ -16,7 +16,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from fluxproof.diagnosis.ground.arrays import Complex
+from fluxproof.diagnosis.ground.arrays import Complex, Real
 from fluxproof.diagnosis.ground.nominal import Machine
 
 MOST_ROWS = 5000
@@ -24,7 +24,7 @@ FIT = 0.25  # misfit over voltage: any real effect is smaller at speed
 BETTER = 0.3  # a change is accepted if the misfit falls below this share
 LEAST_ROWS, LEAST_OF_TABLE = 20, 6  # fewer fit by chance with some change
 LEAST_POINTS, SAME = 3, 0.1  # of dq values: operating points that are so far apart, of rated current and top speed
-TURNS = np.exp(2j * np.pi / 3 * np.arange(3))
+TURNS: Complex = np.exp(2j * np.pi / 3 * np.arange(3))
 
 
 AnyRows = TypeVar("AnyRows", bound="_Intervals")
@@ -47,8 +47,8 @@ class _Intervals:
 class FastRows(_Intervals):
     """i, d: (2, m, 3) phase currents [A] and (m, 3) duties in force; u_dc: (m,) [V]."""
 
-    i: np.ndarray
-    d: np.ndarray
+    i: Real
+    d: Real
     u_dc: np.ndarray
     steady = False
 
@@ -110,11 +110,10 @@ def misfit(rows: Rows, at_current: bool = False, at_d_current: bool = False) -> 
     if isinstance(rows, SteadyRows):
         i, omega = rows.dq.mean(axis=0), rows.omega.mean(axis=0)
         psi = m.inductance_d_h * i.real + 1j * m.inductance_q_h * i.imag + m.magnet_flux_wb
-        left: Complex = rows.u_dq - m.resistance_ohm * i - 1j * omega * psi
-        u = rows.u_dq
-        at = i
+        rest: Complex = rows.u_dq - m.resistance_ohm * i - 1j * omega * psi
+        left, u, at = rest, rows.u_dq, i
         if np.isnan(u.real).any():
-            left, u = left.imag, u.imag
+            left, u = rest.imag, u.imag
     else:
         i_s: Complex = (2 / 3) * rows.i @ TURNS
         turn = np.exp(1j * rows.theta)

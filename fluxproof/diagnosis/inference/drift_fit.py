@@ -48,7 +48,7 @@ def drifts(cells, centred, name, effect) -> bool:
 
 def row_sigmas(view, cells, raw: Complex):
     """(r,) standard deviation [V]: of neighbouring means, and a share of the voltage for the balance itself."""
-    step = np.diff(raw) if len(raw) > 1 else np.zeros(1, complex)
+    step: Complex = np.diff(raw) if len(raw) > 1 else np.zeros(1, complex)
     each = [float(np.sqrt(np.nanmean(x**2) / 2.0)) for x in (step.real, step.imag)]
     own = constants.BALANCE_U * voltage_level(view) + constants.BALANCE_DC * view.nominal.inverter.dc_bus_v
     return np.hypot(np.array(each)[cells.part], own[cells.block])

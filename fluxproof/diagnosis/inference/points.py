@@ -14,6 +14,7 @@ order by itself.  The contrasts carry the drifts.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -43,7 +44,7 @@ class Points:
     point: np.ndarray
     loads: int
     load: float
-    condensed: object  # function of further rows (r,): their means and contrasts (n,)
+    condensed: Callable[[np.ndarray], np.ndarray]  # function of further rows (r,): their means and contrasts (n,)
 
 
 def balance_level(view, cells):

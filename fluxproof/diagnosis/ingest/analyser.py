@@ -31,7 +31,7 @@ def dq_of_analyser(path, columns: dict, nominal, notes: list) -> dict:
         return columns
     m, measured = nominal.machine, {"i_d", "i_q"} <= set(columns)
     names = ("i_d", "i_q") if measured else ("i_d_ref", "i_q_ref")
-    i = columns[names[0]] + 1j * columns[names[1]]
+    i: Complex = columns[names[0]] + 1j * columns[names[1]]
     told = np.abs(i) > LEAST_CURRENT * m.rated_current_a
     if not measured and "i_line" in columns:
         i = np.where(told, i / np.maximum(np.abs(i), 1e-30) * columns["i_line"], i)

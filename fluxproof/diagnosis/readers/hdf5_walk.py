@@ -111,7 +111,7 @@ def _links(group, path) -> list[str]:
 
 
 def _address(identifier) -> tuple:
-    from h5py import h5o
+    from h5py import h5o  # pyright: ignore[reportAttributeAccessIssue]  # compiled, without types
 
     info = h5o.get_info(identifier)
     return info.fileno, info.addr

@@ -153,6 +153,7 @@ def _leave_out_headers(table: Table, columns, layout) -> None:
     between = np.all([c.words for c in given], axis=0)
     if not between.any():
         return
+    assert table.lines is not None  # a text file has them
     row = int(np.argmax(between))
     names = [str(c.raw.iloc[row]).strip() for c in columns.values()]
     what = "repeats the header: another file was appended" if names == list(columns) else "is a line of words"
@@ -171,7 +172,7 @@ def _take(table: Table, name: str, column: _Column) -> None:
         return
     table.columns[name] = column.numbers
     words = np.flatnonzero(column.words)
-    if len(words):
+    if len(words) and table.lines is not None:
         row = int(words[0])
         table.problems.append(
             Problem(

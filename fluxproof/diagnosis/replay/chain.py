@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -141,4 +141,5 @@ def plain_state(state) -> fluxproof.State:
 
 
 def _plain_part(part):
-    return type(part)(*map(int, part)) if isinstance(part, tuple) else int(part)
+    kind: Any = type(part)
+    return kind(*map(int, part)) if isinstance(part, tuple) else int(part)

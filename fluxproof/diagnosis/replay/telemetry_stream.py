@@ -114,7 +114,7 @@ def _whole_packets(raw: bytes, at: int) -> np.ndarray:
 
 def _sound(rows: np.ndarray) -> np.ndarray:
     """(n,) bool: every field is sign- or zero-extended as its format requires, and all other bits are zero."""
-    good: np.ndarray = ~(rows & ~USED).any(axis=1)
+    good = np.asarray(~(rows & ~USED).any(axis=1))
     for field in LAYOUT.values():
         value = _values(rows, field)
         good &= (value >= field.port.fmt.lo) & (value <= field.port.fmt.hi)

@@ -81,8 +81,8 @@ def brief(value) -> str:
     """A value in the notation of drive.toml; a long array by its shape and range."""
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         value = dataclasses.asdict(value)
-    elif hasattr(value, "tolist"):
-        value = value.tolist()
+    elif (listed := getattr(value, "tolist", None)) is not None:
+        value = listed()
     if isinstance(value, bool) or value is None:
         return {True: "true", False: "false", None: "–"}[value]
     if isinstance(value, int | float):
