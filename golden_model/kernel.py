@@ -21,16 +21,16 @@ from numba.core import config
 PACKAGE = Path(__file__).resolve().parent
 SETTINGS: Any = config  # numba makes its attributes at run time
 P = ParamSpec("P")
-R = TypeVar("R", covariant=True)
+R_co = TypeVar("R_co", covariant=True)
 
 
-class Kernel(Protocol[P, R]):
+class Kernel(Protocol[P, R_co]):
     """A compiled function; ``py_func`` is the same as plain Python."""
 
     @property
-    def py_func(self) -> Callable[P, R]: ...
+    def py_func(self) -> Callable[P, R_co]: ...
 
-    def __call__(self, *args: P.args, **kwargs: P.kwargs) -> R: ...
+    def __call__(self, *args: P.args, **kwargs: P.kwargs) -> R_co: ...
 
 
 def _source_hash() -> str:
@@ -71,7 +71,7 @@ def _user() -> int:
 CACHE_DIR = _cache_root() / "numba" / _source_hash()
 
 
-def kernel(function: Callable[P, R], cache_dir: Path = CACHE_DIR) -> Kernel[P, R]:
+def kernel(function: Callable[P, R_co], cache_dir: Path = CACHE_DIR) -> Kernel[P, R_co]:
     """Compile ``function`` with numba on first call; ``function.py_func`` stays plain Python.
 
     A kernel outside this package that calls code outside this package needs a ``cache_dir`` of its own,

@@ -82,7 +82,8 @@ def check_stream(facts: dict, drive, folder: Path) -> None:
     The speed of every sample is that between edges, which no register has.
     """
     words = np.fromfile(facts["folder"] / "capture.bin", "<u4").reshape(-1, COUNT)
-    said = [dict(zip(Sample._fields, a)) | dict(zip(Observed._fields, b)) for a, b in facts["history"]]
+    names = (*Sample._fields, *Observed._fields)
+    said = [dict(zip(names, (*a, *b), strict=True)) for a, b in facts["history"]]
     wanted = [pack(k, values) for k, values in enumerate(said)]
     assert len(words) > 10 and words.tolist() == [list(wanted[k]) for k in words[:, 1]]
     assert all(values["speed_was_given"] for values in said[-len(words) :])

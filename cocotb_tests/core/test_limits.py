@@ -190,7 +190,7 @@ def open_core(carrying, **changes):
     core.advance(1, enable=1)
     code, step = 0, 65536 * 25 // 10000
     amplitude = 2000
-    for k in range(500):
+    for _ in range(500):
         theta = 2 * math.pi * 4 * code / 65536
         sample = {f"adc_{x}": 32768 for x in "abc"}
         for n, x in enumerate("abc"):

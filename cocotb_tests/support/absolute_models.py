@@ -41,7 +41,7 @@ def endat_frame(word: list[int], errors: list[int]) -> list[int]:
 
 def ssi_word(word: list[int], gray: bool, parity: bool) -> list[int]:
     """The bits an SSI encoder sends."""
-    sent = [b ^ a for a, b in zip([0, *word], word)] if gray else list(word)
+    sent = [b ^ a for a, b in zip([0, *word], word, strict=False)] if gray else list(word)
     return [*sent, sum(sent) % 2] if parity else sent
 
 

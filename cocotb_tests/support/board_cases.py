@@ -51,7 +51,7 @@ def forced() -> dict:
         62: {"position_source": 0},
     }
     loop, codes = BoardLoop(drive, writes), []
-    for chunk in loop.run(66):
+    for chunk in loop.run(66):  # noqa: B007  # the last one counts
         codes.append(loop.golden.state.wires.position_code)
     steps = np.diff(codes[30:60]) % (1 << 16)
     latch = loop.golden.state.of_core.of_fault_latch

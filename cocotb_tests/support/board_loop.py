@@ -11,6 +11,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -142,7 +143,7 @@ class BoardLoop:
         words = seen[:, SEEN.index("gate_high")] + 8 * seen[:, SEEN.index("gate_low")]
         ends = np.linspace(0, length, pieces + 1).astype(int)
         currents = [np.array(plant.i_abc)]
-        for begin, end in zip(ends, ends[1:]):
+        for begin, end in pairwise(ends):
             part = words[begin:end]
             at = np.flatnonzero(np.diff(part, prepend=-1))
             seconds = (end - begin) / self.clock_hz

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import pickle
 import signal
@@ -38,10 +39,8 @@ def warm(folder) -> None:
 
 def _hidden(function):
     """An error that the code takes for that of a damaged file, as readers do with every exception."""
-    try:
+    with contextlib.suppress(Exception):
         function()
-    except Exception:
-        pass
 
 
 def _raise(error):

@@ -99,7 +99,7 @@ def matching(pattern: str) -> list[str]:
 
 def _check_target(recording: str) -> None:
     check_address(recording)
-    target = recording.split("::")[-1]
+    target = recording.rsplit("::", maxsplit=1)[-1]
     if protocol_of(target) in HERE and "*" not in target:
         open_regular(fsspec.core.strip_protocol(target)).close()  # an archive may be a FIFO, too
 
@@ -144,7 +144,7 @@ def local(recording: str):
 
 def file_name(address: str) -> str:
     """The name of an address's file, of letters that stay in a folder: the reader needs its suffix."""
-    last = re.split(r"[/\\]", address.split("::")[0].rstrip("/"))[-1]
+    last = re.split(r"[/\\]", address.split("::", maxsplit=1)[0].rstrip("/"))[-1]
     return re.sub(r"[^\w.+@ -]", "_", last)[-MOST_NAME:].lstrip(".") or "recording"
 
 

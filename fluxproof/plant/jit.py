@@ -23,16 +23,16 @@ from numba.core import config
 PACKAGE = Path(__file__).resolve().parent
 SETTINGS: Any = config  # numba makes its attributes at run time
 P = ParamSpec("P")
-R = TypeVar("R", covariant=True)
+R_co = TypeVar("R_co", covariant=True)
 
 
-class Kernel(Protocol[P, R]):
+class Kernel(Protocol[P, R_co]):
     """A compiled function; ``py_func`` is the same as plain Python."""
 
     @property
-    def py_func(self) -> Callable[P, R]: ...
+    def py_func(self) -> Callable[P, R_co]: ...
 
-    def __call__(self, *args: P.args, **kwargs: P.kwargs) -> R: ...
+    def __call__(self, *args: P.args, **kwargs: P.kwargs) -> R_co: ...
 
 
 def _source_hash() -> str:
@@ -74,7 +74,7 @@ SOURCE_HASH = _source_hash()
 CACHE_DIR = _cache_root() / "numba" / SOURCE_HASH
 
 
-def njit(function: Callable[P, R]) -> Kernel[P, R]:
+def njit(function: Callable[P, R_co]) -> Kernel[P, R_co]:
     """Compile a function with numba on first call and keep the result on disk."""
     previous = SETTINGS.CACHE_DIR
     SETTINGS.CACHE_DIR = str(CACHE_DIR)

@@ -99,7 +99,7 @@ def stimuli(rng, config):
         rows.extend(still | writes for _ in range(clocks))
 
     place = 0
-    for k in range(6):
+    for _ in range(6):
         run(1, sample=1, bridge_max=4)
         run(TAKES, bridge_max=4)
     run(1, clear_faults=1)

@@ -130,7 +130,7 @@ class Graph:
             a, b = b, a
         if b == 0 or a == b ^ 1:
             return 0
-        if b == 1 or a == b:
+        if b in (1, a):
             return a
         found = self.made.get((a, b))
         if found is None:
@@ -180,9 +180,9 @@ class Graph:
         """Pairs whose next values differ in structure; those that are one."""
         found = []
         for k, (gold, gate) in enumerate(self.pairs):
-            if value[self.first + gate] == 2 * (self.first + gold):
-                if self._of(self.next[gold], value) != self._of(self.next[gate], value):
-                    found.append(k)
+            merged = value[self.first + gate] == 2 * (self.first + gold)
+            if merged and self._of(self.next[gold], value) != self._of(self.next[gate], value):
+                found.append(k)
         return found
 
     def step(self, value: list[int], free: bool) -> Cut:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import re
 import shutil
@@ -171,8 +172,6 @@ def run_sby(folder: Path, limit: int) -> str:
         except subprocess.TimeoutExpired:
             said = f"DONE (TIMEOUT, rc=8): stopped after {limit + 15} s\n"
         finally:
-            try:
+            with contextlib.suppress(ProcessLookupError):
                 os.killpg(process.pid, signal.SIGKILL)  # its own session: only its children
-            except ProcessLookupError:
-                pass
     return said

@@ -282,4 +282,4 @@ def simulate(drive, course, rng, theta_m=0.0, substeps=1, trace=False):
     run(drive, course, rng.standard_normal((n, 6)), start, duties, substeps, rows, held)
     columns = {"t": np.arange(n) * drive.period_s}
     columns.update((name, rows[:, j]) for j, name in enumerate(ROWS))
-    return columns, dict(zip(TRACE, held.T)) if trace else None
+    return columns, dict(zip(TRACE, held.T, strict=True)) if trace else None

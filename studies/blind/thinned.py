@@ -10,7 +10,7 @@ import argparse
 import sys
 from pathlib import Path
 
-import pyarrow.parquet as parquet
+from pyarrow import parquet
 
 from fluxproof.checkout import BUILD
 from fluxproof.diagnosis.catalogue import CATALOGUE

@@ -34,7 +34,7 @@ def read(path, select=None) -> Table:
         arrays, longest, cells = {}, 0, 0
         for name in names:
             dataset, pick = places[name]
-            longest = max(longest, max(dataset.shape))
+            longest = max(longest, *dataset.shape)
             cells += min(limit, max(dataset.shape))
             check_cells(path, cells, f"data set {shown(dataset.name)}")
             check_readable(dataset, path)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+
 import h5py
 import numpy as np
 from hypothesis import strategies as st
@@ -62,7 +64,5 @@ def warm(folder) -> None:
     for number, (suffix, content) in enumerate(corpus.recordings()):
         path = folder / f"valid{number}{suffix}"
         path.write_bytes(content)
-        try:
+        with contextlib.suppress(RecordingError):
             run(path)
-        except RecordingError:
-            pass

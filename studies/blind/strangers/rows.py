@@ -54,7 +54,7 @@ class Voltages:
             return
         for _ in range(2):
             times, legs = self.carrier(self.period / 2, duties)
-            self.queue += [[t, np.asarray(x, float)] for t, x in zip(times, legs) if t > 0.0]
+            self.queue += [[t, np.asarray(x, float)] for t, x in zip(times, legs, strict=False) if t > 0.0]
 
     def apply(self, plant, seconds):
         """Advance the plant by a time."""
