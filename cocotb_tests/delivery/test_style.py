@@ -11,6 +11,10 @@ import pytest
 
 from fluxproof.checkout import ROOT
 
+LICENCE = "SPDX-License-Identifier: BSD-3-Clause"
+FOLDERS = ("bd", "cocotb_tests", "docs", "fluxproof", "golden_model", "rtl", "scripts", "studies", "tb", "xgui")
+SOURCES = {".c", ".cpp", ".css", ".h", ".html", ".j2", ".py", ".rdl", ".sh", ".sv", ".tcl", ".vhd", ".xdc"}
+
 
 def run(command: list[str]) -> None:
     if shutil.which(command[0]) is None:
@@ -34,3 +38,11 @@ def test_python_style():
 @pytest.mark.slow
 def test_types():
     run(["pyright", "--project", str(ROOT), "--pythonpath", sys.executable])
+
+
+def test_every_source_file_names_its_licence():
+    """In the first line, or in the second below what must be the first."""
+    sources = [f for name in FOLDERS for f in (ROOT / name).rglob("*") if f.suffix in SOURCES]
+    sources += [ROOT / "Makefile", ROOT / ".ci" / "run", ROOT / "fluxproof.core"]
+    assert len(sources) > 900
+    assert [str(f.relative_to(ROOT)) for f in sources if LICENCE not in "".join(f.open().readlines()[:2])] == []

@@ -36,11 +36,11 @@ def c_header(top: AddrmapNode, name: str) -> str:
 
 
 def _portable(text: str) -> str:
-    """Without the attribute `packed`, which lets a compiler store bytes, and with the assertion only where C has it.
+    """With the licence; without the attribute `packed`, which lets a compiler store bytes; the assertion only in C11.
 
     All members are words, so that nothing needs packing; the assertion holds that.
     """
-    lines = []
+    lines = ["// SPDX-License-Identifier: BSD-3-Clause"]
     for line in text.replace(" __attribute__ ((__packed__))", "").splitlines():
         if line.startswith("static_assert"):
             line = f"#if defined(__cplusplus) || __STDC_VERSION__ >= 201112L\n{line}\n#endif"
