@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 # Fluxproof. Every target that needs tools sets them up first (scripts/setup.sh);
 # when everything is there already, that is a comparison of hashes.
 #

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Fluxproof in Python: the plant, the closed loops, the diagnosis of recordings and the commands.
 
 The golden model of the core is the package ``golden_model``.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """``python -m fluxproof``: the same as the command ``fluxproof``."""
 
 import sys

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 r"""Text from a user or a file, written into another language: one function for each language and position.
 
 Each makes text that the language reads back as the same string, or raises DriveError with the character that it cannot

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The registers and generics of fluxproof_board from drive.toml: what its front ends need beside the core's registers.
 
 One function for the Python bus, `fluxproof registers`, the C header of `fluxproof project` and the commissioning.

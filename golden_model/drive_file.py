@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Reads a TOML file into the dataclasses that declare its sections; every error is a message of one line.
 
 A message names the file, the section and the key, and what is allowed: the range, the type, or for an

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """How a key of drive.toml is declared: type, unit and allowed range, written once at the dataclass field.
 
 A section of the file is a frozen dataclass whose fields are made with the functions below; drive_file

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """``@kernel``: a function that runs as plain Python and, compiled by numba, a thousand times faster.
 
 The compiled code is cached on disk.  numba notices a change of the kernel's own file but

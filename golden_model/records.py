@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The records at the core's ports: declared here once, written into fluxproof_pkg.vhd by `make generate`.
 
 * sample_t: what a sample brings: the fields of fluxproof.Sample but ``run``, which the core knows itself.

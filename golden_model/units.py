@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Integers of the core's signals to SI units and back; ``UNITS`` gives the unit of each signal.
 
 The scale of a signal is the value of its LSB: format LSB times base.  Compare values count clocks.

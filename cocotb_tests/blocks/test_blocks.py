@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Every registered block: RTL equal to its model in every bit, model within its bound of the float reference."""
 
 from __future__ import annotations

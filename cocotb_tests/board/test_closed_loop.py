@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """fluxproof_board turns a motor from A/B/Z edges and SPI lines to gates, at every clock as the golden board."""
 
 from __future__ import annotations

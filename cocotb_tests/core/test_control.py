@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The golden drive as a controller: recovery from long saturation, both directions, over the averaged plant."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Limits that hold: what a drive described wrongly or asked for too much ends in, golden core on the switching plant.
 
 The same values go through the VHDL and the converted RTL in the tours of faults and the closed loops.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The texts beside the code: links lead somewhere, section numbers are those of the headings, lists are complete."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Directions of imports: the contract of pyproject.toml is fulfilled, and a violation is detected."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """`fluxproof project`: every file follows the drive file, the clock most of all; the scripts run in the stub."""
 
 from __future__ import annotations

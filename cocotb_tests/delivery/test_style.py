@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """House style: vsg on the VHDL, ruff and pyright on the Python; the same as `make lint`."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Headline, details, advice and doubts: no raw keys, engineering units, and something to do under every verdict."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The improved drive file: values survive a round trip, the core still reads it, trims cancel the sensor errors."""
 
 from __future__ import annotations

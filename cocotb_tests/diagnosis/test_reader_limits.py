@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """A reader takes no more time and memory than the size of the file allows, and its refusal names the reason."""
 
 from __future__ import annotations

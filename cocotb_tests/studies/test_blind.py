@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The blind benchmark: its simulator satisfies flux balance and energy conservation, its seal detects changes."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The sealed generator against physics and against itself, never against the tool: voltages, energy, codes."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The sensitivity of the verdicts to the constants: what is varied, what counts as changed, and the figures."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Absolute encoders as their protocols describe them, one clock at a time, on the far end of a cable.
 
 Nothing here is taken from the RTL or its golden model.  Each model is a function f(memory, clock_line) -> data line;

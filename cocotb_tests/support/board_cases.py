@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Runs of the golden board that end in a fault or use a forced position; as a program: the facts of one as JSON.
 
     NUMBA_DISABLE_JIT=1 python -m cocotb_tests.support.board_cases index_wrong

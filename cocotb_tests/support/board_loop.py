@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """A motor on fluxproof_board, period by period: the golden board, what is wired to its pins, the plant.
 
 What encoder and converters answer depends on the golden board's pins; a device that gets the same inputs and gives the

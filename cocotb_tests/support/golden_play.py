@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The golden model of a clocked block over arrays, row by row; compiled, so that millions of clocks take seconds."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Watches what Python does while a file is read: no code, no import, no process, no network, no file but that one.
 
 Python's audit events report it, also of what a C extension does through Python; not the files that a C library opens by

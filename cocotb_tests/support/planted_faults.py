@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """A target of the fuzzing that does with one byte each what no input may cause, to show that each is noticed."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Registers by name: the protocol that commissioning speaks, and the window of a Zynq through userspace I/O.
 
 A snapshot is one sample of the core: the codes of sensors and encoder, kept by ``take_snapshot``, and the currents,

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """drive.toml with the measured values in place, and commission.json."""
 
 from __future__ import annotations

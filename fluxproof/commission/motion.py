@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Inertia and friction from torque steps, the magnet flux from held speeds, and a point that was not fitted.
 
 Torque steps of i_q both ways, the place of the shaft [electrical rad] from the encoder, integrals over snapshots:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """What the steps share: registers in force, snapshots in SI units, the watch on the currents, the gates."""
 
 from __future__ import annotations

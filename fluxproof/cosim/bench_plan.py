@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Makes the file of a block's bench: its schedule (cosim/schedule.py) as rows for the simulator."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The golden fluxproof_board clock by clock: pins in, pins out; the core's samples as in golden_clock.
 
 The front ends' twins (golden_model/encoders, converters, io) and the clocked part of the core are wired as in

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Closed loop: gate edges switch the plant, the plant's sensors feed the core, the golden model runs in parallel.
 
 The device under test runs one PWM period at a time (see Device): the VHDL in GHDL, its Verilog

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Builds an entity with GHDL and runs a cocotb module on it; the one place that talks to the simulator."""
 
 from __future__ import annotations

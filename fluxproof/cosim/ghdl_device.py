@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The VHDL in GHDL as a device of the closed loop (cosim/closed_loop.py): one period at a time."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The golden core clock by clock: raw samples may enter at any clock, the port values are returned after every clock.
 
 fluxproof.step calculates the values of a sample at once; the clocked part (golden_model/clocked.py) gets them after

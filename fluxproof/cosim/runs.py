@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Runs of the core in parallel with the golden model: the same run in Verilator and in GHDL, each in its own process.
 
 A run is named by the function that makes it (see Named), so that the process that carries it out, a simulator's among

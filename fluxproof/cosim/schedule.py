@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """When the bench drives and compares what: the samples of a block (cosim/stimulus.py) clock by clock.
 
 Samples come back to back and with gaps; inputs are noise before and after the contract wants them; resets come in

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The VHDL files of the core in compile order, found from what they declare and use; no list to keep."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """What the one bench feeds a block: samples, made from the block's declaration and a seed.
 
 Every registered block gets the same treatment: all corner combinations of its ports (sampled where there are too

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Numbers for the samples of a bench: random ones of every size, and ones at which something in the block changes."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Converts the core to one Verilog file, by GHDL 5 or newer only: ``make verilog``.
 
 GHDL 2 converts without a complaint and wrongly (a signed ``shift_right`` loses its sign), so the version is

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Explains why recordings of a real drive differ from its simulation."""
 
 __all__ = ["diagnose"]

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """One operating point: what drifts while it is held, and what a single point cannot separate.
 
 At one point a constant misfit is two numbers, which every effect with two coefficients explains.  Only its change over

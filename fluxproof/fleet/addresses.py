@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Addresses of recordings: which are of this machine, and which protocols may be opened by whose word.
 
 An address that the user types is the user's word.  A manifest may come from a stranger: its addresses reach other

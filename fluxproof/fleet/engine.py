@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Work on all cores of this machine or on a cluster: dask.distributed, with progress and with workers that may die."""
 
 from __future__ import annotations

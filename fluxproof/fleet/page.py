@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """fleet.html: one file, no script, nothing loaded; the style is that of the diagnosis' report."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The report of one recording of a fleet, made when somebody asks for it."""
 
 from __future__ import annotations

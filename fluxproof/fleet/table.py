@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Rows on disk: OUT/rows/KEY.parquet, each written whole or not at all, and OUT/fleet.parquet made of them.
 
 The key is a hash of what a row follows from, so that a later run finds what is done and does again what changed.

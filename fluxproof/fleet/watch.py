@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The limit of time of each item: who runs longer loses its worker process, whatever blocks it."""
 
 from __future__ import annotations

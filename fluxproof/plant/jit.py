@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """`njit` with a cache on disk that follows the whole package.
 
 numba renews a cached function when its own file changes, not when a file that

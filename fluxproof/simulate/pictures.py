@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The pictures of a simulation's report, in the style of the diagnosis' report."""
 
 from __future__ import annotations

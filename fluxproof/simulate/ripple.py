@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The current inside PWM periods, between the samples of a run.
 
 The samples lie in the valley, where the ripple is near zero.  Some periods of a run are therefore computed again from

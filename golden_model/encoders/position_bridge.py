@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """A position code for each sample from an absolute encoder: delay compensated, bad frames bridged, then a trip.
 
     good frame since the last sample:  place(k) = code,  delta(k) = code - place(k-1)

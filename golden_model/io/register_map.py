@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The register map for software: one fixed address for every register, command and status value.
 
 The address of a register is one entry in ``_SETTINGS``; ``registers()`` raises an error for a register without one.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Latches one raw sample, the references and the run state, so that they are constant while it is processed.
 
 Everything that may change at any clock (converter codes, position, references, the gates' running

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """An AXI4-Stream packet for every sample: inputs of the core, its results, and the sample number.
 
 The words of a packet (telemetry_words) are read from the core's live values, delayed by one clock: one word per clock,

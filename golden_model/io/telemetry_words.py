@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The telemetry packet: the layout of its words; one word per clock, read from the core's live values.
 
 ``WORDS`` is the only definition of the packet.  The VHDL twin is generated from it; the reader of a capture and

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Up-down carrier, six gate signals with dead time, enable and latched trip; one step is one clock.
 
 The carrier counts 0 .. CARRIER_HALF-1 and back, each value once per direction: 2*CARRIER_HALF clocks.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """An and-inverter graph that holds a block twice, and what of it can matter for one mutant.
 
 Both halves have their registers in pairs.  As long as all pairs are equal, the mutant behaves like the block: it is

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """One run of the solver: converts the VHDL, writes the job of sby, runs it within a time limit, reads the result."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 # Sourced by scripts/setup.sh: what each target of the Makefile uses, in words (bash).
 #
 #   a group of Python packages   each has its list in requirements/ (pyproject.toml says what it is for)

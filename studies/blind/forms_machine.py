@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Effects of machine, inverter and shaft, in the catalogue's form and in others (registry.py)."""
 
 from __future__ import annotations

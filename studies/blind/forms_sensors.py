@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Effects of sensors and sampling, in the catalogue's form and in others (registry.py).
 
 Signs: measured = true (1 + gain) + offset, for angles measured = true + offset, for the bus measured =

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Whether names stated with a confidence p are right in a share p of the cases."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Switching-level simulation of a drive with field-oriented control; the benchmark's own physics.
 
 State: stator flux linkage in the stator frame, speed, angle.  d psi/dt = C(v_leg - R_x i_x), with the legs'

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """`make demo`: Fig. 9 of paper 001 with the RTL in the loop, and a real recording through the same core.
 
 In Verilator the RTL, converted to Verilog, runs Fig. 9 at the drive's own clock and the whole recording; beside it

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """What to do next, in one or two sentences for each verdict.
 
 complete(answer, nominal, effects)  # sets details, advice, and adds notes

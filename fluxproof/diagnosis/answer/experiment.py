@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Choice of a few operating points that together separate tied explanations best (optimal experiment design).
 
 The distance of two fixed predictions overestimates the separation, since a rival is refitted to the new points.  The

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The flux map that a diagnosis found: the nominal flux linkage and that of the named magnetic effects, as a table.
 
     write_flux_map(answer, out)     # OUT/flux_map.csv, if a named effect bends the flux; returns its path or None

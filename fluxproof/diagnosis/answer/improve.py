@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """drive_improved.toml: the nominal drive file with the identified effects.
 
 The file keeps the text of the original; a changed line states the old value and the effect.  Values for which the

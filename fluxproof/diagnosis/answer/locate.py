@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Location of the misfit: signal, harmonic orders, and regions of speed, current, temperature, bus and time."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Which effects are named, which stay open, and with what confidence.
 
 The posterior compares sets of effects.  Where much of the misfit is left, something unknown is at work, and a part of

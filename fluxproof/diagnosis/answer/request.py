@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The next recording: operating points that separate tied explanations best, also after a rival is refitted."""
 
 from __future__ import annotations

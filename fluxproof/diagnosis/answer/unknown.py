@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The single term that describes best what no effect of the catalogue explains.
 
 Each term of a generic dictionary (harmonic order times a function of the operating point) is regressed on the residual

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Cuts a recording into blocks of equal length in which current and speed are steady.
 
 Angles are moving averages over 2 HALF_WIDTH + 1 samples, in the misfit too: the rotor moves smoothly, unlike the codes

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Several recordings of one drive as one view, and how far drifts have gone in each of them."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Which blocks share an operating point, and when the flux linkage of such points changed at once."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Rows of the balance as complex amplitudes of one order, a value for each block."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Rows that are operating points, as stretches; rows of a long operating point are averaged.
 
 If most rows of a log resemble a neighbour, the others are transients and are left out.

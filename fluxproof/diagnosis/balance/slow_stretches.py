@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Steady stretches of a slow log, for which a voltage balance can be made although samples are far apart.
 
 A slow log, such as that of a CAN bus, holds every value until the next message or interpolates between two messages.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """A View of a slow log: every steady stretch becomes one block, which represents an operating point.
 
 The rows of such a block are synthetic: constant current, voltage and speed over a few sampling periods, so that cells,

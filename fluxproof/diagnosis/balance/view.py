@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Blocks of rows at steady operating points, from which every effect computes its columns.
 
 Row k of a block is the interval from sample k to k+1.  The current of a regressor is a parabola over the block: the

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Voltage loss of the inverter: dead time and device drops, and how both vanish near zero current."""
 
 from collections.abc import Callable

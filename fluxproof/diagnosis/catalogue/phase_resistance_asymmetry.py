@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Unequal phase resistances."""
 
 import numpy as np

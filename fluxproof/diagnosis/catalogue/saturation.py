@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Self-saturation: psi_d = f(i_d), psi_q = g(i_q), g odd; the curves are free."""
 
 import numpy as np

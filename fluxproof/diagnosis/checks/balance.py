@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """How well the nominal machine fits the recording, with or without a change to its columns (not itself a check).
 
 For consecutive rows, with space vectors in the stator frame,

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Derive missing columns from others: speed from angle, a phase current from the other two, the bus voltage.
 
 Columns of zeros (channels that were logged but not connected) count as missing.

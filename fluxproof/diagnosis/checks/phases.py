@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Swapped phases, reversed sensors, wrong rotation direction: the interpretation that the nominal machine fits is used.
 
 Every single change to the columns is tested with the nominal balance.  A change is accepted only if the recording does

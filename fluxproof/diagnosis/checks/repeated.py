@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Samples that were dropped or written twice although the time advances evenly, found from the angle.
 
 The angle advances evenly.  A row in which it advances twice as far as before and after, or not at all with all

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """How well the nominal machine fits steady dq values that are read otherwise (conventions/; not itself a check).
 
 A check must not correct what a reading explains as well: currents with the wrong sign are no frame that is turned.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Wrong units that the magnitude of the values reveals: duties in percent, milliamps, millivolts, kelvin.
 
 Values are compared with the rated values of drive.toml, with a margin of a factor of 20.  If they exceed it and no

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Angles in degrees or turns, angles and speeds of the shaft, speeds in rpm: recognised by the fit and converted.
 
 Each unit of the angle is tested with the nominal stator balance; each unit of the speed with the advance of the angle,

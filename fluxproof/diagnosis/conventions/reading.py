@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """One way to read a recording or a drive file otherwise than documented."""
 
 from __future__ import annotations

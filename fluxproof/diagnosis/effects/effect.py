@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Base class of the catalogue's effects, and the four ways in which physics enters the voltage balance.
 
 The misfit of a channel is the recorded value minus the one that the nominal drive needs:

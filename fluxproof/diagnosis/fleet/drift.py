@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Change of a parameter over the recordings of one serial number: rate, when it was noticed, when it reaches a limit.
 
     x_k = a + b t_k + e_k,   e_k ~ N(0, (g s_k)^2),   g >= 1

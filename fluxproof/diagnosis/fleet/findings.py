@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """What a fleet says, design by design: rates, populations, outliers, drifts, groups."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Recordings with the same unexplained remainder: an unknown effect that is seen often is a discovery.
 
 The signature of a remainder is a vector with a place for each signal and signed electrical order, whose squares are the

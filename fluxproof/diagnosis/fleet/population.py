@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Mean, spread and shrunk values of a parameter over the drives of one design.
 
 Drive i has the true value theta_i ~ N(mu, tau^2); its recordings say x_i with the standard deviation s_i.  A drive that

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """A diagnosis as a row of fleet.parquet: what follows from recording and drive file alone (schema.py)."""
 
 from __future__ import annotations

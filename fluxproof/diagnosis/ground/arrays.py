@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Types of arrays whose elements matter to the reader: a complex one has two axes, d and q."""
 
 import numpy as np

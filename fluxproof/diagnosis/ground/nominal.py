@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The nominal drive: the parameters of the simulation, read from drive.toml.
 
 Every key of the core's drive.toml is accepted, but only those that the balance needs are required, so

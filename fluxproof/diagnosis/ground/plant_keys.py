@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The keys of the plant by section, their values from an effect or from [plant.*] of a drive file, and the flux map.
 
 The names are those of plant.Machine, plant.Inverter, plant.Sensors and of Timing below.  Where a section of the core

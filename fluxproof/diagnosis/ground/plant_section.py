@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The plant that a drive file describes: drive.toml with its [plant.*] sections.
 
 The core's own sections describe the machine and the inverter.  [sensors] describes the sensors as the core assumes

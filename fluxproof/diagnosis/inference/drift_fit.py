@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The fit of drifts at one operating point: the change of the misfit over time and of every effect's columns.
 
 The mean over time is subtracted from both, after which an effect that does not drift has no columns left.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The marginal likelihood of a set of effects, with the sizes of the effects and of the discrepancy learnt.
 
     y = X c + d + q + e,   e ~ N(0, s^2),   d ~ N(0, (lambda_g l)^2),   q ~ N(0, (mu_g w)^2),   c_k ~ N(0, (a_e p_k)^2)

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The rows of a balance, condensed: one mean per functional and operating point, and what differs between visits to it.
 
 A *functional* is one harmonic of one channel in one axis.  What no model has (the *discrepancy*) repeats in every

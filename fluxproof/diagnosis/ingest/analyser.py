@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The table of a power analyser as dq values: a row per operating point, without an angle.
 
     u_line p_el          line-to-line voltage (fundamental) and electric power of the machine

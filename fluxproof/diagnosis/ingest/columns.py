@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Assigns file columns to canonical columns and units: by drive.toml first, then by known names.
 
 A column that the file lacks may be a constant of drive.toml (constants.py).

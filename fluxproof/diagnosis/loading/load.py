@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Load a file as a checked canonical recording: read, map the columns, check.
 
     recording = load_recording("log.csv", load_nominal("drive.toml"))

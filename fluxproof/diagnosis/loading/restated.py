@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """A drive file whose sample time is off by two, or with wrong pole pairs: the recording is read again with the right
 ones.
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Closed-loop simulations for comparison with the recording, of the drive as described and of the improved one.
 
 The controller hides an effect from the currents, in the drive and in the simulation; the signal to compare is the

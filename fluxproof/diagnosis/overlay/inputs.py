@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Inputs of the overlay simulation: stretches of a recording with the signals that drive the simulation."""
 
 from __future__ import annotations

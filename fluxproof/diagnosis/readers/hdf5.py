@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """HDF5 files: every numeric data set of the common length is a column, in any group.
 
 The last part of a data set's path is its name if that is unique.  Units come from an attribute "unit" or "units";

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """What an HDF5 file contains, found without following it anywhere else (not itself a reader).
 
 h5py would open other files that a link, an external data set or a virtual one names, and load a plugin for a filter

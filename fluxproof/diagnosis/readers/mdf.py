@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """MDF measurement files (.mf4, .mdf), read with asammdf.
 
 Channels on several rasters are resampled to one: that of the requested channel with the most samples, which in a

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """CSV and other text tables: any separator, decimal point or comma, header with units, comments, no header.
 
 pandas reads the numbers; sniff.py finds the layout.  Without a header the columns are called "1", "2", ...

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The cause of a difference between replay and recording: a search over single wrong bits or register digits.
 
 The recorded values show where the difference appears; its origin may be hidden, because the core does not output every

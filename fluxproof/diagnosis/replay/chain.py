@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The golden model over recorded samples, compared with ``==``, compiled: a million samples take about a second."""
 
 from __future__ import annotations

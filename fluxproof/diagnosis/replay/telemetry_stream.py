@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Converts a captured telemetry stream to a dump: the words of the core's AXI4-Stream packets as a DMA stores them.
 
     fluxproof dump capture.bin --drive drive.toml [--registers registers.json] [-o run.fluxdump]

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Bar charts: the fit before and after, and the share of the misfit that each named effect explains."""
 
 from __future__ import annotations

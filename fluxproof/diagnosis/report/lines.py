@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Line charts: misfit over time, harmonic orders.
 
 The arrays are those of diagnosis.result.Evidence; a drawing function raises KeyError if one is missing.

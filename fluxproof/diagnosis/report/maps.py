@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Heat maps of the misfit: over electrical angle and current, and over the speed-current plane.
 
 The colour of a cell is the rms over its rows k of sqrt(e_d(k)^2 + e_q(k)^2), the magnitude of the dq misfit;

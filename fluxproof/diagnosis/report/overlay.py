@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The picture of the closed-loop simulation laid over the recording."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """All pictures of a report, and the reason for each one that cannot be drawn."""
 
 from __future__ import annotations

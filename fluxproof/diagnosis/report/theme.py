@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Common style of all pictures, light and dark: colours are roles, which the page's style sheet defines.
 
 A figure is drawn with the light colours; in its SVG each becomes a CSS variable, so that the same picture

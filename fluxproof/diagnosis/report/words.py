@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Texts of the report: the meaning of a verdict, formatted numbers and units, the description of an effect."""
 
 from __future__ import annotations

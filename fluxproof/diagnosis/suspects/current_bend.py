@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Current sensors that are no longer linear towards full scale, as behind a core or an amplifier that saturates."""
 
 import numpy as np

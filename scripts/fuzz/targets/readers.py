@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Recordings of every format: read whole, and with the columns of a drive."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """One recording: the healthy drive of a drive file, and the columns that the simulation gives."""
 
 from __future__ import annotations

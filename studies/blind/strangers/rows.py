@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """One recording: plan, closed loop, columns."""
 
 from __future__ import annotations
