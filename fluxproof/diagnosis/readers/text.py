@@ -173,7 +173,8 @@ def _take(table: Table, name: str, column: _Column) -> None:
         return
     table.columns[name] = column.numbers
     words = np.flatnonzero(column.words)
-    if len(words) and table.lines is not None:
+    if len(words):
+        assert table.lines is not None  # a text file has them
         row = int(words[0])
         table.problems.append(
             Problem(
